@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <source_location>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace af {
+
+/// Process exit codes that users and scripts rely on.
+enum class ExitCode : int {
+  Done = 0,
+  Usage = 2,
+  Input = 3,
+  File = 4,
+  Numeric = 5,
+  Internal = 6,
+  Stopped = 75,  ///< stopped on request, progress saved: run the same command again
+};
+
+/// Base of all errors the project throws on purpose; carries the exit code that app_main returns.
+class Error : public std::runtime_error {
+ public:
+  [[nodiscard]] ExitCode exit_code() const noexcept { return exit_code_; }
+
+ protected:
+  Error(ExitCode exit_code, const std::string& message)
+      : std::runtime_error(message), exit_code_(exit_code) {}
+
+ private:
+  ExitCode exit_code_;
+};
+
+/// The command line itself is wrong (unknown combination, missing option).
+class UsageError : public Error {
+ public:
+  explicit UsageError(const std::string& message) : Error(ExitCode::Usage, message) {}
+};
+
+/// Readable but unacceptable input: names field, value, constraint and, when there is one, file
+/// (and line).
+class InputError : public Error {
+ public:
+  explicit InputError(const std::string& message) : Error(ExitCode::Input, message) {}
+  /// Message "file: field = value: constraint"; an empty file is left out.
+  InputError(const std::string& field,
+             const std::string& value,
+             const std::string& constraint,
+             const std::string& file = "");
+};
+
+/// A file cannot be parsed, is truncated, fails its checksum or belongs to another CT or camera.
+class FileError : public Error {
+ public:
+  FileError(const std::string& path, const std::string& what_is_wrong);
+  /// Message "path: object: expected E, found F".
+  FileError(const std::string& path,
+            const std::string& object,
+            const std::string& expected,
+            const std::string& found);
+};
+
+/// Numerics failed (NaN, codebook beyond repair).
+class NumericError : public Error {
+ public:
+  explicit NumericError(const std::string& message) : Error(ExitCode::Numeric, message) {}
+};
+
+/// Stopped by SIGUSR1 or a time limit with progress saved.
+class StoppedError : public Error {
+ public:
+  explicit StoppedError(const std::string& message) : Error(ExitCode::Stopped, message) {}
+};
+
+/// A broken promise of the caller (a defect, not bad input); becomes exit code 6.
+void check(bool condition,
+           const char* message,
+           std::source_location where = std::source_location::current());
+
+/// Throws one InputError that lists all problems, or does nothing when there is none.
+void throw_if_any(const std::vector<std::string>& problems, const std::string& file = "");
+
+}  // namespace af

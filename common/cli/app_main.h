@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "parallel/communicator.h"
+
+namespace af::cli {
+
+/// The skeleton of every program: starts MPI, parses the command line (on every rank alike; help
+/// and usage errors are printed by rank 0 only), runs `run`, and turns every exception into one
+/// message and the contract's exit code. When one rank alone fails inside MPI the whole job is
+/// ended.
+///
+///     int main(int argc, char** argv) {
+///       Options options;
+///       CLI::App app{"what the program does"};
+///       bind_options(app, options);
+///       return af::cli::app_main(app, argc, argv, [&](const Communicator& world) { return
+///       run(options, world); });
+///     }
+///
+/// `run` returns normally for exit code 0.
+int app_main(CLI::App& app,
+             int argc,
+             char** argv,
+             const std::function<void(const Communicator&)>& run);
+
+/// The command line as typed, quoted for a shell; goes into every output and reproduce.sh.
+std::string command_line(int argc, char** argv);
+
+/// Information for the person at the terminal, on standard error, from rank 0 only. Results go to
+/// standard output.
+void info(const Communicator& communicator, const std::string& message);
+void warn(const Communicator& communicator, const std::string& message);
+
+}  // namespace af::cli

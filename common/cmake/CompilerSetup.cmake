@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: Apache-2.0
+# One interface target carries warnings and code generation for all first-party code, and one function
+# compiles a kernel source once per vector width.
+
+add_library(af_compile_options INTERFACE)
+target_compile_options(
+  af_compile_options
+  INTERFACE -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wshadow -Wdouble-promotion
+            $<$<BOOL:${AF_WERROR}>:-Werror>
+            # GCC 12 reports std::string operator+ falsely (GCC bug 105651).
+            -Wno-restrict
+            # One binary for every x86-64 node: SSE4.2 baseline, wider only in kernels chosen at run time.
+            -march=x86-64-v2
+            # Same bits on every vector width: the compiler may not fuse a multiply with an add.
+            -ffp-contract=off)
+target_include_directories(af_compile_options INTERFACE ${PROJECT_SOURCE_DIR} ${PROJECT_SOURCE_DIR}/common)
+
+if(AF_SANITIZE)
+  list(TRANSFORM AF_SANITIZE PREPEND -fsanitize= OUTPUT_VARIABLE af_sanitize_flags)
+  add_compile_options(${af_sanitize_flags} -fno-omit-frame-pointer)
+  add_link_options(${af_sanitize_flags})
+endif()
+
+# af_add_library(<name> SOURCES ... [PUBLIC libs...] [PRIVATE libs...])
+function(af_add_library name)
+  cmake_parse_arguments(arg "" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  add_library(${name} STATIC ${arg_SOURCES})
+  target_link_libraries(${name} PUBLIC ${arg_PUBLIC} PRIVATE af_compile_options ${arg_PRIVATE})
+  target_include_directories(${name} PUBLIC ${PROJECT_SOURCE_DIR} ${PROJECT_SOURCE_DIR}/common)
+endfunction()
+
+# af_add_program(<name> SOURCES ... LIBS ...): an executable that is installed.
+function(af_add_program name)
+  cmake_parse_arguments(arg "" "" "SOURCES;LIBS" ${ARGN})
+  add_executable(${name} ${arg_SOURCES})
+  target_link_libraries(${name} PRIVATE af_compile_options ${arg_LIBS})
+  set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/bin)
+  install(TARGETS ${name} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+endfunction()
+
+# af_add_kernel(<target> <source>): compiles <source> three times, for 128, 256 and 512 bit vectors, and links the
+# objects into <target>. The source sees AF_VECTOR_BITS and puts its code into namespace AF_KERNEL_NAMESPACE. It may
+# include neither Eigen nor standard library templates: an inline function compiled here for AVX-512 could be the copy
+# that the linker keeps for everyone.
+function(af_add_kernel target source)
+  set(flags_128 "")
+  set(flags_256 -mavx2 -mbmi -mbmi2 -mf16c)
+  set(flags_512 ${flags_256} -mavx512f -mavx512bw -mavx512dq -mavx512vl -mavx512cd -mprefer-vector-width=512)
+  get_filename_component(stem ${source} NAME_WE)
+  foreach(bits 128 256 512)
+    set(object ${target}_${stem}_${bits})
+    add_library(${object} OBJECT ${source})
+    target_compile_definitions(${object} PRIVATE AF_VECTOR_BITS=${bits} AF_KERNEL_NAMESPACE=kernels_${bits})
+    # -Wno-psabi: 512-bit vector types only pass between inlined functions.
+    target_compile_options(${object} PRIVATE $<$<CONFIG:Debug>:-O2> -fno-trapping-math -Wno-psabi ${flags_${bits}})
+    target_link_libraries(${object} PRIVATE af_compile_options)
+    target_sources(${target} PRIVATE $<TARGET_OBJECTS:${object}>)
+  endforeach()
+endfunction()

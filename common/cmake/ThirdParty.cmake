@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: Apache-2.0
+# Every third party is found here, once. None is put on a global include path: a target that does not name MPI, HDF5 or
+# ITK cannot include their headers.
+
+find_package(Threads REQUIRED)
+find_package(Eigen3 3.4 REQUIRED NO_MODULE)
+find_package(CLI11 REQUIRED)
+find_package(spdlog REQUIRED)
+find_package(nlohmann_json REQUIRED)
+find_package(MPI REQUIRED COMPONENTS C)
+find_package(OpenSSL REQUIRED COMPONENTS Crypto)
+find_package(PkgConfig REQUIRED)
+pkg_check_modules(tomlplusplus REQUIRED IMPORTED_TARGET tomlplusplus)
+pkg_check_modules(cairo REQUIRED IMPORTED_TARGET cairo)
+
+# Parallel HDF5 strictly by its own pkg-config file, so that ITK's serial HDF5 can never take its place.
+pkg_check_modules(hdf5_openmpi REQUIRED IMPORTED_TARGET hdf5-openmpi)
+
+# ITK's package file walks all its modules even when components are named; these three would fetch serial HDF5 and other
+# libraries into global variables. The names are ITK's own include guards (ITK internals, tried with 5.2 and 5.3).
+set(ITKHDF5_LOADED 1)
+set(ITKDCMTK_LOADED 1)
+set(ITKMINC_LOADED 1)
+find_package(
+  ITK 5.2 REQUIRED
+  COMPONENTS ITKCommon
+             ITKIOImageBase
+             ITKImageIntensity
+             ITKImageGrid
+             ITKIOGDCM
+             ITKIONIFTI
+             ITKIONRRD
+             ITKIOMeta
+             ITKIOPNG
+             ITKIOTIFF
+             ITKIOTransformInsightLegacy)

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+
+#include "drr/drr_renderer.h"
+#include "field/compressed_attenuation_field.h"
+
+namespace af {
+
+enum class FieldInterpolation { Nearest, Quadrilinear };
+
+/// DRRs by look-up in a compressed field (Sec. II-B): each ray's (u,v,s,t) per slab, nearest node
+/// or quadrilinear over 16 neighbours, decoded straight from the codebook; slabs' contributions
+/// add. \test AfDrr.ReproducesMultilinearFieldExactly
+class AfDrr final : public DrrRenderer {
+ public:
+  explicit AfDrr(std::shared_ptr<const CompressedAttenuationField> field,
+                 FieldInterpolation interpolation = FieldInterpolation::Quadrilinear);
+
+  RenderStatus render(const RigidTransform& room_from_ct,
+                      const View& view,
+                      RenderWorkspace& workspace,
+                      std::span<float> total_attenuation,
+                      const std::optional<PoseGradients>& gradients = std::nullopt) const override;
+  [[nodiscard]] std::unique_ptr<RenderWorkspace> make_workspace() const override;
+  [[nodiscard]] const char* name() const override { return "field"; }
+  [[nodiscard]] const CompressedAttenuationField& field() const { return *field_; }
+
+ private:
+  std::shared_ptr<const CompressedAttenuationField> field_;
+  FieldInterpolation interpolation_;
+};
+
+}  // namespace af

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+
+#include "geometry/camera_geometry.h"
+#include "geometry/rigid_transform.h"
+#include "image/image2d.h"
+
+namespace af {
+
+/// What is rendered: a region of one camera's detector.
+struct View {
+  CameraGeometry camera;
+  RegionOfInterest roi;  ///< pixels of the detector, not scaled
+
+  /// The whole detector of a camera.
+  static View whole_detector(const CameraGeometry& camera);
+  [[nodiscard]] std::size_t pixel_count() const { return roi.pixel_count(); }
+};
+
+/// Request for pose derivatives: six planes of pixel_count() values, dU/d(rx, ry, rz) per rad, then
+/// dU/d(tx, ty, tz) per mm, of x_room -> p + t + Rz Ry Rx (x_room - p) applied after room_from_ct,
+/// at zero, p being `pivot_room_point`.
+struct PoseGradients {
+  Eigen::Vector3d pivot_room_point = Eigen::Vector3d::Zero();
+  std::span<float> planes;
+};
+
+struct RenderStatus {
+  std::int64_t rays_outside = 0;  ///< rays that miss the field's planes; their pixels are 0
+
+  [[nodiscard]] bool is_inside() const { return rays_outside == 0; }
+};
+
+/// Scratch memory of one thread; made by the renderer it is used with.
+class RenderWorkspace {
+ public:
+  virtual ~RenderWorkspace() = default;
+};
+
+/// Makes DRRs of one CT for one camera. Every comparison of fields with ray casting is a swap of
+/// this object. render() is const and re-entrant with one workspace per thread; results do not
+/// depend on threads or vector width.
+class DrrRenderer {
+ public:
+  virtual ~DrrRenderer() = default;
+
+  /// Total attenuation of every ray of the view, dimensionless, row-major over view.roi, into
+  /// `total_attenuation` (view.pixel_count() values). Never extrapolates: rays outside are counted
+  /// and their pixels are 0.
+  virtual RenderStatus render(
+      const RigidTransform& room_from_ct,
+      const View& view,
+      RenderWorkspace& workspace,
+      std::span<float> total_attenuation,
+      const std::optional<PoseGradients>& gradients = std::nullopt) const = 0;
+
+  [[nodiscard]] virtual std::unique_ptr<RenderWorkspace> make_workspace() const = 0;
+
+  /// "field" or "raycast", as in result tables.
+  [[nodiscard]] virtual const char* name() const = 0;
+};
+
+/// Convenience for tools: renders into a fresh image. `rays_outside`, when given, receives the
+/// count.
+Image2d render_image(const DrrRenderer& renderer,
+                     const RigidTransform& room_from_ct,
+                     const View& view,
+                     std::int64_t* rays_outside = nullptr);
+
+/// Derivatives by central differences of render() (steps 1e-3 rad, 0.1 mm... see the definition):
+/// for renderers without analytic ones, and the oracle of those with them.
+RenderStatus central_difference_gradients(const DrrRenderer& renderer,
+                                          const RigidTransform& room_from_ct,
+                                          const View& view,
+                                          RenderWorkspace& workspace,
+                                          const PoseGradients& gradients);
+
+}  // namespace af

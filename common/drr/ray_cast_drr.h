@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+
+#include "drr/drr_renderer.h"
+#include "volume/ray_caster.h"
+
+namespace af {
+
+/// DRRs by the reference ray caster; no ray is ever outside.
+class RayCastDrr final : public DrrRenderer {
+ public:
+  explicit RayCastDrr(std::shared_ptr<const AttenuationVolume> volume,
+                      const RayCasterOptions& options = {});
+
+  RenderStatus render(const RigidTransform& room_from_ct,
+                      const View& view,
+                      RenderWorkspace& workspace,
+                      std::span<float> total_attenuation,
+                      const std::optional<PoseGradients>& gradients = std::nullopt) const override;
+  [[nodiscard]] std::unique_ptr<RenderWorkspace> make_workspace() const override;
+  [[nodiscard]] const char* name() const override { return "raycast"; }
+
+ private:
+  std::shared_ptr<const AttenuationVolume> volume_;
+  RayCaster caster_;
+};
+
+/// The fan of rays (ct frame) that a view sees at a pose.
+RayFan ray_fan(const RigidTransform& room_from_ct, const View& view);
+
+}  // namespace af

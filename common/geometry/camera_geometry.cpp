@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "geometry/camera_geometry.h"
+
+#include <cmath>
+#include <set>
+#include <sstream>
+
+#include <Eigen/Dense>
+
+#include "base/error.h"
+
+namespace af {
+
+namespace {
+
+template <typename Vector>
+std::string text_of(const Vector& vector) {
+  std::ostringstream out;
+  out << '[';
+  for (Eigen::Index i = 0; i < vector.size(); ++i) out << (i > 0 ? ", " : "") << vector[i];
+  out << ']';
+  return out.str();
+}
+
+/// K and R of M = K R with K upper triangular with positive diagonal (RQ decomposition by QR of the
+/// reversed matrix).
+struct RqFactors {
+  Eigen::Matrix3d intrinsics;
+  Eigen::Matrix3d camera_from_room;
+};
+
+RqFactors rq_decomposition(const Eigen::Matrix3d& matrix) {
+  const Eigen::Matrix3d reversal =
+      Eigen::Vector3d::Ones().asDiagonal().toDenseMatrix().rowwise().reverse();
+  const Eigen::HouseholderQR<Eigen::Matrix3d> qr((reversal * matrix).transpose());
+  const Eigen::Matrix3d q = qr.householderQ();
+  const Eigen::Matrix3d upper = qr.matrixQR().triangularView<Eigen::Upper>();
+  Eigen::Matrix3d intrinsics = reversal * upper.transpose() * reversal;
+  Eigen::Matrix3d rotation = reversal * q.transpose();
+  for (int i = 0; i < 3; ++i) {
+    if (intrinsics(i, i) >= 0.0) continue;
+    intrinsics.col(i) *= -1.0;
+    rotation.row(i) *= -1.0;
+  }
+  return {intrinsics, rotation};
+}
+
+}  // namespace
+
+Eigen::Vector3d CameraGeometry::detector_point(double column, double row) const {
+  return detector_origin_point + column * pixel_spacing_mm.x() * column_direction +
+         row * pixel_spacing_mm.y() * row_direction;
+}
+
+Ray CameraGeometry::ray(double column, double row) const {
+  return {source_point, (detector_point(column, row) - source_point).normalized()};
+}
+
+Eigen::Vector2d CameraGeometry::project(const Eigen::Vector3d& room_point) const {
+  const double scale = source_detector_distance_mm() / depth_mm(room_point);
+  const Eigen::Vector3d from_origin =
+      source_point + scale * (room_point - source_point) - detector_origin_point;
+  return {from_origin.dot(column_direction) / pixel_spacing_mm.x(),
+          from_origin.dot(row_direction) / pixel_spacing_mm.y()};
+}
+
+Eigen::Vector3d CameraGeometry::beam_direction() const {
+  const Eigen::Vector3d normal = column_direction.cross(row_direction).normalized();
+  return is_mirrored() ? Eigen::Vector3d(-normal) : normal;
+}
+
+double CameraGeometry::source_detector_distance_mm() const {
+  return (detector_origin_point - source_point).dot(beam_direction());
+}
+
+double CameraGeometry::depth_mm(const Eigen::Vector3d& room_point) const {
+  return (room_point - source_point).dot(beam_direction());
+}
+
+bool CameraGeometry::is_mirrored() const {
+  return column_direction.cross(row_direction).dot(detector_origin_point - source_point) < 0.0;
+}
+
+std::array<Eigen::Vector3d, 4> CameraGeometry::detector_corner_points() const {
+  const double last_column = size_px.x() - 0.5;
+  const double last_row = size_px.y() - 0.5;
+  return {detector_point(-0.5, -0.5),
+          detector_point(last_column, -0.5),
+          detector_point(-0.5, last_row),
+          detector_point(last_column, last_row)};
+}
+
+CameraGeometry CameraGeometry::from_projection_matrix(
+    const std::string& name,
+    const Eigen::Matrix<double, 3, 4>& pixels_from_room,
+    const Eigen::Vector2d& pixel_spacing_mm,
+    const Eigen::Vector2i& size_px,
+    const Eigen::Vector3d& isocenter_point) {
+  const std::string field = "camera '" + name + "': projection_matrix";
+  Eigen::Matrix<double, 3, 4> projection = pixels_from_room;
+  if (!projection.allFinite()) throw InputError(field + " has values that are not finite");
+  const Eigen::Vector4d isocenter(
+      isocenter_point.x(), isocenter_point.y(), isocenter_point.z(), 1.0);
+  if ((projection.row(2) * isocenter).value() < 0.0) projection *= -1.0;
+  const Eigen::Matrix3d left = projection.leftCols<3>();
+  const double row_norm = left.row(2).norm();
+  if (!(std::abs(left.determinant()) > 1e-12 * std::pow(left.norm(), 3)) || !(row_norm > 0.0))
+    throw InputError(field + " is singular: its left 3x3 part must be invertible");
+
+  RqFactors factors = rq_decomposition(left / row_norm);
+  factors.intrinsics /= factors.intrinsics(2, 2);
+  const double focal_column_px = factors.intrinsics(0, 0);
+  const double focal_row_px = factors.intrinsics(1, 1);
+  // The depth direction of the camera must be the direction of growing w; RQ keeps it, since K(2,2)
+  // > 0.
+  const Eigen::Vector3d depth_direction = factors.camera_from_room.row(2);
+  constexpr double kSkewTolerance = 1e-6;
+  if (std::abs(factors.intrinsics(0, 1)) > kSkewTolerance * focal_column_px)
+    throw InputError(field,
+                     "skew of " + std::to_string(factors.intrinsics(0, 1)) + " px",
+                     "pixel columns and rows must be orthogonal");
+  const double distance_column_mm = focal_column_px * pixel_spacing_mm.x();
+  const double distance_row_mm = focal_row_px * pixel_spacing_mm.y();
+  constexpr double kAspectTolerance = 1e-2;
+  if (std::abs(distance_column_mm - distance_row_mm) > kAspectTolerance * distance_column_mm)
+    throw InputError(field,
+                     "focal lengths " + std::to_string(focal_column_px) + " and " +
+                         std::to_string(focal_row_px) + " px",
+                     "must agree with pixel_spacing_mm to 1 %");
+
+  CameraGeometry camera;
+  camera.name = name;
+  camera.size_px = size_px;
+  camera.source_point = -left.inverse() * projection.col(3);
+  camera.column_direction = factors.camera_from_room.row(0);
+  camera.row_direction = factors.camera_from_room.row(1);
+  // The stated spacings fix the detector's distance; their ratio is corrected to the matrix, which
+  // is the calibration.
+  camera.pixel_spacing_mm = {pixel_spacing_mm.x(), distance_column_mm / focal_row_px};
+  camera.detector_origin_point =
+      camera.source_point + distance_column_mm * depth_direction -
+      factors.intrinsics(0, 2) * camera.pixel_spacing_mm.x() * camera.column_direction -
+      factors.intrinsics(1, 2) * camera.pixel_spacing_mm.y() * camera.row_direction;
+  return camera;
+}
+
+std::vector<std::string> problems(const CameraGeometry& camera) {
+  constexpr double kUnitTolerance = 1e-5;
+  std::vector<std::string> found;
+  const auto add =
+      [&](const std::string& key, const std::string& value, const std::string& constraint) {
+        found.push_back("camera '" + camera.name + "': " + key + " = " + value + ": " + constraint);
+      };
+  if (camera.name.empty()) add("name", "\"\"", "must not be empty");
+  if (!camera.source_point.allFinite())
+    add("source_point", text_of(camera.source_point), "must be finite");
+  if (!camera.detector_origin_point.allFinite())
+    add("detector_origin_point", text_of(camera.detector_origin_point), "must be finite");
+  const bool column_unit = std::abs(camera.column_direction.norm() - 1.0) < kUnitTolerance;
+  const bool row_unit = std::abs(camera.row_direction.norm() - 1.0) < kUnitTolerance;
+  if (!column_unit) add("column_direction", text_of(camera.column_direction), "must have length 1");
+  if (!row_unit) add("row_direction", text_of(camera.row_direction), "must have length 1");
+  if (column_unit && row_unit) {
+    const double cosine = camera.column_direction.dot(camera.row_direction);
+    if (!(std::abs(cosine) < kUnitTolerance))
+      add("row_direction",
+          text_of(camera.row_direction),
+          "must be orthogonal to column_direction " + text_of(camera.column_direction));
+    else if (!(std::abs(camera.source_detector_distance_mm()) > 1e-3))
+      add("source_point", text_of(camera.source_point), "must not lie on the detector plane");
+  }
+  if (!(camera.pixel_spacing_mm.minCoeff() > 0.0) || !camera.pixel_spacing_mm.allFinite())
+    add("pixel_spacing_mm", text_of(camera.pixel_spacing_mm), "must be positive");
+  constexpr int kMaxSide = 32768;
+  if (camera.size_px.minCoeff() < 1 || camera.size_px.maxCoeff() > kMaxSide)
+    add("size_px", text_of(camera.size_px), "must be within 1 and 32768");
+  return found;
+}
+
+const CameraGeometry& CameraRig::camera(const std::string& name) const {
+  std::string known;
+  for (const CameraGeometry& candidate : cameras) {
+    if (candidate.name == name) return candidate;
+    known += (known.empty() ? "" : ", ") + candidate.name;
+  }
+  throw InputError("camera", name, "the rig has only: " + known);
+}
+
+std::vector<std::string> problems(const CameraRig& rig) {
+  std::vector<std::string> found;
+  if (!rig.isocenter_point.allFinite()) found.emplace_back("isocenter_point must be finite");
+  if (rig.cameras.empty()) found.emplace_back("the rig has no [[camera]]");
+  std::set<std::string> names;
+  for (const CameraGeometry& camera : rig.cameras) {
+    if (!names.insert(camera.name).second)
+      found.push_back("camera name = " + camera.name + ": must be unique within the rig");
+    const auto of_camera = problems(camera);
+    found.insert(found.end(), of_camera.begin(), of_camera.end());
+  }
+  return found;
+}
+
+}  // namespace af

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "geometry/rigid_transform.h"
+
+#include <cmath>
+
+namespace af {
+
+std::array<double, 6> PoseParameters::deg_and_mm() const {
+  return {rotation_rad.x() * kDegPerRad,
+          rotation_rad.y() * kDegPerRad,
+          rotation_rad.z() * kDegPerRad,
+          translation_mm.x(),
+          translation_mm.y(),
+          translation_mm.z()};
+}
+
+PoseParameters PoseParameters::from_deg_and_mm(const std::array<double, 6>& values) {
+  PoseParameters parameters;
+  parameters.rotation_rad = Eigen::Vector3d(values[0], values[1], values[2]) * kRadPerDeg;
+  parameters.translation_mm = Eigen::Vector3d(values[3], values[4], values[5]);
+  return parameters;
+}
+
+RigidTransform PoseFrame::nominal_room_from_ct() const {
+  return pose_from_parameters(*this, PoseParameters{});
+}
+
+PoseFrame PoseFrame::about(const RigidTransform& room_from_ct,
+                           const Eigen::Vector3d& center_ct_mm) {
+  return {room_from_ct.linear(), center_ct_mm, room_from_ct * center_ct_mm};
+}
+
+Eigen::Matrix3d rotation_from_angles(const Eigen::Vector3d& rotation_rad) {
+  using Eigen::AngleAxisd;
+  using Eigen::Vector3d;
+  return (AngleAxisd(rotation_rad.z(), Vector3d::UnitZ()) *
+          AngleAxisd(rotation_rad.y(), Vector3d::UnitY()) *
+          AngleAxisd(rotation_rad.x(), Vector3d::UnitX()))
+      .toRotationMatrix();
+}
+
+Eigen::Vector3d angles_from_rotation(const Eigen::Matrix3d& rotation) {
+  const double cos_y = std::hypot(rotation(0, 0), rotation(1, 0));
+  const double angle_y = std::atan2(-rotation(2, 0), cos_y);
+  constexpr double kGimbalLock = 1e-9;
+  if (cos_y < kGimbalLock) return {std::atan2(-rotation(1, 2), rotation(1, 1)), angle_y, 0.0};
+  return {std::atan2(rotation(2, 1), rotation(2, 2)),
+          angle_y,
+          std::atan2(rotation(1, 0), rotation(0, 0))};
+}
+
+RigidTransform pose_from_parameters(const PoseFrame& frame, const PoseParameters& parameters) {
+  RigidTransform room_from_ct = RigidTransform::Identity();
+  room_from_ct.linear() = rotation_from_angles(parameters.rotation_rad) * frame.rotation;
+  room_from_ct.translation() =
+      frame.center_room_mm + parameters.translation_mm - room_from_ct.linear() * frame.center_ct_mm;
+  return room_from_ct;
+}
+
+PoseParameters parameters_from_pose(const PoseFrame& frame, const RigidTransform& room_from_ct) {
+  PoseParameters parameters;
+  parameters.rotation_rad =
+      angles_from_rotation(room_from_ct.linear() * frame.rotation.transpose());
+  parameters.translation_mm = room_from_ct * frame.center_ct_mm - frame.center_room_mm;
+  return parameters;
+}
+
+std::vector<std::string> rigidity_problems(const Eigen::Matrix4d& matrix) {
+  constexpr double kTolerance = 1e-5;
+  std::vector<std::string> problems;
+  if (!matrix.allFinite()) return {"pose has values that are not finite"};
+  if (!(matrix.row(3) - Eigen::RowVector4d(0, 0, 0, 1)).isZero(kTolerance))
+    problems.emplace_back("the pose's last row must be 0 0 0 1");
+  const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();
+  const double deviation =
+      (rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+  if (!(deviation <= kTolerance))
+    problems.push_back("the pose is not rigid: its rotation part deviates from orthonormal by " +
+                       std::to_string(deviation));
+  else if (!(rotation.determinant() > 0.0))
+    problems.emplace_back(
+        "the pose is not rigid: its rotation part is a reflection (determinant -1)");
+  return problems;
+}
+
+RigidTransform rigid_from_matrix(const Eigen::Matrix4d& matrix) {
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(matrix.topLeftCorner<3, 3>(),
+                                              Eigen::ComputeFullU | Eigen::ComputeFullV);
+  RigidTransform transform = RigidTransform::Identity();
+  transform.linear() = svd.matrixU() * svd.matrixV().transpose();
+  transform.translation() = matrix.topRightCorner<3, 1>();
+  return transform;
+}
+
+double rotation_angle_between_rad(const RigidTransform& a, const RigidTransform& b) {
+  return std::abs(Eigen::AngleAxisd(Eigen::Matrix3d(a.linear().transpose() * b.linear())).angle());
+}
+
+}  // namespace af

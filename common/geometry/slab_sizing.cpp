@@ -1,0 +1,323 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "geometry/slab_sizing.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <sstream>
+
+#include "base/error.h"
+
+namespace af {
+
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// Maximises a smooth function over the rotation box: a grid that holds corners, edges and centre,
+/// then a pattern search from the best node. At large angles extremes lie inside the box, so
+/// corners alone would not do.
+template <typename Objective>
+double maximum_over_rotations(double max_rotation_rad, const Objective& objective) {
+  constexpr int kGridNodes = 9;
+  Eigen::Vector3d best_angles = Eigen::Vector3d::Zero();
+  double best = objective(best_angles);
+  const auto consider = [&](const Eigen::Vector3d& angles) {
+    const double value = objective(angles);
+    if (!(value > best)) return false;
+    best = value;
+    best_angles = angles;
+    return true;
+  };
+  const double grid_step = 2.0 * max_rotation_rad / (kGridNodes - 1);
+  for (int i = 0; i < kGridNodes; ++i)
+    for (int j = 0; j < kGridNodes; ++j)
+      for (int k = 0; k < kGridNodes; ++k)
+        consider(Eigen::Vector3d::Constant(-max_rotation_rad) +
+                 grid_step * Eigen::Vector3d(i, j, k));
+  constexpr double kFinalStepRad = 1e-8;
+  for (double step = grid_step / 2.0; step > kFinalStepRad;) {
+    const Eigen::Vector3d center = best_angles;
+    bool improved = false;
+    for (int axis = 0; axis < 3; ++axis)
+      for (const double sign : {-1.0, 1.0}) {
+        Eigen::Vector3d angles = center;
+        angles[axis] = std::clamp(angles[axis] + sign * step, -max_rotation_rad, max_rotation_rad);
+        improved = consider(angles) || improved;
+      }
+    if (!improved) step /= 2.0;
+  }
+  return best;
+}
+
+/// A camera seen from the CT at nominal pose: maps room vectors, for one rotation of the CT, to the
+/// slab frame.
+class MovingCamera {
+ public:
+  MovingCamera(const CameraGeometry& camera, const PoseFrame& frame, const MotionRange& range)
+      : slab_from_room_(slab_from_ct_at_nominal(camera, frame).linear() *
+                        frame.rotation.transpose()),
+        source_from_center_(camera.source_point - frame.center_room_mm),
+        range_(range) {
+    for (std::size_t i = 0; i < corner_directions_.size(); ++i)
+      corner_directions_[i] = camera.detector_corner_points()[i] - camera.source_point;
+  }
+
+  [[nodiscard]] double nominal_source_y_mm() const {
+    return (slab_from_room_ * source_from_center_).y();
+  }
+
+  /// Largest coordinate sign * x (axis 0) or sign * z (axis 2) at which the ray to detector corner
+  /// `corner` can meet the plane y = plane_y, over all translations in range.
+  [[nodiscard]] double extreme_hit(const Eigen::Vector3d& angles,
+                                   std::size_t corner,
+                                   double plane_y_mm,
+                                   int axis,
+                                   double sign) const {
+    const Eigen::Matrix3d slab_from_room =
+        slab_from_room_ * rotation_from_angles(angles).transpose();
+    const Eigen::Vector3d point = slab_from_room * source_from_center_;
+    const Eigen::Vector3d direction = slab_from_room * corner_directions_[corner];
+    constexpr double kSteepest = -0.05;  // rays within 3 degrees of the planes make them boundless
+    if (!(direction.y() < kSteepest * direction.norm()))
+      throw InputError("max_rotation_deg",
+                       std::to_string(range_.max_rotation_rad * kDegPerRad),
+                       "too large: some rays of the camera run parallel to the field's planes");
+    const double slope = direction[axis] / direction.y();
+    const double at_rest = point[axis] + (plane_y_mm - point.y()) * slope;
+    const Eigen::Vector3d per_translation =
+        slab_from_room.transpose() *
+        (Eigen::Vector3d::Unit(axis) - slope * Eigen::Vector3d::UnitY());
+    return sign * at_rest + per_translation.lpNorm<1>() * range_.max_translation_mm;
+  }
+
+  [[nodiscard]] double lowest_source_y(const Eigen::Vector3d& angles) const {
+    const Eigen::Matrix3d slab_from_room =
+        slab_from_room_ * rotation_from_angles(angles).transpose();
+    return (slab_from_room * source_from_center_).y() -
+           slab_from_room.row(1).lpNorm<1>() * range_.max_translation_mm;
+  }
+
+  /// Largest of sign * coordinate over the whole motion box and all detector corners.
+  [[nodiscard]] double extreme_hit(double plane_y_mm, int axis, double sign) const {
+    double extreme = -kInfinity;
+    for (std::size_t corner = 0; corner < corner_directions_.size(); ++corner)
+      extreme = std::max(
+          extreme,
+          maximum_over_rotations(range_.max_rotation_rad, [&](const Eigen::Vector3d& angles) {
+            return extreme_hit(angles, corner, plane_y_mm, axis, sign);
+          }));
+    return extreme;
+  }
+
+ private:
+  Eigen::Matrix3d slab_from_room_;
+  Eigen::Vector3d source_from_center_;
+  std::array<Eigen::Vector3d, 4> corner_directions_;
+  MotionRange range_;
+};
+
+/// Vertices of the part of a box (slab frame) with y in [low, high]: its corners inside and its
+/// edges' cuts.
+std::vector<Eigen::Vector3d> clipped_box(const std::array<Eigen::Vector3d, 8>& corners,
+                                         double y_low,
+                                         double y_high) {
+  std::vector<Eigen::Vector3d> vertices;
+  for (const Eigen::Vector3d& corner : corners)
+    if (corner.y() >= y_low && corner.y() <= y_high) vertices.push_back(corner);
+  for (unsigned a = 0; a < 8; ++a)
+    for (unsigned bit = 1; bit < 8; bit <<= 1) {
+      const unsigned b = a | bit;
+      if (b == a) continue;
+      for (const double y : {y_low, y_high}) {
+        const double dy_a = corners[a].y() - y;
+        const double dy_b = corners[b].y() - y;
+        if (dy_a * dy_b < 0.0)
+          vertices.push_back(corners[a] + dy_a / (dy_a - dy_b) * (corners[b] - corners[a]));
+      }
+    }
+  return vertices;
+}
+
+NodeRange even_aligned_range(const GridAxis& axis, double low_mm, double high_mm) {
+  const auto clamp_node = [&](double node) {
+    return static_cast<int>(std::clamp(node, 0.0, axis.nodes - 1.0));
+  };
+  const int first = clamp_node(std::floor(axis.node_coordinate(low_mm)) - 1.0) & ~1;
+  const int last = clamp_node(std::ceil(axis.node_coordinate(high_mm)) + 1.0) | 1;
+  return {first, std::min(last + 1, axis.nodes) - first};
+}
+
+/// Crops a slab to the shadow of `vertices` seen from the (u,v) rectangle's corners; both maps are
+/// projective, so corners decide.
+void crop_to_shadow(const LightSlab& light_slab,
+                    const std::vector<Eigen::Vector3d>& vertices,
+                    SlabGeometry& slab) {
+  PlaneExtent shadow{kInfinity, -kInfinity, kInfinity, -kInfinity};
+  for (const double u : {light_slab.u.first_mm, light_slab.u.last_mm})
+    for (const double v : {light_slab.v.first_mm, light_slab.v.last_mm})
+      for (const Eigen::Vector3d& vertex : vertices) {
+        const Eigen::Vector3d viewpoint(u, light_slab.uv_plane_y_mm, v);
+        const double scale = (slab.st_plane_y_mm - viewpoint.y()) / (vertex.y() - viewpoint.y());
+        const Eigen::Vector3d hit = viewpoint + scale * (vertex - viewpoint);
+        shadow.x_low_mm = std::min(shadow.x_low_mm, hit.x());
+        shadow.x_high_mm = std::max(shadow.x_high_mm, hit.x());
+        shadow.z_low_mm = std::min(shadow.z_low_mm, hit.z());
+        shadow.z_high_mm = std::max(shadow.z_high_mm, hit.z());
+      }
+  if (vertices.empty())
+    shadow = {slab.s.first_mm, slab.s.first_mm, slab.t.first_mm, slab.t.first_mm};
+  slab.stored_s = even_aligned_range(slab.s, shadow.x_low_mm, shadow.x_high_mm);
+  slab.stored_t = even_aligned_range(slab.t, shadow.z_low_mm, shadow.z_high_mm);
+}
+
+void refuse_source_inside_ct(double highest_ct_y_mm, double lowest_source_y_mm) {
+  if (highest_ct_y_mm < lowest_source_y_mm) return;
+  std::ostringstream text;
+  text << "the X-ray source can come within the CT's depth range: in range it comes as near as "
+       << lowest_source_y_mm << " mm to the field's centre plane, and the CT reaches up to "
+       << highest_ct_y_mm
+       << " mm: reduce max_translation_mm or max_rotation_deg, or correct the rig";
+  throw InputError(text.str());
+}
+
+/// Shared terms of eqs. (4)-(10): K of eq. (6) and its denominator D.
+struct ClosedFormTerms {
+  double cosine, sine, tangent, denominator, k_term;
+};
+
+ClosedFormTerms closed_form_terms(const SymmetricCamera& camera, const MotionRange& range) {
+  const double c = std::cos(range.max_rotation_rad);
+  const double s = std::sin(range.max_rotation_rad);
+  const double k = std::tan(camera.half_field_of_view_rad);
+  const double denominator = c * c - s * s * s - k * c * s * (2.0 + s);
+  if (!(denominator > 0.0))
+    throw InputError("max_rotation_deg",
+                     std::to_string(range.max_rotation_rad * kDegPerRad),
+                     "too large: the extreme ray runs parallel to the field's planes");
+  return {
+      c, s, k, denominator, (k * (c * c - s * s + c * c * s) + c * s * (1.0 + s)) / denominator};
+}
+
+}  // namespace
+
+bool MotionRange::contains(const PoseParameters& parameters) const {
+  // A start given in degrees exactly at the limit must not fall outside by the rounding of the
+  // conversion.
+  constexpr double kRounding = 1e-12;
+  return parameters.rotation_rad.cwiseAbs().maxCoeff() <= max_rotation_rad + kRounding &&
+         parameters.translation_mm.cwiseAbs().maxCoeff() <= max_translation_mm + kRounding;
+}
+
+std::vector<std::string> problems(const MotionRange& range) {
+  std::vector<std::string> found;
+  if (!(range.max_rotation_rad >= 0.0 && range.max_rotation_rad <= 60.0 * kRadPerDeg))
+    found.push_back("max_rotation_deg = " + std::to_string(range.max_rotation_rad * kDegPerRad) +
+                    ": must be within 0 and 60");
+  if (!(range.max_translation_mm >= 0.0 && range.max_translation_mm <= 1000.0))
+    found.push_back("max_translation_mm = " + std::to_string(range.max_translation_mm) +
+                    ": must be within 0 and 1000");
+  return found;
+}
+
+std::vector<PlaneExtent> extents_on_planes(const CameraGeometry& camera,
+                                           const PoseFrame& frame,
+                                           const MotionRange& range,
+                                           std::span<const double> plane_y_mm) {
+  const MovingCamera moving(camera, frame, range);
+  std::vector<PlaneExtent> extents;
+  for (const double y : plane_y_mm) {
+    PlaneExtent extent{-moving.extreme_hit(y, 0, -1.0),
+                       moving.extreme_hit(y, 0, 1.0),
+                       -moving.extreme_hit(y, 2, -1.0),
+                       moving.extreme_hit(y, 2, 1.0)};
+    // Rounding and the search's final step stay far below this margin; it also keeps a plane that
+    // is a single point (no motion) from having no size.
+    const double margin =
+        1e-6 *
+        std::max({extent.x_high_mm - extent.x_low_mm, extent.z_high_mm - extent.z_low_mm, 1.0});
+    extent.x_low_mm -= margin;
+    extent.x_high_mm += margin;
+    extent.z_low_mm -= margin;
+    extent.z_high_mm += margin;
+    extents.push_back(extent);
+  }
+  return extents;
+}
+
+double lowest_source_y_mm(const CameraGeometry& camera,
+                          const PoseFrame& frame,
+                          const MotionRange& range) {
+  const MovingCamera moving(camera, frame, range);
+  return -maximum_over_rotations(range.max_rotation_rad, [&](const Eigen::Vector3d& angles) {
+    return -moving.lowest_source_y(angles);
+  });
+}
+
+std::array<Eigen::Vector3d, 8> CtBox::corner_points() const {
+  std::array<Eigen::Vector3d, 8> corners;
+  for (unsigned i = 0; i < 8; ++i)
+    corners[i] = {(i & 1u) != 0 ? high_mm.x() : low_mm.x(),
+                  (i & 2u) != 0 ? high_mm.y() : low_mm.y(),
+                  (i & 4u) != 0 ? high_mm.z() : low_mm.z()};
+  return corners;
+}
+
+LightSlab make_light_slab(const CameraGeometry& camera,
+                          const PoseFrame& frame,
+                          const MotionRange& range,
+                          const CtBox& attenuating_box_ct,
+                          const LightSlabSpec& spec) {
+  check(spec.st_plane_y_mm.size() == spec.slab_boundaries_y_mm.size() + 1,
+        "one (s,t) plane per slab");
+  LightSlab light_slab;
+  light_slab.slab_from_ct = slab_from_ct_at_nominal(camera, frame);
+  light_slab.uv_plane_y_mm = MovingCamera(camera, frame, range).nominal_source_y_mm();
+
+  std::array<Eigen::Vector3d, 8> corners = attenuating_box_ct.corner_points();
+  double highest_ct_y_mm = -kInfinity;
+  for (Eigen::Vector3d& corner : corners) {
+    corner = light_slab.slab_from_ct * corner;
+    highest_ct_y_mm = std::max(highest_ct_y_mm, corner.y());
+  }
+  refuse_source_inside_ct(highest_ct_y_mm, lowest_source_y_mm(camera, frame, range));
+
+  std::vector<double> planes = spec.st_plane_y_mm;
+  planes.push_back(light_slab.uv_plane_y_mm);
+  const std::vector<PlaneExtent> extents = extents_on_planes(camera, frame, range, planes);
+  light_slab.u = {extents.back().x_low_mm, extents.back().x_high_mm, spec.uv_nodes};
+  light_slab.v = {extents.back().z_low_mm, extents.back().z_high_mm, spec.uv_nodes};
+  for (std::size_t k = 0; k < spec.st_plane_y_mm.size(); ++k) {
+    SlabGeometry slab;
+    slab.st_plane_y_mm = spec.st_plane_y_mm[k];
+    if (k > 0) slab.y_low_mm = spec.slab_boundaries_y_mm[k - 1];
+    if (k + 1 < spec.st_plane_y_mm.size()) slab.y_high_mm = spec.slab_boundaries_y_mm[k];
+    slab.s = {extents[k].x_low_mm, extents[k].x_high_mm, spec.st_nodes};
+    slab.t = {extents[k].z_low_mm, extents[k].z_high_mm, spec.st_nodes};
+    crop_to_shadow(light_slab, clipped_box(corners, slab.y_low_mm, slab.y_high_mm), slab);
+    light_slab.slabs.push_back(slab);
+  }
+  return light_slab;
+}
+
+SymmetricPlaneSizes closed_form_plane_sizes(const SymmetricCamera& camera,
+                                            const MotionRange& range) {
+  const ClosedFormTerms terms = closed_form_terms(camera, range);
+  const double c = terms.cosine;
+  const double s = terms.sine;
+  const double f = camera.plane_separation_mm;
+  const double moved = range.max_translation_mm * (1.0 + terms.k_term);
+  return {2.0 * (moved + f * s * (1.0 + s) * (c + s * terms.k_term)),
+          2.0 * (moved + f * terms.tangent * (c * c + s) / terms.denominator)};
+}
+
+SymmetricPlaneSizes small_angle_plane_sizes(const SymmetricCamera& camera,
+                                            const MotionRange& range) {
+  const double phi = camera.half_field_of_view_rad;
+  const double angle = range.max_rotation_rad;
+  const double f = camera.plane_separation_mm;
+  const double moved = range.max_translation_mm * (1.0 + phi + angle);
+  return {2.0 * (moved + f * angle * (1.0 + angle)), 2.0 * (moved + f * phi * (1.0 + angle))};
+}
+
+}  // namespace af

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <span>
+
+#include "geometry/light_slab.h"
+
+namespace af {
+
+/// The motion box of a field: |each angle| and |each translation| relative to its PoseFrame.
+struct MotionRange {
+  double max_rotation_rad = 10.0 * kRadPerDeg;
+  double max_translation_mm = 100.0;
+
+  [[nodiscard]] bool contains(const PoseParameters& parameters) const;
+};
+
+std::vector<std::string> problems(const MotionRange& range);
+
+/// Extent of ray hits on one plane y = const (mm).
+struct PlaneExtent {
+  double x_low_mm = 0.0, x_high_mm = 0.0;  ///< along u or s
+  double z_low_mm = 0.0, z_high_mm = 0.0;  ///< along v or t
+};
+
+/// Where all rays of a camera can meet the planes y = `plane_y_mm` of the slab frame while the CT
+/// moves within `range` (generalises eq. (3), Sec. II-C: true detector corners, any nominal pose,
+/// rotations about room axes). For a fixed rotation the hit point is linear in the translation and
+/// projective in the detector point, so corners decide both; over rotations the maximum is searched
+/// on a grid and refined. Extents include a safety margin of 1e-6 of their size. Throws InputError
+/// when a ray can become parallel to the planes (range too large). \test
+/// SlabSizing.NoInRangeRayMissesAPlane
+std::vector<PlaneExtent> extents_on_planes(const CameraGeometry& camera,
+                                           const PoseFrame& frame,
+                                           const MotionRange& range,
+                                           std::span<const double> plane_y_mm);
+
+/// Lowest slab-frame y that the X-ray source can take while the CT moves within `range`.
+double lowest_source_y_mm(const CameraGeometry& camera,
+                          const PoseFrame& frame,
+                          const MotionRange& range);
+
+/// Corners of a box in the ct frame (mm).
+struct CtBox {
+  Eigen::Vector3d low_mm;
+  Eigen::Vector3d high_mm;
+  [[nodiscard]] std::array<Eigen::Vector3d, 8> corner_points() const;
+};
+
+/// Sizes of a field's planes and resolutions.
+struct LightSlabSpec {
+  int uv_nodes = 64;
+  int st_nodes = 256;
+  std::vector<double> slab_boundaries_y_mm;  ///< K - 1 inner boundaries, ascending; empty for K = 1
+  std::vector<double> st_plane_y_mm = {0.0};  ///< one per slab, in the order of ascending y
+};
+
+/// The complete geometry of a field, every slab cropped to the shadow that `attenuating_corners_ct`
+/// (corners of convex bodies that hold all attenuation, ct frame) can throw from the (u,v)
+/// rectangle, plus one node, even-aligned. Throws InputError when the source can come to lie inside
+/// the CT's depth range or the range is too large.
+LightSlab make_light_slab(const CameraGeometry& camera,
+                          const PoseFrame& frame,
+                          const MotionRange& range,
+                          const CtBox& attenuating_box_ct,
+                          const LightSlabSpec& spec);
+
+/// The paper's symmetric special case: eqs. (3)-(10) for a camera on the y axis moved by T = T_t Rz
+/// Ry Rx.
+struct SymmetricPlaneSizes {
+  double uv_side_mm = 0.0;
+  double st_side_mm = 0.0;
+};
+
+struct SymmetricCamera {
+  double half_field_of_view_rad = 0.0;  ///< phi
+  double plane_separation_mm = 650.0;   ///< f
+};
+
+/// Closed form, eqs. (4)-(6), (8)-(9). Throws InputError when the range makes the denominator D <=
+/// 0.
+SymmetricPlaneSizes closed_form_plane_sizes(const SymmetricCamera& camera,
+                                            const MotionRange& range);
+/// Small-angle form, eqs. (7), (10).
+SymmetricPlaneSizes small_angle_plane_sizes(const SymmetricCamera& camera,
+                                            const MotionRange& range);
+
+}  // namespace af

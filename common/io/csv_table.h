@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace af {
+
+/// A CSV file with a header line, in memory; values as text. RFC 4180 quoting.
+class CsvTable {
+ public:
+  explicit CsvTable(std::vector<std::string> columns) : columns_(std::move(columns)) {}
+  /// FileError naming path and line when a row has the wrong number of fields, quotes are
+  /// unbalanced, a column name is repeated, or the file is empty.
+  static CsvTable read(const std::filesystem::path& path);
+
+  void add_row(std::vector<std::string> fields);
+  [[nodiscard]] std::size_t row_count() const { return rows_.size(); }
+  [[nodiscard]] const std::vector<std::string>& columns() const { return columns_; }
+  [[nodiscard]] std::optional<std::size_t> find_column(std::string_view name) const;
+  [[nodiscard]] const std::string& text(std::size_t row, std::string_view column) const;
+  /// FileError naming path, line, column and value when it is not a finite number.
+  [[nodiscard]] double number(std::size_t row, std::string_view column) const;
+  [[nodiscard]] std::string to_text() const;
+
+ private:
+  std::vector<std::string> columns_;
+  std::vector<std::vector<std::string>> rows_;
+  std::string path_;
+};
+
+/// Shortest text that reads back to the same double ("nan", "inf" for those).
+std::string number_text(double value);
+/// Fixed number of decimals, for columns that people read.
+std::string fixed_text(double value, int decimals);
+
+}  // namespace af

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "volume/ct_volume.h"
+
+namespace af {
+
+struct CtReadOptions {
+  std::string series_uid;  ///< chooses one of several DICOM series in a folder; empty: there must
+                           ///< be only one
+};
+
+/// Reads a CT (DICOM folder, NIfTI, MetaImage, NRRD) as HU in int16, in DICOM LPS; rescale applied,
+/// values rounded and clamped to int16. InputError (exit 3): several series (lists UID,
+/// description, slice count of each), missing or uneven slices (names the position), gantry tilt,
+/// modality other than CT, not 3-D, NaN or infinite values, all air (no voxel
+/// >= -900 HU), non-positive or non-finite spacing, direction not orthonormal, fewer than 2 voxels
+/// on an axis. FileError (exit 4): missing, not an image, truncated, corrupt. Warnings (for example
+/// values that do not look like HU) go to `warnings` when given.
+CtVolume read_ct(const std::filesystem::path& path,
+                 const CtReadOptions& options = {},
+                 std::vector<std::string>* warnings = nullptr);
+
+/// Writes a CT (int16) by extension (.mha .nii.gz .nrrd), atomically.
+void write_ct(const CtVolume& ct, const std::filesystem::path& path);
+
+/// SHA-256 over size (three little-endian int32) and voxels (little-endian int16, i fastest), after
+/// reordering the axes to ascending LPS (so that the same CT as DICOM and as NIfTI has the same
+/// hash).
+std::string ct_content_sha256(const CtVolume& ct);
+
+}  // namespace af

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <string_view>
+
+namespace af {
+
+/// Writes `path` so that it appears under its name only when complete: `write` fills "PATH.partial"
+/// (with the extension kept last, for writers that choose a format by it: "a.partial.png"), which
+/// is closed, synced, renamed and its folder synced. On failure nothing remains. Throws FileError
+/// naming the path and the system's reason.
+void write_atomically(const std::filesystem::path& path,
+                      const std::function<void(const std::filesystem::path& partial)>& write);
+
+/// write_atomically() of a text.
+void write_text_file(const std::filesystem::path& path, std::string_view text);
+
+/// The whole file as text; FileError when unreadable or larger than `max_bytes`.
+std::string read_text_file(const std::filesystem::path& path, std::size_t max_bytes = 256u << 20);
+
+/// Creates a folder with its parents, and checks that files can be made in it.
+void make_output_folder(const std::filesystem::path& folder);
+
+}  // namespace af

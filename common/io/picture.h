@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "image/image2d.h"
+
+namespace af {
+
+/// One panel of a picture: an image with its grey (or diverging blue-white-red) window and a
+/// caption.
+struct PicturePanel {
+  enum class Colors { Grey, Diverging };
+  Image2d image;
+  double low = 0.0;
+  double high = 1.0;
+  std::string title;
+  std::string caption;
+  Colors colors = Colors::Grey;
+  std::vector<RegionOfInterest> boxes;  ///< outlined on the panel
+};
+
+/// Draws panels in a row-major grid of `columns` columns with titles and captions, as PNG (cairo),
+/// row 0 on top, one image pixel becoming `zoom` x `zoom` picture pixels. Atomic.
+void write_picture(const std::vector<PicturePanel>& panels,
+                   int columns,
+                   const std::string& heading,
+                   const std::filesystem::path& path,
+                   int zoom = 1);
+
+/// Checkerboard of two images of one size, fields of `field_px` pixels, both scaled to [0, 1] by
+/// their own 1st and 99th percentile.
+Image2d checkerboard(const Image2d& a, const Image2d& b, int field_px);
+
+/// Window (low, high) of an image's percentiles, in its own units.
+std::array<double, 2> percentile_window(const Image2d& image,
+                                        double low_percent = 1.0,
+                                        double high_percent = 99.0);
+
+}  // namespace af

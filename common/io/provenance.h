@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <string>
+
+namespace af {
+
+/// What every output records about its making.
+struct Provenance {
+  std::string program;       ///< "af-register"
+  std::string command_line;  ///< quoted for a shell
+  std::string options_toml;  ///< the options in force
+  std::uint64_t seed = 0;
+  int rank_count = 1;
+  std::map<std::string, std::string> input_sha256;  ///< name or path -> hash
+};
+
+/// JSON object with program, version, compiler, command line, options, seed, ranks, inputs, host
+/// CPU, start time (UTC).
+nlohmann::json to_json(const Provenance& provenance);
+
+/// Writes `folder`/reproduce.sh: a commented, executable script that changes to the working folder
+/// it was run in and runs the same command.
+void write_reproduce_script(const std::filesystem::path& folder, const Provenance& provenance);
+
+}  // namespace af

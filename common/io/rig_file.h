@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "geometry/camera_geometry.h"
+
+namespace af {
+
+/// Rigs shipped by name: "c-arm-12in" (cameras AP, LAT) and "treatment-room" (cameras A, B).
+std::vector<std::string> builtin_rig_names();
+
+/// TOML text of a shipped rig.
+std::string builtin_rig_text(const std::string& name);
+
+/// Reads a rig by shipped name or from a TOML file. InputError (exit 3) for a bad rig: names file,
+/// line, camera, key, value, constraint; FileError (exit 4) when unreadable or not TOML. `warnings`
+/// receives e.g. "camera 'A': mirrored ...".
+CameraRig read_rig(const std::string& name_or_path, std::vector<std::string>* warnings = nullptr);
+
+/// The rig as TOML text that read_rig() reads back to the last bit.
+std::string rig_to_toml(const CameraRig& rig);
+
+}  // namespace af

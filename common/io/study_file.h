@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "geometry/camera_geometry.h"
+#include "geometry/rigid_transform.h"
+#include "geometry/slab_sizing.h"
+#include "image/image2d.h"
+
+namespace af {
+
+/// What an X-ray's pixel values mean: detector intensity (bright = unattenuated; -log is taken on
+/// reading) or attenuation.
+enum class XrayDomain { Intensity, Attenuation };
+
+/// One X-ray of a case. Paths are absolute after reading.
+struct StudyView {
+  std::string camera;
+  std::filesystem::path xray;
+  XrayDomain xray_domain = XrayDomain::Intensity;
+  RegionOfInterest roi;
+  std::vector<Eigen::Vector2d>
+      fiducials_px;  ///< (column, row), in the order of StudyCase::fiducials_ct_mm
+  std::optional<std::filesystem::path> field;
+  std::optional<std::filesystem::path> mask;
+};
+
+/// One patient.
+struct StudyCase {
+  std::string name;
+  std::filesystem::path ct;  ///< image file or DICOM folder
+  RigidTransform nominal_room_from_ct = RigidTransform::Identity();
+  Eigen::Vector3d center_ct_mm =
+      Eigen::Vector3d::Zero();  ///< ROI centre: rotation origin of the registration
+  CtBox target_box_ct;
+  std::vector<Eigen::Vector3d> fiducials_ct_mm;
+  std::optional<RigidTransform>
+      gold_room_from_ct;  ///< instead of, or to compare with, the fiducials
+  std::vector<StudyView> views;
+
+  /// The frame that --start-* options and fields of this case use: nominal pose, about
+  /// center_ct_mm.
+  [[nodiscard]] PoseFrame frame() const {
+    return PoseFrame::about(nominal_room_from_ct, center_ct_mm);
+  }
+};
+
+struct Study {
+  std::filesystem::path path;
+  CameraRig rig;
+  std::string rig_name_or_path;
+  std::vector<StudyCase> cases;
+
+  /// Throws InputError that lists the known names; an empty name picks the only case.
+  [[nodiscard]] const StudyCase& find_case(const std::string& name) const;
+};
+
+/// Reads and validates study.toml: every message names file, line, key, value and constraint; all
+/// problems are reported at once. InputError (3) for unacceptable content (pose not rigid, ROI off
+/// the detector, collinear or unequal numbers of fiducials, unknown camera, unknown keys as a typo
+/// hint), FileError (4) when it cannot be parsed.
+Study read_study(const std::filesystem::path& path);
+
+/// study.toml text; paths are written relative to `folder` when they lie below it.
+std::string study_to_toml(const Study& study, const std::filesystem::path& folder);
+
+}  // namespace af

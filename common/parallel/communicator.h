@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <exception>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "base/shared_array.h"
+
+namespace af {
+
+/// A group of MPI ranks. Without mpirun it is a group of one. MPI stays behind this header.
+class Communicator {
+ public:
+  /// All ranks of the job. Requires a live MpiEnvironment.
+  static Communicator world();
+
+  [[nodiscard]] int rank() const;
+  [[nodiscard]] int size() const;
+  [[nodiscard]] bool is_root() const { return rank() == 0; }
+
+  /// Collective.
+  void barrier() const;
+  /// Collective. Exact element-wise sums, in place.
+  void sum(std::span<std::uint64_t> values) const;
+  /// Collective. Element-wise maxima, in place.
+  void maximum(std::span<std::uint64_t> values) const;
+  /// Collective. `bytes` of rank 0 replace those of every rank (any size; sent in pieces below 2
+  /// GiB).
+  void broadcast(std::vector<std::byte>& bytes) const;
+  void broadcast(std::string& text) const;
+  /// Collective. Every rank's bytes, in rank order, on every rank.
+  [[nodiscard]] std::vector<std::vector<std::byte>> all_gather(
+      std::span<const std::byte> mine) const;
+  /// Collective. Every rank's bytes, in rank order, on rank 0 (empty elsewhere).
+  [[nodiscard]] std::vector<std::vector<std::byte>> gather(std::span<const std::byte> mine) const;
+  /// Collective. The ranks that share this rank's memory.
+  [[nodiscard]] Communicator node() const;
+
+  /// Collective over node(): memory of `bytes` bytes held once per node; `fill` runs on each node's
+  /// first rank only, and all wait for it. An exception in `fill` is thrown on every rank of the
+  /// node.
+  [[nodiscard]] std::shared_ptr<const std::byte> allocate_on_node(
+      std::size_t bytes, const std::function<void(std::span<std::byte>)>& fill) const;
+
+  struct Impl;
+  [[nodiscard]] const Impl& impl() const { return *impl_; }
+
+ private:
+  explicit Communicator(std::shared_ptr<Impl> impl) : impl_(std::move(impl)) {}
+  std::shared_ptr<Impl> impl_;
+};
+
+/// What went wrong on some rank, for all_or_none().
+struct RankFailure {
+  int exit_code = 0;  ///< 0: none
+  std::string message;
+};
+
+/// Collective. The failure of the lowest failed rank (its message names that rank), the same on
+/// every rank.
+RankFailure first_failure(const Communicator& communicator, const RankFailure& mine);
+
+/// The failure that an exception means, as app_main reports it.
+RankFailure failure_of(const std::exception_ptr& error);
+
+/// Throws the error of a failure: InputError, FileError, ... by exit code.
+[[noreturn]] void throw_failure(const RankFailure& failure);
+
+/// Collective. Runs `function` on every rank; when it throws on any, every rank throws the same
+/// error. Wrap whatever may fail on some ranks only, before the next collective call, or the others
+/// wait for ever.
+template <typename Function>
+std::invoke_result_t<Function> all_or_none(const Communicator& communicator, Function&& function) {
+  using Result = std::invoke_result_t<Function>;
+  RankFailure mine;
+  if constexpr (std::is_void_v<Result>) {
+    try {
+      function();
+    } catch (...) {
+      mine = failure_of(std::current_exception());
+    }
+    if (const RankFailure failure = first_failure(communicator, mine); failure.exit_code != 0)
+      throw_failure(failure);
+  } else {
+    std::optional<Result> result;
+    try {
+      result.emplace(function());
+    } catch (...) {
+      mine = failure_of(std::current_exception());
+    }
+    if (const RankFailure failure = first_failure(communicator, mine); failure.exit_code != 0)
+      throw_failure(failure);
+    return std::move(*result);
+  }
+}
+
+}  // namespace af

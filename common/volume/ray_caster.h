@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <span>
+
+#include "volume/attenuation_volume.h"
+
+namespace af {
+
+/// A fan of rays from one point to a regular grid of points, in the ct frame (mm): a DRR or one
+/// viewpoint of a field. Ray (column, row) runs from `source_point` through first_point + column *
+/// column_step + row * row_step and on.
+struct RayFan {
+  Eigen::Vector3d source_point;
+  Eigen::Vector3d first_point;
+  Eigen::Vector3d column_step;
+  Eigen::Vector3d row_step;
+  int columns = 0;
+  int rows = 0;
+};
+
+struct RayCasterOptions {
+  double step_mm = 1.0;  ///< largest distance between samples along a ray
+};
+
+std::vector<std::string> problems(const RayCasterOptions& options);
+
+/// The reference caster: total attenuation of eq. (1) by trilinear samples at the midpoints of
+/// equal steps not longer than step_mm, over the ray's whole path through the volume, from the
+/// source onwards. A source inside the volume starts there. Values are bit-identical on every
+/// vector width. Re-entrant. \test RayCaster.UniformBoxGivesMuTimesChordLength
+class RayCaster {
+ public:
+  RayCaster(const AttenuationVolume& volume, const RayCasterOptions& options);
+
+  /// U of every ray of the fan, dimensionless, row-major into `total_attenuation` (columns * rows
+  /// values); exactly 0 where a ray misses the volume.
+  void cast(const RayFan& fan, std::span<float> total_attenuation) const;
+
+  /// Total attenuation of one ray (ct frame).
+  [[nodiscard]] float total_attenuation(const Eigen::Vector3d& source_point,
+                                        const Eigen::Vector3d& through_point) const;
+
+ private:
+  const AttenuationVolume& volume_;
+  RayCasterOptions options_;
+};
+
+}  // namespace af
