@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+// Joins files and numerics for the programs that register: af-register and af-evaluate.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "io/ct_reader.h"
+#include "io/study_file.h"
+#include "parallel/communicator.h"
+#include "register/registration.h"
+#include "volume/ray_caster.h"
+
+namespace af::registration {
+
+enum class RendererKind { Field, RayCast };
+
+/// "field" or "raycast".
+const char* to_string(RendererKind kind);
+
+struct CaseLoadOptions {
+  RendererKind renderer = RendererKind::Field;
+  std::map<std::string, std::filesystem::path> field_paths;  ///< camera -> field, over the study's
+  CtReadOptions ct;
+  double water_mu_per_mm = 0.0200;  ///< of ray casting
+  RayCasterOptions ray_caster;
+  bool skip_ct_check = false;  ///< with fields: do not read the CT (it may be absent)
+};
+
+struct LoadedCase {
+  std::shared_ptr<const RegistrationProblem> problem;
+  std::map<std::string, std::string> input_sha256;  ///< "ct", "field A", "xray A", ...
+  std::vector<std::string> warnings;
+};
+
+/// Collective. Everything a registration of one case needs, with the same content on every rank:
+/// X-rays and masks, fields (held once per node) or the CT's attenuation (once per node). With
+/// fields the CT is read by rank 0 alone, for its hash and grid. FileError (exit 4) when a field
+/// was made from another CT (both hashes are named) or for another camera (geometry to 1e-3 mm);
+/// InputError when a view has no field or the field's range does not hold the nominal pose.
+LoadedCase load_case(const Study& study,
+                     const StudyCase& study_case,
+                     const CaseLoadOptions& options,
+                     const Communicator& communicator);
+
+/// FileError when the cameras differ by more than 1e-3 mm in any point of their geometry (1e-6 in
+/// directions and per pixel), or in size.
+void require_same_camera(const CameraGeometry& field_camera,
+                         const CameraGeometry& rig_camera,
+                         const std::string& field_path);
+
+}  // namespace af::registration

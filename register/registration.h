@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "drr/drr_renderer.h"
+#include "register/multi_view_objective.h"
+#include "register/optimizer/optimizer.h"
+#include "register/similarity/similarity_measure.h"
+
+namespace af::registration {
+
+/// One pass of the search, coarse to fine.
+struct PassOptions {
+  double smoothing_sigma_mm = 0.0;  ///< Gaussian on the references (not on the DRRs), in mm on the
+                                    ///< isocentre plane; 0: the references themselves
+  OptimizerOptions optimizer;       ///< steps in mm of mean projected motion
+};
+
+/// How to register. The defaults are the paper's (preset "paper").
+struct RegistrationOptions {
+  SimilarityOptions similarity;
+  std::string optimizer = "best-neighbor";
+  /// The paper lost the value of its first sigma; see register/README.md for ours.
+  std::vector<PassOptions> passes = {{1.0, {5.0, 0.5}}, {0.0, {2.0, 0.1}}};
+  int max_evaluations = 5000;  ///< pose evaluations per registration, all passes together
+};
+
+std::vector<std::string> problems(const RegistrationOptions& options);
+
+std::vector<std::string> preset_names();
+/// InputError that lists the known names.
+RegistrationOptions preset_options(const std::string& name);
+
+/// One X-ray of the problem. Pixels are the camera's; nothing is cropped yet.
+struct RegistrationView {
+  View view;     ///< camera and region of interest
+  Image2d xray;  ///< whole detector, attenuation domain (bright = attenuated)
+  Image2d mask;  ///< whole detector, non-zero = used; empty: every pixel of the region
+  std::shared_ptr<const DrrRenderer> renderer;
+  std::optional<MotionLimit> limit;  ///< motion box of the renderer's field; none for ray casting
+};
+
+/// Everything that does not change between the starts of one case.
+struct RegistrationProblem {
+  RigidTransform nominal_room_from_ct = RigidTransform::Identity();
+  Eigen::Vector3d center_ct_mm = Eigen::Vector3d::Zero();     ///< c_roi: origin of all rotations
+  Eigen::Vector3d isocenter_point = Eigen::Vector3d::Zero();  ///< room, mm
+  std::vector<Eigen::Vector3d> scaling_points_ct;             ///< see ct_lattice_points()
+  std::vector<RegistrationView> views;
+
+  /// What the parameters in results are relative to.
+  [[nodiscard]] PoseFrame frame() const {
+    return PoseFrame::about(nominal_room_from_ct, center_ct_mm);
+  }
+};
+
+std::vector<std::string> problems(const RegistrationProblem& problem);
+
+struct TraceRow {
+  int pass = 0;  ///< from 0
+  double step_mm = 0.0;
+  int evaluations = 0;  ///< so far, all passes
+  double similarity = 0.0;
+  PoseParameters parameters;  ///< relative to RegistrationProblem::frame()
+};
+
+struct RegistrationResult {
+  RigidTransform start_room_from_ct = RigidTransform::Identity();
+  RigidTransform room_from_ct = RigidTransform::Identity();
+  double similarity = 0.0;        ///< at the end, by the last pass's references; NaN if it has none
+  int evaluations = 0;            ///< poses tried
+  int inadmissible = 0;           ///< of these, outside the field or its motion range
+  std::int64_t drr_count = 0;     ///< DRRs rendered
+  std::int64_t rays_outside = 0;  ///< at the start, when that is why it is inadmissible
+  StopReason stop_reason = StopReason::StepBelowFinal;
+  std::vector<TraceRow> trace;
+  double seconds = 0.0;  ///< wall time
+};
+
+/// Registers one case from any number of starts. Construction does what all starts share (smoothed
+/// references, histograms' ranges, X-ray bins); runs reuse the buffers. One runner per thread:
+/// share_preparation() makes another cheaply. A result depends on problem, options and start alone
+/// (its seconds excepted). The DRR range of a case is that of the DRR at the nominal pose over the
+/// region of interest grown by half its size to every side. \test
+/// Registration.TwoViewsRecoverAKnownPose
+class RegistrationRunner {
+ public:
+  /// InputError when options or problem have problems, or when the nominal pose is outside a field.
+  RegistrationRunner(std::shared_ptr<const RegistrationProblem> problem,
+                     const RegistrationOptions& options);
+  ~RegistrationRunner();
+  RegistrationRunner(RegistrationRunner&&) noexcept;
+  RegistrationRunner& operator=(RegistrationRunner&&) noexcept;
+
+  /// A runner for another thread; references and bins are shared.
+  [[nodiscard]] RegistrationRunner share_preparation() const;
+
+  [[nodiscard]] RegistrationResult run(const RigidTransform& start_room_from_ct);
+
+  /// The objective of one pass (default: the last) at a pose.
+  [[nodiscard]] ObjectiveValue similarity_at(const RigidTransform& room_from_ct);
+  [[nodiscard]] ObjectiveValue similarity_at(const RigidTransform& room_from_ct, std::size_t pass);
+
+  [[nodiscard]] const RegistrationProblem& problem() const;
+  [[nodiscard]] const RegistrationOptions& options() const;
+
+ private:
+  struct Impl;
+  explicit RegistrationRunner(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace af::registration
