@@ -73,6 +73,12 @@ class StoppedError : public Error {
   explicit StoppedError(const std::string& message) : Error(ExitCode::Stopped, message) {}
 };
 
+/// An error that happened on some rank, thrown again on all of them with its exit code.
+class RemoteError : public Error {
+ public:
+  RemoteError(ExitCode exit_code, const std::string& message) : Error(exit_code, message) {}
+};
+
 /// A broken promise of the caller (a defect, not bad input); becomes exit code 6.
 void check(bool condition,
            const char* message,

@@ -1,1 +1,92 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "cli/app_main.h"
+
+#include <iostream>
+
+#include "base/build_info.h"
+#include "base/error.h"
+#include "parallel/mpi_environment.h"
+
+namespace af::cli {
+
+namespace {
+
+std::string shell_quoted(const std::string& word) {
+  const std::string plain =
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-+=:,./@%";
+  if (!word.empty() && word.find_first_not_of(plain) == std::string::npos) return word;
+  std::string quoted = "'";
+  for (const char character : word)
+    quoted += character == '\'' ? std::string("'\\''") : std::string(1, character);
+  return quoted + "'";
+}
+
+std::string program_name(const std::string& path) {
+  return path.substr(path.find_last_of('/') + 1);
+}
+
+/// Help and version end with 0, every other parse problem with 2; rank 0 prints.
+int report_parse_result(const CLI::App& app, const CLI::ParseError& error, bool prints) {
+  const bool is_success = error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success);
+  if (prints) {
+    if (is_success)
+      app.exit(error, std::cout, std::cerr);
+    else
+      std::cerr << app.get_name() << ": " << error.what()
+                << "\nRun with --help for more information.\n";
+  }
+  return static_cast<int>(is_success ? ExitCode::Done : ExitCode::Usage);
+}
+
+}  // namespace
+
+int app_main(CLI::App& app,
+             int argc,
+             char** argv,
+             const std::function<void(const Communicator&)>& run) {
+  const MpiEnvironment environment(argc, argv);
+  const Communicator world = Communicator::world();
+  app.name(program_name(argv[0]));
+  app.set_version_flag("--version", app.get_name() + " " + std::string(program_version()));
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return report_parse_result(app, error, world.is_root());
+  }
+  RankFailure failure;
+  bool is_known_everywhere = false;
+  try {
+    run(world);
+    return static_cast<int>(ExitCode::Done);
+  } catch (const RemoteError& error) {
+    failure = {static_cast<int>(error.exit_code()), error.what()};
+    is_known_everywhere = true;
+  } catch (...) {
+    failure = failure_of(std::current_exception());
+  }
+  // An error thrown on all ranks alike is printed once; one that this rank met alone ends the job,
+  // or the others would wait for it in their next collective call.
+  if (is_known_everywhere || world.size() == 1) {
+    if (world.is_root()) std::cerr << app.get_name() << ": " << failure.message << '\n';
+    return failure.exit_code;
+  }
+  std::cerr << app.get_name() << ": rank " << world.rank() << ": " << failure.message << std::endl;
+  MpiEnvironment::abort(failure.exit_code);
+  return failure.exit_code;
+}
+
+std::string command_line(int argc, char** argv) {
+  std::string line;
+  for (int i = 0; i < argc; ++i) line += (i > 0 ? " " : "") + shell_quoted(argv[i]);
+  return line;
+}
+
+void info(const Communicator& communicator, const std::string& message) {
+  if (communicator.is_root()) std::cerr << message << '\n';
+}
+
+void warn(const Communicator& communicator, const std::string& message) {
+  if (communicator.is_root()) std::cerr << "warning: " << message << '\n';
+}
+
+}  // namespace af::cli

@@ -72,8 +72,13 @@ Image2d render_image(const DrrRenderer& renderer,
                      const View& view,
                      std::int64_t* rays_outside = nullptr);
 
-/// Derivatives by central differences of render() (steps 1e-3 rad, 0.1 mm... see the definition):
-/// for renderers without analytic ones, and the oracle of those with them.
+/// Steps of central_difference_gradients(): large against single-precision noise of a DRR, small
+/// against its structures.
+inline constexpr double kGradientStepRad = 1e-3;
+inline constexpr double kGradientStepMm = 0.1;
+
+/// Derivatives by central differences of render(): for renderers without analytic ones, and the
+/// oracle of those with them.
 RenderStatus central_difference_gradients(const DrrRenderer& renderer,
                                           const RigidTransform& room_from_ct,
                                           const View& view,

@@ -1,1 +1,35 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "drr/ray_cast_drr.h"
+
+namespace af {
+
+RayFan ray_fan(const RigidTransform& room_from_ct, const View& view) {
+  const RigidTransform ct_from_room = room_from_ct.inverse();
+  const CameraGeometry& camera = view.camera;
+  return {ct_from_room * camera.source_point,
+          ct_from_room * camera.detector_point(view.roi.column, view.roi.row),
+          ct_from_room.linear() * (camera.pixel_spacing_mm.x() * camera.column_direction),
+          ct_from_room.linear() * (camera.pixel_spacing_mm.y() * camera.row_direction),
+          view.roi.width,
+          view.roi.height};
+}
+
+RayCastDrr::RayCastDrr(std::shared_ptr<const AttenuationVolume> volume,
+                       const RayCasterOptions& options)
+    : volume_(std::move(volume)), caster_(*volume_, options) {}
+
+RenderStatus RayCastDrr::render(const RigidTransform& room_from_ct,
+                                const View& view,
+                                RenderWorkspace& workspace,
+                                std::span<float> total_attenuation,
+                                const std::optional<PoseGradients>& gradients) const {
+  caster_.cast(ray_fan(room_from_ct, view), total_attenuation);
+  if (gradients) central_difference_gradients(*this, room_from_ct, view, workspace, *gradients);
+  return {};
+}
+
+std::unique_ptr<RenderWorkspace> RayCastDrr::make_workspace() const {
+  return std::make_unique<RenderWorkspace>();
+}
+
+}  // namespace af

@@ -266,7 +266,7 @@ std::array<Eigen::Vector3d, 8> CtBox::corner_points() const {
 LightSlab make_light_slab(const CameraGeometry& camera,
                           const PoseFrame& frame,
                           const MotionRange& range,
-                          const CtBox& attenuating_box_ct,
+                          const std::array<Eigen::Vector3d, 8>& attenuating_corners_ct,
                           const LightSlabSpec& spec) {
   check(spec.st_plane_y_mm.size() == spec.slab_boundaries_y_mm.size() + 1,
         "one (s,t) plane per slab");
@@ -274,7 +274,7 @@ LightSlab make_light_slab(const CameraGeometry& camera,
   light_slab.slab_from_ct = slab_from_ct_at_nominal(camera, frame);
   light_slab.uv_plane_y_mm = MovingCamera(camera, frame, range).nominal_source_y_mm();
 
-  std::array<Eigen::Vector3d, 8> corners = attenuating_box_ct.corner_points();
+  std::array<Eigen::Vector3d, 8> corners = attenuating_corners_ct;
   double highest_ct_y_mm = -kInfinity;
   for (Eigen::Vector3d& corner : corners) {
     corner = light_slab.slab_from_ct * corner;

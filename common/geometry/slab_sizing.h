@@ -41,7 +41,7 @@ double lowest_source_y_mm(const CameraGeometry& camera,
                           const PoseFrame& frame,
                           const MotionRange& range);
 
-/// Corners of a box in the ct frame (mm).
+/// An axis-aligned box in the ct frame (mm).
 struct CtBox {
   Eigen::Vector3d low_mm;
   Eigen::Vector3d high_mm;
@@ -63,7 +63,7 @@ struct LightSlabSpec {
 LightSlab make_light_slab(const CameraGeometry& camera,
                           const PoseFrame& frame,
                           const MotionRange& range,
-                          const CtBox& attenuating_box_ct,
+                          const std::array<Eigen::Vector3d, 8>& attenuating_corners_ct,
                           const LightSlabSpec& spec);
 
 /// The paper's symmetric special case: eqs. (3)-(10) for a camera on the y axis moved by T = T_t Rz

@@ -1,1 +1,242 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "parallel/communicator.h"
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <stdexcept>
+
+#include "base/error.h"
+#include "parallel/mpi_handle.h"
+
+namespace af {
+
+namespace {
+
+/// MPI counts are int: longer messages go in pieces.
+constexpr std::size_t kLargestPiece = std::size_t{1} << 30;
+
+void require_success(int code, const char* call) {
+  if (code == MPI_SUCCESS) return;
+  throw std::runtime_error(std::string(call) + " failed with MPI error " + std::to_string(code));
+}
+
+void reduce_in_place(MPI_Comm communicator, std::span<std::uint64_t> values, MPI_Op operation) {
+  constexpr std::size_t kPiece = kLargestPiece / sizeof(std::uint64_t);
+  for (std::size_t first = 0; first < values.size(); first += kPiece) {
+    const std::size_t count = std::min(kPiece, values.size() - first);
+    require_success(MPI_Allreduce(MPI_IN_PLACE,
+                                  values.data() + first,
+                                  static_cast<int>(count),
+                                  MPI_UINT64_T,
+                                  operation,
+                                  communicator),
+                    "MPI_Allreduce");
+  }
+}
+
+void broadcast_bytes(MPI_Comm communicator, std::span<std::byte> bytes) {
+  for (std::size_t first = 0; first < bytes.size(); first += kLargestPiece) {
+    const std::size_t count = std::min(kLargestPiece, bytes.size() - first);
+    require_success(
+        MPI_Bcast(bytes.data() + first, static_cast<int>(count), MPI_BYTE, 0, communicator),
+        "MPI_Bcast");
+  }
+}
+
+std::uint64_t broadcast_size(MPI_Comm communicator, std::uint64_t size) {
+  require_success(MPI_Bcast(&size, 1, MPI_UINT64_T, 0, communicator), "MPI_Bcast");
+  return size;
+}
+
+std::vector<std::byte> bytes_of(const RankFailure& failure) {
+  std::vector<std::byte> bytes(sizeof(int) + failure.message.size());
+  std::memcpy(bytes.data(), &failure.exit_code, sizeof(int));
+  std::memcpy(bytes.data() + sizeof(int), failure.message.data(), failure.message.size());
+  return bytes;
+}
+
+RankFailure failure_from(std::span<const std::byte> bytes) {
+  RankFailure failure;
+  std::memcpy(&failure.exit_code, bytes.data(), sizeof(int));
+  failure.message.assign(reinterpret_cast<const char*>(bytes.data()) + sizeof(int),
+                         bytes.size() - sizeof(int));
+  return failure;
+}
+
+/// A shared-memory window and the handle that frees it on every rank.
+struct NodeWindow {
+  MPI_Win window = MPI_WIN_NULL;
+  ~NodeWindow() {
+    if (window != MPI_WIN_NULL) MPI_Win_free(&window);
+  }
+};
+
+}  // namespace
+
+Communicator::Impl::~Impl() {
+  if (is_owned && handle != MPI_COMM_NULL) MPI_Comm_free(&handle);
+}
+
+Communicator Communicator::world() {
+  return Communicator(std::make_shared<Impl>(MPI_COMM_WORLD, false));
+}
+
+int Communicator::rank() const {
+  int rank = 0;
+  MPI_Comm_rank(impl_->handle, &rank);
+  return rank;
+}
+
+int Communicator::size() const {
+  int size = 1;
+  MPI_Comm_size(impl_->handle, &size);
+  return size;
+}
+
+void Communicator::barrier() const {
+  require_success(MPI_Barrier(impl_->handle), "MPI_Barrier");
+}
+
+void Communicator::sum(std::span<std::uint64_t> values) const {
+  reduce_in_place(impl_->handle, values, MPI_SUM);
+}
+
+void Communicator::maximum(std::span<std::uint64_t> values) const {
+  reduce_in_place(impl_->handle, values, MPI_MAX);
+}
+
+void Communicator::broadcast(std::vector<std::byte>& bytes) const {
+  bytes.resize(broadcast_size(impl_->handle, bytes.size()));
+  broadcast_bytes(impl_->handle, bytes);
+}
+
+void Communicator::broadcast(std::string& text) const {
+  text.resize(broadcast_size(impl_->handle, text.size()));
+  broadcast_bytes(impl_->handle, std::as_writable_bytes(std::span(text)));
+}
+
+std::vector<std::vector<std::byte>> Communicator::all_gather(
+    std::span<const std::byte> mine) const {
+  std::vector<std::vector<std::byte>> parts(static_cast<std::size_t>(size()));
+  for (int source = 0; source < size(); ++source) {
+    auto& part = parts[static_cast<std::size_t>(source)];
+    if (source == rank()) part.assign(mine.begin(), mine.end());
+    std::uint64_t bytes = part.size();
+    require_success(MPI_Bcast(&bytes, 1, MPI_UINT64_T, source, impl_->handle), "MPI_Bcast");
+    part.resize(bytes);
+    for (std::size_t first = 0; first < part.size(); first += kLargestPiece)
+      require_success(MPI_Bcast(part.data() + first,
+                                static_cast<int>(std::min(kLargestPiece, part.size() - first)),
+                                MPI_BYTE,
+                                source,
+                                impl_->handle),
+                      "MPI_Bcast");
+  }
+  return parts;
+}
+
+std::vector<std::vector<std::byte>> Communicator::gather(std::span<const std::byte> mine) const {
+  constexpr int kTag = 1;
+  std::vector<std::vector<std::byte>> parts;
+  if (!is_root()) {
+    const std::uint64_t bytes = mine.size();
+    require_success(MPI_Send(&bytes, 1, MPI_UINT64_T, 0, kTag, impl_->handle), "MPI_Send");
+    for (std::size_t first = 0; first < mine.size(); first += kLargestPiece)
+      require_success(MPI_Send(mine.data() + first,
+                               static_cast<int>(std::min(kLargestPiece, mine.size() - first)),
+                               MPI_BYTE,
+                               0,
+                               kTag,
+                               impl_->handle),
+                      "MPI_Send");
+    return parts;
+  }
+  parts.resize(static_cast<std::size_t>(size()));
+  parts[0].assign(mine.begin(), mine.end());
+  for (int source = 1; source < size(); ++source) {
+    auto& part = parts[static_cast<std::size_t>(source)];
+    std::uint64_t bytes = 0;
+    require_success(
+        MPI_Recv(&bytes, 1, MPI_UINT64_T, source, kTag, impl_->handle, MPI_STATUS_IGNORE),
+        "MPI_Recv");
+    part.resize(bytes);
+    for (std::size_t first = 0; first < part.size(); first += kLargestPiece)
+      require_success(MPI_Recv(part.data() + first,
+                               static_cast<int>(std::min(kLargestPiece, part.size() - first)),
+                               MPI_BYTE,
+                               source,
+                               kTag,
+                               impl_->handle,
+                               MPI_STATUS_IGNORE),
+                      "MPI_Recv");
+  }
+  return parts;
+}
+
+Communicator Communicator::node() const {
+  MPI_Comm node_handle = MPI_COMM_NULL;
+  require_success(
+      MPI_Comm_split_type(impl_->handle, MPI_COMM_TYPE_SHARED, rank(), MPI_INFO_NULL, &node_handle),
+      "MPI_Comm_split_type");
+  return Communicator(std::make_shared<Impl>(node_handle, true));
+}
+
+std::shared_ptr<const std::byte> Communicator::allocate_on_node(
+    std::size_t bytes, const std::function<void(std::span<std::byte>)>& fill) const {
+  const Communicator on_node = node();
+  auto owner = std::make_shared<NodeWindow>();
+  std::byte* base = nullptr;
+  const auto my_bytes = static_cast<MPI_Aint>(on_node.is_root() ? bytes : 0);
+  require_success(MPI_Win_allocate_shared(
+                      my_bytes, 1, MPI_INFO_NULL, on_node.impl_->handle, &base, &owner->window),
+                  "MPI_Win_allocate_shared");
+  MPI_Aint shared_bytes = 0;
+  int unit = 1;
+  require_success(MPI_Win_shared_query(owner->window, 0, &shared_bytes, &unit, &base),
+                  "MPI_Win_shared_query");
+  all_or_none(on_node, [&] {
+    if (on_node.is_root()) fill(std::span<std::byte>(base, bytes));
+  });
+  on_node.barrier();
+  return {owner, base};
+}
+
+RankFailure first_failure(const Communicator& communicator, const RankFailure& mine) {
+  // The common case costs one small reduction; texts travel only when somebody failed.
+  std::array<std::uint64_t, 1> any{mine.exit_code != 0 ? std::uint64_t{1} : std::uint64_t{0}};
+  communicator.maximum(any);
+  if (any[0] == 0) return {};
+  const auto parts = communicator.all_gather(bytes_of(mine));
+  for (std::size_t rank = 0; rank < parts.size(); ++rank) {
+    RankFailure failure = failure_from(parts[rank]);
+    if (failure.exit_code == 0) continue;
+    // When every rank met the same error, as with a bad option, its rank says nothing.
+    const bool is_shared = std::all_of(
+        parts.begin(), parts.end(), [&](const auto& part) { return part == parts[rank]; });
+    if (!is_shared && parts.size() > 1)
+      failure.message = "rank " + std::to_string(rank) + ": " + failure.message;
+    return failure;
+  }
+  return {};
+}
+
+RankFailure failure_of(const std::exception_ptr& error) {
+  try {
+    std::rethrow_exception(error);
+  } catch (const Error& known) {
+    return {static_cast<int>(known.exit_code()), known.what()};
+  } catch (const std::bad_alloc&) {
+    return {static_cast<int>(ExitCode::Internal), "out of memory"};
+  } catch (const std::exception& unknown) {
+    return {static_cast<int>(ExitCode::Internal), std::string("internal error: ") + unknown.what()};
+  } catch (...) {
+    return {static_cast<int>(ExitCode::Internal), "internal error"};
+  }
+}
+
+void throw_failure(const RankFailure& failure) {
+  throw RemoteError(static_cast<ExitCode>(failure.exit_code), failure.message);
+}
+
+}  // namespace af

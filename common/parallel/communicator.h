@@ -71,7 +71,7 @@ RankFailure first_failure(const Communicator& communicator, const RankFailure& m
 /// The failure that an exception means, as app_main reports it.
 RankFailure failure_of(const std::exception_ptr& error);
 
-/// Throws the error of a failure: InputError, FileError, ... by exit code.
+/// Throws the failure as a RemoteError with its exit code.
 [[noreturn]] void throw_failure(const RankFailure& failure);
 
 /// Collective. Runs `function` on every rank; when it throws on any, every rank throws the same

@@ -1,1 +1,126 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "volume/attenuation_volume.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "base/error.h"
+
+namespace af {
+
+namespace {
+
+/// Inclusive voxel ranges of the attenuating part of a CT.
+struct VoxelBox {
+  std::array<int, 3> low;
+  std::array<int, 3> high;
+};
+
+std::size_t voxel_offset(const std::array<int, 3>& size, int i, int j, int k) {
+  return (static_cast<std::size_t>(k) * static_cast<std::size_t>(size[1]) +
+          static_cast<std::size_t>(j)) *
+             static_cast<std::size_t>(size[0]) +
+         static_cast<std::size_t>(i);
+}
+
+VoxelBox attenuating_box(const CtVolume& ct, const AttenuationModel& model) {
+  const auto& size = ct.grid.size;
+  VoxelBox box{size, {-1, -1, -1}};
+  for (int k = 0; k < size[2]; ++k)
+    for (int j = 0; j < size[1]; ++j) {
+      const std::int16_t* row = ct.hu.data() + voxel_offset(size, 0, j, k);
+      const auto attenuates = [&](std::int16_t hu) { return model.relative_attenuation(hu) > 0; };
+      const std::int16_t* first = std::find_if(row, row + size[0], attenuates);
+      if (first == row + size[0]) continue;
+      int last = size[0] - 1;
+      while (!attenuates(row[last])) --last;
+      const std::array<int, 3> low{static_cast<int>(first - row), j, k};
+      const std::array<int, 3> high{last, j, k};
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        box.low[axis] = std::min(box.low[axis], low[axis]);
+        box.high[axis] = std::max(box.high[axis], high[axis]);
+      }
+    }
+  if (box.high[0] < 0)
+    throw InputError("the CT is all air: no voxel reaches " + std::to_string(model.air_below_hu) +
+                     " HU");
+  return box;
+}
+
+CtGrid bordered_grid(const CtGrid& grid, const VoxelBox& box) {
+  CtGrid bordered = grid;
+  double voxels = 1.0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    bordered.size[axis] = box.high[axis] - box.low[axis] + 3;
+    voxels *= bordered.size[axis];
+  }
+  // The kernels address voxels by signed 32-bit offsets.
+  if (voxels >= static_cast<double>(std::numeric_limits<std::int32_t>::max()))
+    throw InputError("CT size",
+                     std::to_string(voxels) + " voxels",
+                     "the attenuating part must have fewer than 2^31 voxels");
+  bordered.origin_mm =
+      grid.point_mm(Eigen::Vector3d(box.low[0] - 1, box.low[1] - 1, box.low[2] - 1));
+  return bordered;
+}
+
+}  // namespace
+
+std::vector<std::string> problems(const AttenuationModel& model) {
+  std::vector<std::string> found;
+  if (!(model.mu_water_per_mm > 0.0 && model.mu_water_per_mm <= 1.0))
+    found.push_back("water_mu_per_mm = " + std::to_string(model.mu_water_per_mm) +
+                    ": must be above 0 and at most 1");
+  if (model.air_below_hu < -1000 || model.air_below_hu > 0)
+    found.push_back("air_below_hu = " + std::to_string(model.air_below_hu) +
+                    ": must be within -1000 and 0");
+  return found;
+}
+
+AttenuationVolume::AttenuationVolume(const CtVolume& ct, const AttenuationModel& model)
+    : model_(model) {
+  throw_if_any(problems(model));
+  const VoxelBox box = attenuating_box(ct, model);
+  grid_ = bordered_grid(ct.grid, box);
+  std::vector<std::uint16_t> voxels(grid_.voxel_count());
+  std::uint16_t largest = 0;
+  for (int k = box.low[2]; k <= box.high[2]; ++k)
+    for (int j = box.low[1]; j <= box.high[1]; ++j) {
+      const std::int16_t* from = ct.hu.data() + voxel_offset(ct.grid.size, box.low[0], j, k);
+      std::uint16_t* to =
+          voxels.data() + voxel_offset(grid_.size, 1, j - box.low[1] + 1, k - box.low[2] + 1);
+      for (int i = 0; i <= box.high[0] - box.low[0]; ++i) {
+        to[i] = model.relative_attenuation(from[i]);
+        largest = std::max(largest, to[i]);
+      }
+    }
+  voxels_ = SharedArray<std::uint16_t>(std::move(voxels));
+  max_mu_per_mm_ = largest * model.mu_per_mm_per_unit();
+}
+
+AttenuationVolume::AttenuationVolume(const CtGrid& bordered_grid,
+                                     const AttenuationModel& model,
+                                     SharedArray<std::uint16_t> voxels)
+    : grid_(bordered_grid), model_(model), voxels_(std::move(voxels)) {
+  check(voxels_.size() == grid_.voxel_count() && voxels_.size() > 0, "one voxel per grid point");
+  max_mu_per_mm_ =
+      *std::max_element(voxels_.view().begin(), voxels_.view().end()) * model.mu_per_mm_per_unit();
+}
+
+std::array<Eigen::Vector3d, 8> AttenuationVolume::corner_points() const {
+  std::array<Eigen::Vector3d, 8> corners;
+  for (unsigned corner = 0; corner < 8; ++corner) {
+    Eigen::Vector3d index;
+    for (unsigned axis = 0; axis < 3; ++axis)
+      index[axis] = (corner >> axis & 1u) != 0 ? grid_.size[axis] - 1 : 0;
+    corners[corner] = grid_.point_mm(index);
+  }
+  return corners;
+}
+
+double AttenuationVolume::max_total_attenuation() const {
+  const Eigen::Vector3d extent_mm = corner_points().back() - corner_points().front();
+  return max_mu_per_mm_ * extent_mm.norm();
+}
+
+}  // namespace af

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "parallel/communicator.h"
+
+#include <cstring>
+
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+
+namespace af {
+namespace {
+
+TEST(Communicator, SumsExactlyOverRanks) {
+  const Communicator world = Communicator::world();
+  std::vector<std::uint64_t> values{
+      1, static_cast<std::uint64_t>(world.rank()), std::uint64_t{1} << 60};
+  world.sum(values);
+  const auto n = static_cast<std::uint64_t>(world.size());
+  EXPECT_EQ(values, (std::vector<std::uint64_t>{n, n * (n - 1) / 2, n << 60}));
+}
+
+TEST(Communicator, BroadcastReplacesTextOfAnyLength) {
+  const Communicator world = Communicator::world();
+  std::string text = world.is_root() ? std::string(100000, 'x') : "other";
+  world.broadcast(text);
+  EXPECT_EQ(text, std::string(100000, 'x'));
+}
+
+TEST(Communicator, GathersPartsInRankOrderAlsoEmptyOnes) {
+  const Communicator world = Communicator::world();
+  const std::vector<std::byte> mine(static_cast<std::size_t>(world.rank()),
+                                    std::byte(world.rank()));
+  const auto everywhere = world.all_gather(mine);
+  ASSERT_EQ(everywhere.size(), static_cast<std::size_t>(world.size()));
+  for (std::size_t rank = 0; rank < everywhere.size(); ++rank)
+    EXPECT_EQ(everywhere[rank], std::vector<std::byte>(rank, std::byte(rank)));
+  const auto on_root = world.gather(mine);
+  if (world.is_root())
+    EXPECT_EQ(on_root, everywhere);
+  else
+    EXPECT_TRUE(on_root.empty());
+}
+
+TEST(Communicator, NodeMemoryIsFilledOnceAndSeenByAll) {
+  const Communicator world = Communicator::world();
+  const auto memory = world.allocate_on_node(
+      1000, [](std::span<std::byte> bytes) { std::memset(bytes.data(), 7, bytes.size()); });
+  EXPECT_EQ(memory.get()[999], std::byte(7));
+}
+
+TEST(AllOrNone, ThrowsTheLoneRanksErrorEverywhere) {
+  const Communicator world = Communicator::world();
+  const int failing = world.size() - 1;
+  try {
+    all_or_none(world, [&] {
+      if (world.rank() == failing) throw InputError("size", "7", "must be even", "a.toml");
+    });
+    ADD_FAILURE() << "no error on rank " << world.rank();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.exit_code(), ExitCode::Input);
+    EXPECT_NE(std::string(error.what()).find("a.toml: size = 7: must be even"), std::string::npos);
+    if (world.size() > 1) {
+      EXPECT_EQ(std::string(error.what()).rfind("rank " + std::to_string(failing) + ": ", 0), 0u);
+    }
+  }
+}
+
+TEST(AllOrNone, ReturnsEachRanksOwnValue) {
+  const Communicator world = Communicator::world();
+  EXPECT_EQ(all_or_none(world, [&] { return world.rank(); }), world.rank());
+}
+
+}  // namespace
+}  // namespace af
