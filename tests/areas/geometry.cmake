@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+af_add_test(slab_sizing_test SOURCES unit/geometry/slab_sizing_test.cpp LIBS af_geometry)
