@@ -153,6 +153,15 @@ std::vector<std::string> problems(const RegistrationOptions& options) {
   return found;
 }
 
+std::vector<PassOptions> paper_passes() {
+  PassOptions smoothed;
+  smoothed.smoothing_sigma_mm = 1.0;
+  smoothed.optimizer = {5.0, 0.5};
+  PassOptions sharp;
+  sharp.optimizer = {2.0, 0.1};
+  return {smoothed, sharp};
+}
+
 std::vector<std::string> preset_names() {
   return {"paper"};
 }

@@ -1,0 +1,10 @@
+# SPDX-License-Identifier: Apache-2.0
+af_add_test(
+  register_tests
+  SOURCES unit/register/mutual_information_test.cpp
+          unit/register/cross_correlation_test.cpp
+          unit/register/best_neighbor_search_test.cpp
+          unit/register/parameter_scaling_test.cpp
+          unit/register/multi_view_objective_test.cpp
+          unit/register/registration_test.cpp
+  LIBS af_registration)

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "register/multi_view_objective.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "unit/register/registration_cases.h"
+
+namespace af::registration {
+namespace {
+
+/// Counts its calls and reports rays outside beyond tx = 3 mm.
+class CountingRenderer final : public DrrRenderer {
+ public:
+  RenderStatus render(const RigidTransform& room_from_ct,
+                      const View& /*view*/,
+                      RenderWorkspace& /*workspace*/,
+                      std::span<float> total_attenuation,
+                      const std::optional<PoseGradients>& /*gradients*/) const override {
+    ++calls;
+    for (float& value : total_attenuation) value = 0.0f;
+    return {room_from_ct.translation().x() > 3.0 ? 7 : 0};
+  }
+  [[nodiscard]] std::unique_ptr<RenderWorkspace> make_workspace() const override {
+    return std::make_unique<RenderWorkspace>();
+  }
+  [[nodiscard]] const char* name() const override { return "counting"; }
+  mutable int calls = 0;
+};
+
+class ConstantMeasure final : public SimilarityMeasure {
+ public:
+  explicit ConstantMeasure(double value) : value_(value) {}
+  [[nodiscard]] double evaluate(std::span<const float> /*drr*/,
+                                SimilarityWorkspace& /*workspace*/) const override {
+    return value_;
+  }
+  [[nodiscard]] std::unique_ptr<SimilarityWorkspace> make_workspace() const override {
+    return std::make_unique<SimilarityWorkspace>();
+  }
+
+ private:
+  double value_;
+};
+
+struct Fixture {
+  std::shared_ptr<CountingRenderer> renderer = std::make_shared<CountingRenderer>();
+
+  MultiViewObjective objective(std::optional<MotionLimit> limit = std::nullopt) const {
+    std::vector<ObjectiveView> views;
+    for (int i = 0; i < 3; ++i) {
+      ObjectiveView view;
+      view.view.camera = test::small_camera(i % 2 == 1);
+      view.view.roi = {0, 0, 4, 4};
+      view.renderer = renderer;
+      view.measure = std::make_shared<ConstantMeasure>(1.0 + i);
+      view.limit = limit;
+      views.push_back(view);
+    }
+    return MultiViewObjective(std::move(views));
+  }
+};
+
+RigidTransform shifted(double tx_mm) {
+  RigidTransform pose = RigidTransform::Identity();
+  pose.translation().x() = tx_mm;
+  return pose;
+}
+
+TEST(MultiViewObjective, IsTheSumOverItsViews) {
+  const Fixture fixture;
+  const ObjectiveValue value = fixture.objective().evaluate(shifted(0.0));
+  EXPECT_TRUE(value.is_admissible);
+  EXPECT_EQ(value.similarity, 1.0 + 2.0 + 3.0);
+  EXPECT_EQ(value.drr_count, 3);
+}
+
+TEST(MultiViewObjective, APoseWithARayOutsideIsInadmissible) {
+  const Fixture fixture;
+  const ObjectiveValue value = fixture.objective().evaluate(shifted(3.5));
+  EXPECT_FALSE(value.is_admissible);
+  EXPECT_TRUE(std::isnan(value.similarity));
+  EXPECT_EQ(value.rays_outside, 7);
+  // The first view decides; the others are not rendered.
+  EXPECT_EQ(fixture.renderer->calls, 1);
+}
+
+TEST(MultiViewObjective, APoseBeyondTheMotionRangeCostsNoDrr) {
+  const Fixture fixture;
+  MotionLimit limit;
+  limit.range.max_translation_mm = 2.0;
+  const ObjectiveValue value = fixture.objective(limit).evaluate(shifted(2.5));
+  EXPECT_FALSE(value.is_admissible);
+  EXPECT_EQ(value.drr_count, 0);
+  EXPECT_EQ(fixture.renderer->calls, 0);
+  EXPECT_TRUE(fixture.objective(limit).evaluate(shifted(1.5)).is_admissible);
+}
+
+}  // namespace
+}  // namespace af::registration
