@@ -1,0 +1,83 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# Installs the Debian 12 packages that building and running needs. Idempotent: with everything in place it
+# asks dpkg only and ends at once. Needs root or sudo only when something is missing.
+set -euo pipefail
+
+# Compilers and build tools, libraries, figures, and the default CT (invesalius-examples).
+base_packages=(
+  g++-12 cmake ninja-build pkg-config
+  libopenmpi-dev openmpi-bin libhdf5-openmpi-dev
+  libinsighttoolkit5-dev
+  libeigen3-dev libcli11-dev libtomlplusplus-dev nlohmann-json3-dev libspdlog-dev libssl-dev libboost-math-dev
+  libgtest-dev libgmock-dev
+  libcairo2-dev fonts-dejavu-core gnuplot-nox
+  invesalius-examples
+)
+lint_packages=(clang-format-14 clang-tidy-14 shellcheck)
+
+usage() {
+  cat <<'TEXT'
+Usage: jobs/install-packages.sh [--with-lint] [--check] [--help]
+
+Installs the Debian 12 packages that the project needs to build, run and pass its tests. Says what it does; does
+nothing when all are there. Needs root or sudo only to install.
+
+  --with-lint   also the formatter and the linters (clang-format-14, clang-tidy-14, shellcheck)
+  --check       only say what is missing; exit 1 when something is
+TEXT
+}
+
+is_installed() {
+  [[ "$(dpkg-query --show --showformat '${db:Status-Status}' "$1" 2>/dev/null || true)" == installed ]]
+}
+
+main() {
+  local packages=("${base_packages[@]}") check_only=no
+  while (($# > 0)); do
+    case "$1" in
+      --with-lint) packages+=("${lint_packages[@]}") ;;
+      --check) check_only=yes ;;
+      --help | -h) usage; return 0 ;;
+      *)
+        echo "install-packages.sh: unknown option '$1' (try --help)" >&2
+        return 2
+        ;;
+    esac
+    shift
+  done
+  if ! command -v dpkg-query >/dev/null; then
+    echo "install-packages.sh: this is not a Debian system (no dpkg). Install the equivalents of: ${packages[*]}" >&2
+    return 1
+  fi
+
+  local missing=() package
+  for package in "${packages[@]}"; do
+    is_installed "$package" || missing+=("$package")
+  done
+  if ((${#missing[@]} == 0)); then
+    echo "Packages: all ${#packages[@]} are installed, nothing to do."
+    return 0
+  fi
+  echo "Packages: ${#missing[@]} of ${#packages[@]} are missing: ${missing[*]}"
+  if [[ "$check_only" == yes ]]; then
+    return 1
+  fi
+
+  local as_root=()
+  if ((EUID != 0)); then
+    if ! command -v sudo >/dev/null; then
+      echo "Neither root nor sudo: ask an administrator to run" >&2
+      echo "  apt-get update && apt-get install --no-install-recommends ${missing[*]}" >&2
+      return 1
+    fi
+    as_root=(sudo)
+  fi
+  echo "Packages: running apt-get update and apt-get install (log on standard output)"
+  "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get update --quiet
+  "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
+    apt-get install --yes --quiet --no-install-recommends "${missing[@]}"
+  echo "Packages: installed ${missing[*]}"
+}
+
+main "$@"

@@ -1,0 +1,76 @@
+# shellcheck shell=bash
+# SPDX-License-Identifier: Apache-2.0
+# Shared by the scripts of jobs/, tests/ and .ci/: messages, building, mpirun. Sourced, never run; the caller has set
+# `set -euo pipefail`.
+
+# The repository (or, installed, the folder that holds jobs/).
+af_root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
+
+# shellcheck disable=SC2034  # for the scripts that source this file
+af_programs=(af-precompute af-drr af-simulate af-register af-evaluate af-inspect)
+
+say() { printf '%s\n' "$*"; }
+
+die() {
+  local code=$1
+  shift
+  printf '%s: %s\n' "$(basename "$0")" "$*" >&2
+  exit "$code"
+}
+
+# 75 -> "1 min 15 s"
+duration() {
+  local seconds=$1
+  if ((seconds < 60)); then
+    printf '%d s' "$seconds"
+  elif ((seconds < 3600)); then
+    printf '%d min %02d s' $((seconds / 60)) $((seconds % 60))
+  else
+    printf '%d h %02d min' $((seconds / 3600)) $((seconds % 3600 / 60))
+  fi
+}
+
+core_count() { nproc 2>/dev/null || echo 1; }
+
+# One compiler per core, but not more than memory allows (the ITK and CLI11 files need up to about 1.5 GB each).
+build_job_count() {
+  local cores memory_kb
+  cores=$(core_count)
+  memory_kb=$(awk '/^MemAvailable:/ {print $2}' /proc/meminfo 2>/dev/null || echo 4000000)
+  local by_memory=$((memory_kb / 1500000))
+  ((by_memory >= 1)) || by_memory=1
+  echo $((cores < by_memory ? cores : by_memory))
+}
+
+# build_preset PRESET LOG [TARGET...]: configures (when needed) and builds build/PRESET; all targets when none is named.
+build_preset() {
+  local preset=$1 log=$2
+  shift 2
+  local folder="$af_root/build/$preset" cache="$af_root/build/$preset/CMakeCache.txt"
+  if [[ -f "$cache" ]] && ! grep -Fxq "CMAKE_HOME_DIRECTORY:INTERNAL=$af_root" "$cache"; then
+    say "  build/$preset was made for another place of this tree: starting it anew"
+    rm -rf "$folder"
+  fi
+  mkdir -p "$folder"
+  local launcher=()
+  if command -v ccache >/dev/null; then
+    launcher=(-DCMAKE_CXX_COMPILER_LAUNCHER=ccache)
+  fi
+  if ! (cd "$af_root" && { [[ -f "$folder/build.ninja" ]] || cmake --preset "$preset" "${launcher[@]}"; } &&
+    cmake --build "$folder" --parallel "$(build_job_count)" ${1+--target "$@"}) >"$log" 2>&1; then
+    tail -n 40 "$log" >&2
+    die 1 "the build failed; the whole log is $log"
+  fi
+}
+
+# Several ranks of a program on this machine: works as root, with more ranks than cores, in containers.
+run_ranks() {
+  local ranks=$1
+  shift
+  if ((ranks == 1)); then
+    "$@"
+    return
+  fi
+  OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 \
+    mpirun -n "$ranks" --oversubscribe --bind-to none "$@"
+}
