@@ -1,0 +1,33 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# The tree holds no path of anybody's machine, every source names its licence, and every text file ends with a line
+# end. Usage: tree.sh ROOT
+set -euo pipefail
+# shellcheck source-path=SCRIPTDIR
+source "$(dirname "$0")/source_files.sh"
+root=$1
+mapfile -d '' -t files < <(list_sources "$root" '*.h' '*.cpp' '*.in' '*.txt' '*.cmake' '*.sh' '*.md' '*.toml' '*.json')
+((${#files[@]} > 0)) || { echo "no sources found below $root" >&2; exit 1; }
+cd "$root"
+failed=no
+# A home folder, a scratch folder of one session, or a mount of one machine.
+if grep -nE '(^|[^[:alnum:]._$}/-])/(home/[a-z]|root/|work/|mnt/|Users/|tmp/[a-z]+/)' -- "${files[@]}"; then
+  echo "tree: the lines above hold a path of one machine" >&2
+  failed=yes
+fi
+for file in "${files[@]}"; do
+  if [[ -s "$file" && -n "$(tail -c 1 "$file")" ]]; then
+    echo "$file: no line end at the end of the file" >&2
+    failed=yes
+  fi
+  case "$file" in
+    *.h | *.cpp | *.cmake | *.sh | */CMakeLists.txt | CMakeLists.txt)
+      if ! head -n 3 "$file" | grep -q 'SPDX-License-Identifier: Apache-2.0'; then
+        echo "$file: no SPDX line" >&2
+        failed=yes
+      fi
+      ;;
+  esac
+done
+[[ "$failed" == no ]] || exit 1
+echo "tree: ${#files[@]} files hold no machine's path and name their licence"
