@@ -57,6 +57,10 @@ AF_KERNEL_INLINE F16 maximum(F16 a, F16 b) {
   return a > b ? a : b;
 }
 
+AF_KERNEL_INLINE I16 minimum(I16 a, I16 b) {
+  return a < b ? a : b;
+}
+
 /// True when any lane of a comparison's result is set.
 AF_KERNEL_INLINE bool any(I16 mask) {
 #if AF_VECTOR_BITS == 512
@@ -69,6 +73,26 @@ AF_KERNEL_INLINE bool any(I16 mask) {
   return (words[0] | words[1] | words[2] | words[3] | words[4] | words[5] | words[6] | words[7]) !=
          0;
 #endif
+}
+
+/// base[offset] per lane.
+AF_KERNEL_INLINE F16 gather(const float* base, I16 offset) {
+  F16 values;
+#if AF_VECTOR_BITS == 512
+  __m512i index;
+  memcpy(&index, &offset, sizeof(index));
+  const __m512 gathered = _mm512_i32gather_ps(index, base, 4);
+  memcpy(&values, &gathered, sizeof(values));
+#elif AF_VECTOR_BITS == 256
+  __m256i index[2];
+  memcpy(index, &offset, sizeof(index));
+  const __m256 gathered[2] = {_mm256_i32gather_ps(base, index[0], 4),
+                              _mm256_i32gather_ps(base, index[1], 4)};
+  memcpy(&values, gathered, sizeof(values));
+#else
+  for (int lane = 0; lane < kLanes; ++lane) values[lane] = base[offset[lane]];
+#endif
+  return values;
 }
 
 /// Two neighbouring 16-bit elements, base[offset] in the low and base[offset + 1] in the high half

@@ -8,6 +8,8 @@
 #include <gtest/gtest.h>
 
 #include "base/hash_random.h"
+#include "base/vector_width.h"
+#include "drr/two_pass_af_drr.h"
 
 namespace af {
 namespace {
@@ -207,6 +209,66 @@ TEST(AfDrr, GradientsAgreeWithCentralDifferences) {
       EXPECT_LT(std::sqrt(error / norm), kRelativeTolerance) << "parameter " << parameter;
     }
   }
+}
+
+/// Without u-s and v-t products a ray's value stays bilinear between (s,t) nodes, and both look-ups
+/// must agree.
+double without_cross_terms(const RayNodes& n) {
+  return 40 + 3 * n.u + 5 * n.v + 7 * n.s + 2 * n.t + n.s * n.t + 2 * n.u * n.v + n.u * n.t +
+         3 * n.v * n.s;
+}
+
+TEST(TwoPassAfDrr, AgreesWithQuadrilinearLookup) {
+  for (const int slabs : {1, 3}) {
+    const auto field = field_of(without_cross_terms, slabs, 6, 11);
+    const AfDrr exact(field);
+    const TwoPassAfDrr two_pass(field);
+    for (const RegionOfInterest& roi :
+         {RegionOfInterest{0, 0, 31, 24}, {5, 3, 17, 1}, {30, 23, 1, 1}}) {
+      const View view{camera(), roi};
+      for (std::uint64_t i = 0; i < 10; ++i) {
+        const RigidTransform pose = pose_from_parameters({}, pose_in_range(i));
+        const Image2d expected = render_image(exact, pose, view);
+        const Image2d image = render_image(two_pass, pose, view);
+        // Single-precision node coordinates (10 nodes, 1e-6) times slopes of up to 60 levels of
+        // 0.25.
+        constexpr float kTolerance = 2e-4f;
+        for (std::size_t p = 0; p < image.pixels.size(); ++p)
+          EXPECT_NEAR(image.pixels[p], expected.pixels[p], kTolerance * expected.pixels[p]);
+      }
+    }
+  }
+}
+
+TEST(TwoPassAfDrr, CountsAndBlanksTheSameRaysAsQuadrilinearLookup) {
+  const auto field = field_of(without_cross_terms, 2);
+  const View view = View::whole_detector(camera());
+  PoseParameters far;
+  far.translation_mm = {120.0, 0.0, -30.0};
+  const RigidTransform pose = pose_from_parameters({}, far);
+  std::int64_t expected = 0;
+  std::int64_t outside = 0;
+  const Image2d exact = render_image(AfDrr(field), pose, view, &expected);
+  const Image2d image = render_image(TwoPassAfDrr(field), pose, view, &outside);
+  EXPECT_GT(expected, 0);
+  EXPECT_EQ(outside, expected);
+  for (std::size_t p = 0; p < image.pixels.size(); ++p)
+    EXPECT_EQ(image.pixels[p] == 0.0f, exact.pixels[p] == 0.0f);
+}
+
+TEST(TwoPassAfDrr, EveryVectorWidthGivesTheSameBits) {
+  const auto field = field_of(multilinear, 2);
+  const TwoPassAfDrr renderer(field);
+  const View view = View::whole_detector(camera());
+  const RigidTransform pose = pose_from_parameters({}, pose_in_range(8));
+  std::vector<float> first;
+  for (const VectorWidth width : supported_vector_widths()) {
+    force_vector_width(width);
+    const Image2d image = render_image(renderer, pose, view);
+    if (first.empty()) first = image.pixels;
+    EXPECT_EQ(image.pixels, first) << to_string(width) << " bits";
+  }
+  force_vector_width(std::nullopt);
 }
 
 TEST(CompressedAttenuationField, NamesWhatIsInconsistent) {
