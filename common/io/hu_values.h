@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+namespace af {
+
+/// Collects voxels as int16 HU and counts what does not fit.
+class HuValues {
+ public:
+  void reserve(std::size_t voxels) { hu_.reserve(voxels); }
+
+  void add(double hu) {
+    constexpr double kLow = std::numeric_limits<std::int16_t>::min();
+    constexpr double kHigh = std::numeric_limits<std::int16_t>::max();
+    const double rounded = std::nearbyint(hu);
+    // Written so that NaN takes the second branch.
+    if (rounded >= kLow && rounded <= kHigh) {
+      hu_.push_back(static_cast<std::int16_t>(rounded));
+      return;
+    }
+    if (!std::isfinite(hu)) {
+      if (non_finite_count_++ == 0) first_non_finite_ = hu_.size();
+      hu_.push_back(0);
+      return;
+    }
+    ++clamped_count_;
+    hu_.push_back(static_cast<std::int16_t>(rounded < kLow ? kLow : kHigh));
+  }
+
+  [[nodiscard]] std::size_t clamped_count() const { return clamped_count_; }
+  [[nodiscard]] std::size_t non_finite_count() const { return non_finite_count_; }
+  /// Voxel number of the first NaN or infinite value.
+  [[nodiscard]] std::size_t first_non_finite() const { return first_non_finite_; }
+  [[nodiscard]] const std::vector<std::int16_t>& hu() const { return hu_; }
+  [[nodiscard]] std::vector<std::int16_t> take() { return std::move(hu_); }
+
+ private:
+  std::vector<std::int16_t> hu_;
+  std::size_t clamped_count_ = 0;
+  std::size_t non_finite_count_ = 0;
+  std::size_t first_non_finite_ = 0;
+};
+
+}  // namespace af

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace af {
+
+/// Image files that the project reads, told apart by content, not by name.
+enum class ImageFormat { MetaImage, Nifti, Nrrd, Png, Tiff, Dicom };
+
+std::string_view format_name(ImageFormat format);
+
+/// The format of a file by its first bytes; nullopt when it is none of them. FileError when it
+/// cannot be read.
+std::optional<ImageFormat> sniff_image_format(const std::filesystem::path& path);
+
+/// Rows of an affine map from voxel index to RAS+ mm.
+using RasAffine = std::array<std::array<double, 4>, 3>;
+
+/// What a NIfTI-1 header says of orientation, where the code is > 0.
+struct NiftiOrientation {
+  std::optional<RasAffine> qform;
+  std::optional<RasAffine> sform;
+};
+
+/// What can be said of an image file before a library is trusted with it.
+struct ImageHeader {
+  ImageFormat format = ImageFormat::MetaImage;
+  std::vector<std::uint64_t> size;   ///< per axis; empty for PNG, TIFF and DICOM
+  std::uint64_t value_bytes = 0;     ///< of one voxel with all its channels
+  std::uint64_t payload_offset = 0;  ///< where the (compressed) voxels begin
+  std::uint64_t skip_bytes = 0;      ///< in front of the voxels, after decompression
+  bool compressed = false;
+  std::filesystem::path data_file;  ///< the file that holds the voxels
+  bool has_orientation = true;
+  NiftiOrientation nifti;
+};
+
+/// Reads and checks the header of a MetaImage, NRRD or NIfTI-1 file without allocating by what it
+/// says. FileError when it is damaged, its extents overflow or its encoding is not supported;
+/// InputError for wrong units or spacing.
+ImageHeader read_image_header(const std::filesystem::path& path, ImageFormat format);
+
+/// Checks that all voxels which the header promises are there: by file size, or by decompressing to
+/// the end (which also verifies the stream's own checksum). The libraries behind ITK fill missing
+/// voxels with zeros. FileError names expected and found bytes; surplus bytes are a warning.
+void check_image_payload(const std::filesystem::path& path,
+                         const ImageHeader& header,
+                         std::vector<std::string>* warnings);
+
+}  // namespace af

@@ -1,0 +1,238 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/itk_image_io.h"
+
+#include <array>
+#include <string_view>
+#include <utility>
+
+#include <itkGDCMImageIO.h>
+#include <itkMetaImageIO.h>
+#include <itkNiftiImageIO.h>
+#include <itkNrrdImageIO.h>
+#include <itkOutputWindow.h>
+#include <itkPNGImageIO.h>
+#include <itkTIFFImageIO.h>
+
+#include "base/error.h"
+#include "io/output_file.h"
+
+namespace af {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+using Component = itk::IOComponentEnum;
+
+constexpr std::array<std::pair<ValueType, Component>, 10> kComponents = {
+    {{ValueType::Int8, Component::CHAR},
+     {ValueType::UInt8, Component::UCHAR},
+     {ValueType::Int16, Component::SHORT},
+     {ValueType::UInt16, Component::USHORT},
+     {ValueType::Int32, Component::INT},
+     {ValueType::UInt32, Component::UINT},
+     {ValueType::Int64, Component::LONGLONG},
+     {ValueType::UInt64, Component::ULONGLONG},
+     {ValueType::Float32, Component::FLOAT},
+     {ValueType::Float64, Component::DOUBLE}}};
+
+/// ITK's messages are the program's business, not the terminal's: what matters comes as exceptions.
+class SilentWindow : public itk::OutputWindow {
+ public:
+  using Self = SilentWindow;
+  using Pointer = itk::SmartPointer<Self>;
+  itkNewMacro(Self) void DisplayText(const char*) override {}
+};
+
+void silence_itk() {
+  static const bool kDone = [] {
+    itk::OutputWindow::SetInstance(SilentWindow::New());
+    return true;
+  }();
+  (void)kDone;
+}
+
+/// The reader or writer itself, not one found through ITK's global factories: content, not names or
+/// plug-ins, decides who parses a file.
+itk::ImageIOBase::Pointer make_image_io(ImageFormat format) {
+  silence_itk();
+  switch (format) {
+    case ImageFormat::MetaImage: {
+      const auto io = itk::MetaImageIO::New();
+      io->SetDoublePrecision(17);
+      return io.GetPointer();
+    }
+    case ImageFormat::Nifti:
+      return itk::NiftiImageIO::New().GetPointer();
+    case ImageFormat::Nrrd:
+      return itk::NrrdImageIO::New().GetPointer();
+    case ImageFormat::Png:
+      return itk::PNGImageIO::New().GetPointer();
+    case ImageFormat::Tiff:
+      return itk::TIFFImageIO::New().GetPointer();
+    case ImageFormat::Dicom:
+      break;
+  }
+  return itk::GDCMImageIO::New().GetPointer();
+}
+
+ValueType value_type_of(const itk::ImageIOBase& io, const fs::path& path) {
+  Component component = io.GetComponentType();
+  // `long` is 8 bytes on every platform this is built for.
+  if (component == Component::LONG) component = Component::LONGLONG;
+  if (component == Component::ULONG) component = Component::ULONGLONG;
+  for (const auto& [type, known] : kComponents)
+    if (known == component) return type;
+  throw FileError(path.string(),
+                  "voxel type",
+                  "a real number type",
+                  itk::ImageIOBase::GetComponentTypeAsString(component));
+}
+
+Component component_of(ValueType type) {
+  for (const auto& [known, component] : kComponents)
+    if (known == type) return component;
+  return Component::UNKNOWNCOMPONENTTYPE;
+}
+
+RawImage header_of(const itk::ImageIOBase& io, const fs::path& path) {
+  RawImage image;
+  for (unsigned axis = 0; axis < io.GetNumberOfDimensions(); ++axis) {
+    image.size.push_back(io.GetDimensions(axis));
+    image.spacing_mm.push_back(io.GetSpacing(axis));
+    image.origin_mm.push_back(io.GetOrigin(axis));
+    image.directions.push_back(io.GetDirection(axis));
+  }
+  image.channels = static_cast<int>(io.GetNumberOfComponents());
+  image.type = value_type_of(io, path);
+  return image;
+}
+
+/// First lines of an ITK exception, without its source location.
+std::string description(const itk::ExceptionObject& error) {
+  std::string text = error.GetDescription();
+  for (char& c : text)
+    if (c == '\n' || c == '\t') c = ' ';
+  constexpr std::size_t kMaxLength = 300;
+  if (text.size() > kMaxLength) text.resize(kMaxLength);
+  return text;
+}
+
+struct WritableFormat {
+  std::string_view extension;
+  ImageFormat format;
+};
+constexpr std::array<WritableFormat, 7> kWritable = {{{".nii.gz", ImageFormat::Nifti},
+                                                      {".nii", ImageFormat::Nifti},
+                                                      {".mha", ImageFormat::MetaImage},
+                                                      {".nrrd", ImageFormat::Nrrd},
+                                                      {".tif", ImageFormat::Tiff},
+                                                      {".tiff", ImageFormat::Tiff},
+                                                      {".png", ImageFormat::Png}}};
+
+WritableFormat writable_format(const fs::path& path) {
+  const std::string name = path.filename().string();
+  for (const WritableFormat& known : kWritable)
+    if (name.size() > known.extension.size() && name.ends_with(known.extension)) return known;
+  throw UsageError(path.string() +
+                   ": unknown image extension; known: .mha .nii.gz .nii .nrrd .tif .tiff .png");
+}
+
+void write_by_itk(const RawImage& image, const fs::path& file, ImageFormat format) {
+  const itk::ImageIOBase::Pointer io = make_image_io(format);
+  io->SetFileName(file.string());
+  const auto dimensions = static_cast<unsigned>(image.size.size());
+  io->SetNumberOfDimensions(dimensions);
+  itk::ImageIORegion region(dimensions);
+  for (unsigned axis = 0; axis < dimensions; ++axis) {
+    io->SetDimensions(axis, image.size[axis]);
+    io->SetSpacing(axis, image.spacing_mm[axis]);
+    io->SetOrigin(axis, image.origin_mm[axis]);
+    io->SetDirection(axis, image.directions[axis]);
+    region.SetSize(axis, image.size[axis]);
+  }
+  io->SetIORegion(region);
+  io->SetNumberOfComponents(static_cast<unsigned>(image.channels));
+  io->SetPixelType(itk::IOPixelEnum::SCALAR);
+  io->SetComponentType(component_of(image.type));
+  io->SetUseCompression(format == ImageFormat::Png);
+  try {
+    io->Write(image.values.data());
+  } catch (const itk::ExceptionObject& error) {
+    throw FileError(file.string(), "cannot be written: " + description(error));
+  }
+}
+
+}  // namespace
+
+std::size_t RawImage::voxel_count() const {
+  std::size_t count = 1;
+  for (const std::size_t extent : size) count *= extent;
+  return count;
+}
+
+std::size_t value_bytes(ValueType type) {
+  switch (type) {
+    case ValueType::Int8:
+    case ValueType::UInt8:
+      return 1;
+    case ValueType::Int16:
+    case ValueType::UInt16:
+      return 2;
+    case ValueType::Int32:
+    case ValueType::UInt32:
+    case ValueType::Float32:
+      return 4;
+    default:
+      return 8;
+  }
+}
+
+RawImage read_raw_image(const fs::path& path,
+                        ImageFormat format,
+                        const std::function<void(const RawImage&)>& accept) {
+  try {
+    const itk::ImageIOBase::Pointer io = make_image_io(format);
+    io->SetFileName(path.string());
+    io->ReadImageInformation();
+    RawImage image = header_of(*io, path);
+    accept(image);
+    itk::ImageIORegion region(io->GetNumberOfDimensions());
+    for (unsigned axis = 0; axis < io->GetNumberOfDimensions(); ++axis)
+      region.SetSize(axis, image.size[axis]);
+    io->SetIORegion(region);
+    image.values.resize(image.voxel_count() * static_cast<std::size_t>(image.channels) *
+                        value_bytes(image.type));
+    if (static_cast<std::size_t>(io->GetImageSizeInBytes()) != image.values.size())
+      throw FileError(path.string(),
+                      "voxel bytes",
+                      std::to_string(image.values.size()),
+                      std::to_string(io->GetImageSizeInBytes()));
+    io->Read(image.values.data());
+    return image;
+  } catch (const itk::ExceptionObject& error) {
+    throw FileError(path.string(),
+                    std::string("not a readable ") + std::string(format_name(format)) +
+                        " image: " + description(error));
+  }
+}
+
+void write_raw_image(const RawImage& image, const fs::path& path) {
+  const WritableFormat target = writable_format(path);
+  write_atomically(path, [&](const fs::path& partial) {
+    // ITK's writers insist on their extension, which a partial name may not end with.
+    const bool fits = partial.string().ends_with(target.extension);
+    const fs::path file =
+        fits ? partial : fs::path(partial.string() + std::string(target.extension));
+    try {
+      write_by_itk(image, file, target.format);
+      if (!fits) fs::rename(file, partial);
+    } catch (...) {
+      std::error_code ignored;
+      if (!fits) fs::remove(file, ignored);
+      throw;
+    }
+  });
+}
+
+}  // namespace af

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "io/image_header.h"
+
+namespace af {
+
+enum class ValueType { Int8, UInt8, Int16, UInt16, Int32, UInt32, Int64, UInt64, Float32, Float64 };
+
+/// An image as ITK hands it over: axes in file order (the first is fastest), LPS mm, values in
+/// their own type.
+struct RawImage {
+  std::vector<std::size_t> size;
+  std::vector<double> spacing_mm;
+  std::vector<double> origin_mm;
+  std::vector<std::vector<double>> directions;  ///< one vector per axis
+  int channels = 1;
+  ValueType type = ValueType::Int16;
+  std::vector<std::byte> values;
+
+  [[nodiscard]] std::size_t voxel_count() const;
+};
+
+std::size_t value_bytes(ValueType type);
+
+/// Calls `function` with the values as a span of their own type.
+template <typename Function>
+decltype(auto) visit_values(const RawImage& image, Function&& function) {
+  const auto as = [&]<typename T>(T) {
+    return function(std::span<const T>(reinterpret_cast<const T*>(image.values.data()),
+                                       image.values.size() / sizeof(T)));
+  };
+  switch (image.type) {
+    case ValueType::Int8:
+      return as(std::int8_t{});
+    case ValueType::UInt8:
+      return as(std::uint8_t{});
+    case ValueType::Int16:
+      return as(std::int16_t{});
+    case ValueType::UInt16:
+      return as(std::uint16_t{});
+    case ValueType::Int32:
+      return as(std::int32_t{});
+    case ValueType::UInt32:
+      return as(std::uint32_t{});
+    case ValueType::Int64:
+      return as(std::int64_t{});
+    case ValueType::UInt64:
+      return as(std::uint64_t{});
+    case ValueType::Float32:
+      return as(float{});
+    case ValueType::Float64:
+      break;
+  }
+  return as(double{});
+}
+
+/// Reads an image file by ITK. `accept` sees it without values and throws when it does not want
+/// them: nothing is allocated by the header's word before that. FileError when ITK fails.
+RawImage read_raw_image(const std::filesystem::path& path,
+                        ImageFormat format,
+                        const std::function<void(const RawImage&)>& accept);
+
+/// Writes an image by ITK; the format follows the extension: .mha .nii .nii.gz .nrrd .tif .tiff
+/// .png. Appears under its name only when complete. UsageError for another extension.
+void write_raw_image(const RawImage& image, const std::filesystem::path& path);
+
+}  // namespace af
