@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "geometry/camera_geometry.h"
+#include "geometry/rigid_transform.h"
+
+namespace af::evaluation {
+
+/// A fiducial's position from two or more views.
+struct BackProjection {
+  Eigen::Vector3d room_point = Eigen::Vector3d::Zero();  ///< mm
+  /// Twice the RMS distance of the point from its rays: for two views exactly the length of the
+  /// shortest segment between the rays, which the paper reports (Sec. III-B).
+  double ray_gap_mm = 0.0;
+};
+
+/// The point with the least sum of squared distances to the rays: for two rays the midpoint of the
+/// shortest segment between them. Throws InputError for fewer than two rays, for rays that are
+/// parallel within 1 degree, and when the point lies behind a source.
+/// \test BackProjection.OfSkewRaysIsTheMidpointOfTheShortestSegment
+BackProjection back_project(std::span<const Ray> rays);
+
+/// Least-squares rigid map between corresponding points.
+struct RigidFit {
+  RigidTransform target_from_source = RigidTransform::Identity();
+  std::vector<double> residuals_mm;  ///< per point, after the fit
+  double fre_mm = 0.0;               ///< fiducial registration error: RMS of the residuals
+};
+
+/// Arun, Huang, Blostein 1987 / Schoenemann 1966, with Umeyama's guard: the result is never a
+/// reflection. Throws InputError for fewer than three points, unequal counts, values that are not
+/// finite, and points that lie on one line. \test RigidFit.NeverReturnsAReflection
+RigidFit fit_rigid(std::span<const Eigen::Vector3d> target_points,
+                   std::span<const Eigen::Vector3d> source_points);
+
+/// Where one camera saw the fiducials: (column, row), in the order of the CT's fiducials.
+struct FiducialView {
+  CameraGeometry camera;
+  std::vector<Eigen::Vector2d> fiducials_px;
+};
+
+/// The gold standard of one case.
+struct FiducialGold {
+  RigidTransform room_from_ct = RigidTransform::Identity();
+  std::vector<BackProjection> back_projections;  ///< per fiducial
+  RigidFit fit;
+};
+
+/// Back-projects every fiducial from all views and fits the CT's fiducials to the result. Throws
+/// InputError as the two steps do, and when a view lacks a fiducial.
+FiducialGold gold_from_fiducials(std::span<const FiducialView> views,
+                                 std::span<const Eigen::Vector3d> fiducials_ct_mm);
+
+}  // namespace af::evaluation
