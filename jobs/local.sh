@@ -1,1 +1,256 @@
-#!/bin/sh
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# The whole job on one machine: packages, build, and a study from a CT to a report.
+set -euo pipefail
+# shellcheck source-path=SCRIPTDIR
+source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
+
+usage() {
+  cat <<'TEXT'
+Usage: jobs/local.sh [OPTIONS]
+
+Installs what is missing, builds, and takes a CT through the whole pipeline: simulated X-ray pair, one attenuation
+field per camera, image quality of the fields, registrations, report.html. Finished stages with unchanged inputs are
+skipped, so an interrupted run goes on where it stopped when the same command is run again.
+
+  --output DIR              where everything goes                                        [./af-study]
+  --ct PATH                 your CT: DICOM folder, NIfTI, MetaImage or NRRD      [a patient's skull CT]
+  --phantom spine           a built-in phantom instead of a CT
+  --paper                   the paper's field parameters (64x64 viewpoints, 256x256 nodes, 16384 codewords, 10 deg,
+                            100 mm) and 30 starts per interval, instead of the quick preset
+  --starts-per-interval N   field registrations in each of the eight intervals of start error
+  --raycast-starts N        ray-cast registrations in each of the first two intervals
+  --pose-count N            random poses whose DRRs are compared with ray casting, per field
+  --ranks N                 MPI ranks                                                     [all cores]
+  --seed N                  of everything random                                                  [1]
+  --skip-packages           do not look for missing packages
+  --skip-build              use the programs as they are
+  --force                   do every stage again
+  --help
+TEXT
+}
+
+# --- options -----------------------------------------------------------------------------------------------------
+
+output="$PWD/af-study"
+ct="" phantom="" preset=quick ranks="" seed=1 force=no skip_build=no skip_packages=no
+starts_per_interval="" raycast_starts="" pose_count=""
+
+need_value() { (($2 >= 2)) || die 2 "option $1 needs a value (try --help)"; }
+need_count() { [[ "$2" =~ ^[1-9][0-9]{0,6}$ ]] || die 2 "$1 = '$2' must be a whole number from 1 to 9999999"; }
+
+while (($# > 0)); do
+  case "$1" in
+    --output | -o) need_value "$1" $#; output=$2; shift ;;
+    --ct) need_value "$1" $#; ct=$2; shift ;;
+    --phantom) need_value "$1" $#; phantom=$2; shift ;;
+    --paper) preset=paper ;;
+    --starts-per-interval) need_value "$1" $#; need_count "$1" "$2"; starts_per_interval=$2; shift ;;
+    --raycast-starts) need_value "$1" $#; need_count "$1" "$2"; raycast_starts=$2; shift ;;
+    --pose-count) need_value "$1" $#; need_count "$1" "$2"; pose_count=$2; shift ;;
+    --ranks | -n) need_value "$1" $#; need_count "$1" "$2"; ranks=$2; shift ;;
+    --seed) need_value "$1" $#; [[ "$2" =~ ^[0-9]{1,18}$ ]] || die 2 "--seed = '$2' must be a whole number"; seed=$2; shift ;;
+    --skip-packages) skip_packages=yes ;;
+    --skip-build) skip_build=yes ;;
+    --force) force=yes ;;
+    --help | -h) usage; exit 0 ;;
+    *) die 2 "unknown option '$1' (try --help)" ;;
+  esac
+  shift
+done
+[[ -z "$ct" || -z "$phantom" ]] || die 2 "--ct and --phantom exclude each other"
+[[ -z "$ct" || -e "$ct" ]] || die 4 "--ct $ct: no such file or folder"
+if [[ -e "$output" && ! -d "$output" ]]; then
+  die 3 "--output $output exists and is not a folder"
+fi
+if [[ -d "$output" && ! -d "$output/.stages" && -n "$(ls -A "$output")" ]]; then
+  die 3 "--output $output holds files that are not of a study of this script; choose another folder"
+fi
+[[ -n "$ranks" ]] || ranks=$(core_count)
+cores=$(core_count)
+
+if [[ "$preset" == paper ]]; then
+  field_options=(--uv-nodes 64 --st-nodes 256 --codewords 16384 --training-fraction 0.1
+    --max-rotation-deg 10 --max-translation-mm 100)
+  : "${starts_per_interval:=30}" "${raycast_starts:=5}" "${pose_count:=100}"
+else
+  field_options=(--uv-nodes 32 --st-nodes 192 --codewords 4096 --training-fraction 0.1
+    --max-rotation-deg 10 --max-translation-mm 30)
+  : "${starts_per_interval:=10}" "${raycast_starts:=2}" "${pose_count:=30}"
+fi
+
+# --- stages ------------------------------------------------------------------------------------------------------
+
+stage_names=() stage_titles=() stage_seconds=()
+plan_stage() {
+  stage_names+=("$1")
+  stage_seconds+=("$2")
+  stage_titles+=("$3")
+}
+
+# parallel_seconds SECONDS_ON_ONE_CORE: expected time on the ranks that have a core of their own.
+parallel_seconds() {
+  local useful=$((ranks < cores ? ranks : cores))
+  echo $((($1 + useful - 1) / useful))
+}
+
+print_plan() {
+  local total=0 i
+  say "Study in $output"
+  say "  CT: ${ct:-phantom $phantom}${default_ct_note}; $preset preset, $ranks rank(s) on $cores core(s), seed $seed"
+  say "Stages and how long they may take (estimates from a two-core virtual machine):"
+  for ((i = 0; i < ${#stage_names[@]}; ++i)); do
+    printf '  %2d  %-52s %s\n' $((i + 1)) "${stage_titles[i]}" "$(duration "${stage_seconds[i]}")"
+    total=$((total + stage_seconds[i]))
+  done
+  say "  In all about $(duration "$total")."
+}
+
+stage_number=0 stage_chain="" current_stage="" stage_report=()
+
+on_exit() {
+  local status=$?
+  if ((status == 130 || status == 143)) && [[ -n "$current_stage" ]]; then
+    printf '\nStopped in stage "%s". Run the same command again to go on.\n' "$current_stage" >&2
+  fi
+}
+trap on_exit EXIT
+
+# run_stage LOG_NAME OUTPUT_PATH COMMAND...: runs the next planned stage unless it was finished with the same command,
+# program and earlier stages. A stage that was cut short keeps its output, for the program to resume from; one whose
+# inputs changed starts from nothing.
+run_stage() {
+  local result=$1
+  shift
+  local name=${stage_names[stage_number]} title=${stage_titles[stage_number]} log program
+  stage_number=$((stage_number + 1))
+  current_stage=$title
+  log="$output/logs/$name.log"
+  program=$(stage_program "$@")
+  stage_chain=$(printf '%s\n' "$stage_chain" "$(sha256sum <"$program")" "$@" | sha256sum | cut -d ' ' -f 1)
+
+  local stamp="$output/.stages/$name"
+  if [[ -f "$stamp.done" && "$(<"$stamp.done")" == "$stage_chain" && -e "$result" ]]; then
+    say "[$stage_number/${#stage_names[@]}] $title: done before, skipped"
+    return
+  fi
+  rm -f "$stamp.done"
+  if [[ ! -f "$stamp.started" || "$(<"$stamp.started")" != "$stage_chain" ]]; then
+    rm -rf "$result" "$result.progress" "$result.partial"
+  fi
+  printf '%s\n' "$stage_chain" >"$stamp.started"
+
+  say "[$stage_number/${#stage_names[@]}] $title"
+  local start=$SECONDS status=0
+  { printf '# '; printf '%q ' "$@"; printf '\n'; } >"$log"
+  "$@" 2>&1 | tee -a "$log" | sed -u 's/^/        /' || status=${PIPESTATUS[0]}
+  if ((status == 75)); then
+    die 75 "stage \"$title\" was stopped with its progress saved: run the same command again"
+  elif ((status != 0)); then
+    die "$status" "stage \"$title\" failed with exit code $status; its log is $log"
+  fi
+  [[ -e "$result" ]] || die 6 "stage \"$title\" ended without its output $result; its log is $log"
+  local seconds=$((SECONDS - start))
+  say "        $(duration "$seconds")"
+  stage_report+=("$(printf '  %-52s %s' "$title" "$(duration "$seconds")")")
+  printf '%s\n' "$stage_chain" >"$stamp.done"
+}
+
+# The program file behind a stage's command, for the stamp: run_ranks N PROGRAM ... or PROGRAM ...
+stage_program() {
+  if [[ "$1" == run_ranks ]]; then
+    echo "$3"
+  else
+    echo "$1"
+  fi
+}
+
+# --- packages and build ------------------------------------------------------------------------------------------
+
+if [[ "$skip_packages" == no ]]; then
+  "$af_root/jobs/install-packages.sh" || die 1 "packages are missing (see above); --skip-packages goes on without them"
+fi
+if [[ -f "$af_root/CMakeLists.txt" ]]; then
+  bin="$af_root/build/release/bin"
+  if [[ "$skip_build" == no ]]; then
+    say "Building the programs in build/release (about 4 minutes from nothing on two cores) ..."
+    build_start=$SECONDS
+    mkdir -p "$af_root/build"
+    build_preset release "$af_root/build/release.log" "${af_programs[@]}"
+    say "        $(duration $((SECONDS - build_start)))"
+  fi
+else
+  # Installed: PREFIX/share/attenuation-fields/jobs beside PREFIX/bin.
+  bin="$(cd "$af_root/../.." && pwd)/bin"
+fi
+for program in "${af_programs[@]}"; do
+  [[ -x "$bin/$program" ]] || die 1 "$bin/$program is missing; run without --skip-build"
+done
+
+# --- the study ---------------------------------------------------------------------------------------------------
+
+mkdir -p "$output/.stages" "$output/logs"
+output="$(cd "$output" && pwd)"
+if [[ "$force" == yes ]]; then
+  rm -f "$output"/.stages/*.done "$output"/.stages/*.started
+fi
+exec 9>"$output/.stages/lock"
+flock --nonblock 9 || die 3 "another run is at work in $output"
+default_ct_note=""
+if [[ -z "$ct" && -z "$phantom" ]]; then
+  ct="$output/skull.mhd"
+  default_ct_note=" (a patient's skull, from Debian's invesalius-examples)"
+  plan_stage ct 1 "Unpack the default CT"
+elif [[ -n "$ct" ]]; then
+  ct="$(realpath "$ct")"
+  # A CT that changes under its name starts the study anew.
+  stage_chain=$(find "$ct" -type f -printf '%P %s %T@\n' | LC_ALL=C sort | sha256sum)
+fi
+field_seconds=60
+[[ "$preset" == quick ]] || field_seconds=600
+plan_stage simulate 30 "Simulate the X-ray pair and its study"
+plan_stage field-A "$(parallel_seconds $field_seconds)" "Precompute the field of camera A"
+plan_stage field-B "$(parallel_seconds $field_seconds)" "Precompute the field of camera B"
+plan_stage image-quality-A "$(parallel_seconds $((pose_count / 2 + 2)))" "Compare $pose_count DRRs of field A with ray casting"
+plan_stage image-quality-B "$(parallel_seconds $((pose_count / 2 + 2)))" "Compare $pose_count DRRs of field B with ray casting"
+plan_stage registration-field "$(parallel_seconds $((8 * starts_per_interval)))" "Register $((8 * starts_per_interval)) starts with the fields"
+plan_stage registration-raycast "$(parallel_seconds $((2 * raycast_starts * 50)))" "Register $((2 * raycast_starts)) starts by ray casting"
+plan_stage overlay 5 "Register one start and draw its overlays"
+plan_stage report 5 "Write the report"
+print_plan
+study_start=$SECONDS
+
+if [[ -n "$default_ct_note" ]]; then
+  run_stage "$ct" "$af_root/jobs/default-ct.sh" "$ct"
+fi
+study="$output/study/study.toml"
+if [[ -n "$phantom" ]]; then
+  run_stage "$study" "$bin/af-simulate" --phantom "$phantom" --rig treatment-room --seed "$seed" -o "$output/study"
+else
+  run_stage "$study" "$bin/af-simulate" --ct "$ct" --rig treatment-room --seed "$seed" -o "$output/study"
+fi
+case_name=$(sed -n 's/^ *name *= *"\(.*\)" *$/\1/p' "$study" | head -n 1)
+for camera in A B; do
+  run_stage "$output/$camera.af.h5" run_ranks "$ranks" "$bin/af-precompute" --study "$study" --case "$case_name" \
+    --camera "$camera" "${field_options[@]}" --seed "$seed" -o "$output/$camera.af.h5"
+done
+fields=(--field "A=$output/A.af.h5" --field "B=$output/B.af.h5")
+for camera in A B; do
+  run_stage "$output/image-quality-$camera/summary.json" run_ranks "$ranks" "$bin/af-evaluate" image-quality \
+    --field "$output/$camera.af.h5" --ct "$ct" --pose-count "$pose_count" --seed "$seed" -o "$output/image-quality-$camera"
+done
+run_stage "$output/registration-field/summary.json" run_ranks "$ranks" "$bin/af-evaluate" registration --study "$study" \
+  "${fields[@]}" --renderer field --starts-per-interval "$starts_per_interval" --seed "$seed" -o "$output/registration-field"
+run_stage "$output/registration-raycast/summary.json" run_ranks "$ranks" "$bin/af-evaluate" registration --study "$study" \
+  --renderer raycast --starts-per-interval "$raycast_starts" --intervals 2 --seed "$seed" -o "$output/registration-raycast"
+run_stage "$output/overlay/result.json" "$bin/af-register" --study "$study" --case "$case_name" "${fields[@]}" \
+  --start-rotation-deg 2,-2,2 --start-translation-mm 3,3,-3 -o "$output/overlay"
+run_stage "$output/report.html" "$bin/af-evaluate" report "$output" -o "$output/report.html"
+current_stage=""
+
+say ""
+if ((${#stage_report[@]} > 0)); then
+  say "Done in $(duration $((SECONDS - study_start))):"
+  printf '%s\n' "${stage_report[@]}"
+fi
+say "Report: $output/report.html"

@@ -1,0 +1,21 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# clang-tidy over the first-party sources of a build (tests left out), as .clang-tidy says; any finding fails.
+# Minutes, so it is not a CTest entry. Usage: tidy.sh BUILD-FOLDER [PATH-PATTERN]
+set -euo pipefail
+# shellcheck source-path=SCRIPTDIR
+source "$(dirname "$0")/source_files.sh"
+command -v clang-tidy-14 >/dev/null || skip_or_fail clang-tidy-14
+build=$1
+pattern=${2:-^(common|precompute|register|evaluate)/}
+database="$build/compile_commands.json"
+[[ -f "$database" ]] || { echo "$database is missing: configure first" >&2; exit 4; }
+root=$(sed -n 's/^CMAKE_HOME_DIRECTORY:INTERNAL=//p' "$build/CMakeCache.txt")
+# Kernels appear once per vector width: each file once.
+mapfile -t files < <(sed -n 's/^ *"file": "\(.*\)",\{0,1\}$/\1/p' "$database" | LC_ALL=C sort -u |
+  sed -n "s|^$root/||p" | grep -E "$pattern" | grep -v '^build/')
+((${#files[@]} > 0)) || { echo "no sources match $pattern" >&2; exit 1; }
+cd "$root"
+printf '%s\0' "${files[@]}" |
+  xargs -0 -n 1 -P "$(nproc)" clang-tidy-14 --quiet --warnings-as-errors='*' -p "$build"
+echo "tidy: ${#files[@]} files are clean"

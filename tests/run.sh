@@ -1,0 +1,57 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# Builds what is needed and runs the tests.
+set -euo pipefail
+# shellcheck source-path=SCRIPTDIR
+source "$(dirname "${BASH_SOURCE[0]}")/../jobs/lib.sh"
+
+usage() {
+  cat <<'TEXT'
+Usage: tests/run.sh [--fast] [--sanitize] [--skip-packages] [--help] [-- CTEST-OPTIONS...]
+
+Installs missing packages, builds everything in build/release and runs all tests with CTest, MPI tests on 1, 2, 3 and 4
+ranks. The last lines are CTest's summary; the exit code is 0 only when every test passed.
+
+  --fast            without the tests labelled physics or regression (minutes)
+  --sanitize        serial tests in build/sanitize, with the address and undefined-behaviour sanitizers
+  --skip-packages   do not look for missing packages
+  -- ...            passed on to ctest, for example: -- -R RayCaster
+TEXT
+}
+
+preset=release skip_packages=no
+ctest_options=()
+while (($# > 0)); do
+  case "$1" in
+    --fast) ctest_options+=(--label-exclude 'physics|regression') ;;
+    --sanitize) preset=sanitize ;;
+    --skip-packages) skip_packages=yes ;;
+    --help | -h) usage; exit 0 ;;
+    --)
+      shift
+      ctest_options+=("$@")
+      break
+      ;;
+    *) die 2 "unknown option '$1' (try --help)" ;;
+  esac
+  shift
+done
+
+if [[ "$skip_packages" == no ]]; then
+  "$af_root/jobs/install-packages.sh" || die 1 "packages are missing (see above)"
+fi
+say "Building build/$preset (about 5 minutes from nothing on two cores) ..."
+mkdir -p "$af_root/build"
+build_start=$SECONDS
+build_preset "$preset" "$af_root/build/$preset.log"
+say "        $(duration $((SECONDS - build_start)))"
+
+export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
+if [[ "$preset" == sanitize ]]; then
+  # OpenMPI keeps some memory until the process ends.
+  export LSAN_OPTIONS="suppressions=$af_root/tests/support/lsan.supp:print_suppressions=0"
+  export ASAN_OPTIONS="fast_unwind_on_malloc=0" UBSAN_OPTIONS="print_stacktrace=1:halt_on_error=1"
+  ctest_options+=(--label-exclude 'mpi|physics|regression|programs|checks')
+fi
+cd "$af_root/build/$preset"
+exec ctest --output-on-failure --no-tests=error --parallel "$(core_count)" "${ctest_options[@]}"
