@@ -38,7 +38,8 @@ struct LoadedCase {
 
 /// Collective. Everything a registration of one case needs, with the same content on every rank:
 /// X-rays and masks, fields (held once per node) or the CT's attenuation (once per node). With
-/// fields the CT is read by rank 0 alone, for its hash and grid. FileError (exit 4) when a field
+/// fields the CT is read by rank 0 alone, for its hash and grid (skip_ct_check: not at all; steps
+/// are then scaled as if it filled 200 mm about the ROI centre). FileError (exit 4) when a field
 /// was made from another CT (both hashes are named) or for another camera (geometry to 1e-3 mm);
 /// InputError when a view has no field or the field's range does not hold the nominal pose.
 LoadedCase load_case(const Study& study,

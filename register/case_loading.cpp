@@ -1,0 +1,259 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "register/case_loading.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstring>
+#include <functional>
+#include <sstream>
+#include <type_traits>
+#include <utility>
+
+#include "base/error.h"
+#include "drr/ray_cast_drr.h"
+#include "drr/two_pass_af_drr.h"
+#include "io/field_file.h"
+#include "io/sha256.h"
+#include "io/xray_reader.h"
+#include "register/parameter_scaling.h"
+
+namespace af::registration {
+namespace {
+
+constexpr double kCameraToleranceMm = 1e-3;
+
+/// Half the side of the cube about the ROI centre that stands for the CT when it is not read.
+constexpr double kAssumedCtHalfSideMm = 100.0;
+
+/// A CT grid as plain numbers, to be sent between ranks.
+struct PlainGrid {
+  std::array<int, 3> size;
+  std::array<double, 15> values;
+};
+static_assert(std::is_trivially_copyable_v<PlainGrid>);
+
+PlainGrid plain_grid(const CtGrid& grid) {
+  PlainGrid plain{grid.size, {}};
+  Eigen::Map<Eigen::Vector3d>(plain.values.data()) = grid.origin_mm;
+  Eigen::Map<Eigen::Vector3d>(plain.values.data() + 3) = grid.spacing_mm;
+  Eigen::Map<Eigen::Matrix3d>(plain.values.data() + 6) = grid.direction;
+  return plain;
+}
+
+CtGrid grid_of(const PlainGrid& plain) {
+  CtGrid grid;
+  grid.size = plain.size;
+  grid.origin_mm = Eigen::Map<const Eigen::Vector3d>(plain.values.data());
+  grid.spacing_mm = Eigen::Map<const Eigen::Vector3d>(plain.values.data() + 3);
+  grid.direction = Eigen::Map<const Eigen::Matrix3d>(plain.values.data() + 6);
+  return grid;
+}
+
+/// What is known of a CT without its voxels.
+struct CtFacts {
+  CtGrid grid;
+  std::string content_sha256;
+};
+
+/// Collective over `group`: rank 0 calls `read`, all receive its facts or its error.
+CtFacts facts_from_root(const Communicator& group, const std::function<CtFacts()>& read) {
+  CtFacts facts;
+  all_or_none(group, [&] {
+    if (group.is_root()) facts = read();
+  });
+  PlainGrid plain = plain_grid(facts.grid);
+  std::vector<std::byte> bytes(sizeof(plain));
+  std::memcpy(bytes.data(), &plain, sizeof(plain));
+  group.broadcast(bytes);
+  std::memcpy(&plain, bytes.data(), sizeof(plain));
+  facts.grid = grid_of(plain);
+  group.broadcast(facts.content_sha256);
+  return facts;
+}
+
+/// The attenuation of a CT, held once per node.
+struct NodeCt {
+  std::shared_ptr<const AttenuationVolume> volume;
+  CtFacts facts;
+};
+
+NodeCt read_ct_per_node(const StudyCase& study_case,
+                        const CaseLoadOptions& options,
+                        const Communicator& communicator,
+                        std::vector<std::string>& warnings) {
+  AttenuationModel model;
+  model.mu_water_per_mm = options.water_mu_per_mm;
+  const Communicator node = communicator.node();
+  CtGrid bordered_grid;
+  NodeCt result;
+  // all_or_none over everybody: a node whose file system lacks the CT must not leave the others
+  // waiting.
+  all_or_none(communicator, [&] {
+    if (!node.is_root()) return;
+    const CtVolume ct = read_ct(study_case.ct, options.ct, &warnings);
+    result.facts = {ct.grid, ct_content_sha256(ct)};
+    result.volume = std::make_shared<const AttenuationVolume>(ct, model);
+    bordered_grid = result.volume->grid();
+  });
+  result.facts = facts_from_root(node, [&] { return result.facts; });
+  if (node.size() == 1) return result;
+  bordered_grid = facts_from_root(node, [&] { return CtFacts{bordered_grid, {}}; }).grid;
+  const std::size_t count = bordered_grid.voxel_count();
+  const auto owner =
+      node.allocate_on_node(count * sizeof(std::uint16_t), [&](std::span<std::byte> memory) {
+        std::memcpy(memory.data(), result.volume->voxels().data(), memory.size());
+      });
+  const auto* const voxels = reinterpret_cast<const std::uint16_t*>(owner.get());
+  result.volume = std::make_shared<const AttenuationVolume>(
+      bordered_grid, model, SharedArray<std::uint16_t>(owner, {voxels, count}));
+  return result;
+}
+
+std::filesystem::path field_path_of(const StudyCase& study_case,
+                                    const StudyView& view,
+                                    const CaseLoadOptions& options) {
+  const auto given = options.field_paths.find(view.camera);
+  if (given != options.field_paths.end()) return given->second;
+  if (view.field.has_value()) return *view.field;
+  throw InputError("case '" + study_case.name + "', view '" + view.camera +
+                   "': field = none: give --field " + view.camera +
+                   "=FIELD.h5, or the key `field` in the study, or --renderer raycast");
+}
+
+void require_known_field_cameras(const StudyCase& study_case, const CaseLoadOptions& options) {
+  std::string known;
+  for (const StudyView& view : study_case.views) known += (known.empty() ? "" : ", ") + view.camera;
+  for (const auto& [camera, path] : options.field_paths) {
+    const bool found = std::any_of(study_case.views.begin(),
+                                   study_case.views.end(),
+                                   [&](const StudyView& view) { return view.camera == camera; });
+    if (!found)
+      throw InputError("field", camera + "=" + path.string(), "camera must be one of " + known);
+  }
+}
+
+std::vector<RegistrationView> read_views(const Study& study,
+                                         const StudyCase& study_case,
+                                         std::map<std::string, std::string>& input_sha256) {
+  std::vector<RegistrationView> views;
+  for (const StudyView& study_view : study_case.views) {
+    RegistrationView view;
+    view.view = {study.rig.camera(study_view.camera), study_view.roi};
+    view.xray = read_xray_attenuation(study_view, view.view.camera);
+    view.mask = read_mask(study_view, view.view.camera);
+    input_sha256["xray " + study_view.camera] = sha256_of_file(study_view.xray.string());
+    if (study_view.mask.has_value())
+      input_sha256["mask " + study_view.camera] = sha256_of_file(study_view.mask->string());
+    views.push_back(std::move(view));
+  }
+  return views;
+}
+
+/// Collective. The fields of all views; their hashes go to `input_sha256`.
+void use_fields(const StudyCase& study_case,
+                const CaseLoadOptions& options,
+                const Communicator& communicator,
+                const std::optional<CtFacts>& ct,
+                RegistrationProblem& problem,
+                std::map<std::string, std::string>& input_sha256) {
+  for (std::size_t i = 0; i < problem.views.size(); ++i) {
+    RegistrationView& view = problem.views[i];
+    const std::string path = all_or_none(communicator, [&] {
+      return field_path_of(study_case, study_case.views[i], options).string();
+    });
+    FieldFileInfo info;
+    const auto field = read_field(path, communicator, &info);
+    all_or_none(communicator, [&] {
+      require_same_camera(field->identity.camera, view.view.camera, path);
+      if (ct.has_value() && ct->content_sha256 != field->identity.ct_content_sha256)
+        throw FileError(path,
+                        "CT of the field (ct_content_sha256)",
+                        ct->content_sha256 + " (" + study_case.ct.string() + ")",
+                        field->identity.ct_content_sha256);
+    });
+    view.renderer = std::make_shared<const TwoPassAfDrr>(field);
+    view.limit = MotionLimit{field->identity.frame, field->identity.range};
+    input_sha256["field " + view.view.camera.name] = info.payload_sha256;
+  }
+}
+
+}  // namespace
+
+const char* to_string(RendererKind kind) {
+  return kind == RendererKind::Field ? "field" : "raycast";
+}
+
+void require_same_camera(const CameraGeometry& field_camera,
+                         const CameraGeometry& rig_camera,
+                         const std::string& field_path) {
+  const std::string object = "camera '" + rig_camera.name + "' of the field";
+  const auto size_text = [](const CameraGeometry& camera) {
+    return std::to_string(camera.size_px.x()) + " x " + std::to_string(camera.size_px.y()) +
+           " pixels";
+  };
+  if (field_camera.size_px != rig_camera.size_px)
+    throw FileError(field_path, object, size_text(rig_camera), size_text(field_camera));
+  const auto require_same_point =
+      [&](const char* name, const Eigen::Vector3d& expected, const Eigen::Vector3d& found) {
+        if ((expected - found).norm() <= kCameraToleranceMm) return;
+        const auto text = [](const Eigen::Vector3d& point) {
+          std::ostringstream out;
+          out << '[' << point.x() << ", " << point.y() << ", " << point.z() << "] mm";
+          return out.str();
+        };
+        throw FileError(field_path, object + ": " + name, text(expected), text(found));
+      };
+  require_same_point("source_point", rig_camera.source_point, field_camera.source_point);
+  const auto expected = rig_camera.detector_corner_points();
+  const auto found = field_camera.detector_corner_points();
+  for (std::size_t i = 0; i < expected.size(); ++i)
+    require_same_point("a detector corner", expected[i], found[i]);
+}
+
+LoadedCase load_case(const Study& study,
+                     const StudyCase& study_case,
+                     const CaseLoadOptions& options,
+                     const Communicator& communicator) {
+  LoadedCase loaded;
+  auto problem = std::make_shared<RegistrationProblem>();
+  problem->nominal_room_from_ct = study_case.nominal_room_from_ct;
+  problem->center_ct_mm = study_case.center_ct_mm;
+  problem->isocenter_point = study.rig.isocenter_point;
+  all_or_none(communicator, [&] {
+    require_known_field_cameras(study_case, options);
+    problem->views = read_views(study, study_case, loaded.input_sha256);
+  });
+
+  std::optional<CtFacts> ct;
+  if (options.renderer == RendererKind::RayCast) {
+    const NodeCt node_ct = read_ct_per_node(study_case, options, communicator, loaded.warnings);
+    ct = node_ct.facts;
+    for (RegistrationView& view : problem->views)
+      view.renderer = std::make_shared<const RayCastDrr>(node_ct.volume, options.ray_caster);
+  } else if (!options.skip_ct_check) {
+    ct = facts_from_root(communicator, [&] {
+      const CtVolume volume = read_ct(study_case.ct, options.ct, &loaded.warnings);
+      return CtFacts{volume.grid, ct_content_sha256(volume)};
+    });
+  }
+  if (options.renderer == RendererKind::Field)
+    use_fields(study_case, options, communicator, ct, *problem, loaded.input_sha256);
+
+  if (ct.has_value()) {
+    loaded.input_sha256["ct"] = ct->content_sha256;
+    problem->scaling_points_ct = ct_lattice_points(ct->grid);
+  } else {
+    const Eigen::Vector3d half = Eigen::Vector3d::Constant(kAssumedCtHalfSideMm);
+    problem->scaling_points_ct =
+        ct_lattice_points(CtBox{study_case.center_ct_mm - half, study_case.center_ct_mm + half});
+    loaded.warnings.emplace_back(
+        "the CT is not read: whether the fields were made from it is not checked, and the steps "
+        "are scaled as if it filled 200 mm about the ROI centre");
+  }
+  loaded.problem = std::move(problem);
+  return loaded;
+}
+
+}  // namespace af::registration

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "register/target_errors_program.h"
+
+#include <optional>
+#include <string>
+
+#include "evaluate/fiducial_registration.h"
+#include "register/parameter_scaling.h"
+
+namespace af::registration {
+namespace {
+
+struct GoldPose {
+  RigidTransform room_from_ct;
+  std::string source;
+};
+
+/// The gold standard of the case's fiducials, or the pose the study states; none when it has
+/// neither.
+std::optional<GoldPose> gold_pose(const Study& study, const StudyCase& study_case) {
+  std::vector<evaluation::FiducialView> views;
+  for (const StudyView& view : study_case.views)
+    if (!view.fiducials_px.empty())
+      views.push_back({study.rig.camera(view.camera), view.fiducials_px});
+  if (!study_case.fiducials_ct_mm.empty() && views.size() >= 2)
+    return GoldPose{evaluation::gold_from_fiducials(views, study_case.fiducials_ct_mm).room_from_ct,
+                    "fiducials"};
+  if (study_case.gold_room_from_ct.has_value())
+    return GoldPose{*study_case.gold_room_from_ct, "gold_room_from_ct"};
+  return std::nullopt;
+}
+
+/// Mean distance between where two poses put the target box's points.
+double mean_distance_mm(const std::vector<Eigen::Vector3d>& points_ct,
+                        const RigidTransform& a,
+                        const RigidTransform& b) {
+  double sum = 0.0;
+  for (const Eigen::Vector3d& point : points_ct) sum += (a * point - b * point).norm();
+  return sum / static_cast<double>(points_ct.size());
+}
+
+}  // namespace
+
+void add_target_errors(const Study& study,
+                       const StudyCase& study_case,
+                       std::vector<RegistrationRecord>& records) {
+  const std::optional<GoldPose> gold = gold_pose(study, study_case);
+  if (!gold.has_value()) return;
+  const std::vector<Eigen::Vector3d> points = ct_lattice_points(study_case.target_box_ct);
+  for (RegistrationRecord& record : records)
+    record.errors =
+        TargetErrors{gold->source,
+                     mean_distance_mm(points, gold->room_from_ct, record.result.start_room_from_ct),
+                     mean_distance_mm(points, gold->room_from_ct, record.result.room_from_ct)};
+}
+
+}  // namespace af::registration
