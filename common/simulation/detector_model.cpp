@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "simulation/detector_model.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/error.h"
+#include "base/hash_random.h"
+#include "image/gaussian_blur.h"
+#include "simulation/parallel_rows.h"
+#include "simulation/poisson.h"
+
+namespace af {
+
+namespace {
+
+/// Means of factor x factor blocks; blocks at the right and lower edge may be smaller.
+Image2d block_means(const Image2d& image, int factor) {
+  Image2d means((image.width + factor - 1) / factor, (image.height + factor - 1) / factor);
+  for (int row = 0; row < means.height; ++row)
+    for (int column = 0; column < means.width; ++column) {
+      const int last_row = std::min((row + 1) * factor, image.height);
+      const int last_column = std::min((column + 1) * factor, image.width);
+      double sum = 0.0;
+      for (int y = row * factor; y < last_row; ++y)
+        for (int x = column * factor; x < last_column; ++x)
+          sum += static_cast<double>(image.at(x, y));
+      means.at(column, row) =
+          static_cast<float>(sum / ((last_row - row * factor) * (last_column - column * factor)));
+    }
+  return means;
+}
+
+/// Bilinear values at the fine pixel centres, edges replicated.
+Image2d magnify(const Image2d& coarse, int factor, int width, int height) {
+  Image2d fine(width, height);
+  const auto coarse_position = [factor](int index, int size) {
+    return std::clamp((index + 0.5) / factor - 0.5, 0.0, static_cast<double>(size - 1));
+  };
+  for (int row = 0; row < height; ++row) {
+    const double y = coarse_position(row, coarse.height);
+    const int y0 = static_cast<int>(y);
+    const int y1 = std::min(y0 + 1, coarse.height - 1);
+    for (int column = 0; column < width; ++column) {
+      const double x = coarse_position(column, coarse.width);
+      const int x0 = static_cast<int>(x);
+      const int x1 = std::min(x0 + 1, coarse.width - 1);
+      const auto along_row = [&](int at_row) {
+        return std::lerp(static_cast<double>(coarse.at(x0, at_row)),
+                         static_cast<double>(coarse.at(x1, at_row)),
+                         x - x0);
+      };
+      fine.at(column, row) = static_cast<float>(std::lerp(along_row(y0), along_row(y1), y - y0));
+    }
+  }
+  return fine;
+}
+
+double mean_within(const Image2d& image, const RegionOfInterest& roi) {
+  double sum = 0.0;
+  for (int row = roi.row; row < roi.row + roi.height; ++row)
+    for (int column = roi.column; column < roi.column + roi.width; ++column)
+      sum += static_cast<double>(image.at(column, row));
+  return sum / static_cast<double>(roi.pixel_count());
+}
+
+}  // namespace
+
+std::vector<std::string> problems(const DetectorOptions& options) {
+  std::vector<std::string> found;
+  const auto require = [&](bool holds,
+                           const std::string& name,
+                           const std::string& value,
+                           const std::string& constraint) {
+    if (!holds) found.push_back(name + " = " + value + ": must be " + constraint);
+  };
+  const auto within = [](double value, double low, double high) {
+    return value >= low && value <= high;
+  };
+  require(within(options.scatter_to_primary_ratio, 0.0, 100.0),
+          "scatter_to_primary_ratio",
+          std::to_string(options.scatter_to_primary_ratio),
+          "within 0 and 100");
+  require(within(options.scatter_sigma_mm, 1.0, 1000.0),
+          "scatter_sigma_mm",
+          std::to_string(options.scatter_sigma_mm),
+          "within 1 and 1000");
+  require(options.photons_per_pixel == 0.0 || within(options.photons_per_pixel, 1.0, 1e12),
+          "photons_per_pixel",
+          std::to_string(options.photons_per_pixel),
+          "within 1 and 1e12, or 0 for no noise");
+  require(within(options.blur_sigma_px, 0.0, 50.0),
+          "blur_sigma_px",
+          std::to_string(options.blur_sigma_px),
+          "within 0 and 50");
+  require(options.bits == 0 || (options.bits >= 8 && options.bits <= 16),
+          "bits",
+          std::to_string(options.bits),
+          "within 8 and 16, or 0 for no quantisation");
+  require(within(options.open_beam_level, 1.0, 1e6),
+          "open_beam_level",
+          std::to_string(options.open_beam_level),
+          "within 1 and 1e6");
+  return found;
+}
+
+Image2d scatter_image(const Image2d& primary,
+                      const RegionOfInterest& roi,
+                      double pixel_spacing_mm,
+                      const DetectorOptions& options) {
+  check(problems(roi, primary.width, primary.height).empty(),
+        "scatter_image() needs a region within the image");
+  Image2d source(primary.width, primary.height);
+  for (std::size_t i = 0; i < primary.pixels.size(); ++i) {
+    const auto value = static_cast<double>(primary.pixels[i]);
+    source.pixels[i] =
+        value > 0.0 && value < 1.0 ? static_cast<float>(-value * std::log(value)) : 0.0f;
+  }
+  // A quarter of the kernel's width per coarse pixel: the Gaussian stays well sampled.
+  const double sigma_px = options.scatter_sigma_mm / pixel_spacing_mm;
+  const int factor = std::max(1, static_cast<int>(sigma_px / 4.0));
+  Image2d scatter = magnify(gaussian_blur(block_means(source, factor), sigma_px / factor),
+                            factor,
+                            primary.width,
+                            primary.height);
+  const double mean_scatter = mean_within(scatter, roi);
+  if (!(mean_scatter > 0.0)) return Image2d(primary.width, primary.height);
+  const double scale = options.scatter_to_primary_ratio * mean_within(primary, roi) / mean_scatter;
+  for (float& value : scatter.pixels)
+    value = static_cast<float>(scale * static_cast<double>(value));
+  return scatter;
+}
+
+Image2d with_photon_noise(const Image2d& signal,
+                          double photons_per_pixel,
+                          std::uint64_t seed,
+                          std::uint64_t key,
+                          int threads) {
+  Image2d noisy(signal.width, signal.height);
+  for_each_row(signal.height, threads, [&](int row) {
+    for (int column = 0; column < signal.width; ++column) {
+      const auto pixel =
+          static_cast<std::uint64_t>(row) * static_cast<std::uint64_t>(signal.width) +
+          static_cast<std::uint64_t>(column);
+      HashRandom random(seed, key, pixel);
+      const double mean = photons_per_pixel * static_cast<double>(signal.at(column, row));
+      noisy.at(column, row) =
+          static_cast<float>(static_cast<double>(draw_poisson(mean, random)) / photons_per_pixel);
+    }
+  });
+  return noisy;
+}
+
+Image2d digitise(const Image2d& signal, const DetectorOptions& options) {
+  Image2d levels(signal.width, signal.height);
+  const double highest = std::ldexp(1.0, options.bits) - 1.0;
+  for (std::size_t i = 0; i < signal.pixels.size(); ++i) {
+    const double level = static_cast<double>(signal.pixels[i]) * options.open_beam_level;
+    levels.pixels[i] =
+        static_cast<float>(options.bits == 0 ? level : std::clamp(std::round(level), 0.0, highest));
+  }
+  return levels;
+}
+
+Image2d detect(const Image2d& primary,
+               const RegionOfInterest& roi,
+               double pixel_spacing_mm,
+               const DetectorOptions& options,
+               std::uint64_t seed,
+               std::uint64_t key,
+               int threads) {
+  Image2d signal = primary;
+  if (options.scatter_to_primary_ratio > 0.0) {
+    const Image2d scatter = scatter_image(primary, roi, pixel_spacing_mm, options);
+    for (std::size_t i = 0; i < signal.pixels.size(); ++i) signal.pixels[i] += scatter.pixels[i];
+  }
+  if (options.photons_per_pixel > 0.0)
+    signal = with_photon_noise(signal, options.photons_per_pixel, seed, key, threads);
+  return digitise(gaussian_blur(signal, options.blur_sigma_px), options);
+}
+
+}  // namespace af

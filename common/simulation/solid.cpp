@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "simulation/solid.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "base/error.h"
+#include "base/hash_random.h"
+#include "simulation/parallel_rows.h"
+
+namespace af {
+
+namespace {
+
+constexpr double kTextureScale_mm = 3.0;
+constexpr int kAirHu = -1000;
+
+/// The points that one slice of voxels is the mean of.
+struct SliceSamples {
+  Eigen::Vector3d first_point;
+  Eigen::Vector3d step_mm;
+  std::array<int, 3> count;
+  std::vector<int> hu;
+
+  SliceSamples(const CtGrid& grid, int slice, int samples_per_axis)
+      : step_mm(grid.spacing_mm / samples_per_axis),
+        count{grid.size[0] * samples_per_axis, grid.size[1] * samples_per_axis, samples_per_axis} {
+    const Eigen::Vector3d voxel_corner =
+        grid.point_mm(Eigen::Vector3d(0, 0, slice)) - 0.5 * grid.spacing_mm;
+    first_point = voxel_corner + 0.5 * step_mm;
+    hu.assign(static_cast<std::size_t>(count[0]) * static_cast<std::size_t>(count[1]) *
+                  static_cast<std::size_t>(count[2]),
+              kAirHu);
+  }
+
+  [[nodiscard]] std::size_t offset(int i, int j, int k) const {
+    return (static_cast<std::size_t>(k) * static_cast<std::size_t>(count[1]) +
+            static_cast<std::size_t>(j)) *
+               static_cast<std::size_t>(count[0]) +
+           static_cast<std::size_t>(i);
+  }
+  /// Samples [first, last) of an axis that lie within [low, high] mm.
+  [[nodiscard]] std::pair<int, int> range(int axis, double low_mm, double high_mm) const {
+    const auto a = static_cast<std::size_t>(axis);
+    const double limit = count[a];
+    const double first = std::ceil((low_mm - first_point[axis]) / step_mm[axis]);
+    const double last = std::floor((high_mm - first_point[axis]) / step_mm[axis]) + 1.0;
+    return {static_cast<int>(std::clamp(first, 0.0, limit)),
+            static_cast<int>(std::clamp(last, 0.0, limit))};
+  }
+
+  void paint(const Solid& solid, const CtBox& bounds) {
+    const auto [i0, i1] = range(0, bounds.low_mm.x(), bounds.high_mm.x());
+    const auto [j0, j1] = range(1, bounds.low_mm.y(), bounds.high_mm.y());
+    const auto [k0, k1] = range(2, bounds.low_mm.z(), bounds.high_mm.z());
+    for (int k = k0; k < k1; ++k)
+      for (int j = j0; j < j1; ++j)
+        for (int i = i0; i < i1; ++i) {
+          const Eigen::Vector3d point =
+              first_point + step_mm.cwiseProduct(Eigen::Vector3d(i, j, k));
+          if (!solid.contains(point)) continue;
+          int value = solid.hu;
+          if (solid.texture_hu != 0)
+            value +=
+                static_cast<int>(std::lround(solid.texture_hu * texture(point, kTextureScale_mm)));
+          hu[offset(i, j, k)] = value;
+        }
+  }
+
+  /// Mean of the samples of voxel (column, row), rounded.
+  [[nodiscard]] std::int16_t voxel_mean(int column, int row, int samples_per_axis) const {
+    int sum = 0;
+    for (int k = 0; k < samples_per_axis; ++k)
+      for (int j = 0; j < samples_per_axis; ++j)
+        for (int i = 0; i < samples_per_axis; ++i)
+          sum += hu[offset(column * samples_per_axis + i, row * samples_per_axis + j, k)];
+    return static_cast<std::int16_t>(std::lround(
+        static_cast<double>(sum) / (samples_per_axis * samples_per_axis * samples_per_axis)));
+  }
+};
+
+/// A value in [-1, 1] of one lattice point.
+double lattice_value(std::int64_t i, std::int64_t j, std::int64_t k) {
+  const std::uint64_t bits = hash64(
+      static_cast<std::uint64_t>(i), static_cast<std::uint64_t>(j), static_cast<std::uint64_t>(k));
+  return 2.0 * static_cast<double>(bits >> 11) * 0x1.0p-53 - 1.0;
+}
+
+}  // namespace
+
+bool Solid::contains(const Eigen::Vector3d& ct_point_mm) const {
+  const Eigen::Vector3d local = rotation.transpose() * (ct_point_mm - center_mm);
+  switch (shape) {
+    case Shape::EllipticCylinder: {
+      const Eigen::Vector3d unit = local.cwiseQuotient(half_sizes_mm);
+      if (std::abs(unit.z()) > 1.0) return false;
+      const double radius = 1.0 - waist * (1.0 - unit.z() * unit.z());
+      return unit.head<2>().squaredNorm() <= radius * radius;
+    }
+    case Shape::Capsule: {
+      const double along = std::clamp(local.z(), -half_sizes_mm.z(), half_sizes_mm.z());
+      const Eigen::Vector3d from_axis(local.x(), local.y(), local.z() - along);
+      return from_axis.squaredNorm() <= half_sizes_mm.x() * half_sizes_mm.x();
+    }
+    case Shape::Ellipsoid:
+      break;
+  }
+  return local.cwiseQuotient(half_sizes_mm).squaredNorm() <= 1.0;
+}
+
+CtBox Solid::bounds() const {
+  Eigen::Vector3d half = half_sizes_mm;
+  if (shape == Shape::Capsule) half = Eigen::Vector3d(half.x(), half.x(), half.z() + half.x());
+  const Eigen::Vector3d reach = rotation.cwiseAbs() * half;
+  return {center_mm - reach, center_mm + reach};
+}
+
+Solid capsule_between(const Eigen::Vector3d& a,
+                      const Eigen::Vector3d& b,
+                      double radius_mm,
+                      int hu) {
+  Solid solid;
+  solid.shape = Solid::Shape::Capsule;
+  solid.center_mm = 0.5 * (a + b);
+  solid.half_sizes_mm = {radius_mm, radius_mm, 0.5 * (b - a).norm()};
+  if (a != b)
+    solid.rotation =
+        Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), b - a).toRotationMatrix();
+  solid.hu = hu;
+  return solid;
+}
+
+double texture(const Eigen::Vector3d& ct_point_mm, double scale_mm) {
+  const Eigen::Vector3d position = ct_point_mm / scale_mm;
+  const Eigen::Vector3d low = position.array().floor();
+  const Eigen::Vector3d part = position - low;
+  const auto i = static_cast<std::int64_t>(low.x());
+  const auto j = static_cast<std::int64_t>(low.y());
+  const auto k = static_cast<std::int64_t>(low.z());
+  const auto along_i = [&](std::int64_t at_j, std::int64_t at_k) {
+    return std::lerp(lattice_value(i, at_j, at_k), lattice_value(i + 1, at_j, at_k), part.x());
+  };
+  const auto along_j = [&](std::int64_t at_k) {
+    return std::lerp(along_i(j, at_k), along_i(j + 1, at_k), part.y());
+  };
+  return std::lerp(along_j(k), along_j(k + 1), part.z());
+}
+
+CtVolume sample_solids(const CtGrid& grid,
+                       const std::vector<Solid>& solids,
+                       int samples_per_axis,
+                       int threads) {
+  check(grid.direction.isIdentity(), "sample_solids() needs a grid along the ct axes");
+  check(samples_per_axis >= 1 && samples_per_axis <= 8, "1 to 8 samples per axis");
+  std::vector<CtBox> bounds;
+  for (const Solid& solid : solids) bounds.push_back(solid.bounds());
+  std::vector<std::int16_t> voxels(grid.voxel_count());
+  for_each_row(grid.size[2], threads, [&](int slice) {
+    SliceSamples samples(grid, slice, samples_per_axis);
+    for (std::size_t i = 0; i < solids.size(); ++i) samples.paint(solids[i], bounds[i]);
+    std::int16_t* voxel = voxels.data() + static_cast<std::size_t>(slice) *
+                                              static_cast<std::size_t>(grid.size[0]) *
+                                              static_cast<std::size_t>(grid.size[1]);
+    for (int row = 0; row < grid.size[1]; ++row)
+      for (int column = 0; column < grid.size[0]; ++column)
+        *voxel++ = samples.voxel_mean(column, row, samples_per_axis);
+  });
+  return {grid, SharedArray<std::int16_t>(std::move(voxels))};
+}
+
+}  // namespace af

@@ -1,0 +1,272 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "simulation/spine_phantom.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "base/error.h"
+
+namespace af {
+
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kWidth_mm = 358.0;  // left-right and front-back
+constexpr double kHeight_mm = 280.0;
+constexpr double kPitch_mm = 33.0;         // between vertebrae
+constexpr int kVertebraeEachSide = 4;      // vertebrae below and above T12
+constexpr double kTorsoFront_mm = -130.0;  // skin, y
+constexpr double kTorsoBack_mm = 80.0;
+constexpr double kTorsoHalfWidth_mm = 158.0;
+constexpr double kTorsoMiddle_mm = 0.5 * (kTorsoFront_mm + kTorsoBack_mm);
+constexpr double kTorsoHalfDepth_mm = 0.5 * (kTorsoBack_mm - kTorsoFront_mm);
+
+constexpr int kFatHu = -100;
+constexpr int kMuscleHu = 50;
+constexpr int kOrganHu = 60;
+constexpr int kGasHu = -1000;
+constexpr int kLungHu = -830;
+constexpr int kDiscHu = 90;
+constexpr int kCanalHu = 20;
+constexpr int kCorticalHu = 1000;
+constexpr int kCancellousHu = 230;
+constexpr int kCancellousTextureHu = 110;
+constexpr double kShell_mm = 1.6;
+
+/// A vertebra by its level: 0 is T12, positive towards the head.
+struct Vertebra {
+  int level;
+  Vector3d center;
+  double half_width_mm;  ///< of the body
+  double half_depth_mm;
+  double half_height_mm;
+
+  [[nodiscard]] bool has_ribs() const { return level >= 0; }
+};
+
+/// The curve of the spine: kyphosis above, lordosis below, a slight bend to the left.
+Vector3d spine_point(double z_mm) {
+  return {3.5 * std::sin(z_mm / 70.0), 6.0 * std::sin(z_mm / 95.0), z_mm};
+}
+
+Vertebra vertebra_at(int level) {
+  return {level,
+          spine_point(level * kPitch_mm),
+          20.0 - 1.1 * level,
+          15.0 - 0.5 * level,
+          0.5 * (25.5 - 0.7 * level)};
+}
+
+Solid ellipsoid(const Vector3d& center, const Vector3d& half_sizes, int hu, int texture_hu = 0) {
+  Solid solid;
+  solid.center_mm = center;
+  solid.half_sizes_mm = half_sizes;
+  solid.hu = hu;
+  solid.texture_hu = texture_hu;
+  return solid;
+}
+
+Solid elliptic_cylinder(const Vector3d& center, const Vector3d& half_sizes, int hu) {
+  Solid solid = ellipsoid(center, half_sizes, hu);
+  solid.shape = Solid::Shape::EllipticCylinder;
+  return solid;
+}
+
+/// Appends a bone as cortical shell and cancellous core: shells of all parts of a bone come first,
+/// so that no shell cuts through the core of a part it is joined to.
+class BonePainter {
+ public:
+  explicit BonePainter(std::vector<Solid>& solids) : solids_(solids) {}
+  ~BonePainter() { solids_.insert(solids_.end(), cores_.begin(), cores_.end()); }
+  BonePainter(const BonePainter&) = delete;
+  BonePainter& operator=(const BonePainter&) = delete;
+
+  void add(Solid part) {
+    part.hu = kCorticalHu;
+    solids_.push_back(part);
+    part.half_sizes_mm -= Vector3d::Constant(kShell_mm);
+    if (part.shape == Solid::Shape::Capsule) part.half_sizes_mm.z() += kShell_mm;
+    if (!(part.half_sizes_mm.minCoeff() > 0.0)) return;
+    part.hu = kCancellousHu;
+    part.texture_hu = kCancellousTextureHu;
+    cores_.push_back(part);
+  }
+  void add_capsule(const Vector3d& a, const Vector3d& b, double radius_mm) {
+    add(capsule_between(a, b, radius_mm, kCorticalHu));
+  }
+
+ private:
+  std::vector<Solid>& solids_;
+  std::vector<Solid> cores_;
+};
+
+void add_arch(const Vertebra& v, BonePainter& bone) {
+  const double back = v.half_depth_mm;
+  for (const double side : {-1.0, 1.0}) {
+    const auto at = [&](double x, double y, double z) {
+      return Vector3d(v.center + Vector3d(side * x, y, z));
+    };
+    bone.add_capsule(at(12.0, back - 4.0, 4.0), at(13.5, back + 9.0, 3.0), 4.5);      // pedicle
+    bone.add_capsule(at(13.5, back + 11.0, 1.0), at(3.0, back + 19.0, -5.0), 3.8);    // lamina
+    bone.add_capsule(at(14.0, back + 9.0, 16.0), at(14.5, back + 12.0, -15.0), 4.2);  // articular
+    const double reach = v.has_ribs() ? 28.0 - v.level : 38.0;
+    bone.add_capsule(
+        at(14.0, back + 9.0, 3.0), at(reach, back + (v.has_ribs() ? 15.0 : 9.0), 5.0), 3.6);
+  }
+}
+
+void add_spinous_process(const Vertebra& v, BonePainter& bone) {
+  // Long and steep on thoracic, broad and level on lumbar vertebrae.
+  const double drop_mm = v.has_ribs() ? 16.0 : 7.0;
+  const Vector3d root = v.center + Vector3d(0.0, v.half_depth_mm + 20.0, -5.0);
+  const Vector3d tip = root + Vector3d(1.0, 22.0, -drop_mm);
+  Solid blade = ellipsoid(0.5 * (root + tip),
+                          {3.4, 0.5 * (tip - root).norm() + 3.0, v.has_ribs() ? 6.0 : 9.0},
+                          kCorticalHu);
+  blade.rotation =
+      Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitY(), tip - root).toRotationMatrix();
+  bone.add(blade);
+}
+
+void add_vertebra(const Vertebra& v, std::vector<Solid>& solids) {
+  BonePainter bone(solids);
+  Solid body = elliptic_cylinder(
+      v.center, {v.half_width_mm, v.half_depth_mm, v.half_height_mm}, kCorticalHu);
+  body.waist = 0.1;
+  bone.add(body);
+  add_arch(v, bone);
+  add_spinous_process(v, bone);
+}
+
+void add_disc(int level_below, std::vector<Solid>& solids) {
+  const Vertebra below = vertebra_at(level_below);
+  const Vertebra above = vertebra_at(level_below + 1);
+  solids.push_back(
+      elliptic_cylinder(0.5 * (below.center + above.center),
+                        {below.half_width_mm - 0.5, below.half_depth_mm - 0.5, 0.5 * kPitch_mm},
+                        kDiscHu));
+}
+
+void add_canal(std::vector<Solid>& solids) {
+  for (int level = -kVertebraeEachSide - 1; level <= kVertebraeEachSide + 1; ++level) {
+    const Vertebra v = vertebra_at(level);
+    solids.push_back(elliptic_cylinder(v.center + Vector3d(0.0, v.half_depth_mm + 8.0, 0.0),
+                                       {9.0, 7.5, 0.5 * kPitch_mm},
+                                       kCanalHu));
+  }
+}
+
+/// Points along a rib: head at the body, tubercle at the transverse process, then around the
+/// chest wall and down.
+std::vector<Vector3d> rib_points(const Vertebra& v, double side) {
+  constexpr double kDegree = std::numbers::pi / 180.0;
+  constexpr int kArcPoints = 24;
+  const bool is_floating = v.level == 0;
+  const double end_deg = is_floating ? 85.0 : std::min(150.0, 110.0 + 12.0 * v.level);
+  const double total_drop_mm = is_floating ? 45.0 : 75.0;
+  // The spine sits deeper than the chest wall's back: the ribs first run backwards, then around.
+  const double half_width = kTorsoHalfWidth_mm - 23.0 - 3.0 * (v.level == 4 ? 1 : 0);
+  const double half_depth = kTorsoHalfDepth_mm - 20.0;
+  std::vector<Vector3d> points{
+      v.center + Vector3d(side * (v.half_width_mm + 1.0), v.half_depth_mm - 3.0, 8.0),
+      v.center + Vector3d(side * (28.0 - v.level), v.half_depth_mm + 13.0, 9.0)};
+  constexpr double kStart_deg = 24.0;
+  for (int i = 0; i <= kArcPoints; ++i) {
+    const double share = static_cast<double>(i) / kArcPoints;
+    const double angle = (kStart_deg + share * (end_deg - kStart_deg)) * kDegree;
+    const double drop = total_drop_mm * (0.15 * share + 0.85 * share * share) - 4.0;
+    points.emplace_back(side * half_width * std::sin(angle),
+                        kTorsoMiddle_mm + half_depth * std::cos(angle),
+                        v.center.z() - drop);
+  }
+  return points;
+}
+
+void add_ribs(std::vector<Solid>& solids) {
+  for (int level = 0; level <= kVertebraeEachSide + 2; ++level)
+    for (const double side : {-1.0, 1.0}) {
+      BonePainter bone(solids);
+      const std::vector<Vector3d> points = rib_points(vertebra_at(level), side);
+      for (std::size_t i = 1; i < points.size(); ++i)
+        bone.add_capsule(points[i - 1], points[i], i < 2 ? 4.0 : 5.0);
+    }
+}
+
+void add_soft_tissue(std::vector<Solid>& solids) {
+  const Vector3d middle(0.0, kTorsoMiddle_mm, 0.0);
+  solids.push_back(
+      elliptic_cylinder(middle, {kTorsoHalfWidth_mm, kTorsoHalfDepth_mm, kHeight_mm}, kFatHu));
+  solids.push_back(elliptic_cylinder(
+      middle, {kTorsoHalfWidth_mm - 12.0, kTorsoHalfDepth_mm - 9.0, kHeight_mm}, kMuscleHu));
+  // Fat between the organs, in front of the spine.
+  solids.push_back(ellipsoid({0.0, -70.0, -70.0}, {118.0, 48.0, 140.0}, -60, 40));
+  // Lung bases reach down beside T11; the left one is narrower for the heart.
+  solids.push_back(ellipsoid({-70.0, -12.0, 150.0}, {56.0, 66.0, 120.0}, kLungHu, 60));
+  solids.push_back(ellipsoid({72.0, -10.0, 150.0}, {53.0, 64.0, 128.0}, kLungHu, 60));
+  solids.push_back(ellipsoid({24.0, -62.0, 120.0}, {52.0, 42.0, 62.0}, kMuscleHu));   // heart
+  solids.push_back(ellipsoid({-62.0, -45.0, 8.0}, {72.0, 66.0, 52.0}, kOrganHu, 8));  // liver
+  solids.push_back(ellipsoid({92.0, 8.0, 22.0}, {30.0, 36.0, 34.0}, kOrganHu, 8));    // spleen
+  solids.push_back(ellipsoid({55.0, -62.0, 2.0}, {44.0, 34.0, 36.0}, 35));            // stomach
+  solids.push_back(ellipsoid({60.0, -76.0, 10.0}, {26.0, 15.0, 20.0}, kGasHu));
+  solids.push_back(ellipsoid({76.0, -50.0, -78.0}, {16.0, 18.0, 34.0}, 30));  // colon
+  solids.push_back(ellipsoid({78.0, -56.0, -70.0}, {10.0, 9.0, 19.0}, kGasHu));
+  solids.push_back(ellipsoid({-58.0, 18.0, -52.0}, {26.0, 22.0, 50.0}, 35));  // kidneys
+  solids.push_back(ellipsoid({60.0, 18.0, -38.0}, {26.0, 22.0, 50.0}, 35));
+  solids.push_back(elliptic_cylinder({13.0, -27.0, 0.0}, {11.0, 11.0, kHeight_mm}, 45));  // aorta
+}
+
+}  // namespace
+
+std::vector<std::string> problems(const SpinePhantomOptions& options) {
+  std::vector<std::string> found;
+  if (!(options.voxel_mm >= 0.5 && options.voxel_mm <= 5.0))
+    found.push_back("voxel_mm = " + std::to_string(options.voxel_mm) +
+                    ": must be within 0.5 and 5");
+  if (options.samples_per_axis < 1 || options.samples_per_axis > 8)
+    found.push_back("samples_per_axis = " + std::to_string(options.samples_per_axis) +
+                    ": must be within 1 and 8");
+  return found;
+}
+
+std::vector<Solid> spine_phantom_solids() {
+  std::vector<Solid> solids;
+  add_soft_tissue(solids);
+  add_ribs(solids);
+  // One vertebra more at each end: the volume cuts through them, as a scan does.
+  for (int level = -kVertebraeEachSide - 1; level <= kVertebraeEachSide; ++level)
+    add_disc(level, solids);
+  for (int level = -kVertebraeEachSide - 1; level <= kVertebraeEachSide + 1; ++level)
+    add_vertebra(vertebra_at(level), solids);
+  add_canal(solids);
+  return solids;
+}
+
+CtVolume spine_phantom(const SpinePhantomOptions& options) {
+  throw_if_any(problems(options));
+  CtGrid grid;
+  const int across = static_cast<int>(std::lround(kWidth_mm / options.voxel_mm));
+  grid.size = {across, across, static_cast<int>(std::lround(kHeight_mm / options.voxel_mm))};
+  grid.spacing_mm = Vector3d::Constant(options.voxel_mm);
+  grid.origin_mm =
+      -0.5 * options.voxel_mm * Vector3d(grid.size[0] - 1, grid.size[1] - 1, grid.size[2] - 1);
+  return sample_solids(grid, spine_phantom_solids(), options.samples_per_axis, options.threads);
+}
+
+RegistrationTarget spine_phantom_target() {
+  const Vertebra middle = vertebra_at(0);
+  const Vector3d half(middle.half_width_mm + 4.0, middle.half_depth_mm + 8.0, 18.0);
+  const Vector3d center = middle.center + Vector3d(0.0, 6.0, 0.0);
+  return {center, {center - half, center + half}};
+}
+
+std::vector<Vector3d> spine_phantom_vertebra_centers() {
+  std::vector<Vector3d> centers;
+  for (int level = -kVertebraeEachSide; level <= kVertebraeEachSide; ++level)
+    centers.push_back(vertebra_at(level).center);
+  return centers;
+}
+
+}  // namespace af

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "simulation/xray_simulator.h"
+
+#include <utility>
+
+#include "simulation/parallel_rows.h"
+
+namespace af {
+
+XraySimulationOptions XraySimulationOptions::ideal() {
+  XraySimulationOptions options;
+  options.spectrum.tube_kvp = 0.0;
+  options.detector.scatter_to_primary_ratio = 0.0;
+  options.detector.photons_per_pixel = 0.0;
+  options.detector.blur_sigma_px = 0.0;
+  options.detector.bits = 0;
+  return options;
+}
+
+std::vector<std::string> problems(const XraySimulationOptions& options) {
+  constexpr int kMostRaysPerSide = 16;
+  constexpr int kMostThreads = 1024;
+  std::vector<std::string> found = problems(options.spectrum);
+  const std::vector<std::string> of_detector = problems(options.detector);
+  found.insert(found.end(), of_detector.begin(), of_detector.end());
+  if (options.rays_per_pixel_side < 1 || options.rays_per_pixel_side > kMostRaysPerSide)
+    found.push_back("rays_per_pixel_side = " + std::to_string(options.rays_per_pixel_side) +
+                    ": must be within 1 and 16");
+  if (options.threads < 0 || options.threads > kMostThreads)
+    found.push_back("threads = " + std::to_string(options.threads) + ": must be within 0 and 1024");
+  return found;
+}
+
+XraySimulator::XraySimulator(const AttenuationVolume& volume,
+                             std::vector<SteelCylinder> fiducials,
+                             const XraySimulationOptions& options)
+    : tissue_(volume.model()),
+      projector_(volume, tissue_),
+      beam_(options.spectrum, tissue_),
+      fiducials_(std::move(fiducials)),
+      options_(options) {}
+
+double XraySimulator::transmission(const Eigen::Vector3d& source_ct_mm,
+                                   const Eigen::Vector3d& detector_ct_mm) const {
+  const PathIntegrals path = projector_.integrate(source_ct_mm, detector_ct_mm);
+  RayMaterials materials{path.water_mm, path.bone_mm, 0.0};
+  for (const SteelCylinder& pin : fiducials_)
+    materials.steel_mm += pin.chord_length_mm(source_ct_mm, detector_ct_mm);
+  return beam_.transmission(materials);
+}
+
+Image2d XraySimulator::primary_image(const CameraGeometry& camera,
+                                     const RigidTransform& room_from_ct,
+                                     const ProgressCallback& progress) const {
+  const RigidTransform ct_from_room = room_from_ct.inverse();
+  const Eigen::Vector3d source_ct_mm = ct_from_room * camera.source_point;
+  const int side = options_.rays_per_pixel_side;
+  Image2d primary(camera.size_px.x(), camera.size_px.y());
+  const auto pixel_mean = [&](int column, int row) {
+    double sum = 0.0;
+    for (int j = 0; j < side; ++j)
+      for (int i = 0; i < side; ++i)
+        sum += transmission(source_ct_mm,
+                            ct_from_room * camera.detector_point(column - 0.5 + (i + 0.5) / side,
+                                                                 row - 0.5 + (j + 0.5) / side));
+    return sum / (side * side);
+  };
+  for_each_row(
+      primary.height,
+      options_.threads,
+      [&](int row) {
+        for (int column = 0; column < primary.width; ++column)
+          primary.at(column, row) = static_cast<float>(pixel_mean(column, row));
+      },
+      progress);
+  return primary;
+}
+
+Image2d XraySimulator::xray(const View& view,
+                            const RigidTransform& room_from_ct,
+                            std::uint64_t seed,
+                            std::uint64_t key,
+                            const ProgressCallback& progress) const {
+  const Image2d primary = primary_image(view.camera, room_from_ct, progress);
+  return detect(primary,
+                view.roi,
+                view.camera.pixel_spacing_mm.x(),
+                options_.detector,
+                seed,
+                key,
+                options_.threads);
+}
+
+}  // namespace af

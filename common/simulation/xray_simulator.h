@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "base/progress.h"
+#include "drr/drr_renderer.h"
+#include "simulation/detector_model.h"
+#include "simulation/fiducials.h"
+#include "simulation/siddon_projector.h"
+#include "simulation/xray_spectrum.h"
+
+namespace af {
+
+/// The imaging chain from tube to grey values.
+struct XraySimulationOptions {
+  SpectrumOptions spectrum;
+  DetectorOptions detector;
+  int rays_per_pixel_side = 1;  ///< n: a pixel is the mean of n x n rays
+  int threads = 0;              ///< 0: as many as the hardware has; results do not depend on it
+
+  /// One energy, one ray per pixel, no scatter, noise, blur or quantisation: Beer and Lambert's
+  /// law.
+  static XraySimulationOptions ideal();
+};
+
+std::vector<std::string> problems(const XraySimulationOptions& options);
+
+/// Makes X-rays of a CT with steel pins. Pins add to the tissue along a ray; the tissue they would
+/// displace (0.04 of the pin's own attenuation and less) is not taken away.
+class XraySimulator {
+ public:
+  /// `volume` must outlive the simulator.
+  XraySimulator(const AttenuationVolume& volume,
+                std::vector<SteelCylinder> fiducials,
+                const XraySimulationOptions& options);
+
+  /// Share of the open beam that reaches every pixel of the camera unscattered.
+  [[nodiscard]] Image2d primary_image(const CameraGeometry& camera,
+                                      const RigidTransform& room_from_ct,
+                                      const ProgressCallback& progress = {}) const;
+
+  /// The X-ray as grey values, bright where nothing attenuates; `view.roi` is where the
+  /// scatter-to-primary ratio holds. Noise is keyed by (seed, key, pixel).
+  [[nodiscard]] Image2d xray(const View& view,
+                             const RigidTransform& room_from_ct,
+                             std::uint64_t seed,
+                             std::uint64_t key,
+                             const ProgressCallback& progress = {}) const;
+
+  [[nodiscard]] const TissueModel& tissue() const { return tissue_; }
+  [[nodiscard]] const BeamTransmission& beam() const { return beam_; }
+
+ private:
+  [[nodiscard]] double transmission(const Eigen::Vector3d& source_ct_mm,
+                                    const Eigen::Vector3d& detector_ct_mm) const;
+
+  TissueModel tissue_;
+  SiddonProjector projector_;
+  BeamTransmission beam_;
+  std::vector<SteelCylinder> fiducials_;
+  XraySimulationOptions options_;
+};
+
+}  // namespace af

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "simulation/xray_spectrum.h"
+
+#include <cmath>
+
+#include "simulation/material_tables.h"
+
+namespace af {
+
+std::vector<std::string> problems(const SpectrumOptions& options) {
+  constexpr int kFewestBins = 20;
+  constexpr int kMostBins = 1000;
+  std::vector<std::string> found;
+  if (options.tube_kvp != 0.0 &&
+      !(options.tube_kvp >= 30.0 && options.tube_kvp <= kHighestTableEnergy_kev))
+    found.push_back("tube_kvp = " + std::to_string(options.tube_kvp) +
+                    ": must be within 30 and 200, or 0 for a single energy");
+  if (!(options.aluminium_mm >= 0.0 && options.aluminium_mm <= 50.0))
+    found.push_back("aluminium_mm = " + std::to_string(options.aluminium_mm) +
+                    ": must be within 0 and 50");
+  if (options.energy_bins < kFewestBins || options.energy_bins > kMostBins)
+    found.push_back("energy_bins = " + std::to_string(options.energy_bins) +
+                    ": must be within 20 and 1000");
+  return found;
+}
+
+std::vector<SpectrumBin> tube_spectrum(const SpectrumOptions& options,
+                                       double effective_energy_kev) {
+  if (options.tube_kvp == 0.0) return {{effective_energy_kev, 1.0}};
+  std::vector<SpectrumBin> bins;
+  const double width_kev = (options.tube_kvp - kLowestTableEnergy_kev) / options.energy_bins;
+  double sum = 0.0;
+  for (int i = 0; i < options.energy_bins; ++i) {
+    const double energy_kev = kLowestTableEnergy_kev + (i + 0.5) * width_kev;
+    const double photons = (options.tube_kvp - energy_kev) / energy_kev;
+    const double filtered =
+        photons * std::exp(-options.aluminium_mm *
+                           linear_attenuation_per_mm(Material::Aluminium, energy_kev));
+    bins.push_back({energy_kev, filtered * energy_kev});
+    sum += bins.back().weight;
+  }
+  for (SpectrumBin& bin : bins) bin.weight /= sum;
+  return bins;
+}
+
+BeamTransmission::BeamTransmission(const SpectrumOptions& options, const TissueModel& tissue)
+    : spectrum_(tube_spectrum(options, tissue.effective_energy_kev())) {
+  for (const SpectrumBin& bin : spectrum_)
+    coefficients_.push_back({tissue.water_mu_per_mm(bin.energy_kev),
+                             tissue.bone_mu_per_mm(bin.energy_kev),
+                             linear_attenuation_per_mm(Material::Iron, bin.energy_kev)});
+}
+
+double BeamTransmission::transmission(const RayMaterials& materials) const {
+  double signal = 0.0;
+  for (std::size_t i = 0; i < spectrum_.size(); ++i)
+    signal += spectrum_[i].weight * std::exp(-(coefficients_[i].water_per_mm * materials.water_mm +
+                                               coefficients_[i].bone_per_mm * materials.bone_mm +
+                                               coefficients_[i].steel_per_mm * materials.steel_mm));
+  return signal;
+}
+
+}  // namespace af
