@@ -18,9 +18,9 @@ constexpr double kWidth_mm = 358.0;  // left-right and front-back
 constexpr double kHeight_mm = 280.0;
 constexpr double kPitch_mm = 33.0;         // between vertebrae
 constexpr int kVertebraeEachSide = 4;      // vertebrae below and above T12
-constexpr double kTorsoFront_mm = -130.0;  // skin, y
-constexpr double kTorsoBack_mm = 80.0;
-constexpr double kTorsoHalfWidth_mm = 158.0;
+constexpr double kTorsoFront_mm = -115.0;  // skin, y
+constexpr double kTorsoBack_mm = 78.0;
+constexpr double kTorsoHalfWidth_mm = 143.0;
 constexpr double kTorsoMiddle_mm = 0.5 * (kTorsoFront_mm + kTorsoBack_mm);
 constexpr double kTorsoHalfDepth_mm = 0.5 * (kTorsoBack_mm - kTorsoFront_mm);
 
@@ -121,8 +121,8 @@ void add_arch(const Vertebra& v, BonePainter& bone) {
 void add_spinous_process(const Vertebra& v, BonePainter& bone) {
   // Long and steep on thoracic, broad and level on lumbar vertebrae.
   const double drop_mm = v.has_ribs() ? 16.0 : 7.0;
-  const Vector3d root = v.center + Vector3d(0.0, v.half_depth_mm + 20.0, -5.0);
-  const Vector3d tip = root + Vector3d(1.0, 22.0, -drop_mm);
+  const Vector3d root = v.center + Vector3d(0.0, v.half_depth_mm + 17.0, -5.0);
+  const Vector3d tip = root + Vector3d(1.0, 25.0, -drop_mm);
   Solid blade = ellipsoid(0.5 * (root + tip),
                           {3.4, 0.5 * (tip - root).norm() + 3.0, v.has_ribs() ? 6.0 : 9.0},
                           kCorticalHu);
@@ -202,15 +202,15 @@ void add_soft_tissue(std::vector<Solid>& solids) {
   solids.push_back(elliptic_cylinder(
       middle, {kTorsoHalfWidth_mm - 12.0, kTorsoHalfDepth_mm - 9.0, kHeight_mm}, kMuscleHu));
   // Fat between the organs, in front of the spine.
-  solids.push_back(ellipsoid({0.0, -70.0, -70.0}, {118.0, 48.0, 140.0}, -60, 40));
+  solids.push_back(ellipsoid({0.0, -58.0, -70.0}, {106.0, 44.0, 140.0}, -60, 40));
   // Lung bases reach down beside T11; the left one is narrower for the heart.
-  solids.push_back(ellipsoid({-70.0, -12.0, 150.0}, {56.0, 66.0, 120.0}, kLungHu, 60));
-  solids.push_back(ellipsoid({72.0, -10.0, 150.0}, {53.0, 64.0, 128.0}, kLungHu, 60));
-  solids.push_back(ellipsoid({24.0, -62.0, 120.0}, {52.0, 42.0, 62.0}, kMuscleHu));   // heart
-  solids.push_back(ellipsoid({-62.0, -45.0, 8.0}, {72.0, 66.0, 52.0}, kOrganHu, 8));  // liver
-  solids.push_back(ellipsoid({92.0, 8.0, 22.0}, {30.0, 36.0, 34.0}, kOrganHu, 8));    // spleen
-  solids.push_back(ellipsoid({55.0, -62.0, 2.0}, {44.0, 34.0, 36.0}, 35));            // stomach
-  solids.push_back(ellipsoid({60.0, -76.0, 10.0}, {26.0, 15.0, 20.0}, kGasHu));
+  solids.push_back(ellipsoid({-63.0, -14.0, 150.0}, {49.0, 60.0, 120.0}, kLungHu, 60));
+  solids.push_back(ellipsoid({65.0, -12.0, 150.0}, {46.0, 58.0, 128.0}, kLungHu, 60));
+  solids.push_back(ellipsoid({22.0, -52.0, 120.0}, {48.0, 38.0, 62.0}, kMuscleHu));   // heart
+  solids.push_back(ellipsoid({-56.0, -38.0, 8.0}, {66.0, 58.0, 52.0}, kOrganHu, 8));  // liver
+  solids.push_back(ellipsoid({84.0, 6.0, 22.0}, {27.0, 34.0, 34.0}, kOrganHu, 8));    // spleen
+  solids.push_back(ellipsoid({52.0, -58.0, 2.0}, {42.0, 34.0, 36.0}, 35));            // stomach
+  solids.push_back(ellipsoid({58.0, -72.0, 10.0}, {26.0, 15.0, 20.0}, kGasHu));
   solids.push_back(ellipsoid({76.0, -50.0, -78.0}, {16.0, 18.0, 34.0}, 30));  // colon
   solids.push_back(ellipsoid({78.0, -56.0, -70.0}, {10.0, 9.0, 19.0}, kGasHu));
   solids.push_back(ellipsoid({-58.0, 18.0, -52.0}, {26.0, 22.0, 50.0}, 35));  // kidneys
