@@ -1,0 +1,12 @@
+# SPDX-License-Identifier: Apache-2.0
+af_add_test(
+  simulation_test
+  SOURCES unit/simulation/automatic_target_test.cpp
+          unit/simulation/detector_model_test.cpp
+          unit/simulation/fiducials_test.cpp
+          unit/simulation/siddon_projector_test.cpp
+          unit/simulation/solid_test.cpp
+          unit/simulation/spine_phantom_test.cpp
+          unit/simulation/xray_physics_test.cpp
+          unit/simulation/xray_simulator_test.cpp
+  LIBS af_simulation)
