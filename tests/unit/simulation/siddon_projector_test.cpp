@@ -84,15 +84,16 @@ PathIntegrals brute_force(const CtVolume& ct,
 
 class SiddonProjectorOfABox : public ::testing::Test {
  protected:
-  SiddonProjectorOfABox() {
-    grid_.size = {40, 30, 20};
-    grid_.spacing_mm = {1.0, 2.0, 3.0};
+  static CtGrid grid() {
+    CtGrid grid;
+    grid.size = {40, 30, 20};
+    grid.spacing_mm = {1.0, 2.0, 3.0};
+    return grid;
   }
-  CtGrid grid_;
   AttenuationModel model_;
   TissueModel tissue_{model_};
   // 500 HU in voxels 10 to 29, 5 to 14, 4 to 13: x in [9.5, 29.5], y in [9, 29], z in [10.5, 40.5].
-  CtVolume ct_ = box_phantom(grid_, {10, 5, 4}, {29, 14, 13}, 500);
+  CtVolume ct_ = box_phantom(grid(), {10, 5, 4}, {29, 14, 13}, 500);
   AttenuationVolume volume_{ct_, model_};
   SiddonProjector projector_{volume_, tissue_};
 

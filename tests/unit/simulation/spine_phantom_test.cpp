@@ -42,8 +42,8 @@ int largest_hu(const Vector3d& low, const Vector3d& high) {
 int gas_voxels(double side) {
   int count = 0;
   for (double z = -120.0; z <= 60.0; z += 2.0)
-    for (double y = -100.0; y <= 30.0; y += 2.0)
-      for (double x = 20.0; x <= 100.0; x += 2.0) count += hu_at({side * x, y, z}) < -950 ? 1 : 0;
+    for (double y = -90.0; y <= 30.0; y += 2.0)
+      for (double x = 20.0; x <= 80.0; x += 2.0) count += hu_at({side * x, y, z}) < -950 ? 1 : 0;
   return count;
 }
 
