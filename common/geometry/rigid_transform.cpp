@@ -5,6 +5,15 @@
 
 namespace af {
 
+namespace {
+
+/// Largest element of |R^T R - I|.
+double orthonormality_error(const Eigen::Matrix3d& rotation) {
+  return (rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+}
+
+}  // namespace
+
 std::array<double, 6> PoseParameters::deg_and_mm() const {
   return {rotation_rad.x() * kDegPerRad,
           rotation_rad.y() * kDegPerRad,
@@ -72,8 +81,7 @@ std::vector<std::string> rigidity_problems(const Eigen::Matrix4d& matrix) {
   if (!(matrix.row(3) - Eigen::RowVector4d(0, 0, 0, 1)).isZero(kTolerance))
     problems.emplace_back("the pose's last row must be 0 0 0 1");
   const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();
-  const double deviation =
-      (rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+  const double deviation = orthonormality_error(rotation);
   if (!(deviation <= kTolerance))
     problems.push_back("the pose is not rigid: its rotation part deviates from orthonormal by " +
                        std::to_string(deviation));
@@ -84,11 +92,14 @@ std::vector<std::string> rigidity_problems(const Eigen::Matrix4d& matrix) {
 }
 
 RigidTransform rigid_from_matrix(const Eigen::Matrix4d& matrix) {
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(matrix.topLeftCorner<3, 3>(),
-                                              Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();
   RigidTransform transform = RigidTransform::Identity();
-  transform.linear() = svd.matrixU() * svd.matrixV().transpose();
+  transform.linear() = rotation;
   transform.translation() = matrix.topRightCorner<3, 1>();
+  constexpr double kRounding = 1e-14;
+  if (orthonormality_error(rotation) <= kRounding) return transform;
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(rotation, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  transform.linear() = svd.matrixU() * svd.matrixV().transpose();
   return transform;
 }
 

@@ -57,7 +57,7 @@ PoseParameters parameters_from_pose(const PoseFrame& frame, const RigidTransform
 std::vector<std::string> rigidity_problems(const Eigen::Matrix4d& matrix);
 
 /// The nearest rigid transform of a matrix that passed rigidity_problems() (re-orthonormalised by
-/// SVD).
+/// SVD); one that is orthonormal to 1e-14 keeps its bits, so that written poses read back the same.
 RigidTransform rigid_from_matrix(const Eigen::Matrix4d& matrix);
 
 /// Angle of the rotation a^-1 b, in rad.

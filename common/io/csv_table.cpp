@@ -1,1 +1,230 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "io/csv_table.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <set>
+#include <utility>
+
+#include "base/error.h"
+#include "io/output_file.h"
+
+namespace af {
+
+namespace {
+
+struct Record {
+  std::vector<std::string> fields;
+  std::size_t line = 0;  ///< where it begins, from 1
+};
+
+/// Splits CSV text into records (RFC 4180; LF or CRLF).
+class CsvParser {
+ public:
+  CsvParser(std::string_view text, const std::string& path) : text_(text), path_(path) {
+    constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+    if (text_.starts_with(kByteOrderMark)) text_.remove_prefix(kByteOrderMark.size());
+    if (const std::size_t nul = text_.find('\0'); nul != std::string_view::npos)
+      throw FileError(path_, "is not text: it has a zero byte at offset " + std::to_string(nul));
+  }
+
+  [[nodiscard]] bool at_end() const { return position_ >= text_.size(); }
+
+  Record next_record() {
+    Record record{{}, line_};
+    for (;;) {
+      record.fields.push_back(peek() == '"' ? quoted_field() : plain_field());
+      if (peek() != ',') break;
+      ++position_;
+    }
+    if (peek() == '\r') ++position_;
+    if (peek() == '\n') ++position_;
+    ++line_;
+    return record;
+  }
+
+ private:
+  /// The next character, or a line end after the last one.
+  [[nodiscard]] char peek() const { return at_end() ? '\n' : text_[position_]; }
+
+  [[nodiscard]] std::string here() const { return path_ + ":" + std::to_string(line_); }
+
+  std::string plain_field() {
+    const std::size_t start = position_;
+    while (!at_end() && peek() != ',' && peek() != '\n' && !at_carriage_return()) {
+      if (peek() == '"')
+        throw FileError(here(), "a quote inside a field that does not begin with one");
+      ++position_;
+    }
+    return std::string(text_.substr(start, position_ - start));
+  }
+
+  /// True at the carriage return of a CRLF pair (or of a file's last line).
+  [[nodiscard]] bool at_carriage_return() const {
+    return peek() == '\r' && (position_ + 1 >= text_.size() || text_[position_ + 1] == '\n');
+  }
+
+  std::string quoted_field() {
+    const std::string start = here();
+    std::string field;
+    for (++position_;; ++position_) {
+      if (at_end()) throw FileError(start, "a quote is opened here and never closed");
+      const char character = text_[position_];
+      if (character == '\n') ++line_;
+      if (character != '"') {
+        field.push_back(character);
+        continue;
+      }
+      ++position_;
+      if (at_end() || text_[position_] != '"') break;
+      field.push_back('"');
+    }
+    if (!at_end() && peek() != ',' && peek() != '\n' && !at_carriage_return())
+      throw FileError(here(), "text after the closing quote of a field");
+    return field;
+  }
+
+  std::string_view text_;
+  const std::string& path_;
+  std::size_t position_ = 0;
+  std::size_t line_ = 1;
+};
+
+std::string quoted_if_needed(const std::string& field) {
+  if (field.find_first_of(",\"\r\n") == std::string::npos) return field;
+  std::string quoted = "\"";
+  for (const char character : field) {
+    if (character == '"') quoted.push_back('"');
+    quoted.push_back(character);
+  }
+  return quoted + '"';
+}
+
+void append_line(std::string& text, const std::vector<std::string>& fields) {
+  // A single empty field would be an empty line, which readers skip.
+  if (fields.size() == 1 && fields[0].empty()) {
+    text += "\"\"\n";
+    return;
+  }
+  for (std::size_t i = 0; i < fields.size(); ++i) {
+    if (i > 0) text.push_back(',');
+    text += quoted_if_needed(fields[i]);
+  }
+  text.push_back('\n');
+}
+
+std::string_view trimmed(std::string_view text) {
+  constexpr std::string_view kBlanks = " \t";
+  const std::size_t first = text.find_first_not_of(kBlanks);
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(kBlanks) - first + 1);
+}
+
+std::optional<double> finite_number(std::string_view text) {
+  text = trimmed(text);
+  if (text.starts_with('+') && !text.starts_with("+-")) text.remove_prefix(1);
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) return {};
+  return value;
+}
+
+/// "nan", "inf" or "-inf"; empty for finite values.
+std::string non_finite_text(double value) {
+  if (std::isnan(value)) return "nan";
+  if (std::isinf(value)) return value > 0.0 ? "inf" : "-inf";
+  return {};
+}
+
+}  // namespace
+
+CsvTable CsvTable::read(const std::filesystem::path& path) {
+  const std::string name = path.string();
+  const std::string text = read_text_file(path);
+  CsvParser parser(text, name);
+  if (parser.at_end()) throw FileError(name, "is empty; a header line was expected");
+  CsvTable table(parser.next_record().fields);
+  table.path_ = name;
+  std::set<std::string_view> seen;
+  for (const std::string& column : table.columns_)
+    if (!seen.insert(column).second)
+      throw FileError(name + ":1", "the column name '" + column + "' is repeated");
+  while (!parser.at_end()) {
+    Record record = parser.next_record();
+    const bool blank_last_line = parser.at_end() && record.fields.size() == 1 &&
+                                 trimmed(record.fields[0]).empty() && table.columns_.size() > 1;
+    if (blank_last_line) break;
+    if (record.fields.size() != table.columns_.size())
+      throw FileError(name + ":" + std::to_string(record.line),
+                      "number of fields",
+                      std::to_string(table.columns_.size()),
+                      std::to_string(record.fields.size()));
+    table.rows_.push_back(std::move(record.fields));
+    table.lines_.push_back(record.line);
+  }
+  return table;
+}
+
+void CsvTable::add_row(std::vector<std::string> fields) {
+  check(fields.size() == columns_.size(),
+        "a CSV row must have as many fields as the table columns");
+  rows_.push_back(std::move(fields));
+  lines_.push_back(rows_.size() + 1);
+}
+
+std::optional<std::size_t> CsvTable::find_column(std::string_view name) const {
+  const auto found = std::find(columns_.begin(), columns_.end(), name);
+  if (found == columns_.end()) return std::nullopt;
+  return static_cast<std::size_t>(found - columns_.begin());
+}
+
+const std::string& CsvTable::text(std::size_t row, std::string_view column) const {
+  check(row < rows_.size(), "CSV row beyond the table");
+  const auto index = find_column(column);
+  if (!index)
+    throw FileError(path_.empty() ? "table" : path_, "has no column '" + std::string(column) + "'");
+  return rows_[row][*index];
+}
+
+double CsvTable::number(std::size_t row, std::string_view column) const {
+  const std::string& value = text(row, column);
+  if (const auto parsed = finite_number(value)) return *parsed;
+  throw FileError(where(row), std::string(column), "a finite number", "'" + value + "'");
+}
+
+std::string CsvTable::where(std::size_t row) const {
+  check(row < rows_.size(), "CSV row beyond the table");
+  return (path_.empty() ? "table" : path_) + ":" + std::to_string(lines_[row]);
+}
+
+std::string CsvTable::to_text() const {
+  std::string text;
+  append_line(text, columns_);
+  for (const auto& row : rows_) append_line(text, row);
+  return text;
+}
+
+std::string number_text(double value) {
+  if (!std::isfinite(value)) return non_finite_text(value);
+  std::string text(32, '\0');
+  const auto [end, error] = std::to_chars(text.data(), text.data() + text.size(), value);
+  check(error == std::errc(), "number_text: buffer too small");
+  text.resize(static_cast<std::size_t>(end - text.data()));
+  return text;
+}
+
+std::string fixed_text(double value, int decimals) {
+  if (!std::isfinite(value)) return non_finite_text(value);
+  constexpr int kMaxDecimals = 60;
+  check(decimals >= 0 && decimals <= kMaxDecimals, "fixed_text: decimals must be within 0 and 60");
+  std::string text(400, '\0');  // 1.8e308 has 309 digits before the point
+  const auto [end, error] = std::to_chars(
+      text.data(), text.data() + text.size(), value, std::chars_format::fixed, decimals);
+  check(error == std::errc(), "fixed_text: buffer too small");
+  text.resize(static_cast<std::size_t>(end - text.data()));
+  if (text.starts_with('-') && text.find_first_not_of("-0.") == std::string::npos) text.erase(0, 1);
+  return text;
+}
+
+}  // namespace af

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace af {
@@ -24,11 +25,14 @@ class CsvTable {
   [[nodiscard]] const std::string& text(std::size_t row, std::string_view column) const;
   /// FileError naming path, line, column and value when it is not a finite number.
   [[nodiscard]] double number(std::size_t row, std::string_view column) const;
+  /// "PATH:LINE" of a row, for messages.
+  [[nodiscard]] std::string where(std::size_t row) const;
   [[nodiscard]] std::string to_text() const;
 
  private:
   std::vector<std::string> columns_;
   std::vector<std::vector<std::string>> rows_;
+  std::vector<std::size_t> lines_;  ///< of the file, where each row begins
   std::string path_;
 };
 

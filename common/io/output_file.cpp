@@ -1,1 +1,177 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "io/output_file.h"
+
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <system_error>
+#include <unistd.h>
+#include <utility>
+#include <vector>
+
+#include "base/error.h"
+
+namespace af {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string because(const std::string& what, int error_number) {
+  return what + ": " + std::generic_category().message(error_number);
+}
+
+/// An open file descriptor. close() reports errors, the destructor cannot.
+class Descriptor {
+ public:
+  Descriptor(const fs::path& path, int flags, mode_t mode = 0)
+      : path_(path.string()), number_(open(path.c_str(), flags | O_CLOEXEC, mode)) {
+    if (number_ < 0) throw FileError(path_, because("cannot be opened", errno));
+  }
+  ~Descriptor() {
+    if (number_ >= 0) ::close(number_);
+  }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+
+  void write(std::string_view text) const {
+    while (!text.empty()) {
+      const ssize_t count = ::write(number_, text.data(), text.size());
+      if (count < 0 && errno == EINTR) continue;
+      if (count < 0) throw FileError(path_, because("cannot be written", errno));
+      text.remove_prefix(static_cast<std::size_t>(count));
+    }
+  }
+  /// The next bytes, at most buffer.size(); 0 at the end.
+  std::size_t read(std::vector<char>& buffer) const {
+    for (;;) {
+      const ssize_t count = ::read(number_, buffer.data(), buffer.size());
+      if (count >= 0) return static_cast<std::size_t>(count);
+      if (errno != EINTR) throw FileError(path_, because("cannot be read", errno));
+    }
+  }
+  void sync() const {
+    // Some file systems cannot sync a folder and say EINVAL: nothing more can be done there.
+    if (fsync(number_) != 0 && errno != EINVAL)
+      throw FileError(path_, because("cannot be synced to disk", errno));
+  }
+  void close() {
+    if (::close(std::exchange(number_, -1)) != 0)
+      throw FileError(path_, because("cannot be closed", errno));
+  }
+
+ private:
+  std::string path_;
+  int number_;
+};
+
+void sync_path(const fs::path& path, int flags) {
+  Descriptor descriptor(path, flags);
+  descriptor.sync();
+  descriptor.close();
+}
+
+fs::path folder_of(const fs::path& path) {
+  return path.has_parent_path() ? path.parent_path() : fs::path(".");
+}
+
+/// "a.mha" -> "a.partial.mha", "a.nii.gz" -> "a.partial.nii.gz", "a" -> "a.partial".
+fs::path partial_path(const fs::path& path) {
+  fs::path stem = path.stem();
+  std::string extension = path.extension().string();
+  if (extension == ".gz" && stem.has_extension()) {
+    extension = stem.extension().string() + extension;
+    stem = stem.stem();
+  }
+  return path.parent_path() / (stem.string() + ".partial" + extension);
+}
+
+void check_output_path(const fs::path& path) {
+  if (!path.has_filename()) throw FileError(path.string(), "is not the name of a file to write");
+  std::error_code ignored;
+  const fs::path folder = folder_of(path);
+  if (!fs::exists(folder, ignored))
+    throw FileError(path.string(), "its folder '" + folder.string() + "' does not exist");
+  if (!fs::is_directory(folder, ignored))
+    throw FileError(path.string(), "'" + folder.string() + "' is not a folder");
+  // A rename would put a plain file in the place of a folder or of a device such as /dev/null.
+  if (fs::exists(path, ignored) && !fs::is_regular_file(path, ignored))
+    throw FileError(path.string(), "exists and is not a regular file");
+}
+
+void write_and_rename(const fs::path& path,
+                      const fs::path& partial,
+                      const std::function<void(const fs::path&)>& write) {
+  write(partial);
+  std::error_code ignored;
+  if (!fs::is_regular_file(partial, ignored))
+    throw FileError(path.string(), "its writer made no file");
+  sync_path(partial, O_RDONLY);
+  if (rename(partial.c_str(), path.c_str()) != 0)
+    throw FileError(path.string(), because("cannot be renamed from its partial file", errno));
+  sync_path(folder_of(path), O_RDONLY | O_DIRECTORY);
+}
+
+}  // namespace
+
+void write_atomically(const std::filesystem::path& path,
+                      const std::function<void(const std::filesystem::path& partial)>& write) {
+  check_output_path(path);
+  const fs::path partial = partial_path(path);
+  const auto remove_partial = [&] {
+    std::error_code ignored;
+    fs::remove(partial, ignored);
+  };
+  remove_partial();
+  try {
+    write_and_rename(path, partial, write);
+  } catch (const std::system_error& error) {  // of std::filesystem and of streams
+    remove_partial();
+    throw FileError(path.string(), std::string("cannot be written: ") + error.what());
+  } catch (...) {
+    remove_partial();
+    throw;
+  }
+}
+
+void write_text_file(const std::filesystem::path& path, std::string_view text) {
+  write_atomically(path, [text](const fs::path& partial) {
+    constexpr mode_t kMode = 0666;  // before the umask
+    Descriptor file(partial, O_WRONLY | O_CREAT | O_EXCL, kMode);
+    file.write(text);
+    file.close();
+  });
+}
+
+std::string read_text_file(const std::filesystem::path& path, std::size_t max_bytes) {
+  const Descriptor file(path, O_RDONLY);
+  std::vector<char> buffer(std::size_t{64} << 10);
+  std::string text;
+  while (const std::size_t count = file.read(buffer)) {
+    if (count > max_bytes - text.size())
+      throw FileError(path.string(),
+                      "is larger than the " + std::to_string(max_bytes) + " bytes allowed here");
+    text.append(buffer.data(), count);
+  }
+  return text;
+}
+
+void make_output_folder(const std::filesystem::path& folder) {
+  if (folder.empty()) throw FileError("output folder", "its name is empty");
+  std::error_code error;
+  fs::create_directories(folder, error);
+  std::error_code ignored;
+  if (!fs::is_directory(folder, ignored))
+    throw FileError(folder.string(),
+                    error ? "cannot be created: " + error.message()
+                          : std::string("exists and is not a folder"));
+  std::string probe = (folder / ".probe-XXXXXX").string();
+  const int descriptor = mkostemp(probe.data(), O_CLOEXEC);
+  if (descriptor < 0) throw FileError(folder.string(), because("cannot be written to", errno));
+  ::close(descriptor);
+  unlink(probe.c_str());
+}
+
+}  // namespace af
