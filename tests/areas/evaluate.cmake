@@ -2,4 +2,9 @@
 af_add_test(
   evaluate_test
   SOURCES unit/evaluate/fiducial_registration_test.cpp
+          unit/evaluate/tre_test.cpp
+          unit/evaluate/perturbed_starts_test.cpp
+          unit/evaluate/success_rate_test.cpp
+          unit/evaluate/statistics_test.cpp
+          unit/evaluate/drr_comparison_test.cpp
   LIBS af_evaluation)

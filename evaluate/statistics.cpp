@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluate/statistics.h"
+
+#include <algorithm>
+#include <boost/math/distributions/students_t.hpp>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "base/error.h"
+
+namespace af::evaluation {
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+double mean_of(std::span<const double> values) {
+  double sum = 0.0;
+  for (const double value : values) sum += value;
+  return sum / static_cast<double>(values.size());
+}
+
+double standard_deviation_of(std::span<const double> values, double mean) {
+  if (values.size() < 2) return kNan;
+  double squares = 0.0;
+  for (const double value : values) squares += (value - mean) * (value - mean);
+  return std::sqrt(squares / static_cast<double>(values.size() - 1));
+}
+
+}  // namespace
+
+double quantile(std::span<const double> sorted, double p) {
+  check(!sorted.empty(), "a quantile needs a value");
+  check(p >= 0.0 && p <= 1.0, "a quantile's p lies between 0 and 1");
+  const double position = p * static_cast<double>(sorted.size() - 1);
+  const auto below = static_cast<std::size_t>(position);
+  const double fraction = position - static_cast<double>(below);
+  // Also where the neighbour is infinite, 0 * inf must not turn up.
+  if (fraction == 0.0 || sorted[below] == sorted[below + 1]) return sorted[below];
+  return sorted[below] + fraction * (sorted[below + 1] - sorted[below]);
+}
+
+SampleSummary summarize(std::vector<double> values) {
+  SampleSummary summary{0, kNan, kNan, kNan, kNan, kNan, kNan, kNan, kNan, kNan};
+  if (values.empty()) return summary;
+  for (const double value : values)
+    if (std::isnan(value)) throw InputError("statistics: a value is NaN; count it as missing");
+  std::sort(values.begin(), values.end());
+  summary.count = values.size();
+  summary.mean = mean_of(values);
+  summary.standard_deviation = standard_deviation_of(values, summary.mean);
+  summary.minimum = values.front();
+  summary.percentile_5 = quantile(values, 0.05);
+  summary.lower_quartile = quantile(values, 0.25);
+  summary.median = quantile(values, 0.5);
+  summary.upper_quartile = quantile(values, 0.75);
+  summary.percentile_95 = quantile(values, 0.95);
+  summary.maximum = values.back();
+  return summary;
+}
+
+PairedComparison compare_paired(std::span<const double> first,
+                                std::span<const double> second,
+                                double margin) {
+  if (first.size() != second.size() || first.size() < 2)
+    throw InputError("a paired test needs two or more pairs, found " +
+                     std::to_string(first.size()) + " and " + std::to_string(second.size()) +
+                     " values");
+  if (!(margin > 0.0))
+    throw InputError("equivalence margin", std::to_string(margin), "must be > 0");
+  std::vector<double> differences(first.size());
+  for (std::size_t i = 0; i < first.size(); ++i) differences[i] = first[i] - second[i];
+
+  PairedComparison result;
+  result.pairs = differences.size();
+  result.margin = margin;
+  result.mean_difference = mean_of(differences);
+  const auto n = static_cast<double>(differences.size());
+  result.standard_error = standard_deviation_of(differences, result.mean_difference) / std::sqrt(n);
+  if (result.standard_error == 0.0) {
+    result.t_test_p = result.mean_difference == 0.0 ? 1.0 : 0.0;
+    result.equivalence_p = std::abs(result.mean_difference) < margin ? 0.0 : 1.0;
+    result.low_90 = result.high_90 = result.mean_difference;
+    return result;
+  }
+  const boost::math::students_t distribution(n - 1.0);
+  const auto upper_tail = [&](double t) { return cdf(complement(distribution, t)); };
+  result.t_test_p = 2.0 * upper_tail(std::abs(result.mean_difference) / result.standard_error);
+  const double closer_limit = margin - std::abs(result.mean_difference);
+  result.equivalence_p = upper_tail(closer_limit / result.standard_error);
+  const double half_90 = boost::math::quantile(distribution, 0.95) * result.standard_error;
+  result.low_90 = result.mean_difference - half_90;
+  result.high_90 = result.mean_difference + half_90;
+  return result;
+}
+
+}  // namespace af::evaluation

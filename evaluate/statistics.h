@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+namespace af::evaluation {
+
+/// Quantile `p` in [0, 1] by linear interpolation between order statistics (Hyndman and Fan's type
+/// 7, the default of R and NumPy). `sorted` is ascending and not empty; infinity is allowed.
+double quantile(std::span<const double> sorted, double p);
+
+/// Location and spread of a sample. Every value is NaN when the sample is empty.
+struct SampleSummary {
+  std::size_t count = 0;
+  double mean = 0.0;
+  double standard_deviation = 0.0;  ///< with n - 1; NaN for fewer than two values
+  double minimum = 0.0;
+  double percentile_5 = 0.0;
+  double lower_quartile = 0.0;
+  double median = 0.0;
+  double upper_quartile = 0.0;
+  double percentile_95 = 0.0;
+  double maximum = 0.0;
+};
+
+/// Throws InputError when a value is NaN: what is missing must be counted, not averaged.
+SampleSummary summarize(std::vector<double> values);
+
+/// Comparison of two methods on the same items.
+struct PairedComparison {
+  std::size_t pairs = 0;
+  double mean_difference = 0.0;  ///< first minus second
+  double standard_error = 0.0;
+  double t_test_p = 1.0;  ///< two-sided: the probability of such a mean if there were no difference
+  double margin = 0.0;
+  double equivalence_p = 1.0;  ///< two one-sided tests (Schuirmann 1987): below 0.05, the mean
+                               ///< difference lies within +-margin at 95 % confidence
+  double low_90 = 0.0;         ///< 90 % confidence interval of the mean difference, the one that
+  double high_90 = 0.0;        ///< corresponds to the two one-sided tests at 5 %
+};
+
+/// Paired t-test and equivalence test. Throws InputError for unequal sizes, fewer than two pairs or
+/// a margin that is not positive. Equal differences everywhere have no spread: p is then 0 or 1.
+PairedComparison compare_paired(std::span<const double> first,
+                                std::span<const double> second,
+                                double margin);
+
+}  // namespace af::evaluation

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "geometry/slab_sizing.h"
+
+namespace af::evaluation {
+
+inline constexpr double kTargetPointSpacingMm = 2.0;
+
+/// The points that stand for a target box (ct frame, mm): the centres of equal cells whose sides
+/// are at most `max_spacing_mm`. Differs from the paper, which averages over the CT's voxels in the
+/// box: a mean over cells does not depend on the CT's resolution. Throws InputError for a box
+/// without volume. \test TargetBox.PointsAreTheCentresOfEqualCells
+std::vector<Eigen::Vector3d> target_points(const CtBox& box,
+                                           double max_spacing_mm = kTargetPointSpacingMm);
+
+/// Root mean square distance (mm) of the box's points from `center_ct_mm`, exact: what turns a
+/// rotation about that point into a distance.
+double rms_radius_mm(const CtBox& box, const Eigen::Vector3d& center_ct_mm);
+
+}  // namespace af::evaluation

@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluate/perturbed_starts.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+#include "evaluate/target_box.h"
+#include "evaluate/tre.h"
+
+namespace af::evaluation {
+namespace {
+
+StartFrame example_frame() {
+  StartFrame frame;
+  frame.case_name = "skull-01";
+  frame.gold_room_from_ct =
+      pose_from_parameters(PoseFrame{}, PoseParameters::from_deg_and_mm({5, -8, 12, 30, -20, 10}));
+  frame.center_ct_mm = {10, 20, -30};
+  frame.target_box_ct = {{-20, -10, -60}, {40, 50, 0}};
+  return frame;
+}
+
+bool anything(const RigidTransform&) {
+  return true;
+}
+
+StratifiedStarts draw(const StartFrame& frame, const StartOptions& options) {
+  return stratified_starts(frame, options, target_points(frame.target_box_ct), anything);
+}
+
+TEST(PerturbedStarts, FillEveryIntervalWithExactlyTheStatedCount) {
+  const StartFrame frame = example_frame();
+  StartOptions options;
+  options.starts_per_interval = 7;
+  const StratifiedStarts result = draw(frame, options);
+  ASSERT_EQ(result.starts.size(), 56u);
+  std::map<int, int> per_interval;
+  std::set<std::uint64_t> draws;
+  for (const PerturbedStart& start : result.starts) {
+    EXPECT_GE(start.initial_tre_mm, 2.0 * start.interval);
+    EXPECT_LT(start.initial_tre_mm, 2.0 * (start.interval + 1));
+    // The stored TRE is that of the stored pose.
+    EXPECT_EQ(start.initial_tre_mm,
+              mean_tre_mm(
+                  start.room_from_ct, frame.gold_room_from_ct, target_points(frame.target_box_ct)));
+    EXPECT_LT(start.draw_index, result.draws);
+    ++per_interval[start.interval];
+    draws.insert(start.draw_index);
+  }
+  for (int interval = 0; interval < 8; ++interval) EXPECT_EQ(per_interval[interval], 7);
+  EXPECT_EQ(draws.size(), 56u) << "a draw was used twice";
+}
+
+TEST(PerturbedStarts, AreTheContractsFormulaRelativeToGold) {
+  const StartFrame frame = example_frame();
+  StartOptions options;
+  options.starts_per_interval = 1;
+  const Eigen::Vector3d gold_center = frame.gold_room_from_ct * frame.center_ct_mm;
+  const Eigen::Vector3d point(3, -4, 5);
+  for (const PerturbedStart& start : draw(frame, options).starts) {
+    // x_room = r_g + t + Rz Ry Rx R_g (x - c_roi)
+    const Eigen::Vector3d expected = gold_center + start.parameters.translation_mm +
+                                     rotation_from_angles(start.parameters.rotation_rad) *
+                                         frame.gold_room_from_ct.linear() *
+                                         (point - frame.center_ct_mm);
+    constexpr double kRoundingMm = 1e-10;
+    EXPECT_LT((start.room_from_ct * point - expected).norm(), kRoundingMm);
+  }
+}
+
+TEST(PerturbedStarts, ADrawDependsOnSeedCaseAndIndexAlone) {
+  StartFrame frame = example_frame();
+  const auto at = [&](std::uint64_t seed, std::uint64_t index) {
+    return draw_perturbation(frame, 24.0, seed, index).deg_and_mm();
+  };
+  const auto fifth = at(1, 5);
+  std::ignore = at(1, 4);
+  EXPECT_EQ(at(1, 5), fifth);
+  EXPECT_NE(at(2, 5), fifth);
+  EXPECT_NE(at(1, 6), fifth);
+  frame.case_name = "skull-02";
+  EXPECT_NE(at(1, 5), fifth);
+}
+
+TEST(PerturbedStarts, DrawsPointEverywhereAlike) {
+  // Each of the six scaled components of a uniform direction has mean 0 and mean square 1/6.
+  const StartFrame frame = example_frame();
+  const double radius_mm = rms_radius_mm(frame.target_box_ct, frame.center_ct_mm);
+  constexpr int kDraws = 20000;
+  Eigen::Matrix<double, 6, 1> mean = Eigen::Matrix<double, 6, 1>::Zero();
+  Eigen::Matrix<double, 6, 1> mean_square = mean;
+  double mean_magnitude = 0.0;
+  for (std::uint64_t i = 0; i < kDraws; ++i) {
+    const PoseParameters draw = draw_perturbation(frame, 24.0, 3, i);
+    Eigen::Matrix<double, 6, 1> scaled;
+    scaled << draw.rotation_rad * radius_mm, draw.translation_mm;
+    mean_magnitude += scaled.norm() / kDraws;
+    EXPECT_LT(scaled.norm(), 24.0 * (1 + 1e-12));
+    scaled.normalize();
+    mean += scaled / kDraws;
+    mean_square += scaled.cwiseProduct(scaled) / kDraws;
+  }
+  // Five standard errors: of a component sqrt(1/6/n) = 0.0029, of its square 0.0013 (variance
+  // 3/48 - 1/36), of the magnitude 24 / sqrt(12 n) = 0.049.
+  EXPECT_LT(mean.cwiseAbs().maxCoeff(), 5 * 0.0029);
+  EXPECT_LT((mean_square.array() - 1.0 / 6).abs().maxCoeff(), 5 * 0.0014);
+  EXPECT_NEAR(mean_magnitude, 12.0, 5 * 0.049);
+}
+
+TEST(PerturbedStarts, ASmallerStudyIsTheLowRankedPartOfTheSameDraws) {
+  // Ranks within every interval are 0 ... n - 1, each once.
+  StartOptions options;
+  options.starts_per_interval = 12;
+  std::map<int, std::set<int>> ranks;
+  for (const PerturbedStart& start : draw(example_frame(), options).starts)
+    ranks[start.interval].insert(start.rank_in_interval);
+  for (const auto& [interval, found] : ranks) {
+    EXPECT_EQ(found.size(), 12u) << interval;
+    EXPECT_EQ(*found.rbegin(), 11) << interval;
+  }
+}
+
+TEST(PerturbedStarts, CountDrawsThatThePredicateRefuses) {
+  const StartFrame frame = example_frame();
+  StartOptions options;
+  options.starts_per_interval = 5;
+  std::uint64_t refused = 0;
+  const auto limited = [&](const RigidTransform& pose) {
+    const bool fits =
+        parameters_from_pose(frame.pose_frame(), pose).rotation_rad.cwiseAbs().maxCoeff() <
+        6.0 * kRadPerDeg;
+    refused += fits ? 0 : 1;
+    return fits;
+  };
+  const StratifiedStarts result =
+      stratified_starts(frame, options, target_points(frame.target_box_ct), limited);
+  EXPECT_EQ(result.starts.size(), 40u);
+  EXPECT_EQ(result.inadmissible_draws, refused);
+  EXPECT_GT(refused, 0u);
+  for (const PerturbedStart& start : result.starts) EXPECT_TRUE(limited(start.room_from_ct));
+}
+
+TEST(PerturbedStarts, SayWhichIntervalsStayEmpty) {
+  const StartFrame frame = example_frame();
+  StartOptions options;
+  options.starts_per_interval = 1;
+  const auto close_only = [&](const RigidTransform& pose) {
+    return parameters_from_pose(frame.pose_frame(), pose).translation_mm.norm() < 0.01;
+  };
+  try {
+    // A coarse grid: this test draws 100000 times.
+    stratified_starts(frame, options, target_points(frame.target_box_ct, 30.0), close_only);
+    FAIL() << "filled intervals that cannot be filled";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("starts_per_interval"));
+    EXPECT_THAT(error.what(), testing::HasSubstr("outside the motion range"));
+  }
+}
+
+TEST(StartOptions, NamesEveryBrokenConstraint) {
+  StartOptions options;
+  options.intervals = 0;
+  options.interval_width_mm = std::nan("");
+  options.starts_per_interval = -3;
+  EXPECT_THAT(problems(options),
+              testing::ElementsAre(testing::StartsWith("intervals = 0"),
+                                   testing::StartsWith("interval_width_mm = nan"),
+                                   testing::StartsWith("starts_per_interval = -3")));
+  EXPECT_THAT(problems(StartOptions{}), testing::IsEmpty());
+}
+
+}  // namespace
+}  // namespace af::evaluation

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluate/statistics.h"
+
+#include <cmath>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+
+namespace af::evaluation {
+namespace {
+
+constexpr double kRounding = 1e-12;
+
+TEST(Quantile, InterpolatesBetweenOrderStatistics) {
+  const std::vector<double> values = {1, 2, 4, 8};
+  EXPECT_EQ(quantile(values, 0.0), 1.0);
+  EXPECT_EQ(quantile(values, 1.0), 8.0);
+  EXPECT_NEAR(quantile(values, 0.5), 3.0, kRounding);
+  EXPECT_NEAR(quantile(values, 0.25), 1.75, kRounding);  // position 0.75
+  EXPECT_NEAR(quantile(values, 0.95), 7.4, kRounding);   // position 2.85
+}
+
+TEST(Quantile, ToleratesInfinityAtTheTop) {
+  const double infinity = std::numeric_limits<double>::infinity();
+  const std::vector<double> values = {40, 41, infinity, infinity};
+  EXPECT_EQ(quantile(values, 1.0), infinity);
+  EXPECT_EQ(quantile(values, 0.9), infinity);
+  EXPECT_EQ(quantile(values, 1.0 / 3.0), 41.0);
+}
+
+TEST(Summary, OfAHandComputedSample) {
+  const SampleSummary summary = summarize({9, 4, 2, 5, 5});
+  EXPECT_EQ(summary.count, 5u);
+  EXPECT_NEAR(summary.mean, 5.0, kRounding);
+  EXPECT_NEAR(summary.standard_deviation, std::sqrt(26.0 / 4.0), kRounding);
+  EXPECT_EQ(summary.minimum, 2.0);
+  EXPECT_EQ(summary.lower_quartile, 4.0);
+  EXPECT_EQ(summary.median, 5.0);
+  EXPECT_EQ(summary.upper_quartile, 5.0);
+  EXPECT_EQ(summary.maximum, 9.0);
+}
+
+TEST(Summary, RefusesNanAndSaysNanOfNothing) {
+  EXPECT_THROW(summarize({1.0, std::nan("")}), InputError);
+  EXPECT_EQ(summarize({}).count, 0u);
+  EXPECT_TRUE(std::isnan(summarize({}).median));
+  EXPECT_TRUE(std::isnan(summarize({1.0}).standard_deviation));
+}
+
+TEST(PairedComparison, EqualsStudentsSleepData) {
+  // Student (1908), extra hours of sleep under two drugs; R: t.test(group1, group2, paired = TRUE)
+  // gives t = -4.0621, df = 9, p = 0.002833, mean difference -1.58.
+  const std::vector<double> first = {0.7, -1.6, -0.2, -1.2, -0.1, 3.4, 3.7, 0.8, 0.0, 2.0};
+  const std::vector<double> second = {1.9, 0.8, 1.1, 0.1, -0.1, 4.4, 5.5, 1.6, 4.6, 3.4};
+  const PairedComparison result = compare_paired(first, second, 3.0);
+  EXPECT_EQ(result.pairs, 10u);
+  EXPECT_NEAR(result.mean_difference, -1.58, kRounding);
+  EXPECT_NEAR(result.mean_difference / result.standard_error, -4.0621, 5e-5);
+  EXPECT_NEAR(result.t_test_p, 0.002833, 5e-7);
+  // Two one-sided tests: the interval of 90 % lies within +-3, so p < 0.05, and the other way
+  // round.
+  EXPECT_LT(result.equivalence_p, 0.05);
+  EXPECT_GT(result.low_90, -3.0);
+  EXPECT_LT(result.high_90, 3.0);
+  EXPECT_GT(compare_paired(first, second, 2.0).equivalence_p, 0.05);
+  EXPECT_LT(result.low_90, -2.0);
+}
+
+TEST(PairedComparison, IsSignificantExactlyWhenEquivalenceIntervalAndPAgree) {
+  // At margin = the far end of the 90 % interval, p of the two one-sided tests is 0.05.
+  const std::vector<double> first = {1.0, 2.0, 3.5, 4.0, 5.5};
+  const std::vector<double> second = {0.8, 2.3, 3.0, 4.1, 5.0};
+  const double far_end = compare_paired(first, second, 1.0).high_90;
+  EXPECT_NEAR(compare_paired(first, second, far_end).equivalence_p, 0.05, 1e-9);
+}
+
+TEST(PairedComparison, HandlesEqualDifferences) {
+  const std::vector<double> values = {1, 2, 3};
+  const std::vector<double> shifted = {2, 3, 4};
+  EXPECT_EQ(compare_paired(values, values, 0.1).t_test_p, 1.0);
+  EXPECT_EQ(compare_paired(values, values, 0.1).equivalence_p, 0.0);
+  EXPECT_EQ(compare_paired(values, shifted, 0.1).t_test_p, 0.0);
+  EXPECT_EQ(compare_paired(values, shifted, 0.1).equivalence_p, 1.0);
+}
+
+TEST(PairedComparison, RefusesWhatIsNotPaired) {
+  const std::vector<double> values = {1, 2, 3};
+  EXPECT_THROW(compare_paired(values, std::span(values).first(2), 1.0), InputError);
+  EXPECT_THROW(compare_paired(std::span(values).first(1), std::span(values).first(1), 1.0),
+               InputError);
+  EXPECT_THROW(compare_paired(values, values, 0.0), InputError);
+}
+
+}  // namespace
+}  // namespace af::evaluation
