@@ -6,7 +6,7 @@ set -euo pipefail
 # shellcheck source-path=SCRIPTDIR
 source "$(dirname "$0")/source_files.sh"
 command -v clang-tidy-14 >/dev/null || skip_or_fail clang-tidy-14
-build=$1
+build=$(cd "$1" && pwd)
 pattern=${2:-^(common|precompute|register|evaluate)/}
 database="$build/compile_commands.json"
 [[ -f "$database" ]] || { echo "$database is missing: configure first" >&2; exit 4; }
