@@ -17,5 +17,6 @@ mapfile -t files < <(sed -n 's/^ *"file": "\(.*\)",\{0,1\}$/\1/p' "$database" | 
 ((${#files[@]} > 0)) || { echo "no sources match $pattern" >&2; exit 1; }
 cd "$root"
 printf '%s\0' "${files[@]}" |
-  xargs -0 -n 1 -P "$(nproc)" clang-tidy-14 --quiet --warnings-as-errors='*' -p "$build"
+  xargs -0 -n 1 -P "$(nproc)" clang-tidy-14 --quiet --warnings-as-errors='*' -p "$build" \
+    --extra-arg=-include --extra-arg="$root/tests/checks/itk_for_clang.h"
 echo "tidy: ${#files[@]} files are clean"
