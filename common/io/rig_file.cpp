@@ -157,13 +157,14 @@ std::optional<CameraGeometry> read_camera(const toml::table& table,
   CameraGeometry stated;
   stated.name = name.value_or("");
   stated.pixel_spacing_mm = spacing.value_or(Eigen::Vector2d::Ones());
-  if (size) stated.size_px = {(*size)[0], (*size)[1]};
+  stated.size_px = size ? Eigen::Vector2i((*size)[0], (*size)[1]) : Eigen::Vector2i(1, 1);
   auto camera = reader.has("projection_matrix")
                     ? camera_from_matrix(reader, stated, isocenter_point, problems)
                     : camera_from_keys(reader, stated);
   reader.refuse_unknown_keys();
-  if (!name || !spacing || !size || !camera) return std::nullopt;
-  if (!note_geometry_problems(*camera, table, problems)) return std::nullopt;
+  if (!camera || !name) return std::nullopt;
+  // Missing sizes stand in as ones, so that the rest is checked too.
+  if (!note_geometry_problems(*camera, table, problems) || !spacing || !size) return std::nullopt;
   clean_axes(*camera);
   return camera;
 }

@@ -14,6 +14,8 @@ namespace af {
 
 namespace {
 
+constexpr std::size_t kLongestKey = 64;  // in messages, and for hints
+
 /// toml++ bounds the nesting of values, but not that of dotted keys, and walks tables recursively.
 void check_key_depth(std::string_view text, const std::string& file) {
   constexpr int kMaxDots = 256;
@@ -39,6 +41,7 @@ std::string value_text(const toml::node& node) {
   std::string text;
   for (const char character : out.str()) {
     const bool blank = std::isspace(static_cast<unsigned char>(character)) != 0;
+    if (character == ']' && text.ends_with(' ')) text.pop_back();
     if (!blank)
       text.push_back(character);
     else if (!text.empty() && text.back() != ' ' && text.back() != '[')
@@ -71,7 +74,6 @@ int edit_distance(std::string_view a, std::string_view b) {
 std::string nearest_name(std::string_view name, const std::set<std::string>& known) {
   std::string nearest;
   int least = std::max(2, static_cast<int>(name.size()) / 3) + 1;
-  constexpr std::size_t kLongestKey = 64;
   if (name.size() > kLongestKey) return nearest;
   for (const std::string& candidate : known) {
     const int distance = edit_distance(name, candidate);
@@ -122,7 +124,7 @@ toml::table read_toml_file(const std::filesystem::path& path) {
 }
 
 void TomlProblems::add(const toml::node& node, const std::string& message) {
-  messages_.push_back(where(node) + ": " + message);
+  problems_.push_back({node.source().begin.line, where(node) + ": " + message});
 }
 
 std::string TomlProblems::where(const toml::node& node) const {
@@ -131,7 +133,13 @@ std::string TomlProblems::where(const toml::node& node) const {
 }
 
 void TomlProblems::throw_if_any() const {
-  af::throw_if_any(messages_);
+  std::vector<Problem> sorted = problems_;
+  std::stable_sort(sorted.begin(), sorted.end(), [](const Problem& a, const Problem& b) {
+    return a.line < b.line;
+  });
+  std::vector<std::string> messages;
+  for (Problem& problem : sorted) messages.push_back(std::move(problem.message));
+  af::throw_if_any(messages);
 }
 
 const toml::node& TomlTableReader::node(const char* key) const {
@@ -259,7 +267,11 @@ void TomlTableReader::refuse_unknown_keys() {
     if (known_keys_.count(name) > 0) continue;
     const std::string nearest = nearest_name(name, known_keys_);
     const std::string hint = nearest.empty() ? "" : ": did you mean \"" + nearest + "\"?";
-    problems_.add(value, prefix_ + "unknown key \"" + name.substr(0, 100) + "\"" + hint);
+    std::string owner = prefix_;
+    if (!owner.empty()) owner.back() = ':';  // "case[0]." -> "case[0]:"
+    problems_.add(value,
+                  owner + (owner.empty() ? "" : " ") + "unknown key \"" +
+                      name.substr(0, kLongestKey) + "\"" + hint);
   }
 }
 

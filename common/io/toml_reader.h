@@ -30,13 +30,18 @@ class TomlProblems {
   /// "FILE:LINE: message".
   void add(const toml::node& node, const std::string& message);
   [[nodiscard]] std::string where(const toml::node& node) const;
-  [[nodiscard]] bool empty() const { return messages_.empty(); }
-  /// InputError that lists every problem, or nothing.
+  [[nodiscard]] bool empty() const { return problems_.empty(); }
+  /// InputError that lists every problem in the order of the file's lines, or nothing.
   void throw_if_any() const;
 
  private:
+  struct Problem {
+    toml::source_index line;
+    std::string message;
+  };
+
   std::string file_;
-  std::vector<std::string> messages_;
+  std::vector<Problem> problems_;
 };
 
 enum class Presence { Required, Optional };
@@ -45,7 +50,8 @@ enum class Presence { Required, Optional };
 /// that is missing or unacceptable is noted as a problem and comes back as nullopt.
 class TomlTableReader {
  public:
-  /// `prefix` stands before key names in messages: "case[0]." or empty.
+  /// `prefix` stands before key names in messages: "case[0]." or empty. Table and problems must
+  /// outlive the reader.
   TomlTableReader(const toml::table& table, std::string prefix, TomlProblems& problems)
       : table_(table), prefix_(std::move(prefix)), problems_(problems) {}
 
