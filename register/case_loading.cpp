@@ -51,12 +51,6 @@ CtGrid grid_of(const PlainGrid& plain) {
   return grid;
 }
 
-/// What is known of a CT without its voxels.
-struct CtFacts {
-  CtGrid grid;
-  std::string content_sha256;
-};
-
 /// Collective over `group`: rank 0 calls `read`, all receive its facts or its error.
 CtFacts facts_from_root(const Communicator& group, const std::function<CtFacts()>& read) {
   CtFacts facts;
@@ -71,44 +65,6 @@ CtFacts facts_from_root(const Communicator& group, const std::function<CtFacts()
   facts.grid = grid_of(plain);
   group.broadcast(facts.content_sha256);
   return facts;
-}
-
-/// The attenuation of a CT, held once per node.
-struct NodeCt {
-  std::shared_ptr<const AttenuationVolume> volume;
-  CtFacts facts;
-};
-
-NodeCt read_ct_per_node(const StudyCase& study_case,
-                        const CaseLoadOptions& options,
-                        const Communicator& communicator,
-                        std::vector<std::string>& warnings) {
-  AttenuationModel model;
-  model.mu_water_per_mm = options.water_mu_per_mm;
-  const Communicator node = communicator.node();
-  CtGrid bordered_grid;
-  NodeCt result;
-  // all_or_none over everybody: a node whose file system lacks the CT must not leave the others
-  // waiting.
-  all_or_none(communicator, [&] {
-    if (!node.is_root()) return;
-    const CtVolume ct = read_ct(study_case.ct, options.ct, &warnings);
-    result.facts = {ct.grid, ct_content_sha256(ct)};
-    result.volume = std::make_shared<const AttenuationVolume>(ct, model);
-    bordered_grid = result.volume->grid();
-  });
-  result.facts = facts_from_root(node, [&] { return result.facts; });
-  if (node.size() == 1) return result;
-  bordered_grid = facts_from_root(node, [&] { return CtFacts{bordered_grid, {}}; }).grid;
-  const std::size_t count = bordered_grid.voxel_count();
-  const auto owner =
-      node.allocate_on_node(count * sizeof(std::uint16_t), [&](std::span<std::byte> memory) {
-        std::memcpy(memory.data(), result.volume->voxels().data(), memory.size());
-      });
-  const auto* const voxels = reinterpret_cast<const std::uint16_t*>(owner.get());
-  result.volume = std::make_shared<const AttenuationVolume>(
-      bordered_grid, model, SharedArray<std::uint16_t>(owner, {voxels, count}));
-  return result;
 }
 
 std::filesystem::path field_path_of(const StudyCase& study_case,
@@ -181,6 +137,37 @@ void use_fields(const StudyCase& study_case,
 
 }  // namespace
 
+NodeCt read_ct_per_node(const std::filesystem::path& path,
+                        const CtReadOptions& options,
+                        const AttenuationModel& model,
+                        const Communicator& communicator,
+                        std::vector<std::string>& warnings) {
+  const Communicator node = communicator.node();
+  CtGrid bordered_grid;
+  NodeCt result;
+  // all_or_none over everybody: a node whose file system lacks the CT must not leave the others
+  // waiting.
+  all_or_none(communicator, [&] {
+    if (!node.is_root()) return;
+    const CtVolume ct = read_ct(path, options, &warnings);
+    result.facts = {ct.grid, ct_content_sha256(ct)};
+    result.volume = std::make_shared<const AttenuationVolume>(ct, model);
+    bordered_grid = result.volume->grid();
+  });
+  result.facts = facts_from_root(node, [&] { return result.facts; });
+  if (node.size() == 1) return result;
+  bordered_grid = facts_from_root(node, [&] { return CtFacts{bordered_grid, {}}; }).grid;
+  const std::size_t count = bordered_grid.voxel_count();
+  const auto owner =
+      node.allocate_on_node(count * sizeof(std::uint16_t), [&](std::span<std::byte> memory) {
+        std::memcpy(memory.data(), result.volume->voxels().data(), memory.size());
+      });
+  const auto* const voxels = reinterpret_cast<const std::uint16_t*>(owner.get());
+  result.volume = std::make_shared<const AttenuationVolume>(
+      bordered_grid, model, SharedArray<std::uint16_t>(owner, {voxels, count}));
+  return result;
+}
+
 const char* to_string(RendererKind kind) {
   return kind == RendererKind::Field ? "field" : "raycast";
 }
@@ -228,7 +215,10 @@ LoadedCase load_case(const Study& study,
 
   std::optional<CtFacts> ct;
   if (options.renderer == RendererKind::RayCast) {
-    const NodeCt node_ct = read_ct_per_node(study_case, options, communicator, loaded.warnings);
+    AttenuationModel model;
+    model.mu_water_per_mm = options.water_mu_per_mm;
+    const NodeCt node_ct =
+        read_ct_per_node(study_case.ct, options.ct, model, communicator, loaded.warnings);
     ct = node_ct.facts;
     for (RegistrationView& view : problem->views)
       view.renderer = std::make_shared<const RayCastDrr>(node_ct.volume, options.ray_caster);
