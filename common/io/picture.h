@@ -23,8 +23,10 @@ struct PicturePanel {
   std::vector<RegionOfInterest> boxes;  ///< outlined on the panel
 };
 
-/// Draws panels in a row-major grid of `columns` columns with titles and captions, as PNG (cairo),
-/// row 0 on top, one image pixel becoming `zoom` x `zoom` picture pixels. Atomic.
+/// Draws panels in a row-major grid of `columns` columns with titles, captions and the range of
+/// their window, as PNG (cairo), row 0 on top, one image pixel becoming `zoom` x `zoom` picture
+/// pixels. Values beyond the window take its end's color; values that are not finite are orange.
+/// Atomic. InputError when the picture would be larger than 30000 pixels on a side or 4e8 in all.
 void write_picture(const std::vector<PicturePanel>& panels,
                    int columns,
                    const std::string& heading,
@@ -32,10 +34,11 @@ void write_picture(const std::vector<PicturePanel>& panels,
                    int zoom = 1);
 
 /// Checkerboard of two images of one size, fields of `field_px` pixels, both scaled to [0, 1] by
-/// their own 1st and 99th percentile.
+/// their own 1st and 99th percentile; the field at pixel (0, 0) shows `a`.
 Image2d checkerboard(const Image2d& a, const Image2d& b, int field_px);
 
-/// Window (low, high) of an image's percentiles, in its own units.
+/// Window (low, high) of the percentiles of an image's finite values, in its own units; (0, 0) when
+/// it has none. Between two values the percentile is interpolated.
 std::array<double, 2> percentile_window(const Image2d& image,
                                         double low_percent = 1.0,
                                         double high_percent = 99.0);

@@ -34,22 +34,39 @@ std::string line_and_column(const toml::source_position& position) {
   return std::to_string(position.line) + ":" + std::to_string(position.column);
 }
 
+/// Appends a value as TOML on one line; stops where messages end anyway.
+void append_value(std::string& text, const toml::node& node) {
+  constexpr std::size_t kLongEnough = 200;
+  if (text.size() > kLongEnough) return;
+  if (const toml::array* list = node.as_array()) {
+    text += '[';
+    for (std::size_t i = 0; i < list->size() && text.size() <= kLongEnough; ++i) {
+      if (i > 0) text += ", ";
+      append_value(text, *list->get(i));
+    }
+    text += ']';
+  } else if (const auto* string = node.as_string()) {
+    text += toml_string(string->get().substr(0, kLongEnough));
+  } else if (const auto* number = node.as_floating_point()) {
+    text += number_text(number->get());
+  } else if (node.is_table()) {
+    text += "{...}";
+  } else {
+    std::ostringstream out;
+    node.visit([&out](const auto& value) { out << value; });
+    text += out.str();
+  }
+}
+
 /// A value on one line, shortened for messages.
 std::string value_text(const toml::node& node) {
-  std::ostringstream out;
-  node.visit([&out](const auto& value) { out << value; });
-  std::string text;
-  for (const char character : out.str()) {
-    const bool blank = std::isspace(static_cast<unsigned char>(character)) != 0;
-    if (character == ']' && text.ends_with(' ')) text.pop_back();
-    if (!blank)
-      text.push_back(character);
-    else if (!text.empty() && text.back() != ' ' && text.back() != '[')
-      text.push_back(' ');
-  }
   constexpr std::size_t kMaxLength = 100;
-  if (text.size() > kMaxLength) text = text.substr(0, kMaxLength - 4) + " ...";
-  return text;
+  std::string text;
+  append_value(text, node);
+  if (text.size() <= kMaxLength) return text;
+  std::size_t end = kMaxLength - 4;
+  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0) == 0x80) --end;  // inside UTF-8
+  return text.substr(0, end) + " ...";
 }
 
 /// Number of edits (insert, delete, replace, swap of neighbours) between two names.
