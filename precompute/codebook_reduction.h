@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+namespace af {
+
+/// How the ranks that train one codebook combine what they know; the algorithms never see MPI. All
+/// ranks call in the same order.
+struct CodebookReduction {
+  /// Exact element-wise sums over the ranks, in place.
+  std::function<void(std::span<std::uint64_t>)> sum;
+  /// Every rank's bytes on every rank, in rank order.
+  std::function<std::vector<std::vector<std::byte>>(std::span<const std::byte>)> all_gather;
+};
+
+/// One rank alone.
+CodebookReduction serial_reduction();
+
+}  // namespace af

@@ -1,0 +1,256 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "precompute/codebook_training.h"
+
+#include <algorithm>
+#include <numeric>
+#include <set>
+
+#include "base/error.h"
+#include "precompute/nearest_codeword.h"
+
+namespace af {
+
+namespace {
+
+/// One rank's share of an iteration; adding shares is exact. One array, so that one reduction does.
+class CentroidSums {
+ public:
+  explicit CentroidSums(std::size_t codewords)
+      : codewords_(codewords), values_(codewords * (kTileElements + 1) + 2, 0) {}
+
+  void add(std::uint32_t codeword, const Tile& tile) {
+    std::uint64_t* sums = &values_[codeword * (kTileElements + 1)];
+    for (std::size_t i = 0; i < kTileElements; ++i) sums[i] += tile[i];
+    ++sums[kTileElements];
+  }
+  [[nodiscard]] std::uint64_t count(std::size_t codeword) const {
+    return values_[codeword * (kTileElements + 1) + kTileElements];
+  }
+  [[nodiscard]] Tile centroid(std::size_t codeword) const {
+    const std::uint64_t* sums = &values_[codeword * (kTileElements + 1)];
+    const std::uint64_t tiles = count(codeword);
+    Tile rounded{};
+    for (std::size_t i = 0; i < kTileElements; ++i)
+      rounded[i] = static_cast<std::uint16_t>((sums[i] + tiles / 2) / tiles);
+    return rounded;
+  }
+  std::uint64_t& training_error() { return values_[codewords_ * (kTileElements + 1)]; }
+  std::uint64_t& held_out_error() { return values_[codewords_ * (kTileElements + 1) + 1]; }
+  std::span<std::uint64_t> values() { return values_; }
+
+ private:
+  std::size_t codewords_;
+  std::vector<std::uint64_t> values_;
+};
+
+/// Tiles of one kind with the codeword that codes each.
+struct CodedTiles {
+  std::vector<Tile> tiles;
+  std::vector<std::uint32_t> nearest;
+  std::vector<std::uint64_t> squared_errors;
+
+  explicit CodedTiles(const std::vector<NumberedTile>& numbered)
+      : nearest(numbered.size(), 0), squared_errors(numbered.size(), 0) {
+    tiles.reserve(numbered.size());
+    for (const NumberedTile& tile : numbered) tiles.push_back(tile.tile);
+  }
+  void encode(const NearestCodeword& search, SearchHint hint) {
+    search.search(tiles, hint, nearest, squared_errors);
+  }
+  [[nodiscard]] std::uint64_t squared_error() const {
+    return std::accumulate(squared_errors.begin(), squared_errors.end(), std::uint64_t{0});
+  }
+  void renumber(const std::vector<std::uint32_t>& new_of_old) {
+    for (std::uint32_t& index : nearest) index = new_of_old[index];
+  }
+};
+
+/// The zero tile and the first distinct, non-zero tiles in the order of their sampling keys.
+Codebook initial_codebook(const TrainingShare& mine,
+                          std::uint64_t training_tiles,
+                          const CodebookOptions& options,
+                          const CodebookReduction& reduction) {
+  const auto wanted = static_cast<std::uint64_t>(options.codewords) - 1;
+  std::vector<std::uint64_t> keys;
+  keys.reserve(mine.training.size());
+  for (const NumberedTile& tile : mine.training)
+    keys.push_back(weighted_sampling_key(options.seed, tile));
+  for (std::uint64_t count = wanted + wanted / 8 + 1;; count *= 2) {
+    const auto drawn =
+        smallest_keyed_tiles(keys, mine.training, std::min(count, training_tiles), reduction);
+    std::set<Tile> distinct;
+    for (const KeyedTile& tile : drawn) {
+      distinct.insert(tile.numbered.tile);
+      if (distinct.size() == wanted) break;
+    }
+    if (distinct.size() == wanted) {
+      Codebook codebook{{Tile{}}};
+      codebook.codewords.insert(codebook.codewords.end(), distinct.begin(), distinct.end());
+      std::sort(codebook.codewords.begin(), codebook.codewords.end(), codeword_less);
+      return codebook;
+    }
+    if (count >= training_tiles)
+      throw InputError("codewords",
+                       std::to_string(options.codewords),
+                       "more codewords than training tiles: there are only " +
+                           std::to_string(distinct.size()) +
+                           " distinct training tiles that are not empty; ask for fewer codewords "
+                           "or raise --training-fraction");
+  }
+}
+
+/// A codeword and the index it had before the sort.
+struct TrackedCodeword {
+  Tile tile{};
+  std::uint32_t old_index = 0;
+};
+
+bool tracked_less(const TrackedCodeword& a, const TrackedCodeword& b) {
+  if (codeword_less(a.tile, b.tile)) return true;
+  if (codeword_less(b.tile, a.tile)) return false;
+  return a.old_index < b.old_index;
+}
+
+/// Replaces codewords that are unused or equal to a lower one by the worst-coded training tiles
+/// (Collective); returns how many.
+class CodebookUpdate {
+ public:
+  CodebookUpdate(const Codebook& old, const CentroidSums& sums) {
+    codewords_.push_back({Tile{}, 0});
+    for (std::uint32_t i = 1; i < old.size(); ++i) {
+      if (sums.count(i) > 0) codewords_.push_back({sums.centroid(i), i});
+      else free_.push_back({old.codewords[i], i});
+    }
+    std::sort(codewords_.begin(), codewords_.end(), tracked_less);
+    const auto is_same = [](const TrackedCodeword& a, const TrackedCodeword& b) {
+      return a.tile == b.tile;
+    };
+    std::vector<TrackedCodeword> distinct;
+    for (const TrackedCodeword& codeword : codewords_) {
+      if (distinct.empty() || !is_same(distinct.back(), codeword)) distinct.push_back(codeword);
+      else free_.push_back(codeword);
+    }
+    codewords_ = std::move(distinct);
+  }
+
+  std::uint64_t repair(const CodedTiles& coded,
+                       const std::vector<NumberedTile>& tiles,
+                       const CodebookReduction& reduction) {
+    if (free_.empty()) return 0;
+    std::vector<std::uint64_t> keys;
+    std::vector<NumberedTile> badly_coded;
+    for (std::size_t i = 0; i < tiles.size(); ++i) {
+      if (coded.squared_errors[i] == 0) continue;
+      keys.push_back(~coded.squared_errors[i]);
+      badly_coded.push_back(tiles[i]);
+    }
+    // Some spare: a tile may equal another or a centroid.
+    const auto worst =
+        smallest_keyed_tiles(keys, badly_coded, 2 * free_.size() + 16, reduction);
+    std::set<Tile> taken;
+    for (const TrackedCodeword& codeword : codewords_) taken.insert(codeword.tile);
+    std::sort(free_.begin(), free_.end(), [](const TrackedCodeword& a, const TrackedCodeword& b) {
+      return a.old_index < b.old_index;
+    });
+    std::uint64_t repaired = 0;
+    auto candidate = worst.begin();
+    for (TrackedCodeword& codeword : free_) {
+      while (candidate != worst.end() && !taken.insert(candidate->numbered.tile).second)
+        ++candidate;
+      if (candidate != worst.end()) {
+        codeword.tile = candidate->numbered.tile;
+        ++repaired;
+      }
+      codewords_.push_back(codeword);
+    }
+    std::sort(codewords_.begin(), codewords_.end(), tracked_less);
+    return repaired;
+  }
+
+  [[nodiscard]] Codebook codebook() const {
+    Codebook sorted;
+    sorted.codewords.reserve(codewords_.size());
+    for (const TrackedCodeword& codeword : codewords_) sorted.codewords.push_back(codeword.tile);
+    return sorted;
+  }
+  [[nodiscard]] std::vector<std::uint32_t> new_of_old() const {
+    std::vector<std::uint32_t> positions(codewords_.size());
+    for (std::uint32_t i = 0; i < codewords_.size(); ++i)
+      positions[codewords_[i].old_index] = i;
+    return positions;
+  }
+
+ private:
+  std::vector<TrackedCodeword> codewords_;  ///< distinct and in use
+  std::vector<TrackedCodeword> free_;
+};
+
+}  // namespace
+
+std::vector<std::string> problems(const CodebookOptions& options) {
+  std::vector<std::string> found;
+  if (options.codewords < 2 || options.codewords > static_cast<int>(kMaxCodewords))
+    found.push_back("codewords = " + std::to_string(options.codewords) +
+                    ": must be within 2 and 65536");
+  if (options.max_iterations < 1)
+    found.push_back("max_iterations = " + std::to_string(options.max_iterations) +
+                    ": must be at least 1");
+  if (!(options.min_relative_improvement >= 0.0 && options.min_relative_improvement < 1.0))
+    found.push_back("min_relative_improvement = " +
+                    std::to_string(options.min_relative_improvement) + ": must be within 0 and 1");
+  return found;
+}
+
+const char* to_string(TrainingStop stop) {
+  return stop == TrainingStop::ImprovementBelowLimit ? "improvement below the limit"
+                                                     : "maximum number of iterations";
+}
+
+TrainedCodebook train_codebook(const TrainingShare& mine,
+                               const CodebookOptions& options,
+                               const CodebookReduction& reduction,
+                               const ProgressCallback& on_progress) {
+  throw_if_any(problems(options));
+  std::array<std::uint64_t, 2> totals{mine.training.size(), mine.held_out.size()};
+  reduction.sum(totals);
+  TrainedCodebook result;
+  result.training_tiles = totals[0];
+  result.held_out_tiles = totals[1];
+  result.codebook = initial_codebook(mine, totals[0], options, reduction);
+
+  CodedTiles training(mine.training);
+  CodedTiles held_out(mine.held_out);
+  SearchHint hint = SearchHint::PreviousTile;
+  for (int i = 0; i < options.max_iterations; ++i) {
+    const NearestCodeword search(result.codebook);
+    training.encode(search, hint);
+    held_out.encode(search, hint);
+    hint = SearchHint::PerTile;
+    CentroidSums sums(result.codebook.size());
+    for (std::size_t tile = 0; tile < training.tiles.size(); ++tile)
+      sums.add(training.nearest[tile], training.tiles[tile]);
+    sums.training_error() = training.squared_error();
+    sums.held_out_error() = held_out.squared_error();
+    reduction.sum(sums.values());
+
+    CodebookUpdate update(result.codebook, sums);
+    const std::uint64_t repaired = update.repair(training, mine.training, reduction);
+    result.codebook = update.codebook();
+    const auto new_of_old = update.new_of_old();
+    training.renumber(new_of_old);
+    held_out.renumber(new_of_old);
+    result.iterations.push_back({sums.training_error(), sums.held_out_error(), repaired});
+    if (on_progress) on_progress(i + 1, options.max_iterations);
+    if (i == 0) continue;
+    const auto before = static_cast<double>(result.iterations[result.iterations.size() - 2]
+                                                .training_squared_error);
+    const auto now = static_cast<double>(sums.training_error());
+    if (!(before - now > options.min_relative_improvement * before)) {
+      result.stop = TrainingStop::ImprovementBelowLimit;
+      break;
+    }
+  }
+  return result;
+}
+
+}  // namespace af

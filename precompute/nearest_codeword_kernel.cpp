@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: Apache-2.0
+// Exact nearest codeword (see nearest_codeword.h). Compiled once per vector width.
+#include "precompute/nearest_codeword_kernel.h"
+
+#include <immintrin.h>
+
+#include "base/vec16.h"
+
+namespace af::AF_KERNEL_NAMESPACE {
+
+namespace {
+
+/// Bits of the lanes whose comparison result is set.
+AF_KERNEL_INLINE uint32_t lane_bits(I16 mask) {
+#if AF_VECTOR_BITS == 512
+  __m512i lanes;
+  memcpy(&lanes, &mask, sizeof(lanes));
+  return _mm512_movepi32_mask(lanes);
+#elif AF_VECTOR_BITS == 256
+  __m256 halves[2];
+  memcpy(halves, &mask, sizeof(halves));
+  return static_cast<uint32_t>(_mm256_movemask_ps(halves[0])) |
+         static_cast<uint32_t>(_mm256_movemask_ps(halves[1])) << 8u;
+#else
+  __m128 quarters[4];
+  memcpy(quarters, &mask, sizeof(quarters));
+  uint32_t bits = 0;
+  for (uint32_t i = 0; i < 4; ++i)
+    bits |= static_cast<uint32_t>(_mm_movemask_ps(quarters[i])) << (4u * i);
+  return bits;
+#endif
+}
+
+/// Exact: 16 squares below 2^32 each.
+AF_KERNEL_INLINE uint64_t squared_error(const uint16_t* a, const uint16_t* b) {
+  uint64_t sum = 0;
+  for (int i = 0; i < 16; ++i) {
+    const int32_t difference = static_cast<int32_t>(a[i]) - static_cast<int32_t>(b[i]);
+    const uint32_t magnitude = static_cast<uint32_t>(difference < 0 ? -difference : difference);
+    sum += static_cast<uint64_t>(magnitude * magnitude);
+  }
+  return sum;
+}
+
+template <int kStride>
+AF_KERNEL_INLINE I16 butterfly(I16 values) {
+  I16 partner;
+  I16 is_upper;
+  for (int lane = 0; lane < kLanes; ++lane) {
+    partner[lane] = lane ^ kStride;
+    is_upper[lane] = (lane & kStride) != 0 ? -1 : 0;
+  }
+  const I16 other = __builtin_shuffle(values, partner);
+  return is_upper != 0 ? other - values : values + other;
+}
+
+/// 4-D Hadamard transform of a tile; integers below 2^21, exact also as floats.
+AF_KERNEL_INLINE void hadamard(const uint16_t* tile, float* coefficients) {
+  I16 values;
+  for (int lane = 0; lane < kLanes; ++lane) values[lane] = tile[lane];
+  values = butterfly<8>(butterfly<4>(butterfly<2>(butterfly<1>(values))));
+  float natural[16];
+  store(natural, to_float(values));
+  for (uint32_t i = 0; i < 16; ++i) coefficients[i] = natural[kCoefficientOrder[i]];
+}
+
+/// The best codeword of one tile so far, and the bound that a better one must meet.
+struct Best {
+  uint64_t squared_error;
+  uint32_t index;
+  float limit;
+};
+
+AF_KERNEL_INLINE float limit_of(uint64_t error) {
+  // The transform scales squared distances by 16. A float sum of 16 squares of exact differences
+  // errs by less than 17 * 2^-24 of itself; 2^-18 = 64 * 2^-24 covers that and this product.
+  return static_cast<float>(16 * error) * (1.0f + 0x1.0p-18f);
+}
+
+/// Ties take the lowest index.
+AF_KERNEL_INLINE void offer(Best& best, uint64_t error, uint32_t candidate) {
+  if (error > best.squared_error || (error == best.squared_error && candidate >= best.index))
+    return;
+  best = {error, candidate, limit_of(error)};
+}
+
+AF_KERNEL_INLINE F16 add_squared_difference(F16 sum, float coefficient, const float* lanes) {
+  const F16 difference = splat(coefficient) - load<F16>(lanes);
+  return sum + difference * difference;
+}
+
+/// Compares a tile with the 16 codewords of one block; gives up after five coefficients when all
+/// are too far.
+AF_KERNEL_INLINE void search_block(const CodewordBlocks& blocks,
+                                   uint32_t block,
+                                   const uint16_t* tile,
+                                   const float* coefficients,
+                                   Best& best) {
+  const float* lanes = blocks.coefficients + static_cast<size_t>(block) * 256;
+  F16 sum = {};
+  for (int i = 0; i < 5; ++i)
+    sum = add_squared_difference(sum, coefficients[i], lanes + 16 * i);
+  if (!any(sum <= splat(best.limit))) return;
+  for (int i = 5; i < 16; ++i)
+    sum = add_squared_difference(sum, coefficients[i], lanes + 16 * i);
+  uint32_t near_bits = lane_bits(sum <= splat(best.limit));
+  for (; near_bits != 0; near_bits &= near_bits - 1) {
+    const uint32_t candidate = block * 16 + static_cast<uint32_t>(__builtin_ctz(near_bits));
+    offer(best,
+                squared_error(tile, blocks.codewords + static_cast<size_t>(candidate) * 16),
+                candidate);
+  }
+}
+
+AF_KERNEL_INLINE float squared_gap(float gap) {
+  return gap > 0.0f ? gap * gap : 0.0f;
+}
+
+/// Walks outwards from the tile's DC in both directions until the DC alone is too far.
+AF_KERNEL_INLINE Best search_tile(const CodewordBlocks& blocks,
+                                  const uint16_t* tile,
+                                  uint32_t hint) {
+  float coefficients[16];
+  hadamard(tile, coefficients);
+  const float dc = coefficients[0];
+  const uint64_t hint_error =
+      squared_error(tile, blocks.codewords + static_cast<size_t>(hint) * 16);
+  Best best{hint_error, hint, limit_of(hint_error)};
+
+  int64_t above = blocks.start_block[static_cast<uint32_t>(dc) >> kStartShift];
+  while (blocks.high_dc[above] < dc) ++above;
+  int64_t below = above - 1;
+  float gap_above = squared_gap(blocks.low_dc[above] - dc);
+  float gap_below = squared_gap(dc - blocks.high_dc[below]);
+  for (;;) {
+    if (gap_above <= gap_below) {
+      if (gap_above > best.limit) return best;
+      search_block(blocks, static_cast<uint32_t>(above), tile, coefficients, best);
+      gap_above = squared_gap(blocks.low_dc[++above] - dc);
+    } else {
+      if (gap_below > best.limit) return best;
+      search_block(blocks, static_cast<uint32_t>(below), tile, coefficients, best);
+      gap_below = squared_gap(dc - blocks.high_dc[--below]);
+    }
+  }
+}
+
+}  // namespace
+
+void find_nearest(const CodewordBlocks& blocks, const NearestRequest& request) {
+  uint32_t hint = 0;
+  for (size_t i = 0; i < request.tile_count; ++i) {
+    if (request.has_hints) hint = request.nearest[i];
+    const Best best = search_tile(blocks, request.tiles + 16 * i, hint);
+    request.nearest[i] = best.index;
+    request.squared_errors[i] = best.squared_error;
+    hint = best.index;
+  }
+}
+
+}  // namespace af::AF_KERNEL_NAMESPACE

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+// Interface of the vectorised search, one function per vector width. Raw pointers only: the kernels
+// are compiled for instruction sets that the rest of the program may not use.
+#pragma once
+
+#include <stddef.h>
+#include <stdint.h>
+
+namespace af {
+
+/// A sorted codebook in the layout of the search: blocks of 16 codewords, padded with codewords
+/// that are farther than any tile.
+struct CodewordBlocks {
+  const float* coefficients;    ///< [block][16 coefficients, DC first, then the 4 linear][16 lanes]
+  const float* low_dc;          ///< [-1 ... block_count]: DC of a block's first codeword
+  const float* high_dc;         ///< [-1 ... block_count]: DC of a block's last codeword
+  const uint16_t* codewords;    ///< [codeword][16]
+  const uint32_t* start_block;  ///< [DC >> kStartShift]: first block whose high_dc is not below it
+  uint32_t block_count;
+};
+
+inline constexpr uint32_t kStartShift = 7;
+inline constexpr uint32_t kStartEntries = (16u * 65535u >> kStartShift) + 1;
+
+/// The order in which the 16 coefficients of the 4-D Hadamard transform are kept: DC, the four
+/// linear ones, then by falling energy in practice.
+inline constexpr uint32_t kCoefficientOrder[16] = {
+    0, 1, 2, 4, 8, 3, 5, 6, 9, 10, 12, 7, 11, 13, 14, 15};
+
+/// `nearest` receives the answers; with `has_hints` it holds a guess per tile on entry, otherwise
+/// each tile's guess is the previous tile's answer.
+struct NearestRequest {
+  const uint16_t* tiles;  ///< [tile][16]
+  size_t tile_count;
+  bool has_hints;
+  uint32_t* nearest;
+  uint64_t* squared_errors;
+};
+
+using NearestFunction = void (*)(const CodewordBlocks&, const NearestRequest&);
+
+namespace kernels_128 {
+void find_nearest(const CodewordBlocks& blocks, const NearestRequest& request);
+}
+namespace kernels_256 {
+void find_nearest(const CodewordBlocks& blocks, const NearestRequest& request);
+}
+namespace kernels_512 {
+void find_nearest(const CodewordBlocks& blocks, const NearestRequest& request);
+}
+
+}  // namespace af
