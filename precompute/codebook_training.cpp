@@ -118,8 +118,10 @@ class CodebookUpdate {
   CodebookUpdate(const Codebook& old, const CentroidSums& sums) {
     codewords_.push_back({Tile{}, 0});
     for (std::uint32_t i = 1; i < old.size(); ++i) {
-      if (sums.count(i) > 0) codewords_.push_back({sums.centroid(i), i});
-      else free_.push_back({old.codewords[i], i});
+      if (sums.count(i) > 0)
+        codewords_.push_back({sums.centroid(i), i});
+      else
+        free_.push_back({old.codewords[i], i});
     }
     std::sort(codewords_.begin(), codewords_.end(), tracked_less);
     const auto is_same = [](const TrackedCodeword& a, const TrackedCodeword& b) {
@@ -127,8 +129,10 @@ class CodebookUpdate {
     };
     std::vector<TrackedCodeword> distinct;
     for (const TrackedCodeword& codeword : codewords_) {
-      if (distinct.empty() || !is_same(distinct.back(), codeword)) distinct.push_back(codeword);
-      else free_.push_back(codeword);
+      if (distinct.empty() || !is_same(distinct.back(), codeword))
+        distinct.push_back(codeword);
+      else
+        free_.push_back(codeword);
     }
     codewords_ = std::move(distinct);
   }
@@ -145,8 +149,7 @@ class CodebookUpdate {
       badly_coded.push_back(tiles[i]);
     }
     // Some spare: a tile may equal another or a centroid.
-    const auto worst =
-        smallest_keyed_tiles(keys, badly_coded, 2 * free_.size() + 16, reduction);
+    const auto worst = smallest_keyed_tiles(keys, badly_coded, 2 * free_.size() + 16, reduction);
     std::set<Tile> taken;
     for (const TrackedCodeword& codeword : codewords_) taken.insert(codeword.tile);
     std::sort(free_.begin(), free_.end(), [](const TrackedCodeword& a, const TrackedCodeword& b) {
@@ -175,8 +178,7 @@ class CodebookUpdate {
   }
   [[nodiscard]] std::vector<std::uint32_t> new_of_old() const {
     std::vector<std::uint32_t> positions(codewords_.size());
-    for (std::uint32_t i = 0; i < codewords_.size(); ++i)
-      positions[codewords_[i].old_index] = i;
+    for (std::uint32_t i = 0; i < codewords_.size(); ++i) positions[codewords_[i].old_index] = i;
     return positions;
   }
 
@@ -242,8 +244,8 @@ TrainedCodebook train_codebook(const TrainingShare& mine,
     result.iterations.push_back({sums.training_error(), sums.held_out_error(), repaired});
     if (on_progress) on_progress(i + 1, options.max_iterations);
     if (i == 0) continue;
-    const auto before = static_cast<double>(result.iterations[result.iterations.size() - 2]
-                                                .training_squared_error);
+    const auto before =
+        static_cast<double>(result.iterations[result.iterations.size() - 2].training_squared_error);
     const auto now = static_cast<double>(sums.training_error());
     if (!(before - now > options.min_relative_improvement * before)) {
       result.stop = TrainingStop::ImprovementBelowLimit;

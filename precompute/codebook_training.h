@@ -13,7 +13,7 @@
 namespace af {
 
 struct CodebookOptions {
-  int codewords = 16384;                  ///< with the zero tile
+  int codewords = 16384;  ///< with the zero tile
   int max_iterations = 12;
   double min_relative_improvement = 0.005;  ///< of the training tiles' squared error
   std::uint64_t seed = 1;
@@ -40,15 +40,14 @@ struct TrainedCodebook {
   TrainingStop stop = TrainingStop::MaxIterations;
 };
 
-/// Collective. Trains a codebook by the generalised Lloyd algorithm (Sec. II-D) on the shares of all
-/// ranks. Sums, counts and errors are exact integers and centroids are rounded to levels, so the
-/// codebook is the same on any number of ranks and on any vector width. Codeword 0 is and stays the
-/// zero tile. Initial codewords are distinct tiles drawn by weighted_sampling_key(); codewords that
-/// end up unused or equal to another are replaced by the worst-coded training tiles. Only when there
-/// are no such tiles left do equal codewords remain (the higher ones are then never used), so the
-/// size is always the one asked for. InputError when there are fewer distinct training tiles than
-/// codewords to draw.
-/// \test CodebookTraining.IsBitIdenticalOnAnyRankCount
+/// Collective. Trains a codebook by the generalised Lloyd algorithm (Sec. II-D) on the shares of
+/// all ranks. Sums, counts and errors are exact integers and centroids are rounded to levels, so
+/// the codebook is the same on any number of ranks and on any vector width. Codeword 0 is and stays
+/// the zero tile. Initial codewords are distinct tiles drawn by weighted_sampling_key(); codewords
+/// that end up unused or equal to another are replaced by the worst-coded training tiles. Only when
+/// there are no such tiles left do equal codewords remain (the higher ones are then never used), so
+/// the size is always the one asked for. InputError when there are fewer distinct training tiles
+/// than codewords to draw. \test CodebookTraining.IsBitIdenticalOnAnyRankCount
 TrainedCodebook train_codebook(const TrainingShare& mine,
                                const CodebookOptions& options,
                                const CodebookReduction& reduction,

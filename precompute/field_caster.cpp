@@ -29,8 +29,7 @@ void RayCastFieldCaster::cast(const WorkUnit& unit, std::span<std::uint16_t> sam
   RayFan row;
   row.columns = unit.t.count;
   row.rows = 1;
-  row.column_step =
-      ct_from_slab_.linear() * Eigen::Vector3d(0.0, 0.0, slab.t.spacing_mm());
+  row.column_step = ct_from_slab_.linear() * Eigen::Vector3d(0.0, 0.0, slab.t.spacing_mm());
   row.row_step = Eigen::Vector3d::Zero();
   std::vector<float> total_attenuation(static_cast<std::size_t>(unit.t.count));
   auto sample = samples.begin();

@@ -74,9 +74,9 @@ void NearestCodeword::search(std::span<const Tile> tiles,
                                hint == SearchHint::PerTile,
                                nearest.data(),
                                squared_errors.data()};
-  select_kernel<NearestFunction>(
-      kernels_128::find_nearest, kernels_256::find_nearest, kernels_512::find_nearest)(blocks,
-                                                                                        request);
+  select_kernel<NearestFunction>(kernels_128::find_nearest,
+                                 kernels_256::find_nearest,
+                                 kernels_512::find_nearest)(blocks, request);
 }
 
 }  // namespace af

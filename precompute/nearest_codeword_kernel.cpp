@@ -98,17 +98,15 @@ AF_KERNEL_INLINE void search_block(const CodewordBlocks& blocks,
                                    Best& best) {
   const float* lanes = blocks.coefficients + static_cast<size_t>(block) * 256;
   F16 sum = {};
-  for (int i = 0; i < 5; ++i)
-    sum = add_squared_difference(sum, coefficients[i], lanes + 16 * i);
+  for (int i = 0; i < 5; ++i) sum = add_squared_difference(sum, coefficients[i], lanes + 16 * i);
   if (!any(sum <= splat(best.limit))) return;
-  for (int i = 5; i < 16; ++i)
-    sum = add_squared_difference(sum, coefficients[i], lanes + 16 * i);
+  for (int i = 5; i < 16; ++i) sum = add_squared_difference(sum, coefficients[i], lanes + 16 * i);
   uint32_t near_bits = lane_bits(sum <= splat(best.limit));
   for (; near_bits != 0; near_bits &= near_bits - 1) {
     const uint32_t candidate = block * 16 + static_cast<uint32_t>(__builtin_ctz(near_bits));
     offer(best,
-                squared_error(tile, blocks.codewords + static_cast<size_t>(candidate) * 16),
-                candidate);
+          squared_error(tile, blocks.codewords + static_cast<size_t>(candidate) * 16),
+          candidate);
   }
 }
 

@@ -38,8 +38,8 @@ UnitExtent unit_extent(const LightSlab& light_slab,
       static_cast<int>(viewpoints / extent.v) / 2 * 2, 2, round_up_to_even(light_slab.u.nodes));
   const std::int64_t rows_of_unit =
       options.rays_per_unit / (std::int64_t{extent.u} * extent.v * rays_of_row);
-  extent.s = static_cast<int>(std::clamp<std::int64_t>(
-      rows_of_unit / 2 * 2, 2, std::max(2, round_up_to_even(rows))));
+  extent.s = static_cast<int>(
+      std::clamp<std::int64_t>(rows_of_unit / 2 * 2, 2, std::max(2, round_up_to_even(rows))));
   return extent;
 }
 
@@ -89,8 +89,7 @@ std::vector<WorkUnit> plan_units(const LightSlab& light_slab, const PlanOptions&
     for (const NodeRange& u : pieces_of({0, light_slab.u.nodes}, extent.u))
       for (const NodeRange& v : pieces_of({0, light_slab.v.nodes}, extent.v))
         for (const NodeRange& s : pieces_of(slab.stored_s, extent.s))
-          units.push_back(
-              {static_cast<std::uint32_t>(units.size()), k, u, v, s, slab.stored_t});
+          units.push_back({static_cast<std::uint32_t>(units.size()), k, u, v, s, slab.stored_t});
   }
   return units;
 }

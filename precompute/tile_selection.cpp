@@ -103,7 +103,8 @@ std::vector<std::string> problems(const TrainingSelection& selection) {
   if (!(selection.fraction > 0.0 && selection.fraction <= 1.0))
     found.push_back("training_fraction = " + std::to_string(selection.fraction) +
                     ": must be above 0 and at most 1");
-  if (selection.max_training_tiles < 1) found.emplace_back("max_training_tiles = 0: must be at least 1");
+  if (selection.max_training_tiles < 1)
+    found.emplace_back("max_training_tiles = 0: must be at least 1");
   return found;
 }
 
@@ -125,12 +126,15 @@ TrainingShare select_training_tiles(std::span<const UnitTiles> tiles,
   reduction.sum(histogram);
   const std::uint64_t last_training =
       capped_last_hash(histogram, last_of_fraction, selection.max_training_tiles);
-  const std::uint64_t held_out_hashes = std::min(last_training / 8, (kEverything - last_training) / 2);
+  const std::uint64_t held_out_hashes =
+      std::min(last_training / 8, (kEverything - last_training) / 2);
   TrainingShare share;
   for_each_numbered_tile(tiles, units, light_slab, [&](const NumberedTile& tile) {
     const std::uint64_t hash = hash_of(tile.global_index);
-    if (hash <= last_training) share.training.push_back(tile);
-    else if (hash > kEverything - held_out_hashes) share.held_out.push_back(tile);
+    if (hash <= last_training)
+      share.training.push_back(tile);
+    else if (hash > kEverything - held_out_hashes)
+      share.held_out.push_back(tile);
   });
   return share;
 }

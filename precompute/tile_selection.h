@@ -25,7 +25,7 @@ struct TrainingShare {
 };
 
 struct TrainingSelection {
-  double fraction = 0.10;                    ///< of the tiles that are not empty
+  double fraction = 0.10;                      ///< of the tiles that are not empty
   std::uint64_t max_training_tiles = 2000000;  ///< over all ranks
   std::uint64_t seed = 1;
 };
@@ -35,8 +35,8 @@ std::vector<std::string> problems(const TrainingSelection& selection);
 /// Collective. The share of this rank's units (`tiles[i]` belongs to `units[tiles[i].unit_id]`):
 /// tile i trains when hash(seed, i) lies below a threshold, so that the choice depends on neither
 /// ranks nor plan. The threshold is the fraction's, or the highest of 65536 steps that keeps the
-/// number of training tiles of all ranks within the cap. An eighth as many again are held out. Empty
-/// tiles take no part: they are codeword 0.
+/// number of training tiles of all ranks within the cap. An eighth as many again are held out.
+/// Empty tiles take no part: they are codeword 0.
 TrainingShare select_training_tiles(std::span<const UnitTiles> tiles,
                                     std::span<const WorkUnit> units,
                                     const LightSlab& light_slab,

@@ -22,11 +22,10 @@ SampleRows rows_of_tiles(const WorkUnit& unit,
     const int u = std::min(2 * tile[0] + static_cast<int>(i >> 2u), unit.u.count - 1);
     const int v = std::min(2 * tile[1] + static_cast<int>((i >> 1u) & 1u), unit.v.count - 1);
     const int s = std::min(2 * tile[2] + static_cast<int>(i & 1u), unit.s.count - 1);
-    const std::size_t row =
-        (static_cast<std::size_t>(u) * static_cast<std::size_t>(unit.v.count) +
-         static_cast<std::size_t>(v)) *
-            static_cast<std::size_t>(unit.s.count) +
-        static_cast<std::size_t>(s);
+    const std::size_t row = (static_cast<std::size_t>(u) * static_cast<std::size_t>(unit.v.count) +
+                             static_cast<std::size_t>(v)) *
+                                static_cast<std::size_t>(unit.s.count) +
+                            static_cast<std::size_t>(s);
     rows[i] = samples.data() + row * static_cast<std::size_t>(unit.t.count);
   }
   return rows;
@@ -71,7 +70,8 @@ std::vector<std::string> problems(const UnitTiles& tiles, const WorkUnit& unit) 
     occupied += static_cast<std::size_t>(std::popcount(word));
   std::vector<std::string> found;
   if (tile_count % 64 != 0 && (tiles.occupied.back() >> (tile_count % 64)) != 0)
-    found.push_back("unit " + std::to_string(unit.id) + ": its bitmap names tiles it does not have");
+    found.push_back("unit " + std::to_string(unit.id) +
+                    ": its bitmap names tiles it does not have");
   if (occupied != tiles.tiles.size())
     found.push_back("unit " + std::to_string(unit.id) + ": its bitmap and its tiles disagree");
   return found;
