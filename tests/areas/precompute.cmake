@@ -4,3 +4,9 @@ af_add_test(
   SOURCES unit/precompute/planner_test.cpp unit/precompute/unit_tiles_test.cpp unit/precompute/nearest_codeword_test.cpp
           unit/precompute/field_caster_test.cpp unit/precompute/codebook_training_test.cpp
   LIBS af_precompute)
+
+af_add_mpi_test(
+  field_file_test
+  SOURCES mpi/field_file_test.cpp
+  LIBS af_io_field af_io_basics MPI::MPI_C PkgConfig::hdf5_openmpi
+  RANKS 1 2 3 4)

@@ -1,0 +1,417 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/field_file.h"
+
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+#include "base/hash_random.h"
+#include "io/field_file_hdf5.h"
+#include "io/sha256.h"
+#include "support/test_paths.h"
+
+namespace af {
+namespace {
+
+constexpr std::uint64_t kSeed = 5;
+
+/// A folder that all ranks share; rank 0 makes and removes it.
+class SharedFolder {
+ public:
+  SharedFolder() {
+    std::string path;
+    if (world_.is_root()) {
+      folder_ = std::make_unique<test::ScratchFolder>();
+      path = folder_->path().string();
+    }
+    world_.broadcast(path);
+    path_ = path;
+  }
+  std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
+
+ private:
+  Communicator world_ = Communicator::world();
+  std::unique_ptr<test::ScratchFolder> folder_;
+  std::filesystem::path path_;
+};
+
+/// Two slabs of odd and even sizes; numbers chosen to be exact.
+CompressedAttenuationField small_field() {
+  CompressedAttenuationField field;
+  CameraGeometry& camera = field.identity.camera;
+  camera.name = "AP";
+  camera.source_point = {0.0, -650.0, 0.0};
+  camera.detector_origin_point = {-150.0, 370.0, 150.0};
+  camera.row_direction = {0.0, 0.0, -1.0};
+  camera.pixel_spacing_mm = {1.25, 1.25};
+  camera.size_px = {256, 256};
+  field.identity.frame.center_ct_mm = {1.0, 2.0, 3.0};
+  field.identity.range.max_rotation_rad = 0.125;
+  field.identity.ct_content_sha256 = std::string(64, 'a');
+  field.light_slab.slab_from_ct.translation() = Eigen::Vector3d(0.5, 0.25, -4.0);
+  field.light_slab.uv_plane_y_mm = 650.0;
+  field.light_slab.u = {-280.0, 280.0, 7};
+  field.light_slab.v = {-270.0, 270.0, 6};
+  SlabGeometry slab;
+  slab.s = {-260.0, 250.0, 21};
+  slab.t = {-240.0, 230.0, 24};
+  slab.stored_s = {2, 19};
+  slab.stored_t = {4, 12};
+  slab.y_high_mm = 10.0;
+  field.light_slab.slabs.push_back(slab);
+  slab.st_plane_y_mm = 40.0;
+  slab.y_low_mm = 10.0;
+  slab.y_high_mm = std::numeric_limits<double>::infinity();
+  slab.stored_s = {0, 4};
+  slab.stored_t = {6, 18};
+  field.light_slab.slabs.push_back(slab);
+  field.quantizer_step = 0.00390625f;
+  for (std::uint16_t i = 0; i < 50; ++i) {
+    Tile tile{};
+    tile.fill(static_cast<std::uint16_t>(3 * i));
+    field.codebook.codewords.push_back(tile);
+  }
+  return field;
+}
+
+std::uint16_t index_at(const std::array<int, 4>& tile, std::size_t slab) {
+  const auto key =
+      static_cast<std::uint64_t>(((tile[0] * 64 + tile[1]) * 64 + tile[2]) * 64 + tile[3]);
+  return static_cast<std::uint16_t>(hash64(kSeed, slab, key) % 50);
+}
+
+/// The slab's tiles in blocks of at most 1 x 2 x 3 x all tiles.
+std::vector<IndexBlock> all_blocks(const CompressedAttenuationField& field) {
+  std::vector<IndexBlock> blocks;
+  for (std::size_t k = 0; k < field.light_slab.slabs.size(); ++k) {
+    const SlabGeometry& slab = field.light_slab.slabs[k];
+    for (int a = 0; a < field.tiles_u(); ++a)
+      for (int b = 0; b < field.tiles_v(); b += 2)
+        for (int c = 0; c < slab.stored_s.tiles(); c += 3) {
+          IndexBlock block;
+          block.slab = k;
+          block.first_tile = {a, b, c, 0};
+          block.tile_count = {1,
+                              std::min(2, field.tiles_v() - b),
+                              std::min(3, slab.stored_s.tiles() - c),
+                              slab.stored_t.tiles()};
+          for (int j = 0; j < block.tile_count[1]; ++j)
+            for (int s = 0; s < block.tile_count[2]; ++s)
+              for (int t = 0; t < block.tile_count[3]; ++t)
+                block.indices.push_back(index_at({a, b + j, c + s, t}, k));
+          blocks.push_back(std::move(block));
+        }
+  }
+  return blocks;
+}
+
+/// Every rank's part; the last of several ranks has none.
+std::vector<IndexBlock> dealt(const std::vector<IndexBlock>& blocks, const Communicator& world) {
+  const int dealt_to = std::max(1, world.size() - 1);
+  std::vector<IndexBlock> mine;
+  for (std::size_t i = 0; i < blocks.size(); ++i)
+    if (static_cast<int>(hash64(kSeed, i) % static_cast<std::uint64_t>(dealt_to)) == world.rank())
+      mine.push_back(blocks[i]);
+  return mine;
+}
+
+FieldProvenance some_provenance() {
+  return {"0.1.0", "af-precompute --ct x", "seed = 1\n", "{\"ranks\": 1}"};
+}
+
+FieldFileInfo write(const CompressedAttenuationField& field, const std::filesystem::path& path) {
+  const Communicator world = Communicator::world();
+  return write_field(field, dealt(all_blocks(field), world), some_provenance(), path, world);
+}
+
+/// Runs `edit` on the file on rank 0.
+void edit_file(const std::filesystem::path& path, const std::function<void(hid_t)>& edit) {
+  const Communicator world = Communicator::world();
+  if (world.is_root()) {
+    const hdf5::Handle file = hdf5::open_file(path, H5F_ACC_RDWR);
+    edit(file);
+  }
+  world.barrier();
+}
+
+/// The message of the FileError that reading the file gives on this rank; fails the test when there
+/// is none.
+std::string refusal(const std::filesystem::path& path) {
+  try {
+    read_field(path, Communicator::world());
+  } catch (const Error& error) {
+    EXPECT_EQ(error.exit_code(), ExitCode::File) << error.what();
+    return error.what();
+  }
+  ADD_FAILURE() << path << " was read";
+  return "";
+}
+
+TEST(FieldFile, ReadsBackWhatRanksWroteTogether) {
+  const SharedFolder folder;
+  const CompressedAttenuationField field = small_field();
+  const FieldFileInfo written = write(field, folder / "a.af.h5");
+  EXPECT_FALSE(std::filesystem::exists(folder / "a.af.h5.partial"));
+  FieldFileInfo info;
+  const auto read = read_field(folder / "a.af.h5", Communicator::world(), &info);
+  EXPECT_EQ(info.payload_sha256, written.payload_sha256);
+  EXPECT_EQ(info.file_bytes, written.file_bytes);
+  EXPECT_EQ(info.payload_bytes, written.payload_bytes);
+  EXPECT_EQ(info.provenance.command_line, some_provenance().command_line);
+  EXPECT_EQ(info.provenance.provenance_json, some_provenance().provenance_json);
+  EXPECT_EQ(read->codebook.codewords, field.codebook.codewords);
+  EXPECT_EQ(read->quantizer_step, field.quantizer_step);
+  EXPECT_EQ(read->identity.camera.name, "AP");
+  EXPECT_EQ(read->identity.camera.size_px, field.identity.camera.size_px);
+  EXPECT_EQ(read->identity.ct_content_sha256, field.identity.ct_content_sha256);
+  EXPECT_EQ(read->identity.frame.center_ct_mm, field.identity.frame.center_ct_mm);
+  EXPECT_EQ(read->light_slab.slab_from_ct.matrix(), field.light_slab.slab_from_ct.matrix());
+  ASSERT_EQ(read->slabs.size(), 2u);
+  for (std::size_t k = 0; k < 2; ++k) {
+    const SlabGeometry& expected = field.light_slab.slabs[k];
+    const SlabGeometry& found = read->light_slab.slabs[k];
+    EXPECT_EQ(found.y_low_mm, expected.y_low_mm);
+    EXPECT_EQ(found.y_high_mm, expected.y_high_mm);
+    EXPECT_EQ(found.stored_s.begin, expected.stored_s.begin);
+    EXPECT_EQ(found.stored_t.count, expected.stored_t.count);
+    std::size_t next = 0;
+    for (int a = 0; a < field.tiles_u(); ++a)
+      for (int b = 0; b < field.tiles_v(); ++b)
+        for (int c = 0; c < expected.stored_s.tiles(); ++c)
+          for (int d = 0; d < expected.stored_t.tiles(); ++d)
+            ASSERT_EQ(read->slabs[k].indices[next++], index_at({a, b, c, d}, k));
+  }
+}
+
+TEST(FieldFile, PayloadHashIsTheSameOnEveryRankCount) {
+  const SharedFolder folder;
+  // Frozen: made by this test on one rank with format version 1.
+  EXPECT_EQ(write(small_field(), folder / "a.af.h5").payload_sha256, "FROZEN");
+}
+
+TEST(FieldFile, MissingBlocksAreNoticedAndLeaveNoFile) {
+  const SharedFolder folder;
+  const Communicator world = Communicator::world();
+  const CompressedAttenuationField field = small_field();
+  auto blocks = all_blocks(field);
+  // The indices that nobody wrote read as 0; drop a block that is not all 0.
+  blocks.erase(blocks.begin() + 3);
+  bool is_thrown = false;
+  try {
+    write_field(field, dealt(blocks, world), some_provenance(), folder / "a.af.h5", world);
+  } catch (const Error& error) {
+    is_thrown = error.exit_code() == ExitCode::File;
+  }
+  EXPECT_TRUE(is_thrown);
+  world.barrier();
+  EXPECT_FALSE(std::filesystem::exists(folder / "a.af.h5"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "a.af.h5.partial"));
+}
+
+TEST(FieldFile, AnUnwritableFolderIsAFileErrorOnEveryRank) {
+  const Communicator world = Communicator::world();
+  const CompressedAttenuationField field = small_field();
+  bool is_thrown = false;
+  try {
+    write_field(
+        field, dealt(all_blocks(field), world), some_provenance(), "/nowhere/a.af.h5", world);
+  } catch (const Error& error) {
+    is_thrown = error.exit_code() == ExitCode::File;
+  }
+  EXPECT_TRUE(is_thrown);
+}
+
+TEST(FieldFile, RefusesWhatIsNotAField) {
+  const SharedFolder folder;
+  const Communicator world = Communicator::world();
+  if (world.is_root()) {
+    std::ofstream(folder / "empty");
+    std::ofstream(folder / "text") << "not HDF5, whatever it says\n";
+    hdf5::create_file(folder / "other.h5");
+    std::filesystem::create_directory(folder / "folder");
+  }
+  world.barrier();
+  EXPECT_NE(refusal(folder / "missing").find("no such file"), std::string::npos);
+  EXPECT_NE(refusal(folder / "empty").find("is empty"), std::string::npos);
+  EXPECT_NE(refusal(folder / "text").find("not an HDF5 file"), std::string::npos);
+  EXPECT_NE(refusal(folder / "folder").find("not a file"), std::string::npos);
+  EXPECT_NE(refusal(folder / "other.h5").find("format"), std::string::npos);
+}
+
+TEST(FieldFile, RefusesATruncatedFileOfAnyLength) {
+  const SharedFolder folder;
+  const Communicator world = Communicator::world();
+  write(small_field(), folder / "a.af.h5");
+  const auto size = std::filesystem::file_size(folder / "a.af.h5");
+  for (const std::uintmax_t kept :
+       {size - 1, size / 2, size / 8, std::uintmax_t{512}, std::uintmax_t{9}}) {
+    if (world.is_root()) {
+      std::filesystem::copy_file(
+          folder / "a.af.h5", folder / "cut", std::filesystem::copy_options::overwrite_existing);
+      std::filesystem::resize_file(folder / "cut", kept);
+    }
+    world.barrier();
+    refusal(folder / "cut");
+    world.barrier();
+  }
+}
+
+TEST(FieldFile, ADamagedByteIsRefusedOrWithoutEffect) {
+  const SharedFolder folder;
+  const Communicator world = Communicator::world();
+  const FieldFileInfo sound = write(small_field(), folder / "a.af.h5");
+  const auto size = std::filesystem::file_size(folder / "a.af.h5");
+  int refused = 0;
+  constexpr int kDamages = 60;
+  for (int i = 0; i < kDamages; ++i) {
+    if (world.is_root()) {
+      std::filesystem::copy_file(
+          folder / "a.af.h5", folder / "bad", std::filesystem::copy_options::overwrite_existing);
+      std::fstream file(folder / "bad", std::ios::in | std::ios::out | std::ios::binary);
+      const auto position =
+          static_cast<std::streamoff>(hash64(kSeed, static_cast<std::uint64_t>(i)) % size);
+      file.seekg(position);
+      const int byte = file.get();
+      file.seekp(position);
+      file.put(static_cast<char>(byte ^ 0x55));
+    }
+    world.barrier();
+    try {
+      FieldFileInfo info;
+      read_field(folder / "bad", world, &info);
+      // Then the byte lay in unused space, in an attribute nobody relies on, or in provenance.
+      EXPECT_EQ(info.payload_sha256, sound.payload_sha256);
+    } catch (const Error& error) {
+      EXPECT_EQ(error.exit_code(), ExitCode::File) << error.what();
+      ++refused;
+    }
+    world.barrier();
+  }
+  EXPECT_GT(refused, kDamages / 4);
+}
+
+TEST(FieldFile, RefusesAnUnknownVersion) {
+  const SharedFolder folder;
+  write(small_field(), folder / "a.af.h5");
+  edit_file(folder / "a.af.h5", [](hid_t file) {
+    H5Adelete(file, "format_version");
+    hdf5::write_int_attribute(file, "format_version", 2);
+  });
+  const std::string message = refusal(folder / "a.af.h5");
+  EXPECT_NE(message.find("format_version: expected 1, found 2"), std::string::npos) << message;
+}
+
+TEST(FieldFile, RefusesAMissingDataset) {
+  const SharedFolder folder;
+  for (const char* name :
+       {"/codebook/codewords", "/geometry/uv_nodes", "/field/slab_1", "/identity"}) {
+    write(small_field(), folder / "a.af.h5");
+    edit_file(folder / "a.af.h5", [&](hid_t file) { H5Ldelete(file, name, H5P_DEFAULT); });
+    refusal(folder / "a.af.h5");
+  }
+}
+
+/// Replaces a dataset of a sound file by another of the same name.
+void replace(hid_t file, const field_layout::Dataset& dataset) {
+  H5Ldelete(file, dataset.rule.name.c_str(), H5P_DEFAULT);
+  hdf5::write_dataset(file, dataset, sha256_hex(dataset.bytes));
+}
+
+TEST(FieldFile, RefusesAnotherTypeOrExtent) {
+  using field_layout::ElementType;
+  const SharedFolder folder;
+  const std::vector<field_layout::DatasetRule> wrong = {
+      {"/geometry/uv_nodes", ElementType::Float64, {2}, false, "1", "x"},
+      {"/geometry/uv_nodes", ElementType::Int32, {3}, false, "1", "x"},
+      {"/geometry/slab_from_ct", ElementType::Float64, {16}, false, "mm", "x"},
+      {"/codebook/codewords", ElementType::UInt16, {70000, 16}, false, "level", "x"},
+      {"/codebook/codewords", ElementType::UInt16, {50, 15}, false, "level", "x"},
+      {"/identity/camera_name", ElementType::Int32, {1}, false, "1", "x"},
+      {"/identity/camera_name", ElementType::Text, {5000}, false, "1", "x"},
+      {"/field/slab_0", ElementType::UInt16, {4, 3, 10, 7}, false, "codeword", "x"},
+      {"/field/slab_0", ElementType::Int32, {4, 3, 10, 6}, false, "codeword", "x"}};
+  for (const auto& rule : wrong) {
+    write(small_field(), folder / "a.af.h5");
+    edit_file(folder / "a.af.h5", [&](hid_t file) {
+      std::size_t bytes = field_layout::element_bytes(rule.type);
+      for (const std::uint64_t extent : rule.extents) bytes *= extent;
+      replace(file, {rule, std::vector<std::byte>(bytes)});
+    });
+    const std::string message = refusal(folder / "a.af.h5");
+    EXPECT_NE(message.find(rule.name), std::string::npos) << message;
+  }
+}
+
+TEST(FieldFile, RefusesAChangedValueWhoseOwnHashWasMended) {
+  const SharedFolder folder;
+  CompressedAttenuationField other = small_field();
+  other.light_slab.u.first_mm -= 1.0;
+  write(small_field(), folder / "a.af.h5");
+  edit_file(folder / "a.af.h5", [&](hid_t file) {
+    for (const auto& dataset : field_layout::datasets_of(other))
+      if (dataset.rule.name == "/geometry/u_extent_mm") replace(file, dataset);
+  });
+  EXPECT_NE(refusal(folder / "a.af.h5").find("payload_sha256"), std::string::npos);
+}
+
+TEST(FieldFile, RefusesContentsThatMakeNoSenseThoughAllHashesAgree) {
+  const SharedFolder folder;
+  const auto refusal_of = [&](const std::function<void(CompressedAttenuationField&)>& spoil) {
+    CompressedAttenuationField field = small_field();
+    spoil(field);
+    write(field, folder / "a.af.h5");
+    return refusal(folder / "a.af.h5");
+  };
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const double infinity = std::numeric_limits<double>::infinity();
+  refusal_of([&](auto& field) { field.light_slab.u.first_mm = nan; });
+  refusal_of([&](auto& field) { field.light_slab.slabs[1].s.last_mm = infinity; });
+  refusal_of([&](auto& field) { field.light_slab.slabs[1].y_low_mm = nan; });
+  refusal_of([&](auto& field) { field.light_slab.slab_from_ct.matrix()(0, 0) = 2.0; });
+  refusal_of([&](auto& field) { field.identity.camera.source_point.x() = nan; });
+  refusal_of([&](auto& field) { field.identity.camera.size_px.x() = -4; });
+  refusal_of([&](auto& field) { field.identity.frame.rotation(0, 0) = -1.0; });
+  refusal_of([&](auto& field) { field.identity.range.max_rotation_rad = -1.0; });
+  refusal_of([&](auto& field) { field.identity.mu_water_per_mm = 0.0; });
+  refusal_of([&](auto& field) { field.quantizer_step = 0.0f; });
+  refusal_of([&](auto& field) { field.quantizer_step = std::numeric_limits<float>::quiet_NaN(); });
+  refusal_of(
+      [&](auto& field) { std::swap(field.codebook.codewords[1], field.codebook.codewords[9]); });
+  refusal_of([&](auto& field) { field.codebook.codewords[0][3] = 1; });
+  const std::string message = refusal_of([&](auto& field) { field.codebook.codewords.resize(20); });
+  EXPECT_NE(message.find("indices below the 20 codewords"), std::string::npos) << message;
+}
+
+TEST(FieldFile, RefusesHugeExtentsBeforeItAsksForMemory) {
+  const SharedFolder folder;
+  const Communicator world = Communicator::world();
+  CompressedAttenuationField huge = small_field();
+  huge.light_slab.u.nodes = huge.light_slab.v.nodes = 65536;
+  SlabGeometry& slab = huge.light_slab.slabs[0];
+  slab.s.nodes = slab.t.nodes = 65536;
+  slab.stored_s = slab.stored_t = {0, 65536};
+  write(small_field(), folder / "a.af.h5");
+  edit_file(folder / "a.af.h5", [&](hid_t file) {
+    for (const auto& dataset : field_layout::datasets_of(huge)) replace(file, dataset);
+  });
+  const std::string message = refusal(folder / "a.af.h5");
+  EXPECT_NE(message.find("a file of"), std::string::npos) << message;
+  // Counts that would overflow a product, or that are negative.
+  for (const std::array<int, 2>& nodes : {std::array{2000000000, 2000000000}, {-6, 24}, {1, 24}}) {
+    CompressedAttenuationField odd = small_field();
+    odd.light_slab.slabs[0].s.nodes = nodes[0];
+    odd.light_slab.slabs[0].stored_s.count = nodes[1];
+    edit_file(folder / "a.af.h5", [&](hid_t file) {
+      for (const auto& dataset : field_layout::datasets_of(odd)) replace(file, dataset);
+    });
+    refusal(folder / "a.af.h5");
+  }
+  world.barrier();
+}
+
+}  // namespace
+}  // namespace af
