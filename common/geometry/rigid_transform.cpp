@@ -51,11 +51,15 @@ Eigen::Matrix3d rotation_from_angles(const Eigen::Vector3d& rotation_rad) {
 Eigen::Vector3d angles_from_rotation(const Eigen::Matrix3d& rotation) {
   const double cos_y = std::hypot(rotation(0, 0), rotation(1, 0));
   const double angle_y = std::atan2(-rotation(2, 0), cos_y);
-  constexpr double kGimbalLock = 1e-9;
-  if (cos_y < kGimbalLock) return {std::atan2(-rotation(1, 2), rotation(1, 1)), angle_y, 0.0};
-  return {std::atan2(rotation(2, 1), rotation(2, 2)),
-          angle_y,
-          std::atan2(rotation(1, 0), rotation(0, 0))};
+  constexpr double kGimbalLock = 1e-12;
+  const double angle_z = cos_y < kGimbalLock ? 0.0 : std::atan2(rotation(1, 0), rotation(0, 0));
+  // rx from what rz leaves over, Rz^-1 R = Ry Rx: near gimbal lock rz is badly determined, and rx
+  // then makes up for its error.
+  const double sin_z = std::sin(angle_z);
+  const double cos_z = std::cos(angle_z);
+  const double angle_x = std::atan2(sin_z * rotation(0, 2) - cos_z * rotation(1, 2),
+                                    cos_z * rotation(1, 1) - sin_z * rotation(0, 1));
+  return {angle_x, angle_y, angle_z};
 }
 
 RigidTransform pose_from_parameters(const PoseFrame& frame, const PoseParameters& parameters) {
