@@ -8,3 +8,8 @@ af_add_test(
           unit/evaluate/statistics_test.cpp
           unit/evaluate/drr_comparison_test.cpp
   LIBS af_evaluation)
+
+af_add_test(
+  evaluate_figures_test
+  SOURCES unit/evaluate/figures_test.cpp
+  LIBS af_evaluation_figures af_io_figure af_io_basics)

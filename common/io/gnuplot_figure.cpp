@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/gnuplot_figure.h"
+
+#include <array>
+#include <cerrno>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <fcntl.h>
+#include <filesystem>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "base/error.h"
+#include "io/csv_table.h"
+#include "io/output_file.h"
+
+extern char** environ;
+
+namespace af {
+namespace {
+
+constexpr const char* kNotFound =
+    "the program 'gnuplot' cannot be run; on Debian: apt-get install gnuplot-nox";
+
+/// A temporary file that ends with this object.
+class TemporaryFile {
+ public:
+  TemporaryFile() {
+    std::string name = (std::filesystem::temp_directory_path() / "af-figure-XXXXXX").string();
+    const int descriptor = mkstemp(name.data());
+    if (descriptor < 0)
+      throw FileError(name, std::string("cannot be created: ") + std::strerror(errno));
+    close(descriptor);
+    path_ = name;
+  }
+  ~TemporaryFile() {
+    std::error_code ignored;
+    std::filesystem::remove(path_, ignored);
+  }
+  TemporaryFile(const TemporaryFile&) = delete;
+  TemporaryFile& operator=(const TemporaryFile&) = delete;
+
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+/// Exit status of "gnuplot ARGUMENT", its output going to `log`; throws when it cannot be started.
+int run_gnuplot(const std::string& argument, const std::filesystem::path& log) {
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+  posix_spawn_file_actions_addopen(
+      &actions, STDOUT_FILENO, log.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
+  posix_spawn_file_actions_adddup2(&actions, STDOUT_FILENO, STDERR_FILENO);
+  // -d: no personal or system-wide settings.
+  std::array<std::string, 3> words = {"gnuplot", "-d", argument};
+  std::array<char*, 4> arguments = {words[0].data(), words[1].data(), words[2].data(), nullptr};
+  pid_t process = 0;
+  const int error = posix_spawnp(&process, "gnuplot", &actions, nullptr, arguments.data(), environ);
+  posix_spawn_file_actions_destroy(&actions);
+  if (error != 0) throw FileError("gnuplot", kNotFound);
+  int status = 0;
+  while (waitpid(process, &status, 0) < 0)
+    if (errno != EINTR)
+      throw FileError("gnuplot", std::string("was lost: ") + std::strerror(errno));
+  return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+}
+
+void run_script(const std::string& script, const std::filesystem::path& figure) {
+  const TemporaryFile script_file;
+  const TemporaryFile log;
+  write_text_file(script_file.path(), script);
+  const int status = run_gnuplot(script_file.path().string(), log.path());
+  if (status == 0) return;
+  throw FileError(
+      figure.string(),
+      "gnuplot failed with status " + std::to_string(status) + ": " + read_text_file(log.path()));
+}
+
+void replace_first(std::string& text, const std::string& from, const std::string& to) {
+  const std::size_t position = text.find(from);
+  if (position != std::string::npos) text.replace(position, from.size(), to);
+}
+
+std::string xml_escaped(std::string_view text) {
+  std::string result;
+  for (const char character : text) {
+    if (character == '&')
+      result += "&amp;";
+    else if (character == '<')
+      result += "&lt;";
+    else
+      result += character;
+  }
+  return result;
+}
+
+/// gnuplot writes colours as rgb(...), with and without blanks; this makes the neutral ones follow
+/// the reader's colour scheme.
+constexpr const char* kDarkStyle =
+    "<style>@media (prefers-color-scheme: dark) {"
+    "[fill='rgb(31,41,51)'], [fill='rgb( 31,  41,  51)'] { fill: #DDE4EC }"
+    "[stroke='rgb( 31,  41,  51)'] { stroke: #93A1B2 }"
+    "[fill='rgb(107,122,140)'] { fill: #A9B5C3 }"
+    "[stroke='rgb(107, 122, 140)'] { stroke: #A9B5C3 }"
+    "[stroke='rgb(216, 222, 230)'] { stroke: #364352 }"
+    "}</style>\n";
+
+void finish_svg(const std::filesystem::path& path, const std::string& title) {
+  std::string svg = read_text_file(path);
+  replace_first(
+      svg, "<title>Gnuplot</title>", "<title>" + xml_escaped(title) + "</title>\n" + kDarkStyle);
+  write_text_file(path, svg);
+}
+
+}  // namespace
+
+std::string gnuplot_quoted(std::string_view text) {
+  std::string result = "'";
+  for (const char character : text) {
+    if (character == '\'')
+      result += "''";
+    else
+      result += static_cast<unsigned char>(character) < 0x20 ? ' ' : character;
+  }
+  return result + "'";
+}
+
+void require_gnuplot() {
+  const TemporaryFile log;
+  if (run_gnuplot("--version", log.path()) != 0) throw FileError("gnuplot", kNotFound);
+}
+
+GnuplotFigure::GnuplotFigure(std::string title, int width_px, int height_px)
+    : title_(std::move(title)), width_px_(width_px), height_px_(height_px) {}
+
+void GnuplotFigure::add_data(const std::string& name,
+                             const std::vector<std::vector<double>>& rows) {
+  body_ += "$" + name + " << END_OF_DATA\n";
+  for (const std::vector<double>& row : rows) {
+    for (std::size_t i = 0; i < row.size(); ++i) {
+      check(!std::isinf(row[i]), "a figure's data are finite or NaN");
+      body_ += (i == 0 ? "" : " ") + (std::isnan(row[i]) ? "NaN" : number_text(row[i]));
+    }
+    body_ += '\n';
+  }
+  body_ += "END_OF_DATA\n";
+}
+
+void GnuplotFigure::add(const std::string& script_lines) {
+  body_ += script_lines + "\n";
+}
+
+std::string GnuplotFigure::script(const std::string& terminal,
+                                  const std::filesystem::path& output) const {
+  const std::string ink = "rgb '" + std::string(palette::kInk) + "'";
+  const std::string grid = "rgb '" + std::string(palette::kGrid) + "'";
+  return "set encoding utf8\nset terminal " + terminal + "\nset output " +
+         gnuplot_quoted(output.string()) + "\nset datafile missing 'NaN'\nset border 3 lc " + ink +
+         "\nset xtics nomirror out scale 0.6 textcolor " + ink +
+         "\nset ytics nomirror out scale 0.6 textcolor " + ink + "\nset grid ytics lt 1 lc " +
+         grid + " dt 1 lw 1\nset key textcolor " + ink + "\nset title " + gnuplot_quoted(title_) +
+         " textcolor " + ink + "\nset xlabel textcolor " + ink + "\nset ylabel textcolor " + ink +
+         "\n" + body_;
+}
+
+void GnuplotFigure::write(const std::filesystem::path& path_without_extension) const {
+  const std::string width = std::to_string(width_px_);
+  const std::string height = std::to_string(height_px_);
+  const std::filesystem::path svg = path_without_extension.string() + ".svg";
+  const std::filesystem::path png = path_without_extension.string() + ".png";
+  write_atomically(svg, [&](const std::filesystem::path& partial) {
+    run_script(script("svg size " + width + "," + height +
+                          " dynamic noenhanced font 'DejaVu Sans,Helvetica,sans-serif,14'",
+                      partial),
+               svg);
+    finish_svg(partial, title_);
+  });
+  write_atomically(png, [&](const std::filesystem::path& partial) {
+    run_script(script("pngcairo size " + std::to_string(2 * width_px_) + "," +
+                          std::to_string(2 * height_px_) +
+                          " noenhanced font 'DejaVu Sans,11' fontscale 2 linewidth 2 pointscale 2 "
+                          "background '#FFFFFF'",
+                      partial),
+               png);
+  });
+}
+
+}  // namespace af

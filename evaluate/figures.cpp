@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluate/figures.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <string_view>
+
+#include "base/hash_random.h"
+#include "evaluate/statistics.h"
+#include "io/csv_table.h"
+#include "io/gnuplot_figure.h"
+
+namespace af::evaluation {
+namespace {
+
+constexpr int kWidthPx = 760;
+constexpr int kHeightPx = 460;
+
+std::string color_of(std::size_t group) {
+  constexpr std::array<std::string_view, 6> kColors = {palette::kBlue,
+                                                       palette::kVermilion,
+                                                       palette::kGreen,
+                                                       palette::kPurple,
+                                                       palette::kSkyBlue,
+                                                       palette::kOrange};
+  return "rgb '" + std::string(kColors[group % kColors.size()]) + "'";
+}
+
+std::string quiet() {
+  return "rgb '" + std::string(palette::kQuiet) + "'";
+}
+
+std::string label_at(const std::string& text, const std::string& position, const char* side) {
+  return "set label " + gnuplot_quoted(text) + " at " + position + " " + side + " textcolor " +
+         quiet() + " font ',11'";
+}
+
+std::vector<double> finite_of(const std::vector<double>& values) {
+  std::vector<double> result;
+  std::copy_if(values.begin(), values.end(), std::back_inserter(result), [](double value) {
+    return std::isfinite(value);
+  });
+  return result;
+}
+
+/// "a, b" of a plot command's parts.
+std::string joined(const std::vector<std::string>& parts) {
+  std::string result;
+  for (const std::string& part : parts) result += (result.empty() ? "" : ", \\\n  ") + part;
+  return result;
+}
+
+std::vector<double> box_row(double x, std::vector<double> values) {
+  const SampleSummary summary = summarize(std::move(values));
+  return {x,
+          summary.lower_quartile,
+          summary.percentile_5,
+          summary.percentile_95,
+          summary.upper_quartile,
+          summary.median};
+}
+
+/// The bar that a TRE falls into, 0.25 mm wide; the last is for all beyond and for NaN.
+constexpr double kBarWidthMm = 0.25;
+constexpr std::size_t kBars = 20;
+
+std::size_t bar_of(double tre_mm) {
+  const double position = tre_mm / kBarWidthMm;
+  return position < static_cast<double>(kBars) ? static_cast<std::size_t>(position) : kBars;
+}
+
+}  // namespace
+
+void draw_psnr_boxes(const std::vector<PsnrGroup>& groups,
+                     const std::filesystem::path& path_without_extension) {
+  GnuplotFigure figure("DRR quality: field against ray casting",
+                       std::max(460, 240 + 170 * static_cast<int>(groups.size())),
+                       kHeightPx);
+  std::vector<std::vector<double>> boxes;
+  std::string tics;
+  double lowest = 35.0;
+  double highest = 45.0;
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    const auto x = static_cast<double>(g + 1);
+    tics += (g == 0 ? "" : ", ") + gnuplot_quoted(groups[g].label) + " " + std::to_string(g + 1);
+    const std::vector<double> values = finite_of(groups[g].psnr_db);
+    std::vector<std::vector<double>> dots;
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      HashRandom jitter(g, i);
+      dots.push_back({x + jitter.uniform(-0.13, 0.13), values[i]});
+      lowest = std::min(lowest, values[i] - 1.0);
+      highest = std::max(highest, values[i] + 1.0);
+    }
+    figure.add_data("dots" + std::to_string(g), dots);
+    if (!values.empty()) boxes.push_back(box_row(x, values));
+  }
+  figure.add_data("boxes", boxes);
+  const std::string right_edge = number_text(static_cast<double>(groups.size()) + 0.6);
+  figure.add("unset key\nset ylabel 'PSNR (dB)'\nset xtics (" + tics + ")\nset xrange [0.4:" +
+             right_edge + "]\nset yrange [" + number_text(std::floor(lowest)) + ":" +
+             number_text(std::ceil(highest)) + "]\nset rmargin 15\nset boxwidth 0.42");
+  const std::array<std::pair<int, const char*>, 3> levels = {
+      {{43, "43: paper's medians"}, {40, "40: almost all above"}, {36, "36: very few below"}}};
+  for (const auto& [level, text] : levels) {
+    const std::string y = std::to_string(level);
+    figure.add("set arrow from graph 0, first " + y + " to graph 1, first " + y +
+               " nohead dt 2 lw 1 lc " + quiet());
+    figure.add(label_at(text, "graph 1.01, first " + y, "left"));
+  }
+  std::vector<std::string> parts;
+  for (std::size_t g = 0; g < groups.size(); ++g)
+    parts.push_back("$dots" + std::to_string(g) + " using 1:2 with points pt 7 ps 0.35 lc rgb '" +
+                    std::string(palette::kSkyBlue) + "'");
+  parts.push_back("$boxes using 1:2:3:4:5 with candlesticks whiskerbars 0.5 lw 2 lc " +
+                  color_of(0));
+  parts.push_back("$boxes using 1:6:6:6:6 with candlesticks lw 4 lc " + color_of(1));
+  figure.add("set style fill empty\nplot " + joined(parts));
+  figure.write(path_without_extension);
+}
+
+void draw_success_rates(const std::vector<OutcomeGroup>& groups,
+                        int intervals,
+                        double width_mm,
+                        const std::filesystem::path& path_without_extension) {
+  GnuplotFigure figure("Success against initial error", kWidthPx, kHeightPx);
+  std::vector<std::string> parts;
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    std::vector<std::vector<double>> rows;
+    const double shift_mm =
+        width_mm * 0.12 * (static_cast<double>(g) - (static_cast<double>(groups.size()) - 1) / 2);
+    for (const IntervalSuccess& interval :
+         success_per_interval(groups[g].outcomes, intervals, width_mm)) {
+      if (interval.trials == 0) continue;
+      rows.push_back({(interval.low_mm + interval.high_mm) / 2 + shift_mm,
+                      100 * interval.rate(),
+                      100 * interval.wilson.low,
+                      100 * interval.wilson.high});
+    }
+    const std::string name = "rates" + std::to_string(g);
+    figure.add_data(name, rows);
+    parts.push_back("$" + name + " using 1:2 with lines lw 1.5 dt 3 lc " + color_of(g) +
+                    " notitle");
+    parts.push_back("$" + name + " using 1:2:3:4 with yerrorbars lw 2 pt " +
+                    std::to_string(g == 0 ? 7 : 5) + " ps 0.8 lc " + color_of(g) + " title " +
+                    gnuplot_quoted(groups[g].label));
+  }
+  figure.add("set xlabel 'initial TRE (mm)'\nset ylabel 'TRE below " + number_text(kSuccessTreMm) +
+             " mm (% of starts, 95 % interval)'\nset xrange [0:" +
+             number_text(intervals * width_mm) + "]\nset xtics " + number_text(width_mm) +
+             "\nset yrange [0:102]\nset ytics 20\nset key bottom left reverse Left samplen 1.5\n"
+             "plot " +
+             joined(parts));
+  figure.write(path_without_extension);
+}
+
+void draw_tre_histogram(const std::vector<OutcomeGroup>& groups,
+                        const std::filesystem::path& path_without_extension) {
+  GnuplotFigure figure("Error after registration", kWidthPx, kHeightPx);
+  std::vector<std::string> parts;
+  const auto group_count = static_cast<double>(groups.size());
+  const double bar_mm = 0.84 * kBarWidthMm / group_count;
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    std::array<double, kBars + 1> counts{};
+    for (const TreOutcome& outcome : groups[g].outcomes) counts[bar_of(outcome.tre_mm)] += 1.0;
+    std::vector<std::vector<double>> rows;
+    for (std::size_t bar = 0; bar <= kBars; ++bar) {
+      // The bar for all beyond stands half a millimetre apart.
+      const double center_mm =
+          (static_cast<double>(bar) + 0.5) * kBarWidthMm + (bar == kBars ? 0.25 : 0.0);
+      const auto total = static_cast<double>(groups[g].outcomes.size());
+      rows.push_back({center_mm + bar_mm * (static_cast<double>(g) - (group_count - 1) / 2),
+                      total > 0 ? 100 * counts[bar] / total : 0.0});
+    }
+    const std::string name = "bars" + std::to_string(g);
+    figure.add_data(name, rows);
+    parts.push_back("$" + name + " using 1:2 with boxes fs solid 0.9 noborder lc " + color_of(g) +
+                    " title " + gnuplot_quoted(groups[g].label));
+  }
+  const double end_mm = static_cast<double>(kBars) * kBarWidthMm;
+  figure.add("set boxwidth " + number_text(bar_mm) +
+             "\nset xlabel 'TRE (mm)'\nset ylabel 'share of starts (%)'\nset xrange [0:" +
+             number_text(end_mm + 0.7) + "]\nset yrange [0:*]\nset xtics 0.5\nset xtics add ('> " +
+             number_text(end_mm) + "' " + number_text(end_mm + 0.375) + ", '' " +
+             number_text(end_mm) + ")\nset key top right samplen 1.5\nset arrow from first " +
+             number_text(kSuccessTreMm) + ", graph 0 to first " + number_text(kSuccessTreMm) +
+             ", graph 1 nohead dt 2 lw 1.5 lc " + quiet());
+  figure.add(label_at("success: below " + number_text(kSuccessTreMm) + " mm",
+                      "first " + number_text(kSuccessTreMm) + ", graph 0.97",
+                      "right offset -0.7,0"));
+  figure.add("plot " + joined(parts));
+  figure.write(path_without_extension);
+}
+
+void draw_tre_scatter(const std::vector<OutcomeGroup>& groups,
+                      double largest_initial_mm,
+                      const std::filesystem::path& path_without_extension) {
+  GnuplotFigure figure("Error before and after registration", kWidthPx, kHeightPx);
+  std::vector<std::string> parts;
+  // Below 0.05 mm nothing more is told apart; the axis ends there.
+  constexpr double kLowestMm = 0.05;
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    std::vector<std::vector<double>> rows;
+    for (const TreOutcome& outcome : groups[g].outcomes)
+      if (std::isfinite(outcome.tre_mm))
+        rows.push_back({outcome.initial_tre_mm, std::max(kLowestMm, outcome.tre_mm)});
+    const std::string name = "starts" + std::to_string(g);
+    figure.add_data(name, rows);
+    parts.push_back("$" + name + " using 1:2 with points pt " + std::to_string(g == 0 ? 6 : 2) +
+                    " ps 0.5 lw 1.5 lc " + color_of(g) + " title " +
+                    gnuplot_quoted(groups[g].label));
+  }
+  parts.push_back("x > " + number_text(kLowestMm) + " ? x : 1/0 with lines lw 1 dt 3 lc " +
+                  quiet() + " notitle");
+  figure.add(
+      "set xlabel 'initial TRE (mm)'\nset ylabel 'final TRE (mm)'\nset logscale y\n"
+      "set xrange [0:" +
+      number_text(largest_initial_mm) + "]\nset yrange [" + number_text(kLowestMm) +
+      ":*]\nset ytics (0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100)\nset key top left "
+      "reverse Left samplen 1\nset samples 400\nset arrow from graph 0, first " +
+      number_text(kSuccessTreMm) + " to graph 1, first " + number_text(kSuccessTreMm) +
+      " nohead dt 2 lw 1.5 lc " + quiet());
+  figure.add(label_at("success below", "graph 0.99, first 2.1", "right"));
+  figure.add(label_at(
+      "no change", "graph 0.985, first " + number_text(largest_initial_mm * 1.25), "right"));
+  figure.add("plot " + joined(parts));
+  figure.write(path_without_extension);
+}
+
+}  // namespace af::evaluation
