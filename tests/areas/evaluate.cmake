@@ -11,5 +11,5 @@ af_add_test(
 
 af_add_test(
   evaluate_figures_test
-  SOURCES unit/evaluate/figures_test.cpp
+  SOURCES unit/evaluate/figure_files_test.cpp
   LIBS af_evaluation_figures af_io_figure af_io_basics)

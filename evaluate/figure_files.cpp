@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "evaluate/figures.h"
+#include "evaluate/figure_files.h"
 
 #include <algorithm>
 #include <array>
