@@ -26,10 +26,9 @@ FileError::FileError(const std::string& path,
                      const std::string& found)
     : FileError(path, object + ": expected " + expected + ", found " + found) {}
 
-void check(bool condition, const char* message, std::source_location where) {
-  if (condition) return;
-  throw std::logic_error(std::string(message) + " (" + where.file_name() + ":" +
-                         std::to_string(where.line()) + ")");
+void check(bool condition, const char* message, const char* file, int line) {
+  if (!condition)
+    throw std::logic_error(std::string(message) + " (" + file + ":" + std::to_string(line) + ")");
 }
 
 void throw_if_any(const std::vector<std::string>& problems, const std::string& file) {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <source_location>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -79,10 +78,13 @@ class RemoteError : public Error {
   RemoteError(ExitCode exit_code, const std::string& message) : Error(exit_code, message) {}
 };
 
-/// A broken promise of the caller (a defect, not bad input); becomes exit code 6.
+/// A broken promise of the caller (a defect, not bad input); becomes exit code 6. The builtins,
+/// which GCC and Clang share, stand where std::source_location would: Clang 14, whose tools check
+/// this code, does not have it.
 void check(bool condition,
            const char* message,
-           std::source_location where = std::source_location::current());
+           const char* file = __builtin_FILE(),
+           int line = __builtin_LINE());
 
 /// Throws one InputError that lists all problems, or does nothing when there is none.
 void throw_if_any(const std::vector<std::string>& problems, const std::string& file = "");

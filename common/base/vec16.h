@@ -113,7 +113,7 @@ AF_KERNEL_INLINE I16 gather_pairs(const uint16_t* base, I16 offset) {
   memcpy(&pairs, gathered, sizeof(pairs));
 #else
   for (int lane = 0; lane < kLanes; ++lane) {
-    int32_t pair;
+    int32_t pair = 0;
     memcpy(&pair, base + offset[lane], sizeof(pair));
     pairs[lane] = pair;
   }

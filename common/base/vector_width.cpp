@@ -27,8 +27,7 @@ VectorWidth width_from_environment(const char* text) {
 std::vector<VectorWidth> supported_vector_widths() {
   std::vector<VectorWidth> widths{VectorWidth::Bits128};
   __builtin_cpu_init();
-  const bool avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi2") &&
-                    __builtin_cpu_supports("f16c");
+  const bool avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi2");
   if (avx2) widths.push_back(VectorWidth::Bits256);
   if (avx2 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
       __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl") &&

@@ -44,7 +44,7 @@ endfunction()
 # that the linker keeps for everyone.
 function(af_add_kernel target source)
   set(flags_128 "")
-  set(flags_256 -mavx2 -mbmi -mbmi2 -mf16c)
+  set(flags_256 -mavx2 -mbmi -mbmi2)
   set(flags_512 ${flags_256} -mavx512f -mavx512bw -mavx512dq -mavx512vl -mavx512cd -mprefer-vector-width=512)
   get_filename_component(stem ${source} NAME_WE)
   foreach(bits 128 256 512)

@@ -39,10 +39,10 @@ FieldSample nearest_sample(const CompressedAttenuationField& field,
   const SlabGeometry& slab = light_slab.slabs[k];
   FieldSample sample;
   sample.value = static_cast<double>(field.node_value(k,
-                                                      nearest_node(nodes.u, light_slab.u.nodes),
-                                                      nearest_node(nodes.v, light_slab.v.nodes),
-                                                      nearest_node(nodes.s, slab.s.nodes),
-                                                      nearest_node(nodes.t, slab.t.nodes)));
+                                                      {nearest_node(nodes.u, light_slab.u.nodes),
+                                                       nearest_node(nodes.v, light_slab.v.nodes),
+                                                       nearest_node(nodes.s, slab.s.nodes),
+                                                       nearest_node(nodes.t, slab.t.nodes)}));
   return sample;
 }
 
@@ -64,7 +64,8 @@ FieldSample quadrilinear_sample(const CompressedAttenuationField& field,
       node[axis] = taps[axis].node + (is_upper ? 1 : 0);
       weight[axis] = is_upper ? taps[axis].weight : 1.0 - taps[axis].weight;
     }
-    const auto value = static_cast<double>(field.node_value(k, node[0], node[1], node[2], node[3]));
+    const auto value =
+        static_cast<double>(field.node_value(k, {node[0], node[1], node[2], node[3]}));
     sample.value += weight[0] * weight[1] * weight[2] * weight[3] * value;
     for (unsigned axis = 0; axis < 4; ++axis) {
       double others = (corner >> axis & 1u) != 0 ? value : -value;

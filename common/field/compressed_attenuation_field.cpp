@@ -35,10 +35,10 @@ std::size_t CompressedAttenuationField::tile_count(std::size_t slab) const {
          static_cast<std::size_t>(geometry.stored_t.tiles());
 }
 
-float CompressedAttenuationField::node_value(std::size_t slab, int u, int v, int s, int t) const {
+float CompressedAttenuationField::node_value(std::size_t slab, const NodeIndex& node) const {
   const SlabGeometry& geometry = light_slab.slabs[slab];
-  const int local_s = s - geometry.stored_s.begin;
-  const int local_t = t - geometry.stored_t.begin;
+  const int local_s = node.s - geometry.stored_s.begin;
+  const int local_t = node.t - geometry.stored_t.begin;
   if (local_s < 0 || local_t < 0 || local_s >= geometry.stored_s.count ||
       local_t >= geometry.stored_t.count)
     return 0.0f;
@@ -46,13 +46,13 @@ float CompressedAttenuationField::node_value(std::size_t slab, int u, int v, int
     return static_cast<std::size_t>(outer) * static_cast<std::size_t>(count) +
            static_cast<std::size_t>(inner);
   };
-  const std::size_t uv = at(u / 2, tiles_v(), v / 2);
+  const std::size_t uv = at(node.u / 2, tiles_v(), node.v / 2);
   const std::size_t st = at(local_s / 2, geometry.stored_t.tiles(), local_t / 2);
   const std::size_t st_tiles = static_cast<std::size_t>(geometry.stored_s.tiles()) *
                                static_cast<std::size_t>(geometry.stored_t.tiles());
   const Tile& tile = codebook.codewords[slabs[slab].indices[uv * st_tiles + st]];
-  const std::size_t element = tile_element(static_cast<unsigned>(u) & 1u,
-                                           static_cast<unsigned>(v) & 1u,
+  const std::size_t element = tile_element(static_cast<unsigned>(node.u) & 1u,
+                                           static_cast<unsigned>(node.v) & 1u,
                                            static_cast<unsigned>(local_s) & 1u,
                                            static_cast<unsigned>(local_t) & 1u);
   return quantizer_step * static_cast<float>(tile[element]);

@@ -31,6 +31,14 @@ struct CompressedSlab {
   SharedArray<std::uint16_t> indices;
 };
 
+/// A lattice node; s and t count over the uncropped lattice.
+struct NodeIndex {
+  int u = 0;
+  int v = 0;
+  int s = 0;
+  int t = 0;
+};
+
 /// A vector-quantised attenuation field: sum over slabs of decoded tiles times the quantiser step.
 struct CompressedAttenuationField {
   FieldIdentity identity;
@@ -44,7 +52,7 @@ struct CompressedAttenuationField {
   [[nodiscard]] std::size_t tile_count(std::size_t slab) const;
   /// Decoded total attenuation at a stored or unstored lattice node of one slab (0 outside the
   /// stored range).
-  [[nodiscard]] float node_value(std::size_t slab, int u, int v, int s, int t) const;
+  [[nodiscard]] float node_value(std::size_t slab, const NodeIndex& node) const;
 };
 
 /// Every inconsistency between geometry, codebook and index arrays (sizes, indices out of range);

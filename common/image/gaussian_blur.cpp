@@ -32,7 +32,7 @@ Image2d gaussian_blur(const Image2d& image, double sigma_px) {
     for (int column = 0; column < image.width; ++column) {
       double sum = 0.0;
       for (int i = -radius; i <= radius; ++i)
-        sum += kernel[static_cast<std::size_t>(i + radius)] *
+        sum += kernel[static_cast<std::size_t>(i) + static_cast<std::size_t>(radius)] *
                static_cast<double>(image.at(std::clamp(column + i, 0, image.width - 1), row));
       along_rows.at(column, row) = static_cast<float>(sum);
     }
@@ -40,7 +40,7 @@ Image2d gaussian_blur(const Image2d& image, double sigma_px) {
     for (int column = 0; column < image.width; ++column) {
       double sum = 0.0;
       for (int i = -radius; i <= radius; ++i)
-        sum += kernel[static_cast<std::size_t>(i + radius)] *
+        sum += kernel[static_cast<std::size_t>(i) + static_cast<std::size_t>(radius)] *
                static_cast<double>(along_rows.at(column, std::clamp(row + i, 0, image.height - 1)));
       blurred.at(column, row) = static_cast<float>(sum);
     }

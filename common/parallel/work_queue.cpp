@@ -30,7 +30,7 @@ class Ledger {
   /// Blocks shrink towards the end so that ranks finish together.
   Block take_fair_share() {
     const std::scoped_lock lock(mutex_);
-    return take(std::max<std::int64_t>(1, (count_ - next_) / (4 * ranks_)));
+    return take(std::max<std::int64_t>(1, (count_ - next_) / (std::int64_t{4} * ranks_)));
   }
   Block take_one() {
     const std::scoped_lock lock(mutex_);

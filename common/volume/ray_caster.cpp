@@ -120,7 +120,7 @@ void RayCaster::cast(const RayFan& fan, std::span<float> total_attenuation) cons
       kernels_128::sum_bundle, kernels_256::sum_bundle, kernels_512::sum_bundle);
   const auto mu_per_mm_per_unit = static_cast<float>(volume_.model().mu_per_mm_per_unit());
 
-  RayBundle bundle;
+  RayBundle bundle{};
   std::array<float, RayBundle::kRays> weights_mm{};
   std::array<float, RayBundle::kRays> sums{};
   std::size_t next = 0;

@@ -175,10 +175,10 @@ TEST(AfDrr, ValuesOutsideTheStoredRangeAreZero) {
   slab.stored_s = {4, 2};
   std::vector<std::uint16_t> indices(cropped->tile_count(0), std::uint16_t{1});
   cropped->slabs[0].indices = SharedArray<std::uint16_t>(indices);
-  EXPECT_EQ(cropped->node_value(0, 0, 0, 3, 0), 0.0f);
-  EXPECT_EQ(cropped->node_value(0, 0, 0, 4, 0), 2.0f);
-  EXPECT_EQ(cropped->node_value(0, 0, 0, 5, 0), 2.0f);
-  EXPECT_EQ(cropped->node_value(0, 0, 0, 6, 0), 0.0f);
+  EXPECT_EQ(cropped->node_value(0, {0, 0, 3, 0}), 0.0f);
+  EXPECT_EQ(cropped->node_value(0, {0, 0, 4, 0}), 2.0f);
+  EXPECT_EQ(cropped->node_value(0, {0, 0, 5, 0}), 2.0f);
+  EXPECT_EQ(cropped->node_value(0, {0, 0, 6, 0}), 0.0f);
 }
 
 TEST(AfDrr, GradientsAgreeWithCentralDifferences) {
