@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -53,6 +54,15 @@ std::vector<float> cast_by_itk(const ItkImage::Pointer& image, const RayFan& fan
   return values;
 }
 
+double median_difference(const std::vector<float>& a, const std::vector<float>& b) {
+  std::vector<double> differences(a.size());
+  for (std::size_t i = 0; i < a.size(); ++i)
+    differences[i] = std::abs(static_cast<double>(a[i]) - static_cast<double>(b[i]));
+  const auto middle = differences.begin() + static_cast<std::ptrdiff_t>(differences.size() / 2);
+  std::nth_element(differences.begin(), middle, differences.end());
+  return *middle;
+}
+
 /// A real patient's CT, reordered to identity direction for ITK's caster.
 CtVolume real_ct_in_identity_direction() {
   CtVolume ct = read_ct(AF_DEFAULT_CT_PATH);
@@ -102,18 +112,19 @@ TEST(RayCaster, AgreesWithItksRayCasterOnARealCt) {
                      kSide};
     const std::vector<float> by_itk = cast_by_itk(image, fan);
     std::vector<float> ours(by_itk.size());
-    // ITK interpolates bilinearly on one voxel plane per crossing, a trapezoid rule with steps of a
-    // voxel (0.96 to 1.5 mm) along the ray's main axis; on CTs such rules lie 75 dB or more from a
-    // fine trilinear integral. A shift of the frame by half a voxel, the usual mistake, would cost
-    // 40 dB.
-    constexpr double kFineDb = 65.0;
     fine.cast(fan, ours);
-    EXPECT_GT(psnr(ours, by_itk)->psnr_db, kFineDb);
-    // The default step of 1 mm undersamples the finest structures; its own error is below -60 dB.
-    constexpr double kUsualDb = 58.0;
+    // ITK interpolates bilinearly on one voxel plane per crossing, a rule that on smooth tissue
+    // differs from the fine trilinear integral by far less than one sample: mu * step = 0.02 * 1.5
+    // mm, times 5 % curvature.
+    constexpr double kMedianDifference = 1.5e-3;
+    EXPECT_LT(median_difference(ours, by_itk), kMedianDifference);
+    // It also cuts a ray's ends to whole planes, which loses up to one sample of bone (0.05 * 1.5
+    // mm = 0.075 of U = 5) where this CT ends in the neck: should a tenth of the rays lose half of
+    // that, 52 dB are left. A frame shifted by half a voxel, the usual mistake, costs far more.
+    constexpr double kLeastDb = 52.0;
+    EXPECT_GT(psnr(ours, by_itk)->psnr_db, kLeastDb);
     usual.cast(fan, ours);
-    EXPECT_GT(psnr(ours, by_itk)->psnr_db, kUsualDb);
-    RecordProperty("fine_psnr_db", std::to_string(psnr(ours, by_itk)->psnr_db));
+    EXPECT_GT(psnr(ours, by_itk)->psnr_db, kLeastDb);
   }
 }
 
