@@ -81,12 +81,14 @@ std::filesystem::path field_path_of(const StudyCase& study_case,
 void require_known_field_cameras(const StudyCase& study_case, const CaseLoadOptions& options) {
   std::string known;
   for (const StudyView& view : study_case.views) known += (known.empty() ? "" : ", ") + view.camera;
-  for (const auto& [camera, path] : options.field_paths) {
-    const bool found = std::any_of(study_case.views.begin(),
-                                   study_case.views.end(),
-                                   [&](const StudyView& view) { return view.camera == camera; });
+  for (const auto& given : options.field_paths) {
+    const bool found =
+        std::any_of(study_case.views.begin(), study_case.views.end(), [&](const StudyView& view) {
+          return view.camera == given.first;
+        });
     if (!found)
-      throw InputError("field", camera + "=" + path.string(), "camera must be one of " + known);
+      throw InputError(
+          "field", given.first + "=" + given.second.string(), "camera must be one of " + known);
   }
 }
 

@@ -5,6 +5,7 @@
 #include "base/error.h"
 #include "cli/app_main.h"
 #include "cli/progress_printer.h"
+#include "io/csv_table.h"
 #include "io/output_file.h"
 #include "io/study_file.h"
 #include "register/multi_start_program.h"
@@ -57,7 +58,7 @@ void bind_method(CLI::App& app, RegisterOptions& options) {
   app.add_option("--smoothing-sigma-mm",
                  options.smoothing_sigma_mm,
                  "First pass: Gaussian on the X-rays, mm on the isocentre plane (preset: " +
-                     std::to_string(paper_passes().front().smoothing_sigma_mm).substr(0, 4) + ")");
+                     af::number_text(paper_passes().front().smoothing_sigma_mm) + ")");
   app.add_option("--max-evaluations",
                  options.max_evaluations,
                  "Most poses tried per registration (preset: " +
@@ -75,7 +76,7 @@ void bind_options(CLI::App& app, RegisterOptions& options) {
   app.add_option("--field",
                  options.fields,
                  "CAMERA=FIELD.h5, once per camera; replaces the study's `field`")
-      ->take_all();
+      ->allow_extra_args(false);
   bind_method(app, options);
   bind_start(app, options);
   app.add_option("--water-mu-per-mm",

@@ -96,12 +96,7 @@ CaseLoadOptions case_load_options(const RegisterOptions& options) {
 }
 
 std::vector<RigidTransform> start_poses(const RegisterOptions& options, const PoseFrame& frame) {
-  if (!options.starts.empty()) {
-    std::vector<RigidTransform> starts = read_poses_csv(options.starts, frame);
-    if (starts.empty())
-      throw InputError("starts", "no row", "must hold at least one start", options.starts.string());
-    return starts;
-  }
+  if (!options.starts.empty()) return read_poses_csv(options.starts, frame);
   if (!options.start_pose.empty()) return {read_pose(options.start_pose)};
   std::array<double, 6> values{};
   for (std::size_t i = 0; i < 3; ++i) {

@@ -95,7 +95,7 @@ ObjectiveView prepare_view(const RegistrationProblem& problem,
   reference.used = used_pixels(view);
   reference.drr_range = drr_range;
   std::vector<std::string> found = problems(reference);
-  for (std::string& text : found) text = view_name(view) + text;
+  for (std::string& text : found) text.insert(0, view_name(view));
   throw_if_any(found);
   return {view.view, view.renderer, make_similarity(options.similarity, reference), view.limit};
 }

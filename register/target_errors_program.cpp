@@ -5,7 +5,8 @@
 #include <string>
 
 #include "evaluate/fiducial_registration.h"
-#include "register/parameter_scaling.h"
+#include "evaluate/target_box.h"
+#include "evaluate/tre.h"
 
 namespace af::registration {
 namespace {
@@ -30,15 +31,6 @@ std::optional<GoldPose> gold_pose(const Study& study, const StudyCase& study_cas
   return std::nullopt;
 }
 
-/// Mean distance between where two poses put the target box's points.
-double mean_distance_mm(const std::vector<Eigen::Vector3d>& points_ct,
-                        const RigidTransform& a,
-                        const RigidTransform& b) {
-  double sum = 0.0;
-  for (const Eigen::Vector3d& point : points_ct) sum += (a * point - b * point).norm();
-  return sum / static_cast<double>(points_ct.size());
-}
-
 }  // namespace
 
 void add_target_errors(const Study& study,
@@ -46,12 +38,12 @@ void add_target_errors(const Study& study,
                        std::vector<RegistrationRecord>& records) {
   const std::optional<GoldPose> gold = gold_pose(study, study_case);
   if (!gold.has_value()) return;
-  const std::vector<Eigen::Vector3d> points = ct_lattice_points(study_case.target_box_ct);
+  const std::vector<Eigen::Vector3d> points = evaluation::target_points(study_case.target_box_ct);
   for (RegistrationRecord& record : records)
-    record.errors =
-        TargetErrors{gold->source,
-                     mean_distance_mm(points, gold->room_from_ct, record.result.start_room_from_ct),
-                     mean_distance_mm(points, gold->room_from_ct, record.result.room_from_ct)};
+    record.errors = TargetErrors{
+        gold->source,
+        evaluation::mean_tre_mm(record.result.start_room_from_ct, gold->room_from_ct, points),
+        evaluation::mean_tre_mm(record.result.room_from_ct, gold->room_from_ct, points)};
 }
 
 }  // namespace af::registration

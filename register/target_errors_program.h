@@ -8,7 +8,7 @@
 
 namespace af::registration {
 
-/// Fills in every record's TRE (mean distance over a 24 x 24 x 24 lattice of the target box) when
+/// Fills in every record's TRE (mean over the target box) when
 /// the study knows the case's gold pose: from its fiducials if it has any, else the one it states.
 void add_target_errors(const Study& study,
                        const StudyCase& study_case,

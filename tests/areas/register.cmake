@@ -8,3 +8,8 @@ af_add_test(
           unit/register/multi_view_objective_test.cpp
           unit/register/registration_test.cpp
   LIBS af_registration)
+af_add_test(
+  register_program_unit_tests
+  SOURCES unit/register/register_command_test.cpp unit/register/result_files_test.cpp
+  LIBS af_registration_program)
+af_add_mpi_test(register_mpi_tests SOURCES mpi/register/multi_start_mpi_test.cpp LIBS af_registration_program RANKS 1 2 3 4)

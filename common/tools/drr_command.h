@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "drr/drr_renderer.h"
+#include "parallel/communicator.h"
+
+namespace af::tools {
+
+/// The options of af-drr as typed.
+struct DrrOptions {
+  std::filesystem::path field;
+  std::filesystem::path ct;
+  std::string series_uid;
+  std::string rig;
+  std::string camera;
+  std::optional<std::array<double, 3>> rotation_deg;
+  std::optional<std::array<double, 3>> translation_mm;
+  std::filesystem::path pose;
+  std::filesystem::path poses;
+  std::string interpolation = "linear";
+  double water_mu_per_mm = 0.0200;
+  double step_mm = 1.0;
+  bool compare = false;
+  bool invert = false;
+  std::array<double, 2> window_percent = {0.5, 99.5};  ///< of PNG files
+  std::filesystem::path output;
+};
+
+/// All combinations and values that cannot be; empty when the options are sound.
+std::vector<std::string> problems(const DrrOptions& options);
+
+/// What renders, for which camera, and what pose parameters are relative to.
+struct DrrScene {
+  std::shared_ptr<const DrrRenderer> renderer;   ///< the field's, else the ray caster
+  std::shared_ptr<const DrrRenderer> reference;  ///< the ray caster, for --compare
+  View view;
+  PoseFrame frame;
+};
+
+/// Collective. Reads field, CT and rig. FileError when --compare's CT is not the field's.
+DrrScene load_scene(const DrrOptions& options, const Communicator& communicator);
+
+/// Poses in the order of the options or the CSV file.
+std::vector<RigidTransform> requested_poses(const DrrOptions& options, const PoseFrame& frame);
+
+/// DRRs of all poses; InputError when any ray of any pose is outside the field.
+std::vector<Image2d> render_poses(const DrrRenderer& renderer,
+                                  const View& view,
+                                  const std::vector<RigidTransform>& poses);
+
+/// One DRR, a stack of several, or a PNG, by the name's extension. Returns a line about it.
+std::string write_drrs(const std::vector<Image2d>& drrs,
+                       const View& view,
+                       const DrrOptions& options);
+
+/// Field, ray cast and difference of one pose in one PNG. Returns the PSNR in words.
+std::string write_comparison(const DrrScene& scene,
+                             const RigidTransform& room_from_ct,
+                             const std::filesystem::path& path);
+
+}  // namespace af::tools

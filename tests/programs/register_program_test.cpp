@@ -1,0 +1,245 @@
+// SPDX-License-Identifier: Apache-2.0
+// af-register and af-drr as a user meets them: files, exit codes, messages.
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "io/csv_table.h"
+#include "io/image_file.h"
+#include "programs/small_study.h"
+#include "support/run_program.h"
+#include "support/test_paths.h"
+
+namespace af {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string program(const std::string& name) {
+  return std::string(AF_PROGRAM_FOLDER "/") + name;
+}
+
+/// One study and its fields for all tests of this file.
+class ProgramTest : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = new test::ScratchFolder();
+    test::write_small_study(folder_->path());
+    for (const char* camera : {"AP", "LAT"}) {
+      const test::ProgramRun run = test::run_command(
+          program("af-precompute") + " --study " + path("study.toml") + " --camera " + camera +
+          " --max-rotation-deg 8 --max-translation-mm 12 --uv-nodes 24 --st-nodes 96"
+          " --codewords 1024 -o " +
+          path(std::string(camera) + ".af.h5"));
+      ASSERT_EQ(run.exit_code, 0) << run.output;
+    }
+  }
+  static void TearDownTestSuite() { delete folder_; }
+
+  static std::string path(const std::string& name) { return (*folder_ / name).string(); }
+  static std::string fields() {
+    return " --field AP=" + path("AP.af.h5") + " --field LAT=" + path("LAT.af.h5");
+  }
+  static test::ProgramRun run_register(const std::string& arguments) {
+    return test::run_command(program("af-register") + " --study " + path("study.toml") + " " +
+                             arguments);
+  }
+  static test::ProgramRun run_drr(const std::string& arguments) {
+    return test::run_command(program("af-drr") + " " + arguments);
+  }
+  static nlohmann::json result(const std::string& folder) {
+    std::ifstream file(path(folder + "/result.json"));
+    return nlohmann::json::parse(file);
+  }
+  static void expect_refused(const test::ProgramRun& run, int exit_code, const std::string& part) {
+    EXPECT_EQ(run.exit_code, exit_code) << run.output;
+    EXPECT_NE(run.output.find(part), std::string::npos) << "no '" << part << "' in\n" << run.output;
+  }
+
+ private:
+  static inline test::ScratchFolder* folder_ = nullptr;
+};
+
+/// The 36 x 36 pixels of 2 mm at the isocentre see half a millimetre at best through a small field.
+constexpr double kFieldTreMm = 1.0;
+/// See registration_test.cpp: the X-rays are this very ray caster's DRRs.
+constexpr double kRayCastTreMm = 0.5;
+
+class RegisterProgram : public ProgramTest {};
+
+TEST_F(RegisterProgram, RegistersByFieldAndByRayCasting) {
+  const std::string start =
+      " --bins 24 --start-rotation-deg -1,0.5,2.5 --start-translation-mm 0.5,1,4 ";
+  const test::ProgramRun by_field = run_register(fields() + start + "-o " + path("by-field"));
+  ASSERT_EQ(by_field.exit_code, 0) << by_field.output;
+  EXPECT_GT(result("by-field").at("initial_tre_mm").get<double>(), 3.0);
+  EXPECT_LT(result("by-field").at("tre_mm").get<double>(), kFieldTreMm);
+  const test::ProgramRun by_casting =
+      run_register("--renderer raycast" + start + "-o " + path("by-casting"));
+  ASSERT_EQ(by_casting.exit_code, 0) << by_casting.output;
+  EXPECT_LT(result("by-casting").at("tre_mm").get<double>(), kRayCastTreMm);
+  for (const char* name :
+       {"pose.toml", "result.tfm", "AP-overlay.png", "LAT-overlay.png", "reproduce.sh"})
+    EXPECT_TRUE(fs::exists(path("by-field/" + std::string(name)))) << name;
+  const nlohmann::json provenance = result("by-field").at("provenance");
+  EXPECT_EQ(provenance.at("inputs").size(), 5U) << provenance;  // CT, two fields, two X-rays
+}
+
+TEST_F(RegisterProgram, ManyStartsGiveTheSameRowsOnAnyRankCount) {
+  std::ofstream(path("starts.csv")) << "rx_deg,ry_deg,rz_deg,tx_mm,ty_mm,tz_mm\n0,0,0,0,0,0\n"
+                                       "1,1,1,1,1,1\n-1,2,0,3,0,2\n40,0,0,0,0,0\n0,0,2,0,-3,0\n";
+  const std::string arguments = fields() + " --max-evaluations 80 --starts " + path("starts.csv");
+  ASSERT_EQ(run_register(arguments + " -o " + path("serial")).exit_code, 0);
+  const test::ProgramRun shared = test::run_command(
+      "OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 mpirun -n 3 --oversubscribe " +
+      program("af-register") + " --study " + path("study.toml") + arguments + " -o " +
+      path("shared"));
+  ASSERT_EQ(shared.exit_code, 0) << shared.output;
+  const CsvTable a = CsvTable::read(path("serial/registrations.csv"));
+  const CsvTable b = CsvTable::read(path("shared/registrations.csv"));
+  ASSERT_EQ(a.row_count(), 5U);
+  ASSERT_EQ(b.row_count(), 5U);
+  for (std::size_t row = 0; row < 5; ++row)
+    for (const std::string& column : a.columns())
+      if (column != "seconds") {
+        EXPECT_EQ(a.text(row, column), b.text(row, column)) << row << ' ' << column;
+      }
+  EXPECT_EQ(a.text(3, "stop_reason"), "start-inadmissible");
+}
+
+TEST_F(RegisterProgram, RefusesAFieldOfAnotherCamera) {
+  const test::ProgramRun run =
+      run_register("--field AP=" + path("LAT.af.h5") + " --field LAT=" + path("LAT.af.h5") +
+                   " -o " + path("refused"));
+  expect_refused(run, 4, "camera 'AP' of the field");
+  EXPECT_FALSE(fs::exists(path("refused/result.json")));
+}
+
+TEST_F(RegisterProgram, RefusesAFieldOfAnotherCtAndNamesBothHashes) {
+  const test::ScratchFolder other;
+  for (const char* name : {"study.toml", "rig.toml", "AP.mha", "LAT.mha"})
+    fs::copy_file(path(name), other / name);
+  CtVolume ct = test::five_ellipsoids();
+  std::vector<std::int16_t> hu(ct.hu.view().begin(), ct.hu.view().end());
+  hu[100] = 7;
+  ct.hu = SharedArray<std::int16_t>(hu);
+  write_ct(ct, other / "ct.nii.gz");
+  const std::string command = program("af-register") + " --study " +
+                              (other / "study.toml").string() + fields() + " --max-evaluations 20" +
+                              " -o " + (other / "out").string();
+  const test::ProgramRun run = test::run_command(command);
+  expect_refused(run, 4, ct_content_sha256(ct));
+  EXPECT_NE(run.output.find(ct_content_sha256(test::five_ellipsoids())), std::string::npos);
+  // Told not to look, it does not; nor does the CT need to be there.
+  fs::remove(other / "ct.nii.gz");
+  const test::ProgramRun unchecked = test::run_command(command + " --skip-ct-check");
+  EXPECT_EQ(unchecked.exit_code, 0) << unchecked.output;
+  EXPECT_NE(unchecked.output.find("warning"), std::string::npos) << unchecked.output;
+}
+
+TEST_F(RegisterProgram, RefusesWhatDoesNotExist) {
+  const std::string out = " -o " + path("refused");
+  expect_refused(run_register(fields() + " --similarity gc" + out), 2, "mi");
+  expect_refused(run_register(fields() + " --optimizer bobyqa" + out), 2, "best-neighbor");
+  expect_refused(run_register(fields() + " --preset fast" + out), 2, "paper");
+  expect_refused(run_register(fields() + " --no-such-option" + out), 2, "no-such-option");
+  expect_refused(run_register(fields()), 2, "--output");
+  expect_refused(run_register(fields() + " --case nobody" + out), 3, "ellipsoids");
+  expect_refused(run_register(out), 3, "--field AP=");
+  expect_refused(run_register("--field X=a.h5" + out), 3, "AP, LAT");
+  expect_refused(run_register("--field AP" + out), 3, "CAMERA=PATH");
+  expect_refused(run_register(fields() + " --bins 1" + out), 3, "bins = 1");
+  expect_refused(
+      run_register(fields() + " --start-pose a --starts b" + out), 3, "given in several ways");
+  expect_refused(run_register(fields() + " --starts " + path("absent.csv") + out), 4, "absent.csv");
+  expect_refused(
+      run_register("--field AP=" + path("ct.nii.gz") + " --field LAT=" + path("LAT.af.h5") + out),
+      4,
+      "ct.nii.gz");
+  EXPECT_FALSE(fs::exists(path("refused/result.json")));
+}
+
+TEST_F(RegisterProgram, AStartOutsideTheFieldIsReportedNotFatal) {
+  const test::ProgramRun run =
+      run_register(fields() + " --start-translation-mm 0,0,13 -o " + path("outside"));
+  EXPECT_EQ(run.exit_code, 0) << run.output;
+  EXPECT_NE(run.output.find("start-inadmissible"), std::string::npos) << run.output;
+  EXPECT_TRUE(result("outside").at("similarity").is_null());
+}
+
+class DrrProgram : public ProgramTest {};
+
+TEST_F(DrrProgram, WritesTheSameDrrInEveryFormat) {
+  const std::string source = "--ct " + path("ct.nii.gz") + " --rig " + path("rig.toml") +
+                             " --camera AP --rotation-deg -5,3,2 --translation-mm 1,-2,3 -o ";
+  ASSERT_EQ(run_drr(source + path("drr.mha")).exit_code, 0);
+  const Image2d reference = read_image(path("drr.mha"));
+  EXPECT_EQ(reference.width, 48);
+  for (const char* name : {"drr.nii.gz", "drr.nrrd", "drr.tif"}) {
+    const test::ProgramRun run = run_drr(source + path(name));
+    ASSERT_EQ(run.exit_code, 0) << run.output;
+    EXPECT_EQ(read_image(path(name)).pixels, reference.pixels) << name;
+  }
+}
+
+TEST_F(DrrProgram, PngIsBrightWhereTheBodyIsUnlessInverted) {
+  const std::string source =
+      "--ct " + path("ct.nii.gz") + " --rig " + path("rig.toml") + " --camera AP -o ";
+  ASSERT_EQ(run_drr(source + path("drr.png")).exit_code, 0);
+  ASSERT_EQ(run_drr(source + path("film.png") + " --invert").exit_code, 0);
+  const Image2d bright = read_image(path("drr.png"));
+  const Image2d film = read_image(path("film.png"));
+  EXPECT_EQ(bright.at(0, 0), 0.0f);
+  EXPECT_GT(bright.at(24, 24), 100.0f);
+  EXPECT_EQ(film.at(0, 0), 255.0f);
+  // Rounding of either scale.
+  EXPECT_NEAR(bright.at(24, 24) + film.at(24, 24), 255.0f, 1.0f);
+}
+
+TEST_F(DrrProgram, StacksPosesInOrder) {
+  std::ofstream(path("poses.csv")) << "rx_deg,ry_deg,rz_deg,tx_mm,ty_mm,tz_mm\n0,0,0,0,0,0\n"
+                                      "0,0,0,6,0,0\n2,0,0,0,0,0\n";
+  const test::ProgramRun run = run_drr("--field " + path("AP.af.h5") + " --poses " +
+                                       path("poses.csv") + " -o " + path("stack.mha"));
+  ASSERT_EQ(run.exit_code, 0) << run.output;
+  EXPECT_NE(run.output.find("48 x 48 x 3"), std::string::npos) << run.output;
+  EXPECT_GE(fs::file_size(path("stack.mha")), 3U * 48U * 48U * 4U);
+}
+
+TEST_F(DrrProgram, ComparesFieldAndRayCast) {
+  const test::ProgramRun run = run_drr("--compare --field " + path("AP.af.h5") + " --ct " +
+                                       path("ct.nii.gz") + " -o " + path("compare.png"));
+  ASSERT_EQ(run.exit_code, 0) << run.output;
+  EXPECT_NE(run.output.find("PSNR "), std::string::npos) << run.output;
+  EXPECT_TRUE(fs::exists(path("compare.png")));
+}
+
+TEST_F(DrrProgram, RefusesAPoseOutsideTheFieldWithTheRayCount) {
+  const test::ProgramRun run = run_drr("--field " + path("AP.af.h5") +
+                                       " --translation-mm 0,0,200 -o " + path("outside.mha"));
+  expect_refused(run, 3, "of 2304 rays miss its planes");
+  EXPECT_FALSE(fs::exists(path("outside.mha")));
+}
+
+TEST_F(DrrProgram, RefusesWhatDoesNotFit) {
+  const std::string field = "--field " + path("AP.af.h5");
+  const std::string ct = "--ct " + path("ct.nii.gz");
+  const std::string out = " -o " + path("refused.mha");
+  expect_refused(run_drr("-o a.mha"), 3, "give --field");
+  expect_refused(run_drr(field + " " + ct + out), 3, "only for --compare");
+  expect_refused(run_drr(ct + out), 3, "needs --rig and --camera");
+  expect_refused(run_drr(field + " --interpolation cubic" + out), 2, "nearest");
+  expect_refused(run_drr(field + " -o " + path("a.jpg")), 3, "must end in");
+  expect_refused(run_drr(field + " --compare" + out), 3, "needs both");
+  expect_refused(run_drr(field + " --rotation-deg 1,2" + out), 2, "--rotation-deg");
+  expect_refused(run_drr(field + " --pose " + path("absent.toml") + out), 4, "absent.toml");
+  expect_refused(run_drr(ct + " --rig treatment-room --camera Z" + out), 3, "A, B");
+  EXPECT_FALSE(fs::exists(path("refused.mha")));
+}
+
+}  // namespace
+}  // namespace af
