@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Included first by clang-tidy only: Debian's ITK headers accept no compiler but the GCC they were configured with.
+// Included first by clang-tidy only: Debian's ITK headers accept no compiler but the GCC they were
+// configured with.
 #if __has_include(<itk_compiler_detection.h>)
 #pragma push_macro("__clang__")
 #pragma push_macro("__GNUC__")
