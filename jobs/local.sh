@@ -19,7 +19,7 @@ skipped, so an interrupted run goes on where it stopped when the same command is
   --paper                   the paper's field parameters (64x64 viewpoints, 256x256 nodes, 16384 codewords, 10 deg,
                             100 mm) and 30 starts per interval, instead of the quick preset
   --starts-per-interval N   field registrations in each of the eight intervals of start error
-  --raycast-starts N        ray-cast registrations in each of the first two intervals
+  --raycast-starts N        how many of them, in each of the first two intervals, are repeated by ray casting
   --pose-count N            random poses whose DRRs are compared with ray casting, per field
   --ranks N                 MPI ranks                                                     [all cores]
   --seed N                  of everything random                                                  [1]
@@ -78,6 +78,8 @@ else
     --max-rotation-deg 10 --max-translation-mm 30)
   : "${starts_per_interval:=10}" "${raycast_starts:=2}" "${pose_count:=30}"
 fi
+((raycast_starts <= starts_per_interval)) ||
+  die 2 "--raycast-starts = $raycast_starts must not exceed --starts-per-interval = $starts_per_interval"
 
 # --- stages ------------------------------------------------------------------------------------------------------
 
@@ -136,7 +138,10 @@ run_stage() {
   fi
   rm -f "$stamp.done"
   if [[ ! -f "$stamp.started" || "$(<"$stamp.started")" != "$stage_chain" ]]; then
-    rm -rf "$result" "$result.progress" "$result.partial"
+    # A result inside a folder of its own takes that folder with it.
+    local old=$result
+    [[ "$(dirname "$result")" == "$output" ]] || old=$(dirname "$result")
+    rm -rf "$old" "$old.progress" "$old.partial"
   fi
   printf '%s\n' "$stage_chain" >"$stamp.started"
 
@@ -213,8 +218,8 @@ plan_stage field-A "$(parallel_seconds $field_seconds)" "Precompute the field of
 plan_stage field-B "$(parallel_seconds $field_seconds)" "Precompute the field of camera B"
 plan_stage image-quality-A "$(parallel_seconds $((pose_count / 2 + 2)))" "Compare $pose_count DRRs of field A with ray casting"
 plan_stage image-quality-B "$(parallel_seconds $((pose_count / 2 + 2)))" "Compare $pose_count DRRs of field B with ray casting"
-plan_stage registration-field "$(parallel_seconds $((8 * starts_per_interval)))" "Register $((8 * starts_per_interval)) starts with the fields"
-plan_stage registration-raycast "$(parallel_seconds $((2 * raycast_starts * 50)))" "Register $((2 * raycast_starts)) starts by ray casting"
+plan_stage registration "$(parallel_seconds $((8 * starts_per_interval * 1 + 2 * raycast_starts * 60)))" \
+  "Register $((8 * starts_per_interval)) starts with fields, $((2 * raycast_starts)) of them also by ray casting"
 plan_stage overlay 5 "Register one start and draw its overlays"
 plan_stage report 5 "Write the report"
 print_plan
@@ -225,10 +230,13 @@ if [[ -n "$default_ct_note" ]]; then
 fi
 study="$output/study/study.toml"
 if [[ -n "$phantom" ]]; then
-  run_stage "$study" "$bin/af-simulate" --phantom "$phantom" --rig treatment-room --seed "$seed" -o "$output/study"
+  run_stage "$study" "$bin/af-simulate" --phantom "$phantom" --rig treatment-room --seed "$seed" --force \
+    -o "$output/study"
 else
-  run_stage "$study" "$bin/af-simulate" --ct "$ct" --rig treatment-room --seed "$seed" -o "$output/study"
+  run_stage "$study" "$bin/af-simulate" --ct "$ct" --rig treatment-room --seed "$seed" --force \
+    -o "$output/study"
 fi
+[[ -z "$phantom" ]] || ct="$output/study/ct.nii.gz"
 case_name=$(sed -n 's/^ *name *= *"\(.*\)" *$/\1/p' "$study" | head -n 1)
 for camera in A B; do
   run_stage "$output/$camera.af.h5" run_ranks "$ranks" "$bin/af-precompute" --study "$study" --case "$case_name" \
@@ -239,10 +247,9 @@ for camera in A B; do
   run_stage "$output/image-quality-$camera/summary.json" run_ranks "$ranks" "$bin/af-evaluate" image-quality \
     --field "$output/$camera.af.h5" --ct "$ct" --pose-count "$pose_count" --seed "$seed" -o "$output/image-quality-$camera"
 done
-run_stage "$output/registration-field/summary.json" run_ranks "$ranks" "$bin/af-evaluate" registration --study "$study" \
-  "${fields[@]}" --renderer field --starts-per-interval "$starts_per_interval" --seed "$seed" -o "$output/registration-field"
-run_stage "$output/registration-raycast/summary.json" run_ranks "$ranks" "$bin/af-evaluate" registration --study "$study" \
-  --renderer raycast --starts-per-interval "$raycast_starts" --intervals 2 --seed "$seed" -o "$output/registration-raycast"
+run_stage "$output/registration/summary.json" run_ranks "$ranks" "$bin/af-evaluate" registration --study "$study" \
+  "${fields[@]}" --renderer both --starts-per-interval "$starts_per_interval" \
+  --raycast-starts-per-interval "$raycast_starts" --raycast-intervals 2 --seed "$seed" -o "$output/registration"
 run_stage "$output/overlay/result.json" "$bin/af-register" --study "$study" --case "$case_name" "${fields[@]}" \
   --start-rotation-deg 2,-2,2 --start-translation-mm 3,3,-3 -o "$output/overlay"
 run_stage "$output/report.html" "$bin/af-evaluate" report "$output" -o "$output/report.html"
