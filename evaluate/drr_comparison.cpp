@@ -2,6 +2,7 @@
 #include "evaluate/drr_comparison.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstddef>
 #include <string>
@@ -11,6 +12,8 @@
 
 namespace af::evaluation {
 namespace {
+
+using Clock = std::chrono::steady_clock;
 
 constexpr std::uint64_t kPoseStream = 0x706F7365;  // "pose"
 constexpr std::uint64_t kMostDraws = 1000;
@@ -60,14 +63,18 @@ DrrComparison DrrComparer::at_pose(const PoseFrame& frame, const PoseParameters&
   DrrComparison comparison;
   comparison.parameters = parameters;
   const RigidTransform room_from_ct = pose_from_parameters(frame, parameters);
+  const Clock::time_point start = Clock::now();
   reference_.render(room_from_ct, view_, *reference_workspace_, reference_image_.pixels);
+  const Clock::time_point between = Clock::now();
+  comparison.rays_outside =
+      tested_.render(room_from_ct, view_, *tested_workspace_, tested_image_.pixels).rays_outside;
+  comparison.reference_seconds = std::chrono::duration<double>(between - start).count();
+  comparison.tested_seconds = std::chrono::duration<double>(Clock::now() - between).count();
   const auto foreground = std::count_if(reference_image_.pixels.begin(),
                                         reference_image_.pixels.end(),
                                         [](float value) { return value != 0.0f; });
   comparison.foreground_fraction =
       static_cast<double>(foreground) / static_cast<double>(view_.pixel_count());
-  comparison.rays_outside =
-      tested_.render(room_from_ct, view_, *tested_workspace_, tested_image_.pixels).rays_outside;
   if (comparison.rays_outside > 0) return comparison;
   const std::optional<Psnr> quality = psnr(tested_image_.pixels, reference_image_.pixels);
   if (!quality.has_value()) return comparison;

@@ -33,6 +33,8 @@ struct DrrComparison {
   double largest_difference = std::numeric_limits<double>::quiet_NaN();  ///< absolute value
   double reference_maximum = std::numeric_limits<double>::quiet_NaN();   ///< I_max
   double foreground_fraction = std::numeric_limits<double>::quiet_NaN();
+  double tested_seconds = 0.0;  ///< wall time of the two DRRs
+  double reference_seconds = 0.0;
 };
 
 /// Compares two renderers of one view. One object per thread.

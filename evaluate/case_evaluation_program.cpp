@@ -1,0 +1,303 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluate/case_evaluation_program.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cmath>
+#include <exception>
+#include <utility>
+
+#include "base/error.h"
+#include "cli/app_main.h"
+#include "cli/progress_printer.h"
+#include "evaluate/row_gathering_program.h"
+#include "evaluate/target_box.h"
+#include "evaluate/tre.h"
+#include "io/output_file.h"
+#include "io/picture.h"
+#include "parallel/work_queue.h"
+#include "register/case_loading.h"
+#include "register/result_files.h"
+
+namespace af::evaluation {
+namespace {
+
+using nlohmann::json;
+using registration::RegistrationResult;
+using registration::RegistrationRunner;
+using registration::RendererKind;
+using registration::StopReason;
+
+/// One renderer's share of a case.
+struct Method {
+  std::string renderer;
+  RegistrationRunner runner;
+  std::vector<std::size_t> start_indices;
+};
+
+registration::RegistrationOptions registration_options(const RegistrationStudyOptions& options) {
+  registration::RegistrationOptions result = registration::preset_options(options.preset);
+  if (options.similarity.has_value()) result.similarity.name = *options.similarity;
+  if (options.optimizer.has_value()) result.optimizer = *options.optimizer;
+  throw_if_any(problems(result));
+  return result;
+}
+
+registration::CaseLoadOptions load_options(const RegistrationStudyOptions& options,
+                                           const std::string& renderer) {
+  registration::CaseLoadOptions result;
+  result.renderer = renderer == "field" ? RendererKind::Field : RendererKind::RayCast;
+  if (renderer == "field")
+    for (const std::string& text : options.fields) {
+      const std::size_t equals = text.find('=');
+      result.field_paths[text.substr(0, equals)] = text.substr(equals + 1);
+    }
+  result.ct.series_uid = options.series_uid;
+  result.water_mu_per_mm = options.water_mu_per_mm;
+  result.ray_caster.step_mm = options.step_mm;
+  return result;
+}
+
+/// Collective.
+std::vector<Method> load_methods(const RegistrationStudyOptions& options,
+                                 const Study& study,
+                                 const StudyCase& study_case,
+                                 const Communicator& world,
+                                 CaseEvaluation& evaluation) {
+  std::vector<Method> methods;
+  for (const std::string& renderer : options.renderers()) {
+    const registration::LoadedCase loaded =
+        registration::load_case(study, study_case, load_options(options, renderer), world);
+    for (const std::string& text : loaded.warnings) cli::warn(world, text);
+    for (const auto& [name, hash] : loaded.input_sha256)
+      evaluation.input_sha256[study_case.name + ": " + name] = hash;
+    RegistrationRunner runner = all_or_none(
+        world, [&] { return RegistrationRunner(loaded.problem, registration_options(options)); });
+    methods.push_back({renderer, std::move(runner), {}});
+  }
+  return methods;
+}
+
+/// Inside the motion range of every field in use.
+bool is_admissible(const std::vector<Method>& methods, const RigidTransform& room_from_ct) {
+  for (const Method& method : methods)
+    for (const registration::RegistrationView& view : method.runner.problem().views)
+      if (view.limit.has_value() &&
+          !view.limit->range.contains(parameters_from_pose(view.limit->frame, room_from_ct)))
+        return false;
+  return true;
+}
+
+StratifiedStarts draw_starts(const RegistrationStudyOptions& options,
+                             const StudyCase& study_case,
+                             const GoldStandard& gold,
+                             const std::vector<Method>& methods) {
+  const StartFrame frame = {
+      study_case.name, gold.room_from_ct, study_case.center_ct_mm, study_case.target_box_ct};
+  const StartOptions start_options = {
+      options.intervals, options.interval_width_mm, options.starts_per_interval, options.seed};
+  return stratified_starts(
+      frame,
+      start_options,
+      target_points(study_case.target_box_ct),
+      [&](const RigidTransform& pose) { return is_admissible(methods, pose); });
+}
+
+/// With both renderers, ray casting may be given fewer intervals and starts.
+void assign_starts(const RegistrationStudyOptions& options,
+                   const StratifiedStarts& starts,
+                   Method& method) {
+  const bool is_reduced = options.renderer == "both" && method.renderer == "raycast";
+  const int intervals =
+      is_reduced ? options.raycast_intervals.value_or(options.intervals) : options.intervals;
+  const int per_interval =
+      is_reduced ? options.raycast_starts_per_interval.value_or(options.starts_per_interval)
+                 : options.starts_per_interval;
+  for (std::size_t i = 0; i < starts.starts.size(); ++i)
+    if (starts.starts[i].interval < intervals && starts.starts[i].rank_in_interval < per_interval)
+      method.start_indices.push_back(i);
+}
+
+/// What rows are measured with.
+struct Yardstick {
+  PoseFrame gold_frame;
+  RigidTransform gold_room_from_ct;
+  std::optional<RigidTransform> stated_pose;  ///< only beside fiducials
+  std::vector<Eigen::Vector3d> points_ct_mm;
+};
+
+/// Whether a registration ended with a pose that means anything.
+bool has_pose(const RegistrationResult& result) {
+  return std::isfinite(result.similarity) && result.room_from_ct.matrix().allFinite();
+}
+
+void add_result(const RegistrationResult& result,
+                const Yardstick& yardstick,
+                RegistrationRow& row) {
+  row.evaluations = result.evaluations;
+  row.inadmissible = result.inadmissible;
+  row.drr_count = result.drr_count;
+  row.stop_reason = to_string(result.stop_reason);
+  row.seconds = result.seconds;
+  if (!has_pose(result)) return;
+  row.similarity = result.similarity;
+  row.final_deg_mm = parameters_from_pose(yardstick.gold_frame, result.room_from_ct).deg_and_mm();
+  row.tre_mm =
+      mean_tre_mm(result.room_from_ct, yardstick.gold_room_from_ct, yardstick.points_ct_mm);
+  if (yardstick.stated_pose.has_value())
+    row.stated_pose_tre_mm =
+        mean_tre_mm(result.room_from_ct, *yardstick.stated_pose, yardstick.points_ct_mm);
+}
+
+RegistrationRow registered_row(const std::string& case_name,
+                               Method& method,
+                               const StratifiedStarts& starts,
+                               std::size_t start_index,
+                               const Yardstick& yardstick) {
+  const PerturbedStart& start = starts.starts[start_index];
+  RegistrationRow row;
+  row.case_name = case_name;
+  row.renderer = method.renderer;
+  row.start_index = static_cast<std::int64_t>(start_index);
+  row.draw_index = start.draw_index;
+  row.interval = start.interval;
+  row.start_deg_mm = start.parameters.deg_and_mm();
+  row.initial_tre_mm = start.initial_tre_mm;
+  try {
+    add_result(method.runner.run(start.room_from_ct), yardstick, row);
+  } catch (const std::exception& error) {
+    row.stop_reason = "error";
+    row.error = error.what();
+  }
+  return row;
+}
+
+/// Collective. All rows on rank 0, by renderer and start index. Ray casting, the slow one, is
+/// handed out first, so that the ranks end together.
+std::vector<RegistrationRow> register_all(const std::string& case_name,
+                                          std::vector<Method>& methods,
+                                          const StratifiedStarts& starts,
+                                          const Yardstick& yardstick,
+                                          const Communicator& world) {
+  std::vector<std::pair<std::size_t, std::size_t>> items;  // method, start
+  for (std::size_t m = methods.size(); m-- > 0;)
+    for (const std::size_t index : methods[m].start_indices) items.emplace_back(m, index);
+  std::vector<json> mine;
+  const auto count = static_cast<double>(items.size());
+  cli::ProgressPrinter printer("registrations of case " + case_name, world.is_root());
+  for_each_item(
+      world,
+      static_cast<std::int64_t>(items.size()),
+      [&](std::int64_t item) {
+        const auto [m, index] = items[static_cast<std::size_t>(item)];
+        const std::size_t order = m * starts.starts.size() + index;
+        mine.push_back(packed_row(static_cast<std::int64_t>(order),
+                                  registered_row(case_name, methods[m], starts, index, yardstick)));
+      },
+      [&](std::int64_t done) { printer.update(static_cast<double>(done), count); });
+  std::vector<RegistrationRow> rows;
+  for (const json& packed : gather_rows(world, mine)) rows.push_back(row_of(packed));
+  return rows;
+}
+
+std::string file_name_part(std::string name) {
+  for (char& character : name) {
+    const auto code = static_cast<unsigned char>(character);
+    if (std::isalnum(code) == 0 && character != '-' && character != '_') character = '_';
+  }
+  return name;
+}
+
+void draw_xrays(const registration::RegistrationProblem& problem,
+                const std::filesystem::path& folder,
+                CaseEvaluation& evaluation) {
+  std::vector<PicturePanel> panels;
+  for (const registration::RegistrationView& view : problem.views) {
+    const auto [low, high] = percentile_window(view.xray);
+    panels.push_back({view.xray,
+                      low,
+                      high,
+                      "X-ray " + view.view.camera.name,
+                      "attenuation; the frame is the region of interest",
+                      PicturePanel::Colors::Grey,
+                      {view.view.roi}});
+  }
+  const std::string name = file_name_part(evaluation.case_name) + "-xrays.png";
+  write_picture(
+      panels, static_cast<int>(panels.size()), "Case " + evaluation.case_name, folder / name);
+  evaluation.pictures.push_back(
+      {{"file", name}, {"case", evaluation.case_name}, {"which", "xrays"}});
+}
+
+/// Overlays of the best, median and worst registration of the first renderer.
+void draw_overlays(const Method& method,
+                   const Yardstick& yardstick,
+                   const std::filesystem::path& folder,
+                   CaseEvaluation& evaluation) {
+  std::vector<const RegistrationRow*> by_tre;
+  for (const RegistrationRow& row : evaluation.rows)
+    if (row.renderer == method.renderer && std::isfinite(row.tre_mm)) by_tre.push_back(&row);
+  if (by_tre.empty()) return;
+  std::stable_sort(by_tre.begin(), by_tre.end(), [](const auto* a, const auto* b) {
+    return a->tre_mm < b->tre_mm;
+  });
+  const std::array<std::pair<const char*, std::size_t>, 3> chosen = {
+      {{"best", 0}, {"median", (by_tre.size() - 1) / 2}, {"worst", by_tre.size() - 1}}};
+  for (const auto& [which, position] : chosen) {
+    const RegistrationRow& row = *by_tre[position];
+    const RigidTransform pose = pose_from_parameters(
+        yardstick.gold_frame, PoseParameters::from_deg_and_mm(row.final_deg_mm));
+    for (const registration::RegistrationView& view : method.runner.problem().views) {
+      const std::string& camera = view.view.camera.name;
+      const std::string name = file_name_part(evaluation.case_name) + "-" + which + "-" +
+                               file_name_part(camera) + ".png";
+      registration::write_overlay(view,
+                                  pose,
+                                  evaluation.case_name + ", view " + camera + ", " + which +
+                                      " result: TRE " + fixed_text(row.tre_mm, 2) + " mm",
+                                  folder / name);
+      evaluation.pictures.push_back({{"file", name},
+                                     {"case", evaluation.case_name},
+                                     {"which", which},
+                                     {"camera", camera},
+                                     {"renderer", row.renderer},
+                                     {"start_index", row.start_index},
+                                     {"initial_tre_mm", row.initial_tre_mm},
+                                     {"tre_mm", row.tre_mm}});
+    }
+  }
+}
+
+}  // namespace
+
+CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
+                             const Study& study,
+                             const StudyCase& study_case,
+                             const Communicator& world,
+                             const std::function<void(const CaseEvaluation&)>& on_starts) {
+  CaseEvaluation evaluation;
+  evaluation.case_name = study_case.name;
+  std::vector<Method> methods = load_methods(options, study, study_case, world, evaluation);
+  all_or_none(world, [&] {
+    evaluation.gold = gold_standard(study, study_case, options.gold);
+    evaluation.starts = draw_starts(options, study_case, evaluation.gold, methods);
+    for (Method& method : methods) assign_starts(options, evaluation.starts, method);
+    on_starts(evaluation);
+  });
+  Yardstick yardstick;
+  yardstick.gold_room_from_ct = evaluation.gold.room_from_ct;
+  yardstick.gold_frame = PoseFrame::about(evaluation.gold.room_from_ct, study_case.center_ct_mm);
+  if (evaluation.gold.source == "fiducials") yardstick.stated_pose = evaluation.gold.stated_pose;
+  yardstick.points_ct_mm = target_points(study_case.target_box_ct);
+
+  evaluation.rows = register_all(study_case.name, methods, evaluation.starts, yardstick, world);
+  all_or_none(world, [&] {
+    if (!world.is_root()) return;
+    draw_xrays(methods.front().runner.problem(), options.output_folder, evaluation);
+    draw_overlays(methods.front(), yardstick, options.output_folder, evaluation);
+  });
+  return evaluation;
+}
+
+}  // namespace af::evaluation

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+
+#include "evaluate/fiducial_registration.h"
+#include "io/study_file.h"
+
+namespace af::evaluation {
+
+/// What a case's registrations are measured against.
+struct GoldStandard {
+  RigidTransform room_from_ct = RigidTransform::Identity();
+  std::string source;                            ///< "fiducials" or "study"
+  std::optional<FiducialGold> fiducials;         ///< when at least two views show them
+  std::optional<RigidTransform> stated_pose;     ///< the study's gold_room_from_ct
+  std::optional<double> stated_to_fiducials_mm;  ///< mean TRE between the two, when both exist
+};
+
+/// The gold standard of a case. `choice`: "fiducials", "study" (gold_room_from_ct) or "auto":
+/// fiducials when the case has them, else the stated pose. Throws InputError when the chosen one
+/// does not exist.
+GoldStandard gold_standard(const Study& study,
+                           const StudyCase& study_case,
+                           const std::string& choice);
+
+/// Source, fiducial registration error, ray gaps, residuals, distance between both golds.
+nlohmann::json to_json(const GoldStandard& gold);
+
+}  // namespace af::evaluation

@@ -1,0 +1,310 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluate/registration_command.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iomanip>
+#include <iostream>
+#include <set>
+#include <sstream>
+
+#include "base/error.h"
+#include "cli/app_main.h"
+#include "evaluate/case_evaluation_program.h"
+#include "evaluate/figure_files.h"
+#include "evaluate/summary_files.h"
+#include "io/gnuplot_figure.h"
+#include "io/output_file.h"
+#include "io/provenance.h"
+#include "io/sha256.h"
+#include "register/registration.h"
+#include "register/similarity/similarity_measure.h"
+#include "volume/attenuation_volume.h"
+#include "volume/ray_caster.h"
+
+namespace af::evaluation {
+namespace {
+
+using nlohmann::json;
+
+/// How the study's X-rays were simulated, if they were: the provenance that af-simulate leaves
+/// beside study.toml.
+json simulation_of(const Study& study) {
+  const std::filesystem::path path = study.path.parent_path() / "provenance.json";
+  if (!std::filesystem::exists(path)) return nullptr;
+  json provenance = json::parse(read_text_file(path), nullptr, false);
+  if (!provenance.is_object() || provenance.value("program", "") != "af-simulate") return nullptr;
+  return provenance;
+}
+
+json case_json(const CaseEvaluation& evaluation) {
+  return {{"case", evaluation.case_name},
+          {"gold", to_json(evaluation.gold)},
+          {"starts", evaluation.starts.starts.size()},
+          {"draws", evaluation.starts.draws},
+          {"inadmissible_draws", evaluation.starts.inadmissible_draws},
+          {"draws_beyond_last_interval", evaluation.starts.draws_beyond}};
+}
+
+void draw_figures(const RegistrationStudyOptions& options,
+                  const std::vector<RegistrationRow>& rows) {
+  std::vector<OutcomeGroup> groups;
+  for (const std::string& renderer : options.renderers())
+    groups.push_back({renderer == "field" ? "field" : "ray casting", outcomes_of(rows, renderer)});
+  const std::filesystem::path& folder = options.output_folder;
+  draw_success_rates(groups, options.intervals, options.interval_width_mm, folder / "success-rate");
+  draw_tre_histogram(groups, folder / "tre-histogram");
+  draw_tre_scatter(groups, options.intervals * options.interval_width_mm, folder / "tre-scatter");
+}
+
+json summary_json(const RegistrationStudyOptions& options,
+                  const Study& study,
+                  const std::vector<CaseEvaluation>& evaluations,
+                  const std::vector<RegistrationRow>& rows) {
+  json summary = {{"format", "attenuation-fields evaluation"},
+                  {"format_version", 1},
+                  {"kind", "registration"},
+                  {"study", study.path.string()},
+                  {"success_tre_mm", kSuccessTreMm}};
+  summary["simulation"] = simulation_of(study);
+  summary["cases"] = json::array();
+  summary["pictures"] = json::array();
+  for (const CaseEvaluation& evaluation : evaluations) {
+    summary["cases"].push_back(case_json(evaluation));
+    for (const json& picture : evaluation.pictures) summary["pictures"].push_back(picture);
+  }
+  summary["renderers"] = json::array();
+  for (const std::string& renderer : options.renderers())
+    summary["renderers"].push_back(
+        renderer_statistics(rows, renderer, {options.intervals, options.interval_width_mm}));
+  summary["field_against_raycast"] = paired_statistics(rows, options.equivalence_margin_mm);
+  summary["figures"] = {"success-rate", "tre-histogram", "tre-scatter"};
+  return summary;
+}
+
+void print_outcome(const json& summary, const std::filesystem::path& folder) {
+  for (const json& renderer : summary["renderers"])
+    std::cout << renderer["renderer"].get<std::string>() << ": "
+              << renderer["successes"].get<std::int64_t>() << " of "
+              << renderer["starts"].get<std::int64_t>() << " starts succeeded (TRE < "
+              << number_text(kSuccessTreMm) << " mm), mean TRE of these "
+              << fixed_text(number_of(renderer["tre_of_successes_mm"]["mean"]), 2) << " mm, median "
+              << fixed_text(number_of(renderer["seconds"]["median"]), 2) << " s each\n";
+  std::cout << "results: " << folder.string() << '\n';
+}
+
+void append_problem_of_fields(const RegistrationStudyOptions& options,
+                              std::vector<std::string>& found) {
+  std::set<std::string> cameras;
+  for (const std::string& text : options.fields) {
+    const std::size_t equals = text.find('=');
+    if (equals == std::string::npos || equals == 0 || equals + 1 == text.size())
+      found.push_back("--field = '" + text + "': must be CAMERA=PATH");
+    else if (!cameras.insert(text.substr(0, equals)).second)
+      found.push_back("--field = '" + text + "': this camera is given twice");
+  }
+  if (options.renderer == "raycast" && !options.fields.empty())
+    found.emplace_back("--field = set: must not be given with --renderer raycast");
+}
+
+std::vector<StudyCase> chosen_cases(const RegistrationStudyOptions& options, const Study& study) {
+  std::vector<StudyCase> cases;
+  if (options.cases.empty()) cases = study.cases;
+  for (const std::string& name : std::set(options.cases.begin(), options.cases.end()))
+    cases.push_back(study.find_case(name));
+  std::sort(cases.begin(), cases.end(), [](const StudyCase& a, const StudyCase& b) {
+    return a.name < b.name;
+  });
+  if (cases.size() > 1 && !options.fields.empty())
+    throw InputError("--field",
+                     options.fields.front(),
+                     "a field belongs to one CT: with several cases put the key `field` into the "
+                     "study, or choose one by --case",
+                     study.path.string());
+  return cases;
+}
+
+}  // namespace
+
+std::vector<std::string> RegistrationStudyOptions::renderers() const {
+  if (renderer == "both") return {"field", "raycast"};
+  return {renderer};
+}
+
+std::vector<std::string> problems(const RegistrationStudyOptions& options) {
+  std::vector<std::string> found = problems(StartOptions{
+      options.intervals, options.interval_width_mm, options.starts_per_interval, options.seed});
+  append_problem_of_fields(options, found);
+  const auto require_part = [&](const char* name, const std::optional<int>& part, int whole) {
+    if (part.has_value() && !(*part >= 1 && *part <= whole))
+      found.push_back(std::string(name) + " = " + std::to_string(*part) + ": must be from 1 to " +
+                      std::to_string(whole));
+    if (part.has_value() && options.renderer != "both")
+      found.push_back(std::string(name) + " = " + std::to_string(*part) +
+                      ": must not be given without --renderer both");
+  };
+  require_part("--raycast-starts-per-interval",
+               options.raycast_starts_per_interval,
+               options.starts_per_interval);
+  require_part("--raycast-intervals", options.raycast_intervals, options.intervals);
+  if (!(options.equivalence_margin_mm > 0.0) || !std::isfinite(options.equivalence_margin_mm))
+    found.push_back("--equivalence-margin-mm = " + number_text(options.equivalence_margin_mm) +
+                    ": must be positive");
+  AttenuationModel model;
+  model.mu_water_per_mm = options.water_mu_per_mm;
+  for (const std::string& text : af::problems(model)) found.push_back(text);
+  for (const std::string& text : af::problems(RayCasterOptions{options.step_mm}))
+    found.push_back(text);
+  return found;
+}
+
+std::string to_toml(const RegistrationStudyOptions& options) {
+  std::ostringstream out;
+  out << "study = " << std::quoted(options.study.string()) << "\nrenderer = \"" << options.renderer
+      << "\"\nstarts_per_interval = " << options.starts_per_interval
+      << "\nintervals = " << options.intervals
+      << "\ninterval_width_mm = " << number_text(options.interval_width_mm) << '\n';
+  if (options.renderer == "both")
+    out << "raycast_starts_per_interval = "
+        << options.raycast_starts_per_interval.value_or(options.starts_per_interval)
+        << "\nraycast_intervals = " << options.raycast_intervals.value_or(options.intervals)
+        << '\n';
+  out << "gold = \"" << options.gold << "\"\npreset = \"" << options.preset << "\"\n";
+  registration::RegistrationOptions method = registration::preset_options(options.preset);
+  out << "similarity = \"" << options.similarity.value_or(method.similarity.name)
+      << "\"\noptimizer = \"" << options.optimizer.value_or(method.optimizer)
+      << "\"\nequivalence_margin_mm = " << number_text(options.equivalence_margin_mm)
+      << "\nwater_mu_per_mm = " << number_text(options.water_mu_per_mm)
+      << "\nstep_mm = " << number_text(options.step_mm) << "\nseed = " << options.seed << '\n';
+  for (const std::string& name : options.cases) out << "# --case " << name << '\n';
+  for (const std::string& field : options.fields) out << "# --field " << field << '\n';
+  return out.str();
+}
+
+CLI::App* bind_registration(CLI::App& app, RegistrationStudyOptions& options) {
+  CLI::App* command = app.add_subcommand(
+      "registration",
+      "Registers the cases of a study from starts at stated distances from the gold pose and "
+      "reports TRE and success (the paper's Table II, Figs. 15 and 16)");
+  command->add_option("--study", options.study, "study.toml: rig, cases, X-rays, gold standard")
+      ->required();
+  command->add_option("--case", options.cases, "Case of the study, may be repeated (default: all)")
+      ->take_all();
+  command
+      ->add_option("--field",
+                   options.fields,
+                   "CAMERA=FIELD.h5, once per camera; replaces the study's `field`")
+      ->take_all();
+  command
+      ->add_option("--renderer",
+                   options.renderer,
+                   "How DRRs are made: field (look-up), raycast, or both from the same starts")
+      ->check(CLI::IsMember({"field", "raycast", "both"}))
+      ->capture_default_str();
+  command
+      ->add_option("--starts-per-interval",
+                   options.starts_per_interval,
+                   "Starts in each interval of initial TRE")
+      ->capture_default_str();
+  command
+      ->add_option(
+          "--intervals", options.intervals, "Number of intervals of initial TRE, from 0 mm")
+      ->capture_default_str();
+  command->add_option("--interval-width-mm", options.interval_width_mm, "Width of an interval, mm")
+      ->capture_default_str();
+  command->add_option("--raycast-starts-per-interval",
+                      options.raycast_starts_per_interval,
+                      "With --renderer both: so many of each interval's starts also by ray casting "
+                      "(default: all)");
+  command->add_option("--raycast-intervals",
+                      options.raycast_intervals,
+                      "With --renderer both: ray casting only in the first so many intervals "
+                      "(default: all)");
+  command
+      ->add_option("--gold",
+                   options.gold,
+                   "Gold pose: fiducials (back-projected from the views), study (its "
+                   "gold_room_from_ct), or auto (fiducials when there are any)")
+      ->check(CLI::IsMember({"auto", "fiducials", "study"}))
+      ->capture_default_str();
+  command->add_option("--preset", options.preset, "Registration method as a whole")
+      ->check(CLI::IsMember(registration::preset_names()))
+      ->capture_default_str();
+  command
+      ->add_option("--similarity", options.similarity, "Similarity measure (default: the preset's)")
+      ->check(CLI::IsMember(registration::similarity_names()));
+  command->add_option("--optimizer", options.optimizer, "Optimiser (default: the preset's)")
+      ->check(CLI::IsMember(registration::optimizer_names()));
+  command
+      ->add_option("--equivalence-margin-mm",
+                   options.equivalence_margin_mm,
+                   "Field and ray casting count as equal when their mean TREs differ by less, mm")
+      ->capture_default_str();
+  command
+      ->add_option("--water-mu-per-mm",
+                   options.water_mu_per_mm,
+                   "Attenuation of water for ray casting, 1/mm")
+      ->capture_default_str();
+  command->add_option("--step-mm", options.step_mm, "Longest step of ray casting, mm")
+      ->capture_default_str();
+  command->add_option(
+      "--series", options.series_uid, "DICOM series UID, when a CT's folder has several");
+  command->add_option("--seed", options.seed, "Of the starts")->capture_default_str();
+  command->add_option("-o,--output", options.output_folder, "Folder for the results")->required();
+  return command;
+}
+
+void run_registration(const RegistrationStudyOptions& options,
+                      const std::string& command_line,
+                      const Communicator& world) {
+  const std::filesystem::path& folder = options.output_folder;
+  const Study study = all_or_none(world, [&] {
+    throw_if_any(problems(options));
+    return read_study(options.study);
+  });
+  const std::vector<StudyCase> cases =
+      all_or_none(world, [&] { return chosen_cases(options, study); });
+  all_or_none(world, [&] {
+    if (!world.is_root()) return;
+    require_gnuplot();
+    make_output_folder(folder);
+  });
+
+  std::vector<CaseEvaluation> evaluations;
+  std::vector<std::string> case_names;
+  std::vector<StratifiedStarts> starts;
+  for (const StudyCase& study_case : cases) {
+    evaluations.push_back(
+        evaluate_case(options, study, study_case, world, [&](const CaseEvaluation& so_far) {
+          case_names.push_back(so_far.case_name);
+          starts.push_back(so_far.starts);
+          if (world.is_root())
+            write_text_file(folder / "starts.csv", starts_table(case_names, starts).to_text());
+        }));
+  }
+  all_or_none(world, [&] {
+    if (!world.is_root()) return;
+    std::vector<RegistrationRow> rows;
+    Provenance provenance = {"af-evaluate registration",
+                             command_line,
+                             to_toml(options),
+                             options.seed,
+                             world.size(),
+                             {{"study", sha256_of_file(study.path.string())}}};
+    for (const CaseEvaluation& evaluation : evaluations) {
+      rows.insert(rows.end(), evaluation.rows.begin(), evaluation.rows.end());
+      provenance.input_sha256.insert(evaluation.input_sha256.begin(),
+                                     evaluation.input_sha256.end());
+    }
+    write_text_file(folder / "registrations.csv", registrations_table(rows).to_text());
+    draw_figures(options, rows);
+    write_reproduce_script(folder, provenance);
+    json summary = summary_json(options, study, evaluations, rows);
+    summary["provenance"] = af::to_json(provenance);
+    // Last: when it is there, everything is.
+    write_text_file(folder / "summary.json", summary.dump(2) + "\n");
+    print_outcome(summary, folder);
+  });
+}
+
+}  // namespace af::evaluation

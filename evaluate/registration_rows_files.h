@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "evaluate/perturbed_starts.h"
+#include "evaluate/success_rate.h"
+#include "io/csv_table.h"
+
+namespace af::evaluation {
+
+/// One registration as evaluated. Without an end pose (stop reasons of failed registrations)
+/// similarity, TRE and final parameters are NaN.
+struct RegistrationRow {
+  static constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
+
+  std::string case_name;
+  std::string renderer;          ///< "field" or "raycast"
+  std::int64_t start_index = 0;  ///< row of the case's starts in starts.csv
+  std::uint64_t draw_index = 0;
+  int interval = 0;                      ///< of initial TRE
+  std::array<double, 6> start_deg_mm{};  ///< relative to gold, about the ROI centre
+  std::array<double, 6> final_deg_mm = {kMissing, kMissing, kMissing, kMissing, kMissing, kMissing};
+  double initial_tre_mm = kMissing;
+  double tre_mm = kMissing;
+  double stated_pose_tre_mm = kMissing;  ///< against gold_room_from_ct when gold is the fiducials'
+  double similarity = kMissing;
+  std::int64_t evaluations = 0;
+  std::int64_t inadmissible = 0;
+  std::int64_t drr_count = 0;
+  std::string stop_reason;
+  std::string error;     ///< message of a registration that threw
+  double seconds = 0.0;  ///< wall time
+};
+
+/// A row to be sent between ranks, and back; element 0 is `order`.
+nlohmann::json packed_row(std::int64_t order, const RegistrationRow& row);
+RegistrationRow row_of(const nlohmann::json& packed);
+
+/// registrations.csv with the contract's columns, in the given order; timings last.
+CsvTable registrations_table(const std::vector<RegistrationRow>& rows);
+
+/// starts.csv: the starts of all cases, in order; `case_names` is parallel to `starts`.
+CsvTable starts_table(const std::vector<std::string>& case_names,
+                      const std::vector<StratifiedStarts>& starts);
+
+/// Starts and TREs of one renderer, in row order.
+std::vector<TreOutcome> outcomes_of(const std::vector<RegistrationRow>& rows,
+                                    const std::string& renderer);
+
+/// How initial TRE is divided.
+struct TreIntervals {
+  int count = 8;
+  double width_mm = 2.0;
+};
+
+/// Counts, success (overall, per interval, per threshold), TRE statistics, stop reasons and times
+/// of one renderer; per case, too, when there are several.
+nlohmann::json renderer_statistics(const std::vector<RegistrationRow>& rows,
+                                   const std::string& renderer,
+                                   const TreIntervals& intervals);
+
+/// Field against ray casting on the starts that both were given and from which both succeeded:
+/// paired t-test and equivalence of TRE; null when there are fewer than two such pairs.
+nlohmann::json paired_statistics(const std::vector<RegistrationRow>& rows, double margin_mm);
+
+}  // namespace af::evaluation
