@@ -10,7 +10,7 @@
 #include <unistd.h>
 
 #include "base/error.h"
-#include "io/field_file_hdf5.h"
+#include "io/field_file_access.h"
 #include "io/field_file_layout.h"
 #include "io/sha256.h"
 #include "parallel/mpi_handle.h"

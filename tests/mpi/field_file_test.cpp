@@ -10,7 +10,7 @@
 
 #include "base/error.h"
 #include "base/hash_random.h"
-#include "io/field_file_hdf5.h"
+#include "io/field_file_access.h"
 #include "io/sha256.h"
 #include "support/test_paths.h"
 

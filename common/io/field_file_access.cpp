@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/field_file_hdf5.h"
+#include "io/field_file_access.h"
 
 #include "base/error.h"
 #include "io/sha256.h"

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "precompute/precompute_options.h"
+
+#include <array>
+#include <charconv>
+
+namespace af {
+
+namespace {
+
+/// A TOML basic string.
+std::string quoted(const std::string& text) {
+  constexpr const char* kHexDigits = "0123456789ABCDEF";
+  std::string result = "\"";
+  for (const char character : text) {
+    const auto code = static_cast<unsigned char>(character);
+    if (character == '"' || character == '\\') {
+      result += '\\';
+      result += character;
+    } else if (code < 0x20) {
+      result += std::string("\\u00") + kHexDigits[code >> 4u] + kHexDigits[code & 15u];
+    } else {
+      result += character;
+    }
+  }
+  return result + "\"";
+}
+
+void append(const std::vector<std::string>& more, std::vector<std::string>& found) {
+  found.insert(found.end(), more.begin(), more.end());
+}
+
+void append_node_problems(const char* name, int nodes, std::vector<std::string>& found) {
+  constexpr int kMaxNodes = 4096;
+  if (nodes < 2 || nodes > kMaxNodes)
+    found.push_back(std::string(name) + " = " + std::to_string(nodes) +
+                    ": must be within 2 and 4096");
+}
+
+}  // namespace
+
+CodebookOptions PrecomputeOptions::codebook_options() const {
+  CodebookOptions options;
+  options.codewords = codewords;
+  options.max_iterations = max_iterations;
+  options.seed = seed;
+  return options;
+}
+
+LightSlabSpec PrecomputeOptions::light_slab_spec() const {
+  LightSlabSpec spec;
+  spec.uv_nodes = uv_nodes;
+  spec.st_nodes = st_nodes;
+  return spec;
+}
+
+std::vector<std::string> problems(const PrecomputeOptions& options) {
+  std::vector<std::string> found = problems(options.range());
+  if (options.slabs != 1)
+    found.push_back("slabs = " + std::to_string(options.slabs) +
+                    ": must be 1 (the trilinear caster fills fields of one slab)");
+  append_node_problems("uv_nodes", options.uv_nodes, found);
+  append_node_problems("st_nodes", options.st_nodes, found);
+  if (options.caster != "trilinear")
+    found.push_back("caster = " + options.caster + ": must be trilinear");
+  append(problems(RayCasterOptions{options.step_mm}), found);
+  append(problems(options.attenuation_model()), found);
+  append(problems(options.codebook_options()), found);
+  append(problems(options.training_selection()), found);
+  if (!options.center_ct_mm.empty() && options.center_ct_mm.size() != 3)
+    found.push_back("center_ct_mm has " + std::to_string(options.center_ct_mm.size()) +
+                    " numbers: must be x,y,z");
+  return found;
+}
+
+std::vector<std::pair<std::string, std::string>> deciding_options(
+    const PrecomputeOptions& options) {
+  return {{"max_rotation_deg", exact_text(options.max_rotation_deg)},
+          {"max_translation_mm", exact_text(options.max_translation_mm)},
+          {"slabs", std::to_string(options.slabs)},
+          {"uv_nodes", std::to_string(options.uv_nodes)},
+          {"st_nodes", std::to_string(options.st_nodes)},
+          {"caster", quoted(options.caster)},
+          {"step_mm", exact_text(options.step_mm)},
+          {"water_mu_per_mm", exact_text(options.water_mu_per_mm)},
+          {"codewords", std::to_string(options.codewords)},
+          {"max_iterations", std::to_string(options.max_iterations)},
+          {"training_fraction", exact_text(options.training_fraction)},
+          {"max_training_tiles", std::to_string(options.max_training_tiles)},
+          {"seed", std::to_string(options.seed)}};
+}
+
+std::string to_toml(const PrecomputeOptions& options) {
+  std::string text;
+  const auto add_text = [&](const char* name, const std::string& value) {
+    if (!value.empty()) text += std::string(name) + " = " + quoted(value) + "\n";
+  };
+  add_text("ct", options.ct);
+  add_text("series", options.series_uid);
+  add_text("rig", options.rig);
+  add_text("camera", options.camera);
+  add_text("nominal_pose", options.nominal_pose);
+  add_text("study", options.study);
+  add_text("case", options.case_name);
+  if (options.center_ct_mm.size() == 3)
+    text += "center_ct_mm = [" + exact_text(options.center_ct_mm[0]) + ", " +
+            exact_text(options.center_ct_mm[1]) + ", " + exact_text(options.center_ct_mm[2]) +
+            "]\n";
+  for (const auto& [name, value] : deciding_options(options)) text += name + " = " + value + "\n";
+  add_text("output", options.output);
+  text += "memory_limit_bytes = " + std::to_string(options.memory_limit_bytes) + "\n";
+  text += std::string("checkpoint = ") + (options.has_checkpoint ? "true" : "false") + "\n";
+  return text;
+}
+
+std::string exact_text(double value) {
+  std::array<char, 32> text{};
+  const auto end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
+  std::string digits(text.data(), end);
+  // TOML tells floats from integers by the point or exponent.
+  if (digits.find_first_of(".en") == std::string::npos) digits += ".0";
+  return digits;
+}
+
+}  // namespace af

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "geometry/slab_sizing.h"
+#include "precompute/codebook_training.h"
+#include "precompute/planner.h"
+#include "precompute/tile_selection.h"
+#include "volume/attenuation_volume.h"
+#include "volume/ray_caster.h"
+
+namespace af {
+
+/// Options of af-precompute: what is cast, how it is compressed, where it goes. Angles in degrees,
+/// as at every interface.
+struct PrecomputeOptions {
+  // The CT, the camera and the pose about which the CT moves: named one by one ...
+  std::string ct;
+  std::string series_uid;
+  std::string rig;
+  std::string camera;
+  std::vector<double> center_ct_mm;  ///< empty: the CT's centre
+  std::string nominal_pose;          ///< file; empty: R0 = identity, at the rig's isocentre
+  // ... or by a case of a study.
+  std::string study;
+  std::string case_name;
+
+  double max_rotation_deg = 10.0;
+  double max_translation_mm = 100.0;
+  int slabs = 1;
+  int uv_nodes = 64;
+  int st_nodes = 256;
+  std::string caster = "trilinear";
+  double step_mm = RayCasterOptions{}.step_mm;
+  double water_mu_per_mm = AttenuationModel{}.mu_water_per_mm;
+
+  int codewords = CodebookOptions{}.codewords;
+  int max_iterations = CodebookOptions{}.max_iterations;
+  double training_fraction = TrainingSelection{}.fraction;
+  std::uint64_t max_training_tiles = TrainingSelection{}.max_training_tiles;
+  std::uint64_t seed = 1;
+
+  std::uint64_t memory_limit_bytes = 0;  ///< per rank, 0: none
+  std::string output;
+  bool is_dry_run = false;
+  bool is_restart = false;
+  bool has_checkpoint = true;
+
+  [[nodiscard]] MotionRange range() const {
+    return {max_rotation_deg * kRadPerDeg, max_translation_mm};
+  }
+  [[nodiscard]] AttenuationModel attenuation_model() const {
+    return {water_mu_per_mm, AttenuationModel{}.air_below_hu};
+  }
+  [[nodiscard]] TrainingSelection training_selection() const {
+    return {training_fraction, max_training_tiles, seed};
+  }
+  [[nodiscard]] CodebookOptions codebook_options() const;
+  [[nodiscard]] LightSlabSpec light_slab_spec() const;
+};
+
+/// Every broken constraint of the values themselves (not of files).
+std::vector<std::string> problems(const PrecomputeOptions& options);
+
+/// Name and value of every option that decides the payload, apart from CT, camera and pose.
+std::vector<std::pair<std::string, std::string>> deciding_options(const PrecomputeOptions& options);
+
+/// All options in force as TOML, stored in the field.
+std::string to_toml(const PrecomputeOptions& options);
+
+/// Shortest text that reads back as the same double.
+std::string exact_text(double value);
+
+}  // namespace af
