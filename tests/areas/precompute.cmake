@@ -10,3 +10,9 @@ af_add_mpi_test(
   SOURCES mpi/field_file_test.cpp
   LIBS af_io_field af_io_basics MPI::MPI_C PkgConfig::hdf5_openmpi
   RANKS 1 2 3 4)
+
+af_add_mpi_test(
+  field_build_test
+  SOURCES mpi/field_build_test.cpp
+  LIBS af_precompute_build
+  RANKS 1 2 3 4)

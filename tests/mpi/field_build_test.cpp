@@ -1,0 +1,268 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <atomic>
+#include <filesystem>
+#include <fstream>
+
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+#include "base/vector_width.h"
+#include "precompute/field_build_program.h"
+#include "precompute/planner.h"
+#include "support/test_paths.h"
+#include "volume/phantoms.h"
+
+namespace af {
+namespace {
+
+// Made by these tests on one rank with the widest vectors; any rank count, plan and vector width
+// must give the same. From correctly rounded operations only.
+constexpr const char* kFrozenPayload =
+    "f2f5b60b4f8945b3b23f57da9610fa7a21bf08e0b89d793507ac2bb447bec2b6";
+
+class SharedFolder {
+ public:
+  SharedFolder() {
+    std::string path;
+    if (world_.is_root()) {
+      folder_ = std::make_unique<test::ScratchFolder>();
+      path = folder_->path().string();
+    }
+    world_.broadcast(path);
+    path_ = path;
+  }
+  std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
+
+ private:
+  Communicator world_ = Communicator::world();
+  std::unique_ptr<test::ScratchFolder> folder_;
+  std::filesystem::path path_;
+};
+
+CtVolume small_ct() {
+  CtGrid grid;
+  grid.size = {24, 20, 18};
+  grid.spacing_mm = {3.0, 4.0, 5.0};
+  grid.origin_mm = Eigen::Vector3d(-34.5, -38.0, -42.5);
+  return box_phantom(grid, {4, 3, 3}, {17, 14, 13}, 400);
+}
+
+/// 7 x 6 viewpoints over 25 x 22 nodes, of which an odd number is stored. No libm.
+LightSlab small_light_slab() {
+  LightSlab light_slab;
+  light_slab.uv_plane_y_mm = 500.0;
+  light_slab.u = {-90.0, 90.0, 7};
+  light_slab.v = {-70.0, 60.0, 6};
+  SlabGeometry slab;
+  slab.s = {-60.0, 62.0, 25};
+  slab.t = {-50.0, 55.0, 22};
+  slab.stored_s = {2, 23};
+  slab.stored_t = {2, 16};
+  light_slab.slabs.push_back(slab);
+  return light_slab;
+}
+
+/// Everything between CT and file, at a small scale.
+class FieldBuildTest : public testing::Test {
+ protected:
+  FieldFileInfo build(
+      const std::filesystem::path& path,
+      std::int64_t rays_per_unit,
+      ProgressFolder* progress = nullptr,
+      const StopRequested& stop = [] { return false; }) {
+    const auto units = plan_units(light_slab_, {rays_per_unit});
+    CastPhase cast = cast_field(caster_, units, progress, stop, {}, world_);
+    units_resumed_ = cast.units_resumed;
+    const TrainedCodebook trained = train_field(
+        cast, units, light_slab_, {0.5, 100000, 3}, {.codewords = 64, .seed = 3}, {}, world_);
+    EncodePhase encoded = encode_field(cast, units, light_slab_, trained.codebook, {}, world_);
+    CompressedAttenuationField field;
+    field.identity.camera.name = "AP";
+    field.identity.camera.detector_origin_point = {-100.0, -100.0, 1000.0};
+    field.identity.camera.size_px = {200, 200};
+    field.identity.ct_content_sha256 = std::string(64, 'b');
+    field.light_slab = light_slab_;
+    field.quantizer_step = quantizer_.step();
+    field.codebook = trained.codebook;
+    return write_field(field, encoded.blocks, {"0", "c", "o", "{}"}, path, world_);
+  }
+
+  [[nodiscard]] ProgressManifest manifest(std::int64_t rays_per_unit) const {
+    return {{{"seed", "3"}, {"ct_content_sha256", "b"}}, rays_per_unit};
+  }
+
+  /// Casts with progress until some units are done, then stops as SIGUSR1 does.
+  void stop_after(const std::filesystem::path& path, std::uint64_t units_per_rank) {
+    ProgressManifest expected = manifest(kUnitRays);
+    ProgressFolder progress(path, false, expected, world_);
+    std::atomic<std::uint64_t> asked = 0;
+    try {
+      build("/nowhere/unused.h5", expected.rays_per_unit, &progress, [&] {
+        return asked++ >= units_per_rank;
+      });
+      FAIL() << "it did not stop";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.exit_code(), ExitCode::Stopped) << error.what();
+    }
+    world_.barrier();
+  }
+
+  static constexpr std::int64_t kUnitRays = 2 * 2 * 4 * 16;
+
+  Communicator world_ = Communicator::world();
+  SharedFolder folder_;
+  AttenuationVolume volume_{small_ct(), AttenuationModel{}};
+  AttenuationQuantizer quantizer_ =
+      AttenuationQuantizer::for_maximum(volume_.max_total_attenuation());
+  LightSlab light_slab_ = small_light_slab();
+  RayCastFieldCaster caster_{volume_, light_slab_, quantizer_, RayCasterOptions{2.0}};
+  std::uint64_t units_resumed_ = 0;
+};
+
+TEST_F(FieldBuildTest, PayloadIsTheSameOnAnyRankCountPlanAndVectorWidth) {
+  EXPECT_EQ(build(folder_ / "whole.h5", 1000000).payload_sha256, kFrozenPayload);
+  for (const VectorWidth width : supported_vector_widths()) {
+    force_vector_width(width);
+    EXPECT_EQ(build(folder_ / "cut.h5", kUnitRays).payload_sha256, kFrozenPayload);
+  }
+  force_vector_width(std::nullopt);
+}
+
+TEST_F(FieldBuildTest, DecodedFieldStaysNearTheCastSamples) {
+  build(folder_ / "a.h5", kUnitRays);
+  const auto field = read_field(folder_ / "a.h5", world_);
+  const RayCaster single(volume_, RayCasterOptions{2.0});
+  double squared = 0.0;
+  double squared_signal = 0.0;
+  const SlabGeometry& slab = light_slab_.slabs.front();
+  for (int u = 0; u < 7; ++u)
+    for (int v = 0; v < 6; ++v)
+      for (int s = 0; s < 25; ++s)
+        for (int t = 0; t < 22; ++t) {
+          const float direct = single.total_attenuation(light_slab_.viewpoint(u, v),
+                                                        light_slab_.st_point(slab, s, t));
+          const bool is_stored = s >= 2 && t >= 2 && t < 18;
+          const double difference = static_cast<double>(field->node_value(0, {u, v, s, t})) -
+                                    (is_stored ? static_cast<double>(direct) : 0.0);
+          squared += difference * difference;
+          squared_signal += static_cast<double>(direct) * static_cast<double>(direct);
+        }
+  // 64 codewords for a smooth body: a decoder that mixed up axes or blocks would be off by the
+  // signal itself.
+  EXPECT_LT(squared, 0.01 * squared_signal);
+}
+
+TEST_F(FieldBuildTest, AStoppedRunIsResumedToTheSamePayload) {
+  const auto progress_path = folder_ / "a.h5.progress";
+  stop_after(progress_path, 2);
+  stop_after(progress_path, 3);
+  ProgressManifest expected = manifest(999);  // another plan, as another rank count would make
+  ProgressFolder progress(progress_path, false, expected, world_);
+  EXPECT_EQ(expected.rays_per_unit, kUnitRays);
+  EXPECT_EQ(build(folder_ / "a.h5", expected.rays_per_unit, &progress).payload_sha256,
+            kFrozenPayload);
+  EXPECT_GE(units_resumed_, 5u);
+  progress.remove();
+  EXPECT_FALSE(std::filesystem::exists(progress_path));
+}
+
+TEST_F(FieldBuildTest, DamagedAndTornShardsAreCastAgain) {
+  const auto progress_path = folder_ / "a.h5.progress";
+  stop_after(progress_path, 6);
+  if (world_.is_root()) {
+    int shard = 0;
+    for (const auto& entry : std::filesystem::directory_iterator(progress_path)) {
+      if (entry.path().extension() != ".shard") continue;
+      const auto size = std::filesystem::file_size(entry.path());
+      if (shard++ == 0) {
+        std::filesystem::resize_file(entry.path(), size - 5);  // torn at the end
+        std::fstream file(entry.path(), std::ios::in | std::ios::out | std::ios::binary);
+        file.seekp(33);  // in the first unit's bitmap
+        file.put('\x5A');
+      } else {
+        std::ofstream(entry.path(), std::ios::app) << "garbage that is no record header at all";
+      }
+    }
+    std::ofstream(progress_path / "0009-000000.shard");
+  }
+  world_.barrier();
+  ProgressManifest expected = manifest(kUnitRays);
+  ProgressFolder progress(progress_path, false, expected, world_);
+  EXPECT_EQ(build(folder_ / "a.h5", expected.rays_per_unit, &progress).payload_sha256,
+            kFrozenPayload);
+  EXPECT_GE(units_resumed_, 1u);
+}
+
+TEST_F(FieldBuildTest, ProgressOfOtherOptionsIsRefusedByNameAndRestartThrowsItAway) {
+  const auto progress_path = folder_ / "a.h5.progress";
+  stop_after(progress_path, 2);
+  ProgressManifest other = manifest(kUnitRays);
+  other.decides["seed"] = "4";
+  try {
+    const ProgressFolder refused(progress_path, false, other, world_);
+    FAIL() << "it was accepted";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.exit_code(), ExitCode::Input);
+    EXPECT_NE(std::string(error.what()).find("seed = 4: the unfinished work was begun with 3"),
+              std::string::npos)
+        << error.what();
+  }
+  world_.barrier();
+  ProgressFolder fresh(progress_path, true, other, world_);
+  EXPECT_TRUE(fresh.read_finished(plan_units(light_slab_, {kUnitRays})).empty());
+}
+
+TEST_F(FieldBuildTest, ADamagedManifestIsAFileError) {
+  const auto progress_path = folder_ / "a.h5.progress";
+  stop_after(progress_path, 1);
+  for (const char* text : {"", "{", "{\"format\": 3}", "[1, 2]"}) {
+    if (world_.is_root()) std::ofstream(progress_path / "manifest.json") << text;
+    world_.barrier();
+    ProgressManifest expected = manifest(kUnitRays);
+    try {
+      const ProgressFolder refused(progress_path, false, expected, world_);
+      ADD_FAILURE() << text << " was accepted";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.exit_code(), ExitCode::File) << error.what();
+    }
+    world_.barrier();
+  }
+}
+
+TEST_F(FieldBuildTest, TooManyCodewordsAreOneErrorOfTheWholeJob) {
+  const auto units = plan_units(light_slab_, {kUnitRays});
+  const CastPhase cast = cast_field(
+      caster_, units, nullptr, [] { return false; }, {}, world_);
+  try {
+    train_field(cast, units, light_slab_, {0.001, 100000, 3}, {.codewords = 64}, {}, world_);
+    FAIL() << "it trained";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.exit_code(), ExitCode::Input);
+    EXPECT_NE(std::string(error.what()).find("more codewords than training tiles"),
+              std::string::npos)
+        << error.what();
+  }
+}
+
+TEST_F(FieldBuildTest, GeometryOfRankZeroIsTakenOver) {
+  LightSlab mine = small_light_slab();
+  mine.u.first_mm += 1e-13 * world_.rank();
+  mine.slabs[0].y_high_mm = 12.5;
+  const LightSlab shared = shared_light_slab(mine, world_);
+  EXPECT_EQ(shared.u.first_mm, -90.0);
+  EXPECT_EQ(shared.v.nodes, 6);
+  EXPECT_EQ(shared.slabs[0].stored_t.count, 16);
+  EXPECT_EQ(shared.slabs[0].y_high_mm, 12.5);
+  EXPECT_EQ(shared.slabs[0].t.last_mm, 55.0);
+  EXPECT_EQ(shared.slab_from_ct.matrix(), mine.slab_from_ct.matrix());
+}
+
+TEST(Crc32c, MatchesThePublishedCheckValue) {
+  const std::string digits = "123456789";
+  const auto bytes = std::as_bytes(std::span(digits));
+  EXPECT_EQ(crc32c(bytes), 0xE3069283u);
+  EXPECT_EQ(crc32c(bytes.subspan(4), crc32c(bytes.first(4))), 0xE3069283u);
+}
+
+}  // namespace
+}  // namespace af
