@@ -76,6 +76,11 @@ struct Font {
   [[nodiscard]] double line_height_px() const { return std::ceil(1.35 * size_px); }
 };
 
+/// A rectangle of the picture's pixels.
+struct Area {
+  int x, y, width, height;
+};
+
 /// A cairo image surface with its context.
 class Canvas {
  public:
@@ -114,19 +119,15 @@ class Canvas {
     cairo_move_to(context_.get(), x, baseline_y);
     cairo_show_text(context_.get(), text.c_str());
   }
-  /// Sets single pixels; `color_at(x, y)` gives 0xRRGGBB within the rectangle.
-  void set_pixels(int x0,
-                  int y0,
-                  int width,
-                  int height,
-                  const std::function<std::uint32_t(int, int)>& color_at) {
+  /// Sets single pixels; `color_at(x, y)` gives 0xRRGGBB, x and y counted from the area's corner.
+  void set_pixels(const Area& area, const std::function<std::uint32_t(int, int)>& color_at) {
     cairo_surface_flush(surface_.get());
     unsigned char* data = cairo_image_surface_get_data(surface_.get());
     const int stride = cairo_image_surface_get_stride(surface_.get());
-    for (int y = 0; y < height; ++y) {
+    for (int y = 0; y < area.height; ++y) {
       unsigned char* row =
-          data + static_cast<std::ptrdiff_t>(y0 + y) * stride + std::ptrdiff_t{4} * x0;
-      for (int x = 0; x < width; ++x) {
+          data + static_cast<std::ptrdiff_t>(area.y + y) * stride + std::ptrdiff_t{4} * area.x;
+      for (int x = 0; x < area.width; ++x) {
         const std::uint32_t color = color_at(x, y);
         std::memcpy(row + std::ptrdiff_t{4} * x, &color, sizeof color);
       }
@@ -316,11 +317,12 @@ std::vector<PanelRow> rows_of(const std::vector<PicturePanel>& panels,
 // -------------------------------------------------------------------------------------
 
 void draw_image(Canvas& canvas, const PicturePanel& panel, int x0, int y0, int zoom) {
-  canvas.set_pixels(x0, y0, panel.image.width * zoom, panel.image.height * zoom, [&](int x, int y) {
-    const double value = static_cast<double>(panel.image.at(x / zoom, y / zoom));
-    if (!std::isfinite(value)) return packed(kNotFinite);
-    return color_of(window_position(value, panel.low, panel.high), panel.colors);
-  });
+  canvas.set_pixels({x0, y0, panel.image.width * zoom, panel.image.height * zoom},
+                    [&](int x, int y) {
+                      const double value = static_cast<double>(panel.image.at(x / zoom, y / zoom));
+                      if (!std::isfinite(value)) return packed(kNotFinite);
+                      return color_of(window_position(value, panel.low, panel.high), panel.colors);
+                    });
   for (const RegionOfInterest& box : panel.boxes) {
     const double x = x0 + box.column * zoom, y = y0 + box.row * zoom;
     const double width = box.width * zoom, height = box.height * zoom;
@@ -338,7 +340,7 @@ void draw_image(Canvas& canvas, const PicturePanel& panel, int x0, int y0, int z
 /// The window as a bar of its colors between its two values.
 void draw_scale(
     Canvas& canvas, const PicturePanel& panel, int x0, int y0, int width, const Font& font) {
-  canvas.set_pixels(x0, y0, width, kBarHeight, [&](int x, int) {
+  canvas.set_pixels({x0, y0, width, kBarHeight}, [&](int x, int) {
     return color_of(width > 1 ? static_cast<double>(x) / (width - 1) : 0.5, panel.colors);
   });
   canvas.outline(x0 - 0.5, y0 - 0.5, width + 1, kBarHeight + 1, kFaintInk, 1.0);

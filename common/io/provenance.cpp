@@ -17,7 +17,7 @@ namespace af {
 namespace {
 
 /// When this process started, as near as a library can tell.
-const std::time_t kStartTime = std::time(nullptr);
+const std::time_t process_start_time = std::time(nullptr);
 
 std::string utc_text(std::time_t time) {
   std::tm parts{};
@@ -59,8 +59,8 @@ std::string script_text(const Provenance& provenance) {
   const bool is_parallel = provenance.rank_count > 1;
   std::string text = "#!/bin/sh\n# Repeats the run that made the files beside this script.\n";
   text += "# " + comment_text(provenance.program) + " " + std::string(program_version()) + " (" +
-          std::string(compiler_description()) + "), started " + utc_text(kStartTime) + ", " +
-          std::to_string(provenance.rank_count) + " rank(s), seed " +
+          std::string(compiler_description()) + "), started " + utc_text(process_start_time) +
+          ", " + std::to_string(provenance.rank_count) + " rank(s), seed " +
           std::to_string(provenance.seed) + "\n";
   if (!provenance.input_sha256.empty()) text += "# Its inputs, by SHA-256:\n";
   for (const auto& [name, hash] : provenance.input_sha256)
@@ -91,7 +91,7 @@ nlohmann::json to_json(const Provenance& provenance) {
       {"rank_count", provenance.rank_count},
       {"input_sha256", provenance.input_sha256},
       {"host", {{"cpu", cpu_model()}, {"vector_bits", static_cast<int>(active_vector_width())}}},
-      {"started_utc", utc_text(kStartTime)}};
+      {"started_utc", utc_text(process_start_time)}};
 }
 
 void write_reproduce_script(const std::filesystem::path& folder, const Provenance& provenance) {

@@ -68,9 +68,9 @@ size_px = [512, 512]
 )";
 
 const std::map<std::string, const char*>& builtin_rigs() {
-  static const std::map<std::string, const char*> kRigs = {{"c-arm-12in", kCArmText},
-                                                           {"treatment-room", kTreatmentRoomText}};
-  return kRigs;
+  static const std::map<std::string, const char*> rigs = {{"c-arm-12in", kCArmText},
+                                                          {"treatment-room", kTreatmentRoomText}};
+  return rigs;
 }
 
 constexpr std::array kGeometryKeys = {

@@ -155,6 +155,7 @@ void TomlProblems::throw_if_any() const {
     return a.line < b.line;
   });
   std::vector<std::string> messages;
+  messages.reserve(sorted.size());
   for (Problem& problem : sorted) messages.push_back(std::move(problem.message));
   af::throw_if_any(messages);
 }
@@ -186,7 +187,7 @@ const toml::node* TomlTableReader::find(const char* key, Presence presence) {
 std::optional<std::string> TomlTableReader::get_string(const char* key, Presence presence) {
   const toml::node* found = find(key, presence);
   if (found == nullptr) return std::nullopt;
-  if (const auto text = found->value_exact<std::string>(); text && !text->empty()) {
+  if (auto text = found->value_exact<std::string>(); text && !text->empty()) {
     if (text->find('\0') == std::string::npos) return text;
     add_problem(key, "must not hold a zero character");
     return std::nullopt;

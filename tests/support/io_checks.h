@@ -31,8 +31,10 @@ std::string message_of(const Action& action) {
   return {};
 }
 
-/// Writes a small input file, without the syncing that outputs need.
+/// Writes a small input file, without the syncing that outputs need. Removed first: file systems
+/// sync a file that is truncated and written anew.
 inline void write_input(const std::filesystem::path& path, const std::string& text) {
+  std::filesystem::remove(path);
   std::ofstream(path, std::ios::binary) << text;
 }
 

@@ -39,7 +39,7 @@ struct Pixels {
     const int stride = cairo_image_surface_get_stride(surface);
     for (int y = 0; y < height; ++y)
       for (int x = 0; x < width; ++x) {
-        const unsigned char* pixel = data + y * stride + 4 * x;
+        const unsigned char* pixel = data + std::ptrdiff_t{stride} * y + std::ptrdiff_t{4} * x;
         colors.push_back(static_cast<std::uint32_t>(pixel[2] << 16 | pixel[1] << 8 | pixel[0]));
       }
     cairo_surface_destroy(surface);
@@ -140,7 +140,7 @@ TEST_F(Picture, GridIsRowMajor) {
   const std::vector<float> greys{0.2F, 0.4F, 0.6F};
   for (std::size_t i = 0; i < 3; ++i) {
     panels[i].image = Image2d(200, 50);
-    panels[i].image.pixels.assign(200 * 50, greys[i]);
+    panels[i].image.pixels.assign(panels[i].image.pixels.size(), greys[i]);
   }
   const Pixels pixels = drawn(panels, 2);
   const auto center_of = [&](std::uint32_t color) {
