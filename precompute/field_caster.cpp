@@ -14,12 +14,7 @@ RayCastFieldCaster::RayCastFieldCaster(const AttenuationVolume& volume,
     : light_slab_(light_slab),
       quantizer_(quantizer),
       caster_(volume, options),
-      ct_from_slab_(light_slab.slab_from_ct.inverse()) {
-  if (light_slab.slabs.size() != 1)
-    throw InputError("slabs",
-                     std::to_string(light_slab.slabs.size()),
-                     "the trilinear caster fills fields of one slab only");
-}
+      ct_from_slab_(light_slab.slab_from_ct.inverse()) {}
 
 void RayCastFieldCaster::cast(const WorkUnit& unit, std::span<std::uint16_t> samples) const {
   check(samples.size() == unit.sample_count(), "one sample per node of the unit");
@@ -31,6 +26,9 @@ void RayCastFieldCaster::cast(const WorkUnit& unit, std::span<std::uint16_t> sam
   row.rows = 1;
   row.column_step = ct_from_slab_.linear() * Eigen::Vector3d(0.0, 0.0, slab.t.spacing_mm());
   row.row_step = Eigen::Vector3d::Zero();
+  const double plane_distance_mm = light_slab_.uv_plane_y_mm - slab.st_plane_y_mm;
+  row.begin = (light_slab_.uv_plane_y_mm - slab.y_high_mm) / plane_distance_mm;
+  row.end = (light_slab_.uv_plane_y_mm - slab.y_low_mm) / plane_distance_mm;
   std::vector<float> total_attenuation(static_cast<std::size_t>(unit.t.count));
   auto sample = samples.begin();
   for (int u = unit.u.begin; u < unit.u.end(); ++u)

@@ -25,11 +25,11 @@ class FieldCaster {
   [[nodiscard]] virtual const char* name() const = 0;
 };
 
-/// The reference: trilinear samples along every ray (RayCaster). For fields of one slab.
+/// The reference: trilinear samples along every ray (RayCaster), cut to the unit's slab.
 /// \test RayCastFieldCaster.SamplesEqualSingleRays
 class RayCastFieldCaster final : public FieldCaster {
  public:
-  /// `volume` and `light_slab` must outlive the caster. Throws InputError for more than one slab.
+  /// `volume` and `light_slab` must outlive the caster.
   RayCastFieldCaster(const AttenuationVolume& volume,
                      const LightSlab& light_slab,
                      const AttenuationQuantizer& quantizer,

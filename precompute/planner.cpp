@@ -33,9 +33,9 @@ UnitExtent unit_extent(const LightSlab& light_slab,
   const std::int64_t viewpoints = std::max<std::int64_t>(
       4, options.rays_per_unit / std::max<std::int64_t>(1, rows * rays_of_row));
   UnitExtent extent;
-  extent.v = std::min(round_up_to_even(light_slab.v.nodes), round_up_to_even(viewpoints / 2));
-  extent.u = std::clamp(
-      static_cast<int>(viewpoints / extent.v) / 2 * 2, 2, round_up_to_even(light_slab.u.nodes));
+  extent.u = std::min(round_up_to_even(light_slab.u.nodes), round_up_to_even(viewpoints / 2));
+  extent.v = std::clamp(
+      static_cast<int>(viewpoints / extent.u) / 2 * 2, 2, round_up_to_even(light_slab.v.nodes));
   const std::int64_t rows_of_unit =
       options.rays_per_unit / (std::int64_t{extent.u} * extent.v * rays_of_row);
   extent.s = static_cast<int>(
@@ -94,12 +94,12 @@ std::vector<WorkUnit> plan_units(const LightSlab& light_slab, const PlanOptions&
   return units;
 }
 
-PlanOptions plan_options_for_ranks(const LightSlab& light_slab, int ranks) {
+PlanOptions plan_options_for_ranks(const LightSlab& light_slab,
+                                   int ranks,
+                                   const PlanOptions& largest) {
   constexpr std::int64_t kUnitsPerRank = 16;
-  PlanOptions options;
   const std::int64_t share = stored_ray_count(light_slab) / (kUnitsPerRank * ranks);
-  options.rays_per_unit = std::clamp<std::int64_t>(share, 1, options.rays_per_unit);
-  return options;
+  return {std::clamp<std::int64_t>(share, 1, largest.rays_per_unit)};
 }
 
 std::int64_t stored_ray_count(const LightSlab& light_slab) {

@@ -4,12 +4,9 @@
 // fused, so every width gives identical bits.
 #pragma once
 
+#include <immintrin.h>
 #include <stdint.h>
 #include <string.h>
-
-#if AF_VECTOR_BITS > 128
-#include <immintrin.h>
-#endif
 
 #define AF_KERNEL_INLINE static inline __attribute__((always_inline))
 
@@ -20,6 +17,8 @@ inline constexpr int kLanes = 16;
 using F16 = float __attribute__((vector_size(64)));
 using I16 = int32_t __attribute__((vector_size(64)));
 using U16 = uint32_t __attribute__((vector_size(64)));
+/// Thirty-two 16-bit lanes, for integer arithmetic on samples.
+using S32 = int16_t __attribute__((vector_size(64)));
 
 AF_KERNEL_INLINE F16 splat(float value) {
   return value - F16{};
@@ -30,7 +29,7 @@ AF_KERNEL_INLINE I16 splat(int32_t value) {
 
 template <typename Vector, typename Element>
 AF_KERNEL_INLINE Vector load(const Element* from) {
-  static_assert(sizeof(Vector) == kLanes * sizeof(Element));
+  static_assert(sizeof(Vector) == 64 && sizeof(Vector{}[0]) == sizeof(Element));
   Vector vector;
   memcpy(&vector, from, sizeof(vector));
   return vector;
@@ -38,7 +37,7 @@ AF_KERNEL_INLINE Vector load(const Element* from) {
 
 template <typename Vector, typename Element>
 AF_KERNEL_INLINE void store(Element* to, Vector vector) {
-  static_assert(sizeof(Vector) == kLanes * sizeof(Element));
+  static_assert(sizeof(Vector) == 64 && sizeof(Vector{}[0]) == sizeof(Element));
   memcpy(to, &vector, sizeof(vector));
 }
 
@@ -50,16 +49,55 @@ AF_KERNEL_INLINE F16 to_float(I16 value) {
   return __builtin_convertvector(value, F16);
 }
 
-AF_KERNEL_INLINE F16 minimum(F16 a, F16 b) {
-  return a < b ? a : b;
-}
-AF_KERNEL_INLINE F16 maximum(F16 a, F16 b) {
-  return a > b ? a : b;
-}
+// The registers that make up one 64-byte vector, and the intrinsics of that width.
+#if AF_VECTOR_BITS == 512
+#define AF_INTRINSIC(operation) _mm512_##operation
+using IntegerRegister = __m512i;
+using FloatRegister = __m512;
+#elif AF_VECTOR_BITS == 256
+#define AF_INTRINSIC(operation) _mm256_##operation
+using IntegerRegister = __m256i;
+using FloatRegister = __m256;
+#else
+#define AF_INTRINSIC(operation) _mm_##operation
+using IntegerRegister = __m128i;
+using FloatRegister = __m128;
+#endif
+inline constexpr int kRegisters = 512 / AF_VECTOR_BITS;
 
-AF_KERNEL_INLINE I16 minimum(I16 a, I16 b) {
-  return a < b ? a : b;
-}
+#define AF_DEFINE_OPERATION(name, operation, Register, Result, Operand)                        \
+  AF_KERNEL_INLINE Result name(Operand a, Operand b) {                                         \
+    Register left[kRegisters];                                                                 \
+    Register right[kRegisters];                                                                \
+    memcpy(left, &a, sizeof(left));                                                            \
+    memcpy(right, &b, sizeof(right));                                                          \
+    for (int i = 0; i < kRegisters; ++i) left[i] = AF_INTRINSIC(operation)(left[i], right[i]); \
+    Result result;                                                                             \
+    memcpy(&result, left, sizeof(result));                                                     \
+    return result;                                                                             \
+  }
+
+/// a < b ? a : b per lane.
+AF_DEFINE_OPERATION(minimum, min_ps, FloatRegister, F16, F16)
+AF_DEFINE_OPERATION(minimum, min_epi32, IntegerRegister, I16, I16)
+/// a > b ? a : b per lane.
+AF_DEFINE_OPERATION(maximum, max_ps, FloatRegister, F16, F16)
+/// round(a * b / 2^15) per 16-bit lane; not for a == b == -32768.
+AF_DEFINE_OPERATION(multiply_fraction, mulhrs_epi16, IntegerRegister, S32, S32)
+/// Within each group of 8 lanes: a[0] b[0] a[1] b[1] a[2] b[2] a[3] b[3].
+AF_DEFINE_OPERATION(interleave_low, unpacklo_epi16, IntegerRegister, S32, S32)
+/// Within each group of 8 lanes: a[4] b[4] a[5] b[5] a[6] b[6] a[7] b[7].
+AF_DEFINE_OPERATION(interleave_high, unpackhi_epi16, IntegerRegister, S32, S32)
+/// The same for pairs and for fours of 16-bit lanes.
+AF_DEFINE_OPERATION(interleave_pairs_low, unpacklo_epi32, IntegerRegister, S32, S32)
+AF_DEFINE_OPERATION(interleave_pairs_high, unpackhi_epi32, IntegerRegister, S32, S32)
+AF_DEFINE_OPERATION(interleave_fours_low, unpacklo_epi64, IntegerRegister, S32, S32)
+AF_DEFINE_OPERATION(interleave_fours_high, unpackhi_epi64, IntegerRegister, S32, S32)
+/// Saturated to 0 ... 65535 (as bits); within each group of 8 lanes: a's four, then b's four. The
+/// inverse of the two interleaves.
+AF_DEFINE_OPERATION(pack_unsigned, packus_epi32, IntegerRegister, S32, I16)
+
+#undef AF_DEFINE_OPERATION
 
 /// True when any lane of a comparison's result is set.
 AF_KERNEL_INLINE bool any(I16 mask) {
@@ -119,6 +157,24 @@ AF_KERNEL_INLINE I16 gather_pairs(const uint16_t* base, I16 offset) {
   }
 #endif
   return pairs;
+}
+
+/// Stores the four groups of 8 lanes at to, to + stride, to + 2 stride and to + 3 stride.
+AF_KERNEL_INLINE void store_groups(int16_t* to, int stride, S32 value) {
+  using Group = int16_t __attribute__((vector_size(16)));
+  const Group groups[4] = {__builtin_shufflevector(value, value, 0, 1, 2, 3, 4, 5, 6, 7),
+                           __builtin_shufflevector(value, value, 8, 9, 10, 11, 12, 13, 14, 15),
+                           __builtin_shufflevector(value, value, 16, 17, 18, 19, 20, 21, 22, 23),
+                           __builtin_shufflevector(value, value, 24, 25, 26, 27, 28, 29, 30, 31)};
+  for (int i = 0; i < 4; ++i) memcpy(to + i * stride, &groups[i], sizeof(groups[i]));
+}
+
+AF_KERNEL_INLINE F16 square_root(F16 value) {
+  FloatRegister parts[kRegisters];
+  memcpy(parts, &value, sizeof(parts));
+  for (int i = 0; i < kRegisters; ++i) parts[i] = AF_INTRINSIC(sqrt_ps)(parts[i]);
+  memcpy(&value, parts, sizeof(value));
+  return value;
 }
 
 }  // namespace af::AF_KERNEL_NAMESPACE

@@ -51,9 +51,9 @@ function(af_add_kernel target source)
     set(object ${target}_${stem}_${bits})
     add_library(${object} OBJECT ${source})
     target_compile_definitions(${object} PRIVATE AF_VECTOR_BITS=${bits} AF_KERNEL_NAMESPACE=kernels_${bits})
-    # -Wno-psabi: 512-bit vector types only pass between inlined functions. -Wno-maybe-uninitialized: GCC 12's own
+    # -Wno-psabi: 512-bit vector types only pass between inlined functions. -Wno-(maybe-)uninitialized: GCC 12's own
     # intrinsics headers (GCC bug 105593).
-    target_compile_options(${object} PRIVATE $<$<CONFIG:Debug>:-O2> -fno-trapping-math -Wno-psabi -Wno-maybe-uninitialized ${flags_${bits}})
+    target_compile_options(${object} PRIVATE $<$<CONFIG:Debug>:-O2> -fno-trapping-math -Wno-psabi -Wno-uninitialized -Wno-maybe-uninitialized ${flags_${bits}})
     target_link_libraries(${object} PRIVATE af_compile_options)
     target_sources(${target} PRIVATE $<TARGET_OBJECTS:${object}>)
   endforeach()

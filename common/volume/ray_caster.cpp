@@ -21,11 +21,11 @@ struct Interval {
   double end;
 };
 
-Interval clip_to_volume(const Eigen::Vector3d& origin,
+Interval clip_to_volume(Interval inside,
+                        const Eigen::Vector3d& origin,
                         const Eigen::Vector3d& direction,
                         const Eigen::Vector3d& low,
                         const Eigen::Vector3d& high) {
-  Interval inside{0.0, std::numeric_limits<double>::infinity()};
   for (int axis = 0; axis < 3; ++axis) {
     if (direction[axis] == 0.0) {
       if (!(origin[axis] > low[axis] && origin[axis] < high[axis])) return {0.0, 0.0};
@@ -42,7 +42,8 @@ Interval clip_to_volume(const Eigen::Vector3d& origin,
 /// Turns a fan given in mm into bundles of rays in voxel indices.
 class BundleMaker {
  public:
-  BundleMaker(const CtGrid& grid, const RayFan& fan, double step_mm) : step_mm_(step_mm) {
+  BundleMaker(const CtGrid& grid, const RayFan& fan, double step_mm)
+      : step_mm_(step_mm), layer_{std::max(0.0, fan.begin), fan.end} {
     const Eigen::Matrix3d index_from_mm =
         grid.spacing_mm.cwiseInverse().asDiagonal() * grid.direction.transpose();
     mm_from_index_ = grid.spacing_mm;
@@ -64,7 +65,7 @@ class BundleMaker {
   /// misses).
   float fill_lane(int column, int row, int lane, RayBundle& bundle) const {
     const Eigen::Vector3d direction = first_ + column * column_step_ + row * row_step_;
-    const Interval inside = clip_to_volume(origin_, direction, low_, high_);
+    const Interval inside = clip_to_volume(layer_, origin_, direction, low_, high_);
     if (!(inside.end > inside.begin)) {
       clear_lane(lane, bundle);
       return 0.0f;
@@ -92,6 +93,7 @@ class BundleMaker {
 
  private:
   double step_mm_;
+  Interval layer_;
   Eigen::Vector3d mm_from_index_;
   Eigen::Vector3d origin_, first_, column_step_, row_step_;
   Eigen::Vector3d low_, high_;

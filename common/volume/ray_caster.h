@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <limits>
 #include <span>
 
 #include "volume/attenuation_volume.h"
@@ -17,6 +18,10 @@ struct RayFan {
   Eigen::Vector3d row_step;
   int columns = 0;
   int rows = 0;
+  /// The part of every ray that counts, in multiples of the way from source to grid point: a layer
+  /// between two planes parallel to the grid's.
+  double begin = 0.0;
+  double end = std::numeric_limits<double>::infinity();
 };
 
 struct RayCasterOptions {

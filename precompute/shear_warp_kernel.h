@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <stdint.h>
+
+namespace af {
+
+/// Columns of t nodes that are cast together: one 64-byte vector of 16-bit samples.
+inline constexpr int kShearColumns = 32;
+/// Slices that are added per visit of an accumulator.
+inline constexpr int kShearSlices = 16;
+
+/// One slice brought to a tile of t nodes by the first pass: rows [x][kShearColumns].
+struct ShearColumns {
+  const int16_t* slice;           ///< [z][x], x fastest
+  int64_t z_stride;               ///< elements from (z, x) to (z + 1, x)
+  int32_t z_row[kShearColumns];   ///< lower z row of each column
+  int16_t weight[kShearColumns];  ///< of row z_row + 1, in 1/32768
+};
+
+/// The slices of one block as one viewpoint sees them. Node i of s lies at x = (start + step * i) /
+/// 256 of slice k, in grid units; x outside [low, high] / 256 means 0, and rows low / 256 and high
+/// / 256 hold zeros.
+struct ShearBlock {
+  int32_t slices = 0;              ///< 1 ... kShearSlices
+  float start[kShearSlices] = {};  ///< in 1/256 of the grid's spacing, plus one half to round
+  float step[kShearSlices] = {};
+  float low[kShearSlices] = {};
+  float high[kShearSlices] = {};
+  int32_t origin[kShearSlices] = {};  ///< elements from `rows` to (the possibly absent) row x = 0
+};
+
+/// What turns the accumulators of one viewpoint and a tile of t nodes into samples.
+struct ShearScale {
+  float attenuation_per_unit;  ///< of a ray perpendicular to the planes
+  float quantizer_step;
+  float slope_squared_t[kShearColumns];  ///< ((t - v) / (f - Y0))^2, in the order of accumulators
+};
+
+/// A row of trilinear samples of the CT: sample i at start + i * step, in voxel indices.
+struct ResampledRow {
+  float start[3];
+  float step[3];
+  int32_t count;
+  float scale;
+};
+
+/// Voxels of a bordered volume, i fastest.
+struct ResampledVolume {
+  const uint16_t* voxels;
+  int32_t size[3];
+};
+
+namespace shear_warp {
+
+/// out[i] = round(scale * trilinear sample i); exactly 0 outside the volume. Writes whole vectors
+/// of 16.
+using ResampleRow = void (*)(const ResampledVolume& volume, const ResampledRow& row, int16_t* out);
+
+/// First pass: rows[x - first_x][j] = slice interpolated in z, for x in [first_x, first_x +
+/// row_count); row_count is a multiple of 32.
+using InterpolateColumns = void (*)(const ShearColumns& columns,
+                                    int32_t first_x,
+                                    int32_t row_count,
+                                    int16_t* rows);
+
+/// Second pass: adds 256 times the sum over the block's slices, interpolated in x, to the
+/// accumulators of nodes [first_node, end_node). `sums` is that of node 0 of the tile: [i -
+/// first_row_node][kShearColumns].
+using AccumulateNodes = void (*)(const int16_t* rows,
+                                 const ShearBlock& block,
+                                 int32_t first_node,
+                                 int32_t end_node,
+                                 int32_t* sums_of_first_node);
+
+/// Samples of one node s and a tile of t nodes from their accumulators.
+using QuantizeNode = void (*)(const int32_t* sums,
+                              const ShearScale& scale,
+                              float slope_squared_s,
+                              uint16_t* samples);
+
+}  // namespace shear_warp
+
+#define AF_DECLARE_SHEAR_WARP_KERNELS(name_space)                                          \
+  namespace name_space {                                                                   \
+  void resample_row(const ResampledVolume& volume, const ResampledRow& row, int16_t* out); \
+  void interpolate_columns(const ShearColumns& columns,                                    \
+                           int32_t first_x,                                                \
+                           int32_t row_count,                                              \
+                           int16_t* rows);                                                 \
+  void accumulate_nodes(const int16_t* rows,                                               \
+                        const ShearBlock& block,                                           \
+                        int32_t first_node,                                                \
+                        int32_t end_node,                                                  \
+                        int32_t* sums);                                                    \
+  void quantize_node(const int32_t* sums,                                                  \
+                     const ShearScale& scale,                                              \
+                     float slope_squared_s,                                                \
+                     uint16_t* samples);                                                   \
+  }
+AF_DECLARE_SHEAR_WARP_KERNELS(kernels_128)
+AF_DECLARE_SHEAR_WARP_KERNELS(kernels_256)
+AF_DECLARE_SHEAR_WARP_KERNELS(kernels_512)
+#undef AF_DECLARE_SHEAR_WARP_KERNELS
+
+}  // namespace af
