@@ -73,8 +73,7 @@ std::vector<std::string> problems(const PrecomputeOptions& options) {
   return found;
 }
 
-std::vector<std::pair<std::string, std::string>> deciding_options(
-    const PrecomputeOptions& options) {
+NamedValues casting_options(const PrecomputeOptions& options) {
   return {{"max_rotation_deg", exact_text(options.max_rotation_deg)},
           {"max_translation_mm", exact_text(options.max_translation_mm)},
           {"slabs", std::to_string(options.slabs)},
@@ -82,8 +81,11 @@ std::vector<std::pair<std::string, std::string>> deciding_options(
           {"st_nodes", std::to_string(options.st_nodes)},
           {"caster", quoted(options.caster)},
           {"step_mm", exact_text(options.step_mm)},
-          {"water_mu_per_mm", exact_text(options.water_mu_per_mm)},
-          {"codewords", std::to_string(options.codewords)},
+          {"water_mu_per_mm", exact_text(options.water_mu_per_mm)}};
+}
+
+NamedValues codebook_options(const PrecomputeOptions& options) {
+  return {{"codewords", std::to_string(options.codewords)},
           {"max_iterations", std::to_string(options.max_iterations)},
           {"training_fraction", exact_text(options.training_fraction)},
           {"max_training_tiles", std::to_string(options.max_training_tiles)},
@@ -106,7 +108,8 @@ std::string to_toml(const PrecomputeOptions& options) {
     text += "center_ct_mm = [" + exact_text(options.center_ct_mm[0]) + ", " +
             exact_text(options.center_ct_mm[1]) + ", " + exact_text(options.center_ct_mm[2]) +
             "]\n";
-  for (const auto& [name, value] : deciding_options(options)) text += name + " = " + value + "\n";
+  for (const auto& [name, value] : casting_options(options)) text += name + " = " + value + "\n";
+  for (const auto& [name, value] : codebook_options(options)) text += name + " = " + value + "\n";
   add_text("output", options.output);
   text += "memory_limit_bytes = " + std::to_string(options.memory_limit_bytes) + "\n";
   text += std::string("checkpoint = ") + (options.has_checkpoint ? "true" : "false") + "\n";

@@ -66,8 +66,13 @@ struct PrecomputeOptions {
 /// Every broken constraint of the values themselves (not of files).
 std::vector<std::string> problems(const PrecomputeOptions& options);
 
-/// Name and value of every option that decides the payload, apart from CT, camera and pose.
-std::vector<std::pair<std::string, std::string>> deciding_options(const PrecomputeOptions& options);
+using NamedValues = std::vector<std::pair<std::string, std::string>>;
+
+/// Name and value of every option that decides the cast samples, apart from CT, camera and pose.
+NamedValues casting_options(const PrecomputeOptions& options);
+
+/// Name and value of every option that decides what the codebook makes of the samples.
+NamedValues codebook_options(const PrecomputeOptions& options);
 
 /// All options in force as TOML, stored in the field.
 std::string to_toml(const PrecomputeOptions& options);

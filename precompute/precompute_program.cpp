@@ -6,6 +6,7 @@
 #include <cmath>
 #include <csignal>
 #include <cstdlib>
+#include <filesystem>
 #include <iostream>
 #include <optional>
 #include <sstream>
@@ -14,6 +15,7 @@
 #include "base/error.h"
 #include "cli/app_main.h"
 #include "cli/progress_printer.h"
+#include "io/output_file.h"
 #include "io/provenance.h"
 #include "precompute/dry_run_report.h"
 #include "precompute/field_build_program.h"
@@ -73,12 +75,13 @@ std::string numbers_text(const Eigen::PlainObjectBase<Derived>& matrix) {
   return numbers_text(matrix.data(), matrix.size());
 }
 
-/// Everything that decides the payload.
+/// Everything that decides the cast samples. Options of the codebook may change between a stop and
+/// its resume, for example after "more codewords than training tiles".
 ProgressManifest manifest_of(const PrecomputeOptions& options,
                              const FieldSource& source,
                              const PlanOptions& plan) {
   ProgressManifest manifest;
-  for (const auto& [name, value] : deciding_options(options)) manifest.decides[name] = value;
+  for (const auto& [name, value] : casting_options(options)) manifest.decides[name] = value;
   const CameraGeometry& camera = source.camera;
   manifest.decides["ct_content_sha256"] = source.ct_content_sha256;
   manifest.decides["camera"] = camera.name;
@@ -159,6 +162,7 @@ class PrecomputeRun {
       throw_if_any(problems(options_));
       if (!options_.is_dry_run && options_.output.empty())
         throw UsageError("-o FIELD.h5 is needed (or --dry-run)");
+      if (!options_.is_dry_run && world_.is_root()) require_output_folder();
     });
     load();
     const RayCastFieldCaster caster(
@@ -177,6 +181,14 @@ class PrecomputeRun {
  private:
   [[nodiscard]] AttenuationQuantizer quantizer() const {
     return AttenuationQuantizer::for_maximum(source_.volume->max_total_attenuation());
+  }
+
+  /// Before the work, not after it.
+  void require_output_folder() const {
+    const std::filesystem::path output(options_.output);
+    if (std::filesystem::is_directory(output))
+      throw FileError(options_.output, "is a folder, not a field file");
+    make_output_folder(output.has_parent_path() ? output.parent_path() : ".");
   }
 
   void load() {

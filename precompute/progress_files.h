@@ -12,8 +12,8 @@
 
 namespace af {
 
-/// What unfinished work is valid for: everything that decides the payload, and the plan it was cut
-/// by.
+/// What unfinished work is valid for: everything that decides the cast samples, and the plan it was
+/// cut by.
 struct ProgressManifest {
   std::map<std::string, std::string> decides;  ///< option or input -> value
   std::int64_t rays_per_unit = 0;

@@ -16,3 +16,7 @@ af_add_mpi_test(
   SOURCES mpi/field_build_test.cpp
   LIBS af_precompute_build
   RANKS 1 2 3 4)
+
+add_test(NAME precompute_program COMMAND ${PROJECT_SOURCE_DIR}/tests/checks/precompute_program.sh
+                                         $<TARGET_FILE:af-precompute> ${MPIEXEC_EXECUTABLE})
+set_tests_properties(precompute_program PROPERTIES LABELS mpi TIMEOUT 300 PROCESSORS 2)

@@ -88,7 +88,7 @@ class FieldBuildTest : public testing::Test {
   }
 
   [[nodiscard]] ProgressManifest manifest(std::int64_t rays_per_unit) const {
-    return {{{"seed", "3"}, {"ct_content_sha256", "b"}}, rays_per_unit};
+    return {{{"step_mm", "3"}, {"ct_content_sha256", "b"}}, rays_per_unit};
   }
 
   /// Casts with progress until some units are done, then stops as SIGUSR1 does.
@@ -197,13 +197,13 @@ TEST_F(FieldBuildTest, ProgressOfOtherOptionsIsRefusedByNameAndRestartThrowsItAw
   const auto progress_path = folder_ / "a.h5.progress";
   stop_after(progress_path, 2);
   ProgressManifest other = manifest(kUnitRays);
-  other.decides["seed"] = "4";
+  other.decides["step_mm"] = "4";
   try {
     const ProgressFolder refused(progress_path, false, other, world_);
     FAIL() << "it was accepted";
   } catch (const Error& error) {
     EXPECT_EQ(error.exit_code(), ExitCode::Input);
-    EXPECT_NE(std::string(error.what()).find("seed = 4: the unfinished work was begun with 3"),
+    EXPECT_NE(std::string(error.what()).find("step_mm = 4: the unfinished work was begun with 3"),
               std::string::npos)
         << error.what();
   }

@@ -190,7 +190,8 @@ TEST(FieldFile, ReadsBackWhatRanksWroteTogether) {
 TEST(FieldFile, PayloadHashIsTheSameOnEveryRankCount) {
   const SharedFolder folder;
   // Frozen: made by this test on one rank with format version 1.
-  EXPECT_EQ(write(small_field(), folder / "a.af.h5").payload_sha256, "c4d25e978a038a8745f6bf31cdafac62251aabc5e05d7d200ef51f96ca1d99f0");
+  EXPECT_EQ(write(small_field(), folder / "a.af.h5").payload_sha256,
+            "c4d25e978a038a8745f6bf31cdafac62251aabc5e05d7d200ef51f96ca1d99f0");
 }
 
 TEST(FieldFile, MissingBlocksAreNoticedAndLeaveNoFile) {

@@ -1,0 +1,117 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# Runs af-precompute as a person would: exit codes, dry run, stop and resume, the same payload on other ranks and widths.
+#
+#   precompute_program.sh AF_PRECOMPUTE MPIEXEC
+set -euo pipefail
+
+program=$1
+mpiexec=$2
+export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMPI_MCA_hwloc_base_binding_policy=none
+scratch=$(mktemp -d)
+trap 'rm -rf "$scratch"' EXIT
+cd "$scratch"
+
+fail() {
+  echo "FAILED: $*" >&2
+  exit 1
+}
+
+# A body of 300 HU in air, 24 x 20 x 16 voxels of 4 mm, as MetaImage.
+make_ct() {
+  local columns=24 rows=20 slices=16 k j air body
+  printf 'ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\n'
+  printf 'CompressedData = False\nTransformMatrix = 1 0 0 0 1 0 0 0 1\nOffset = -46 -38 -30\n'
+  printf 'ElementSpacing = 4 4 4\nDimSize = %d %d %d\n' "$columns" "$rows" "$slices"
+  printf 'ElementType = MET_SHORT\nElementDataFile = LOCAL\n'
+  air=$(printf '\\x18\\xfc%.0s' $(seq "$columns"))
+  body=$(printf '\\x18\\xfc%.0s' 1 2 3 4)$(printf '\\x2c\\x01%.0s' $(seq 16))$(printf '\\x18\\xfc%.0s' 1 2 3 4)
+  for ((k = 0; k < slices; ++k)); do
+    for ((j = 0; j < rows; ++j)); do
+      if ((k >= 3 && k < 13 && j >= 4 && j < 16)); then printf '%b' "$body"; else printf '%b' "$air"; fi
+    done
+  done
+}
+make_ct >ct.mha
+
+# expect CODE PATTERN ARGUMENTS...: exit code and a text on standard error; nothing may be left behind.
+expect() {
+  local code=$1 pattern=$2 found=0
+  shift 2
+  "$program" "$@" >out 2>err || found=$?
+  [[ $found == "$code" ]] || fail "$* gave $found instead of $code: $(cat err)"
+  grep -q -- "$pattern" err || fail "$* did not say '$pattern': $(cat err)"
+  [[ -z $(find . -name 'refused*') ]] || fail "$* left $(find . -name 'refused*')"
+}
+common=(--ct ct.mha --rig c-arm-12in --camera AP --max-translation-mm 30 --uv-nodes 9 --st-nodes 61 --codewords 200 --training-fraction 0.5)
+
+# refuse CODE PATTERN OPTION VALUE...: expect with the common options, one of them replaced or added, and an output name.
+refuse() {
+  local code=$1 pattern=$2 option=$3 i kept=()
+  shift 2
+  for ((i = 0; i < ${#common[@]}; i += 2)); do
+    [[ ${common[i]} == "$option" ]] || kept+=("${common[@]:i:2}")
+  done
+  expect "$code" "$pattern" "${kept[@]}" "$@"
+}
+expect 2 'not expected' --no-such-option
+expect 2 'excludes' --study s.toml "${common[@]}"
+expect 2 '-o FIELD.h5' "${common[@]}"
+expect 2 'AP, LAT' --ct ct.mha --rig c-arm-12in -o refused.h5
+expect 2 'name a CT' -o refused.h5
+refuse 3 'codewords = 65537' --codewords 65537 -o refused.h5
+refuse 3 'uv_nodes = 1' --uv-nodes 1 -o refused.h5
+refuse 3 'slabs = 2' --slabs 2 -o refused.h5
+refuse 3 'caster = shear-warp' --caster shear-warp -o refused.h5
+refuse 3 'training_fraction' --training-fraction 0 -o refused.h5
+refuse 3 'more codewords than training tiles' --codewords 60000 --no-checkpoint -o refused.h5
+refuse 3 'max_rotation_deg' --max-rotation-deg 80 -o refused.h5
+refuse 3 "the rig has only: AP, LAT" --camera PA -o refused.h5
+refuse 3 'memory_limit' --memory-limit 10kb -o refused.h5
+refuse 4 'missing.mha' --ct missing.mha -o refused.h5
+head -c 900 ct.mha >cut.mha
+refuse 4 'cut.mha' --ct cut.mha -o refused.h5
+expect 4 'ct.mha' "${common[@]}" -o ct.mha/refused.h5 --no-checkpoint
+expect 4 'is a folder' "${common[@]}" -o .
+
+"$program" "${common[@]}" --dry-run >dry-run.txt
+for word in 'plane' 'units' 'per rank' 'payload' 'file' 'time' 'Your range uses'; do
+  grep -q "$word" dry-run.txt || fail "the dry run says nothing of '$word'"
+done
+[[ -z $(find . -name '*.h5*') ]] || fail 'the dry run wrote a file'
+
+hash_of() { sed -n 's/.*sha256 //p' "$1"; }
+"$program" "${common[@]}" -o one.h5 >one.txt 2>/dev/null
+expected=$(hash_of one.txt)
+[[ ${#expected} == 64 ]] || fail "no payload hash: $(cat one.txt)"
+for bits in 128 256; do
+  grep -q avx2 /proc/cpuinfo || [[ $bits == 128 ]] || continue
+  AF_VECTOR_BITS=$bits "$program" "${common[@]}" -o bits.h5 >bits.txt 2>/dev/null
+  [[ $(hash_of bits.txt) == "$expected" ]] || fail "another payload with $bits-bit vectors"
+done
+"$mpiexec" -n 3 --oversubscribe "$program" "${common[@]}" -o three.h5 >three.txt 2>/dev/null
+[[ $(hash_of three.txt) == "$expected" ]] || fail 'another payload on 3 ranks'
+[[ ! -e three.h5.progress && ! -e three.h5.partial ]] || fail 'work files are left'
+
+# A slow run (fine steps), stopped by SIGUSR1 on two ranks, resumed on one; another sampling in between is refused.
+slow=(--ct ct.mha --rig c-arm-12in --camera AP --uv-nodes 25 --st-nodes 161 --codewords 200)
+slow+=(--max-translation-mm 30 --step-mm 0.05)
+"$mpiexec" -n 2 --oversubscribe "$program" "${slow[@]}" -o slow.h5 >slow.txt 2>slow.err &
+job=$!
+for ((i = 0; i < 600; ++i)); do
+  [[ -n $(find . -path './slow.h5.progress/*.shard' -size +0) ]] && break
+  sleep 0.1
+done
+kill -USR1 "$job"
+code=0
+wait "$job" || code=$?
+[[ $code == 75 ]] || fail "SIGUSR1 gave $code instead of 75: $(cat slow.err)"
+[[ ! -e slow.h5 ]] || fail 'an unfinished field has its name'
+expect 3 'step_mm = 0.5: the unfinished work was begun with 0.05' "${slow[@]:0:10}" --max-translation-mm 30 \
+  --step-mm 0.5 -o slow.h5
+"$program" "${slow[@]}" -o slow.h5 >slow.txt 2>slow.err
+grep -q 'resumed' slow.err || fail "nothing was resumed: $(cat slow.err)"
+"$program" "${slow[@]}" -o again.h5 --no-checkpoint >again.txt 2>/dev/null
+[[ $(hash_of slow.txt) == "$(hash_of again.txt)" ]] || fail 'the resumed field differs'
+[[ ! -e slow.h5.progress ]] || fail 'the progress folder is left'
+echo 'af-precompute: exit codes, dry run, resume and payload are as promised'
