@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <iostream>
+#include <string>
+#include <vector>
+
+#include "cli/app_main.h"
+#include "tools/inspection.h"
+
+namespace {
+
+using af::Communicator;
+
+struct Options {
+  std::vector<std::string> paths;
+  af::InspectOptions inspect;
+  bool as_json = false;
+};
+
+/// The report of each path as soon as it is known; JSON is one array.
+void print(const Options& options, const std::vector<af::Inspection>& inspections) {
+  if (!options.as_json) {
+    for (const af::Inspection& inspection : inspections) std::cout << af::to_text(inspection);
+    return;
+  }
+  auto array = nlohmann::ordered_json::array();
+  for (const af::Inspection& inspection : inspections) array.push_back(af::to_json(inspection));
+  // File headers may hold text of any encoding.
+  std::cout << array.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) << '\n';
+}
+
+void run(const Options& options, const Communicator& world) {
+  std::vector<af::Inspection> inspections;
+  af::ExitCode worst = af::ExitCode::Done;
+  std::size_t bad = 0;
+  for (const std::string& path : options.paths) {
+    inspections.push_back(af::inspect_path(path, options.inspect, world));
+    const af::ExitCode code = af::worst_exit_code(inspections.back());
+    worst = std::max(worst, code);
+    bad += code == af::ExitCode::Done ? 0 : 1;
+  }
+  if (world.is_root()) print(options, inspections);
+  if (worst == af::ExitCode::Done) return;
+  std::cout.flush();
+  // Every rank knows the same; said once.
+  throw af::RemoteError(worst,
+                        std::to_string(bad) + " of " + std::to_string(options.paths.size()) +
+                            " paths not usable; the reasons are in the report");
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Options options;
+  CLI::App app{
+      "Says what files are, whether they are sane, and what they were made from: CTs (image file "
+      "or DICOM folder), X-rays and DRRs, rigs, studies, poses, fields (every checksum verified), "
+      "results and folders of results. The exit code is the worst over all paths: 0 usable, 3 "
+      "readable but unacceptable, 4 not readable or damaged."};
+  app.add_option("PATH", options.paths, "Files, folders or names of shipped rigs")->required();
+  app.add_flag("--json", options.as_json, "Print one JSON array instead of text");
+  app.add_option("--series",
+                 options.inspect.series_uid,
+                 "SeriesInstanceUID to read from a DICOM folder that holds several series");
+  return af::cli::app_main(
+      app, argc, argv, [&](const Communicator& world) { run(options, world); });
+}

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "base/error.h"
+#include "parallel/communicator.h"
+
+namespace af {
+
+/// What af-inspect found out about one path.
+struct Inspection {
+  std::string path;
+  std::string kind = "unknown";  ///< "CT", "X-ray", "rig", "study", "field", "pose", ...
+  nlohmann::ordered_json facts = nlohmann::ordered_json::object();
+  std::vector<std::string> warnings;  ///< readable, but probably not what was meant
+  std::string error;                  ///< why it is not usable; empty when it is
+  ExitCode exit_code = ExitCode::Done;
+  std::vector<Inspection> items;  ///< the known files of a folder
+};
+
+struct InspectOptions {
+  std::string series_uid;  ///< of a DICOM folder with several series
+};
+
+/// Collective. Recognises a path by content and checks it completely (fields: every checksum).
+/// Problems of the file come in the result, never as exceptions.
+Inspection inspect_path(const std::filesystem::path& path,
+                        const InspectOptions& options,
+                        const Communicator& communicator);
+
+/// The worst exit code of an inspection and its items.
+ExitCode worst_exit_code(const Inspection& inspection);
+
+/// {path, kind, ok, exit_code, error?, warnings, facts..., items?}.
+nlohmann::ordered_json to_json(const Inspection& inspection);
+
+/// For people: one fact per line.
+std::string to_text(const Inspection& inspection);
+
+}  // namespace af
