@@ -145,10 +145,10 @@ CtVolume read_ct_image(const fs::path& path, HuValues& values, std::vector<std::
                      " picture has no HU values and no patient frame; a CT is DICOM, NIfTI, "
                      "MetaImage or NRRD");
   const ImageHeader header = read_image_header(path, *format);
+  check_image_payload(path, header, &warnings);
   const RawImage image = read_raw_image(path, *format, [&](const RawImage& seen) {
     check_is_scalar_volume(seen, path);
     check_grid(grid_of(seen), file);
-    check_image_payload(path, header, &warnings);
   });
   CtVolume ct;
   ct.grid = grid_of(image);

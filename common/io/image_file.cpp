@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "base/error.h"
+#include "io/dicom_pixels.h"
 #include "io/image_header.h"
 #include "io/itk_image_io.h"
 
@@ -78,6 +79,16 @@ void check_is_image(const Image2d& image) {
         "an image to write has pixels for its size");
 }
 
+Image2d read_dicom_image(const fs::path& path) {
+  const DicomPixelLayout layout = dicom_pixel_layout(DicomElements::read(path));
+  const std::vector<double> values = read_dicom_pixels(layout);
+  Image2d image(layout.columns, layout.rows);
+  std::transform(values.begin(), values.end(), image.pixels.begin(), [](const double value) {
+    return static_cast<float>(value);
+  });
+  return image;
+}
+
 std::size_t extent(int value) {
   return static_cast<std::size_t>(value);
 }
@@ -90,11 +101,11 @@ Image2d read_image(const fs::path& path) {
     throw FileError(path.string(),
                     "not an image: its content is none of MetaImage, NIfTI, NRRD, TIFF, PNG, "
                     "DICOM");
+  if (*format == ImageFormat::Dicom) return read_dicom_image(path);
   const ImageHeader header = read_image_header(path, *format);
-  const RawImage raw = read_raw_image(path, *format, [&](const RawImage& seen) {
-    check_is_2d(seen, path);
-    check_image_payload(path, header, nullptr);
-  });
+  check_image_payload(path, header, nullptr);
+  const RawImage raw =
+      read_raw_image(path, *format, [&](const RawImage& seen) { check_is_2d(seen, path); });
   Image2d image(static_cast<int>(raw.size[0]), static_cast<int>(raw.size[1]));
   visit_values(raw, [&](const auto values) {
     std::transform(values.begin(), values.end(), image.pixels.begin(), [](const auto value) {

@@ -9,8 +9,7 @@
 #include <fstream>
 #include <limits>
 #include <map>
-#include <memory>
-#include <span>
+#include <new>
 #include <sstream>
 #include <zlib.h>
 
@@ -28,6 +27,7 @@ constexpr std::size_t kMaxTextHeaderBytes = 1u << 20;
 constexpr std::uint64_t kMaxVoxels = std::uint64_t{1} << 32;
 /// Deflate cannot expand a byte to more than this many.
 constexpr std::uint64_t kMaxDeflateRatio = 1040;
+constexpr float kMaxOrientationMm = 1e6f;
 constexpr std::size_t kNifti1HeaderBytes = 348;
 constexpr std::size_t kNifti2HeaderBytes = 540;
 
@@ -47,17 +47,36 @@ bool is_gzip(std::string_view bytes) {
   return bytes.starts_with("\x1f\x8b");
 }
 
-struct GzCloser {
-  void operator()(gzFile file) const { gzclose(file); }
+/// An inflating zlib stream (zlib or gzip wrapped) that releases itself.
+class Inflater {
+ public:
+  Inflater() {
+    // 15 bits of window; + 32 detects zlib or gzip framing by itself.
+    if (inflateInit2(&stream_, 15 + 32) != Z_OK) throw std::bad_alloc();
+  }
+  ~Inflater() { inflateEnd(&stream_); }
+  Inflater(const Inflater&) = delete;
+  Inflater& operator=(const Inflater&) = delete;
+  z_stream& stream() { return stream_; }
+
+ private:
+  z_stream stream_{};
 };
 
-/// First bytes of a file, inflated when it is gzip; shorter when the file is.
-std::string read_inflated_prefix(const fs::path& path, unsigned bytes) {
-  const std::unique_ptr<std::remove_pointer_t<gzFile>, GzCloser> file(gzopen(path.c_str(), "rb"));
-  if (!file) throw FileError(path.string(), "cannot be opened: " + std::string(strerror(errno)));
+/// First bytes of a file, inflated when it is gzip; fewer when there are not as many.
+std::string read_inflated_prefix(const fs::path& path, std::size_t bytes) {
+  constexpr std::size_t kInputBytes = 1u << 14;
+  std::string input = read_prefix(path, std::max(bytes, kInputBytes));
+  if (!is_gzip(input)) return input.substr(0, bytes);
   std::string prefix(bytes, '\0');
-  const int got = gzread(file.get(), prefix.data(), bytes);
-  prefix.resize(got > 0 ? static_cast<std::size_t>(got) : 0);
+  Inflater inflater;
+  z_stream& stream = inflater.stream();
+  stream.next_in = reinterpret_cast<unsigned char*>(input.data());
+  stream.avail_in = static_cast<unsigned>(input.size());
+  stream.next_out = reinterpret_cast<unsigned char*>(prefix.data());
+  stream.avail_out = static_cast<unsigned>(bytes);
+  (void)inflate(&stream, Z_SYNC_FLUSH);  // what came out before an error is still told apart
+  prefix.resize(bytes - stream.avail_out);
   return prefix;
 }
 
@@ -233,12 +252,39 @@ bool is_true(const TextHeader& header, const std::string& key, bool fallback) {
   return (*value)[0] == 'T' || (*value)[0] == 't' || (*value)[0] == '1';
 }
 
+/// MetaIO prints to the terminal when it meets what is no number.
+void check_meta_numbers(const TextHeader& header) {
+  for (const char* key : {"elementspacing",
+                          "elementsize",
+                          "offset",
+                          "position",
+                          "origin",
+                          "transformmatrix",
+                          "rotation",
+                          "orientation",
+                          "centerofrotation"}) {
+    const std::string* text = header.find(key);
+    if (text == nullptr) continue;
+    std::istringstream words(*text);
+    for (std::string word; words >> word;) {
+      double value = 0.0;
+      const char* first = word.data() + (word[0] == '+' ? 1 : 0);
+      const auto [end, error] = std::from_chars(first, word.data() + word.size(), value);
+      if (error != std::errc() || end != word.data() + word.size())
+        throw FileError(header.path, key, "numbers", "'" + *text + "'");
+      if (!std::isfinite(value))
+        throw InputError(key, "'" + *text + "'", "must be finite", header.path);
+    }
+  }
+}
+
 ImageHeader read_meta_header(const fs::path& path) {
   const TextHeader text = parse_meta_text(path);
   ImageHeader header;
   header.format = ImageFormat::MetaImage;
   const std::int64_t dimension = checked_dimension(text, "ndims");
   header.size = parse_sizes(text.path, text.require("dimsize"), dimension);
+  check_meta_numbers(text);
   const std::int64_t channels = text.integer("elementnumberofchannels", 1);
   if (channels < 1 || channels > 1024)
     throw FileError(text.path, "ElementNumberOfChannels", "1 to 1024", std::to_string(channels));
@@ -451,6 +497,14 @@ void check_nifti_numbers(const std::string& path, std::string_view raw, bool swa
                        "spacing must be positive and finite (mm)",
                        path);
   }
+  // Single-precision orientation: quaternion, offsets, handedness, and the rows of the sform. ITK's
+  // singular value decomposition does not survive what is not finite.
+  for (std::size_t offset = 256; offset < 328; offset += 4)
+    if (!(std::abs(load<float>(raw, offset, swapped)) < kMaxOrientationMm))
+      throw InputError("orientation (header byte " + std::to_string(offset) + ")",
+                       std::to_string(load<float>(raw, offset, swapped)),
+                       "must be finite and below 1e6",
+                       path);
   const float slope = load<float>(raw, 112, swapped);
   const float intercept = load<float>(raw, 116, swapped);
   if (!std::isfinite(slope) || !std::isfinite(intercept))
@@ -503,23 +557,67 @@ ImageHeader read_nifti_header(const fs::path& path) {
   return header;
 }
 
-// ---- payload ----
+// ---- PNG ----
 
-/// An inflating zlib stream (zlib or gzip wrapped) that releases itself.
-class Inflater {
- public:
-  Inflater() {
-    // 15 bits of window; + 32 detects zlib or gzip framing by itself.
-    if (inflateInit2(&stream_, 15 + 32) != Z_OK) throw std::bad_alloc();
+std::uint32_t big_endian(std::string_view bytes) {
+  std::uint32_t value = 0;
+  for (const char byte : bytes) value = value << 8 | static_cast<unsigned char>(byte);
+  return value;
+}
+
+/// Checks IHDR; libpng aborts the process on what it does not like there.
+void check_png_header(const std::string& path, std::string_view data) {
+  constexpr std::uint32_t kMaxPngSide = 1000000;  // libpng's own limit
+  const std::uint32_t width = big_endian(data.substr(0, 4));
+  const std::uint32_t height = big_endian(data.substr(4, 4));
+  if (width < 1 || height < 1 || width > kMaxPngSide || height > kMaxPngSide)
+    throw FileError(path,
+                    "PNG size",
+                    "1 to 1000000 pixels",
+                    std::to_string(width) + " x " + std::to_string(height));
+  const int depth = data[8];
+  const int color = data[9];
+  if (color == 2 || color == 3 || color == 4 || color == 6)
+    throw InputError("PNG colour type", std::to_string(color), "must be 0, plain grey", path);
+  if (color != 0 || std::string_view("\1\2\4\10\20").find(data[8]) == std::string_view::npos ||
+      data[10] != 0 || data[11] != 0 || (data[12] & ~1) != 0)
+    throw FileError(
+        path,
+        "PNG header",
+        "grey of 1 to 16 bits",
+        "colour type " + std::to_string(color) + ", " + std::to_string(depth) + " bits");
+}
+
+/// Walks the chunks of a PNG file with their checksums up to its end mark.
+void check_png(const fs::path& path) {
+  const std::uint64_t file_bytes = existing_file_size(path, path);
+  std::ifstream file(path, std::ios::binary);
+  std::uint64_t at = 8;  // behind the signature
+  for (bool is_first = true;; is_first = false) {
+    std::array<char, 8> head{};
+    file.seekg(static_cast<std::streamoff>(at));
+    file.read(head.data(), head.size());
+    const std::uint64_t length = big_endian({head.data(), 4});
+    const std::string_view type(head.data() + 4, 4);
+    if (!file || at + 12 + length > file_bytes)
+      throw FileError(path.string(), "truncated: a PNG chunk reaches beyond the end of the file");
+    std::string data(length + 4, '\0');
+    file.read(data.data(), static_cast<std::streamsize>(data.size()));
+    uLong crc = crc32(0, reinterpret_cast<const unsigned char*>(type.data()), 4);
+    crc =
+        crc32(crc, reinterpret_cast<const unsigned char*>(data.data()), static_cast<uInt>(length));
+    if (crc != big_endian(std::string_view(data).substr(length)))
+      throw FileError(path.string(),
+                      "corrupt: the checksum of PNG chunk " + std::string(type) + " is wrong");
+    if (is_first && (type != "IHDR" || length != 13))
+      throw FileError(path.string(), "PNG file does not begin with its header");
+    if (is_first) check_png_header(path.string(), data);
+    if (type == "IEND") return;
+    at += 12 + length;
   }
-  ~Inflater() { inflateEnd(&stream_); }
-  Inflater(const Inflater&) = delete;
-  Inflater& operator=(const Inflater&) = delete;
-  z_stream& stream() { return stream_; }
+}
 
- private:
-  z_stream stream_{};
-};
+// ---- payload ----
 
 /// Bytes that a compressed stream inflates to; throws when it is cut or its checksum is wrong.
 std::uint64_t inflated_bytes(const fs::path& path, std::uint64_t offset) {
@@ -619,6 +717,7 @@ ImageHeader read_image_header(const fs::path& path, ImageFormat format) {
 void check_image_payload(const fs::path& path,
                          const ImageHeader& header,
                          std::vector<std::string>* warnings) {
+  if (header.format == ImageFormat::Png) check_png(path);
   if (header.size.empty()) return;
   const std::uint64_t expected = checked_payload_bytes(path, header) + header.skip_bytes;
   const std::uint64_t file_bytes = existing_file_size(path, header.data_file);

@@ -49,7 +49,8 @@ ImageHeader read_image_header(const std::filesystem::path& path, ImageFormat for
 
 /// Checks that all voxels which the header promises are there: by file size, or by decompressing to
 /// the end (which also verifies the stream's own checksum). The libraries behind ITK fill missing
-/// voxels with zeros. FileError names expected and found bytes; surplus bytes are a warning.
+/// voxels with zeros, and that of PNG aborts the process on a damaged header, which is walked
+/// here first. FileError names expected and found bytes; surplus bytes are a warning.
 void check_image_payload(const std::filesystem::path& path,
                          const ImageHeader& header,
                          std::vector<std::string>* warnings);

@@ -5,7 +5,6 @@
 #include <string_view>
 #include <utility>
 
-#include <itkGDCMImageIO.h>
 #include <itkMetaImageIO.h>
 #include <itkNiftiImageIO.h>
 #include <itkNrrdImageIO.h>
@@ -73,7 +72,7 @@ itk::ImageIOBase::Pointer make_image_io(ImageFormat format) {
     case ImageFormat::Dicom:
       break;
   }
-  return itk::GDCMImageIO::New().GetPointer();
+  throw std::logic_error("DICOM is read by dicom_pixels");
 }
 
 ValueType value_type_of(const itk::ImageIOBase& io, const fs::path& path) {
@@ -219,20 +218,8 @@ RawImage read_raw_image(const fs::path& path,
 
 void write_raw_image(const RawImage& image, const fs::path& path) {
   const WritableFormat target = writable_format(path);
-  write_atomically(path, [&](const fs::path& partial) {
-    // ITK's writers insist on their extension, which a partial name may not end with.
-    const bool fits = partial.string().ends_with(target.extension);
-    const fs::path file =
-        fits ? partial : fs::path(partial.string() + std::string(target.extension));
-    try {
-      write_by_itk(image, file, target.format);
-      if (!fits) fs::rename(file, partial);
-    } catch (...) {
-      std::error_code ignored;
-      if (!fits) fs::remove(file, ignored);
-      throw;
-    }
-  });
+  write_atomically(path,
+                   [&](const fs::path& partial) { write_by_itk(image, partial, target.format); });
 }
 
 }  // namespace af

@@ -19,8 +19,8 @@ table='
 ^common/simulation/  | simulation drr volume field image geometry base |
 ^common/parallel/    | parallel base | MPI
 ^common/cli/         | cli parallel base | IOSTREAM
-^common/io/(itk_image_io|dicom_series)[.] | io volume image geometry base | ITK
-^common/io/(ct_reader|xray_reader)[.] | io volume image geometry base |
+^common/io/(itk_image_io|dicom_pixels)[.] | io base | ITK
+^common/io/(ct_reader|dicom_series|xray_reader)[.] | io volume image geometry base |
 ^common/io/field_file[a-z0-9_]*[.] | io field parallel image geometry base | MPI HDF5
 ^common/io/          | io image geometry base |
 ^common/tools/       | * | IOSTREAM

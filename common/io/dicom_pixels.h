@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "io/dicom_elements.h"
+
+namespace af {
+
+/// How one DICOM file holds its single grey frame; checked against the bytes that are there.
+struct DicomPixelLayout {
+  std::filesystem::path path;
+  int columns = 0;
+  int rows = 0;
+  double slope = 1.0;  ///< modality rescale; 1 and 0 when the file has none
+  double intercept = 0.0;
+};
+
+/// InputError for more than one frame or channel, for colour
+/// and a half-given rescale; FileError for impossible bit depths or too few pixel bytes.
+DicomPixelLayout dicom_pixel_layout(const DicomElements& header);
+
+/// Decoded pixels (GDCM) with the rescale applied, row 0 on top.
+std::vector<double> read_dicom_pixels(const DicomPixelLayout& layout);
+
+}  // namespace af

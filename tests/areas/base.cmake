@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+af_add_test(base_test SOURCES unit/base/base_test.cpp LIBS af_base af_cli)

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+af_add_test(image_test SOURCES unit/image/image_test.cpp LIBS af_image)

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <array>
+#include <cmath>
+#include <set>
+
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+#include "base/hash_random.h"
+#include "base/vector_width.h"
+#include "cli/progress_printer.h"
+
+namespace af {
+namespace {
+
+TEST(HashRandom, DependsOnItsKeysAloneAndOnAllOfThem) {
+  EXPECT_EQ(HashRandom(1, 2, 3).next_bits(), HashRandom(1, 2, 3).next_bits());
+  const std::set<std::uint64_t> values{HashRandom(1, 2, 3).next_bits(),
+                                       HashRandom(9, 2, 3).next_bits(),
+                                       HashRandom(1, 9, 3).next_bits(),
+                                       HashRandom(1, 2, 9).next_bits()};
+  EXPECT_EQ(values.size(), 4u);
+  EXPECT_NE(hash_name("skull-01"), hash_name("skull-02"));
+}
+
+TEST(HashRandom, UniformAndNormalHaveTheirMoments) {
+  constexpr int kDraws = 200000;
+  HashRandom random(7);
+  double mean = 0.0;
+  double normal_mean = 0.0;
+  double normal_square = 0.0;
+  std::array<int, 10> bins{};
+  for (int i = 0; i < kDraws; ++i) {
+    const double value = random.uniform();
+    ASSERT_GE(value, 0.0);
+    ASSERT_LT(value, 1.0);
+    mean += value / kDraws;
+    ++bins[static_cast<std::size_t>(value * 10.0)];
+    const double normal = random.normal();
+    normal_mean += normal / kDraws;
+    normal_square += normal * normal / kDraws;
+  }
+  // Five standard errors: 0.289 / sqrt(n), sqrt(n p q) / n, 1 / sqrt(n) and sqrt(2 / n).
+  const double root = std::sqrt(static_cast<double>(kDraws));
+  EXPECT_NEAR(mean, 0.5, 5 * 0.289 / root);
+  for (const int count : bins) EXPECT_NEAR(count, kDraws / 10.0, 5 * 0.3 * root);
+  EXPECT_NEAR(normal_mean, 0.0, 5 / root);
+  EXPECT_NEAR(normal_square, 1.0, 5 * std::sqrt(2.0) / root);
+}
+
+TEST(Error, NamesFileFieldValueAndConstraint) {
+  const InputError error("roi_px", "[1, 2]", "must have four values", "study.toml");
+  EXPECT_STREQ(error.what(), "study.toml: roi_px = [1, 2]: must have four values");
+  EXPECT_EQ(error.exit_code(), ExitCode::Input);
+  const FileError truncated("a.h5", "/field", "10 bytes", "7 bytes");
+  EXPECT_STREQ(truncated.what(), "a.h5: /field: expected 10 bytes, found 7 bytes");
+  EXPECT_EQ(truncated.exit_code(), ExitCode::File);
+}
+
+TEST(Error, ThrowIfAnyListsEveryProblem) {
+  EXPECT_NO_THROW(throw_if_any({}));
+  try {
+    throw_if_any({"a is bad", "b is worse"}, "f.toml");
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_STREQ(error.what(), "f.toml: a is bad\n  f.toml: b is worse");
+  }
+}
+
+TEST(VectorWidth, ForcedWidthIsUsedUntilReleased) {
+  for (const VectorWidth width : supported_vector_widths()) {
+    force_vector_width(width);
+    EXPECT_EQ(active_vector_width(), width);
+  }
+  force_vector_width(std::nullopt);
+  EXPECT_EQ(supported_vector_widths().front(), VectorWidth::Bits128);
+}
+
+TEST(DurationText, ReadsLikeAPersonWouldSay) {
+  EXPECT_EQ(cli::duration_text(12.34), "12.3 s");
+  EXPECT_EQ(cli::duration_text(200), "3 min 20 s");
+  EXPECT_EQ(cli::duration_text(3900), "1 h 05 min");
+}
+
+}  // namespace
+}  // namespace af

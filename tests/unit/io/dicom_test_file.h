@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace af::test {
+
+/// A DICOM file (explicit VR, little endian) written byte by byte, independently of the library
+/// that reads it, so that tests can also write wrong ones.
+class DicomTestFile {
+ public:
+  using Tag = std::pair<std::uint16_t, std::uint16_t>;
+
+  void set_text(Tag tag, const std::string& vr, std::string value) {
+    if (value.size() % 2 != 0) value += vr == "UI" ? '\0' : ' ';
+    elements_[tag] = {vr, std::move(value)};
+  }
+  void set_u16(Tag tag, std::uint16_t value) {
+    std::string bytes;
+    append(bytes, value, 2);
+    elements_[tag] = {"US", bytes};
+  }
+  void set_pixels(const std::vector<std::int16_t>& pixels) {
+    std::string bytes;
+    for (const std::int16_t pixel : pixels) append(bytes, static_cast<std::uint16_t>(pixel), 2);
+    elements_[{0x7fe0, 0x0010}] = {"OW", bytes};
+  }
+  void erase(Tag tag) { elements_.erase(tag); }
+
+  void write(const std::filesystem::path& path) const {
+    std::string meta;
+    append_element(meta, {0x0002, 0x0002}, {"UI", text_or({0x0008, 0x0016})});
+    append_element(meta, {0x0002, 0x0003}, {"UI", text_or({0x0008, 0x0018})});
+    append_element(meta, {0x0002, 0x0010}, {"UI", std::string("1.2.840.10008.1.2.1\0", 20)});
+    std::string length;
+    append(length, meta.size(), 4);
+    std::string bytes(128, '\0');
+    bytes += "DICM";
+    append_element(bytes, {0x0002, 0x0000}, {"UL", length});
+    bytes += meta;
+    for (const auto& [tag, element] : elements_) append_element(bytes, tag, element);
+    std::ofstream(path, std::ios::binary) << bytes;
+  }
+
+ private:
+  struct Element {
+    std::string vr;
+    std::string bytes;
+  };
+
+  static void append(std::string& bytes, std::uint64_t value, int count) {
+    for (int i = 0; i < count; ++i) bytes += static_cast<char>(value >> (8 * i) & 0xff);
+  }
+  static void append_element(std::string& bytes, Tag tag, const Element& element) {
+    append(bytes, tag.first, 2);
+    append(bytes, tag.second, 2);
+    bytes += element.vr;
+    if (element.vr == "OW") {
+      append(bytes, 0, 2);
+      append(bytes, element.bytes.size(), 4);
+    } else {
+      append(bytes, element.bytes.size(), 2);
+    }
+    bytes += element.bytes;
+  }
+  [[nodiscard]] std::string text_or(Tag tag) const {
+    const auto found = elements_.find(tag);
+    return found == elements_.end() ? std::string() : found->second.bytes;
+  }
+
+  std::map<Tag, Element> elements_;
+};
+
+}  // namespace af::test
