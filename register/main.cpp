@@ -10,7 +10,6 @@
 #include "io/study_file.h"
 #include "register/multi_start_program.h"
 #include "register/register_command.h"
-#include "register/result_files.h"
 #include "register/target_errors_program.h"
 
 namespace {
@@ -106,14 +105,15 @@ void run(const RegisterOptions& options,
       af::all_or_none(world, [&] { return study.find_case(options.case_name); });
   const std::vector<af::RigidTransform> starts =
       af::all_or_none(world, [&] { return start_poses(options, study_case.frame()); });
-  af::all_or_none(world, [&] {
-    if (world.is_root()) af::make_output_folder(options.output_folder);
-  });
-
   const LoadedCase loaded = load_case(study, study_case, case_load_options(options), world);
   for (const std::string& text : loaded.warnings) af::cli::warn(world, text);
   RegistrationRunner runner =
       af::all_or_none(world, [&] { return RegistrationRunner(loaded.problem, method); });
+  // Before the work, so that an unwritable folder does not cost it; after the inputs, so that bad
+  // ones leave nothing behind.
+  af::all_or_none(world, [&] {
+    if (world.is_root()) af::make_output_folder(options.output_folder);
+  });
 
   af::cli::ProgressPrinter printer("registrations", world.is_root() && starts.size() > 1);
   const auto total = static_cast<double>(starts.size());
