@@ -137,6 +137,8 @@ void run(const RegisterOptions& options,
 
 }  // namespace
 
+// Binding options can throw only by a defect, which may well end the program.
+// NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
   RegisterOptions options;
   CLI::App app{

@@ -83,6 +83,8 @@ void run(const DrrOptions& options, const af::Communicator& world) {
 
 }  // namespace
 
+// Binding options can throw only by a defect, which may well end the program.
+// NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
   DrrOptions options;
   CLI::App app{
