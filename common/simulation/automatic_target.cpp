@@ -14,8 +14,9 @@ namespace {
 
 constexpr int kBoneHu = 250;
 constexpr int kAirBelowHu = -900;
-constexpr double kCell_mm = 5.0;
-constexpr double kCentralness_mm = 60.0;
+constexpr double kCellMm = 5.0;
+constexpr int kMarginCells = 3;  // between box and CT: a region of interest sees a little more
+constexpr double kCentralnessMm = 40.0;
 
 std::size_t voxel_offset(const CtGrid& grid, int j, int k) {
   return (static_cast<std::size_t>(k) * static_cast<std::size_t>(grid.size[1]) +
@@ -64,12 +65,12 @@ class BoneTable {
   BoneTable(const CtVolume& ct, const CtBox& bounds) : low_mm_(bounds.low_mm) {
     for (int axis = 0; axis < 3; ++axis)
       cells_[static_cast<std::size_t>(axis)] = std::max(
-          1, static_cast<int>(std::ceil((bounds.high_mm[axis] - bounds.low_mm[axis]) / kCell_mm)));
+          1, static_cast<int>(std::ceil((bounds.high_mm[axis] - bounds.low_mm[axis]) / kCellMm)));
     sums_.assign(static_cast<std::size_t>(cells_[0] + 1) * static_cast<std::size_t>(cells_[1] + 1) *
                      static_cast<std::size_t>(cells_[2] + 1),
                  0.0);
     for_each_voxel_from(ct, kBoneHu, [&](const Eigen::Vector3d& index, int) {
-      const Eigen::Vector3d cell = (ct.grid.point_mm(index) - low_mm_) / kCell_mm;
+      const Eigen::Vector3d cell = (ct.grid.point_mm(index) - low_mm_) / kCellMm;
       at(cell_index(cell.x(), 0) + 1, cell_index(cell.y(), 1) + 1, cell_index(cell.z(), 2) + 1) +=
           1.0;
     });
@@ -85,7 +86,7 @@ class BoneTable {
   }
   [[nodiscard]] Eigen::Vector3d middle_mm(const std::array<int, 3>& a,
                                           const std::array<int, 3>& b) const {
-    return low_mm_ + 0.5 * kCell_mm * Eigen::Vector3d(a[0] + b[0], a[1] + b[1], a[2] + b[2]);
+    return low_mm_ + 0.5 * kCellMm * Eigen::Vector3d(a[0] + b[0], a[1] + b[1], a[2] + b[2]);
   }
 
  private:
@@ -113,24 +114,37 @@ class BoneTable {
   std::vector<double> sums_;
 };
 
+/// Positions [first, last] that the low corner of a box of `extent` cells may take on an axis.
+struct CellRange {
+  int first;
+  int last;
+};
+
+CellRange low_corner_range(int cells, int extent) {
+  const int margin = std::clamp((cells - extent) / 2, 0, kMarginCells);
+  return {margin, cells - extent - margin};
+}
+
 /// The centre of the best box on the lattice.
 Eigen::Vector3d best_box_center(const BoneTable& bone,
                                 const Eigen::Vector3d& centroid_mm,
                                 double side_mm) {
   std::array<int, 3> extent{};
-  for (std::size_t axis = 0; axis < 3; ++axis)
-    extent[axis] = std::min(bone.cells()[axis], static_cast<int>(std::lround(side_mm / kCell_mm)));
+  std::array<CellRange, 3> range{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    extent[axis] = std::min(bone.cells()[axis], static_cast<int>(std::lround(side_mm / kCellMm)));
+    range[axis] = low_corner_range(bone.cells()[axis], extent[axis]);
+  }
   Eigen::Vector3d best = centroid_mm;
   double best_score = 0.0;
-  for (int k = 0; k + extent[2] <= bone.cells()[2]; ++k)
-    for (int j = 0; j + extent[1] <= bone.cells()[1]; ++j)
-      for (int i = 0; i + extent[0] <= bone.cells()[0]; ++i) {
+  for (int k = range[2].first; k <= range[2].last; ++k)
+    for (int j = range[1].first; j <= range[1].last; ++j)
+      for (int i = range[0].first; i <= range[0].last; ++i) {
         const std::array<int, 3> low{i, j, k};
         const std::array<int, 3> high{i + extent[0], j + extent[1], k + extent[2]};
         const Eigen::Vector3d middle = bone.middle_mm(low, high);
-        const double distance_squared = (middle - centroid_mm).squaredNorm();
-        const double score = bone.within(low, high) * std::exp(-0.5 * distance_squared /
-                                                               (kCentralness_mm * kCentralness_mm));
+        const double distance = (middle - centroid_mm).norm() / kCentralnessMm;
+        const double score = bone.within(low, high) * std::exp(-0.5 * distance * distance);
         if (score > best_score) {
           best_score = score;
           best = middle;
@@ -168,10 +182,11 @@ RegistrationTarget find_target(const CtVolume& ct, double side_mm) {
   if (bone.total() > 0.0)
     center = bone_centroid_within(
         ct, target_box_at(best_box_center(bone, centroid_mm, side_mm), side_mm).box_ct);
-  // Keep the box within the CT where the CT is large enough for it.
+  // Keep the box and its margin within the CT where the CT is large enough for them.
+  const double reach_mm = 0.5 * side_mm + kMarginCells * kCellMm;
   for (int axis = 0; axis < 3; ++axis) {
-    const double low = bounds.low_mm[axis] + 0.5 * side_mm;
-    const double high = bounds.high_mm[axis] - 0.5 * side_mm;
+    const double low = bounds.low_mm[axis] + reach_mm;
+    const double high = bounds.high_mm[axis] - reach_mm;
     center[axis] = low <= high ? std::clamp(center[axis], low, high) : 0.5 * (low + high);
   }
   return target_box_at(center, side_mm);
@@ -181,9 +196,9 @@ RegionOfInterest target_region(const CameraGeometry& camera,
                                const RigidTransform& room_from_ct,
                                const RegistrationTarget& target,
                                const Eigen::Vector2i& wanted_px) {
-  constexpr double kBoxMargin_px = 8.0;
-  constexpr int kDetectorMargin_px = 2;
-  constexpr int kSmallestSide_px = 16;
+  constexpr double kBoxMarginPx = 8.0;
+  constexpr int kDetectorMarginPx = 2;
+  constexpr int kSmallestSidePx = 16;
   Eigen::Array2d low = Eigen::Array2d::Constant(std::numeric_limits<double>::infinity());
   Eigen::Array2d high = -low;
   for (const Eigen::Vector3d& corner : target.box_ct.corner_points()) {
@@ -196,17 +211,17 @@ RegionOfInterest target_region(const CameraGeometry& camera,
   }
   const Eigen::Array2d middle = 0.5 * (low + high);
   const Eigen::Array2d side =
-      (high - low + 2.0 * kBoxMargin_px).max(wanted_px.cast<double>().array());
+      (high - low + 2.0 * kBoxMarginPx).max(wanted_px.cast<double>().array());
   Eigen::Array2i first{};
   Eigen::Array2i last{};  // one past the end
   for (int axis = 0; axis < 2; ++axis) {
-    const double furthest = camera.size_px[axis] - kDetectorMargin_px;
+    const double furthest = camera.size_px[axis] - kDetectorMarginPx;
     const double begin = std::round(middle[axis] - 0.5 * side[axis] + 0.5);
     first[axis] =
-        static_cast<int>(std::clamp(begin, static_cast<double>(kDetectorMargin_px), furthest));
+        static_cast<int>(std::clamp(begin, static_cast<double>(kDetectorMarginPx), furthest));
     last[axis] = static_cast<int>(std::clamp(
-        begin + std::ceil(side[axis]), static_cast<double>(kDetectorMargin_px), furthest));
-    if (last[axis] - first[axis] < kSmallestSide_px)
+        begin + std::ceil(side[axis]), static_cast<double>(kDetectorMarginPx), furthest));
+    if (last[axis] - first[axis] < kSmallestSidePx)
       throw InputError("the target's projection misses the detector of camera '" + camera.name +
                        "': give --center-ct-mm, or another rig");
   }
@@ -214,11 +229,11 @@ RegionOfInterest target_region(const CameraGeometry& camera,
 }
 
 Eigen::Vector2i default_region_size_px(const CameraGeometry& camera) {
-  constexpr int kUsualSide_px = 200;
+  constexpr int kUsualSidePx = 200;
   constexpr double kLargestShare = 0.6;
   return (camera.size_px.cast<double>() * kLargestShare)
       .cast<int>()
-      .cwiseMin(Eigen::Vector2i::Constant(kUsualSide_px));
+      .cwiseMin(Eigen::Vector2i::Constant(kUsualSidePx));
 }
 
 }  // namespace af

@@ -17,10 +17,11 @@ struct RegistrationTarget {
 RegistrationTarget target_box_at(const Eigen::Vector3d& center_ct_mm, double side_mm);
 
 /// The bone-rich place near the centre of the patient: of all boxes of `side_mm` (on a 5 mm
-/// lattice, within the CT), the one with the most bone (voxels >= 250 HU) weighted by exp(-d^2 / (2
-/// s^2)), d being its distance from the centroid of attenuation and s = 60 mm; then centred once on
-/// the bone inside it. On a trunk this is a vertebra, on a head the skull base. A CT without bone
-/// gets the box at the centroid. \test AutomaticTarget.FindsTheMiddleVertebraOfTheSpinePhantom
+/// lattice, 15 mm within the CT), the one with the most bone (voxels >= 250 HU) weighted by
+/// exp(-d^2 / (2 s^2)), d being its distance from the centroid of attenuation and s = 40 mm; then
+/// centred once on the bone inside it. On a trunk this is a vertebra, on a head the skull base. A
+/// CT without bone gets the box at the centroid. \test
+/// AutomaticTarget.FindsTheMiddleVertebraOfTheSpinePhantom
 RegistrationTarget find_target(const CtVolume& ct, double side_mm = 60.0);
 
 /// The region of a view for a target at a pose: as wide and high as `wanted_px` or the projected

@@ -12,9 +12,9 @@ namespace af {
 
 namespace {
 
-constexpr double kTetrahedronEdge_mm = 25.0;
-constexpr double kLeastDistance_mm = 15.0;
-constexpr double kSearchRadius_mm = 10.0;
+constexpr double kTetrahedronEdgeMm = 25.0;
+constexpr double kLeastDistanceMm = 15.0;
+constexpr double kSearchRadiusMm = 10.0;
 constexpr int kBoneHu = 250;
 
 struct Interval {
@@ -30,7 +30,7 @@ struct Interval {
 
 bool keeps_distance(const Eigen::Vector3d& point, const std::vector<SteelCylinder>& placed) {
   return std::all_of(placed.begin(), placed.end(), [&](const SteelCylinder& other) {
-    return (other.center_point - point).norm() >= kLeastDistance_mm;
+    return (other.center_point - point).norm() >= kLeastDistanceMm;
   });
 }
 
@@ -44,13 +44,13 @@ Eigen::Vector3d nearest_bone(const CtVolume& ct,
   std::array<int, 3> high{};
   for (int axis = 0; axis < 3; ++axis) {
     const auto a = static_cast<std::size_t>(axis);
-    const double reach = kSearchRadius_mm / grid.spacing_mm[axis];
+    const double reach = kSearchRadiusMm / grid.spacing_mm[axis];
     const double last = grid.size[a] - 1;
     low[a] = static_cast<int>(std::ceil(std::clamp(index[axis] - reach, 0.0, last)));
     high[a] = static_cast<int>(std::floor(std::clamp(index[axis] + reach, 0.0, last)));
   }
   Eigen::Vector3d best = wanted;
-  double best_distance = kSearchRadius_mm;
+  double best_distance = kSearchRadiusMm;
   for (int k = low[2]; k <= high[2]; ++k)
     for (int j = low[1]; j <= high[1]; ++j)
       for (int i = low[0]; i <= high[0]; ++i) {
@@ -104,7 +104,7 @@ double SteelCylinder::chord_length_mm(const Eigen::Vector3d& source_point,
 
 std::vector<SteelCylinder> place_fiducials(const CtVolume& ct,
                                            const Eigen::Vector3d& center_ct_mm) {
-  const double reach = kTetrahedronEdge_mm / std::sqrt(8.0);  // half the enclosing cube's side
+  const double reach = kTetrahedronEdgeMm / std::sqrt(8.0);  // half the enclosing cube's side
   const std::array<Eigen::Vector3d, 4> corners{Eigen::Vector3d(1, 1, 1),
                                                Eigen::Vector3d(1, -1, -1),
                                                Eigen::Vector3d(-1, 1, -1),

@@ -48,7 +48,7 @@ const MaterialData& data_of(Material material) {
 }  // namespace
 
 double mass_attenuation_cm2_per_g(Material material, double energy_kev) {
-  if (!(energy_kev >= kLowestTableEnergy_kev && energy_kev <= kHighestTableEnergy_kev))
+  if (!(energy_kev >= kLowestTableEnergyKev && energy_kev <= kHighestTableEnergyKev))
     throw InputError("photon energy",
                      std::to_string(energy_kev) + " keV",
                      "the attenuation tables reach from 10 to 200 keV");
@@ -71,8 +71,8 @@ double linear_attenuation_per_mm(Material material, double energy_kev) {
 }
 
 double effective_energy_kev(double mu_water_per_mm) {
-  double low = kLowestTableEnergy_kev;  // water attenuates less and less up to 200 keV
-  double high = kHighestTableEnergy_kev;
+  double low = kLowestTableEnergyKev;  // water attenuates less and less up to 200 keV
+  double high = kHighestTableEnergyKev;
   const double largest = linear_attenuation_per_mm(Material::Water, low);
   const double smallest = linear_attenuation_per_mm(Material::Water, high);
   if (!(mu_water_per_mm >= smallest && mu_water_per_mm <= largest))

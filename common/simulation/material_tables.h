@@ -7,8 +7,8 @@ namespace af {
 enum class Material { Water, CorticalBone, Aluminium, Iron };
 
 /// Photon energies (keV) that the tables cover.
-inline constexpr double kLowestTableEnergy_kev = 10.0;
-inline constexpr double kHighestTableEnergy_kev = 200.0;
+inline constexpr double kLowestTableEnergyKev = 10.0;
+inline constexpr double kHighestTableEnergyKev = 200.0;
 
 /// Mass attenuation coefficient mu/rho (cm^2/g) with coherent scattering, from J. H. Hubbell and
 /// S. M. Seltzer, NIST Standard Reference Database 126 (NISTIR 5632), tables 3 (Al, Fe) and 4

@@ -13,7 +13,7 @@ namespace af {
 
 namespace {
 
-constexpr double kTextureScale_mm = 3.0;
+constexpr double kTextureScaleMm = 3.0;
 constexpr int kAirHu = -1000;
 
 /// The points that one slice of voxels is the mean of.
@@ -63,7 +63,7 @@ struct SliceSamples {
           int value = solid.hu;
           if (solid.texture_hu != 0)
             value +=
-                static_cast<int>(std::lround(solid.texture_hu * texture(point, kTextureScale_mm)));
+                static_cast<int>(std::lround(solid.texture_hu * texture(point, kTextureScaleMm)));
           hu[offset(i, j, k)] = value;
         }
   }

@@ -14,15 +14,15 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kWidth_mm = 358.0;  // left-right and front-back
-constexpr double kHeight_mm = 280.0;
-constexpr double kPitch_mm = 33.0;         // between vertebrae
-constexpr int kVertebraeEachSide = 4;      // vertebrae below and above T12
-constexpr double kTorsoFront_mm = -115.0;  // skin, y
-constexpr double kTorsoBack_mm = 78.0;
-constexpr double kTorsoHalfWidth_mm = 143.0;
-constexpr double kTorsoMiddle_mm = 0.5 * (kTorsoFront_mm + kTorsoBack_mm);
-constexpr double kTorsoHalfDepth_mm = 0.5 * (kTorsoBack_mm - kTorsoFront_mm);
+constexpr double kWidthMm = 358.0;  // left-right and front-back
+constexpr double kHeightMm = 280.0;
+constexpr double kPitchMm = 33.0;         // between vertebrae
+constexpr int kVertebraeEachSide = 4;     // vertebrae below and above T12
+constexpr double kTorsoFrontMm = -115.0;  // skin, y
+constexpr double kTorsoBackMm = 78.0;
+constexpr double kTorsoHalfWidthMm = 143.0;
+constexpr double kTorsoMiddleMm = 0.5 * (kTorsoFrontMm + kTorsoBackMm);
+constexpr double kTorsoHalfDepthMm = 0.5 * (kTorsoBackMm - kTorsoFrontMm);
 
 constexpr int kFatHu = -100;
 constexpr int kMuscleHu = 50;
@@ -34,7 +34,7 @@ constexpr int kCanalHu = 20;
 constexpr int kCorticalHu = 1000;
 constexpr int kCancellousHu = 230;
 constexpr int kCancellousTextureHu = 110;
-constexpr double kShell_mm = 1.6;
+constexpr double kShellMm = 1.6;
 
 /// A vertebra by its level: 0 is T12, positive towards the head.
 struct Vertebra {
@@ -54,7 +54,7 @@ Vector3d spine_point(double z_mm) {
 
 Vertebra vertebra_at(int level) {
   return {level,
-          spine_point(level * kPitch_mm),
+          spine_point(level * kPitchMm),
           20.0 - 1.1 * level,
           15.0 - 0.5 * level,
           0.5 * (25.5 - 0.7 * level)};
@@ -87,8 +87,8 @@ class BonePainter {
   void add(Solid part) {
     part.hu = kCorticalHu;
     solids_.push_back(part);
-    part.half_sizes_mm -= Vector3d::Constant(kShell_mm);
-    if (part.shape == Solid::Shape::Capsule) part.half_sizes_mm.z() += kShell_mm;
+    part.half_sizes_mm -= Vector3d::Constant(kShellMm);
+    if (part.shape == Solid::Shape::Capsule) part.half_sizes_mm.z() += kShellMm;
     if (!(part.half_sizes_mm.minCoeff() > 0.0)) return;
     part.hu = kCancellousHu;
     part.texture_hu = kCancellousTextureHu;
@@ -146,7 +146,7 @@ void add_disc(int level_below, std::vector<Solid>& solids) {
   const Vertebra above = vertebra_at(level_below + 1);
   solids.push_back(
       elliptic_cylinder(0.5 * (below.center + above.center),
-                        {below.half_width_mm - 0.5, below.half_depth_mm - 0.5, 0.5 * kPitch_mm},
+                        {below.half_width_mm - 0.5, below.half_depth_mm - 0.5, 0.5 * kPitchMm},
                         kDiscHu));
 }
 
@@ -154,7 +154,7 @@ void add_canal(std::vector<Solid>& solids) {
   for (int level = -kVertebraeEachSide - 1; level <= kVertebraeEachSide + 1; ++level) {
     const Vertebra v = vertebra_at(level);
     solids.push_back(elliptic_cylinder(v.center + Vector3d(0.0, v.half_depth_mm + 8.0, 0.0),
-                                       {9.0, 7.5, 0.5 * kPitch_mm},
+                                       {9.0, 7.5, 0.5 * kPitchMm},
                                        kCanalHu));
   }
 }
@@ -168,18 +168,18 @@ std::vector<Vector3d> rib_points(const Vertebra& v, double side) {
   const double end_deg = is_floating ? 85.0 : std::min(150.0, 110.0 + 12.0 * v.level);
   const double total_drop_mm = is_floating ? 45.0 : 75.0;
   // The spine sits deeper than the chest wall's back: the ribs first run backwards, then around.
-  const double half_width = kTorsoHalfWidth_mm - 23.0 - 3.0 * (v.level == 4 ? 1 : 0);
-  const double half_depth = kTorsoHalfDepth_mm - 20.0;
+  const double half_width = kTorsoHalfWidthMm - 23.0 - 3.0 * (v.level == 4 ? 1 : 0);
+  const double half_depth = kTorsoHalfDepthMm - 20.0;
   std::vector<Vector3d> points{
       v.center + Vector3d(side * (v.half_width_mm + 1.0), v.half_depth_mm - 3.0, 8.0),
       v.center + Vector3d(side * (28.0 - v.level), v.half_depth_mm + 13.0, 9.0)};
-  constexpr double kStart_deg = 24.0;
+  constexpr double kStartDeg = 24.0;
   for (int i = 0; i <= kArcPoints; ++i) {
     const double share = static_cast<double>(i) / kArcPoints;
-    const double angle = (kStart_deg + share * (end_deg - kStart_deg)) * kDegree;
+    const double angle = (kStartDeg + share * (end_deg - kStartDeg)) * kDegree;
     const double drop = total_drop_mm * (0.15 * share + 0.85 * share * share) - 4.0;
     points.emplace_back(side * half_width * std::sin(angle),
-                        kTorsoMiddle_mm + half_depth * std::cos(angle),
+                        kTorsoMiddleMm + half_depth * std::cos(angle),
                         v.center.z() - drop);
   }
   return points;
@@ -196,11 +196,11 @@ void add_ribs(std::vector<Solid>& solids) {
 }
 
 void add_soft_tissue(std::vector<Solid>& solids) {
-  const Vector3d middle(0.0, kTorsoMiddle_mm, 0.0);
+  const Vector3d middle(0.0, kTorsoMiddleMm, 0.0);
   solids.push_back(
-      elliptic_cylinder(middle, {kTorsoHalfWidth_mm, kTorsoHalfDepth_mm, kHeight_mm}, kFatHu));
+      elliptic_cylinder(middle, {kTorsoHalfWidthMm, kTorsoHalfDepthMm, kHeightMm}, kFatHu));
   solids.push_back(elliptic_cylinder(
-      middle, {kTorsoHalfWidth_mm - 12.0, kTorsoHalfDepth_mm - 9.0, kHeight_mm}, kMuscleHu));
+      middle, {kTorsoHalfWidthMm - 12.0, kTorsoHalfDepthMm - 9.0, kHeightMm}, kMuscleHu));
   // Fat between the organs, in front of the spine.
   solids.push_back(ellipsoid({0.0, -58.0, -70.0}, {106.0, 44.0, 140.0}, -60, 40));
   // Lung bases reach down beside T11; the left one is narrower for the heart.
@@ -215,7 +215,7 @@ void add_soft_tissue(std::vector<Solid>& solids) {
   solids.push_back(ellipsoid({78.0, -56.0, -70.0}, {10.0, 9.0, 19.0}, kGasHu));
   solids.push_back(ellipsoid({-58.0, 18.0, -52.0}, {26.0, 22.0, 50.0}, 35));  // kidneys
   solids.push_back(ellipsoid({60.0, 18.0, -38.0}, {26.0, 22.0, 50.0}, 35));
-  solids.push_back(elliptic_cylinder({13.0, -27.0, 0.0}, {11.0, 11.0, kHeight_mm}, 45));  // aorta
+  solids.push_back(elliptic_cylinder({13.0, -27.0, 0.0}, {11.0, 11.0, kHeightMm}, 45));  // aorta
 }
 
 }  // namespace
@@ -247,8 +247,8 @@ std::vector<Solid> spine_phantom_solids() {
 CtVolume spine_phantom(const SpinePhantomOptions& options) {
   throw_if_any(problems(options));
   CtGrid grid;
-  const int across = static_cast<int>(std::lround(kWidth_mm / options.voxel_mm));
-  grid.size = {across, across, static_cast<int>(std::lround(kHeight_mm / options.voxel_mm))};
+  const int across = static_cast<int>(std::lround(kWidthMm / options.voxel_mm));
+  grid.size = {across, across, static_cast<int>(std::lround(kHeightMm / options.voxel_mm))};
   grid.spacing_mm = Vector3d::Constant(options.voxel_mm);
   grid.origin_mm =
       -0.5 * options.voxel_mm * Vector3d(grid.size[0] - 1, grid.size[1] - 1, grid.size[2] - 1);

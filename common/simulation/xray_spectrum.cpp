@@ -12,7 +12,7 @@ std::vector<std::string> problems(const SpectrumOptions& options) {
   constexpr int kMostBins = 1000;
   std::vector<std::string> found;
   if (options.tube_kvp != 0.0 &&
-      !(options.tube_kvp >= 30.0 && options.tube_kvp <= kHighestTableEnergy_kev))
+      !(options.tube_kvp >= 30.0 && options.tube_kvp <= kHighestTableEnergyKev))
     found.push_back("tube_kvp = " + std::to_string(options.tube_kvp) +
                     ": must be within 30 and 200, or 0 for a single energy");
   if (!(options.aluminium_mm >= 0.0 && options.aluminium_mm <= 50.0))
@@ -28,10 +28,10 @@ std::vector<SpectrumBin> tube_spectrum(const SpectrumOptions& options,
                                        double effective_energy_kev) {
   if (options.tube_kvp == 0.0) return {{effective_energy_kev, 1.0}};
   std::vector<SpectrumBin> bins;
-  const double width_kev = (options.tube_kvp - kLowestTableEnergy_kev) / options.energy_bins;
+  const double width_kev = (options.tube_kvp - kLowestTableEnergyKev) / options.energy_bins;
   double sum = 0.0;
   for (int i = 0; i < options.energy_bins; ++i) {
-    const double energy_kev = kLowestTableEnergy_kev + (i + 0.5) * width_kev;
+    const double energy_kev = kLowestTableEnergyKev + (i + 0.5) * width_kev;
     const double photons = (options.tube_kvp - energy_kev) / energy_kev;
     const double filtered =
         photons * std::exp(-options.aluminium_mm *

@@ -10,3 +10,14 @@ af_add_test(
           unit/simulation/xray_physics_test.cpp
           unit/simulation/xray_simulator_test.cpp
   LIBS af_simulation)
+af_add_test(
+  partial_folder_test
+  SOURCES unit/io/partial_folder_test.cpp
+  LIBS af_io_basics)
+af_add_test(
+  af_simulate_test
+  SOURCES unit/simulation/af_simulate_test.cpp
+  LIBS af_simulation af_evaluation af_io_ct
+  TIMEOUT 300)
+target_compile_definitions(af_simulate_test PRIVATE AF_SIMULATE_PROGRAM="$<TARGET_FILE:af-simulate>")
+add_dependencies(af_simulate_test af-simulate)

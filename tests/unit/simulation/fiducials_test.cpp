@@ -16,7 +16,7 @@ using Eigen::Vector3d;
 
 // Positions up to 1000 mm in double: rounding 1e-13 mm, divided by sines down to 0.1 and square
 // roots near tangency.
-constexpr double kChordTolerance_mm = 1e-6;
+constexpr double kChordToleranceMm = 1e-6;
 
 SteelCylinder tilted_pin() {
   SteelCylinder pin;
@@ -33,16 +33,16 @@ TEST(SteelCylinder, ChordsHaveTheirClosedForms) {
     return pin.chord_length_mm(point - 500.0 * direction.normalized(), point);
   };
   const Vector3d center = pin.center_point;
-  EXPECT_NEAR(chord(center, across), 2.0, kChordTolerance_mm);
-  EXPECT_NEAR(chord(center, pin.axis_direction), 6.0, kChordTolerance_mm);
+  EXPECT_NEAR(chord(center, across), 2.0, kChordToleranceMm);
+  EXPECT_NEAR(chord(center, pin.axis_direction), 6.0, kChordToleranceMm);
   // Off the axis by 0.6 radii: 2 * 0.8.
-  EXPECT_NEAR(chord(center + 0.6 * other, across), 1.6, kChordTolerance_mm);
+  EXPECT_NEAR(chord(center + 0.6 * other, across), 1.6, kChordToleranceMm);
   // At 45 degrees through the centre: diameter * sqrt 2, well within the ends.
-  EXPECT_NEAR(chord(center, across + pin.axis_direction), 2.0 * std::sqrt(2.0), kChordTolerance_mm);
+  EXPECT_NEAR(chord(center, across + pin.axis_direction), 2.0 * std::sqrt(2.0), kChordToleranceMm);
   // Through one end face's centre at 45 degrees: from the face to the side.
   EXPECT_NEAR(chord(center + 3.0 * pin.axis_direction, across + pin.axis_direction),
               std::sqrt(2.0),
-              kChordTolerance_mm);
+              kChordToleranceMm);
   EXPECT_EQ(chord(center + 1.01 * other, across), 0.0);
   EXPECT_EQ(chord(center + 3.01 * pin.axis_direction, across), 0.0);
   EXPECT_EQ(chord(center + 1.01 * across, pin.axis_direction), 0.0);
@@ -53,7 +53,7 @@ TEST(SteelCylinder, IsMetOnlyInFrontOfTheSource) {
   const Vector3d across = pin.axis_direction.unitOrthogonal();
   const Vector3d away = pin.center_point + 50.0 * across;
   EXPECT_EQ(pin.chord_length_mm(away, away + across), 0.0);
-  EXPECT_NEAR(pin.chord_length_mm(pin.center_point, away), 1.0, kChordTolerance_mm);
+  EXPECT_NEAR(pin.chord_length_mm(pin.center_point, away), 1.0, kChordToleranceMm);
 }
 
 TEST(SteelCylinder, ChordsSumToItsVolume) {
@@ -61,18 +61,18 @@ TEST(SteelCylinder, ChordsSumToItsVolume) {
   // Parallel rays on a square lattice of 0.05 mm; the midpoint rule on a body whose chord vanishes
   // like a square root at its silhouette errs by about h^1.5 * perimeter (16 mm), here 0.18 mm^3 at
   // worst; measured an order below.
-  constexpr double kPitch_mm = 0.05;
-  constexpr double kVolumeTolerance_mm3 = 0.18;
+  constexpr double kPitchMm = 0.05;
+  constexpr double kVolumeToleranceMm3 = 0.18;
   const Vector3d direction = Vector3d(2.0, -1.0, 0.7).normalized();
   const Vector3d u = direction.unitOrthogonal();
   const Vector3d v = direction.cross(u);
   double sum = 0.0;
   for (int i = -80; i < 80; ++i)
     for (int j = -80; j < 80; ++j) {
-      const Vector3d point = pin.center_point + kPitch_mm * ((i + 0.5) * u + (j + 0.5) * v);
+      const Vector3d point = pin.center_point + kPitchMm * ((i + 0.5) * u + (j + 0.5) * v);
       sum += pin.chord_length_mm(point - 100.0 * direction, point);
     }
-  EXPECT_NEAR(sum * kPitch_mm * kPitch_mm, 6.0 * M_PI, kVolumeTolerance_mm3);
+  EXPECT_NEAR(sum * kPitchMm * kPitchMm, 6.0 * M_PI, kVolumeToleranceMm3);
 }
 
 CtVolume soft_block_with_bone(const Vector3d& bone_center_mm) {
@@ -142,12 +142,12 @@ CameraGeometry camera_512() {
 
 TEST(DetectFiducials, AreExactProjectionsWithoutNoiseAndScatterByTheStatedSigma) {
   const CameraGeometry camera = camera_512();
-  constexpr double kSigma_px = 0.2;
+  constexpr double kSigmaPx = 0.2;
   constexpr std::size_t kPins = 5000;
   std::vector<SteelCylinder> pins(kPins);
   const RigidTransform pose = RigidTransform::Identity();
   const auto exact = detect_fiducials(camera, pose, pins, 0.0, 1, 2);
-  const auto noisy = detect_fiducials(camera, pose, pins, kSigma_px, 1, 2);
+  const auto noisy = detect_fiducials(camera, pose, pins, kSigmaPx, 1, 2);
   double sum = 0.0;
   double sum_of_squares = 0.0;
   for (std::size_t i = 0; i < kPins; ++i) {
@@ -160,10 +160,10 @@ TEST(DetectFiducials, AreExactProjectionsWithoutNoiseAndScatterByTheStatedSigma)
   }
   // Five standard errors of 2 * 5000 normal draws.
   constexpr double kDraws = 2.0 * kPins;
-  EXPECT_NEAR(sum / kDraws, 0.0, 5.0 * kSigma_px / std::sqrt(kDraws));
+  EXPECT_NEAR(sum / kDraws, 0.0, 5.0 * kSigmaPx / std::sqrt(kDraws));
   EXPECT_NEAR(sum_of_squares / kDraws,
-              kSigma_px * kSigma_px,
-              5.0 * kSigma_px * kSigma_px * std::sqrt(2.0 / kDraws));
+              kSigmaPx * kSigmaPx,
+              5.0 * kSigmaPx * kSigmaPx * std::sqrt(2.0 / kDraws));
 }
 
 TEST(DetectFiducials, DependOnSeedAndKeyOnly) {

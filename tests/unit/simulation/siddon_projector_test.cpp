@@ -19,9 +19,9 @@ using Eigen::Vector3d;
 
 // Sums of up to about 100 segments of lengths computed from t values up to 1000 mm: 100 * 1000 mm *
 // 2^-53 is 1e-11 mm; relative attenuation is at most 3. The contract asks for 1e-4.
-constexpr double kPathTolerance_mm = 1e-9;
+constexpr double kPathToleranceMm = 1e-9;
 // bone_part() is stored as float: relative error 2^-24 of a path of up to 200 mm of bone.
-constexpr double kSplitTolerance_mm = 200.0 * 0x1.0p-24;
+constexpr double kSplitToleranceMm = 200.0 * 0x1.0p-24;
 
 CtGrid oblique_grid(const std::array<int, 3>& size) {
   CtGrid grid;
@@ -104,25 +104,25 @@ class SiddonProjectorOfABox : public ::testing::Test {
 };
 
 TEST_F(SiddonProjectorOfABox, AxisParallelRaysMeasureTheSides) {
-  EXPECT_NEAR(total_mm({-50, 20, 20}, {0, 20, 20}), 1.5 * 20.0, kPathTolerance_mm);
-  EXPECT_NEAR(total_mm({20, 200, 20}, {20, 0, 20}), 1.5 * 20.0, kPathTolerance_mm);
-  EXPECT_NEAR(total_mm({20, 20, -100}, {20, 20, 0}), 1.5 * 30.0, kPathTolerance_mm);
+  EXPECT_NEAR(total_mm({-50, 20, 20}, {0, 20, 20}), 1.5 * 20.0, kPathToleranceMm);
+  EXPECT_NEAR(total_mm({20, 200, 20}, {20, 0, 20}), 1.5 * 20.0, kPathToleranceMm);
+  EXPECT_NEAR(total_mm({20, 20, -100}, {20, 20, 0}), 1.5 * 30.0, kPathToleranceMm);
 }
 
 TEST_F(SiddonProjectorOfABox, ObliqueRayMeasuresTheChord) {
   // Enters at x = 9.5 and leaves at y = 29 along (1, 1, 0) through (9.5, 14, 20): chord 15 sqrt 2.
   EXPECT_NEAR(
-      total_mm({-10.5, -6, 20}, {9.5, 14, 20}), 1.5 * 15.0 * std::sqrt(2.0), kPathTolerance_mm);
+      total_mm({-10.5, -6, 20}, {9.5, 14, 20}), 1.5 * 15.0 * std::sqrt(2.0), kPathToleranceMm);
   // The space diagonal of the box, in both directions.
   const Vector3d low(9.5, 9.0, 10.5);
   const Vector3d high(29.5, 29.0, 40.5);
   const double diagonal = (high - low).norm();
-  EXPECT_NEAR(total_mm(low - (high - low), high), 1.5 * diagonal, kPathTolerance_mm);
-  EXPECT_NEAR(total_mm(high + (high - low), low), 1.5 * diagonal, kPathTolerance_mm);
+  EXPECT_NEAR(total_mm(low - (high - low), high), 1.5 * diagonal, kPathToleranceMm);
+  EXPECT_NEAR(total_mm(high + (high - low), low), 1.5 * diagonal, kPathToleranceMm);
 }
 
 TEST_F(SiddonProjectorOfABox, RayWithinAFaceBelongsToTheVoxelAbove) {
-  EXPECT_NEAR(total_mm({-50, 9.0, 20}, {0, 9.0, 20}), 1.5 * 20.0, kPathTolerance_mm);
+  EXPECT_NEAR(total_mm({-50, 9.0, 20}, {0, 9.0, 20}), 1.5 * 20.0, kPathToleranceMm);
   EXPECT_EQ(total_mm({-50, 29.0, 20}, {0, 29.0, 20}), 0.0);
 }
 
@@ -132,15 +132,15 @@ TEST_F(SiddonProjectorOfABox, MissingAndBackwardRaysAreExactlyZero) {
 }
 
 TEST_F(SiddonProjectorOfABox, SourceInsideStartsThere) {
-  EXPECT_NEAR(total_mm({20, 20, 20}, {21, 20, 20}), 1.5 * 9.5, kPathTolerance_mm);
+  EXPECT_NEAR(total_mm({20, 20, 20}, {21, 20, 20}), 1.5 * 9.5, kPathToleranceMm);
 }
 
 TEST_F(SiddonProjectorOfABox, BoneShareFollowsTheMixtureModel) {
   const double hu_bone = tissue_.cortical_bone_hu();
   const double share = (500.0 - 100.0) / (hu_bone - 100.0);
   const PathIntegrals path = projector_.integrate({-50, 20, 20}, {0, 20, 20});
-  EXPECT_NEAR(path.bone_mm, 20.0 * share * (1.0 + hu_bone / 1000.0), kSplitTolerance_mm);
-  EXPECT_NEAR(path.water_mm, 20.0 * (1.0 - share) * 1.1, kSplitTolerance_mm);
+  EXPECT_NEAR(path.bone_mm, 20.0 * share * (1.0 + hu_bone / 1000.0), kSplitToleranceMm);
+  EXPECT_NEAR(path.water_mm, 20.0 * (1.0 - share) * 1.1, kSplitToleranceMm);
 }
 
 TEST(SiddonProjector, EqualsBruteForceBoxClipping) {
@@ -158,8 +158,8 @@ TEST(SiddonProjector, EqualsBruteForceBoxClipping) {
         center + 5.0 * Vector3d(random.normal(), random.normal(), random.normal());
     const PathIntegrals path = projector.integrate(source, through);
     const PathIntegrals expected = brute_force(ct, tissue, source, through);
-    ASSERT_NEAR(path.water_mm, expected.water_mm, kPathTolerance_mm) << "ray " << n;
-    ASSERT_NEAR(path.bone_mm, expected.bone_mm, kPathTolerance_mm) << "ray " << n;
+    ASSERT_NEAR(path.water_mm, expected.water_mm, kPathToleranceMm) << "ray " << n;
+    ASSERT_NEAR(path.bone_mm, expected.bone_mm, kPathToleranceMm) << "ray " << n;
   }
 }
 
@@ -182,8 +182,8 @@ TEST(SiddonProjector, EqualsBruteForceAlongVoxelAxesAndThroughCorners) {
         const Vector3d source = through - 20.0 * direction;
         const PathIntegrals path = projector.integrate(source, through);
         const PathIntegrals expected = brute_force(ct, tissue, source, through);
-        EXPECT_NEAR(path.water_mm, expected.water_mm, kPathTolerance_mm) << direction.transpose();
-        EXPECT_NEAR(path.bone_mm, expected.bone_mm, kPathTolerance_mm) << direction.transpose();
+        EXPECT_NEAR(path.water_mm, expected.water_mm, kPathToleranceMm) << direction.transpose();
+        EXPECT_NEAR(path.bone_mm, expected.bone_mm, kPathToleranceMm) << direction.transpose();
       }
 }
 
@@ -201,7 +201,7 @@ TEST(SiddonProjector, SwappingTheEndsKeepsTheIntegral) {
     const Vector3d a = middle - 100.0 * direction.normalized();
     const Vector3d b = middle + 100.0 * direction.normalized();
     EXPECT_NEAR(
-        projector.integrate(a, b).water_mm, projector.integrate(b, a).water_mm, kPathTolerance_mm);
+        projector.integrate(a, b).water_mm, projector.integrate(b, a).water_mm, kPathToleranceMm);
   }
 }
 

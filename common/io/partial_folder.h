@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+
+namespace af {
+
+/// An output folder that appears under its name only when complete. It is filled as
+/// "NAME.partial"; commit() renames it. Unless committed, the destructor removes it.
+class PartialFolder {
+ public:
+  enum class Existing { Refuse, Replace };
+
+  /// Makes an empty "FOLDER.partial" and its parents, removing one left by a killed run. Throws
+  /// InputError when FOLDER exists with content and `existing` is Refuse, FileError when the folder
+  /// cannot be made.
+  PartialFolder(const std::filesystem::path& folder, Existing existing);
+  ~PartialFolder();
+  PartialFolder(const PartialFolder&) = delete;
+  PartialFolder& operator=(const PartialFolder&) = delete;
+
+  /// Where to write now (absolute).
+  [[nodiscard]] const std::filesystem::path& path() const { return partial_; }
+  /// Where the content will stand (absolute).
+  [[nodiscard]] const std::filesystem::path& final_path() const { return folder_; }
+  /// Renames to the final name; an older folder of that name is removed afterwards. FileError on
+  /// failure.
+  void commit();
+
+ private:
+  std::filesystem::path folder_;
+  std::filesystem::path partial_;
+  bool committed_ = false;
+};
+
+}  // namespace af

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+// af-simulate: a whole registration study, with a known answer, from a CT or a phantom.
+#include <memory>
+#include <string>
+
+#include "base/error.h"
+#include "cli/app_main.h"
+#include "cli/progress_printer.h"
+#include "io/csv_table.h"
+#include "io/ct_reader.h"
+#include "io/partial_folder.h"
+#include "io/rig_file.h"
+#include "tools/simulate_options.h"
+#include "tools/simulated_study.h"
+
+namespace {
+
+using namespace af;
+using tools::SimulatedCase;
+using tools::SimulateOptions;
+
+CtVolume patient(const SimulateOptions& options, const Communicator& world) {
+  if (!options.phantom.empty()) {
+    SpinePhantomOptions phantom = options.phantom_options;
+    phantom.threads = options.xray.threads;
+    return spine_phantom(phantom);
+  }
+  std::vector<std::string> warnings;
+  CtVolume ct = read_ct(options.ct, {options.series_uid}, &warnings);
+  for (const std::string& warning : warnings) cli::warn(world, warning);
+  return ct;
+}
+
+CameraRig cameras(const SimulateOptions& options, const Communicator& world) {
+  std::vector<std::string> warnings;
+  CameraRig rig = read_rig(options.rig, &warnings);
+  for (const std::string& warning : warnings) cli::warn(world, warning);
+  return rig;
+}
+
+/// Writes the CT into the study, or refers to where it is.
+std::filesystem::path ct_of_study(const SimulateOptions& options,
+                                  const CtVolume& ct,
+                                  const std::filesystem::path& folder) {
+  if (options.phantom.empty() && !options.copies_ct) return std::filesystem::absolute(options.ct);
+  std::filesystem::path path = folder / "ct.nii.gz";
+  write_ct(ct, path);
+  return path;
+}
+
+std::string summary(const SimulatedCase& simulated, const std::filesystem::path& folder) {
+  const auto offset = simulated.true_offset.deg_and_mm();
+  std::string text = "True pose, relative to nominal:";
+  for (std::size_t i = 0; i < 6; ++i)
+    text += ' ' + fixed_text(offset[i], 2) + (i < 3 ? " deg" : " mm");
+  if (simulated.fiducial_gold) {
+    const RigidTransform& gold = *simulated.study_case.gold_room_from_ct;
+    const RigidTransform& fitted = simulated.fiducial_gold->room_from_ct;
+    const Eigen::Vector3d& center = simulated.study_case.center_ct_mm;
+    text += "\nFiducial gold pose: " + fixed_text((fitted * center - gold * center).norm(), 3) +
+            " mm and " + fixed_text(rotation_angle_between_rad(gold, fitted) * kDegPerRad, 3) +
+            " deg from it, FRE " + fixed_text(simulated.fiducial_gold->fit.fre_mm, 3) + " mm";
+  }
+  return text + "\nStudy: " + (folder / "study.toml").string();
+}
+
+void run(const SimulateOptions& options,
+         const std::string& command_line,
+         const std::string& options_toml,
+         const Communicator& world) {
+  if (!world.is_root()) return;  // the work is small; a launcher with several ranks does no harm
+  throw_if_any(problems(options));
+  const CameraRig rig = cameras(options, world);
+  PartialFolder folder(
+      options.output,
+      options.replaces_output ? PartialFolder::Existing::Replace : PartialFolder::Existing::Refuse);
+
+  cli::info(world, options.phantom.empty() ? "Reading " + options.ct : "Making the phantom");
+  const CtVolume ct = patient(options, world);
+  const AttenuationVolume volume(ct, options.attenuation);
+  SimulatedCase simulated = plan_case(options, ct, rig, volume);
+  {
+    cli::ProgressPrinter printer("Taking X-rays", true);
+    take_xrays(options, rig, volume, folder.path(), simulated, printer.callback());
+  }
+  cli::info(world, "Writing the study");
+  simulated.study_case.ct = ct_of_study(options, ct, folder.path());
+
+  Provenance provenance;
+  provenance.program = "af-simulate";
+  provenance.command_line = command_line;
+  provenance.options_toml = options_toml;
+  provenance.seed = options.seed;
+  provenance.rank_count = world.size();
+  provenance.input_sha256["ct_content"] = ct_content_sha256(ct);
+  write_study_files(rig, simulated, provenance, folder.path());
+  folder.commit();
+  cli::info(world, summary(simulated, folder.final_path()));
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  SimulateOptions options;
+  CLI::App app{
+      "Makes a registration study with a known answer: X-rays of a CT or phantom by an exact "
+      "polyenergetic projector with scatter, noise, blur and grey levels, steel fiducials and "
+      "their detections, regions of interest, and the true pose."};
+  tools::bind_options(app, options);
+  return cli::app_main(app, argc, argv, [&](const Communicator& world) {
+    run(options, cli::command_line(argc, argv), app.config_to_str(true), world);
+  });
+}

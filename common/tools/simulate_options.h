@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "simulation/spine_phantom.h"
+#include "simulation/xray_simulator.h"
+#include "volume/attenuation_volume.h"
+
+namespace af::tools {
+
+/// What af-simulate is asked for. Empty strings and vectors mean: not given.
+struct SimulateOptions {
+  std::string ct;
+  std::string series_uid;
+  std::string phantom;
+  SpinePhantomOptions phantom_options;
+  std::string rig = "treatment-room";
+  std::string case_name;
+  std::string output;
+  std::uint64_t seed = 1;
+  bool copies_ct = false;
+  bool replaces_output = false;
+
+  std::vector<double> center_ct_mm;      ///< x, y, z
+  std::vector<double> target_box_ct_mm;  ///< low x, y, z, high x, y, z
+  double target_side_mm = 60.0;
+  std::vector<int> roi_px;  ///< width, height
+
+  double max_offset_rotation_deg = 5.0;
+  double max_offset_translation_mm = 10.0;
+  bool has_fiducials = true;
+  double fiducial_sigma_px = 0.2;
+
+  AttenuationModel attenuation;
+  XraySimulationOptions xray;
+  bool is_ideal = false;
+
+  /// The imaging chain in force: `xray`, or all its effects off when is_ideal.
+  [[nodiscard]] XraySimulationOptions xray_in_force() const;
+  /// case_name, or one made from the CT's file name or the phantom.
+  [[nodiscard]] std::string case_name_in_force() const;
+};
+
+std::vector<std::string> problems(const SimulateOptions& options);
+
+void bind_options(CLI::App& app, SimulateOptions& options);
+
+}  // namespace af::tools

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/progress.h"
+#include "evaluate/fiducial_registration.h"
+#include "io/provenance.h"
+#include "io/study_file.h"
+#include "simulation/xray_simulator.h"
+#include "tools/simulate_options.h"
+
+namespace af::tools {
+
+/// A case before its X-rays are taken: where the patient lies and what is to be found.
+struct SimulatedCase {
+  StudyCase study_case;        ///< without file names; gold_room_from_ct is the true pose
+  PoseParameters true_offset;  ///< of the true pose from the nominal one
+  std::vector<SteelCylinder> fiducials;
+  std::vector<std::vector<Eigen::Vector2d>> exact_fiducials_px;  ///< per view, without noise
+  std::optional<evaluation::FiducialGold> fiducial_gold;
+};
+
+/// Chooses target, regions, true pose and fiducials. Throws InputError when the target or a
+/// fiducial misses a detector, or a source lies inside the CT.
+SimulatedCase plan_case(const SimulateOptions& options,
+                        const CtVolume& ct,
+                        const CameraRig& rig,
+                        const AttenuationVolume& volume);
+
+/// Takes the X-ray of every view and writes it with its preview into `folder`; fills in the file
+/// names.
+void take_xrays(const SimulateOptions& options,
+                const CameraRig& rig,
+                const AttenuationVolume& volume,
+                const std::filesystem::path& folder,
+                SimulatedCase& simulated,
+                const ProgressCallback& progress);
+
+/// study.toml, rig.toml, truth.toml, provenance.json and reproduce.sh.
+void write_study_files(const CameraRig& rig,
+                       const SimulatedCase& simulated,
+                       const Provenance& provenance,
+                       const std::filesystem::path& folder);
+
+}  // namespace af::tools

@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: Apache-2.0
+// The program af-simulate as people run it.
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <string>
+#include <sys/wait.h>
+
+#include <gtest/gtest.h>
+
+#include "evaluate/fiducial_registration.h"
+#include "io/ct_reader.h"
+#include "io/image_file.h"
+#include "io/output_file.h"
+#include "io/pose_file.h"
+#include "io/study_file.h"
+#include "io/xray_reader.h"
+#include "simulation/siddon_projector.h"
+#include "support/test_paths.h"
+
+namespace af {
+namespace {
+
+namespace fs = std::filesystem;
+
+const std::string kCoarse = "--phantom spine --phantom-voxel-mm 4 ";
+
+class AfSimulate : public ::testing::Test {
+ protected:
+  /// Exit code of the program; its messages go to a file.
+  int run(const std::string& arguments) {
+    const std::string command = std::string(AF_SIMULATE_PROGRAM) + " " + arguments + " > '" +
+                                log_path().string() + "' 2>&1";
+    const int status = std::system(command.c_str());
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  }
+  [[nodiscard]] fs::path log_path() const { return scratch_ / "log.txt"; }
+  std::string log() { return read_text_file(log_path()); }
+  std::string folder(const std::string& name) { return "-o '" + (scratch_ / name).string() + "'"; }
+
+  test::ScratchFolder scratch_;
+};
+
+TEST_F(AfSimulate, MakesAStudyThatReadsBack) {
+  ASSERT_EQ(run(kCoarse + "--seed 5 " + folder("s")), 0) << log();
+  const Study study = read_study(scratch_ / "s" / "study.toml");
+  const StudyCase& patient = study.find_case("");
+  ASSERT_EQ(patient.views.size(), 2u);
+  ASSERT_EQ(patient.fiducials_ct_mm.size(), 4u);
+  for (const StudyView& view : patient.views) {
+    const CameraGeometry& camera = study.rig.camera(view.camera);
+    const Image2d attenuation = read_xray_attenuation(view, camera);
+    EXPECT_EQ(attenuation.width, camera.size_px.x());
+    EXPECT_GE(view.roi.column, 2);
+    EXPECT_LE(view.roi.row + view.roi.height, camera.size_px.y() - 2);
+  }
+  EXPECT_NO_THROW(read_ct(patient.ct));
+  for (const char* name : {"provenance.json", "reproduce.sh", "A-preview.png", "B-preview.png"})
+    EXPECT_TRUE(fs::exists(scratch_ / "s" / name)) << name;
+  EXPECT_FALSE(fs::exists(scratch_ / "s.partial"));
+}
+
+TEST_F(AfSimulate, TruthIsWithinTheStatedRangeAndTheFiducialsFindIt) {
+  ASSERT_EQ(run(kCoarse + "--seed 5 " + folder("s")), 0) << log();
+  const Study study = read_study(scratch_ / "s" / "study.toml");
+  const StudyCase& patient = study.find_case("");
+  ASSERT_TRUE(patient.gold_room_from_ct.has_value());
+  const RigidTransform gold = *patient.gold_room_from_ct;
+  EXPECT_TRUE(gold.isApprox(read_pose(scratch_ / "s" / "truth.toml"), 1e-12));
+  const auto offset = parameters_from_pose(patient.frame(), gold).deg_and_mm();
+  double largest = 0.0;
+  for (std::size_t i = 0; i < 6; ++i) {
+    EXPECT_LE(std::abs(offset[i]), i < 3 ? 5.0 : 10.0);
+    largest = std::max(largest, std::abs(offset[i]));
+  }
+  EXPECT_GT(largest, 0.1);
+  std::vector<evaluation::FiducialView> views;
+  for (const StudyView& view : patient.views)
+    views.push_back({study.rig.camera(view.camera), view.fiducials_px});
+  const auto fitted = evaluation::gold_from_fiducials(views, patient.fiducials_ct_mm);
+  // 0.2 px are 0.058 mm at the isocentre; four pins average to about half of that per axis, and
+  // five standard errors stay below 0.25 mm.
+  EXPECT_LT((fitted.room_from_ct * patient.center_ct_mm - gold * patient.center_ct_mm).norm(),
+            0.25);
+}
+
+TEST_F(AfSimulate, SameSeedGivesTheSameBytesOnAnyNumberOfThreads) {
+  ASSERT_EQ(run(kCoarse + "--seed 9 --threads 1 " + folder("one")), 0) << log();
+  ASSERT_EQ(run(kCoarse + "--seed 9 --threads 3 " + folder("three")), 0) << log();
+  ASSERT_EQ(run(kCoarse + "--seed 10 --threads 3 " + folder("other")), 0) << log();
+  for (const char* name : {"A.mha", "B.mha", "study.toml", "truth.toml", "ct.nii.gz"}) {
+    const std::string one = read_text_file(scratch_ / "one" / name);
+    EXPECT_EQ(one, read_text_file(scratch_ / "three" / name)) << name;
+    const bool depends_on_seed = std::string(name) != "ct.nii.gz";
+    EXPECT_EQ(one != read_text_file(scratch_ / "other" / name), depends_on_seed) << name;
+  }
+}
+
+TEST_F(AfSimulate, IdealXrayIsTheExactIntegralOfTheStudysCt) {
+  constexpr double kTolerance = 1e-4;  // the contract's
+  ASSERT_EQ(run(kCoarse + "--ideal --no-fiducials " + folder("s")), 0) << log();
+  const Study study = read_study(scratch_ / "s" / "study.toml");
+  const StudyCase& patient = study.find_case("");
+  const CtVolume ct = read_ct(patient.ct);
+  const AttenuationModel model;
+  const AttenuationVolume volume(ct, model);
+  const TissueModel tissue(model);
+  const SiddonProjector projector(volume, tissue);
+  const RigidTransform ct_from_room = patient.gold_room_from_ct->inverse();
+  for (const StudyView& view : patient.views) {
+    const CameraGeometry& camera = study.rig.camera(view.camera);
+    const Image2d xray = read_image(view.xray);
+    for (int row = 3; row < camera.size_px.y(); row += 50)
+      for (int column = 5; column < camera.size_px.x(); column += 50) {
+        const PathIntegrals path = projector.integrate(
+            ct_from_room * camera.source_point, ct_from_room * camera.detector_point(column, row));
+        const double exact = model.mu_water_per_mm * (path.water_mm + path.bone_mm);
+        const double level = static_cast<double>(xray.at(column, row));
+        ASSERT_NEAR(-std::log(level / 4000.0), exact, kTolerance) << column << ' ' << row;
+      }
+  }
+}
+
+TEST_F(AfSimulate, RefusesBadInputByTheContractsCodesAndLeavesNothing) {
+  std::ofstream(scratch_ / "not-a-ct.nii.gz") << "text";
+  std::ofstream(scratch_ / "bad.toml") << "isocenter_point = [0, 0, 0]\n";
+  const std::string text_file = "'" + (scratch_ / "not-a-ct.nii.gz").string() + "' ";
+  const std::string bad_rig = "'" + (scratch_ / "bad.toml").string() + "' ";
+  struct Case {
+    std::string arguments;
+    int exit_code;
+    std::string message;
+  };
+  const std::vector<Case> cases{
+      {"", 2, "--ct,--phantom"},
+      {"--ct a --phantom spine", 2, "2 were given"},
+      {"--phantom pelvis", 2, "spine"},
+      {"--phantom spine --center-ct-mm 1,2", 2, "center-ct-mm"},
+      {kCoarse + "--bits 7", 3, "bits = 7"},
+      {kCoarse + "--tube-kvp 10 --energy-bins 3", 3, "energy_bins = 3"},
+      {kCoarse + "--water-mu-per-mm 0.6", 3, "water_mu_per_mm"},
+      {kCoarse + "--center-ct-mm 900,0,0", 3, "center_ct_mm"},
+      {kCoarse + "--target-box-ct-mm 0,0,0,-1,5,5", 3, "target_box_ct_mm"},
+      {kCoarse + "--rig " + bad_rig, 3, "camera"},
+      {kCoarse + "--rig nowhere.toml", 4, "nowhere.toml"},
+      {"--ct /nowhere/ct.nii.gz", 4, "/nowhere/ct.nii.gz"},
+      {"--ct " + text_file, 4, "not-a-ct.nii.gz"},
+  };
+  for (const Case& bad : cases) {
+    EXPECT_EQ(run(bad.arguments + " " + folder("s")), bad.exit_code) << bad.arguments << '\n'
+                                                                     << log();
+    EXPECT_NE(log().find(bad.message), std::string::npos) << bad.arguments << '\n' << log();
+    EXPECT_FALSE(fs::exists(scratch_ / "s")) << bad.arguments;
+    EXPECT_FALSE(fs::exists(scratch_ / "s.partial")) << bad.arguments;
+  }
+}
+
+TEST_F(AfSimulate, KeepsAnExistingFolderUnlessForced) {
+  fs::create_directories(scratch_ / "s");
+  std::ofstream(scratch_ / "s" / "mine") << "x";
+  EXPECT_EQ(run(kCoarse + folder("s")), 3);
+  EXPECT_NE(log().find("--force"), std::string::npos);
+  EXPECT_TRUE(fs::exists(scratch_ / "s" / "mine"));
+  EXPECT_EQ(run(kCoarse + "--force " + folder("s")), 0) << log();
+  EXPECT_FALSE(fs::exists(scratch_ / "s" / "mine"));
+  EXPECT_TRUE(fs::exists(scratch_ / "s" / "study.toml"));
+}
+
+}  // namespace
+}  // namespace af
