@@ -78,11 +78,12 @@ std::string advice_text(const FieldSource& source,
   MotionRange narrower = options.range();
   narrower.max_translation_mm /= 2.0;
   if (narrower.max_translation_mm >= 5.0) {
-    const LightSlab alternative = make_light_slab(source.camera,
-                                                  source.frame,
-                                                  narrower,
-                                                  source.volume->corner_points(),
-                                                  options.light_slab_spec());
+    const LightSlab alternative =
+        make_light_slab(source.camera,
+                        source.frame,
+                        narrower,
+                        source.volume->corner_points(),
+                        options.light_slab_spec({{}, {slab.st_plane_y_mm}}));
     text += formatted(
         "  With --max-translation-mm %.0f the same nodes would stand %.2f instead of %.2f mm apart "
         "on the (s,t) plane: sharper DRRs for the same size.\n",
@@ -110,10 +111,12 @@ std::string megabytes_text(std::uint64_t bytes) {
   return formatted(megabytes < 10.0 ? "%.2f MB" : "%.1f MB", megabytes);
 }
 
-CastSample measure_casting(const FieldCaster& caster, const LightSlab& light_slab, double seconds) {
-  constexpr std::int64_t kSmallUnitRays = 4096;
+CastSample measure_casting(const FieldCaster& caster,
+                           const LightSlab& light_slab,
+                           const PlanOptions& plan,
+                           double seconds) {
   constexpr std::uint64_t kOrderSeed = 1;
-  const auto units = plan_units(light_slab, {kSmallUnitRays});
+  const auto units = plan_units(light_slab, plan);
   const auto start = std::chrono::steady_clock::now();
   double elapsed = 0.0;
   std::size_t rays = 0;
@@ -136,7 +139,7 @@ CastSample measure_casting(const FieldCaster& caster, const LightSlab& light_sla
 
 FieldForecast forecast(const LightSlab& light_slab,
                        const PrecomputeOptions& options,
-                       const AttenuationVolume& volume,
+                       std::uint64_t volume_bytes,
                        const CastSample& sample,
                        int ranks) {
   const auto rays = static_cast<double>(stored_ray_count(light_slab));
@@ -150,7 +153,7 @@ FieldForecast forecast(const LightSlab& light_slab,
   result.cropped_bytes = static_cast<std::uint64_t>(2.0 * rays);
   result.payload_bytes = static_cast<std::uint64_t>(2.0 * tiles + codebook_bytes);
   result.file_bytes = static_cast<std::uint64_t>(1.9 * occupied + codebook_bytes);
-  result.ct_bytes_per_node = volume.voxels().size_bytes();
+  result.ct_bytes_per_node = volume_bytes;
   // Tiles, training tiles with their working arrays, indices (twice while blocks are joined), and
   // centroid sums.
   constexpr double kTrainingBytesPerTile = 48.0 + 32.0 + 4.0 + 8.0 + 8.0 + 56.0;
@@ -172,10 +175,12 @@ FieldForecast forecast(const LightSlab& light_slab,
 std::string dry_run_text(const FieldSource& source,
                          const LightSlab& light_slab,
                          const PrecomputeOptions& options,
+                         const PlanOptions& plan,
+                         std::uint64_t volume_bytes,
                          const CastSample& sample,
                          int ranks) {
-  const FieldForecast need = forecast(light_slab, options, *source.volume, sample, ranks);
-  const auto units = plan_units(light_slab, plan_options_for_ranks(light_slab, ranks));
+  const FieldForecast need = forecast(light_slab, options, volume_bytes, sample, ranks);
+  const auto units = plan_units(light_slab, plan);
   const auto ratio = [](std::uint64_t raw, std::uint64_t stored) {
     return static_cast<double>(raw) / static_cast<double>(stored);
   };

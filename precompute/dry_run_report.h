@@ -18,8 +18,11 @@ struct CastSample {
   double occupied_fraction = 0.0;  ///< of its tiles
 };
 
-/// Casts small units in pseudo-random order for about `seconds`.
-CastSample measure_casting(const FieldCaster& caster, const LightSlab& light_slab, double seconds);
+/// Casts units of a plan in pseudo-random order for about `seconds`.
+CastSample measure_casting(const FieldCaster& caster,
+                           const LightSlab& light_slab,
+                           const PlanOptions& plan,
+                           double seconds);
 
 /// What the field would need.
 struct FieldForecast {
@@ -32,9 +35,10 @@ struct FieldForecast {
   double seconds = 0.0;
 };
 
+/// `volume_bytes`: what the CT and its resampled grid take on each node.
 FieldForecast forecast(const LightSlab& light_slab,
                        const PrecomputeOptions& options,
-                       const AttenuationVolume& volume,
+                       std::uint64_t volume_bytes,
                        const CastSample& sample,
                        int ranks);
 
@@ -42,6 +46,8 @@ FieldForecast forecast(const LightSlab& light_slab,
 std::string dry_run_text(const FieldSource& source,
                          const LightSlab& light_slab,
                          const PrecomputeOptions& options,
+                         const PlanOptions& plan,
+                         std::uint64_t volume_bytes,
                          const CastSample& sample,
                          int ranks);
 

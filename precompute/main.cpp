@@ -36,7 +36,10 @@ void bind_field(CLI::App& app, PrecomputeOptions& options) {
                  options.max_translation_mm,
                  "Range: largest shift along each room axis, mm")
       ->capture_default_str();
-  app.add_option("--slabs", options.slabs, "Depth slabs K, each with its own (s,t) plane; now 1")
+  app.add_option("--slabs",
+                 options.slabs,
+                 "Depth slabs K, each with its own (s,t) plane: with 8, some 8 --uv-nodes suffice; "
+                 "1 is the paper's field")
       ->capture_default_str();
   app.add_option("--uv-nodes",
                  options.uv_nodes,
@@ -48,9 +51,13 @@ void bind_field(CLI::App& app, PrecomputeOptions& options) {
       ->capture_default_str();
   app.add_option("--caster",
                  options.caster,
-                 "How line integrals are made: trilinear (samples along every ray)")
+                 "How line integrals are made: shear-warp (the CT resampled once, then slice by "
+                 "slice; some 100 times faster) or trilinear (the reference: samples along every "
+                 "ray)")
       ->capture_default_str();
-  app.add_option("--step-mm", options.step_mm, "Largest distance of samples along a ray, mm")
+  app.add_option("--step-mm",
+                 options.step_mm,
+                 "Trilinear caster: largest distance of samples along a ray, mm")
       ->capture_default_str();
   app.add_option("--water-mu-per-mm",
                  options.water_mu_per_mm,

@@ -47,22 +47,24 @@ CodebookOptions PrecomputeOptions::codebook_options() const {
   return options;
 }
 
-LightSlabSpec PrecomputeOptions::light_slab_spec() const {
+LightSlabSpec PrecomputeOptions::light_slab_spec(const DepthSlabs& depth_slabs) const {
   LightSlabSpec spec;
   spec.uv_nodes = uv_nodes;
   spec.st_nodes = st_nodes;
+  spec.slab_boundaries_y_mm = depth_slabs.boundaries_y_mm;
+  spec.st_plane_y_mm = depth_slabs.st_plane_y_mm;
   return spec;
 }
 
 std::vector<std::string> problems(const PrecomputeOptions& options) {
   std::vector<std::string> found = problems(options.range());
-  if (options.slabs != 1)
-    found.push_back("slabs = " + std::to_string(options.slabs) +
-                    ": must be 1 (the trilinear caster fills fields of one slab)");
+  constexpr int kMostSlabs = 64;
+  if (options.slabs < 1 || options.slabs > kMostSlabs)
+    found.push_back("slabs = " + std::to_string(options.slabs) + ": must be within 1 and 64");
   append_node_problems("uv_nodes", options.uv_nodes, found);
   append_node_problems("st_nodes", options.st_nodes, found);
-  if (options.caster != "trilinear")
-    found.push_back("caster = " + options.caster + ": must be trilinear");
+  if (options.caster != "trilinear" && !options.is_shear_warp())
+    found.push_back("caster = " + options.caster + ": must be trilinear or shear-warp");
   append(problems(RayCasterOptions{options.step_mm}), found);
   append(problems(options.attenuation_model()), found);
   append(problems(options.codebook_options()), found);

@@ -8,6 +8,7 @@
 
 #include "geometry/slab_sizing.h"
 #include "precompute/codebook_training.h"
+#include "precompute/depth_slabs.h"
 #include "precompute/planner.h"
 #include "precompute/tile_selection.h"
 #include "volume/attenuation_volume.h"
@@ -34,8 +35,8 @@ struct PrecomputeOptions {
   int slabs = 1;
   int uv_nodes = 64;
   int st_nodes = 256;
-  std::string caster = "trilinear";
-  double step_mm = RayCasterOptions{}.step_mm;
+  std::string caster = "shear-warp";
+  double step_mm = RayCasterOptions{}.step_mm;  ///< of the trilinear caster
   double water_mu_per_mm = AttenuationModel{}.mu_water_per_mm;
 
   int codewords = CodebookOptions{}.codewords;
@@ -60,7 +61,8 @@ struct PrecomputeOptions {
     return {training_fraction, max_training_tiles, seed};
   }
   [[nodiscard]] CodebookOptions codebook_options() const;
-  [[nodiscard]] LightSlabSpec light_slab_spec() const;
+  [[nodiscard]] bool is_shear_warp() const { return caster == "shear-warp"; }
+  [[nodiscard]] LightSlabSpec light_slab_spec(const DepthSlabs& depth_slabs) const;
 };
 
 /// Every broken constraint of the values themselves (not of files).

@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <iostream>
+#include <memory>
 #include <optional>
 #include <sstream>
 
@@ -19,6 +20,8 @@
 #include "io/provenance.h"
 #include "precompute/dry_run_report.h"
 #include "precompute/field_build_program.h"
+#include "precompute/resampling_program.h"
+#include "precompute/shear_warp_caster.h"
 #include "precompute/source_loading.h"
 
 namespace af {
@@ -100,15 +103,7 @@ ProgressManifest manifest_of(const PrecomputeOptions& options,
 }
 
 /// Refuses before any work when a rank would need more than --memory-limit.
-void require_memory(const PrecomputeOptions& options,
-                    const LightSlab& light_slab,
-                    const AttenuationVolume& volume,
-                    const FieldCaster& caster,
-                    int ranks) {
-  if (options.memory_limit_bytes == 0) return;
-  constexpr double kSampleSeconds = 0.3;
-  const FieldForecast need = forecast(
-      light_slab, options, volume, measure_casting(caster, light_slab, kSampleSeconds), ranks);
+void require_memory(const PrecomputeOptions& options, const FieldForecast& need, int ranks) {
   if (need.bytes_per_rank <= options.memory_limit_bytes) return;
   throw InputError("memory_limit",
                    megabytes_text(options.memory_limit_bytes) + " per rank",
@@ -165,17 +160,21 @@ class PrecomputeRun {
       if (!options_.is_dry_run && world_.is_root()) require_output_folder();
     });
     load();
-    const RayCastFieldCaster caster(
-        *source_.volume, light_slab_, quantizer(), RayCasterOptions{options_.step_mm});
+    const std::unique_ptr<const FieldCaster> caster = make_caster();
     if (options_.is_dry_run) {
-      print_dry_run(caster);
+      print_dry_run(*caster);
       return;
     }
     all_or_none(world_, [&] {
-      if (world_.is_root())
-        require_memory(options_, light_slab_, *source_.volume, caster, world_.size());
+      if (!world_.is_root() || options_.memory_limit_bytes == 0) return;
+      constexpr double kSampleSeconds = 0.3;
+      const CastSample sample =
+          measure_casting(*caster, light_slab_, sample_plan(), kSampleSeconds);
+      const FieldForecast need =
+          forecast(light_slab_, options_, volume_bytes(), sample, world_.size());
+      require_memory(options_, need, world_.size());
     });
-    build(caster);
+    build(*caster);
   }
 
  private:
@@ -194,34 +193,70 @@ class PrecomputeRun {
   void load() {
     source_ = load_source(options_, world_);
     for (const std::string& warning : source_.warnings) cli::warn(world_, warning);
-    light_slab_ =
-        shared_light_slab(all_or_none(world_,
-                                      [&] {
-                                        return make_light_slab(source_.camera,
-                                                               source_.frame,
-                                                               options_.range(),
-                                                               source_.volume->corner_points(),
-                                                               options_.light_slab_spec());
-                                      }),
-                          world_);
+    size_planes(DepthSlabs{{}, {0.0}});
     clock_.end("read");
+    if (!options_.is_shear_warp() && options_.slabs == 1) return;
+    resampled_ = std::make_shared<const SlabAlignedVolume>(
+        resample_on_node(*source_.volume, light_slab_.slab_from_ct, SlabAlignedOptions{}, world_));
+    if (options_.slabs > 1)
+      size_planes(
+          all_or_none(world_, [&] { return choose_depth_slabs(*resampled_, options_.slabs); }));
+    if (!options_.is_shear_warp()) resampled_ = nullptr;
+    clock_.end("resample");
+  }
+
+  /// Collective.
+  void size_planes(const DepthSlabs& depth_slabs) {
+    const LightSlab light_slab = all_or_none(world_, [&] {
+      return make_light_slab(source_.camera,
+                             source_.frame,
+                             options_.range(),
+                             source_.volume->corner_points(),
+                             options_.light_slab_spec(depth_slabs));
+    });
+    light_slab_ = shared_light_slab(light_slab, world_);
+  }
+
+  [[nodiscard]] std::unique_ptr<const FieldCaster> make_caster() const {
+    if (options_.is_shear_warp())
+      return std::make_unique<ShearWarpFieldCaster>(*resampled_, light_slab_, quantizer());
+    return std::make_unique<RayCastFieldCaster>(
+        *source_.volume, light_slab_, quantizer(), RayCasterOptions{options_.step_mm});
+  }
+
+  [[nodiscard]] PlanOptions plan() const {
+    return plan_options_for_ranks(
+        light_slab_, world_.size(), options_.is_shear_warp() ? kShearWarpPlan : PlanOptions{});
+  }
+
+  /// Units whose casting tells the speed: small ones, where size does not matter to the caster.
+  [[nodiscard]] PlanOptions sample_plan() const {
+    constexpr std::int64_t kSmallUnitRays = 4096;
+    return options_.is_shear_warp() ? plan() : PlanOptions{kSmallUnitRays};
+  }
+
+  [[nodiscard]] std::uint64_t volume_bytes() const {
+    return source_.volume->voxels().size_bytes() +
+           (resampled_ == nullptr ? 0 : resampled_->grid().value_count() * sizeof(std::int16_t));
   }
 
   void print_dry_run(const FieldCaster& caster) const {
     constexpr double kSampleSeconds = 1.0;
     all_or_none(world_, [&] {
       if (world_.is_root())
-        std::cout << dry_run_text(source_,
-                                  light_slab_,
-                                  options_,
-                                  measure_casting(caster, light_slab_, kSampleSeconds),
-                                  world_.size());
+        std::cout << dry_run_text(
+            source_,
+            light_slab_,
+            options_,
+            plan(),
+            volume_bytes(),
+            measure_casting(caster, light_slab_, sample_plan(), kSampleSeconds),
+            world_.size());
     });
   }
 
   void build(const FieldCaster& caster) {
-    ProgressManifest manifest =
-        manifest_of(options_, source_, plan_options_for_ranks(light_slab_, world_.size()));
+    ProgressManifest manifest = manifest_of(options_, source_, plan());
     std::optional<ProgressFolder> progress;
     if (options_.has_checkpoint) {
       listen_for_stop_requests();
@@ -360,6 +395,7 @@ class PrecomputeRun {
   const Communicator& world_;
   FieldSource source_;
   LightSlab light_slab_;
+  std::shared_ptr<const SlabAlignedVolume> resampled_;  ///< for the shear-warp caster
   PhaseClock clock_;
 };
 

@@ -186,6 +186,14 @@ Communicator Communicator::node() const {
 
 std::shared_ptr<const std::byte> Communicator::allocate_on_node(
     std::size_t bytes, const std::function<void(std::span<std::byte>)>& fill) const {
+  return allocate_on_node_together(bytes, [&](std::span<std::byte> memory, int part, int) {
+    if (part == 0) fill(memory);
+  });
+}
+
+std::shared_ptr<const std::byte> Communicator::allocate_on_node_together(
+    std::size_t bytes,
+    const std::function<void(std::span<std::byte>, int part, int parts)>& fill) const {
   const Communicator on_node = node();
   auto owner = std::make_shared<NodeWindow>();
   std::byte* base = nullptr;
@@ -197,9 +205,8 @@ std::shared_ptr<const std::byte> Communicator::allocate_on_node(
   int unit = 1;
   require_success(MPI_Win_shared_query(owner->window, 0, &shared_bytes, &unit, &base),
                   "MPI_Win_shared_query");
-  all_or_none(on_node, [&] {
-    if (on_node.is_root()) fill(std::span<std::byte>(base, bytes));
-  });
+  all_or_none(on_node,
+              [&] { fill(std::span<std::byte>(base, bytes), on_node.rank(), on_node.size()); });
   on_node.barrier();
   return {owner, base};
 }

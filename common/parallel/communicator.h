@@ -49,6 +49,11 @@ class Communicator {
   /// node.
   [[nodiscard]] std::shared_ptr<const std::byte> allocate_on_node(
       std::size_t bytes, const std::function<void(std::span<std::byte>)>& fill) const;
+  /// The same, filled together: `fill` runs on every rank of the node and gets all the memory, its
+  /// own number and how many they are.
+  [[nodiscard]] std::shared_ptr<const std::byte> allocate_on_node_together(
+      std::size_t bytes,
+      const std::function<void(std::span<std::byte>, int part, int parts)>& fill) const;
 
   struct Impl;
   [[nodiscard]] const Impl& impl() const { return *impl_; }

@@ -61,8 +61,9 @@ expect 2 'AP, LAT' --ct ct.mha --rig c-arm-12in -o refused.h5
 expect 2 'name a CT' -o refused.h5
 refuse 3 'codewords = 65537' --codewords 65537 -o refused.h5
 refuse 3 'uv_nodes = 1' --uv-nodes 1 -o refused.h5
-refuse 3 'slabs = 2' --slabs 2 -o refused.h5
-refuse 3 'caster = shear-warp' --caster shear-warp -o refused.h5
+refuse 3 'slabs = 0' --slabs 0 -o refused.h5
+refuse 3 'slabs = 60: must be' --slabs 60 -o refused.h5
+refuse 3 'caster = bilinear' --caster bilinear -o refused.h5
 refuse 3 'training_fraction' --training-fraction 0 -o refused.h5
 refuse 3 'more codewords than training tiles' --codewords 60000 --no-checkpoint -o refused.h5
 refuse 3 'max_rotation_deg' --max-rotation-deg 80 -o refused.h5
@@ -81,21 +82,29 @@ done
 [[ -z $(find . -name '*.h5*') ]] || fail 'the dry run wrote a file'
 
 hash_of() { sed -n 's/.*sha256 //p' "$1"; }
-"$program" "${common[@]}" -o one.h5 >one.txt 2>/dev/null
-expected=$(hash_of one.txt)
-[[ ${#expected} == 64 ]] || fail "no payload hash: $(cat one.txt)"
-for bits in 128 256; do
-  grep -q avx2 /proc/cpuinfo || [[ $bits == 128 ]] || continue
-  AF_VECTOR_BITS=$bits "$program" "${common[@]}" -o bits.h5 >bits.txt 2>/dev/null
-  [[ $(hash_of bits.txt) == "$expected" ]] || fail "another payload with $bits-bit vectors"
+hashes=()
+for caster in shear-warp trilinear; do
+  for slabs in 1 3; do
+    options=("${common[@]}" --caster "$caster" --slabs "$slabs")
+    "$program" "${options[@]}" -o one.h5 >one.txt 2>/dev/null
+    expected=$(hash_of one.txt)
+    [[ ${#expected} == 64 ]] || fail "no payload hash: $(cat one.txt)"
+    hashes+=("$expected")
+    for bits in 128 256; do
+      grep -q avx2 /proc/cpuinfo || [[ $bits == 128 ]] || continue
+      AF_VECTOR_BITS=$bits "$program" "${options[@]}" -o bits.h5 >bits.txt 2>/dev/null
+      [[ $(hash_of bits.txt) == "$expected" ]] || fail "another payload with $bits-bit vectors, $caster, $slabs slabs"
+    done
+    "$mpiexec" -n 3 --oversubscribe "$program" "${options[@]}" -o three.h5 >three.txt 2>/dev/null
+    [[ $(hash_of three.txt) == "$expected" ]] || fail "another payload on 3 ranks, $caster, $slabs slabs"
+  done
 done
-"$mpiexec" -n 3 --oversubscribe "$program" "${common[@]}" -o three.h5 >three.txt 2>/dev/null
-[[ $(hash_of three.txt) == "$expected" ]] || fail 'another payload on 3 ranks'
+[[ $(printf '%s\n' "${hashes[@]}" | sort -u | wc -l) == 4 ]] || fail 'casters or slabs make no difference'
 [[ ! -e three.h5.progress && ! -e three.h5.partial ]] || fail 'work files are left'
 
 # A slow run (fine steps), stopped by SIGUSR1 on two ranks, resumed on one; another sampling in between is refused.
 slow=(--ct ct.mha --rig c-arm-12in --camera AP --uv-nodes 25 --st-nodes 161 --codewords 200)
-slow+=(--max-translation-mm 30 --step-mm 0.05)
+slow+=(--max-translation-mm 30 --caster trilinear --step-mm 0.05)
 "$mpiexec" -n 2 --oversubscribe "$program" "${slow[@]}" -o slow.h5 >slow.txt 2>slow.err &
 job=$!
 for ((i = 0; i < 600; ++i)); do
@@ -108,7 +117,10 @@ wait "$job" || code=$?
 [[ $code == 75 ]] || fail "SIGUSR1 gave $code instead of 75: $(cat slow.err)"
 [[ ! -e slow.h5 ]] || fail 'an unfinished field has its name'
 expect 3 'step_mm = 0.5: the unfinished work was begun with 0.05' "${slow[@]:0:10}" --max-translation-mm 30 \
-  --step-mm 0.5 -o slow.h5
+  --caster trilinear --step-mm 0.5 -o slow.h5
+expect 3 "caster = \"shear-warp\": the unfinished work was begun with \"trilinear\"" "${slow[@]:0:10}" \
+  --max-translation-mm 30 --caster shear-warp --step-mm 0.05 -o slow.h5
+expect 3 'slabs = 2: the unfinished work was begun with 1' "${slow[@]}" --slabs 2 -o slow.h5
 "$program" "${slow[@]}" -o slow.h5 >slow.txt 2>slow.err
 grep -q 'resumed' slow.err || fail "nothing was resumed: $(cat slow.err)"
 "$program" "${slow[@]}" -o again.h5 --no-checkpoint >again.txt 2>/dev/null
