@@ -105,6 +105,7 @@ void run(const RegisterOptions& options,
       af::all_or_none(world, [&] { return study.find_case(options.case_name); });
   const std::vector<af::RigidTransform> starts =
       af::all_or_none(world, [&] { return start_poses(options, study_case.frame()); });
+  const auto gold = af::all_or_none(world, [&] { return known_gold(study, study_case); });
   const LoadedCase loaded = load_case(study, study_case, case_load_options(options), world);
   for (const std::string& text : loaded.warnings) af::cli::warn(world, text);
   RegistrationRunner runner =
@@ -123,7 +124,7 @@ void run(const RegisterOptions& options,
       });
   af::all_or_none(world, [&] {
     if (!world.is_root()) return;
-    add_target_errors(study, study_case, records);
+    add_target_errors(gold, study_case.target_box_ct, records);
     RunDescription description{study_case.name, options.renderer, {}};
     description.provenance = {"af-register",
                               command_line,

@@ -172,6 +172,7 @@ CsvTable registrations_table(std::vector<RegistrationRecord> records,
                              "stop_reason",
                              "inadmissible",
                              "drr_count",
+                             "relative_to",
                              "seconds"})
     columns.emplace_back(column);
   CsvTable table(columns);
@@ -190,6 +191,7 @@ CsvTable registrations_table(std::vector<RegistrationRecord> records,
     fields.emplace_back(to_string(result.stop_reason));
     fields.push_back(std::to_string(result.inadmissible));
     fields.push_back(std::to_string(result.drr_count));
+    fields.emplace_back("nominal");
     fields.push_back(number_text(result.seconds));
     table.add_row(std::move(fields));
   }

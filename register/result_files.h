@@ -15,7 +15,7 @@ namespace af::registration {
 
 /// Distances of a registration's start and end from the gold pose.
 struct TargetErrors {
-  std::string gold_source;  ///< "fiducials" or "gold_room_from_ct"
+  std::string gold_source;  ///< "fiducials" or "study" (its gold_room_from_ct)
   double initial_tre_mm = 0.0;
   double tre_mm = 0.0;
 };
@@ -48,7 +48,8 @@ nlohmann::json result_json(const RegistrationRecord& record,
                            const RegistrationProblem& problem,
                            const RunDescription& run);
 
-/// registrations.csv with the contract's columns, rows sorted by start index.
+/// registrations.csv with the contract's columns, rows sorted by start index. Parameters are
+/// relative to the nominal pose, which the column `relative_to` says.
 CsvTable registrations_table(std::vector<RegistrationRecord> records,
                              const RegistrationProblem& problem,
                              const RunDescription& run);

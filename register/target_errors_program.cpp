@@ -1,44 +1,30 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "register/target_errors_program.h"
 
-#include <optional>
-#include <string>
+#include <algorithm>
 
-#include "evaluate/fiducial_registration.h"
 #include "evaluate/target_box.h"
 #include "evaluate/tre.h"
 
 namespace af::registration {
-namespace {
 
-struct GoldPose {
-  RigidTransform room_from_ct;
-  std::string source;
-};
-
-/// The gold standard of the case's fiducials, or the pose the study states; none when it has
-/// neither.
-std::optional<GoldPose> gold_pose(const Study& study, const StudyCase& study_case) {
-  std::vector<evaluation::FiducialView> views;
-  for (const StudyView& view : study_case.views)
-    if (!view.fiducials_px.empty())
-      views.push_back({study.rig.camera(view.camera), view.fiducials_px});
-  if (!study_case.fiducials_ct_mm.empty() && views.size() >= 2)
-    return GoldPose{evaluation::gold_from_fiducials(views, study_case.fiducials_ct_mm).room_from_ct,
-                    "fiducials"};
-  if (study_case.gold_room_from_ct.has_value())
-    return GoldPose{*study_case.gold_room_from_ct, "gold_room_from_ct"};
-  return std::nullopt;
+std::optional<evaluation::GoldStandard> known_gold(const Study& study,
+                                                   const StudyCase& study_case) {
+  const auto views_with_fiducials =
+      std::count_if(study_case.views.begin(), study_case.views.end(), [](const StudyView& view) {
+        return !view.fiducials_px.empty();
+      });
+  if (!study_case.gold_room_from_ct.has_value() &&
+      (study_case.fiducials_ct_mm.empty() || views_with_fiducials < 2))
+    return std::nullopt;
+  return evaluation::gold_standard(study, study_case, "auto");
 }
 
-}  // namespace
-
-void add_target_errors(const Study& study,
-                       const StudyCase& study_case,
+void add_target_errors(const std::optional<evaluation::GoldStandard>& gold,
+                       const CtBox& target_box_ct,
                        std::vector<RegistrationRecord>& records) {
-  const std::optional<GoldPose> gold = gold_pose(study, study_case);
   if (!gold.has_value()) return;
-  const std::vector<Eigen::Vector3d> points = evaluation::target_points(study_case.target_box_ct);
+  const std::vector<Eigen::Vector3d> points = evaluation::target_points(target_box_ct);
   for (RegistrationRecord& record : records)
     record.errors = TargetErrors{
         gold->source,

@@ -1,17 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <vector>
 
+#include "evaluate/gold_standard_files.h"
 #include "io/study_file.h"
 #include "register/result_files.h"
 
 namespace af::registration {
 
-/// Fills in every record's TRE (mean over the target box) when
-/// the study knows the case's gold pose: from its fiducials if it has any, else the one it states.
-void add_target_errors(const Study& study,
-                       const StudyCase& study_case,
+/// The case's gold pose as af-evaluate takes it (from its fiducials if two views show them, else
+/// the one the study states); nullopt when the study knows none.
+std::optional<evaluation::GoldStandard> known_gold(const Study& study, const StudyCase& study_case);
+
+/// Fills in every record's TRE: the mean over the target box.
+void add_target_errors(const std::optional<evaluation::GoldStandard>& gold,
+                       const CtBox& target_box_ct,
                        std::vector<RegistrationRecord>& records);
 
 }  // namespace af::registration
