@@ -189,8 +189,9 @@ class UnitCast {
       // Beyond the grid, and beyond the last node, stands the row of zeros at z = 0.
       const double z = j < t_count ? slice.z_of_t.index(v_mm, first_t + j) : 0.0;
       const bool is_inside = z > 0.0 && z < last_row + 1.0;
-      const auto fixed =
-          is_inside ? static_cast<std::int32_t>(z * (1 << kWeightBits) + 0.5) : std::int32_t{0};
+      const auto fixed = is_inside
+                             ? static_cast<std::int32_t>(std::floor(z * (1 << kWeightBits) + 0.5))
+                             : std::int32_t{0};
       const int row = std::min(fixed >> kWeightBits, grid.size[2] - 2);
       columns.z_row[j] = row;
       // The last row is 0, so at its very edge a weight of all but 1/32768 is as good as 1.
