@@ -76,8 +76,8 @@ void MutualInformation::count(std::span<const float> drr, std::span<std::uint32_
   std::fill(joint.begin(), joint.end(), 0U);
   const auto last_bin = static_cast<float>(bins_ - 1);
   const auto column_of = [&](float value) {
-    // max first: a NaN becomes bin 0 here, and the caller's DRRs are finite.
-    const float position = std::min(std::max((value - drr_low_) * drr_scale_, 0.0f), last_bin);
+    // In this order of arguments a NaN becomes bin 0 instead of an undefined conversion.
+    const float position = std::min(std::max(0.0f, (value - drr_low_) * drr_scale_), last_bin);
     return static_cast<std::uint32_t>(static_cast<std::int32_t>(position));
   };
   std::uint32_t* const even = joint.data();

@@ -27,8 +27,8 @@ std::string program(const std::string& name) {
 class ProgramTest : public testing::Test {
  protected:
   static void SetUpTestSuite() {
-    folder_ = new test::ScratchFolder();
-    test::write_small_study(folder_->path());
+    study_folder = new test::ScratchFolder();
+    test::write_small_study(study_folder->path());
     for (const char* camera : {"AP", "LAT"}) {
       const test::ProgramRun run = test::run_command(
           program("af-precompute") + " --study " + path("study.toml") + " --camera " + camera +
@@ -38,9 +38,9 @@ class ProgramTest : public testing::Test {
       ASSERT_EQ(run.exit_code, 0) << run.output;
     }
   }
-  static void TearDownTestSuite() { delete folder_; }
+  static void TearDownTestSuite() { delete study_folder; }
 
-  static std::string path(const std::string& name) { return (*folder_ / name).string(); }
+  static std::string path(const std::string& name) { return (*study_folder / name).string(); }
   static std::string fields() {
     return " --field AP=" + path("AP.af.h5") + " --field LAT=" + path("LAT.af.h5");
   }
@@ -61,7 +61,7 @@ class ProgramTest : public testing::Test {
   }
 
  private:
-  static inline test::ScratchFolder* folder_ = nullptr;
+  static inline test::ScratchFolder* study_folder = nullptr;
 };
 
 /// The 36 x 36 pixels of 2 mm at the isocentre see half a millimetre at best through a small field.

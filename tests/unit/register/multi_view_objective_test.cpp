@@ -47,7 +47,8 @@ class ConstantMeasure final : public SimilarityMeasure {
 struct Fixture {
   std::shared_ptr<CountingRenderer> renderer = std::make_shared<CountingRenderer>();
 
-  MultiViewObjective objective(std::optional<MotionLimit> limit = std::nullopt) const {
+  [[nodiscard]] MultiViewObjective objective(
+      const std::optional<MotionLimit>& limit = std::nullopt) const {
     std::vector<ObjectiveView> views;
     for (int i = 0; i < 3; ++i) {
       ObjectiveView view;

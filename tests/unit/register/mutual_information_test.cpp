@@ -158,7 +158,6 @@ TEST(MutualInformation, IsSymmetricInItsTwoImages) {
 
 TEST(MutualInformation, IgnoresPixelsOutsideTheMask) {
   const Image2d xray = noise(20, 10, 6);
-  Image2d masked_xray = xray;
   std::vector<float> drr = noise(20, 10, 7).pixels;
   std::vector<float> masked_drr = drr;
   SimilarityReference reference{xray, std::vector<std::uint8_t>(200, 1), {0.0, 4.0}};
@@ -174,6 +173,21 @@ TEST(MutualInformation, IgnoresPixelsOutsideTheMask) {
   const SimilarityReference half{crop(xray, {0, 0, 20, 5}), {}, {0.0, 4.0}};
   drr.resize(100);
   EXPECT_EQ(mutual_information(half, drr), expected);
+}
+
+TEST(MutualInformation, StaysDefinedForADrrThatIsNotFinite) {
+  const Image2d xray = noise(16, 16, 9);
+  std::vector<float> drr = xray.pixels;
+  const SimilarityReference reference{xray, {}, {0.0, 4.0}};
+  const double infinity = std::numeric_limits<double>::infinity();
+  drr[0] = std::numeric_limits<float>::quiet_NaN();
+  drr[1] = static_cast<float>(infinity);
+  drr[2] = static_cast<float>(-infinity);
+  const double with_bad_values = mutual_information(reference, drr);
+  // NaN and below count in the first bin, above in the last.
+  drr[0] = drr[2] = 0.0f;
+  drr[1] = 4.0f;
+  EXPECT_EQ(with_bad_values, mutual_information(reference, drr));
 }
 
 TEST(MutualInformation, RefusesAnEmptyMaskAConstantXrayAndAnEmptyDrrRange) {

@@ -8,10 +8,12 @@
 namespace af::registration {
 namespace {
 
-const Eigen::Vector3d kCenterCt(5.0, -7.0, 3.0);
+Eigen::Vector3d center_ct() {
+  return {5.0, -7.0, 3.0};
+}
 
 RigidTransform some_pose() {
-  const PoseFrame frame = PoseFrame::about(RigidTransform::Identity(), kCenterCt);
+  const PoseFrame frame = PoseFrame::about(RigidTransform::Identity(), center_ct());
   return pose_from_parameters(frame,
                               PoseParameters::from_deg_and_mm({20, -10, 30, 4.0, -3.0, 6.0}));
 }
@@ -35,7 +37,7 @@ double brute_force_displacement_mm(const std::vector<Eigen::Vector3d>& points,
                                    int index,
                                    double step) {
   const RigidTransform start = some_pose();
-  const PoseFrame frame = PoseFrame::about(start, kCenterCt);
+  const PoseFrame frame = PoseFrame::about(start, center_ct());
   PoseParameters parameters;
   (index < 3 ? parameters.rotation_rad : parameters.translation_mm)[index % 3] = step;
   const RigidTransform moved = pose_from_parameters(frame, parameters);
@@ -60,7 +62,7 @@ TEST(ParameterScaling, EqualsTheMeasuredMeanDisplacement) {
   const std::vector<Eigen::Vector3d> points = ct_lattice_points(test::five_ellipsoids().grid, 12);
   const std::vector<View> views = two_views();
   const auto scaling =
-      projected_motion_scaling(some_pose(), kCenterCt, points, views, Eigen::Vector3d::Zero());
+      projected_motion_scaling(some_pose(), center_ct(), points, views, Eigen::Vector3d::Zero());
   ASSERT_TRUE(scaling.has_value());
   // Second-order terms: 1e-4 rad or mm against arms and depths of some 100 mm.
   constexpr double kStep = 1e-4;
@@ -76,7 +78,7 @@ TEST(ParameterScaling, OneScaledUnitMovesProjectionsByOneMillimetre) {
   const std::vector<Eigen::Vector3d> points = ct_lattice_points(test::five_ellipsoids().grid, 12);
   const std::vector<View> views = two_views();
   const auto scaling =
-      projected_motion_scaling(some_pose(), kCenterCt, points, views, Eigen::Vector3d::Zero());
+      projected_motion_scaling(some_pose(), center_ct(), points, views, Eigen::Vector3d::Zero());
   ASSERT_TRUE(scaling.has_value());
   // Perspective and curvature: 1 mm against a depth of 650 mm and arms of some 50 mm.
   constexpr double kSecondOrder = 0.02;
@@ -106,7 +108,7 @@ TEST(ParameterScaling, IsUndefinedWhenNoPointProjectsIntoARegion) {
   far_away.translation() = Eigen::Vector3d(0, 0, 500);
   const auto views = two_views();
   EXPECT_FALSE(projected_motion_scaling(far_away,
-                                        kCenterCt,
+                                        center_ct(),
                                         ct_lattice_points(test::five_ellipsoids().grid, 8),
                                         views,
                                         Eigen::Vector3d::Zero())
