@@ -44,13 +44,26 @@ AF_KERNEL_INLINE uint64_t squared_error(const uint16_t* a, const uint16_t* b) {
 
 template <int kStride>
 AF_KERNEL_INLINE I16 butterfly(I16 values) {
-  I16 partner;
-  I16 is_upper;
-  for (int lane = 0; lane < kLanes; ++lane) {
-    partner[lane] = lane ^ kStride;
-    is_upper[lane] = (lane & kStride) != 0 ? -1 : 0;
-  }
-  const I16 other = __builtin_shuffle(values, partner);
+  const I16 lanes = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+  const I16 is_upper = lanes & splat(int32_t{kStride});
+  const I16 other = __builtin_shufflevector(values,
+                                            values,
+                                            0 ^ kStride,
+                                            1 ^ kStride,
+                                            2 ^ kStride,
+                                            3 ^ kStride,
+                                            4 ^ kStride,
+                                            5 ^ kStride,
+                                            6 ^ kStride,
+                                            7 ^ kStride,
+                                            8 ^ kStride,
+                                            9 ^ kStride,
+                                            10 ^ kStride,
+                                            11 ^ kStride,
+                                            12 ^ kStride,
+                                            13 ^ kStride,
+                                            14 ^ kStride,
+                                            15 ^ kStride);
   return is_upper != 0 ? other - values : values + other;
 }
 
@@ -99,7 +112,7 @@ AF_KERNEL_INLINE void search_block(const CodewordBlocks& blocks,
   const float* lanes = blocks.coefficients + static_cast<size_t>(block) * 256;
   F16 sum = {};
   for (int i = 0; i < 5; ++i) sum = add_squared_difference(sum, coefficients[i], lanes + 16 * i);
-  if (!any(sum <= splat(best.limit))) return;
+  if (lane_bits(sum <= splat(best.limit)) == 0) return;
   for (int i = 5; i < 16; ++i) sum = add_squared_difference(sum, coefficients[i], lanes + 16 * i);
   uint32_t near_bits = lane_bits(sum <= splat(best.limit));
   for (; near_bits != 0; near_bits &= near_bits - 1) {

@@ -110,8 +110,8 @@ std::string to_toml(const PrecomputeOptions& options) {
     text += "center_ct_mm = [" + exact_text(options.center_ct_mm[0]) + ", " +
             exact_text(options.center_ct_mm[1]) + ", " + exact_text(options.center_ct_mm[2]) +
             "]\n";
-  for (const auto& [name, value] : casting_options(options)) text += name + " = " + value + "\n";
-  for (const auto& [name, value] : codebook_options(options)) text += name + " = " + value + "\n";
+  for (const NamedValues& values : {casting_options(options), codebook_options(options)})
+    for (const auto& [name, value] : values) text.append(name).append(" = ").append(value) += '\n';
   add_text("output", options.output);
   text += "memory_limit_bytes = " + std::to_string(options.memory_limit_bytes) + "\n";
   text += std::string("checkpoint = ") + (options.has_checkpoint ? "true" : "false") + "\n";

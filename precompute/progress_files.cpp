@@ -131,8 +131,11 @@ void require_same(const ProgressManifest& earlier,
     const auto found = earlier.decides.find(name);
     const std::string before = found == earlier.decides.end() ? "nothing" : found->second;
     if (before != value)
-      differences.push_back(name + " = " + value + ": the unfinished work was begun with " +
-                            before);
+      differences.push_back(std::string(name)
+                                .append(" = ")
+                                .append(value)
+                                .append(": the unfinished work was begun with ")
+                                .append(before));
   }
   if (differences.empty() && earlier.decides.size() == now.decides.size()) return;
   differences.emplace_back(
@@ -162,9 +165,9 @@ std::int64_t open_folder(const std::filesystem::path& folder,
   return manifest.rays_per_unit;
 }
 
-/// "017-00003.shard": run, rank.
+/// "0017-000003.shard": run, rank.
 std::filesystem::path shard_name(std::uint64_t run, int rank) {
-  const auto padded = [](std::string digits, std::size_t width) {
+  const auto padded = [](const std::string& digits, std::size_t width) {
     return std::string(width - std::min(width, digits.size()), '0') + digits;
   };
   return padded(std::to_string(run), 4) + "-" + padded(std::to_string(rank), 6) + ".shard";

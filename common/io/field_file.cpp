@@ -73,7 +73,7 @@ void for_each_run(const IndexBlock& block, const DatasetRule& rule, Visit&& visi
   std::span<const std::uint16_t> rest(block.indices);
   const auto run = static_cast<std::size_t>(block.tile_count[3]);
   const auto position = [&](std::size_t axis, int local) {
-    return static_cast<std::uint64_t>(block.first_tile[axis] + local);
+    return static_cast<std::uint64_t>(block.first_tile[axis]) + static_cast<std::uint64_t>(local);
   };
   for (int a = 0; a < block.tile_count[0]; ++a)
     for (int b = 0; b < block.tile_count[1]; ++b)
@@ -338,7 +338,7 @@ std::string verify_and_seal(const CompressedAttenuationField& field,
     index_sha256.push_back(sha256.hex_digest());
     hdf5::replace_text_attribute(dataset, "sha256", index_sha256.back());
   }
-  const std::string payload = payload_hash(field_layout::datasets_of(field), rules, index_sha256);
+  std::string payload = payload_hash(field_layout::datasets_of(field), rules, index_sha256);
   hdf5::replace_text_attribute(file, "payload_sha256", payload);
   file.close("H5Fclose");
   return payload;
