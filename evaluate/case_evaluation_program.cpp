@@ -119,14 +119,6 @@ void assign_starts(const RegistrationStudyOptions& options,
       method.start_indices.push_back(i);
 }
 
-/// What rows are measured with.
-struct Yardstick {
-  PoseFrame gold_frame;
-  RigidTransform gold_room_from_ct;
-  std::optional<RigidTransform> stated_pose;  ///< only beside fiducials
-  std::vector<Eigen::Vector3d> points_ct_mm;
-};
-
 /// Whether a registration ended with a pose that means anything.
 bool has_pose(const RegistrationResult& result) {
   return std::isfinite(result.similarity) && result.room_from_ct.matrix().allFinite();
@@ -150,52 +142,43 @@ void add_result(const RegistrationResult& result,
         mean_tre_mm(result.room_from_ct, *yardstick.stated_pose, yardstick.points_ct_mm);
 }
 
-RegistrationRow registered_row(const std::string& case_name,
-                               Method& method,
-                               const StratifiedStarts& starts,
-                               std::size_t start_index,
-                               const Yardstick& yardstick) {
-  const PerturbedStart& start = starts.starts[start_index];
-  RegistrationRow row;
-  row.case_name = case_name;
-  row.renderer = method.renderer;
-  row.start_index = static_cast<std::int64_t>(start_index);
-  row.draw_index = start.draw_index;
-  row.interval = start.interval;
-  row.start_deg_mm = start.parameters.deg_and_mm();
-  row.initial_tre_mm = start.initial_tre_mm;
-  try {
-    add_result(method.runner.run(start.room_from_ct), yardstick, row);
-  } catch (const std::exception& error) {
-    row.stop_reason = "error";
-    row.error = error.what();
-  }
-  return row;
+/// Collective. Registers every start of one method; `first_order` numbers its rows. Methods go one
+/// after the other: blocks of the work queue then hold work of one duration.
+void register_with(Method& method,
+                   const std::string& case_name,
+                   const StratifiedStarts& starts,
+                   const Yardstick& yardstick,
+                   std::size_t first_order,
+                   const Communicator& world,
+                   std::vector<json>& mine) {
+  const auto count = static_cast<std::int64_t>(method.start_indices.size());
+  cli::ProgressPrinter printer("case " + case_name + ", " + method.renderer + " registrations",
+                               world.is_root());
+  const auto work = [&](std::int64_t item) {
+    const std::size_t index = method.start_indices[static_cast<std::size_t>(item)];
+    RegistrationRow row =
+        registered_row([&](const RigidTransform& start) { return method.runner.run(start); },
+                       starts.starts[index],
+                       yardstick);
+    row.case_name = case_name;
+    row.renderer = method.renderer;
+    row.start_index = static_cast<std::int64_t>(index);
+    mine.push_back(packed_row(static_cast<std::int64_t>(first_order + index), row));
+  };
+  for_each_item(world, count, work, [&](std::int64_t done) {
+    printer.update(static_cast<double>(done), static_cast<double>(count));
+  });
 }
 
-/// Collective. All rows on rank 0, by renderer and start index. Ray casting, the slow one, is
-/// handed out first, so that the ranks end together.
+/// Collective. All rows on rank 0, by renderer and start index.
 std::vector<RegistrationRow> register_all(const std::string& case_name,
                                           std::vector<Method>& methods,
                                           const StratifiedStarts& starts,
                                           const Yardstick& yardstick,
                                           const Communicator& world) {
-  std::vector<std::pair<std::size_t, std::size_t>> items;  // method, start
-  for (std::size_t m = methods.size(); m-- > 0;)
-    for (const std::size_t index : methods[m].start_indices) items.emplace_back(m, index);
   std::vector<json> mine;
-  const auto count = static_cast<double>(items.size());
-  cli::ProgressPrinter printer("registrations of case " + case_name, world.is_root());
-  for_each_item(
-      world,
-      static_cast<std::int64_t>(items.size()),
-      [&](std::int64_t item) {
-        const auto [m, index] = items[static_cast<std::size_t>(item)];
-        const std::size_t order = m * starts.starts.size() + index;
-        mine.push_back(packed_row(static_cast<std::int64_t>(order),
-                                  registered_row(case_name, methods[m], starts, index, yardstick)));
-      },
-      [&](std::int64_t done) { printer.update(static_cast<double>(done), count); });
+  for (std::size_t m = 0; m < methods.size(); ++m)
+    register_with(methods[m], case_name, starts, yardstick, m * starts.starts.size(), world, mine);
   std::vector<RegistrationRow> rows;
   for (const json& packed : gather_rows(world, mine)) rows.push_back(row_of(packed));
   return rows;
@@ -270,6 +253,24 @@ void draw_overlays(const Method& method,
 }
 
 }  // namespace
+
+RegistrationRow registered_row(
+    const std::function<RegistrationResult(const RigidTransform& start)>& run,
+    const PerturbedStart& start,
+    const Yardstick& yardstick) {
+  RegistrationRow row;
+  row.draw_index = start.draw_index;
+  row.interval = start.interval;
+  row.start_deg_mm = start.parameters.deg_and_mm();
+  row.initial_tre_mm = start.initial_tre_mm;
+  try {
+    add_result(run(start.room_from_ct), yardstick, row);
+  } catch (const std::exception& error) {
+    row.stop_reason = "error";
+    row.error = error.what();
+  }
+  return row;
+}
 
 CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
                              const Study& study,

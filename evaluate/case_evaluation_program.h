@@ -4,6 +4,7 @@
 #include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,7 @@
 #include "evaluate/registration_rows_files.h"
 #include "io/study_file.h"
 #include "parallel/communicator.h"
+#include "register/registration.h"
 
 namespace af::evaluation {
 
@@ -25,6 +27,22 @@ struct CaseEvaluation {
   std::map<std::string, std::string> input_sha256;
   nlohmann::json pictures = nlohmann::json::array();  ///< rank 0: files and what they show
 };
+
+/// What registrations are measured with.
+struct Yardstick {
+  PoseFrame gold_frame;
+  RigidTransform gold_room_from_ct = RigidTransform::Identity();
+  std::optional<RigidTransform> stated_pose;  ///< only beside fiducials
+  std::vector<Eigen::Vector3d> points_ct_mm;
+};
+
+/// The row of one registration, without case, renderer and start index. Never throws for `run`: an
+/// exception becomes stop reason "error" with its message; a result without similarity has no pose.
+/// \test RegisteredRow.OfARegistrationThatThrowsIsAFailure
+RegistrationRow registered_row(
+    const std::function<registration::RegistrationResult(const RigidTransform& start)>& run,
+    const PerturbedStart& start,
+    const Yardstick& yardstick);
 
 /// Collective. Draws a case's starts, calls `on_starts` with the evaluation so far (on every rank,
 /// before anything is registered), registers from every start with every renderer, the work shared

@@ -15,8 +15,8 @@
 namespace af::evaluation {
 namespace {
 
-constexpr int kWidthPx = 760;
-constexpr int kHeightPx = 460;
+constexpr int kWidthPx = 640;
+constexpr int kHeightPx = 420;
 
 std::string color_of(std::size_t group) {
   constexpr std::array<std::string_view, 6> kColors = {palette::kBlue,
@@ -146,8 +146,7 @@ void draw_success_rates(const std::vector<OutcomeGroup>& groups,
                     std::to_string(g == 0 ? 7 : 5) + " ps 0.8 lc " + color_of(g) + " title " +
                     gnuplot_quoted(groups[g].label));
   }
-  figure.add("set xlabel 'initial TRE (mm)'\nset ylabel 'TRE below " + number_text(kSuccessTreMm) +
-             " mm (% of starts, 95 % interval)'\nset xrange [0:" +
+  figure.add("set xlabel 'initial TRE (mm)'\nset ylabel 'success (% of starts)'\nset xrange [0:" +
              number_text(intervals * width_mm) + "]\nset xtics " + number_text(width_mm) +
              "\nset yrange [0:102]\nset ytics 20\nset key bottom left reverse Left samplen 1.5\n"
              "plot " +
@@ -181,9 +180,10 @@ void draw_tre_histogram(const std::vector<OutcomeGroup>& groups,
   const double end_mm = static_cast<double>(kBars) * kBarWidthMm;
   figure.add("set boxwidth " + number_text(bar_mm) +
              "\nset xlabel 'TRE (mm)'\nset ylabel 'share of starts (%)'\nset xrange [0:" +
-             number_text(end_mm + 0.7) + "]\nset yrange [0:*]\nset xtics 0.5\nset xtics add ('> " +
-             number_text(end_mm) + "' " + number_text(end_mm + 0.375) + ", '' " +
-             number_text(end_mm) + ")\nset key top right samplen 1.5\nset arrow from first " +
+             number_text(end_mm + 0.7) + "]\nset yrange [0:*]\nset xtics 0, 0.5, " +
+             number_text(end_mm) + "\nset xtics add ('> " + number_text(end_mm) + "' " +
+             number_text(end_mm + 0.375) + ", '' " + number_text(end_mm) +
+             ")\nset key top right samplen 1.5\nset arrow from first " +
              number_text(kSuccessTreMm) + ", graph 0 to first " + number_text(kSuccessTreMm) +
              ", graph 1 nohead dt 2 lw 1.5 lc " + quiet());
   figure.add(label_at("success: below " + number_text(kSuccessTreMm) + " mm",
@@ -208,8 +208,7 @@ void draw_tre_scatter(const std::vector<OutcomeGroup>& groups,
     const std::string name = "starts" + std::to_string(g);
     figure.add_data(name, rows);
     parts.push_back("$" + name + " using 1:2 with points pt " + std::to_string(g == 0 ? 6 : 2) +
-                    " ps 0.5 lw 1.5 lc " + color_of(g) + " title " +
-                    gnuplot_quoted(groups[g].label));
+                    " ps 0.6 lw 2 lc " + color_of(g) + " title " + gnuplot_quoted(groups[g].label));
   }
   parts.push_back("x > " + number_text(kLowestMm) + " ? x : 1/0 with lines lw 1 dt 3 lc " +
                   quiet() + " notitle");

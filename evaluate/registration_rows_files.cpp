@@ -227,30 +227,37 @@ json renderer_statistics(const std::vector<RegistrationRow>& rows,
 }
 
 json paired_statistics(const std::vector<RegistrationRow>& rows, double margin_mm) {
-  std::map<std::pair<std::string, std::int64_t>, std::array<double, 2>> pairs;
-  for (const RegistrationRow& row : rows) {
-    auto& pair = pairs
-                     .try_emplace({row.case_name, row.start_index},
-                                  std::array{RegistrationRow::kMissing, RegistrationRow::kMissing})
-                     .first->second;
-    pair[row.renderer == "field" ? 0 : 1] = row.tre_mm;
+  // Field first, ray casting second.
+  std::map<std::pair<std::string, std::int64_t>, std::array<const RegistrationRow*, 2>> by_start;
+  for (const RegistrationRow& row : rows)
+    by_start[{row.case_name, row.start_index}][row.renderer == "field" ? 0 : 1] = &row;
+  std::array<std::vector<double>, 2> seconds;
+  std::array<std::vector<double>, 2> tre_mm;
+  std::array<std::int64_t, 2> successes{};
+  for (const auto& [start, pair] : by_start) {
+    if (pair[0] == nullptr || pair[1] == nullptr) continue;
+    const std::array<bool, 2> succeeded = {pair[0]->tre_mm < kSuccessTreMm,
+                                           pair[1]->tre_mm < kSuccessTreMm};
+    for (std::size_t side = 0; side < 2; ++side) {
+      seconds[side].push_back(pair[side]->seconds);
+      successes[side] += succeeded[side] ? 1 : 0;
+      if (succeeded[0] && succeeded[1]) tre_mm[side].push_back(pair[side]->tre_mm);
+    }
   }
-  std::vector<double> field;
-  std::vector<double> raycast;
-  for (const auto& [key, tre_mm] : pairs) {
-    if (!(tre_mm[0] < kSuccessTreMm && tre_mm[1] < kSuccessTreMm)) continue;
-    field.push_back(tre_mm[0]);
-    raycast.push_back(tre_mm[1]);
-  }
-  if (field.size() < 2) return nullptr;
-  const PairedComparison comparison = compare_paired(field, raycast, margin_mm);
-  return {{"pairs", comparison.pairs},
-          {"mean_difference_mm", comparison.mean_difference},
-          {"low_90_mm", comparison.low_90},
-          {"high_90_mm", comparison.high_90},
-          {"t_test_p", comparison.t_test_p},
-          {"margin_mm", comparison.margin},
-          {"equivalence_p", comparison.equivalence_p}};
+  if (seconds[0].empty()) return nullptr;
+  json result = {{"common_starts", seconds[0].size()},
+                 {"successes", successes},
+                 {"median_seconds", {summarize(seconds[0]).median, summarize(seconds[1]).median}},
+                 {"pairs", tre_mm[0].size()}};
+  if (tre_mm[0].size() < 2) return result;
+  const PairedComparison comparison = compare_paired(tre_mm[0], tre_mm[1], margin_mm);
+  result["test"] = {{"mean_difference_mm", comparison.mean_difference},
+                    {"low_90_mm", comparison.low_90},
+                    {"high_90_mm", comparison.high_90},
+                    {"t_test_p", comparison.t_test_p},
+                    {"margin_mm", comparison.margin},
+                    {"equivalence_p", comparison.equivalence_p}};
+  return result;
 }
 
 }  // namespace af::evaluation

@@ -65,8 +65,9 @@ nlohmann::json renderer_statistics(const std::vector<RegistrationRow>& rows,
                                    const std::string& renderer,
                                    const TreIntervals& intervals);
 
-/// Field against ray casting on the starts that both were given and from which both succeeded:
-/// paired t-test and equivalence of TRE; null when there are fewer than two such pairs.
+/// Field against ray casting on the starts that both were given: successes and median seconds of
+/// each; on those from which both succeeded ("pairs"), if there are two or more, paired t-test and
+/// equivalence of TRE. null when no start was given to both.
 nlohmann::json paired_statistics(const std::vector<RegistrationRow>& rows, double margin_mm);
 
 }  // namespace af::evaluation

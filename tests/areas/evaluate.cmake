@@ -13,3 +13,18 @@ af_add_test(
   evaluate_figures_test
   SOURCES unit/evaluate/figure_files_test.cpp
   LIBS af_evaluation_figures af_io_figure af_io_basics)
+
+af_add_test(
+  evaluate_report_test
+  SOURCES unit/evaluate/report_text_test.cpp unit/evaluate/evaluation_rows_test.cpp
+  LIBS af_evaluation_program af_evaluation_report)
+
+# One CTest entry for all: the tests share a study and its fields, which take longer than they do.
+add_executable(evaluate_program_tests programs/evaluate_program_test.cpp)
+target_link_libraries(evaluate_program_tests PRIVATE af_compile_options af_test_support GTest::gtest_main
+                                                     af_registration_case)
+target_compile_definitions(evaluate_program_tests PRIVATE AF_PROGRAM_FOLDER="${PROJECT_BINARY_DIR}/bin"
+                                                          AF_MPIEXEC="${MPIEXEC_EXECUTABLE}")
+add_dependencies(evaluate_program_tests af-evaluate af-precompute)
+add_test(NAME evaluate_program_tests COMMAND evaluate_program_tests)
+set_tests_properties(evaluate_program_tests PROPERTIES LABELS "programs;mpi" TIMEOUT 600 PROCESSORS 2)

@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cstdlib>
+
+#include "base/error.h"
+#include "evaluate/figure_files.h"
+#include "evaluate/report/html_text.h"
+#include "evaluate/report/number_html.h"
+#include "evaluate/report/sections_report.h"
+#include "evaluate/summary_files.h"
+#include "io/output_file.h"
+
+namespace af::evaluation {
+
+using nlohmann::json;
+
+namespace {
+
+/// A folder that ends with this object.
+class TemporaryFolder {
+ public:
+  TemporaryFolder() {
+    std::string name = (std::filesystem::temp_directory_path() / "af-report-XXXXXX").string();
+    if (mkdtemp(name.data()) == nullptr) throw FileError(name, "cannot be created");
+    path_ = name;
+  }
+  ~TemporaryFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+std::string camera_of(const EvaluationRun& run) {
+  return run.summary.at("field").at("camera").get<std::string>();
+}
+
+/// One box plot of all fields, drawn anew from their tables.
+std::string joint_box_plot(const std::vector<const EvaluationRun*>& runs) {
+  std::vector<PsnrGroup> groups;
+  for (const EvaluationRun* run : runs) {
+    const CsvTable rows = CsvTable::read(run->folder / "image-quality.csv");
+    PsnrGroup group{"camera " + camera_of(*run), {}};
+    for (std::size_t i = 0; i < rows.row_count(); ++i) {
+      const std::string& text = rows.text(i, "psnr_db");
+      if (text != "nan" && text != "inf") group.psnr_db.push_back(rows.number(i, "psnr_db"));
+    }
+    groups.push_back(std::move(group));
+  }
+  const TemporaryFolder folder;
+  draw_psnr_boxes(groups, folder.path() / "psnr");
+  return figure(read_text_file(folder.path() / "psnr.svg"),
+                "image/svg+xml",
+                "Box plots of PSNR",
+                "<b>PSNR at random poses</b> (the paper's Fig. 8). Box: quartiles and median; "
+                "whiskers: 5th and 95th percentile; dots: every pose.",
+                "narrow");
+}
+
+std::string nodes_text(const json& field) {
+  const auto pair = [&](const char* key) {
+    return field.at(key).at(0).dump() + "×" + field.at(key).at(1).dump();
+  };
+  return pair("uv_nodes") + ", " + pair("st_nodes") +
+         (field.at("slabs") == 1 ? "" : " × " + field.at("slabs").dump() + " slabs");
+}
+
+std::string quality_table(const std::vector<const EvaluationRun*>& runs) {
+  HtmlTable table({{"Camera", false},
+                   {"Nodes (u,v), (s,t)", true},
+                   {"Codewords", true},
+                   {"File (MB)", true},
+                   {"Range", true},
+                   {"Poses", true},
+                   {"Median", true},
+                   {"5th percentile", true},
+                   {"Minimum", true},
+                   {"Above 40 dB", true},
+                   {"Below 36 dB", true},
+                   {"Field, per DRR", true},
+                   {"Ray cast, per DRR", true}},
+                  "PSNR in dB against ray casting; times are medians of whole-detector DRRs on one "
+                  "core of this computer");
+  for (const EvaluationRun* run : runs) {
+    const json& summary = run->summary;
+    const json& field = summary.at("field");
+    const json& psnr = summary.at("psnr_db");
+    constexpr double kBytesPerMb = 1e6;
+    table.add_row({escaped(camera_of(*run)),
+                   nodes_text(field),
+                   field.at("codewords").dump(),
+                   decimals(field.at("file_bytes").get<double>() / kBytesPerMb, 1),
+                   "±" + decimals(field.at("max_rotation_deg"), 0) + "°, ±" +
+                       decimals(field.at("max_translation_mm"), 0) + " mm",
+                   summary.at("compared").dump(),
+                   decimals(psnr.at("median"), 1),
+                   decimals(psnr.at("p5"), 1),
+                   decimals(psnr.at("min"), 1),
+                   percent(number_of(summary.at("share_above_40_db"))),
+                   percent(number_of(summary.at("share_below_36_db"))),
+                   seconds_text(number_of(summary.at("seconds_per_drr_field").at("median"))),
+                   seconds_text(number_of(summary.at("seconds_per_drr_raycast").at("median")))});
+  }
+  table.add_row({"Paper, 2005",
+                 "64×64, 256×256",
+                 "16384",
+                 "32",
+                 "±10°, ±100 mm",
+                 "100",
+                 "&gt; 43",
+                 "",
+                 "",
+                 "almost all",
+                 "very few",
+                 "50 ms",
+                 "1.5 s"},
+                "reference");
+  return table.html();
+}
+
+std::string pair_pictures(const EvaluationRun& run) {
+  std::string figures;
+  for (const json& picture : run.summary.at("pictures"))
+    figures += figure(run.file(picture.at("file").get<std::string>()),
+                      "image/png",
+                      "field and ray cast side by side",
+                      "<b>Camera " + escaped(camera_of(run)) + ", the " +
+                          escaped(picture.at("which").get<std::string>()) + " pair.</b> PSNR " +
+                          decimals(picture.at("psnr_db"), 1) + " dB.",
+                      "picture wide");
+  return figures;
+}
+
+}  // namespace
+
+std::string image_quality_section(const std::vector<EvaluationRun>& runs) {
+  const auto qualities = runs_of(runs, "image-quality");
+  if (qualities.empty()) return "";
+  std::string pictures;
+  for (const EvaluationRun* run : qualities) pictures += pair_pictures(*run);
+  return element("h2", "Image quality of the fields") +
+         element("p",
+                 "Images looked up in the compressed fields, compared with ray casting through "
+                 "the CT at random poses of the fields' whole motion range.") +
+         joint_box_plot(qualities) + quality_table(qualities) +
+         element("p",
+                 "The paper's row: skull, thorax and pelvis, frontal and lateral. Its times are "
+                 "those of a 2.2 GHz Xeon of 2005 for 256 × 256 pixels of a "
+                 "512 × 512 × 512 CT, its sizes those of its format; they are given for scale.",
+                 "note") +
+         element("div", pictures, "figures");
+}
+
+}  // namespace af::evaluation

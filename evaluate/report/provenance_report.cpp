@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <array>
+#include <map>
+#include <sstream>
+
+#include "evaluate/report/html_text.h"
+#include "evaluate/report/number_html.h"
+#include "evaluate/report/sections_report.h"
+
+namespace af::evaluation {
+
+using nlohmann::json;
+
+namespace {
+
+/// "key = value" lines of an options text.
+std::map<std::string, std::string> option_lines(const std::string& text) {
+  std::map<std::string, std::string> options;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    const std::size_t equals = line.find('=');
+    if (line.starts_with("#") || equals == std::string::npos) continue;
+    const auto trimmed = [](std::string part) {
+      const std::size_t first = part.find_first_not_of(" \"");
+      const std::size_t last = part.find_last_not_of(" \"");
+      return first == std::string::npos ? std::string() : part.substr(first, last - first + 1);
+    };
+    options[trimmed(line.substr(0, equals))] = trimmed(line.substr(equals + 1));
+  }
+  return options;
+}
+
+struct OptionLabel {
+  const char* key;
+  const char* label;
+  const char* unit;
+};
+
+constexpr std::array<OptionLabel, 13> kSimulationLabels = {
+    {{"tube-kvp", "Tube voltage", "kV"},
+     {"aluminium-mm", "Filter", "mm aluminium"},
+     {"energy-bins", "Spectrum", "energy bins"},
+     {"scatter-to-primary", "Scatter-to-primary ratio", ""},
+     {"scatter-sigma-mm", "Scatter kernel, sigma", "mm"},
+     {"photons-per-pixel", "Photons per pixel, open beam (Poisson noise)", ""},
+     {"blur-sigma-px", "Detector blur, sigma", "pixels"},
+     {"bits", "Quantisation", "bits"},
+     {"rays-per-pixel-side", "Rays per pixel side", ""},
+     {"fiducial-sigma-px", "Noise of the fiducials' detected positions", "pixels"},
+     {"max-offset-rotation-deg", "True pose: drawn within, per angle", "degrees of nominal"},
+     {"max-offset-translation-mm", "True pose: drawn within, per axis", "mm of nominal"},
+     {"seed", "Seed", ""}}};
+
+std::string simulation_text(const json& simulation) {
+  const auto options = option_lines(simulation.value("options_toml", ""));
+  std::vector<std::pair<std::string, std::string>> items;
+  for (const OptionLabel& label : kSimulationLabels)
+    if (const auto found = options.find(label.key); found != options.end())
+      items.emplace_back(label.label,
+                         escaped(found->second) + (*label.unit ? " " : "") + label.unit);
+  const auto ideal = options.find("ideal");
+  const bool is_ideal = ideal != options.end() && ideal->second == "true";
+  std::string text = element(
+      "p",
+      "The X-rays were simulated by <code>af-simulate</code> " +
+          escaped(simulation.value("program_version", "")) +
+          " through the CT itself, by an exact projector (Siddon) that shares no code with the "
+          "ray caster that made the fields, with a polychromatic spectrum, scatter, noise and "
+          "blur, so that the images differ from any DRR as X-rays do.");
+  if (is_ideal)
+    text = element("p",
+                   "The X-rays were simulated by <code>af-simulate</code> " +
+                       escaped(simulation.value("program_version", "")) +
+                       " with <strong>every effect switched off</strong> (<code>--ideal</code>): "
+                       "they are line integrals, and errors are smaller than with X-rays.");
+  return text + (is_ideal ? "" : definition_list(items));
+}
+
+std::string hashes_text(const json& hashes) {
+  std::string text;
+  for (const auto& [name, hash] : hashes.items())
+    text += escaped(name) + "<br><span class=\"hash\">" + escaped(hash.get<std::string>()) +
+            "</span><br>";
+  return text.empty() ? "–" : text;
+}
+
+std::string run_provenance(const EvaluationRun& run, const std::filesystem::path& report) {
+  const json& provenance = run.summary.at("provenance");
+  const auto text = [&](const char* key) {
+    const json value = provenance.value(key, json());
+    return value.is_string() ? escaped(value.get<std::string>()) : escaped(value.dump());
+  };
+  const json host = provenance.value("host", json::object());
+  const std::filesystem::path folder = std::filesystem::absolute(report).parent_path();
+  const std::string link = (run.folder.lexically_proximate(folder) / "reproduce.sh").string();
+  const std::string name = run.folder.lexically_proximate(folder).string();
+  return element("h3",
+                 escaped(run.kind == "registration" ? "Registration" : "Image quality") + ": " +
+                     escaped(name)) +
+         definition_list(
+             {{"Program", text("program") + " " + text("program_version")},
+              {"Started (UTC)", text("started_utc")},
+              {"Compiler, processor",
+               text("compiler") + ", " + escaped(host.value("cpu", "unknown")) + " (" +
+                   escaped(host.value("vector_bits", json()).dump()) + "-bit vectors)"},
+              {"Ranks", text("rank_count")},
+              {"Seed", text("seed")},
+              {"Inputs, SHA-256", hashes_text(provenance.value("input_sha256", json::object()))},
+              {"Script that repeats it",
+               "<a href=\"" + escaped(link) + "\">" + escaped(link) + "</a>"}}) +
+         element("pre", text("command_line")) + element("pre", text("options_toml"));
+}
+
+}  // namespace
+
+std::string xray_section(const std::vector<EvaluationRun>& runs) {
+  std::string text;
+  for (const EvaluationRun* run : runs_of(runs, "registration")) {
+    const json& simulation = run->summary.at("simulation");
+    if (simulation.is_object())
+      text += simulation_text(simulation);
+    else
+      text += element("p",
+                      "Nothing beside the study says that its X-rays were simulated: they are "
+                      "taken to be real.");
+  }
+  if (text.empty()) return "";
+  return "<h2 id=\"xrays\">How the X-rays were made</h2>\n" + text;
+}
+
+std::string definitions_section() {
+  return element("h2", "What the words mean") +
+         definition_list(
+             {{"DRR",
+               "Digitally reconstructed radiograph: an image of line integrals through the CT, "
+               "dimensionless."},
+              {"Attenuation field",
+               "The line integrals of all rays of a motion range, tabulated on two planes, "
+               "vector-quantised; a DRR is a look-up (Russakoff et al., IEEE TMI 24(11), 2005)."},
+              {"TRE",
+               "Target registration error: the mean distance, over points 2 mm apart or less in "
+               "the target box, between where the found pose and the gold pose put them; mm."},
+              {"Gold pose",
+               "From fiducials: each is back-projected from all views, and the CT's fiducials are "
+               "fitted to these points rigidly (Arun 1987). FRE is the RMS residual of that fit; "
+               "a ray gap the shortest distance between the two views' rays."},
+              {"Stated pose",
+               "The pose that the study itself gives (gold_room_from_ct); for simulated X-rays "
+               "the true one, free of the fiducials' detection noise."},
+              {"Success", "TRE below 2.5 mm. Failures of every kind stay in the denominator."},
+              {"95 % interval",
+               "Wilson's score interval. It treats starts as independent; starts of one patient "
+               "share a CT and its X-rays, so it says nothing about other patients."},
+              {"PSNR",
+               "20 log<sub>10</sub>(I<sub>max</sub> / RMS difference), I<sub>max</sub> the "
+               "reference's maximum, over pixels whose ray meets matter; dB."}});
+}
+
+std::string provenance_section(const std::vector<EvaluationRun>& runs,
+                               const std::filesystem::path& report) {
+  std::string text = "<h2 id=\"provenance\">Provenance</h2>\n";
+  for (const EvaluationRun& run : runs) text += run_provenance(run, report);
+  return text;
+}
+
+}  // namespace af::evaluation

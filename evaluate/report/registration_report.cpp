@@ -1,0 +1,278 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cctype>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+
+#include "evaluate/report/html_text.h"
+#include "evaluate/report/number_html.h"
+#include "evaluate/report/sections_report.h"
+#include "evaluate/summary_files.h"
+
+namespace af::evaluation {
+
+using nlohmann::json;
+
+namespace {
+
+constexpr std::int64_t kMostFailuresListed = 60;
+
+std::string renderer_title(const json& renderer) {
+  return renderer.at("renderer") == "field" ? "field" : "ray casting";
+}
+
+std::string svg_figure(const EvaluationRun& run,
+                       const std::string& name,
+                       std::string_view alternative,
+                       std::string_view caption,
+                       std::string_view css_class = "") {
+  return figure(run.file(name + ".svg"), "image/svg+xml", alternative, caption, css_class);
+}
+
+std::string bar(double share) {
+  return "<span class=\"bar\" style=\"--share:" + decimals(100 * share, 1) + "\"></span>";
+}
+
+std::string success_table(const json& renderers) {
+  std::vector<HtmlTable::Column> columns = {{"Initial TRE (mm)", false}};
+  for (const json& renderer : renderers) {
+    columns.push_back({renderer_title(renderer) + ": starts", true});
+    columns.push_back({"succeeded", true});
+    columns.push_back({"rate (95 % interval)", false});
+  }
+  HtmlTable table(columns, "Success per interval of initial error, with Wilson intervals");
+  const std::size_t intervals = renderers.front().at("intervals").size();
+  for (std::size_t i = 0; i < intervals; ++i) {
+    const json& first = renderers.front().at("intervals").at(i);
+    std::vector<std::string> cells = {decimals(first.at("low_mm"), 0) + "–" +
+                                      decimals(first.at("high_mm"), 0)};
+    for (const json& renderer : renderers) {
+      const json& interval = renderer.at("intervals").at(i);
+      cells.push_back(interval.at("starts").dump());
+      cells.push_back(interval.at("successes").dump());
+      cells.push_back(interval.at("starts") == 0
+                          ? "–"
+                          : bar(number_of(interval.at("rate"))) + rate_with_interval(interval));
+    }
+    table.add_row(cells);
+  }
+  return table.html();
+}
+
+std::string error_table(const json& renderers) {
+  HtmlTable table({{"Method", false},
+                   {"Starts", true},
+                   {"Median", true},
+                   {"Quartiles", true},
+                   {"95th percentile", true},
+                   {"Largest", true},
+                   {"No pose", true},
+                   {"Mean ± SD of successes", true},
+                   {"Same against stated pose", true}},
+                  "TRE in mm over all registrations that gave a pose, then over successes only");
+  for (const json& renderer : renderers) {
+    const json& all = renderer.at("tre_mm");
+    const json& good = renderer.at("tre_of_successes_mm");
+    table.add_row({renderer_title(renderer),
+                   renderer.at("starts").dump(),
+                   decimals(all.at("median"), 2),
+                   decimals(all.at("q1"), 2) + "–" + decimals(all.at("q3"), 2),
+                   decimals(all.at("p95"), 2),
+                   decimals(all.at("max"), 2),
+                   renderer.at("without_pose").dump(),
+                   decimals(good.at("mean"), 2) + " ± " + decimals(good.at("sd"), 2),
+                   decimals(renderer.at("stated_pose_tre_of_successes_mm").at("mean"), 2)});
+  }
+  return table.html();
+}
+
+std::string threshold_table(const json& renderers) {
+  std::vector<HtmlTable::Column> columns = {{"TRE below", false}};
+  for (const json& renderer : renderers)
+    columns.push_back({renderer_title(renderer) + " (95 % interval)", true});
+  HtmlTable table(columns, "Share of all starts below other thresholds");
+  const std::size_t count = renderers.front().at("thresholds").size();
+  for (std::size_t i = 0; i < count; ++i) {
+    const json& threshold = renderers.front().at("thresholds").at(i).at("threshold_mm");
+    std::vector<std::string> cells = {decimals(threshold, threshold == 2.5 ? 1 : 0) + " mm"};
+    for (const json& renderer : renderers)
+      cells.push_back(rate_with_interval(renderer.at("thresholds").at(i)));
+    table.add_row(cells);
+  }
+  return table.html();
+}
+
+std::string case_table(const json& summary) {
+  HtmlTable table({{"Case", false},
+                   {"Method", false},
+                   {"Starts", true},
+                   {"Success (95 % interval)", true},
+                   {"Mean TRE of successes (mm)", true},
+                   {"Median seconds", true},
+                   {"Median evaluations", true}},
+                  "Per patient (the paper's Table II)");
+  for (const json& renderer : summary.at("renderers"))
+    for (const json& entry : renderer.at("cases"))
+      table.add_row({escaped(entry.at("case").get<std::string>()),
+                     renderer_title(renderer),
+                     entry.at("starts").dump(),
+                     rate_with_interval(entry),
+                     decimals(entry.at("tre_of_successes_mm").at("mean"), 2),
+                     decimals(entry.at("seconds").at("median"), 2),
+                     decimals(entry.at("evaluations").at("median"), 0)});
+  return table.html();
+}
+
+std::string gold_table(const json& cases) {
+  HtmlTable table({{"Case", false},
+                   {"Gold pose from", false},
+                   {"Fiducials", true},
+                   {"FRE (mm)", true},
+                   {"Largest ray gap (mm)", true},
+                   {"Stated pose to fiducials (mm)", true},
+                   {"Draws", true},
+                   {"of these outside the fields' range", true},
+                   {"beyond the last interval", true}},
+                  "Gold standard and starts");
+  for (const json& entry : cases) {
+    const json& gold = entry.at("gold");
+    double largest_gap_mm = std::numeric_limits<double>::quiet_NaN();
+    for (const json& gap : gold.value("ray_gaps_mm", json::array()))
+      largest_gap_mm = std::fmax(largest_gap_mm, gap.get<double>());
+    table.add_row({escaped(entry.at("case").get<std::string>()),
+                   gold.at("source") == "fiducials" ? "fiducials" : "the study's stated pose",
+                   std::to_string(gold.value("residuals_mm", json::array()).size()),
+                   decimals(gold.value("fre_mm", json()), 3),
+                   decimals(number_json(largest_gap_mm), 3),
+                   decimals(gold.value("stated_to_fiducials_mm", json()), 3),
+                   entry.at("draws").dump(),
+                   entry.at("inadmissible_draws").dump(),
+                   entry.at("draws_beyond_last_interval").dump()});
+  }
+  return table.html();
+}
+
+std::string p_text(double p) {
+  return p < 0.001 ? "p &lt; 0.001" : "p = " + decimals(p, 3);
+}
+
+std::string test_text(const json& test) {
+  const double equivalence_p = test.at("equivalence_p").get<double>();
+  return " On the starts that both solved TRE differs by " +
+         decimals(test.at("mean_difference_mm"), 3) + " mm on average (90 % interval " +
+         decimals(test.at("low_90_mm"), 3) + " to " + decimals(test.at("high_90_mm"), 3) +
+         " mm; paired t-test " + p_text(test.at("t_test_p").get<double>()) +
+         "). Equivalence within ±" + decimals(test.at("margin_mm"), 2) +
+         " mm, two one-sided tests: " + p_text(equivalence_p) +
+         (equivalence_p < 0.05 ? ", equivalent at the 5 % level."
+                               : ", not shown: too few pairs or too different ones.");
+}
+
+std::string paired_text(const json& paired) {
+  if (!paired.is_object()) return "";
+  std::string text = "<strong>Field against ray casting</strong>, the " +
+                     counted(paired.at("common_starts").get<std::int64_t>(), "start", "starts") +
+                     " given to both: " + paired.at("successes").at(0).dump() + " and " +
+                     paired.at("successes").at(1).dump() + " successes.";
+  if (paired.contains("test")) text += test_text(paired.at("test"));
+  return element("p", text + " Starts of one patient are not independent samples of patients.");
+}
+
+std::string failures_table(const EvaluationRun& run) {
+  const CsvTable rows = CsvTable::read(run.folder / "registrations.csv");
+  HtmlTable table({{"Case", false},
+                   {"Method", false},
+                   {"Start", true},
+                   {"Initial TRE (mm)", true},
+                   {"Final TRE (mm)", true},
+                   {"Stopped because", false}});
+  std::int64_t failures = 0;
+  for (std::size_t i = 0; i < rows.row_count(); ++i) {
+    if (rows.text(i, "success") == "1") continue;
+    if (++failures > kMostFailuresListed) continue;
+    const std::string& tre = rows.text(i, "tre_mm");
+    const std::string& error = rows.text(i, "error");
+    table.add_row({escaped(rows.text(i, "case")),
+                   rows.text(i, "renderer") == "field" ? "field" : "ray casting",
+                   escaped(rows.text(i, "start_index")),
+                   decimals(rows.number(i, "initial_tre_mm"), 2),
+                   tre == "nan" ? "–" : decimals(rows.number(i, "tre_mm"), 2),
+                   escaped(error.empty() ? rows.text(i, "stop_reason") : error)});
+  }
+  if (failures == 0) return element("p", "No registration failed.");
+  std::string text = element("p",
+                             "All " + counted(failures, "failure counts", "failures count") +
+                                 " in every rate above. " +
+                                 (failures > kMostFailuresListed
+                                      ? "The first " + std::to_string(kMostFailuresListed) +
+                                            " are listed; <code>registrations.csv</code> has all."
+                                      : ""));
+  return text + table.html();
+}
+
+std::string overlay_figures(const EvaluationRun& run) {
+  std::string figures;
+  for (const json& picture : run.summary.at("pictures")) {
+    const std::string which = picture.at("which").get<std::string>();
+    const std::string name = picture.at("file").get<std::string>();
+    const std::string case_name = escaped(picture.at("case").get<std::string>());
+    if (which == "xrays") {
+      figures += figure(
+          run.file(name),
+          "image/png",
+          "X-rays of the case",
+          "<b>Case " + case_name + ".</b> The X-rays and, framed, the regions that are compared.",
+          "picture wide");
+      continue;
+    }
+    figures +=
+        figure(run.file(name),
+               "image/png",
+               which + " registration as overlay",
+               "<b>" + std::string(1, static_cast<char>(std::toupper(which[0]))) + which.substr(1) +
+                   " result, view " + escaped(picture.at("camera").get<std::string>()) +
+                   ".</b> Start " + picture.at("start_index").dump() + " went from " +
+                   decimals(picture.at("initial_tre_mm"), 1) + " mm to " +
+                   decimals(picture.at("tre_mm"), 2) + " mm TRE.",
+               "picture");
+  }
+  return element("div", figures, "figures");
+}
+
+}  // namespace
+
+std::string registration_section(const EvaluationRun& run) {
+  const json& summary = run.summary;
+  const json& renderers = summary.at("renderers");
+  std::string figures =
+      svg_figure(run,
+                 "success-rate",
+                 "Success rate per interval of initial error",
+                 "<b>Success against initial error</b> (the paper's Fig. 16). Dots: share of "
+                 "starts that end below 2.5 mm; bars: 95 % Wilson intervals.") +
+      svg_figure(run,
+                 "tre-scatter",
+                 "Initial against final error",
+                 "<b>Every registration</b> as one mark: where it started and where it ended.") +
+      svg_figure(run,
+                 "tre-histogram",
+                 "Histogram of the error after registration",
+                 "<b>Error after registration</b> (the paper's Fig. 15); the last bar holds "
+                 "everything beyond 5 mm and registrations without a pose.",
+                 "wide narrow");
+  return element("h2", "Registration accuracy") +
+         element("p",
+                 "Starts are random disturbances of the gold pose, as many in each interval of "
+                 "initial target registration error (TRE), the same for every method.") +
+         element("div", figures, "figures") + success_table(renderers) + error_table(renderers) +
+         threshold_table(renderers) + paired_text(summary.at("field_against_raycast")) +
+         case_table(summary) + gold_table(summary.at("cases")) + element("h3", "Failures") +
+         failures_table(run) + element("h2", "What it looks like") +
+         element("p",
+                 "X-ray, DRR at the found pose, both as a checkerboard, and their difference. "
+                 "White bars are the steel fiducials, which the CT lacks.") +
+         overlay_figures(run);
+}
+
+}  // namespace af::evaluation

@@ -1,0 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string_view>
+
+namespace af::evaluation {
+
+/// The report's style sheet, report.css.
+std::string_view report_style();
+
+}  // namespace af::evaluation

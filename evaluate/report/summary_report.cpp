@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+
+#include "evaluate/report/html_text.h"
+#include "evaluate/report/number_html.h"
+#include "evaluate/report/sections_report.h"
+#include "evaluate/summary_files.h"
+
+namespace af::evaluation {
+
+using nlohmann::json;
+
+namespace {
+
+std::string tile(const std::string& value,
+                 const std::string& unit,
+                 const std::string& label,
+                 const std::string& detail) {
+  return element("div",
+                 element("div", value + (unit.empty() ? "" : element("small", unit)), "value") +
+                     element("div", label, "label") + element("div", detail, "detail"),
+                 "tile");
+}
+
+std::string method_name(const json& renderer) {
+  return renderer.at("renderer") == "field" ? "attenuation fields" : "ray casting";
+}
+
+double median_seconds(const json& renderer) {
+  return number_of(renderer.at("seconds").at("median"));
+}
+
+/// Upper end of the intervals, from 0 mm on, in which every start succeeded; 0 when even the first
+/// has a failure.
+double flawless_up_to_mm(const json& renderer) {
+  double end_mm = 0.0;
+  for (const json& interval : renderer.at("intervals")) {
+    if (interval.at("starts") == 0) continue;
+    if (interval.at("successes") != interval.at("starts")) break;
+    end_mm = interval.at("high_mm").get<double>();
+  }
+  return end_mm;
+}
+
+std::string success_sentence(const json& renderer, double threshold_mm) {
+  const auto starts = renderer.at("starts").get<std::int64_t>();
+  const auto successes = renderer.at("successes").get<std::int64_t>();
+  std::string text = "With " + method_name(renderer) + ", " + std::to_string(successes) + " of " +
+                     counted(starts, "registration", "registrations") + " (" +
+                     percent(number_of(renderer.at("rate"))) + ", 95 % interval " +
+                     interval_text(renderer) + ") ended less than " + decimals(threshold_mm, 1) +
+                     " mm from the gold pose";
+  if (successes == 0) return text + ".";
+  text += "; these ended " + decimals(renderer.at("tre_of_successes_mm").at("mean"), 2) +
+          " mm from it on average.";
+  const double flawless_mm = flawless_up_to_mm(renderer);
+  if (successes == starts)
+    text += " None failed.";
+  else if (flawless_mm > 0.0)
+    text += " Every start closer than " + decimals(flawless_mm, 0) + " mm succeeded.";
+  else
+    text += " Failures begin with the very closest starts.";
+  return text;
+}
+
+std::string speed_sentence(const json& paired) {
+  if (!paired.is_object()) return "";
+  const double field = paired.at("median_seconds").at(0).get<double>();
+  const double raycast = paired.at("median_seconds").at(1).get<double>();
+  if (!(field > 0.0)) return "";
+  return "From the " + counted(paired.at("common_starts").get<std::int64_t>(), "start", "starts") +
+         " given to both, a registration took " + seconds_text(field) + " with fields and " +
+         seconds_text(raycast) + " with ray casting (medians): " + decimals(raycast / field, 0) +
+         " times as long.";
+}
+
+std::string registration_sentences(const EvaluationRun& run) {
+  const json& summary = run.summary;
+  std::string items;
+  for (const json& renderer : summary.at("renderers"))
+    items += element("li", success_sentence(renderer, summary.at("success_tre_mm").get<double>()));
+  const std::string speed = speed_sentence(summary.at("field_against_raycast"));
+  if (!speed.empty()) items += element("li", speed);
+  return items;
+}
+
+std::string quality_sentence(const std::vector<const EvaluationRun*>& runs) {
+  if (runs.empty()) return "";
+  std::string list;
+  for (const EvaluationRun* run : runs)
+    list += (list.empty() ? "" : ", ") + decimals(run->summary.at("psnr_db").at("median"), 1) +
+            " dB (camera " + escaped(run->summary.at("field").at("camera").get<std::string>()) +
+            ")";
+  return element("li",
+                 "The fields' images agree with ray casting to a median PSNR of " + list +
+                     "; the paper reports medians above 43 dB.");
+}
+
+std::string seconds_tile(const json& renderer) {
+  const std::string seconds = seconds_text(median_seconds(renderer));
+  const std::size_t blank = seconds.find(' ');
+  return tile(seconds.substr(0, blank),
+              blank == std::string::npos ? "" : seconds.substr(blank + 1),
+              "per registration",
+              method_name(renderer) + ", median");
+}
+
+/// Success, error and time of the first method, time of the others.
+std::string registration_tiles(const EvaluationRun& run) {
+  const json& renderers = run.summary.at("renderers");
+  const json& first = renderers.at(0);
+  std::string tiles = tile(percent(number_of(first.at("rate"))),
+                           "",
+                           "of starts succeed",
+                           method_name(first) + ", " +
+                               counted(first.at("starts").get<std::int64_t>(), "start", "starts")) +
+                      tile(decimals(first.at("tre_of_successes_mm").at("mean"), 2),
+                           "mm",
+                           "mean error of successes",
+                           method_name(first));
+  for (const json& renderer : renderers) tiles += seconds_tile(renderer);
+  return tiles;
+}
+
+}  // namespace
+
+std::vector<const EvaluationRun*> runs_of(const std::vector<EvaluationRun>& runs,
+                                          const std::string& kind) {
+  std::vector<const EvaluationRun*> result;
+  for (const EvaluationRun& run : runs)
+    if (run.kind == kind) result.push_back(&run);
+  return result;
+}
+
+std::string summary_section(const std::vector<EvaluationRun>& runs) {
+  const auto registrations = runs_of(runs, "registration");
+  const auto qualities = runs_of(runs, "image-quality");
+  std::string sentences;
+  std::string tiles;
+  bool is_simulated = false;
+  for (const EvaluationRun* run : registrations) {
+    sentences += registration_sentences(*run);
+    tiles += registration_tiles(*run);
+    is_simulated = is_simulated || run->summary.at("simulation").is_object();
+  }
+  sentences += quality_sentence(qualities);
+  for (const EvaluationRun* run : qualities)
+    tiles += tile(decimals(run->summary.at("psnr_db").at("median"), 1),
+                  "dB",
+                  "median PSNR of the field",
+                  "camera " + escaped(run->summary.at("field").at("camera").get<std::string>()) +
+                      ", against ray casting");
+  std::string caution;
+  if (is_simulated)
+    caution += element(
+        "p",
+        "<strong>The X-rays are simulated</strong>, with effects that neither fields nor ray "
+        "casting model (<a href=\"#xrays\">how</a>). Real X-rays hold more: motion, devices, "
+        "calibration errors.");
+  caution += element("p", "Research software, not a medical device.");
+  return element("section",
+                 element("ul", sentences) + element("div", tiles, "tiles") +
+                     element("div", caution, "caution"),
+                 "summary");
+}
+
+}  // namespace af::evaluation

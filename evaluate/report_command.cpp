@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluate/report_command.h"
+
+#include <functional>
+#include <iostream>
+#include <set>
+
+#include "base/build_info.h"
+#include "base/error.h"
+#include "evaluate/report/html_text.h"
+#include "evaluate/report/report_style.h"
+#include "evaluate/report/sections_report.h"
+#include "io/gnuplot_figure.h"
+#include "io/output_file.h"
+
+namespace af::evaluation {
+namespace {
+
+using nlohmann::json;
+
+/// "Registration of skull" or what else the runs are about.
+std::string default_title(const std::vector<EvaluationRun>& runs) {
+  std::set<std::string> cases;
+  for (const EvaluationRun* run : runs_of(runs, "registration"))
+    for (const json& entry : run->summary.at("cases"))
+      cases.insert(entry.at("case").get<std::string>());
+  if (cases.empty()) return "Image quality of attenuation fields";
+  if (cases.size() > 4) return "Registration of " + std::to_string(cases.size()) + " cases";
+  std::string names;
+  for (const std::string& name : cases) names += (names.empty() ? "" : ", ") + name;
+  return "Registration of " + names;
+}
+
+std::string header(const std::vector<EvaluationRun>& runs, const std::string& title) {
+  const std::string started =
+      runs.front().summary.at("provenance").value("started_utc", "").substr(0, 10);
+  return element("header",
+                 element("p", "Attenuation fields · evaluation report", "eyebrow") +
+                     element("h1", escaped(title)) +
+                     element("p",
+                             "af-evaluate " + escaped(program_version()) + " · run on " +
+                                 escaped(started) + " · <a href=\"#provenance\">provenance</a>",
+                             "quiet"));
+}
+
+}  // namespace
+
+std::string report_page(const std::vector<EvaluationRun>& runs,
+                        const std::filesystem::path& output,
+                        const std::string& title) {
+  const std::string heading = title.empty() ? default_title(runs) : title;
+  std::string body = header(runs, heading) + summary_section(runs);
+  for (const EvaluationRun* run : runs_of(runs, "registration")) body += registration_section(*run);
+  body += image_quality_section(runs) + xray_section(runs) + definitions_section() +
+          provenance_section(runs, output);
+  body += element("footer",
+                  "Made by af-evaluate " + escaped(program_version()) +
+                      ". Research software, not a medical device. This file holds everything it "
+                      "shows and opens without a network.");
+  return "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+         "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n" +
+         element("title", escaped(heading)) + element("style", report_style()) +
+         "</head>\n<body>\n" + element("main", body) + "</body>\n</html>\n";
+}
+
+CLI::App* bind_report(CLI::App& app, ReportOptions& options) {
+  CLI::App* command = app.add_subcommand(
+      "report",
+      "One self-contained HTML page of finished runs: findings in plain words, figures, tables, "
+      "overlays, provenance; opens offline, prints well");
+  command->add_option("RUN", options.runs, "Folders of finished runs, searched with all below them")
+      ->required();
+  command->add_option("-o,--output", options.output, "The page to write")->capture_default_str();
+  command->add_option("--title", options.title, "Its title (default: made from the cases' names)");
+  return command;
+}
+
+void run_report(const ReportOptions& options, const Communicator& world) {
+  all_or_none(world, [&] {
+    if (!world.is_root()) return;
+    require_gnuplot();
+    const std::vector<EvaluationRun> runs = find_runs(options.runs);
+    try {
+      write_text_file(options.output, report_page(runs, options.output, options.title));
+    } catch (const json::exception& error) {
+      throw FileError("summary.json of a run", std::string("lacks something: ") + error.what());
+    }
+    std::cout << "report of " << runs.size() << " run(s): " << options.output.string() << '\n';
+  });
+}
+
+}  // namespace af::evaluation

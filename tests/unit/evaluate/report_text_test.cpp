@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+#include <fstream>
+#include <limits>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+#include "evaluate/report/evaluation_run_files.h"
+#include "evaluate/report/html_text.h"
+#include "evaluate/report/number_html.h"
+#include "evaluate/report/report_style.h"
+#include "evaluate/summary_files.h"
+#include "io/output_file.h"
+#include "support/test_paths.h"
+
+namespace af::evaluation {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+using testing::Not;
+
+TEST(HtmlText, EscapesWhatMeansSomethingToHtml) {
+  EXPECT_EQ(escaped("<script>\"a\" & 'b'</script>"),
+            "&lt;script&gt;&quot;a&quot; &amp; &#39;b&#39;&lt;/script&gt;");
+}
+
+TEST(HtmlText, Base64EqualsTheVectorsOfRfc4648) {
+  EXPECT_EQ(base64(""), "");
+  EXPECT_EQ(base64("f"), "Zg==");
+  EXPECT_EQ(base64("fo"), "Zm8=");
+  EXPECT_EQ(base64("foo"), "Zm9v");
+  EXPECT_EQ(base64("foob"), "Zm9vYg==");
+  EXPECT_EQ(base64("fooba"), "Zm9vYmE=");
+  EXPECT_EQ(base64("foobar"), "Zm9vYmFy");
+  EXPECT_EQ(base64(std::string("\xff\x00\xfe", 3)), "/wD+");
+}
+
+TEST(HtmlText, TableEscapesTitlesAndAlignsNumbers) {
+  HtmlTable table({{"a < b", false}, {"n", true}});
+  table.add_row({"x", "1"}, "reference");
+  EXPECT_THAT(table.html(), HasSubstr("a &lt; b"));
+  EXPECT_THAT(table.html(), HasSubstr("<tr class=\"reference\"><td>x</td><td class=\"number\">1"));
+}
+
+TEST(ReportStyle, NeedsNothingFromOutside) {
+  EXPECT_THAT(std::string(report_style()), Not(HasSubstr("url(")));
+  EXPECT_THAT(std::string(report_style()), Not(HasSubstr("@import")));
+  EXPECT_THAT(std::string(report_style()), HasSubstr("prefers-color-scheme: dark"));
+}
+
+TEST(NumberHtml, ShowsWhatDoesNotExistAsADash) {
+  EXPECT_EQ(decimals(json(nullptr), 2), "–");
+  EXPECT_EQ(decimals(json("inf"), 2), "∞");
+  EXPECT_EQ(decimals(json(1.005), 1), "1.0");
+}
+
+TEST(NumberHtml, NeverRoundsAFailureAway) {
+  EXPECT_EQ(percent(1.0), "100\u00a0%");
+  EXPECT_EQ(percent(0.997), "99.7\u00a0%");
+  EXPECT_EQ(percent(0.9), "90\u00a0%");
+  EXPECT_EQ(percent(0.004), "0.4\u00a0%");
+  EXPECT_EQ(percent(0.0), "0\u00a0%");
+}
+
+TEST(NumberHtml, ChoosesTheUnitOfTimes) {
+  EXPECT_EQ(seconds_text(0.00123), "1.2 ms");
+  EXPECT_EQ(seconds_text(0.0426), "43 ms");
+  EXPECT_EQ(seconds_text(0.2), "0.20 s");
+  EXPECT_EQ(seconds_text(42.58), "42.6 s");
+}
+
+TEST(SummaryJson, KeepsWhatJsonLacks) {
+  const double infinity = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(number_of(json::parse(number_json(infinity).dump())), infinity);
+  EXPECT_TRUE(std::isnan(number_of(json::parse(number_json(std::nan("")).dump()))));
+  EXPECT_EQ(number_of(number_json(0.1)), 0.1);
+}
+
+/// A folder with `text` as NAME/summary.json.
+void write_summary(const test::ScratchFolder& folder,
+                   const std::string& name,
+                   const std::string& text) {
+  std::filesystem::create_directories(folder / name);
+  write_text_file(folder / name / "summary.json", text);
+}
+
+std::string minimal_summary(const std::string& kind) {
+  return json({{"format", "attenuation-fields evaluation"}, {"format_version", 1}, {"kind", kind}})
+      .dump();
+}
+
+TEST(FindRuns, FindsRunsBelowAFolderOnceAndInAFixedOrder) {
+  const test::ScratchFolder folder;
+  write_summary(folder, "b/quality", minimal_summary("image-quality"));
+  write_summary(folder, "a/quality", minimal_summary("image-quality"));
+  write_summary(folder, "c", minimal_summary("registration"));
+  write_summary(folder, "other", "{\"format\": \"of another program\"}");
+  const auto runs = find_runs({folder.path(), folder / "a"});
+  ASSERT_EQ(runs.size(), 3u);
+  EXPECT_EQ(runs[0].kind, "registration");
+  EXPECT_EQ(runs[1].folder.parent_path().filename(), "a");
+  EXPECT_EQ(runs[2].folder.parent_path().filename(), "b");
+}
+
+TEST(FindRuns, RefusesWhatIsNotASoundRun) {
+  const test::ScratchFolder folder;
+  EXPECT_THROW(find_runs({folder / "missing"}), FileError);
+  EXPECT_THROW(find_runs({folder.path()}), InputError);
+  write_summary(folder, "truncated", minimal_summary("registration").substr(0, 40));
+  EXPECT_THROW(find_runs({folder / "truncated"}), FileError);
+  write_summary(folder, "list", "[1, 2]");
+  EXPECT_THROW(find_runs({folder / "list"}), FileError);
+  write_summary(folder, "strange", minimal_summary("strange"));
+  EXPECT_THROW(find_runs({folder / "strange"}), FileError);
+  json newer = json::parse(minimal_summary("registration"));
+  newer["format_version"] = 2;
+  write_summary(folder, "newer", newer.dump());
+  EXPECT_THROW(find_runs({folder / "newer"}), FileError);
+}
+
+TEST(FindRuns, ARunGivesOnlyItsOwnFiles) {
+  const test::ScratchFolder folder;
+  write_summary(folder, "run", minimal_summary("registration"));
+  write_text_file(folder / "secret", "secret");
+  const auto runs = find_runs({folder.path()});
+  EXPECT_THAT(runs[0].file("summary.json"), HasSubstr("registration"));
+  for (const char* name : {"../secret", "/etc/hostname", "", ".", "..", "sub/file", "missing.png"})
+    EXPECT_THROW(std::ignore = runs[0].file(name), FileError) << name;
+}
+
+}  // namespace
+}  // namespace af::evaluation
