@@ -84,7 +84,8 @@ CtGrid grid_of(const RawImage& image) {
     grid.spacing_mm[i] = image.spacing_mm[axis];
     grid.origin_mm[i] = image.origin_mm[axis];
     for (std::size_t row = 0; row < 3; ++row)
-      grid.direction(static_cast<Eigen::Index>(row), i) = image.directions[axis][row];
+      grid.direction(static_cast<Eigen::Index>(row), i) =
+          image.directions[axis][row] + 0.0;  // no -0
   }
   return grid;
 }

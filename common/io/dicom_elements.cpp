@@ -82,7 +82,8 @@ class DicomWalker {
     at_ = is_marked_dicom(elements_.path_) ? kPreambleBytes : 0;
     while (at_ < size_ && peek_group() == 0x0002) read_element({}, size_, 0);
     const Encoding encoding = data_encoding();
-    while (at_ < size_ && !elements_.has_pixels_) read_element(encoding, size_, 0);
+    elements_.is_big_endian_ = encoding.is_big_endian;
+    while (at_ < size_ && !elements_.has_pixels()) read_element(encoding, size_, 0);
     return std::move(elements_);
   }
 
@@ -187,12 +188,7 @@ class DicomWalker {
       else if (depth == 0 && header.length <= kLongestKeptValue && !is_pixels)
         keep(header, take(header.length, end), encoding.is_big_endian);
       else
-        at_ += header.length;
-    }
-    if (is_pixels) {
-      elements_.has_pixels_ = true;
-      elements_.has_compressed_pixels_ = header.length == kUndefinedLength;
-      if (header.length != kUndefinedLength) elements_.pixel_bytes_ = header.length;
+        skip(header.length, is_pixels);
     }
   }
 
@@ -224,15 +220,20 @@ class DicomWalker {
     return false;
   }
 
+  void skip(std::uint32_t bytes, bool is_pixels) {
+    if (is_pixels) elements_.pixel_parts_.push_back({at_, bytes});
+    at_ += bytes;
+  }
+
   void read_fragments(const Encoding& encoding, std::uint64_t end) {
+    elements_.has_compressed_pixels_ = true;
     for (;;) {
       const Header fragment = read_header(encoding, end);
       if (fragment.tag == kSequenceEnd) return;
       if (fragment.tag != kItem || fragment.length == kUndefinedLength)
         fail("compressed pixels hold something that is no fragment");
       need(fragment.length, end);
-      elements_.pixel_bytes_ += fragment.length;
-      at_ += fragment.length;
+      skip(fragment.length, true);
     }
   }
 
@@ -257,6 +258,12 @@ class DicomWalker {
 
 DicomElements DicomElements::read(const fs::path& path) {
   return DicomWalker(path).walk();
+}
+
+std::uint64_t DicomElements::pixel_bytes() const {
+  std::uint64_t bytes = 0;
+  for (const DicomPart& part : pixel_parts_) bytes += part.bytes;
+  return bytes;
 }
 
 std::string DicomElements::text(DicomTag tag) const {

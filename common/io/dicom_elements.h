@@ -14,9 +14,15 @@ namespace af {
 /// (group, element).
 using DicomTag = std::pair<std::uint16_t, std::uint16_t>;
 
+/// A stretch of a file.
+struct DicomPart {
+  std::uint64_t offset = 0;
+  std::uint32_t bytes = 0;
+};
+
 /// The top-level elements of a DICOM file, read by walking its structure to the end of the pixel
-/// data. GDCM is only shown files that passed here: Debian's build of it aborts the process on a
-/// header that is cut short, and takes cut pixel data for granted.
+/// data. GDCM's own parser is not used: Debian's build of it aborts the process on headers that are
+/// cut short or of an unexpected form, and accepts cut pixel data in silence.
 class DicomElements {
  public:
   /// FileError when the file is cut short or its structure is broken; InputError when its transfer
@@ -24,11 +30,14 @@ class DicomElements {
   static DicomElements read(const std::filesystem::path& path);
 
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-  [[nodiscard]] bool has_pixels() const { return has_pixels_; }
-  /// In fragments of an encoded stream, not one plain value.
+  [[nodiscard]] bool has_pixels() const { return !pixel_parts_.empty(); }
   [[nodiscard]] bool has_compressed_pixels() const { return has_compressed_pixels_; }
-  /// Bytes of pixel data that stand in the file.
-  [[nodiscard]] std::uint64_t pixel_bytes() const { return pixel_bytes_; }
+  [[nodiscard]] bool is_big_endian() const { return is_big_endian_; }
+  /// Where pixel data stand: one part, or the fragments of an encoded stream (the first is its
+  /// offset table).
+  [[nodiscard]] const std::vector<DicomPart>& pixel_parts() const { return pixel_parts_; }
+  /// Bytes of all parts.
+  [[nodiscard]] std::uint64_t pixel_bytes() const;
   /// An element as text without padding; numbers in binary are written out. Empty when absent.
   [[nodiscard]] std::string text(DicomTag tag) const;
   /// Backslash-separated numbers; empty when the element is absent, InputError naming `name` when
@@ -40,9 +49,9 @@ class DicomElements {
   friend class DicomWalker;
   std::filesystem::path path_;
   std::map<DicomTag, std::string> texts_;
-  bool has_pixels_ = false;
   bool has_compressed_pixels_ = false;
-  std::uint64_t pixel_bytes_ = 0;
+  bool is_big_endian_ = false;
+  std::vector<DicomPart> pixel_parts_;
 };
 
 /// True for a file with the mark of DICOM, or without its preamble as old files are. Reads a few

@@ -16,13 +16,13 @@ namespace {
 constexpr double kMaxSidePx = 65535.0;
 
 void silence_gdcm() {
-  static const bool kDone = [] {
+  static const bool done = [] {
     gdcm::Trace::WarningOff();
     gdcm::Trace::ErrorOff();
     gdcm::Trace::DebugOff();
     return true;
   }();
-  (void)kDone;
+  (void)done;
 }
 
 int required_integer(
@@ -54,23 +54,31 @@ void check_is_one_grey_frame(const DicomElements& header) {
   if (!header.has_pixels()) throw FileError(file, "has no pixel data");
 }
 
-/// Bytes of one stored pixel.
-std::uint64_t stored_pixel_bytes(const DicomElements& header) {
-  const int allocated = required_integer(header, {0x0028, 0x0100}, "BitsAllocated", 8, 32);
-  if (allocated % 8 != 0 || allocated == 24)
-    throw FileError(
-        header.path().string(), "BitsAllocated", "8, 16 or 32", std::to_string(allocated));
-  const int stored = required_integer(header, {0x0028, 0x0101}, "BitsStored", 1, allocated);
-  (void)required_integer(header, {0x0028, 0x0102}, "HighBit", stored - 1, allocated - 1);
-  (void)required_integer(header, {0x0028, 0x0103}, "PixelRepresentation", 0, 1);
-  return static_cast<std::uint64_t>(allocated) / 8;
+void read_bit_layout(const DicomElements& header, DicomPixelLayout& layout) {
+  layout.allocated_bits = required_integer(header, {0x0028, 0x0100}, "BitsAllocated", 8, 32);
+  if (layout.allocated_bits % 8 != 0 || layout.allocated_bits == 24)
+    throw FileError(header.path().string(),
+                    "BitsAllocated",
+                    "8, 16 or 32",
+                    std::to_string(layout.allocated_bits));
+  layout.stored_bits =
+      required_integer(header, {0x0028, 0x0101}, "BitsStored", 1, layout.allocated_bits);
+  layout.high_bit = required_integer(
+      header, {0x0028, 0x0102}, "HighBit", layout.stored_bits - 1, layout.allocated_bits - 1);
+  layout.is_signed = required_integer(header, {0x0028, 0x0103}, "PixelRepresentation", 0, 1) == 1;
+}
+
+std::size_t pixel_count(const DicomPixelLayout& layout) {
+  return static_cast<std::size_t>(layout.columns) * static_cast<std::size_t>(layout.rows);
+}
+
+std::size_t decoded_bytes(const DicomPixelLayout& layout) {
+  return pixel_count(layout) * static_cast<std::size_t>(layout.allocated_bits) / 8;
 }
 
 void check_bytes(const DicomElements& header, const DicomPixelLayout& layout) {
-  const std::string file = layout.path.string();
-  const std::uint64_t expected = static_cast<std::uint64_t>(layout.columns) *
-                                 static_cast<std::uint64_t>(layout.rows) *
-                                 stored_pixel_bytes(header);
+  const std::string file = layout.path().string();
+  const std::uint64_t expected = decoded_bytes(layout);
   if (!header.has_compressed_pixels() && header.pixel_bytes() < expected)
     throw FileError(file,
                     "pixel data",
@@ -85,51 +93,89 @@ void check_bytes(const DicomElements& header, const DicomPixelLayout& layout) {
                     std::to_string(header.pixel_bytes()));
 }
 
-template <typename T>
-std::vector<double> rescaled(const std::vector<char>& raw, const DicomPixelLayout& layout) {
-  std::vector<double> values(raw.size() / sizeof(T));
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    T value{};
-    std::memcpy(&value, raw.data() + i * sizeof(T), sizeof(T));
-    values[i] = static_cast<double>(value) * layout.slope + layout.intercept;
-  }
-  return values;
+std::vector<char> part_of_file(const std::filesystem::path& path, const DicomPart& part) {
+  std::ifstream file(path, std::ios::binary);
+  file.seekg(static_cast<std::streamoff>(part.offset));
+  std::vector<char> bytes(part.bytes);
+  file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  if (!file) throw FileError(path.string(), "its pixels cannot be read");
+  return bytes;
 }
 
-struct DecodedPixels {
-  std::vector<char> bytes;
-  gdcm::PixelFormat format;
-};
+/// GDCM's image of what the file says, made without its parser.
+gdcm::Image compressed_image(const DicomPixelLayout& layout) {
+  const std::string syntax = layout.header.text({0x0002, 0x0010});
+  const gdcm::TransferSyntax::TSType type = gdcm::TransferSyntax::GetTSType(syntax.c_str());
+  if (type == gdcm::TransferSyntax::TS_END)
+    throw InputError(
+        "transfer syntax", syntax, "is not known to the decoder", layout.path().string());
+  const gdcm::SmartPointer<gdcm::SequenceOfFragments> fragments = new gdcm::SequenceOfFragments;
+  const std::vector<DicomPart>& parts = layout.header.pixel_parts();
+  for (std::size_t i = 1; i < parts.size(); ++i) {
+    const std::vector<char> bytes = part_of_file(layout.path(), parts[i]);
+    gdcm::Fragment fragment;
+    fragment.SetByteValue(bytes.data(), parts[i].bytes);
+    fragments->AddFragment(fragment);
+  }
+  gdcm::DataElement pixels(gdcm::Tag(0x7fe0, 0x0010));
+  pixels.SetVR(gdcm::VR::OB);
+  pixels.SetValue(*fragments);
+  gdcm::Image image;
+  image.SetNumberOfDimensions(2);
+  image.SetColumns(static_cast<unsigned>(layout.columns));
+  image.SetRows(static_cast<unsigned>(layout.rows));
+  image.SetTransferSyntax(type);
+  image.SetPixelFormat(gdcm::PixelFormat(1,
+                                         static_cast<std::uint16_t>(layout.allocated_bits),
+                                         static_cast<std::uint16_t>(layout.stored_bits),
+                                         static_cast<std::uint16_t>(layout.high_bit),
+                                         layout.is_signed ? 1 : 0));
+  image.SetPhotometricInterpretation(gdcm::PhotometricInterpretation::MONOCHROME2);
+  image.SetDataElement(pixels);
+  return image;
+}
 
-DecodedPixels decode(const DicomPixelLayout& layout) {
-  const std::string file = layout.path.string();
+std::vector<char> decompressed(const DicomPixelLayout& layout) {
+  const std::string file = layout.path().string();
   silence_gdcm();
   try {
-    gdcm::ImageReader reader;
-    reader.SetFileName(layout.path.c_str());
-    if (!reader.Read()) throw FileError(file, "its pixels are corrupt or of an unknown encoding");
-    const gdcm::Image& image = reader.GetImage();
-    DecodedPixels pixels;
-    pixels.format = image.GetPixelFormat();
-    const std::size_t expected = static_cast<std::size_t>(layout.columns) *
-                                 static_cast<std::size_t>(layout.rows) *
-                                 pixels.format.GetPixelSize();
-    if (image.GetBufferLength() != expected)
+    const gdcm::Image image = compressed_image(layout);
+    std::vector<char> bytes(decoded_bytes(layout));
+    if (image.GetBufferLength() != bytes.size())
       throw FileError(file,
                       "decoded pixels",
-                      std::to_string(expected) + " bytes",
+                      std::to_string(bytes.size()) + " bytes",
                       std::to_string(image.GetBufferLength()));
-    pixels.bytes.resize(expected);
-    if (!image.GetBuffer(pixels.bytes.data()))
-      throw FileError(file, "its pixels are truncated or corrupt");
-    return pixels;
+    if (!image.GetBuffer(bytes.data())) throw FileError(file, "its compressed pixels are corrupt");
+    return bytes;
   } catch (const Error&) {
     throw;
   } catch (const std::bad_alloc&) {
     throw;
   } catch (...) {  // GDCM also throws what is no exception class
-    throw FileError(file, "its pixels cannot be decoded");
+    throw FileError(file, "its compressed pixels cannot be decoded");
   }
+}
+
+/// Cuts the stored bits out of the allocated ones, extends the sign, and rescales.
+std::vector<double> rescaled(const std::vector<char>& raw,
+                             bool is_big_endian,
+                             const DicomPixelLayout& layout) {
+  const auto pixel_bytes = static_cast<std::size_t>(layout.allocated_bits) / 8;
+  const int shift = layout.high_bit + 1 - layout.stored_bits;
+  const std::int64_t range = std::int64_t{1} << layout.stored_bits;
+  std::vector<double> values(pixel_count(layout));
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    std::uint32_t bits = 0;
+    for (std::size_t byte = 0; byte < pixel_bytes; ++byte) {
+      const std::size_t at = is_big_endian ? byte : pixel_bytes - 1 - byte;
+      bits = bits << 8 | static_cast<unsigned char>(raw[i * pixel_bytes + at]);
+    }
+    std::int64_t value = std::int64_t{bits >> shift} & (range - 1);
+    if (layout.is_signed && value >= range / 2) value -= range;
+    values[i] = static_cast<double>(value) * layout.slope + layout.intercept;
+  }
+  return values;
 }
 
 }  // namespace
@@ -137,7 +183,7 @@ DecodedPixels decode(const DicomPixelLayout& layout) {
 DicomPixelLayout dicom_pixel_layout(const DicomElements& header) {
   check_is_one_grey_frame(header);
   DicomPixelLayout layout;
-  layout.path = header.path();
+  layout.header = header;
   layout.rows = required_integer(header, {0x0028, 0x0010}, "Rows", 1, kMaxSidePx);
   layout.columns = required_integer(header, {0x0028, 0x0011}, "Columns", 1, kMaxSidePx);
   const auto slope = header.number_or_none({0x0028, 0x1053}, "RescaleSlope");
@@ -150,33 +196,16 @@ DicomPixelLayout dicom_pixel_layout(const DicomElements& header) {
         header.path().string());
   layout.slope = slope.value_or(1.0);
   layout.intercept = intercept.value_or(0.0);
+  read_bit_layout(header, layout);
   check_bytes(header, layout);
   return layout;
 }
 
 std::vector<double> read_dicom_pixels(const DicomPixelLayout& layout) {
-  const DecodedPixels pixels = decode(layout);
-  switch (pixels.format.GetScalarType()) {
-    case gdcm::PixelFormat::UINT8:
-      return rescaled<std::uint8_t>(pixels.bytes, layout);
-    case gdcm::PixelFormat::INT8:
-      return rescaled<std::int8_t>(pixels.bytes, layout);
-    case gdcm::PixelFormat::UINT12:
-    case gdcm::PixelFormat::UINT16:
-      return rescaled<std::uint16_t>(pixels.bytes, layout);
-    case gdcm::PixelFormat::INT12:
-    case gdcm::PixelFormat::INT16:
-      return rescaled<std::int16_t>(pixels.bytes, layout);
-    case gdcm::PixelFormat::UINT32:
-      return rescaled<std::uint32_t>(pixels.bytes, layout);
-    case gdcm::PixelFormat::INT32:
-      return rescaled<std::int32_t>(pixels.bytes, layout);
-    default:
-      throw InputError("pixel type",
-                       pixels.format.GetScalarTypeAsString(),
-                       "must be an integer of 8, 16 or 32 bits",
-                       layout.path.string());
-  }
+  if (layout.header.has_compressed_pixels()) return rescaled(decompressed(layout), false, layout);
+  return rescaled(part_of_file(layout.path(), layout.header.pixel_parts().front()),
+                  layout.header.is_big_endian(),
+                  layout);
 }
 
 }  // namespace af

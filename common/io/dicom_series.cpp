@@ -31,7 +31,7 @@ constexpr double kMaxDriftMm = 0.05;
 constexpr double kMaxGantryTiltDeg = 0.01;
 constexpr std::size_t kMaxVoxels = std::size_t{1} << 32;
 
-const char* const kMediaStorageDirectory = "1.2.840.10008.1.3.10";
+constexpr std::string_view kMediaStorageDirectory = "1.2.840.10008.1.3.10";
 
 std::string number(double value) {
   std::ostringstream text;
@@ -191,8 +191,8 @@ std::string vector_text(const Eigen::Vector3d& v) {
 }
 
 void check_alike(const Slice& first, const Slice& slice) {
-  const std::string file = slice.pixels.path.string();
-  const std::string as_first = "must be as in " + first.pixels.path.filename().string();
+  const std::string file = slice.pixels.path().string();
+  const std::string as_first = "must be as in " + first.pixels.path().filename().string();
   if (slice.pixels.rows != first.pixels.rows || slice.pixels.columns != first.pixels.columns)
     throw InputError(
         "Columns x Rows",
@@ -252,8 +252,8 @@ double even_distance(const fs::path& folder,
     if (gaps[i] < kUnevenMm)
       throw InputError(folder.string() + ": two slices at one position, " +
                        place(i + 1, heights[i + 1]) +
-                       " along the slice normal: " + slices[i].pixels.path.filename().string() +
-                       " and " + slices[i + 1].pixels.path.filename().string());
+                       " along the slice normal: " + slices[i].pixels.path().filename().string() +
+                       " and " + slices[i + 1].pixels.path().filename().string());
     if (std::abs(gaps[i] - usual) > std::max(kUnevenShare * usual, kUnevenMm))
       throw InputError(
           folder.string() + ": between " + place(i, heights[i]) + " and " +
@@ -278,7 +278,7 @@ void check_not_sheared(const fs::path& folder,
     const double angle_deg =
         std::acos(std::clamp(std::abs(way.normalized().dot(normal)), 0.0, 1.0)) * 180.0 / M_PI;
     throw InputError(folder.string() + ": gantry tilt or shifted slices: " +
-                     slice.pixels.path.filename().string() + " lies " + number(drift.norm()) +
+                     slice.pixels.path().filename().string() + " lies " + number(drift.norm()) +
                      " mm beside the line along the slice normal (limit " + number(limit) +
                      " mm; the stack leans by " + number(angle_deg) +
                      " deg); resample the CT to upright slices");
@@ -292,6 +292,7 @@ CtGrid sorted_grid(const fs::path& folder, std::vector<Slice>& slices) {
     return normal.dot(a.position_mm) < normal.dot(b.position_mm);
   });
   std::vector<double> heights;
+  heights.reserve(slices.size());
   for (const Slice& slice : slices) heights.push_back(normal.dot(slice.position_mm));
   CtGrid grid;
   grid.size = {

@@ -14,8 +14,10 @@
 #include <zlib.h>
 
 #include <Eigen/Geometry>
+#include <Eigen/LU>
 
 #include "base/error.h"
+#include "io/csv_table.h"
 
 namespace af {
 
@@ -27,7 +29,8 @@ constexpr std::size_t kMaxTextHeaderBytes = 1u << 20;
 constexpr std::uint64_t kMaxVoxels = std::uint64_t{1} << 32;
 /// Deflate cannot expand a byte to more than this many.
 constexpr std::uint64_t kMaxDeflateRatio = 1040;
-constexpr float kMaxOrientationMm = 1e6f;
+constexpr float kMaxOrientation = 1e6f;
+constexpr float kMinOrientation = 1e-30f;
 constexpr std::size_t kNifti1HeaderBytes = 348;
 constexpr std::size_t kNifti2HeaderBytes = 540;
 
@@ -115,7 +118,8 @@ std::string lower(std::string text) {
   return text;
 }
 
-/// "key = value" or "key: value" lines of a text header, keys in lower case, with where it ends.
+/// "key = value" or "key: value" lines of a text header, with where it ends. MetaIO wants its keys
+/// in their exact case; NRRD fields are kept in lower case.
 struct TextHeader {
   std::string path;
   std::map<std::string, std::string> fields;
@@ -216,9 +220,9 @@ TextHeader parse_meta_text(const fs::path& path) {
       if (trimmed(line).empty()) continue;
       break;
     }
-    const std::string key = lower(trimmed(line.substr(0, separator)));
+    const std::string key = trimmed(line.substr(0, separator));
     header.fields[key] = trimmed(line.substr(separator + 1));
-    if (key == "elementdatafile") {
+    if (key == "ElementDataFile") {
       header.end_offset = at;
       return header;
     }
@@ -227,21 +231,21 @@ TextHeader parse_meta_text(const fs::path& path) {
 }
 
 std::uint64_t meta_type_bytes(const TextHeader& header) {
-  static const std::map<std::string, std::uint64_t> kBytes = {{"MET_CHAR", 1},
-                                                              {"MET_UCHAR", 1},
-                                                              {"MET_SHORT", 2},
-                                                              {"MET_USHORT", 2},
-                                                              {"MET_INT", 4},
-                                                              {"MET_UINT", 4},
-                                                              {"MET_LONG", 4},
-                                                              {"MET_ULONG", 4},
-                                                              {"MET_LONG_LONG", 8},
-                                                              {"MET_ULONG_LONG", 8},
-                                                              {"MET_FLOAT", 4},
-                                                              {"MET_DOUBLE", 8}};
-  const std::string& type = header.require("elementtype");
-  const auto found = kBytes.find(type);
-  if (found == kBytes.end())
+  static const std::map<std::string, std::uint64_t> bytes_of_type = {{"MET_CHAR", 1},
+                                                                     {"MET_UCHAR", 1},
+                                                                     {"MET_SHORT", 2},
+                                                                     {"MET_USHORT", 2},
+                                                                     {"MET_INT", 4},
+                                                                     {"MET_UINT", 4},
+                                                                     {"MET_LONG", 4},
+                                                                     {"MET_ULONG", 4},
+                                                                     {"MET_LONG_LONG", 8},
+                                                                     {"MET_ULONG_LONG", 8},
+                                                                     {"MET_FLOAT", 4},
+                                                                     {"MET_DOUBLE", 8}};
+  const std::string& type = header.require("ElementType");
+  const auto found = bytes_of_type.find(type);
+  if (found == bytes_of_type.end())
     throw FileError(header.path, "ElementType", "one of MET_CHAR ... MET_DOUBLE", type);
   return found->second;
 }
@@ -254,15 +258,15 @@ bool is_true(const TextHeader& header, const std::string& key, bool fallback) {
 
 /// MetaIO prints to the terminal when it meets what is no number.
 void check_meta_numbers(const TextHeader& header) {
-  for (const char* key : {"elementspacing",
-                          "elementsize",
-                          "offset",
-                          "position",
-                          "origin",
-                          "transformmatrix",
-                          "rotation",
-                          "orientation",
-                          "centerofrotation"}) {
+  for (const char* key : {"ElementSpacing",
+                          "ElementSize",
+                          "Offset",
+                          "Position",
+                          "Origin",
+                          "TransformMatrix",
+                          "Rotation",
+                          "Orientation",
+                          "CenterOfRotation"}) {
     const std::string* text = header.find(key);
     if (text == nullptr) continue;
     std::istringstream words(*text);
@@ -282,19 +286,19 @@ ImageHeader read_meta_header(const fs::path& path) {
   const TextHeader text = parse_meta_text(path);
   ImageHeader header;
   header.format = ImageFormat::MetaImage;
-  const std::int64_t dimension = checked_dimension(text, "ndims");
-  header.size = parse_sizes(text.path, text.require("dimsize"), dimension);
+  const std::int64_t dimension = checked_dimension(text, "NDims");
+  header.size = parse_sizes(text.path, text.require("DimSize"), dimension);
   check_meta_numbers(text);
-  const std::int64_t channels = text.integer("elementnumberofchannels", 1);
+  const std::int64_t channels = text.integer("ElementNumberOfChannels", 1);
   if (channels < 1 || channels > 1024)
     throw FileError(text.path, "ElementNumberOfChannels", "1 to 1024", std::to_string(channels));
   header.value_bytes = meta_type_bytes(text) * static_cast<std::uint64_t>(channels);
-  if (!is_true(text, "binarydata", true))
+  if (!is_true(text, "BinaryData", true))
     throw FileError(text.path, "BinaryData = False: text voxels are not supported");
-  header.compressed = is_true(text, "compresseddata", false);
-  header.has_orientation = text.find("transformmatrix") != nullptr ||
-                           text.find("rotation") != nullptr || text.find("orientation") != nullptr;
-  const std::string& data_file = text.require("elementdatafile");
+  header.compressed = is_true(text, "CompressedData", false);
+  header.has_orientation = text.find("TransformMatrix") != nullptr ||
+                           text.find("Rotation") != nullptr || text.find("Orientation") != nullptr;
+  const std::string& data_file = text.require("ElementDataFile");
   const std::string kind = lower(data_file);
   if (kind.starts_with("list") || data_file.find('%') != std::string::npos)
     throw FileError(text.path,
@@ -303,7 +307,7 @@ ImageHeader read_meta_header(const fs::path& path) {
   const bool local = kind == "local";
   header.data_file = local ? path : beside(path, data_file);
   const std::uint64_t bytes = existing_file_size(path, header.data_file);
-  const std::int64_t header_size = text.integer("headersize", 0);
+  const std::int64_t header_size = text.integer("HeaderSize", 0);
   const std::uint64_t payload = checked_payload_bytes(path, header);
   header.payload_offset = local ? text.end_offset : 0;
   if (header_size > 0) header.payload_offset = static_cast<std::uint64_t>(header_size);
@@ -342,49 +346,49 @@ TextHeader parse_nrrd_text(const fs::path& path) {
 }
 
 std::uint64_t nrrd_type_bytes(const TextHeader& header) {
-  static const std::map<std::string, std::uint64_t> kBytes = {{"signed char", 1},
-                                                              {"int8", 1},
-                                                              {"int8_t", 1},
-                                                              {"uchar", 1},
-                                                              {"unsigned char", 1},
-                                                              {"uint8", 1},
-                                                              {"uint8_t", 1},
-                                                              {"short", 2},
-                                                              {"short int", 2},
-                                                              {"signed short", 2},
-                                                              {"signed short int", 2},
-                                                              {"int16", 2},
-                                                              {"int16_t", 2},
-                                                              {"ushort", 2},
-                                                              {"unsigned short", 2},
-                                                              {"unsigned short int", 2},
-                                                              {"uint16", 2},
-                                                              {"uint16_t", 2},
-                                                              {"int", 4},
-                                                              {"signed int", 4},
-                                                              {"int32", 4},
-                                                              {"int32_t", 4},
-                                                              {"uint", 4},
-                                                              {"unsigned int", 4},
-                                                              {"uint32", 4},
-                                                              {"uint32_t", 4},
-                                                              {"longlong", 8},
-                                                              {"long long", 8},
-                                                              {"long long int", 8},
-                                                              {"signed long long", 8},
-                                                              {"signed long long int", 8},
-                                                              {"int64", 8},
-                                                              {"int64_t", 8},
-                                                              {"ulonglong", 8},
-                                                              {"unsigned long long", 8},
-                                                              {"unsigned long long int", 8},
-                                                              {"uint64", 8},
-                                                              {"uint64_t", 8},
-                                                              {"float", 4},
-                                                              {"double", 8}};
+  static const std::map<std::string, std::uint64_t> bytes_of_type = {{"signed char", 1},
+                                                                     {"int8", 1},
+                                                                     {"int8_t", 1},
+                                                                     {"uchar", 1},
+                                                                     {"unsigned char", 1},
+                                                                     {"uint8", 1},
+                                                                     {"uint8_t", 1},
+                                                                     {"short", 2},
+                                                                     {"short int", 2},
+                                                                     {"signed short", 2},
+                                                                     {"signed short int", 2},
+                                                                     {"int16", 2},
+                                                                     {"int16_t", 2},
+                                                                     {"ushort", 2},
+                                                                     {"unsigned short", 2},
+                                                                     {"unsigned short int", 2},
+                                                                     {"uint16", 2},
+                                                                     {"uint16_t", 2},
+                                                                     {"int", 4},
+                                                                     {"signed int", 4},
+                                                                     {"int32", 4},
+                                                                     {"int32_t", 4},
+                                                                     {"uint", 4},
+                                                                     {"unsigned int", 4},
+                                                                     {"uint32", 4},
+                                                                     {"uint32_t", 4},
+                                                                     {"longlong", 8},
+                                                                     {"long long", 8},
+                                                                     {"long long int", 8},
+                                                                     {"signed long long", 8},
+                                                                     {"signed long long int", 8},
+                                                                     {"int64", 8},
+                                                                     {"int64_t", 8},
+                                                                     {"ulonglong", 8},
+                                                                     {"unsigned long long", 8},
+                                                                     {"unsigned long long int", 8},
+                                                                     {"uint64", 8},
+                                                                     {"uint64_t", 8},
+                                                                     {"float", 4},
+                                                                     {"double", 8}};
   const std::string type = lower(header.require("type"));
-  const auto found = kBytes.find(type);
-  if (found == kBytes.end())
+  const auto found = bytes_of_type.find(type);
+  if (found == bytes_of_type.end())
     throw FileError(header.path, "type", "a number type of NRRD", "'" + type + "'");
   return found->second;
 }
@@ -427,20 +431,20 @@ ImageHeader read_nrrd_header(const fs::path& path) {
 // ---- NIfTI-1 ----
 
 std::uint64_t nifti_type_bytes(const std::string& path, int datatype) {
-  static const std::map<int, std::uint64_t> kBytes = {{2, 1},
-                                                      {4, 2},
-                                                      {8, 4},
-                                                      {16, 4},
-                                                      {64, 8},
-                                                      {128, 3},
-                                                      {256, 1},
-                                                      {512, 2},
-                                                      {768, 4},
-                                                      {1024, 8},
-                                                      {1280, 8},
-                                                      {2304, 4}};
-  const auto found = kBytes.find(datatype);
-  if (found == kBytes.end())
+  static const std::map<int, std::uint64_t> bytes_of_type = {{2, 1},
+                                                             {4, 2},
+                                                             {8, 4},
+                                                             {16, 4},
+                                                             {64, 8},
+                                                             {128, 3},
+                                                             {256, 1},
+                                                             {512, 2},
+                                                             {768, 4},
+                                                             {1024, 8},
+                                                             {1280, 8},
+                                                             {2304, 4}};
+  const auto found = bytes_of_type.find(datatype);
+  if (found == bytes_of_type.end())
     throw FileError(path, "datatype", "a real number type of NIfTI-1", std::to_string(datatype));
   return found->second;
 }
@@ -474,6 +478,21 @@ RasAffine sform_affine(std::string_view raw, bool swapped) {
   return affine;
 }
 
+/// ITK decomposes a map that is not orthogonal, prints its complaint, and may accept a flat one.
+void check_is_orthogonal(const std::string& path, const char* name, const RasAffine& affine) {
+  constexpr double kMaxShear = 1e-3;  // cosine between axes
+  Eigen::Matrix3d axes;
+  for (Eigen::Index row = 0; row < 3; ++row)
+    for (Eigen::Index column = 0; column < 3; ++column)
+      axes(row, column) = affine[static_cast<std::size_t>(row)][static_cast<std::size_t>(column)];
+  const Eigen::Matrix3d unit = axes.colwise().normalized();
+  const Eigen::Matrix3d gram = unit.transpose() * unit;
+  if (!gram.allFinite() ||
+      !((gram - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() <= kMaxShear))
+    throw InputError(
+        name, "a sheared or singular map", "its axes must be orthogonal; resample the CT", path);
+}
+
 NiftiOrientation nifti_orientation(std::string_view raw, bool swapped) {
   NiftiOrientation orientation;
   if (load<std::int16_t>(raw, 252, swapped) > 0) orientation.qform = qform_affine(raw, swapped);
@@ -497,14 +516,16 @@ void check_nifti_numbers(const std::string& path, std::string_view raw, bool swa
                        "spacing must be positive and finite (mm)",
                        path);
   }
-  // Single-precision orientation: quaternion, offsets, handedness, and the rows of the sform. ITK's
-  // singular value decomposition does not survive what is not finite.
-  for (std::size_t offset = 256; offset < 328; offset += 4)
-    if (!(std::abs(load<float>(raw, offset, swapped)) < kMaxOrientationMm))
+  // Quaternion, offsets, and the rows of the sform. What is not finite makes ITK's singular value
+  // decomposition run for ever, what is next to nothing makes it print.
+  for (std::size_t offset = 256; offset < 328; offset += 4) {
+    const float value = std::abs(load<float>(raw, offset, swapped));
+    if (!(value < kMaxOrientation) || (value > 0.0f && value < kMinOrientation))
       throw InputError("orientation (header byte " + std::to_string(offset) + ")",
-                       std::to_string(load<float>(raw, offset, swapped)),
-                       "must be finite and below 1e6",
+                       number_text(static_cast<double>(value)),
+                       "must be finite, 0 or between 1e-30 and 1e6",
                        path);
+  }
   const float slope = load<float>(raw, 112, swapped);
   const float intercept = load<float>(raw, 116, swapped);
   if (!std::isfinite(slope) || !std::isfinite(intercept))
@@ -553,6 +574,7 @@ ImageHeader read_nifti_header(const fs::path& path) {
   header.skip_bytes = static_cast<std::uint64_t>(offset);
   check_nifti_numbers(name, raw, swapped);
   header.nifti = nifti_orientation(raw, swapped);
+  if (header.nifti.sform) check_is_orthogonal(name, "sform", *header.nifti.sform);
   header.has_orientation = header.nifti.qform.has_value() || header.nifti.sform.has_value();
   return header;
 }
@@ -575,8 +597,8 @@ void check_png_header(const std::string& path, std::string_view data) {
                     "PNG size",
                     "1 to 1000000 pixels",
                     std::to_string(width) + " x " + std::to_string(height));
-  const int depth = data[8];
-  const int color = data[9];
+  const int depth = static_cast<unsigned char>(data[8]);
+  const int color = static_cast<unsigned char>(data[9]);
   if (color == 2 || color == 3 || color == 4 || color == 6)
     throw InputError("PNG colour type", std::to_string(color), "must be 0, plain grey", path);
   if (color != 0 || std::string_view("\1\2\4\10\20").find(data[8]) == std::string_view::npos ||
@@ -629,27 +651,28 @@ std::uint64_t inflated_bytes(const fs::path& path, std::uint64_t offset) {
   std::vector<unsigned char> output(1u << 18);
   std::uint64_t total = 0;
   bool finished = false;
-  while (file) {
+  while (file && !finished) {
     file.read(reinterpret_cast<char*>(input.data()), static_cast<std::streamsize>(input.size()));
     stream.next_in = input.data();
     stream.avail_in = static_cast<unsigned>(file.gcount());
-    while (stream.avail_in > 0) {
-      if (finished) {
-        // Another gzip member may follow; anything else is padding that readers ignore.
-        if (stream.next_in[0] != 0x1f) return total;
-        inflateReset(&stream);
-        finished = false;
-      }
+    // A full output buffer may hide more output that needs no more input.
+    do {
       stream.next_out = output.data();
       stream.avail_out = static_cast<unsigned>(output.size());
       const int status = inflate(&stream, Z_NO_FLUSH);
       total += output.size() - stream.avail_out;
       finished = status == Z_STREAM_END;
-      if (!finished && status != Z_OK)
+      // Z_BUF_ERROR: nothing was left to do; the next input goes on.
+      if (!finished && status != Z_OK && status != Z_BUF_ERROR)
         throw FileError(path.string(),
                         "compressed data are corrupt after " + std::to_string(total) +
                             " bytes: " + (stream.msg != nullptr ? stream.msg : "bad stream"));
-    }
+      // Another gzip member may follow; anything else is padding that readers ignore.
+      if (finished && stream.avail_in > 0 && stream.next_in[0] == 0x1f) {
+        inflateReset(&stream);
+        finished = false;
+      }
+    } while (!finished && (stream.avail_in > 0 || stream.avail_out == 0));
   }
   if (!finished)
     throw FileError(path.string(),

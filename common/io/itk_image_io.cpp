@@ -44,11 +44,11 @@ class SilentWindow : public itk::OutputWindow {
 };
 
 void silence_itk() {
-  static const bool kDone = [] {
+  static const bool done = [] {
     itk::OutputWindow::SetInstance(SilentWindow::New());
     return true;
   }();
-  (void)kDone;
+  (void)done;
 }
 
 /// The reader or writer itself, not one found through ITK's global factories: content, not names or

@@ -95,10 +95,10 @@ ordered_json finite_or_null(double value) {
 
 /// Numbers of a column; cells such as "nan" and "inf" are left out.
 std::vector<double> finite_cells(const CsvTable& table, const std::string& column) {
-  static const std::set<std::string> kNotFinite = {"", "nan", "-nan", "inf", "-inf"};
+  static const std::set<std::string> not_finite = {"", "nan", "-nan", "inf", "-inf"};
   std::vector<double> values;
   for (std::size_t row = 0; row < table.row_count(); ++row)
-    if (!kNotFinite.contains(table.text(row, column))) values.push_back(table.number(row, column));
+    if (!not_finite.contains(table.text(row, column))) values.push_back(table.number(row, column));
   return values;
 }
 
@@ -171,7 +171,7 @@ void inspect_study(const fs::path& path, Inspection& inspection) {
 void inspect_pose(const fs::path& path, Inspection& inspection) {
   inspection.kind = "pose";
   const RigidTransform room_from_ct = read_pose(path);
-  const Eigen::Matrix4d matrix = room_from_ct.matrix();
+  const Eigen::Matrix4d& matrix = room_from_ct.matrix();
   for (Eigen::Index row = 0; row < 4; ++row)
     inspection.facts["room_from_ct"].push_back(vector_json(matrix.row(row).transpose()));
   inspection.facts["rotation_deg"] =

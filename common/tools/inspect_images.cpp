@@ -35,8 +35,9 @@ struct HuStatistics {
   std::uint64_t total = 0;
 
   explicit HuStatistics(std::span<const std::int16_t> hu) : total(hu.size()) {
-    for (const std::int16_t value : hu) ++counts[static_cast<std::size_t>(value + 32768)];
+    for (const std::int16_t value : hu) ++counts[bin(value)];
   }
+  static std::size_t bin(int hu) { return static_cast<std::size_t>(std::ptrdiff_t{hu} + 32768); }
   /// Smallest value that at least `share` of the voxels do not exceed.
   [[nodiscard]] int quantile(double share) const {
     const auto rank =
@@ -51,8 +52,7 @@ struct HuStatistics {
   /// Share of voxels in [low, high).
   [[nodiscard]] double share(int low, int high) const {
     std::uint64_t inside = 0;
-    for (int value = low; value < high; ++value)
-      inside += counts[static_cast<std::size_t>(value + 32768)];
+    for (int value = low; value < high; ++value) inside += counts[bin(value)];
     return static_cast<double>(inside) / static_cast<double>(total);
   }
 };

@@ -21,7 +21,7 @@ namespace {
 
 constexpr std::string_view kHdf5Mark = "\x89HDF\r\n\x1a\n";
 
-const char* const kWhatWasTried =
+constexpr const char* kWhatWasTried =
     "not recognised; tried: DICOM folder, result folder, unfinished work (NAME.progress), HDF5 "
     "field, NIfTI, MetaImage, NRRD, TIFF, PNG, DICOM file, TOML rig, study or pose, JSON result, "
     "CSV table, ITK transform, pose of 16 numbers, name of a shipped rig";
@@ -206,7 +206,7 @@ std::string text_at(const Inspection& inspection, const std::string& indent) {
     text += indent + "  error: " + indented(inspection.error, indent + "  ") + "\n";
   append_facts(inspection.facts, indent + "  ", text);
   for (const std::string& warning : inspection.warnings)
-    text += indent + "  warning: " + warning + "\n";
+    text.append(indent).append("  warning: ").append(warning).append("\n");
   for (const Inspection& item : inspection.items) text += text_at(item, indent + "  ");
   return text;
 }

@@ -329,6 +329,17 @@ auto nifti_with(std::size_t offset, std::vector<T> values) {
   };
 }
 
+/// ... with this sform and no qform.
+auto nifti_with_sform(const std::vector<float>& rows) {
+  return [=](const fs::path& folder) {
+    const fs::path path = nifti_with<float>(280, rows)(folder);
+    std::string bytes = read_bytes(path);
+    bytes.replace(252, 4, bytes_of(std::vector<std::int16_t>{0, 1}));
+    write_bytes(path, bytes);
+    return path;
+  };
+}
+
 auto dicom(const test::SliceEdit& edit) {
   return [=](const fs::path& folder) {
     write_dicom_series(asymmetric_ct(small_grid()), folder / "dicom", edit);
@@ -414,7 +425,7 @@ std::vector<BadCt> bad_cts() {
       {"MetaZeroSpacing", meta({{"ElementSpacing", "1 1 0"}}), kInput, "must be positive"},
       {"MetaNegativeSpacing", meta({{"ElementSpacing", "1 -1 1"}}), kInput, "must be positive"},
       {"MetaNanSpacing", meta({{"ElementSpacing", "1 nan 1"}}), kInput, "must be finite"},
-      {"MetaTextSpacing", meta({{"ElementSpacing", "1 one 1"}}), kFile, "elementspacing"},
+      {"MetaTextSpacing", meta({{"ElementSpacing", "1 one 1"}}), kFile, "ElementSpacing"},
       {"MetaShearedDirection",
        meta({{"TransformMatrix", "1 0 0 0.3 0.954 0 0 0 1"}}),
        kInput,
@@ -486,6 +497,16 @@ std::vector<BadCt> bad_cts() {
       {"NiftiComplex", nifti_with<std::int16_t>(70, {32, 64}), kFile, "datatype"},
       {"NiftiMetres", nifti_with<char>(123, {1}), kInput, "xyzt_units = metres"},
       {"NiftiZeroSpacing", nifti_with<float>(80, {0.0f}), kInput, "pixdim[1]"},
+      // srow_x = srow_y: two axes of the patient are one.
+      {"NiftiFlatSform",
+       nifti_with_sform({1, 0, 0, 0, 1, 0, 0, 0, 0, 0, 1, 0}),
+       kInput,
+       "sform = a sheared or singular map"},
+      {"NiftiShearedSform",
+       nifti_with_sform({-1, 0.5f, 0, 0, 0, -1, 0, 0, 0, 0, 1, 0}),
+       kInput,
+       "must be orthogonal"},
+      {"NiftiNanSform", nifti_with<float>(280, {nan}), kInput, "must be finite"},
       {"NiftiNanSlope", nifti_with<float>(112, {nan}), kInput, "scl_slope"},
       {"NiftiBadOffset", nifti_with<float>(108, {1e30f}), kFile, "vox_offset"},
       {"NiftiVersion2", nifti_with<std::int32_t>(0, {540}), kFile, "NIfTI-2"},
@@ -650,6 +671,104 @@ INSTANTIATE_TEST_SUITE_P(BadInputs,
                          CtReaderRefuses,
                          testing::ValuesIn(bad_cts()),
                          [](const auto& bad) { return bad.param.name; });
+
+/// Pixels in the RLE encoding of DICOM (PS3.5, annex G): high bytes, then low bytes, as literal
+/// runs.
+std::string rle_encoded(const std::vector<std::int16_t>& pixels) {
+  std::string segments[2];
+  for (std::size_t first = 0; first < pixels.size(); first += 128) {
+    const std::size_t count = std::min<std::size_t>(128, pixels.size() - first);
+    for (std::string& segment : segments) segment += static_cast<char>(count - 1);
+    for (std::size_t i = first; i < first + count; ++i) {
+      segments[0] += static_cast<char>(pixels[i] >> 8 & 0xff);
+      segments[1] += static_cast<char>(pixels[i] & 0xff);
+    }
+  }
+  for (std::string& segment : segments)
+    if (segment.size() % 2 != 0) segment += '\0';
+  std::vector<std::uint32_t> header(16);
+  header[0] = 2;
+  header[1] = 64;
+  header[2] = static_cast<std::uint32_t>(64 + segments[0].size());
+  return bytes_of(header) + segments[0] + segments[1];
+}
+
+TEST(CtReader, DecodesCompressedDicomPixels) {
+  const ScratchFolder folder;
+  const CtVolume ct = asymmetric_ct(small_grid());
+  write_dicom_series(ct, folder / "dicom", [&](int slice, test::DicomTestFile& file) {
+    std::vector<std::int16_t> stored;
+    for (std::size_t i = 0; i < 42; ++i)
+      stored.push_back(
+          static_cast<std::int16_t>(ct.hu[static_cast<std::size_t>(slice) * 42 + i] + 1024));
+    file.set_fragment("1.2.840.10008.1.2.5", rle_encoded(stored));
+  });
+  expect_same_ct(ct, read_ct(folder / "dicom"));
+}
+
+TEST(CtReader, CutsTwelveStoredBitsOutOfSixteenAndExtendsTheirSign) {
+  const ScratchFolder folder;
+  const CtVolume ct = asymmetric_ct(small_grid());
+  write_dicom_series(ct, folder / "dicom", [&](int slice, test::DicomTestFile& file) {
+    // HU themselves, in bits 2 ... 13, with rubbish (an overlay) in the others.
+    std::vector<std::int16_t> stored;
+    for (std::size_t i = 0; i < 42; ++i) {
+      const int hu = ct.hu[static_cast<std::size_t>(slice) * 42 + i];
+      stored.push_back(static_cast<std::int16_t>((hu & 0xfff) << 2 | 0xc001));
+    }
+    file.set_pixels(stored);
+    file.set_u16({0x0028, 0x0101}, 12);
+    file.set_u16({0x0028, 0x0102}, 13);
+    file.set_text({0x0028, 0x1052}, "DS", "0");
+  });
+  expect_same_ct(ct, read_ct(folder / "dicom"));
+}
+
+TEST(CtReader, ReadsCompressedVolumesThatFillEveryBuffer) {
+  // 5 MB of nearly constant voxels pack into a few kB: output waits while no input is left.
+  const ScratchFolder folder;
+  CtVolume ct;
+  ct.grid.size = {160, 160, 100};
+  std::vector<std::int16_t> hu(ct.grid.voxel_count(), -1000);
+  hu.back() = 500;
+  ct.hu = SharedArray<std::int16_t>(std::move(hu));
+  write_ct(ct, folder / "ct.nii.gz");
+  EXPECT_EQ(ct_content_sha256(read_ct(folder / "ct.nii.gz")), ct_content_sha256(ct));
+}
+
+/// Every way to cut a small file short, and one wrong bit in each byte of its header.
+TEST(CtReader, NeitherAcceptsAnyTruncationNorDiesOfAnyFlippedHeaderByte) {
+  const ScratchFolder folder;
+  const CtVolume ct = asymmetric_ct(small_grid());
+  write_dicom_series(ct, folder / "dicom");
+  write_ct(ct, folder / "ct.mha");
+  write_ct(ct, folder / "ct.nrrd");
+  write_ct(ct, folder / "ct.nii.gz");
+  const auto refused = [](const fs::path& path) {
+    try {
+      (void)read_ct(path);
+      return false;
+    } catch (const Error&) {
+      return true;
+    }
+  };
+  for (const char* name : {"dicom/IM6.dcm", "ct.mha", "ct.nrrd", "ct.nii.gz"}) {
+    const fs::path file = folder / name;
+    const fs::path path = file.extension() == ".dcm" ? file.parent_path() : file;
+    const std::string good = read_bytes(file);
+    for (std::size_t length = 0; length < good.size(); length += 1 + length / 16) {
+      write_bytes(file, good.substr(0, length));
+      EXPECT_TRUE(refused(path)) << name << " cut to " << length << " of " << good.size();
+    }
+    for (std::size_t at = 0; at < std::min<std::size_t>(good.size(), 560); at += 3) {
+      std::string bad = good;
+      bad[at] = static_cast<char>(bad[at] ^ 0x11);
+      write_bytes(file, bad);
+      (void)refused(path);  // either is right; ending the process is not
+    }
+    write_bytes(file, good);
+  }
+}
 
 TEST(CtReader, NamesAnUnknownSeriesAndTheKnownOnes) {
   const ScratchFolder folder;

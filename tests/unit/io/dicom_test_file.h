@@ -31,13 +31,28 @@ class DicomTestFile {
     for (const std::int16_t pixel : pixels) append(bytes, static_cast<std::uint16_t>(pixel), 2);
     elements_[{0x7fe0, 0x0010}] = {"OW", bytes};
   }
+  /// Pixels as one compressed fragment behind an empty offset table.
+  void set_fragment(const std::string& transfer_syntax, std::string bytes) {
+    if (bytes.size() % 2 != 0) bytes += '\0';
+    std::string stream;
+    for (const std::string& item : {std::string(), bytes}) {
+      append(stream, 0xe000fffe, 4);
+      append(stream, item.size(), 4);
+      stream += item;
+    }
+    append(stream, 0xe0ddfffe, 4);
+    append(stream, 0, 4);
+    elements_[{0x7fe0, 0x0010}] = {"OB", stream};
+    transfer_syntax_ = transfer_syntax;
+    if (transfer_syntax_.size() % 2 != 0) transfer_syntax_ += '\0';
+  }
   void erase(Tag tag) { elements_.erase(tag); }
 
   void write(const std::filesystem::path& path) const {
     std::string meta;
     append_element(meta, {0x0002, 0x0002}, {"UI", text_or({0x0008, 0x0016})});
     append_element(meta, {0x0002, 0x0003}, {"UI", text_or({0x0008, 0x0018})});
-    append_element(meta, {0x0002, 0x0010}, {"UI", std::string("1.2.840.10008.1.2.1\0", 20)});
+    append_element(meta, {0x0002, 0x0010}, {"UI", transfer_syntax_});
     std::string length;
     append(length, meta.size(), 4);
     std::string bytes(128, '\0');
@@ -61,9 +76,10 @@ class DicomTestFile {
     append(bytes, tag.first, 2);
     append(bytes, tag.second, 2);
     bytes += element.vr;
-    if (element.vr == "OW") {
+    if (element.vr == "OW" || element.vr == "OB") {
       append(bytes, 0, 2);
-      append(bytes, element.bytes.size(), 4);
+      // Fragments have their own end mark: undefined length.
+      append(bytes, element.vr == "OB" ? 0xffffffff : element.bytes.size(), 4);
     } else {
       append(bytes, element.bytes.size(), 2);
     }
@@ -75,6 +91,7 @@ class DicomTestFile {
   }
 
   std::map<Tag, Element> elements_;
+  std::string transfer_syntax_ = std::string("1.2.840.10008.1.2.1\0", 20);
 };
 
 }  // namespace af::test

@@ -1,0 +1,257 @@
+// SPDX-License-Identifier: Apache-2.0
+// af-inspect as a user meets it: what it recognises, what it says, how it ends.
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/build_info.h"
+#include "io/csv_table.h"
+#include "io/pose_file.h"
+#include "programs/small_study.h"
+#include "support/run_program.h"
+#include "support/test_paths.h"
+#include "unit/io/ct_test_data.h"
+
+namespace af {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+using test::ScratchFolder;
+using testing::Contains;
+using testing::HasSubstr;
+
+std::string program(const std::string& name) {
+  return std::string(AF_PROGRAM_FOLDER "/") + name;
+}
+
+test::ProgramRun inspect(const std::string& arguments) {
+  return test::run_command(program("af-inspect") + " " + arguments);
+}
+
+/// Its standard output alone.
+test::ProgramRun json_run(const std::string& arguments) {
+  return test::run_command("(" + program("af-inspect") + " --json " + arguments + " 2>/dev/null)");
+}
+
+/// The one entry that af-inspect --json gives for a usable path.
+json inspect_json(const std::string& path, int exit_code = 0) {
+  const test::ProgramRun run = json_run(path);
+  EXPECT_EQ(run.exit_code, exit_code) << run.output;
+  const json array = json::parse(run.output, nullptr, false);
+  EXPECT_TRUE(array.is_array() && array.size() == 1) << run.output;
+  return array.is_array() && array.size() == 1 ? array[0] : json::object();
+}
+
+void write_bytes(const fs::path& path, const std::string& bytes) {
+  std::ofstream(path, std::ios::binary) << bytes;
+}
+
+TEST(AfInspect, TellsACtsGeometryValuesAndContentHash) {
+  const ScratchFolder folder;
+  CtGrid grid = test::small_grid();
+  grid.direction = Eigen::Vector3d(-1, -1, 1).asDiagonal();
+  const CtVolume ct = test::asymmetric_ct(grid);
+  write_ct(ct, folder / "ct.nii.gz");
+  const json entry = inspect_json((folder / "ct.nii.gz").string());
+  EXPECT_EQ(entry["kind"], "CT");
+  EXPECT_EQ(entry["ok"], true);
+  const json& facts = entry["facts"];
+  EXPECT_EQ(facts["geometry"]["size_voxels"], json({7, 6, 5}));
+  EXPECT_EQ(facts["geometry"]["axes_point_to"], json({"R", "A", "S"}));
+  EXPECT_EQ(facts["ct_content_sha256"], ct_content_sha256(ct));
+  EXPECT_EQ(facts["values"]["min_hu"], -1000);
+  // 7 x 6 x 5 voxels, of which all with i < 2 or j < 1 are air: 1 - (5 * 5) / (7 * 6). Where
+  // position adds up to 100 HU (i + 7 j + 13 k = 100 at most 93), air stays below -900.
+  EXPECT_DOUBLE_EQ(facts["values"]["share_air_below_-900_hu"].get<double>(), 1.0 - 25.0 / 42.0);
+  // From -0.5 to 6.5 voxels of 0.8 mm towards R from -31.25 mm.
+  EXPECT_NEAR(facts["geometry"]["right_to_left_mm"][0].get<double>(), -31.25 - 6.5 * 0.8, 1e-4);
+  EXPECT_NEAR(facts["geometry"]["right_to_left_mm"][1].get<double>(), -31.25 + 0.5 * 0.8, 1e-4);
+  EXPECT_THAT(entry["warnings"].get<std::vector<std::string>>(),
+              Contains(HasSubstr("truncated field of view")));
+}
+
+TEST(AfInspect, WarnsOfThickSlicesAndOfALeftHandedGrid) {
+  const ScratchFolder folder;
+  CtGrid grid = test::small_grid();
+  grid.spacing_mm.z() = 5.0;
+  grid.direction = Eigen::Vector3d(1, 1, -1).asDiagonal();
+  write_ct(test::asymmetric_ct(grid), folder / "ct.mha");
+  const auto warnings =
+      inspect_json((folder / "ct.mha").string())["warnings"].get<std::vector<std::string>>();
+  EXPECT_THAT(warnings, Contains(HasSubstr("anisotropic")));
+  EXPECT_THAT(warnings, Contains(HasSubstr("left-handed")));
+}
+
+TEST(AfInspect, RefusesADicomFolderWithTwoSeriesUntilOneIsChosen) {
+  const ScratchFolder folder;
+  const CtVolume ct = test::asymmetric_ct(test::small_grid());
+  test::write_dicom_series(ct, folder / "dicom", {}, "1.2.3.4", "A");
+  test::write_dicom_series(ct, folder / "dicom", {}, "1.2.3.5", "B");
+  const test::ProgramRun run = inspect((folder / "dicom").string());
+  EXPECT_EQ(run.exit_code, 3);
+  EXPECT_THAT(run.output, HasSubstr("1.2.3.5  5 slices"));
+  const json entry = inspect_json("--series 1.2.3.5 " + (folder / "dicom").string());
+  EXPECT_EQ(entry["facts"]["ct_content_sha256"], ct_content_sha256(ct));
+}
+
+TEST(AfInspect, TellsImagesStacksAndCtsApart) {
+  const ScratchFolder folder;
+  Image2d image(4, 3);
+  for (std::size_t i = 0; i < image.pixels.size(); ++i)
+    image.pixels[i] = 0.25f * static_cast<float>(i);
+  write_image(image, folder / "drr.mha", 0.5, 0.75);
+  write_image_stack({image, image}, folder / "stack.nrrd", 0.5, 0.75);
+  write_image_stack({image, image}, folder / "stack.tif", 0.5, 0.75);
+  write_png_image(image, folder / "drr.png", 0, 3);
+  const json drr = inspect_json((folder / "drr.mha").string());
+  EXPECT_EQ(drr["kind"], "X-ray or DRR image");
+  EXPECT_EQ(drr["facts"]["columns_rows"], json({4, 3}));
+  EXPECT_EQ(drr["facts"]["pixel_spacing_mm"], json({0.5, 0.75}));
+  EXPECT_EQ(drr["facts"]["values"]["max"], 2.75);
+  EXPECT_EQ(inspect_json((folder / "drr.png").string())["kind"], "X-ray or DRR image");
+  for (const char* name : {"stack.nrrd", "stack.tif"}) {
+    const json stack = inspect_json((folder / name).string());
+    EXPECT_EQ(stack["kind"], "image stack") << name;
+    EXPECT_EQ(stack["facts"]["columns_rows_images"], json({4, 3, 2})) << name;
+  }
+}
+
+TEST(AfInspect, DescribesRigsByNameAndFileAndWarnsOfMirroredOnes) {
+  const ScratchFolder folder;
+  const json shipped = inspect_json("c-arm-12in");
+  EXPECT_EQ(shipped["kind"], "rig");
+  EXPECT_EQ(shipped["facts"]["cameras"][0]["source_detector_distance_mm"], 1020.0);
+  EXPECT_EQ(shipped["facts"]["angles_between_beams_deg"][0]["angle_deg"], 90.0);
+  std::string text = builtin_rig_text("c-arm-12in");
+  const std::string right = "column_direction = [1.0, 0.0, 0.0]";
+  ASSERT_NE(text.find(right), std::string::npos);
+  text.replace(text.find(right), right.size(), "column_direction = [-1.0, 0.0, 0.0]");
+  write_bytes(folder / "rig.toml", text);
+  const auto warnings =
+      inspect_json((folder / "rig.toml").string())["warnings"].get<std::vector<std::string>>();
+  EXPECT_THAT(warnings, Contains(HasSubstr("mirrored")));
+}
+
+TEST(AfInspect, RecognisesPosesTablesAndResults) {
+  const ScratchFolder folder;
+  const RigidTransform pose(Eigen::Translation3d(1, 2, 3));
+  write_bytes(folder / "pose.toml", pose_to_toml(pose));
+  write_bytes(folder / "pose.tfm", pose_to_itk_transform(pose));
+  write_bytes(folder / "pose.txt", "1 0 0 1\n0 1 0 2\n0 0 1 3\n0 0 0 1\n");
+  for (const char* name : {"pose.toml", "pose.tfm", "pose.txt"}) {
+    const json entry = inspect_json((folder / name).string());
+    EXPECT_EQ(entry["kind"], "pose") << name;
+    EXPECT_EQ(entry["facts"]["room_from_ct"][1], json({0.0, 1.0, 0.0, 2.0})) << name;
+  }
+  write_bytes(folder / "image-quality.csv",
+              "pose_index,rx_deg,ry_deg,rz_deg,tx_mm,ty_mm,tz_mm,psnr_db\n"
+              "0,1,2,3,4,5,6,43.5\n1,1,2,3,4,5,6,inf\n2,1,2,3,4,5,6,41.5\n3,0,0,0,0,0,0,45\n");
+  const json quality = inspect_json((folder / "image-quality.csv").string());
+  EXPECT_EQ(quality["kind"], "image quality");
+  EXPECT_EQ(quality["facts"]["poses"], 4);
+  EXPECT_EQ(quality["facts"]["with_finite_psnr"], 3);
+  EXPECT_EQ(quality["facts"]["median_psnr_db"], 43.5);
+  EXPECT_EQ(quality["facts"]["min_psnr_db"], 41.5);
+  write_bytes(folder / "registrations.csv",
+              "case,start_index,renderer,tre_mm,stop_reason\n"
+              "a,0,field,0.5,step-below-final\na,1,field,9,left-range\na,2,field,nan,failed\n");
+  const json rows = inspect_json((folder / "registrations.csv").string());
+  EXPECT_EQ(rows["kind"], "registrations");
+  EXPECT_EQ(rows["facts"]["rows_by"]["stop_reason"]["left-range"], 1);
+  EXPECT_EQ(rows["facts"]["tre_below_2.5_mm"], 1);
+  write_bytes(folder / "poses.csv", "rx_deg,ry_deg,rz_deg,tx_mm,ty_mm,tz_mm\n1,2,3,4,5,6\n");
+  EXPECT_EQ(inspect_json((folder / "poses.csv").string())["kind"], "poses");
+  write_bytes(folder / "summary.json",
+              R"({"format": "attenuation-fields evaluation", "provenance": {"seed": 7}})");
+  const json summary = inspect_json((folder / "summary.json").string());
+  EXPECT_EQ(summary["kind"], "attenuation-fields evaluation");
+  EXPECT_EQ(summary["facts"]["provenance"]["seed"], 7);
+  // The folder that holds them all.
+  const json all = inspect_json(folder.path().string());
+  EXPECT_EQ(all["kind"], "folder of results");
+  EXPECT_EQ(all["items"].size(), 5u);
+}
+
+TEST(AfInspect, SaysWhatItTriedWhenNothingFits) {
+  const ScratchFolder folder;
+  write_bytes(folder / "noise.bin", std::string("\x01\x02\x00\xff rubbish", 12));
+  write_bytes(folder / "empty", "");
+  write_bytes(folder / "other.json", R"({"a": 1})");
+  write_bytes(folder / "other.csv", "a,b\n1,2\n");
+  write_bytes(folder / "cut.json", R"({"format": "attenu)");
+  for (const auto& [name, code, message] :
+       {std::tuple("noise.bin", 4, "not recognised; tried: DICOM folder"),
+        std::tuple("empty", 4, "not recognised"),
+        std::tuple("none", 4, "does not exist"),
+        std::tuple("other.json", 3, "no result of this project"),
+        std::tuple("other.csv", 3, "none of registrations.csv"),
+        std::tuple("cut.json", 4, "cut short")}) {
+    const test::ProgramRun run = inspect((folder / name).string());
+    EXPECT_EQ(run.exit_code, code) << name << ": " << run.output;
+    EXPECT_THAT(run.output, HasSubstr(message));
+    EXPECT_THAT(run.output, HasSubstr("NOT USABLE"));
+  }
+}
+
+TEST(AfInspect, EndsWithTheWorstCodeButReportsEveryPath) {
+  const ScratchFolder folder;
+  write_bytes(folder / "pose.txt", "2 0 0 0  0 1 0 0  0 0 1 0  0 0 0 1");  // not rigid
+  const std::string paths = "treatment-room " + (folder / "pose.txt").string() + " " +
+                            (folder / "none").string() + " c-arm-12in";
+  const test::ProgramRun run = json_run(paths);
+  EXPECT_EQ(run.exit_code, 4);
+  const json array = json::parse(run.output);
+  ASSERT_EQ(array.size(), 4u);
+  EXPECT_EQ(array[0]["exit_code"], 0);
+  EXPECT_EQ(array[1]["exit_code"], 3);
+  EXPECT_EQ(array[2]["exit_code"], 4);
+  EXPECT_EQ(array[3]["ok"], true);
+  EXPECT_EQ(inspect("").exit_code, 2);
+  EXPECT_EQ(inspect("--no-such-option x").exit_code, 2);
+}
+
+TEST(AfInspect, VerifiesAFieldAndAStudyAndSeesDamage) {
+  const ScratchFolder folder;
+  test::write_small_study(folder.path());
+  const std::string study = (folder / "study.toml").string();
+  const json study_entry = inspect_json(study);
+  EXPECT_EQ(study_entry["kind"], "study");
+  EXPECT_EQ(study_entry["facts"]["cases"][0]["views"].size(), 2u);
+
+  const fs::path field = folder / "AP.af.h5";
+  const test::ProgramRun made = test::run_command(
+      program("af-precompute") + " --study " + study +
+      " --camera AP --max-rotation-deg 4 --max-translation-mm 8 --uv-nodes 6 --st-nodes 24"
+      " --codewords 16 -o " +
+      field.string());
+  ASSERT_EQ(made.exit_code, 0) << made.output;
+  const json facts = inspect_json(field.string())["facts"];
+  EXPECT_EQ(facts["checksums"], "verified");
+  EXPECT_EQ(facts["payload_sha256"].get<std::string>().size(), 64u);
+  EXPECT_EQ(facts["camera"]["name"], "AP");
+  EXPECT_EQ(facts["codewords"], 16);
+  EXPECT_EQ(facts["ct_content_sha256"],
+            inspect_json((folder / "ct.nii.gz").string())["facts"]["ct_content_sha256"]);
+  // 6 x 6 viewpoints of 24 x 24 rays, 2 bytes each, in MB of 10^6 bytes.
+  EXPECT_DOUBLE_EQ(facts["sizes"]["uncompressed_mb"].get<double>(), 2 * 36 * 576 / 1e6);
+  EXPECT_DOUBLE_EQ(facts["sizes"]["file_mb"].get<double>(),
+                   static_cast<double>(fs::file_size(field)) / 1e6);
+  EXPECT_EQ(facts["provenance"]["source_version"], std::string(program_version()));
+
+  fs::resize_file(field, fs::file_size(field) / 2);
+  EXPECT_EQ(inspect(field.string()).exit_code, 4);
+  fs::remove(folder / "LAT.mha");
+  const test::ProgramRun broken = inspect(study);
+  EXPECT_EQ(broken.exit_code, 4);
+  EXPECT_THAT(broken.output, HasSubstr("LAT.mha"));
+}
+
+}  // namespace
+}  // namespace af
