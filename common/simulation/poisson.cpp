@@ -12,7 +12,10 @@ namespace {
 double log_factorial(double k) {
   double shift = 0.0;
   double x = k + 1.0;
-  for (; x < 10.0; x += 1.0) shift += std::log(x);
+  while (x < 10.0) {
+    shift += std::log(x);
+    x += 1.0;
+  }
   const double inverse = 1.0 / x;
   const double square = inverse * inverse;
   const double series =
@@ -23,7 +26,11 @@ double log_factorial(double k) {
 std::int64_t draw_by_products(double mean, HashRandom& random) {
   const double limit = std::exp(-mean);
   std::int64_t count = 0;
-  for (double product = random.uniform(); product > limit; product *= random.uniform()) ++count;
+  double product = random.uniform();
+  while (product > limit) {
+    ++count;
+    product *= random.uniform();
+  }
   return count;
 }
 

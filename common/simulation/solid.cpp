@@ -154,6 +154,7 @@ CtVolume sample_solids(const CtGrid& grid,
   check(grid.direction.isIdentity(), "sample_solids() needs a grid along the ct axes");
   check(samples_per_axis >= 1 && samples_per_axis <= 8, "1 to 8 samples per axis");
   std::vector<CtBox> bounds;
+  bounds.reserve(solids.size());
   for (const Solid& solid : solids) bounds.push_back(solid.bounds());
   std::vector<std::int16_t> voxels(grid.voxel_count());
   for_each_row(grid.size[2], threads, [&](int slice) {

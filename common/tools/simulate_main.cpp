@@ -65,8 +65,8 @@ std::string summary(const SimulatedCase& simulated, const std::filesystem::path&
 }
 
 void run(const SimulateOptions& options,
+         const CLI::App& app,
          const std::string& command_line,
-         const std::string& options_toml,
          const Communicator& world) {
   if (!world.is_root()) return;  // the work is small; a launcher with several ranks does no harm
   throw_if_any(problems(options));
@@ -89,7 +89,7 @@ void run(const SimulateOptions& options,
   Provenance provenance;
   provenance.program = "af-simulate";
   provenance.command_line = command_line;
-  provenance.options_toml = options_toml;
+  provenance.options_toml = app.config_to_str(true);
   provenance.seed = options.seed;
   provenance.rank_count = world.size();
   provenance.input_sha256["ct_content"] = ct_content_sha256(ct);
@@ -100,6 +100,8 @@ void run(const SimulateOptions& options,
 
 }  // namespace
 
+// Outside app_main only the declaration of options can throw, which is a defect of this program.
+// NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
   SimulateOptions options;
   CLI::App app{
@@ -107,7 +109,7 @@ int main(int argc, char** argv) {
       "polyenergetic projector with scatter, noise, blur and grey levels, steel fiducials and "
       "their detections, regions of interest, and the true pose."};
   tools::bind_options(app, options);
-  return cli::app_main(app, argc, argv, [&](const Communicator& world) {
-    run(options, cli::command_line(argc, argv), app.config_to_str(true), world);
-  });
+  const std::string command_line = cli::command_line(argc, argv);
+  return cli::app_main(
+      app, argc, argv, [&](const Communicator& world) { run(options, app, command_line, world); });
 }

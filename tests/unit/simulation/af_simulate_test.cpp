@@ -23,7 +23,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const std::string kCoarse = "--phantom spine --phantom-voxel-mm 4 ";
+const std::string coarse = "--phantom spine --phantom-voxel-mm 4 ";
 
 class AfSimulate : public ::testing::Test {
  protected:
@@ -42,7 +42,7 @@ class AfSimulate : public ::testing::Test {
 };
 
 TEST_F(AfSimulate, MakesAStudyThatReadsBack) {
-  ASSERT_EQ(run(kCoarse + "--seed 5 " + folder("s")), 0) << log();
+  ASSERT_EQ(run(coarse + "--seed 5 " + folder("s")), 0) << log();
   const Study study = read_study(scratch_ / "s" / "study.toml");
   const StudyCase& patient = study.find_case("");
   ASSERT_EQ(patient.views.size(), 2u);
@@ -61,7 +61,7 @@ TEST_F(AfSimulate, MakesAStudyThatReadsBack) {
 }
 
 TEST_F(AfSimulate, TruthIsWithinTheStatedRangeAndTheFiducialsFindIt) {
-  ASSERT_EQ(run(kCoarse + "--seed 5 " + folder("s")), 0) << log();
+  ASSERT_EQ(run(coarse + "--seed 5 " + folder("s")), 0) << log();
   const Study study = read_study(scratch_ / "s" / "study.toml");
   const StudyCase& patient = study.find_case("");
   ASSERT_TRUE(patient.gold_room_from_ct.has_value());
@@ -85,9 +85,9 @@ TEST_F(AfSimulate, TruthIsWithinTheStatedRangeAndTheFiducialsFindIt) {
 }
 
 TEST_F(AfSimulate, SameSeedGivesTheSameBytesOnAnyNumberOfThreads) {
-  ASSERT_EQ(run(kCoarse + "--seed 9 --threads 1 " + folder("one")), 0) << log();
-  ASSERT_EQ(run(kCoarse + "--seed 9 --threads 3 " + folder("three")), 0) << log();
-  ASSERT_EQ(run(kCoarse + "--seed 10 --threads 3 " + folder("other")), 0) << log();
+  ASSERT_EQ(run(coarse + "--seed 9 --threads 1 " + folder("one")), 0) << log();
+  ASSERT_EQ(run(coarse + "--seed 9 --threads 3 " + folder("three")), 0) << log();
+  ASSERT_EQ(run(coarse + "--seed 10 --threads 3 " + folder("other")), 0) << log();
   for (const char* name : {"A.mha", "B.mha", "study.toml", "truth.toml", "ct.nii.gz"}) {
     const std::string one = read_text_file(scratch_ / "one" / name);
     EXPECT_EQ(one, read_text_file(scratch_ / "three" / name)) << name;
@@ -98,7 +98,7 @@ TEST_F(AfSimulate, SameSeedGivesTheSameBytesOnAnyNumberOfThreads) {
 
 TEST_F(AfSimulate, IdealXrayIsTheExactIntegralOfTheStudysCt) {
   constexpr double kTolerance = 1e-4;  // the contract's
-  ASSERT_EQ(run(kCoarse + "--ideal --no-fiducials " + folder("s")), 0) << log();
+  ASSERT_EQ(run(coarse + "--ideal --no-fiducials " + folder("s")), 0) << log();
   const Study study = read_study(scratch_ / "s" / "study.toml");
   const StudyCase& patient = study.find_case("");
   const CtVolume ct = read_ct(patient.ct);
@@ -136,13 +136,13 @@ TEST_F(AfSimulate, RefusesBadInputByTheContractsCodesAndLeavesNothing) {
       {"--ct a --phantom spine", 2, "2 were given"},
       {"--phantom pelvis", 2, "spine"},
       {"--phantom spine --center-ct-mm 1,2", 2, "center-ct-mm"},
-      {kCoarse + "--bits 7", 3, "bits = 7"},
-      {kCoarse + "--tube-kvp 10 --energy-bins 3", 3, "energy_bins = 3"},
-      {kCoarse + "--water-mu-per-mm 0.6", 3, "water_mu_per_mm"},
-      {kCoarse + "--center-ct-mm 900,0,0", 3, "center_ct_mm"},
-      {kCoarse + "--target-box-ct-mm 0,0,0,-1,5,5", 3, "target_box_ct_mm"},
-      {kCoarse + "--rig " + bad_rig, 3, "camera"},
-      {kCoarse + "--rig nowhere.toml", 4, "nowhere.toml"},
+      {coarse + "--bits 7", 3, "bits = 7"},
+      {coarse + "--tube-kvp 10 --energy-bins 3", 3, "energy_bins = 3"},
+      {coarse + "--water-mu-per-mm 0.6", 3, "water_mu_per_mm"},
+      {coarse + "--center-ct-mm 900,0,0", 3, "center_ct_mm"},
+      {coarse + "--target-box-ct-mm 0,0,0,-1,5,5", 3, "target_box_ct_mm"},
+      {coarse + "--rig " + bad_rig, 3, "camera"},
+      {coarse + "--rig nowhere.toml", 4, "nowhere.toml"},
       {"--ct /nowhere/ct.nii.gz", 4, "/nowhere/ct.nii.gz"},
       {"--ct " + text_file, 4, "not-a-ct.nii.gz"},
   };
@@ -158,10 +158,10 @@ TEST_F(AfSimulate, RefusesBadInputByTheContractsCodesAndLeavesNothing) {
 TEST_F(AfSimulate, KeepsAnExistingFolderUnlessForced) {
   fs::create_directories(scratch_ / "s");
   std::ofstream(scratch_ / "s" / "mine") << "x";
-  EXPECT_EQ(run(kCoarse + folder("s")), 3);
+  EXPECT_EQ(run(coarse + folder("s")), 3);
   EXPECT_NE(log().find("--force"), std::string::npos);
   EXPECT_TRUE(fs::exists(scratch_ / "s" / "mine"));
-  EXPECT_EQ(run(kCoarse + "--force " + folder("s")), 0) << log();
+  EXPECT_EQ(run(coarse + "--force " + folder("s")), 0) << log();
   EXPECT_FALSE(fs::exists(scratch_ / "s" / "mine"));
   EXPECT_TRUE(fs::exists(scratch_ / "s" / "study.toml"));
 }

@@ -112,7 +112,9 @@ TEST(SampleSolids, LaterBodiesReplaceEarlierOnes) {
   inner.half_sizes_mm = Vector3d::Constant(10.0);
   inner.hu = -1000;
   const CtVolume ct = sample_solids(cube_grid(31, 2.0), {outer, inner}, 2, 1);
-  const auto at = [&](int i) { return ct.hu[static_cast<std::size_t>((15 * 31 + 15) * 31 + i)]; };
+  const auto at = [&](int i) {
+    return ct.hu[(std::size_t{15} * 31 + 15) * 31 + static_cast<std::size_t>(i)];
+  };
   EXPECT_EQ(at(15), -1000);
   EXPECT_EQ(at(22), 40);
   EXPECT_EQ(at(30), -1000);
