@@ -57,7 +57,8 @@ build_preset() {
     launcher=(-DCMAKE_CXX_COMPILER_LAUNCHER=ccache)
   fi
   if ! (cd "$af_root" && { [[ -f "$folder/build.ninja" ]] || cmake --preset "$preset" "${launcher[@]}"; } &&
-    cmake --build "$folder" --parallel "$(build_job_count)" ${1+--target "$@"}) >"$log" 2>&1; then
+    cmake --build "$folder" --parallel "$(build_job_count)" ${1+--target "$@"}) 2>&1 |
+    tee "$log" | awk '/^\[[0-9]+\/[0-9]+\]/ && ++steps % 40 == 0 {print "        " $1; fflush()}'; then
     tail -n 40 "$log" >&2
     die 1 "the build failed; the whole log is $log"
   fi

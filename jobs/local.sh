@@ -15,12 +15,15 @@ skipped, so an interrupted run goes on where it stopped when the same command is
 
   --output DIR              where everything goes                                        [./af-study]
   --ct PATH                 your CT: DICOM folder, NIfTI, MetaImage or NRRD      [a patient's skull CT]
+  --series UID              DICOM series, when the folder of --ct holds several
   --phantom spine           a built-in phantom instead of a CT
-  --paper                   the paper's field parameters (64x64 viewpoints, 256x256 nodes, 16384 codewords, 10 deg,
-                            100 mm) and 30 starts per interval, instead of the quick preset
-  --starts-per-interval N   field registrations in each of the eight intervals of start error
+  --paper                   the paper's full range of translations (100 mm instead of 30 mm), 100 compared poses and
+                            10 ray-cast starts per interval
+  --starts-per-interval N   field registrations in each of the eight intervals of start error            [30]
   --raycast-starts N        how many of them, in each of the first two intervals, are repeated by ray casting
+                                                                                            [2, --paper: 10]
   --pose-count N            random poses whose DRRs are compared with ray casting, per field
+                                                                                          [30, --paper: 100]
   --ranks N                 MPI ranks                                                     [all cores]
   --seed N                  of everything random                                                  [1]
   --skip-packages           do not look for missing packages
@@ -35,6 +38,7 @@ TEXT
 output="$PWD/af-study"
 ct="" phantom="" preset=quick ranks="" seed=1 force=no skip_build=no skip_packages=no
 starts_per_interval="" raycast_starts="" pose_count=""
+series_option=()
 
 need_value() { (($2 >= 2)) || die 2 "option $1 needs a value (try --help)"; }
 need_count() { [[ "$2" =~ ^[1-9][0-9]{0,6}$ ]] || die 2 "$1 = '$2' must be a whole number from 1 to 9999999"; }
@@ -43,6 +47,7 @@ while (($# > 0)); do
   case "$1" in
     --output | -o) need_value "$1" $#; output=$2; shift ;;
     --ct) need_value "$1" $#; ct=$2; shift ;;
+    --series) need_value "$1" $#; series_option=(--series "$2"); shift ;;
     --phantom) need_value "$1" $#; phantom=$2; shift ;;
     --paper) preset=paper ;;
     --starts-per-interval) need_value "$1" $#; need_count "$1" "$2"; starts_per_interval=$2; shift ;;
@@ -59,6 +64,7 @@ while (($# > 0)); do
   shift
 done
 [[ -z "$ct" || -z "$phantom" ]] || die 2 "--ct and --phantom exclude each other"
+((${#series_option[@]} == 0)) || [[ -n "$ct" ]] || die 2 "--series needs --ct"
 [[ -z "$ct" || -e "$ct" ]] || die 4 "--ct $ct: no such file or folder"
 if [[ -e "$output" && ! -d "$output" ]]; then
   die 3 "--output $output exists and is not a folder"
@@ -69,14 +75,14 @@ fi
 [[ -n "$ranks" ]] || ranks=$(core_count)
 cores=$(core_count)
 
+# The quick preset has the paper's resolutions over a smaller range of translations and compares less.
+field_options=(--uv-nodes 64 --st-nodes 256 --codewords 16384 --training-fraction 0.1 --max-rotation-deg 10)
 if [[ "$preset" == paper ]]; then
-  field_options=(--uv-nodes 64 --st-nodes 256 --codewords 16384 --training-fraction 0.1
-    --max-rotation-deg 10 --max-translation-mm 100)
-  : "${starts_per_interval:=30}" "${raycast_starts:=5}" "${pose_count:=100}"
+  field_options+=(--max-translation-mm 100)
+  : "${starts_per_interval:=30}" "${raycast_starts:=10}" "${pose_count:=100}"
 else
-  field_options=(--uv-nodes 32 --st-nodes 192 --codewords 4096 --training-fraction 0.1
-    --max-rotation-deg 10 --max-translation-mm 30)
-  : "${starts_per_interval:=10}" "${raycast_starts:=2}" "${pose_count:=30}"
+  field_options+=(--max-translation-mm 30)
+  : "${starts_per_interval:=30}" "${raycast_starts:=2}" "${pose_count:=30}"
 fi
 ((raycast_starts <= starts_per_interval)) ||
   die 2 "--raycast-starts = $raycast_starts must not exceed --starts-per-interval = $starts_per_interval"
@@ -97,15 +103,22 @@ parallel_seconds() {
 }
 
 print_plan() {
-  local total=0 i
+  local total=0 i packages="none missing" build="none"
+  if [[ "$skip_packages" == no ]] && ! "$af_root/jobs/install-packages.sh" --check >/dev/null 2>&1; then
+    packages="some are missing: about 3 min"
+  fi
+  if [[ "$skip_build" == no && -f "$af_root/CMakeLists.txt" ]]; then
+    build="seconds, up to 5 min from nothing"
+  fi
   say "Study in $output"
   say "  CT: ${ct:-phantom $phantom}${default_ct_note}; $preset preset, $ranks rank(s) on $cores core(s), seed $seed"
-  say "Stages and how long they may take (estimates from a two-core virtual machine):"
+  say "What will be done, and how long it may take (estimates, made on two cores of a virtual machine):"
+  printf '      %-76s %s\n' "Install packages" "$packages" "Build" "$build"
   for ((i = 0; i < ${#stage_names[@]}; ++i)); do
-    printf '  %2d  %-52s %s\n' $((i + 1)) "${stage_titles[i]}" "$(duration "${stage_seconds[i]}")"
+    printf '  %2d  %-76s %s\n' $((i + 1)) "${stage_titles[i]}" "$(duration "${stage_seconds[i]}")"
     total=$((total + stage_seconds[i]))
   done
-  say "  In all about $(duration "$total")."
+  say "  After the build about $(duration "$total")."
 }
 
 stage_number=0 stage_chain="" current_stage="" stage_report=()
@@ -118,7 +131,7 @@ on_exit() {
 }
 trap on_exit EXIT
 
-# run_stage LOG_NAME OUTPUT_PATH COMMAND...: runs the next planned stage unless it was finished with the same command,
+# run_stage OUTPUT_PATH COMMAND...: runs the next planned stage unless it was finished with the same command,
 # program and earlier stages. A stage that was cut short keeps its output, for the program to resume from; one whose
 # inputs changed starts from nothing.
 run_stage() {
@@ -157,7 +170,7 @@ run_stage() {
   [[ -e "$result" ]] || die 6 "stage \"$title\" ended without its output $result; its log is $log"
   local seconds=$((SECONDS - start))
   say "        $(duration "$seconds")"
-  stage_report+=("$(printf '  %-52s %s' "$title" "$(duration "$seconds")")")
+  stage_report+=("$(printf '  %-76s %s' "$title" "$(duration "$seconds")")")
   printf '%s\n' "$stage_chain" >"$stamp.done"
 }
 
@@ -170,29 +183,7 @@ stage_program() {
   fi
 }
 
-# --- packages and build ------------------------------------------------------------------------------------------
-
-if [[ "$skip_packages" == no ]]; then
-  "$af_root/jobs/install-packages.sh" || die 1 "packages are missing (see above); --skip-packages goes on without them"
-fi
-if [[ -f "$af_root/CMakeLists.txt" ]]; then
-  bin="$af_root/build/release/bin"
-  if [[ "$skip_build" == no ]]; then
-    say "Building the programs in build/release (about 4 minutes from nothing on two cores) ..."
-    build_start=$SECONDS
-    mkdir -p "$af_root/build"
-    build_preset release "$af_root/build/release.log" "${af_programs[@]}"
-    say "        $(duration $((SECONDS - build_start)))"
-  fi
-else
-  # Installed: PREFIX/share/attenuation-fields/jobs beside PREFIX/bin.
-  bin="$(cd "$af_root/../.." && pwd)/bin"
-fi
-for program in "${af_programs[@]}"; do
-  [[ -x "$bin/$program" ]] || die 1 "$bin/$program is missing; run without --skip-build"
-done
-
-# --- the study ---------------------------------------------------------------------------------------------------
+# --- the plan ----------------------------------------------------------------------------------------------------
 
 mkdir -p "$output/.stages" "$output/logs"
 output="$(cd "$output" && pwd)"
@@ -211,18 +202,44 @@ elif [[ -n "$ct" ]]; then
   # A CT that changes under its name starts the study anew.
   stage_chain=$(find "$ct" -type f -printf '%P %s %T@\n' | LC_ALL=C sort | sha256sum)
 fi
-field_seconds=60
-[[ "$preset" == quick ]] || field_seconds=600
-plan_stage simulate 30 "Simulate the X-ray pair and its study"
+field_seconds=40
+[[ "$preset" == quick ]] || field_seconds=60
+plan_stage simulate 5 "Simulate the X-ray pair and its study"
 plan_stage field-A "$(parallel_seconds $field_seconds)" "Precompute the field of camera A"
 plan_stage field-B "$(parallel_seconds $field_seconds)" "Precompute the field of camera B"
-plan_stage image-quality-A "$(parallel_seconds $((pose_count / 2 + 2)))" "Compare $pose_count DRRs of field A with ray casting"
-plan_stage image-quality-B "$(parallel_seconds $((pose_count / 2 + 2)))" "Compare $pose_count DRRs of field B with ray casting"
-plan_stage registration "$(parallel_seconds $((8 * starts_per_interval * 1 + 2 * raycast_starts * 60)))" \
+compare_seconds=$(parallel_seconds $((pose_count / 3 + 4)))
+plan_stage image-quality-A "$compare_seconds" "Compare $pose_count DRRs of field A with ray casting"
+plan_stage image-quality-B "$compare_seconds" "Compare $pose_count DRRs of field B with ray casting"
+plan_stage registration "$(parallel_seconds $((8 * starts_per_interval / 3 + 2 * raycast_starts * 60)))" \
   "Register $((8 * starts_per_interval)) starts with fields, $((2 * raycast_starts)) of them also by ray casting"
 plan_stage overlay 5 "Register one start and draw its overlays"
 plan_stage report 5 "Write the report"
 print_plan
+
+# --- packages and build ------------------------------------------------------------------------------------------
+
+if [[ "$skip_packages" == no ]]; then
+  "$af_root/jobs/install-packages.sh" || die 1 "packages are missing (see above); --skip-packages goes on without them"
+fi
+if [[ -f "$af_root/CMakeLists.txt" ]]; then
+  bin="$af_root/build/release/bin"
+  if [[ "$skip_build" == no ]]; then
+    say "Building the programs in build/release ..."
+    build_start=$SECONDS
+    mkdir -p "$af_root/build"
+    build_preset release "$af_root/build/release.log" "${af_programs[@]}"
+    say "        $(duration $((SECONDS - build_start)))"
+  fi
+else
+  # Installed: PREFIX/share/attenuation-fields/jobs beside PREFIX/bin.
+  bin="$(cd "$af_root/../.." && pwd)/bin"
+fi
+for program in "${af_programs[@]}"; do
+  [[ -x "$bin/$program" ]] || die 1 "$bin/$program is missing; run without --skip-build"
+done
+
+# --- the study --------------------------------------------------------------------------------------------------
+
 study_start=$SECONDS
 
 if [[ -n "$default_ct_note" ]]; then
@@ -233,26 +250,28 @@ if [[ -n "$phantom" ]]; then
   run_stage "$study" "$bin/af-simulate" --phantom "$phantom" --rig treatment-room --seed "$seed" --force \
     -o "$output/study"
 else
-  run_stage "$study" "$bin/af-simulate" --ct "$ct" --rig treatment-room --seed "$seed" --force \
+  run_stage "$study" "$bin/af-simulate" --ct "$ct" "${series_option[@]}" --rig treatment-room --seed "$seed" --force \
     -o "$output/study"
 fi
 [[ -z "$phantom" ]] || ct="$output/study/ct.nii.gz"
 case_name=$(sed -n 's/^ *name *= *"\(.*\)" *$/\1/p' "$study" | head -n 1)
 for camera in A B; do
   run_stage "$output/$camera.af.h5" run_ranks "$ranks" "$bin/af-precompute" --study "$study" --case "$case_name" \
-    --camera "$camera" "${field_options[@]}" --seed "$seed" -o "$output/$camera.af.h5"
+    --camera "$camera" "${series_option[@]}" "${field_options[@]}" --seed "$seed" -o "$output/$camera.af.h5"
 done
 fields=(--field "A=$output/A.af.h5" --field "B=$output/B.af.h5")
 for camera in A B; do
   run_stage "$output/image-quality-$camera/summary.json" run_ranks "$ranks" "$bin/af-evaluate" image-quality \
-    --field "$output/$camera.af.h5" --ct "$ct" --pose-count "$pose_count" --seed "$seed" -o "$output/image-quality-$camera"
+    --field "$output/$camera.af.h5" --ct "$ct" "${series_option[@]}" --pose-count "$pose_count" --seed "$seed" \
+    -o "$output/image-quality-$camera"
 done
 run_stage "$output/registration/summary.json" run_ranks "$ranks" "$bin/af-evaluate" registration --study "$study" \
-  "${fields[@]}" --renderer both --starts-per-interval "$starts_per_interval" \
+  "${series_option[@]}" "${fields[@]}" --renderer both --starts-per-interval "$starts_per_interval" \
   --raycast-starts-per-interval "$raycast_starts" --raycast-intervals 2 --seed "$seed" -o "$output/registration"
-run_stage "$output/overlay/result.json" "$bin/af-register" --study "$study" --case "$case_name" "${fields[@]}" \
+run_stage "$output/overlay/result.json" "$bin/af-register" --study "$study" --case "$case_name" "${series_option[@]}" \
+  "${fields[@]}" \
   --start-rotation-deg 2,-2,2 --start-translation-mm 3,3,-3 -o "$output/overlay"
-run_stage "$output/report.html" "$bin/af-evaluate" report "$output" -o "$output/report.html"
+run_stage "$output/report.html" "$bin/af-evaluate" report -o "$output/report.html" "$output"
 current_stage=""
 
 say ""
