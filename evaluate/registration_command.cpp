@@ -107,6 +107,16 @@ void append_problem_of_fields(const RegistrationStudyOptions& options,
     found.emplace_back("--field = set: must not be given with --renderer raycast");
 }
 
+/// ["a", "b"] as in TOML.
+std::string list_text(const std::vector<std::string>& values) {
+  std::ostringstream out;
+  out << '[';
+  for (std::size_t i = 0; i < values.size(); ++i)
+    out << (i == 0 ? "" : ", ") << std::quoted(values[i]);
+  out << ']';
+  return out.str();
+}
+
 std::vector<StudyCase> chosen_cases(const RegistrationStudyOptions& options, const Study& study) {
   std::vector<StudyCase> cases;
   if (options.cases.empty()) cases = study.cases;
@@ -170,14 +180,13 @@ std::string to_toml(const RegistrationStudyOptions& options) {
         << "\nraycast_intervals = " << options.raycast_intervals.value_or(options.intervals)
         << '\n';
   out << "gold = \"" << options.gold << "\"\npreset = \"" << options.preset << "\"\n";
-  registration::RegistrationOptions method = registration::preset_options(options.preset);
+  const registration::RegistrationOptions method = registration::preset_options(options.preset);
   out << "similarity = \"" << options.similarity.value_or(method.similarity.name)
       << "\"\noptimizer = \"" << options.optimizer.value_or(method.optimizer)
       << "\"\nequivalence_margin_mm = " << number_text(options.equivalence_margin_mm)
       << "\nwater_mu_per_mm = " << number_text(options.water_mu_per_mm)
       << "\nstep_mm = " << number_text(options.step_mm) << "\nseed = " << options.seed << '\n';
-  for (const std::string& name : options.cases) out << "# --case " << name << '\n';
-  for (const std::string& field : options.fields) out << "# --field " << field << '\n';
+  out << "case = " << list_text(options.cases) << "\nfield = " << list_text(options.fields) << '\n';
   return out.str();
 }
 

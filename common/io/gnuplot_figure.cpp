@@ -99,8 +99,8 @@ std::string xml_escaped(std::string_view text) {
   return result;
 }
 
-/// gnuplot writes colours as rgb(...), with and without blanks; this makes the neutral ones follow
-/// the reader's colour scheme.
+/// gnuplot writes colours as rgb(...), with and without blanks; this makes the neutral ones, blue
+/// and vermilion follow the reader's colour scheme.
 constexpr const char* kDarkStyle =
     "<style>@media (prefers-color-scheme: dark) {"
     "[fill='rgb(31,41,51)'], [fill='rgb( 31,  41,  51)'] { fill: #DDE4EC }"
@@ -108,6 +108,13 @@ constexpr const char* kDarkStyle =
     "[fill='rgb(107,122,140)'] { fill: #A9B5C3 }"
     "[stroke='rgb(107, 122, 140)'] { stroke: #A9B5C3 }"
     "[stroke='rgb(216, 222, 230)'] { stroke: #364352 }"
+    "[stroke='rgb(  0, 114, 178)'] { stroke: #4FA8DE }"
+    "[fill='rgb(  0, 114, 178)'] { fill: #4FA8DE }"
+    "[color='rgb(  0, 114, 178)'] { color: #4FA8DE }"
+    "[stroke='rgb(213,  94,   0)'] { stroke: #F0904F }"
+    "[fill='rgb(213,  94,   0)'] { fill: #F0904F }"
+    "[color='rgb(213,  94,   0)'] { color: #F0904F }"
+    "[color='white'] { color: #12171D }"
     "}</style>\n";
 
 void finish_svg(const std::filesystem::path& path, const std::string& title) {

@@ -64,9 +64,9 @@ std::string simulation_text(const json& simulation) {
       "p",
       "The X-rays were simulated by <code>af-simulate</code> " +
           escaped(simulation.value("program_version", "")) +
-          " through the CT itself, by an exact projector (Siddon) that shares no code with the "
-          "ray caster that made the fields, with a polychromatic spectrum, scatter, noise and "
-          "blur, so that the images differ from any DRR as X-rays do.");
+          " through the CT itself, by an exact projector (Siddon) instead of the ray caster that "
+          "made the fields, with a polychromatic spectrum, scatter, noise and detector blur, so "
+          "that the images differ from any DRR as X-rays do.");
   if (is_ideal)
     text = element("p",
                    "The X-rays were simulated by <code>af-simulate</code> " +

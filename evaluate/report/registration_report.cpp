@@ -51,9 +51,11 @@ std::string success_table(const json& renderers) {
       const json& interval = renderer.at("intervals").at(i);
       cells.push_back(interval.at("starts").dump());
       cells.push_back(interval.at("successes").dump());
-      cells.push_back(interval.at("starts") == 0
-                          ? "–"
-                          : bar(number_of(interval.at("rate"))) + rate_with_interval(interval));
+      cells.push_back(interval.at("starts") == 0 ? "–"
+                                                 : element("span",
+                                                           bar(number_of(interval.at("rate"))) +
+                                                               rate_with_interval(interval),
+                                                           "nowrap"));
     }
     table.add_row(cells);
   }

@@ -71,7 +71,7 @@ std::string speed_sentence(const json& paired) {
   return "From the " + counted(paired.at("common_starts").get<std::int64_t>(), "start", "starts") +
          " given to both, a registration took " + seconds_text(field) + " with fields and " +
          seconds_text(raycast) + " with ray casting (medians): " + decimals(raycast / field, 0) +
-         " times as long.";
+         " times as long, on this computer.";
 }
 
 std::string registration_sentences(const EvaluationRun& run) {
