@@ -225,9 +225,9 @@ AxisOrder ascending_lps_order(const Eigen::Matrix3d& direction) {
 
 template <typename T>
 void append_little_endian(std::vector<std::byte>& bytes, T value) {
-  auto bits = static_cast<std::make_unsigned_t<T>>(value);
+  const std::uint64_t bits = static_cast<std::make_unsigned_t<T>>(value);
   for (std::size_t i = 0; i < sizeof(T); ++i)
-    bytes.push_back(static_cast<std::byte>(bits >> (8 * i) & 0xffu));
+    bytes.push_back(static_cast<std::byte>(bits >> (8 * i) & 0xffU));
 }
 
 RawImage raw_image_of(const CtVolume& ct) {

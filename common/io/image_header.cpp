@@ -256,30 +256,31 @@ bool is_true(const TextHeader& header, const std::string& key, bool fallback) {
   return (*value)[0] == 'T' || (*value)[0] == 't' || (*value)[0] == '1';
 }
 
-/// MetaIO prints to the terminal when it meets what is no number.
-void check_meta_numbers(const TextHeader& header) {
-  for (const char* key : {"ElementSpacing",
-                          "ElementSize",
-                          "Offset",
-                          "Position",
-                          "Origin",
-                          "TransformMatrix",
-                          "Rotation",
-                          "Orientation",
-                          "CenterOfRotation"}) {
-    const std::string* text = header.find(key);
-    if (text == nullptr) continue;
-    std::istringstream words(*text);
-    for (std::string word; words >> word;) {
-      double value = 0.0;
-      const char* first = word.data() + (word[0] == '+' ? 1 : 0);
-      const auto [end, error] = std::from_chars(first, word.data() + word.size(), value);
-      if (error != std::errc() || end != word.data() + word.size())
-        throw FileError(header.path, key, "numbers", "'" + *text + "'");
-      if (!std::isfinite(value))
-        throw InputError(key, "'" + *text + "'", "must be finite", header.path);
-    }
+void check_meta_numbers(const TextHeader& header, const std::string& key, std::int64_t expected) {
+  const std::string* text = header.find(key);
+  if (text == nullptr) return;
+  std::int64_t count = 0;
+  std::istringstream words(*text);
+  for (std::string word; words >> word; ++count) {
+    double value = 0.0;
+    const char* first = word.data() + (word[0] == '+' ? 1 : 0);
+    const auto [end, error] = std::from_chars(first, word.data() + word.size(), value);
+    if (error != std::errc() || end != word.data() + word.size())
+      throw FileError(header.path, key, "numbers", "'" + *text + "'");
+    if (!std::isfinite(value))
+      throw InputError(key, "'" + *text + "'", "must be finite", header.path);
   }
+  if (count != expected)
+    throw FileError(header.path, key, std::to_string(expected) + " numbers", "'" + *text + "'");
+}
+
+/// MetaIO prints to the terminal when numbers are missing or are none.
+void check_meta_numbers(const TextHeader& header, std::int64_t dimension) {
+  for (const char* key : {"TransformMatrix", "Rotation", "Orientation"})
+    check_meta_numbers(header, key, dimension * dimension);
+  for (const char* key :
+       {"ElementSpacing", "ElementSize", "Offset", "Position", "Origin", "CenterOfRotation"})
+    check_meta_numbers(header, key, dimension);
 }
 
 ImageHeader read_meta_header(const fs::path& path) {
@@ -288,7 +289,7 @@ ImageHeader read_meta_header(const fs::path& path) {
   header.format = ImageFormat::MetaImage;
   const std::int64_t dimension = checked_dimension(text, "NDims");
   header.size = parse_sizes(text.path, text.require("DimSize"), dimension);
-  check_meta_numbers(text);
+  check_meta_numbers(text, dimension);
   const std::int64_t channels = text.integer("ElementNumberOfChannels", 1);
   if (channels < 1 || channels > 1024)
     throw FileError(text.path, "ElementNumberOfChannels", "1 to 1024", std::to_string(channels));

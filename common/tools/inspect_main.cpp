@@ -50,6 +50,8 @@ void run(const Options& options, const Communicator& world) {
 
 }  // namespace
 
+// Binding options can throw only by a defect, which may well end the program.
+// NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
   Options options;
   CLI::App app{

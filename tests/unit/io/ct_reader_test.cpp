@@ -430,6 +430,10 @@ std::vector<BadCt> bad_cts() {
        meta({{"TransformMatrix", "1 0 0 0.3 0.954 0 0 0 1"}}),
        kInput,
        "orthonormal"},
+      {"MetaShortDirection",
+       meta({{"TransformMatrix", "1 0 0 0 1 0 0 1"}}),
+       kFile,
+       "TransformMatrix: expected 9 numbers"},
       {"MetaMissingRawFile",
        [](const fs::path& f) {
          write_bytes(f / "bad.mhd", meta_header({}, "none.raw"));
@@ -752,6 +756,7 @@ TEST(CtReader, NeitherAcceptsAnyTruncationNorDiesOfAnyFlippedHeaderByte) {
       return true;
     }
   };
+  testing::internal::CaptureStderr();
   for (const char* name : {"dicom/IM6.dcm", "ct.mha", "ct.nrrd", "ct.nii.gz"}) {
     const fs::path file = folder / name;
     const fs::path path = file.extension() == ".dcm" ? file.parent_path() : file;
@@ -768,6 +773,7 @@ TEST(CtReader, NeitherAcceptsAnyTruncationNorDiesOfAnyFlippedHeaderByte) {
     }
     write_bytes(file, good);
   }
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
 }
 
 TEST(CtReader, NamesAnUnknownSeriesAndTheKnownOnes) {
