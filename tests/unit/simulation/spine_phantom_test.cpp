@@ -17,9 +17,12 @@ const CtVolume& phantom() {
   return ct;
 }
 
+/// HU of the voxel at a point; air outside the volume.
 int hu_at(const Vector3d& ct_point_mm) {
   const CtGrid& grid = phantom().grid;
   const Vector3d index = grid.index_of(ct_point_mm).array().round();
+  for (int axis = 0; axis < 3; ++axis)
+    if (index[axis] < 0 || index[axis] >= grid.size[static_cast<std::size_t>(axis)]) return -1000;
   const auto i = static_cast<std::size_t>(index.x());
   const auto j = static_cast<std::size_t>(index.y());
   const auto k = static_cast<std::size_t>(index.z());
