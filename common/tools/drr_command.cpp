@@ -82,11 +82,12 @@ void append_output_problems(const DrrOptions& options, std::vector<std::string>&
                     ": must be 0 <= low < high <= 100");
 }
 
-/// An error of the library with the option that led to it.
 std::shared_ptr<const DrrRenderer> field_renderer(
     std::shared_ptr<const CompressedAttenuationField> field, const std::string& interpolation) {
   if (interpolation == "nearest")
     return std::make_shared<const AfDrr>(std::move(field), FieldInterpolation::Nearest);
+  if (interpolation == "quadrilinear")
+    return std::make_shared<const AfDrr>(std::move(field), FieldInterpolation::Quadrilinear);
   return std::make_shared<const TwoPassAfDrr>(std::move(field));
 }
 

@@ -20,10 +20,12 @@ void bind_source(CLI::App& app, DrrOptions& options) {
       "--series", options.series_uid, "DICOM series UID, when the CT's folder has several");
   app.add_option("--rig", options.rig, "Rig file, or c-arm-12in, or treatment-room");
   app.add_option("--camera", options.camera, "Camera of the rig");
-  app.add_option("--interpolation",
-                 options.interpolation,
-                 "Look-up in the field: 'nearest' node, or 'linear' in u, v, s and t")
-      ->check(CLI::IsMember({"nearest", "linear"}))
+  app.add_option(
+         "--interpolation",
+         options.interpolation,
+         "Look-up in the field: 'nearest' node, 'linear' in u, v, s and t in two quick passes (as "
+         "af-register does), or 'quadrilinear', literally over each ray's 16 neighbours")
+      ->check(CLI::IsMember({"nearest", "linear", "quadrilinear"}))
       ->capture_default_str();
   app.add_option("--water-mu-per-mm",
                  options.water_mu_per_mm,
