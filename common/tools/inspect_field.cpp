@@ -68,8 +68,24 @@ ordered_json provenance_json(const FieldProvenance& provenance) {
   json["source_version"] = provenance.source_version;
   json["command_line"] = provenance.command_line;
   json["options_toml"] = provenance.options_toml;
-  const auto details = ordered_json::parse(provenance.provenance_json, nullptr, false);
-  json["details"] = details.is_discarded() ? ordered_json(provenance.provenance_json) : details;
+  auto details = ordered_json::parse(provenance.provenance_json, nullptr, false);
+  if (!details.is_object()) {
+    json["details"] = provenance.provenance_json;
+    return json;
+  }
+  // Stand above already.
+  details.erase("command_line");
+  details.erase("options_toml");
+  // A summary needs how the training ended, not each step.
+  if (details.contains("training") && details["training"].is_object()) {
+    ordered_json& training = details["training"];
+    const ordered_json steps = training.value("iterations", ordered_json::array());
+    if (steps.is_array() && !steps.empty()) {
+      training["iterations"] = steps.size();
+      training["last_iteration"] = steps.back();
+    }
+  }
+  json["details"] = details;
   return json;
 }
 

@@ -244,6 +244,7 @@ TEST(AfInspect, VerifiesAFieldAndAStudyAndSeesDamage) {
   EXPECT_DOUBLE_EQ(facts["sizes"]["file_mb"].get<double>(),
                    static_cast<double>(fs::file_size(field)) / 1e6);
   EXPECT_EQ(facts["provenance"]["source_version"], std::string(program_version()));
+  EXPECT_GE(facts["provenance"]["details"]["training"]["iterations"].get<int>(), 1);
 
   fs::resize_file(field, fs::file_size(field) / 2);
   EXPECT_EQ(inspect(field.string()).exit_code, 4);
