@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+// Writes the inputs of bad_inputs.sh into a folder: a small valid study in valid/, and CTs that are
+// wrong in one way each.
+#include <exception>
+#include <fstream>
+#include <iostream>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "programs/small_study.h"
+#include "unit/io/ct_test_data.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+using namespace af;
+using test::DicomTestFile;
+
+constexpr DicomTestFile::Tag kModality{0x0008, 0x0060};
+constexpr DicomTestFile::Tag kTilt{0x0018, 0x1120};
+constexpr DicomTestFile::Tag kPosition{0x0020, 0x0032};
+
+std::string position(double z_mm) {
+  return "-31.25\\12.5\\" + std::to_string(z_mm);
+}
+
+void write_dicom_folders(const fs::path& folder) {
+  const CtVolume ct = test::asymmetric_ct(test::small_grid());
+  test::write_dicom_series(ct, folder / "two-series", {}, "1.2.3.4", "A");
+  test::write_dicom_series(ct, folder / "two-series", {}, "1.2.3.5", "B");
+  test::write_dicom_series(
+      ct, folder / "mr", [](int, DicomTestFile& file) { file.set_text(kModality, "CS", "MR"); });
+  test::write_dicom_series(
+      ct, folder / "tilted", [](int, DicomTestFile& file) { file.set_text(kTilt, "DS", "12.5"); });
+  test::write_dicom_series(ct, folder / "missing-slice", [](int slice, DicomTestFile& file) {
+    file.set_text(kPosition, "DS", position(-107.0 + 1.5 * (slice > 2 ? slice + 1 : slice)));
+  });
+  test::write_dicom_series(ct, folder / "uneven", [](int slice, DicomTestFile& file) {
+    file.set_text(kPosition, "DS", position(-107.0 + 1.5 * slice + (slice == 2 ? 0.6 : 0.0)));
+  });
+}
+
+/// A MetaImage of 4 x 4 x 4 voxels (x 2 when there are four dimensions).
+template <typename T>
+void write_meta(const fs::path& path, const std::string& type, int dimensions, T first, T other) {
+  std::ofstream out(path, std::ios::binary);
+  out << "ObjectType = Image\nNDims = " << dimensions
+      << "\nBinaryData = True\nBinaryDataByteOrderMSB = False\nElementSpacing = 1 1 1"
+      << (dimensions == 4 ? " 1\nDimSize = 4 4 4 2" : "\nDimSize = 4 4 4")
+      << "\nElementType = " << type << "\nElementDataFile = LOCAL\n";
+  std::vector<T> voxels(dimensions == 4 ? 128 : 64, other);
+  voxels.front() = first;
+  out.write(reinterpret_cast<const char*>(voxels.data()),
+            static_cast<std::streamsize>(voxels.size() * sizeof(T)));
+  if (!out.flush()) throw std::runtime_error("cannot write " + path.string());
+}
+
+void write_inputs(const fs::path& folder) {
+  fs::create_directories(folder / "valid");
+  test::write_small_study(folder / "valid");
+  write_dicom_folders(folder);
+  write_meta<float>(folder / "nan.mha", "MET_FLOAT", 3, std::numeric_limits<float>::quiet_NaN(), 0);
+  write_meta<short>(folder / "all-air.mha", "MET_SHORT", 3, -1000, -1000);
+  write_meta<short>(folder / "four-d.mha", "MET_SHORT", 4, 40, 40);
+  // A second CT, of the valid one's size, that the valid one's field does not belong to.
+  CtVolume other = test::five_ellipsoids();
+  std::vector<std::int16_t> hu(other.hu.view().begin(), other.hu.view().end());
+  hu[hu.size() / 2] = 321;
+  other.hu = SharedArray<std::int16_t>(std::move(hu));
+  write_ct(other, folder / "other.nii.gz");
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 2) {
+    std::cerr << "usage: make_bad_inputs FOLDER\n";
+    return 2;
+  }
+  try {
+    write_inputs(argv[1]);
+  } catch (const std::exception& error) {
+    std::cerr << error.what() << '\n';
+    return 1;
+  }
+  return 0;
+}
