@@ -28,6 +28,19 @@ View View::whole_detector(const CameraGeometry& camera) {
   return {camera, {0, 0, camera.size_px.x(), camera.size_px.y()}};
 }
 
+View View::coarser(int factor) const {
+  check(factor >= 1 && roi.width >= factor && roi.height >= factor,
+        "a coarse pixel must fit into the region");
+  const double center = 0.5 * (factor - 1);
+  View coarse = *this;
+  coarse.camera.detector_origin_point =
+      camera.detector_point(roi.column + center, roi.row + center);
+  coarse.camera.pixel_spacing_mm = factor * camera.pixel_spacing_mm;
+  coarse.camera.size_px = {roi.width / factor, roi.height / factor};
+  coarse.roi = {0, 0, roi.width / factor, roi.height / factor};
+  return coarse;
+}
+
 Image2d render_image(const DrrRenderer& renderer,
                      const RigidTransform& room_from_ct,
                      const View& view,

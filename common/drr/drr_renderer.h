@@ -20,6 +20,11 @@ struct View {
   /// The whole detector of a camera.
   static View whole_detector(const CameraGeometry& camera);
   [[nodiscard]] std::size_t pixel_count() const { return roi.pixel_count(); }
+  /// The same region seen by pixels `factor` times as wide and high: each lies on the centre of
+  /// gravity of factor x factor pixels, counted from the region's corner. The coarse detector is
+  /// the region alone (roi.column = roi.row = 0); columns and rows that fill no coarse pixel are
+  /// left out.
+  [[nodiscard]] View coarser(int factor) const;
 };
 
 /// Request for pose derivatives: six planes of pixel_count() values, dU/d(rx, ry, rz) per rad, then

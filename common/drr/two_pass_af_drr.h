@@ -4,7 +4,8 @@
 #include <memory>
 
 #include "drr/drr_renderer.h"
-#include "field/compressed_attenuation_field.h"
+#include "drr/field_level.h"
+#include "drr/viewpoint_blender.h"
 
 namespace af {
 
@@ -18,6 +19,8 @@ namespace af {
 class TwoPassAfDrr final : public DrrRenderer {
  public:
   explicit TwoPassAfDrr(std::shared_ptr<const CompressedAttenuationField> field);
+  /// A level of an image pyramid; it inherits the field's coverage.
+  explicit TwoPassAfDrr(std::shared_ptr<const FieldLevel> level);
 
   RenderStatus render(const RigidTransform& room_from_ct,
                       const View& view,
@@ -26,10 +29,9 @@ class TwoPassAfDrr final : public DrrRenderer {
                       const std::optional<PoseGradients>& gradients = std::nullopt) const override;
   [[nodiscard]] std::unique_ptr<RenderWorkspace> make_workspace() const override;
   [[nodiscard]] const char* name() const override { return "field"; }
-  [[nodiscard]] const CompressedAttenuationField& field() const { return *field_; }
 
  private:
-  std::shared_ptr<const CompressedAttenuationField> field_;
+  std::unique_ptr<const ViewpointBlender> blender_;
 };
 
 }  // namespace af

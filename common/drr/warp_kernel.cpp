@@ -17,15 +17,15 @@ AF_KERNEL_INLINE F16 warped(const NodeImage& image, const WarpRow& row, F16 colu
   const I16 t_node = minimum(to_int(t), splat(image.t_count - 2));
   const F16 s_weight = minimum(s - to_float(s_node), splat(1.0f));
   const F16 t_weight = minimum(t - to_float(t_node), splat(1.0f));
-  const I16 offset = s_node * image.t_count + t_node;
-  const float* next = image.values + image.t_count;
+  const I16 offset = t_node * image.s_count + s_node;
+  const float* next = image.values + image.s_count;
   const F16 near_low = gather(image.values, offset);
   const F16 near_high = gather(image.values + 1, offset);
   const F16 far_low = gather(next, offset);
   const F16 far_high = gather(next + 1, offset);
-  const F16 near_value = near_low + t_weight * (near_high - near_low);
-  const F16 far_value = far_low + t_weight * (far_high - far_low);
-  return near_value + s_weight * (far_value - near_value);
+  const F16 near_value = near_low + s_weight * (near_high - near_low);
+  const F16 far_value = far_low + s_weight * (far_high - far_low);
+  return near_value + t_weight * (far_value - near_value);
 }
 
 }  // namespace

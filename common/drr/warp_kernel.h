@@ -13,7 +13,7 @@ struct WarpRow {
   float d_0, d_1;
 };
 
-/// Image of (s,t) nodes: t fastest, at least 2 x 2.
+/// Image of (s,t) nodes: s fastest, at least 2 x 2.
 struct NodeImage {
   const float* values;
   int32_t s_count;

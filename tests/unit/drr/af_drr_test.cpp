@@ -2,95 +2,20 @@
 #include "drr/af_drr.h"
 
 #include <cmath>
-#include <functional>
 #include <vector>
 
 #include <gtest/gtest.h>
 
-#include "base/hash_random.h"
 #include "base/vector_width.h"
 #include "drr/two_pass_af_drr.h"
+#include "unit/drr/small_fields.h"
 
 namespace af {
 namespace {
 
-using FieldFunction = std::function<double(const RayNodes&)>;
-
-CameraGeometry camera() {
-  CameraGeometry camera;
-  camera.name = "AP";
-  camera.source_point = {0.0, -650.0, 0.0};
-  camera.column_direction = {1.0, 0.0, 0.0};
-  camera.row_direction = {0.0, 0.0, -1.0};
-  camera.pixel_spacing_mm = {6.0, 6.0};
-  camera.size_px = {31, 24};
-  camera.detector_origin_point = {-90.0, 370.0, 69.0};
-  return camera;
-}
-
-/// An uncompressed field in compressed form: one codeword per tile of a function of (u, v, s, t) in
-/// node units. The function must be integer at the nodes, so that nothing is lost.
-std::shared_ptr<CompressedAttenuationField> field_of(const FieldFunction& function,
-                                                     int slab_count,
-                                                     int uv_nodes = 5,
-                                                     int st_nodes = 9) {
-  auto field = std::make_shared<CompressedAttenuationField>();
-  field->identity.camera = camera();
-  field->identity.range = {8.0 * kRadPerDeg, 20.0};
-  LightSlabSpec spec;
-  spec.uv_nodes = uv_nodes;
-  spec.st_nodes = st_nodes;
-  spec.st_plane_y_mm.clear();
-  for (int k = 0; k < slab_count; ++k) {
-    spec.st_plane_y_mm.push_back(30.0 * k - 15.0 * (slab_count - 1));
-    if (k > 0) spec.slab_boundaries_y_mm.push_back(spec.st_plane_y_mm.back() - 15.0);
-  }
-  const auto everywhere = CtBox{{-300, -300, -300}, {300, 300, 300}}.corner_points();
-  field->light_slab = make_light_slab(camera(), {}, field->identity.range, everywhere, spec);
-  field->quantizer_step = 0.25f;
-  field->codebook.codewords.push_back(Tile{});
-  for (SlabGeometry& slab : field->light_slab.slabs) {
-    // The test's function lives on the whole lattice.
-    slab.stored_s = {0, st_nodes};
-    slab.stored_t = {0, st_nodes};
-    std::vector<std::uint16_t> indices;
-    for (int u = 0; u < uv_nodes; u += 2)
-      for (int v = 0; v < uv_nodes; v += 2)
-        for (int s = 0; s < st_nodes; s += 2)
-          for (int t = 0; t < st_nodes; t += 2) {
-            Tile tile{};
-            for (unsigned e = 0; e < 16; ++e) {
-              const int du = static_cast<int>(e >> 3 & 1u);
-              const int dv = static_cast<int>(e >> 2 & 1u);
-              const int ds = static_cast<int>(e >> 1 & 1u);
-              const int dt = static_cast<int>(e & 1u);
-              const RayNodes nodes{static_cast<double>(std::min(u + du, uv_nodes - 1)),
-                                   static_cast<double>(std::min(v + dv, uv_nodes - 1)),
-                                   static_cast<double>(std::min(s + ds, st_nodes - 1)),
-                                   static_cast<double>(std::min(t + dt, st_nodes - 1))};
-              tile[e] = static_cast<std::uint16_t>(std::lround(function(nodes)));
-            }
-            indices.push_back(static_cast<std::uint16_t>(field->codebook.size()));
-            field->codebook.codewords.push_back(tile);
-          }
-    field->slabs.push_back({SharedArray<std::uint16_t>(std::move(indices))});
-  }
-  return field;
-}
-
 double multilinear(const RayNodes& n) {
   return 40 + 3 * n.u + 5 * n.v + 7 * n.s + 2 * n.t + n.u * n.s + 2 * n.v * n.t +
          n.u * n.v * n.s * n.t;
-}
-
-PoseParameters pose_in_range(std::uint64_t index) {
-  HashRandom random(17, index);
-  PoseParameters parameters;
-  for (int i = 0; i < 3; ++i) {
-    parameters.rotation_rad[i] = 8.0 * kRadPerDeg * random.uniform(-1, 1);
-    parameters.translation_mm[i] = 20.0 * random.uniform(-1, 1);
-  }
-  return parameters;
 }
 
 /// (u, v, s, t) of a pixel's ray by straight geometry, independent of the renderer's own path.
@@ -100,7 +25,7 @@ RayNodes nodes_of_pixel(const CompressedAttenuationField& field,
                         int row,
                         std::size_t k) {
   const RigidTransform slab_from_room = field.light_slab.slab_from_ct * room_from_ct.inverse();
-  const Ray ray = camera().ray(column, row);
+  const Ray ray = small_camera().ray(column, row);
   return *field.light_slab.intersect(
       {slab_from_room * ray.origin_point, slab_from_room.linear() * ray.direction},
       field.light_slab.slabs[k]);
@@ -108,11 +33,11 @@ RayNodes nodes_of_pixel(const CompressedAttenuationField& field,
 
 TEST(AfDrr, ReproducesMultilinearFieldExactly) {
   for (const int slabs : {1, 3}) {
-    const auto field = field_of(multilinear, slabs);
+    const auto field = small_field(multilinear, slabs);
     const AfDrr renderer(field, FieldInterpolation::Quadrilinear);
-    const View view = View::whole_detector(camera());
+    const View view = View::whole_detector(small_camera());
     for (std::uint64_t i = 0; i < 10; ++i) {
-      const RigidTransform pose = pose_from_parameters({}, pose_in_range(i));
+      const RigidTransform pose = pose_from_parameters({}, small_pose(i));
       std::int64_t outside = -1;
       const Image2d image = render_image(renderer, pose, view, &outside);
       ASSERT_EQ(outside, 0);
@@ -129,10 +54,10 @@ TEST(AfDrr, ReproducesMultilinearFieldExactly) {
 }
 
 TEST(AfDrr, NearestTakesTheClosestNode) {
-  const auto field = field_of(multilinear, 1);
+  const auto field = small_field(multilinear, 1);
   const AfDrr renderer(field, FieldInterpolation::Nearest);
-  const View view = View::whole_detector(camera());
-  const RigidTransform pose = pose_from_parameters({}, pose_in_range(3));
+  const View view = View::whole_detector(small_camera());
+  const RigidTransform pose = pose_from_parameters({}, small_pose(3));
   const Image2d image = render_image(renderer, pose, view);
   for (int row = 0; row < view.roi.height; ++row)
     for (int column = 0; column < view.roi.width; ++column) {
@@ -144,22 +69,22 @@ TEST(AfDrr, NearestTakesTheClosestNode) {
 }
 
 TEST(AfDrr, RegionOfInterestEqualsThatPartOfTheWholeImage) {
-  const auto field = field_of(multilinear, 1);
+  const auto field = small_field(multilinear, 1);
   const AfDrr renderer(field);
-  const View whole = View::whole_detector(camera());
-  const View part{camera(), {5, 7, 11, 9}};
-  const RigidTransform pose = pose_from_parameters({}, pose_in_range(4));
+  const View whole = View::whole_detector(small_camera());
+  const View part{small_camera(), {5, 7, 11, 9}};
+  const RigidTransform pose = pose_from_parameters({}, small_pose(4));
   EXPECT_EQ(render_image(renderer, pose, part).pixels,
             crop(render_image(renderer, pose, whole), part.roi).pixels);
 }
 
 TEST(AfDrr, RaysOutsideAreCountedAndNeverExtrapolated) {
-  const auto field = field_of(multilinear, 1);
+  const auto field = small_field(multilinear, 1);
   const AfDrr renderer(field);
   PoseParameters far;
   far.translation_mm = {150.0, 0.0, 0.0};
   std::int64_t outside = 0;
-  const View view = View::whole_detector(camera());
+  const View view = View::whole_detector(small_camera());
   const Image2d image = render_image(renderer, pose_from_parameters({}, far), view, &outside);
   EXPECT_GT(outside, 0);
   std::int64_t zeros = 0;
@@ -169,7 +94,7 @@ TEST(AfDrr, RaysOutsideAreCountedAndNeverExtrapolated) {
 }
 
 TEST(AfDrr, ValuesOutsideTheStoredRangeAreZero) {
-  auto field = field_of([](const RayNodes&) { return 8.0; }, 1);
+  auto field = small_field([](const RayNodes&) { return 8.0; }, 1);
   auto cropped = std::make_shared<CompressedAttenuationField>(*field);
   SlabGeometry& slab = cropped->light_slab.slabs[0];
   slab.stored_s = {4, 2};
@@ -186,10 +111,10 @@ TEST(AfDrr, GradientsAgreeWithCentralDifferences) {
   // truncation error falls with step^2, single-precision noise of 1e-7 * U / step stays below 1e-4
   // of the gradients' scale.
   for (const int slabs : {1, 2}) {
-    const auto field = field_of(multilinear, slabs);
+    const auto field = small_field(multilinear, slabs);
     const AfDrr renderer(field);
-    const View view{camera(), {3, 2, 20, 15}};
-    const RigidTransform pose = pose_from_parameters({}, pose_in_range(6));
+    const View view{small_camera(), {3, 2, 20, 15}};
+    const RigidTransform pose = pose_from_parameters({}, small_pose(6));
     const auto workspace = renderer.make_workspace();
     std::vector<float> values(view.pixel_count());
     std::vector<float> analytic(6 * view.pixel_count());
@@ -220,14 +145,14 @@ double without_cross_terms(const RayNodes& n) {
 
 TEST(TwoPassAfDrr, AgreesWithQuadrilinearLookup) {
   for (const int slabs : {1, 3}) {
-    const auto field = field_of(without_cross_terms, slabs, 6, 11);
+    const auto field = small_field(without_cross_terms, slabs, 6, 11);
     const AfDrr exact(field);
     const TwoPassAfDrr two_pass(field);
     for (const RegionOfInterest& roi :
          {RegionOfInterest{0, 0, 31, 24}, {5, 3, 17, 1}, {30, 23, 1, 1}}) {
-      const View view{camera(), roi};
+      const View view{small_camera(), roi};
       for (std::uint64_t i = 0; i < 10; ++i) {
-        const RigidTransform pose = pose_from_parameters({}, pose_in_range(i));
+        const RigidTransform pose = pose_from_parameters({}, small_pose(i));
         const Image2d expected = render_image(exact, pose, view);
         const Image2d image = render_image(two_pass, pose, view);
         // Single-precision node coordinates (10 nodes, 1e-6) times slopes of up to 60 levels of
@@ -241,8 +166,8 @@ TEST(TwoPassAfDrr, AgreesWithQuadrilinearLookup) {
 }
 
 TEST(TwoPassAfDrr, CountsAndBlanksTheSameRaysAsQuadrilinearLookup) {
-  const auto field = field_of(without_cross_terms, 2);
-  const View view = View::whole_detector(camera());
+  const auto field = small_field(without_cross_terms, 2);
+  const View view = View::whole_detector(small_camera());
   PoseParameters far;
   far.translation_mm = {120.0, 0.0, -30.0};
   const RigidTransform pose = pose_from_parameters({}, far);
@@ -257,10 +182,10 @@ TEST(TwoPassAfDrr, CountsAndBlanksTheSameRaysAsQuadrilinearLookup) {
 }
 
 TEST(TwoPassAfDrr, EveryVectorWidthGivesTheSameBits) {
-  const auto field = field_of(multilinear, 2);
+  const auto field = small_field(multilinear, 2);
   const TwoPassAfDrr renderer(field);
-  const View view = View::whole_detector(camera());
-  const RigidTransform pose = pose_from_parameters({}, pose_in_range(8));
+  const View view = View::whole_detector(small_camera());
+  const RigidTransform pose = pose_from_parameters({}, small_pose(8));
   std::vector<float> first;
   for (const VectorWidth width : supported_vector_widths()) {
     force_vector_width(width);
@@ -272,7 +197,7 @@ TEST(TwoPassAfDrr, EveryVectorWidthGivesTheSameBits) {
 }
 
 TEST(CompressedAttenuationField, NamesWhatIsInconsistent) {
-  const auto field = field_of(multilinear, 1);
+  const auto field = small_field(multilinear, 1);
   CompressedAttenuationField bad = *field;
   bad.codebook.codewords.resize(10);
   EXPECT_FALSE(problems(bad).empty());

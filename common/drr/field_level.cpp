@@ -1,0 +1,296 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "drr/field_level.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <exception>
+#include <mutex>
+#include <string>
+#include <thread>
+
+#include "base/error.h"
+#include "base/vector_width.h"
+#include "drr/field_level_kernel.h"
+
+namespace af {
+
+namespace {
+
+GridAxis halved_axis(const GridAxis& axis, const char* name) {
+  const int nodes = (axis.nodes + 1) / 2;
+  if (nodes < 2)
+    throw InputError(std::string(name) + " nodes of a field level",
+                     std::to_string(axis.nodes),
+                     "too few to halve: must be at least 3");
+  const double first_mm = axis.first_mm + 0.5 * axis.spacing_mm();
+  return {first_mm, first_mm + 2.0 * axis.spacing_mm() * (nodes - 1), nodes};
+}
+
+/// All coarse nodes that a stored node of the level below touches.
+NodeRange halved_range(const NodeRange& fine, const GridAxis& coarse) {
+  const int begin = std::max(0, fine.begin - 1) / 2;
+  const int end = std::min(coarse.nodes, fine.end() / 2 + 1);
+  return {begin, end - begin};
+}
+
+SlabGeometry halved_lattice(const SlabGeometry& fine) {
+  SlabGeometry coarse = fine;
+  coarse.s = halved_axis(fine.s, "s");
+  coarse.t = halved_axis(fine.t, "t");
+  coarse.stored_s = halved_range(fine.stored_s, coarse.s);
+  coarse.stored_t = halved_range(fine.stored_t, coarse.t);
+  return coarse;
+}
+
+/// Samples of one viewpoint of the level below, [t][s], with the border that halving reads.
+class BorderedPlane {
+ public:
+  BorderedPlane(const SlabGeometry& fine, const SlabGeometry& coarse)
+      : fine_(fine),
+        first_s_(2 * coarse.stored_s.begin - 1),
+        first_t_(2 * coarse.stored_t.begin - 1),
+        width_(2 * coarse.stored_s.count + 2),
+        height_(2 * coarse.stored_t.count + 2),
+        samples_(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_)) {}
+
+  [[nodiscard]] int width() const { return width_; }
+  [[nodiscard]] const std::uint16_t* samples() const { return samples_.data(); }
+  /// Where the first stored sample stands.
+  [[nodiscard]] std::uint16_t* stored() {
+    return at(fine_.stored_s.begin - first_s_, fine_.stored_t.begin - first_t_);
+  }
+
+  /// Nodes beyond the lattice take the value of its outermost node.
+  void replicate_edges() {
+    const int s_end = std::min(width_, fine_.s.nodes - first_s_);
+    const int t_end = std::min(height_, fine_.t.nodes - first_t_);
+    for (int row = 0; row < t_end; ++row) {
+      if (first_s_ < 0) *at(0, row) = *at(1, row);
+      std::fill(at(s_end, row), at(0, row) + width_, *at(s_end - 1, row));
+    }
+    if (first_t_ < 0) std::copy_n(at(0, 1), width_, at(0, 0));
+    for (int row = t_end; row < height_; ++row) std::copy_n(at(0, t_end - 1), width_, at(0, row));
+  }
+
+ private:
+  [[nodiscard]] std::uint16_t* at(int column, int row) {
+    return samples_.data() + static_cast<std::ptrdiff_t>(row) * width_ + column;
+  }
+
+  SlabGeometry fine_;
+  int first_s_;
+  int first_t_;
+  int width_;
+  int height_;
+  std::vector<std::uint16_t> samples_;
+};
+
+/// A part's share of `count` units.
+struct Share {
+  int begin, end;
+};
+
+Share share_of(int count, int part, int parts) {
+  const auto edge = [&](int i) {
+    return static_cast<int>(static_cast<std::int64_t>(count) * i / parts);
+  };
+  return {edge(part), edge(part + 1)};
+}
+
+std::size_t viewpoint_count(const LightSlab& light_slab) {
+  return static_cast<std::size_t>(light_slab.u.nodes) *
+         static_cast<std::size_t>(light_slab.v.nodes);
+}
+
+/// Where the samples of viewpoint (u, v) begin; null when the tiles' padding goes beyond the last
+/// viewpoint.
+std::uint16_t* viewpoint_samples(const LightSlab& light_slab,
+                                 int u,
+                                 int v,
+                                 std::size_t samples_per_viewpoint,
+                                 std::span<std::uint16_t> samples) {
+  if (u >= light_slab.u.nodes || v >= light_slab.v.nodes) return nullptr;
+  const auto viewpoint =
+      static_cast<std::size_t>(u) * static_cast<std::size_t>(light_slab.v.nodes) +
+      static_cast<std::size_t>(v);
+  return samples.data() + viewpoint * samples_per_viewpoint;
+}
+
+/// Halves one bordered plane into a viewpoint's samples.
+class Halving {
+ public:
+  explicit Halving(const SlabGeometry& coarse)
+      : rows_(coarse.stored_t.count),
+        columns_(coarse.stored_s.count),
+        sums_(2 * static_cast<std::size_t>(columns_) + 2),
+        halve_plane_(select_kernel<HalvePlane>(
+            kernels_128::halve_plane, kernels_256::halve_plane, kernels_512::halve_plane)) {}
+
+  void operator()(BorderedPlane& plane, std::uint16_t* samples) {
+    plane.replicate_edges();
+    halve_plane_(plane.samples(), plane.width(), rows_, columns_, sums_.data(), samples);
+  }
+
+ private:
+  int rows_;
+  int columns_;
+  std::vector<std::uint32_t> sums_;
+  HalvePlane halve_plane_;
+};
+
+/// Decodes a share of one slab's viewpoints, halved when `level` is 1.
+void decode_slab(const CompressedAttenuationField& field,
+                 std::size_t k,
+                 const FieldLevelSlab& to,
+                 int level,
+                 Share u_tiles,
+                 std::span<std::uint16_t> samples) {
+  const SlabGeometry& fine = field.light_slab.slabs[k];
+  const auto decode_tiles = select_kernel<DecodeTiles>(
+      kernels_128::decode_tiles, kernels_256::decode_tiles, kernels_512::decode_tiles);
+  const SlabGeometry coarse = halved_lattice(fine);
+  std::array<BorderedPlane, 4> planes{BorderedPlane(fine, coarse),
+                                      BorderedPlane(fine, coarse),
+                                      BorderedPlane(fine, coarse),
+                                      BorderedPlane(fine, coarse)};
+  Halving halve(coarse);
+  const std::size_t st_tiles = field.tile_count(k) / static_cast<std::size_t>(field.tiles_u()) /
+                               static_cast<std::size_t>(field.tiles_v());
+  for (int a = u_tiles.begin; a < u_tiles.end; ++a)
+    for (int b = 0; b < field.tiles_v(); ++b) {
+      std::array<std::uint16_t*, 4> targets{};
+      std::array<std::uint16_t*, 4> decoded{};
+      for (int i = 0; i < 4; ++i) {
+        const auto at = static_cast<std::size_t>(i);
+        targets[at] = viewpoint_samples(
+            field.light_slab, 2 * a + i / 2, 2 * b + i % 2, to.samples_per_viewpoint(), samples);
+        if (targets[at] != nullptr) decoded[at] = planes[at].stored();
+      }
+      const auto uv_tile = static_cast<std::size_t>(a * field.tiles_v() + b);
+      decode_tiles({field.slabs[k].indices.data() + uv_tile * st_tiles,
+                    field.codebook.codewords.data()->data(),
+                    fine.stored_s.tiles(),
+                    fine.stored_t.tiles()},
+                   planes[0].width(),
+                   decoded.data());
+      for (std::size_t i = 0; i < 4; ++i) {
+        if (targets[i] == nullptr) continue;
+        if (level > 0) {
+          halve(planes[i], targets[i]);
+          continue;
+        }
+        for (int row = 0; row < fine.stored_t.count; ++row)
+          std::copy_n(planes[i].stored() + static_cast<std::ptrdiff_t>(row) * planes[i].width(),
+                      fine.stored_s.count,
+                      targets[i] + static_cast<std::ptrdiff_t>(row) * fine.stored_s.count);
+      }
+    }
+}
+
+/// Halves a share of one slab's viewpoints.
+void halve_slab(const FieldLevelSlab& from,
+                const FieldLevelSlab& to,
+                Share viewpoints,
+                std::span<std::uint16_t> samples) {
+  const SlabGeometry& fine = from.lattice;
+  BorderedPlane plane(fine, to.lattice);
+  Halving halve(to.lattice);
+  for (int viewpoint = viewpoints.begin; viewpoint < viewpoints.end; ++viewpoint) {
+    const auto at = static_cast<std::size_t>(viewpoint);
+    const std::uint16_t* source = from.samples.data() + at * from.samples_per_viewpoint();
+    for (int row = 0; row < fine.stored_t.count; ++row)
+      std::copy_n(source + static_cast<std::ptrdiff_t>(row) * fine.stored_s.count,
+                  fine.stored_s.count,
+                  plane.stored() + static_cast<std::ptrdiff_t>(row) * plane.width());
+    halve(plane, samples.data() + at * to.samples_per_viewpoint());
+  }
+}
+
+}  // namespace
+
+double FieldLevel::blur_sigma_in_nodes() const {
+  return std::sqrt((std::pow(4.0, level) - 1.0) / 4.0);
+}
+
+double FieldLevel::blur_sigma_mm(bool with_resampling) const {
+  const double resampling = with_resampling ? (std::pow(4.0, level) - 1.0) / 6.0 : 0.0;
+  const double sigma_in_nodes = std::sqrt(std::pow(blur_sigma_in_nodes(), 2) + resampling);
+  double node_mm = 0.0;
+  for (const SlabGeometry& slab : coverage.slabs) {
+    const double scale = coverage.uv_plane_y_mm / (coverage.uv_plane_y_mm - slab.st_plane_y_mm);
+    node_mm += scale * 0.5 * (slab.s.spacing_mm() + slab.t.spacing_mm());
+  }
+  return sigma_in_nodes * node_mm / static_cast<double>(coverage.slabs.size());
+}
+
+FieldLevelMemory process_memory(int threads) {
+  check(threads >= 1, "at least one thread");
+  return [threads](std::size_t count, const FieldLevelFill& fill) {
+    const std::shared_ptr<std::uint16_t[]> owner =
+        std::make_unique_for_overwrite<std::uint16_t[]>(count);
+    const std::span<std::uint16_t> samples(owner.get(), count);
+    std::exception_ptr failure;
+    std::mutex failure_mutex;
+    const auto run = [&](int part) {
+      try {
+        fill(samples, part, threads);
+      } catch (...) {
+        const std::scoped_lock lock(failure_mutex);
+        failure = std::current_exception();
+      }
+    };
+    {
+      std::vector<std::jthread> helpers;
+      for (int part = 1; part < threads; ++part) helpers.emplace_back(run, part);
+      run(0);
+    }
+    if (failure) std::rethrow_exception(failure);
+    return SharedArray<std::uint16_t>(owner, samples);
+  };
+}
+
+FieldLevel decode_field_level(const CompressedAttenuationField& field,
+                              int level,
+                              const FieldLevelMemory& memory) {
+  check(level == 0 || level == 1, "levels beyond 1 are made from the level below");
+  FieldLevel result{level, field.light_slab, field.quantizer_step, {}};
+  for (std::size_t k = 0; k < field.slabs.size(); ++k) {
+    const SlabGeometry& fine = field.light_slab.slabs[k];
+    FieldLevelSlab slab{level == 0 ? fine : halved_lattice(fine), {}};
+    slab.samples = memory(
+        viewpoint_count(field.light_slab) * slab.samples_per_viewpoint(),
+        [&](std::span<std::uint16_t> samples, int part, int parts) {
+          decode_slab(field, k, slab, level, share_of(field.tiles_u(), part, parts), samples);
+        });
+    result.slabs.push_back(std::move(slab));
+  }
+  return result;
+}
+
+FieldLevel next_field_level(const FieldLevel& level, const FieldLevelMemory& memory) {
+  FieldLevel result{level.level + 1, level.coverage, level.quantizer_step, {}};
+  const std::size_t viewpoints = viewpoint_count(level.coverage);
+  for (const FieldLevelSlab& from : level.slabs) {
+    FieldLevelSlab slab{halved_lattice(from.lattice), {}};
+    slab.samples = memory(viewpoints * slab.samples_per_viewpoint(),
+                          [&](std::span<std::uint16_t> samples, int part, int parts) {
+                            const Share share = share_of(static_cast<int>(viewpoints), part, parts);
+                            halve_slab(from, slab, share, samples);
+                          });
+    result.slabs.push_back(std::move(slab));
+  }
+  return result;
+}
+
+std::vector<std::shared_ptr<const FieldLevel>> make_field_pyramid(
+    const CompressedAttenuationField& field, int coarsest_level, const FieldLevelMemory& memory) {
+  check(coarsest_level >= 1, "a pyramid begins at level 1");
+  std::vector<std::shared_ptr<const FieldLevel>> levels{
+      std::make_shared<const FieldLevel>(decode_field_level(field, 1, memory))};
+  while (static_cast<int>(levels.size()) < coarsest_level)
+    levels.push_back(std::make_shared<const FieldLevel>(next_field_level(*levels.back(), memory)));
+  return levels;
+}
+
+}  // namespace af

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "base/shared_array.h"
+#include "field/compressed_attenuation_field.h"
+
+namespace af {
+
+/// One slab of a field that is held as plain 16-bit samples, [u][v][t][s] with s fastest (s runs
+/// along the detector's columns, so a row of viewpoint samples is a row of a DRR).
+struct FieldLevelSlab {
+  SlabGeometry lattice;  ///< this level's (s,t) nodes; stored ranges need not be even
+  SharedArray<std::uint16_t> samples;
+
+  [[nodiscard]] std::size_t samples_per_viewpoint() const {
+    return static_cast<std::size_t>(lattice.stored_s.count) *
+           static_cast<std::size_t>(lattice.stored_t.count);
+  }
+};
+
+/// A decoded attenuation field, blurred and decimated in (s,t) for one level of an image pyramid.
+///
+/// Level 0 has the field's own samples. Each further level halves the nodes of both (s,t) axes: a
+/// node lies midway between nodes 2i and 2i + 1 of the level below and takes (1 3 3 1)/8 of nodes
+/// 2i - 1 ... 2i + 2 along each axis, rounded to 16 bits. Beyond the lattice the outermost nodes
+/// are replicated; nodes that are not stored count as 0. (u,v) nodes stay. Memory: 2 bytes a
+/// sample, 134 MB for level 1 and 34 MB for level 2 of 64x64 x 256x256 nodes (uncropped). \test
+/// FieldLevel.HalvingTakesBinomialWeights
+struct FieldLevel {
+  int level = 0;
+  LightSlab coverage;  ///< the field's geometry: it decides which rays are outside, at every level
+  float quantizer_step = 0.0f;
+  std::vector<FieldLevelSlab> slabs;  ///< in the order of coverage.slabs
+
+  /// Standard deviation, in nodes of level 0, of the blur that a DRR of this level carries along s
+  /// and t against one of level 0: the variances 3/4 4^i of the halvings i = 0 ... level - 1.
+  [[nodiscard]] double blur_sigma_in_nodes() const;
+  /// The same in mm at the plane through the field's centre (y = 0 of the slab frame), the mean of
+  /// s and t and of the slabs. Blur a reference image by this sigma (times the magnification
+  /// there) to match. The bilinear resampling of the coarser nodes blurs a little more, by a
+  /// variance of (4^level - 1) / 6 nodes of level 0 on average; `with_resampling` includes it.
+  [[nodiscard]] double blur_sigma_mm(bool with_resampling = false) const;
+};
+
+/// Fills memory in parts that may run at the same time, each knowing its number and how many there
+/// are.
+using FieldLevelFill = std::function<void(std::span<std::uint16_t> samples, int part, int parts)>;
+
+/// Provides memory for `count` samples and has it filled: by one call (samples, 0, 1), by several
+/// threads, or by the ranks of a node together (Communicator::allocate_on_node_together).
+using FieldLevelMemory =
+    std::function<SharedArray<std::uint16_t>(std::size_t count, const FieldLevelFill& fill)>;
+
+/// Memory of this process, filled by `threads` threads.
+FieldLevelMemory process_memory(int threads = 1);
+
+/// Level 0 or 1 of a compressed field. Level 0 of 64x64 x 256x256 nodes is 537 MB. InputError when
+/// an axis has too few nodes to halve.
+FieldLevel decode_field_level(const CompressedAttenuationField& field,
+                              int level,
+                              const FieldLevelMemory& memory = process_memory());
+
+/// The level above.
+FieldLevel next_field_level(const FieldLevel& level,
+                            const FieldLevelMemory& memory = process_memory());
+
+/// Levels 1 ... coarsest_level of a compressed field, [0] being level 1; coarsest_level >= 1.
+std::vector<std::shared_ptr<const FieldLevel>> make_field_pyramid(
+    const CompressedAttenuationField& field,
+    int coarsest_level,
+    const FieldLevelMemory& memory = process_memory());
+
+}  // namespace af

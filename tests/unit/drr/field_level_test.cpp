@@ -1,0 +1,246 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "drr/field_level.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+#include "base/hash_random.h"
+#include "base/vector_width.h"
+#include "drr/two_pass_af_drr.h"
+#include "unit/drr/small_fields.h"
+
+namespace af {
+namespace {
+
+/// Integer noise over the whole 16-bit range, the same for the same node.
+double noise(const RayNodes& n) {
+  const auto index = static_cast<std::uint64_t>(((n.u * 100 + n.v) * 100 + n.s) * 100 + n.t);
+  return std::floor(HashRandom(5, index).uniform(0, 65535));
+}
+
+/// A field of noise whose slab is cropped.
+std::shared_ptr<CompressedAttenuationField> cropped_noise(int st_nodes,
+                                                          const NodeRange& s,
+                                                          const NodeRange& t) {
+  auto field = small_field(noise, 1, 5, st_nodes);
+  const int all_tiles = (st_nodes + 1) / 2;
+  SlabGeometry& slab = field->light_slab.slabs[0];
+  slab.stored_s = s;
+  slab.stored_t = t;
+  std::vector<std::uint16_t> indices;
+  for (int uv = 0; uv < 9; ++uv)
+    for (int c = 0; c < s.tiles(); ++c)
+      for (int d = 0; d < t.tiles(); ++d)
+        indices.push_back(field->slabs[0].indices[static_cast<std::size_t>(
+            (uv * all_tiles + s.begin / 2 + c) * all_tiles + t.begin / 2 + d)]);
+  field->slabs[0].indices = SharedArray<std::uint16_t>(std::move(indices));
+  return field;
+}
+
+/// A level's sample by its node on the level's lattice; 0 where nothing is stored.
+int sample(const FieldLevel& level, const NodeIndex& node) {
+  const FieldLevelSlab& slab = level.slabs[0];
+  const NodeRange& s = slab.lattice.stored_s;
+  const NodeRange& t = slab.lattice.stored_t;
+  if (node.s < s.begin || node.s >= s.end() || node.t < t.begin || node.t >= t.end()) return 0;
+  const int viewpoint = node.u * level.coverage.v.nodes + node.v;
+  const int index = (viewpoint * t.count + node.t - t.begin) * s.count + node.s - s.begin;
+  return slab.samples[static_cast<std::size_t>(index)];
+}
+
+/// Level + 1 by the definition: (1 3 3 1)/8 on both axes, replicated beyond the lattice.
+int halved_sample(const FieldLevel& level, const NodeIndex& node) {
+  constexpr std::array<int, 4> kWeights{1, 3, 3, 1};
+  const SlabGeometry& lattice = level.slabs[0].lattice;
+  int sum = 0;
+  for (int i = 0; i < 4; ++i)
+    for (int j = 0; j < 4; ++j) {
+      const NodeIndex fine{node.u,
+                           node.v,
+                           std::clamp(2 * node.s - 1 + i, 0, lattice.s.nodes - 1),
+                           std::clamp(2 * node.t - 1 + j, 0, lattice.t.nodes - 1)};
+      sum += kWeights[static_cast<std::size_t>(i)] * kWeights[static_cast<std::size_t>(j)] *
+             sample(level, fine);
+    }
+  return (sum + 32) / 64;
+}
+
+void expect_halved(const FieldLevel& fine, const FieldLevel& coarse) {
+  const SlabGeometry& lattice = coarse.slabs[0].lattice;
+  EXPECT_EQ(coarse.level, fine.level + 1);
+  ASSERT_EQ(lattice.s.nodes, (fine.slabs[0].lattice.s.nodes + 1) / 2);
+  for (int u = 0; u < coarse.coverage.u.nodes; ++u)
+    for (int v = 0; v < coarse.coverage.v.nodes; ++v)
+      for (int s = 0; s < lattice.s.nodes; ++s)
+        for (int t = 0; t < lattice.t.nodes; ++t)
+          ASSERT_EQ(sample(coarse, {u, v, s, t}), halved_sample(fine, {u, v, s, t}))
+              << u << ' ' << v << ' ' << s << ' ' << t;
+}
+
+struct Crop {
+  int st_nodes;
+  NodeRange s, t;
+};
+
+TEST(FieldLevel, HalvingTakesBinomialWeights) {
+  for (const Crop& crop : {Crop{11, {0, 11}, {0, 11}},
+                           Crop{12, {0, 12}, {0, 12}},
+                           Crop{11, {2, 9}, {4, 4}},
+                           Crop{16, {4, 8}, {6, 6}}}) {
+    const auto field = cropped_noise(crop.st_nodes, crop.s, crop.t);
+    const FieldLevel level_0 = decode_field_level(*field, 0);
+    const auto pyramid = make_field_pyramid(*field, 2);
+    ASSERT_EQ(pyramid.size(), 2u);
+    expect_halved(level_0, *pyramid[0]);
+    expect_halved(*pyramid[0], *pyramid[1]);
+  }
+}
+
+TEST(FieldLevel, LevelZeroHasTheFieldsSamples) {
+  const auto field = cropped_noise(11, {2, 9}, {4, 4});
+  const FieldLevel level = decode_field_level(*field, 0);
+  for (int u = 0; u < 5; ++u)
+    for (int v = 0; v < 5; ++v)
+      for (int s = 0; s < 11; ++s)
+        for (int t = 0; t < 11; ++t)
+          ASSERT_EQ(level.quantizer_step * static_cast<float>(sample(level, {u, v, s, t})),
+                    field->node_value(0, {u, v, s, t}));
+}
+
+TEST(FieldLevel, CoarseNodesLieMidwayBetweenFineNodes) {
+  const auto field = small_field(noise, 1, 5, 12);
+  const auto pyramid = make_field_pyramid(*field, 2);
+  const GridAxis& fine = field->light_slab.slabs[0].s;
+  const GridAxis& half = pyramid[0]->slabs[0].lattice.s;
+  const GridAxis& quarter = pyramid[1]->slabs[0].lattice.s;
+  constexpr double kRounding = 1e-9;  // of double arithmetic on hundreds of mm
+  for (int i = 0; i < half.nodes; ++i)
+    EXPECT_NEAR(half.position_mm(i), fine.first_mm + (2 * i + 0.5) * fine.spacing_mm(), kRounding);
+  for (int i = 0; i < quarter.nodes; ++i)
+    EXPECT_NEAR(
+        quarter.position_mm(i), fine.first_mm + (4 * i + 1.5) * fine.spacing_mm(), kRounding);
+}
+
+TEST(FieldLevel, BlurSigmaIsThatOfAnImpulse) {
+  // The response of level 2 to one node of level 0, over all positions of that node: its variance.
+  const auto spread = [](int at) {
+    const auto field =
+        small_field([&](const RayNodes& n) { return n.s == at ? 65535 : 0; }, 1, 3, 32);
+    const FieldLevel level = *make_field_pyramid(*field, 2)[1];
+    std::array<double, 3> moments{};
+    for (int s = 0; s < 8; ++s) {
+      const double x = 4.0 * s + 1.5 - at;
+      const double value = sample(level, {0, 0, s, 4});
+      for (std::size_t m = 0; m < 3; ++m) moments[m] += value * std::pow(x, m);
+    }
+    return moments;
+  };
+  std::array<double, 3> sums{};
+  for (int at = 14; at < 18; ++at)
+    for (std::size_t m = 0; m < 3; ++m) sums[m] += spread(at)[m];
+  const double variance = sums[2] / sums[0] - std::pow(sums[1] / sums[0], 2);
+  const FieldLevel level = *make_field_pyramid(*small_field(noise, 1, 3, 32), 2)[1];
+  // Samples are rounded twice to integers of 65535.
+  EXPECT_NEAR(std::sqrt(variance), level.blur_sigma_in_nodes(), 1e-3);
+  const GridAxis& s = level.coverage.slabs[0].s;
+  const GridAxis& t = level.coverage.slabs[0].t;
+  EXPECT_NEAR(level.blur_sigma_mm(),
+              std::sqrt(variance) * 0.5 * (s.spacing_mm() + t.spacing_mm()),
+              1e-3 * level.blur_sigma_mm());
+  EXPECT_GT(level.blur_sigma_mm(true), level.blur_sigma_mm());
+}
+
+TEST(FieldLevel, SamplesDoNotDependOnPartsOrVectorWidth) {
+  const auto field = cropped_noise(16, {4, 8}, {2, 12});
+  const auto expected = make_field_pyramid(*field, 2);
+  const auto expect_same = [&](const FieldLevelMemory& memory) {
+    const auto pyramid = make_field_pyramid(*field, 2, memory);
+    for (std::size_t level = 0; level < 2; ++level)
+      EXPECT_TRUE(std::ranges::equal(pyramid[level]->slabs[0].samples.view(),
+                                     expected[level]->slabs[0].samples.view()));
+  };
+  expect_same(process_memory(4));
+  for (const VectorWidth width : supported_vector_widths()) {
+    force_vector_width(width);
+    expect_same(process_memory());
+  }
+  force_vector_width(std::nullopt);
+}
+
+TEST(FieldLevel, FailureOfAPartIsThrownAgain) {
+  EXPECT_THROW(process_memory(3)(8,
+                                 [](std::span<std::uint16_t>, int part, int) {
+                                   if (part == 2) throw NumericError("part 2");
+                                 }),
+               NumericError);
+}
+
+TEST(FieldLevel, RefusesAxesThatCannotBeHalved) {
+  EXPECT_THROW(decode_field_level(*small_field(noise, 1, 3, 2), 1), InputError);
+}
+
+/// Linear along s and t: blurring and decimation leave it as it is, away from the lattice's edges.
+double linear(const RayNodes& n) {
+  return 4096 + 64 * (3 * n.u + 5 * n.v + 8 * n.s - 4 * n.t);
+}
+
+TEST(TwoPassAfDrr, LevelsOfALinearFieldGiveTheSameDrr) {
+  for (const int slabs : {1, 3}) {
+    const auto field = small_field(linear, slabs, 5, 32);
+    const View whole = View::whole_detector(small_camera());
+    const View view{whole.camera, {8, 6, 15, 12}};
+    const TwoPassAfDrr fine(field);
+    const TwoPassAfDrr decoded(std::make_shared<const FieldLevel>(decode_field_level(*field, 0)));
+    const auto pyramid = make_field_pyramid(*field, 2);
+    for (std::uint64_t i = 0; i < 5; ++i) {
+      const RigidTransform pose = pose_from_parameters({}, small_pose(i));
+      const Image2d expected = render_image(fine, pose, view);
+      // Single-precision node coordinates: 32 nodes * 1e-7 of slopes below the values themselves.
+      constexpr float kTolerance = 1e-5f;
+      for (const auto& pixels : {render_image(decoded, pose, view).pixels,
+                                 render_image(TwoPassAfDrr(pyramid[0]), pose, view).pixels,
+                                 render_image(TwoPassAfDrr(pyramid[1]), pose, view).pixels})
+        for (std::size_t p = 0; p < pixels.size(); ++p)
+          EXPECT_NEAR(pixels[p], expected.pixels[p], kTolerance * expected.pixels[p]);
+    }
+  }
+}
+
+TEST(TwoPassAfDrr, LevelsHaveTheCoverageOfTheField) {
+  const auto field = small_field(linear, 2, 5, 32);
+  const View view = View::whole_detector(small_camera());
+  PoseParameters far;
+  far.translation_mm = {120.0, 0.0, -30.0};
+  const RigidTransform pose = pose_from_parameters({}, far);
+  std::int64_t expected = 0;
+  render_image(TwoPassAfDrr(field), pose, view, &expected);
+  EXPECT_GT(expected, 0);
+  for (const auto& level : make_field_pyramid(*field, 2)) {
+    std::int64_t outside = 0;
+    render_image(TwoPassAfDrr(level), pose, view, &outside);
+    EXPECT_EQ(outside, expected);
+  }
+}
+
+TEST(View, CoarsePixelLiesAtTheMeanOfItsFinePixels) {
+  const View fine{small_camera(), {3, 5, 22, 17}};
+  const View coarse = fine.coarser(4);
+  EXPECT_EQ(coarse.roi.width, 5);
+  EXPECT_EQ(coarse.roi.height, 4);
+  for (int row = 0; row < coarse.roi.height; ++row)
+    for (int column = 0; column < coarse.roi.width; ++column) {
+      Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+      for (int i = 0; i < 16; ++i)
+        mean += fine.camera.detector_point(fine.roi.column + 4 * column + i % 4,
+                                           fine.roi.row + 4 * row + i / 4) /
+                16.0;
+      EXPECT_NEAR((coarse.camera.detector_point(column, row) - mean).norm(), 0.0, 1e-9);
+    }
+}
+
+}  // namespace
+}  // namespace af

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "unit/drr/small_fields.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/hash_random.h"
+
+namespace af {
+
+CameraGeometry small_camera() {
+  CameraGeometry camera;
+  camera.name = "AP";
+  camera.source_point = {0.0, -650.0, 0.0};
+  camera.column_direction = {1.0, 0.0, 0.0};
+  camera.row_direction = {0.0, 0.0, -1.0};
+  camera.pixel_spacing_mm = {6.0, 6.0};
+  camera.size_px = {31, 24};
+  camera.detector_origin_point = {-90.0, 370.0, 69.0};
+  return camera;
+}
+
+std::shared_ptr<CompressedAttenuationField> small_field(const FieldFunction& function,
+                                                        int slab_count,
+                                                        int uv_nodes,
+                                                        int st_nodes) {
+  auto field = std::make_shared<CompressedAttenuationField>();
+  field->identity.camera = small_camera();
+  field->identity.range = {8.0 * kRadPerDeg, 20.0};
+  LightSlabSpec spec;
+  spec.uv_nodes = uv_nodes;
+  spec.st_nodes = st_nodes;
+  spec.st_plane_y_mm.clear();
+  for (int k = 0; k < slab_count; ++k) {
+    spec.st_plane_y_mm.push_back(30.0 * k - 15.0 * (slab_count - 1));
+    if (k > 0) spec.slab_boundaries_y_mm.push_back(spec.st_plane_y_mm.back() - 15.0);
+  }
+  const auto everywhere = CtBox{{-300, -300, -300}, {300, 300, 300}}.corner_points();
+  field->light_slab = make_light_slab(small_camera(), {}, field->identity.range, everywhere, spec);
+  field->quantizer_step = 0.25f;
+  field->codebook.codewords.push_back(Tile{});
+  for (SlabGeometry& slab : field->light_slab.slabs) {
+    // The test's function lives on the whole lattice.
+    slab.stored_s = {0, st_nodes};
+    slab.stored_t = {0, st_nodes};
+    std::vector<std::uint16_t> indices;
+    for (int u = 0; u < uv_nodes; u += 2)
+      for (int v = 0; v < uv_nodes; v += 2)
+        for (int s = 0; s < st_nodes; s += 2)
+          for (int t = 0; t < st_nodes; t += 2) {
+            Tile tile{};
+            for (unsigned e = 0; e < 16; ++e) {
+              const int du = static_cast<int>(e >> 3 & 1u);
+              const int dv = static_cast<int>(e >> 2 & 1u);
+              const int ds = static_cast<int>(e >> 1 & 1u);
+              const int dt = static_cast<int>(e & 1u);
+              const RayNodes nodes{static_cast<double>(std::min(u + du, uv_nodes - 1)),
+                                   static_cast<double>(std::min(v + dv, uv_nodes - 1)),
+                                   static_cast<double>(std::min(s + ds, st_nodes - 1)),
+                                   static_cast<double>(std::min(t + dt, st_nodes - 1))};
+              tile[e] = static_cast<std::uint16_t>(std::lround(function(nodes)));
+            }
+            indices.push_back(static_cast<std::uint16_t>(field->codebook.size()));
+            field->codebook.codewords.push_back(tile);
+          }
+    field->slabs.push_back({SharedArray<std::uint16_t>(std::move(indices))});
+  }
+  return field;
+}
+
+PoseParameters small_pose(std::uint64_t index) {
+  HashRandom random(17, index);
+  PoseParameters parameters;
+  for (int i = 0; i < 3; ++i) {
+    parameters.rotation_rad[i] = 8.0 * kRadPerDeg * random.uniform(-1, 1);
+    parameters.translation_mm[i] = 20.0 * random.uniform(-1, 1);
+  }
+  return parameters;
+}
+
+}  // namespace af

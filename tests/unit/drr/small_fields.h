@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+#include <memory>
+
+#include "field/compressed_attenuation_field.h"
+
+namespace af {
+
+using FieldFunction = std::function<double(const RayNodes&)>;
+
+/// 31 x 24 pixels of 6 mm on a C-arm.
+CameraGeometry small_camera();
+
+/// An uncompressed field in compressed form: one codeword per tile of a function of (u, v, s, t) in
+/// node units, times a quantiser step of 0.25. The function must be integer at the nodes, so that
+/// nothing is lost.
+std::shared_ptr<CompressedAttenuationField> small_field(const FieldFunction& function,
+                                                        int slab_count,
+                                                        int uv_nodes = 5,
+                                                        int st_nodes = 9);
+
+/// Pose `index` of a fixed random series within the small fields' range.
+PoseParameters small_pose(std::uint64_t index);
+
+}  // namespace af
