@@ -16,8 +16,9 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// The smallest eigenvalue of sum(I - d d^T) for two rays at angle a is 1 - cos(a): 1 degree.
-const double kSmallestRayEigenvalue = 1.0 - std::cos(1.0 * kRadPerDeg);
+// The smallest eigenvalue of sum(I - d d^T) for two rays at angle a is 1 - cos(a): 1 degree, to
+// second order.
+constexpr double kSmallestRayEigenvalue = kRadPerDeg * kRadPerDeg / 2.0;
 
 // Points spread less than this share of their length across a line count as collinear: a rotation
 // about that line would be decided by rounding or detection noise.

@@ -105,8 +105,9 @@ void draw_psnr_boxes(const std::vector<PsnrGroup>& groups,
       {{43, "43: paper's medians"}, {40, "40: almost all above"}, {36, "36: very few below"}}};
   for (const auto& [level, text] : levels) {
     const std::string y = std::to_string(level);
-    figure.add("set arrow from graph 0, first " + y + " to graph 1, first " + y +
-               " nohead dt 2 lw 1 lc " + quiet());
+    std::string line = "set arrow from graph 0, first " + y;
+    line.append(" to graph 1, first ").append(y).append(" nohead dt 2 lw 1 lc ").append(quiet());
+    figure.add(line);
     figure.add(label_at(text, "graph 1.01, first " + y, "left"));
   }
   std::vector<std::string> parts;

