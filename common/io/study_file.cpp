@@ -185,6 +185,7 @@ StudyCase read_case(const toml::table& table,
   StudyCase study_case;
   study_case.name = reader.get_string("name", Presence::Required).value_or("");
   check_case_name(reader, study_case.name);
+  study_case.note = reader.get_string("note", Presence::Optional).value_or("");
   study_case.ct = get_path(reader, "ct", Presence::Required, context.folder).value_or(fs::path());
   study_case.nominal_room_from_ct = reader.get_pose("nominal_room_from_ct", Presence::Required)
                                         .value_or(RigidTransform::Identity());
@@ -252,6 +253,7 @@ std::string view_text(const StudyView& view, const fs::path& folder) {
 
 std::string case_text(const StudyCase& study_case, const fs::path& folder) {
   std::string text = "\n[[case]]\nname = " + toml_string(study_case.name) + "\n";
+  if (!study_case.note.empty()) text += "note = " + toml_string(study_case.note) + "\n";
   text += "ct = " + toml_string(relative_if_below(study_case.ct, folder)) + "\n";
   text += "nominal_room_from_ct = " + toml_matrix(study_case.nominal_room_from_ct.matrix()) + "\n";
   text += "center_ct_mm = " + toml_numbers(study_case.center_ct_mm) + "\n";

@@ -32,6 +32,7 @@ struct StudyView {
 /// One patient.
 struct StudyCase {
   std::string name;
+  std::string note;          ///< free text for people, for example how X-rays were simulated
   std::filesystem::path ct;  ///< image file or DICOM folder
   RigidTransform nominal_room_from_ct = RigidTransform::Identity();
   Eigen::Vector3d center_ct_mm =

@@ -85,6 +85,10 @@ std::vector<std::string> problems(const DetectorOptions& options) {
           "scatter_sigma_mm",
           std::to_string(options.scatter_sigma_mm),
           "within 1 and 1000");
+  require(within(options.heel_ramp, 0.0, 0.9),
+          "heel_ramp",
+          std::to_string(options.heel_ramp),
+          "within 0 and 0.9");
   require(options.photons_per_pixel == 0.0 || within(options.photons_per_pixel, 1.0, 1e12),
           "photons_per_pixel",
           std::to_string(options.photons_per_pixel),
@@ -111,10 +115,14 @@ Image2d scatter_image(const Image2d& primary,
   check(problems(roi, primary.width, primary.height).empty(),
         "scatter_image() needs a region within the image");
   Image2d source(primary.width, primary.height);
-  for (std::size_t i = 0; i < primary.pixels.size(); ++i) {
-    const auto value = static_cast<double>(primary.pixels[i]);
-    source.pixels[i] =
-        value > 0.0 && value < 1.0 ? static_cast<float>(-value * std::log(value)) : 0.0f;
+  if (options.scatter_source == ScatterSource::ObjectAndOpenBeam) {
+    source.pixels = primary.pixels;
+  } else {
+    std::transform(
+        primary.pixels.begin(), primary.pixels.end(), source.pixels.begin(), [](float pixel) {
+          const auto value = static_cast<double>(pixel);
+          return value > 0.0 && value < 1.0 ? static_cast<float>(-value * std::log(value)) : 0.0f;
+        });
   }
   // A quarter of the kernel's width per coarse pixel: the Gaussian stays well sampled.
   const double sigma_px = options.scatter_sigma_mm / pixel_spacing_mm;
@@ -129,6 +137,16 @@ Image2d scatter_image(const Image2d& primary,
   for (float& value : scatter.pixels)
     value = static_cast<float>(scale * static_cast<double>(value));
   return scatter;
+}
+
+Image2d with_heel_ramp(const Image2d& signal, double heel_ramp) {
+  Image2d ramped = signal;
+  for (int row = 0; row < signal.height; ++row) {
+    const double place = signal.height > 1 ? 2.0 * row / (signal.height - 1) - 1.0 : 1.0;
+    const auto gain = static_cast<float>((1.0 + heel_ramp * place) / (1.0 + heel_ramp));
+    for (int column = 0; column < signal.width; ++column) ramped.at(column, row) *= gain;
+  }
+  return ramped;
 }
 
 Image2d with_photon_noise(const Image2d& signal,
@@ -174,6 +192,7 @@ Image2d detect(const Image2d& primary,
     const Image2d scatter = scatter_image(primary, roi, pixel_spacing_mm, options);
     for (std::size_t i = 0; i < signal.pixels.size(); ++i) signal.pixels[i] += scatter.pixels[i];
   }
+  if (options.heel_ramp > 0.0) signal = with_heel_ramp(signal, options.heel_ramp);
   if (options.photons_per_pixel > 0.0)
     signal = with_photon_noise(signal, options.photons_per_pixel, seed, key, threads);
   return digitise(gaussian_blur(signal, options.blur_sigma_px), options);

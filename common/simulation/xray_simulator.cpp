@@ -32,21 +32,19 @@ std::vector<std::string> problems(const XraySimulationOptions& options) {
 }
 
 XraySimulator::XraySimulator(const AttenuationVolume& volume,
-                             std::vector<SteelCylinder> fiducials,
+                             SteelBodies steel,
                              const XraySimulationOptions& options)
     : tissue_(volume.model()),
       projector_(volume, tissue_),
       beam_(options.spectrum, tissue_),
-      fiducials_(std::move(fiducials)),
+      steel_(std::move(steel)),
       options_(options) {}
 
 double XraySimulator::transmission(const Eigen::Vector3d& source_ct_mm,
                                    const Eigen::Vector3d& detector_ct_mm) const {
   const PathIntegrals path = projector_.integrate(source_ct_mm, detector_ct_mm);
-  RayMaterials materials{path.water_mm, path.bone_mm, 0.0};
-  for (const SteelCylinder& pin : fiducials_)
-    materials.steel_mm += pin.chord_length_mm(source_ct_mm, detector_ct_mm);
-  return beam_.transmission(materials);
+  return beam_.transmission(
+      {path.water_mm, path.bone_mm, steel_.chord_length_mm(source_ct_mm, detector_ct_mm)});
 }
 
 Image2d XraySimulator::primary_image(const CameraGeometry& camera,

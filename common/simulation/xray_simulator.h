@@ -8,7 +8,7 @@
 #include "base/progress.h"
 #include "drr/drr_renderer.h"
 #include "simulation/detector_model.h"
-#include "simulation/fiducials.h"
+#include "simulation/occluders.h"
 #include "simulation/siddon_projector.h"
 #include "simulation/xray_spectrum.h"
 
@@ -28,13 +28,13 @@ struct XraySimulationOptions {
 
 std::vector<std::string> problems(const XraySimulationOptions& options);
 
-/// Makes X-rays of a CT with steel pins. Pins add to the tissue along a ray; the tissue they would
-/// displace (0.04 of the pin's own attenuation and less) is not taken away.
+/// Makes X-rays of a CT with steel bodies. Steel adds to the tissue along a ray; the tissue it
+/// would displace (0.04 of the steel's own attenuation and less) is not taken away.
 class XraySimulator {
  public:
   /// `volume` must outlive the simulator.
   XraySimulator(const AttenuationVolume& volume,
-                std::vector<SteelCylinder> fiducials,
+                SteelBodies steel,
                 const XraySimulationOptions& options);
 
   /// Share of the open beam that reaches every pixel of the camera unscattered.
@@ -60,7 +60,7 @@ class XraySimulator {
   TissueModel tissue_;
   SiddonProjector projector_;
   BeamTransmission beam_;
-  std::vector<SteelCylinder> fiducials_;
+  SteelBodies steel_;
   XraySimulationOptions options_;
 };
 

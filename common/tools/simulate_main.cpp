@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // af-simulate: a whole registration study, with a known answer, from a CT or a phantom.
-#include <memory>
+#include <optional>
 #include <string>
 
 #include "base/error.h"
@@ -41,11 +41,26 @@ CameraRig cameras(const SimulateOptions& options, const Communicator& world) {
 /// Writes the CT into the study, or refers to where it is.
 std::filesystem::path ct_of_study(const SimulateOptions& options,
                                   const CtVolume& ct,
+                                  const SimulatedCase& simulated,
                                   const std::filesystem::path& folder) {
-  if (options.phantom.empty() && !options.copies_ct) return std::filesystem::absolute(options.ct);
+  const std::optional<CtVolume> degraded = degraded_study_ct(options, ct, simulated);
+  if (options.phantom.empty() && !options.copies_ct && !degraded)
+    return std::filesystem::absolute(options.ct);
   std::filesystem::path path = folder / "ct.nii.gz";
-  write_ct(ct, path);
+  write_ct(degraded ? *degraded : ct, path);
   return path;
+}
+
+/// Plans the case and takes its X-rays into `folder`.
+SimulatedCase imaged_case(const SimulateOptions& options,
+                          const CtVolume& ct,
+                          const CameraRig& rig,
+                          const std::filesystem::path& folder) {
+  SimulatedCase simulated = plan_case(options, ct, rig, AttenuationVolume(ct, options.attenuation));
+  const AttenuationVolume volume(imaged_anatomy(options, ct, simulated), options.attenuation);
+  cli::ProgressPrinter printer("Taking X-rays", true);
+  take_xrays(options, volume, folder, simulated, printer.callback());
+  return simulated;
 }
 
 std::string summary(const SimulatedCase& simulated, const std::filesystem::path& folder) {
@@ -61,6 +76,9 @@ std::string summary(const SimulatedCase& simulated, const std::filesystem::path&
             " mm and " + fixed_text(rotation_angle_between_rad(gold, fitted) * kDegPerRad, 3) +
             " deg from it, FRE " + fixed_text(simulated.fiducial_gold->fit.fre_mm, 3) + " mm";
   }
+  if (!simulated.occluders.cylinders.empty() || !simulated.occluders.balls.empty())
+    text += "\nIn the X-rays only: " + std::to_string(simulated.occluders.cylinders.size()) +
+            " rods, " + std::to_string(simulated.occluders.balls.size()) + " balls";
   return text + "\nStudy: " + (folder / "study.toml").string();
 }
 
@@ -77,14 +95,9 @@ void run(const SimulateOptions& options,
 
   cli::info(world, options.phantom.empty() ? "Reading " + options.ct : "Making the phantom");
   const CtVolume ct = patient(options, world);
-  const AttenuationVolume volume(ct, options.attenuation);
-  SimulatedCase simulated = plan_case(options, ct, rig, volume);
-  {
-    cli::ProgressPrinter printer("Taking X-rays", true);
-    take_xrays(options, rig, volume, folder.path(), simulated, printer.callback());
-  }
+  SimulatedCase simulated = imaged_case(options, ct, rig, folder.path());
   cli::info(world, "Writing the study");
-  simulated.study_case.ct = ct_of_study(options, ct, folder.path());
+  simulated.study_case.ct = ct_of_study(options, ct, simulated, folder.path());
 
   Provenance provenance;
   provenance.program = "af-simulate";
@@ -93,7 +106,7 @@ void run(const SimulateOptions& options,
   provenance.seed = options.seed;
   provenance.rank_count = world.size();
   provenance.input_sha256["ct_content"] = ct_content_sha256(ct);
-  write_study_files(rig, simulated, provenance, folder.path());
+  write_study_files(options, rig, simulated, provenance, folder.path());
   folder.commit();
   cli::info(world, summary(simulated, folder.final_path()));
 }

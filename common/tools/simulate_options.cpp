@@ -4,6 +4,8 @@
 #include <cmath>
 #include <filesystem>
 
+#include "simulation/range_check.h"
+
 namespace af::tools {
 
 namespace {
@@ -137,14 +139,59 @@ void bind_imaging(CLI::App& app, SimulateOptions& o) {
       ->capture_default_str();
 }
 
+void bind_stress(CLI::App& app, SimulateOptions& o) {
+  const std::string group =
+      "Stress (what real X-rays have; strengths count only where named by --stress)";
+  StressOptions& stress = o.stress;
+  const auto add = [&](const std::string& name, auto& value, const std::string& text) {
+    app.add_option(name, value, text)->capture_default_str()->group(group);
+  };
+  app.add_option(
+         "--stress",
+         stress.names,
+         "Comma separated: rods, fiducials (steel in the X-rays, not in the CT), heel (ramp "
+         "over the detector), scatter (heavy, from the open beam too), noise, degraded-ct "
+         "(the study's CT; X-rays show the good one), calibration (the study's rig is "
+         "slightly wrong), motion (non-rigid, away from the target); or all")
+      ->delimiter(',')
+      ->check(CLI::IsMember(stress_names()))
+      ->group(group);
+  add("--rod-count", stress.occluders.rod_count, "rods: how many");
+  add("--rod-diameter-mm", stress.occluders.rod_diameter_mm, "rods: diameter, mm");
+  add("--rod-length-mm", stress.occluders.rod_length_mm, "rods: length, mm");
+  add("--ball-count", stress.occluders.ball_count, "fiducials: how many balls");
+  add("--ball-diameter-mm", stress.occluders.ball_diameter_mm, "fiducials: diameter, mm");
+  add("--heel-ramp", stress.heel_ramp, "heel: share by which the beam varies, 0.25 for +-25 %");
+  add("--open-scatter-to-primary",
+      stress.scatter_to_primary_ratio,
+      "scatter: mean scatter / mean primary within the region of interest");
+  add("--noisy-photons-per-pixel",
+      stress.photons_per_pixel,
+      "noise: photons per pixel in the open beam");
+  add("--ct-slice-mm",
+      stress.degraded_ct.slice_mm,
+      "degraded-ct: slices are averaged in groups of about this thickness, mm");
+  add("--ct-noise-hu", stress.degraded_ct.noise_hu, "degraded-ct: noise, HU");
+  add("--ct-step-hu", stress.degraded_ct.step_hu, "degraded-ct: steps of the values, HU");
+  add("--calibration-error-px",
+      stress.calibration_error_px,
+      "calibration: RMS shift of the target box's projections, px");
+  add("--motion-mm", stress.motion.amplitude_mm, "motion: largest displacement along an axis, mm");
+  add("--motion-wavelength-mm", stress.motion.wavelength_mm, "motion: wavelength, mm");
+  add("--motion-margin-mm",
+      stress.motion.margin_mm,
+      "motion: what stays still around the target box, mm");
+  add("--motion-ramp-mm", stress.motion.ramp_mm, "motion: from still to full displacement, mm");
+}
+
 }  // namespace
 
 XraySimulationOptions SimulateOptions::xray_in_force() const {
-  if (!is_ideal) return xray;
-  XraySimulationOptions ideal = XraySimulationOptions::ideal();
-  ideal.threads = xray.threads;
-  ideal.rays_per_pixel_side = xray.rays_per_pixel_side;
-  return ideal;
+  XraySimulationOptions in_force = is_ideal ? XraySimulationOptions::ideal() : xray;
+  in_force.threads = xray.threads;
+  in_force.rays_per_pixel_side = xray.rays_per_pixel_side;
+  in_force.detector = stress.detector(in_force.detector);
+  return in_force;
 }
 
 std::string SimulateOptions::case_name_in_force() const {
@@ -158,33 +205,27 @@ std::string SimulateOptions::case_name_in_force() const {
 }
 
 std::vector<std::string> problems(const SimulateOptions& options) {
-  std::vector<std::string> found = problems(options.attenuation);
-  const auto append = [&](const std::vector<std::string>& more) {
-    found.insert(found.end(), more.begin(), more.end());
-  };
-  append(problems(options.xray));
-  append(problems(options.phantom_options));
-  const auto require_within = [&](const std::string& name, double value, double low, double high) {
-    if (!(value >= low && value <= high))
-      found.push_back(name + " = " + std::to_string(value) + ": must be within " +
-                      std::to_string(low) + " and " + std::to_string(high));
-  };
-  require_within("target_side_mm", options.target_side_mm, 1.0, 1000.0);
-  require_within("max_offset_rotation_deg", options.max_offset_rotation_deg, 0.0, 60.0);
-  require_within("max_offset_translation_mm", options.max_offset_translation_mm, 0.0, 1000.0);
-  require_within("fiducial_sigma_px", options.fiducial_sigma_px, 0.0, 100.0);
+  RangeCheck check_range;
+  check_range.append(problems(options.attenuation));
+  check_range.append(problems(options.xray));
+  check_range.append(problems(options.phantom_options));
+  check_range.append(problems(options.stress));
+  check_range.require("target_side_mm", options.target_side_mm, 1.0, 1000.0);
+  check_range.require("max_offset_rotation_deg", options.max_offset_rotation_deg, 0.0, 60.0);
+  check_range.require("max_offset_translation_mm", options.max_offset_translation_mm, 0.0, 1000.0);
+  check_range.require("fiducial_sigma_px", options.fiducial_sigma_px, 0.0, 100.0);
   for (const double value : options.center_ct_mm)
-    if (!std::isfinite(value)) found.emplace_back("center_ct_mm must be finite");
+    if (!std::isfinite(value)) check_range.add("center_ct_mm must be finite");
   const std::vector<double>& box = options.target_box_ct_mm;
   for (std::size_t axis = 0; box.size() == 6 && axis < 3; ++axis)
     if (!(box[axis] < box[axis + 3]) || !std::isfinite(box[axis + 3] - box[axis]))
-      found.push_back("target_box_ct_mm: low " + std::to_string(box[axis]) +
+      check_range.add("target_box_ct_mm: low " + std::to_string(box[axis]) +
                       " must be below high " + std::to_string(box[axis + 3]));
   for (const int side : options.roi_px)
-    if (side < 16) found.push_back("roi_px = " + std::to_string(side) + ": must be at least 16");
+    if (side < 16) check_range.add("roi_px = " + std::to_string(side) + ": must be at least 16");
   if (options.case_name.find_first_of("/\\\"\n") != std::string::npos)
-    found.push_back("case = " + options.case_name + ": must not hold / \\ \" or line ends");
-  return found;
+    check_range.add("case = " + options.case_name + ": must not hold / \\ \" or line ends");
+  return check_range.problems();
 }
 
 void bind_options(CLI::App& app, SimulateOptions& options) {
@@ -193,6 +234,7 @@ void bind_options(CLI::App& app, SimulateOptions& options) {
   bind_target(app, options);
   bind_truth(app, options);
   bind_imaging(app, options);
+  bind_stress(app, options);
 }
 
 }  // namespace af::tools

@@ -8,6 +8,7 @@
 #include <CLI/CLI.hpp>
 
 #include "simulation/spine_phantom.h"
+#include "simulation/stress.h"
 #include "simulation/xray_simulator.h"
 #include "volume/attenuation_volume.h"
 
@@ -39,8 +40,10 @@ struct SimulateOptions {
   AttenuationModel attenuation;
   XraySimulationOptions xray;
   bool is_ideal = false;
+  StressOptions stress;
 
-  /// The imaging chain in force: `xray`, or all its effects off when is_ideal.
+  /// The imaging chain in force: `xray`, or all its effects off when is_ideal, with the wanted
+  /// stress.
   [[nodiscard]] XraySimulationOptions xray_in_force() const;
   /// case_name, or one made from the CT's file name or the phantom.
   [[nodiscard]] std::string case_name_in_force() const;

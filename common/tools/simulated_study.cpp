@@ -104,7 +104,7 @@ void add_fiducials(const SimulateOptions& options,
     study_case.fiducials_ct_mm.push_back(pin.center_point);
   std::vector<evaluation::FiducialView> views;
   for (std::size_t i = 0; i < rig.cameras.size(); ++i) {
-    const CameraGeometry& camera = rig.cameras[i];
+    const CameraGeometry& camera = simulated.true_rig.cameras[i];
     const auto detected = [&](double sigma_px) {
       return detect_fiducials(camera,
                               *study_case.gold_room_from_ct,
@@ -116,10 +116,43 @@ void add_fiducials(const SimulateOptions& options,
     simulated.exact_fiducials_px.push_back(detected(0.0));
     refuse_pins_off_detector(camera, simulated.exact_fiducials_px.back());
     study_case.views[i].fiducials_px = detected(options.fiducial_sigma_px);
-    views.push_back({camera, study_case.views[i].fiducials_px});
+    // Who evaluates knows only the study's cameras.
+    views.push_back({rig.cameras[i], study_case.views[i].fiducials_px});
   }
   if (views.size() >= 2)
     simulated.fiducial_gold = evaluation::gold_from_fiducials(views, study_case.fiducials_ct_mm);
+}
+
+/// The cameras as they truly stand.
+CameraRig true_rig(const SimulateOptions& options,
+                   const CameraRig& rig,
+                   const StudyCase& study_case) {
+  CameraRig result = rig;
+  if (!options.stress.has(Stress::Calibration)) return result;
+  for (CameraGeometry& camera : result.cameras)
+    camera = camera_with_calibration_error(camera,
+                                           *study_case.gold_room_from_ct,
+                                           study_case.target_box_ct,
+                                           options.stress.calibration_error_px,
+                                           options.seed,
+                                           view_key(study_case.name, camera.name, "calibration"));
+  return result;
+}
+
+void add_occluders(const SimulateOptions& options, const CameraRig& rig, SimulatedCase& simulated) {
+  const StudyCase& study_case = simulated.study_case;
+  const StressOptions& stress = options.stress;
+  std::vector<View> views;
+  for (std::size_t i = 0; i < rig.cameras.size(); ++i)
+    views.push_back({rig.cameras[i], study_case.views[i].roi});
+  const OccluderSite site =
+      occluder_site(views, *study_case.gold_room_from_ct, study_case.center_ct_mm);
+  const auto key = [&](const char* what) { return view_key(study_case.name, "", what); };
+  if (stress.has(Stress::Rods))
+    simulated.occluders.cylinders = place_rods(site, stress.occluders, options.seed, key("rods"));
+  if (stress.has(Stress::Fiducials))
+    simulated.occluders.balls =
+        place_balls(site, simulated.fiducials, stress.occluders, options.seed, key("balls"));
 }
 
 /// The X-ray as people look at it: bone bright, the window over the middle 98 % of the pixels.
@@ -132,6 +165,25 @@ void write_preview(const Image2d& xray, double open_beam_level, const std::files
   }
   const auto [low, high] = percentile_window(attenuation);
   write_png_image(attenuation, path, low, std::max(high, low + 1e-6));
+}
+
+std::string cylinder_text(const std::string& table, const SteelCylinder& cylinder) {
+  return "\n[[" + table + "]]                     # steel cylinder, ct frame\ncenter_ct_mm = " +
+         toml_array(cylinder.center_point) + "\naxis_ct = " + toml_array(cylinder.axis_direction) +
+         "\nradius_mm = " + number_text(cylinder.radius_mm) +
+         "\nlength_mm = " + number_text(cylinder.length_mm) + "\n";
+}
+
+/// What was simulated, in one line for people.
+std::string note_text(const SimulateOptions& options) {
+  std::string text = "X-rays simulated by af-simulate from ";
+  text += options.phantom.empty() ? "a CT" : "the " + options.phantom + " phantom";
+  const std::vector<StressDescription> stress = descriptions(options.stress);
+  if (stress.empty()) return text;
+  text += ", made harder by";
+  for (std::size_t i = 0; i < stress.size(); ++i)
+    text += (i == 0 ? " " : "; ") + stress[i].name + " (" + stress[i].text + ")";
+  return text;
 }
 
 std::string truth_text(const SimulatedCase& simulated) {
@@ -148,11 +200,11 @@ std::string truth_text(const SimulatedCase& simulated) {
     text += "\n[fiducial_gold]\n" + pose_to_toml(simulated.fiducial_gold->room_from_ct) +
             "\nfre_mm = " + number_text(simulated.fiducial_gold->fit.fre_mm) + "\n";
   }
-  for (const SteelCylinder& pin : simulated.fiducials)
-    text += "\n[[fiducial]]                     # steel cylinder, ct frame\ncenter_ct_mm = " +
-            toml_array(pin.center_point) + "\naxis_ct = " + toml_array(pin.axis_direction) +
-            "\nradius_mm = " + number_text(pin.radius_mm) +
-            "\nlength_mm = " + number_text(pin.length_mm) + "\n";
+  for (const SteelCylinder& pin : simulated.fiducials) text += cylinder_text("fiducial", pin);
+  for (const SteelCylinder& rod : simulated.occluders.cylinders) text += cylinder_text("rod", rod);
+  for (const SteelBall& ball : simulated.occluders.balls)
+    text += "\n[[ball]]                         # steel, ct frame\ncenter_ct_mm = " +
+            toml_array(ball.center_point) + "\nradius_mm = " + number_text(ball.radius_mm) + "\n";
   for (std::size_t i = 0; i < simulated.exact_fiducials_px.size(); ++i)
     text += "\n[[view]]\ncamera = \"" + study_case.views[i].camera +
             "\"\nexact_fiducials_px = " + toml_rows(simulated.exact_fiducials_px[i]) + "\n";
@@ -190,19 +242,52 @@ SimulatedCase plan_case(const SimulateOptions& options,
     view.roi = target_region(camera, study_case.nominal_room_from_ct, target, wanted_px);
     study_case.views.push_back(view);
   }
+  simulated.true_rig = true_rig(options, rig, study_case);
   if (options.has_fiducials) add_fiducials(options, ct, rig, simulated);
+  add_occluders(options, rig, simulated);
+  study_case.note = note_text(options);
   return simulated;
 }
 
+CtVolume imaged_anatomy(const SimulateOptions& options,
+                        const CtVolume& ct,
+                        const SimulatedCase& simulated) {
+  if (!options.stress.has(Stress::Motion)) return ct;
+  SmoothMotionOptions motion = options.stress.motion;
+  motion.threads = options.xray.threads;
+  const StudyCase& study_case = simulated.study_case;
+  return SmoothMotion(study_case.target_box_ct,
+                      motion,
+                      options.seed,
+                      view_key(study_case.name, "", "motion"))
+      .moved(ct);
+}
+
+std::optional<CtVolume> degraded_study_ct(const SimulateOptions& options,
+                                          const CtVolume& ct,
+                                          const SimulatedCase& simulated) {
+  if (!options.stress.has(Stress::DegradedCt)) return std::nullopt;
+  CtDegradationOptions degradation = options.stress.degraded_ct;
+  degradation.threads = options.xray.threads;
+  return degraded_ct(ct,
+                     degradation,
+                     options.attenuation.air_below_hu,
+                     options.seed,
+                     view_key(simulated.study_case.name, "", "ct noise"));
+}
+
 void take_xrays(const SimulateOptions& options,
-                const CameraRig& rig,
                 const AttenuationVolume& volume,
                 const std::filesystem::path& folder,
                 SimulatedCase& simulated,
                 const ProgressCallback& progress) {
   StudyCase& study_case = simulated.study_case;
   const XraySimulationOptions imaging = options.xray_in_force();
-  const XraySimulator simulator(volume, simulated.fiducials, imaging);
+  SteelBodies steel = simulated.occluders;
+  steel.cylinders.insert(
+      steel.cylinders.end(), simulated.fiducials.begin(), simulated.fiducials.end());
+  const XraySimulator simulator(volume, steel, imaging);
+  const CameraRig& rig = simulated.true_rig;
   const auto camera_count = static_cast<double>(rig.cameras.size());
   for (std::size_t i = 0; i < rig.cameras.size(); ++i) {
     const CameraGeometry& camera = rig.cameras[i];
@@ -223,7 +308,8 @@ void take_xrays(const SimulateOptions& options,
   }
 }
 
-void write_study_files(const CameraRig& rig,
+void write_study_files(const SimulateOptions& options,
+                       const CameraRig& rig,
                        const SimulatedCase& simulated,
                        const Provenance& provenance,
                        const std::filesystem::path& folder) {
@@ -235,7 +321,13 @@ void write_study_files(const CameraRig& rig,
   write_text_file(folder / "rig.toml", rig_to_toml(rig));
   write_text_file(folder / "study.toml", study_to_toml(study, folder));
   write_text_file(folder / "truth.toml", truth_text(simulated));
-  write_text_file(folder / "provenance.json", to_json(provenance).dump(2) + "\n");
+  if (options.stress.has(Stress::Calibration))
+    write_text_file(folder / "rig-true.toml", rig_to_toml(simulated.true_rig));
+  nlohmann::json record = to_json(provenance);
+  record["stress"] = nlohmann::json::array();
+  for (const StressDescription& stress : descriptions(options.stress))
+    record["stress"].push_back({{"name", stress.name}, {"text", stress.text}});
+  write_text_file(folder / "provenance.json", record.dump(2) + "\n");
   write_reproduce_script(folder, provenance);
 }
 

@@ -7,6 +7,7 @@ af_add_test(
           unit/simulation/siddon_projector_test.cpp
           unit/simulation/solid_test.cpp
           unit/simulation/spine_phantom_test.cpp
+          unit/simulation/stress_test.cpp
           unit/simulation/xray_physics_test.cpp
           unit/simulation/xray_simulator_test.cpp
   LIBS af_simulation)

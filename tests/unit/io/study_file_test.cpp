@@ -83,6 +83,7 @@ void expect_identical(const StudyView& a, const StudyView& b) {
 
 void expect_identical(const StudyCase& a, const StudyCase& b) {
   EXPECT_EQ(a.name, b.name);
+  EXPECT_EQ(a.note, b.note);
   EXPECT_EQ(a.ct, b.ct);
   EXPECT_EQ(a.nominal_room_from_ct.matrix(), b.nominal_room_from_ct.matrix());
   EXPECT_EQ(a.center_ct_mm, b.center_ct_mm);
@@ -125,6 +126,13 @@ TEST_F(StudyFile, EveryKeyIsReadAndPathsAreRelativeToTheFile) {
   EXPECT_EQ(b.xray, "/elsewhere/B.mha");
   EXPECT_EQ(b.xray_domain, XrayDomain::Attenuation);
   EXPECT_EQ(b.mask, fs::path(folder() / "B-mask.png"));
+}
+
+TEST_F(StudyFile, NoteIsFreeTextThatSurvivesWriting) {
+  EXPECT_EQ(read(kGoodStudy).find_case("").note, "");
+  const Study study = read(replaced(kGoodStudy, "ct = ", "note = \"two \\\"views\\\"\"\nct = "));
+  EXPECT_EQ(study.find_case("").note, "two \"views\"");
+  expect_identical(read(study_to_toml(study, folder().path())).find_case(""), study.find_case(""));
 }
 
 TEST_F(StudyFile, RelativePathOfTheStudyGivesAbsolutePaths) {

@@ -13,6 +13,7 @@
 #include "io/image_file.h"
 #include "io/output_file.h"
 #include "io/pose_file.h"
+#include "io/rig_file.h"
 #include "io/study_file.h"
 #include "io/xray_reader.h"
 #include "simulation/siddon_projector.h"
@@ -121,6 +122,73 @@ TEST_F(AfSimulate, IdealXrayIsTheExactIntegralOfTheStudysCt) {
   }
 }
 
+TEST_F(AfSimulate, StressChangesTheXraysButNeitherTruthNorTargetNorRegions) {
+  ASSERT_EQ(run(coarse + "--seed 5 " + folder("clean")), 0) << log();
+  const Study clean_study = read_study(scratch_ / "clean" / "study.toml");
+  const StudyCase& clean = clean_study.find_case("");
+  const std::string hash = ct_content_sha256(read_ct(clean.ct));
+  for (const char* stress : {"rods", "fiducials", "heel", "scatter", "noise", "motion"}) {
+    ASSERT_EQ(run(coarse + "--seed 5 --force --stress " + stress + " " + folder("s")), 0) << log();
+    const Study study = read_study(scratch_ / "s" / "study.toml");
+    const StudyCase& hard = study.find_case("");
+    EXPECT_EQ(hard.gold_room_from_ct->matrix(), clean.gold_room_from_ct->matrix()) << stress;
+    EXPECT_EQ(hard.target_box_ct.low_mm, clean.target_box_ct.low_mm) << stress;
+    EXPECT_EQ(hard.views[0].roi.column, clean.views[0].roi.column) << stress;
+    EXPECT_EQ(hard.views[0].fiducials_px, clean.views[0].fiducials_px) << stress;
+    EXPECT_NE(hard.note.find(std::string(stress) + " ("), std::string::npos) << hard.note;
+    EXPECT_NE(read_text_file(hard.views[0].xray), read_text_file(clean.views[0].xray)) << stress;
+    EXPECT_EQ(ct_content_sha256(read_ct(hard.ct)), hash) << stress;
+    EXPECT_EQ(read_text_file(scratch_ / "s" / "rig.toml"),
+              read_text_file(scratch_ / "clean" / "rig.toml"))
+        << stress;
+  }
+}
+
+TEST_F(AfSimulate, DegradedCtIsTheStudysWhileTheXraysShowTheGoodOne) {
+  ASSERT_EQ(run(coarse + "--seed 5 " + folder("clean")), 0) << log();
+  ASSERT_EQ(run(coarse + "--seed 5 --stress degraded-ct --ct-slice-mm 8 " + folder("s")), 0)
+      << log();
+  EXPECT_EQ(read_text_file(scratch_ / "s" / "A.mha"), read_text_file(scratch_ / "clean" / "A.mha"));
+  const CtVolume good = read_ct(scratch_ / "clean" / "ct.nii.gz");
+  const CtVolume poor = read_ct(scratch_ / "s" / "ct.nii.gz");
+  EXPECT_EQ(poor.grid.size[2], good.grid.size[2] / 2);
+  EXPECT_NEAR(poor.grid.spacing_mm.z(), 8.0, 1e-6);
+  // Geometry passes through the float of the file format.
+  EXPECT_NEAR(poor.grid.origin_mm.z() - good.grid.origin_mm.z(), 2.0, 1e-4);
+}
+
+TEST_F(AfSimulate, CalibrationErrorLeavesTheStudysRigAndRecordsTheTrueOne) {
+  ASSERT_EQ(run(coarse + "--seed 5 " + folder("clean")), 0) << log();
+  ASSERT_EQ(run(coarse + "--seed 5 --stress calibration " + folder("s")), 0) << log();
+  EXPECT_EQ(read_text_file(scratch_ / "s" / "rig.toml"),
+            read_text_file(scratch_ / "clean" / "rig.toml"));
+  EXPECT_FALSE(fs::exists(scratch_ / "clean" / "rig-true.toml"));
+  const CameraRig true_rig = read_rig((scratch_ / "s" / "rig-true.toml").string());
+  const Study study = read_study(scratch_ / "s" / "study.toml");
+  const StudyCase& patient = study.find_case("");
+  for (const CameraGeometry& camera : true_rig.cameras) {
+    double sum = 0.0;
+    for (const Eigen::Vector3d& corner : patient.target_box_ct.corner_points()) {
+      const Eigen::Vector3d in_room = *patient.gold_room_from_ct * corner;
+      sum +=
+          (camera.project(in_room) - study.rig.camera(camera.name).project(in_room)).squaredNorm();
+    }
+    EXPECT_NEAR(std::sqrt(sum / 8.0), 0.2, 1e-6);
+  }
+}
+
+TEST_F(AfSimulate, AllStressesTogetherDependOnTheSeedButNotOnThreads) {
+  ASSERT_EQ(run(coarse + "--stress all --seed 9 --threads 1 " + folder("one")), 0) << log();
+  ASSERT_EQ(run(coarse + "--stress all --seed 9 --threads 3 " + folder("three")), 0) << log();
+  for (const char* name :
+       {"A.mha", "B.mha", "study.toml", "truth.toml", "ct.nii.gz", "rig-true.toml"})
+    EXPECT_EQ(read_text_file(scratch_ / "one" / name), read_text_file(scratch_ / "three" / name))
+        << name;
+  const std::string record = read_text_file(scratch_ / "one" / "provenance.json");
+  for (const char* name : {"rods", "heel", "degraded-ct", "calibration", "motion"})
+    EXPECT_NE(record.find(std::string("\"name\": \"") + name + "\""), std::string::npos) << name;
+}
+
 TEST_F(AfSimulate, RefusesBadInputByTheContractsCodesAndLeavesNothing) {
   std::ofstream(scratch_ / "not-a-ct.nii.gz") << "text";
   std::ofstream(scratch_ / "bad.toml") << "isocenter_point = [0, 0, 0]\n";
@@ -136,6 +204,8 @@ TEST_F(AfSimulate, RefusesBadInputByTheContractsCodesAndLeavesNothing) {
       {"--ct a --phantom spine", 2, "2 were given"},
       {"--phantom pelvis", 2, "spine"},
       {"--phantom spine --center-ct-mm 1,2", 2, "center-ct-mm"},
+      {coarse + "--stress rods,bones", 2, "bones"},
+      {coarse + "--stress motion --motion-mm 30", 3, "motion amplitude_mm"},
       {coarse + "--bits 7", 3, "bits = 7"},
       {coarse + "--tube-kvp 10 --energy-bins 3", 3, "energy_bins = 3"},
       {coarse + "--water-mu-per-mm 0.6", 3, "water_mu_per_mm"},

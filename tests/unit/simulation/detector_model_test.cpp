@@ -52,6 +52,37 @@ TEST(ScatterImage, HasTheStatedRatioWithinTheRegion) {
   }
 }
 
+TEST(ScatterImage, OfTheOpenBeamVeilsTheObjectFromItsEdgesInwards) {
+  const Image2d primary = disc_primary();
+  DetectorOptions options;
+  options.scatter_sigma_mm = 12.0;  // 30 px on a disc of 85 px radius
+  const auto edge_over_middle = [&](ScatterSource source) {
+    options.scatter_source = source;
+    const Image2d scatter = scatter_image(primary, kRoi, 0.4, options);
+    // The stated ratio holds for either source; pixels are floats.
+    EXPECT_NEAR(mean_in(scatter, kRoi) / mean_in(primary, kRoi), 0.3, 1e-6);
+    return scatter.at(100, 14) / scatter.at(100, 95);
+  };
+  const float of_object = edge_over_middle(ScatterSource::Object);
+  const float with_open_beam = edge_over_middle(ScatterSource::ObjectAndOpenBeam);
+  // At the disc's edge half of the kernel sees the open beam, which is at least 2.5 times as bright
+  // as anything in the disc; in the middle it sees none (2.8 sigma).
+  EXPECT_LT(of_object, 1.5f);
+  EXPECT_GT(with_open_beam, 2.5f);
+}
+
+TEST(WithHeelRamp, GrowsLinearlyFromTheFirstToTheLastRow) {
+  Image2d flat(5, 101);
+  std::fill(flat.pixels.begin(), flat.pixels.end(), 0.8f);
+  const Image2d ramped = with_heel_ramp(flat, 0.25);
+  constexpr float kTolerance = 1e-6f;  // products of floats of about 1
+  EXPECT_NEAR(ramped.at(2, 100), 0.8f, kTolerance);
+  EXPECT_NEAR(ramped.at(2, 100) / ramped.at(2, 0), 1.25f / 0.75f, 4.0f * kTolerance);
+  EXPECT_NEAR(ramped.at(2, 50), 0.5f * (ramped.at(2, 0) + ramped.at(2, 100)), kTolerance);
+  for (int row = 0; row < 101; ++row) EXPECT_EQ(ramped.at(0, row), ramped.at(4, row));
+  EXPECT_EQ(with_heel_ramp(flat, 0.0).pixels, flat.pixels);
+}
+
 TEST(ScatterImage, IsBroad) {
   const Image2d primary = disc_primary();
   const Image2d scatter = scatter_image(primary, kRoi, 0.4, DetectorOptions{});

@@ -93,7 +93,7 @@ TEST_F(XraySimulatorOfABlock, PinsDarkenByTheirChord) {
   CameraGeometry camera = camera_;
   camera.size_px = {65, 65};
   camera.detector_origin_point = {-96.0, 300.0, 96.0};  // pixel (32, 32) looks at the origin
-  const Image2d with = XraySimulator(volume, {pin}, XraySimulationOptions::ideal())
+  const Image2d with = XraySimulator(volume, {{pin}, {}}, XraySimulationOptions::ideal())
                            .primary_image(camera, RigidTransform::Identity());
   const Image2d without = XraySimulator(volume, {}, XraySimulationOptions::ideal())
                               .primary_image(camera, RigidTransform::Identity());
