@@ -14,17 +14,19 @@ base_packages=(
   libcairo2-dev fonts-dejavu-core gnuplot-nox
   invesalius-examples
 )
+benchmark_packages=(plastimatch libfaiss-dev libopenblas-dev)
 lint_packages=(clang-format-14 clang-tidy-14 shellcheck)
 
 usage() {
   cat <<'TEXT'
-Usage: jobs/install-packages.sh [--with-lint] [--check] [--help]
+Usage: jobs/install-packages.sh [--with-lint] [--with-benchmarks] [--check] [--help]
 
 Installs the Debian 12 packages that the project needs to build, run and pass its tests. Says what it does; does
 nothing when all are there. Needs root or sudo only to install.
 
-  --with-lint   also the formatter and the linters (clang-format-14, clang-tidy-14, shellcheck)
-  --check       only say what is missing; exit 1 when something is
+  --with-lint         also the formatter and the linters (clang-format-14, clang-tidy-14, shellcheck)
+  --with-benchmarks   also what tests/benchmark/run.sh compares with (plastimatch, Faiss, OpenBLAS)
+  --check             only say what is missing; exit 1 when something is
 TEXT
 }
 
@@ -37,6 +39,7 @@ main() {
   while (($# > 0)); do
     case "$1" in
       --with-lint) packages+=("${lint_packages[@]}") ;;
+      --with-benchmarks) packages+=("${benchmark_packages[@]}") ;;
       --check) check_only=yes ;;
       --help | -h) usage; return 0 ;;
       *)

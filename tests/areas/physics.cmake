@@ -4,6 +4,5 @@ set(af_default_ct ${CMAKE_CURRENT_BINARY_DIR}/default-ct/skull.mhd)
 add_test(NAME default_ct COMMAND ${PROJECT_SOURCE_DIR}/jobs/default-ct.sh ${af_default_ct})
 set_tests_properties(default_ct PROPERTIES LABELS physics FIXTURES_SETUP default_ct)
 
-af_add_test(physics_test LABEL physics TIMEOUT 300 FIXTURE default_ct SOURCES physics/ray_caster_itk_test.cpp LIBS af_volume af_image af_io_ct ITKCommon)
-target_include_directories(physics_test SYSTEM PRIVATE ${ITK_INCLUDE_DIRS})
+af_add_test(physics_test LABEL physics TIMEOUT 300 FIXTURE default_ct SOURCES physics/ray_caster_itk_test.cpp LIBS af_volume af_image af_io_ct af_test_itk)
 target_compile_definitions(physics_test PRIVATE AF_DEFAULT_CT_PATH="${af_default_ct}")

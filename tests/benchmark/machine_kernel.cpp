@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "benchmark/machine_kernel.h"
+
+#include "base/vec16.h"
+
+namespace af::AF_KERNEL_NAMESPACE {
+
+namespace {
+
+AF_KERNEL_INLINE int32_t sum_of_lanes(I16 value) {
+  int32_t sum = 0;
+  for (int lane = 0; lane < kLanes; ++lane) sum ^= value[lane];
+  return sum;
+}
+
+}  // namespace
+
+int32_t read_all(const int32_t* values, size_t count, size_t repetitions) {
+  I16 sums[4] = {};
+  for (size_t repetition = 0; repetition < repetitions; ++repetition)
+    for (size_t i = 0; i + 4 * kLanes <= count; i += 4 * kLanes)
+      for (size_t j = 0; j < 4; ++j) sums[j] += load<I16>(values + i + j * kLanes);
+  return sum_of_lanes(sums[0] + sums[1] + sums[2] + sums[3]);
+}
+
+int32_t multiply_add_pairs(const int32_t* values, size_t count, size_t repetitions) {
+  IntegerRegister sums[8];
+  IntegerRegister factors[8];
+  for (int j = 0; j < 8; ++j) {
+    sums[j] = AF_INTRINSIC(set1_epi32)(j);
+    factors[j] = AF_INTRINSIC(set1_epi32)(values[j]);
+  }
+  for (size_t repetition = 0; repetition < repetitions; ++repetition)
+    for (size_t i = 0; i < count; ++i) {
+      const IntegerRegister weight = AF_INTRINSIC(set1_epi32)(values[i]);
+      for (int j = 0; j < 8; ++j)
+        sums[j] = AF_INTRINSIC(add_epi32)(sums[j], AF_INTRINSIC(madd_epi16)(factors[j], weight));
+    }
+  int32_t result = 0;
+  for (const IntegerRegister& sum : sums) {
+    int32_t first = 0;
+    memcpy(&first, &sum, sizeof(first));
+    result ^= first;
+  }
+  return result;
+}
+
+int32_t squared_differences(const int32_t* values, size_t count, size_t repetitions) {
+  F16 sums[8] = {};
+  F16 points[8];
+  for (int j = 0; j < 8; ++j) points[j] = splat(static_cast<float>(j));
+  for (size_t repetition = 0; repetition < repetitions; ++repetition)
+    for (size_t i = 0; i < count; ++i) {
+      const F16 value = splat(static_cast<float>(values[i]));
+      for (int j = 0; j < 8; ++j) {
+        const F16 difference = value - points[j];
+        sums[j] += difference * difference;
+      }
+    }
+  F16 total = {};
+  for (const F16& sum : sums) total += sum;
+  return sum_of_lanes(reinterpret_cast<I16>(total));
+}
+
+int32_t gather_all(const int32_t* values, size_t count, size_t repetitions) {
+  // Lanes a prime number of values apart, as samples of neighbouring rays are; `count` is a power
+  // of two of at least 4096.
+  const I16 lanes = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+  const int32_t stride = 67;
+  I16 sum = {};
+  for (size_t repetition = 0; repetition < repetitions; ++repetition)
+    for (size_t i = 0; i < count; ++i) {
+      const int32_t first = static_cast<int32_t>((i * 31) & (count / 2 - 1));
+      const I16 offset = (lanes * stride + first) * 2;
+      sum += gather_pairs(reinterpret_cast<const uint16_t*>(values), offset);
+    }
+  return sum_of_lanes(sum);
+}
+
+}  // namespace af::AF_KERNEL_NAMESPACE

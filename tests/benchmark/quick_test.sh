@@ -1,0 +1,19 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# The benchmarks with little work: every section writes what the report needs. The programs themselves fail when fast
+# and plain searches differ or casters see different images. Usage: quick_test.sh BUILD-FOLDER CT
+set -euo pipefail
+programs=$1 ct=$2
+scratch=$(mktemp -d)
+trap 'rm -rf "$scratch"' EXIT
+"$(dirname "$0")/run.sh" --quick --programs "$programs" --ct "$ct" --out "$scratch/out" >"$scratch/log" 2>&1 || {
+  cat "$scratch/log" >&2
+  exit 1
+}
+for section in machine casting encoding fields efficiency memory quality drr-look-up ranks-2 ranks-4; do
+  grep -q "^    \"$section\": {" "$scratch/out/benchmark.json" || { echo "benchmark.json lacks section $section" >&2; exit 1; }
+done
+for table in 'Casting' 'Encoding' 'One DRR' 'Whole fields' 'Seconds per phase' 'Machine'; do
+  grep -q "^## $table" "$scratch/out/benchmark.md" || { echo "benchmark.md lacks the table $table" >&2; exit 1; }
+done
+echo "all sections and tables are there"

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace af::benchmark {
+
+struct WatchedRun {
+  int exit_code = -1;  ///< -1: ended by a signal
+  double seconds = 0.0;
+  std::uint64_t peak_bytes = 0;  ///< 0 when memory was not watched
+};
+
+enum class WatchMemory { No, Yes };
+
+/// Runs a command (no shell) with its output in `log`. With WatchMemory::Yes, 20 times a second,
+/// the proportional set sizes (PSS) of all processes named `process_name` below it are added:
+/// memory that ranks share counts once. That slows the program down, so its seconds are not those
+/// of a timing.
+WatchedRun run_watched(const std::vector<std::string>& command,
+                       const std::filesystem::path& log,
+                       const std::string& process_name,
+                       WatchMemory watch_memory);
+
+/// Drops a file's pages from the page cache, so that the next reading comes from the disk.
+void forget_cached_pages(const std::filesystem::path& path);
+
+}  // namespace af::benchmark
