@@ -62,7 +62,8 @@ nlohmann::json agreement(const std::vector<float>& image, const std::vector<floa
   // Casters differ in how they cut ray ends and interpolate; a shift by a pixel costs far more.
   constexpr double kLeastDb = 35.0;
   if (!quality.has_value() || !(quality->psnr_db > kLeastDb))
-    throw NumericError("two casters do not see the same image");
+    throw NumericError("two casters do not see the same image: " +
+                       std::to_string(quality ? quality->psnr_db : 0.0) + " dB");
   return {{"factor", factor}, {"psnr_db", quality->psnr_db}};
 }
 
