@@ -42,7 +42,7 @@ struct Nearest {
   uint32_t index;
 };
 
-/// Floats decide only what is surely farther; lanes in ascending order keep the lowest of equals.
+/// Floats decide only what is surely farther. Ties take the lowest index.
 AF_KERNEL_INLINE void offer_block(const benchmark::BruteForceCodebook& codebook,
                                   uint32_t block,
                                   const uint16_t* tile,
@@ -50,11 +50,11 @@ AF_KERNEL_INLINE void offer_block(const benchmark::BruteForceCodebook& codebook,
                                   Nearest& nearest) {
   for (int lane = 0; lane < kLanes; ++lane) {
     if (sums[lane] > nearest.limit) continue;
-    const uint32_t index = block * kLanes + static_cast<uint32_t>(lane);
+    const uint32_t index = codebook.order[block * kLanes + static_cast<uint32_t>(lane)];
     const uint64_t error =
         exact_error(tile, codebook.codewords + static_cast<size_t>(index) * kElements);
     // A sum of 16 rounded squares of exact differences errs by less than 17 * 2^-24 of itself.
-    if (error < nearest.error)
+    if (error < nearest.error || (error == nearest.error && index < nearest.index))
       nearest = {error, static_cast<float>(error) * (1.0f + 0x1.0p-18f), index};
   }
 }

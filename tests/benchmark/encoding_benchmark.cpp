@@ -2,6 +2,8 @@
 // Tiles per second of one core: the exact nearest-codeword search, plain brute force and Faiss, on
 // tiles and codebooks of a real field.
 #include <algorithm>
+#include <numeric>
+#include <random>
 
 #include "base/error.h"
 #include "base/vector_width.h"
@@ -70,16 +72,20 @@ class BruteForce {
     constexpr float kFarAway = 1e18f;
     const std::size_t blocks = (codewords_.size() + kLanes - 1) / kLanes;
     elements_.assign(blocks * kTileElements * kLanes, kFarAway);
+    order_.resize(codewords_.size());
+    std::iota(order_.begin(), order_.end(), 0u);
+    std::shuffle(order_.begin(), order_.end(), std::mt19937(1));
     for (std::size_t i = 0; i < codewords_.size(); ++i)
       for (std::size_t element = 0; element < kTileElements; ++element)
         elements_[(i / kLanes * kTileElements + element) * kLanes + i % kLanes] =
-            codewords_[i][element];
+            codewords_[order_[i]][element];
   }
 
   void search(const std::vector<Tile>& tiles, std::vector<std::uint32_t>& nearest) const {
     const BruteForceCodebook codebook{
         elements_.data(),
         codewords_.front().data(),
+        order_.data(),
         static_cast<std::uint32_t>((codewords_.size() + kTileElements - 1) / kTileElements)};
     select_kernel<BruteForceFunction>(kernels_128::brute_force_nearest,
                                       kernels_256::brute_force_nearest,
@@ -89,6 +95,7 @@ class BruteForce {
 
  private:
   std::vector<Tile> codewords_;
+  std::vector<std::uint32_t> order_;
   std::vector<float> elements_;
 };
 

@@ -64,9 +64,10 @@ std::string blas_description() {
     description = resolved;
     std::free(resolved);
   }
-  using Configuration = const char* (*)();
-  if (void* symbol = dlsym(RTLD_DEFAULT, "openblas_get_config"))
-    description += std::string(": ") + reinterpret_cast<Configuration>(symbol)();
+  using Text = const char* (*)();
+  for (const char* function : {"openblas_get_config", "openblas_get_corename"})
+    if (void* symbol = dlsym(RTLD_DEFAULT, function))
+      description += std::string(": ") + reinterpret_cast<Text>(symbol)();
   return description;
 }
 
