@@ -9,9 +9,8 @@
 #include "base/error.h"
 #include "cli/app_main.h"
 #include "cli/progress_printer.h"
-#include "drr/af_drr.h"
+#include "drr/field_renderer.h"
 #include "drr/ray_cast_drr.h"
-#include "drr/two_pass_af_drr.h"
 #include "evaluate/figure_files.h"
 #include "evaluate/image_quality_files.h"
 #include "evaluate/row_gathering_program.h"
@@ -29,14 +28,6 @@ namespace af::evaluation {
 namespace {
 
 using nlohmann::json;
-
-std::unique_ptr<DrrRenderer> field_renderer(
-    const std::string& look_up, std::shared_ptr<const CompressedAttenuationField> field) {
-  if (look_up == "two-pass") return std::make_unique<TwoPassAfDrr>(std::move(field));
-  return std::make_unique<AfDrr>(
-      std::move(field),
-      look_up == "nearest" ? FieldInterpolation::Nearest : FieldInterpolation::Quadrilinear);
-}
 
 std::string to_toml(const ImageQualityOptions& options) {
   std::ostringstream out;
@@ -212,9 +203,9 @@ CLI::App* bind_image_quality(CLI::App& app, ImageQualityOptions& options) {
   command
       ->add_option("--look-up",
                    options.look_up,
-                   "two-pass (what registration uses), quadrilinear (the paper's, literal) or "
-                   "nearest")
-      ->check(CLI::IsMember({"two-pass", "quadrilinear", "nearest"}))
+                   "linear in two passes (what registration uses), cubic in (s,t), cubic-uv in "
+                   "(u,v) too, quadrilinear (the paper's, literal) or nearest")
+      ->check(CLI::IsMember(field_look_up_names()))
       ->capture_default_str();
   command->add_option("--step-mm", options.step_mm, "Longest step of ray casting, mm")
       ->capture_default_str();
@@ -235,7 +226,7 @@ void run_image_quality(const ImageQualityOptions& options,
     make_output_folder(options.output_folder);
   });
   const Setup setup = load(options, world);
-  const auto field = field_renderer(options.look_up, setup.field);
+  const auto field = make_field_renderer(setup.field, options.look_up);
   const RayCastDrr ray_cast(setup.ct.volume, {options.step_mm});
   DrrComparer comparer(*field, ray_cast, setup.view);
 

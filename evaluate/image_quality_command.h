@@ -18,7 +18,7 @@ struct ImageQualityOptions {
   std::filesystem::path ct;
   int pose_count = 100;
   std::filesystem::path poses;
-  std::string look_up = "two-pass";
+  std::string look_up = "linear";
   double step_mm = 1.0;
   std::string series_uid;
   std::uint64_t seed = 1;

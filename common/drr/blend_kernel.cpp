@@ -1,22 +1,144 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "drr/blend_kernel.h"
 
+#include "base/vec_native.h"
+
 namespace af::AF_KERNEL_NAMESPACE {
 
-void blend_samples(const SampleRun& run, float* blended, int32_t count) {
-  const float v_weight = run.v_weight;
-  const float step = run.step;
-  const float* __restrict u_weights = run.u_weights;
-  float* __restrict out = blended;
-  for (int32_t i = 0; i < count; ++i) {
-    const auto low_low = static_cast<float>(run.viewpoints[0][i]);
-    const auto low_up = static_cast<float>(run.viewpoints[1][i]);
-    const auto up_low = static_cast<float>(run.viewpoints[2][i]);
-    const auto up_up = static_cast<float>(run.viewpoints[3][i]);
-    const float low = low_low + v_weight * (low_up - low_low);
-    const float up = up_low + v_weight * (up_up - up_low);
-    out[i] = step * (low + u_weights[i] * (up - low));
+namespace {
+
+using native::Floats;
+using native::kLanes;
+using native::load;
+using native::splat;
+using native::store;
+
+/// A register of a codeword's elements, weighted and summed over the taps.
+struct Blend {
+  Floats value, u_slope, v_slope;
+};
+
+/// Elements first ... first + kLanes - 1 of the tiles at d.
+template <bool kWithSlopes>
+AF_NATIVE_INLINE Blend blend_elements(const TileStrip& strip, int32_t d, int first) {
+  Blend sum{splat(0.0f), splat(0.0f), splat(0.0f)};
+  const TileTap* const v_begin = strip.v_taps + strip.v_begin[d];
+  const TileTap* const v_end = strip.v_taps + strip.v_begin[d + 1];
+  for (int32_t a = 0; a < strip.u_count; ++a) {
+    const TileTap& u = strip.u_taps[a];
+    Floats over_v = splat(0.0f);
+    Floats slope_over_v = splat(0.0f);
+    for (const TileTap* v = v_begin; v != v_end; ++v) {
+      const int64_t codeword = strip.indices[u.offset + v->offset + d];
+      const Floats elements = load(strip.codewords + 16 * codeword + first);
+      over_v += elements * load(v->weights + first);
+      if (kWithSlopes) slope_over_v += elements * load(v->slopes + first);
+    }
+    sum.value += over_v * load(u.weights + first);
+    if (!kWithSlopes) continue;
+    sum.u_slope += over_v * load(u.slopes + first);
+    sum.v_slope += slope_over_v * load(u.weights + first);
   }
+  return sum;
+}
+
+using F8 = float __attribute__((vector_size(32)));
+using F4 = float __attribute__((vector_size(16)));
+
+/// The four nodes of a tile, [s][t], go to two rows of the image.
+AF_NATIVE_INLINE void store_nodes(F4 nodes, float* image, int64_t stride) {
+  const F4 rows = __builtin_shufflevector(nodes, nodes, 0, 2, 1, 3);
+  float values[4];
+  memcpy(values, &rows, sizeof(values));
+  memcpy(image, values, 2 * sizeof(float));
+  memcpy(image + stride, values + 2, 2 * sizeof(float));
+}
+
+// Sums over the four viewpoints of a tile, always in the order (0 + 2) + (1 + 3).
+#if AF_VECTOR_BITS == 512
+AF_NATIVE_INLINE F4 sum_over_viewpoints(Floats elements) {
+  const F8 pairs = __builtin_shufflevector(elements, elements, 0, 1, 2, 3, 4, 5, 6, 7) +
+                   __builtin_shufflevector(elements, elements, 8, 9, 10, 11, 12, 13, 14, 15);
+  return __builtin_shufflevector(pairs, pairs, 0, 1, 2, 3) +
+         __builtin_shufflevector(pairs, pairs, 4, 5, 6, 7);
+}
+#elif AF_VECTOR_BITS == 256
+AF_NATIVE_INLINE F4 sum_over_viewpoints(F8 pairs) {
+  return __builtin_shufflevector(pairs, pairs, 0, 1, 2, 3) +
+         __builtin_shufflevector(pairs, pairs, 4, 5, 6, 7);
+}
+#endif
+
+template <bool kWithSlopes>
+AF_NATIVE_INLINE void blend_tile(const TileStrip& strip, int32_t d) {
+#if AF_VECTOR_BITS == 512
+  const Blend blend = blend_elements<kWithSlopes>(strip, d, 0);
+  const F4 value = sum_over_viewpoints(blend.value);
+  const F4 u_slope = sum_over_viewpoints(blend.u_slope);
+  const F4 v_slope = sum_over_viewpoints(blend.v_slope);
+#elif AF_VECTOR_BITS == 256
+  const Blend low = blend_elements<kWithSlopes>(strip, d, 0);
+  const Blend high = blend_elements<kWithSlopes>(strip, d, 8);
+  const F4 value = sum_over_viewpoints(low.value + high.value);
+  const F4 u_slope = sum_over_viewpoints(low.u_slope + high.u_slope);
+  const F4 v_slope = sum_over_viewpoints(low.v_slope + high.v_slope);
+#else
+  const Blend q0 = blend_elements<kWithSlopes>(strip, d, 0);
+  const Blend q1 = blend_elements<kWithSlopes>(strip, d, 4);
+  const Blend q2 = blend_elements<kWithSlopes>(strip, d, 8);
+  const Blend q3 = blend_elements<kWithSlopes>(strip, d, 12);
+  const F4 value = (q0.value + q2.value) + (q1.value + q3.value);
+  const F4 u_slope = (q0.u_slope + q2.u_slope) + (q1.u_slope + q3.u_slope);
+  const F4 v_slope = (q0.v_slope + q2.v_slope) + (q1.v_slope + q3.v_slope);
+#endif
+  const int64_t at = 2 * d * strip.stride;
+  store_nodes(value, strip.images[0] + at, strip.stride);
+  if (!kWithSlopes) return;
+  store_nodes(u_slope, strip.images[1] + at, strip.stride);
+  store_nodes(v_slope, strip.images[2] + at, strip.stride);
+}
+
+template <bool kWithSlopes, int kTaps>
+AF_NATIVE_INLINE void blend_run(const SampleRun& run) {
+  for (int32_t i = 0; i < run.count; i += kLanes) {
+    Floats value = splat(0.0f);
+    Floats u_slope = splat(0.0f);
+    Floats v_slope = splat(0.0f);
+    for (int a = 0; a < kTaps; ++a) {
+      Floats over_v = splat(0.0f);
+      Floats slope_over_v = splat(0.0f);
+      for (int b = 0; b < kTaps; ++b) {
+        const Floats samples = load(run.samples + a * run.u_stride + b * run.v_stride + i);
+        over_v += samples * run.v_weights[b];
+        if (kWithSlopes) slope_over_v += samples * run.v_slopes[b];
+      }
+      value += over_v * load(run.u_weights[a] + i);
+      if (!kWithSlopes) continue;
+      u_slope += over_v * load(run.u_slopes[a] + i);
+      v_slope += slope_over_v * load(run.u_weights[a] + i);
+    }
+    store(run.images[0] + i, value);
+    if (!kWithSlopes) continue;
+    store(run.images[1] + i, u_slope);
+    store(run.images[2] + i, v_slope);
+  }
+}
+
+}  // namespace
+
+void blend_tiles(const TileStrip& strip) {
+  if (strip.images[1] == nullptr)
+    for (int32_t d = strip.tile_begin; d < strip.tile_end; ++d) blend_tile<false>(strip, d);
+  else
+    for (int32_t d = strip.tile_begin; d < strip.tile_end; ++d) blend_tile<true>(strip, d);
+}
+
+void blend_samples(const SampleRun& run) {
+  const bool has_slopes = run.images[1] != nullptr;
+  if (run.taps == 2)
+    has_slopes ? blend_run<true, 2>(run) : blend_run<false, 2>(run);
+  else
+    has_slopes ? blend_run<true, 4>(run) : blend_run<false, 4>(run);
 }
 
 }  // namespace af::AF_KERNEL_NAMESPACE

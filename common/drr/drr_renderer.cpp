@@ -56,14 +56,15 @@ RenderStatus central_difference_gradients(const DrrRenderer& renderer,
                                           const RigidTransform& room_from_ct,
                                           const View& view,
                                           RenderWorkspace& workspace,
-                                          const PoseGradients& gradients) {
+                                          const PoseGradients& gradients,
+                                          const DifferenceSteps& steps) {
   check(gradients.planes.size() == 6 * view.pixel_count(),
         "six gradient planes of the view's size");
   std::vector<float> plus(view.pixel_count());
   std::vector<float> minus(view.pixel_count());
   RenderStatus worst;
   for (int parameter = 0; parameter < 6; ++parameter) {
-    const double step = parameter < 3 ? kGradientStepRad : kGradientStepMm;
+    const double step = parameter < 3 ? steps.rotation_rad : steps.translation_mm;
     for (const double sign : {1.0, -1.0}) {
       const RigidTransform pose =
           perturbed(room_from_ct, gradients.pivot_room_point, parameter, sign * step);

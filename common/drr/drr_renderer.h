@@ -77,10 +77,12 @@ Image2d render_image(const DrrRenderer& renderer,
                      const View& view,
                      std::int64_t* rays_outside = nullptr);
 
-/// Steps of central_difference_gradients(): large against single-precision noise of a DRR, small
-/// against its structures.
-inline constexpr double kGradientStepRad = 1e-3;
-inline constexpr double kGradientStepMm = 0.1;
+/// Steps of central_difference_gradients(): by default large against single-precision noise of a
+/// DRR, small against its structures.
+struct DifferenceSteps {
+  double rotation_rad = 1e-3;
+  double translation_mm = 0.1;
+};
 
 /// Derivatives by central differences of render(): for renderers without analytic ones, and the
 /// oracle of those with them.
@@ -88,6 +90,7 @@ RenderStatus central_difference_gradients(const DrrRenderer& renderer,
                                           const RigidTransform& room_from_ct,
                                           const View& view,
                                           RenderWorkspace& workspace,
-                                          const PoseGradients& gradients);
+                                          const PoseGradients& gradients,
+                                          const DifferenceSteps& steps = {});
 
 }  // namespace af

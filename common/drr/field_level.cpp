@@ -98,11 +98,6 @@ Share share_of(int count, int part, int parts) {
   return {edge(part), edge(part + 1)};
 }
 
-std::size_t viewpoint_count(const LightSlab& light_slab) {
-  return static_cast<std::size_t>(light_slab.u.nodes) *
-         static_cast<std::size_t>(light_slab.v.nodes);
-}
-
 /// Where the samples of viewpoint (u, v) begin; null when the tiles' padding goes beyond the last
 /// viewpoint.
 std::uint16_t* viewpoint_samples(const LightSlab& light_slab,
@@ -207,6 +202,19 @@ void halve_slab(const FieldLevelSlab& from,
   }
 }
 
+/// The samples of one slab of a level, filled in parts, and their padding.
+SharedArray<std::uint16_t> padded_samples(const FieldLevel& level,
+                                          const FieldLevelSlab& slab,
+                                          const FieldLevelMemory& memory,
+                                          const FieldLevelFill& fill) {
+  const std::size_t count = level.viewpoint_count() * slab.samples_per_viewpoint();
+  return memory(count + kFieldLevelPadding,
+                [&](std::span<std::uint16_t> samples, int part, int parts) {
+                  if (part == 0) std::ranges::fill(samples.subspan(count), std::uint16_t{0});
+                  fill(samples.first(count), part, parts);
+                });
+}
+
 }  // namespace
 
 double FieldLevel::blur_sigma_in_nodes() const {
@@ -258,11 +266,9 @@ FieldLevel decode_field_level(const CompressedAttenuationField& field,
   for (std::size_t k = 0; k < field.slabs.size(); ++k) {
     const SlabGeometry& fine = field.light_slab.slabs[k];
     FieldLevelSlab slab{level == 0 ? fine : halved_lattice(fine), {}};
-    slab.samples = memory(
-        viewpoint_count(field.light_slab) * slab.samples_per_viewpoint(),
-        [&](std::span<std::uint16_t> samples, int part, int parts) {
-          decode_slab(field, k, slab, level, share_of(field.tiles_u(), part, parts), samples);
-        });
+    slab.samples = padded_samples(result, slab, memory, [&](auto samples, int part, int parts) {
+      decode_slab(field, k, slab, level, share_of(field.tiles_u(), part, parts), samples);
+    });
     result.slabs.push_back(std::move(slab));
   }
   return result;
@@ -270,14 +276,12 @@ FieldLevel decode_field_level(const CompressedAttenuationField& field,
 
 FieldLevel next_field_level(const FieldLevel& level, const FieldLevelMemory& memory) {
   FieldLevel result{level.level + 1, level.coverage, level.quantizer_step, {}};
-  const std::size_t viewpoints = viewpoint_count(level.coverage);
   for (const FieldLevelSlab& from : level.slabs) {
     FieldLevelSlab slab{halved_lattice(from.lattice), {}};
-    slab.samples = memory(viewpoints * slab.samples_per_viewpoint(),
-                          [&](std::span<std::uint16_t> samples, int part, int parts) {
-                            const Share share = share_of(static_cast<int>(viewpoints), part, parts);
-                            halve_slab(from, slab, share, samples);
-                          });
+    slab.samples = padded_samples(result, slab, memory, [&](auto samples, int part, int parts) {
+      const auto viewpoints = static_cast<int>(level.viewpoint_count());
+      halve_slab(from, slab, share_of(viewpoints, part, parts), samples);
+    });
     result.slabs.push_back(std::move(slab));
   }
   return result;

@@ -12,11 +12,14 @@
 
 namespace af {
 
+/// Samples beyond the last one, 0, so that kernels may load whole vectors.
+inline constexpr std::size_t kFieldLevelPadding = 16;
+
 /// One slab of a field that is held as plain 16-bit samples, [u][v][t][s] with s fastest (s runs
 /// along the detector's columns, so a row of viewpoint samples is a row of a DRR).
 struct FieldLevelSlab {
-  SlabGeometry lattice;  ///< this level's (s,t) nodes; stored ranges need not be even
-  SharedArray<std::uint16_t> samples;
+  SlabGeometry lattice;                ///< this level's (s,t) nodes; stored ranges need not be even
+  SharedArray<std::uint16_t> samples;  ///< kFieldLevelPadding more than the nodes
 
   [[nodiscard]] std::size_t samples_per_viewpoint() const {
     return static_cast<std::size_t>(lattice.stored_s.count) *
@@ -37,6 +40,10 @@ struct FieldLevel {
   LightSlab coverage;  ///< the field's geometry: it decides which rays are outside, at every level
   float quantizer_step = 0.0f;
   std::vector<FieldLevelSlab> slabs;  ///< in the order of coverage.slabs
+
+  [[nodiscard]] std::size_t viewpoint_count() const {
+    return static_cast<std::size_t>(coverage.u.nodes) * static_cast<std::size_t>(coverage.v.nodes);
+  }
 
   /// Standard deviation, in nodes of level 0, of the blur that a DRR of this level carries along s
   /// and t against one of level 0: the variances 3/4 4^i of the halvings i = 0 ... level - 1.

@@ -34,35 +34,93 @@ bool SlabRays::all_inside(const LightSlab& light_slab) const {
   return true;
 }
 
-Footprint footprint_of(const SlabGeometry& slab, const SlabRays& rays) {
-  std::array<double, 4> bounds{1e300, -1e300, 1e300, -1e300};
-  for (const Eigen::Vector3d& direction : rays.corner_directions()) {
-    const double scale = (slab.st_plane_y_mm - rays.source.y()) / direction.y();
-    const double s = slab.s.node_coordinate(rays.source.x() + scale * direction.x());
-    const double t = slab.t.node_coordinate(rays.source.z() + scale * direction.z());
-    bounds = {std::min(bounds[0], s),
-              std::max(bounds[1], s),
-              std::min(bounds[2], t),
-              std::max(bounds[3], t)};
-  }
+namespace {
+
+/// Nodes around coordinates low ... high, within the lattice; at least two.
+NodeRange nodes_around(double low, double high, int nodes, const Footprint::Needs& needs) {
   // Clamped before rounding: rays that miss the plane can be anywhere.
-  const auto lower = [](double coordinate, int nodes) {
-    return static_cast<int>(std::floor(std::clamp(coordinate, 0.0, nodes - 2.0)));
+  const int lower = static_cast<int>(std::floor(std::clamp(low, 0.0, nodes - 2.0)));
+  const int upper = static_cast<int>(std::ceil(std::clamp(high, lower + 1.0, nodes - 1.0)));
+  int begin = std::max(0, lower - needs.margin);
+  int end = std::min(nodes, upper + 1 + needs.margin);
+  if (needs.whole_tiles) {
+    begin -= begin % 2;
+    end += end % 2;
+  }
+  return {begin, end - begin};
+}
+
+}  // namespace
+
+Footprint::Footprint(const SlabGeometry& slab, const SlabRays& rays, const Needs& needs)
+    : margin_(needs.margin) {
+  const auto directions = rays.corner_directions();
+  std::array<double, 2> low{1e300, 1e300};
+  std::array<double, 2> high{-1e300, -1e300};
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Eigen::Vector3d& direction = directions[i == 2 ? 3 : (i == 3 ? 2 : i)];
+    const double scale = (slab.st_plane_y_mm - rays.source.y()) / direction.y();
+    corners_[i] = {slab.s.node_coordinate(rays.source.x() + scale * direction.x()),
+                   slab.t.node_coordinate(rays.source.z() + scale * direction.z())};
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      low[axis] = std::min(low[axis], corners_[i][axis]);
+      high[axis] = std::max(high[axis], corners_[i][axis]);
+    }
+  }
+  for (std::size_t i = 0; i < 4; ++i)
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      const double run = corners_[(i + 1) % 4][axis] - corners_[i][axis];
+      const double rise = corners_[(i + 1) % 4][1 - axis] - corners_[i][1 - axis];
+      side_slopes_[i][axis] = run == 0.0 ? 0.0 : rise / run;
+    }
+  s_ = nodes_around(low[0], high[0], slab.s.nodes, needs);
+  t_ = nodes_around(low[1], high[1], slab.t.nodes, needs);
+}
+
+NodeRange Footprint::t_needed(const NodeRange& s) const {
+  return needed(s, 0);
+}
+
+NodeRange Footprint::s_needed(const NodeRange& t) const {
+  return needed(t, 1);
+}
+
+NodeRange Footprint::needed(const NodeRange& across, std::size_t axis) const {
+  const NodeRange& box_across = axis == 0 ? s_ : t_;
+  const NodeRange& box = axis == 0 ? t_ : s_;
+  // A node serves the cells on both its sides. Coordinates beyond the box are clamped to its edge.
+  constexpr double kRounding = 1e-3;
+  double first = across.begin - 1 - margin_ - kRounding;
+  double last = across.end() + margin_ + kRounding;
+  if (across.begin <= box_across.begin) first = -1e300;
+  if (across.end() >= box_across.end()) last = 1e300;
+  double low = 1e300;
+  double high = -1e300;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const auto& from = corners_[i];
+    const double to = corners_[(i + 1) % 4][axis];
+    if (std::min(from[axis], to) > last || std::max(from[axis], to) < first) continue;
+    for (const double end : {from[axis], to}) {
+      const double at = std::clamp(end, first, last);
+      const double other = from[1 - axis] + side_slopes_[i][axis] * (at - from[axis]);
+      low = std::min(low, other);
+      high = std::max(high, other);
+    }
+  }
+  if (low > high) return {box.begin, 0};
+  const auto lower_node = [&](double coordinate) {
+    return static_cast<int>(
+        std::floor(std::clamp(coordinate, static_cast<double>(box.begin), box.end() - 2.0)));
   };
-  const auto upper = [](double coordinate, int first, int nodes) {
-    return static_cast<int>(std::ceil(std::clamp(coordinate, first + 1.0, nodes - 1.0)));
-  };
-  Footprint footprint;
-  footprint.s_first = lower(bounds[0], slab.s.nodes);
-  footprint.t_first = lower(bounds[2], slab.t.nodes);
-  footprint.s_last = upper(bounds[1], footprint.s_first, slab.s.nodes);
-  footprint.t_last = upper(bounds[3], footprint.t_first, slab.t.nodes);
-  return footprint;
+  const int begin = std::max(box.begin, lower_node(low - kRounding) - margin_);
+  const int end = std::min(box.end(), lower_node(high + kRounding) + 2 + margin_);
+  return {begin, end - begin};
 }
 
 std::int64_t blank_rays_outside(const LightSlab& light_slab,
                                 const SlabRays& rays,
-                                std::span<float> total_attenuation) {
+                                std::span<float> planes,
+                                std::span<float> more_planes) {
   std::int64_t outside = 0;
   std::size_t pixel = 0;
   for (int row = 0; row < rays.roi.height; ++row)
@@ -73,7 +131,9 @@ std::int64_t blank_rays_outside(const LightSlab& light_slab,
             return light_slab.intersect(ray, slab).has_value();
           });
       if (is_inside) continue;
-      total_attenuation[pixel] = 0.0f;
+      for (const std::span<float>& output : {planes, more_planes})
+        for (std::size_t at = pixel; at < output.size(); at += rays.roi.pixel_count())
+          output[at] = 0.0f;
       ++outside;
     }
   return outside;

@@ -27,22 +27,44 @@ struct SlabRays {
   [[nodiscard]] bool all_inside(const LightSlab& light_slab) const;
 };
 
-/// Nodes of an (s,t) lattice that a view's rays need, both ends included.
-struct Footprint {
-  int s_first = 0, s_last = 0;
-  int t_first = 0, t_last = 0;
+/// Nodes of an (s,t) lattice that a view's rays need: a quadrilateral and its bounding box.
+class Footprint {
+ public:
+  /// How a renderer reads the nodes.
+  struct Needs {
+    int margin = 0;            ///< nodes on every side beyond the cells that the rays hit
+    bool whole_tiles = false;  ///< the box begins at an even and ends at an odd node; on an odd
+                               ///< number of nodes it holds one more than the lattice
+  };
 
-  [[nodiscard]] int s_count() const { return s_last - s_first + 1; }
-  [[nodiscard]] int t_count() const { return t_last - t_first + 1; }
+  /// For rays that descend.
+  Footprint(const SlabGeometry& slab, const SlabRays& rays, const Needs& needs);
+
+  /// The box, at least 2 x 2 nodes.
+  [[nodiscard]] const NodeRange& s() const { return s_; }
+  [[nodiscard]] const NodeRange& t() const { return t_; }
+  /// The nodes along t that are needed among nodes s, and the other way round; may be empty.
+  [[nodiscard]] NodeRange t_needed(const NodeRange& s) const;
+  [[nodiscard]] NodeRange s_needed(const NodeRange& t) const;
+
+ private:
+  /// Where the rays of the region's corners meet the plane, in node coordinates (s, t), in order
+  /// around the quadrilateral.
+  std::array<std::array<double, 2>, 4> corners_{};
+  /// Of the side from corner i to the next: change of the other coordinate with coordinate 0 or 1.
+  std::array<std::array<double, 2>, 4> side_slopes_{};
+  NodeRange s_;
+  NodeRange t_;
+  int margin_;
+
+  [[nodiscard]] NodeRange needed(const NodeRange& across, std::size_t axis) const;
 };
 
-/// Bounding box of the lattice's nodes around all rays of a view that descend; at least 2 x 2
-/// nodes.
-Footprint footprint_of(const SlabGeometry& slab, const SlabRays& rays);
-
-/// Zeroes and counts the rays that miss a plane.
+/// Counts the rays that miss a plane and zeroes their pixels in both outputs, each of any number of
+/// planes of the region's pixels.
 std::int64_t blank_rays_outside(const LightSlab& light_slab,
                                 const SlabRays& rays,
-                                std::span<float> total_attenuation);
+                                std::span<float> planes,
+                                std::span<float> more_planes = {});
 
 }  // namespace af

@@ -5,59 +5,199 @@
 
 #include "base/error.h"
 #include "base/vector_width.h"
-#include "drr/viewpoint_blender.h"
+#include "drr/node_image_kernel.h"
 #include "drr/warp_kernel.h"
 
 namespace af {
 
 namespace {
 
+/// Kernels read a row and read and write whole vectors, up to two, beyond an image.
+constexpr std::size_t kImagePadding = 64;
+
+std::ptrdiff_t rounded_up(std::ptrdiff_t count, std::ptrdiff_t multiple) {
+  return (count + multiple - 1) / multiple * multiple;
+}
+
+/// A node image's memory, grown when a larger one is needed and never shrunk.
+class ImageBuffer {
+ public:
+  float* reserve(std::ptrdiff_t stride, int rows) {
+    const auto size = static_cast<std::size_t>(stride * (rows + 1)) + kImagePadding;
+    if (values_.size() < size) values_.resize(size);
+    return values_.data();
+  }
+
+ private:
+  std::vector<float> values_;
+};
+
+/// Value, and slopes along the source's x and z.
+using ImageBuffers = std::array<ImageBuffer, 3>;
+
 class Workspace final : public RenderWorkspace {
  public:
   BlendScratch scratch;
-  std::vector<float> blended;
+  ImageBuffers blended;
+  ImageBuffers fine;
+  std::vector<float> row;
 };
 
-/// Second pass: adds the blended image, resampled to the view's pixels, to `total_attenuation`.
-void add_warped(const SlabGeometry& slab,
-                const SlabRays& rays,
-                const Footprint& footprint,
-                const float* blended,
-                std::span<float> total_attenuation) {
-  const auto add_warped_row = select_kernel<AddWarpedRow>(
-      kernels_128::add_warped_row, kernels_256::add_warped_row, kernels_512::add_warped_row);
-  const NodeImage image{blended, footprint.s_count(), footprint.t_count()};
-  // node = (source + reach * d_x / d_y - first) / spacing, multiplied through by d_y: affine in the
-  // column.
-  const double reach = slab.st_plane_y_mm - rays.source.y();
-  const double s_offset = rays.source.x() - slab.s.position_mm(footprint.s_first);
-  const double t_offset = rays.source.z() - slab.t.position_mm(footprint.t_first);
-  const auto numerator =
-      [&](const Eigen::Vector3d& direction, double offset, int axis, double spacing) {
-        return static_cast<float>((offset * direction.y() + reach * direction[axis]) / spacing);
-      };
-  for (int row = 0; row < rays.roi.height; ++row) {
-    const Eigen::Vector3d first = rays.first + row * rays.row_step;
-    const WarpRow warp{numerator(first, s_offset, 0, slab.s.spacing_mm()),
-                       numerator(rays.column_step, s_offset, 0, slab.s.spacing_mm()),
-                       numerator(first, t_offset, 2, slab.t.spacing_mm()),
-                       numerator(rays.column_step, t_offset, 2, slab.t.spacing_mm()),
-                       static_cast<float>(first.y()),
-                       static_cast<float>(rays.column_step.y())};
-    add_warped_row(image,
-                   warp,
-                   total_attenuation.data() + static_cast<std::ptrdiff_t>(row) * rays.roi.width,
-                   rays.roi.width);
+/// The nodes that the second pass reads: a slab's lattice, or one twice as fine.
+struct NodeGrid {
+  double s_first_mm, s_spacing_mm;
+  double t_first_mm, t_spacing_mm;
+  double plane_y_mm;
+  std::int32_t stride, s_count, t_count;
+};
+
+/// Blended images of one slab, ready for the second pass.
+struct SlabImages {
+  NodeGrid grid;
+  std::array<const float*, 3> images;
+
+  [[nodiscard]] NodeImage image(std::size_t i) const {
+    return {images[i], grid.stride, grid.s_count, grid.t_count};
   }
+};
+
+NodeGrid grid_of(const SlabGeometry& slab, const Footprint& footprint, std::ptrdiff_t stride) {
+  return {slab.s.position_mm(footprint.s().begin),
+          slab.s.spacing_mm(),
+          slab.t.position_mm(footprint.t().begin),
+          slab.t.spacing_mm(),
+          slab.st_plane_y_mm,
+          static_cast<std::int32_t>(stride),
+          footprint.s().count,
+          footprint.t().count};
+}
+
+NodeGrid twice_as_fine(const NodeGrid& grid, std::ptrdiff_t stride) {
+  NodeGrid fine = grid;
+  fine.s_spacing_mm *= 0.5;
+  fine.t_spacing_mm *= 0.5;
+  fine.s_count = 2 * grid.s_count - 1;
+  fine.t_count = 2 * grid.t_count - 1;
+  fine.stride = static_cast<std::int32_t>(stride);
+  return fine;
+}
+
+/// node = (source + reach * d_x / d_y - first) / spacing, multiplied through by d_y: affine in the
+/// pixel.
+Homography nodes_from_pixels(const NodeGrid& grid, const SlabRays& rays) {
+  const double reach = grid.plane_y_mm - rays.source.y();
+  const double s_offset = rays.source.x() - grid.s_first_mm;
+  const double t_offset = rays.source.z() - grid.t_first_mm;
+  Homography homography{};
+  const std::array<const Eigen::Vector3d*, 3> directions{
+      &rays.first, &rays.column_step, &rays.row_step};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Eigen::Vector3d& d = *directions[i];
+    homography.s[i] = (s_offset * d.y() + reach * d.x()) / grid.s_spacing_mm;
+    homography.t[i] = (t_offset * d.y() + reach * d.z()) / grid.t_spacing_mm;
+    homography.d[i] = d.y();
+  }
+  return homography;
+}
+
+/// What the gradients of a pose need of a slab's images (PoseSlopes has the mechanics).
+PoseSlopes pose_slopes(const SlabImages& slab,
+                       const SlabRays& rays,
+                       const Eigen::Matrix3d& slab_from_room,
+                       const Eigen::Vector3d& source_from_pivot) {
+  const NodeGrid& grid = slab.grid;
+  const double reach = grid.plane_y_mm - rays.source.y();
+  PoseSlopes slopes{};
+  slopes.source_x = slab.images[1];
+  slopes.source_z = slab.images[2];
+  slopes.nodes_per_mm[0] = static_cast<float>(1.0 / grid.s_spacing_mm);
+  slopes.nodes_per_mm[1] = static_cast<float>(1.0 / grid.t_spacing_mm);
+  slopes.m_scale[0] = static_cast<float>(grid.s_spacing_mm / reach);
+  slopes.m_scale[1] = static_cast<float>(grid.t_spacing_mm / reach);
+  slopes.m_offset[0] = static_cast<float>((grid.s_first_mm - rays.source.x()) / reach);
+  slopes.m_offset[1] = static_cast<float>((grid.t_first_mm - rays.source.z()) / reach);
+  // A CT moved by t + omega x (x - p) meets rays moved the other way.
+  for (int axis = 0; axis < 3; ++axis) {
+    const Eigen::Vector3d direction = slab_from_room.col(axis);
+    const Eigen::Vector3d arm = direction.cross(slab_from_room * source_from_pivot);
+    for (int i = 0; i < 3; ++i) {
+      slopes.translation_of_force[axis][i] = static_cast<float>(-direction[i]);
+      slopes.rotation_of_moment[axis][i] = static_cast<float>(-reach * direction[i]);
+      slopes.rotation_of_force[axis][i] = static_cast<float>(-arm[i]);
+    }
+  }
+  return slopes;
+}
+
+/// What the second pass needs of the first.
+struct BlendNeeds {
+  int margin;  ///< nodes around those that the rays hit
+  bool slopes;
+};
+
+/// First pass of slab k: images of the value and, when wanted, of its slopes along the source.
+SlabImages blended_images(const ViewpointBlender& blender,
+                          std::size_t k,
+                          const SlabRays& rays,
+                          const BlendNeeds& needs,
+                          Workspace& workspace) {
+  const Footprint footprint = blender.footprint(k, rays, needs.margin);
+  const std::ptrdiff_t stride = rounded_up(footprint.s().count, 16);
+  BlendedImages images;
+  images.stride = stride;
+  images.value = workspace.blended[0].reserve(stride, footprint.t().count);
+  if (needs.slopes) {
+    images.source_x = workspace.blended[1].reserve(stride, footprint.t().count);
+    images.source_z = workspace.blended[2].reserve(stride, footprint.t().count);
+  }
+  blender.blend(k, rays, footprint, workspace.scratch, images);
+  return {grid_of(blender.lattice(k), footprint, stride),
+          {images.value, images.source_x, images.source_z}};
+}
+
+/// The same images with a node inserted between any two neighbours.
+SlabImages upsampled(const SlabImages& slab, Workspace& workspace) {
+  const auto upsample_image = select_kernel<UpsampleImage>(
+      kernels_128::upsample_image, kernels_256::upsample_image, kernels_512::upsample_image);
+  const NodeGrid& grid = slab.grid;
+  const std::ptrdiff_t stride = 2 * rounded_up(grid.s_count, 16);
+  SlabImages fine{twice_as_fine(grid, stride), {}};
+  workspace.row.resize(
+      std::max(workspace.row.size(), static_cast<std::size_t>(grid.s_count) + kImagePadding));
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (slab.images[i] == nullptr) continue;
+    float* to = workspace.fine[i].reserve(stride, fine.grid.t_count);
+    upsample_image(slab.images[i],
+                   grid.stride,
+                   grid.s_count,
+                   grid.t_count,
+                   workspace.row.data(),
+                   to,
+                   fine.grid.stride);
+    fine.images[i] = to;
+  }
+  return fine;
+}
+
+/// Sobel's slopes of the value image along s and t, in the place of those along the source.
+SlabImages with_sobel_slopes(const SlabImages& slab, Workspace& workspace) {
+  const auto sobel_slopes = select_kernel<SobelSlopes>(
+      kernels_128::sobel_slopes, kernels_256::sobel_slopes, kernels_512::sobel_slopes);
+  const NodeGrid& grid = slab.grid;
+  float* along_s = workspace.blended[1].reserve(grid.stride, grid.t_count);
+  float* along_t = workspace.blended[2].reserve(grid.stride, grid.t_count);
+  sobel_slopes(slab.images[0], grid.stride, grid.s_count, grid.t_count, along_s, along_t);
+  return {grid, {slab.images[0], along_s, along_t}};
 }
 
 }  // namespace
 
-TwoPassAfDrr::TwoPassAfDrr(std::shared_ptr<const CompressedAttenuationField> field)
-    : blender_(make_viewpoint_blender(std::move(field))) {}
+TwoPassAfDrr::TwoPassAfDrr(std::shared_ptr<const CompressedAttenuationField> field,
+                           const TwoPassOptions& options)
+    : blender_(make_viewpoint_blender(std::move(field), options.uv)), options_(options) {}
 
-TwoPassAfDrr::TwoPassAfDrr(std::shared_ptr<const FieldLevel> level)
-    : blender_(make_viewpoint_blender(std::move(level))) {}
+TwoPassAfDrr::TwoPassAfDrr(std::shared_ptr<const FieldLevel> level, const TwoPassOptions& options)
+    : blender_(make_viewpoint_blender(std::move(level), options.uv)), options_(options) {}
 
 std::unique_ptr<RenderWorkspace> TwoPassAfDrr::make_workspace() const {
   return std::make_unique<Workspace>();
@@ -68,28 +208,76 @@ RenderStatus TwoPassAfDrr::render(const RigidTransform& room_from_ct,
                                   RenderWorkspace& workspace,
                                   std::span<float> total_attenuation,
                                   const std::optional<PoseGradients>& gradients) const {
-  check(total_attenuation.size() == view.pixel_count(), "one value per pixel of the view");
-  auto& [scratch, blended] = dynamic_cast<Workspace&>(workspace);
+  const std::size_t pixels = view.pixel_count();
+  check(total_attenuation.size() == pixels, "one value per pixel of the view");
+  check(!gradients || gradients->planes.size() == 6 * pixels,
+        "six gradient planes of the view's size");
+  auto& scratch = dynamic_cast<Workspace&>(workspace);
+  const LightSlab& light_slab = blender_->coverage();
+  const RigidTransform slab_from_room = light_slab.slab_from_ct * room_from_ct.inverse();
+  const SlabRays rays(slab_from_room, view);
+  if (!rays.all_descend())
+    return {blank_rays_outside(
+        light_slab, rays, total_attenuation, gradients ? gradients->planes : std::span<float>{})};
+  const auto warp_image = select_kernel<WarpImage>(
+      kernels_128::warp_image, kernels_256::warp_image, kernels_512::warp_image);
+  const auto warp_with_pose_slopes =
+      select_kernel<WarpWithPoseSlopes>(kernels_128::warp_with_pose_slopes,
+                                        kernels_256::warp_with_pose_slopes,
+                                        kernels_512::warp_with_pose_slopes);
+  const bool is_cubic = options_.st == AxisInterpolation::Cubic;
+  const BlendNeeds needs{is_cubic ? kUpsampleReach - 1 : 0, gradients.has_value()};
+  for (std::size_t k = 0; k < light_slab.slabs.size(); ++k) {
+    SlabImages slab = blended_images(*blender_, k, rays, needs, scratch);
+    if (is_cubic) slab = upsampled(slab, scratch);
+    const Homography homography = nodes_from_pixels(slab.grid, rays);
+    const PixelGrid grid{view.roi.width, view.roi.height, k > 0};
+    if (!gradients) {
+      warp_image(slab.image(0), homography, grid, total_attenuation.data());
+      continue;
+    }
+    warp_with_pose_slopes(slab.image(0),
+                          pose_slopes(slab,
+                                      rays,
+                                      slab_from_room.linear(),
+                                      view.camera.source_point - gradients->pivot_room_point),
+                          homography,
+                          grid,
+                          total_attenuation.data(),
+                          gradients->planes.data(),
+                          static_cast<std::int64_t>(pixels));
+  }
+  if (rays.all_inside(light_slab)) return {};
+  return {blank_rays_outside(
+      light_slab, rays, total_attenuation, gradients ? gradients->planes : std::span<float>{})};
+}
+
+RenderStatus TwoPassAfDrr::render_gradient_images(const RigidTransform& room_from_ct,
+                                                  const View& view,
+                                                  RenderWorkspace& workspace,
+                                                  std::span<float> column_gradient,
+                                                  std::span<float> row_gradient) const {
+  check(column_gradient.size() == view.pixel_count() && row_gradient.size() == view.pixel_count(),
+        "one value per pixel of the view");
+  auto& scratch = dynamic_cast<Workspace&>(workspace);
   const LightSlab& light_slab = blender_->coverage();
   const SlabRays rays(light_slab.slab_from_ct * room_from_ct.inverse(), view);
-  std::fill(total_attenuation.begin(), total_attenuation.end(), 0.0f);
-  RenderStatus status;
-  if (!rays.all_descend()) {
-    status.rays_outside = blank_rays_outside(light_slab, rays, total_attenuation);
-    return status;
-  }
+  if (!rays.all_descend())
+    return {blank_rays_outside(light_slab, rays, column_gradient, row_gradient)};
+  const auto warp_slopes = select_kernel<WarpSlopes>(
+      kernels_128::warp_slopes, kernels_256::warp_slopes, kernels_512::warp_slopes);
   for (std::size_t k = 0; k < light_slab.slabs.size(); ++k) {
-    const Footprint footprint = footprint_of(blender_->lattice(k), rays);
-    const auto nodes = static_cast<std::size_t>(footprint.s_count()) *
-                       static_cast<std::size_t>(footprint.t_count());
-    if (blended.size() < nodes) blended.resize(nodes);
-    blender_->blend(k, rays, footprint, scratch, {blended.data(), nodes});
-    add_warped(blender_->lattice(k), rays, footprint, blended.data(), total_attenuation);
+    const SlabImages slab =
+        with_sobel_slopes(blended_images(*blender_, k, rays, {1, false}, scratch), scratch);
+    warp_slopes(slab.image(1),
+                slab.images[2],
+                nodes_from_pixels(slab.grid, rays),
+                {view.roi.width, view.roi.height, k > 0},
+                column_gradient.data(),
+                row_gradient.data());
   }
-  if (!rays.all_inside(light_slab))
-    status.rays_outside = blank_rays_outside(light_slab, rays, total_attenuation);
-  if (gradients) central_difference_gradients(*this, room_from_ct, view, workspace, *gradients);
-  return status;
+  if (rays.all_inside(light_slab)) return {};
+  return {blank_rays_outside(light_slab, rays, column_gradient, row_gradient)};
 }
 
 }  // namespace af

@@ -9,29 +9,50 @@
 
 namespace af {
 
+struct TwoPassOptions {
+  /// Cubic inserts a Catmull-Rom node between any two neighbours of the blended image before it is
+  /// resampled bilinearly.
+  AxisInterpolation st = AxisInterpolation::Linear;
+  AxisInterpolation uv = AxisInterpolation::Linear;
+};
+
 /// DRRs by look-up in two cheap passes per slab. All rays of a DRR meet in the source, so a ray's
-/// (u,v) is an affine function of its (s,t): first the four viewpoints around it are blended once
-/// per (s,t) node of the detector's footprint, then that image is resampled to the detector
-/// bilinearly through one homography. Differs from the paper: (u,v) weights are taken at the (s,t)
-/// nodes instead of at the ray itself. Against ray casting both are equally good; AfDrr is the
-/// literal quadrilinear look-up and this class's oracle. \test
-/// TwoPassAfDrr.AgreesWithQuadrilinearLookup
+/// (u,v) is an affine function of its (s,t): first the viewpoints around it are blended once per
+/// (s,t) node of the detector's footprint, then that image is resampled to the detector through one
+/// homography. Differs from the paper: (u,v) weights are taken at the (s,t) nodes instead of at the
+/// ray itself. Against ray casting both are equally good; AfDrr is the literal quadrilinear look-up
+/// and this class's oracle. Pose derivatives are analytic, from the slopes of both passes.
+/// \test TwoPassAfDrr.AgreesWithQuadrilinearLookup
 class TwoPassAfDrr final : public DrrRenderer {
  public:
-  explicit TwoPassAfDrr(std::shared_ptr<const CompressedAttenuationField> field);
+  explicit TwoPassAfDrr(std::shared_ptr<const CompressedAttenuationField> field,
+                        const TwoPassOptions& options = {});
   /// A level of an image pyramid; it inherits the field's coverage.
-  explicit TwoPassAfDrr(std::shared_ptr<const FieldLevel> level);
+  explicit TwoPassAfDrr(std::shared_ptr<const FieldLevel> level,
+                        const TwoPassOptions& options = {});
 
   RenderStatus render(const RigidTransform& room_from_ct,
                       const View& view,
                       RenderWorkspace& workspace,
                       std::span<float> total_attenuation,
                       const std::optional<PoseGradients>& gradients = std::nullopt) const override;
+
+  /// The gradient image that the paper hints at (Sec. V), without the DRR itself: dU/dcolumn and
+  /// dU/drow per pixel (view.pixel_count() values each) for little more than the price of a DRR.
+  /// Sobel's weights on the blended (s,t) nodes give its slopes, which are resampled like values.
+  /// It is the gradient of the DRR smoothed over about two nodes. Rays outside are counted and 0.
+  RenderStatus render_gradient_images(const RigidTransform& room_from_ct,
+                                      const View& view,
+                                      RenderWorkspace& workspace,
+                                      std::span<float> column_gradient,
+                                      std::span<float> row_gradient) const;
+
   [[nodiscard]] std::unique_ptr<RenderWorkspace> make_workspace() const override;
   [[nodiscard]] const char* name() const override { return "field"; }
 
  private:
   std::unique_ptr<const ViewpointBlender> blender_;
+  TwoPassOptions options_;
 };
 
 }  // namespace af

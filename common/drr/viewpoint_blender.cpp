@@ -2,169 +2,368 @@
 #include "drr/viewpoint_blender.h"
 
 #include <algorithm>
+#include <cmath>
 
+#include "base/error.h"
 #include "base/vector_width.h"
-#include "drr/blend_kernel.h"
 
 namespace af {
 
 namespace {
 
-/// Taps for the (s or t) nodes of `nodes`: the ray from the source through node position p meets
-/// the (u,v) plane at source + ratio * (p - source), on each axis by itself.
-void make_taps(const GridAxis& node_axis,
-               const NodeRange& nodes,
-               double source_mm,
-               double ratio,
-               const GridAxis& viewpoint_axis,
-               std::vector<ViewpointTap>& taps) {
-  taps.clear();
-  for (int node = nodes.begin; node < nodes.end(); ++node) {
-    const double at_mm = source_mm + ratio * (node_axis.position_mm(node) - source_mm);
-    // Nodes just outside the outermost rays can ask for a viewpoint just outside the rectangle.
-    const double coordinate =
-        std::clamp(viewpoint_axis.node_coordinate(at_mm), 0.0, viewpoint_axis.nodes - 1.0);
-    const int lower = std::min(static_cast<int>(coordinate), viewpoint_axis.nodes - 2);
-    taps.push_back({lower, static_cast<float>(coordinate - lower)});
-  }
+/// Cubic weights or their slopes, of nodes -1, 0, 1, 2 around a position between nodes 0 and 1.
+using CubicTaps = std::array<double, 4>;
+
+CubicTaps cubic_weights(double x) {
+  return {0.5 * x * (x * (2.0 - x) - 1.0),
+          0.5 * (x * x * (3.0 * x - 5.0) + 2.0),
+          0.5 * x * (x * (4.0 - 3.0 * x) + 1.0),
+          0.5 * x * x * (x - 1.0)};
 }
 
-NodeRange overlap(const NodeRange& stored, int first, int last) {
-  const int begin = std::max(first, stored.begin);
-  return {begin, std::max(0, std::min(last + 1, stored.end()) - begin)};
+CubicTaps cubic_slopes(double x) {
+  return {0.5 * (x * (4.0 - 3.0 * x) - 1.0),
+          0.5 * x * (9.0 * x - 10.0),
+          0.5 * (x * (8.0 - 9.0 * x) + 1.0),
+          0.5 * x * (3.0 * x - 2.0)};
+}
+
+/// Taps that lie inside: the weight of a node beyond the first or last one goes to the nodes that
+/// it continues linearly. At least four nodes.
+CubicTaps folded(const CubicTaps& taps, int lower, int nodes) {
+  if (lower == 0) return {taps[1] + 2.0 * taps[0], taps[2] - taps[0], taps[3], 0.0};
+  if (lower == nodes - 2) return {0.0, taps[0], taps[1] - taps[3], taps[2] + 2.0 * taps[3]};
+  return taps;
+}
+
+/// How the viewpoint coordinate on one axis follows from the node: the ray from the source through
+/// node position p meets the (u,v) plane at source + ratio * (p - source), on each axis by itself.
+class ViewpointLine {
+ public:
+  ViewpointLine(const GridAxis& nodes,
+                double source_mm,
+                double ratio,
+                const GridAxis& viewpoints,
+                AxisInterpolation interpolation)
+      : at_node_0_(viewpoints.node_coordinate(source_mm + ratio * (nodes.first_mm - source_mm))),
+        per_node_(ratio * nodes.spacing_mm() / viewpoints.spacing_mm()),
+        per_mm_((1.0 - ratio) / viewpoints.spacing_mm()),
+        viewpoints_(viewpoints.nodes),
+        interpolation_(interpolation) {}
+
+  [[nodiscard]] ViewpointTap tap(int node) const {
+    // Nodes just outside the outermost rays can ask for a viewpoint just outside the rectangle.
+    const double coordinate = std::clamp(at_node_0_ + node * per_node_, 0.0, viewpoints_ - 1.0);
+    const int lower = std::min(static_cast<int>(coordinate), viewpoints_ - 2);
+    const double x = coordinate - lower;
+    const auto slope = static_cast<float>(per_mm_);
+    if (interpolation_ == AxisInterpolation::Linear)
+      return {lower,
+              {static_cast<float>(1.0 - x), static_cast<float>(x), 0.0f, 0.0f},
+              {-slope, slope, 0.0f, 0.0f}};
+    const CubicTaps weights = folded(cubic_weights(x), lower, viewpoints_);
+    const CubicTaps slopes = folded(cubic_slopes(x), lower, viewpoints_);
+    ViewpointTap tap{std::clamp(lower - 1, 0, viewpoints_ - 4), {}, {}};
+    for (std::size_t i = 0; i < 4; ++i) {
+      tap.weights[i] = static_cast<float>(weights[i]);
+      tap.slopes[i] = static_cast<float>(per_mm_ * slopes[i]);
+    }
+    return tap;
+  }
+
+  void make_taps(const NodeRange& nodes, std::vector<ViewpointTap>& taps) const {
+    taps.clear();
+    for (int node = nodes.begin; node < nodes.end(); ++node) taps.push_back(tap(node));
+  }
+
+ private:
+  double at_node_0_;
+  double per_node_;
+  double per_mm_;
+  int viewpoints_;
+  AxisInterpolation interpolation_;
+};
+
+NodeRange overlap(const NodeRange& a, const NodeRange& b) {
+  const int begin = std::max(a.begin, b.begin);
+  return {begin, std::max(0, std::min(a.end(), b.end()) - begin)};
+}
+
+/// The nodes of an image that a blender fills.
+struct StoredNodes {
+  NodeRange s;
+  NodeRange t;
+};
+
+/// Zeroes the nodes of the footprint's box that are not stored.
+void clear_unstored(const Footprint& footprint,
+                    const StoredNodes& stored,
+                    float* image,
+                    std::ptrdiff_t stride) {
+  const int s_count = footprint.s().count;
+  const int left = stored.s.begin - footprint.s().begin;
+  const int right = left + stored.s.count;
+  for (int t = footprint.t().begin; t < footprint.t().end(); ++t, image += stride) {
+    if (t < stored.t.begin || t >= stored.t.end() || stored.s.count == 0) {
+      std::fill_n(image, s_count, 0.0f);
+      continue;
+    }
+    std::fill_n(image, left, 0.0f);
+    std::fill(image + right, image + s_count, 0.0f);
+  }
 }
 
 /// What both kinds of field share: taps of the stored nodes, zeroes elsewhere.
 class AnyBlender : public ViewpointBlender {
  public:
+  explicit AnyBlender(AxisInterpolation uv) : uv_(uv) {}
+
   void blend(std::size_t k,
              const SlabRays& rays,
              const Footprint& footprint,
              BlendScratch& scratch,
-             std::span<float> blended) const final {
+             const BlendedImages& images) const final {
     const SlabGeometry& slab = lattice(k);
-    const NodeRange s = overlap(slab.stored_s, footprint.s_first, footprint.s_last);
-    const NodeRange t = overlap(slab.stored_t, footprint.t_first, footprint.t_last);
-    if (s.count < footprint.s_count() || t.count < footprint.t_count())
-      std::fill(blended.begin(), blended.end(), 0.0f);
-    if (s.count == 0 || t.count == 0) return;
-    const LightSlab& light_slab = coverage();
-    const double ratio =
-        (light_slab.uv_plane_y_mm - rays.source.y()) / (slab.st_plane_y_mm - rays.source.y());
-    make_taps(slab.s, s, rays.source.x(), ratio, light_slab.u, scratch.u_taps);
-    make_taps(slab.t, t, rays.source.z(), ratio, light_slab.v, scratch.v_taps);
-    const std::ptrdiff_t stride = footprint.s_count();
-    blend_stored(
-        k,
-        s,
-        t,
-        scratch,
-        stride,
-        blended.data() + (t.begin - footprint.t_first) * stride + (s.begin - footprint.s_first));
+    const StoredNodes stored = stored_nodes(slab, footprint);
+    if (stored.s.count > 0 && stored.t.count > 0) {
+      const LightSlab& light_slab = coverage();
+      const double ratio =
+          (light_slab.uv_plane_y_mm - rays.source.y()) / (slab.st_plane_y_mm - rays.source.y());
+      ViewpointLine(slab.s, rays.source.x(), ratio, light_slab.u, interpolation())
+          .make_taps(stored.s, scratch.u_taps);
+      ViewpointLine(slab.t, rays.source.z(), ratio, light_slab.v, interpolation())
+          .make_taps(stored.t, scratch.v_taps);
+      blend_stored(k, footprint, stored, scratch, images);
+    }
+    if (stored.s.count == footprint.s().count && stored.t.count == footprint.t().count) return;
+    for (float* image : {images.value, images.source_x, images.source_z})
+      if (image != nullptr) clear_unstored(footprint, stored, image, images.stride);
   }
 
  protected:
-  /// The stored nodes s x t into `blended`, [t][s] with `stride` values from row to row.
+  /// The nodes that the footprint and the field share.
+  [[nodiscard]] virtual StoredNodes stored_nodes(const SlabGeometry& slab,
+                                                 const Footprint& footprint) const = 0;
   virtual void blend_stored(std::size_t k,
-                            const NodeRange& s,
-                            const NodeRange& t,
+                            const Footprint& footprint,
+                            const StoredNodes& stored,
                             BlendScratch& scratch,
-                            std::ptrdiff_t stride,
-                            float* blended) const = 0;
+                            const BlendedImages& images) const = 0;
+
+  [[nodiscard]] AxisInterpolation interpolation() const {
+    const bool has_four = coverage().u.nodes >= 4 && coverage().v.nodes >= 4;
+    return has_four ? uv_ : AxisInterpolation::Linear;
+  }
+  [[nodiscard]] int tap_count() const {
+    return interpolation() == AxisInterpolation::Linear ? 2 : 4;
+  }
+
+ private:
+  AxisInterpolation uv_;
+};
+
+/// Where a node's image values stand.
+BlendedImages at_node(const BlendedImages& images, const Footprint& footprint, int s, int t) {
+  const std::ptrdiff_t offset =
+      (t - footprint.t().begin) * images.stride + (s - footprint.s().begin);
+  if (images.source_x == nullptr) return {images.value + offset, nullptr, nullptr, images.stride};
+  return {images.value + offset, images.source_x + offset, images.source_z + offset, images.stride};
+}
+
+/// A codeword on a boundary of half a cache line.
+struct alignas(32) AlignedTile {
+  Tile elements;
 };
 
 class CompressedBlender final : public AnyBlender {
  public:
-  explicit CompressedBlender(std::shared_ptr<const CompressedAttenuationField> field)
-      : field_(std::move(field)) {}
+  CompressedBlender(std::shared_ptr<const CompressedAttenuationField> field, AxisInterpolation uv)
+      : AnyBlender(uv), field_(std::move(field)) {
+    codewords_.reserve(field_->codebook.size());
+    for (const Tile& tile : field_->codebook.codewords) codewords_.push_back({tile});
+  }
 
   [[nodiscard]] const LightSlab& coverage() const override { return field_->light_slab; }
   [[nodiscard]] const SlabGeometry& lattice(std::size_t k) const override {
     return field_->light_slab.slabs[k];
   }
+  [[nodiscard]] Footprint footprint(std::size_t k,
+                                    const SlabRays& rays,
+                                    int margin) const override {
+    return {lattice(k), rays, {margin, true}};
+  }
 
  private:
-  void blend_stored(std::size_t k,
-                    const NodeRange& s_nodes,
-                    const NodeRange& t_nodes,
-                    BlendScratch& scratch,
-                    std::ptrdiff_t stride,
-                    float* blended) const override {
-    const SlabGeometry& slab = lattice(k);
-    const auto t_tiles = static_cast<std::size_t>(slab.stored_t.tiles());
-    const std::size_t v_stride = static_cast<std::size_t>(slab.stored_s.tiles()) * t_tiles;
-    const std::size_t u_stride = v_stride * static_cast<std::size_t>(field_->tiles_v());
-    for (int s = s_nodes.begin; s < s_nodes.end(); ++s) {
-      const ViewpointTap& u = scratch.u_taps[static_cast<std::size_t>(s - s_nodes.begin)];
-      const auto local_s = static_cast<std::size_t>(s - slab.stored_s.begin);
-      for (int t = t_nodes.begin; t < t_nodes.end(); ++t) {
-        const ViewpointTap& v = scratch.v_taps[static_cast<std::size_t>(t - t_nodes.begin)];
-        const auto local_t = static_cast<std::size_t>(t - slab.stored_t.begin);
-        const std::uint16_t* at =
-            field_->slabs[k].indices.data() + (local_s / 2) * t_tiles + local_t / 2;
-        const auto level = [&](int du, int dv) {
-          const auto u_node = static_cast<std::size_t>(u.lower + du);
-          const auto v_node = static_cast<std::size_t>(v.lower + dv);
-          const Tile& tile =
-              field_->codebook.codewords[at[u_node / 2 * u_stride + v_node / 2 * v_stride]];
-          return static_cast<float>(
-              tile[tile_element(u_node & 1u, v_node & 1u, local_s & 1u, local_t & 1u)]);
-        };
-        const float at_low_u = level(0, 0) + v.weight * (level(0, 1) - level(0, 0));
-        const float at_up_u = level(1, 0) + v.weight * (level(1, 1) - level(1, 0));
-        blended[(t - t_nodes.begin) * stride + (s - s_nodes.begin)] =
-            field_->quantizer_step * (at_low_u + u.weight * (at_up_u - at_low_u));
+  [[nodiscard]] StoredNodes stored_nodes(const SlabGeometry& slab,
+                                         const Footprint& footprint) const override {
+    const NodeRange s{slab.stored_s.begin, 2 * slab.stored_s.tiles()};
+    const NodeRange t{slab.stored_t.begin, 2 * slab.stored_t.tiles()};
+    return {overlap(s, footprint.s()), overlap(t, footprint.t())};
+  }
+
+  /// Regroups the taps of node pairs by the pairs of viewpoints that share a tile. `shift` selects
+  /// the element's bits: u and s, or v and t.
+  void make_tile_taps(const std::vector<ViewpointTap>& node_taps,
+                      std::int64_t tile_stride,
+                      unsigned shift,
+                      float scale,
+                      std::vector<TileTap>& taps,
+                      std::vector<std::int32_t>& begin) const {
+    taps.clear();
+    begin.assign(1, 0);
+    for (std::size_t i = 0; i < node_taps.size(); i += 2) {
+      const ViewpointTap* pair = node_taps.data() + i;
+      const int first = std::min(pair[0].first, pair[1].first) / 2;
+      const int last = (std::max(pair[0].first, pair[1].first) + tap_count() - 1) / 2;
+      for (int tile = first; tile <= last; ++tile) {
+        TileTap tap{};
+        tap.offset = tile * tile_stride;
+        bool is_used = false;
+        for (unsigned element = 0; element < kTileElements; ++element) {
+          const int viewpoint = 2 * tile + static_cast<int>(element >> (2 + shift) & 1u);
+          const ViewpointTap& node = pair[element >> shift & 1u];
+          const int at = viewpoint - node.first;
+          if (at < 0 || at >= tap_count()) continue;
+          tap.weights[element] = scale * node.weights[at];
+          tap.slopes[element] = scale * node.slopes[at];
+          is_used = is_used || node.weights[at] != 0.0f || node.slopes[at] != 0.0f;
+        }
+        if (is_used) taps.push_back(tap);
       }
+      begin.push_back(static_cast<std::int32_t>(taps.size()));
+    }
+  }
+
+  void blend_stored(std::size_t k,
+                    const Footprint& footprint,
+                    const StoredNodes& stored,
+                    BlendScratch& scratch,
+                    const BlendedImages& images) const override {
+    const SlabGeometry& slab = lattice(k);
+    const std::int64_t t_tiles = slab.stored_t.tiles();
+    const std::int64_t v_stride = slab.stored_s.tiles() * t_tiles;
+    const std::int64_t u_stride = v_stride * field_->tiles_v();
+    const auto blend_tiles = select_kernel<BlendTiles>(
+        kernels_128::blend_tiles, kernels_256::blend_tiles, kernels_512::blend_tiles);
+    make_tile_taps(
+        scratch.u_taps, u_stride, 1, field_->quantizer_step, scratch.u_tiles, scratch.u_begin);
+    make_tile_taps(scratch.v_taps, v_stride, 0, 1.0f, scratch.v_tiles, scratch.v_begin);
+    const int t_tile = (stored.t.begin - slab.stored_t.begin) / 2;
+    for (int c = 0; c < stored.s.count / 2; ++c) {
+      const int s = stored.s.begin + 2 * c;
+      const NodeRange needed = overlap(footprint.t_needed({s, 2}), stored.t);
+      const BlendedImages strip = at_node(images, footprint, s, stored.t.begin);
+      const auto at = static_cast<std::size_t>(c);
+      blend_tiles(
+          {field_->slabs[k].indices.data() + ((s - slab.stored_s.begin) / 2) * t_tiles + t_tile,
+           codewords_.data()->elements.data(),
+           scratch.u_tiles.data() + scratch.u_begin[at],
+           scratch.u_begin[at + 1] - scratch.u_begin[at],
+           scratch.v_tiles.data(),
+           scratch.v_begin.data(),
+           (needed.begin - stored.t.begin) / 2,
+           (needed.end() - stored.t.begin + 1) / 2,
+           {strip.value, strip.source_x, strip.source_z},
+           images.stride});
     }
   }
 
   std::shared_ptr<const CompressedAttenuationField> field_;
+  std::vector<AlignedTile> codewords_;
 };
 
 class LevelBlender final : public AnyBlender {
  public:
-  explicit LevelBlender(std::shared_ptr<const FieldLevel> level) : level_(std::move(level)) {}
+  LevelBlender(std::shared_ptr<const FieldLevel> level, AxisInterpolation uv)
+      : AnyBlender(uv), level_(std::move(level)) {
+    for (const FieldLevelSlab& slab : level_->slabs)
+      check(slab.samples.size() ==
+                level_->viewpoint_count() * slab.samples_per_viewpoint() + kFieldLevelPadding,
+            "a field level's samples do not have its geometry's size");
+  }
 
   [[nodiscard]] const LightSlab& coverage() const override { return level_->coverage; }
   [[nodiscard]] const SlabGeometry& lattice(std::size_t k) const override {
     return level_->slabs[k].lattice;
   }
+  [[nodiscard]] Footprint footprint(std::size_t k,
+                                    const SlabRays& rays,
+                                    int margin) const override {
+    return {lattice(k), rays, {margin, false}};
+  }
 
  private:
+  [[nodiscard]] StoredNodes stored_nodes(const SlabGeometry& slab,
+                                         const Footprint& footprint) const override {
+    return {overlap(slab.stored_s, footprint.s()), overlap(slab.stored_t, footprint.t())};
+  }
+
   void blend_stored(std::size_t k,
-                    const NodeRange& s,
-                    const NodeRange& t,
+                    const Footprint& footprint,
+                    const StoredNodes& stored,
                     BlendScratch& scratch,
-                    std::ptrdiff_t stride,
-                    float* blended) const override {
+                    const BlendedImages& images) const override {
     const FieldLevelSlab& slab = level_->slabs[k];
     const auto blend_samples = select_kernel<BlendSamples>(
         kernels_128::blend_samples, kernels_256::blend_samples, kernels_512::blend_samples);
-    scratch.u_weights.clear();
-    for (const ViewpointTap& tap : scratch.u_taps) scratch.u_weights.push_back(tap.weight);
-    const auto v_stride = static_cast<std::ptrdiff_t>(slab.samples_per_viewpoint());
-    const std::ptrdiff_t u_stride = v_stride * level_->coverage.v.nodes;
-    for (int row = 0; row < t.count; ++row) {
-      const ViewpointTap& v = scratch.v_taps[static_cast<std::size_t>(row)];
-      const std::ptrdiff_t in_viewpoint =
-          static_cast<std::ptrdiff_t>(t.begin + row - slab.lattice.stored_t.begin) *
-              slab.lattice.stored_s.count +
-          (s.begin - slab.lattice.stored_s.begin);
+    // One row of weights and one of slopes per tap, readable for a vector beyond their ends.
+    const std::size_t row_length = scratch.u_taps.size() + kFieldLevelPadding;
+    const auto taps = static_cast<std::size_t>(tap_count());
+    scratch.run_weights.resize(2 * taps * row_length);
+    for (std::size_t i = 0; i < scratch.u_taps.size(); ++i)
+      for (std::size_t tap = 0; tap < taps; ++tap) {
+        float* weight = scratch.run_weights.data() + 2 * tap * row_length + i;
+        weight[0] = level_->quantizer_step * scratch.u_taps[i].weights[tap];
+        weight[row_length] = level_->quantizer_step * scratch.u_taps[i].slopes[tap];
+      }
+    for (int t = stored.t.begin; t < stored.t.end(); ++t) {
+      const NodeRange needed = overlap(footprint.s_needed({t, 1}), stored.s);
       // Runs of nodes that lie between the same viewpoints.
-      for (int begin = 0, end = 0; begin < s.count; begin = end) {
-        const int lower = scratch.u_taps[static_cast<std::size_t>(begin)].lower;
-        while (end < s.count && scratch.u_taps[static_cast<std::size_t>(end)].lower == lower) ++end;
-        const std::uint16_t* samples =
-            slab.samples.data() + lower * u_stride + v.lower * v_stride + in_viewpoint + begin;
-        blend_samples(
-            {{samples, samples + v_stride, samples + u_stride, samples + u_stride + v_stride},
-             scratch.u_weights.data() + begin,
-             v.weight,
-             level_->quantizer_step},
-            blended + row * stride + begin,
-            end - begin);
+      for (int begin = needed.begin, end = begin; begin < needed.end(); begin = end) {
+        const auto tap_of = [&](int s) -> const ViewpointTap& {
+          return scratch.u_taps[static_cast<std::size_t>(s - stored.s.begin)];
+        };
+        while (end < needed.end() && tap_of(end).first == tap_of(begin).first) ++end;
+        blend_samples(run_of(slab,
+                             scratch,
+                             row_length,
+                             stored,
+                             {begin, end - begin},
+                             t,
+                             at_node(images, footprint, begin, t)));
       }
     }
+  }
+
+  [[nodiscard]] SampleRun run_of(const FieldLevelSlab& slab,
+                                 const BlendScratch& scratch,
+                                 std::size_t row_length,
+                                 const StoredNodes& stored,
+                                 const NodeRange& s,
+                                 int t,
+                                 const BlendedImages& images) const {
+    const auto first_tap = static_cast<std::size_t>(s.begin - stored.s.begin);
+    const ViewpointTap& v = scratch.v_taps[static_cast<std::size_t>(t - stored.t.begin)];
+    SampleRun run{};
+    run.v_stride = static_cast<std::int64_t>(slab.samples_per_viewpoint());
+    run.u_stride = run.v_stride * level_->coverage.v.nodes;
+    run.samples =
+        slab.samples.data() + scratch.u_taps[first_tap].first * run.u_stride +
+        v.first * run.v_stride +
+        static_cast<std::int64_t>(t - slab.lattice.stored_t.begin) * slab.lattice.stored_s.count +
+        (s.begin - slab.lattice.stored_s.begin);
+    run.taps = tap_count();
+    for (std::size_t tap = 0; tap < static_cast<std::size_t>(run.taps); ++tap) {
+      run.u_weights[tap] = scratch.run_weights.data() + 2 * tap * row_length + first_tap;
+      run.u_slopes[tap] = run.u_weights[tap] + row_length;
+      run.v_weights[tap] = v.weights[tap];
+      run.v_slopes[tap] = v.slopes[tap];
+    }
+    run.images[0] = images.value;
+    run.images[1] = images.source_x;
+    run.images[2] = images.source_z;
+    run.count = s.count;
+    return run;
   }
 
   std::shared_ptr<const FieldLevel> level_;
@@ -173,13 +372,13 @@ class LevelBlender final : public AnyBlender {
 }  // namespace
 
 std::unique_ptr<const ViewpointBlender> make_viewpoint_blender(
-    std::shared_ptr<const CompressedAttenuationField> field) {
-  return std::make_unique<CompressedBlender>(std::move(field));
+    std::shared_ptr<const CompressedAttenuationField> field, AxisInterpolation uv) {
+  return std::make_unique<CompressedBlender>(std::move(field), uv);
 }
 
 std::unique_ptr<const ViewpointBlender> make_viewpoint_blender(
-    std::shared_ptr<const FieldLevel> level) {
-  return std::make_unique<LevelBlender>(std::move(level));
+    std::shared_ptr<const FieldLevel> level, AxisInterpolation uv) {
+  return std::make_unique<LevelBlender>(std::move(level), uv);
 }
 
 }  // namespace af

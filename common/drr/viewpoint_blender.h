@@ -4,28 +4,46 @@
 #include <memory>
 #include <vector>
 
+#include "drr/blend_kernel.h"
 #include "drr/field_level.h"
 #include "drr/slab_rays.h"
 
 namespace af {
 
-/// Where one (s,t) coordinate's rays through the source meet the viewpoints along one axis: between
-/// `lower` and lower + 1.
+/// Interpolation along an axis of the field: between two nodes, or Catmull-Rom's cubic through four
+/// (beyond the first and last node the field continues linearly).
+enum class AxisInterpolation { Linear, Cubic };
+
+/// Where one (s or t) coordinate's rays through the source meet the viewpoints along one axis.
 struct ViewpointTap {
-  int lower;
-  float weight;  ///< of viewpoint lower + 1, in [0, 1]
+  int first;                 ///< viewpoint of weights[0]
+  float weights[kMostTaps];  ///< of first, first + 1, ...
+  float slopes[kMostTaps];   ///< their derivatives with respect to the source, per mm
 };
 
 /// Scratch memory of the first pass; one per thread.
 struct BlendScratch {
   std::vector<ViewpointTap> u_taps;  ///< one per s node
   std::vector<ViewpointTap> v_taps;  ///< one per t node
-  std::vector<float> u_weights;
+  std::vector<TileTap> u_tiles, v_tiles;
+  std::vector<std::int32_t> u_begin, v_begin;
+  std::vector<float> run_weights;
+};
+
+/// Images of the nodes of a footprint, [t][s] with `stride` values from row to row, each writable
+/// for 32 values beyond its end.
+struct BlendedImages {
+  float* value = nullptr;
+  /// Derivatives with respect to the source's x and z, per mm, as the source moves parallel to the
+  /// planes and the nodes stay; null when not wanted.
+  float* source_x = nullptr;
+  float* source_z = nullptr;
+  std::ptrdiff_t stride = 0;
 };
 
 /// First pass of a look-up: all rays of a DRR meet in the source, so the viewpoint (u, v) of a ray
-/// is an affine function of its (s, t), u of s and v of t alone. Blends the four viewpoints around
-/// it for every (s,t) node.
+/// is an affine function of its (s, t), u of s and v of t alone. Blends the viewpoints around it
+/// for every (s,t) node.
 class ViewpointBlender {
  public:
   virtual ~ViewpointBlender() = default;
@@ -34,20 +52,23 @@ class ViewpointBlender {
   [[nodiscard]] virtual const LightSlab& coverage() const = 0;
   /// The (s,t) nodes of slab k, in the order of coverage().slabs.
   [[nodiscard]] virtual const SlabGeometry& lattice(std::size_t k) const = 0;
-  /// Total attenuation of the rays from rays.source through the nodes of `footprint`, into
-  /// `blended` [t][s]; nodes that are not stored are 0.
+  [[nodiscard]] virtual Footprint footprint(std::size_t k,
+                                            const SlabRays& rays,
+                                            int margin) const = 0;
+  /// Total attenuation of the rays from rays.source through the needed nodes of `footprint`; nodes
+  /// that are not stored are 0, those not needed are unspecified.
   virtual void blend(std::size_t k,
                      const SlabRays& rays,
                      const Footprint& footprint,
                      BlendScratch& scratch,
-                     std::span<float> blended) const = 0;
+                     const BlendedImages& images) const = 0;
 };
 
 /// From the codebook's tiles.
 std::unique_ptr<const ViewpointBlender> make_viewpoint_blender(
-    std::shared_ptr<const CompressedAttenuationField> field);
+    std::shared_ptr<const CompressedAttenuationField> field, AxisInterpolation uv);
 /// From decoded samples.
 std::unique_ptr<const ViewpointBlender> make_viewpoint_blender(
-    std::shared_ptr<const FieldLevel> level);
+    std::shared_ptr<const FieldLevel> level, AxisInterpolation uv);
 
 }  // namespace af

@@ -5,36 +5,94 @@
 
 namespace af {
 
-/// One detector row of a homography: the node coordinates of column c are (s_0 + c s_1) / (d_0 + c
-/// d_1), likewise t.
-struct WarpRow {
-  float s_0, s_1;
-  float t_0, t_1;
-  float d_0, d_1;
+/// Node coordinates of detector pixels: s(c, r) = S / D, t = T / D, each of S, T and D being
+/// affine: [0] + c [1] + r [2].
+struct Homography {
+  double s[3];
+  double t[3];
+  double d[3];
 };
 
-/// Image of (s,t) nodes: s fastest, at least 2 x 2.
+/// Image of (s,t) nodes: s fastest, at least 2 x 2; readable for one row and 32 values beyond its
+/// end.
 struct NodeImage {
   const float* values;
+  int32_t stride;  ///< from row to row
   int32_t s_count;
   int32_t t_count;
 };
 
-/// Adds the bilinearly resampled image to `columns` values of a detector row. Coordinates are
-/// clamped to the image.
-using AddWarpedRow = void (*)(const NodeImage& image,
-                              const WarpRow& row,
-                              float* values,
-                              int32_t columns);
+/// Where resampled pixels go: rows x columns, row-major.
+struct PixelGrid {
+  int32_t columns;
+  int32_t rows;
+  bool adds;  ///< to what stands there, instead of replacing it
+};
 
-namespace kernels_128 {
-void add_warped_row(const NodeImage& image, const WarpRow& row, float* values, int32_t columns);
-}
-namespace kernels_256 {
-void add_warped_row(const NodeImage& image, const WarpRow& row, float* values, int32_t columns);
-}
-namespace kernels_512 {
-void add_warped_row(const NodeImage& image, const WarpRow& row, float* values, int32_t columns);
-}
+/// Resamples a node image bilinearly. Coordinates are clamped to the image.
+using WarpImage = void (*)(const NodeImage& image,
+                           const Homography& homography,
+                           const PixelGrid& grid,
+                           float* values);
+
+/// What turns slopes of node images into derivatives for the motions of the CT. In the slab frame a
+/// ray through `source` meets the node plane at source + reach (m_x, 1, m_z). Moving the ray acts
+/// on a pixel like velocities on forces: F = (I_x, ., I_z) at the node plane (the image's slopes
+/// per mm) and G at the source (the blended viewpoints'), both perpendicular to the ray.
+struct PoseSlopes {
+  const float* source_x;  ///< G_x, per mm, a node image like the value's
+  const float* source_z;  ///< G_z
+  float nodes_per_mm[2];  ///< along s, t
+  float m_scale[2];       ///< m_x = m_scale[0] s + m_offset[0], m_z likewise of t
+  float m_offset[2];
+  /// One row per room axis: what F + G, and (m_x, 1, m_z) x F and F + G, do to the derivatives.
+  float translation_of_force[3][3];
+  float rotation_of_moment[3][3];
+  float rotation_of_force[3][3];
+};
+
+/// The same with six planes of rows x columns derivatives, `plane_stride` values apart, in the
+/// order of PoseGradients.
+using WarpWithPoseSlopes = void (*)(const NodeImage& image,
+                                    const PoseSlopes& slopes,
+                                    const Homography& homography,
+                                    const PixelGrid& grid,
+                                    float* values,
+                                    float* planes,
+                                    int64_t plane_stride);
+
+/// Resamples two node images, the slopes of one per node along s and t, to its slopes per pixel
+/// along columns and rows.
+using WarpSlopes = void (*)(const NodeImage& s_slopes,
+                            const float* t_slopes,
+                            const Homography& homography,
+                            const PixelGrid& grid,
+                            float* column_slopes,
+                            float* row_slopes);
+
+#define AF_DECLARE_KERNELS(space)                          \
+  namespace space {                                        \
+  void warp_image(const NodeImage& image,                  \
+                  const Homography& homography,            \
+                  const PixelGrid& grid,                   \
+                  float* values);                          \
+  void warp_with_pose_slopes(const NodeImage& image,       \
+                             const PoseSlopes& slopes,     \
+                             const Homography& homography, \
+                             const PixelGrid& grid,        \
+                             float* values,                \
+                             float* planes,                \
+                             int64_t plane_stride);        \
+  void warp_slopes(const NodeImage& s_slopes,              \
+                   const float* t_slopes,                  \
+                   const Homography& homography,           \
+                   const PixelGrid& grid,                  \
+                   float* column_slopes,                   \
+                   float* row_slopes);                     \
+  }
+AF_DECLARE_KERNELS(kernels_128)
+AF_DECLARE_KERNELS(kernels_256)
+AF_DECLARE_KERNELS(kernels_512)
+#undef AF_DECLARE_KERNELS
 
 }  // namespace af

@@ -6,9 +6,8 @@
 #include <sstream>
 
 #include "base/error.h"
-#include "drr/af_drr.h"
+#include "drr/field_renderer.h"
 #include "drr/ray_cast_drr.h"
-#include "drr/two_pass_af_drr.h"
 #include "image/psnr.h"
 #include "io/csv_table.h"
 #include "io/ct_reader.h"
@@ -82,15 +81,6 @@ void append_output_problems(const DrrOptions& options, std::vector<std::string>&
                     ": must be 0 <= low < high <= 100");
 }
 
-std::shared_ptr<const DrrRenderer> field_renderer(
-    std::shared_ptr<const CompressedAttenuationField> field, const std::string& interpolation) {
-  if (interpolation == "nearest")
-    return std::make_shared<const AfDrr>(std::move(field), FieldInterpolation::Nearest);
-  if (interpolation == "quadrilinear")
-    return std::make_shared<const AfDrr>(std::move(field), FieldInterpolation::Quadrilinear);
-  return std::make_shared<const TwoPassAfDrr>(std::move(field));
-}
-
 struct CastCt {
   std::shared_ptr<const DrrRenderer> renderer;
   Eigen::Vector3d center_ct_mm;
@@ -142,7 +132,7 @@ DrrScene load_scene(const DrrOptions& options, const Communicator& communicator)
     field = read_field(options.field, communicator);
     scene.view = View::whole_detector(field->identity.camera);
     scene.frame = field->identity.frame;
-    scene.renderer = field_renderer(field, options.interpolation);
+    scene.renderer = make_field_renderer(field, options.interpolation);
   }
   if (!options.rig.empty()) {
     const CameraRig rig = read_rig(options.rig);

@@ -3,6 +3,7 @@
 
 #include "base/error.h"
 #include "cli/app_main.h"
+#include "drr/field_renderer.h"
 #include "tools/drr_command.h"
 
 namespace {
@@ -23,9 +24,10 @@ void bind_source(CLI::App& app, DrrOptions& options) {
   app.add_option(
          "--interpolation",
          options.interpolation,
-         "Look-up in the field: 'nearest' node, 'linear' in u, v, s and t in two quick passes (as "
-         "af-register does), or 'quadrilinear', literally over each ray's 16 neighbours")
-      ->check(CLI::IsMember({"nearest", "linear", "quadrilinear"}))
+         "Look-up in the field: 'nearest' node; 'linear' in u, v, s and t in two quick passes (as "
+         "af-register does); 'cubic' in s and t, 'cubic-uv' in all four; or 'quadrilinear', "
+         "literally over each ray's 16 neighbours")
+      ->check(CLI::IsMember(af::field_look_up_names()))
       ->capture_default_str();
   app.add_option("--water-mu-per-mm",
                  options.water_mu_per_mm,

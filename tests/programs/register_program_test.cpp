@@ -232,7 +232,7 @@ TEST_F(DrrProgram, RefusesWhatDoesNotFit) {
   expect_refused(run_drr("-o a.mha"), 3, "give --field");
   expect_refused(run_drr(field + " " + ct + out), 3, "only for --compare");
   expect_refused(run_drr(ct + out), 3, "needs --rig and --camera");
-  expect_refused(run_drr(field + " --interpolation cubic" + out), 2, "nearest");
+  expect_refused(run_drr(field + " --interpolation sinc" + out), 2, "nearest");
   expect_refused(run_drr(field + " -o " + path("a.jpg")), 3, "must end in");
   expect_refused(run_drr(field + " --compare" + out), 3, "needs both");
   expect_refused(run_drr(field + " --rotation-deg 1,2" + out), 2, "--rotation-deg");

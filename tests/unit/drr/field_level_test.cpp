@@ -213,9 +213,7 @@ TEST(TwoPassAfDrr, LevelsOfALinearFieldGiveTheSameDrr) {
 TEST(TwoPassAfDrr, LevelsHaveTheCoverageOfTheField) {
   const auto field = small_field(linear, 2, 5, 32);
   const View view = View::whole_detector(small_camera());
-  PoseParameters far;
-  far.translation_mm = {120.0, 0.0, -30.0};
-  const RigidTransform pose = pose_from_parameters({}, far);
+  const RigidTransform pose = pose_partly_outside();
   std::int64_t expected = 0;
   render_image(TwoPassAfDrr(field), pose, view, &expected);
   EXPECT_GT(expected, 0);

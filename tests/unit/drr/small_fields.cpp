@@ -78,4 +78,10 @@ PoseParameters small_pose(std::uint64_t index) {
   return parameters;
 }
 
+RigidTransform pose_partly_outside() {
+  PoseParameters far;
+  far.translation_mm = {80.0, 0.0, -30.0};
+  return pose_from_parameters({}, far);
+}
+
 }  // namespace af

@@ -24,4 +24,7 @@ std::shared_ptr<CompressedAttenuationField> small_field(const FieldFunction& fun
 /// Pose `index` of a fixed random series within the small fields' range.
 PoseParameters small_pose(std::uint64_t index);
 
+/// A pose that some of small_camera()'s rays, not all, miss the small fields at.
+RigidTransform pose_partly_outside();
+
 }  // namespace af

@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: Apache-2.0
+// For kernels only (see af_add_kernel): vectors of one register, 4, 8 or 16 lanes. For code whose
+// lanes do not meet each other; operations are per lane and never fused, so every width gives
+// identical bits. Beside vec16.h, whose vectors have 16 lanes at every width: GCC keeps those that
+// take several registers in memory.
+#pragma once
+
+#include <immintrin.h>
+#include <stdint.h>
+#include <string.h>
+
+namespace af::AF_KERNEL_NAMESPACE::native {
+
+#define AF_NATIVE_INLINE static inline __attribute__((always_inline))
+
+inline constexpr int kLanes = AF_VECTOR_BITS / 32;
+
+using Floats = float __attribute__((vector_size(AF_VECTOR_BITS / 8)));
+using Ints = int32_t __attribute__((vector_size(AF_VECTOR_BITS / 8)));
+
+AF_NATIVE_INLINE Floats splat(float value) {
+  return value - Floats{};
+}
+AF_NATIVE_INLINE Ints splat(int32_t value) {
+  return value - Ints{};
+}
+
+AF_NATIVE_INLINE Floats load(const float* from) {
+  Floats vector;
+  memcpy(&vector, from, sizeof(vector));
+  return vector;
+}
+
+/// Unsigned 16-bit elements as floats.
+AF_NATIVE_INLINE Floats load(const uint16_t* from) {
+  using Samples = uint16_t __attribute__((vector_size(AF_VECTOR_BITS / 16)));
+  Samples samples;
+  memcpy(&samples, from, sizeof(samples));
+  return __builtin_convertvector(__builtin_convertvector(samples, Ints), Floats);
+}
+
+AF_NATIVE_INLINE void store(float* to, Floats vector) {
+  memcpy(to, &vector, sizeof(vector));
+}
+
+/// Truncation towards zero.
+AF_NATIVE_INLINE Ints to_int(Floats value) {
+  return __builtin_convertvector(value, Ints);
+}
+AF_NATIVE_INLINE Floats to_float(Ints value) {
+  return __builtin_convertvector(value, Floats);
+}
+
+/// 0, 1, 2, ...
+AF_NATIVE_INLINE Ints lane_numbers() {
+  Ints lanes = splat(0);
+  for (int i = 0; i < kLanes; ++i) lanes[i] = i;
+  return lanes;
+}
+
+#if AF_VECTOR_BITS == 512
+#define AF_NATIVE(operation) _mm512_##operation
+#elif AF_VECTOR_BITS == 256
+#define AF_NATIVE(operation) _mm256_##operation
+#else
+#define AF_NATIVE(operation) _mm_##operation
+#endif
+
+// Registers of the intrinsics are vector types of the same size and convert by a cast.
+#if AF_VECTOR_BITS == 512
+using IntegerRegister = __m512i;
+#elif AF_VECTOR_BITS == 256
+using IntegerRegister = __m256i;
+#else
+using IntegerRegister = __m128i;
+#endif
+
+/// a < b ? a : b per lane.
+AF_NATIVE_INLINE Floats minimum(Floats a, Floats b) {
+  return AF_NATIVE(min_ps)(a, b);
+}
+AF_NATIVE_INLINE Ints minimum(Ints a, Ints b) {
+  return reinterpret_cast<Ints>(AF_NATIVE(min_epi32)(reinterpret_cast<IntegerRegister>(a),
+                                                     reinterpret_cast<IntegerRegister>(b)));
+}
+/// a > b ? a : b per lane.
+AF_NATIVE_INLINE Floats maximum(Floats a, Floats b) {
+  return AF_NATIVE(max_ps)(a, b);
+}
+
+/// True when any lane lies outside [low, high].
+AF_NATIVE_INLINE bool any_outside(Ints value, int32_t low, int32_t high) {
+#if AF_VECTOR_BITS == 512
+  // As unsigned numbers, those below `low` wrap around.
+  return _mm512_cmpgt_epu32_mask(reinterpret_cast<__m512i>(value - low),
+                                 _mm512_set1_epi32(high - low)) != 0;
+#elif AF_VECTOR_BITS == 256
+  const Ints outside = (value < low) | (value > high);
+  return _mm256_movemask_epi8(reinterpret_cast<__m256i>(outside)) != 0;
+#else
+  const Ints outside = (value < low) | (value > high);
+  return _mm_movemask_epi8(reinterpret_cast<__m128i>(outside)) != 0;
+#endif
+}
+
+/// base[offset] per lane.
+AF_NATIVE_INLINE Floats gather(const float* base, Ints offset) {
+#if AF_VECTOR_BITS == 512
+  return _mm512_i32gather_ps(reinterpret_cast<__m512i>(offset), base, 4);
+#elif AF_VECTOR_BITS == 256
+  return _mm256_i32gather_ps(base, reinterpret_cast<__m256i>(offset), 4);
+#else
+  return Floats{base[offset[0]], base[offset[1]], base[offset[2]], base[offset[3]]};
+#endif
+}
+
+#if AF_VECTOR_BITS >= 256
+/// window[index] per lane, index in 0 ... kLanes - 1.
+AF_NATIVE_INLINE Floats pick(Floats window, Ints index) {
+#if AF_VECTOR_BITS == 512
+  return _mm512_permutexvar_ps(reinterpret_cast<__m512i>(index), window);
+#else
+  return _mm256_permutevar8x32_ps(window, reinterpret_cast<__m256i>(index));
+#endif
+}
+#endif
+
+/// Stores a[0], b[0], a[1], b[1], ...
+AF_NATIVE_INLINE void store_interleaved(float* to, Floats a, Floats b) {
+#if AF_VECTOR_BITS == 512
+  store(to, __builtin_shufflevector(a, b, 0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23));
+  store(
+      to + kLanes,
+      __builtin_shufflevector(a, b, 8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31));
+#elif AF_VECTOR_BITS == 256
+  store(to, __builtin_shufflevector(a, b, 0, 8, 1, 9, 2, 10, 3, 11));
+  store(to + kLanes, __builtin_shufflevector(a, b, 4, 12, 5, 13, 6, 14, 7, 15));
+#else
+  store(to, __builtin_shufflevector(a, b, 0, 4, 1, 5));
+  store(to + kLanes, __builtin_shufflevector(a, b, 2, 6, 3, 7));
+#endif
+}
+
+#undef AF_NATIVE
+
+}  // namespace af::AF_KERNEL_NAMESPACE::native

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "drr/drr_renderer.h"
+#include "field/compressed_attenuation_field.h"
+
+namespace af {
+
+/// The ways of looking DRRs up that programs offer: "nearest" node, "linear" and "cubic" in (s,t)
+/// by two passes, "cubic-uv" by two passes and cubic in (u,v) too, "quadrilinear" literally over
+/// each ray's 16 neighbours.
+const std::vector<std::string>& field_look_up_names();
+
+/// The renderer of a way of field_look_up_names(); InputError when it is none of them.
+std::shared_ptr<const DrrRenderer> make_field_renderer(
+    std::shared_ptr<const CompressedAttenuationField> field, const std::string& look_up);
+
+}  // namespace af

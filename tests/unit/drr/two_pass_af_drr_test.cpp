@@ -1,0 +1,314 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "drr/two_pass_af_drr.h"
+
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "base/vector_width.h"
+#include "drr/af_drr.h"
+#include "unit/drr/small_fields.h"
+
+namespace af {
+namespace {
+
+constexpr TwoPassOptions kLinear{AxisInterpolation::Linear, AxisInterpolation::Linear};
+constexpr TwoPassOptions kCubicInSt{AxisInterpolation::Cubic, AxisInterpolation::Linear};
+constexpr TwoPassOptions kCubic{AxisInterpolation::Cubic, AxisInterpolation::Cubic};
+
+/// Smooth on the scale of the nodes, so that interpolations differ little from it; scaled up, since
+/// small fields hold integers.
+double waves(const RayNodes& n) {
+  return std::round(30000 + 8000 * std::sin(0.35 * n.s + 0.2 * n.u) * std::cos(0.3 * n.t) +
+                    4000 * std::cos(0.5 * n.v + 0.25 * n.t));
+}
+
+/// Everything a renderer can make of one view.
+struct Outputs {
+  std::vector<float> values, planes, column_gradient, row_gradient;
+
+  bool operator==(const Outputs&) const = default;
+};
+
+Outputs all_outputs(const TwoPassAfDrr& renderer,
+                    const RigidTransform& pose,
+                    const View& view,
+                    RenderWorkspace& workspace) {
+  const std::size_t pixels = view.pixel_count();
+  Outputs outputs{std::vector<float>(pixels),
+                  std::vector<float>(6 * pixels),
+                  std::vector<float>(pixels),
+                  std::vector<float>(pixels)};
+  const PoseGradients gradients{Eigen::Vector3d(10.0, -20.0, 30.0), outputs.planes};
+  renderer.render(pose, view, workspace, outputs.values, gradients);
+  renderer.render_gradient_images(
+      pose, view, workspace, outputs.column_gradient, outputs.row_gradient);
+  return outputs;
+}
+
+/// |a - b| / |b| over elements [begin, end).
+double relative_difference(const std::vector<float>& a,
+                           const std::vector<float>& b,
+                           std::size_t begin,
+                           std::size_t end) {
+  double difference = 0.0;
+  double norm = 0.0;
+  for (std::size_t i = begin; i < end; ++i) {
+    difference += std::pow(static_cast<double>(a[i]) - static_cast<double>(b[i]), 2);
+    norm += std::pow(static_cast<double>(b[i]), 2);
+  }
+  return std::sqrt(difference / norm);
+}
+
+TEST(TwoPassAfDrr, EveryVectorWidthGivesTheSameBits) {
+  for (const TwoPassOptions& options : {kLinear, kCubicInSt, kCubic})
+    for (const int slabs : {1, 2}) {
+      const auto field = small_field(waves, slabs, 7, 21);
+      const TwoPassAfDrr compressed(field, options);
+      const TwoPassAfDrr level(make_field_pyramid(*field, 1).front(), options);
+      for (const TwoPassAfDrr* renderer : {&compressed, &level}) {
+        const View view = View::whole_detector(small_camera());
+        const RigidTransform pose = pose_from_parameters({}, small_pose(8));
+        const auto workspace = renderer->make_workspace();
+        Outputs first;
+        for (const VectorWidth width : supported_vector_widths()) {
+          force_vector_width(width);
+          const Outputs outputs = all_outputs(*renderer, pose, view, *workspace);
+          if (first.values.empty()) first = outputs;
+          EXPECT_EQ(outputs, first) << to_string(width) << " bits";
+        }
+        force_vector_width(std::nullopt);
+      }
+    }
+}
+
+TEST(TwoPassAfDrr, AWorkspaceLeavesNoTrace) {
+  // Nodes that no ray needs are not written: what an earlier pose left there must not matter.
+  for (const TwoPassOptions& options : {kLinear, kCubic}) {
+    const auto field = small_field(waves, 2, 7, 41);
+    const TwoPassAfDrr renderer(field, options);
+    const TwoPassAfDrr level(make_field_pyramid(*field, 1).front(), options);
+    const View view{small_camera(), {4, 3, 20, 18}};
+    const auto workspace = renderer.make_workspace();
+    for (std::uint64_t i = 0; i < 20; ++i) {
+      PoseParameters parameters = small_pose(i);
+      parameters.rotation_rad.y() = (i % 2 == 0 ? 0.14 : -0.14);  // about the beam
+      const RigidTransform pose = pose_from_parameters({}, parameters);
+      for (const TwoPassAfDrr* each : {&renderer, &level})
+        EXPECT_EQ(all_outputs(*each, pose, view, *workspace),
+                  all_outputs(*each, pose, view, *each->make_workspace()));
+    }
+  }
+}
+
+TEST(TwoPassAfDrr, ValueIsTheSameWithAndWithoutGradients) {
+  const auto field = small_field(waves, 2, 7, 21);
+  const View view = View::whole_detector(small_camera());
+  const RigidTransform pose = pose_from_parameters({}, small_pose(2));
+  for (const TwoPassOptions& options : {kLinear, kCubic}) {
+    const TwoPassAfDrr renderer(field, options);
+    EXPECT_EQ(all_outputs(renderer, pose, view, *renderer.make_workspace()).values,
+              render_image(renderer, pose, view).pixels);
+  }
+}
+
+TEST(TwoPassAfDrr, LargeMagnificationAndSteepRowsAgreeWithQuadrilinearLookup) {
+  // 16 pixels span more than 16 nodes, or many rows: lanes are gathered instead of picked. A field
+  // without u-s and v-t products is bilinear between nodes, and both look-ups must agree.
+  const auto bilinear = [](const RayNodes& n) {
+    return 4000 + 30 * n.u + 50 * n.v + 70 * n.s + 20 * n.t + n.s * n.t;
+  };
+  const auto field = small_field(bilinear, 1, 5, 151);
+  CameraGeometry turned = small_camera();
+  std::swap(turned.column_direction, turned.row_direction);
+  turned.detector_origin_point = {-69.0, 370.0, 90.0};
+  CameraGeometry oblique = small_camera();
+  oblique.column_direction = Eigen::Vector3d(1.0, 0.0, 0.5).normalized();
+  oblique.row_direction = Eigen::Vector3d(0.5, 0.0, -1.0).normalized();
+  oblique.pixel_spacing_mm = {0.8, 0.8};
+  oblique.detector_origin_point = {-20.0, 370.0, 5.0};
+  for (const CameraGeometry& camera : {small_camera(), turned, oblique}) {
+    const View view = View::whole_detector(camera);
+    for (std::uint64_t i = 0; i < 5; ++i) {
+      const RigidTransform pose = pose_from_parameters({}, small_pose(i));
+      const Image2d expected = render_image(AfDrr(field), pose, view);
+      const Image2d image = render_image(TwoPassAfDrr(field), pose, view);
+      // Single-precision node coordinates (150 nodes, 1e-5) times 220 levels a node of 10^4.
+      constexpr float kTolerance = 2e-6f;
+      for (std::size_t p = 0; p < image.pixels.size(); ++p)
+        ASSERT_NEAR(image.pixels[p], expected.pixels[p], kTolerance * expected.pixels[p]);
+    }
+  }
+}
+
+TEST(TwoPassAfDrr, GradientsAgreeWithCentralDifferences) {
+  // Slopes jump at the borders between cells: in a share of pixels of about twice the step over the
+  // spacing (0.02 mm of 14 mm nodes, as wide as the pixels) the difference mixes two slopes.
+  // Single-precision noise is 1e-7 of the value over 1e-6 of it per step.
+  const DifferenceSteps steps{1e-4, 0.05};
+  constexpr double kRelativeTolerance = 0.03;
+  for (const TwoPassOptions& options : {kLinear, kCubicInSt, kCubic})
+    for (const int slabs : {1, 2}) {
+      const auto field = small_field(waves, slabs, 7, 41);
+      const TwoPassAfDrr fine(field, options);
+      const TwoPassAfDrr level(make_field_pyramid(*field, 1).front(), options);
+      for (const TwoPassAfDrr* renderer : {&fine, &level}) {
+        const View view{small_camera(), {3, 2, 20, 15}};
+        const RigidTransform pose = pose_from_parameters({}, small_pose(6));
+        const auto workspace = renderer->make_workspace();
+        const Outputs outputs = all_outputs(*renderer, pose, view, *workspace);
+        std::vector<float> differences(outputs.planes.size());
+        central_difference_gradients(*renderer,
+                                     pose,
+                                     view,
+                                     *workspace,
+                                     {Eigen::Vector3d(10.0, -20.0, 30.0), differences},
+                                     steps);
+        const std::size_t pixels = view.pixel_count();
+        for (std::size_t parameter = 0; parameter < 6; ++parameter)
+          EXPECT_LT(relative_difference(
+                        outputs.planes, differences, parameter * pixels, (parameter + 1) * pixels),
+                    kRelativeTolerance)
+              << "parameter " << parameter << ", " << slabs << " slabs";
+      }
+    }
+}
+
+TEST(TwoPassAfDrr, GradientsOfAMultilinearFieldEqualThoseOfQuadrilinearLookup) {
+  const auto field = small_field(
+      [](const RayNodes& n) {
+        return 4000 + 30 * n.u + 50 * n.v + 70 * n.s + 20 * n.t + n.s * n.t + 5 * n.u * n.v;
+      },
+      2,
+      5,
+      21);
+  const View view{small_camera(), {3, 2, 20, 15}};
+  const RigidTransform pose = pose_from_parameters({}, small_pose(6));
+  std::vector<float> values(view.pixel_count());
+  std::vector<float> expected(6 * view.pixel_count());
+  const AfDrr exact(field);
+  const Eigen::Vector3d pivot(10.0, -20.0, 30.0);
+  exact.render(pose, view, *exact.make_workspace(), values, PoseGradients{pivot, expected});
+  const TwoPassAfDrr renderer(field);
+  const Outputs outputs = all_outputs(renderer, pose, view, *renderer.make_workspace());
+  // The slope along the source's depth is taken at the pixel instead of its four nodes: within a
+  // cell of 14 mm, 2 % of the source's distance, times the small (u,v) part.
+  constexpr double kRelativeTolerance = 2e-3;
+  for (std::size_t parameter = 0; parameter < 6; ++parameter)
+    EXPECT_LT(
+        relative_difference(
+            outputs.planes, expected, parameter * values.size(), (parameter + 1) * values.size()),
+        kRelativeTolerance)
+        << "parameter " << parameter;
+}
+
+TEST(TwoPassAfDrr, OutsideRaysHaveNoGradient) {
+  const auto field = small_field(waves, 2, 7, 21);
+  const View view = View::whole_detector(small_camera());
+  const RigidTransform pose = pose_partly_outside();
+  const TwoPassAfDrr renderer(field);
+  const Outputs outputs = all_outputs(renderer, pose, view, *renderer.make_workspace());
+  int outside = 0;
+  for (std::size_t i = 0; i < outputs.values.size(); ++i) {
+    if (outputs.values[i] != 0.0f) continue;
+    ++outside;
+    for (std::size_t plane = 0; plane < 6; ++plane)
+      EXPECT_EQ(outputs.planes[plane * outputs.values.size() + i], 0.0f);
+    EXPECT_EQ(outputs.column_gradient[i], 0.0f);
+    EXPECT_EQ(outputs.row_gradient[i], 0.0f);
+  }
+  EXPECT_GT(outside, 0);
+  EXPECT_LT(outside, static_cast<int>(outputs.values.size()));
+}
+
+TEST(TwoPassAfDrr, CubicInterpolationIsMoreAccurateOnASmoothField) {
+  // A wave of 9 nodes along s and t: between nodes, linear interpolation errs by up to
+  // (2 pi / 9)^2 / 8 = 6 % of it, Catmull-Rom's cubic by some tenths of that.
+  constexpr double kWaveNumber = 2.0 * std::numbers::pi / 9.0;
+  const auto wave = [](const RayNodes& n) {
+    return std::sin(kWaveNumber * n.s) * std::sin(kWaveNumber * n.t);
+  };
+  const auto field =
+      small_field([&](const RayNodes& n) { return std::round(30000 + 20000 * wave(n)); }, 1, 5, 41);
+  CameraGeometry camera = small_camera();
+  camera.pixel_spacing_mm = {1.7, 1.7};
+  camera.detector_origin_point = {-25.0, 370.0, 20.0};
+  const View view = View::whole_detector(camera);
+  const RigidTransform pose = pose_from_parameters({}, small_pose(1));
+  const RigidTransform slab_from_room = field->light_slab.slab_from_ct * pose.inverse();
+  std::array<double, 2> squares{};
+  for (std::size_t i = 0; i < 2; ++i) {
+    const Image2d image =
+        render_image(TwoPassAfDrr(field, i == 0 ? kLinear : kCubicInSt), pose, view);
+    for (int row = 0; row < image.height; ++row)
+      for (int column = 0; column < image.width; ++column) {
+        const Ray ray = camera.ray(column, row);
+        const RayNodes nodes = *field->light_slab.intersect(
+            {slab_from_room * ray.origin_point, slab_from_room.linear() * ray.direction},
+            field->light_slab.slabs[0]);
+        squares[i] += std::pow(
+            static_cast<double>(image.at(column, row)) - 0.25 * (30000 + 20000 * wave(nodes)), 2);
+      }
+  }
+  constexpr double kLeastGain = 2.5;  // of the RMS error; the last step remains linear
+  EXPECT_GT(std::sqrt(squares[0] / squares[1]), kLeastGain);
+}
+
+TEST(TwoPassAfDrr, CubicInterpolationReproducesALinearField) {
+  // Including the outermost viewpoints, beyond which the field continues linearly.
+  const auto linear = [](const RayNodes& n) {
+    return 4096 + 64 * (3 * n.u + 5 * n.v + 8 * n.s - 4 * n.t);
+  };
+  const auto field = small_field(linear, 2, 4, 41);
+  const View view{small_camera(), {5, 4, 20, 15}};
+  for (std::uint64_t i = 0; i < 10; ++i) {
+    const RigidTransform pose = pose_from_parameters({}, small_pose(i));
+    const Image2d expected = render_image(TwoPassAfDrr(field, kLinear), pose, view);
+    const Image2d image = render_image(TwoPassAfDrr(field, kCubic), pose, view);
+    constexpr float kTolerance = 1e-5f;  // single precision over a few dozen operations
+    for (std::size_t p = 0; p < image.pixels.size(); ++p)
+      EXPECT_NEAR(image.pixels[p], expected.pixels[p], kTolerance * expected.pixels[p]);
+  }
+}
+
+TEST(TwoPassAfDrr, GradientImagesEqualDifferencesOfASmoothDrr) {
+  // Where the blended image is bilinear in (s,t), Sobel's smoothing changes nothing, and central
+  // differences over two pixels are exact but for the perspective within them.
+  const auto field = small_field(
+      [](const RayNodes& n) {
+        return 4000 + 30 * n.u + 50 * n.v + 70 * n.s + 20 * n.t + n.s * n.t;
+      },
+      2,
+      5,
+      41);
+  const TwoPassAfDrr renderer(field);
+  const View view{small_camera(), {5, 4, 20, 15}};
+  for (std::uint64_t i = 0; i < 5; ++i) {
+    const RigidTransform pose = pose_from_parameters({}, small_pose(i));
+    const Image2d drr = render_image(renderer, pose, view);
+    const Outputs outputs = all_outputs(renderer, pose, view, *renderer.make_workspace());
+    std::array<double, 2> difference{};
+    std::array<double, 2> norm{};
+    for (int row = 1; row + 1 < drr.height; ++row)
+      for (int column = 1; column + 1 < drr.width; ++column) {
+        const auto at = static_cast<std::size_t>(row * drr.width + column);
+        const std::array<double, 2> expected{
+            0.5 * static_cast<double>(drr.at(column + 1, row) - drr.at(column - 1, row)),
+            0.5 * static_cast<double>(drr.at(column, row + 1) - drr.at(column, row - 1))};
+        const std::array<float, 2> gradient{outputs.column_gradient[at], outputs.row_gradient[at]};
+        for (std::size_t axis = 0; axis < 2; ++axis) {
+          difference[axis] += std::pow(static_cast<double>(gradient[axis]) - expected[axis], 2);
+          norm[axis] += std::pow(expected[axis], 2);
+        }
+      }
+    constexpr double kRelativeTolerance = 2e-3;
+    for (std::size_t axis = 0; axis < 2; ++axis)
+      EXPECT_LT(std::sqrt(difference[axis] / norm[axis]), kRelativeTolerance);
+  }
+}
+
+}  // namespace
+}  // namespace af
