@@ -9,15 +9,13 @@
 #include <utility>
 
 #include "base/error.h"
-#include "cli/app_main.h"
 #include "cli/progress_printer.h"
+#include "evaluate/method_loading.h"
 #include "evaluate/row_gathering_program.h"
 #include "evaluate/target_box.h"
-#include "evaluate/tre.h"
 #include "io/output_file.h"
 #include "io/picture.h"
 #include "parallel/work_queue.h"
-#include "register/case_loading.h"
 #include "register/result_files.h"
 
 namespace af::evaluation {
@@ -26,7 +24,6 @@ namespace {
 using nlohmann::json;
 using registration::RegistrationResult;
 using registration::RegistrationRunner;
-using registration::RendererKind;
 using registration::StopReason;
 
 /// One renderer's share of a case.
@@ -35,49 +32,6 @@ struct Method {
   RegistrationRunner runner;
   std::vector<std::size_t> start_indices;
 };
-
-registration::RegistrationOptions registration_options(const RegistrationStudyOptions& options) {
-  registration::RegistrationOptions result = registration::preset_options(options.preset);
-  if (options.similarity.has_value()) result.similarity.name = *options.similarity;
-  if (options.optimizer.has_value()) result.optimizer = *options.optimizer;
-  throw_if_any(problems(result));
-  return result;
-}
-
-registration::CaseLoadOptions load_options(const RegistrationStudyOptions& options,
-                                           const std::string& renderer) {
-  registration::CaseLoadOptions result;
-  result.renderer = renderer == "field" ? RendererKind::Field : RendererKind::RayCast;
-  if (renderer == "field")
-    for (const std::string& text : options.fields) {
-      const std::size_t equals = text.find('=');
-      result.field_paths[text.substr(0, equals)] = text.substr(equals + 1);
-    }
-  result.ct.series_uid = options.series_uid;
-  result.water_mu_per_mm = options.water_mu_per_mm;
-  result.ray_caster.step_mm = options.step_mm;
-  return result;
-}
-
-/// Collective.
-std::vector<Method> load_methods(const RegistrationStudyOptions& options,
-                                 const Study& study,
-                                 const StudyCase& study_case,
-                                 const Communicator& world,
-                                 CaseEvaluation& evaluation) {
-  std::vector<Method> methods;
-  for (const std::string& renderer : options.renderers()) {
-    const registration::LoadedCase loaded =
-        registration::load_case(study, study_case, load_options(options, renderer), world);
-    for (const std::string& text : loaded.warnings) cli::warn(world, text);
-    for (const auto& [name, hash] : loaded.input_sha256)
-      evaluation.input_sha256[study_case.name + ": " + name] = hash;
-    RegistrationRunner runner = all_or_none(
-        world, [&] { return RegistrationRunner(loaded.problem, registration_options(options)); });
-    methods.push_back({renderer, std::move(runner), {}});
-  }
-  return methods;
-}
 
 /// Inside the motion range of every field in use.
 bool is_admissible(const std::vector<Method>& methods, const RigidTransform& room_from_ct) {
@@ -89,19 +43,20 @@ bool is_admissible(const std::vector<Method>& methods, const RigidTransform& roo
   return true;
 }
 
+StartFrame start_frame(const StudyCase& study_case, const GoldStandard& gold) {
+  return {study_case.name, gold.room_from_ct, study_case.center_ct_mm, study_case.target_box_ct};
+}
+
 StratifiedStarts draw_starts(const RegistrationStudyOptions& options,
                              const StudyCase& study_case,
                              const GoldStandard& gold,
                              const std::vector<Method>& methods) {
-  const StartFrame frame = {
-      study_case.name, gold.room_from_ct, study_case.center_ct_mm, study_case.target_box_ct};
-  const StartOptions start_options = {
-      options.intervals, options.interval_width_mm, options.starts_per_interval, options.seed};
-  return stratified_starts(
-      frame,
-      start_options,
-      target_points(study_case.target_box_ct),
-      [&](const RigidTransform& pose) { return is_admissible(methods, pose); });
+  const auto admissible = [&](const RigidTransform& pose) { return is_admissible(methods, pose); };
+  const auto& draw = options.start_rule == "uniform" ? uniform_starts : stratified_starts;
+  return draw(start_frame(study_case, gold),
+              options.start_options(),
+              target_points(study_case.target_box_ct),
+              admissible);
 }
 
 /// With both renderers, ray casting may be given fewer intervals and starts.
@@ -114,8 +69,10 @@ void assign_starts(const RegistrationStudyOptions& options,
   const int per_interval =
       is_reduced ? options.raycast_starts_per_interval.value_or(options.starts_per_interval)
                  : options.starts_per_interval;
+  // Of the others every start counts, also those of a file that lie beyond the intervals.
   for (std::size_t i = 0; i < starts.starts.size(); ++i)
-    if (starts.starts[i].interval < intervals && starts.starts[i].rank_in_interval < per_interval)
+    if (!is_reduced ||
+        (starts.starts[i].interval < intervals && starts.starts[i].rank_in_interval < per_interval))
       method.start_indices.push_back(i);
 }
 
@@ -134,12 +91,7 @@ void add_result(const RegistrationResult& result,
   row.seconds = result.seconds;
   if (!has_pose(result)) return;
   row.similarity = result.similarity;
-  row.final_deg_mm = parameters_from_pose(yardstick.gold_frame, result.room_from_ct).deg_and_mm();
-  row.tre_mm =
-      mean_tre_mm(result.room_from_ct, yardstick.gold_room_from_ct, yardstick.points_ct_mm);
-  if (yardstick.stated_pose.has_value())
-    row.stated_pose_tre_mm =
-        mean_tre_mm(result.room_from_ct, *yardstick.stated_pose, yardstick.points_ct_mm);
+  measure_pose(result.room_from_ct, yardstick, row);
 }
 
 /// Collective. Registers every start of one method; `first_order` numbers its rows. Methods go one
@@ -254,15 +206,38 @@ void draw_overlays(const Method& method,
 
 }  // namespace
 
+PoseTableFrames pose_table_frames(const Study& study,
+                                  const StudyCase& study_case,
+                                  const GoldStandard& gold) {
+  return {study_case.name,
+          study.cases.size() == 1,
+          PoseFrame::about(gold.room_from_ct, study_case.center_ct_mm),
+          PoseFrame::about(study_case.nominal_room_from_ct, study_case.center_ct_mm)};
+}
+
+StratifiedStarts given_starts(const RegistrationStudyOptions& options,
+                              const Study& study,
+                              const StudyCase& study_case,
+                              const GoldStandard& gold) {
+  return starts_at(start_frame(study_case, gold),
+                   options.start_options(),
+                   target_points(study_case.target_box_ct),
+                   read_starts(options.starts_from, pose_table_frames(study, study_case, gold)));
+}
+
+void set_start(const PerturbedStart& start, RegistrationRow& row) {
+  row.draw_index = start.draw_index;
+  row.interval = start.interval;
+  row.start_deg_mm = start.parameters.deg_and_mm();
+  row.initial_tre_mm = start.initial_tre_mm;
+}
+
 RegistrationRow registered_row(
     const std::function<RegistrationResult(const RigidTransform& start)>& run,
     const PerturbedStart& start,
     const Yardstick& yardstick) {
   RegistrationRow row;
-  row.draw_index = start.draw_index;
-  row.interval = start.interval;
-  row.start_deg_mm = start.parameters.deg_and_mm();
-  row.initial_tre_mm = start.initial_tre_mm;
+  set_start(start, row);
   try {
     add_result(run(start.room_from_ct), yardstick, row);
   } catch (const std::exception& error) {
@@ -279,19 +254,20 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
                              const std::function<void(const CaseEvaluation&)>& on_starts) {
   CaseEvaluation evaluation;
   evaluation.case_name = study_case.name;
-  std::vector<Method> methods = load_methods(options, study, study_case, world, evaluation);
+  std::vector<Method> methods;
+  for (LoadedMethod& method :
+       load_methods(options, study, study_case, world, evaluation.input_sha256))
+    methods.push_back({method.renderer, std::move(method.runner), {}});
   all_or_none(world, [&] {
     evaluation.gold = gold_standard(study, study_case, options.gold);
-    evaluation.starts = draw_starts(options, study_case, evaluation.gold, methods);
+    evaluation.starts = options.starts_from.empty()
+                            ? draw_starts(options, study_case, evaluation.gold, methods)
+                            : given_starts(options, study, study_case, evaluation.gold);
     for (Method& method : methods) assign_starts(options, evaluation.starts, method);
     on_starts(evaluation);
   });
-  Yardstick yardstick;
-  yardstick.gold_room_from_ct = evaluation.gold.room_from_ct;
-  yardstick.gold_frame = PoseFrame::about(evaluation.gold.room_from_ct, study_case.center_ct_mm);
-  if (evaluation.gold.source == "fiducials") yardstick.stated_pose = evaluation.gold.stated_pose;
-  yardstick.points_ct_mm = target_points(study_case.target_box_ct);
-
+  if (options.is_starts_only) return evaluation;
+  const Yardstick yardstick = yardstick_of(study, study_case, evaluation.gold);
   evaluation.rows = register_all(study_case.name, methods, evaluation.starts, yardstick, world);
   all_or_none(world, [&] {
     if (!world.is_root()) return;

@@ -4,7 +4,6 @@
 #include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,6 +11,8 @@
 #include "evaluate/perturbed_starts.h"
 #include "evaluate/registration_command.h"
 #include "evaluate/registration_rows_files.h"
+#include "evaluate/start_pose_files.h"
+#include "evaluate/yardstick_files.h"
 #include "io/study_file.h"
 #include "parallel/communicator.h"
 #include "register/registration.h"
@@ -25,16 +26,23 @@ struct CaseEvaluation {
   StratifiedStarts starts;
   std::vector<RegistrationRow> rows;  ///< rank 0: by renderer, start index
   std::map<std::string, std::string> input_sha256;
+  std::vector<std::string> pose_problems;             ///< of poses that were read, in words
   nlohmann::json pictures = nlohmann::json::array();  ///< rank 0: files and what they show
 };
 
-/// What registrations are measured with.
-struct Yardstick {
-  PoseFrame gold_frame;
-  RigidTransform gold_room_from_ct = RigidTransform::Identity();
-  std::optional<RigidTransform> stated_pose;  ///< only beside fiducials
-  std::vector<Eigen::Vector3d> points_ct_mm;
-};
+/// What poses in files of one case are relative to.
+PoseTableFrames pose_table_frames(const Study& study,
+                                  const StudyCase& study_case,
+                                  const GoldStandard& gold);
+
+/// The starts of --starts-from for one case.
+StratifiedStarts given_starts(const RegistrationStudyOptions& options,
+                              const Study& study,
+                              const StudyCase& study_case,
+                              const GoldStandard& gold);
+
+/// The start of a row.
+void set_start(const PerturbedStart& start, RegistrationRow& row);
 
 /// The row of one registration, without case, renderer and start index. Never throws for `run`: an
 /// exception becomes stop reason "error" with its message; a result without similarity has no pose.
@@ -47,7 +55,8 @@ RegistrationRow registered_row(
 /// Collective. Draws a case's starts, calls `on_starts` with the evaluation so far (on every rank,
 /// before anything is registered), registers from every start with every renderer, the work shared
 /// over the ranks as these become free, and draws the X-rays and the overlays of the best, median
-/// and worst result. A registration that throws becomes a row without a pose.
+/// and worst result. A registration that throws becomes a row without a pose. With --starts-only
+/// nothing is registered and drawn.
 CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
                              const Study& study,
                              const StudyCase& study_case,

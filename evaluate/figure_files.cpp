@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <string_view>
 
 #include "base/hash_random.h"
@@ -69,6 +70,13 @@ constexpr std::size_t kBars = 20;
 std::size_t bar_of(double tre_mm) {
   const double position = tre_mm / kBarWidthMm;
   return position < static_cast<double>(kBars) ? static_cast<std::size_t>(position) : kBars;
+}
+
+/// The start of a figure of several panels under one title.
+std::string multiplot(const std::string& title, int rows, int columns) {
+  return "unset title\nset multiplot layout " + std::to_string(rows) + "," +
+         std::to_string(columns) + " title " + gnuplot_quoted(title) + " textcolor rgb '" +
+         std::string(palette::kInk) + "'";
 }
 
 }  // namespace
@@ -225,6 +233,84 @@ void draw_tre_scatter(const std::vector<OutcomeGroup>& groups,
   figure.add(label_at(
       "no change", "graph 0.985, first " + number_text(largest_initial_mm * 1.25), "right"));
   figure.add("plot " + joined(parts));
+  figure.write(path_without_extension);
+}
+
+void draw_curve_panels(const std::vector<CurvePanel>& panels,
+                       const std::string& title,
+                       const std::string& y_label,
+                       const std::filesystem::path& path_without_extension) {
+  GnuplotFigure figure(title, 900, 560);
+  double lowest = std::numeric_limits<double>::infinity();
+  double highest = -lowest;
+  for (const CurvePanel& panel : panels)
+    for (const PanelCurve& curve : panel.curves)
+      for (const double value : finite_of(curve.y)) {
+        lowest = std::min(lowest, value);
+        highest = std::max(highest, value);
+      }
+  const double margin = 0.05 * (highest - lowest);
+  const int rows = (static_cast<int>(panels.size()) + 2) / 3;
+  figure.add(multiplot(title, rows, 3) + "\nset yrange [" + number_text(lowest - margin) + ":" +
+             number_text(highest + 3 * margin) +
+             "]\nset arrow from 0, graph 0 to 0, graph 1 nohead " + "dt 2 lw 1 lc " + quiet() +
+             "\nset key at screen 0.99, screen 0.99 right top horizontal samplen 1.5");
+  for (std::size_t p = 0; p < panels.size(); ++p) {
+    std::vector<std::string> parts;
+    for (std::size_t c = 0; c < panels[p].curves.size(); ++c) {
+      const PanelCurve& curve = panels[p].curves[c];
+      std::vector<std::vector<double>> points;
+      for (std::size_t i = 0; i < curve.x.size(); ++i) points.push_back({curve.x[i], curve.y[i]});
+      const std::string name = "curve" + std::to_string(p) + "_" + std::to_string(c);
+      figure.add_data(name, points);
+      figure.add_data(name + "_peak", {{curve.peak_x, curve.peak_y}});
+      const std::string key = p == 0 ? "title " + gnuplot_quoted(curve.label) : "notitle";
+      parts.push_back("$" + name + " using 1:2 with lines lw 2 lc " + color_of(c) + " " + key);
+      parts.push_back("$" + name + "_peak using 1:2 with points pt " +
+                      std::to_string(c == 0 ? 7 : 4) + " ps 0.9 lc " + color_of(c) + " notitle");
+    }
+    figure.add("set xlabel " + gnuplot_quoted(panels[p].x_label) + "\nset ylabel " +
+               gnuplot_quoted(p % 3 == 0 ? y_label : "") + "\nplot " + joined(parts));
+  }
+  figure.add("unset multiplot");
+  figure.write(path_without_extension);
+}
+
+void draw_sweep_panels(const std::vector<SweepPanel>& panels,
+                       const std::string& title,
+                       const std::string& y_label,
+                       const std::filesystem::path& path_without_extension) {
+  GnuplotFigure figure(title, 760, 600);
+  const int rows = (static_cast<int>(panels.size()) + 1) / 2;
+  figure.add(multiplot(title, rows, 2) + "\nunset key\nset ylabel " + gnuplot_quoted(y_label));
+  for (std::size_t p = 0; p < panels.size(); ++p) {
+    std::vector<std::vector<double>> all;
+    std::vector<std::vector<double>> base;
+    std::string tics;
+    for (const SweepPoint& point : panels[p].points) {
+      all.push_back({point.x, point.middle, point.low, point.high});
+      if (point.is_base) base.push_back(all.back());
+      tics += (tics.empty() ? "" : ", ") + gnuplot_quoted(number_text(point.x)) + " " +
+              number_text(point.x);
+    }
+    if (all.empty()) continue;
+    const std::string name = "sweep" + std::to_string(p);
+    figure.add_data(name, all);
+    figure.add_data(name + "_base", base.empty() ? all : base);
+    const double low_x = all.front()[0];
+    const double high_x = all.back()[0];
+    const double room = panels[p].is_logarithmic ? 1.25 : 0.1 * (high_x - low_x) + 1e-3 * high_x;
+    figure.add(
+        std::string(panels[p].is_logarithmic ? "set logscale x" : "unset logscale x") +
+        "\nset xrange [" + number_text(panels[p].is_logarithmic ? low_x / room : low_x - room) +
+        ":" + number_text(panels[p].is_logarithmic ? high_x * room : high_x + room) +
+        "]\nset xtics (" + tics + ")\nset xlabel " + gnuplot_quoted(panels[p].x_label) + "\nplot " +
+        joined({"$" + name + " using 1:2 with lines lw 1.5 dt 3 lc " + color_of(0),
+                "$" + name + " using 1:2:3:4 with yerrorbars pt 7 ps 0.8 lw 2 lc " + color_of(0),
+                "$" + name + "_base using 1:2:3:4 with yerrorbars pt 7 ps 0.9 lw 2 lc " +
+                    color_of(base.empty() ? 0 : 1)}));
+  }
+  figure.add("unset multiplot");
   figure.write(path_without_extension);
 }
 

@@ -43,4 +43,47 @@ void draw_tre_scatter(const std::vector<OutcomeGroup>& groups,
                       double largest_initial_mm,
                       const std::filesystem::path& path_without_extension);
 
+/// One curve of a panel; NaN values are holes.
+struct PanelCurve {
+  std::string label;
+  std::vector<double> x;
+  std::vector<double> y;
+  double peak_x = 0.0;
+  double peak_y = 0.0;
+};
+
+struct CurvePanel {
+  std::string x_label;
+  std::vector<PanelCurve> curves;
+};
+
+/// Panels in rows of three with one common y axis, each with its curves, their highest points
+/// marked and a line at x = 0 (Fig. 14).
+void draw_curve_panels(const std::vector<CurvePanel>& panels,
+                       const std::string& title,
+                       const std::string& y_label,
+                       const std::filesystem::path& path_without_extension);
+
+/// Median and quartiles of a quantity over settings.
+struct SweepPoint {
+  double x = 0.0;
+  double low = 0.0;
+  double middle = 0.0;
+  double high = 0.0;
+  bool is_base = false;  ///< the setting that all sweeps share
+};
+
+struct SweepPanel {
+  std::string x_label;
+  bool is_logarithmic = true;
+  std::vector<SweepPoint> points;  ///< ascending x
+};
+
+/// Panels in rows of two: medians joined by a line, bars from `low` to `high`, the shared setting
+/// in another colour (Fig. 10).
+void draw_sweep_panels(const std::vector<SweepPanel>& panels,
+                       const std::string& title,
+                       const std::string& y_label,
+                       const std::filesystem::path& path_without_extension);
+
 }  // namespace af::evaluation

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/app_main.h"
+#include "evaluate/compare_command.h"
+#include "evaluate/field_parameters_command.h"
 #include "evaluate/image_quality_command.h"
 #include "evaluate/registration_command.h"
 #include "evaluate/report_command.h"
+#include "evaluate/similarity_curves_command.h"
 
 int main(int argc, char** argv) {
   CLI::App app{
@@ -13,12 +16,22 @@ int main(int argc, char** argv) {
   const CLI::App* image_quality_command = bind_image_quality(app, image_quality);
   af::evaluation::RegistrationStudyOptions registration;
   const CLI::App* registration_command = bind_registration(app, registration);
+  af::evaluation::SimilarityCurvesOptions curves;
+  const CLI::App* curves_command = bind_similarity_curves(app, curves);
+  af::evaluation::FieldParametersOptions field_parameters;
+  const CLI::App* field_parameters_command = bind_field_parameters(app, field_parameters);
+  af::evaluation::CompareOptions compare;
+  const CLI::App* compare_command = bind_compare(app, compare);
   af::evaluation::ReportOptions report;
   const CLI::App* report_command = bind_report(app, report);
   const std::string command_line = af::cli::command_line(argc, argv);
   return af::cli::app_main(app, argc, argv, [&](const af::Communicator& world) {
     if (image_quality_command->parsed()) run_image_quality(image_quality, command_line, world);
     if (registration_command->parsed()) run_registration(registration, command_line, world);
+    if (curves_command->parsed()) run_similarity_curves(curves, command_line, world);
+    if (field_parameters_command->parsed())
+      run_field_parameters(field_parameters, command_line, world);
+    if (compare_command->parsed()) run_compare(compare, world);
     if (report_command->parsed()) run_report(report, world);
   });
 }

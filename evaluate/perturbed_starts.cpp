@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <map>
 
 #include "base/error.h"
 #include "base/hash_random.h"
@@ -21,6 +22,7 @@ constexpr double kMagnitudeOverTre = 1.5;
 // Keys of the streams of random numbers, so that no two uses share one.
 constexpr std::uint64_t kDrawStream = 0x73746172;  // "star"
 constexpr std::uint64_t kPickStream = 0x7069636B;  // "pick"
+constexpr std::uint64_t kTreStream = 0x74726521;   // "tre!"
 
 std::uint64_t most_draws(const StartOptions& options) {
   const auto wanted = static_cast<std::uint64_t>(options.starts_per_interval) *
@@ -44,6 +46,45 @@ std::vector<PerturbedStart> pick(std::vector<PerturbedStart> candidates,
     return a.draw_index < b.draw_index;
   });
   return candidates;
+}
+
+/// TRE and interval of a start whose pose is set.
+void measure(const StartFrame& frame,
+             const StartOptions& options,
+             std::span<const Eigen::Vector3d> target_points_ct_mm,
+             PerturbedStart& start) {
+  start.initial_tre_mm =
+      mean_tre_mm(start.room_from_ct, frame.gold_room_from_ct, target_points_ct_mm);
+  constexpr double kFarthestInterval = 1e9;
+  start.interval = static_cast<int>(
+      std::min(start.initial_tre_mm / options.interval_width_mm, kFarthestInterval));
+}
+
+/// The same of one whose parameters are set.
+void locate(const StartFrame& frame,
+            const StartOptions& options,
+            std::span<const Eigen::Vector3d> target_points_ct_mm,
+            PerturbedStart& start) {
+  start.room_from_ct = pose_from_parameters(frame.pose_frame(), start.parameters);
+  measure(frame, options, target_points_ct_mm, start);
+}
+
+/// Scales the parameters until the initial TRE is `tre_mm`. TRE is a mean of distances that grow
+/// with the scale almost in proportion, so each step gains some digits.
+void scale_to_tre(const StartFrame& frame,
+                  const StartOptions& options,
+                  std::span<const Eigen::Vector3d> target_points_ct_mm,
+                  double tre_mm,
+                  PerturbedStart& start) {
+  constexpr double kToleranceMm = 1e-9;
+  constexpr int kMostSteps = 50;
+  for (int step = 0; step < kMostSteps; ++step) {
+    locate(frame, options, target_points_ct_mm, start);
+    if (std::abs(start.initial_tre_mm - tre_mm) < kToleranceMm) return;
+    const double factor = tre_mm / start.initial_tre_mm;
+    start.parameters.rotation_rad *= factor;
+    start.parameters.translation_mm *= factor;
+  }
 }
 
 [[noreturn]] void throw_too_empty(const std::vector<std::vector<PerturbedStart>>& by_interval,
@@ -101,9 +142,9 @@ StratifiedStarts stratified_starts(
   const double largest_magnitude_mm =
       kMagnitudeOverTre * options.intervals * options.interval_width_mm;
   const auto wanted = static_cast<std::size_t>(options.starts_per_interval);
-  const PoseFrame pose_frame = frame.pose_frame();
   std::vector<std::vector<PerturbedStart>> by_interval(static_cast<std::size_t>(options.intervals));
   StratifiedStarts result;
+  result.inadmissible_per_interval.resize(by_interval.size());
   std::size_t full_intervals = 0;
   while (full_intervals < by_interval.size()) {
     if (result.draws == most_draws(options)) throw_too_empty(by_interval, options, result);
@@ -111,16 +152,13 @@ StratifiedStarts stratified_starts(
     start.draw_index = result.draws++;
     start.parameters =
         draw_perturbation(frame, largest_magnitude_mm, options.seed, start.draw_index);
-    start.room_from_ct = pose_from_parameters(pose_frame, start.parameters);
-    start.initial_tre_mm =
-        mean_tre_mm(start.room_from_ct, frame.gold_room_from_ct, target_points_ct_mm);
-    const double position = start.initial_tre_mm / options.interval_width_mm;
-    if (!(position < options.intervals)) {
+    locate(frame, options, target_points_ct_mm, start);
+    if (start.interval >= options.intervals) {
       ++result.draws_beyond;
     } else if (!is_admissible(start.room_from_ct)) {
       ++result.inadmissible_draws;
+      ++result.inadmissible_per_interval[static_cast<std::size_t>(start.interval)];
     } else {
-      start.interval = static_cast<int>(position);
       std::vector<PerturbedStart>& candidates =
           by_interval[static_cast<std::size_t>(start.interval)];
       candidates.push_back(start);
@@ -131,6 +169,63 @@ StratifiedStarts stratified_starts(
   for (std::vector<PerturbedStart>& candidates : by_interval)
     for (const PerturbedStart& start : pick(std::move(candidates), options, case_key))
       result.starts.push_back(start);
+  return result;
+}
+
+StratifiedStarts uniform_starts(
+    const StartFrame& frame,
+    const StartOptions& options,
+    std::span<const Eigen::Vector3d> target_points_ct_mm,
+    const std::function<bool(const RigidTransform& room_from_ct)>& is_admissible) {
+  throw_if_any(problems(options));
+  constexpr std::uint64_t kMostAttempts = 1000;
+  const auto count = static_cast<std::uint64_t>(options.intervals) *
+                     static_cast<std::uint64_t>(options.starts_per_interval);
+  const double largest_tre_mm = options.intervals * options.interval_width_mm;
+  StratifiedStarts result;
+  result.inadmissible_per_interval.resize(static_cast<std::size_t>(options.intervals));
+  std::vector<int> found(static_cast<std::size_t>(options.intervals));
+  for (std::uint64_t index = 0; index < count; ++index) {
+    HashRandom random(options.seed, hash64(kTreStream, hash_name(frame.case_name)), index);
+    const double tre_mm = random.uniform(0.0, largest_tre_mm);
+    PerturbedStart start;
+    for (std::uint64_t attempt = 0;; ++attempt) {
+      if (attempt == kMostAttempts)
+        throw InputError("starts",
+                         std::to_string(tre_mm) + " mm",
+                         "every one of 1000 draws of this initial TRE lies outside the motion "
+                         "range: use fewer intervals or fields of a larger range");
+      start.draw_index = index * kMostAttempts + attempt;
+      start.parameters = draw_perturbation(frame, largest_tre_mm, options.seed, start.draw_index);
+      scale_to_tre(frame, options, target_points_ct_mm, tre_mm, start);
+      start.interval = std::min(start.interval, options.intervals - 1);
+      ++result.draws;
+      if (is_admissible(start.room_from_ct)) break;
+      ++result.inadmissible_draws;
+      ++result.inadmissible_per_interval[static_cast<std::size_t>(start.interval)];
+    }
+    start.rank_in_interval = found[static_cast<std::size_t>(start.interval)]++;
+    result.starts.push_back(start);
+  }
+  return result;
+}
+
+StratifiedStarts starts_at(const StartFrame& frame,
+                           const StartOptions& options,
+                           std::span<const Eigen::Vector3d> target_points_ct_mm,
+                           std::span<const RigidTransform> poses) {
+  StratifiedStarts result;
+  std::map<int, int> found;
+  for (const RigidTransform& pose : poses) {
+    PerturbedStart start;
+    start.draw_index = result.draws++;
+    start.parameters = parameters_from_pose(frame.pose_frame(), pose);
+    start.room_from_ct = pose;
+    measure(frame, options, target_points_ct_mm, start);
+    start.rank_in_interval = found[start.interval]++;
+    if (start.interval >= options.intervals) ++result.draws_beyond;
+    result.starts.push_back(start);
+  }
   return result;
 }
 

@@ -60,6 +60,9 @@ struct StratifiedStarts {
   std::uint64_t draws = 0;
   std::uint64_t inadmissible_draws = 0;  ///< refused by the predicate
   std::uint64_t draws_beyond = 0;        ///< initial TRE past the last interval
+  /// Refused by the predicate, by the interval that the draw would have been in; a start counts in
+  /// full intervals, too.
+  std::vector<std::uint64_t> inadmissible_per_interval;
 };
 
 /// The paper's rule: draws until every interval has enough, then picks at random that many in each.
@@ -71,5 +74,21 @@ StratifiedStarts stratified_starts(
     const StartOptions& options,
     std::span<const Eigen::Vector3d> target_points_ct_mm,
     const std::function<bool(const RigidTransform& room_from_ct)>& is_admissible);
+
+/// As many starts in all, with initial TREs uniform over all intervals together: start i has a TRE
+/// of its own, drawn by (seed, case name, i), and a direction that is drawn again while
+/// `is_admissible` refuses it, so that the distribution stays uniform. Throws InputError after 1000
+/// refusals of one start. \test PerturbedStarts.UniformInTreHaveThatDistribution
+StratifiedStarts uniform_starts(
+    const StartFrame& frame,
+    const StartOptions& options,
+    std::span<const Eigen::Vector3d> target_points_ct_mm,
+    const std::function<bool(const RigidTransform& room_from_ct)>& is_admissible);
+
+/// The starts at given poses, in their order; intervals may lie beyond the last one.
+StratifiedStarts starts_at(const StartFrame& frame,
+                           const StartOptions& options,
+                           std::span<const Eigen::Vector3d> target_points_ct_mm,
+                           std::span<const RigidTransform> poses);
 
 }  // namespace af::evaluation

@@ -12,15 +12,14 @@
 #include "cli/app_main.h"
 #include "evaluate/case_evaluation_program.h"
 #include "evaluate/figure_files.h"
+#include "evaluate/method_loading.h"
+#include "evaluate/pose_results_program.h"
+#include "evaluate/registration_statistics_files.h"
 #include "evaluate/summary_files.h"
 #include "io/gnuplot_figure.h"
 #include "io/output_file.h"
 #include "io/provenance.h"
 #include "io/sha256.h"
-#include "register/registration.h"
-#include "register/similarity/similarity_measure.h"
-#include "volume/attenuation_volume.h"
-#include "volume/ray_caster.h"
 
 namespace af::evaluation {
 namespace {
@@ -43,6 +42,7 @@ json case_json(const CaseEvaluation& evaluation) {
           {"starts", evaluation.starts.starts.size()},
           {"draws", evaluation.starts.draws},
           {"inadmissible_draws", evaluation.starts.inadmissible_draws},
+          {"inadmissible_draws_per_interval", evaluation.starts.inadmissible_per_interval},
           {"draws_beyond_last_interval", evaluation.starts.draws_beyond}};
 }
 
@@ -50,7 +50,8 @@ void draw_figures(const RegistrationStudyOptions& options,
                   const std::vector<RegistrationRow>& rows) {
   std::vector<OutcomeGroup> groups;
   for (const std::string& renderer : options.renderers())
-    groups.push_back({renderer == "field" ? "field" : "ray casting", outcomes_of(rows, renderer)});
+    groups.push_back(
+        {renderer == "raycast" ? "ray casting" : renderer, outcomes_of(rows, renderer)});
   const std::filesystem::path& folder = options.output_folder;
   draw_success_rates(groups, options.intervals, options.interval_width_mm, folder / "success-rate");
   draw_tre_histogram(groups, folder / "tre-histogram");
@@ -66,6 +67,10 @@ json summary_json(const RegistrationStudyOptions& options,
                   {"kind", "registration"},
                   {"study", study.path.string()},
                   {"success_tre_mm", kSuccessTreMm}};
+  const registration::RegistrationOptions method = registration_options(options);
+  summary["method"] = {{"preset", options.preset},
+                       {"similarity", method.similarity.name},
+                       {"optimizer", method.optimizer}};
   summary["simulation"] = simulation_of(study);
   summary["cases"] = json::array();
   summary["pictures"] = json::array();
@@ -75,46 +80,31 @@ json summary_json(const RegistrationStudyOptions& options,
   }
   summary["renderers"] = json::array();
   for (const std::string& renderer : options.renderers())
-    summary["renderers"].push_back(
-        renderer_statistics(rows, renderer, {options.intervals, options.interval_width_mm}));
+    summary["renderers"].push_back(renderer_statistics(
+        rows, renderer, {options.intervals, options.interval_width_mm, options.seed}));
+  std::vector<std::string> found = row_problems(rows);
+  for (const CaseEvaluation& evaluation : evaluations)
+    found.insert(found.end(), evaluation.pose_problems.begin(), evaluation.pose_problems.end());
+  summary["row_problems"] = found;
   summary["field_against_raycast"] = paired_statistics(rows, options.equivalence_margin_mm);
   summary["figures"] = {"success-rate", "tre-histogram", "tre-scatter"};
   return summary;
 }
 
 void print_outcome(const json& summary, const std::filesystem::path& folder) {
-  for (const json& renderer : summary["renderers"])
+  for (const json& renderer : summary["renderers"]) {
     std::cout << renderer["renderer"].get<std::string>() << ": "
               << renderer["successes"].get<std::int64_t>() << " of "
               << renderer["starts"].get<std::int64_t>() << " starts succeeded (TRE < "
               << number_text(kSuccessTreMm) << " mm), mean TRE of these "
-              << fixed_text(number_of(renderer["tre_of_successes_mm"]["mean"]), 2) << " mm, median "
-              << fixed_text(number_of(renderer["seconds"]["median"]), 2) << " s each\n";
-  std::cout << "results: " << folder.string() << '\n';
-}
-
-void append_problem_of_fields(const RegistrationStudyOptions& options,
-                              std::vector<std::string>& found) {
-  std::set<std::string> cameras;
-  for (const std::string& text : options.fields) {
-    const std::size_t equals = text.find('=');
-    if (equals == std::string::npos || equals == 0 || equals + 1 == text.size())
-      found.push_back("--field = '" + text + "': must be CAMERA=PATH");
-    else if (!cameras.insert(text.substr(0, equals)).second)
-      found.push_back("--field = '" + text + "': this camera is given twice");
+              << fixed_text(number_of(renderer["tre_of_successes_mm"]["mean"]), 2) << " mm";
+    const double seconds = number_of(renderer["seconds"]["median"]);
+    if (std::isfinite(seconds)) std::cout << ", median " << fixed_text(seconds, 2) << " s each";
+    std::cout << '\n';
   }
-  if (options.renderer == "raycast" && !options.fields.empty())
-    found.emplace_back("--field = set: must not be given with --renderer raycast");
-}
-
-/// ["a", "b"] as in TOML.
-std::string list_text(const std::vector<std::string>& values) {
-  std::ostringstream out;
-  out << '[';
-  for (std::size_t i = 0; i < values.size(); ++i)
-    out << (i == 0 ? "" : ", ") << std::quoted(values[i]);
-  out << ']';
-  return out.str();
+  for (const json& problem : summary["row_problems"])
+    std::cout << "problem: " << problem.get<std::string>() << '\n';
+  std::cout << "results: " << folder.string() << '\n';
 }
 
 std::vector<StudyCase> chosen_cases(const RegistrationStudyOptions& options, const Study& study) {
@@ -137,14 +127,13 @@ std::vector<StudyCase> chosen_cases(const RegistrationStudyOptions& options, con
 }  // namespace
 
 std::vector<std::string> RegistrationStudyOptions::renderers() const {
-  if (renderer == "both") return {"field", "raycast"};
-  return {renderer};
+  if (!poses_from.empty()) return {method_name};
+  return chosen_renderers();
 }
 
 std::vector<std::string> problems(const RegistrationStudyOptions& options) {
-  std::vector<std::string> found = problems(StartOptions{
-      options.intervals, options.interval_width_mm, options.starts_per_interval, options.seed});
-  append_problem_of_fields(options, found);
+  std::vector<std::string> found = problems(options.start_options());
+  append_problems(options, found);
   const auto require_part = [&](const char* name, const std::optional<int>& part, int whole) {
     if (part.has_value() && !(*part >= 1 && *part <= whole))
       found.push_back(std::string(name) + " = " + std::to_string(*part) + ": must be from 1 to " +
@@ -160,33 +149,39 @@ std::vector<std::string> problems(const RegistrationStudyOptions& options) {
   if (!(options.equivalence_margin_mm > 0.0) || !std::isfinite(options.equivalence_margin_mm))
     found.push_back("--equivalence-margin-mm = " + number_text(options.equivalence_margin_mm) +
                     ": must be positive");
-  AttenuationModel model;
-  model.mu_water_per_mm = options.water_mu_per_mm;
-  for (const std::string& text : af::problems(model)) found.push_back(text);
-  for (const std::string& text : af::problems(RayCasterOptions{options.step_mm}))
-    found.push_back(text);
+  if (!options.poses_from.empty() && options.starts_from.empty())
+    found.push_back("--poses-from = '" + options.poses_from.string() +
+                    "': needs --starts-from, the starts.csv that the poses were found from");
+  if (options.method_name.empty() ||
+      options.method_name.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
+                                            "0123456789 ._+-") != std::string::npos)
+    found.push_back("--method-name = '" + options.method_name +
+                    "': must hold letters, digits, blanks and . _ + - only");
+  if (options.poses_from.empty() && options.method_name != RegistrationStudyOptions{}.method_name)
+    found.push_back("--method-name = '" + options.method_name +
+                    "': must not be given without --poses-from");
   return found;
 }
 
 std::string to_toml(const RegistrationStudyOptions& options) {
   std::ostringstream out;
-  out << "study = " << std::quoted(options.study.string()) << "\nrenderer = \"" << options.renderer
-      << "\"\nstarts_per_interval = " << options.starts_per_interval
+  out << to_toml(static_cast<const MethodOptions&>(options))
+      << "starts_per_interval = " << options.starts_per_interval
       << "\nintervals = " << options.intervals
-      << "\ninterval_width_mm = " << number_text(options.interval_width_mm) << '\n';
+      << "\ninterval_width_mm = " << number_text(options.interval_width_mm) << "\nstart_rule = \""
+      << options.start_rule << "\"\n";
+  if (!options.starts_from.empty())
+    out << "starts_from = " << std::quoted(options.starts_from.string()) << '\n';
+  if (!options.poses_from.empty())
+    out << "poses_from = " << std::quoted(options.poses_from.string())
+        << "\nmethod_name = " << std::quoted(options.method_name) << '\n';
   if (options.renderer == "both")
     out << "raycast_starts_per_interval = "
         << options.raycast_starts_per_interval.value_or(options.starts_per_interval)
         << "\nraycast_intervals = " << options.raycast_intervals.value_or(options.intervals)
         << '\n';
-  out << "gold = \"" << options.gold << "\"\npreset = \"" << options.preset << "\"\n";
-  const registration::RegistrationOptions method = registration::preset_options(options.preset);
-  out << "similarity = \"" << options.similarity.value_or(method.similarity.name)
-      << "\"\noptimizer = \"" << options.optimizer.value_or(method.optimizer)
-      << "\"\nequivalence_margin_mm = " << number_text(options.equivalence_margin_mm)
-      << "\nwater_mu_per_mm = " << number_text(options.water_mu_per_mm)
-      << "\nstep_mm = " << number_text(options.step_mm) << "\nseed = " << options.seed << '\n';
-  out << "case = " << list_text(options.cases) << "\nfield = " << list_text(options.fields) << '\n';
+  out << "equivalence_margin_mm = " << number_text(options.equivalence_margin_mm)
+      << "\nseed = " << options.seed << "\ncase = " << toml_list(options.cases) << '\n';
   return out.str();
 }
 
@@ -195,21 +190,9 @@ CLI::App* bind_registration(CLI::App& app, RegistrationStudyOptions& options) {
       "registration",
       "Registers the cases of a study from starts at stated distances from the gold pose and "
       "reports TRE and success (the paper's Table II, Figs. 15 and 16)");
-  command->add_option("--study", options.study, "study.toml: rig, cases, X-rays, gold standard")
-      ->required();
+  bind_method(*command, options);
   command->add_option("--case", options.cases, "Case of the study, may be repeated (default: all)")
       ->take_all();
-  command
-      ->add_option("--field",
-                   options.fields,
-                   "CAMERA=FIELD.h5, once per camera; replaces the study's `field`")
-      ->take_all();
-  command
-      ->add_option("--renderer",
-                   options.renderer,
-                   "How DRRs are made: field (look-up), raycast, or both from the same starts")
-      ->check(CLI::IsMember({"field", "raycast", "both"}))
-      ->capture_default_str();
   command
       ->add_option("--starts-per-interval",
                    options.starts_per_interval,
@@ -221,6 +204,28 @@ CLI::App* bind_registration(CLI::App& app, RegistrationStudyOptions& options) {
       ->capture_default_str();
   command->add_option("--interval-width-mm", options.interval_width_mm, "Width of an interval, mm")
       ->capture_default_str();
+  command
+      ->add_option("--start-rule",
+                   options.start_rule,
+                   "stratified: as many starts in each interval (the paper); uniform: as many in "
+                   "all, their initial TREs uniform over all intervals")
+      ->check(CLI::IsMember({"stratified", "uniform"}))
+      ->capture_default_str();
+  command->add_option("--starts-from",
+                      options.starts_from,
+                      "starts.csv of another run instead of drawn starts: [case,] and m00 ... m23 "
+                      "of room_from_ct, or start_rx_deg ... start_tz_mm relative to gold");
+  command->add_flag("--starts-only",
+                    options.is_starts_only,
+                    "Write starts.csv, for other programs, and register nothing");
+  command->add_option("--poses-from",
+                      options.poses_from,
+                      "Evaluate the poses that another program found from --starts-from, without "
+                      "registering: CSV of start_index, [case, seconds] and m00 ... m23 of "
+                      "room_from_ct, or rx_deg ... tz_mm relative to the nominal pose, or "
+                      "final_rx_deg ... relative to gold; or a folder of [CASE-]INDEX.tfm");
+  command->add_option("--method-name", options.method_name, "With --poses-from: what to call them")
+      ->capture_default_str();
   command->add_option("--raycast-starts-per-interval",
                       options.raycast_starts_per_interval,
                       "With --renderer both: so many of each interval's starts also by ray casting "
@@ -230,34 +235,11 @@ CLI::App* bind_registration(CLI::App& app, RegistrationStudyOptions& options) {
                       "With --renderer both: ray casting only in the first so many intervals "
                       "(default: all)");
   command
-      ->add_option("--gold",
-                   options.gold,
-                   "Gold pose: fiducials (back-projected from the views), study (its "
-                   "gold_room_from_ct), or auto (fiducials when there are any)")
-      ->check(CLI::IsMember({"auto", "fiducials", "study"}))
-      ->capture_default_str();
-  command->add_option("--preset", options.preset, "Registration method as a whole")
-      ->check(CLI::IsMember(registration::preset_names()))
-      ->capture_default_str();
-  command
-      ->add_option("--similarity", options.similarity, "Similarity measure (default: the preset's)")
-      ->check(CLI::IsMember(registration::similarity_names()));
-  command->add_option("--optimizer", options.optimizer, "Optimiser (default: the preset's)")
-      ->check(CLI::IsMember(registration::optimizer_names()));
-  command
       ->add_option("--equivalence-margin-mm",
                    options.equivalence_margin_mm,
-                   "Field and ray casting count as equal when their mean TREs differ by less, mm")
+                   "Field and ray casting count as equal when their mean TREs differ by less, mm: "
+                   "two one-sided tests")
       ->capture_default_str();
-  command
-      ->add_option("--water-mu-per-mm",
-                   options.water_mu_per_mm,
-                   "Attenuation of water for ray casting, 1/mm")
-      ->capture_default_str();
-  command->add_option("--step-mm", options.step_mm, "Longest step of ray casting, mm")
-      ->capture_default_str();
-  command->add_option(
-      "--series", options.series_uid, "DICOM series UID, when a CT's folder has several");
   command->add_option("--seed", options.seed, "Of the starts")->capture_default_str();
   command->add_option("-o,--output", options.output_folder, "Folder for the results")->required();
   return command;
@@ -283,13 +265,22 @@ void run_registration(const RegistrationStudyOptions& options,
   std::vector<std::string> case_names;
   std::vector<StratifiedStarts> starts;
   for (const StudyCase& study_case : cases) {
-    evaluations.push_back(
-        evaluate_case(options, study, study_case, world, [&](const CaseEvaluation& so_far) {
-          case_names.push_back(so_far.case_name);
-          starts.push_back(so_far.starts);
-          if (world.is_root())
-            write_text_file(folder / "starts.csv", starts_table(case_names, starts).to_text());
-        }));
+    const auto write_starts = [&](const CaseEvaluation& so_far) {
+      case_names.push_back(so_far.case_name);
+      starts.push_back(so_far.starts);
+      if (world.is_root())
+        write_text_file(folder / "starts.csv", starts_table(case_names, starts).to_text());
+    };
+    evaluations.push_back(options.poses_from.empty()
+                              ? evaluate_case(options, study, study_case, world, write_starts)
+                              : all_or_none(world, [&] {
+                                  return evaluate_found_poses(
+                                      options, study, study_case, write_starts);
+                                }));
+  }
+  if (options.is_starts_only) {
+    if (world.is_root()) std::cout << "starts: " << (folder / "starts.csv").string() << '\n';
+    return;
   }
   all_or_none(world, [&] {
     if (!world.is_root()) return;

@@ -9,34 +9,34 @@
 
 #include <CLI/CLI.hpp>
 
+#include "evaluate/method_options_command.h"
+#include "evaluate/perturbed_starts.h"
 #include "parallel/communicator.h"
 
 namespace af::evaluation {
 
 /// `af-evaluate registration` as typed.
-struct RegistrationStudyOptions {
-  std::filesystem::path study;
-  std::vector<std::string> cases;   ///< empty: all
-  std::vector<std::string> fields;  ///< CAMERA=PATH each
-  std::string renderer = "field";   ///< "field", "raycast" or "both"
+struct RegistrationStudyOptions : MethodOptions {
+  std::vector<std::string> cases;  ///< empty: all
   int starts_per_interval = 30;
   int intervals = 8;
   double interval_width_mm = 2.0;
   std::optional<int> raycast_starts_per_interval;  ///< with "both"; default: as many
   std::optional<int> raycast_intervals;            ///< with "both"; default: as many
-  std::string gold = "auto";
-  std::string preset = "paper";
-  std::optional<std::string> similarity;  ///< these replace what the preset says
-  std::optional<std::string> optimizer;
-  double equivalence_margin_mm = 0.25;
-  double water_mu_per_mm = 0.0200;
-  double step_mm = 1.0;
-  std::string series_uid;
+  std::string start_rule = "stratified";           ///< or "uniform" in initial TRE
+  std::filesystem::path starts_from;               ///< starts.csv instead of drawn ones
+  bool is_starts_only = false;                     ///< write starts.csv and register nothing
+  std::filesystem::path poses_from;                ///< poses that another program found
+  std::string method_name = "poses";               ///< what these are called
+  double equivalence_margin_mm = 0.1;
   std::uint64_t seed = 1;
   std::filesystem::path output_folder;
 
-  /// Renderers in the order of rows: "field" before "raycast".
+  /// Methods in the order of rows: "field" before "raycast"; with poses_from method_name alone.
   [[nodiscard]] std::vector<std::string> renderers() const;
+  [[nodiscard]] StartOptions start_options() const {
+    return {intervals, interval_width_mm, starts_per_interval, seed};
+  }
 };
 
 std::vector<std::string> problems(const RegistrationStudyOptions& options);
@@ -46,9 +46,9 @@ std::string to_toml(const RegistrationStudyOptions& options);
 /// Adds the subcommand; returns it.
 CLI::App* bind_registration(CLI::App& app, RegistrationStudyOptions& options);
 
-/// Collective. Registers a study's cases from stratified starts (Sec. IV-B) and writes starts.csv
-/// (before anything is registered), registrations.csv, figures, overlays, summary.json and
-/// reproduce.sh.
+/// Collective. Registers a study's cases from starts about gold (Sec. IV-B), or takes the poses
+/// that another program found, and writes starts.csv (before anything is registered),
+/// registrations.csv, figures, overlays, summary.json and reproduce.sh.
 void run_registration(const RegistrationStudyOptions& options,
                       const std::string& command_line,
                       const Communicator& world);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "evaluate/perturbed_starts.h"
+#include "evaluate/registration_errors.h"
 #include "evaluate/success_rate.h"
 #include "io/csv_table.h"
 
@@ -29,6 +30,7 @@ struct RegistrationRow {
   double initial_tre_mm = kMissing;
   double tre_mm = kMissing;
   double stated_pose_tre_mm = kMissing;  ///< against gold_room_from_ct when gold is the fiducials'
+  RegistrationErrors errors;
   double similarity = kMissing;
   std::int64_t evaluations = 0;
   std::int64_t inadmissible = 0;
@@ -52,22 +54,5 @@ CsvTable starts_table(const std::vector<std::string>& case_names,
 /// Starts and TREs of one renderer, in row order.
 std::vector<TreOutcome> outcomes_of(const std::vector<RegistrationRow>& rows,
                                     const std::string& renderer);
-
-/// How initial TRE is divided.
-struct TreIntervals {
-  int count = 8;
-  double width_mm = 2.0;
-};
-
-/// Counts, success (overall, per interval, per threshold), TRE statistics, stop reasons and times
-/// of one renderer; per case, too, when there are several.
-nlohmann::json renderer_statistics(const std::vector<RegistrationRow>& rows,
-                                   const std::string& renderer,
-                                   const TreIntervals& intervals);
-
-/// Field against ray casting on the starts that both were given: successes and median seconds of
-/// each; on those from which both succeeded ("pairs"), if there are two or more, paired t-test and
-/// equivalence of TRE. null when no start was given to both.
-nlohmann::json paired_statistics(const std::vector<RegistrationRow>& rows, double margin_mm);
 
 }  // namespace af::evaluation

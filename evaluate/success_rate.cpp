@@ -30,6 +30,29 @@ std::int64_t count_successes(std::span<const TreOutcome> outcomes, double thresh
   });
 }
 
+std::optional<CaptureRange> capture_range(std::span<const TreOutcome> outcomes,
+                                          double share,
+                                          double threshold_mm) {
+  check(share > 0.0 && share <= 1.0, "a share lies between 0 and 1");
+  std::vector<TreOutcome> sorted;
+  for (const TreOutcome& outcome : outcomes)
+    if (std::isfinite(outcome.initial_tre_mm)) sorted.push_back(outcome);
+  std::sort(sorted.begin(), sorted.end(), [](const TreOutcome& a, const TreOutcome& b) {
+    return a.initial_tre_mm < b.initial_tre_mm;
+  });
+  std::optional<CaptureRange> range;
+  std::int64_t successes = 0;
+  for (std::size_t i = 0; i < sorted.size(); ++i) {
+    successes += sorted[i].tre_mm < threshold_mm ? 1 : 0;
+    // Starts of equal error are taken together.
+    if (i + 1 < sorted.size() && sorted[i + 1].initial_tre_mm == sorted[i].initial_tre_mm) continue;
+    const auto starts = static_cast<std::int64_t>(i + 1);
+    if (static_cast<double>(successes) >= share * static_cast<double>(starts))
+      range = {sorted[i].initial_tre_mm, starts, successes, i + 1 == sorted.size()};
+  }
+  return range;
+}
+
 std::vector<IntervalSuccess> success_per_interval(std::span<const TreOutcome> outcomes,
                                                   int intervals,
                                                   double width_mm,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -43,6 +44,21 @@ struct TreOutcome {
 
 /// Number of outcomes with TRE below `threshold_mm`; NaN never is.
 std::int64_t count_successes(std::span<const TreOutcome> outcomes, double threshold_mm);
+
+/// Capture range: how far registrations may start.
+struct CaptureRange {
+  double initial_tre_mm = 0.0;  ///< the largest initial TRE with enough success up to it
+  std::int64_t starts = 0;      ///< that began at or below it
+  std::int64_t successes = 0;
+  bool is_whole_study = false;  ///< it is the farthest start: the true range may be larger
+};
+
+/// The largest initial TRE d of any outcome such that at least `share` of the outcomes with an
+/// initial TRE of at most d succeeded; nullopt when there is none. Outcomes without an initial TRE
+/// are left out. \test CaptureRange.IsTheLargestErrorWithEnoughSuccessBelowIt
+std::optional<CaptureRange> capture_range(std::span<const TreOutcome> outcomes,
+                                          double share = 0.95,
+                                          double threshold_mm = kSuccessTreMm);
 
 /// Success per interval [k, k + 1) * width; outcomes whose initial TRE lies beyond the last
 /// interval are left out.

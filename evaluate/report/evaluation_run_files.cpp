@@ -54,8 +54,12 @@ std::vector<EvaluationRun> find_runs(const std::vector<std::filesystem::path>& f
                       std::to_string(kVersion),
                       run.summary.value("format_version", json()).dump());
     const json kind = run.summary.value("kind", json());
-    if (kind != "image-quality" && kind != "registration")
-      throw FileError(path.string(), "kind", "image-quality or registration", kind.dump());
+    if (kind != "image-quality" && kind != "registration" && kind != "similarity-curves" &&
+        kind != "field-parameters")
+      throw FileError(path.string(),
+                      "kind",
+                      "image-quality, registration, similarity-curves or field-parameters",
+                      kind.dump());
     run.kind = kind.get<std::string>();
     runs.push_back(std::move(run));
   }

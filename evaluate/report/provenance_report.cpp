@@ -84,6 +84,12 @@ std::string hashes_text(const json& hashes) {
   return text.empty() ? "–" : text;
 }
 
+std::string title_of_kind(const std::string& kind) {
+  if (kind == "registration") return "Registration";
+  if (kind == "similarity-curves") return "Similarity curves";
+  return kind == "field-parameters" ? "Field parameters" : "Image quality";
+}
+
 std::string run_provenance(const EvaluationRun& run, const std::filesystem::path& report) {
   const json& provenance = run.summary.at("provenance");
   const auto text = [&](const char* key) {
@@ -94,9 +100,7 @@ std::string run_provenance(const EvaluationRun& run, const std::filesystem::path
   const std::filesystem::path folder = std::filesystem::absolute(report).parent_path();
   const std::string link = (run.folder.lexically_proximate(folder) / "reproduce.sh").string();
   const std::string name = run.folder.lexically_proximate(folder).string();
-  return element("h3",
-                 escaped(run.kind == "registration" ? "Registration" : "Image quality") + ": " +
-                     escaped(name)) +
+  return element("h3", title_of_kind(run.kind) + ": " + escaped(name)) +
          definition_list(
              {{"Program", text("program") + " " + text("program_version")},
               {"Started (UTC)", text("started_utc")},
@@ -148,6 +152,10 @@ std::string definitions_section() {
                "The pose that the study itself gives (gold_room_from_ct); for simulated X-rays "
                "the true one, free of the fiducials' detection noise."},
               {"Success", "TRE below 2.5 mm. Failures of every kind stay in the denominator."},
+              {"mRPD",
+               "Mean reprojection distance: of a target point at the gold pose from the line "
+               "through the source and the same point at the found pose; mm (van de Kraats et al., "
+               "IEEE TMI 24(9), 2005)."},
               {"95 % interval",
                "Wilson's score interval. It treats starts as independent; starts of one patient "
                "share a CT and its X-rays, so it says nothing about other patients."},

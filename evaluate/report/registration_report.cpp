@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <set>
 
 #include "evaluate/report/html_text.h"
 #include "evaluate/report/number_html.h"
@@ -19,7 +20,8 @@ namespace {
 constexpr std::int64_t kMostFailuresListed = 60;
 
 std::string renderer_title(const json& renderer) {
-  return renderer.at("renderer") == "field" ? "field" : "ray casting";
+  const std::string name = renderer.at("renderer").get<std::string>();
+  return name == "raycast" ? "ray casting" : name;
 }
 
 std::string svg_figure(const EvaluationRun& run,
@@ -63,30 +65,38 @@ std::string success_table(const json& renderers) {
 }
 
 std::string error_table(const json& renderers) {
-  HtmlTable table({{"Method", false},
-                   {"Starts", true},
-                   {"Median", true},
-                   {"Quartiles", true},
-                   {"95th percentile", true},
-                   {"Largest", true},
-                   {"No pose", true},
-                   {"Mean ± SD of successes", true},
-                   {"Same against stated pose", true}},
-                  "TRE in mm over all registrations that gave a pose, then over successes only");
+  HtmlTable table(
+      {{"Method", false},
+       {"Starts", true},
+       {"Median", true},
+       {"Quartiles", true},
+       {"95th percentile", true},
+       {"Largest with a pose", true},
+       {"No pose", true},
+       {"Mean ± SD of successes", true},
+       {"Same against stated pose", true}},
+      "TRE in mm over all registrations, one without a pose counting as infinitely far; "
+      "then over successes only");
   for (const json& renderer : renderers) {
-    const json& all = renderer.at("tre_mm");
+    const json& all = renderer.at("tre_of_all_mm");
     const json& good = renderer.at("tre_of_successes_mm");
     table.add_row({renderer_title(renderer),
                    renderer.at("starts").dump(),
                    decimals(all.at("median"), 2),
                    decimals(all.at("q1"), 2) + "–" + decimals(all.at("q3"), 2),
                    decimals(all.at("p95"), 2),
-                   decimals(all.at("max"), 2),
+                   decimals(renderer.at("tre_mm").at("max"), 2),
                    renderer.at("without_pose").dump(),
                    decimals(good.at("mean"), 2) + " ± " + decimals(good.at("sd"), 2),
                    decimals(renderer.at("stated_pose_tre_of_successes_mm").at("mean"), 2)});
   }
   return table.html();
+}
+
+std::string capture_text(const json& range) {
+  if (!range.is_object()) return "none";
+  return std::string(range.at("is_whole_study").get<bool>() ? "at least " : "") +
+         decimals(range.at("initial_tre_mm"), 1) + " mm";
 }
 
 std::string threshold_table(const json& renderers) {
@@ -102,7 +112,97 @@ std::string threshold_table(const json& renderers) {
       cells.push_back(rate_with_interval(renderer.at("thresholds").at(i)));
     table.add_row(cells);
   }
+  std::vector<std::string> gross = {"gross failures: 10 mm or more, or no pose"};
+  std::vector<std::string> capture = {
+      "capture range: largest initial TRE with 95 % success up to it"};
+  for (const json& renderer : renderers) {
+    gross.push_back(rate_with_interval(renderer.at("gross_failures")));
+    capture.push_back(capture_text(renderer.at("capture_range")));
+  }
+  table.add_row(gross);
+  table.add_row(capture);
   return table.html();
+}
+
+/// Failures of every kind, for each method.
+std::string reason_table(const json& renderers) {
+  std::set<std::string> reasons;
+  std::vector<HtmlTable::Column> columns = {{"Reason", false}};
+  for (const json& renderer : renderers) {
+    columns.push_back({renderer_title(renderer) + ": failures", true});
+    for (const auto& [reason, count] : renderer.at("failures_by_reason").items())
+      reasons.insert(reason);
+  }
+  if (reasons.empty()) return "";
+  HtmlTable table(columns, "Why registrations failed");
+  for (const std::string& reason : reasons) {
+    std::vector<std::string> cells = {escaped(reason)};
+    for (const json& renderer : renderers)
+      cells.push_back(std::to_string(renderer.at("failures_by_reason").value(reason, 0)));
+    table.add_row(cells);
+  }
+  return table.html();
+}
+
+/// The other errors and the bias of the optimum, over successes.
+std::string other_errors_table(const json& renderers) {
+  HtmlTable table({{"Method", false},
+                   {"mRPD (mm)", true},
+                   {"On the detector (mm)", true},
+                   {"In the isocentre plane (mm)", true},
+                   {"Rotation (deg)", true},
+                   {"Translation (mm)", true},
+                   {"Bias rx, ry, rz (deg)", true},
+                   {"Bias tx, ty, tz (mm)", true}},
+                  "Other errors of successes (means), and the mean signed error of each parameter");
+  for (const json& renderer : renderers) {
+    std::vector<std::string> cells = {renderer_title(renderer)};
+    const json& errors = renderer.at("errors_of_successes");
+    for (const char* name : {"mrpd_mm",
+                             "projection_detector_mm",
+                             "projection_isocenter_mm",
+                             "rotation_error_deg",
+                             "translation_error_mm"})
+      cells.push_back(decimals(errors.at(name).at("mean"), 3));
+    const json& bias = renderer.at("bias");
+    const auto three = [&](const char* a, const char* b, const char* c) {
+      return decimals(bias.at(a).at("mean"), 3) + ", " + decimals(bias.at(b).at("mean"), 3) + ", " +
+             decimals(bias.at(c).at("mean"), 3);
+    };
+    cells.push_back(three("rx_deg", "ry_deg", "rz_deg"));
+    cells.push_back(three("tx_mm", "ty_mm", "tz_mm"));
+    table.add_row(cells);
+  }
+  return table.html();
+}
+
+/// Intervals over patients, with a warning where these are too few.
+std::string over_cases_text(const json& renderers) {
+  std::string text;
+  for (const json& renderer : renderers) {
+    const json& rate = renderer.at("over_cases").at("rate");
+    const auto cases = rate.at("cases").get<std::int64_t>();
+    if (!rate.at("low").is_number()) continue;
+    text += element("p",
+                    "<strong>Over patients</strong> (" + renderer_title(renderer) +
+                        "): resampling the " + std::to_string(cases) +
+                        " cases gives a 95 % interval of " + percent(rate.at("low").get<double>()) +
+                        " to " + percent(rate.at("high").get<double>()) + " for the success rate." +
+                        (rate.at("is_optimistic").get<bool>()
+                             ? " With so few cases this interval is too narrow."
+                             : ""));
+  }
+  if (!text.empty()) return text;
+  return element("p", "One patient says nothing about others: there is no interval over patients.");
+}
+
+std::string problems_text(const json& problems) {
+  if (problems.empty()) return "";
+  std::string items;
+  for (const json& problem : problems) items += element("li", escaped(problem.get<std::string>()));
+  return element("div",
+                 element("p", "<strong>The rows have problems:</strong>") + element("ul", items),
+                 "caution");
 }
 
 std::string case_table(const json& summary) {
@@ -165,10 +265,14 @@ std::string test_text(const json& test) {
          decimals(test.at("mean_difference_mm"), 3) + " mm on average (90 % interval " +
          decimals(test.at("low_90_mm"), 3) + " to " + decimals(test.at("high_90_mm"), 3) +
          " mm; paired t-test " + p_text(test.at("t_test_p").get<double>()) +
+         ", Wilcoxon's signed-rank test " + p_text(test.at("signed_rank_p").get<double>()) +
          "). Equivalence within ±" + decimals(test.at("margin_mm"), 2) +
          " mm, two one-sided tests: " + p_text(equivalence_p) +
          (equivalence_p < 0.05 ? ", equivalent at the 5 % level."
-                               : ", not shown: too few pairs or too different ones.");
+                               : ", not shown: too few pairs or too different ones.") +
+         " The power of this test, were there no difference, is " +
+         percent(test.at("equivalence_power").get<double>()) + " with these " +
+         "pairs and their standard deviation of " + decimals(test.at("sd_mm"), 3) + " mm.";
 }
 
 std::string paired_text(const json& paired) {
@@ -176,7 +280,8 @@ std::string paired_text(const json& paired) {
   std::string text = "<strong>Field against ray casting</strong>, the " +
                      counted(paired.at("common_starts").get<std::int64_t>(), "start", "starts") +
                      " given to both: " + paired.at("successes").at(0).dump() + " and " +
-                     paired.at("successes").at(1).dump() + " successes.";
+                     paired.at("successes").at(1).dump() + " successes (McNemar " +
+                     p_text(paired.at("mcnemar_p").get<double>()) + ").";
   if (paired.contains("test")) text += test_text(paired.at("test"));
   return element("p", text + " Starts of one patient are not independent samples of patients.");
 }
@@ -196,7 +301,7 @@ std::string failures_table(const EvaluationRun& run) {
     const std::string& tre = rows.text(i, "tre_mm");
     const std::string& error = rows.text(i, "error");
     table.add_row({escaped(rows.text(i, "case")),
-                   rows.text(i, "renderer") == "field" ? "field" : "ray casting",
+                   renderer_title({{"renderer", rows.text(i, "renderer")}}),
                    escaped(rows.text(i, "start_index")),
                    decimals(rows.number(i, "initial_tre_mm"), 2),
                    tre == "nan" ? "–" : decimals(rows.number(i, "tre_mm"), 2),
@@ -267,9 +372,11 @@ std::string registration_section(const EvaluationRun& run) {
          element("p",
                  "Starts are random disturbances of the gold pose, as many in each interval of "
                  "initial target registration error (TRE), the same for every method.") +
-         element("div", figures, "figures") + success_table(renderers) + error_table(renderers) +
-         threshold_table(renderers) + paired_text(summary.at("field_against_raycast")) +
-         case_table(summary) + gold_table(summary.at("cases")) + element("h3", "Failures") +
+         problems_text(summary.at("row_problems")) + element("div", figures, "figures") +
+         success_table(renderers) + error_table(renderers) + threshold_table(renderers) +
+         other_errors_table(renderers) + over_cases_text(renderers) +
+         paired_text(summary.at("field_against_raycast")) + case_table(summary) +
+         gold_table(summary.at("cases")) + element("h3", "Failures") + reason_table(renderers) +
          failures_table(run) + element("h2", "What it looks like") +
          element("p",
                  "X-ray, DRR at the found pose, both as a checkerboard, and their difference. "

@@ -23,6 +23,13 @@ std::string registration_section(const EvaluationRun& run);
 /// such runs.
 std::string image_quality_section(const std::vector<EvaluationRun>& runs);
 
+/// Similarity along each pose parameter of all similarity-curves runs; HTML, empty without such
+/// runs.
+std::string similarity_section(const std::vector<EvaluationRun>& runs);
+
+/// Image quality and cost of fields against their parameters; HTML, empty without such runs.
+std::string field_parameters_section(const std::vector<EvaluationRun>& runs);
+
 /// How the X-rays of the registration runs were made; HTML.
 std::string xray_section(const std::vector<EvaluationRun>& runs);
 

@@ -23,7 +23,8 @@ std::string tile(const std::string& value,
 }
 
 std::string method_name(const json& renderer) {
-  return renderer.at("renderer") == "field" ? "attenuation fields" : "ray casting";
+  const std::string name = renderer.at("renderer").get<std::string>();
+  return name == "field" ? "attenuation fields" : name == "raycast" ? "ray casting" : escaped(name);
 }
 
 double median_seconds(const json& renderer) {

@@ -6,6 +6,10 @@ af_add_test(
           unit/evaluate/perturbed_starts_test.cpp
           unit/evaluate/success_rate_test.cpp
           unit/evaluate/statistics_test.cpp
+          unit/evaluate/signed_rank_test_test.cpp
+          unit/evaluate/bootstrap_test.cpp
+          unit/evaluate/registration_errors_test.cpp
+          unit/evaluate/similarity_curve_test.cpp
           unit/evaluate/drr_comparison_test.cpp
   LIBS af_evaluation)
 
@@ -17,7 +21,7 @@ af_add_test(
 af_add_test(
   evaluate_report_test
   SOURCES unit/evaluate/report_text_test.cpp unit/evaluate/evaluation_rows_test.cpp
-  LIBS af_evaluation_program af_evaluation_report)
+  LIBS af_evaluation_program af_evaluation_report af_io_basics)
 
 # One CTest entry for all: the tests share a study and its fields, which take longer than they do.
 add_executable(evaluate_program_tests programs/evaluate_program_test.cpp)

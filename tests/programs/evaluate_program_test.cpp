@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // af-evaluate as a user meets it: files, the same rows on every rank count, exit codes, messages.
+#include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -9,6 +10,7 @@
 
 #include "io/csv_table.h"
 #include "io/output_file.h"
+#include "io/pose_file.h"
 #include "io/study_file.h"
 #include "programs/small_study.h"
 #include "support/run_program.h"
@@ -157,13 +159,161 @@ TEST_F(EvaluateProgram, RegistersAlikeOnAnyRankCount) {
   EXPECT_EQ(summary["field_against_raycast"]["common_starts"], 4);
 }
 
+TEST_F(EvaluateProgram, MeasuresPosesOfAnotherProgramLikeItsOwn) {
+  const std::string study = "registration --study " + path("with-fiducials.toml") + " ";
+  ASSERT_EQ(evaluate(study + fields() + "--intervals 2 --starts-per-interval 3 -o " + path("own"))
+                .exit_code,
+            0);
+  const CsvTable own = CsvTable::read(path("own/registrations.csv"));
+  // As a table of its own parameters: the same errors, without X-rays or fields.
+  const test::ProgramRun again =
+      evaluate(study + "--starts-from " + path("own/starts.csv") + " --poses-from " +
+               path("own/registrations.csv") + " --method-name again -o " + path("again"));
+  ASSERT_EQ(again.exit_code, 0) << again.output;
+  const CsvTable rows = CsvTable::read(path("again/registrations.csv"));
+  ASSERT_EQ(rows.row_count(), own.row_count());
+  // Angles in degrees and back: 1e-16 of 1 rad times 100 mm.
+  constexpr double kRoundingMm = 1e-9;
+  for (std::size_t i = 0; i < own.row_count(); ++i)
+    for (const char* name : {"tre_mm", "initial_tre_mm", "mrpd_mm", "rotation_error_deg"})
+      EXPECT_NEAR(rows.number(i, name), own.number(i, name), kRoundingMm) << name;
+  EXPECT_TRUE(json::parse(text("again/summary.json"))["row_problems"].empty());
+
+  // As ITK transforms, one missing and one of a start that does not exist.
+  std::filesystem::create_directories(path("tfm"));
+  const CsvTable starts = CsvTable::read(path("own/starts.csv"));
+  for (std::size_t i = 1; i < starts.row_count() + 1; ++i) {
+    RigidTransform pose;
+    for (int row = 0; row < 3; ++row)
+      for (int column = 0; column < 4; ++column)
+        pose.matrix()(row, column) =
+            starts.number(0, "m" + std::to_string(row) + std::to_string(column));
+    pose.makeAffine();
+    write_text_file(path("tfm/" + std::to_string(i) + ".tfm"), pose_to_itk_transform(pose));
+  }
+  const test::ProgramRun folder =
+      evaluate(study + "--starts-from " + path("own/starts.csv") + " --poses-from " + path("tfm") +
+               " -o " + path("from-tfm"));
+  ASSERT_EQ(folder.exit_code, 0) << folder.output;
+  const CsvTable found = CsvTable::read(path("from-tfm/registrations.csv"));
+  EXPECT_EQ(found.text(0, "stop_reason"), "no-pose");
+  EXPECT_EQ(found.text(0, "success"), "0");
+  EXPECT_NEAR(found.number(1, "tre_mm"), starts.number(0, "initial_tre_mm"), kRoundingMm);
+  EXPECT_EQ(json::parse(text("from-tfm/summary.json"))["row_problems"].size(), 2u);
+  EXPECT_THAT(folder.output, HasSubstr("no pose for start 0"));
+  EXPECT_THAT(folder.output, HasSubstr("a pose for start 6, which does not exist"));
+}
+
+TEST_F(EvaluateProgram, RegistersFromTheStartsOfAFile) {
+  const std::string study = "registration --study " + path("study.toml") + fields();
+  const test::ProgramRun only = evaluate(study +
+                                         "--start-rule uniform --intervals 2 --starts-per-interval "
+                                         "2 --starts-only -o " +
+                                         path("only"));
+  ASSERT_EQ(only.exit_code, 0) << only.output;
+  EXPECT_FALSE(std::filesystem::exists(path("only/registrations.csv")));
+  ASSERT_EQ(
+      evaluate(study + "--starts-from " + path("only/starts.csv") + " -o " + path("from-file"))
+          .exit_code,
+      0);
+  const CsvTable starts = CsvTable::read(path("only/starts.csv"));
+  const CsvTable rows = CsvTable::read(path("from-file/registrations.csv"));
+  ASSERT_EQ(rows.row_count(), 4u);
+  for (std::size_t i = 0; i < 4; ++i)
+    EXPECT_EQ(rows.text(i, "initial_tre_mm"), starts.text(i, "initial_tre_mm"));
+}
+
+TEST_F(EvaluateProgram, DrawsSimilarityAboutTheGoldPoseAlikeOnAnyRankCount) {
+  const std::string arguments =
+      "similarity-curves --study " + path("study.toml") + fields() +
+      "--half-width-mm 2 --half-width-deg 2 --curve-step-mm 0.5 --curve-step-deg 0.5 -o ";
+  for (const int ranks : {1, 2}) {
+    const test::ProgramRun run =
+        evaluate(arguments + path("curves-" + std::to_string(ranks)), ranks);
+    ASSERT_EQ(run.exit_code, 0) << run.output;
+    EXPECT_THAT(run.output, HasSubstr("broadest rotation"));
+  }
+  EXPECT_EQ(text("curves-1/similarity-curves.csv"), text("curves-2/similarity-curves.csv"));
+  EXPECT_EQ(text("curves-1/maxima.csv"), text("curves-2/maxima.csv"));
+  const CsvTable maxima = CsvTable::read(path("curves-1/maxima.csv"));
+  ASSERT_EQ(maxima.row_count(), 12u);
+  // The X-rays are ray-cast DRRs at the gold pose: ray casting has its maxima there, within the
+  // step of the grid.
+  for (std::size_t i = 6; i < 12; ++i) {
+    EXPECT_EQ(maxima.text(i, "renderer"), "raycast");
+    EXPECT_LT(std::abs(maxima.number(i, "offset_of_maximum")), 0.5);
+  }
+  EXPECT_EQ(CsvTable::read(path("curves-1/similarity-curves.csv")).row_count(), 2u * 6u * 9u);
+  EXPECT_TRUE(std::filesystem::exists(path("curves-1/similarity-curves.svg")));
+  expect_refused(evaluate("similarity-curves --study " + path("study.toml") + fields() +
+                          "--half-width-deg 0.05 -o " + path("x")),
+                 3,
+                 "--curve-step-deg = 0.1");
+}
+
+TEST_F(EvaluateProgram, BuildsTheFieldsOfASweepOnceAndReusesThem) {
+  const std::string arguments =
+      "field-parameters --study " + path("study.toml") +
+      " --camera AP --max-rotation-deg 8 --max-translation-mm 8 --base-uv-nodes 8 --base-st-nodes "
+      "32"
+      " --base-codewords 16 --uv-nodes 4,8 --st-nodes 32,64 --codewords 64 --training-fraction 0.1"
+      " --pose-count 4 --fields " +
+      path("sweep-fields") + " -o ";
+  const test::ProgramRun first = evaluate(arguments + path("sweep-1"));
+  ASSERT_EQ(first.exit_code, 0) << first.output;
+  const auto made =
+      std::filesystem::last_write_time(path("sweep-fields/AP-uv8-st64-n16-t0.1.af.h5"));
+  const test::ProgramRun second = evaluate(arguments + path("sweep-2"), 2);
+  ASSERT_EQ(second.exit_code, 0) << second.output;
+  EXPECT_EQ(std::filesystem::last_write_time(path("sweep-fields/AP-uv8-st64-n16-t0.1.af.h5")),
+            made);
+  // Also the creation times: they are the fields' own.
+  EXPECT_EQ(text("sweep-1/field-parameters.csv"), text("sweep-2/field-parameters.csv"));
+  const CsvTable table = CsvTable::read(path("sweep-1/field-parameters.csv"));
+  ASSERT_EQ(table.row_count(), 4u);  // base, uv 4, st 64, 64 codewords
+  EXPECT_EQ(table.number(0, "uncompressed_bytes"), 2.0 * 8 * 8 * 32 * 32);
+  EXPECT_LT(table.number(1, "psnr_median_db"), table.number(0, "psnr_median_db"));
+  EXPECT_GT(table.number(2, "psnr_median_db"), table.number(0, "psnr_median_db"));
+  EXPECT_TRUE(std::filesystem::exists(path("sweep-1/field-parameters.svg")));
+  // Another range under the same names: refused, not reused.
+  std::string other = arguments;
+  other.replace(other.find("--max-rotation-deg 8"), 20, "--max-rotation-deg 7");
+  expect_refused(evaluate(other + path("sweep-3")), 4, "options of the field to reuse");
+}
+
+TEST_F(EvaluateProgram, ComparesRunsInOneTable) {
+  const std::string study = "registration --study " + path("study.toml") + fields() +
+                            "--intervals 2 --starts-per-interval 2 -o ";
+  ASSERT_EQ(evaluate(study + path("methods/mi")).exit_code, 0);
+  ASSERT_EQ(evaluate(study + path("methods/ncc") + " --similarity ncc").exit_code, 0);
+  const test::ProgramRun run =
+      evaluate("compare " + path("methods") + " -o " + path("methods/table.md"));
+  ASSERT_EQ(run.exit_code, 0) << run.output;
+  EXPECT_EQ(text("methods/table.md"), run.output);
+  const CsvTable table = CsvTable::read(path("methods/table.csv"));
+  ASSERT_EQ(table.row_count(), 2u);
+  EXPECT_EQ(table.text(0, "method"), "paper mi best-neighbor");
+  EXPECT_EQ(table.text(1, "method"), "paper ncc best-neighbor");
+  EXPECT_EQ(table.text(1, "starts_0_8_mm"), "4");
+  expect_refused(evaluate("compare " + path("nowhere")), 4, "nowhere");
+}
+
 TEST_F(EvaluateProgram, WritesOneSelfContainedReport) {
   const std::string quality = "image-quality --field " + path("LAT.af.h5") + " --ct " +
                               path("ct.nii.gz") + " --pose-count 3 -o " + path("runs/quality");
   const std::string registration = "registration --study " + path("study.toml") + fields() +
                                    "--intervals 2 --starts-per-interval 2 -o " +
                                    path("runs/registration");
-  for (const std::string& arguments : {quality, registration}) {
+  const std::string curves = "similarity-curves --study " + path("study.toml") + fields() +
+                             "--renderer field --half-width-mm 1 --half-width-deg 1 -o " +
+                             path("runs/curves");
+  const std::string sweep = "field-parameters --study " + path("study.toml") +
+                            " --camera AP --max-rotation-deg 8 --max-translation-mm 8"
+                            " --base-uv-nodes 8 --base-st-nodes 32 --base-codewords 16 --uv-nodes 4"
+                            " --st-nodes 32 --codewords 16 --training-fraction 0.1 --pose-count 2"
+                            " -o " +
+                            path("runs/sweep");
+  for (const std::string& arguments : {quality, registration, curves, sweep}) {
     const test::ProgramRun run = evaluate(arguments);
     ASSERT_EQ(run.exit_code, 0) << run.output;
   }
@@ -187,8 +337,9 @@ TEST_F(EvaluateProgram, WritesOneSelfContainedReport) {
     EXPECT_EQ(page.compare(at, 11, " src=\"data:"), 0) << page.substr(at, 60);
     ++images;
   }
-  // Three figures, X-rays, three overlays in two views; box plot, worst and median pair.
-  EXPECT_EQ(images, 3u + 1u + 6u + 1u + 2u);
+  // Three figures, X-rays, three overlays in two views; box plot, worst and median pair; curves;
+  // sweep.
+  EXPECT_EQ(images, 3u + 1u + 6u + 1u + 2u + 1u + 1u);
 }
 
 TEST_F(EvaluateProgram, SaysWhenTheFieldHasNoRoomForTheStarts) {
@@ -223,6 +374,7 @@ TEST_F(EvaluateProgram, RefusesBadInputWithTheContractsCodes) {
       evaluate(study + fields() + "--raycast-intervals 3 --starts-per-interval 0 -o " + path("x")),
       3,
       "--raycast-intervals = 3");
+  expect_refused(evaluate(study + "--poses-from x.csv -o " + path("x")), 3, "needs --starts-from");
   expect_refused(evaluate("report " + path("nowhere")), 4, "nowhere");
   std::filesystem::create_directories(path("empty"));
   expect_refused(

@@ -9,7 +9,12 @@
 #include "base/error.h"
 #include "evaluate/case_evaluation_program.h"
 #include "evaluate/image_quality_files.h"
+#include "evaluate/method_comparison_files.h"
 #include "evaluate/registration_rows_files.h"
+#include "evaluate/registration_statistics_files.h"
+#include "io/output_file.h"
+#include "support/test_paths.h"
+#include "unit/evaluate/camera_along_z.h"
 
 namespace af::evaluation {
 namespace {
@@ -41,6 +46,7 @@ TEST(RegistrationRows, TravelWithEveryBit) {
   RegistrationRow sent = row("field", 7, 3.3, std::nan(""));
   sent.draw_index = 0xFFFFFFFFFFFFFFF0u;
   sent.start_deg_mm = {0.1, -1.0 / 3, 1e-300, std::numeric_limits<double>::denorm_min(), 5, -0.0};
+  sent.errors = {0.5, 1.0 / 3, 2.0, std::nan(""), 1e-300};
   sent.error = "numerics; \"failed\"\n";
   const RegistrationRow received = row_of(through_cbor(packed_row(3, sent)));
   EXPECT_EQ(received.case_name, sent.case_name);
@@ -49,6 +55,9 @@ TEST(RegistrationRows, TravelWithEveryBit) {
   EXPECT_TRUE(std::signbit(received.start_deg_mm[5]));
   EXPECT_TRUE(std::isnan(received.tre_mm));
   EXPECT_TRUE(std::isnan(received.final_deg_mm[0]));
+  EXPECT_EQ(received.errors.projection_detector_mm, 1.0 / 3);
+  EXPECT_TRUE(std::isnan(received.errors.rotation_deg));
+  EXPECT_EQ(received.errors.translation_mm, 1e-300);
   EXPECT_EQ(received.error, sent.error);
   EXPECT_EQ(received.seconds, sent.seconds);
 }
@@ -105,6 +114,79 @@ TEST(RegistrationStatistics, OfHandBuiltRowsAreTheKnownOnes) {
   EXPECT_EQ(result["cases"].size(), 1u);
 }
 
+TEST(RegistrationStatistics, KeepEveryFailureInTheDenominatorAndNameItsReason) {
+  std::vector<RegistrationRow> rows;
+  for (std::int64_t i = 0; i < 10; ++i)
+    rows.push_back(row("field", i, 0.5 + static_cast<double>(i), 0.5));
+  const auto fail = [&](std::size_t i, const char* reason, double tre_mm) {
+    rows[i].stop_reason = reason;
+    rows[i].tre_mm = tre_mm;
+  };
+  fail(9, "pinned-at-limit", 4.0);
+  fail(8, "start-inadmissible", std::nan(""));
+  fail(7, "evaluation-budget-spent", 12.0);
+  fail(6, "error", std::nan(""));
+  fail(5, "step-below-final", 10.0);
+  const json result = renderer_statistics(rows, "field", {4, 2.0});
+  EXPECT_EQ(result["starts"], 10);
+  EXPECT_EQ(result["failures_by_reason"],
+            json({{"left range", 2}, {"budget", 1}, {"numerics", 1}, {"other optimum", 1}}));
+  // 10.0 and 12.0 mm and the two without a pose.
+  EXPECT_EQ(result["gross_failures"]["successes"], 4);
+  EXPECT_EQ(result["gross_failures"]["starts"], 10);
+  // Ten values, the last two infinite: 0.5 x 5, 4, 10, 12, inf, inf.
+  EXPECT_EQ(result["tre_of_all_mm"]["median"], (0.5 + 4.0) / 2);
+  EXPECT_EQ(result["tre_of_all_mm"]["q3"], 10.0 + 0.75 * 2.0);
+  EXPECT_EQ(result["tre_of_all_mm"]["p95"], "inf");
+  EXPECT_EQ(result["capture_range"]["initial_tre_mm"], 4.5);
+  EXPECT_EQ(result["capture_range"]["starts"], 5);
+  EXPECT_EQ(result["capture_range"]["is_whole_study"], false);
+  // 8.5 and 9.5 mm.
+  EXPECT_EQ(result["starts_beyond_last_interval"], 2);
+}
+
+TEST(RegistrationStatistics, BiasIsTheMeanSignedErrorOfSuccesses) {
+  std::vector<RegistrationRow> rows = {
+      row("field", 0, 1, 0.1), row("field", 1, 1, 0.2), row("field", 2, 1, 9.0)};
+  rows[0].final_deg_mm = {0.1, 0, 0, -1.0, 0, 0};
+  rows[1].final_deg_mm = {0.3, 0, 0, 2.0, 0, 0};
+  rows[2].final_deg_mm = {50, 50, 50, 50, 50, 50};
+  const json bias = renderer_statistics(rows, "field", {8, 2.0})["bias"];
+  EXPECT_DOUBLE_EQ(bias["rx_deg"]["mean"].get<double>(), 0.2);
+  EXPECT_DOUBLE_EQ(bias["tx_mm"]["mean"].get<double>(), 0.5);
+  EXPECT_DOUBLE_EQ(bias["tx_mm"]["sd"].get<double>(), std::sqrt(4.5));
+  EXPECT_DOUBLE_EQ(bias["tx_mm"]["standard_error"].get<double>(), 1.5);
+  EXPECT_EQ(bias["tz_mm"]["mean"], 0.0);
+}
+
+TEST(RegistrationStatistics, IntervalsOverCasesNeedSeveral) {
+  std::vector<RegistrationRow> rows = {row("field", 0, 1, 0.2, "a"), row("field", 1, 1, 9.0, "a")};
+  EXPECT_TRUE(renderer_statistics(rows, "field", {})["over_cases"]["rate"]["low"].is_null());
+  rows.push_back(row("field", 0, 1, 0.4, "b"));
+  const json over = renderer_statistics(rows, "field", {})["over_cases"];
+  // Drawn are a and a, a and b, or b and b: rates 1/2, 2/3, 1; mean TRE 0.2, 0.3, 0.4.
+  EXPECT_EQ(over["rate"]["low"], 0.5);
+  EXPECT_EQ(over["rate"]["high"], 1.0);
+  EXPECT_EQ(over["rate"]["cases"], 2);
+  EXPECT_EQ(over["rate"]["is_optimistic"], true);
+  EXPECT_DOUBLE_EQ(over["mean_tre_of_successes_mm"]["low"].get<double>(), 0.2);
+  EXPECT_DOUBLE_EQ(over["mean_tre_of_successes_mm"]["high"].get<double>(), 0.4);
+}
+
+TEST(RowProblems, NameDuplicatesAndRowsThatContradictThemselves) {
+  RegistrationRow good = row("field", 0, 1, 0.2);
+  good.final_deg_mm = {};
+  RegistrationRow twice = good;
+  RegistrationRow without_parameters = row("field", 1, 1, 0.2);
+  RegistrationRow without_initial = row("field", 2, std::nan(""), std::nan(""));
+  EXPECT_THAT(row_problems({good}), testing::IsEmpty());
+  EXPECT_THAT(
+      row_problems({good, twice, without_parameters, without_initial}),
+      testing::ElementsAre("skull, field, start 0: occurs more than once",
+                           "skull, field, start 1: final pose and TRE do not belong together",
+                           "skull, field, start 2: has no initial TRE"));
+}
+
 TEST(PairedStatistics, TakeOnlyStartsThatBothWereGiven) {
   const std::vector<RegistrationRow> rows = {row("field", 0, 0.5, 0.2),
                                              row("field", 1, 1.5, 0.6),
@@ -116,9 +198,16 @@ TEST(PairedStatistics, TakeOnlyStartsThatBothWereGiven) {
   const json result = paired_statistics(rows, 0.5);
   EXPECT_EQ(result["common_starts"], 3);
   EXPECT_EQ(result["successes"], json({2, 3}));
+  // Start 3 alone is discordant: both of the two ways are equally probable.
+  EXPECT_EQ(result["mcnemar_p"], 1.0);
   EXPECT_EQ(result["median_seconds"], json({0.2, 40.0}));
   EXPECT_EQ(result["pairs"], 2);
-  EXPECT_NEAR(result["test"]["mean_difference_mm"].get<double>(), -0.05, 1e-15);
+  const json& test = result["test"];
+  EXPECT_NEAR(test["mean_difference_mm"].get<double>(), -0.05, 1e-15);
+  // Differences -0.1 and 0: one that is not zero cannot be significant.
+  EXPECT_EQ(test["signed_rank_p"], 1.0);
+  EXPECT_EQ(test["margin_mm"], 0.5);
+  EXPECT_GT(test["equivalence_power"].get<double>(), 0.0);
 }
 
 TEST(PairedStatistics, DoNotExistWithoutCommonStarts) {
@@ -135,6 +224,7 @@ Yardstick yardstick_at_origin() {
   Yardstick yardstick;
   yardstick.stated_pose = RigidTransform(Eigen::Translation3d(0, 0, 1));
   yardstick.points_ct_mm = {{0, 0, 0}, {10, 0, 0}};
+  yardstick.rig.cameras = {test::camera_along_z()};
   return yardstick;
 }
 
@@ -164,6 +254,8 @@ TEST(RegisteredRow, MeasuresTheEndAgainstBothPoses) {
   EXPECT_EQ(found.tre_mm, 0.25);
   EXPECT_EQ(found.stated_pose_tre_mm, 0.75);
   EXPECT_EQ(found.final_deg_mm[5], 0.25);
+  EXPECT_EQ(found.errors.translation_mm, 0.25);
+  EXPECT_EQ(found.errors.rotation_deg, 0.0);
 }
 
 TEST(RegisteredRow, OfARegistrationThatThrowsIsAFailure) {
@@ -192,6 +284,50 @@ TEST(RegisteredRow, OfAStartThatNeverMovedIsAFailureHoweverCloseItWas) {
       yardstick_at_origin());
   EXPECT_EQ(found.stop_reason, "start-inadmissible");
   EXPECT_TRUE(std::isnan(found.tre_mm));
+}
+
+TEST(MethodComparison, OfAHandBuiltRunIsTheKnownOne) {
+  const test::ScratchFolder folder;
+  std::vector<RegistrationRow> rows = {row("field", 0, 1, 0.2),
+                                       row("field", 1, 7, 0.4),
+                                       row("field", 2, 8, 9.0),
+                                       row("field", 3, 29, std::nan("")),
+                                       row("field", 4, 31, 0.3)};
+  rows[0].final_deg_mm = {0.3, 0, 0, 0, 1, 0};
+  rows[1].final_deg_mm = {0, 0.6, 0, 0, 2, 0};
+  rows[4].final_deg_mm = {0, 0, 0, 0, 3, 0};
+  for (RegistrationRow& each : rows) each.drr_count = 100 + each.start_index;
+  write_text_file(folder / "registrations.csv", registrations_table(rows).to_text());
+  EvaluationRun run{folder.path(), "registration", {}};
+  run.summary["method"] = {{"preset", "fast"}, {"similarity", "gc"}, {"optimizer", "gradient"}};
+  const std::vector<MethodRow> found = method_rows({run});
+  ASSERT_EQ(found.size(), 1u);
+  const MethodRow& method = found.front();
+  EXPECT_EQ(method.method, "fast gc gradient");
+  EXPECT_EQ(method.starts, 5);
+  EXPECT_EQ(method.bands[0].successes, 2);
+  EXPECT_EQ(method.bands[0].trials, 2);
+  EXPECT_EQ(method.bands[1].successes, 0);
+  EXPECT_EQ(method.bands[1].trials, 1);  // 8 mm belongs to the band that begins there
+  EXPECT_EQ(method.bands[2].trials, 1);  // 31 mm lies beyond all
+  EXPECT_DOUBLE_EQ(method.mean_tre_mm, 0.3);
+  EXPECT_DOUBLE_EQ(method.translation_bias_mm, 2.0);
+  EXPECT_DOUBLE_EQ(method.rotation_bias_deg, std::hypot(0.1, 0.2));
+  EXPECT_EQ(method.median_drr_count, 102.0);
+  EXPECT_EQ(method.median_seconds, 0.2);
+  const std::string text = methods_markdown(found);
+  EXPECT_THAT(text, testing::HasSubstr("| 100 / 0 / 0 | 2 / 1 / 1 | 0.300 | 0.224, 2.000 | 102 |"));
+  EXPECT_EQ(methods_table(found).text(0, "successes_0_8_mm"), "2");
+}
+
+TEST(MethodComparison, OfARunWithoutSuccessHasNoErrors) {
+  const test::ScratchFolder folder;
+  write_text_file(folder / "registrations.csv",
+                  registrations_table({row("field", 0, 1, 5.0)}).to_text());
+  const MethodRow method =
+      method_rows({EvaluationRun{folder.path(), "registration", json::object()}}).front();
+  EXPECT_TRUE(std::isnan(method.mean_tre_mm));
+  EXPECT_THAT(methods_markdown({method}), testing::HasSubstr("| - | -, - |"));
 }
 
 std::vector<DrrComparison> comparisons(const std::vector<double>& psnr_db) {

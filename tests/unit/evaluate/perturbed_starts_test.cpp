@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <set>
 
 #include <gmock/gmock.h>
@@ -143,7 +144,62 @@ TEST(PerturbedStarts, CountDrawsThatThePredicateRefuses) {
   EXPECT_EQ(result.starts.size(), 40u);
   EXPECT_EQ(result.inadmissible_draws, refused);
   EXPECT_GT(refused, 0u);
+  ASSERT_EQ(result.inadmissible_per_interval.size(), 8u);
+  EXPECT_EQ(std::accumulate(result.inadmissible_per_interval.begin(),
+                            result.inadmissible_per_interval.end(),
+                            std::uint64_t{0}),
+            refused);
+  // 6 degrees are 3 mm at the box's RMS radius: close starts are never refused.
+  EXPECT_EQ(result.inadmissible_per_interval[0], 0u);
+  EXPECT_GT(result.inadmissible_per_interval[7], 0u);
   for (const PerturbedStart& start : result.starts) EXPECT_TRUE(limited(start.room_from_ct));
+}
+
+TEST(PerturbedStarts, UniformInTreHaveThatDistribution) {
+  const StartFrame frame = example_frame();
+  StartOptions options;
+  options.starts_per_interval = 50;
+  // A coarse grid: 400 starts, several scalings each.
+  const auto points = target_points(frame.target_box_ct, 20.0);
+  const auto admissible = [&](const RigidTransform& pose) {
+    return parameters_from_pose(frame.pose_frame(), pose).translation_mm.x() < 5.0;
+  };
+  const StratifiedStarts result = uniform_starts(frame, options, points, admissible);
+  ASSERT_EQ(result.starts.size(), 400u);
+  EXPECT_EQ(result.draws, 400u + result.inadmissible_draws);
+  EXPECT_GT(result.inadmissible_draws, 0u);
+  double sum = 0.0;
+  for (const PerturbedStart& start : result.starts) {
+    EXPECT_TRUE(admissible(start.room_from_ct));
+    EXPECT_NEAR(start.initial_tre_mm,
+                mean_tre_mm(start.room_from_ct, frame.gold_room_from_ct, points),
+                1e-12);
+    EXPECT_EQ(start.interval, static_cast<int>(start.initial_tre_mm / 2.0));
+    sum += start.initial_tre_mm;
+  }
+  // Uniform on 0 to 16 mm whatever was refused: mean 8, five standard errors of 16 / sqrt(12 n).
+  EXPECT_NEAR(sum / 400, 8.0, 5 * 16 / std::sqrt(12.0 * 400));
+  // A shorter study is the beginning of a longer one.
+  options.starts_per_interval = 5;
+  EXPECT_EQ(uniform_starts(frame, options, points, admissible).starts[39].parameters.deg_and_mm(),
+            result.starts[39].parameters.deg_and_mm());
+}
+
+TEST(PerturbedStarts, AtGivenPosesKeepThem) {
+  const StartFrame frame = example_frame();
+  const auto points = target_points(frame.target_box_ct, 20.0);
+  const std::vector<PerturbedStart> drawn =
+      stratified_starts(frame, StartOptions{8, 2.0, 1, 1}, points, anything).starts;
+  std::vector<RigidTransform> poses;
+  for (const PerturbedStart& start : drawn) poses.push_back(start.room_from_ct);
+  const StratifiedStarts result = starts_at(frame, StartOptions{4, 2.0, 1, 1}, points, poses);
+  ASSERT_EQ(result.starts.size(), 8u);
+  EXPECT_EQ(result.draws_beyond, 4u);
+  for (std::size_t i = 0; i < 8; ++i) {
+    EXPECT_EQ(result.starts[i].room_from_ct.matrix(), poses[i].matrix());
+    EXPECT_EQ(result.starts[i].initial_tre_mm, drawn[i].initial_tre_mm);
+    EXPECT_EQ(result.starts[i].interval, static_cast<int>(i));
+  }
 }
 
 TEST(PerturbedStarts, SayWhichIntervalsStayEmpty) {

@@ -3,10 +3,12 @@
 
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "base/hash_random.h"
 
 namespace af::evaluation {
 namespace {
@@ -74,6 +76,43 @@ TEST(PairedComparison, IsSignificantExactlyWhenEquivalenceIntervalAndPAgree) {
   const std::vector<double> second = {0.8, 2.3, 3.0, 4.1, 5.0};
   const double far_end = compare_paired(first, second, 1.0).high_90;
   EXPECT_NEAR(compare_paired(first, second, far_end).equivalence_p, 0.05, 1e-9);
+}
+
+TEST(EquivalencePower, EqualsTheShareOfSimulatedStudies) {
+  // Studies of normal differences about zero: the share that shows equivalence is the power.
+  constexpr std::uint64_t kStudies = 4000;
+  for (const auto& [pairs, margin] : {std::pair<std::size_t, double>{12, 1.0}, {40, 0.5}}) {
+    int shown = 0;
+    for (std::uint64_t study = 0; study < kStudies; ++study) {
+      HashRandom random(3, pairs, study);
+      std::vector<double> first(pairs);
+      for (double& value : first) value = random.normal();
+      const PairedComparison result =
+          compare_paired(first, std::vector<double>(pairs, 0.0), margin);
+      shown += result.equivalence_p < 0.05 ? 1 : 0;
+    }
+    // Five standard errors of a share of 4000.
+    const double power = equivalence_power(pairs, 1.0, margin);
+    const double standard_error = std::sqrt(power * (1 - power) / kStudies);
+    EXPECT_NEAR(static_cast<double>(shown) / kStudies, power, 5 * standard_error) << pairs;
+    EXPECT_GT(power, 0.5);
+    EXPECT_LT(power, 0.95);
+  }
+}
+
+TEST(EquivalencePower, IsThatOfANormalDistributionForManyPairs) {
+  // 2 Phi(margin / se - 1.6449) - 1 with se = 0.1 / sqrt(10000) = 0.001 and margin 0.003:
+  // 2 Phi(1.3551) - 1 = 0.8246.
+  EXPECT_NEAR(equivalence_power(10000, 0.1, 0.003), 0.8246, 1e-3);
+  EXPECT_EQ(equivalence_power(10, 0.0, 0.1), 1.0);
+  EXPECT_EQ(equivalence_power(3, 10.0, 0.1), 0.0);
+}
+
+TEST(EquivalencePower, PairsForAPowerAreTheFewestThatReachIt) {
+  const std::size_t pairs = pairs_for_equivalence(0.3, 0.1, 0.9);
+  EXPECT_GE(equivalence_power(pairs, 0.3, 0.1), 0.9);
+  EXPECT_LT(equivalence_power(pairs - 1, 0.3, 0.1), 0.9);
+  EXPECT_EQ(pairs_for_equivalence(1e6, 0.1, 0.9), 0u);
 }
 
 TEST(PairedComparison, HandlesEqualDifferences) {

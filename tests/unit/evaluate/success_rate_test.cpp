@@ -71,5 +71,26 @@ TEST(SuccessRate, NanIsNeverASuccess) {
   EXPECT_EQ(count_successes(kOutcomes, 1e9), 6);
 }
 
+TEST(CaptureRange, IsTheLargestErrorWithEnoughSuccessBelowIt) {
+  // Twenty starts 1 ... 20 mm, of which the 15th fails: 14 of 14, 14 of 15, ... 19 of 20.
+  std::vector<TreOutcome> outcomes;
+  for (int i = 1; i <= 20; ++i) outcomes.push_back({static_cast<double>(i), i == 15 ? 9.0 : 0.1});
+  const std::optional<CaptureRange> range = capture_range(outcomes);
+  ASSERT_TRUE(range.has_value());
+  EXPECT_EQ(range->initial_tre_mm, 20.0);  // 19 of 20 are 95 %
+  EXPECT_TRUE(range->is_whole_study);
+  EXPECT_EQ(capture_range(std::span(outcomes).first(19))->initial_tre_mm, 14.0);
+  EXPECT_FALSE(capture_range(std::span(outcomes).first(19))->is_whole_study);
+  EXPECT_EQ(capture_range(outcomes, 1.0)->initial_tre_mm, 14.0);
+}
+
+TEST(CaptureRange, CountsFailuresWithoutAPoseAndTakesEqualErrorsTogether) {
+  const std::vector<TreOutcome> outcomes = {{1, 0.1}, {2, 0.1}, {2, std::nan("")}};
+  EXPECT_EQ(capture_range(outcomes)->initial_tre_mm, 1.0);
+  EXPECT_EQ(capture_range(outcomes)->starts, 1);
+  EXPECT_FALSE(capture_range(std::vector<TreOutcome>{{1, 9.0}}).has_value());
+  EXPECT_FALSE(capture_range({}).has_value());
+}
+
 }  // namespace
 }  // namespace af::evaluation

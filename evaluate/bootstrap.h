@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <span>
+
+namespace af::evaluation {
+
+/// With fewer cases the percentile interval is too narrow: in simulated studies whose cases differ,
+/// it held the truth 80 % of the time with 4 cases, 90 % with 10 and 94 % with 30.
+/// \test CaseBootstrap.CoversTheTruthTheMoreOftenTheMoreCases
+inline constexpr std::size_t kEnoughCases = 30;
+
+/// Percentile interval of a statistic under resampling of cases.
+struct CaseBootstrap {
+  std::size_t cases = 0;
+  std::size_t replicates = 0;
+  std::size_t undefined = 0;  ///< replicates whose statistic is NaN; they are left out
+  double low = 0.0;           ///< 95 %; NaN when less than two cases or no replicate has a value
+  double high = 0.0;
+
+  [[nodiscard]] bool is_optimistic() const { return cases < kEnoughCases; }
+};
+
+inline constexpr std::size_t kBootstrapReplicates = 2000;
+
+/// 95 % percentile bootstrap interval (Efron 1979) of `statistic` over `cases` cases, drawn with
+/// replacement: starts of one patient share a CT and its X-rays, so patients are what is sampled.
+/// The statistic is given the drawn case numbers. Depends on (cases, seed, replicates) alone.
+CaseBootstrap bootstrap_over_cases(
+    std::size_t cases,
+    const std::function<double(std::span<const std::size_t> drawn)>& statistic,
+    std::uint64_t seed,
+    std::size_t replicates = kBootstrapReplicates);
+
+}  // namespace af::evaluation

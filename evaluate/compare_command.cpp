@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluate/compare_command.h"
+
+#include <iostream>
+
+#include "base/error.h"
+#include "evaluate/method_comparison_files.h"
+#include "io/output_file.h"
+
+namespace af::evaluation {
+
+CLI::App* bind_compare(CLI::App& app, CompareOptions& options) {
+  CLI::App* command = app.add_subcommand(
+      "compare",
+      "One table of finished registration runs: success for starts 0-8, 8-16 and 16-30 mm from "
+      "gold, TRE, bias, DRRs and seconds, as Markdown and CSV");
+  command->add_option("RUN", options.runs, "Folders of finished runs, searched with all below them")
+      ->required();
+  command
+      ->add_option("-o,--output", options.output, "The Markdown file; the CSV takes its name, .csv")
+      ->capture_default_str();
+  return command;
+}
+
+void run_compare(const CompareOptions& options, const Communicator& world) {
+  all_or_none(world, [&] {
+    if (!world.is_root()) return;
+    const std::vector<MethodRow> rows = method_rows(find_runs(options.runs));
+    if (rows.empty())
+      throw InputError("RUN", options.runs.front().string(), "holds no finished registration run");
+    const std::string text = methods_markdown(rows);
+    std::filesystem::path csv = options.output;
+    write_text_file(csv.replace_extension(".csv"), methods_table(rows).to_text());
+    write_text_file(options.output, text);
+    std::cout << text;
+  });
+}
+
+}  // namespace af::evaluation

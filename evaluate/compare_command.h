@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "parallel/communicator.h"
+
+namespace af::evaluation {
+
+/// `af-evaluate compare` as typed.
+struct CompareOptions {
+  std::vector<std::filesystem::path> runs;
+  std::filesystem::path output = "methods.md";
+};
+
+/// Adds the subcommand; returns it.
+CLI::App* bind_compare(CLI::App& app, CompareOptions& options);
+
+/// Collective. One table of all finished registration runs, as Markdown and, beside it, as CSV.
+void run_compare(const CompareOptions& options, const Communicator& world);
+
+}  // namespace af::evaluation

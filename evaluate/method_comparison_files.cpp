@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluate/method_comparison_files.h"
+
+#include <array>
+#include <cmath>
+#include <iterator>
+#include <limits>
+#include <map>
+#include <utility>
+
+#include <Eigen/Core>
+
+#include "evaluate/statistics.h"
+
+namespace af::evaluation {
+
+using nlohmann::json;
+
+namespace {
+
+constexpr std::size_t kBands = std::size(kBandEndsMm) - 1;
+
+double number_or_nan(const CsvTable& table, std::size_t row, const char* column) {
+  return table.text(row, column) == "nan" ? std::numeric_limits<double>::quiet_NaN()
+                                          : table.number(row, column);
+}
+
+/// Registrations of one case by one renderer.
+struct Sums {
+  std::array<IntervalSuccess, kBands> bands{};
+  Eigen::Matrix<double, 6, 1> parameters = Eigen::Matrix<double, 6, 1>::Zero();
+  double tre_mm = 0.0;
+  std::int64_t successes = 0;
+  std::int64_t starts = 0;
+  std::vector<double> drr_counts;
+  std::vector<double> seconds;
+};
+
+void add_row(const CsvTable& table, std::size_t row, Sums& sums) {
+  const double initial_mm = table.number(row, "initial_tre_mm");
+  const double tre_mm = number_or_nan(table, row, "tre_mm");
+  const bool is_success = tre_mm < kSuccessTreMm;
+  ++sums.starts;
+  for (std::size_t band = 0; band < kBands; ++band) {
+    if (!(initial_mm >= kBandEndsMm[band] && initial_mm < kBandEndsMm[band + 1])) continue;
+    ++sums.bands[band].trials;
+    sums.bands[band].successes += is_success ? 1 : 0;
+  }
+  sums.drr_counts.push_back(table.number(row, "drr_count"));
+  const double seconds = number_or_nan(table, row, "seconds");
+  if (std::isfinite(seconds)) sums.seconds.push_back(seconds);
+  if (!is_success) return;
+  ++sums.successes;
+  sums.tre_mm += tre_mm;
+  constexpr std::array<const char*, 6> kFinal = {
+      "final_rx_deg", "final_ry_deg", "final_rz_deg", "final_tx_mm", "final_ty_mm", "final_tz_mm"};
+  for (std::size_t i = 0; i < kFinal.size(); ++i)
+    sums.parameters[static_cast<Eigen::Index>(i)] += table.number(row, kFinal[i]);
+}
+
+std::string method_of(const EvaluationRun& run, const std::string& renderer) {
+  if (renderer != "field" && renderer != "raycast") return renderer;
+  const json method = run.summary.value("method", json::object());
+  return method.value("preset", "?") + " " + method.value("similarity", "?") + " " +
+         method.value("optimizer", "?");
+}
+
+MethodRow row_of(const EvaluationRun& run,
+                 const std::string& case_name,
+                 const std::string& renderer,
+                 const Sums& sums) {
+  MethodRow row;
+  row.run = run.folder.filename().string();
+  row.case_name = case_name;
+  row.method = method_of(run, renderer);
+  row.renderer = renderer;
+  row.starts = sums.starts;
+  for (std::size_t band = 0; band < kBands; ++band) {
+    row.bands.push_back(sums.bands[band]);
+    row.bands[band].low_mm = kBandEndsMm[band];
+    row.bands[band].high_mm = kBandEndsMm[band + 1];
+    row.bands[band].wilson = wilson_interval(sums.bands[band].successes, sums.bands[band].trials);
+  }
+  // NaN without a success: 0 / 0.
+  const auto successes = static_cast<double>(sums.successes);
+  row.mean_tre_mm = sums.tre_mm / successes;
+  row.rotation_bias_deg = sums.parameters.head<3>().norm() / successes;
+  row.translation_bias_mm = sums.parameters.tail<3>().norm() / successes;
+  row.median_drr_count = summarize(sums.drr_counts).median;
+  row.median_seconds = summarize(sums.seconds).median;
+  return row;
+}
+
+std::string percent_text(const IntervalSuccess& band) {
+  if (band.trials == 0) return "-";
+  // Whole per cents must not round a failure away.
+  const double percent = 100 * band.rate();
+  const bool would_mislead = percent < 100 && percent >= 99.5;
+  return fixed_text(percent, would_mislead ? 1 : 0);
+}
+
+std::string number_or_dash(double value, int decimals) {
+  return std::isfinite(value) ? fixed_text(value, decimals) : "-";
+}
+
+}  // namespace
+
+std::vector<MethodRow> method_rows(const std::vector<EvaluationRun>& runs) {
+  std::vector<MethodRow> rows;
+  for (const EvaluationRun& run : runs) {
+    if (run.kind != "registration") continue;
+    const CsvTable table = CsvTable::read(run.folder / "registrations.csv");
+    std::map<std::pair<std::string, std::string>, Sums> sums;
+    for (std::size_t i = 0; i < table.row_count(); ++i)
+      add_row(table, i, sums[{table.text(i, "case"), table.text(i, "renderer")}]);
+    for (const auto& [key, value] : sums) rows.push_back(row_of(run, key.first, key.second, value));
+  }
+  return rows;
+}
+
+CsvTable methods_table(const std::vector<MethodRow>& rows) {
+  std::vector<std::string> columns = {"run", "case", "method", "renderer", "starts"};
+  for (std::size_t band = 0; band < kBands; ++band) {
+    const std::string name =
+        fixed_text(kBandEndsMm[band], 0) + "_" + fixed_text(kBandEndsMm[band + 1], 0) + "_mm";
+    for (const char* what : {"starts_", "successes_", "wilson_low_", "wilson_high_"})
+      columns.push_back(what + name);
+  }
+  for (const char* name : {"mean_tre_mm",
+                           "rotation_bias_deg",
+                           "translation_bias_mm",
+                           "median_drr_count",
+                           "median_seconds"})
+    columns.emplace_back(name);
+  CsvTable table(columns);
+  for (const MethodRow& row : rows) {
+    std::vector<std::string> fields = {
+        row.run, row.case_name, row.method, row.renderer, std::to_string(row.starts)};
+    for (const IntervalSuccess& band : row.bands) {
+      fields.push_back(std::to_string(band.trials));
+      fields.push_back(std::to_string(band.successes));
+      fields.push_back(number_text(band.wilson.low));
+      fields.push_back(number_text(band.wilson.high));
+    }
+    for (const double value : {row.mean_tre_mm,
+                               row.rotation_bias_deg,
+                               row.translation_bias_mm,
+                               row.median_drr_count,
+                               row.median_seconds})
+      fields.push_back(number_text(value));
+    table.add_row(std::move(fields));
+  }
+  return table;
+}
+
+std::string methods_markdown(const std::vector<MethodRow>& rows) {
+  std::string text = "| Run | Case | Method | Renderer | Success %, starts ";
+  for (std::size_t band = 0; band < kBands; ++band)
+    text += (band == 0 ? "" : " / ") + fixed_text(kBandEndsMm[band], 0) + "-" +
+            fixed_text(kBandEndsMm[band + 1], 0);
+  text +=
+      " mm | of starts | Mean TRE of successes, mm | Bias, deg and mm | DRRs | Seconds |\n"
+      "|---|---|---|---|---|---|---|---|---|---|\n";
+  for (const MethodRow& row : rows) {
+    std::string percents;
+    std::string counts;
+    for (const IntervalSuccess& band : row.bands) {
+      percents += (percents.empty() ? "" : " / ") + percent_text(band);
+      counts += (counts.empty() ? "" : " / ") + std::to_string(band.trials);
+    }
+    text += "| " + row.run + " | " + row.case_name + " | " + row.method + " | " + row.renderer +
+            " | " + percents + " | " + counts + " | " + number_or_dash(row.mean_tre_mm, 3) + " | " +
+            number_or_dash(row.rotation_bias_deg, 3) + ", " +
+            number_or_dash(row.translation_bias_mm, 3) + " | " +
+            number_or_dash(row.median_drr_count, 0) + " | " +
+            number_or_dash(row.median_seconds, 4) + " |\n";
+  }
+  return text;
+}
+
+}  // namespace af::evaluation

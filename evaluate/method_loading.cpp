@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluate/method_loading.h"
+
+#include <utility>
+
+#include "base/error.h"
+#include "cli/app_main.h"
+#include "register/case_loading.h"
+
+namespace af::evaluation {
+namespace {
+
+registration::CaseLoadOptions load_options(const MethodOptions& options,
+                                           const std::string& renderer) {
+  registration::CaseLoadOptions result;
+  result.renderer =
+      renderer == "field" ? registration::RendererKind::Field : registration::RendererKind::RayCast;
+  if (renderer == "field")
+    for (const std::string& text : options.fields) {
+      const std::size_t equals = text.find('=');
+      result.field_paths[text.substr(0, equals)] = text.substr(equals + 1);
+    }
+  result.ct.series_uid = options.series_uid;
+  result.water_mu_per_mm = options.water_mu_per_mm;
+  result.ray_caster.step_mm = options.step_mm;
+  return result;
+}
+
+}  // namespace
+
+registration::RegistrationOptions registration_options(const MethodOptions& options) {
+  registration::RegistrationOptions result = registration::preset_options(options.preset);
+  if (options.similarity.has_value()) result.similarity.name = *options.similarity;
+  if (options.optimizer.has_value()) result.optimizer = *options.optimizer;
+  throw_if_any(problems(result));
+  return result;
+}
+
+std::vector<LoadedMethod> load_methods(const MethodOptions& options,
+                                       const Study& study,
+                                       const StudyCase& study_case,
+                                       const Communicator& world,
+                                       std::map<std::string, std::string>& input_sha256) {
+  std::vector<LoadedMethod> methods;
+  for (const std::string& renderer : options.chosen_renderers()) {
+    const registration::LoadedCase loaded =
+        registration::load_case(study, study_case, load_options(options, renderer), world);
+    for (const std::string& text : loaded.warnings) cli::warn(world, text);
+    for (const auto& [name, hash] : loaded.input_sha256)
+      input_sha256[study_case.name + ": " + name] = hash;
+    registration::RegistrationRunner runner = all_or_none(world, [&] {
+      return registration::RegistrationRunner(loaded.problem, registration_options(options));
+    });
+    methods.push_back({renderer, std::move(runner)});
+  }
+  return methods;
+}
+
+}  // namespace af::evaluation

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <limits>
+#include <span>
+
+#include "geometry/camera_geometry.h"
+#include "geometry/rigid_transform.h"
+
+namespace af::evaluation {
+
+/// How far a pose T lies from the gold pose G, beside its mean TRE (tre.h). Means are over target
+/// points p and over cameras; docs/errors.md has the formulas and where they come from.
+struct RegistrationErrors {
+  static constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
+
+  /// Reprojection distance: of G p from the line through the source and T p (van de Kraats 2005).
+  double mrpd_mm = kMissing;
+  double projection_detector_mm = kMissing;   ///< distance of both projections on the detector
+  double projection_isocenter_mm = kMissing;  ///< the same on the plane through the isocentre
+  double rotation_deg = kMissing;             ///< angle of the rotation between the two poses
+  double translation_mm = kMissing;           ///< distance of T c from G c, c the ROI centre
+
+  /// In the order of the members, the order of columns.
+  [[nodiscard]] std::array<double, 5> values() const {
+    return {mrpd_mm, projection_detector_mm, projection_isocenter_mm, rotation_deg, translation_mm};
+  }
+  static RegistrationErrors of_values(const std::array<double, 5>& values) {
+    return {values[0], values[1], values[2], values[3], values[4]};
+  }
+};
+
+/// The errors of `room_from_ct`. Projections are NaN when a point lies behind a source. Throws
+/// InputError without points or cameras.
+/// \test RegistrationErrors.OfHandComputedCases
+RegistrationErrors registration_errors(const RigidTransform& room_from_ct,
+                                       const RigidTransform& gold_room_from_ct,
+                                       std::span<const Eigen::Vector3d> points_ct_mm,
+                                       const Eigen::Vector3d& center_ct_mm,
+                                       const CameraRig& rig);
+
+}  // namespace af::evaluation

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluate/report/html_text.h"
+#include "evaluate/report/number_html.h"
+#include "evaluate/report/sections_report.h"
+#include "evaluate/summary_files.h"
+
+namespace af::evaluation {
+
+using nlohmann::json;
+
+namespace {
+
+std::string maxima_table(const json& summary) {
+  std::vector<HtmlTable::Column> columns = {{"Parameter", false}};
+  for (const json& renderer : summary.at("renderers")) {
+    const std::string name = renderer.at("renderer") == "field" ? "field" : "ray casting";
+    columns.push_back({name + ": maximum at", true});
+    columns.push_back({"width", true});
+    columns.push_back({"width at the target (mm)", true});
+  }
+  HtmlTable table(columns,
+                  "Where the similarity is highest, relative to the gold pose, and how broad it is "
+                  "at half height above the lowest value of all six curves");
+  const std::size_t count = summary.at("renderers").front().at("maxima").size();
+  for (std::size_t i = 0; i < count; ++i) {
+    const json& first = summary.at("renderers").front().at("maxima").at(i);
+    const std::string unit = first.at("unit").get<std::string>();
+    std::vector<std::string> cells = {first.at("parameter").get<std::string>()};
+    for (const json& renderer : summary.at("renderers")) {
+      const json& peak = renderer.at("maxima").at(i);
+      cells.push_back((peak.at("is_at_edge").get<bool>() ? "beyond " : "") +
+                      decimals(peak.at("offset"), 2) + " " + unit);
+      cells.push_back(peak.at("width").is_number() ? decimals(peak.at("width"), 2) + " " + unit
+                                                   : "wider than shown");
+      cells.push_back(decimals(peak.at("width_mm_at_target"), 2));
+    }
+    table.add_row(cells);
+  }
+  return table.html();
+}
+
+std::string broadest_text(const json& summary) {
+  std::string text;
+  for (const json& renderer : summary.at("renderers")) {
+    const std::string axis = renderer.at("broadest_rotation").get<std::string>();
+    text +=
+        std::string(renderer.at("renderer") == "field" ? "With the field" : "With ray casting") +
+        (axis.empty() ? " no rotation stands out as broadest. "
+                      : " the broadest rotation is " + axis + ". ");
+  }
+  return element("p",
+                 text +
+                     "The paper finds the rotation about the patient's cranial-caudal axis, rz in "
+                     "this project's room frame, typically the broadest.");
+}
+
+}  // namespace
+
+std::string similarity_section(const std::vector<EvaluationRun>& runs) {
+  std::string text;
+  for (const EvaluationRun* run : runs_of(runs, "similarity-curves"))
+    text += element("h3", "Case " + escaped(run->summary.at("case").get<std::string>())) +
+            figure(run->file("similarity-curves.svg"),
+                   "image/svg+xml",
+                   "Similarity along each pose parameter",
+                   "<b>Similarity about the gold pose</b> (the paper's Fig. 14): one parameter at "
+                   "a time; the marks are the maxima.",
+                   "wide") +
+            maxima_table(run->summary) + broadest_text(run->summary);
+  return text.empty() ? "" : element("h2", "Shape of the similarity") + text;
+}
+
+std::string field_parameters_section(const std::vector<EvaluationRun>& runs) {
+  std::string text;
+  for (const EvaluationRun* run : runs_of(runs, "field-parameters")) {
+    HtmlTable table({{"(u,v) nodes", true},
+                     {"(s,t) nodes", true},
+                     {"Codewords", true},
+                     {"Training share", true},
+                     {"PSNR median (dB)", true},
+                     {"Quartiles", true},
+                     {"Lowest", true},
+                     {"Uncompressed (MB)", true},
+                     {"Payload (MB)", true},
+                     {"Compression", true},
+                     {"Creation (s)", true},
+                     {"Ranks", true}},
+                    "Every setting (the paper's Table I): the first is the one that all sweeps "
+                    "share; compression is that of the payload");
+    for (const json& setting : run->summary.at("settings")) {
+      const json& psnr = setting.at("psnr_db");
+      const double uncompressed = setting.at("uncompressed_bytes").get<double>();
+      const double payload = setting.at("payload_bytes").get<double>();
+      table.add_row({setting.at("uv_nodes").dump(),
+                     setting.at("st_nodes").dump(),
+                     setting.at("codewords").dump(),
+                     setting.at("training_fraction").dump(),
+                     decimals(psnr.at("median"), 2),
+                     decimals(psnr.at("q1"), 2) + "–" + decimals(psnr.at("q3"), 2),
+                     decimals(psnr.at("min"), 2),
+                     decimals(uncompressed / 1e6, 1),
+                     decimals(payload / 1e6, 1),
+                     decimals(uncompressed / payload, 1),
+                     decimals(setting.at("creation_seconds"), 1),
+                     setting.at("creation_ranks").dump()});
+    }
+    text += element("h3", "Camera " + escaped(run->summary.at("camera").get<std::string>())) +
+            figure(run->file("field-parameters.svg"),
+                   "image/svg+xml",
+                   "PSNR against each field parameter",
+                   "<b>Image quality against the field's parameters</b> (the paper's Fig. 10): "
+                   "medians and quartiles over " +
+                       run->summary.at("poses").dump() +
+                       " random poses; the setting that all panels share is set off.",
+                   "wide") +
+            table.html();
+  }
+  return text.empty() ? "" : element("h2", "What a field costs and gives") + text;
+}
+
+}  // namespace af::evaluation

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+// Poses of starts, and poses that any program found from them, as files.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "geometry/rigid_transform.h"
+
+namespace af::evaluation {
+
+/// What the columns of a table of poses are relative to.
+struct PoseTableFrames {
+  std::string case_name;
+  bool is_only_case = true;  ///< a table or file name need not name the case
+  PoseFrame gold;            ///< of start_rx_deg ... and final_rx_deg ...
+  PoseFrame nominal;         ///< of rx_deg ... tz_mm
+};
+
+/// The starts of one case from a CSV file, in its order: rows whose `case` is the case's; the pose
+/// is m00 ... m23 of room_from_ct, or start_rx_deg ... start_tz_mm relative to gold. FileError:
+/// unreadable, or a value that is not a number; InputError: no row of the case, a pose that is not
+/// rigid.
+std::vector<RigidTransform> read_starts(const std::filesystem::path& path,
+                                        const PoseTableFrames& frames);
+
+/// Poses that were found, by start index.
+struct FoundPoses {
+  std::map<std::int64_t, RigidTransform> room_from_ct;
+  std::map<std::int64_t, double> seconds;  ///< where the table has that column
+  std::vector<std::string> problems;       ///< what was left out and why, in words
+};
+
+/// The poses of one case: a CSV file with start_index, optionally case and seconds, and m00 ... m23
+/// of room_from_ct, or final_rx_deg ... final_tz_mm relative to gold (as in registrations.csv), or
+/// rx_deg ... tz_mm relative to the nominal pose, about the ROI centre. Or a folder of ITK
+/// transforms (.tfm, ct_from_room) named [CASE-]INDEX.tfm. A pose with a value that is not finite
+/// is no pose; of a start that occurs twice the first counts; both are reported as problems.
+FoundPoses read_found_poses(const std::filesystem::path& path, const PoseTableFrames& frames);
+
+}  // namespace af::evaluation

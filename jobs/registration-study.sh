@@ -1,0 +1,180 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# Registration methods against each other, on clean and on hard X-rays: one table.
+set -euo pipefail
+# shellcheck source-path=SCRIPTDIR
+source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
+
+usage() {
+  cat <<'TEXT'
+Usage: jobs/registration-study.sh [OPTIONS]
+
+Simulates one study per anatomy and variant, builds the fields, draws one table of starts per anatomy, registers from
+these same starts with every method, and writes methods.md and methods.csv: success for starts 0-8, 8-16 and 16-30 mm
+from the true pose, TRE of successes, bias, DRRs, seconds. What is finished is kept, so the same command goes on where
+it was stopped, and a method that is added costs only itself. Needs the programs in build/release/bin (or installed).
+
+  --output DIR              where everything goes                                     [./registration-study]
+  --ct NAME=PATH            an anatomy: a CT file or DICOM folder; may be repeated
+  --phantom NAME            an anatomy: a built-in phantom; may be repeated    [the default skull CT alone]
+  --variants LIST           comma separated: clean, stressed (rods,fiducials,heel,noise,degraded-ct),
+                            moving (the same and motion), scatter, calibration, or any names that
+                            af-simulate --stress takes, joined by +                [clean,stressed,scatter]
+  --methods LIST            comma separated, each PRESET[:SIMILARITY[:OPTIMIZER]]                   [paper]
+  --renderer NAME           field, raycast or both                                                  [field]
+  --starts-per-interval N   starts in each interval of 2 mm                                            [30]
+  --intervals N             intervals of 2 mm, from 0                                                  [15]
+  --max-rotation-deg X      range of the fields, degrees                                               [12]
+  --max-translation-mm X    range of the fields, mm                                                    [40]
+  --quick                   2 starts in each of 8 intervals and small fields: whether it works
+  --ranks N                 MPI ranks of fields and registrations                               [all cores]
+  --seed N                  of everything random                                                        [1]
+  --help
+TEXT
+}
+
+# --- options -----------------------------------------------------------------------------------------------------
+
+output="$PWD/registration-study"
+anatomies=() variants=clean,stressed,scatter methods=paper renderer=field
+starts_per_interval=30 intervals=15 max_rotation_deg=12 max_translation_mm=40 seed=1
+field_size=(--uv-nodes 64 --st-nodes 256 --codewords 16384)
+ranks=$(core_count)
+
+need_value() { (($2 >= 2)) || die 2 "option $1 needs a value (try --help)"; }
+need_count() { [[ "$2" =~ ^[1-9][0-9]{0,6}$ ]] || die 2 "$1 = '$2' must be a whole number from 1 to 9999999"; }
+need_number() { [[ "$2" =~ ^[0-9]+([.][0-9]+)?$ ]] || die 2 "$1 = '$2' must be a number"; }
+
+while (($# > 0)); do
+  case "$1" in
+    --output | -o) need_value "$1" $#; output=$2; shift ;;
+    --ct)
+      need_value "$1" $#
+      [[ "$2" =~ ^[A-Za-z0-9._-]+=.+$ ]] || die 2 "--ct = '$2' must be NAME=PATH"
+      [[ -e "${2#*=}" ]] || die 4 "--ct ${2#*=}: no such file or folder"
+      anatomies+=("${2%%=*}=ct=$(realpath "${2#*=}")")
+      shift
+      ;;
+    --phantom) need_value "$1" $#; anatomies+=("$2=phantom=$2"); shift ;;
+    --variants) need_value "$1" $#; variants=$2; shift ;;
+    --methods) need_value "$1" $#; methods=$2; shift ;;
+    --renderer) need_value "$1" $#; renderer=$2; shift ;;
+    --starts-per-interval) need_value "$1" $#; need_count "$1" "$2"; starts_per_interval=$2; shift ;;
+    --intervals) need_value "$1" $#; need_count "$1" "$2"; intervals=$2; shift ;;
+    --max-rotation-deg) need_value "$1" $#; need_number "$1" "$2"; max_rotation_deg=$2; shift ;;
+    --max-translation-mm) need_value "$1" $#; need_number "$1" "$2"; max_translation_mm=$2; shift ;;
+    --quick) starts_per_interval=2 intervals=8 field_size=(--uv-nodes 24 --st-nodes 128 --codewords 2048) ;;
+    --ranks | -n) need_value "$1" $#; need_count "$1" "$2"; ranks=$2; shift ;;
+    --seed) need_value "$1" $#; [[ "$2" =~ ^[0-9]{1,18}$ ]] || die 2 "--seed = '$2' must be a whole number"; seed=$2; shift ;;
+    --help | -h) usage; exit 0 ;;
+    *) die 2 "unknown option '$1' (try --help)" ;;
+  esac
+  shift
+done
+
+# stress_of VARIANT: what af-simulate --stress is given; nothing for clean.
+stress_of() {
+  case "$1" in
+    clean) ;;
+    stressed) echo rods,fiducials,heel,noise,degraded-ct ;;
+    moving) echo rods,fiducials,heel,noise,degraded-ct,motion ;;
+    *) echo "${1//+/,}" ;;
+  esac
+}
+
+# --- stages ------------------------------------------------------------------------------------------------------
+
+if [[ -f "$af_root/CMakeLists.txt" ]]; then
+  bin="$af_root/build/release/bin"
+else
+  bin="$(cd "$af_root/../.." && pwd)/bin"
+fi
+for program in af-simulate af-precompute af-evaluate; do
+  [[ -x "$bin/$program" ]] || die 1 "$bin/$program is missing: build it first"
+done
+
+mkdir -p "$output/.stages" "$output/logs"
+output="$(cd "$output" && pwd)"
+exec 9>"$output/.stages/lock"
+flock --nonblock 9 || die 3 "another run is at work in $output"
+
+# What the stages of an anatomy depend on beyond their own command lines.
+chain=""
+
+# run_stage NAME COMMAND...: unless it was finished with the same command and chain; its output goes to a log.
+run_stage() {
+  local name=$1 stamp="$output/.stages/${1//\//-}.done" log="$output/logs/${1//\//-}.log" start=$SECONDS status=0
+  shift
+  if [[ -f "$stamp" && "$(<"$stamp")" == "$chain$*" ]]; then
+    return
+  fi
+  rm -f "$stamp"
+  say "$name ..."
+  "$@" >"$log" 2>&1 || status=$?
+  if ((status != 0)); then
+    tail -n 5 "$log" >&2
+    die "$status" "$name failed with exit code $status; its log is $log"
+  fi
+  printf '%s\n' "$chain$*" >"$stamp"
+  say "    $(duration $((SECONDS - start)))"
+}
+
+# build_fields NAME STUDY: one field per camera, NAME/A.af.h5 and NAME/B.af.h5.
+build_fields() {
+  local name=$1 study=$2 camera
+  for camera in A B; do
+    run_stage "field $camera of $name" run_ranks "$ranks" "$bin/af-precompute" --study "$study" --camera "$camera" \
+      --max-rotation-deg "$max_rotation_deg" --max-translation-mm "$max_translation_mm" "${field_size[@]}" \
+      --seed "$seed" -o "$output/fields/$name/$camera.af.h5"
+  done
+}
+
+if ((${#anatomies[@]} == 0)); then
+  if [[ ! -f "$output/skull.mhd" ]]; then
+    run_stage "the default CT" "$af_root/jobs/default-ct.sh" "$output/skull.mhd"
+  fi
+  anatomies=("skull=ct=$output/skull.mhd")
+fi
+mkdir -p "$output/studies" "$output/fields" "$output/starts" "$output/runs"
+IFS=, read -r -a variant_list <<<"$variants"
+IFS=, read -r -a method_list <<<"$methods"
+
+run_folders=()
+for anatomy in "${anatomies[@]}"; do
+  IFS='=' read -r name kind source <<<"$anatomy"
+  chain="$kind $source, ${field_size[*]}, $max_rotation_deg deg, $max_translation_mm mm: "
+  starts=""
+  for variant in clean "${variant_list[@]/#clean/}"; do
+    [[ -n "$variant" ]] || continue
+    stress=$(stress_of "$variant")
+    study="$output/studies/$name-$variant/study.toml"
+    run_stage "study $name-$variant" "$bin/af-simulate" "--$kind" "$source" --case "$name" --rig treatment-room \
+      --seed "$seed" ${stress:+--stress "$stress"} --force -o "$output/studies/$name-$variant"
+    # Only a degraded CT needs fields of its own.
+    fields="$name-clean"
+    [[ ",$stress," != *,degraded-ct,* ]] || fields="$name-$variant"
+    build_fields "$fields" "$output/studies/$fields/study.toml"
+    field_options=(--field "A=$output/fields/$fields/A.af.h5" --field "B=$output/fields/$fields/B.af.h5")
+    if [[ -z "$starts" ]]; then
+      starts="$output/starts/$name/starts.csv"
+      run_stage "starts of $name" "$bin/af-evaluate" registration --study "$study" "${field_options[@]}" --gold study \
+        --intervals "$intervals" --starts-per-interval "$starts_per_interval" --seed "$seed" --starts-only \
+        -o "$output/starts/$name"
+    fi
+    # The clean study is made for its fields and starts in any case, but registered only when asked for.
+    [[ ",$variants," == *",$variant,"* ]] || continue
+    [[ "$renderer" != raycast ]] || field_options=()
+    for method in "${method_list[@]}"; do
+      IFS=: read -r preset similarity optimizer <<<"$method"
+      run="$output/runs/$name-$variant-${method//:/-}"
+      run_stage "$name-$variant by $method" run_ranks "$ranks" "$bin/af-evaluate" registration --study "$study" \
+        "${field_options[@]}" --renderer "$renderer" --gold study --preset "$preset" \
+        ${similarity:+--similarity "$similarity"} ${optimizer:+--optimizer "$optimizer"} --intervals "$intervals" \
+        --starts-per-interval "$starts_per_interval" --starts-from "$starts" --seed "$seed" -o "$run"
+      run_folders+=("$run")
+    done
+  done
+done
+((${#run_folders[@]} > 0)) || die 2 "--variants = '$variants' and --methods = '$methods' name nothing to do"
+"$bin/af-evaluate" compare "${run_folders[@]}" -o "$output/methods.md"
+say "Table: $output/methods.md, $output/methods.csv"
