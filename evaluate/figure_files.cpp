@@ -281,8 +281,17 @@ void draw_sweep_panels(const std::vector<SweepPanel>& panels,
                        const std::string& y_label,
                        const std::filesystem::path& path_without_extension) {
   GnuplotFigure figure(title, 760, 600);
+  double lowest = std::numeric_limits<double>::infinity();
+  double highest = -lowest;
+  for (const SweepPanel& panel : panels)
+    for (const SweepPoint& point : panel.points) {
+      lowest = std::min(lowest, point.low);
+      highest = std::max(highest, point.high);
+    }
   const int rows = (static_cast<int>(panels.size()) + 1) / 2;
-  figure.add(multiplot(title, rows, 2) + "\nunset key\nset ylabel " + gnuplot_quoted(y_label));
+  figure.add(multiplot(title, rows, 2) + "\nunset key\nset ylabel " + gnuplot_quoted(y_label) +
+             "\nset yrange [" + number_text(std::floor(lowest)) + ":" +
+             number_text(std::ceil(highest)) + "]");
   for (std::size_t p = 0; p < panels.size(); ++p) {
     std::vector<std::vector<double>> all;
     std::vector<std::vector<double>> base;

@@ -79,8 +79,8 @@ struct SweepPanel {
   std::vector<SweepPoint> points;  ///< ascending x
 };
 
-/// Panels in rows of two: medians joined by a line, bars from `low` to `high`, the shared setting
-/// in another colour (Fig. 10).
+/// Panels in rows of two with one common y axis: medians joined by a line, bars from `low` to
+/// `high`, the shared setting in another colour (Fig. 10).
 void draw_sweep_panels(const std::vector<SweepPanel>& panels,
                        const std::string& title,
                        const std::string& y_label,
