@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -11,7 +12,7 @@
 
 namespace af {
 
-/// How finely a volume is resampled when its axes are not those of the slab frame.
+/// How finely a volume is resampled along x and z where these are not axes of the CT.
 struct SlabAlignedOptions {
   double relative_spacing = 0.5;  ///< of the CT's own spacing in that direction
   /// Coarser spacing, at most the CT's own, is taken where the grid would need more.
@@ -27,8 +28,14 @@ struct SlabAlignedGrid {
   std::array<int, 3> size = {0, 0, 0};  ///< x, y, z
   int row_stride = 0;                   ///< values from (x, y, z) to (x, y, z + 1): whole vectors
   float levels_per_unit = 1.0f;         ///< stored level of a relative attenuation of 1
-  bool is_sharpened = false;            ///< slices sharpened against the smoothing by interpolation
+  /// Slab axes that do not run along an axis of the CT: x and z are then sampled finely and
+  /// sharpened against the smoothing by interpolation, slices along y are means over their
+  /// neighbourhood.
+  std::array<bool, 3> is_resampled = {false, false, false};
 
+  [[nodiscard]] bool is_oblique() const {
+    return is_resampled[0] || is_resampled[1] || is_resampled[2];
+  }
   [[nodiscard]] std::size_t row_count() const {
     return static_cast<std::size_t>(size[1]) * static_cast<std::size_t>(size[2]);
   }
@@ -42,7 +49,7 @@ struct SlabAlignedGrid {
   [[nodiscard]] double slice_y_mm(int slice) const {
     return origin_mm.y() + spacing_mm.y() * slice;
   }
-  /// Node (0, y, 0) of slice y. Sharpened slices are shifted against each other along x and z by
+  /// Node (0, y, 0) of slice y. Along resampled x and z slices are shifted against each other by
   /// parts of a cell, so that rays that run along y meet every slice at another place between its
   /// nodes and errors of interpolation cancel.
   [[nodiscard]] Eigen::Vector3d slice_origin_mm(int slice) const;
@@ -52,12 +59,13 @@ struct SlabAlignedGrid {
   static constexpr std::size_t kTailValues = 64;
 };
 
-/// The grid that holds all attenuation of `volume` and has zeros on its faces. Where the slab frame
-/// runs along the CT's axes the nodes are the voxels, so that nothing is interpolated twice;
-/// otherwise the grid is finer than the CT by options.relative_spacing and slices are sharpened
-/// against the second interpolation. Slices are never much farther apart than columns. Levels are
-/// scaled such that no level exceeds 32767 and no sum of 256 times one level per slice exceeds 2^31
-/// - 1: casters add in 32-bit integers.
+/// The grid that holds all attenuation of `volume` and has zeros on its faces. A slab axis that
+/// runs along one of the CT keeps the CT's nodes, so that nothing is interpolated twice along it:
+/// all three for a camera that looks along an axis, z for one that is turned about the patient's
+/// axis. Along the others the grid is finer than the CT by options.relative_spacing and slices are
+/// sharpened against the second interpolation. Slices are never much farther apart than voxels.
+/// Levels are scaled such that no level exceeds 32767 and no sum of 256 times one level per slice
+/// exceeds 2^31 - 1: casters add in 32-bit integers.
 SlabAlignedGrid slab_aligned_grid(const AttenuationVolume& volume,
                                   const RigidTransform& slab_from_ct,
                                   const SlabAlignedOptions& options = {});
@@ -68,7 +76,7 @@ struct OccupiedRange {
   std::int16_t end = 0;
 };
 
-/// Resamples slices [first_slice, end_slice) trilinearly. `values` are those of these slices alone,
+/// Resamples slices [first_slice, end_slice). `values` are those of these slices alone,
 /// [y][z][x] with row_stride; `occupied` has one range per row. Pieces may be filled by several
 /// ranks; the values do not depend on the pieces or the vector width.
 void fill_slices(const AttenuationVolume& volume,

@@ -280,7 +280,7 @@ TEST(ShearWarpFieldCaster, SlabsSumToTheWhole) {
     const double rounding = (static_cast<double>(boundaries_y_mm.size()) + 2.0) / 2.0;
     const double overshoot = 23.0 / 180.0 * 0.1 * mu_per_mm(0) * 4.0;
     const double tolerance =
-        rounding + (whole.resampled.grid().is_sharpened
+        rounding + (whole.resampled.grid().is_oblique()
                         ? overshoot / static_cast<double>(whole.quantizer.step())
                         : 0.0);
     int most_slabs = 0;

@@ -38,7 +38,7 @@ TEST(SlabAlignedVolume, HoldsTheVoxelsThemselvesWhenAxesAgree) {
     const RigidTransform slab_from_ct = rotated(rotation);
     const SlabAlignedVolume resampled(volume, slab_from_ct);
     const SlabAlignedGrid& grid = resampled.grid();
-    EXPECT_FALSE(grid.is_sharpened);
+    EXPECT_FALSE(grid.is_oblique());
     EXPECT_EQ(static_cast<std::size_t>(grid.size[0]) * grid.row_count(),
               volume.grid().voxel_count());
     int compared = 0;
@@ -78,7 +78,7 @@ TEST(SlabAlignedVolume, ObliqueGridReproducesALinearRamp) {
     const RigidTransform slab_from_ct = rotated(rotation);
     const SlabAlignedVolume resampled(volume, slab_from_ct);
     const SlabAlignedGrid& grid = resampled.grid();
-    EXPECT_TRUE(grid.is_sharpened);
+    EXPECT_TRUE(grid.is_oblique());
     int compared = 0;
     for (int y = 0; y < grid.size[1]; ++y)
       for (int z = 0; z < grid.size[2]; ++z)
