@@ -88,7 +88,7 @@ void fill_slices(const AttenuationVolume& volume,
                  std::span<OccupiedRange> occupied);
 
 /// A volume resampled to the slab frame: what the shear-warp caster reads. 2 bytes per node.
-/// \test SlabAlignedVolume.HoldsTheVoxelsThemselvesWhenAxesAgree
+/// \test SlabAlignedVolume.HoldsMeansOfTwoVoxelsWhenAxesAgree
 class SlabAlignedVolume {
  public:
   SlabAlignedVolume(const AttenuationVolume& volume,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "precompute/depth_slabs.h"
 
+#include <cmath>
 #include <limits>
 
 #include <gtest/gtest.h>
@@ -79,14 +80,15 @@ TEST(DepthSlabs, BoundariesLieBetweenSlicesAndPlanesAtCentroids) {
   RigidTransform slab_from_ct = RigidTransform::Identity();
   slab_from_ct.translation() = Eigen::Vector3d(0.0, 25.0, 0.0);
   const DepthSlabs slabs = choose_depth_slabs(SlabAlignedVolume(volume, slab_from_ct), 3);
+  // Slices stand a fifth of 2 mm before the voxels' planes, and the cuts lie midway between them.
+  const double shift_mm = (0.5 - std::sqrt(1.0 / 12.0)) * 2.0;
   constexpr double kRoundingMm = 1e-9;
   ASSERT_EQ(slabs.boundaries_y_mm.size(), 2U);
-  EXPECT_NEAR(slabs.boundaries_y_mm[0], 25.0 - 8.0, kRoundingMm);
-  EXPECT_NEAR(slabs.boundaries_y_mm[1], 25.0 + 8.0, kRoundingMm);
+  EXPECT_NEAR(slabs.boundaries_y_mm[0], 25.0 - 8.0 - shift_mm, kRoundingMm);
+  EXPECT_NEAR(slabs.boundaries_y_mm[1], 25.0 + 8.0 - shift_mm, kRoundingMm);
   ASSERT_EQ(slabs.st_plane_y_mm.size(), 3U);
   for (int k = 0; k < 3; ++k)
-    EXPECT_NEAR(
-        slabs.st_plane_y_mm[static_cast<std::size_t>(k)], 25.0 + 16.0 * (k - 1), kRoundingMm);
+    EXPECT_NEAR(slabs.st_plane_y_mm[static_cast<std::size_t>(k)], 25.0 + 16.0 * (k - 1), shift_mm);
 }
 
 }  // namespace

@@ -293,8 +293,9 @@ TEST(ShearWarpFieldCaster, SlabsSumToTheWhole) {
 }
 
 TEST(ShearWarpFieldCaster, AgreesWithTheReferenceInEverySlab) {
-  const LightSlab light_slab =
-      test::cut_at(test::small_light_slab(test::aligned_rotations()[0]), {-6.6 - 2.1, 6.6 - 2.1});
+  constexpr double kShiftMm = 0.2113 * 1.2;  // of slices beside the CT's planes
+  const LightSlab light_slab = test::cut_at(test::small_light_slab(test::aligned_rotations()[0]),
+                                            {-6.6 - 2.1 - kShiftMm, 6.6 - 2.1 - kShiftMm});
   const CastCase cut(test::smooth_ct(), light_slab);
   const RayCastFieldCaster reference(cut.volume, light_slab, cut.quantizer, {0.25});
   // Boundaries lie midway between slices. There the reference ends sharply where the trapezoidal

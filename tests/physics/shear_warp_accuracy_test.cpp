@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include "io/ct_reader.h"
+#include "io/rig_file.h"
+#include "physics/caster_accuracy.h"
+
+namespace af {
+namespace {
+
+// The error that a caster may add so that a field's PSNR of some 45 dB falls by less than 0.1 dB:
+// errors that add in squares may be 0.1 dB * ln(10) / 10 = 2.3 % of 10^-4.5, 61 dB; 75 dB keeps
+// them below a tenth of even 64 dB fields.
+constexpr double kLeastDb = 75.0;
+
+CtVolume skull() {
+  return read_ct(AF_DEFAULT_CT_PATH);
+}
+
+void expect_accurate(const std::string& rig_name,
+                     const std::string& camera,
+                     const Eigen::Vector3d& angles_deg,
+                     double max_translation_mm) {
+  const CtVolume ct = skull();
+  const CameraRig rig = read_rig(rig_name);
+  const PoseFrame frame{
+      rotation_from_angles(angles_deg * kRadPerDeg), ct.grid.center_mm(), rig.isocenter_point};
+  const test::CasterAccuracy found =
+      test::measure_caster_accuracy(AttenuationVolume(ct, AttenuationModel{}),
+                                    rig.camera(camera),
+                                    frame,
+                                    {10.0 * kRadPerDeg, max_translation_mm},
+                                    200);
+  EXPECT_GT(found.rays, 5000);
+  EXPECT_GT(found.reference_psnr_db, kLeastDb + 15.0);  // the reference is converged
+  EXPECT_GT(found.psnr_db, kLeastDb);
+}
+
+TEST(ShearWarpAccuracy, IsAtLeast75DbAlongTheAxesOfARealCt) {
+  expect_accurate("c-arm-12in", "AP", {0.0, 0.0, 0.0}, 100.0);
+  expect_accurate("c-arm-12in", "LAT", {0.0, 0.0, 0.0}, 100.0);
+}
+
+TEST(ShearWarpAccuracy, IsAtLeast75DbFromObliqueCameras) {
+  expect_accurate("treatment-room", "A", {0.0, 0.0, 0.0}, 30.0);
+  expect_accurate("c-arm-12in", "AP", {0.0, 0.0, 45.0}, 100.0);
+}
+
+}  // namespace
+}  // namespace af
