@@ -14,10 +14,9 @@
 #include "precompute/shear_warp_caster.h"
 #include "support/itk_comparison.h"
 
-namespace {
+namespace af::benchmark {
 
-using namespace af;
-using namespace af::benchmark;
+namespace {
 
 constexpr const char* kReference = "reference RayCaster, DRR, 1 mm";
 constexpr const char* kItk = "itk::RayCastInterpolateImageFunction, DRR";
@@ -156,11 +155,16 @@ void run(const CaseOptions& options, const std::string& work_folder) {
 
 }  // namespace
 
+}  // namespace af::benchmark
+
+// Only what CLI11 throws while the options are bound: a defect.
+// NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
-  CaseOptions options;
+  af::benchmark::CaseOptions options;
   std::string work_folder;
   CLI::App app{"Rays per second of one core: both casters of fields, ITK's and plastimatch's."};
-  bind_case(app, options);
+  af::benchmark::bind_case(app, options);
   app.add_option("--work", work_folder, "Folder for plastimatch's files")->required();
-  return cli::app_main(app, argc, argv, [&](const Communicator&) { run(options, work_folder); });
+  return af::cli::app_main(
+      app, argc, argv, [&](const af::Communicator&) { af::benchmark::run(options, work_folder); });
 }

@@ -16,10 +16,9 @@
 #include "precompute/nearest_codeword.h"
 #include "precompute/shear_warp_caster.h"
 
-namespace {
+namespace af::benchmark {
 
-using namespace af;
-using namespace af::benchmark;
+namespace {
 
 constexpr const char* kFast = "NearestCodeword";
 constexpr const char* kBruteForce = "brute force";
@@ -169,9 +168,14 @@ void run(const CaseOptions& options) {
 
 }  // namespace
 
+}  // namespace af::benchmark
+
+// Only what CLI11 throws while the options are bound: a defect.
+// NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
-  CaseOptions options;
+  af::benchmark::CaseOptions options;
   CLI::App app{"Tiles per second of one core: exact search, brute force, Faiss."};
-  bind_case(app, options);
-  return cli::app_main(app, argc, argv, [&](const Communicator&) { run(options); });
+  af::benchmark::bind_case(app, options);
+  return af::cli::app_main(
+      app, argc, argv, [&](const af::Communicator&) { af::benchmark::run(options); });
 }

@@ -9,7 +9,7 @@
 
 #include "base/error.h"
 
-extern "C" void sgemm_();
+extern "C" void sgemm_();  // NOLINT(readability-identifier-naming): the name of BLAS
 
 namespace af::benchmark {
 

@@ -13,10 +13,9 @@
 #include "cli/app_main.h"
 #include "support/run_program.h"
 
-namespace {
+namespace af::benchmark {
 
-using namespace af;
-using namespace af::benchmark;
+namespace {
 namespace fs = std::filesystem;
 
 struct FieldOptions {
@@ -151,6 +150,7 @@ nlohmann::json median_phases(const std::vector<nlohmann::json>& phases) {
   nlohmann::json medians = nlohmann::json::object();
   for (const auto& [phase, ignored] : phases.front().items()) {
     std::vector<double> seconds;
+    seconds.reserve(phases.size());
     for (const nlohmann::json& of_round : phases)
       seconds.push_back(of_round.at(phase).get<double>());
     medians[phase] = median_of(seconds);
@@ -243,14 +243,19 @@ void run(const FieldOptions& options) {
 
 }  // namespace
 
+}  // namespace af::benchmark
+
+// Only what CLI11 throws while the options are bound: a defect.
+// NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
-  FieldOptions options;
+  af::benchmark::FieldOptions options;
   options.of_case.rounds = 3;
   CLI::App app{"Whole fields by af-precompute: seconds, memory, size, image quality."};
-  bind_case(app, options.of_case);
+  af::benchmark::bind_case(app, options.of_case);
   app.add_option("--programs", options.programs, "Folder of the programs")->required();
   app.add_option("--work", options.work, "Folder for fields and logs")->required();
   app.add_option("--part", options.part, "fields, efficiency, memory or quality")
       ->capture_default_str();
-  return cli::app_main(app, argc, argv, [&](const Communicator&) { run(options); });
+  return af::cli::app_main(
+      app, argc, argv, [&](const af::Communicator&) { af::benchmark::run(options); });
 }

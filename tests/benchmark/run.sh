@@ -73,8 +73,9 @@ fi
 
 # One BLAS thread: everything is per core.
 export OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
-# Debian's OpenBLAS takes AVX2 kernels on processors newer than itself; Faiss shall have the best there is.
-if [[ -z "${OPENBLAS_CORETYPE:-}" ]] && grep -q avx512vl /proc/cpuinfo 2>/dev/null; then
+# Faiss shall have OpenBLAS's best: Debian's takes AVX2 kernels on processors newer than itself.
+unset OPENBLAS_CORETYPE OPENBLAS_L2_SIZE
+if grep -q avx512vl /proc/cpuinfo 2>/dev/null; then
   export OPENBLAS_CORETYPE=SkylakeX
 fi
 export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1

@@ -20,6 +20,8 @@ void require_identity(const Eigen::Matrix3d& direction) {
 
 CtVolume in_identity_direction(const CtVolume& ct) {
   const auto& size = ct.grid.size;
+  const auto row = static_cast<std::size_t>(size[0]);
+  const auto slice = row * static_cast<std::size_t>(size[1]);
   const Eigen::Matrix3d& flips = ct.grid.direction;
   require_identity(flips.cwiseAbs());
   std::vector<std::int16_t> voxels(ct.hu.size());
@@ -31,7 +33,8 @@ CtVolume in_identity_direction(const CtVolume& ct) {
         const int from_j = flips(1, 1) > 0 ? j : size[1] - 1 - j;
         const int from_k = flips(2, 2) > 0 ? k : size[2] - 1 - k;
         voxels[next++] =
-            ct.hu[static_cast<std::size_t>((from_k * size[1] + from_j) * size[0] + from_i)];
+            ct.hu[static_cast<std::size_t>(from_k) * slice +
+                  static_cast<std::size_t>(from_j) * row + static_cast<std::size_t>(from_i)];
       }
   CtGrid grid = ct.grid;
   for (int axis = 0; axis < 3; ++axis)

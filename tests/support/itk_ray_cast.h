@@ -20,10 +20,10 @@ struct ItkGrid {
 
 /// As RayFan.
 struct ItkFan {
-  Triple source_point;
-  Triple first_point;
-  Triple column_step;
-  Triple row_step;
+  Triple source_point = {0, 0, 0};
+  Triple first_point = {0, 0, 0};
+  Triple column_step = {0, 0, 0};
+  Triple row_step = {0, 0, 0};
   int columns = 0;
   int rows = 0;
 };
