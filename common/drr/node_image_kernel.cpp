@@ -12,11 +12,9 @@ using native::kLanes;
 using native::load;
 using native::store;
 
-#ifndef AFW
-#define AFW \
-  { 0.5625f, -0.0625f, 0.0f }
-#endif
-constexpr float kWeights[kUpsampleReach] = AFW;
+/// Lagrange's polynomial through six nodes, halfway between the middle two: weights of the nearest
+/// nodes on either side, then of the next ones.
+constexpr float kWeights[kUpsampleReach] = {150.0f / 256.0f, -25.0f / 256.0f, 3.0f / 256.0f};
 
 AF_NATIVE_INLINE Floats halfway(const float* const rows[2 * kUpsampleReach], int32_t at) {
   Floats sum = native::splat(0.0f);

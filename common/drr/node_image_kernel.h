@@ -8,10 +8,10 @@ namespace af {
 /// Nodes beyond an image's edge that up-sampling and slopes read, on either side.
 inline constexpr int kUpsampleReach = 3;
 
-/// Inserts a node halfway between any two neighbours along both axes, by the interpolation of
-/// kUpsampleWeights; the image's edge is replicated. `in`: t_count rows of s_count nodes, `out`:
-/// 2 t_count - 1 rows of 2 s_count - 1; strides from row to row, those of `out` at least 2 s_count
-/// rounded up to 32. `row` holds s_count + 32 values.
+/// Inserts a node halfway between any two neighbours along both axes, by Lagrange's polynomial
+/// through six nodes (exact for cubics and up to degree five); the image's edge is replicated.
+/// `in`: t_count rows of s_count nodes, `out`: 2 t_count - 1 rows of 2 s_count - 1; strides from
+/// row to row, that of `out` at least 2 s_count rounded up to 32. `row` holds s_count + 32 values.
 using UpsampleImage = void (*)(const float* in,
                                int32_t in_stride,
                                int32_t s_count,

@@ -10,8 +10,8 @@
 namespace af {
 
 struct TwoPassOptions {
-  /// Cubic inserts a Catmull-Rom node between any two neighbours of the blended image before it is
-  /// resampled bilinearly.
+  /// Cubic inserts a node between any two neighbours of the blended image, by weights that are
+  /// exact for cubics (Lagrange's through six nodes), before it is resampled bilinearly.
   AxisInterpolation st = AxisInterpolation::Linear;
   AxisInterpolation uv = AxisInterpolation::Linear;
 };

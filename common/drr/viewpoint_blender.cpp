@@ -252,6 +252,7 @@ class CompressedBlender final : public AnyBlender {
     for (int c = 0; c < stored.s.count / 2; ++c) {
       const int s = stored.s.begin + 2 * c;
       const NodeRange needed = overlap(footprint.t_needed({s, 2}), stored.t);
+      if (needed.count == 0) continue;
       const BlendedImages strip = at_node(images, footprint, s, stored.t.begin);
       const auto at = static_cast<std::size_t>(c);
       blend_tiles(

@@ -10,8 +10,8 @@
 
 namespace af {
 
-/// Interpolation along an axis of the field: between two nodes, or Catmull-Rom's cubic through four
-/// (beyond the first and last node the field continues linearly).
+/// Interpolation along axes of the field: between two nodes, or cubic: Catmull-Rom's through four
+/// in (u,v), where the field continues linearly beyond its first and last node.
 enum class AxisInterpolation { Linear, Cubic };
 
 /// Where one (s or t) coordinate's rays through the source meet the viewpoints along one axis.

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Seconds of one DRR looked up in a field, one core, beside casting it through the CT.
+#include <functional>
+
 #include "base/error.h"
 #include "base/hash_random.h"
 #include "benchmark/alternating_rounds.h"
@@ -31,21 +33,74 @@ std::vector<RigidTransform> random_poses(const CompressedAttenuationField& field
   return poses;
 }
 
-/// One run renders `poses` `repetitions` times; all contenders see the same poses.
-Contender renderer_contender(const char* name,
-                             const DrrRenderer& renderer,
-                             const std::vector<RigidTransform>& poses,
-                             const View& view,
-                             int repetitions) {
+/// Renders one pose into planes of the view's pixels.
+using Draw = std::function<void(
+    const RigidTransform& pose, RenderWorkspace& workspace, std::span<float> planes)>;
+
+/// The poses that all contenders see, and how often in one run.
+struct Series {
+  const std::vector<RigidTransform>& poses;
+  int repetitions;
+};
+
+Contender drawing_contender(const std::string& name,
+                            const DrrRenderer& renderer,
+                            const Series& series,
+                            std::size_t values,
+                            const Draw& draw) {
   const auto workspace = std::shared_ptr<RenderWorkspace>(renderer.make_workspace());
-  const auto image = std::make_shared<std::vector<float>>(view.pixel_count());
-  const auto run = [&renderer, &poses, view, workspace, image, repetitions] {
+  const auto planes = std::make_shared<std::vector<float>>(values);
+  const auto run = [series, workspace, planes, draw] {
     return seconds_of([&] {
-      for (int i = 0; i < repetitions; ++i)
-        for (const RigidTransform& pose : poses) renderer.render(pose, view, *workspace, *image);
+      for (int i = 0; i < series.repetitions; ++i)
+        for (const RigidTransform& pose : series.poses) draw(pose, *workspace, *planes);
     });
   };
-  return {name, static_cast<double>(repetitions) * static_cast<double>(poses.size()), "DRRs", run};
+  const double count =
+      static_cast<double>(series.repetitions) * static_cast<double>(series.poses.size());
+  return {name, count, "DRRs", run};
+}
+
+enum class Derivatives { None, OfThePose };
+
+Contender renderer_contender(const std::string& name,
+                             const DrrRenderer& renderer,
+                             const Series& series,
+                             const View& view,
+                             Derivatives derivatives = Derivatives::None) {
+  const std::size_t pixels = view.pixel_count();
+  const bool has_gradients = derivatives == Derivatives::OfThePose;
+  const Draw draw = [&renderer, view, pixels, has_gradients](
+                        const RigidTransform& pose, RenderWorkspace& workspace, auto planes) {
+    std::optional<PoseGradients> gradients;
+    if (has_gradients) gradients = {Eigen::Vector3d::Zero(), planes.subspan(pixels)};
+    renderer.render(pose, view, workspace, planes.first(pixels), gradients);
+  };
+  return drawing_contender(name, renderer, series, (has_gradients ? 7 : 1) * pixels, draw);
+}
+
+/// dU/dcolumn and dU/drow.
+Contender gradient_image_contender(const std::string& name,
+                                   const TwoPassAfDrr& renderer,
+                                   const Series& series,
+                                   const View& view) {
+  const std::size_t pixels = view.pixel_count();
+  return drawing_contender(
+      name,
+      renderer,
+      series,
+      2 * pixels,
+      [&renderer, view, pixels](
+          const RigidTransform& pose, RenderWorkspace& workspace, auto planes) {
+        renderer.render_gradient_images(
+            pose, view, workspace, planes.first(pixels), planes.last(pixels));
+      });
+}
+
+/// The middle of the detector, 3/4 as wide and high.
+View middle_of(const View& whole) {
+  const RegionOfInterest& roi = whole.roi;
+  return {whole.camera, {roi.width / 8, roi.height / 8, roi.width * 3 / 4, roi.height * 3 / 4}};
 }
 
 void run(const CaseOptions& options,
@@ -59,12 +114,30 @@ void run(const CaseOptions& options,
   const std::vector<RigidTransform> poses = random_poses(*field, options.is_quick ? 2 : 20);
   const std::vector<RigidTransform> few_poses = evenly_spread(poses, 2);
   const TwoPassAfDrr two_pass(field);
+  const TwoPassAfDrr cubic(field, {AxisInterpolation::Cubic, AxisInterpolation::Linear});
+  const TwoPassAfDrr cubic_uv(field, {AxisInterpolation::Cubic, AxisInterpolation::Cubic});
+  const auto pyramid = make_field_pyramid(*field, 2);
+  const TwoPassAfDrr half(pyramid[0]);
+  const TwoPassAfDrr quarter(pyramid[1]);
+  const View region = middle_of(view);
   const AfDrr quadrilinear(field);
   const RayCastDrr ray_cast(benchmark_case.volume());
+  const Series series{poses, options.is_quick ? 1 : 20};
+  const std::string region_name = "TwoPassAfDrr, region of 3/4";
   std::vector<Contender> contenders = {
-      renderer_contender("TwoPassAfDrr", two_pass, poses, view, options.is_quick ? 1 : 20),
-      renderer_contender("AfDrr, 16 taps", quadrilinear, poses, view, 1),
-      renderer_contender("RayCastDrr", ray_cast, few_poses, view, 1)};
+      renderer_contender("TwoPassAfDrr", two_pass, series, view),
+      renderer_contender("TwoPassAfDrr, cubic", cubic, series, view),
+      renderer_contender("TwoPassAfDrr, cubic-uv", cubic_uv, series, view),
+      renderer_contender(
+          "TwoPassAfDrr, six gradients", two_pass, series, view, Derivatives::OfThePose),
+      renderer_contender(
+          "TwoPassAfDrr, cubic, six gradients", cubic, series, view, Derivatives::OfThePose),
+      gradient_image_contender("TwoPassAfDrr, gradient images", two_pass, series, view),
+      renderer_contender(region_name, two_pass, series, region),
+      renderer_contender(region_name + ", level 1", half, series, region.coarser(2)),
+      renderer_contender(region_name + ", level 2", quarter, series, region.coarser(4)),
+      renderer_contender("AfDrr, 16 taps", quadrilinear, {poses, 1}, view),
+      renderer_contender("RayCastDrr", ray_cast, {few_poses, 1}, view)};
   const auto plastimatch = PlastimatchDrr::prepare(benchmark_case, work, options.is_quick ? 1 : 3);
   if (plastimatch)
     contenders.push_back({"plastimatch drr exact", 1.0 * plastimatch->drrs_per_call(), "DRRs", [&] {

@@ -27,17 +27,7 @@ std::shared_ptr<CompressedAttenuationField> cropped_noise(int st_nodes,
                                                           const NodeRange& s,
                                                           const NodeRange& t) {
   auto field = small_field(noise, 1, 5, st_nodes);
-  const int all_tiles = (st_nodes + 1) / 2;
-  SlabGeometry& slab = field->light_slab.slabs[0];
-  slab.stored_s = s;
-  slab.stored_t = t;
-  std::vector<std::uint16_t> indices;
-  for (int uv = 0; uv < 9; ++uv)
-    for (int c = 0; c < s.tiles(); ++c)
-      for (int d = 0; d < t.tiles(); ++d)
-        indices.push_back(field->slabs[0].indices[static_cast<std::size_t>(
-            (uv * all_tiles + s.begin / 2 + c) * all_tiles + t.begin / 2 + d)]);
-  field->slabs[0].indices = SharedArray<std::uint16_t>(std::move(indices));
+  crop_stored(*field, s, t);
   return field;
 }
 

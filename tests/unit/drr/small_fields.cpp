@@ -68,6 +68,21 @@ std::shared_ptr<CompressedAttenuationField> small_field(const FieldFunction& fun
   return field;
 }
 
+void crop_stored(CompressedAttenuationField& field, const NodeRange& s, const NodeRange& t) {
+  SlabGeometry& slab = field.light_slab.slabs[0];
+  const int s_tiles = slab.stored_s.tiles();
+  const int t_tiles = slab.stored_t.tiles();
+  std::vector<std::uint16_t> indices;
+  for (int uv = 0; uv < field.tiles_u() * field.tiles_v(); ++uv)
+    for (int c = 0; c < s.tiles(); ++c)
+      for (int d = 0; d < t.tiles(); ++d)
+        indices.push_back(field.slabs[0].indices[static_cast<std::size_t>(
+            (uv * s_tiles + s.begin / 2 + c) * t_tiles + t.begin / 2 + d)]);
+  slab.stored_s = s;
+  slab.stored_t = t;
+  field.slabs[0].indices = SharedArray<std::uint16_t>(std::move(indices));
+}
+
 PoseParameters small_pose(std::uint64_t index) {
   HashRandom random(17, index);
   PoseParameters parameters;

@@ -21,6 +21,9 @@ std::shared_ptr<CompressedAttenuationField> small_field(const FieldFunction& fun
                                                         int uv_nodes = 5,
                                                         int st_nodes = 9);
 
+/// Leaves of a one-slab field that stores its whole lattice the even-aligned nodes s x t.
+void crop_stored(CompressedAttenuationField& field, const NodeRange& s, const NodeRange& t);
+
 /// Pose `index` of a fixed random series within the small fields' range.
 PoseParameters small_pose(std::uint64_t index);
 

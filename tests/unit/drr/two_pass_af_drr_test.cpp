@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -205,6 +206,39 @@ TEST(TwoPassAfDrr, GradientsOfAMultilinearFieldEqualThoseOfQuadrilinearLookup) {
         << "parameter " << parameter;
 }
 
+TEST(TwoPassAfDrr, CroppedFieldEqualsOneThatStoresItsZeros) {
+  // The footprint reaches beyond the stored nodes, on any side, in part or altogether.
+  for (const auto& [s, t] : {std::pair<NodeRange, NodeRange>{{14, 12}, {16, 10}},
+                             {{2, 6}, {30, 8}},
+                             {{34, 7}, {20, 2}},
+                             {{12, 2}, {0, 41}}}) {
+    const auto is_stored = [&](const RayNodes& n) {
+      return n.s >= s.begin && n.s < s.end() && n.t >= t.begin && n.t < t.end();
+    };
+    const auto whole =
+        small_field([&](const RayNodes& n) { return is_stored(n) ? waves(n) : 0.0; }, 1, 5, 41);
+    const auto cropped = small_field(waves, 1, 5, 41);
+    crop_stored(*cropped, s, t);
+    for (const TwoPassOptions& options : {kLinear, kCubic}) {
+      const TwoPassAfDrr expected(whole, options);
+      const TwoPassAfDrr renderer(cropped, options);
+      const TwoPassAfDrr level(std::make_shared<const FieldLevel>(decode_field_level(*cropped, 0)),
+                               options);
+      const TwoPassAfDrr level_of_whole(
+          std::make_shared<const FieldLevel>(decode_field_level(*whole, 0)), options);
+      for (std::uint64_t i = 0; i < 30; ++i) {
+        const RigidTransform pose = pose_from_parameters({}, small_pose(i));
+        const View view{small_camera(), {3, 2, 25, 20}};
+        const auto workspace = renderer.make_workspace();
+        EXPECT_EQ(all_outputs(renderer, pose, view, *workspace),
+                  all_outputs(expected, pose, view, *workspace));
+        EXPECT_EQ(all_outputs(level, pose, view, *workspace),
+                  all_outputs(level_of_whole, pose, view, *workspace));
+      }
+    }
+  }
+}
+
 TEST(TwoPassAfDrr, OutsideRaysHaveNoGradient) {
   const auto field = small_field(waves, 2, 7, 21);
   const View view = View::whole_detector(small_camera());
@@ -226,7 +260,7 @@ TEST(TwoPassAfDrr, OutsideRaysHaveNoGradient) {
 
 TEST(TwoPassAfDrr, CubicInterpolationIsMoreAccurateOnASmoothField) {
   // A wave of 9 nodes along s and t: between nodes, linear interpolation errs by up to
-  // (2 pi / 9)^2 / 8 = 6 % of it, Catmull-Rom's cubic by some tenths of that.
+  // (2 pi / 9)^2 / 8 = 6 % of it, the cubic ones by some tenths of that.
   constexpr double kWaveNumber = 2.0 * std::numbers::pi / 9.0;
   const auto wave = [](const RayNodes& n) {
     return std::sin(kWaveNumber * n.s) * std::sin(kWaveNumber * n.t);
@@ -263,7 +297,7 @@ TEST(TwoPassAfDrr, CubicInterpolationReproducesALinearField) {
     return 4096 + 64 * (3 * n.u + 5 * n.v + 8 * n.s - 4 * n.t);
   };
   const auto field = small_field(linear, 2, 4, 41);
-  const View view{small_camera(), {5, 4, 20, 15}};
+  const View view{small_camera(), {10, 8, 10, 8}};  // away from the edge of (s,t)
   for (std::uint64_t i = 0; i < 10; ++i) {
     const RigidTransform pose = pose_from_parameters({}, small_pose(i));
     const Image2d expected = render_image(TwoPassAfDrr(field, kLinear), pose, view);

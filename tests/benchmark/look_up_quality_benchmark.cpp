@@ -1,0 +1,208 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the ways of looking DRRs up are worth without the codebook's loss, and how well their
+// gradients agree with ray casting's.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+
+#include "base/hash_random.h"
+#include "benchmark/benchmark_case.h"
+#include "cli/app_main.h"
+#include "drr/ray_cast_drr.h"
+#include "drr/two_pass_af_drr.h"
+#include "image/psnr.h"
+#include "io/field_file.h"
+#include "precompute/shear_warp_caster.h"
+
+namespace {
+
+using namespace af;
+using namespace af::benchmark;
+
+/// A field's samples as they are cast: level 0 without vector quantisation.
+std::shared_ptr<const FieldLevel> cast_level(const BenchmarkCase& benchmark_case) {
+  const LightSlab& light_slab = benchmark_case.light_slab();
+  const SlabAlignedVolume resampled(*benchmark_case.volume(), light_slab.slab_from_ct);
+  const ShearWarpFieldCaster caster(resampled, light_slab, benchmark_case.quantizer());
+  auto level = std::make_shared<FieldLevel>();
+  level->coverage = light_slab;
+  level->quantizer_step = benchmark_case.quantizer().step();
+  level->slabs.push_back({light_slab.slabs[0], {}});
+  const SlabGeometry& slab = light_slab.slabs[0];
+  const std::size_t per_viewpoint = level->slabs[0].samples_per_viewpoint();
+  std::vector<std::uint16_t> samples(level->viewpoint_count() * per_viewpoint + kFieldLevelPadding);
+  std::vector<std::uint16_t> cast;
+  for (const WorkUnit& unit : benchmark_case.units()) {
+    cast.resize(unit.sample_count());
+    caster.cast(unit, cast);
+    const std::uint16_t* from = cast.data();
+    for (int u = unit.u.begin; u < unit.u.end(); ++u)
+      for (int v = unit.v.begin; v < unit.v.end(); ++v)
+        for (int s = unit.s.begin; s < unit.s.end(); ++s)
+          for (int t = unit.t.begin; t < unit.t.end(); ++t) {
+            const auto viewpoint = static_cast<std::size_t>(u * light_slab.v.nodes + v);
+            const auto node = static_cast<std::size_t>(
+                (t - slab.stored_t.begin) * slab.stored_s.count + s - slab.stored_s.begin);
+            samples[viewpoint * per_viewpoint + node] = *from++;
+          }
+  }
+  level->slabs[0].samples = SharedArray<std::uint16_t>(std::move(samples));
+  return level;
+}
+
+struct Way {
+  std::string name;
+  std::shared_ptr<const TwoPassAfDrr> renderer;
+};
+
+double median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  return values[values.size() / 2];
+}
+
+/// PSNR against ray casting at every pose.
+double median_psnr_db(const Way& way,
+                      const std::vector<RigidTransform>& poses,
+                      const std::vector<Image2d>& references,
+                      const View& view) {
+  std::vector<double> values;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const auto quality =
+        psnr(render_image(*way.renderer, poses[i], view).pixels, references[i].pixels);
+    if (quality.has_value()) values.push_back(quality->psnr_db);
+  }
+  return values.empty() ? std::numeric_limits<double>::quiet_NaN() : median(values);
+}
+
+using SixNumbers = std::array<double, 6>;
+
+struct GradientQuality {
+  SixNumbers cosine_with_ray_casting{};
+  SixNumbers relative_difference{};  ///< from central differences of the same renderer
+};
+
+/// Sums over the pixels of one parameter's planes.
+struct Products {
+  double ab = 0.0, aa = 0.0, bb = 0.0;
+
+  void add(std::span<const float> a, std::span<const float> b) {
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      ab += static_cast<double>(a[i]) * static_cast<double>(b[i]);
+      aa += static_cast<double>(a[i]) * static_cast<double>(a[i]);
+      bb += static_cast<double>(b[i]) * static_cast<double>(b[i]);
+    }
+  }
+};
+
+GradientQuality gradient_quality(const Way& way,
+                                 const std::vector<RigidTransform>& poses,
+                                 const std::vector<std::vector<float>>& cast_gradients,
+                                 const View& view,
+                                 const Eigen::Vector3d& pivot) {
+  const std::size_t pixels = view.pixel_count();
+  const auto workspace = way.renderer->make_workspace();
+  std::vector<float> value(pixels);
+  std::vector<float> analytic(6 * pixels);
+  std::vector<float> differences(6 * pixels);
+  std::array<Products, 6> with_cast{};
+  std::array<Products, 6> with_own{};
+  // Small, since slopes jump at the borders of cells.
+  const DifferenceSteps steps{5e-5, 0.005};
+  for (std::size_t pose = 0; pose < cast_gradients.size(); ++pose) {
+    way.renderer->render(poses[pose], view, *workspace, value, PoseGradients{pivot, analytic});
+    central_difference_gradients(
+        *way.renderer, poses[pose], view, *workspace, {pivot, differences}, steps);
+    for (std::size_t p = 0; p < 6; ++p) {
+      const auto plane = std::span<const float>(analytic).subspan(p * pixels, pixels);
+      with_cast[p].add(plane,
+                       std::span<const float>(cast_gradients[pose]).subspan(p * pixels, pixels));
+      with_own[p].add(plane, std::span<const float>(differences).subspan(p * pixels, pixels));
+    }
+  }
+  GradientQuality quality;
+  for (std::size_t p = 0; p < 6; ++p) {
+    const Products& cast = with_cast[p];
+    const Products& own = with_own[p];
+    quality.cosine_with_ray_casting[p] = cast.ab / std::sqrt(cast.aa * cast.bb);
+    quality.relative_difference[p] = std::sqrt((own.aa - 2.0 * own.ab + own.bb) / own.bb);
+  }
+  return quality;
+}
+
+std::vector<Way> all_ways(const std::shared_ptr<const CompressedAttenuationField>& field,
+                          const std::shared_ptr<const FieldLevel>& samples) {
+  using enum AxisInterpolation;
+  std::vector<Way> ways;
+  for (const auto& [name, options] :
+       {std::pair<const char*, TwoPassOptions>{"linear", {Linear, Linear}},
+        {"cubic", {Cubic, Linear}},
+        {"cubic-uv", {Cubic, Cubic}}}) {
+    ways.push_back({name, std::make_shared<const TwoPassAfDrr>(field, options)});
+    ways.push_back({std::string(name) + ", unquantised",
+                    std::make_shared<const TwoPassAfDrr>(samples, options)});
+  }
+  return ways;
+}
+
+void run(const CaseOptions& options, const std::string& field_path, const Communicator& world) {
+  const BenchmarkCase benchmark_case(options);
+  const auto field = read_field(field_path, world);
+  const RayCastDrr ray_cast(benchmark_case.volume());
+  const View& view = benchmark_case.view();
+  const MotionRange& range = field->identity.range;
+  const Eigen::Vector3d pivot = field->identity.frame.center_room_mm;
+  std::vector<RigidTransform> poses;
+  std::vector<Image2d> references;
+  for (std::uint64_t i = 0; i < (options.is_quick ? 2u : 100u); ++i) {
+    HashRandom random(1, i);
+    std::array<double, 6> p{};
+    for (double& value : p) value = random.uniform(-1.0, 1.0);
+    PoseParameters parameters;
+    parameters.rotation_rad = range.max_rotation_rad * Eigen::Vector3d(p[0], p[1], p[2]);
+    parameters.translation_mm = range.max_translation_mm * Eigen::Vector3d(p[3], p[4], p[5]);
+    poses.push_back(pose_from_parameters(field->identity.frame, parameters));
+    references.push_back(render_image(ray_cast, poses.back(), view));
+  }
+  std::vector<std::vector<float>> cast_gradients(options.is_quick ? 1 : 5);
+  const auto workspace = ray_cast.make_workspace();
+  for (std::size_t i = 0; i < cast_gradients.size(); ++i) {
+    cast_gradients[i].resize(6 * view.pixel_count());
+    // Larger than the ray caster's noise from its step of 1 mm.
+    central_difference_gradients(
+        ray_cast, poses[i], view, *workspace, {pivot, cast_gradients[i]}, {2e-3, 0.5});
+  }
+  nlohmann::json results;
+  for (const Way& way : all_ways(field, cast_level(benchmark_case))) {
+    const GradientQuality gradients = gradient_quality(way, poses, cast_gradients, view, pivot);
+    const double psnr_db = median_psnr_db(way, poses, references, view);
+    results[way.name] = {{"median_psnr_db", psnr_db},
+                         {"gradient_cosine_with_ray_casting", gradients.cosine_with_ray_casting},
+                         {"gradient_relative_difference", gradients.relative_difference}};
+    std::printf("%-22s %.2f dB, cosine", way.name.c_str(), psnr_db);
+    for (const double cosine : gradients.cosine_with_ray_casting) std::printf(" %.3f", cosine);
+    std::printf(", from differences");
+    for (const double part : gradients.relative_difference) std::printf(" %.4f", part);
+    std::printf("\n");
+  }
+  write_section(options.output,
+                "look-up-quality",
+                {{"case", benchmark_case.description()}, {"results", results}});
+}
+
+}  // namespace
+
+// Binding options can throw only by a defect, which may well end the program.
+// NOLINTNEXTLINE(bugprone-exception-escape)
+int main(int argc, char** argv) {
+  CaseOptions options;
+  std::string field_path;
+  CLI::App app{
+      "PSNR and gradients of every two-pass look-up, of a field and of its samples before the "
+      "codebook."};
+  bind_case(app, options);
+  app.add_option("--field", field_path, "The field of --ct and --camera, one slab")->required();
+  return cli::app_main(
+      app, argc, argv, [&](const Communicator& world) { run(options, field_path, world); });
+}
