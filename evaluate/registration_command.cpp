@@ -249,10 +249,12 @@ void run_registration(const RegistrationStudyOptions& options,
                       const std::string& command_line,
                       const Communicator& world) {
   const std::filesystem::path& folder = options.output_folder;
+  std::vector<std::string> study_warnings;
   const Study study = all_or_none(world, [&] {
     throw_if_any(problems(options));
-    return read_study(options.study);
+    return read_study(options.study, &study_warnings);
   });
+  for (const std::string& text : study_warnings) cli::warn(world, text);
   const std::vector<StudyCase> cases =
       all_or_none(world, [&] { return chosen_cases(options, study); });
   all_or_none(world, [&] {

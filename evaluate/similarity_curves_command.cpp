@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "base/error.h"
+#include "cli/app_main.h"
 #include "cli/progress_printer.h"
 #include "evaluate/figure_files.h"
 #include "evaluate/gold_standard_files.h"
@@ -275,14 +276,16 @@ void run_similarity_curves(const SimilarityCurvesOptions& options,
                            const std::string& command_line,
                            const Communicator& world) {
   const std::filesystem::path& folder = options.output_folder;
+  std::vector<std::string> warnings;
   const Study study = all_or_none(world, [&] {
     throw_if_any(problems(options));
     if (world.is_root()) {
       require_gnuplot();
       make_output_folder(folder);
     }
-    return read_study(options.study);
+    return read_study(options.study, &warnings);
   });
+  for (const std::string& text : warnings) cli::warn(world, text);
   const StudyCase study_case =
       all_or_none(world, [&] { return study.find_case(options.case_name); });
   const GoldStandard gold =

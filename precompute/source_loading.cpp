@@ -30,8 +30,8 @@ std::string only_camera(const std::vector<std::string>& cameras, const std::stri
                    known);
 }
 
-NamedSource source_of_study(const PrecomputeOptions& options) {
-  const Study study = read_study(options.study);
+NamedSource source_of_study(const PrecomputeOptions& options, std::vector<std::string>& warnings) {
+  const Study study = read_study(options.study, &warnings);
   const StudyCase& study_case = study.find_case(options.case_name);
   NamedSource source;
   source.ct_path = study_case.ct.string();
@@ -79,7 +79,7 @@ FieldSource load_source(const PrecomputeOptions& options, const Communicator& co
   FieldSource source;
   const NamedSource named = all_or_none(communicator, [&] {
     NamedSource found = options.study.empty() ? source_of_options(options, source.warnings)
-                                              : source_of_study(options);
+                                              : source_of_study(options, source.warnings);
     source.camera = found.rig.camera(found.camera);
     return found;
   });

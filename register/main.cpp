@@ -100,7 +100,10 @@ void run(const RegisterOptions& options,
     af::throw_if_any(problems(options));
     return registration_options(options);
   });
-  const af::Study study = af::all_or_none(world, [&] { return af::read_study(options.study); });
+  std::vector<std::string> study_warnings;
+  const af::Study study =
+      af::all_or_none(world, [&] { return af::read_study(options.study, &study_warnings); });
+  for (const std::string& text : study_warnings) af::cli::warn(world, text);
   const af::StudyCase study_case =
       af::all_or_none(world, [&] { return study.find_case(options.case_name); });
   const std::vector<af::RigidTransform> starts =

@@ -280,7 +280,7 @@ const StudyCase& Study::find_case(const std::string& name) const {
   throw InputError("case", name, "the study has only: " + known, path.string());
 }
 
-Study read_study(const std::filesystem::path& path) {
+Study read_study(const std::filesystem::path& path, std::vector<std::string>* warnings) {
   const toml::table table = read_toml_file(path);
   TomlProblems problems(path.string());
   TomlTableReader reader(table, "", problems);
@@ -290,7 +290,7 @@ Study read_study(const std::filesystem::path& path) {
   const auto rig = reader.get_string("rig", Presence::Required);
   if (!rig) problems.throw_if_any();  // without cameras nothing else can be judged
   study.rig_name_or_path = resolved_rig(*rig, folder);
-  study.rig = read_rig(study.rig_name_or_path);
+  study.rig = read_rig(study.rig_name_or_path, warnings);
   read_cases(reader, study, {folder, study.rig, problems});
   reader.refuse_unknown_keys();
   problems.throw_if_any();

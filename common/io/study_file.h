@@ -63,8 +63,8 @@ struct Study {
 /// Reads and validates study.toml: every message names file, line, key, value and constraint; all
 /// problems are reported at once. InputError (3) for unacceptable content (pose not rigid, ROI off
 /// the detector, collinear or unequal numbers of fiducials, unknown camera, unknown keys as a typo
-/// hint), FileError (4) when it cannot be parsed.
-Study read_study(const std::filesystem::path& path);
+/// hint), FileError (4) when it cannot be parsed. `warnings` receives those of the rig.
+Study read_study(const std::filesystem::path& path, std::vector<std::string>* warnings = nullptr);
 
 /// study.toml text; paths are written relative to `folder` when they lie below it.
 std::string study_to_toml(const Study& study, const std::filesystem::path& folder);

@@ -103,6 +103,9 @@ bool Solid::contains(const Eigen::Vector3d& ct_point_mm) const {
       const Eigen::Vector3d from_axis(local.x(), local.y(), local.z() - along);
       return from_axis.squaredNorm() <= half_sizes_mm.x() * half_sizes_mm.x();
     }
+    case Shape::HalfEllipsoid:
+      if (local.z() < 0.0) return false;
+      break;
     case Shape::Ellipsoid:
       break;
   }

@@ -13,6 +13,7 @@ namespace af {
 struct Solid {
   enum class Shape {
     Ellipsoid,
+    HalfEllipsoid,     ///< the half of an ellipsoid at positive z of the body
     EllipticCylinder,  ///< axis along the body's z; narrower by `waist` at half height
     Capsule,           ///< a segment along z of half length half_sizes_mm.z(), fattened by
                        ///< half_sizes_mm.x()

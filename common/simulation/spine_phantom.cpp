@@ -24,28 +24,10 @@ constexpr double kTorsoHalfWidthMm = 143.0;
 constexpr double kTorsoMiddleMm = 0.5 * (kTorsoFrontMm + kTorsoBackMm);
 constexpr double kTorsoHalfDepthMm = 0.5 * (kTorsoBackMm - kTorsoFrontMm);
 
-constexpr int kFatHu = -100;
-constexpr int kMuscleHu = 50;
 constexpr int kOrganHu = 60;
-constexpr int kGasHu = -1000;
 constexpr int kLungHu = -830;
 constexpr int kDiscHu = 90;
 constexpr int kCanalHu = 20;
-constexpr int kCorticalHu = 1000;
-constexpr int kCancellousHu = 230;
-constexpr int kCancellousTextureHu = 110;
-constexpr double kShellMm = 1.6;
-
-/// A vertebra by its level: 0 is T12, positive towards the head.
-struct Vertebra {
-  int level;
-  Vector3d center;
-  double half_width_mm;  ///< of the body
-  double half_depth_mm;
-  double half_height_mm;
-
-  [[nodiscard]] bool has_ribs() const { return level >= 0; }
-};
 
 /// The curve of the spine: kyphosis above, lordosis below, a slight bend to the left.
 Vector3d spine_point(double z_mm) {
@@ -58,87 +40,6 @@ Vertebra vertebra_at(int level) {
           20.0 - 1.1 * level,
           15.0 - 0.5 * level,
           0.5 * (25.5 - 0.7 * level)};
-}
-
-Solid ellipsoid(const Vector3d& center, const Vector3d& half_sizes, int hu, int texture_hu = 0) {
-  Solid solid;
-  solid.center_mm = center;
-  solid.half_sizes_mm = half_sizes;
-  solid.hu = hu;
-  solid.texture_hu = texture_hu;
-  return solid;
-}
-
-Solid elliptic_cylinder(const Vector3d& center, const Vector3d& half_sizes, int hu) {
-  Solid solid = ellipsoid(center, half_sizes, hu);
-  solid.shape = Solid::Shape::EllipticCylinder;
-  return solid;
-}
-
-/// Appends a bone as cortical shell and cancellous core: shells of all parts of a bone come first,
-/// so that no shell cuts through the core of a part it is joined to.
-class BonePainter {
- public:
-  explicit BonePainter(std::vector<Solid>& solids) : solids_(solids) {}
-  ~BonePainter() { solids_.insert(solids_.end(), cores_.begin(), cores_.end()); }
-  BonePainter(const BonePainter&) = delete;
-  BonePainter& operator=(const BonePainter&) = delete;
-
-  void add(Solid part) {
-    part.hu = kCorticalHu;
-    solids_.push_back(part);
-    part.half_sizes_mm -= Vector3d::Constant(kShellMm);
-    if (part.shape == Solid::Shape::Capsule) part.half_sizes_mm.z() += kShellMm;
-    if (!(part.half_sizes_mm.minCoeff() > 0.0)) return;
-    part.hu = kCancellousHu;
-    part.texture_hu = kCancellousTextureHu;
-    cores_.push_back(part);
-  }
-  void add_capsule(const Vector3d& a, const Vector3d& b, double radius_mm) {
-    add(capsule_between(a, b, radius_mm, kCorticalHu));
-  }
-
- private:
-  std::vector<Solid>& solids_;
-  std::vector<Solid> cores_;
-};
-
-void add_arch(const Vertebra& v, BonePainter& bone) {
-  const double back = v.half_depth_mm;
-  for (const double side : {-1.0, 1.0}) {
-    const auto at = [&](double x, double y, double z) {
-      return Vector3d(v.center + Vector3d(side * x, y, z));
-    };
-    bone.add_capsule(at(12.0, back - 4.0, 4.0), at(13.5, back + 9.0, 3.0), 4.5);      // pedicle
-    bone.add_capsule(at(13.5, back + 11.0, 1.0), at(3.0, back + 19.0, -5.0), 3.8);    // lamina
-    bone.add_capsule(at(14.0, back + 9.0, 16.0), at(14.5, back + 12.0, -15.0), 4.2);  // articular
-    const double reach = v.has_ribs() ? 28.0 - v.level : 38.0;
-    bone.add_capsule(
-        at(14.0, back + 9.0, 3.0), at(reach, back + (v.has_ribs() ? 15.0 : 9.0), 5.0), 3.6);
-  }
-}
-
-void add_spinous_process(const Vertebra& v, BonePainter& bone) {
-  // Long and steep on thoracic, broad and level on lumbar vertebrae.
-  const double drop_mm = v.has_ribs() ? 16.0 : 7.0;
-  const Vector3d root = v.center + Vector3d(0.0, v.half_depth_mm + 17.0, -5.0);
-  const Vector3d tip = root + Vector3d(1.0, 25.0, -drop_mm);
-  Solid blade = ellipsoid(0.5 * (root + tip),
-                          {3.4, 0.5 * (tip - root).norm() + 3.0, v.has_ribs() ? 6.0 : 9.0},
-                          kCorticalHu);
-  blade.rotation =
-      Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitY(), tip - root).toRotationMatrix();
-  bone.add(blade);
-}
-
-void add_vertebra(const Vertebra& v, std::vector<Solid>& solids) {
-  BonePainter bone(solids);
-  Solid body = elliptic_cylinder(
-      v.center, {v.half_width_mm, v.half_depth_mm, v.half_height_mm}, kCorticalHu);
-  body.waist = 0.1;
-  bone.add(body);
-  add_arch(v, bone);
-  add_spinous_process(v, bone);
 }
 
 void add_disc(int level_below, std::vector<Solid>& solids) {
@@ -218,20 +119,27 @@ void add_soft_tissue(std::vector<Solid>& solids) {
   solids.push_back(elliptic_cylinder({13.0, -27.0, 0.0}, {11.0, 11.0, kHeightMm}, 45));  // aorta
 }
 
-}  // namespace
-
-std::vector<std::string> problems(const SpinePhantomOptions& options) {
-  std::vector<std::string> found;
-  if (!(options.voxel_mm >= 0.5 && options.voxel_mm <= 5.0))
-    found.push_back("voxel_mm = " + std::to_string(options.voxel_mm) +
-                    ": must be within 0.5 and 5");
-  if (options.samples_per_axis < 1 || options.samples_per_axis > 8)
-    found.push_back("samples_per_axis = " + std::to_string(options.samples_per_axis) +
-                    ": must be within 1 and 8");
-  return found;
+/// Pedicle screws from T11 to L1 and a rod on each side.
+void add_screws_and_rods(std::vector<Solid>& solids) {
+  constexpr double kScrewRadiusMm = 2.8;
+  constexpr double kHeadRadiusMm = 5.0;
+  for (const double side : {-1.0, 1.0}) {
+    std::vector<Vector3d> heads;
+    for (int level = -1; level <= 1; ++level) {
+      const Vertebra v = vertebra_at(level);
+      const Vector3d tip = v.center + Vector3d(side * 8.0, -0.4 * v.half_depth_mm, 3.0);
+      const Vector3d head = v.center + Vector3d(side * 17.0, v.half_depth_mm + 22.0, 3.0);
+      solids.push_back(capsule_between(tip, head, kScrewRadiusMm, kTitaniumHu));
+      solids.push_back(ellipsoid(head, Vector3d::Constant(kHeadRadiusMm), kTitaniumHu));
+      heads.push_back(head);
+    }
+    solids.push_back(capsule_between(heads.front(), heads.back(), kScrewRadiusMm, kTitaniumHu));
+  }
 }
 
-std::vector<Solid> spine_phantom_solids() {
+}  // namespace
+
+std::vector<Solid> spine_phantom_solids(bool has_metal) {
   std::vector<Solid> solids;
   add_soft_tissue(solids);
   add_ribs(solids);
@@ -241,18 +149,14 @@ std::vector<Solid> spine_phantom_solids() {
   for (int level = -kVertebraeEachSide - 1; level <= kVertebraeEachSide + 1; ++level)
     add_vertebra(vertebra_at(level), solids);
   add_canal(solids);
+  if (has_metal) add_screws_and_rods(solids);
   return solids;
 }
 
-CtVolume spine_phantom(const SpinePhantomOptions& options) {
-  throw_if_any(problems(options));
-  CtGrid grid;
-  const int across = static_cast<int>(std::lround(kWidthMm / options.voxel_mm));
-  grid.size = {across, across, static_cast<int>(std::lround(kHeightMm / options.voxel_mm))};
-  grid.spacing_mm = Vector3d::Constant(options.voxel_mm);
-  grid.origin_mm =
-      -0.5 * options.voxel_mm * Vector3d(grid.size[0] - 1, grid.size[1] - 1, grid.size[2] - 1);
-  return sample_solids(grid, spine_phantom_solids(), options.samples_per_axis, options.threads);
+Phantom spine_phantom(bool has_metal) {
+  return {spine_phantom_solids(has_metal),
+          0.5 * Vector3d(kWidthMm, kWidthMm, kHeightMm),
+          spine_phantom_target()};
 }
 
 RegistrationTarget spine_phantom_target() {

@@ -1,22 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <string>
 #include <vector>
 
-#include "simulation/automatic_target.h"
-#include "simulation/solid.h"
-#include "volume/ct_volume.h"
+#include "simulation/phantom_parts.h"
 
 namespace af {
-
-struct SpinePhantomOptions {
-  double voxel_mm = 1.4;
-  int samples_per_axis = 2;  ///< points per voxel and axis
-  int threads = 0;           ///< 0: as many as the hardware has; voxels do not depend on it
-};
-
-std::vector<std::string> problems(const SpinePhantomOptions& options);
 
 /// A synthetic trunk from T8 to L4 in DICOM LPS (left +x, back +y, head +z), the body of T12 at the
 /// origin, which is also the centre of the volume's 358 x 358 x 280 mm: nine vertebrae (cortical
@@ -24,11 +13,11 @@ std::vector<std::string> problems(const SpinePhantomOptions& options);
 /// processes), discs, five pairs of ribs that start at the vertebrae, fat, muscle, lung bases,
 /// heart, liver, stomach with gas, spleen, kidneys and aorta. Left and right differ: liver right,
 /// gas, spleen and aorta left, and the spine bends. Sizes are typical of adults, not of one person;
-/// nothing is taken from patient data.
-CtVolume spine_phantom(const SpinePhantomOptions& options);
+/// nothing is taken from patient data. Metal: pedicle screws from T11 to L1 and two rods.
+Phantom spine_phantom(bool has_metal);
 
 /// The bodies of the phantom in painting order.
-std::vector<Solid> spine_phantom_solids();
+std::vector<Solid> spine_phantom_solids(bool has_metal);
 
 /// The body of T12, the middle vertebra, with its pedicles.
 RegistrationTarget spine_phantom_target();

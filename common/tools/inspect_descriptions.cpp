@@ -159,11 +159,8 @@ void inspect_rig(const std::string& name_or_path, Inspection& inspection) {
 
 void inspect_study(const fs::path& path, Inspection& inspection) {
   inspection.kind = "study";
-  const Study study = read_study(path);
+  const Study study = read_study(path, &inspection.warnings);
   inspection.facts["rig"] = rig_json(study.rig);
-  for (const CameraGeometry& camera : study.rig.cameras)
-    if (camera.is_mirrored())
-      inspection.warnings.push_back("camera '" + camera.name + "': mirrored images");
   for (const StudyCase& study_case : study.cases)
     inspection.facts["cases"].push_back(case_json(study_case, study.rig));
 }

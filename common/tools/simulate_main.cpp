@@ -19,16 +19,24 @@ using namespace af;
 using tools::SimulatedCase;
 using tools::SimulateOptions;
 
-CtVolume patient(const SimulateOptions& options, const Communicator& world) {
+/// A patient as X-rays and as the CT show them; they differ only where the CT clips metal.
+struct Patient {
+  CtVolume anatomy;
+  CtVolume ct;
+};
+
+Patient patient(const SimulateOptions& options, const Communicator& world) {
   if (!options.phantom.empty()) {
-    SpinePhantomOptions phantom = options.phantom_options;
+    PhantomOptions phantom = options.phantom_options;
     phantom.threads = options.xray.threads;
-    return spine_phantom(phantom);
+    const CtVolume anatomy =
+        sample_phantom(make_phantom(options.phantom, phantom.has_metal), phantom);
+    return {anatomy, phantom.has_metal ? with_scanner_range(anatomy) : anatomy};
   }
   std::vector<std::string> warnings;
-  CtVolume ct = read_ct(options.ct, {options.series_uid}, &warnings);
+  const CtVolume ct = read_ct(options.ct, {options.series_uid}, &warnings);
   for (const std::string& warning : warnings) cli::warn(world, warning);
-  return ct;
+  return {ct, ct};
 }
 
 CameraRig cameras(const SimulateOptions& options, const Communicator& world) {
@@ -53,11 +61,13 @@ std::filesystem::path ct_of_study(const SimulateOptions& options,
 
 /// Plans the case and takes its X-rays into `folder`.
 SimulatedCase imaged_case(const SimulateOptions& options,
-                          const CtVolume& ct,
+                          const Patient& patient,
                           const CameraRig& rig,
                           const std::filesystem::path& folder) {
-  SimulatedCase simulated = plan_case(options, ct, rig, AttenuationVolume(ct, options.attenuation));
-  const AttenuationVolume volume(imaged_anatomy(options, ct, simulated), options.attenuation);
+  SimulatedCase simulated =
+      plan_case(options, patient.ct, rig, AttenuationVolume(patient.ct, options.attenuation));
+  const AttenuationVolume volume(imaged_anatomy(options, patient.anatomy, simulated),
+                                 options.attenuation);
   cli::ProgressPrinter printer("Taking X-rays", true);
   take_xrays(options, volume, folder, simulated, printer.callback());
   return simulated;
@@ -94,10 +104,10 @@ void run(const SimulateOptions& options,
       options.replaces_output ? PartialFolder::Existing::Replace : PartialFolder::Existing::Refuse);
 
   cli::info(world, options.phantom.empty() ? "Reading " + options.ct : "Making the phantom");
-  const CtVolume ct = patient(options, world);
-  SimulatedCase simulated = imaged_case(options, ct, rig, folder.path());
+  const Patient imaged = patient(options, world);
+  SimulatedCase simulated = imaged_case(options, imaged, rig, folder.path());
   cli::info(world, "Writing the study");
-  simulated.study_case.ct = ct_of_study(options, ct, simulated, folder.path());
+  simulated.study_case.ct = ct_of_study(options, imaged.ct, simulated, folder.path());
 
   Provenance provenance;
   provenance.program = "af-simulate";
@@ -105,7 +115,7 @@ void run(const SimulateOptions& options,
   provenance.options_toml = app.config_to_str(true);
   provenance.seed = options.seed;
   provenance.rank_count = world.size();
-  provenance.input_sha256["ct_content"] = ct_content_sha256(ct);
+  provenance.input_sha256["ct_content"] = ct_content_sha256(imaged.ct);
   write_study_files(options, rig, simulated, provenance, folder.path());
   folder.commit();
   cli::info(world, summary(simulated, folder.final_path()));

@@ -14,15 +14,21 @@ void bind_input(CLI::App& app, SimulateOptions& o) {
   auto* input = app.add_option_group("Patient", "exactly one of");
   input->add_option("--ct", o.ct, "CT to image: DICOM folder, NIfTI, MetaImage or NRRD, in HU");
   input
-      ->add_option("--phantom",
-                   o.phantom,
-                   "Built-in synthetic patient instead of a CT. There is one: spine (trunk from T8 "
-                   "to L4 with ribs and organs)")
-      ->check(CLI::IsMember({"spine"}));
+      ->add_option(
+          "--phantom",
+          o.phantom,
+          "Built-in synthetic patient instead of a CT: spine (trunk from T8 to L4 with ribs "
+          "and organs), pelvis (L4 to the upper thighs) or head (vault to C4)")
+      ->check(CLI::IsMember(phantom_names()));
   input->require_option(1);
   app.add_option("--series", o.series_uid, "UID of the DICOM series, when the folder has several");
   app.add_option("--phantom-voxel-mm", o.phantom_options.voxel_mm, "Voxel side of the phantom, mm")
       ->capture_default_str();
+  app.add_flag("--metal",
+               o.phantom_options.has_metal,
+               "Phantoms only: with pedicle screws and rods (spine), a hip prosthesis (pelvis) or "
+               "fillings and a plate (head). The X-rays show metal as dense as it is, the CT clips "
+               "it at 3071 HU as scanners do");
   app.add_option("--rig",
                  o.rig,
                  "X-ray cameras: treatment-room, c-arm-12in or a rig.toml; every camera takes one "
@@ -214,6 +220,8 @@ std::vector<std::string> problems(const SimulateOptions& options) {
   check_range.require("max_offset_rotation_deg", options.max_offset_rotation_deg, 0.0, 60.0);
   check_range.require("max_offset_translation_mm", options.max_offset_translation_mm, 0.0, 1000.0);
   check_range.require("fiducial_sigma_px", options.fiducial_sigma_px, 0.0, 100.0);
+  if (options.phantom_options.has_metal && options.phantom.empty())
+    check_range.add("metal: needs a phantom; a CT has its own");
   for (const double value : options.center_ct_mm)
     if (!std::isfinite(value)) check_range.add("center_ct_mm must be finite");
   const std::vector<double>& box = options.target_box_ct_mm;

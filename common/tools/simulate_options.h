@@ -7,7 +7,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "simulation/spine_phantom.h"
+#include "simulation/phantom.h"
 #include "simulation/stress.h"
 #include "simulation/xray_simulator.h"
 #include "volume/attenuation_volume.h"
@@ -19,7 +19,7 @@ struct SimulateOptions {
   std::string ct;
   std::string series_uid;
   std::string phantom;
-  SpinePhantomOptions phantom_options;
+  PhantomOptions phantom_options;
   std::string rig = "treatment-room";
   std::string case_name;
   std::string output;

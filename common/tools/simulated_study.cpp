@@ -13,6 +13,7 @@
 #include "io/pose_file.h"
 #include "io/rig_file.h"
 #include "simulation/automatic_target.h"
+#include "simulation/phantom.h"
 
 namespace af::tools {
 
@@ -44,8 +45,9 @@ RegistrationTarget chosen_target(const SimulateOptions& options, const CtVolume&
   } else if (center.size() == 3) {
     target = target_box_at({center[0], center[1], center[2]}, options.target_side_mm);
   } else {
-    target =
-        options.phantom.empty() ? find_target(ct, options.target_side_mm) : spine_phantom_target();
+    target = options.phantom.empty()
+                 ? find_target(ct, options.target_side_mm)
+                 : make_phantom(options.phantom, options.phantom_options.has_metal).target;
   }
   if (center.size() == 3) target.center_ct_mm = {center[0], center[1], center[2]};
   return target;
@@ -178,6 +180,7 @@ std::string cylinder_text(const std::string& table, const SteelCylinder& cylinde
 std::string note_text(const SimulateOptions& options) {
   std::string text = "X-rays simulated by af-simulate from ";
   text += options.phantom.empty() ? "a CT" : "the " + options.phantom + " phantom";
+  if (options.phantom_options.has_metal) text += " with metal";
   const std::vector<StressDescription> stress = descriptions(options.stress);
   if (stress.empty()) return text;
   text += ", made harder by";
@@ -250,9 +253,9 @@ SimulatedCase plan_case(const SimulateOptions& options,
 }
 
 CtVolume imaged_anatomy(const SimulateOptions& options,
-                        const CtVolume& ct,
+                        const CtVolume& anatomy,
                         const SimulatedCase& simulated) {
-  if (!options.stress.has(Stress::Motion)) return ct;
+  if (!options.stress.has(Stress::Motion)) return anatomy;
   SmoothMotionOptions motion = options.stress.motion;
   motion.threads = options.xray.threads;
   const StudyCase& study_case = simulated.study_case;
@@ -260,7 +263,7 @@ CtVolume imaged_anatomy(const SimulateOptions& options,
                       motion,
                       options.seed,
                       view_key(study_case.name, "", "motion"))
-      .moved(ct);
+      .moved(anatomy);
 }
 
 std::optional<CtVolume> degraded_study_ct(const SimulateOptions& options,

@@ -33,9 +33,9 @@ SimulatedCase plan_case(const SimulateOptions& options,
                         const CameraRig& rig,
                         const AttenuationVolume& volume);
 
-/// What the X-rays show: the CT itself, or with the wanted non-rigid motion.
+/// What the X-rays show: the anatomy itself, or with the wanted non-rigid motion.
 CtVolume imaged_anatomy(const SimulateOptions& options,
-                        const CtVolume& ct,
+                        const CtVolume& anatomy,
                         const SimulatedCase& simulated);
 
 /// What the study's CT is to be when it is not the input itself: a wanted degraded one.

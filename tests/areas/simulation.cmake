@@ -4,6 +4,7 @@ af_add_test(
   SOURCES unit/simulation/automatic_target_test.cpp
           unit/simulation/detector_model_test.cpp
           unit/simulation/fiducials_test.cpp
+          unit/simulation/phantom_test.cpp
           unit/simulation/siddon_projector_test.cpp
           unit/simulation/solid_test.cpp
           unit/simulation/spine_phantom_test.cpp

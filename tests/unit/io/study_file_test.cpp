@@ -135,6 +135,22 @@ TEST_F(StudyFile, NoteIsFreeTextThatSurvivesWriting) {
   expect_identical(read(study_to_toml(study, folder().path())).find_case(""), study.find_case(""));
 }
 
+TEST_F(StudyFile, WarningsOfTheRigReachTheCaller) {
+  const std::string rig = builtin_rig_text("treatment-room");
+  std::vector<std::string> warnings;
+  std::ofstream(folder() / "rig.toml") << rig;
+  std::ofstream(path()) << replaced(kGoodStudy, "\"treatment-room\"", "\"rig.toml\"");
+  read_study(path(), &warnings);
+  EXPECT_TRUE(warnings.empty());
+  CameraRig mirrored = read_rig("treatment-room");
+  CameraGeometry& camera = mirrored.cameras.front();
+  camera.row_direction = -camera.row_direction;
+  std::ofstream(folder() / "rig.toml") << rig_to_toml(mirrored);
+  read_study(path(), &warnings);
+  ASSERT_EQ(warnings.size(), 1U);
+  EXPECT_THAT(warnings.front(), HasSubstr("mirrored"));
+}
+
 TEST_F(StudyFile, RelativePathOfTheStudyGivesAbsolutePaths) {
   read(kGoodStudy);
   const fs::path before = fs::current_path();

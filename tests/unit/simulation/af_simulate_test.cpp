@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The program af-simulate as people run it.
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
@@ -144,6 +145,27 @@ TEST_F(AfSimulate, StressChangesTheXraysButNeitherTruthNorTargetNorRegions) {
   }
 }
 
+TEST_F(AfSimulate, MetalIsDenseInTheXraysAndClippedInTheCt) {
+  for (const char* name : {"spine", "pelvis", "head"}) {
+    const std::string phantom =
+        std::string("--phantom ") + name + " --phantom-voxel-mm 3 --no-fiducials ";
+    ASSERT_EQ(run(phantom + "--force " + folder("s")), 0) << log();
+    const Study plain = read_study(scratch_ / "s" / "study.toml");
+    const Image2d without = read_image(plain.find_case("").views[0].xray);
+    ASSERT_EQ(run(phantom + "--metal --force " + folder("s")), 0) << log();
+    const Study study = read_study(scratch_ / "s" / "study.toml");
+    const StudyCase& patient = study.find_case("");
+    EXPECT_NE(patient.note.find("with metal"), std::string::npos);
+    const CtVolume ct = read_ct(patient.ct);
+    EXPECT_EQ(*std::max_element(ct.hu.view().begin(), ct.hu.view().end()), 3071) << name;
+    const Image2d with = read_image(patient.views[0].xray);
+    int darker = 0;
+    for (std::size_t i = 0; i < with.pixels.size(); ++i)
+      darker += with.pixels[i] < 0.7f * without.pixels[i] ? 1 : 0;
+    EXPECT_GT(darker, 20) << name;
+  }
+}
+
 TEST_F(AfSimulate, DegradedCtIsTheStudysWhileTheXraysShowTheGoodOne) {
   ASSERT_EQ(run(coarse + "--seed 5 " + folder("clean")), 0) << log();
   ASSERT_EQ(run(coarse + "--seed 5 --stress degraded-ct --ct-slice-mm 8 " + folder("s")), 0)
@@ -202,10 +224,11 @@ TEST_F(AfSimulate, RefusesBadInputByTheContractsCodesAndLeavesNothing) {
   const std::vector<Case> cases{
       {"", 2, "--ct,--phantom"},
       {"--ct a --phantom spine", 2, "2 were given"},
-      {"--phantom pelvis", 2, "spine"},
+      {"--phantom knee", 2, "spine"},
       {"--phantom spine --center-ct-mm 1,2", 2, "center-ct-mm"},
       {coarse + "--stress rods,bones", 2, "bones"},
       {coarse + "--stress motion --motion-mm 30", 3, "motion amplitude_mm"},
+      {"--ct a --metal", 3, "metal"},
       {coarse + "--bits 7", 3, "bits = 7"},
       {coarse + "--tube-kvp 10 --energy-bins 3", 3, "energy_bins = 3"},
       {coarse + "--water-mu-per-mm 0.6", 3, "water_mu_per_mm"},

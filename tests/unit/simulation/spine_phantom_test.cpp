@@ -13,7 +13,7 @@ constexpr int kBoneHu = 250;
 
 /// One coarse phantom for all tests here.
 const CtVolume& phantom() {
-  static const CtVolume ct = spine_phantom({2.0, 2, 0});
+  static const CtVolume ct = sample_phantom(spine_phantom(false), {2.0, 2, 0});
   return ct;
 }
 
@@ -122,14 +122,14 @@ TEST(SpinePhantom, TargetHoldsTheMiddleVertebraOnly) {
 }
 
 TEST(SpinePhantom, VoxelsAreReproducible) {
-  const CtVolume again = spine_phantom({2.0, 2, 1});
+  const CtVolume again = sample_phantom(spine_phantom(false), {2.0, 2, 1});
   EXPECT_TRUE(
       std::equal(again.hu.view().begin(), again.hu.view().end(), phantom().hu.view().begin()));
 }
 
-TEST(SpinePhantomOptions, ReportsEveryBrokenConstraint) {
-  EXPECT_TRUE(problems(SpinePhantomOptions{}).empty());
-  EXPECT_THAT(problems(SpinePhantomOptions{0.1, 9, 0}),
+TEST(PhantomOptions, ReportsEveryBrokenConstraint) {
+  EXPECT_TRUE(problems(PhantomOptions{}).empty());
+  EXPECT_THAT(problems(PhantomOptions{0.1, 9, 0}),
               ::testing::ElementsAre(::testing::HasSubstr("voxel_mm = 0.1"),
                                      ::testing::HasSubstr("samples_per_axis = 9")));
 }

@@ -44,7 +44,7 @@ RigidTransform tilted_pose() {
                               PoseParameters::from_deg_and_mm({8.0, -5.0, 12.0, 3.0, -2.0, 4.0}));
 }
 
-const Vector3d kCenter(4.0, -3.0, 2.0);
+const Vector3d center_ct_mm(4.0, -3.0, 2.0);
 
 /// A block of soft tissue, 200 mm wide, in air.
 CtVolume block(const Vector3d& spacing_mm, const std::array<int, 3>& size) {
@@ -90,12 +90,12 @@ TEST(PlacedRods, CrossTheRegionOfInterestOfEveryView) {
   OccluderOptions options;
   options.rod_count = 40;
   const std::vector<View> views = two_views();
-  const OccluderSite site = occluder_site(views, tilted_pose(), kCenter);
+  const OccluderSite site = occluder_site(views, tilted_pose(), center_ct_mm);
   // 100 rows of 1 mm at a magnification of about 1.5.
   EXPECT_NEAR(site.reach_mm, 50.0 / 1.5, 1.0);
   for (const SteelCylinder& rod : place_rods(site, options, 3, 7)) {
     EXPECT_NEAR(rod.axis_direction.norm(), 1.0, 1e-12);
-    const double offset_mm = (rod.center_point - kCenter).norm();
+    const double offset_mm = (rod.center_point - center_ct_mm).norm();
     EXPECT_GE(offset_mm, 0.2 * site.reach_mm);
     EXPECT_LE(offset_mm, 0.6 * site.reach_mm);
     for (const View& view : views) {
@@ -113,14 +113,14 @@ TEST(PlacedRods, CrossTheRegionOfInterestOfEveryView) {
 TEST(PlacedBalls, LieApartWithinTheRegionsAndAwayFromThePins) {
   OccluderOptions options;
   options.ball_count = 30;
-  const OccluderSite site = occluder_site(two_views(), tilted_pose(), kCenter);
+  const OccluderSite site = occluder_site(two_views(), tilted_pose(), center_ct_mm);
   SteelCylinder pin;
-  pin.center_point = kCenter;
+  pin.center_point = center_ct_mm;
   const std::vector<SteelBall> balls = place_balls(site, {pin}, options, 3, 7);
   ASSERT_EQ(balls.size(), 30u);
   for (std::size_t i = 0; i < balls.size(); ++i) {
-    EXPECT_GE((balls[i].center_point - kCenter).norm(), 8.0);
-    EXPECT_LE((balls[i].center_point - kCenter).norm(), 0.8 * site.reach_mm);
+    EXPECT_GE((balls[i].center_point - center_ct_mm).norm(), 8.0);
+    EXPECT_LE((balls[i].center_point - center_ct_mm).norm(), 0.8 * site.reach_mm);
     for (std::size_t j = 0; j < i; ++j)
       EXPECT_GE((balls[i].center_point - balls[j].center_point).norm(), 9.0);
   }
@@ -128,7 +128,7 @@ TEST(PlacedBalls, LieApartWithinTheRegionsAndAwayFromThePins) {
 
 TEST(PlacedOccluders, DependOnSeedAndKeyOnly) {
   const OccluderOptions options;
-  const OccluderSite site = occluder_site(two_views(), tilted_pose(), kCenter);
+  const OccluderSite site = occluder_site(two_views(), tilted_pose(), center_ct_mm);
   const auto first_rod = [&](std::uint64_t seed, std::uint64_t key) {
     return place_rods(site, options, seed, key).front().center_point;
   };
@@ -142,7 +142,7 @@ TEST(PlacedOccluders, DarkenTheirOwnPixelsByTheSteelOnTheRay) {
   const AttenuationVolume volume(ct, {});
   const std::vector<View> views = two_views();
   const RigidTransform pose = tilted_pose();
-  const OccluderSite site = occluder_site(views, pose, kCenter);
+  const OccluderSite site = occluder_site(views, pose, center_ct_mm);
   const SteelBodies steel{place_rods(site, {}, 3, 7), place_balls(site, {}, {}, 3, 8)};
   const XraySimulationOptions ideal = XraySimulationOptions::ideal();
   const CameraGeometry& camera = views[0].camera;
@@ -235,17 +235,17 @@ TEST(DegradedCt, RefusesToLeaveLessThanTwoSlices) {
   EXPECT_THROW(degraded_ct(textured({9, 8, 11}, 1.5), options, -900, 1, 2), InputError);
 }
 
-const CtBox kStillBox{{-10.0, -12.0, -9.0}, {11.0, 10.0, 8.0}};
+const CtBox still_box{{-10.0, -12.0, -9.0}, {11.0, 10.0, 8.0}};
 
 TEST(SmoothMotion, VanishesInTheTargetBoxAndItsMargin) {
   const SmoothMotionOptions options;
-  const SmoothMotion motion(kStillBox, options, 5, 6);
+  const SmoothMotion motion(still_box, options, 5, 6);
   HashRandom random(9);
   double largest = 0.0;
   for (int n = 0; n < 4000; ++n) {
     const Vector3d point(
         random.uniform(-90.0, 90.0), random.uniform(-90.0, 90.0), random.uniform(-90.0, 90.0));
-    const Vector3d nearest = point.cwiseMax(kStillBox.low_mm).cwiseMin(kStillBox.high_mm);
+    const Vector3d nearest = point.cwiseMax(still_box.low_mm).cwiseMin(still_box.high_mm);
     const double distance_mm = (point - nearest).norm();
     const Vector3d displacement = motion.displacement_mm(point);
     if (distance_mm <= options.margin_mm) {
@@ -263,7 +263,7 @@ TEST(SmoothMotion, NeverFoldsSpace) {
   SmoothMotionOptions options;
   options.amplitude_mm = 6.7;
   ASSERT_TRUE(problems(options).empty());
-  const SmoothMotion motion(kStillBox, options, 5, 6);
+  const SmoothMotion motion(still_box, options, 5, 6);
   HashRandom random(10);
   constexpr double kStepMm = 0.01;
   for (int n = 0; n < 4000; ++n) {
@@ -282,7 +282,7 @@ TEST(SmoothMotion, MovesVoxelsOutsideTheBoxAndKeepsThoseWithin) {
   const CtVolume ct = textured({60, 60, 60}, 3.0);
   SmoothMotionOptions options;
   options.threads = 1;
-  const CtVolume moved = SmoothMotion(kStillBox, options, 5, 6).moved(ct);
+  const CtVolume moved = SmoothMotion(still_box, options, 5, 6).moved(ct);
   EXPECT_EQ(moved.grid.size, ct.grid.size);
   EXPECT_EQ(moved.grid.origin_mm, ct.grid.origin_mm);
   std::size_t changed = 0;
@@ -291,8 +291,8 @@ TEST(SmoothMotion, MovesVoxelsOutsideTheBoxAndKeepsThoseWithin) {
     for (int j = 0; j < 60; ++j)
       for (int i = 0; i < 60; ++i, ++voxel) {
         const Vector3d point = ct.grid.point_mm(Vector3d(i, j, k));
-        const bool is_still = (point.array() >= kStillBox.low_mm.array()).all() &&
-                              (point.array() <= kStillBox.high_mm.array()).all();
+        const bool is_still = (point.array() >= still_box.low_mm.array()).all() &&
+                              (point.array() <= still_box.high_mm.array()).all();
         if (is_still) {
           ASSERT_EQ(moved.hu[voxel], ct.hu[voxel]);
         }
@@ -300,7 +300,7 @@ TEST(SmoothMotion, MovesVoxelsOutsideTheBoxAndKeepsThoseWithin) {
       }
   EXPECT_GT(changed, ct.grid.voxel_count() / 2);
   options.threads = 3;
-  const CtVolume again = SmoothMotion(kStillBox, options, 5, 6).moved(ct);
+  const CtVolume again = SmoothMotion(still_box, options, 5, 6).moved(ct);
   EXPECT_TRUE(std::equal(again.hu.view().begin(), again.hu.view().end(), moved.hu.view().begin()));
 }
 
@@ -311,7 +311,7 @@ TEST(SmoothMotion, ShowsAtAPointWhatWasAtItsDisplacedPlace) {
   std::vector<std::int16_t> ramp(ct.grid.voxel_count());
   for (std::size_t i = 0; i < ramp.size(); ++i) ramp[i] = static_cast<std::int16_t>(30 * (i % 60));
   ct.hu = SharedArray<std::int16_t>(std::move(ramp));
-  const SmoothMotion motion(kStillBox, {}, 5, 6);
+  const SmoothMotion motion(still_box, {}, 5, 6);
   const CtVolume moved = motion.moved(ct);
   for (int i = 5; i < 55; ++i) {
     const Vector3d point = ct.grid.point_mm(Vector3d(i, 12, 50));
@@ -325,11 +325,11 @@ TEST(CalibrationError, MovesTheTargetBoxByTheStatedRms) {
   for (const View& view : two_views())
     for (const double error_px : {0.2, 1.0}) {
       const CameraGeometry moved =
-          camera_with_calibration_error(view.camera, tilted_pose(), kStillBox, error_px, 1, 2);
+          camera_with_calibration_error(view.camera, tilted_pose(), still_box, error_px, 1, 2);
       EXPECT_TRUE(problems(moved).empty());
       EXPECT_EQ(moved.name, view.camera.name);
       double sum = 0.0;
-      for (const Vector3d& corner : kStillBox.corner_points())
+      for (const Vector3d& corner : still_box.corner_points())
         sum += (moved.project(tilted_pose() * corner) - view.camera.project(tilted_pose() * corner))
                    .squaredNorm();
       EXPECT_NEAR(std::sqrt(sum / 8.0), error_px, kTolerancePx);

@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "simulation/phantom_parts.h"
+
+namespace af {
+
+/// Names of the phantoms: spine, pelvis, head.
+std::vector<std::string> phantom_names();
+
+/// A phantom by its name; InputError for any other.
+Phantom make_phantom(const std::string& name, bool has_metal);
+
+}  // namespace af
