@@ -108,10 +108,12 @@ void register_with(Method& method,
                                world.is_root());
   const auto work = [&](std::int64_t item) {
     const std::size_t index = method.start_indices[static_cast<std::size_t>(item)];
-    RegistrationRow row =
-        registered_row([&](const RigidTransform& start) { return method.runner.run(start); },
-                       starts.starts[index],
-                       yardstick);
+    RegistrationRow row = registered_row(
+        [&](const RigidTransform& start) {
+          return method.runner.run(start, static_cast<std::int64_t>(index));
+        },
+        starts.starts[index],
+        yardstick);
     row.case_name = case_name;
     row.renderer = method.renderer;
     row.start_index = static_cast<std::int64_t>(index);

@@ -11,8 +11,10 @@ namespace af::evaluation {
 namespace {
 
 registration::CaseLoadOptions load_options(const MethodOptions& options,
-                                           const std::string& renderer) {
+                                           const std::string& renderer,
+                                           int coarsest_level) {
   registration::CaseLoadOptions result;
+  result.coarsest_level = coarsest_level;
   result.renderer =
       renderer == "field" ? registration::RendererKind::Field : registration::RendererKind::RayCast;
   if (renderer == "field")
@@ -28,29 +30,22 @@ registration::CaseLoadOptions load_options(const MethodOptions& options,
 
 }  // namespace
 
-registration::RegistrationOptions registration_options(const MethodOptions& options) {
-  registration::RegistrationOptions result = registration::preset_options(options.preset);
-  if (options.similarity.has_value()) result.similarity.name = *options.similarity;
-  if (options.optimizer.has_value()) result.optimizer = *options.optimizer;
-  throw_if_any(problems(result));
-  return result;
-}
-
 std::vector<LoadedMethod> load_methods(const MethodOptions& options,
                                        const Study& study,
                                        const StudyCase& study_case,
                                        const Communicator& world,
                                        std::map<std::string, std::string>& input_sha256) {
   std::vector<LoadedMethod> methods;
+  const registration::RegistrationOptions method =
+      all_or_none(world, [&] { return registration::resolve(options.method); });
   for (const std::string& renderer : options.chosen_renderers()) {
-    const registration::LoadedCase loaded =
-        registration::load_case(study, study_case, load_options(options, renderer), world);
+    const registration::LoadedCase loaded = registration::load_case(
+        study, study_case, load_options(options, renderer, method.coarsest_level()), world);
     for (const std::string& text : loaded.warnings) cli::warn(world, text);
     for (const auto& [name, hash] : loaded.input_sha256)
       input_sha256[study_case.name + ": " + name] = hash;
-    registration::RegistrationRunner runner = all_or_none(world, [&] {
-      return registration::RegistrationRunner(loaded.problem, registration_options(options));
-    });
+    registration::RegistrationRunner runner = all_or_none(
+        world, [&] { return registration::RegistrationRunner(loaded.problem, method); });
     methods.push_back({renderer, std::move(runner)});
   }
   return methods;

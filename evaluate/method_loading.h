@@ -17,9 +17,6 @@ struct LoadedMethod {
   registration::RegistrationRunner runner;
 };
 
-/// The preset with what replaces parts of it.
-registration::RegistrationOptions registration_options(const MethodOptions& options);
-
 /// Collective. The methods of a case, in the order of chosen_renderers(); hashes of the inputs go
 /// to `input_sha256`, as "CASE: what". Throws as load_case() does.
 std::vector<LoadedMethod> load_methods(const MethodOptions& options,

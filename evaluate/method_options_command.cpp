@@ -7,8 +7,7 @@
 
 #include "base/error.h"
 #include "io/csv_table.h"
-#include "register/registration.h"
-#include "register/similarity/similarity_measure.h"
+#include "register/method_command.h"
 #include "volume/attenuation_volume.h"
 #include "volume/ray_caster.h"
 
@@ -54,15 +53,13 @@ std::string toml_list(const std::vector<std::string>& values) {
 }
 
 std::string to_toml(const MethodOptions& options) {
-  const registration::RegistrationOptions method = registration::preset_options(options.preset);
   std::ostringstream out;
   out << "study = " << std::quoted(options.study.string()) << "\nrenderer = \"" << options.renderer
-      << "\"\ngold = \"" << options.gold << "\"\npreset = \"" << options.preset
-      << "\"\nsimilarity = \"" << options.similarity.value_or(method.similarity.name)
-      << "\"\noptimizer = \"" << options.optimizer.value_or(method.optimizer)
+      << "\"\ngold = \"" << options.gold
       << "\"\nwater_mu_per_mm = " << number_text(options.water_mu_per_mm)
       << "\nstep_mm = " << number_text(options.step_mm) << "\nfield = " << toml_list(options.fields)
-      << '\n';
+      << '\n'
+      << to_toml(options.method, registration::resolve(options.method));
   return out.str();
 }
 
@@ -87,14 +84,7 @@ void bind_method(CLI::App& command, MethodOptions& options) {
                   "gold_room_from_ct), or auto (fiducials when there are any)")
       ->check(CLI::IsMember({"auto", "fiducials", "study"}))
       ->capture_default_str();
-  command.add_option("--preset", options.preset, "Registration method as a whole")
-      ->check(CLI::IsMember(registration::preset_names()))
-      ->capture_default_str();
-  command
-      .add_option("--similarity", options.similarity, "Similarity measure (default: the preset's)")
-      ->check(CLI::IsMember(registration::similarity_names()));
-  command.add_option("--optimizer", options.optimizer, "Optimiser (default: the preset's)")
-      ->check(CLI::IsMember(registration::optimizer_names()));
+  bind_method(command, options.method);
   command
       .add_option("--water-mu-per-mm",
                   options.water_mu_per_mm,

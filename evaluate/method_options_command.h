@@ -2,13 +2,13 @@
 #pragma once
 
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include <CLI/CLI.hpp>
 
 #include "io/study_file.h"
+#include "register/method_options.h"
 
 namespace af::evaluation {
 
@@ -19,9 +19,7 @@ struct MethodOptions {
   std::vector<std::string> fields;  ///< CAMERA=PATH each
   std::string renderer = "field";   ///< "field", "raycast" or "both"
   std::string gold = "auto";
-  std::string preset = "paper";
-  std::optional<std::string> similarity;  ///< these replace what the preset says
-  std::optional<std::string> optimizer;
+  registration::MethodOptions method;
   double water_mu_per_mm = 0.0200;
   double step_mm = 1.0;
   std::string series_uid;

@@ -67,10 +67,10 @@ json summary_json(const RegistrationStudyOptions& options,
                   {"kind", "registration"},
                   {"study", study.path.string()},
                   {"success_tre_mm", kSuccessTreMm}};
-  const registration::RegistrationOptions method = registration_options(options);
-  summary["method"] = {{"preset", options.preset},
-                       {"similarity", method.similarity.name},
-                       {"optimizer", method.optimizer}};
+  const registration::RegistrationOptions method = registration::resolve(options.method);
+  summary["method"] = {{"preset", options.method.preset},
+                       {"similarity", method.similarity_list()},
+                       {"optimizer", method.optimizer_list()}};
   summary["simulation"] = simulation_of(study);
   summary["cases"] = json::array();
   summary["pictures"] = json::array();
@@ -81,7 +81,7 @@ json summary_json(const RegistrationStudyOptions& options,
   summary["renderers"] = json::array();
   for (const std::string& renderer : options.renderers())
     summary["renderers"].push_back(renderer_statistics(
-        rows, renderer, {options.intervals, options.interval_width_mm, options.seed}));
+        rows, renderer, {options.intervals, options.interval_width_mm, options.method.seed}));
   std::vector<std::string> found = row_problems(rows);
   for (const CaseEvaluation& evaluation : evaluations)
     found.insert(found.end(), evaluation.pose_problems.begin(), evaluation.pose_problems.end());
@@ -181,7 +181,7 @@ std::string to_toml(const RegistrationStudyOptions& options) {
         << "\nraycast_intervals = " << options.raycast_intervals.value_or(options.intervals)
         << '\n';
   out << "equivalence_margin_mm = " << number_text(options.equivalence_margin_mm)
-      << "\nseed = " << options.seed << "\ncase = " << toml_list(options.cases) << '\n';
+      << "\ncase = " << toml_list(options.cases) << '\n';
   return out.str();
 }
 
@@ -240,7 +240,8 @@ CLI::App* bind_registration(CLI::App& app, RegistrationStudyOptions& options) {
                    "Field and ray casting count as equal when their mean TREs differ by less, mm: "
                    "two one-sided tests")
       ->capture_default_str();
-  command->add_option("--seed", options.seed, "Of the starts")->capture_default_str();
+  command->add_option("--seed", options.method.seed, "Of the starts, and of what cma-es draws")
+      ->capture_default_str();
   command->add_option("-o,--output", options.output_folder, "Folder for the results")->required();
   return command;
 }
@@ -290,7 +291,7 @@ void run_registration(const RegistrationStudyOptions& options,
     Provenance provenance = {"af-evaluate registration",
                              command_line,
                              to_toml(options),
-                             options.seed,
+                             options.method.seed,
                              world.size(),
                              {{"study", sha256_of_file(study.path.string())}}};
     for (const CaseEvaluation& evaluation : evaluations) {

@@ -15,7 +15,7 @@
 
 namespace af::evaluation {
 
-/// `af-evaluate registration` as typed.
+/// `af-evaluate registration` as typed; method.seed is the seed of the starts, too.
 struct RegistrationStudyOptions : MethodOptions {
   std::vector<std::string> cases;  ///< empty: all
   int starts_per_interval = 30;
@@ -29,13 +29,12 @@ struct RegistrationStudyOptions : MethodOptions {
   std::filesystem::path poses_from;                ///< poses that another program found
   std::string method_name = "poses";               ///< what these are called
   double equivalence_margin_mm = 0.1;
-  std::uint64_t seed = 1;
   std::filesystem::path output_folder;
 
   /// Methods in the order of rows: "field" before "raycast"; with poses_from method_name alone.
   [[nodiscard]] std::vector<std::string> renderers() const;
   [[nodiscard]] StartOptions start_options() const {
-    return {intervals, interval_width_mm, starts_per_interval, seed};
+    return {intervals, interval_width_mm, starts_per_interval, method.seed};
   }
 };
 

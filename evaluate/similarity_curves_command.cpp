@@ -306,7 +306,7 @@ void run_similarity_curves(const SimilarityCurvesOptions& options,
     write_text_file(folder / "maxima.csv", maxima_table(curves, radius_mm).to_text());
     draw_curve_panels(panels_of(curves),
                       "Similarity about the gold pose",
-                      "similarity (" + methods.front().runner.options().similarity.name + ")",
+                      "similarity (" + methods.front().runner.options().final_similarity() + ")",
                       folder / "similarity-curves");
     write_reproduce_script(folder, provenance);
     json summary = {{"format", "attenuation-fields evaluation"},
@@ -314,7 +314,7 @@ void run_similarity_curves(const SimilarityCurvesOptions& options,
                     {"kind", "similarity-curves"},
                     {"case", study_case.name},
                     {"gold", to_json(gold)},
-                    {"similarity", methods.front().runner.options().similarity.name},
+                    {"similarity", methods.front().runner.options().final_similarity()},
                     {"rms_radius_mm", radius_mm},
                     {"figures", {"similarity-curves"}}};
     summary["renderers"] = json::array();

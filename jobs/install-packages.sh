@@ -9,7 +9,7 @@ base_packages=(
   g++-12 cmake ninja-build pkg-config
   libopenmpi-dev openmpi-bin libhdf5-openmpi-dev
   libinsighttoolkit5-dev libgdcm-dev zlib1g-dev
-  libeigen3-dev libcli11-dev libtomlplusplus-dev nlohmann-json3-dev libspdlog-dev libssl-dev libboost-math-dev
+  libeigen3-dev libcli11-dev libtomlplusplus-dev nlohmann-json3-dev libnlopt-dev libspdlog-dev libssl-dev libboost-math-dev
   libgtest-dev libgmock-dev
   libcairo2-dev fonts-dejavu-core gnuplot-nox
   invesalius-examples

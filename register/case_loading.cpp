@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "drr/field_level.h"
 #include "drr/ray_cast_drr.h"
 #include "drr/two_pass_af_drr.h"
 #include "io/field_file.h"
@@ -109,6 +110,32 @@ std::vector<RegistrationView> read_views(const Study& study,
   return views;
 }
 
+/// Collective over the node: memory that its ranks share and fill together.
+FieldLevelMemory node_memory(const Communicator& node) {
+  return [node](std::size_t count, const FieldLevelFill& fill) {
+    const auto samples_of = [count](const std::byte* bytes) {
+      return reinterpret_cast<const std::uint16_t*>(bytes);
+    };
+    const auto owner = node.allocate_on_node_together(
+        count * sizeof(std::uint16_t), [&](std::span<std::byte> memory, int part, int parts) {
+          fill({reinterpret_cast<std::uint16_t*>(memory.data()), count}, part, parts);
+        });
+    return SharedArray<std::uint16_t>(owner, {samples_of(owner.get()), count});
+  };
+}
+
+/// Collective. Levels 1 ... coarsest of a field's pyramid, held once per node.
+std::vector<RendererLevel> coarse_field_levels(const CompressedAttenuationField& field,
+                                               int coarsest,
+                                               const Communicator& communicator) {
+  std::vector<RendererLevel> levels;
+  if (coarsest < 1) return levels;
+  const Communicator node = communicator.node();
+  for (const auto& level : make_field_pyramid(field, coarsest, node_memory(node)))
+    levels.push_back({std::make_shared<const TwoPassAfDrr>(level), level->blur_sigma_mm(true)});
+  return levels;
+}
+
 /// Collective. The fields of all views; their hashes go to `input_sha256`.
 void use_fields(const StudyCase& study_case,
                 const CaseLoadOptions& options,
@@ -132,6 +159,7 @@ void use_fields(const StudyCase& study_case,
                         field->identity.ct_content_sha256);
     });
     view.renderer = std::make_shared<const TwoPassAfDrr>(field);
+    view.coarse_levels = coarse_field_levels(*field, options.coarsest_level, communicator);
     view.limit = MotionLimit{field->identity.frame, field->identity.range};
     input_sha256["field " + view.view.camera.name] = info.payload_sha256;
   }
@@ -207,6 +235,7 @@ LoadedCase load_case(const Study& study,
                      const Communicator& communicator) {
   LoadedCase loaded;
   auto problem = std::make_shared<RegistrationProblem>();
+  problem->case_name = study_case.name;
   problem->nominal_room_from_ct = study_case.nominal_room_from_ct;
   problem->center_ct_mm = study_case.center_ct_mm;
   problem->isocenter_point = study.rig.isocenter_point;

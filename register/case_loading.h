@@ -28,6 +28,7 @@ struct CaseLoadOptions {
   double water_mu_per_mm = 0.0200;  ///< of ray casting
   RayCasterOptions ray_caster;
   bool skip_ct_check = false;  ///< with fields: do not read the CT (it may be absent)
+  int coarsest_level = 0;      ///< of the image pyramids: RegistrationOptions::coarsest_level()
 };
 
 struct LoadedCase {

@@ -8,6 +8,7 @@
 #include "io/csv_table.h"
 #include "io/output_file.h"
 #include "io/study_file.h"
+#include "register/method_command.h"
 #include "register/multi_start_program.h"
 #include "register/register_command.h"
 #include "register/target_errors_program.h"
@@ -36,35 +37,14 @@ void bind_start(CLI::App& app, RegisterOptions& options) {
                  "or m00 ... m23 of room_from_ct; under mpirun the ranks share them");
 }
 
-void bind_method(CLI::App& app, RegisterOptions& options) {
-  using namespace af::registration;
+void bind_renderer(CLI::App& app, RegisterOptions& options) {
   app.add_option("--renderer",
                  options.renderer,
                  "How DRRs are made: 'field' looks them up, 'raycast' casts rays through the CT")
       ->check(CLI::IsMember({"field", "raycast"}))
       ->capture_default_str();
-  app.add_option("--preset",
-                 options.preset,
-                 "Method as a whole: 'paper' is mutual information with best neighbour in two "
-                 "passes; the options below replace parts of it")
-      ->check(CLI::IsMember(preset_names()))
-      ->capture_default_str();
-  app.add_option("--similarity", options.similarity, "Similarity measure (preset: mi)")
-      ->check(CLI::IsMember(similarity_names()));
-  app.add_option("--optimizer", options.optimizer, "Optimiser (preset: best-neighbor)")
-      ->check(CLI::IsMember(optimizer_names()));
-  app.add_option("--bins", options.bins, "Histogram bins per axis, 2 to 256 (preset: 64)");
-  app.add_option("--smoothing-sigma-mm",
-                 options.smoothing_sigma_mm,
-                 "First pass: Gaussian on the X-rays, mm on the isocentre plane (preset: " +
-                     af::number_text(paper_passes().front().smoothing_sigma_mm) + ")");
-  app.add_option("--max-evaluations",
-                 options.max_evaluations,
-                 "Most poses tried per registration (preset: " +
-                     std::to_string(RegistrationOptions().max_evaluations) + ")");
-  app.add_option("--seed",
-                 options.seed,
-                 "Recorded with the results; no present optimiser draws random numbers")
+  bind_method(app, options.method);
+  app.add_option("--seed", options.method.seed, "Of the random numbers that cma-es draws")
       ->capture_default_str();
 }
 
@@ -76,7 +56,7 @@ void bind_options(CLI::App& app, RegisterOptions& options) {
                  options.fields,
                  "CAMERA=FIELD.h5, once per camera; replaces the study's `field`")
       ->allow_extra_args(false);
-  bind_method(app, options);
+  bind_renderer(app, options);
   bind_start(app, options);
   app.add_option("--water-mu-per-mm",
                  options.water_mu_per_mm,
@@ -98,7 +78,7 @@ void run(const RegisterOptions& options,
   using namespace af::registration;
   const RegistrationOptions method = af::all_or_none(world, [&] {
     af::throw_if_any(problems(options));
-    return registration_options(options);
+    return resolve(options.method);
   });
   std::vector<std::string> study_warnings;
   const af::Study study =
@@ -109,7 +89,8 @@ void run(const RegisterOptions& options,
   const std::vector<af::RigidTransform> starts =
       af::all_or_none(world, [&] { return start_poses(options, study_case.frame()); });
   const auto gold = af::all_or_none(world, [&] { return known_gold(study, study_case); });
-  const LoadedCase loaded = load_case(study, study_case, case_load_options(options), world);
+  const LoadedCase loaded =
+      load_case(study, study_case, case_load_options(options, method.coarsest_level()), world);
   for (const std::string& text : loaded.warnings) af::cli::warn(world, text);
   RegistrationRunner runner =
       af::all_or_none(world, [&] { return RegistrationRunner(loaded.problem, method); });
@@ -132,7 +113,7 @@ void run(const RegisterOptions& options,
     description.provenance = {"af-register",
                               command_line,
                               to_toml(options, method),
-                              options.seed,
+                              options.method.seed,
                               world.size(),
                               loaded.input_sha256};
     std::cout << write_run(records, *loaded.problem, description, options.output_folder);

@@ -141,7 +141,7 @@ std::vector<RegistrationRecord> register_starts(
   const auto work = [&](std::int64_t index) {
     RegistrationRecord record;
     record.start_index = index;
-    record.result = runner.run(starts[static_cast<std::size_t>(index)]);
+    record.result = runner.run(starts[static_cast<std::size_t>(index)], index);
     mine.push_back(plain(record));
     if (has_best && !is_better(record, my_best)) return;
     my_best = std::move(record);

@@ -8,6 +8,7 @@
 
 #include "drr/drr_renderer.h"
 #include "geometry/slab_sizing.h"
+#include "register/optimizer/optimizer.h"
 #include "register/similarity/similarity_measure.h"
 
 namespace af::registration {
@@ -34,12 +35,20 @@ struct ObjectiveValue {
 };
 
 /// Eq. (13): sum of the views' similarities at a pose. Owns the scratch memory: one objective per
-/// thread; evaluate() does not allocate.
+/// thread; evaluations do not allocate (those with derivatives: after the first).
 class MultiViewObjective {
  public:
   explicit MultiViewObjective(std::vector<ObjectiveView> views);
 
   ObjectiveValue evaluate(const RigidTransform& room_from_ct);
+
+  /// With derivatives, into `result`: by small motions of the CT in the room about
+  /// `pivot_room_point`, as PoseGradients (per rad, per mm). Derivatives::Gradient leaves the
+  /// matrix 0. The measures must have what is asked for.
+  ObjectiveValue evaluate_with(const RigidTransform& room_from_ct,
+                               const Eigen::Vector3d& pivot_room_point,
+                               Derivatives derivatives,
+                               NormalEquations& result);
 
   [[nodiscard]] const std::vector<ObjectiveView>& views() const { return views_; }
 
@@ -48,7 +57,11 @@ class MultiViewObjective {
     std::unique_ptr<RenderWorkspace> render;
     std::unique_ptr<SimilarityWorkspace> similarity;
     std::vector<float> drr;
+    std::vector<float> planes;    ///< six, once derivatives were asked for
+    std::vector<float> by_pixel;  ///< likewise
   };
+  [[nodiscard]] bool is_in_range(const RigidTransform& room_from_ct) const;
+
   std::vector<ObjectiveView> views_;
   std::vector<Scratch> scratch_;
 };

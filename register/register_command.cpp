@@ -70,20 +70,9 @@ std::vector<std::string> problems(const RegisterOptions& options) {
   return found;
 }
 
-RegistrationOptions registration_options(const RegisterOptions& options) {
-  RegistrationOptions result = preset_options(options.preset);
-  if (options.similarity.has_value()) result.similarity.name = *options.similarity;
-  if (options.bins.has_value()) result.similarity.bins = *options.bins;
-  if (options.optimizer.has_value()) result.optimizer = *options.optimizer;
-  if (options.smoothing_sigma_mm.has_value())
-    result.passes.front().smoothing_sigma_mm = *options.smoothing_sigma_mm;
-  if (options.max_evaluations.has_value()) result.max_evaluations = *options.max_evaluations;
-  throw_if_any(problems(result));
-  return result;
-}
-
-CaseLoadOptions case_load_options(const RegisterOptions& options) {
+CaseLoadOptions case_load_options(const RegisterOptions& options, int coarsest_level) {
   CaseLoadOptions result;
+  result.coarsest_level = coarsest_level;
   result.renderer = options.renderer == "raycast" ? RendererKind::RayCast : RendererKind::Field;
   for (const std::string& text : options.fields)
     if (const auto field = split_field(text); field.has_value())
@@ -112,12 +101,6 @@ std::string to_toml(const RegisterOptions& options, const RegistrationOptions& r
   out << "study = " << quoted(options.study.string()) << '\n'
       << "case = " << quoted(options.case_name) << '\n'
       << "renderer = " << quoted(options.renderer) << '\n'
-      << "preset = " << quoted(options.preset) << '\n'
-      << "similarity = " << quoted(registration.similarity.name) << '\n'
-      << "bins = " << registration.similarity.bins << '\n'
-      << "optimizer = " << quoted(registration.optimizer) << '\n'
-      << "max_evaluations = " << registration.max_evaluations << '\n'
-      << "seed = " << options.seed << '\n'
       << "water_mu_per_mm = " << number_text(options.water_mu_per_mm) << '\n'
       << "step_mm = " << number_text(options.step_mm) << '\n'
       << "skip_ct_check = " << (options.skip_ct_check ? "true" : "false") << '\n';
@@ -129,10 +112,7 @@ std::string to_toml(const RegisterOptions& options, const RegistrationOptions& r
   if (!options.start_pose.empty())
     out << "start_pose = " << quoted(options.start_pose.string()) << '\n';
   if (!options.starts.empty()) out << "starts = " << quoted(options.starts.string()) << '\n';
-  for (const PassOptions& pass : registration.passes)
-    out << "\n[[pass]]\nsmoothing_sigma_mm = " << number_text(pass.smoothing_sigma_mm)
-        << "\ninitial_step_mm = " << number_text(pass.optimizer.initial_step_mm)
-        << "\nfinal_step_mm = " << number_text(pass.optimizer.final_step_mm) << '\n';
+  out << to_toml(options.method, registration);
   return out.str();
 }
 

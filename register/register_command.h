@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "register/case_loading.h"
+#include "register/method_options.h"
 #include "register/registration.h"
 
 namespace af::registration {
@@ -19,17 +20,11 @@ struct RegisterOptions {
   std::string case_name;
   std::vector<std::string> fields;  ///< CAMERA=PATH each
   std::string renderer = "field";
-  std::string preset = "paper";
-  std::optional<std::string> similarity;  ///< these replace what the preset says
-  std::optional<std::string> optimizer;
-  std::optional<int> bins;
-  std::optional<double> smoothing_sigma_mm;
-  std::optional<int> max_evaluations;
+  MethodOptions method;
   std::optional<std::array<double, 3>> start_rotation_deg;
   std::optional<std::array<double, 3>> start_translation_mm;
   std::filesystem::path start_pose;
   std::filesystem::path starts;
-  std::uint64_t seed = 1;
   double water_mu_per_mm = 0.0200;
   double step_mm = 1.0;
   std::string series_uid;
@@ -40,10 +35,8 @@ struct RegisterOptions {
 /// All combinations and values that cannot be; empty when the options are sound.
 std::vector<std::string> problems(const RegisterOptions& options);
 
-/// The preset with the replacements; InputError for unknown names and values out of range.
-RegistrationOptions registration_options(const RegisterOptions& options);
-
-CaseLoadOptions case_load_options(const RegisterOptions& options);
+/// `coarsest_level`: of the method.
+CaseLoadOptions case_load_options(const RegisterOptions& options, int coarsest_level = 0);
 
 /// The starts of a run: of --starts, or the one of --start-pose, or nominal with
 /// --start-rotation-deg and --start-translation-mm.

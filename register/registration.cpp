@@ -8,8 +8,10 @@
 #include <utility>
 
 #include "base/error.h"
-#include "image/gaussian_blur.h"
+#include "base/hash_random.h"
 #include "register/parameter_scaling.h"
+#include "register/pose_target.h"
+#include "register/stage_view.h"
 
 namespace af::registration {
 namespace {
@@ -65,16 +67,6 @@ ValueRange drr_range_at_nominal(const RegistrationProblem& problem, const Regist
   return {static_cast<double>(*low), static_cast<double>(*high)};
 }
 
-std::vector<std::uint8_t> used_pixels(const RegistrationView& view) {
-  if (view.mask.pixels.empty()) return {};
-  const Image2d mask = crop(view.mask, view.view.roi);
-  std::vector<std::uint8_t> used(mask.pixels.size());
-  std::transform(mask.pixels.begin(), mask.pixels.end(), used.begin(), [](float value) {
-    return static_cast<std::uint8_t>(value != 0.0f ? 1 : 0);
-  });
-  return used;
-}
-
 /// Detector pixels per millimetre on the isocentre plane (mean of both directions).
 double pixels_per_isocenter_mm(const RegistrationProblem& problem, const CameraGeometry& camera) {
   const double magnification =
@@ -82,96 +74,71 @@ double pixels_per_isocenter_mm(const RegistrationProblem& problem, const CameraG
   return magnification / camera.pixel_spacing_mm.mean();
 }
 
+StageGrid stage_grid(const RegistrationProblem& problem,
+                     const RegistrationView& view,
+                     const StageOptions& stage) {
+  double variance_mm2 = stage.smoothing_sigma_mm * stage.smoothing_sigma_mm;
+  if (stage.level > 0) {
+    const auto coarse = static_cast<std::size_t>(stage.level) - 1;
+    variance_mm2 += std::pow(view.coarse_levels[coarse].blur_sigma_mm, 2);
+  }
+  return {stage.pixel_step,
+          stage.roi_scale,
+          std::sqrt(variance_mm2) * pixels_per_isocenter_mm(problem, view.view.camera)};
+}
+
+std::shared_ptr<const DrrRenderer> stage_renderer(const RegistrationView& view, int level) {
+  return level == 0 ? view.renderer
+                    : view.coarse_levels[static_cast<std::size_t>(level) - 1].renderer;
+}
+
 ObjectiveView prepare_view(const RegistrationProblem& problem,
                            const RegistrationView& view,
                            const ValueRange& drr_range,
-                           const RegistrationOptions& options,
-                           const PassOptions& pass) {
-  SimilarityReference reference;
-  const double sigma_px =
-      pass.smoothing_sigma_mm * pixels_per_isocenter_mm(problem, view.view.camera);
-  // Blurred before it is cropped: the region's edge pixels see their true surroundings.
-  reference.xray = crop(gaussian_blur(view.xray, sigma_px), view.view.roi);
-  reference.used = used_pixels(view);
+                           const StageOptions& stage) {
+  const StageGrid grid = stage_grid(problem, view, stage);
+  SimilarityReference reference = stage_reference(view.xray, view.mask, view.view, grid);
   reference.drr_range = drr_range;
   std::vector<std::string> found = problems(reference);
   for (std::string& text : found) text.insert(0, view_name(view));
   throw_if_any(found);
-  return {view.view, view.renderer, make_similarity(options.similarity, reference), view.limit};
+  SimilarityOptions similarity = stage.similarity;
+  similarity.has_smooth_histogram |=
+      make_optimizer(stage.optimizer)->needs() == Derivatives::Gradient;
+  return {stage_view(view.view, grid),
+          stage_renderer(view, stage.level),
+          make_similarity(similarity, reference),
+          view.limit};
 }
 
-/// The poses that a pass searches: scaled parameters about the pass's start.
-class PoseTarget final : public OptimizationTarget {
- public:
-  PoseTarget(MultiViewObjective& objective, PoseFrame frame, const ParameterScaling& scaling)
-      : objective_(objective), frame_(std::move(frame)), scaling_(scaling) {}
+/// Points enough for the lengths of steps that derivatives choose.
+std::vector<Eigen::Vector3d> some_points(const std::vector<Eigen::Vector3d>& points) {
+  constexpr std::size_t kPoints = 512;
+  // Odd, so that it walks through all rows and layers of an even lattice.
+  const std::size_t stride = std::max<std::size_t>(1, points.size() / kPoints) | 1;
+  std::vector<Eigen::Vector3d> some;
+  for (std::size_t i = 0; i < points.size(); i += stride) some.push_back(points[i]);
+  return some;
+}
 
-  std::optional<double> evaluate(const ScaledParameters& point) override {
-    const ObjectiveValue value = objective_.evaluate(pose(point));
-    drr_count_ += value.drr_count;
-    rays_outside_ = value.rays_outside;
-    if (!value.is_admissible) return std::nullopt;
-    return value.similarity;
-  }
-  [[nodiscard]] RigidTransform pose(const ScaledParameters& point) const {
-    return pose_from_parameters(frame_, scaling_.unscaled(point));
-  }
-  [[nodiscard]] std::int64_t drr_count() const { return drr_count_; }
-  /// Of the latest evaluation.
-  [[nodiscard]] std::int64_t rays_outside() const { return rays_outside_; }
+/// Where a chain ended.
+struct ChainEnd {
+  RigidTransform room_from_ct;
+  double similarity = std::numeric_limits<double>::quiet_NaN();
+  StopReason stop_reason = StopReason::StepBelowFinal;
+};
 
- private:
-  MultiViewObjective& objective_;
-  PoseFrame frame_;
-  ParameterScaling scaling_;
-  std::int64_t drr_count_ = 0;
-  std::int64_t rays_outside_ = 0;
+struct PreparedStage {
+  StageOptions options;
+  std::shared_ptr<const Optimizer> optimizer;
+  MultiViewObjective objective;
+
+  [[nodiscard]] PreparedStage copy() const {
+    return {options, optimizer, MultiViewObjective(objective.views())};
+  }
 };
 
 }  // namespace
-
-std::vector<std::string> problems(const RegistrationOptions& options) {
-  std::vector<std::string> found = problems(options.similarity);
-  const std::vector<std::string> names = optimizer_names();
-  if (std::find(names.begin(), names.end(), options.optimizer) == names.end()) {
-    std::string list;
-    for (const std::string& name : names) list += (list.empty() ? "" : ", ") + name;
-    found.push_back("optimizer = '" + options.optimizer + "': must be one of " + list);
-  }
-  if (options.passes.empty()) found.emplace_back("passes = none: there must be at least one");
-  for (std::size_t i = 0; i < options.passes.size(); ++i) {
-    const std::string where = "pass " + std::to_string(i + 1) + ": ";
-    const double sigma = options.passes[i].smoothing_sigma_mm;
-    if (!(sigma >= 0.0) || !std::isfinite(sigma))
-      found.push_back(where + "smoothing_sigma_mm = " + std::to_string(sigma) + ": must be >= 0");
-    for (const std::string& text : problems(options.passes[i].optimizer))
-      found.push_back(where + text);
-  }
-  if (options.max_evaluations < 1)
-    found.push_back("max_evaluations = " + std::to_string(options.max_evaluations) +
-                    ": must be >= 1");
-  return found;
-}
-
-std::vector<PassOptions> paper_passes() {
-  PassOptions smoothed;
-  smoothed.smoothing_sigma_mm = 1.0;
-  smoothed.optimizer = {5.0, 0.5};
-  PassOptions sharp;
-  sharp.optimizer = {2.0, 0.1};
-  return {smoothed, sharp};
-}
-
-std::vector<std::string> preset_names() {
-  return {"paper"};
-}
-
-RegistrationOptions preset_options(const std::string& name) {
-  if (name == "paper") return {};
-  std::string list;
-  for (const std::string& known : preset_names()) list += (list.empty() ? "" : ", ") + known;
-  throw InputError("preset", "'" + name + "'", "must be one of " + list);
-}
 
 std::vector<std::string> problems(const RegistrationProblem& problem) {
   std::vector<std::string> found;
@@ -186,61 +153,156 @@ struct RegistrationRunner::Impl {
   std::shared_ptr<const RegistrationProblem> problem;
   RegistrationOptions options;
   std::vector<View> views;
-  std::vector<MultiViewObjective> objectives;  ///< one per pass
-  std::shared_ptr<const Optimizer> optimizer;
-  OptimizerResult search;  ///< reused
+  std::vector<Eigen::Vector3d> some_points_ct;
+  std::vector<PreparedStage> stages;         ///< of all chains, one after the other
+  std::optional<PreparedStage> judge;        ///< of a portfolio
+  OptimizerResult search;                    ///< reused
+  std::optional<ParameterScaling> at_start;  ///< by some_points_ct, at the run's start
 
-  /// Searches one pass from result.room_from_ct; false when no further pass makes sense.
-  bool run_pass(std::size_t pass, RegistrationResult& result);
-  void append_trace(std::size_t pass,
-                    int evaluations_before,
-                    const PoseTarget& target,
-                    RegistrationResult& result) const;
+  void prepare();
+  [[nodiscard]] PreparedStage prepare(const StageOptions& stage,
+                                      const std::vector<ValueRange>& drr_ranges) const;
+  [[nodiscard]] std::optional<ParameterScaling> scaling_at(
+      const RigidTransform& room_from_ct, std::span<const Eigen::Vector3d> points_ct) const;
+  /// Runs the stages of a chain, the first of which is `first`, from `end`.
+  void run_chain(const ChainOptions& chain,
+                 std::size_t first,
+                 std::int64_t start_index,
+                 ChainEnd& end,
+                 RegistrationResult& result);
+  /// Searches one stage from `end`; false when no further stage makes sense.
+  bool run_stage(std::size_t index,
+                 std::int64_t start_index,
+                 ChainEnd& end,
+                 RegistrationResult& result);
+  void run_portfolio(std::int64_t start_index, RegistrationResult& result);
+  ObjectiveValue judged(const RigidTransform& room_from_ct);
+  void append_trace(std::size_t index, const PoseTarget& target, RegistrationResult& result) const;
 };
 
-void RegistrationRunner::Impl::append_trace(std::size_t pass,
-                                            int evaluations_before,
+PreparedStage RegistrationRunner::Impl::prepare(const StageOptions& stage,
+                                                const std::vector<ValueRange>& drr_ranges) const {
+  std::vector<ObjectiveView> stage_views;
+  for (std::size_t i = 0; i < problem->views.size(); ++i)
+    stage_views.push_back(prepare_view(*problem, problem->views[i], drr_ranges[i], stage));
+  return {stage, make_optimizer(stage.optimizer), MultiViewObjective(std::move(stage_views))};
+}
+
+void RegistrationRunner::Impl::prepare() {
+  const int coarsest = options.coarsest_level();
+  std::vector<ValueRange> drr_ranges;
+  for (const RegistrationView& view : problem->views) {
+    if (static_cast<int>(view.coarse_levels.size()) < coarsest)
+      throw InputError(view_name(view) +
+                       "coarse_levels = " + std::to_string(view.coarse_levels.size()) +
+                       ": the stages need " + std::to_string(coarsest));
+    views.push_back(view.view);
+    drr_ranges.push_back(drr_range_at_nominal(*problem, view));
+  }
+  some_points_ct = some_points(problem->scaling_points_ct);
+  for (const ChainOptions& chain : options.chains)
+    for (const StageOptions& stage : chain.stages) stages.push_back(prepare(stage, drr_ranges));
+  if (options.chains.size() > 1) judge = prepare(options.judge.stage, drr_ranges);
+}
+
+std::optional<ParameterScaling> RegistrationRunner::Impl::scaling_at(
+    const RigidTransform& room_from_ct, std::span<const Eigen::Vector3d> points_ct) const {
+  return projected_motion_scaling(
+      room_from_ct, problem->center_ct_mm, points_ct, views, problem->isocenter_point);
+}
+
+void RegistrationRunner::Impl::append_trace(std::size_t index,
                                             const PoseTarget& target,
                                             RegistrationResult& result) const {
   const PoseFrame frame = problem->frame();
   for (const OptimizerIteration& iteration : search.trace)
-    result.trace.push_back({static_cast<int>(pass),
+    result.trace.push_back({static_cast<int>(index),
                             iteration.step_mm,
-                            evaluations_before + iteration.evaluations,
+                            result.evaluations + iteration.evaluations,
                             iteration.value,
                             parameters_from_pose(frame, target.pose(iteration.point))});
 }
 
-bool RegistrationRunner::Impl::run_pass(std::size_t pass, RegistrationResult& result) {
+bool RegistrationRunner::Impl::run_stage(std::size_t index,
+                                         std::int64_t start_index,
+                                         ChainEnd& end,
+                                         RegistrationResult& result) {
+  PreparedStage& stage = stages[index];
   const std::optional<ParameterScaling> scaling =
-      projected_motion_scaling(result.room_from_ct,
-                               problem->center_ct_mm,
-                               problem->scaling_points_ct,
-                               views,
-                               problem->isocenter_point);
+      stage.optimizer->needs() == Derivatives::None
+          ? scaling_at(end.room_from_ct, problem->scaling_points_ct)
+          : at_start;
   if (!scaling.has_value()) {
-    result.stop_reason = StopReason::CtOutsideRoi;
+    end.stop_reason = StopReason::CtOutsideRoi;
     return false;
   }
   PoseTarget target(
-      objectives[pass], PoseFrame::about(result.room_from_ct, problem->center_ct_mm), *scaling);
-  optimizer->maximize(
-      target, options.passes[pass].optimizer, options.max_evaluations - result.evaluations, search);
-  append_trace(pass, result.evaluations, target, result);
+      stage.objective, PoseFrame::about(end.room_from_ct, problem->center_ct_mm), *scaling);
+  const SearchBudget budget{options.max_evaluations - result.evaluations,
+                            hash64(options.seed,
+                                   hash_name(problem->case_name),
+                                   static_cast<std::uint64_t>(start_index),
+                                   index)};
+  stage.optimizer->maximize(target, stage.options.search, budget, search);
+  append_trace(index, target, result);
   result.evaluations += search.evaluations;
   result.inadmissible += search.inadmissible;
   result.drr_count += target.drr_count();
-  result.stop_reason = search.stop_reason;
-  result.similarity = search.value;
+  end.stop_reason = search.stop_reason;
+  end.similarity = search.value;
   if (search.stop_reason == StopReason::StartInadmissible) {
     result.rays_outside = target.rays_outside();
-    // The pass before ended on the very limit, and rounding put its end beyond.
-    if (pass > 0) result.stop_reason = StopReason::PinnedAtLimit;
     return false;
   }
-  result.room_from_ct = target.pose(search.point);
+  end.room_from_ct = target.pose(search.point);
   return search.stop_reason == StopReason::StepBelowFinal ||
          search.stop_reason == StopReason::PinnedAtLimit;
+}
+
+void RegistrationRunner::Impl::run_chain(const ChainOptions& chain,
+                                         std::size_t first,
+                                         std::int64_t start_index,
+                                         ChainEnd& end,
+                                         RegistrationResult& result) {
+  for (std::size_t i = 0; i < chain.stages.size(); ++i) {
+    if (run_stage(first + i, start_index, end, result)) continue;
+    // The stage before ended on the very limit, and rounding put its end beyond.
+    if (i > 0 && end.stop_reason == StopReason::StartInadmissible)
+      end.stop_reason = StopReason::PinnedAtLimit;
+    return;
+  }
+}
+
+ObjectiveValue RegistrationRunner::Impl::judged(const RigidTransform& room_from_ct) {
+  ObjectiveValue value = judge->objective.evaluate(room_from_ct);
+  value.similarity /= static_cast<double>(views.size());
+  return value;
+}
+
+void RegistrationRunner::Impl::run_portfolio(std::int64_t start_index, RegistrationResult& result) {
+  std::size_t first = 0;
+  bool has_end = false;
+  for (const ChainOptions& chain : options.chains) {
+    ChainEnd end{result.start_room_from_ct};
+    run_chain(chain, first, start_index, end, result);
+    first += chain.stages.size();
+    ObjectiveValue value = judged(end.room_from_ct);
+    result.drr_count += value.drr_count;
+    if (!value.is_admissible || !std::isfinite(value.similarity)) {
+      if (!has_end) result.stop_reason = end.stop_reason;
+      continue;
+    }
+    if (!has_end || value.similarity > result.similarity) {
+      result.similarity = value.similarity;
+      result.room_from_ct = end.room_from_ct;
+      result.stop_reason = end.stop_reason;
+      result.chain = chain.name;
+    }
+    has_end = true;
+    if (result.similarity >= options.judge.enough_value) break;
+  }
+  if (has_end && result.similarity <= options.judge.least_value)
+    result.stop_reason = StopReason::NoBetterThanNoDrr;
 }
 
 RegistrationRunner::RegistrationRunner(std::shared_ptr<const RegistrationProblem> problem,
@@ -249,20 +311,9 @@ RegistrationRunner::RegistrationRunner(std::shared_ptr<const RegistrationProblem
   check(problem != nullptr, "a registration needs a problem");
   throw_if_any(problems(options));
   throw_if_any(problems(*problem));
-  std::vector<ValueRange> drr_ranges;
-  for (const RegistrationView& view : problem->views) {
-    impl_->views.push_back(view.view);
-    drr_ranges.push_back(drr_range_at_nominal(*problem, view));
-  }
-  for (const PassOptions& pass : options.passes) {
-    std::vector<ObjectiveView> views;
-    for (std::size_t i = 0; i < problem->views.size(); ++i)
-      views.push_back(prepare_view(*problem, problem->views[i], drr_ranges[i], options, pass));
-    impl_->objectives.emplace_back(std::move(views));
-  }
-  impl_->optimizer = make_optimizer(options.optimizer);
   impl_->options = options;
   impl_->problem = std::move(problem);
+  impl_->prepare();
 }
 
 RegistrationRunner::RegistrationRunner(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -275,32 +326,45 @@ RegistrationRunner RegistrationRunner::share_preparation() const {
   impl->problem = impl_->problem;
   impl->options = impl_->options;
   impl->views = impl_->views;
-  impl->optimizer = impl_->optimizer;
-  for (const MultiViewObjective& objective : impl_->objectives)
-    impl->objectives.emplace_back(objective.views());
+  impl->some_points_ct = impl_->some_points_ct;
+  for (const PreparedStage& stage : impl_->stages) impl->stages.push_back(stage.copy());
+  if (impl_->judge.has_value()) impl->judge = impl_->judge->copy();
   return RegistrationRunner(std::move(impl));
 }
 
-RegistrationResult RegistrationRunner::run(const RigidTransform& start_room_from_ct) {
+RegistrationResult RegistrationRunner::run(const RigidTransform& start_room_from_ct,
+                                           std::int64_t start_index) {
   const Clock::time_point begin = Clock::now();
+  Impl& impl = *impl_;
   RegistrationResult result;
   result.start_room_from_ct = start_room_from_ct;
   result.room_from_ct = start_room_from_ct;
   result.similarity = std::numeric_limits<double>::quiet_NaN();
-  for (std::size_t pass = 0; pass < impl_->objectives.size(); ++pass)
-    if (!impl_->run_pass(pass, result)) break;
+  impl.at_start = impl.scaling_at(start_room_from_ct, impl.some_points_ct);
+  if (impl.judge.has_value()) {
+    impl.run_portfolio(start_index, result);
+  } else {
+    const ChainOptions& chain = impl.options.chains.front();
+    ChainEnd end{start_room_from_ct};
+    impl.run_chain(chain, 0, start_index, end, result);
+    result.room_from_ct = end.room_from_ct;
+    result.similarity = end.similarity;
+    result.stop_reason = end.stop_reason;
+    result.chain = chain.name;
+  }
   result.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
   return result;
 }
 
 ObjectiveValue RegistrationRunner::similarity_at(const RigidTransform& room_from_ct) {
-  return similarity_at(room_from_ct, impl_->objectives.size() - 1);
+  return impl_->judge.has_value() ? impl_->judged(room_from_ct)
+                                  : similarity_at(room_from_ct, impl_->stages.size() - 1);
 }
 
 ObjectiveValue RegistrationRunner::similarity_at(const RigidTransform& room_from_ct,
-                                                 std::size_t pass) {
-  check(pass < impl_->objectives.size(), "no such pass");
-  return impl_->objectives[pass].evaluate(room_from_ct);
+                                                 std::size_t stage) {
+  check(stage < impl_->stages.size(), "no such stage");
+  return impl_->stages[stage].objective.evaluate(room_from_ct);
 }
 
 const RegistrationProblem& RegistrationRunner::problem() const {

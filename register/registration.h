@@ -9,35 +9,16 @@
 
 #include "drr/drr_renderer.h"
 #include "register/multi_view_objective.h"
-#include "register/optimizer/optimizer.h"
-#include "register/similarity/similarity_measure.h"
+#include "register/presets.h"
+#include "register/registration_options.h"
 
 namespace af::registration {
 
-/// One pass of the search, coarse to fine.
-struct PassOptions {
-  double smoothing_sigma_mm = 0.0;  ///< Gaussian on the references (not on the DRRs), in mm on the
-                                    ///< isocentre plane; 0: the references themselves
-  OptimizerOptions optimizer;       ///< steps in mm of mean projected motion
+/// A coarser renderer of a view's image pyramid.
+struct RendererLevel {
+  std::shared_ptr<const DrrRenderer> renderer;
+  double blur_sigma_mm = 0.0;  ///< of its DRRs, in mm on the isocentre plane
 };
-
-/// The two passes of the paper (Sec. III-B2). It lost the value of its sigma; register/README.md
-/// says how ours was chosen.
-std::vector<PassOptions> paper_passes();
-
-/// How to register. The defaults are the paper's (preset "paper").
-struct RegistrationOptions {
-  SimilarityOptions similarity;
-  std::string optimizer = "best-neighbor";
-  std::vector<PassOptions> passes = paper_passes();
-  int max_evaluations = 5000;  ///< pose evaluations per registration, all passes together
-};
-
-std::vector<std::string> problems(const RegistrationOptions& options);
-
-std::vector<std::string> preset_names();
-/// InputError that lists the known names.
-RegistrationOptions preset_options(const std::string& name);
 
 /// One X-ray of the problem. Pixels are the camera's; nothing is cropped yet.
 struct RegistrationView {
@@ -45,11 +26,13 @@ struct RegistrationView {
   Image2d xray;  ///< whole detector, attenuation domain (bright = attenuated)
   Image2d mask;  ///< whole detector, non-zero = used; empty: every pixel of the region
   std::shared_ptr<const DrrRenderer> renderer;
+  std::vector<RendererLevel> coarse_levels;  ///< levels 1, 2, ... as far as stages need them
   std::optional<MotionLimit> limit;  ///< motion box of the renderer's field; none for ray casting
 };
 
 /// Everything that does not change between the starts of one case.
 struct RegistrationProblem {
+  std::string case_name;  ///< a key of random numbers
   RigidTransform nominal_room_from_ct = RigidTransform::Identity();
   Eigen::Vector3d center_ct_mm = Eigen::Vector3d::Zero();     ///< c_roi: origin of all rotations
   Eigen::Vector3d isocenter_point = Eigen::Vector3d::Zero();  ///< room, mm
@@ -65,9 +48,9 @@ struct RegistrationProblem {
 std::vector<std::string> problems(const RegistrationProblem& problem);
 
 struct TraceRow {
-  int pass = 0;  ///< from 0
+  int pass = 0;  ///< stage, from 0, counted over the chains
   double step_mm = 0.0;
-  int evaluations = 0;  ///< so far, all passes
+  int evaluations = 0;  ///< so far, all stages
   double similarity = 0.0;
   PoseParameters parameters;  ///< relative to RegistrationProblem::frame()
 };
@@ -75,7 +58,9 @@ struct TraceRow {
 struct RegistrationResult {
   RigidTransform start_room_from_ct = RigidTransform::Identity();
   RigidTransform room_from_ct = RigidTransform::Identity();
-  double similarity = 0.0;        ///< at the end, by the last pass's references; NaN if it has none
+  double similarity = 0.0;        ///< at the end: of the chain's last stage, of a portfolio by its
+                                  ///< judge (mean over views); NaN if it has none
+  std::string chain;              ///< the one that the result is from
   int evaluations = 0;            ///< poses tried
   int inadmissible = 0;           ///< of these, outside the field or its motion range
   std::int64_t drr_count = 0;     ///< DRRs rendered
@@ -86,10 +71,10 @@ struct RegistrationResult {
 };
 
 /// Registers one case from any number of starts. Construction does what all starts share (smoothed
-/// references, histograms' ranges, X-ray bins); runs reuse the buffers. One runner per thread:
-/// share_preparation() makes another cheaply. A result depends on problem, options and start alone
-/// (its seconds excepted). The DRR range of a case is that of the DRR at the nominal pose over the
-/// region of interest grown by half its size to every side. \test
+/// and decimated references, histograms' ranges, X-ray bins); runs reuse the buffers. One runner
+/// per thread: share_preparation() makes another cheaply. A result depends on problem, options and
+/// start alone (its seconds excepted). The DRR range of a case is that of the DRR at the nominal
+/// pose over the region of interest grown by half its size to every side. \test
 /// Registration.TwoViewsRecoverAKnownPose
 class RegistrationRunner {
  public:
@@ -103,11 +88,14 @@ class RegistrationRunner {
   /// A runner for another thread; references and bins are shared.
   [[nodiscard]] RegistrationRunner share_preparation() const;
 
-  [[nodiscard]] RegistrationResult run(const RigidTransform& start_room_from_ct);
+  /// `start_index` is a key of random numbers.
+  [[nodiscard]] RegistrationResult run(const RigidTransform& start_room_from_ct,
+                                       std::int64_t start_index = 0);
 
-  /// The objective of one pass (default: the last) at a pose.
+  /// What RegistrationResult::similarity is at a pose.
   [[nodiscard]] ObjectiveValue similarity_at(const RigidTransform& room_from_ct);
-  [[nodiscard]] ObjectiveValue similarity_at(const RigidTransform& room_from_ct, std::size_t pass);
+  /// The objective of one stage, counted over the chains, at a pose.
+  [[nodiscard]] ObjectiveValue similarity_at(const RigidTransform& room_from_ct, std::size_t stage);
 
   [[nodiscard]] const RegistrationProblem& problem() const;
   [[nodiscard]] const RegistrationOptions& options() const;

@@ -2,8 +2,8 @@
 #include "register/optimizer/best_neighbor_search.h"
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
+
+#include "register/optimizer/search_run.h"
 
 namespace af::registration {
 namespace {
@@ -16,97 +16,52 @@ ScaledParameters neighbor(const ScaledParameters& point, int index, double step_
   return moved;
 }
 
-enum class Examined { Complete, BudgetSpent, NonFinite };
-
 struct Neighborhood {
-  Examined examined = Examined::Complete;
-  int best_index = -1;  ///< -1: none beats the present point
+  bool is_complete = true;  ///< false: the search has ended
+  int best_index = -1;      ///< -1: none beats the present point
   double best_value = 0.0;
   bool has_inadmissible = false;
 };
 
-Neighborhood examine(OptimizationTarget& target,
-                     double step_mm,
-                     int max_evaluations,
-                     OptimizerResult& result) {
+Neighborhood examine(SearchRun& run, double step_mm) {
   Neighborhood found;
-  found.best_value = result.value;
+  const ScaledParameters point = run.result().point;
+  found.best_value = run.result().value;
   for (int index = 0; index < kNeighbors; ++index) {
-    if (result.evaluations >= max_evaluations) {
-      found.examined = Examined::BudgetSpent;
+    const SearchRun::Evaluation evaluation = run.evaluate(neighbor(point, index, step_mm));
+    if (evaluation.outcome == SearchRun::Outcome::Ended) {
+      found.is_complete = false;
       return found;
     }
-    const std::optional<double> value = target.evaluate(neighbor(result.point, index, step_mm));
-    ++result.evaluations;
-    if (!value.has_value()) {
-      ++result.inadmissible;
+    if (evaluation.outcome == SearchRun::Outcome::Inadmissible) {
       found.has_inadmissible = true;
-      continue;
-    }
-    if (!std::isfinite(*value)) {
-      found.examined = Examined::NonFinite;
-      return found;
-    }
-    if (*value > found.best_value) {
-      found.best_value = *value;
+    } else if (evaluation.target.value > found.best_value) {
+      found.best_value = evaluation.target.value;
       found.best_index = index;
     }
   }
   return found;
 }
 
-/// False when the search has ended with the start.
-bool begin(OptimizationTarget& target, int max_evaluations, OptimizerResult& result) {
-  result.point.setZero();
-  result.value = std::numeric_limits<double>::quiet_NaN();
-  result.evaluations = 0;
-  result.inadmissible = 0;
-  result.trace.clear();
-  if (max_evaluations < 1) {
-    result.stop_reason = StopReason::EvaluationBudgetSpent;
-    return false;
-  }
-  const std::optional<double> value = target.evaluate(result.point);
-  result.evaluations = 1;
-  if (!value.has_value()) {
-    result.inadmissible = 1;
-    result.stop_reason = StopReason::StartInadmissible;
-    return false;
-  }
-  result.value = *value;
-  if (!std::isfinite(*value)) {
-    result.stop_reason = StopReason::NonFiniteSimilarity;
-    return false;
-  }
-  return true;
-}
-
 }  // namespace
 
 void BestNeighborSearch::maximize(OptimizationTarget& target,
                                   const OptimizerOptions& options,
-                                  int max_evaluations,
+                                  const SearchBudget& budget,
                                   OptimizerResult& result) const {
-  if (!begin(target, max_evaluations, result)) return;
+  SearchRun run(target, budget, result);
+  if (!run.begin(Derivatives::None)) return;
   double step_mm = options.initial_step_mm;
   for (;;) {
-    const Neighborhood found = examine(target, step_mm, max_evaluations, result);
+    const Neighborhood found = examine(run, step_mm);
     // A spent budget still keeps the best neighbour seen.
-    if (found.best_index >= 0) {
-      result.point = neighbor(result.point, found.best_index, step_mm);
-      result.value = found.best_value;
-    }
-    result.trace.push_back({step_mm, result.value, result.evaluations, result.point});
-    if (found.examined != Examined::Complete) {
-      result.stop_reason = found.examined == Examined::BudgetSpent
-                               ? StopReason::EvaluationBudgetSpent
-                               : StopReason::NonFiniteSimilarity;
-      return;
-    }
+    if (found.best_index >= 0)
+      run.accept(neighbor(result.point, found.best_index, step_mm), found.best_value);
+    run.trace(step_mm);
+    if (!found.is_complete) return;
     if (found.best_index >= 0) continue;
     if (step_mm <= options.final_step_mm) {
-      result.stop_reason =
-          found.has_inadmissible ? StopReason::PinnedAtLimit : StopReason::StepBelowFinal;
+      run.converge(found.has_inadmissible);
       return;
     }
     step_mm = std::max(step_mm / 2.0, options.final_step_mm);

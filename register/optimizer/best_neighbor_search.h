@@ -14,7 +14,7 @@ class BestNeighborSearch final : public Optimizer {
  public:
   void maximize(OptimizationTarget& target,
                 const OptimizerOptions& options,
-                int max_evaluations,
+                const SearchBudget& budget,
                 OptimizerResult& result) const override;
 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
@@ -12,21 +13,37 @@ namespace af::registration {
 
 /// Why a search ended.
 enum class StopReason {
-  StepBelowFinal,         ///< converged: no neighbour at the final step is better
+  StepBelowFinal,         ///< converged: no better point at the final step
   EvaluationBudgetSpent,  ///< max_evaluations reached
-  PinnedAtLimit,          ///< converged, but a neighbour at the final step is inadmissible
+  PinnedAtLimit,          ///< converged, but points at the final step are inadmissible
   StartInadmissible,      ///< the start lies outside the field or its motion range
   CtOutsideRoi,           ///< no CT point projects into a region of interest: steps undefined
   NonFiniteSimilarity,    ///< the similarity is NaN or infinite
+  NoBetterThanNoDrr,      ///< every chain of a portfolio explains the X-rays no better than no DRR
 };
 
 /// "step-below-final", "evaluation-budget-spent", "pinned-at-limit", "start-inadmissible",
-/// "ct-outside-roi", "non-finite-similarity": as in result files.
+/// "ct-outside-roi", "non-finite-similarity", "no-better-than-no-drr": as in result files.
 const char* to_string(StopReason reason);
 
 /// Six pose parameters (rx, ry, rz, tx, ty, tz) scaled so that one unit of each moves projected CT
 /// points by 1 mm on average (ParameterScaling).
 using ScaledParameters = Eigen::Matrix<double, 6, 1>;
+using ScaledMatrix = Eigen::Matrix<double, 6, 6>;
+
+/// What an optimiser asks of its target, each including the ones before.
+enum class Derivatives {
+  None,
+  Gradient,         ///< first derivatives
+  NormalEquations,  ///< and a positive semi-definite stand-in for the negative Hessian
+};
+
+/// A target at a point, as far as was asked for.
+struct TargetValue {
+  double value = 0.0;
+  ScaledParameters gradient = ScaledParameters::Zero();
+  ScaledMatrix matrix = ScaledMatrix::Zero();
+};
 
 /// What an optimiser maximises.
 class OptimizationTarget {
@@ -35,18 +52,26 @@ class OptimizationTarget {
 
   /// nullopt: the point is inadmissible.
   virtual std::optional<double> evaluate(const ScaledParameters& point) = 0;
+  /// With derivatives; only for targets that were made for optimisers that need them.
+  virtual std::optional<TargetValue> evaluate_with(const ScaledParameters& point,
+                                                   Derivatives derivatives);
+  /// The point, or one near it that known limits admit (it may still turn out inadmissible).
+  [[nodiscard]] virtual ScaledParameters nearest_admissible(const ScaledParameters& point) const {
+    return point;
+  }
 };
 
 struct OptimizerOptions {
-  double initial_step_mm = 5.0;
-  double final_step_mm = 0.5;
+  double initial_step_mm = 5.0;  ///< first, and with derivatives longest, step
+  double final_step_mm = 0.5;    ///< a search whose steps fall below has converged
+  int population = 16;           ///< cma-es: points per generation
 };
 
 std::vector<std::string> problems(const OptimizerOptions& options);
 
 /// One accepted move or one change of the step.
 struct OptimizerIteration {
-  double step_mm = 0.0;  ///< step of the neighbours examined
+  double step_mm = 0.0;  ///< of the points examined
   double value = 0.0;    ///< best value after the iteration
   int evaluations = 0;   ///< so far, this search
   ScaledParameters point = ScaledParameters::Zero();
@@ -61,17 +86,24 @@ struct OptimizerResult {
   std::vector<OptimizerIteration> trace;
 };
 
-/// A local search from the origin of the scaled parameters. Stateless, hence re-entrant; draws no
-/// random numbers.
+/// What one search may spend, and its random numbers' key.
+struct SearchBudget {
+  int max_evaluations = 5000;    ///< calls of the target; derivatives do not count extra
+  std::uint64_t random_key = 0;  ///< of (seed, case, start); only cma-es draws
+};
+
+/// A search from the origin of the scaled parameters. Stateless, hence re-entrant: the same target,
+/// options and budget give the same result.
 class Optimizer {
  public:
   virtual ~Optimizer() = default;
 
-  /// At most `max_evaluations` calls of target.evaluate(); `result` is overwritten, its memory
-  /// reused.
+  [[nodiscard]] virtual Derivatives needs() const { return Derivatives::None; }
+
+  /// `result` is overwritten, its memory reused.
   virtual void maximize(OptimizationTarget& target,
                         const OptimizerOptions& options,
-                        int max_evaluations,
+                        const SearchBudget& budget,
                         OptimizerResult& result) const = 0;
 };
 

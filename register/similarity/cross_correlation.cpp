@@ -1,82 +1,98 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "register/similarity/cross_correlation.h"
 
-#include <array>
+#include <algorithm>
 #include <cmath>
 
 #include "base/error.h"
+#include "register/similarity/pixel_sums.h"
 
 namespace af::registration {
 namespace {
 
-class EmptyWorkspace final : public SimilarityWorkspace {};
-
-/// Independent partial sums: additions need not wait for each other, and their order is fixed.
-constexpr std::size_t kLanes = 4;
-
-struct Sums {
-  std::array<double, kLanes> product{};
-  std::array<double, kLanes> value{};
-  std::array<double, kLanes> square{};
-};
-
-double total(const std::array<double, kLanes>& lanes) {
-  return (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]);
-}
+/// A constant image leaves rounding errors of this order in its variance: products are rounded to
+/// single precision.
+constexpr double kRelativeRounding = 1e-6;
 
 }  // namespace
+
+UnitCorrelation correlate(std::span<const float> image,
+                          std::span<const float> unit_reference,
+                          std::span<const float> weights,
+                          double used_pixels,
+                          double offset) {
+  const auto single_offset = static_cast<float>(offset);
+  const CorrelationSums sums =
+      pixel_sum_kernels().correlation_sums(image.data(),
+                                           unit_reference.data(),
+                                           weights.empty() ? nullptr : weights.data(),
+                                           single_offset,
+                                           static_cast<std::int32_t>(image.size()));
+  UnitCorrelation result;
+  const double mean = sums.value / used_pixels;
+  result.mean = mean + static_cast<double>(single_offset);
+  const double variance = sums.square - sums.value * mean;
+  if (std::isnan(variance)) result.value = variance;
+  if (!(variance > kRelativeRounding * sums.square)) return result;
+  result.norm = std::sqrt(variance);
+  result.value = sums.product / result.norm;
+  return result;
+}
+
+void correlation_derivative(const UnitCorrelation& correlation,
+                            std::span<const float> image,
+                            std::span<const float> unit_reference,
+                            std::span<const float> weights,
+                            std::span<float> derivative) {
+  if (!(correlation.norm > 0.0)) {
+    std::fill(derivative.begin(), derivative.end(), 0.0f);
+    return;
+  }
+  const auto mean = static_cast<float>(correlation.mean);
+  const auto by_norm = static_cast<float>(1.0 / correlation.norm);
+  const auto shrink = static_cast<float>(correlation.value / correlation.norm);
+  for (std::size_t i = 0; i < image.size(); ++i) {
+    const float slope = by_norm * (unit_reference[i] - shrink * (image[i] - mean));
+    derivative[i] = weights.empty() ? slope : weights[i] * slope;
+  }
+}
 
 CrossCorrelation::CrossCorrelation(const SimilarityReference& reference)
     : drr_offset_((reference.drr_range.low + reference.drr_range.high) / 2.0) {
   throw_if_any(problems(reference));
-  const std::size_t pixels = reference.xray.pixels.size();
-  weights_.resize(pixels);
-  unit_xray_.resize(pixels);
-  double sum = 0.0;
-  for (std::size_t i = 0; i < pixels; ++i) {
-    weights_[i] = reference.is_used(i) ? 1.0f : 0.0f;
-    if (!reference.is_used(i)) continue;
-    used_pixels_ += 1.0;
-    sum += static_cast<double>(reference.xray.pixels[i]);
-  }
-  const double mean = sum / used_pixels_;
-  double square = 0.0;
-  for (std::size_t i = 0; i < pixels; ++i) {
-    if (!reference.is_used(i)) continue;
-    const double centred = static_cast<double>(reference.xray.pixels[i]) - mean;
-    square += centred * centred;
-  }
-  const double norm = std::sqrt(square);
-  for (std::size_t i = 0; i < pixels; ++i)
-    unit_xray_[i] =
-        reference.is_used(i)
-            ? static_cast<float>((static_cast<double>(reference.xray.pixels[i]) - mean) / norm)
-            : 0.0f;
+  weights_ = pixel_weights(reference);
+  unit_xray_ = unit_image(reference.xray.pixels, weights_);
+  used_pixels_ = weight_sum(weights_, unit_xray_.size());
 }
 
 double CrossCorrelation::evaluate(std::span<const float> drr,
                                   SimilarityWorkspace& /*workspace*/) const {
   check(drr.size() == unit_xray_.size(), "the DRR must have the size of its reference");
-  Sums sums;
-  for (std::size_t i = 0; i < drr.size(); ++i) {
-    const std::size_t lane = i % kLanes;
-    const double centred =
-        (static_cast<double>(drr[i]) - drr_offset_) * static_cast<double>(weights_[i]);
-    sums.product[lane] += static_cast<double>(unit_xray_[i]) * centred;
-    sums.value[lane] += centred;
-    sums.square[lane] += centred * centred;
-  }
-  const double value = total(sums.value);
-  const double square = total(sums.square);
-  const double variance = square - value * value / used_pixels_;
-  // A constant DRR leaves rounding errors of this order.
-  constexpr double kRelativeRounding = 1e-12;
-  if (!(variance > kRelativeRounding * square)) return std::isnan(variance) ? variance : 0.0;
-  return total(sums.product) / std::sqrt(variance);
+  return correlate(drr, unit_xray_, weights_, used_pixels_, drr_offset_).value;
+}
+
+double CrossCorrelation::evaluate_with_derivative(std::span<const float> drr,
+                                                  std::span<float> derivative,
+                                                  SimilarityWorkspace& /*workspace*/) const {
+  check(drr.size() == unit_xray_.size() && derivative.size() == drr.size(),
+        "DRR and derivative must have the size of the reference");
+  const UnitCorrelation correlation =
+      correlate(drr, unit_xray_, weights_, used_pixels_, drr_offset_);
+  correlation_derivative(correlation, drr, unit_xray_, weights_, derivative);
+  return correlation.value;
+}
+
+NormalEquations CrossCorrelation::normal_equations(std::span<const float> drr,
+                                                   std::span<const float> planes,
+                                                   SimilarityWorkspace& /*workspace*/) const {
+  check(drr.size() == unit_xray_.size(), "the DRR must have the size of its reference");
+  const GramSums sums = gram_sums(planes, drr, unit_xray_, weights_, drr_offset_);
+  return correlation_normal_equations(
+      sums, kRelativeRounding * gram_product(sums, kDrrChannel, kDrrChannel));
 }
 
 std::unique_ptr<SimilarityWorkspace> CrossCorrelation::make_workspace() const {
-  return std::make_unique<EmptyWorkspace>();
+  return std::make_unique<SimilarityWorkspace>();
 }
 
 }  // namespace af::registration

@@ -14,8 +14,9 @@ namespace af::registration {
 ///     NCC = sum (x - mean x)(d - mean d) / sqrt(sum (x - mean x)^2 sum (d - mean d)^2)   in [-1,
 ///     1]
 ///
-/// over the used pixels; 0 when the DRR is constant there. Sums run in double in a fixed order.
-/// \test CrossCorrelation.IsOneForAnyRisingLinearMap
+/// over the used pixels; 0 when the DRR is constant there. With x^ and d^ the centred images of
+/// norm 1, NCC = 1 - |x^ - d^|^2 / 2: a sum of squares, whose normal equations gain and offset do
+/// not enter. \test CrossCorrelation.IsOneForAnyRisingLinearMap
 class CrossCorrelation final : public SimilarityMeasure {
  public:
   /// InputError when the reference has problems.
@@ -23,13 +24,42 @@ class CrossCorrelation final : public SimilarityMeasure {
 
   [[nodiscard]] double evaluate(std::span<const float> drr,
                                 SimilarityWorkspace& workspace) const override;
+  [[nodiscard]] bool has_derivative() const override { return true; }
+  double evaluate_with_derivative(std::span<const float> drr,
+                                  std::span<float> derivative,
+                                  SimilarityWorkspace& workspace) const override;
+  [[nodiscard]] bool has_normal_equations() const override { return true; }
+  [[nodiscard]] NormalEquations normal_equations(std::span<const float> drr,
+                                                 std::span<const float> planes,
+                                                 SimilarityWorkspace& workspace) const override;
   [[nodiscard]] std::unique_ptr<SimilarityWorkspace> make_workspace() const override;
 
  private:
+  std::vector<float> weights_;    ///< 1 where used, 0 elsewhere; empty: all are
   std::vector<float> unit_xray_;  ///< (x - mean) / norm; 0 where unused
-  std::vector<float> weights_;    ///< 1 where used, 0 elsewhere
   double used_pixels_ = 0.0;
   double drr_offset_ = 0.0;  ///< subtracted before squaring, against cancellation
 };
+
+/// Mean, norm and correlation of an image with a centred image of norm 1.
+struct UnitCorrelation {
+  double value = 0.0;  ///< 0 when the image is constant
+  double mean = 0.0;
+  double norm = 0.0;  ///< of the centred image; 0 when it is constant
+};
+
+/// Over the pixels of weight 1 (none given: all).
+UnitCorrelation correlate(std::span<const float> image,
+                          std::span<const float> unit_reference,
+                          std::span<const float> weights,
+                          double used_pixels,
+                          double offset);
+
+/// Derivative of the correlation by every pixel of the image.
+void correlation_derivative(const UnitCorrelation& correlation,
+                            std::span<const float> image,
+                            std::span<const float> unit_reference,
+                            std::span<const float> weights,
+                            std::span<float> derivative);
 
 }  // namespace af::registration

@@ -2,11 +2,21 @@
 #include "register/similarity/similarity_measure.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "base/error.h"
 #include "register/similarity/cross_correlation.h"
+#include "register/similarity/difference_entropy.h"
+#include "register/similarity/gradient_correlation.h"
+#include "register/similarity/gradient_difference.h"
+#include "register/similarity/gradient_orientation.h"
 #include "register/similarity/mutual_information.h"
+#include "register/similarity/normalized_mutual_information.h"
+#include "register/similarity/pattern_intensity.h"
+#include "register/similarity/robust_gradient.h"
+#include "register/similarity/sum_of_squared_differences.h"
+#include "register/similarity/tiled_correlation.h"
 
 namespace af::registration {
 namespace {
@@ -38,6 +48,58 @@ void append_value_problems(const SimilarityReference& reference, std::vector<std
   }
 }
 
+using MeasurePointer = std::unique_ptr<SimilarityMeasure>;
+
+struct KnownMeasure {
+  const char* name;
+  bool has_derivative;
+  bool has_normal_equations;
+  MeasurePointer (*make)(const SimilarityOptions& options, const SimilarityReference& reference);
+};
+
+template <typename Measure>
+MeasurePointer make_plain(const SimilarityOptions& /*options*/,
+                          const SimilarityReference& reference) {
+  return std::make_unique<Measure>(reference);
+}
+template <typename Measure>
+MeasurePointer make_histogram(const SimilarityOptions& options,
+                              const SimilarityReference& reference) {
+  return std::make_unique<Measure>(reference, options.bins, options.has_smooth_histogram);
+}
+MeasurePointer make_entropy(const SimilarityOptions& options,
+                            const SimilarityReference& reference) {
+  return std::make_unique<DifferenceEntropy>(reference, options.bins);
+}
+MeasurePointer make_tiled(const SimilarityOptions& options, const SimilarityReference& reference) {
+  return std::make_unique<TiledCorrelation>(reference, options.tiles);
+}
+MeasurePointer make_robust(const SimilarityOptions& options, const SimilarityReference& reference) {
+  return std::make_unique<RobustGradient>(reference, options.residual_scale);
+}
+
+/// Every measure there is; a new one joins here.
+constexpr std::array kMeasures = {
+    KnownMeasure{"mi", true, false, make_histogram<MutualInformation>},
+    KnownMeasure{"nmi", true, false, make_histogram<NormalizedMutualInformation>},
+    KnownMeasure{"ncc", true, true, make_plain<CrossCorrelation>},
+    KnownMeasure{"tncc", false, true, make_tiled},
+    KnownMeasure{"gc", true, true, make_plain<GradientCorrelation>},
+    KnownMeasure{"gd", false, false, make_plain<GradientDifference>},
+    KnownMeasure{"rg", true, true, make_robust},
+    KnownMeasure{"pi", false, false, make_plain<PatternIntensity>},
+    KnownMeasure{"entropy", false, false, make_entropy},
+    KnownMeasure{"ssd", true, true, make_plain<SumOfSquaredDifferences>},
+    KnownMeasure{"go", false, false, make_plain<GradientOrientation>},
+};
+
+const KnownMeasure* find_measure(const std::string& name) {
+  const auto found = std::find_if(kMeasures.begin(), kMeasures.end(), [&](const auto& measure) {
+    return name == measure.name;
+  });
+  return found == kMeasures.end() ? nullptr : &*found;
+}
+
 }  // namespace
 
 std::vector<std::string> problems(const SimilarityReference& reference) {
@@ -61,29 +123,66 @@ std::vector<std::string> problems(const SimilarityReference& reference) {
   return found;
 }
 
+NormalEquations& NormalEquations::operator+=(const NormalEquations& other) {
+  value += other.value;
+  gradient += other.gradient;
+  matrix += other.matrix;
+  return *this;
+}
+
+double SimilarityMeasure::evaluate_with_derivative(std::span<const float> /*drr*/,
+                                                   std::span<float> /*derivative*/,
+                                                   SimilarityWorkspace& /*workspace*/) const {
+  check(false, "this similarity measure has no derivative");
+  return 0.0;
+}
+
+NormalEquations SimilarityMeasure::normal_equations(std::span<const float> /*drr*/,
+                                                    std::span<const float> /*planes*/,
+                                                    SimilarityWorkspace& /*workspace*/) const {
+  check(false, "this similarity measure has no normal equations");
+  return {};
+}
+
 std::vector<std::string> problems(const SimilarityOptions& options) {
   std::vector<std::string> found;
-  const std::vector<std::string> names = similarity_names();
-  if (std::find(names.begin(), names.end(), options.name) == names.end()) {
+  if (find_measure(options.name) == nullptr) {
     std::string list;
-    for (const std::string& name : names) list += (list.empty() ? "" : ", ") + name;
+    for (const std::string& name : similarity_names()) list += (list.empty() ? "" : ", ") + name;
     found.push_back("similarity = '" + options.name + "': must be one of " + list);
   }
-  if (options.bins < 2 || options.bins > kMaxHistogramBins)
-    found.push_back("bins = " + std::to_string(options.bins) + ": must be 2 ... " +
-                    std::to_string(kMaxHistogramBins));
+  const int fewest = options.has_smooth_histogram ? 4 : 2;
+  if (options.bins < fewest || options.bins > kMaxHistogramBins)
+    found.push_back("bins = " + std::to_string(options.bins) + ": must be " +
+                    std::to_string(fewest) + " ... " + std::to_string(kMaxHistogramBins));
+  if (!(options.residual_scale > 0.0) || !std::isfinite(options.residual_scale))
+    found.push_back("residual_scale = " + std::to_string(options.residual_scale) +
+                    ": must be positive");
+  if (options.tiles < 1 || options.tiles > 64)
+    found.push_back("tiles = " + std::to_string(options.tiles) + ": must be 1 ... 64");
   return found;
 }
 
 std::vector<std::string> similarity_names() {
-  return {"mi", "ncc"};
+  std::vector<std::string> names;
+  for (const KnownMeasure& measure : kMeasures) names.emplace_back(measure.name);
+  return names;
+}
+
+bool similarity_has_derivative(const std::string& name) {
+  const KnownMeasure* const measure = find_measure(name);
+  return measure != nullptr && measure->has_derivative;
+}
+
+bool similarity_has_normal_equations(const std::string& name) {
+  const KnownMeasure* const measure = find_measure(name);
+  return measure != nullptr && measure->has_normal_equations;
 }
 
 std::unique_ptr<SimilarityMeasure> make_similarity(const SimilarityOptions& options,
                                                    const SimilarityReference& reference) {
   throw_if_any(problems(options));
-  if (options.name == "ncc") return std::make_unique<CrossCorrelation>(reference);
-  return std::make_unique<MutualInformation>(reference, options.bins);
+  return find_measure(options.name)->make(options, reference);
 }
 
 }  // namespace af::registration

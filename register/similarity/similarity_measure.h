@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include <Eigen/Core>
+
 #include "image/image2d.h"
 
 namespace af::registration {
@@ -36,9 +38,23 @@ class SimilarityWorkspace {
   virtual ~SimilarityWorkspace() = default;
 };
 
+/// Values that belong to six pose parameters.
+using PoseVector = Eigen::Matrix<double, 6, 1>;
+using PoseMatrix = Eigen::Matrix<double, 6, 6>;
+
+/// A similarity near a pose, as Gauss and Newton see it: S(p + h) ~ value + gradient h - h' matrix
+/// h / 2 with the residuals taken as linear in h, so that `matrix` is positive semi-definite.
+struct NormalEquations {
+  double value = 0.0;
+  PoseVector gradient = PoseVector::Zero();
+  PoseMatrix matrix = PoseMatrix::Zero();
+
+  NormalEquations& operator+=(const NormalEquations& other);
+};
+
 /// Similarity of one view's DRR to its X-ray; higher is more alike. Holds all that can be computed
-/// from the X-ray beforehand. evaluate() is const and re-entrant with one workspace per thread; its
-/// value depends on nothing but its arguments. Several views are summed by MultiViewObjective
+/// from the X-ray beforehand. Calls are const and re-entrant with one workspace per thread; their
+/// values depend on nothing but their arguments. Several views are summed by MultiViewObjective
 /// (eq. (13)).
 class SimilarityMeasure {
  public:
@@ -47,18 +63,44 @@ class SimilarityMeasure {
   /// `drr`: total attenuation, row-major, as many pixels as the reference.
   [[nodiscard]] virtual double evaluate(std::span<const float> drr,
                                         SimilarityWorkspace& workspace) const = 0;
+
+  /// Whether evaluate_with_derivative() may be called.
+  [[nodiscard]] virtual bool has_derivative() const { return false; }
+  /// The value, and in `derivative` (as many pixels) its derivative by every DRR pixel. The value
+  /// is evaluate()'s up to rounding.
+  virtual double evaluate_with_derivative(std::span<const float> drr,
+                                          std::span<float> derivative,
+                                          SimilarityWorkspace& workspace) const;
+
+  /// Whether normal_equations() may be called: the measure is a sum of squared residuals.
+  [[nodiscard]] virtual bool has_normal_equations() const { return false; }
+  /// `planes`: derivatives of every DRR pixel by six parameters, six planes one after the other.
+  [[nodiscard]] virtual NormalEquations normal_equations(std::span<const float> drr,
+                                                         std::span<const float> planes,
+                                                         SimilarityWorkspace& workspace) const;
+
   [[nodiscard]] virtual std::unique_ptr<SimilarityWorkspace> make_workspace() const = 0;
 };
 
 struct SimilarityOptions {
   std::string name = "mi";
-  int bins = 64;  ///< per axis of the joint histogram (mi)
+  int bins = 64;  ///< per axis of the joint histogram (mi, nmi) or of the difference (entropy)
+  /// mi, nmi: DRR values are counted through cubic B-spline windows, which makes the measure
+  /// differentiable; optimisers that need derivatives set it.
+  bool has_smooth_histogram = false;
+  /// rg: residuals of this many times the typical X-ray gradient count half.
+  double residual_scale = 1.0;
+  int tiles = 4;  ///< tncc: tiles per axis
 };
 
 std::vector<std::string> problems(const SimilarityOptions& options);
 
 /// Names that make_similarity() knows.
 std::vector<std::string> similarity_names();
+
+/// What optimisers may ask of a measure, by its name.
+bool similarity_has_derivative(const std::string& name);
+bool similarity_has_normal_equations(const std::string& name);
 
 /// InputError when the options or the reference have problems.
 std::unique_ptr<SimilarityMeasure> make_similarity(const SimilarityOptions& options,

@@ -3,7 +3,11 @@ af_add_test(
   register_tests
   SOURCES unit/register/mutual_information_test.cpp
           unit/register/cross_correlation_test.cpp
+          unit/register/similarity_measures_test.cpp
           unit/register/best_neighbor_search_test.cpp
+          unit/register/optimizers_test.cpp
+          unit/register/stage_view_test.cpp
+          unit/register/method_options_test.cpp
           unit/register/parameter_scaling_test.cpp
           unit/register/multi_view_objective_test.cpp
           unit/register/registration_test.cpp

@@ -143,9 +143,9 @@ TEST_F(RegisterProgram, RefusesAFieldOfAnotherCtAndNamesBothHashes) {
 
 TEST_F(RegisterProgram, RefusesWhatDoesNotExist) {
   const std::string out = " -o " + path("refused");
-  expect_refused(run_register(fields() + " --similarity gc" + out), 2, "mi");
-  expect_refused(run_register(fields() + " --optimizer bobyqa" + out), 2, "best-neighbor");
-  expect_refused(run_register(fields() + " --preset fast" + out), 2, "paper");
+  expect_refused(run_register(fields() + " --similarity psnr" + out), 2, "mi");
+  expect_refused(run_register(fields() + " --optimizer newton" + out), 2, "best-neighbor");
+  expect_refused(run_register(fields() + " --preset swift" + out), 2, "paper");
   expect_refused(run_register(fields() + " --no-such-option" + out), 2, "no-such-option");
   expect_refused(run_register(fields()), 2, "--output");
   expect_refused(run_register(fields() + " --case nobody" + out), 3, "ellipsoids");

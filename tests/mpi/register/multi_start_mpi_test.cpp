@@ -24,7 +24,7 @@ std::vector<RigidTransform> some_starts(const test::SmallCase& small, int count)
 RegistrationOptions quick_options() {
   RegistrationOptions options;
   options.max_evaluations = 60;
-  options.similarity.bins = 24;
+  for (StageOptions& stage : options.chains.front().stages) stage.similarity.bins = 24;
   return options;
 }
 

@@ -9,23 +9,10 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "unit/register/function_target.h"
 
 namespace af::registration {
 namespace {
-
-class FunctionTarget final : public OptimizationTarget {
- public:
-  explicit FunctionTarget(std::function<std::optional<double>(const ScaledParameters&)> function)
-      : function_(std::move(function)) {}
-  std::optional<double> evaluate(const ScaledParameters& point) override {
-    points.push_back(point);
-    return function_(point);
-  }
-  std::vector<ScaledParameters> points;
-
- private:
-  std::function<std::optional<double>(const ScaledParameters&)> function_;
-};
 
 ScaledParameters optimum() {
   ScaledParameters point;
@@ -37,12 +24,13 @@ OptimizerResult search(OptimizationTarget& target,
                        const OptimizerOptions& options = {5.0, 0.5},
                        int max_evaluations = 100000) {
   OptimizerResult result;
-  BestNeighborSearch().maximize(target, options, max_evaluations, result);
+  BestNeighborSearch().maximize(target, options, {max_evaluations, 0}, result);
   return result;
 }
 
 TEST(BestNeighborSearch, FindsAQuadraticsMaximumToTheFinalStep) {
-  FunctionTarget target([](const ScaledParameters& p) { return -(p - optimum()).squaredNorm(); });
+  test::FunctionTarget target(
+      [](const ScaledParameters& p) { return -(p - optimum()).squaredNorm(); });
   const OptimizerOptions options{5.0, 0.1};
   const OptimizerResult result = search(target, options);
   EXPECT_EQ(result.stop_reason, StopReason::StepBelowFinal);
@@ -53,7 +41,8 @@ TEST(BestNeighborSearch, FindsAQuadraticsMaximumToTheFinalStep) {
 }
 
 TEST(BestNeighborSearch, CountsEveryEvaluation) {
-  FunctionTarget target([](const ScaledParameters& p) { return -(p - optimum()).squaredNorm(); });
+  test::FunctionTarget target(
+      [](const ScaledParameters& p) { return -(p - optimum()).squaredNorm(); });
   const OptimizerResult result = search(target);
   EXPECT_EQ(static_cast<std::size_t>(result.evaluations), target.points.size());
   // One for the start and twelve for each line of the trace.
@@ -62,7 +51,7 @@ TEST(BestNeighborSearch, CountsEveryEvaluation) {
 }
 
 TEST(BestNeighborSearch, HalvesTheStepDownToExactlyTheFinalOne) {
-  FunctionTarget target([](const ScaledParameters& p) { return -p.squaredNorm(); });
+  test::FunctionTarget target([](const ScaledParameters& p) { return -p.squaredNorm(); });
   const OptimizerResult result = search(target, {2.0, 0.1});
   const std::vector<double> expected = {2.0, 1.0, 0.5, 0.25, 0.125, 0.1};
   ASSERT_EQ(result.trace.size(), expected.size());
@@ -71,7 +60,7 @@ TEST(BestNeighborSearch, HalvesTheStepDownToExactlyTheFinalOne) {
 
 TEST(BestNeighborSearch, TakesTheFirstOfEquallyGoodNeighbours) {
   // All twelve neighbours of the start are equally good; their neighbours are worse.
-  FunctionTarget target([](const ScaledParameters& p) {
+  test::FunctionTarget target([](const ScaledParameters& p) {
     const double distance = p.norm();
     return -(distance - 5.0) * (distance - 5.0);
   });
@@ -82,7 +71,7 @@ TEST(BestNeighborSearch, TakesTheFirstOfEquallyGoodNeighbours) {
 }
 
 TEST(BestNeighborSearch, StaysWhenNoNeighbourIsStrictlyBetter) {
-  FunctionTarget target([](const ScaledParameters&) { return 1.0; });
+  test::FunctionTarget target([](const ScaledParameters&) { return 1.0; });
   const OptimizerResult result = search(target, {1.0, 1.0});
   EXPECT_EQ(result.point, ScaledParameters::Zero());
   EXPECT_EQ(result.stop_reason, StopReason::StepBelowFinal);
@@ -91,7 +80,7 @@ TEST(BestNeighborSearch, StaysWhenNoNeighbourIsStrictlyBetter) {
 
 TEST(BestNeighborSearch, PassesOverInadmissiblePointsAndReportsALimit) {
   // The optimum along tx lies at 7.9, the limit at 4.
-  FunctionTarget target([](const ScaledParameters& p) -> std::optional<double> {
+  test::FunctionTarget target([](const ScaledParameters& p) -> std::optional<double> {
     if (p[3] > 4.0) return std::nullopt;
     return -(p - optimum()).squaredNorm();
   });
@@ -103,7 +92,7 @@ TEST(BestNeighborSearch, PassesOverInadmissiblePointsAndReportsALimit) {
 }
 
 TEST(BestNeighborSearch, ReportsAnInadmissibleStartAfterOneEvaluation) {
-  FunctionTarget target([](const ScaledParameters&) { return std::optional<double>(); });
+  test::FunctionTarget target([](const ScaledParameters&) { return std::optional<double>(); });
   const OptimizerResult result = search(target);
   EXPECT_EQ(result.stop_reason, StopReason::StartInadmissible);
   EXPECT_EQ(result.evaluations, 1);
@@ -113,7 +102,8 @@ TEST(BestNeighborSearch, ReportsAnInadmissibleStartAfterOneEvaluation) {
 
 TEST(BestNeighborSearch, NeverExceedsItsBudgetAndKeepsTheBestSeen) {
   for (const int budget : {1, 2, 12, 13, 14, 40}) {
-    FunctionTarget target([](const ScaledParameters& p) { return -(p - optimum()).squaredNorm(); });
+    test::FunctionTarget target(
+        [](const ScaledParameters& p) { return -(p - optimum()).squaredNorm(); });
     const OptimizerResult result = search(target, {5.0, 0.1}, budget);
     EXPECT_EQ(result.stop_reason, StopReason::EvaluationBudgetSpent) << budget;
     EXPECT_EQ(result.evaluations, budget);
@@ -125,7 +115,7 @@ TEST(BestNeighborSearch, NeverExceedsItsBudgetAndKeepsTheBestSeen) {
 }
 
 TEST(BestNeighborSearch, StopsAtANonFiniteValue) {
-  FunctionTarget target([](const ScaledParameters& p) {
+  test::FunctionTarget target([](const ScaledParameters& p) {
     return p[4] > 0.0 ? std::numeric_limits<double>::quiet_NaN() : -p.squaredNorm();
   });
   const OptimizerResult result = search(target);
@@ -143,10 +133,12 @@ TEST(OptimizerOptions, NamesStepsThatCannotBe) {
 
 TEST(Optimizer, AnUnknownNameIsRefusedWithTheKnownOnes) {
   try {
-    make_optimizer("gradient");
+    make_optimizer("newton");
     FAIL() << "must throw";
   } catch (const InputError& error) {
-    EXPECT_STREQ(error.what(), "optimizer = 'gradient': must be one of best-neighbor");
+    EXPECT_STREQ(error.what(),
+                 "optimizer = 'newton': must be one of best-neighbor, gauss-newton, gradient, "
+                 "bobyqa, nelder-mead, cma-es");
   }
 }
 

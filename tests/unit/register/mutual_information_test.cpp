@@ -206,11 +206,13 @@ TEST(MutualInformation, RefusesAnEmptyMaskAConstantXrayAndAnEmptyDrrRange) {
 
 TEST(SimilarityOptions, AnUnknownMeasureIsRefusedWithTheKnownOnes) {
   SimilarityOptions options;
-  options.name = "nmi";
+  options.name = "psnr";
   options.bins = 1;
   const std::vector<std::string> found = problems(options);
   ASSERT_EQ(found.size(), 2U);
-  EXPECT_EQ(found[0], "similarity = 'nmi': must be one of mi, ncc");
+  EXPECT_EQ(
+      found[0],
+      "similarity = 'psnr': must be one of mi, nmi, ncc, tncc, gc, gd, rg, pi, entropy, ssd, go");
   EXPECT_EQ(found[1], "bins = 1: must be 2 ... 256");
   EXPECT_THROW(make_similarity(options, {}), InputError);
 }

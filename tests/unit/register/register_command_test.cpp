@@ -36,24 +36,6 @@ TEST(RegisterOptions, ListsEveryBrokenConstraint) {
   EXPECT_TRUE(problems(RegisterOptions()).empty());
 }
 
-TEST(RegisterOptions, ReplaceWhatThePresetSays) {
-  RegisterOptions options;
-  options.similarity = "ncc";
-  options.smoothing_sigma_mm = 2.5;
-  options.max_evaluations = 77;
-  const RegistrationOptions method = registration_options(options);
-  EXPECT_EQ(method.similarity.name, "ncc");
-  EXPECT_EQ(method.passes[0].smoothing_sigma_mm, 2.5);
-  EXPECT_EQ(method.passes[1].smoothing_sigma_mm, 0.0);
-  EXPECT_EQ(method.max_evaluations, 77);
-  EXPECT_EQ(method.optimizer, "best-neighbor");
-  options.bins = 1;
-  EXPECT_THROW(registration_options(options), InputError);
-  options.bins = 64;
-  options.preset = "fast";
-  EXPECT_THROW(registration_options(options), InputError);
-}
-
 TEST(RegisterOptions, FieldsAreSplitAtTheFirstEqualsSign) {
   RegisterOptions options;
   options.fields = {"A=x=y.h5"};

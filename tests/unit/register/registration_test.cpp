@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "register/pose_target.h"
 #include "unit/register/registration_cases.h"
 
 namespace af::registration {
@@ -35,13 +36,18 @@ RigidTransform start_near(const test::SmallCase& small) {
                               PoseParameters::from_deg_and_mm({-3.0, 2.0, 2.5, -3.0, 2.5, 2.0}));
 }
 
+void use_bins(int bins, RegistrationOptions& options) {
+  for (ChainOptions& chain : options.chains)
+    for (StageOptions& stage : chain.stages) stage.similarity.bins = bins;
+}
+
 TEST(Registration, TwoViewsRecoverAKnownPose) {
   const test::SmallCase small = test::small_case();
   for (const char* similarity : {"mi", "ncc"}) {
     RegistrationOptions options;
-    options.similarity.name = similarity;
+    options.use_similarity(similarity);
     // 1296 pixels per view are few for 64 x 64 bins.
-    options.similarity.bins = 24;
+    use_bins(24, options);
     RegistrationRunner runner(small.problem, options);
     const RigidTransform start = start_near(small);
     ASSERT_GT(mean_distance_mm(start, small.gold_room_from_ct), 4.0);
@@ -134,7 +140,7 @@ TEST(Registration, ACtFarFromTheRegionsIsReported) {
 TEST(Registration, AMaskedSpotDoesNotMoveTheResult) {
   test::SmallCase small = test::small_case();
   RegistrationOptions options;
-  options.similarity.bins = 24;
+  use_bins(24, options);
   for (RegistrationView& view : small.problem->views) {
     view.mask = Image2d(48, 48);
     std::fill(view.mask.pixels.begin(), view.mask.pixels.end(), 1.0f);
@@ -170,15 +176,172 @@ TEST(RegistrationProblem, NamesEverythingThatIsWrong) {
 
 TEST(RegistrationOptions, NamesEverythingThatIsWrong) {
   RegistrationOptions options;
-  options.similarity.name = "gc";
-  options.optimizer = "bobyqa";
-  options.passes[0].smoothing_sigma_mm = std::numeric_limits<double>::quiet_NaN();
-  options.passes[1].optimizer.final_step_mm = 0.0;
+  StageOptions& first = options.chains[0].stages[0];
+  StageOptions& second = options.chains[0].stages[1];
+  first.similarity.name = "unheard-of";
+  first.smoothing_sigma_mm = std::numeric_limits<double>::quiet_NaN();
+  first.level = -1;
+  second.optimizer = "unheard-of";
+  second.search.final_step_mm = 0.0;
   options.max_evaluations = 0;
-  EXPECT_EQ(problems(options).size(), 5U);
-  EXPECT_TRUE(problems(RegistrationOptions()).empty());
-  EXPECT_TRUE(problems(preset_options("paper")).empty());
-  EXPECT_THROW(preset_options("fast"), InputError);
+  EXPECT_EQ(problems(options).size(), 6U);
+  for (const std::string& name : preset_names())
+    EXPECT_TRUE(problems(preset_options(name)).empty()) << name;
+  EXPECT_THROW(preset_options("unheard-of"), InputError);
+}
+
+TEST(RegistrationOptions, RefuseAnOptimizerThatItsMeasureCannotServe) {
+  RegistrationOptions options;
+  options.use_optimizer("gauss-newton");
+  options.use_similarity("mi");
+  EXPECT_EQ(problems(options).size(), 2U);
+  options.use_similarity("ncc");
+  EXPECT_TRUE(problems(options).empty());
+  options.use_optimizer("gradient");
+  options.use_similarity("pi");
+  EXPECT_EQ(problems(options).size(), 2U);
+  options.use_similarity("mi");
+  EXPECT_TRUE(problems(options).empty());
+}
+
+/// Two stages of one measure and optimiser that suit the small case.
+RegistrationOptions two_stages(const std::string& similarity, const std::string& optimizer) {
+  RegistrationOptions options;
+  options.use_similarity(similarity);
+  options.use_optimizer(optimizer);
+  use_bins(24, options);
+  for (StageOptions& stage : options.chains[0].stages) stage.smoothing_sigma_mm = 0.0;
+  options.chains[0].stages[0].search.initial_step_mm = 3.0;
+  return options;
+}
+
+TEST(Registration, EveryOptimizerRecoversAKnownPose) {
+  const test::SmallCase small = test::small_case();
+  const std::vector<std::pair<std::string, std::string>> methods = {{"gauss-newton", "ncc"},
+                                                                    {"gauss-newton", "gc"},
+                                                                    {"gauss-newton", "rg"},
+                                                                    {"gauss-newton", "tncc"},
+                                                                    {"gauss-newton", "ssd"},
+                                                                    {"gradient", "mi"},
+                                                                    {"gradient", "ncc"},
+                                                                    {"bobyqa", "ncc"},
+                                                                    {"nelder-mead", "ncc"},
+                                                                    {"cma-es", "ncc"}};
+  for (const auto& [optimizer, similarity] : methods) {
+    RegistrationRunner runner(small.problem, two_stages(similarity, optimizer));
+    const RegistrationResult result = runner.run(start_near(small));
+    EXPECT_EQ(result.stop_reason, StopReason::StepBelowFinal) << optimizer << ' ' << similarity;
+    EXPECT_LT(mean_distance_mm(result.room_from_ct, small.gold_room_from_ct), kFinalStepErrorMm)
+        << optimizer << ' ' << similarity;
+    EXPECT_EQ(result.similarity, result.trace.back().similarity);
+  }
+}
+
+TEST(Registration, EveryMeasureIsBestNearTheKnownPose) {
+  const test::SmallCase small = test::small_case();
+  for (const std::string& similarity : similarity_names()) {
+    RegistrationOptions options = two_stages(similarity, "best-neighbor");
+    RegistrationRunner runner(small.problem, options);
+    const double at_gold = runner.similarity_at(small.gold_room_from_ct).similarity;
+    EXPECT_GT(at_gold, runner.similarity_at(start_near(small)).similarity) << similarity;
+    const RegistrationResult result = runner.run(start_near(small));
+    EXPECT_LT(mean_distance_mm(result.room_from_ct, small.gold_room_from_ct),
+              0.5 * mean_distance_mm(start_near(small), small.gold_room_from_ct))
+        << similarity;
+  }
+}
+
+TEST(Registration, DrawnSearchesDependOnSeedAndStartIndexAlone) {
+  const test::SmallCase small = test::small_case();
+  RegistrationOptions options = two_stages("ncc", "cma-es");
+  options.max_evaluations = 120;
+  RegistrationRunner runner(small.problem, options);
+  const RegistrationResult first = runner.run(start_near(small), 3);
+  (void)runner.run(start_near(small), 4);
+  EXPECT_EQ(runner.run(start_near(small), 3).room_from_ct.matrix(), first.room_from_ct.matrix());
+  EXPECT_NE(runner.run(start_near(small), 4).room_from_ct.matrix(), first.room_from_ct.matrix());
+  options.seed = 2;
+  RegistrationRunner other(small.problem, options);
+  EXPECT_NE(other.run(start_near(small), 3).room_from_ct.matrix(), first.room_from_ct.matrix());
+}
+
+TEST(Registration, APortfolioTakesTheChainThatItsJudgePrefers) {
+  const test::SmallCase small = test::small_case();
+  RegistrationOptions good = two_stages("ncc", "gauss-newton");
+  ChainOptions idle = good.chains[0];
+  idle.name = "idle";
+  // Steps so small that it ends where it began.
+  for (StageOptions& stage : idle.stages) stage.search = {1e-6, 1e-6, 16};
+  good.chains[0].name = "good";
+  RegistrationOptions options = good;
+  options.chains = {idle, good.chains[0], idle};
+  options.judge.stage.similarity.name = "rg";
+  RegistrationRunner runner(small.problem, options);
+  const RegistrationResult result = runner.run(start_near(small));
+  EXPECT_EQ(result.chain, "good");
+  EXPECT_LT(mean_distance_mm(result.room_from_ct, small.gold_room_from_ct), kFinalStepErrorMm);
+  EXPECT_EQ(result.similarity, runner.similarity_at(result.room_from_ct).similarity);
+  // An end that is good enough ends the portfolio; one that explains nothing is said to.
+  options.judge.enough_value = -1.0;
+  EXPECT_EQ(RegistrationRunner(small.problem, options).run(start_near(small)).chain, "idle");
+  options.judge.least_value = 2.0;
+  EXPECT_EQ(RegistrationRunner(small.problem, options).run(start_near(small)).stop_reason,
+            StopReason::NoBetterThanNoDrr);
+}
+
+TEST(Registration, AStageOfAMissingLevelIsRefused) {
+  const test::SmallCase small = test::small_case();
+  EXPECT_THROW(RegistrationRunner(small.problem, preset_options("fast")), InputError);
+}
+
+TEST(Registration, GaussNewtonStaysInsideTheMotionRange) {
+  const test::SmallCase small = test::small_case();
+  const MotionLimit limit{small.problem->frame(), {5.0 * kRadPerDeg, 1.5}};
+  for (RegistrationView& view : small.problem->views) view.limit = limit;
+  RegistrationRunner runner(small.problem, two_stages("ncc", "gauss-newton"));
+  const RegistrationResult result = runner.run(small.problem->nominal_room_from_ct);
+  const PoseParameters end = parameters_from_pose(limit.frame, result.room_from_ct);
+  EXPECT_TRUE(limit.range.contains(end));
+  // The gold pose is at 2.5 mm along x: the search goes to the wall and along it.
+  EXPECT_NEAR(end.translation_mm.x(), 1.5, 1e-3);
+}
+
+TEST(PoseTarget, DerivativesAreThoseOfItsValue) {
+  const test::SmallCase small = test::small_case();
+  for (const char* similarity : {"ncc", "gc", "rg", "ssd", "tncc"}) {
+    RegistrationRunner runner(small.problem, two_stages(similarity, "gauss-newton"));
+    const RegistrationProblem& problem = runner.problem();
+    std::vector<ObjectiveView> views;
+    for (const RegistrationView& view : problem.views) {
+      SimilarityReference reference{crop(view.xray, view.view.roi), {}, {0.0, 5.0}};
+      SimilarityOptions options;
+      options.name = similarity;
+      views.push_back(
+          {view.view, view.renderer, make_similarity(options, reference), std::nullopt});
+    }
+    MultiViewObjective objective(views);
+    ParameterScaling scaling;
+    scaling.displacement_mm << 40.0, 30.0, 20.0, 1.0, 0.8, 1.2;
+    PoseTarget target(
+        objective, PoseFrame::about(start_near(small), problem.center_ct_mm), scaling);
+    ScaledParameters point;
+    point << 1.0, -0.7, 0.5, 0.3, -0.2, 0.4;
+    const auto with = target.evaluate_with(point, Derivatives::NormalEquations);
+    ASSERT_TRUE(with.has_value());
+    for (int k = 0; k < 6; ++k) {
+      // The renderer's own derivatives are differences over 1e-3 rad and 0.1 mm.
+      const double step = 0.05;
+      ScaledParameters up = point;
+      ScaledParameters down = point;
+      up[k] += step;
+      down[k] -= step;
+      const double slope = (*target.evaluate(up) - *target.evaluate(down)) / (2.0 * step);
+      // Kinks of ray-cast DRRs and differences of second order: a few percent of the largest slope.
+      constexpr double kSlopeShare = 0.05;
+      EXPECT_NEAR(with->gradient[k], slope, kSlopeShare * with->gradient.cwiseAbs().maxCoeff())
+          << similarity << ' ' << k;
+    }
+  }
 }
 
 }  // namespace

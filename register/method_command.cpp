@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "register/method_command.h"
+
+#include "register/presets.h"
+
+namespace af::registration {
+
+void bind_method(CLI::App& app, MethodOptions& options) {
+  const char* const group = "Method";
+  app.add_option("--preset",
+                 options.preset,
+                 "Method as a whole; the options below replace parts of it. " + preset_help())
+      ->check(CLI::IsMember(preset_names()))
+      ->capture_default_str()
+      ->group(group);
+  app.add_option("--similarity", options.similarity, "Similarity measure of every stage")
+      ->check(CLI::IsMember(similarity_names()))
+      ->group(group);
+  app.add_option("--optimizer", options.optimizer, "Optimiser of every stage")
+      ->check(CLI::IsMember(optimizer_names()))
+      ->group(group);
+  app.add_option("--chain",
+                 options.chains,
+                 "Stages in place of the preset's, separated by ';': measure, optimiser, then any "
+                 "of level=, pixels=, roi=, sigma=, step=, final=, bins=, scale=, tiles=, "
+                 "population=. Given several times, the chains are a portfolio")
+      ->take_all()
+      ->group(group);
+  app.add_option("--bins", options.bins, "Histogram bins per axis, 2 to 256 (default: 64)")
+      ->group(group);
+  app.add_option("--smoothing-sigma-mm",
+                 options.smoothing_sigma_mm,
+                 "First stage: Gaussian on the X-rays, mm on the isocentre plane (paper: 1)")
+      ->group(group);
+  app.add_option("--coarse-roi-scale",
+                 options.coarse_roi_scale,
+                 "Coarse stages look at this many times the region's sides (fast, robust: 2); "
+                 "never beyond the detector")
+      ->group(group);
+  app.add_option("--max-evaluations",
+                 options.max_evaluations,
+                 "Most poses tried per registration (default: 5000)")
+      ->group(group);
+}
+
+}  // namespace af::registration

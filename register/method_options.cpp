@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "register/method_options.h"
+
+#include <sstream>
+
+#include "base/error.h"
+#include "register/chain_text.h"
+#include "register/presets.h"
+
+namespace af::registration {
+namespace {
+
+void replace_in_stages(const MethodOptions& options, RegistrationOptions& result) {
+  if (options.similarity.has_value()) result.use_similarity(*options.similarity);
+  if (options.optimizer.has_value()) result.use_optimizer(*options.optimizer);
+  for (ChainOptions& chain : result.chains) {
+    if (options.smoothing_sigma_mm.has_value() && !chain.stages.empty())
+      chain.stages.front().smoothing_sigma_mm = *options.smoothing_sigma_mm;
+    for (StageOptions& stage : chain.stages) {
+      if (options.bins.has_value()) stage.similarity.bins = *options.bins;
+      if (options.coarse_roi_scale.has_value() && stage.roi_scale > 1.0)
+        stage.roi_scale = *options.coarse_roi_scale;
+    }
+  }
+}
+
+}  // namespace
+
+RegistrationOptions resolve(const MethodOptions& options) {
+  RegistrationOptions result = preset_options(options.preset);
+  if (!options.chains.empty()) result.chains.clear();
+  for (const std::string& text : options.chains)
+    result.chains.push_back(
+        chain_from_text("chain-" + std::to_string(result.chains.size() + 1), text));
+  replace_in_stages(options, result);
+  if (options.max_evaluations.has_value()) result.max_evaluations = *options.max_evaluations;
+  result.seed = options.seed;
+  throw_if_any(problems(result));
+  return result;
+}
+
+std::string to_toml(const MethodOptions& options, const RegistrationOptions& resolved) {
+  std::ostringstream out;
+  out << "preset = \"" << options.preset << "\"\nmax_evaluations = " << resolved.max_evaluations
+      << "\nseed = " << resolved.seed << "\nchain = [";
+  for (const ChainOptions& chain : resolved.chains) out << "\n  \"" << chain_text(chain) << "\",";
+  out << "\n]\n";
+  if (resolved.chains.size() > 1)
+    out << "judge = \"" << stage_text(resolved.judge.stage)
+        << "\"\njudge_least_value = " << resolved.judge.least_value
+        << "\njudge_enough_value = " << resolved.judge.enough_value << '\n';
+  return out.str();
+}
+
+}  // namespace af::registration

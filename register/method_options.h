@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "register/registration_options.h"
+
+namespace af::registration {
+
+/// How to register, as typed: a preset, and what replaces parts of it.
+struct MethodOptions {
+  std::string preset = "paper";
+  std::vector<std::string> chains;           ///< chain_from_text(): replace the preset's chains
+  std::optional<std::string> similarity;     ///< of every stage
+  std::optional<std::string> optimizer;      ///< of every stage
+  std::optional<int> bins;                   ///< of every stage
+  std::optional<double> smoothing_sigma_mm;  ///< of each chain's first stage
+  std::optional<double> coarse_roi_scale;    ///< of stages that look beyond the region
+  std::optional<int> max_evaluations;
+  std::uint64_t seed = 1;
+};
+
+/// The preset with the replacements; InputError for unknown names and values out of range.
+RegistrationOptions resolve(const MethodOptions& options);
+
+/// Lines of the options in force: preset, budget, seed, and every chain as text.
+std::string to_toml(const MethodOptions& options, const RegistrationOptions& resolved);
+
+}  // namespace af::registration

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "register/optimizer/nlopt_search.h"
+
+#include <algorithm>
+#include <exception>
+#include <nlopt.h>
+
+#include "base/error.h"
+#include "register/optimizer/search_run.h"
+
+namespace af::registration {
+namespace {
+
+struct OptimizerDeleter {
+  void operator()(nlopt_opt optimizer) const { nlopt_destroy(optimizer); }
+};
+using OptimizerHandle = std::unique_ptr<nlopt_opt_s, OptimizerDeleter>;
+
+/// What NLopt's callback works on. Exceptions wait here: they must not cross C code.
+struct Callback {
+  SearchRun& run;
+  nlopt_opt optimizer;
+  double worst_value;
+  bool met_limit = false;  ///< by the latest point
+  bool has_ended = false;
+  std::exception_ptr failure;
+};
+
+double value_for_nlopt(unsigned /*count*/, const double* x, double* /*gradient*/, void* data) {
+  auto& callback = *static_cast<Callback*>(data);
+  try {
+    const ScaledParameters point = Eigen::Map<const ScaledParameters>(x);
+    const SearchRun::Evaluation evaluation = callback.run.evaluate(point);
+    callback.met_limit = evaluation.outcome == SearchRun::Outcome::Inadmissible;
+    if (evaluation.outcome == SearchRun::Outcome::Value) {
+      const double value = evaluation.target.value;
+      callback.worst_value = std::min(callback.worst_value, value);
+      if (value > callback.run.result().value) {
+        callback.run.accept(point, value);
+        callback.run.trace(0.0);
+      }
+      return value;
+    }
+    if (!callback.met_limit) {
+      callback.has_ended = true;
+      nlopt_force_stop(callback.optimizer);
+    }
+  } catch (...) {
+    callback.failure = std::current_exception();
+    nlopt_force_stop(callback.optimizer);
+  }
+  // Finite, so that BOBYQA's models stay defined, and less than any admissible value so far.
+  const double best = callback.run.result().value;
+  return callback.worst_value - 0.1 * (best - callback.worst_value);
+}
+
+void require_success(nlopt_result code, const char* what) {
+  check(code >= 0, what);
+}
+
+}  // namespace
+
+void NloptSearch::maximize(OptimizationTarget& target,
+                           const OptimizerOptions& options,
+                           const SearchBudget& budget,
+                           OptimizerResult& result) const {
+  SearchRun run(target, budget, result);
+  if (!run.begin(Derivatives::None)) return;
+  const OptimizerHandle optimizer(nlopt_create(
+      algorithm_ == NloptAlgorithm::Bobyqa ? NLOPT_LN_BOBYQA : NLOPT_LN_NELDERMEAD, 6));
+  check(optimizer != nullptr, "NLopt gives an optimiser");
+  Callback callback{run, optimizer.get(), result.value, false, false, nullptr};
+  require_success(nlopt_set_max_objective(optimizer.get(), value_for_nlopt, &callback),
+                  "NLopt takes an objective");
+  require_success(nlopt_set_initial_step1(optimizer.get(), options.initial_step_mm),
+                  "NLopt takes a first step");
+  require_success(nlopt_set_xtol_abs1(optimizer.get(), options.final_step_mm),
+                  "NLopt takes a final step");
+  ScaledParameters point = ScaledParameters::Zero();
+  double value = 0.0;
+  // Its verdict does not matter beyond what the callback saw: BOBYQA calls steps that rounding
+  // stopped a failure, too.
+  nlopt_optimize(optimizer.get(), point.data(), &value);
+  if (callback.failure) std::rethrow_exception(callback.failure);
+  run.trace(options.final_step_mm);
+  if (!callback.has_ended) run.converge(callback.met_limit);
+}
+
+}  // namespace af::registration

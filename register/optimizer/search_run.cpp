@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "register/optimizer/search_run.h"
+
+#include <cmath>
+#include <limits>
+
+namespace af::registration {
+
+SearchRun::SearchRun(OptimizationTarget& target,
+                     const SearchBudget& budget,
+                     OptimizerResult& result)
+    : target_(target), budget_(budget), result_(result) {
+  result_.point.setZero();
+  result_.value = std::numeric_limits<double>::quiet_NaN();
+  result_.evaluations = 0;
+  result_.inadmissible = 0;
+  result_.stop_reason = StopReason::StepBelowFinal;
+  result_.trace.clear();
+}
+
+std::optional<TargetValue> SearchRun::begin(Derivatives derivatives) {
+  const Evaluation start = evaluate(ScaledParameters::Zero(), derivatives);
+  if (start.outcome == Outcome::Inadmissible) result_.stop_reason = StopReason::StartInadmissible;
+  if (start.outcome != Outcome::Value) return std::nullopt;
+  result_.value = start.target.value;
+  return start.target;
+}
+
+SearchRun::Evaluation SearchRun::evaluate(const ScaledParameters& point, Derivatives derivatives) {
+  if (result_.evaluations >= budget_.max_evaluations) {
+    result_.stop_reason = StopReason::EvaluationBudgetSpent;
+    return {};
+  }
+  ++result_.evaluations;
+  std::optional<TargetValue> found;
+  if (derivatives == Derivatives::None) {
+    if (const std::optional<double> value = target_.evaluate(point); value.has_value())
+      found = TargetValue{*value, ScaledParameters::Zero(), ScaledMatrix::Zero()};
+  } else {
+    found = target_.evaluate_with(point, derivatives);
+  }
+  if (!found.has_value()) {
+    ++result_.inadmissible;
+    return {Outcome::Inadmissible, {}};
+  }
+  if (!std::isfinite(found->value) || !found->gradient.allFinite()) {
+    // A start without a finite value still says what it was.
+    if (result_.evaluations == 1) result_.value = found->value;
+    result_.stop_reason = StopReason::NonFiniteSimilarity;
+    return {};
+  }
+  return {Outcome::Value, *found};
+}
+
+void SearchRun::accept(const ScaledParameters& point, double value) {
+  result_.point = point;
+  result_.value = value;
+}
+
+void SearchRun::offer(const ScaledParameters& point, double value) {
+  if (value > result_.value) accept(point, value);
+}
+
+void SearchRun::trace(double step_mm) {
+  result_.trace.push_back({step_mm, result_.value, result_.evaluations, result_.point});
+}
+
+void SearchRun::converge(bool met_limit) {
+  result_.stop_reason = met_limit ? StopReason::PinnedAtLimit : StopReason::StepBelowFinal;
+}
+
+}  // namespace af::registration

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "register/optimizer/optimizer.h"
+#include "register/similarity/similarity_measure.h"
+
+namespace af::registration {
+
+/// Coarsest level of an image pyramid.
+inline constexpr int kCoarsestLevel = 3;
+
+/// One stage of a chain: what is compared, how finely, and how it is searched.
+struct StageOptions {
+  /// Of the pyramid: nodes of the field 2^level as far apart, X-rays blurred to match.
+  int level = 0;
+  int pixel_step = 1;               ///< detector pixels per stage pixel, along each axis
+  double roi_scale = 1.0;           ///< sides of the region over those of the study's
+  double smoothing_sigma_mm = 0.0;  ///< Gaussian on the X-rays (not on the DRRs), in mm on the
+                                    ///< isocentre plane, besides the level's
+  SimilarityOptions similarity;
+  std::string optimizer = "best-neighbor";
+  OptimizerOptions search;  ///< steps in mm of mean projected motion
+};
+
+std::vector<std::string> problems(const StageOptions& stage);
+
+/// Stages from coarse to fine, each starting where the one before ended.
+struct ChainOptions {
+  std::string name;
+  std::vector<StageOptions> stages;
+};
+
+/// How a portfolio chooses among the ends of its chains: by the value of a measure that is 0 for
+/// what no DRR at all explains (rg).
+struct JudgeOptions {
+  StageOptions stage;         ///< its optimiser is not used
+  double least_value = 0.0;   ///< mean over views; ends at or below are no better than no DRR
+  double enough_value = 1.0;  ///< mean over views; an end at or above ends the portfolio
+};
+
+/// How to register: one chain, or a portfolio of several from the same start.
+struct RegistrationOptions {
+  std::vector<ChainOptions> chains;
+  JudgeOptions judge;          ///< of a portfolio; not used with one chain
+  int max_evaluations = 5000;  ///< pose evaluations per registration, all chains together
+  std::uint64_t seed = 1;      ///< of optimisers that draw random numbers
+
+  /// The paper's method.
+  RegistrationOptions();
+
+  /// Replaces the measure, or the optimiser, of every stage.
+  void use_similarity(const std::string& name);
+  void use_optimizer(const std::string& name);
+  /// Names of the measures, or of the optimisers, in the order of stages, each once: "ncc, gc".
+  [[nodiscard]] std::string similarity_list() const;
+  [[nodiscard]] std::string optimizer_list() const;
+  /// The measure that results' similarities are values of.
+  [[nodiscard]] std::string final_similarity() const;
+  /// Highest level of any stage.
+  [[nodiscard]] int coarsest_level() const;
+};
+
+std::vector<std::string> problems(const RegistrationOptions& options);
+
+}  // namespace af::registration

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "register/similarity/similarity_measure.h"
+
+namespace af::registration {
+
+/// Scratch memory of the measures that work on a difference image.
+class DifferenceWorkspace final : public SimilarityWorkspace {
+ public:
+  std::vector<float> difference;
+  std::vector<std::uint32_t> counts;
+};
+
+/// x - a d - b over the used pixels, with the gain a >= 0 and the offset b of least squares (Penney
+/// et al., IEEE TMI 17(4), 1998, search the gain).
+class DifferenceImage {
+ public:
+  /// InputError when the reference has problems.
+  explicit DifferenceImage(const SimilarityReference& reference);
+
+  /// Fills workspace.difference; unused pixels are 0. False when the DRR is not finite.
+  bool take(std::span<const float> drr, DifferenceWorkspace& workspace) const;
+
+  [[nodiscard]] const std::vector<float>& weights() const { return weights_; }
+  [[nodiscard]] double used_pixels() const { return used_pixels_; }
+  [[nodiscard]] double xray_range() const { return xray_range_; }
+
+ private:
+  std::vector<float> centered_xray_;  ///< 0 where unused
+  std::vector<float> weights_;
+  double used_pixels_ = 0.0;
+  double xray_range_ = 0.0;
+  double drr_offset_ = 0.0;
+};
+
+}  // namespace af::registration

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "register/similarity/gradient_images.h"
+
+namespace af::registration {
+
+/// Robust gradient residuals: how much of the X-ray's gradients a DRR explains, judged by a cost
+/// that saturates (Geman and McClure; as an M-estimator in Black and Rangarajan, IJCV 19(1), 1996),
+///
+///     RG = 1 - sum rho(x_i - a d_i) / sum rho(x_i),   rho(r) = r^2 / (s^2 + r^2),
+///
+/// over Sobel's derivatives along columns and rows at the used pixels. The gain a >= 0 of the view
+/// is eliminated: from least squares, refined by a fixed number of reweighted steps. 1 is a
+/// perfect DRR, 0 what no DRR at all explains (a = 0), and what occluders, which a DRR cannot know,
+/// contribute is bounded. s = `residual_scale` times the median length of the X-ray's gradients.
+/// \test RobustGradient.OccludersCostABoundedPrice
+class RobustGradient final : public SimilarityMeasure {
+ public:
+  /// InputError as GradientReference, or when most of the X-ray has no gradient.
+  RobustGradient(const SimilarityReference& reference, double residual_scale);
+
+  [[nodiscard]] double evaluate(std::span<const float> drr,
+                                SimilarityWorkspace& workspace) const override;
+  [[nodiscard]] bool has_derivative() const override { return true; }
+  double evaluate_with_derivative(std::span<const float> drr,
+                                  std::span<float> derivative,
+                                  SimilarityWorkspace& workspace) const override;
+  [[nodiscard]] bool has_normal_equations() const override { return true; }
+  [[nodiscard]] NormalEquations normal_equations(std::span<const float> drr,
+                                                 std::span<const float> planes,
+                                                 SimilarityWorkspace& workspace) const override;
+  [[nodiscard]] std::unique_ptr<SimilarityWorkspace> make_workspace() const override;
+
+ private:
+  [[nodiscard]] RobustSums sums_at(const GradientPair& drr, double gain) const;
+  [[nodiscard]] double gain_of(const GradientPair& drr) const;
+  /// Fills workspace.pixel_weights with the weights of one direction.
+  void take_weights(int direction, double gain, GradientWorkspace& workspace) const;
+
+  GradientReference reference_;
+  double squared_scale_ = 0.0;
+  double cost_without_drr_ = 0.0;
+};
+
+}  // namespace af::registration

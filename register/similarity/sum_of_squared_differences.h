@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "register/similarity/similarity_measure.h"
+
+namespace af::registration {
+
+/// Sum of squared differences as a similarity (Hill et al., Phys. Med. Biol. 46(3), 2001, Sec.
+/// 4.2.2): the negative mean over the n used pixels, best value 0,
+///
+///     SSD = -1/n sum (x - d)^2.
+///
+/// It asks for equal scales: only for X-rays that are line integrals of the same attenuation.
+/// \test SumOfSquaredDifferences.OfAShiftedImageIsMinusTheSquaredShift
+class SumOfSquaredDifferences final : public SimilarityMeasure {
+ public:
+  /// InputError when the reference has problems.
+  explicit SumOfSquaredDifferences(const SimilarityReference& reference);
+
+  [[nodiscard]] double evaluate(std::span<const float> drr,
+                                SimilarityWorkspace& workspace) const override;
+  [[nodiscard]] bool has_derivative() const override { return true; }
+  double evaluate_with_derivative(std::span<const float> drr,
+                                  std::span<float> derivative,
+                                  SimilarityWorkspace& workspace) const override;
+  [[nodiscard]] bool has_normal_equations() const override { return true; }
+  [[nodiscard]] NormalEquations normal_equations(std::span<const float> drr,
+                                                 std::span<const float> planes,
+                                                 SimilarityWorkspace& workspace) const override;
+  [[nodiscard]] std::unique_ptr<SimilarityWorkspace> make_workspace() const override;
+
+ private:
+  std::vector<float> xray_;     ///< 0 where unused
+  std::vector<float> weights_;  ///< 1 where used, 0 elsewhere
+  double used_pixels_ = 0.0;
+};
+
+}  // namespace af::registration

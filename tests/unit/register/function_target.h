@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "register/optimizer/optimizer.h"
+
+namespace af::test {
+
+/// A function as an optimiser's target; it keeps every point asked for.
+class FunctionTarget final : public registration::OptimizationTarget {
+ public:
+  using Value = std::function<std::optional<double>(const registration::ScaledParameters&)>;
+  using Equations = std::function<registration::TargetValue(const registration::ScaledParameters&)>;
+
+  explicit FunctionTarget(Value value, Equations equations = {})
+      : value_(std::move(value)), equations_(std::move(equations)) {}
+
+  std::optional<double> evaluate(const registration::ScaledParameters& point) override {
+    points.push_back(point);
+    return value_(point);
+  }
+  std::optional<registration::TargetValue> evaluate_with(
+      const registration::ScaledParameters& point,
+      registration::Derivatives /*derivatives*/) override {
+    const std::optional<double> value = evaluate(point);
+    if (!value.has_value()) return std::nullopt;
+    registration::TargetValue result = equations_(point);
+    result.value = *value;
+    return result;
+  }
+
+  std::vector<registration::ScaledParameters> points;
+
+ private:
+  Value value_;
+  Equations equations_;
+};
+
+}  // namespace af::test
