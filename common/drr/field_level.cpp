@@ -162,7 +162,9 @@ void decode_slab(const CompressedAttenuationField& field,
             field.light_slab, 2 * a + i / 2, 2 * b + i % 2, to.samples_per_viewpoint(), samples);
         if (targets[at] != nullptr) decoded[at] = planes[at].stored();
       }
-      const auto uv_tile = static_cast<std::size_t>(a * field.tiles_v() + b);
+      const std::size_t uv_tile =
+          static_cast<std::size_t>(a) * static_cast<std::size_t>(field.tiles_v()) +
+          static_cast<std::size_t>(b);
       decode_tiles({field.slabs[k].indices.data() + uv_tile * st_tiles,
                     field.codebook.codewords.data()->data(),
                     fine.stored_s.tiles(),

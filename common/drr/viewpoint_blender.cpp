@@ -201,12 +201,16 @@ class CompressedBlender final : public AnyBlender {
     return {overlap(s, footprint.s()), overlap(t, footprint.t())};
   }
 
-  /// Regroups the taps of node pairs by the pairs of viewpoints that share a tile. `shift` selects
-  /// the element's bits: u and s, or v and t.
+  /// One of the axis pairs u, s and v, t of a tile.
+  struct TileAxis {
+    std::int64_t tile_stride;  ///< of the viewpoints' tiles in the index array
+    unsigned node_bit;         ///< of an element's number; the viewpoint's bit is two higher
+    float scale;               ///< of all weights
+  };
+
+  /// Regroups the taps of node pairs by the pairs of viewpoints that share a tile.
   void make_tile_taps(const std::vector<ViewpointTap>& node_taps,
-                      std::int64_t tile_stride,
-                      unsigned shift,
-                      float scale,
+                      const TileAxis& axis,
                       std::vector<TileTap>& taps,
                       std::vector<std::int32_t>& begin) const {
     taps.clear();
@@ -217,15 +221,15 @@ class CompressedBlender final : public AnyBlender {
       const int last = (std::max(pair[0].first, pair[1].first) + tap_count() - 1) / 2;
       for (int tile = first; tile <= last; ++tile) {
         TileTap tap{};
-        tap.offset = tile * tile_stride;
+        tap.offset = tile * axis.tile_stride;
         bool is_used = false;
         for (unsigned element = 0; element < kTileElements; ++element) {
-          const int viewpoint = 2 * tile + static_cast<int>(element >> (2 + shift) & 1u);
-          const ViewpointTap& node = pair[element >> shift & 1u];
+          const int viewpoint = 2 * tile + static_cast<int>(element >> (2 + axis.node_bit) & 1u);
+          const ViewpointTap& node = pair[element >> axis.node_bit & 1u];
           const int at = viewpoint - node.first;
           if (at < 0 || at >= tap_count()) continue;
-          tap.weights[element] = scale * node.weights[at];
-          tap.slopes[element] = scale * node.slopes[at];
+          tap.weights[element] = axis.scale * node.weights[at];
+          tap.slopes[element] = axis.scale * node.slopes[at];
           is_used = is_used || node.weights[at] != 0.0f || node.slopes[at] != 0.0f;
         }
         if (is_used) taps.push_back(tap);
@@ -246,8 +250,8 @@ class CompressedBlender final : public AnyBlender {
     const auto blend_tiles = select_kernel<BlendTiles>(
         kernels_128::blend_tiles, kernels_256::blend_tiles, kernels_512::blend_tiles);
     make_tile_taps(
-        scratch.u_taps, u_stride, 1, field_->quantizer_step, scratch.u_tiles, scratch.u_begin);
-    make_tile_taps(scratch.v_taps, v_stride, 0, 1.0f, scratch.v_tiles, scratch.v_begin);
+        scratch.u_taps, {u_stride, 1, field_->quantizer_step}, scratch.u_tiles, scratch.u_begin);
+    make_tile_taps(scratch.v_taps, {v_stride, 0, 1.0f}, scratch.v_tiles, scratch.v_begin);
     const int t_tile = (stored.t.begin - slab.stored_t.begin) / 2;
     for (int c = 0; c < stored.s.count / 2; ++c) {
       const int s = stored.s.begin + 2 * c;
