@@ -91,7 +91,7 @@ AF_NATIVE_INLINE void blend_tile(const TileStrip& strip, int32_t d) {
   const F4 u_slope = (q0.u_slope + q2.u_slope) + (q1.u_slope + q3.u_slope);
   const F4 v_slope = (q0.v_slope + q2.v_slope) + (q1.v_slope + q3.v_slope);
 #endif
-  const int64_t at = 2 * d * strip.stride;
+  const int64_t at = int64_t{2} * d * strip.stride;
   store_nodes(value, strip.images[0] + at, strip.stride);
   if (!kWithSlopes) return;
   store_nodes(u_slope, strip.images[1] + at, strip.stride);

@@ -66,7 +66,7 @@ AF_NATIVE_INLINE void measure(Cells& cells) {
 }
 
 AF_NATIVE_INLINE Cells cells_of(const NodeImage& image, const WarpRow& row, Floats column) {
-  Cells cells;
+  Cells cells{};
   cells.inverse_depth = splat(1.0f) / (row.d_0 + column * row.d_1);
   const Floats zero = splat(0.0f);
   cells.s = native::maximum(zero, (row.s_0 + column * row.s_1) * cells.inverse_depth);
@@ -121,7 +121,7 @@ AF_NATIVE_INLINE RowPair sample_compact(const float* values, int32_t stride, con
 AF_NATIVE_INLINE RowPair sample_scattered(const float* values, int32_t stride, const Cells& cells) {
   const Ints offset = cells.t_node * stride + cells.s_node;
   const float* next = values + stride;
-  RowPair pair;
+  RowPair pair{};
   const Floats low = native::gather(values, offset);
   const Floats high = native::gather(next, offset);
   pair.low_slope = native::gather(values + 1, offset) - low;

@@ -42,9 +42,12 @@ std::shared_ptr<const FieldLevel> cast_level(const BenchmarkCase& benchmark_case
       for (int v = unit.v.begin; v < unit.v.end(); ++v)
         for (int s = unit.s.begin; s < unit.s.end(); ++s)
           for (int t = unit.t.begin; t < unit.t.end(); ++t) {
-            const auto viewpoint = static_cast<std::size_t>(u * light_slab.v.nodes + v);
-            const auto node = static_cast<std::size_t>(
-                (t - slab.stored_t.begin) * slab.stored_s.count + s - slab.stored_s.begin);
+            const auto viewpoint =
+                static_cast<std::size_t>(u) * static_cast<std::size_t>(light_slab.v.nodes) +
+                static_cast<std::size_t>(v);
+            const auto node = static_cast<std::size_t>(t - slab.stored_t.begin) *
+                                  static_cast<std::size_t>(slab.stored_s.count) +
+                              static_cast<std::size_t>(s - slab.stored_s.begin);
             samples[viewpoint * per_viewpoint + node] = *from++;
           }
   }
