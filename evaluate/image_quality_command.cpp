@@ -17,12 +17,12 @@
 #include "evaluate/summary_files.h"
 #include "io/field_file.h"
 #include "io/gnuplot_figure.h"
+#include "io/node_ct.h"
 #include "io/output_file.h"
 #include "io/picture.h"
 #include "io/pose_file.h"
 #include "io/provenance.h"
 #include "parallel/work_queue.h"
-#include "register/case_loading.h"
 
 namespace af::evaluation {
 namespace {
@@ -46,7 +46,7 @@ std::string to_toml(const ImageQualityOptions& options) {
 struct Setup {
   std::shared_ptr<const CompressedAttenuationField> field;
   FieldFileInfo field_info;
-  registration::NodeCt ct;
+  NodeCt ct;
   std::vector<RigidTransform> poses;  ///< empty: random ones
   View view;
 
@@ -60,11 +60,11 @@ Setup load(const ImageQualityOptions& options, const Communicator& world) {
   setup.field = read_field(options.field, world, &setup.field_info);
   const FieldIdentity& identity = setup.field->identity;
   std::vector<std::string> warnings;
-  setup.ct = registration::read_ct_per_node(options.ct,
-                                            {options.series_uid},
-                                            {identity.mu_water_per_mm, identity.air_below_hu},
-                                            world,
-                                            warnings);
+  setup.ct = read_ct_per_node(options.ct,
+                              {options.series_uid},
+                              {identity.mu_water_per_mm, identity.air_below_hu},
+                              world,
+                              warnings);
   for (const std::string& text : warnings) cli::warn(world, text);
   all_or_none(world, [&] {
     if (setup.ct.facts.content_sha256 != identity.ct_content_sha256)

@@ -16,6 +16,7 @@ struct CodebookReduction {
   std::function<void(std::span<std::uint64_t>)> sum;
   /// Every rank's bytes on every rank, in rank order.
   std::function<std::vector<std::vector<std::byte>>(std::span<const std::byte>)> all_gather;
+  std::size_t rank = 0;  ///< this rank's place in that order
 };
 
 /// One rank alone.

@@ -45,17 +45,26 @@ class CentroidSums {
 
 /// Tiles of one kind with the codeword that codes each.
 struct CodedTiles {
-  std::vector<Tile> tiles;
+  const std::vector<NumberedTile>& tiles;
   std::vector<std::uint32_t> nearest;
   std::vector<std::uint64_t> squared_errors;
 
   explicit CodedTiles(const std::vector<NumberedTile>& numbered)
-      : nearest(numbered.size(), 0), squared_errors(numbered.size(), 0) {
-    tiles.reserve(numbered.size());
-    for (const NumberedTile& tile : numbered) tiles.push_back(tile.tile);
-  }
+      : tiles(numbered), nearest(numbered.size(), 0), squared_errors(numbered.size(), 0) {}
+
+  /// Piece by piece: the search wants tiles alone, and a copy of all would cost memory.
   void encode(const NearestCodeword& search, SearchHint hint) {
-    search.search(tiles, hint, nearest, squared_errors);
+    constexpr std::size_t kPiece = 4096;
+    std::vector<Tile> piece;
+    for (std::size_t first = 0; first < tiles.size(); first += kPiece) {
+      const std::size_t count = std::min(kPiece, tiles.size() - first);
+      piece.clear();
+      for (std::size_t i = 0; i < count; ++i) piece.push_back(tiles[first + i].tile);
+      search.search(piece,
+                    hint,
+                    std::span(nearest).subspan(first, count),
+                    std::span(squared_errors).subspan(first, count));
+    }
   }
   [[nodiscard]] std::uint64_t squared_error() const {
     return std::accumulate(squared_errors.begin(), squared_errors.end(), std::uint64_t{0});
@@ -137,19 +146,14 @@ class CodebookUpdate {
     codewords_ = std::move(distinct);
   }
 
-  std::uint64_t repair(const CodedTiles& coded,
-                       const std::vector<NumberedTile>& tiles,
-                       const CodebookReduction& reduction) {
+  std::uint64_t repair(const CodedTiles& coded, const CodebookReduction& reduction) {
     if (free_.empty()) return 0;
     std::vector<std::uint64_t> keys;
-    std::vector<NumberedTile> badly_coded;
-    for (std::size_t i = 0; i < tiles.size(); ++i) {
-      if (coded.squared_errors[i] == 0) continue;
-      keys.push_back(~coded.squared_errors[i]);
-      badly_coded.push_back(tiles[i]);
-    }
+    keys.reserve(coded.squared_errors.size());
+    for (const std::uint64_t error : coded.squared_errors) keys.push_back(~error);
+    static_assert(kNeverPicked == ~std::uint64_t{0}, "a tile without error repairs nothing");
     // Some spare: a tile may equal another or a centroid.
-    const auto worst = smallest_keyed_tiles(keys, badly_coded, 2 * free_.size() + 16, reduction);
+    const auto worst = smallest_keyed_tiles(keys, coded.tiles, 2 * free_.size() + 16, reduction);
     std::set<Tile> taken;
     for (const TrackedCodeword& codeword : codewords_) taken.insert(codeword.tile);
     std::sort(free_.begin(), free_.end(), [](const TrackedCodeword& a, const TrackedCodeword& b) {
@@ -230,13 +234,13 @@ TrainedCodebook train_codebook(const TrainingShare& mine,
     hint = SearchHint::PerTile;
     CentroidSums sums(result.codebook.size());
     for (std::size_t tile = 0; tile < training.tiles.size(); ++tile)
-      sums.add(training.nearest[tile], training.tiles[tile]);
+      sums.add(training.nearest[tile], training.tiles[tile].tile);
     sums.training_error() = training.squared_error();
     sums.held_out_error() = held_out.squared_error();
     reduction.sum(sums.values());
 
     CodebookUpdate update(result.codebook, sums);
-    const std::uint64_t repaired = update.repair(training, mine.training, reduction);
+    const std::uint64_t repaired = update.repair(training, reduction);
     result.codebook = update.codebook();
     const auto new_of_old = update.new_of_old();
     training.renumber(new_of_old);

@@ -87,8 +87,7 @@ std::vector<int> best_slice_cuts(std::span<const std::int64_t> slice_sums, int s
   return cuts;
 }
 
-DepthSlabs choose_depth_slabs(const SlabAlignedVolume& volume, int slabs) {
-  if (slabs == 1) return {{}, {0.0}};
+DepthSlabs choose_depth_slabs(const SlabAlignedVolume& volume, int slabs, StPlane st_plane) {
   const auto sums = volume.slice_sums();
   const std::vector<int> cuts = best_slice_cuts(sums, slabs);
   const SlabAlignedGrid& grid = volume.grid();
@@ -99,8 +98,10 @@ DepthSlabs choose_depth_slabs(const SlabAlignedVolume& volume, int slabs) {
     const std::size_t end = k < cuts.size() ? static_cast<std::size_t>(cuts[k]) : sums.size();
     if (k < cuts.size())
       depth_slabs.boundaries_y_mm.push_back(grid.slice_y_mm(cuts[k]) - grid.spacing_mm.y() / 2.0);
-    depth_slabs.st_plane_y_mm.push_back(grid.origin_mm.y() +
-                                        grid.spacing_mm.y() * moments.centroid(begin, end));
+    depth_slabs.st_plane_y_mm.push_back(
+        st_plane == StPlane::Centre
+            ? 0.0
+            : grid.origin_mm.y() + grid.spacing_mm.y() * moments.centroid(begin, end));
     begin = end;
   }
   return depth_slabs;

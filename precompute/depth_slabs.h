@@ -22,8 +22,13 @@ struct DepthSlabs {
 /// fewer attenuating slices than slabs. \test DepthSlabs.CutIsTheBestOfAllCuts
 std::vector<int> best_slice_cuts(std::span<const std::int64_t> slice_sums, int slabs);
 
-/// K = 1: the paper's field, its plane through the field's centre (y = 0). K > 1: the best cuts,
-/// every plane at its slab's centroid of attenuation.
-DepthSlabs choose_depth_slabs(const SlabAlignedVolume& volume, int slabs);
+/// Where the (s,t) planes stand.
+enum class StPlane {
+  Centre,    ///< all through the field's centre, y = 0: the paper's, for one slab
+  Centroid,  ///< each at its slab's centroid of attenuation
+};
+
+/// The best cuts into `slabs` slabs, and their (s,t) planes.
+DepthSlabs choose_depth_slabs(const SlabAlignedVolume& volume, int slabs, StPlane st_plane);
 
 }  // namespace af

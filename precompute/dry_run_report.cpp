@@ -3,22 +3,13 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
-#include <cmath>
 #include <cstdio>
 
-#include "base/hash_random.h"
 #include "precompute/planner.h"
-#include "precompute/unit_tiles.h"
 
 namespace af {
 
 namespace {
-
-// Measured on one core at 2 to 3 GHz (tests/benchmark); a forecast needs no more than the order.
-constexpr double kNearestSecondsPerTile = 0.5e-6;
-constexpr double kIterationsExpected = 8.0;
-constexpr double kFileSecondsPerByte = 2.0e-8;
 
 template <typename... Values>
 std::string formatted(const char* format, Values... values) {
@@ -111,93 +102,146 @@ std::string megabytes_text(std::uint64_t bytes) {
   return formatted(megabytes < 10.0 ? "%.2f MB" : "%.1f MB", megabytes);
 }
 
-CastSample measure_casting(const FieldCaster& caster,
-                           const LightSlab& light_slab,
-                           const PlanOptions& plan,
-                           double seconds) {
-  constexpr std::uint64_t kOrderSeed = 1;
-  const auto units = plan_units(light_slab, plan);
-  const auto start = std::chrono::steady_clock::now();
-  double elapsed = 0.0;
-  std::size_t rays = 0;
-  std::size_t tiles = 0;
-  std::size_t occupied = 0;
-  std::vector<std::uint16_t> samples;
-  for (std::uint64_t i = 0; elapsed < seconds && i < units.size(); ++i) {
-    const WorkUnit& unit = units[hash64(kOrderSeed, i) % units.size()];
-    samples.resize(unit.sample_count());
-    caster.cast(unit, samples);
-    const UnitTiles of_unit = make_unit_tiles(unit, samples);
-    rays += samples.size();
-    tiles += unit.tile_count();
-    occupied += of_unit.tiles.size();
-    elapsed = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+std::string seconds_text(const PhaseSeconds& seconds) {
+  std::string text;
+  for (const auto& [phase, of_phase] : seconds)
+    text += (text.empty() ? "" : ", ") + phase +
+            formatted(of_phase < 9.95 ? " %.1f" : " %.0f", of_phase);
+  return text;
+}
+
+double FieldForecast::all_seconds() const {
+  double all = 0.0;
+  for (const auto& [phase, of_phase] : seconds) all += of_phase;
+  return all;
+}
+
+namespace {
+
+/// Tiles of a field and how many are worked on.
+struct TileCounts {
+  double all = 0.0;
+  double occupied = 0.0;
+  double training = 0.0;  ///< with those held out
+
+  TileCounts(const DryRun& run)
+      : all(static_cast<double>(stored_tile_count(run.light_slab))),
+        occupied(all * run.speed.occupied_fraction),
+        training(1.125 * std::min(occupied * run.options.training_fraction,
+                                  static_cast<double>(run.options.max_training_tiles))) {}
+};
+
+double seconds_at(double amount, double per_second) {
+  return per_second > 0.0 ? amount / per_second : 0.0;
+}
+
+void forecast_memory(const DryRun& run, const TileCounts& tiles, FieldForecast& need) {
+  need.limit_bytes = memory_limit(run.options, run.memory);
+  const std::uint64_t kept_per_rank = run.memory.kept_tile_bytes(need.limit_bytes);
+  need.tile_bytes = static_cast<std::uint64_t>(sizeof(Tile) * tiles.occupied);
+  need.kept_bytes =
+      std::min(need.tile_bytes, kept_per_rank * static_cast<std::uint64_t>(run.ranks));
+  need.bytes_per_rank =
+      run.memory.least_bytes() + need.kept_bytes / static_cast<std::uint64_t>(run.ranks);
+  // As choose_overflow(): the disk is shared by the ranks, the casting is not.
+  const double cast_bytes_per_second =
+      2.0 * run.speed.rays_per_second * run.speed.occupied_fraction * run.ranks;
+  if (run.options.has_checkpoint && run.options.overflow != "cast-again" &&
+      (run.options.overflow == "read-back" ||
+       run.disk.read_bytes_per_second >= cast_bytes_per_second))
+    need.overflow = TileOverflow::ReadBack;
+}
+
+void forecast_seconds(const DryRun& run, const TileCounts& tiles, FieldForecast& need) {
+  const SpeedSample& speed = run.speed;
+  const auto tile_bytes = static_cast<double>(need.tile_bytes);
+  const double cast_seconds =
+      static_cast<double>(stored_ray_count(run.light_slab)) / speed.rays_per_second / run.ranks;
+  const double checkpoint_seconds =
+      run.options.has_checkpoint ? seconds_at(tile_bytes, run.disk.write_bytes_per_second) : 0.0;
+  // Most trainings end after about so many iterations.
+  const double iterations = std::min(10, run.options.max_iterations);
+  const double overflow_fraction =
+      tile_bytes > 0.0 ? 1.0 - static_cast<double>(need.kept_bytes) / tile_bytes : 0.0;
+  const double overflow_seconds =
+      need.overflow == TileOverflow::ReadBack
+          ? seconds_at(overflow_fraction * tile_bytes, run.disk.read_bytes_per_second)
+          : overflow_fraction * cast_seconds;
+  const double index_bytes = 2.0 * tiles.occupied;
+  const double compress_seconds = index_bytes * speed.compress_seconds_per_byte;
+  // Rank 0 reads the file back: inflating takes about a fifth of deflating, SHA-256 some 2 ns a
+  // byte.
+  const double verify_seconds = 0.2 * compress_seconds + 2e-9 * 2.0 * tiles.all;
+  need.seconds = run.past;
+  need.seconds.emplace_back("cast", cast_seconds + checkpoint_seconds);
+  need.seconds.emplace_back("train",
+                            iterations * (speed.codebook_seconds + speed.train_seconds_per_tile *
+                                                                       tiles.training / run.ranks));
+  need.seconds.emplace_back(
+      "encode", speed.encode_seconds_per_tile * tiles.occupied / run.ranks + overflow_seconds);
+  need.seconds.emplace_back(
+      "write",
+      compress_seconds / run.ranks + verify_seconds +
+          seconds_at(static_cast<double>(need.file_bytes), run.disk.write_bytes_per_second));
+}
+
+std::string memory_text(const DryRun& run, const FieldForecast& need) {
+  std::string text = "  memory             " + megabytes_text(run.volume_bytes) +
+                     " per node for the CT and its grid, up to " +
+                     megabytes_text(need.bytes_per_rank) + " per rank (limit " +
+                     megabytes_text(need.limit_bytes) + ")\n";
+  text += "  tiles in memory    " + megabytes_text(need.kept_bytes) + " of " +
+          megabytes_text(need.tile_bytes);
+  if (need.kept_bytes < need.tile_bytes) {
+    text += need.overflow == TileOverflow::ReadBack
+                ? "; the rest is read back from the progress folder"
+                : "; the rest is cast again";
+    text += formatted(" (disk %.0f MB/s, casting %.0f MB/s)",
+                      run.disk.read_bytes_per_second / 1e6,
+                      2e-6 * run.speed.rays_per_second * run.speed.occupied_fraction * run.ranks);
   }
-  return {static_cast<double>(rays) / std::max(elapsed, 1e-9),
-          static_cast<double>(occupied) / static_cast<double>(tiles)};
+  text += "\n";
+  if (run.options.has_checkpoint)
+    text += "  progress folder    " + megabytes_text(need.tile_bytes) +
+            " on disk until the field is complete\n";
+  return text;
 }
 
-FieldForecast forecast(const LightSlab& light_slab,
-                       const PrecomputeOptions& options,
-                       std::uint64_t volume_bytes,
-                       const CastSample& sample,
-                       int ranks) {
-  const auto rays = static_cast<double>(stored_ray_count(light_slab));
-  const auto tiles = static_cast<double>(stored_tile_count(light_slab));
-  const double occupied = tiles * sample.occupied_fraction;
-  const double training = std::min(occupied * options.training_fraction,
-                                   static_cast<double>(options.max_training_tiles));
-  const double codebook_bytes = 32.0 * options.codewords;
-  FieldForecast result;
-  result.uncropped_bytes = 2 * uncropped_ray_count(light_slab);
-  result.cropped_bytes = static_cast<std::uint64_t>(2.0 * rays);
-  result.payload_bytes = static_cast<std::uint64_t>(2.0 * tiles + codebook_bytes);
-  result.file_bytes = static_cast<std::uint64_t>(1.9 * occupied + codebook_bytes);
-  result.ct_bytes_per_node = volume_bytes;
-  // Tiles, training tiles with their working arrays, indices (twice while blocks are joined), and
-  // centroid sums.
-  constexpr double kTrainingBytesPerTile = 48.0 + 32.0 + 4.0 + 8.0 + 8.0 + 56.0;
-  const double per_rank =
-      (32.0 * occupied + kTrainingBytesPerTile * training + 4.0 * tiles) / ranks +
-      400.0 * options.codewords;
-  result.bytes_per_rank = static_cast<std::uint64_t>(per_rank);
-  // Search time grows a little slower than the square root of the codebook.
-  const double nearest_seconds =
-      kNearestSecondsPerTile * std::max(0.3, std::sqrt(options.codewords / 16384.0));
-  const double serial_seconds = kFileSecondsPerByte * static_cast<double>(result.payload_bytes);
-  result.seconds = (rays / sample.rays_per_second +
-                    nearest_seconds * (occupied + kIterationsExpected * training)) /
-                       ranks +
-                   serial_seconds;
-  return result;
+}  // namespace
+
+FieldForecast forecast(const DryRun& run) {
+  const TileCounts tiles(run);
+  const double codebook_bytes = 32.0 * run.options.codewords;
+  FieldForecast need;
+  need.uncropped_bytes = 2 * uncropped_ray_count(run.light_slab);
+  need.cropped_bytes = 2 * static_cast<std::uint64_t>(stored_ray_count(run.light_slab));
+  need.payload_bytes = static_cast<std::uint64_t>(2.0 * tiles.all + codebook_bytes);
+  need.file_bytes = static_cast<std::uint64_t>(
+      2.0 * run.speed.compressed_fraction * tiles.occupied + codebook_bytes);
+  forecast_memory(run, tiles, need);
+  forecast_seconds(run, tiles, need);
+  return need;
 }
 
-std::string dry_run_text(const FieldSource& source,
-                         const LightSlab& light_slab,
-                         const PrecomputeOptions& options,
-                         const PlanOptions& plan,
-                         std::uint64_t volume_bytes,
-                         const CastSample& sample,
-                         int ranks) {
-  const FieldForecast need = forecast(light_slab, options, volume_bytes, sample, ranks);
-  const auto units = plan_units(light_slab, plan);
+std::string dry_run_text(const DryRun& run) {
+  const FieldForecast need = forecast(run);
   const auto ratio = [](std::uint64_t raw, std::uint64_t stored) {
     return static_cast<double>(raw) / static_cast<double>(stored);
   };
-  std::string text = "Field of camera " + source.camera.name + " for " + source.ct_path + "\n";
+  std::string text =
+      "Field of camera " + run.source.camera.name + " for " + run.source.ct_path + "\n";
   text += formatted("  range              +-%g degrees, +-%g mm\n",
-                    options.max_rotation_deg,
-                    options.max_translation_mm);
-  text += plane_text(light_slab);
+                    run.options.max_rotation_deg,
+                    run.options.max_translation_mm);
+  text += plane_text(run.light_slab);
   text += formatted("  rays               %.1f million stored of %.1f million\n",
-                    static_cast<double>(stored_ray_count(light_slab)) / 1e6,
-                    static_cast<double>(uncropped_ray_count(light_slab)) / 1e6);
+                    static_cast<double>(stored_ray_count(run.light_slab)) / 1e6,
+                    static_cast<double>(uncropped_ray_count(run.light_slab)) / 1e6);
   text += formatted("  tiles              %.2f million, about %.0f %% not empty\n",
-                    static_cast<double>(stored_tile_count(light_slab)) / 1e6,
-                    100.0 * sample.occupied_fraction);
-  text += formatted("  work               %zu units on %d ranks\n", units.size(), ranks);
-  text += "  memory             " + megabytes_text(need.ct_bytes_per_node) +
-          " per node for the CT, about " + megabytes_text(need.bytes_per_rank) + " per rank\n";
+                    static_cast<double>(stored_tile_count(run.light_slab)) / 1e6,
+                    100.0 * run.speed.occupied_fraction);
+  text += formatted("  work               %zu units on %d ranks\n", run.units.size(), run.ranks);
+  text += memory_text(run, need);
   text += "  raw field, 16 bit  " + megabytes_text(need.uncropped_bytes) + " uncropped, " +
           megabytes_text(need.cropped_bytes) + " cropped to the CT's shadow\n";
   text += "  payload            " + megabytes_text(need.payload_bytes) +
@@ -208,10 +252,12 @@ std::string dry_run_text(const FieldSource& source,
           formatted(" (1 : %.1f of uncropped, 1 : %.1f of cropped)\n",
                     ratio(need.uncropped_bytes, need.file_bytes),
                     ratio(need.cropped_bytes, need.file_bytes));
-  text += formatted("  time               about %.0f s (%.2f million rays per second and rank)\n",
-                    need.seconds,
-                    sample.rays_per_second / 1e6);
-  return text + advice_text(source, light_slab, options);
+  text +=
+      formatted("  time               about %.1f s (%s; %.1f million rays per second and rank)\n",
+                need.all_seconds(),
+                seconds_text(need.seconds).c_str(),
+                run.speed.rays_per_second / 1e6);
+  return text + advice_text(run.source, run.light_slab, run.options);
 }
 
 }  // namespace af

@@ -3,55 +3,59 @@
 
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "geometry/light_slab.h"
-#include "precompute/field_caster.h"
+#include "precompute/field_build_program.h"
+#include "precompute/memory_plan.h"
 #include "precompute/precompute_options.h"
 #include "precompute/source_loading.h"
+#include "precompute/speed_sample.h"
 
 namespace af {
 
-/// Speed and occupancy of a field, from casting a spread sample of it.
-struct CastSample {
-  double rays_per_second = 0.0;
-  double occupied_fraction = 0.0;  ///< of its tiles
-};
+using PhaseSeconds = std::vector<std::pair<std::string, double>>;
 
-/// Casts units of a plan in pseudo-random order for about `seconds`.
-CastSample measure_casting(const FieldCaster& caster,
-                           const LightSlab& light_slab,
-                           const PlanOptions& plan,
-                           double seconds);
+/// What a forecast is made from.
+struct DryRun {
+  const FieldSource& source;
+  const LightSlab& light_slab;
+  const PrecomputeOptions& options;
+  std::vector<WorkUnit> units;
+  std::uint64_t volume_bytes = 0;  ///< of the CT and its resampled grid, once per node
+  SpeedSample speed;               ///< of one rank
+  DiskSample disk;                 ///< of the folder that holds unfinished work
+  MemoryPlan memory;
+  PhaseSeconds past;  ///< phases that a dry run goes through itself: reading and resampling
+  int ranks = 1;
+};
 
 /// What the field would need.
 struct FieldForecast {
-  std::uint64_t uncropped_bytes = 0;  ///< all nodes of the lattice at 16 bits
-  std::uint64_t cropped_bytes = 0;    ///< stored nodes at 16 bits
-  std::uint64_t payload_bytes = 0;    ///< indices and codebook
-  std::uint64_t file_bytes = 0;       ///< about: empty tiles compress away
-  std::uint64_t ct_bytes_per_node = 0;
+  std::uint64_t uncropped_bytes = 0;                ///< all nodes of the lattice at 16 bits
+  std::uint64_t cropped_bytes = 0;                  ///< stored nodes at 16 bits
+  std::uint64_t payload_bytes = 0;                  ///< indices and codebook
+  std::uint64_t file_bytes = 0;                     ///< about: empty tiles compress away
+  std::uint64_t tile_bytes = 0;                     ///< of tiles that are not empty, over all ranks
+  std::uint64_t kept_bytes = 0;                     ///< of them in memory
+  TileOverflow overflow = TileOverflow::CastAgain;  ///< of the rest
+  std::uint64_t limit_bytes = 0;                    ///< of memory, per rank
   std::uint64_t bytes_per_rank = 0;
-  double seconds = 0.0;
+  PhaseSeconds seconds;
+
+  [[nodiscard]] double all_seconds() const;
 };
 
-/// `volume_bytes`: what the CT and its resampled grid take on each node.
-FieldForecast forecast(const LightSlab& light_slab,
-                       const PrecomputeOptions& options,
-                       std::uint64_t volume_bytes,
-                       const CastSample& sample,
-                       int ranks);
+FieldForecast forecast(const DryRun& run);
 
 /// The text of --dry-run: sizes, units, memory, ratios, time, advice.
-std::string dry_run_text(const FieldSource& source,
-                         const LightSlab& light_slab,
-                         const PrecomputeOptions& options,
-                         const PlanOptions& plan,
-                         std::uint64_t volume_bytes,
-                         const CastSample& sample,
-                         int ranks);
+std::string dry_run_text(const DryRun& run);
 
 /// "12.3 MB" (10^6 bytes).
 std::string megabytes_text(std::uint64_t bytes);
+
+/// "read 1.2, cast 3.4".
+std::string seconds_text(const PhaseSeconds& seconds);
 
 }  // namespace af

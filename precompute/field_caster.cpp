@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "precompute/field_caster.h"
 
-#include <vector>
+#include <algorithm>
+#include <array>
 
 #include "base/error.h"
 
@@ -19,26 +20,29 @@ RayCastFieldCaster::RayCastFieldCaster(const AttenuationVolume& volume,
 void RayCastFieldCaster::cast(const WorkUnit& unit, std::span<std::uint16_t> samples) const {
   check(samples.size() == unit.sample_count(), "one sample per node of the unit");
   const SlabGeometry& slab = light_slab_.slabs[unit.slab];
-  // One fan per row of (s,t) nodes, placed by the lattice itself: a fan that began at the unit's
-  // first row would round its points differently in every plan.
-  RayFan row;
-  row.columns = unit.t.count;
-  row.rows = 1;
-  row.column_step = ct_from_slab_.linear() * Eigen::Vector3d(0.0, 0.0, slab.t.spacing_mm());
-  row.row_step = Eigen::Vector3d::Zero();
   const double plane_distance_mm = light_slab_.uv_plane_y_mm - slab.st_plane_y_mm;
-  row.begin = (light_slab_.uv_plane_y_mm - slab.y_high_mm) / plane_distance_mm;
-  row.end = (light_slab_.uv_plane_y_mm - slab.y_low_mm) / plane_distance_mm;
-  std::vector<float> total_attenuation(static_cast<std::size_t>(unit.t.count));
+  RayFan run;
+  run.rows = 1;
+  run.column_step = ct_from_slab_.linear() * Eigen::Vector3d(0.0, 0.0, slab.t.spacing_mm());
+  run.row_step = Eigen::Vector3d::Zero();
+  run.begin = (light_slab_.uv_plane_y_mm - slab.y_high_mm) / plane_distance_mm;
+  run.end = (light_slab_.uv_plane_y_mm - slab.y_low_mm) / plane_distance_mm;
+  std::array<float, kRunOfT> total_attenuation{};
   auto sample = samples.begin();
   for (int u = unit.u.begin; u < unit.u.end(); ++u)
     for (int v = unit.v.begin; v < unit.v.end(); ++v) {
-      row.source_point = ct_from_slab_ * light_slab_.viewpoint(u, v);
-      for (int s = unit.s.begin; s < unit.s.end(); ++s) {
-        row.first_point = ct_from_slab_ * light_slab_.st_point(slab, s, unit.t.begin);
-        caster_.cast(row, total_attenuation);
-        for (const float value : total_attenuation) *sample++ = quantizer_.quantize(value);
-      }
+      run.source_point = ct_from_slab_ * light_slab_.viewpoint(u, v);
+      for (int s = unit.s.begin; s < unit.s.end(); ++s)
+        // One fan per run of nodes, placed by the lattice itself: fans that differed from plan to
+        // plan would round their points differently.
+        for (int t = unit.t.begin; t < unit.t.end(); t += kRunOfT) {
+          run.columns = std::min(kRunOfT, unit.t.end() - t);
+          run.first_point = ct_from_slab_ * light_slab_.st_point(slab, s, t);
+          const auto values =
+              std::span(total_attenuation).first(static_cast<std::size_t>(run.columns));
+          caster_.cast(run, values);
+          for (const float value : values) *sample++ = quantizer_.quantize(value);
+        }
     }
 }
 

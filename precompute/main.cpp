@@ -11,7 +11,9 @@ void bind_source(CLI::App& app, PrecomputeOptions& options) {
   app.add_option("--series", options.series_uid, "DICOM series UID, when the folder holds several");
   auto* rig = app.add_option(
       "--rig", options.rig, "Cameras: a rig.toml, or a shipped rig: c-arm-12in, treatment-room");
-  app.add_option("--camera", options.camera, "Which camera of the rig (a field belongs to one)");
+  app.add_option("--camera",
+                 options.camera,
+                 "Which camera of the rig, in letters of any case (a field belongs to one)");
   auto* center = app.add_option("--center-ct-mm",
                                 options.center_ct_mm,
                                 "x,y,z: point of the CT (DICOM LPS, mm) about which it turns and "
@@ -41,6 +43,11 @@ void bind_field(CLI::App& app, PrecomputeOptions& options) {
                  "Depth slabs K, each with its own (s,t) plane: with 8, some 8 --uv-nodes suffice; "
                  "1 is the paper's field")
       ->capture_default_str();
+  app.add_option(
+      "--st-plane",
+      options.st_plane,
+      "Where the (s,t) planes stand: centre (all through the field's centre) or centroid "
+      "(each where its slab's attenuation is) [centre for one slab, else centroid]");
   app.add_option("--uv-nodes",
                  options.uv_nodes,
                  "Viewpoints along each side of the (u,v) plane, both edges included")
@@ -85,10 +92,19 @@ void bind_codebook(CLI::App& app, PrecomputeOptions& options) {
 
 void bind_run(CLI::App& app, PrecomputeOptions& options) {
   app.add_option("-o,--output", options.output, "The field file to write, FIELD.h5");
-  app.add_option("--memory-limit",
-                 options.memory_limit_bytes,
-                 "Refuse fields that need more memory per rank, e.g. 2GB [none]")
+  app.add_option(
+         "--memory-limit",
+         options.memory_limit_bytes,
+         "Memory that each rank may take beside the CT and its grid, which every node holds "
+         "once, e.g. 8GB. Tiles that do not fit are read back or cast again, see --overflow "
+         "[300 MiB]")
       ->transform(CLI::AsSizeValue(true));
+  app.add_option(
+         "--overflow",
+         options.overflow,
+         "What is done once the codebook is trained about tiles that did not fit: read-back "
+         "(from FIELD.h5.progress), cast-again, or auto (what is faster, measured)")
+      ->capture_default_str();
   app.add_flag("--dry-run",
                options.is_dry_run,
                "Print sizes, memory, compression, expected time and advice; write nothing");
@@ -96,7 +112,7 @@ void bind_run(CLI::App& app, PrecomputeOptions& options) {
   app.add_flag_callback(
       "--no-checkpoint",
       [&options] { options.has_checkpoint = false; },
-      "Do not keep unfinished work in FIELD.h5.progress");
+      "Do not keep unfinished work in FIELD.h5.progress; tiles that do not fit are cast again");
 }
 
 }  // namespace

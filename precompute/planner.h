@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -15,10 +16,16 @@ struct PlanOptions {
 
 std::vector<std::string> problems(const PlanOptions& options);
 
-/// Units that cover every stored node of every slab exactly once, in the order slab, u, v, s. A
-/// unit grows from 2 x 2 viewpoints by further viewpoints when these have too few rays, first along
-/// u (viewpoints of equal v share the shear-warp caster's first pass), and is cut into bands of s
-/// rows when they have too many.
+/// Most nodes of a unit along s and t: the chunks of field files (kIndexChunkTiles), so that a unit
+/// is written as whole chunks.
+inline constexpr int kLargestS = 256;
+inline constexpr int kLargestT = 128;
+
+/// Units that cover every stored node of every slab exactly once, in the order slab, u, v, s, t. A
+/// unit begins as a row of viewpoints along u and two along v (viewpoints of equal v share the
+/// shear-warp caster's first pass) over one chunk of the field file. With too few rays it grows
+/// along v; with too many it is cut first along t and s to runs of kRunOfT nodes, which costs that
+/// caster little, then along u. Along t it begins at a multiple of kRunOfT nodes of what is stored.
 std::vector<WorkUnit> plan_units(const LightSlab& light_slab, const PlanOptions& options);
 
 /// Unit size that leaves every rank enough units to end together: not more than `largest`, at least
@@ -26,6 +33,13 @@ std::vector<WorkUnit> plan_units(const LightSlab& light_slab, const PlanOptions&
 PlanOptions plan_options_for_ranks(const LightSlab& light_slab,
                                    int ranks,
                                    const PlanOptions& largest = {});
+
+/// What casting each unit costs, in units of one ray through the whole CT: rays that miss the box
+/// of all attenuation (`attenuating_corners_ct`, ct frame) cost little, and of a thin slab less is
+/// summed. To hand out the costly units first.
+std::vector<double> unit_costs(const std::vector<WorkUnit>& units,
+                               const LightSlab& light_slab,
+                               const std::array<Eigen::Vector3d, 8>& attenuating_corners_ct);
 
 /// Rays of all slabs' stored nodes.
 std::int64_t stored_ray_count(const LightSlab& light_slab);

@@ -47,6 +47,11 @@ CodebookOptions PrecomputeOptions::codebook_options() const {
   return options;
 }
 
+StPlane PrecomputeOptions::st_plane_rule() const {
+  if (st_plane.empty()) return slabs == 1 ? StPlane::Centre : StPlane::Centroid;
+  return st_plane == "centre" ? StPlane::Centre : StPlane::Centroid;
+}
+
 LightSlabSpec PrecomputeOptions::light_slab_spec(const DepthSlabs& depth_slabs) const {
   LightSlabSpec spec;
   spec.uv_nodes = uv_nodes;
@@ -65,6 +70,11 @@ std::vector<std::string> problems(const PrecomputeOptions& options) {
   append_node_problems("st_nodes", options.st_nodes, found);
   if (options.caster != "trilinear" && !options.is_shear_warp())
     found.push_back("caster = " + options.caster + ": must be trilinear or shear-warp");
+  if (!options.st_plane.empty() && options.st_plane != "centre" && options.st_plane != "centroid")
+    found.push_back("st_plane = " + options.st_plane + ": must be centre or centroid");
+  if (options.overflow != "auto" && options.overflow != "read-back" &&
+      options.overflow != "cast-again")
+    found.push_back("overflow = " + options.overflow + ": must be auto, read-back or cast-again");
   append(problems(RayCasterOptions{options.step_mm}), found);
   append(problems(options.attenuation_model()), found);
   append(problems(options.codebook_options()), found);
@@ -79,6 +89,7 @@ NamedValues casting_options(const PrecomputeOptions& options) {
   return {{"max_rotation_deg", exact_text(options.max_rotation_deg)},
           {"max_translation_mm", exact_text(options.max_translation_mm)},
           {"slabs", std::to_string(options.slabs)},
+          {"st_plane", quoted(options.st_plane_rule() == StPlane::Centre ? "centre" : "centroid")},
           {"uv_nodes", std::to_string(options.uv_nodes)},
           {"st_nodes", std::to_string(options.st_nodes)},
           {"caster", quoted(options.caster)},
@@ -114,6 +125,7 @@ std::string to_toml(const PrecomputeOptions& options) {
     for (const auto& [name, value] : values) text.append(name).append(" = ").append(value) += '\n';
   add_text("output", options.output);
   text += "memory_limit_bytes = " + std::to_string(options.memory_limit_bytes) + "\n";
+  add_text("overflow", options.overflow);
   text += std::string("checkpoint = ") + (options.has_checkpoint ? "true" : "false") + "\n";
   return text;
 }

@@ -16,6 +16,9 @@
 
 namespace af {
 
+/// What a rank may take beside what every node holds once, when nothing else is said.
+inline constexpr std::uint64_t kDefaultMemoryLimitBytes = std::uint64_t{300} << 20;
+
 /// Options of af-precompute: what is cast, how it is compressed, where it goes. Angles in degrees,
 /// as at every interface.
 struct PrecomputeOptions {
@@ -33,6 +36,8 @@ struct PrecomputeOptions {
   double max_rotation_deg = 10.0;
   double max_translation_mm = 100.0;
   int slabs = 1;
+  std::string
+      st_plane;  ///< "centre", "centroid"; empty: the centre for one slab, else the centroid
   int uv_nodes = 64;
   int st_nodes = 256;
   std::string caster = "shear-warp";
@@ -45,7 +50,8 @@ struct PrecomputeOptions {
   std::uint64_t max_training_tiles = TrainingSelection{}.max_training_tiles;
   std::uint64_t seed = 1;
 
-  std::uint64_t memory_limit_bytes = 0;  ///< per rank, 0: none
+  std::uint64_t memory_limit_bytes = 0;  ///< per rank beside the CT; 0: kDefaultMemoryLimitBytes
+  std::string overflow = "auto";         ///< of tiles beyond it: "auto", "read-back", "cast-again"
   std::string output;
   bool is_dry_run = false;
   bool is_restart = false;
@@ -61,6 +67,7 @@ struct PrecomputeOptions {
     return {training_fraction, max_training_tiles, seed};
   }
   [[nodiscard]] CodebookOptions codebook_options() const;
+  [[nodiscard]] StPlane st_plane_rule() const;
   [[nodiscard]] bool is_shear_warp() const { return caster == "shear-warp"; }
   [[nodiscard]] LightSlabSpec light_slab_spec(const DepthSlabs& depth_slabs) const;
 };

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "precompute/precompute_program.h"
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cmath>
@@ -9,6 +10,7 @@
 #include <filesystem>
 #include <iostream>
 #include <memory>
+#include <numeric>
 #include <optional>
 #include <sstream>
 
@@ -53,9 +55,13 @@ class PhaseClock {
     seconds_.emplace_back(phase, std::chrono::duration<double>(now - start_).count());
     start_ = now;
   }
-  [[nodiscard]] const std::vector<std::pair<std::string, double>>& phases() const {
-    return seconds_;
+  /// Takes part of what has passed since the last end as a phase of its own.
+  void split(const std::string& phase, double seconds) {
+    seconds_.emplace_back(phase, seconds);
+    start_ += std::chrono::duration_cast<std::chrono::steady_clock::duration>(
+        std::chrono::duration<double>(seconds));
   }
+  [[nodiscard]] const PhaseSeconds& phases() const { return seconds_; }
   [[nodiscard]] double seconds_of(const std::string& phase) const {
     for (const auto& [name, seconds] : seconds_)
       if (name == phase) return seconds;
@@ -64,7 +70,7 @@ class PhaseClock {
 
  private:
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-  std::vector<std::pair<std::string, double>> seconds_;
+  PhaseSeconds seconds_;
 };
 
 std::string numbers_text(const double* values, Eigen::Index count) {
@@ -102,16 +108,6 @@ ProgressManifest manifest_of(const PrecomputeOptions& options,
   return manifest;
 }
 
-/// Refuses before any work when a rank would need more than --memory-limit.
-void require_memory(const PrecomputeOptions& options, const FieldForecast& need, int ranks) {
-  if (need.bytes_per_rank <= options.memory_limit_bytes) return;
-  throw InputError("memory_limit",
-                   megabytes_text(options.memory_limit_bytes) + " per rank",
-                   "this field needs about " + megabytes_text(need.bytes_per_rank) +
-                       " on each of " + std::to_string(ranks) +
-                       " ranks: use more ranks or nodes, fewer nodes of the planes, or raise it");
-}
-
 nlohmann::json training_json(const TrainedCodebook& trained) {
   nlohmann::json iterations = nlohmann::json::array();
   for (const TrainingIteration& iteration : trained.iterations)
@@ -144,6 +140,26 @@ std::string training_text(const TrainedCodebook& trained, float step) {
   return text.str();
 }
 
+/// What a build measured, over all ranks.
+struct BuildStatistics {
+  std::uint64_t squared_error = 0;  ///< in squared levels
+  double rms_error = 0.0;           ///< total attenuation
+  std::vector<double> encode_seconds;
+  std::uint64_t peak_bytes_per_rank = 0;  ///< beside the CT and its grid
+};
+
+double largest_of(const std::vector<double>& seconds) {
+  return *std::max_element(seconds.begin(), seconds.end());
+}
+
+/// Mean over largest: 1 when all ranks were equally long at work.
+double balance_of(const std::vector<double>& seconds) {
+  const double largest = largest_of(seconds);
+  if (!(largest > 0.0)) return 1.0;
+  return std::accumulate(seconds.begin(), seconds.end(), 0.0) /
+         (largest * static_cast<double>(seconds.size()));
+}
+
 /// One run, phase by phase.
 class PrecomputeRun {
  public:
@@ -165,15 +181,6 @@ class PrecomputeRun {
       print_dry_run(*caster);
       return;
     }
-    all_or_none(world_, [&] {
-      if (!world_.is_root() || options_.memory_limit_bytes == 0) return;
-      constexpr double kSampleSeconds = 0.3;
-      const CastSample sample =
-          measure_casting(*caster, light_slab_, sample_plan(), kSampleSeconds);
-      const FieldForecast need =
-          forecast(light_slab_, options_, volume_bytes(), sample, world_.size());
-      require_memory(options_, need, world_.size());
-    });
     build(*caster);
   }
 
@@ -195,12 +202,14 @@ class PrecomputeRun {
     for (const std::string& warning : source_.warnings) cli::warn(world_, warning);
     size_planes(DepthSlabs{{}, {0.0}});
     clock_.end("read");
-    if (!options_.is_shear_warp() && options_.slabs == 1) return;
+    const StPlane st_plane = options_.st_plane_rule();
+    const bool is_default = options_.slabs == 1 && st_plane == StPlane::Centre;
+    if (!options_.is_shear_warp() && is_default) return;
     resampled_ = std::make_shared<const SlabAlignedVolume>(
         resample_on_node(*source_.volume, light_slab_.slab_from_ct, SlabAlignedOptions{}, world_));
-    if (options_.slabs > 1)
-      size_planes(
-          all_or_none(world_, [&] { return choose_depth_slabs(*resampled_, options_.slabs); }));
+    if (!is_default)
+      size_planes(all_or_none(
+          world_, [&] { return choose_depth_slabs(*resampled_, options_.slabs, st_plane); }));
     if (!options_.is_shear_warp()) resampled_ = nullptr;
     clock_.end("resample");
   }
@@ -240,18 +249,50 @@ class PrecomputeRun {
            (resampled_ == nullptr ? 0 : resampled_->grid().value_count() * sizeof(std::int16_t));
   }
 
+  /// Collective. Memory of the rank that has most of its own.
+  [[nodiscard]] std::uint64_t largest_over_ranks(std::uint64_t bytes) const {
+    std::array<std::uint64_t, 1> largest{bytes};
+    world_.maximum(largest);
+    return largest[0];
+  }
+
+  /// Alone on its node, a rank holds the CT and its grid as memory of its own.
+  [[nodiscard]] std::uint64_t without_volume(std::uint64_t own_bytes) const {
+    return ranks_on_node_ > 1 ? own_bytes : own_bytes - std::min(own_bytes, volume_bytes());
+  }
+
+  /// Collective.
+  [[nodiscard]] MemoryPlan memory_plan(const std::vector<WorkUnit>& units) const {
+    // The program's pages are shared by the ranks of a node, but the first rank counts, too.
+    const ProcessMemory now = process_memory();
+    const std::uint64_t fixed =
+        largest_over_ranks(without_volume(now.own_bytes) + now.program_bytes);
+    return plan_memory(light_slab_, units, options_, fixed, world_.size());
+  }
+
+  [[nodiscard]] std::filesystem::path output_folder() const {
+    const std::filesystem::path output(options_.output);
+    return output.has_parent_path() ? output.parent_path() : ".";
+  }
+
   void print_dry_run(const FieldCaster& caster) const {
     constexpr double kSampleSeconds = 1.0;
+    std::vector<WorkUnit> units = plan_units(light_slab_, plan());
+    const MemoryPlan memory = memory_plan(units);
     all_or_none(world_, [&] {
-      if (world_.is_root())
-        std::cout << dry_run_text(
-            source_,
-            light_slab_,
-            options_,
-            plan(),
-            volume_bytes(),
-            measure_casting(caster, light_slab_, sample_plan(), kSampleSeconds),
-            world_.size());
+      if (!world_.is_root()) return;
+      const SpeedSample speed =
+          sample_speed(caster, light_slab_, sample_plan(), options_, kSampleSeconds);
+      std::cout << dry_run_text({source_,
+                                 light_slab_,
+                                 options_,
+                                 std::move(units),
+                                 volume_bytes(),
+                                 speed,
+                                 sample_disk(output_folder()),
+                                 memory,
+                                 clock_.phases(),
+                                 world_.size()});
     });
   }
 
@@ -263,61 +304,105 @@ class PrecomputeRun {
       progress.emplace(options_.output + ".progress", options_.is_restart, manifest, world_);
     }
     const auto units = plan_units(light_slab_, {manifest.rays_per_unit});
-    CastPhase cast = cast_phase(caster, units, progress);
+    const FieldBuild build{caster,
+                           light_slab_,
+                           units,
+                           unit_costs(units, light_slab_, source_.volume->corner_points()),
+                           progress.has_value() ? &*progress : nullptr,
+                           world_};
+    CastPhase cast = cast_phase(build);
+    const OverflowChoice choice = overflow_choice(build, cast);
     CompressedAttenuationField field = field_without_indices();
-    const TrainedCodebook trained = train_phase(cast, units);
+    const TrainedCodebook trained = train_phase(build, cast);
     field.codebook = trained.codebook;
-    EncodePhase encoded = encode_phase(cast, units, trained.codebook);
-    const FieldProvenance provenance = provenance_of(trained, cast, encoded);
-    const FieldFileInfo info =
-        write_field(field, encoded.blocks, provenance, options_.output, world_);
-    if (progress.has_value()) progress->remove();
-    clock_.end("write");
-    report(info, cast, trained, encoded);
+    write_phase(build, cast, trained, choice, field);
   }
 
-  CastPhase cast_phase(const FieldCaster& caster,
-                       const std::vector<WorkUnit>& units,
-                       std::optional<ProgressFolder>& progress) {
+  CastPhase cast_phase(const FieldBuild& build) {
+    const MemoryPlan plan = memory_plan(build.units);
+    const std::uint64_t limit = all_or_none(world_, [&] { return memory_limit(options_, plan); });
+    forget_peak();
     cli::ProgressPrinter printer("casting", world_.is_root());
-    CastPhase cast = cast_field(caster,
-                                units,
-                                progress.has_value() ? &*progress : nullptr,
+    CastPhase cast = cast_field(build,
+                                {options_.training_selection(), plan.kept_tile_bytes(limit)},
                                 is_stop_requested,
-                                printer.callback(),
-                                world_);
+                                printer.callback());
     clock_.end("cast");
     if (cast.units_resumed > 0)
       cli::info(world_,
                 "resumed " + std::to_string(cast.units_resumed) + " of " +
-                    std::to_string(units.size()) + " units from " + progress->path().string());
+                    std::to_string(build.units.size()) + " units from " +
+                    build.progress->path().string());
     stop_if_requested();
     return cast;
   }
 
-  TrainedCodebook train_phase(const CastPhase& cast, const std::vector<WorkUnit>& units) {
+  /// Collective. Says where the tiles are.
+  OverflowChoice overflow_choice(const FieldBuild& build, const CastPhase& cast) {
+    const std::size_t units = build.units.size();
+    if (cast.units_kept == units) {
+      cli::info(world_, "tiles: all " + tile_bytes_text(cast) + " kept in memory");
+      return {};
+    }
+    OverflowChoice choice = choose_overflow(build, cast);
+    if (options_.overflow == "cast-again") choice.overflow = TileOverflow::CastAgain;
+    if (options_.overflow == "read-back" && build.progress != nullptr)
+      choice.overflow = TileOverflow::ReadBack;
+    std::ostringstream text;
+    text.precision(3);
+    text << "tiles: " << cast.units_kept << " of " << units << " units (" << tile_bytes_text(cast)
+         << " in all) kept in memory; the others are "
+         << (choice.overflow == TileOverflow::ReadBack
+                 ? "read back from " + build.progress->path().string()
+                 : "cast again");
+    if (choice.read_bytes_per_second > 0.0)
+      text << " (a rank reads " << choice.read_bytes_per_second / 1e6 << " MB/s, casts "
+           << choice.cast_bytes_per_second / 1e6 << " MB/s)";
+    cli::info(world_, text.str());
+    return choice;
+  }
+
+  static std::string tile_bytes_text(const CastPhase& cast) {
+    return megabytes_text(cast.occupied_tiles * sizeof(Tile));
+  }
+
+  TrainedCodebook train_phase(const FieldBuild& build, CastPhase& cast) {
     cli::ProgressPrinter printer("training the codebook", world_.is_root());
-    TrainedCodebook trained = train_field(cast,
-                                          units,
-                                          light_slab_,
-                                          options_.training_selection(),
-                                          options_.codebook_options(),
-                                          printer.callback(),
-                                          world_);
+    TrainedCodebook trained =
+        train_field(build, cast, options_.codebook_options(), printer.callback());
     clock_.end("train");
     stop_if_requested();
     return trained;
   }
 
-  EncodePhase encode_phase(CastPhase& cast,
-                           const std::vector<WorkUnit>& units,
-                           const Codebook& codebook) {
-    cli::ProgressPrinter printer("encoding", world_.is_root());
-    EncodePhase encoded =
-        encode_field(cast, units, light_slab_, codebook, printer.callback(), world_);
-    clock_.end("encode");
-    stop_if_requested();
-    return encoded;
+  /// Encoding and writing take turns, so that no rank holds more than a round of indices.
+  void write_phase(const FieldBuild& build,
+                   CastPhase& cast,
+                   const TrainedCodebook& trained,
+                   const OverflowChoice& choice,
+                   const CompressedAttenuationField& field) {
+    FieldEncoder encoder(build, cast, trained.codebook, choice.overflow);
+    BuildStatistics statistics;
+    std::optional<cli::ProgressPrinter> printer;
+    printer.emplace("encoding and writing", world_.is_root());
+    const FieldFileInfo info = write_field(
+        field,
+        [&] {
+          if (options_.has_checkpoint && is_stop_requested())
+            throw StoppedError("stopped with all units saved: run the same command again to go on");
+          return encoder.next_blocks(printer->callback());
+        },
+        [&] {
+          statistics = statistics_of(cast, encoder);
+          clock_.split("encode", largest_of(statistics.encode_seconds));
+          return provenance_of(trained, cast, statistics);
+        },
+        options_.output,
+        world_);
+    printer.reset();
+    if (build.progress != nullptr) build.progress->remove();
+    clock_.end("write");
+    report(info, cast, trained, statistics);
   }
 
   /// Collective. Every unit is saved once casting is over, so a stop loses little.
@@ -343,9 +428,22 @@ class PrecomputeRun {
     return field;
   }
 
+  /// Collective.
+  [[nodiscard]] BuildStatistics statistics_of(const CastPhase& cast,
+                                              const FieldEncoder& encoder) const {
+    BuildStatistics statistics;
+    statistics.squared_error = encoder.squared_error();
+    statistics.rms_error =
+        rms_attenuation(statistics.squared_error, cast.occupied_tiles, quantizer().step());
+    statistics.encode_seconds = encoder.busy_seconds();
+    statistics.peak_bytes_per_rank =
+        largest_over_ranks(without_volume(process_memory().peak_own_bytes));
+    return statistics;
+  }
+
   [[nodiscard]] FieldProvenance provenance_of(const TrainedCodebook& trained,
                                               const CastPhase& cast,
-                                              const EncodePhase& encoded) const {
+                                              const BuildStatistics& statistics) const {
     Provenance provenance;
     provenance.program = "af-precompute";
     provenance.command_line = command_line_;
@@ -356,10 +454,13 @@ class PrecomputeRun {
     nlohmann::json json = to_json(provenance);
     json["training"] = training_json(trained);
     json["occupied_tiles"] = cast.occupied_tiles;
-    json["rms_attenuation_error"] =
-        rms_attenuation(encoded.squared_error, cast.occupied_tiles, quantizer().step());
+    json["rms_attenuation_error"] = statistics.rms_error;
     json["rays_cast"] = cast.rays_cast;
     json["units_resumed"] = cast.units_resumed;
+    json["units_kept_in_memory"] = cast.units_kept;
+    json["busy_seconds"] = {{"cast", cast.busy_seconds}, {"encode", statistics.encode_seconds}};
+    json["peak_bytes"] = {{"per_rank", statistics.peak_bytes_per_rank},
+                          {"ct_and_grid_per_node", volume_bytes()}};
     for (const auto& [phase, seconds] : clock_.phases()) json["seconds"][phase] = seconds;
     return {std::string(program_version()), command_line_, provenance.options_toml, json.dump(2)};
   }
@@ -367,21 +468,21 @@ class PrecomputeRun {
   void report(const FieldFileInfo& info,
               const CastPhase& cast,
               const TrainedCodebook& trained,
-              const EncodePhase& encoded) const {
-    const float step = quantizer().step();
+              const BuildStatistics& statistics) const {
     const auto rate = static_cast<double>(cast.rays_cast) / clock_.seconds_of("cast") / 1e6;
     const auto raw_bytes = static_cast<double>(2 * stored_ray_count(light_slab_));
     std::ostringstream text;
     text.precision(3);
-    text << training_text(trained, step)
+    text << training_text(trained, quantizer().step())
          << "\nwhole field: " << static_cast<double>(cast.occupied_tiles) / 1e6
-         << " million tiles not empty, rms error "
-         << rms_attenuation(encoded.squared_error, cast.occupied_tiles, step)
-         << " (total attenuation)\nseconds:";
-    for (const auto& [phase, seconds] : clock_.phases()) text << ' ' << phase << ' ' << seconds;
-    text << "; cast " << rate << " million rays/s on " << world_.size()
-         << " ranks\nratio of 16-bit "
-         << "samples stored: payload 1 : " << raw_bytes / static_cast<double>(info.payload_bytes)
+         << " million tiles not empty, rms error " << statistics.rms_error
+         << " (total attenuation)\nseconds: " << seconds_text(clock_.phases()) << "; cast " << rate
+         << " million rays/s on " << world_.size() << " ranks\nbalance (mean / slowest rank): cast "
+         << balance_of(cast.busy_seconds) << ", encode " << balance_of(statistics.encode_seconds)
+         << "; peak memory " << megabytes_text(statistics.peak_bytes_per_rank)
+         << " of one rank beside " << megabytes_text(volume_bytes())
+         << " per node for the CT\nratio of 16-bit samples stored: payload 1 : "
+         << raw_bytes / static_cast<double>(info.payload_bytes)
          << ", file 1 : " << raw_bytes / static_cast<double>(info.file_bytes);
     cli::info(world_, text.str());
     if (world_.is_root())
@@ -393,6 +494,7 @@ class PrecomputeRun {
   const PrecomputeOptions& options_;
   std::string command_line_;
   const Communicator& world_;
+  int ranks_on_node_ = world_.node().size();
   FieldSource source_;
   LightSlab light_slab_;
   std::shared_ptr<const SlabAlignedVolume> resampled_;  ///< for the shear-warp caster

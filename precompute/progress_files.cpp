@@ -7,6 +7,7 @@
 #include <fcntl.h>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <tuple>
 #include <unistd.h>
 
 #include "base/error.h"
@@ -17,7 +18,7 @@ namespace af {
 namespace {
 
 constexpr const char* kFormat = "af-precompute-progress";
-constexpr int kFormatVersion = 1;
+constexpr int kFormatVersion = 2;  // 2: units are cut along t, too
 constexpr std::array<char, 8> kMagic = {'A', 'F', 'U', 'N', 'I', 'T', '0', '1'};
 
 /// Stands before every unit in a shard.
@@ -38,67 +39,106 @@ struct RecordHeader {
 };
 static_assert(sizeof(RecordHeader) == 32);
 
-/// Where a unit lies in the shards.
-struct RecordPlace {
-  std::uint64_t shard = 0;
-  std::uint64_t offset = 0;
-  RecordHeader header;
-};
-
-std::vector<std::filesystem::path> shard_paths(const std::filesystem::path& folder) {
-  std::vector<std::filesystem::path> paths;
-  for (const auto& entry : std::filesystem::directory_iterator(folder))
-    if (entry.path().extension() == ".shard") paths.push_back(entry.path());
-  std::sort(paths.begin(), paths.end());
-  return paths;
+bool is_header_of(const RecordHeader& header, const WorkUnit& unit) {
+  const std::size_t tile_count = unit.tile_count();
+  return header.unit_id == unit.id && header.bitmap_words == (tile_count + 63) / 64 &&
+         header.tile_count <= tile_count;
 }
 
-/// Headers that make sense, up to the first that does not: what follows a torn record is lost.
-void scan_shard(const std::filesystem::path& path,
-                std::uint64_t shard,
+/// Reads the header at `offset`; false when there is none that is sound.
+bool read_header(std::ifstream& file, std::uint64_t offset, RecordHeader& header) {
+  file.seekg(static_cast<std::streamoff>(offset));
+  file.read(reinterpret_cast<char*>(&header), sizeof(RecordHeader));
+  return file.good() && header.magic == kMagic && header.header_crc == header.computed_crc();
+}
+
+/// Where a unit lies, as sent between ranks.
+struct RecordPlace {
+  std::uint64_t unit_id = 0;
+  UnitPlace place;
+};
+
+/// "0017-000003.shard": run, rank.
+std::filesystem::path shard_name(std::uint64_t run, std::uint64_t rank) {
+  const auto padded = [](const std::string& digits, std::size_t width) {
+    return std::string(width - std::min(width, digits.size()), '0') + digits;
+  };
+  return padded(std::to_string(run), 4) + "-" + padded(std::to_string(rank), 6) + ".shard";
+}
+
+/// Run and rank of every shard of the folder, in order.
+std::vector<UnitPlace> shards_of(const std::filesystem::path& folder) {
+  std::vector<UnitPlace> shards;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    const std::string name = entry.path().filename().string();
+    char* end = nullptr;
+    const std::uint64_t run = std::strtoull(name.c_str(), &end, 10);
+    const std::uint64_t rank = *end == '-' ? std::strtoull(end + 1, nullptr, 10) : 0;
+    if (name == shard_name(run, rank)) shards.push_back({run, rank, 0});
+  }
+  std::sort(shards.begin(), shards.end(), [](const UnitPlace& a, const UnitPlace& b) {
+    return std::tie(a.run, a.rank) < std::tie(b.run, b.rank);
+  });
+  return shards;
+}
+
+/// Units whose headers make sense, up to the first that does not: what follows a torn record is
+/// lost.
+void scan_shard(const std::filesystem::path& folder,
+                const UnitPlace& shard,
                 std::span<const WorkUnit> units,
-                std::set<std::uint32_t>& seen,
-                std::vector<RecordPlace>& places) {
+                std::set<std::uint64_t>& seen,
+                std::vector<RecordPlace>& found) {
+  const std::filesystem::path path = folder / shard_name(shard.run, shard.rank);
   std::ifstream file(path, std::ios::binary);
   const std::uint64_t size = std::filesystem::file_size(path);
-  std::uint64_t offset = 0;
-  while (size - offset >= sizeof(RecordHeader)) {
-    RecordPlace place{shard, offset, {}};
-    file.seekg(static_cast<std::streamoff>(offset));
-    file.read(reinterpret_cast<char*>(&place.header), sizeof(RecordHeader));
-    const RecordHeader& header = place.header;
-    if (!file || header.magic != kMagic || header.header_crc != header.computed_crc() ||
-        header.unit_id >= units.size())
+  UnitPlace place = shard;
+  RecordHeader header;
+  while (size - place.offset >= sizeof(RecordHeader)) {
+    if (!read_header(file, place.offset, header) || header.unit_id >= units.size() ||
+        !is_header_of(header, units[header.unit_id]) ||
+        header.content_bytes() > size - place.offset - sizeof(RecordHeader))
       return;
-    const std::size_t tile_count = units[header.unit_id].tile_count();
-    if (header.bitmap_words != (tile_count + 63) / 64 || header.tile_count > tile_count ||
-        header.content_bytes() > size - offset - sizeof(RecordHeader))
-      return;
-    offset += sizeof(RecordHeader) + header.content_bytes();
-    if (seen.insert(header.unit_id).second) places.push_back(place);
+    if (seen.insert(header.unit_id).second) found.push_back({header.unit_id, place});
+    place.offset += sizeof(RecordHeader) + header.content_bytes();
   }
 }
 
-/// The unit, or one without bitmap when its content is damaged.
-UnitTiles read_unit(std::ifstream& file, const RecordPlace& place, const WorkUnit& unit) {
+/// The unit, or nothing when it is damaged.
+std::optional<UnitTiles> read_unit(const std::filesystem::path& path,
+                                   std::uint64_t offset,
+                                   const WorkUnit& unit) {
+  std::ifstream file(path, std::ios::binary);
+  RecordHeader header;
+  if (!read_header(file, offset, header) || !is_header_of(header, unit)) return std::nullopt;
   UnitTiles tiles;
-  tiles.unit_id = place.header.unit_id;
-  tiles.occupied.resize(place.header.bitmap_words);
-  tiles.tiles.resize(place.header.tile_count);
+  tiles.unit_id = unit.id;
+  tiles.occupied.resize(header.bitmap_words);
+  tiles.tiles.resize(header.tile_count);
   const auto read_into = [&](std::span<std::byte> bytes) {
     file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
   };
-  file.clear();
-  file.seekg(static_cast<std::streamoff>(place.offset + sizeof(RecordHeader)));
   const auto bitmap = std::as_writable_bytes(std::span(tiles.occupied));
   const auto content = std::as_writable_bytes(std::span(tiles.tiles));
   read_into(bitmap);
   read_into(content);
-  const bool is_sound = file.good() &&
-                        crc32c(content, crc32c(bitmap)) == place.header.content_crc &&
+  const bool is_sound = file.good() && crc32c(content, crc32c(bitmap)) == header.content_crc &&
                         problems(tiles, unit).empty();
-  if (!is_sound) tiles.occupied.clear();
+  if (!is_sound) return std::nullopt;
   return tiles;
+}
+
+template <typename Record>
+std::vector<std::byte> bytes_of(const std::vector<Record>& records) {
+  const auto raw = std::as_bytes(std::span(records));
+  return {raw.begin(), raw.end()};
+}
+
+template <typename Record>
+std::vector<Record> records_of(std::span<const std::byte> bytes) {
+  std::vector<Record> records(bytes.size() / sizeof(Record));
+  if (!bytes.empty()) std::memcpy(records.data(), bytes.data(), bytes.size());
+  return records;
 }
 
 std::string manifest_text(const ProgressManifest& manifest) {
@@ -160,25 +200,16 @@ std::int64_t open_folder(const std::filesystem::path& folder,
                       std::to_string(earlier.rays_per_unit));
     return earlier.rays_per_unit;
   }
-  for (const auto& orphan : shard_paths(folder)) std::filesystem::remove(orphan);
+  for (const UnitPlace& orphan : shards_of(folder))
+    std::filesystem::remove(folder / shard_name(orphan.run, orphan.rank));
   write_text_file(manifest_path, manifest_text(manifest));
   return manifest.rays_per_unit;
 }
 
-/// "0017-000003.shard": run, rank.
-std::filesystem::path shard_name(std::uint64_t run, int rank) {
-  const auto padded = [](const std::string& digits, std::size_t width) {
-    return std::string(width - std::min(width, digits.size()), '0') + digits;
-  };
-  return padded(std::to_string(run), 4) + "-" + padded(std::to_string(rank), 6) + ".shard";
-}
-
 /// One more than the highest run of any shard.
 std::uint64_t next_run(const std::filesystem::path& folder) {
-  std::uint64_t run = 0;
-  for (const auto& path : shard_paths(folder))
-    run = std::max<std::uint64_t>(run, std::strtoull(path.filename().c_str(), nullptr, 10) + 1);
-  return run;
+  const auto shards = shards_of(folder);
+  return shards.empty() ? 0 : shards.back().run + 1;
 }
 
 std::uint64_t value_of_root(const Communicator& communicator, std::uint64_t value) {
@@ -206,53 +237,38 @@ ProgressFolder::ProgressFolder(const std::filesystem::path& path,
   });
   manifest.rays_per_unit = static_cast<std::int64_t>(
       value_of_root(communicator_, static_cast<std::uint64_t>(manifest.rays_per_unit)));
-  shard_path_ = path_ / shard_name(value_of_root(communicator_, run), communicator_.rank());
+  shard_.run = value_of_root(communicator_, run);
+  shard_.rank = static_cast<std::uint64_t>(communicator_.rank());
 }
 
-std::vector<UnitTiles> ProgressFolder::read_finished(std::span<const WorkUnit> units) const {
-  std::vector<std::filesystem::path> paths;
-  std::vector<std::byte> bytes;
+std::filesystem::path ProgressFolder::path_of(const UnitPlace& place) const {
+  return path_ / shard_name(place.run, place.rank);
+}
+
+void ProgressFolder::visit_finished(std::span<const WorkUnit> units, const Visit& visit) {
+  std::vector<RecordPlace> found;
   all_or_none(communicator_, [&] {
     if (!communicator_.is_root()) return;
-    paths = shard_paths(path_);
-    std::vector<RecordPlace> found;
-    std::set<std::uint32_t> seen;
-    for (std::size_t i = 0; i < paths.size(); ++i) scan_shard(paths[i], i, units, seen, found);
-    const auto raw = std::as_bytes(std::span(found));
-    bytes.assign(raw.begin(), raw.end());
+    std::set<std::uint64_t> seen;
+    for (const UnitPlace& shard : shards_of(path_)) scan_shard(path_, shard, units, seen, found);
   });
+  std::vector<std::byte> bytes = bytes_of(found);
   communicator_.broadcast(bytes);
-  std::vector<RecordPlace> places(bytes.size() / sizeof(RecordPlace));
-  if (!bytes.empty()) std::memcpy(places.data(), bytes.data(), bytes.size());
-  std::string names;
-  for (const auto& path : paths) names += path.filename().string() + "\n";
-  communicator_.broadcast(names);
-
-  std::vector<std::filesystem::path> known;
-  for (std::size_t begin = 0; begin < names.size();) {
-    const std::size_t end = names.find('\n', begin);
-    known.push_back(path_ / names.substr(begin, end - begin));
-    begin = end + 1;
+  found = records_of<RecordPlace>(bytes);
+  const auto ranks = static_cast<std::size_t>(communicator_.size());
+  for (auto i = static_cast<std::size_t>(communicator_.rank()); i < found.size(); i += ranks) {
+    const WorkUnit& unit = units[found[i].unit_id];
+    std::optional<UnitTiles> tiles =
+        read_unit(path_of(found[i].place), found[i].place.offset, unit);
+    if (!tiles.has_value()) continue;
+    places_[unit.id] = found[i].place;
+    visit(std::move(*tiles));
   }
-  std::vector<UnitTiles> mine;
-  std::ifstream file;
-  std::uint64_t opened = known.size();
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    if (i % static_cast<std::size_t>(communicator_.size()) !=
-        static_cast<std::size_t>(communicator_.rank()))
-      continue;
-    if (places[i].shard != opened) {
-      file = std::ifstream(known[places[i].shard], std::ios::binary);
-      opened = places[i].shard;
-    }
-    UnitTiles tiles = read_unit(file, places[i], units[places[i].header.unit_id]);
-    if (!tiles.occupied.empty()) mine.push_back(std::move(tiles));
-  }
-  return mine;
 }
 
 void ProgressFolder::append(const UnitTiles& tiles) {
-  if (!shard_.is_open()) shard_.open(shard_path_, std::ios::binary | std::ios::app);
+  const std::filesystem::path path = path_of(shard_);
+  if (!file_.is_open()) file_.open(path, std::ios::binary | std::ios::app);
   const auto bitmap = std::as_bytes(std::span(tiles.occupied));
   const auto content = std::as_bytes(std::span(tiles.tiles));
   RecordHeader header;
@@ -262,26 +278,49 @@ void ProgressFolder::append(const UnitTiles& tiles) {
   header.content_crc = crc32c(content, crc32c(bitmap));
   header.header_crc = header.computed_crc();
   for (const auto& part : {std::as_bytes(std::span(&header, 1)), bitmap, content})
-    shard_.write(reinterpret_cast<const char*>(part.data()),
-                 static_cast<std::streamsize>(part.size()));
-  shard_.flush();
-  if (!shard_)
-    throw FileError(shard_path_.string(),
-                    std::string("cannot be written: ") + std::strerror(errno));
+    file_.write(reinterpret_cast<const char*>(part.data()),
+                static_cast<std::streamsize>(part.size()));
+  file_.flush();
+  if (!file_)
+    throw FileError(path.string(), std::string("cannot be written: ") + std::strerror(errno));
+  places_[tiles.unit_id] = shard_;
+  shard_.offset += sizeof(header) + header.content_bytes();
+}
+
+void ProgressFolder::share_places() {
+  std::vector<RecordPlace> mine;
+  for (const auto& [unit_id, place] : places_) mine.push_back({unit_id, place});
+  for (const auto& bytes : communicator_.all_gather(std::as_bytes(std::span(mine))))
+    for (const RecordPlace& record : records_of<RecordPlace>(bytes))
+      places_[static_cast<std::uint32_t>(record.unit_id)] = record.place;
+}
+
+std::optional<UnitTiles> ProgressFolder::read(const WorkUnit& unit) const {
+  const auto place = places_.find(unit.id);
+  if (place == places_.end()) return std::nullopt;
+  return read_unit(path_of(place->second), place->second.offset, unit);
+}
+
+void ProgressFolder::forget_cached() const {
+  const int descriptor = ::open(path_of(shard_).c_str(), O_RDONLY);
+  if (descriptor < 0) return;
+  ::posix_fadvise(descriptor, 0, 0, POSIX_FADV_DONTNEED);
+  ::close(descriptor);
 }
 
 void ProgressFolder::sync() {
-  if (!shard_.is_open()) return;
-  const int descriptor = ::open(shard_path_.c_str(), O_RDONLY);
+  if (!file_.is_open()) return;
+  const std::filesystem::path path = path_of(shard_);
+  const int descriptor = ::open(path.c_str(), O_RDONLY);
   const bool is_synced = descriptor >= 0 && ::fsync(descriptor) == 0;
   const int reason = errno;
   if (descriptor >= 0) ::close(descriptor);
   if (!is_synced)
-    throw FileError(shard_path_.string(), std::string("cannot sync: ") + std::strerror(reason));
+    throw FileError(path.string(), std::string("cannot sync: ") + std::strerror(reason));
 }
 
 void ProgressFolder::remove() {
-  shard_.close();
+  file_.close();
   communicator_.barrier();
   all_or_none(communicator_, [&] {
     std::error_code error;

@@ -3,7 +3,9 @@
 
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,6 +21,13 @@ struct ProgressManifest {
   std::int64_t rays_per_unit = 0;
 };
 
+/// Where a unit lies: "RUN-RANK.shard" and the offset of its record.
+struct UnitPlace {
+  std::uint64_t run = 0;
+  std::uint64_t rank = 0;
+  std::uint64_t offset = 0;
+};
+
 /// Unfinished work of one field, "NAME.progress/": manifest.json and one shard per rank and run,
 /// to which finished units are appended, each with its size and CRC-32C. Whatever a killed run left
 /// incomplete fails its CRC and is cast again.
@@ -32,11 +41,24 @@ class ProgressFolder {
                  ProgressManifest& manifest,
                  const Communicator& communicator);
 
-  /// Collective. The verified units of earlier runs, each on one rank, dealt out evenly.
-  [[nodiscard]] std::vector<UnitTiles> read_finished(std::span<const WorkUnit> units) const;
+  using Visit = std::function<void(UnitTiles)>;
+  /// Collective. Calls `visit` with the verified units of earlier runs, one at a time, each on one
+  /// rank, dealt out evenly.
+  void visit_finished(std::span<const WorkUnit> units, const Visit& visit);
 
   /// Appends a finished unit to this rank's shard. FileError when it cannot be written.
   void append(const UnitTiles& tiles);
+
+  /// Collective. Tells every rank where each unit lies, so that any can read it.
+  void share_places();
+
+  /// A unit that this rank has appended or visited, or any after share_places(); nothing when it is
+  /// not there or is damaged.
+  [[nodiscard]] std::optional<UnitTiles> read(const WorkUnit& unit) const;
+
+  /// Asks the system to drop this rank's shard from its file cache, so that reading shows what it
+  /// costs.
+  void forget_cached() const;
 
   /// Makes sure that what was appended survives (fsync).
   void sync();
@@ -47,10 +69,13 @@ class ProgressFolder {
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
 
  private:
+  [[nodiscard]] std::filesystem::path path_of(const UnitPlace& place) const;
+
   std::filesystem::path path_;
   Communicator communicator_;
-  std::filesystem::path shard_path_;
-  std::ofstream shard_;
+  UnitPlace shard_;  ///< this rank's, and where its next unit will lie
+  std::ofstream file_;
+  std::map<std::uint32_t, UnitPlace> places_;
 };
 
 /// CRC-32C (Castagnoli) of bytes, as in iSCSI (RFC 3720): "123456789" gives 0xE3069283.

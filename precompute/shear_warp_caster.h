@@ -7,8 +7,8 @@
 
 namespace af {
 
-/// Units that suit the shear-warp caster: a fraction of a second, and long in u.
-inline constexpr PlanOptions kShearWarpPlan{std::int64_t{1} << 23};
+/// Units that suit the shear-warp caster: some hundredths of a second, and little memory.
+inline constexpr PlanOptions kShearWarpPlan{std::int64_t{1} << 22};
 
 /// Casts a field from a slab-aligned volume. From one viewpoint each slice y = const maps to the
 /// (s,t) nodes by a scale and a shift along x and along z, so a slice is interpolated along z once

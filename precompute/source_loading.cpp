@@ -4,10 +4,10 @@
 #include <optional>
 
 #include "base/error.h"
+#include "io/node_ct.h"
 #include "io/pose_file.h"
 #include "io/rig_file.h"
 #include "io/study_file.h"
-#include "register/case_loading.h"
 
 namespace af {
 
@@ -85,7 +85,7 @@ FieldSource load_source(const PrecomputeOptions& options, const Communicator& co
   });
   CtReadOptions ct_options;
   ct_options.series_uid = options.series_uid;
-  const registration::NodeCt ct = registration::read_ct_per_node(
+  const NodeCt ct = read_ct_per_node(
       named.ct_path, ct_options, options.attenuation_model(), communicator, source.warnings);
   source.volume = ct.volume;
   source.ct_path = named.ct_path;

@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <numeric>
 #include <tuple>
 
 #include "base/error.h"
@@ -28,20 +29,6 @@ std::uint64_t last_hash_of_fraction(double fraction) {
   return threshold == 0 ? 0 : threshold - 1;
 }
 
-template <typename Visit>
-void for_each_numbered_tile(std::span<const UnitTiles> tiles,
-                            std::span<const WorkUnit> units,
-                            const LightSlab& light_slab,
-                            Visit&& visit) {
-  for (const UnitTiles& of_unit : tiles) {
-    const WorkUnit& unit = units[of_unit.unit_id];
-    const TileLattice lattice(light_slab, unit.slab);
-    of_unit.for_each([&](std::size_t local_tile, const Tile& tile) {
-      visit(NumberedTile{lattice.global_index(unit, light_slab, local_tile), tile});
-    });
-  }
-}
-
 std::uint64_t capped_last_hash(std::span<const std::uint64_t> histogram,
                                std::uint64_t last_hash,
                                std::uint64_t max_tiles) {
@@ -51,6 +38,62 @@ std::uint64_t capped_last_hash(std::span<const std::uint64_t> histogram,
     if (tiles > max_tiles) return bin == 0 ? 0 : (static_cast<std::uint64_t>(bin) << 48u) - 1;
   }
   return last_hash;
+}
+
+/// Hashes above this are held out when the last training hash is `last_training`.
+std::uint64_t first_held_out(std::uint64_t last_training) {
+  return kEverything - std::min(last_training / 8, (kEverything - last_training) / 2);
+}
+
+/// The lowest of first_held_out(x) for all x up to `last_training`.
+std::uint64_t lowest_held_out(std::uint64_t last_training) {
+  constexpr std::uint64_t kMostHeldOut = kEverything / 10 * 8;  // where the two halves meet
+  return first_held_out(std::min(last_training, kMostHeldOut)) - 8;
+}
+
+/// How many of this rank's tiles others take over, and at which of all tiles moved its own begin.
+struct Move {
+  std::uint64_t given = 0;
+  std::uint64_t first_taken = 0;
+  std::uint64_t taken = 0;
+};
+
+/// `counts[r]`: tiles of rank r. Every rank ends with the mean, the first ones with one more.
+Move move_of_rank(std::span<const std::uint64_t> counts, std::size_t rank) {
+  const std::uint64_t all = std::accumulate(counts.begin(), counts.end(), std::uint64_t{0});
+  Move move;
+  for (std::size_t r = 0; r <= rank; ++r) {
+    const std::uint64_t target = all / counts.size() + (r < all % counts.size() ? 1 : 0);
+    move.first_taken += move.taken;
+    move.given = counts[r] > target ? counts[r] - target : 0;
+    move.taken = counts[r] < target ? target - counts[r] : 0;
+  }
+  return move;
+}
+
+void level_out_tiles(std::vector<NumberedTile>& tiles, const CodebookReduction& reduction) {
+  const std::uint64_t mine = tiles.size();
+  std::vector<std::uint64_t> counts;
+  for (const auto& bytes : reduction.all_gather(std::as_bytes(std::span(&mine, 1)))) {
+    counts.emplace_back();
+    std::memcpy(&counts.back(), bytes.data(), sizeof(std::uint64_t));
+  }
+  const Move move = move_of_rank(counts, reduction.rank);
+  const std::size_t kept = tiles.size() - move.given;
+  std::uint64_t position = 0;
+  std::vector<NumberedTile> taken(move.taken);
+  for (const auto& bytes : reduction.all_gather(std::as_bytes(std::span(tiles).subspan(kept)))) {
+    const std::uint64_t end = position + bytes.size() / sizeof(NumberedTile);
+    const std::uint64_t from = std::max(position, move.first_taken);
+    const std::uint64_t to = std::min(end, move.first_taken + move.taken);
+    if (from < to)
+      std::memcpy(&taken[from - move.first_taken],
+                  bytes.data() + (from - position) * sizeof(NumberedTile),
+                  (to - from) * sizeof(NumberedTile));
+    position = end;
+  }
+  tiles.resize(kept);
+  tiles.insert(tiles.end(), taken.begin(), taken.end());
 }
 
 /// Natural logarithm for (0, 1], accurate to about 1e-12: exponent and an atanh series, in
@@ -79,7 +122,9 @@ std::uint64_t key_of_rank(std::span<const std::uint64_t> keys,
   for (int shift = 48; shift >= 0; shift -= 16) {
     std::vector<std::uint64_t> histogram(kBins, 0);
     for (const std::uint64_t key : keys)
-      if (shift == 48 || (key >> (shift + 16)) == (prefix >> (shift + 16)))
+      if (key == kNeverPicked)
+        continue;
+      else if (shift == 48 || (key >> (shift + 16)) == (prefix >> (shift + 16)))
         ++histogram[(key >> shift) & 0xFFFFu];
     reduction.sum(histogram);
     std::uint64_t bin = 0;
@@ -95,7 +140,8 @@ CodebookReduction serial_reduction() {
   return {[](std::span<std::uint64_t>) {},
           [](std::span<const std::byte> mine) {
             return std::vector<std::vector<std::byte>>{{mine.begin(), mine.end()}};
-          }};
+          },
+          0};
 }
 
 std::vector<std::string> problems(const TrainingSelection& selection) {
@@ -108,35 +154,83 @@ std::vector<std::string> problems(const TrainingSelection& selection) {
   return found;
 }
 
+TrainingTilePicker::TrainingTilePicker(const TrainingSelection& selection,
+                                       const LightSlab& light_slab)
+    : selection_(selection), light_slab_(light_slab), histogram_(kBins, 0) {
+  throw_if_any(problems(selection));
+  lower_threshold(last_hash_of_fraction(selection.fraction));
+  // Only what is used of it becomes memory. An eighth above the cap, so that dropping is rare.
+  constexpr std::uint64_t kMostReserved = std::uint64_t{1} << 24;
+  const std::uint64_t most = std::min(selection.max_training_tiles, kMostReserved);
+  candidates_.training.reserve(most + most / 8 + 1);
+}
+
+void TrainingTilePicker::lower_threshold(std::uint64_t last_training) {
+  last_training_ = last_training;
+  first_held_out_ = lowest_held_out(last_training);
+}
+
+void TrainingTilePicker::add(const UnitTiles& tiles, const WorkUnit& unit) {
+  const TileLattice lattice(light_slab_, unit.slab);
+  tiles.for_each([&](std::size_t local_tile, const Tile& tile) {
+    const NumberedTile numbered{lattice.global_index(unit, light_slab_, local_tile), tile};
+    const std::uint64_t hash = hash_of(numbered);
+    if (hash <= last_training_) {
+      ++histogram_[hash >> 48u];
+      candidates_.training.push_back(numbered);
+      if (candidates_.training.size() == candidates_.training.capacity()) keep_within_cap();
+    } else if (hash > first_held_out_) {
+      candidates_.held_out.push_back(numbered);
+    }
+  });
+}
+
+void TrainingTilePicker::keep_within_cap() {
+  // What one rank's tiles alone push over the cap, those of all ranks do, too.
+  lower_threshold(capped_last_hash(histogram_, last_training_, selection_.max_training_tiles));
+  drop_beyond();
+}
+
+void TrainingTilePicker::drop_beyond() {
+  std::vector<NumberedTile>& held_out = candidates_.held_out;
+  std::erase_if(held_out,
+                [&](const NumberedTile& tile) { return hash_of(tile) <= first_held_out_; });
+  std::erase_if(candidates_.training, [&](const NumberedTile& tile) {
+    const std::uint64_t hash = hash_of(tile);
+    if (hash > last_training_ && hash > first_held_out_) held_out.push_back(tile);
+    return hash > last_training_;
+  });
+}
+
+TrainingShare TrainingTilePicker::take(const CodebookReduction& reduction) {
+  // Above a rank's own threshold its histogram lacks tiles, but the common one lies below it.
+  reduction.sum(histogram_);
+  last_training_ = capped_last_hash(
+      histogram_, last_hash_of_fraction(selection_.fraction), selection_.max_training_tiles);
+  first_held_out_ = first_held_out(last_training_);
+  drop_beyond();
+  candidates_.training.shrink_to_fit();
+  candidates_.held_out.shrink_to_fit();
+  return std::move(candidates_);
+}
+
+std::uint64_t TrainingTilePicker::hash_of(const NumberedTile& tile) const {
+  return hash64(selection_.seed, kTrainingStream, static_cast<std::uint64_t>(tile.global_index));
+}
+
 TrainingShare select_training_tiles(std::span<const UnitTiles> tiles,
                                     std::span<const WorkUnit> units,
                                     const LightSlab& light_slab,
                                     const TrainingSelection& selection,
                                     const CodebookReduction& reduction) {
-  throw_if_any(problems(selection));
-  const auto hash_of = [&](std::int64_t index) {
-    return hash64(selection.seed, kTrainingStream, static_cast<std::uint64_t>(index));
-  };
-  const std::uint64_t last_of_fraction = last_hash_of_fraction(selection.fraction);
-  std::vector<std::uint64_t> histogram(kBins, 0);
-  for_each_numbered_tile(tiles, units, light_slab, [&](const NumberedTile& tile) {
-    const std::uint64_t hash = hash_of(tile.global_index);
-    if (hash <= last_of_fraction) ++histogram[hash >> 48u];
-  });
-  reduction.sum(histogram);
-  const std::uint64_t last_training =
-      capped_last_hash(histogram, last_of_fraction, selection.max_training_tiles);
-  const std::uint64_t held_out_hashes =
-      std::min(last_training / 8, (kEverything - last_training) / 2);
-  TrainingShare share;
-  for_each_numbered_tile(tiles, units, light_slab, [&](const NumberedTile& tile) {
-    const std::uint64_t hash = hash_of(tile.global_index);
-    if (hash <= last_training)
-      share.training.push_back(tile);
-    else if (hash > kEverything - held_out_hashes)
-      share.held_out.push_back(tile);
-  });
-  return share;
+  TrainingTilePicker picker(selection, light_slab);
+  for (const UnitTiles& of_unit : tiles) picker.add(of_unit, units[of_unit.unit_id]);
+  return picker.take(reduction);
+}
+
+void level_out(TrainingShare& share, const CodebookReduction& reduction) {
+  level_out_tiles(share.training, reduction);
+  level_out_tiles(share.held_out, reduction);
 }
 
 std::vector<KeyedTile> smallest_keyed_tiles(std::span<const std::uint64_t> keys,
@@ -147,7 +241,7 @@ std::vector<KeyedTile> smallest_keyed_tiles(std::span<const std::uint64_t> keys,
   const std::uint64_t last_key = key_of_rank(keys, count, reduction);
   std::vector<KeyedTile> mine;
   for (std::size_t i = 0; i < keys.size(); ++i)
-    if (keys[i] <= last_key) mine.push_back({keys[i], tiles[i]});
+    if (keys[i] <= last_key && keys[i] != kNeverPicked) mine.push_back({keys[i], tiles[i]});
   std::vector<KeyedTile> picked;
   for (const auto& bytes : reduction.all_gather(std::as_bytes(std::span(mine)))) {
     const std::size_t first = picked.size();

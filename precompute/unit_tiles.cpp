@@ -31,13 +31,11 @@ SampleRows rows_of_tiles(const WorkUnit& unit,
   return rows;
 }
 
-}  // namespace
-
-UnitTiles make_unit_tiles(const WorkUnit& unit, std::span<const std::uint16_t> samples) {
-  check(samples.size() == unit.sample_count(), "one sample per node of the unit");
-  UnitTiles result;
-  result.unit_id = unit.id;
-  result.occupied.assign((unit.tile_count() + 63) / 64, 0);
+/// Calls visit(local_tile, tile) for every tile that is not all zero, in order.
+template <typename Visit>
+void for_each_occupied_tile(const WorkUnit& unit,
+                            std::span<const std::uint16_t> samples,
+                            Visit&& visit) {
   const auto counts = unit.tile_counts();
   std::size_t local_tile = 0;
   for (int a = 0; a < counts[0]; ++a)
@@ -52,12 +50,27 @@ UnitTiles make_unit_tiles(const WorkUnit& unit, std::span<const std::uint16_t> s
             tile[2 * i] = rows[i][t_0];
             tile[2 * i + 1] = rows[i][t_1];
           }
-          if (is_zero(tile)) continue;
-          result.occupied[local_tile / 64] |= std::uint64_t{1} << (local_tile % 64);
-          result.tiles.push_back(tile);
+          if (!is_zero(tile)) visit(local_tile, tile);
         }
       }
-  result.tiles.shrink_to_fit();
+}
+
+}  // namespace
+
+UnitTiles make_unit_tiles(const WorkUnit& unit, std::span<const std::uint16_t> samples) {
+  check(samples.size() == unit.sample_count(), "one sample per node of the unit");
+  UnitTiles result;
+  result.unit_id = unit.id;
+  result.occupied.assign((unit.tile_count() + 63) / 64, 0);
+  std::size_t count = 0;
+  for_each_occupied_tile(unit, samples, [&](std::size_t local_tile, const Tile&) {
+    result.occupied[local_tile / 64] |= std::uint64_t{1} << (local_tile % 64);
+    ++count;
+  });
+  // Counted first: a vector that grows would take three times the memory for a while.
+  result.tiles.reserve(count);
+  for_each_occupied_tile(
+      unit, samples, [&](std::size_t, const Tile& tile) { result.tiles.push_back(tile); });
   return result;
 }
 

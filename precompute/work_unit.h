@@ -9,16 +9,20 @@
 
 namespace af {
 
+/// Units begin at multiples of this along t, counted from the slab's first stored node: casters
+/// work on such runs.
+inline constexpr int kRunOfT = 32;
+
 /// The unit of work and of restart: one slab x an even-aligned rectangle of viewpoints x an
-/// even-aligned band of the slab's stored s rows, over all its stored t nodes. Every tile is
-/// complete within one unit, so no samples cross ranks and the payload does not depend on the plan.
+/// even-aligned rectangle of the slab's stored nodes. Every tile is complete within one unit, so no
+/// samples cross ranks and the payload does not depend on the plan.
 struct WorkUnit {
   std::uint32_t id = 0;  ///< position in the plan
   std::size_t slab = 0;
   NodeRange u;  ///< of LightSlab::u
   NodeRange v;
   NodeRange s;  ///< lattice nodes within the slab's stored_s
-  NodeRange t;  ///< the slab's stored_t
+  NodeRange t;  ///< within stored_t
 
   /// Samples [u][v][s][t], t fastest.
   [[nodiscard]] std::size_t sample_count() const {

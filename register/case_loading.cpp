@@ -4,11 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstddef>
-#include <cstring>
-#include <functional>
 #include <sstream>
-#include <type_traits>
 #include <utility>
 
 #include "base/error.h"
@@ -16,6 +12,7 @@
 #include "drr/ray_cast_drr.h"
 #include "drr/two_pass_af_drr.h"
 #include "io/field_file.h"
+#include "io/node_ct.h"
 #include "io/sha256.h"
 #include "io/xray_reader.h"
 #include "register/parameter_scaling.h"
@@ -27,46 +24,6 @@ constexpr double kCameraToleranceMm = 1e-3;
 
 /// Half the side of the cube about the ROI centre that stands for the CT when it is not read.
 constexpr double kAssumedCtHalfSideMm = 100.0;
-
-/// A CT grid as plain numbers, to be sent between ranks.
-struct PlainGrid {
-  std::array<int, 3> size;
-  std::array<double, 15> values;
-};
-static_assert(std::is_trivially_copyable_v<PlainGrid>);
-
-PlainGrid plain_grid(const CtGrid& grid) {
-  PlainGrid plain{grid.size, {}};
-  Eigen::Map<Eigen::Vector3d>(plain.values.data()) = grid.origin_mm;
-  Eigen::Map<Eigen::Vector3d>(plain.values.data() + 3) = grid.spacing_mm;
-  Eigen::Map<Eigen::Matrix3d>(plain.values.data() + 6) = grid.direction;
-  return plain;
-}
-
-CtGrid grid_of(const PlainGrid& plain) {
-  CtGrid grid;
-  grid.size = plain.size;
-  grid.origin_mm = Eigen::Map<const Eigen::Vector3d>(plain.values.data());
-  grid.spacing_mm = Eigen::Map<const Eigen::Vector3d>(plain.values.data() + 3);
-  grid.direction = Eigen::Map<const Eigen::Matrix3d>(plain.values.data() + 6);
-  return grid;
-}
-
-/// Collective over `group`: rank 0 calls `read`, all receive its facts or its error.
-CtFacts facts_from_root(const Communicator& group, const std::function<CtFacts()>& read) {
-  CtFacts facts;
-  all_or_none(group, [&] {
-    if (group.is_root()) facts = read();
-  });
-  PlainGrid plain = plain_grid(facts.grid);
-  std::vector<std::byte> bytes(sizeof(plain));
-  std::memcpy(bytes.data(), &plain, sizeof(plain));
-  group.broadcast(bytes);
-  std::memcpy(&plain, bytes.data(), sizeof(plain));
-  facts.grid = grid_of(plain);
-  group.broadcast(facts.content_sha256);
-  return facts;
-}
 
 std::filesystem::path field_path_of(const StudyCase& study_case,
                                     const StudyView& view,
@@ -167,37 +124,6 @@ void use_fields(const StudyCase& study_case,
 
 }  // namespace
 
-NodeCt read_ct_per_node(const std::filesystem::path& path,
-                        const CtReadOptions& options,
-                        const AttenuationModel& model,
-                        const Communicator& communicator,
-                        std::vector<std::string>& warnings) {
-  const Communicator node = communicator.node();
-  CtGrid bordered_grid;
-  NodeCt result;
-  // all_or_none over everybody: a node whose file system lacks the CT must not leave the others
-  // waiting.
-  all_or_none(communicator, [&] {
-    if (!node.is_root()) return;
-    const CtVolume ct = read_ct(path, options, &warnings);
-    result.facts = {ct.grid, ct_content_sha256(ct)};
-    result.volume = std::make_shared<const AttenuationVolume>(ct, model);
-    bordered_grid = result.volume->grid();
-  });
-  result.facts = facts_from_root(node, [&] { return result.facts; });
-  if (node.size() == 1) return result;
-  bordered_grid = facts_from_root(node, [&] { return CtFacts{bordered_grid, {}}; }).grid;
-  const std::size_t count = bordered_grid.voxel_count();
-  const auto owner =
-      node.allocate_on_node(count * sizeof(std::uint16_t), [&](std::span<std::byte> memory) {
-        std::memcpy(memory.data(), result.volume->voxels().data(), memory.size());
-      });
-  const auto* const voxels = reinterpret_cast<const std::uint16_t*>(owner.get());
-  result.volume = std::make_shared<const AttenuationVolume>(
-      bordered_grid, model, SharedArray<std::uint16_t>(owner, {voxels, count}));
-  return result;
-}
-
 const char* to_string(RendererKind kind) {
   return kind == RendererKind::Field ? "field" : "raycast";
 }
@@ -254,10 +180,7 @@ LoadedCase load_case(const Study& study,
     for (RegistrationView& view : problem->views)
       view.renderer = std::make_shared<const RayCastDrr>(node_ct.volume, options.ray_caster);
   } else if (!options.skip_ct_check) {
-    ct = facts_from_root(communicator, [&] {
-      const CtVolume volume = read_ct(study_case.ct, options.ct, &loaded.warnings);
-      return CtFacts{volume.grid, ct_content_sha256(volume)};
-    });
+    ct = read_ct_facts(study_case.ct, options.ct, communicator, loaded.warnings);
   }
   if (options.renderer == RendererKind::Field)
     use_fields(study_case, options, communicator, ct, *problem, loaded.input_sha256);

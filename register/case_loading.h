@@ -48,25 +48,6 @@ LoadedCase load_case(const Study& study,
                      const CaseLoadOptions& options,
                      const Communicator& communicator);
 
-/// What is known of a CT without its voxels.
-struct CtFacts {
-  CtGrid grid;
-  std::string content_sha256;
-};
-
-/// The attenuation of a CT, held once per node.
-struct NodeCt {
-  std::shared_ptr<const AttenuationVolume> volume;
-  CtFacts facts;
-};
-
-/// Collective. Each node's first rank reads the CT; errors as read_ct(), on every rank.
-NodeCt read_ct_per_node(const std::filesystem::path& path,
-                        const CtReadOptions& options,
-                        const AttenuationModel& model,
-                        const Communicator& communicator,
-                        std::vector<std::string>& warnings);
-
 /// FileError when the cameras differ by more than 1e-3 mm in any point of their geometry (1e-6 in
 /// directions and per pixel), or in size.
 void require_same_camera(const CameraGeometry& field_camera,

@@ -177,12 +177,30 @@ std::vector<std::string> problems(const CameraGeometry& camera) {
   return found;
 }
 
+namespace {
+
+bool is_equal_but_for_case(const std::string& a, const std::string& b) {
+  const auto lower = [](char letter) {
+    return letter >= 'A' && letter <= 'Z' ? static_cast<char>(letter - 'A' + 'a') : letter;
+  };
+  return std::equal(
+      a.begin(), a.end(), b.begin(), b.end(), [&](char x, char y) { return lower(x) == lower(y); });
+}
+
+}  // namespace
+
 const CameraGeometry& CameraRig::camera(const std::string& name) const {
   std::string known;
+  const CameraGeometry* alike = nullptr;
+  int alike_count = 0;
   for (const CameraGeometry& candidate : cameras) {
     if (candidate.name == name) return candidate;
     known += (known.empty() ? "" : ", ") + candidate.name;
+    if (!is_equal_but_for_case(candidate.name, name)) continue;
+    alike = &candidate;
+    ++alike_count;
   }
+  if (alike_count == 1) return *alike;
   throw InputError("camera", name, "the rig has only: " + known);
 }
 

@@ -62,6 +62,7 @@ struct CameraRig {
   Eigen::Vector3d isocenter_point = Eigen::Vector3d::Zero();
   std::vector<CameraGeometry> cameras;
 
+  /// The camera of that name, or the only one whose name differs just in the case of letters.
   /// Throws InputError that lists the known names.
   [[nodiscard]] const CameraGeometry& camera(const std::string& name) const;
 };

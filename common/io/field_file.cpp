@@ -8,6 +8,7 @@
 #include <numeric>
 #include <sstream>
 #include <unistd.h>
+#include <utility>
 
 #include "base/error.h"
 #include "io/field_file_access.h"
@@ -25,7 +26,9 @@ using hdf5::checked;
 using hdf5::Handle;
 
 constexpr std::size_t kSha256Digits = 64;
-constexpr std::uint64_t kMaxChunkBytes = 1u << 20;
+/// Tiles along s and t of a chunk, 16 KiB: units of precompute begin and end at chunks.
+constexpr std::uint64_t kChunkRows = kIndexChunkTiles[0];
+constexpr std::uint64_t kChunkColumns = kIndexChunkTiles[1];
 constexpr unsigned kDeflateLevel = 4;
 /// Deflate shrinks nothing by more than this.
 constexpr std::uint64_t kMaxDeflateRatio = 1032;
@@ -111,46 +114,37 @@ void check_blocks(const std::vector<IndexBlock>& blocks, const std::vector<Datas
   }
 }
 
-/// Joins blocks of one row of viewpoints that follow each other along v, which saves collective
-/// writes.
-std::vector<IndexBlock> joined(std::vector<IndexBlock> blocks) {
-  const auto key = [](const IndexBlock& block) {
-    return std::tuple(block.slab,
-                      block.first_tile[0],
-                      block.first_tile[2],
-                      block.tile_count[0],
-                      block.tile_count[2],
-                      block.first_tile[1]);
+/// The indices of several blocks of one slab in the order of a selection that is the union of the
+/// blocks: ascending tile numbers. Frees the blocks' own.
+std::vector<std::uint16_t> merged(std::span<IndexBlock*> blocks, const DatasetRule& rule) {
+  struct Run {
+    std::uint64_t first_tile;
+    std::span<const std::uint16_t> indices;
   };
-  std::sort(blocks.begin(), blocks.end(), [&](const IndexBlock& a, const IndexBlock& b) {
-    return key(a) < key(b);
-  });
-  std::vector<IndexBlock> result;
-  for (IndexBlock& block : blocks) {
-    if (!result.empty() && block.tile_count[0] == 1) {
-      IndexBlock& last = result.back();
-      IndexBlock continued = block;
-      continued.first_tile[1] = last.first_tile[1];
-      if (key(last) == key(continued) &&
-          last.first_tile[1] + last.tile_count[1] == block.first_tile[1]) {
-        last.tile_count[1] += block.tile_count[1];
-        last.indices.insert(last.indices.end(), block.indices.begin(), block.indices.end());
-        continue;
-      }
-    }
-    result.push_back(std::move(block));
+  std::vector<Run> runs;
+  std::size_t count = 0;
+  for (const IndexBlock* block : blocks) {
+    count += block->indices.size();
+    for_each_run(*block, rule, [&](std::uint64_t first, std::span<const std::uint16_t> indices) {
+      runs.push_back({first, indices});
+    });
   }
-  return result;
+  std::sort(runs.begin(), runs.end(), [](const Run& a, const Run& b) {
+    return a.first_tile < b.first_tile;
+  });
+  std::vector<std::uint16_t> indices;
+  indices.reserve(count);
+  for (const Run& run : runs) indices.insert(indices.end(), run.indices.begin(), run.indices.end());
+  for (IndexBlock* block : blocks) block->indices = {};
+  return indices;
 }
 
-/// One chunk holds the (s,t) plane of one (u,v) tile, or a band of it: a unit of precompute writes
+/// One chunk holds the (s,t) plane of one (u,v) tile, or a part of it: a unit of precompute writes
 /// whole chunks, and a look-up of one viewpoint reads few.
 Handle index_creation(const DatasetRule& rule) {
   Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose, "H5Pcreate");
-  const std::uint64_t row_bytes = rule.extents[3] * sizeof(std::uint16_t);
-  const std::uint64_t rows =
-      std::clamp<std::uint64_t>(kMaxChunkBytes / row_bytes, 1, rule.extents[2]);
-  const std::array<hsize_t, 4> chunk = {1, 1, rows, rule.extents[3]};
+  const std::array<hsize_t, 4> chunk = {
+      1, 1, std::min(kChunkRows, rule.extents[2]), std::min(kChunkColumns, rule.extents[3])};
   checked(H5Pset_chunk(creation, 4, chunk.data()), "H5Pset_chunk");
   checked(H5Pset_shuffle(creation), "H5Pset_shuffle");
   checked(H5Pset_deflate(creation, kDeflateLevel), "H5Pset_deflate");
@@ -174,108 +168,163 @@ void create_index_dataset(hid_t file, const DatasetRule& rule) {
   hdf5::write_text_attribute(dataset, "sha256", std::string(kSha256Digits, '0'));
 }
 
-/// Rank 0 alone: everything but the indices.
+/// Rank 0 alone: everything but the indices and the provenance.
 void create_file_without_indices(const CompressedAttenuationField& field,
-                                 const FieldProvenance& provenance,
                                  const std::filesystem::path& path) {
   Handle file = hdf5::create_file(path);
   hdf5::write_text_attribute(file, "format", field_layout::kFormat);
   hdf5::write_int_attribute(file, "format_version", field_layout::kFormatVersion);
-  hdf5::write_text_attribute(file, "options_toml", provenance.options_toml);
-  hdf5::write_text_attribute(file, "source_version", provenance.source_version);
   hdf5::write_text_attribute(file, "ct_sha256", field.identity.ct_content_sha256);
   hdf5::write_text_attribute(file, "payload_sha256", std::string(kSha256Digits, '0'));
   for (const Dataset& dataset : field_layout::datasets_of(field))
-    hdf5::write_dataset(file, dataset, sha256_hex(dataset.bytes));
-  for (const Dataset& dataset : field_layout::datasets_of(provenance))
     hdf5::write_dataset(file, dataset, sha256_hex(dataset.bytes));
   for (const DatasetRule& rule : index_rules(field)) create_index_dataset(file, rule);
   file.close("H5Fclose");
 }
 
-/// Collective. One write of one block; `block` is null on a rank that has none left and still takes
-/// part.
-void write_block(hid_t dataset, const IndexBlock* block) {
+/// The union of the blocks in the file.
+void select_blocks(hid_t in_file, std::span<IndexBlock*> blocks) {
+  checked(H5Sselect_none(in_file), "H5Sselect_none");
+  for (const IndexBlock* block : blocks) {
+    std::array<hsize_t, 4> start{};
+    std::array<hsize_t, 4> count{};
+    for (std::size_t axis = 0; axis < 4; ++axis) {
+      start[axis] = static_cast<hsize_t>(block->first_tile[axis]);
+      count[axis] = static_cast<hsize_t>(block->tile_count[axis]);
+    }
+    checked(
+        H5Sselect_hyperslab(in_file, H5S_SELECT_OR, start.data(), nullptr, count.data(), nullptr),
+        "H5Sselect_hyperslab");
+  }
+}
+
+/// Collective. One write of all blocks of one slab; there may be none on some ranks.
+void write_slab(hid_t dataset, const DatasetRule& rule, std::span<IndexBlock*> blocks) {
   const Handle in_file(H5Dget_space(dataset), H5Sclose, "H5Dget_space");
   const Handle transfer(H5Pcreate(H5P_DATASET_XFER), H5Pclose, "H5Pcreate");
   checked(H5Pset_dxpl_mpio(transfer, H5FD_MPIO_COLLECTIVE), "H5Pset_dxpl_mpio");
-  if (block == nullptr) {
-    checked(H5Sselect_none(in_file), "H5Sselect_none");
-    const hsize_t one = 1;
-    const Handle in_memory(H5Screate_simple(1, &one, nullptr), H5Sclose, "H5Screate_simple");
-    checked(H5Sselect_none(in_memory), "H5Sselect_none");
-    const std::uint16_t unused = 0;
-    checked(H5Dwrite(dataset, H5T_NATIVE_UINT16, in_memory, in_file, transfer, &unused),
-            "H5Dwrite");
-    return;
-  }
-  std::array<hsize_t, 4> start{};
-  std::array<hsize_t, 4> count{};
-  for (std::size_t axis = 0; axis < 4; ++axis) {
-    start[axis] = static_cast<hsize_t>(block->first_tile[axis]);
-    count[axis] = static_cast<hsize_t>(block->tile_count[axis]);
-  }
-  checked(
-      H5Sselect_hyperslab(in_file, H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr),
-      "H5Sselect_hyperslab");
-  const Handle in_memory(H5Screate_simple(4, count.data(), nullptr), H5Sclose, "H5Screate_simple");
-  checked(H5Dwrite(dataset, H5T_NATIVE_UINT16, in_memory, in_file, transfer, block->indices.data()),
+  select_blocks(in_file, blocks);
+  std::vector<std::uint16_t> indices = merged(blocks, rule);
+  const hsize_t count = std::max<hsize_t>(1, indices.size());
+  const Handle in_memory(H5Screate_simple(1, &count, nullptr), H5Sclose, "H5Screate_simple");
+  if (indices.empty()) checked(H5Sselect_none(in_memory), "H5Sselect_none");
+  indices.resize(count);
+  checked(H5Dwrite(dataset, H5T_NATIVE_UINT16, in_memory, in_file, transfer, indices.data()),
           "H5Dwrite");
 }
 
-/// Collective. Writes the blocks of one slab; a rank that failed goes on taking part, so that the
-/// others do not wait for it.
-void write_slab(hid_t file,
-                const DatasetRule& rule,
-                const std::vector<const IndexBlock*>& blocks,
-                const Communicator& communicator) {
-  std::array<std::uint64_t, 1> rounds{blocks.size()};
-  communicator.maximum(rounds);
-  const Handle dataset(H5Dopen2(file, rule.name.c_str(), H5P_DEFAULT), H5Dclose, "H5Dopen2");
-  std::exception_ptr failure;
-  for (std::size_t i = 0; i < rounds[0]; ++i) {
+/// The open file of all ranks. Closing it is collective, so it is done by close() and never while
+/// unwinding: a rank that fails goes on taking part.
+class SharedFile {
+ public:
+  /// Collective.
+  SharedFile(const std::filesystem::path& path,
+             const std::vector<DatasetRule>& rules,
+             const Communicator& communicator)
+      : path_(path), rules_(rules), communicator_(communicator) {
+    all_or_none(communicator_, [&] {
+      naming_file(path_, [&] {
+        const Handle access = hdf5::file_access();
+        checked(H5Pset_fapl_mpio(access, communicator_.impl().handle, MPI_INFO_NULL),
+                "H5Pset_fapl_mpio");
+        file_ = checked(H5Fopen(path_.c_str(), H5F_ACC_RDWR, access), "H5Fopen");
+      });
+    });
+  }
+
+  /// Collective. Writes the blocks of all ranks, slab by slab.
+  void write(std::vector<IndexBlock>& blocks) {
+    std::vector<std::uint64_t> holders(rules_.size(), 0);
+    for (const IndexBlock& block : blocks) holders[block.slab] = 1;
+    communicator_.maximum(holders);
+    for (std::size_t k = 0; k < rules_.size(); ++k) {
+      if (holders[k] == 0) continue;
+      std::vector<IndexBlock*> of_slab;
+      for (IndexBlock& block : blocks)
+        if (block.slab == k) of_slab.push_back(&block);
+      remember([&] {
+        const Handle dataset(
+            H5Dopen2(file_, rules_[k].name.c_str(), H5P_DEFAULT), H5Dclose, "H5Dopen2");
+        write_slab(dataset, rules_[k], of_slab);
+      });
+    }
+    throw_first();
+  }
+
+  /// Collective. Every rank comes here, failed or not.
+  void close() {
+    if (file_ == H5I_INVALID_HID) return;
+    remember([&] { checked(H5Fclose(std::exchange(file_, H5I_INVALID_HID)), "H5Fclose"); });
+    throw_first();
+  }
+
+ private:
+  template <typename Function>
+  void remember(Function&& function) {
     try {
-      write_block(dataset, i < blocks.size() ? blocks[i] : nullptr);
+      naming_file(path_, function);
     } catch (...) {
-      if (failure == nullptr) failure = std::current_exception();
+      if (failure_.exit_code == 0) failure_ = failure_of(std::current_exception());
     }
   }
-  if (failure != nullptr) std::rethrow_exception(failure);
+  void throw_first() const {
+    if (const RankFailure first = first_failure(communicator_, failure_); first.exit_code != 0)
+      throw_failure(first);
+  }
+
+  const std::filesystem::path& path_;
+  const std::vector<DatasetRule>& rules_;
+  const Communicator& communicator_;
+  hid_t file_ = H5I_INVALID_HID;
+  RankFailure failure_;
+};
+
+/// Collective. Writes blocks in rounds until no rank has any; returns the hash sums of each slab
+/// over all ranks.
+std::vector<std::uint64_t> write_rounds(SharedFile& file,
+                                        const std::vector<DatasetRule>& rules,
+                                        const NextBlocks& next_blocks,
+                                        const Communicator& communicator) {
+  std::vector<std::uint64_t> sums(rules.size(), 0);
+  while (true) {
+    std::vector<IndexBlock> blocks = all_or_none(communicator, [&] {
+      std::vector<IndexBlock> next = next_blocks();
+      check_blocks(next, rules);
+      return next;
+    });
+    std::array<std::uint64_t, 1> any{blocks.empty() ? std::uint64_t{0} : 1};
+    communicator.maximum(any);
+    if (any[0] == 0) break;
+    for (const IndexBlock& block : blocks)
+      for_each_run(block,
+                   rules[block.slab],
+                   [&](std::uint64_t first_tile, std::span<const std::uint16_t> indices) {
+                     sums[block.slab] += hash_sum(first_tile, indices);
+                   });
+    file.write(blocks);
+  }
+  communicator.sum(sums);
+  return sums;
 }
 
 /// Collective.
-void write_indices(const std::filesystem::path& path,
-                   const std::vector<DatasetRule>& rules,
-                   const std::vector<IndexBlock>& blocks,
-                   const Communicator& communicator) {
-  hid_t file = H5I_INVALID_HID;
-  all_or_none(communicator, [&] {
-    naming_file(path, [&] {
-      const Handle access = hdf5::file_access();
-      checked(H5Pset_fapl_mpio(access, communicator.impl().handle, MPI_INFO_NULL),
-              "H5Pset_fapl_mpio");
-      file = checked(H5Fopen(path.c_str(), H5F_ACC_RDWR, access), "H5Fopen");
-    });
-  });
-  RankFailure failure;
-  for (std::size_t k = 0; k < rules.size(); ++k) {
-    std::vector<const IndexBlock*> of_slab;
-    for (const IndexBlock& block : blocks)
-      if (block.slab == k) of_slab.push_back(&block);
-    try {
-      naming_file(path, [&] { write_slab(file, rules[k], of_slab, communicator); });
-    } catch (...) {
-      failure = failure_of(std::current_exception());
-    }
-  }
-  // Closing is collective: every rank comes here, failed or not.
+std::vector<std::uint64_t> write_indices(const std::filesystem::path& path,
+                                         const std::vector<DatasetRule>& rules,
+                                         const NextBlocks& next_blocks,
+                                         const Communicator& communicator) {
+  SharedFile file(path, rules, communicator);
   try {
-    naming_file(path, [&] { checked(H5Fclose(file), "H5Fclose"); });
+    auto sums = write_rounds(file, rules, next_blocks, communicator);
+    file.close();
+    return sums;
   } catch (...) {
-    if (failure.exit_code == 0) failure = failure_of(std::current_exception());
+    // Every rank is here: what is thrown above is thrown on all.
+    try {
+      file.close();
+    } catch (const std::exception&) {  // the first error is the one to report
+    }
+    throw;
   }
-  if (const RankFailure first = first_failure(communicator, failure); first.exit_code != 0)
-    throw_failure(first);
 }
 
 // --- reading back --------------------------------------------------------------------------------
@@ -311,8 +360,10 @@ std::string payload_hash(std::span<const Dataset> datasets,
   return sha256_hex(std::as_bytes(std::span(lines)));
 }
 
-/// Rank 0 alone: reads every index back, compares with what the ranks wrote, and stores the hashes.
+/// Rank 0 alone: reads every index back, compares with what the ranks wrote, and stores the hashes
+/// and the provenance.
 std::string verify_and_seal(const CompressedAttenuationField& field,
+                            const FieldProvenance& provenance,
                             const std::vector<std::uint64_t>& written_sums,
                             const std::filesystem::path& path) {
   Handle file = hdf5::open_file(path, H5F_ACC_RDWR);
@@ -340,6 +391,10 @@ std::string verify_and_seal(const CompressedAttenuationField& field,
   }
   std::string payload = payload_hash(field_layout::datasets_of(field), rules, index_sha256);
   hdf5::replace_text_attribute(file, "payload_sha256", payload);
+  hdf5::write_text_attribute(file, "options_toml", provenance.options_toml);
+  hdf5::write_text_attribute(file, "source_version", provenance.source_version);
+  for (const Dataset& dataset : field_layout::datasets_of(provenance))
+    hdf5::write_dataset(file, dataset, sha256_hex(dataset.bytes));
   file.close("H5Fclose");
   return payload;
 }
@@ -526,35 +581,26 @@ CompressedSlab read_slab(const std::filesystem::path& path,
 }  // namespace
 
 FieldFileInfo write_field(const CompressedAttenuationField& field,
-                          const std::vector<IndexBlock>& my_blocks,
-                          const FieldProvenance& provenance,
+                          const NextBlocks& next_blocks,
+                          const MakeProvenance& make_provenance,
                           const std::filesystem::path& path,
                           const Communicator& communicator) {
   const hdf5::QuietErrors quiet;
   const std::filesystem::path partial = path.string() + ".partial";
   const auto rules = index_rules(field);
-  check_blocks(my_blocks, rules);
-  const std::vector<IndexBlock> blocks = joined(my_blocks);
-  std::vector<std::uint64_t> sums(rules.size(), 0);
-  for (const IndexBlock& block : blocks)
-    for_each_run(block,
-                 rules[block.slab],
-                 [&](std::uint64_t first_tile, std::span<const std::uint16_t> indices) {
-                   sums[block.slab] += hash_sum(first_tile, indices);
-                 });
-  communicator.sum(sums);
-
-  FieldFileInfo info{provenance, "", 0, field_layout::payload_bytes(field)};
+  FieldFileInfo info;
+  info.payload_bytes = field_layout::payload_bytes(field);
   try {
     all_or_none(communicator, [&] {
       if (communicator.is_root())
-        naming_file(partial, [&] { create_file_without_indices(field, provenance, partial); });
+        naming_file(partial, [&] { create_file_without_indices(field, partial); });
     });
-    write_indices(partial, rules, blocks, communicator);
+    const auto sums = write_indices(partial, rules, next_blocks, communicator);
+    info.provenance = make_provenance();
     all_or_none(communicator, [&] {
       if (!communicator.is_root()) return;
-      info.payload_sha256 =
-          naming_file(partial, [&] { return verify_and_seal(field, sums, partial); });
+      info.payload_sha256 = naming_file(
+          partial, [&] { return verify_and_seal(field, info.provenance, sums, partial); });
       commit(partial, path);
       info.file_bytes = std::filesystem::file_size(path);
     });
@@ -565,6 +611,20 @@ FieldFileInfo write_field(const CompressedAttenuationField& field,
   }
   share(info, communicator);
   return info;
+}
+
+FieldFileInfo write_field(const CompressedAttenuationField& field,
+                          const std::vector<IndexBlock>& my_blocks,
+                          const FieldProvenance& provenance,
+                          const std::filesystem::path& path,
+                          const Communicator& communicator) {
+  std::vector<IndexBlock> left = my_blocks;
+  return write_field(
+      field,
+      [&] { return std::exchange(left, {}); },
+      [&] { return provenance; },
+      path,
+      communicator);
 }
 
 std::shared_ptr<const CompressedAttenuationField> read_field(const std::filesystem::path& path,

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -36,9 +38,27 @@ struct IndexBlock {
   std::vector<std::uint16_t> indices;
 };
 
+/// Tiles along s and along t that one chunk of an index dataset spans, where the slab has as many.
+/// Blocks that begin and end at multiples of them are written without reading chunks back.
+inline constexpr std::array<int, 2> kIndexChunkTiles = {128, 64};
+
+/// This rank's next blocks, none when it has no more. Called on every rank equally often, until no
+/// rank has any left; what it throws is thrown on every rank.
+using NextBlocks = std::function<std::vector<IndexBlock>()>;
+/// Called on every rank after the last block.
+using MakeProvenance = std::function<FieldProvenance()>;
+
 /// Collective. Writes `field` (its slabs' index arrays are ignored) with the blocks of all ranks by
 /// parallel HDF5 to "PATH.partial", closes it, verifies it by reading it back on rank 0, syncs and
-/// renames. Ranks without a block take part. Returns the same info on every rank.
+/// renames. Blocks are asked for and written in rounds, one collective write per round and slab, so
+/// that no rank need hold more than one round's; ranks without a block take part. Returns the same
+/// info on every rank.
+FieldFileInfo write_field(const CompressedAttenuationField& field,
+                          const NextBlocks& next_blocks,
+                          const MakeProvenance& make_provenance,
+                          const std::filesystem::path& path,
+                          const Communicator& communicator);
+/// Collective. The same in one round.
 FieldFileInfo write_field(const CompressedAttenuationField& field,
                           const std::vector<IndexBlock>& my_blocks,
                           const FieldProvenance& provenance,

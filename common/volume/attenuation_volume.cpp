@@ -77,25 +77,37 @@ std::vector<std::string> problems(const AttenuationModel& model) {
   return found;
 }
 
-AttenuationVolume::AttenuationVolume(const CtVolume& ct, const AttenuationModel& model)
-    : model_(model) {
+CtGrid AttenuationVolume::bordered_grid_of(const CtVolume& ct, const AttenuationModel& model) {
   throw_if_any(problems(model));
-  const VoxelBox box = attenuating_box(ct, model);
-  grid_ = bordered_grid(ct.grid, box);
-  std::vector<std::uint16_t> voxels(grid_.voxel_count());
-  std::uint16_t largest = 0;
-  for (int k = box.low[2]; k <= box.high[2]; ++k)
-    for (int j = box.low[1]; j <= box.high[1]; ++j) {
-      const std::int16_t* from = ct.hu.data() + voxel_offset(ct.grid.size, box.low[0], j, k);
-      std::uint16_t* to =
-          voxels.data() + voxel_offset(grid_.size, 1, j - box.low[1] + 1, k - box.low[2] + 1);
-      for (int i = 0; i <= box.high[0] - box.low[0]; ++i) {
-        to[i] = model.relative_attenuation(from[i]);
-        largest = std::max(largest, to[i]);
-      }
+  return bordered_grid(ct.grid, attenuating_box(ct, model));
+}
+
+void AttenuationVolume::fill_voxels(const CtVolume& ct,
+                                    const AttenuationModel& model,
+                                    const CtGrid& bordered_grid,
+                                    std::span<std::uint16_t> voxels) {
+  check(voxels.size() == bordered_grid.voxel_count(), "one voxel per grid point");
+  std::fill(voxels.begin(), voxels.end(), std::uint16_t{0});
+  // Voxel (1, 1, 1) of the bordered grid is this voxel of the CT.
+  const Eigen::Vector3d first =
+      ct.grid.index_of(bordered_grid.point_mm(Eigen::Vector3d::Ones())).array().round();
+  const Eigen::Vector3i low = first.cast<int>();
+  const auto& size = bordered_grid.size;
+  for (int k = 1; k < size[2] - 1; ++k)
+    for (int j = 1; j < size[1] - 1; ++j) {
+      const std::int16_t* from =
+          ct.hu.data() + voxel_offset(ct.grid.size, low.x(), low.y() + j - 1, low.z() + k - 1);
+      std::uint16_t* to = voxels.data() + voxel_offset(size, 1, j, k);
+      for (int i = 0; i < size[0] - 2; ++i) to[i] = model.relative_attenuation(from[i]);
     }
+}
+
+AttenuationVolume::AttenuationVolume(const CtVolume& ct, const AttenuationModel& model)
+    : grid_(bordered_grid_of(ct, model)), model_(model) {
+  std::vector<std::uint16_t> voxels(grid_.voxel_count());
+  fill_voxels(ct, model, grid_, voxels);
+  max_mu_per_mm_ = *std::max_element(voxels.begin(), voxels.end()) * model.mu_per_mm_per_unit();
   voxels_ = SharedArray<std::uint16_t>(std::move(voxels));
-  max_mu_per_mm_ = largest * model.mu_per_mm_per_unit();
 }
 
 AttenuationVolume::AttenuationVolume(const CtGrid& bordered_grid,

@@ -38,6 +38,14 @@ class AttenuationVolume {
                     const AttenuationModel& model,
                     SharedArray<std::uint16_t> voxels);
 
+  /// Grid with border of the volume that a CT makes. InputError when no voxel attenuates.
+  [[nodiscard]] static CtGrid bordered_grid_of(const CtVolume& ct, const AttenuationModel& model);
+  /// The voxels of that volume, into memory for bordered_grid.voxel_count() of them.
+  static void fill_voxels(const CtVolume& ct,
+                          const AttenuationModel& model,
+                          const CtGrid& bordered_grid,
+                          std::span<std::uint16_t> voxels);
+
   /// Grid with border: voxel (0, 0, 0) is a border voxel.
   [[nodiscard]] const CtGrid& grid() const { return grid_; }
   [[nodiscard]] const AttenuationModel& model() const { return model_; }

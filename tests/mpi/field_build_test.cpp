@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <array>
 #include <atomic>
 #include <filesystem>
 #include <fstream>
@@ -71,11 +72,10 @@ class FieldBuildTest : public testing::Test {
       ProgressFolder* progress = nullptr,
       const StopRequested& stop = [] { return false; }) {
     const auto units = plan_units(light_slab_, {rays_per_unit});
-    CastPhase cast = cast_field(caster_, units, progress, stop, {}, world_);
+    const FieldBuild build = build_of(units, progress);
+    CastPhase cast = cast_field(build, {kSelection, kept_tile_bytes_}, stop, {});
     units_resumed_ = cast.units_resumed;
-    const TrainedCodebook trained = train_field(
-        cast, units, light_slab_, {0.5, 100000, 3}, {.codewords = 64, .seed = 3}, {}, world_);
-    EncodePhase encoded = encode_field(cast, units, light_slab_, trained.codebook, {}, world_);
+    units_kept_ = cast.units_kept;
     CompressedAttenuationField field;
     field.identity.camera.name = "AP";
     field.identity.camera.detector_origin_point = {-100.0, -100.0, 1000.0};
@@ -83,8 +83,28 @@ class FieldBuildTest : public testing::Test {
     field.identity.ct_content_sha256 = std::string(64, 'b');
     field.light_slab = light_slab_;
     field.quantizer_step = quantizer_.step();
-    field.codebook = trained.codebook;
-    return write_field(field, encoded.blocks, {"0", "c", "o", "{}"}, path, world_);
+    field.codebook = train_field(build, cast, {.codewords = 64, .seed = 3}, {}).codebook;
+    FieldEncoder encoder(build, cast, field.codebook, overflow_);
+    const FieldFileInfo info = write_field(
+        field,
+        [&] { return encoder.next_blocks(); },
+        [] {
+          return FieldProvenance{"0", "c", "o", "{}"};
+        },
+        path,
+        world_);
+    units_damaged_ = encoder.units_damaged();
+    return info;
+  }
+
+  [[nodiscard]] FieldBuild build_of(const std::vector<WorkUnit>& units,
+                                    ProgressFolder* progress) const {
+    return {caster_,
+            light_slab_,
+            units,
+            unit_costs(units, light_slab_, volume_.corner_points()),
+            progress,
+            world_};
   }
 
   [[nodiscard]] ProgressManifest manifest(std::int64_t rays_per_unit) const {
@@ -116,7 +136,12 @@ class FieldBuildTest : public testing::Test {
       AttenuationQuantizer::for_maximum(volume_.max_total_attenuation());
   LightSlab light_slab_ = small_light_slab();
   RayCastFieldCaster caster_{volume_, light_slab_, quantizer_, RayCasterOptions{2.0}};
+  static constexpr TrainingSelection kSelection{0.5, 100000, 3};
+  std::uint64_t kept_tile_bytes_ = ~std::uint64_t{0};
+  TileOverflow overflow_ = TileOverflow::CastAgain;
   std::uint64_t units_resumed_ = 0;
+  std::uint64_t units_kept_ = 0;
+  std::uint64_t units_damaged_ = 0;
 };
 
 TEST_F(FieldBuildTest, PayloadIsTheSameOnAnyRankCountPlanAndVectorWidth) {
@@ -126,6 +151,49 @@ TEST_F(FieldBuildTest, PayloadIsTheSameOnAnyRankCountPlanAndVectorWidth) {
     EXPECT_EQ(build(folder_ / "cut.h5", kUnitRays).payload_sha256, kFrozenPayload);
   }
   force_vector_width(std::nullopt);
+}
+
+TEST_F(FieldBuildTest, PayloadIsTheSameWhereverTheTilesAreKept) {
+  constexpr std::uint64_t kRoomForSome = 2000;
+  for (const std::uint64_t room : {std::uint64_t{0}, kRoomForSome}) {
+    kept_tile_bytes_ = room;
+    overflow_ = TileOverflow::CastAgain;
+    EXPECT_EQ(build(folder_ / "cast-again.h5", kUnitRays).payload_sha256, kFrozenPayload);
+    overflow_ = TileOverflow::ReadBack;
+    ProgressManifest expected = manifest(kUnitRays);
+    ProgressFolder progress(folder_ / "read-back.h5.progress", false, expected, world_);
+    EXPECT_EQ(build(folder_ / "read-back.h5", kUnitRays, &progress).payload_sha256, kFrozenPayload);
+    EXPECT_EQ(units_damaged_, 0u);
+    progress.remove();
+    if (room == 0)
+      EXPECT_EQ(units_kept_, 0u);
+    else
+      EXPECT_GT(units_kept_, 0u);
+  }
+}
+
+TEST_F(FieldBuildTest, TilesThatCannotBeReadBackAreCastAgain) {
+  const auto units = plan_units(light_slab_, {kUnitRays});
+  ProgressManifest expected = manifest(kUnitRays);
+  ProgressFolder progress(folder_ / "a.h5.progress", false, expected, world_);
+  const FieldBuild build = build_of(units, &progress);
+  CastPhase cast = cast_field(build, {kSelection, 0}, [] { return false; }, {});
+  const OverflowChoice choice = choose_overflow(build, cast);
+  EXPECT_GT(choice.read_bytes_per_second, 0.0);
+  const Codebook codebook = train_field(build, cast, {.codewords = 64, .seed = 3}, {}).codebook;
+  FieldEncoder encoder(build, cast, codebook, TileOverflow::ReadBack);
+  world_.barrier();
+  if (world_.is_root())
+    for (const auto& entry : std::filesystem::directory_iterator(progress.path()))
+      if (entry.path().extension() == ".shard") std::filesystem::resize_file(entry.path(), 0);
+  world_.barrier();
+  std::size_t mine = 0;
+  for (auto blocks = encoder.next_blocks(); !blocks.empty(); blocks = encoder.next_blocks())
+    mine += blocks.size();
+  EXPECT_EQ(encoder.units_damaged(), mine);
+  std::array<std::uint64_t, 1> all{mine};
+  world_.sum(all);
+  EXPECT_EQ(all[0], units.size());
 }
 
 TEST_F(FieldBuildTest, DecodedFieldStaysNearTheCastSamples) {
@@ -209,7 +277,8 @@ TEST_F(FieldBuildTest, ProgressOfOtherOptionsIsRefusedByNameAndRestartThrowsItAw
   }
   world_.barrier();
   ProgressFolder fresh(progress_path, true, other, world_);
-  EXPECT_TRUE(fresh.read_finished(plan_units(light_slab_, {kUnitRays})).empty());
+  fresh.visit_finished(plan_units(light_slab_, {kUnitRays}),
+                       [](const UnitTiles&) { ADD_FAILURE() << "a unit is left"; });
 }
 
 TEST_F(FieldBuildTest, ADamagedManifestIsAFileError) {
@@ -231,10 +300,10 @@ TEST_F(FieldBuildTest, ADamagedManifestIsAFileError) {
 
 TEST_F(FieldBuildTest, TooManyCodewordsAreOneErrorOfTheWholeJob) {
   const auto units = plan_units(light_slab_, {kUnitRays});
-  const CastPhase cast = cast_field(
-      caster_, units, nullptr, [] { return false; }, {}, world_);
+  const FieldBuild build = build_of(units, nullptr);
+  CastPhase cast = cast_field(build, {{0.001, 100000, 3}}, [] { return false; }, {});
   try {
-    train_field(cast, units, light_slab_, {0.001, 100000, 3}, {.codewords = 64}, {}, world_);
+    train_field(build, cast, {.codewords = 64}, {});
     FAIL() << "it trained";
   } catch (const Error& error) {
     EXPECT_EQ(error.exit_code(), ExitCode::Input);

@@ -64,7 +64,8 @@ class ThreadRanks {
               auto all = bytes_;
               barrier_.arrive_and_wait();
               return all;
-            }};
+            },
+            rank};
   }
 
  private:

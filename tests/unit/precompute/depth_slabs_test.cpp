@@ -67,7 +67,8 @@ TEST(DepthSlabs, OneSlabIsThePapersField) {
   const AttenuationVolume volume(test::smooth_ct(), AttenuationModel{});
   RigidTransform slab_from_ct = RigidTransform::Identity();
   slab_from_ct.translation() = Eigen::Vector3d(0.0, 25.0, 0.0);
-  const DepthSlabs slabs = choose_depth_slabs(SlabAlignedVolume(volume, slab_from_ct), 1);
+  const DepthSlabs slabs =
+      choose_depth_slabs(SlabAlignedVolume(volume, slab_from_ct), 1, StPlane::Centre);
   EXPECT_TRUE(slabs.boundaries_y_mm.empty());
   EXPECT_EQ(slabs.st_plane_y_mm, (std::vector<double>{0.0}));
 }
@@ -79,7 +80,8 @@ TEST(DepthSlabs, BoundariesLieBetweenSlicesAndPlanesAtCentroids) {
   const AttenuationVolume volume(ct, AttenuationModel{});
   RigidTransform slab_from_ct = RigidTransform::Identity();
   slab_from_ct.translation() = Eigen::Vector3d(0.0, 25.0, 0.0);
-  const DepthSlabs slabs = choose_depth_slabs(SlabAlignedVolume(volume, slab_from_ct), 3);
+  const DepthSlabs slabs =
+      choose_depth_slabs(SlabAlignedVolume(volume, slab_from_ct), 3, StPlane::Centroid);
   // Slices stand a fifth of 2 mm before the voxels' planes, and the cuts lie midway between them.
   const double shift_mm = (0.5 - std::sqrt(1.0 / 12.0)) * 2.0;
   constexpr double kRoundingMm = 1e-9;

@@ -65,12 +65,48 @@ TEST(Planner, UnitsBeginAtEvenNodesAndHoldAllStoredRays) {
     }
 }
 
-TEST(Planner, UnitsStayWithinTheirSizeDownToOneRowOfTiles) {
+TEST(Planner, UnitsStayWithinTheirSizeDownToARunOfTiles) {
   const LightSlab light_slab = lattice(16, 16, {{NodeRange{0, 40}, NodeRange{0, 40}}});
-  constexpr std::int64_t kSmallest = 2 * 2 * 2 * 40;
+  constexpr std::int64_t kSmallest = 2 * 2 * 2 * kRunOfT;
   for (const std::int64_t rays_per_unit : {kSmallest, 3 * kSmallest, 100 * kSmallest})
     for (const WorkUnit& unit : plan_units(light_slab, {rays_per_unit}))
       EXPECT_LE(static_cast<std::int64_t>(unit.sample_count()), rays_per_unit);
+}
+
+TEST(Planner, UnitsKeepAllOfUWhileTheyCanBeCutOtherwise) {
+  const LightSlab light_slab = lattice(64, 64, {{NodeRange{0, 40}, NodeRange{0, 40}}});
+  constexpr std::int64_t kLeastOfWholeRows = 64 * 2 * kRunOfT * kRunOfT;
+  for (const std::int64_t rays_per_unit : {kLeastOfWholeRows, 3 * kLeastOfWholeRows})
+    for (const WorkUnit& unit : plan_units(light_slab, {rays_per_unit}))
+      EXPECT_EQ(unit.u.count, 64);
+}
+
+TEST(Planner, UnitsBeginAtRunsAndEndAtChunksOfTheFile) {
+  LightSlab light_slab = lattice(16, 16, {{NodeRange{10, 500}, NodeRange{4, 300}}});
+  for (const std::int64_t rays_per_unit : {std::int64_t{100000}, std::int64_t{1} << 22})
+    for (const WorkUnit& unit : plan_units(light_slab, {rays_per_unit})) {
+      EXPECT_EQ((unit.t.begin - 4) % kRunOfT, 0);
+      EXPECT_EQ((unit.t.begin - 4) / kLargestT, (unit.t.end() - 5) / kLargestT);
+      EXPECT_EQ((unit.s.begin - 10) / kLargestS, (unit.s.end() - 11) / kLargestS);
+    }
+}
+
+TEST(Planner, RaysThroughTheBoxCostMoreThanRaysBesideIt) {
+  const LightSlab light_slab = lattice(4, 4, {{NodeRange{0, 40}, NodeRange{0, 40}}});
+  const auto units = plan_units(light_slab, {4 * 2 * 2 * kRunOfT});
+  const CtBox box{{-9.0, -1.0, -1.0}, {-2.0, 1.0, 9.0}};
+  const auto costs = unit_costs(units, light_slab, box.corner_points());
+  double beside = 0.0;
+  double inside = 0.0;
+  for (std::size_t i = 0; i < units.size(); ++i) {
+    const double cost = costs[i] / static_cast<double>(units[i].sample_count());
+    // The lattice spans -10 to 10 mm in x; the box ends at -2 mm, and its shadow moves by up to
+    // 20 mm * 1 mm / 650 mm.
+    if (light_slab.slabs[0].s.position_mm(units[i].s.begin) > -1.9) beside = std::max(beside, cost);
+    inside = std::max(inside, cost);
+  }
+  EXPECT_GT(inside, 5.0 * beside);
+  EXPECT_GT(beside, 0.0);
 }
 
 TEST(Planner, EveryRankGetsUnitsUntilUnitsAreSmallest) {

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "io/ct_reader.h"
+#include "parallel/communicator.h"
+#include "volume/attenuation_volume.h"
+
+namespace af {
+
+/// What is known of a CT without its voxels.
+struct CtFacts {
+  CtGrid grid;
+  std::string content_sha256;
+};
+
+/// The attenuation of a CT, held once per node.
+struct NodeCt {
+  std::shared_ptr<const AttenuationVolume> volume;
+  CtFacts facts;
+};
+
+/// Collective. Each node's first rank reads the CT; errors as read_ct(), on every rank. Only that
+/// rank ever holds anything but the shared voxels: the file's values and the CT as int16 while it
+/// reads, then the CT while it fills the voxels.
+NodeCt read_ct_per_node(const std::filesystem::path& path,
+                        const CtReadOptions& options,
+                        const AttenuationModel& model,
+                        const Communicator& communicator,
+                        std::vector<std::string>& warnings);
+
+/// Collective. Rank 0 reads the CT for its grid and hash.
+CtFacts read_ct_facts(const std::filesystem::path& path,
+                      const CtReadOptions& options,
+                      const Communicator& communicator,
+                      std::vector<std::string>& warnings);
+
+}  // namespace af
