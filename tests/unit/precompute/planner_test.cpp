@@ -6,6 +6,8 @@
 
 #include <gtest/gtest.h>
 
+#include "geometry/slab_sizing.h"
+
 namespace af {
 namespace {
 
