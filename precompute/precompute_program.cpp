@@ -297,6 +297,9 @@ class PrecomputeRun {
   }
 
   void build(const FieldCaster& caster) {
+    // A limit that is too low is refused before anything is made.
+    const MemoryPlan memory = memory_plan(plan_units(light_slab_, plan()));
+    all_or_none(world_, [&] { (void)memory_limit(options_, memory); });
     ProgressManifest manifest = manifest_of(options_, source_, plan());
     std::optional<ProgressFolder> progress;
     if (options_.has_checkpoint) {
