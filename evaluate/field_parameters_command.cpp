@@ -20,6 +20,7 @@
 #include "io/csv_table.h"
 #include "io/field_file.h"
 #include "io/gnuplot_figure.h"
+#include "io/node_ct.h"
 #include "io/output_file.h"
 #include "io/provenance.h"
 #include "io/study_file.h"
@@ -377,7 +378,7 @@ void run_field_parameters(const FieldParametersOptions& options,
     return ct_path_of(options.base);
   });
   std::vector<std::string> warnings;
-  const registration::NodeCt ct = registration::read_ct_per_node(
+  const NodeCt ct = read_ct_per_node(
       ct_path, {options.base.series_uid}, options.base.attenuation_model(), world, warnings);
   for (const std::string& text : warnings) cli::warn(world, text);
   const RayCastDrr reference(ct.volume, {options.drr_step_mm});

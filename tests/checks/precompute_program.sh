@@ -95,10 +95,35 @@ for caster in shear-warp trilinear; do
       AF_VECTOR_BITS=$bits "$program" "${options[@]}" -o bits.h5 >bits.txt 2>/dev/null
       [[ $(hash_of bits.txt) == "$expected" ]] || fail "another payload with $bits-bit vectors, $caster, $slabs slabs"
     done
-    "$mpiexec" -n 3 --oversubscribe "$program" "${options[@]}" -o three.h5 >three.txt 2>/dev/null
-    [[ $(hash_of three.txt) == "$expected" ]] || fail "another payload on 3 ranks, $caster, $slabs slabs"
+    for ranks in 3 8; do
+      "$mpiexec" -n "$ranks" --oversubscribe "$program" "${options[@]}" -o three.h5 >three.txt 2>/dev/null
+      [[ $(hash_of three.txt) == "$expected" ]] || fail "another payload on $ranks ranks, $caster, $slabs slabs"
+    done
   done
 done
+# Where the (s,t) plane stands is an option; camera names may be typed in any case.
+for plane in centre centroid; do
+  "$program" "${common[@]}" --center-ct-mm 0,8,0 --st-plane "$plane" -o plane.h5 >"$plane.txt" 2>/dev/null
+done
+[[ $(hash_of centre.txt) != "$(hash_of centroid.txt)" ]] || fail '--st-plane makes no difference'
+"$program" --ct ct.mha --rig c-arm-12in --camera ap "${common[@]:6}" --st-plane centre -o plane.h5 >plane.txt 2>/dev/null
+[[ $(hash_of plane.txt) == "${hashes[0]}" ]] || fail '--camera ap or --st-plane centre gives another field'
+
+# Tiles of 200 MB under a limit that holds a fraction of them: read back and cast again give the payload of tiles kept,
+# and no rank exceeds the limit.
+large=(--ct ct.mha --rig c-arm-12in --camera AP --max-translation-mm 5 --uv-nodes 48 --st-nodes 900 --codewords 500)
+large+=(--max-training-tiles 50000)
+"$program" "${large[@]}" --memory-limit 4GB -o kept.h5 >kept.txt 2>kept.err
+grep -q 'all .* kept in memory' kept.err || fail "tiles were not kept: $(cat kept.err)"
+for overflow in read-back cast-again; do
+  limit=120
+  "$program" "${large[@]}" --memory-limit "${limit}MB" --overflow "$overflow" -o bound.h5 >bound.txt 2>bound.err
+  grep -q "the others are ${overflow%%-*}" bound.err || fail "it did not $overflow: $(cat bound.err)"
+  [[ $(hash_of bound.txt) == "$(hash_of kept.txt)" ]] || fail "another payload with --overflow $overflow"
+  peak=$(sed -n 's/.*peak memory \([0-9]*\)[.0-9]* MB of one rank.*/\1/p' bound.err)
+  [[ -n $peak && $peak -lt $limit ]] || fail "a rank took ${peak:-?} MB of $limit MB"
+done
+
 [[ $(printf '%s\n' "${hashes[@]}" | sort -u | wc -l) == 4 ]] || fail 'casters or slabs make no difference'
 [[ ! -e three.h5.progress && ! -e three.h5.partial ]] || fail 'work files are left'
 
