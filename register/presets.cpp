@@ -50,7 +50,8 @@ RegistrationOptions robust_preset() {
                     {gauss_newton_stage("ncc", 2, 8, 2.0, 10.0, 0.5),
                      gauss_newton_stage("tncc", 2, 8, 2.0, 5.0, 0.2),
                      gauss_newton_stage("rg", 2, 4, 1.0, 5.0, 0.1),
-                     gauss_newton_stage("rg", 1, 2, 1.0, 2.0, 0.02)}});
+                     gauss_newton_stage("rg", 1, 2, 1.0, 2.0, 0.05),
+                     gauss_newton_stage("rg", 0, 2, 1.0, 2.0, 0.02)}});
 }
 
 struct Preset {
