@@ -46,7 +46,7 @@ ScaledParameters ascent_direction(const std::deque<Change>& changes,
 ScaledParameters bounded_step(const std::deque<Change>& changes,
                               const ScaledParameters& gradient,
                               double longest_mm) {
-  const ScaledParameters direction = ascent_direction(changes, gradient);
+  ScaledParameters direction = ascent_direction(changes, gradient);
   const double length = direction.norm();
   if (!(length > 0.0)) return ScaledParameters::Zero();
   if (changes.empty() || length > longest_mm) return direction * (longest_mm / length);

@@ -17,7 +17,8 @@ double DifferenceEntropy::evaluate(std::span<const float> drr,
   std::fill(mine.counts.begin(), mine.counts.end(), 0U);
   const auto bins_per_unit = static_cast<float>(bins_ / (2.0 * difference_.xray_range()));
   // No difference is the middle of a bin: rounding does not spread it over two.
-  const float middle = static_cast<float>(bins_ / 2) + 0.5f;
+  const int middle_bin = bins_ / 2;
+  const float middle = static_cast<float>(middle_bin) + 0.5f;
   const auto last = static_cast<float>(bins_ - 1);
   for (std::size_t i = 0; i < drr.size(); ++i) {
     if (difference_.weights()[i] == 0.0f) continue;
