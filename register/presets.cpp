@@ -4,26 +4,10 @@
 #include <array>
 
 #include "base/error.h"
+#include "register/chain_text.h"
 
 namespace af::registration {
 namespace {
-
-StageOptions gauss_newton_stage(const char* similarity,
-                                int level,
-                                int pixel_step,
-                                double roi_scale,
-                                double longest_step_mm,
-                                double final_step_mm) {
-  StageOptions stage;
-  stage.level = level;
-  stage.pixel_step = pixel_step;
-  stage.roi_scale = roi_scale;
-  stage.similarity.name = similarity;
-  stage.optimizer = "gauss-newton";
-  stage.search.initial_step_mm = longest_step_mm;
-  stage.search.final_step_mm = final_step_mm;
-  return stage;
-}
 
 RegistrationOptions one_chain(ChainOptions chain) {
   RegistrationOptions options;
@@ -38,20 +22,20 @@ RegistrationOptions paper_preset() {
 }
 
 RegistrationOptions fast_preset() {
-  return one_chain({"fast",
-                    {gauss_newton_stage("ncc", 2, 8, 2.0, 10.0, 0.5),
-                     gauss_newton_stage("gc", 2, 8, 2.0, 5.0, 0.2),
-                     gauss_newton_stage("gc", 2, 4, 1.0, 5.0, 0.1),
-                     gauss_newton_stage("gc", 1, 2, 1.0, 2.0, 0.02)}});
+  return one_chain(chain_from_text("fast",
+                                   "ncc gauss-newton level=2 pixels=8 roi=2 step=10;"
+                                   "gc gauss-newton level=2 pixels=8 roi=2 final=0.2;"
+                                   "gc gauss-newton level=2 pixels=4 final=0.1;"
+                                   "gc gauss-newton level=1 pixels=2 step=2 final=0.02"));
 }
 
 RegistrationOptions robust_preset() {
-  return one_chain({"robust",
-                    {gauss_newton_stage("ncc", 2, 8, 2.0, 10.0, 0.5),
-                     gauss_newton_stage("tncc", 2, 8, 2.0, 5.0, 0.2),
-                     gauss_newton_stage("rg", 2, 4, 1.0, 5.0, 0.1),
-                     gauss_newton_stage("rg", 1, 2, 1.0, 2.0, 0.05),
-                     gauss_newton_stage("rg", 0, 2, 1.0, 2.0, 0.02)}});
+  return one_chain(chain_from_text("robust",
+                                   "ncc gauss-newton level=2 pixels=8 roi=2 step=10;"
+                                   "tncc gauss-newton level=2 pixels=8 roi=2 final=0.2;"
+                                   "rg gauss-newton level=2 pixels=4 final=0.1;"
+                                   "rg gauss-newton level=1 pixels=2 step=2 final=0.05;"
+                                   "rg gauss-newton pixels=2 step=2 final=0.02"));
 }
 
 struct Preset {
@@ -81,6 +65,7 @@ ChainOptions paper_chain() {
 
 std::vector<std::string> preset_names() {
   std::vector<std::string> names;
+  names.reserve(kPresets.size());
   for (const Preset& preset : kPresets) names.emplace_back(preset.name);
   return names;
 }
