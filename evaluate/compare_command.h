@@ -14,12 +14,14 @@ namespace af::evaluation {
 struct CompareOptions {
   std::vector<std::filesystem::path> runs;
   std::filesystem::path output = "methods.md";
+  bool is_screen = false;  ///< Markdown of measures against optimisers
 };
 
 /// Adds the subcommand; returns it.
 CLI::App* bind_compare(CLI::App& app, CompareOptions& options);
 
-/// Collective. One table of all finished registration runs, as Markdown and, beside it, as CSV.
+/// Collective. One table of all finished registration runs, as Markdown and, beside it, as CSV; one
+/// of pairs below it when runs have both renderers.
 void run_compare(const CompareOptions& options, const Communicator& world);
 
 }  // namespace af::evaluation

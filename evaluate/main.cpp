@@ -3,6 +3,7 @@
 #include "evaluate/compare_command.h"
 #include "evaluate/field_parameters_command.h"
 #include "evaluate/image_quality_command.h"
+#include "evaluate/method_options_command.h"
 #include "evaluate/registration_command.h"
 #include "evaluate/report_command.h"
 #include "evaluate/similarity_curves_command.h"
@@ -24,6 +25,8 @@ int main(int argc, char** argv) {
   const CLI::App* compare_command = bind_compare(app, compare);
   af::evaluation::ReportOptions report;
   const CLI::App* report_command = bind_report(app, report);
+  af::registration::MethodOptions method;
+  const CLI::App* method_command = af::evaluation::bind_show_method(app, method);
   const std::string command_line = af::cli::command_line(argc, argv);
   return af::cli::app_main(app, argc, argv, [&](const af::Communicator& world) {
     if (image_quality_command->parsed()) run_image_quality(image_quality, command_line, world);
@@ -32,6 +35,7 @@ int main(int argc, char** argv) {
     if (field_parameters_command->parsed())
       run_field_parameters(field_parameters, command_line, world);
     if (compare_command->parsed()) run_compare(compare, world);
+    if (method_command->parsed()) af::evaluation::show_method(method, world);
     if (report_command->parsed()) run_report(report, world);
   });
 }

@@ -6,11 +6,13 @@
 #include <iterator>
 #include <limits>
 #include <map>
+#include <set>
 #include <utility>
 
 #include <Eigen/Core>
 
 #include "evaluate/statistics.h"
+#include "evaluate/summary_files.h"
 
 namespace af::evaluation {
 
@@ -29,8 +31,7 @@ double number_or_nan(const CsvTable& table, std::size_t row, const char* column)
 struct Sums {
   std::array<IntervalSuccess, kBands> bands{};
   Eigen::Matrix<double, 6, 1> parameters = Eigen::Matrix<double, 6, 1>::Zero();
-  double tre_mm = 0.0;
-  std::int64_t successes = 0;
+  std::vector<double> tre_mm;  ///< of successes
   std::int64_t starts = 0;
   std::vector<double> drr_counts;
   std::vector<double> seconds;
@@ -50,19 +51,21 @@ void add_row(const CsvTable& table, std::size_t row, Sums& sums) {
   const double seconds = number_or_nan(table, row, "seconds");
   if (std::isfinite(seconds)) sums.seconds.push_back(seconds);
   if (!is_success) return;
-  ++sums.successes;
-  sums.tre_mm += tre_mm;
+  sums.tre_mm.push_back(tre_mm);
   constexpr std::array<const char*, 6> kFinal = {
       "final_rx_deg", "final_ry_deg", "final_rz_deg", "final_tx_mm", "final_ty_mm", "final_tz_mm"};
   for (std::size_t i = 0; i < kFinal.size(); ++i)
     sums.parameters[static_cast<Eigen::Index>(i)] += table.number(row, kFinal[i]);
 }
 
-std::string method_of(const EvaluationRun& run, const std::string& renderer) {
-  if (renderer != "field" && renderer != "raycast") return renderer;
+void name_method(const EvaluationRun& run, MethodRow& row) {
+  row.method = row.renderer;
+  if (row.renderer != "field" && row.renderer != "raycast") return;
   const json method = run.summary.value("method", json::object());
-  return method.value("preset", "?") + " " + method.value("similarity", "?") + " " +
-         method.value("optimizer", "?");
+  row.preset = method.value("preset", "?");
+  row.similarity = method.value("similarity", "?");
+  row.optimizer = method.value("optimizer", "?");
+  row.method = row.preset + " " + row.similarity + " " + row.optimizer;
 }
 
 MethodRow row_of(const EvaluationRun& run,
@@ -72,8 +75,8 @@ MethodRow row_of(const EvaluationRun& run,
   MethodRow row;
   row.run = run.folder.filename().string();
   row.case_name = case_name;
-  row.method = method_of(run, renderer);
   row.renderer = renderer;
+  name_method(run, row);
   row.starts = sums.starts;
   for (std::size_t band = 0; band < kBands; ++band) {
     row.bands.push_back(sums.bands[band]);
@@ -82,8 +85,10 @@ MethodRow row_of(const EvaluationRun& run,
     row.bands[band].wilson = wilson_interval(sums.bands[band].successes, sums.bands[band].trials);
   }
   // NaN without a success: 0 / 0.
-  const auto successes = static_cast<double>(sums.successes);
-  row.mean_tre_mm = sums.tre_mm / successes;
+  const auto successes = static_cast<double>(sums.tre_mm.size());
+  const SampleSummary tre = summarize(sums.tre_mm);
+  row.mean_tre_mm = tre.mean;
+  row.median_tre_mm = tre.median;
   row.rotation_bias_deg = sums.parameters.head<3>().norm() / successes;
   row.translation_bias_mm = sums.parameters.tail<3>().norm() / successes;
   row.median_drr_count = summarize(sums.drr_counts).median;
@@ -97,6 +102,16 @@ std::string percent_text(const IntervalSuccess& band) {
   const double percent = 100 * band.rate();
   const bool would_mislead = percent < 100 && percent >= 99.5;
   return fixed_text(percent, would_mislead ? 1 : 0);
+}
+
+std::string wilson_text(const IntervalSuccess& band) {
+  if (band.trials == 0) return "";
+  return " [" + fixed_text(100 * band.wilson.low, 0) + ", " +
+         fixed_text(100 * band.wilson.high, 0) + "]";
+}
+
+std::string p_text(double p) {
+  return p < 0.0001 ? "< 0.0001" : fixed_text(p, 4);
 }
 
 std::string number_or_dash(double value, int decimals) {
@@ -127,6 +142,7 @@ CsvTable methods_table(const std::vector<MethodRow>& rows) {
       columns.push_back(what + name);
   }
   for (const char* name : {"mean_tre_mm",
+                           "median_tre_mm",
                            "rotation_bias_deg",
                            "translation_bias_mm",
                            "median_drr_count",
@@ -143,6 +159,7 @@ CsvTable methods_table(const std::vector<MethodRow>& rows) {
       fields.push_back(number_text(band.wilson.high));
     }
     for (const double value : {row.mean_tre_mm,
+                               row.median_tre_mm,
                                row.rotation_bias_deg,
                                row.translation_bias_mm,
                                row.median_drr_count,
@@ -154,28 +171,83 @@ CsvTable methods_table(const std::vector<MethodRow>& rows) {
 }
 
 std::string methods_markdown(const std::vector<MethodRow>& rows) {
-  std::string text = "| Run | Case | Method | Renderer | Success %, starts ";
+  std::string text = "| Run | Case | Method | Renderer | Success % [95 % interval], starts ";
   for (std::size_t band = 0; band < kBands; ++band)
     text += (band == 0 ? "" : " / ") + fixed_text(kBandEndsMm[band], 0) + "-" +
             fixed_text(kBandEndsMm[band + 1], 0);
   text +=
-      " mm | of starts | Mean TRE of successes, mm | Bias, deg and mm | DRRs | Seconds |\n"
+      " mm | of starts | TRE of successes, mm: mean, median | Bias, deg and mm | DRRs | Seconds |\n"
       "|---|---|---|---|---|---|---|---|---|---|\n";
   for (const MethodRow& row : rows) {
     std::string percents;
     std::string counts;
     for (const IntervalSuccess& band : row.bands) {
-      percents += (percents.empty() ? "" : " / ") + percent_text(band);
+      percents += (percents.empty() ? "" : " / ") + percent_text(band) + wilson_text(band);
       counts += (counts.empty() ? "" : " / ") + std::to_string(band.trials);
     }
     text += "| " + row.run + " | " + row.case_name + " | " + row.method + " | " + row.renderer +
-            " | " + percents + " | " + counts + " | " + number_or_dash(row.mean_tre_mm, 3) + " | " +
+            " | " + percents + " | " + counts + " | " + number_or_dash(row.mean_tre_mm, 3) + ", " +
+            number_or_dash(row.median_tre_mm, 3) + " | " +
             number_or_dash(row.rotation_bias_deg, 3) + ", " +
             number_or_dash(row.translation_bias_mm, 3) + " | " +
             number_or_dash(row.median_drr_count, 0) + " | " +
             number_or_dash(row.median_seconds, 4) + " |\n";
   }
   return text;
+}
+
+std::string screen_markdown(const std::vector<MethodRow>& rows) {
+  std::map<std::array<std::string, 4>, std::map<std::string, std::string>> lines;
+  std::set<std::string> optimizers;
+  for (const MethodRow& row : rows) {
+    optimizers.insert(row.optimizer);
+    lines[{row.case_name, row.renderer, row.preset, row.similarity}][row.optimizer] =
+        percent_text(row.bands[0]) + " / " + percent_text(row.bands[1]) + ", " +
+        number_or_dash(row.median_tre_mm, 3);
+  }
+  std::string head = "| Case | Renderer | Preset | Measure |";
+  std::string rule = "|---|---|---|---|";
+  for (const std::string& optimizer : optimizers) {
+    head += " " + optimizer + " |";
+    rule += "---|";
+  }
+  std::string text = head + "\n" + rule + "\n";
+  for (const auto& [key, cells] : lines) {
+    text += "|";
+    for (const std::string& part : key) text += " " + part + " |";
+    for (const std::string& optimizer : optimizers) {
+      const auto cell = cells.find(optimizer);
+      text += " " + (cell == cells.end() ? std::string() : cell->second) + " |";
+    }
+    text += "\n";
+  }
+  return text;
+}
+
+std::string pairs_markdown(const std::vector<EvaluationRun>& runs) {
+  std::string text;
+  for (const EvaluationRun& run : runs) {
+    const json pairs = run.summary.value("field_against_raycast", json());
+    if (!pairs.is_object() || !pairs.contains("test")) continue;
+    const json& test = pairs["test"];
+    const auto number = [&](const char* name, int decimals) {
+      return number_or_dash(number_of(test[name]), decimals);
+    };
+    text += "| " + run.folder.filename().string() + " | " + pairs["common_starts"].dump() + " | " +
+            pairs["successes"][0].dump() + ", " + pairs["successes"][1].dump() + " | " +
+            number_or_dash(number_of(pairs["mcnemar_p"]), 2) + " | " + pairs["pairs"].dump() +
+            " | " + number("mean_difference_mm", 3) + " [" + number("low_90_mm", 3) + ", " +
+            number("high_90_mm", 3) + "] | " + p_text(number_of(test["equivalence_p"])) + " at " +
+            number("margin_mm", 2) + " mm | " + number("equivalence_power", 2) + " | " +
+            number_or_dash(number_of(pairs["median_seconds"][0]), 4) + ", " +
+            number_or_dash(number_of(pairs["median_seconds"][1]), 2) + " |\n";
+  }
+  if (text.empty()) return text;
+  return "| Run | Common starts | Successes: field, ray casting | McNemar p | Pairs | TRE, field "
+         "less "
+         "ray casting, mm [90 % interval] | Equivalence p | Power | Seconds |\n"
+         "|---|---|---|---|---|---|---|---|---|\n" +
+         text;
 }
 
 }  // namespace af::evaluation

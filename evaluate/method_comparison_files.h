@@ -16,10 +16,12 @@ struct MethodRow {
   std::string run;  ///< its folder's name
   std::string case_name;
   std::string method;  ///< "PRESET SIMILARITY OPTIMIZER", or the name of other programs' poses
+  std::string preset, similarity, optimizer;  ///< the parts of it; empty for other programs' poses
   std::string renderer;
   std::vector<IntervalSuccess> bands;  ///< of initial TRE, see kBandEndsMm
   std::int64_t starts = 0;
-  double mean_tre_mm = 0.0;          ///< of successes, as the rest
+  double mean_tre_mm = 0.0;  ///< of successes, as the rest
+  double median_tre_mm = 0.0;
   double rotation_bias_deg = 0.0;    ///< length of the mean signed rotation
   double translation_bias_mm = 0.0;  ///< length of the mean signed translation
   double median_drr_count = 0.0;     ///< of all starts, as the seconds
@@ -38,5 +40,14 @@ CsvTable methods_table(const std::vector<MethodRow>& rows);
 
 /// The same for people, as a table in Markdown.
 std::string methods_markdown(const std::vector<MethodRow>& rows);
+
+/// Success for the first two bands and median TRE, as a table in Markdown of measures against
+/// optimisers: one line per case, renderer, preset and measure.
+std::string screen_markdown(const std::vector<MethodRow>& rows);
+
+/// Field against ray casting from the same starts, of the runs that have both: success, the paired
+/// TRE difference with its 90 % interval, two one-sided tests and their power, as a table in
+/// Markdown; empty without such a run.
+std::string pairs_markdown(const std::vector<EvaluationRun>& runs);
 
 }  // namespace af::evaluation

@@ -12,9 +12,11 @@ namespace {
 
 registration::CaseLoadOptions load_options(const MethodOptions& options,
                                            const std::string& renderer,
-                                           int coarsest_level) {
+                                           int coarsest_level,
+                                           const std::vector<double>& level_blur_sigma_mm) {
   registration::CaseLoadOptions result;
   result.coarsest_level = coarsest_level;
+  result.level_blur_sigma_mm = level_blur_sigma_mm;
   result.renderer =
       renderer == "field" ? registration::RendererKind::Field : registration::RendererKind::RayCast;
   if (renderer == "field")
@@ -28,6 +30,15 @@ registration::CaseLoadOptions load_options(const MethodOptions& options,
   return result;
 }
 
+/// Blurs of a problem's levels, means over the views.
+std::vector<double> level_blurs_mm(const registration::RegistrationProblem& problem) {
+  std::vector<double> blurs(problem.views.front().coarse_levels.size(), 0.0);
+  for (const registration::RegistrationView& view : problem.views)
+    for (std::size_t i = 0; i < blurs.size(); ++i)
+      blurs[i] += view.coarse_levels[i].blur_sigma_mm / static_cast<double>(problem.views.size());
+  return blurs;
+}
+
 }  // namespace
 
 std::vector<LoadedMethod> load_methods(const MethodOptions& options,
@@ -38,9 +49,15 @@ std::vector<LoadedMethod> load_methods(const MethodOptions& options,
   std::vector<LoadedMethod> methods;
   const registration::RegistrationOptions method =
       all_or_none(world, [&] { return registration::resolve(options.method); });
+  // Ray casting after a field takes its levels' blurs, so that both run the same method.
+  std::vector<double> blurs_mm;
   for (const std::string& renderer : options.chosen_renderers()) {
-    const registration::LoadedCase loaded = registration::load_case(
-        study, study_case, load_options(options, renderer, method.coarsest_level()), world);
+    const registration::LoadedCase loaded =
+        registration::load_case(study,
+                                study_case,
+                                load_options(options, renderer, method.coarsest_level(), blurs_mm),
+                                world);
+    blurs_mm = level_blurs_mm(*loaded.problem);
     for (const std::string& text : loaded.warnings) cli::warn(world, text);
     for (const auto& [name, hash] : loaded.input_sha256)
       input_sha256[study_case.name + ": " + name] = hash;

@@ -2,6 +2,7 @@
 #include "evaluate/method_options_command.h"
 
 #include <iomanip>
+#include <iostream>
 #include <set>
 #include <sstream>
 
@@ -94,6 +95,20 @@ void bind_method(CLI::App& command, MethodOptions& options) {
       ->capture_default_str();
   command.add_option(
       "--series", options.series_uid, "DICOM series UID, when a CT's folder has several");
+}
+
+CLI::App* bind_show_method(CLI::App& app, registration::MethodOptions& options) {
+  CLI::App* command = app.add_subcommand(
+      "method", "What a preset and the options that replace parts of it stand for: its chains");
+  bind_method(*command, options);
+  return command;
+}
+
+void show_method(const registration::MethodOptions& options, const Communicator& world) {
+  all_or_none(world, [&] {
+    const std::string text = to_toml(options, registration::resolve(options));
+    if (world.is_root()) std::cout << text;
+  });
 }
 
 }  // namespace af::evaluation

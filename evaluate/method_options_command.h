@@ -8,6 +8,7 @@
 #include <CLI/CLI.hpp>
 
 #include "io/study_file.h"
+#include "parallel/communicator.h"
 #include "register/method_options.h"
 
 namespace af::evaluation {
@@ -37,5 +38,11 @@ std::string to_toml(const MethodOptions& options);
 std::string toml_list(const std::vector<std::string>& values);
 
 void bind_method(CLI::App& command, MethodOptions& options);
+
+/// Adds the subcommand `method`; returns it.
+CLI::App* bind_show_method(CLI::App& app, registration::MethodOptions& options);
+
+/// Prints what a preset and the options that replace parts of it stand for, as TOML.
+void show_method(const registration::MethodOptions& options, const Communicator& world);
 
 }  // namespace af::evaluation

@@ -12,7 +12,7 @@ Usage: jobs/registration-study.sh [OPTIONS]
 Simulates one study per anatomy and variant, builds the fields, draws one table of starts per anatomy, registers from
 these same starts with every method, and writes methods.md and methods.csv: success for starts 0-8, 8-16 and 16-30 mm
 from the true pose, TRE of successes, bias, DRRs, seconds. What is finished is kept, so the same command goes on where
-it was stopped, and a method that is added costs only itself. Needs the programs in build/release/bin (or installed).
+it was stopped, and a method that is added or changed costs only itself. Needs the programs in build/release/bin (or installed).
 
   --output DIR              where everything goes                                     [./registration-study]
   --ct NAME=PATH            an anatomy: a CT file or DICOM folder; may be repeated
@@ -20,8 +20,17 @@ it was stopped, and a method that is added costs only itself. Needs the programs
   --variants LIST           comma separated: clean, stressed (rods,fiducials,heel,noise,degraded-ct),
                             moving (the same and motion), scatter, calibration, or any names that
                             af-simulate --stress takes, joined by +                [clean,stressed,scatter]
-  --methods LIST            comma separated, each PRESET[:SIMILARITY[:OPTIMIZER]]                   [paper]
+  --methods LIST            comma separated, each PRESET[:SIMILARITY[:OPTIMIZER]] or a --chain's    [paper]
+                            NAME
+  --chain NAME=TEXT         a method of one's own, TEXT as af-evaluate's --chain; the same NAME again
+                            makes a portfolio
   --renderer NAME           field, raycast or both                                                  [field]
+  --screen                  first, on the first anatomy, clean: every measure with every optimiser that can
+                            use it, from 10 starts in each interval up to 16 mm; a table of its own
+  --pairs NAME=N            on anatomy NAME, clean: the first N starts in each interval up to 16 mm also by
+                            ray casting, for a table of field against ray casting; may be repeated
+  --pair-methods LIST       methods of these pairs                                         [those of --methods]
+  --roi-px N                side of the regions of interest, detector pixels                         [200]
   --starts-per-interval N   starts in each interval of 2 mm                                            [30]
   --intervals N             intervals of 2 mm, from 0                                                  [15]
   --max-rotation-deg X      range of the fields, degrees                                               [12]
@@ -37,7 +46,8 @@ TEXT
 
 output="$PWD/registration-study"
 anatomies=() variants=clean,stressed,scatter methods=paper renderer=field
-starts_per_interval=30 intervals=15 max_rotation_deg=12 max_translation_mm=40 seed=1
+starts_per_interval=30 intervals=15 roi_px=200 with_screen=0 pair_methods="" max_rotation_deg=12 max_translation_mm=40 seed=1
+declare -A pairs=() chains=()
 field_size=(--uv-nodes 64 --st-nodes 256 --codewords 16384)
 ranks=$(core_count)
 
@@ -58,6 +68,21 @@ while (($# > 0)); do
     --phantom) need_value "$1" $#; anatomies+=("$2=phantom=$2"); shift ;;
     --variants) need_value "$1" $#; variants=$2; shift ;;
     --methods) need_value "$1" $#; methods=$2; shift ;;
+    --chain)
+      need_value "$1" $#
+      [[ "$2" =~ ^[A-Za-z0-9._-]+=.+$ ]] || die 2 "--chain = '$2' must be NAME=TEXT"
+      chains[${2%%=*}]+="${2#*=}"$'\n'
+      shift
+      ;;
+    --screen) with_screen=1 ;;
+    --pairs)
+      need_value "$1" $#
+      [[ "$2" =~ ^[A-Za-z0-9._-]+=[1-9][0-9]*$ ]] || die 2 "--pairs = '$2' must be NAME=N"
+      pairs[${2%%=*}]=${2#*=}
+      shift
+      ;;
+    --pair-methods) need_value "$1" $#; pair_methods=$2; shift ;;
+    --roi-px) need_value "$1" $#; need_count "$1" "$2"; roi_px=$2; shift ;;
     --renderer) need_value "$1" $#; renderer=$2; shift ;;
     --starts-per-interval) need_value "$1" $#; need_count "$1" "$2"; starts_per_interval=$2; shift ;;
     --intervals) need_value "$1" $#; need_count "$1" "$2"; intervals=$2; shift ;;
@@ -135,24 +160,84 @@ if ((${#anatomies[@]} == 0)); then
   fi
   anatomies=("skull=ct=$output/skull.mhd")
 fi
-mkdir -p "$output/studies" "$output/fields" "$output/starts" "$output/runs"
+mkdir -p "$output/studies" "$output/fields" "$output/starts" "$output/runs" "$output/screen" "$output/pairs"
 IFS=, read -r -a variant_list <<<"$variants"
 IFS=, read -r -a method_list <<<"$methods"
+IFS=, read -r -a pair_method_list <<<"${pair_methods:-$methods}"
 
-run_folders=()
+# make_study NAME-VARIANT KIND SOURCE STRESS: a simulated case whose regions have --roi-px, about the detectors' middles.
+make_study() {
+  local name=$1 kind=$2 source=$3 stress=$4 study="$output/studies/$1/study.toml" corner=$(((512 - roi_px) / 2))
+  "$bin/af-simulate" "--$kind" "$source" --case "${name%%-*}" --rig treatment-room --seed "$seed" --no-fiducials \
+    --roi-px "$roi_px" "$roi_px" ${stress:+--stress "$stress"} --force -o "$output/studies/$name"
+  # af-simulate lets regions grow until they hold the target box.
+  sed -i "s/^roi_px.*/roi_px = [$corner, $corner, $roi_px, $roi_px]/" "$study"
+}
+
+# method_options METHOD: sets method_options to what af-evaluate is given, and method_text to what that stands for.
+method_options() {
+  local preset similarity optimizer text
+  method_options=()
+  if [[ -n "${chains[$1]:-}" ]]; then
+    while IFS= read -r text; do
+      method_options+=(--chain "$text")
+    done <<<"${chains[$1]%$'\n'}"
+  else
+    IFS=: read -r preset similarity optimizer <<<"$1"
+    method_options=(--preset "$preset" ${similarity:+--similarity "$similarity"} ${optimizer:+--optimizer "$optimizer"})
+  fi
+  method_text="$("$bin/af-evaluate" method "${method_options[@]}")"
+}
+
+# register FOLDER METHOD OPTIONS...: registers the current study, unless it was done with the same options by a method of
+# the same chains.
+register() {
+  local folder=$1 method=$2 base_chain=$chain
+  shift 2
+  method_options "$method"
+  chain="$base_chain$method_text "
+  run_stage "$folder" run_ranks "$ranks" "$bin/af-evaluate" registration --study "$study" "${field_options[@]}" \
+    --gold study "${method_options[@]}" --seed "$seed" -o "$output/$folder" "$@"
+  chain=$base_chain
+}
+
+# Measures and the optimisers that can use them: local ones that need only values in the paper's two passes, those that
+# need derivatives, bobyqa for comparison and the costly cma-es on the pyramid of `fast`.
+screen_methods() {
+  local similarity optimizer
+  for similarity in mi nmi ncc tncc gc rg ssd gd go pi entropy; do
+    for optimizer in best-neighbor bobyqa nelder-mead; do echo "paper:$similarity:$optimizer"; done
+    for optimizer in bobyqa cma-es; do echo "fast:$similarity:$optimizer"; done
+  done
+  for similarity in ncc tncc gc rg ssd; do echo "fast:$similarity:gauss-newton"; done
+  for similarity in mi nmi ncc gc rg ssd; do echo "fast:$similarity:gradient"; done
+}
+
+# On the clean study.
+screen() {
+  local method
+  run_stage "starts of the screen" "$bin/af-evaluate" registration --study "$study" "${field_options[@]}" --gold study \
+    --intervals 8 --starts-per-interval 10 --seed "$seed" --starts-only -o "$output/starts/screen"
+  for method in $(screen_methods); do
+    register "screen/${method//:/-}" "$method" --intervals 8 --starts-per-interval 10 \
+      --starts-from "$output/starts/screen/starts.csv"
+    screen_folders+=("$output/screen/${method//:/-}")
+  done
+}
+
+run_folders=() screen_folders=() pair_folders=()
 for anatomy in "${anatomies[@]}"; do
   IFS='=' read -r name kind source <<<"$anatomy"
-  chain="$kind $source, ${field_size[*]}, $max_rotation_deg deg, $max_translation_mm mm: "
+  chain="$kind $source, ${field_size[*]}, $max_rotation_deg deg, $max_translation_mm mm, $roi_px px: "
   starts=""
   for variant in clean "${variant_list[@]/#clean/}"; do
     [[ -n "$variant" ]] || continue
     stress=$(stress_of "$variant")
     study="$output/studies/$name-$variant/study.toml"
-    run_stage "study $name-$variant" "$bin/af-simulate" "--$kind" "$source" --case "$name" --rig treatment-room \
-      --seed "$seed" ${stress:+--stress "$stress"} --force -o "$output/studies/$name-$variant"
-    # Only a degraded CT needs fields of its own.
+    run_stage "study $name-$variant" make_study "$name-$variant" "$kind" "$source" "$stress"
+    # Only a degraded CT and a wrong rig need fields of their own.
     fields="$name-clean"
-    [[ ",$stress," != *,degraded-ct,* ]] || fields="$name-$variant"
+    [[ ! ",$stress," =~ ,(degraded-ct|calibration), ]] || fields="$name-$variant"
     build_fields "$fields" "$output/studies/$fields/study.toml"
     field_options=(--field "A=$output/fields/$fields/A.af.h5" --field "B=$output/fields/$fields/B.af.h5")
     if [[ -z "$starts" ]]; then
@@ -161,20 +246,36 @@ for anatomy in "${anatomies[@]}"; do
         --intervals "$intervals" --starts-per-interval "$starts_per_interval" --seed "$seed" --starts-only \
         -o "$output/starts/$name"
     fi
+    start_options=(--intervals "$intervals" --starts-per-interval "$starts_per_interval" --starts-from "$starts")
+    if [[ "$variant" == clean ]]; then
+      if ((with_screen && ${#screen_folders[@]} == 0)); then
+        screen
+      fi
+      if [[ -n "${pairs[$name]:-}" ]]; then
+        for method in "${pair_method_list[@]}"; do
+          register "pairs/$name-${method//:/-}" "$method" "${start_options[@]}" --renderer both --raycast-intervals 8 \
+            --raycast-starts-per-interval "${pairs[$name]}"
+          pair_folders+=("$output/pairs/$name-${method//:/-}")
+        done
+      fi
+    fi
     # The clean study is made for its fields and starts in any case, but registered only when asked for.
     [[ ",$variants," == *",$variant,"* ]] || continue
     [[ "$renderer" != raycast ]] || field_options=()
     for method in "${method_list[@]}"; do
-      IFS=: read -r preset similarity optimizer <<<"$method"
-      run="$output/runs/$name-$variant-${method//:/-}"
-      run_stage "$name-$variant by $method" run_ranks "$ranks" "$bin/af-evaluate" registration --study "$study" \
-        "${field_options[@]}" --renderer "$renderer" --gold study --preset "$preset" \
-        ${similarity:+--similarity "$similarity"} ${optimizer:+--optimizer "$optimizer"} --intervals "$intervals" \
-        --starts-per-interval "$starts_per_interval" --starts-from "$starts" --seed "$seed" -o "$run"
-      run_folders+=("$run")
+      register "runs/$name-$variant-${method//:/-}" "$method" "${start_options[@]}" --renderer "$renderer"
+      run_folders+=("$output/runs/$name-$variant-${method//:/-}")
     done
   done
 done
 ((${#run_folders[@]} > 0)) || die 2 "--variants = '$variants' and --methods = '$methods' name nothing to do"
 "$bin/af-evaluate" compare "${run_folders[@]}" -o "$output/methods.md"
 say "Table: $output/methods.md, $output/methods.csv"
+if ((${#screen_folders[@]} > 0)); then
+  "$bin/af-evaluate" compare --screen "${screen_folders[@]}" -o "$output/screen.md"
+  say "Table: $output/screen.md, $output/screen.csv"
+fi
+if ((${#pair_folders[@]} > 0)); then
+  "$bin/af-evaluate" compare "${pair_folders[@]}" -o "$output/pairs.md"
+  say "Table: $output/pairs.md, $output/pairs.csv"
+fi

@@ -16,6 +16,7 @@
 #include "io/sha256.h"
 #include "io/xray_reader.h"
 #include "register/parameter_scaling.h"
+#include "volume/blurred_volume.h"
 
 namespace af::registration {
 namespace {
@@ -24,6 +25,10 @@ constexpr double kCameraToleranceMm = 1e-3;
 
 /// Half the side of the cube about the ROI centre that stands for the CT when it is not read.
 constexpr double kAssumedCtHalfSideMm = 100.0;
+
+/// Between the nodes of the field whose levels ray casting imitates, when there is none: about that
+/// of the paper's field of a head or a spine.
+constexpr double kAssumedNodeMm = 1.0;
 
 std::filesystem::path field_path_of(const StudyCase& study_case,
                                     const StudyView& view,
@@ -90,6 +95,40 @@ std::vector<RendererLevel> coarse_field_levels(const CompressedAttenuationField&
   const Communicator node = communicator.node();
   for (const auto& level : make_field_pyramid(field, coarsest, node_memory(node)))
     levels.push_back({std::make_shared<const TwoPassAfDrr>(level), level->blur_sigma_mm(true)});
+  return levels;
+}
+
+/// Collective. The same CT, its attenuation blurred by sigma_mm, held once per node.
+std::shared_ptr<const AttenuationVolume> blurred_per_node(const AttenuationVolume& volume,
+                                                          double sigma_mm,
+                                                          const Communicator& communicator) {
+  const VolumeBlur blur(volume.grid(), sigma_mm);
+  const std::size_t count = blur.grid().voxel_count();
+  const auto owner = communicator.node().allocate_on_node(
+      count * sizeof(std::uint16_t), [&](std::span<std::byte> memory) {
+        blur.fill(volume, {reinterpret_cast<std::uint16_t*>(memory.data()), count});
+      });
+  const auto* const voxels = reinterpret_cast<const std::uint16_t*>(owner.get());
+  return std::make_shared<const AttenuationVolume>(
+      blur.grid(), volume.model(), SharedArray<std::uint16_t>(owner, {voxels, count}));
+}
+
+/// Collective. Levels 1 ... coarsest_level of ray casting: the CT blurred as the fields' levels
+/// blur DRRs, sampled twice per sigma.
+std::vector<RendererLevel> coarse_ray_casts(const AttenuationVolume& volume,
+                                            const CaseLoadOptions& options,
+                                            const Communicator& communicator) {
+  std::vector<RendererLevel> levels;
+  for (int level = 1; level <= options.coarsest_level; ++level) {
+    const auto at = static_cast<std::size_t>(level - 1);
+    const double sigma_mm = at < options.level_blur_sigma_mm.size()
+                                ? options.level_blur_sigma_mm[at]
+                                : kAssumedNodeMm * level_blur_sigma_in_nodes(level, true);
+    const auto blurred = blurred_per_node(volume, sigma_mm, communicator);
+    RayCasterOptions caster = options.ray_caster;
+    caster.step_mm = std::max(caster.step_mm, 0.5 * sigma_mm);
+    levels.push_back({std::make_shared<const RayCastDrr>(blurred, caster), sigma_mm});
+  }
   return levels;
 }
 
@@ -177,8 +216,12 @@ LoadedCase load_case(const Study& study,
     const NodeCt node_ct =
         read_ct_per_node(study_case.ct, options.ct, model, communicator, loaded.warnings);
     ct = node_ct.facts;
-    for (RegistrationView& view : problem->views)
-      view.renderer = std::make_shared<const RayCastDrr>(node_ct.volume, options.ray_caster);
+    const auto renderer = std::make_shared<const RayCastDrr>(node_ct.volume, options.ray_caster);
+    const auto levels = coarse_ray_casts(*node_ct.volume, options, communicator);
+    for (RegistrationView& view : problem->views) {
+      view.renderer = renderer;
+      view.coarse_levels = levels;
+    }
   } else if (!options.skip_ct_check) {
     ct = read_ct_facts(study_case.ct, options.ct, communicator, loaded.warnings);
   }

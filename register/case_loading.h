@@ -29,6 +29,9 @@ struct CaseLoadOptions {
   RayCasterOptions ray_caster;
   bool skip_ct_check = false;  ///< with fields: do not read the CT (it may be absent)
   int coarsest_level = 0;      ///< of the image pyramids: RegistrationOptions::coarsest_level()
+  /// Ray casting: blurs of levels 1, 2, ..., in mm on the isocentre plane; of missing ones, those
+  /// of a field with 1 mm between its nodes.
+  std::vector<double> level_blur_sigma_mm;
 };
 
 struct LoadedCase {
@@ -38,7 +41,8 @@ struct LoadedCase {
 };
 
 /// Collective. Everything a registration of one case needs, with the same content on every rank:
-/// X-rays and masks, fields (held once per node) or the CT's attenuation (once per node). With
+/// X-rays and masks, fields or the CT's attenuation, and their coarser levels, all held once per
+/// node. The levels of ray casting are the CT, blurred as the levels of fields blur DRRs. With
 /// fields the CT is read by rank 0 alone, for its hash and grid (skip_ct_check: not at all; steps
 /// are then scaled as if it filled 200 mm about the ROI centre). FileError (exit 4) when a field
 /// was made from another CT (both hashes are named) or for another camera (geometry to 1e-3 mm);

@@ -219,13 +219,13 @@ SharedArray<std::uint16_t> padded_samples(const FieldLevel& level,
 
 }  // namespace
 
-double FieldLevel::blur_sigma_in_nodes() const {
-  return std::sqrt((std::pow(4.0, level) - 1.0) / 4.0);
+double level_blur_sigma_in_nodes(int level, bool with_resampling) {
+  const double variance_per_step = 1.0 / 4.0 + (with_resampling ? 1.0 / 6.0 : 0.0);
+  return std::sqrt((std::pow(4.0, level) - 1.0) * variance_per_step);
 }
 
 double FieldLevel::blur_sigma_mm(bool with_resampling) const {
-  const double resampling = with_resampling ? (std::pow(4.0, level) - 1.0) / 6.0 : 0.0;
-  const double sigma_in_nodes = std::sqrt(std::pow(blur_sigma_in_nodes(), 2) + resampling);
+  const double sigma_in_nodes = level_blur_sigma_in_nodes(level, with_resampling);
   double node_mm = 0.0;
   for (const SlabGeometry& slab : coverage.slabs) {
     const double scale = coverage.uv_plane_y_mm / (coverage.uv_plane_y_mm - slab.st_plane_y_mm);

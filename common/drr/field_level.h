@@ -27,6 +27,12 @@ struct FieldLevelSlab {
   }
 };
 
+/// Standard deviation, in nodes of level 0, of the blur that a DRR of a level carries along s and t
+/// against one of level 0: the variances 3/4 4^i of the halvings i = 0 ... level - 1. The bilinear
+/// resampling of the coarser nodes blurs a little more, by a variance of (4^level - 1) / 6 nodes of
+/// level 0 on average; `with_resampling` includes it.
+double level_blur_sigma_in_nodes(int level, bool with_resampling = false);
+
 /// A decoded attenuation field, blurred and decimated in (s,t) for one level of an image pyramid.
 ///
 /// Level 0 has the field's own samples. Each further level halves the nodes of both (s,t) axes: a
@@ -45,13 +51,9 @@ struct FieldLevel {
     return static_cast<std::size_t>(coverage.u.nodes) * static_cast<std::size_t>(coverage.v.nodes);
   }
 
-  /// Standard deviation, in nodes of level 0, of the blur that a DRR of this level carries along s
-  /// and t against one of level 0: the variances 3/4 4^i of the halvings i = 0 ... level - 1.
-  [[nodiscard]] double blur_sigma_in_nodes() const;
-  /// The same in mm at the plane through the field's centre (y = 0 of the slab frame), the mean of
-  /// s and t and of the slabs. Blur a reference image by this sigma (times the magnification
-  /// there) to match. The bilinear resampling of the coarser nodes blurs a little more, by a
-  /// variance of (4^level - 1) / 6 nodes of level 0 on average; `with_resampling` includes it.
+  /// level_blur_sigma_in_nodes() in mm at the plane through the field's centre (y = 0 of the slab
+  /// frame), the mean of s and t and of the slabs. Blur a reference image by this sigma (times the
+  /// magnification there) to match.
   [[nodiscard]] double blur_sigma_mm(bool with_resampling = false) const;
 };
 

@@ -49,22 +49,25 @@ VoxelBox attenuating_box(const CtVolume& ct, const AttenuationModel& model) {
 
 CtGrid bordered_grid(const CtGrid& grid, const VoxelBox& box) {
   CtGrid bordered = grid;
-  double voxels = 1.0;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
+  for (std::size_t axis = 0; axis < 3; ++axis)
     bordered.size[axis] = box.high[axis] - box.low[axis] + 3;
-    voxels *= bordered.size[axis];
-  }
-  // The kernels address voxels by signed 32-bit offsets.
-  if (voxels >= static_cast<double>(std::numeric_limits<std::int32_t>::max()))
-    throw InputError("CT size",
-                     std::to_string(voxels) + " voxels",
-                     "the attenuating part must have fewer than 2^31 voxels");
+  require_castable(bordered);
   bordered.origin_mm =
       grid.point_mm(Eigen::Vector3d(box.low[0] - 1, box.low[1] - 1, box.low[2] - 1));
   return bordered;
 }
 
 }  // namespace
+
+void require_castable(const CtGrid& bordered_grid) {
+  double voxels = 1.0;
+  for (const int size : bordered_grid.size) voxels *= size;
+  // The kernels address voxels by signed 32-bit offsets.
+  if (voxels >= static_cast<double>(std::numeric_limits<std::int32_t>::max()))
+    throw InputError("CT size",
+                     std::to_string(voxels) + " voxels",
+                     "the attenuating part must have fewer than 2^31 voxels");
+}
 
 std::vector<std::string> problems(const AttenuationModel& model) {
   std::vector<std::string> found;

@@ -25,6 +25,9 @@ struct AttenuationModel {
 
 std::vector<std::string> problems(const AttenuationModel& model);
 
+/// InputError when a grid has 2^31 voxels or more: casters could not address them.
+void require_castable(const CtGrid& bordered_grid);
+
 /// The attenuating part of a CT, ready for casting: integers in units of mu_water/1000, so the HU
 /// model is exact; cropped to the box of voxels that attenuate and surrounded by a border of one
 /// zero voxel, so that trilinear interpolation falls to zero over one voxel and never needs a

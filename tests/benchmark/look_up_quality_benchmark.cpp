@@ -15,6 +15,7 @@
 #include "image/psnr.h"
 #include "io/field_file.h"
 #include "precompute/shear_warp_caster.h"
+#include "volume/blurred_volume.h"
 
 namespace {
 
@@ -149,6 +150,41 @@ std::vector<Way> all_ways(const std::shared_ptr<const CompressedAttenuationField
   return ways;
 }
 
+/// The gradients of ray casting at the first poses.
+std::vector<std::vector<float>> cast_gradients_at(const std::vector<RigidTransform>& poses,
+                                                  std::size_t count,
+                                                  const RayCastDrr& ray_cast,
+                                                  const View& view,
+                                                  const Eigen::Vector3d& pivot) {
+  std::vector<std::vector<float>> gradients(count);
+  const auto workspace = ray_cast.make_workspace();
+  for (std::size_t i = 0; i < count; ++i) {
+    gradients[i].resize(6 * view.pixel_count());
+    // Larger than the ray caster's noise from its step of 1 mm.
+    central_difference_gradients(
+        ray_cast, poses[i], view, *workspace, {pivot, gradients[i]}, {2e-3, 0.5});
+  }
+  return gradients;
+}
+
+nlohmann::json report(const Way& way,
+                      const std::vector<RigidTransform>& poses,
+                      const std::vector<Image2d>& references,
+                      const std::vector<std::vector<float>>& cast_gradients,
+                      const View& view,
+                      const Eigen::Vector3d& pivot) {
+  const GradientQuality gradients = gradient_quality(way, poses, cast_gradients, view, pivot);
+  const double psnr_db = median_psnr_db(way, poses, references, view);
+  std::printf("%-22s %.2f dB, cosine", way.name.c_str(), psnr_db);
+  for (const double cosine : gradients.cosine_with_ray_casting) std::printf(" %.3f", cosine);
+  std::printf(", from differences");
+  for (const double part : gradients.relative_difference) std::printf(" %.4f", part);
+  std::printf("\n");
+  return {{"median_psnr_db", psnr_db},
+          {"gradient_cosine_with_ray_casting", gradients.cosine_with_ray_casting},
+          {"gradient_relative_difference", gradients.relative_difference}};
+}
+
 void run(const CaseOptions& options, const std::string& field_path, const Communicator& world) {
   const BenchmarkCase benchmark_case(options);
   const auto field = read_field(field_path, world);
@@ -168,26 +204,26 @@ void run(const CaseOptions& options, const std::string& field_path, const Commun
     poses.push_back(pose_from_parameters(field->identity.frame, parameters));
     references.push_back(render_image(ray_cast, poses.back(), view));
   }
-  std::vector<std::vector<float>> cast_gradients(options.is_quick ? 1 : 5);
-  const auto workspace = ray_cast.make_workspace();
-  for (std::size_t i = 0; i < cast_gradients.size(); ++i) {
-    cast_gradients[i].resize(6 * view.pixel_count());
-    // Larger than the ray caster's noise from its step of 1 mm.
-    central_difference_gradients(
-        ray_cast, poses[i], view, *workspace, {pivot, cast_gradients[i]}, {2e-3, 0.5});
-  }
+  const std::size_t gradient_poses = options.is_quick ? 1 : 5;
+  const auto cast_gradients = cast_gradients_at(poses, gradient_poses, ray_cast, view, pivot);
   nlohmann::json results;
-  for (const Way& way : all_ways(field, cast_level(benchmark_case))) {
-    const GradientQuality gradients = gradient_quality(way, poses, cast_gradients, view, pivot);
-    const double psnr_db = median_psnr_db(way, poses, references, view);
-    results[way.name] = {{"median_psnr_db", psnr_db},
-                         {"gradient_cosine_with_ray_casting", gradients.cosine_with_ray_casting},
-                         {"gradient_relative_difference", gradients.relative_difference}};
-    std::printf("%-22s %.2f dB, cosine", way.name.c_str(), psnr_db);
-    for (const double cosine : gradients.cosine_with_ray_casting) std::printf(" %.3f", cosine);
-    std::printf(", from differences");
-    for (const double part : gradients.relative_difference) std::printf(" %.4f", part);
-    std::printf("\n");
+  for (const Way& way : all_ways(field, cast_level(benchmark_case)))
+    results[way.name] = report(way, poses, references, cast_gradients, view, pivot);
+  // Levels of the field against those of ray casting, which blur the CT by as much.
+  for (const auto& level : make_field_pyramid(*field, 2)) {
+    const RayCastDrr blurred(blurred_volume(*benchmark_case.volume(), level->blur_sigma_mm(true)));
+    const View coarse = view.coarser(1 << level->level);
+    std::vector<Image2d> blurred_references;
+    for (const RigidTransform& pose : poses)
+      blurred_references.push_back(render_image(blurred, pose, coarse));
+    const Way way{"level " + std::to_string(level->level),
+                  std::make_shared<const TwoPassAfDrr>(level)};
+    results[way.name] = report(way,
+                               poses,
+                               blurred_references,
+                               cast_gradients_at(poses, gradient_poses, blurred, coarse, pivot),
+                               coarse,
+                               pivot);
   }
   write_section(options.output,
                 "look-up-quality",

@@ -82,6 +82,12 @@ TEST_F(RegisterProgram, RegistersByFieldAndByRayCasting) {
       run_register("--renderer raycast" + start + "-o " + path("by-casting"));
   ASSERT_EQ(by_casting.exit_code, 0) << by_casting.output;
   EXPECT_LT(result("by-casting").at("tre_mm").get<double>(), kRayCastTreMm);
+  for (const std::string preset : {"fast", "robust"}) {
+    const test::ProgramRun coarse =
+        run_register("--renderer raycast --preset " + preset + start + "-o " + path(preset));
+    ASSERT_EQ(coarse.exit_code, 0) << coarse.output;
+    EXPECT_LT(result(preset).at("tre_mm").get<double>(), kRayCastTreMm) << preset;
+  }
   for (const char* name :
        {"pose.toml", "result.tfm", "AP-overlay.png", "LAT-overlay.png", "reproduce.sh"})
     EXPECT_TRUE(fs::exists(path("by-field/" + std::string(name)))) << name;

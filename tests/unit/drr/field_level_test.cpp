@@ -135,7 +135,7 @@ TEST(FieldLevel, BlurSigmaIsThatOfAnImpulse) {
   const double variance = sums[2] / sums[0] - std::pow(sums[1] / sums[0], 2);
   const FieldLevel level = *make_field_pyramid(*small_field(noise, 1, 3, 32), 2)[1];
   // Samples are rounded twice to integers of 65535.
-  EXPECT_NEAR(std::sqrt(variance), level.blur_sigma_in_nodes(), 1e-3);
+  EXPECT_NEAR(std::sqrt(variance), level_blur_sigma_in_nodes(2), 1e-3);
   const GridAxis& s = level.coverage.slabs[0].s;
   const GridAxis& t = level.coverage.slabs[0].t;
   EXPECT_NEAR(level.blur_sigma_mm(),

@@ -311,12 +311,16 @@ TEST(MethodComparison, OfAHandBuiltRunIsTheKnownOne) {
   EXPECT_EQ(method.bands[1].trials, 1);  // 8 mm belongs to the band that begins there
   EXPECT_EQ(method.bands[2].trials, 1);  // 31 mm lies beyond all
   EXPECT_DOUBLE_EQ(method.mean_tre_mm, 0.3);
+  EXPECT_DOUBLE_EQ(method.median_tre_mm, 0.3);
   EXPECT_DOUBLE_EQ(method.translation_bias_mm, 2.0);
   EXPECT_DOUBLE_EQ(method.rotation_bias_deg, std::hypot(0.1, 0.2));
   EXPECT_EQ(method.median_drr_count, 102.0);
   EXPECT_EQ(method.median_seconds, 0.2);
   const std::string text = methods_markdown(found);
-  EXPECT_THAT(text, testing::HasSubstr("| 100 / 0 / 0 | 2 / 1 / 1 | 0.300 | 0.224, 2.000 | 102 |"));
+  // Wilson's interval of 2 of 2 begins at 2 / (2 + 1.96^2) = 34 %, that of 0 of 1 ends at 79 %.
+  EXPECT_THAT(text,
+              testing::HasSubstr("| 100 [34, 100] / 0 [0, 79] / 0 [0, 79] | 2 / 1 / 1 | 0.300, "
+                                 "0.300 | 0.224, 2.000 | 102 |"));
   EXPECT_EQ(methods_table(found).text(0, "successes_0_8_mm"), "2");
 }
 
@@ -327,7 +331,43 @@ TEST(MethodComparison, OfARunWithoutSuccessHasNoErrors) {
   const MethodRow method =
       method_rows({EvaluationRun{folder.path(), "registration", json::object()}}).front();
   EXPECT_TRUE(std::isnan(method.mean_tre_mm));
-  EXPECT_THAT(methods_markdown({method}), testing::HasSubstr("| - | -, - |"));
+  EXPECT_THAT(methods_markdown({method}), testing::HasSubstr("| -, - | -, - |"));
+}
+
+TEST(MethodComparison, ScreenHasALinePerMeasureAndAColumnPerOptimizer) {
+  MethodRow a;
+  a.case_name = "skull";
+  a.renderer = "field";
+  a.preset = "paper";
+  a.similarity = "mi";
+  a.optimizer = "bobyqa";
+  a.bands = {{0, 8, 4, 4, {}}, {8, 16, 4, 1, {}}, {16, 30, 0, 0, {}}};
+  a.median_tre_mm = 0.25;
+  MethodRow b = a;
+  b.similarity = "ncc";
+  b.optimizer = "nelder-mead";
+  EXPECT_EQ(screen_markdown({a, b}),
+            "| Case | Renderer | Preset | Measure | bobyqa | nelder-mead |\n"
+            "|---|---|---|---|---|---|\n"
+            "| skull | field | paper | mi | 100 / 25, 0.250 |  |\n"
+            "| skull | field | paper | ncc |  | 100 / 25, 0.250 |\n");
+}
+
+TEST(MethodComparison, PairsTellTheTestOfTheSummary) {
+  const std::vector<RegistrationRow> rows = {row("field", 0, 1, 0.2),
+                                             row("raycast", 0, 1, 0.1),
+                                             row("field", 1, 2, 0.4),
+                                             row("raycast", 1, 2, 0.3),
+                                             row("field", 2, 9, 0.3),
+                                             row("raycast", 2, 9, 5.0)};
+  EvaluationRun run{"runs/skull-fast", "registration", {}};
+  run.summary["field_against_raycast"] = paired_statistics(rows, 0.5);
+  // Equal differences of 0.1 mm have no spread; one success of three differs.
+  EXPECT_THAT(pairs_markdown({run}),
+              testing::HasSubstr("| skull-fast | 3 | 3, 2 | 1.00 | 2 | 0.100 [0.100, 0.100] | "
+                                 "< 0.0001 at 0.50 mm | 1.00 |"));
+  run.summary["field_against_raycast"] = nullptr;
+  EXPECT_EQ(pairs_markdown({run}), "");
 }
 
 std::vector<DrrComparison> comparisons(const std::vector<double>& psnr_db) {
