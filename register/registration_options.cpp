@@ -66,6 +66,9 @@ std::vector<std::string> problems(const StageOptions& stage) {
 
 RegistrationOptions::RegistrationOptions() : chains{paper_chain()} {
   judge.stage.similarity.name = "rg";
+  judge.stage.level = 1;
+  judge.stage.pixel_step = 2;
+  judge.stage.roi_scale = 2.0;
 }
 
 void RegistrationOptions::use_similarity(const std::string& name) {

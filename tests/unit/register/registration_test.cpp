@@ -275,18 +275,43 @@ TEST(Registration, APortfolioTakesTheChainThatItsJudgePrefers) {
   good.chains[0].name = "good";
   RegistrationOptions options = good;
   options.chains = {idle, good.chains[0], idle};
+  options.judge.stage = StageOptions();
   options.judge.stage.similarity.name = "rg";
   RegistrationRunner runner(small.problem, options);
   const RegistrationResult result = runner.run(start_near(small));
   EXPECT_EQ(result.chain, "good");
   EXPECT_LT(mean_distance_mm(result.room_from_ct, small.gold_room_from_ct), kFinalStepErrorMm);
   EXPECT_EQ(result.similarity, runner.similarity_at(result.room_from_ct).similarity);
-  // An end that is good enough ends the portfolio; one that explains nothing is said to.
-  options.judge.enough_value = -1.0;
-  EXPECT_EQ(RegistrationRunner(small.problem, options).run(start_near(small)).chain, "idle");
+  // An end that explains nothing is said to.
   options.judge.least_value = 2.0;
   EXPECT_EQ(RegistrationRunner(small.problem, options).run(start_near(small)).stop_reason,
             StopReason::NoBetterThanNoDrr);
+}
+
+TEST(Registration, APortfolioEndsAtTheFirstConvincingChain) {
+  const test::SmallCase small = test::small_case();
+  RegistrationOptions options = two_stages("ncc", "gauss-newton");
+  options.chains.push_back(options.chains[0]);
+  options.chains[0].name = "first";
+  options.chains[1].name = "second";
+  options.judge.stage = StageOptions();
+  options.judge.stage.similarity.name = "rg";
+  options.judge.enough_value = 2.0;  // never
+  RegistrationOptions one = options;
+  one.chains.pop_back();
+  const int alone = RegistrationRunner(small.problem, one).run(start_near(small)).evaluations;
+  RegistrationRunner all(small.problem, options);
+  const RegistrationResult both = all.run(start_near(small));
+  EXPECT_EQ(both.evaluations, 2 * alone);
+  // Just convincing, and just not: the value at the end itself is enough.
+  for (const bool is_convincing : {true, false}) {
+    options.judge.enough_value = both.similarity + (is_convincing ? 0.0 : 1e-9);
+    RegistrationRunner runner(small.problem, options);
+    const RegistrationResult result = runner.run(start_near(small));
+    EXPECT_EQ(result.evaluations, is_convincing ? alone : 2 * alone);
+    EXPECT_EQ(result.chain, "first");
+    EXPECT_EQ(result.room_from_ct.matrix(), both.room_from_ct.matrix());
+  }
 }
 
 TEST(Registration, AStageOfAMissingLevelIsRefused) {
