@@ -4,12 +4,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <exception>
-#include <mutex>
 #include <string>
-#include <thread>
 
 #include "base/error.h"
+#include "base/thread_pool.h"
 #include "base/vector_width.h"
 #include "drr/field_level_kernel.h"
 
@@ -240,22 +238,8 @@ FieldLevelMemory process_memory(int threads) {
     const std::shared_ptr<std::uint16_t[]> owner =
         std::make_unique_for_overwrite<std::uint16_t[]>(count);
     const std::span<std::uint16_t> samples(owner.get(), count);
-    std::exception_ptr failure;
-    std::mutex failure_mutex;
-    const auto run = [&](int part) {
-      try {
-        fill(samples, part, threads);
-      } catch (...) {
-        const std::scoped_lock lock(failure_mutex);
-        failure = std::current_exception();
-      }
-    };
-    {
-      std::vector<std::jthread> helpers;
-      for (int part = 1; part < threads; ++part) helpers.emplace_back(run, part);
-      run(0);
-    }
-    if (failure) std::rethrow_exception(failure);
+    ThreadPool pool(threads);
+    pool.for_each(threads, [&](int part, int /*slot*/) { fill(samples, part, threads); });
     return SharedArray<std::uint16_t>(owner, samples);
   };
 }

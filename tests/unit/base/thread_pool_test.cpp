@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "base/thread_pool.h"
+
+#include <chrono>
+#include <sched.h>
+#include <stdexcept>
+#include <string>
+
+#include <gtest/gtest.h>
+
+namespace af {
+namespace {
+
+class ThreadPoolOf : public testing::TestWithParam<int> {};
+
+INSTANTIATE_TEST_SUITE_P(Threads, ThreadPoolOf, testing::Values(1, 2, 3, 8));
+
+TEST_P(ThreadPoolOf, RunsEveryTaskOnce) {
+  ThreadPool pool(GetParam());
+  EXPECT_EQ(pool.threads(), GetParam());
+  for (const int count : {0, 1, 2, 7, 1000}) {
+    std::vector<std::atomic<int>> runs(static_cast<std::size_t>(count));
+    pool.for_each(count, [&](int task, int /*slot*/) { ++runs[static_cast<std::size_t>(task)]; });
+    for (const std::atomic<int>& times : runs) EXPECT_EQ(times, 1);
+  }
+}
+
+TEST_P(ThreadPoolOf, ThreadsOfOneLoopHaveDifferentSlots) {
+  ThreadPool pool(GetParam());
+  std::vector<std::atomic<bool>> is_taken(static_cast<std::size_t>(GetParam()));
+  std::atomic<int> clashes = 0;
+  pool.for_each(2000, [&](int /*task*/, int slot) {
+    std::atomic<bool>& mine = is_taken[static_cast<std::size_t>(slot)];
+    if (mine.exchange(true)) ++clashes;
+    mine = false;
+  });
+  EXPECT_EQ(clashes, 0);
+}
+
+TEST_P(ThreadPoolOf, NestedLoopsRunEveryTaskOnce) {
+  ThreadPool pool(GetParam());
+  std::atomic<int> sum = 0;
+  for (int repeat = 0; repeat < 50; ++repeat)
+    pool.for_each(5, [&](int outer, int /*slot*/) {
+      pool.for_each(7, [&](int inner, int /*slot*/) { sum += 7 * outer + inner; });
+    });
+  EXPECT_EQ(sum, 50 * (34 * 35 / 2));
+}
+
+TEST_P(ThreadPoolOf, ThrowsTheExceptionOfTheLowestTaskThatFailed) {
+  ThreadPool pool(GetParam());
+  for (int repeat = 0; repeat < 50; ++repeat) {
+    try {
+      pool.for_each(100, [](int task, int /*slot*/) {
+        if (task % 10 == 3) throw std::runtime_error("task " + std::to_string(task));
+      });
+      FAIL() << "nothing was thrown";
+    } catch (const std::runtime_error& error) {
+      EXPECT_STREQ(error.what(), "task 3");
+    }
+  }
+}
+
+TEST_P(ThreadPoolOf, WorksAgainAfterItsThreadsSlept) {
+  ThreadPool pool(GetParam());
+  for (int repeat = 0; repeat < 20; ++repeat) {
+    // Far longer than the threads watch for work.
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    std::atomic<int> done = 0;
+    pool.for_each(10, [&](int /*task*/, int /*slot*/) { ++done; });
+    EXPECT_EQ(done, 10);
+  }
+}
+
+TEST(ThreadPool, SeveralThreadsTakePartInALoopOfWaitingTasks) {
+  // Every task waits until all of them have begun: one thread alone would wait for ever.
+  ThreadPool pool(4);
+  std::atomic<int> begun = 0;
+  pool.for_each(4, [&](int /*task*/, int /*slot*/) {
+    ++begun;
+    while (begun < 4) std::this_thread::yield();
+  });
+  EXPECT_EQ(begun, 4);
+}
+
+TEST(ThreadPool, ZeroThreadsMeansTheProcessorsThatTheProcessMayUse) {
+  cpu_set_t before;
+  CPU_ZERO(&before);
+  ASSERT_EQ(sched_getaffinity(0, sizeof(before), &before), 0);
+  EXPECT_EQ(thread_count(0), CPU_COUNT(&before));
+  cpu_set_t one;
+  CPU_ZERO(&one);
+  for (std::size_t cpu = 0; CPU_COUNT(&one) == 0; ++cpu)
+    if (CPU_ISSET(cpu, &before)) CPU_SET(cpu, &one);
+  ASSERT_EQ(sched_setaffinity(0, sizeof(one), &one), 0);
+  EXPECT_EQ(thread_count(0), 1);
+  EXPECT_EQ(thread_count(3), 3);
+  ASSERT_EQ(sched_setaffinity(0, sizeof(before), &before), 0);
+}
+
+TEST(ThreadPool, RefusesNegativeAndAbsurdNumbers) {
+  EXPECT_TRUE(thread_problems(0).empty());
+  EXPECT_TRUE(thread_problems(1024).empty());
+  EXPECT_EQ(thread_problems(-1).size(), 1u);
+  EXPECT_EQ(thread_problems(1025).size(), 1u);
+}
+
+}  // namespace
+}  // namespace af
