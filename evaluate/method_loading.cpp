@@ -49,20 +49,21 @@ std::vector<LoadedMethod> load_methods(const MethodOptions& options,
   std::vector<LoadedMethod> methods;
   const registration::RegistrationOptions method =
       all_or_none(world, [&] { return registration::resolve(options.method); });
+  const auto pool = std::make_shared<ThreadPool>(thread_count(options.method.threads));
   // Ray casting after a field takes its levels' blurs, so that both run the same method.
   std::vector<double> blurs_mm;
   for (const std::string& renderer : options.chosen_renderers()) {
+    registration::CaseLoadOptions loading =
+        load_options(options, renderer, method.coarsest_level(), blurs_mm);
+    loading.pool = pool;
     const registration::LoadedCase loaded =
-        registration::load_case(study,
-                                study_case,
-                                load_options(options, renderer, method.coarsest_level(), blurs_mm),
-                                world);
+        registration::load_case(study, study_case, loading, world);
     blurs_mm = level_blurs_mm(*loaded.problem);
     for (const std::string& text : loaded.warnings) cli::warn(world, text);
     for (const auto& [name, hash] : loaded.input_sha256)
       input_sha256[study_case.name + ": " + name] = hash;
     registration::RegistrationRunner runner = all_or_none(
-        world, [&] { return registration::RegistrationRunner(loaded.problem, method); });
+        world, [&] { return registration::RegistrationRunner(loaded.problem, method, pool); });
     methods.push_back({renderer, std::move(runner)});
   }
   return methods;

@@ -72,28 +72,37 @@ std::vector<RegistrationView> read_views(const Study& study,
   return views;
 }
 
-/// Collective over the node: memory that its ranks share and fill together.
-FieldLevelMemory node_memory(const Communicator& node) {
-  return [node](std::size_t count, const FieldLevelFill& fill) {
+/// Parts of a rank's share of a level, one thread's work each. The same on every rank, however many
+/// threads these have.
+constexpr int kPartsPerRank = 8;
+
+/// Collective over the node: memory that its ranks share and fill together, each on its threads.
+FieldLevelMemory node_memory(const Communicator& node, ThreadPool& pool) {
+  return [node, &pool](std::size_t count, const FieldLevelFill& fill) {
     const auto samples_of = [count](const std::byte* bytes) {
       return reinterpret_cast<const std::uint16_t*>(bytes);
     };
     const auto owner = node.allocate_on_node_together(
-        count * sizeof(std::uint16_t), [&](std::span<std::byte> memory, int part, int parts) {
-          fill({reinterpret_cast<std::uint16_t*>(memory.data()), count}, part, parts);
+        count * sizeof(std::uint16_t), [&](std::span<std::byte> memory, int rank, int ranks) {
+          const std::span samples(reinterpret_cast<std::uint16_t*>(memory.data()), count);
+          pool.for_each(kPartsPerRank, [&](int part, int /*slot*/) {
+            fill(samples, rank * kPartsPerRank + part, ranks * kPartsPerRank);
+          });
         });
     return SharedArray<std::uint16_t>(owner, {samples_of(owner.get()), count});
   };
 }
 
-/// Collective. Levels 1 ... coarsest of a field's pyramid, held once per node.
+/// Collective. The coarse levels of a field's pyramid, held once per node.
 std::vector<RendererLevel> coarse_field_levels(const CompressedAttenuationField& field,
-                                               int coarsest,
+                                               const CaseLoadOptions& options,
                                                const Communicator& communicator) {
   std::vector<RendererLevel> levels;
-  if (coarsest < 1) return levels;
+  if (options.coarsest_level < 1) return levels;
   const Communicator node = communicator.node();
-  for (const auto& level : make_field_pyramid(field, coarsest, node_memory(node)))
+  const auto pool = options.pool ? options.pool : std::make_shared<ThreadPool>();
+  for (const auto& level :
+       make_field_pyramid(field, options.coarsest_level, node_memory(node, *pool)))
     levels.push_back({std::make_shared<const TwoPassAfDrr>(level), level->blur_sigma_mm(true)});
   return levels;
 }
@@ -155,7 +164,7 @@ void use_fields(const StudyCase& study_case,
                         field->identity.ct_content_sha256);
     });
     view.renderer = std::make_shared<const TwoPassAfDrr>(field);
-    view.coarse_levels = coarse_field_levels(*field, options.coarsest_level, communicator);
+    view.coarse_levels = coarse_field_levels(*field, options, communicator);
     view.limit = MotionLimit{field->identity.frame, field->identity.range};
     input_sha256["field " + view.view.camera.name] = info.payload_sha256;
   }

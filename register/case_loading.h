@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "base/thread_pool.h"
 #include "io/ct_reader.h"
 #include "io/study_file.h"
 #include "parallel/communicator.h"
@@ -32,6 +33,8 @@ struct CaseLoadOptions {
   /// Ray casting: blurs of levels 1, 2, ..., in mm on the isocentre plane; of missing ones, those
   /// of a field with 1 mm between its nodes.
   std::vector<double> level_blur_sigma_mm;
+  /// Threads that make the levels together; none: the calling thread alone.
+  std::shared_ptr<ThreadPool> pool = nullptr;
 };
 
 struct LoadedCase {

@@ -89,11 +89,13 @@ void run(const RegisterOptions& options,
   const std::vector<af::RigidTransform> starts =
       af::all_or_none(world, [&] { return start_poses(options, study_case.frame()); });
   const auto gold = af::all_or_none(world, [&] { return known_gold(study, study_case); });
-  const LoadedCase loaded =
-      load_case(study, study_case, case_load_options(options, method.coarsest_level()), world);
+  const auto pool = std::make_shared<af::ThreadPool>(af::thread_count(options.method.threads));
+  CaseLoadOptions load_options = case_load_options(options, method.coarsest_level());
+  load_options.pool = pool;
+  const LoadedCase loaded = load_case(study, study_case, load_options, world);
   for (const std::string& text : loaded.warnings) af::cli::warn(world, text);
   RegistrationRunner runner =
-      af::all_or_none(world, [&] { return RegistrationRunner(loaded.problem, method); });
+      af::all_or_none(world, [&] { return RegistrationRunner(loaded.problem, method, pool); });
   // Before the work, so that an unwritable folder does not cost it; after the inputs, so that bad
   // ones leave nothing behind.
   af::all_or_none(world, [&] {

@@ -41,6 +41,12 @@ void bind_method(CLI::App& app, MethodOptions& options) {
                  options.max_evaluations,
                  "Most poses tried per registration (default: 5000)")
       ->group(group);
+  app.add_option("--threads",
+                 options.threads,
+                 "Threads that one registration spreads over, on every rank; 0: as many as there "
+                 "are processors for the rank. Many starts are better shared by ranks")
+      ->capture_default_str()
+      ->group(group);
 }
 
 }  // namespace af::registration

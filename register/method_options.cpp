@@ -4,6 +4,7 @@
 #include <sstream>
 
 #include "base/error.h"
+#include "base/thread_pool.h"
 #include "register/chain_text.h"
 #include "register/presets.h"
 
@@ -35,14 +36,16 @@ RegistrationOptions resolve(const MethodOptions& options) {
   replace_in_stages(options, result);
   if (options.max_evaluations.has_value()) result.max_evaluations = *options.max_evaluations;
   result.seed = options.seed;
-  throw_if_any(problems(result));
+  std::vector<std::string> found = problems(result);
+  for (const std::string& text : thread_problems(options.threads)) found.push_back(text);
+  throw_if_any(found);
   return result;
 }
 
 std::string to_toml(const MethodOptions& options, const RegistrationOptions& resolved) {
   std::ostringstream out;
   out << "preset = \"" << options.preset << "\"\nmax_evaluations = " << resolved.max_evaluations
-      << "\nseed = " << resolved.seed << "\nchain = [";
+      << "\nseed = " << resolved.seed << "\nthreads = " << options.threads << "\nchain = [";
   for (const ChainOptions& chain : resolved.chains) out << "\n  \"" << chain_text(chain) << "\",";
   out << "\n]\n";
   if (resolved.chains.size() > 1)

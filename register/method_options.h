@@ -21,6 +21,7 @@ struct MethodOptions {
   std::optional<double> coarse_roi_scale;    ///< of stages that look beyond the region
   std::optional<int> max_evaluations;
   std::uint64_t seed = 1;
+  int threads = 1;  ///< that one registration spreads over; 0: every processor of this process
 };
 
 /// The preset with the replacements; InputError for unknown names and values out of range.

@@ -4,8 +4,10 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
+#include "base/thread_pool.h"
 #include "drr/drr_renderer.h"
 #include "geometry/slab_sizing.h"
 #include "register/optimizer/optimizer.h"
@@ -34,13 +36,18 @@ struct ObjectiveValue {
   int drr_count = 0;              ///< DRRs rendered for this value
 };
 
-/// Eq. (13): sum of the views' similarities at a pose. Owns the scratch memory: one objective per
-/// thread; evaluations do not allocate (those with derivatives: after the first).
+/// Eq. (13): sum of the views' similarities at a pose. Owns the scratch memory: one objective at a
+/// time on a pool of threads, over which views and poses are spread. Values do not depend on the
+/// number of threads. Evaluations do not allocate, but for the first ones of a kind.
 class MultiViewObjective {
  public:
-  explicit MultiViewObjective(std::vector<ObjectiveView> views);
+  /// `pool`: none means the calling thread alone.
+  explicit MultiViewObjective(std::vector<ObjectiveView> views,
+                              std::shared_ptr<ThreadPool> pool = nullptr);
 
   ObjectiveValue evaluate(const RigidTransform& room_from_ct);
+  /// One value per pose.
+  void evaluate_all(std::span<const RigidTransform> room_from_ct, std::span<ObjectiveValue> values);
 
   /// With derivatives, into `result`: by small motions of the CT in the room about
   /// `pivot_room_point`, as PoseGradients (per rad, per mm). Derivatives::Gradient leaves the
@@ -51,8 +58,10 @@ class MultiViewObjective {
                                NormalEquations& result);
 
   [[nodiscard]] const std::vector<ObjectiveView>& views() const { return views_; }
+  [[nodiscard]] const std::shared_ptr<ThreadPool>& pool() const { return pool_; }
 
  private:
+  /// Of one view and thread.
   struct Scratch {
     std::unique_ptr<RenderWorkspace> render;
     std::unique_ptr<SimilarityWorkspace> similarity;
@@ -60,10 +69,37 @@ class MultiViewObjective {
     std::vector<float> planes;    ///< six, once derivatives were asked for
     std::vector<float> by_pixel;  ///< likewise
   };
+  /// What is known of one pose before its views are summed.
+  struct PoseState {
+    bool is_in_range = false;
+    int first_outside = 0;  ///< first view with rays outside; those after it do not count
+  };
+  /// What one view adds to the value of one pose.
+  struct Part {
+    std::int64_t rays_outside = 0;
+    NormalEquations equations;  ///< or the value alone
+  };
+
   [[nodiscard]] bool is_in_range(const RigidTransform& room_from_ct) const;
+  void prepare(std::span<const RigidTransform> room_from_ct);
+  Scratch& scratch_of(int slot, std::size_t view);
+  /// Renders a view of pose `i` and has `compare` fill its part, unless an earlier view of the pose
+  /// is known to have rays outside.
+  template <typename Compare>
+  void evaluate_view(std::size_t i,
+                     const RigidTransform& room_from_ct,
+                     std::size_t view,
+                     Scratch& scratch,
+                     const std::optional<PoseGradients>& gradients,
+                     const Compare& compare);
+  /// The sum over the views of pose `i`, in their order.
+  [[nodiscard]] ObjectiveValue sum_of(std::size_t i, NormalEquations& equations) const;
 
   std::vector<ObjectiveView> views_;
-  std::vector<Scratch> scratch_;
+  std::shared_ptr<ThreadPool> pool_;
+  std::vector<Scratch> scratch_;  ///< [thread][view], made when first used
+  std::vector<PoseState> poses_;  ///< reused
+  std::vector<Part> parts_;       ///< [pose][view], reused
 };
 
 }  // namespace af::registration

@@ -82,6 +82,18 @@ std::optional<double> PoseTarget::evaluate(const ScaledParameters& point) {
   return value.similarity;
 }
 
+void PoseTarget::evaluate_all(std::span<const ScaledParameters> points,
+                              std::span<std::optional<double>> values) {
+  poses_.clear();
+  for (const ScaledParameters& point : points) poses_.push_back(pose(point));
+  values_.assign(points.size(), {});
+  objective_.evaluate_all(poses_, values_);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    count(values_[i]);
+    values[i] = values_[i].is_admissible ? std::optional(values_[i].similarity) : std::nullopt;
+  }
+}
+
 std::optional<TargetValue> PoseTarget::evaluate_with(const ScaledParameters& point,
                                                      Derivatives derivatives) {
   const PoseParameters parameters = scaling_.unscaled(point);

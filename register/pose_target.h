@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
+#include <vector>
 
 #include "register/multi_view_objective.h"
 #include "register/parameter_scaling.h"
@@ -15,6 +17,8 @@ class PoseTarget final : public OptimizationTarget {
   PoseTarget(MultiViewObjective& objective, PoseFrame frame, const ParameterScaling& scaling);
 
   std::optional<double> evaluate(const ScaledParameters& point) override;
+  void evaluate_all(std::span<const ScaledParameters> points,
+                    std::span<std::optional<double>> values) override;
   std::optional<TargetValue> evaluate_with(const ScaledParameters& point,
                                            Derivatives derivatives) override;
   /// Clamps to the motion ranges of all views.
@@ -33,6 +37,8 @@ class PoseTarget final : public OptimizationTarget {
   ParameterScaling scaling_;
   std::int64_t drr_count_ = 0;
   std::int64_t rays_outside_ = 0;
+  std::vector<RigidTransform> poses_;   ///< reused
+  std::vector<ObjectiveValue> values_;  ///< reused
 };
 
 }  // namespace af::registration

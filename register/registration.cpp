@@ -152,6 +152,7 @@ std::vector<std::string> problems(const RegistrationProblem& problem) {
 struct RegistrationRunner::Impl {
   std::shared_ptr<const RegistrationProblem> problem;
   RegistrationOptions options;
+  std::shared_ptr<ThreadPool> pool;
   std::vector<View> views;
   std::vector<Eigen::Vector3d> some_points_ct;
   std::vector<PreparedStage> stages;         ///< of all chains, one after the other
@@ -185,7 +186,7 @@ PreparedStage RegistrationRunner::Impl::prepare(const StageOptions& stage,
   std::vector<ObjectiveView> stage_views;
   for (std::size_t i = 0; i < problem->views.size(); ++i)
     stage_views.push_back(prepare_view(*problem, problem->views[i], drr_ranges[i], stage));
-  return {stage, make_optimizer(stage.optimizer), MultiViewObjective(std::move(stage_views))};
+  return {stage, make_optimizer(stage.optimizer), MultiViewObjective(std::move(stage_views), pool)};
 }
 
 void RegistrationRunner::Impl::prepare() {
@@ -306,12 +307,14 @@ void RegistrationRunner::Impl::run_portfolio(std::int64_t start_index, Registrat
 }
 
 RegistrationRunner::RegistrationRunner(std::shared_ptr<const RegistrationProblem> problem,
-                                       const RegistrationOptions& options)
+                                       const RegistrationOptions& options,
+                                       std::shared_ptr<ThreadPool> pool)
     : impl_(std::make_unique<Impl>()) {
   check(problem != nullptr, "a registration needs a problem");
   throw_if_any(problems(options));
   throw_if_any(problems(*problem));
   impl_->options = options;
+  impl_->pool = std::move(pool);
   impl_->problem = std::move(problem);
   impl_->prepare();
 }

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "base/thread_pool.h"
 #include "drr/drr_renderer.h"
 #include "register/multi_view_objective.h"
 #include "register/presets.h"
@@ -71,21 +72,24 @@ struct RegistrationResult {
 };
 
 /// Registers one case from any number of starts. Construction does what all starts share (smoothed
-/// and decimated references, histograms' ranges, X-ray bins); runs reuse the buffers. One runner
-/// per thread: share_preparation() makes another cheaply. A result depends on problem, options and
-/// start alone (its seconds excepted). The DRR range of a case is that of the DRR at the nominal
-/// pose over the region of interest grown by half its size to every side. \test
-/// Registration.TwoViewsRecoverAKnownPose
+/// and decimated references, histograms' ranges, X-ray bins); runs reuse the buffers. One run at a
+/// time spreads over the threads of a pool: views, and poses that do not depend on each other. For
+/// runs at the same time share_preparation() makes another runner cheaply. A result depends on
+/// problem, options and start alone (its seconds excepted), not on the number of threads. The DRR
+/// range of a case is that of the DRR at the nominal pose over the region of interest grown by half
+/// its size to every side. \test Registration.TwoViewsRecoverAKnownPose
 class RegistrationRunner {
  public:
   /// InputError when options or problem have problems, or when the nominal pose is outside a field.
+  /// `pool`: none means the calling thread alone.
   RegistrationRunner(std::shared_ptr<const RegistrationProblem> problem,
-                     const RegistrationOptions& options);
+                     const RegistrationOptions& options,
+                     std::shared_ptr<ThreadPool> pool = nullptr);
   ~RegistrationRunner();
   RegistrationRunner(RegistrationRunner&&) noexcept;
   RegistrationRunner& operator=(RegistrationRunner&&) noexcept;
 
-  /// A runner for another thread; references and bins are shared.
+  /// A runner for another thread, on that thread alone; references and bins are shared.
   [[nodiscard]] RegistrationRunner share_preparation() const;
 
   /// `start_index` is a key of random numbers.

@@ -2,6 +2,7 @@
 #include "register/optimizer/best_neighbor_search.h"
 
 #include <algorithm>
+#include <array>
 
 #include "register/optimizer/search_run.h"
 
@@ -25,10 +26,12 @@ struct Neighborhood {
 
 Neighborhood examine(SearchRun& run, double step_mm) {
   Neighborhood found;
-  const ScaledParameters point = run.result().point;
   found.best_value = run.result().value;
-  for (int index = 0; index < kNeighbors; ++index) {
-    const SearchRun::Evaluation evaluation = run.evaluate(neighbor(point, index, step_mm));
+  std::array<ScaledParameters, kNeighbors> points;
+  for (int index = 0; index < kNeighbors; ++index)
+    points[static_cast<std::size_t>(index)] = neighbor(run.result().point, index, step_mm);
+  int index = 0;
+  for (const SearchRun::Evaluation& evaluation : run.evaluate_all(points)) {
     if (evaluation.outcome == SearchRun::Outcome::Ended) {
       found.is_complete = false;
       return found;
@@ -39,6 +42,7 @@ Neighborhood examine(SearchRun& run, double step_mm) {
       found.best_value = evaluation.target.value;
       found.best_index = index;
     }
+    ++index;
   }
   return found;
 }

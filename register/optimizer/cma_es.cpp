@@ -118,23 +118,26 @@ void CmaEs::maximize(OptimizationTarget& target,
   Distribution distribution;
   distribution.sigma = options.initial_step_mm;
   std::vector<Sample> samples(static_cast<std::size_t>(options.population));
+  std::vector<ScaledParameters> points(samples.size());
   for (int generation = 0;; ++generation) {
-    bool met_limit = true;
-    for (Sample& sample : samples) {
+    for (std::size_t i = 0; i < samples.size(); ++i) {
       ScaledParameters normal;
-      for (int i = 0; i < 6; ++i) normal[i] = random.normal();
-      sample.step = distribution.axes * distribution.lengths.cwiseProduct(normal);
-      const ScaledParameters point = distribution.mean + distribution.sigma * sample.step;
-      const SearchRun::Evaluation evaluation = run.evaluate(point);
-      if (evaluation.outcome == SearchRun::Outcome::Ended) {
+      for (int axis = 0; axis < 6; ++axis) normal[axis] = random.normal();
+      samples[i].step = distribution.axes * distribution.lengths.cwiseProduct(normal);
+      points[i] = distribution.mean + distribution.sigma * samples[i].step;
+    }
+    bool met_limit = true;
+    const std::span<const SearchRun::Evaluation> evaluations = run.evaluate_all(points);
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      if (evaluations[i].outcome == SearchRun::Outcome::Ended) {
         run.trace(distribution.largest_deviation());
         return;
       }
-      const bool is_admissible = evaluation.outcome == SearchRun::Outcome::Value;
+      const bool is_admissible = evaluations[i].outcome == SearchRun::Outcome::Value;
       met_limit = met_limit && !is_admissible;
-      sample.value =
-          is_admissible ? evaluation.target.value : -std::numeric_limits<double>::infinity();
-      if (is_admissible) run.offer(point, sample.value);
+      samples[i].value =
+          is_admissible ? evaluations[i].target.value : -std::numeric_limits<double>::infinity();
+      if (is_admissible) run.offer(points[i], samples[i].value);
     }
     // Stable: equal values keep the order of drawing.
     std::stable_sort(samples.begin(), samples.end(), [](const Sample& a, const Sample& b) {

@@ -52,6 +52,12 @@ std::vector<std::string> problems(const OptimizerOptions& options) {
   return found;
 }
 
+void OptimizationTarget::evaluate_all(std::span<const ScaledParameters> points,
+                                      std::span<std::optional<double>> values) {
+  check(points.size() == values.size(), "one value per point");
+  for (std::size_t i = 0; i < points.size(); ++i) values[i] = evaluate(points[i]);
+}
+
 std::optional<TargetValue> OptimizationTarget::evaluate_with(const ScaledParameters& /*point*/,
                                                              Derivatives /*derivatives*/) {
   check(false, "this target has no derivatives");

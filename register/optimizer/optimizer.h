@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -52,6 +53,10 @@ class OptimizationTarget {
 
   /// nullopt: the point is inadmissible.
   virtual std::optional<double> evaluate(const ScaledParameters& point) = 0;
+  /// The same for points that do not depend on each other, as many `values`: targets may evaluate
+  /// them at the same time.
+  virtual void evaluate_all(std::span<const ScaledParameters> points,
+                            std::span<std::optional<double>> values);
   /// With derivatives; only for targets that were made for optimisers that need them.
   virtual std::optional<TargetValue> evaluate_with(const ScaledParameters& point,
                                                    Derivatives derivatives);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "register/optimizer/search_run.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -26,19 +27,14 @@ std::optional<TargetValue> SearchRun::begin(Derivatives derivatives) {
   return start.target;
 }
 
-SearchRun::Evaluation SearchRun::evaluate(const ScaledParameters& point, Derivatives derivatives) {
-  if (result_.evaluations >= budget_.max_evaluations) {
-    result_.stop_reason = StopReason::EvaluationBudgetSpent;
-    return {};
-  }
+bool SearchRun::has_budget() {
+  if (result_.evaluations < budget_.max_evaluations) return true;
+  result_.stop_reason = StopReason::EvaluationBudgetSpent;
+  return false;
+}
+
+SearchRun::Evaluation SearchRun::counted(const std::optional<TargetValue>& found) {
   ++result_.evaluations;
-  std::optional<TargetValue> found;
-  if (derivatives == Derivatives::None) {
-    if (const std::optional<double> value = target_.evaluate(point); value.has_value())
-      found = TargetValue{*value, ScaledParameters::Zero(), ScaledMatrix::Zero()};
-  } else {
-    found = target_.evaluate_with(point, derivatives);
-  }
   if (!found.has_value()) {
     ++result_.inadmissible;
     return {Outcome::Inadmissible, {}};
@@ -50,6 +46,31 @@ SearchRun::Evaluation SearchRun::evaluate(const ScaledParameters& point, Derivat
     return {};
   }
   return {Outcome::Value, *found};
+}
+
+SearchRun::Evaluation SearchRun::evaluate(const ScaledParameters& point, Derivatives derivatives) {
+  if (!has_budget()) return {};
+  if (derivatives != Derivatives::None) return counted(target_.evaluate_with(point, derivatives));
+  const std::optional<double> value = target_.evaluate(point);
+  return counted(value.has_value() ? std::optional(TargetValue{*value}) : std::nullopt);
+}
+
+std::span<const SearchRun::Evaluation> SearchRun::evaluate_all(
+    std::span<const ScaledParameters> points) {
+  const auto left =
+      static_cast<std::size_t>(std::max(0, budget_.max_evaluations - result_.evaluations));
+  const std::size_t count = std::min(points.size(), left);
+  values_.assign(count, std::nullopt);
+  target_.evaluate_all(points.first(count), values_);
+  evaluations_.assign(points.size(), {});
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (!has_budget()) break;
+    const std::optional<double>& value = values_[i];
+    evaluations_[i] =
+        counted(value.has_value() ? std::optional(TargetValue{*value}) : std::nullopt);
+    if (evaluations_[i].outcome == Outcome::Ended) break;
+  }
+  return evaluations_;
 }
 
 void SearchRun::accept(const ScaledParameters& point, double value) {

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <optional>
+#include <span>
+#include <vector>
 
 #include "register/optimizer/optimizer.h"
 
@@ -26,6 +28,9 @@ class SearchRun {
   /// One evaluation; Ended when the budget is spent or the value is not finite, which the result
   /// then says.
   Evaluation evaluate(const ScaledParameters& point, Derivatives derivatives = Derivatives::None);
+  /// The same, without derivatives, for points that do not depend on each other. Counted in their
+  /// order: after one that ends the search all are Ended.
+  std::span<const Evaluation> evaluate_all(std::span<const ScaledParameters> points);
 
   /// The point that a step from the best one leads to, inside known limits.
   [[nodiscard]] ScaledParameters stepped(const ScaledParameters& step) const {
@@ -43,9 +48,16 @@ class SearchRun {
   [[nodiscard]] const OptimizerResult& result() const { return result_; }
 
  private:
+  /// Whether the budget allows one more evaluation; if not, the result says so.
+  bool has_budget();
+  /// Counts an evaluation, and says what it means.
+  Evaluation counted(const std::optional<TargetValue>& found);
+
   OptimizationTarget& target_;
   SearchBudget budget_;
   OptimizerResult& result_;
+  std::vector<std::optional<double>> values_;  ///< reused
+  std::vector<Evaluation> evaluations_;        ///< reused
 };
 
 }  // namespace af::registration

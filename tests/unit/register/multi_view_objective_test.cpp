@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "register/multi_view_objective.h"
 
+#include <atomic>
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -26,7 +27,7 @@ class CountingRenderer final : public DrrRenderer {
     return std::make_unique<RenderWorkspace>();
   }
   [[nodiscard]] const char* name() const override { return "counting"; }
-  mutable int calls = 0;
+  mutable std::atomic<int> calls = 0;
 };
 
 class ConstantMeasure final : public SimilarityMeasure {
@@ -47,8 +48,8 @@ class ConstantMeasure final : public SimilarityMeasure {
 struct Fixture {
   std::shared_ptr<CountingRenderer> renderer = std::make_shared<CountingRenderer>();
 
-  [[nodiscard]] MultiViewObjective objective(
-      const std::optional<MotionLimit>& limit = std::nullopt) const {
+  [[nodiscard]] MultiViewObjective objective(const std::optional<MotionLimit>& limit = std::nullopt,
+                                             int threads = 1) const {
     std::vector<ObjectiveView> views;
     for (int i = 0; i < 3; ++i) {
       ObjectiveView view;
@@ -59,7 +60,7 @@ struct Fixture {
       view.limit = limit;
       views.push_back(view);
     }
-    return MultiViewObjective(std::move(views));
+    return MultiViewObjective(std::move(views), std::make_shared<ThreadPool>(threads));
   }
 };
 
@@ -96,6 +97,29 @@ TEST(MultiViewObjective, APoseBeyondTheMotionRangeCostsNoDrr) {
   EXPECT_EQ(value.drr_count, 0);
   EXPECT_EQ(fixture.renderer->calls, 0);
   EXPECT_TRUE(fixture.objective(limit).evaluate(shifted(1.5)).is_admissible);
+}
+
+TEST(MultiViewObjective, PosesTogetherHaveTheValuesThatTheyHaveAlone) {
+  const Fixture fixture;
+  MotionLimit limit;
+  limit.range.max_translation_mm = 5.0;
+  std::vector<RigidTransform> poses;
+  for (int i = 0; i < 40; ++i) poses.push_back(shifted(0.25 * i));  // inside, outside, beyond
+  MultiViewObjective alone = fixture.objective(limit);
+  for (const int threads : {1, 2, 5}) {
+    MultiViewObjective together = fixture.objective(limit, threads);
+    std::vector<ObjectiveValue> values(poses.size());
+    together.evaluate_all(poses, values);
+    for (std::size_t i = 0; i < poses.size(); ++i) {
+      const ObjectiveValue expected = alone.evaluate(poses[i]);
+      EXPECT_EQ(values[i].is_admissible, expected.is_admissible);
+      if (expected.is_admissible) {
+        EXPECT_EQ(values[i].similarity, expected.similarity);
+      }
+      EXPECT_EQ(values[i].drr_count, expected.drr_count);
+      EXPECT_EQ(values[i].rays_outside, expected.rays_outside);
+    }
+  }
 }
 
 }  // namespace

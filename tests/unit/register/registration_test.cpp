@@ -314,6 +314,55 @@ TEST(Registration, APortfolioEndsAtTheFirstConvincingChain) {
   }
 }
 
+/// Everything but the seconds.
+void expect_same(const RegistrationResult& a, const RegistrationResult& b) {
+  EXPECT_EQ(a.room_from_ct.matrix(), b.room_from_ct.matrix());
+  EXPECT_EQ(a.similarity, b.similarity);
+  EXPECT_EQ(a.evaluations, b.evaluations);
+  EXPECT_EQ(a.inadmissible, b.inadmissible);
+  EXPECT_EQ(a.drr_count, b.drr_count);
+  EXPECT_EQ(a.stop_reason, b.stop_reason);
+  ASSERT_EQ(a.trace.size(), b.trace.size());
+  for (std::size_t i = 0; i < a.trace.size(); ++i) {
+    EXPECT_EQ(a.trace[i].similarity, b.trace[i].similarity);
+    EXPECT_EQ(a.trace[i].evaluations, b.trace[i].evaluations);
+    EXPECT_EQ(a.trace[i].parameters.rotation_rad, b.trace[i].parameters.rotation_rad);
+    EXPECT_EQ(a.trace[i].parameters.translation_mm, b.trace[i].parameters.translation_mm);
+  }
+}
+
+TEST(Registration, AnyNumberOfThreadsGivesTheSameBits) {
+  const test::SmallCase small = test::small_case();
+  const std::vector<std::pair<std::string, std::string>> methods = {{"best-neighbor", "mi"},
+                                                                    {"cma-es", "ncc"},
+                                                                    {"gauss-newton", "rg"},
+                                                                    {"gradient", "ncc"},
+                                                                    {"nelder-mead", "gd"}};
+  for (const auto& [optimizer, similarity] : methods) {
+    SCOPED_TRACE(optimizer);
+    RegistrationOptions options = two_stages(similarity, optimizer);
+    options.max_evaluations = 60;
+    const RegistrationResult alone =
+        RegistrationRunner(small.problem, options).run(start_near(small));
+    for (const int threads : {2, 5}) {
+      RegistrationRunner runner(small.problem, options, std::make_shared<ThreadPool>(threads));
+      expect_same(runner.run(start_near(small)), alone);
+    }
+  }
+}
+
+TEST(Registration, ThreadsAgreeWhereTheMotionRangeEnds) {
+  const test::SmallCase small = test::small_case();
+  const MotionLimit limit{small.problem->frame(), {5.0 * kRadPerDeg, 4.2}};
+  for (RegistrationView& view : small.problem->views) view.limit = limit;
+  RegistrationOptions options = two_stages("ncc", "best-neighbor");
+  const RegistrationResult alone =
+      RegistrationRunner(small.problem, options).run(start_near(small));
+  EXPECT_GT(alone.inadmissible, 0);
+  RegistrationRunner runner(small.problem, options, std::make_shared<ThreadPool>(3));
+  expect_same(runner.run(start_near(small)), alone);
+}
+
 TEST(Registration, AStageOfAMissingLevelIsRefused) {
   const test::SmallCase small = test::small_case();
   EXPECT_THROW(RegistrationRunner(small.problem, preset_options("fast")), InputError);
