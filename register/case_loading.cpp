@@ -103,7 +103,8 @@ std::vector<RendererLevel> coarse_field_levels(const CompressedAttenuationField&
   const auto pool = options.pool ? options.pool : std::make_shared<ThreadPool>();
   for (const auto& level :
        make_field_pyramid(field, options.coarsest_level, node_memory(node, *pool)))
-    levels.push_back({std::make_shared<const TwoPassAfDrr>(level), level->blur_sigma_mm(true)});
+    levels.push_back({std::make_shared<const TwoPassAfDrr>(level, TwoPassOptions{}, pool),
+                      level->blur_sigma_mm(true)});
   return levels;
 }
 
@@ -136,7 +137,7 @@ std::vector<RendererLevel> coarse_ray_casts(const AttenuationVolume& volume,
     const auto blurred = blurred_per_node(volume, sigma_mm, communicator);
     RayCasterOptions caster = options.ray_caster;
     caster.step_mm = std::max(caster.step_mm, 0.5 * sigma_mm);
-    levels.push_back({std::make_shared<const RayCastDrr>(blurred, caster), sigma_mm});
+    levels.push_back({std::make_shared<const RayCastDrr>(blurred, caster, options.pool), sigma_mm});
   }
   return levels;
 }
@@ -163,7 +164,7 @@ void use_fields(const StudyCase& study_case,
                         ct->content_sha256 + " (" + study_case.ct.string() + ")",
                         field->identity.ct_content_sha256);
     });
-    view.renderer = std::make_shared<const TwoPassAfDrr>(field);
+    view.renderer = std::make_shared<const TwoPassAfDrr>(field, TwoPassOptions{}, options.pool);
     view.coarse_levels = coarse_field_levels(*field, options, communicator);
     view.limit = MotionLimit{field->identity.frame, field->identity.range};
     input_sha256["field " + view.view.camera.name] = info.payload_sha256;
@@ -225,7 +226,8 @@ LoadedCase load_case(const Study& study,
     const NodeCt node_ct =
         read_ct_per_node(study_case.ct, options.ct, model, communicator, loaded.warnings);
     ct = node_ct.facts;
-    const auto renderer = std::make_shared<const RayCastDrr>(node_ct.volume, options.ray_caster);
+    const auto renderer =
+        std::make_shared<const RayCastDrr>(node_ct.volume, options.ray_caster, options.pool);
     const auto levels = coarse_ray_casts(*node_ct.volume, options, communicator);
     for (RegistrationView& view : problem->views) {
       view.renderer = renderer;

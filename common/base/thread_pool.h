@@ -46,6 +46,14 @@ class ThreadPool {
     run(loop);
   }
 
+  /// Calls work(begin, end) for [0, count) in blocks of `block`, the last one perhaps smaller.
+  template <typename Work>
+  void for_each_block(int count, int block, Work&& work) {
+    for_each((count + block - 1) / block, [&](int task, int /*slot*/) {
+      work(task * block, task * block + block < count ? task * block + block : count);
+    });
+  }
+
  private:
   /// One call of for_each().
   struct Loop {

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "base/thread_pool.h"
 #include "drr/drr_renderer.h"
 #include "field/compressed_attenuation_field.h"
 
@@ -15,8 +16,11 @@ namespace af {
 /// each ray's 16 neighbours.
 const std::vector<std::string>& field_look_up_names();
 
-/// The renderer of a way of field_look_up_names(); InputError when it is none of them.
+/// The renderer of a way of field_look_up_names(); InputError when it is none of them. The threads
+/// of `pool` share a large DRR, but for "nearest" and "quadrilinear".
 std::shared_ptr<const DrrRenderer> make_field_renderer(
-    std::shared_ptr<const CompressedAttenuationField> field, const std::string& look_up);
+    std::shared_ptr<const CompressedAttenuationField> field,
+    const std::string& look_up,
+    std::shared_ptr<ThreadPool> pool = nullptr);
 
 }  // namespace af

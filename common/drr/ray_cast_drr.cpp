@@ -15,15 +15,16 @@ RayFan ray_fan(const RigidTransform& room_from_ct, const View& view) {
 }
 
 RayCastDrr::RayCastDrr(std::shared_ptr<const AttenuationVolume> volume,
-                       const RayCasterOptions& options)
-    : volume_(std::move(volume)), caster_(*volume_, options) {}
+                       const RayCasterOptions& options,
+                       std::shared_ptr<ThreadPool> pool)
+    : volume_(std::move(volume)), caster_(*volume_, options), pool_(std::move(pool)) {}
 
 RenderStatus RayCastDrr::render(const RigidTransform& room_from_ct,
                                 const View& view,
                                 RenderWorkspace& workspace,
                                 std::span<float> total_attenuation,
                                 const std::optional<PoseGradients>& gradients) const {
-  caster_.cast(ray_fan(room_from_ct, view), total_attenuation);
+  caster_.cast(ray_fan(room_from_ct, view), total_attenuation, pool_.get());
   if (gradients) central_difference_gradients(*this, room_from_ct, view, workspace, *gradients);
   return {};
 }

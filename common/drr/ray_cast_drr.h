@@ -11,8 +11,10 @@ namespace af {
 /// DRRs by the reference ray caster; no ray is ever outside.
 class RayCastDrr final : public DrrRenderer {
  public:
+  /// `pool`: threads that share the rows of a DRR; none means the calling thread alone.
   explicit RayCastDrr(std::shared_ptr<const AttenuationVolume> volume,
-                      const RayCasterOptions& options = {});
+                      const RayCasterOptions& options = {},
+                      std::shared_ptr<ThreadPool> pool = nullptr);
 
   RenderStatus render(const RigidTransform& room_from_ct,
                       const View& view,
@@ -25,6 +27,7 @@ class RayCastDrr final : public DrrRenderer {
  private:
   std::shared_ptr<const AttenuationVolume> volume_;
   RayCaster caster_;
+  std::shared_ptr<ThreadPool> pool_;
 };
 
 /// The fan of rays (ct frame) that a view sees at a pose.

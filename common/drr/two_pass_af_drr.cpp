@@ -190,14 +190,33 @@ SlabImages with_sobel_slopes(const SlabImages& slab, Workspace& workspace) {
   return {grid, {slab.images[0], along_s, along_t}};
 }
 
+/// Calls work(PixelGrid) for bands of the view's rows, shared by the threads of a pool. The first
+/// pass is not worth sharing: it takes as long for any detector.
+template <typename Work>
+void for_each_band(const View& view, bool adds, ThreadPool& pool, const Work& work) {
+  // Smaller bands gain little or lose: another processor first has to fetch the node image.
+  constexpr int kPixelsPerBand = 65536;
+  const int rows = std::max(1, kPixelsPerBand / view.roi.width);
+  pool.for_each_block(view.roi.height, rows, [&](int begin, int end) {
+    work(PixelGrid{view.roi.width, begin, end, adds});
+  });
+}
+
 }  // namespace
 
 TwoPassAfDrr::TwoPassAfDrr(std::shared_ptr<const CompressedAttenuationField> field,
-                           const TwoPassOptions& options)
-    : blender_(make_viewpoint_blender(std::move(field), options.uv)), options_(options) {}
+                           const TwoPassOptions& options,
+                           std::shared_ptr<ThreadPool> pool)
+    : blender_(make_viewpoint_blender(std::move(field), options.uv)),
+      options_(options),
+      pool_(pool ? std::move(pool) : std::make_shared<ThreadPool>()) {}
 
-TwoPassAfDrr::TwoPassAfDrr(std::shared_ptr<const FieldLevel> level, const TwoPassOptions& options)
-    : blender_(make_viewpoint_blender(std::move(level), options.uv)), options_(options) {}
+TwoPassAfDrr::TwoPassAfDrr(std::shared_ptr<const FieldLevel> level,
+                           const TwoPassOptions& options,
+                           std::shared_ptr<ThreadPool> pool)
+    : blender_(make_viewpoint_blender(std::move(level), options.uv)),
+      options_(options),
+      pool_(pool ? std::move(pool) : std::make_shared<ThreadPool>()) {}
 
 std::unique_ptr<RenderWorkspace> TwoPassAfDrr::make_workspace() const {
   return std::make_unique<Workspace>();
@@ -231,21 +250,25 @@ RenderStatus TwoPassAfDrr::render(const RigidTransform& room_from_ct,
     SlabImages slab = blended_images(*blender_, k, rays, needs, scratch);
     if (is_cubic) slab = upsampled(slab, scratch);
     const Homography homography = nodes_from_pixels(slab.grid, rays);
-    const PixelGrid grid{view.roi.width, view.roi.height, k > 0};
     if (!gradients) {
-      warp_image(slab.image(0), homography, grid, total_attenuation.data());
+      for_each_band(view, k > 0, *pool_, [&](const PixelGrid& band) {
+        warp_image(slab.image(0), homography, band, total_attenuation.data());
+      });
       continue;
     }
-    warp_with_pose_slopes(slab.image(0),
-                          pose_slopes(slab,
-                                      rays,
-                                      slab_from_room.linear(),
-                                      view.camera.source_point - gradients->pivot_room_point),
-                          homography,
-                          grid,
-                          total_attenuation.data(),
-                          gradients->planes.data(),
-                          static_cast<std::int64_t>(pixels));
+    const PoseSlopes slopes = pose_slopes(slab,
+                                          rays,
+                                          slab_from_room.linear(),
+                                          view.camera.source_point - gradients->pivot_room_point);
+    for_each_band(view, k > 0, *pool_, [&](const PixelGrid& band) {
+      warp_with_pose_slopes(slab.image(0),
+                            slopes,
+                            homography,
+                            band,
+                            total_attenuation.data(),
+                            gradients->planes.data(),
+                            static_cast<std::int64_t>(pixels));
+    });
   }
   if (rays.all_inside(light_slab)) return {};
   return {blank_rays_outside(
@@ -269,12 +292,14 @@ RenderStatus TwoPassAfDrr::render_gradient_images(const RigidTransform& room_fro
   for (std::size_t k = 0; k < light_slab.slabs.size(); ++k) {
     const SlabImages slab =
         with_sobel_slopes(blended_images(*blender_, k, rays, {1, false}, scratch), scratch);
-    warp_slopes(slab.image(1),
-                slab.images[2],
-                nodes_from_pixels(slab.grid, rays),
-                {view.roi.width, view.roi.height, k > 0},
-                column_gradient.data(),
-                row_gradient.data());
+    for_each_band(view, k > 0, *pool_, [&](const PixelGrid& band) {
+      warp_slopes(slab.image(1),
+                  slab.images[2],
+                  nodes_from_pixels(slab.grid, rays),
+                  band,
+                  column_gradient.data(),
+                  row_gradient.data());
+    });
   }
   if (rays.all_inside(light_slab)) return {};
   return {blank_rays_outside(light_slab, rays, column_gradient, row_gradient)};

@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#include "base/thread_pool.h"
 #include "drr/drr_renderer.h"
 #include "drr/field_level.h"
 #include "drr/viewpoint_blender.h"
@@ -25,11 +26,14 @@ struct TwoPassOptions {
 /// \test TwoPassAfDrr.AgreesWithQuadrilinearLookup
 class TwoPassAfDrr final : public DrrRenderer {
  public:
+  /// `pool`: threads that share a large DRR; none means the calling thread alone.
   explicit TwoPassAfDrr(std::shared_ptr<const CompressedAttenuationField> field,
-                        const TwoPassOptions& options = {});
+                        const TwoPassOptions& options = {},
+                        std::shared_ptr<ThreadPool> pool = nullptr);
   /// A level of an image pyramid; it inherits the field's coverage.
   explicit TwoPassAfDrr(std::shared_ptr<const FieldLevel> level,
-                        const TwoPassOptions& options = {});
+                        const TwoPassOptions& options = {},
+                        std::shared_ptr<ThreadPool> pool = nullptr);
 
   RenderStatus render(const RigidTransform& room_from_ct,
                       const View& view,
@@ -53,6 +57,7 @@ class TwoPassAfDrr final : public DrrRenderer {
  private:
   std::unique_ptr<const ViewpointBlender> blender_;
   TwoPassOptions options_;
+  std::shared_ptr<ThreadPool> pool_;
 };
 
 }  // namespace af

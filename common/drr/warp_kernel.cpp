@@ -168,7 +168,7 @@ AF_NATIVE_INLINE void put(const PixelRun& run, float* values, Floats value) {
 template <typename Work>
 AF_NATIVE_INLINE void for_each_run(const Homography& homography, const PixelGrid& grid, Work work) {
   const Ints lane = native::lane_numbers();
-  for (int32_t r = 0; r < grid.rows; ++r) {
+  for (int32_t r = grid.row_begin; r < grid.row_end; ++r) {
     const WarpRow row = row_of(homography, r);
     for (int32_t c = 0; c < grid.columns; c += kLanes) {
       const int32_t left = grid.columns - c;

@@ -22,10 +22,11 @@ struct NodeImage {
   int32_t t_count;
 };
 
-/// Where resampled pixels go: rows x columns, row-major.
+/// Where resampled pixels go: a band of rows of a row-major image.
 struct PixelGrid {
   int32_t columns;
-  int32_t rows;
+  int32_t row_begin;
+  int32_t row_end;
   bool adds;  ///< to what stands there, instead of replacing it
 };
 

@@ -86,7 +86,9 @@ struct CastCt {
   Eigen::Vector3d center_ct_mm;
 };
 
-CastCt ray_caster(const DrrOptions& options, const CompressedAttenuationField* field) {
+CastCt ray_caster(const DrrOptions& options,
+                  const CompressedAttenuationField* field,
+                  const std::shared_ptr<ThreadPool>& pool) {
   const CtVolume ct = read_ct(options.ct, {options.series_uid});
   AttenuationModel model;
   model.mu_water_per_mm = options.water_mu_per_mm;
@@ -101,7 +103,8 @@ CastCt ray_caster(const DrrOptions& options, const CompressedAttenuationField* f
     model = {field->identity.mu_water_per_mm, field->identity.air_below_hu};
   }
   return {std::make_shared<const RayCastDrr>(std::make_shared<const AttenuationVolume>(ct, model),
-                                             RayCasterOptions{options.step_mm}),
+                                             RayCasterOptions{options.step_mm},
+                                             pool),
           ct.grid.center_mm()};
 }
 
@@ -117,6 +120,7 @@ std::vector<std::string> problems(const DrrOptions& options) {
   append_source_problems(options, found);
   append_pose_problems(options, found);
   append_output_problems(options, found);
+  for (const std::string& text : thread_problems(options.threads)) found.push_back(text);
   AttenuationModel model;
   model.mu_water_per_mm = options.water_mu_per_mm;
   for (const std::string& text : af::problems(model)) found.push_back(text);
@@ -127,12 +131,13 @@ std::vector<std::string> problems(const DrrOptions& options) {
 
 DrrScene load_scene(const DrrOptions& options, const Communicator& communicator) {
   DrrScene scene;
+  scene.pool = std::make_shared<ThreadPool>(thread_count(options.threads));
   std::shared_ptr<const CompressedAttenuationField> field;
   if (!options.field.empty()) {
     field = read_field(options.field, communicator);
     scene.view = View::whole_detector(field->identity.camera);
     scene.frame = field->identity.frame;
-    scene.renderer = make_field_renderer(field, options.interpolation);
+    scene.renderer = make_field_renderer(field, options.interpolation, scene.pool);
   }
   if (!options.rig.empty()) {
     const CameraRig rig = read_rig(options.rig);
@@ -140,7 +145,7 @@ DrrScene load_scene(const DrrOptions& options, const Communicator& communicator)
     if (!field) scene.frame.center_room_mm = rig.isocenter_point;
   }
   if (!options.ct.empty()) {
-    const CastCt cast = ray_caster(options, field.get());
+    const CastCt cast = ray_caster(options, field.get(), scene.pool);
     (field ? scene.reference : scene.renderer) = cast.renderer;
     if (!field) scene.frame.center_ct_mm = cast.center_ct_mm;
   }
@@ -160,17 +165,18 @@ std::vector<RigidTransform> requested_poses(const DrrOptions& options, const Pos
 
 std::vector<Image2d> render_poses(const DrrRenderer& renderer,
                                   const View& view,
-                                  const std::vector<RigidTransform>& poses) {
-  std::vector<Image2d> drrs;
-  drrs.reserve(poses.size());
-  for (std::size_t i = 0; i < poses.size(); ++i) {
+                                  const std::vector<RigidTransform>& poses,
+                                  ThreadPool& pool) {
+  std::vector<Image2d> drrs(poses.size());
+  pool.for_each(static_cast<int>(poses.size()), [&](int task, int /*slot*/) {
+    const auto i = static_cast<std::size_t>(task);
     std::int64_t rays_outside = 0;
-    drrs.push_back(render_image(renderer, poses[i], view, &rays_outside));
+    drrs[i] = render_image(renderer, poses[i], view, &rays_outside);
     if (rays_outside > 0)
       throw InputError("pose " + std::to_string(i) + " = outside the field: " +
                        std::to_string(rays_outside) + " of " + std::to_string(view.pixel_count()) +
                        " rays miss its planes; must be within the motion range it was made for");
-  }
+  });
   return drrs;
 }
 
@@ -206,8 +212,10 @@ std::string write_drrs(const std::vector<Image2d>& drrs,
 std::string write_comparison(const DrrScene& scene,
                              const RigidTransform& room_from_ct,
                              const std::filesystem::path& path) {
-  const Image2d field = render_poses(*scene.renderer, scene.view, {room_from_ct}).front();
-  const Image2d cast = render_poses(*scene.reference, scene.view, {room_from_ct}).front();
+  const Image2d field =
+      render_poses(*scene.renderer, scene.view, {room_from_ct}, *scene.pool).front();
+  const Image2d cast =
+      render_poses(*scene.reference, scene.view, {room_from_ct}, *scene.pool).front();
   const std::optional<Psnr> quality = psnr(field.pixels, cast.pixels);
   Image2d difference = field;
   for (std::size_t i = 0; i < difference.pixels.size(); ++i) difference.pixels[i] -= cast.pixels[i];

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "base/thread_pool.h"
 #include "drr/drr_renderer.h"
 #include "parallel/communicator.h"
 
@@ -30,6 +31,7 @@ struct DrrOptions {
   bool compare = false;
   bool invert = false;
   std::array<double, 2> window_percent = {0.5, 99.5};  ///< of PNG files
+  int threads = 1;                                     ///< 0: every processor
   std::filesystem::path output;
 };
 
@@ -42,6 +44,7 @@ struct DrrScene {
   std::shared_ptr<const DrrRenderer> reference;  ///< the ray caster, for --compare
   View view;
   PoseFrame frame;
+  std::shared_ptr<ThreadPool> pool;
 };
 
 /// Collective. Reads field, CT and rig. FileError when --compare's CT is not the field's.
@@ -50,10 +53,12 @@ DrrScene load_scene(const DrrOptions& options, const Communicator& communicator)
 /// Poses in the order of the options or the CSV file.
 std::vector<RigidTransform> requested_poses(const DrrOptions& options, const PoseFrame& frame);
 
-/// DRRs of all poses; InputError when any ray of any pose is outside the field.
+/// DRRs of all poses, shared by the threads of the pool; InputError when any ray of any pose is
+/// outside the field.
 std::vector<Image2d> render_poses(const DrrRenderer& renderer,
                                   const View& view,
-                                  const std::vector<RigidTransform>& poses);
+                                  const std::vector<RigidTransform>& poses,
+                                  ThreadPool& pool);
 
 /// One DRR, a stack of several, or a PNG, by the name's extension. Returns a line about it.
 std::string write_drrs(const std::vector<Image2d>& drrs,

@@ -64,6 +64,10 @@ void bind_output(CLI::App& app, DrrOptions& options) {
                  "PNG: low,high percentile of the DRR that become black and white")
       ->delimiter(',')
       ->capture_default_str();
+  app.add_option("--threads",
+                 options.threads,
+                 "Threads that share a large DRR, or the DRRs of --poses; 0: every processor")
+      ->capture_default_str();
   app.add_option("-o,--output",
                  options.output,
                  "OUT.mha, .nii.gz, .nrrd, .tif: total attenuation, float32, not scaled; OUT.png: "
@@ -81,7 +85,8 @@ void run(const DrrOptions& options, const af::Communicator& world) {
     std::cout << options.output.string() << ": " << words << '\n';
     return;
   }
-  const std::vector<af::Image2d> drrs = af::tools::render_poses(*scene.renderer, scene.view, poses);
+  const std::vector<af::Image2d> drrs =
+      af::tools::render_poses(*scene.renderer, scene.view, poses, *scene.pool);
   std::cout << af::tools::write_drrs(drrs, scene.view, options) << '\n';
 }
 

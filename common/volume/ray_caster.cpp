@@ -111,7 +111,9 @@ RayCaster::RayCaster(const AttenuationVolume& volume, const RayCasterOptions& op
   throw_if_any(problems(options));
 }
 
-void RayCaster::cast(const RayFan& fan, std::span<float> total_attenuation) const {
+void RayCaster::cast(const RayFan& fan,
+                     std::span<float> total_attenuation,
+                     ThreadPool* pool) const {
   check(total_attenuation.size() ==
             static_cast<std::size_t>(fan.columns) * static_cast<std::size_t>(fan.rows),
         "one value per ray of the fan");
@@ -121,12 +123,11 @@ void RayCaster::cast(const RayFan& fan, std::span<float> total_attenuation) cons
   const SumBundle sum_bundle = select_kernel<SumBundle>(
       kernels_128::sum_bundle, kernels_256::sum_bundle, kernels_512::sum_bundle);
   const auto mu_per_mm_per_unit = static_cast<float>(volume_.model().mu_per_mm_per_unit());
-
-  RayBundle bundle{};
-  std::array<float, RayBundle::kRays> weights_mm{};
-  std::array<float, RayBundle::kRays> sums{};
-  std::size_t next = 0;
-  for (int row = 0; row < fan.rows; ++row)
+  const auto cast_row = [&](int row, int /*slot*/) {
+    RayBundle bundle{};
+    std::array<float, RayBundle::kRays> weights_mm{};
+    std::array<float, RayBundle::kRays> sums{};
+    auto next = static_cast<std::size_t>(row) * static_cast<std::size_t>(fan.columns);
     for (int first = 0; first < fan.columns; first += RayBundle::kRays) {
       const int count = std::min(RayBundle::kRays, fan.columns - first);
       for (int lane = 0; lane < RayBundle::kRays; ++lane) {
@@ -143,6 +144,11 @@ void RayCaster::cast(const RayFan& fan, std::span<float> total_attenuation) cons
         total_attenuation[next++] = sums[i] * (weights_mm[i] * mu_per_mm_per_unit);
       }
     }
+  };
+  if (pool != nullptr)
+    pool->for_each(fan.rows, cast_row);
+  else
+    for (int row = 0; row < fan.rows; ++row) cast_row(row, 0);
 }
 
 float RayCaster::total_attenuation(const Eigen::Vector3d& source_point,

@@ -4,6 +4,7 @@
 #include <limits>
 #include <span>
 
+#include "base/thread_pool.h"
 #include "volume/attenuation_volume.h"
 
 namespace af {
@@ -39,8 +40,11 @@ class RayCaster {
   RayCaster(const AttenuationVolume& volume, const RayCasterOptions& options);
 
   /// U of every ray of the fan, dimensionless, row-major into `total_attenuation` (columns * rows
-  /// values); exactly 0 where a ray misses the volume.
-  void cast(const RayFan& fan, std::span<float> total_attenuation) const;
+  /// values); exactly 0 where a ray misses the volume. Rows are shared by the threads of `pool`,
+  /// when one is given.
+  void cast(const RayFan& fan,
+            std::span<float> total_attenuation,
+            ThreadPool* pool = nullptr) const;
 
   /// Total attenuation of one ray (ct frame).
   [[nodiscard]] float total_attenuation(const Eigen::Vector3d& source_point,

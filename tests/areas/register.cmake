@@ -17,3 +17,7 @@ af_add_test(
   SOURCES unit/register/register_command_test.cpp unit/register/result_files_test.cpp
   LIBS af_registration_program)
 af_add_mpi_test(register_mpi_tests SOURCES mpi/register/multi_start_mpi_test.cpp LIBS af_registration_program RANKS 1 2 3 4)
+af_add_test(
+  allocation_test
+  SOURCES unit/register/allocation_test.cpp unit/drr/small_fields.cpp support/counted_allocations.cpp
+  LIBS af_registration)

@@ -37,6 +37,18 @@ TEST_P(ThreadPoolOf, ThreadsOfOneLoopHaveDifferentSlots) {
   EXPECT_EQ(clashes, 0);
 }
 
+TEST_P(ThreadPoolOf, BlocksCoverEveryNumberOnce) {
+  ThreadPool pool(GetParam());
+  for (const int count : {0, 1, 15, 16, 17, 100}) {
+    std::vector<std::atomic<int>> runs(static_cast<std::size_t>(count));
+    pool.for_each_block(count, 16, [&](int begin, int end) {
+      EXPECT_LE(end - begin, 16);
+      for (int i = begin; i < end; ++i) ++runs[static_cast<std::size_t>(i)];
+    });
+    for (const std::atomic<int>& times : runs) EXPECT_EQ(times, 1);
+  }
+}
+
 TEST_P(ThreadPoolOf, NestedLoopsRunEveryTaskOnce) {
   ThreadPool pool(GetParam());
   std::atomic<int> sum = 0;

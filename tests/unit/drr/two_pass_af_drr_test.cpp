@@ -86,6 +86,30 @@ TEST(TwoPassAfDrr, EveryVectorWidthGivesTheSameBits) {
     }
 }
 
+TEST(TwoPassAfDrr, AnyNumberOfThreadsGivesTheSameBits) {
+  // Pixels enough for several bands.
+  View view = View::whole_detector(small_camera());
+  view.camera.pixel_spacing_mm /= 16.0;
+  view.camera.size_px *= 16;
+  view.roi = {0, 0, view.camera.size_px.x(), view.camera.size_px.y()};
+  const RigidTransform pose = pose_from_parameters({}, small_pose(8));
+  for (const TwoPassOptions& options : {kLinear, kCubicInSt}) {
+    const auto field = small_field(waves, 2, 7, 41);
+    const auto level = make_field_pyramid(*field, 1).front();
+    const TwoPassAfDrr alone(field, options);
+    const TwoPassAfDrr level_alone(level, options);
+    for (const int threads : {2, 5}) {
+      const auto pool = std::make_shared<ThreadPool>(threads);
+      const TwoPassAfDrr shared(field, options, pool);
+      const TwoPassAfDrr level_shared(level, options, pool);
+      EXPECT_EQ(all_outputs(shared, pose, view, *shared.make_workspace()),
+                all_outputs(alone, pose, view, *alone.make_workspace()));
+      EXPECT_EQ(all_outputs(level_shared, pose, view, *level_shared.make_workspace()),
+                all_outputs(level_alone, pose, view, *level_alone.make_workspace()));
+    }
+  }
+}
+
 TEST(TwoPassAfDrr, AWorkspaceLeavesNoTrace) {
   // Nodes that no ray needs are not written: what an earlier pose left there must not matter.
   for (const TwoPassOptions& options : {kLinear, kCubic}) {

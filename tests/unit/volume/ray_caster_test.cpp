@@ -188,6 +188,22 @@ TEST(RayCaster, EveryVectorWidthGivesTheSameBits) {
   force_vector_width(std::nullopt);
 }
 
+TEST(RayCaster, AnyNumberOfThreadsGivesTheSameBits) {
+  const CtVolume ct = ellipsoid_phantom(
+      cube_grid(40, 1.3), {{{3, 2, 1}, {15, 20, 12}, Eigen::Matrix3d::Identity(), 700}}, 2);
+  const AttenuationVolume volume(ct, {});
+  const RayCaster caster(volume, {});
+  const RayFan fan{{10, -500, 20}, {-30, 100, -30}, {1.7, 0.01, 0}, {0, 0, 1.9}, 37, 31};
+  std::vector<float> alone(37 * 31);
+  caster.cast(fan, alone);
+  for (const int threads : {2, 5}) {
+    ThreadPool pool(threads);
+    std::vector<float> values(37 * 31);
+    caster.cast(fan, values, &pool);
+    EXPECT_EQ(values, alone);
+  }
+}
+
 TEST(RayCaster, FanEqualsItsSingleRays) {
   const CtVolume ct = box_phantom(cube_grid(24, 1.0), {5, 6, 7}, {15, 16, 17}, 400);
   const AttenuationVolume volume(ct, {});
