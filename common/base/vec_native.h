@@ -33,10 +33,17 @@ AF_NATIVE_INLINE Floats load(const float* from) {
 
 /// Unsigned 16-bit elements as floats.
 AF_NATIVE_INLINE Floats load(const uint16_t* from) {
-  using Samples = uint16_t __attribute__((vector_size(AF_VECTOR_BITS / 16)));
-  Samples samples;
-  memcpy(&samples, from, sizeof(samples));
-  return __builtin_convertvector(__builtin_convertvector(samples, Ints), Floats);
+#if AF_VECTOR_BITS == 512
+  const __m512i samples =
+      _mm512_cvtepu16_epi32(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(from)));
+#elif AF_VECTOR_BITS == 256
+  const __m256i samples =
+      _mm256_cvtepu16_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(from)));
+#else
+  const __m128i samples =
+      _mm_cvtepu16_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(from)));
+#endif
+  return __builtin_convertvector(reinterpret_cast<Ints>(samples), Floats);
 }
 
 AF_NATIVE_INLINE void store(float* to, Floats vector) {
@@ -88,21 +95,6 @@ AF_NATIVE_INLINE Floats maximum(Floats a, Floats b) {
   return AF_NATIVE(max_ps)(a, b);
 }
 
-/// True when any lane lies outside [low, high].
-AF_NATIVE_INLINE bool any_outside(Ints value, int32_t low, int32_t high) {
-#if AF_VECTOR_BITS == 512
-  // As unsigned numbers, those below `low` wrap around.
-  return _mm512_cmpgt_epu32_mask(reinterpret_cast<__m512i>(value - low),
-                                 _mm512_set1_epi32(high - low)) != 0;
-#elif AF_VECTOR_BITS == 256
-  const Ints outside = (value < low) | (value > high);
-  return _mm256_movemask_epi8(reinterpret_cast<__m256i>(outside)) != 0;
-#else
-  const Ints outside = (value < low) | (value > high);
-  return _mm_movemask_epi8(reinterpret_cast<__m128i>(outside)) != 0;
-#endif
-}
-
 /// base[offset] per lane.
 AF_NATIVE_INLINE Floats gather(const float* base, Ints offset) {
 #if AF_VECTOR_BITS == 512
@@ -115,12 +107,40 @@ AF_NATIVE_INLINE Floats gather(const float* base, Ints offset) {
 }
 
 #if AF_VECTOR_BITS >= 256
+/// True when any lane has any of the bits set.
+AF_NATIVE_INLINE bool any_bit(Ints value, int32_t bits) {
+#if AF_VECTOR_BITS == 512
+  return _mm512_test_epi32_mask(reinterpret_cast<__m512i>(value), _mm512_set1_epi32(bits)) != 0;
+#else
+  return _mm256_testz_si256(reinterpret_cast<__m256i>(value), _mm256_set1_epi32(bits)) == 0;
+#endif
+}
+
 /// window[index] per lane, index in 0 ... kLanes - 1.
 AF_NATIVE_INLINE Floats pick(Floats window, Ints index) {
 #if AF_VECTOR_BITS == 512
   return _mm512_permutexvar_ps(reinterpret_cast<__m512i>(index), window);
 #else
   return _mm256_permutevar8x32_ps(window, reinterpret_cast<__m256i>(index));
+#endif
+}
+AF_NATIVE_INLINE Ints pick(Ints window, Ints index) {
+#if AF_VECTOR_BITS == 512
+  return reinterpret_cast<Ints>(_mm512_permutexvar_epi32(reinterpret_cast<__m512i>(index),
+                                                         reinterpret_cast<__m512i>(window)));
+#else
+  return reinterpret_cast<Ints>(_mm256_permutevar8x32_epi32(reinterpret_cast<__m256i>(window),
+                                                            reinterpret_cast<__m256i>(index)));
+#endif
+}
+/// Of two windows, one after the other: index modulo 2 kLanes.
+AF_NATIVE_INLINE Floats pick(Floats low, Floats high, Ints index) {
+#if AF_VECTOR_BITS == 512
+  return _mm512_permutex2var_ps(low, reinterpret_cast<__m512i>(index), high);
+#else
+  // A lane's bit 3 becomes its sign.
+  return _mm256_blendv_ps(
+      pick(low, index), pick(high, index), reinterpret_cast<__m256>(index << 28));
 #endif
 }
 #endif

@@ -126,7 +126,9 @@ AF_NATIVE_INLINE void blend_run(const SampleRun& run) {
 
 }  // namespace
 
-void blend_tiles(const TileStrip& strip) {
+void blend_tiles(const TileStrip& given) {
+  // A copy that no store can change.
+  const TileStrip strip = given;
   if (strip.images[1] == nullptr)
     for (int32_t d = strip.tile_begin; d < strip.tile_end; ++d) blend_tile<false>(strip, d);
   else

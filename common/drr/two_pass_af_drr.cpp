@@ -12,7 +12,8 @@ namespace af {
 
 namespace {
 
-/// Kernels read a row and read and write whole vectors, up to two, beyond an image.
+/// Kernels read rows, and read and write whole vectors, up to two, beyond an image.
+constexpr int kRowsBeyond = 4;
 constexpr std::size_t kImagePadding = 64;
 
 std::ptrdiff_t rounded_up(std::ptrdiff_t count, std::ptrdiff_t multiple) {
@@ -23,7 +24,7 @@ std::ptrdiff_t rounded_up(std::ptrdiff_t count, std::ptrdiff_t multiple) {
 class ImageBuffer {
  public:
   float* reserve(std::ptrdiff_t stride, int rows) {
-    const auto size = static_cast<std::size_t>(stride * (rows + 1)) + kImagePadding;
+    const auto size = static_cast<std::size_t>(stride * (rows + kRowsBeyond)) + kImagePadding;
     if (values_.size() < size) values_.resize(size);
     return values_.data();
   }

@@ -219,23 +219,44 @@ class CompressedBlender final : public AnyBlender {
       const ViewpointTap* pair = node_taps.data() + i;
       const int first = std::min(pair[0].first, pair[1].first) / 2;
       const int last = (std::max(pair[0].first, pair[1].first) + tap_count() - 1) / 2;
-      for (int tile = first; tile <= last; ++tile) {
-        TileTap tap{};
-        tap.offset = tile * axis.tile_stride;
-        bool is_used = false;
-        for (unsigned element = 0; element < kTileElements; ++element) {
-          const int viewpoint = 2 * tile + static_cast<int>(element >> (2 + axis.node_bit) & 1u);
-          const ViewpointTap& node = pair[element >> axis.node_bit & 1u];
-          const int at = viewpoint - node.first;
-          if (at < 0 || at >= tap_count()) continue;
-          tap.weights[element] = axis.scale * node.weights[at];
-          tap.slopes[element] = axis.scale * node.slopes[at];
-          is_used = is_used || node.weights[at] != 0.0f || node.slopes[at] != 0.0f;
-        }
-        if (is_used) taps.push_back(tap);
-      }
+      for (int tile = first; tile <= last; ++tile) append_tile_tap(pair, tile, axis, taps);
       begin.push_back(static_cast<std::int32_t>(taps.size()));
     }
+  }
+
+  /// What viewpoints 2 tile and 2 tile + 1 add to a pair of nodes, unless that is nothing.
+  void append_tile_tap(const ViewpointTap* pair,
+                       int tile,
+                       const TileAxis& axis,
+                       std::vector<TileTap>& taps) const {
+    float weights[4] = {};  // [viewpoint][node]
+    float slopes[4] = {};
+    bool is_used = false;
+    for (int i = 0; i < 4; ++i) {
+      const ViewpointTap& node = pair[i % 2];
+      const int at = 2 * tile + i / 2 - node.first;
+      if (at < 0 || at >= tap_count()) continue;
+      weights[i] = axis.scale * node.weights[at];
+      slopes[i] = axis.scale * node.slopes[at];
+      is_used = is_used || weights[i] != 0.0f || slopes[i] != 0.0f;
+    }
+    if (!is_used) return;
+    TileTap& tap = taps.emplace_back();
+    tap.offset = tile * axis.tile_stride;
+    if (axis.node_bit == 0) {
+      spread<0>(weights, tap.weights);
+      spread<0>(slopes, tap.slopes);
+    } else {
+      spread<1>(weights, tap.weights);
+      spread<1>(slopes, tap.slopes);
+    }
+  }
+
+  /// Values [viewpoint][node] to the elements of a codeword.
+  template <unsigned kNodeBit>
+  static void spread(const float (&values)[4], float (&elements)[kTileElements]) {
+    for (unsigned element = 0; element < kTileElements; ++element)
+      elements[element] = values[(element >> (2 + kNodeBit) & 1u) * 2 + (element >> kNodeBit & 1u)];
   }
 
   void blend_stored(std::size_t k,

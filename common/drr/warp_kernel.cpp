@@ -31,51 +31,91 @@ WarpRow row_of(const Homography& h, int32_t row) {
           static_cast<float>(h.d[1])};
 }
 
+/// A row's lanes in which the coordinates are least: along a row of pixels they run one way, but
+/// for rounding.
+struct LeastLanes {
+  Ints s, t;
+};
+
+/// The part of a node image that registers hold for the cells of neighbouring pixels.
+struct Window {
+  int64_t first;  ///< of its nodes in the image
+  Ints lane;      ///< of each cell's lower s node; kLanes on for cells in an odd row
+  Ints row;       ///< of each cell's lower t node, from the window's first
+  int32_t rows;   ///< that lower nodes may be in: 2 or 4; 0 when registers cannot hold the cells
+};
+
 /// The cells of a node image that neighbouring pixels fall into, one per lane.
 struct Cells {
   Floats inverse_depth;
-  Floats s, t;                ///< node coordinates, not below 0
+  Floats s, t;                ///< node coordinates, clamped to the image
   Floats s_weight, t_weight;  ///< of the upper nodes
   Ints s_node, t_node;        ///< lower nodes
-  int32_t first_s;            ///< least of s_node
-  int32_t first_t, last_t;
-  bool is_compact;  ///< few rows of at most kLanes nodes hold all cells
+  Window window;
 };
 
-/// Rows up to which picking from registers beats gathering.
-inline constexpr int32_t kMostRows = 8;
+/// What clamps coordinates: the largest numbers below the last node's.
+struct Limits {
+  float s, t;
+};
 
-/// Finds out whether registers can hold the cells. Along a row of pixels the coordinates run one
-/// way, but for rounding.
-AF_NATIVE_INLINE void measure(Cells& cells) {
-#if AF_VECTOR_BITS >= 256
-  const int32_t s_ends[2] = {cells.s_node[0], cells.s_node[kLanes - 1]};
-  const int32_t t_ends[2] = {cells.t_node[0], cells.t_node[kLanes - 1]};
-  const bool s_rises = s_ends[0] < s_ends[1];
-  const bool t_rises = t_ends[0] < t_ends[1];
-  cells.first_s = s_rises ? s_ends[0] : s_ends[1];
-  cells.first_t = t_rises ? t_ends[0] : t_ends[1];
-  cells.last_t = t_rises ? t_ends[1] : t_ends[0];
-  cells.is_compact =
-      cells.last_t - cells.first_t < kMostRows &&
-      !native::any_outside(cells.s_node, cells.first_s, cells.first_s + kLanes - 1) &&
-      !native::any_outside(cells.t_node, cells.first_t, cells.last_t);
-#else
-  cells.is_compact = false;
-#endif
+AF_NATIVE_INLINE float largest_below(int32_t positive) {
+  const auto value = static_cast<float>(positive);
+  int32_t bits = 0;
+  memcpy(&bits, &value, sizeof(bits));
+  --bits;
+  float below = 0.0f;
+  memcpy(&below, &bits, sizeof(below));
+  return below;
 }
 
-AF_NATIVE_INLINE Cells cells_of(const NodeImage& image, const WarpRow& row, Floats column) {
+AF_NATIVE_INLINE Floats clamped(Floats value, float limit) {
+  return native::minimum(native::maximum(value, splat(0.0f)), splat(limit));
+}
+
+#if AF_VECTOR_BITS >= 256
+AF_NATIVE_INLINE LeastLanes least_lanes(const WarpRow& row) {
+  const bool s_rises = row.s_1 * row.d_0 > row.s_0 * row.d_1;
+  const bool t_rises = row.t_1 * row.d_0 > row.t_0 * row.d_1;
+  return {splat(s_rises ? 0 : kLanes - 1), splat(t_rises ? 0 : kLanes - 1)};
+}
+
+AF_NATIVE_INLINE Window window_of(const Cells& cells, const LeastLanes& least, int32_t stride) {
+  const Ints first_s = native::pick(cells.s_node, least.s);
+  const Ints first_t = native::pick(cells.t_node, least.t);
+  const Ints column = cells.s_node - first_s;
+  const Ints row = cells.t_node - first_t;
+  Window window{
+      static_cast<int64_t>(first_t[0]) * stride + first_s[0], column + row * kLanes, row, 0};
+  // No high bit is set exactly when both are at least 0, column < kLanes and row < 2, or 4.
+  constexpr int32_t kHighBits = ~(kLanes - 1);
+  if (!native::any_bit(column | row * (kLanes / 2), kHighBits))
+    window.rows = 2;
+  else if (!native::any_bit(column | row * (kLanes / 4), kHighBits))
+    window.rows = 4;
+  return window;
+}
+#else
+// Without instructions that pick lanes everything is gathered.
+AF_NATIVE_INLINE LeastLanes least_lanes(const WarpRow& /*row*/) {
+  return LeastLanes();
+}
+AF_NATIVE_INLINE Window window_of(const Cells& /*cells*/,
+                                  const LeastLanes& /*least*/,
+                                  int32_t /*stride*/) {
+  return Window();
+}
+#endif
+
+AF_NATIVE_INLINE Cells cells_of(const Limits& limits, const WarpRow& row, Floats column) {
   Cells cells{};
   cells.inverse_depth = splat(1.0f) / (row.d_0 + column * row.d_1);
-  const Floats zero = splat(0.0f);
-  cells.s = native::maximum(zero, (row.s_0 + column * row.s_1) * cells.inverse_depth);
-  cells.t = native::maximum(zero, (row.t_0 + column * row.t_1) * cells.inverse_depth);
-  cells.s_node = native::minimum(native::to_int(cells.s), splat(image.s_count - 2));
-  cells.t_node = native::minimum(native::to_int(cells.t), splat(image.t_count - 2));
-  cells.s_weight = native::minimum(cells.s - to_float(cells.s_node), splat(1.0f));
-  cells.t_weight = native::minimum(cells.t - to_float(cells.t_node), splat(1.0f));
-  measure(cells);
+  cells.s = clamped((row.s_0 + column * row.s_1) * cells.inverse_depth, limits.s);
+  cells.t = clamped((row.t_0 + column * row.t_1) * cells.inverse_depth, limits.t);
+  cells.s_node = native::to_int(cells.s);
+  cells.t_node = native::to_int(cells.t);
+  cells.s_weight = cells.s - to_float(cells.s_node);
+  cells.t_weight = cells.t - to_float(cells.t_node);
   return cells;
 }
 
@@ -85,57 +125,56 @@ struct RowPair {
   Floats low_slope, high_slope;
 };
 
-#if AF_VECTOR_BITS >= 256
-struct RowSample {
-  Floats value, slope;
+/// The nodes of one column in both rows of each cell.
+struct Column {
+  Floats low, high;
 };
 
-AF_NATIVE_INLINE RowSample sample_row(const float* row, Ints lane, Floats weight) {
-  const Floats left = native::pick(load(row), lane);
-  const Floats slope = native::pick(load(row + 1), lane) - left;
-  return {left + weight * slope, slope};
-}
-
-AF_NATIVE_INLINE RowPair sample_compact(const float* values, int32_t stride, const Cells& cells) {
-  const float* row = values + static_cast<int64_t>(cells.first_t) * stride + cells.first_s;
-  const Ints lane = cells.s_node - cells.first_s;
-  const RowSample first = sample_row(row, lane, cells.s_weight);
-  RowSample last = sample_row(row + stride, lane, cells.s_weight);
-  RowPair pair{first.value, last.value, first.slope, last.slope};
-  // At least once, whether needed or not: cheaper than a branch that is often mispredicted.
-  int32_t t = cells.first_t + 1;
-  do {
-    row += stride;
-    const RowSample next = sample_row(row + stride, lane, cells.s_weight);
-    const Ints is_beyond = cells.t_node >= t;
-    pair.low = is_beyond ? last.value : pair.low;
-    pair.high = is_beyond ? next.value : pair.high;
-    pair.low_slope = is_beyond ? last.slope : pair.low_slope;
-    pair.high_slope = is_beyond ? next.slope : pair.high_slope;
-    last = next;
-  } while (++t <= cells.last_t);
-  return pair;
+#if AF_VECTOR_BITS >= 256
+AF_NATIVE_INLINE Column pick_column(const float* nodes, int64_t stride, const Window& window) {
+  const Floats row_0 = load(nodes);
+  const Floats row_1 = load(nodes + stride);
+  const Floats row_2 = load(nodes + 2 * stride);
+  const Column column{native::pick(row_0, row_1, window.lane),
+                      native::pick(row_1, row_2, window.lane)};
+  if (window.rows == 2) return column;
+  const Floats row_3 = load(nodes + 3 * stride);
+  const Floats row_4 = load(nodes + 4 * stride);
+  const Ints is_upper = window.row >= 2;
+  return {is_upper ? native::pick(row_2, row_3, window.lane) : column.low,
+          is_upper ? native::pick(row_3, row_4, window.lane) : column.high};
 }
 #endif
 
-AF_NATIVE_INLINE RowPair sample_scattered(const float* values, int32_t stride, const Cells& cells) {
+struct Corners {
+  Column left, right;
+};
+
+AF_NATIVE_INLINE Corners gather_corners(const float* values, int32_t stride, const Cells& cells) {
   const Ints offset = cells.t_node * stride + cells.s_node;
   const float* next = values + stride;
-  RowPair pair{};
-  const Floats low = native::gather(values, offset);
-  const Floats high = native::gather(next, offset);
-  pair.low_slope = native::gather(values + 1, offset) - low;
-  pair.high_slope = native::gather(next + 1, offset) - high;
-  pair.low = low + cells.s_weight * pair.low_slope;
-  pair.high = high + cells.s_weight * pair.high_slope;
-  return pair;
+  return {{native::gather(values, offset), native::gather(next, offset)},
+          {native::gather(values + 1, offset), native::gather(next + 1, offset)}};
+}
+
+AF_NATIVE_INLINE Corners corners_of(const float* values, int32_t stride, const Cells& cells) {
+#if AF_VECTOR_BITS >= 256
+  if (cells.window.rows > 0) {
+    const float* first = values + cells.window.first;
+    return {pick_column(first, stride, cells.window), pick_column(first + 1, stride, cells.window)};
+  }
+#endif
+  return gather_corners(values, stride, cells);
 }
 
 AF_NATIVE_INLINE RowPair sample(const float* values, int32_t stride, const Cells& cells) {
-#if AF_VECTOR_BITS >= 256
-  if (cells.is_compact) return sample_compact(values, stride, cells);
-#endif
-  return sample_scattered(values, stride, cells);
+  const Corners corners = corners_of(values, stride, cells);
+  const Floats low_slope = corners.right.low - corners.left.low;
+  const Floats high_slope = corners.right.high - corners.left.high;
+  return {corners.left.low + cells.s_weight * low_slope,
+          corners.left.high + cells.s_weight * high_slope,
+          low_slope,
+          high_slope};
 }
 
 AF_NATIVE_INLINE Floats value_of(const RowPair& pair, const Cells& cells) {
@@ -164,17 +203,27 @@ AF_NATIVE_INLINE void put(const PixelRun& run, float* values, Floats value) {
   for (int32_t i = 0; i < run.count; ++i) to[i] = run.adds ? to[i] + lanes[i] : lanes[i];
 }
 
-/// Calls work(row, columns of the lanes, run) for all pixels.
+/// Calls work(row, cells, run) for all pixels. Arguments come as copies: the compiler cannot know
+/// that stores to pixels leave what references refer to alone, and would load it again and again.
 template <typename Work>
-AF_NATIVE_INLINE void for_each_run(const Homography& homography, const PixelGrid& grid, Work work) {
-  const Ints lane = native::lane_numbers();
+AF_NATIVE_INLINE void for_each_run(NodeImage image,
+                                   Homography homography,
+                                   PixelGrid grid,
+                                   Work work) {
+  const Limits limits{largest_below(image.s_count - 1), largest_below(image.t_count - 1)};
+  const Floats last_column = splat(static_cast<float>(grid.columns - 1));
   for (int32_t r = grid.row_begin; r < grid.row_end; ++r) {
     const WarpRow row = row_of(homography, r);
+    const LeastLanes least = least_lanes(row);
+    Floats column = to_float(native::lane_numbers());
     for (int32_t c = 0; c < grid.columns; c += kLanes) {
       const int32_t left = grid.columns - c;
       const PixelRun run{
           static_cast<int64_t>(r) * grid.columns + c, left < kLanes ? left : kLanes, grid.adds};
-      work(row, to_float(native::minimum(lane + c, splat(grid.columns - 1))), run);
+      Cells cells = cells_of(limits, row, native::minimum(column, last_column));
+      cells.window = window_of(cells, least, image.stride);
+      work(row, cells, run);
+      column += static_cast<float>(kLanes);
     }
   }
 }
@@ -185,10 +234,11 @@ void warp_image(const NodeImage& image,
                 const Homography& homography,
                 const PixelGrid& grid,
                 float* values) {
-  for_each_run(homography, grid, [&](const WarpRow& row, Floats column, const PixelRun& run) {
-    const Cells cells = cells_of(image, row, column);
-    put(run, values, value_of(sample(image.values, image.stride, cells), cells));
-  });
+  const NodeImage from = image;
+  for_each_run(
+      from, homography, grid, [=](const WarpRow& /*row*/, const Cells& cells, const PixelRun& run) {
+        put(run, values, value_of(sample(from.values, from.stride, cells), cells));
+      });
 }
 
 void warp_with_pose_slopes(const NodeImage& image,
@@ -198,31 +248,33 @@ void warp_with_pose_slopes(const NodeImage& image,
                            float* values,
                            float* planes,
                            int64_t plane_stride) {
-  for_each_run(homography, grid, [&](const WarpRow& row, Floats column, const PixelRun& run) {
-    const Cells cells = cells_of(image, row, column);
-    const RowPair pair = sample(image.values, image.stride, cells);
-    put(run, values, value_of(pair, cells));
-    const Floats f_x = slopes.nodes_per_mm[0] *
-                       (pair.low_slope + cells.t_weight * (pair.high_slope - pair.low_slope));
-    const Floats f_z = slopes.nodes_per_mm[1] * (pair.high - pair.low);
-    const Floats g_x = value_of(sample(slopes.source_x, image.stride, cells), cells);
-    const Floats g_z = value_of(sample(slopes.source_z, image.stride, cells), cells);
-    const Floats m_x = cells.s * slopes.m_scale[0] + slopes.m_offset[0];
-    const Floats m_z = cells.t * slopes.m_scale[1] + slopes.m_offset[1];
-    // Forces are perpendicular to the ray.
-    const Floats f_y = -(m_x * f_x + m_z * f_z);
-    const Floats force[3] = {f_x + g_x, f_y - (m_x * g_x + m_z * g_z), f_z + g_z};
-    const Floats moment[3] = {f_z - m_z * f_y, m_z * f_x - m_x * f_z, m_x * f_y - f_x};
-    for (int axis = 0; axis < 3; ++axis) {
-      put(run,
-          planes + axis * plane_stride,
-          product(slopes.rotation_of_moment[axis], moment) +
-              product(slopes.rotation_of_force[axis], force));
-      put(run,
-          planes + (axis + 3) * plane_stride,
-          product(slopes.translation_of_force[axis], force));
-    }
-  });
+  const NodeImage from = image;
+  const PoseSlopes of = slopes;
+  for_each_run(
+      from, homography, grid, [=](const WarpRow& /*row*/, const Cells& cells, const PixelRun& run) {
+        const RowPair pair = sample(from.values, from.stride, cells);
+        put(run, values, value_of(pair, cells));
+        const Floats f_x = of.nodes_per_mm[0] *
+                           (pair.low_slope + cells.t_weight * (pair.high_slope - pair.low_slope));
+        const Floats f_z = of.nodes_per_mm[1] * (pair.high - pair.low);
+        const Floats g_x = value_of(sample(of.source_x, from.stride, cells), cells);
+        const Floats g_z = value_of(sample(of.source_z, from.stride, cells), cells);
+        const Floats m_x = cells.s * of.m_scale[0] + of.m_offset[0];
+        const Floats m_z = cells.t * of.m_scale[1] + of.m_offset[1];
+        // Forces are perpendicular to the ray.
+        const Floats f_y = -(m_x * f_x + m_z * f_z);
+        const Floats force[3] = {f_x + g_x, f_y - (m_x * g_x + m_z * g_z), f_z + g_z};
+        const Floats moment[3] = {f_z - m_z * f_y, m_z * f_x - m_x * f_z, m_x * f_y - f_x};
+        for (int axis = 0; axis < 3; ++axis) {
+          put(run,
+              planes + axis * plane_stride,
+              product(of.rotation_of_moment[axis], moment) +
+                  product(of.rotation_of_force[axis], force));
+          put(run,
+              planes + (axis + 3) * plane_stride,
+              product(of.translation_of_force[axis], force));
+        }
+      });
 }
 
 void warp_slopes(const NodeImage& s_slopes,
@@ -231,20 +283,23 @@ void warp_slopes(const NodeImage& s_slopes,
                  const PixelGrid& grid,
                  float* column_slopes,
                  float* row_slopes) {
+  const NodeImage from = s_slopes;
   const auto s_row = static_cast<float>(homography.s[2]);
   const auto t_row = static_cast<float>(homography.t[2]);
   const auto d_row = static_cast<float>(homography.d[2]);
-  for_each_run(homography, grid, [&](const WarpRow& row, Floats column, const PixelRun& run) {
-    const Cells cells = cells_of(s_slopes, row, column);
-    const Floats along_s =
-        cells.inverse_depth * value_of(sample(s_slopes.values, s_slopes.stride, cells), cells);
-    const Floats along_t =
-        cells.inverse_depth * value_of(sample(t_slopes, s_slopes.stride, cells), cells);
-    put(run,
-        column_slopes,
-        along_s * (row.s_1 - cells.s * row.d_1) + along_t * (row.t_1 - cells.t * row.d_1));
-    put(run, row_slopes, along_s * (s_row - cells.s * d_row) + along_t * (t_row - cells.t * d_row));
-  });
+  for_each_run(
+      from, homography, grid, [=](const WarpRow& row, const Cells& cells, const PixelRun& run) {
+        const Floats along_s =
+            cells.inverse_depth * value_of(sample(from.values, from.stride, cells), cells);
+        const Floats along_t =
+            cells.inverse_depth * value_of(sample(t_slopes, from.stride, cells), cells);
+        put(run,
+            column_slopes,
+            along_s * (row.s_1 - cells.s * row.d_1) + along_t * (row.t_1 - cells.t * row.d_1));
+        put(run,
+            row_slopes,
+            along_s * (s_row - cells.s * d_row) + along_t * (t_row - cells.t * d_row));
+      });
 }
 
 }  // namespace af::AF_KERNEL_NAMESPACE

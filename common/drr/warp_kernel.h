@@ -13,7 +13,7 @@ struct Homography {
   double d[3];
 };
 
-/// Image of (s,t) nodes: s fastest, at least 2 x 2; readable for one row and 32 values beyond its
+/// Image of (s,t) nodes: s fastest, at least 2 x 2; readable for four rows and 32 values beyond its
 /// end.
 struct NodeImage {
   const float* values;
