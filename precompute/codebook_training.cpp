@@ -226,7 +226,7 @@ TrainedCodebook train_codebook(const TrainingShare& mine,
 
   CodedTiles training(mine.training);
   CodedTiles held_out(mine.held_out);
-  SearchHint hint = SearchHint::PreviousTile;
+  SearchHint hint = SearchHint::None;
   for (int i = 0; i < options.max_iterations; ++i) {
     const NearestCodeword search(result.codebook);
     training.encode(search, hint);

@@ -10,7 +10,7 @@ EncodedUnit encode_unit(const NearestCodeword& search,
                         const UnitTiles& tiles) {
   std::vector<std::uint32_t> nearest(tiles.tiles.size());
   std::vector<std::uint64_t> squared_errors(tiles.tiles.size());
-  search.search(tiles.tiles, SearchHint::PreviousTile, nearest, squared_errors);
+  search.search(tiles.tiles, SearchHint::None, nearest, squared_errors);
   EncodedUnit encoded;
   encoded.indices.assign(unit.tile_count(), 0);
   std::size_t next = 0;

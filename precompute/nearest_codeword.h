@@ -11,17 +11,17 @@ namespace af {
 
 /// Where the search for a tile takes its first guess from; only speed depends on it.
 enum class SearchHint {
-  PreviousTile,  ///< the answer of the tile before it: neighbours in the field are alike
-  PerTile,       ///< the caller's guess, for example the answer of the last training iteration
+  None,     ///< the codewords next to the tile's DC serve: nearer than a neighbour's answer
+  PerTile,  ///< the caller's guess, for example the answer of the last training iteration
 };
 
 /// Exact nearest-codeword search (squared Euclidean distance of 16 levels; ties take the lowest
 /// index). Tiles and codewords are compared in the coordinates of the 4-D Hadamard transform, whose
 /// first coefficient (DC) orders the codebook: blocks of 16 codewords are visited outwards from the
 /// tile's DC until the DC alone is farther than the best, and left after five coefficients when all
-/// 16 are. Floats only discard, with a margin above their rounding; integers decide, so the answer
-/// equals brute force on every vector width.
-/// \test NearestCodeword.EqualsBruteForceOnEveryWidth
+/// 16 are. Floats decide where they are exact (sums below 2^24); above, they discard with a margin
+/// above their rounding and integers decide. So the answer equals brute force on every vector
+/// width. \test NearestCodeword.EqualsBruteForceOnEveryWidth
 class NearestCodeword {
  public:
   explicit NearestCodeword(const Codebook& codebook);

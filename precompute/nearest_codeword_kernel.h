@@ -27,8 +27,7 @@ inline constexpr uint32_t kStartEntries = (16u * 65535u >> kStartShift) + 1;
 inline constexpr uint32_t kCoefficientOrder[16] = {
     0, 1, 2, 4, 8, 3, 5, 6, 9, 10, 12, 7, 11, 13, 14, 15};
 
-/// `nearest` receives the answers; with `has_hints` it holds a guess per tile on entry, otherwise
-/// each tile's guess is the previous tile's answer.
+/// `nearest` receives the answers; with `has_hints` it holds a guess per tile on entry.
 struct NearestRequest {
   const uint16_t* tiles;  ///< [tile][16]
   size_t tile_count;

@@ -108,7 +108,7 @@ void sample_search(const SampledTiles& tiles, int codewords, SpeedSample& sample
     search.search(tiles.run, hint, nearest, errors);
     return watch.seconds() / static_cast<double>(tiles.run.size());
   };
-  sample.encode_seconds_per_tile = seconds_per_tile(SearchHint::PreviousTile);
+  sample.encode_seconds_per_tile = seconds_per_tile(SearchHint::None);
   sample.train_seconds_per_tile = seconds_per_tile(SearchHint::PerTile);
   sample_compression(nearest, sample);
 }

@@ -123,7 +123,7 @@ nlohmann::json measure(const std::vector<Tile>& tiles, int codewords, const Case
        "tiles",
        [&] {
          return seconds_of(
-             [&] { search.search(tiles, SearchHint::PreviousTile, nearest, errors); });
+             [&] { search.search(tiles, SearchHint::None, nearest, errors); });
        }},
       {kBruteForce, work, "tiles", [&] {
          return seconds_of([&] { brute_force.search(some, by_brute_force); });
@@ -136,7 +136,7 @@ nlohmann::json measure(const std::vector<Tile>& tiles, int codewords, const Case
 
   std::vector<std::uint32_t> same_tiles(some.size());
   std::vector<std::uint64_t> same_errors(some.size());
-  search.search(some, SearchHint::PreviousTile, same_tiles, same_errors);
+  search.search(some, SearchHint::None, same_tiles, same_errors);
   if (differing(same_tiles, by_brute_force) != 0)
     throw NumericError("NearestCodeword and brute force give different answers");
   nlohmann::json json{{"codewords", codewords},

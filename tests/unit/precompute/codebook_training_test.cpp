@@ -167,7 +167,7 @@ TEST(CodebookTraining, CodewordsEndAsTheRoundedMeansOfTheTilesNearestToThem) {
   for (const NumberedTile& tile : share.training) tiles.push_back(tile.tile);
   std::vector<std::uint32_t> nearest(tiles.size());
   std::vector<std::uint64_t> errors(tiles.size());
-  NearestCodeword(trained.codebook).search(tiles, SearchHint::PreviousTile, nearest, errors);
+  NearestCodeword(trained.codebook).search(tiles, SearchHint::None, nearest, errors);
   for (std::uint32_t codeword = 1; codeword < 12; ++codeword)
     for (std::size_t element = 0; element < 16; ++element) {
       double sum = 0.0;

@@ -64,7 +64,7 @@ void expect_equals_brute_force(const Codebook& codebook, const std::vector<Tile>
     force_vector_width(width);
     std::vector<std::uint32_t> nearest(tiles.size());
     std::vector<std::uint64_t> errors(tiles.size());
-    search.search(tiles, SearchHint::PreviousTile, nearest, errors);
+    search.search(tiles, SearchHint::None, nearest, errors);
     std::vector<std::uint32_t> from_bad_hints(tiles.size());
     for (std::size_t i = 0; i < tiles.size(); ++i)
       from_bad_hints[i] = static_cast<std::uint32_t>(hash64(kSeed, i) % codebook.size());
@@ -118,6 +118,25 @@ TEST(NearestCodeword, TiesTakeTheLowestIndex) {
   std::vector<Tile> codewords = coarse(200, 3);
   codewords.insert(codewords.end(), codewords.begin(), codewords.begin() + 100);
   expect_equals_brute_force(codebook_of(codewords), coarse(1000, 4));
+}
+
+TEST(NearestCodeword, TiesFartherThanFloatsAreExactTakeTheLowestIndex) {
+  // Distances from 9000^2 up (a sum of 16 * 9000^2 > 2^24 in the transform): the codewords are one
+  // level from the tile's mirror images, so floats cannot tell ties from neighbours.
+  std::vector<Tile> codewords;
+  for (unsigned i = 0; i < 200; ++i) {
+    Tile tile;
+    tile.fill(30000);
+    tile[i % 16] = static_cast<std::uint16_t>(i % 2 == 0 ? 39000 : 21000);
+    tile[(i / 16 + 5) % 16] = static_cast<std::uint16_t>(30000 + i % 3);
+    codewords.push_back(tile);
+  }
+  std::vector<Tile> tiles(20);
+  for (unsigned i = 0; i < tiles.size(); ++i) {
+    tiles[i].fill(30000);
+    tiles[i][i % 16] = static_cast<std::uint16_t>(30000 + i / 8);
+  }
+  expect_equals_brute_force(codebook_of(codewords), tiles);
 }
 
 TEST(NearestCodeword, RefusesAnUnsortedCodebook) {
