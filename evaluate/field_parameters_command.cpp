@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <iostream>
 #include <memory>
 #include <set>
@@ -51,10 +52,15 @@ std::vector<PrecomputeOptions> settings_of(const FieldParametersOptions& options
   return settings;
 }
 
+/// Of the tiles: sweeps always state it.
+double training_share(const PrecomputeOptions& setting) {
+  return setting.training_fraction.value();
+}
+
 std::string field_name(const PrecomputeOptions& setting) {
   return setting.camera + "-uv" + std::to_string(setting.uv_nodes) + "-st" +
          std::to_string(setting.st_nodes) + "-n" + std::to_string(setting.codewords) + "-t" +
-         number_text(setting.training_fraction) + ".af.h5";
+         number_text(training_share(setting)) + ".af.h5";
 }
 
 /// What decides a field's content, without where it goes.
@@ -163,7 +169,7 @@ CsvTable settings_table(const std::vector<SettingResult>& results) {
     table.add_row({std::to_string(result.setting.uv_nodes),
                    std::to_string(result.setting.st_nodes),
                    std::to_string(result.setting.codewords),
-                   number_text(result.setting.training_fraction),
+                   number_text(training_share(result.setting)),
                    std::to_string(result.setting.slabs),
                    number_text(psnr.median),
                    number_text(psnr.lower_quartile),
@@ -189,24 +195,24 @@ CsvTable poses_table(const std::vector<SettingResult>& results) {
       table.add_row({std::to_string(result.setting.uv_nodes),
                      std::to_string(result.setting.st_nodes),
                      std::to_string(result.setting.codewords),
-                     number_text(result.setting.training_fraction),
+                     number_text(training_share(result.setting)),
                      std::to_string(i),
                      number_text(result.comparisons[i].psnr_db)});
   return table;
 }
 
 /// One panel of the figure: the settings that differ from the base in this parameter alone.
-template <typename Value>
+template <typename ValueOf>
 SweepPanel panel_of(const std::vector<SettingResult>& results,
                     const std::string& label,
-                    Value PrecomputeOptions::*member) {
+                    ValueOf value_of) {
   SweepPanel panel{label, true, {}};
   const PrecomputeOptions& base = results.front().setting;
   for (const SettingResult& result : results) {
     const bool is_base = &result == &results.front();
-    if (!is_base && result.setting.*member == base.*member) continue;
+    if (!is_base && std::invoke(value_of, result.setting) == std::invoke(value_of, base)) continue;
     const SampleSummary psnr = psnr_of(result);
-    panel.points.push_back({static_cast<double>(result.setting.*member),
+    panel.points.push_back({static_cast<double>(std::invoke(value_of, result.setting)),
                             psnr.lower_quartile,
                             psnr.median,
                             psnr.upper_quartile,
@@ -222,7 +228,7 @@ json result_json(const SettingResult& result) {
   return {{"uv_nodes", result.setting.uv_nodes},
           {"st_nodes", result.setting.st_nodes},
           {"codewords", result.setting.codewords},
-          {"training_fraction", result.setting.training_fraction},
+          {"training_fraction", training_share(result.setting)},
           {"field", result.field},
           {"field_file", result.setting.output},
           {"psnr_db", to_json(psnr_of(result))},
@@ -258,14 +264,13 @@ void write_results(const FieldParametersOptions& options,
   const std::filesystem::path& folder = options.output_folder;
   write_text_file(folder / "field-parameters.csv", settings_table(results).to_text());
   write_text_file(folder / "field-parameters-poses.csv", poses_table(results).to_text());
-  draw_sweep_panels(
-      {panel_of(results, "(u,v) nodes per side", &PrecomputeOptions::uv_nodes),
-       panel_of(results, "(s,t) nodes per side", &PrecomputeOptions::st_nodes),
-       panel_of(results, "codewords", &PrecomputeOptions::codewords),
-       panel_of(results, "share of tiles for training", &PrecomputeOptions::training_fraction)},
-      "DRR quality against the field's parameters",
-      "PSNR (dB)",
-      folder / "field-parameters");
+  draw_sweep_panels({panel_of(results, "(u,v) nodes per side", &PrecomputeOptions::uv_nodes),
+                     panel_of(results, "(s,t) nodes per side", &PrecomputeOptions::st_nodes),
+                     panel_of(results, "codewords", &PrecomputeOptions::codewords),
+                     panel_of(results, "share of tiles for training", training_share)},
+                    "DRR quality against the field's parameters",
+                    "PSNR (dB)",
+                    folder / "field-parameters");
   write_reproduce_script(folder, provenance);
   json summary = {{"format", "attenuation-fields evaluation"},
                   {"format_version", 1},
@@ -281,7 +286,7 @@ void write_results(const FieldParametersOptions& options,
   for (const SettingResult& result : results)
     std::cout << "uv " << result.setting.uv_nodes << ", st " << result.setting.st_nodes << ", "
               << result.setting.codewords << " codewords, training "
-              << number_text(result.setting.training_fraction) << ": PSNR median "
+              << number_text(training_share(result.setting)) << ": PSNR median "
               << fixed_text(psnr_of(result).median, 2) << " dB, "
               << fixed_text(static_cast<double>(result.info.payload_bytes) / 1e6, 1) << " MB, "
               << fixed_text(result.creation_seconds, 1) << " s\n";
@@ -319,6 +324,7 @@ CLI::App* bind_field_parameters(CLI::App& app, FieldParametersOptions& options) 
       "time and compression (the paper's Fig. 10 and Table I); builds the fields that are missing");
   PrecomputeOptions& base = options.base;
   base.max_translation_mm = 30.0;
+  base.training_fraction = 0.1;  // the paper's
   auto* ct = command->add_option("--ct", base.ct, "CT: image file or DICOM folder");
   command->add_option("--series", base.series_uid, "DICOM series UID, when there are several");
   command->add_option("--rig", base.rig, "rig.toml, or c-arm-12in, treatment-room");
@@ -339,7 +345,7 @@ CLI::App* bind_field_parameters(CLI::App& app, FieldParametersOptions& options) 
       ->capture_default_str();
   command
       ->add_option("--base-training-fraction",
-                   base.training_fraction,
+                   *base.training_fraction,
                    "Share of the tiles for training while others vary")
       ->capture_default_str();
   const auto add_sweep = [&](const char* name, auto& values, const char* what) {

@@ -127,8 +127,13 @@ struct TileCounts {
   TileCounts(const DryRun& run)
       : all(static_cast<double>(stored_tile_count(run.light_slab))),
         occupied(all * run.speed.occupied_fraction),
-        training(1.125 * std::min(occupied * run.options.training_fraction,
-                                  static_cast<double>(run.options.max_training_tiles))) {}
+        training(training_tiles(run.options.training_selection())) {}
+
+ private:
+  [[nodiscard]] double training_tiles(const TrainingSelection& selection) const {
+    return 1.125 * std::min(occupied * selection.fraction,
+                            static_cast<double>(selection.max_training_tiles));
+  }
 };
 
 double seconds_at(double amount, double per_second) {

@@ -53,9 +53,10 @@ MemoryPlan plan_memory(const LightSlab& light_slab,
                        std::uint64_t fixed_bytes,
                        int ranks) {
   const double unit = unit_bytes(units);
+  const TrainingSelection training = options.training_selection();
   const double fraction_tiles =
-      options.training_fraction * static_cast<double>(stored_tile_count(light_slab));
-  const auto cap = static_cast<double>(options.max_training_tiles);
+      training.fraction * static_cast<double>(stored_tile_count(light_slab));
+  const auto cap = static_cast<double>(training.max_training_tiles);
   constexpr double kCandidateBytes = sizeof(NumberedTile);
   // The picker holds up to an eighth above the cap before it drops what lies beyond.
   const double candidates =

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "precompute/precompute_options.h"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 
@@ -85,6 +86,12 @@ std::vector<std::string> problems(const PrecomputeOptions& options) {
   return found;
 }
 
+TrainingSelection PrecomputeOptions::training_selection() const {
+  if (training_fraction) return {*training_fraction, max_training_tiles, seed};
+  const auto per_codeword = kTrainingTilesPerCodeword * static_cast<std::uint64_t>(codewords);
+  return {kLargestTrainingFraction, std::min(max_training_tiles, per_codeword), seed};
+}
+
 NamedValues casting_options(const PrecomputeOptions& options) {
   return {{"max_rotation_deg", exact_text(options.max_rotation_deg)},
           {"max_translation_mm", exact_text(options.max_translation_mm)},
@@ -100,7 +107,10 @@ NamedValues casting_options(const PrecomputeOptions& options) {
 NamedValues codebook_options(const PrecomputeOptions& options) {
   return {{"codewords", std::to_string(options.codewords)},
           {"max_iterations", std::to_string(options.max_iterations)},
-          {"training_fraction", exact_text(options.training_fraction)},
+          options.training_fraction
+              ? NamedValues::value_type{"training_fraction", exact_text(*options.training_fraction)}
+              : NamedValues::value_type{"training_tiles_per_codeword",
+                                        std::to_string(kTrainingTilesPerCodeword)},
           {"max_training_tiles", std::to_string(options.max_training_tiles)},
           {"seed", std::to_string(options.seed)}};
 }

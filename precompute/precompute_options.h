@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -46,7 +47,7 @@ struct PrecomputeOptions {
 
   int codewords = CodebookOptions{}.codewords;
   int max_iterations = CodebookOptions{}.max_iterations;
-  double training_fraction = TrainingSelection{}.fraction;
+  std::optional<double> training_fraction;  ///< none: kTrainingTilesPerCodeword decide
   std::uint64_t max_training_tiles = TrainingSelection{}.max_training_tiles;
   std::uint64_t seed = 1;
 
@@ -63,14 +64,16 @@ struct PrecomputeOptions {
   [[nodiscard]] AttenuationModel attenuation_model() const {
     return {water_mu_per_mm, AttenuationModel{}.air_below_hu};
   }
-  [[nodiscard]] TrainingSelection training_selection() const {
-    return {training_fraction, max_training_tiles, seed};
-  }
+  [[nodiscard]] TrainingSelection training_selection() const;
   [[nodiscard]] CodebookOptions codebook_options() const;
   [[nodiscard]] StPlane st_plane_rule() const;
   [[nodiscard]] bool is_shear_warp() const { return caster == "shear-warp"; }
   [[nodiscard]] LightSlabSpec light_slab_spec(const DepthSlabs& depth_slabs) const;
 };
+
+/// Training tiles where no share is stated: enough that unseen tiles come out nearly as training
+/// tiles do (precompute/README.md has what more and fewer give).
+inline constexpr std::uint64_t kTrainingTilesPerCodeword = 64;
 
 /// Every broken constraint of the values themselves (not of files).
 std::vector<std::string> problems(const PrecomputeOptions& options);

@@ -24,8 +24,11 @@ struct TrainingShare {
   std::vector<NumberedTile> held_out;
 };
 
+/// The largest share of the tiles that may train: an eighth as many again are held out.
+inline constexpr double kLargestTrainingFraction = 8.0 / 9.0;
+
 struct TrainingSelection {
-  double fraction = 0.10;                      ///< of the tiles that are not empty
+  double fraction = kLargestTrainingFraction;  ///< of the tiles that are not empty
   std::uint64_t max_training_tiles = 2000000;  ///< over all ranks
   std::uint64_t seed = 1;
 };

@@ -82,22 +82,28 @@ done
 [[ -z $(find . -name '*.h5*') ]] || fail 'the dry run wrote a file'
 
 hash_of() { sed -n 's/.*sha256 //p' "$1"; }
+# same_hash RANKS EXPECTED OPTIONS...
+same_hash() {
+  local ranks=$1 expected=$2
+  shift 2
+  "$mpiexec" -n "$ranks" --oversubscribe "$program" "$@" -o ranks.h5 >ranks.txt 2>/dev/null
+  [[ $(hash_of ranks.txt) == "$expected" ]] || fail "another payload on $ranks ranks: $*"
+}
 hashes=()
-for caster in shear-warp trilinear; do
-  for slabs in 1 3; do
-    options=("${common[@]}" --caster "$caster" --slabs "$slabs")
-    "$program" "${options[@]}" -o one.h5 >one.txt 2>/dev/null
-    expected=$(hash_of one.txt)
-    [[ ${#expected} == 64 ]] || fail "no payload hash: $(cat one.txt)"
-    hashes+=("$expected")
-    for bits in 128 256; do
-      grep -q avx2 /proc/cpuinfo || [[ $bits == 128 ]] || continue
-      AF_VECTOR_BITS=$bits "$program" "${options[@]}" -o bits.h5 >bits.txt 2>/dev/null
-      [[ $(hash_of bits.txt) == "$expected" ]] || fail "another payload with $bits-bit vectors, $caster, $slabs slabs"
-    done
-    for ranks in 3 8; do
-      "$mpiexec" -n "$ranks" --oversubscribe "$program" "${options[@]}" -o three.h5 >three.txt 2>/dev/null
-      [[ $(hash_of three.txt) == "$expected" ]] || fail "another payload on $ranks ranks, $caster, $slabs slabs"
+for sizes in '9 61' '8 64'; do
+  for caster in shear-warp trilinear; do
+    for slabs in 1 8; do
+      options=("${common[@]:0:8}" --uv-nodes "${sizes% *}" --st-nodes "${sizes#* }" "${common[@]:12}" --caster "$caster" --slabs "$slabs")
+      "$program" "${options[@]}" -o one.h5 >one.txt 2>/dev/null
+      expected=$(hash_of one.txt)
+      [[ ${#expected} == 64 ]] || fail "no payload hash: $(cat one.txt)"
+      hashes+=("$expected")
+      for bits in 128 256; do
+        grep -q avx2 /proc/cpuinfo || [[ $bits == 128 ]] || continue
+        AF_VECTOR_BITS=$bits "$program" "${options[@]}" -o bits.h5 >bits.txt 2>/dev/null
+        [[ $(hash_of bits.txt) == "$expected" ]] || fail "another payload with $bits-bit vectors: ${options[*]}"
+      done
+      for ranks in 2 3 4 8; do same_hash "$ranks" "$expected" "${options[@]}"; done
     done
   done
 done
@@ -124,8 +130,8 @@ for overflow in read-back cast-again; do
   [[ -n $peak && $peak -lt $limit ]] || fail "a rank took ${peak:-?} MB of $limit MB"
 done
 
-[[ $(printf '%s\n' "${hashes[@]}" | sort -u | wc -l) == 4 ]] || fail 'casters or slabs make no difference'
-[[ ! -e three.h5.progress && ! -e three.h5.partial ]] || fail 'work files are left'
+[[ $(printf '%s\n' "${hashes[@]}" | sort -u | wc -l) == 8 ]] || fail 'sizes, casters or slabs make no difference'
+[[ ! -e ranks.h5.progress && ! -e ranks.h5.partial ]] || fail 'work files are left'
 
 # A slow run (fine steps), stopped by SIGUSR1 on two ranks, resumed on one; another sampling in between is refused.
 slow=(--ct ct.mha --rig c-arm-12in --camera AP --uv-nodes 25 --st-nodes 161 --codewords 200)
