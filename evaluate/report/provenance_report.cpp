@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <array>
 #include <map>
 #include <sstream>
+#include <string_view>
 
 #include "evaluate/report/html_text.h"
 #include "evaluate/report/number_html.h"
@@ -51,6 +53,25 @@ constexpr std::array<OptionLabel, 13> kSimulationLabels = {
      {"max-offset-translation-mm", "True pose: drawn within, per axis", "mm of nominal"},
      {"seed", "Seed", ""}}};
 
+/// What the X-rays have beyond a clean simulation, one item per effect; empty when nothing.
+std::string stress_text(const json& simulation) {
+  std::string items;
+  for (const json& effect : simulation.value("stress", json::array()))
+    items += element("li",
+                     "<strong>" + escaped(effect.value("name", "")) +
+                         "</strong>: " + escaped(effect.value("text", "")));
+  if (items.empty()) return "";
+  return element("p",
+                 "The X-rays are harder than that, as real ones are (<code>--stress</code>):") +
+         element("ul", items);
+}
+
+bool has_stress(const json& simulation, const std::string& name) {
+  const json stress = simulation.value("stress", json::array());
+  return std::any_of(
+      stress.begin(), stress.end(), [&](const json& e) { return e.value("name", "") == name; });
+}
+
 std::string simulation_text(const json& simulation) {
   const auto options = option_lines(simulation.value("options_toml", ""));
   std::vector<std::pair<std::string, std::string>> items;
@@ -64,7 +85,10 @@ std::string simulation_text(const json& simulation) {
       "p",
       "The X-rays were simulated by <code>af-simulate</code> " +
           escaped(simulation.value("program_version", "")) +
-          " through the CT itself, by an exact projector (Siddon) instead of the ray caster that "
+          (has_stress(simulation, "degraded-ct") || has_stress(simulation, "motion")
+               ? " through the original CT, which is not the one that is registered,"
+               : " through the CT itself,") +
+          " by an exact projector (Siddon) instead of the ray caster that "
           "made the fields, with a polychromatic spectrum, scatter, noise and detector blur, so "
           "that the images differ from any DRR as X-rays do.");
   if (is_ideal)
@@ -73,7 +97,7 @@ std::string simulation_text(const json& simulation) {
                        escaped(simulation.value("program_version", "")) +
                        " with <strong>every effect switched off</strong> (<code>--ideal</code>): "
                        "they are line integrals, and errors are smaller than with X-rays.");
-  return text + (is_ideal ? "" : definition_list(items));
+  return text + (is_ideal ? "" : definition_list(items)) + stress_text(simulation);
 }
 
 std::string hashes_text(const json& hashes) {
@@ -84,7 +108,7 @@ std::string hashes_text(const json& hashes) {
   return text.empty() ? "–" : text;
 }
 
-std::string title_of_kind(const std::string& kind) {
+std::string title_of_kind(std::string_view kind) {
   if (kind == "registration") return "Registration";
   if (kind == "similarity-curves") return "Similarity curves";
   return kind == "field-parameters" ? "Field parameters" : "Image quality";

@@ -11,6 +11,7 @@
 #include "evaluate/report/html_text.h"
 #include "evaluate/report/number_html.h"
 #include "evaluate/report/report_style.h"
+#include "evaluate/report/sections_report.h"
 #include "evaluate/summary_files.h"
 #include "io/output_file.h"
 #include "support/test_paths.h"
@@ -90,6 +91,21 @@ void write_summary(const test::ScratchFolder& folder,
 std::string minimal_summary(const std::string& kind) {
   return json({{"format", "attenuation-fields evaluation"}, {"format_version", 1}, {"kind", kind}})
       .dump();
+}
+
+TEST(XraySection, NamesEveryEffectOfStressAndWhichCtTheXraysShow) {
+  EvaluationRun run;
+  run.kind = "registration";
+  run.summary["simulation"] = {{"program_version", "1.0"}, {"options_toml", ""}};
+  EXPECT_NE(xray_section({run}).find("through the CT itself"), std::string::npos);
+  EXPECT_EQ(xray_section({run}).find("--stress"), std::string::npos);
+
+  run.summary["simulation"]["stress"] = {{{"name", "rods"}, {"text", "2 rods < 5 mm"}},
+                                         {{"name", "motion"}, {"text", "by up to 6 mm"}}};
+  const std::string text = xray_section({run});
+  EXPECT_EQ(text.find("through the CT itself"), std::string::npos);
+  EXPECT_NE(text.find("<strong>rods</strong>: 2 rods &lt; 5 mm"), std::string::npos);
+  EXPECT_NE(text.find("<strong>motion</strong>: by up to 6 mm"), std::string::npos);
 }
 
 TEST(FindRuns, FindsRunsBelowAFolderOnceAndInAFixedOrder) {
