@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "geometry/point_projector.h"
 
 namespace af::evaluation {
 namespace {
@@ -16,13 +17,14 @@ struct PointErrors {
   double detector_mm = 0.0;
 };
 
-PointErrors point_errors(const CameraGeometry& camera,
+PointErrors point_errors(const PointProjector& projector,
                          const Vector3d& point,
                          const Vector3d& gold_point) {
-  if (!(camera.depth_mm(point) > 0.0 && camera.depth_mm(gold_point) > 0.0))
+  const CameraGeometry& camera = projector.camera();
+  if (!(projector.depth_mm(point) > 0.0 && projector.depth_mm(gold_point) > 0.0))
     return {RegistrationErrors::kMissing, RegistrationErrors::kMissing};
   const Vector3d direction = (point - camera.source_point).normalized();
-  const Eigen::Vector2d shift_px = camera.project(point) - camera.project(gold_point);
+  const Eigen::Vector2d shift_px = projector.project(point) - projector.project(gold_point);
   return {(gold_point - camera.source_point).cross(direction).norm(),
           shift_px.cwiseProduct(camera.pixel_spacing_mm).norm()};
 }
@@ -46,9 +48,10 @@ RegistrationErrors registration_errors(const RigidTransform& room_from_ct,
     // Parallel planes: distances on them are as their depths.
     const double demagnification =
         camera.depth_mm(rig.isocenter_point) / camera.source_detector_distance_mm();
+    const PointProjector projector(camera);
     for (const Vector3d& point_ct : points_ct_mm) {
       const PointErrors point =
-          point_errors(camera, room_from_ct * point_ct, gold_room_from_ct * point_ct);
+          point_errors(projector, room_from_ct * point_ct, gold_room_from_ct * point_ct);
       reprojection_mm += point.reprojection_mm;
       detector_mm += point.detector_mm;
       isocenter_mm += point.detector_mm * demagnification;

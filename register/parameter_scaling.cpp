@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "register/parameter_scaling.h"
 
-#include <algorithm>
+#include "geometry/point_projector.h"
 
 namespace af::registration {
 namespace {
@@ -10,21 +10,22 @@ namespace {
 /// say) is scaled as if it moved them so far, which keeps its steps finite.
 constexpr double kSmallestDisplacementMm = 1e-3;
 
-bool projects_into(const View& view, const Eigen::Vector3d& room_point) {
-  if (!(view.camera.depth_mm(room_point) > 0.0)) return false;
-  const Eigen::Vector2d pixel = view.camera.project(room_point);
-  const RegionOfInterest& roi = view.roi;
+bool projects_into(const PointProjector& projector,
+                   const RegionOfInterest& roi,
+                   const Eigen::Vector3d& room_point) {
+  if (!(projector.depth_mm(room_point) > 0.0)) return false;
+  const Eigen::Vector2d pixel = projector.project(room_point);
   return pixel.x() >= roi.column - 0.5 && pixel.x() < roi.column + roi.width - 0.5 &&
          pixel.y() >= roi.row - 0.5 && pixel.y() < roi.row + roi.height - 0.5;
 }
 
 /// Lengths of the image velocities on the isocentre plane of a point that moves by each parameter.
-ScaledParameters image_speeds(const View& view,
+ScaledParameters image_speeds(const PointProjector& projector,
                               const Eigen::Vector3d& room_point,
                               const Eigen::Vector3d& center_room_point,
                               double isocenter_depth_mm) {
-  const Eigen::Vector3d beam = view.camera.beam_direction();
-  const Eigen::Vector3d from_source = room_point - view.camera.source_point;
+  const Eigen::Vector3d& beam = projector.beam_direction();
+  const Eigen::Vector3d from_source = room_point - projector.camera().source_point;
   const double depth = beam.dot(from_source);
   const Eigen::Vector3d arm = room_point - center_room_point;
   ScaledParameters speeds;
@@ -79,17 +80,21 @@ std::optional<ParameterScaling> projected_motion_scaling(const RigidTransform& r
                                                          std::span<const View> views,
                                                          const Eigen::Vector3d& isocenter_point) {
   const Eigen::Vector3d center_room_point = room_from_ct * center_ct_mm;
+  std::vector<PointProjector> projectors;
+  for (const View& view : views) projectors.emplace_back(view.camera);
   ScaledParameters sums = ScaledParameters::Zero();
   std::size_t count = 0;
   for (const Eigen::Vector3d& ct_point : points_ct) {
     const Eigen::Vector3d point = room_from_ct * ct_point;
-    if (std::none_of(
-            views.begin(), views.end(), [&](const View& v) { return projects_into(v, point); }))
-      continue;
-    for (const View& view : views) {
+    bool is_seen = false;
+    for (std::size_t i = 0; i < views.size() && !is_seen; ++i)
+      is_seen = projects_into(projectors[i], views[i].roi, point);
+    if (!is_seen) continue;
+    for (const PointProjector& projector : projectors) {
       // A point beside the source of another view has no image there.
-      if (!(view.camera.depth_mm(point) > 0.0)) continue;
-      sums += image_speeds(view, point, center_room_point, view.camera.depth_mm(isocenter_point));
+      if (!(projector.depth_mm(point) > 0.0)) continue;
+      sums +=
+          image_speeds(projector, point, center_room_point, projector.depth_mm(isocenter_point));
       ++count;
     }
   }

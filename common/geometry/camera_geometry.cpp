@@ -57,7 +57,9 @@ Ray CameraGeometry::ray(double column, double row) const {
 }
 
 Eigen::Vector2d CameraGeometry::project(const Eigen::Vector3d& room_point) const {
-  const double scale = source_detector_distance_mm() / depth_mm(room_point);
+  const Eigen::Vector3d beam = beam_direction();
+  const double scale =
+      (detector_origin_point - source_point).dot(beam) / (room_point - source_point).dot(beam);
   const Eigen::Vector3d from_origin =
       source_point + scale * (room_point - source_point) - detector_origin_point;
   return {from_origin.dot(column_direction) / pixel_spacing_mm.x(),

@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "base/hash_random.h"
+#include "geometry/point_projector.h"
 #include "geometry/rigid_transform.h"
 
 namespace af {
@@ -108,6 +109,22 @@ TEST_P(CameraHandedness, ProjectInvertsRay) {
     const Ray ray = camera.ray(pixel.x(), pixel.y());
     const Vector3d point = ray.origin_point + random.uniform(100.0, 3000.0) * ray.direction;
     EXPECT_LT((camera.project(point) - pixel).norm(), kPixelTolerance);
+  }
+}
+
+TEST_P(CameraHandedness, APointProjectorHasTheBitsOfItsCamera) {
+  HashRandom random(7);
+  for (int i = 0; i < 20; ++i) {
+    const CameraGeometry camera = random_camera(random, GetParam());
+    const PointProjector projector(camera);
+    EXPECT_EQ(projector.beam_direction(), camera.beam_direction());
+    for (int k = 0; k < 20; ++k) {
+      const Vector3d point = camera.source_point +
+                             random.uniform(0.1, 2.0) *
+                                 (camera.detector_point(20.0 * k, 7.0 * k) - camera.source_point);
+      EXPECT_EQ(projector.depth_mm(point), camera.depth_mm(point));
+      EXPECT_EQ(projector.project(point), camera.project(point));
+    }
   }
 }
 
