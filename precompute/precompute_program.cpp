@@ -246,7 +246,7 @@ class PrecomputeRun {
 
   [[nodiscard]] std::uint64_t volume_bytes() const {
     return source_.volume->voxels().size_bytes() +
-           (resampled_ == nullptr ? 0 : resampled_->grid().value_count() * sizeof(std::int16_t));
+           (resampled_ == nullptr ? 0 : resampled_->bytes());
   }
 
   /// Collective. Memory of the rank that has most of its own.

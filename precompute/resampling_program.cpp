@@ -1,43 +1,40 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "precompute/resampling_program.h"
 
+#include <algorithm>
+#include <array>
+
 namespace af {
 
 SlabAlignedVolume resample_on_node(const AttenuationVolume& volume,
                                    const RigidTransform& slab_from_ct,
                                    const SlabAlignedOptions& options,
                                    const Communicator& communicator) {
-  const SlabAlignedGrid grid =
-      all_or_none(communicator, [&] { return slab_aligned_grid(volume, slab_from_ct, options); });
-  const std::size_t value_bytes = grid.value_count() * sizeof(std::int16_t);
-  const std::size_t bytes = value_bytes + grid.row_count() * sizeof(OccupiedRange);
+  const SlabAlignedLayout layout =
+      all_or_none(communicator, [&] { return slab_aligned_layout(volume, slab_from_ct, options); });
+  const std::size_t value_bytes = layout.value_count * sizeof(std::int16_t);
   const auto values_in = [&](std::byte* memory) {
-    return std::span(reinterpret_cast<std::int16_t*>(memory), grid.value_count());
+    return std::span(reinterpret_cast<std::int16_t*>(memory), layout.value_count);
   };
-  const auto ranges_in = [&](std::byte* memory) {
-    return std::span(reinterpret_cast<OccupiedRange*>(memory + value_bytes), grid.row_count());
+  const auto rows_in = [&](std::byte* memory) {
+    return std::span(reinterpret_cast<GridRow*>(memory + value_bytes), layout.rows.size());
   };
-  const auto z_rows = static_cast<std::size_t>(grid.size[2]);
   const auto fill = [&](std::span<std::byte> memory, int part, int parts) {
-    const auto begin = static_cast<int>(std::int64_t{grid.size[1]} * part / parts);
-    const auto end = static_cast<int>(std::int64_t{grid.size[1]} * (part + 1) / parts);
-    const auto first_row = static_cast<std::size_t>(begin) * z_rows;
-    fill_slices(volume,
-                slab_from_ct,
-                grid,
-                begin,
-                end,
-                values_in(memory.data()).subspan(grid.slice_offset(begin)),
-                ranges_in(memory.data())
-                    .subspan(first_row, static_cast<std::size_t>(end) * z_rows - first_row));
+    const int begin = layout.part_begin(part, parts);
+    const int end = layout.part_begin(part + 1, parts);
+    const std::span<GridRow> rows = rows_in(memory.data());
+    const auto [first_row, end_row] =
+        std::array{layout.grid.row_index(begin, 0), layout.grid.row_index(end, 0)};
+    std::copy_n(layout.rows.data() + first_row, end_row - first_row, rows.data() + first_row);
+    fill_slices(volume, slab_from_ct, layout.grid, begin, end, values_in(memory.data()), rows);
   };
   const std::shared_ptr<const std::byte> memory =
-      communicator.allocate_on_node_together(bytes, fill);
+      communicator.allocate_on_node_together(layout.bytes(), fill);
   auto* base = const_cast<std::byte*>(memory.get());  // only to form views of const elements
-  return {grid,
+  return {layout.grid,
           volume.model(),
           SharedArray<std::int16_t>(memory, values_in(base)),
-          SharedArray<OccupiedRange>(memory, ranges_in(base))};
+          SharedArray<GridRow>(memory, rows_in(base))};
 }
 
 }  // namespace af

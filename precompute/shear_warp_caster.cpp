@@ -15,8 +15,9 @@ namespace {
 
 /// Rows of the first pass's buffer: 512 KiB, about half of a second-level cache.
 constexpr int kBufferRows = 8192;
-/// interpolate_columns writes rows in groups of this many.
-constexpr int kRowGroup = 32;
+/// interpolate_columns writes rows in groups of this many: whole blocks of what is stored.
+constexpr int kRowGroup = kRowBlock;
+static_assert(kRowBlock == kShearColumns);
 
 /// A linear map from node numbers of s or t to grid indices of one slice, for viewpoints at p:
 /// index = per_viewpoint_mm * p + at_first_node + per_node * node.
@@ -52,8 +53,9 @@ struct Slice {
 /// A slice that matters for one tile of t nodes, and where its rows stand in the buffer.
 struct ActiveSlice {
   const Slice* slice = nullptr;
-  int low_x = 0;   ///< a column of zeros, or one that no ray reaches
-  int high_x = 0;  ///< likewise
+  int first_x = 0;  ///< of the rows in the buffer: a multiple of kRowGroup
+  int low_x = 0;    ///< a column of zeros, or one that no ray reaches
+  int high_x = 0;   ///< likewise
   int row_count = 0;
   ShearColumns columns{};
 };
@@ -101,7 +103,7 @@ class UnitCast {
  private:
   /// Room for kBufferRows, or for one slice that alone needs more.
   static std::size_t buffer_values(const SlabAlignedGrid& grid) {
-    return static_cast<std::size_t>(std::max(kBufferRows, grid.size[0] + 2 * kRowGroup)) *
+    return static_cast<std::size_t>(std::max(kBufferRows, grid.size[0] + 3 * kRowGroup)) *
            kShearColumns;
   }
 
@@ -165,15 +167,17 @@ class UnitCast {
     int begin = grid.size[0];
     int end = 0;
     for (int z = low_row; z <= high_row; ++z) {
-      const OccupiedRange range = volume_.occupied(slice.y, z);
-      if (range.begin == range.end) continue;
-      begin = std::min<int>(begin, range.begin);
-      end = std::max<int>(end, range.end);
+      const GridRow& row = volume_.row(slice.y, z);
+      if (row.begin == row.end) continue;
+      begin = std::min<int>(begin, row.begin);
+      end = std::max<int>(end, row.end);
     }
     active.low_x = std::max(begin - 1, slice.first_x);
     active.high_x = std::min(end, slice.last_x);
     if (active.high_x <= active.low_x) return active;
-    active.row_count = (active.high_x + 1 - active.low_x + kRowGroup) / kRowGroup * kRowGroup;
+    active.first_x = active.low_x / kRowGroup * kRowGroup;
+    // Up to and with the row after high_x: it is read with a weight of 0.
+    active.row_count = (active.high_x + 1 - active.first_x + kRowGroup) / kRowGroup * kRowGroup;
     fill_columns(slice, v_mm, first_t, t_count, active.columns);
     return active;
   }
@@ -182,8 +186,9 @@ class UnitCast {
       const Slice& slice, double v_mm, int first_t, int t_count, ShearColumns& columns) const {
     constexpr int kWeightBits = 15;
     const SlabAlignedGrid& grid = volume_.grid();
-    columns.slice = volume_.slice(slice.y);
-    columns.z_stride = grid.row_stride;
+    columns.values = volume_.values();
+    columns.whole_begin = 0;
+    columns.whole_end = grid.size[0];
     const double last_row = grid.size[2] - 2.0;
     for (int j = 0; j < kShearColumns; ++j) {
       // Beyond the grid, and beyond the last node, stands the row of zeros at z = 0.
@@ -193,11 +198,23 @@ class UnitCast {
                              ? static_cast<std::int32_t>(std::floor(z * (1 << kWeightBits) + 0.5))
                              : std::int32_t{0};
       const int row = std::min(fixed >> kWeightBits, grid.size[2] - 2);
-      columns.z_row[j] = row;
+      columns.lower[j] = shear_row(slice.y, row);
+      columns.upper[j] = shear_row(slice.y, row + 1);
+      for (const ShearRow& of : {columns.lower[j], columns.upper[j]}) {
+        columns.whole_begin = std::max(columns.whole_begin, of.begin);
+        columns.whole_end = std::min(columns.whole_end, of.begin + of.count);
+      }
       // The last row is 0, so at its very edge a weight of all but 1/32768 is as good as 1.
       columns.weight[j] =
           static_cast<std::int16_t>(std::min(fixed - (row << kWeightBits), (1 << kWeightBits) - 1));
     }
+  }
+
+  [[nodiscard]] ShearRow shear_row(int y, int z) const {
+    const GridRow& row = volume_.row(y, z);
+    return {row.origin_offset(),
+            kRowBlock * row.first_block(),
+            kRowBlock * (row.end_block() - row.first_block())};
   }
 
   /// Both passes over the active slices.
@@ -208,10 +225,10 @@ class UnitCast {
     for (std::size_t k = 0; k < active_.size(); ++k) {
       const ActiveSlice& active = active_[k];
       kernels_.interpolate_columns(active.columns,
-                                   active.low_x,
+                                   active.first_x,
                                    active.row_count,
                                    buffer_.data() + std::ptrdiff_t{row} * kShearColumns);
-      block.origin[k] = (row - active.low_x) * kShearColumns;
+      block.origin[k] = (row - active.first_x) * kShearColumns;
       block.step[k] = static_cast<float>(256.0 * active.slice->x_of_s.per_node);
       block.low[k] = static_cast<float>(256 * active.low_x);
       block.high[k] = static_cast<float>(256 * active.high_x);

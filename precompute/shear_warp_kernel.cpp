@@ -53,6 +53,30 @@ AF_KERNEL_INLINE F16 sample(const ResampledVolume& volume, F16 x, F16 y, F16 z) 
   return mix(low, high, i.weight);
 }
 
+constexpr int16_t kZeros[kShearColumns] = {};
+
+/// The levels of a row from x on, a multiple of kShearColumns.
+template <bool kIsStored>
+AF_KERNEL_INLINE const int16_t* block_of(const int16_t* values, const ShearRow& row, int32_t x) {
+  const bool is_stored =
+      kIsStored || static_cast<uint32_t>(x - row.begin) < static_cast<uint32_t>(row.count);
+  return is_stored ? values + (row.origin + x) : kZeros;
+}
+
+/// Eight columns from `group` on for kShearColumns places from x on.
+template <bool kIsStored>
+AF_KERNEL_INLINE void interpolate_block(const ShearColumns& columns,
+                                        int group,
+                                        int32_t x,
+                                        S32 (&block)[8]) {
+  for (int i = 0; i < 8; ++i) {
+    const int j = group + i;
+    const S32 lower = load<S32>(block_of<kIsStored>(columns.values, columns.lower[j], x));
+    const S32 upper = load<S32>(block_of<kIsStored>(columns.values, columns.upper[j], x));
+    block[i] = lower + multiply_fraction(upper - lower, columns.weight[j] - S32{});
+  }
+}
+
 /// Transposes 8 x 8 lanes within each of the four groups: rows of x become rows of t.
 AF_KERNEL_INLINE void transpose_groups(S32 (&rows)[8]) {
   S32 pairs[8];
@@ -105,6 +129,7 @@ AF_KERNEL_INLINE void add_slices(const int16_t* columns,
 
 void resample_row(const ResampledVolume& volume, const ResampledRow& row, int16_t* out) {
   F16 index = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+  index += static_cast<float>(row.first);
   const F16 scale = splat(row.scale);
   for (int32_t i = 0; i < row.count; i += kLanes, index += static_cast<float>(kLanes)) {
     const F16 value = sample(volume,
@@ -124,14 +149,12 @@ void interpolate_columns(const ShearColumns& columns,
   // prefetchers of memory want.
   for (int group = 0; group < kShearColumns; group += 8)
     for (int32_t row = 0; row < row_count; row += kShearColumns) {
+      const int32_t x = first_x + row;
       S32 block[8];
-      for (int i = 0; i < 8; ++i) {
-        const int j = group + i;
-        const int16_t* from = columns.slice + columns.z_row[j] * columns.z_stride + first_x + row;
-        const S32 lower = load<S32>(from);
-        const S32 upper = load<S32>(from + columns.z_stride);
-        block[i] = lower + multiply_fraction(upper - lower, columns.weight[j] - S32{});
-      }
+      if (x >= columns.whole_begin && x < columns.whole_end)
+        interpolate_block<true>(columns, group, x, block);
+      else
+        interpolate_block<false>(columns, group, x, block);
       transpose_groups(block);
       for (int i = 0; i < 8; ++i)
         store_groups(rows + (row + i) * kShearColumns + group, 8 * kShearColumns, block[i]);

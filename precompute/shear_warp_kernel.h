@@ -10,12 +10,21 @@ inline constexpr int kShearColumns = 32;
 /// Slices that are added per visit of an accumulator.
 inline constexpr int kShearSlices = 16;
 
+/// A row of a slice: whole vectors of kShearColumns levels from x = begin, 0 elsewhere.
+struct ShearRow {
+  int64_t origin;  ///< elements from `values` to x = 0
+  int32_t begin;   ///< a multiple of kShearColumns
+  int32_t count;   ///< likewise
+};
+
 /// One slice brought to a tile of t nodes by the first pass: rows [x][kShearColumns].
 struct ShearColumns {
-  const int16_t* slice;           ///< [z][x], x fastest
-  int64_t z_stride;               ///< elements from (z, x) to (z + 1, x)
-  int32_t z_row[kShearColumns];   ///< lower z row of each column
-  int16_t weight[kShearColumns];  ///< of row z_row + 1, in 1/32768
+  const int16_t* values;
+  ShearRow lower[kShearColumns];  ///< the rows that each column lies between
+  ShearRow upper[kShearColumns];
+  int16_t weight[kShearColumns];  ///< of the upper row, in 1/32768
+  int32_t whole_begin;            ///< all these rows are stored for x in [whole_begin, whole_end)
+  int32_t whole_end;
 };
 
 /// The slices of one block as one viewpoint sees them. Node i of s lies at x = (start + step * i) /
@@ -41,6 +50,7 @@ struct ShearScale {
 struct ResampledRow {
   float start[3];
   float step[3];
+  int32_t first;  ///< the i to begin with
   int32_t count;
   float scale;
 };
@@ -53,12 +63,12 @@ struct ResampledVolume {
 
 namespace shear_warp {
 
-/// out[i] = round(scale * trilinear sample i); exactly 0 outside the volume. Writes whole vectors
-/// of 16.
+/// out[n] = round(scale * trilinear sample first + n); exactly 0 outside the volume. Writes whole
+/// vectors of 16.
 using ResampleRow = void (*)(const ResampledVolume& volume, const ResampledRow& row, int16_t* out);
 
 /// First pass: rows[x - first_x][j] = slice interpolated in z, for x in [first_x, first_x +
-/// row_count); row_count is a multiple of 32.
+/// row_count); both are multiples of kShearColumns.
 using InterpolateColumns = void (*)(const ShearColumns& columns,
                                     int32_t first_x,
                                     int32_t row_count,

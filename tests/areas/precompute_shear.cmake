@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 af_add_test(
   shear_warp_test
-  SOURCES unit/precompute/slab_aligned_volume_test.cpp unit/precompute/shear_warp_caster_test.cpp
+  SOURCES unit/precompute/attenuating_bricks_test.cpp
+          unit/precompute/slab_aligned_volume_test.cpp unit/precompute/shear_warp_caster_test.cpp
           unit/precompute/depth_slabs_test.cpp
   LIBS af_precompute)
 

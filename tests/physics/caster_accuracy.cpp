@@ -86,10 +86,7 @@ CasterAccuracy measure_caster_accuracy(const AttenuationVolume& volume,
       of_reference.add(static_cast<double>(expected_coarser[t]), value);
     }
   }
-  return {of_caster.psnr_db(),
-          of_reference.psnr_db(),
-          of_caster.count(),
-          resampled.grid().value_count() * sizeof(std::int16_t)};
+  return {of_caster.psnr_db(), of_reference.psnr_db(), of_caster.count(), resampled.bytes()};
 }
 
 }  // namespace af::test

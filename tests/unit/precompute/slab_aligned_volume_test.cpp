@@ -27,9 +27,15 @@ std::vector<Eigen::Matrix3d> all_rotations() {
   return rotations;
 }
 
-std::vector<std::int16_t> values_of(const SlabAlignedVolume& volume) {
-  const std::size_t count = volume.grid().slice_offset(volume.grid().size[1]);
-  return {volume.slice(0), volume.slice(0) + count};
+/// Levels of all nodes, [y][z][x].
+std::vector<std::int16_t> levels_of(const SlabAlignedVolume& volume) {
+  const SlabAlignedGrid& grid = volume.grid();
+  std::vector<std::int16_t> levels;
+  levels.reserve(grid.row_count() * static_cast<std::size_t>(grid.size[0]));
+  for (int y = 0; y < grid.size[1]; ++y)
+    for (int z = 0; z < grid.size[2]; ++z)
+      for (int x = 0; x < grid.size[0]; ++x) levels.push_back(volume.level(x, y, z));
+  return levels;
 }
 
 TEST(SlabAlignedVolume, HoldsMeansOfTwoVoxelsWhenAxesAgree) {
@@ -66,7 +72,7 @@ TEST(SlabAlignedVolume, HoldsMeansOfTwoVoxelsWhenAxesAgree) {
               (1.0 - from_previous) * voxel(index) + from_previous * voxel(previous);
           // Half a level of rounding, and positions in single precision.
           constexpr double kTolerance = 0.5 + 0.02;
-          ASSERT_NEAR(resampled.slice(y)[z * grid.row_stride + x],
+          ASSERT_NEAR(resampled.level(x, y, z),
                       expected * static_cast<double>(grid.levels_per_unit),
                       kTolerance);
         }
@@ -78,7 +84,8 @@ TEST(SlabAlignedVolume, KeepsTheNodesOfTheAxisThatACameraIsTurnedAbout) {
   for (int axis = 0; axis < 3; ++axis) {
     Eigen::Vector3d angles = Eigen::Vector3d::Zero();
     angles[axis] = 0.6;
-    const SlabAlignedGrid grid = slab_aligned_grid(volume, rotated(rotation_from_angles(angles)));
+    const SlabAlignedGrid grid =
+        slab_aligned_layout(volume, rotated(rotation_from_angles(angles))).grid;
     for (int other = 0; other < 3; ++other)
       EXPECT_EQ(grid.is_resampled[static_cast<std::size_t>(other)], other != axis);
     EXPECT_NEAR(grid.spacing_mm[axis], volume.grid().spacing_mm[axis], 1e-9);
@@ -111,7 +118,7 @@ TEST(SlabAlignedVolume, ObliqueGridReproducesALinearRamp) {
                Eigen::Vector3d(grid.spacing_mm.x() * x, 0.0, grid.spacing_mm.z() * z));
           if (point.cwiseAbs().maxCoeff() > 16.0) continue;
           const double scale = static_cast<double>(grid.levels_per_unit);
-          ASSERT_NEAR(resampled.slice(y)[z * grid.row_stride + x],
+          ASSERT_NEAR(resampled.level(x, y, z),
                       (1000.0 + hu(point)) * scale,
                       kRoundingLevels + kHuRounding * scale);
           ++compared;
@@ -120,7 +127,7 @@ TEST(SlabAlignedVolume, ObliqueGridReproducesALinearRamp) {
   }
 }
 
-TEST(SlabAlignedVolume, HasZerosOnItsFacesAndOutsideTheOccupiedRanges) {
+TEST(SlabAlignedVolume, HasZerosOnItsFacesAndKnowsWhereRowsBeginAndEnd) {
   const CtVolume ct = box_phantom(
       test::centered_grid({24, 25, 26}, {1.0, 1.0, 1.0}), {0, 0, 0}, {23, 24, 25}, 3071);
   const AttenuationVolume volume(ct, AttenuationModel{});
@@ -129,23 +136,57 @@ TEST(SlabAlignedVolume, HasZerosOnItsFacesAndOutsideTheOccupiedRanges) {
     const SlabAlignedGrid& grid = resampled.grid();
     for (int y = 0; y < grid.size[1]; ++y)
       for (int z = 0; z < grid.size[2]; ++z) {
-        const OccupiedRange range = resampled.occupied(y, z);
-        const std::int16_t* row = resampled.slice(y) + z * grid.row_stride;
-        for (int x = 0; x < grid.row_stride; ++x) {
-          if (x < range.begin || x >= range.end) {
-            ASSERT_EQ(row[x], 0);
+        const GridRow& row = resampled.row(y, z);
+        if (row.begin == row.end) continue;
+        const bool is_face = y == 0 || y == grid.size[1] - 1 || z == 0 || z == grid.size[2] - 1;
+        ASSERT_FALSE(is_face);
+        ASSERT_GT(row.begin, 0);
+        ASSERT_LT(row.end, grid.size[0]);
+        EXPECT_NE(resampled.level(row.begin, y, z), 0);
+        EXPECT_NE(resampled.level(row.end - 1, y, z), 0);
+        // Casters read whole blocks.
+        const std::int16_t* levels = resampled.values() + row.origin_offset();
+        for (int x = kRowBlock * row.first_block(); x < kRowBlock * row.end_block(); ++x)
+          if (x < row.begin || x >= row.end) {
+            ASSERT_EQ(levels[x], 0);
           }
-          const bool is_face = x == 0 || x >= grid.size[0] - 1 || y == 0 || y == grid.size[1] - 1 ||
-                               z == 0 || z == grid.size[2] - 1;
-          if (is_face) {
-            ASSERT_EQ(row[x], 0);
-          }
-        }
-        if (range.begin < range.end) {
-          EXPECT_NE(row[range.begin], 0);
-          EXPECT_NE(row[range.end - 1], 0);
-        }
       }
+  }
+}
+
+/// Levels when every node of the grid is stored, as if nothing were known of where the volume
+/// attenuates.
+SlabAlignedVolume resampled_with_all_nodes(const AttenuationVolume& volume,
+                                           const RigidTransform& slab_from_ct) {
+  SlabAlignedLayout layout = slab_aligned_layout(volume, slab_from_ct);
+  const SlabAlignedGrid& grid = layout.grid;
+  std::int32_t blocks = 0;
+  for (GridRow& row : layout.rows) {
+    row = {blocks, 0, static_cast<std::int16_t>(grid.size[0])};
+    blocks += row.end_block();
+  }
+  std::vector<std::int16_t> values(static_cast<std::size_t>(blocks) * kRowBlock);
+  fill_slices(volume, slab_from_ct, grid, 1, grid.size[1] - 1, values, layout.rows);
+  return {grid,
+          volume.model(),
+          SharedArray<std::int16_t>(std::move(values)),
+          SharedArray<GridRow>(std::move(layout.rows))};
+}
+
+TEST(SlabAlignedVolume, StoresAllThatIsNotZero) {
+  // Two bodies that leave much air in and around the box that holds them.
+  CtVolume ct =
+      box_phantom(test::centered_grid({40, 44, 36}, {1.0, 0.9, 1.1}), {3, 4, 5}, {3, 4, 5}, 3071);
+  const CtVolume other = box_phantom(ct.grid, {20, 25, 20}, {34, 36, 30}, 1200);
+  std::vector<std::int16_t> hu(ct.hu.view().begin(), ct.hu.view().end());
+  for (std::size_t i = 0; i < hu.size(); ++i) hu[i] = std::max(hu[i], other.hu[i]);
+  ct.hu = SharedArray<std::int16_t>(std::move(hu));
+  const AttenuationVolume volume(ct, AttenuationModel{});
+  for (const Eigen::Matrix3d& rotation : all_rotations()) {
+    const SlabAlignedVolume resampled(volume, rotated(rotation));
+    const SlabAlignedVolume all = resampled_with_all_nodes(volume, rotated(rotation));
+    EXPECT_EQ(levels_of(resampled), levels_of(all));
+    EXPECT_LT(resampled.bytes(), all.bytes() * 3 / 4);
   }
 }
 
@@ -154,32 +195,52 @@ TEST(SlabAlignedVolume, DoesNotDependOnThePiecesOrTheVectorWidth) {
   for (const Eigen::Matrix3d& rotation : all_rotations()) {
     const RigidTransform slab_from_ct = rotated(rotation);
     const SlabAlignedVolume whole(volume, slab_from_ct);
-    const SlabAlignedGrid grid = slab_aligned_grid(volume, slab_from_ct);
     for (const VectorWidth width : supported_vector_widths()) {
       force_vector_width(width);
-      std::vector<std::int16_t> values(grid.value_count());
-      std::vector<OccupiedRange> occupied(grid.row_count());
-      const auto z_rows = static_cast<std::size_t>(grid.size[2]);
-      for (int first = 0; first < grid.size[1]; first += 7) {
-        const int end = std::min(first + 7, grid.size[1]);
-        const auto slices = static_cast<std::size_t>(end - first);
-        fill_slices(
-            volume,
-            slab_from_ct,
-            grid,
-            first,
-            end,
-            std::span(values).subspan(grid.slice_offset(first)),
-            std::span(occupied).subspan(static_cast<std::size_t>(first) * z_rows, slices * z_rows));
-      }
+      SlabAlignedLayout layout = slab_aligned_layout(volume, slab_from_ct);
+      const SlabAlignedGrid& grid = layout.grid;
+      std::vector<std::int16_t> values(layout.value_count);
+      for (int first = 0; first < grid.size[1]; first += 7)
+        fill_slices(volume,
+                    slab_from_ct,
+                    grid,
+                    first,
+                    std::min(first + 7, grid.size[1]),
+                    values,
+                    layout.rows);
       const SlabAlignedVolume pieced(grid,
                                      volume.model(),
                                      SharedArray<std::int16_t>(std::move(values)),
-                                     SharedArray<OccupiedRange>(std::move(occupied)));
-      EXPECT_EQ(values_of(pieced), values_of(whole)) << to_string(width);
+                                     SharedArray<GridRow>(std::move(layout.rows)));
+      EXPECT_EQ(levels_of(pieced), levels_of(whole)) << to_string(width);
       EXPECT_EQ(pieced.slice_sums(), whole.slice_sums());
     }
     force_vector_width(std::nullopt);
+  }
+}
+
+TEST(SlabAlignedLayout, PartsCoverAllSlicesAndAreAboutEven) {
+  const AttenuationVolume volume(test::smooth_ct(), AttenuationModel{});
+  const SlabAlignedLayout layout =
+      slab_aligned_layout(volume, rotated(test::oblique_rotations()[0]));
+  const auto end_value_of = [&](int y) {
+    const GridRow& row = layout.rows[layout.grid.row_index(y, layout.grid.size[2] - 1)];
+    return static_cast<double>(row.origin_offset() + kRowBlock * row.end_block());
+  };
+  double largest_slice = 0.0;
+  for (int y = 1; y < layout.grid.size[1]; ++y)
+    largest_slice = std::max(largest_slice, end_value_of(y) - end_value_of(y - 1));
+  for (const int parts : {1, 2, 3, 7, 400}) {
+    EXPECT_EQ(layout.part_begin(0, parts), 0);
+    EXPECT_EQ(layout.part_begin(parts, parts), layout.grid.size[1]);
+    for (int part = 0; part < parts; ++part) {
+      const int begin = layout.part_begin(part, parts);
+      const int end = layout.part_begin(part + 1, parts);
+      ASSERT_LE(begin, end);
+      const double values =
+          end > begin ? end_value_of(end - 1) - (begin > 0 ? end_value_of(begin - 1) : 0.0) : 0.0;
+      EXPECT_LE(values, static_cast<double>(layout.value_count) / parts + largest_slice);
+    }
   }
 }
 
@@ -191,9 +252,13 @@ TEST(SlabAlignedVolume, NoColumnOfLargestLevelsOverflowsTheCastersSums) {
     const SlabAlignedVolume resampled(volume, rotated(rotation));
     std::int64_t sum = 0;
     const SlabAlignedGrid& grid = resampled.grid();
-    const auto slice_values = static_cast<std::ptrdiff_t>(grid.slice_offset(1));
-    for (int y = 0; y < grid.size[1]; ++y)
-      sum += *std::max_element(resampled.slice(y), resampled.slice(y) + slice_values);
+    for (int y = 0; y < grid.size[1]; ++y) {
+      std::int16_t largest = 0;
+      for (int z = 0; z < grid.size[2]; ++z)
+        for (int x = 0; x < grid.size[0]; ++x)
+          largest = std::max(largest, resampled.level(x, y, z));
+      sum += largest;
+    }
     EXPECT_LE(sum * 256, std::numeric_limits<std::int32_t>::max());
     EXPECT_GT(sum * 256, std::numeric_limits<std::int32_t>::max() / 50);
   }
@@ -203,16 +268,18 @@ TEST(SlabAlignedVolume, CoarsensAnObliqueGridToTheMemoryAllowed) {
   const AttenuationVolume volume(test::smooth_ct(), AttenuationModel{});
   SlabAlignedOptions options;
   options.largest_bytes = 2'000'000;
-  const SlabAlignedGrid grid =
-      slab_aligned_grid(volume, rotated(test::oblique_rotations()[0]), options);
-  EXPECT_LE(grid.value_count() * sizeof(std::int16_t), options.largest_bytes);
-  EXPECT_GT(grid.value_count() * sizeof(std::int16_t), options.largest_bytes * 3 / 4);
+  const SlabAlignedLayout layout =
+      slab_aligned_layout(volume, rotated(test::oblique_rotations()[0]), options);
+  EXPECT_LE(layout.bytes(), options.largest_bytes);
+  EXPECT_GT(layout.bytes(), options.largest_bytes * 3 / 4);
 }
 
 TEST(SlabAlignedVolume, RefusesASpacingOutOfRange) {
   const AttenuationVolume volume(test::smooth_ct(), AttenuationModel{});
   for (const double spacing : {0.0, 0.05, 1.5, std::nan("")})
-    EXPECT_THROW(slab_aligned_grid(volume, RigidTransform::Identity(), {spacing}), InputError);
+    for (const SlabAlignedOptions& options :
+         {SlabAlignedOptions{spacing, 0.5, 0}, SlabAlignedOptions{0.5, spacing, 0}})
+      EXPECT_THROW(slab_aligned_layout(volume, RigidTransform::Identity(), options), InputError);
 }
 
 }  // namespace
