@@ -130,6 +130,56 @@ void check_nifti_orientation(const CtGrid& grid,
                      (uses_qform ? "qform" : "sform") + " is used");
 }
 
+void check_is_ct(const RawImage& image, const fs::path& path) {
+  check_is_scalar_volume(image, path);
+  check_grid(grid_of(image), path.string());
+}
+
+void add_values(ValueType type, std::span<const std::byte> bytes, HuValues& values) {
+  visit_values(type, bytes, [&](const auto span) { values.add_all(span); });
+}
+
+/// Voxels of any format: the whole image is held in its own type meanwhile, by some of ITK's
+/// readers twice.
+RawImage read_values_by_itk(const fs::path& path,
+                            const ImageHeader& header,
+                            HuValues& values,
+                            std::vector<std::string>& warnings) {
+  check_image_payload(path, header, &warnings);
+  RawImage image =
+      read_raw_image(path, header.format, [&](const RawImage& seen) { check_is_ct(seen, path); });
+  values.reserve(image.voxel_count());
+  add_values(image.type, image.values, values);
+  image.values = {};
+  return image;
+}
+
+/// Voxels that are the values as they stand, converted piece by piece while the file is read and
+/// checked, once. No values in the image returned.
+RawImage read_plain_values(const fs::path& path,
+                           const ImageHeader& header,
+                           HuValues& values,
+                           std::vector<std::string>& warnings) {
+  RawImage image;
+  try {
+    image = read_raw_image_header(path, header.format);
+  } catch (const FileError&) {
+    check_image_payload(path, header, nullptr);  // says more of a damaged stream than ITK does
+    throw;
+  }
+  check_is_ct(image, path);
+  if (value_bytes(image.type) != header.value_bytes)
+    throw FileError(path.string(),
+                    "bytes of a voxel",
+                    std::to_string(value_bytes(image.type)),
+                    std::to_string(header.value_bytes));
+  read_image_payload(path, header, &warnings, [&](std::span<const std::byte> piece) {
+    if (values.hu().empty()) values.reserve(image.voxel_count());
+    add_values(image.type, piece, values);
+  });
+  return image;
+}
+
 CtVolume read_ct_image(const fs::path& path, HuValues& values, std::vector<std::string>& warnings) {
   const std::string file = path.string();
   const std::optional<ImageFormat> format = sniff_image_format(path);
@@ -146,11 +196,9 @@ CtVolume read_ct_image(const fs::path& path, HuValues& values, std::vector<std::
                      " picture has no HU values and no patient frame; a CT is DICOM, NIfTI, "
                      "MetaImage or NRRD");
   const ImageHeader header = read_image_header(path, *format);
-  check_image_payload(path, header, &warnings);
-  const RawImage image = read_raw_image(path, *format, [&](const RawImage& seen) {
-    check_is_scalar_volume(seen, path);
-    check_grid(grid_of(seen), file);
-  });
+  const RawImage image = header.has_plain_values
+                             ? read_plain_values(path, header, values, warnings)
+                             : read_values_by_itk(path, header, values, warnings);
   CtVolume ct;
   ct.grid = grid_of(image);
   if (header.format == ImageFormat::Nifti && header.has_orientation)
@@ -158,10 +206,6 @@ CtVolume read_ct_image(const fs::path& path, HuValues& values, std::vector<std::
   if (!header.has_orientation)
     warnings.push_back(file + ": no patient orientation is stored; axes are taken as LPS by " +
                        std::string(format_name(*format)) + "'s default");
-  values.reserve(image.voxel_count());
-  visit_values(image, [&](const auto span) {
-    for (const auto value : span) values.add(static_cast<double>(value));
-  });
   return ct;
 }
 

@@ -5,6 +5,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <span>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 namespace af {
@@ -30,6 +33,14 @@ class HuValues {
     }
     ++clamped_count_;
     hu_.push_back(static_cast<std::int16_t>(rounded < kLow ? kLow : kHigh));
+  }
+
+  template <typename Value>
+  void add_all(std::span<const Value> values) {
+    if constexpr (std::is_same_v<Value, std::int16_t>)
+      hu_.insert(hu_.end(), values.begin(), values.end());
+    else
+      for (const Value value : values) add(static_cast<double>(value));
   }
 
   [[nodiscard]] std::size_t clamped_count() const { return clamped_count_; }

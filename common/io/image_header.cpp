@@ -574,6 +574,10 @@ ImageHeader read_nifti_header(const fs::path& path) {
     throw FileError(name, "vox_offset", "352 to 1e9", std::to_string(offset));
   header.skip_bytes = static_cast<std::uint64_t>(offset);
   check_nifti_numbers(name, raw, swapped);
+  const float slope = load<float>(raw, 112, swapped);
+  const float intercept = load<float>(raw, 116, swapped);
+  // A slope of 0 means that there is none.
+  header.has_plain_values = !swapped && (slope == 0.0f || slope == 1.0f) && intercept == 0.0f;
   header.nifti = nifti_orientation(raw, swapped);
   if (header.nifti.sform) check_is_orthogonal(name, "sform", *header.nifti.sform);
   header.has_orientation = header.nifti.qform.has_value() || header.nifti.sform.has_value();
@@ -642,8 +646,14 @@ void check_png(const fs::path& path) {
 
 // ---- payload ----
 
-/// Bytes that a compressed stream inflates to; throws when it is cut or its checksum is wrong.
-std::uint64_t inflated_bytes(const fs::path& path, std::uint64_t offset) {
+using Bytes = std::span<const std::byte>;
+using ByteVisitor = std::function<void(Bytes)>;
+
+constexpr std::size_t kPieceBytes = std::size_t{1} << 20;
+
+/// Bytes that a compressed stream inflates to, handed to `visit` on the way; throws when it is cut
+/// or its checksum is wrong.
+std::uint64_t inflate_file(const fs::path& path, std::uint64_t offset, const ByteVisitor& visit) {
   std::ifstream file(path, std::ios::binary);
   file.seekg(static_cast<std::streamoff>(offset));
   Inflater inflater;
@@ -661,7 +671,9 @@ std::uint64_t inflated_bytes(const fs::path& path, std::uint64_t offset) {
       stream.next_out = output.data();
       stream.avail_out = static_cast<unsigned>(output.size());
       const int status = inflate(&stream, Z_NO_FLUSH);
-      total += output.size() - stream.avail_out;
+      const std::size_t inflated = output.size() - stream.avail_out;
+      visit(std::as_bytes(std::span(output).first(inflated)));
+      total += inflated;
       finished = status == Z_STREAM_END;
       // Z_BUF_ERROR: nothing was left to do; the next input goes on.
       if (!finished && status != Z_OK && status != Z_BUF_ERROR)
@@ -681,6 +693,58 @@ std::uint64_t inflated_bytes(const fs::path& path, std::uint64_t offset) {
                         " bytes without their end mark");
   return total;
 }
+
+/// The bytes of a file from `offset` on, read whole only when somebody wants them.
+std::uint64_t read_plain_file(const fs::path& path,
+                              std::uint64_t offset,
+                              const ByteVisitor& visit) {
+  std::ifstream file(path, std::ios::binary);
+  file.seekg(static_cast<std::streamoff>(offset));
+  std::vector<char> piece(kPieceBytes);
+  std::uint64_t total = 0;
+  while (file) {
+    file.read(piece.data(), static_cast<std::streamsize>(piece.size()));
+    const auto found = static_cast<std::size_t>(file.gcount());
+    visit(std::as_bytes(std::span(piece).first(found)));
+    total += found;
+  }
+  return total;
+}
+
+/// Cuts a stream of bytes into pieces of kPieceBytes, without what stands before and after the
+/// voxels.
+class PayloadPieces {
+ public:
+  PayloadPieces(std::uint64_t skipped_bytes, std::uint64_t payload_bytes, ByteVisitor visit)
+      : to_skip_(skipped_bytes), to_come_(payload_bytes), visit_(std::move(visit)) {}
+
+  void add(Bytes bytes) {
+    const auto skipped = std::min<std::uint64_t>(to_skip_, bytes.size());
+    to_skip_ -= skipped;
+    bytes = bytes.subspan(skipped);
+    bytes = bytes.first(std::min<std::uint64_t>(to_come_, bytes.size()));
+    to_come_ -= bytes.size();
+    while (!bytes.empty()) {
+      const std::size_t taken = std::min(bytes.size(), kPieceBytes - piece_.size());
+      piece_.insert(
+          piece_.end(), bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(taken));
+      bytes = bytes.subspan(taken);
+      if (piece_.size() == kPieceBytes) flush();
+    }
+    if (to_come_ == 0) flush();
+  }
+
+ private:
+  void flush() {
+    if (!piece_.empty()) visit_(piece_);
+    piece_.clear();
+  }
+
+  std::uint64_t to_skip_;
+  std::uint64_t to_come_;
+  ByteVisitor visit_;
+  std::vector<std::byte> piece_;
+};
 
 }  // namespace
 
@@ -741,21 +805,33 @@ ImageHeader read_image_header(const fs::path& path, ImageFormat format) {
 void check_image_payload(const fs::path& path,
                          const ImageHeader& header,
                          std::vector<std::string>* warnings) {
+  read_image_payload(path, header, warnings, nullptr);
+}
+
+void read_image_payload(const fs::path& path,
+                        const ImageHeader& header,
+                        std::vector<std::string>* warnings,
+                        const ByteVisitor& visit) {
   if (header.format == ImageFormat::Png) check_png(path);
   if (header.size.empty()) return;
-  const std::uint64_t expected = checked_payload_bytes(path, header) + header.skip_bytes;
+  const std::uint64_t payload = checked_payload_bytes(path, header);
+  const std::uint64_t expected = payload + header.skip_bytes;
   const std::uint64_t file_bytes = existing_file_size(path, header.data_file);
   const std::uint64_t stored =
       file_bytes > header.payload_offset ? file_bytes - header.payload_offset : 0;
+  if (header.compressed && stored < expected / kMaxDeflateRatio)
+    throw FileError(path.string(),
+                    "truncated: " + std::to_string(stored) + " compressed bytes cannot hold the " +
+                        std::to_string(expected) + " bytes that the header promises");
+  PayloadPieces pieces(header.skip_bytes, payload, visit);
+  const ByteVisitor take = [&](Bytes bytes) {
+    if (visit) pieces.add(bytes);
+  };
   std::uint64_t found = stored;
-  if (header.compressed) {
-    if (stored < expected / kMaxDeflateRatio)
-      throw FileError(path.string(),
-                      "truncated: " + std::to_string(stored) +
-                          " compressed bytes cannot hold the " + std::to_string(expected) +
-                          " bytes that the header promises");
-    found = inflated_bytes(header.data_file, header.payload_offset);
-  }
+  if (header.compressed)
+    found = inflate_file(header.data_file, header.payload_offset, take);
+  else if (visit && stored >= expected)
+    found = read_plain_file(header.data_file, header.payload_offset, take);
   if (found < expected)
     throw FileError(header.data_file.string(),
                     "truncated: voxel data",

@@ -2,9 +2,12 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -38,6 +41,9 @@ struct ImageHeader {
   std::uint64_t skip_bytes = 0;      ///< in front of the voxels, after decompression
   bool compressed = false;
   std::filesystem::path data_file;  ///< the file that holds the voxels
+  /// The stored voxels are the values: this machine's byte order, not rescaled. Known of NIfTI
+  /// only.
+  bool has_plain_values = false;
   bool has_orientation = true;
   NiftiOrientation nifti;
 };
@@ -54,5 +60,12 @@ ImageHeader read_image_header(const std::filesystem::path& path, ImageFormat for
 void check_image_payload(const std::filesystem::path& path,
                          const ImageHeader& header,
                          std::vector<std::string>* warnings);
+
+/// The same, and hands the bytes of the voxels to `visit` on the way, in order, in pieces of 1 MiB
+/// (the last may be shorter). What `visit` has seen counts for nothing when this throws.
+void read_image_payload(const std::filesystem::path& path,
+                        const ImageHeader& header,
+                        std::vector<std::string>* warnings,
+                        const std::function<void(std::span<const std::byte>)>& visit);
 
 }  // namespace af

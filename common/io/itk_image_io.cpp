@@ -117,6 +117,18 @@ std::string description(const itk::ExceptionObject& error) {
   return text;
 }
 
+/// What `read` returns; FileError for what ITK throws.
+template <typename Read>
+RawImage with_itk_errors(const fs::path& path, ImageFormat format, const Read& read) {
+  try {
+    return read();
+  } catch (const itk::ExceptionObject& error) {
+    throw FileError(path.string(),
+                    std::string("not a readable ") + std::string(format_name(format)) +
+                        " image: " + description(error));
+  }
+}
+
 struct WritableFormat {
   std::string_view extension;
   ImageFormat format;
@@ -187,10 +199,19 @@ std::size_t value_bytes(ValueType type) {
   }
 }
 
+RawImage read_raw_image_header(const fs::path& path, ImageFormat format) {
+  return with_itk_errors(path, format, [&] {
+    const itk::ImageIOBase::Pointer io = make_image_io(format);
+    io->SetFileName(path.string());
+    io->ReadImageInformation();
+    return header_of(*io, path);
+  });
+}
+
 RawImage read_raw_image(const fs::path& path,
                         ImageFormat format,
                         const std::function<void(const RawImage&)>& accept) {
-  try {
+  return with_itk_errors(path, format, [&] {
     const itk::ImageIOBase::Pointer io = make_image_io(format);
     io->SetFileName(path.string());
     io->ReadImageInformation();
@@ -209,11 +230,7 @@ RawImage read_raw_image(const fs::path& path,
                       std::to_string(io->GetImageSizeInBytes()));
     io->Read(image.values.data());
     return image;
-  } catch (const itk::ExceptionObject& error) {
-    throw FileError(path.string(),
-                    std::string("not a readable ") + std::string(format_name(format)) +
-                        " image: " + description(error));
-  }
+  });
 }
 
 void write_raw_image(const RawImage& image, const fs::path& path) {

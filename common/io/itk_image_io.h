@@ -7,6 +7,7 @@
 #include <functional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "io/image_header.h"
@@ -31,14 +32,16 @@ struct RawImage {
 
 std::size_t value_bytes(ValueType type);
 
-/// Calls `function` with the values as a span of their own type.
+/// Calls `function` with values of a type as a span of it.
 template <typename Function>
-decltype(auto) visit_values(const RawImage& image, Function&& function) {
+decltype(auto) visit_values(ValueType type,
+                            std::span<const std::byte> values,
+                            Function&& function) {
   const auto as = [&]<typename T>(T) {
-    return function(std::span<const T>(reinterpret_cast<const T*>(image.values.data()),
-                                       image.values.size() / sizeof(T)));
+    return function(
+        std::span<const T>(reinterpret_cast<const T*>(values.data()), values.size() / sizeof(T)));
   };
-  switch (image.type) {
+  switch (type) {
     case ValueType::Int8:
       return as(std::int8_t{});
     case ValueType::UInt8:
@@ -62,6 +65,14 @@ decltype(auto) visit_values(const RawImage& image, Function&& function) {
   }
   return as(double{});
 }
+
+template <typename Function>
+decltype(auto) visit_values(const RawImage& image, Function&& function) {
+  return visit_values(image.type, image.values, std::forward<Function>(function));
+}
+
+/// What read_raw_image() reads, without values.
+RawImage read_raw_image_header(const std::filesystem::path& path, ImageFormat format);
 
 /// Reads an image file (not DICOM) by ITK. `accept` sees it without values and throws when it does
 /// not want them: nothing is allocated by the header's word before that. FileError when ITK fails.

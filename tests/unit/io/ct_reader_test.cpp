@@ -1,16 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/ct_reader.h"
 
+#include <array>
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <limits>
+#include <span>
 
 #include <Eigen/Geometry>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "io/itk_image_io.h"
 #include "support/test_paths.h"
 #include "unit/io/ct_test_data.h"
 
@@ -738,6 +741,47 @@ TEST(CtReader, ReadsCompressedVolumesThatFillEveryBuffer) {
   ct.hu = SharedArray<std::int16_t>(std::move(hu));
   write_ct(ct, folder / "ct.nii.gz");
   EXPECT_EQ(ct_content_sha256(read_ct(folder / "ct.nii.gz")), ct_content_sha256(ct));
+}
+
+/// A NIfTI file of floats, its voxels `extra` bytes behind where they usually begin.
+void write_float_nifti(const std::vector<float>& voxels,
+                       const std::array<std::size_t, 3>& size,
+                       std::size_t extra,
+                       const fs::path& path) {
+  RawImage image;
+  image.size.assign(size.begin(), size.end());
+  image.spacing_mm = {0.8, 0.9, 1.5};
+  image.origin_mm = {-31.25, 12.5, -107.0};
+  image.directions = {{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}};
+  image.type = ValueType::Float32;
+  const auto bytes = std::as_bytes(std::span(voxels));
+  image.values.assign(bytes.begin(), bytes.end());
+  write_raw_image(image, path);
+  std::string file = read_bytes(path);
+  constexpr std::size_t kUsual = 352;
+  file.insert(kUsual, std::string(extra, 'x'));
+  file.replace(108, 4, bytes_of(std::vector<float>{static_cast<float>(kUsual + extra)}));
+  write_bytes(path, file);
+}
+
+TEST(CtReader, ReadsFloatNiftiInPiecesWhereverTheVoxelsBegin) {
+  const ScratchFolder folder;
+  // 3.3 MB: pieces of 1 MiB end within a row.
+  const std::array<std::size_t, 3> size = {101, 91, 89};
+  std::vector<float> voxels(size[0] * size[1] * size[2]);
+  for (std::size_t i = 0; i < voxels.size(); ++i)
+    voxels[i] = static_cast<float>(i * 7919 % 3001) - 1000.0f;
+  // 3: floats no longer begin at multiples of 4 bytes of the file.
+  for (const std::size_t extra : {std::size_t{0}, std::size_t{3}}) {
+    write_float_nifti(voxels, size, extra, folder / "ct.nii");
+    ASSERT_EQ(std::system(("gzip -kf " + (folder / "ct.nii").string()).c_str()), 0);
+    for (const char* name : {"ct.nii", "ct.nii.gz"}) {
+      const CtVolume ct = read_ct(folder / name);
+      ASSERT_EQ(ct.hu.size(), voxels.size());
+      for (std::size_t i = 0; i < voxels.size(); ++i)
+        ASSERT_EQ(static_cast<float>(ct.hu[i]), voxels[i]) << name << ", voxel " << i;
+    }
+  }
 }
 
 /// Every way to cut a small file short, and one wrong bit in each byte of its header.
