@@ -122,8 +122,7 @@ nlohmann::json measure(const std::vector<Tile>& tiles, int codewords, const Case
        static_cast<double>(tiles.size()),
        "tiles",
        [&] {
-         return seconds_of(
-             [&] { search.search(tiles, SearchHint::None, nearest, errors); });
+         return seconds_of([&] { search.search(tiles, SearchHint::None, nearest, errors); });
        }},
       {kBruteForce, work, "tiles", [&] {
          return seconds_of([&] { brute_force.search(some, by_brute_force); });
