@@ -15,6 +15,7 @@
 #include "image/psnr.h"
 #include "io/field_file.h"
 #include "precompute/shear_warp_caster.h"
+#include "support/plane_products.h"
 #include "volume/blurred_volume.h"
 
 namespace {
@@ -87,19 +88,6 @@ struct GradientQuality {
   SixNumbers relative_difference{};  ///< from central differences of the same renderer
 };
 
-/// Sums over the pixels of one parameter's planes.
-struct Products {
-  double ab = 0.0, aa = 0.0, bb = 0.0;
-
-  void add(std::span<const float> a, std::span<const float> b) {
-    for (std::size_t i = 0; i < a.size(); ++i) {
-      ab += static_cast<double>(a[i]) * static_cast<double>(b[i]);
-      aa += static_cast<double>(a[i]) * static_cast<double>(a[i]);
-      bb += static_cast<double>(b[i]) * static_cast<double>(b[i]);
-    }
-  }
-};
-
 GradientQuality gradient_quality(const Way& way,
                                  const std::vector<RigidTransform>& poses,
                                  const std::vector<std::vector<float>>& cast_gradients,
@@ -110,8 +98,8 @@ GradientQuality gradient_quality(const Way& way,
   std::vector<float> value(pixels);
   std::vector<float> analytic(6 * pixels);
   std::vector<float> differences(6 * pixels);
-  std::array<Products, 6> with_cast{};
-  std::array<Products, 6> with_own{};
+  std::array<af::test::PlaneProducts, 6> with_cast{};
+  std::array<af::test::PlaneProducts, 6> with_own{};
   // Small, since slopes jump at the borders of cells.
   const DifferenceSteps steps{5e-5, 0.005};
   for (std::size_t pose = 0; pose < cast_gradients.size(); ++pose) {
@@ -127,10 +115,8 @@ GradientQuality gradient_quality(const Way& way,
   }
   GradientQuality quality;
   for (std::size_t p = 0; p < 6; ++p) {
-    const Products& cast = with_cast[p];
-    const Products& own = with_own[p];
-    quality.cosine_with_ray_casting[p] = cast.ab / std::sqrt(cast.aa * cast.bb);
-    quality.relative_difference[p] = std::sqrt((own.aa - 2.0 * own.ab + own.bb) / own.bb);
+    quality.cosine_with_ray_casting[p] = with_cast[p].cosine();
+    quality.relative_difference[p] = with_own[p].relative_distance();
   }
   return quality;
 }

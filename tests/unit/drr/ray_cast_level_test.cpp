@@ -9,6 +9,8 @@
 #include "drr/field_level.h"
 #include "drr/ray_cast_drr.h"
 #include "drr/two_pass_af_drr.h"
+#include "support/cube_grid.h"
+#include "support/plane_products.h"
 #include "unit/drr/small_fields.h"
 #include "volume/blurred_volume.h"
 #include "volume/phantoms.h"
@@ -16,13 +18,8 @@
 namespace af {
 namespace {
 
-CtGrid cube_grid(int side, double spacing_mm) {
-  CtGrid grid;
-  grid.size = {side, side, side};
-  grid.spacing_mm = Eigen::Vector3d::Constant(spacing_mm);
-  grid.origin_mm = Eigen::Vector3d::Constant(-0.5 * (side - 1) * spacing_mm);
-  return grid;
-}
+using test::cube_grid;
+using test::PlaneProducts;
 
 /// Bodies with edges in all directions, 90 mm across.
 std::shared_ptr<const AttenuationVolume> bodies() {
@@ -70,20 +67,6 @@ FieldLevel cast_level(const AttenuationVolume& volume) {
   return level;
 }
 
-struct Products {
-  double ab = 0.0, aa = 0.0, bb = 0.0;
-
-  void add(std::span<const float> a, std::span<const float> b) {
-    for (std::size_t i = 0; i < a.size(); ++i) {
-      ab += static_cast<double>(a[i]) * static_cast<double>(b[i]);
-      aa += static_cast<double>(a[i]) * static_cast<double>(a[i]);
-      bb += static_cast<double>(b[i]) * static_cast<double>(b[i]);
-    }
-  }
-  [[nodiscard]] double relative_distance() const { return std::sqrt((aa - 2.0 * ab + bb) / bb); }
-  [[nodiscard]] double cosine() const { return ab / std::sqrt(aa * bb); }
-};
-
 /// Value, then six derivative planes, of one renderer.
 std::vector<float> rendered(const DrrRenderer& renderer,
                             const RigidTransform& pose,
@@ -102,10 +85,10 @@ std::vector<float> rendered(const DrrRenderer& renderer,
 }
 
 /// Field against ray casting over five poses: values, then derivatives.
-std::array<Products, 7> compare(const DrrRenderer& field,
-                                const DrrRenderer& ray_cast,
-                                const View& view) {
-  std::array<Products, 7> products;
+std::array<PlaneProducts, 7> compare(const DrrRenderer& field,
+                                     const DrrRenderer& ray_cast,
+                                     const View& view) {
+  std::array<PlaneProducts, 7> products;
   for (std::uint64_t i = 0; i < 5; ++i) {
     const RigidTransform pose = pose_from_parameters({}, small_pose(i));
     const auto a = rendered(field, pose, view);

@@ -354,12 +354,13 @@ TEST(MethodComparison, ScreenHasALinePerMeasureAndAColumnPerOptimizer) {
 }
 
 TEST(MethodComparison, PairsTellTheTestOfTheSummary) {
-  const std::vector<RegistrationRow> rows = {row("field", 0, 1, 0.2),
-                                             row("raycast", 0, 1, 0.1),
-                                             row("field", 1, 2, 0.4),
-                                             row("raycast", 1, 2, 0.3),
-                                             row("field", 2, 9, 0.3),
-                                             row("raycast", 2, 9, 5.0)};
+  std::vector<RegistrationRow> rows;
+  for (const auto& [field_mm, raycast_mm] :
+       std::vector<std::pair<double, double>>{{0.2, 0.1}, {0.4, 0.3}, {0.3, 5.0}}) {
+    const auto start = static_cast<std::int64_t>(rows.size() / 2);
+    rows.push_back(row("field", start, 1, field_mm));
+    rows.push_back(row("raycast", start, 1, raycast_mm));
+  }
   EvaluationRun run{"runs/skull-fast", "registration", {}};
   run.summary["field_against_raycast"] = paired_statistics(rows, 0.5);
   // Equal differences of 0.1 mm have no spread; one success of three differs.

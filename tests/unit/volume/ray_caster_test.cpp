@@ -9,18 +9,13 @@
 #include "base/error.h"
 #include "base/hash_random.h"
 #include "base/vector_width.h"
+#include "support/cube_grid.h"
 #include "volume/phantoms.h"
 
 namespace af {
 namespace {
 
-CtGrid cube_grid(int size, double spacing_mm) {
-  CtGrid grid;
-  grid.size = {size, size, size};
-  grid.spacing_mm = Eigen::Vector3d::Constant(spacing_mm);
-  grid.origin_mm = Eigen::Vector3d::Constant(-0.5 * (size - 1) * spacing_mm);
-  return grid;
-}
+using test::cube_grid;
 
 /// Double-precision trilinear interpolation, zero outside, straight from the definition.
 double brute_force_mu(const CtVolume& ct,
