@@ -7,13 +7,14 @@ source "$(dirname "${BASH_SOURCE[0]}")/../jobs/lib.sh"
 
 usage() {
   cat <<'TEXT'
-Usage: tests/run.sh [--fast] [--sanitize] [--skip-packages] [--help] [-- CTEST-OPTIONS...]
+Usage: tests/run.sh [--fast] [--sanitize] [--sanitize-threads] [--skip-packages] [--help] [-- CTEST-OPTIONS...]
 
 Installs missing packages, builds everything in build/release and runs all tests with CTest, MPI tests on 1, 2, 3 and 4
 ranks. The last lines are CTest's summary; the exit code is 0 only when every test passed.
 
   --fast            without the tests labelled physics or regression (minutes)
   --sanitize        serial tests in build/sanitize, with the address and undefined-behaviour sanitizers
+  --sanitize-threads  tests of threads in build/sanitize-threads, with the thread sanitizer
   --skip-packages   do not look for missing packages
   -- ...            passed on to ctest, for example: -- -R RayCaster
 TEXT
@@ -25,6 +26,7 @@ while (($# > 0)); do
   case "$1" in
     --fast) ctest_options+=(--label-exclude 'physics|regression') ;;
     --sanitize) preset=sanitize ;;
+    --sanitize-threads) preset=sanitize-threads ;;
     --skip-packages) skip_packages=yes ;;
     --help | -h) usage; exit 0 ;;
     --)
@@ -52,6 +54,10 @@ if [[ "$preset" == sanitize ]]; then
   export LSAN_OPTIONS="suppressions=$af_root/tests/support/lsan.supp:print_suppressions=0"
   export ASAN_OPTIONS="fast_unwind_on_malloc=0" UBSAN_OPTIONS="print_stacktrace=1:halt_on_error=1"
   ctest_options+=(--label-exclude 'mpi|physics|regression|programs|checks')
+fi
+if [[ "$preset" == sanitize-threads ]]; then
+  export TSAN_OPTIONS="halt_on_error=1"
+  ctest_options+=(--tests-regex 'Thread|MultiViewObjective|FieldLevel' --label-exclude 'mpi|programs|checks')
 fi
 cd "$af_root/build/$preset"
 exec ctest --output-on-failure --no-tests=error --parallel "$(core_count)" "${ctest_options[@]}"

@@ -103,6 +103,15 @@ View middle_of(const View& whole) {
   return {whole.camera, {roi.width / 8, roi.height / 8, roi.width * 3 / 4, roi.height * 3 / 4}};
 }
 
+/// The whole detector seen by four times as many pixels along each axis.
+View finer(const View& whole) {
+  CameraGeometry camera = whole.camera;
+  camera.detector_origin_point = camera.detector_point(-0.375, -0.375);
+  camera.pixel_spacing_mm /= 4.0;
+  camera.size_px *= 4;
+  return View::whole_detector(camera);
+}
+
 void run(const CaseOptions& options,
          const std::string& field_path,
          const std::string& work,
@@ -120,6 +129,8 @@ void run(const CaseOptions& options,
   const TwoPassAfDrr half(pyramid[0]);
   const TwoPassAfDrr quarter(pyramid[1]);
   const View region = middle_of(view);
+  const View fine = finer(view);
+  const TwoPassAfDrr on_two_threads(field, {}, std::make_shared<ThreadPool>(2));
   const AfDrr quadrilinear(field);
   const RayCastDrr ray_cast(benchmark_case.volume());
   const Series series{poses, options.is_quick ? 1 : 20};
@@ -136,6 +147,9 @@ void run(const CaseOptions& options,
       renderer_contender(region_name, two_pass, series, region),
       renderer_contender(region_name + ", level 1", half, series, region.coarser(2)),
       renderer_contender(region_name + ", level 2", quarter, series, region.coarser(4)),
+      renderer_contender("TwoPassAfDrr, 16 times the pixels", two_pass, {poses, 2}, fine),
+      renderer_contender(
+          "TwoPassAfDrr, 16 times the pixels, two threads", on_two_threads, {poses, 2}, fine),
       renderer_contender("AfDrr, 16 taps", quadrilinear, {poses, 1}, view),
       renderer_contender("RayCastDrr", ray_cast, {few_poses, 1}, view)};
   const auto plastimatch = PlastimatchDrr::prepare(benchmark_case, work, options.is_quick ? 1 : 3);
