@@ -266,10 +266,10 @@ for camera in A B; do
     -o "$output/image-quality-$camera"
 done
 run_stage "$output/registration/summary.json" run_ranks "$ranks" "$bin/af-evaluate" registration --study "$study" \
-  "${series_option[@]}" "${fields[@]}" --renderer both --starts-per-interval "$starts_per_interval" \
+  "${series_option[@]}" "${fields[@]}" --preset paper --renderer both --starts-per-interval "$starts_per_interval" \
   --raycast-starts-per-interval "$raycast_starts" --raycast-intervals 2 --seed "$seed" -o "$output/registration"
 run_stage "$output/overlay/result.json" "$bin/af-register" --study "$study" --case "$case_name" "${series_option[@]}" \
-  "${fields[@]}" \
+  "${fields[@]}" --preset paper \
   --start-rotation-deg 2,-2,2 --start-translation-mm 3,3,-3 -o "$output/overlay"
 run_stage "$output/report.html" "$bin/af-evaluate" report -o "$output/report.html" "$output"
 current_stage=""
