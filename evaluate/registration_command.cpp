@@ -68,9 +68,10 @@ json summary_json(const RegistrationStudyOptions& options,
                   {"study", study.path.string()},
                   {"success_tre_mm", kSuccessTreMm}};
   const registration::RegistrationOptions method = registration::resolve(options.method);
-  summary["method"] = {{"preset", options.method.chains.empty() ? options.method.preset : "chain"},
-                       {"similarity", method.similarity_list()},
-                       {"optimizer", method.optimizer_list()}};
+  summary["method"] = {
+      {"preset", options.method.chains.empty() ? options.method.preset_name() : "chain"},
+      {"similarity", method.similarity_list()},
+      {"optimizer", method.optimizer_list()}};
   summary["simulation"] = simulation_of(study);
   summary["cases"] = json::array();
   summary["pictures"] = json::array();

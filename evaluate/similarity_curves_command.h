@@ -12,7 +12,10 @@ namespace af::evaluation {
 
 /// `af-evaluate similarity-curves` as typed.
 struct SimilarityCurvesOptions : MethodOptions {
-  SimilarityCurvesOptions() { renderer = "both"; }
+  SimilarityCurvesOptions() {
+    renderer = "both";
+    method.preset = "paper";  // a curve is of one measure
+  }
 
   std::string case_name;  ///< empty: the study's only one
   double half_width_mm = 5.0;

@@ -9,9 +9,9 @@ void bind_method(CLI::App& app, MethodOptions& options) {
   const char* const group = "Method";
   app.add_option("--preset",
                  options.preset,
-                 "Method as a whole; the options below replace parts of it. " + preset_help())
+                 "Method as a whole; the options below replace parts of it. " + preset_help() +
+                     ". Default: robust; paper with --similarity or --optimizer")
       ->check(CLI::IsMember(preset_names()))
-      ->capture_default_str()
       ->group(group);
   app.add_option("--similarity", options.similarity, "Similarity measure of every stage")
       ->check(CLI::IsMember(similarity_names()))
@@ -23,8 +23,19 @@ void bind_method(CLI::App& app, MethodOptions& options) {
                  options.chains,
                  "Stages in place of the preset's, separated by ';': measure, optimiser, then any "
                  "of level=, pixels=, roi=, sigma=, step=, final=, bins=, scale=, tiles=, "
-                 "population=. Given several times, the chains are a portfolio")
+                 "population=. Given several times, the chains are a portfolio: a judge chooses "
+                 "among their ends")
       ->take_all()
+      ->group(group);
+  app.add_option("--finish",
+                 options.finish,
+                 "Stages, written as for --chain, that follow the chain, or a portfolio's best one "
+                 "(default: the preset's; none with --chain)")
+      ->group(group);
+  app.add_option("--judge",
+                 options.judge,
+                 "Of a portfolio: what ends are compared by, one stage written as for --chain; its "
+                 "measure is rg, its optimiser does not count (default: the preset's)")
       ->group(group);
   app.add_option("--bins", options.bins, "Histogram bins per axis, 2 to 256 (default: 64)")
       ->group(group);
@@ -34,8 +45,9 @@ void bind_method(CLI::App& app, MethodOptions& options) {
       ->group(group);
   app.add_option("--coarse-roi-scale",
                  options.coarse_roi_scale,
-                 "Coarse stages look at this many times the region's sides (fast, robust: 2); "
-                 "never beyond the detector")
+                 "Coarse stages look at this many times the region's sides (fast, robust: 2), "
+                 "cut at the detector's edges. A field holds every ray of its camera's whole "
+                 "detector, so none is made for it")
       ->group(group);
   app.add_option("--max-evaluations",
                  options.max_evaluations,

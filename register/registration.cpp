@@ -155,7 +155,7 @@ struct RegistrationRunner::Impl {
   std::shared_ptr<ThreadPool> pool;
   std::vector<View> views;
   std::vector<Eigen::Vector3d> some_points_ct;
-  std::vector<PreparedStage> stages;         ///< of all chains, one after the other
+  std::vector<PreparedStage> stages;         ///< of all chains and the finish, in this order
   std::optional<PreparedStage> judge;        ///< of a portfolio
   OptimizerResult search;                    ///< reused
   std::optional<ParameterScaling> at_start;  ///< by some_points_ct, at the run's start
@@ -165,8 +165,9 @@ struct RegistrationRunner::Impl {
                                       const std::vector<ValueRange>& drr_ranges) const;
   [[nodiscard]] std::optional<ParameterScaling> scaling_at(
       const RigidTransform& room_from_ct, std::span<const Eigen::Vector3d> points_ct) const;
-  /// Runs the stages of a chain, the first of which is `first`, from `end`.
-  void run_chain(const ChainOptions& chain,
+  /// Runs the stages of a chain, the first of which is `first`, from `end`; false when one of them
+  /// was the last that makes sense.
+  bool run_chain(const ChainOptions& chain,
                  std::size_t first,
                  std::int64_t start_index,
                  ChainEnd& end,
@@ -177,7 +178,14 @@ struct RegistrationRunner::Impl {
                  ChainEnd& end,
                  RegistrationResult& result);
   void run_portfolio(std::int64_t start_index, RegistrationResult& result);
+  /// The finish, from `end`.
+  void run_finish(std::int64_t start_index, ChainEnd& end, RegistrationResult& result) {
+    run_chain(
+        options.finish, stages.size() - options.finish.stages.size(), start_index, end, result);
+  }
   ObjectiveValue judged(const RigidTransform& room_from_ct);
+  /// NaN when inadmissible; counted in `result`.
+  double judged(const RigidTransform& room_from_ct, RegistrationResult& result);
   void append_trace(std::size_t index, const PoseTarget& target, RegistrationResult& result) const;
 };
 
@@ -203,6 +211,8 @@ void RegistrationRunner::Impl::prepare() {
   some_points_ct = some_points(problem->scaling_points_ct);
   for (const ChainOptions& chain : options.chains)
     for (const StageOptions& stage : chain.stages) stages.push_back(prepare(stage, drr_ranges));
+  for (const StageOptions& stage : options.finish.stages)
+    stages.push_back(prepare(stage, drr_ranges));
   if (options.chains.size() > 1) judge = prepare(options.judge.stage, drr_ranges);
 }
 
@@ -260,7 +270,7 @@ bool RegistrationRunner::Impl::run_stage(std::size_t index,
          search.stop_reason == StopReason::PinnedAtLimit;
 }
 
-void RegistrationRunner::Impl::run_chain(const ChainOptions& chain,
+bool RegistrationRunner::Impl::run_chain(const ChainOptions& chain,
                                          std::size_t first,
                                          std::int64_t start_index,
                                          ChainEnd& end,
@@ -270,8 +280,9 @@ void RegistrationRunner::Impl::run_chain(const ChainOptions& chain,
     // The stage before ended on the very limit, and rounding put its end beyond.
     if (i > 0 && end.stop_reason == StopReason::StartInadmissible)
       end.stop_reason = StopReason::PinnedAtLimit;
-    return;
+    return false;
   }
+  return true;
 }
 
 ObjectiveValue RegistrationRunner::Impl::judged(const RigidTransform& room_from_ct) {
@@ -280,30 +291,40 @@ ObjectiveValue RegistrationRunner::Impl::judged(const RigidTransform& room_from_
   return value;
 }
 
+double RegistrationRunner::Impl::judged(const RigidTransform& room_from_ct,
+                                        RegistrationResult& result) {
+  const ObjectiveValue value = judged(room_from_ct);
+  result.drr_count += value.drr_count;
+  return value.similarity;
+}
+
 void RegistrationRunner::Impl::run_portfolio(std::int64_t start_index, RegistrationResult& result) {
   std::size_t first = 0;
-  bool has_end = false;
+  std::optional<ChainEnd> best;
   for (const ChainOptions& chain : options.chains) {
     ChainEnd end{result.start_room_from_ct};
     run_chain(chain, first, start_index, end, result);
     first += chain.stages.size();
-    ObjectiveValue value = judged(end.room_from_ct);
-    result.drr_count += value.drr_count;
-    if (!value.is_admissible || !std::isfinite(value.similarity)) {
-      if (!has_end) result.stop_reason = end.stop_reason;
+    end.similarity = judged(end.room_from_ct, result);
+    if (!std::isfinite(end.similarity)) {
+      if (!best.has_value()) result.stop_reason = end.stop_reason;
       continue;
     }
-    if (!has_end || value.similarity > result.similarity) {
-      result.similarity = value.similarity;
-      result.room_from_ct = end.room_from_ct;
-      result.stop_reason = end.stop_reason;
+    if (!best.has_value() || end.similarity > best->similarity) {
+      best = end;
       result.chain = chain.name;
     }
-    has_end = true;
-    if (result.similarity >= options.judge.enough_value) break;
+    if (best->similarity >= options.judge.enough_value) break;
   }
-  if (has_end && result.similarity <= options.judge.least_value)
-    result.stop_reason = StopReason::NoBetterThanNoDrr;
+  if (!best.has_value()) return;
+  if (!options.finish.stages.empty()) {
+    run_finish(start_index, *best, result);
+    best->similarity = judged(best->room_from_ct, result);
+  }
+  result.similarity = best->similarity;
+  result.room_from_ct = best->room_from_ct;
+  result.stop_reason = best->similarity <= options.judge.least_value ? StopReason::NoBetterThanNoDrr
+                                                                     : best->stop_reason;
 }
 
 RegistrationRunner::RegistrationRunner(std::shared_ptr<const RegistrationProblem> problem,
@@ -349,7 +370,8 @@ RegistrationResult RegistrationRunner::run(const RigidTransform& start_room_from
   } else {
     const ChainOptions& chain = impl.options.chains.front();
     ChainEnd end{start_room_from_ct};
-    impl.run_chain(chain, 0, start_index, end, result);
+    if (impl.run_chain(chain, 0, start_index, end, result))
+      impl.run_finish(start_index, end, result);
     result.room_from_ct = end.room_from_ct;
     result.similarity = end.similarity;
     result.stop_reason = end.stop_reason;

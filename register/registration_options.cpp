@@ -41,6 +41,12 @@ void append_optimizer_problems(const StageOptions& stage, std::vector<std::strin
                   "' needs derivatives, which these have: " + list_of(fitting));
 }
 
+void append_chain_problems(const ChainOptions& chain, std::vector<std::string>& found) {
+  for (std::size_t i = 0; i < chain.stages.size(); ++i)
+    for (const std::string& text : problems(chain.stages[i]))
+      found.push_back("chain '" + chain.name + "', stage " + std::to_string(i + 1) + ": " + text);
+}
+
 bool is_non_negative(double value) {
   return value >= 0.0 && std::isfinite(value);
 }
@@ -66,44 +72,54 @@ std::vector<std::string> problems(const StageOptions& stage) {
 
 RegistrationOptions::RegistrationOptions() : chains{paper_chain()} {
   judge.stage.similarity.name = "rg";
-  judge.stage.level = 1;
-  judge.stage.pixel_step = 2;
+  judge.stage.level = 2;
+  judge.stage.pixel_step = 4;
   judge.stage.roi_scale = 2.0;
 }
 
-void RegistrationOptions::use_similarity(const std::string& name) {
+std::vector<StageOptions*> RegistrationOptions::stages() {
+  std::vector<StageOptions*> all;
   for (ChainOptions& chain : chains)
-    for (StageOptions& stage : chain.stages) stage.similarity.name = name;
+    for (StageOptions& stage : chain.stages) all.push_back(&stage);
+  for (StageOptions& stage : finish.stages) all.push_back(&stage);
+  return all;
+}
+
+std::vector<const StageOptions*> RegistrationOptions::stages() const {
+  std::vector<const StageOptions*> all;
+  for (const ChainOptions& chain : chains)
+    for (const StageOptions& stage : chain.stages) all.push_back(&stage);
+  for (const StageOptions& stage : finish.stages) all.push_back(&stage);
+  return all;
+}
+
+void RegistrationOptions::use_similarity(const std::string& name) {
+  for (StageOptions* const stage : stages()) stage->similarity.name = name;
 }
 
 void RegistrationOptions::use_optimizer(const std::string& name) {
-  for (ChainOptions& chain : chains)
-    for (StageOptions& stage : chain.stages) stage.optimizer = name;
+  for (StageOptions* const stage : stages()) stage->optimizer = name;
 }
 
 std::string RegistrationOptions::similarity_list() const {
   std::vector<std::string> names;
-  for (const ChainOptions& chain : chains)
-    for (const StageOptions& stage : chain.stages) add_once(stage.similarity.name, names);
+  for (const StageOptions* const stage : stages()) add_once(stage->similarity.name, names);
   return list_of(names);
 }
 
 std::string RegistrationOptions::optimizer_list() const {
   std::vector<std::string> names;
-  for (const ChainOptions& chain : chains)
-    for (const StageOptions& stage : chain.stages) add_once(stage.optimizer, names);
+  for (const StageOptions* const stage : stages()) add_once(stage->optimizer, names);
   return list_of(names);
 }
 
 std::string RegistrationOptions::final_similarity() const {
-  return chains.size() > 1 ? judge.stage.similarity.name
-                           : chains.front().stages.back().similarity.name;
+  return chains.size() > 1 ? judge.stage.similarity.name : stages().back()->similarity.name;
 }
 
 int RegistrationOptions::coarsest_level() const {
   int coarsest = chains.size() > 1 ? judge.stage.level : 0;
-  for (const ChainOptions& chain : chains)
-    for (const StageOptions& stage : chain.stages) coarsest = std::max(coarsest, stage.level);
+  for (const StageOptions* const stage : stages()) coarsest = std::max(coarsest, stage->level);
   return coarsest;
 }
 
@@ -113,10 +129,9 @@ std::vector<std::string> problems(const RegistrationOptions& options) {
   for (const ChainOptions& chain : options.chains) {
     if (chain.stages.empty())
       found.push_back("chain '" + chain.name + "': stages = none: there must be at least one");
-    for (std::size_t i = 0; i < chain.stages.size(); ++i)
-      for (const std::string& text : problems(chain.stages[i]))
-        found.push_back("chain '" + chain.name + "', stage " + std::to_string(i + 1) + ": " + text);
+    append_chain_problems(chain, found);
   }
+  append_chain_problems(options.finish, found);
   if (options.chains.size() > 1) {
     for (const std::string& text : problems(options.judge.stage)) found.push_back("judge: " + text);
     if (options.judge.stage.similarity.name != "rg")

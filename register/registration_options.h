@@ -45,6 +45,8 @@ struct JudgeOptions {
 /// How to register: one chain, or a portfolio of several from the same start.
 struct RegistrationOptions {
   std::vector<ChainOptions> chains;
+  /// Stages that follow the chain, of a portfolio from its best end only; may have none.
+  ChainOptions finish;
   JudgeOptions judge;          ///< of a portfolio; not used with one chain
   int max_evaluations = 5000;  ///< pose evaluations per registration, all chains together
   std::uint64_t seed = 1;      ///< of optimisers that draw random numbers
@@ -62,6 +64,11 @@ struct RegistrationOptions {
   [[nodiscard]] std::string final_similarity() const;
   /// Highest level of any stage.
   [[nodiscard]] int coarsest_level() const;
+
+ private:
+  /// Of all chains and of the finish, in this order.
+  [[nodiscard]] std::vector<const StageOptions*> stages() const;
+  [[nodiscard]] std::vector<StageOptions*> stages();
 };
 
 std::vector<std::string> problems(const RegistrationOptions& options);

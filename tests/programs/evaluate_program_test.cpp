@@ -283,7 +283,7 @@ TEST_F(EvaluateProgram, BuildsTheFieldsOfASweepOnceAndReusesThem) {
 
 TEST_F(EvaluateProgram, ComparesRunsInOneTable) {
   const std::string study = "registration --study " + path("study.toml") + fields() +
-                            "--intervals 2 --starts-per-interval 2 -o ";
+                            "--preset paper --intervals 2 --starts-per-interval 2 -o ";
   ASSERT_EQ(evaluate(study + path("methods/mi")).exit_code, 0);
   ASSERT_EQ(evaluate(study + path("methods/ncc") + " --similarity ncc").exit_code, 0);
   const test::ProgramRun run =

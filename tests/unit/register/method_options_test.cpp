@@ -30,6 +30,39 @@ TEST(MethodOptions, ReplaceWhatThePresetSays) {
   EXPECT_THROW(resolve(options), InputError);
 }
 
+TEST(MethodOptions, TakeTheRobustPresetUnlessAMeasureOrAnOptimizerIsChosen) {
+  MethodOptions options;
+  EXPECT_EQ(options.preset_name(), "robust");
+  EXPECT_EQ(resolve(options).chains.size(), preset_options("robust").chains.size());
+  options.similarity = "mi";
+  EXPECT_EQ(options.preset_name(), "paper");
+  options.similarity.reset();
+  options.optimizer = "bobyqa";
+  EXPECT_EQ(options.preset_name(), "paper");
+  options.preset = "fast";
+  EXPECT_EQ(options.preset_name(), "fast");
+}
+
+TEST(MethodOptions, ChainsLeaveThePresetsFinishBehindUnlessOneIsTyped) {
+  MethodOptions options;
+  options.preset = "robust";
+  options.judge = "rg gauss-newton level=1 pixels=3";
+  EXPECT_FALSE(resolve(options).finish.stages.empty());
+  options.chains = {"ncc gauss-newton", "gc gauss-newton"};
+  EXPECT_TRUE(resolve(options).finish.stages.empty());
+  options.finish = "ssd gauss-newton; rg gauss-newton";
+  const RegistrationOptions method = resolve(options);
+  ASSERT_EQ(method.finish.stages.size(), 2U);
+  EXPECT_EQ(method.similarity_list(), "ncc, gc, ssd, rg");
+  EXPECT_EQ(method.judge.stage.pixel_step, 3);
+  const std::string text = to_toml(options, method);
+  EXPECT_NE(text.find("finish = \"" + *options.finish + "\""), std::string::npos) << text;
+  options.judge = "mi best-neighbor";
+  EXPECT_THROW(resolve(options), InputError);
+  options.judge = "rg gauss-newton; rg gauss-newton";
+  EXPECT_THROW(resolve(options), InputError);
+}
+
 TEST(MethodOptions, RefuseAnUnknownPreset) {
   MethodOptions options;
   options.preset = "unheard-of";

@@ -363,6 +363,31 @@ TEST(Registration, ThreadsAgreeWhereTheMotionRangeEnds) {
   expect_same(runner.run(start_near(small)), alone);
 }
 
+TEST(Registration, TheFinishFollowsTheBestEndOnly) {
+  const test::SmallCase small = test::small_case();
+  RegistrationOptions options = two_stages("ncc", "gauss-newton");
+  ChainOptions rough{"rough", {options.chains[0].stages[0]}};
+  rough.stages[0].search.final_step_mm = 1.0;
+  const ChainOptions finish{"finish", {options.chains[0].stages[1]}};
+  options.chains = {rough};
+  const int alone = RegistrationRunner(small.problem, options).run(start_near(small)).evaluations;
+  options.finish = finish;
+  const RegistrationResult chain =
+      RegistrationRunner(small.problem, options).run(start_near(small));
+  EXPECT_GT(chain.evaluations, alone);
+  EXPECT_LT(mean_distance_mm(chain.room_from_ct, small.gold_room_from_ct), kFinalStepErrorMm);
+  // A portfolio of the same chain twice pays for it twice, and once for the finish.
+  options.chains = {rough, rough};
+  options.judge.stage = StageOptions();
+  options.judge.stage.similarity.name = "rg";
+  options.judge.enough_value = 2.0;  // never
+  RegistrationRunner runner(small.problem, options);
+  const RegistrationResult portfolio = runner.run(start_near(small));
+  EXPECT_EQ(portfolio.evaluations, chain.evaluations + alone);
+  EXPECT_EQ(portfolio.room_from_ct.matrix(), chain.room_from_ct.matrix());
+  EXPECT_EQ(portfolio.similarity, runner.similarity_at(portfolio.room_from_ct).similarity);
+}
+
 TEST(Registration, AStageOfAMissingLevelIsRefused) {
   const test::SmallCase small = test::small_case();
   EXPECT_THROW(RegistrationRunner(small.problem, preset_options("fast")), InputError);
