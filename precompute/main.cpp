@@ -75,10 +75,11 @@ void bind_field(CLI::App& app, PrecomputeOptions& options) {
 void bind_codebook(CLI::App& app, PrecomputeOptions& options) {
   app.add_option("--codewords", options.codewords, "Size of the codebook, 2 to 65536")
       ->capture_default_str();
-  app.add_option("--training-fraction",
-                 options.training_fraction,
-                 "Share of the tiles that are not empty on which the codebook is trained; the "
-                 "paper's was 0.1 [64 tiles per codeword, at most 8 of 9 tiles]");
+  app.add_option(
+      "--training-fraction",
+      options.training_fraction,
+      "Share of the tiles that are not empty on which the codebook is trained; the "
+      "paper's was 0.1 [64 tiles per codeword, at most a million, at most 8 of 9 tiles]");
   app.add_option("--max-training-tiles",
                  options.max_training_tiles,
                  "Most training tiles, whatever the share")

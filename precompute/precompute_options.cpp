@@ -89,7 +89,9 @@ std::vector<std::string> problems(const PrecomputeOptions& options) {
 TrainingSelection PrecomputeOptions::training_selection() const {
   if (training_fraction) return {*training_fraction, max_training_tiles, seed};
   const auto per_codeword = kTrainingTilesPerCodeword * static_cast<std::uint64_t>(codewords);
-  return {kLargestTrainingFraction, std::min(max_training_tiles, per_codeword), seed};
+  return {kLargestTrainingFraction,
+          std::min({max_training_tiles, per_codeword, kTrainingTilesUnlessStated}),
+          seed};
 }
 
 NamedValues casting_options(const PrecomputeOptions& options) {

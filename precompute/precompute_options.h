@@ -74,6 +74,8 @@ struct PrecomputeOptions {
 /// Training tiles where no share is stated: enough that unseen tiles come out nearly as training
 /// tiles do (precompute/README.md has what more and fewer give).
 inline constexpr std::uint64_t kTrainingTilesPerCodeword = 64;
+/// Whatever the codebook: so that 65536 codewords do not take more than twice the time of 16384.
+inline constexpr std::uint64_t kTrainingTilesUnlessStated = std::uint64_t{1} << 20u;
 
 /// Every broken constraint of the values themselves (not of files).
 std::vector<std::string> problems(const PrecomputeOptions& options);

@@ -19,7 +19,7 @@ TEST(PrecomputeOptions, TrainsOn64TilesPerCodewordUnlessAShareIsStated) {
 TEST(PrecomputeOptions, TrainOnNoMoreTilesThanTheCap) {
   PrecomputeOptions options;
   options.codewords = 65536;
-  EXPECT_EQ(options.training_selection().max_training_tiles, 2000000u);
+  EXPECT_EQ(options.training_selection().max_training_tiles, kTrainingTilesUnlessStated);
   options.max_training_tiles = 5;
   EXPECT_EQ(options.training_selection().max_training_tiles, 5u);
 }
