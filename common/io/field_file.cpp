@@ -114,31 +114,6 @@ void check_blocks(const std::vector<IndexBlock>& blocks, const std::vector<Datas
   }
 }
 
-/// The indices of several blocks of one slab in the order of a selection that is the union of the
-/// blocks: ascending tile numbers. Frees the blocks' own.
-std::vector<std::uint16_t> merged(std::span<IndexBlock*> blocks, const DatasetRule& rule) {
-  struct Run {
-    std::uint64_t first_tile;
-    std::span<const std::uint16_t> indices;
-  };
-  std::vector<Run> runs;
-  std::size_t count = 0;
-  for (const IndexBlock* block : blocks) {
-    count += block->indices.size();
-    for_each_run(*block, rule, [&](std::uint64_t first, std::span<const std::uint16_t> indices) {
-      runs.push_back({first, indices});
-    });
-  }
-  std::sort(runs.begin(), runs.end(), [](const Run& a, const Run& b) {
-    return a.first_tile < b.first_tile;
-  });
-  std::vector<std::uint16_t> indices;
-  indices.reserve(count);
-  for (const Run& run : runs) indices.insert(indices.end(), run.indices.begin(), run.indices.end());
-  for (IndexBlock* block : blocks) block->indices = {};
-  return indices;
-}
-
 /// One chunk holds the (s,t) plane of one (u,v) tile, or a part of it: a unit of precompute writes
 /// whole chunks, and a look-up of one viewpoint reads few.
 Handle index_creation(const DatasetRule& rule) {
@@ -148,6 +123,10 @@ Handle index_creation(const DatasetRule& rule) {
   checked(H5Pset_chunk(creation, 4, chunk.data()), "H5Pset_chunk");
   checked(H5Pset_shuffle(creation), "H5Pset_shuffle");
   checked(H5Pset_deflate(creation, kDeflateLevel), "H5Pset_deflate");
+  // Storage exists before the ranks open the dataset. Otherwise opening it allocates storage
+  // collectively, on the ranks that find none yet: HDF5 1.10 then hangs now and then, one rank
+  // still allocating while another, which found some, is writing.
+  checked(H5Pset_alloc_time(creation, H5D_ALLOC_TIME_EARLY), "H5Pset_alloc_time");
   return creation;
 }
 
@@ -182,35 +161,33 @@ void create_file_without_indices(const CompressedAttenuationField& field,
   file.close("H5Fclose");
 }
 
-/// The union of the blocks in the file.
-void select_blocks(hid_t in_file, std::span<IndexBlock*> blocks) {
-  checked(H5Sselect_none(in_file), "H5Sselect_none");
-  for (const IndexBlock* block : blocks) {
-    std::array<hsize_t, 4> start{};
-    std::array<hsize_t, 4> count{};
-    for (std::size_t axis = 0; axis < 4; ++axis) {
-      start[axis] = static_cast<hsize_t>(block->first_tile[axis]);
-      count[axis] = static_cast<hsize_t>(block->tile_count[axis]);
-    }
-    checked(
-        H5Sselect_hyperslab(in_file, H5S_SELECT_OR, start.data(), nullptr, count.data(), nullptr),
-        "H5Sselect_hyperslab");
-  }
-}
-
-/// Collective. One write of all blocks of one slab; there may be none on some ranks.
-void write_slab(hid_t dataset, const DatasetRule& rule, std::span<IndexBlock*> blocks) {
+/// Collective. Writes one block, or none where `block` is null. One plain hyperslab with a memory
+/// space of the same shape: collective filtered writes of unions of hyperslabs from a 1-D memory
+/// space crash or hang in HDF5 1.10.8 now and then.
+void write_block(hid_t dataset, IndexBlock* block) {
   const Handle in_file(H5Dget_space(dataset), H5Sclose, "H5Dget_space");
   const Handle transfer(H5Pcreate(H5P_DATASET_XFER), H5Pclose, "H5Pcreate");
   checked(H5Pset_dxpl_mpio(transfer, H5FD_MPIO_COLLECTIVE), "H5Pset_dxpl_mpio");
-  select_blocks(in_file, blocks);
-  std::vector<std::uint16_t> indices = merged(blocks, rule);
-  const hsize_t count = std::max<hsize_t>(1, indices.size());
-  const Handle in_memory(H5Screate_simple(1, &count, nullptr), H5Sclose, "H5Screate_simple");
-  if (indices.empty()) checked(H5Sselect_none(in_memory), "H5Sselect_none");
-  indices.resize(count);
-  checked(H5Dwrite(dataset, H5T_NATIVE_UINT16, in_memory, in_file, transfer, indices.data()),
-          "H5Dwrite");
+  std::array<hsize_t, 4> start{};
+  std::array<hsize_t, 4> count = {1, 1, 1, 1};
+  for (std::size_t axis = 0; block != nullptr && axis < 4; ++axis) {
+    start[axis] = static_cast<hsize_t>(block->first_tile[axis]);
+    count[axis] = static_cast<hsize_t>(block->tile_count[axis]);
+  }
+  const Handle in_memory(H5Screate_simple(4, count.data(), nullptr), H5Sclose, "H5Screate_simple");
+  const std::uint16_t nothing = 0;
+  const std::uint16_t* indices = &nothing;
+  if (block != nullptr) {
+    indices = block->indices.data();
+    checked(
+        H5Sselect_hyperslab(in_file, H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr),
+        "H5Sselect_hyperslab");
+  } else {
+    checked(H5Sselect_none(in_file), "H5Sselect_none");
+    checked(H5Sselect_none(in_memory), "H5Sselect_none");
+  }
+  checked(H5Dwrite(dataset, H5T_NATIVE_UINT16, in_memory, in_file, transfer, indices), "H5Dwrite");
+  if (block != nullptr) block->indices = {};
 }
 
 /// The open file of all ranks. Closing it is collective, so it is done by close() and never while
@@ -232,20 +209,21 @@ class SharedFile {
     });
   }
 
-  /// Collective. Writes the blocks of all ranks, slab by slab.
+  /// Collective. Writes the blocks of all ranks, slab by slab, one block of every rank at a time.
   void write(std::vector<IndexBlock>& blocks) {
-    std::vector<std::uint64_t> holders(rules_.size(), 0);
-    for (const IndexBlock& block : blocks) holders[block.slab] = 1;
-    communicator_.maximum(holders);
+    std::vector<std::uint64_t> most_blocks(rules_.size(), 0);
+    for (const IndexBlock& block : blocks) ++most_blocks[block.slab];
+    communicator_.maximum(most_blocks);
     for (std::size_t k = 0; k < rules_.size(); ++k) {
-      if (holders[k] == 0) continue;
+      if (most_blocks[k] == 0) continue;
       std::vector<IndexBlock*> of_slab;
       for (IndexBlock& block : blocks)
         if (block.slab == k) of_slab.push_back(&block);
       remember([&] {
         const Handle dataset(
             H5Dopen2(file_, rules_[k].name.c_str(), H5P_DEFAULT), H5Dclose, "H5Dopen2");
-        write_slab(dataset, rules_[k], of_slab);
+        for (std::size_t i = 0; i < most_blocks[k]; ++i)
+          write_block(dataset, i < of_slab.size() ? of_slab[i] : nullptr);
       });
     }
     throw_first();
