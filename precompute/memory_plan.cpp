@@ -11,7 +11,7 @@ namespace af {
 
 namespace {
 
-/// Indices of one round: the blocks, their merged copy, HDF5's chunks and what they compress to.
+/// Indices of one round: the blocks, HDF5's chunks and what they compress to.
 constexpr std::uint64_t kRoundBytes = std::uint64_t{32} << 20;
 /// A rank's part of all tiles may exceed the mean by this.
 constexpr double kLargestShare = 1.3;

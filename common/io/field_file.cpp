@@ -123,10 +123,6 @@ Handle index_creation(const DatasetRule& rule) {
   checked(H5Pset_chunk(creation, 4, chunk.data()), "H5Pset_chunk");
   checked(H5Pset_shuffle(creation), "H5Pset_shuffle");
   checked(H5Pset_deflate(creation, kDeflateLevel), "H5Pset_deflate");
-  // Storage exists before the ranks open the dataset. Otherwise opening it allocates storage
-  // collectively, on the ranks that find none yet: HDF5 1.10 then hangs now and then, one rank
-  // still allocating while another, which found some, is writing.
-  checked(H5Pset_alloc_time(creation, H5D_ALLOC_TIME_EARLY), "H5Pset_alloc_time");
   return creation;
 }
 
@@ -222,8 +218,9 @@ class SharedFile {
       remember([&] {
         const Handle dataset(
             H5Dopen2(file_, rules_[k].name.c_str(), H5P_DEFAULT), H5Dclose, "H5Dopen2");
+        // A rank whose write fails takes part in the others', so that nobody waits for it.
         for (std::size_t i = 0; i < most_blocks[k]; ++i)
-          write_block(dataset, i < of_slab.size() ? of_slab[i] : nullptr);
+          remember([&] { write_block(dataset, i < of_slab.size() ? of_slab[i] : nullptr); });
       });
     }
     throw_first();
