@@ -34,18 +34,21 @@ Vector3d mean(std::span<const Vector3d> points) {
   return sum / static_cast<double>(points.size());
 }
 
-void refuse_unusable(std::span<const Vector3d> points, const char* which) {
+bool are_collinear(std::span<const Vector3d> points) {
   Matrix3d scatter = Matrix3d::Zero();
   const Vector3d center = mean(points);
-  for (const Vector3d& point : points) {
-    if (!point.allFinite())
-      throw InputError(std::string("fiducials: ") + which + " points must be finite");
-    scatter += (point - center) * (point - center).transpose();
-  }
+  for (const Vector3d& point : points) scatter += (point - center) * (point - center).transpose();
   // Ascending: the middle eigenvalue is the second largest squared spread.
   const Vector3d spread =
       Eigen::SelfAdjointEigenSolver<Matrix3d>(scatter, Eigen::EigenvaluesOnly).eigenvalues();
-  if (!(std::sqrt(std::max(0.0, spread[1])) > kCollinearRatio * std::sqrt(spread[2])))
+  return !(std::sqrt(std::max(0.0, spread[1])) > kCollinearRatio * std::sqrt(spread[2]));
+}
+
+void refuse_unusable(std::span<const Vector3d> points, const char* which) {
+  for (const Vector3d& point : points)
+    if (!point.allFinite())
+      throw InputError(std::string("fiducials: ") + which + " points must be finite");
+  if (are_collinear(points))
     throw InputError(std::string("fiducials: the ") + which +
                      " points are collinear: they must span a plane to fix a rotation");
 }
@@ -114,6 +117,24 @@ RigidFit fit_rigid(std::span<const Vector3d> target_points,
   return fit;
 }
 
+std::vector<double> leave_one_out_errors_mm(std::span<const Vector3d> target_points,
+                                            std::span<const Vector3d> source_points) {
+  check(target_points.size() == source_points.size(), "points come in pairs");
+  std::vector<double> errors_mm;
+  if (source_points.size() < 4) return errors_mm;
+  for (std::size_t left_out = 0; left_out < source_points.size(); ++left_out) {
+    std::vector<Vector3d> targets(target_points.begin(), target_points.end());
+    std::vector<Vector3d> sources(source_points.begin(), source_points.end());
+    targets.erase(targets.begin() + static_cast<std::ptrdiff_t>(left_out));
+    sources.erase(sources.begin() + static_cast<std::ptrdiff_t>(left_out));
+    if (are_collinear(targets) || are_collinear(sources)) return {};
+    const RigidFit fit = fit_rigid(targets, sources);
+    errors_mm.push_back(
+        (fit.target_from_source * source_points[left_out] - target_points[left_out]).norm());
+  }
+  return errors_mm;
+}
+
 FiducialGold gold_from_fiducials(std::span<const FiducialView> views,
                                  std::span<const Vector3d> fiducials_ct_mm) {
   for (const FiducialView& view : views)
@@ -133,6 +154,7 @@ FiducialGold gold_from_fiducials(std::span<const FiducialView> views,
   }
   gold.fit = fit_rigid(room_points, fiducials_ct_mm);
   gold.room_from_ct = gold.fit.target_from_source;
+  gold.leave_one_out_mm = leave_one_out_errors_mm(room_points, fiducials_ct_mm);
   return gold;
 }
 

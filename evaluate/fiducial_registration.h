@@ -47,7 +47,14 @@ struct FiducialGold {
   RigidTransform room_from_ct = RigidTransform::Identity();
   std::vector<BackProjection> back_projections;  ///< per fiducial
   RigidFit fit;
+  /// Per fiducial: its distance (mm) from where the pose fitted to all others puts it. Empty when
+  /// the others are fewer than three or, for any of the fiducials, lie on one line.
+  std::vector<double> leave_one_out_mm;
 };
+
+/// Leave-one-out distances as FiducialGold has them. \test LeaveOneOut.OfHandComputedCases
+std::vector<double> leave_one_out_errors_mm(std::span<const Eigen::Vector3d> target_points,
+                                            std::span<const Eigen::Vector3d> source_points);
 
 /// Back-projects every fiducial from all views and fits the CT's fiducials to the result. Throws
 /// InputError as the two steps do, and when a view lacks a fiducial.

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "evaluate/fiducial_registration.h"
+#include "evaluate/gold_uncertainty.h"
 #include "io/study_file.h"
 
 namespace af::evaluation {
@@ -15,6 +16,7 @@ struct GoldStandard {
   RigidTransform room_from_ct = RigidTransform::Identity();
   std::string source;                            ///< "fiducials" or "study"
   std::optional<FiducialGold> fiducials;         ///< when at least two views show them
+  std::optional<GoldUncertainty> uncertainty;    ///< of the fiducials' pose at the target
   std::optional<RigidTransform> stated_pose;     ///< the study's gold_room_from_ct
   std::optional<double> stated_to_fiducials_mm;  ///< mean TRE between the two, when both exist
 };
@@ -26,7 +28,12 @@ GoldStandard gold_standard(const Study& study,
                            const StudyCase& study_case,
                            const std::string& choice);
 
-/// Source, fiducial registration error, ray gaps, residuals, distance between both golds.
+/// What stands beside every TRE that is measured against this pose: the mean TRE (mm) that the gold
+/// standard has by itself. NaN for a stated pose, whose uncertainty nothing tells.
+double own_tre_mm(const GoldStandard& gold);
+
+/// Source, fiducial registration error, ray gaps, residuals, leave-one-out errors, uncertainty at
+/// the target, distance between both golds.
 nlohmann::json to_json(const GoldStandard& gold);
 
 }  // namespace af::evaluation

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <iomanip>
 #include <iostream>
+#include <map>
 #include <set>
 #include <sstream>
 
@@ -46,6 +47,25 @@ json case_json(const CaseEvaluation& evaluation) {
           {"draws_beyond_last_interval", evaluation.starts.draws_beyond}};
 }
 
+/// Beside every TRE what the gold standard has by itself: of a case, and the mean over a renderer's
+/// starts; null when a case's gold pose is a stated one.
+void add_gold_uncertainty(const std::vector<CaseEvaluation>& evaluations, json& renderers) {
+  std::map<std::string, double> own_mm;
+  for (const CaseEvaluation& evaluation : evaluations)
+    own_mm[evaluation.case_name] = own_tre_mm(evaluation.gold);
+  for (json& renderer : renderers) {
+    double sum_mm = 0.0;
+    double starts = 0.0;
+    for (json& entry : renderer["cases"]) {
+      const double case_mm = own_mm.at(entry["case"].get<std::string>());
+      entry["gold_uncertainty_mm"] = number_json(case_mm);
+      sum_mm += case_mm * entry["starts"].get<double>();
+      starts += entry["starts"].get<double>();
+    }
+    renderer["gold_uncertainty_mm"] = number_json(sum_mm / starts);
+  }
+}
+
 void draw_figures(const RegistrationStudyOptions& options,
                   const std::vector<RegistrationRow>& rows) {
   std::vector<OutcomeGroup> groups;
@@ -83,6 +103,7 @@ json summary_json(const RegistrationStudyOptions& options,
   for (const std::string& renderer : options.renderers())
     summary["renderers"].push_back(renderer_statistics(
         rows, renderer, {options.intervals, options.interval_width_mm, options.method.seed}));
+  add_gold_uncertainty(evaluations, summary["renderers"]);
   std::vector<std::string> found = row_problems(rows);
   for (const CaseEvaluation& evaluation : evaluations)
     found.insert(found.end(), evaluation.pose_problems.begin(), evaluation.pose_problems.end());
@@ -99,6 +120,9 @@ void print_outcome(const json& summary, const std::filesystem::path& folder) {
               << renderer["starts"].get<std::int64_t>() << " starts succeeded (TRE < "
               << number_text(kSuccessTreMm) << " mm), mean TRE of these "
               << fixed_text(number_of(renderer["tre_of_successes_mm"]["mean"]), 2) << " mm";
+    const double gold_mm = number_of(renderer["gold_uncertainty_mm"]);
+    if (std::isfinite(gold_mm))
+      std::cout << " (gold standard by itself: " << fixed_text(gold_mm, 2) << " mm)";
     const double seconds = number_of(renderer["seconds"]["median"]);
     if (std::isfinite(seconds)) std::cout << ", median " << fixed_text(seconds, 2) << " s each";
     std::cout << '\n';

@@ -2,6 +2,7 @@
 af_add_test(
   evaluate_test
   SOURCES unit/evaluate/fiducial_registration_test.cpp
+          unit/evaluate/gold_uncertainty_test.cpp
           unit/evaluate/tre_test.cpp
           unit/evaluate/perturbed_starts_test.cpp
           unit/evaluate/success_rate_test.cpp

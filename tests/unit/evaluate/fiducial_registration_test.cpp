@@ -7,11 +7,13 @@
 
 #include "base/error.h"
 #include "base/hash_random.h"
+#include "unit/evaluate/camera_at.h"
 
 namespace af::evaluation {
 namespace {
 
 using Eigen::Vector3d;
+using test::camera_at;
 
 // Values up to 1000 mm, a few dozen double operations: 1e3 * 2.2e-16 * 100 is 2e-11; the normal
 // matrix's condition number (at most 1e2 here) multiplies it.
@@ -128,20 +130,6 @@ TEST(RigidFit, RefusesPointsThatFixNoRotation) {
   std::vector<Vector3d> with_nan = plane;
   with_nan[2].y() = std::nan("");
   EXPECT_THROW(fit_rigid(with_nan, plane), InputError);
-}
-
-CameraGeometry camera_at(const std::string& name, const Vector3d& source, const Vector3d& column) {
-  CameraGeometry camera;
-  camera.name = name;
-  camera.source_point = source;
-  camera.column_direction = column;
-  camera.row_direction = -Vector3d::UnitZ();
-  camera.pixel_spacing_mm = {0.4, 0.4};
-  camera.size_px = {512, 512};
-  const double half_side_mm = 255.5 * 0.4;
-  camera.detector_origin_point =
-      -0.5 * source - half_side_mm * (camera.column_direction + camera.row_direction);
-  return camera;
 }
 
 TEST(FiducialGold, RecoversThePoseThatProjectedTheFiducials) {
