@@ -8,9 +8,8 @@
 
 namespace af::evaluation {
 
-/// With fewer cases the percentile interval is too narrow: in simulated studies whose cases differ,
-/// it held the truth 80 % of the time with 4 cases, 90 % with 10 and 94 % with 30.
-/// \test CaseBootstrap.CoversTheTruthTheMoreOftenTheMoreCases
+/// With fewer cases the percentile interval is too narrow: docs/errors.md has how often it holds
+/// the truth of simulated studies. \test IntervalCoverage.OfTheBootstrapGrowsWithTheCases
 inline constexpr std::size_t kEnoughCases = 30;
 
 /// Percentile interval of a statistic under resampling of cases.

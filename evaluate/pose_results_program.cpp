@@ -21,6 +21,24 @@ RegistrationRow found_row(const FoundPoses& found, std::int64_t index, const Yar
   return row;
 }
 
+/// "no pose for start 0", "no pose for starts 7 to 19": one line for each gap.
+std::vector<std::string> missing_pose_problems(const std::string& case_name,
+                                               const FoundPoses& found,
+                                               std::int64_t count) {
+  std::vector<std::string> problems;
+  for (std::int64_t first = 0; first < count; ++first) {
+    if (found.room_from_ct.contains(first)) continue;
+    std::int64_t last = first;
+    while (last + 1 < count && !found.room_from_ct.contains(last + 1)) ++last;
+    problems.push_back(case_name + ": no pose for start" +
+                       (first == last
+                            ? " " + std::to_string(first)
+                            : "s " + std::to_string(first) + " to " + std::to_string(last)));
+    first = last;
+  }
+  return problems;
+}
+
 }  // namespace
 
 CaseEvaluation evaluate_found_poses(const RegistrationStudyOptions& options,
@@ -43,11 +61,10 @@ CaseEvaluation evaluate_found_poses(const RegistrationStudyOptions& options,
     row.case_name = study_case.name;
     row.renderer = options.method_name;
     row.start_index = index;
-    if (!found.room_from_ct.contains(index))
-      evaluation.pose_problems.push_back(study_case.name + ": no pose for start " +
-                                         std::to_string(index));
     evaluation.rows.push_back(row);
   }
+  for (const std::string& text : missing_pose_problems(study_case.name, found, count))
+    evaluation.pose_problems.push_back(text);
   for (const auto& [index, pose] : found.room_from_ct)
     if (index < 0 || index >= count)
       evaluation.pose_problems.push_back(study_case.name + ": a pose for start " +

@@ -107,19 +107,31 @@ json summary_json(const RegistrationStudyOptions& options,
   std::vector<std::string> found = row_problems(rows);
   for (const CaseEvaluation& evaluation : evaluations)
     found.insert(found.end(), evaluation.pose_problems.begin(), evaluation.pose_problems.end());
+  if (!options.poses_from.empty()) {
+    std::set<std::string> known;
+    for (const StudyCase& study_case : study.cases) known.insert(study_case.name);
+    for (const std::string& text : unknown_case_problems(options.poses_from, known))
+      found.push_back(text);
+  }
   summary["row_problems"] = found;
-  summary["field_against_raycast"] = paired_statistics(rows, options.equivalence_margin_mm);
+  summary["warnings"] = warnings_about_cases(evaluations.size());
+  summary["field_against_raycast"] =
+      paired_statistics(rows, options.equivalence_margin_mm, options.method.seed);
   summary["figures"] = {"success-rate", "tre-histogram", "tre-scatter"};
   return summary;
 }
 
-void print_outcome(const json& summary, const std::filesystem::path& folder) {
+void print_outcome(const json& summary,
+                   const std::filesystem::path& folder,
+                   const Communicator& world) {
   for (const json& renderer : summary["renderers"]) {
     std::cout << renderer["renderer"].get<std::string>() << ": "
               << renderer["successes"].get<std::int64_t>() << " of "
               << renderer["starts"].get<std::int64_t>() << " starts succeeded (TRE < "
-              << number_text(kSuccessTreMm) << " mm), mean TRE of these "
-              << fixed_text(number_of(renderer["tre_of_successes_mm"]["mean"]), 2) << " mm";
+              << number_text(kSuccessTreMm) << " mm)";
+    const double mean_mm = number_of(renderer["tre_of_successes_mm"]["mean"]);
+    if (std::isfinite(mean_mm))
+      std::cout << ", mean TRE of these " << fixed_text(mean_mm, 2) << " mm";
     const double gold_mm = number_of(renderer["gold_uncertainty_mm"]);
     if (std::isfinite(gold_mm))
       std::cout << " (gold standard by itself: " << fixed_text(gold_mm, 2) << " mm)";
@@ -127,6 +139,7 @@ void print_outcome(const json& summary, const std::filesystem::path& folder) {
     if (std::isfinite(seconds)) std::cout << ", median " << fixed_text(seconds, 2) << " s each";
     std::cout << '\n';
   }
+  for (const json& warning : summary["warnings"]) cli::warn(world, warning.get<std::string>());
   for (const json& problem : summary["row_problems"])
     std::cout << "problem: " << problem.get<std::string>() << '\n';
   std::cout << "results: " << folder.string() << '\n';
@@ -331,7 +344,7 @@ void run_registration(const RegistrationStudyOptions& options,
     summary["provenance"] = af::to_json(provenance);
     // Last: when it is there, everything is.
     write_text_file(folder / "summary.json", summary.dump(2) + "\n");
-    print_outcome(summary, folder);
+    print_outcome(summary, folder, world);
   });
 }
 

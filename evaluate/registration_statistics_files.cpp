@@ -105,26 +105,44 @@ json thresholds_json(const std::vector<TreOutcome>& outcomes) {
   return result;
 }
 
+/// Quartiles, median and 95th percentile where what is missing counts as infinitely far.
+json summary_of_all(std::vector<double> values) {
+  for (double& value : values)
+    if (!std::isfinite(value)) value = std::numeric_limits<double>::infinity();
+  const json all = to_json(summarize(std::move(values)));
+  json result;
+  for (const char* name : {"count", "q1", "median", "q3", "p95", "max"}) result[name] = all[name];
+  return result;
+}
+
+/// The errors beside TRE, over all.
+json errors_of_all_json(const Rows& rows) {
+  json result = json::object();
+  for (std::size_t i = 0; i < kErrorNames.size(); ++i) {
+    std::vector<double> values;
+    for (const RegistrationRow* row : rows) values.push_back(row->errors.values()[i]);
+    result[kErrorNames[i]] = summary_of_all(std::move(values));
+  }
+  return result;
+}
+
 /// Success and TRE of some rows.
 json accuracy_of(const Rows& rows) {
   std::vector<TreOutcome> outcomes;
   std::vector<double> tre_mm;
-  std::vector<double> tre_or_infinity_mm;
+  std::vector<double> all_tre_mm;
   std::vector<double> successful_tre_mm;
   for (const RegistrationRow* row : rows) {
     outcomes.push_back({row->initial_tre_mm, row->tre_mm});
-    const bool has_pose = std::isfinite(row->tre_mm);
-    if (has_pose) tre_mm.push_back(row->tre_mm);
-    tre_or_infinity_mm.push_back(has_pose ? row->tre_mm : std::numeric_limits<double>::infinity());
+    if (std::isfinite(row->tre_mm)) tre_mm.push_back(row->tre_mm);
+    all_tre_mm.push_back(row->tre_mm);
     if (is_success(*row)) successful_tre_mm.push_back(row->tre_mm);
   }
   const auto trials = static_cast<std::int64_t>(outcomes.size());
   json result = proportion_json(count_successes(outcomes, kSuccessTreMm), trials);
   result["without_pose"] = outcomes.size() - tre_mm.size();
   result["tre_mm"] = to_json(summarize(tre_mm));
-  const json all = to_json(summarize(tre_or_infinity_mm));
-  for (const char* name : {"count", "q1", "median", "q3", "p95", "max"})
-    result["tre_of_all_mm"][name] = all[name];
+  result["tre_of_all_mm"] = summary_of_all(std::move(all_tre_mm));
   result["tre_of_successes_mm"] = to_json(summarize(successful_tre_mm));
   result["thresholds"] = thresholds_json(outcomes);
   result["gross_failures"] =
@@ -138,6 +156,7 @@ json statistics_of(const Rows& rows) {
   json result = accuracy_of(rows);
   result["bias"] = bias_json(rows);
   result["errors_of_successes"] = errors_json(rows);
+  result["errors_of_all"] = errors_of_all_json(rows);
   std::vector<double> seconds;
   std::vector<double> evaluations;
   std::vector<double> drr_counts;
@@ -168,42 +187,55 @@ json bootstrap_json(const CaseBootstrap& bootstrap) {
           {"is_optimistic", bootstrap.is_optimistic()}};
 }
 
-/// Sums over the starts of one case.
-struct CaseSums {
-  double starts = 0.0;
-  double successes = 0.0;
-  double successful_tre_mm = 0.0;
+/// A mean over one case, as the sum and the number of what it is taken over.
+struct CaseMean {
+  double sum = 0.0;
+  double count = 0.0;
 };
+
+/// By bootstrap over cases, and Student's interval of the cases' own means, each counting alike.
+json interval_over_cases(const std::vector<CaseMean>& cases, std::uint64_t seed) {
+  json result = bootstrap_json(bootstrap_over_cases(
+      cases.size(),
+      [&](std::span<const std::size_t> drawn) {
+        CaseMean all;
+        for (const std::size_t index : drawn) {
+          all.sum += cases[index].sum;
+          all.count += cases[index].count;
+        }
+        return all.sum / all.count;
+      },
+      seed));
+  std::vector<double> means;
+  for (const CaseMean& mean : cases)
+    if (mean.count > 0.0) means.push_back(mean.sum / mean.count);
+  const MeanInterval student = student_interval(means);
+  result["student_low"] = number_json(student.low);
+  result["student_high"] = number_json(student.high);
+  return result;
+}
 
 /// Intervals over cases of the success rate and of the mean TRE of successes.
 json over_cases_json(const std::map<std::string, Rows>& by_case, std::uint64_t seed) {
-  std::vector<CaseSums> cases;
+  std::vector<CaseMean> rates;
+  std::vector<CaseMean> successful_tre_mm;
   for (const auto& [name, rows] : by_case) {
-    CaseSums& sums = cases.emplace_back();
+    CaseMean tre_mm;
     for (const RegistrationRow* row : rows) {
-      sums.starts += 1.0;
       if (!is_success(*row)) continue;
-      sums.successes += 1.0;
-      sums.successful_tre_mm += row->tre_mm;
+      tre_mm.sum += row->tre_mm;
+      tre_mm.count += 1.0;
     }
+    successful_tre_mm.push_back(tre_mm);
+    rates.push_back({tre_mm.count, static_cast<double>(rows.size())});
   }
-  const auto interval = [&](double CaseSums::*numerator, double CaseSums::*denominator) {
-    return bootstrap_json(bootstrap_over_cases(
-        cases.size(),
-        [&](std::span<const std::size_t> drawn) {
-          double top = 0.0;
-          double bottom = 0.0;
-          for (const std::size_t index : drawn) {
-            top += cases[index].*numerator;
-            bottom += cases[index].*denominator;
-          }
-          return top / bottom;
-        },
-        seed));
-  };
-  return {
-      {"rate", interval(&CaseSums::successes, &CaseSums::starts)},
-      {"mean_tre_of_successes_mm", interval(&CaseSums::successful_tre_mm, &CaseSums::successes)}};
+  json result = {{"rate", interval_over_cases(rates, seed)},
+                 {"mean_tre_of_successes_mm", interval_over_cases(successful_tre_mm, seed)}};
+  // Student's interval does not know that rates end at 0 and 1.
+  for (const char* name : {"student_low", "student_high"})
+    if (json& end = result["rate"][name]; end.is_number())
+      end = std::clamp(end.get<double>(), 0.0, 1.0);
+  return result;
 }
 
 /// Field and ray casting from one start.
@@ -254,6 +286,7 @@ std::string failure_reason(const RegistrationRow& row) {
   if (stop == "pinned-at-limit" || stop == "start-inadmissible") return "left range";
   if (stop == "evaluation-budget-spent") return "budget";
   if (stop == "ct-outside-roi") return "no CT in region";
+  if (stop == "no-pose") return "no pose given";
   if (stop == "error" || stop == "non-finite-similarity" || !std::isfinite(row.tre_mm))
     return "numerics";
   return "other optimum";
@@ -293,10 +326,13 @@ json renderer_statistics(const std::vector<RegistrationRow>& rows,
   return result;
 }
 
-json paired_statistics(const std::vector<RegistrationRow>& rows, double margin_mm) {
+json paired_statistics(const std::vector<RegistrationRow>& rows,
+                       double margin_mm,
+                       std::uint64_t seed) {
   std::array<std::vector<double>, 2> seconds;
   std::vector<double> field_tre_mm;
   std::vector<double> raycast_tre_mm;
+  std::map<std::string, CaseMean> differences_mm;
   std::int64_t only_field = 0;
   std::int64_t only_raycast = 0;
   for (const StartPair& pair : pairs_of(rows)) {
@@ -309,6 +345,9 @@ json paired_statistics(const std::vector<RegistrationRow>& rows, double margin_m
     if (!field || !raycast) continue;
     field_tre_mm.push_back(pair.field->tre_mm);
     raycast_tre_mm.push_back(pair.raycast->tre_mm);
+    CaseMean& difference_mm = differences_mm[pair.field->case_name];
+    difference_mm.sum += pair.field->tre_mm - pair.raycast->tre_mm;
+    difference_mm.count += 1.0;
   }
   if (seconds[0].empty()) return nullptr;
   const auto both = static_cast<std::int64_t>(field_tre_mm.size());
@@ -318,6 +357,10 @@ json paired_statistics(const std::vector<RegistrationRow>& rows, double margin_m
                  {"median_seconds", {summarize(seconds[0]).median, summarize(seconds[1]).median}},
                  {"pairs", both}};
   if (both >= 2) result["test"] = test_json(field_tre_mm, raycast_tre_mm, margin_mm);
+  std::vector<CaseMean> case_differences_mm;
+  for (const auto& [name, difference_mm] : differences_mm)
+    case_differences_mm.push_back(difference_mm);
+  result["mean_difference_over_cases_mm"] = interval_over_cases(case_differences_mm, seed);
   return result;
 }
 
@@ -337,6 +380,17 @@ std::vector<std::string> row_problems(const std::vector<RegistrationRow>& rows) 
       found.push_back(name + ": final pose and TRE do not belong together");
   }
   return found;
+}
+
+std::vector<std::string> warnings_about_cases(std::size_t cases) {
+  if (cases >= kEnoughCases) return {};
+  if (cases < 2)
+    return {
+        "one case: its intervals hold for other starts of this patient and say nothing about "
+        "other patients"};
+  return {std::to_string(cases) + " cases: the bootstrap interval over cases is too narrow below " +
+          std::to_string(kEnoughCases) +
+          " cases; take Student's interval beside it (docs/errors.md)"};
 }
 
 }  // namespace af::evaluation

@@ -23,7 +23,8 @@ struct StatisticsOptions {
 
 /// Why a registration that did not succeed failed: "left range" (start outside, or pinned at the
 /// limit of the field or of its motion range), "budget", "numerics" (an exception, or no finite
-/// similarity), "no CT in region", or "other optimum" for one that converged elsewhere.
+/// similarity), "no CT in region", "no pose given" (by another program), or "other optimum" for one
+/// that converged elsewhere.
 std::string failure_reason(const RegistrationRow& row);
 
 /// Counts, success (overall, per interval, per threshold), gross failures, failures by reason,
@@ -36,12 +37,17 @@ nlohmann::json renderer_statistics(const std::vector<RegistrationRow>& rows,
 
 /// Field against ray casting on the starts that both were given: successes and median seconds of
 /// each, McNemar's test of success; on those from which both succeeded ("pairs"), if there are two
-/// or more, paired t-test, signed-rank test, and equivalence of TRE with its power. null when no
-/// start was given to both.
-nlohmann::json paired_statistics(const std::vector<RegistrationRow>& rows, double margin_mm);
+/// or more, paired t-test, signed-rank test, and equivalence of TRE with its power, and intervals
+/// of the mean difference over cases. null when no start was given to both.
+nlohmann::json paired_statistics(const std::vector<RegistrationRow>& rows,
+                                 double margin_mm,
+                                 std::uint64_t seed = 1);
 
 /// What is wrong with a set of rows, in words: registrations that occur twice, values that are NaN
 /// beside a pose, initial TREs that are not finite. Empty when nothing is.
 std::vector<std::string> row_problems(const std::vector<RegistrationRow>& rows);
+
+/// What so few cases do not allow, in words; empty when they are enough.
+std::vector<std::string> warnings_about_cases(std::size_t cases);
 
 }  // namespace af::evaluation

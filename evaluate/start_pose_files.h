@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -23,7 +24,8 @@ struct PoseTableFrames {
 /// The starts of one case from a CSV file, in its order: rows whose `case` is the case's; the pose
 /// is m00 ... m23 of room_from_ct, or start_rx_deg ... start_tz_mm relative to gold. FileError:
 /// unreadable, or a value that is not a number; InputError: no row of the case, a pose that is not
-/// rigid.
+/// rigid, or a start_index (where there is that column) that is not the row's place among the
+/// case's: a start that is missing, repeated or out of order would give all others another number.
 std::vector<RigidTransform> read_starts(const std::filesystem::path& path,
                                         const PoseTableFrames& frames);
 
@@ -38,7 +40,13 @@ struct FoundPoses {
 /// of room_from_ct, or final_rx_deg ... final_tz_mm relative to gold (as in registrations.csv), or
 /// rx_deg ... tz_mm relative to the nominal pose, about the ROI centre. Or a folder of ITK
 /// transforms (.tfm, ct_from_room) named [CASE-]INDEX.tfm. A pose with a value that is not finite
-/// is no pose; of a start that occurs twice the first counts; both are reported as problems.
+/// is no pose; of a start that occurs twice the first counts, also when it is no pose; a
+/// start_index that is not a whole number is no start: all are reported as problems.
 FoundPoses read_found_poses(const std::filesystem::path& path, const PoseTableFrames& frames);
+
+/// What a table or folder of poses holds of cases that are not among `known`, in words: nobody
+/// would miss them otherwise. Empty when there are none, and for a table without cases.
+std::vector<std::string> unknown_case_problems(const std::filesystem::path& path,
+                                               const std::set<std::string>& known);
 
 }  // namespace af::evaluation

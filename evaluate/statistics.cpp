@@ -60,6 +60,17 @@ SampleSummary summarize(std::vector<double> values) {
   return summary;
 }
 
+MeanInterval student_interval(std::span<const double> values) {
+  if (values.size() < 2) return {kNan, kNan};
+  const double mean = mean_of(values);
+  const double spread = standard_deviation_of(values, mean);
+  if (!(spread > 0.0)) return {kNan, kNan};
+  const auto n = static_cast<double>(values.size());
+  const double half =
+      boost::math::quantile(boost::math::students_t(n - 1.0), 0.975) * spread / std::sqrt(n);
+  return {mean - half, mean + half};
+}
+
 PairedComparison compare_paired(std::span<const double> first,
                                 std::span<const double> second,
                                 double margin) {
@@ -70,7 +81,11 @@ PairedComparison compare_paired(std::span<const double> first,
   if (!(margin > 0.0))
     throw InputError("equivalence margin", std::to_string(margin), "must be > 0");
   std::vector<double> differences(first.size());
-  for (std::size_t i = 0; i < first.size(); ++i) differences[i] = first[i] - second[i];
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    differences[i] = first[i] - second[i];
+    if (!std::isfinite(differences[i]))
+      throw InputError("a paired test", std::to_string(differences[i]), "needs finite values");
+  }
 
   PairedComparison result;
   result.pairs = differences.size();

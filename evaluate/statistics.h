@@ -28,6 +28,16 @@ struct SampleSummary {
 /// Throws InputError when a value is NaN: what is missing must be counted, not averaged.
 SampleSummary summarize(std::vector<double> values);
 
+struct MeanInterval {
+  double low = 0.0;
+  double high = 0.0;
+};
+
+/// Student's 95 % interval of a mean, of few values that vary like a normal distribution. NaN for
+/// fewer than two values and for equal ones, whose spread nothing tells.
+/// \test StudentInterval.EqualsStudentsSleepData
+MeanInterval student_interval(std::span<const double> values);
+
 /// Comparison of two methods on the same items.
 struct PairedComparison {
   std::size_t pairs = 0;
@@ -42,8 +52,9 @@ struct PairedComparison {
   double equivalence_power = 0.0;  ///< see equivalence_power(), with the spread that was observed
 };
 
-/// Paired t-test and equivalence test. Throws InputError for unequal sizes, fewer than two pairs or
-/// a margin that is not positive. Equal differences everywhere have no spread: p is then 0 or 1.
+/// Paired t-test and equivalence test. Throws InputError for unequal sizes, fewer than two pairs,
+/// values that are not finite or a margin that is not positive. Equal differences everywhere have
+/// no spread: p is then 0 or 1.
 PairedComparison compare_paired(std::span<const double> first,
                                 std::span<const double> second,
                                 double margin);

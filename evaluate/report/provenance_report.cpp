@@ -172,6 +172,11 @@ std::string definitions_section() {
                "From fiducials: each is back-projected from all views, and the CT's fiducials are "
                "fitted to these points rigidly (Arun 1987). FRE is the RMS residual of that fit; "
                "a ray gap the shortest distance between the two views' rays."},
+              {"Gold standard by itself",
+               "The mean TRE that the fiducials' gold pose has with respect to the true pose, by "
+               "Monte Carlo on the residuals of the fiducials; a TRE below it is not measured. "
+               "Leave-one-out: how far a fiducial lies from where the pose fitted to the others "
+               "puts it (RMS)."},
               {"Stated pose",
                "The pose that the study itself gives (gold_room_from_ct); for simulated X-rays "
                "the true one, free of the fiducials' detection noise."},

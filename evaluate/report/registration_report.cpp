@@ -74,7 +74,8 @@ std::string error_table(const json& renderers) {
        {"Largest with a pose", true},
        {"No pose", true},
        {"Mean ± SD of successes", true},
-       {"Same against stated pose", true}},
+       {"Same against stated pose", true},
+       {"Gold standard by itself", true}},
       "TRE in mm over all registrations, one without a pose counting as infinitely far; "
       "then over successes only");
   for (const json& renderer : renderers) {
@@ -88,7 +89,8 @@ std::string error_table(const json& renderers) {
                    decimals(renderer.at("tre_mm").at("max"), 2),
                    renderer.at("without_pose").dump(),
                    decimals(good.at("mean"), 2) + " ± " + decimals(good.at("sd"), 2),
-                   decimals(renderer.at("stated_pose_tre_of_successes_mm").at("mean"), 2)});
+                   decimals(renderer.at("stated_pose_tre_of_successes_mm").at("mean"), 2),
+                   decimals(renderer.value("gold_uncertainty_mm", json()), 2)});
   }
   return table.html();
 }
@@ -176,6 +178,19 @@ std::string other_errors_table(const json& renderers) {
   return table.html();
 }
 
+/// What few cases do to the bootstrap, and the interval to take instead.
+std::string optimism_text(const json& rate) {
+  if (!rate.at("is_optimistic").get<bool>()) return "";
+  std::string text =
+      " <strong>With so few cases this interval is too narrow</strong>: it holds the "
+      "truth less often than it says.";
+  if (rate.value("student_low", json()).is_number())
+    text += " Student's interval of the cases' own rates is " +
+            percent(rate.at("student_low").get<double>()) + " to " +
+            percent(rate.at("student_high").get<double>()) + ".";
+  return text;
+}
+
 /// Intervals over patients, with a warning where these are too few.
 std::string over_cases_text(const json& renderers) {
   std::string text;
@@ -188,9 +203,7 @@ std::string over_cases_text(const json& renderers) {
                         "): resampling the " + std::to_string(cases) +
                         " cases gives a 95 % interval of " + percent(rate.at("low").get<double>()) +
                         " to " + percent(rate.at("high").get<double>()) + " for the success rate." +
-                        (rate.at("is_optimistic").get<bool>()
-                             ? " With so few cases this interval is too narrow."
-                             : ""));
+                        optimism_text(rate));
   }
   if (!text.empty()) return text;
   return element("p", "One patient says nothing about others: there is no interval over patients.");
@@ -211,6 +224,7 @@ std::string case_table(const json& summary) {
                    {"Starts", true},
                    {"Success (95 % interval)", true},
                    {"Mean TRE of successes (mm)", true},
+                   {"Gold standard by itself (mm)", true},
                    {"Median seconds", true},
                    {"Median evaluations", true}},
                   "Per patient (the paper's Table II)");
@@ -221,6 +235,7 @@ std::string case_table(const json& summary) {
                      entry.at("starts").dump(),
                      rate_with_interval(entry),
                      decimals(entry.at("tre_of_successes_mm").at("mean"), 2),
+                     decimals(entry.value("gold_uncertainty_mm", json()), 2),
                      decimals(entry.at("seconds").at("median"), 2),
                      decimals(entry.at("evaluations").at("median"), 0)});
   return table.html();
@@ -232,6 +247,8 @@ std::string gold_table(const json& cases) {
                    {"Fiducials", true},
                    {"FRE (mm)", true},
                    {"Largest ray gap (mm)", true},
+                   {"Leave-one-out (mm)", true},
+                   {"Own TRE: mean, 95th percentile (mm)", true},
                    {"Stated pose to fiducials (mm)", true},
                    {"Draws", true},
                    {"of these outside the fields' range", true},
@@ -239,6 +256,7 @@ std::string gold_table(const json& cases) {
                   "Gold standard and starts");
   for (const json& entry : cases) {
     const json& gold = entry.at("gold");
+    const json uncertainty = gold.value("uncertainty", json::object());
     double largest_gap_mm = std::numeric_limits<double>::quiet_NaN();
     for (const json& gap : gold.value("ray_gaps_mm", json::array()))
       largest_gap_mm = std::fmax(largest_gap_mm, gap.get<double>());
@@ -247,6 +265,9 @@ std::string gold_table(const json& cases) {
                    std::to_string(gold.value("residuals_mm", json::array()).size()),
                    decimals(gold.value("fre_mm", json()), 3),
                    decimals(number_json(largest_gap_mm), 3),
+                   decimals(gold.value("leave_one_out_rms_mm", json()), 3),
+                   decimals(uncertainty.value("mean_tre_mm", json()), 3) + ", " +
+                       decimals(uncertainty.value("p95_tre_mm", json()), 3),
                    decimals(gold.value("stated_to_fiducials_mm", json()), 3),
                    entry.at("draws").dump(),
                    entry.at("inadmissible_draws").dump(),

@@ -9,6 +9,7 @@ af_add_test(
           unit/evaluate/statistics_test.cpp
           unit/evaluate/signed_rank_test_test.cpp
           unit/evaluate/bootstrap_test.cpp
+          support/interval_coverage.cpp
           unit/evaluate/registration_errors_test.cpp
           unit/evaluate/similarity_curve_test.cpp
           unit/evaluate/drr_comparison_test.cpp
@@ -23,6 +24,13 @@ af_add_test(
   evaluate_report_test
   SOURCES unit/evaluate/report_text_test.cpp unit/evaluate/evaluation_rows_test.cpp
   LIBS af_evaluation_program af_evaluation_report af_io_basics)
+
+add_executable(evaluate_statistics_program_tests programs/evaluate_statistics_test.cpp)
+target_link_libraries(evaluate_statistics_program_tests PRIVATE af_compile_options af_test_support GTest::gtest_main
+                                                                af_io_basics nlohmann_json::nlohmann_json)
+target_compile_definitions(evaluate_statistics_program_tests PRIVATE AF_PROGRAM_FOLDER="${PROJECT_BINARY_DIR}/bin")
+add_dependencies(evaluate_statistics_program_tests af-evaluate)
+gtest_discover_tests(evaluate_statistics_program_tests PROPERTIES LABELS programs TIMEOUT 120 DISCOVERY_TIMEOUT 60)
 
 # One CTest entry for all: the tests share a study and its fields, which take longer than they do.
 add_executable(evaluate_program_tests programs/evaluate_program_test.cpp)

@@ -145,6 +145,19 @@ TEST(RegistrationStatistics, KeepEveryFailureInTheDenominatorAndNameItsReason) {
   EXPECT_EQ(result["starts_beyond_last_interval"], 2);
 }
 
+TEST(RegistrationStatistics, OfOtherErrorsKeepEveryFailureToo) {
+  std::vector<RegistrationRow> rows = {
+      row("field", 0, 1, 0.1), row("field", 1, 1, 9.0), row("field", 2, 1, std::nan(""))};
+  rows[0].errors.mrpd_mm = 0.5;
+  rows[1].errors.mrpd_mm = 4.0;
+  const json result = renderer_statistics(rows, "field", {8, 2.0});
+  EXPECT_EQ(result["errors_of_successes"]["mrpd_mm"]["count"], 1);
+  EXPECT_EQ(result["errors_of_successes"]["mrpd_mm"]["mean"], 0.5);
+  EXPECT_EQ(result["errors_of_all"]["mrpd_mm"]["count"], 3);
+  EXPECT_EQ(result["errors_of_all"]["mrpd_mm"]["median"], 4.0);
+  EXPECT_EQ(result["errors_of_all"]["mrpd_mm"]["max"], "inf");
+}
+
 TEST(RegistrationStatistics, BiasIsTheMeanSignedErrorOfSuccesses) {
   std::vector<RegistrationRow> rows = {
       row("field", 0, 1, 0.1), row("field", 1, 1, 0.2), row("field", 2, 1, 9.0)};
@@ -171,6 +184,36 @@ TEST(RegistrationStatistics, IntervalsOverCasesNeedSeveral) {
   EXPECT_EQ(over["rate"]["is_optimistic"], true);
   EXPECT_DOUBLE_EQ(over["mean_tre_of_successes_mm"]["low"].get<double>(), 0.2);
   EXPECT_DOUBLE_EQ(over["mean_tre_of_successes_mm"]["high"].get<double>(), 0.4);
+  // Student's quantile of one degree of freedom is tan(0.475 pi) = 12.7062: 0.3 +- 12.7062 * 0.1 of
+  // the TRE; a rate of 0.75 +- 12.7062 * 0.25 ends at 0 and 1.
+  EXPECT_NEAR(over["mean_tre_of_successes_mm"]["student_high"].get<double>(), 1.57062, 1e-5);
+  EXPECT_EQ(over["rate"]["student_low"], 0.0);
+  EXPECT_EQ(over["rate"]["student_high"], 1.0);
+}
+
+TEST(RegistrationStatistics, OfNoRowsHaveNoRateInsteadOfAWrongOne) {
+  const json result = renderer_statistics({}, "field", {});
+  EXPECT_EQ(result["starts"], 0);
+  EXPECT_TRUE(result["rate"].is_null());
+  EXPECT_EQ(result["wilson_low"], 0.0);
+  EXPECT_EQ(result["wilson_high"], 1.0);
+  EXPECT_TRUE(result["capture_range"].is_null());
+  EXPECT_TRUE(result["tre_of_all_mm"]["median"].is_null());
+  EXPECT_TRUE(result["over_cases"]["rate"]["low"].is_null());
+}
+
+TEST(RegistrationStatistics, OfCasesThatAllSucceedHaveNoSpreadOverCases) {
+  const std::vector<RegistrationRow> rows = {row("field", 0, 1, 0.2, "a"),
+                                             row("field", 0, 1, 0.2, "b")};
+  const json rate = renderer_statistics(rows, "field", {})["over_cases"]["rate"];
+  EXPECT_EQ(rate["low"], 1.0);
+  EXPECT_TRUE(rate["student_low"].is_null());
+}
+
+TEST(Warnings, AreGivenWhereCasesAreTooFew) {
+  EXPECT_THAT(warnings_about_cases(1), testing::ElementsAre(testing::HasSubstr("one case")));
+  EXPECT_THAT(warnings_about_cases(4), testing::ElementsAre(testing::HasSubstr("4 cases: ")));
+  EXPECT_THAT(warnings_about_cases(30), testing::IsEmpty());
 }
 
 TEST(RowProblems, NameDuplicatesAndRowsThatContradictThemselves) {
@@ -208,6 +251,31 @@ TEST(PairedStatistics, TakeOnlyStartsThatBothWereGiven) {
   EXPECT_EQ(test["signed_rank_p"], 1.0);
   EXPECT_EQ(test["margin_mm"], 0.5);
   EXPECT_GT(test["equivalence_power"].get<double>(), 0.0);
+  // One case says nothing about others.
+  EXPECT_TRUE(result["mean_difference_over_cases_mm"]["low"].is_null());
+}
+
+TEST(PairedStatistics, OverCasesResampleCases) {
+  const std::vector<RegistrationRow> rows = {row("field", 0, 1, 0.5, "a"),
+                                             row("raycast", 0, 1, 0.25, "a"),
+                                             row("field", 0, 1, 0.5, "b"),
+                                             row("raycast", 0, 1, 0.75, "b")};
+  const json over = paired_statistics(rows, 0.5)["mean_difference_over_cases_mm"];
+  EXPECT_EQ(over["low"], -0.25);
+  EXPECT_EQ(over["high"], 0.25);
+  EXPECT_NEAR(over["student_high"].get<double>(), 12.7062 * 0.25, 1e-4);
+}
+
+TEST(PairedStatistics, TieInEveryPairAtOnceIsEquivalenceWithoutSpread) {
+  std::vector<RegistrationRow> rows;
+  for (std::int64_t i = 0; i < 3; ++i) {
+    rows.push_back(row("field", i, 1, 0.5));
+    rows.push_back(row("raycast", i, 1, 0.5));
+  }
+  const json test = paired_statistics(rows, 0.1)["test"];
+  EXPECT_EQ(test["t_test_p"], 1.0);
+  EXPECT_EQ(test["signed_rank_p"], 1.0);
+  EXPECT_EQ(test["equivalence_p"], 0.0);
 }
 
 TEST(PairedStatistics, DoNotExistWithoutCommonStarts) {

@@ -51,6 +51,21 @@ TEST(Summary, RefusesNanAndSaysNanOfNothing) {
   EXPECT_TRUE(std::isnan(summarize({1.0}).standard_deviation));
 }
 
+TEST(StudentInterval, EqualsStudentsSleepData) {
+  // The differences of Student's data below; R: t.test() gives -2.4598858 to -0.7001142.
+  const std::vector<double> differences = {
+      -1.2, -2.4, -1.3, -1.3, 0.0, -1.0, -1.8, -0.8, -4.6, -1.4};
+  const MeanInterval interval = student_interval(differences);
+  EXPECT_NEAR(interval.low, -2.4598858, 5e-8);
+  EXPECT_NEAR(interval.high, -0.7001142, 5e-8);
+}
+
+TEST(StudentInterval, DoesNotExistWithoutSpread) {
+  EXPECT_TRUE(std::isnan(student_interval({}).low));
+  EXPECT_TRUE(std::isnan(student_interval(std::vector<double>{0.9}).high));
+  EXPECT_TRUE(std::isnan(student_interval(std::vector<double>{1.0, 1.0, 1.0}).low));
+}
+
 TEST(PairedComparison, EqualsStudentsSleepData) {
   // Student (1908), extra hours of sleep under two drugs; R: t.test(group1, group2, paired = TRUE)
   // gives t = -4.0621, df = 9, p = 0.002833, mean difference -1.58.
@@ -125,6 +140,8 @@ TEST(PairedComparison, HandlesEqualDifferences) {
 }
 
 TEST(PairedComparison, RefusesWhatIsNotPaired) {
+  EXPECT_THROW(compare_paired(std::vector<double>{1, std::nan("")}, std::vector<double>{1, 2}, 0.1),
+               InputError);
   const std::vector<double> values = {1, 2, 3};
   EXPECT_THROW(compare_paired(values, std::span(values).first(2), 1.0), InputError);
   EXPECT_THROW(compare_paired(std::span(values).first(1), std::span(values).first(1), 1.0),

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "support/interval_coverage.h"
+
+#include <cmath>
+#include <span>
+#include <vector>
+
+#include "base/hash_random.h"
+#include "evaluate/bootstrap.h"
+#include "evaluate/statistics.h"
+#include "evaluate/success_rate.h"
+
+namespace af::test {
+namespace {
+
+constexpr double kMeanTreMm = 0.3;
+
+/// What the cases of one study gave.
+struct StudyMeans {
+  std::vector<double> rates;
+  std::vector<double> tre_mm;
+  std::int64_t successes = 0;
+};
+
+StudyMeans simulate(const SimulatedStudies& setting, std::uint64_t study) {
+  HashRandom random(setting.seed, setting.cases, study);
+  const auto starts = static_cast<double>(setting.starts_per_case);
+  const double log_sd = 2.0 * setting.half_spread;
+  StudyMeans means;
+  for (std::size_t i = 0; i < setting.cases; ++i) {
+    const double own_rate =
+        setting.mean_rate + setting.half_spread * (2.0 * random.uniform() - 1.0);
+    const double own_tre_mm =
+        kMeanTreMm * std::exp(log_sd * random.normal() - 0.5 * log_sd * log_sd);
+    int successes = 0;
+    double tre_sum_mm = 0.0;
+    for (int start = 0; start < setting.starts_per_case; ++start) {
+      successes += random.uniform() < own_rate ? 1 : 0;
+      tre_sum_mm += own_tre_mm * random.uniform(0.5, 1.5);
+    }
+    means.rates.push_back(successes / starts);
+    means.tre_mm.push_back(tre_sum_mm / starts);
+    means.successes += successes;
+  }
+  return means;
+}
+
+/// Counts of intervals that hold a truth; comparisons with NaN are false.
+struct Covered {
+  std::uint64_t bootstrap = 0;
+  std::uint64_t student = 0;
+
+  void add(const std::vector<double>& values,
+           double truth,
+           std::uint64_t seed,
+           std::size_t replicates) {
+    const evaluation::CaseBootstrap resampled = evaluation::bootstrap_over_cases(
+        values.size(),
+        [&](std::span<const std::size_t> drawn) {
+          double sum = 0.0;
+          for (const std::size_t index : drawn) sum += values[index];
+          return sum / static_cast<double>(drawn.size());
+        },
+        seed,
+        replicates);
+    bootstrap += resampled.low <= truth && truth <= resampled.high ? 1 : 0;
+    const evaluation::MeanInterval interval = evaluation::student_interval(values);
+    student += interval.low <= truth && truth <= interval.high ? 1 : 0;
+  }
+};
+
+}  // namespace
+
+IntervalCoverage interval_coverage(const SimulatedStudies& setting) {
+  std::uint64_t wilson = 0;
+  Covered rate;
+  Covered tre;
+  const std::int64_t trials =
+      static_cast<std::int64_t>(setting.cases) * static_cast<std::int64_t>(setting.starts_per_case);
+  for (std::uint64_t study = 0; study < setting.studies; ++study) {
+    const StudyMeans means = simulate(setting, study);
+    const evaluation::ProportionInterval interval =
+        evaluation::wilson_interval(means.successes, trials);
+    wilson += interval.low <= setting.mean_rate && setting.mean_rate <= interval.high ? 1 : 0;
+    rate.add(means.rates, setting.mean_rate, study, setting.replicates);
+    tre.add(means.tre_mm, kMeanTreMm, study, setting.replicates);
+  }
+  const auto share = [&](std::uint64_t count) {
+    return static_cast<double>(count) / static_cast<double>(setting.studies);
+  };
+  return {share(wilson),
+          share(rate.bootstrap),
+          share(rate.student),
+          share(tre.bootstrap),
+          share(tre.student)};
+}
+
+}  // namespace af::test

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace af::test {
+
+/// Simulated studies of a number of patients, who differ: each has a success rate of its own,
+/// uniform in mean_rate +- half_spread, and a mean TRE of its own, log-normal about 0.3 mm with a
+/// standard deviation of the logarithm of 2 half_spread; every start is an independent draw (of TRE
+/// uniform in 0.5 to 1.5 times the patient's).
+struct SimulatedStudies {
+  std::size_t cases = 4;
+  int starts_per_case = 24;
+  double mean_rate = 0.8;
+  double half_spread = 0.2;  ///< 0: starts of all patients are alike, that is independent
+  std::uint64_t studies = 2000;
+  std::uint64_t seed = 1;
+  std::size_t replicates = 2000;  ///< of the bootstrap
+};
+
+/// Shares of the studies whose 95 % intervals hold the truth. An interval that does not exist holds
+/// nothing.
+struct IntervalCoverage {
+  double wilson_rate = 0.0;     ///< of the success rate, taking all starts as independent
+  double bootstrap_rate = 0.0;  ///< of the success rate, over cases
+  double student_rate = 0.0;
+  double bootstrap_tre = 0.0;  ///< of the mean TRE, over cases
+  double student_tre = 0.0;
+};
+
+IntervalCoverage interval_coverage(const SimulatedStudies& setting);
+
+}  // namespace af::test
