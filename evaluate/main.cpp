@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/app_main.h"
 #include "evaluate/compare_command.h"
+#include "evaluate/error_budget_command.h"
 #include "evaluate/field_parameters_command.h"
 #include "evaluate/image_quality_command.h"
 #include "evaluate/method_options_command.h"
@@ -23,6 +24,8 @@ int main(int argc, char** argv) {
   const CLI::App* field_parameters_command = bind_field_parameters(app, field_parameters);
   af::evaluation::CompareOptions compare;
   const CLI::App* compare_command = bind_compare(app, compare);
+  af::evaluation::ErrorBudgetOptions error_budget;
+  const CLI::App* error_budget_command = bind_error_budget(app, error_budget);
   af::evaluation::ReportOptions report;
   const CLI::App* report_command = bind_report(app, report);
   af::registration::MethodOptions method;
@@ -35,6 +38,7 @@ int main(int argc, char** argv) {
     if (field_parameters_command->parsed())
       run_field_parameters(field_parameters, command_line, world);
     if (compare_command->parsed()) run_compare(compare, world);
+    if (error_budget_command->parsed()) run_error_budget(error_budget, command_line, world);
     if (method_command->parsed()) af::evaluation::show_method(method, world);
     if (report_command->parsed()) run_report(report, world);
   });

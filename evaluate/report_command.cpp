@@ -51,8 +51,9 @@ std::string report_page(const std::vector<EvaluationRun>& runs,
   const std::string heading = title.empty() ? default_title(runs) : title;
   std::string body = header(runs, heading) + summary_section(runs);
   for (const EvaluationRun* run : runs_of(runs, "registration")) body += registration_section(*run);
-  body += similarity_section(runs) + image_quality_section(runs) + field_parameters_section(runs) +
-          xray_section(runs) + definitions_section() + provenance_section(runs, output);
+  body += error_budget_section(runs) + similarity_section(runs) + image_quality_section(runs) +
+          field_parameters_section(runs) + xray_section(runs) + definitions_section() +
+          provenance_section(runs, output);
   body += element("footer",
                   "Made by af-evaluate " + escaped(program_version()) +
                       ". Research software, not a medical device. This file holds everything it "

@@ -55,11 +55,12 @@ std::vector<EvaluationRun> find_runs(const std::vector<std::filesystem::path>& f
                       run.summary.value("format_version", json()).dump());
     const json kind = run.summary.value("kind", json());
     if (kind != "image-quality" && kind != "registration" && kind != "similarity-curves" &&
-        kind != "field-parameters")
-      throw FileError(path.string(),
-                      "kind",
-                      "image-quality, registration, similarity-curves or field-parameters",
-                      kind.dump());
+        kind != "field-parameters" && kind != "error-budget")
+      throw FileError(
+          path.string(),
+          "kind",
+          "image-quality, registration, similarity-curves, field-parameters or error-budget",
+          kind.dump());
     run.kind = kind.get<std::string>();
     runs.push_back(std::move(run));
   }

@@ -30,6 +30,9 @@ std::string similarity_section(const std::vector<EvaluationRun>& runs);
 /// Image quality and cost of fields against their parameters; HTML, empty without such runs.
 std::string field_parameters_section(const std::vector<EvaluationRun>& runs);
 
+/// What each part of the chain from CT to pose adds to the error; HTML, empty without such runs.
+std::string error_budget_section(const std::vector<EvaluationRun>& runs);
+
 /// How the X-rays of the registration runs were made; HTML.
 std::string xray_section(const std::vector<EvaluationRun>& runs);
 

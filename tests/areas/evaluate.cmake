@@ -11,6 +11,7 @@ af_add_test(
           unit/evaluate/bootstrap_test.cpp
           support/interval_coverage.cpp
           unit/evaluate/registration_errors_test.cpp
+          unit/evaluate/error_budget_test.cpp
           unit/evaluate/similarity_curve_test.cpp
           unit/evaluate/drr_comparison_test.cpp
   LIBS af_evaluation)

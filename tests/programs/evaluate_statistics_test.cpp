@@ -277,6 +277,43 @@ TEST_F(HandBuiltResults, AreRefusedWhenTheStartsThemselvesAreAmbiguous) {
   EXPECT_THAT(run.output, HasSubstr("starts.csv:3"));
 }
 
+TEST_F(HandBuiltResults, InAChainGiveTheKnownErrorBudget) {
+  const auto budget = [&](const std::string& first, const std::string& second) {
+    return test::run_command(
+        std::string(AF_PROGRAM_FOLDER "/af-evaluate error-budget --step 'as it "
+                                      "was=") +
+        path(first) + "' --step 'moved=" + path(second) + "' -o " + path("budget"));
+  };
+  ASSERT_EQ(evaluate("--case perfect").exit_code, 0);
+  std::filesystem::rename(path("out"), path("first"));
+  // Every end of the case 0.25 mm farther along the same axis.
+  const std::string before = pose_text(0.5);
+  const std::string after = pose_text(0.75);
+  for (auto at = poses_.find(before); at != std::string::npos;
+       at = poses_.find(before, at + after.size()))
+    poses_.replace(at, before.size(), after);
+  ASSERT_EQ(evaluate("--case perfect").exit_code, 0);
+  const test::ProgramRun run = budget("first", "out");
+  ASSERT_EQ(run.exit_code, 0) << run.output;
+  EXPECT_THAT(run.output,
+              HasSubstr("| moved | 20 of 20 | 0.250 +- 0.000 | 0.750 | 0.000 | 0.750 |"));
+  const json steps = json::parse(read_text_file(path("budget/summary.json")))["steps"];
+  // Final parameters are written in degrees and read back: rounding of poses of 1 mm.
+  EXPECT_NEAR(steps[1]["shift_mm"].get<double>(), 0.25, 1e-12);
+  EXPECT_NEAR(steps[0]["bias_mm"].get<double>(), 0.5, 1e-12);
+  // In the report, too.
+  ASSERT_EQ(test::run_command(std::string(AF_PROGRAM_FOLDER "/af-evaluate report ") +
+                              path("budget") + " -o " + path("budget.html"))
+                .exit_code,
+            0);
+  EXPECT_NE(read_text_file(path("budget.html")).find("Error budget"), std::string::npos);
+
+  ASSERT_EQ(evaluate("--case mixed").exit_code, 0);
+  const test::ProgramRun refused = budget("first", "out");
+  EXPECT_EQ(refused.exit_code, 3);
+  EXPECT_THAT(refused.output, HasSubstr("must be from the same starts"));
+}
+
 TEST_F(HandBuiltResults, GiveAReportAlsoWhenNothingSucceeded) {
   ASSERT_EQ(evaluate("--case hopeless").exit_code, 0);
   const test::ProgramRun run =

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "geometry/rigid_transform.h"
+
+namespace af::evaluation {
+
+/// The ends of one way of registering, from a table of starts that all ways share.
+struct BudgetRun {
+  std::string label;  ///< what is different from the run before
+  /// Per start, relative to the gold pose; nullopt: no success.
+  std::vector<std::optional<PoseParameters>> ends;
+};
+
+/// What one change did. Distances are mean TREs (mm) between two poses over the target points.
+struct BudgetStep {
+  std::string label;
+  std::size_t starts = 0;
+  std::size_t successes = 0;
+  PoseParameters mean_end;  ///< over the common starts, relative to gold
+  double bias_mm = 0.0;     ///< of the mean end from the gold pose: the systematic error
+  double scatter_mm = 0.0;  ///< of an end from the mean end, on average: the optimiser's
+  double tre_mm = 0.0;      ///< of an end from the gold pose, on average: both
+  double shift_mm = 0.0;    ///< of the mean end from the previous run's; NaN for the first
+  double shift_standard_error_mm = 0.0;  ///< of the shift, from its spread over the starts
+};
+
+struct ErrorBudget {
+  /// Starts from which every run succeeded: the only ones that count beyond `successes`.
+  std::size_t common_starts = 0;
+  std::vector<BudgetStep> steps;
+};
+
+/// Walks through a chain of runs, each of which differs from the one before in one thing, and tells
+/// how far each change moves the mean end: as signed parameters these shifts add up to the bias of
+/// the last run exactly. Throws InputError for fewer than two runs, unequal numbers of starts, no
+/// target points, or fewer than two common starts.
+/// \test ErrorBudget.OfHandBuiltEndsIsTheKnownOne
+ErrorBudget error_budget(std::span<const BudgetRun> runs,
+                         const PoseFrame& gold,
+                         std::span<const Eigen::Vector3d> target_points_ct_mm);
+
+}  // namespace af::evaluation

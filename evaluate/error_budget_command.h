@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "parallel/communicator.h"
+
+namespace af::evaluation {
+
+/// `af-evaluate error-budget` as typed.
+struct ErrorBudgetOptions {
+  std::vector<std::string> steps;  ///< LABEL=RUN each, in the order of the chain
+  std::filesystem::path output_folder;
+};
+
+/// Adds the subcommand; returns it.
+CLI::App* bind_error_budget(CLI::App& app, ErrorBudgetOptions& options);
+
+/// Collective. How far each change of a chain of finished registration runs of one case moves the
+/// mean end, beside the optimiser's scatter and the gold standard's own uncertainty: prints
+/// error-budget.md and writes it, error-budget.csv, summary.json and reproduce.sh. InputError: runs
+/// of several cases or methods, or from other starts.
+void run_error_budget(const ErrorBudgetOptions& options,
+                      const std::string& command_line,
+                      const Communicator& world);
+
+}  // namespace af::evaluation

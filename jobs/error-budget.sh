@@ -1,0 +1,146 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# What each part of the chain from CT to pose adds to the error of a registration: one thing is changed after the other,
+# and every change is registered from the same starts.
+set -euo pipefail
+# shellcheck source-path=SCRIPTDIR
+source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
+
+usage() {
+  cat <<'TEXT'
+Usage: jobs/error-budget.sh [OPTIONS] [-- METHOD OPTIONS OF af-evaluate]
+
+Simulates three X-ray pairs of one CT at one pose (ideal; with the tube's spectrum; with everything), builds three fields
+per camera, draws starts, registers seven times from these and prints the error budget. What is finished is kept.
+
+  --output DIR              where everything goes                                            [./error-budget]
+  --ct PATH                 the CT                                                   [a patient's skull CT]
+  --starts-per-interval N   in each of --intervals intervals of 2 mm                                     [6]
+  --intervals N                                                                                          [4]
+  --fine-step-mm X          step of ray casting where casting shall add nothing                       [0.25]
+  --ranks N                 MPI ranks                                                           [all cores]
+  --seed N                  of everything random                                                         [1]
+  --quick                   small fields, 2 starts, coarse steps: whether it works
+  --help
+
+The method is a pyramid of gradient correlation by Gauss-Newton that ends on the pixels of the X-rays themselves, unless
+METHOD OPTIONS name another, such as `-- --preset paper`.
+TEXT
+}
+
+output="$PWD/error-budget" ct="" starts_per_interval=6 intervals=4 fine_step_mm=0.25 seed=1
+ranks=$(core_count)
+field_size=(--uv-nodes 64 --st-nodes 256) codewords=16384 most_codewords=65536
+method=(--chain "gc gauss-newton level=2 pixels=8 roi=2 final=0.2; gc gauss-newton level=1 pixels=4 final=0.1; gc gauss-newton pixels=2 step=2 final=0.01")
+
+need_value() { (($2 >= 2)) || die 2 "option $1 needs a value (try --help)"; }
+while (($# > 0)); do
+  case "$1" in
+    --output | -o) need_value "$1" $#; output=$2; shift ;;
+    --ct) need_value "$1" $#; ct=$2; shift ;;
+    --starts-per-interval) need_value "$1" $#; starts_per_interval=$2; shift ;;
+    --intervals) need_value "$1" $#; intervals=$2; shift ;;
+    --fine-step-mm) need_value "$1" $#; fine_step_mm=$2; shift ;;
+    --ranks | -n) need_value "$1" $#; ranks=$2; shift ;;
+    --seed) need_value "$1" $#; seed=$2; shift ;;
+    --quick)
+      starts_per_interval=1 intervals=2 fine_step_mm=2 codewords=512 most_codewords=1024
+      field_size=(--uv-nodes 16 --st-nodes 64)
+      ;;
+    --help | -h) usage; exit 0 ;;
+    --) shift; method=("$@"); break ;;
+    *) die 2 "unknown option '$1' (try --help)" ;;
+  esac
+  shift
+done
+
+if [[ -f "$af_root/CMakeLists.txt" ]]; then
+  bin="$af_root/build/release/bin"
+else
+  bin="$(cd "$af_root/../.." && pwd)/bin"
+fi
+[[ -x "$bin/af-evaluate" ]] || die 1 "$bin/af-evaluate is missing: build it first"
+mkdir -p "$output/logs" "$output/studies" "$output/fields" "$output/runs"
+output="$(cd "$output" && pwd)"
+
+# make RESULT COMMAND...: unless RESULT is there, which the programs put in place only when it is complete.
+make() {
+  local result="$output/$1" log="$output/logs/${1//\//-}.log" start=$SECONDS status=0
+  shift
+  [[ ! -e "$result" ]] || return 0
+  say "${result#"$output"/} ..."
+  "$@" >"$log" 2>&1 || status=$?
+  if ((status != 0)); then
+    tail -n 5 "$log" >&2
+    die "$status" "it failed with exit code $status; its log is $log"
+  fi
+  say "    $(duration $((SECONDS - start)))"
+}
+
+if [[ -z "$ct" ]]; then
+  ct="$output/skull.mhd"
+  make skull.mhd "$af_root/jobs/default-ct.sh" "$ct"
+fi
+
+# --- the same patient, pose and cameras in three pairs of X-rays ---------------------------------------------------
+
+simulate() {
+  local name=$1
+  shift
+  make "studies/$name" "$bin/af-simulate" --ct "$ct" --case patient --seed "$seed" -o "$output/studies/$name" "$@"
+}
+nothing=(--no-fiducials --scatter-to-primary 0 --photons-per-pixel 0 --blur-sigma-px 0 --bits 0)
+simulate ideal "${nothing[@]}" --tube-kvp 0
+simulate spectrum "${nothing[@]}"
+simulate xrays
+
+# --- three fields per camera: by the reference caster, by shear-warp, and as they are shipped -----------------------
+
+field_options=()
+field() {
+  local name=$1 camera
+  shift
+  field_options=()
+  for camera in A B; do
+    make "fields/$name-$camera.af.h5" run_ranks "$ranks" "$bin/af-precompute" --study "$output/studies/xrays/study.toml" \
+      --camera "$camera" --max-rotation-deg 10 --max-translation-mm 30 "${field_size[@]}" --seed "$seed" "$@" \
+      -o "$output/fields/$name-$camera.af.h5"
+    field_options+=(--field "$camera=$output/fields/$name-$camera.af.h5")
+  done
+}
+
+# --- registrations from the same starts ----------------------------------------------------------------------------
+
+starts=()
+register() {
+  local name=$1 study=$2
+  shift 2
+  make "runs/$name/summary.json" run_ranks "$ranks" "$bin/af-evaluate" registration \
+    --study "$output/studies/$study/study.toml" --gold study "${method[@]}" --intervals "$intervals" \
+    --starts-per-interval "$starts_per_interval" --seed "$seed" "${starts[@]}" "$@" -o "$output/runs/$name"
+}
+
+field shipped --codewords "$codewords"
+make runs/starts/starts.csv "$bin/af-evaluate" registration --study "$output/studies/xrays/study.toml" --gold study \
+  "${field_options[@]}" --intervals "$intervals" --starts-per-interval "$starts_per_interval" --seed "$seed" \
+  --starts-only -o "$output/runs/starts"
+starts=(--starts-from "$output/runs/starts/starts.csv")
+register field-shipped xrays "${field_options[@]}"
+field shear-warp --codewords "$most_codewords"
+register field-shear-warp xrays "${field_options[@]}"
+field trilinear --codewords "$most_codewords" --caster trilinear
+register field-trilinear xrays "${field_options[@]}"
+register raycast xrays --renderer raycast
+register raycast-fine xrays --renderer raycast --step-mm "$fine_step_mm"
+register raycast-spectrum spectrum --renderer raycast --step-mm "$fine_step_mm"
+register raycast-ideal ideal --renderer raycast --step-mm "$fine_step_mm"
+
+"$bin/af-evaluate" error-budget \
+  --step "method alone: ray casting every $fine_step_mm mm, ideal X-rays=$output/runs/raycast-ideal" \
+  --step "HU model: the tube's spectrum=$output/runs/raycast-spectrum" \
+  --step "X-rays: scatter, noise, blur, grey levels, pins=$output/runs/raycast-fine" \
+  --step "casting: every 1 mm=$output/runs/raycast" \
+  --step "interpolation: field of the reference caster, $most_codewords codewords=$output/runs/field-trilinear" \
+  --step "casting of fields: shear-warp=$output/runs/field-shear-warp" \
+  --step "quantisation: $codewords codewords=$output/runs/field-shipped" \
+  -o "$output/budget"
