@@ -53,6 +53,7 @@ std::vector<std::size_t> common_starts(std::span<const BudgetRun> runs) {
 
 std::vector<PoseParameters> ends_of(const BudgetRun& run, const std::vector<std::size_t>& starts) {
   std::vector<PoseParameters> ends;
+  ends.reserve(starts.size());
   for (const std::size_t start : starts) ends.push_back(*run.ends[start]);
   return ends;
 }

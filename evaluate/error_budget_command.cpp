@@ -29,11 +29,9 @@ constexpr std::array<const char*, 6> kParameterNames = {
 
 /// A run of the chain as its folder has it.
 struct ChainRun {
-  std::string label;
-  std::filesystem::path folder;
-  json summary;
+  EvaluationRun files;
   std::string starts_text;
-  std::vector<std::optional<PoseParameters>> ends;
+  BudgetRun budget;
 };
 
 std::optional<PoseParameters> end_of(const CsvTable& table, std::size_t row) {
@@ -48,19 +46,17 @@ ChainRun read_run(const std::string& step) {
   const std::size_t equals = step.find('=');
   if (equals == std::string::npos || equals == 0)
     throw InputError("--step", step, "must be LABEL=RUN");
-  ChainRun run;
-  run.label = step.substr(0, equals);
-  run.folder = step.substr(equals + 1);
-  const std::vector<EvaluationRun> found = find_runs({run.folder});
+  const std::vector<EvaluationRun> found = find_runs({step.substr(equals + 1)});
   if (found.size() != 1 || found.front().kind != "registration")
     throw InputError("--step", step, "must name the folder of one finished registration run");
-  run.summary = found.front().summary;
-  if (run.summary.at("cases").size() != 1 || run.summary.at("renderers").size() != 1)
+  const EvaluationRun& files = found.front();
+  if (files.summary.at("cases").size() != 1 || files.summary.at("renderers").size() != 1)
     throw InputError("--step", step, "must be of one case and one renderer");
-  run.starts_text = read_text_file(run.folder / "starts.csv");
-  const CsvTable table = CsvTable::read(run.folder / "registrations.csv");
-  for (std::size_t row = 0; row < table.row_count(); ++row) run.ends.push_back(end_of(table, row));
-  return run;
+  const CsvTable table = CsvTable::read(files.folder / "registrations.csv");
+  BudgetRun budget = {step.substr(0, equals), {}};
+  for (std::size_t row = 0; row < table.row_count(); ++row)
+    budget.ends.push_back(end_of(table, row));
+  return {files, read_text_file(files.folder / "starts.csv"), budget};
 }
 
 /// Starts are poses: the same ones mean the same case and gold pose, too.
@@ -69,20 +65,21 @@ void require_same_starts(const std::vector<ChainRun>& runs) {
     if (run.starts_text != runs.front().starts_text)
       throw InputError(
           "--step",
-          run.label,
+          run.budget.label,
           "must be from the same starts and gold pose as the first run; the starts.csv "
           "differ",
-          run.folder.string());
+          run.files.folder.string());
 }
 
 ErrorBudget budget_of(const std::vector<ChainRun>& runs) {
-  const Study study = read_study(runs.front().summary.at("study").get<std::string>());
-  const json& of_case = runs.front().summary.at("cases").front();
+  const Study study = read_study(runs.front().files.summary.at("study").get<std::string>());
+  const json& of_case = runs.front().files.summary.at("cases").front();
   const StudyCase& study_case = study.find_case(of_case.at("case").get<std::string>());
   const GoldStandard gold =
       gold_standard(study, study_case, of_case.at("gold").at("source").get<std::string>());
   std::vector<BudgetRun> budget_runs;
-  for (const ChainRun& run : runs) budget_runs.push_back({run.label, run.ends});
+  budget_runs.reserve(runs.size());
+  for (const ChainRun& run : runs) budget_runs.push_back(run.budget);
   return error_budget(budget_runs,
                       PoseFrame::about(gold.room_from_ct, study_case.center_ct_mm),
                       target_points(study_case.target_box_ct));
@@ -127,7 +124,7 @@ CsvTable budget_table(const ErrorBudget& budget) {
 json gold_of(const std::vector<ChainRun>& runs) {
   json result;
   for (const ChainRun& run : runs) {
-    const json& gold = run.summary.at("cases").front().at("gold");
+    const json& gold = run.files.summary.at("cases").front().at("gold");
     if (gold.contains("uncertainty")) result = gold;
   }
   return result;
@@ -137,8 +134,8 @@ json summary_json(const std::vector<ChainRun>& runs, const ErrorBudget& budget) 
   json summary = {{"format", "attenuation-fields evaluation"},
                   {"format_version", 1},
                   {"kind", "error-budget"},
-                  {"case", runs.front().summary.at("cases").front().at("case")},
-                  {"method", runs.back().summary.at("method")},
+                  {"case", runs.front().files.summary.at("cases").front().at("case")},
+                  {"method", runs.back().files.summary.at("method")},
                   {"common_starts", budget.common_starts},
                   {"gold", gold_of(runs)}};
   for (const BudgetStep& step : budget.steps) summary["steps"].push_back(step_json(step));
@@ -204,8 +201,8 @@ void run_error_budget(const ErrorBudgetOptions& options,
                              {}};
     for (const std::string& step : options.steps) {
       runs.push_back(read_run(step));
-      provenance.input_sha256[runs.back().label] =
-          sha256_of_file((runs.back().folder / "registrations.csv").string());
+      provenance.input_sha256[runs.back().budget.label] =
+          sha256_of_file((runs.back().files.folder / "registrations.csv").string());
     }
     require_same_starts(runs);
     const ErrorBudget budget = budget_of(runs);

@@ -358,6 +358,7 @@ json paired_statistics(const std::vector<RegistrationRow>& rows,
                  {"pairs", both}};
   if (both >= 2) result["test"] = test_json(field_tre_mm, raycast_tre_mm, margin_mm);
   std::vector<CaseMean> case_differences_mm;
+  case_differences_mm.reserve(differences_mm.size());
   for (const auto& [name, difference_mm] : differences_mm)
     case_differences_mm.push_back(difference_mm);
   result["mean_difference_over_cases_mm"] = interval_over_cases(case_differences_mm, seed);

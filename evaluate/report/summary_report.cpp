@@ -106,6 +106,13 @@ std::string seconds_tile(const json& renderer) {
               method_name(renderer) + ", median");
 }
 
+/// What the gold standard adds by itself, to stand beside an error.
+std::string gold_text(const json& renderer) {
+  const json gold_mm = renderer.value("gold_uncertainty_mm", json());
+  return gold_mm.is_number() ? "; the gold standard by itself: " + decimals(gold_mm, 2) + " mm"
+                             : "";
+}
+
 /// Success, error and time of the first method, time of the others.
 std::string registration_tiles(const EvaluationRun& run) {
   const json& renderers = run.summary.at("renderers");
@@ -118,7 +125,7 @@ std::string registration_tiles(const EvaluationRun& run) {
                       tile(decimals(first.at("tre_of_successes_mm").at("mean"), 2),
                            "mm",
                            "mean error of successes",
-                           method_name(first));
+                           method_name(first) + gold_text(first));
   for (const json& renderer : renderers) tiles += seconds_tile(renderer);
   return tiles;
 }
