@@ -3,13 +3,16 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
+#include <chrono>
 #include <cmath>
 #include <exception>
+#include <tuple>
 #include <utility>
 
 #include "base/error.h"
+#include "cli/app_main.h"
 #include "cli/progress_printer.h"
+#include "evaluate/failure_trace_files.h"
 #include "evaluate/method_loading.h"
 #include "evaluate/row_gathering_program.h"
 #include "evaluate/target_box.h"
@@ -17,6 +20,7 @@
 #include "io/picture.h"
 #include "parallel/work_queue.h"
 #include "register/result_files.h"
+#include "register/slicer_files.h"
 
 namespace af::evaluation {
 namespace {
@@ -63,6 +67,16 @@ StratifiedStarts draw_starts(const RegistrationStudyOptions& options,
 void assign_starts(const RegistrationStudyOptions& options,
                    const StratifiedStarts& starts,
                    Method& method) {
+  if (options.only_start.has_value()) {
+    const auto index = static_cast<std::size_t>(*options.only_start);
+    if (index >= starts.starts.size())
+      throw InputError(
+          "--only-start",
+          std::to_string(index),
+          "must be less than the number of starts, " + std::to_string(starts.starts.size()));
+    method.start_indices = {index};
+    return;
+  }
   const bool is_reduced = options.renderer == "both" && method.renderer == "raycast";
   const int intervals =
       is_reduced ? options.raycast_intervals.value_or(options.intervals) : options.intervals;
@@ -94,6 +108,28 @@ void add_result(const RegistrationResult& result,
   measure_pose(result.room_from_ct, yardstick, row);
 }
 
+/// The row of one start, without its case; of a failure with its trace.
+RegistrationRow traced_row(Method& method,
+                           const PerturbedStart& start,
+                           std::size_t index,
+                           const Yardstick& yardstick) {
+  std::vector<registration::TraceRow> trace;
+  RegistrationRow row = registered_row(
+      [&](const RigidTransform& room_from_ct) {
+        RegistrationResult result =
+            method.runner.run(room_from_ct, static_cast<std::int64_t>(index));
+        trace = result.trace;
+        return result;
+      },
+      start,
+      yardstick);
+  row.renderer = method.renderer;
+  row.start_index = static_cast<std::int64_t>(index);
+  if (!row.is_success())
+    row.trace = trace_points(trace, method.runner.problem().frame(), yardstick);
+  return row;
+}
+
 /// Collective. Registers every start of one method; `first_order` numbers its rows. Methods go one
 /// after the other: blocks of the work queue then hold work of one duration.
 void register_with(Method& method,
@@ -106,22 +142,57 @@ void register_with(Method& method,
   const auto count = static_cast<std::int64_t>(method.start_indices.size());
   cli::ProgressPrinter printer("case " + case_name + ", " + method.renderer + " registrations",
                                world.is_root());
+  std::size_t traced = 0;
   const auto work = [&](std::int64_t item) {
     const std::size_t index = method.start_indices[static_cast<std::size_t>(item)];
-    RegistrationRow row = registered_row(
-        [&](const RigidTransform& start) {
-          return method.runner.run(start, static_cast<std::int64_t>(index));
-        },
-        starts.starts[index],
-        yardstick);
+    RegistrationRow row = traced_row(method, starts.starts[index], index, yardstick);
     row.case_name = case_name;
-    row.renderer = method.renderer;
-    row.start_index = static_cast<std::int64_t>(index);
+    // Items come in order: a rank's first failures are its share of the first of all.
+    if (!row.trace.empty() && ++traced > kMostTraces) row.trace.clear();
     mine.push_back(packed_row(static_cast<std::int64_t>(first_order + index), row));
   };
   for_each_item(world, count, work, [&](std::int64_t done) {
     printer.update(static_cast<double>(done), static_cast<double>(count));
   });
+}
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// Rank 0 says how long each method will take, from a sample: one registration by fields; by ray
+/// casting, where that would be long, one similarity for each of the poses that the sample tried.
+/// A sample that fails says nothing: the run itself will tell why.
+void announce_times(std::vector<Method>& methods,
+                    const std::string& case_name,
+                    const StratifiedStarts& starts,
+                    const Communicator& world) {
+  // What the presets try at the median, where no field gives a sample.
+  double poses_tried = 400.0;
+  for (Method& method : methods) {
+    if (!world.is_root() || method.start_indices.size() < 2) continue;
+    const std::size_t index = method.start_indices[method.start_indices.size() / 2];
+    const RigidTransform& start = starts.starts[index].room_from_ct;
+    double seconds = 0.0;
+    try {
+      const auto begin = std::chrono::steady_clock::now();
+      if (method.renderer == "field") {
+        poses_tried = method.runner.run(start, static_cast<std::int64_t>(index)).evaluations;
+        seconds = seconds_since(begin);
+      } else {
+        std::ignore = method.runner.similarity_at(start);
+        seconds = poses_tried * seconds_since(begin);
+      }
+    } catch (const std::exception&) {
+      continue;
+    }
+    cli::info(
+        world,
+        cli::expected_time_text("case " + case_name + ", " + method.renderer + " registrations",
+                                static_cast<std::int64_t>(method.start_indices.size()),
+                                seconds,
+                                world.size()));
+  }
 }
 
 /// Collective. All rows on rank 0, by renderer and start index.
@@ -135,15 +206,8 @@ std::vector<RegistrationRow> register_all(const std::string& case_name,
     register_with(methods[m], case_name, starts, yardstick, m * starts.starts.size(), world, mine);
   std::vector<RegistrationRow> rows;
   for (const json& packed : gather_rows(world, mine)) rows.push_back(row_of(packed));
+  for (const Method& method : methods) keep_first_traces(rows, method.renderer);
   return rows;
-}
-
-std::string file_name_part(std::string name) {
-  for (char& character : name) {
-    const auto code = static_cast<unsigned char>(character);
-    if (std::isalnum(code) == 0 && character != '-' && character != '_') character = '_';
-  }
-  return name;
 }
 
 void draw_xrays(const registration::RegistrationProblem& problem,
@@ -167,8 +231,10 @@ void draw_xrays(const registration::RegistrationProblem& problem,
       {{"file", name}, {"case", evaluation.case_name}, {"which", "xrays"}});
 }
 
-/// Overlays of the best, median and worst registration of the first renderer.
+/// Overlays of the best, median and worst registration of the first renderer, and what Slicer loads
+/// of each.
 void draw_overlays(const Method& method,
+                   const StudyCase& study_case,
                    const Yardstick& yardstick,
                    const std::filesystem::path& folder,
                    CaseEvaluation& evaluation) {
@@ -185,6 +251,8 @@ void draw_overlays(const Method& method,
     const RegistrationRow& row = *by_tre[position];
     const RigidTransform pose = pose_from_parameters(
         yardstick.gold_frame, PoseParameters::from_deg_and_mm(row.final_deg_mm));
+    const std::string slicer = "slicer/" + file_name_part(evaluation.case_name) + "-" + which;
+    registration::write_slicer_folder(method.runner.problem(), pose, study_case, folder / slicer);
     for (const registration::RegistrationView& view : method.runner.problem().views) {
       const std::string& camera = view.view.camera.name;
       const std::string name = file_name_part(evaluation.case_name) + "-" + which + "-" +
@@ -198,6 +266,7 @@ void draw_overlays(const Method& method,
                                      {"case", evaluation.case_name},
                                      {"which", which},
                                      {"camera", camera},
+                                     {"slicer", slicer},
                                      {"renderer", row.renderer},
                                      {"start_index", row.start_index},
                                      {"initial_tre_mm", row.initial_tre_mm},
@@ -270,11 +339,12 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
   });
   if (options.is_starts_only) return evaluation;
   const Yardstick yardstick = yardstick_of(study, study_case, evaluation.gold);
+  announce_times(methods, study_case.name, evaluation.starts, world);
   evaluation.rows = register_all(study_case.name, methods, evaluation.starts, yardstick, world);
   all_or_none(world, [&] {
     if (!world.is_root()) return;
     draw_xrays(methods.front().runner.problem(), options.output_folder, evaluation);
-    draw_overlays(methods.front(), yardstick, options.output_folder, evaluation);
+    draw_overlays(methods.front(), study_case, yardstick, options.output_folder, evaluation);
   });
   return evaluation;
 }

@@ -12,6 +12,7 @@
 #include "evaluate/statistics.h"
 #include "io/csv_table.h"
 #include "io/gnuplot_figure.h"
+#include "io/output_file.h"
 
 namespace af::evaluation {
 namespace {
@@ -63,6 +64,12 @@ std::vector<double> box_row(double x, std::vector<double> values) {
           summary.median};
 }
 
+/// The numbers of a figure, as CSV beside it.
+void write_figure_table(const std::filesystem::path& path_without_extension,
+                        const CsvTable& table) {
+  write_text_file(path_without_extension.string() + ".csv", table.to_text());
+}
+
 /// The bar that a TRE falls into, 0.25 mm wide; the last is for all beyond and for NaN.
 constexpr double kBarWidthMm = 0.25;
 constexpr std::size_t kBars = 20;
@@ -87,6 +94,7 @@ void draw_psnr_boxes(const std::vector<PsnrGroup>& groups,
                        std::max(460, 240 + 170 * static_cast<int>(groups.size())),
                        kHeightPx);
   std::vector<std::vector<double>> boxes;
+  CsvTable table({"group", "psnr_db"});
   std::string tics;
   double lowest = 35.0;
   double highest = 45.0;
@@ -98,6 +106,7 @@ void draw_psnr_boxes(const std::vector<PsnrGroup>& groups,
     for (std::size_t i = 0; i < values.size(); ++i) {
       HashRandom jitter(g, i);
       dots.push_back({x + jitter.uniform(-0.13, 0.13), values[i]});
+      table.add_row({groups[g].label, number_text(values[i])});
       lowest = std::min(lowest, values[i] - 1.0);
       highest = std::max(highest, values[i] + 1.0);
     }
@@ -127,6 +136,7 @@ void draw_psnr_boxes(const std::vector<PsnrGroup>& groups,
   parts.push_back("$boxes using 1:6:6:6:6 with candlesticks lw 4 lc " + color_of(1));
   figure.add("set style fill empty\nplot " + joined(parts));
   figure.write(path_without_extension);
+  write_figure_table(path_without_extension, table);
 }
 
 void draw_success_rates(const std::vector<OutcomeGroup>& groups,
@@ -135,6 +145,8 @@ void draw_success_rates(const std::vector<OutcomeGroup>& groups,
                         const std::filesystem::path& path_without_extension) {
   GnuplotFigure figure("Success against initial error", kWidthPx, kHeightPx);
   std::vector<std::string> parts;
+  CsvTable table(
+      {"group", "low_mm", "high_mm", "starts", "successes", "rate", "wilson_low", "wilson_high"});
   for (std::size_t g = 0; g < groups.size(); ++g) {
     std::vector<std::vector<double>> rows;
     const double shift_mm =
@@ -142,6 +154,14 @@ void draw_success_rates(const std::vector<OutcomeGroup>& groups,
     for (const IntervalSuccess& interval :
          success_per_interval(groups[g].outcomes, intervals, width_mm)) {
       if (interval.trials == 0) continue;
+      table.add_row({groups[g].label,
+                     number_text(interval.low_mm),
+                     number_text(interval.high_mm),
+                     std::to_string(interval.trials),
+                     std::to_string(interval.successes),
+                     number_text(interval.rate()),
+                     number_text(interval.wilson.low),
+                     number_text(interval.wilson.high)});
       rows.push_back({(interval.low_mm + interval.high_mm) / 2 + shift_mm,
                       100 * interval.rate(),
                       100 * interval.wilson.low,
@@ -161,6 +181,7 @@ void draw_success_rates(const std::vector<OutcomeGroup>& groups,
              "plot " +
              joined(parts));
   figure.write(path_without_extension);
+  write_figure_table(path_without_extension, table);
 }
 
 void draw_tre_histogram(const std::vector<OutcomeGroup>& groups,
@@ -169,6 +190,7 @@ void draw_tre_histogram(const std::vector<OutcomeGroup>& groups,
   std::vector<std::string> parts;
   const auto group_count = static_cast<double>(groups.size());
   const double bar_mm = 0.84 * kBarWidthMm / group_count;
+  CsvTable table({"group", "low_mm", "high_mm", "starts", "share"});
   for (std::size_t g = 0; g < groups.size(); ++g) {
     std::array<double, kBars + 1> counts{};
     for (const TreOutcome& outcome : groups[g].outcomes) counts[bar_of(outcome.tre_mm)] += 1.0;
@@ -178,8 +200,15 @@ void draw_tre_histogram(const std::vector<OutcomeGroup>& groups,
       const double center_mm =
           (static_cast<double>(bar) + 0.5) * kBarWidthMm + (bar == kBars ? 0.25 : 0.0);
       const auto total = static_cast<double>(groups[g].outcomes.size());
-      rows.push_back({center_mm + bar_mm * (static_cast<double>(g) - (group_count - 1) / 2),
-                      total > 0 ? 100 * counts[bar] / total : 0.0});
+      const double share = total > 0 ? counts[bar] / total : 0.0;
+      rows.push_back(
+          {center_mm + bar_mm * (static_cast<double>(g) - (group_count - 1) / 2), 100 * share});
+      const double low_mm = static_cast<double>(bar) * kBarWidthMm;
+      table.add_row({groups[g].label,
+                     number_text(low_mm),
+                     bar == kBars ? "inf" : number_text(low_mm + kBarWidthMm),
+                     number_text(counts[bar]),
+                     number_text(share)});
     }
     const std::string name = "bars" + std::to_string(g);
     figure.add_data(name, rows);
@@ -200,6 +229,7 @@ void draw_tre_histogram(const std::vector<OutcomeGroup>& groups,
                       "right offset -0.7,0"));
   figure.add("plot " + joined(parts));
   figure.write(path_without_extension);
+  write_figure_table(path_without_extension, table);
 }
 
 void draw_tre_scatter(const std::vector<OutcomeGroup>& groups,
@@ -207,17 +237,22 @@ void draw_tre_scatter(const std::vector<OutcomeGroup>& groups,
                       const std::filesystem::path& path_without_extension) {
   GnuplotFigure figure("Error before and after registration", kWidthPx, kHeightPx);
   std::vector<std::string> parts;
+  CsvTable table({"group", "initial_tre_mm", "tre_mm"});
   // Below 0.05 mm nothing more is told apart; the axis ends there.
   constexpr double kLowestMm = 0.05;
   for (std::size_t g = 0; g < groups.size(); ++g) {
     std::vector<std::vector<double>> rows;
-    for (const TreOutcome& outcome : groups[g].outcomes)
+    for (const TreOutcome& outcome : groups[g].outcomes) {
+      table.add_row(
+          {groups[g].label, number_text(outcome.initial_tre_mm), number_text(outcome.tre_mm)});
       if (std::isfinite(outcome.tre_mm))
         rows.push_back({outcome.initial_tre_mm, std::max(kLowestMm, outcome.tre_mm)});
+    }
     const std::string name = "starts" + std::to_string(g);
     figure.add_data(name, rows);
-    parts.push_back("$" + name + " using 1:2 with points pt " + std::to_string(g == 0 ? 6 : 2) +
-                    " ps 0.6 lw 2 lc " + color_of(g) + " title " + gnuplot_quoted(groups[g].label));
+    parts.push_back("$" + name + " using 1:2 with points pt " + std::to_string(g == 0 ? 7 : 9) +
+                    " ps " + (g == 0 ? "0.4" : "0.6") + " lc " + color_of(g) + " title " +
+                    gnuplot_quoted(groups[g].label));
   }
   parts.push_back("x > " + number_text(kLowestMm) + " ? x : 1/0 with lines lw 1 dt 3 lc " +
                   quiet() + " notitle");
@@ -229,11 +264,13 @@ void draw_tre_scatter(const std::vector<OutcomeGroup>& groups,
       "reverse Left samplen 1\nset samples 400\nset arrow from graph 0, first " +
       number_text(kSuccessTreMm) + " to graph 1, first " + number_text(kSuccessTreMm) +
       " nohead dt 2 lw 1.5 lc " + quiet());
-  figure.add(label_at("success below", "graph 0.99, first 2.1", "right"));
+  figure.add(label_at(
+      "success below", "graph 0.99, first " + number_text(kSuccessTreMm), "right offset 0,-0.6"));
   figure.add(label_at(
       "no change", "graph 0.985, first " + number_text(largest_initial_mm * 1.25), "right"));
   figure.add("plot " + joined(parts));
   figure.write(path_without_extension);
+  write_figure_table(path_without_extension, table);
 }
 
 void draw_curve_panels(const std::vector<CurvePanel>& panels,

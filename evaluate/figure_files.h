@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The figures of the paper's evaluation, as SVG and PNG.
+// The figures of the paper's evaluation, as SVG and PNG; those without a table of their own beside
+// them also as CSV of what is drawn.
 #pragma once
 
 #include <filesystem>

@@ -31,6 +31,7 @@ int main(int argc, char** argv) {
   af::registration::MethodOptions method;
   const CLI::App* method_command = af::evaluation::bind_show_method(app, method);
   const std::string command_line = af::cli::command_line(argc, argv);
+  registration.program = af::cli::shell_quoted(argv[0]);
   return af::cli::app_main(app, argc, argv, [&](const af::Communicator& world) {
     if (image_quality_command->parsed()) run_image_quality(image_quality, command_line, world);
     if (registration_command->parsed()) run_registration(registration, command_line, world);

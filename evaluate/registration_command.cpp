@@ -12,6 +12,8 @@
 #include "base/error.h"
 #include "cli/app_main.h"
 #include "evaluate/case_evaluation_program.h"
+#include "evaluate/failed_start_files.h"
+#include "evaluate/failure_trace_files.h"
 #include "evaluate/figure_files.h"
 #include "evaluate/method_loading.h"
 #include "evaluate/pose_results_program.h"
@@ -35,6 +37,31 @@ json simulation_of(const Study& study) {
   json provenance = json::parse(read_text_file(path), nullptr, false);
   if (!provenance.is_object() || provenance.value("program", "") != "af-simulate") return nullptr;
   return provenance;
+}
+
+/// Options that the command for one start alone has of its own, or does not need.
+const std::set<std::string> kNotOfRepeats = {"--case",
+                                             "--renderer",
+                                             "--starts-from",
+                                             "--starts-per-interval",
+                                             "--start-rule",
+                                             "--starts-only",
+                                             "--only-start",
+                                             "--raycast-starts-per-interval",
+                                             "--raycast-intervals",
+                                             "--output"};
+
+/// What repeat_command() makes the command for one start of; null for another program's poses.
+json repeat_json(const RegistrationStudyOptions& options) {
+  if (!options.poses_from.empty()) return nullptr;
+  const std::filesystem::path folder =
+      std::filesystem::absolute(options.output_folder).lexically_normal();
+  return {{"command",
+           "cd " + cli::shell_quoted(std::filesystem::current_path().string()) + " && " +
+               options.program + " registration" + options.shared_by_repeats + " --starts-from " +
+               cli::shell_quoted((folder / "starts.csv").string())},
+          {"renderer", options.renderer},
+          {"output", (folder / "repeats").string()}};
 }
 
 json case_json(const CaseEvaluation& evaluation) {
@@ -118,7 +145,20 @@ json summary_json(const RegistrationStudyOptions& options,
   summary["field_against_raycast"] =
       paired_statistics(rows, options.equivalence_margin_mm, options.method.seed);
   summary["figures"] = {"success-rate", "tre-histogram", "tre-scatter"};
+  summary["repeat"] = repeat_json(options);
+  if (options.only_start.has_value()) summary["only_start"] = *options.only_start;
   return summary;
+}
+
+void write_traces(const std::filesystem::path& folder, const std::vector<RegistrationRow>& rows) {
+  // Those of an earlier run would be taken for this one's.
+  std::filesystem::remove_all(folder / "traces");
+  for (const RegistrationRow& row : rows) {
+    if (row.trace.empty()) continue;
+    make_output_folder(folder / "traces");
+    write_text_file(folder / trace_file(row.case_name, row.renderer, row.start_index),
+                    trace_table(row.trace).to_text());
+  }
 }
 
 void print_outcome(const json& summary,
@@ -187,6 +227,8 @@ std::vector<std::string> problems(const RegistrationStudyOptions& options) {
   if (!(options.equivalence_margin_mm > 0.0) || !std::isfinite(options.equivalence_margin_mm))
     found.push_back("--equivalence-margin-mm = " + number_text(options.equivalence_margin_mm) +
                     ": must be positive");
+  if (options.only_start.has_value() && *options.only_start < 0)
+    found.push_back("--only-start = " + std::to_string(*options.only_start) + ": must be >= 0");
   if (!options.poses_from.empty() && options.starts_from.empty())
     found.push_back("--poses-from = '" + options.poses_from.string() +
                     "': needs --starts-from, the starts.csv that the poses were found from");
@@ -210,6 +252,7 @@ std::string to_toml(const RegistrationStudyOptions& options) {
       << options.start_rule << "\"\n";
   if (!options.starts_from.empty())
     out << "starts_from = " << std::quoted(options.starts_from.string()) << '\n';
+  if (options.only_start.has_value()) out << "only_start = " << *options.only_start << '\n';
   if (!options.poses_from.empty())
     out << "poses_from = " << std::quoted(options.poses_from.string())
         << "\nmethod_name = " << std::quoted(options.method_name) << '\n';
@@ -256,6 +299,10 @@ CLI::App* bind_registration(CLI::App& app, RegistrationStudyOptions& options) {
   command->add_flag("--starts-only",
                     options.is_starts_only,
                     "Write starts.csv, for other programs, and register nothing");
+  command->add_option("--only-start",
+                      options.only_start,
+                      "Register from this start alone, its start_index in starts.csv, by every "
+                      "renderer: repeats one row of a run");
   command->add_option("--poses-from",
                       options.poses_from,
                       "Evaluate the poses that another program found from --starts-from, without "
@@ -281,6 +328,9 @@ CLI::App* bind_registration(CLI::App& app, RegistrationStudyOptions& options) {
   command->add_option("--seed", options.method.seed, "Of the starts, and of what cma-es draws")
       ->capture_default_str();
   command->add_option("-o,--output", options.output_folder, "Folder for the results")->required();
+  command->parse_complete_callback([&options, command] {
+    options.shared_by_repeats = cli::given_options(*command, kNotOfRepeats);
+  });
   return command;
 }
 
@@ -338,6 +388,7 @@ void run_registration(const RegistrationStudyOptions& options,
                                      evaluation.input_sha256.end());
     }
     write_text_file(folder / "registrations.csv", registrations_table(rows).to_text());
+    write_traces(folder, rows);
     draw_figures(options, rows);
     write_reproduce_script(folder, provenance);
     json summary = summary_json(options, study, evaluations, rows);

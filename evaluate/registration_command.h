@@ -26,10 +26,13 @@ struct RegistrationStudyOptions : MethodOptions {
   std::string start_rule = "stratified";           ///< or "uniform" in initial TRE
   std::filesystem::path starts_from;               ///< starts.csv instead of drawn ones
   bool is_starts_only = false;                     ///< write starts.csv and register nothing
+  std::optional<std::int64_t> only_start;          ///< of the table of starts, by every renderer
   std::filesystem::path poses_from;                ///< poses that another program found
   std::string method_name = "poses";               ///< what these are called
   double equivalence_margin_mm = 0.1;
   std::filesystem::path output_folder;
+  std::string program = "af-evaluate";  ///< as typed, quoted for a shell
+  std::string shared_by_repeats;        ///< options as typed but those of starts and output
 
   /// Methods in the order of rows: "field" before "raycast"; with poses_from method_name alone.
   [[nodiscard]] std::vector<std::string> renderers() const;

@@ -17,6 +17,30 @@ void append_numbers(std::vector<std::string>& fields, const std::array<double, 6
   for (const double value : values) fields.push_back(number_text(value));
 }
 
+json packed_trace(const std::vector<TracePoint>& trace) {
+  json packed = json::array();
+  for (const TracePoint& point : trace)
+    packed.push_back({point.stage,
+                      point.step_mm,
+                      point.poses_tried,
+                      point.similarity,
+                      point.deg_mm,
+                      point.tre_mm});
+  return packed;
+}
+
+std::vector<TracePoint> trace_of(const json& packed) {
+  std::vector<TracePoint> trace;
+  for (const json& point : packed)
+    trace.push_back({point[0].get<int>(),
+                     point[1].get<double>(),
+                     point[2].get<std::int64_t>(),
+                     point[3].get<double>(),
+                     point[4].get<std::array<double, 6>>(),
+                     point[5].get<double>()});
+  return trace;
+}
+
 }  // namespace
 
 json packed_row(std::int64_t order, const RegistrationRow& row) {
@@ -32,7 +56,8 @@ json packed_row(std::int64_t order, const RegistrationRow& row) {
           row.errors.values(),
           {row.evaluations, row.inadmissible, row.drr_count},
           row.stop_reason,
-          row.error};
+          row.error,
+          packed_trace(row.trace)};
 }
 
 RegistrationRow row_of(const json& packed) {
@@ -57,6 +82,7 @@ RegistrationRow row_of(const json& packed) {
   row.drr_count = counts[2];
   row.stop_reason = packed[11].get<std::string>();
   row.error = packed[12].get<std::string>();
+  row.trace = trace_of(packed[13]);
   return row;
 }
 
@@ -94,7 +120,7 @@ CsvTable registrations_table(const std::vector<RegistrationRow>& rows) {
     fields.push_back(number_text(row.similarity));
     fields.push_back(std::to_string(row.evaluations));
     fields.push_back(row.stop_reason);
-    fields.emplace_back(row.tre_mm < kSuccessTreMm ? "1" : "0");
+    fields.emplace_back(row.is_success() ? "1" : "0");
     fields.push_back(std::to_string(row.interval));
     fields.push_back(std::to_string(row.draw_index));
     fields.push_back(number_text(row.stated_pose_tre_mm));

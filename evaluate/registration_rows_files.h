@@ -15,6 +15,16 @@
 
 namespace af::evaluation {
 
+/// One step of a search that failed.
+struct TracePoint {
+  int stage = 0;  ///< from 1, counted over the chains
+  double step_mm = 0.0;
+  std::int64_t poses_tried = 0;  ///< so far, all stages
+  double similarity = 0.0;
+  std::array<double, 6> deg_mm{};  ///< relative to gold, about the ROI centre
+  double tre_mm = 0.0;
+};
+
 /// One registration as evaluated. Without an end pose (stop reasons of failed registrations)
 /// similarity, TRE and final parameters are NaN.
 struct RegistrationRow {
@@ -36,8 +46,11 @@ struct RegistrationRow {
   std::int64_t inadmissible = 0;
   std::int64_t drr_count = 0;
   std::string stop_reason;
-  std::string error;     ///< message of a registration that threw
-  double seconds = 0.0;  ///< wall time
+  std::string error;              ///< message of a registration that threw
+  double seconds = 0.0;           ///< wall time
+  std::vector<TracePoint> trace;  ///< of some failures, see failure_trace_files.h
+
+  [[nodiscard]] bool is_success() const { return tre_mm < kSuccessTreMm; }
 };
 
 /// A row to be sent between ranks, and back; element 0 is `order`.

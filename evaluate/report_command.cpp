@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "evaluate/report_command.h"
 
-#include <functional>
 #include <iostream>
 #include <set>
+#include <string_view>
 
 #include "base/build_info.h"
 #include "base/error.h"
@@ -43,32 +43,61 @@ std::string header(const std::vector<EvaluationRun>& runs, const std::string& ti
                              "quiet"));
 }
 
+/// Links to the sections of a page, from their headings.
+std::string contents(const std::string& sections) {
+  constexpr std::string_view kOpening = "<h2 id=\"";
+  std::string items;
+  for (std::size_t at = sections.find(kOpening); at != std::string::npos;
+       at = sections.find(kOpening, at + 1)) {
+    const std::size_t id = at + kOpening.size();
+    const std::size_t id_end = sections.find('"', id);
+    const std::size_t text = sections.find('>', id_end) + 1;
+    items += element("li",
+                     "<a href=\"#" + sections.substr(id, id_end - id) + "\">" +
+                         sections.substr(text, sections.find("</h2>", text) - text) + "</a>");
+  }
+  return "<nav aria-label=\"Contents\">" + element("ul", items) + "</nav>\n";
+}
+
 }  // namespace
 
-std::string report_page(const std::vector<EvaluationRun>& runs,
+std::string report_page(std::vector<EvaluationRun> runs,
                         const std::filesystem::path& output,
                         const std::string& title) {
+  const std::filesystem::path page = std::filesystem::weakly_canonical(output);
+  const std::filesystem::path figures = page.parent_path() / (page.stem().string() + "-figures");
+  for (EvaluationRun& run : runs) run.page_folder = page.parent_path();
   const std::string heading = title.empty() ? default_title(runs) : title;
-  std::string body = header(runs, heading) + summary_section(runs);
-  for (const EvaluationRun* run : runs_of(runs, "registration")) body += registration_section(*run);
-  body += error_budget_section(runs) + similarity_section(runs) + image_quality_section(runs) +
-          field_parameters_section(runs) + xray_section(runs) + definitions_section() +
-          provenance_section(runs, output);
-  body += element("footer",
-                  "Made by af-evaluate " + escaped(program_version()) +
-                      ". Research software, not a medical device. This file holds everything it "
-                      "shows and opens without a network.");
+  const auto registrations = runs_of(runs, "registration");
+  std::string sections = comparison_section(runs, figures);
+  for (const EvaluationRun* run : registrations)
+    sections += registration_section(
+        *run, registrations.size() == 1 ? "Registration accuracy" : "Registration: " + run->name);
+  sections += error_budget_section(runs) + similarity_section(runs) +
+              image_quality_section(runs, figures) + field_parameters_section(runs) +
+              xray_section(runs) + definitions_section() + provenance_section(runs);
+  const std::string footer =
+      element("footer",
+              "Made by af-evaluate " + escaped(program_version()) +
+                  ". Research software, not a medical device. This file holds everything it shows "
+                  "and opens without a network; links lead to files beside it.");
   return "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
          "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n" +
          element("title", escaped(heading)) + element("style", report_style()) +
-         "</head>\n<body>\n" + element("main", body) + "</body>\n</html>\n";
+         "</head>\n<body>\n" +
+         element("main",
+                 header(runs, heading) + summary_section(runs) + contents(sections) + sections +
+                     footer) +
+         element("script", report_script()) + "</body>\n</html>\n";
 }
 
 CLI::App* bind_report(CLI::App& app, ReportOptions& options) {
   CLI::App* command = app.add_subcommand(
       "report",
-      "One self-contained HTML page of finished runs: findings in plain words, figures, tables, "
-      "overlays, provenance; opens offline, prints well");
+      "One self-contained HTML page of finished runs, side by side when there are several: "
+      "findings "
+      "in plain words, figures, tables that sort, overlays, failures with their searches and the "
+      "commands that repeat them, provenance; opens offline, prints well");
   command->add_option("RUN", options.runs, "Folders of finished runs, searched with all below them")
       ->required();
   command->add_option("-o,--output", options.output, "The page to write")->capture_default_str();

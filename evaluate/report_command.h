@@ -22,8 +22,9 @@ struct ReportOptions {
 /// Adds the subcommand; returns it.
 CLI::App* bind_report(CLI::App& app, ReportOptions& options);
 
-/// The whole page, self-contained: style, figures and pictures are part of it.
-std::string report_page(const std::vector<EvaluationRun>& runs,
+/// The whole page, self-contained: style, figures and pictures are part of it. Figures that join
+/// several runs are also left beside it, in `output`'s name with "-figures" for its extension.
+std::string report_page(std::vector<EvaluationRun> runs,
                         const std::filesystem::path& output,
                         const std::string& title);
 

@@ -15,7 +15,8 @@ base_packages=(
   invesalius-examples
 )
 benchmark_packages=(plastimatch libfaiss-dev libopenblas-dev)
-lint_packages=(clang-format-14 clang-tidy-14 shellcheck)
+# Formatter, linters, and the browser that opens the report in a test.
+lint_packages=(clang-format-14 clang-tidy-14 shellcheck chromium)
 
 usage() {
   cat <<'TEXT'
@@ -24,7 +25,8 @@ Usage: jobs/install-packages.sh [--with-lint] [--with-benchmarks] [--check] [--h
 Installs the Debian 12 packages that the project needs to build, run and pass its tests. Says what it does; does
 nothing when all are there. Needs root or sudo only to install.
 
-  --with-lint         also the formatter and the linters (clang-format-14, clang-tidy-14, shellcheck)
+  --with-lint         also the formatter, the linters and the browser that checks reports (clang-format-14, clang-tidy-14,
+                      shellcheck, chromium)
   --with-benchmarks   also what tests/benchmark/run.sh compares with (plastimatch, Faiss, OpenBLAS)
   --check             only say what is missing; exit 1 when something is
 TEXT

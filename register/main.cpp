@@ -11,6 +11,7 @@
 #include "register/method_command.h"
 #include "register/multi_start_program.h"
 #include "register/register_command.h"
+#include "register/slicer_files.h"
 #include "register/target_errors_program.h"
 
 namespace {
@@ -118,6 +119,11 @@ void run(const RegisterOptions& options,
                               options.method.seed,
                               world.size(),
                               loaded.input_sha256};
+    // Before result.json: when that is there, everything is.
+    write_slicer_folder(*loaded.problem,
+                        records[best_record(records)].result.room_from_ct,
+                        study_case,
+                        options.output_folder / "slicer");
     std::cout << write_run(records, *loaded.problem, description, options.output_folder);
   });
 }
@@ -131,7 +137,8 @@ int main(int argc, char** argv) {
   CLI::App app{
       "Finds the pose of a CT in the room from calibrated X-rays (2D-3D registration).\n"
       "Writes result.json, pose.toml, result.tfm (ct_from_room, for Slicer), one overlay picture "
-      "per view and reproduce.sh; with --starts also registrations.csv."};
+      "per view, slicer/ (a folder that 3D Slicer loads) and reproduce.sh; with --starts also "
+      "registrations.csv."};
   bind_options(app, options);
   const std::string command_line = af::cli::command_line(argc, argv);
   return af::cli::app_main(

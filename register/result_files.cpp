@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <sstream>
 
@@ -50,15 +49,6 @@ json trace_json(const std::vector<TraceRow>& trace) {
     rows.push_back(entry);
   }
   return rows;
-}
-
-/// A camera's name as part of a file name.
-std::string file_name_part(std::string name) {
-  for (char& character : name) {
-    const auto code = static_cast<unsigned char>(character);
-    if (std::isalnum(code) == 0 && character != '-' && character != '_') character = '_';
-  }
-  return name;
 }
 
 /// gain and offset that bring `from` to `to` by least squares; gain 0 when `from` is constant.
@@ -207,7 +197,7 @@ void write_overlay(const RegistrationView& view,
   Image2d drr = render_image(*view.renderer, room_from_ct, view.view, &rays_outside);
   const auto drr_window = percentile_window(drr);
   PicturePanel drr_panel{drr, drr_window[0], drr_window[1], "DRR", "", {}, {}};
-  drr_panel.caption = "U " + short_text(drr_window[0]) + " to " + short_text(drr_window[1]);
+  drr_panel.caption = "attenuation";
   if (rays_outside > 0)
     drr_panel.caption += ", " + std::to_string(rays_outside) + " rays outside the field";
   const auto [gain, offset] = linear_fit(drr, xray);
@@ -217,9 +207,8 @@ void write_overlay(const RegistrationView& view,
   const auto xray_window = percentile_window(xray);
   const double half_range = (xray_window[1] - xray_window[0]) / 4.0;
   const int field_px = std::max(1, std::max(xray.width, xray.height) / kCheckerFields);
-  PicturePanel xray_panel{xray, xray_window[0], xray_window[1], "X-ray", "", {}, {}};
-  xray_panel.caption =
-      "attenuation " + short_text(xray_window[0]) + " to " + short_text(xray_window[1]);
+  const PicturePanel xray_panel{
+      xray, xray_window[0], xray_window[1], "X-ray", "attenuation", {}, {}};
   const PicturePanel checker_panel{checkerboard(xray, drr, field_px),
                                    0.0,
                                    1.0,
@@ -231,8 +220,9 @@ void write_overlay(const RegistrationView& view,
                                       -half_range,
                                       half_range,
                                       "Difference",
-                                      "X-ray - (" + short_text(gain) + " DRR + " +
-                                          short_text(offset) + "), +-" + short_text(half_range),
+                                      "X-ray - (" + short_text(gain) + " DRR " +
+                                          (offset < 0.0 ? "- " : "+ ") +
+                                          short_text(std::abs(offset)) + "), attenuation",
                                       PicturePanel::Colors::Diverging,
                                       {}};
   const int zoom = std::max(1, 300 / std::max(1, std::max(xray.width, xray.height)));

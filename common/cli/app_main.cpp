@@ -11,16 +11,6 @@ namespace af::cli {
 
 namespace {
 
-std::string shell_quoted(const std::string& word) {
-  const std::string plain =
-      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-+=:,./@%";
-  if (!word.empty() && word.find_first_not_of(plain) == std::string::npos) return word;
-  std::string quoted = "'";
-  for (const char character : word)
-    quoted += character == '\'' ? std::string("'\\''") : std::string(1, character);
-  return quoted + "'";
-}
-
 std::string program_name(const std::string& path) {
   return path.substr(path.find_last_of('/') + 1);
 }
@@ -73,6 +63,28 @@ int app_main(CLI::App& app,
   std::cerr << app.get_name() << ": rank " << world.rank() << ": " << failure.message << std::endl;
   MpiEnvironment::abort(failure.exit_code);
   return failure.exit_code;
+}
+
+std::string shell_quoted(const std::string& word) {
+  const std::string plain =
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-+=:,./@%";
+  if (!word.empty() && word.find_first_not_of(plain) == std::string::npos) return word;
+  std::string quoted = "'";
+  for (const char character : word)
+    quoted += character == '\'' ? std::string("'\\''") : std::string(1, character);
+  return quoted + "'";
+}
+
+std::string given_options(const CLI::App& command, const std::set<std::string>& left_out) {
+  std::string line;
+  for (const CLI::Option* option : command.get_options()) {
+    if (option->count() == 0 || left_out.contains(option->get_name())) continue;
+    const std::string name = shell_quoted(option->get_name());
+    const bool is_flag = option->get_expected_max() == 0;
+    for (const std::string& value : option->results())
+      line += " " + name + (is_flag ? "" : " " + shell_quoted(value));
+  }
+  return line;
 }
 
 std::string command_line(int argc, char** argv) {

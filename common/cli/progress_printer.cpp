@@ -55,6 +55,18 @@ ProgressCallback ProgressPrinter::callback() {
   return [this](double done, double total) { update(done, total); };
 }
 
+std::string expected_time_text(const std::string& what,
+                               std::int64_t count,
+                               double seconds_each,
+                               int ranks) {
+  const double rounds = std::ceil(static_cast<double>(count) / ranks);
+  char each[32];
+  std::snprintf(each, sizeof(each), "%.*f ms", seconds_each < 0.01 ? 1 : 0, 1000 * seconds_each);
+  return what + ": " + std::to_string(count) + ", about " + duration_text(rounds * seconds_each) +
+         " on " + std::to_string(ranks) + (ranks == 1 ? " rank" : " ranks") + " (" +
+         (seconds_each < 1.0 ? std::string(each) : duration_text(seconds_each)) + " each)";
+}
+
 std::string duration_text(double seconds) {
   char text[64];
   if (seconds < 60.0) {

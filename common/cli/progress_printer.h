@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <string>
 
 #include "base/progress.h"
@@ -30,6 +31,12 @@ class ProgressPrinter {
   std::chrono::steady_clock::time_point start_;
   std::chrono::steady_clock::time_point last_print_;
 };
+
+/// "poses compared: 98, about 1 min 20 s on 2 ranks (1.6 s each)".
+std::string expected_time_text(const std::string& what,
+                               std::int64_t count,
+                               double seconds_each,
+                               int ranks);
 
 /// "1 h 05 min", "3 min 20 s", "12.4 s".
 std::string duration_text(double seconds);

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <optional>
 
+#include <Eigen/Geometry>
+
 #include "base/error.h"
 #include "io/dicom_pixels.h"
 #include "io/image_header.h"
@@ -125,6 +127,24 @@ void write_image(const Image2d& image,
                               ValueType::Float32,
                               column_spacing_mm,
                               row_spacing_mm);
+  append(raw.values, image.pixels);
+  write_raw_image(raw, path);
+}
+
+void write_image_in_space(const Image2d& image, const fs::path& path, const ImagePlane& plane) {
+  refuse_png(path);
+  check_is_image(image);
+  RawImage raw = raw_image_of({extent(image.width), extent(image.height), 1},
+                              ValueType::Float32,
+                              plane.spacing_mm.x(),
+                              plane.spacing_mm.y());
+  const auto values_of = [](const Eigen::Vector3d& vector) {
+    return std::vector<double>(vector.begin(), vector.end());
+  };
+  raw.origin_mm = values_of(plane.origin_mm);
+  raw.directions = {values_of(plane.column_direction),
+                    values_of(plane.row_direction),
+                    values_of(plane.column_direction.cross(plane.row_direction))};
   append(raw.values, image.pixels);
   write_raw_image(raw, path);
 }

@@ -6,6 +6,8 @@
 #include <span>
 #include <vector>
 
+#include <Eigen/Core>
+
 #include "image/image2d.h"
 
 namespace af {
@@ -22,6 +24,19 @@ void write_image(const Image2d& image,
                  const std::filesystem::path& path,
                  double column_spacing_mm,
                  double row_spacing_mm);
+
+/// Where an image lies in space, LPS mm.
+struct ImagePlane {
+  Eigen::Vector3d origin_mm = Eigen::Vector3d::Zero();          ///< centre of pixel (0, 0)
+  Eigen::Vector3d column_direction = Eigen::Vector3d::UnitX();  ///< unit, of increasing column
+  Eigen::Vector3d row_direction = Eigen::Vector3d::UnitY();     ///< unit, of increasing row
+  Eigen::Vector2d spacing_mm = Eigen::Vector2d::Ones();         ///< column, row
+};
+
+/// An image as a 3-D one of a single slice, 1 mm thick, where it lies in space; .mha .nii.gz .nrrd.
+void write_image_in_space(const Image2d& image,
+                          const std::filesystem::path& path,
+                          const ImagePlane& plane);
 
 /// Several images of one size as one 3-D stack; same formats.
 void write_image_stack(const std::vector<Image2d>& images,

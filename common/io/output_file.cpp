@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/output_file.h"
 
+#include <cctype>
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
@@ -156,6 +157,14 @@ std::string read_text_file(const std::filesystem::path& path, std::size_t max_by
     text.append(buffer.data(), count);
   }
   return text;
+}
+
+std::string file_name_part(std::string name) {
+  for (char& character : name) {
+    const auto code = static_cast<unsigned char>(character);
+    if (std::isalnum(code) == 0 && character != '-' && character != '_') character = '_';
+  }
+  return name;
 }
 
 void make_output_folder(const std::filesystem::path& folder) {

@@ -21,6 +21,9 @@ void write_text_file(const std::filesystem::path& path, std::string_view text);
 /// The whole file as text; FileError when unreadable or larger than `max_bytes`.
 std::string read_text_file(const std::filesystem::path& path, std::size_t max_bytes = 256u << 20);
 
+/// A name (of a case, a camera) as part of a file name: all but letters, digits, - and _ become _.
+std::string file_name_part(std::string name);
+
 /// Creates a folder with its parents, and checks that files can be made in it.
 void make_output_folder(const std::filesystem::path& folder);
 

@@ -344,12 +344,15 @@ void draw_scale(
     return color_of(width > 1 ? static_cast<double>(x) / (width - 1) : 0.5, panel.colors);
   });
   canvas.outline(x0 - 0.5, y0 - 0.5, width + 1, kBarHeight + 1, kFaintInk, 1.0);
-  const auto short_text = [](double value) {
-    std::string text = number_text(value);
-    constexpr std::size_t kShort = 7;
-    if (text.size() <= kShort || !std::isfinite(value)) return text;
-    const double size = std::abs(value);
-    return fixed_text(value, size >= 1000.0 ? 0 : size >= 10.0 ? 1 : size >= 0.1 ? 3 : 6);
+  // Both ends to the same decimals, which tell a hundredth of the window.
+  const double span = std::abs(panel.high - panel.low);
+  const int decimals = span > 0.0 && std::isfinite(span)
+                           ? std::clamp(2 - static_cast<int>(std::floor(std::log10(span))), 0, 9)
+                           : 3;
+  const auto short_text = [decimals](double value) {
+    const std::string exact = number_text(value);
+    const std::string rounded = std::isfinite(value) ? fixed_text(value, decimals) : exact;
+    return exact.size() < rounded.size() ? exact : rounded;
   };
   const double baseline = y0 + kBarHeight + 3 + font.size_px;
   const std::string high = short_text(panel.high);

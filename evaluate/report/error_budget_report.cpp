@@ -54,7 +54,7 @@ std::string error_budget_section(const std::vector<EvaluationRun>& runs) {
                         run->summary.at("common_starts").dump() +
                         " starts from which every run succeeded.") +
             budget_table(run->summary) + gold_text(run->summary.at("gold"));
-  return text.empty() ? "" : element("h2", "Error budget") + text;
+  return text.empty() ? "" : section_heading("Error budget", "error-budget") + text;
 }
 
 }  // namespace af::evaluation

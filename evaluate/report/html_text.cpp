@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "evaluate/report/html_text.h"
 
+#include <cctype>
 #include <cstddef>
 #include <cstdint>
 
@@ -55,27 +56,50 @@ std::string element(const char* tag, std::string_view content, std::string_view 
   return result + ">" + std::string(content) + "</" + tag + ">\n";
 }
 
-HtmlTable::HtmlTable(std::vector<Column> columns, std::string caption)
-    : columns_(std::move(columns)), caption_(std::move(caption)) {}
+std::string url_of(std::string_view path) {
+  constexpr std::string_view kDigits = "0123456789ABCDEF";
+  std::string result;
+  for (const char character : path) {
+    const auto code = static_cast<unsigned char>(character);
+    if (std::isalnum(code) != 0 || std::string_view("-_.~/").find(character) != std::string::npos) {
+      result += character;
+    } else {
+      result += '%';
+      result += kDigits[code >> 4];
+      result += kDigits[code & 15u];
+    }
+  }
+  return result;
+}
+
+namespace {
+
+std::string class_of(const HtmlTable::Column& column) {
+  if (!column.is_printed) return " class=\"on-screen\"";
+  return column.is_numeric ? " class=\"number\"" : "";
+}
+
+}  // namespace
+
+HtmlTable::HtmlTable(std::vector<Column> columns, std::string title)
+    : columns_(std::move(columns)), title_(std::move(title)) {}
 
 void HtmlTable::add_row(const std::vector<std::string>& cells, std::string_view css_class) {
   check(cells.size() == columns_.size(), "a table row has a cell per column");
   std::string row;
   for (std::size_t i = 0; i < cells.size(); ++i)
-    row += (columns_[i].is_numeric ? "<td class=\"number\">" : "<td>") + cells[i] + "</td>";
+    row += "<td" + class_of(columns_[i]) + ">" + cells[i] + "</td>";
   rows_ += element("tr", row, css_class);
 }
 
 std::string HtmlTable::html() const {
   std::string head;
   for (const Column& column : columns_)
-    head += (column.is_numeric ? "<th scope=\"col\" class=\"number\">" : "<th scope=\"col\">") +
-            escaped(column.title) + "</th>";
-  const std::string caption = caption_.empty() ? "" : element("caption", caption_);
-  return element(
-      "div",
-      element("table", caption + element("thead", element("tr", head)) + element("tbody", rows_)),
-      "scroll");
+    head += "<th scope=\"col\"" + class_of(column) + ">" + escaped(column.title) + "</th>";
+  const std::string table =
+      element("table", element("thead", element("tr", head)) + element("tbody", rows_));
+  return (title_.empty() ? "" : element("p", title_, "table-title")) +
+         element("div", table, "scroll");
 }
 
 std::string definition_list(const std::vector<std::pair<std::string, std::string>>& items) {

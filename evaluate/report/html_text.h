@@ -16,23 +16,30 @@ std::string base64(std::string_view bytes);
 /// <tag class="...">content</tag>; `content` is HTML, an empty class is left out.
 std::string element(const char* tag, std::string_view content, std::string_view css_class = "");
 
-/// An HTML table. Cells are HTML.
+/// A relative path as a link: blanks and what else means something in a URL become %XX.
+std::string url_of(std::string_view path);
+
+/// An HTML table that readers may sort by any column; cells are HTML. A wide one scrolls below its
+/// title.
 class HtmlTable {
  public:
-  /// Column titles are text; numeric columns are right-aligned.
+  /// Column titles are text; numeric columns are right-aligned, and some are not printed.
   struct Column {
     std::string title;
     bool is_numeric = true;
+    bool is_printed = true;
   };
 
-  explicit HtmlTable(std::vector<Column> columns, std::string caption = "");
-  /// `css_class` of the row, e.g. "reference".
+  /// `title` is HTML.
+  explicit HtmlTable(std::vector<Column> columns, std::string title = "");
+  /// `css_class` of the row, e.g. "reference" (which sorting leaves at the end).
   void add_row(const std::vector<std::string>& cells, std::string_view css_class = "");
+  [[nodiscard]] bool empty() const { return rows_.empty(); }
   [[nodiscard]] std::string html() const;
 
  private:
   std::vector<Column> columns_;
-  std::string caption_;
+  std::string title_;
   std::string rows_;
 };
 

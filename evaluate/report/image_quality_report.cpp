@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <cstdlib>
+#include <filesystem>
 
-#include "base/error.h"
 #include "evaluate/figure_files.h"
 #include "evaluate/report/html_text.h"
 #include "evaluate/report/number_html.h"
 #include "evaluate/report/sections_report.h"
 #include "evaluate/summary_files.h"
+#include "io/csv_table.h"
 #include "io/output_file.h"
 
 namespace af::evaluation {
@@ -15,51 +15,34 @@ using nlohmann::json;
 
 namespace {
 
-/// A folder that ends with this object.
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    std::string name = (std::filesystem::temp_directory_path() / "af-report-XXXXXX").string();
-    if (mkdtemp(name.data()) == nullptr) throw FileError(name, "cannot be created");
-    path_ = name;
-  }
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+constexpr const char* kBoxPlotCaption =
+    "<b>PSNR at random poses</b> (the paper's Fig. 8). Box: quartiles and median; whiskers: 5th "
+    "and "
+    "95th percentile; dots: every pose.";
 
-  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
-
-std::string camera_of(const EvaluationRun& run) {
-  return run.summary.at("field").at("camera").get<std::string>();
-}
-
-/// One box plot of all fields, drawn anew from their tables.
-std::string joint_box_plot(const std::vector<const EvaluationRun*>& runs) {
+/// One box plot of all fields; of several drawn anew from their tables.
+std::string joint_box_plot(const std::vector<const EvaluationRun*>& runs,
+                           const std::filesystem::path& figures) {
+  constexpr const char* kAlternative = "Box plots of PSNR";
+  if (runs.size() == 1)
+    return run_figure(*runs.front(), "psnr", kAlternative, kBoxPlotCaption, "narrow");
   std::vector<PsnrGroup> groups;
   for (const EvaluationRun* run : runs) {
     const CsvTable rows = CsvTable::read(run->folder / "image-quality.csv");
-    PsnrGroup group{"camera " + camera_of(*run), {}};
+    PsnrGroup group{field_name(*run), {}};
     for (std::size_t i = 0; i < rows.row_count(); ++i) {
       const std::string& text = rows.text(i, "psnr_db");
       if (text != "nan" && text != "inf") group.psnr_db.push_back(rows.number(i, "psnr_db"));
     }
     groups.push_back(std::move(group));
   }
-  const TemporaryFolder folder;
-  draw_psnr_boxes(groups, folder.path() / "psnr");
-  return figure(read_text_file(folder.path() / "psnr.svg"),
-                "image/svg+xml",
-                "Box plots of PSNR",
-                "<b>PSNR at random poses</b> (the paper's Fig. 8). Box: quartiles and median; "
-                "whiskers: 5th and 95th percentile; dots: every pose.",
-                "narrow");
+  make_output_folder(figures);
+  draw_psnr_boxes(groups, figures / "psnr");
+  return report_figure(figures / "psnr",
+                       runs.front()->page_folder,
+                       kAlternative,
+                       kBoxPlotCaption,
+                       runs.size() > 3 ? "wide" : "narrow");
 }
 
 std::string nodes_text(const json& field) {
@@ -71,7 +54,7 @@ std::string nodes_text(const json& field) {
 }
 
 std::string quality_table(const std::vector<const EvaluationRun*>& runs) {
-  HtmlTable table({{"Camera", false},
+  HtmlTable table({{"Field", false},
                    {"Nodes (u,v), (s,t)", true},
                    {"Codewords", true},
                    {"File (MB)", true},
@@ -91,7 +74,7 @@ std::string quality_table(const std::vector<const EvaluationRun*>& runs) {
     const json& field = summary.at("field");
     const json& psnr = summary.at("psnr_db");
     constexpr double kBytesPerMb = 1e6;
-    table.add_row({escaped(camera_of(*run)),
+    table.add_row({escaped(field_name(*run)),
                    nodes_text(field),
                    field.at("codewords").dump(),
                    decimals(field.at("file_bytes").get<double>() / kBytesPerMb, 1),
@@ -129,7 +112,7 @@ std::string pair_pictures(const EvaluationRun& run) {
     figures += figure(run.file(picture.at("file").get<std::string>()),
                       "image/png",
                       "field and ray cast side by side",
-                      "<b>Camera " + escaped(camera_of(run)) + ", the " +
+                      "<b>" + escaped(field_name(run)) + ", the " +
                           escaped(picture.at("which").get<std::string>()) + " pair.</b> PSNR " +
                           decimals(picture.at("psnr_db"), 1) + " dB.",
                       "picture wide");
@@ -138,16 +121,17 @@ std::string pair_pictures(const EvaluationRun& run) {
 
 }  // namespace
 
-std::string image_quality_section(const std::vector<EvaluationRun>& runs) {
+std::string image_quality_section(const std::vector<EvaluationRun>& runs,
+                                  const std::filesystem::path& figures) {
   const auto qualities = runs_of(runs, "image-quality");
   if (qualities.empty()) return "";
   std::string pictures;
   for (const EvaluationRun* run : qualities) pictures += pair_pictures(*run);
-  return element("h2", "Image quality of the fields") +
+  return section_heading("Image quality of the fields", "image-quality") +
          element("p",
                  "Images looked up in the compressed fields, compared with ray casting through "
                  "the CT at random poses of the fields' whole motion range.") +
-         joint_box_plot(qualities) + quality_table(qualities) +
+         joint_box_plot(qualities, figures) + quality_table(qualities) +
          element("p",
                  "The paper's row: skull, thorax and pelvis, frontal and lateral. Its times are "
                  "those of a 2.2 GHz Xeon of 2005 for 256 × 256 pixels of a "

@@ -111,20 +111,19 @@ std::string hashes_text(const json& hashes) {
 std::string title_of_kind(std::string_view kind) {
   if (kind == "registration") return "Registration";
   if (kind == "similarity-curves") return "Similarity curves";
+  if (kind == "error-budget") return "Error budget";
   return kind == "field-parameters" ? "Field parameters" : "Image quality";
 }
 
-std::string run_provenance(const EvaluationRun& run, const std::filesystem::path& report) {
+std::string run_provenance(const EvaluationRun& run) {
   const json& provenance = run.summary.at("provenance");
   const auto text = [&](const char* key) {
     const json value = provenance.value(key, json());
     return value.is_string() ? escaped(value.get<std::string>()) : escaped(value.dump());
   };
   const json host = provenance.value("host", json::object());
-  const std::filesystem::path folder = std::filesystem::absolute(report).parent_path();
-  const std::string link = (run.folder.lexically_proximate(folder) / "reproduce.sh").string();
-  const std::string name = run.folder.lexically_proximate(folder).string();
-  return element("h3", title_of_kind(run.kind) + ": " + escaped(name)) +
+  const std::string link = run.link("reproduce.sh");
+  return element("h3", title_of_kind(run.kind) + ": " + escaped(run.name)) +
          definition_list(
              {{"Program", text("program") + " " + text("program_version")},
               {"Started (UTC)", text("started_utc")},
@@ -134,30 +133,38 @@ std::string run_provenance(const EvaluationRun& run, const std::filesystem::path
               {"Ranks", text("rank_count")},
               {"Seed", text("seed")},
               {"Inputs, SHA-256", hashes_text(provenance.value("input_sha256", json::object()))},
-              {"Script that repeats it",
-               "<a href=\"" + escaped(link) + "\">" + escaped(link) + "</a>"}}) +
+              {"Script that repeats it", "<a href=\"" + link + "\">" + link + "</a>"}}) +
          element("pre", text("command_line")) + element("pre", text("options_toml"));
 }
 
 }  // namespace
 
 std::string xray_section(const std::vector<EvaluationRun>& runs) {
-  std::string text;
+  // Runs of one study say the same: it is said once, with their names.
+  std::vector<std::pair<std::string, std::string>> texts;
   for (const EvaluationRun* run : runs_of(runs, "registration")) {
     const json& simulation = run->summary.at("simulation");
-    if (simulation.is_object())
-      text += simulation_text(simulation);
+    const std::string text = simulation.is_object()
+                                 ? simulation_text(simulation)
+                                 : element("p",
+                                           "Nothing beside the study says that its X-rays were "
+                                           "simulated: they are taken to be real.");
+    const auto same = std::find_if(
+        texts.begin(), texts.end(), [&](const auto& entry) { return entry.first == text; });
+    if (same == texts.end())
+      texts.emplace_back(text, escaped(run->name));
     else
-      text += element("p",
-                      "Nothing beside the study says that its X-rays were simulated: they are "
-                      "taken to be real.");
+      same->second += ", " + escaped(run->name);
   }
-  if (text.empty()) return "";
-  return "<h2 id=\"xrays\">How the X-rays were made</h2>\n" + text;
+  if (texts.empty()) return "";
+  std::string result = section_heading("How the X-rays were made", "xrays");
+  for (const auto& [text, names] : texts)
+    result += (texts.size() > 1 ? element("h3", names) : "") + text;
+  return result;
 }
 
 std::string definitions_section() {
-  return element("h2", "What the words mean") +
+  return section_heading("What the words mean", "words") +
          definition_list(
              {{"DRR",
                "Digitally reconstructed radiograph: an image of line integrals through the CT, "
@@ -193,10 +200,9 @@ std::string definitions_section() {
                "reference's maximum, over pixels whose ray meets matter; dB."}});
 }
 
-std::string provenance_section(const std::vector<EvaluationRun>& runs,
-                               const std::filesystem::path& report) {
-  std::string text = "<h2 id=\"provenance\">Provenance</h2>\n";
-  for (const EvaluationRun& run : runs) text += run_provenance(run, report);
+std::string provenance_section(const std::vector<EvaluationRun>& runs) {
+  std::string text = section_heading("Provenance", "provenance");
+  for (const EvaluationRun& run : runs) text += run_provenance(run);
   return text;
 }
 

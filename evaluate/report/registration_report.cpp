@@ -8,6 +8,7 @@
 
 #include "evaluate/report/html_text.h"
 #include "evaluate/report/number_html.h"
+#include "evaluate/report/run_report.h"
 #include "evaluate/report/sections_report.h"
 #include "evaluate/summary_files.h"
 
@@ -17,21 +18,6 @@ using nlohmann::json;
 
 namespace {
 
-constexpr std::int64_t kMostFailuresListed = 60;
-
-std::string renderer_title(const json& renderer) {
-  const std::string name = renderer.at("renderer").get<std::string>();
-  return name == "raycast" ? "ray casting" : name;
-}
-
-std::string svg_figure(const EvaluationRun& run,
-                       const std::string& name,
-                       std::string_view alternative,
-                       std::string_view caption,
-                       std::string_view css_class = "") {
-  return figure(run.file(name + ".svg"), "image/svg+xml", alternative, caption, css_class);
-}
-
 std::string bar(double share) {
   return "<span class=\"bar\" style=\"--share:" + decimals(100 * share, 1) + "\"></span>";
 }
@@ -39,7 +25,7 @@ std::string bar(double share) {
 std::string success_table(const json& renderers) {
   std::vector<HtmlTable::Column> columns = {{"Initial TRE (mm)", false}};
   for (const json& renderer : renderers) {
-    columns.push_back({renderer_title(renderer) + ": starts", true});
+    columns.push_back({method_title(renderer) + ": starts", true});
     columns.push_back({"succeeded", true});
     columns.push_back({"rate (95 % interval)", false});
   }
@@ -81,7 +67,7 @@ std::string error_table(const json& renderers) {
   for (const json& renderer : renderers) {
     const json& all = renderer.at("tre_of_all_mm");
     const json& good = renderer.at("tre_of_successes_mm");
-    table.add_row({renderer_title(renderer),
+    table.add_row({method_title(renderer),
                    renderer.at("starts").dump(),
                    decimals(all.at("median"), 2),
                    decimals(all.at("q1"), 2) + "–" + decimals(all.at("q3"), 2),
@@ -104,7 +90,7 @@ std::string capture_text(const json& range) {
 std::string threshold_table(const json& renderers) {
   std::vector<HtmlTable::Column> columns = {{"TRE below", false}};
   for (const json& renderer : renderers)
-    columns.push_back({renderer_title(renderer) + " (95 % interval)", true});
+    columns.push_back({method_title(renderer) + " (95 % interval)", true});
   HtmlTable table(columns, "Share of all starts below other thresholds");
   const std::size_t count = renderers.front().at("thresholds").size();
   for (std::size_t i = 0; i < count; ++i) {
@@ -131,7 +117,7 @@ std::string reason_table(const json& renderers) {
   std::set<std::string> reasons;
   std::vector<HtmlTable::Column> columns = {{"Reason", false}};
   for (const json& renderer : renderers) {
-    columns.push_back({renderer_title(renderer) + ": failures", true});
+    columns.push_back({method_title(renderer) + ": failures", true});
     for (const auto& [reason, count] : renderer.at("failures_by_reason").items())
       reasons.insert(reason);
   }
@@ -158,7 +144,7 @@ std::string other_errors_table(const json& renderers) {
                    {"Bias tx, ty, tz (mm)", true}},
                   "Other errors of successes (means), and the mean signed error of each parameter");
   for (const json& renderer : renderers) {
-    std::vector<std::string> cells = {renderer_title(renderer)};
+    std::vector<std::string> cells = {method_title(renderer)};
     const json& errors = renderer.at("errors_of_successes");
     for (const char* name : {"mrpd_mm",
                              "projection_detector_mm",
@@ -199,7 +185,7 @@ std::string over_cases_text(const json& renderers) {
     const auto cases = rate.at("cases").get<std::int64_t>();
     if (!rate.at("low").is_number()) continue;
     text += element("p",
-                    "<strong>Over patients</strong> (" + renderer_title(renderer) +
+                    "<strong>Over patients</strong> (" + method_title(renderer) +
                         "): resampling the " + std::to_string(cases) +
                         " cases gives a 95 % interval of " + percent(rate.at("low").get<double>()) +
                         " to " + percent(rate.at("high").get<double>()) + " for the success rate." +
@@ -231,7 +217,7 @@ std::string case_table(const json& summary) {
   for (const json& renderer : summary.at("renderers"))
     for (const json& entry : renderer.at("cases"))
       table.add_row({escaped(entry.at("case").get<std::string>()),
-                     renderer_title(renderer),
+                     method_title(renderer),
                      entry.at("starts").dump(),
                      rate_with_interval(entry),
                      decimals(entry.at("tre_of_successes_mm").at("mean"), 2),
@@ -307,36 +293,11 @@ std::string paired_text(const json& paired) {
   return element("p", text + " Starts of one patient are not independent samples of patients.");
 }
 
-std::string failures_table(const EvaluationRun& run) {
-  const CsvTable rows = CsvTable::read(run.folder / "registrations.csv");
-  HtmlTable table({{"Case", false},
-                   {"Method", false},
-                   {"Start", true},
-                   {"Initial TRE (mm)", true},
-                   {"Final TRE (mm)", true},
-                   {"Stopped because", false}});
-  std::int64_t failures = 0;
-  for (std::size_t i = 0; i < rows.row_count(); ++i) {
-    if (rows.text(i, "success") == "1") continue;
-    if (++failures > kMostFailuresListed) continue;
-    const std::string& tre = rows.text(i, "tre_mm");
-    const std::string& error = rows.text(i, "error");
-    table.add_row({escaped(rows.text(i, "case")),
-                   renderer_title({{"renderer", rows.text(i, "renderer")}}),
-                   escaped(rows.text(i, "start_index")),
-                   decimals(rows.number(i, "initial_tre_mm"), 2),
-                   tre == "nan" ? "–" : decimals(rows.number(i, "tre_mm"), 2),
-                   escaped(error.empty() ? rows.text(i, "stop_reason") : error)});
-  }
-  if (failures == 0) return element("p", "No registration failed.");
-  std::string text = element("p",
-                             "All " + counted(failures, "failure counts", "failures count") +
-                                 " in every rate above. " +
-                                 (failures > kMostFailuresListed
-                                      ? "The first " + std::to_string(kMostFailuresListed) +
-                                            " are listed; <code>registrations.csv</code> has all."
-                                      : ""));
-  return text + table.html();
+/// The folder of a result that Slicer loads, where there is one.
+std::string slicer_link(const EvaluationRun& run, const json& picture) {
+  const std::string folder = picture.value("slicer", "");
+  if (folder.empty()) return "";
+  return element("span", "<a href=\"" + run.link(folder) + "\">for Slicer</a>", "files");
 }
 
 std::string overlay_figures(const EvaluationRun& run) {
@@ -358,51 +319,69 @@ std::string overlay_figures(const EvaluationRun& run) {
         figure(run.file(name),
                "image/png",
                which + " registration as overlay",
-               "<b>" + std::string(1, static_cast<char>(std::toupper(which[0]))) + which.substr(1) +
-                   " result, view " + escaped(picture.at("camera").get<std::string>()) +
-                   ".</b> Start " + picture.at("start_index").dump() + " went from " +
-                   decimals(picture.at("initial_tre_mm"), 1) + " mm to " +
-                   decimals(picture.at("tre_mm"), 2) + " mm TRE.",
+               "<b>Case " + case_name + ", the " + escaped(which) + " result, view " +
+                   escaped(picture.at("camera").get<std::string>()) + ".</b> By " +
+                   method_title(picture) + ", start " + picture.at("start_index").dump() +
+                   ", from " + decimals(picture.at("initial_tre_mm"), 1) + " mm to " +
+                   decimals(picture.at("tre_mm"), 2) + " mm TRE." + slicer_link(run, picture),
                "picture");
   }
   return element("div", figures, "figures");
 }
 
+/// Where the starts are from, as far as the run says.
+std::string starts_text(const json& summary) {
+  if (summary.contains("only_start")) return "One start of another run, repeated alone.";
+  return "Starts are poses about the gold pose at stated initial target registration errors (TRE), "
+         "the same for every method.";
+}
+
+std::string registration_figures(const EvaluationRun& run) {
+  return element("div",
+                 run_figure(run,
+                            "success-rate",
+                            "Success rate per interval of initial error",
+                            "<b>Success against initial error</b> (the paper's Fig. 16). Dots: "
+                            "share of starts that end below 2.5 mm; bars: 95 % Wilson intervals.") +
+                     run_figure(run,
+                                "tre-scatter",
+                                "Initial against final error",
+                                "<b>Every registration</b> as one mark: where it started and where "
+                                "it ended.") +
+                     run_figure(run,
+                                "tre-histogram",
+                                "Histogram of the error after registration",
+                                "<b>Error after registration</b> (the paper's Fig. 15); the last "
+                                "bar holds everything beyond 5 mm and registrations without a "
+                                "pose."),
+                 "figures");
+}
+
+std::string appearance_text(const EvaluationRun& run) {
+  const json& summary = run.summary;
+  if (summary.at("pictures").empty()) return "";
+  return element("h3", "What it looks like") +
+         element("p",
+                 std::string("X-ray, DRR at the found pose, both as a checkerboard, and their "
+                             "difference, all as attenuation: what attenuates more is brighter.") +
+                     (summary.at("simulation").is_object()
+                          ? " Small bright bars are the steel fiducials, which the CT lacks."
+                          : "")) +
+         overlay_figures(run);
+}
+
 }  // namespace
 
-std::string registration_section(const EvaluationRun& run) {
+std::string registration_section(const EvaluationRun& run, const std::string& title) {
   const json& summary = run.summary;
   const json& renderers = summary.at("renderers");
-  std::string figures =
-      svg_figure(run,
-                 "success-rate",
-                 "Success rate per interval of initial error",
-                 "<b>Success against initial error</b> (the paper's Fig. 16). Dots: share of "
-                 "starts that end below 2.5 mm; bars: 95 % Wilson intervals.") +
-      svg_figure(run,
-                 "tre-scatter",
-                 "Initial against final error",
-                 "<b>Every registration</b> as one mark: where it started and where it ended.") +
-      svg_figure(run,
-                 "tre-histogram",
-                 "Histogram of the error after registration",
-                 "<b>Error after registration</b> (the paper's Fig. 15); the last bar holds "
-                 "everything beyond 5 mm and registrations without a pose.",
-                 "wide narrow");
-  return element("h2", "Registration accuracy") +
-         element("p",
-                 "Starts are random disturbances of the gold pose, as many in each interval of "
-                 "initial target registration error (TRE), the same for every method.") +
-         problems_text(summary.at("row_problems")) + element("div", figures, "figures") +
+  return section_heading(escaped(title), run_id(run)) + element("p", starts_text(summary)) +
+         problems_text(summary.at("row_problems")) + registration_figures(run) +
          success_table(renderers) + error_table(renderers) + threshold_table(renderers) +
          other_errors_table(renderers) + over_cases_text(renderers) +
          paired_text(summary.at("field_against_raycast")) + case_table(summary) +
          gold_table(summary.at("cases")) + element("h3", "Failures") + reason_table(renderers) +
-         failures_table(run) + element("h2", "What it looks like") +
-         element("p",
-                 "X-ray, DRR at the found pose, both as a checkerboard, and their difference. "
-                 "White bars are the steel fiducials, which the CT lacks.") +
-         overlay_figures(run);
+         failures_text(run) + appearance_text(run);
 }
 
 }  // namespace af::evaluation

@@ -8,4 +8,7 @@ namespace af::evaluation {
 /// The report's style sheet, report.css.
 std::string_view report_style();
 
+/// What makes the report's tables sort, report.js.
+std::string_view report_script();
+
 }  // namespace af::evaluation

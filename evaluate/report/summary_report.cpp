@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cmath>
 
 #include "evaluate/report/html_text.h"
@@ -12,6 +13,10 @@ using nlohmann::json;
 
 namespace {
 
+/// Beyond so many runs tables tell more than sentences and tiles.
+constexpr std::size_t kMostSentences = 4;
+constexpr std::size_t kMostTiles = 4;
+
 std::string tile(const std::string& value,
                  const std::string& unit,
                  const std::string& label,
@@ -20,11 +25,6 @@ std::string tile(const std::string& value,
                  element("div", value + (unit.empty() ? "" : element("small", unit)), "value") +
                      element("div", label, "label") + element("div", detail, "detail"),
                  "tile");
-}
-
-std::string method_name(const json& renderer) {
-  const std::string name = renderer.at("renderer").get<std::string>();
-  return name == "field" ? "attenuation fields" : name == "raycast" ? "ray casting" : escaped(name);
 }
 
 double median_seconds(const json& renderer) {
@@ -46,7 +46,7 @@ double flawless_up_to_mm(const json& renderer) {
 std::string success_sentence(const json& renderer, double threshold_mm) {
   const auto starts = renderer.at("starts").get<std::int64_t>();
   const auto successes = renderer.at("successes").get<std::int64_t>();
-  std::string text = "With " + method_name(renderer) + ", " + std::to_string(successes) + " of " +
+  std::string text = "With " + method_title(renderer) + ", " + std::to_string(successes) + " of " +
                      counted(starts, "registration", "registrations") + " (" +
                      percent(number_of(renderer.at("rate"))) + ", 95 % interval " +
                      interval_text(renderer) + ") ended less than " + decimals(threshold_mm, 1) +
@@ -85,13 +85,40 @@ std::string registration_sentences(const EvaluationRun& run) {
   return items;
 }
 
+/// One of several runs: its first method, and how long the others take; a table says the rest.
+std::string run_sentences(const EvaluationRun& run) {
+  const json& summary = run.summary;
+  return element("li",
+                 "<b>" + escaped(run.name) + ":</b> " +
+                     success_sentence(summary.at("renderers").at(0),
+                                      summary.at("success_tre_mm").get<double>()) +
+                     " " + speed_sentence(summary.at("field_against_raycast")));
+}
+
+double median_psnr_db(const EvaluationRun& run) {
+  return number_of(run.summary.at("psnr_db").at("median"));
+}
+
+/// The runs, or none when there are too many.
+std::vector<const EvaluationRun*> at_most(const std::vector<const EvaluationRun*>& runs,
+                                          std::size_t count) {
+  return runs.size() > count ? std::vector<const EvaluationRun*>() : runs;
+}
+
 std::string quality_sentence(const std::vector<const EvaluationRun*>& runs) {
   if (runs.empty()) return "";
   std::string list;
-  for (const EvaluationRun* run : runs)
+  if (runs.size() > kMostTiles) {
+    const auto [lowest, highest] =
+        std::minmax_element(runs.begin(), runs.end(), [](const auto* a, const auto* b) {
+          return median_psnr_db(*a) < median_psnr_db(*b);
+        });
+    list = decimals(median_psnr_db(**lowest), 1) + " to " + decimals(median_psnr_db(**highest), 1) +
+           " dB over " + std::to_string(runs.size()) + " fields";
+  }
+  for (const EvaluationRun* run : at_most(runs, kMostTiles))
     list += (list.empty() ? "" : ", ") + decimals(run->summary.at("psnr_db").at("median"), 1) +
-            " dB (camera " + escaped(run->summary.at("field").at("camera").get<std::string>()) +
-            ")";
+            " dB (" + escaped(field_name(*run)) + ")";
   return element("li",
                  "The fields' images agree with ray casting to a median PSNR of " + list +
                      "; the paper reports medians above 43 dB.");
@@ -103,7 +130,7 @@ std::string seconds_tile(const json& renderer) {
   return tile(seconds.substr(0, blank),
               blank == std::string::npos ? "" : seconds.substr(blank + 1),
               "per registration",
-              method_name(renderer) + ", median");
+              method_title(renderer) + ", median");
 }
 
 /// What the gold standard adds by itself, to stand beside an error.
@@ -120,25 +147,17 @@ std::string registration_tiles(const EvaluationRun& run) {
   std::string tiles = tile(percent(number_of(first.at("rate"))),
                            "",
                            "of starts succeed",
-                           method_name(first) + ", " +
+                           method_title(first) + ", " +
                                counted(first.at("starts").get<std::int64_t>(), "start", "starts")) +
                       tile(decimals(first.at("tre_of_successes_mm").at("mean"), 2),
                            "mm",
                            "mean error of successes",
-                           method_name(first) + gold_text(first));
+                           method_title(first) + gold_text(first));
   for (const json& renderer : renderers) tiles += seconds_tile(renderer);
   return tiles;
 }
 
 }  // namespace
-
-std::vector<const EvaluationRun*> runs_of(const std::vector<EvaluationRun>& runs,
-                                          const std::string& kind) {
-  std::vector<const EvaluationRun*> result;
-  for (const EvaluationRun& run : runs)
-    if (run.kind == kind) result.push_back(&run);
-  return result;
-}
 
 std::string summary_section(const std::vector<EvaluationRun>& runs) {
   const auto registrations = runs_of(runs, "registration");
@@ -147,17 +166,20 @@ std::string summary_section(const std::vector<EvaluationRun>& runs) {
   std::string tiles;
   bool is_simulated = false;
   for (const EvaluationRun* run : registrations) {
-    sentences += registration_sentences(*run);
-    tiles += registration_tiles(*run);
+    if (registrations.size() == 1) {
+      sentences += registration_sentences(*run);
+      tiles += registration_tiles(*run);
+    } else if (registrations.size() <= kMostSentences) {
+      sentences += run_sentences(*run);
+    }
     is_simulated = is_simulated || run->summary.at("simulation").is_object();
   }
   sentences += quality_sentence(qualities);
-  for (const EvaluationRun* run : qualities)
+  for (const EvaluationRun* run : at_most(qualities, kMostTiles))
     tiles += tile(decimals(run->summary.at("psnr_db").at("median"), 1),
                   "dB",
                   "median PSNR of the field",
-                  "camera " + escaped(run->summary.at("field").at("camera").get<std::string>()) +
-                      ", against ray casting");
+                  escaped(field_name(*run)) + ", against ray casting");
   std::string caution;
   if (is_simulated)
     caution += element(
@@ -167,7 +189,7 @@ std::string summary_section(const std::vector<EvaluationRun>& runs) {
         "calibration errors.");
   caution += element("p", "Research software, not a medical device.");
   return element("section",
-                 element("ul", sentences) + element("div", tiles, "tiles") +
+                 element("ul", sentences) + (tiles.empty() ? "" : element("div", tiles, "tiles")) +
                      element("div", caution, "caution"),
                  "summary");
 }

@@ -59,15 +59,16 @@ std::string broadest_text(const json& summary) {
 std::string similarity_section(const std::vector<EvaluationRun>& runs) {
   std::string text;
   for (const EvaluationRun* run : runs_of(runs, "similarity-curves"))
-    text += element("h3", "Case " + escaped(run->summary.at("case").get<std::string>())) +
-            figure(run->file("similarity-curves.svg"),
-                   "image/svg+xml",
+    text +=
+        element("h3", "Case " + escaped(run->summary.at("case").get<std::string>())) +
+        run_figure(*run,
+                   "similarity-curves",
                    "Similarity along each pose parameter",
                    "<b>Similarity about the gold pose</b> (the paper's Fig. 14): one parameter at "
                    "a time; the marks are the maxima.",
                    "wide") +
-            maxima_table(run->summary) + broadest_text(run->summary);
-  return text.empty() ? "" : element("h2", "Shape of the similarity") + text;
+        maxima_table(run->summary) + broadest_text(run->summary);
+  return text.empty() ? "" : section_heading("Shape of the similarity", "similarity") + text;
 }
 
 std::string field_parameters_section(const std::vector<EvaluationRun>& runs) {
@@ -105,17 +106,18 @@ std::string field_parameters_section(const std::vector<EvaluationRun>& runs) {
                      setting.at("creation_ranks").dump()});
     }
     text += element("h3", "Camera " + escaped(run->summary.at("camera").get<std::string>())) +
-            figure(run->file("field-parameters.svg"),
-                   "image/svg+xml",
-                   "PSNR against each field parameter",
-                   "<b>Image quality against the field's parameters</b> (the paper's Fig. 10): "
-                   "medians and quartiles over " +
-                       run->summary.at("poses").dump() +
-                       " random poses; the setting that all panels share is set off.",
-                   "wide") +
+            run_figure(*run,
+                       "field-parameters",
+                       "PSNR against each field parameter",
+                       "<b>Image quality against the field's parameters</b> (the paper's Fig. 10): "
+                       "medians and quartiles over " +
+                           run->summary.at("poses").dump() +
+                           " random poses; the setting that all panels share is set off.",
+                       "wide") +
             table.html();
   }
-  return text.empty() ? "" : element("h2", "What a field costs and gives") + text;
+  return text.empty() ? ""
+                      : section_heading("What a field costs and gives", "field-parameters") + text;
 }
 
 }  // namespace af::evaluation

@@ -24,6 +24,7 @@ af_add_test(
 af_add_test(
   evaluate_report_test
   SOURCES unit/evaluate/report_text_test.cpp unit/evaluate/evaluation_rows_test.cpp
+          unit/evaluate/failure_trace_files_test.cpp
   LIBS af_evaluation_program af_evaluation_report af_io_basics)
 
 add_executable(evaluate_statistics_program_tests programs/evaluate_statistics_test.cpp)

@@ -15,7 +15,8 @@ af_add_test(
 af_add_test(
   register_program_unit_tests
   SOURCES unit/register/register_command_test.cpp unit/register/result_files_test.cpp
-  LIBS af_registration_program)
+          unit/register/slicer_files_test.cpp
+  LIBS af_registration_program af_io_itk)
 af_add_mpi_test(register_mpi_tests SOURCES mpi/register/multi_start_mpi_test.cpp LIBS af_registration_program RANKS 1 2 3 4)
 af_add_test(
   allocation_test

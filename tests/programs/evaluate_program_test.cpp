@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // af-evaluate as a user meets it: files, the same rows on every rank count, exit codes, messages.
 #include <cmath>
+#include <cstdlib>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -13,6 +15,7 @@
 #include "io/pose_file.h"
 #include "io/study_file.h"
 #include "programs/small_study.h"
+#include "support/browser.h"
 #include "support/run_program.h"
 #include "support/test_paths.h"
 
@@ -77,6 +80,30 @@ class EvaluateProgram : public testing::Test {
       for (const std::string& column : table.columns())
         if (column != "seconds") result += table.text(i, column) + ",";
     return result;
+  }
+  /// Once for all tests: a run of every kind, and a registration whose searches end too early to
+  /// succeed, with a report of all.
+  static void make_runs_of_every_kind() {
+    if (std::filesystem::exists(path("runs/report.html"))) return;
+    const std::string registration =
+        "registration --study " + path("study.toml") + fields() + "--intervals 2 ";
+    const std::vector<std::string> runs = {
+        "image-quality --field " + path("LAT.af.h5") + " --ct " + path("ct.nii.gz") +
+            " --pose-count 3 -o " + path("runs/quality"),
+        registration + "--starts-per-interval 2 -o " + path("runs/registration"),
+        registration + "--starts-per-interval 3 --max-evaluations 14 -o " + path("runs/short"),
+        "similarity-curves --study " + path("study.toml") + fields() +
+            "--renderer field --half-width-mm 1 --half-width-deg 1 -o " + path("runs/curves"),
+        "field-parameters --study " + path("study.toml") +
+            " --camera AP --max-rotation-deg 8 --max-translation-mm 8"
+            " --base-uv-nodes 8 --base-st-nodes 32 --base-codewords 16 --uv-nodes 4"
+            " --st-nodes 32 --codewords 16 --training-fraction 0.1 --pose-count 2 -o " +
+            path("runs/sweep"),
+        "report " + path("runs") + " -o " + path("runs/report.html")};
+    for (const std::string& arguments : runs) {
+      const test::ProgramRun run = evaluate(arguments);
+      ASSERT_EQ(run.exit_code, 0) << run.output;
+    }
   }
   static void expect_refused(const test::ProgramRun& run, int exit_code, const std::string& part) {
     EXPECT_EQ(run.exit_code, exit_code) << run.output;
@@ -299,27 +326,7 @@ TEST_F(EvaluateProgram, ComparesRunsInOneTable) {
 }
 
 TEST_F(EvaluateProgram, WritesOneSelfContainedReport) {
-  const std::string quality = "image-quality --field " + path("LAT.af.h5") + " --ct " +
-                              path("ct.nii.gz") + " --pose-count 3 -o " + path("runs/quality");
-  const std::string registration = "registration --study " + path("study.toml") + fields() +
-                                   "--intervals 2 --starts-per-interval 2 -o " +
-                                   path("runs/registration");
-  const std::string curves = "similarity-curves --study " + path("study.toml") + fields() +
-                             "--renderer field --half-width-mm 1 --half-width-deg 1 -o " +
-                             path("runs/curves");
-  const std::string sweep = "field-parameters --study " + path("study.toml") +
-                            " --camera AP --max-rotation-deg 8 --max-translation-mm 8"
-                            " --base-uv-nodes 8 --base-st-nodes 32 --base-codewords 16 --uv-nodes 4"
-                            " --st-nodes 32 --codewords 16 --training-fraction 0.1 --pose-count 2"
-                            " -o " +
-                            path("runs/sweep");
-  for (const std::string& arguments : {quality, registration, curves, sweep}) {
-    const test::ProgramRun run = evaluate(arguments);
-    ASSERT_EQ(run.exit_code, 0) << run.output;
-  }
-  const test::ProgramRun run =
-      evaluate("report " + path("runs") + " -o " + path("runs/report.html"));
-  ASSERT_EQ(run.exit_code, 0) << run.output;
+  make_runs_of_every_kind();
   const std::string page = text("runs/report.html");
   // Not by matchers: these would print a page of megabytes.
   const auto has = [&](const char* part) { return page.find(part) != std::string::npos; };
@@ -331,15 +338,126 @@ TEST_F(EvaluateProgram, WritesOneSelfContainedReport) {
   EXPECT_FALSE(has(">nan"));
   EXPECT_FALSE(has("http://"));
   EXPECT_FALSE(has("https://"));
-  std::size_t images = 0;
-  for (std::size_t at = page.find(" src=\""); at != std::string::npos;
-       at = page.find(" src=\"", at + 1)) {
-    EXPECT_EQ(page.compare(at, 11, " src=\"data:"), 0) << page.substr(at, 60);
-    ++images;
+  const std::size_t images = test::count_of(page, " src=\"");
+  EXPECT_EQ(test::count_of(page, " src=\"data:"), images);
+  // Of each registration three figures, X-rays, three overlays in two views; one figure of both;
+  // box plot, worst and median pair; curves; sweep.
+  EXPECT_EQ(images, 2u * (3u + 1u + 6u) + 1u + 1u + 2u + 1u + 1u);
+}
+
+TEST_F(EvaluateProgram, LeavesWhatTheReportLinksToBesideIt) {
+  make_runs_of_every_kind();
+  const std::string page = text("runs/report.html");
+  std::size_t links = 0;
+  for (std::size_t at = page.find("href=\""); at != std::string::npos;
+       at = page.find("href=\"", at + 1)) {
+    const std::string target = page.substr(at + 6, page.find('"', at + 6) - at - 6);
+    const bool exists = target.front() == '#'
+                            ? page.find("id=\"" + target.substr(1) + "\"") != std::string::npos
+                            : std::filesystem::exists(path("runs/" + target));
+    EXPECT_TRUE(exists) << target;
+    ++links;
   }
-  // Three figures, X-rays, three overlays in two views; box plot, worst and median pair; curves;
-  // sweep.
-  EXPECT_EQ(images, 3u + 1u + 6u + 1u + 2u + 1u + 1u);
+  EXPECT_GT(links, 20u);
+  for (const char* name : {"success-rate", "tre-histogram", "tre-scatter"})
+    for (const char* extension : {".svg", ".png", ".csv"})
+      EXPECT_TRUE(std::filesystem::exists(path("runs/short/" + std::string(name) + extension)));
+}
+
+TEST_F(EvaluateProgram, RepeatsAFailedStartByTheCommandInTheReport) {
+  make_runs_of_every_kind();
+  const std::string page = text("runs/report.html");
+  const std::string opening = "<pre class=\"command\">";
+  const std::size_t at = page.find(opening);
+  ASSERT_NE(at, std::string::npos) << "the short searches all succeeded";
+  const std::size_t first = at + opening.size();
+  // The scratch folder's name needs no quotes: nothing of the command is an HTML entity but &&.
+  std::string command = page.substr(first, page.find("</pre>", first) - first);
+  for (std::size_t i = command.find("&amp;"); i != std::string::npos; i = command.find("&amp;"))
+    command.replace(i, 5, "&");
+  const test::ProgramRun run = test::run_command("( " + command + " )");
+  ASSERT_EQ(run.exit_code, 0) << command << '\n' << run.output;
+
+  std::filesystem::path repeat;
+  for (const auto& entry : std::filesystem::directory_iterator(path("runs/short/repeats")))
+    repeat = entry.path();
+  const CsvTable repeated = CsvTable::read(repeat / "registrations.csv");
+  ASSERT_EQ(repeated.row_count(), 1u);
+  const CsvTable all = CsvTable::read(path("runs/short/registrations.csv"));
+  const auto row = static_cast<std::size_t>(repeated.number(0, "start_index"));
+  EXPECT_EQ(repeated.text(0, "success"), "0");
+  for (const char* name : {"final_rx_deg", "final_tz_mm", "tre_mm", "similarity", "evaluations"})
+    EXPECT_EQ(repeated.text(0, name), all.text(row, name)) << name;
+  const std::string trace = "traces/ellipsoids-field-" + all.text(row, "start_index") + ".csv";
+  EXPECT_EQ(read_text_file(repeat / trace), text("runs/short/" + trace));
+  // The search ends where the row says.
+  const CsvTable steps = CsvTable::read(repeat / trace);
+  EXPECT_EQ(steps.text(steps.row_count() - 1, "tre_mm"), all.text(row, "tre_mm"));
+
+  // A repeat is no run of its own in a report of everything.
+  EXPECT_THAT(evaluate("report " + path("runs") + " -o " + path("runs/again.html")).output,
+              HasSubstr("report of 5 run(s)"));
+}
+
+TEST_F(EvaluateProgram, MakesAReportThatWorksInABrowserWithoutAnyComplaint) {
+  if (!test::has_browser() && std::getenv("AF_REQUIRE_TOOLS") == nullptr)
+    GTEST_SKIP() << "chromium is not installed (jobs/install-packages.sh --with-lint installs it)";
+  make_runs_of_every_kind();
+  const test::ScratchFolder scratch;
+  // A script beside the page's own: clicks on the title of every column, twice on the first
+  // table's third, and writes down what the browser has.
+  const std::string probe = R"(<script>
+    for (const button of document.querySelectorAll('th button')) button.click();
+    const table = document.querySelector('table');
+    const column = table.tHead.rows[0].cells.length - 1;
+    const cells = () => [...table.tBodies[0].rows].map((r) => r.cells[column].textContent).join('|');
+    const before = cells();
+    table.tHead.rows[0].cells[column].querySelector('button').click();
+    document.body.dataset.probe = JSON.stringify({
+      figures: document.querySelectorAll('figure').length,
+      broken: [...document.images].filter((i) => !i.complete || i.naturalWidth === 0).length,
+      rows: document.querySelectorAll('tbody tr').length,
+      sparks: document.querySelectorAll('svg.spark polyline').length,
+      turned: before !== cells(),
+      overflow: document.documentElement.scrollWidth - document.documentElement.clientWidth,
+      sorted: table.tHead.rows[0].cells[column].getAttribute('aria-sort')});
+    </script></body>)";
+  std::string page = text("runs/report.html");
+  const std::size_t rows =
+      test::count_of(page.substr(page.find("<main>")), "<tr") - test::count_of(page, "<thead>");
+  const std::size_t figures = test::count_of(page, "<figure");
+  const std::size_t failures = test::count_of(page, "<pre class=\"command\">");
+  page.replace(page.rfind("</body>"), 7, probe);
+  write_text_file(scratch / "page.html", page);
+  const test::BrowserPage opened = test::open_in_browser(scratch / "page.html", scratch.path());
+  EXPECT_EQ(opened.console, "");
+  const std::string opening = "data-probe=\"";
+  const std::size_t at = opened.document.find(opening);
+  ASSERT_NE(at, std::string::npos);
+  const std::size_t first = at + opening.size();
+  std::string found = opened.document.substr(first, opened.document.find("\">", first) - first);
+  for (std::size_t i = found.find("&quot;"); i != std::string::npos; i = found.find("&quot;"))
+    found.replace(i, 6, "\"");
+  const json probed = json::parse(found);
+  EXPECT_EQ(probed["figures"], figures);
+  EXPECT_EQ(probed["broken"], 0);
+  EXPECT_EQ(probed["rows"], rows);
+  EXPECT_EQ(probed["sparks"], failures);
+  EXPECT_GT(failures, 0u);
+  EXPECT_EQ(probed["sorted"], "descending");
+  EXPECT_EQ(probed["turned"], true);
+  EXPECT_EQ(probed["overflow"], 0);
+}
+
+TEST_F(EvaluateProgram, HasABrowserThatTellsOfErrors) {
+  if (!test::has_browser() && std::getenv("AF_REQUIRE_TOOLS") == nullptr)
+    GTEST_SKIP() << "chromium is not installed (jobs/install-packages.sh --with-lint installs it)";
+  const test::ScratchFolder scratch;
+  write_text_file(scratch / "bad.html",
+                  "<!DOCTYPE html><html><head><title>bad</title></head><body>"
+                  "<script>nonsense();</script></body></html>");
+  EXPECT_THAT(test::open_in_browser(scratch / "bad.html", scratch.path()).console,
+              HasSubstr("nonsense is not defined"));
 }
 
 TEST_F(EvaluateProgram, SaysWhenTheFieldHasNoRoomForTheStarts) {

@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "base/hash_random.h"
+#include "io/csv_table.h"
 #include "io/gnuplot_figure.h"
 #include "io/output_file.h"
 #include "support/test_paths.h"
@@ -87,11 +88,34 @@ TEST(Figures, AreDrawnWithTitlesAndUnits) {
     EXPECT_THAT(read_text_file(folder / (std::string(name) + ".svg")), Not(HasSubstr("nan")));
 }
 
+TEST(Figures, HaveTheirNumbersBesideThem) {
+  const test::ScratchFolder folder;
+  const std::vector<OutcomeGroup> groups = {
+      {"field", {{1.0, 0.3}, {1.5, 4.9}, {3.0, std::nan("")}, {9.0, 0.1}}}};
+  draw_success_rates(groups, 2, 2.0, folder / "success");
+  draw_tre_histogram(groups, folder / "histogram");
+  draw_tre_scatter(groups, 16.0, folder / "scatter");
+  draw_psnr_boxes({{"camera A", {40.5, 41.0}}}, folder / "psnr");
+
+  const CsvTable success = CsvTable::read(folder / "success.csv");
+  ASSERT_EQ(success.row_count(), 2u);
+  EXPECT_EQ(success.number(0, "rate"), 0.5);
+  EXPECT_EQ(success.text(1, "successes"), "0");
+  const CsvTable histogram = CsvTable::read(folder / "histogram.csv");
+  ASSERT_EQ(histogram.row_count(), 21u);
+  EXPECT_EQ(histogram.number(1, "share"), 0.25) << "0.25 to 0.5 mm";
+  EXPECT_EQ(histogram.text(20, "high_mm"), "inf");
+  EXPECT_EQ(histogram.number(20, "share"), 0.25) << "without a pose";
+  EXPECT_EQ(CsvTable::read(folder / "scatter.csv").text(2, "tre_mm"), "nan");
+  EXPECT_EQ(CsvTable::read(folder / "psnr.csv").number(1, "psnr_db"), 41.0);
+}
+
 TEST(Figures, AreDrawnForEmptyGroups) {
   const test::ScratchFolder folder;
   const std::vector<OutcomeGroup> groups = {{"field", {{1.0, std::nan("")}}}};
   EXPECT_NO_THROW(draw_tre_histogram(groups, folder / "histogram"));
   EXPECT_NO_THROW(draw_success_rates(groups, 8, 2.0, folder / "success"));
+  EXPECT_NO_THROW(draw_success_rates({{"field", {{40.0, 1.0}}}}, 8, 2.0, folder / "beyond"));
   EXPECT_NO_THROW(draw_tre_scatter(groups, 16.0, folder / "scatter"));
   EXPECT_NO_THROW(draw_psnr_boxes({{"camera A", {}}}, folder / "psnr"));
 }

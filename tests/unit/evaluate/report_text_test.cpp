@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "evaluate/failed_start_files.h"
 #include "evaluate/report/evaluation_run_files.h"
 #include "evaluate/report/html_text.h"
 #include "evaluate/report/number_html.h"
@@ -44,6 +45,36 @@ TEST(HtmlText, TableEscapesTitlesAndAlignsNumbers) {
   table.add_row({"x", "1"}, "reference");
   EXPECT_THAT(table.html(), HasSubstr("a &lt; b"));
   EXPECT_THAT(table.html(), HasSubstr("<tr class=\"reference\"><td>x</td><td class=\"number\">1"));
+}
+
+TEST(HtmlText, UrlsKeepPathsAndEscapeTheRest) {
+  EXPECT_EQ(url_of("../a-b/c_d.csv"), "../a-b/c_d.csv");
+  EXPECT_EQ(url_of("a study/50%#1?.csv"), "a%20study/50%25%231%3F.csv");
+  EXPECT_EQ(url_of("\xc3\xa4"), "%C3%A4");
+}
+
+TEST(RepeatCommand, NamesTheStartAndKeepsBothRenderersWhereRayCastingDependsOnFields) {
+  const json both = {{"repeat",
+                      {{"command", "cd /w && af-evaluate registration --study s.toml"},
+                       {"renderer", "both"},
+                       {"output", "/w/run/repeats"}}}};
+  EXPECT_EQ(repeat_command(both, "skull", "field", 12),
+            "cd /w && af-evaluate registration --study s.toml --case skull --renderer field "
+            "--only-start 12 --output /w/run/repeats/skull-field-12");
+  EXPECT_THAT(repeat_command(both, "a b", "raycast", 3),
+              HasSubstr("--case 'a b' --renderer both --only-start 3 --output "
+                        "/w/run/repeats/a_b-raycast-3"));
+  json alone = both;
+  alone["repeat"]["renderer"] = "raycast";
+  EXPECT_THAT(repeat_command(alone, "skull", "raycast", 3), HasSubstr("--renderer raycast"));
+  EXPECT_EQ(repeat_command({{"repeat", nullptr}}, "skull", "theirs", 3), "");
+  EXPECT_EQ(repeat_command(json::object(), "skull", "field", 3), "");
+}
+
+TEST(ReportScript, NeedsNothingFromOutside) {
+  EXPECT_THAT(std::string(report_script()), HasSubstr("aria-sort"));
+  for (const char* part : {"fetch(", "XMLHttpRequest", "import", "eval(", "</script"})
+    EXPECT_THAT(std::string(report_script()), Not(HasSubstr(part)));
 }
 
 TEST(ReportStyle, NeedsNothingFromOutside) {
@@ -119,6 +150,31 @@ TEST(FindRuns, FindsRunsBelowAFolderOnceAndInAFixedOrder) {
   EXPECT_EQ(runs[0].kind, "registration");
   EXPECT_EQ(runs[1].folder.parent_path().filename(), "a");
   EXPECT_EQ(runs[2].folder.parent_path().filename(), "b");
+}
+
+TEST(FindRuns, NamesRunsByWhatTellsThemApartAndLinksToTheirFiles) {
+  const test::ScratchFolder folder;
+  write_summary(folder, "skull/registration", minimal_summary("registration"));
+  write_summary(folder, "thorax 2/registration", minimal_summary("registration"));
+  auto runs = find_runs({folder.path()});
+  EXPECT_EQ(runs[0].name, "skull");
+  EXPECT_EQ(runs[1].name, "thorax 2");
+  runs[1].page_folder = std::filesystem::weakly_canonical(folder / "skull");
+  EXPECT_EQ(runs[1].link("starts.csv"), "../thorax%202/registration/starts.csv");
+  EXPECT_EQ(find_runs({folder / "skull"})[0].name, "registration");
+  // One run in another's folder: both have a name.
+  write_summary(folder, "skull", minimal_summary("image-quality"));
+  for (const EvaluationRun& run : find_runs({folder / "skull"})) EXPECT_FALSE(run.name.empty());
+}
+
+TEST(FindRuns, LeavesOutRepeatsOfSingleStartsUnlessTheyAreNamed) {
+  const test::ScratchFolder folder;
+  write_summary(folder, "run", minimal_summary("registration"));
+  json repeat = json::parse(minimal_summary("registration"));
+  repeat["only_start"] = 12;
+  write_summary(folder, "run/repeats/skull-field-12", repeat.dump());
+  EXPECT_EQ(find_runs({folder.path()}).size(), 1u);
+  EXPECT_EQ(find_runs({folder / "run/repeats/skull-field-12"}).size(), 1u);
 }
 
 TEST(FindRuns, RefusesWhatIsNotASoundRun) {

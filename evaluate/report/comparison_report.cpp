@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+
+#include "evaluate/figure_files.h"
+#include "evaluate/report/html_text.h"
+#include "evaluate/report/number_html.h"
+#include "evaluate/report/sections_report.h"
+#include "evaluate/summary_files.h"
+#include "io/csv_table.h"
+#include "io/output_file.h"
+
+namespace af::evaluation {
+
+using nlohmann::json;
+
+namespace {
+
+/// The figure has colours for no more methods than this.
+constexpr std::size_t kMostCurves = 6;
+
+std::string case_names(const json& summary) {
+  constexpr std::size_t kMostNamed = 4;
+  const json& cases = summary.at("cases");
+  if (cases.size() > kMostNamed) return std::to_string(cases.size()) + " cases";
+  std::string names;
+  for (const json& entry : cases)
+    names += (names.empty() ? "" : ", ") + escaped(entry.at("case").get<std::string>());
+  return names;
+}
+
+/// What our own renderers' runs searched with; nothing of another program's poses.
+std::string search_text(const json& summary, const json& renderer) {
+  const json method = summary.value("method", json::object());
+  const std::string name = renderer.at("renderer").get<std::string>();
+  std::string text;
+  if (name == "field" || name == "raycast")
+    for (const char* part : {"preset", "similarity", "optimizer"})
+      if (const std::string value = method.value(part, ""); !value.empty())
+        text += (text.empty() ? "" : ", ") + escaped(value);
+  return text.empty() ? "–" : text;
+}
+
+std::string capture_cell(const json& range) {
+  if (!range.is_object()) return "none";
+  return std::string(range.at("is_whole_study").get<bool>() ? "≥ " : "") +
+         decimals(range.at("initial_tre_mm"), 1);
+}
+
+std::string comparison_table(const std::vector<const EvaluationRun*>& runs) {
+  HtmlTable table({{"Run", false},
+                   {"Cases", false},
+                   {"Method", false},
+                   {"Preset, similarity, search", false},
+                   {"Starts", true},
+                   {"Success (95 % interval)", true},
+                   {"Median TRE of all (mm)", true},
+                   {"95th percentile (mm)", true},
+                   {"Mean TRE of successes (mm)", true},
+                   {"Gross failures", true},
+                   {"Capture range (mm)", true},
+                   {"Median time", true}},
+                  "Every run and method; titles sort");
+  for (const EvaluationRun* run : runs)
+    for (const json& renderer : run->summary.at("renderers"))
+      table.add_row({"<a href=\"#" + run_id(*run) + "\">" + escaped(run->name) + "</a>",
+                     case_names(run->summary),
+                     element("span", method_title(renderer), "nowrap"),
+                     search_text(run->summary, renderer),
+                     renderer.at("starts").dump(),
+                     rate_with_interval(renderer),
+                     decimals(renderer.at("tre_of_all_mm").at("median"), 2),
+                     decimals(renderer.at("tre_of_all_mm").at("p95"), 2),
+                     decimals(renderer.at("tre_of_successes_mm").at("mean"), 2),
+                     renderer.at("gross_failures").at("successes").dump(),
+                     capture_cell(renderer.at("capture_range")),
+                     seconds_text(number_of(renderer.at("seconds").at("median")))});
+  return table.html();
+}
+
+/// Initial and final TRE of one renderer's rows.
+std::vector<TreOutcome> outcomes_of_run(const EvaluationRun& run, const std::string& renderer) {
+  const CsvTable rows = CsvTable::read(run.folder / "registrations.csv");
+  std::vector<TreOutcome> outcomes;
+  for (std::size_t i = 0; i < rows.row_count(); ++i) {
+    if (rows.text(i, "renderer") != renderer) continue;
+    const bool has_pose = rows.text(i, "tre_mm") != "nan";
+    outcomes.push_back(
+        {rows.number(i, "initial_tre_mm"), has_pose ? rows.number(i, "tre_mm") : std::nan("")});
+  }
+  return outcomes;
+}
+
+/// Whether two runs divide initial TRE alike.
+bool have_same_intervals(const EvaluationRun& a, const EvaluationRun& b) {
+  const json& of_a = a.summary.at("renderers").at(0).at("intervals");
+  const json& of_b = b.summary.at("renderers").at(0).at("intervals");
+  return of_a.size() == of_b.size() && of_a.at(0).at("high_mm") == of_b.at(0).at("high_mm");
+}
+
+/// Success of the first method of each run; empty when the runs' intervals differ.
+std::string success_figure(const std::vector<const EvaluationRun*>& runs,
+                           const std::filesystem::path& figures) {
+  std::vector<OutcomeGroup> groups;
+  for (const EvaluationRun* run : runs) {
+    if (!have_same_intervals(*runs.front(), *run)) return "";
+    const std::string renderer =
+        run->summary.at("renderers").at(0).at("renderer").get<std::string>();
+    if (groups.size() < kMostCurves) groups.push_back({run->name, outcomes_of_run(*run, renderer)});
+  }
+  const json& intervals = runs.front()->summary.at("renderers").at(0).at("intervals");
+  make_output_folder(figures);
+  draw_success_rates(groups,
+                     static_cast<int>(intervals.size()),
+                     intervals.at(0).at("high_mm").get<double>(),
+                     figures / "success-of-runs");
+  return report_figure(figures / "success-of-runs",
+                       runs.front()->page_folder,
+                       "Success rate of every run per interval of initial error",
+                       "<b>Success against initial error</b>, the first method of " +
+                           std::string(runs.size() > kMostCurves
+                                           ? "the first " + std::to_string(kMostCurves) + " runs"
+                                           : "each run") +
+                           "; bars: 95 % Wilson intervals.",
+                       "narrow");
+}
+
+}  // namespace
+
+std::string comparison_section(const std::vector<EvaluationRun>& runs,
+                               const std::filesystem::path& figures) {
+  const auto registrations = runs_of(runs, "registration");
+  if (registrations.size() < 2) return "";
+  return section_heading("Runs side by side", "runs") + comparison_table(registrations) +
+         success_figure(registrations, figures);
+}
+
+}  // namespace af::evaluation
