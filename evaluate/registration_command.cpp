@@ -161,6 +161,16 @@ void write_traces(const std::filesystem::path& folder, const std::vector<Registr
   }
 }
 
+/// The mean TRE of successes beside the gold standard's own error; empty without a success.
+std::string mean_text(const json& renderer) {
+  const double mean_mm = number_of(renderer["tre_of_successes_mm"]["mean"]);
+  const double gold_mm = number_of(renderer["gold_uncertainty_mm"]);
+  if (!std::isfinite(mean_mm)) return "";
+  return ", mean TRE of these " + fixed_text(mean_mm, 2) + " mm" +
+         (std::isfinite(gold_mm) ? " (gold standard by itself: " + fixed_text(gold_mm, 2) + " mm)"
+                                 : "");
+}
+
 void print_outcome(const json& summary,
                    const std::filesystem::path& folder,
                    const Communicator& world) {
@@ -169,12 +179,7 @@ void print_outcome(const json& summary,
               << renderer["successes"].get<std::int64_t>() << " of "
               << renderer["starts"].get<std::int64_t>() << " starts succeeded (TRE < "
               << number_text(kSuccessTreMm) << " mm)";
-    const double mean_mm = number_of(renderer["tre_of_successes_mm"]["mean"]);
-    if (std::isfinite(mean_mm))
-      std::cout << ", mean TRE of these " << fixed_text(mean_mm, 2) << " mm";
-    const double gold_mm = number_of(renderer["gold_uncertainty_mm"]);
-    if (std::isfinite(gold_mm))
-      std::cout << " (gold standard by itself: " << fixed_text(gold_mm, 2) << " mm)";
+    std::cout << mean_text(renderer);
     const double seconds = number_of(renderer["seconds"]["median"]);
     if (std::isfinite(seconds)) std::cout << ", median " << fixed_text(seconds, 2) << " s each";
     std::cout << '\n';
