@@ -62,8 +62,11 @@ std::vector<RegistrationView> read_views(const Study& study,
   for (const StudyView& study_view : study_case.views) {
     RegistrationView view;
     view.view = {study.rig.camera(study_view.camera), study_view.roi};
-    view.xray = read_xray_attenuation(study_view, view.view.camera);
-    view.mask = read_mask(study_view, view.view.camera);
+    view.xray = used_from(study_view.places, "xray", [&] {
+      return read_xray_attenuation(study_view, view.view.camera);
+    });
+    view.mask = used_from(
+        study_view.places, "mask", [&] { return read_mask(study_view, view.view.camera); });
     input_sha256["xray " + study_view.camera] = sha256_of_file(study_view.xray.string());
     if (study_view.mask.has_value())
       input_sha256["mask " + study_view.camera] = sha256_of_file(study_view.mask->string());
@@ -142,6 +145,25 @@ std::vector<RendererLevel> coarse_ray_casts(const AttenuationVolume& volume,
   return levels;
 }
 
+/// Collective. A field, checked against the view's camera and the CT.
+std::shared_ptr<const CompressedAttenuationField> field_of_view(const std::string& path,
+                                                                const StudyCase& study_case,
+                                                                const RegistrationView& view,
+                                                                const std::optional<CtFacts>& ct,
+                                                                const Communicator& communicator,
+                                                                FieldFileInfo& info) {
+  auto field = read_field(path, communicator, &info);
+  all_or_none(communicator, [&] {
+    require_same_camera(field->identity.camera, view.view.camera, path);
+    if (ct.has_value() && ct->content_sha256 != field->identity.ct_content_sha256)
+      throw FileError(path,
+                      "CT of the field (ct_content_sha256)",
+                      ct->content_sha256 + " (" + study_case.ct.string() + ")",
+                      field->identity.ct_content_sha256);
+  });
+  return field;
+}
+
 /// Collective. The fields of all views; their hashes go to `input_sha256`.
 void use_fields(const StudyCase& study_case,
                 const CaseLoadOptions& options,
@@ -154,16 +176,12 @@ void use_fields(const StudyCase& study_case,
     const std::string path = all_or_none(communicator, [&] {
       return field_path_of(study_case, study_case.views[i], options).string();
     });
+    const bool is_of_study = options.field_paths.count(view.view.camera.name) == 0;
     FieldFileInfo info;
-    const auto field = read_field(path, communicator, &info);
-    all_or_none(communicator, [&] {
-      require_same_camera(field->identity.camera, view.view.camera, path);
-      if (ct.has_value() && ct->content_sha256 != field->identity.ct_content_sha256)
-        throw FileError(path,
-                        "CT of the field (ct_content_sha256)",
-                        ct->content_sha256 + " (" + study_case.ct.string() + ")",
-                        field->identity.ct_content_sha256);
-    });
+    const auto field =
+        used_from(is_of_study ? study_case.views[i].places : StudyPlaces(), "field", [&] {
+          return field_of_view(path, study_case, view, ct, communicator, info);
+        });
     view.renderer = std::make_shared<const TwoPassAfDrr>(field, TwoPassOptions{}, options.pool);
     view.coarse_levels = coarse_field_levels(*field, options, communicator);
     view.limit = MotionLimit{field->identity.frame, field->identity.range};
@@ -223,8 +241,9 @@ LoadedCase load_case(const Study& study,
   if (options.renderer == RendererKind::RayCast) {
     AttenuationModel model;
     model.mu_water_per_mm = options.water_mu_per_mm;
-    const NodeCt node_ct =
-        read_ct_per_node(study_case.ct, options.ct, model, communicator, loaded.warnings);
+    const NodeCt node_ct = used_from(study_case.places, "ct", [&] {
+      return read_ct_per_node(study_case.ct, options.ct, model, communicator, loaded.warnings);
+    });
     ct = node_ct.facts;
     const auto renderer =
         std::make_shared<const RayCastDrr>(node_ct.volume, options.ray_caster, options.pool);
@@ -234,7 +253,9 @@ LoadedCase load_case(const Study& study,
       view.coarse_levels = levels;
     }
   } else if (!options.skip_ct_check) {
-    ct = read_ct_facts(study_case.ct, options.ct, communicator, loaded.warnings);
+    ct = used_from(study_case.places, "ct", [&] {
+      return read_ct_facts(study_case.ct, options.ct, communicator, loaded.warnings);
+    });
   }
   if (options.renderer == RendererKind::Field)
     use_fields(study_case, options, communicator, ct, *problem, loaded.input_sha256);

@@ -34,12 +34,15 @@ fs::path resolved(const fs::path& folder, const std::string& path) {
   return tidied(folder / path);
 }
 
+/// Its place goes to `places`.
 std::optional<fs::path> get_path(TomlTableReader& reader,
                                  const char* key,
                                  Presence presence,
-                                 const fs::path& folder) {
+                                 const fs::path& folder,
+                                 StudyPlaces& places) {
   const auto text = reader.get_string(key, presence);
   if (!text) return std::nullopt;
+  places[key] = reader.place(key);
   return resolved(folder, *text);
 }
 
@@ -138,12 +141,15 @@ StudyView read_view(const toml::table& table,
   StudyView view;
   const CameraGeometry* camera = get_camera(reader, context.rig);
   if (camera != nullptr) view.camera = camera->name;
-  view.xray = get_path(reader, "xray", Presence::Required, context.folder).value_or(fs::path());
+  const auto path = [&](const char* key, Presence presence) {
+    return get_path(reader, key, presence, context.folder, view.places);
+  };
+  view.xray = path("xray", Presence::Required).value_or(fs::path());
   view.xray_domain = get_xray_domain(reader);
   view.roi = get_roi(reader, camera);
   view.fiducials_px = get_points<2>(reader, "fiducials_px");
-  view.field = get_path(reader, "field", Presence::Optional, context.folder);
-  view.mask = get_path(reader, "mask", Presence::Optional, context.folder);
+  view.field = path("field", Presence::Optional);
+  view.mask = path("mask", Presence::Optional);
   check_fiducials(reader, view, fiducial_count, camera);
   reader.refuse_unknown_keys();
   return view;
@@ -186,7 +192,8 @@ StudyCase read_case(const toml::table& table,
   study_case.name = reader.get_string("name", Presence::Required).value_or("");
   check_case_name(reader, study_case.name);
   study_case.note = reader.get_string("note", Presence::Optional).value_or("");
-  study_case.ct = get_path(reader, "ct", Presence::Required, context.folder).value_or(fs::path());
+  study_case.ct =
+      get_path(reader, "ct", Presence::Required, context.folder, study_case.places).value_or("");
   study_case.nominal_room_from_ct = reader.get_pose("nominal_room_from_ct", Presence::Required)
                                         .value_or(RigidTransform::Identity());
   study_case.center_ct_mm =
@@ -280,6 +287,16 @@ const StudyCase& Study::find_case(const std::string& name) const {
   throw InputError("case", name, "the study has only: " + known, path.string());
 }
 
+std::vector<const StudyCase*> Study::chosen_cases(const std::vector<std::string>& names) const {
+  std::map<std::string, const StudyCase*> chosen;
+  for (const std::string& name : names) chosen.emplace(name, &find_case(name));
+  if (names.empty())
+    for (const StudyCase& study_case : cases) chosen.emplace(study_case.name, &study_case);
+  std::vector<const StudyCase*> result;
+  for (const auto& [name, study_case] : chosen) result.push_back(study_case);
+  return result;
+}
+
 Study read_study(const std::filesystem::path& path, std::vector<std::string>* warnings) {
   const toml::table table = read_toml_file(path);
   TomlProblems problems(path.string());
@@ -290,7 +307,9 @@ Study read_study(const std::filesystem::path& path, std::vector<std::string>* wa
   const auto rig = reader.get_string("rig", Presence::Required);
   if (!rig) problems.throw_if_any();  // without cameras nothing else can be judged
   study.rig_name_or_path = resolved_rig(*rig, folder);
-  study.rig = read_rig(study.rig_name_or_path, warnings);
+  study.rig = used_from({{"rig", reader.place("rig")}}, "rig", [&] {
+    return read_rig(study.rig_name_or_path, warnings);
+  });
   read_cases(reader, study, {folder, study.rig, problems});
   reader.refuse_unknown_keys();
   problems.throw_if_any();

@@ -2,10 +2,13 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
+#include <type_traits>
 #include <vector>
 
+#include "base/error.h"
 #include "geometry/camera_geometry.h"
 #include "geometry/rigid_transform.h"
 #include "geometry/slab_sizing.h"
@@ -17,6 +20,10 @@ namespace af {
 /// reading) or attenuation.
 enum class XrayDomain { Intensity, Attenuation };
 
+/// Where a study names each of its files: key -> "study.toml:12: case[0].view[1].xray". Empty for
+/// studies that were not read.
+using StudyPlaces = std::map<std::string, std::string>;
+
 /// One X-ray of a case. Paths are absolute after reading.
 struct StudyView {
   std::string camera;
@@ -27,6 +34,7 @@ struct StudyView {
       fiducials_px;  ///< (column, row), in the order of StudyCase::fiducials_ct_mm
   std::optional<std::filesystem::path> field;
   std::optional<std::filesystem::path> mask;
+  StudyPlaces places;
 };
 
 /// One patient.
@@ -42,6 +50,7 @@ struct StudyCase {
   std::optional<RigidTransform>
       gold_room_from_ct;  ///< instead of, or to compare with, the fiducials
   std::vector<StudyView> views;
+  StudyPlaces places;
 
   /// The frame that --start-* options and fields of this case use: nominal pose, about
   /// center_ct_mm.
@@ -58,6 +67,9 @@ struct Study {
 
   /// Throws InputError that lists the known names; an empty name picks the only case.
   [[nodiscard]] const StudyCase& find_case(const std::string& name) const;
+  /// The named cases, each once, or all; by name.
+  [[nodiscard]] std::vector<const StudyCase*> chosen_cases(
+      const std::vector<std::string>& names) const;
 };
 
 /// Reads and validates study.toml: every message names file, line, key, value and constraint; all
@@ -65,6 +77,23 @@ struct Study {
 /// the detector, collinear or unequal numbers of fiducials, unknown camera, unknown keys as a typo
 /// hint), FileError (4) when it cannot be parsed. `warnings` receives those of the rig.
 Study read_study(const std::filesystem::path& path, std::vector<std::string>* warnings = nullptr);
+
+/// Runs `use`, which reads the file that `key` names; what it throws then begins with the study's
+/// line. \test StudyFile.ErrorsOfItsFilesNameTheLine
+template <typename Use>
+std::invoke_result_t<Use> used_from(const StudyPlaces& places, const std::string& key, Use&& use) {
+  const auto place = places.find(key);
+  if (place == places.end()) return use();
+  try {
+    return use();
+  } catch (const InputError& error) {
+    throw InputError(place->second + ": " + error.what());
+  } catch (const FileError& error) {
+    throw FileError(place->second, error.what());
+  } catch (const RemoteError& error) {
+    throw RemoteError(error.exit_code(), place->second + ": " + error.what());
+  }
+}
 
 /// study.toml text; paths are written relative to `folder` when they lie below it.
 std::string study_to_toml(const Study& study, const std::filesystem::path& folder);

@@ -170,6 +170,10 @@ bool TomlTableReader::has(const char* key) {
   return table_.contains(key);
 }
 
+std::string TomlTableReader::place(const char* key) const {
+  return problems_.where(node(key)) + ": " + prefix_ + key;
+}
+
 void TomlTableReader::add_problem(const char* key, const std::string& constraint) {
   const toml::node* found = table_.get(key);
   const std::string value = found != nullptr ? " = " + value_text(*found) : std::string();

@@ -79,6 +79,8 @@ class TomlTableReader {
   [[nodiscard]] const toml::node& node(const char* key) const;
   /// Whether the key is there; makes it a known one.
   bool has(const char* key);
+  /// "FILE:LINE: PREFIXkey".
+  [[nodiscard]] std::string place(const char* key) const;
   /// "FILE:LINE: PREFIXkey = value: constraint".
   void add_problem(const char* key, const std::string& constraint);
   /// Notes keys that were never asked for, each with the nearest known name. Call it last.

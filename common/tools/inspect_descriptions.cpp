@@ -53,6 +53,10 @@ ordered_json rig_json(const CameraRig& rig) {
   return json;
 }
 
+void require_existing(const fs::path& path) {
+  if (!fs::exists(path)) throw FileError(path.string(), "does not exist");
+}
+
 ordered_json view_json(const StudyView& view, const CameraRig& rig) {
   ordered_json json;
   json["camera"] = view.camera;
@@ -60,11 +64,12 @@ ordered_json view_json(const StudyView& view, const CameraRig& rig) {
   json["xray_domain"] = view.xray_domain == XrayDomain::Intensity ? "intensity" : "attenuation";
   json["roi_px"] = {view.roi.column, view.roi.row, view.roi.width, view.roi.height};
   json["fiducials"] = view.fiducials_px.size();
-  (void)read_xray_attenuation(view, rig.camera(view.camera));
-  (void)read_mask(view, rig.camera(view.camera));
+  const CameraGeometry& camera = rig.camera(view.camera);
+  used_from(view.places, "xray", [&] { (void)read_xray_attenuation(view, camera); });
+  used_from(view.places, "mask", [&] { (void)read_mask(view, camera); });
   if (!view.field) return json;
   json["field"] = view.field->string();
-  if (!fs::exists(*view.field)) throw FileError(view.field->string(), "does not exist");
+  used_from(view.places, "field", [&] { require_existing(*view.field); });
   return json;
 }
 
@@ -72,7 +77,7 @@ ordered_json case_json(const StudyCase& study_case, const CameraRig& rig) {
   ordered_json json;
   json["name"] = study_case.name;
   json["ct"] = study_case.ct.string();
-  if (!fs::exists(study_case.ct)) throw FileError(study_case.ct.string(), "does not exist");
+  used_from(study_case.places, "ct", [&] { require_existing(study_case.ct); });
   json["center_ct_mm"] = vector_json(study_case.center_ct_mm);
   json["target_box_ct_mm"] = {vector_json(study_case.target_box_ct.low_mm),
                               vector_json(study_case.target_box_ct.high_mm)};

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "cli/app_main.h"
+#include "io/study_template.h"
 #include "tools/inspection.h"
 
 namespace {
@@ -13,6 +14,7 @@ using af::Communicator;
 
 struct Options {
   std::vector<std::string> paths;
+  std::string template_name;
   af::InspectOptions inspect;
   bool as_json = false;
 };
@@ -30,6 +32,10 @@ void print(const Options& options, const std::vector<af::Inspection>& inspection
 }
 
 void run(const Options& options, const Communicator& world) {
+  if (!options.template_name.empty()) {
+    if (world.is_root()) std::cout << af::template_text(options.template_name);
+    return;
+  }
   std::vector<af::Inspection> inspections;
   af::ExitCode worst = af::ExitCode::Done;
   std::size_t bad = 0;
@@ -59,7 +65,15 @@ int main(int argc, char** argv) {
       "or DICOM folder), X-rays and DRRs, rigs, studies, poses, fields (every checksum verified), "
       "results and folders of results. The exit code is the worst over all paths: 0 usable, 3 "
       "readable but unacceptable, 4 not readable or damaged."};
-  app.add_option("PATH", options.paths, "Files, folders or names of shipped rigs")->required();
+  auto* what = app.add_option_group("What", "one of");
+  what->add_option("PATH", options.paths, "Files, folders or names of shipped rigs");
+  what->add_option(
+          "--template",
+          options.template_name,
+          "Print a file to fill in, every key with a comment: study (af-inspect --template "
+          "study > study.toml) or rig")
+      ->check(CLI::IsMember(af::template_names()));
+  what->require_option(1);
   app.add_flag("--json", options.as_json, "Print one JSON array instead of text");
   app.add_option("--series",
                  options.inspect.series_uid,

@@ -200,6 +200,26 @@ TEST(AfInspect, SaysWhatItTriedWhenNothingFits) {
   }
 }
 
+TEST(AfInspect, NamesTheStudysLineOfAFileThatIsGone) {
+  const ScratchFolder folder;
+  test::write_small_study(folder.path());
+  fs::remove(folder / "LAT.mha");
+  const test::ProgramRun run = inspect((folder / "study.toml").string());
+  EXPECT_EQ(run.exit_code, 4);
+  EXPECT_THAT(run.output, testing::ContainsRegex("study.toml:[0-9]+: case.0..view.1..xray: "));
+}
+
+TEST(AfInspect, PrintsATemplateThatItAccepts) {
+  const ScratchFolder folder;
+  const test::ProgramRun printed = inspect("--template rig");
+  ASSERT_EQ(printed.exit_code, 0);
+  write_bytes(folder / "rig.toml", printed.output);
+  EXPECT_EQ(inspect((folder / "rig.toml").string()).exit_code, 0);
+  EXPECT_THAT(inspect("--template study").output, HasSubstr("[[case.view]]"));
+  EXPECT_EQ(inspect("--template patient").exit_code, 2);
+  EXPECT_EQ(inspect("").exit_code, 2);
+}
+
 TEST(AfInspect, EndsWithTheWorstCodeButReportsEveryPath) {
   const ScratchFolder folder;
   write_bytes(folder / "pose.txt", "2 0 0 0  0 1 0 0  0 0 1 0  0 0 0 1");  // not rigid

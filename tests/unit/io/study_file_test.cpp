@@ -2,12 +2,14 @@
 #include "io/study_file.h"
 
 #include <filesystem>
+#include <regex>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "base/error.h"
 #include "io/rig_file.h"
+#include "io/study_template.h"
 #include "support/io_checks.h"
 
 namespace af {
@@ -310,6 +312,48 @@ TEST_F(StudyFile, RepeatedCaseNameIsRefused) {
   const std::string twice = body + body.substr(body.find("[[case]]"));
   EXPECT_THAT(message_of<InputError>([&] { read(twice); }),
               AllOf(HasSubstr("case[1].name"), HasSubstr("study.toml:2")));
+}
+
+TEST_F(StudyFile, ErrorsOfItsFilesNameTheLine) {
+  const Study study = read(kGoodStudy);
+  const StudyView& view = study.cases.front().views.front();
+  const auto fails = [] { throw FileError("A.mha", "is gone"); };
+  EXPECT_EQ(message_of<FileError>([&] { used_from(view.places, "xray", fails); }),
+            path() + ":11: case[0].view[0].xray: A.mha: is gone");
+  EXPECT_EQ(message_of<InputError>([&] {
+              used_from(study.cases.front().places, "ct", [] { throw InputError("no HU"); });
+            }),
+            path() + ":4: case[0].ct: no HU");
+  // Of what the study does not name, and of other defects, nothing is said.
+  EXPECT_EQ(message_of<FileError>([&] { used_from(view.places, "mask", fails); }),
+            "A.mha: is gone");
+  EXPECT_THAT(
+      message_of<FileError>([&] { read(replaced(kGoodStudy, "treatment-room", "gone.toml")); }),
+      HasSubstr(path() + ":1: rig: "));
+}
+
+/// The template with every optional key in force.
+std::string uncommented(const std::string& text) {
+  return std::regex_replace(text, std::regex("(^|\n)# ([a-z_]+ = )"), "$1$2");
+}
+
+TEST_F(StudyFile, TemplateIsAValidStudyWithAndWithoutItsOptionalKeys) {
+  const Study plain = read(template_text("study"));
+  ASSERT_EQ(plain.cases.size(), 2U);
+  EXPECT_TRUE(plain.cases.front().fiducials_ct_mm.empty());
+  const StudyCase full = read(uncommented(template_text("study"))).cases.front();
+  EXPECT_EQ(full.fiducials_ct_mm.size(), 4U);
+  EXPECT_TRUE(full.gold_room_from_ct.has_value());
+  EXPECT_FALSE(full.note.empty());
+  EXPECT_TRUE(full.views.front().field.has_value());
+  EXPECT_TRUE(full.views.front().mask.has_value());
+  EXPECT_EQ(full.views.back().fiducials_px.size(), 4U);
+  EXPECT_THROW(template_text("patient"), InputError);
+}
+
+TEST_F(StudyFile, TemplateOfARigIsAValidRig) {
+  test::write_input(folder() / "rig.toml", template_text("rig"));
+  EXPECT_EQ(read_rig(folder() / "rig.toml").cameras.size(), 2U);
 }
 
 TEST_F(StudyFile, WhatIsNotTomlIsAFileError) {
