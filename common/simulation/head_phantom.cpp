@@ -26,6 +26,8 @@ void add_soft_tissue(std::vector<Solid>& solids) {
   add(ellipsoid({0.0, -34.0, -46.0}, {66.0, 62.0, 70.0}, 30, 15));             // face
   add(ellipsoid({0.0, -70.0, -92.0}, {30.0, 32.0, 24.0}, 20, 15));             // chin
   add(ellipsoid({0.0, -98.0, -34.0}, {12.0, 16.0, 17.0}, 20));                 // nose
+  add(ellipsoid({0.0, -88.0, -10.0}, {9.0, 17.0, 24.0}, 20));                  // its bridge
+  add(ellipsoid({0.0, -60.0, -6.0}, {66.0, 43.0, 30.0}, 20, 15));              // brow and eyelids
   add(ellipsoid(vault_mm, vault_half_mm + Vector3d::Constant(6.0), 20, 30));   // scalp
   for (const double side : {-1.0, 1.0})
     add(ellipsoid({side * 56.0, -22.0, -42.0}, {11.0, 22.0, 30.0}, 60));  // masticatory muscles
