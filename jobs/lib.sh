@@ -75,3 +75,45 @@ run_ranks() {
   OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 \
     mpirun -n "$ranks" --oversubscribe --bind-to none "$@"
 }
+
+# Options of scripts: need_value OPTION ARGUMENTS_LEFT, need_count OPTION VALUE.
+need_value() { (($2 >= 2)) || die 2 "option $1 needs a value (try --help)"; }
+need_count() { [[ "$2" =~ ^[1-9][0-9]{0,6}$ ]] || die 2 "$1 = '$2' must be a whole number from 1 to 9999999"; }
+need_seed() { [[ "$2" =~ ^[0-9]{1,18}$ ]] || die 2 "$1 = '$2' must be a whole number"; }
+
+# program_path NAME: of a built program (or an installed one, PREFIX/bin beside PREFIX/share/attenuation-fields/jobs).
+program_path() {
+  local folder="$af_root/build/release/bin"
+  [[ -f "$af_root/CMakeLists.txt" ]] || folder="$(cd "$af_root/../.." && pwd)/bin"
+  [[ -x "$folder/$1" ]] || die 1 "$folder/$1 is missing: build it first"
+  echo "$folder/$1"
+}
+
+# open_output DIR: makes the folder, sets output to its full path and keeps other runs out of it.
+open_output() {
+  mkdir -p "$1/.stages" "$1/logs"
+  output="$(cd "$1" && pwd)"
+  exec {output_lock}>"$output/.stages/lock"
+  flock --nonblock "$output_lock" || die 3 "another run is at work in $output"
+}
+
+# once NAME RESULT COMMAND...: runs a command unless it made RESULT before with the same words and the same program, from
+# the same inputs (once_inputs, which the caller sets); its output goes to logs/NAME.log and, indented, to the screen.
+once_inputs=""
+once() {
+  local name=$1 result=$2 program=$3 start=$SECONDS status=0 key
+  shift 2
+  [[ "$program" != run_ranks ]] || program=$3
+  key=$(printf '%s\n' "$once_inputs" "$(sha256sum <"$program")" "$@" | sha256sum)
+  local stamp="$output/.stages/$name.done"
+  if [[ -e "$result" && -f "$stamp" && "$(<"$stamp")" == "$key" ]]; then
+    say "$name: done before"
+    return
+  fi
+  rm -f "$stamp"
+  say "$name ..."
+  "$@" 2>&1 | tee "$output/logs/$name.log" | sed -u 's/^/    /' || status=${PIPESTATUS[0]}
+  ((status == 0)) || die "$status" "$name failed with exit code $status; its log is $output/logs/$name.log"
+  printf '%s\n' "$key" >"$stamp"
+  say "    $(duration $((SECONDS - start)))"
+}

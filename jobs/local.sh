@@ -40,9 +40,6 @@ ct="" phantom="" preset=quick ranks="" seed=1 force=no skip_build=no skip_packag
 starts_per_interval="" raycast_starts="" pose_count=""
 series_option=()
 
-need_value() { (($2 >= 2)) || die 2 "option $1 needs a value (try --help)"; }
-need_count() { [[ "$2" =~ ^[1-9][0-9]{0,6}$ ]] || die 2 "$1 = '$2' must be a whole number from 1 to 9999999"; }
-
 while (($# > 0)); do
   case "$1" in
     --output | -o) need_value "$1" $#; output=$2; shift ;;
@@ -54,7 +51,7 @@ while (($# > 0)); do
     --raycast-starts) need_value "$1" $#; need_count "$1" "$2"; raycast_starts=$2; shift ;;
     --pose-count) need_value "$1" $#; need_count "$1" "$2"; pose_count=$2; shift ;;
     --ranks | -n) need_value "$1" $#; need_count "$1" "$2"; ranks=$2; shift ;;
-    --seed) need_value "$1" $#; [[ "$2" =~ ^[0-9]{1,18}$ ]] || die 2 "--seed = '$2' must be a whole number"; seed=$2; shift ;;
+    --seed) need_value "$1" $#; need_seed "$1" "$2"; seed=$2; shift ;;
     --skip-packages) skip_packages=yes ;;
     --skip-build) skip_build=yes ;;
     --force) force=yes ;;
