@@ -11,14 +11,12 @@
 
 #include "base/error.h"
 #include "cli/app_main.h"
-#include "cli/progress_printer.h"
 #include "evaluate/failure_trace_files.h"
 #include "evaluate/method_loading.h"
 #include "evaluate/row_gathering_program.h"
 #include "evaluate/target_box.h"
 #include "io/output_file.h"
 #include "io/picture.h"
-#include "parallel/work_queue.h"
 #include "register/result_files.h"
 #include "register/slicer_files.h"
 
@@ -130,30 +128,32 @@ RegistrationRow traced_row(Method& method,
   return row;
 }
 
-/// Collective. Registers every start of one method; `first_order` numbers its rows. Methods go one
-/// after the other: blocks of the work queue then hold work of one duration.
+/// Collective. Registers every start of one method and appends its rows on rank 0, by start index.
+/// Methods go one after the other: blocks of the work queue then hold work of one duration.
 void register_with(Method& method,
                    const std::string& case_name,
                    const StratifiedStarts& starts,
                    const Yardstick& yardstick,
-                   std::size_t first_order,
                    const Communicator& world,
-                   std::vector<json>& mine) {
-  const auto count = static_cast<std::int64_t>(method.start_indices.size());
-  cli::ProgressPrinter printer("case " + case_name + ", " + method.renderer + " registrations",
-                               world.is_root());
+                   std::vector<RegistrationRow>& rows) {
+  const std::size_t first = rows.size();
+  if (world.is_root()) rows.resize(first + method.start_indices.size());
   std::size_t traced = 0;
-  const auto work = [&](std::int64_t item) {
+  const auto registered = [&](std::int64_t item) {
     const std::size_t index = method.start_indices[static_cast<std::size_t>(item)];
     RegistrationRow row = traced_row(method, starts.starts[index], index, yardstick);
     row.case_name = case_name;
     // Items come in order: a rank's first failures are its share of the first of all.
     if (!row.trace.empty() && ++traced > kMostTraces) row.trace.clear();
-    mine.push_back(packed_row(static_cast<std::int64_t>(first_order + index), row));
+    return packed_row(item, row);
   };
-  for_each_item(world, count, work, [&](std::int64_t done) {
-    printer.update(static_cast<double>(done), static_cast<double>(count));
-  });
+  collect_rows(world,
+               static_cast<std::int64_t>(method.start_indices.size()),
+               "case " + case_name + ", " + method.renderer + " registrations",
+               registered,
+               [&](std::int64_t item, const json& packed) {
+                 rows[first + static_cast<std::size_t>(item)] = row_of(packed);
+               });
 }
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
@@ -201,11 +201,8 @@ std::vector<RegistrationRow> register_all(const std::string& case_name,
                                           const StratifiedStarts& starts,
                                           const Yardstick& yardstick,
                                           const Communicator& world) {
-  std::vector<json> mine;
-  for (std::size_t m = 0; m < methods.size(); ++m)
-    register_with(methods[m], case_name, starts, yardstick, m * starts.starts.size(), world, mine);
   std::vector<RegistrationRow> rows;
-  for (const json& packed : gather_rows(world, mine)) rows.push_back(row_of(packed));
+  for (Method& method : methods) register_with(method, case_name, starts, yardstick, world, rows);
   for (const Method& method : methods) keep_first_traces(rows, method.renderer);
   return rows;
 }

@@ -15,7 +15,7 @@ namespace af::evaluation {
 
 /// `af-evaluate field-parameters` as typed.
 struct FieldParametersOptions {
-  PrecomputeOptions base;  ///< the setting that all sweeps share; CT, camera, range
+  PrecomputeOptions base;  ///< the setting that all sweeps share; CT, range; camera (none: all)
   std::vector<int> uv_nodes = {16, 32, 64};
   std::vector<int> st_nodes = {128, 256, 512};
   std::vector<int> codewords = {1024, 4096, 16384, 65536};
@@ -32,10 +32,11 @@ std::vector<std::string> problems(const FieldParametersOptions& options);
 /// Adds the subcommand; returns it.
 CLI::App* bind_field_parameters(CLI::App& app, FieldParametersOptions& options);
 
-/// Collective. Image quality of one camera's fields against each of the four field parameters, the
-/// others as in the base setting (Fig. 10), with memory, creation time and compression (Table I).
-/// Fields are built once and kept in a folder; one that is there with the same options is reused.
-/// Writes field-parameters.csv, field-parameters-poses.csv, the figure, summary.json, reproduce.sh.
+/// Collective. Image quality of fields against each of the four field parameters, the others as in
+/// the base setting (Fig. 10), with memory, creation time and compression (Table I), and difference
+/// images at three qualities (Fig. 9): of one camera, or of all views of a study together. Fields
+/// are built once and kept in a folder; one that is there with the same options is reused. Writes
+/// what write_sweep() and write_difference_images() write, summary.json and reproduce.sh.
 void run_field_parameters(const FieldParametersOptions& options,
                           const std::string& command_line,
                           const Communicator& world);

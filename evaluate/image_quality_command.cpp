@@ -1,18 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "evaluate/image_quality_command.h"
 
+#include <algorithm>
 #include <cmath>
+#include <iomanip>
 #include <iostream>
 #include <memory>
 #include <sstream>
 
 #include "base/error.h"
 #include "cli/app_main.h"
-#include "cli/progress_printer.h"
 #include "drr/field_renderer.h"
 #include "drr/ray_cast_drr.h"
 #include "evaluate/figure_files.h"
 #include "evaluate/image_quality_files.h"
+#include "evaluate/loss_split.h"
+#include "evaluate/loss_split_files.h"
+#include "evaluate/method_options_command.h"
 #include "evaluate/row_gathering_program.h"
 #include "evaluate/summary_files.h"
 #include "io/field_file.h"
@@ -22,7 +26,7 @@
 #include "io/picture.h"
 #include "io/pose_file.h"
 #include "io/provenance.h"
-#include "parallel/work_queue.h"
+#include "io/study_file.h"
 
 namespace af::evaluation {
 namespace {
@@ -31,16 +35,41 @@ using nlohmann::json;
 
 std::string to_toml(const ImageQualityOptions& options) {
   std::ostringstream out;
-  out << "field = " << std::quoted(options.field.string())
-      << "\nct = " << std::quoted(options.ct.string());
+  if (options.study.empty())
+    out << "field = " << std::quoted(options.field.string())
+        << "\nct = " << std::quoted(options.ct.string());
+  else
+    out << "study = " << std::quoted(options.study.string())
+        << "\ncase = " << toml_list(options.cases);
   if (options.poses.empty())
     out << "\npose_count = " << options.pose_count;
   else
     out << "\nposes = " << std::quoted(options.poses.string());
-  out << "\nlook_up = \"" << options.look_up << "\"\nstep_mm = " << number_text(options.step_mm)
-      << "\nseed = " << options.seed << '\n';
+  out << "\nlook_up = \"" << options.look_up
+      << "\"\nsplit_loss_poses = " << options.split_loss_poses
+      << "\nstep_mm = " << number_text(options.step_mm) << "\nseed = " << options.seed << '\n';
   return out.str();
 }
+
+/// One field to compare.
+struct Target {
+  std::string case_name;  ///< empty when the field stands alone
+  std::filesystem::path field;
+  std::filesystem::path ct;
+  std::filesystem::path folder;  ///< of its results
+};
+
+/// What a study shows together.
+struct TargetResult {
+  std::string case_name;
+  std::string camera;
+  std::vector<DrrComparison> comparisons;
+  std::vector<PicturePanel> worst_pair;
+
+  [[nodiscard]] std::string label() const {
+    return (case_name.empty() ? "camera" : case_name) + " " + camera;
+  }
+};
 
 /// Everything a comparison needs, the same on every rank.
 struct Setup {
@@ -55,12 +84,12 @@ struct Setup {
   }
 };
 
-Setup load(const ImageQualityOptions& options, const Communicator& world) {
+Setup load(const ImageQualityOptions& options, const Target& target, const Communicator& world) {
   Setup setup;
-  setup.field = read_field(options.field, world, &setup.field_info);
+  setup.field = read_field(target.field, world, &setup.field_info);
   const FieldIdentity& identity = setup.field->identity;
   std::vector<std::string> warnings;
-  setup.ct = read_ct_per_node(options.ct,
+  setup.ct = read_ct_per_node(target.ct,
                               {options.series_uid},
                               {identity.mu_water_per_mm, identity.air_below_hu},
                               world,
@@ -68,10 +97,16 @@ Setup load(const ImageQualityOptions& options, const Communicator& world) {
   for (const std::string& text : warnings) cli::warn(world, text);
   all_or_none(world, [&] {
     if (setup.ct.facts.content_sha256 != identity.ct_content_sha256)
-      throw FileError(options.field.string(),
+      throw FileError(target.field.string(),
                       "CT of the field (ct_content_sha256)",
-                      setup.ct.facts.content_sha256 + " (" + options.ct.string() + ")",
+                      setup.ct.facts.content_sha256 + " (" + target.ct.string() + ")",
                       identity.ct_content_sha256);
+    if (options.split_loss_poses > 0 && setup.field->light_slab.slabs.size() != 1)
+      throw InputError("--split-loss-poses",
+                       std::to_string(options.split_loss_poses),
+                       "needs a field of one slab; this has " +
+                           std::to_string(setup.field->light_slab.slabs.size()),
+                       target.field.string());
     if (options.poses.empty()) return;
     setup.poses = read_poses_csv(options.poses, identity.frame);
     if (setup.poses.empty())
@@ -93,45 +128,62 @@ DrrComparison compare(const ImageQualityOptions& options,
   return comparer.at_pose(identity.frame, parameters_from_pose(identity.frame, pose));
 }
 
-void write_pair(const ImageQualityOptions& options,
-                const Setup& setup,
-                DrrComparer& comparer,
-                std::size_t index,
-                const std::string& which) {
-  const DrrComparison comparison =
-      compare(options, setup, comparer, static_cast<std::int64_t>(index));
+/// Field, ray casting and their difference at one pose.
+std::vector<PicturePanel> pair_panels(const DrrComparison& comparison,
+                                      const DrrComparer& comparer,
+                                      const std::string& what) {
   const Image2d& field = comparer.tested_image();
   const Image2d& cast = comparer.reference_image();
   Image2d difference = field;
   for (std::size_t i = 0; i < difference.pixels.size(); ++i) difference.pixels[i] -= cast.pixels[i];
   const double top = comparison.reference_maximum;
   constexpr double kDifferenceShare = 0.05;
-  const std::vector<PicturePanel> panels = {
-      {field, 0.0, top, "Field", "look-up in the compressed field", {}, {}},
-      {cast, 0.0, top, "Ray casting", "the reference", {}, {}},
-      {difference,
-       -kDifferenceShare * top,
-       kDifferenceShare * top,
-       "Difference",
-       "field - ray casting, window +-5 % of the maximum",
-       PicturePanel::Colors::Diverging,
-       {}}};
-  const std::string heading = "Pose " + std::to_string(index) + ", the " + which + " of " +
-                              std::to_string(setup.pose_count(options)) + ": PSNR " +
-                              fixed_text(comparison.psnr_db, 1) + " dB";
-  const int zoom = std::max(1, 360 / std::max(field.width, field.height));
-  write_picture(panels, 3, heading, options.output_folder / (which + "-pair.png"), zoom);
+  const std::string before = what.empty() ? "" : what + ": ";
+  return {{field, 0.0, top, before + "field", "look-up in the compressed field", {}, {}},
+          {cast, 0.0, top, before + "ray casting", "the reference", {}, {}},
+          {difference,
+           -kDifferenceShare * top,
+           kDifferenceShare * top,
+           before + "difference, PSNR " + fixed_text(comparison.psnr_db, 1) + " dB",
+           "field - ray casting, window +-5 % of the maximum",
+           PicturePanel::Colors::Diverging,
+           {}}};
+}
+
+int zoom_of(const Image2d& image) {
+  return std::max(1, 360 / std::max(image.width, image.height));
+}
+
+void write_pair(const std::vector<PicturePanel>& panels,
+                const std::string& which,
+                std::size_t index,
+                std::size_t count,
+                const std::filesystem::path& folder) {
+  write_picture(panels,
+                3,
+                "Pose " + std::to_string(index) + ", the " + which + " of " + std::to_string(count),
+                folder / (which + "-pair.png"),
+                zoom_of(panels.front().image));
+}
+
+PsnrGroup group_of(const TargetResult& result) {
+  PsnrGroup group{result.label(), {}};
+  for (const DrrComparison& comparison : result.comparisons)
+    group.psnr_db.push_back(comparison.psnr_db);
+  return group;
 }
 
 void write_results(const ImageQualityOptions& options,
+                   const Target& target,
                    const Setup& setup,
                    DrrComparer& comparer,
-                   const std::vector<DrrComparison>& comparisons,
+                   const std::vector<LossSplit>& splits,
+                   TargetResult& result,
                    const Provenance& provenance) {
-  const std::filesystem::path& folder = options.output_folder;
+  const std::filesystem::path& folder = target.folder;
+  const std::vector<DrrComparison>& comparisons = result.comparisons;
   write_text_file(folder / "image-quality.csv", image_quality_table(comparisons).to_text());
-  PsnrGroup group{"camera " + setup.field->identity.camera.name, {}};
-  for (const DrrComparison& comparison : comparisons) group.psnr_db.push_back(comparison.psnr_db);
+  const PsnrGroup group = group_of(result);
   draw_psnr_boxes({group}, folder / "psnr");
   json summary = {{"format", "attenuation-fields evaluation"},
                   {"format_version", 1},
@@ -141,11 +193,20 @@ void write_results(const ImageQualityOptions& options,
   for (const auto& [which, share] : {std::pair("worst", 0.0), std::pair("median", 0.5)}) {
     const auto index = comparison_at(comparisons, share);
     if (!index.has_value()) continue;
-    write_pair(options, setup, comparer, *index, which);
+    const DrrComparison comparison =
+        compare(options, setup, comparer, static_cast<std::int64_t>(*index));
+    write_pair(pair_panels(comparison, comparer, ""), which, *index, comparisons.size(), folder);
+    if (std::string(which) == "worst")
+      result.worst_pair = pair_panels(comparison, comparer, result.label());
     summary["pictures"].push_back({{"file", std::string(which) + "-pair.png"},
                                    {"which", which},
                                    {"pose_index", *index},
                                    {"psnr_db", number_json(comparisons[*index].psnr_db)}});
+  }
+  if (!target.case_name.empty()) summary["case"] = target.case_name;
+  if (!splits.empty()) {
+    summary["loss_split"] = write_loss_split(splits, folder);
+    summary["figures"].push_back("loss-split");
   }
   summary["field"] = field_description(*setup.field);
   summary["field"]["file_bytes"] = setup.field_info.file_bytes;
@@ -169,12 +230,138 @@ void write_results(const ImageQualityOptions& options,
             << " poses\nresults: " << folder.string() << '\n';
 }
 
+/// Collective. The losses of the first poses, on rank 0.
+std::vector<LossSplit> split_losses(const ImageQualityOptions& options,
+                                    const Setup& setup,
+                                    const DrrRenderer& field,
+                                    const DrrRenderer& reference,
+                                    DrrComparer& comparer,
+                                    const Communicator& world) {
+  const std::int64_t count =
+      std::min<std::int64_t>(options.split_loss_poses, setup.pose_count(options));
+  std::vector<LossSplit> splits(static_cast<std::size_t>(count));
+  if (count == 0) return splits;
+  const LossSplitter splitter(
+      field, reference, setup.ct.volume, {options.step_mm}, setup.field->light_slab, setup.view);
+  collect_rows(
+      world,
+      count,
+      "losses split",
+      [&](std::int64_t index) -> json {
+        const PoseParameters parameters = compare(options, setup, comparer, index).parameters;
+        return splitter.at_pose(pose_from_parameters(setup.field->identity.frame, parameters))
+            .mean_square;
+      },
+      [&](std::int64_t index, const json& row) {
+        row.get_to(splits[static_cast<std::size_t>(index)].mean_square);
+      });
+  return splits;
+}
+
+/// Collective. Compares one field and writes its folder; the result is rank 0's.
+TargetResult evaluate_target(const ImageQualityOptions& options,
+                             const Target& target,
+                             const std::string& command_line,
+                             const Communicator& world) {
+  all_or_none(world, [&] {
+    if (world.is_root()) make_output_folder(target.folder);
+  });
+  const Setup setup = load(options, target, world);
+  const auto field = make_field_renderer(setup.field, options.look_up);
+  const RayCastDrr ray_cast(setup.ct.volume, {options.step_mm});
+  DrrComparer comparer(*field, ray_cast, setup.view);
+  const std::int64_t count = setup.pose_count(options);
+  TargetResult result{target.case_name, setup.view.camera.name, {}, {}};
+  result.comparisons.resize(static_cast<std::size_t>(count));
+  collect_rows(
+      world,
+      count,
+      "poses compared",
+      [&](std::int64_t index) { return comparison_row(compare(options, setup, comparer, index)); },
+      [&](std::int64_t index, const json& row) {
+        result.comparisons[static_cast<std::size_t>(index)] = comparison_of(row);
+      });
+  const std::vector<LossSplit> splits =
+      split_losses(options, setup, *field, ray_cast, comparer, world);
+  const Provenance provenance = {
+      "af-evaluate image-quality",
+      command_line,
+      to_toml(options),
+      options.seed,
+      world.size(),
+      {{"field " + setup.view.camera.name, setup.field_info.payload_sha256},
+       {"ct", setup.ct.facts.content_sha256}}};
+  all_or_none(world, [&] {
+    if (world.is_root())
+      write_results(options, target, setup, comparer, splits, result, provenance);
+  });
+  return result;
+}
+
+/// The fields to compare: the one of --field, or those of the study's views.
+std::vector<Target> targets_of(const ImageQualityOptions& options) {
+  const bool has_field = !options.field.empty() && !options.ct.empty();
+  const bool has_any = !options.field.empty() || !options.ct.empty();
+  if (options.study.empty() ? !has_field : has_any)
+    throw UsageError("name a field and its CT, --field FIELD --ct CT, or --study STUDY alone");
+  if (options.study.empty()) return {{"", options.field, options.ct, options.output_folder}};
+  const Study study = read_study(options.study);
+  std::vector<Target> targets;
+  for (const StudyCase* study_case : study.chosen_cases(options.cases))
+    for (const StudyView& view : study_case->views) {
+      if (!view.field.has_value())
+        throw InputError("case '" + study_case->name + "', view '" + view.camera + "': field",
+                         "none",
+                         "must be in the study",
+                         study.path.string());
+      targets.push_back({study_case->name,
+                         *view.field,
+                         study_case->ct,
+                         options.output_folder / (study_case->name + "-" + view.camera)});
+    }
+  return targets;
+}
+
+/// One table, box plot and sheet of pairs of all fields of a study.
+void write_together(const std::vector<TargetResult>& results, const std::filesystem::path& folder) {
+  std::vector<std::string> columns = {"case", "camera"};
+  const std::vector<std::string> own_columns = image_quality_table({}).columns();
+  columns.insert(columns.end(), own_columns.begin(), own_columns.end());
+  CsvTable table(columns);
+  std::vector<PsnrGroup> groups;
+  std::vector<PicturePanel> panels;
+  for (const TargetResult& result : results) {
+    const CsvTable own = image_quality_table(result.comparisons);
+    for (std::size_t row = 0; row < own.row_count(); ++row) {
+      std::vector<std::string> fields = {result.case_name, result.camera};
+      for (const std::string& column : own_columns) fields.push_back(own.text(row, column));
+      table.add_row(std::move(fields));
+    }
+    groups.push_back(group_of(result));
+    panels.insert(panels.end(), result.worst_pair.begin(), result.worst_pair.end());
+  }
+  write_text_file(folder / "image-quality.csv", table.to_text());
+  draw_psnr_boxes(groups, folder / "psnr");
+  write_picture(panels,
+                3,
+                "The worst pair of every field",
+                folder / "worst-pairs.png",
+                zoom_of(panels.front().image));
+  std::cout << "all fields: " << (folder / "psnr.svg").string() << ", "
+            << (folder / "worst-pairs.png").string() << '\n';
+}
+
 }  // namespace
 
 std::vector<std::string> problems(const ImageQualityOptions& options) {
   std::vector<std::string> found;
   if (options.pose_count < 1)
     found.push_back("--pose-count = " + std::to_string(options.pose_count) + ": must be >= 1");
+  if (!options.study.empty() && !options.poses.empty())
+    found.push_back("--poses = '" + options.poses.string() + "': must not be given with --study");
+  if (options.split_loss_poses < 0 || (options.split_loss_poses > 0 && options.look_up != "linear"))
+    found.push_back("--split-loss-poses = " + std::to_string(options.split_loss_poses) +
+                    ": must not be negative, and 0 for a look-up other than linear");
   for (const std::string& text : af::problems(RayCasterOptions{options.step_mm}))
     found.push_back(text);
   return found;
@@ -185,10 +372,16 @@ CLI::App* bind_image_quality(CLI::App& app, ImageQualityOptions& options) {
       "image-quality",
       "DRRs of a field against ray casting at random poses of its motion range (the paper's Fig. "
       "8): PSNR, statistics, box plot, worst pair");
-  command->add_option("--field", options.field, "Field file of one camera")->required();
-  command
-      ->add_option("--ct", options.ct, "The CT the field was made from: image file or DICOM folder")
-      ->required();
+  command->add_option("--field", options.field, "Field file of one camera");
+  command->add_option(
+      "--ct", options.ct, "The CT the field was made from: image file or DICOM folder");
+  command->add_option(
+      "--study",
+      options.study,
+      "Instead of both: study.toml whose views name their fields (key `field`); one "
+      "box plot of all, the worst pairs side by side");
+  command->add_option("--case", options.cases, "Case of the study, may be repeated (default: all)")
+      ->take_all();
   auto* count =
       command
           ->add_option(
@@ -207,6 +400,12 @@ CLI::App* bind_image_quality(CLI::App& app, ImageQualityOptions& options) {
                    "(u,v) too, quadrilinear (the paper's, literal) or nearest")
       ->check(CLI::IsMember(field_look_up_names()))
       ->capture_default_str();
+  command
+      ->add_option("--split-loss-poses",
+                   options.split_loss_poses,
+                   "Split the loss at so many of the poses into interpolation over (u,v), over "
+                   "(s,t), and quantisation; some ten ray-cast DRRs each")
+      ->capture_default_str();
   command->add_option("--step-mm", options.step_mm, "Longest step of ray casting, mm")
       ->capture_default_str();
   command->add_option(
@@ -219,43 +418,19 @@ CLI::App* bind_image_quality(CLI::App& app, ImageQualityOptions& options) {
 void run_image_quality(const ImageQualityOptions& options,
                        const std::string& command_line,
                        const Communicator& world) {
-  all_or_none(world, [&] {
+  const std::vector<Target> targets = all_or_none(world, [&] {
     throw_if_any(problems(options));
-    if (!world.is_root()) return;
-    require_gnuplot();
-    make_output_folder(options.output_folder);
+    if (world.is_root()) {
+      require_gnuplot();
+      make_output_folder(options.output_folder);
+    }
+    return targets_of(options);
   });
-  const Setup setup = load(options, world);
-  const auto field = make_field_renderer(setup.field, options.look_up);
-  const RayCastDrr ray_cast(setup.ct.volume, {options.step_mm});
-  DrrComparer comparer(*field, ray_cast, setup.view);
-
-  const std::int64_t count = setup.pose_count(options);
-  std::vector<json> mine;
-  {
-    cli::ProgressPrinter printer("poses compared", world.is_root());
-    for_each_item(
-        world,
-        count,
-        [&](std::int64_t index) {
-          mine.push_back(comparison_row(index, compare(options, setup, comparer, index)));
-        },
-        [&](std::int64_t done) {
-          printer.update(static_cast<double>(done), static_cast<double>(count));
-        });
-  }
-  std::vector<DrrComparison> comparisons;
-  for (const json& row : gather_rows(world, mine)) comparisons.push_back(comparison_of(row));
-  const Provenance provenance = {
-      "af-evaluate image-quality",
-      command_line,
-      to_toml(options),
-      options.seed,
-      world.size(),
-      {{"field " + setup.view.camera.name, setup.field_info.payload_sha256},
-       {"ct", setup.ct.facts.content_sha256}}};
+  std::vector<TargetResult> results;
+  for (const Target& target : targets)
+    results.push_back(evaluate_target(options, target, command_line, world));
   all_or_none(world, [&] {
-    if (world.is_root()) write_results(options, setup, comparer, comparisons, provenance);
+    if (world.is_root() && !options.study.empty()) write_together(results, options.output_folder);
   });
 }
 

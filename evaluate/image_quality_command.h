@@ -16,9 +16,12 @@ namespace af::evaluation {
 struct ImageQualityOptions {
   std::filesystem::path field;
   std::filesystem::path ct;
+  std::filesystem::path study;     ///< instead of both: all its cases and views
+  std::vector<std::string> cases;  ///< of the study; empty: all
   int pose_count = 100;
   std::filesystem::path poses;
   std::string look_up = "linear";
+  int split_loss_poses = 0;  ///< so many poses' losses are split
   double step_mm = 1.0;
   std::string series_uid;
   std::uint64_t seed = 1;
@@ -31,7 +34,9 @@ std::vector<std::string> problems(const ImageQualityOptions& options);
 CLI::App* bind_image_quality(CLI::App& app, ImageQualityOptions& options);
 
 /// Collective. Compares a field's DRRs with ray casting (Fig. 8) and writes image-quality.csv,
-/// figures, the pictures of the worst and the median pair, summary.json and reproduce.sh.
+/// figures, the pictures of the worst and the median pair, summary.json and reproduce.sh. Of a
+/// study every view's field gets a folder of its own, CASE-CAMERA, and the run's folder one table,
+/// one box plot and the worst pairs side by side.
 void run_image_quality(const ImageQualityOptions& options,
                        const std::string& command_line,
                        const Communicator& world);

@@ -41,11 +41,10 @@ json share_where(const std::vector<double>& values, const auto& predicate) {
 
 }  // namespace
 
-json comparison_row(std::int64_t pose_index, const DrrComparison& comparison) {
+json comparison_row(const DrrComparison& comparison) {
   const auto& rotation = comparison.parameters.rotation_rad;
   const auto& translation = comparison.parameters.translation_mm;
-  return {pose_index,
-          {rotation.x(), rotation.y(), rotation.z()},
+  return {{rotation.x(), rotation.y(), rotation.z()},
           {translation.x(), translation.y(), translation.z()},
           comparison.redrawn,
           comparison.rays_outside,
@@ -64,11 +63,11 @@ DrrComparison comparison_of(const json& row) {
     return Eigen::Vector3d(
         values[0].get<double>(), values[1].get<double>(), values[2].get<double>());
   };
-  const auto values = row[5].get<std::array<double, 8>>();
+  const auto values = row[4].get<std::array<double, 8>>();
   DrrComparison comparison;
-  comparison.parameters = {vector_of(row[1]), vector_of(row[2])};
-  comparison.redrawn = row[3].get<int>();
-  comparison.rays_outside = row[4].get<std::int64_t>();
+  comparison.parameters = {vector_of(row[0]), vector_of(row[1])};
+  comparison.redrawn = row[2].get<int>();
+  comparison.rays_outside = row[3].get<std::int64_t>();
   comparison.psnr_db = values[0];
   comparison.rms_difference = values[1];
   comparison.mean_difference = values[2];

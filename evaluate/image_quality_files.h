@@ -12,7 +12,7 @@
 namespace af::evaluation {
 
 /// A comparison as a row to be sent between ranks, and back.
-nlohmann::json comparison_row(std::int64_t pose_index, const DrrComparison& comparison);
+nlohmann::json comparison_row(const DrrComparison& comparison);
 DrrComparison comparison_of(const nlohmann::json& row);
 
 /// image-quality.csv: one row per pose, in order; no timings.

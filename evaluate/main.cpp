@@ -4,6 +4,7 @@
 #include "evaluate/error_budget_command.h"
 #include "evaluate/field_parameters_command.h"
 #include "evaluate/image_quality_command.h"
+#include "evaluate/join_studies_command.h"
 #include "evaluate/method_options_command.h"
 #include "evaluate/registration_command.h"
 #include "evaluate/report_command.h"
@@ -26,6 +27,8 @@ int main(int argc, char** argv) {
   const CLI::App* compare_command = bind_compare(app, compare);
   af::evaluation::ErrorBudgetOptions error_budget;
   const CLI::App* error_budget_command = bind_error_budget(app, error_budget);
+  af::evaluation::JoinStudiesOptions join;
+  const CLI::App* join_command = bind_join_studies(app, join);
   af::evaluation::ReportOptions report;
   const CLI::App* report_command = bind_report(app, report);
   af::registration::MethodOptions method;
@@ -40,6 +43,7 @@ int main(int argc, char** argv) {
       run_field_parameters(field_parameters, command_line, world);
     if (compare_command->parsed()) run_compare(compare, world);
     if (error_budget_command->parsed()) run_error_budget(error_budget, command_line, world);
+    if (join_command->parsed()) run_join_studies(join, world);
     if (method_command->parsed()) af::evaluation::show_method(method, world);
     if (report_command->parsed()) run_report(report, world);
   });

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "evaluate/registration_command.h"
 
-#include <algorithm>
 #include <cmath>
 #include <iomanip>
 #include <iostream>
+#include <iterator>
 #include <map>
 #include <set>
 #include <sstream>
@@ -12,6 +12,7 @@
 #include "base/error.h"
 #include "cli/app_main.h"
 #include "evaluate/case_evaluation_program.h"
+#include "evaluate/case_table_files.h"
 #include "evaluate/failed_start_files.h"
 #include "evaluate/failure_trace_files.h"
 #include "evaluate/figure_files.h"
@@ -29,10 +30,9 @@ namespace {
 
 using nlohmann::json;
 
-/// How the study's X-rays were simulated, if they were: the provenance that af-simulate leaves
-/// beside study.toml.
-json simulation_of(const Study& study) {
-  const std::filesystem::path path = study.path.parent_path() / "provenance.json";
+/// What af-simulate left in a folder; null when it did not make it.
+json simulation_in(const std::filesystem::path& folder) {
+  const std::filesystem::path path = folder / "provenance.json";
   if (!std::filesystem::exists(path)) return nullptr;
   json provenance = json::parse(read_text_file(path), nullptr, false);
   if (!provenance.is_object() || provenance.value("program", "") != "af-simulate") return nullptr;
@@ -62,6 +62,24 @@ json repeat_json(const RegistrationStudyOptions& options) {
                cli::shell_quoted((folder / "starts.csv").string())},
           {"renderer", options.renderer},
           {"output", (folder / "repeats").string()}};
+}
+
+/// How the study's X-rays were simulated, if they were: the provenance that af-simulate leaves
+/// beside study.toml, or beside the X-rays when studies were joined. Then that of the first case
+/// speaks, and the commands of all are listed.
+json simulation_of(const Study& study) {
+  if (json simulation = simulation_in(study.path.parent_path()); simulation.is_object())
+    return simulation;
+  json first;
+  json commands = json::object();
+  for (const StudyCase& study_case : study.cases) {
+    const json simulation = simulation_in(study_case.views.front().xray.parent_path());
+    if (!simulation.is_object()) continue;
+    if (first.is_null()) first = simulation;
+    commands[study_case.name] = simulation.value("command_line", "");
+  }
+  if (first.is_object()) first["commands_of_cases"] = commands;
+  return first;
 }
 
 json case_json(const CaseEvaluation& evaluation) {
@@ -192,12 +210,8 @@ void print_outcome(const json& summary,
 
 std::vector<StudyCase> chosen_cases(const RegistrationStudyOptions& options, const Study& study) {
   std::vector<StudyCase> cases;
-  if (options.cases.empty()) cases = study.cases;
-  for (const std::string& name : std::set(options.cases.begin(), options.cases.end()))
-    cases.push_back(study.find_case(name));
-  std::sort(cases.begin(), cases.end(), [](const StudyCase& a, const StudyCase& b) {
-    return a.name < b.name;
-  });
+  for (const StudyCase* study_case : study.chosen_cases(options.cases))
+    cases.push_back(*study_case);
   if (cases.size() > 1 && !options.fields.empty())
     throw InputError("--field",
                      options.fields.front(),
@@ -358,20 +372,20 @@ void run_registration(const RegistrationStudyOptions& options,
   });
 
   std::vector<CaseEvaluation> evaluations;
-  std::vector<std::string> case_names;
-  std::vector<StratifiedStarts> starts;
   for (const StudyCase& study_case : cases) {
-    const auto write_starts = [&](const CaseEvaluation& so_far) {
-      case_names.push_back(so_far.case_name);
-      starts.push_back(so_far.starts);
-      if (world.is_root())
-        write_text_file(folder / "starts.csv", starts_table(case_names, starts).to_text());
+    const auto on_starts = [&](const CaseEvaluation& so_far) {
+      if (!world.is_root()) return;
+      std::vector<CaseStarts> starts;
+      for (const CaseEvaluation& done : evaluations)
+        starts.push_back({done.case_name, &done.starts.starts});
+      starts.push_back({so_far.case_name, &so_far.starts.starts});
+      write_starts(folder / "starts.csv", starts);
     };
     evaluations.push_back(options.poses_from.empty()
-                              ? evaluate_case(options, study, study_case, world, write_starts)
+                              ? evaluate_case(options, study, study_case, world, on_starts)
                               : all_or_none(world, [&] {
                                   return evaluate_found_poses(
-                                      options, study, study_case, write_starts);
+                                      options, study, study_case, on_starts);
                                 }));
   }
   if (options.is_starts_only) {
@@ -387,16 +401,20 @@ void run_registration(const RegistrationStudyOptions& options,
                              options.method.seed,
                              world.size(),
                              {{"study", sha256_of_file(study.path.string())}}};
-    for (const CaseEvaluation& evaluation : evaluations) {
-      rows.insert(rows.end(), evaluation.rows.begin(), evaluation.rows.end());
+    for (CaseEvaluation& evaluation : evaluations) {
+      rows.insert(rows.end(),
+                  std::make_move_iterator(evaluation.rows.begin()),
+                  std::make_move_iterator(evaluation.rows.end()));
+      evaluation.rows = {};
       provenance.input_sha256.insert(evaluation.input_sha256.begin(),
                                      evaluation.input_sha256.end());
     }
-    write_text_file(folder / "registrations.csv", registrations_table(rows).to_text());
+    write_registrations(folder / "registrations.csv", rows);
     write_traces(folder, rows);
     draw_figures(options, rows);
     write_reproduce_script(folder, provenance);
     json summary = summary_json(options, study, evaluations, rows);
+    write_text_file(folder / "cases.csv", case_table(summary["renderers"]).to_text());
     summary["provenance"] = af::to_json(provenance);
     // Last: when it is there, everything is.
     write_text_file(folder / "summary.json", summary.dump(2) + "\n");

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "evaluate/registration_rows_files.h"
 
+#include <algorithm>
 #include <array>
+#include <cstddef>
 #include <utility>
 
 namespace af::evaluation {
@@ -39,6 +41,31 @@ std::vector<TracePoint> trace_of(const json& packed) {
                      point[4].get<std::array<double, 6>>(),
                      point[5].get<double>()});
   return trace;
+}
+
+std::vector<std::string> start_columns() {
+  std::vector<std::string> columns = {"case", "start_index", "interval", "draw_index"};
+  for (const char* name : kParameterNames) columns.push_back(std::string("start_") + name);
+  columns.emplace_back("initial_tre_mm");
+  for (const char row : {'0', '1', '2'})
+    for (const char column : {'0', '1', '2', '3'})
+      columns.push_back(std::string("m") + row + column);
+  return columns;
+}
+
+std::vector<std::string> start_fields(const std::string& case_name,
+                                      std::size_t index,
+                                      const PerturbedStart& start) {
+  std::vector<std::string> fields = {case_name,
+                                     std::to_string(index),
+                                     std::to_string(start.interval),
+                                     std::to_string(start.draw_index)};
+  append_numbers(fields, start.parameters.deg_and_mm());
+  fields.push_back(number_text(start.initial_tre_mm));
+  for (int row = 0; row < 3; ++row)
+    for (int column = 0; column < 4; ++column)
+      fields.push_back(number_text(start.room_from_ct.matrix()(row, column)));
+  return fields;
 }
 
 }  // namespace
@@ -134,31 +161,29 @@ CsvTable registrations_table(const std::vector<RegistrationRow>& rows) {
   return table;
 }
 
-CsvTable starts_table(const std::vector<std::string>& case_names,
-                      const std::vector<StratifiedStarts>& starts) {
-  std::vector<std::string> columns = {"case", "start_index", "interval", "draw_index"};
-  for (const char* name : kParameterNames) columns.push_back(std::string("start_") + name);
-  columns.emplace_back("initial_tre_mm");
-  for (const char row : {'0', '1', '2'})
-    for (const char column : {'0', '1', '2', '3'})
-      columns.push_back(std::string("m") + row + column);
-  CsvTable table(columns);
-  for (std::size_t c = 0; c < starts.size(); ++c) {
-    for (std::size_t i = 0; i < starts[c].starts.size(); ++i) {
-      const PerturbedStart& start = starts[c].starts[i];
-      std::vector<std::string> fields = {case_names[c],
-                                         std::to_string(i),
-                                         std::to_string(start.interval),
-                                         std::to_string(start.draw_index)};
-      append_numbers(fields, start.parameters.deg_and_mm());
-      fields.push_back(number_text(start.initial_tre_mm));
-      for (int row = 0; row < 3; ++row)
-        for (int column = 0; column < 4; ++column)
-          fields.push_back(number_text(start.room_from_ct.matrix()(row, column)));
-      table.add_row(std::move(fields));
+void write_registrations(const std::filesystem::path& path,
+                         const std::vector<RegistrationRow>& rows) {
+  write_csv_in_parts(path, rows.size(), [&](std::size_t first, std::size_t end) {
+    const auto begin = rows.begin();
+    return registrations_table(
+        {begin + static_cast<std::ptrdiff_t>(first), begin + static_cast<std::ptrdiff_t>(end)});
+  });
+}
+
+void write_starts(const std::filesystem::path& path, const std::vector<CaseStarts>& cases) {
+  std::size_t count = 0;
+  for (const CaseStarts& entry : cases) count += entry.starts->size();
+  write_csv_in_parts(path, count, [&](std::size_t first, std::size_t end) {
+    CsvTable table(start_columns());
+    for (const CaseStarts& entry : cases) {
+      const std::size_t size = entry.starts->size();
+      for (std::size_t i = std::min(first, size); i < std::min(end, size); ++i)
+        table.add_row(start_fields(entry.case_name, i, (*entry.starts)[i]));
+      first -= std::min(first, size);
+      end -= std::min(end, size);
     }
-  }
-  return table;
+    return table;
+  });
 }
 
 std::vector<TreOutcome> outcomes_of(const std::vector<RegistrationRow>& rows,

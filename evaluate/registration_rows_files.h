@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <filesystem>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -60,9 +61,18 @@ RegistrationRow row_of(const nlohmann::json& packed);
 /// registrations.csv with the contract's columns, in the given order; timings last.
 CsvTable registrations_table(const std::vector<RegistrationRow>& rows);
 
-/// starts.csv: the starts of all cases, in order; `case_names` is parallel to `starts`.
-CsvTable starts_table(const std::vector<std::string>& case_names,
-                      const std::vector<StratifiedStarts>& starts);
+/// registrations.csv of any length, a part at a time.
+void write_registrations(const std::filesystem::path& path,
+                         const std::vector<RegistrationRow>& rows);
+
+/// The starts of one case in starts.csv.
+struct CaseStarts {
+  std::string case_name;
+  const std::vector<PerturbedStart>* starts = nullptr;
+};
+
+/// starts.csv: the starts of all cases, in order, of any number.
+void write_starts(const std::filesystem::path& path, const std::vector<CaseStarts>& cases);
 
 /// Starts and TREs of one renderer, in row order.
 std::vector<TreOutcome> outcomes_of(const std::vector<RegistrationRow>& rows,

@@ -1,27 +1,40 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "evaluate/row_gathering_program.h"
 
-#include <algorithm>
 #include <cstddef>
-#include <cstdint>
+#include <optional>
 #include <span>
+#include <vector>
+
+#include "cli/progress_printer.h"
+#include "parallel/work_queue.h"
 
 namespace af::evaluation {
 
 using nlohmann::json;
 
-std::vector<json> gather_rows(const Communicator& communicator, const std::vector<json>& mine) {
-  const std::vector<std::uint8_t> packed = json::to_cbor(mine);
-  std::vector<json> rows;
-  for (const std::vector<std::byte>& bytes :
-       communicator.gather(std::as_bytes(std::span(packed)))) {
-    const auto* const first = reinterpret_cast<const std::uint8_t*>(bytes.data());
-    for (json& row : json::from_cbor(first, first + bytes.size())) rows.push_back(std::move(row));
-  }
-  std::sort(rows.begin(), rows.end(), [](const json& a, const json& b) {
-    return a[0].get<std::int64_t>() < b[0].get<std::int64_t>();
-  });
-  return rows;
+void collect_rows(const Communicator& world,
+                  std::int64_t count,
+                  const std::string& what,
+                  const std::function<json(std::int64_t item)>& row_of_item,
+                  const std::function<void(std::int64_t item, const json& row)>& receive) {
+  std::optional<cli::ProgressPrinter> printer;
+  if (!what.empty()) printer.emplace(what, world.is_root());
+  collect_items(
+      world,
+      count,
+      [&](std::int64_t item) {
+        const std::vector<std::uint8_t> packed = json::to_cbor(row_of_item(item));
+        const auto bytes = std::as_bytes(std::span(packed));
+        return std::vector<std::byte>(bytes.begin(), bytes.end());
+      },
+      [&](std::int64_t item, std::span<const std::byte> bytes) {
+        const auto* const first = reinterpret_cast<const std::uint8_t*>(bytes.data());
+        receive(item, json::from_cbor(first, first + bytes.size()));
+      },
+      [&](std::int64_t done) {
+        if (printer) printer->update(static_cast<double>(done), static_cast<double>(count));
+      });
 }
 
 }  // namespace af::evaluation

@@ -1,16 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
+#include <functional>
 #include <nlohmann/json.hpp>
-#include <vector>
+#include <string>
 
 #include "parallel/communicator.h"
 
 namespace af::evaluation {
 
-/// Collective. The rows of all ranks on rank 0 (none elsewhere), sorted by their element 0, a whole
-/// number. Rows travel as CBOR: doubles keep every bit, NaN and infinity.
-std::vector<nlohmann::json> gather_rows(const Communicator& communicator,
-                                        const std::vector<nlohmann::json>& mine);
+/// Collective. Shares items over the ranks as these become free; `receive` gets each item's row on
+/// rank 0 while the work goes on, in any order. Rows travel as CBOR: doubles keep every bit, NaN
+/// and infinity. Rank 0 prints the progress of `what`, unless that is empty.
+void collect_rows(const Communicator& world,
+                  std::int64_t count,
+                  const std::string& what,
+                  const std::function<nlohmann::json(std::int64_t item)>& row_of_item,
+                  const std::function<void(std::int64_t item, const nlohmann::json& row)>& receive);
 
 }  // namespace af::evaluation

@@ -10,7 +10,6 @@
 
 #include "base/error.h"
 #include "cli/app_main.h"
-#include "cli/progress_printer.h"
 #include "evaluate/figure_files.h"
 #include "evaluate/gold_standard_files.h"
 #include "evaluate/method_loading.h"
@@ -23,7 +22,6 @@
 #include "io/output_file.h"
 #include "io/provenance.h"
 #include "io/sha256.h"
-#include "parallel/work_queue.h"
 
 namespace af::evaluation {
 namespace {
@@ -76,37 +74,28 @@ void measure_curves(std::vector<LoadedMethod>& methods,
                     const PoseFrame& gold_frame,
                     const Communicator& world,
                     std::vector<Curve>& curves) {
-  std::vector<json> mine;
-  std::int64_t first_of_method = 0;
   for (LoadedMethod& method : methods) {
     std::vector<std::pair<std::size_t, std::size_t>> items;
     for (std::size_t c = 0; c < curves.size(); ++c)
       for (std::size_t i = 0; curves[c].renderer == method.renderer && i < curves[c].offsets.size();
            ++i)
         items.emplace_back(c, i);
-    const auto count = static_cast<std::int64_t>(items.size());
-    cli::ProgressPrinter printer(method.renderer + " similarities", world.is_root());
-    for_each_item(
+    collect_rows(
         world,
-        count,
-        [&](std::int64_t item) {
+        static_cast<std::int64_t>(items.size()),
+        method.renderer + " similarities",
+        [&](std::int64_t item) -> json {
           const auto [c, i] = items[static_cast<std::size_t>(item)];
           const RigidTransform pose =
               pose_from_parameters(gold_frame, along_axis(curves[c].axis, curves[c].offsets[i]));
           const registration::ObjectiveValue value = method.runner.similarity_at(pose);
-          mine.push_back(
-              {first_of_method + item,
-               c,
-               i,
-               value.is_admissible ? value.similarity : std::numeric_limits<double>::quiet_NaN()});
+          return value.is_admissible ? value.similarity : std::numeric_limits<double>::quiet_NaN();
         },
-        [&](std::int64_t done) {
-          printer.update(static_cast<double>(done), static_cast<double>(count));
+        [&](std::int64_t item, const json& similarity) {
+          const auto [c, i] = items[static_cast<std::size_t>(item)];
+          curves[c].similarity[i] = similarity.get<double>();
         });
-    first_of_method += count;
   }
-  for (const json& row : gather_rows(world, mine))
-    curves[row[1].get<std::size_t>()].similarity[row[2].get<std::size_t>()] = row[3].get<double>();
 }
 
 /// The level that widths are measured against: the lowest similarity of any curve of the renderer,

@@ -201,8 +201,28 @@ std::string CsvTable::where(std::size_t row) const {
 std::string CsvTable::to_text() const {
   std::string text;
   append_line(text, columns_);
+  return text + rows_text();
+}
+
+std::string CsvTable::rows_text() const {
+  std::string text;
   for (const auto& row : rows_) append_line(text, row);
   return text;
+}
+
+void write_csv_in_parts(
+    const std::filesystem::path& path,
+    std::size_t row_count,
+    const std::function<CsvTable(std::size_t first, std::size_t end)>& table_of) {
+  constexpr std::size_t kRowsPerPart = 4096;
+  std::size_t first = 0;
+  bool has_header = false;
+  write_text_in_parts(path, [&]() -> std::string {
+    if (has_header && first == row_count) return "";
+    const std::size_t end = std::min(row_count, first + kRowsPerPart);
+    const CsvTable part = table_of(std::exchange(first, end), end);
+    return std::exchange(has_header, true) ? part.rows_text() : part.to_text();
+  });
 }
 
 std::string number_text(double value) {

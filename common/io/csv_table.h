@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -28,6 +29,8 @@ class CsvTable {
   /// "PATH:LINE" of a row, for messages.
   [[nodiscard]] std::string where(std::size_t row) const;
   [[nodiscard]] std::string to_text() const;
+  /// to_text() without the header line.
+  [[nodiscard]] std::string rows_text() const;
 
  private:
   std::vector<std::string> columns_;
@@ -35,6 +38,13 @@ class CsvTable {
   std::vector<std::size_t> lines_;  ///< of the file, where each row begins
   std::string path_;
 };
+
+/// Writes a table of `row_count` rows, made a few thousand at a time, for tables too long to be
+/// held as text: `table_of` gives rows [first, end). The file appears when complete.
+void write_csv_in_parts(
+    const std::filesystem::path& path,
+    std::size_t row_count,
+    const std::function<CsvTable(std::size_t first, std::size_t end)>& table_of);
 
 /// Shortest text that reads back to the same double ("nan", "inf" for those).
 std::string number_text(double value);

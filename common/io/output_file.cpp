@@ -115,6 +115,16 @@ void write_and_rename(const fs::path& path,
   sync_path(folder_of(path), O_RDONLY | O_DIRECTORY);
 }
 
+/// write_atomically() of what `write` writes.
+void write_new_file(const fs::path& path, const std::function<void(const Descriptor&)>& write) {
+  write_atomically(path, [&](const fs::path& partial) {
+    constexpr mode_t kMode = 0666;  // before the umask
+    Descriptor file(partial, O_WRONLY | O_CREAT | O_EXCL, kMode);
+    write(file);
+    file.close();
+  });
+}
+
 }  // namespace
 
 void write_atomically(const std::filesystem::path& path,
@@ -138,11 +148,13 @@ void write_atomically(const std::filesystem::path& path,
 }
 
 void write_text_file(const std::filesystem::path& path, std::string_view text) {
-  write_atomically(path, [text](const fs::path& partial) {
-    constexpr mode_t kMode = 0666;  // before the umask
-    Descriptor file(partial, O_WRONLY | O_CREAT | O_EXCL, kMode);
-    file.write(text);
-    file.close();
+  write_new_file(path, [&](const Descriptor& file) { file.write(text); });
+}
+
+void write_text_in_parts(const std::filesystem::path& path,
+                         const std::function<std::string()>& next_part) {
+  write_new_file(path, [&](const Descriptor& file) {
+    for (std::string part = next_part(); !part.empty(); part = next_part()) file.write(part);
   });
 }
 

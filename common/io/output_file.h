@@ -18,6 +18,11 @@ void write_atomically(const std::filesystem::path& path,
 /// write_atomically() of a text.
 void write_text_file(const std::filesystem::path& path, std::string_view text);
 
+/// write_atomically() of the texts that `next_part` returns, up to the first empty one: for files
+/// too long to be held in memory.
+void write_text_in_parts(const std::filesystem::path& path,
+                         const std::function<std::string()>& next_part);
+
 /// The whole file as text; FileError when unreadable or larger than `max_bytes`.
 std::string read_text_file(const std::filesystem::path& path, std::size_t max_bytes = 256u << 20);
 

@@ -5,8 +5,11 @@
 #include <array>
 #include <atomic>
 #include <chrono>
+#include <cstring>
+#include <limits>
 #include <mutex>
 #include <thread>
+#include <utility>
 
 #include "parallel/mpi_handle.h"
 
@@ -17,6 +20,37 @@ namespace {
 constexpr int kRequestTag = 11;
 constexpr int kGrantTag = 12;
 
+using Bytes = std::vector<std::byte>;
+using Receive = std::function<void(std::int64_t item, std::span<const std::byte> result)>;
+
+void append_number(Bytes& bytes, std::int64_t number) {
+  const auto* const first = reinterpret_cast<const std::byte*>(&number);
+  bytes.insert(bytes.end(), first, first + sizeof(number));
+}
+
+std::int64_t take_number(std::span<const std::byte>& bytes) {
+  std::int64_t number = 0;
+  std::memcpy(&number, bytes.data(), sizeof(number));
+  bytes = bytes.subspan(sizeof(number));
+  return number;
+}
+
+/// Results travel and wait as item, size, bytes; item, size, bytes; ...
+void append_result(Bytes& packed, std::int64_t item, const Bytes& result) {
+  append_number(packed, item);
+  append_number(packed, static_cast<std::int64_t>(result.size()));
+  packed.insert(packed.end(), result.begin(), result.end());
+}
+
+/// What all ranks do.
+struct Job {
+  std::int64_t count = 0;
+  std::int64_t most_per_block = std::numeric_limits<std::int64_t>::max();
+  std::function<Bytes(std::int64_t item)> work;
+  Receive receive;
+  std::function<void(std::int64_t done)> on_progress;
+};
+
 struct Block {
   std::int64_t first = 0;
   std::int64_t count = 0;  ///< 0: no more work
@@ -25,12 +59,14 @@ struct Block {
 /// State of the hand-out on rank 0, shared by its computing thread and its answering thread.
 class Ledger {
  public:
-  Ledger(std::int64_t count, int ranks) : count_(count), ranks_(ranks) {}
+  Ledger(const Job& job, int ranks)
+      : count_(job.count), most_per_block_(job.most_per_block), ranks_(ranks) {}
 
   /// Blocks shrink towards the end so that ranks finish together.
   Block take_fair_share() {
     const std::scoped_lock lock(mutex_);
-    return take(std::max<std::int64_t>(1, (count_ - next_) / (std::int64_t{4} * ranks_)));
+    return take(std::clamp<std::int64_t>(
+        (count_ - next_) / (std::int64_t{4} * ranks_), 1, most_per_block_));
   }
   Block take_one() {
     const std::scoped_lock lock(mutex_);
@@ -59,39 +95,91 @@ class Ledger {
 
   std::mutex mutex_;
   std::int64_t count_;
+  std::int64_t most_per_block_;
   int ranks_;
   std::int64_t next_ = 0;
   std::int64_t done_ = 0;
 };
 
+/// Results on their way to Job::receive, on rank 0.
+class Inbox {
+ public:
+  Inbox(const Job& job, Ledger& ledger) : job_(job), ledger_(ledger) {}
+
+  /// From the computing thread.
+  void add(std::int64_t item, const Bytes& result) {
+    const std::scoped_lock lock(mutex_);
+    append_result(waiting_, item, result);
+  }
+  /// The rest in the answering thread.
+  void deliver_waiting() {
+    Bytes packed;
+    {
+      const std::scoped_lock lock(mutex_);
+      packed.swap(waiting_);
+    }
+    deliver(packed);
+  }
+  void deliver(std::span<const std::byte> packed) {
+    while (!packed.empty()) {
+      const std::int64_t item = take_number(packed);
+      const auto size = static_cast<std::size_t>(take_number(packed));
+      receive(item, packed.first(size));
+      packed = packed.subspan(size);
+      ledger_.add_done(1);
+    }
+  }
+  [[nodiscard]] const RankFailure& failure() const { return failure_; }
+
+ private:
+  /// After a failure nothing is given any more, and no more work handed out.
+  void receive(std::int64_t item, std::span<const std::byte> result) {
+    if (failure_.exit_code != 0) return;
+    try {
+      if (job_.receive) job_.receive(item, result);
+    } catch (...) {
+      failure_ = failure_of(std::current_exception());
+      ledger_.stop();
+    }
+  }
+
+  const Job& job_;
+  Ledger& ledger_;
+  std::mutex mutex_;
+  Bytes waiting_;
+  RankFailure failure_;
+};
+
 /// Answers one request when there is one; `active_workers` falls when a worker is sent home.
 /// Messages, not one-sided windows: those fail across hosts over TCP or stall while the target
 /// computes.
-bool answer_request(MPI_Comm handle, Ledger& ledger, int& active_workers) {
+bool answer_request(MPI_Comm handle, Ledger& ledger, Inbox& inbox, int& active_workers) {
   int arrived = 0;
   MPI_Status status;
   MPI_Iprobe(MPI_ANY_SOURCE, kRequestTag, handle, &arrived, &status);
   if (arrived == 0) return false;
-  // {items finished since the last request, whether the rank failed}
-  std::array<std::int64_t, 2> request{};
+  int size = 0;
+  MPI_Get_count(&status, MPI_BYTE, &size);
+  // Whether the rank failed, then what it finished since the last request.
+  Bytes request(static_cast<std::size_t>(size));
   MPI_Recv(
-      request.data(), 2, MPI_INT64_T, status.MPI_SOURCE, kRequestTag, handle, MPI_STATUS_IGNORE);
-  ledger.add_done(request[0]);
-  if (request[1] != 0) ledger.stop();
+      request.data(), size, MPI_BYTE, status.MPI_SOURCE, kRequestTag, handle, MPI_STATUS_IGNORE);
+  std::span<const std::byte> rest = request;
+  if (take_number(rest) != 0) ledger.stop();
+  // The worker goes on before its results are looked at.
   const Block block = ledger.take_fair_share();
   const std::array<std::int64_t, 2> grant{block.first, block.count};
   MPI_Send(grant.data(), 2, MPI_INT64_T, status.MPI_SOURCE, kGrantTag, handle);
   if (block.count == 0) --active_workers;
+  inbox.deliver(rest);
   return true;
 }
 
 /// Rank 0's own share of the work, item by item.
-RankFailure work_until_empty(Ledger& ledger, const std::function<void(std::int64_t)>& work) {
+RankFailure work_until_empty(const Job& job, Ledger& ledger, Inbox& inbox) {
   try {
-    for (Block block = ledger.take_one(); block.count > 0; block = ledger.take_one()) {
-      work(block.first);
-      ledger.add_done(1);
-    }
+    for (Block block = ledger.take_one(); block.count > 0; block = ledger.take_one())
+      inbox.add(block.first, job.work(block.first));
   } catch (...) {
     ledger.stop();
     return failure_of(std::current_exception());
@@ -101,52 +189,62 @@ RankFailure work_until_empty(Ledger& ledger, const std::function<void(std::int64
 
 /// Rank 0 computes in a second thread, so that a long item does not keep other ranks waiting; MPI
 /// stays in this one.
-RankFailure run_as_manager(const Communicator& communicator,
-                           std::int64_t count,
-                           const std::function<void(std::int64_t)>& work,
-                           const std::function<void(std::int64_t)>& on_progress) {
-  Ledger ledger(count, communicator.size());
+RankFailure run_as_manager(const Communicator& communicator, const Job& job) {
+  Ledger ledger(job, communicator.size());
+  Inbox inbox(job, ledger);
   RankFailure failure;
   std::atomic<bool> is_computing{true};
   std::thread computing([&] {
-    failure = work_until_empty(ledger, work);
+    failure = work_until_empty(job, ledger, inbox);
     is_computing = false;
   });
   int active_workers = communicator.size() - 1;
   std::int64_t reported = 0;
+  const auto report_progress = [&] {
+    if (const std::int64_t done = ledger.done(); job.on_progress && done > reported)
+      job.on_progress(reported = done);
+  };
   while (is_computing || active_workers > 0) {
-    if (active_workers > 0 && answer_request(communicator.impl().handle, ledger, active_workers))
+    inbox.deliver_waiting();
+    if (active_workers > 0 &&
+        answer_request(communicator.impl().handle, ledger, inbox, active_workers))
       continue;
-    if (const std::int64_t done = ledger.done(); on_progress && done > reported)
-      on_progress(reported = done);
+    report_progress();
     std::this_thread::sleep_for(std::chrono::microseconds(50));
   }
   computing.join();
-  if (on_progress && ledger.done() > reported) on_progress(ledger.done());
-  return failure;
+  inbox.deliver_waiting();
+  report_progress();
+  return failure.exit_code != 0 ? failure : inbox.failure();
 }
 
-RankFailure run_as_worker(const Communicator& communicator,
-                          const std::function<void(std::int64_t)>& work) {
+RankFailure run_as_worker(const Communicator& communicator, const Job& job) {
   const MPI_Comm handle = communicator.impl().handle;
   RankFailure failure;
-  std::int64_t finished = 0;
+  Bytes finished;
   while (true) {
-    const std::array<std::int64_t, 2> request{finished, failure.exit_code != 0 ? 1 : 0};
-    MPI_Send(request.data(), 2, MPI_INT64_T, 0, kRequestTag, handle);
+    Bytes request;
+    append_number(request, failure.exit_code != 0 ? 1 : 0);
+    request.insert(request.end(), finished.begin(), finished.end());
+    MPI_Send(request.data(), static_cast<int>(request.size()), MPI_BYTE, 0, kRequestTag, handle);
     std::array<std::int64_t, 2> grant{};
     MPI_Recv(grant.data(), 2, MPI_INT64_T, 0, kGrantTag, handle, MPI_STATUS_IGNORE);
     if (grant[1] == 0) return failure;
-    finished = 0;
+    finished.clear();
     try {
-      for (std::int64_t i = 0; i < grant[1] && failure.exit_code == 0; ++i) {
-        work(grant[0] + i);
-        ++finished;
-      }
+      for (std::int64_t i = 0; i < grant[1]; ++i)
+        append_result(finished, grant[0] + i, job.work(grant[0] + i));
     } catch (...) {
       failure = failure_of(std::current_exception());
     }
   }
+}
+
+void run_job(const Communicator& communicator, const Job& job) {
+  const RankFailure mine =
+      communicator.is_root() ? run_as_manager(communicator, job) : run_as_worker(communicator, job);
+  if (const RankFailure failure = first_failure(communicator, mine); failure.exit_code != 0)
+    throw_failure(failure);
 }
 
 }  // namespace
@@ -155,11 +253,24 @@ void for_each_item(const Communicator& communicator,
                    std::int64_t count,
                    const std::function<void(std::int64_t item)>& work,
                    const std::function<void(std::int64_t done)>& on_progress) {
-  const RankFailure mine = communicator.is_root()
-                               ? run_as_manager(communicator, count, work, on_progress)
-                               : run_as_worker(communicator, work);
-  if (const RankFailure failure = first_failure(communicator, mine); failure.exit_code != 0)
-    throw_failure(failure);
+  Job job;
+  job.count = count;
+  job.work = [&](std::int64_t item) {
+    work(item);
+    return Bytes();
+  };
+  job.on_progress = on_progress;
+  run_job(communicator, job);
+}
+
+void collect_items(const Communicator& communicator,
+                   std::int64_t count,
+                   const std::function<Bytes(std::int64_t item)>& work,
+                   const Receive& receive,
+                   const std::function<void(std::int64_t done)>& on_progress) {
+  // Few enough that their results stay small in memory and in one message.
+  constexpr std::int64_t kMostPerBlock = 64;
+  run_job(communicator, {count, kMostPerBlock, work, receive, on_progress});
 }
 
 }  // namespace af

@@ -14,6 +14,7 @@ af_add_test(
           unit/evaluate/error_budget_test.cpp
           unit/evaluate/similarity_curve_test.cpp
           unit/evaluate/drr_comparison_test.cpp
+          unit/evaluate/loss_split_test.cpp
   LIBS af_evaluation)
 
 af_add_test(
@@ -24,7 +25,7 @@ af_add_test(
 af_add_test(
   evaluate_report_test
   SOURCES unit/evaluate/report_text_test.cpp unit/evaluate/evaluation_rows_test.cpp
-          unit/evaluate/failure_trace_files_test.cpp
+          unit/evaluate/failure_trace_files_test.cpp unit/evaluate/study_runs_test.cpp
   LIBS af_evaluation_program af_evaluation_report af_io_basics)
 
 add_executable(evaluate_statistics_program_tests programs/evaluate_statistics_test.cpp)

@@ -308,6 +308,64 @@ TEST_F(EvaluateProgram, BuildsTheFieldsOfASweepOnceAndReusesThem) {
   expect_refused(evaluate(other + path("sweep-3")), 4, "options of the field to reuse");
 }
 
+TEST_F(EvaluateProgram, PoolsTheFieldsOfAllViewsOfAStudy) {
+  const test::ProgramRun run = evaluate(
+      "field-parameters --study " + path("study.toml") +
+          " --max-rotation-deg 8 --max-translation-mm 8 --base-uv-nodes 8 --base-st-nodes 32"
+          " --base-codewords 16 --uv-nodes 4,8 --st-nodes 32 --codewords 16 --training-fraction 0.1"
+          " --pose-count 3 -o " +
+          path("pooled"),
+      2);
+  ASSERT_EQ(run.exit_code, 0) << run.output;
+  const CsvTable pooled = CsvTable::read(path("pooled/field-parameters.csv"));
+  const CsvTable fields = CsvTable::read(path("pooled/field-parameters-fields.csv"));
+  ASSERT_EQ(pooled.row_count(), 2u);
+  ASSERT_EQ(fields.row_count(), 4u);  // AP's, then LAT's
+  EXPECT_EQ(fields.text(2, "camera"), "LAT");
+  constexpr double kRounding = 1e-9;  // of sums in another order
+  for (std::size_t i = 0; i < 2; ++i)
+    for (const char* column : {"psnr_mean_db", "payload_bytes"}) {
+      const double mean = 0.5 * (fields.number(i, column) + fields.number(i + 2, column));
+      EXPECT_NEAR(pooled.number(i, column), mean, kRounding * mean);
+    }
+  const CsvTable differences = CsvTable::read(path("pooled/difference-images.csv"));
+  ASSERT_EQ(differences.row_count(), 3u);
+  for (std::size_t i = 0; i < 3; ++i)
+    EXPECT_EQ(differences.text(i, "pose_index"), differences.text(0, "pose_index"));
+  EXPECT_TRUE(std::filesystem::exists(path("pooled/difference-images.png")));
+}
+
+TEST_F(EvaluateProgram, ComparesTheFieldsOfAStudyTogetherAndSplitsTheirLoss) {
+  Study study = read_study(path("study.toml"));
+  for (StudyView& view : study.cases.front().views) view.field = path(view.camera + ".af.h5");
+  write_text_file(path("with-fields.toml"), study_to_toml(study, path("")));
+  const std::string arguments = "image-quality --study " + path("with-fields.toml") +
+                                " --pose-count 3 --split-loss-poses 2 -o ";
+  for (const int ranks : {1, 2}) {
+    const test::ProgramRun run =
+        evaluate(arguments + path("together-" + std::to_string(ranks)), ranks);
+    ASSERT_EQ(run.exit_code, 0) << run.output;
+  }
+  const std::string split = "/ellipsoids-LAT/loss-split-poses.csv";
+  EXPECT_EQ(text("together-1" + split), text("together-2" + split));
+  EXPECT_EQ(text("together-1/image-quality.csv"), text("together-2/image-quality.csv"));
+  const CsvTable rows = CsvTable::read(path("together-1/image-quality.csv"));
+  ASSERT_EQ(rows.row_count(), 6u);
+  EXPECT_EQ(rows.text(5, "case"), "ellipsoids");
+  EXPECT_EQ(rows.text(5, "camera"), "LAT");
+  const CsvTable parts = CsvTable::read(path("together-1" + split));
+  ASSERT_EQ(parts.row_count(), 2u);
+  // The whole loss is the one that the table has.
+  constexpr double kRoundingDb = 1e-6;
+  for (std::size_t i = 0; i < 2; ++i)
+    EXPECT_NEAR(parts.number(i, "total_psnr_db"), rows.number(3 + i, "psnr_db"), kRoundingDb);
+  for (const char* name : {"psnr.svg", "worst-pairs.png", "ellipsoids-AP/loss-split.svg"})
+    EXPECT_TRUE(std::filesystem::exists(path(std::string("together-1/") + name))) << name;
+  expect_refused(evaluate("image-quality --study " + path("study.toml") + " -o " + path("x")),
+                 3,
+                 "view 'AP': field");
+}
+
 TEST_F(EvaluateProgram, ComparesRunsInOneTable) {
   const std::string study = "registration --study " + path("study.toml") + fields() +
                             "--preset paper --intervals 2 --starts-per-interval 2 -o ";
@@ -471,7 +529,7 @@ TEST_F(EvaluateProgram, SaysWhenTheFieldHasNoRoomForTheStarts) {
 TEST_F(EvaluateProgram, RefusesBadInputWithTheContractsCodes) {
   const std::string field = "image-quality --field " + path("AP.af.h5") + " ";
   expect_refused(evaluate(""), 2, "subcommand");
-  expect_refused(evaluate(field), 2, "--ct");
+  expect_refused(evaluate(field + "-o " + path("x")), 2, "--ct");
   expect_refused(evaluate(field + "--ct " + path("ct.nii.gz") + " --pose-count 0 --step-mm -1 -o " +
                           path("x")),
                  3,

@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "base/hash_random.h"
+#include "io/output_file.h"
 #include "support/io_checks.h"
 
 namespace af {
@@ -120,6 +121,18 @@ TEST_F(CsvTableFile, DamagedFilesAreReadOrRefused) {
           static_cast<void>(table.number(row, "value"));
       });
   EXPECT_GT(refused, 100U);
+}
+
+TEST_F(CsvTableFile, WrittenInPartsIsTheSameFile) {
+  for (const std::size_t count : {0u, 1u, 4096u, 10'000u}) {
+    const auto part = [](std::size_t first, std::size_t end) {
+      CsvTable table({"index", "text"});
+      for (std::size_t i = first; i < end; ++i) table.add_row({std::to_string(i), "a,\"b\"\n"});
+      return table;
+    };
+    write_csv_in_parts(path(), count, part);
+    EXPECT_EQ(read_text_file(path()), part(0, count).to_text()) << count << " rows";
+  }
 }
 
 TEST(CsvTable, RowsMustFitTheColumns) {

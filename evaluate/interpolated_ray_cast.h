@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+
+#include "drr/drr_renderer.h"
+#include "geometry/light_slab.h"
+#include "volume/ray_caster.h"
+
+namespace af::evaluation {
+
+/// On which planes of a field rays are replaced by those through the nodes around them.
+enum class InterpolatedPlanes { Uv, St, Both };
+
+/// Ray casting that makes the interpolation error of a field's look-up and no other: it has the
+/// field's nodes, but neither its codebook nor its 16 bits. As TwoPassAfDrr: with (u,v), a ray's
+/// value is blended from those of the four viewpoints around it, seen through its own (s,t) point;
+/// with (s,t), a pixel's value is bilinear in the image of the nodes, seen from the source. For
+/// fields of one slab. \test InterpolatedRayCast.EqualsTheRaysThroughTheNodesAround
+class InterpolatedRayCast final : public DrrRenderer {
+ public:
+  InterpolatedRayCast(std::shared_ptr<const AttenuationVolume> volume,
+                      const RayCasterOptions& options,
+                      const LightSlab& light_slab,
+                      InterpolatedPlanes planes);
+
+  /// Without gradients.
+  RenderStatus render(const RigidTransform& room_from_ct,
+                      const View& view,
+                      RenderWorkspace& workspace,
+                      std::span<float> total_attenuation,
+                      const std::optional<PoseGradients>& gradients = std::nullopt) const override;
+  [[nodiscard]] std::unique_ptr<RenderWorkspace> make_workspace() const override;
+  [[nodiscard]] const char* name() const override { return "interpolated-raycast"; }
+
+ private:
+  std::shared_ptr<const AttenuationVolume> volume_;
+  RayCaster caster_;
+  LightSlab light_slab_;
+  InterpolatedPlanes planes_;
+};
+
+}  // namespace af::evaluation
