@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "evaluate/field_parameters_command.h"
 
+#include <chrono>
+#include <cmath>
+#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <set>
@@ -8,6 +11,7 @@
 
 #include "base/error.h"
 #include "cli/app_main.h"
+#include "cli/progress_printer.h"
 #include "drr/ray_cast_drr.h"
 #include "drr/two_pass_af_drr.h"
 #include "evaluate/difference_images_program.h"
@@ -165,6 +169,29 @@ std::vector<Target> targets_of(const FieldParametersOptions& options) {
   return targets;
 }
 
+/// What a setting costs relative to another: the rays of its field.
+double rays_of(const PrecomputeOptions& setting) {
+  return std::pow(static_cast<double>(setting.uv_nodes) * setting.st_nodes, 2.0);
+}
+
+/// Says how long the settings after the first will take, from that one's time: fields by their
+/// rays, comparisons alike.
+void announce_rest(const std::vector<PrecomputeOptions>& settings,
+                   double field_seconds,
+                   double comparison_seconds,
+                   const Communicator& world) {
+  if (settings.size() < 2) return;
+  double seconds = 0.0;
+  for (std::size_t i = 1; i < settings.size(); ++i)
+    seconds +=
+        comparison_seconds + (std::filesystem::exists(settings[i].output)
+                                  ? 0.0
+                                  : field_seconds * rays_of(settings[i]) / rays_of(settings[0]));
+  cli::info(world,
+            "after the first field " + std::to_string(settings.size() - 1) + " more, about " +
+                cli::duration_text(seconds));
+}
+
 /// Collective. Every setting's field of one target, made or reused, and its comparisons.
 void sweep_target(const FieldParametersOptions& options,
                   const Target& target,
@@ -178,8 +205,13 @@ void sweep_target(const FieldParametersOptions& options,
       target.ct_path, {target.base.series_uid}, target.base.attenuation_model(), world, warnings);
   for (const std::string& text : warnings) cli::warn(world, text);
   const RayCastDrr reference(ct.volume, {options.drr_step_mm});
-  for (PrecomputeOptions setting : settings_of(options, target.base)) {
+  std::vector<PrecomputeOptions> settings = settings_of(options, target.base);
+  for (PrecomputeOptions& setting : settings)
     setting.output = (fields / field_name(setting)).string();
+  using Clock = std::chrono::steady_clock;
+  for (const PrecomputeOptions& setting : settings) {
+    const bool is_made = !std::filesystem::exists(setting.output);
+    const Clock::time_point start = Clock::now();
     SettingResult& result = results.emplace_back();
     result.setting = setting;
     const auto field = field_of(setting, command_line, world, result.info);
@@ -193,7 +225,13 @@ void sweep_target(const FieldParametersOptions& options,
     result.field = field_description(*field);
     result.uncompressed_bytes = uncompressed_bytes_of(setting);
     read_creation(result);
+    const Clock::time_point compared = Clock::now();
     result.comparisons = compare(options, field, reference, world);
+    if (is_made && &setting == &settings.front())
+      announce_rest(settings,
+                    std::chrono::duration<double>(compared - start).count(),
+                    std::chrono::duration<double>(Clock::now() - compared).count(),
+                    world);
     provenance.input_sha256["field " + field_name(setting)] = result.info.payload_sha256;
   }
   provenance.input_sha256["ct " + results.back().target()] = ct.facts.content_sha256;

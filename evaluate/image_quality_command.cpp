@@ -7,6 +7,7 @@
 #include <iostream>
 #include <memory>
 #include <sstream>
+#include <tuple>
 
 #include "base/error.h"
 #include "cli/app_main.h"
@@ -273,6 +274,8 @@ TargetResult evaluate_target(const ImageQualityOptions& options,
   const std::int64_t count = setup.pose_count(options);
   TargetResult result{target.case_name, setup.view.camera.name, {}, {}};
   result.comparisons.resize(static_cast<std::size_t>(count));
+  announce_time(
+      world, "poses compared", count, [&] { std::ignore = compare(options, setup, comparer, 0); });
   collect_rows(
       world,
       count,

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "evaluate/row_gathering_program.h"
 
+#include <chrono>
 #include <cstddef>
+#include <exception>
 #include <optional>
 #include <span>
 #include <vector>
 
+#include "cli/app_main.h"
 #include "cli/progress_printer.h"
 #include "parallel/work_queue.h"
 
@@ -35,6 +38,21 @@ void collect_rows(const Communicator& world,
       [&](std::int64_t done) {
         if (printer) printer->update(static_cast<double>(done), static_cast<double>(count));
       });
+}
+
+void announce_time(const Communicator& world,
+                   const std::string& what,
+                   std::int64_t count,
+                   const std::function<void()>& item) {
+  if (!world.is_root() || count < 2) return;
+  const auto start = std::chrono::steady_clock::now();
+  try {
+    item();
+  } catch (const std::exception&) {
+    return;
+  }
+  const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
+  cli::info(world, cli::expected_time_text(what, count, seconds.count(), world.size()));
 }
 
 }  // namespace af::evaluation

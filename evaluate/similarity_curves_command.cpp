@@ -7,6 +7,7 @@
 #include <iostream>
 #include <limits>
 #include <sstream>
+#include <tuple>
 
 #include "base/error.h"
 #include "cli/app_main.h"
@@ -80,6 +81,11 @@ void measure_curves(std::vector<LoadedMethod>& methods,
       for (std::size_t i = 0; curves[c].renderer == method.renderer && i < curves[c].offsets.size();
            ++i)
         items.emplace_back(c, i);
+    announce_time(
+        world, method.renderer + " similarities", static_cast<std::int64_t>(items.size()), [&] {
+          std::ignore =
+              method.runner.similarity_at(pose_from_parameters(gold_frame, PoseParameters()));
+        });
     collect_rows(
         world,
         static_cast<std::int64_t>(items.size()),
