@@ -11,6 +11,7 @@
 
 #include "base/error.h"
 #include "cli/app_main.h"
+#include "cli/progress_printer.h"
 #include "evaluate/failure_trace_files.h"
 #include "evaluate/method_loading.h"
 #include "evaluate/row_gathering_program.h"
