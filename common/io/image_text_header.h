@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+// Text headers of images: MetaImage's and NRRD's.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace af::image_formats {
+
+inline constexpr std::size_t kMaxTextHeaderBytes = 1u << 20;
+
+/// "key = value" or "key: value" lines of a text header, with where it ends. MetaIO wants its keys
+/// in their exact case; NRRD fields are kept in lower case.
+struct TextHeader {
+  std::string path;
+  std::map<std::string, std::string> fields;
+  std::uint64_t end_offset = 0;
+
+  /// nullptr when the header does not have it.
+  [[nodiscard]] const std::string* find(const std::string& key) const;
+  /// FileError when the header does not have it.
+  [[nodiscard]] const std::string& require(const std::string& key) const;
+  /// FileError when it is no integer.
+  [[nodiscard]] std::int64_t integer(const std::string& key, std::int64_t fallback) const;
+};
+
+/// Without blanks at both ends.
+std::string trimmed(std::string_view text);
+std::string lower(std::string text);
+
+/// `dimension` positive integers; FileError when `text` holds anything else.
+std::vector<std::uint64_t> parse_sizes(const std::string& path,
+                                       const std::string& text,
+                                       std::int64_t dimension);
+
+/// The number of axes under `key`, 1 to 10.
+std::int64_t checked_dimension(const TextHeader& header, const std::string& key);
+
+/// The voxel file that a header names, relative to the header.
+std::filesystem::path beside(const std::filesystem::path& header_path, const std::string& name);
+
+}  // namespace af::image_formats
