@@ -5,8 +5,6 @@
 #include <array>
 #include <chrono>
 #include <cmath>
-#include <csignal>
-#include <cstdlib>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -18,6 +16,7 @@
 #include "base/error.h"
 #include "cli/app_main.h"
 #include "cli/progress_printer.h"
+#include "cli/stop_request.h"
 #include "io/output_file.h"
 #include "io/provenance.h"
 #include "precompute/dry_run_report.h"
@@ -29,23 +28,6 @@
 namespace af {
 
 namespace {
-
-volatile std::sig_atomic_t stop_signal = 0;
-
-extern "C" void remember_signal(int signal) {
-  stop_signal = signal;
-}
-
-bool is_stop_requested() {
-  return stop_signal != 0;
-}
-
-/// SIGUSR1 asks for a stop with progress saved; so does SIGTERM without mpirun (with it, mpirun
-/// itself passes SIGTERM on as a kill).
-void listen_for_stop_requests() {
-  std::signal(SIGUSR1, remember_signal);
-  if (std::getenv("OMPI_COMM_WORLD_SIZE") == nullptr) std::signal(SIGTERM, remember_signal);
-}
 
 /// Seconds of each phase, in order.
 class PhaseClock {
@@ -303,7 +285,7 @@ class PrecomputeRun {
     ProgressManifest manifest = manifest_of(options_, source_, plan());
     std::optional<ProgressFolder> progress;
     if (options_.has_checkpoint) {
-      listen_for_stop_requests();
+      cli::listen_for_stop_requests();
       progress.emplace(options_.output + ".progress", options_.is_restart, manifest, world_);
     }
     const auto units = plan_units(light_slab_, {manifest.rays_per_unit});
@@ -328,7 +310,7 @@ class PrecomputeRun {
     cli::ProgressPrinter printer("casting", world_.is_root());
     CastPhase cast = cast_field(build,
                                 {options_.training_selection(), plan.kept_tile_bytes(limit)},
-                                is_stop_requested,
+                                cli::is_stop_requested,
                                 printer.callback());
     clock_.end("cast");
     if (cast.units_resumed > 0)
@@ -391,7 +373,7 @@ class PrecomputeRun {
     const FieldFileInfo info = write_field(
         field,
         [&] {
-          if (options_.has_checkpoint && is_stop_requested())
+          if (options_.has_checkpoint && cli::is_stop_requested())
             throw StoppedError("stopped with all units saved: run the same command again to go on");
           return encoder.next_blocks(printer->callback());
         },
@@ -412,7 +394,7 @@ class PrecomputeRun {
   void stop_if_requested() const {
     if (!options_.has_checkpoint) return;
     all_or_none(world_, [] {
-      if (is_stop_requested())
+      if (cli::is_stop_requested())
         throw StoppedError("stopped with all units saved: run the same command again to go on");
     });
   }

@@ -10,6 +10,7 @@
 #include <tuple>
 #include <unistd.h>
 
+#include "base/crc32c.h"
 #include "base/error.h"
 #include "io/output_file.h"
 
@@ -163,26 +164,6 @@ ProgressManifest read_manifest(const std::filesystem::path& path) {
   }
 }
 
-void require_same(const ProgressManifest& earlier,
-                  const ProgressManifest& now,
-                  const std::filesystem::path& folder) {
-  std::vector<std::string> differences;
-  for (const auto& [name, value] : now.decides) {
-    const auto found = earlier.decides.find(name);
-    const std::string before = found == earlier.decides.end() ? "nothing" : found->second;
-    if (before != value)
-      differences.push_back(std::string(name)
-                                .append(" = ")
-                                .append(value)
-                                .append(": the unfinished work was begun with ")
-                                .append(before));
-  }
-  if (differences.empty() && earlier.decides.size() == now.decides.size()) return;
-  differences.emplace_back(
-      "repeat the earlier options to go on with it, or give --restart to throw it away");
-  throw_if_any(differences, folder.string());
-}
-
 /// Rank 0 alone; returns the plan to use.
 std::int64_t open_folder(const std::filesystem::path& folder,
                          bool restart,
@@ -192,7 +173,7 @@ std::int64_t open_folder(const std::filesystem::path& folder,
   const std::filesystem::path manifest_path = folder / "manifest.json";
   if (std::filesystem::exists(manifest_path)) {
     const ProgressManifest earlier = read_manifest(manifest_path);
-    require_same(earlier, manifest, folder);
+    require_same(earlier.decides, manifest.decides, folder);
     if (earlier.rays_per_unit < 1)
       throw FileError(manifest_path.string(),
                       "rays_per_unit",
@@ -327,21 +308,6 @@ void ProgressFolder::remove() {
     if (communicator_.is_root()) std::filesystem::remove_all(path_, error);
     if (error) throw FileError(path_.string(), "cannot be removed: " + error.message());
   });
-}
-
-std::uint32_t crc32c(std::span<const std::byte> bytes, std::uint32_t previous) {
-  // The SSE4.2 instruction: part of the x86-64-v2 baseline.
-  std::uint64_t crc = ~previous;
-  std::size_t i = 0;
-  for (; i + 8 <= bytes.size(); i += 8) {
-    std::uint64_t word = 0;
-    std::memcpy(&word, bytes.data() + i, sizeof(word));
-    crc = __builtin_ia32_crc32di(crc, word);
-  }
-  auto tail = static_cast<std::uint32_t>(crc);
-  for (; i < bytes.size(); ++i)
-    tail = __builtin_ia32_crc32qi(tail, static_cast<unsigned char>(bytes[i]));
-  return ~tail;
 }
 
 }  // namespace af

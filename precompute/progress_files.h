@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "io/progress_manifest.h"
 #include "parallel/communicator.h"
 #include "precompute/unit_tiles.h"
 
@@ -17,7 +18,7 @@ namespace af {
 /// What unfinished work is valid for: everything that decides the cast samples, and the plan it was
 /// cut by.
 struct ProgressManifest {
-  std::map<std::string, std::string> decides;  ///< option or input -> value
+  DecidingValues decides;
   std::int64_t rays_per_unit = 0;
 };
 
@@ -77,8 +78,5 @@ class ProgressFolder {
   std::ofstream file_;
   std::map<std::uint32_t, UnitPlace> places_;
 };
-
-/// CRC-32C (Castagnoli) of bytes, as in iSCSI (RFC 3720): "123456789" gives 0xE3069283.
-std::uint32_t crc32c(std::span<const std::byte> bytes, std::uint32_t previous = 0);
 
 }  // namespace af

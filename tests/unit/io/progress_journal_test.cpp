@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/progress_journal.h"
+
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+#include "support/test_paths.h"
+
+namespace af {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+const DecidingValues kDecides = {{"seed", "1"}, {"preset", "paper"}};
+
+void append(ProgressJournal& journal, const std::string& text) {
+  journal.append(std::as_bytes(std::span(text)));
+}
+
+std::vector<std::string> finished(ProgressJournal& journal) {
+  std::vector<std::string> records;
+  journal.visit_finished([&](std::span<const std::byte> record) {
+    records.emplace_back(reinterpret_cast<const char*>(record.data()), record.size());
+  });
+  return records;
+}
+
+/// A journal with the records "one", "" and "three".
+fs::path three_records(const fs::path& folder) {
+  ProgressJournal journal(folder, "case", kDecides, false);
+  for (const char* text : {"one", "", "three"}) append(journal, text);
+  journal.sync();
+  return folder / "case.records";
+}
+
+TEST(ProgressJournal, GivesBackWhatEarlierRunsAppended) {
+  const test::ScratchFolder folder;
+  three_records(folder / "p");
+  ProgressJournal again(folder / "p", "case", kDecides, false);
+  EXPECT_THAT(finished(again), ElementsAre("one", "", "three"));
+  append(again, "four");
+  ProgressJournal third(folder / "p", "case", kDecides, false);
+  EXPECT_THAT(finished(third), ElementsAre("one", "", "three", "four"));
+  third.remove();
+  EXPECT_FALSE(fs::exists(folder / "p"));
+}
+
+TEST(ProgressJournal, CutsOffWhatAKillTore) {
+  const test::ScratchFolder folder;
+  const fs::path records = three_records(folder / "p");
+  const std::uintmax_t size = fs::file_size(records);
+  for (std::uintmax_t kept = size; kept-- > size - 21;) {  // 21 bytes: the last record
+    fs::resize_file(records, kept);
+    ProgressJournal journal(folder / "p", "case", kDecides, false);
+    EXPECT_THAT(finished(journal), ElementsAre("one", "")) << kept;
+    append(journal, "next");
+    ProgressJournal again(folder / "p", "case", kDecides, false);
+    EXPECT_THAT(finished(again), ElementsAre("one", "", "next")) << kept;
+    fs::remove_all(folder / "p");
+    three_records(folder / "p");
+  }
+}
+
+TEST(ProgressJournal, TrustsNoRecordWithADamagedByteNorAnyAfterIt) {
+  const test::ScratchFolder folder;
+  const fs::path records = three_records(folder / "p");
+  const auto size = static_cast<int>(fs::file_size(records));
+  for (int damaged = 0; damaged < size; ++damaged) {
+    {
+      std::fstream file(records, std::ios::binary | std::ios::in | std::ios::out);
+      file.seekg(damaged);
+      const char byte = static_cast<char>(file.get() ^ 0x20);
+      file.seekp(damaged);
+      file.put(byte);
+    }
+    ProgressJournal journal(folder / "p", "case", kDecides, false);
+    // Records of 19, 16 and 21 bytes.
+    const std::size_t sound = damaged < 19 ? 0U : damaged < 35 ? 1U : 2U;
+    EXPECT_EQ(finished(journal).size(), sound) << damaged;
+    fs::remove_all(folder / "p");
+    three_records(folder / "p");
+  }
+}
+
+TEST(ProgressJournal, RefusesOtherDecisionsAndNamesThem) {
+  const test::ScratchFolder folder;
+  three_records(folder / "p");
+  try {
+    ProgressJournal(folder / "p", "case", {{"seed", "2"}, {"bins", "64"}}, false);
+    FAIL() << "accepted";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("seed = 2: the unfinished work was begun with 1"));
+    EXPECT_THAT(error.what(), HasSubstr("bins = 64: the unfinished work was begun with nothing"));
+    EXPECT_THAT(error.what(),
+                HasSubstr("preset = nothing: the unfinished work was begun with paper"));
+  }
+  ProgressJournal restarted(folder / "p", "case", {{"seed", "2"}}, true);
+  EXPECT_TRUE(finished(restarted).empty());
+}
+
+TEST(ProgressJournal, RefusesADamagedManifest) {
+  const test::ScratchFolder folder;
+  three_records(folder / "p");
+  std::ofstream(folder / "p/case.json") << "{";
+  EXPECT_THROW(ProgressJournal(folder / "p", "case", kDecides, false), FileError);
+}
+
+}  // namespace
+}  // namespace af
