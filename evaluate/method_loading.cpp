@@ -25,6 +25,7 @@ registration::CaseLoadOptions load_options(const MethodOptions& options,
       result.field_paths[text.substr(0, equals)] = text.substr(equals + 1);
     }
   result.ct.series_uid = options.series_uid;
+  result.fiducial_mask_mm = options.method.fiducial_mask_mm;
   result.water_mu_per_mm = options.water_mu_per_mm;
   result.ray_caster.step_mm = options.step_mm;
   return result;

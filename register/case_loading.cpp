@@ -15,7 +15,9 @@
 #include "io/node_ct.h"
 #include "io/sha256.h"
 #include "io/xray_reader.h"
+#include "register/fiducial_mask.h"
 #include "register/parameter_scaling.h"
+#include "register/stage_view.h"
 #include "volume/blurred_volume.h"
 
 namespace af::registration {
@@ -57,16 +59,20 @@ void require_known_field_cameras(const StudyCase& study_case, const CaseLoadOpti
 
 std::vector<RegistrationView> read_views(const Study& study,
                                          const StudyCase& study_case,
+                                         double fiducial_mask_mm,
                                          std::map<std::string, std::string>& input_sha256) {
   std::vector<RegistrationView> views;
   for (const StudyView& study_view : study_case.views) {
     RegistrationView view;
     view.view = {study.rig.camera(study_view.camera), study_view.roi};
-    view.xray = used_from(study_view.places, "xray", [&] {
-      return read_xray_attenuation(study_view, view.view.camera);
-    });
-    view.mask = used_from(
-        study_view.places, "mask", [&] { return read_mask(study_view, view.view.camera); });
+    const CameraGeometry& camera = view.view.camera;
+    view.xray = used_from(
+        study_view.places, "xray", [&] { return read_xray_attenuation(study_view, camera); });
+    view.mask = mask_fiducials(
+        used_from(study_view.places, "mask", [&] { return read_mask(study_view, camera); }),
+        camera,
+        study_view.fiducials_px,
+        fiducial_mask_mm * pixels_per_mm(camera, study.rig.isocenter_point));
     input_sha256["xray " + study_view.camera] = sha256_of_file(study_view.xray.string());
     if (study_view.mask.has_value())
       input_sha256["mask " + study_view.camera] = sha256_of_file(study_view.mask->string());
@@ -234,7 +240,7 @@ LoadedCase load_case(const Study& study,
   problem->isocenter_point = study.rig.isocenter_point;
   all_or_none(communicator, [&] {
     require_known_field_cameras(study_case, options);
-    problem->views = read_views(study, study_case, loaded.input_sha256);
+    problem->views = read_views(study, study_case, options.fiducial_mask_mm, loaded.input_sha256);
   });
 
   std::optional<CtFacts> ct;

@@ -29,7 +29,10 @@ struct CaseLoadOptions {
   double water_mu_per_mm = 0.0200;  ///< of ray casting
   RayCasterOptions ray_caster;
   bool skip_ct_check = false;  ///< with fields: do not read the CT (it may be absent)
-  int coarsest_level = 0;      ///< of the image pyramids: RegistrationOptions::coarsest_level()
+  /// Radius, mm on the isocentre plane, of the discs about the study's fiducials that registration
+  /// does not see; 0: it sees them.
+  double fiducial_mask_mm = 0.0;
+  int coarsest_level = 0;  ///< of the image pyramids: RegistrationOptions::coarsest_level()
   /// Ray casting: blurs of levels 1, 2, ..., in mm on the isocentre plane; of missing ones, those
   /// of a field with 1 mm between its nodes.
   std::vector<double> level_blur_sigma_mm;

@@ -53,6 +53,13 @@ void bind_method(CLI::App& app, MethodOptions& options) {
                  options.max_evaluations,
                  "Most poses tried per registration (default: 5000)")
       ->group(group);
+  app.add_option("--fiducial-mask-mm",
+                 options.fiducial_mask_mm,
+                 "Radius of the discs about the study's fiducials that registration does not see, "
+                 "mm on the isocentre plane: the markers of the gold standard must neither help "
+                 "nor hinder what it judges. 0: it sees them")
+      ->capture_default_str()
+      ->group(group);
   app.add_option("--threads",
                  options.threads,
                  "Threads that one registration spreads over, on every rank; 0: as many as there "

@@ -11,6 +11,9 @@
 namespace af::registration {
 namespace {
 
+/// Larger discs would hide what is to be registered.
+constexpr double kMostFiducialMaskMm = 50.0;
+
 void replace_in_chain(const MethodOptions& options, ChainOptions& chain) {
   for (StageOptions& stage : chain.stages) {
     if (options.bins.has_value()) stage.similarity.bins = *options.bins;
@@ -62,6 +65,12 @@ RegistrationOptions resolve(const MethodOptions& options) {
   result.seed = options.seed;
   std::vector<std::string> found = problems(result);
   for (const std::string& text : thread_problems(options.threads)) found.push_back(text);
+  if (!(options.fiducial_mask_mm >= 0.0 && options.fiducial_mask_mm <= kMostFiducialMaskMm)) {
+    std::ostringstream text;
+    text << "--fiducial-mask-mm = " << options.fiducial_mask_mm << ": must be within 0 and "
+         << kMostFiducialMaskMm;
+    found.push_back(text.str());
+  }
   throw_if_any(found);
   return result;
 }
@@ -70,7 +79,8 @@ std::string to_toml(const MethodOptions& options, const RegistrationOptions& res
   std::ostringstream out;
   out << "preset = \"" << options.preset_name()
       << "\"\nmax_evaluations = " << resolved.max_evaluations << "\nseed = " << resolved.seed
-      << "\nthreads = " << options.threads << "\nchain = [";
+      << "\nthreads = " << options.threads << "\nfiducial_mask_mm = " << options.fiducial_mask_mm
+      << "\nchain = [";
   for (const ChainOptions& chain : resolved.chains) out << "\n  \"" << chain_text(chain) << "\",";
   out << "\n]\n";
   if (!resolved.finish.stages.empty())

@@ -22,6 +22,9 @@ struct MethodOptions {
   std::optional<double> smoothing_sigma_mm;  ///< of each chain's first stage
   std::optional<double> coarse_roi_scale;    ///< of stages that look beyond the region
   std::optional<int> max_evaluations;
+  /// Radius, mm on the isocentre plane, of the discs about fiducials that registration does not
+  /// see.
+  double fiducial_mask_mm = 4.0;
   std::uint64_t seed = 1;
   int threads = 1;  ///< that one registration spreads over; 0: every processor of this process
 

@@ -42,7 +42,7 @@ RegistrationOptions robust_preset() {
                                     "tncc gauss-newton level=2 pixels=8 roi=2 final=0.2;"
                                     "rg gauss-newton level=2 pixels=4 final=0.1"),
                     chain_from_text("wide",
-                                    "ncc cma-es level=2 pixels=8 roi=2 step=8 final=1;"
+                                    "rg cma-es level=2 pixels=8 roi=2 step=8 final=1;"
                                     "rg gauss-newton level=2 pixels=8 roi=2 final=0.2;"
                                     "rg gauss-newton level=2 pixels=4 final=0.1")};
   options.finish = chain_from_text("finish",

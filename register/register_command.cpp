@@ -81,6 +81,7 @@ CaseLoadOptions case_load_options(const RegisterOptions& options, int coarsest_l
   result.water_mu_per_mm = options.water_mu_per_mm;
   result.ray_caster.step_mm = options.step_mm;
   result.skip_ct_check = options.skip_ct_check;
+  result.fiducial_mask_mm = options.method.fiducial_mask_mm;
   return result;
 }
 

@@ -67,13 +67,6 @@ ValueRange drr_range_at_nominal(const RegistrationProblem& problem, const Regist
   return {static_cast<double>(*low), static_cast<double>(*high)};
 }
 
-/// Detector pixels per millimetre on the isocentre plane (mean of both directions).
-double pixels_per_isocenter_mm(const RegistrationProblem& problem, const CameraGeometry& camera) {
-  const double magnification =
-      camera.source_detector_distance_mm() / camera.depth_mm(problem.isocenter_point);
-  return magnification / camera.pixel_spacing_mm.mean();
-}
-
 StageGrid stage_grid(const RegistrationProblem& problem,
                      const RegistrationView& view,
                      const StageOptions& stage) {
@@ -84,7 +77,7 @@ StageGrid stage_grid(const RegistrationProblem& problem,
   }
   return {stage.pixel_step,
           stage.roi_scale,
-          std::sqrt(variance_mm2) * pixels_per_isocenter_mm(problem, view.view.camera)};
+          std::sqrt(variance_mm2) * pixels_per_mm(view.view.camera, problem.isocenter_point)};
 }
 
 std::shared_ptr<const DrrRenderer> stage_renderer(const RegistrationView& view, int level) {

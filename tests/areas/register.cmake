@@ -7,6 +7,7 @@ af_add_test(
           unit/register/best_neighbor_search_test.cpp
           unit/register/optimizers_test.cpp
           unit/register/stage_view_test.cpp
+          unit/register/fiducial_mask_test.cpp
           unit/register/method_options_test.cpp
           unit/register/parameter_scaling_test.cpp
           unit/register/multi_view_objective_test.cpp

@@ -117,6 +117,42 @@ TEST_F(RegisterProgram, ManyStartsGiveTheSameRowsOnAnyRankCount) {
   EXPECT_EQ(a.text(3, "stop_reason"), "start-inadmissible");
 }
 
+/// The study with fiducials, as NAME.toml; each adds `marker` to the X-rays' pixel in its middle.
+void write_study_with_fiducials(const fs::path& folder, const std::string& name, float marker) {
+  Study study = read_study(folder / "study.toml");
+  StudyCase& study_case = study.cases.front();
+  study_case.fiducials_ct_mm = {{15, 0, 0}, {-12, 10, 4}, {0, -9, 14}, {3, 6, -13}};
+  for (StudyView& view : study_case.views) {
+    Image2d xray = read_image(view.xray);
+    for (const Eigen::Vector3d& point : study_case.fiducials_ct_mm) {
+      const Eigen::Vector2d pixel =
+          study.rig.camera(view.camera).project(*study_case.gold_room_from_ct * point);
+      view.fiducials_px.push_back(pixel);
+      xray.at(static_cast<int>(std::lround(pixel.x())), static_cast<int>(std::lround(pixel.y()))) +=
+          marker;
+    }
+    view.xray = folder / (name + "-" + view.camera + ".mha");
+    write_image(xray, view.xray, 3.0, 3.0);
+  }
+  write_text_file(folder / (name + ".toml"), study_to_toml(study, folder));
+}
+
+TEST_F(RegisterProgram, DoesNotSeeTheMarkersOfTheGoldStandard) {
+  write_study_with_fiducials(path(""), "bare", 0.0f);
+  write_study_with_fiducials(path(""), "marked", 5.0f);
+  const auto tre_mm = [&](const std::string& study, const std::string& options) {
+    const std::string folder = path(study + "-result" + std::to_string(options.size()));
+    const test::ProgramRun run = test::run_command(
+        program("af-register") + " --study " + path(study + ".toml") + fields() +
+        " --chain 'gc gauss-newton' --start-rotation-deg 1,-1,1 " + options + " -o " + folder);
+    EXPECT_EQ(run.exit_code, 0) << run.output;
+    std::ifstream file(folder + "/result.json");
+    return nlohmann::json::parse(file).at("tre_mm").get<double>();
+  };
+  EXPECT_EQ(tre_mm("marked", ""), tre_mm("bare", ""));
+  EXPECT_NE(tre_mm("marked", "--fiducial-mask-mm 0"), tre_mm("bare", "--fiducial-mask-mm 0"));
+}
+
 TEST_F(RegisterProgram, RefusesAFieldOfAnotherCamera) {
   const test::ProgramRun run =
       run_register("--field AP=" + path("LAT.af.h5") + " --field LAT=" + path("LAT.af.h5") +

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "register/method_options.h"
 
+#include <limits>
+
 #include <gtest/gtest.h>
 
 #include "base/error.h"
@@ -67,6 +69,14 @@ TEST(MethodOptions, RefuseAnUnknownPreset) {
   MethodOptions options;
   options.preset = "unheard-of";
   EXPECT_THROW(resolve(options), InputError);
+}
+
+TEST(MethodOptions, RefuseAFiducialMaskOfNoSize) {
+  for (const double radius_mm : {-1.0, 51.0, std::numeric_limits<double>::quiet_NaN()}) {
+    MethodOptions options;
+    options.fiducial_mask_mm = radius_mm;
+    EXPECT_THROW(resolve(options), InputError) << radius_mm;
+  }
 }
 
 TEST(MethodOptions, ScaleOnlyTheRegionsOfCoarseStages) {

@@ -28,6 +28,19 @@ TEST(StageView, OfTheFinestGridIsTheView) {
   EXPECT_EQ(stage_reference(xray, {}, view, {}).xray.pixels, crop(xray, view.roi).pixels);
 }
 
+TEST(StageView, PixelsPerMmAreThoseOfProjectedLengths) {
+  CameraGeometry camera = test::small_camera(false);
+  camera.pixel_spacing_mm = {3.0, 5.0};
+  const Eigen::Vector3d point(7.0, 20.0, -5.0);
+  const auto moved_px = [&](const Eigen::Vector3d& direction) {
+    return (camera.project(point + direction) - camera.project(point)).norm();
+  };
+  const double columns = moved_px(camera.column_direction);
+  const double rows = moved_px(camera.row_direction);
+  // Of spacings a and b: 2 / (a + b), the harmonic mean of 1 / a and 1 / b.
+  EXPECT_NEAR(pixels_per_mm(camera, point), 2.0 / (1.0 / columns + 1.0 / rows), 1e-9);
+}
+
 TEST(StageView, ScalesTheRegionAboutItsCentreAndStaysOnTheDetector) {
   const View view{test::small_camera(false), {16, 10, 16, 16}};
   const View twice = stage_view(view, {1, 2.0, 0.0});
