@@ -32,9 +32,13 @@ void run_compare(const CompareOptions& options, const Communicator& world) {
     const std::vector<MethodRow> rows = method_rows(runs);
     if (rows.empty())
       throw InputError("RUN", options.runs.front().string(), "holds no finished registration run");
-    std::string text = options.is_screen ? screen_markdown(rows) : methods_markdown(rows);
-    const std::string pairs = pairs_markdown(runs);
-    if (!pairs.empty()) text += "\n" + pairs;
+    std::vector<std::string> parts = {options.is_screen ? screen_markdown(rows)
+                                                        : methods_markdown(rows)};
+    std::string text;
+    if (!options.is_screen) parts.push_back(studies_markdown(rows));
+    parts.push_back(pairs_markdown(runs));
+    for (const std::string& part : parts)
+      if (!part.empty()) text += (text.empty() ? "" : "\n") + part;
     std::filesystem::path csv = options.output;
     write_text_file(csv.replace_extension(".csv"), methods_table(rows).to_text());
     write_text_file(options.output, text);

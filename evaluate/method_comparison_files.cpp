@@ -118,6 +118,35 @@ std::string number_or_dash(double value, int decimals) {
   return std::isfinite(value) ? fixed_text(value, decimals) : "-";
 }
 
+/// A table of cells by line (several keys) and column.
+struct CrossTable {
+  std::vector<std::string> key_names;
+  std::map<std::vector<std::string>, std::map<std::string, std::string>> lines;
+  std::set<std::string> columns;
+
+  void set(const std::vector<std::string>& keys, const std::string& column, std::string cell) {
+    columns.insert(column);
+    lines[keys][column] = std::move(cell);
+  }
+
+  [[nodiscard]] std::string markdown() const {
+    std::string text = "|";
+    for (const std::string& name : key_names) text += " " + name + " |";
+    for (const std::string& column : columns) text += " " + column + " |";
+    text += "\n|";
+    for (std::size_t i = 0; i < key_names.size() + columns.size(); ++i) text += "---|";
+    for (const auto& [keys, cells] : lines) {
+      text += "\n|";
+      for (const std::string& key : keys) text += " " + key + " |";
+      for (const std::string& column : columns) {
+        const auto cell = cells.find(column);
+        text += " " + (cell == cells.end() ? std::string() : cell->second) + " |";
+      }
+    }
+    return text + "\n";
+  }
+};
+
 }  // namespace
 
 std::vector<MethodRow> method_rows(const std::vector<EvaluationRun>& runs) {
@@ -197,31 +226,29 @@ std::string methods_markdown(const std::vector<MethodRow>& rows) {
 }
 
 std::string screen_markdown(const std::vector<MethodRow>& rows) {
-  std::map<std::array<std::string, 4>, std::map<std::string, std::string>> lines;
-  std::set<std::string> optimizers;
+  CrossTable table{{"Case", "Renderer", "Preset", "Measure"}, {}, {}};
+  for (const MethodRow& row : rows)
+    table.set({row.case_name, row.renderer, row.preset, row.similarity},
+              row.optimizer,
+              percent_text(row.bands[0]) + " / " + percent_text(row.bands[1]) + ", " +
+                  number_or_dash(row.median_tre_mm, 3));
+  return table.markdown();
+}
+
+std::string studies_markdown(const std::vector<MethodRow>& rows) {
+  CrossTable table{{"Study", "Renderer"}, {}, {}};
   for (const MethodRow& row : rows) {
-    optimizers.insert(row.optimizer);
-    lines[{row.case_name, row.renderer, row.preset, row.similarity}][row.optimizer] =
-        percent_text(row.bands[0]) + " / " + percent_text(row.bands[1]) + ", " +
-        number_or_dash(row.median_tre_mm, 3);
+    const std::size_t end = row.run.rfind("-" + row.preset);
+    if (row.preset.empty() || end == std::string::npos) continue;
+    std::string percents;
+    for (const IntervalSuccess& band : row.bands)
+      percents += (percents.empty() ? "" : " / ") + percent_text(band);
+    table.set({row.run.substr(0, end), row.renderer},
+              row.run.substr(end + 1),
+              percents + ", " + number_or_dash(row.median_tre_mm, 3) + ", " +
+                  number_or_dash(1000.0 * row.median_seconds, 1));
   }
-  std::string head = "| Case | Renderer | Preset | Measure |";
-  std::string rule = "|---|---|---|---|";
-  for (const std::string& optimizer : optimizers) {
-    head += " " + optimizer + " |";
-    rule += "---|";
-  }
-  std::string text = head + "\n" + rule + "\n";
-  for (const auto& [key, cells] : lines) {
-    text += "|";
-    for (const std::string& part : key) text += " " + part + " |";
-    for (const std::string& optimizer : optimizers) {
-      const auto cell = cells.find(optimizer);
-      text += " " + (cell == cells.end() ? std::string() : cell->second) + " |";
-    }
-    text += "\n";
-  }
-  return text;
+  return table.columns.size() < 2 ? std::string() : table.markdown();
 }
 
 std::string pairs_markdown(const std::vector<EvaluationRun>& runs) {

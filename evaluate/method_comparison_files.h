@@ -45,6 +45,11 @@ std::string methods_markdown(const std::vector<MethodRow>& rows);
 /// optimisers: one line per case, renderer, preset and measure.
 std::string screen_markdown(const std::vector<MethodRow>& rows);
 
+/// The same rows as one line per study and one column per method: success for the three bands (%),
+/// median TRE of successes (mm), median milliseconds. A run's folder is named STUDY-PRESET...;
+/// others are left out. Empty with fewer than two methods.
+std::string studies_markdown(const std::vector<MethodRow>& rows);
+
 /// Field against ray casting from the same starts, of the runs that have both: success, the paired
 /// TRE difference with its 90 % interval, two one-sided tests and their power, as a table in
 /// Markdown; empty without such a run.

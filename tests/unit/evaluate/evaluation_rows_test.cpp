@@ -421,6 +421,26 @@ TEST(MethodComparison, ScreenHasALinePerMeasureAndAColumnPerOptimizer) {
             "| skull | field | paper | ncc |  | 100 / 25, 0.250 |\n");
 }
 
+TEST(MethodComparison, StudiesHaveALineEachAndAColumnPerMethod) {
+  MethodRow a;
+  a.run = "skull-clean-paper";
+  a.renderer = "field";
+  a.preset = "paper";
+  a.bands = {{0, 8, 4, 4, {}}, {8, 16, 4, 1, {}}, {16, 30, 0, 0, {}}};
+  a.median_tre_mm = 0.25;
+  a.median_seconds = 0.0625;
+  EXPECT_EQ(studies_markdown({a}), "");
+  MethodRow b = a;
+  b.run = "skull-heel-paper-mi-bobyqa";
+  MethodRow other_program = a;
+  other_program.run = "skull-clean-theirs";
+  EXPECT_EQ(studies_markdown({a, b, other_program}),
+            "| Study | Renderer | paper | paper-mi-bobyqa |\n"
+            "|---|---|---|---|\n"
+            "| skull-clean | field | 100 / 25 / -, 0.250, 62.5 |  |\n"
+            "| skull-heel | field |  | 100 / 25 / -, 0.250, 62.5 |\n");
+}
+
 TEST(MethodComparison, PairsTellTheTestOfTheSummary) {
   std::vector<RegistrationRow> rows;
   for (const auto& [field_mm, raycast_mm] :
