@@ -6,18 +6,24 @@
 #include <chrono>
 #include <cmath>
 #include <exception>
+#include <map>
+#include <span>
 #include <tuple>
 #include <utility>
 
+#include "base/build_info.h"
 #include "base/error.h"
 #include "cli/app_main.h"
 #include "cli/progress_printer.h"
+#include "cli/stop_request.h"
+#include "evaluate/case_progress_program.h"
 #include "evaluate/failure_trace_files.h"
 #include "evaluate/method_loading.h"
 #include "evaluate/row_gathering_program.h"
 #include "evaluate/target_box.h"
 #include "io/output_file.h"
 #include "io/picture.h"
+#include "io/sha256.h"
 #include "register/result_files.h"
 #include "register/slicer_files.h"
 
@@ -129,19 +135,26 @@ RegistrationRow traced_row(Method& method,
   return row;
 }
 
-/// Collective. Registers every start of one method and appends its rows on rank 0, by start index.
-/// Methods go one after the other: blocks of the work queue then hold work of one duration.
+/// Collective. Registers every start of one method that is not finished and appends the rows of all
+/// on rank 0, by start index. Methods go one after the other: blocks of the work queue then hold
+/// work of one duration. Once a stop is asked for, starts are passed over.
 void register_with(Method& method,
                    const std::string& case_name,
                    const StratifiedStarts& starts,
                    const Yardstick& yardstick,
                    const Communicator& world,
+                   CaseProgress& progress,
                    std::vector<RegistrationRow>& rows) {
-  const std::size_t first = rows.size();
-  if (world.is_root()) rows.resize(first + method.start_indices.size());
+  std::map<std::size_t, RegistrationRow> by_start;
+  if (world.is_root())
+    for (const std::size_t index : method.start_indices)
+      if (const RegistrationRow* row = progress.find(method.renderer, index); row != nullptr)
+        by_start[index] = *row;
+  const std::vector<std::size_t> to_do = progress.unfinished(method.renderer, method.start_indices);
   std::size_t traced = 0;
-  const auto registered = [&](std::int64_t item) {
-    const std::size_t index = method.start_indices[static_cast<std::size_t>(item)];
+  const auto registered = [&](std::int64_t item) -> json {
+    if (cli::is_stop_requested()) return nullptr;
+    const std::size_t index = to_do[static_cast<std::size_t>(item)];
     RegistrationRow row = traced_row(method, starts.starts[index], index, yardstick);
     row.case_name = case_name;
     // Items come in order: a rank's first failures are its share of the first of all.
@@ -149,12 +162,16 @@ void register_with(Method& method,
     return packed_row(item, row);
   };
   collect_rows(world,
-               static_cast<std::int64_t>(method.start_indices.size()),
+               static_cast<std::int64_t>(to_do.size()),
                "case " + case_name + ", " + method.renderer + " registrations",
                registered,
                [&](std::int64_t item, const json& packed) {
-                 rows[first + static_cast<std::size_t>(item)] = row_of(packed);
+                 if (packed.is_null()) return;
+                 progress.append(packed);
+                 by_start[to_do[static_cast<std::size_t>(item)]] = row_of(packed);
                });
+  progress.sync();
+  for (auto& [index, row] : by_start) rows.push_back(std::move(row));
 }
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
@@ -201,11 +218,30 @@ std::vector<RegistrationRow> register_all(const std::string& case_name,
                                           std::vector<Method>& methods,
                                           const StratifiedStarts& starts,
                                           const Yardstick& yardstick,
-                                          const Communicator& world) {
+                                          const Communicator& world,
+                                          CaseProgress& progress) {
   std::vector<RegistrationRow> rows;
-  for (Method& method : methods) register_with(method, case_name, starts, yardstick, world, rows);
+  for (Method& method : methods)
+    register_with(method, case_name, starts, yardstick, world, progress, rows);
   for (const Method& method : methods) keep_first_traces(rows, method.renderer);
   return rows;
+}
+
+/// Every option, input and start that decides a case's rows.
+DecidingValues deciding_values(const RegistrationStudyOptions& options,
+                               const CaseEvaluation& evaluation) {
+  DecidingValues values = deciding_lines(to_toml(options));
+  values.erase("threads");
+  values["program version"] = program_version();
+  values["case name"] = evaluation.case_name;
+  for (const auto& [name, hash] : evaluation.input_sha256) values["SHA-256 of " + name] = hash;
+  Sha256 starts;
+  for (const PerturbedStart& start : evaluation.starts.starts) {
+    const Eigen::Matrix4d matrix = start.room_from_ct.matrix();
+    starts.update(std::as_bytes(std::span(matrix.data(), 16)));
+  }
+  values["SHA-256 of the starts"] = starts.hex_digest();
+  return values;
 }
 
 void draw_xrays(const registration::RegistrationProblem& problem,
@@ -338,7 +374,17 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
   if (options.is_starts_only) return evaluation;
   const Yardstick yardstick = yardstick_of(study, study_case, evaluation.gold);
   announce_times(methods, study_case.name, evaluation.starts, world);
-  evaluation.rows = register_all(study_case.name, methods, evaluation.starts, yardstick, world);
+  CaseProgress progress(progress_folder(options.output_folder),
+                        file_name_part(study_case.name),
+                        deciding_values(options, evaluation),
+                        options.restarts,
+                        world);
+  if (progress.finished_count() > 0)
+    cli::info(world,
+              "case " + study_case.name + ": goes on after " +
+                  std::to_string(progress.finished_count()) + " finished registrations");
+  evaluation.rows =
+      register_all(study_case.name, methods, evaluation.starts, yardstick, world, progress);
   all_or_none(world, [&] {
     if (!world.is_root()) return;
     draw_xrays(methods.front().runner.problem(), options.output_folder, evaluation);

@@ -11,7 +11,9 @@
 
 #include "base/error.h"
 #include "cli/app_main.h"
+#include "cli/stop_request.h"
 #include "evaluate/case_evaluation_program.h"
+#include "evaluate/case_progress_program.h"
 #include "evaluate/case_table_files.h"
 #include "evaluate/failed_start_files.h"
 #include "evaluate/failure_trace_files.h"
@@ -47,6 +49,7 @@ const std::set<std::string> kNotOfRepeats = {"--case",
                                              "--start-rule",
                                              "--starts-only",
                                              "--only-start",
+                                             "--restart",
                                              "--raycast-starts-per-interval",
                                              "--raycast-intervals",
                                              "--output"};
@@ -346,6 +349,9 @@ CLI::App* bind_registration(CLI::App& app, RegistrationStudyOptions& options) {
       ->capture_default_str();
   command->add_option("--seed", options.method.seed, "Of the starts, and of what cma-es draws")
       ->capture_default_str();
+  command->add_flag("--restart",
+                    options.restarts,
+                    "Throw away what a stopped or killed run has finished (OUTPUT.progress)");
   command->add_option("-o,--output", options.output_folder, "Folder for the results")->required();
   command->parse_complete_callback([&options, command] {
     options.shared_by_repeats = cli::given_options(*command, kNotOfRepeats);
@@ -371,6 +377,7 @@ void run_registration(const RegistrationStudyOptions& options,
     make_output_folder(folder);
   });
 
+  cli::listen_for_stop_requests();
   std::vector<CaseEvaluation> evaluations;
   for (const StudyCase& study_case : cases) {
     const auto on_starts = [&](const CaseEvaluation& so_far) {
@@ -418,6 +425,7 @@ void run_registration(const RegistrationStudyOptions& options,
     summary["provenance"] = af::to_json(provenance);
     // Last: when it is there, everything is.
     write_text_file(folder / "summary.json", summary.dump(2) + "\n");
+    std::filesystem::remove_all(progress_folder(folder));
     print_outcome(summary, folder, world);
   });
 }

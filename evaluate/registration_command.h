@@ -30,6 +30,7 @@ struct RegistrationStudyOptions : MethodOptions {
   std::filesystem::path poses_from;                ///< poses that another program found
   std::string method_name = "poses";               ///< what these are called
   double equivalence_margin_mm = 0.1;
+  bool restarts = false;  ///< throw unfinished work away
   std::filesystem::path output_folder;
   std::string program = "af-evaluate";  ///< as typed, quoted for a shell
   std::string shared_by_repeats;        ///< options as typed but those of starts and output
@@ -50,7 +51,8 @@ CLI::App* bind_registration(CLI::App& app, RegistrationStudyOptions& options);
 
 /// Collective. Registers a study's cases from starts about gold (Sec. IV-B), or takes the poses
 /// that another program found, and writes starts.csv (before anything is registered),
-/// registrations.csv, figures, overlays, summary.json and reproduce.sh.
+/// registrations.csv, figures, overlays, summary.json and reproduce.sh. Finished registrations are
+/// kept in OUTPUT.progress/ until all is written; StoppedError when SIGUSR1 asked for a stop.
 void run_registration(const RegistrationStudyOptions& options,
                       const std::string& command_line,
                       const Communicator& world);

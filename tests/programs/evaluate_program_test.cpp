@@ -186,6 +186,61 @@ TEST_F(EvaluateProgram, RegistersAlikeOnAnyRankCount) {
   EXPECT_EQ(summary["field_against_raycast"]["common_starts"], 4);
 }
 
+/// How a run is cut short.
+struct Cut {
+  const char* name;
+  const char* script;  ///< of bash; $launcher: mpirun's process, $OUT: what all command lines hold
+  int exit_code;       ///< of mpirun
+};
+
+/// Runs $CMD in the background, waits until some registrations are kept, and cuts it short. Nothing
+/// of it is left when this ends.
+constexpr const char* kCutScript = R"(
+  eval "$CMD" &
+  launcher=$!
+  while [[ "$(stat -c %s "$OUT.progress/ellipsoids.records" 2>/dev/null || echo 0)" -lt 4000 ]];
+do
+  kill - 0 $launcher || exit 99 sleep 0.01 done eval "$CUT" wait $launcher status =
+      $ ? while pgrep - f-- "$OUT" > / dev / null;
+do sleep 0.02; done
+  exit $status
+)";
+
+TEST_F(EvaluateProgram, GoesOnAfterAStopOrAKillOnAnotherRankCount) {
+  const std::string arguments = "registration --study " + path("study.toml") + fields() +
+                                "--preset paper --starts-per-interval 50 -o ";
+  ASSERT_EQ(evaluate(arguments + path("whole"), 2).exit_code, 0);
+  const std::string expected = rows_without_seconds("whole");
+  write_text_file(path("cut.sh"), kCutScript);
+  const Cut cuts[] = {
+      {"usr1", "kill -USR1 $launcher", 75},
+      {"term", "kill -TERM $launcher", 143},
+      {"rank", "kill -KILL $(pgrep -f -- \"^[^ ]*/af-evaluate.*$OUT\" | tail -n 1)", 137},
+      {"all", "pkill -KILL -f -- \"$OUT\"", 137}};
+  for (const int ranks : {1, 2, 4})
+    for (const Cut& cut : cuts) {
+      const std::string out = path(std::string(cut.name) + std::to_string(ranks));
+      SCOPED_TRACE(out);
+      // By the environment: command lines that hold $OUT are those of the run alone.
+      setenv("OUT", out.c_str(), 1);
+      setenv("CUT", cut.script, 1);
+      setenv("CMD",
+             (std::string(AF_MPIEXEC " --oversubscribe -n ") + std::to_string(ranks) +
+              " " AF_PROGRAM_FOLDER "/af-evaluate " + arguments + out)
+                 .c_str(),
+             1);
+      const test::ProgramRun run = test::run_command("bash " + path("cut.sh"));
+      EXPECT_EQ(run.exit_code, cut.exit_code) << run.output;
+      EXPECT_FALSE(std::filesystem::exists(out + "/summary.json"));
+      expect_refused(evaluate(arguments + out + " --seed 2", 1), 3, "begun with 1");
+      const test::ProgramRun resumed = evaluate(arguments + out, ranks % 3 + 1);
+      ASSERT_EQ(resumed.exit_code, 0) << resumed.output;
+      EXPECT_THAT(resumed.output, HasSubstr("goes on after"));
+      EXPECT_EQ(rows_without_seconds(std::filesystem::path(out).filename()), expected);
+      EXPECT_FALSE(std::filesystem::exists(out + ".progress"));
+    }
+}
+
 TEST_F(EvaluateProgram, MeasuresPosesOfAnotherProgramLikeItsOwn) {
   const std::string study = "registration --study " + path("with-fiducials.toml") + " ";
   ASSERT_EQ(evaluate(study + fields() + "--intervals 2 --starts-per-interval 3 -o " + path("own"))
