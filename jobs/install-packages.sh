@@ -17,10 +17,11 @@ base_packages=(
 benchmark_packages=(plastimatch libfaiss-dev libopenblas-dev)
 # Formatter, linters, and the browser that opens the report in a test.
 lint_packages=(clang-format-14 clang-tidy-14 shellcheck chromium)
+slurm_packages=(slurm-wlm munge)
 
 usage() {
   cat <<'TEXT'
-Usage: jobs/install-packages.sh [--with-lint] [--with-benchmarks] [--check] [--help]
+Usage: jobs/install-packages.sh [--with-lint] [--with-benchmarks] [--with-slurm] [--check] [--help]
 
 Installs the Debian 12 packages that the project needs to build, run and pass its tests. Says what it does; does
 nothing when all are there. Needs root or sudo only to install.
@@ -28,6 +29,7 @@ nothing when all are there. Needs root or sudo only to install.
   --with-lint         also the formatter, the linters and the browser that checks reports (clang-format-14, clang-tidy-14,
                       shellcheck, chromium)
   --with-benchmarks   also what tests/benchmark/run.sh compares with (plastimatch, Faiss, OpenBLAS)
+  --with-slurm        also a Slurm of one node, for tests/slurm
   --check             only say what is missing; exit 1 when something is
 TEXT
 }
@@ -42,6 +44,7 @@ main() {
     case "$1" in
       --with-lint) packages+=("${lint_packages[@]}") ;;
       --with-benchmarks) packages+=("${benchmark_packages[@]}") ;;
+      --with-slurm) packages+=("${slurm_packages[@]}") ;;
       --check) check_only=yes ;;
       --help | -h) usage; return 0 ;;
       *)

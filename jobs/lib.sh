@@ -32,6 +32,26 @@ duration() {
 
 core_count() { nproc 2>/dev/null || echo 1; }
 
+# Where the programs are: of the repository's release build or, installed, PREFIX/bin beside
+# PREFIX/share/attenuation-fields/jobs.
+program_folder() {
+  if [[ -f "$af_root/CMakeLists.txt" ]]; then
+    echo "$af_root/build/release/bin"
+  else
+    (cd "$af_root/../../bin" && pwd)
+  fi
+}
+
+# need_programs FOLDER PROGRAM...: ends when one is missing.
+need_programs() {
+  local folder=$1 program
+  shift
+  for program in "$@"; do
+    [[ -x "$folder/$program" ]] ||
+      die 1 "$folder/$program is missing: build it first (cmake --preset release && cmake --build build/release)"
+  done
+}
+
 # One compiler per core, but not more than memory allows (the ITK and CLI11 files need up to about 1.5 GB each).
 build_job_count() {
   local cores memory_kb

@@ -218,22 +218,15 @@ print_plan
 if [[ "$skip_packages" == no ]]; then
   "$af_root/jobs/install-packages.sh" || die 1 "packages are missing (see above); --skip-packages goes on without them"
 fi
-if [[ -f "$af_root/CMakeLists.txt" ]]; then
-  bin="$af_root/build/release/bin"
-  if [[ "$skip_build" == no ]]; then
-    say "Building the programs in build/release ..."
-    build_start=$SECONDS
-    mkdir -p "$af_root/build"
-    build_preset release "$af_root/build/release.log" "${af_programs[@]}"
-    say "        $(duration $((SECONDS - build_start)))"
-  fi
-else
-  # Installed: PREFIX/share/attenuation-fields/jobs beside PREFIX/bin.
-  bin="$(cd "$af_root/../.." && pwd)/bin"
+if [[ -f "$af_root/CMakeLists.txt" && "$skip_build" == no ]]; then
+  say "Building the programs in build/release ..."
+  build_start=$SECONDS
+  mkdir -p "$af_root/build"
+  build_preset release "$af_root/build/release.log" "${af_programs[@]}"
+  say "        $(duration $((SECONDS - build_start)))"
 fi
-for program in "${af_programs[@]}"; do
-  [[ -x "$bin/$program" ]] || die 1 "$bin/$program is missing; run without --skip-build"
-done
+bin=$(program_folder)
+need_programs "$bin" "${af_programs[@]}"
 
 # --- the study --------------------------------------------------------------------------------------------------
 

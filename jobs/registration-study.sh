@@ -109,14 +109,8 @@ stress_of() {
 
 # --- stages ------------------------------------------------------------------------------------------------------
 
-if [[ -f "$af_root/CMakeLists.txt" ]]; then
-  bin="$af_root/build/release/bin"
-else
-  bin="$(cd "$af_root/../.." && pwd)/bin"
-fi
-for program in af-simulate af-precompute af-evaluate; do
-  [[ -x "$bin/$program" ]] || die 1 "$bin/$program is missing: build it first"
-done
+bin=$(program_folder)
+need_programs "$bin" af-simulate af-precompute af-evaluate
 
 mkdir -p "$output/.stages" "$output/logs"
 output="$(cd "$output" && pwd)"

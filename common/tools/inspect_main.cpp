@@ -17,6 +17,7 @@ struct Options {
   std::string template_name;
   af::InspectOptions inspect;
   bool as_json = false;
+  bool lists_views = false;
 };
 
 /// The report of each path as soon as it is known; JSON is one array.
@@ -34,6 +35,13 @@ void print(const Options& options, const std::vector<af::Inspection>& inspection
 void run(const Options& options, const Communicator& world) {
   if (!options.template_name.empty()) {
     if (world.is_root()) std::cout << af::template_text(options.template_name);
+    return;
+  }
+  if (options.lists_views) {
+    for (const std::string& path : options.paths) {
+      const std::string lines = af::all_or_none(world, [&] { return af::view_lines(path); });
+      if (world.is_root()) std::cout << lines;
+    }
     return;
   }
   std::vector<af::Inspection> inspections;
@@ -75,6 +83,11 @@ int main(int argc, char** argv) {
       ->check(CLI::IsMember(af::template_names()));
   what->require_option(1);
   app.add_flag("--json", options.as_json, "Print one JSON array instead of text");
+  app.add_flag("--list-views",
+               options.lists_views,
+               "Of studies, for scripts: one line per view, its case and its camera with a tab "
+               "between them")
+      ->excludes("--json");
   app.add_option("--series",
                  options.inspect.series_uid,
                  "SeriesInstanceUID to read from a DICOM folder that holds several series");

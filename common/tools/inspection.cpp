@@ -10,6 +10,7 @@
 #include "io/dicom_series.h"
 #include "io/image_header.h"
 #include "io/rig_file.h"
+#include "io/study_file.h"
 #include "tools/inspect_kinds.h"
 
 namespace af {
@@ -254,6 +255,14 @@ ordered_json to_json(const Inspection& inspection) {
 
 std::string to_text(const Inspection& inspection) {
   return text_at(inspection, "");
+}
+
+std::string view_lines(const fs::path& study_path) {
+  std::string lines;
+  for (const StudyCase& study_case : read_study(study_path).cases)
+    for (const StudyView& view : study_case.views)
+      lines += study_case.name + '\t' + view.camera + '\n';
+  return lines;
 }
 
 }  // namespace af

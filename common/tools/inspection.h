@@ -41,4 +41,7 @@ nlohmann::ordered_json to_json(const Inspection& inspection);
 /// For people: one fact per line.
 std::string to_text(const Inspection& inspection);
 
+/// For scripts: one line per view of a study, "case<tab>camera". Throws as read_study().
+std::string view_lines(const std::filesystem::path& study_path);
+
 }  // namespace af

@@ -195,16 +195,19 @@ struct Cut {
 
 /// Runs $CMD in the background, waits until some registrations are kept, and cuts it short. Nothing
 /// of it is left when this ends.
-constexpr const char* kCutScript = R"(
+constexpr const char* kCutScript = R"sh(
   eval "$CMD" &
   launcher=$!
-  while [[ "$(stat -c %s "$OUT.progress/ellipsoids.records" 2>/dev/null || echo 0)" -lt 4000 ]];
-do
-  kill - 0 $launcher || exit 99 sleep 0.01 done eval "$CUT" wait $launcher status =
-      $ ? while pgrep - f-- "$OUT" > / dev / null;
-do sleep 0.02; done
+  while [[ "$(stat -c %s "$OUT.progress/ellipsoids.records" 2>/dev/null || echo 0)" -lt 4000 ]]; do
+    kill -0 $launcher || exit 99
+    sleep 0.01
+  done
+  eval "$CUT"
+  wait $launcher
+  status=$?
+  while pgrep -f -- "$OUT" >/dev/null; do sleep 0.02; done
   exit $status
-)";
+)sh";
 
 TEST_F(EvaluateProgram, GoesOnAfterAStopOrAKillOnAnotherRankCount) {
   const std::string arguments = "registration --study " + path("study.toml") + fields() +

@@ -244,6 +244,7 @@ TEST(AfInspect, VerifiesAFieldAndAStudyAndSeesDamage) {
   const json study_entry = inspect_json(study);
   EXPECT_EQ(study_entry["kind"], "study");
   EXPECT_EQ(study_entry["facts"]["cases"][0]["views"].size(), 2u);
+  EXPECT_EQ(inspect("--list-views " + study).output, "ellipsoids\tAP\nellipsoids\tLAT\n");
 
   const fs::path field = folder / "AP.af.h5";
   const test::ProgramRun made = test::run_command(

@@ -1,0 +1,25 @@
+# shellcheck shell=bash disable=SC2034
+# SPDX-License-Identifier: Apache-2.0
+# What the jobs of jobs/submit.sh ask Slurm for, and what they run. Copy it, change it, and give it with --resources.
+
+# Options of every job, for example --partition=long --account=project --qos=normal
+slurm_options=()
+
+# srun (with PMIx, as Debian's OpenMPI wants it) or mpirun
+launcher=srun
+srun_options=(--mpi=pmix)
+mpirun_options=()
+
+# Ranks, memory for each of them, and the time limit of one field, of one case's registrations, of the report.
+precompute_ranks=8 precompute_memory=2G precompute_time=02:00:00
+evaluate_ranks=8 evaluate_memory=2G evaluate_time=08:00:00
+report_memory=4G report_time=00:30:00
+
+# So many seconds before its time limit (and when it is pre-empted) a job gets TERM, saves, and is queued again.
+stop_seconds=120
+# After so many times it is given up: a job that never gets further is not left going round for ever.
+most_requeues=50
+
+# What the programs are asked for, beside study, case, camera and output.
+precompute_options=(--max-rotation-deg 10 --max-translation-mm 30)
+evaluate_options=(--preset robust --renderer field)

@@ -1,0 +1,141 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# A study on a Slurm cluster: fields, registrations and report as a chain of jobs.
+set -euo pipefail
+# shellcheck source-path=SCRIPTDIR
+source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
+
+usage() {
+  cat <<'TEXT'
+Usage: jobs/submit.sh STUDY.toml [OPTIONS]
+
+Submits a chain of Slurm jobs and returns: one array per camera with one MPI job per case that computes its field, an
+array over the cases that registers them, each as soon as its own fields are there, and a report when all have ended. A
+job that Slurm stops (time limit, pre-emption) saves what is finished and is queued again. Run again, it submits the
+same chain; what was finished by the same commands is not done twice.
+
+  --output DIR        where everything goes; must be seen by all nodes                        [./af-run]
+  --resources FILE    ranks, memory, time limits, partition, programs' options   [jobs/slurm/resources.sh]
+  --dry-run           print the chain and its commands, submit nothing
+  --help
+TEXT
+}
+
+# --- options -----------------------------------------------------------------------------------------------------
+
+study="" output="$PWD/af-run" resources="$af_root/jobs/slurm/resources.sh" dry_run=no
+need_value() { (($2 >= 2)) || die 2 "option $1 needs a value (try --help)"; }
+while (($# > 0)); do
+  case "$1" in
+    --output | -o) need_value "$1" $#; output=$2; shift ;;
+    --resources) need_value "$1" $#; resources=$2; shift ;;
+    --dry-run) dry_run=yes ;;
+    --help | -h) usage; exit 0 ;;
+    -*) die 2 "unknown option '$1' (try --help)" ;;
+    *)
+      [[ -z "$study" ]] || die 2 "one study at a time: '$study' and '$1' were given"
+      study=$1
+      ;;
+  esac
+  shift
+done
+[[ -n "$study" ]] || die 2 "which study? Give a study.toml (try --help)"
+[[ -f "$study" ]] || die 4 "$study: no such file"
+[[ -f "$resources" ]] || die 4 "--resources $resources: no such file"
+study=$(realpath "$study")
+bin=$(program_folder)
+need_programs "$bin" af-precompute af-evaluate af-inspect
+[[ "$dry_run" == yes ]] || command -v sbatch >/dev/null || die 1 "sbatch is missing: this is no Slurm cluster (jobs/local.sh needs none)"
+
+# shellcheck source=slurm/resources.sh
+source "$resources"
+
+# --- what there is to do -----------------------------------------------------------------------------------------
+
+# One line per view: case, camera. Says what is wrong with the study, if anything.
+views=$("$bin/af-inspect" --list-views "$study")
+declare -A cameras_of=()
+case_names=() most_views=0
+while IFS=$'\t' read -r case_name camera; do
+  [[ -v cameras_of["$case_name"] ]] || case_names+=("$case_name")
+  cameras_of[$case_name]+="$camera"$'\n'
+done <<<"$views"
+for case_name in "${case_names[@]}"; do
+  view_count=$(grep -c . <<<"${cameras_of[$case_name]}")
+  ((view_count <= most_views)) || most_views=$view_count
+done
+
+# command_line WORD...: as it is typed.
+command_line() {
+  printf '%q ' "$@"
+  printf '\n'
+}
+
+# The field of a case's VIEW-th camera; `true` when the case has not so many.
+precompute_line() {
+  local case_name=$1 view=$2 camera
+  camera=$(sed -n "$((view + 1))p" <<<"${cameras_of[$case_name]}")
+  if [[ -z "$camera" ]]; then
+    echo true
+    return
+  fi
+  command_line "$bin/af-precompute" --study "$study" --case "$case_name" --camera "$camera" \
+    "${precompute_options[@]}" -o "$output/fields/$case_name-$camera.af.h5"
+}
+
+evaluate_line() {
+  local case_name=$1 camera fields=()
+  while IFS= read -r camera; do
+    fields+=(--field "$camera=$output/fields/$case_name-$camera.af.h5")
+  done <<<"${cameras_of[$case_name]%$'\n'}"
+  command_line "$bin/af-evaluate" registration --study "$study" --case "$case_name" "${fields[@]}" \
+    "${evaluate_options[@]}" -o "$output/registration/$case_name"
+}
+
+# --- the chain ---------------------------------------------------------------------------------------------------
+
+# submit STAGE COMMANDS RANKS MEMORY TIME [DEPENDENCY]: one array task for each line of COMMANDS; sets job_id.
+submit() {
+  local stage=$1 commands=$2 ranks=$3 memory=$4 time=$5 dependency=${6:-}
+  local command=(sbatch --parsable "--job-name=af-$stage" "--ntasks=$ranks" "--mem-per-cpu=$memory" "--time=$time"
+    "--signal=B:TERM@$stop_seconds" --requeue --open-mode=append "--output=$output/logs/$stage-%a.log"
+    "--array=0-$(($(wc -l <<<"$commands") - 1))" "${slurm_options[@]}")
+  [[ -z "$dependency" ]] || command+=("--dependency=$dependency" --kill-on-invalid-dep=yes)
+  command+=("$af_root/jobs/slurm/stage.sbatch" "$output" "$stage")
+  if [[ "$dry_run" == yes ]]; then
+    job_id="JOB_OF_$stage"
+    say "${command[*]}"
+    say "    ${commands//$'\n'/$'\n'    }"
+    return
+  fi
+  printf '%s\n' "$commands" >"$output/jobs/$stage.commands"
+  job_id=$("${command[@]}") || die 1 "sbatch refused stage '$stage' (see above); what stands before it in the chain is submitted"
+  job_id=${job_id%%;*}
+  say "$stage: job $job_id"
+}
+
+# lines FUNCTION [ARGUMENT]: what FUNCTION CASE [ARGUMENT] prints for every case.
+lines() {
+  local case_name
+  for case_name in "${case_names[@]}"; do
+    "$1" "$case_name" "${@:2}"
+  done
+}
+
+if [[ "$dry_run" == no ]]; then
+  mkdir -p "$output"/{fields,registration,logs,jobs,.stages}
+  cp "$resources" "$output/jobs/resources.sh"
+fi
+output=$(realpath -m "$output")
+
+# A case waits for its own fields only (aftercorr: the task of the same number).
+after_fields=""
+for ((view = 0; view < most_views; ++view)); do
+  submit "precompute-$((view + 1))" "$(lines precompute_line "$view")" "$precompute_ranks" "$precompute_memory" "$precompute_time"
+  after_fields+="${after_fields:+,}aftercorr:$job_id"
+done
+submit evaluate "$(lines evaluate_line)" "$evaluate_ranks" "$evaluate_memory" "$evaluate_time" "$after_fields"
+# The report is of what there is, also when a case failed; it says which cases it has.
+submit report "$(command_line "$bin/af-evaluate" report -o "$output/report.html" "$output/registration")" 1 "$report_memory" \
+  "$report_time" "afterany:$job_id"
+[[ "$dry_run" == yes ]] || say "Watch: squeue --me; logs: $output/logs; at the end: $output/report.html"

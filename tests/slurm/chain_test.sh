@@ -1,0 +1,105 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# jobs/submit.sh on a real Slurm of one node: a study of two patients from CT to report, once undisturbed and once with
+# a field and a case's registrations stopped by Slurm's TERM, queued again and finished; both must have given the same.
+# Usage: chain_test.sh [SCRATCH_FOLDER]. Needs root, the release build and jobs/install-packages.sh --with-slurm.
+set -euo pipefail
+# shellcheck source-path=SCRIPTDIR
+source "$(dirname "${BASH_SOURCE[0]}")/../../jobs/lib.sh"
+
+scratch=${1:-$(mktemp -d)}
+mkdir -p "$scratch"
+slurm="$af_root/tests/slurm/one-node-slurm.sh"
+bin=$(program_folder)
+need_programs "$bin" af-simulate af-evaluate af-inspect af-precompute
+
+finish() {
+  local status=$?
+  "$slurm" stop "$scratch/slurm"
+  if ((status == 0)); then
+    rm -rf "$scratch"
+  else
+    say "What is left for a look: $scratch"
+  fi
+}
+trap finish EXIT
+"$slurm" start "$scratch/slurm"
+export SLURM_CONF=$scratch/slurm/slurm.conf OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
+
+fail() {
+  squeue || true
+  tail -n 8 "$scratch"/run-*/logs/*.log || true
+  die 1 "$*"
+}
+
+# wait_until SECONDS WHAT COMMAND...
+wait_until() {
+  local deadline=$((SECONDS + $1)) what=$2
+  shift 2
+  until "$@"; do
+    ((SECONDS < deadline)) || fail "waited too long for $what"
+    sleep 0.3
+  done
+}
+
+# Two patients: the spine phantom twice, at different poses.
+for seed in 1 2; do
+  "$bin/af-simulate" --phantom spine --case "patient-$seed" --seed "$seed" -o "$scratch/patient-$seed" >"$scratch/simulate.log"
+done
+"$bin/af-evaluate" join-studies "$scratch/patient-1/study.toml" "$scratch/patient-2/study.toml" -o "$scratch/study.toml"
+
+# Work that lasts some seconds: what is stopped must be under way.
+cat >"$scratch/resources.sh" <<TEXT
+slurm_options=()
+launcher=${LAUNCHER:-srun}
+srun_options=(--mpi=pmix)
+mpirun_options=(--oversubscribe)
+precompute_ranks=2 precompute_memory=100M precompute_time=00:10:00
+evaluate_ranks=2 evaluate_memory=100M evaluate_time=00:10:00
+report_memory=100M report_time=00:05:00
+stop_seconds=5
+most_requeues=3
+precompute_options=(--max-rotation-deg 10 --max-translation-mm 30 --uv-nodes 40 --st-nodes 96 --codewords 2048 --caster trilinear)
+evaluate_options=(--preset paper --starts-per-interval 20)
+TEXT
+
+# submit RUN: submits the chain, output in RUN.
+submit() { "$af_root/jobs/submit.sh" "$scratch/study.toml" --resources "$scratch/resources.sh" --output "$1"; }
+
+no_jobs_left() { [[ -z "$(squeue --noheader)" ]]; }
+
+# Rows without their last column, the seconds.
+rows_of() { sed 's/,[^,]*$//' "$1"/registration/patient-*/registrations.csv; }
+payloads_of() { "$bin/af-inspect" --json "$1"/fields/*.af.h5 | grep payload_sha256; }
+
+undisturbed=$scratch/run-undisturbed disturbed=$scratch/run-disturbed
+submit "$undisturbed"
+wait_until 240 "the undisturbed chain" no_jobs_left
+[[ -s "$undisturbed/report.html" ]] || fail "no report.html after the undisturbed chain"
+
+# stop_job NAME PROGRESS: TERM to the batch script once PROGRESS exists.
+stop_job() {
+  local name=$1 progress=$2 job
+  wait_until 120 "$progress" test -e "$progress"
+  job=$(squeue --noheader --name "$name" --states RUNNING --format %A | head -n 1)
+  [[ -n "$job" ]] || fail "$name ended before it could be stopped"
+  scancel --signal=TERM --batch "$job"
+  wait_until 60 "the stop of $name" grep -q 'exit code 75' "$disturbed/logs/${name#af-}-0.log"
+}
+
+submit "$disturbed"
+stop_job af-precompute-1 "$disturbed/fields/patient-1-A.af.h5.progress/0000-000000.shard"
+stop_job af-evaluate "$disturbed/registration/patient-1.progress/patient-1.records"
+wait_until 300 "the disturbed chain" no_jobs_left
+[[ -s "$disturbed/report.html" ]] || fail "no report.html after the disturbed chain"
+for stage in precompute-1 evaluate; do
+  grep -q 'restart 1' "$disturbed/logs/$stage-0.log" || fail "$stage was not queued again"
+done
+[[ "$(payloads_of "$disturbed")" == "$(payloads_of "$undisturbed")" ]] || fail "the fields differ"
+[[ "$(rows_of "$disturbed")" == "$(rows_of "$undisturbed")" ]] || fail "the rows differ"
+
+# Run again, nothing is left to do.
+submit "$disturbed"
+wait_until 120 "the chain that was done before" no_jobs_left
+[[ "$(grep -l 'done before' "$disturbed"/logs/*.log | wc -l)" == 6 ]] || fail "something was done twice"
+say "chain_test: a stopped chain gave the same fields and rows as an undisturbed one"
