@@ -68,11 +68,12 @@ std::vector<RegistrationView> read_views(const Study& study,
     const CameraGeometry& camera = view.view.camera;
     view.xray = used_from(
         study_view.places, "xray", [&] { return read_xray_attenuation(study_view, camera); });
-    view.mask = mask_fiducials(
-        used_from(study_view.places, "mask", [&] { return read_mask(study_view, camera); }),
-        camera,
-        study_view.fiducials_px,
-        fiducial_mask_mm * pixels_per_mm(camera, study.rig.isocenter_point));
+    view.mask = used_from(study_view.places, "mask", [&] { return read_mask(study_view, camera); });
+    view.mask_without_markers =
+        mask_fiducials(view.mask,
+                       camera,
+                       study_view.fiducials_px,
+                       fiducial_mask_mm * pixels_per_mm(camera, study.rig.isocenter_point));
     input_sha256["xray " + study_view.camera] = sha256_of_file(study_view.xray.string());
     if (study_view.mask.has_value())
       input_sha256["mask " + study_view.camera] = sha256_of_file(study_view.mask->string());

@@ -85,12 +85,27 @@ std::shared_ptr<const DrrRenderer> stage_renderer(const RegistrationView& view, 
                     : view.coarse_levels[static_cast<std::size_t>(level) - 1].renderer;
 }
 
+/// Hiding markers must leave three quarters of so many pixels of a stage: coarse pixels of a small
+/// region may nearly all touch one.
+constexpr std::size_t kLeastPixelsToHideIn = 400;
+
+/// The X-ray of a stage with the markers hidden, if that leaves enough of it.
+SimilarityReference visible_reference(const RegistrationView& view, const StageGrid& grid) {
+  SimilarityReference plain = stage_reference(view.xray, view.mask, view.view, grid);
+  if (view.mask_without_markers.pixels.empty()) return plain;
+  SimilarityReference hidden =
+      stage_reference(view.xray, view.mask_without_markers, view.view, grid);
+  const auto used = static_cast<std::size_t>(std::count(hidden.used.begin(), hidden.used.end(), 1));
+  const std::size_t pixels = hidden.used.size();
+  return pixels >= kLeastPixelsToHideIn && 4 * used >= 3 * pixels ? hidden : plain;
+}
+
 ObjectiveView prepare_view(const RegistrationProblem& problem,
                            const RegistrationView& view,
                            const ValueRange& drr_range,
                            const StageOptions& stage) {
   const StageGrid grid = stage_grid(problem, view, stage);
-  SimilarityReference reference = stage_reference(view.xray, view.mask, view.view, grid);
+  SimilarityReference reference = visible_reference(view, grid);
   reference.drr_range = drr_range;
   std::vector<std::string> found = problems(reference);
   for (std::string& text : found) text.insert(0, view_name(view));

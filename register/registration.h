@@ -26,6 +26,9 @@ struct RegistrationView {
   View view;     ///< camera and region of interest
   Image2d xray;  ///< whole detector, attenuation domain (bright = attenuated)
   Image2d mask;  ///< whole detector, non-zero = used; empty: every pixel of the region
+  /// `mask` without the gold standard's markers; empty: the same. It counts in stages of 400 pixels
+  /// or more where it leaves three quarters of them.
+  Image2d mask_without_markers;
   std::shared_ptr<const DrrRenderer> renderer;
   std::vector<RendererLevel> coarse_levels;  ///< levels 1, 2, ... as far as stages need them
   std::optional<MotionLimit> limit;  ///< motion box of the renderer's field; none for ray casting
