@@ -196,14 +196,14 @@ register() {
 }
 
 # Measures and the optimisers that can use them: local ones that need only values in the paper's two passes, those that
-# need derivatives, bobyqa for comparison and the costly cma-es on the pyramid of `fast`. Pattern intensity and entropy
-# take seconds a registration.
+# need derivatives, bobyqa for comparison and the costly cma-es on the pyramid of `fast`. Pattern intensity
+# takes seconds a registration.
 screen_methods() {
   local similarity optimizer
   for similarity in ncc tncc gc rg ssd; do echo "fast:$similarity:gauss-newton"; done
   for similarity in mi nmi ncc gc rg ssd; do echo "fast:$similarity:gradient"; done
-  for similarity in pi entropy; do echo "paper:$similarity:best-neighbor"; done
-  for similarity in mi nmi ncc tncc gc rg ssd gd go; do
+  echo paper:pi:best-neighbor
+  for similarity in mi nmi ncc tncc gc rg ssd gd go entropy; do
     for optimizer in best-neighbor bobyqa nelder-mead; do echo "paper:$similarity:$optimizer"; done
     for optimizer in bobyqa cma-es; do echo "fast:$similarity:$optimizer"; done
   done
