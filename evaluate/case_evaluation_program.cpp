@@ -6,7 +6,6 @@
 #include <chrono>
 #include <cmath>
 #include <exception>
-#include <map>
 #include <span>
 #include <tuple>
 #include <utility>
@@ -20,7 +19,7 @@
 #include "evaluate/failure_trace_files.h"
 #include "evaluate/method_loading.h"
 #include "evaluate/row_gathering_program.h"
-#include "evaluate/target_box.h"
+#include "gold/target_box.h"
 #include "io/output_file.h"
 #include "io/picture.h"
 #include "io/sha256.h"
@@ -145,11 +144,18 @@ void register_with(Method& method,
                    const Communicator& world,
                    CaseProgress& progress,
                    std::vector<RegistrationRow>& rows) {
-  std::map<std::size_t, RegistrationRow> by_start;
+  const std::size_t first = rows.size();
+  if (world.is_root()) rows.resize(first + method.start_indices.size());
+  // Start indices ascend.
+  const auto row_at = [&](std::size_t index) -> RegistrationRow& {
+    const auto found =
+        std::lower_bound(method.start_indices.begin(), method.start_indices.end(), index);
+    return rows[first + static_cast<std::size_t>(found - method.start_indices.begin())];
+  };
   if (world.is_root())
     for (const std::size_t index : method.start_indices)
       if (const RegistrationRow* row = progress.find(method.renderer, index); row != nullptr)
-        by_start[index] = *row;
+        row_at(index) = *row;
   const std::vector<std::size_t> to_do = progress.unfinished(method.renderer, method.start_indices);
   std::size_t traced = 0;
   const auto registered = [&](std::int64_t item) -> json {
@@ -168,10 +174,9 @@ void register_with(Method& method,
                [&](std::int64_t item, const json& packed) {
                  if (packed.is_null()) return;
                  progress.append(packed);
-                 by_start[to_do[static_cast<std::size_t>(item)]] = row_of(packed);
+                 row_at(to_do[static_cast<std::size_t>(item)]) = row_of(packed);
                });
   progress.sync();
-  for (auto& [index, row] : by_start) rows.push_back(std::move(row));
 }
 
 double seconds_since(std::chrono::steady_clock::time_point start) {

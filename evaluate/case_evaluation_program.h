@@ -7,12 +7,12 @@
 #include <string>
 #include <vector>
 
-#include "evaluate/gold_standard_files.h"
 #include "evaluate/perturbed_starts.h"
 #include "evaluate/registration_command.h"
 #include "evaluate/registration_rows_files.h"
 #include "evaluate/start_pose_files.h"
 #include "evaluate/yardstick_files.h"
+#include "gold/gold_standard_files.h"
 #include "io/study_file.h"
 #include "parallel/communicator.h"
 #include "register/registration.h"

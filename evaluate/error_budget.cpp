@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "base/error.h"
-#include "evaluate/tre.h"
+#include "gold/tre.h"
 
 namespace af::evaluation {
 namespace {

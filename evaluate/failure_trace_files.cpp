@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "evaluate/tre.h"
+#include "gold/tre.h"
 
 namespace af::evaluation {
 

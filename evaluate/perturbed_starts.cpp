@@ -8,8 +8,8 @@
 
 #include "base/error.h"
 #include "base/hash_random.h"
-#include "evaluate/target_box.h"
-#include "evaluate/tre.h"
+#include "gold/target_box.h"
+#include "gold/tre.h"
 
 namespace af::evaluation {
 namespace {

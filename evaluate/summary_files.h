@@ -4,14 +4,10 @@
 
 #include <nlohmann/json.hpp>
 
-#include "evaluate/statistics.h"
+#include "base/sample_summary.h"
+#include "io/number_json.h"
 
 namespace af::evaluation {
-
-/// null for NaN, "inf" for infinity (which JSON lacks).
-nlohmann::json number_json(double value);
-/// The inverse; NaN for null.
-double number_of(const nlohmann::json& value);
 
 /// {count, mean, sd, min, p5, q1, median, q3, p95, max}.
 nlohmann::json to_json(const SampleSummary& summary);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "evaluate/yardstick_files.h"
 
-#include "evaluate/target_box.h"
-#include "evaluate/tre.h"
+#include "gold/target_box.h"
+#include "gold/tre.h"
 
 namespace af::evaluation {
 

@@ -5,9 +5,9 @@
 #include <optional>
 #include <vector>
 
-#include "evaluate/gold_standard_files.h"
 #include "evaluate/registration_rows_files.h"
 #include "geometry/camera_geometry.h"
+#include "gold/gold_standard_files.h"
 #include "io/study_file.h"
 
 namespace af::evaluation {

@@ -290,14 +290,7 @@ void ProgressFolder::forget_cached() const {
 }
 
 void ProgressFolder::sync() {
-  if (!file_.is_open()) return;
-  const std::filesystem::path path = path_of(shard_);
-  const int descriptor = ::open(path.c_str(), O_RDONLY);
-  const bool is_synced = descriptor >= 0 && ::fsync(descriptor) == 0;
-  const int reason = errno;
-  if (descriptor >= 0) ::close(descriptor);
-  if (!is_synced)
-    throw FileError(path.string(), std::string("cannot sync: ") + std::strerror(reason));
+  if (file_.is_open()) sync_path(path_of(shard_));
 }
 
 void ProgressFolder::remove() {

@@ -3,13 +3,12 @@
 
 #include <algorithm>
 
-#include "evaluate/target_box.h"
-#include "evaluate/tre.h"
+#include "gold/target_box.h"
+#include "gold/tre.h"
 
 namespace af::registration {
 
-std::optional<evaluation::GoldStandard> known_gold(const Study& study,
-                                                   const StudyCase& study_case) {
+std::optional<GoldStandard> known_gold(const Study& study, const StudyCase& study_case) {
   const auto views_with_fiducials =
       std::count_if(study_case.views.begin(), study_case.views.end(), [](const StudyView& view) {
         return !view.fiducials_px.empty();
@@ -17,19 +16,19 @@ std::optional<evaluation::GoldStandard> known_gold(const Study& study,
   if (!study_case.gold_room_from_ct.has_value() &&
       (study_case.fiducials_ct_mm.empty() || views_with_fiducials < 2))
     return std::nullopt;
-  return evaluation::gold_standard(study, study_case, "auto");
+  return gold_standard(study, study_case, "auto");
 }
 
-void add_target_errors(const std::optional<evaluation::GoldStandard>& gold,
+void add_target_errors(const std::optional<GoldStandard>& gold,
                        const CtBox& target_box_ct,
                        std::vector<RegistrationRecord>& records) {
   if (!gold.has_value()) return;
-  const std::vector<Eigen::Vector3d> points = evaluation::target_points(target_box_ct);
+  const std::vector<Eigen::Vector3d> points = target_points(target_box_ct);
   for (RegistrationRecord& record : records)
-    record.errors = TargetErrors{
-        gold->source,
-        evaluation::mean_tre_mm(record.result.start_room_from_ct, gold->room_from_ct, points),
-        evaluation::mean_tre_mm(record.result.room_from_ct, gold->room_from_ct, points)};
+    record.errors =
+        TargetErrors{gold->source,
+                     mean_tre_mm(record.result.start_room_from_ct, gold->room_from_ct, points),
+                     mean_tre_mm(record.result.room_from_ct, gold->room_from_ct, points)};
 }
 
 }  // namespace af::registration

@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "evaluate/gold_standard_files.h"
+#include "gold/gold_standard_files.h"
 #include "io/study_file.h"
 #include "register/result_files.h"
 
@@ -12,10 +12,10 @@ namespace af::registration {
 
 /// The case's gold pose as af-evaluate takes it (from its fiducials if two views show them, else
 /// the one the study states); nullopt when the study knows none.
-std::optional<evaluation::GoldStandard> known_gold(const Study& study, const StudyCase& study_case);
+std::optional<GoldStandard> known_gold(const Study& study, const StudyCase& study_case);
 
 /// Fills in every record's TRE: the mean over the target box.
-void add_target_errors(const std::optional<evaluation::GoldStandard>& gold,
+void add_target_errors(const std::optional<GoldStandard>& gold,
                        const CtBox& target_box_ct,
                        std::vector<RegistrationRecord>& records);
 

@@ -4,15 +4,14 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <fcntl.h>
 #include <numeric>
 #include <sstream>
-#include <unistd.h>
 #include <utility>
 
 #include "base/error.h"
 #include "io/field_file_access.h"
 #include "io/field_file_layout.h"
+#include "io/output_file.h"
 #include "io/sha256.h"
 #include "parallel/mpi_handle.h"
 
@@ -374,26 +373,6 @@ std::string verify_and_seal(const CompressedAttenuationField& field,
   return payload;
 }
 
-void sync_path(const std::filesystem::path& path, int flags) {
-  const int descriptor = ::open(path.c_str(), flags);
-  const bool is_synced = descriptor >= 0 && ::fsync(descriptor) == 0;
-  const int reason = errno;
-  if (descriptor >= 0) ::close(descriptor);
-  if (!is_synced)
-    throw FileError(path.string(), std::string("cannot sync: ") + std::strerror(reason));
-}
-
-void commit(const std::filesystem::path& partial, const std::filesystem::path& path) {
-  sync_path(partial, O_RDONLY);
-  std::error_code error;
-  std::filesystem::rename(partial, path, error);
-  if (error)
-    throw FileError(path.string(),
-                    "cannot rename from " + partial.string() + ": " + error.message());
-  const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
-  sync_path(folder, O_RDONLY | O_DIRECTORY);
-}
-
 void share(FieldFileInfo& info, const Communicator& communicator) {
   communicator.broadcast(info.payload_sha256);
   std::array<std::uint64_t, 1> bytes{communicator.is_root() ? info.file_bytes : 0};
@@ -576,7 +555,7 @@ FieldFileInfo write_field(const CompressedAttenuationField& field,
       if (!communicator.is_root()) return;
       info.payload_sha256 = naming_file(
           partial, [&] { return verify_and_seal(field, info.provenance, sums, partial); });
-      commit(partial, path);
+      move_into_place(partial, path);
       info.file_bytes = std::filesystem::file_size(path);
     });
   } catch (...) {

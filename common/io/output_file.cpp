@@ -68,12 +68,6 @@ class Descriptor {
   int number_;
 };
 
-void sync_path(const fs::path& path, int flags) {
-  Descriptor descriptor(path, flags);
-  descriptor.sync();
-  descriptor.close();
-}
-
 fs::path folder_of(const fs::path& path) {
   return path.has_parent_path() ? path.parent_path() : fs::path(".");
 }
@@ -109,10 +103,7 @@ void write_and_rename(const fs::path& path,
   std::error_code ignored;
   if (!fs::is_regular_file(partial, ignored))
     throw FileError(path.string(), "its writer made no file");
-  sync_path(partial, O_RDONLY);
-  if (rename(partial.c_str(), path.c_str()) != 0)
-    throw FileError(path.string(), because("cannot be renamed from its partial file", errno));
-  sync_path(folder_of(path), O_RDONLY | O_DIRECTORY);
+  move_into_place(partial, path);
 }
 
 /// write_atomically() of what `write` writes.
@@ -156,6 +147,19 @@ void write_text_in_parts(const std::filesystem::path& path,
   write_new_file(path, [&](const Descriptor& file) {
     for (std::string part = next_part(); !part.empty(); part = next_part()) file.write(part);
   });
+}
+
+void sync_path(const fs::path& path) {
+  Descriptor descriptor(path, O_RDONLY);
+  descriptor.sync();
+  descriptor.close();
+}
+
+void move_into_place(const fs::path& partial, const fs::path& path) {
+  sync_path(partial);
+  if (rename(partial.c_str(), path.c_str()) != 0)
+    throw FileError(path.string(), because("cannot be renamed from " + partial.string(), errno));
+  sync_path(folder_of(path));
 }
 
 std::string read_text_file(const std::filesystem::path& path, std::size_t max_bytes) {

@@ -23,6 +23,13 @@ void write_text_file(const std::filesystem::path& path, std::string_view text);
 void write_text_in_parts(const std::filesystem::path& path,
                          const std::function<std::string()>& next_part);
 
+/// Makes sure that what was written to a file or folder survives the machine (fsync). FileError
+/// when it cannot.
+void sync_path(const std::filesystem::path& path);
+
+/// Syncs a complete file and gives it its name, in one step. FileError when it cannot.
+void move_into_place(const std::filesystem::path& partial, const std::filesystem::path& path);
+
 /// The whole file as text; FileError when unreadable or larger than `max_bytes`.
 std::string read_text_file(const std::filesystem::path& path, std::size_t max_bytes = 256u << 20);
 

@@ -4,10 +4,8 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
-#include <fcntl.h>
 #include <nlohmann/json.hpp>
 #include <system_error>
-#include <unistd.h>
 #include <vector>
 
 #include "base/crc32c.h"
@@ -116,13 +114,7 @@ void ProgressJournal::append(std::span<const std::byte> record) {
 }
 
 void ProgressJournal::sync() {
-  if (!file_.is_open()) return;
-  const int descriptor = ::open(records_path().c_str(), O_RDONLY);
-  const bool is_synced = descriptor >= 0 && ::fsync(descriptor) == 0;
-  const int reason = errno;
-  if (descriptor >= 0) ::close(descriptor);
-  if (!is_synced)
-    throw FileError(records_path().string(), std::string("cannot sync: ") + std::strerror(reason));
+  if (file_.is_open()) sync_path(records_path());
 }
 
 void ProgressJournal::remove() {

@@ -104,7 +104,7 @@ void add_fiducials(const SimulateOptions& options,
   simulated.fiducials = place_fiducials(ct, study_case.center_ct_mm);
   for (const SteelCylinder& pin : simulated.fiducials)
     study_case.fiducials_ct_mm.push_back(pin.center_point);
-  std::vector<evaluation::FiducialView> views;
+  std::vector<FiducialView> views;
   for (std::size_t i = 0; i < rig.cameras.size(); ++i) {
     const CameraGeometry& camera = simulated.true_rig.cameras[i];
     const auto detected = [&](double sigma_px) {
@@ -122,7 +122,7 @@ void add_fiducials(const SimulateOptions& options,
     views.push_back({rig.cameras[i], study_case.views[i].fiducials_px});
   }
   if (views.size() >= 2)
-    simulated.fiducial_gold = evaluation::gold_from_fiducials(views, study_case.fiducials_ct_mm);
+    simulated.fiducial_gold = gold_from_fiducials(views, study_case.fiducials_ct_mm);
 }
 
 /// The cameras as they truly stand.

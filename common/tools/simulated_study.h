@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "base/progress.h"
-#include "evaluate/fiducial_registration.h"
+#include "gold/fiducial_registration.h"
 #include "io/provenance.h"
 #include "io/study_file.h"
 #include "simulation/xray_simulator.h"
@@ -23,7 +23,7 @@ struct SimulatedCase {
   std::vector<SteelCylinder> fiducials;
   SteelBodies occluders;  ///< in the X-rays only, besides the fiducials
   std::vector<std::vector<Eigen::Vector2d>> exact_fiducials_px;  ///< per view, without noise
-  std::optional<evaluation::FiducialGold> fiducial_gold;
+  std::optional<FiducialGold> fiducial_gold;
 };
 
 /// Chooses target, regions, true pose, true cameras, fiducials and occluders. Throws InputError

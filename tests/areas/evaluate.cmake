@@ -1,10 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 af_add_test(
   evaluate_test
-  SOURCES unit/evaluate/fiducial_registration_test.cpp
-          unit/evaluate/gold_uncertainty_test.cpp
-          unit/evaluate/tre_test.cpp
-          unit/evaluate/perturbed_starts_test.cpp
+  SOURCES unit/evaluate/perturbed_starts_test.cpp
           unit/evaluate/success_rate_test.cpp
           unit/evaluate/statistics_test.cpp
           unit/evaluate/signed_rank_test_test.cpp

@@ -19,7 +19,7 @@ af_add_test(
 af_add_test(
   af_simulate_test
   SOURCES unit/simulation/af_simulate_test.cpp
-  LIBS af_simulation af_evaluation af_io_ct
+  LIBS af_simulation af_gold af_io_ct
   TIMEOUT 300)
 target_compile_definitions(af_simulate_test PRIVATE AF_SIMULATE_PROGRAM="$<TARGET_FILE:af-simulate>")
 add_dependencies(af_simulate_test af-simulate)

@@ -11,8 +11,8 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
-#include "evaluate/target_box.h"
-#include "evaluate/tre.h"
+#include "gold/target_box.h"
+#include "gold/tre.h"
 
 namespace af::evaluation {
 namespace {

@@ -9,7 +9,7 @@
 
 #include <gtest/gtest.h>
 
-#include "evaluate/fiducial_registration.h"
+#include "gold/fiducial_registration.h"
 #include "io/ct_reader.h"
 #include "io/image_file.h"
 #include "io/output_file.h"
@@ -76,10 +76,10 @@ TEST_F(AfSimulate, TruthIsWithinTheStatedRangeAndTheFiducialsFindIt) {
     largest = std::max(largest, std::abs(offset[i]));
   }
   EXPECT_GT(largest, 0.1);
-  std::vector<evaluation::FiducialView> views;
+  std::vector<FiducialView> views;
   for (const StudyView& view : patient.views)
     views.push_back({study.rig.camera(view.camera), view.fiducials_px});
-  const auto fitted = evaluation::gold_from_fiducials(views, patient.fiducials_ct_mm);
+  const auto fitted = gold_from_fiducials(views, patient.fiducials_ct_mm);
   // 0.2 px are 0.058 mm at the isocentre; four pins average to about half of that per axis, and
   // five standard errors stay below 0.25 mm.
   EXPECT_LT((fitted.room_from_ct * patient.center_ct_mm - gold * patient.center_ct_mm).norm(),

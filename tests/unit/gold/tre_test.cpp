@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "evaluate/tre.h"
+#include "gold/tre.h"
 
 #include <array>
 #include <cmath>
@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
-#include "evaluate/target_box.h"
+#include "gold/target_box.h"
 
 namespace af::evaluation {
 namespace {

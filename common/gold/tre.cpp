@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "evaluate/tre.h"
+#include "gold/tre.h"
 
 #include "base/error.h"
 
-namespace af::evaluation {
+namespace af {
 
 double mean_tre_mm(const RigidTransform& room_from_ct,
                    const RigidTransform& gold_room_from_ct,
@@ -18,4 +18,4 @@ double mean_tre_mm(const RigidTransform& room_from_ct,
   return sum_mm / static_cast<double>(points_ct_mm.size());
 }
 
-}  // namespace af::evaluation
+}  // namespace af

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Leave-one-out errors and the gold standard's own uncertainty against hand-computed and simulated
 // answers.
-#include "evaluate/gold_uncertainty.h"
+#include "gold/gold_uncertainty.h"
 
 #include <cmath>
 
@@ -10,9 +10,9 @@
 
 #include "base/error.h"
 #include "base/hash_random.h"
-#include "evaluate/target_box.h"
-#include "evaluate/tre.h"
-#include "unit/evaluate/camera_at.h"
+#include "gold/target_box.h"
+#include "gold/tre.h"
+#include "unit/gold/camera_at.h"
 
 namespace af::evaluation {
 namespace {

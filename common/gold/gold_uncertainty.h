@@ -5,9 +5,9 @@
 #include <cstdint>
 #include <span>
 
-#include "evaluate/fiducial_registration.h"
+#include "gold/fiducial_registration.h"
 
-namespace af::evaluation {
+namespace af {
 
 /// How far the fiducials' gold pose may itself lie from the true pose, as a TRE over the target.
 struct GoldUncertainty {
@@ -39,4 +39,4 @@ GoldUncertainty gold_uncertainty(const FiducialGold& gold,
                                  std::uint64_t seed,
                                  std::size_t replicates = kGoldReplicates);
 
-}  // namespace af::evaluation
+}  // namespace af

@@ -6,7 +6,7 @@
 
 #include "geometry/slab_sizing.h"
 
-namespace af::evaluation {
+namespace af {
 
 inline constexpr double kTargetPointSpacingMm = 2.0;
 
@@ -21,4 +21,4 @@ std::vector<Eigen::Vector3d> target_points(const CtBox& box,
 /// rotation about that point into a distance.
 double rms_radius_mm(const CtBox& box, const Eigen::Vector3d& center_ct_mm);
 
-}  // namespace af::evaluation
+}  // namespace af

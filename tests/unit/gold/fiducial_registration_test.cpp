@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "evaluate/fiducial_registration.h"
+#include "gold/fiducial_registration.h"
 
 #include <cmath>
 
@@ -7,7 +7,7 @@
 
 #include "base/error.h"
 #include "base/hash_random.h"
-#include "unit/evaluate/camera_at.h"
+#include "unit/gold/camera_at.h"
 
 namespace af::evaluation {
 namespace {

@@ -5,11 +5,11 @@
 #include <optional>
 #include <string>
 
-#include "evaluate/fiducial_registration.h"
-#include "evaluate/gold_uncertainty.h"
+#include "gold/fiducial_registration.h"
+#include "gold/gold_uncertainty.h"
 #include "io/study_file.h"
 
-namespace af::evaluation {
+namespace af {
 
 /// What a case's registrations are measured against.
 struct GoldStandard {
@@ -36,4 +36,4 @@ double own_tre_mm(const GoldStandard& gold);
 /// the target, distance between both golds.
 nlohmann::json to_json(const GoldStandard& gold);
 
-}  // namespace af::evaluation
+}  // namespace af

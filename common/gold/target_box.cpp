@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "evaluate/target_box.h"
+#include "gold/target_box.h"
 
 #include <array>
 #include <cmath>
@@ -7,7 +7,7 @@
 
 #include "base/error.h"
 
-namespace af::evaluation {
+namespace af {
 
 std::vector<Eigen::Vector3d> target_points(const CtBox& box, double max_spacing_mm) {
   check(max_spacing_mm > 0.0, "the spacing of target points is positive");
@@ -36,4 +36,4 @@ double rms_radius_mm(const CtBox& box, const Eigen::Vector3d& center_ct_mm) {
   return std::sqrt(offset.squaredNorm() + (box.high_mm - box.low_mm).squaredNorm() / 12.0);
 }
 
-}  // namespace af::evaluation
+}  // namespace af

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "evaluate/gold_standard_files.h"
+#include "gold/gold_standard_files.h"
 
 #include <cmath>
 #include <limits>
 
 #include "base/error.h"
-#include "evaluate/summary_files.h"
-#include "evaluate/target_box.h"
-#include "evaluate/tre.h"
+#include "gold/target_box.h"
+#include "gold/tre.h"
+#include "io/number_json.h"
 
-namespace af::evaluation {
+namespace af {
 
 using nlohmann::json;
 
@@ -104,4 +104,4 @@ json to_json(const GoldStandard& gold) {
   return result;
 }
 
-}  // namespace af::evaluation
+}  // namespace af

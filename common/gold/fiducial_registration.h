@@ -7,7 +7,7 @@
 #include "geometry/camera_geometry.h"
 #include "geometry/rigid_transform.h"
 
-namespace af::evaluation {
+namespace af {
 
 /// A fiducial's position from two or more views.
 struct BackProjection {
@@ -61,4 +61,4 @@ std::vector<double> leave_one_out_errors_mm(std::span<const Eigen::Vector3d> tar
 FiducialGold gold_from_fiducials(std::span<const FiducialView> views,
                                  std::span<const Eigen::Vector3d> fiducials_ct_mm);
 
-}  // namespace af::evaluation
+}  // namespace af

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "evaluate/fiducial_registration.h"
+#include "gold/fiducial_registration.h"
 
 #include <cmath>
 #include <cstddef>
@@ -10,7 +10,7 @@
 
 #include "base/error.h"
 
-namespace af::evaluation {
+namespace af {
 namespace {
 
 using Eigen::Matrix3d;
@@ -158,4 +158,4 @@ FiducialGold gold_from_fiducials(std::span<const FiducialView> views,
   return gold;
 }
 
-}  // namespace af::evaluation
+}  // namespace af

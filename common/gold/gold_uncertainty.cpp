@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "evaluate/gold_uncertainty.h"
+#include "gold/gold_uncertainty.h"
 
 #include <cmath>
 #include <limits>
@@ -7,11 +7,11 @@
 
 #include "base/error.h"
 #include "base/hash_random.h"
-#include "evaluate/statistics.h"
-#include "evaluate/tre.h"
+#include "base/sample_summary.h"
 #include "geometry/point_projector.h"
+#include "gold/tre.h"
 
-namespace af::evaluation {
+namespace af {
 namespace {
 
 using Eigen::Vector3d;
@@ -97,4 +97,4 @@ GoldUncertainty gold_uncertainty(const FiducialGold& gold,
   return result;
 }
 
-}  // namespace af::evaluation
+}  // namespace af
