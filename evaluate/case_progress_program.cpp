@@ -43,8 +43,7 @@ CaseProgress::CaseProgress(const std::filesystem::path& folder,
     if (!communicator_.is_root()) return;
     journal_ = std::make_unique<ProgressJournal>(folder, case_name, decides, restart);
     journal_->visit_finished([&](std::span<const std::byte> record) {
-      const auto* const first = reinterpret_cast<const std::uint8_t*>(record.data());
-      RegistrationRow row = row_of(json::from_cbor(first, first + record.size()));
+      RegistrationRow row = row_of_record(record, folder.string());
       finished_[{row.renderer, static_cast<std::size_t>(row.start_index)}] = std::move(row);
     });
   });

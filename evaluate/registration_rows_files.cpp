@@ -4,7 +4,11 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <stdexcept>
 #include <utility>
+
+#include "base/error.h"
+#include "io/cbor_json.h"
 
 namespace af::evaluation {
 
@@ -31,15 +35,26 @@ json packed_trace(const std::vector<TracePoint>& trace) {
   return packed;
 }
 
+/// What get() does not look at: that a number is whole and fits.
+template <typename Integer>
+Integer integer_of(const json& value) {
+  const bool fits =
+      value.is_number_unsigned()
+          ? std::in_range<Integer>(value.get<std::uint64_t>())
+          : value.is_number_integer() && std::in_range<Integer>(value.get<std::int64_t>());
+  if (!fits) throw std::runtime_error("a whole number is not one, or too large");
+  return value.get<Integer>();
+}
+
 std::vector<TracePoint> trace_of(const json& packed) {
   std::vector<TracePoint> trace;
   for (const json& point : packed)
-    trace.push_back({point[0].get<int>(),
-                     point[1].get<double>(),
-                     point[2].get<std::int64_t>(),
-                     point[3].get<double>(),
-                     point[4].get<std::array<double, 6>>(),
-                     point[5].get<double>()});
+    trace.push_back({integer_of<int>(point.at(0)),
+                     point.at(1).get<double>(),
+                     integer_of<std::int64_t>(point.at(2)),
+                     point.at(3).get<double>(),
+                     point.at(4).get<std::array<double, 6>>(),
+                     point.at(5).get<double>()});
   return trace;
 }
 
@@ -89,28 +104,36 @@ json packed_row(std::int64_t order, const RegistrationRow& row) {
 
 RegistrationRow row_of(const json& packed) {
   RegistrationRow row;
-  row.case_name = packed[1].get<std::string>();
-  row.renderer = packed[2].get<std::string>();
-  row.start_index = packed[3].get<std::int64_t>();
-  row.draw_index = packed[4].get<std::uint64_t>();
-  row.interval = packed[5].get<int>();
-  row.start_deg_mm = packed[6].get<std::array<double, 6>>();
-  row.final_deg_mm = packed[7].get<std::array<double, 6>>();
-  const auto values = packed[8].get<std::array<double, 5>>();
+  row.case_name = packed.at(1).get<std::string>();
+  row.renderer = packed.at(2).get<std::string>();
+  row.start_index = integer_of<std::int64_t>(packed.at(3));
+  row.draw_index = integer_of<std::uint64_t>(packed.at(4));
+  row.interval = integer_of<int>(packed.at(5));
+  row.start_deg_mm = packed.at(6).get<std::array<double, 6>>();
+  row.final_deg_mm = packed.at(7).get<std::array<double, 6>>();
+  const auto values = packed.at(8).get<std::array<double, 5>>();
   row.initial_tre_mm = values[0];
   row.tre_mm = values[1];
   row.stated_pose_tre_mm = values[2];
   row.similarity = values[3];
   row.seconds = values[4];
-  row.errors = RegistrationErrors::of_values(packed[9].get<std::array<double, 5>>());
-  const auto counts = packed[10].get<std::array<std::int64_t, 3>>();
-  row.evaluations = counts[0];
-  row.inadmissible = counts[1];
-  row.drr_count = counts[2];
-  row.stop_reason = packed[11].get<std::string>();
-  row.error = packed[12].get<std::string>();
-  row.trace = trace_of(packed[13]);
+  row.errors = RegistrationErrors::of_values(packed.at(9).get<std::array<double, 5>>());
+  row.evaluations = integer_of<std::int64_t>(packed.at(10).at(0));
+  row.inadmissible = integer_of<std::int64_t>(packed.at(10).at(1));
+  row.drr_count = integer_of<std::int64_t>(packed.at(10).at(2));
+  row.stop_reason = packed.at(11).get<std::string>();
+  row.error = packed.at(12).get<std::string>();
+  row.trace = trace_of(packed.at(13));
   return row;
+}
+
+RegistrationRow row_of_record(std::span<const std::byte> record, const std::string& file) {
+  const json packed = json_of_cbor(record, file);
+  try {
+    return row_of(packed);
+  } catch (const std::exception& error) {
+    throw FileError(file, std::string("a record is no row: ") + error.what());
+  }
 }
 
 CsvTable registrations_table(const std::vector<RegistrationRow>& rows) {

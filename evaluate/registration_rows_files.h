@@ -2,10 +2,12 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -57,6 +59,8 @@ struct RegistrationRow {
 /// A row to be sent between ranks, and back; element 0 is `order`.
 nlohmann::json packed_row(std::int64_t order, const RegistrationRow& row);
 RegistrationRow row_of(const nlohmann::json& packed);
+/// The same from a record of a file, in CBOR; FileError naming `file` when it holds no row.
+RegistrationRow row_of_record(std::span<const std::byte> record, const std::string& file);
 
 /// registrations.csv with the contract's columns, in the given order; timings last.
 CsvTable registrations_table(const std::vector<RegistrationRow>& rows);

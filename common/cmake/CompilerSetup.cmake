@@ -21,6 +21,17 @@ if(AF_SANITIZE)
   add_link_options(${af_sanitize_flags})
 endif()
 
+# Fuzzers: every library is watched by libFuzzer and the sanitizers; the fuzzers' main is linked in tests/fuzz. Clang does
+# not know all of GCC's warnings, and GCC's have the word.
+if(AF_BUILD_FUZZERS)
+  if(NOT CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
+    message(FATAL_ERROR "AF_BUILD_FUZZERS needs Clang: cmake --preset fuzz")
+  endif()
+  add_compile_options(-fsanitize=fuzzer-no-link,address,undefined -fno-sanitize-recover=undefined
+                      -fno-omit-frame-pointer -w "SHELL:-include ${PROJECT_SOURCE_DIR}/tests/checks/itk_for_clang.h")
+  add_link_options(-fsanitize=address,undefined)
+endif()
+
 # af_add_library(<name> SOURCES ... [PUBLIC libs...] [PRIVATE libs...])
 function(af_add_library name)
   cmake_parse_arguments(arg "" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})

@@ -14,6 +14,8 @@ namespace af {
 
 namespace {
 
+constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+
 struct Record {
   std::vector<std::string> fields;
   std::size_t line = 0;  ///< where it begins, from 1
@@ -23,7 +25,6 @@ struct Record {
 class CsvParser {
  public:
   CsvParser(std::string_view text, const std::string& path) : text_(text), path_(path) {
-    constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
     if (text_.starts_with(kByteOrderMark)) text_.remove_prefix(kByteOrderMark.size());
     if (const std::size_t nul = text_.find('\0'); nul != std::string_view::npos)
       throw FileError(path_, "is not text: it has a zero byte at offset " + std::to_string(nul));
@@ -92,7 +93,8 @@ class CsvParser {
 };
 
 std::string quoted_if_needed(const std::string& field) {
-  if (field.find_first_of(",\"\r\n") == std::string::npos) return field;
+  if (field.find_first_of(",\"\r\n") == std::string::npos && !field.starts_with(kByteOrderMark))
+    return field;
   std::string quoted = "\"";
   for (const char character : field) {
     if (character == '"') quoted.push_back('"');

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/field_file_access.h"
 
+#include <array>
+#include <span>
+
 #include "base/error.h"
 #include "io/sha256.h"
 
@@ -13,6 +16,8 @@ using field_layout::ElementType;
 namespace {
 
 constexpr std::size_t kMaxAttributeBytes = 1u << 20;
+/// Of a chunk, which HDF5 holds whole; ours have 8192.
+constexpr std::uint64_t kMaxChunkElements = 1u << 20;
 
 /// The innermost message of HDF5's error stack: the true reason.
 herr_t keep_first(unsigned position, const H5E_error2_t* error, void* text) {
@@ -79,6 +84,49 @@ bool is_type_of(hid_t type, const DatasetRule& rule) {
     return H5Tget_class(type) == H5T_STRING && H5Tis_variable_str(type) == 0;
   const Handle expected = file_type(rule);
   return checked(H5Tequal(type, expected), "H5Tequal") > 0;
+}
+
+/// Every part of an object's path must be an object of this file: links may lead to other files.
+void check_is_of_this_file(hid_t file, const DatasetRule& rule, const std::string& path) {
+  for (std::size_t end = rule.name.find('/', 1);; end = rule.name.find('/', end + 1)) {
+    const std::string part = rule.name.substr(0, end);
+    H5L_info_t link;
+    checked(H5Lget_info(file, part.c_str(), &link, H5P_DEFAULT), "H5Lget_info");
+    if (link.type != H5L_TYPE_HARD) throw FileError(path, part, "an object of this file", "a link");
+    if (end == std::string::npos) return;
+  }
+}
+
+/// Contents of this file itself, in pieces that fit in memory, by filters that HDF5 has built in:
+/// not those of another file (external, virtual), and nothing that loads a plug-in.
+void check_storage(hid_t dataset, const DatasetRule& rule, const std::string& path) {
+  const Handle creation(H5Dget_create_plist(dataset), H5Pclose, "H5Dget_create_plist");
+  const H5D_layout_t layout = H5Pget_layout(creation);
+  if (layout == H5D_VIRTUAL || (layout == H5D_CONTIGUOUS && H5Pget_external_count(creation) != 0))
+    throw FileError(path, rule.name, "contents of this file", "those of another");
+  const int filters = checked(H5Pget_nfilters(creation), "H5Pget_nfilters");
+  for (int i = 0; i < filters; ++i) {
+    unsigned flags = 0;
+    std::size_t parameters = 0;
+    const H5Z_filter_t filter = H5Pget_filter2(
+        creation, static_cast<unsigned>(i), &flags, &parameters, nullptr, 0, nullptr, nullptr);
+    if (filter != H5Z_FILTER_DEFLATE && filter != H5Z_FILTER_SHUFFLE &&
+        filter != H5Z_FILTER_FLETCHER32)
+      throw FileError(
+          path, rule.name, "filters deflate, shuffle, fletcher32", std::to_string(filter));
+  }
+  if (layout != H5D_CHUNKED) return;
+  std::array<hsize_t, H5S_MAX_RANK> chunk{};
+  const int rank = checked(H5Pget_chunk(creation, H5S_MAX_RANK, chunk.data()), "H5Pget_chunk");
+  std::uint64_t elements = 1;
+  for (const hsize_t extent : std::span(chunk).first(static_cast<std::size_t>(rank))) {
+    if (extent < 1 || extent > kMaxChunkElements / elements)
+      throw FileError(path,
+                      rule.name,
+                      "chunks of at most " + std::to_string(kMaxChunkElements) + " elements",
+                      "larger ones");
+    elements *= extent;
+  }
 }
 
 bool fits(const std::vector<std::uint64_t>& found, const DatasetRule& rule) {
@@ -208,7 +256,9 @@ Handle open_dataset(hid_t file,
                     const DatasetRule& rule,
                     const std::string& path,
                     std::vector<std::uint64_t>& found) {
+  check_is_of_this_file(file, rule, path);
   Handle dataset(H5Dopen2(file, rule.name.c_str(), H5P_DEFAULT), H5Dclose, "H5Dopen2");
+  check_storage(dataset, rule, path);
   const Handle type(H5Dget_type(dataset), H5Tclose, "H5Dget_type");
   if (!is_type_of(type, rule))
     throw FileError(

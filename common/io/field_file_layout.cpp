@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
+#include "base/file_name.h"
 
 namespace af::field_layout {
 
@@ -267,6 +268,8 @@ std::vector<std::string> header_problems(const CompressedAttenuationField& field
   };
   append(problems(field.identity.camera));
   append(problems(field.identity.range));
+  if (!is_plain_file_name(field.identity.camera.name))
+    found.emplace_back("camera_name: must be usable in a file name");
   append(rigidity_problems(field.light_slab.slab_from_ct.matrix()));
   append(rigidity_problems(field.identity.frame.nominal_room_from_ct().matrix()));
   append_axis_problems("u", field.light_slab.u, found);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/image_text_header.h"
 
+#include <algorithm>
 #include <cctype>
 #include <charconv>
 #include <sstream>
@@ -74,7 +75,10 @@ std::int64_t checked_dimension(const TextHeader& header, const std::string& key)
 
 std::filesystem::path beside(const std::filesystem::path& header_path, const std::string& name) {
   const std::filesystem::path data(name);
-  return data.is_absolute() ? data : header_path.parent_path() / data;
+  if (data.is_absolute() || std::find(data.begin(), data.end(), "..") != data.end())
+    throw FileError(header_path.string(),
+                    "its voxel file '" + name + "' must stand beside it or in a folder below");
+  return header_path.parent_path() / data;
 }
 
 }  // namespace af::image_formats

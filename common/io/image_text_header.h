@@ -41,7 +41,8 @@ std::vector<std::uint64_t> parse_sizes(const std::string& path,
 /// The number of axes under `key`, 1 to 10.
 std::int64_t checked_dimension(const TextHeader& header, const std::string& key);
 
-/// The voxel file that a header names, relative to the header.
+/// The voxel file that a header names, relative to the header. FileError when that leads out of the
+/// header's folder: an image from elsewhere must not show the content of the reader's other files.
 std::filesystem::path beside(const std::filesystem::path& header_path, const std::string& name);
 
 }  // namespace af::image_formats

@@ -10,6 +10,7 @@
 #include <Eigen/Geometry>
 
 #include "base/error.h"
+#include "base/file_name.h"
 #include "io/output_file.h"
 #include "io/toml_reader.h"
 
@@ -105,11 +106,10 @@ bool note_geometry_problems(const CameraGeometry& camera,
 
 /// Camera names become parts of options (--field NAME=PATH) and of file names.
 void check_camera_name(const std::string& name, TomlTableReader& reader) {
-  const bool has_bad_character = std::any_of(name.begin(), name.end(), [](char character) {
-    return static_cast<unsigned char>(character) < ' ' || character == '/' || character == '=';
-  });
-  if (has_bad_character || name == "." || name == ".." || name.front() == '-')
-    reader.add_problem("name", "must be usable in a file name: no '/', '=' or control characters");
+  if (!is_plain_file_name(name) || name.find('=') != std::string::npos || name.front() == '-')
+    reader.add_problem("name",
+                       "must be usable in a file name: at most 100 bytes, no '/', '=' or control "
+                       "characters, no '-' in front");
 }
 
 std::optional<CameraGeometry> camera_from_matrix(TomlTableReader& reader,

@@ -7,6 +7,7 @@
 #include <Eigen/Dense>
 
 #include "base/error.h"
+#include "base/file_name.h"
 #include "io/rig_file.h"
 #include "io/toml_reader.h"
 
@@ -157,11 +158,9 @@ StudyView read_view(const toml::table& table,
 
 /// Case names become parts of file names.
 void check_case_name(TomlTableReader& reader, const std::string& name) {
-  const bool has_bad_character = std::any_of(name.begin(), name.end(), [](char character) {
-    return static_cast<unsigned char>(character) < ' ' || character == '/';
-  });
-  if (has_bad_character || name == "." || name == "..")
-    reader.add_problem("name", "must be usable as a file name: no '/' or control characters");
+  if (!name.empty() && !is_plain_file_name(name))
+    reader.add_problem(
+        "name", "must be usable as a file name: at most 100 bytes, no '/' or control characters");
 }
 
 void read_views(TomlTableReader& reader,

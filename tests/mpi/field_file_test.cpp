@@ -347,6 +347,73 @@ TEST(FieldFile, RefusesAnotherTypeOrExtent) {
   }
 }
 
+/// A field whose `name` was replaced by what `make` creates.
+std::string refusal_with(const std::filesystem::path& path,
+                         const std::string& name,
+                         const std::function<void(hid_t file, const char* name)>& make) {
+  write(small_field(), path);
+  edit_file(path, [&](hid_t file) {
+    H5Ldelete(file, name.c_str(), H5P_DEFAULT);
+    make(file, name.c_str());
+  });
+  return refusal(path);
+}
+
+TEST(FieldFile, RefusesLinks) {
+  const SharedFolder folder;
+  write(small_field(), folder / "other.af.h5");
+  for (const char* name : {"/geometry/uv_nodes", "/identity", "/field/slab_1"}) {
+    std::string message =
+        refusal_with(folder / "a.af.h5", name, [](hid_t file, const char* to_make) {
+          H5Lcreate_external("other.af.h5", to_make, file, to_make, H5P_DEFAULT, H5P_DEFAULT);
+        });
+    EXPECT_NE(message.find("found a link"), std::string::npos) << message;
+    message = refusal_with(folder / "a.af.h5", name, [](hid_t file, const char* to_make) {
+      H5Lcreate_soft("/codebook", file, to_make, H5P_DEFAULT, H5P_DEFAULT);
+    });
+    EXPECT_NE(message.find("found a link"), std::string::npos) << message;
+  }
+}
+
+TEST(FieldFile, RefusesContentsElsewhereHugeChunksAndFiltersOfPlugIns) {
+  const SharedFolder folder;
+  const auto refusal_of = [&](const std::function<void(hid_t creation, hid_t space)>& set) {
+    return refusal_with(
+        folder / "a.af.h5", "/geometry/uv_nodes", [&](hid_t file, const char* name) {
+          const std::array<hsize_t, 1> extents = {2};
+          const hdf5::Handle space(
+              H5Screate_simple(1, extents.data(), nullptr), H5Sclose, "H5Screate_simple");
+          const hdf5::Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose, "H5Pcreate");
+          set(creation, space);
+          const hdf5::Handle dataset(
+              H5Dcreate2(file, name, H5T_STD_I32LE, space, H5P_DEFAULT, creation, H5P_DEFAULT),
+              H5Dclose,
+              "H5Dcreate2");
+        });
+  };
+  const std::string external = refusal_of(
+      [](hid_t creation, hid_t) { H5Pset_external(creation, "/etc/hostname", 0, H5F_UNLIMITED); });
+  EXPECT_NE(external.find("those of another"), std::string::npos) << external;
+  const std::string mapped = refusal_of([](hid_t creation, hid_t space) {
+    H5Pset_virtual(creation, space, "other.af.h5", "/geometry/uv_nodes", space);
+  });
+  EXPECT_NE(mapped.find("those of another"), std::string::npos) << mapped;
+  const std::string filtered = refusal_of([](hid_t creation, hid_t) {
+    const std::array<hsize_t, 1> chunk = {2};
+    H5Pset_chunk(creation, 1, chunk.data());
+    H5Pset_nbit(creation);
+  });
+  EXPECT_NE(filtered.find("filters deflate"), std::string::npos) << filtered;
+}
+
+TEST(FieldFile, RefusesACameraNameThatIsAPath) {
+  const SharedFolder folder;
+  CompressedAttenuationField field = small_field();
+  field.identity.camera.name = "../AP";
+  write(field, folder / "a.af.h5");
+  EXPECT_NE(refusal(folder / "a.af.h5").find("camera_name"), std::string::npos);
+}
+
 TEST(FieldFile, RefusesAChangedValueWhoseOwnHashWasMended) {
   const SharedFolder folder;
   CompressedAttenuationField other = small_field();

@@ -62,6 +62,27 @@ TEST(RegistrationRows, TravelWithEveryBit) {
   EXPECT_EQ(received.seconds, sent.seconds);
 }
 
+TEST(RegistrationRows, ARecordThatIsNoRowIsAFileError) {
+  const auto refusal = [](const json& value) {
+    const auto bytes = json::to_cbor(value);
+    try {
+      row_of_record(std::as_bytes(std::span(bytes)), "skull.records");
+    } catch (const FileError& error) {
+      return std::string(error.what());
+    }
+    return std::string("was read");
+  };
+  const json good = packed_row(3, row("field", 7, 3.3, 1.0));
+  EXPECT_EQ(refusal(good), "was read");
+  EXPECT_THAT(refusal(json::array({1, "skull"})), testing::HasSubstr("skull.records"));
+  EXPECT_THAT(refusal("text"), testing::HasSubstr("no row"));
+  for (const json& start : std::initializer_list<json>{"7", 7.5, 1e300, 0xFFFFFFFFFFFFFFF0u}) {
+    json wrong = good;
+    wrong[3] = start;
+    EXPECT_THAT(refusal(wrong), testing::HasSubstr("no row")) << start;
+  }
+}
+
 TEST(RegistrationRows, TableHasTheContractsColumnsWithTimingsLast) {
   const CsvTable table = registrations_table({row("field", 0, 1.5, 0.3)});
   const std::vector<std::string> first(table.columns().begin(), table.columns().begin() + 20);

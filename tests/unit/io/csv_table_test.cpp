@@ -49,6 +49,11 @@ TEST_F(CsvTableFile, RoundTripKeepsEveryText) {
       EXPECT_EQ(back.text(row, column), table.text(row, column));
 }
 
+TEST_F(CsvTableFile, AColumnThatBeginsLikeAByteOrderMarkKeepsItsName) {
+  const CsvTable table({"\xEF\xBB\xBFx"});
+  EXPECT_EQ(read(table.to_text()).columns(), table.columns());
+}
+
 TEST_F(CsvTableFile, SingleColumnKeepsEmptyFields) {
   CsvTable table({"only"});
   table.add_row({""});

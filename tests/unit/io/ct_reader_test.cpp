@@ -395,6 +395,16 @@ std::vector<BadCt> bad_cts() {
       // MetaImage.
       {"MetaTruncated", truncated("bad.mha", 0.9), kFile, "truncated"},
       {"MetaHeaderOnly", text_file("ObjectType = Image\nNDims = 3\n"), kFile, "ElementDataFile"},
+      {"MetaVoxelsInAFolderAbove",
+       text_file(meta_header({}, "../ct.raw")),
+       kFile,
+       "must stand beside it"},
+      {"MetaVoxelsAnywhere", text_file(meta_header({}, "/etc/passwd")), kFile, "must stand beside"},
+      {"NrrdVoxelsInAFolderAbove",
+       text_file("NRRD0004\ntype: short\ndimension: 3\nsizes: 4 3 2\nencoding: raw\n"
+                 "data file: x/../../ct.raw\n"),
+       kFile,
+       "must stand beside it"},
       {"MetaTwoDimensional",
        meta({{"NDims", "2"},
              {"DimSize", "4 6"},

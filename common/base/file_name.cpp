@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "base/file_name.h"
+
+#include <algorithm>
+
+namespace af {
+
+bool is_plain_file_name(std::string_view name) {
+  // File systems allow 255; suffixes and a camera's name may stand behind a case's.
+  constexpr std::size_t kMaxBytes = 100;
+  constexpr unsigned char kDelete = 0x7F;
+  const auto is_bad = [](char character) {
+    const auto code = static_cast<unsigned char>(character);
+    return code < ' ' || code == kDelete || character == '/';
+  };
+  return !name.empty() && name.size() <= kMaxBytes && name != "." && name != ".." &&
+         std::none_of(name.begin(), name.end(), is_bad);
+}
+
+}  // namespace af

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <nlohmann/json.hpp>
+#include <span>
+#include <string>
+
+namespace af {
+
+/// The value of CBOR bytes from a file; FileError naming `file` when they are none, or nest deeper
+/// than 16 levels: the library's reader calls itself for every level, so that deep ones would
+/// exhaust the stack. \test CborJson.RefusesWhatIsNestedTooDeeply
+nlohmann::json json_of_cbor(std::span<const std::byte> bytes, const std::string& file);
+
+}  // namespace af
