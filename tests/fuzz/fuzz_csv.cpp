@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// Tables: CSV as such, poses for DRRs, starts of registrations, and poses that were found.
+#include <optional>
+
+#include "evaluate/start_pose_files.h"
+#include "fuzz/fuzz_input.h"
+#include "io/csv_table.h"
+#include "io/pose_file.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace af;
+  const auto path = fuzz::written("poses.csv", fuzz::as_text({data, size}));
+  std::optional<CsvTable> table;
+  if (!fuzz::is_accepted([&] { table = CsvTable::read(path); })) return 0;
+  const auto again = CsvTable::read(fuzz::written("again.csv", table->to_text()));
+  fuzz::require(again.columns() == table->columns() && again.row_count() == table->row_count() &&
+                    again.to_text() == table->to_text(),
+                "a table reads back as it was written");
+  fuzz::is_accepted([&] { read_poses_csv(path, PoseFrame()); });
+  evaluation::PoseTableFrames frames;
+  frames.case_name = "skull-01";
+  fuzz::is_accepted([&] { evaluation::read_starts(path, frames); });
+  fuzz::is_accepted([&] { evaluation::read_found_poses(path, frames); });
+  fuzz::is_accepted([&] { evaluation::unknown_case_problems(path, {"skull-01"}); });
+  return 0;
+}

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+// Image files up to where ITK's libraries would be trusted with them: formats, headers, payloads.
+#include <limits>
+#include <optional>
+
+#include "fuzz/fuzz_input.h"
+#include "io/image_header.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace af;
+  const auto path = fuzz::written("image", fuzz::as_text({data, size}));
+  const auto format = sniff_image_format(path);
+  if (!format || *format == ImageFormat::Dicom) return 0;
+  std::optional<ImageHeader> header;
+  std::vector<std::string> warnings;
+  if (!fuzz::is_accepted([&] { header = read_image_header(path, *format); })) return 0;
+  // What belongs to an image lies beside it.
+  fuzz::require(header->data_file.lexically_normal().native().starts_with(
+                    fuzz::scratch_folder().lexically_normal().native()),
+                "voxels come from the header's folder");
+  std::uint64_t seen = 0;
+  const bool is_whole = fuzz::is_accepted([&] {
+    read_image_payload(
+        path, *header, &warnings, [&](std::span<const std::byte> piece) { seen += piece.size(); });
+  });
+  if (!is_whole || header->size.empty()) return 0;
+  std::uint64_t promised = header->value_bytes;
+  for (const std::uint64_t extent : header->size) promised *= extent;
+  fuzz::require(seen == promised, "an accepted image has all voxels that its header promises");
+  return 0;
+}

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+// A journal of unfinished work. The first byte chooses: a manifest of any content, records of any
+// content, or sound records (with right checksums) that are cut and changed afterwards.
+#include <fstream>
+#include <vector>
+
+#include "fuzz/fuzz_input.h"
+#include "io/progress_journal.h"
+
+namespace {
+
+using namespace af;
+using Records = std::vector<std::string>;
+
+const DecidingValues kDecides = {{"seed", "1"}, {"ct", "0123"}};
+
+std::filesystem::path folder() {
+  return fuzz::scratch_folder() / "journal";
+}
+
+Records records_of(ProgressJournal& journal) {
+  Records records;
+  journal.visit_finished([&](std::span<const std::byte> record) {
+    records.emplace_back(reinterpret_cast<const char*>(record.data()), record.size());
+  });
+  return records;
+}
+
+Records append_records(fuzz::InputBytes& input) {
+  ProgressJournal journal(folder(), "case", kDecides, true);
+  Records records;
+  for (std::size_t left = input.take_below(6); left > 0; --left) {
+    records.emplace_back(fuzz::as_text(input.take_bytes(input.take_below(64))));
+    journal.append(std::as_bytes(std::span(records.back())));
+  }
+  return records;
+}
+
+/// Cuts the file or changes bytes in it.
+void damage(fuzz::InputBytes& input) {
+  const auto path = folder() / "case.records";
+  if (!std::filesystem::exists(path)) return;
+  for (std::size_t left = input.take_below(4); left > 0; --left) {
+    const auto size = std::filesystem::file_size(path);
+    const auto place = input.take_below(size + 1);
+    if (input.take<std::uint8_t>() % 2 == 0) {
+      std::filesystem::resize_file(path, place);
+    } else {
+      std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+      file.seekp(static_cast<std::streamoff>(place));
+      file.put(static_cast<char>(input.take<std::uint8_t>()));
+    }
+  }
+}
+
+/// What is read must be what was appended, up to the first record that was damaged; and the journal
+/// goes on from there.
+void read_and_go_on(const Records& appended) {
+  ProgressJournal journal(folder(), "case", kDecides, false);
+  Records found = records_of(journal);
+  fuzz::require(
+      found.size() <= appended.size() && std::equal(found.begin(), found.end(), appended.begin()),
+      "records are those that were appended");
+  found.emplace_back("one more");
+  journal.append(std::as_bytes(std::span(found.back())));
+  ProgressJournal again(folder(), "case", kDecides, false);
+  fuzz::require(records_of(again) == found, "a repaired journal goes on");
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  fuzz::InputBytes input(data, size);
+  std::filesystem::remove_all(folder());
+  switch (input.take<std::uint8_t>() % 3) {
+    case 0:
+      std::filesystem::create_directories(folder());
+      fuzz::written("journal/case.json", fuzz::as_text(input.rest()));
+      fuzz::is_accepted([&] { ProgressJournal(folder(), "case", kDecides, false); });
+      return 0;
+    case 1: {
+      ProgressJournal journal(folder(), "case", kDecides, true);
+      fuzz::written("journal/case.records", fuzz::as_text(input.rest()));
+      fuzz::is_accepted([&] { records_of(journal); });
+      return 0;
+    }
+    default: {
+      const Records appended = append_records(input);
+      damage(input);
+      read_and_go_on(appended);
+      return 0;
+    }
+  }
+}

@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: Apache-2.0
+// Writes small inputs for the fuzzers to begin with, one folder per fuzzer: what our own programs
+// and tests write, and what once was a finding (findings/NAME.txt, a line of hexadecimal digits
+// each).
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <stdexcept>
+#include <string>
+
+#include "evaluate/registration_rows_files.h"
+#include "io/ct_reader.h"
+#include "io/image_file.h"
+#include "io/pose_file.h"
+#include "io/rig_file.h"
+#include "io/study_template.h"
+#include "unit/io/ct_test_data.h"
+#include "volume/ct_volume.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+using namespace af;
+using namespace std::string_literals;
+
+void write_seed(const fs::path& path, const std::string& bytes) {
+  fs::create_directories(path.parent_path());
+  std::ofstream file(path, std::ios::binary);
+  file << bytes;
+  if (!file.flush()) throw std::runtime_error("cannot write " + path.string());
+}
+
+RigidTransform some_pose() {
+  return pose_from_parameters(PoseFrame(), PoseParameters::from_deg_and_mm({1, -2, 3, 4, 5, -6}));
+}
+
+/// A template with its optional keys, which stand behind "# ".
+std::string uncommented(std::string text) {
+  for (std::size_t at = text.find("\n# "); at != std::string::npos;
+       at = text.find("\n# ", at + 1)) {
+    const std::size_t end = text.find('\n', at + 1);
+    if (text.substr(at, end - at).find(" = ") != std::string::npos) text.erase(at + 1, 2);
+  }
+  return text;
+}
+
+void write_toml_seeds(const fs::path& folder) {
+  for (const std::string& name : builtin_rig_names())
+    write_seed(folder / "rig" / name, builtin_rig_text(name));
+  write_seed(folder / "rig" / "matrix",
+             "isocenter_point = [0, 0, 0]\n[[camera]]\nname = \"A\"\nsize_px = [9, 9]\n"
+             "pixel_spacing_mm = [1, 1]\n"
+             "projection_matrix = [[4, 1000, 0, 4000], [4, 0, 1000, 4000], [1, 0, 0, 600]]\n");
+  write_seed(folder / "rig" / "template", template_text("rig"));
+  write_seed(folder / "study" / "template", template_text("study"));
+  write_seed(folder / "study" / "optional", uncommented(template_text("study")));
+}
+
+void write_table_seeds(const fs::path& folder) {
+  write_seed(folder / "csv" / "parameters",
+             "rx_deg,ry_deg,rz_deg,tx_mm,ty_mm,tz_mm\r\n1,-2,3e0,0.5,+4,\"5\"\r\n");
+  write_seed(folder / "csv" / "matrix",
+             "case,start_index,m00,m01,m02,m03,m10,m11,m12,m13,m20,m21,m22,m23\n"
+             "skull-01,0,1,0,0,0,0,1,0,0,0,0,1,0\n\"a \"\"b\"\"\n,\",1,1,0,0,9,0,1,0,9,0,0,1,9\n");
+  write_seed(folder / "csv" / "found",
+             "case,start_index,final_rx_deg,final_ry_deg,final_rz_deg,final_tx_mm,final_ty_mm,"
+             "final_tz_mm,seconds\nskull-01,0,0,0,0,nan,0,0,1\nskull-01,1,0,0,0,1,2,3,0.5\n");
+  write_seed(folder / "csv" / "starts",
+             "start_index,start_rx_deg,start_ry_deg,start_rz_deg,start_tx_mm,start_ty_mm,"
+             "start_tz_mm\n0,0,0,0,0,0,0\n1,1,2,3,4,5,6\n");
+}
+
+void write_pose_seeds(const fs::path& folder) {
+  write_seed(folder / "pose" / "plain", "\0# by row\n1 0 0 5\n0 1 0 6, 0 0 1 7\n0 0 0 1\n"s);
+  write_seed(folder / "pose" / "toml", "\1"s + pose_to_toml(some_pose()));
+  write_seed(folder / "pose" / "affine", "\2"s + pose_to_itk_transform(some_pose()));
+  write_seed(folder / "pose" / "versor",
+             "\2#Insight Transform File V1.0\nTransform: VersorRigid3DTransform_double_3_3\n"
+             "Parameters: 0.1 0 0.2 1 2 3\nFixedParameters: 0 0 1\n"s);
+  write_seed(folder / "pose" / "json",
+             "\3{\"room_from_ct\": [[1,0,0,1],[0,1,0,2],[0,0,1,3],[0,0,0,1]], \"a\": [null]}"s);
+}
+
+void write_image_seeds(const fs::path& folder) {
+  fs::create_directories(folder / "image");
+  CtGrid grid = test::small_grid();
+  const CtVolume ct = test::asymmetric_ct(grid);
+  for (const char* name : {"ct.mha", "ct.nrrd", "ct.nii.gz"}) write_ct(ct, folder / "image" / name);
+  Image2d image(5, 4);
+  image.at(2, 1) = 7.0f;
+  write_image_u16(image, folder / "image" / "xray.png", 1.0, 1.0);
+  write_image(image, folder / "image" / "xray.mha", 1.0, 1.0);
+  write_image(image, folder / "image" / "xray.tif", 1.0, 1.0);
+  write_seed(folder / "image" / "detached.mhd",
+             "NDims = 2\nDimSize = 4 4\nElementType = MET_UCHAR\nElementSpacing = 1 1\n"
+             "HeaderSize = -1\nElementDataFile = image\n");
+  write_seed(folder / "image" / "detached.nhdr",
+             "NRRD0004\ntype: short\ndimension: 2\nsizes: 4 4\nencoding: raw\nendian: little\n"
+             "byte skip: -1\ndata file: image\n");
+}
+
+void write_dicom_seeds(const fs::path& folder) {
+  fs::create_directories(folder / "dicom");
+  test::write_dicom_series(test::asymmetric_ct(test::small_grid()), folder / "dicom");
+  test::DicomTestFile encoded;
+  encoded.set_text({0x0008, 0x0060}, "CS", "CT");
+  encoded.set_fragment("1.2.840.10008.1.2.4.70", "not a stream");
+  encoded.write(folder / "dicom" / "encoded");
+  // Without file header, implicit, with a sequence of undefined length.
+  write_seed(folder / "dicom" / "implicit",
+             "\x08\0\x60\0\2\0\0\0CT\x08\0\x40\x11\xff\xff\xff\xff\xfe\xff\0\xe0\xff\xff\xff\xff"
+             "\x08\0\x50\x11\2\0\0\0"
+             "12\xfe\xff\x0d\xe0\0\0\0\0\xfe\xff\xdd\xe0\0\0\0\0"
+             "\x28\0\x10\0\2\0\0\0\1\0\x28\0\x11\0\2\0\0\0\1\0\xe0\x7f\x10\0\2\0\0\0\1\1"s);
+}
+
+void write_other_seeds(const fs::path& folder) {
+  write_seed(folder / "journal" / "manifest",
+             "\0{\"format\": \"af-progress-journal\", \"format_version\": 1, \"decides\": "
+             "{\"seed\": \"1\", \"ct\": \"0123\"}}"s);
+  write_seed(folder / "journal" / "records", "\1AFR1\4\0\0\0\1\2\3\4\5\6\7\x08"s + "abcd");
+  write_seed(folder / "journal" / "damaged",
+             "\2\3\0\4\0abcd\0\0\5\0hello\2\0\x15\0\0\x77\x20\0\1\x44"s);
+  evaluation::RegistrationRow row;
+  row.case_name = "skull";
+  row.renderer = "field";
+  row.stop_reason = "step-below-final";
+  row.trace.push_back({1, 2.0, 13, 0.5, {}, 4.0});
+  const auto bytes = nlohmann::json::to_cbor(evaluation::packed_row(3, row));
+  write_seed(folder / "rows" / "row", std::string(bytes.begin(), bytes.end()));
+  write_seed(folder / "field_values" / "sound", "");
+  write_seed(folder / "field_values" / "shifted",
+             "\2\0\3\0\1\0\0\0\0\0\0\0\x59\x40\5\0\2\0\0\0\x06\0\0\0"s);
+  write_seed(folder / "field_file" / "sound", "");
+  write_seed(folder / "field_file" / "content", "\x0a\0\0\0\0\0\6\0\0\0"s);
+  write_seed(folder / "field_file" / "replaced",
+             "\x05\0\2\0\2\0\1\0\2\0\0\0\0\0\1\0\0\0\0\0\0\0\0\0\0\0"s);
+  write_seed(folder / "field_file" / "linked", "\x08\0\3\0\x09\0\0\0\x0a\0\3\0\x0b\0\2\0"s);
+}
+
+std::string bytes_of_hex(const std::string& digits) {
+  std::string bytes;
+  for (std::size_t i = 0; i + 1 < digits.size(); i += 2)
+    bytes += static_cast<char>(std::stoi(digits.substr(i, 2), nullptr, 16));
+  return bytes;
+}
+
+void write_findings(const fs::path& findings, const fs::path& folder) {
+  for (const auto& entry : fs::directory_iterator(findings)) {
+    std::ifstream file(entry.path());
+    int number = 0;
+    for (std::string line; std::getline(file, line);)
+      if (!line.starts_with('#'))
+        write_seed(folder / entry.path().stem() / ("finding-" + std::to_string(number++)),
+                   bytes_of_hex(line));
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 3) {
+    std::cerr << "usage: make_fuzz_seeds FINDINGS FOLDER\n";
+    return 2;
+  }
+  try {
+    const fs::path folder = argv[2];
+    write_toml_seeds(folder);
+    write_table_seeds(folder);
+    write_pose_seeds(folder);
+    write_image_seeds(folder);
+    write_dicom_seeds(folder);
+    write_other_seeds(folder);
+    write_findings(argv[1], folder);
+  } catch (const std::exception& error) {
+    std::cerr << error.what() << "\n";
+    return 1;
+  }
+  return 0;
+}

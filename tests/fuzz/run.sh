@@ -1,0 +1,63 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# Builds the fuzzers with Clang and runs them, one after the other.
+set -euo pipefail
+# shellcheck source-path=SCRIPTDIR
+source "$(dirname "${BASH_SOURCE[0]}")/../../jobs/lib.sh"
+
+usage() {
+  cat <<'TEXT'
+Usage: tests/fuzz/run.sh [--seconds N] [--output FOLDER] [--no-build] [--help] [NAME...]
+
+Runs libFuzzer on our readers: rig, study, csv, pose, image, dicom, journal, rows, field_values, field_file, or those
+named. Needs clang-14. Corpora grow in FOLDER/NAME/corpus, the log is FOLDER/NAME/log, inputs that are findings are
+FOLDER/NAME/crash-*, oom-* or timeout-*. Exit code 1 when there was a finding.
+
+  --seconds N      for each reader (default: 1200)
+  --output FOLDER  default: build/fuzz/findings
+  --no-build       build/fuzz is up to date
+TEXT
+}
+
+seconds=1200 output=$af_root/build/fuzz/findings build=yes
+names=()
+while (($# > 0)); do
+  case "$1" in
+    --seconds) seconds=$2; shift ;;
+    --output) output=$2; shift ;;
+    --no-build) build=no ;;
+    --help | -h) usage; exit 0 ;;
+    -*) die 2 "unknown option '$1' (try --help)" ;;
+    *) names+=("$1") ;;
+  esac
+  shift
+done
+((${#names[@]} > 0)) || names=(rig study csv pose image dicom journal rows field_values field_file)
+
+binaries=$af_root/build/fuzz/tests/fuzz
+if [[ "$build" == yes ]]; then
+  (cd "$af_root" && cmake --preset fuzz && cmake --build build/fuzz --target make_fuzz_seeds "${names[@]/#/fuzz_}") ||
+    die 1 "the fuzzers do not build"
+fi
+mkdir -p "$output"
+output=$(cd "$output" && pwd)
+"$binaries/make_fuzz_seeds" "$af_root/tests/fuzz/findings" "$output/seeds"
+
+# One process without mpirun; files in memory; a hostile size shows as a finding.
+export OMPI_MCA_ess_singleton_isolated=1 OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
+export ASAN_OPTIONS=quarantine_size_mb=16:detect_leaks=1 TMPDIR=${TMPDIR:-/dev/shm}
+status=0
+for name in "${names[@]}"; do
+  mkdir -p "$output/$name/corpus"
+  cd "$output/$name"
+  leaks=1
+  [[ "$name" == field_file ]] && leaks=0 # OpenMPI and HDF5 keep memory until the end
+  "$binaries/fuzz_$name" -max_total_time="$seconds" -timeout=20 -rss_limit_mb=512 -malloc_limit_mb=256 -detect_leaks=$leaks \
+    -print_final_stats=1 corpus "$output/seeds/$name" >log 2>&1 || status=1
+  printf '%-13s %12s runs, coverage %s -> %s edges, %s inputs kept, %s findings\n' "$name" \
+    "$(sed -n 's/^stat::number_of_executed_units: *//p' log)" \
+    "$(sed -n 's/.*INITED cov: \([0-9]*\).*/\1/p' log | head -n 1)" \
+    "$(sed -n 's/.* cov: \([0-9]*\) .*/\1/p' log | tail -n 1)" \
+    "$(find corpus -type f | wc -l)" "$(find . -maxdepth 1 -name '*-[0-9a-f]*' -type f | wc -l)"
+done
+exit $status

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "field/compressed_attenuation_field.h"
+#include "io/field_file.h"
+
+namespace af::fuzz {
+
+/// A sound field of two slabs, small enough to be written thousands of times; without its indices.
+CompressedAttenuationField sample_field();
+
+/// All its tiles, one block per slab.
+std::vector<IndexBlock> sample_blocks(const CompressedAttenuationField& field);
+
+}  // namespace af::fuzz
