@@ -191,6 +191,55 @@ class CodebookUpdate {
   std::vector<TrackedCodeword> free_;
 };
 
+/// Iterations on one rank's share of the tiles.
+class CodebookIterations {
+ public:
+  CodebookIterations(const TrainingShare& mine, const CodebookReduction& reduction)
+      : training_(mine.training), held_out_(mine.held_out), reduction_(reduction) {}
+
+  /// Collective. Replaces the codebook by a better one.
+  TrainingIteration improve(Codebook& codebook) {
+    const NearestCodeword search(codebook);
+    training_.encode(search, hint_);
+    held_out_.encode(search, hint_);
+    hint_ = SearchHint::PerTile;
+    CentroidSums sums(codebook.size());
+    for (std::size_t tile = 0; tile < training_.tiles.size(); ++tile)
+      sums.add(training_.nearest[tile], training_.tiles[tile].tile);
+    sums.training_error() = training_.squared_error();
+    sums.held_out_error() = held_out_.squared_error();
+    reduction_.sum(sums.values());
+
+    CodebookUpdate update(codebook, sums);
+    const std::uint64_t repaired = update.repair(training_, reduction_);
+    codebook = update.codebook();
+    const auto new_of_old = update.new_of_old();
+    training_.renumber(new_of_old);
+    held_out_.renumber(new_of_old);
+    return {sums.training_error(), sums.held_out_error(), repaired};
+  }
+
+ private:
+  CodedTiles training_;
+  CodedTiles held_out_;
+  SearchHint hint_ = SearchHint::None;
+  const CodebookReduction& reduction_;
+};
+
+/// Whether another iteration is not worth while, or not allowed; says why.
+bool has_ended(TrainedCodebook& training, const CodebookOptions& options) {
+  const std::size_t done = training.iterations.size();
+  if (done >= 2) {
+    const auto before = static_cast<double>(training.iterations[done - 2].training_squared_error);
+    const auto now = static_cast<double>(training.iterations[done - 1].training_squared_error);
+    if (!(before - now > options.min_relative_improvement * before)) {
+      training.stop = TrainingStop::ImprovementBelowLimit;
+      return true;
+    }
+  }
+  return done >= static_cast<std::size_t>(options.max_iterations);
+}
+
 }  // namespace
 
 std::vector<std::string> problems(const CodebookOptions& options) {
@@ -215,46 +264,24 @@ const char* to_string(TrainingStop stop) {
 TrainedCodebook train_codebook(const TrainingShare& mine,
                                const CodebookOptions& options,
                                const CodebookReduction& reduction,
-                               const ProgressCallback& on_progress) {
+                               const ProgressCallback& on_progress,
+                               const TrainingCheckpoints& checkpoints) {
   throw_if_any(problems(options));
   std::array<std::uint64_t, 2> totals{mine.training.size(), mine.held_out.size()};
   reduction.sum(totals);
   TrainedCodebook result;
+  if (checkpoints.begun)
+    result = *checkpoints.begun;
+  else
+    result.codebook = initial_codebook(mine, totals[0], options, reduction);
   result.training_tiles = totals[0];
   result.held_out_tiles = totals[1];
-  result.codebook = initial_codebook(mine, totals[0], options, reduction);
-
-  CodedTiles training(mine.training);
-  CodedTiles held_out(mine.held_out);
-  SearchHint hint = SearchHint::None;
-  for (int i = 0; i < options.max_iterations; ++i) {
-    const NearestCodeword search(result.codebook);
-    training.encode(search, hint);
-    held_out.encode(search, hint);
-    hint = SearchHint::PerTile;
-    CentroidSums sums(result.codebook.size());
-    for (std::size_t tile = 0; tile < training.tiles.size(); ++tile)
-      sums.add(training.nearest[tile], training.tiles[tile].tile);
-    sums.training_error() = training.squared_error();
-    sums.held_out_error() = held_out.squared_error();
-    reduction.sum(sums.values());
-
-    CodebookUpdate update(result.codebook, sums);
-    const std::uint64_t repaired = update.repair(training, reduction);
-    result.codebook = update.codebook();
-    const auto new_of_old = update.new_of_old();
-    training.renumber(new_of_old);
-    held_out.renumber(new_of_old);
-    result.iterations.push_back({sums.training_error(), sums.held_out_error(), repaired});
-    if (on_progress) on_progress(i + 1, options.max_iterations);
-    if (i == 0) continue;
-    const auto before =
-        static_cast<double>(result.iterations[result.iterations.size() - 2].training_squared_error);
-    const auto now = static_cast<double>(sums.training_error());
-    if (!(before - now > options.min_relative_improvement * before)) {
-      result.stop = TrainingStop::ImprovementBelowLimit;
-      break;
-    }
+  CodebookIterations iterations(mine, reduction);
+  while (!has_ended(result, options)) {
+    result.iterations.push_back(iterations.improve(result.codebook));
+    if (on_progress)
+      on_progress(static_cast<double>(result.iterations.size()), options.max_iterations);
+    if (checkpoints.on_iteration) checkpoints.on_iteration(result);
   }
   return result;
 }

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -40,6 +41,15 @@ struct TrainedCodebook {
   TrainingStop stop = TrainingStop::MaxIterations;
 };
 
+/// How a training that was cut short goes on.
+struct TrainingCheckpoints {
+  /// What on_iteration() was last given, by an earlier run on any number of ranks; none: from the
+  /// start. The same tiles and options give the same codebook as a training without a stop.
+  std::optional<TrainedCodebook> begun;
+  /// Called on every rank after every iteration; when it throws, it must on all ranks.
+  std::function<void(const TrainedCodebook& so_far)> on_iteration;
+};
+
 /// Collective. Trains a codebook by the generalised Lloyd algorithm (Sec. II-D) on the shares of
 /// all ranks. Sums, counts and errors are exact integers and centroids are rounded to levels, so
 /// the codebook is the same on any number of ranks and on any vector width. Codeword 0 is and stays
@@ -51,6 +61,7 @@ struct TrainedCodebook {
 TrainedCodebook train_codebook(const TrainingShare& mine,
                                const CodebookOptions& options,
                                const CodebookReduction& reduction,
-                               const ProgressCallback& on_progress = {});
+                               const ProgressCallback& on_progress = {},
+                               const TrainingCheckpoints& checkpoints = {});
 
 }  // namespace af

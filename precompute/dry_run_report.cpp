@@ -207,7 +207,7 @@ std::string memory_text(const DryRun& run, const FieldForecast& need) {
   }
   text += "\n";
   if (run.options.has_checkpoint)
-    text += "  progress folder    " + megabytes_text(need.tile_bytes) +
+    text += "  progress folder    " + megabytes_text(need.tile_bytes + need.payload_bytes) +
             " on disk until the field is complete\n";
   return text;
 }

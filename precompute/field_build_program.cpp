@@ -10,6 +10,7 @@
 #include <queue>
 #include <utility>
 
+#include "base/crc32c.h"
 #include "base/error.h"
 #include "parallel/work_queue.h"
 #include "precompute/field_encoder.h"
@@ -281,13 +282,14 @@ OverflowChoice choose_overflow(const FieldBuild& build, const CastPhase& cast) {
 TrainedCodebook train_field(const FieldBuild& build,
                             CastPhase& cast,
                             const CodebookOptions& options,
-                            const ProgressCallback& on_progress) {
+                            const ProgressCallback& on_progress,
+                            const TrainingCheckpoints& checkpoints) {
   const CodebookReduction reduction = reduction_over(build.communicator);
   // Every rank comes to the same conclusion; this makes it one error of the whole job.
   return all_or_none(build.communicator, [&] {
     TrainingShare share = cast.picker.take(reduction);
     level_out(share, reduction);
-    return train_codebook(share, options, reduction, on_progress);
+    return train_codebook(share, options, reduction, on_progress, checkpoints);
   });
 }
 
@@ -295,7 +297,11 @@ FieldEncoder::FieldEncoder(const FieldBuild& build,
                            CastPhase& cast,
                            const Codebook& codebook,
                            TileOverflow overflow)
-    : build_(build), cast_(cast), search_(codebook), overflow_(overflow) {
+    : build_(build),
+      cast_(cast),
+      search_(codebook),
+      codebook_crc_(crc32c(std::as_bytes(std::span(codebook.codewords)))),
+      overflow_(overflow) {
   if (build_.progress != nullptr && overflow_ == TileOverflow::ReadBack)
     build_.progress->share_places();
   deal_out_others();
@@ -318,26 +324,52 @@ void FieldEncoder::deal_out_others() {
   tiles_in_all_ = static_cast<double>(loads[mine]);
 }
 
-std::vector<IndexBlock> FieldEncoder::next_blocks(const ProgressCallback& on_progress) {
+std::vector<IndexBlock> FieldEncoder::next_blocks(const ProgressCallback& on_progress,
+                                                  const StopRequested& stop_requested) {
   const auto start = Clock::now();
   std::vector<IndexBlock> blocks;
   std::size_t bytes = 0;
   while (bytes < kRoundBytes && !(cast_.kept.empty() && others_.empty())) {
-    UnitTiles tiles;
-    if (!cast_.kept.empty()) {
-      tiles = std::move(cast_.kept.back());
-      cast_.kept.pop_back();
-    } else {
-      tiles = tiles_again(build_.units[others_.back()]);
-      others_.pop_back();
+    if (stop_requested && stop_requested()) {
+      if (build_.progress != nullptr) build_.progress->sync();
+      throw StoppedError(
+          "stopped while encoding with all finished units saved: run the same command again to go "
+          "on");
     }
-    blocks.push_back(encoded(tiles));
+    blocks.push_back(next_block());
     bytes += blocks.back().indices.size() * sizeof(std::uint16_t);
-    tiles_done_ += static_cast<double>(tiles.tiles.size());
     if (on_progress) on_progress(tiles_done_, tiles_in_all_);
   }
   busy_seconds_ += seconds_since(start);
   return blocks;
+}
+
+IndexBlock FieldEncoder::next_block() {
+  const bool is_kept = !cast_.kept.empty();
+  const WorkUnit& unit = build_.units[is_kept ? cast_.kept.back().unit_id : others_.back()];
+  EncodedUnit of_unit = encoded(unit, is_kept);
+  if (is_kept)
+    cast_.kept.pop_back();
+  else
+    others_.pop_back();
+  tiles_done_ += static_cast<double>(cast_.unit_tiles[unit.id]);
+  squared_error_ += of_unit.squared_error;
+  return {unit.slab,
+          first_tile_of(unit, build_.light_slab),
+          unit.tile_counts(),
+          std::move(of_unit.indices)};
+}
+
+EncodedUnit FieldEncoder::encoded(const WorkUnit& unit, bool is_kept) {
+  if (build_.progress != nullptr)
+    if (auto before = build_.progress->read_encoded(unit, codebook_crc_)) {
+      ++units_resumed_;
+      return std::move(*before);
+    }
+  EncodedUnit of_unit = is_kept ? encode_unit(search_, unit, cast_.kept.back())
+                                : encode_unit(search_, unit, tiles_again(unit));
+  if (build_.progress != nullptr) build_.progress->append(unit, of_unit, codebook_crc_);
+  return of_unit;
 }
 
 UnitTiles FieldEncoder::tiles_again(const WorkUnit& unit) {
@@ -350,18 +382,12 @@ UnitTiles FieldEncoder::tiles_again(const WorkUnit& unit) {
   return make_unit_tiles(unit, samples_);
 }
 
-IndexBlock FieldEncoder::encoded(const UnitTiles& tiles) {
-  const WorkUnit& unit = build_.units[tiles.unit_id];
-  EncodedUnit of_unit = encode_unit(search_, unit, tiles);
-  squared_error_ += of_unit.squared_error;
-  return {unit.slab,
-          first_tile_of(unit, build_.light_slab),
-          unit.tile_counts(),
-          std::move(of_unit.indices)};
-}
-
 std::uint64_t FieldEncoder::squared_error() const {
   return sum_over(build_.communicator, squared_error_);
+}
+
+std::uint64_t FieldEncoder::units_resumed() const {
+  return sum_over(build_.communicator, units_resumed_);
 }
 
 std::vector<double> FieldEncoder::busy_seconds() const {

@@ -78,7 +78,8 @@ OverflowChoice choose_overflow(const FieldBuild& build, const CastPhase& cast);
 TrainedCodebook train_field(const FieldBuild& build,
                             CastPhase& cast,
                             const CodebookOptions& options,
-                            const ProgressCallback& on_progress);
+                            const ProgressCallback& on_progress,
+                            const TrainingCheckpoints& checkpoints = {});
 
 /// Encodes units in rounds, for write_field(). Every rank encodes the tiles it has kept; the others
 /// are dealt out such that all ranks have equally many.
@@ -90,8 +91,11 @@ class FieldEncoder {
                const Codebook& codebook,
                TileOverflow overflow);
 
-  /// This rank's next units, about kRoundBytes of indices; none when it has no more.
-  std::vector<IndexBlock> next_blocks(const ProgressCallback& on_progress = {});
+  /// This rank's next units, about kRoundBytes of indices; none when it has no more. Units that an
+  /// earlier run encoded with the same codebook are read. StoppedError, with what is encoded saved,
+  /// when `stop_requested` says so.
+  std::vector<IndexBlock> next_blocks(const ProgressCallback& on_progress = {},
+                                      const StopRequested& stop_requested = {});
 
   /// Collective. Over all ranks, in squared levels; once all blocks are made.
   [[nodiscard]] std::uint64_t squared_error() const;
@@ -99,17 +103,21 @@ class FieldEncoder {
   [[nodiscard]] std::vector<double> busy_seconds() const;
   /// Units that were to be read back but were damaged, and cast again; this rank's.
   [[nodiscard]] std::uint64_t units_damaged() const { return units_damaged_; }
+  /// Collective. Units that an earlier run had encoded, over all ranks.
+  [[nodiscard]] std::uint64_t units_resumed() const;
 
   static constexpr std::size_t kRoundBytes = std::size_t{8} << 20;
 
  private:
   void deal_out_others();
   [[nodiscard]] UnitTiles tiles_again(const WorkUnit& unit);
-  [[nodiscard]] IndexBlock encoded(const UnitTiles& tiles);
+  IndexBlock next_block();
+  EncodedUnit encoded(const WorkUnit& unit, bool is_kept);
 
   const FieldBuild& build_;
   CastPhase& cast_;
   NearestCodeword search_;
+  std::uint32_t codebook_crc_;
   TileOverflow overflow_;
   std::vector<std::uint32_t> others_;  ///< this rank's units that are not in memory
   double tiles_in_all_ = 0.0;
@@ -117,6 +125,7 @@ class FieldEncoder {
   double busy_seconds_ = 0.0;
   std::uint64_t squared_error_ = 0;
   std::uint64_t units_damaged_ = 0;
+  std::uint64_t units_resumed_ = 0;
   std::vector<std::uint16_t> samples_;
 };
 

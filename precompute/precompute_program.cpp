@@ -24,6 +24,7 @@
 #include "precompute/resampling_program.h"
 #include "precompute/shear_warp_caster.h"
 #include "precompute/source_loading.h"
+#include "precompute/training_files.h"
 
 namespace af {
 
@@ -74,6 +75,7 @@ ProgressManifest manifest_of(const PrecomputeOptions& options,
   ProgressManifest manifest;
   for (const auto& [name, value] : casting_options(options)) manifest.decides[name] = value;
   const CameraGeometry& camera = source.camera;
+  manifest.decides["program version"] = program_version();
   manifest.decides["ct_content_sha256"] = source.ct_content_sha256;
   manifest.decides["camera"] = camera.name;
   manifest.decides["camera source_point"] = numbers_text(camera.source_point);
@@ -127,7 +129,8 @@ struct BuildStatistics {
   std::uint64_t squared_error = 0;  ///< in squared levels
   double rms_error = 0.0;           ///< total attenuation
   std::vector<double> encode_seconds;
-  std::uint64_t peak_bytes_per_rank = 0;  ///< beside the CT and its grid
+  std::uint64_t units_encoded_before = 0;  ///< by earlier runs
+  std::uint64_t peak_bytes_per_rank = 0;   ///< beside the CT and its grid
 };
 
 double largest_of(const std::vector<double>& seconds) {
@@ -157,7 +160,9 @@ class PrecomputeRun {
         throw UsageError("-o FIELD.h5 is needed (or --dry-run)");
       if (!options_.is_dry_run && world_.is_root()) require_output_folder();
     });
+    if (options_.has_checkpoint && !options_.is_dry_run) cli::listen_for_stop_requests();
     load();
+    stop_if_requested("before the first unit");
     const std::unique_ptr<const FieldCaster> caster = make_caster();
     if (options_.is_dry_run) {
       print_dry_run(*caster);
@@ -284,10 +289,8 @@ class PrecomputeRun {
     all_or_none(world_, [&] { (void)memory_limit(options_, memory); });
     ProgressManifest manifest = manifest_of(options_, source_, plan());
     std::optional<ProgressFolder> progress;
-    if (options_.has_checkpoint) {
-      cli::listen_for_stop_requests();
+    if (options_.has_checkpoint)
       progress.emplace(options_.output + ".progress", options_.is_restart, manifest, world_);
-    }
     const auto units = plan_units(light_slab_, {manifest.rays_per_unit});
     const FieldBuild build{caster,
                            light_slab_,
@@ -310,7 +313,7 @@ class PrecomputeRun {
     cli::ProgressPrinter printer("casting", world_.is_root());
     CastPhase cast = cast_field(build,
                                 {options_.training_selection(), plan.kept_tile_bytes(limit)},
-                                cli::is_stop_requested,
+                                stop_requested(),
                                 printer.callback());
     clock_.end("cast");
     if (cast.units_resumed > 0)
@@ -318,7 +321,7 @@ class PrecomputeRun {
                 "resumed " + std::to_string(cast.units_resumed) + " of " +
                     std::to_string(build.units.size()) + " units from " +
                     build.progress->path().string());
-    stop_if_requested();
+    stop_if_requested("with all units saved");
     return cast;
   }
 
@@ -353,10 +356,26 @@ class PrecomputeRun {
 
   TrainedCodebook train_phase(const FieldBuild& build, CastPhase& cast) {
     cli::ProgressPrinter printer("training the codebook", world_.is_root());
+    std::optional<TrainingJournal> journal;
+    TrainingCheckpoints checkpoints;
+    if (build.progress != nullptr) {
+      const NamedValues decides = codebook_options(options_);
+      journal.emplace(
+          build.progress->path(), DecidingValues(decides.begin(), decides.end()), world_);
+      checkpoints.begun = journal->begun();
+      checkpoints.on_iteration = [&](const TrainedCodebook& so_far) {
+        journal->append(so_far);
+        stop_if_requested("with all units and " + std::to_string(so_far.iterations.size()) +
+                          " iterations of the training saved");
+      };
+    }
+    iterations_resumed_ = checkpoints.begun ? checkpoints.begun->iterations.size() : 0;
+    if (iterations_resumed_ > 0)
+      cli::info(world_,
+                "resumed " + std::to_string(iterations_resumed_) + " iterations of the training");
     TrainedCodebook trained =
-        train_field(build, cast, options_.codebook_options(), printer.callback());
+        train_field(build, cast, options_.codebook_options(), printer.callback(), checkpoints);
     clock_.end("train");
-    stop_if_requested();
     return trained;
   }
 
@@ -372,11 +391,7 @@ class PrecomputeRun {
     printer.emplace("encoding and writing", world_.is_root());
     const FieldFileInfo info = write_field(
         field,
-        [&] {
-          if (options_.has_checkpoint && cli::is_stop_requested())
-            throw StoppedError("stopped with all units saved: run the same command again to go on");
-          return encoder.next_blocks(printer->callback());
-        },
+        [&] { return encoder.next_blocks(printer->callback(), stop_requested()); },
         [&] {
           statistics = statistics_of(cast, encoder);
           clock_.split("encode", largest_of(statistics.encode_seconds));
@@ -390,12 +405,20 @@ class PrecomputeRun {
     report(info, cast, trained, statistics);
   }
 
-  /// Collective. Every unit is saved once casting is over, so a stop loses little.
-  void stop_if_requested() const {
+  /// Without a progress folder there is nothing to stop for.
+  [[nodiscard]] StopRequested stop_requested() const {
+    return [is_heard = options_.has_checkpoint] { return is_heard && cli::is_stop_requested(); };
+  }
+
+  /// Collective. StoppedError on every rank when a stop was asked for on any; `state` says what of
+  /// the work is saved.
+  void stop_if_requested(const std::string& state) const {
     if (!options_.has_checkpoint) return;
-    all_or_none(world_, [] {
-      if (cli::is_stop_requested())
-        throw StoppedError("stopped with all units saved: run the same command again to go on");
+    std::array<std::uint64_t, 1> stops{cli::is_stop_requested() ? 1U : 0U};
+    world_.maximum(stops);
+    if (stops[0] == 0) return;
+    all_or_none(world_, [&] {
+      throw StoppedError("stopped " + state + ": run the same command again to go on");
     });
   }
 
@@ -421,6 +444,7 @@ class PrecomputeRun {
     statistics.rms_error =
         rms_attenuation(statistics.squared_error, cast.occupied_tiles, quantizer().step());
     statistics.encode_seconds = encoder.busy_seconds();
+    statistics.units_encoded_before = encoder.units_resumed();
     statistics.peak_bytes_per_rank =
         largest_over_ranks(without_volume(process_memory().peak_own_bytes));
     return statistics;
@@ -442,6 +466,8 @@ class PrecomputeRun {
     json["rms_attenuation_error"] = statistics.rms_error;
     json["rays_cast"] = cast.rays_cast;
     json["units_resumed"] = cast.units_resumed;
+    json["training_iterations_resumed"] = iterations_resumed_;
+    json["units_encoded_before"] = statistics.units_encoded_before;
     json["units_kept_in_memory"] = cast.units_kept;
     json["busy_seconds"] = {{"cast", cast.busy_seconds}, {"encode", statistics.encode_seconds}};
     json["peak_bytes"] = {{"per_rank", statistics.peak_bytes_per_rank},
@@ -483,6 +509,7 @@ class PrecomputeRun {
   FieldSource source_;
   LightSlab light_slab_;
   std::shared_ptr<const SlabAlignedVolume> resampled_;  ///< for the shear-warp caster
+  std::size_t iterations_resumed_ = 0;                  ///< of the training, by earlier runs
   PhaseClock clock_;
 };
 

@@ -19,20 +19,24 @@ namespace af {
 namespace {
 
 constexpr const char* kFormat = "af-precompute-progress";
-constexpr int kFormatVersion = 2;  // 2: units are cut along t, too
-constexpr std::array<char, 8> kMagic = {'A', 'F', 'U', 'N', 'I', 'T', '0', '1'};
+constexpr int kFormatVersion = 3;  // 2: units are cut along t, too; 3: indices
+using Magic = std::array<char, 8>;
+constexpr Magic kTilesMagic = {'A', 'F', 'U', 'N', 'I', 'T', '0', '1'};
+constexpr Magic kIndicesMagic = {'A', 'F', 'C', 'O', 'D', 'E', '0', '1'};
 
-/// Stands before every unit in a shard.
+/// Stands before the tiles of every unit in a shard, and before its indices.
 struct RecordHeader {
-  std::array<char, 8> magic = kMagic;
+  Magic magic = kTilesMagic;
   std::uint32_t unit_id = 0;
-  std::uint32_t bitmap_words = 0;
-  std::uint64_t tile_count = 0;
+  std::uint32_t detail = 0;  ///< of tiles: words of their bitmap; of indices: CRC of the codebook
+  std::uint64_t count = 0;   ///< of tiles that are not empty, or of indices
   std::uint32_t content_crc = 0;
   std::uint32_t header_crc = 0;  ///< of the fields before it
 
+  [[nodiscard]] bool is_of_tiles() const { return magic == kTilesMagic; }
   [[nodiscard]] std::uint64_t content_bytes() const {
-    return bitmap_words * sizeof(std::uint64_t) + tile_count * sizeof(Tile);
+    return is_of_tiles() ? detail * sizeof(std::uint64_t) + count * sizeof(Tile)
+                         : sizeof(std::uint64_t) + count * sizeof(std::uint16_t);
   }
   [[nodiscard]] std::uint32_t computed_crc() const {
     return crc32c(std::as_bytes(std::span(this, 1)).first(offsetof(RecordHeader, header_crc)));
@@ -42,21 +46,37 @@ static_assert(sizeof(RecordHeader) == 32);
 
 bool is_header_of(const RecordHeader& header, const WorkUnit& unit) {
   const std::size_t tile_count = unit.tile_count();
-  return header.unit_id == unit.id && header.bitmap_words == (tile_count + 63) / 64 &&
-         header.tile_count <= tile_count;
+  if (header.unit_id != unit.id) return false;
+  return header.is_of_tiles()
+             ? header.detail == (tile_count + 63) / 64 && header.count <= tile_count
+             : header.count == tile_count;
 }
 
 /// Reads the header at `offset`; false when there is none that is sound.
 bool read_header(std::ifstream& file, std::uint64_t offset, RecordHeader& header) {
   file.seekg(static_cast<std::streamoff>(offset));
   file.read(reinterpret_cast<char*>(&header), sizeof(RecordHeader));
-  return file.good() && header.magic == kMagic && header.header_crc == header.computed_crc();
+  return file.good() && (header.magic == kTilesMagic || header.magic == kIndicesMagic) &&
+         header.header_crc == header.computed_crc();
 }
 
 /// Where a unit lies, as sent between ranks.
 struct RecordPlace {
   std::uint64_t unit_id = 0;
   UnitPlace place;
+};
+
+struct IndicesPlace {
+  std::uint64_t unit_id = 0;
+  std::uint64_t codebook_crc = 0;
+  UnitPlace place;
+};
+
+/// What the shards of earlier runs hold.
+struct FoundUnits {
+  std::set<std::uint64_t> seen;
+  std::vector<RecordPlace> tiles;  ///< each unit once
+  std::vector<IndicesPlace> indices;
 };
 
 /// "0017-000003.shard": run, rank.
@@ -88,8 +108,7 @@ std::vector<UnitPlace> shards_of(const std::filesystem::path& folder) {
 void scan_shard(const std::filesystem::path& folder,
                 const UnitPlace& shard,
                 std::span<const WorkUnit> units,
-                std::set<std::uint64_t>& seen,
-                std::vector<RecordPlace>& found) {
+                FoundUnits& found) {
   const std::filesystem::path path = folder / shard_name(shard.run, shard.rank);
   std::ifstream file(path, std::ios::binary);
   const std::uint64_t size = std::filesystem::file_size(path);
@@ -100,33 +119,56 @@ void scan_shard(const std::filesystem::path& folder,
         !is_header_of(header, units[header.unit_id]) ||
         header.content_bytes() > size - place.offset - sizeof(RecordHeader))
       return;
-    if (seen.insert(header.unit_id).second) found.push_back({header.unit_id, place});
+    if (!header.is_of_tiles())
+      found.indices.push_back({header.unit_id, header.detail, place});
+    else if (found.seen.insert(header.unit_id).second)
+      found.tiles.push_back({header.unit_id, place});
     place.offset += sizeof(RecordHeader) + header.content_bytes();
   }
 }
 
-/// The unit, or nothing when it is damaged.
+void read_into(std::ifstream& file, std::span<std::byte> bytes) {
+  file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+}
+
+/// The unit's tiles, or nothing when they are damaged.
 std::optional<UnitTiles> read_unit(const std::filesystem::path& path,
                                    std::uint64_t offset,
                                    const WorkUnit& unit) {
   std::ifstream file(path, std::ios::binary);
   RecordHeader header;
-  if (!read_header(file, offset, header) || !is_header_of(header, unit)) return std::nullopt;
+  if (!read_header(file, offset, header) || !header.is_of_tiles() || !is_header_of(header, unit))
+    return std::nullopt;
   UnitTiles tiles;
   tiles.unit_id = unit.id;
-  tiles.occupied.resize(header.bitmap_words);
-  tiles.tiles.resize(header.tile_count);
-  const auto read_into = [&](std::span<std::byte> bytes) {
-    file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-  };
+  tiles.occupied.resize(header.detail);
+  tiles.tiles.resize(header.count);
   const auto bitmap = std::as_writable_bytes(std::span(tiles.occupied));
   const auto content = std::as_writable_bytes(std::span(tiles.tiles));
-  read_into(bitmap);
-  read_into(content);
+  read_into(file, bitmap);
+  read_into(file, content);
   const bool is_sound = file.good() && crc32c(content, crc32c(bitmap)) == header.content_crc &&
                         problems(tiles, unit).empty();
   if (!is_sound) return std::nullopt;
   return tiles;
+}
+
+/// The unit's indices, or nothing when they are damaged.
+std::optional<EncodedUnit> read_indices(const std::filesystem::path& path,
+                                        std::uint64_t offset,
+                                        const WorkUnit& unit) {
+  std::ifstream file(path, std::ios::binary);
+  RecordHeader header;
+  if (!read_header(file, offset, header) || header.is_of_tiles() || !is_header_of(header, unit))
+    return std::nullopt;
+  EncodedUnit encoded;
+  encoded.indices.resize(header.count);
+  const auto error = std::as_writable_bytes(std::span(&encoded.squared_error, 1));
+  const auto indices = std::as_writable_bytes(std::span(encoded.indices));
+  read_into(file, error);
+  read_into(file, indices);
+  if (!file.good() || crc32c(indices, crc32c(error)) != header.content_crc) return std::nullopt;
+  return encoded;
 }
 
 template <typename Record>
@@ -227,45 +269,80 @@ std::filesystem::path ProgressFolder::path_of(const UnitPlace& place) const {
 }
 
 void ProgressFolder::visit_finished(std::span<const WorkUnit> units, const Visit& visit) {
-  std::vector<RecordPlace> found;
+  FoundUnits found;
   all_or_none(communicator_, [&] {
     if (!communicator_.is_root()) return;
-    std::set<std::uint64_t> seen;
-    for (const UnitPlace& shard : shards_of(path_)) scan_shard(path_, shard, units, seen, found);
+    for (const UnitPlace& shard : shards_of(path_)) scan_shard(path_, shard, units, found);
   });
-  std::vector<std::byte> bytes = bytes_of(found);
+  std::vector<std::byte> bytes = bytes_of(found.tiles);
   communicator_.broadcast(bytes);
-  found = records_of<RecordPlace>(bytes);
+  found.tiles = records_of<RecordPlace>(bytes);
+  bytes = bytes_of(found.indices);
+  communicator_.broadcast(bytes);
+  // Later runs are the ones to go on with.
+  for (const IndicesPlace& of_unit : records_of<IndicesPlace>(bytes))
+    encoded_places_[static_cast<std::uint32_t>(of_unit.unit_id)] = {
+        of_unit.place, static_cast<std::uint32_t>(of_unit.codebook_crc)};
   const auto ranks = static_cast<std::size_t>(communicator_.size());
-  for (auto i = static_cast<std::size_t>(communicator_.rank()); i < found.size(); i += ranks) {
-    const WorkUnit& unit = units[found[i].unit_id];
-    std::optional<UnitTiles> tiles =
-        read_unit(path_of(found[i].place), found[i].place.offset, unit);
+  for (auto i = static_cast<std::size_t>(communicator_.rank()); i < found.tiles.size();
+       i += ranks) {
+    const auto& [unit_id, place] = found.tiles[i];
+    const WorkUnit& unit = units[unit_id];
+    std::optional<UnitTiles> tiles = read_unit(path_of(place), place.offset, unit);
     if (!tiles.has_value()) continue;
-    places_[unit.id] = found[i].place;
+    places_[unit.id] = place;
     visit(std::move(*tiles));
   }
 }
 
-void ProgressFolder::append(const UnitTiles& tiles) {
+void ProgressFolder::append(std::initializer_list<std::span<const std::byte>> parts) {
   const std::filesystem::path path = path_of(shard_);
   if (!file_.is_open()) file_.open(path, std::ios::binary | std::ios::app);
+  for (const auto& part : parts) {
+    file_.write(reinterpret_cast<const char*>(part.data()),
+                static_cast<std::streamsize>(part.size()));
+    shard_.offset += part.size();
+  }
+  file_.flush();
+  if (!file_)
+    throw FileError(path.string(), std::string("cannot be written: ") + std::strerror(errno));
+}
+
+void ProgressFolder::append(const UnitTiles& tiles) {
   const auto bitmap = std::as_bytes(std::span(tiles.occupied));
   const auto content = std::as_bytes(std::span(tiles.tiles));
   RecordHeader header;
   header.unit_id = tiles.unit_id;
-  header.bitmap_words = static_cast<std::uint32_t>(tiles.occupied.size());
-  header.tile_count = tiles.tiles.size();
+  header.detail = static_cast<std::uint32_t>(tiles.occupied.size());
+  header.count = tiles.tiles.size();
   header.content_crc = crc32c(content, crc32c(bitmap));
   header.header_crc = header.computed_crc();
-  for (const auto& part : {std::as_bytes(std::span(&header, 1)), bitmap, content})
-    file_.write(reinterpret_cast<const char*>(part.data()),
-                static_cast<std::streamsize>(part.size()));
-  file_.flush();
-  if (!file_)
-    throw FileError(path.string(), std::string("cannot be written: ") + std::strerror(errno));
-  places_[tiles.unit_id] = shard_;
-  shard_.offset += sizeof(header) + header.content_bytes();
+  const UnitPlace place = shard_;
+  append({std::as_bytes(std::span(&header, 1)), bitmap, content});
+  places_[tiles.unit_id] = place;
+}
+
+void ProgressFolder::append(const WorkUnit& unit,
+                            const EncodedUnit& encoded,
+                            std::uint32_t codebook_crc) {
+  const auto error = std::as_bytes(std::span(&encoded.squared_error, 1));
+  const auto indices = std::as_bytes(std::span(encoded.indices));
+  RecordHeader header;
+  header.magic = kIndicesMagic;
+  header.unit_id = unit.id;
+  header.detail = codebook_crc;
+  header.count = encoded.indices.size();
+  header.content_crc = crc32c(indices, crc32c(error));
+  header.header_crc = header.computed_crc();
+  append({std::as_bytes(std::span(&header, 1)), error, indices});
+}
+
+std::optional<EncodedUnit> ProgressFolder::read_encoded(const WorkUnit& unit,
+                                                        std::uint32_t codebook_crc) const {
+  const auto found = encoded_places_.find(unit.id);
+  if (found == encoded_places_.end() || found->second.codebook_crc != codebook_crc)
+    return std::nullopt;
+  return read_indices(path_of(found->second.place), found->second.place.offset, unit);
 }
 
 void ProgressFolder::share_places() {

@@ -4,13 +4,16 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <initializer_list>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "io/progress_manifest.h"
 #include "parallel/communicator.h"
+#include "precompute/field_encoder.h"
 #include "precompute/unit_tiles.h"
 
 namespace af {
@@ -29,9 +32,16 @@ struct UnitPlace {
   std::uint64_t offset = 0;
 };
 
+/// The indices of a unit in a shard, and the codebook that they are of.
+struct EncodedPlace {
+  UnitPlace place;
+  std::uint32_t codebook_crc = 0;
+};
+
 /// Unfinished work of one field, "NAME.progress/": manifest.json and one shard per rank and run,
-/// to which finished units are appended, each with its size and CRC-32C. Whatever a killed run left
-/// incomplete fails its CRC and is cast again.
+/// to which finished units are appended, each with its size and CRC-32C: first as tiles, then, when
+/// there is a codebook, as indices. Whatever a killed run left incomplete fails its CRC and is done
+/// again.
 class ProgressFolder {
  public:
   /// Collective. Opens or creates the folder. With work of an earlier run in it, `manifest` takes
@@ -49,6 +59,14 @@ class ProgressFolder {
 
   /// Appends a finished unit to this rank's shard. FileError when it cannot be written.
   void append(const UnitTiles& tiles);
+
+  /// Appends the indices of a unit, by the codebook of this CRC-32C. FileError as above.
+  void append(const WorkUnit& unit, const EncodedUnit& encoded, std::uint32_t codebook_crc);
+
+  /// The indices of a unit that an earlier run encoded with the codebook of this CRC-32C; nothing
+  /// when there are none, or damaged ones.
+  [[nodiscard]] std::optional<EncodedUnit> read_encoded(const WorkUnit& unit,
+                                                        std::uint32_t codebook_crc) const;
 
   /// Collective. Tells every rank where each unit lies, so that any can read it.
   void share_places();
@@ -71,12 +89,14 @@ class ProgressFolder {
 
  private:
   [[nodiscard]] std::filesystem::path path_of(const UnitPlace& place) const;
+  void append(std::initializer_list<std::span<const std::byte>> parts);
 
   std::filesystem::path path_;
   Communicator communicator_;
   UnitPlace shard_;  ///< this rank's, and where its next unit will lie
   std::ofstream file_;
   std::map<std::uint32_t, UnitPlace> places_;
+  std::map<std::uint32_t, EncodedPlace> encoded_places_;  ///< of earlier runs
 };
 
 }  // namespace af

@@ -10,6 +10,7 @@
 #include "base/vector_width.h"
 #include "precompute/field_build_program.h"
 #include "precompute/planner.h"
+#include "precompute/training_files.h"
 #include "support/test_paths.h"
 #include "volume/phantoms.h"
 
@@ -311,6 +312,66 @@ TEST_F(FieldBuildTest, TooManyCodewordsAreOneErrorOfTheWholeJob) {
               std::string::npos)
         << error.what();
   }
+}
+
+TEST_F(FieldBuildTest, TrainingIsKeptForTheSameOptionsOnly) {
+  TrainedCodebook training;
+  training.codebook.codewords = {Tile{}, Tile{1, 2, 3}};
+  training.training_tiles = 70;
+  training.iterations = {{500, 60, 1}, {400, 50, 0}};
+  const DecidingValues decides = {{"codewords", "2"}};
+  EXPECT_FALSE(TrainingJournal(folder_ / "progress", decides, world_).begun().has_value());
+  TrainingJournal(folder_ / "progress", decides, world_).append(training);
+  const auto begun = TrainingJournal(folder_ / "progress", decides, world_).begun();
+  ASSERT_TRUE(begun.has_value());
+  EXPECT_EQ(begun->codebook.codewords, training.codebook.codewords);
+  EXPECT_EQ(begun->training_tiles, 70u);
+  ASSERT_EQ(begun->iterations.size(), 2u);
+  EXPECT_EQ(begun->iterations[1].training_squared_error, 400u);
+  const TrainingJournal other(folder_ / "progress", {{"codewords", "3"}}, world_);
+  EXPECT_FALSE(other.begun().has_value());
+}
+
+TEST(TrainingFiles, BytesThatAreNotOfATrainingAreNone) {
+  TrainedCodebook training;
+  training.codebook.codewords = {Tile{}};
+  training.iterations = {{5, 6, 0}};
+  std::vector<std::byte> bytes = packed_training(training);
+  EXPECT_TRUE(unpacked_training(bytes).has_value());
+  bytes.pop_back();
+  EXPECT_FALSE(unpacked_training(bytes).has_value());
+  EXPECT_FALSE(unpacked_training({}).has_value());
+  std::fill(bytes.begin(), bytes.end(), std::byte{0xFF});  // sizes that would overflow
+  EXPECT_FALSE(unpacked_training(bytes).has_value());
+}
+
+TEST_F(FieldBuildTest, EncodedUnitsAreReadForTheirCodebookOnly) {
+  const auto units = plan_units(light_slab_, {kUnitRays});
+  ProgressManifest expected = manifest(kUnitRays);
+  const EncodedUnit encoded{std::vector<std::uint16_t>(units[1].tile_count(), 7), 99};
+  constexpr std::uint32_t kCodebookCrc = 5;
+  {
+    ProgressFolder progress(folder_ / "a.h5.progress", false, expected, world_);
+    if (world_.is_root()) progress.append(units[1], encoded, kCodebookCrc);
+    world_.barrier();
+  }
+  ProgressFolder progress(folder_ / "a.h5.progress", false, expected, world_);
+  progress.visit_finished(units, [](const UnitTiles&) { ADD_FAILURE() << "no tiles were kept"; });
+  const auto read = progress.read_encoded(units[1], kCodebookCrc);
+  ASSERT_TRUE(read.has_value());
+  EXPECT_EQ(read->indices, encoded.indices);
+  EXPECT_EQ(read->squared_error, 99u);
+  EXPECT_FALSE(progress.read_encoded(units[1], kCodebookCrc + 1).has_value());
+  EXPECT_FALSE(progress.read_encoded(units[0], kCodebookCrc).has_value());
+  world_.barrier();
+  if (world_.is_root()) {
+    std::fstream shard(progress.path() / "0000-000000.shard",
+                       std::ios::in | std::ios::out | std::ios::binary);
+    shard.seekp(41);  // behind the header and the error: in the indices
+    shard.put('\x5A');
+  }
+  world_.barrier();
+  EXPECT_FALSE(progress.read_encoded(units[1], kCodebookCrc).has_value());
 }
 
 TEST_F(FieldBuildTest, GeometryOfRankZeroIsTakenOver) {

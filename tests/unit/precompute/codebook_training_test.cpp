@@ -112,6 +112,30 @@ TEST(CodebookTraining, IsBitIdenticalOnAnyRankCount) {
   }
 }
 
+TEST(CodebookTraining, GoesOnFromAnyIterationToTheSameCodebook) {
+  const auto tiles = training_tiles(3000);
+  const TrainingShare share = dealt(tiles, 1).front();
+  const CodebookOptions options{.codewords = 100, .max_iterations = 20, .seed = kSeed};
+  std::vector<TrainedCodebook> after_iterations;
+  TrainingCheckpoints remember;
+  remember.on_iteration = [&](const TrainedCodebook& so_far) {
+    after_iterations.push_back(so_far);
+  };
+  const TrainedCodebook whole = train_codebook(share, options, serial_reduction(), {}, remember);
+  ASSERT_GT(whole.iterations.size(), 2u);
+  ASSERT_EQ(after_iterations.size(), whole.iterations.size());
+  for (const TrainedCodebook& begun : after_iterations) {
+    std::size_t iterations_done = 0;
+    TrainingCheckpoints go_on;
+    go_on.begun = begun;
+    go_on.on_iteration = [&](const TrainedCodebook&) { ++iterations_done; };
+    const TrainedCodebook trained = train_codebook(share, options, serial_reduction(), {}, go_on);
+    EXPECT_EQ(trained.codebook.codewords, whole.codebook.codewords);
+    EXPECT_EQ(trained.stop, whole.stop);
+    EXPECT_EQ(iterations_done, whole.iterations.size() - begun.iterations.size());
+  }
+}
+
 TEST(CodebookTraining, IsBitIdenticalOnEveryVectorWidth) {
   const TrainingShare share = dealt(training_tiles(3000), 1).front();
   const CodebookOptions options{.codewords = 100, .seed = kSeed};

@@ -1,0 +1,444 @@
+// SPDX-License-Identifier: Apache-2.0
+// Jobs cut short at random moments within every stage, and gone on with on other rank counts:
+// nothing lost, nothing done twice, the same bytes. A seeded handful; AF_KILLS=100 kills as many
+// times, AF_KILL_SEED draws others.
+#include <algorithm>
+#include <array>
+#include <csignal>
+#include <cstdint>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <random>
+#include <set>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "io/csv_table.h"
+#include "io/output_file.h"
+#include "programs/small_study.h"
+#include "support/launched_job.h"
+#include "support/run_program.h"
+#include "support/test_paths.h"
+
+namespace af {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+enum class Stage { Cast, Train, Encode, Evaluate };
+enum class Cut { Usr1, Term, KillRank, KillAll };
+constexpr std::array kCastTrainEncode = {Stage::Cast, Stage::Train, Stage::Encode};
+constexpr std::array kCuts = {Cut::Usr1, Cut::Term, Cut::KillRank, Cut::KillAll};
+constexpr std::array kRankCounts = {1, 2, 4};
+constexpr std::chrono::seconds kEndsWithin{60};
+
+const char* name_of(Stage stage) {
+  constexpr std::array names = {"cast", "train", "encode", "evaluate"};
+  return names[static_cast<std::size_t>(stage)];
+}
+
+const char* name_of(Cut cut) {
+  constexpr std::array names = {"SIGUSR1", "SIGTERM", "SIGKILL of one rank", "SIGKILL of all"};
+  return names[static_cast<std::size_t>(cut)];
+}
+
+std::uint64_t setting(const char* variable, std::uint64_t otherwise) {
+  const char* const text = std::getenv(variable);
+  return text == nullptr ? otherwise : std::stoull(text);
+}
+
+/// Bytes of finished work below a progress folder; 0 when it is not there.
+struct ProgressBytes {
+  std::uint64_t units = 0;     ///< tiles, then indices
+  std::uint64_t training = 0;  ///< iterations; rows of registrations
+};
+
+ProgressBytes progress_bytes(const fs::path& folder) {
+  ProgressBytes bytes;
+  std::error_code gone;
+  for (const auto& entry : fs::directory_iterator(folder, gone)) {
+    const std::uintmax_t size = fs::file_size(entry.path(), gone);
+    if (gone) continue;
+    if (entry.path().extension() == ".shard") bytes.units += size;
+    if (entry.path().extension() == ".records") bytes.training += size;
+  }
+  return bytes;
+}
+
+/// Records that are whole in the progress of af-precompute, counted from the bytes.
+struct KeptWork {
+  std::set<std::uint32_t> cast;
+  std::set<std::uint32_t> encoded;
+  std::uint64_t iterations = 0;
+};
+
+template <typename T>
+T number_at(const std::string& bytes, std::size_t position) {
+  T number{};
+  std::memcpy(&number, bytes.data() + position, sizeof(T));
+  return number;
+}
+
+void count_units(const std::string& shard, KeptWork& kept) {
+  constexpr std::size_t kHeaderBytes = 32;
+  for (std::size_t at = 0; at + kHeaderBytes <= shard.size();) {
+    const bool is_cast = shard.substr(at, 8) == "AFUNIT01";
+    const auto unit = number_at<std::uint32_t>(shard, at + 8);
+    const auto words = number_at<std::uint32_t>(shard, at + 12);
+    const auto count = number_at<std::uint64_t>(shard, at + 16);
+    at += kHeaderBytes + (is_cast ? 8 * words + 32 * count : 8 + 2 * count);
+    if (at > shard.size()) return;
+    (is_cast ? kept.cast : kept.encoded).insert(unit);
+  }
+}
+
+KeptWork kept_work(const fs::path& folder) {
+  KeptWork kept;
+  for (const auto& entry : fs::directory_iterator(folder))
+    if (entry.path().extension() == ".shard") count_units(read_text_file(entry.path()), kept);
+  if (!fs::exists(folder / "training.records")) return kept;
+  const std::string records = read_text_file(folder / "training.records");
+  constexpr std::size_t kHeaderBytes = 16;
+  for (std::size_t at = 0; at + kHeaderBytes <= records.size(); ++kept.iterations) {
+    at += kHeaderBytes + number_at<std::uint32_t>(records, at + 4);
+    if (at > records.size()) return kept;
+  }
+  return kept;
+}
+
+/// Progress at which a stage begins and ends, from an undisturbed run.
+struct StageBytes {
+  std::uint64_t all_cast = 0;
+  std::uint64_t all_trained = 0;
+  std::uint64_t all_encoded = 0;
+};
+
+/// One run to be cut: what, where, when, how.
+struct Plan {
+  Stage stage = Stage::Cast;
+  Cut cut = Cut::Usr1;
+  int ranks = 1;
+  int other_ranks = 2;
+};
+
+class KillMatrix : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    setenv("OMPI_ALLOW_RUN_AS_ROOT", "1", 1);
+    setenv("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1", 1);
+    setenv("OMPI_MCA_hwloc_base_binding_policy", "none", 1);
+    // A slow search: training and encoding last long enough to be hit.
+    setenv("AF_VECTOR_BITS", "128", 1);
+    folder_ = new test::ScratchFolder();
+    test::write_small_study(folder_->path());
+  }
+  static void TearDownTestSuite() { delete folder_; }
+
+  static fs::path path(const std::string& name) { return *folder_ / name; }
+
+  static std::vector<std::string> under_mpirun(int ranks, std::vector<std::string> command) {
+    // The test itself goes first, so that it does not miss a moment on a busy machine.
+    std::vector<std::string> all = {
+        "nice", "-n", "5", AF_MPIEXEC, "--oversubscribe", "-n", std::to_string(ranks)};
+    all.insert(all.end(), command.begin(), command.end());
+    return all;
+  }
+  static std::vector<std::string> precompute(int ranks, const fs::path& field) {
+    const std::string study = path("study.toml");
+    return under_mpirun(ranks,
+                        {AF_PROGRAM_FOLDER "/af-precompute",
+                         "--study",
+                         study,
+                         "--camera",
+                         "AP",
+                         "--max-translation-mm",
+                         "12",
+                         "--uv-nodes",
+                         "24",
+                         "--st-nodes",
+                         "144",
+                         "--caster",
+                         "trilinear",
+                         "--step-mm",
+                         "1",
+                         "--codewords",
+                         "20000",
+                         "--max-iterations",
+                         "6",
+                         "-o",
+                         field});
+  }
+  static std::vector<std::string> registration(int ranks, const fs::path& folder) {
+    return under_mpirun(ranks,
+                        {AF_PROGRAM_FOLDER "/af-evaluate",
+                         "registration",
+                         "--study",
+                         path("study.toml"),
+                         "--field",
+                         "AP=" + path("AP.af.h5").string(),
+                         "--field",
+                         "LAT=" + path("LAT.af.h5").string(),
+                         "--preset",
+                         "paper",
+                         "--starts-per-interval",
+                         "25",
+                         "-o",
+                         folder});
+  }
+
+  /// What af-inspect says of a field whose checksums it has verified.
+  static json inspected(const fs::path& field) {
+    const test::ProgramRun run =
+        test::run_command(AF_PROGRAM_FOLDER "/af-inspect --json " + field.string());
+    EXPECT_EQ(run.exit_code, 0) << run.output;
+    return json::parse(run.output)[0]["facts"];
+  }
+
+  /// An undisturbed run: its payload, and where its stages lie.
+  static StageBytes measure(int ranks) {
+    const fs::path field = path("whole.af.h5");
+    const fs::path progress = field.string() + ".progress";
+    StageBytes bytes;
+    test::LaunchedJob job(precompute(ranks, field), path("output.txt"));
+    job.wait_until([&] {
+      const ProgressBytes now = progress_bytes(progress);
+      bytes.all_trained = std::max(bytes.all_trained, now.training);
+      // Not while the folder is being removed.
+      if (bytes.all_trained == 0) bytes.all_cast = std::max(bytes.all_cast, now.units);
+      bytes.all_encoded = std::max(bytes.all_encoded, now.units);
+      return false;
+    });
+    EXPECT_EQ(job.wait(kEndsWithin), 0) << read_text_file(path("output.txt"));
+    const std::string payload = inspected(field)["payload_sha256"];
+    if (payload_.empty()) payload_ = payload;
+    EXPECT_EQ(payload, payload_);
+    fs::remove(field);
+    return bytes;
+  }
+
+  static const StageBytes& bytes_on(int ranks) {
+    auto found = bytes_.find(ranks);
+    if (found == bytes_.end()) found = bytes_.emplace(ranks, measure(ranks)).first;
+    return found->second;
+  }
+
+  double fraction() { return std::uniform_real_distribution<>(0.0, 1.0)(random_); }
+
+  /// Waits for a moment of a stage, drawn uniformly over its finished work, and a little longer:
+  /// moments within a unit are hit, too.
+  bool reach(const Plan& plan, test::LaunchedJob& job, const fs::path& progress) {
+    const StageBytes& stages = bytes_on(plan.ranks);
+    const double drawn = fraction();
+    const auto part = [&](std::uint64_t begin, std::uint64_t end) {
+      return begin + static_cast<std::uint64_t>(drawn * static_cast<double>(end - begin));
+    };
+    const bool is_reached = job.wait_until([&] {
+      const ProgressBytes now = progress_bytes(progress);
+      switch (plan.stage) {
+        case Stage::Cast:
+          return now.units > part(0, stages.all_cast);
+        case Stage::Train:
+          return now.units >= stages.all_cast && now.training >= part(0, stages.all_trained);
+        case Stage::Encode:
+          return now.units > part(stages.all_cast, stages.all_encoded);
+        case Stage::Evaluate:
+          return now.training > part(0, registration_bytes_);
+      }
+      return false;
+    });
+    // At most about the time that a unit takes; encoding one takes no longer than a poll.
+    constexpr std::array kLongestUnitMs = {10.0, 100.0, 0.0, 20.0};
+    const double unit_ms = kLongestUnitMs[static_cast<std::size_t>(plan.stage)];
+    std::this_thread::sleep_for(std::chrono::duration<double, std::milli>(fraction() * unit_ms));
+    return is_reached;
+  }
+
+  void cut_short(const Plan& plan, const test::LaunchedJob& job) {
+    std::vector<pid_t> ranks = job.ranks();
+    std::shuffle(ranks.begin(), ranks.end(), random_);
+    if (plan.cut == Cut::Usr1) kill(job.launcher(), SIGUSR1);
+    if (plan.cut == Cut::Term) {
+      // Open MPI takes half a second to pass it on: until then the ranks stay where they are.
+      for (const pid_t rank : ranks) kill(rank, SIGSTOP);
+      kill(job.launcher(), SIGTERM);
+    }
+    if (plan.cut == Cut::KillAll) kill(job.launcher(), SIGKILL);
+    if (plan.cut == Cut::KillRank && !ranks.empty()) kill(ranks.front(), SIGKILL);
+    if (plan.cut == Cut::KillAll)
+      for (const pid_t rank : ranks) kill(rank, SIGKILL);
+  }
+
+  /// Cuts a run of af-precompute; false when it was over before the signal came.
+  bool cut_field(const Plan& plan, const fs::path& field) {
+    const fs::path progress = field.string() + ".progress";
+    test::LaunchedJob job(precompute(plan.ranks, field), path("output.txt"));
+    const bool is_reached = reach(plan, job, progress);
+    cut_short(plan, job);
+    const int exit_code = job.wait(kEndsWithin);
+    if (!is_reached || fs::exists(field)) return false;
+    const std::string said = read_text_file(path("output.txt"));
+    EXPECT_EQ(exit_code == 75, plan.cut == Cut::Usr1) << exit_code << said;
+    EXPECT_NE(exit_code, 0) << said;
+    if (plan.cut == Cut::Usr1) {
+      EXPECT_NE(said.find("run the same command again"), std::string::npos) << said;
+    }
+    return true;
+  }
+
+  /// Goes on to the end: the same payload, and none of the kept work done again.
+  void expect_whole(const Plan& plan, const fs::path& field) {
+    const fs::path progress = field.string() + ".progress";
+    const KeptWork kept = kept_work(progress);
+    test::LaunchedJob job(precompute(plan.other_ranks, field), path("output.txt"));
+    ASSERT_EQ(job.wait(kEndsWithin), 0) << read_text_file(path("output.txt"));
+    const json facts = inspected(field);
+    EXPECT_EQ(facts["payload_sha256"], payload_);
+    const json details = facts["provenance"]["details"];
+    EXPECT_EQ(details["units_resumed"], kept.cast.size());
+    EXPECT_EQ(details["training_iterations_resumed"], kept.iterations);
+    EXPECT_EQ(details["units_encoded_before"], kept.encoded.size());
+    EXPECT_FALSE(fs::exists(progress));
+    units_kept_ += kept.cast.size();
+    iterations_kept_ += kept.iterations;
+    encoded_kept_ += kept.encoded.size();
+  }
+
+  static void make_fields() {
+    for (const std::string camera : {"AP", "LAT"}) {
+      if (fs::exists(path(camera + ".af.h5"))) continue;
+      const test::ProgramRun run = test::run_command(
+          std::string(AF_PROGRAM_FOLDER
+                      "/af-precompute --max-rotation-deg 15 "
+                      "--max-translation-mm 12 --uv-nodes 20 --st-nodes 64 --codewords 512 ") +
+          "--camera " + camera + " --study " + path("study.toml").string() + " -o " +
+          path(camera + ".af.h5").string());
+      ASSERT_EQ(run.exit_code, 0) << run.output;
+    }
+  }
+
+  static std::string rows_without_seconds(const fs::path& folder) {
+    const CsvTable table = CsvTable::read(folder / "registrations.csv");
+    std::string result;
+    for (std::size_t i = 0; i < table.row_count(); ++i)
+      for (const std::string& column : table.columns())
+        if (column != "seconds") result += table.text(i, column) + ",";
+    return result;
+  }
+
+  static void measure_registration() {
+    if (registration_bytes_ > 0) return;
+    make_fields();
+    test::LaunchedJob job(registration(2, path("whole")), path("output.txt"));
+    job.wait_until([&] {
+      registration_bytes_ =
+          std::max(registration_bytes_, progress_bytes(path("whole.progress")).training);
+      return false;
+    });
+    ASSERT_EQ(job.wait(kEndsWithin), 0) << read_text_file(path("output.txt"));
+    rows_ = rows_without_seconds(path("whole"));
+  }
+
+  bool cut_registration(const Plan& plan, const fs::path& folder) {
+    test::LaunchedJob job(registration(plan.ranks, folder), path("output.txt"));
+    const bool is_reached = reach(plan, job, folder.string() + ".progress");
+    cut_short(plan, job);
+    const int exit_code = job.wait(kEndsWithin);
+    if (!is_reached || fs::exists(folder / "summary.json")) return false;
+    EXPECT_EQ(exit_code == 75, plan.cut == Cut::Usr1) << exit_code;
+    EXPECT_NE(exit_code, 0);
+    return true;
+  }
+
+  static void expect_whole_registration(const Plan& plan, const fs::path& folder) {
+    test::LaunchedJob job(registration(plan.other_ranks, folder), path("output.txt"));
+    ASSERT_EQ(job.wait(kEndsWithin), 0) << read_text_file(path("output.txt"));
+    EXPECT_NE(read_text_file(path("output.txt")).find("goes on after"), std::string::npos);
+    EXPECT_EQ(rows_without_seconds(folder), rows_);
+    EXPECT_FALSE(fs::exists(folder.string() + ".progress"));
+  }
+
+  /// Cuts, sometimes cuts what goes on, too, and goes on to the end.
+  void go_through(const Plan& plan) {
+    SCOPED_TRACE(std::string(name_of(plan.stage)) + ", " + name_of(plan.cut) + ", " +
+                 std::to_string(plan.ranks) + " ranks, then " + std::to_string(plan.other_ranks));
+    const fs::path output = path("cut-" + std::to_string(cuts_made_) + ".out");
+    const bool is_evaluation = plan.stage == Stage::Evaluate;
+    if (is_evaluation) measure_registration();
+    constexpr int kMostTries = 10;
+    for (int i = 0; i < kMostTries; ++i) {
+      fs::remove_all(output);
+      fs::remove_all(output.string() + ".progress");
+      if (!(is_evaluation ? cut_registration(plan, output) : cut_field(plan, output))) continue;
+      ++cuts_made_;
+      if (is_evaluation)
+        expect_whole_registration(plan, output);
+      else
+        expect_whole(plan, output);
+      fs::remove_all(output);
+      return;
+    }
+    const StageBytes& stages = bytes_on(plan.ranks);
+    ADD_FAILURE() << "the run was over too early " << kMostTries
+                  << " times; bytes of its stages: " << stages.all_cast << ", "
+                  << stages.all_trained << ", " << stages.all_encoded;
+  }
+
+  int other_than(int ranks) {
+    int other = ranks;
+    while (other == ranks) other = kRankCounts[random_() % kRankCounts.size()];
+    return other;
+  }
+
+  std::mt19937_64 random_{setting("AF_KILL_SEED", 1)};
+  std::uint64_t cuts_made_ = 0;
+  std::uint64_t units_kept_ = 0;
+  std::uint64_t iterations_kept_ = 0;
+  std::uint64_t encoded_kept_ = 0;
+
+ private:
+  static inline test::ScratchFolder* folder_ = nullptr;
+  static inline std::string payload_;
+  static inline std::map<int, StageBytes> bytes_;
+  static inline std::string rows_;
+  static inline std::uint64_t registration_bytes_ = 0;
+};
+
+/// Every stage with every cut; the rank counts take turns.
+TEST_F(KillMatrix, GoesOnToTheSameBytesOnAnotherRankCount) {
+  std::cout << "AF_KILL_SEED=" << setting("AF_KILL_SEED", 1) << '\n';
+  std::size_t turn = random_() % kRankCounts.size();
+  for (const Stage stage : kCastTrainEncode)
+    for (const Cut cut : kCuts) {
+      const int ranks = kRankCounts[turn++ % kRankCounts.size()];
+      go_through({stage, cut, ranks, other_than(ranks)});
+    }
+}
+
+/// AF_KILLS times: stages, cuts and rank counts in turn, so that each of the 48 comes up.
+TEST_F(KillMatrix, LosesNothingOverManyKills) {
+  const std::uint64_t kills = setting("AF_KILLS", 0);
+  if (kills == 0) GTEST_SKIP() << "AF_KILLS=100 asks for it";
+  constexpr std::size_t kStages = 4;
+  for (std::uint64_t i = 0; i < kills && !HasFailure(); ++i) {
+    const int ranks = kRankCounts[i % kRankCounts.size()];
+    const Cut cut = kCuts[i / kRankCounts.size() % kCuts.size()];
+    const auto stage = static_cast<Stage>(i / (kRankCounts.size() * kCuts.size()) % kStages);
+    go_through({stage, cut, ranks, other_than(ranks)});
+  }
+  std::cout << cuts_made_ << " runs cut short; kept and not done again: " << units_kept_
+            << " cast units, " << iterations_kept_ << " iterations, " << encoded_kept_
+            << " encoded units\n";
+}
+
+}  // namespace
+}  // namespace af
