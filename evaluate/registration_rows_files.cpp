@@ -85,9 +85,8 @@ std::vector<std::string> start_fields(const std::string& case_name,
 
 }  // namespace
 
-json packed_row(std::int64_t order, const RegistrationRow& row) {
-  return {order,
-          row.case_name,
+json packed_row(const RegistrationRow& row) {
+  return {row.case_name,
           row.renderer,
           row.start_index,
           row.draw_index,
@@ -104,26 +103,26 @@ json packed_row(std::int64_t order, const RegistrationRow& row) {
 
 RegistrationRow row_of(const json& packed) {
   RegistrationRow row;
-  row.case_name = packed.at(1).get<std::string>();
-  row.renderer = packed.at(2).get<std::string>();
-  row.start_index = integer_of<std::int64_t>(packed.at(3));
-  row.draw_index = integer_of<std::uint64_t>(packed.at(4));
-  row.interval = integer_of<int>(packed.at(5));
-  row.start_deg_mm = packed.at(6).get<std::array<double, 6>>();
-  row.final_deg_mm = packed.at(7).get<std::array<double, 6>>();
-  const auto values = packed.at(8).get<std::array<double, 5>>();
+  row.case_name = packed.at(0).get<std::string>();
+  row.renderer = packed.at(1).get<std::string>();
+  row.start_index = integer_of<std::int64_t>(packed.at(2));
+  row.draw_index = integer_of<std::uint64_t>(packed.at(3));
+  row.interval = integer_of<int>(packed.at(4));
+  row.start_deg_mm = packed.at(5).get<std::array<double, 6>>();
+  row.final_deg_mm = packed.at(6).get<std::array<double, 6>>();
+  const auto values = packed.at(7).get<std::array<double, 5>>();
   row.initial_tre_mm = values[0];
   row.tre_mm = values[1];
   row.stated_pose_tre_mm = values[2];
   row.similarity = values[3];
   row.seconds = values[4];
-  row.errors = RegistrationErrors::of_values(packed.at(9).get<std::array<double, 5>>());
-  row.evaluations = integer_of<std::int64_t>(packed.at(10).at(0));
-  row.inadmissible = integer_of<std::int64_t>(packed.at(10).at(1));
-  row.drr_count = integer_of<std::int64_t>(packed.at(10).at(2));
-  row.stop_reason = packed.at(11).get<std::string>();
-  row.error = packed.at(12).get<std::string>();
-  row.trace = trace_of(packed.at(13));
+  row.errors = RegistrationErrors::of_values(packed.at(8).get<std::array<double, 5>>());
+  row.evaluations = integer_of<std::int64_t>(packed.at(9).at(0));
+  row.inadmissible = integer_of<std::int64_t>(packed.at(9).at(1));
+  row.drr_count = integer_of<std::int64_t>(packed.at(9).at(2));
+  row.stop_reason = packed.at(10).get<std::string>();
+  row.error = packed.at(11).get<std::string>();
+  row.trace = trace_of(packed.at(12));
   return row;
 }
 

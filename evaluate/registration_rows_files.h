@@ -56,8 +56,8 @@ struct RegistrationRow {
   [[nodiscard]] bool is_success() const { return tre_mm < kSuccessTreMm; }
 };
 
-/// A row to be sent between ranks, and back; element 0 is `order`.
-nlohmann::json packed_row(std::int64_t order, const RegistrationRow& row);
+/// A row as it is kept while others are unfinished, and back.
+nlohmann::json packed_row(const RegistrationRow& row);
 RegistrationRow row_of(const nlohmann::json& packed);
 /// The same from a record of a file, in CBOR; FileError naming `file` when it holds no row.
 RegistrationRow row_of_record(std::span<const std::byte> record, const std::string& file);

@@ -62,11 +62,11 @@ class Ledger {
   Ledger(const Job& job, int ranks)
       : count_(job.count), most_per_block_(job.most_per_block), ranks_(ranks) {}
 
-  /// Blocks shrink towards the end so that ranks finish together.
   Block take_fair_share() {
     const std::scoped_lock lock(mutex_);
-    return take(std::clamp<std::int64_t>(
-        (count_ - next_) / (std::int64_t{4} * ranks_), 1, most_per_block_));
+    const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start_;
+    return take(
+        std::min(block_size(count_ - next_, done_, ranks_, elapsed.count()), most_per_block_));
   }
   Block take_one() {
     const std::scoped_lock lock(mutex_);
@@ -97,6 +97,7 @@ class Ledger {
   std::int64_t count_;
   std::int64_t most_per_block_;
   int ranks_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   std::int64_t next_ = 0;
   std::int64_t done_ = 0;
 };
@@ -248,6 +249,19 @@ void run_job(const Communicator& communicator, const Job& job) {
 }
 
 }  // namespace
+
+std::int64_t block_size(std::int64_t items_left,
+                        std::int64_t items_done,
+                        int ranks,
+                        double elapsed_seconds) {
+  if (items_done == 0) return 1;
+  const std::int64_t share = items_left / (std::int64_t{4} * ranks);
+  constexpr double kMostSeconds = 2.0;
+  const double items_in_time =
+      kMostSeconds * static_cast<double>(items_done) / (elapsed_seconds * ranks);
+  return static_cast<std::int64_t>(
+      std::clamp(items_in_time, 1.0, std::max(1.0, static_cast<double>(share))));
+}
 
 void for_each_item(const Communicator& communicator,
                    std::int64_t count,
