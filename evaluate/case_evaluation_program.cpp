@@ -382,6 +382,7 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
                             ? draw_starts(options, study_case, evaluation.gold, methods)
                             : given_starts(options, study, study_case, evaluation.gold);
     for (Method& method : methods) assign_starts(options, evaluation.starts, method);
+    evaluation.start_count = evaluation.starts.starts.size();
     on_starts(evaluation);
   });
   if (options.is_starts_only) return evaluation;
@@ -398,6 +399,8 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
                   std::to_string(progress.finished_count()) + " finished registrations");
   for (Method& method : methods)
     register_with(method, study_case.name, evaluation.starts, yardstick, world, progress);
+  // Rows take their place: memory holds one or the other.
+  evaluation.starts.starts = {};
   all_or_none(world, [&] {
     if (!world.is_root()) return;
     evaluation.rows = rows_of(methods, progress);

@@ -87,14 +87,13 @@ class Stratification {
       : frame_(frame),
         options_(options),
         points_(target_points_ct_mm),
-        moments_(point_moments(target_points_ct_mm)),
+        bounder_(target_points_ct_mm),
         largest_magnitude_mm_(kMagnitudeOverTre * options.intervals * options.interval_width_mm) {}
 
   /// The interval of a draw. Most need no mean over all points: bounds of the TRE suffice.
   [[nodiscard]] int interval_of_draw(PerturbedStart& start) const {
     place(start);
-    const TreBounds bounds =
-        mean_tre_bounds_mm(start.room_from_ct, frame_.gold_room_from_ct, moments_);
+    const TreBounds bounds = bounder_.bounds(start.room_from_ct, frame_.gold_room_from_ct);
     const int lowest = interval_of(bounds.low_mm, options_);
     if (lowest >= options_.intervals || lowest == interval_of(bounds.high_mm, options_))
       return lowest;
@@ -132,7 +131,7 @@ class Stratification {
   const StartFrame& frame_;
   const StartOptions& options_;
   std::span<const Eigen::Vector3d> points_;
-  PointMoments moments_;
+  TreBounder bounder_;
   double largest_magnitude_mm_;
 };
 

@@ -3,12 +3,15 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cstddef>
+#include <cstring>
 #include <stdexcept>
 #include <utility>
 
 #include "base/error.h"
 #include "io/cbor_json.h"
+#include "io/output_file.h"
 
 namespace af::evaluation {
 
@@ -192,20 +195,24 @@ void write_registrations(const std::filesystem::path& path,
   });
 }
 
-void write_starts(const std::filesystem::path& path, const std::vector<CaseStarts>& cases) {
-  std::size_t count = 0;
-  for (const CaseStarts& entry : cases) count += entry.starts->size();
-  write_csv_in_parts(path, count, [&](std::size_t first, std::size_t end) {
-    CsvTable table(start_columns());
-    for (const CaseStarts& entry : cases) {
-      const std::size_t size = entry.starts->size();
-      for (std::size_t i = std::min(first, size); i < std::min(end, size); ++i)
-        table.add_row(start_fields(entry.case_name, i, (*entry.starts)[i]));
-      first -= std::min(first, size);
-      end -= std::min(end, size);
-    }
-    return table;
-  });
+StartsFile::StartsFile(std::filesystem::path path)
+    : path_(std::move(path)), partial_(path_.string() + ".partial"), file_(partial_) {
+  file_ << CsvTable(start_columns()).to_text();
+}
+
+void StartsFile::add(const std::string& case_name, const std::vector<PerturbedStart>& starts) {
+  for (std::size_t i = 0; i < starts.size(); ++i) {
+    CsvTable row(start_columns());
+    row.add_row(start_fields(case_name, i, starts[i]));
+    file_ << row.rows_text();
+  }
+}
+
+void StartsFile::finish() {
+  file_.close();
+  if (!file_)
+    throw FileError(partial_.string(), std::string("cannot be written: ") + std::strerror(errno));
+  move_into_place(partial_, path_);
 }
 
 std::vector<TreOutcome> outcomes_of(const std::vector<RegistrationRow>& rows,

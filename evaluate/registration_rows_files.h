@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <span>
@@ -69,14 +70,19 @@ CsvTable registrations_table(const std::vector<RegistrationRow>& rows);
 void write_registrations(const std::filesystem::path& path,
                          const std::vector<RegistrationRow>& rows);
 
-/// The starts of one case in starts.csv.
-struct CaseStarts {
-  std::string case_name;
-  const std::vector<PerturbedStart>* starts = nullptr;
-};
+/// starts.csv: the starts of all cases, in order, of any number. It has its name once finished.
+class StartsFile {
+ public:
+  explicit StartsFile(std::filesystem::path path);
+  void add(const std::string& case_name, const std::vector<PerturbedStart>& starts);
+  /// FileError when it cannot be written whole.
+  void finish();
 
-/// starts.csv: the starts of all cases, in order, of any number.
-void write_starts(const std::filesystem::path& path, const std::vector<CaseStarts>& cases);
+ private:
+  std::filesystem::path path_;
+  std::filesystem::path partial_;
+  std::ofstream file_;
+};
 
 /// Starts and TREs of one renderer, in row order.
 std::vector<TreOutcome> outcomes_of(const std::vector<RegistrationRow>& rows,

@@ -59,7 +59,7 @@ TEST(MeanTre, OfATranslationIsItsLength) {
 
 TEST(MeanTre, LiesWithinItsBounds) {
   const std::vector<Vector3d> points = target_points({{-10, 0, -30}, {60, 20, 15}}, 5.0);
-  const PointMoments moments = point_moments(points);
+  const TreBounder bounder(points);
   HashRandom random(1, 2, 3);
   for (int draw = 0; draw < 1000; ++draw) {
     std::array<double, 6> deg_mm{};
@@ -70,9 +70,10 @@ TEST(MeanTre, LiesWithinItsBounds) {
     const RigidTransform pose =
         pose_from_parameters(PoseFrame{}, PoseParameters::from_deg_and_mm(deg_mm));
     const double tre_mm = mean_tre_mm(pose, RigidTransform::Identity(), points);
-    const TreBounds bounds = mean_tre_bounds_mm(pose, RigidTransform::Identity(), moments);
+    const TreBounds bounds = bounder.bounds(pose, RigidTransform::Identity());
     EXPECT_LE(bounds.low_mm, tre_mm);
     EXPECT_GE(bounds.high_mm, tre_mm);
+    EXPECT_LT(bounds.high_mm - bounds.low_mm, 0.1 * tre_mm);
     if (draw % 10 == 0) {
       EXPECT_LT(bounds.high_mm - bounds.low_mm, 1e-6);
     }
