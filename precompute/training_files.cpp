@@ -12,8 +12,6 @@ namespace af {
 
 namespace {
 
-constexpr const char* kName = "training";
-
 /// Stands before the iterations and the codewords.
 struct TrainingHeader {
   std::uint64_t training_tiles = 0;
@@ -40,11 +38,13 @@ void take_bytes(std::span<const std::byte>& bytes, std::span<T> values) {
 }
 
 /// Of other options: thrown away. Other faults are the caller's.
-ProgressJournal opened(const std::filesystem::path& folder, const DecidingValues& decides) {
+std::unique_ptr<ProgressJournal> opened(const std::filesystem::path& folder,
+                                        const DecidingValues& decides) {
+  constexpr const char* kName = "training";
   try {
-    return {folder, kName, decides, false};
+    return std::make_unique<ProgressJournal>(folder, kName, decides, false);
   } catch (const InputError&) {
-    return {folder, kName, decides, true};
+    return std::make_unique<ProgressJournal>(folder, kName, decides, true);
   }
 }
 
@@ -84,13 +84,13 @@ std::optional<TrainedCodebook> unpacked_training(std::span<const std::byte> byte
 TrainingJournal::TrainingJournal(const std::filesystem::path& progress_folder,
                                  const DecidingValues& decides,
                                  const Communicator& communicator)
-    : communicator_(communicator), shard_(progress_folder, kName, 0) {
+    : communicator_(communicator) {
   std::vector<std::byte> last;
   all_or_none(communicator_, [&] {
     if (!communicator_.is_root()) return;
-    opened(progress_folder, decides).mend_and_visit([&](std::span<const std::byte> record) {
-      last.assign(record.begin(), record.end());
-    });
+    journal_ = opened(progress_folder, decides);
+    journal_->visit_finished(
+        [&](std::span<const std::byte> record) { last.assign(record.begin(), record.end()); });
   });
   communicator_.broadcast(last);
   begun_ = unpacked_training(last);
@@ -98,9 +98,9 @@ TrainingJournal::TrainingJournal(const std::filesystem::path& progress_folder,
 
 void TrainingJournal::append(const TrainedCodebook& so_far) {
   all_or_none(communicator_, [&] {
-    if (!communicator_.is_root()) return;
-    shard_.append(packed_training(so_far));
-    shard_.sync();
+    if (!journal_) return;
+    journal_->append(packed_training(so_far));
+    journal_->sync();
   });
 }
 

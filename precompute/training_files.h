@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -29,7 +30,7 @@ class TrainingJournal {
 
  private:
   Communicator communicator_;
-  ProgressShard shard_;  ///< rank 0 alone writes
+  std::unique_ptr<ProgressJournal> journal_;  ///< rank 0 alone
   std::optional<TrainedCodebook> begun_;
 };
 

@@ -45,14 +45,14 @@ output=$(cd "$output" && pwd)
 
 # One process without mpirun; files in memory; a hostile size shows as a finding.
 export OMPI_MCA_ess_singleton_isolated=1 OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
-export ASAN_OPTIONS=quarantine_size_mb=16:detect_leaks=1 TMPDIR=${TMPDIR:-/dev/shm}
+export TMPDIR=${TMPDIR:-/dev/shm}
 status=0
 for name in "${names[@]}"; do
   mkdir -p "$output/$name/corpus"
   cd "$output/$name"
   leaks=1
   [[ "$name" == field_file ]] && leaks=0 # OpenMPI and HDF5 keep memory until the end
-  "$binaries/fuzz_$name" -max_total_time="$seconds" -timeout=20 -rss_limit_mb=512 -malloc_limit_mb=256 -detect_leaks=$leaks \
+  ASAN_OPTIONS=quarantine_size_mb=16:detect_leaks=$leaks "$binaries/fuzz_$name" -max_total_time="$seconds" -timeout="${AF_FUZZ_TIMEOUT:-30}" -rss_limit_mb=512 -malloc_limit_mb=256 -detect_leaks=$leaks \
     -print_final_stats=1 corpus "$output/seeds/$name" >log 2>&1 || status=1
   printf '%-13s %12s runs, coverage %s -> %s edges, %s inputs kept, %s findings\n' "$name" \
     "$(sed -n 's/^stat::number_of_executed_units: *//p' log)" \

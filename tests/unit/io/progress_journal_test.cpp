@@ -20,31 +20,24 @@ using testing::HasSubstr;
 
 const DecidingValues kDecides = {{"seed", "1"}, {"preset", "paper"}};
 
-void append(const fs::path& folder, const std::string& text, int shard = 0) {
-  ProgressShard writer(folder, "case", shard);
-  writer.append(std::as_bytes(std::span(text)));
-  writer.sync();
+void append(ProgressJournal& journal, const std::string& text) {
+  journal.append(std::as_bytes(std::span(text)));
 }
 
 std::vector<std::string> finished(ProgressJournal& journal) {
-  std::vector<std::string> mended;
-  std::vector<std::string> visited;
-  const auto into = [](std::vector<std::string>& records) {
-    return [&records](std::span<const std::byte> record) {
-      records.emplace_back(reinterpret_cast<const char*>(record.data()), record.size());
-    };
-  };
-  journal.mend_and_visit(into(mended));
-  journal.visit(into(visited));
-  EXPECT_EQ(mended, visited);
-  return mended;
+  std::vector<std::string> records;
+  journal.visit_finished([&](std::span<const std::byte> record) {
+    records.emplace_back(reinterpret_cast<const char*>(record.data()), record.size());
+  });
+  return records;
 }
 
-/// A journal with the records "one", "" and "three" of one process.
+/// A journal with the records "one", "" and "three".
 fs::path three_records(const fs::path& folder) {
-  const ProgressJournal journal(folder, "case", kDecides, false);
-  for (const char* text : {"one", "", "three"}) append(folder, text);
-  return folder / "case.000000.records";
+  ProgressJournal journal(folder, "case", kDecides, false);
+  for (const char* text : {"one", "", "three"}) append(journal, text);
+  journal.sync();
+  return folder / "case.records";
 }
 
 TEST(ProgressJournal, GivesBackWhatEarlierRunsAppended) {
@@ -52,26 +45,11 @@ TEST(ProgressJournal, GivesBackWhatEarlierRunsAppended) {
   three_records(folder / "p");
   ProgressJournal again(folder / "p", "case", kDecides, false);
   EXPECT_THAT(finished(again), ElementsAre("one", "", "three"));
-  append(folder / "p", "four");
+  append(again, "four");
   ProgressJournal third(folder / "p", "case", kDecides, false);
   EXPECT_THAT(finished(third), ElementsAre("one", "", "three", "four"));
   third.remove();
   EXPECT_FALSE(fs::exists(folder / "p"));
-}
-
-TEST(ProgressJournal, JoinsTheShardsOfAllProcessesAndNoOtherJournals) {
-  const test::ScratchFolder folder;
-  three_records(folder / "p");
-  append(folder / "p", "of twelve", 12);
-  append(folder / "p", "of two", 2);
-  // Names that begin alike.
-  ProgressJournal other(folder / "p", "case.2", kDecides, false);
-  ProgressShard(folder / "p", "case.2", 1).append(std::as_bytes(std::span("other", 5)));
-  ProgressJournal journal(folder / "p", "case", kDecides, false);
-  EXPECT_THAT(finished(journal), ElementsAre("one", "", "three", "of two", "of twelve"));
-  EXPECT_THAT(finished(other), ElementsAre("other"));
-  journal.remove();
-  EXPECT_THAT(finished(other), ElementsAre("other"));
 }
 
 TEST(ProgressJournal, CutsOffWhatAKillTore) {
@@ -82,7 +60,7 @@ TEST(ProgressJournal, CutsOffWhatAKillTore) {
     fs::resize_file(records, kept);
     ProgressJournal journal(folder / "p", "case", kDecides, false);
     EXPECT_THAT(finished(journal), ElementsAre("one", "")) << kept;
-    append(folder / "p", "next");
+    append(journal, "next");
     ProgressJournal again(folder / "p", "case", kDecides, false);
     EXPECT_THAT(finished(again), ElementsAre("one", "", "next")) << kept;
     fs::remove_all(folder / "p");
