@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <exception>
+#include <map>
 #include <span>
 #include <tuple>
 #include <utility>
@@ -18,11 +19,11 @@
 #include "evaluate/case_progress_program.h"
 #include "evaluate/failure_trace_files.h"
 #include "evaluate/method_loading.h"
-#include "evaluate/row_gathering_program.h"
 #include "gold/target_box.h"
 #include "io/output_file.h"
 #include "io/picture.h"
 #include "io/sha256.h"
+#include "parallel/work_queue.h"
 #include "register/result_files.h"
 #include "register/slicer_files.h"
 
@@ -134,49 +135,70 @@ RegistrationRow traced_row(Method& method,
   return row;
 }
 
-/// Collective. Registers every start of one method that is not finished and appends the rows of all
-/// on rank 0, by start index. Methods go one after the other: blocks of the work queue then hold
-/// work of one duration. Once a stop is asked for, starts are passed over.
+/// Collective. Registers every start of one method that is not finished. Methods go one after the
+/// other: blocks of the work queue then hold work of one duration. Once a stop is asked for, starts
+/// are passed over.
 void register_with(Method& method,
                    const std::string& case_name,
                    const StratifiedStarts& starts,
                    const Yardstick& yardstick,
                    const Communicator& world,
-                   CaseProgress& progress,
-                   std::vector<RegistrationRow>& rows) {
-  const std::size_t first = rows.size();
-  if (world.is_root()) rows.resize(first + method.start_indices.size());
-  // Start indices ascend.
-  const auto row_at = [&](std::size_t index) -> RegistrationRow& {
-    const auto found =
-        std::lower_bound(method.start_indices.begin(), method.start_indices.end(), index);
-    return rows[first + static_cast<std::size_t>(found - method.start_indices.begin())];
-  };
-  if (world.is_root())
-    for (const std::size_t index : method.start_indices)
-      if (const RegistrationRow* row = progress.find(method.renderer, index); row != nullptr)
-        row_at(index) = *row;
+                   CaseProgress& progress) {
   const std::vector<std::size_t> to_do = progress.unfinished(method.renderer, method.start_indices);
+  const auto count = static_cast<std::int64_t>(to_do.size());
   std::size_t traced = 0;
-  const auto registered = [&](std::int64_t item) -> json {
-    if (cli::is_stop_requested()) return nullptr;
-    const std::size_t index = to_do[static_cast<std::size_t>(item)];
-    RegistrationRow row = traced_row(method, starts.starts[index], index, yardstick);
-    row.case_name = case_name;
-    // Items come in order: a rank's first failures are its share of the first of all.
-    if (!row.trace.empty() && ++traced > kMostTraces) row.trace.clear();
-    return packed_row(item, row);
-  };
-  collect_rows(world,
-               static_cast<std::int64_t>(to_do.size()),
-               "case " + case_name + ", " + method.renderer + " registrations",
-               registered,
-               [&](std::int64_t item, const json& packed) {
-                 if (packed.is_null()) return;
-                 progress.append(packed);
-                 row_at(to_do[static_cast<std::size_t>(item)]) = row_of(packed);
-               });
+  cli::ProgressPrinter printer("case " + case_name + ", " + method.renderer + " registrations",
+                               world.is_root());
+  for_each_item(
+      world,
+      count,
+      [&](std::int64_t item) {
+        if (cli::is_stop_requested()) return;
+        const std::size_t index = to_do[static_cast<std::size_t>(item)];
+        RegistrationRow row = traced_row(method, starts.starts[index], index, yardstick);
+        row.case_name = case_name;
+        // Items come in order: a rank's first failures are its share of the first of all.
+        if (!row.trace.empty() && ++traced > kMostTraces) row.trace.clear();
+        progress.append(row);
+      },
+      [&](std::int64_t done) {
+        printer.update(static_cast<double>(done), static_cast<double>(count));
+      });
   progress.sync();
+}
+
+/// Rank 0: the rows of all methods, by method and start index. FileError when some are gone.
+std::vector<RegistrationRow> rows_of(const std::vector<Method>& methods,
+                                     const CaseProgress& progress) {
+  std::map<std::string, std::size_t> first_row;
+  std::size_t count = 0;
+  for (const Method& method : methods) {
+    first_row[method.renderer] = count;
+    count += method.start_indices.size();
+  }
+  std::vector<RegistrationRow> rows(count);
+  std::vector<bool> is_there(count);
+  progress.visit_rows([&](RegistrationRow row) {
+    for (const Method& method : methods) {
+      if (method.renderer != row.renderer) continue;
+      const auto index = static_cast<std::size_t>(row.start_index);
+      // Start indices ascend.
+      const auto found =
+          std::lower_bound(method.start_indices.begin(), method.start_indices.end(), index);
+      if (found == method.start_indices.end() || *found != index) return;
+      const std::size_t place = first_row[method.renderer] +
+                                static_cast<std::size_t>(found - method.start_indices.begin());
+      rows[place] = std::move(row);
+      is_there[place] = true;
+      return;
+    }
+  });
+  const auto lost = std::count(is_there.begin(), is_there.end(), false);
+  if (lost > 0)
+    throw FileError(progress.folder().string(),
+                    std::to_string(lost) +
+                        " finished registrations are no longer there: run the same command again");
+  return rows;
 }
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
@@ -216,20 +238,6 @@ void announce_times(std::vector<Method>& methods,
                                 seconds,
                                 world.size()));
   }
-}
-
-/// Collective. All rows on rank 0, by renderer and start index.
-std::vector<RegistrationRow> register_all(const std::string& case_name,
-                                          std::vector<Method>& methods,
-                                          const StratifiedStarts& starts,
-                                          const Yardstick& yardstick,
-                                          const Communicator& world,
-                                          CaseProgress& progress) {
-  std::vector<RegistrationRow> rows;
-  for (Method& method : methods)
-    register_with(method, case_name, starts, yardstick, world, progress, rows);
-  for (const Method& method : methods) keep_first_traces(rows, method.renderer);
-  return rows;
 }
 
 /// Every option, input and start that decides a case's rows.
@@ -374,6 +382,7 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
                             ? draw_starts(options, study_case, evaluation.gold, methods)
                             : given_starts(options, study, study_case, evaluation.gold);
     for (Method& method : methods) assign_starts(options, evaluation.starts, method);
+    evaluation.start_count = evaluation.starts.starts.size();
     on_starts(evaluation);
   });
   if (options.is_starts_only) return evaluation;
@@ -388,10 +397,14 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
     cli::info(world,
               "case " + study_case.name + ": goes on after " +
                   std::to_string(progress.finished_count()) + " finished registrations");
-  evaluation.rows =
-      register_all(study_case.name, methods, evaluation.starts, yardstick, world, progress);
+  for (Method& method : methods)
+    register_with(method, study_case.name, evaluation.starts, yardstick, world, progress);
+  // Rows take their place: memory holds one or the other.
+  evaluation.starts.starts = {};
   all_or_none(world, [&] {
     if (!world.is_root()) return;
+    evaluation.rows = rows_of(methods, progress);
+    for (const Method& method : methods) keep_first_traces(evaluation.rows, method.renderer);
     draw_xrays(methods.front().runner.problem(), options.output_folder, evaluation);
     draw_overlays(methods.front(), study_case, yardstick, options.output_folder, evaluation);
   });

@@ -23,7 +23,8 @@ namespace af::evaluation {
 struct CaseEvaluation {
   std::string case_name;
   GoldStandard gold;
-  StratifiedStarts starts;
+  StratifiedStarts starts;  ///< its list of starts is dropped when they are registered
+  std::size_t start_count = 0;
   std::vector<RegistrationRow> rows;  ///< rank 0: by renderer, start index
   std::map<std::string, std::string> input_sha256;
   std::vector<std::string> pose_problems;             ///< of poses that were read, in words

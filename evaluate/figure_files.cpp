@@ -235,14 +235,24 @@ void draw_tre_histogram(const std::vector<OutcomeGroup>& groups,
 void draw_tre_scatter(const std::vector<OutcomeGroup>& groups,
                       double largest_initial_mm,
                       const std::filesystem::path& path_without_extension) {
-  GnuplotFigure figure("Error before and after registration", kWidthPx, kHeightPx);
+  std::size_t most = 0;
+  for (const OutcomeGroup& group : groups) most = std::max(most, group.outcomes.size());
+  // More dots tell no more, and make a page of many megabytes.
+  constexpr std::size_t kMostDots = 4000;
+  const std::size_t stride = std::max<std::size_t>(1, (most + kMostDots - 1) / kMostDots);
+  GnuplotFigure figure(
+      "Error before and after registration" +
+          (stride == 1 ? std::string() : ", one start in " + std::to_string(stride)),
+      kWidthPx,
+      kHeightPx);
   std::vector<std::string> parts;
   CsvTable table({"group", "initial_tre_mm", "tre_mm"});
   // Below 0.05 mm nothing more is told apart; the axis ends there.
   constexpr double kLowestMm = 0.05;
   for (std::size_t g = 0; g < groups.size(); ++g) {
     std::vector<std::vector<double>> rows;
-    for (const TreOutcome& outcome : groups[g].outcomes) {
+    for (std::size_t i = 0; i < groups[g].outcomes.size(); i += stride) {
+      const TreOutcome& outcome = groups[g].outcomes[i];
       table.add_row(
           {groups[g].label, number_text(outcome.initial_tre_mm), number_text(outcome.tre_mm)});
       if (std::isfinite(outcome.tre_mm))

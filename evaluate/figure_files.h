@@ -39,7 +39,9 @@ void draw_success_rates(const std::vector<OutcomeGroup>& groups,
 void draw_tre_histogram(const std::vector<OutcomeGroup>& groups,
                         const std::filesystem::path& path_without_extension);
 
-/// Initial against final TRE, one dot per registration, logarithmic final TRE.
+/// Initial against final TRE, one dot per registration, logarithmic final TRE. Of more than 4000
+/// every second, third, ... is drawn, which the title says.
+/// \test Figures.DrawAPartOfVeryManyStartsAndSaySo
 void draw_tre_scatter(const std::vector<OutcomeGroup>& groups,
                       double largest_initial_mm,
                       const std::filesystem::path& path_without_extension);

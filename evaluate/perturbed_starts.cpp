@@ -30,22 +30,15 @@ std::uint64_t most_draws(const StartOptions& options) {
   return std::max<std::uint64_t>(100000, 1000 * wanted);
 }
 
-std::vector<PerturbedStart> pick(std::vector<PerturbedStart> candidates,
-                                 const StartOptions& options,
-                                 std::uint64_t case_key) {
-  const auto order = [&](const PerturbedStart& start) {
-    return hash64(options.seed, kPickStream, case_key, start.draw_index);
-  };
-  std::sort(candidates.begin(), candidates.end(), [&](const auto& a, const auto& b) {
-    return order(a) < order(b);
-  });
-  candidates.resize(static_cast<std::size_t>(options.starts_per_interval));
-  for (std::size_t i = 0; i < candidates.size(); ++i)
-    candidates[i].rank_in_interval = static_cast<int>(i);
-  std::sort(candidates.begin(), candidates.end(), [](const auto& a, const auto& b) {
-    return a.draw_index < b.draw_index;
-  });
-  return candidates;
+/// A draw that may become a start.
+struct Candidate {
+  std::uint64_t order = 0;  ///< random: those of low order are taken
+  std::uint64_t draw_index = 0;
+};
+
+int interval_of(double initial_tre_mm, const StartOptions& options) {
+  constexpr double kFarthestInterval = 1e9;
+  return static_cast<int>(std::min(initial_tre_mm / options.interval_width_mm, kFarthestInterval));
 }
 
 /// TRE and interval of a start whose pose is set.
@@ -55,9 +48,7 @@ void measure(const StartFrame& frame,
              PerturbedStart& start) {
   start.initial_tre_mm =
       mean_tre_mm(start.room_from_ct, frame.gold_room_from_ct, target_points_ct_mm);
-  constexpr double kFarthestInterval = 1e9;
-  start.interval = static_cast<int>(
-      std::min(start.initial_tre_mm / options.interval_width_mm, kFarthestInterval));
+  start.interval = interval_of(start.initial_tre_mm, options);
 }
 
 /// The same of one whose parameters are set.
@@ -87,7 +78,64 @@ void scale_to_tre(const StartFrame& frame,
   }
 }
 
-[[noreturn]] void throw_too_empty(const std::vector<std::vector<PerturbedStart>>& by_interval,
+/// Draws of one case by stratified_starts().
+class Stratification {
+ public:
+  Stratification(const StartFrame& frame,
+                 const StartOptions& options,
+                 std::span<const Eigen::Vector3d> target_points_ct_mm)
+      : frame_(frame),
+        options_(options),
+        points_(target_points_ct_mm),
+        bounder_(target_points_ct_mm),
+        largest_magnitude_mm_(kMagnitudeOverTre * options.intervals * options.interval_width_mm) {}
+
+  /// The interval of a draw. Most need no mean over all points: bounds of the TRE suffice.
+  [[nodiscard]] int interval_of_draw(PerturbedStart& start) const {
+    place(start);
+    const TreBounds bounds = bounder_.bounds(start.room_from_ct, frame_.gold_room_from_ct);
+    const int lowest = interval_of(bounds.low_mm, options_);
+    if (lowest >= options_.intervals || lowest == interval_of(bounds.high_mm, options_))
+      return lowest;
+    measure(frame_, options_, points_, start);
+    return start.interval;
+  }
+
+  /// Picks as many as wanted at random and appends them by draw index.
+  void pick(std::vector<Candidate> candidates, std::vector<PerturbedStart>& starts) const {
+    std::sort(candidates.begin(), candidates.end(), [](const auto& a, const auto& b) {
+      return a.order < b.order;
+    });
+    candidates.resize(static_cast<std::size_t>(options_.starts_per_interval));
+    const std::size_t first = starts.size();
+    for (std::size_t i = 0; i < candidates.size(); ++i) {
+      PerturbedStart& start = starts.emplace_back();
+      start.draw_index = candidates[i].draw_index;
+      start.rank_in_interval = static_cast<int>(i);
+      place(start);
+      measure(frame_, options_, points_, start);
+    }
+    std::sort(starts.begin() + static_cast<std::ptrdiff_t>(first),
+              starts.end(),
+              [](const auto& a, const auto& b) { return a.draw_index < b.draw_index; });
+  }
+
+ private:
+  /// Parameters and pose of a start whose draw index is set.
+  void place(PerturbedStart& start) const {
+    start.parameters =
+        draw_perturbation(frame_, largest_magnitude_mm_, options_.seed, start.draw_index);
+    start.room_from_ct = pose_from_parameters(frame_.pose_frame(), start.parameters);
+  }
+
+  const StartFrame& frame_;
+  const StartOptions& options_;
+  std::span<const Eigen::Vector3d> points_;
+  TreBounder bounder_;
+  double largest_magnitude_mm_;
+};
+
+[[noreturn]] void throw_too_empty(const std::vector<std::vector<Candidate>>& by_interval,
                                   const StartOptions& options,
                                   const StratifiedStarts& counts) {
   std::string found;
@@ -139,10 +187,10 @@ StratifiedStarts stratified_starts(
     std::span<const Eigen::Vector3d> target_points_ct_mm,
     const std::function<bool(const RigidTransform& room_from_ct)>& is_admissible) {
   throw_if_any(problems(options));
-  const double largest_magnitude_mm =
-      kMagnitudeOverTre * options.intervals * options.interval_width_mm;
+  const Stratification stratification(frame, options, target_points_ct_mm);
+  const std::uint64_t case_key = hash_name(frame.case_name);
   const auto wanted = static_cast<std::size_t>(options.starts_per_interval);
-  std::vector<std::vector<PerturbedStart>> by_interval(static_cast<std::size_t>(options.intervals));
+  std::vector<std::vector<Candidate>> by_interval(static_cast<std::size_t>(options.intervals));
   StratifiedStarts result;
   result.inadmissible_per_interval.resize(by_interval.size());
   std::size_t full_intervals = 0;
@@ -150,25 +198,21 @@ StratifiedStarts stratified_starts(
     if (result.draws == most_draws(options)) throw_too_empty(by_interval, options, result);
     PerturbedStart start;
     start.draw_index = result.draws++;
-    start.parameters =
-        draw_perturbation(frame, largest_magnitude_mm, options.seed, start.draw_index);
-    locate(frame, options, target_points_ct_mm, start);
-    if (start.interval >= options.intervals) {
+    const auto interval = static_cast<std::size_t>(stratification.interval_of_draw(start));
+    if (interval >= by_interval.size()) {
       ++result.draws_beyond;
     } else if (!is_admissible(start.room_from_ct)) {
       ++result.inadmissible_draws;
-      ++result.inadmissible_per_interval[static_cast<std::size_t>(start.interval)];
+      ++result.inadmissible_per_interval[interval];
     } else {
-      std::vector<PerturbedStart>& candidates =
-          by_interval[static_cast<std::size_t>(start.interval)];
-      candidates.push_back(start);
-      if (candidates.size() == wanted) ++full_intervals;
+      by_interval[interval].push_back(
+          {hash64(options.seed, kPickStream, case_key, start.draw_index), start.draw_index});
+      if (by_interval[interval].size() == wanted) ++full_intervals;
     }
   }
-  const std::uint64_t case_key = hash_name(frame.case_name);
-  for (std::vector<PerturbedStart>& candidates : by_interval)
-    for (const PerturbedStart& start : pick(std::move(candidates), options, case_key))
-      result.starts.push_back(start);
+  result.starts.reserve(by_interval.size() * wanted);
+  for (std::vector<Candidate>& candidates : by_interval)
+    stratification.pick(std::move(candidates), result.starts);
   return result;
 }
 

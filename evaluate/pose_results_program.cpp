@@ -54,7 +54,8 @@ CaseEvaluation evaluate_found_poses(const RegistrationStudyOptions& options,
   const FoundPoses found =
       read_found_poses(options.poses_from, pose_table_frames(study, study_case, evaluation.gold));
   evaluation.pose_problems = found.problems;
-  const auto count = static_cast<std::int64_t>(evaluation.starts.starts.size());
+  evaluation.start_count = evaluation.starts.starts.size();
+  const auto count = static_cast<std::int64_t>(evaluation.start_count);
   for (std::int64_t index = 0; index < count; ++index) {
     RegistrationRow row = found_row(found, index, yardstick);
     set_start(evaluation.starts.starts[static_cast<std::size_t>(index)], row);

@@ -88,7 +88,7 @@ json simulation_of(const Study& study) {
 json case_json(const CaseEvaluation& evaluation) {
   return {{"case", evaluation.case_name},
           {"gold", to_json(evaluation.gold)},
-          {"starts", evaluation.starts.starts.size()},
+          {"starts", evaluation.start_count},
           {"draws", evaluation.starts.draws},
           {"inadmissible_draws", evaluation.starts.inadmissible_draws},
           {"inadmissible_draws_per_interval", evaluation.starts.inadmissible_per_interval},
@@ -371,10 +371,12 @@ void run_registration(const RegistrationStudyOptions& options,
   for (const std::string& text : study_warnings) cli::warn(world, text);
   const std::vector<StudyCase> cases =
       all_or_none(world, [&] { return chosen_cases(options, study); });
+  std::optional<StartsFile> starts_file;
   all_or_none(world, [&] {
     if (!world.is_root()) return;
     require_gnuplot();
     make_output_folder(folder);
+    starts_file.emplace(folder / "starts.csv");
   });
 
   cli::listen_for_stop_requests();
@@ -382,11 +384,8 @@ void run_registration(const RegistrationStudyOptions& options,
   for (const StudyCase& study_case : cases) {
     const auto on_starts = [&](const CaseEvaluation& so_far) {
       if (!world.is_root()) return;
-      std::vector<CaseStarts> starts;
-      for (const CaseEvaluation& done : evaluations)
-        starts.push_back({done.case_name, &done.starts.starts});
-      starts.push_back({so_far.case_name, &so_far.starts.starts});
-      write_starts(folder / "starts.csv", starts);
+      starts_file->add(so_far.case_name, so_far.starts.starts);
+      if (&study_case == &cases.back()) starts_file->finish();
     };
     evaluations.push_back(options.poses_from.empty()
                               ? evaluate_case(options, study, study_case, world, on_starts)

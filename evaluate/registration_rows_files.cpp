@@ -3,12 +3,15 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cstddef>
+#include <cstring>
 #include <stdexcept>
 #include <utility>
 
 #include "base/error.h"
 #include "io/cbor_json.h"
+#include "io/output_file.h"
 
 namespace af::evaluation {
 
@@ -85,9 +88,8 @@ std::vector<std::string> start_fields(const std::string& case_name,
 
 }  // namespace
 
-json packed_row(std::int64_t order, const RegistrationRow& row) {
-  return {order,
-          row.case_name,
+json packed_row(const RegistrationRow& row) {
+  return {row.case_name,
           row.renderer,
           row.start_index,
           row.draw_index,
@@ -104,26 +106,26 @@ json packed_row(std::int64_t order, const RegistrationRow& row) {
 
 RegistrationRow row_of(const json& packed) {
   RegistrationRow row;
-  row.case_name = packed.at(1).get<std::string>();
-  row.renderer = packed.at(2).get<std::string>();
-  row.start_index = integer_of<std::int64_t>(packed.at(3));
-  row.draw_index = integer_of<std::uint64_t>(packed.at(4));
-  row.interval = integer_of<int>(packed.at(5));
-  row.start_deg_mm = packed.at(6).get<std::array<double, 6>>();
-  row.final_deg_mm = packed.at(7).get<std::array<double, 6>>();
-  const auto values = packed.at(8).get<std::array<double, 5>>();
+  row.case_name = packed.at(0).get<std::string>();
+  row.renderer = packed.at(1).get<std::string>();
+  row.start_index = integer_of<std::int64_t>(packed.at(2));
+  row.draw_index = integer_of<std::uint64_t>(packed.at(3));
+  row.interval = integer_of<int>(packed.at(4));
+  row.start_deg_mm = packed.at(5).get<std::array<double, 6>>();
+  row.final_deg_mm = packed.at(6).get<std::array<double, 6>>();
+  const auto values = packed.at(7).get<std::array<double, 5>>();
   row.initial_tre_mm = values[0];
   row.tre_mm = values[1];
   row.stated_pose_tre_mm = values[2];
   row.similarity = values[3];
   row.seconds = values[4];
-  row.errors = RegistrationErrors::of_values(packed.at(9).get<std::array<double, 5>>());
-  row.evaluations = integer_of<std::int64_t>(packed.at(10).at(0));
-  row.inadmissible = integer_of<std::int64_t>(packed.at(10).at(1));
-  row.drr_count = integer_of<std::int64_t>(packed.at(10).at(2));
-  row.stop_reason = packed.at(11).get<std::string>();
-  row.error = packed.at(12).get<std::string>();
-  row.trace = trace_of(packed.at(13));
+  row.errors = RegistrationErrors::of_values(packed.at(8).get<std::array<double, 5>>());
+  row.evaluations = integer_of<std::int64_t>(packed.at(9).at(0));
+  row.inadmissible = integer_of<std::int64_t>(packed.at(9).at(1));
+  row.drr_count = integer_of<std::int64_t>(packed.at(9).at(2));
+  row.stop_reason = packed.at(10).get<std::string>();
+  row.error = packed.at(11).get<std::string>();
+  row.trace = trace_of(packed.at(12));
   return row;
 }
 
@@ -193,20 +195,24 @@ void write_registrations(const std::filesystem::path& path,
   });
 }
 
-void write_starts(const std::filesystem::path& path, const std::vector<CaseStarts>& cases) {
-  std::size_t count = 0;
-  for (const CaseStarts& entry : cases) count += entry.starts->size();
-  write_csv_in_parts(path, count, [&](std::size_t first, std::size_t end) {
-    CsvTable table(start_columns());
-    for (const CaseStarts& entry : cases) {
-      const std::size_t size = entry.starts->size();
-      for (std::size_t i = std::min(first, size); i < std::min(end, size); ++i)
-        table.add_row(start_fields(entry.case_name, i, (*entry.starts)[i]));
-      first -= std::min(first, size);
-      end -= std::min(end, size);
-    }
-    return table;
-  });
+StartsFile::StartsFile(std::filesystem::path path)
+    : path_(std::move(path)), partial_(path_.string() + ".partial"), file_(partial_) {
+  file_ << CsvTable(start_columns()).to_text();
+}
+
+void StartsFile::add(const std::string& case_name, const std::vector<PerturbedStart>& starts) {
+  for (std::size_t i = 0; i < starts.size(); ++i) {
+    CsvTable row(start_columns());
+    row.add_row(start_fields(case_name, i, starts[i]));
+    file_ << row.rows_text();
+  }
+}
+
+void StartsFile::finish() {
+  file_.close();
+  if (!file_)
+    throw FileError(partial_.string(), std::string("cannot be written: ") + std::strerror(errno));
+  move_into_place(partial_, path_);
 }
 
 std::vector<TreOutcome> outcomes_of(const std::vector<RegistrationRow>& rows,

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <span>
@@ -56,8 +57,8 @@ struct RegistrationRow {
   [[nodiscard]] bool is_success() const { return tre_mm < kSuccessTreMm; }
 };
 
-/// A row to be sent between ranks, and back; element 0 is `order`.
-nlohmann::json packed_row(std::int64_t order, const RegistrationRow& row);
+/// A row as it is kept while others are unfinished, and back.
+nlohmann::json packed_row(const RegistrationRow& row);
 RegistrationRow row_of(const nlohmann::json& packed);
 /// The same from a record of a file, in CBOR; FileError naming `file` when it holds no row.
 RegistrationRow row_of_record(std::span<const std::byte> record, const std::string& file);
@@ -69,14 +70,19 @@ CsvTable registrations_table(const std::vector<RegistrationRow>& rows);
 void write_registrations(const std::filesystem::path& path,
                          const std::vector<RegistrationRow>& rows);
 
-/// The starts of one case in starts.csv.
-struct CaseStarts {
-  std::string case_name;
-  const std::vector<PerturbedStart>* starts = nullptr;
-};
+/// starts.csv: the starts of all cases, in order, of any number. It has its name once finished.
+class StartsFile {
+ public:
+  explicit StartsFile(std::filesystem::path path);
+  void add(const std::string& case_name, const std::vector<PerturbedStart>& starts);
+  /// FileError when it cannot be written whole.
+  void finish();
 
-/// starts.csv: the starts of all cases, in order, of any number.
-void write_starts(const std::filesystem::path& path, const std::vector<CaseStarts>& cases);
+ private:
+  std::filesystem::path path_;
+  std::filesystem::path partial_;
+  std::ofstream file_;
+};
 
 /// Starts and TREs of one renderer, in row order.
 std::vector<TreOutcome> outcomes_of(const std::vector<RegistrationRow>& rows,

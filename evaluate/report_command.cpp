@@ -20,6 +20,9 @@ using nlohmann::json;
 
 /// "Registration of skull" or what else the runs are about.
 std::string default_title(const std::vector<EvaluationRun>& runs) {
+  const auto is_only = [&](const char* kind) { return runs_of(runs, kind).size() == runs.size(); };
+  if (is_only("error-budget")) return "Error budget of registrations";
+  if (is_only("similarity-curves")) return "Shape of the similarity";
   std::set<std::string> cases;
   for (const EvaluationRun* run : runs_of(runs, "registration"))
     for (const json& entry : run->summary.at("cases"))

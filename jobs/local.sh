@@ -8,6 +8,7 @@ source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
 usage() {
   cat <<'TEXT'
 Usage: jobs/local.sh [OPTIONS]
+       jobs/local.sh STUDY.toml [OPTIONS]    a study of yours: see jobs/run-study.sh --help
 
 Installs what is missing, builds, and takes a CT through the whole pipeline: simulated X-ray pair, one attenuation
 field per camera, image quality of the fields, registrations, report.html. Finished stages with unchanged inputs are
@@ -35,6 +36,9 @@ TEXT
 
 # --- options -----------------------------------------------------------------------------------------------------
 
+if [[ "${1:-}" == *.toml ]]; then
+  exec "$af_root/jobs/run-study.sh" "$@"
+fi
 output="$PWD/af-study"
 ct="" phantom="" preset=quick ranks="" seed=1 force=no skip_build=no skip_packages=no
 starts_per_interval="" raycast_starts="" pose_count=""

@@ -45,52 +45,14 @@ done
 study=$(realpath "$study")
 bin=$(program_folder)
 need_programs "$bin" af-precompute af-evaluate af-inspect
-[[ "$dry_run" == yes ]] || command -v sbatch >/dev/null || die 1 "sbatch is missing: this is no Slurm cluster (jobs/local.sh needs none)"
+[[ "$dry_run" == yes ]] || command -v sbatch >/dev/null || die 1 "sbatch is missing: this is no Slurm cluster (jobs/local.sh STUDY.toml needs none)"
 
 # shellcheck source=slurm/resources.sh
 source "$resources"
 
-# --- what there is to do -----------------------------------------------------------------------------------------
-
-# One line per view: case, camera. Says what is wrong with the study, if anything.
-views=$("$bin/af-inspect" --list-views "$study")
-declare -A cameras_of=()
-case_names=() most_views=0
-while IFS=$'\t' read -r case_name camera; do
-  [[ -v cameras_of["$case_name"] ]] || case_names+=("$case_name")
-  cameras_of[$case_name]+="$camera"$'\n'
-done <<<"$views"
-for case_name in "${case_names[@]}"; do
-  view_count=$(grep -c . <<<"${cameras_of[$case_name]}")
-  ((view_count <= most_views)) || most_views=$view_count
-done
-
-# command_line WORD...: as it is typed.
-command_line() {
-  printf '%q ' "$@"
-  printf '\n'
-}
-
-# The field of a case's VIEW-th camera; `true` when the case has not so many.
-precompute_line() {
-  local case_name=$1 view=$2 camera
-  camera=$(sed -n "$((view + 1))p" <<<"${cameras_of[$case_name]}")
-  if [[ -z "$camera" ]]; then
-    echo true
-    return
-  fi
-  command_line "$bin/af-precompute" --study "$study" --case "$case_name" --camera "$camera" \
-    "${precompute_options[@]}" -o "$output/fields/$case_name-$camera.af.h5"
-}
-
-evaluate_line() {
-  local case_name=$1 camera fields=()
-  while IFS= read -r camera; do
-    fields+=(--field "$camera=$output/fields/$case_name-$camera.af.h5")
-  done <<<"${cameras_of[$case_name]%$'\n'}"
-  command_line "$bin/af-evaluate" registration --study "$study" --case "$case_name" "${fields[@]}" \
-    "${evaluate_options[@]}" -o "$output/registration/$case_name"
-}
+# shellcheck source=chain.sh
+source "$af_root/jobs/chain.sh"
+read_chain
 
 # --- the chain ---------------------------------------------------------------------------------------------------
 
@@ -114,11 +76,19 @@ submit() {
   say "$stage: job $job_id"
 }
 
-# lines FUNCTION [ARGUMENT]: what FUNCTION CASE [ARGUMENT] prints for every case.
+# typed FUNCTION [ARGUMENT...]: the command that FUNCTION sets, as one types it.
+typed() {
+  local command=()
+  "$@"
+  printf '%q ' "${command[@]}"
+  printf '\n'
+}
+
+# lines FUNCTION [ARGUMENT]: the commands of FUNCTION CASE [ARGUMENT] for all cases.
 lines() {
   local case_name
   for case_name in "${case_names[@]}"; do
-    "$1" "$case_name" "${@:2}"
+    typed "$1" "$case_name" "${@:2}"
   done
 }
 
@@ -131,11 +101,11 @@ output=$(realpath -m "$output")
 # A case waits for its own fields only (aftercorr: the task of the same number).
 after_fields=""
 for ((view = 0; view < most_views; ++view)); do
-  submit "precompute-$((view + 1))" "$(lines precompute_line "$view")" "$precompute_ranks" "$precompute_memory" "$precompute_time"
+  submit "precompute-$((view + 1))" "$(lines precompute_command "$view")" "$precompute_ranks" "$precompute_memory" "$precompute_time"
   after_fields+="${after_fields:+,}aftercorr:$job_id"
 done
-submit evaluate "$(lines evaluate_line)" "$evaluate_ranks" "$evaluate_memory" "$evaluate_time" "$after_fields"
+submit evaluate "$(lines evaluate_command)" "$evaluate_ranks" "$evaluate_memory" "$evaluate_time" "$after_fields"
 # The report is of what there is, also when a case failed; it says which cases it has.
-submit report "$(command_line "$bin/af-evaluate" report -o "$output/report.html" "$output/registration")" 1 "$report_memory" \
+submit report "$(typed report_command)" 1 "$report_memory" \
   "$report_time" "afterany:$job_id"
 [[ "$dry_run" == yes ]] || say "Watch: squeue --me; logs: $output/logs; at the end: $output/report.html"

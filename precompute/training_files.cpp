@@ -12,6 +12,8 @@ namespace af {
 
 namespace {
 
+constexpr const char* kName = "training";
+
 /// Stands before the iterations and the codewords.
 struct TrainingHeader {
   std::uint64_t training_tiles = 0;
@@ -38,13 +40,11 @@ void take_bytes(std::span<const std::byte>& bytes, std::span<T> values) {
 }
 
 /// Of other options: thrown away. Other faults are the caller's.
-std::unique_ptr<ProgressJournal> opened(const std::filesystem::path& folder,
-                                        const DecidingValues& decides) {
-  constexpr const char* kName = "training";
+ProgressJournal opened(const std::filesystem::path& folder, const DecidingValues& decides) {
   try {
-    return std::make_unique<ProgressJournal>(folder, kName, decides, false);
+    return {folder, kName, decides, false};
   } catch (const InputError&) {
-    return std::make_unique<ProgressJournal>(folder, kName, decides, true);
+    return {folder, kName, decides, true};
   }
 }
 
@@ -84,13 +84,13 @@ std::optional<TrainedCodebook> unpacked_training(std::span<const std::byte> byte
 TrainingJournal::TrainingJournal(const std::filesystem::path& progress_folder,
                                  const DecidingValues& decides,
                                  const Communicator& communicator)
-    : communicator_(communicator) {
+    : communicator_(communicator), shard_(progress_folder, kName, 0) {
   std::vector<std::byte> last;
   all_or_none(communicator_, [&] {
     if (!communicator_.is_root()) return;
-    journal_ = opened(progress_folder, decides);
-    journal_->visit_finished(
-        [&](std::span<const std::byte> record) { last.assign(record.begin(), record.end()); });
+    opened(progress_folder, decides).mend_and_visit([&](std::span<const std::byte> record) {
+      last.assign(record.begin(), record.end());
+    });
   });
   communicator_.broadcast(last);
   begun_ = unpacked_training(last);
@@ -98,9 +98,9 @@ TrainingJournal::TrainingJournal(const std::filesystem::path& progress_folder,
 
 void TrainingJournal::append(const TrainedCodebook& so_far) {
   all_or_none(communicator_, [&] {
-    if (!journal_) return;
-    journal_->append(packed_training(so_far));
-    journal_->sync();
+    if (!communicator_.is_root()) return;
+    shard_.append(packed_training(so_far));
+    shard_.sync();
   });
 }
 

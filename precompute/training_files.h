@@ -3,7 +3,6 @@
 
 #include <cstddef>
 #include <filesystem>
-#include <memory>
 #include <optional>
 #include <vector>
 
@@ -30,7 +29,7 @@ class TrainingJournal {
 
  private:
   Communicator communicator_;
-  std::unique_ptr<ProgressJournal> journal_;  ///< rank 0 alone
+  ProgressShard shard_;  ///< rank 0 alone writes
   std::optional<TrainedCodebook> begun_;
 };
 

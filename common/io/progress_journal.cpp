@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/progress_journal.h"
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <nlohmann/json.hpp>
 #include <system_error>
@@ -18,7 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kFormat = "af-progress-journal";
-constexpr int kFormatVersion = 1;
+constexpr int kFormatVersion = 2;  // 2: one file of records per process
 
 /// Stands before every record.
 struct RecordHeader {
@@ -58,6 +60,43 @@ DecidingValues read_manifest(const fs::path& path) {
   }
 }
 
+fs::path manifest_path(const fs::path& folder, const std::string& name) {
+  return folder / (name + ".json");
+}
+
+/// "NAME.000012.records".
+fs::path shard_path(const fs::path& folder, const std::string& name, int shard) {
+  const std::string digits = std::to_string(shard);
+  constexpr std::size_t kWidth = 6;
+  return folder / (name + "." + std::string(kWidth - std::min(kWidth, digits.size()), '0') +
+                   digits + ".records");
+}
+
+/// The shards of a journal, in order. Another journal's name may begin alike.
+std::vector<fs::path> shards_of(const fs::path& folder, const std::string& name) {
+  std::vector<fs::path> shards;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    const std::string file = entry.path().filename().string();
+    if (!file.starts_with(name + ".")) continue;
+    const int shard = std::atoi(file.c_str() + name.size() + 1);
+    if (entry.path() == shard_path(folder, name, shard)) shards.push_back(entry.path());
+  }
+  std::sort(shards.begin(), shards.end());
+  return shards;
+}
+
+/// Visits the sound records up to the first that is not; returns their size with their headers.
+std::uint64_t visit_shard(const fs::path& path, const ProgressJournal::Visit& visit) {
+  std::ifstream file(path, std::ios::binary);
+  const std::uint64_t size = fs::file_size(path);
+  std::uint64_t sound_bytes = 0;
+  for (std::vector<std::byte> record; read_record(file, size - sound_bytes, record);) {
+    visit(record);
+    sound_bytes += sizeof(RecordHeader) + record.size();
+  }
+  return sound_bytes;
+}
+
 }  // namespace
 
 ProgressJournal::ProgressJournal(const fs::path& folder,
@@ -66,40 +105,43 @@ ProgressJournal::ProgressJournal(const fs::path& folder,
                                  bool restart)
     : folder_(folder), name_(name) {
   make_output_folder(folder_);
-  if (restart) fs::remove(manifest_path());
-  if (fs::exists(manifest_path())) {
-    require_same(read_manifest(manifest_path()), decides, folder_);
+  const fs::path manifest = manifest_path(folder_, name_);
+  if (restart) fs::remove(manifest);
+  if (fs::exists(manifest)) {
+    require_same(read_manifest(manifest), decides, folder_);
     return;
   }
   // Records without a manifest are of nobody knows what.
-  fs::remove(records_path());
-  const nlohmann::json manifest = {
+  for (const fs::path& shard : shards_of(folder_, name_)) fs::remove(shard);
+  const nlohmann::json json = {
       {"format", kFormat}, {"format_version", kFormatVersion}, {"decides", decides}};
-  write_text_file(manifest_path(), manifest.dump(2) + "\n");
+  write_text_file(manifest, json.dump(2) + "\n");
 }
 
-fs::path ProgressJournal::manifest_path() const {
-  return folder_ / (name_ + ".json");
+void ProgressJournal::visit(const Visit& visit) const {
+  for (const fs::path& shard : shards_of(folder_, name_)) visit_shard(shard, visit);
 }
 
-fs::path ProgressJournal::records_path() const {
-  return folder_ / (name_ + ".records");
-}
-
-void ProgressJournal::visit_finished(const Visit& visit) {
-  if (!fs::exists(records_path())) return;
-  std::ifstream file(records_path(), std::ios::binary);
-  const std::uint64_t size = fs::file_size(records_path());
-  std::uint64_t sound_bytes = 0;
-  for (std::vector<std::byte> record; read_record(file, size - sound_bytes, record);) {
-    visit(record);
-    sound_bytes += sizeof(RecordHeader) + record.size();
+void ProgressJournal::mend_and_visit(const Visit& visit) {
+  for (const fs::path& shard : shards_of(folder_, name_)) {
+    const std::uint64_t sound_bytes = visit_shard(shard, visit);
+    if (sound_bytes < fs::file_size(shard)) fs::resize_file(shard, sound_bytes);
   }
-  if (sound_bytes < size) fs::resize_file(records_path(), sound_bytes);
 }
 
-void ProgressJournal::append(std::span<const std::byte> record) {
-  if (!file_.is_open()) file_.open(records_path(), std::ios::binary | std::ios::app);
+void ProgressJournal::remove() {
+  // The manifest first: shards alone are of nothing.
+  fs::remove(manifest_path(folder_, name_));
+  for (const fs::path& shard : shards_of(folder_, name_)) fs::remove(shard);
+  std::error_code not_empty;
+  fs::remove(folder_, not_empty);
+}
+
+ProgressShard::ProgressShard(const fs::path& folder, const std::string& name, int shard)
+    : path_(shard_path(folder, name, shard)) {}
+
+void ProgressShard::append(std::span<const std::byte> record) {
+  if (!file_.is_open()) file_.open(path_, std::ios::binary | std::ios::app);
   RecordHeader header;
   header.content_bytes = static_cast<std::uint32_t>(record.size());
   header.content_crc = crc32c(record);
@@ -109,20 +151,11 @@ void ProgressJournal::append(std::span<const std::byte> record) {
                 static_cast<std::streamsize>(part.size()));
   file_.flush();
   if (!file_)
-    throw FileError(records_path().string(),
-                    std::string("cannot be written: ") + std::strerror(errno));
+    throw FileError(path_.string(), std::string("cannot be written: ") + std::strerror(errno));
 }
 
-void ProgressJournal::sync() {
-  if (file_.is_open()) sync_path(records_path());
-}
-
-void ProgressJournal::remove() {
-  file_.close();
-  fs::remove(manifest_path());
-  fs::remove(records_path());
-  std::error_code not_empty;
-  fs::remove(folder_, not_empty);
+void ProgressShard::sync() {
+  if (file_.is_open()) sync_path(path_);
 }
 
 }  // namespace af

@@ -13,11 +13,14 @@
 
 namespace af {
 
-/// Finished records of unfinished work: FOLDER/NAME.json says what they are valid for, and to
-/// FOLDER/NAME.records one process appends them, each with its size and CRC-32C. Whatever a killed
-/// run left torn or damaged is cut off when the journal is opened again.
+/// Finished records of unfinished work: FOLDER/NAME.json says what they are valid for; to
+/// FOLDER/NAME.SHARD.records each process appends its own, each with its size and CRC-32C, so that
+/// nothing passes through one process. Whatever a killed run left torn or damaged is cut off when
+/// the journal is opened again. This side is for one process alone.
 class ProgressJournal {
  public:
+  using Visit = std::function<void(std::span<const std::byte> record)>;
+
   /// Opens or creates a journal. InputError that names the difference when earlier records were
   /// about something else; `restart` throws them away. FileError when files cannot be read or
   /// written.
@@ -26,25 +29,34 @@ class ProgressJournal {
                   const DecidingValues& decides,
                   bool restart);
 
-  using Visit = std::function<void(std::span<const std::byte> record)>;
-  /// The sound records of earlier runs, in the order in which they were appended; what follows the
-  /// first unsound one is cut off. To be called before append().
-  void visit_finished(const Visit& visit);
+  /// The sound records of all shards, by shard and in the order in which they were appended.
+  void visit(const Visit& visit) const;
 
-  /// The record survives the end of this process from now on; of the machine after sync().
-  void append(std::span<const std::byte> record);
-
-  void sync();
+  /// The same of what earlier runs left; what follows the first unsound record of a shard is cut
+  /// off. To be called before any process appends.
+  void mend_and_visit(const Visit& visit);
 
   /// Removes the journal, and the folder when nothing else is in it: the work is complete.
   void remove();
 
  private:
-  [[nodiscard]] std::filesystem::path manifest_path() const;
-  [[nodiscard]] std::filesystem::path records_path() const;
-
   std::filesystem::path folder_;
   std::string name_;
+};
+
+/// What one process appends to a journal that exists.
+class ProgressShard {
+ public:
+  ProgressShard(const std::filesystem::path& folder, const std::string& name, int shard);
+
+  /// The record survives the end of this process from now on; of the machine after sync().
+  /// FileError when it cannot be written.
+  void append(std::span<const std::byte> record);
+
+  void sync();
+
+ private:
+  std::filesystem::path path_;
   std::ofstream file_;
 };
 

@@ -22,6 +22,15 @@ void for_each_item(const Communicator& communicator,
                    const std::function<void(std::int64_t item)>& work,
                    const std::function<void(std::int64_t done)>& on_progress = {});
 
+/// How many items a rank is given at a time: a quarter of its share of what is left, so that all
+/// ranks finish together, but not more than ranks have been seen to do in two seconds, so that
+/// progress is known; one while nothing is known. At least one.
+/// \test BlockSize.ShrinksTowardsTheEndAndLastsTwoSecondsAtMost
+std::int64_t block_size(std::int64_t items_left,
+                        std::int64_t items_done,
+                        int ranks,
+                        double elapsed_seconds);
+
 /// for_each_item() whose items yield bytes. Rank 0 is given them while the work goes on, outside
 /// the working thread, in any order, each item once: a rank holds those of one small block only.
 /// When `receive` throws, that is as if `work` had. \test WorkQueue.GivesEveryResultToRankZeroOnce

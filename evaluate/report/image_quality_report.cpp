@@ -106,6 +106,32 @@ std::string quality_table(const std::vector<const EvaluationRun*>& runs) {
   return table.html();
 }
 
+/// Median PSNR with one part of the chain alone in force, and its share of the mean square error.
+std::string loss_text(const EvaluationRun& run) {
+  if (!run.summary.contains("loss_split")) return "";
+  const json& split = run.summary.at("loss_split");
+  HtmlTable table({{"Lossy step", false}, {"Median PSNR (dB)", true}, {"Share of the error", true}},
+                  "Each step alone, the others exact; shares are of the field's mean square error "
+                  "and need not add up to 100 %, since errors of steps add or cancel");
+  for (const json& part : split.at("parts"))
+    table.add_row({escaped(part.at("name").get<std::string>()),
+                   decimals(part.at("psnr_db").at("median"), 1),
+                   percent(number_of(part.at("share_of_total")))});
+  return run_figure(run,
+                    "loss-split",
+                    "Box plots of PSNR by lossy step",
+                    "<b>Where quality is lost, " + escaped(field_name(run)) + "</b>, over " +
+                        split.at("poses").dump() + " poses.",
+                    "narrow") +
+         table.html();
+}
+
+std::string loss_section(const std::vector<const EvaluationRun*>& runs) {
+  std::string text;
+  for (const EvaluationRun* run : runs) text += loss_text(*run);
+  return text.empty() ? "" : element("h3", "Loss by interpolation and by quantisation") + text;
+}
+
 std::string pair_pictures(const EvaluationRun& run) {
   std::string figures;
   for (const json& picture : run.summary.at("pictures"))
@@ -137,7 +163,7 @@ std::string image_quality_section(const std::vector<EvaluationRun>& runs,
                  "those of a 2.2 GHz Xeon of 2005 for 256 × 256 pixels of a "
                  "512 × 512 × 512 CT, its sizes those of its format; they are given for scale.",
                  "note") +
-         element("div", pictures, "figures");
+         element("div", pictures, "figures") + loss_section(qualities);
 }
 
 }  // namespace af::evaluation

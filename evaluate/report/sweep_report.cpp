@@ -54,6 +54,22 @@ std::string broadest_text(const json& summary) {
                      "this project's room frame, typically the broadest.");
 }
 
+/// The paper's Fig. 9, when the sweep has DRRs near its levels.
+std::string difference_text(const EvaluationRun& run) {
+  const json images = run.summary.value("difference_images", json());
+  if (!images.is_object()) return "";
+  std::string levels;
+  for (const json& image : images.at("images"))
+    levels += (levels.empty() ? "" : ", ") + decimals(image.at("psnr_db"), 1);
+  return figure(run.file(images.at("file").get<std::string>()),
+                "image/png",
+                "a field DRR and difference images at three qualities",
+                "<b>What a PSNR looks like</b> (the paper's Fig. 9): field less ray cast at " +
+                    levels + " dB, " + escaped(images.at("target").get<std::string>()) +
+                    ", all at one pose and in one window.",
+                "picture wide");
+}
+
 }  // namespace
 
 std::string similarity_section(const std::vector<EvaluationRun>& runs) {
@@ -114,7 +130,7 @@ std::string field_parameters_section(const std::vector<EvaluationRun>& runs) {
                            run->summary.at("poses").dump() +
                            " random poses; the setting that all panels share is set off.",
                        "wide") +
-            table.html();
+            difference_text(*run) + table.html();
   }
   return text.empty() ? ""
                       : section_heading("What a field costs and gives", "field-parameters") + text;

@@ -126,7 +126,7 @@ void write_other_seeds(const fs::path& folder) {
   row.renderer = "field";
   row.stop_reason = "step-below-final";
   row.trace.push_back({1, 2.0, 13, 0.5, {}, 4.0});
-  const auto bytes = nlohmann::json::to_cbor(evaluation::packed_row(3, row));
+  const auto bytes = nlohmann::json::to_cbor(evaluation::packed_row(row));
   write_seed(folder / "rows" / "row", std::string(bytes.begin(), bytes.end()));
   write_seed(folder / "field_values" / "sound", "");
   write_seed(folder / "field_values" / "shifted",

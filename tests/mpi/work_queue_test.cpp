@@ -102,5 +102,18 @@ TEST(WorkQueue, FailureToReceiveIsThrownOnEveryRank) {
   }
 }
 
+TEST(BlockSize, ShrinksTowardsTheEndAndLastsTwoSecondsAtMost) {
+  // Nothing is known yet.
+  EXPECT_EQ(block_size(1000000, 0, 10, 0.0), 1);
+  // 10 ranks did 5000 items of 2 ms in one second: 1000 of them take a rank two seconds.
+  EXPECT_EQ(block_size(1000000, 5000, 10, 1.0), 1000);
+  // A quarter of a rank's share of 4000 items is 100.
+  EXPECT_EQ(block_size(4000, 5000, 10, 1.0), 100);
+  EXPECT_EQ(block_size(39, 5000, 10, 1.0), 1);
+  EXPECT_EQ(block_size(0, 5000, 10, 1.0), 1);
+  // Items of a minute go one by one.
+  EXPECT_EQ(block_size(1000000, 10, 10, 60.0), 1);
+}
+
 }  // namespace
 }  // namespace af

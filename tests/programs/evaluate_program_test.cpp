@@ -193,16 +193,21 @@ struct Cut {
   bool is_stop;        ///< exit code 75; otherwise any but 0
 };
 
-/// Runs $CMD in the background, waits until some registrations are kept, and cuts it short. Nothing
-/// of it is left when this ends.
+/// Runs $CMD in the background, waits until some registrations are kept, holds the ranks there and
+/// cuts the run short, so that it cannot be faster than the cut. Nothing of it is left when this
+/// ends.
 constexpr const char* kCutScript = R"sh(
+  ranks="^[^ ]*/af-evaluate.*$OUT"
   eval "exec $CMD" &
   launcher=$!
-  while [[ "$(stat -c %s "$OUT.progress/ellipsoids.records" 2>/dev/null || echo 0)" -lt 4000 ]]; do
+  until [[ "$(cat "$OUT.progress"/ellipsoids.*.records 2>/dev/null | wc -c)" -gt 4000 ]]; do
     kill -0 $launcher || exit 99
     sleep 0.01
   done
+  pkill -STOP -f -- "$ranks"
   eval "$CUT"
+  sleep 0.3
+  pkill -CONT -f -- "$ranks"
   wait $launcher
   status=$?
   while pgrep -f -- "$OUT" >/dev/null; do sleep 0.02; done

@@ -106,8 +106,8 @@ KeptWork kept_work(const fs::path& folder) {
   KeptWork kept;
   for (const auto& entry : fs::directory_iterator(folder))
     if (entry.path().extension() == ".shard") count_units(read_text_file(entry.path()), kept);
-  if (!fs::exists(folder / "training.records")) return kept;
-  const std::string records = read_text_file(folder / "training.records");
+  if (!fs::exists(folder / "training.000000.records")) return kept;
+  const std::string records = read_text_file(folder / "training.000000.records");
   constexpr std::size_t kHeaderBytes = 16;
   for (std::size_t at = 0; at + kHeaderBytes <= records.size(); ++kept.iterations) {
     at += kHeaderBytes + number_at<std::uint32_t>(records, at + 4);

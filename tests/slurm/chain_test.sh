@@ -89,7 +89,7 @@ stop_job() {
 
 submit "$disturbed"
 stop_job af-precompute-1 "$disturbed/fields/patient-1-A.af.h5.progress/0000-000000.shard"
-stop_job af-evaluate "$disturbed/registration/patient-1.progress/patient-1.records"
+stop_job af-evaluate "$disturbed/registration/patient-1.progress/patient-1.000000.records"
 wait_until 300 "the disturbed chain" no_jobs_left
 [[ -s "$disturbed/report.html" ]] || fail "no report.html after the disturbed chain"
 for stage in precompute-1 evaluate; do
@@ -102,4 +102,11 @@ done
 submit "$disturbed"
 wait_until 120 "the chain that was done before" no_jobs_left
 [[ "$(grep -l 'done before' "$disturbed"/logs/*.log | wc -l)" == 6 ]] || fail "something was done twice"
-say "chain_test: a stopped chain gave the same fields and rows as an undisturbed one"
+
+# And without Slurm.
+local_run=$scratch/run-local
+"$af_root/jobs/local.sh" "$scratch/study.toml" --resources "$scratch/resources.sh" --output "$local_run" --ranks 2
+[[ -s "$local_run/report.html" ]] || fail "no report.html of the local run"
+[[ "$(payloads_of "$local_run")" == "$(payloads_of "$undisturbed")" ]] || fail "the fields of the local run differ"
+[[ "$(rows_of "$local_run")" == "$(rows_of "$undisturbed")" ]] || fail "the rows of the local run differ"
+say "chain_test: a stopped chain gave the same fields and rows as an undisturbed one, and as jobs/local.sh"

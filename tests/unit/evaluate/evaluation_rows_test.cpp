@@ -48,7 +48,7 @@ TEST(RegistrationRows, TravelWithEveryBit) {
   sent.start_deg_mm = {0.1, -1.0 / 3, 1e-300, std::numeric_limits<double>::denorm_min(), 5, -0.0};
   sent.errors = {0.5, 1.0 / 3, 2.0, std::nan(""), 1e-300};
   sent.error = "numerics; \"failed\"\n";
-  const RegistrationRow received = row_of(through_cbor(packed_row(3, sent)));
+  const RegistrationRow received = row_of(through_cbor(packed_row(sent)));
   EXPECT_EQ(received.case_name, sent.case_name);
   EXPECT_EQ(received.draw_index, sent.draw_index);
   EXPECT_EQ(received.start_deg_mm, sent.start_deg_mm);
@@ -72,13 +72,13 @@ TEST(RegistrationRows, ARecordThatIsNoRowIsAFileError) {
     }
     return std::string("was read");
   };
-  const json good = packed_row(3, row("field", 7, 3.3, 1.0));
+  const json good = packed_row(row("field", 7, 3.3, 1.0));
   EXPECT_EQ(refusal(good), "was read");
   EXPECT_THAT(refusal(json::array({1, "skull"})), testing::HasSubstr("skull.records"));
   EXPECT_THAT(refusal("text"), testing::HasSubstr("no row"));
   for (const json& start : std::initializer_list<json>{"7", 7.5, 1e300, 0xFFFFFFFFFFFFFFF0u}) {
     json wrong = good;
-    wrong[3] = start;
+    wrong[2] = start;
     EXPECT_THAT(refusal(wrong), testing::HasSubstr("no row")) << start;
   }
 }

@@ -110,6 +110,17 @@ TEST(Figures, HaveTheirNumbersBesideThem) {
   EXPECT_EQ(CsvTable::read(folder / "psnr.csv").number(1, "psnr_db"), 41.0);
 }
 
+TEST(Figures, DrawAPartOfVeryManyStartsAndSaySo) {
+  const test::ScratchFolder folder;
+  OutcomeGroup group{"field", {}};
+  for (int i = 0; i < 8001; ++i) group.outcomes.push_back({1.0, 0.001 * i});
+  draw_tre_scatter({group}, 16.0, folder / "scatter");
+  EXPECT_THAT(read_text_file(folder / "scatter.svg"), HasSubstr("one start in 3"));
+  const CsvTable drawn = CsvTable::read(folder / "scatter.csv");
+  EXPECT_EQ(drawn.row_count(), 2667u);
+  EXPECT_EQ(drawn.text(2666, "tre_mm"), number_text(0.001 * 7998));
+}
+
 TEST(Figures, AreDrawnForEmptyGroups) {
   const test::ScratchFolder folder;
   const std::vector<OutcomeGroup> groups = {{"field", {{1.0, std::nan("")}}}};

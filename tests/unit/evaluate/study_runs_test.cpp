@@ -115,9 +115,13 @@ TEST(CaseTable, HasARowPerCaseAndOneOverAll) {
 TEST(StartsFile, HasEveryStartOfEveryCaseWhateverTheirNumber) {
   const test::ScratchFolder folder;
   std::vector<PerturbedStart> few(3);
-  std::vector<PerturbedStart> many(9000);  // more than are written at a time
+  std::vector<PerturbedStart> many(9000);
   for (std::size_t i = 0; i < many.size(); ++i) many[i].draw_index = 2 * i;
-  write_starts(folder / "starts.csv", {{"few", &few}, {"many", &many}});
+  StartsFile file(folder / "starts.csv");
+  file.add("few", few);
+  file.add("many", many);
+  EXPECT_FALSE(std::filesystem::exists(folder / "starts.csv"));
+  file.finish();
   const CsvTable table = CsvTable::read(folder / "starts.csv");
   ASSERT_EQ(table.row_count(), few.size() + many.size());
   EXPECT_EQ(table.text(2, "case"), "few");

@@ -9,7 +9,7 @@
 #include "base/hash_random.h"
 #include "unit/gold/camera_at.h"
 
-namespace af::evaluation {
+namespace af {
 namespace {
 
 using Eigen::Vector3d;
@@ -152,4 +152,4 @@ TEST(FiducialGold, RecoversThePoseThatProjectedTheFiducials) {
 }
 
 }  // namespace
-}  // namespace af::evaluation
+}  // namespace af

@@ -14,7 +14,7 @@
 #include "gold/tre.h"
 #include "unit/gold/camera_at.h"
 
-namespace af::evaluation {
+namespace af {
 namespace {
 
 using Eigen::Vector3d;
@@ -144,4 +144,4 @@ TEST(GoldUncertainty, NeedsTargetPoints) {
 }
 
 }  // namespace
-}  // namespace af::evaluation
+}  // namespace af

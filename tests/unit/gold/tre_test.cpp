@@ -8,9 +8,10 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "base/hash_random.h"
 #include "gold/target_box.h"
 
-namespace af::evaluation {
+namespace af {
 namespace {
 
 using Eigen::Vector3d;
@@ -54,6 +55,29 @@ TEST(MeanTre, OfATranslationIsItsLength) {
   RigidTransform moved = gold;
   moved.translation() += Vector3d(3, 4, 12);
   EXPECT_NEAR(mean_tre_mm(moved, gold, target_points(kCube)), 13.0, kRoundingMm);
+}
+
+TEST(MeanTre, LiesWithinItsBounds) {
+  const std::vector<Vector3d> points = target_points({{-10, 0, -30}, {60, 20, 15}}, 5.0);
+  const TreBounder bounder(points);
+  HashRandom random(1, 2, 3);
+  for (int draw = 0; draw < 1000; ++draw) {
+    std::array<double, 6> deg_mm{};
+    for (double& value : deg_mm) value = random.uniform(-20.0, 20.0);
+    // Now and then a translation alone or a rotation alone.
+    if (draw % 10 == 0) deg_mm[0] = deg_mm[1] = deg_mm[2] = 0.0;
+    if (draw % 10 == 1) deg_mm[3] = deg_mm[4] = deg_mm[5] = 0.0;
+    const RigidTransform pose =
+        pose_from_parameters(PoseFrame{}, PoseParameters::from_deg_and_mm(deg_mm));
+    const double tre_mm = mean_tre_mm(pose, RigidTransform::Identity(), points);
+    const TreBounds bounds = bounder.bounds(pose, RigidTransform::Identity());
+    EXPECT_LE(bounds.low_mm, tre_mm);
+    EXPECT_GE(bounds.high_mm, tre_mm);
+    EXPECT_LT(bounds.high_mm - bounds.low_mm, 0.1 * tre_mm);
+    if (draw % 10 == 0) {
+      EXPECT_LT(bounds.high_mm - bounds.low_mm, 1e-6);
+    }
+  }
 }
 
 TEST(MeanTre, OfEqualPosesIsZero) {
@@ -128,4 +152,4 @@ TEST(MeanTre, OfAPoseThatIsNotFiniteIsNan) {
 }
 
 }  // namespace
-}  // namespace af::evaluation
+}  // namespace af

@@ -20,24 +20,31 @@ using testing::HasSubstr;
 
 const DecidingValues kDecides = {{"seed", "1"}, {"preset", "paper"}};
 
-void append(ProgressJournal& journal, const std::string& text) {
-  journal.append(std::as_bytes(std::span(text)));
+void append(const fs::path& folder, const std::string& text, int shard = 0) {
+  ProgressShard writer(folder, "case", shard);
+  writer.append(std::as_bytes(std::span(text)));
+  writer.sync();
 }
 
 std::vector<std::string> finished(ProgressJournal& journal) {
-  std::vector<std::string> records;
-  journal.visit_finished([&](std::span<const std::byte> record) {
-    records.emplace_back(reinterpret_cast<const char*>(record.data()), record.size());
-  });
-  return records;
+  std::vector<std::string> mended;
+  std::vector<std::string> visited;
+  const auto into = [](std::vector<std::string>& records) {
+    return [&records](std::span<const std::byte> record) {
+      records.emplace_back(reinterpret_cast<const char*>(record.data()), record.size());
+    };
+  };
+  journal.mend_and_visit(into(mended));
+  journal.visit(into(visited));
+  EXPECT_EQ(mended, visited);
+  return mended;
 }
 
-/// A journal with the records "one", "" and "three".
+/// A journal with the records "one", "" and "three" of one process.
 fs::path three_records(const fs::path& folder) {
-  ProgressJournal journal(folder, "case", kDecides, false);
-  for (const char* text : {"one", "", "three"}) append(journal, text);
-  journal.sync();
-  return folder / "case.records";
+  const ProgressJournal journal(folder, "case", kDecides, false);
+  for (const char* text : {"one", "", "three"}) append(folder, text);
+  return folder / "case.000000.records";
 }
 
 TEST(ProgressJournal, GivesBackWhatEarlierRunsAppended) {
@@ -45,11 +52,26 @@ TEST(ProgressJournal, GivesBackWhatEarlierRunsAppended) {
   three_records(folder / "p");
   ProgressJournal again(folder / "p", "case", kDecides, false);
   EXPECT_THAT(finished(again), ElementsAre("one", "", "three"));
-  append(again, "four");
+  append(folder / "p", "four");
   ProgressJournal third(folder / "p", "case", kDecides, false);
   EXPECT_THAT(finished(third), ElementsAre("one", "", "three", "four"));
   third.remove();
   EXPECT_FALSE(fs::exists(folder / "p"));
+}
+
+TEST(ProgressJournal, JoinsTheShardsOfAllProcessesAndNoOtherJournals) {
+  const test::ScratchFolder folder;
+  three_records(folder / "p");
+  append(folder / "p", "of twelve", 12);
+  append(folder / "p", "of two", 2);
+  // Names that begin alike.
+  ProgressJournal other(folder / "p", "case.2", kDecides, false);
+  ProgressShard(folder / "p", "case.2", 1).append(std::as_bytes(std::span("other", 5)));
+  ProgressJournal journal(folder / "p", "case", kDecides, false);
+  EXPECT_THAT(finished(journal), ElementsAre("one", "", "three", "of two", "of twelve"));
+  EXPECT_THAT(finished(other), ElementsAre("other"));
+  journal.remove();
+  EXPECT_THAT(finished(other), ElementsAre("other"));
 }
 
 TEST(ProgressJournal, CutsOffWhatAKillTore) {
@@ -60,7 +82,7 @@ TEST(ProgressJournal, CutsOffWhatAKillTore) {
     fs::resize_file(records, kept);
     ProgressJournal journal(folder / "p", "case", kDecides, false);
     EXPECT_THAT(finished(journal), ElementsAre("one", "")) << kept;
-    append(journal, "next");
+    append(folder / "p", "next");
     ProgressJournal again(folder / "p", "case", kDecides, false);
     EXPECT_THAT(finished(again), ElementsAre("one", "", "next")) << kept;
     fs::remove_all(folder / "p");

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <stdint.h>
+
+namespace af {
+
+/// y = matrix x + offset, row by row.
+struct PointMap {
+  double matrix[3][3];
+  double offset[3];
+};
+
+/// Sum of |map(x)| over `count` points (x, y, z one after the other). Added up in eight parts, so
+/// that every vector width gives identical bits.
+using SumLengths = double (*)(const double* points, int64_t count, const PointMap& map);
+
+/// What points contribute in one camera.
+struct ProjectionSums {
+  double reprojection;    ///< distance of the gold point from the line through source and point
+  double slope;           ///< distance of both projections on a detector at depth 1
+  double smallest_depth;  ///< of any point or gold point
+};
+
+/// The maps lead into the camera's frame: source at the origin, depth along z.
+using SumProjections = ProjectionSums (*)(const double* points,
+                                          int64_t count,
+                                          const PointMap& camera_from_ct,
+                                          const PointMap& gold_camera_from_ct);
+
+namespace kernels_128 {
+double sum_lengths(const double* points, int64_t count, const PointMap& map);
+ProjectionSums sum_projections(const double* points,
+                               int64_t count,
+                               const PointMap& camera_from_ct,
+                               const PointMap& gold_camera_from_ct);
+}  // namespace kernels_128
+namespace kernels_256 {
+double sum_lengths(const double* points, int64_t count, const PointMap& map);
+ProjectionSums sum_projections(const double* points,
+                               int64_t count,
+                               const PointMap& camera_from_ct,
+                               const PointMap& gold_camera_from_ct);
+}  // namespace kernels_256
+namespace kernels_512 {
+double sum_lengths(const double* points, int64_t count, const PointMap& map);
+ProjectionSums sum_projections(const double* points,
+                               int64_t count,
+                               const PointMap& camera_from_ct,
+                               const PointMap& gold_camera_from_ct);
+}  // namespace kernels_512
+
+}  // namespace af
