@@ -27,14 +27,16 @@ const std::vector<double>& paper_levels_db() {
   return levels;
 }
 
-/// Rank 0 knows the comparisons; everybody needs the choice.
+/// Rank 0 knows the comparisons; everybody needs the choice. A DRR that is nearest to several
+/// levels is shown once.
 std::vector<SweepDrr> shared_choice(const std::vector<SettingResult>& results,
                                     const Communicator& world) {
   std::string text;
   if (world.is_root()) {
     json chosen = json::array();
     for (const SweepDrr& drr : drrs_at_levels(results, paper_levels_db()))
-      chosen.push_back({drr.result, drr.pose});
+      if (const json pair = {drr.result, drr.pose}; chosen.empty() || chosen.back() != pair)
+        chosen.push_back(pair);
     text = chosen.dump();
   }
   world.broadcast(text);
@@ -57,10 +59,10 @@ void write_files(const std::vector<SettingResult>& results,
   write_picture(panels,
                 2,
                 first.target() + ", pose " + std::to_string(drrs.front().pose) +
-                    ": differences at three qualities, in one window",
+                    ": field - ray casting at " + std::to_string(drrs.size()) +
+                    " qualities, in one window",
                 folder / "difference-images.png");
-  CsvTable table({"level_db",
-                  "psnr_db",
+  CsvTable table({"psnr_db",
                   "case",
                   "camera",
                   "pose_index",
@@ -68,13 +70,12 @@ void write_files(const std::vector<SettingResult>& results,
                   "st_nodes",
                   "codewords",
                   "training_fraction"});
-  for (std::size_t i = 0; i < drrs.size(); ++i) {
-    const SettingResult& result = results[drrs[i].result];
-    table.add_row({number_text(paper_levels_db()[i]),
-                   number_text(result.comparisons[drrs[i].pose].psnr_db),
+  for (const SweepDrr& drr : drrs) {
+    const SettingResult& result = results[drr.result];
+    table.add_row({number_text(result.comparisons[drr.pose].psnr_db),
                    result.setting.case_name,
                    result.setting.camera,
-                   std::to_string(drrs[i].pose),
+                   std::to_string(drr.pose),
                    std::to_string(result.setting.uv_nodes),
                    std::to_string(result.setting.st_nodes),
                    std::to_string(result.setting.codewords),
@@ -176,9 +177,8 @@ json write_difference_images(const std::vector<SettingResult>& results,
     if (!world.is_root()) return nullptr;
     write_files(results, drrs, panels_of(results, drrs, field_images, reference), folder);
     json images = json::array();
-    for (std::size_t i = 0; i < drrs.size(); ++i)
-      images.push_back({{"level_db", paper_levels_db()[i]},
-                        {"psnr_db", results[drrs[i].result].comparisons[drrs[i].pose].psnr_db}});
+    for (const SweepDrr& drr : drrs)
+      images.push_back({{"psnr_db", results[drr.result].comparisons[drr.pose].psnr_db}});
     return {{"file", "difference-images.png"},
             {"target", results[drrs.front().result].target()},
             {"pose_index", drrs.front().pose},

@@ -22,9 +22,10 @@ std::string method_title(const json& renderer) {
 }
 
 std::string field_name(const EvaluationRun& run) {
+  const std::string camera = run.summary.at("field").at("camera").get<std::string>();
+  if (run.summary.contains("case")) return run.summary.at("case").get<std::string>() + " " + camera;
   const std::string study = std::filesystem::path(run.name).parent_path().generic_string();
-  return "camera " + run.summary.at("field").at("camera").get<std::string>() +
-         (study.empty() ? "" : " of " + study);
+  return "camera " + camera + (study.empty() ? "" : " of " + study);
 }
 
 std::string section_heading(const std::string& text, const std::string& id) {

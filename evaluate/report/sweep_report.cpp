@@ -63,7 +63,7 @@ std::string difference_text(const EvaluationRun& run) {
     levels += (levels.empty() ? "" : ", ") + decimals(image.at("psnr_db"), 1);
   return figure(run.file(images.at("file").get<std::string>()),
                 "image/png",
-                "a field DRR and difference images at three qualities",
+                "a field DRR and difference images",
                 "<b>What a PSNR looks like</b> (the paper's Fig. 9): field less ray cast at " +
                     levels + " dB, " + escaped(images.at("target").get<std::string>()) +
                     ", all at one pose and in one window.",
