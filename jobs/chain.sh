@@ -2,7 +2,28 @@
 # SPDX-License-Identifier: Apache-2.0
 # What a study's chain consists of: a field for every view, the registrations of every case, a report. Sourced by
 # jobs/submit.sh (on Slurm) and jobs/run-study.sh (on this machine), so that both run the same commands. The caller has
-# sourced lib.sh and a resources file, and has set study, output and bin.
+# sourced lib.sh and sets output, and maybe resources.
+
+study="" resources="$af_root/jobs/slurm/resources.sh"
+
+# take_study WORD: the word of the command line that is no option.
+take_study() {
+  [[ "$1" != -* ]] || die 2 "unknown option '$1' (try --help)"
+  [[ -z "$study" ]] || die 2 "one study at a time: '$study' and '$1' were given"
+  study=$1
+}
+
+# open_study: checks study and resources, and reads the latter.
+open_study() {
+  [[ -n "$study" ]] || die 2 "which study? Give a study.toml (try --help)"
+  [[ -f "$study" ]] || die 4 "$study: no such file"
+  [[ -f "$resources" ]] || die 4 "--resources $resources: no such file"
+  study=$(realpath "$study")
+  bin=$(program_folder)
+  need_programs "$bin" af-precompute af-evaluate af-inspect
+  # shellcheck source=slurm/resources.sh
+  source "$resources"
+}
 
 declare -A cameras_of=()
 case_names=() most_views=0

@@ -4,6 +4,8 @@
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR
 source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
+# shellcheck source=chain.sh
+source "$af_root/jobs/chain.sh"
 
 usage() {
   cat <<'TEXT'
@@ -20,33 +22,20 @@ those of a cluster and not used here. Stopped (Ctrl-C, kill), it goes on when th
 TEXT
 }
 
-study="" target="$PWD/af-run" resources="$af_root/jobs/slurm/resources.sh" ranks=""
+target="$PWD/af-run" ranks=""
 while (($# > 0)); do
   case "$1" in
     --output | -o) need_value "$1" $#; target=$2; shift ;;
     --resources) need_value "$1" $#; resources=$2; shift ;;
     --ranks | -n) need_value "$1" $#; need_count "$1" "$2"; ranks=$2; shift ;;
     --help | -h) usage; exit 0 ;;
-    -*) die 2 "unknown option '$1' (try --help)" ;;
-    *)
-      [[ -z "$study" ]] || die 2 "one study at a time: '$study' and '$1' were given"
-      study=$1
-      ;;
+    *) take_study "$1" ;;
   esac
   shift
 done
-[[ -n "$study" ]] || die 2 "which study? Give a study.toml (try --help)"
-[[ -f "$study" ]] || die 4 "$study: no such file"
-[[ -f "$resources" ]] || die 4 "--resources $resources: no such file"
-study=$(realpath "$study")
+open_study
 [[ -n "$ranks" ]] || ranks=$(core_count)
-bin=$(program_folder)
-need_programs "$bin" af-precompute af-evaluate af-inspect
 
-# shellcheck source=slurm/resources.sh
-source "$resources"
-# shellcheck source=chain.sh
-source "$af_root/jobs/chain.sh"
 read_chain
 open_output "$target"
 mkdir -p "$output"/{fields,registration}

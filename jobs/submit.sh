@@ -4,6 +4,8 @@
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR
 source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
+# shellcheck source=chain.sh
+source "$af_root/jobs/chain.sh"
 
 usage() {
   cat <<'TEXT'
@@ -23,35 +25,20 @@ TEXT
 
 # --- options -----------------------------------------------------------------------------------------------------
 
-study="" output="$PWD/af-run" resources="$af_root/jobs/slurm/resources.sh" dry_run=no
-need_value() { (($2 >= 2)) || die 2 "option $1 needs a value (try --help)"; }
+output="$PWD/af-run" dry_run=no
 while (($# > 0)); do
   case "$1" in
     --output | -o) need_value "$1" $#; output=$2; shift ;;
     --resources) need_value "$1" $#; resources=$2; shift ;;
     --dry-run) dry_run=yes ;;
     --help | -h) usage; exit 0 ;;
-    -*) die 2 "unknown option '$1' (try --help)" ;;
-    *)
-      [[ -z "$study" ]] || die 2 "one study at a time: '$study' and '$1' were given"
-      study=$1
-      ;;
+    *) take_study "$1" ;;
   esac
   shift
 done
-[[ -n "$study" ]] || die 2 "which study? Give a study.toml (try --help)"
-[[ -f "$study" ]] || die 4 "$study: no such file"
-[[ -f "$resources" ]] || die 4 "--resources $resources: no such file"
-study=$(realpath "$study")
-bin=$(program_folder)
-need_programs "$bin" af-precompute af-evaluate af-inspect
+open_study
 [[ "$dry_run" == yes ]] || command -v sbatch >/dev/null || die 1 "sbatch is missing: this is no Slurm cluster (jobs/local.sh STUDY.toml needs none)"
 
-# shellcheck source=slurm/resources.sh
-source "$resources"
-
-# shellcheck source=chain.sh
-source "$af_root/jobs/chain.sh"
 read_chain
 
 # --- the chain ---------------------------------------------------------------------------------------------------

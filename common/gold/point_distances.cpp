@@ -36,7 +36,7 @@ double sum_of_lengths_mm(std::span<const Eigen::Vector3d> points_ct_mm,
                          const Eigen::Matrix3d& matrix,
                          const Eigen::Vector3d& offset_mm) {
   if (points_ct_mm.empty()) return 0.0;
-  const auto sum = select_kernel<SumLengths>(
+  const auto sum = select_kernel<SumLengths*>(
       kernels_128::sum_lengths, kernels_256::sum_lengths, kernels_512::sum_lengths);
   return sum(points_ct_mm.front().data(),
              static_cast<std::int64_t>(points_ct_mm.size()),
@@ -48,7 +48,7 @@ ProjectionDistances projection_distances(const CameraGeometry& camera,
                                          const RigidTransform& room_from_ct,
                                          const RigidTransform& gold_room_from_ct) {
   if (points_ct_mm.empty()) return {};
-  const auto sum = select_kernel<SumProjections>(
+  const auto sum = select_kernel<SumProjections*>(
       kernels_128::sum_projections, kernels_256::sum_projections, kernels_512::sum_projections);
   const ProjectionSums sums = sum(points_ct_mm.front().data(),
                                   static_cast<std::int64_t>(points_ct_mm.size()),

@@ -13,7 +13,7 @@ struct PointMap {
 
 /// Sum of |map(x)| over `count` points (x, y, z one after the other). Added up in eight parts, so
 /// that every vector width gives identical bits.
-using SumLengths = double (*)(const double* points, int64_t count, const PointMap& map);
+using SumLengths = double(const double* points, int64_t count, const PointMap& map);
 
 /// What points contribute in one camera.
 struct ProjectionSums {
@@ -23,31 +23,22 @@ struct ProjectionSums {
 };
 
 /// The maps lead into the camera's frame: source at the origin, depth along z.
-using SumProjections = ProjectionSums (*)(const double* points,
-                                          int64_t count,
-                                          const PointMap& camera_from_ct,
-                                          const PointMap& gold_camera_from_ct);
+using SumProjections = ProjectionSums(const double* points,
+                                      int64_t count,
+                                      const PointMap& camera_from_ct,
+                                      const PointMap& gold_camera_from_ct);
 
 namespace kernels_128 {
-double sum_lengths(const double* points, int64_t count, const PointMap& map);
-ProjectionSums sum_projections(const double* points,
-                               int64_t count,
-                               const PointMap& camera_from_ct,
-                               const PointMap& gold_camera_from_ct);
+SumLengths sum_lengths;
+SumProjections sum_projections;
 }  // namespace kernels_128
 namespace kernels_256 {
-double sum_lengths(const double* points, int64_t count, const PointMap& map);
-ProjectionSums sum_projections(const double* points,
-                               int64_t count,
-                               const PointMap& camera_from_ct,
-                               const PointMap& gold_camera_from_ct);
+SumLengths sum_lengths;
+SumProjections sum_projections;
 }  // namespace kernels_256
 namespace kernels_512 {
-double sum_lengths(const double* points, int64_t count, const PointMap& map);
-ProjectionSums sum_projections(const double* points,
-                               int64_t count,
-                               const PointMap& camera_from_ct,
-                               const PointMap& gold_camera_from_ct);
+SumLengths sum_lengths;
+SumProjections sum_projections;
 }  // namespace kernels_512
 
 }  // namespace af
