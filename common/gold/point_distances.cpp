@@ -13,7 +13,7 @@ namespace {
 static_assert(sizeof(Eigen::Vector3d) == 3 * sizeof(double), "kernels read points as numbers");
 
 PointMap map_of(const Eigen::Matrix3d& matrix, const Eigen::Vector3d& offset) {
-  PointMap map;
+  PointMap map{};
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3; ++column) map.matrix[row][column] = matrix(row, column);
     map.offset[row] = offset[row];

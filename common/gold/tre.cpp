@@ -25,15 +25,16 @@ TreBounder::TreBounder(std::span<const Eigen::Vector3d> points_ct_mm) {
   if (points_ct_mm.empty()) throw InputError("target points: there must be at least one");
   Eigen::AlignedBox3d box;
   for (const Eigen::Vector3d& point : points_ct_mm) box.extend(point);
-  constexpr int kCellsPerAxis = 4;
-  const Eigen::Vector3d cell_mm = (box.sizes() / kCellsPerAxis).cwiseMax(1e-9);
+  constexpr std::size_t kCellsPerAxis = 4;
+  const Eigen::Vector3d cell_mm = (box.sizes() / static_cast<double>(kCellsPerAxis)).cwiseMax(1e-9);
   cells_.resize(kCellsPerAxis * kCellsPerAxis * kCellsPerAxis);
   const Eigen::Vector3d center = box.center();
   for (const Eigen::Vector3d& point : points_ct_mm) {
-    const Eigen::Vector3i place =
-        (point - box.min()).cwiseQuotient(cell_mm).cast<int>().cwiseMin(kCellsPerAxis - 1);
-    Cell& cell = cells_[static_cast<std::size_t>(
-        (place.z() * kCellsPerAxis + place.y()) * kCellsPerAxis + place.x())];
+    const Eigen::Vector3d place = (point - box.min()).cwiseQuotient(cell_mm);
+    std::size_t index = 0;
+    for (const double along : {place.z(), place.y(), place.x()})
+      index = index * kCellsPerAxis + std::min(static_cast<std::size_t>(along), kCellsPerAxis - 1);
+    Cell& cell = cells_[index];
     cell.share += 1.0;
     cell.mean_mm += point - center;
     cell.covariance_mm2 += (point - center) * (point - center).transpose();
