@@ -6,6 +6,7 @@
 #include <iostream>
 #include <iterator>
 #include <map>
+#include <optional>
 #include <set>
 #include <sstream>
 
@@ -24,6 +25,7 @@
 #include "evaluate/summary_files.h"
 #include "io/gnuplot_figure.h"
 #include "io/output_file.h"
+#include "io/output_lock.h"
 #include "io/provenance.h"
 #include "io/sha256.h"
 
@@ -50,6 +52,8 @@ const std::set<std::string> kNotOfRepeats = {"--case",
                                              "--starts-only",
                                              "--only-start",
                                              "--restart",
+                                             "--max-hours",
+                                             "--stall-minutes",
                                              "--raycast-starts-per-interval",
                                              "--raycast-intervals",
                                              "--output"};
@@ -352,6 +356,7 @@ CLI::App* bind_registration(CLI::App& app, RegistrationStudyOptions& options) {
   command->add_flag("--restart",
                     options.restarts,
                     "Throw away what a stopped or killed run has finished (OUTPUT.progress)");
+  cli::bind_run_limits(*command);
   command->add_option("-o,--output", options.output_folder, "Folder for the results")->required();
   command->parse_complete_callback([&options, command] {
     options.shared_by_repeats = cli::given_options(*command, kNotOfRepeats);
@@ -371,11 +376,13 @@ void run_registration(const RegistrationStudyOptions& options,
   for (const std::string& text : study_warnings) cli::warn(world, text);
   const std::vector<StudyCase> cases =
       all_or_none(world, [&] { return chosen_cases(options, study); });
+  std::optional<OutputLock> lock;
   std::optional<StartsFile> starts_file;
   all_or_none(world, [&] {
     if (!world.is_root()) return;
     require_gnuplot();
     make_output_folder(folder);
+    lock.emplace(folder);
     starts_file.emplace(folder / "starts.csv");
   });
 

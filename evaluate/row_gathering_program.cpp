@@ -11,6 +11,7 @@
 #include "cli/app_main.h"
 #include "cli/progress_printer.h"
 #include "parallel/work_queue.h"
+#include "parallel/work_watch.h"
 
 namespace af::evaluation {
 
@@ -27,6 +28,8 @@ void collect_rows(const Communicator& world,
       world,
       count,
       [&](std::int64_t item) {
+        const WorkNote note((what.empty() ? "" : what + ", ") + "item " + std::to_string(item + 1) +
+                            " of " + std::to_string(count));
         const std::vector<std::uint8_t> packed = json::to_cbor(row_of_item(item));
         const auto bytes = std::as_bytes(std::span(packed));
         return std::vector<std::byte>(bytes.begin(), bytes.end());

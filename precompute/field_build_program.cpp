@@ -13,6 +13,7 @@
 #include "base/crc32c.h"
 #include "base/error.h"
 #include "parallel/work_queue.h"
+#include "parallel/work_watch.h"
 #include "precompute/field_encoder.h"
 #include "precompute/planner.h"
 
@@ -93,6 +94,16 @@ std::array<int, 4> first_tile_of(const WorkUnit& unit, const LightSlab& light_sl
           unit.v.begin / 2,
           (unit.s.begin - slab.stored_s.begin) / 2,
           (unit.t.begin - slab.stored_t.begin) / 2};
+}
+
+/// "unit 3 of 32 (slab 0, viewpoints u 0 to 7, v 2 to 3)".
+std::string name_of(const WorkUnit& unit, std::size_t units) {
+  const auto range = [](const NodeRange& nodes) {
+    return std::to_string(nodes.begin) + " to " + std::to_string(nodes.end() - 1);
+  };
+  return "unit " + std::to_string(unit.id) + " of " + std::to_string(units) + " (slab " +
+         std::to_string(unit.slab) + ", viewpoints u " + range(unit.u) + ", v " + range(unit.v) +
+         ")";
 }
 
 void append_axis(const GridAxis& axis, std::vector<double>& numbers) {
@@ -214,11 +225,14 @@ CastPhase cast_field(const FieldBuild& build,
   cast.unit_tiles.assign(build.units.size(), 0);
   TileKeeper keeper(build, limits.kept_tile_bytes, cast);
   std::vector<std::uint64_t> is_finished(build.units.size(), 0);
-  if (build.progress != nullptr)
+  if (build.progress != nullptr) {
+    const WorkNote note("reading finished units from " + build.progress->path().string());
     build.progress->visit_finished(build.units, [&](UnitTiles tiles) {
+      note_progress();
       is_finished[tiles.unit_id] = 1;
       keeper.add(std::move(tiles));
     });
+  }
   const std::uint64_t resumed =
       static_cast<std::uint64_t>(std::count(is_finished.begin(), is_finished.end(), 1));
   cast.units_resumed = sum_over(communicator, resumed);
@@ -231,6 +245,7 @@ CastPhase cast_field(const FieldBuild& build,
     if (stop_requested()) return;
     const auto start = Clock::now();
     const WorkUnit& unit = build.units[missing[static_cast<std::size_t>(item)]];
+    const WorkNote note("casting " + name_of(unit, build.units.size()));
     samples.resize(unit.sample_count());
     build.caster.cast(unit, samples);
     UnitTiles tiles = make_unit_tiles(unit, samples);
@@ -347,6 +362,7 @@ std::vector<IndexBlock> FieldEncoder::next_blocks(const ProgressCallback& on_pro
 IndexBlock FieldEncoder::next_block() {
   const bool is_kept = !cast_.kept.empty();
   const WorkUnit& unit = build_.units[is_kept ? cast_.kept.back().unit_id : others_.back()];
+  const WorkNote note("encoding " + name_of(unit, build_.units.size()));
   EncodedUnit of_unit = encoded(unit, is_kept);
   if (is_kept)
     cast_.kept.pop_back();

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/app_main.h"
+#include "cli/stop_request.h"
 #include "precompute/precompute_program.h"
 
 namespace {
@@ -129,6 +130,7 @@ int main(int argc, char** argv) {
   bind_field(app, options);
   bind_codebook(app, options);
   bind_run(app, options);
+  af::cli::bind_run_limits(app);
   const std::string command = af::cli::command_line(argc, argv);
   return af::cli::app_main(app, argc, argv, [&](const af::Communicator& world) {
     af::run_precompute(options, command, world);

@@ -18,7 +18,9 @@
 #include "cli/progress_printer.h"
 #include "cli/stop_request.h"
 #include "io/output_file.h"
+#include "io/output_lock.h"
 #include "io/provenance.h"
+#include "parallel/work_watch.h"
 #include "precompute/dry_run_report.h"
 #include "precompute/field_build_program.h"
 #include "precompute/resampling_program.h"
@@ -158,7 +160,9 @@ class PrecomputeRun {
       throw_if_any(problems(options_));
       if (!options_.is_dry_run && options_.output.empty())
         throw UsageError("-o FIELD.h5 is needed (or --dry-run)");
-      if (!options_.is_dry_run && world_.is_root()) require_output_folder();
+      if (options_.is_dry_run || !world_.is_root()) return;
+      require_output_folder();
+      lock_ = std::make_unique<OutputLock>(options_.output);
     });
     if (options_.has_checkpoint && !options_.is_dry_run) cli::listen_for_stop_requests();
     load();
@@ -185,6 +189,7 @@ class PrecomputeRun {
   }
 
   void load() {
+    WorkNote note("reading the CT", WorkNote::Kind::Phase);
     source_ = load_source(options_, world_);
     for (const std::string& warning : source_.warnings) cli::warn(world_, warning);
     size_planes(DepthSlabs{{}, {0.0}});
@@ -192,6 +197,7 @@ class PrecomputeRun {
     const StPlane st_plane = options_.st_plane_rule();
     const bool is_default = options_.slabs == 1 && st_plane == StPlane::Centre;
     if (!options_.is_shear_warp() && is_default) return;
+    note.change("resampling the CT");
     resampled_ = std::make_shared<const SlabAlignedVolume>(
         resample_on_node(*source_.volume, light_slab_.slab_from_ct, SlabAlignedOptions{}, world_));
     if (!is_default)
@@ -356,8 +362,12 @@ class PrecomputeRun {
 
   TrainedCodebook train_phase(const FieldBuild& build, CastPhase& cast) {
     cli::ProgressPrinter printer("training the codebook", world_.is_root());
+    const auto iteration = [](std::size_t done) {
+      return "training the codebook, iteration " + std::to_string(done + 1);
+    };
     std::optional<TrainingJournal> journal;
     TrainingCheckpoints checkpoints;
+    WorkNote note(iteration(0));
     if (build.progress != nullptr) {
       const NamedValues decides = codebook_options(options_);
       journal.emplace(
@@ -365,6 +375,7 @@ class PrecomputeRun {
       checkpoints.begun = journal->begun();
       checkpoints.on_iteration = [&](const TrainedCodebook& so_far) {
         journal->append(so_far);
+        note.change(iteration(so_far.iterations.size()));
         stop_if_requested("with all units and " + std::to_string(so_far.iterations.size()) +
                           " iterations of the training saved");
       };
@@ -506,6 +517,7 @@ class PrecomputeRun {
   std::string command_line_;
   const Communicator& world_;
   int ranks_on_node_ = world_.node().size();
+  std::unique_ptr<OutputLock> lock_;  ///< rank 0
   FieldSource source_;
   LightSlab light_slab_;
   std::shared_ptr<const SlabAlignedVolume> resampled_;  ///< for the shear-warp caster

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <iostream>
+#include <optional>
 #include <string>
 
 #include "base/error.h"
@@ -7,6 +8,7 @@
 #include "cli/progress_printer.h"
 #include "io/csv_table.h"
 #include "io/output_file.h"
+#include "io/output_lock.h"
 #include "io/study_file.h"
 #include "register/method_command.h"
 #include "register/multi_start_program.h"
@@ -99,8 +101,11 @@ void run(const RegisterOptions& options,
       af::all_or_none(world, [&] { return RegistrationRunner(loaded.problem, method, pool); });
   // Before the work, so that an unwritable folder does not cost it; after the inputs, so that bad
   // ones leave nothing behind.
+  std::optional<af::OutputLock> lock;
   af::all_or_none(world, [&] {
-    if (world.is_root()) af::make_output_folder(options.output_folder);
+    if (!world.is_root()) return;
+    af::make_output_folder(options.output_folder);
+    lock.emplace(options.output_folder);
   });
 
   af::cli::ProgressPrinter printer("registrations", world.is_root() && starts.size() > 1);

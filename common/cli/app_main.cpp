@@ -1,11 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/app_main.h"
 
+#include <chrono>
+#include <csignal>
 #include <iostream>
+#include <optional>
+#include <sstream>
+#include <thread>
 
 #include "base/build_info.h"
 #include "base/error.h"
+#include "cli/stop_request.h"
 #include "parallel/mpi_environment.h"
+#include "parallel/work_watch.h"
 
 namespace af::cli {
 
@@ -28,6 +35,28 @@ int report_parse_result(const CLI::App& app, const CLI::ParseError& error, bool 
   return static_cast<int>(is_success ? ExitCode::Done : ExitCode::Usage);
 }
 
+/// What asked for a stop.
+std::string reason_text(const RankFailure& failure) {
+  const bool is_stop = failure.exit_code == static_cast<int>(ExitCode::Stopped);
+  return is_stop && !stop_reason().empty() ? " (" + stop_reason() + ")" : "";
+}
+
+/// Whoever has not reported leaves the ending to who has, for a while.
+[[noreturn]] void end_after_report(int exit_code, bool has_reported) {
+  constexpr std::chrono::seconds kPatience{5};
+  if (!has_reported) std::this_thread::sleep_for(kPatience);
+  MpiEnvironment::abort(exit_code);
+}
+
+/// From the watchdog's thread.
+void end_job(const CLI::App& app, const std::string& stall) {
+  std::ostringstream text;
+  text << app.get_name() << ": " << stall
+       << " (--stall-minutes): the job is ended; run the same command again to go on\n";
+  std::cerr << text.str() << std::flush;
+  MpiEnvironment::abort(static_cast<int>(ExitCode::Stopped));
+}
+
 }  // namespace
 
 int app_main(CLI::App& app,
@@ -43,6 +72,12 @@ int app_main(CLI::App& app,
   } catch (const CLI::ParseError& error) {
     return report_parse_result(app, error, world.is_root());
   }
+  // A write beyond a limit of file sizes is an error to report, not a signal to die from.
+  std::signal(SIGXFSZ, SIG_IGN);
+  std::optional<StallWatch> watch;
+  if (stall_minutes() > 0.0)
+    watch.emplace(
+        world, stall_minutes(), [&app](const std::string& stall) { end_job(app, stall); });
   RankFailure failure;
   bool is_known_everywhere = false;
   try {
@@ -57,12 +92,16 @@ int app_main(CLI::App& app,
   // An error thrown on all ranks alike is printed once; one that this rank met alone ends the job,
   // or the others would wait for it in their next collective call.
   if (is_known_everywhere || world.size() == 1) {
-    if (world.is_root()) std::cerr << app.get_name() << ": " << failure.message << '\n';
-    return failure.exit_code;
+    if (world.is_root())
+      std::cerr << app.get_name() << ": " << failure.message << reason_text(failure) << std::endl;
+    if (!MpiEnvironment::is_abort_required()) return failure.exit_code;
+    end_after_report(failure.exit_code, world.is_root());
   }
-  std::cerr << app.get_name() << ": rank " << world.rank() << ": " << failure.message << std::endl;
-  MpiEnvironment::abort(failure.exit_code);
-  return failure.exit_code;
+  const bool is_reporting = claim_report();
+  if (is_reporting)
+    std::cerr << app.get_name() << ": rank " << world.rank() << " on " << host_name() << ": "
+              << failure.message << std::endl;
+  end_after_report(failure.exit_code, is_reporting);
 }
 
 std::string shell_quoted(const std::string& word) {

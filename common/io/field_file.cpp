@@ -13,7 +13,9 @@
 #include "io/field_file_layout.h"
 #include "io/output_file.h"
 #include "io/sha256.h"
+#include "parallel/mpi_environment.h"
 #include "parallel/mpi_handle.h"
+#include "parallel/work_watch.h"
 
 namespace af {
 
@@ -185,8 +187,9 @@ void write_block(hid_t dataset, IndexBlock* block) {
   if (block != nullptr) block->indices = {};
 }
 
-/// The open file of all ranks. Closing it is collective, so it is done by close() and never while
-/// unwinding: a rank that fails goes on taking part.
+/// The open file of all ranks. After a failed write it can neither be written nor closed: some
+/// ranks know of the failure and others wait for them within MPI-IO. So a rank that fails throws at
+/// once, the file stays open, and the job must end by abort.
 class SharedFile {
  public:
   /// Collective.
@@ -214,43 +217,26 @@ class SharedFile {
       std::vector<IndexBlock*> of_slab;
       for (IndexBlock& block : blocks)
         if (block.slab == k) of_slab.push_back(&block);
-      remember([&] {
+      naming_file(path_, [&] {
         const Handle dataset(
             H5Dopen2(file_, rules_[k].name.c_str(), H5P_DEFAULT), H5Dclose, "H5Dopen2");
-        // A rank whose write fails takes part in the others', so that nobody waits for it.
         for (std::size_t i = 0; i < most_blocks[k]; ++i)
-          remember([&] { write_block(dataset, i < of_slab.size() ? of_slab[i] : nullptr); });
+          write_block(dataset, i < of_slab.size() ? of_slab[i] : nullptr);
       });
     }
-    throw_first();
   }
 
-  /// Collective. Every rank comes here, failed or not.
+  /// Collective.
   void close() {
-    if (file_ == H5I_INVALID_HID) return;
-    remember([&] { checked(H5Fclose(std::exchange(file_, H5I_INVALID_HID)), "H5Fclose"); });
-    throw_first();
+    naming_file(path_,
+                [&] { checked(H5Fclose(std::exchange(file_, H5I_INVALID_HID)), "H5Fclose"); });
   }
 
  private:
-  template <typename Function>
-  void remember(Function&& function) {
-    try {
-      naming_file(path_, function);
-    } catch (...) {
-      if (failure_.exit_code == 0) failure_ = failure_of(std::current_exception());
-    }
-  }
-  void throw_first() const {
-    if (const RankFailure first = first_failure(communicator_, failure_); first.exit_code != 0)
-      throw_failure(first);
-  }
-
   const std::filesystem::path& path_;
   const std::vector<DatasetRule>& rules_;
   const Communicator& communicator_;
   hid_t file_ = H5I_INVALID_HID;
-  RankFailure failure_;
 };
 
 /// Collective. Writes blocks in rounds until no rank has any; returns the hash sums of each slab
@@ -260,7 +246,7 @@ std::vector<std::uint64_t> write_rounds(SharedFile& file,
                                         const NextBlocks& next_blocks,
                                         const Communicator& communicator) {
   std::vector<std::uint64_t> sums(rules.size(), 0);
-  while (true) {
+  for (int round = 1;; ++round) {
     std::vector<IndexBlock> blocks = all_or_none(communicator, [&] {
       std::vector<IndexBlock> next = next_blocks();
       check_blocks(next, rules);
@@ -275,6 +261,7 @@ std::vector<std::uint64_t> write_rounds(SharedFile& file,
                    [&](std::uint64_t first_tile, std::span<const std::uint16_t> indices) {
                      sums[block.slab] += hash_sum(first_tile, indices);
                    });
+    const WorkNote note("writing round " + std::to_string(round) + " of the indices");
     file.write(blocks);
   }
   communicator.sum(sums);
@@ -291,12 +278,9 @@ std::vector<std::uint64_t> write_indices(const std::filesystem::path& path,
     auto sums = write_rounds(file, rules, next_blocks, communicator);
     file.close();
     return sums;
-  } catch (...) {
-    // Every rank is here: what is thrown above is thrown on all.
-    try {
-      file.close();
-    } catch (const std::exception&) {  // the first error is the one to report
-    }
+  } catch (const Error& error) {
+    // A stop is thrown on every rank, and nothing is wrong with the file.
+    if (error.exit_code() == ExitCode::Stopped) file.close();
     throw;
   }
 }
@@ -320,6 +304,7 @@ void read_planes(hid_t dataset, const DatasetRule& rule, PlaneOf&& plane_of, Don
     checked(H5Dread(dataset, H5T_NATIVE_UINT16, in_memory, in_file, H5P_DEFAULT, plane.data()),
             "H5Dread");
     done(u, std::span<const std::uint16_t>(plane));
+    note_progress();
   }
 }
 
@@ -546,19 +531,23 @@ FieldFileInfo write_field(const CompressedAttenuationField& field,
   info.payload_bytes = field_layout::payload_bytes(field);
   try {
     all_or_none(communicator, [&] {
-      if (communicator.is_root())
-        naming_file(partial, [&] { create_file_without_indices(field, partial); });
+      if (!communicator.is_root()) return;
+      const WorkNote note("making " + partial.string());
+      naming_file(partial, [&] { create_file_without_indices(field, partial); });
     });
     const auto sums = write_indices(partial, rules, next_blocks, communicator);
     info.provenance = make_provenance();
     all_or_none(communicator, [&] {
       if (!communicator.is_root()) return;
+      const WorkNote note("reading " + partial.string() + " back to verify it");
       info.payload_sha256 = naming_file(
           partial, [&] { return verify_and_seal(field, info.provenance, sums, partial); });
       move_into_place(partial, path);
       info.file_bytes = std::filesystem::file_size(path);
     });
-  } catch (...) {
+  } catch (const Error& error) {
+    // HDF5 would try again to write what could not be written, when MPI is finalised.
+    if (error.exit_code() != ExitCode::Stopped) MpiEnvironment::require_abort();
     std::error_code ignored;
     if (communicator.is_root()) std::filesystem::remove(partial, ignored);
     throw;

@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "parallel/mpi_handle.h"
+#include "parallel/work_watch.h"
 
 namespace af {
 
@@ -62,18 +63,47 @@ RankFailure failure_from(std::span<const std::byte> bytes) {
   return failure;
 }
 
-/// A shared-memory window and the handle that frees it on every rank.
+/// Collective. Where each rank runs.
+std::vector<std::string> host_names(const Communicator& communicator) {
+  std::vector<std::string> names;
+  const std::string mine = host_name();
+  for (const auto& bytes : communicator.all_gather(std::as_bytes(std::span(mine))))
+    names.emplace_back(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  return names;
+}
+
+RankFailure plain_failure_of(const std::exception_ptr& error) {
+  try {
+    std::rethrow_exception(error);
+  } catch (const Error& known) {
+    return {static_cast<int>(known.exit_code()), known.what()};
+  } catch (const std::bad_alloc&) {
+    return {static_cast<int>(ExitCode::Internal), "out of memory"};
+  } catch (const std::exception& unknown) {
+    return {static_cast<int>(ExitCode::Internal), std::string("internal error: ") + unknown.what()};
+  } catch (...) {
+    return {static_cast<int>(ExitCode::Internal), "internal error"};
+  }
+}
+
+/// A shared-memory window and the handle that frees it on every rank. Freeing waits for all ranks:
+/// it is left to the end of the process when an error passes, which may be of this rank alone.
 struct NodeWindow {
   MPI_Win window = MPI_WIN_NULL;
+  int exceptions = std::uncaught_exceptions();
   ~NodeWindow() {
-    if (window != MPI_WIN_NULL) MPI_Win_free(&window);
+    if (window == MPI_WIN_NULL || std::uncaught_exceptions() > exceptions) return;
+    const WaitNote waits;
+    MPI_Win_free(&window);
   }
 };
 
 }  // namespace
 
 Communicator::Impl::~Impl() {
-  if (is_owned && handle != MPI_COMM_NULL) MPI_Comm_free(&handle);
+  // As with NodeWindow: the other ranks may not come here.
+  if (is_owned && handle != MPI_COMM_NULL && std::uncaught_exceptions() == 0)
+    MPI_Comm_free(&handle);
 }
 
 Communicator Communicator::world() {
@@ -93,29 +123,35 @@ int Communicator::size() const {
 }
 
 void Communicator::barrier() const {
+  const WaitNote waits;
   require_success(MPI_Barrier(impl_->handle), "MPI_Barrier");
 }
 
 void Communicator::sum(std::span<std::uint64_t> values) const {
+  const WaitNote waits;
   reduce_in_place(impl_->handle, values, MPI_SUM);
 }
 
 void Communicator::maximum(std::span<std::uint64_t> values) const {
+  const WaitNote waits;
   reduce_in_place(impl_->handle, values, MPI_MAX);
 }
 
 void Communicator::broadcast(std::vector<std::byte>& bytes) const {
+  const WaitNote waits;
   bytes.resize(broadcast_size(impl_->handle, bytes.size()));
   broadcast_bytes(impl_->handle, bytes);
 }
 
 void Communicator::broadcast(std::string& text) const {
+  const WaitNote waits;
   text.resize(broadcast_size(impl_->handle, text.size()));
   broadcast_bytes(impl_->handle, std::as_writable_bytes(std::span(text)));
 }
 
 std::vector<std::vector<std::byte>> Communicator::all_gather(
     std::span<const std::byte> mine) const {
+  const WaitNote waits;
   std::vector<std::vector<std::byte>> parts(static_cast<std::size_t>(size()));
   for (int source = 0; source < size(); ++source) {
     auto& part = parts[static_cast<std::size_t>(source)];
@@ -135,6 +171,7 @@ std::vector<std::vector<std::byte>> Communicator::all_gather(
 }
 
 std::vector<std::vector<std::byte>> Communicator::gather(std::span<const std::byte> mine) const {
+  const WaitNote waits;
   constexpr int kTag = 1;
   std::vector<std::vector<std::byte>> parts;
   if (!is_root()) {
@@ -213,6 +250,7 @@ RankFailure first_failure(const Communicator& communicator, const RankFailure& m
   communicator.maximum(any);
   if (any[0] == 0) return {};
   const auto parts = communicator.all_gather(bytes_of(mine));
+  const std::vector<std::string> hosts = host_names(communicator);
   for (std::size_t rank = 0; rank < parts.size(); ++rank) {
     RankFailure failure = failure_from(parts[rank]);
     if (failure.exit_code == 0) continue;
@@ -220,24 +258,20 @@ RankFailure first_failure(const Communicator& communicator, const RankFailure& m
     const bool is_shared = std::all_of(
         parts.begin(), parts.end(), [&](const auto& part) { return part == parts[rank]; });
     if (!is_shared && parts.size() > 1)
-      failure.message = "rank " + std::to_string(rank) + ": " + failure.message;
+      failure.message =
+          "rank " + std::to_string(rank) + " on " + hosts[rank] + ": " + failure.message;
     return failure;
   }
   return {};
 }
 
 RankFailure failure_of(const std::exception_ptr& error) {
-  try {
-    std::rethrow_exception(error);
-  } catch (const Error& known) {
-    return {static_cast<int>(known.exit_code()), known.what()};
-  } catch (const std::bad_alloc&) {
-    return {static_cast<int>(ExitCode::Internal), "out of memory"};
-  } catch (const std::exception& unknown) {
-    return {static_cast<int>(ExitCode::Internal), std::string("internal error: ") + unknown.what()};
-  } catch (...) {
-    return {static_cast<int>(ExitCode::Internal), "internal error"};
-  }
+  RankFailure failure = plain_failure_of(error);
+  // What a rank was at tells more than its number; a stop is no failure.
+  const std::string unit = take_failed_unit();
+  if (!unit.empty() && failure.exit_code != static_cast<int>(ExitCode::Stopped))
+    failure.message = unit + ": " + failure.message;
+  return failure;
 }
 
 void throw_failure(const RankFailure& failure) {

@@ -1,9 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "parallel/mpi_environment.h"
 
+#include <atomic>
+#include <cstdlib>
+
 #include <mpi.h>
 
 namespace af {
+
+namespace {
+
+std::atomic<bool> abort_required = false;
+
+}  // namespace
 
 MpiEnvironment::MpiEnvironment(int& argc, char**& argv) {
   int provided = 0;
@@ -15,7 +24,19 @@ MpiEnvironment::~MpiEnvironment() {
 }
 
 void MpiEnvironment::abort(int exit_code) {
-  MPI_Abort(MPI_COMM_WORLD, exit_code);
+  int ranks = 1;
+  MPI_Comm_size(MPI_COMM_WORLD, &ranks);
+  // A rank alone has nobody to tell.
+  if (ranks > 1) MPI_Abort(MPI_COMM_WORLD, exit_code);
+  std::_Exit(exit_code);
+}
+
+void MpiEnvironment::require_abort() {
+  abort_required = true;
+}
+
+bool MpiEnvironment::is_abort_required() {
+  return abort_required;
 }
 
 }  // namespace af

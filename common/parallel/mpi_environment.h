@@ -12,8 +12,13 @@ class MpiEnvironment {
   MpiEnvironment(const MpiEnvironment&) = delete;
   MpiEnvironment& operator=(const MpiEnvironment&) = delete;
 
-  /// Ends every rank of the job with `exit_code`; does not return when there is more than one rank.
-  static void abort(int exit_code);
+  /// Ends every rank of the job with `exit_code`, at once.
+  [[noreturn]] static void abort(int exit_code);
+
+  /// From now on this rank can only end by abort(): a library is in a state in which finalising
+  /// would hang or crash.
+  static void require_abort();
+  [[nodiscard]] static bool is_abort_required();
 };
 
 }  // namespace af

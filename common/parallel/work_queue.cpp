@@ -8,10 +8,13 @@
 #include <cstring>
 #include <limits>
 #include <mutex>
+#include <optional>
+#include <string>
 #include <thread>
 #include <utility>
 
 #include "parallel/mpi_handle.h"
+#include "parallel/work_watch.h"
 
 namespace af {
 
@@ -49,6 +52,11 @@ struct Job {
   std::function<Bytes(std::int64_t item)> work;
   Receive receive;
   std::function<void(std::int64_t done)> on_progress;
+
+  [[nodiscard]] Bytes result_of(std::int64_t item) const {
+    const WorkNote note("item " + std::to_string(item + 1) + " of " + std::to_string(count));
+    return work(item);
+  }
 };
 
 struct Block {
@@ -180,7 +188,7 @@ bool answer_request(MPI_Comm handle, Ledger& ledger, Inbox& inbox, int& active_w
 RankFailure work_until_empty(const Job& job, Ledger& ledger, Inbox& inbox) {
   try {
     for (Block block = ledger.take_one(); block.count > 0; block = ledger.take_one())
-      inbox.add(block.first, job.work(block.first));
+      inbox.add(block.first, job.result_of(block.first));
   } catch (...) {
     ledger.stop();
     return failure_of(std::current_exception());
@@ -205,7 +213,9 @@ RankFailure run_as_manager(const Communicator& communicator, const Job& job) {
     if (const std::int64_t done = ledger.done(); job.on_progress && done > reported)
       job.on_progress(reported = done);
   };
+  std::optional<WaitNote> waits;
   while (is_computing || active_workers > 0) {
+    if (!is_computing && !waits) waits.emplace();
     inbox.deliver_waiting();
     if (active_workers > 0 &&
         answer_request(communicator.impl().handle, ledger, inbox, active_workers))
@@ -219,6 +229,13 @@ RankFailure run_as_manager(const Communicator& communicator, const Job& job) {
   return failure.exit_code != 0 ? failure : inbox.failure();
 }
 
+std::array<std::int64_t, 2> next_grant(MPI_Comm handle) {
+  const WaitNote waits;
+  std::array<std::int64_t, 2> grant{};
+  MPI_Recv(grant.data(), 2, MPI_INT64_T, 0, kGrantTag, handle, MPI_STATUS_IGNORE);
+  return grant;
+}
+
 RankFailure run_as_worker(const Communicator& communicator, const Job& job) {
   const MPI_Comm handle = communicator.impl().handle;
   RankFailure failure;
@@ -228,13 +245,12 @@ RankFailure run_as_worker(const Communicator& communicator, const Job& job) {
     append_number(request, failure.exit_code != 0 ? 1 : 0);
     request.insert(request.end(), finished.begin(), finished.end());
     MPI_Send(request.data(), static_cast<int>(request.size()), MPI_BYTE, 0, kRequestTag, handle);
-    std::array<std::int64_t, 2> grant{};
-    MPI_Recv(grant.data(), 2, MPI_INT64_T, 0, kGrantTag, handle, MPI_STATUS_IGNORE);
+    const std::array<std::int64_t, 2> grant = next_grant(handle);
     if (grant[1] == 0) return failure;
     finished.clear();
     try {
       for (std::int64_t i = 0; i < grant[1]; ++i)
-        append_result(finished, grant[0] + i, job.work(grant[0] + i));
+        append_result(finished, grant[0] + i, job.result_of(grant[0] + i));
     } catch (...) {
       failure = failure_of(std::current_exception());
     }

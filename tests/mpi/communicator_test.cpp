@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "parallel/work_watch.h"
 
 namespace af {
 namespace {
@@ -60,7 +61,8 @@ TEST(AllOrNone, ThrowsTheLoneRanksErrorEverywhere) {
     EXPECT_EQ(error.exit_code(), ExitCode::Input);
     EXPECT_NE(std::string(error.what()).find("a.toml: size = 7: must be even"), std::string::npos);
     if (world.size() > 1) {
-      EXPECT_EQ(std::string(error.what()).rfind("rank " + std::to_string(failing) + ": ", 0), 0u);
+      const std::string who = "rank " + std::to_string(failing) + " on " + host_name() + ": ";
+      EXPECT_EQ(std::string(error.what()).rfind(who, 0), 0u);
     }
   }
 }

@@ -24,6 +24,7 @@
 
 #include "io/csv_table.h"
 #include "io/output_file.h"
+#include "programs/slow_jobs.h"
 #include "programs/small_study.h"
 #include "support/launched_job.h"
 #include "support/run_program.h"
@@ -134,11 +135,7 @@ struct Plan {
 class KillMatrix : public testing::Test {
  protected:
   static void SetUpTestSuite() {
-    setenv("OMPI_ALLOW_RUN_AS_ROOT", "1", 1);
-    setenv("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1", 1);
-    setenv("OMPI_MCA_hwloc_base_binding_policy", "none", 1);
-    // A slow search: training and encoding last long enough to be hit.
-    setenv("AF_VECTOR_BITS", "128", 1);
+    test::prepare_slow_jobs();
     folder_ = new test::ScratchFolder();
     test::write_small_study(folder_->path());
   }
@@ -146,54 +143,25 @@ class KillMatrix : public testing::Test {
 
   static fs::path path(const std::string& name) { return *folder_ / name; }
 
-  static std::vector<std::string> under_mpirun(int ranks, std::vector<std::string> command) {
-    // The test itself goes first, so that it does not miss a moment on a busy machine.
-    std::vector<std::string> all = {
-        "nice", "-n", "5", AF_MPIEXEC, "--oversubscribe", "-n", std::to_string(ranks)};
-    all.insert(all.end(), command.begin(), command.end());
-    return all;
-  }
   static std::vector<std::string> precompute(int ranks, const fs::path& field) {
-    const std::string study = path("study.toml");
-    return under_mpirun(ranks,
-                        {AF_PROGRAM_FOLDER "/af-precompute",
-                         "--study",
-                         study,
-                         "--camera",
-                         "AP",
-                         "--max-translation-mm",
-                         "12",
-                         "--uv-nodes",
-                         "24",
-                         "--st-nodes",
-                         "144",
-                         "--caster",
-                         "trilinear",
-                         "--step-mm",
-                         "1",
-                         "--codewords",
-                         "20000",
-                         "--max-iterations",
-                         "6",
-                         "-o",
-                         field});
+    return test::slow_precompute(ranks, folder_->path(), field);
   }
   static std::vector<std::string> registration(int ranks, const fs::path& folder) {
-    return under_mpirun(ranks,
-                        {AF_PROGRAM_FOLDER "/af-evaluate",
-                         "registration",
-                         "--study",
-                         path("study.toml"),
-                         "--field",
-                         "AP=" + path("AP.af.h5").string(),
-                         "--field",
-                         "LAT=" + path("LAT.af.h5").string(),
-                         "--preset",
-                         "paper",
-                         "--starts-per-interval",
-                         "25",
-                         "-o",
-                         folder});
+    return test::under_mpirun(ranks,
+                              {AF_PROGRAM_FOLDER "/af-evaluate",
+                               "registration",
+                               "--study",
+                               path("study.toml"),
+                               "--field",
+                               "AP=" + path("AP.af.h5").string(),
+                               "--field",
+                               "LAT=" + path("LAT.af.h5").string(),
+                               "--preset",
+                               "paper",
+                               "--starts-per-interval",
+                               "25",
+                               "-o",
+                               folder});
   }
 
   /// What af-inspect says of a field whose checksums it has verified.

@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "parallel/work_watch.h"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstring>
+#include <exception>
+#include <limits>
+#include <mutex>
+#include <new>
+#include <span>
+#include <sstream>
+#include <unistd.h>
+#include <utility>
+
+namespace af {
+
+namespace {
+
+/// What one rank is at, seen by the others of its host.
+struct RankNote {
+  std::atomic<std::int64_t> since_ns = 0;        ///< the last progress; 0: nothing in work
+  std::atomic<std::int64_t> waits_since_ns = 0;  ///< in a call that waits for others; 0: not
+  std::int32_t rank = 0;
+  std::int32_t process = 0;
+  std::atomic<bool> has_reported = false;  ///< of the first rank of a host: why the job ends
+  /// Read without a lock, only for a message: half of it may be new. Always ends in a 0.
+  std::array<char, 256> what{};
+};
+static_assert(std::atomic<std::int64_t>::is_always_lock_free, "shared between processes");
+
+RankNote own_note;
+std::atomic<RankNote*> my_note = &own_note;
+std::atomic<RankNote*> first_note = &own_note;  ///< of this host
+std::mutex text_mutex;                          ///< rank 0 computes in a second thread
+std::string text_now;
+thread_local std::string failed_unit;
+
+/// The same clock in all processes of a host.
+std::int64_t now_ns() {
+  return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
+}
+
+/// Replaces the text; returns the one before.
+std::string set_text(const std::string& what) {
+  RankNote& note = *my_note;
+  const std::scoped_lock lock(text_mutex);
+  const std::size_t bytes = std::min(what.size(), note.what.size() - 1);
+  std::memcpy(note.what.data(), what.data(), bytes);
+  note.what[bytes] = '\0';
+  note.since_ns = what.empty() ? 0 : now_ns();
+  return std::exchange(text_now, what);
+}
+
+std::string minutes_text(std::int64_t ns) {
+  constexpr double kNsPerMinute = 60e9;
+  std::ostringstream text;
+  text.precision(3);
+  text << static_cast<double>(ns) / kNsPerMinute << " min";
+  return text.str();
+}
+
+}  // namespace
+
+WorkNote::WorkNote(const std::string& what, Kind kind)
+    : what_(what), before_(set_text(what)), kind_(kind), exceptions_(std::uncaught_exceptions()) {
+  failed_unit.clear();
+}
+
+WorkNote::~WorkNote() {
+  const bool is_leaving_by_exception = std::uncaught_exceptions() > exceptions_;
+  if (!is_leaving_by_exception)
+    failed_unit.clear();
+  else if (kind_ == Kind::Unit && failed_unit.empty())
+    failed_unit = what_;
+  set_text(before_);
+}
+
+void WorkNote::change(const std::string& what) {
+  what_ = what;
+  set_text(what);
+}
+
+void note_progress() {
+  RankNote& note = *my_note;
+  if (note.since_ns != 0) note.since_ns = now_ns();
+}
+
+WaitNote::WaitNote() : before_((*my_note).waits_since_ns) {
+  if (before_ == 0) (*my_note).waits_since_ns = now_ns();
+}
+
+WaitNote::~WaitNote() {
+  (*my_note).waits_since_ns = before_;
+  note_progress();
+}
+
+std::string take_failed_unit() {
+  return std::exchange(failed_unit, {});
+}
+
+bool claim_report() {
+  return !(*first_note).has_reported.exchange(true);
+}
+
+std::string host_name() {
+  std::array<char, 256> name{};
+  return gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "unknown";
+}
+
+/// The notes of the ranks of this host.
+struct StallWatch::Board {
+  std::shared_ptr<const std::byte> memory;
+  std::span<RankNote> notes;
+};
+
+StallWatch::StallWatch(const Communicator& communicator, double limit_minutes, OnStall on_stall)
+    : board_(std::make_unique<Board>()),
+      limit_ns_(static_cast<std::int64_t>(limit_minutes * 60e9)),
+      on_stall_(std::move(on_stall)) {
+  const Communicator node = communicator.node();
+  const auto ranks = static_cast<std::size_t>(node.size());
+  RankNote* notes = nullptr;
+  board_->memory = communicator.allocate_on_node_together(
+      ranks * sizeof(RankNote), [&](std::span<std::byte> bytes, int part, int) {
+        notes = reinterpret_cast<RankNote*>(bytes.data());
+        auto* const mine = new (notes + part) RankNote;
+        mine->rank = communicator.rank();
+        mine->process = getpid();
+      });
+  board_->notes = {notes, ranks};
+  my_note = notes + node.rank();
+  first_note = notes;
+  set_text(set_text({}));
+  thread_ = std::thread([this] { watch(); });
+}
+
+StallWatch::~StallWatch() {
+  is_over_ = true;
+  thread_.join();
+  my_note = &own_note;
+  first_note = &own_note;
+}
+
+void StallWatch::watch() {
+  constexpr std::int64_t kShortestTickNs = 10'000'000;
+  constexpr std::int64_t kLongestTickNs = 200'000'000;  // a program that ends waits so long
+  const std::int64_t tick_ns = std::clamp(limit_ns_ / 20, kShortestTickNs, kLongestTickNs);
+  std::int64_t last_tick_ns = now_ns();
+  std::int64_t watched_since_ns = last_tick_ns;
+  while (!is_over_) {
+    std::this_thread::sleep_for(std::chrono::nanoseconds(tick_ns));
+    const std::int64_t tick = now_ns();
+    // A batch system may stop and continue whole jobs: that time does not count.
+    if (tick - last_tick_ns > limit_ns_ / 2) watched_since_ns = tick;
+    last_tick_ns = tick;
+    const std::string text = stall_text(watched_since_ns);
+    if (!text.empty() && claim_report()) on_stall_(text);
+  }
+}
+
+std::string StallWatch::stall_text(std::int64_t watched_since_ns) const {
+  const std::int64_t now = now_ns();
+  const RankNote* stuck = nullptr;
+  std::int64_t stuck_ns = limit_ns_;
+  std::int64_t all_wait_ns = std::numeric_limits<std::int64_t>::max();
+  for (const RankNote& note : board_->notes) {
+    const std::int64_t waits_since = note.waits_since_ns;
+    const std::int64_t since = waits_since != 0 ? waits_since : note.since_ns.load();
+    const std::int64_t ns = since == 0 ? 0 : now - std::max(since, watched_since_ns);
+    all_wait_ns = std::min(all_wait_ns, waits_since == 0 ? 0 : ns);
+    // Who waits is not stuck.
+    if (waits_since != 0 || ns <= stuck_ns) continue;
+    stuck = &note;
+    stuck_ns = ns;
+  }
+  if (stuck != nullptr)
+    return "rank " + std::to_string(stuck->rank) + " on " + host_name() + " (process " +
+           std::to_string(stuck->process) + "): " + stuck->what.data() + ": no progress for " +
+           minutes_text(stuck_ns);
+  // When nobody of this host works, the host of who does has had the time to say so.
+  constexpr std::int64_t kPatience = 3;
+  if (all_wait_ns <= kPatience * limit_ns_) return {};
+  return "all ranks on " + host_name() + ": " + board_->notes[0].what.data() +
+         ": waiting for others for " + minutes_text(all_wait_ns);
+}
+
+}  // namespace af

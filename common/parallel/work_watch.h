@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+// What every rank is at, for messages and for the watchdog.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include "parallel/communicator.h"
+
+namespace af {
+
+/// "casting unit 17 of 96": what this rank works on as long as the note lives. Notes nest; the
+/// innermost counts. An exception that passes a unit's note is reported with its text
+/// (failure_of()), one that passes only a phase's is not.
+class WorkNote {
+ public:
+  enum class Kind { Phase, Unit };
+
+  explicit WorkNote(const std::string& what, Kind kind = Kind::Unit);
+  ~WorkNote();
+  WorkNote(const WorkNote&) = delete;
+  WorkNote& operator=(const WorkNote&) = delete;
+
+  /// The next unit of the same kind.
+  void change(const std::string& what);
+
+ private:
+  std::string what_;
+  std::string before_;
+  Kind kind_;
+  int exceptions_;
+};
+
+/// A unit that takes long has come a step further.
+void note_progress();
+
+/// This rank is in a call that waits for other ranks as long as the note lives: if that takes long,
+/// it is others who are stuck.
+class WaitNote {
+ public:
+  WaitNote();
+  ~WaitNote();
+  WaitNote(const WaitNote&) = delete;
+  WaitNote& operator=(const WaitNote&) = delete;
+
+ private:
+  std::int64_t before_;
+};
+
+/// The unit that the exception just caught in this thread has left, once; empty when there is none.
+std::string take_failed_unit();
+
+/// Whether this rank is the one to report why the job ends: the first of its host that asks, as far
+/// as there is a StallWatch.
+bool claim_report();
+
+/// Name of this host.
+std::string host_name();
+
+/// Watches the ranks of every host from a thread of each: when one makes no progress, for whatever
+/// reason (it computes for ever, hangs in the file system, is stopped), `on_stall` is called on one
+/// rank of its host with a text that names rank, host and unit. It must end the job.
+/// \test WorkWatch.NamesTheRankThatIsStuckNotThoseThatWaitForIt
+class StallWatch {
+ public:
+  using OnStall = std::function<void(const std::string& message)>;
+
+  /// Collective.
+  StallWatch(const Communicator& communicator, double limit_minutes, OnStall on_stall);
+  /// Collective.
+  ~StallWatch();
+  StallWatch(const StallWatch&) = delete;
+  StallWatch& operator=(const StallWatch&) = delete;
+
+ private:
+  struct Board;
+  void watch();
+  [[nodiscard]] std::string stall_text(std::int64_t watched_since_ns) const;
+
+  std::unique_ptr<Board> board_;
+  std::int64_t limit_ns_;
+  OnStall on_stall_;
+  std::atomic<bool> is_over_ = false;
+  std::thread thread_;
+};
+
+}  // namespace af

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "parallel/work_watch.h"
+
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <string>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+
+namespace af {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr double kLimitMinutes = 0.2 / 60.0;
+constexpr double kLongLimitMinutes = 1.0 / 60.0;  // many steps, on a busy machine, too
+constexpr std::chrono::milliseconds kStep{50};
+constexpr int kSteps = 40;  // well above any limit here
+
+TEST(WorkNote, NamesTheUnitThatAnErrorCameFrom) {
+  const Communicator world = Communicator::world();
+  try {
+    all_or_none(world, [&] {
+      const WorkNote phase("reading", WorkNote::Kind::Phase);
+      if (!world.is_root()) return;
+      const WorkNote unit("unit 7 of 9");
+      throw FileError("a.h5", "is torn");
+    });
+    ADD_FAILURE() << "no error";
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("unit 7 of 9: a.h5: is torn"));
+    EXPECT_EQ(std::string(error.what()).find("reading"), std::string::npos);
+  }
+  EXPECT_EQ(take_failed_unit(), "");
+}
+
+TEST(WorkNote, IsNotBlamedForAnErrorThatWasHandledOrCameLater) {
+  const auto failing_unit = [] {
+    const WorkNote unit("unit 1");
+    throw NumericError("no");
+  };
+  try {
+    failing_unit();
+  } catch (const Error&) {  // handled: the work goes on
+  }
+  { const WorkNote unit("unit 2"); }
+  try {
+    throw NumericError("later");
+  } catch (...) {
+    EXPECT_EQ(failure_of(std::current_exception()).message, "later");
+  }
+}
+
+TEST(WorkWatch, NamesTheRankThatIsStuckNotThoseThatWaitForIt) {
+  const Communicator world = Communicator::world();
+  const int stuck = world.size() - 1;
+  std::atomic<int> reports = 0;
+  std::string said;
+  {
+    const StallWatch watch(world, kLimitMinutes, [&](const std::string& message) {
+      said = message;
+      ++reports;
+    });
+    const WorkNote note("unit " + std::to_string(world.rank()));
+    if (world.rank() == stuck) std::this_thread::sleep_for(kSteps * kStep);
+    world.barrier();
+  }
+  std::array<std::uint64_t, 1> all{static_cast<std::uint64_t>(reports)};
+  world.sum(all);
+  EXPECT_EQ(all[0], 1u);
+  if (reports > 0) {
+    const std::string number = std::to_string(stuck);
+    EXPECT_THAT(said, HasSubstr("rank " + number + " on " + host_name()));
+    EXPECT_THAT(said, HasSubstr("unit " + number + ": no progress for 0.00"));
+  }
+}
+
+TEST(WorkWatch, IsSilentWhileEverybodyMakesProgress) {
+  const Communicator world = Communicator::world();
+  std::atomic<int> reports = 0;
+  {
+    const StallWatch watch(world, kLongLimitMinutes, [&](const std::string&) { ++reports; });
+    const WorkNote note("many steps");
+    for (int i = 0; i < kSteps; ++i) {
+      std::this_thread::sleep_for(kStep);
+      note_progress();
+    }
+    // Waiting for others, who work, is no stall either.
+    if (world.is_root())
+      for (int i = 0; i < kSteps / 2; ++i) {
+        std::this_thread::sleep_for(kStep);
+        note_progress();
+      }
+    world.barrier();
+  }
+  EXPECT_EQ(reports, 0);
+}
+
+TEST(WorkWatch, SaysWhenAllRanksOfAHostWaitForOthers) {
+  const Communicator world = Communicator::world();
+  std::atomic<int> reports = 0;
+  std::string said;
+  {
+    const StallWatch watch(world, kLimitMinutes, [&](const std::string& message) {
+      said = message;
+      ++reports;
+    });
+    const WorkNote note("training");
+    const WaitNote waits;
+    std::this_thread::sleep_for(kSteps * kStep);
+  }
+  std::array<std::uint64_t, 1> all{static_cast<std::uint64_t>(reports)};
+  world.sum(all);
+  EXPECT_EQ(all[0], 1u);
+  if (reports > 0) {
+    EXPECT_THAT(said, HasSubstr("all ranks on " + host_name() + ": training: waiting for others"));
+  }
+}
+
+}  // namespace
+}  // namespace af

@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: Apache-2.0
+// What goes wrong on clusters, made to happen: each ends the job with one message that names rank,
+// host, unit and cause, and the same command goes on afterwards.
+#include <algorithm>
+#include <csignal>
+#include <cstdlib>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <sys/resource.h>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "io/output_file.h"
+#include "programs/slow_jobs.h"
+#include "programs/small_study.h"
+#include "support/launched_job.h"
+#include "support/run_program.h"
+#include "support/test_paths.h"
+
+namespace af {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::AllOf;
+using testing::ContainsRegex;
+using testing::HasSubstr;
+using testing::Not;
+
+constexpr std::chrono::seconds kEndsWithin{60};
+constexpr int kRanks = 3;
+
+class Faults : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    test::prepare_slow_jobs();
+    folder_ = new test::ScratchFolder();
+    test::write_small_study(folder_->path());
+    const test::ProgramRun run = test::run_command(words(precompute(kRanks)));
+    ASSERT_EQ(run.exit_code, 0) << run.output;
+    payload_ = payload();
+  }
+  static void TearDownTestSuite() { delete folder_; }
+  void SetUp() override { fs::remove(field()); }
+
+  static fs::path field() { return *folder_ / "A.af.h5"; }
+  static fs::path progress() { return field().string() + ".progress"; }
+
+  static std::vector<std::string> precompute(int ranks,
+                                             const std::vector<std::string>& options = {}) {
+    return test::slow_precompute(ranks, folder_->path(), field(), options);
+  }
+  static std::string words(const std::vector<std::string>& command) {
+    std::string line;
+    for (const std::string& word : command) line += word + " ";
+    return line;
+  }
+  static std::string payload() {
+    const test::ProgramRun run =
+        test::run_command(AF_PROGRAM_FOLDER "/af-inspect --json " + field().string());
+    EXPECT_EQ(run.exit_code, 0) << run.output;
+    return nlohmann::json::parse(run.output)[0]["facts"]["payload_sha256"];
+  }
+
+  static fs::path output() { return *folder_ / "output.txt"; }
+  static std::string said() { return read_text_file(output()); }
+
+  /// Units cast or encoded so far, in bytes.
+  static std::uint64_t unit_bytes() {
+    std::uint64_t bytes = 0;
+    std::error_code gone;
+    for (const auto& entry : fs::directory_iterator(progress(), gone))
+      if (entry.path().extension() == ".shard") bytes += fs::file_size(entry.path(), gone);
+    return bytes;
+  }
+
+  /// The next run ends with the right field.
+  static void expect_going_on() {
+    const test::ProgramRun run = test::run_command(words(precompute(2)));
+    EXPECT_EQ(run.exit_code, 0) << run.output;
+    EXPECT_EQ(payload(), payload_);
+    EXPECT_FALSE(fs::exists(progress()));
+    EXPECT_FALSE(fs::exists(field().string() + ".lock"));
+  }
+
+  /// Files of these processes may not grow beyond `bytes` from now on: a full disk.
+  static void limit_files(const std::vector<pid_t>& processes, rlim_t bytes) {
+    const rlimit limit{bytes, bytes};
+    for (const pid_t process : processes)
+      EXPECT_EQ(prlimit(process, RLIMIT_FSIZE, &limit, nullptr), 0);
+  }
+
+  static std::size_t count_of(const std::string& part, const std::string& text) {
+    std::size_t count = 0;
+    for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1))
+      ++count;
+    return count;
+  }
+
+ private:
+  static inline test::ScratchFolder* folder_ = nullptr;
+  static inline std::string payload_;
+};
+
+TEST_F(Faults, TimeThatIsOverStopsTheJobByItself) {
+  // 1.1 s after the start of each rank: casting alone takes longer.
+  const test::ProgramRun run =
+      test::run_command(words(precompute(kRanks, {"--max-hours", "1e-4"})));
+  EXPECT_EQ(run.exit_code, 75) << run.output;
+  EXPECT_THAT(run.output, AllOf(HasSubstr("stopped"), HasSubstr("(--max-hours 0.0001)")));
+  expect_going_on();
+}
+
+TEST_F(Faults, ASecondJobIsRefusedAndToldOfTheFirst) {
+  test::LaunchedJob first(precompute(2), output());
+  ASSERT_TRUE(first.wait_until([] { return unit_bytes() > 0; }));
+  const test::ProgramRun second = test::run_command(words(precompute(1)));
+  EXPECT_EQ(second.exit_code, 3) << second.output;
+  EXPECT_THAT(second.output,
+              AllOf(HasSubstr("another job writes it: process "), HasSubstr(", since 20")));
+  EXPECT_EQ(first.wait(kEndsWithin), 0) << said();
+  EXPECT_FALSE(fs::exists(field().string() + ".lock"));
+}
+
+TEST_F(Faults, AStoppedRankIsNamedAndTheJobEnded) {
+  test::LaunchedJob job(precompute(kRanks, {"--stall-minutes", "0.05"}), output());
+  ASSERT_TRUE(job.wait_until([] { return unit_bytes() > 0; }));
+  kill(job.ranks().back(), SIGSTOP);
+  EXPECT_EQ(job.wait(kEndsWithin), 75) << said();
+  EXPECT_THAT(said(), ContainsRegex("rank [0-9] on .*: no progress for .* min"));
+  EXPECT_EQ(count_of("no progress for", said()), 1u);
+  expect_going_on();
+}
+
+TEST_F(Faults, AFullDiskWhileCastingNamesTheUnit) {
+  test::LaunchedJob job(precompute(kRanks), output());
+  ASSERT_TRUE(job.wait_until([] { return unit_bytes() > 0; }));
+  limit_files(job.ranks(), 300'000);
+  EXPECT_EQ(job.wait(kEndsWithin), 4) << said();
+  EXPECT_THAT(said(),
+              ContainsRegex("rank [0-9] on .*: casting unit .*shard: cannot be written: File too "
+                            "large"));
+  expect_going_on();
+}
+
+TEST_F(Faults, AFullDiskWhileTheFieldIsWrittenEndsTheJobAtOnce) {
+  // Ranks within a collective write of which one fails would wait for ever.
+  for (const int ranks : {1, kRanks}) {
+    test::LaunchedJob job(precompute(ranks, {"--no-checkpoint"}), output());
+    ASSERT_TRUE(job.wait_until([] { return fs::exists(field().string() + ".partial"); }));
+    limit_files(job.ranks(), 800'000);  // more than the codebook has
+    EXPECT_EQ(job.wait(kEndsWithin), 4) << said();
+    EXPECT_THAT(said(),
+                ContainsRegex("writing round 1 of the indices: .*partial: H5Dwrite failed"));
+    EXPECT_EQ(count_of("H5Dwrite failed", said()), 1u) << said();
+    EXPECT_FALSE(fs::exists(field()));
+  }
+  expect_going_on();
+}
+
+TEST_F(Faults, AProgressFolderDeletedMeanwhileIsSaidOrNotNeeded) {
+  test::LaunchedJob job(precompute(kRanks), output());
+  ASSERT_TRUE(job.wait_until([] { return unit_bytes() > 0; }));
+  fs::remove_all(progress());
+  // Shards are open, so casting goes on; the training's journal cannot be made again.
+  EXPECT_EQ(job.wait(kEndsWithin), 4) << said();
+  EXPECT_THAT(said(), HasSubstr(progress().string()));
+  expect_going_on();
+}
+
+}  // namespace
+}  // namespace af

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+// Jobs of the small study that last long enough to be cut short in every stage.
+#pragma once
+
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace af::test {
+
+/// What mpirun needs as root and on few cores; and a slow search, which training and encoding wait
+/// for.
+inline void prepare_slow_jobs() {
+  setenv("OMPI_ALLOW_RUN_AS_ROOT", "1", 1);
+  setenv("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1", 1);
+  setenv("OMPI_MCA_hwloc_base_binding_policy", "none", 1);
+  setenv("AF_VECTOR_BITS", "128", 1);
+}
+
+/// The test itself goes first, so that it does not miss a moment on a busy machine.
+inline std::vector<std::string> under_mpirun(int ranks, const std::vector<std::string>& command) {
+  std::vector<std::string> all = {
+      "nice", "-n", "5", AF_MPIEXEC, "--oversubscribe", "-n", std::to_string(ranks)};
+  all.insert(all.end(), command.begin(), command.end());
+  return all;
+}
+
+/// af-precompute of a study written by write_small_study().
+inline std::vector<std::string> slow_precompute(int ranks,
+                                                const std::filesystem::path& study_folder,
+                                                const std::filesystem::path& field,
+                                                const std::vector<std::string>& options = {}) {
+  std::vector<std::string> command = {AF_PROGRAM_FOLDER "/af-precompute", "-o", field.string()};
+  for (const char* word : {"--camera",
+                           "AP",
+                           "--max-translation-mm",
+                           "12",
+                           "--uv-nodes",
+                           "24",
+                           "--st-nodes",
+                           "144",
+                           "--caster",
+                           "trilinear",
+                           "--step-mm",
+                           "1",
+                           "--codewords",
+                           "20000",
+                           "--max-iterations",
+                           "6",
+                           "--study"})
+    command.emplace_back(word);
+  command.push_back((study_folder / "study.toml").string());
+  command.insert(command.end(), options.begin(), options.end());
+  return under_mpirun(ranks, command);
+}
+
+}  // namespace af::test
