@@ -107,6 +107,11 @@ void bind_run(CLI::App& app, PrecomputeOptions& options) {
          "What is done once the codebook is trained about tiles that did not fit: read-back "
          "(from FIELD.h5.progress), cast-again, or auto (what is faster, measured)")
       ->capture_default_str();
+  app.add_option("--mpi-io-hint",
+                 options.mpi_io_hints,
+                 "KEY=VALUE, once per hint to MPI-IO: cb_nodes, cb_buffer_size, striping_factor, "
+                 "...; precompute/README.md has which and when [MPI's own choice]")
+      ->allow_extra_args(false);
   app.add_flag("--dry-run",
                options.is_dry_run,
                "Print sizes, memory, compression, expected time and advice; write nothing");

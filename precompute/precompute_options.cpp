@@ -76,6 +76,9 @@ std::vector<std::string> problems(const PrecomputeOptions& options) {
   if (options.overflow != "auto" && options.overflow != "read-back" &&
       options.overflow != "cast-again")
     found.push_back("overflow = " + options.overflow + ": must be auto, read-back or cast-again");
+  for (const std::string& hint : options.mpi_io_hints)
+    if (const std::size_t equals = hint.find('='); equals == 0 || equals >= hint.size() - 1)
+      found.push_back("mpi_io_hint = " + hint + ": must be KEY=VALUE");
   append(problems(RayCasterOptions{options.step_mm}), found);
   append(problems(options.attenuation_model()), found);
   append(problems(options.codebook_options()), found);
@@ -138,6 +141,11 @@ std::string to_toml(const PrecomputeOptions& options) {
   add_text("output", options.output);
   text += "memory_limit_bytes = " + std::to_string(options.memory_limit_bytes) + "\n";
   add_text("overflow", options.overflow);
+  if (!options.mpi_io_hints.empty()) {
+    text += "mpi_io_hints = [";
+    for (const std::string& hint : options.mpi_io_hints) text += quoted(hint) + ", ";
+    text += "]\n";
+  }
   text += std::string("checkpoint = ") + (options.has_checkpoint ? "true" : "false") + "\n";
   return text;
 }

@@ -165,6 +165,7 @@ class PrecomputeRun {
       lock_ = std::make_unique<OutputLock>(options_.output);
     });
     if (options_.has_checkpoint && !options_.is_dry_run) cli::listen_for_stop_requests();
+    if (!options_.is_dry_run) check_parallel_writing(options_.output, world_, hints());
     load();
     stop_if_requested("before the first unit");
     const std::unique_ptr<const FieldCaster> caster = make_caster();
@@ -178,6 +179,15 @@ class PrecomputeRun {
  private:
   [[nodiscard]] AttenuationQuantizer quantizer() const {
     return AttenuationQuantizer::for_maximum(source_.volume->max_total_attenuation());
+  }
+
+  [[nodiscard]] MpiIoHints hints() const {
+    MpiIoHints pairs;
+    for (const std::string& hint : options_.mpi_io_hints) {
+      const std::size_t equals = hint.find('=');
+      pairs.emplace_back(hint.substr(0, equals), hint.substr(equals + 1));
+    }
+    return pairs;
   }
 
   /// Before the work, not after it.
@@ -409,7 +419,8 @@ class PrecomputeRun {
           return provenance_of(trained, cast, statistics);
         },
         options_.output,
-        world_);
+        world_,
+        hints());
     printer.reset();
     if (build.progress != nullptr) build.progress->remove();
     clock_.end("write");

@@ -187,6 +187,41 @@ void write_block(hid_t dataset, IndexBlock* block) {
   if (block != nullptr) block->indices = {};
 }
 
+/// Hints as MPI wants them.
+class MpiInfo {
+ public:
+  explicit MpiInfo(const MpiIoHints& hints) {
+    if (hints.empty()) return;
+    MPI_Info_create(&info_);
+    for (const auto& [key, value] : hints) MPI_Info_set(info_, key.c_str(), value.c_str());
+  }
+  ~MpiInfo() {
+    if (info_ != MPI_INFO_NULL) MPI_Info_free(&info_);
+  }
+  MpiInfo(const MpiInfo&) = delete;
+  MpiInfo& operator=(const MpiInfo&) = delete;
+
+  [[nodiscard]] MPI_Info handle() const { return info_; }
+
+ private:
+  MPI_Info info_ = MPI_INFO_NULL;
+};
+
+/// Rank 0 alone. Hints of how a file is laid out (stripes) count when it is made: MPI-IO makes it
+/// where there are hints, and HDF5 writes into it.
+void lay_out(const std::filesystem::path& path, const MpiIoHints& hints) {
+  if (hints.empty()) return;
+  std::error_code ignored;
+  std::filesystem::remove(path, ignored);
+  const MpiInfo info(hints);
+  MPI_File file = MPI_FILE_NULL;
+  if (MPI_File_open(
+          MPI_COMM_SELF, path.c_str(), MPI_MODE_CREATE | MPI_MODE_WRONLY, info.handle(), &file) !=
+      MPI_SUCCESS)
+    throw FileError(path.string(), "cannot be made by MPI-IO");
+  MPI_File_close(&file);
+}
+
 /// The open file of all ranks. After a failed write it can neither be written nor closed: some
 /// ranks know of the failure and others wait for them within MPI-IO. So a rank that fails throws at
 /// once, the file stays open, and the job must end by abort.
@@ -195,12 +230,14 @@ class SharedFile {
   /// Collective.
   SharedFile(const std::filesystem::path& path,
              const std::vector<DatasetRule>& rules,
-             const Communicator& communicator)
+             const Communicator& communicator,
+             const MpiIoHints& hints)
       : path_(path), rules_(rules), communicator_(communicator) {
     all_or_none(communicator_, [&] {
       naming_file(path_, [&] {
         const Handle access = hdf5::file_access();
-        checked(H5Pset_fapl_mpio(access, communicator_.impl().handle, MPI_INFO_NULL),
+        const MpiInfo info(hints);
+        checked(H5Pset_fapl_mpio(access, communicator_.impl().handle, info.handle()),
                 "H5Pset_fapl_mpio");
         file_ = checked(H5Fopen(path_.c_str(), H5F_ACC_RDWR, access), "H5Fopen");
       });
@@ -272,8 +309,9 @@ std::vector<std::uint64_t> write_rounds(SharedFile& file,
 std::vector<std::uint64_t> write_indices(const std::filesystem::path& path,
                                          const std::vector<DatasetRule>& rules,
                                          const NextBlocks& next_blocks,
-                                         const Communicator& communicator) {
-  SharedFile file(path, rules, communicator);
+                                         const Communicator& communicator,
+                                         const MpiIoHints& hints) {
+  SharedFile file(path, rules, communicator, hints);
   try {
     auto sums = write_rounds(file, rules, next_blocks, communicator);
     file.close();
@@ -496,15 +534,15 @@ void read_indices(const std::filesystem::path& path,
                     std::to_string(largest));
 }
 
-/// Collective. The indices of one slab, held once per node; each node's first rank reads them.
+/// Collective. The indices of one slab, held once per node; rank 0 reads them for all.
 CompressedSlab read_slab(const std::filesystem::path& path,
                          const DatasetRule& rule,
                          const std::string& sha256,
                          std::size_t codewords,
                          const Communicator& communicator) {
   const std::size_t tiles = tile_count_of(rule);
-  const auto memory =
-      communicator.allocate_on_node(tiles * sizeof(std::uint16_t), [&](std::span<std::byte> bytes) {
+  const auto memory = communicator.allocate_on_nodes_from_root(
+      tiles * sizeof(std::uint16_t), [&](std::span<std::byte> bytes) {
         naming_file(path, [&] {
           read_indices(path,
                        rule,
@@ -523,7 +561,8 @@ FieldFileInfo write_field(const CompressedAttenuationField& field,
                           const NextBlocks& next_blocks,
                           const MakeProvenance& make_provenance,
                           const std::filesystem::path& path,
-                          const Communicator& communicator) {
+                          const Communicator& communicator,
+                          const MpiIoHints& hints) {
   const hdf5::QuietErrors quiet;
   const std::filesystem::path partial = path.string() + ".partial";
   const auto rules = index_rules(field);
@@ -533,9 +572,10 @@ FieldFileInfo write_field(const CompressedAttenuationField& field,
     all_or_none(communicator, [&] {
       if (!communicator.is_root()) return;
       const WorkNote note("making " + partial.string());
+      lay_out(partial, hints);
       naming_file(partial, [&] { create_file_without_indices(field, partial); });
     });
-    const auto sums = write_indices(partial, rules, next_blocks, communicator);
+    const auto sums = write_indices(partial, rules, next_blocks, communicator, hints);
     info.provenance = make_provenance();
     all_or_none(communicator, [&] {
       if (!communicator.is_root()) return;
@@ -560,14 +600,16 @@ FieldFileInfo write_field(const CompressedAttenuationField& field,
                           const std::vector<IndexBlock>& my_blocks,
                           const FieldProvenance& provenance,
                           const std::filesystem::path& path,
-                          const Communicator& communicator) {
+                          const Communicator& communicator,
+                          const MpiIoHints& hints) {
   std::vector<IndexBlock> left = my_blocks;
   return write_field(
       field,
       [&] { return std::exchange(left, {}); },
       [&] { return provenance; },
       path,
-      communicator);
+      communicator,
+      hints);
 }
 
 std::shared_ptr<const CompressedAttenuationField> read_field(const std::filesystem::path& path,

@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "field/compressed_attenuation_field.h"
@@ -48,22 +49,37 @@ using NextBlocks = std::function<std::vector<IndexBlock>()>;
 /// Called on every rank after the last block.
 using MakeProvenance = std::function<FieldProvenance()>;
 
+/// How MPI-IO is to write: names and values of its hints ("cb_nodes", "8"). Those that it does not
+/// know it ignores.
+using MpiIoHints = std::vector<std::pair<std::string, std::string>>;
+
 /// Collective. Writes `field` (its slabs' index arrays are ignored) with the blocks of all ranks by
 /// parallel HDF5 to "PATH.partial", closes it, verifies it by reading it back on rank 0, syncs and
 /// renames. Blocks are asked for and written in rounds, one collective write per round and slab, so
 /// that no rank need hold more than one round's; ranks without a block take part. Returns the same
-/// info on every rank.
+/// info on every rank. When a write fails, MPI-IO and HDF5 cannot be used or finalised any more:
+/// the ranks that know of it throw, alone, and MpiEnvironment::is_abort_required() is true.
 FieldFileInfo write_field(const CompressedAttenuationField& field,
                           const NextBlocks& next_blocks,
                           const MakeProvenance& make_provenance,
                           const std::filesystem::path& path,
-                          const Communicator& communicator);
+                          const Communicator& communicator,
+                          const MpiIoHints& hints = {});
 /// Collective. The same in one round.
 FieldFileInfo write_field(const CompressedAttenuationField& field,
                           const std::vector<IndexBlock>& my_blocks,
                           const FieldProvenance& provenance,
                           const std::filesystem::path& path,
-                          const Communicator& communicator);
+                          const Communicator& communicator,
+                          const MpiIoHints& hints = {});
+
+/// Collective. Writes about a megabyte to "PATH.io-test" as write_field() will write a field to
+/// `path`, with ranks that have nothing to write, verifies it and removes it. A file system, HDF5
+/// or MPI-IO that cannot do this is found before the work, not after it. FileError with their
+/// versions.
+void check_parallel_writing(const std::filesystem::path& path,
+                            const Communicator& communicator,
+                            const MpiIoHints& hints = {});
 
 /// Collective. Rank 0 reads and verifies (extents against dataspaces before allocating, checksums,
 /// index range), the rest receive it; indices are held once per node. FileError (exit 4) on

@@ -53,23 +53,20 @@ NodeCt read_ct_per_node(const std::filesystem::path& path,
                         const AttenuationModel& model,
                         const Communicator& communicator,
                         std::vector<std::string>& warnings) {
-  const Communicator node = communicator.node();
   CtVolume ct;
   CtFacts facts;
   CtFacts bordered;
-  // all_or_none over everybody: a node whose file system lacks the CT must not leave the others
-  // waiting.
   all_or_none(communicator, [&] {
-    if (!node.is_root()) return;
+    if (!communicator.is_root()) return;
     ct = read_ct(path, options, &warnings);
     facts = {ct.grid, ct_content_sha256(ct)};
     bordered.grid = AttenuationVolume::bordered_grid_of(ct, model);
   });
-  share(facts, node);
-  share(bordered, node);
+  share(facts, communicator);
+  share(bordered, communicator);
   const std::size_t count = bordered.grid.voxel_count();
-  const auto owner =
-      node.allocate_on_node(count * sizeof(std::uint16_t), [&](std::span<std::byte> memory) {
+  const auto owner = communicator.allocate_on_nodes_from_root(
+      count * sizeof(std::uint16_t), [&](std::span<std::byte> memory) {
         AttenuationVolume::fill_voxels(
             ct, model, bordered.grid, {reinterpret_cast<std::uint16_t*>(memory.data()), count});
       });

@@ -24,9 +24,9 @@ struct NodeCt {
   CtFacts facts;
 };
 
-/// Collective. Each node's first rank reads the CT; errors as read_ct(), on every rank. Only that
-/// rank ever holds anything but the shared voxels: the file's values and the CT as int16 while it
-/// reads, then the CT while it fills the voxels.
+/// Collective. Rank 0 reads the CT, the other nodes get the voxels; errors as read_ct(), on every
+/// rank. Only rank 0 ever holds anything but the shared voxels: the file's values and the CT as
+/// int16 while it reads, then the CT while it fills the voxels.
 NodeCt read_ct_per_node(const std::filesystem::path& path,
                         const CtReadOptions& options,
                         const AttenuationModel& model,

@@ -244,6 +244,31 @@ std::shared_ptr<const std::byte> Communicator::allocate_on_node_together(
   return {owner, base};
 }
 
+std::shared_ptr<const std::byte> Communicator::allocate_on_nodes_from_root(
+    std::size_t bytes, const std::function<void(std::span<std::byte>)>& fill) const {
+  std::span<std::byte> memory;
+  bool is_first_of_node = false;
+  auto owner =
+      allocate_on_node_together(bytes, [&](std::span<std::byte> on_node, int part, int /*parts*/) {
+        memory = on_node;
+        is_first_of_node = part == 0;
+      });
+  all_or_none(*this, [&] {
+    if (is_root()) fill(memory);
+  });
+  MPI_Comm first_ranks = MPI_COMM_NULL;
+  require_success(
+      MPI_Comm_split(impl_->handle, is_first_of_node ? 0 : MPI_UNDEFINED, rank(), &first_ranks),
+      "MPI_Comm_split");
+  if (is_first_of_node) {
+    const WaitNote waits;
+    broadcast_bytes(first_ranks, memory);
+    MPI_Comm_free(&first_ranks);
+  }
+  barrier();
+  return owner;
+}
+
 RankFailure first_failure(const Communicator& communicator, const RankFailure& mine) {
   // The common case costs one small reduction; texts travel only when somebody failed.
   std::array<std::uint64_t, 1> any{mine.exit_code != 0 ? std::uint64_t{1} : std::uint64_t{0}};

@@ -55,6 +55,11 @@ class Communicator {
       std::size_t bytes,
       const std::function<void(std::span<std::byte>, int part, int parts)>& fill) const;
 
+  /// Collective. The same, filled on rank 0 alone: the other nodes get a copy, so that no file need
+  /// be read twice. An exception in `fill` is thrown on every rank.
+  [[nodiscard]] std::shared_ptr<const std::byte> allocate_on_nodes_from_root(
+      std::size_t bytes, const std::function<void(std::span<std::byte>)>& fill) const;
+
   struct Impl;
   [[nodiscard]] const Impl& impl() const { return *impl_; }
 

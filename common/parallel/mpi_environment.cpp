@@ -15,6 +15,9 @@ std::atomic<bool> abort_required = false;
 }  // namespace
 
 MpiEnvironment::MpiEnvironment(int& argc, char**& argv) {
+  // Open MPI would make a file per rank beside each file that ranks open together, for shared file
+  // pointers, which nothing here uses. What the user has set stays.
+  setenv("OMPI_MCA_sharedfp", "^lockedfile", 0);
   int provided = 0;
   MPI_Init_thread(&argc, &argv, MPI_THREAD_FUNNELED, &provided);
 }

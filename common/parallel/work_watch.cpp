@@ -21,6 +21,7 @@ namespace {
 /// What one rank is at, seen by the others of its host.
 struct RankNote {
   std::atomic<std::int64_t> since_ns = 0;        ///< the last progress; 0: nothing in work
+  std::atomic<std::int64_t> limit_ns = 0;        ///< of what is in work; 0: the watchdog's own
   std::atomic<std::int64_t> waits_since_ns = 0;  ///< in a call that waits for others; 0: not
   std::int32_t rank = 0;
   std::int32_t process = 0;
@@ -53,8 +54,13 @@ std::string set_text(const std::string& what) {
   return std::exchange(text_now, what);
 }
 
+constexpr double kNsPerMinute = 60e9;
+
+std::int64_t nanoseconds_of(double minutes) {
+  return static_cast<std::int64_t>(minutes * kNsPerMinute);
+}
+
 std::string minutes_text(std::int64_t ns) {
-  constexpr double kNsPerMinute = 60e9;
   std::ostringstream text;
   text.precision(3);
   text << static_cast<double>(ns) / kNsPerMinute << " min";
@@ -63,9 +69,10 @@ std::string minutes_text(std::int64_t ns) {
 
 }  // namespace
 
-WorkNote::WorkNote(const std::string& what, Kind kind)
+WorkNote::WorkNote(const std::string& what, Kind kind, double limit_minutes)
     : what_(what), before_(set_text(what)), kind_(kind), exceptions_(std::uncaught_exceptions()) {
   failed_unit.clear();
+  (*my_note).limit_ns = nanoseconds_of(limit_minutes);
 }
 
 WorkNote::~WorkNote() {
@@ -74,6 +81,7 @@ WorkNote::~WorkNote() {
     failed_unit.clear();
   else if (kind_ == Kind::Unit && failed_unit.empty())
     failed_unit = what_;
+  (*my_note).limit_ns = 0;
   set_text(before_);
 }
 
@@ -117,7 +125,7 @@ struct StallWatch::Board {
 
 StallWatch::StallWatch(const Communicator& communicator, double limit_minutes, OnStall on_stall)
     : board_(std::make_unique<Board>()),
-      limit_ns_(static_cast<std::int64_t>(limit_minutes * 60e9)),
+      limit_ns_(nanoseconds_of(limit_minutes)),
       on_stall_(std::move(on_stall)) {
   const Communicator node = communicator.node();
   const auto ranks = static_cast<std::size_t>(node.size());
@@ -163,15 +171,17 @@ void StallWatch::watch() {
 std::string StallWatch::stall_text(std::int64_t watched_since_ns) const {
   const std::int64_t now = now_ns();
   const RankNote* stuck = nullptr;
-  std::int64_t stuck_ns = limit_ns_;
+  std::int64_t stuck_ns = 0;
   std::int64_t all_wait_ns = std::numeric_limits<std::int64_t>::max();
   for (const RankNote& note : board_->notes) {
     const std::int64_t waits_since = note.waits_since_ns;
     const std::int64_t since = waits_since != 0 ? waits_since : note.since_ns.load();
     const std::int64_t ns = since == 0 ? 0 : now - std::max(since, watched_since_ns);
     all_wait_ns = std::min(all_wait_ns, waits_since == 0 ? 0 : ns);
+    const std::int64_t own_limit = note.limit_ns;
+    const std::int64_t limit = own_limit == 0 ? limit_ns_ : std::min(own_limit, limit_ns_);
     // Who waits is not stuck.
-    if (waits_since != 0 || ns <= stuck_ns) continue;
+    if (waits_since != 0 || ns <= std::max(limit, stuck_ns)) continue;
     stuck = &note;
     stuck_ns = ns;
   }

@@ -20,7 +20,8 @@ class WorkNote {
  public:
   enum class Kind { Phase, Unit };
 
-  explicit WorkNote(const std::string& what, Kind kind = Kind::Unit);
+  /// `limit_minutes`: of the watchdog for this note, when it is less than the watchdog's own.
+  explicit WorkNote(const std::string& what, Kind kind = Kind::Unit, double limit_minutes = 0.0);
   ~WorkNote();
   WorkNote(const WorkNote&) = delete;
   WorkNote& operator=(const WorkNote&) = delete;

@@ -2,6 +2,7 @@
 #include "parallel/communicator.h"
 
 #include <cstring>
+#include <tuple>
 
 #include <gtest/gtest.h>
 
@@ -47,6 +48,20 @@ TEST(Communicator, NodeMemoryIsFilledOnceAndSeenByAll) {
   const auto memory = world.allocate_on_node(
       1000, [](std::span<std::byte> bytes) { std::memset(bytes.data(), 7, bytes.size()); });
   EXPECT_EQ(memory.get()[999], std::byte(7));
+}
+
+TEST(Communicator, NodeMemoryFromRankZeroIsFilledThereAloneAndSeenByAll) {
+  const Communicator world = Communicator::world();
+  int fills = 0;
+  const auto memory = world.allocate_on_nodes_from_root(1000, [&](std::span<std::byte> bytes) {
+    ++fills;
+    std::memset(bytes.data(), 9, bytes.size());
+  });
+  EXPECT_EQ(memory.get()[999], std::byte(9));
+  EXPECT_EQ(fills, world.is_root() ? 1 : 0);
+  EXPECT_THROW(std::ignore = world.allocate_on_nodes_from_root(
+                   8, [](std::span<std::byte>) { throw FileError("a.h5", "is torn"); }),
+               Error);
 }
 
 TEST(AllOrNone, ThrowsTheLoneRanksErrorEverywhere) {

@@ -213,6 +213,33 @@ TEST(FieldFile, MissingBlocksAreNoticedAndLeaveNoFile) {
   EXPECT_FALSE(std::filesystem::exists(folder / "a.af.h5.partial"));
 }
 
+TEST(FieldFile, HintsToMpiIoDoNotChangeThePayload) {
+  const SharedFolder folder;
+  const Communicator world = Communicator::world();
+  const CompressedAttenuationField field = small_field();
+  const std::string expected = write(field, folder / "a.af.h5").payload_sha256;
+  const MpiIoHints hints = {{"cb_nodes", "1"}, {"striping_unit", "65536"}, {"no-such-hint", "1"}};
+  const FieldFileInfo info = write_field(
+      field, dealt(all_blocks(field), world), some_provenance(), folder / "b.af.h5", world, hints);
+  EXPECT_EQ(info.payload_sha256, expected);
+}
+
+TEST(FieldFile, TheTestOfCollectiveWritesLeavesNothingAndSaysWhatFailed) {
+  const SharedFolder folder;
+  const Communicator world = Communicator::world();
+  check_parallel_writing(folder / "a.af.h5", world);
+  world.barrier();
+  EXPECT_TRUE(std::filesystem::is_empty(folder / ""));
+  std::string said;
+  try {
+    check_parallel_writing("/nowhere/a.af.h5", world);
+  } catch (const Error& error) {
+    said = error.what();
+  }
+  EXPECT_NE(said.find("/nowhere/a.af.h5.io-test"), std::string::npos) << said;
+  EXPECT_NE(said.find("HDF5 1."), std::string::npos) << said;
+}
+
 TEST(FieldFile, AnUnwritableFolderIsAFileErrorOnEveryRank) {
   const Communicator world = Communicator::world();
   const CompressedAttenuationField field = small_field();
