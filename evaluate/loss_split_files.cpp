@@ -56,6 +56,7 @@ json write_loss_split(const std::vector<LossSplit>& splits, const std::filesyste
     groups.push_back({kLabels[part], values});
     parts.push_back(
         {{"name", LossSplit::kNames[part]},
+         {"label", kLabels[part]},
          {"psnr_db", to_json(summarize(values))},
          {"share_of_total",
           number_json(mean_of_part(splits, part) / mean_of_part(splits, LossSplit::kParts - 1))}});

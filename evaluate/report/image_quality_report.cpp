@@ -111,10 +111,11 @@ std::string loss_text(const EvaluationRun& run) {
   if (!run.summary.contains("loss_split")) return "";
   const json& split = run.summary.at("loss_split");
   HtmlTable table({{"Lossy step", false}, {"Median PSNR (dB)", true}, {"Share of the error", true}},
-                  "Each step alone, the others exact; shares are of the field's mean square error "
+                  "Interpolation in one plane alone, in both, quantisation alone, and all of it; "
+                  "shares are of the field's mean square error "
                   "and need not add up to 100 %, since errors of steps add or cancel");
   for (const json& part : split.at("parts"))
-    table.add_row({escaped(part.at("name").get<std::string>()),
+    table.add_row({escaped(part.at("label").get<std::string>()),
                    decimals(part.at("psnr_db").at("median"), 1),
                    percent(number_of(part.at("share_of_total")))});
   return run_figure(run,
