@@ -16,6 +16,7 @@ namespace {
 /// What is known before the CT is read; the default centre is the CT's.
 struct NamedSource {
   std::string ct_path;
+  StudyPlaces places;  ///< where the study names its files
   CameraRig rig;
   std::string camera;
   std::optional<PoseFrame> frame;
@@ -35,6 +36,7 @@ NamedSource source_of_study(const PrecomputeOptions& options, std::vector<std::s
   const StudyCase& study_case = study.find_case(options.case_name);
   NamedSource source;
   source.ct_path = study_case.ct.string();
+  source.places = study_case.places;
   source.rig = study.rig;
   source.frame = study_case.frame();
   std::vector<std::string> cameras;
@@ -85,8 +87,10 @@ FieldSource load_source(const PrecomputeOptions& options, const Communicator& co
   });
   CtReadOptions ct_options;
   ct_options.series_uid = options.series_uid;
-  const NodeCt ct = read_ct_per_node(
-      named.ct_path, ct_options, options.attenuation_model(), communicator, source.warnings);
+  const NodeCt ct = used_from(named.places, "ct", [&] {
+    return read_ct_per_node(
+        named.ct_path, ct_options, options.attenuation_model(), communicator, source.warnings);
+  });
   source.volume = ct.volume;
   source.ct_path = named.ct_path;
   source.ct_content_sha256 = ct.facts.content_sha256;
