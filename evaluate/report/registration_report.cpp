@@ -346,8 +346,8 @@ std::string registration_figures(const EvaluationRun& run) {
                      run_figure(run,
                                 "tre-scatter",
                                 "Initial against final error",
-                                "<b>Every registration</b> as one mark: where it started and where "
-                                "it ended.") +
+                                "<b>Where registrations started and ended</b>, a mark each (of "
+                                "very many a part, as the title says).") +
                      run_figure(run,
                                 "tre-histogram",
                                 "Histogram of the error after registration",
