@@ -99,8 +99,9 @@ void CaseProgress::sync() {
 }
 
 void CaseProgress::visit_rows(const std::function<void(RegistrationRow row)>& receive) const {
-  journal_->visit(
-      [&](std::span<const std::byte> record) { receive(row_of_record(record, folder_.string())); });
+  journal_->visit(communicator_.size(), [&](std::span<const std::byte> record) {
+    receive(row_of_record(record, folder_.string()));
+  });
 }
 
 }  // namespace af::evaluation

@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <system_error>
 #include <vector>
 
@@ -118,8 +119,13 @@ ProgressJournal::ProgressJournal(const fs::path& folder,
   write_text_file(manifest, json.dump(2) + "\n");
 }
 
-void ProgressJournal::visit(const Visit& visit) const {
-  for (const fs::path& shard : shards_of(folder_, name_)) visit_shard(shard, visit);
+void ProgressJournal::visit(int shard_count, const Visit& visit) const {
+  const std::vector<fs::path> listed = shards_of(folder_, name_);
+  std::set<fs::path> shards(listed.begin(), listed.end());
+  for (int shard = 0; shard < shard_count; ++shard)
+    if (const fs::path path = shard_path(folder_, name_, shard); fs::exists(path))
+      shards.insert(path);
+  for (const fs::path& shard : shards) visit_shard(shard, visit);
 }
 
 void ProgressJournal::mend_and_visit(const Visit& visit) {

@@ -29,8 +29,10 @@ class ProgressJournal {
                   const DecidingValues& decides,
                   bool restart);
 
-  /// The sound records of all shards, by shard and in the order in which they were appended.
-  void visit(const Visit& visit) const;
+  /// The sound records of all shards, by shard and in the order in which they were appended. Shards
+  /// 0 ... shard_count - 1 are looked for by name: a network file system may list late what another
+  /// host has just made.
+  void visit(int shard_count, const Visit& visit) const;
 
   /// The same of what earlier runs left; what follows the first unsound record of a shard is cut
   /// off. To be called before any process appends.

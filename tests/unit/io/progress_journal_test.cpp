@@ -35,7 +35,7 @@ std::vector<std::string> finished(ProgressJournal& journal) {
     };
   };
   journal.mend_and_visit(into(mended));
-  journal.visit(into(visited));
+  journal.visit(1, into(visited));
   EXPECT_EQ(mended, visited);
   return mended;
 }
