@@ -80,6 +80,9 @@ Handle any_space(fuzz::InputBytes& input) {
 
 Handle any_creation(hid_t space, fuzz::InputBytes& input) {
   Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose, "H5Pcreate");
+  // Of large ones HDF5 would make all chunks; without storage only their extents are large.
+  constexpr hssize_t kMostElements = 1 << 20;
+  if (H5Sget_simple_extent_npoints(space) > kMostElements) return creation;
   const int rank = H5Sget_simple_extent_ndims(space);
   std::array<hsize_t, 5> chunk{};
   switch (input.take_below(5)) {
@@ -105,13 +108,21 @@ Handle any_creation(hid_t space, fuzz::InputBytes& input) {
   return creation;
 }
 
-void mend_hash(hid_t dataset) {
-  const Handle type(H5Dget_type(dataset), H5Tclose, "H5Dget_type");
+/// Whether its contents can be held here; they have at least one element then.
+bool is_small(hid_t dataset, hid_t type) {
+  constexpr std::size_t kMostBytes = 1u << 22;
   const Handle space(H5Dget_space(dataset), H5Sclose, "H5Dget_space");
   const auto elements = H5Sget_simple_extent_npoints(space);
-  constexpr hssize_t kMost = 1 << 20;
-  if (elements < 1 || elements > kMost || H5Tis_variable_str(type) > 0) return;
-  std::vector<std::byte> bytes(static_cast<std::size_t>(elements) * H5Tget_size(type));
+  return elements >= 1 && H5Tis_variable_str(type) == 0 &&
+         static_cast<std::size_t>(elements) <= kMostBytes / H5Tget_size(type);
+}
+
+void mend_hash(hid_t dataset) {
+  const Handle type(H5Dget_type(dataset), H5Tclose, "H5Dget_type");
+  if (!is_small(dataset, type)) return;
+  const Handle space(H5Dget_space(dataset), H5Sclose, "H5Dget_space");
+  std::vector<std::byte> bytes(static_cast<std::size_t>(H5Sget_simple_extent_npoints(space)) *
+                               H5Tget_size(type));
   hdf5::checked(H5Dread(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, bytes.data()), "H5Dread");
   H5Adelete(dataset, "sha256");
   hdf5::write_text_attribute(dataset, "sha256", sha256_hex(bytes));
@@ -120,12 +131,11 @@ void mend_hash(hid_t dataset) {
 void change_content(hid_t file, const std::string& name, fuzz::InputBytes& input) {
   const Handle dataset(H5Dopen2(file, name.c_str(), H5P_DEFAULT), H5Dclose, "H5Dopen2");
   const Handle type(H5Dget_type(dataset), H5Tclose, "H5Dget_type");
+  if (!is_small(dataset, type)) return;
   const Handle space(H5Dget_space(dataset), H5Sclose, "H5Dget_space");
   const std::size_t width = H5Tget_size(type);
   std::vector<std::byte> bytes(static_cast<std::size_t>(H5Sget_simple_extent_npoints(space)) *
                                width);
-  constexpr std::size_t kMost = 1u << 20;
-  if (bytes.empty() || bytes.size() > kMost) return;
   H5Dread(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, bytes.data());
   const std::size_t place = input.take_below(bytes.size() / width) * width;
   const auto value = std::as_bytes(input.take_bytes(width));

@@ -1,0 +1,138 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# A field and registrations on two hosts that only a network joins, and what happens when it is cut. The hosts are network
+# namespaces on a bridge of this machine, so MPI's messages go by TCP, and files are shared as on a cluster. Needs root
+# and iproute2; not a CTest, because it changes the machine's network for some minutes. All of it is removed at the end.
+# Usage: two_hosts_test.sh BUILD-FOLDER
+set -euo pipefail
+build=$(cd "$1" && pwd)
+bin=$build/bin
+((EUID == 0)) || { echo "two_hosts_test: needs root" >&2; exit 77; }
+command -v ip >/dev/null || { echo "two_hosts_test: needs iproute2" >&2; exit 77; }
+hosts=(afhost1 afhost2) bridge=afbridge scratch=$(mktemp -d)
+for host in "${hosts[@]}"; do
+  [[ ! -e /run/netns/$host ]] || { echo "two_hosts_test: namespace $host is in use" >&2; exit 1; }
+done
+
+remove_hosts() {
+  local host pid
+  for host in "${hosts[@]}"; do
+    for pid in $(ip netns pids "$host" 2>/dev/null); do kill -9 "$pid" 2>/dev/null || true; done
+    ip netns del "$host" 2>/dev/null || true
+    rm -f "/etc/netns/$host/hosts"
+    rmdir "/etc/netns/$host" 2>/dev/null || true
+  done
+  ip link del "$bridge" 2>/dev/null || true
+}
+clean_up() {
+  remove_hosts
+  rm -rf --one-file-system "$scratch"
+}
+trap clean_up EXIT
+
+make_hosts() {
+  ip link add "$bridge" type bridge
+  ip link set "$bridge" up
+  local i host
+  for i in 1 2; do
+    host=${hosts[i - 1]}
+    ip netns add "$host"
+    ip link add "afveth$i" type veth peer name eth0 netns "$host"
+    ip link set "afveth$i" master "$bridge" up
+    ip -n "$host" link set lo up
+    ip -n "$host" addr add "10.78.0.$i/24" dev eth0
+    ip -n "$host" link set eth0 up
+    mkdir -p "/etc/netns/$host"
+    printf '127.0.0.1 localhost\n10.78.0.1 afhost1\n10.78.0.2 afhost2\n' >"/etc/netns/$host/hosts"
+  done
+  # A host name of its own: otherwise Open MPI takes both for one and shares memory. The words after the host are a
+  # command line for a shell, as ssh takes them.
+  cat >"$scratch/agent" <<'AGENT'
+#!/bin/bash
+while [[ "$1" == -* ]]; do shift; done
+host=$1
+shift
+exec ip netns exec "$host" unshare --uts -- /bin/bash -c 'hostname "$1"; shift; exec /bin/bash -c "$*"' _ "$host" "$@"
+AGENT
+  chmod +x "$scratch/agent"
+  # The bridge learns where the hosts are.
+  for i in 1 2 3 4 5 6 7 8 9 10; do
+    ip netns exec afhost1 bash -c 'exec 3<>/dev/tcp/10.78.0.2/9' 2>/dev/null && break
+    sleep 0.1
+  done
+}
+
+export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
+ends_on_loss=(--mca oob_tcp_keepalive_time 10 --mca oob_tcp_keepalive_intvl 2 --mca oob_tcp_keepalive_probes 3)
+
+# on_two_hosts SECONDS MPIRUN-OPTIONS... -- PROGRAM...: four ranks, two on each host.
+on_two_hosts() {
+  local seconds=$1
+  shift
+  local options=()
+  while [[ "$1" != -- ]]; do options+=("$1"); shift; done
+  shift
+  timeout -k 10 "$seconds" ip netns exec afhost1 unshare --uts -- /bin/bash -c 'hostname afhost1; exec "$@"' _ \
+    mpirun --oversubscribe --mca plm rsh --mca plm_rsh_agent "$scratch/agent" --mca pml ob1 --mca btl self,vader,tcp \
+    --mca btl_tcp_if_include eth0 --mca oob_tcp_if_include eth0 --host afhost1:2,afhost2:2 "${options[@]}" "$@"
+}
+on_one_host() { mpirun --oversubscribe -n 3 "$@"; }
+sent_bytes() { ip -n afhost2 -s -j link show eth0 | sed -E 's/.*"tx":\{"bytes":([0-9]+).*/\1/'; }
+payload() { "$bin/af-inspect" --json "$1" | grep -o '"payload_sha256": *"[0-9a-f]*"'; }
+# Rows without their times, the last column.
+rows() { sed 's/,[^,]*$//' "$1/registrations.csv"; }
+fail() { echo "two_hosts_test: FAILED: $*" >&2; exit 1; }
+
+"$build/tests/make_bad_inputs" "$scratch/in"
+cd "$scratch"
+study=$scratch/in/valid/study.toml
+precompute=("$bin/af-precompute" --study "$study" --max-rotation-deg 8 --max-translation-mm 20 --uv-nodes 24 --st-nodes 96
+            --codewords 256 --training-fraction 0.5)
+register=("$bin/af-evaluate" registration --study "$study" --field AP=one-AP.h5 --field LAT=one-LAT.h5 --gold study
+          --preset paper --intervals 4)
+
+make_hosts
+for camera in AP LAT; do
+  on_one_host "${precompute[@]}" --camera "$camera" -o "one-$camera.h5" >log 2>&1 || { tail -5 log; fail "a field on one host"; }
+done
+before=$(sent_bytes)
+on_two_hosts 300 -- "${precompute[@]}" --camera AP -o two-AP.h5 >log 2>&1 || { tail -5 log; fail "a field on two hosts"; }
+[[ "$(payload one-AP.h5)" == "$(payload two-AP.h5)" ]] || fail "another payload on two hosts"
+echo "field: the same payload on one host and on two; the second host sent $((($(sent_bytes) - before) / 1000)) kB"
+
+on_one_host "${register[@]}" --starts-per-interval 20 -o one >log 2>&1 || { tail -5 log; fail "registrations on one host"; }
+before=$(sent_bytes)
+on_two_hosts 300 -- "${register[@]}" --starts-per-interval 20 -o two >log 2>&1 || { tail -5 log; fail "registrations on two hosts"; }
+diff <(rows one) <(rows two) >/dev/null || fail "other rows on two hosts"
+echo "registrations: the same rows on one host and on two; the second host sent $((($(sent_bytes) - before) / 1000)) kB"
+
+on_one_host "${register[@]}" --starts-per-interval 1500 -o whole >log 2>&1 || { tail -5 log; fail "the long study"; }
+
+# lose_host NAME SECONDS MPIRUN-OPTIONS...: registrations, the second host's cable out once some are kept; how that ends.
+lose_host() {
+  local name=$1 seconds=$2
+  shift 2
+  on_two_hosts "$seconds" "$@" -- "${register[@]}" --starts-per-interval 1500 -o "$name" >"$name.log" 2>&1 &
+  local job=$! code=0 begin kept=0
+  until ((kept > 20000)); do
+    kill -0 "$job" 2>/dev/null || { tail -5 "$name.log"; fail "$name ended before the cut"; }
+    sleep 0.2
+    kept=$(find "$name.progress" -name '*.records' -printf '%s\n' 2>/dev/null | awk '{sum += $1} END {print sum + 0}' || true)
+  done
+  ip link set afveth2 down
+  begin=$SECONDS
+  wait "$job" || code=$?
+  echo "$name: $((SECONDS - begin)) s after the cut the job had ended with code $code ($kept bytes of rows were kept by then)"
+  { grep -vE '^[[:space:]]*$|^-+$' "$name.log" || true; } | tail -n 8 | cut -c1-150 | sed 's/^/    /'
+  [[ ! -e "$name/registrations.csv" ]] || fail "$name has results"
+  # The lost host still runs: a cluster's resource manager would end what is there.
+  local pid
+  for pid in $(ip netns pids afhost1) $(ip netns pids afhost2); do kill -9 "$pid" 2>/dev/null || true; done
+  ip link set afveth2 up
+  on_one_host "${register[@]}" --starts-per-interval 1500 -o "$name" >"$name.log" 2>&1 || { tail -5 "$name.log"; fail "going on"; }
+  diff <(rows whole) <(rows "$name") >/dev/null || fail "$name: other rows after going on"
+  echo "$name: the next run went on, with the rows of an undisturbed one"
+}
+lose_host defaults 90
+lose_host keepalive 90 "${ends_on_loss[@]}"
+echo "two_hosts_test: done"
