@@ -64,15 +64,20 @@ struct ProgressBytes {
   std::uint64_t training = 0;  ///< iterations; rows of registrations
 };
 
+std::uint64_t bytes_of_files(const fs::path& folder, const std::string& extension) {
+  std::uint64_t bytes = 0;
+  std::error_code gone;
+  for (const auto& entry : fs::directory_iterator(folder, gone))
+    if (entry.path().extension() == extension)
+      if (const std::uintmax_t size = fs::file_size(entry.path(), gone); !gone) bytes += size;
+  return bytes;
+}
+
+/// Units first: as long as there is no training after them, they are cast ones.
 ProgressBytes progress_bytes(const fs::path& folder) {
   ProgressBytes bytes;
-  std::error_code gone;
-  for (const auto& entry : fs::directory_iterator(folder, gone)) {
-    const std::uintmax_t size = fs::file_size(entry.path(), gone);
-    if (gone) continue;
-    if (entry.path().extension() == ".shard") bytes.units += size;
-    if (entry.path().extension() == ".records") bytes.training += size;
-  }
+  bytes.units = bytes_of_files(folder, ".shard");
+  bytes.training = bytes_of_files(folder, ".records");
   return bytes;
 }
 
