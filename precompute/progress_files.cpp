@@ -74,8 +74,7 @@ struct IndicesPlace {
 
 /// What the shards of earlier runs hold.
 struct FoundUnits {
-  std::set<std::uint64_t> seen;
-  std::vector<RecordPlace> tiles;  ///< each unit once
+  std::vector<RecordPlace> tiles;
   std::vector<IndicesPlace> indices;
 };
 
@@ -121,7 +120,7 @@ void scan_shard(const std::filesystem::path& folder,
       return;
     if (!header.is_of_tiles())
       found.indices.push_back({header.unit_id, header.detail, place});
-    else if (found.seen.insert(header.unit_id).second)
+    else
       found.tiles.push_back({header.unit_id, place});
     place.offset += sizeof(RecordHeader) + header.content_bytes();
   }
@@ -182,6 +181,50 @@ std::vector<Record> records_of(std::span<const std::byte> bytes) {
   std::vector<Record> records(bytes.size() / sizeof(Record));
   if (!bytes.empty()) std::memcpy(records.data(), bytes.data(), bytes.size());
   return records;
+}
+
+/// Collective. All ranks' records on every rank, in rank order.
+template <typename Record>
+std::vector<Record> from_all(const std::vector<Record>& mine, const Communicator& communicator) {
+  std::vector<Record> all;
+  for (const auto& bytes : communicator.all_gather(std::as_bytes(std::span(mine))))
+    for (const Record& record : records_of<Record>(bytes)) all.push_back(record);
+  return all;
+}
+
+template <typename Record>
+void sort_by_place(std::vector<Record>& records) {
+  std::sort(records.begin(), records.end(), [](const Record& a, const Record& b) {
+    return std::tie(a.place.run, a.place.rank, a.place.offset) <
+           std::tie(b.place.run, b.place.rank, b.place.offset);
+  });
+}
+
+/// Collective. Rank 0 lists the shards, all ranks scan them; the same on every rank: tiles of each
+/// unit once, indices in the order of the runs.
+FoundUnits scan_together(const std::filesystem::path& folder,
+                         std::span<const WorkUnit> units,
+                         const Communicator& communicator) {
+  std::vector<std::byte> bytes;
+  all_or_none(communicator, [&] {
+    if (communicator.is_root()) bytes = bytes_of(shards_of(folder));
+  });
+  communicator.broadcast(bytes);
+  const auto shards = records_of<UnitPlace>(bytes);
+  const auto ranks = static_cast<std::size_t>(communicator.size());
+  FoundUnits found;
+  all_or_none(communicator, [&] {
+    for (auto i = static_cast<std::size_t>(communicator.rank()); i < shards.size(); i += ranks)
+      scan_shard(folder, shards[i], units, found);
+  });
+  found.tiles = from_all(found.tiles, communicator);
+  found.indices = from_all(found.indices, communicator);
+  sort_by_place(found.tiles);
+  sort_by_place(found.indices);
+  std::set<std::uint64_t> seen;
+  std::erase_if(found.tiles,
+                [&](const RecordPlace& tiles) { return !seen.insert(tiles.unit_id).second; });
+  return found;
 }
 
 std::string manifest_text(const ProgressManifest& manifest) {
@@ -269,18 +312,9 @@ std::filesystem::path ProgressFolder::path_of(const UnitPlace& place) const {
 }
 
 void ProgressFolder::visit_finished(std::span<const WorkUnit> units, const Visit& visit) {
-  FoundUnits found;
-  all_or_none(communicator_, [&] {
-    if (!communicator_.is_root()) return;
-    for (const UnitPlace& shard : shards_of(path_)) scan_shard(path_, shard, units, found);
-  });
-  std::vector<std::byte> bytes = bytes_of(found.tiles);
-  communicator_.broadcast(bytes);
-  found.tiles = records_of<RecordPlace>(bytes);
-  bytes = bytes_of(found.indices);
-  communicator_.broadcast(bytes);
+  const FoundUnits found = scan_together(path_, units, communicator_);
   // Later runs are the ones to go on with.
-  for (const IndicesPlace& of_unit : records_of<IndicesPlace>(bytes))
+  for (const IndicesPlace& of_unit : found.indices)
     encoded_places_[static_cast<std::uint32_t>(of_unit.unit_id)] = {
         of_unit.place, static_cast<std::uint32_t>(of_unit.codebook_crc)};
   const auto ranks = static_cast<std::size_t>(communicator_.size());
