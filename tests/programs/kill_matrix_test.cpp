@@ -236,14 +236,18 @@ class KillMatrix : public testing::Test {
     return is_reached;
   }
 
-  void cut_short(const Plan& plan, const test::LaunchedJob& job) {
+  void cut_short(const Plan& plan, test::LaunchedJob& job) {
     std::vector<pid_t> ranks = job.ranks();
     std::shuffle(ranks.begin(), ranks.end(), random_);
     if (plan.cut == Cut::Usr1) kill(job.launcher(), SIGUSR1);
     if (plan.cut == Cut::Term) {
-      // Open MPI takes half a second to pass it on: until then the ranks stay where they are.
-      for (const pid_t rank : ranks) kill(rank, SIGSTOP);
+      // Open MPI wakes the ranks a second before it passes the signal on, which is longer than
+      // some stages last here: the ranks are kept where they are.
       kill(job.launcher(), SIGTERM);
+      job.wait_until([&] {
+        for (const pid_t rank : job.ranks()) kill(rank, SIGSTOP);
+        return false;
+      });
     }
     if (plan.cut == Cut::KillAll) kill(job.launcher(), SIGKILL);
     if (plan.cut == Cut::KillRank && !ranks.empty()) kill(ranks.front(), SIGKILL);
