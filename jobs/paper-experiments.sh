@@ -36,7 +36,7 @@ that was stopped goes on when repeated. DIR/paper/ holds every result under the 
   --seed N         of everything random                                                                   [1]
   --help
 
-On two cores of a virtual machine the laptop preset takes about half an hour, the registrations by fields 3 minutes of it.
+On two cores of a virtual machine the laptop preset takes 4 min 31 s, its 960 registrations by fields 44 s of it.
 TEXT
 }
 
