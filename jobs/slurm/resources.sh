@@ -8,7 +8,8 @@ slurm_options=()
 # srun (with PMIx, as Debian's OpenMPI wants it) or mpirun
 launcher=srun
 srun_options=(--mpi=pmix)
-mpirun_options=()
+# The settings let mpirun notice a lost node within about 90 s (docs/hosts.md); srun leaves that to Slurm.
+mpirun_options=(--mca oob_tcp_keepalive_time 60 --mca oob_tcp_keepalive_intvl 10 --mca oob_tcp_keepalive_probes 3)
 
 # Ranks, memory for each of them, and the time limit of one field, of one case's registrations, of the report.
 precompute_ranks=8 precompute_memory=2G precompute_time=02:00:00
