@@ -167,19 +167,25 @@ void register_with(Method& method,
   progress.sync();
 }
 
+/// What of a method remains when its fields are let go.
+struct MethodStarts {
+  std::string renderer;
+  std::vector<std::size_t> start_indices;
+};
+
 /// Rank 0: the rows of all methods, by method and start index. FileError when some are gone.
-std::vector<RegistrationRow> rows_of(const std::vector<Method>& methods,
+std::vector<RegistrationRow> rows_of(const std::vector<MethodStarts>& methods,
                                      const CaseProgress& progress) {
   std::map<std::string, std::size_t> first_row;
   std::size_t count = 0;
-  for (const Method& method : methods) {
+  for (const MethodStarts& method : methods) {
     first_row[method.renderer] = count;
     count += method.start_indices.size();
   }
   std::vector<RegistrationRow> rows(count);
   std::vector<bool> is_there(count);
   progress.visit_rows([&](RegistrationRow row) {
-    for (const Method& method : methods) {
+    for (const MethodStarts& method : methods) {
       if (method.renderer != row.renderer) continue;
       const auto index = static_cast<std::size_t>(row.start_index);
       // Start indices ascend.
@@ -278,24 +284,44 @@ void draw_xrays(const registration::RegistrationProblem& problem,
       {{"file", name}, {"case", evaluation.case_name}, {"which", "xrays"}});
 }
 
-/// Overlays of the best, median and worst registration of the first renderer, and what Slicer loads
-/// of each.
+/// A row worth a look.
+struct ChosenRow {
+  const char* which;
+  RegistrationRow row;
+};
+
+/// Rank 0: the rows of the best, median and worst registration of a renderer; none when none has a
+/// pose. Rows are visited twice instead of held: memory holds fields at this point.
+std::vector<ChosenRow> chosen_rows(const std::string& renderer, const CaseProgress& progress) {
+  std::vector<std::pair<double, std::int64_t>> by_tre;
+  progress.visit_rows([&](const RegistrationRow& row) {
+    if (row.renderer == renderer && std::isfinite(row.tre_mm))
+      by_tre.emplace_back(row.tre_mm, row.start_index);
+  });
+  if (by_tre.empty()) return {};
+  std::sort(by_tre.begin(), by_tre.end());
+  by_tre.erase(std::unique(by_tre.begin(), by_tre.end()), by_tre.end());
+  const std::array<std::pair<const char*, std::int64_t>, 3> wanted = {
+      {{"best", by_tre.front().second},
+       {"median", by_tre[(by_tre.size() - 1) / 2].second},
+       {"worst", by_tre.back().second}}};
+  std::vector<ChosenRow> chosen;
+  for (const auto& [which, index] : wanted) chosen.push_back({which, {}});
+  progress.visit_rows([&](const RegistrationRow& row) {
+    for (std::size_t i = 0; i < wanted.size(); ++i)
+      if (row.renderer == renderer && row.start_index == wanted[i].second) chosen[i].row = row;
+  });
+  return chosen;
+}
+
+/// Overlays of chosen registrations, and what Slicer loads of each.
 void draw_overlays(const Method& method,
+                   const std::vector<ChosenRow>& chosen,
                    const StudyCase& study_case,
                    const Yardstick& yardstick,
                    const std::filesystem::path& folder,
                    CaseEvaluation& evaluation) {
-  std::vector<const RegistrationRow*> by_tre;
-  for (const RegistrationRow& row : evaluation.rows)
-    if (row.renderer == method.renderer && std::isfinite(row.tre_mm)) by_tre.push_back(&row);
-  if (by_tre.empty()) return;
-  std::stable_sort(by_tre.begin(), by_tre.end(), [](const auto* a, const auto* b) {
-    return a->tre_mm < b->tre_mm;
-  });
-  const std::array<std::pair<const char*, std::size_t>, 3> chosen = {
-      {{"best", 0}, {"median", (by_tre.size() - 1) / 2}, {"worst", by_tre.size() - 1}}};
-  for (const auto& [which, position] : chosen) {
-    const RegistrationRow& row = *by_tre[position];
+  for (const auto& [which, row] : chosen) {
     const RigidTransform pose = pose_from_parameters(
         yardstick.gold_frame, PoseParameters::from_deg_and_mm(row.final_deg_mm));
     const std::string slicer = "slicer/" + file_name_part(evaluation.case_name) + "-" + which;
@@ -403,10 +429,24 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
   evaluation.starts.starts = {};
   all_or_none(world, [&] {
     if (!world.is_root()) return;
-    evaluation.rows = rows_of(methods, progress);
-    for (const Method& method : methods) keep_first_traces(evaluation.rows, method.renderer);
     draw_xrays(methods.front().runner.problem(), options.output_folder, evaluation);
-    draw_overlays(methods.front(), study_case, yardstick, options.output_folder, evaluation);
+    draw_overlays(methods.front(),
+                  chosen_rows(methods.front().renderer, progress),
+                  study_case,
+                  yardstick,
+                  options.output_folder,
+                  evaluation);
+  });
+  std::vector<MethodStarts> registered;
+  for (Method& method : methods)
+    registered.push_back({method.renderer, std::move(method.start_indices)});
+  // Rows take the place of fields and CT: memory holds one or the other.
+  methods.clear();
+  all_or_none(world, [&] {
+    if (!world.is_root()) return;
+    evaluation.rows = rows_of(registered, progress);
+    for (const MethodStarts& method : registered)
+      keep_first_traces(evaluation.rows, method.renderer);
   });
   return evaluation;
 }
