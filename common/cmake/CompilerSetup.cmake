@@ -17,7 +17,8 @@ target_include_directories(af_compile_options INTERFACE ${PROJECT_SOURCE_DIR} ${
 
 if(AF_SANITIZE)
   list(TRANSFORM AF_SANITIZE PREPEND -fsanitize= OUTPUT_VARIABLE af_sanitize_flags)
-  add_compile_options(${af_sanitize_flags} -fno-omit-frame-pointer)
+  # Undefined behaviour ends the process: a finding fails its test wherever that process was started from.
+  add_compile_options(${af_sanitize_flags} -fno-sanitize-recover=all -fno-omit-frame-pointer)
   add_link_options(${af_sanitize_flags})
 endif()
 
