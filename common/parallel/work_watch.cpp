@@ -4,19 +4,41 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <cstring>
 #include <exception>
 #include <limits>
 #include <mutex>
 #include <new>
 #include <span>
 #include <sstream>
+#include <string_view>
 #include <unistd.h>
 #include <utility>
 
 namespace af {
 
 namespace {
+
+/// Written and read letter by letter, without a lock: only for messages, half of it may be new.
+class SharedText {
+ public:
+  void set(std::string_view text) {
+    const std::size_t size = std::min(text.size(), letters_.size());
+    for (std::size_t i = 0; i < size; ++i) letters_[i].store(text[i], std::memory_order_relaxed);
+    if (size < letters_.size()) letters_[size].store('\0', std::memory_order_relaxed);
+  }
+  [[nodiscard]] std::string get() const {
+    std::string text;
+    for (const std::atomic<char>& letter : letters_) {
+      const char read = letter.load(std::memory_order_relaxed);
+      if (read == '\0') break;
+      text.push_back(read);
+    }
+    return text;
+  }
+
+ private:
+  std::array<std::atomic<char>, 255> letters_{};
+};
 
 /// What one rank is at, seen by the others of its host.
 struct RankNote {
@@ -26,10 +48,10 @@ struct RankNote {
   std::int32_t rank = 0;
   std::int32_t process = 0;
   std::atomic<bool> has_reported = false;  ///< of the first rank of a host: why the job ends
-  /// Read without a lock, only for a message: half of it may be new. Always ends in a 0.
-  std::array<char, 256> what{};
+  SharedText what;
 };
 static_assert(std::atomic<std::int64_t>::is_always_lock_free, "shared between processes");
+static_assert(std::atomic<char>::is_always_lock_free, "shared between processes");
 
 RankNote own_note;
 std::atomic<RankNote*> my_note = &own_note;
@@ -47,9 +69,7 @@ std::int64_t now_ns() {
 std::string set_text(const std::string& what) {
   RankNote& note = *my_note;
   const std::scoped_lock lock(text_mutex);
-  const std::size_t bytes = std::min(what.size(), note.what.size() - 1);
-  std::memcpy(note.what.data(), what.data(), bytes);
-  note.what[bytes] = '\0';
+  note.what.set(what);
   note.since_ns = what.empty() ? 0 : now_ns();
   return std::exchange(text_now, what);
 }
@@ -187,12 +207,12 @@ std::string StallWatch::stall_text(std::int64_t watched_since_ns) const {
   }
   if (stuck != nullptr)
     return "rank " + std::to_string(stuck->rank) + " on " + host_name() + " (process " +
-           std::to_string(stuck->process) + "): " + stuck->what.data() + ": no progress for " +
+           std::to_string(stuck->process) + "): " + stuck->what.get() + ": no progress for " +
            minutes_text(stuck_ns);
   // When nobody of this host works, the host of who does has had the time to say so.
   constexpr std::int64_t kPatience = 3;
   if (all_wait_ns <= kPatience * limit_ns_) return {};
-  return "all ranks on " + host_name() + ": " + board_->notes[0].what.data() +
+  return "all ranks on " + host_name() + ": " + board_->notes[0].what.get() +
          ": waiting for others for " + minutes_text(all_wait_ns);
 }
 
