@@ -11,19 +11,18 @@
 #include <tuple>
 #include <utility>
 
-#include "base/build_info.h"
 #include "base/error.h"
 #include "cli/app_main.h"
 #include "cli/progress_printer.h"
-#include "cli/stop_request.h"
-#include "evaluate/case_progress_program.h"
+#include "cli/resumable_items.h"
 #include "evaluate/failure_trace_files.h"
 #include "evaluate/method_loading.h"
+#include "evaluate/row_gathering_program.h"
 #include "gold/target_box.h"
+#include "io/cbor_json.h"
 #include "io/output_file.h"
 #include "io/picture.h"
 #include "io/sha256.h"
-#include "parallel/work_queue.h"
 #include "register/result_files.h"
 #include "register/slicer_files.h"
 
@@ -39,7 +38,7 @@ using registration::StopReason;
 struct Method {
   std::string renderer;
   RegistrationRunner runner;
-  std::vector<std::size_t> start_indices;
+  std::vector<std::int64_t> start_indices;  ///< ascending
 };
 
 /// Inside the motion range of every field in use.
@@ -73,13 +72,12 @@ void assign_starts(const RegistrationStudyOptions& options,
                    const StratifiedStarts& starts,
                    Method& method) {
   if (options.only_start.has_value()) {
-    const auto index = static_cast<std::size_t>(*options.only_start);
-    if (index >= starts.starts.size())
+    if (static_cast<std::size_t>(*options.only_start) >= starts.starts.size())
       throw InputError(
           "--only-start",
-          std::to_string(index),
+          std::to_string(*options.only_start),
           "must be less than the number of starts, " + std::to_string(starts.starts.size()));
-    method.start_indices = {index};
+    method.start_indices = {*options.only_start};
     return;
   }
   const bool is_reduced = options.renderer == "both" && method.renderer == "raycast";
@@ -92,7 +90,7 @@ void assign_starts(const RegistrationStudyOptions& options,
   for (std::size_t i = 0; i < starts.starts.size(); ++i)
     if (!is_reduced ||
         (starts.starts[i].interval < intervals && starts.starts[i].rank_in_interval < per_interval))
-      method.start_indices.push_back(i);
+      method.start_indices.push_back(static_cast<std::int64_t>(i));
 }
 
 /// Whether a registration ended with a pose that means anything.
@@ -116,94 +114,74 @@ void add_result(const RegistrationResult& result,
 /// The row of one start, without its case; of a failure with its trace.
 RegistrationRow traced_row(Method& method,
                            const PerturbedStart& start,
-                           std::size_t index,
+                           std::int64_t index,
                            const Yardstick& yardstick) {
   std::vector<registration::TraceRow> trace;
   RegistrationRow row = registered_row(
       [&](const RigidTransform& room_from_ct) {
-        RegistrationResult result =
-            method.runner.run(room_from_ct, static_cast<std::int64_t>(index));
+        RegistrationResult result = method.runner.run(room_from_ct, index);
         trace = result.trace;
         return result;
       },
       start,
       yardstick);
   row.renderer = method.renderer;
-  row.start_index = static_cast<std::int64_t>(index);
+  row.start_index = index;
   if (!row.is_success())
     row.trace = trace_points(trace, method.runner.problem().frame(), yardstick);
   return row;
 }
 
+/// What of a method remains when its fields are let go.
+struct MethodRows {
+  std::string renderer;
+  std::vector<std::int64_t> start_indices;
+  cli::ResumableItems items;  ///< one per start index
+
+  /// Rank 0: calls `receive` with the row of every start.
+  void visit(
+      const std::function<void(std::int64_t start_index, RegistrationRow row)>& receive) const {
+    items.visit([&](std::int64_t index, std::span<const std::byte> record) {
+      receive(index, row_of_record(record, renderer + " rows"));
+    });
+  }
+};
+
 /// Collective. Registers every start of one method that is not finished. Methods go one after the
-/// other: blocks of the work queue then hold work of one duration. Once a stop is asked for, starts
-/// are passed over.
+/// other: blocks of the work queue then hold work of one duration.
 void register_with(Method& method,
                    const std::string& case_name,
                    const StratifiedStarts& starts,
                    const Yardstick& yardstick,
-                   const Communicator& world,
-                   CaseProgress& progress) {
-  const std::vector<std::size_t> to_do = progress.unfinished(method.renderer, method.start_indices);
-  const auto count = static_cast<std::int64_t>(to_do.size());
+                   cli::ResumableItems& items) {
   std::size_t traced = 0;
-  cli::ProgressPrinter printer("case " + case_name + ", " + method.renderer + " registrations",
-                               world.is_root());
-  for_each_item(
-      world,
-      count,
-      [&](std::int64_t item) {
-        if (cli::is_stop_requested()) return;
-        const std::size_t index = to_do[static_cast<std::size_t>(item)];
-        RegistrationRow row = traced_row(method, starts.starts[index], index, yardstick);
-        row.case_name = case_name;
-        // Items come in order: a rank's first failures are its share of the first of all.
-        if (!row.trace.empty() && ++traced > kMostTraces) row.trace.clear();
-        progress.append(row);
-      },
-      [&](std::int64_t done) {
-        printer.update(static_cast<double>(done), static_cast<double>(count));
-      });
-  progress.sync();
+  items.complete(method.start_indices,
+                 "case " + case_name + ", " + method.renderer + " registrations",
+                 [&](std::int64_t index) {
+                   RegistrationRow row = traced_row(
+                       method, starts.starts[static_cast<std::size_t>(index)], index, yardstick);
+                   row.case_name = case_name;
+                   // Items come in order: a rank's first failures are its share of the first of
+                   // all.
+                   if (!row.trace.empty() && ++traced > kMostTraces) row.trace.clear();
+                   return cbor_bytes(packed_row(row));
+                 });
 }
 
-/// What of a method remains when its fields are let go.
-struct MethodStarts {
-  std::string renderer;
-  std::vector<std::size_t> start_indices;
-};
-
-/// Rank 0: the rows of all methods, by method and start index. FileError when some are gone.
-std::vector<RegistrationRow> rows_of(const std::vector<MethodStarts>& methods,
-                                     const CaseProgress& progress) {
-  std::map<std::string, std::size_t> first_row;
+/// Rank 0: the rows of all methods, by method and start index.
+std::vector<RegistrationRow> rows_of(const std::vector<MethodRows>& methods) {
   std::size_t count = 0;
-  for (const MethodStarts& method : methods) {
-    first_row[method.renderer] = count;
-    count += method.start_indices.size();
-  }
+  for (const MethodRows& method : methods) count += method.start_indices.size();
   std::vector<RegistrationRow> rows(count);
-  std::vector<bool> is_there(count);
-  progress.visit_rows([&](RegistrationRow row) {
-    for (const MethodStarts& method : methods) {
-      if (method.renderer != row.renderer) continue;
-      const auto index = static_cast<std::size_t>(row.start_index);
-      // Start indices ascend.
-      const auto found =
-          std::lower_bound(method.start_indices.begin(), method.start_indices.end(), index);
-      if (found == method.start_indices.end() || *found != index) return;
-      const std::size_t place = first_row[method.renderer] +
-                                static_cast<std::size_t>(found - method.start_indices.begin());
-      rows[place] = std::move(row);
-      is_there[place] = true;
-      return;
-    }
-  });
-  const auto lost = std::count(is_there.begin(), is_there.end(), false);
-  if (lost > 0)
-    throw FileError(progress.folder().string(),
-                    std::to_string(lost) +
-                        " finished registrations are no longer there: run the same command again");
+  std::size_t first = 0;
+  for (const MethodRows& method : methods) {
+    const std::vector<std::int64_t>& indices = method.start_indices;
+    method.visit([&](std::int64_t index, RegistrationRow row) {
+      const auto place = std::lower_bound(indices.begin(), indices.end(), index);
+      rows[first + static_cast<std::size_t>(place - indices.begin())] = std::move(row);
+    });
+    first += indices.size();
+  }
   return rows;
 }
 
@@ -222,13 +200,13 @@ void announce_times(std::vector<Method>& methods,
   double poses_tried = 400.0;
   for (Method& method : methods) {
     if (!world.is_root() || method.start_indices.size() < 2) continue;
-    const std::size_t index = method.start_indices[method.start_indices.size() / 2];
-    const RigidTransform& start = starts.starts[index].room_from_ct;
+    const std::int64_t index = method.start_indices[method.start_indices.size() / 2];
+    const RigidTransform& start = starts.starts[static_cast<std::size_t>(index)].room_from_ct;
     double seconds = 0.0;
     try {
       const auto begin = std::chrono::steady_clock::now();
       if (method.renderer == "field") {
-        poses_tried = method.runner.run(start, static_cast<std::int64_t>(index)).evaluations;
+        poses_tried = method.runner.run(start, index).evaluations;
         seconds = seconds_since(begin);
       } else {
         std::ignore = method.runner.similarity_at(start);
@@ -249,11 +227,8 @@ void announce_times(std::vector<Method>& methods,
 /// Every option, input and start that decides a case's rows.
 DecidingValues deciding_values(const RegistrationStudyOptions& options,
                                const CaseEvaluation& evaluation) {
-  DecidingValues values = deciding_lines(to_toml(options));
-  values.erase("threads");
-  values["program version"] = program_version();
+  DecidingValues values = af::deciding_values(to_toml(options), evaluation.input_sha256);
   values["case name"] = evaluation.case_name;
-  for (const auto& [name, hash] : evaluation.input_sha256) values["SHA-256 of " + name] = hash;
   Sha256 starts;
   for (const PerturbedStart& start : evaluation.starts.starts) {
     const Eigen::Matrix4d matrix = start.room_from_ct.matrix();
@@ -290,13 +265,12 @@ struct ChosenRow {
   RegistrationRow row;
 };
 
-/// Rank 0: the rows of the best, median and worst registration of a renderer; none when none has a
+/// Rank 0: the rows of the best, median and worst registration of a method; none when none has a
 /// pose. Rows are visited twice instead of held: memory holds fields at this point.
-std::vector<ChosenRow> chosen_rows(const std::string& renderer, const CaseProgress& progress) {
+std::vector<ChosenRow> chosen_rows(const MethodRows& method) {
   std::vector<std::pair<double, std::int64_t>> by_tre;
-  progress.visit_rows([&](const RegistrationRow& row) {
-    if (row.renderer == renderer && std::isfinite(row.tre_mm))
-      by_tre.emplace_back(row.tre_mm, row.start_index);
+  method.visit([&](std::int64_t index, const RegistrationRow& row) {
+    if (std::isfinite(row.tre_mm)) by_tre.emplace_back(row.tre_mm, index);
   });
   if (by_tre.empty()) return {};
   std::sort(by_tre.begin(), by_tre.end());
@@ -307,9 +281,9 @@ std::vector<ChosenRow> chosen_rows(const std::string& renderer, const CaseProgre
        {"worst", by_tre.back().second}}};
   std::vector<ChosenRow> chosen;
   for (const auto& [which, index] : wanted) chosen.push_back({which, {}});
-  progress.visit_rows([&](const RegistrationRow& row) {
+  method.visit([&](std::int64_t index, const RegistrationRow& row) {
     for (std::size_t i = 0; i < wanted.size(); ++i)
-      if (row.renderer == renderer && row.start_index == wanted[i].second) chosen[i].row = row;
+      if (index == wanted[i].second) chosen[i].row = row;
   });
   return chosen;
 }
@@ -414,39 +388,35 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
   if (options.is_starts_only) return evaluation;
   const Yardstick yardstick = yardstick_of(study, study_case, evaluation.gold);
   announce_times(methods, study_case.name, evaluation.starts, world);
-  CaseProgress progress(progress_folder(options.output_folder),
-                        file_name_part(study_case.name),
-                        deciding_values(options, evaluation),
-                        options.restarts,
-                        world);
-  if (progress.finished_count() > 0)
-    cli::info(world,
-              "case " + study_case.name + ": goes on after " +
-                  std::to_string(progress.finished_count()) + " finished registrations");
-  for (Method& method : methods)
-    register_with(method, study_case.name, evaluation.starts, yardstick, world, progress);
+  std::vector<MethodRows> registered;
+  for (Method& method : methods) {
+    registered.push_back({method.renderer,
+                          method.start_indices,
+                          {{progress_folder(options.output_folder),
+                            file_name_part(study_case.name) + "-" + method.renderer,
+                            deciding_values(options, evaluation),
+                            options.restarts},
+                           world}});
+    register_with(method, study_case.name, evaluation.starts, yardstick, registered.back().items);
+  }
   // Rows take their place: memory holds one or the other.
   evaluation.starts.starts = {};
   all_or_none(world, [&] {
     if (!world.is_root()) return;
     draw_xrays(methods.front().runner.problem(), options.output_folder, evaluation);
     draw_overlays(methods.front(),
-                  chosen_rows(methods.front().renderer, progress),
+                  chosen_rows(registered.front()),
                   study_case,
                   yardstick,
                   options.output_folder,
                   evaluation);
   });
-  std::vector<MethodStarts> registered;
-  for (Method& method : methods)
-    registered.push_back({method.renderer, std::move(method.start_indices)});
   // Rows take the place of fields and CT: memory holds one or the other.
   methods.clear();
   all_or_none(world, [&] {
     if (!world.is_root()) return;
-    evaluation.rows = rows_of(registered, progress);
-    for (const MethodStarts& method : registered)
-      keep_first_traces(evaluation.rows, method.renderer);
+    evaluation.rows = rows_of(registered);
+    for (const MethodRows& method : registered) keep_first_traces(evaluation.rows, method.renderer);
   });
   return evaluation;
 }

@@ -6,12 +6,14 @@
 #include <filesystem>
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <set>
 #include <sstream>
 
 #include "base/error.h"
 #include "cli/app_main.h"
 #include "cli/progress_printer.h"
+#include "cli/stop_request.h"
 #include "drr/ray_cast_drr.h"
 #include "drr/two_pass_af_drr.h"
 #include "evaluate/difference_images_program.h"
@@ -23,6 +25,7 @@
 #include "io/gnuplot_figure.h"
 #include "io/node_ct.h"
 #include "io/output_file.h"
+#include "io/output_lock.h"
 #include "io/provenance.h"
 #include "io/study_file.h"
 #include "precompute/precompute_program.h"
@@ -89,12 +92,14 @@ std::shared_ptr<const CompressedAttenuationField> field_of(const PrecomputeOptio
 std::vector<DrrComparison> compare(const FieldParametersOptions& options,
                                    const std::shared_ptr<const CompressedAttenuationField>& field,
                                    const RayCastDrr& reference,
+                                   const cli::UnfinishedWork& unfinished,
                                    const Communicator& world) {
   const TwoPassAfDrr tested(field);
   DrrComparer comparer(tested, reference, View::whole_detector(field->identity.camera));
   std::vector<DrrComparison> comparisons(static_cast<std::size_t>(options.pose_count));
   collect_rows(
       world,
+      unfinished,
       options.pose_count,
       "",
       [&](std::int64_t index) {
@@ -107,6 +112,13 @@ std::vector<DrrComparison> compare(const FieldParametersOptions& options,
         comparisons[static_cast<std::size_t>(index)] = comparison_of(row);
       });
   return comparisons;
+}
+
+/// What decides the comparisons of one field.
+std::string comparison_toml(const FieldParametersOptions& options) {
+  return "pose_count = " + std::to_string(options.pose_count) +
+         "\ndrr_step_mm = " + number_text(options.drr_step_mm) +
+         "\npose_seed = " + std::to_string(options.seed) + "\n";
 }
 
 std::string to_toml(const FieldParametersOptions& options) {
@@ -122,9 +134,7 @@ std::string to_toml(const FieldParametersOptions& options) {
   list("sweep_st_nodes", options.st_nodes);
   list("sweep_codewords", options.codewords);
   list("sweep_training_fraction", options.training_fractions);
-  out << "pose_count = " << options.pose_count
-      << "\ndrr_step_mm = " << number_text(options.drr_step_mm) << "\npose_seed = " << options.seed
-      << '\n';
+  out << comparison_toml(options);
   return out.str();
 }
 
@@ -206,8 +216,10 @@ void sweep_target(const FieldParametersOptions& options,
   for (const std::string& text : warnings) cli::warn(world, text);
   const RayCastDrr reference(ct.volume, {options.drr_step_mm});
   std::vector<PrecomputeOptions> settings = settings_of(options, target.base);
-  for (PrecomputeOptions& setting : settings)
+  for (PrecomputeOptions& setting : settings) {
     setting.output = (fields / field_name(setting)).string();
+    setting.is_restart = options.restarts;
+  }
   using Clock = std::chrono::steady_clock;
   for (const PrecomputeOptions& setting : settings) {
     const bool is_made = !std::filesystem::exists(setting.output);
@@ -226,7 +238,16 @@ void sweep_target(const FieldParametersOptions& options,
     result.uncompressed_bytes = uncompressed_bytes_of(setting);
     read_creation(result);
     const Clock::time_point compared = Clock::now();
-    result.comparisons = compare(options, field, reference, world);
+    result.comparisons = compare(options,
+                                 field,
+                                 reference,
+                                 {progress_folder(options.output_folder),
+                                  field_name(setting),
+                                  deciding_values(comparison_toml(options),
+                                                  {{"the field", result.info.payload_sha256},
+                                                   {"the CT", ct.facts.content_sha256}}),
+                                  options.restarts},
+                                 world);
     if (is_made && &setting == &settings.front())
       announce_rest(settings,
                     std::chrono::duration<double>(compared - start).count(),
@@ -308,6 +329,7 @@ CLI::App* bind_field_parameters(CLI::App& app, FieldParametersOptions& options) 
   command->add_option("--fields",
                       options.fields_folder,
                       "Where fields are kept and looked for (default: OUTPUT/fields)");
+  cli::bind_resume(*command, options.restarts);
   command->add_option("-o,--output", options.output_folder, "Folder for the results")->required();
   return command;
 }
@@ -317,15 +339,18 @@ void run_field_parameters(const FieldParametersOptions& options,
                           const Communicator& world) {
   const std::filesystem::path fields =
       options.fields_folder.empty() ? options.output_folder / "fields" : options.fields_folder;
+  std::optional<OutputLock> lock;
   const std::vector<Target> targets = all_or_none(world, [&] {
     throw_if_any(problems(options));
     if (world.is_root()) {
       require_gnuplot();
       make_output_folder(options.output_folder);
+      lock.emplace(options.output_folder);
       make_output_folder(fields);
     }
     return targets_of(options);
   });
+  cli::listen_for_stop_requests();
   Provenance provenance = {"af-evaluate field-parameters",
                            command_line,
                            to_toml(options),
@@ -338,7 +363,9 @@ void run_field_parameters(const FieldParametersOptions& options,
   const json difference_images =
       write_difference_images(results, options.drr_step_mm, options.output_folder, world);
   all_or_none(world, [&] {
-    if (world.is_root()) write_results(options, results, difference_images, provenance);
+    if (!world.is_root()) return;
+    write_results(options, results, difference_images, provenance);
+    std::filesystem::remove_all(progress_folder(options.output_folder));
   });
 }
 

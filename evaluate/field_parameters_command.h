@@ -24,6 +24,7 @@ struct FieldParametersOptions {
   double drr_step_mm = 1.0;  ///< of the reference DRRs
   std::uint64_t seed = 1;
   std::filesystem::path fields_folder;  ///< empty: OUTPUT/fields
+  bool restarts = false;
   std::filesystem::path output_folder;
 };
 

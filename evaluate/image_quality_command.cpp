@@ -6,11 +6,13 @@
 #include <iomanip>
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <sstream>
 #include <tuple>
 
 #include "base/error.h"
 #include "cli/app_main.h"
+#include "cli/stop_request.h"
 #include "drr/field_renderer.h"
 #include "drr/ray_cast_drr.h"
 #include "evaluate/figure_files.h"
@@ -24,9 +26,11 @@
 #include "io/gnuplot_figure.h"
 #include "io/node_ct.h"
 #include "io/output_file.h"
+#include "io/output_lock.h"
 #include "io/picture.h"
 #include "io/pose_file.h"
 #include "io/provenance.h"
+#include "io/sha256.h"
 #include "io/study_file.h"
 
 namespace af::evaluation {
@@ -237,6 +241,7 @@ std::vector<LossSplit> split_losses(const ImageQualityOptions& options,
                                     const DrrRenderer& field,
                                     const DrrRenderer& reference,
                                     DrrComparer& comparer,
+                                    const cli::UnfinishedWork& unfinished,
                                     const Communicator& world) {
   const std::int64_t count =
       std::min<std::int64_t>(options.split_loss_poses, setup.pose_count(options));
@@ -246,6 +251,7 @@ std::vector<LossSplit> split_losses(const ImageQualityOptions& options,
       field, reference, setup.ct.volume, {options.step_mm}, setup.field->light_slab, setup.view);
   collect_rows(
       world,
+      unfinished,
       count,
       "losses split",
       [&](std::int64_t index) -> json {
@@ -271,6 +277,24 @@ TargetResult evaluate_target(const ImageQualityOptions& options,
   const auto field = make_field_renderer(setup.field, options.look_up);
   const RayCastDrr ray_cast(setup.ct.volume, {options.step_mm});
   DrrComparer comparer(*field, ray_cast, setup.view);
+  Provenance provenance = {"af-evaluate image-quality",
+                           command_line,
+                           to_toml(options),
+                           options.seed,
+                           world.size(),
+                           {{"field " + setup.view.camera.name, setup.field_info.payload_sha256},
+                            {"ct", setup.ct.facts.content_sha256}}};
+  all_or_none(world, [&] {
+    if (world.is_root() && !options.poses.empty())
+      provenance.input_sha256["poses"] = sha256_of_file(options.poses.string());
+  });
+  const std::string name = target.folder.filename().string();
+  const auto unfinished = [&](const std::string& what) -> cli::UnfinishedWork {
+    return {progress_folder(options.output_folder),
+            name + what,
+            deciding_values(provenance.options_toml, provenance.input_sha256),
+            options.restarts};
+  };
   const std::int64_t count = setup.pose_count(options);
   TargetResult result{target.case_name, setup.view.camera.name, {}, {}};
   result.comparisons.resize(static_cast<std::size_t>(count));
@@ -278,6 +302,7 @@ TargetResult evaluate_target(const ImageQualityOptions& options,
       world, "poses compared", count, [&] { std::ignore = compare(options, setup, comparer, 0); });
   collect_rows(
       world,
+      unfinished("-poses"),
       count,
       "poses compared",
       [&](std::int64_t index) { return comparison_row(compare(options, setup, comparer, index)); },
@@ -285,15 +310,7 @@ TargetResult evaluate_target(const ImageQualityOptions& options,
         result.comparisons[static_cast<std::size_t>(index)] = comparison_of(row);
       });
   const std::vector<LossSplit> splits =
-      split_losses(options, setup, *field, ray_cast, comparer, world);
-  const Provenance provenance = {
-      "af-evaluate image-quality",
-      command_line,
-      to_toml(options),
-      options.seed,
-      world.size(),
-      {{"field " + setup.view.camera.name, setup.field_info.payload_sha256},
-       {"ct", setup.ct.facts.content_sha256}}};
+      split_losses(options, setup, *field, ray_cast, comparer, unfinished("-losses"), world);
   all_or_none(world, [&] {
     if (world.is_root())
       write_results(options, target, setup, comparer, splits, result, provenance);
@@ -414,6 +431,7 @@ CLI::App* bind_image_quality(CLI::App& app, ImageQualityOptions& options) {
   command->add_option(
       "--series", options.series_uid, "DICOM series UID, when the folder has several");
   command->add_option("--seed", options.seed, "Of the random poses")->capture_default_str();
+  cli::bind_resume(*command, options.restarts);
   command->add_option("-o,--output", options.output_folder, "Folder for the results")->required();
   return command;
 }
@@ -421,19 +439,24 @@ CLI::App* bind_image_quality(CLI::App& app, ImageQualityOptions& options) {
 void run_image_quality(const ImageQualityOptions& options,
                        const std::string& command_line,
                        const Communicator& world) {
+  std::optional<OutputLock> lock;
   const std::vector<Target> targets = all_or_none(world, [&] {
     throw_if_any(problems(options));
     if (world.is_root()) {
       require_gnuplot();
       make_output_folder(options.output_folder);
+      lock.emplace(options.output_folder);
     }
     return targets_of(options);
   });
+  cli::listen_for_stop_requests();
   std::vector<TargetResult> results;
   for (const Target& target : targets)
     results.push_back(evaluate_target(options, target, command_line, world));
   all_or_none(world, [&] {
-    if (world.is_root() && !options.study.empty()) write_together(results, options.output_folder);
+    if (!world.is_root()) return;
+    if (!options.study.empty()) write_together(results, options.output_folder);
+    std::filesystem::remove_all(progress_folder(options.output_folder));
   });
 }
 

@@ -25,6 +25,7 @@ struct ImageQualityOptions {
   double step_mm = 1.0;
   std::string series_uid;
   std::uint64_t seed = 1;
+  bool restarts = false;
   std::filesystem::path output_folder;
 };
 

@@ -14,7 +14,6 @@
 #include "cli/app_main.h"
 #include "cli/stop_request.h"
 #include "evaluate/case_evaluation_program.h"
-#include "evaluate/case_progress_program.h"
 #include "evaluate/case_table_files.h"
 #include "evaluate/failed_start_files.h"
 #include "evaluate/failure_trace_files.h"
@@ -26,6 +25,7 @@
 #include "io/gnuplot_figure.h"
 #include "io/output_file.h"
 #include "io/output_lock.h"
+#include "io/progress_manifest.h"
 #include "io/provenance.h"
 #include "io/sha256.h"
 
@@ -353,10 +353,7 @@ CLI::App* bind_registration(CLI::App& app, RegistrationStudyOptions& options) {
       ->capture_default_str();
   command->add_option("--seed", options.method.seed, "Of the starts, and of what cma-es draws")
       ->capture_default_str();
-  command->add_flag("--restart",
-                    options.restarts,
-                    "Throw away what a stopped or killed run has finished (OUTPUT.progress)");
-  cli::bind_run_limits(*command);
+  cli::bind_resume(*command, options.restarts);
   command->add_option("-o,--output", options.output_folder, "Folder for the results")->required();
   command->parse_complete_callback([&options, command] {
     options.shared_by_repeats = cli::given_options(*command, kNotOfRepeats);

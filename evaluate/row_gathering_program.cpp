@@ -4,43 +4,40 @@
 #include <chrono>
 #include <cstddef>
 #include <exception>
-#include <optional>
+#include <numeric>
 #include <span>
 #include <vector>
 
+#include "base/error.h"
 #include "cli/app_main.h"
 #include "cli/progress_printer.h"
-#include "parallel/work_queue.h"
-#include "parallel/work_watch.h"
+#include "io/cbor_json.h"
 
 namespace af::evaluation {
 
 using nlohmann::json;
 
 void collect_rows(const Communicator& world,
+                  const cli::UnfinishedWork& unfinished,
                   std::int64_t count,
                   const std::string& what,
                   const std::function<json(std::int64_t item)>& row_of_item,
                   const std::function<void(std::int64_t item, const json& row)>& receive) {
-  std::optional<cli::ProgressPrinter> printer;
-  if (!what.empty()) printer.emplace(what, world.is_root());
-  collect_items(
-      world,
-      count,
-      [&](std::int64_t item) {
-        const WorkNote note((what.empty() ? "" : what + ", ") + "item " + std::to_string(item + 1) +
-                            " of " + std::to_string(count));
-        const std::vector<std::uint8_t> packed = json::to_cbor(row_of_item(item));
-        const auto bytes = std::as_bytes(std::span(packed));
-        return std::vector<std::byte>(bytes.begin(), bytes.end());
-      },
-      [&](std::int64_t item, std::span<const std::byte> bytes) {
-        const auto* const first = reinterpret_cast<const std::uint8_t*>(bytes.data());
-        receive(item, json::from_cbor(first, first + bytes.size()));
-      },
-      [&](std::int64_t done) {
-        if (printer) printer->update(static_cast<double>(done), static_cast<double>(count));
-      });
+  cli::ResumableItems items(unfinished, world);
+  std::vector<std::int64_t> all(static_cast<std::size_t>(count));
+  std::iota(all.begin(), all.end(), 0);
+  items.complete(all, what, [&](std::int64_t item) { return cbor_bytes(row_of_item(item)); });
+  all_or_none(world, [&] {
+    if (!world.is_root()) return;
+    items.visit([&](std::int64_t item, std::span<const std::byte> row) {
+      try {
+        receive(item, json_of_cbor(row, unfinished.folder.string()));
+      } catch (const json::exception& error) {
+        throw FileError(unfinished.folder.string(),
+                        std::string("a record is no row: ") + error.what());
+      }
+    });
+  });
 }
 
 void announce_time(const Communicator& world,

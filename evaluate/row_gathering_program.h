@@ -6,14 +6,17 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "cli/resumable_items.h"
 #include "parallel/communicator.h"
 
 namespace af::evaluation {
 
-/// Collective. Shares items over the ranks as these become free; `receive` gets each item's row on
-/// rank 0 while the work goes on, in any order. Rows travel as CBOR: doubles keep every bit, NaN
-/// and infinity. Rank 0 prints the progress of `what`, unless that is empty.
+/// Collective. The rows of items 0 ... count - 1 that no earlier run has finished, shared over the
+/// ranks and kept (see ResumableItems); then `receive` gets every item's row on rank 0, in any
+/// order. Rows are kept as CBOR: doubles keep every bit, NaN and infinity. Rank 0 prints the
+/// progress of `what`, unless that is empty.
 void collect_rows(const Communicator& world,
+                  const cli::UnfinishedWork& unfinished,
                   std::int64_t count,
                   const std::string& what,
                   const std::function<nlohmann::json(std::int64_t item)>& row_of_item,

@@ -6,11 +6,13 @@
 #include <cmath>
 #include <iostream>
 #include <limits>
+#include <optional>
 #include <sstream>
 #include <tuple>
 
 #include "base/error.h"
 #include "cli/app_main.h"
+#include "cli/stop_request.h"
 #include "evaluate/figure_files.h"
 #include "evaluate/method_loading.h"
 #include "evaluate/row_gathering_program.h"
@@ -21,6 +23,7 @@
 #include "io/csv_table.h"
 #include "io/gnuplot_figure.h"
 #include "io/output_file.h"
+#include "io/output_lock.h"
 #include "io/provenance.h"
 #include "io/sha256.h"
 
@@ -73,6 +76,7 @@ std::vector<Curve> empty_curves(const SimilarityCurvesOptions& options) {
 /// queue hold work of one duration.
 void measure_curves(std::vector<LoadedMethod>& methods,
                     const PoseFrame& gold_frame,
+                    cli::UnfinishedWork unfinished,
                     const Communicator& world,
                     std::vector<Curve>& curves) {
   for (LoadedMethod& method : methods) {
@@ -86,8 +90,10 @@ void measure_curves(std::vector<LoadedMethod>& methods,
           std::ignore =
               method.runner.similarity_at(pose_from_parameters(gold_frame, PoseParameters()));
         });
+    unfinished.name = method.renderer;
     collect_rows(
         world,
+        unfinished,
         static_cast<std::int64_t>(items.size()),
         method.renderer + " similarities",
         [&](std::int64_t item) -> json {
@@ -263,6 +269,7 @@ CLI::App* bind_similarity_curves(CLI::App& app, SimilarityCurvesOptions& options
       ->capture_default_str();
   command->add_option("--curve-step-deg", options.curve_step_deg, "Step of rotations, degrees")
       ->capture_default_str();
+  cli::bind_resume(*command, options.restarts);
   command->add_option("-o,--output", options.output_folder, "Folder for the results")->required();
   return command;
 }
@@ -272,14 +279,17 @@ void run_similarity_curves(const SimilarityCurvesOptions& options,
                            const Communicator& world) {
   const std::filesystem::path& folder = options.output_folder;
   std::vector<std::string> warnings;
+  std::optional<OutputLock> lock;
   const Study study = all_or_none(world, [&] {
     throw_if_any(problems(options));
     if (world.is_root()) {
       require_gnuplot();
       make_output_folder(folder);
+      lock.emplace(folder);
     }
     return read_study(options.study, &warnings);
   });
+  cli::listen_for_stop_requests();
   for (const std::string& text : warnings) cli::warn(world, text);
   const StudyCase study_case =
       all_or_none(world, [&] { return study.find_case(options.case_name); });
@@ -289,12 +299,20 @@ void run_similarity_curves(const SimilarityCurvesOptions& options,
       "af-evaluate similarity-curves", command_line, to_toml(options), 0, world.size(), {}};
   std::vector<LoadedMethod> methods =
       load_methods(options, study, study_case, world, provenance.input_sha256);
+  all_or_none(world, [&] {
+    if (world.is_root()) provenance.input_sha256["study"] = sha256_of_file(study.path.string());
+  });
   std::vector<Curve> curves = empty_curves(options);
-  measure_curves(
-      methods, PoseFrame::about(gold.room_from_ct, study_case.center_ct_mm), world, curves);
+  measure_curves(methods,
+                 PoseFrame::about(gold.room_from_ct, study_case.center_ct_mm),
+                 {progress_folder(folder),
+                  "",
+                  deciding_values(provenance.options_toml, provenance.input_sha256),
+                  options.restarts},
+                 world,
+                 curves);
   all_or_none(world, [&] {
     if (!world.is_root()) return;
-    provenance.input_sha256["study"] = sha256_of_file(study.path.string());
     find_peaks(curves);
     const double radius_mm = rms_radius_mm(study_case.target_box_ct, study_case.center_ct_mm);
     write_text_file(folder / "similarity-curves.csv", curves_table(curves).to_text());
@@ -318,6 +336,7 @@ void run_similarity_curves(const SimilarityCurvesOptions& options,
     summary["provenance"] = af::to_json(provenance);
     // Last: when it is there, everything is.
     write_text_file(folder / "summary.json", summary.dump(2) + "\n");
+    std::filesystem::remove_all(progress_folder(folder));
     print_maxima(curves, summary["renderers"]);
     std::cout << "results: " << folder.string() << '\n';
   });

@@ -22,6 +22,7 @@ struct SimilarityCurvesOptions : MethodOptions {
   double half_width_deg = 5.0;
   double curve_step_mm = 0.1;
   double curve_step_deg = 0.1;
+  bool restarts = false;
   std::filesystem::path output_folder;
 };
 

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <filesystem>
 #include <iostream>
 #include <optional>
 #include <string>
 
 #include "base/error.h"
 #include "cli/app_main.h"
-#include "cli/progress_printer.h"
+#include "cli/stop_request.h"
 #include "io/csv_table.h"
 #include "io/output_file.h"
 #include "io/output_lock.h"
@@ -20,60 +21,6 @@ namespace {
 
 using af::Communicator;
 using af::registration::RegisterOptions;
-
-void bind_start(CLI::App& app, RegisterOptions& options) {
-  app.add_option("--start-rotation-deg",
-                 options.start_rotation_deg,
-                 "Start: rx,ry,rz about the room's axes through the ROI centre, degrees, relative "
-                 "to the case's nominal pose (default 0,0,0)")
-      ->delimiter(',');
-  app.add_option("--start-translation-mm",
-                 options.start_translation_mm,
-                 "Start: tx,ty,tz along the room's axes, mm, relative to nominal (default 0,0,0)")
-      ->delimiter(',');
-  app.add_option("--start-pose",
-                 options.start_pose,
-                 "Start: file with room_from_ct (TOML, JSON, ITK .tfm or 16 numbers)");
-  app.add_option("--starts",
-                 options.starts,
-                 "CSV of many starts: rx_deg,ry_deg,rz_deg,tx_mm,ty_mm,tz_mm relative to nominal, "
-                 "or m00 ... m23 of room_from_ct; under mpirun the ranks share them");
-}
-
-void bind_renderer(CLI::App& app, RegisterOptions& options) {
-  app.add_option("--renderer",
-                 options.renderer,
-                 "How DRRs are made: 'field' looks them up, 'raycast' casts rays through the CT")
-      ->check(CLI::IsMember({"field", "raycast"}))
-      ->capture_default_str();
-  bind_method(app, options.method);
-  app.add_option("--seed", options.method.seed, "Of the random numbers that cma-es draws")
-      ->capture_default_str();
-}
-
-void bind_options(CLI::App& app, RegisterOptions& options) {
-  app.add_option("--study", options.study, "study.toml: rig, cases, X-rays")->required();
-  app.add_option(
-      "--case", options.case_name, "Case of the study (may be left out when it has one)");
-  app.add_option("--field",
-                 options.fields,
-                 "CAMERA=FIELD.h5, once per camera; replaces the study's `field`")
-      ->allow_extra_args(false);
-  bind_renderer(app, options);
-  bind_start(app, options);
-  app.add_option("--water-mu-per-mm",
-                 options.water_mu_per_mm,
-                 "Attenuation of water, 1/mm, for ray casting (a field has its own)")
-      ->capture_default_str();
-  app.add_option("--step-mm", options.step_mm, "Longest step of ray casting, mm")
-      ->capture_default_str();
-  app.add_option(
-      "--series", options.series_uid, "DICOM series UID, when the CT's folder has several");
-  app.add_flag("--skip-ct-check",
-               options.skip_ct_check,
-               "Do not read the CT (it may be absent): fields are trusted to be of this case");
-  app.add_option("-o,--output", options.output_folder, "Folder for the results")->required();
-}
 
 void run(const RegisterOptions& options,
          const std::string& command_line,
@@ -108,28 +55,36 @@ void run(const RegisterOptions& options,
     lock.emplace(options.output_folder);
   });
 
-  af::cli::ProgressPrinter printer("registrations", world.is_root() && starts.size() > 1);
-  const auto total = static_cast<double>(starts.size());
+  af::cli::listen_for_stop_requests();
+  RunDescription description{study_case.name, options.renderer, {}};
+  description.provenance = {"af-register",
+                            command_line,
+                            to_toml(options, method),
+                            options.method.seed,
+                            world.size(),
+                            loaded.input_sha256};
+  auto& input_sha256 = description.provenance.input_sha256;
+  af::all_or_none(world, [&] {
+    if (world.is_root()) input_sha256.merge(hashes_of_files(options));
+  });
   std::vector<RegistrationRecord> records =
-      register_starts(runner, starts, world, [&](std::int64_t done) {
-        printer.update(static_cast<double>(done), total);
-      });
+      register_starts(runner,
+                      starts,
+                      {af::progress_folder(options.output_folder),
+                       "registrations",
+                       af::deciding_values(description.provenance.options_toml, input_sha256),
+                       options.restarts},
+                      world);
   af::all_or_none(world, [&] {
     if (!world.is_root()) return;
     add_target_errors(gold, study_case.target_box_ct, records);
-    RunDescription description{study_case.name, options.renderer, {}};
-    description.provenance = {"af-register",
-                              command_line,
-                              to_toml(options, method),
-                              options.method.seed,
-                              world.size(),
-                              loaded.input_sha256};
     // Before result.json: when that is there, everything is.
     write_slicer_folder(*loaded.problem,
                         records[best_record(records)].result.room_from_ct,
                         study_case,
                         options.output_folder / "slicer");
     std::cout << write_run(records, *loaded.problem, description, options.output_folder);
+    std::filesystem::remove_all(af::progress_folder(options.output_folder));
   });
 }
 

@@ -5,14 +5,16 @@
 #include <array>
 #include <cstddef>
 #include <cstring>
+#include <numeric>
+#include <optional>
 #include <type_traits>
 
-#include "parallel/work_queue.h"
+#include "base/error.h"
 
 namespace af::registration {
 namespace {
 
-/// A record without its trace as plain numbers, to be sent between ranks.
+/// A record without its trace as plain numbers.
 struct PlainRecord {
   std::int64_t start_index;
   std::array<double, 16> start_room_from_ct;
@@ -98,64 +100,72 @@ TraceRow trace_row_of(const PlainTraceRow& from) {
   return row;
 }
 
-/// Collective. All ranks' values on rank 0, in rank order.
-template <typename T>
-std::vector<T> gather_values(const Communicator& communicator, const std::vector<T>& mine) {
-  std::vector<T> all;
-  for (const std::vector<std::byte>& bytes : communicator.gather(std::as_bytes(std::span(mine)))) {
-    const std::size_t first = all.size();
-    all.resize(first + bytes.size() / sizeof(T));
-    if (!bytes.empty()) std::memcpy(all.data() + first, bytes.data(), bytes.size());
-  }
-  return all;
+/// As it is kept: the record, then its trace.
+std::vector<std::byte> bytes_of(const RegistrationRecord& record) {
+  const PlainRecord head = plain(record);
+  const std::vector<PlainTraceRow> rows = plain(record.result.trace);
+  std::vector<std::byte> bytes(sizeof(head) + rows.size() * sizeof(PlainTraceRow));
+  std::memcpy(bytes.data(), &head, sizeof(head));
+  std::memcpy(bytes.data() + sizeof(head), rows.data(), bytes.size() - sizeof(head));
+  return bytes;
 }
 
-/// Collective. Moves the best record's trace from the rank that has it to rank 0.
-void collect_best_trace(const Communicator& communicator,
-                        const RegistrationRecord& my_best,
-                        bool has_best,
-                        std::vector<RegistrationRecord>& records) {
-  std::array<std::uint64_t, 1> best_index{0};
-  if (communicator.is_root())
-    best_index[0] = static_cast<std::uint64_t>(records[best_record(records)].start_index);
-  communicator.maximum(best_index);
-  const bool is_mine = has_best && static_cast<std::uint64_t>(my_best.start_index) == best_index[0];
-  const std::vector<PlainTraceRow> rows = gather_values(
-      communicator, is_mine ? plain(my_best.result.trace) : std::vector<PlainTraceRow>());
-  if (!communicator.is_root()) return;
-  for (const PlainTraceRow& row : rows)
-    records[best_index[0]].result.trace.push_back(trace_row_of(row));
+RegistrationRecord record_of(std::span<const std::byte> bytes) {
+  PlainRecord head;
+  if (bytes.size() < sizeof(head) || (bytes.size() - sizeof(head)) % sizeof(PlainTraceRow) != 0)
+    throw FileError("unfinished registrations",
+                    "a record is of another size: start over with --restart");
+  std::memcpy(&head, bytes.data(), sizeof(head));
+  RegistrationRecord record = record_of(head);
+  bytes = bytes.subspan(sizeof(head));
+  for (; !bytes.empty(); bytes = bytes.subspan(sizeof(PlainTraceRow))) {
+    PlainTraceRow row;
+    std::memcpy(&row, bytes.data(), sizeof(row));
+    record.result.trace.push_back(trace_row_of(row));
+  }
+  return record;
+}
+
+/// Rank 0: the records of all starts; the best keeps its trace.
+std::vector<RegistrationRecord> records_of(const cli::ResumableItems& items, std::size_t count) {
+  std::vector<RegistrationRecord> records(count);
+  std::optional<RegistrationRecord> best;
+  items.visit([&](std::int64_t index, std::span<const std::byte> bytes) {
+    RegistrationRecord record = record_of(bytes);
+    record.start_index = index;
+    if (!best.has_value() || is_better(record, *best)) best = record;
+    record.result.trace.clear();
+    records[static_cast<std::size_t>(index)] = std::move(record);
+  });
+  if (best.has_value()) records[best_record(records)].result.trace = best->result.trace;
+  return records;
 }
 
 }  // namespace
 
-std::vector<RegistrationRecord> register_starts(
-    RegistrationRunner& runner,
-    std::span<const RigidTransform> starts,
-    const Communicator& communicator,
-    const std::function<void(std::int64_t done)>& on_progress) {
-  if (starts.empty()) return {};
-  std::vector<PlainRecord> mine;
-  RegistrationRecord my_best;
-  bool has_best = false;
-  const auto work = [&](std::int64_t index) {
-    RegistrationRecord record;
-    record.start_index = index;
-    record.result = runner.run(starts[static_cast<std::size_t>(index)], index);
-    mine.push_back(plain(record));
-    if (has_best && !is_better(record, my_best)) return;
-    my_best = std::move(record);
-    has_best = true;
+std::vector<RegistrationRecord> register_starts(RegistrationRunner& runner,
+                                                std::span<const RigidTransform> starts,
+                                                const cli::UnfinishedWork& unfinished,
+                                                const Communicator& communicator) {
+  const auto run = [&](std::int64_t index) {
+    return RegistrationRecord{
+        index, runner.run(starts[static_cast<std::size_t>(index)], index), std::nullopt};
   };
-  for_each_item(communicator, static_cast<std::int64_t>(starts.size()), work, on_progress);
-
   std::vector<RegistrationRecord> records;
-  for (const PlainRecord& from : gather_values(communicator, mine))
-    records.push_back(record_of(from));
-  std::sort(records.begin(), records.end(), [](const auto& a, const auto& b) {
-    return a.start_index < b.start_index;
+  if (starts.empty()) return records;
+  if (starts.size() == 1) {
+    all_or_none(communicator, [&] {
+      if (communicator.is_root()) records.push_back(run(0));
+    });
+    return records;
+  }
+  cli::ResumableItems items(unfinished, communicator);
+  std::vector<std::int64_t> all(starts.size());
+  std::iota(all.begin(), all.end(), 0);
+  items.complete(all, "registrations", [&](std::int64_t index) { return bytes_of(run(index)); });
+  all_or_none(communicator, [&] {
+    if (communicator.is_root()) records = records_of(items, starts.size());
   });
-  collect_best_trace(communicator, my_best, has_best, records);
   return records;
 }
 

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstdint>
-#include <functional>
 #include <span>
 #include <vector>
 
+#include "cli/resumable_items.h"
 #include "parallel/communicator.h"
 #include "register/registration.h"
 #include "register/result_files.h"
@@ -13,13 +12,13 @@
 namespace af::registration {
 
 /// Collective. Registers from every start, the starts shared over the ranks as these become free.
-/// Rank 0 returns one record per start, in the order of starts; the others return none. Only the
-/// record of the highest similarity (ties: the lowest start index) keeps its trace, so that memory
-/// does not grow with the number of starts. `on_progress` is called on rank 0 with the number done.
-std::vector<RegistrationRecord> register_starts(
-    RegistrationRunner& runner,
-    std::span<const RigidTransform> starts,
-    const Communicator& communicator,
-    const std::function<void(std::int64_t done)>& on_progress = {});
+/// Of several starts the finished ones are kept (see ResumableItems): a stopped or killed run
+/// goes on. Rank 0 returns one record per start, in the order of starts; the others return none.
+/// Only the record of the highest similarity (ties: the lowest start index) keeps its trace, so
+/// that memory does not grow with the number of starts.
+std::vector<RegistrationRecord> register_starts(RegistrationRunner& runner,
+                                                std::span<const RigidTransform> starts,
+                                                const cli::UnfinishedWork& unfinished,
+                                                const Communicator& communicator);
 
 }  // namespace af::registration

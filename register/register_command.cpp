@@ -5,8 +5,11 @@
 #include <sstream>
 
 #include "base/error.h"
+#include "cli/stop_request.h"
 #include "io/csv_table.h"
 #include "io/pose_file.h"
+#include "io/sha256.h"
+#include "register/method_command.h"
 
 namespace af::registration {
 namespace {
@@ -32,7 +35,62 @@ std::string triple(const std::array<double, 3>& values) {
          number_text(values[2]) + "]";
 }
 
+void bind_start(CLI::App& app, RegisterOptions& options) {
+  app.add_option("--start-rotation-deg",
+                 options.start_rotation_deg,
+                 "Start: rx,ry,rz about the room's axes through the ROI centre, degrees, relative "
+                 "to the case's nominal pose (default 0,0,0)")
+      ->delimiter(',');
+  app.add_option("--start-translation-mm",
+                 options.start_translation_mm,
+                 "Start: tx,ty,tz along the room's axes, mm, relative to nominal (default 0,0,0)")
+      ->delimiter(',');
+  app.add_option("--start-pose",
+                 options.start_pose,
+                 "Start: file with room_from_ct (TOML, JSON, ITK .tfm or 16 numbers)");
+  app.add_option("--starts",
+                 options.starts,
+                 "CSV of many starts: rx_deg,ry_deg,rz_deg,tx_mm,ty_mm,tz_mm relative to nominal, "
+                 "or m00 ... m23 of room_from_ct; under mpirun the ranks share them");
+}
+
+void bind_renderer(CLI::App& app, RegisterOptions& options) {
+  app.add_option("--renderer",
+                 options.renderer,
+                 "How DRRs are made: 'field' looks them up, 'raycast' casts rays through the CT")
+      ->check(CLI::IsMember({"field", "raycast"}))
+      ->capture_default_str();
+  bind_method(app, options.method);
+  app.add_option("--seed", options.method.seed, "Of the random numbers that cma-es draws")
+      ->capture_default_str();
+}
+
 }  // namespace
+
+void bind_options(CLI::App& app, RegisterOptions& options) {
+  app.add_option("--study", options.study, "study.toml: rig, cases, X-rays")->required();
+  app.add_option(
+      "--case", options.case_name, "Case of the study (may be left out when it has one)");
+  app.add_option("--field",
+                 options.fields,
+                 "CAMERA=FIELD.h5, once per camera; replaces the study's `field`")
+      ->allow_extra_args(false);
+  bind_renderer(app, options);
+  bind_start(app, options);
+  app.add_option("--water-mu-per-mm",
+                 options.water_mu_per_mm,
+                 "Attenuation of water, 1/mm, for ray casting (a field has its own)")
+      ->capture_default_str();
+  app.add_option("--step-mm", options.step_mm, "Longest step of ray casting, mm")
+      ->capture_default_str();
+  app.add_option(
+      "--series", options.series_uid, "DICOM series UID, when the CT's folder has several");
+  app.add_flag("--skip-ct-check",
+               options.skip_ct_check,
+               "Do not read the CT (it may be absent): fields are trusted to be of this case");
+  cli::bind_resume(app, options.restarts);
+  app.add_option("-o,--output", options.output_folder, "Folder for the results")->required();
+}
 
 std::vector<std::string> problems(const RegisterOptions& options) {
   std::vector<std::string> found;
@@ -95,6 +153,12 @@ std::vector<RigidTransform> start_poses(const RegisterOptions& options, const Po
       values[i + 3] = (*options.start_translation_mm)[i];
   }
   return {pose_from_parameters(frame, PoseParameters::from_deg_and_mm(values))};
+}
+
+std::map<std::string, std::string> hashes_of_files(const RegisterOptions& options) {
+  std::map<std::string, std::string> hashes = {{"study", sha256_of_file(options.study.string())}};
+  if (!options.starts.empty()) hashes["starts"] = sha256_of_file(options.starts.string());
+  return hashes;
 }
 
 std::string to_toml(const RegisterOptions& options, const RegistrationOptions& registration) {

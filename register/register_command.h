@@ -4,9 +4,12 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
+
+#include <CLI/CLI.hpp>
 
 #include "register/case_loading.h"
 #include "register/method_options.h"
@@ -29,8 +32,12 @@ struct RegisterOptions {
   double step_mm = 1.0;
   std::string series_uid;
   bool skip_ct_check = false;
+  bool restarts = false;
   std::filesystem::path output_folder;
 };
+
+/// Adds the options to the program.
+void bind_options(CLI::App& app, RegisterOptions& options);
 
 /// All combinations and values that cannot be; empty when the options are sound.
 std::vector<std::string> problems(const RegisterOptions& options);
@@ -41,6 +48,9 @@ CaseLoadOptions case_load_options(const RegisterOptions& options, int coarsest_l
 /// The starts of a run: of --starts, or the one of --start-pose, or nominal with
 /// --start-rotation-deg and --start-translation-mm.
 std::vector<RigidTransform> start_poses(const RegisterOptions& options, const PoseFrame& frame);
+
+/// SHA-256 of the study and, if given, the file of starts, by name.
+std::map<std::string, std::string> hashes_of_files(const RegisterOptions& options);
 
 /// The options in force as TOML, presets resolved.
 std::string to_toml(const RegisterOptions& options, const RegistrationOptions& registration);

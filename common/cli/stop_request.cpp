@@ -70,6 +70,13 @@ void bind_run_limits(CLI::App& app) {
       ->capture_default_str();
 }
 
+void bind_resume(CLI::App& app, bool& restarts) {
+  app.add_flag("--restart",
+               restarts,
+               "Throw away what a stopped or killed run has finished (OUTPUT.progress)");
+  bind_run_limits(app);
+}
+
 bool is_stop_requested() {
   return stop_signal != 0 || is_time_over();
 }

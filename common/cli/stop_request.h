@@ -15,6 +15,10 @@ void listen_for_stop_requests();
 /// \test StopRequest.ComesWhenTheHoursAreOver
 void bind_run_limits(CLI::App& app);
 
+/// Adds --restart, --max-hours and --stall-minutes to a program, or a subcommand, whose unfinished
+/// work lies in progress_folder(OUTPUT).
+void bind_resume(CLI::App& app, bool& restarts);
+
 /// Whether such a signal has come to this rank, or its --max-hours are over. Ranks may answer
 /// differently for a moment: they must agree before a collective call depends on it. May be called
 /// from any thread.

@@ -41,6 +41,12 @@ class DepthCheck : public nlohmann::json_sax<json> {
 
 }  // namespace
 
+std::vector<std::byte> cbor_bytes(const json& value) {
+  const std::vector<std::uint8_t> packed = json::to_cbor(value);
+  const auto bytes = std::as_bytes(std::span(packed));
+  return {bytes.begin(), bytes.end()};
+}
+
 json json_of_cbor(std::span<const std::byte> bytes, const std::string& file) {
   const auto* const first = reinterpret_cast<const std::uint8_t*>(bytes.data());
   const auto* const last = first + bytes.size();

@@ -5,8 +5,12 @@
 #include <nlohmann/json.hpp>
 #include <span>
 #include <string>
+#include <vector>
 
 namespace af {
+
+/// A value as CBOR: doubles keep every bit, NaN and infinity.
+std::vector<std::byte> cbor_bytes(const nlohmann::json& value);
 
 /// The value of CBOR bytes from a file; FileError naming `file` when they are none, or nest deeper
 /// than 16 levels: the library's reader calls itself for every level, so that deep ones would

@@ -1,11 +1,48 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/progress_manifest.h"
 
+#include <sstream>
 #include <vector>
 
+#include "base/build_info.h"
 #include "base/error.h"
 
 namespace af {
+namespace {
+
+/// Lines "key = value"; lines of a list go with the line that began it, comments nowhere.
+DecidingValues values_of_lines(const std::string& toml) {
+  DecidingValues values;
+  std::string* last = nullptr;
+  std::istringstream lines(toml);
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with('#')) continue;
+    const std::size_t equals = line.find(" = ");
+    const bool begins = equals != std::string::npos && line.front() != ' ';
+    if (begins)
+      last = &(values[line.substr(0, equals)] = line.substr(equals + 3));
+    else if (last != nullptr)
+      *last += line;
+  }
+  return values;
+}
+
+}  // namespace
+
+std::filesystem::path progress_folder(const std::filesystem::path& output) {
+  std::filesystem::path folder = output.lexically_normal();
+  if (!folder.has_filename()) folder = folder.parent_path();
+  return folder += ".progress";
+}
+
+DecidingValues deciding_values(const std::string& options_toml,
+                               const std::map<std::string, std::string>& input_sha256) {
+  DecidingValues values = values_of_lines(options_toml);
+  values.erase("threads");
+  values["program version"] = program_version();
+  for (const auto& [name, hash] : input_sha256) values["SHA-256 of " + name] = hash;
+  return values;
+}
 
 void require_same(const DecidingValues& earlier,
                   const DecidingValues& now,

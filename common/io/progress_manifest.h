@@ -10,6 +10,14 @@ namespace af {
 /// What unfinished work is valid for: every option and input that decides its results.
 using DecidingValues = std::map<std::string, std::string>;
 
+/// "OUTPUT.progress", beside the output: where its unfinished work lies.
+std::filesystem::path progress_folder(const std::filesystem::path& output);
+
+/// What decides every result of a run: this program's version, the options in force as TOML (but
+/// `threads` and comments) and the inputs' SHA-256 by name.
+DecidingValues deciding_values(const std::string& options_toml,
+                               const std::map<std::string, std::string>& input_sha256);
+
 /// InputError that names every difference between what earlier work in `folder` was begun with and
 /// what is asked for now.
 void require_same(const DecidingValues& earlier,

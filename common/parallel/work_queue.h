@@ -1,11 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <span>
-#include <vector>
 
 #include "parallel/communicator.h"
 
@@ -30,15 +27,5 @@ std::int64_t block_size(std::int64_t items_left,
                         std::int64_t items_done,
                         int ranks,
                         double elapsed_seconds);
-
-/// for_each_item() whose items yield bytes. Rank 0 is given them while the work goes on, outside
-/// the working thread, in any order, each item once: a rank holds those of one small block only.
-/// When `receive` throws, that is as if `work` had. \test WorkQueue.GivesEveryResultToRankZeroOnce
-void collect_items(
-    const Communicator& communicator,
-    std::int64_t count,
-    const std::function<std::vector<std::byte>(std::int64_t item)>& work,
-    const std::function<void(std::int64_t item, std::span<const std::byte> result)>& receive,
-    const std::function<void(std::int64_t done)>& on_progress = {});
 
 }  // namespace af

@@ -20,6 +20,7 @@ table='
 ^common/gold/gold_standard_files[.] | gold io geometry base |
 ^common/gold/        | gold geometry base |
 ^common/parallel/    | parallel base | MPI
+^common/cli/resumable_items[.] | cli io parallel base |
 ^common/cli/         | cli parallel base | IOSTREAM
 ^common/io/(itk_image_io|dicom_pixels)[.] | io base | ITK
 ^common/io/(ct_reader|dicom_series|xray_reader)[.] | io volume image geometry base |

@@ -11,7 +11,7 @@
 #include "precompute/field_build_program.h"
 #include "precompute/planner.h"
 #include "precompute/training_files.h"
-#include "support/test_paths.h"
+#include "support/shared_folder.h"
 #include "volume/phantoms.h"
 
 namespace af {
@@ -21,25 +21,6 @@ namespace {
 // must give the same. From correctly rounded operations only.
 constexpr const char* kFrozenPayload =
     "f2f5b60b4f8945b3b23f57da9610fa7a21bf08e0b89d793507ac2bb447bec2b6";
-
-class SharedFolder {
- public:
-  SharedFolder() {
-    std::string path;
-    if (world_.is_root()) {
-      folder_ = std::make_unique<test::ScratchFolder>();
-      path = folder_->path().string();
-    }
-    world_.broadcast(path);
-    path_ = path;
-  }
-  std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
-
- private:
-  Communicator world_ = Communicator::world();
-  std::unique_ptr<test::ScratchFolder> folder_;
-  std::filesystem::path path_;
-};
 
 CtVolume small_ct() {
   CtGrid grid;
@@ -131,7 +112,7 @@ class FieldBuildTest : public testing::Test {
   static constexpr std::int64_t kUnitRays = 2 * 2 * 4 * 16;
 
   Communicator world_ = Communicator::world();
-  SharedFolder folder_;
+  test::SharedFolder folder_;
   AttenuationVolume volume_{small_ct(), AttenuationModel{}};
   AttenuationQuantizer quantizer_ =
       AttenuationQuantizer::for_maximum(volume_.max_total_attenuation());

@@ -12,32 +12,12 @@
 #include "base/hash_random.h"
 #include "io/field_file_access.h"
 #include "io/sha256.h"
-#include "support/test_paths.h"
+#include "support/shared_folder.h"
 
 namespace af {
 namespace {
 
 constexpr std::uint64_t kSeed = 5;
-
-/// A folder that all ranks share; rank 0 makes and removes it.
-class SharedFolder {
- public:
-  SharedFolder() {
-    std::string path;
-    if (world_.is_root()) {
-      folder_ = std::make_unique<test::ScratchFolder>();
-      path = folder_->path().string();
-    }
-    world_.broadcast(path);
-    path_ = path;
-  }
-  std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
-
- private:
-  Communicator world_ = Communicator::world();
-  std::unique_ptr<test::ScratchFolder> folder_;
-  std::filesystem::path path_;
-};
 
 /// Two slabs of odd and even sizes; numbers chosen to be exact.
 CompressedAttenuationField small_field() {
@@ -152,7 +132,7 @@ std::string refusal(const std::filesystem::path& path) {
 }
 
 TEST(FieldFile, ReadsBackWhatRanksWroteTogether) {
-  const SharedFolder folder;
+  const test::SharedFolder folder;
   const CompressedAttenuationField field = small_field();
   const FieldFileInfo written = write(field, folder / "a.af.h5");
   EXPECT_FALSE(std::filesystem::exists(folder / "a.af.h5.partial"));
@@ -188,14 +168,14 @@ TEST(FieldFile, ReadsBackWhatRanksWroteTogether) {
 }
 
 TEST(FieldFile, PayloadHashIsTheSameOnEveryRankCount) {
-  const SharedFolder folder;
+  const test::SharedFolder folder;
   // Frozen: made by this test on one rank with format version 1.
   EXPECT_EQ(write(small_field(), folder / "a.af.h5").payload_sha256,
             "c4d25e978a038a8745f6bf31cdafac62251aabc5e05d7d200ef51f96ca1d99f0");
 }
 
 TEST(FieldFile, MissingBlocksAreNoticedAndLeaveNoFile) {
-  const SharedFolder folder;
+  const test::SharedFolder folder;
   const Communicator world = Communicator::world();
   const CompressedAttenuationField field = small_field();
   auto blocks = all_blocks(field);
@@ -214,7 +194,7 @@ TEST(FieldFile, MissingBlocksAreNoticedAndLeaveNoFile) {
 }
 
 TEST(FieldFile, HintsToMpiIoDoNotChangeThePayload) {
-  const SharedFolder folder;
+  const test::SharedFolder folder;
   const Communicator world = Communicator::world();
   const CompressedAttenuationField field = small_field();
   const std::string expected = write(field, folder / "a.af.h5").payload_sha256;
@@ -225,7 +205,7 @@ TEST(FieldFile, HintsToMpiIoDoNotChangeThePayload) {
 }
 
 TEST(FieldFile, TheTestOfCollectiveWritesLeavesNothingAndSaysWhatFailed) {
-  const SharedFolder folder;
+  const test::SharedFolder folder;
   const Communicator world = Communicator::world();
   check_parallel_writing(folder / "a.af.h5", world);
   world.barrier();
@@ -254,7 +234,7 @@ TEST(FieldFile, AnUnwritableFolderIsAFileErrorOnEveryRank) {
 }
 
 TEST(FieldFile, RefusesWhatIsNotAField) {
-  const SharedFolder folder;
+  const test::SharedFolder folder;
   const Communicator world = Communicator::world();
   if (world.is_root()) {
     std::ofstream(folder / "empty");
@@ -271,7 +251,7 @@ TEST(FieldFile, RefusesWhatIsNotAField) {
 }
 
 TEST(FieldFile, RefusesATruncatedFileOfAnyLength) {
-  const SharedFolder folder;
+  const test::SharedFolder folder;
   const Communicator world = Communicator::world();
   write(small_field(), folder / "a.af.h5");
   const auto size = std::filesystem::file_size(folder / "a.af.h5");
@@ -289,7 +269,7 @@ TEST(FieldFile, RefusesATruncatedFileOfAnyLength) {
 }
 
 TEST(FieldFile, ADamagedByteIsRefusedOrWithoutEffect) {
-  const SharedFolder folder;
+  const test::SharedFolder folder;
   const Communicator world = Communicator::world();
   const FieldFileInfo sound = write(small_field(), folder / "a.af.h5");
   const auto size = std::filesystem::file_size(folder / "a.af.h5");
@@ -323,7 +303,7 @@ TEST(FieldFile, ADamagedByteIsRefusedOrWithoutEffect) {
 }
 
 TEST(FieldFile, RefusesAnUnknownVersion) {
-  const SharedFolder folder;
+  const test::SharedFolder folder;
   write(small_field(), folder / "a.af.h5");
   edit_file(folder / "a.af.h5", [](hid_t file) {
     H5Adelete(file, "format_version");
@@ -334,7 +314,7 @@ TEST(FieldFile, RefusesAnUnknownVersion) {
 }
 
 TEST(FieldFile, RefusesAMissingDataset) {
-  const SharedFolder folder;
+  const test::SharedFolder folder;
   for (const char* name :
        {"/codebook/codewords", "/geometry/uv_nodes", "/field/slab_1", "/identity"}) {
     write(small_field(), folder / "a.af.h5");
@@ -351,7 +331,7 @@ void replace(hid_t file, const field_layout::Dataset& dataset) {
 
 TEST(FieldFile, RefusesAnotherTypeOrExtent) {
   using field_layout::ElementType;
-  const SharedFolder folder;
+  const test::SharedFolder folder;
   const std::vector<field_layout::DatasetRule> wrong = {
       {"/geometry/uv_nodes", ElementType::Float64, {2}, false, "1", "x"},
       {"/geometry/uv_nodes", ElementType::Int32, {3}, false, "1", "x"},
@@ -387,7 +367,7 @@ std::string refusal_with(const std::filesystem::path& path,
 }
 
 TEST(FieldFile, RefusesLinks) {
-  const SharedFolder folder;
+  const test::SharedFolder folder;
   write(small_field(), folder / "other.af.h5");
   for (const char* name : {"/geometry/uv_nodes", "/identity", "/field/slab_1"}) {
     std::string message =
@@ -403,7 +383,7 @@ TEST(FieldFile, RefusesLinks) {
 }
 
 TEST(FieldFile, RefusesContentsElsewhereHugeChunksAndFiltersOfPlugIns) {
-  const SharedFolder folder;
+  const test::SharedFolder folder;
   const auto refusal_of = [&](const std::function<void(hid_t creation, hid_t space)>& set) {
     return refusal_with(
         folder / "a.af.h5", "/geometry/uv_nodes", [&](hid_t file, const char* name) {
@@ -434,7 +414,7 @@ TEST(FieldFile, RefusesContentsElsewhereHugeChunksAndFiltersOfPlugIns) {
 }
 
 TEST(FieldFile, RefusesACameraNameThatIsAPath) {
-  const SharedFolder folder;
+  const test::SharedFolder folder;
   CompressedAttenuationField field = small_field();
   field.identity.camera.name = "../AP";
   write(field, folder / "a.af.h5");
@@ -442,7 +422,7 @@ TEST(FieldFile, RefusesACameraNameThatIsAPath) {
 }
 
 TEST(FieldFile, RefusesAChangedValueWhoseOwnHashWasMended) {
-  const SharedFolder folder;
+  const test::SharedFolder folder;
   CompressedAttenuationField other = small_field();
   other.light_slab.u.first_mm -= 1.0;
   write(small_field(), folder / "a.af.h5");
@@ -454,7 +434,7 @@ TEST(FieldFile, RefusesAChangedValueWhoseOwnHashWasMended) {
 }
 
 TEST(FieldFile, RefusesContentsThatMakeNoSenseThoughAllHashesAgree) {
-  const SharedFolder folder;
+  const test::SharedFolder folder;
   const auto refusal_of = [&](const std::function<void(CompressedAttenuationField&)>& spoil) {
     CompressedAttenuationField field = small_field();
     spoil(field);
@@ -482,7 +462,7 @@ TEST(FieldFile, RefusesContentsThatMakeNoSenseThoughAllHashesAgree) {
 }
 
 TEST(FieldFile, RefusesHugeExtentsBeforeItAsksForMemory) {
-  const SharedFolder folder;
+  const test::SharedFolder folder;
   const Communicator world = Communicator::world();
   CompressedAttenuationField huge = small_field();
   huge.light_slab.u.nodes = huge.light_slab.v.nodes = 65536;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "parallel/work_queue.h"
 
-#include <algorithm>
 #include <chrono>
 #include <thread>
 #include <vector>
@@ -54,48 +53,6 @@ TEST(WorkQueue, FailureOfOneItemIsThrownOnEveryRank) {
   };
   try {
     for_each_item(world, 100, fails_at_5);
-    ADD_FAILURE() << "no error on rank " << world.rank();
-  } catch (const Error& error) {
-    EXPECT_EQ(error.exit_code(), ExitCode::File);
-  }
-}
-
-/// As many bytes as the item's number, modulo 100, each its lowest 8 bits.
-std::vector<std::byte> result_of(std::int64_t item) {
-  return std::vector<std::byte>(static_cast<std::size_t>(item % 100),
-                                static_cast<std::byte>(item & 0xFF));
-}
-
-TEST(WorkQueue, GivesEveryResultToRankZeroOnce) {
-  const Communicator world = Communicator::world();
-  for (const std::int64_t count : {0, 1, 3, 5000}) {
-    std::vector<int> times(static_cast<std::size_t>(count), 0);
-    std::int64_t reported = 0;
-    collect_items(
-        world,
-        count,
-        result_of,
-        [&](std::int64_t item, std::span<const std::byte> result) {
-          ++times[static_cast<std::size_t>(item)];
-          const std::vector<std::byte> expected = result_of(item);
-          EXPECT_TRUE(std::equal(result.begin(), result.end(), expected.begin(), expected.end()))
-              << "item " << item;
-        },
-        [&](std::int64_t done) { reported = done; });
-    // Other ranks are given nothing.
-    const int expected_times = world.is_root() ? 1 : 0;
-    EXPECT_EQ(times, std::vector<int>(times.size(), expected_times)) << count << " items";
-    EXPECT_EQ(reported, world.is_root() ? count : 0);
-  }
-}
-
-TEST(WorkQueue, FailureToReceiveIsThrownOnEveryRank) {
-  const Communicator world = Communicator::world();
-  const auto receive = [](std::int64_t item, std::span<const std::byte>) {
-    if (item == 5) throw FileError("rows.csv", "disk full");
-  };
-  try {
-    collect_items(world, 1000, result_of, receive);
     ADD_FAILURE() << "no error on rank " << world.rank();
   } catch (const Error& error) {
     EXPECT_EQ(error.exit_code(), ExitCode::File);

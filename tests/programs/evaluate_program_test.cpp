@@ -200,7 +200,7 @@ constexpr const char* kCutScript = R"sh(
   ranks="^[^ ]*/af-evaluate.*$OUT"
   eval "exec $CMD" &
   launcher=$!
-  until [[ "$(cat "$OUT.progress"/ellipsoids.*.records 2>/dev/null | wc -c)" -gt 4000 ]]; do
+  until [[ "$(cat "$OUT.progress"/*.records 2>/dev/null | wc -c)" -gt 4000 ]]; do
     kill -0 $launcher || exit 99
     sleep 0.01
   done
@@ -248,6 +248,33 @@ TEST_F(EvaluateProgram, GoesOnAfterAStopOrAKillOnAnotherRankCount) {
       EXPECT_EQ(rows_without_seconds(std::filesystem::path(out).filename()), expected);
       EXPECT_FALSE(std::filesystem::exists(out + ".progress"));
     }
+}
+
+TEST_F(EvaluateProgram, EveryStageThatTakesLongGoesOnAfterStops) {
+  const std::string field = "image-quality --field " + path("LAT.af.h5") + " --ct " +
+                            path("ct.nii.gz") + " --pose-count 40 --split-loss-poses 2 -o ";
+  const std::string curves = "similarity-curves --study " + path("study.toml") + fields() +
+                             "--half-width-mm 2 --half-width-deg 2 -o ";
+  struct Stage {
+    std::string arguments;
+    const char* table;
+  };
+  for (const auto& [arguments, table] : {Stage{field, "image-quality.csv"},
+                                         Stage{field, "loss-split.csv"},
+                                         Stage{curves, "similarity-curves.csv"}}) {
+    SCOPED_TRACE(table);
+    const std::string name = std::string(table) + "-";
+    ASSERT_EQ(evaluate(arguments + path(name + "whole")).exit_code, 0);
+    const std::string stopped = path(name + "stopped");
+    expect_refused(evaluate(arguments + stopped + test::kStopAtOnce, 2), 75, "saved: run the same");
+    EXPECT_FALSE(std::filesystem::exists(stopped + "/summary.json"));
+    expect_refused(evaluate(arguments + stopped + " --step-mm 0.7"), 3, "begun with");
+    const test::ProgramRun last =
+        test::run_until_done(AF_PROGRAM_FOLDER "/af-evaluate " + arguments + stopped);
+    ASSERT_EQ(last.exit_code, 0) << last.output;
+    EXPECT_EQ(text(name + "stopped/" + table), text(name + "whole/" + table));
+    EXPECT_FALSE(std::filesystem::exists(stopped + ".progress"));
+  }
 }
 
 TEST_F(EvaluateProgram, MeasuresPosesOfAnotherProgramLikeItsOwn) {

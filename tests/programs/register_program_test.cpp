@@ -92,7 +92,8 @@ TEST_F(RegisterProgram, RegistersByFieldAndByRayCasting) {
        {"pose.toml", "result.tfm", "AP-overlay.png", "LAT-overlay.png", "reproduce.sh"})
     EXPECT_TRUE(fs::exists(path("by-field/" + std::string(name)))) << name;
   const nlohmann::json provenance = result("by-field").at("provenance");
-  EXPECT_EQ(provenance.at("input_sha256").size(), 5U) << provenance;  // CT, two fields, two X-rays
+  // Study, CT, two fields, two X-rays.
+  EXPECT_EQ(provenance.at("input_sha256").size(), 6U) << provenance;
 }
 
 TEST_F(RegisterProgram, ManyStartsGiveTheSameRowsOnAnyRankCount) {
@@ -115,6 +116,33 @@ TEST_F(RegisterProgram, ManyStartsGiveTheSameRowsOnAnyRankCount) {
         EXPECT_EQ(a.text(row, column), b.text(row, column)) << row << ' ' << column;
       }
   EXPECT_EQ(a.text(3, "stop_reason"), "start-inadmissible");
+}
+
+TEST_F(RegisterProgram, ManyStartsGoOnAfterAStop) {
+  std::ofstream starts(path("starts.csv"));
+  starts << "rx_deg,ry_deg,rz_deg,tx_mm,ty_mm,tz_mm\n";
+  for (int i = 0; i < 60; ++i) starts << "0,0," << 0.1 * (i % 20) << ",1,0," << 0.05 * i << '\n';
+  starts.close();
+  const std::string arguments = fields() + " --preset paper --starts " + path("starts.csv");
+  ASSERT_EQ(run_register(arguments + " -o " + path("whole")).exit_code, 0);
+  const std::string output = " -o " + path("stopped");
+  const test::ProgramRun first = run_register(arguments + output + test::kStopAtOnce);
+  expect_refused(first, 75, " of 60 saved: run the same command again");
+  EXPECT_FALSE(fs::exists(path("stopped/result.json")));
+  expect_refused(run_register(arguments + output + " --max-evaluations 99"), 3, "begun with");
+  const test::ProgramRun last = test::run_until_done(program("af-register") + " --study " +
+                                                     path("study.toml") + arguments + output);
+  ASSERT_EQ(last.exit_code, 0) << last.output;
+  EXPECT_FALSE(fs::exists(path("stopped.progress")));
+  const CsvTable whole = CsvTable::read(path("whole/registrations.csv"));
+  const CsvTable resumed = CsvTable::read(path("stopped/registrations.csv"));
+  ASSERT_EQ(resumed.row_count(), 60U);
+  for (std::size_t row = 0; row < 60; ++row)
+    for (const std::string& column : whole.columns())
+      if (column != "seconds") {
+        EXPECT_EQ(resumed.text(row, column), whole.text(row, column)) << row << ' ' << column;
+      }
+  EXPECT_EQ(result("stopped").at("trace"), result("whole").at("trace"));
 }
 
 /// The study with fiducials, as NAME.toml; each adds `marker` to the X-rays' pixel in its middle.

@@ -89,7 +89,7 @@ stop_job() {
 
 submit "$disturbed"
 stop_job af-precompute-1 "$disturbed/fields/patient-1-A.af.h5.progress/0000-000000.shard"
-stop_job af-evaluate "$disturbed/registration/patient-1.progress/patient-1.000000.records"
+stop_job af-evaluate "$disturbed/registration/patient-1.progress/patient-1-field.000000.records"
 wait_until 300 "the disturbed chain" no_jobs_left
 [[ -s "$disturbed/report.html" ]] || fail "no report.html after the disturbed chain"
 for stage in precompute-1 evaluate; do

@@ -23,4 +23,13 @@ ProgramRun run_command(const std::string& command) {
   return run;
 }
 
+ProgramRun run_until_done(const std::string& command) {
+  constexpr int kStopped = 75;
+  ProgramRun run;
+  run.exit_code = kStopped;
+  for (double hours = 0.1 / 3600.0; run.exit_code == kStopped; hours *= 2.0)
+    run = run_command(command + " --max-hours " + std::to_string(hours));
+  return run;
+}
+
 }  // namespace af::test
