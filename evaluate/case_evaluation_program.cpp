@@ -7,6 +7,7 @@
 #include <cmath>
 #include <exception>
 #include <map>
+#include <optional>
 #include <span>
 #include <tuple>
 #include <utility>
@@ -23,6 +24,7 @@
 #include "io/output_file.h"
 #include "io/picture.h"
 #include "io/sha256.h"
+#include "parallel/work_watch.h"
 #include "register/result_files.h"
 #include "register/slicer_files.h"
 
@@ -322,6 +324,38 @@ void draw_overlays(const Method& method,
   }
 }
 
+/// Collective. What of each method is finished; nothing of it is done yet.
+std::vector<MethodRows> begin_registrations(const RegistrationStudyOptions& options,
+                                            const CaseEvaluation& evaluation,
+                                            const std::vector<Method>& methods,
+                                            const Communicator& world) {
+  const std::string name = file_name_part(evaluation.case_name);
+  const DecidingValues decides = deciding_values(options, evaluation);
+  std::vector<MethodRows> begun;
+  for (const Method& method : methods)
+    begun.push_back({method.renderer,
+                     method.start_indices,
+                     {{progress_folder(options.output_folder),
+                       name + "-" + method.renderer,
+                       decides,
+                       options.restarts},
+                      world}});
+  return begun;
+}
+
+/// Rank 0: the pictures of a case, by its first method.
+void draw_pictures(const RegistrationStudyOptions& options,
+                   const StudyCase& study_case,
+                   const Method& method,
+                   const MethodRows& rows,
+                   const Yardstick& yardstick,
+                   CaseEvaluation& evaluation) {
+  const WorkNote note("drawing case " + study_case.name, WorkNote::Kind::Phase);
+  draw_xrays(method.runner.problem(), options.output_folder, evaluation);
+  draw_overlays(
+      method, chosen_rows(rows), study_case, yardstick, options.output_folder, evaluation);
+}
+
 }  // namespace
 
 PoseTableFrames pose_table_frames(const Study& study,
@@ -372,6 +406,8 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
                              const std::function<void(const CaseEvaluation&)>& on_starts) {
   CaseEvaluation evaluation;
   evaluation.case_name = study_case.name;
+  std::optional<WorkNote> phase(
+      std::in_place, "loading case " + study_case.name, WorkNote::Kind::Phase);
   std::vector<Method> methods;
   for (LoadedMethod& method :
        load_methods(options, study, study_case, world, evaluation.input_sha256))
@@ -383,40 +419,30 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
                             : given_starts(options, study, study_case, evaluation.gold);
     for (Method& method : methods) assign_starts(options, evaluation.starts, method);
     evaluation.start_count = evaluation.starts.starts.size();
-    on_starts(evaluation);
   });
+  // Refusals first: they leave the results of an earlier run alone.
+  std::vector<MethodRows> rows;
+  if (!options.is_starts_only) rows = begin_registrations(options, evaluation, methods, world);
+  all_or_none(world, [&] { on_starts(evaluation); });
   if (options.is_starts_only) return evaluation;
   const Yardstick yardstick = yardstick_of(study, study_case, evaluation.gold);
   announce_times(methods, study_case.name, evaluation.starts, world);
-  std::vector<MethodRows> registered;
-  for (Method& method : methods) {
-    registered.push_back({method.renderer,
-                          method.start_indices,
-                          {{progress_folder(options.output_folder),
-                            file_name_part(study_case.name) + "-" + method.renderer,
-                            deciding_values(options, evaluation),
-                            options.restarts},
-                           world}});
-    register_with(method, study_case.name, evaluation.starts, yardstick, registered.back().items);
-  }
+  phase.reset();
+  for (std::size_t i = 0; i < methods.size(); ++i)
+    register_with(methods[i], study_case.name, evaluation.starts, yardstick, rows[i].items);
   // Rows take their place: memory holds one or the other.
   evaluation.starts.starts = {};
   all_or_none(world, [&] {
-    if (!world.is_root()) return;
-    draw_xrays(methods.front().runner.problem(), options.output_folder, evaluation);
-    draw_overlays(methods.front(),
-                  chosen_rows(registered.front()),
-                  study_case,
-                  yardstick,
-                  options.output_folder,
-                  evaluation);
+    if (world.is_root())
+      draw_pictures(options, study_case, methods.front(), rows.front(), yardstick, evaluation);
   });
   // Rows take the place of fields and CT: memory holds one or the other.
   methods.clear();
   all_or_none(world, [&] {
     if (!world.is_root()) return;
-    evaluation.rows = rows_of(registered);
-    for (const MethodRows& method : registered) keep_first_traces(evaluation.rows, method.renderer);
+    const WorkNote note("reading the rows of case " + study_case.name, WorkNote::Kind::Phase);
+    evaluation.rows = rows_of(rows);
+    for (const MethodRows& method : rows) keep_first_traces(evaluation.rows, method.renderer);
   });
   return evaluation;
 }

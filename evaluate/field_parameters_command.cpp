@@ -143,6 +143,8 @@ void write_results(const FieldParametersOptions& options,
                    const json& difference_images,
                    const Provenance& provenance) {
   const std::filesystem::path& folder = options.output_folder;
+  // What an earlier run left here is whole no more.
+  std::filesystem::remove(folder / "summary.json");
   json summary = write_sweep(results, folder);
   write_reproduce_script(folder, provenance);
   summary["format"] = "attenuation-fields evaluation";

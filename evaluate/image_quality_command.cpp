@@ -187,6 +187,8 @@ void write_results(const ImageQualityOptions& options,
                    const Provenance& provenance) {
   const std::filesystem::path& folder = target.folder;
   const std::vector<DrrComparison>& comparisons = result.comparisons;
+  // What an earlier run left here is whole no more.
+  std::filesystem::remove(folder / "summary.json");
   write_text_file(folder / "image-quality.csv", image_quality_table(comparisons).to_text());
   const PsnrGroup group = group_of(result);
   draw_psnr_boxes({group}, folder / "psnr");

@@ -28,6 +28,8 @@
 #include "io/progress_manifest.h"
 #include "io/provenance.h"
 #include "io/sha256.h"
+#include "io/shared_inputs.h"
+#include "parallel/work_watch.h"
 
 namespace af::evaluation {
 namespace {
@@ -365,11 +367,10 @@ void run_registration(const RegistrationStudyOptions& options,
                       const std::string& command_line,
                       const Communicator& world) {
   const std::filesystem::path& folder = options.output_folder;
+  cli::listen_for_stop_requests();
   std::vector<std::string> study_warnings;
-  const Study study = all_or_none(world, [&] {
-    throw_if_any(problems(options));
-    return read_study(options.study, &study_warnings);
-  });
+  all_or_none(world, [&] { throw_if_any(problems(options)); });
+  const Study study = read_study(options.study, world, &study_warnings);
   for (const std::string& text : study_warnings) cli::warn(world, text);
   const std::vector<StudyCase> cases =
       all_or_none(world, [&] { return chosen_cases(options, study); });
@@ -383,11 +384,12 @@ void run_registration(const RegistrationStudyOptions& options,
     starts_file.emplace(folder / "starts.csv");
   });
 
-  cli::listen_for_stop_requests();
   std::vector<CaseEvaluation> evaluations;
   for (const StudyCase& study_case : cases) {
     const auto on_starts = [&](const CaseEvaluation& so_far) {
       if (!world.is_root()) return;
+      // What an earlier run left here is whole no more.
+      std::filesystem::remove(folder / "summary.json");
       starts_file->add(so_far.case_name, so_far.starts.starts);
       if (&study_case == &cases.back()) starts_file->finish();
     };
@@ -404,6 +406,7 @@ void run_registration(const RegistrationStudyOptions& options,
   }
   all_or_none(world, [&] {
     if (!world.is_root()) return;
+    const WorkNote note("writing the results", WorkNote::Kind::Phase);
     std::vector<RegistrationRow> rows;
     Provenance provenance = {"af-evaluate registration",
                              command_line,

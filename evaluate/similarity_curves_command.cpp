@@ -26,6 +26,7 @@
 #include "io/output_lock.h"
 #include "io/provenance.h"
 #include "io/sha256.h"
+#include "io/shared_inputs.h"
 
 namespace af::evaluation {
 namespace {
@@ -280,15 +281,15 @@ void run_similarity_curves(const SimilarityCurvesOptions& options,
   const std::filesystem::path& folder = options.output_folder;
   std::vector<std::string> warnings;
   std::optional<OutputLock> lock;
-  const Study study = all_or_none(world, [&] {
+  all_or_none(world, [&] {
     throw_if_any(problems(options));
     if (world.is_root()) {
       require_gnuplot();
       make_output_folder(folder);
       lock.emplace(folder);
     }
-    return read_study(options.study, &warnings);
   });
+  const Study study = read_study(options.study, world, &warnings);
   cli::listen_for_stop_requests();
   for (const std::string& text : warnings) cli::warn(world, text);
   const StudyCase study_case =
@@ -315,6 +316,8 @@ void run_similarity_curves(const SimilarityCurvesOptions& options,
     if (!world.is_root()) return;
     find_peaks(curves);
     const double radius_mm = rms_radius_mm(study_case.target_box_ct, study_case.center_ct_mm);
+    // What an earlier run left here is whole no more.
+    std::filesystem::remove(folder / "summary.json");
     write_text_file(folder / "similarity-curves.csv", curves_table(curves).to_text());
     write_text_file(folder / "maxima.csv", maxima_table(curves, radius_mm).to_text());
     draw_curve_panels(panels_of(curves),

@@ -43,6 +43,11 @@ read_chain() {
   done
 }
 
+# forget_progress: throws away what earlier runs of this chain left unfinished in `output`; every stage is done again.
+forget_progress() {
+  rm -rf "$output"/.stages/*.done "$output"/fields/*.progress "$output"/registration/*.progress
+}
+
 # Each of these sets `command`. precompute_command CASE VIEW: of the VIEW-th camera, `true` when the case has not so many.
 precompute_command() {
   local case_name=$1 view=$2 camera

@@ -6,6 +6,8 @@ set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
 # shellcheck source=chain.sh
 source "$af_root/jobs/chain.sh"
+# shellcheck source=stamps.sh
+source "$af_root/jobs/stamps.sh"
 
 usage() {
   cat <<'TEXT'
@@ -18,16 +20,18 @@ those of a cluster and not used here. Stopped (Ctrl-C, kill), it goes on when th
   --output DIR        where everything goes                                                   [./af-run]
   --resources FILE    what the programs are asked for                          [jobs/slurm/resources.sh]
   --ranks N           MPI ranks                                                              [all cores]
+  --restart           throw away what earlier runs left unfinished, and do every stage again
   --help
 TEXT
 }
 
-target="$PWD/af-run" ranks=""
+target="$PWD/af-run" ranks="" restart=no
 while (($# > 0)); do
   case "$1" in
     --output | -o) need_value "$1" $#; target=$2; shift ;;
     --resources) need_value "$1" $#; resources=$2; shift ;;
     --ranks | -n) need_value "$1" $#; need_count "$1" "$2"; ranks=$2; shift ;;
+    --restart) restart=yes ;;
     --help | -h) usage; exit 0 ;;
     *) take_study "$1" ;;
   esac
@@ -40,24 +44,23 @@ read_chain
 open_output "$target"
 mkdir -p "$output"/{fields,registration}
 
-# result_of COMMAND...: what stands behind its -o.
-result_of() {
-  while [[ "$1" != -o ]]; do shift; done
-  echo "$2"
+[[ "$restart" == no ]] || forget_progress
+
+# stage NAME: runs `command` unless it has been done from the same inputs.
+stage() {
+  once_inputs=$(inputs_of "$bin/af-inspect" "${command[@]}")
+  once "$1" "$(result_of "${command[@]}")" run_ranks "$ranks" "${command[@]}"
 }
 
-# What a stage reads beside its command line; the programs themselves check CTs and X-rays when they go on.
-once_inputs=$(sha256sum <"$study")
 command=()
 for case_name in "${case_names[@]}"; do
   for ((view = 0; view < most_views; ++view)); do
     precompute_command "$case_name" "$view"
     [[ "${command[0]}" != true ]] || continue
-    field=$(result_of "${command[@]}")
-    once "$(basename "$field" .af.h5)" "$field" run_ranks "$ranks" "${command[@]}"
+    stage "$(basename "$(result_of "${command[@]}")" .af.h5)"
   done
   evaluate_command "$case_name"
-  once "registration-$case_name" "$(result_of "${command[@]}")/summary.json" run_ranks "$ranks" "${command[@]}"
+  stage "registration-$case_name"
 done
 report_command
 "${command[@]}"

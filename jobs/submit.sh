@@ -18,6 +18,7 @@ same chain; what was finished by the same commands is not done twice.
 
   --output DIR        where everything goes; must be seen by all nodes                        [./af-run]
   --resources FILE    ranks, memory, time limits, partition, programs' options   [jobs/slurm/resources.sh]
+  --restart           throw away what earlier chains left unfinished there, and do every stage again
   --dry-run           print the chain and its commands, submit nothing
   --help
 TEXT
@@ -25,11 +26,12 @@ TEXT
 
 # --- options -----------------------------------------------------------------------------------------------------
 
-output="$PWD/af-run" dry_run=no
+output="$PWD/af-run" dry_run=no restart=no
 while (($# > 0)); do
   case "$1" in
     --output | -o) need_value "$1" $#; output=$2; shift ;;
     --resources) need_value "$1" $#; resources=$2; shift ;;
+    --restart) restart=yes ;;
     --dry-run) dry_run=yes ;;
     --help | -h) usage; exit 0 ;;
     *) take_study "$1" ;;
@@ -60,6 +62,7 @@ submit() {
   printf '%s\n' "$commands" >"$output/jobs/$stage.commands"
   job_id=$("${command[@]}") || die 1 "sbatch refused stage '$stage' (see above); what stands before it in the chain is submitted"
   job_id=${job_id%%;*}
+  echo "$job_id" >>"$output/jobs/submitted"
   say "$stage: job $job_id"
 }
 
@@ -79,11 +82,21 @@ lines() {
   done
 }
 
+# jobs_of_output: the jobs of this folder that Slurm still has.
+jobs_of_output() {
+  [[ ! -f "$output/jobs/submitted" ]] || squeue --me --noheader --format %F | sort -u | grep -Fx -f "$output/jobs/submitted" || true
+}
+
+output=$(realpath -m "$output")
 if [[ "$dry_run" == no ]]; then
   mkdir -p "$output"/{fields,registration,logs,jobs,.stages}
+  queued=$(jobs_of_output | paste -sd ' ')
+  [[ -z "$queued" ]] || die 3 "$output: an earlier chain is still in the queue: wait for it, or: scancel $queued"
+  rm -f "$output"/.stages/*.fruitless "$output/jobs/submitted"
+  [[ "$restart" == no ]] || forget_progress
   cp "$resources" "$output/jobs/resources.sh"
+  cp "$af_root/jobs/stamps.sh" "$output/jobs/stamps.sh"
 fi
-output=$(realpath -m "$output")
 
 # A case waits for its own fields only (aftercorr: the task of the same number).
 after_fields=""

@@ -77,7 +77,7 @@ ProgressManifest manifest_of(const PrecomputeOptions& options,
   ProgressManifest manifest;
   for (const auto& [name, value] : casting_options(options)) manifest.decides[name] = value;
   const CameraGeometry& camera = source.camera;
-  manifest.decides["program version"] = program_version();
+  manifest.decides["program"] = program_build();
   manifest.decides["ct_content_sha256"] = source.ct_content_sha256;
   manifest.decides["camera"] = camera.name;
   manifest.decides["camera source_point"] = numbers_text(camera.source_point);
@@ -317,7 +317,7 @@ class PrecomputeRun {
     CastPhase cast = cast_phase(build);
     const OverflowChoice choice = overflow_choice(build, cast);
     CompressedAttenuationField field = field_without_indices();
-    const TrainedCodebook trained = train_phase(build, cast);
+    const TrainedCodebook trained = train_phase(build, manifest, cast);
     field.codebook = trained.codebook;
     write_phase(build, cast, trained, choice, field);
   }
@@ -370,7 +370,9 @@ class PrecomputeRun {
     return megabytes_text(cast.occupied_tiles * sizeof(Tile));
   }
 
-  TrainedCodebook train_phase(const FieldBuild& build, CastPhase& cast) {
+  TrainedCodebook train_phase(const FieldBuild& build,
+                              const ProgressManifest& manifest,
+                              CastPhase& cast) {
     cli::ProgressPrinter printer("training the codebook", world_.is_root());
     const auto iteration = [](std::size_t done) {
       return "training the codebook, iteration " + std::to_string(done + 1);
@@ -379,9 +381,9 @@ class PrecomputeRun {
     TrainingCheckpoints checkpoints;
     WorkNote note(iteration(0));
     if (build.progress != nullptr) {
-      const NamedValues decides = codebook_options(options_);
-      journal.emplace(
-          build.progress->path(), DecidingValues(decides.begin(), decides.end()), world_);
+      DecidingValues decides = manifest.decides;
+      for (const auto& [name, value] : codebook_options(options_)) decides[name] = value;
+      journal.emplace(build.progress->path(), decides, world_);
       checkpoints.begun = journal->begun();
       checkpoints.on_iteration = [&](const TrainedCodebook& so_far) {
         journal->append(so_far);

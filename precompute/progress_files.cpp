@@ -340,6 +340,7 @@ void ProgressFolder::append(std::initializer_list<std::span<const std::byte>> pa
   file_.flush();
   if (!file_)
     throw FileError(path.string(), std::string("cannot be written: ") + std::strerror(errno));
+  if (std::chrono::steady_clock::now() - last_sync_ > std::chrono::minutes(1)) sync();
 }
 
 void ProgressFolder::append(const UnitTiles& tiles) {
@@ -402,6 +403,7 @@ void ProgressFolder::forget_cached() const {
 
 void ProgressFolder::sync() {
   if (file_.is_open()) sync_path(path_of(shard_));
+  last_sync_ = std::chrono::steady_clock::now();
 }
 
 void ProgressFolder::remove() {

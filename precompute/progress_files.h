@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -95,6 +96,7 @@ class ProgressFolder {
   Communicator communicator_;
   UnitPlace shard_;  ///< this rank's, and where its next unit will lie
   std::ofstream file_;
+  std::chrono::steady_clock::time_point last_sync_ = std::chrono::steady_clock::now();
   std::map<std::uint32_t, UnitPlace> places_;
   std::map<std::uint32_t, EncodedPlace> encoded_places_;  ///< of earlier runs
 };

@@ -7,7 +7,7 @@
 #include "io/node_ct.h"
 #include "io/pose_file.h"
 #include "io/rig_file.h"
-#include "io/study_file.h"
+#include "io/shared_inputs.h"
 
 namespace af {
 
@@ -31,8 +31,7 @@ std::string only_camera(const std::vector<std::string>& cameras, const std::stri
                    known);
 }
 
-NamedSource source_of_study(const PrecomputeOptions& options, std::vector<std::string>& warnings) {
-  const Study study = read_study(options.study, &warnings);
+NamedSource source_of_study(const PrecomputeOptions& options, const Study& study) {
   const StudyCase& study_case = study.find_case(options.case_name);
   NamedSource source;
   source.ct_path = study_case.ct.string();
@@ -79,9 +78,11 @@ PoseFrame frame_of(const NamedSource& source,
 
 FieldSource load_source(const PrecomputeOptions& options, const Communicator& communicator) {
   FieldSource source;
+  const Study study =
+      options.study.empty() ? Study() : read_study(options.study, communicator, &source.warnings);
   const NamedSource named = all_or_none(communicator, [&] {
     NamedSource found = options.study.empty() ? source_of_options(options, source.warnings)
-                                              : source_of_study(options, source.warnings);
+                                              : source_of_study(options, study);
     source.camera = found.rig.camera(found.camera);
     return found;
   });

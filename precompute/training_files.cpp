@@ -84,13 +84,14 @@ std::optional<TrainedCodebook> unpacked_training(std::span<const std::byte> byte
 TrainingJournal::TrainingJournal(const std::filesystem::path& progress_folder,
                                  const DecidingValues& decides,
                                  const Communicator& communicator)
-    : communicator_(communicator), shard_(progress_folder, kName, 0) {
+    : communicator_(communicator) {
   std::vector<std::byte> last;
   all_or_none(communicator_, [&] {
     if (!communicator_.is_root()) return;
-    opened(progress_folder, decides).mend_and_visit([&](std::span<const std::byte> record) {
-      last.assign(record.begin(), record.end());
-    });
+    ProgressJournal journal = opened(progress_folder, decides);
+    journal.mend_and_visit(
+        [&](std::span<const std::byte> record) { last.assign(record.begin(), record.end()); });
+    shard_.emplace(progress_folder, kName, journal.run(), 0);
   });
   communicator_.broadcast(last);
   begun_ = unpacked_training(last);
@@ -99,8 +100,8 @@ TrainingJournal::TrainingJournal(const std::filesystem::path& progress_folder,
 void TrainingJournal::append(const TrainedCodebook& so_far) {
   all_or_none(communicator_, [&] {
     if (!communicator_.is_root()) return;
-    shard_.append(packed_training(so_far));
-    shard_.sync();
+    shard_->append(packed_training(so_far));
+    shard_->sync();
   });
 }
 

@@ -29,7 +29,7 @@ class TrainingJournal {
 
  private:
   Communicator communicator_;
-  ProgressShard shard_;  ///< rank 0 alone writes
+  std::optional<ProgressShard> shard_;  ///< of rank 0
   std::optional<TrainedCodebook> begun_;
 };
 

@@ -13,7 +13,9 @@
 #include "drr/two_pass_af_drr.h"
 #include "io/field_file.h"
 #include "io/node_ct.h"
+#include "io/rig_file.h"
 #include "io/sha256.h"
+#include "io/shared_inputs.h"
 #include "io/xray_reader.h"
 #include "register/fiducial_mask.h"
 #include "register/parameter_scaling.h"
@@ -57,42 +59,73 @@ void require_known_field_cameras(const StudyCase& study_case, const CaseLoadOpti
   }
 }
 
+/// X-ray and mask of a view from their files; their hashes go to `input_sha256`.
+void read_images(const StudyView& study_view,
+                 RegistrationView& view,
+                 std::map<std::string, std::string>& input_sha256) {
+  const CameraGeometry& camera = view.view.camera;
+  view.xray = used_from(
+      study_view.places, "xray", [&] { return read_xray_attenuation(study_view, camera); });
+  view.mask = used_from(study_view.places, "mask", [&] { return read_mask(study_view, camera); });
+  input_sha256["xray " + study_view.camera] = sha256_of_file(study_view.xray.string());
+  if (study_view.mask.has_value())
+    input_sha256["mask " + study_view.camera] = sha256_of_file(study_view.mask->string());
+}
+
+/// Collective. The views without renderers; rank 0 reads the images and keeps the hashes.
 std::vector<RegistrationView> read_views(const Study& study,
                                          const StudyCase& study_case,
                                          double fiducial_mask_mm,
+                                         const Communicator& communicator,
                                          std::map<std::string, std::string>& input_sha256) {
   std::vector<RegistrationView> views;
   for (const StudyView& study_view : study_case.views) {
     RegistrationView view;
-    view.view = {study.rig.camera(study_view.camera), study_view.roi};
+    all_or_none(communicator, [&] {
+      view.view = {study.rig.camera(study_view.camera), study_view.roi};
+      if (communicator.is_root()) read_images(study_view, view, input_sha256);
+    });
+    broadcast(view.xray, communicator);
+    broadcast(view.mask, communicator);
     const CameraGeometry& camera = view.view.camera;
-    view.xray = used_from(
-        study_view.places, "xray", [&] { return read_xray_attenuation(study_view, camera); });
-    view.mask = used_from(study_view.places, "mask", [&] { return read_mask(study_view, camera); });
     view.mask_without_markers =
         mask_fiducials(view.mask,
                        camera,
                        study_view.fiducials_px,
                        fiducial_mask_mm * pixels_per_mm(camera, study.rig.isocenter_point));
-    input_sha256["xray " + study_view.camera] = sha256_of_file(study_view.xray.string());
-    if (study_view.mask.has_value())
-      input_sha256["mask " + study_view.camera] = sha256_of_file(study_view.mask->string());
     views.push_back(std::move(view));
   }
   return views;
+}
+
+/// What the study says of the case, and the rig of its cameras, but for the paths of files.
+std::string case_sha256(const Study& study, const StudyCase& study_case) {
+  Study one;
+  one.rig = study.rig;
+  one.cases = {study_case};
+  StudyCase& only = one.cases.front();
+  only.note.clear();
+  only.ct.clear();
+  for (StudyView& view : only.views) {
+    view.xray.clear();
+    view.field.reset();
+    if (view.mask.has_value()) view.mask->clear();
+  }
+  const std::string text = study_to_toml(one, {}) + rig_to_toml(one.rig);
+  return sha256_hex(std::as_bytes(std::span(text)));
 }
 
 /// Parts of a rank's share of a level, one thread's work each. The same on every rank, however many
 /// threads these have.
 constexpr int kPartsPerRank = 8;
 
-/// Collective over the node: memory that its ranks share and fill together, each on its threads.
-FieldLevelMemory node_memory(const Communicator& node, ThreadPool& pool) {
-  return [node, &pool](std::size_t count, const FieldLevelFill& fill) {
+/// Collective: memory that the ranks of a node share and fill together, each on its threads.
+FieldLevelMemory node_memory(const Communicator& communicator, ThreadPool& pool) {
+  return [communicator, &pool](std::size_t count, const FieldLevelFill& fill) {
     const auto samples_of = [count](const std::byte* bytes) {
       return reinterpret_cast<const std::uint16_t*>(bytes);
     };
-    const auto owner = node.allocate_on_node_together(
+    const auto owner = communicator.allocate_on_node_together(
         count * sizeof(std::uint16_t), [&](std::span<std::byte> memory, int rank, int ranks) {
           const std::span samples(reinterpret_cast<std::uint16_t*>(memory.data()), count);
           pool.for_each(kPartsPerRank, [&](int part, int /*slot*/) {
@@ -109,10 +142,9 @@ std::vector<RendererLevel> coarse_field_levels(const CompressedAttenuationField&
                                                const Communicator& communicator) {
   std::vector<RendererLevel> levels;
   if (options.coarsest_level < 1) return levels;
-  const Communicator node = communicator.node();
   const auto pool = options.pool ? options.pool : std::make_shared<ThreadPool>();
   for (const auto& level :
-       make_field_pyramid(field, options.coarsest_level, node_memory(node, *pool)))
+       make_field_pyramid(field, options.coarsest_level, node_memory(communicator, *pool)))
     levels.push_back({std::make_shared<const TwoPassAfDrr>(level, TwoPassOptions{}, pool),
                       level->blur_sigma_mm(true)});
   return levels;
@@ -124,7 +156,7 @@ std::shared_ptr<const AttenuationVolume> blurred_per_node(const AttenuationVolum
                                                           const Communicator& communicator) {
   const VolumeBlur blur(volume.grid(), sigma_mm);
   const std::size_t count = blur.grid().voxel_count();
-  const auto owner = communicator.node().allocate_on_node(
+  const auto owner = communicator.allocate_on_node(
       count * sizeof(std::uint16_t), [&](std::span<std::byte> memory) {
         blur.fill(volume, {reinterpret_cast<std::uint16_t*>(memory.data()), count});
       });
@@ -241,8 +273,10 @@ LoadedCase load_case(const Study& study,
   problem->isocenter_point = study.rig.isocenter_point;
   all_or_none(communicator, [&] {
     require_known_field_cameras(study_case, options);
-    problem->views = read_views(study, study_case, options.fiducial_mask_mm, loaded.input_sha256);
+    loaded.input_sha256["case"] = case_sha256(study, study_case);
   });
+  problem->views =
+      read_views(study, study_case, options.fiducial_mask_mm, communicator, loaded.input_sha256);
 
   std::optional<CtFacts> ct;
   if (options.renderer == RendererKind::RayCast) {

@@ -47,12 +47,12 @@ struct LoadedCase {
 };
 
 /// Collective. Everything a registration of one case needs, with the same content on every rank:
-/// X-rays and masks, fields or the CT's attenuation, and their coarser levels, all held once per
-/// node. The levels of ray casting are the CT, blurred as the levels of fields blur DRRs. With
-/// fields the CT is read by rank 0 alone, for its hash and grid (skip_ct_check: not at all; steps
-/// are then scaled as if it filled 200 mm about the ROI centre). FileError (exit 4) when a field
-/// was made from another CT (both hashes are named) or for another camera (geometry to 1e-3 mm);
-/// InputError when a view has no field or the field's range does not hold the nominal pose.
+/// X-rays and masks (on every rank), fields or the CT's attenuation, and their coarser levels, held
+/// once per node. The levels of ray casting are the CT, blurred as the levels of fields blur DRRs.
+/// With fields the CT is read by rank 0 alone, for its hash and grid (skip_ct_check: not at all;
+/// steps are then scaled as if it filled 200 mm about the ROI centre). FileError (exit 4) when a
+/// field was made from another CT (both hashes are named) or for another camera (geometry to 1e-3
+/// mm); InputError when a view has no field or the field's range does not hold the nominal pose.
 LoadedCase load_case(const Study& study,
                      const StudyCase& study_case,
                      const CaseLoadOptions& options,

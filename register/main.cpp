@@ -10,7 +10,8 @@
 #include "io/csv_table.h"
 #include "io/output_file.h"
 #include "io/output_lock.h"
-#include "io/study_file.h"
+#include "io/shared_inputs.h"
+#include "parallel/work_watch.h"
 #include "register/method_command.h"
 #include "register/multi_start_program.h"
 #include "register/register_command.h"
@@ -26,13 +27,13 @@ void run(const RegisterOptions& options,
          const std::string& command_line,
          const Communicator& world) {
   using namespace af::registration;
+  af::cli::listen_for_stop_requests();
   const RegistrationOptions method = af::all_or_none(world, [&] {
     af::throw_if_any(problems(options));
     return resolve(options.method);
   });
   std::vector<std::string> study_warnings;
-  const af::Study study =
-      af::all_or_none(world, [&] { return af::read_study(options.study, &study_warnings); });
+  const af::Study study = af::read_study(options.study, world, &study_warnings);
   for (const std::string& text : study_warnings) af::cli::warn(world, text);
   const af::StudyCase study_case =
       af::all_or_none(world, [&] { return study.find_case(options.case_name); });
@@ -42,7 +43,10 @@ void run(const RegisterOptions& options,
   const auto pool = std::make_shared<af::ThreadPool>(af::thread_count(options.method.threads));
   CaseLoadOptions load_options = case_load_options(options, method.coarsest_level());
   load_options.pool = pool;
-  const LoadedCase loaded = load_case(study, study_case, load_options, world);
+  const LoadedCase loaded = [&] {
+    const af::WorkNote note("loading case " + study_case.name, af::WorkNote::Kind::Phase);
+    return load_case(study, study_case, load_options, world);
+  }();
   for (const std::string& text : loaded.warnings) af::cli::warn(world, text);
   RegistrationRunner runner =
       af::all_or_none(world, [&] { return RegistrationRunner(loaded.problem, method, pool); });
@@ -55,7 +59,6 @@ void run(const RegisterOptions& options,
     lock.emplace(options.output_folder);
   });
 
-  af::cli::listen_for_stop_requests();
   RunDescription description{study_case.name, options.renderer, {}};
   description.provenance = {"af-register",
                             command_line,

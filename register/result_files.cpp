@@ -252,6 +252,8 @@ std::string write_run(const std::vector<RegistrationRecord>& records,
                       const RunDescription& run,
                       const std::filesystem::path& folder) {
   const RegistrationRecord& best = records[best_record(records)];
+  // What an earlier run left here is whole no more.
+  std::filesystem::remove(folder / "result.json");
   std::ostringstream summary;
   summary << "case " << run.case_name << ", renderer " << run.renderer << '\n';
   if (records.size() > 1) {

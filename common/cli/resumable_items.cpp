@@ -33,9 +33,8 @@ std::string of_all(std::size_t part, std::size_t all) {
 }  // namespace
 
 ResumableItems::ResumableItems(const UnfinishedWork& work, const Communicator& communicator)
-    : folder_(work.folder),
-      communicator_(communicator),
-      shard_(work.folder, work.name, communicator.rank()) {
+    : folder_(work.folder), communicator_(communicator) {
+  std::array<std::uint64_t, 1> run{};
   all_or_none(communicator_, [&] {
     if (!communicator_.is_root()) return;
     journal_ =
@@ -43,7 +42,10 @@ ResumableItems::ResumableItems(const UnfinishedWork& work, const Communicator& c
     journal_->mend_and_visit(
         [&](std::span<const std::byte> record) { finished_.push_back(item_of(record, folder_)); });
     std::sort(finished_.begin(), finished_.end());
+    run[0] = static_cast<std::uint64_t>(journal_->run());
   });
+  communicator_.maximum(run);
+  shard_.emplace(work.folder, work.name, static_cast<int>(run[0]), communicator_.rank());
 }
 
 std::vector<std::int64_t> ResumableItems::unfinished(const std::vector<std::int64_t>& items) const {
@@ -91,12 +93,12 @@ void ResumableItems::append(std::int64_t item, std::span<const std::byte> result
   record_.resize(sizeof(item) + result.size());
   std::memcpy(record_.data(), &item, sizeof(item));
   std::copy(result.begin(), result.end(), record_.begin() + sizeof(item));
-  shard_.append(record_);
+  shard_->append(record_);
   ++saved_;
 }
 
 void ResumableItems::save(const std::string& what) {
-  all_or_none(communicator_, [&] { shard_.sync(); });
+  all_or_none(communicator_, [&] { shard_->sync(); });
   // Ranks may have seen the request at different times: one that did is enough.
   std::array<std::uint64_t, 1> stops = {is_stop_requested() ? 1U : 0U};
   communicator_.maximum(stops);

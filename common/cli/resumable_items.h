@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -58,7 +59,7 @@ class ResumableItems {
   std::filesystem::path folder_;
   Communicator communicator_;
   std::unique_ptr<ProgressJournal> journal_;  ///< rank 0 alone
-  ProgressShard shard_;                       ///< this rank's
+  std::optional<ProgressShard> shard_;        ///< this rank's
   std::vector<std::int64_t> finished_;        ///< rank 0: by earlier runs, ascending
   std::vector<std::int64_t> items_;           ///< rank 0: of complete()
   std::uint64_t saved_ = 0;        ///< of items_, by this rank; on rank 0 by earlier runs too

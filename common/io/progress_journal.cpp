@@ -6,9 +6,11 @@
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <system_error>
+#include <tuple>
 #include <vector>
 
 #include "base/crc32c.h"
@@ -21,7 +23,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kFormat = "af-progress-journal";
-constexpr int kFormatVersion = 2;  // 2: one file of records per process
+constexpr int kFormatVersion = 3;  // 3: one file of records per run and process
 
 /// Stands before every record.
 struct RecordHeader {
@@ -65,24 +67,37 @@ fs::path manifest_path(const fs::path& folder, const std::string& name) {
   return folder / (name + ".json");
 }
 
-/// "NAME.000012.records".
-fs::path shard_path(const fs::path& folder, const std::string& name, int shard) {
-  const std::string digits = std::to_string(shard);
-  constexpr std::size_t kWidth = 6;
-  return folder / (name + "." + std::string(kWidth - std::min(kWidth, digits.size()), '0') +
-                   digits + ".records");
+std::string padded(int number, std::size_t width) {
+  const std::string digits = std::to_string(number);
+  return std::string(width - std::min(width, digits.size()), '0') + digits;
 }
 
-/// The shards of a journal, in order. Another journal's name may begin alike.
-std::vector<fs::path> shards_of(const fs::path& folder, const std::string& name) {
-  std::vector<fs::path> shards;
+/// "NAME.0002-000012.records".
+fs::path shard_path(const fs::path& folder, const std::string& name, int run, int shard) {
+  return folder / (name + "." + padded(run, 4) + "-" + padded(shard, 6) + ".records");
+}
+
+struct ShardFile {
+  fs::path path;
+  int run = 0;
+};
+
+/// The shards of a journal, by run and name. Another journal's name may begin alike.
+std::vector<ShardFile> shards_of(const fs::path& folder, const std::string& name) {
+  std::vector<ShardFile> shards;
   for (const auto& entry : fs::directory_iterator(folder)) {
     const std::string file = entry.path().filename().string();
     if (!file.starts_with(name + ".")) continue;
-    const int shard = std::atoi(file.c_str() + name.size() + 1);
-    if (entry.path() == shard_path(folder, name, shard)) shards.push_back(entry.path());
+    const char* const number = file.c_str() + name.size() + 1;
+    const int run = std::atoi(number);
+    const char* const dash = std::strchr(number, '-');
+    if (dash == nullptr || run < 0 || run == std::numeric_limits<int>::max()) continue;
+    if (entry.path() == shard_path(folder, name, run, std::atoi(dash + 1)))
+      shards.push_back({entry.path(), run});
   }
-  std::sort(shards.begin(), shards.end());
+  std::sort(shards.begin(), shards.end(), [](const ShardFile& a, const ShardFile& b) {
+    return std::tie(a.run, a.path) < std::tie(b.run, b.path);
+  });
   return shards;
 }
 
@@ -110,41 +125,42 @@ ProgressJournal::ProgressJournal(const fs::path& folder,
   if (restart) fs::remove(manifest);
   if (fs::exists(manifest)) {
     require_same(read_manifest(manifest), decides, folder_);
+    for (const ShardFile& shard : shards_of(folder_, name_)) run_ = std::max(run_, shard.run + 1);
     return;
   }
   // Records without a manifest are of nobody knows what.
-  for (const fs::path& shard : shards_of(folder_, name_)) fs::remove(shard);
+  for (const ShardFile& shard : shards_of(folder_, name_)) fs::remove(shard.path);
   const nlohmann::json json = {
       {"format", kFormat}, {"format_version", kFormatVersion}, {"decides", decides}};
   write_text_file(manifest, json.dump(2) + "\n");
 }
 
 void ProgressJournal::visit(int shard_count, const Visit& visit) const {
-  const std::vector<fs::path> listed = shards_of(folder_, name_);
-  std::set<fs::path> shards(listed.begin(), listed.end());
+  std::set<fs::path> shards;
+  for (const ShardFile& shard : shards_of(folder_, name_)) shards.insert(shard.path);
   for (int shard = 0; shard < shard_count; ++shard)
-    if (const fs::path path = shard_path(folder_, name_, shard); fs::exists(path))
+    if (const fs::path path = shard_path(folder_, name_, run_, shard); fs::exists(path))
       shards.insert(path);
   for (const fs::path& shard : shards) visit_shard(shard, visit);
 }
 
 void ProgressJournal::mend_and_visit(const Visit& visit) {
-  for (const fs::path& shard : shards_of(folder_, name_)) {
-    const std::uint64_t sound_bytes = visit_shard(shard, visit);
-    if (sound_bytes < fs::file_size(shard)) fs::resize_file(shard, sound_bytes);
+  for (const ShardFile& shard : shards_of(folder_, name_)) {
+    const std::uint64_t sound_bytes = visit_shard(shard.path, visit);
+    if (sound_bytes < fs::file_size(shard.path)) fs::resize_file(shard.path, sound_bytes);
   }
 }
 
 void ProgressJournal::remove() {
   // The manifest first: shards alone are of nothing.
   fs::remove(manifest_path(folder_, name_));
-  for (const fs::path& shard : shards_of(folder_, name_)) fs::remove(shard);
+  for (const ShardFile& shard : shards_of(folder_, name_)) fs::remove(shard.path);
   std::error_code not_empty;
   fs::remove(folder_, not_empty);
 }
 
-ProgressShard::ProgressShard(const fs::path& folder, const std::string& name, int shard)
-    : path_(shard_path(folder, name, shard)) {}
+ProgressShard::ProgressShard(const fs::path& folder, const std::string& name, int run, int shard)
+    : path_(shard_path(folder, name, run, shard)), last_sync_(std::chrono::steady_clock::now()) {}
 
 void ProgressShard::append(std::span<const std::byte> record) {
   if (!file_.is_open()) file_.open(path_, std::ios::binary | std::ios::app);
@@ -158,10 +174,12 @@ void ProgressShard::append(std::span<const std::byte> record) {
   file_.flush();
   if (!file_)
     throw FileError(path_.string(), std::string("cannot be written: ") + std::strerror(errno));
+  if (std::chrono::steady_clock::now() - last_sync_ > std::chrono::minutes(1)) sync();
 }
 
 void ProgressShard::sync() {
   if (file_.is_open()) sync_path(path_);
+  last_sync_ = std::chrono::steady_clock::now();
 }
 
 }  // namespace af

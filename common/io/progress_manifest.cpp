@@ -6,6 +6,7 @@
 
 #include "base/build_info.h"
 #include "base/error.h"
+#include "io/sha256.h"
 
 namespace af {
 namespace {
@@ -35,11 +36,26 @@ std::filesystem::path progress_folder(const std::filesystem::path& output) {
   return folder += ".progress";
 }
 
+std::string program_build() {
+  constexpr std::size_t kDigits = 16;
+  static const std::string build = std::string(program_version()) + " build " +
+                                   sha256_of_file("/proc/self/exe").substr(0, kDigits);
+  return build;
+}
+
 DecidingValues deciding_values(const std::string& options_toml,
                                const std::map<std::string, std::string>& input_sha256) {
   DecidingValues values = values_of_lines(options_toml);
-  values.erase("threads");
-  values["program version"] = program_version();
+  for (const char* key : {"threads",
+                          "study",
+                          "ct",
+                          "field",
+                          "poses",
+                          "starts",
+                          "starts_from",
+                          "equivalence_margin_mm"})
+    values.erase(key);
+  values["program"] = program_build();
   for (const auto& [name, hash] : input_sha256) values["SHA-256 of " + name] = hash;
   return values;
 }

@@ -13,8 +13,13 @@ using DecidingValues = std::map<std::string, std::string>;
 /// "OUTPUT.progress", beside the output: where its unfinished work lies.
 std::filesystem::path progress_folder(const std::filesystem::path& output);
 
-/// What decides every result of a run: this program's version, the options in force as TOML (but
-/// `threads` and comments) and the inputs' SHA-256 by name.
+/// The running program's version and the beginning of its file's SHA-256: another build may compute
+/// something else.
+std::string program_build();
+
+/// What decides every result of a run: this program's build, the inputs' SHA-256 by name, and the
+/// options in force as TOML but for threads, comments and the paths of inputs, whose contents
+/// count.
 DecidingValues deciding_values(const std::string& options_toml,
                                const std::map<std::string, std::string>& input_sha256);
 

@@ -230,12 +230,18 @@ std::string builtin_rig_text(const std::string& name) {
 CameraRig read_rig(const std::string& name_or_path, std::vector<std::string>* warnings) {
   if (name_or_path.empty()) throw InputError("rig", "\"\"", "must not be empty");
   if (const auto found = builtin_rigs().find(name_or_path); found != builtin_rigs().end())
-    return rig_from_table(parse_toml(found->second, name_or_path), name_or_path, warnings);
+    return parse_rig(found->second, name_or_path, warnings);
   std::error_code ignored;
   if (!std::filesystem::exists(name_or_path, ignored))
     throw FileError(name_or_path,
                     "no such file, and not a shipped rig (" + joined(builtin_rig_names()) + ")");
   return rig_from_table(read_toml_file(name_or_path), name_or_path, warnings);
+}
+
+CameraRig parse_rig(const std::string& text,
+                    const std::string& file,
+                    std::vector<std::string>* warnings) {
+  return rig_from_table(parse_toml(text, file), file, warnings);
 }
 
 std::string rig_to_toml(const CameraRig& rig) {

@@ -19,6 +19,11 @@ std::string builtin_rig_text(const std::string& name);
 /// receives e.g. "camera 'A': mirrored ...".
 CameraRig read_rig(const std::string& name_or_path, std::vector<std::string>* warnings = nullptr);
 
+/// The same from its text; messages name `file`.
+CameraRig parse_rig(const std::string& text,
+                    const std::string& file,
+                    std::vector<std::string>* warnings = nullptr);
+
 /// The rig as TOML text that read_rig() reads back to the last bit.
 std::string rig_to_toml(const CameraRig& rig);
 

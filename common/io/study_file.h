@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
@@ -77,6 +78,11 @@ struct Study {
 /// the detector, collinear or unequal numbers of fiducials, unknown camera, unknown keys as a typo
 /// hint), FileError (4) when it cannot be parsed. `warnings` receives those of the rig.
 Study read_study(const std::filesystem::path& path, std::vector<std::string>* warnings = nullptr);
+
+/// read_study() of a text that stands in `path`, its rig read by `read_rig_of`.
+Study parse_study(const std::string& text,
+                  const std::filesystem::path& path,
+                  const std::function<CameraRig(const std::string& name_or_path)>& read_rig_of);
 
 /// Runs `use`, which reads the file that `key` names; what it throws then begins with the study's
 /// line. \test StudyFile.ErrorsOfItsFilesNameTheLine

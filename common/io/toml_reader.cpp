@@ -136,8 +136,7 @@ toml::table parse_toml(std::string_view text, const std::string& file) {
 }
 
 toml::table read_toml_file(const std::filesystem::path& path) {
-  constexpr std::size_t kMaxBytes = std::size_t{64} << 20;
-  return parse_toml(read_text_file(path, kMaxBytes), path.string());
+  return parse_toml(read_text_file(path, kMostTomlBytes), path.string());
 }
 
 void TomlProblems::add(const toml::node& node, const std::string& message) {

@@ -19,7 +19,9 @@ namespace af {
 /// Parses TOML. FileError "FILE:LINE:COLUMN: reason" when it is not TOML; also for an empty text
 /// and for keys nested so deeply that handling them would exhaust the stack.
 toml::table parse_toml(std::string_view text, const std::string& file);
-/// parse_toml() of a file of at most 64 MiB.
+constexpr std::size_t kMostTomlBytes = std::size_t{64} << 20;
+
+/// parse_toml() of a file of at most kMostTomlBytes.
 toml::table read_toml_file(const std::filesystem::path& path);
 
 /// Collects everything wrong with one file, so that all of it is reported at once.

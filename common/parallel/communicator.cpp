@@ -238,7 +238,8 @@ std::shared_ptr<const std::byte> Communicator::allocate_on_node_together(
   int unit = 1;
   require_success(MPI_Win_shared_query(owner->window, 0, &shared_bytes, &unit, &base),
                   "MPI_Win_shared_query");
-  all_or_none(on_node,
+  // All nodes: ranks of another would go on to a collective call that these never reach.
+  all_or_none(*this,
               [&] { fill(std::span<std::byte>(base, bytes), on_node.rank(), on_node.size()); });
   on_node.barrier();
   return {owner, base};

@@ -44,9 +44,8 @@ class Communicator {
   /// Collective. The ranks that share this rank's memory.
   [[nodiscard]] Communicator node() const;
 
-  /// Collective over node(): memory of `bytes` bytes held once per node; `fill` runs on each node's
-  /// first rank only, and all wait for it. An exception in `fill` is thrown on every rank of the
-  /// node.
+  /// Collective. Memory of `bytes` bytes held once per node; `fill` runs on each node's first rank
+  /// only, and all wait for it. An exception in `fill` is thrown on every rank of every node.
   [[nodiscard]] std::shared_ptr<const std::byte> allocate_on_node(
       std::size_t bytes, const std::function<void(std::span<std::byte>)>& fill) const;
   /// The same, filled together: `fill` runs on every rank of the node and gets all the memory, its

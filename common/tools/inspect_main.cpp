@@ -18,6 +18,7 @@ struct Options {
   af::InspectOptions inspect;
   bool as_json = false;
   bool lists_views = false;
+  bool lists_inputs = false;
 };
 
 /// The report of each path as soon as it is known; JSON is one array.
@@ -37,9 +38,11 @@ void run(const Options& options, const Communicator& world) {
     if (world.is_root()) std::cout << af::template_text(options.template_name);
     return;
   }
-  if (options.lists_views) {
+  if (options.lists_views || options.lists_inputs) {
     for (const std::string& path : options.paths) {
-      const std::string lines = af::all_or_none(world, [&] { return af::view_lines(path); });
+      const std::string lines = af::all_or_none(world, [&] {
+        return options.lists_views ? af::view_lines(path) : af::input_lines(path);
+      });
       if (world.is_root()) std::cout << lines;
     }
     return;
@@ -88,6 +91,12 @@ int main(int argc, char** argv) {
                "Of studies, for scripts: one line per view, its case and its camera with a tab "
                "between them")
       ->excludes("--json");
+  app.add_flag("--list-inputs",
+               options.lists_inputs,
+               "Of studies, for scripts: one line per case and file that it reads, with a tab "
+               "between them")
+      ->excludes("--json")
+      ->excludes("--list-views");
   app.add_option("--series",
                  options.inspect.series_uid,
                  "SeriesInstanceUID to read from a DICOM folder that holds several series");

@@ -265,4 +265,21 @@ std::string view_lines(const fs::path& study_path) {
   return lines;
 }
 
+std::string input_lines(const fs::path& study_path) {
+  std::string lines;
+  const Study study = read_study(study_path);
+  for (const StudyCase& study_case : study.cases) {
+    const auto add = [&](const fs::path& path) {
+      lines += study_case.name + '\t' + path.string() + '\n';
+    };
+    add(study_case.ct);
+    if (fs::exists(study.rig_name_or_path)) add(study.rig_name_or_path);
+    for (const StudyView& view : study_case.views) {
+      add(view.xray);
+      if (view.mask.has_value()) add(*view.mask);
+    }
+  }
+  return lines;
+}
+
 }  // namespace af

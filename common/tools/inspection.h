@@ -44,4 +44,8 @@ std::string to_text(const Inspection& inspection);
 /// For scripts: one line per view of a study, "case<tab>camera". Throws as read_study().
 std::string view_lines(const std::filesystem::path& study_path);
 
+/// For scripts: a line "case<tab>path" for every file that a study's cases read: CT, rig (unless it
+/// is a shipped one), X-rays, masks. FileError and InputError as read_study().
+std::string input_lines(const std::filesystem::path& study_path);
+
 }  // namespace af

@@ -95,8 +95,8 @@ void measure_messages(const Communicator& world, int repetitions, QueueCosts& co
 void measure_rows(int repetitions, QueueCosts& costs) {
   const test::ScratchFolder folder;
   const ProgressJournal journal(folder.path(), "case", {}, true);
-  ProgressShard on_rank_zero(folder.path(), "case", 0);
-  ProgressShard own(folder.path(), "case", 1);
+  ProgressShard on_rank_zero(folder.path(), "case", 0, 0);
+  ProgressShard own(folder.path(), "case", 0, 1);
   // Medians over rounds: now and then the disk takes its time.
   constexpr int kRows = 500;
   std::vector<RegistrationRow> kept(kRows);

@@ -24,7 +24,7 @@ table='
 ^common/cli/         | cli parallel base | IOSTREAM
 ^common/io/(itk_image_io|dicom_pixels)[.] | io base | ITK
 ^common/io/(ct_reader|dicom_series|xray_reader)[.] | io volume image geometry base |
-^common/io/node_ct[.] | io parallel volume image geometry base |
+^common/io/(node_ct|shared_inputs)[.] | io parallel volume image geometry base |
 ^common/io/field_file[a-z0-9_]*[.] | io field parallel image geometry base | MPI HDF5
 ^common/io/          | io image geometry base |
 ^common/tools/       | * | IOSTREAM

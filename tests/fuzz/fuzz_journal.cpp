@@ -28,7 +28,7 @@ Records records_of(ProgressJournal& journal) {
 
 Records append_records(fuzz::InputBytes& input) {
   const ProgressJournal journal(folder(), "case", kDecides, true);
-  ProgressShard shard(folder(), "case", 0);
+  ProgressShard shard(folder(), "case", 0, 0);
   Records records;
   for (std::size_t left = input.take_below(6); left > 0; --left) {
     records.emplace_back(fuzz::as_text(input.take_bytes(input.take_below(64))));
@@ -39,7 +39,7 @@ Records append_records(fuzz::InputBytes& input) {
 
 /// Cuts the file or changes bytes in it.
 void damage(fuzz::InputBytes& input) {
-  const auto path = folder() / "case.000000.records";
+  const auto path = folder() / "case.0000-000000.records";
   if (!std::filesystem::exists(path)) return;
   for (std::size_t left = input.take_below(4); left > 0; --left) {
     const auto size = std::filesystem::file_size(path);
@@ -63,7 +63,7 @@ void read_and_go_on(const Records& appended) {
       found.size() <= appended.size() && std::equal(found.begin(), found.end(), appended.begin()),
       "records are those that were appended");
   found.emplace_back("one more");
-  ProgressShard(folder(), "case", 0).append(std::as_bytes(std::span(found.back())));
+  ProgressShard(folder(), "case", 0, 0).append(std::as_bytes(std::span(found.back())));
   ProgressJournal again(folder(), "case", kDecides, false);
   fuzz::require(records_of(again) == found, "a repaired journal goes on");
 }
@@ -81,7 +81,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       return 0;
     case 1: {
       ProgressJournal journal(folder(), "case", kDecides, true);
-      fuzz::written("journal/case.000000.records", fuzz::as_text(input.rest()));
+      fuzz::written("journal/case.0000-000000.records", fuzz::as_text(input.rest()));
       fuzz::is_accepted([&] { records_of(journal); });
       return 0;
     }

@@ -245,6 +245,10 @@ TEST(AfInspect, VerifiesAFieldAndAStudyAndSeesDamage) {
   EXPECT_EQ(study_entry["kind"], "study");
   EXPECT_EQ(study_entry["facts"]["cases"][0]["views"].size(), 2u);
   EXPECT_EQ(inspect("--list-views " + study).output, "ellipsoids\tAP\nellipsoids\tLAT\n");
+  std::string inputs;
+  for (const char* name : {"ct.nii.gz", "rig.toml", "AP.mha", "LAT.mha"})
+    inputs += "ellipsoids\t" + (folder / name).string() + "\n";
+  EXPECT_EQ(inspect("--list-inputs " + study).output, inputs);
 
   const fs::path field = folder / "AP.af.h5";
   const test::ProgramRun made = test::run_command(

@@ -108,17 +108,26 @@ void count_units(const std::string& shard, KeptWork& kept) {
   }
 }
 
+/// Whole records of all processes and runs in a journal's folder.
+std::uint64_t kept_records(const fs::path& folder) {
+  std::uint64_t count = 0;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    if (entry.path().extension() != ".records") continue;
+    const std::string records = read_text_file(entry.path());
+    constexpr std::size_t kHeaderBytes = 16;
+    for (std::size_t at = 0; at + kHeaderBytes <= records.size(); ++count) {
+      at += kHeaderBytes + number_at<std::uint32_t>(records, at + 4);
+      if (at > records.size()) break;
+    }
+  }
+  return count;
+}
+
 KeptWork kept_work(const fs::path& folder) {
   KeptWork kept;
   for (const auto& entry : fs::directory_iterator(folder))
     if (entry.path().extension() == ".shard") count_units(read_text_file(entry.path()), kept);
-  if (!fs::exists(folder / "training.000000.records")) return kept;
-  const std::string records = read_text_file(folder / "training.000000.records");
-  constexpr std::size_t kHeaderBytes = 16;
-  for (std::size_t at = 0; at + kHeaderBytes <= records.size(); ++kept.iterations) {
-    at += kHeaderBytes + number_at<std::uint32_t>(records, at + 4);
-    if (at > records.size()) return kept;
-  }
+  kept.iterations = kept_records(folder);
   return kept;
 }
 
@@ -337,9 +346,13 @@ class KillMatrix : public testing::Test {
   }
 
   static void expect_whole_registration(const Plan& plan, const fs::path& folder) {
+    const std::uint64_t kept = kept_records(folder.string() + ".progress");
     test::LaunchedJob job(registration(plan.other_ranks, folder), path("output.txt"));
     ASSERT_EQ(job.wait(kEndsWithin), 0) << read_text_file(path("output.txt"));
-    EXPECT_NE(read_text_file(path("output.txt")).find("goes on after"), std::string::npos);
+    EXPECT_NE(
+        read_text_file(path("output.txt")).find("goes on after " + std::to_string(kept) + " of "),
+        std::string::npos)
+        << kept << " rows were kept";
     EXPECT_EQ(rows_without_seconds(folder), rows_);
     EXPECT_FALSE(fs::exists(folder.string() + ".progress"));
   }

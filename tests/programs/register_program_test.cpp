@@ -92,8 +92,8 @@ TEST_F(RegisterProgram, RegistersByFieldAndByRayCasting) {
        {"pose.toml", "result.tfm", "AP-overlay.png", "LAT-overlay.png", "reproduce.sh"})
     EXPECT_TRUE(fs::exists(path("by-field/" + std::string(name)))) << name;
   const nlohmann::json provenance = result("by-field").at("provenance");
-  // Study, CT, two fields, two X-rays.
-  EXPECT_EQ(provenance.at("input_sha256").size(), 6U) << provenance;
+  // Study, its case, CT, two fields, two X-rays.
+  EXPECT_EQ(provenance.at("input_sha256").size(), 7U) << provenance;
 }
 
 TEST_F(RegisterProgram, ManyStartsGiveTheSameRowsOnAnyRankCount) {
@@ -130,6 +130,13 @@ TEST_F(RegisterProgram, ManyStartsGoOnAfterAStop) {
   expect_refused(first, 75, " of 60 saved: run the same command again");
   EXPECT_FALSE(fs::exists(path("stopped/result.json")));
   expect_refused(run_register(arguments + output + " --max-evaluations 99"), 3, "begun with");
+  Study changed = read_study(path("study.toml"));
+  changed.cases.front().views.front().roi.width -= 1;
+  write_text_file(path("changed.toml"), study_to_toml(changed, path("")));
+  expect_refused(test::run_command(program("af-register") + " --study " + path("changed.toml") +
+                                   arguments + output),
+                 3,
+                 "SHA-256 of case");
   const test::ProgramRun last = test::run_until_done(program("af-register") + " --study " +
                                                      path("study.toml") + arguments + output);
   ASSERT_EQ(last.exit_code, 0) << last.output;

@@ -58,7 +58,7 @@ precompute_ranks=2 precompute_memory=100M precompute_time=00:10:00
 evaluate_ranks=2 evaluate_memory=100M evaluate_time=00:10:00
 report_memory=100M report_time=00:05:00
 stop_seconds=5
-most_requeues=3
+most_requeues=3 most_fruitless=3
 precompute_options=(--max-rotation-deg 10 --max-translation-mm 30 --uv-nodes 40 --st-nodes 96 --codewords 2048 --caster trilinear)
 evaluate_options=(--preset paper --starts-per-interval 20)
 TEXT
@@ -88,8 +88,13 @@ stop_job() {
 }
 
 submit "$disturbed"
+refused=0
+submit "$disturbed" >"$scratch/second.log" 2>&1 || refused=$?
+if ((refused != 3)) || ! grep -q 'still in the queue' "$scratch/second.log"; then
+  fail "a second chain in the same folder was not refused"
+fi
 stop_job af-precompute-1 "$disturbed/fields/patient-1-A.af.h5.progress/0000-000000.shard"
-stop_job af-evaluate "$disturbed/registration/patient-1.progress/patient-1-field.000000.records"
+stop_job af-evaluate "$disturbed/registration/patient-1.progress/patient-1-field.0000-000000.records"
 wait_until 300 "the disturbed chain" no_jobs_left
 [[ -s "$disturbed/report.html" ]] || fail "no report.html after the disturbed chain"
 for stage in precompute-1 evaluate; do
@@ -102,6 +107,22 @@ done
 submit "$disturbed"
 wait_until 120 "the chain that was done before" no_jobs_left
 [[ "$(grep -l 'done before' "$disturbed"/logs/*.log | wc -l)" == 6 ]] || fail "something was done twice"
+
+# A job that its owner cancels does not come back; the next chain goes on from what it had finished.
+rm "$disturbed/registration/patient-2/summary.json"
+submit "$disturbed"
+rows=$disturbed/registration/patient-2.progress/patient-2-field.0000-000000.records
+wait_until 120 "$rows" test -s "$rows"
+scancel --name af-evaluate
+scancel --name af-report
+wait_until 120 "the end of what was cancelled" no_jobs_left
+sleep 3
+no_jobs_left || fail "a cancelled job was queued again"
+[[ ! -e "$disturbed/registration/patient-2/summary.json" ]] || fail "the cancelled job had ended before"
+submit "$disturbed"
+wait_until 300 "the chain after a cancelled one" no_jobs_left
+grep -q 'goes on after' "$disturbed/logs/evaluate-1.log" || fail "nothing of the cancelled job was taken over"
+[[ "$(rows_of "$disturbed")" == "$(rows_of "$undisturbed")" ]] || fail "the rows differ after the cancelled job"
 
 # And without Slurm.
 local_run=$scratch/run-local

@@ -20,8 +20,8 @@ using testing::HasSubstr;
 
 const DecidingValues kDecides = {{"seed", "1"}, {"preset", "paper"}};
 
-void append(const fs::path& folder, const std::string& text, int shard = 0) {
-  ProgressShard writer(folder, "case", shard);
+void append(const fs::path& folder, const std::string& text, int shard = 0, int run = 0) {
+  ProgressShard writer(folder, "case", run, shard);
   writer.append(std::as_bytes(std::span(text)));
   writer.sync();
 }
@@ -44,7 +44,7 @@ std::vector<std::string> finished(ProgressJournal& journal) {
 fs::path three_records(const fs::path& folder) {
   const ProgressJournal journal(folder, "case", kDecides, false);
   for (const char* text : {"one", "", "three"}) append(folder, text);
-  return folder / "case.000000.records";
+  return folder / "case.0000-000000.records";
 }
 
 TEST(ProgressJournal, GivesBackWhatEarlierRunsAppended) {
@@ -59,6 +59,21 @@ TEST(ProgressJournal, GivesBackWhatEarlierRunsAppended) {
   EXPECT_FALSE(fs::exists(folder / "p"));
 }
 
+TEST(ProgressJournal, GivesEveryRunFilesOfItsOwn) {
+  const test::ScratchFolder folder;
+  three_records(folder / "p");
+  const ProgressJournal second(folder / "p", "case", kDecides, false);
+  EXPECT_EQ(second.run(), 1);
+  append(folder / "p", "four", 0, second.run());
+  // Runs go by number, not by letters; the first one's process writes on.
+  append(folder / "p", "far later", 0, 10001);
+  append(folder / "p", "from the past", 0, 0);
+  ProgressJournal last(folder / "p", "case", kDecides, false);
+  EXPECT_EQ(last.run(), 10002);
+  EXPECT_THAT(finished(last),
+              ElementsAre("one", "", "three", "from the past", "four", "far later"));
+}
+
 TEST(ProgressJournal, JoinsTheShardsOfAllProcessesAndNoOtherJournals) {
   const test::ScratchFolder folder;
   three_records(folder / "p");
@@ -66,7 +81,7 @@ TEST(ProgressJournal, JoinsTheShardsOfAllProcessesAndNoOtherJournals) {
   append(folder / "p", "of two", 2);
   // Names that begin alike.
   ProgressJournal other(folder / "p", "case.2", kDecides, false);
-  ProgressShard(folder / "p", "case.2", 1).append(std::as_bytes(std::span("other", 5)));
+  ProgressShard(folder / "p", "case.2", 0, 1).append(std::as_bytes(std::span("other", 5)));
   ProgressJournal journal(folder / "p", "case", kDecides, false);
   EXPECT_THAT(finished(journal), ElementsAre("one", "", "three", "of two", "of twelve"));
   EXPECT_THAT(finished(other), ElementsAre("other"));

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/shared_inputs.h"
+
+#include <array>
+#include <cstddef>
+#include <cstring>
+
+#include "io/output_file.h"
+#include "io/rig_file.h"
+
+namespace af {
+
+Study read_study(const std::filesystem::path& path,
+                 const Communicator& communicator,
+                 std::vector<std::string>* warnings) {
+  std::string study_text;
+  std::string rig_text;
+  Study study = all_or_none(communicator, [&] {
+    if (!communicator.is_root()) return Study();
+    study_text = read_text_file(path);
+    Study found = read_study(path, warnings);
+    rig_text = rig_to_toml(found.rig);
+    return found;
+  });
+  communicator.broadcast(study_text);
+  communicator.broadcast(rig_text);
+  all_or_none(communicator, [&] {
+    if (!communicator.is_root())
+      study = parse_study(
+          study_text, path, [&](const std::string& rig) { return parse_rig(rig_text, rig); });
+  });
+  return study;
+}
+
+void broadcast(Image2d& image, const Communicator& communicator) {
+  const std::size_t head_bytes = 2 * sizeof(int);
+  std::vector<std::byte> bytes;
+  if (communicator.is_root()) {
+    const std::array<int, 2> size = {image.width, image.height};
+    bytes.resize(head_bytes + image.pixels.size() * sizeof(float));
+    std::memcpy(bytes.data(), size.data(), head_bytes);
+    if (!image.pixels.empty())
+      std::memcpy(bytes.data() + head_bytes, image.pixels.data(), bytes.size() - head_bytes);
+  }
+  communicator.broadcast(bytes);
+  if (communicator.is_root()) return;
+  std::array<int, 2> size{};
+  std::memcpy(size.data(), bytes.data(), head_bytes);
+  image = Image2d(size[0], size[1]);
+  if (!image.pixels.empty())
+    std::memcpy(image.pixels.data(), bytes.data() + head_bytes, bytes.size() - head_bytes);
+}
+
+}  // namespace af

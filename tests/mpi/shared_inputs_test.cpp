@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/shared_inputs.h"
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "io/output_file.h"
+#include "io/rig_file.h"
+#include "support/shared_folder.h"
+
+namespace af {
+namespace {
+
+const char* const kStudy = R"(rig = "rig.toml"
+[[case]]
+name = "skull-01"
+ct = "ct.nii.gz"
+nominal_room_from_ct = [[1,0,0,10],[0,0,-1,20],[0,1,0,30],[0,0,0,1]]
+center_ct_mm = [0.1, 2.0, 3.0]
+target_box_ct_mm = [[-30,-31,-32],[30,31,32]]
+gold_room_from_ct = [[1,0,0,11],[0,0,-1,20],[0,1,0,30],[0,0,0,1]]
+[[case.view]]
+camera = "A"
+xray = "A.mha"
+xray_domain = "intensity"
+roi_px = [150, 160, 200, 201]
+)";
+
+TEST(SharedInputs, StudyAndRigAreReadByRankZeroAlone) {
+  const Communicator world = Communicator::world();
+  const test::SharedFolder folder;
+  if (world.is_root()) {
+    CameraRig rig = read_rig("treatment-room");
+    rig.isocenter_point.x() = 1.0 / 3.0;
+    write_text_file(folder / "rig.toml", rig_to_toml(rig));
+    write_text_file(folder / "study.toml", kStudy);
+  }
+  // Nothing is there for the others.
+  const Study study = read_study(
+      world.is_root() ? folder / "study.toml" : std::filesystem::path("/nowhere/study.toml"),
+      world);
+  EXPECT_EQ(study.rig.isocenter_point.x(), 1.0 / 3.0);
+  EXPECT_EQ(study.rig.camera("A").size_px, read_rig("treatment-room").camera("A").size_px);
+  ASSERT_EQ(study.cases.size(), 1U);
+  EXPECT_EQ(study.cases.front().center_ct_mm.x(), 0.1);
+  EXPECT_EQ(study.cases.front().views.front().roi.height, 201);
+}
+
+TEST(SharedInputs, WhatRankZeroCannotReadIsTheSameErrorOnEveryRank) {
+  const Communicator world = Communicator::world();
+  try {
+    static_cast<void>(read_study("/nowhere/study.toml", world));
+    ADD_FAILURE() << "no error on rank " << world.rank();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.exit_code(), ExitCode::File);
+  }
+}
+
+TEST(SharedInputs, ImagesReachEveryRankToTheLastBit) {
+  const Communicator world = Communicator::world();
+  Image2d image;
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  if (world.is_root()) {
+    image = Image2d(3, 2);
+    image.pixels = {0.1F, -0.0F, nan, std::numeric_limits<float>::denorm_min(), 1e30F, 7.0F};
+  }
+  broadcast(image, world);
+  ASSERT_EQ(image.width, 3);
+  ASSERT_EQ(image.height, 2);
+  ASSERT_EQ(image.pixels.size(), 6U);
+  EXPECT_EQ(image.pixels[0], 0.1F);
+  EXPECT_TRUE(std::signbit(image.pixels[1]));
+  EXPECT_TRUE(std::isnan(image.pixels[2]));
+  EXPECT_EQ(image.pixels[3], std::numeric_limits<float>::denorm_min());
+  Image2d empty;
+  broadcast(empty, world);
+  EXPECT_TRUE(empty.pixels.empty());
+}
+
+}  // namespace
+}  // namespace af
