@@ -28,7 +28,7 @@ result_of() {
 progress_of() { echo "$(value_of -o "$@").progress"; }
 
 # bytes_in FOLDER: of all files; 0 when there is none.
-bytes_in() { find "$1" -type f -printf '%s\n' 2>/dev/null | awk '{sum += $1} END {print sum + 0}'; }
+bytes_in() { { find "$1" -type f -printf '%s\n' 2>/dev/null || true; } | awk '{sum += $1} END {print sum + 0}'; }
 
 # state_of PATH...: name, size and time of a file (of the voxels beside a header, too) or of all files of a folder; of what
 # is missing, that.
