@@ -332,6 +332,7 @@ std::vector<MethodRows> begin_registrations(const RegistrationStudyOptions& opti
   const std::string name = file_name_part(evaluation.case_name);
   const DecidingValues decides = deciding_values(options, evaluation);
   std::vector<MethodRows> begun;
+  begun.reserve(methods.size());
   for (const Method& method : methods)
     begun.push_back({method.renderer,
                      method.start_indices,

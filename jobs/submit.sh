@@ -18,6 +18,7 @@ same chain; what was finished by the same commands is not done twice.
 
   --output DIR        where everything goes; must be seen by all nodes                        [./af-run]
   --resources FILE    ranks, memory, time limits, partition, programs' options   [jobs/slurm/resources.sh]
+  --status            what each task of the chain in DIR is at, and nothing else; needs no study
   --restart           throw away what earlier chains left unfinished there, and do every stage again
   --dry-run           print the chain and its commands, submit nothing
   --help
@@ -26,18 +27,57 @@ TEXT
 
 # --- options -----------------------------------------------------------------------------------------------------
 
-output="$PWD/af-run" dry_run=no restart=no
+output="$PWD/af-run" dry_run=no restart=no status=no
 while (($# > 0)); do
   case "$1" in
     --output | -o) need_value "$1" $#; output=$2; shift ;;
     --resources) need_value "$1" $#; resources=$2; shift ;;
     --restart) restart=yes ;;
+    --status) status=yes ;;
     --dry-run) dry_run=yes ;;
     --help | -h) usage; exit 0 ;;
     *) take_study "$1" ;;
   esac
   shift
 done
+
+# task_state STAGE TASK JOB: of one array task, in a word or two.
+task_state() {
+  local stage=$1 task=$2 job=$3 log="$output/logs/$1-$2.log" state
+  state=$(squeue --noheader --jobs "${job}_$task" --format %T 2>/dev/null || true)
+  if [[ -n "$state" ]]; then
+    echo "${state,,}"
+  elif [[ -f "$output/.stages/$stage-$task.done" || ("$stage" == report && -f "$output/report.html") ]]; then
+    echo "done"
+  elif [[ -s "$log" ]]; then
+    echo "ended: $(tail -n 1 "$log" | cut -c 1-80)"
+  else
+    echo "not begun"
+  fi
+}
+
+# print_status: a line for each task: stage, case, state, how often it was queued again, its log.
+print_status() {
+  local stage job line task case_name restarts
+  [[ -f "$output/jobs/submitted" ]] || die 4 "$output/jobs/submitted: no such file: no chain was submitted there"
+  while read -r job stage; do
+    task=0
+    while IFS= read -r line; do
+      case_name=$(sed -n 's/.* --case \([^ ]*\).*/\1/p' <<<"$line")
+      restarts=$(grep -c '^[-0-9]* [:0-9]* job .* restart [1-9]' "$output/logs/$stage-$task.log" 2>/dev/null || true)
+      [[ "$line" == "true "* ]] ||
+        printf '%-14s %-20s %-12s %s\n' "$stage" "${case_name:--}" "$(task_state "$stage" "$task" "$job")" \
+          "queued again ${restarts:-0} times, logs/$stage-$task.log"
+      task=$((task + 1))
+    done <"$output/jobs/$stage.commands"
+  done <"$output/jobs/submitted"
+}
+
+if [[ "$status" == yes ]]; then
+  output=$(realpath -m "$output")
+  print_status
+  exit 0
+fi
 open_study
 [[ "$dry_run" == yes ]] || command -v sbatch >/dev/null || die 1 "sbatch is missing: this is no Slurm cluster (jobs/local.sh STUDY.toml needs none)"
 
@@ -62,7 +102,7 @@ submit() {
   printf '%s\n' "$commands" >"$output/jobs/$stage.commands"
   job_id=$("${command[@]}") || die 1 "sbatch refused stage '$stage' (see above); what stands before it in the chain is submitted"
   job_id=${job_id%%;*}
-  echo "$job_id" >>"$output/jobs/submitted"
+  echo "$job_id $stage" >>"$output/jobs/submitted"
   say "$stage: job $job_id"
 }
 
@@ -84,7 +124,7 @@ lines() {
 
 # jobs_of_output: the jobs of this folder that Slurm still has.
 jobs_of_output() {
-  [[ ! -f "$output/jobs/submitted" ]] || squeue --me --noheader --format %F | sort -u | grep -Fx -f "$output/jobs/submitted" || true
+  [[ ! -f "$output/jobs/submitted" ]] || squeue --me --noheader --format %F | sort -u | grep -Fx -f <(cut -d ' ' -f 1 "$output/jobs/submitted") || true
 }
 
 output=$(realpath -m "$output")
@@ -108,4 +148,4 @@ submit evaluate "$(lines evaluate_command)" "$evaluate_ranks" "$evaluate_memory"
 # The report is of what there is, also when a case failed; it says which cases it has.
 submit report "$(typed report_command)" 1 "$report_memory" \
   "$report_time" "afterany:$job_id"
-[[ "$dry_run" == yes ]] || say "Watch: squeue --me; logs: $output/logs; at the end: $output/report.html"
+[[ "$dry_run" == yes ]] || say "Watch: squeue --me; or: jobs/submit.sh --status --output $(printf '%q' "$output"); logs: $output/logs; at the end: $output/report.html"

@@ -111,7 +111,7 @@ std::vector<std::byte> bytes_of(const RegistrationRecord& record) {
 }
 
 RegistrationRecord record_of(std::span<const std::byte> bytes) {
-  PlainRecord head;
+  PlainRecord head{};
   if (bytes.size() < sizeof(head) || (bytes.size() - sizeof(head)) % sizeof(PlainTraceRow) != 0)
     throw FileError("unfinished registrations",
                     "a record is of another size: start over with --restart");
@@ -119,7 +119,7 @@ RegistrationRecord record_of(std::span<const std::byte> bytes) {
   RegistrationRecord record = record_of(head);
   bytes = bytes.subspan(sizeof(head));
   for (; !bytes.empty(); bytes = bytes.subspan(sizeof(PlainTraceRow))) {
-    PlainTraceRow row;
+    PlainTraceRow row{};
     std::memcpy(&row, bytes.data(), sizeof(row));
     record.result.trace.push_back(trace_row_of(row));
   }

@@ -33,7 +33,7 @@ add_dependencies(evaluate_statistics_program_tests af-evaluate)
 gtest_discover_tests(evaluate_statistics_program_tests PROPERTIES LABELS programs TIMEOUT 120 DISCOVERY_TIMEOUT 60)
 
 # One CTest entry for all: the tests share a study and its fields, which take longer than they do.
-add_executable(evaluate_program_tests programs/evaluate_program_test.cpp)
+add_executable(evaluate_program_tests programs/evaluate_program_test.cpp support/launched_job.cpp)
 target_link_libraries(evaluate_program_tests PRIVATE af_compile_options af_test_support GTest::gtest_main
                                                      af_registration_case)
 target_compile_definitions(evaluate_program_tests PRIVATE AF_PROGRAM_FOLDER="${PROJECT_BINARY_DIR}/bin"

@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // af-evaluate as a user meets it: files, the same rows on every rank count, exit codes, messages.
+#include <chrono>
 #include <cmath>
+#include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <string>
+#include <sys/resource.h>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -12,10 +16,13 @@
 
 #include "io/csv_table.h"
 #include "io/output_file.h"
+#include "io/output_lock.h"
 #include "io/pose_file.h"
 #include "io/study_file.h"
 #include "programs/small_study.h"
 #include "support/browser.h"
+#include "support/kept_records.h"
+#include "support/launched_job.h"
 #include "support/run_program.h"
 #include "support/test_paths.h"
 
@@ -242,12 +249,74 @@ TEST_F(EvaluateProgram, GoesOnAfterAStopOrAKillOnAnotherRankCount) {
       EXPECT_NE(run.exit_code, 0) << run.output;
       EXPECT_FALSE(std::filesystem::exists(out + "/summary.json"));
       if (ranks == 1) expect_refused(evaluate(arguments + out + " --seed 2", 1), 3, "begun with 1");
+      const std::uint64_t kept = test::kept_records(out + ".progress");
+      EXPECT_GT(kept, 0U);
       const test::ProgramRun resumed = evaluate(arguments + out, ranks % 3 + 1);
       ASSERT_EQ(resumed.exit_code, 0) << resumed.output;
-      EXPECT_THAT(resumed.output, HasSubstr("goes on after"));
+      EXPECT_THAT(resumed.output, HasSubstr("goes on after " + std::to_string(kept) + " of 200"));
       EXPECT_EQ(rows_without_seconds(std::filesystem::path(out).filename()), expected);
       EXPECT_FALSE(std::filesystem::exists(out + ".progress"));
     }
+}
+
+TEST_F(EvaluateProgram, ASecondRunInAFolderIsRefused) {
+  const OutputLock lock(path("taken"));
+  for (const std::string& arguments :
+       {"registration --study " + path("study.toml") + fields(),
+        "similarity-curves --study " + path("study.toml") + fields(),
+        "image-quality --field " + path("LAT.af.h5") + " --ct " + path("ct.nii.gz")})
+    expect_refused(evaluate(arguments + " -o " + path("taken")), 3, "another job writes it");
+}
+
+/// Registrations that last some seconds, under mpirun; what it says goes to said.txt.
+class BrokenRegistrations : public EvaluateProgram {
+ protected:
+  static std::string arguments(const std::string& folder) {
+    return "registration --study " + path("study.toml") + fields() +
+           "--preset paper --starts-per-interval 25 -o " + path(folder);
+  }
+  static std::vector<std::string> on_two_ranks(const std::string& folder) {
+    std::vector<std::string> words = {
+        AF_MPIEXEC, "--oversubscribe", "-n", "2", AF_PROGRAM_FOLDER "/af-evaluate"};
+    std::istringstream rest(arguments(folder) + " --stall-minutes 0.05");
+    for (std::string word; rest >> word;) words.push_back(word);
+    return words;
+  }
+  static bool has_rows(const std::string& folder) {
+    std::error_code gone;
+    for (const auto& entry : std::filesystem::directory_iterator(path(folder + ".progress"), gone))
+      if (entry.path().extension() == ".records" && entry.file_size(gone) > 0) return true;
+    return false;
+  }
+  static void expect_going_on(const std::string& folder) {
+    const test::ProgramRun run = evaluate(arguments(folder), 2);
+    EXPECT_EQ(run.exit_code, 0) << run.output;
+    EXPECT_THAT(run.output, HasSubstr("goes on after"));
+    EXPECT_EQ(CsvTable::read(path(folder + "/registrations.csv")).row_count(), 200U);
+  }
+  static constexpr std::chrono::seconds kEndsWithin{60};
+};
+
+TEST_F(BrokenRegistrations, AStoppedRankIsNamedWithItsStartAndTheJobEnded) {
+  test::LaunchedJob job(on_two_ranks("stalled"), path("said.txt"));
+  ASSERT_TRUE(job.wait_until([] { return has_rows("stalled"); }));
+  kill(job.ranks().back(), SIGSTOP);
+  EXPECT_EQ(job.wait(kEndsWithin), 75) << text("said.txt");
+  EXPECT_THAT(text("said.txt"),
+              testing::ContainsRegex("rank [01] on .*registrations: item [0-9]+ .[0-9]+ of 200.: "
+                                     "no progress for"));
+  expect_going_on("stalled");
+}
+
+TEST_F(BrokenRegistrations, AFullDiskNamesTheFileAndWhatIsFinishedIsKept) {
+  test::LaunchedJob job(on_two_ranks("full"), path("said.txt"));
+  ASSERT_TRUE(job.wait_until([] { return has_rows("full"); }));
+  const rlimit limit{6000, 6000};  // some twenty rows
+  for (const pid_t process : job.ranks())
+    EXPECT_EQ(prlimit(process, RLIMIT_FSIZE, &limit, nullptr), 0);
+  EXPECT_EQ(job.wait(kEndsWithin), 4) << text("said.txt");
+  EXPECT_THAT(text("said.txt"), HasSubstr(".records: cannot be written: File too large"));
+  expect_going_on("full");
 }
 
 TEST_F(EvaluateProgram, EveryStageThatTakesLongGoesOnAfterStops) {

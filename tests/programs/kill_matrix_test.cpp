@@ -26,6 +26,7 @@
 #include "io/output_file.h"
 #include "programs/slow_jobs.h"
 #include "programs/small_study.h"
+#include "support/kept_records.h"
 #include "support/launched_job.h"
 #include "support/run_program.h"
 #include "support/test_paths.h"
@@ -88,46 +89,24 @@ struct KeptWork {
   std::uint64_t iterations = 0;
 };
 
-template <typename T>
-T number_at(const std::string& bytes, std::size_t position) {
-  T number{};
-  std::memcpy(&number, bytes.data() + position, sizeof(T));
-  return number;
-}
-
 void count_units(const std::string& shard, KeptWork& kept) {
   constexpr std::size_t kHeaderBytes = 32;
   for (std::size_t at = 0; at + kHeaderBytes <= shard.size();) {
     const bool is_cast = shard.substr(at, 8) == "AFUNIT01";
-    const auto unit = number_at<std::uint32_t>(shard, at + 8);
-    const auto words = number_at<std::uint32_t>(shard, at + 12);
-    const auto count = number_at<std::uint64_t>(shard, at + 16);
+    const auto unit = test::number_at<std::uint32_t>(shard, at + 8);
+    const auto words = test::number_at<std::uint32_t>(shard, at + 12);
+    const auto count = test::number_at<std::uint64_t>(shard, at + 16);
     at += kHeaderBytes + (is_cast ? 8 * words + 32 * count : 8 + 2 * count);
     if (at > shard.size()) return;
     (is_cast ? kept.cast : kept.encoded).insert(unit);
   }
 }
 
-/// Whole records of all processes and runs in a journal's folder.
-std::uint64_t kept_records(const fs::path& folder) {
-  std::uint64_t count = 0;
-  for (const auto& entry : fs::directory_iterator(folder)) {
-    if (entry.path().extension() != ".records") continue;
-    const std::string records = read_text_file(entry.path());
-    constexpr std::size_t kHeaderBytes = 16;
-    for (std::size_t at = 0; at + kHeaderBytes <= records.size(); ++count) {
-      at += kHeaderBytes + number_at<std::uint32_t>(records, at + 4);
-      if (at > records.size()) break;
-    }
-  }
-  return count;
-}
-
 KeptWork kept_work(const fs::path& folder) {
   KeptWork kept;
   for (const auto& entry : fs::directory_iterator(folder))
     if (entry.path().extension() == ".shard") count_units(read_text_file(entry.path()), kept);
-  kept.iterations = kept_records(folder);
+  kept.iterations = test::kept_records(folder);
   return kept;
 }
 
@@ -346,7 +325,7 @@ class KillMatrix : public testing::Test {
   }
 
   static void expect_whole_registration(const Plan& plan, const fs::path& folder) {
-    const std::uint64_t kept = kept_records(folder.string() + ".progress");
+    const std::uint64_t kept = test::kept_records(folder.string() + ".progress");
     test::LaunchedJob job(registration(plan.other_ranks, folder), path("output.txt"));
     ASSERT_EQ(job.wait(kEndsWithin), 0) << read_text_file(path("output.txt"));
     EXPECT_NE(

@@ -87,7 +87,9 @@ stop_job() {
   wait_until 60 "the stop of $name" grep -q 'exit code 75' "$disturbed/logs/${name#af-}-0.log"
 }
 
+status_of() { "$af_root/jobs/submit.sh" --status --output "$disturbed"; }
 submit "$disturbed"
+(($(status_of | wc -l) == 7)) || fail "--status does not list seven tasks"
 refused=0
 submit "$disturbed" >"$scratch/second.log" 2>&1 || refused=$?
 if ((refused != 3)) || ! grep -q 'still in the queue' "$scratch/second.log"; then
@@ -97,6 +99,7 @@ stop_job af-precompute-1 "$disturbed/fields/patient-1-A.af.h5.progress/0000-0000
 stop_job af-evaluate "$disturbed/registration/patient-1.progress/patient-1-field.0000-000000.records"
 wait_until 300 "the disturbed chain" no_jobs_left
 [[ -s "$disturbed/report.html" ]] || fail "no report.html after the disturbed chain"
+(($(status_of | grep -c ' done ') == 7)) || fail "--status does not say that all is done"
 for stage in precompute-1 evaluate; do
   grep -q 'restart 1' "$disturbed/logs/$stage-0.log" || fail "$stage was not queued again"
 done
