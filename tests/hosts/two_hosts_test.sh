@@ -3,9 +3,17 @@
 # A field and registrations on two hosts that only a network joins, and what happens when it is cut. The hosts are network
 # namespaces on a bridge of this machine, so MPI's messages go by TCP, and files are shared as on a cluster. Needs root
 # and iproute2; not a CTest, because it changes the machine's network for some minutes. All of it is removed at the end.
-# Usage: two_hosts_test.sh BUILD-FOLDER
+# Usage: two_hosts_test.sh BUILD-FOLDER [PART...]; parts: same (a field, registrations, the tests of the ranks' messages),
+# cut-evaluate, cut-precompute; all of them when none is named.
 set -euo pipefail
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 build=$(cd "$1" && pwd)
+shift
+parts=("$@")
+((${#parts[@]} > 0)) || parts=(same cut-evaluate cut-precompute)
+for part in "${parts[@]}"; do
+  [[ "$part" =~ ^(same|cut-evaluate|cut-precompute)$ ]] || { echo "two_hosts_test: no part '$part'" >&2; exit 2; }
+done
 bin=$build/bin
 ((EUID == 0)) || { echo "two_hosts_test: needs root" >&2; exit 77; }
 command -v ip >/dev/null || { echo "two_hosts_test: needs iproute2" >&2; exit 77; }
@@ -64,6 +72,9 @@ AGENT
 
 export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
 ends_on_loss=(--mca oob_tcp_keepalive_time 10 --mca oob_tcp_keepalive_intvl 2 --mca oob_tcp_keepalive_probes 3)
+# mpirun_options: what the job scripts give mpirun.
+# shellcheck source-path=SCRIPTDIR source=../../jobs/slurm/resources.sh
+source "$root/jobs/slurm/resources.sh"
 
 # on_two_hosts SECONDS MPIRUN-OPTIONS... -- PROGRAM...: four ranks, two on each host.
 on_two_hosts() {
@@ -86,53 +97,99 @@ fail() { echo "two_hosts_test: FAILED: $*" >&2; exit 1; }
 "$build/tests/make_bad_inputs" "$scratch/in"
 cd "$scratch"
 study=$scratch/in/valid/study.toml
-precompute=("$bin/af-precompute" --study "$study" --max-rotation-deg 8 --max-translation-mm 20 --uv-nodes 24 --st-nodes 96
-            --codewords 256 --training-fraction 0.5)
+range=(--study "$study" --max-rotation-deg 8 --max-translation-mm 20 --codewords 256)
+precompute=("$bin/af-precompute" "${range[@]}" --uv-nodes 24 --st-nodes 96 --training-fraction 0.5)
+cast=("$bin/af-precompute" "${range[@]}" --uv-nodes 80 --st-nodes 320 --training-fraction 0.02 --camera AP)
 register=("$bin/af-evaluate" registration --study "$study" --field AP=one-AP.h5 --field LAT=one-LAT.h5 --gold study
           --preset paper --intervals 4)
 
-make_hosts
-for camera in AP LAT; do
-  on_one_host "${precompute[@]}" --camera "$camera" -o "one-$camera.h5" >log 2>&1 || { tail -5 log; fail "a field on one host"; }
-done
-before=$(sent_bytes)
-on_two_hosts 300 -- "${precompute[@]}" --camera AP -o two-AP.h5 >log 2>&1 || { tail -5 log; fail "a field on two hosts"; }
-[[ "$(payload one-AP.h5)" == "$(payload two-AP.h5)" ]] || fail "another payload on two hosts"
-echo "field: the same payload on one host and on two; the second host sent $((($(sent_bytes) - before) / 1000)) kB"
 
-on_one_host "${register[@]}" --starts-per-interval 20 -o one >log 2>&1 || { tail -5 log; fail "registrations on one host"; }
-before=$(sent_bytes)
-on_two_hosts 300 -- "${register[@]}" --starts-per-interval 20 -o two >log 2>&1 || { tail -5 log; fail "registrations on two hosts"; }
-diff <(rows one) <(rows two) >/dev/null || fail "other rows on two hosts"
-echo "registrations: the same rows on one host and on two; the second host sent $((($(sent_bytes) - before) / 1000)) kB"
+fields_on_one_host() {
+  for camera in AP LAT; do
+    on_one_host "${precompute[@]}" --camera "$camera" -o "one-$camera.h5" >log 2>&1 || { tail -5 log; fail "a field on one host"; }
+  done
+}
 
-on_one_host "${register[@]}" --starts-per-interval 1500 -o whole >log 2>&1 || { tail -5 log; fail "the long study"; }
+same_on_two_hosts() {
+  local before
+  before=$(sent_bytes)
+  on_two_hosts 300 -- "${precompute[@]}" --camera AP -o two-AP.h5 >log 2>&1 || { tail -5 log; fail "a field on two hosts"; }
+  [[ "$(payload one-AP.h5)" == "$(payload two-AP.h5)" ]] || fail "another payload on two hosts"
+  echo "field: the same payload on one host and on two; the second host sent $((($(sent_bytes) - before) / 1000)) kB"
 
-# lose_host NAME SECONDS MPIRUN-OPTIONS...: registrations, the second host's cable out once some are kept; how that ends.
+  on_one_host "${register[@]}" --starts-per-interval 20 -o one >log 2>&1 || { tail -5 log; fail "registrations on one host"; }
+  before=$(sent_bytes)
+  on_two_hosts 300 -- "${register[@]}" --starts-per-interval 20 -o two >log 2>&1 || { tail -5 log; fail "registrations on two hosts"; }
+  diff <(rows one) <(rows two) >/dev/null || fail "other rows on two hosts"
+  echo "registrations: the same rows on one host and on two; the second host sent $((($(sent_bytes) - before) / 1000)) kB"
+
+  on_two_hosts 120 -- "$build/tests/parallel_test" >log 2>&1 || { grep -A4 Failure log | head -n 20; fail "parallel_test on two hosts"; }
+  echo "parallel_test: passes on two hosts"
+}
+
+# lose_host NAME FILES BYTES SECONDS MPIRUN-OPTIONS... -- PROGRAM...: on two hosts, the second one's cable out once FILES
+# in NAME.progress hold more than BYTES; how that ends. The output NAME must not exist then.
 lose_host() {
-  local name=$1 seconds=$2
-  shift 2
-  on_two_hosts "$seconds" "$@" -- "${register[@]}" --starts-per-interval 1500 -o "$name" >"$name.log" 2>&1 &
+  local name=$1 files=$2 enough=$3 seconds=$4
+  shift 4
+  on_two_hosts "$seconds" "$@" >"$name.log" 2>&1 &
   local job=$! code=0 begin kept=0
-  until ((kept > 20000)); do
+  until ((kept > enough)); do
     kill -0 "$job" 2>/dev/null || { tail -5 "$name.log"; fail "$name ended before the cut"; }
     sleep 0.2
-    kept=$(find "$name.progress" -name '*.records' -printf '%s\n' 2>/dev/null | awk '{sum += $1} END {print sum + 0}' || true)
+    kept=$(find "$name.progress" -name "$files" -printf '%s\n' 2>/dev/null | awk '{sum += $1} END {print sum + 0}' || true)
   done
   ip link set afveth2 down
   begin=$SECONDS
   wait "$job" || code=$?
-  echo "$name: $((SECONDS - begin)) s after the cut the job had ended with code $code ($kept bytes of rows were kept by then)"
+  echo "$name: $((SECONDS - begin)) s after the cut the job had ended with code $code ($kept bytes were kept by then)"
   { grep -vE '^[[:space:]]*$|^-+$' "$name.log" || true; } | tail -n 8 | cut -c1-150 | sed 's/^/    /'
-  [[ ! -e "$name/registrations.csv" ]] || fail "$name has results"
   # The lost host still runs: a cluster's resource manager would end what is there.
   local pid
   for pid in $(ip netns pids afhost1) $(ip netns pids afhost2); do kill -9 "$pid" 2>/dev/null || true; done
   ip link set afveth2 up
-  on_one_host "${register[@]}" --starts-per-interval 1500 -o "$name" >"$name.log" 2>&1 || { tail -5 "$name.log"; fail "going on"; }
+}
+
+# lose_registrations NAME MPIRUN-OPTIONS...
+lose_registrations() {
+  local name=$1 program=("${register[@]}" --starts-per-interval 1500 -o "$1")
+  shift
+  lose_host "$name" '*.records' 20000 90 "$@" -- "${program[@]}"
+  [[ ! -e "$name/registrations.csv" ]] || fail "$name has results"
+  on_one_host "${program[@]}" >"$name.log" 2>&1 || { tail -5 "$name.log"; fail "going on"; }
   diff <(rows whole) <(rows "$name") >/dev/null || fail "$name: other rows after going on"
   echo "$name: the next run went on, with the rows of an undisturbed one"
 }
-lose_host defaults 90
-lose_host keepalive 90 "${ends_on_loss[@]}"
+cut_while_registering() {
+  on_one_host "${register[@]}" --starts-per-interval 1500 -o whole >log 2>&1 || { tail -5 log; fail "the long study"; }
+  lose_registrations defaults
+  lose_registrations keepalive "${ends_on_loss[@]}"
+}
+
+# lose_cast NAME.h5 MPIRUN-OPTIONS...
+lose_cast() {
+  local name=$1 program=("${cast[@]}" -o "$1")
+  shift
+  lose_host "$name" '*.shard' 10000000 180 "$@" -- "${program[@]}"
+  [[ ! -e "$name" ]] || fail "$name exists"
+  on_one_host "${program[@]}" >"$name.log" 2>&1 || { tail -5 "$name.log"; fail "going on"; }
+  grep -o 'resumed .*' "$name.log" | cut -c1-150 | sed 's/^/    /' || fail "$name: began anew"
+  [[ "$(payload whole.h5)" == "$(payload "$name")" ]] || fail "$name: another payload after going on"
+  echo "$name: the next run went on, with the payload of an undisturbed one"
+}
+cut_while_casting() {
+  on_one_host "${cast[@]}" -o whole.h5 >log 2>&1 || { tail -5 log; fail "the large field"; }
+  lose_cast cast-keepalive.h5 "${ends_on_loss[@]}"
+  lose_cast cast-jobs.h5 "${mpirun_options[@]}"
+}
+
+make_hosts
+fields_on_one_host
+for part in "${parts[@]}"; do
+  case "$part" in
+    same) same_on_two_hosts ;;
+    cut-evaluate) cut_while_registering ;;
+    cut-precompute) cut_while_casting ;;
+  esac
+done
 echo "two_hosts_test: done"
