@@ -6,13 +6,13 @@
 #include <charconv>
 #include <cmath>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <sstream>
 #include <string_view>
 
 #include "base/error.h"
 #include "io/csv_table.h"
+#include "io/json_text.h"
 #include "io/output_file.h"
 #include "io/toml_reader.h"
 
@@ -62,12 +62,7 @@ RigidTransform pose_of_plain_numbers(const std::string& text, const std::string&
 }
 
 RigidTransform pose_of_json(const std::string& text, const std::string& file) {
-  nlohmann::json json;
-  try {
-    json = nlohmann::json::parse(text);
-  } catch (const nlohmann::json::exception& error) {
-    throw FileError(file, std::string("is not valid JSON: ") + error.what());
-  }
+  const nlohmann::json json = json_of_text(text, file);
   const auto bad_shape = [&file] {
     return InputError(file + ": " + kPoseKey + " must be a list of 4 lists of 4 numbers");
   };

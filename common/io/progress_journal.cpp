@@ -55,7 +55,7 @@ DecidingValues read_manifest(const fs::path& path) {
   try {
     const nlohmann::json json = nlohmann::json::parse(read_text_file(path));
     if (json.at("format") != kFormat || json.at("format_version") != kFormatVersion)
-      throw FileError(path.string(), "format", kFormat, json.at("format").dump());
+      throw FileError(path.string(), "format", kFormat, "another, or another version");
     return json.at("decides").get<DecidingValues>();
   } catch (const nlohmann::json::exception& error) {
     throw FileError(path.string(),

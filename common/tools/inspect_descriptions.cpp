@@ -6,6 +6,7 @@
 
 #include "io/csv_table.h"
 #include "io/image_file.h"
+#include "io/json_text.h"
 #include "io/output_file.h"
 #include "io/pose_file.h"
 #include "io/rig_file.h"
@@ -203,8 +204,7 @@ void inspect_csv(const fs::path& path, Inspection& inspection) {
 
 void inspect_json(const fs::path& path, Inspection& inspection) {
   inspection.kind = "JSON";
-  const auto json = ordered_json::parse(read_text_file(path), nullptr, false);
-  if (json.is_discarded()) throw FileError(path.string(), "is not JSON, or cut short");
+  const ordered_json json = ordered_json_of_text(read_text_file(path), path.string());
   if (!json.is_object()) throw InputError(path.string() + ": JSON, but no object");
   inspection.facts = shortened(json);
   if (json.contains("format") && json["format"].is_string())

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "base/error.h"
 #include "io/field_file.h"
+#include "io/json_text.h"
 #include "tools/inspect_kinds.h"
 
 namespace af {
@@ -68,7 +70,11 @@ ordered_json provenance_json(const FieldProvenance& provenance) {
   json["source_version"] = provenance.source_version;
   json["command_line"] = provenance.command_line;
   json["options_toml"] = provenance.options_toml;
-  auto details = ordered_json::parse(provenance.provenance_json, nullptr, false);
+  ordered_json details;
+  try {
+    details = ordered_json_of_text(provenance.provenance_json, "provenance");
+  } catch (const FileError&) {  // shown as it is
+  }
   if (!details.is_object()) {
     json["details"] = provenance.provenance_json;
     return json;

@@ -176,7 +176,7 @@ TEST_F(PoseFile, MalformedFilesAreRefused) {
   EXPECT_THAT(refusal<FileError>("p.txt", "1 2 3"), HasSubstr("16 numbers"));
   EXPECT_THAT(refusal<FileError>("p.txt", "1 0 0 x"), HasSubstr("'x'"));
   EXPECT_THAT(refusal<FileError>("p.json", "{\"room_from_ct\": [["),
-              HasSubstr("is not valid JSON"));
+              HasSubstr("is not JSON"));
   EXPECT_THAT(refusal<InputError>("p.json", "{}"), HasSubstr("room_from_ct"));
   EXPECT_THAT(refusal<InputError>("p.json", "{\"room_from_ct\": [1, 2]}"),
               HasSubstr("4 lists of 4"));
@@ -193,7 +193,7 @@ TEST_F(PoseFile, DeeplyNestedJsonIsRefused) {
   EXPECT_THROW(read("p.json", "{\"a\": " + std::string(200'000, '[')), FileError);
   EXPECT_THROW(
       read("p.json", "{\"a\": " + std::string(200'000, '[') + std::string(200'000, ']') + "}"),
-      InputError);
+      FileError);
 }
 
 TEST_F(PoseFile, DamagedFilesAreReadOrRefused) {
