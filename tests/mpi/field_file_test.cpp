@@ -382,7 +382,7 @@ TEST(FieldFile, RefusesLinks) {
   }
 }
 
-TEST(FieldFile, RefusesContentsElsewhereHugeChunksAndFiltersOfPlugIns) {
+TEST(FieldFile, RefusesContentsElsewhereAndFiltersOfPlugIns) {
   const test::SharedFolder folder;
   const auto refusal_of = [&](const std::function<void(hid_t creation, hid_t space)>& set) {
     return refusal_with(
@@ -411,6 +411,37 @@ TEST(FieldFile, RefusesContentsElsewhereHugeChunksAndFiltersOfPlugIns) {
     H5Pset_nbit(creation);
   });
   EXPECT_NE(filtered.find("filters deflate"), std::string::npos) << filtered;
+}
+
+TEST(FieldFile, RefusesChunksOfMoreThanAMillionElements) {
+  const test::SharedFolder folder;
+  const auto refusal_of = [&](const std::vector<hsize_t>& chunk) {
+    return refusal_with(
+        folder / "a.af.h5", "/geometry/uv_nodes", [&](hid_t file, const char* name) {
+          // A chunk may be larger than what it holds where that may grow.
+          const auto rank = static_cast<int>(chunk.size());
+          const std::vector<hsize_t> extents(chunk.size(), 2);
+          const std::vector<hsize_t> limits(chunk.size(), H5S_UNLIMITED);
+          const hdf5::Handle space(
+              H5Screate_simple(rank, extents.data(), limits.data()), H5Sclose, "H5Screate_simple");
+          const hdf5::Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose, "H5Pcreate");
+          H5Pset_chunk(creation, rank, chunk.data());
+          const hdf5::Handle dataset(
+              H5Dcreate2(file, name, H5T_STD_I32LE, space, H5P_DEFAULT, creation, H5P_DEFAULT),
+              H5Dclose,
+              "H5Dcreate2");
+        });
+  };
+  constexpr hsize_t kMost = 1u << 20;
+  for (const std::vector<hsize_t>& chunk :
+       {std::vector<hsize_t>{kMost + 1}, {1u << 11, 1u << 10}, {1, 1, kMost + 1}}) {
+    const std::string message = refusal_of(chunk);
+    EXPECT_NE(message.find("/geometry/uv_nodes"), std::string::npos) << message;
+    EXPECT_NE(message.find("chunks of at most 1048576 elements"), std::string::npos) << message;
+  }
+  // At the limit it is refused for something else: nothing has been written into it.
+  const std::string message = refusal_of({kMost});
+  EXPECT_EQ(message.find("chunks"), std::string::npos) << message;
 }
 
 TEST(FieldFile, RefusesACameraNameThatIsAPath) {
