@@ -308,6 +308,16 @@ TrainedCodebook train_field(const FieldBuild& build,
   });
 }
 
+namespace {
+
+/// A record's checksum says that it is whole, not that it is ours.
+bool are_below(const std::vector<std::uint16_t>& indices, std::size_t count) {
+  return std::all_of(
+      indices.begin(), indices.end(), [&](std::uint16_t index) { return index < count; });
+}
+
+}  // namespace
+
 FieldEncoder::FieldEncoder(const FieldBuild& build,
                            CastPhase& cast,
                            const Codebook& codebook,
@@ -378,7 +388,8 @@ IndexBlock FieldEncoder::next_block() {
 
 EncodedUnit FieldEncoder::encoded(const WorkUnit& unit, bool is_kept) {
   if (build_.progress != nullptr)
-    if (auto before = build_.progress->read_encoded(unit, codebook_crc_)) {
+    if (auto before = build_.progress->read_encoded(unit, codebook_crc_);
+        before && are_below(before->indices, search_.codeword_count())) {
       ++units_resumed_;
       return std::move(*before);
     }

@@ -383,7 +383,10 @@ class PrecomputeRun {
     if (build.progress != nullptr) {
       DecidingValues decides = manifest.decides;
       for (const auto& [name, value] : codebook_options(options_)) decides[name] = value;
-      journal.emplace(build.progress->path(), decides, world_);
+      journal.emplace(build.progress->path(),
+                      decides,
+                      static_cast<std::size_t>(options_.codebook_options().codewords),
+                      world_);
       checkpoints.begun = journal->begun();
       checkpoints.on_iteration = [&](const TrainedCodebook& so_far) {
         journal->append(so_far);

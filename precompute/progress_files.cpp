@@ -6,7 +6,6 @@
 #include <cstring>
 #include <fcntl.h>
 #include <nlohmann/json.hpp>
-#include <set>
 #include <tuple>
 #include <unistd.h>
 
@@ -86,7 +85,8 @@ std::filesystem::path shard_name(std::uint64_t run, std::uint64_t rank) {
   return padded(std::to_string(run), 4) + "-" + padded(std::to_string(rank), 6) + ".shard";
 }
 
-/// Run and rank of every shard of the folder, in order.
+/// Run and rank of every shard of the folder, in order. Numbers that no run reaches are not ours:
+/// the next run's must be higher than all.
 std::vector<UnitPlace> shards_of(const std::filesystem::path& folder) {
   std::vector<UnitPlace> shards;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
@@ -94,7 +94,9 @@ std::vector<UnitPlace> shards_of(const std::filesystem::path& folder) {
     char* end = nullptr;
     const std::uint64_t run = std::strtoull(name.c_str(), &end, 10);
     const std::uint64_t rank = *end == '-' ? std::strtoull(end + 1, nullptr, 10) : 0;
-    if (name == shard_name(run, rank)) shards.push_back({run, rank, 0});
+    constexpr std::uint64_t kMost = 1'000'000'000;
+    if (run <= kMost && rank <= kMost && name == shard_name(run, rank))
+      shards.push_back({run, rank, 0});
   }
   std::sort(shards.begin(), shards.end(), [](const UnitPlace& a, const UnitPlace& b) {
     return std::tie(a.run, a.rank) < std::tie(b.run, b.rank);
@@ -110,7 +112,9 @@ void scan_shard(const std::filesystem::path& folder,
                 FoundUnits& found) {
   const std::filesystem::path path = folder / shard_name(shard.run, shard.rank);
   std::ifstream file(path, std::ios::binary);
-  const std::uint64_t size = std::filesystem::file_size(path);
+  std::error_code error;
+  const std::uint64_t size = std::filesystem::file_size(path, error);
+  if (error) return;  // lost, or no file: as if damaged
   UnitPlace place = shard;
   RecordHeader header;
   while (size - place.offset >= sizeof(RecordHeader)) {
@@ -221,9 +225,12 @@ FoundUnits scan_together(const std::filesystem::path& folder,
   found.indices = from_all(found.indices, communicator);
   sort_by_place(found.tiles);
   sort_by_place(found.indices);
-  std::set<std::uint64_t> seen;
-  std::erase_if(found.tiles,
-                [&](const RecordPlace& tiles) { return !seen.insert(tiles.unit_id).second; });
+  // A unit was cast again because its earlier record was damaged.
+  std::map<std::uint64_t, RecordPlace> last;
+  for (const RecordPlace& tiles : found.tiles) last[tiles.unit_id] = tiles;
+  std::erase_if(found.tiles, [&](const RecordPlace& tiles) {
+    return last.at(tiles.unit_id).place != tiles.place;
+  });
   return found;
 }
 
@@ -240,7 +247,7 @@ ProgressManifest read_manifest(const std::filesystem::path& path) {
   try {
     const nlohmann::json json = nlohmann::json::parse(read_text_file(path));
     if (json.at("format") != kFormat || json.at("format_version") != kFormatVersion)
-      throw FileError(path.string(), "format", kFormat, json.at("format").dump());
+      throw FileError(path.string(), "format", kFormat, "another, or another version");
     return {json.at("decides").get<std::map<std::string, std::string>>(),
             json.at("rays_per_unit").get<std::int64_t>()};
   } catch (const nlohmann::json::exception& error) {

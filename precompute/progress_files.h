@@ -31,6 +31,8 @@ struct UnitPlace {
   std::uint64_t run = 0;
   std::uint64_t rank = 0;
   std::uint64_t offset = 0;
+
+  bool operator==(const UnitPlace&) const = default;
 };
 
 /// The indices of a unit in a shard, and the codebook that they are of.

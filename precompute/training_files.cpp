@@ -78,11 +78,13 @@ std::optional<TrainedCodebook> unpacked_training(std::span<const std::byte> byte
   training.codebook.codewords.resize(header.codewords);
   take_bytes(bytes, std::span(training.iterations));
   take_bytes(bytes, std::span(training.codebook.codewords));
+  if (!problems(training.codebook).empty()) return std::nullopt;
   return training;
 }
 
 TrainingJournal::TrainingJournal(const std::filesystem::path& progress_folder,
                                  const DecidingValues& decides,
+                                 std::size_t codewords,
                                  const Communicator& communicator)
     : communicator_(communicator) {
   std::vector<std::byte> last;
@@ -95,6 +97,7 @@ TrainingJournal::TrainingJournal(const std::filesystem::path& progress_folder,
   });
   communicator_.broadcast(last);
   begun_ = unpacked_training(last);
+  if (begun_ && begun_->codebook.size() != codewords) begun_.reset();
 }
 
 void TrainingJournal::append(const TrainedCodebook& so_far) {

@@ -16,9 +16,11 @@ namespace af {
 class TrainingJournal {
  public:
   /// Collective. Opens or creates the journal. Iterations with other options are thrown away: the
-  /// codebook may be changed between a stop and going on, the cast units stay.
+  /// codebook may be changed between a stop and going on, the cast units stay. So are those whose
+  /// codebook is not usable, or not of so many codewords.
   TrainingJournal(const std::filesystem::path& progress_folder,
                   const DecidingValues& decides,
+                  std::size_t codewords,
                   const Communicator& communicator);
 
   /// What the last sound iteration of earlier runs gave, the same on every rank; none without one.
@@ -33,7 +35,7 @@ class TrainingJournal {
   std::optional<TrainedCodebook> begun_;
 };
 
-/// A training as bytes, and back; nothing when the bytes are not of one.
+/// A training as bytes, and back; nothing when the bytes are not of one with a usable codebook.
 std::vector<std::byte> packed_training(const TrainedCodebook& training);
 std::optional<TrainedCodebook> unpacked_training(std::span<const std::byte> bytes);
 

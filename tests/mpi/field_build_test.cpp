@@ -301,16 +301,30 @@ TEST_F(FieldBuildTest, TrainingIsKeptForTheSameOptionsOnly) {
   training.training_tiles = 70;
   training.iterations = {{500, 60, 1}, {400, 50, 0}};
   const DecidingValues decides = {{"codewords", "2"}};
-  EXPECT_FALSE(TrainingJournal(folder_ / "progress", decides, world_).begun().has_value());
-  TrainingJournal(folder_ / "progress", decides, world_).append(training);
-  const auto begun = TrainingJournal(folder_ / "progress", decides, world_).begun();
+  EXPECT_FALSE(TrainingJournal(folder_ / "progress", decides, 2, world_).begun().has_value());
+  TrainingJournal(folder_ / "progress", decides, 2, world_).append(training);
+  const auto begun = TrainingJournal(folder_ / "progress", decides, 2, world_).begun();
   ASSERT_TRUE(begun.has_value());
   EXPECT_EQ(begun->codebook.codewords, training.codebook.codewords);
   EXPECT_EQ(begun->training_tiles, 70u);
   ASSERT_EQ(begun->iterations.size(), 2u);
   EXPECT_EQ(begun->iterations[1].training_squared_error, 400u);
-  const TrainingJournal other(folder_ / "progress", {{"codewords", "3"}}, world_);
+  const TrainingJournal other(folder_ / "progress", {{"codewords", "3"}}, 3, world_);
   EXPECT_FALSE(other.begun().has_value());
+}
+
+TEST_F(FieldBuildTest, ATrainingWithAnotherCodebookThanItSaysIsThrownAway) {
+  const DecidingValues decides = {{"codewords", "2"}};
+  const auto begun_with = [&](const std::vector<Tile>& codewords) {
+    TrainedCodebook training;
+    training.codebook.codewords = codewords;
+    TrainingJournal(folder_ / "progress", decides, 2, world_).append(training);
+    return TrainingJournal(folder_ / "progress", decides, 2, world_).begun().has_value();
+  };
+  EXPECT_TRUE(begun_with({Tile{}, Tile{1}}));
+  EXPECT_FALSE(begun_with({Tile{}, Tile{1}, Tile{2}}));  // too many
+  EXPECT_FALSE(begun_with({Tile{1}, Tile{}}));           // not sorted, zero is not the first
+  EXPECT_FALSE(begun_with({}));
 }
 
 TEST(TrainingFiles, BytesThatAreNotOfATrainingAreNone) {
