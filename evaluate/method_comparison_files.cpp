@@ -153,7 +153,7 @@ std::vector<MethodRow> method_rows(const std::vector<EvaluationRun>& runs) {
   std::vector<MethodRow> rows;
   for (const EvaluationRun& run : runs) {
     if (run.kind != "registration") continue;
-    const CsvTable table = CsvTable::read(run.folder / "registrations.csv");
+    const CsvTable table = run.table("registrations.csv");
     std::map<std::pair<std::string, std::string>, Sums> sums;
     for (std::size_t i = 0; i < table.row_count(); ++i)
       add_row(table, i, sums[{table.text(i, "case"), table.text(i, "renderer")}]);

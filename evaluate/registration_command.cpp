@@ -23,6 +23,7 @@
 #include "evaluate/registration_statistics_files.h"
 #include "evaluate/summary_files.h"
 #include "io/gnuplot_figure.h"
+#include "io/json_text.h"
 #include "io/output_file.h"
 #include "io/output_lock.h"
 #include "io/progress_manifest.h"
@@ -40,9 +41,14 @@ using nlohmann::json;
 json simulation_in(const std::filesystem::path& folder) {
   const std::filesystem::path path = folder / "provenance.json";
   if (!std::filesystem::exists(path)) return nullptr;
-  json provenance = json::parse(read_text_file(path), nullptr, false);
-  if (!provenance.is_object() || provenance.value("program", "") != "af-simulate") return nullptr;
-  return provenance;
+  const std::string text = read_text_file(path);
+  try {
+    json provenance = json_of_text(text, path.string());
+    if (provenance.is_object() && provenance.value("program", json()) == "af-simulate")
+      return provenance;
+  } catch (const FileError&) {  // another program's
+  }
+  return nullptr;
 }
 
 /// Options that the command for one start alone has of its own, or does not need.

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/error.h"
 #include "evaluate/figure_files.h"
 #include "evaluate/report/html_text.h"
 #include "evaluate/report/number_html.h"
@@ -67,12 +68,12 @@ std::string comparison_table(const std::vector<const EvaluationRun*>& runs) {
                      case_names(run->summary),
                      element("span", method_title(renderer), "nowrap"),
                      search_text(run->summary, renderer),
-                     renderer.at("starts").dump(),
+                     plain(renderer.at("starts")),
                      rate_with_interval(renderer),
                      decimals(renderer.at("tre_of_all_mm").at("median"), 2),
                      decimals(renderer.at("tre_of_all_mm").at("p95"), 2),
                      decimals(renderer.at("tre_of_successes_mm").at("mean"), 2),
-                     renderer.at("gross_failures").at("successes").dump(),
+                     plain(renderer.at("gross_failures").at("successes")),
                      capture_cell(renderer.at("capture_range")),
                      seconds_text(number_of(renderer.at("seconds").at("median")))});
   return table.html();
@@ -80,7 +81,7 @@ std::string comparison_table(const std::vector<const EvaluationRun*>& runs) {
 
 /// Initial and final TRE of one renderer's rows.
 std::vector<TreOutcome> outcomes_of_run(const EvaluationRun& run, const std::string& renderer) {
-  const CsvTable rows = CsvTable::read(run.folder / "registrations.csv");
+  const CsvTable rows = run.table("registrations.csv");
   std::vector<TreOutcome> outcomes;
   for (std::size_t i = 0; i < rows.row_count(); ++i) {
     if (rows.text(i, "renderer") != renderer) continue;
@@ -109,11 +110,16 @@ std::string success_figure(const std::vector<const EvaluationRun*>& runs,
     if (groups.size() < kMostCurves) groups.push_back({run->name, outcomes_of_run(*run, renderer)});
   }
   const json& intervals = runs.front()->summary.at("renderers").at(0).at("intervals");
+  const double width_mm = intervals.at(0).at("high_mm").get<double>();
+  constexpr double kMostMm = 1000;
+  if (!(width_mm > 0.0 && width_mm <= kMostMm))
+    throw FileError((runs.front()->folder / "summary.json").string(),
+                    "high_mm of the first interval",
+                    "above 0, at most 1000",
+                    plain(intervals.at(0).at("high_mm")));
   make_output_folder(figures);
-  draw_success_rates(groups,
-                     static_cast<int>(intervals.size()),
-                     intervals.at(0).at("high_mm").get<double>(),
-                     figures / "success-of-runs");
+  draw_success_rates(
+      groups, static_cast<int>(intervals.size()), width_mm, figures / "success-of-runs");
   return report_figure(figures / "success-of-runs",
                        runs.front()->page_folder,
                        "Success rate of every run per interval of initial error",

@@ -22,7 +22,7 @@ std::string budget_table(const json& summary) {
       "end from the mean end, which is the optimiser's");
   for (const json& step : summary.at("steps"))
     table.add_row({escaped(step.at("label").get<std::string>()),
-                   step.at("successes").dump() + " of " + step.at("starts").dump(),
+                   plain(step.at("successes")) + " of " + plain(step.at("starts")),
                    decimals(step.at("shift_mm"), 3),
                    decimals(step.at("shift_standard_error_mm"), 3),
                    decimals(step.at("bias_mm"), 3),
@@ -51,7 +51,7 @@ std::string error_budget_section(const std::vector<EvaluationRun>& runs) {
             element("p",
                     "A chain of runs from the same starts, each different from the one before in "
                     "one thing, over the " +
-                        run->summary.at("common_starts").dump() +
+                        plain(run->summary.at("common_starts")) +
                         " starts from which every run succeeded.") +
             budget_table(run->summary) + gold_text(run->summary.at("gold"));
   return text.empty() ? "" : section_heading("Error budget", "error-budget") + text;

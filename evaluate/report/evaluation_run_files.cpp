@@ -7,6 +7,8 @@
 
 #include "base/error.h"
 #include "evaluate/report/html_text.h"
+#include "evaluate/report/number_html.h"
+#include "io/json_text.h"
 #include "io/output_file.h"
 
 namespace af::evaluation {
@@ -18,14 +20,26 @@ namespace {
 constexpr const char* kFormat = "attenuation-fields evaluation";
 constexpr int kVersion = 1;
 
-/// summary.json files in a folder and below, a run's own unfinished folders left out.
+/// Folders with a summary.json, the given one and those below it.
 void collect(const std::filesystem::path& folder, std::set<std::filesystem::path>& found) {
-  if (!std::filesystem::is_directory(folder))
+  std::error_code error;
+  if (!std::filesystem::is_directory(folder, error))
     throw FileError(folder.string(), "is not a folder of results");
-  for (const auto& entry : std::filesystem::recursive_directory_iterator(
-           folder, std::filesystem::directory_options::skip_permission_denied))
-    if (entry.path().filename() == "summary.json" && entry.is_regular_file())
-      found.insert(std::filesystem::weakly_canonical(entry.path()));
+  try {
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(
+             folder, std::filesystem::directory_options::skip_permission_denied))
+      if (entry.path().filename() == "summary.json" && entry.is_regular_file(error))
+        found.insert(std::filesystem::weakly_canonical(entry.path().parent_path()));
+  } catch (const std::filesystem::filesystem_error& error_of_walk) {
+    throw FileError(folder.string(), error_of_walk.what());
+  }
+}
+
+/// Whether a path stays below where it begins.
+bool leads_down(const std::filesystem::path& relative) {
+  const std::filesystem::path path = relative.lexically_normal();
+  return !path.empty() && !path.is_absolute() && *path.begin() != ".." &&
+         path.native().find('\0') == std::string::npos;
 }
 
 /// The paths below the deepest folder that all runs share. Where several registration runs end
@@ -52,16 +66,44 @@ void set_names(std::vector<EvaluationRun>& runs) {
 
 }  // namespace
 
-std::string EvaluationRun::file(const std::string& file_name) const {
-  const std::filesystem::path path(file_name);
-  if (file_name.empty() || path.filename() != path || file_name == "." || file_name == "..")
+std::filesystem::path EvaluationRun::path_of(const std::string& relative) const {
+  std::error_code error;
+  const std::filesystem::path path = std::filesystem::weakly_canonical(folder / relative, error);
+  if (error) throw FileError((folder / relative).string(), error.message());
+  const std::filesystem::path own = std::filesystem::weakly_canonical(folder, error);
+  if (error || !leads_down(relative) || !leads_down(path.lexically_relative(own)))
     throw FileError((folder / "summary.json").string(),
-                    "names '" + file_name + "', which is not a file of the run");
-  return read_text_file(folder / path);
+                    "names '" + relative + "', which is not a file of the run");
+  return path;
 }
 
-std::string EvaluationRun::link(const std::string& file_name) const {
-  return url_of((folder.lexically_proximate(page_folder) / file_name).generic_string());
+bool EvaluationRun::has_file(const std::string& relative) const {
+  std::error_code error;
+  return std::filesystem::is_regular_file(path_of(relative), error);
+}
+
+std::string EvaluationRun::file(const std::string& file_name) const {
+  const std::filesystem::path path(file_name);
+  if (path.filename() != path)
+    throw FileError((folder / "summary.json").string(),
+                    "names '" + file_name + "', which is not a file of the run");
+  return read_text_file(existing(file_name));
+}
+
+CsvTable EvaluationRun::table(const std::string& relative) const {
+  return CsvTable::read(existing(relative));
+}
+
+std::filesystem::path EvaluationRun::existing(const std::string& relative) const {
+  if (!has_file(relative)) throw FileError((folder / relative).string(), "is missing, or no file");
+  return path_of(relative);
+}
+
+std::string EvaluationRun::link(const std::string& relative) const {
+  if (!leads_down(relative))
+    throw FileError((folder / "summary.json").string(),
+                    "names '" + relative + "', which is not in the run's folder");
+  return url_of((folder.lexically_proximate(page_folder) / relative).generic_string());
 }
 
 std::vector<EvaluationRun> find_runs(const std::vector<std::filesystem::path>& folders) {
@@ -72,18 +114,19 @@ std::vector<EvaluationRun> find_runs(const std::vector<std::filesystem::path>& f
     named.insert(std::filesystem::weakly_canonical(folder));
   }
   std::vector<EvaluationRun> runs;
-  for (const std::filesystem::path& path : paths) {
+  for (const std::filesystem::path& path_of_run : paths) {
     EvaluationRun run;
-    run.folder = path.parent_path();
-    run.summary = json::parse(read_text_file(path), nullptr, false);
-    if (!run.summary.is_object()) throw FileError(path.string(), "is not JSON");
+    run.folder = path_of_run;
+    const std::filesystem::path path = run.folder / "summary.json";
+    run.summary = json_of_text(run.file("summary.json"), path.string());
+    if (!run.summary.is_object()) throw FileError(path.string(), "is no JSON object");
     // Other programs may leave a summary.json, too.
     if (run.summary.value("format", json()) != kFormat) continue;
     if (run.summary.value("format_version", json()) != kVersion)
       throw FileError(path.string(),
                       "format_version",
                       std::to_string(kVersion),
-                      run.summary.value("format_version", json()).dump());
+                      plain(run.summary.value("format_version", json())));
     const json kind = run.summary.value("kind", json());
     if (kind != "image-quality" && kind != "registration" && kind != "similarity-curves" &&
         kind != "field-parameters" && kind != "error-budget")
@@ -91,7 +134,7 @@ std::vector<EvaluationRun> find_runs(const std::vector<std::filesystem::path>& f
           path.string(),
           "kind",
           "image-quality, registration, similarity-curves, field-parameters or error-budget",
-          kind.dump());
+          kind.is_string() ? kind.get<std::string>() : "no text");
     run.kind = kind.get<std::string>();
     // Asked for by its own folder, the repeat of a start is a run like others.
     if (run.summary.contains("only_start") && !named.contains(run.folder)) continue;

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "base/error.h"
 #include "evaluate/failed_start_files.h"
 #include "evaluate/report/html_text.h"
 #include "evaluate/report/number_html.h"
@@ -34,7 +35,12 @@ double number_or_nan(const CsvTable& table, std::size_t row, const char* column)
 }
 
 std::int64_t start_index_of(const CsvTable& rows, std::size_t row) {
-  return static_cast<std::int64_t>(rows.number(row, "start_index"));
+  const double index = rows.number(row, "start_index");
+  constexpr double kMost = 1e15;  // far below where doubles skip whole numbers
+  if (!(index >= 0.0 && index <= kMost) || index != std::floor(index))
+    throw FileError(
+        rows.where(row), "start_index", "a whole number", rows.text(row, "start_index"));
+  return static_cast<std::int64_t>(index);
 }
 
 std::vector<SparkPoint> spark_points(const CsvTable& trace, double initial_tre_mm) {
@@ -72,9 +78,9 @@ std::string spark(const std::vector<SparkPoint>& points) {
 std::string trace_cell(const EvaluationRun& run, const CsvTable& rows, std::size_t row) {
   const std::string file =
       trace_file(rows.text(row, "case"), rows.text(row, "renderer"), start_index_of(rows, row));
-  if (!std::filesystem::exists(run.folder / file)) return "–";
+  if (!run.has_file(file)) return "–";
   const std::vector<SparkPoint> points =
-      spark_points(CsvTable::read(run.folder / file), rows.number(row, "initial_tre_mm"));
+      spark_points(run.table(file), rows.number(row, "initial_tre_mm"));
   return "<span class=\"nowrap\">" + spark(points) + " <a href=\"" + run.link(file) +
          "\">trace</a></span>";
 }
@@ -105,7 +111,7 @@ void add_failure(const EvaluationRun& run,
 }  // namespace
 
 std::string failures_text(const EvaluationRun& run) {
-  const CsvTable rows = CsvTable::read(run.folder / "registrations.csv");
+  const CsvTable rows = run.table("registrations.csv");
   HtmlTable table({{"Case", false},
                    {"Method", false},
                    {"Start", true},

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <cmath>
 #include <filesystem>
 
+#include "base/error.h"
 #include "evaluate/figure_files.h"
 #include "evaluate/report/html_text.h"
 #include "evaluate/report/number_html.h"
@@ -28,11 +30,15 @@ std::string joint_box_plot(const std::vector<const EvaluationRun*>& runs,
     return run_figure(*runs.front(), "psnr", kAlternative, kBoxPlotCaption, "narrow");
   std::vector<PsnrGroup> groups;
   for (const EvaluationRun* run : runs) {
-    const CsvTable rows = CsvTable::read(run->folder / "image-quality.csv");
+    const CsvTable rows = run->table("image-quality.csv");
     PsnrGroup group{field_name(*run), {}};
     for (std::size_t i = 0; i < rows.row_count(); ++i) {
       const std::string& text = rows.text(i, "psnr_db");
-      if (text != "nan" && text != "inf") group.psnr_db.push_back(rows.number(i, "psnr_db"));
+      if (text == "nan" || text == "inf") continue;
+      group.psnr_db.push_back(rows.number(i, "psnr_db"));
+      constexpr double kMostDb = 1000;
+      if (std::abs(group.psnr_db.back()) > kMostDb)
+        throw FileError(rows.where(i), "psnr_db", "within ±1000", text);
     }
     groups.push_back(std::move(group));
   }
@@ -47,10 +53,10 @@ std::string joint_box_plot(const std::vector<const EvaluationRun*>& runs,
 
 std::string nodes_text(const json& field) {
   const auto pair = [&](const char* key) {
-    return field.at(key).at(0).dump() + "×" + field.at(key).at(1).dump();
+    return plain(field.at(key).at(0)) + "×" + plain(field.at(key).at(1));
   };
   return pair("uv_nodes") + ", " + pair("st_nodes") +
-         (field.at("slabs") == 1 ? "" : " × " + field.at("slabs").dump() + " slabs");
+         (field.at("slabs") == 1 ? "" : " × " + plain(field.at("slabs")) + " slabs");
 }
 
 std::string quality_table(const std::vector<const EvaluationRun*>& runs) {
@@ -76,11 +82,11 @@ std::string quality_table(const std::vector<const EvaluationRun*>& runs) {
     constexpr double kBytesPerMb = 1e6;
     table.add_row({escaped(field_name(*run)),
                    nodes_text(field),
-                   field.at("codewords").dump(),
+                   plain(field.at("codewords")),
                    decimals(field.at("file_bytes").get<double>() / kBytesPerMb, 1),
                    "±" + decimals(field.at("max_rotation_deg"), 0) + "°, ±" +
                        decimals(field.at("max_translation_mm"), 0) + " mm",
-                   summary.at("compared").dump(),
+                   plain(summary.at("compared")),
                    decimals(psnr.at("median"), 1),
                    decimals(psnr.at("p5"), 1),
                    decimals(psnr.at("min"), 1),
@@ -122,7 +128,7 @@ std::string loss_text(const EvaluationRun& run) {
                     "loss-split",
                     "Box plots of PSNR by lossy step",
                     "<b>Where quality is lost, " + escaped(field_name(run)) + "</b>, over " +
-                        split.at("poses").dump() + " poses.",
+                        plain(split.at("poses")) + " poses.",
                     "narrow") +
          table.html();
 }

@@ -3,7 +3,10 @@
 
 #include <cmath>
 #include <iomanip>
+#include <limits>
 #include <sstream>
+
+#include "base/error.h"
 
 namespace af::evaluation {
 
@@ -23,6 +26,19 @@ std::string decimals(const json& value, int count) {
   if (value == "inf") return "∞";
   if (!value.is_number()) return "–";
   return fixed(value.get<double>(), count);
+}
+
+std::string plain(const json& value) {
+  return value.is_number() ? value.dump() : "–";
+}
+
+std::int64_t count_of(const json& value) {
+  constexpr std::uint64_t kMost = std::numeric_limits<std::int64_t>::max();
+  const bool is_count = value.is_number_integer() && value >= 0 &&
+                        (!value.is_number_unsigned() || value.get<std::uint64_t>() <= kMost);
+  if (!is_count)
+    throw FileError("summary.json of a run", "a count", "a whole number", plain(value));
+  return value.get<std::int64_t>();
 }
 
 std::string percent(double share) {

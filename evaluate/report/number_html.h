@@ -10,6 +10,12 @@ namespace af::evaluation {
 /// A number of a summary with fixed decimals; "–" for what does not exist, "∞" for infinity.
 std::string decimals(const nlohmann::json& value, int count);
 
+/// A number as it stands in a summary; "–" for anything else.
+std::string plain(const nlohmann::json& value);
+
+/// A count of a summary; FileError unless it is a whole number of at least 0.
+std::int64_t count_of(const nlohmann::json& value);
+
 /// A share as "91 %"; one decimal where whole per cents would round to 0 or 100 falsely.
 std::string percent(double share);
 

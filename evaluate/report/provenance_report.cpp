@@ -119,7 +119,7 @@ std::string run_provenance(const EvaluationRun& run) {
   const json& provenance = run.summary.at("provenance");
   const auto text = [&](const char* key) {
     const json value = provenance.value(key, json());
-    return value.is_string() ? escaped(value.get<std::string>()) : escaped(value.dump());
+    return value.is_string() ? escaped(value.get<std::string>()) : plain(value);
   };
   const json host = provenance.value("host", json::object());
   const std::string link = run.link("reproduce.sh");
@@ -129,7 +129,7 @@ std::string run_provenance(const EvaluationRun& run) {
               {"Started (UTC)", text("started_utc")},
               {"Compiler, processor",
                text("compiler") + ", " + escaped(host.value("cpu", "unknown")) + " (" +
-                   escaped(host.value("vector_bits", json()).dump()) + "-bit vectors)"},
+                   plain(host.value("vector_bits", json())) + "-bit vectors)"},
               {"Ranks", text("rank_count")},
               {"Seed", text("seed")},
               {"Inputs, SHA-256", hashes_text(provenance.value("input_sha256", json::object()))},

@@ -25,20 +25,20 @@ std::string bar(double share) {
 std::string success_table(const json& renderers) {
   std::vector<HtmlTable::Column> columns = {{"Initial TRE (mm)", false}};
   for (const json& renderer : renderers) {
-    columns.push_back({method_title(renderer) + ": starts", true});
+    columns.push_back({method_name(renderer) + ": starts", true});
     columns.push_back({"succeeded", true});
     columns.push_back({"rate (95 % interval)", false});
   }
   HtmlTable table(columns, "Success per interval of initial error, with Wilson intervals");
-  const std::size_t intervals = renderers.front().at("intervals").size();
+  const std::size_t intervals = renderers.at(0).at("intervals").size();
   for (std::size_t i = 0; i < intervals; ++i) {
-    const json& first = renderers.front().at("intervals").at(i);
+    const json& first = renderers.at(0).at("intervals").at(i);
     std::vector<std::string> cells = {decimals(first.at("low_mm"), 0) + "–" +
                                       decimals(first.at("high_mm"), 0)};
     for (const json& renderer : renderers) {
       const json& interval = renderer.at("intervals").at(i);
-      cells.push_back(interval.at("starts").dump());
-      cells.push_back(interval.at("successes").dump());
+      cells.push_back(plain(interval.at("starts")));
+      cells.push_back(plain(interval.at("successes")));
       cells.push_back(interval.at("starts") == 0 ? "–"
                                                  : element("span",
                                                            bar(number_of(interval.at("rate"))) +
@@ -68,12 +68,12 @@ std::string error_table(const json& renderers) {
     const json& all = renderer.at("tre_of_all_mm");
     const json& good = renderer.at("tre_of_successes_mm");
     table.add_row({method_title(renderer),
-                   renderer.at("starts").dump(),
+                   plain(renderer.at("starts")),
                    decimals(all.at("median"), 2),
                    decimals(all.at("q1"), 2) + "–" + decimals(all.at("q3"), 2),
                    decimals(all.at("p95"), 2),
                    decimals(renderer.at("tre_mm").at("max"), 2),
-                   renderer.at("without_pose").dump(),
+                   plain(renderer.at("without_pose")),
                    decimals(good.at("mean"), 2) + " ± " + decimals(good.at("sd"), 2),
                    decimals(renderer.at("stated_pose_tre_of_successes_mm").at("mean"), 2),
                    decimals(renderer.value("gold_uncertainty_mm", json()), 2)});
@@ -90,11 +90,11 @@ std::string capture_text(const json& range) {
 std::string threshold_table(const json& renderers) {
   std::vector<HtmlTable::Column> columns = {{"TRE below", false}};
   for (const json& renderer : renderers)
-    columns.push_back({method_title(renderer) + " (95 % interval)", true});
+    columns.push_back({method_name(renderer) + " (95 % interval)", true});
   HtmlTable table(columns, "Share of all starts below other thresholds");
-  const std::size_t count = renderers.front().at("thresholds").size();
+  const std::size_t count = renderers.at(0).at("thresholds").size();
   for (std::size_t i = 0; i < count; ++i) {
-    const json& threshold = renderers.front().at("thresholds").at(i).at("threshold_mm");
+    const json& threshold = renderers.at(0).at("thresholds").at(i).at("threshold_mm");
     std::vector<std::string> cells = {decimals(threshold, threshold == 2.5 ? 1 : 0) + " mm"};
     for (const json& renderer : renderers)
       cells.push_back(rate_with_interval(renderer.at("thresholds").at(i)));
@@ -117,7 +117,7 @@ std::string reason_table(const json& renderers) {
   std::set<std::string> reasons;
   std::vector<HtmlTable::Column> columns = {{"Reason", false}};
   for (const json& renderer : renderers) {
-    columns.push_back({method_title(renderer) + ": failures", true});
+    columns.push_back({method_name(renderer) + ": failures", true});
     for (const auto& [reason, count] : renderer.at("failures_by_reason").items())
       reasons.insert(reason);
   }
@@ -126,7 +126,7 @@ std::string reason_table(const json& renderers) {
   for (const std::string& reason : reasons) {
     std::vector<std::string> cells = {escaped(reason)};
     for (const json& renderer : renderers)
-      cells.push_back(std::to_string(renderer.at("failures_by_reason").value(reason, 0)));
+      cells.push_back(plain(renderer.at("failures_by_reason").value(reason, json(0))));
     table.add_row(cells);
   }
   return table.html();
@@ -182,7 +182,7 @@ std::string over_cases_text(const json& renderers) {
   std::string text;
   for (const json& renderer : renderers) {
     const json& rate = renderer.at("over_cases").at("rate");
-    const auto cases = rate.at("cases").get<std::int64_t>();
+    const auto cases = count_of(rate.at("cases"));
     if (!rate.at("low").is_number()) continue;
     text += element("p",
                     "<strong>Over patients</strong> (" + method_title(renderer) +
@@ -218,7 +218,7 @@ std::string case_table(const json& summary) {
     for (const json& entry : renderer.at("cases"))
       table.add_row({escaped(entry.at("case").get<std::string>()),
                      method_title(renderer),
-                     entry.at("starts").dump(),
+                     plain(entry.at("starts")),
                      rate_with_interval(entry),
                      decimals(entry.at("tre_of_successes_mm").at("mean"), 2),
                      decimals(entry.value("gold_uncertainty_mm", json()), 2),
@@ -255,9 +255,9 @@ std::string gold_table(const json& cases) {
                    decimals(uncertainty.value("mean_tre_mm", json()), 3) + ", " +
                        decimals(uncertainty.value("p95_tre_mm", json()), 3),
                    decimals(gold.value("stated_to_fiducials_mm", json()), 3),
-                   entry.at("draws").dump(),
-                   entry.at("inadmissible_draws").dump(),
-                   entry.at("draws_beyond_last_interval").dump()});
+                   plain(entry.at("draws")),
+                   plain(entry.at("inadmissible_draws")),
+                   plain(entry.at("draws_beyond_last_interval"))});
   }
   return table.html();
 }
@@ -285,9 +285,9 @@ std::string test_text(const json& test) {
 std::string paired_text(const json& paired) {
   if (!paired.is_object()) return "";
   std::string text = "<strong>Field against ray casting</strong>, the " +
-                     counted(paired.at("common_starts").get<std::int64_t>(), "start", "starts") +
-                     " given to both: " + paired.at("successes").at(0).dump() + " and " +
-                     paired.at("successes").at(1).dump() + " successes (McNemar " +
+                     counted(count_of(paired.at("common_starts")), "start", "starts") +
+                     " given to both: " + plain(paired.at("successes").at(0)) + " and " +
+                     plain(paired.at("successes").at(1)) + " successes (McNemar " +
                      p_text(paired.at("mcnemar_p").get<double>()) + ").";
   if (paired.contains("test")) text += test_text(paired.at("test"));
   return element("p", text + " Starts of one patient are not independent samples of patients.");
@@ -321,7 +321,7 @@ std::string overlay_figures(const EvaluationRun& run) {
                which + " registration as overlay",
                "<b>Case " + case_name + ", the " + escaped(which) + " result, view " +
                    escaped(picture.at("camera").get<std::string>()) + ".</b> By " +
-                   method_title(picture) + ", start " + picture.at("start_index").dump() +
+                   method_title(picture) + ", start " + plain(picture.at("start_index")) +
                    ", from " + decimals(picture.at("initial_tre_mm"), 1) + " mm to " +
                    decimals(picture.at("tre_mm"), 2) + " mm TRE." + slicer_link(run, picture),
                "picture");

@@ -16,9 +16,13 @@ std::vector<const EvaluationRun*> runs_of(const std::vector<EvaluationRun>& runs
   return result;
 }
 
-std::string method_title(const json& renderer) {
+std::string method_name(const json& renderer) {
   const std::string name = renderer.at("renderer").get<std::string>();
-  return name == "field" ? "attenuation fields" : name == "raycast" ? "ray casting" : escaped(name);
+  return name == "field" ? "attenuation fields" : name == "raycast" ? "ray casting" : name;
+}
+
+std::string method_title(const json& renderer) {
+  return escaped(method_name(renderer));
 }
 
 std::string field_name(const EvaluationRun& run) {
@@ -36,11 +40,14 @@ std::string run_id(const EvaluationRun& run) {
   return "run-" + escaped(file_name_part(run.name));
 }
 
-std::string report_figure(const std::filesystem::path& path,
-                          const std::filesystem::path& page_folder,
-                          std::string_view alternative,
-                          std::string_view caption,
-                          std::string_view css_class) {
+namespace {
+
+std::string figure_with_links(const std::string& svg,
+                              const std::filesystem::path& path,
+                              const std::filesystem::path& page_folder,
+                              std::string_view alternative,
+                              std::string_view caption,
+                              std::string_view css_class) {
   std::string links;
   for (const char* extension : {"png", "csv"}) {
     const std::filesystem::path file = path.string() + "." + extension;
@@ -49,11 +56,22 @@ std::string report_figure(const std::filesystem::path& path,
     links +=
         " <a href=\"" + url + "\">" + (extension == std::string("png") ? "PNG" : "CSV") + "</a>";
   }
-  return figure(read_text_file(path.string() + ".svg"),
+  return figure(svg,
                 "image/svg+xml",
                 alternative,
                 std::string(caption) + element("span", links, "files"),
                 css_class);
+}
+
+}  // namespace
+
+std::string report_figure(const std::filesystem::path& path,
+                          const std::filesystem::path& page_folder,
+                          std::string_view alternative,
+                          std::string_view caption,
+                          std::string_view css_class) {
+  return figure_with_links(
+      read_text_file(path.string() + ".svg"), path, page_folder, alternative, caption, css_class);
 }
 
 std::string run_figure(const EvaluationRun& run,
@@ -61,7 +79,8 @@ std::string run_figure(const EvaluationRun& run,
                        std::string_view alternative,
                        std::string_view caption,
                        std::string_view css_class) {
-  return report_figure(run.folder / name, run.page_folder, alternative, caption, css_class);
+  return figure_with_links(
+      run.file(name + ".svg"), run.folder / name, run.page_folder, alternative, caption, css_class);
 }
 
 }  // namespace af::evaluation

@@ -15,7 +15,10 @@ namespace af::evaluation {
 std::vector<const EvaluationRun*> runs_of(const std::vector<EvaluationRun>& runs,
                                           const std::string& kind);
 
-/// "attenuation fields" or "ray casting" for our own renderers, else the method's name; HTML.
+/// "attenuation fields" or "ray casting" for our own renderers, else the method's name; text.
+std::string method_name(const nlohmann::json& renderer);
+
+/// The same as HTML.
 std::string method_title(const nlohmann::json& renderer);
 
 /// The field of an image quality run: "camera A", with several studies "camera A of skull"; text.

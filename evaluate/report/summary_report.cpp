@@ -44,8 +44,8 @@ double flawless_up_to_mm(const json& renderer) {
 }
 
 std::string success_sentence(const json& renderer, double threshold_mm) {
-  const auto starts = renderer.at("starts").get<std::int64_t>();
-  const auto successes = renderer.at("successes").get<std::int64_t>();
+  const auto starts = count_of(renderer.at("starts"));
+  const auto successes = count_of(renderer.at("successes"));
   std::string text = "With " + method_title(renderer) + ", " + std::to_string(successes) + " of " +
                      counted(starts, "registration", "registrations") + " (" +
                      percent(number_of(renderer.at("rate"))) + ", 95 % interval " +
@@ -69,7 +69,7 @@ std::string speed_sentence(const json& paired) {
   const double field = paired.at("median_seconds").at(0).get<double>();
   const double raycast = paired.at("median_seconds").at(1).get<double>();
   if (!(field > 0.0)) return "";
-  return "From the " + counted(paired.at("common_starts").get<std::int64_t>(), "start", "starts") +
+  return "From the " + counted(count_of(paired.at("common_starts")), "start", "starts") +
          " given to both, a registration took " + seconds_text(field) + " with fields and " +
          seconds_text(raycast) + " with ray casting (medians): " + decimals(raycast / field, 0) +
          " times as long, on this computer.";
@@ -144,15 +144,15 @@ std::string gold_text(const json& renderer) {
 std::string registration_tiles(const EvaluationRun& run) {
   const json& renderers = run.summary.at("renderers");
   const json& first = renderers.at(0);
-  std::string tiles = tile(percent(number_of(first.at("rate"))),
-                           "",
-                           "of starts succeed",
-                           method_title(first) + ", " +
-                               counted(first.at("starts").get<std::int64_t>(), "start", "starts")) +
-                      tile(decimals(first.at("tre_of_successes_mm").at("mean"), 2),
-                           "mm",
-                           "mean error of successes",
-                           method_title(first) + gold_text(first));
+  std::string tiles =
+      tile(percent(number_of(first.at("rate"))),
+           "",
+           "of starts succeed",
+           method_title(first) + ", " + counted(count_of(first.at("starts")), "start", "starts")) +
+      tile(decimals(first.at("tre_of_successes_mm").at("mean"), 2),
+           "mm",
+           "mean error of successes",
+           method_title(first) + gold_text(first));
   for (const json& renderer : renderers) tiles += seconds_tile(renderer);
   return tiles;
 }

@@ -21,11 +21,11 @@ std::string maxima_table(const json& summary) {
   HtmlTable table(columns,
                   "Where the similarity is highest, relative to the gold pose, and how broad it is "
                   "at half height above the lowest value of all six curves");
-  const std::size_t count = summary.at("renderers").front().at("maxima").size();
+  const std::size_t count = summary.at("renderers").at(0).at("maxima").size();
   for (std::size_t i = 0; i < count; ++i) {
-    const json& first = summary.at("renderers").front().at("maxima").at(i);
-    const std::string unit = first.at("unit").get<std::string>();
-    std::vector<std::string> cells = {first.at("parameter").get<std::string>()};
+    const json& first = summary.at("renderers").at(0).at("maxima").at(i);
+    const std::string unit = escaped(first.at("unit").get<std::string>());
+    std::vector<std::string> cells = {escaped(first.at("parameter").get<std::string>())};
     for (const json& renderer : summary.at("renderers")) {
       const json& peak = renderer.at("maxima").at(i);
       cells.push_back((peak.at("is_at_edge").get<bool>() ? "beyond " : "") +
@@ -42,7 +42,7 @@ std::string maxima_table(const json& summary) {
 std::string broadest_text(const json& summary) {
   std::string text;
   for (const json& renderer : summary.at("renderers")) {
-    const std::string axis = renderer.at("broadest_rotation").get<std::string>();
+    const std::string axis = escaped(renderer.at("broadest_rotation").get<std::string>());
     text +=
         std::string(renderer.at("renderer") == "field" ? "With the field" : "With ray casting") +
         (axis.empty() ? " no rotation stands out as broadest. "
@@ -108,10 +108,10 @@ std::string field_parameters_section(const std::vector<EvaluationRun>& runs) {
       const json& psnr = setting.at("psnr_db");
       const double uncompressed = setting.at("uncompressed_bytes").get<double>();
       const double payload = setting.at("payload_bytes").get<double>();
-      table.add_row({setting.at("uv_nodes").dump(),
-                     setting.at("st_nodes").dump(),
-                     setting.at("codewords").dump(),
-                     setting.at("training_fraction").dump(),
+      table.add_row({plain(setting.at("uv_nodes")),
+                     plain(setting.at("st_nodes")),
+                     plain(setting.at("codewords")),
+                     plain(setting.at("training_fraction")),
                      decimals(psnr.at("median"), 2),
                      decimals(psnr.at("q1"), 2) + "–" + decimals(psnr.at("q3"), 2),
                      decimals(psnr.at("min"), 2),
@@ -119,7 +119,7 @@ std::string field_parameters_section(const std::vector<EvaluationRun>& runs) {
                      decimals(payload / 1e6, 1),
                      decimals(uncompressed / payload, 1),
                      decimals(setting.at("creation_seconds"), 1),
-                     setting.at("creation_ranks").dump()});
+                     plain(setting.at("creation_ranks"))});
     }
     text += element("h3", "Camera " + escaped(run->summary.at("camera").get<std::string>())) +
             run_figure(*run,
@@ -127,7 +127,7 @@ std::string field_parameters_section(const std::vector<EvaluationRun>& runs) {
                        "PSNR against each field parameter",
                        "<b>Image quality against the field's parameters</b> (the paper's Fig. 10): "
                        "medians and quartiles over " +
-                           run->summary.at("poses").dump() +
+                           plain(run->summary.at("poses")) +
                            " random poses; the setting that all panels share is set off.",
                        "wide") +
             difference_text(*run) + table.html();

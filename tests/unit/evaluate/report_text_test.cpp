@@ -203,5 +203,75 @@ TEST(FindRuns, ARunGivesOnlyItsOwnFiles) {
     EXPECT_THROW(std::ignore = runs[0].file(name), FileError) << name;
 }
 
+TEST(FindRuns, ARunGivesNothingThatALinkBringsFromElsewhere) {
+  const test::ScratchFolder folder;
+  write_summary(folder, "run", minimal_summary("registration"));
+  write_text_file(folder / "secret", "secret");
+  write_text_file(folder / "run/own.csv", "a\n1\n");
+  std::filesystem::create_symlink("../secret", folder / "run/link.png");
+  std::filesystem::create_symlink("own.csv", folder / "run/link.csv");
+  std::filesystem::create_directory_symlink("..", folder / "run/up");
+  std::filesystem::create_directory(folder / "run/folder.png");
+  const auto runs = find_runs({folder.path()});
+  EXPECT_EQ(runs[0].table("link.csv").number(0, "a"), 1.0);
+  EXPECT_THROW(std::ignore = runs[0].file("link.png"), FileError);
+  EXPECT_THROW(std::ignore = runs[0].file("folder.png"), FileError);
+  EXPECT_THROW(std::ignore = runs[0].table("up/secret"), FileError);
+  EXPECT_THROW(std::ignore = runs[0].table("../secret"), FileError);
+  EXPECT_THROW(std::ignore = runs[0].file(std::string("own.csv\0x", 9)), FileError);
+  EXPECT_THROW(std::ignore = runs[0].has_file(std::string(300, 'n')), FileError);
+  EXPECT_FALSE(runs[0].has_file("missing.csv"));
+}
+
+TEST(FindRuns, ASummaryThatIsALinkToElsewhereIsRefused) {
+  const test::ScratchFolder folder;
+  write_summary(folder, "mine", minimal_summary("registration"));
+  std::filesystem::create_directory(folder / "theirs");
+  std::filesystem::create_symlink("../mine/summary.json", folder / "theirs/summary.json");
+  EXPECT_EQ(find_runs({folder / "mine"}).size(), 1u);
+  EXPECT_THROW(find_runs({folder / "theirs"}), FileError);
+}
+
+TEST(FindRuns, LinksLeadBelowTheRunOnly) {
+  const test::ScratchFolder folder;
+  write_summary(folder, "run", minimal_summary("registration"));
+  auto runs = find_runs({folder.path()});
+  runs[0].page_folder = std::filesystem::weakly_canonical(folder.path());
+  EXPECT_EQ(runs[0].link("slicer/a b"), "run/slicer/a%20b");
+  for (const char* name : {"../other", "//host/x", "/etc/hostname", "a/../../other", ""})
+    EXPECT_THROW(std::ignore = runs[0].link(name), FileError) << name;
+}
+
+TEST(NumberHtml, ShowsNothingButNumbersAsTheyStand) {
+  EXPECT_EQ(plain(json(512)), "512");
+  EXPECT_EQ(plain(json(0.25)), "0.25");
+  for (const json& value : {json("<b>"), json(nullptr), json::array({1}), json(true)})
+    EXPECT_EQ(plain(value), "–");
+  EXPECT_EQ(count_of(json(7)), 7);
+  for (const json& value : {json(-1), json(1.5), json(1e300), json("7"), json(nullptr)})
+    EXPECT_THROW(count_of(value), FileError) << value;
+}
+
+TEST(SimilaritySection, EscapesTheTextsOfTheRun) {
+  const test::ScratchFolder folder;
+  write_summary(folder, "run", minimal_summary("similarity-curves"));
+  write_text_file(folder / "run/similarity-curves.svg", "<svg/>");
+  auto runs = find_runs({folder.path()});
+  const json peak = {{"parameter", "<i>"},
+                     {"unit", "<b>"},
+                     {"is_at_edge", false},
+                     {"offset", 0.1},
+                     {"width", 1.0},
+                     {"width_mm_at_target", 1.0}};
+  runs[0].summary["case"] = "<u>";
+  runs[0].summary["renderers"] = {
+      {{"renderer", "field"}, {"maxima", {peak}}, {"broadest_rotation", "<s>"}}};
+  const std::string html = similarity_section(runs);
+  for (const char* tag : {"<i>", "<b>mm", "<u>", "<s>", "1.00 <b>"})
+    EXPECT_THAT(html, Not(HasSubstr(tag)));
+  for (const char* text : {"&lt;i&gt;", "0.10 &lt;b&gt;", "&lt;u&gt;", "is &lt;s&gt;."})
+    EXPECT_THAT(html, HasSubstr(text));
+}
+
 }  // namespace
 }  // namespace af::evaluation
