@@ -39,8 +39,9 @@ std::string repeat_command(const json& summary,
       std::filesystem::path(repeat.at("output").get<std::string>()) /
       start_name(case_name, renderer, start_index);
   return repeat.at("command").get<std::string>() + " --case " + cli::shell_quoted(case_name) +
-         " --renderer " + (is_beside_fields ? "both" : cli::shell_quoted(renderer)) + " --only-start " +
-         std::to_string(start_index) + " --output " + cli::shell_quoted(output.string());
+         " --renderer " + (is_beside_fields ? "both" : cli::shell_quoted(renderer)) +
+         " --only-start " + std::to_string(start_index) + " --output " +
+         cli::shell_quoted(output.string());
 }
 
 }  // namespace af::evaluation

@@ -32,14 +32,15 @@ inline std::string_view as_text(std::span<const std::uint8_t> bytes) {
 }
 
 /// Runs `read`; false when it refused the input with one of the project's errors. Everything else
-/// that is thrown (out of memory, broken promises, other libraries' exceptions) ends the process
-/// and is a finding.
+/// that is thrown (out of memory, broken promises, other libraries' exceptions, also where
+/// all_or_none() made an error of them) ends the process and is a finding.
 template <typename Read>
 bool is_accepted(Read&& read) {
   try {
     read();
     return true;
-  } catch (const Error&) {
+  } catch (const Error& error) {
+    require(error.exit_code() != ExitCode::Internal, error.what());
     return false;
   }
 }

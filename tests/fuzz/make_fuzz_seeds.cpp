@@ -138,6 +138,44 @@ void write_other_seeds(const fs::path& folder) {
   write_seed(folder / "field_file" / "linked", "\x08\0\3\0\x09\0\0\0\x0a\0\3\0\x0b\0\2\0"s);
 }
 
+/// "Run KIND, and run OTHER, changed by EDITS"; each number has two bytes.
+std::string report_input(char kind, char other, const std::string& edits = "") {
+  return "\0\0"s + kind + "\0"s + other + "\0"s + edits;
+}
+
+void write_report_seeds(const fs::path& folder) {
+  constexpr char kNoOther = 63;
+  for (char kind = 0; kind < 5; ++kind) {
+    write_seed(folder / "report" / ("sound-" + std::to_string(kind)), report_input(kind, kNoOther));
+    for (char place = 1; place < 40; place = static_cast<char>(place + 13))
+      write_seed(folder / "report" / ("changed-" + std::to_string(kind) + std::to_string(place)),
+                 report_input(kind, kNoOther, "\0\0\7\0"s + place + "\0\1\0\0\0"s));
+  }
+  write_seed(folder / "report" / "two-registrations", report_input(0, 5));
+  write_seed(folder / "report" / "two-image-qualities", report_input(1, 6));
+  write_seed(folder / "report" / "table", report_input(0, kNoOther, "\0\0\0\0\x66\1\0\0\1\0"s));
+  write_seed(folder / "report" / "raw",
+             "\1\0\0\0\x3f\0"s +
+                 "{\"format\": \"attenuation-fields evaluation\", \"format_version\": 1, \"kind\": "
+                 "\"registration\", \"provenance\": {}, \"renderers\": [{}], \"cases\": []}");
+}
+
+void write_shard_seeds(const fs::path& folder) {
+  write_seed(folder / "shards" / "manifest",
+             "\0\0{\"format\": \"af-precompute-progress\", \"format_version\": 3, \"decides\": "
+             "{\"step_mm\": \"3\", \"ct\": \"b\"}, \"rays_per_unit\": 1000}"s);
+  write_seed(folder / "shards" / "sound",
+             "\1\0\1\0\2\0\3\0\x11\1\1\0\2\0\1\0\0\0\2\0\1\0\5\0\x11\1\0\0"s);
+  write_seed(folder / "shards" / "damaged",
+             "\1\0\1\0\0\0\2\0\0\0\1\0\0\0\2\0\0\0\1\0\0\0\2\0\0\0\1\0\x30\0\1\x77"s);
+  write_seed(folder / "shards" / "training",
+             "\2\0\x08\0\0\0\0\0\0\0\0\0\4\0\0\0\0\1\0\0\2\0\0\3\0\0\1\0"s);
+  write_seed(folder / "shards" / "codebook", "\3\0"s + std::string(64, '\0'));
+  write_seed(folder / "shards" / "forged",
+             "\4\0\0\0\0\0\1\0\0\0\0\0\0\0\2\0\1\0\1\0\1\0\x08\0\x3f\0\0\0\0\0\0\0"s);
+  write_seed(folder / "shards" / "names", "\4\0\3\0\0\0\1\0\0\0\0\0\0\0\2\0"s);
+}
+
 std::string bytes_of_hex(const std::string& digits) {
   std::string bytes;
   for (std::size_t i = 0; i + 1 < digits.size(); i += 2)
@@ -171,6 +209,8 @@ int main(int argc, char** argv) {
     write_image_seeds(folder);
     write_dicom_seeds(folder);
     write_other_seeds(folder);
+    write_report_seeds(folder);
+    write_shard_seeds(folder);
     write_findings(argv[1], folder);
   } catch (const std::exception& error) {
     std::cerr << error.what() << "\n";

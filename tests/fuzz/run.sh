@@ -9,8 +9,8 @@ usage() {
   cat <<'TEXT'
 Usage: tests/fuzz/run.sh [--seconds N] [--output FOLDER] [--no-build] [--help] [NAME...]
 
-Runs libFuzzer on our readers: rig, study, csv, pose, image, dicom, journal, rows, field_values, field_file, or those
-named. Needs clang-14. Corpora grow in FOLDER/NAME/corpus, the log is FOLDER/NAME/log, inputs that are findings are
+Runs libFuzzer on our readers: rig, study, csv, pose, image, dicom, journal, rows, field_values, field_file, shards,
+report, or those named. Needs clang-14. Corpora grow in FOLDER/NAME/corpus, the log is FOLDER/NAME/log, inputs that are findings are
 FOLDER/NAME/crash-*, oom-* or timeout-*. Exit code 1 when there was a finding.
 
   --seconds N      for each reader (default: 1200)
@@ -32,7 +32,7 @@ while (($# > 0)); do
   esac
   shift
 done
-((${#names[@]} > 0)) || names=(rig study csv pose image dicom journal rows field_values field_file)
+((${#names[@]} > 0)) || names=(rig study csv pose image dicom journal rows field_values field_file shards report)
 
 binaries=$af_root/build/fuzz/tests/fuzz
 if [[ "$build" == yes ]]; then
@@ -51,13 +51,13 @@ for name in "${names[@]}"; do
   mkdir -p "$output/$name/corpus"
   cd "$output/$name"
   leaks=1
-  [[ "$name" == field_file ]] && leaks=0 # OpenMPI and HDF5 keep memory until the end
-  ASAN_OPTIONS=quarantine_size_mb=16:detect_leaks=$leaks "$binaries/fuzz_$name" -max_total_time="$seconds" -timeout="${AF_FUZZ_TIMEOUT:-30}" -rss_limit_mb=512 -malloc_limit_mb=256 -detect_leaks=$leaks \
+  [[ "$name" == field_file || "$name" == shards ]] && leaks=0 # OpenMPI and HDF5 keep memory until the end
+  ASAN_OPTIONS=quarantine_size_mb=16:malloc_context_size=4:detect_leaks=$leaks "$binaries/fuzz_$name" -max_total_time="$seconds" -timeout="${AF_FUZZ_TIMEOUT:-30}" -rss_limit_mb=512 -malloc_limit_mb=256 -detect_leaks=$leaks \
     -print_final_stats=1 corpus "$output/seeds/$name" >log 2>&1 || status=1
   printf '%-13s %12s runs, coverage %s -> %s edges, %s inputs kept, %s findings\n' "$name" \
     "$(sed -n 's/^stat::number_of_executed_units: *//p' log)" \
     "$(sed -n 's/.*INITED cov: \([0-9]*\).*/\1/p' log | head -n 1)" \
     "$(sed -n 's/.* cov: \([0-9]*\) .*/\1/p' log | tail -n 1)" \
-    "$(find corpus -type f | wc -l)" "$(find . -maxdepth 1 -name '*-[0-9a-f]*' -type f | wc -l)"
+    "$(find corpus -type f | wc -l)" "$(find . -maxdepth 1 -regextype posix-extended -regex './(crash|oom|timeout|leak)-.*' -type f | wc -l)"
 done
 exit $status

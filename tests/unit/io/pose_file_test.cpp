@@ -175,8 +175,7 @@ TEST_F(PoseFile, MalformedFilesAreRefused) {
   EXPECT_THAT(refusal<FileError>("p.txt", ""), HasSubstr("is empty"));
   EXPECT_THAT(refusal<FileError>("p.txt", "1 2 3"), HasSubstr("16 numbers"));
   EXPECT_THAT(refusal<FileError>("p.txt", "1 0 0 x"), HasSubstr("'x'"));
-  EXPECT_THAT(refusal<FileError>("p.json", "{\"room_from_ct\": [["),
-              HasSubstr("is not JSON"));
+  EXPECT_THAT(refusal<FileError>("p.json", "{\"room_from_ct\": [["), HasSubstr("is not JSON"));
   EXPECT_THAT(refusal<InputError>("p.json", "{}"), HasSubstr("room_from_ct"));
   EXPECT_THAT(refusal<InputError>("p.json", "{\"room_from_ct\": [1, 2]}"),
               HasSubstr("4 lists of 4"));
