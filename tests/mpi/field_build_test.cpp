@@ -369,6 +369,35 @@ TEST_F(FieldBuildTest, EncodedUnitsAreReadForTheirCodebookOnly) {
   EXPECT_FALSE(progress.read_encoded(units[1], kCodebookCrc).has_value());
 }
 
+TEST_F(FieldBuildTest, AUnitCastAgainForItsDamagedRecordIsFoundByTheNextRun) {
+  const auto units = plan_units(light_slab_, {kUnitRays});
+  ProgressManifest expected = manifest(kUnitRays);
+  const UnitTiles tiles =
+      make_unit_tiles(units[0], std::vector<std::uint16_t>(units[0].sample_count(), 3));
+  const auto run = [&](bool appends) {
+    ProgressFolder progress(folder_ / "a.h5.progress", false, expected, world_);
+    std::array<std::uint64_t, 1> found{0};
+    progress.visit_finished(units, [&](const UnitTiles&) { ++found[0]; });
+    world_.sum(found);
+    if (appends && world_.is_root()) progress.append(tiles);
+    world_.barrier();
+    return found[0];
+  };
+  EXPECT_EQ(run(true), 0u);
+  if (world_.is_root()) {
+    std::fstream shard(folder_ / "a.h5.progress" / "0000-000000.shard",
+                       std::ios::in | std::ios::out | std::ios::binary);
+    shard.seekp(-1, std::ios::end);
+    shard.put('\x5A');
+    // No shards, though they are called so: a folder, and a run that none can follow.
+    std::filesystem::create_directory(folder_ / "a.h5.progress" / "0000-000009.shard");
+    std::ofstream(folder_ / "a.h5.progress" / "18446744073709551615-000000.shard") << "x";
+  }
+  world_.barrier();
+  EXPECT_EQ(run(true), 0u);
+  EXPECT_EQ(run(false), 1u);
+}
+
 TEST_F(FieldBuildTest, GeometryOfRankZeroIsTakenOver) {
   LightSlab mine = small_light_slab();
   mine.u.first_mm += 1e-13 * world_.rank();
