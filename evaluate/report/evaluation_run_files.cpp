@@ -58,7 +58,7 @@ void set_names(std::vector<EvaluationRun>& runs) {
     ++registrations;
     ends.insert(name.has_parent_path() ? name.filename() : std::filesystem::path());
   }
-  if (registrations < 2 || ends.size() != 1) return;
+  if (registrations < 2 || ends.size() != 1 || ends.begin()->empty()) return;
   for (EvaluationRun& run : runs)
     if (run.kind == "registration")
       run.name = std::filesystem::path(run.name).parent_path().generic_string();

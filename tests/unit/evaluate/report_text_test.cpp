@@ -162,6 +162,11 @@ TEST(FindRuns, NamesRunsByWhatTellsThemApartAndLinksToTheirFiles) {
   runs[1].page_folder = std::filesystem::weakly_canonical(folder / "skull");
   EXPECT_EQ(runs[1].link("starts.csv"), "../thorax%202/registration/starts.csv");
   EXPECT_EQ(find_runs({folder / "skull"})[0].name, "registration");
+  // Side by side in one folder: nothing is left out.
+  write_summary(folder, "flat/first", minimal_summary("registration"));
+  write_summary(folder, "flat/second", minimal_summary("registration"));
+  EXPECT_EQ(find_runs({folder / "flat"})[0].name, "first");
+  EXPECT_EQ(find_runs({folder / "flat"})[1].name, "second");
   // One run in another's folder: both have a name.
   write_summary(folder, "skull", minimal_summary("image-quality"));
   for (const EvaluationRun& run : find_runs({folder / "skull"})) EXPECT_FALSE(run.name.empty());
