@@ -2,13 +2,36 @@
 #include <array>
 #include <cstdint>
 #include <iostream>
+#include <string>
 
 #include <gtest/gtest.h>
 
 #include "parallel/communicator.h"
 #include "parallel/mpi_environment.h"
 
-/// Runs all tests on every rank; rank 0 prints. The program fails when any rank failed.
+namespace {
+
+/// What failed on a rank whose results nobody else prints.
+class FailurePrinter : public testing::EmptyTestEventListener {
+ public:
+  explicit FailurePrinter(int rank) : rank_(rank) {}
+
+ private:
+  void OnTestPartResult(const testing::TestPartResult& result) override {
+    if (!result.failed()) return;
+    const testing::TestInfo* const test = testing::UnitTest::GetInstance()->current_test_info();
+    std::cout << "rank " << rank_ << ": "
+              << (test == nullptr ? "" : std::string(test->test_suite_name()) + "." + test->name())
+              << ": " << (result.file_name() == nullptr ? "" : result.file_name()) << ':'
+              << result.line_number() << ": " << result.message() << std::endl;
+  }
+  int rank_;
+};
+
+}  // namespace
+
+/// Runs all tests on every rank; rank 0 prints all, the others what failed. The program fails when
+/// any rank failed.
 int main(int argc, char** argv) {
   const af::MpiEnvironment environment(argc, argv);
   testing::InitGoogleTest(&argc, argv);
@@ -16,6 +39,7 @@ int main(int argc, char** argv) {
   if (!world.is_root()) {
     auto& listeners = testing::UnitTest::GetInstance()->listeners();
     delete listeners.Release(listeners.default_result_printer());
+    listeners.Append(new FailurePrinter(world.rank()));  // which the list deletes
   }
   std::array<std::uint64_t, 1> failed{RUN_ALL_TESTS() == 0 ? std::uint64_t{0} : std::uint64_t{1}};
   world.sum(failed);
