@@ -170,45 +170,6 @@ std::vector<std::vector<std::byte>> Communicator::all_gather(
   return parts;
 }
 
-std::vector<std::vector<std::byte>> Communicator::gather(std::span<const std::byte> mine) const {
-  const WaitNote waits;
-  constexpr int kTag = 1;
-  std::vector<std::vector<std::byte>> parts;
-  if (!is_root()) {
-    const std::uint64_t bytes = mine.size();
-    require_success(MPI_Send(&bytes, 1, MPI_UINT64_T, 0, kTag, impl_->handle), "MPI_Send");
-    for (std::size_t first = 0; first < mine.size(); first += kLargestPiece)
-      require_success(MPI_Send(mine.data() + first,
-                               static_cast<int>(std::min(kLargestPiece, mine.size() - first)),
-                               MPI_BYTE,
-                               0,
-                               kTag,
-                               impl_->handle),
-                      "MPI_Send");
-    return parts;
-  }
-  parts.resize(static_cast<std::size_t>(size()));
-  parts[0].assign(mine.begin(), mine.end());
-  for (int source = 1; source < size(); ++source) {
-    auto& part = parts[static_cast<std::size_t>(source)];
-    std::uint64_t bytes = 0;
-    require_success(
-        MPI_Recv(&bytes, 1, MPI_UINT64_T, source, kTag, impl_->handle, MPI_STATUS_IGNORE),
-        "MPI_Recv");
-    part.resize(bytes);
-    for (std::size_t first = 0; first < part.size(); first += kLargestPiece)
-      require_success(MPI_Recv(part.data() + first,
-                               static_cast<int>(std::min(kLargestPiece, part.size() - first)),
-                               MPI_BYTE,
-                               source,
-                               kTag,
-                               impl_->handle,
-                               MPI_STATUS_IGNORE),
-                      "MPI_Recv");
-  }
-  return parts;
-}
-
 Communicator Communicator::node() const {
   MPI_Comm node_handle = MPI_COMM_NULL;
   require_success(

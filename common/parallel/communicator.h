@@ -39,8 +39,6 @@ class Communicator {
   /// Collective. Every rank's bytes, in rank order, on every rank.
   [[nodiscard]] std::vector<std::vector<std::byte>> all_gather(
       std::span<const std::byte> mine) const;
-  /// Collective. Every rank's bytes, in rank order, on rank 0 (empty elsewhere).
-  [[nodiscard]] std::vector<std::vector<std::byte>> gather(std::span<const std::byte> mine) const;
   /// Collective. The ranks that share this rank's memory.
   [[nodiscard]] Communicator node() const;
 

@@ -38,7 +38,7 @@ RegistrationRow some_row(std::int64_t index) {
   return row;
 }
 
-/// Results of as many items travel in one message at most (collect_items).
+/// Results of as many items would travel in one message, were they sent to rank 0.
 constexpr int kMostCollectedPerBlock = 64;
 
 void append(ProgressShard& shard, const json& row) {

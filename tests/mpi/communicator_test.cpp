@@ -35,11 +35,6 @@ TEST(Communicator, GathersPartsInRankOrderAlsoEmptyOnes) {
   ASSERT_EQ(everywhere.size(), static_cast<std::size_t>(world.size()));
   for (std::size_t rank = 0; rank < everywhere.size(); ++rank)
     EXPECT_EQ(everywhere[rank], std::vector<std::byte>(rank, std::byte(rank)));
-  const auto on_root = world.gather(mine);
-  if (world.is_root())
-    EXPECT_EQ(on_root, everywhere);
-  else
-    EXPECT_TRUE(on_root.empty());
 }
 
 TEST(Communicator, NodeMemoryIsFilledOnceAndSeenByAll) {
