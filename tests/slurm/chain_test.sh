@@ -15,12 +15,12 @@ need_programs "$bin" af-simulate af-evaluate af-inspect af-precompute
 
 finish() {
   local status=$?
-  "$slurm" stop "$scratch/slurm"
-  if ((status == 0)); then
-    rm -rf "$scratch"
-  else
+  "$slurm" stop "$scratch/slurm" || true
+  # What was found does not depend on what can be removed.
+  if ((status != 0)) || ! rm -rf "$scratch"; then
     say "What is left for a look: $scratch"
   fi
+  exit "$status"
 }
 trap finish EXIT
 "$slurm" start "$scratch/slurm"

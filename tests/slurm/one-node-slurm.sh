@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # A Slurm of one node for tests, as root, without systemd, cgroups or accounting:
 #   one-node-slurm.sh start FOLDER    prints nothing; then export SLURM_CONF=FOLDER/slurm.conf
-#   one-node-slurm.sh stop FOLDER
+#   one-node-slurm.sh stop FOLDER     cancels the jobs and returns once the daemons are gone
 # The node claims eight processors, however many there are. State and logs stay in FOLDER.
 set -euo pipefail
 
@@ -90,16 +90,28 @@ start() {
   wait_for 30 node_is_ready || die "the node did not come up; logs are in $folder"
 }
 
+# A zombie has ended, even where no init process buries it.
+has_ended() { [[ ! -e "/proc/$1" ]] || grep -q '^State:[[:space:]]*Z' "/proc/$1/status"; }
+
+# end_daemon PIDFILE: returns once the process is gone, so that it writes nothing any more.
+end_daemon() {
+  local pid
+  [[ -s "$1" ]] || return 0
+  pid=$(<"$1")
+  kill "$pid" 2>/dev/null || return 0
+  wait_for 30 has_ended "$pid" || kill -KILL "$pid" 2>/dev/null || true
+  wait_for 10 has_ended "$pid" || die "process $pid of $1 does not end"
+}
+
+no_jobs_run() { [[ -z "$(squeue --noheader)" ]]; }
+
 stop() {
-  local folder=$1 daemon
+  local folder=$1
   export SLURM_CONF=$folder/slurm.conf
-  scancel --user=root >/dev/null 2>&1 || true
-  for daemon in slurmd slurmctld; do
-    [[ ! -s "$folder/$daemon.pid" ]] || kill "$(<"$folder/$daemon.pid")" 2>/dev/null || true
-  done
-  if [[ -e "$folder/munged-is-ours" && -s /run/munge/munged.pid ]]; then
-    kill "$(</run/munge/munged.pid)" 2>/dev/null || true
-  fi
+  if scancel --user=root >/dev/null 2>&1; then wait_for 30 no_jobs_run || true; fi
+  end_daemon "$folder/slurmd.pid"
+  end_daemon "$folder/slurmctld.pid"
+  [[ ! -e "$folder/munged-is-ours" ]] || end_daemon /run/munge/munged.pid
 }
 
 case "${1:-}" in
