@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <vector>
 
 #include "base/error.h"
@@ -23,7 +22,6 @@ CaseBootstrap bootstrap_over_cases(
     std::uint64_t seed,
     std::size_t replicates) {
   check(replicates > 0, "a bootstrap has replicates");
-  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   CaseBootstrap result{cases, 0, 0, kNan, kNan};
   if (cases < 2) return result;
   result.replicates = replicates;

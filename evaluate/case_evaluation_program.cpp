@@ -5,6 +5,8 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <cstdint>
+#include <cstring>
 #include <exception>
 #include <map>
 #include <optional>
@@ -67,6 +69,23 @@ StratifiedStarts draw_starts(const RegistrationStudyOptions& options,
               options.start_options(),
               target_points(study_case.target_box_ct),
               admissible);
+}
+
+/// Collective. Rank 0's starts on every rank, held once per node: a rank each, ten million would
+/// fill a node.
+SharedArray<PerturbedStart> held_per_node(const SharedArray<PerturbedStart>& starts,
+                                          const Communicator& world) {
+  if (world.size() == 1) return starts;
+  std::array<std::uint64_t, 1> count = {world.is_root() ? starts.size() : 0};
+  world.maximum(count);
+  if (count[0] == 0) return {};
+  const auto owner = world.allocate_on_nodes_from_root(
+      count[0] * sizeof(PerturbedStart), [&](std::span<std::byte> memory) {
+        std::memcpy(memory.data(), starts.data(), memory.size());
+      });
+  check(reinterpret_cast<std::uintptr_t>(owner.get()) % alignof(PerturbedStart) == 0,
+        "memory of a node is aligned");
+  return {owner, {reinterpret_cast<const PerturbedStart*>(owner.get()), count[0]}};
 }
 
 /// With both renderers, ray casting may be given fewer intervals and starts.
@@ -330,7 +349,8 @@ std::vector<MethodRows> begin_registrations(const RegistrationStudyOptions& opti
                                             const std::vector<Method>& methods,
                                             const Communicator& world) {
   const std::string name = file_name_part(evaluation.case_name);
-  const DecidingValues decides = deciding_values(options, evaluation);
+  DecidingValues decides;
+  if (world.is_root()) decides = deciding_values(options, evaluation);
   std::vector<MethodRows> begun;
   begun.reserve(methods.size());
   for (const Method& method : methods)
@@ -415,11 +435,15 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
     methods.push_back({method.renderer, std::move(method.runner), {}});
   all_or_none(world, [&] {
     evaluation.gold = gold_standard(study, study_case, options.gold);
+    if (!world.is_root()) return;
     evaluation.starts = options.starts_from.empty()
                             ? draw_starts(options, study_case, evaluation.gold, methods)
                             : given_starts(options, study, study_case, evaluation.gold);
+  });
+  evaluation.starts.starts = held_per_node(evaluation.starts.starts, world);
+  evaluation.start_count = evaluation.starts.starts.size();
+  all_or_none(world, [&] {
     for (Method& method : methods) assign_starts(options, evaluation.starts, method);
-    evaluation.start_count = evaluation.starts.starts.size();
   });
   // Refusals first: they leave the results of an earlier run alone.
   std::vector<MethodRows> rows;

@@ -23,7 +23,8 @@ namespace af::evaluation {
 struct CaseEvaluation {
   std::string case_name;
   GoldStandard gold;
-  StratifiedStarts starts;  ///< its list of starts is dropped when they are registered
+  /// Rank 0; the list of starts on every rank, until they are registered.
+  StratifiedStarts starts;
   std::size_t start_count = 0;
   std::vector<RegistrationRow> rows;  ///< rank 0: by renderer, start index
   std::map<std::string, std::string> input_sha256;

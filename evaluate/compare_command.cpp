@@ -3,6 +3,8 @@
 
 #include <iostream>
 
+#include <CLI/CLI.hpp>
+
 #include "base/error.h"
 #include "evaluate/method_comparison_files.h"
 #include "io/output_file.h"

@@ -4,8 +4,7 @@
 #include <filesystem>
 #include <vector>
 
-#include <CLI/CLI.hpp>
-
+#include "cli/app_forward.h"
 #include "parallel/communicator.h"
 
 namespace af::evaluation {

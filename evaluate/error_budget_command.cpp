@@ -5,6 +5,8 @@
 #include <iostream>
 #include <sstream>
 
+#include <CLI/CLI.hpp>
+
 #include "base/error.h"
 #include "evaluate/error_budget.h"
 #include "evaluate/method_options_command.h"
@@ -23,9 +25,6 @@ namespace af::evaluation {
 namespace {
 
 using nlohmann::json;
-
-constexpr std::array<const char*, 6> kParameterNames = {
-    "rx_deg", "ry_deg", "rz_deg", "tx_mm", "ty_mm", "tz_mm"};
 
 /// A run of the chain as its folder has it.
 struct ChainRun {

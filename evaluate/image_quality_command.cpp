@@ -10,6 +10,8 @@
 #include <sstream>
 #include <tuple>
 
+#include <CLI/CLI.hpp>
+
 #include "base/error.h"
 #include "cli/app_main.h"
 #include "cli/stop_request.h"

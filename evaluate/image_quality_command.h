@@ -6,8 +6,7 @@
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
-
+#include "cli/app_forward.h"
 #include "parallel/communicator.h"
 
 namespace af::evaluation {

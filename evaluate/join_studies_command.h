@@ -5,8 +5,7 @@
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
-
+#include "cli/app_forward.h"
 #include "io/study_file.h"
 #include "parallel/communicator.h"
 

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <CLI/CLI.hpp>
+
 #include "cli/app_main.h"
 #include "evaluate/compare_command.h"
 #include "evaluate/error_budget_command.h"

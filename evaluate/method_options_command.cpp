@@ -6,6 +6,8 @@
 #include <set>
 #include <sstream>
 
+#include <CLI/CLI.hpp>
+
 #include "base/error.h"
 #include "io/csv_table.h"
 #include "register/method_command.h"

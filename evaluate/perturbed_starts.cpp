@@ -210,9 +210,11 @@ StratifiedStarts stratified_starts(
       if (by_interval[interval].size() == wanted) ++full_intervals;
     }
   }
-  result.starts.reserve(by_interval.size() * wanted);
+  std::vector<PerturbedStart> starts;
+  starts.reserve(by_interval.size() * wanted);
   for (std::vector<Candidate>& candidates : by_interval)
-    stratification.pick(std::move(candidates), result.starts);
+    stratification.pick(std::move(candidates), starts);
+  result.starts = SharedArray<PerturbedStart>(std::move(starts));
   return result;
 }
 
@@ -229,6 +231,8 @@ StratifiedStarts uniform_starts(
   StratifiedStarts result;
   result.inadmissible_per_interval.resize(static_cast<std::size_t>(options.intervals));
   std::vector<int> found(static_cast<std::size_t>(options.intervals));
+  std::vector<PerturbedStart> starts;
+  starts.reserve(count);
   for (std::uint64_t index = 0; index < count; ++index) {
     HashRandom random(options.seed, hash64(kTreStream, hash_name(frame.case_name)), index);
     const double tre_mm = random.uniform(0.0, largest_tre_mm);
@@ -249,8 +253,9 @@ StratifiedStarts uniform_starts(
       ++result.inadmissible_per_interval[static_cast<std::size_t>(start.interval)];
     }
     start.rank_in_interval = found[static_cast<std::size_t>(start.interval)]++;
-    result.starts.push_back(start);
+    starts.push_back(start);
   }
+  result.starts = SharedArray<PerturbedStart>(std::move(starts));
   return result;
 }
 
@@ -260,6 +265,8 @@ StratifiedStarts starts_at(const StartFrame& frame,
                            std::span<const RigidTransform> poses) {
   StratifiedStarts result;
   std::map<int, int> found;
+  std::vector<PerturbedStart> starts;
+  starts.reserve(poses.size());
   for (const RigidTransform& pose : poses) {
     PerturbedStart start;
     start.draw_index = result.draws++;
@@ -268,8 +275,9 @@ StratifiedStarts starts_at(const StartFrame& frame,
     measure(frame, options, target_points_ct_mm, start);
     start.rank_in_interval = found[start.interval]++;
     if (start.interval >= options.intervals) ++result.draws_beyond;
-    result.starts.push_back(start);
+    starts.push_back(start);
   }
+  result.starts = SharedArray<PerturbedStart>(std::move(starts));
   return result;
 }
 

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "base/shared_array.h"
 #include "geometry/rigid_transform.h"
 #include "geometry/slab_sizing.h"
 
@@ -56,7 +57,7 @@ struct PerturbedStart {
 };
 
 struct StratifiedStarts {
-  std::vector<PerturbedStart> starts;  ///< by interval, then draw index
+  SharedArray<PerturbedStart> starts;  ///< by interval, then draw index
   std::uint64_t draws = 0;
   std::uint64_t inadmissible_draws = 0;  ///< refused by the predicate
   std::uint64_t draws_beyond = 0;        ///< initial TRE past the last interval

@@ -10,6 +10,8 @@
 #include <set>
 #include <sstream>
 
+#include <CLI/CLI.hpp>
+
 #include "base/error.h"
 #include "cli/app_main.h"
 #include "cli/stop_request.h"
@@ -396,15 +398,16 @@ void run_registration(const RegistrationStudyOptions& options,
       if (!world.is_root()) return;
       // What an earlier run left here is whole no more.
       std::filesystem::remove(folder / "summary.json");
-      starts_file->add(so_far.case_name, so_far.starts.starts);
+      starts_file->add(so_far.case_name, so_far.starts.starts.view());
       if (&study_case == &cases.back()) starts_file->finish();
     };
-    evaluations.push_back(options.poses_from.empty()
-                              ? evaluate_case(options, study, study_case, world, on_starts)
-                              : all_or_none(world, [&] {
-                                  return evaluate_found_poses(
-                                      options, study, study_case, on_starts);
-                                }));
+    evaluations.push_back(
+        options.poses_from.empty()
+            ? evaluate_case(options, study, study_case, world, on_starts)
+            : all_or_none(world, [&] {
+                return world.is_root() ? evaluate_found_poses(options, study, study_case, on_starts)
+                                       : CaseEvaluation{};
+              }));
   }
   if (options.is_starts_only) {
     if (world.is_root()) std::cout << "starts: " << (folder / "starts.csv").string() << '\n';

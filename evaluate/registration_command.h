@@ -7,8 +7,7 @@
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
-
+#include "cli/app_forward.h"
 #include "evaluate/method_options_command.h"
 #include "evaluate/perturbed_starts.h"
 #include "parallel/communicator.h"

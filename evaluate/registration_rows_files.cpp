@@ -19,9 +19,6 @@ using nlohmann::json;
 
 namespace {
 
-constexpr std::array<const char*, 6> kParameterNames = {
-    "rx_deg", "ry_deg", "rz_deg", "tx_mm", "ty_mm", "tz_mm"};
-
 void append_numbers(std::vector<std::string>& fields, const std::array<double, 6>& values) {
   for (const double value : values) fields.push_back(number_text(value));
 }
@@ -200,7 +197,7 @@ StartsFile::StartsFile(std::filesystem::path path)
   file_ << CsvTable(start_columns()).to_text();
 }
 
-void StartsFile::add(const std::string& case_name, const std::vector<PerturbedStart>& starts) {
+void StartsFile::add(const std::string& case_name, std::span<const PerturbedStart> starts) {
   for (std::size_t i = 0; i < starts.size(); ++i) {
     CsvTable row(start_columns());
     row.add_row(start_fields(case_name, i, starts[i]));

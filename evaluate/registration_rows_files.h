@@ -74,7 +74,7 @@ void write_registrations(const std::filesystem::path& path,
 class StartsFile {
  public:
   explicit StartsFile(std::filesystem::path path);
-  void add(const std::string& case_name, const std::vector<PerturbedStart>& starts);
+  void add(const std::string& case_name, std::span<const PerturbedStart> starts);
   /// FileError when it cannot be written whole.
   void finish();
 

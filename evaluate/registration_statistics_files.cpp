@@ -6,7 +6,8 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <set>
+#include <string>
+#include <tuple>
 #include <utility>
 
 #include "evaluate/bootstrap.h"
@@ -23,8 +24,6 @@ namespace {
 using Rows = std::vector<const RegistrationRow*>;
 
 constexpr std::array<double, 5> kThresholdsMm = {1.0, 2.0, kSuccessTreMm, 5.0, 10.0};
-constexpr std::array<const char*, 6> kParameterNames = {
-    "rx_deg", "ry_deg", "rz_deg", "tx_mm", "ty_mm", "tz_mm"};
 constexpr std::array<const char*, 5> kErrorNames = {"mrpd_mm",
                                                     "projection_detector_mm",
                                                     "projection_isocenter_mm",
@@ -244,17 +243,49 @@ struct StartPair {
   const RegistrationRow* raycast = nullptr;
 };
 
+bool is_earlier_start(const RegistrationRow* a, const RegistrationRow* b) {
+  return std::tie(a->case_name, a->start_index) < std::tie(b->case_name, b->start_index);
+}
+
+/// By case and start index. Millions of rows are looked at through pointers: a map of them would
+/// need more memory than they.
+Rows rows_by_start(const std::vector<RegistrationRow>& rows, const std::string& renderer) {
+  Rows found;
+  for (const RegistrationRow& row : rows)
+    if (row.renderer == renderer) found.push_back(&row);
+  std::sort(found.begin(), found.end(), is_earlier_start);
+  return found;
+}
+
 std::vector<StartPair> pairs_of(const std::vector<RegistrationRow>& rows) {
-  std::map<std::pair<std::string, std::int64_t>, StartPair> by_start;
-  for (const RegistrationRow& row : rows) {
-    StartPair& pair = by_start[{row.case_name, row.start_index}];
-    if (row.renderer == "field") pair.field = &row;
-    if (row.renderer == "raycast") pair.raycast = &row;
-  }
+  const Rows raycast = rows_by_start(rows, "raycast");
+  if (raycast.empty()) return {};
   std::vector<StartPair> pairs;
-  for (const auto& [start, pair] : by_start)
-    if (pair.field != nullptr && pair.raycast != nullptr) pairs.push_back(pair);
+  auto next = raycast.begin();
+  for (const RegistrationRow* field : rows_by_start(rows, "field")) {
+    next = std::lower_bound(next, raycast.end(), field, is_earlier_start);
+    if (next == raycast.end()) break;
+    if (!is_earlier_start(field, *next)) pairs.push_back({field, *next});
+  }
   return pairs;
+}
+
+/// Those of a renderer, case and start index that another row has before them, ascending.
+Rows repeated_rows(const std::vector<RegistrationRow>& rows) {
+  const auto key = [](const RegistrationRow* row) {
+    return std::tie(row->case_name, row->renderer, row->start_index);
+  };
+  Rows sorted;
+  sorted.reserve(rows.size());
+  for (const RegistrationRow& row : rows) sorted.push_back(&row);
+  std::sort(sorted.begin(), sorted.end(), [&](const RegistrationRow* a, const RegistrationRow* b) {
+    return key(a) != key(b) ? key(a) < key(b) : a < b;
+  });
+  Rows repeated;
+  for (std::size_t i = 1; i < sorted.size(); ++i)
+    if (key(sorted[i - 1]) == key(sorted[i])) repeated.push_back(sorted[i]);
+  std::sort(repeated.begin(), repeated.end());
+  return repeated;
 }
 
 json test_json(const std::vector<double>& field_tre_mm,
@@ -367,18 +398,19 @@ json paired_statistics(const std::vector<RegistrationRow>& rows,
 
 std::vector<std::string> row_problems(const std::vector<RegistrationRow>& rows) {
   std::vector<std::string> found;
-  std::set<std::tuple<std::string, std::string, std::int64_t>> seen;
+  const Rows repeated = repeated_rows(rows);
   for (const RegistrationRow& row : rows) {
-    const std::string name =
-        row.case_name + ", " + row.renderer + ", start " + std::to_string(row.start_index);
-    if (!seen.insert({row.case_name, row.renderer, row.start_index}).second)
-      found.push_back(name + ": occurs more than once");
-    if (!std::isfinite(row.initial_tre_mm)) found.push_back(name + ": has no initial TRE");
+    const auto add = [&](const char* problem) {
+      found.push_back(row.case_name + ", " + row.renderer + ", start " +
+                      std::to_string(row.start_index) + ": " + problem);
+    };
+    if (std::binary_search(repeated.begin(), repeated.end(), &row)) add("occurs more than once");
+    if (!std::isfinite(row.initial_tre_mm)) add("has no initial TRE");
     const bool has_parameters = std::all_of(row.final_deg_mm.begin(),
                                             row.final_deg_mm.end(),
                                             [](double value) { return std::isfinite(value); });
     if (std::isfinite(row.tre_mm) != has_parameters)
-      found.push_back(name + ": final pose and TRE do not belong together");
+      add("final pose and TRE do not belong together");
   }
   return found;
 }

@@ -3,6 +3,8 @@
 
 #include <iostream>
 
+#include <CLI/CLI.hpp>
+
 #include "evaluate/report/report_page.h"
 #include "io/gnuplot_figure.h"
 #include "io/output_file.h"

@@ -4,14 +4,12 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 
 #include "base/error.h"
+#include "base/sample_summary.h"
 
 namespace af::evaluation {
 namespace {
-
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 /// Where the curve crosses `level` when walking from `peak` by `direction`; NaN when it does not
 /// before its end or a hole.

@@ -15,9 +15,6 @@
 namespace af::evaluation {
 namespace {
 
-constexpr std::array<const char*, 6> kParameterNames = {
-    "rx_deg", "ry_deg", "rz_deg", "tx_mm", "ty_mm", "tz_mm"};
-
 bool is_of_case(const CsvTable& table, std::size_t row, const PoseTableFrames& frames) {
   if (table.find_column("case").has_value()) return table.text(row, "case") == frames.case_name;
   if (frames.is_only_case) return true;

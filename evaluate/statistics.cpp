@@ -5,17 +5,11 @@
 #include <boost/math/distributions/non_central_t.hpp>
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
-#include <limits>
 #include <string>
 
 #include "base/error.h"
 
 namespace af::evaluation {
-namespace {
-
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-
-}  // namespace
 
 MeanInterval student_interval(std::span<const double> values) {
   if (values.size() < 2) return {kNan, kNan};

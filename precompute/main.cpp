@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <CLI/CLI.hpp>
+
 #include "cli/app_main.h"
 #include "cli/stop_request.h"
 #include "precompute/precompute_program.h"

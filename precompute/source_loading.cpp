@@ -45,19 +45,40 @@ NamedSource source_of_study(const PrecomputeOptions& options, const Study& study
   return source;
 }
 
+/// Collective.
 NamedSource source_of_options(const PrecomputeOptions& options,
+                              const Communicator& communicator,
                               std::vector<std::string>& warnings) {
-  if (options.ct.empty() || options.rig.empty())
-    throw UsageError("name a CT and a camera: --ct CT --rig RIG --camera NAME, or --study STUDY");
   NamedSource source;
   source.ct_path = options.ct;
-  source.rig = read_rig(options.rig, &warnings);
-  std::vector<std::string> cameras;
-  for (const CameraGeometry& camera : source.rig.cameras) cameras.push_back(camera.name);
-  source.camera =
-      options.camera.empty() ? only_camera(cameras, "rig " + options.rig) : options.camera;
-  if (!options.nominal_pose.empty()) source.nominal_room_from_ct = read_pose(options.nominal_pose);
+  source.rig = read_rig(options.rig, communicator, &warnings);
+  source.camera = options.camera;
+  if (options.camera.empty()) {
+    std::vector<std::string> cameras;
+    for (const CameraGeometry& camera : source.rig.cameras) cameras.push_back(camera.name);
+    source.camera =
+        all_or_none(communicator, [&] { return only_camera(cameras, "rig " + options.rig); });
+  }
+  if (!options.nominal_pose.empty())
+    source.nominal_room_from_ct = shared_poses(communicator, [&] {
+                                    return std::vector{read_pose(options.nominal_pose)};
+                                  }).front();
   return source;
+}
+
+/// Collective.
+NamedSource named_source(const PrecomputeOptions& options,
+                         const Communicator& communicator,
+                         std::vector<std::string>& warnings) {
+  if (!options.study.empty()) {
+    const Study study = read_study(options.study, communicator, &warnings);
+    return all_or_none(communicator, [&] { return source_of_study(options, study); });
+  }
+  all_or_none(communicator, [&] {
+    if (options.ct.empty() || options.rig.empty())
+      throw UsageError("name a CT and a camera: --ct CT --rig RIG --camera NAME, or --study STUDY");
+  });
+  return source_of_options(options, communicator, warnings);
 }
 
 PoseFrame frame_of(const NamedSource& source,
@@ -78,14 +99,8 @@ PoseFrame frame_of(const NamedSource& source,
 
 FieldSource load_source(const PrecomputeOptions& options, const Communicator& communicator) {
   FieldSource source;
-  const Study study =
-      options.study.empty() ? Study() : read_study(options.study, communicator, &source.warnings);
-  const NamedSource named = all_or_none(communicator, [&] {
-    NamedSource found = options.study.empty() ? source_of_options(options, source.warnings)
-                                              : source_of_study(options, study);
-    source.camera = found.rig.camera(found.camera);
-    return found;
-  });
+  const NamedSource named = named_source(options, communicator, source.warnings);
+  source.camera = all_or_none(communicator, [&] { return named.rig.camera(named.camera); });
   CtReadOptions ct_options;
   ct_options.series_uid = options.series_uid;
   const NodeCt ct = used_from(named.places, "ct", [&] {

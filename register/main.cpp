@@ -4,6 +4,8 @@
 #include <optional>
 #include <string>
 
+#include <CLI/CLI.hpp>
+
 #include "base/error.h"
 #include "cli/app_main.h"
 #include "cli/stop_request.h"
@@ -38,7 +40,7 @@ void run(const RegisterOptions& options,
   const af::StudyCase study_case =
       af::all_or_none(world, [&] { return study.find_case(options.case_name); });
   const std::vector<af::RigidTransform> starts =
-      af::all_or_none(world, [&] { return start_poses(options, study_case.frame()); });
+      af::shared_poses(world, [&] { return start_poses(options, study_case.frame()); });
   const auto gold = af::all_or_none(world, [&] { return known_gold(study, study_case); });
   const auto pool = std::make_shared<af::ThreadPool>(af::thread_count(options.method.threads));
   CaseLoadOptions load_options = case_load_options(options, method.coarsest_level());

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "register/method_command.h"
 
+#include <CLI/CLI.hpp>
+
 #include "register/presets.h"
 
 namespace af::registration {

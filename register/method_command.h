@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <CLI/CLI.hpp>
-
+#include "cli/app_forward.h"
 #include "register/method_options.h"
 
 namespace af::registration {

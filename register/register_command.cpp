@@ -4,6 +4,8 @@
 #include <cmath>
 #include <sstream>
 
+#include <CLI/CLI.hpp>
+
 #include "base/error.h"
 #include "cli/stop_request.h"
 #include "io/csv_table.h"

@@ -9,8 +9,7 @@
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
-
+#include "cli/app_forward.h"
 #include "register/case_loading.h"
 #include "register/method_options.h"
 #include "register/registration.h"

@@ -153,7 +153,7 @@ CsvTable registrations_table(std::vector<RegistrationRecord> records,
   });
   std::vector<std::string> columns = {"case", "start_index", "renderer"};
   for (const char* when : {"start", "final"})
-    for (const char* parameter : {"rx_deg", "ry_deg", "rz_deg", "tx_mm", "ty_mm", "tz_mm"})
+    for (const char* parameter : kParameterNames)
       columns.push_back(std::string(when) + "_" + parameter);
   for (const char* column : {"initial_tre_mm",
                              "tre_mm",

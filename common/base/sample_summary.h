@@ -2,10 +2,14 @@
 #pragma once
 
 #include <cstddef>
+#include <limits>
 #include <span>
 #include <vector>
 
 namespace af {
+
+/// What a sample too small for it has as a statistic.
+inline constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 /// Quantile `p` in [0, 1] by linear interpolation between order statistics (Hyndman and Fan's type
 /// 7, the default of R and NumPy). `sorted` is ascending and not empty; infinity is allowed.

@@ -27,6 +27,8 @@ class SharedArray {
   [[nodiscard]] std::size_t size() const { return view_.size(); }
   [[nodiscard]] std::span<const T> view() const { return view_; }
   const T& operator[](std::size_t i) const { return view_[i]; }
+  [[nodiscard]] auto begin() const { return view_.begin(); }
+  [[nodiscard]] auto end() const { return view_.end(); }
 
  private:
   std::shared_ptr<const void> owner_;

@@ -8,6 +8,8 @@
 #include <sstream>
 #include <thread>
 
+#include <CLI/CLI.hpp>
+
 #include "base/build_info.h"
 #include "base/error.h"
 #include "cli/stop_request.h"

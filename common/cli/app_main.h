@@ -5,8 +5,7 @@
 #include <set>
 #include <string>
 
-#include <CLI/CLI.hpp>
-
+#include "cli/app_forward.h"
 #include "parallel/communicator.h"
 
 namespace af::cli {

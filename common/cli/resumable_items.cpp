@@ -60,14 +60,14 @@ std::vector<std::int64_t> ResumableItems::unfinished(const std::vector<std::int6
   return left;
 }
 
-void ResumableItems::complete(std::vector<std::int64_t> items,
+void ResumableItems::complete(const std::vector<std::int64_t>& items,
                               const std::string& what,
                               const Work& work) {
   const std::vector<std::int64_t> to_do = unfinished(items);
   const std::size_t all = items.size();
   const std::size_t done_before = all - to_do.size();
   saved_ = communicator_.is_root() ? done_before : 0;
-  if (communicator_.is_root()) items_ = std::move(items);
+  if (communicator_.is_root()) items_ = items;
   if (done_before > 0 && !what.empty())
     info(communicator_, what + ": goes on after " + of_all(done_before, all));
   std::optional<ProgressPrinter> printer;

@@ -43,7 +43,7 @@ class ResumableItems {
   /// on rank 0 how far `what` ("case skull, field registrations"; empty: silent) has come. When a
   /// stop was asked for on any rank, items are passed over and StoppedError is thrown on every
   /// rank, with what is finished saved.
-  void complete(std::vector<std::int64_t> items, const std::string& what, const Work& work);
+  void complete(const std::vector<std::int64_t>& items, const std::string& what, const Work& work);
 
   /// Rank 0, after complete(): calls `receive` with each of its items' results, in any order, more
   /// than once when several runs made one: they are alike. FileError when some are gone.

@@ -8,6 +8,8 @@
 #include <limits>
 #include <sstream>
 
+#include <CLI/CLI.hpp>
+
 namespace af::cli {
 namespace {
 

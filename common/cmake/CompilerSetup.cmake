@@ -9,6 +9,8 @@ target_compile_options(
             $<$<BOOL:${AF_WERROR}>:-Werror>
             # GCC 12 reports std::string operator+ falsely (GCC bug 105651).
             -Wno-restrict
+            # In a unity build GCC takes the types of a source file for those of a header.
+            $<$<BOOL:${CMAKE_UNITY_BUILD}>:-Wno-subobject-linkage>
             # One binary for every x86-64 node: SSE4.2 baseline, wider only in kernels chosen at run time.
             -march=x86-64-v2
             # Same bits on every vector width: the compiler may not fuse a multiply with an add.
@@ -41,11 +43,20 @@ function(af_add_library name)
   target_include_directories(${name} PUBLIC ${PROJECT_SOURCE_DIR} ${PROJECT_SOURCE_DIR}/common)
 endfunction()
 
+# af_compile_quickly(<targets>): for what only calls libraries that are optimized: options, texts, tests. -O3 takes a third
+# longer to compile.
+function(af_compile_quickly)
+  foreach(target ${ARGN})
+    target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>)
+  endforeach()
+endfunction()
+
 # af_add_program(<name> SOURCES ... LIBS ...): an executable that is installed.
 function(af_add_program name)
   cmake_parse_arguments(arg "" "" "SOURCES;LIBS" ${ARGN})
   add_executable(${name} ${arg_SOURCES})
   target_link_libraries(${name} PRIVATE af_compile_options ${arg_LIBS})
+  af_compile_quickly(${name})
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/bin)
   install(TARGETS ${name} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 endfunction()

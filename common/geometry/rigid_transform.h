@@ -28,6 +28,10 @@ struct PoseParameters {
   static PoseParameters from_deg_and_mm(const std::array<double, 6>& values);
 };
 
+/// Names of deg_and_mm() in files.
+inline constexpr std::array<const char*, 6> kParameterNames = {
+    "rx_deg", "ry_deg", "rz_deg", "tx_mm", "ty_mm", "tz_mm"};
+
 /// What six pose parameters are relative to: the triple (R0, c, r) of
 ///
 ///     x_room = r + t + Rz(rz) Ry(ry) Rx(rx) R0 (x_ct - c)

@@ -2,8 +2,8 @@
 #include "gold/point_distances.h"
 
 #include <cstdint>
-#include <limits>
 
+#include "base/sample_summary.h"
 #include "base/vector_width.h"
 #include "gold/point_distances_kernel.h"
 
@@ -54,7 +54,6 @@ ProjectionDistances projection_distances(const CameraGeometry& camera,
                                   static_cast<std::int64_t>(points_ct_mm.size()),
                                   camera_from_ct(camera, room_from_ct),
                                   camera_from_ct(camera, gold_room_from_ct));
-  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   if (!(sums.smallest_depth > 0.0)) return {kNan, kNan};
   return {sums.reprojection, sums.slope * camera.source_detector_distance_mm()};
 }

@@ -157,8 +157,6 @@ RigidTransform pose_of_itk_transform(const std::string& text, const std::string&
   return rigid_or_throw(ct_from_room, file).inverse();
 }
 
-constexpr std::array kParameterColumns = {"rx_deg", "ry_deg", "rz_deg", "tx_mm", "ty_mm", "tz_mm"};
-
 std::string matrix_column(int row, int column) {
   return "m" + std::to_string(row) + std::to_string(column);
 }
@@ -179,14 +177,13 @@ RigidTransform matrix_of_row(const CsvTable& table, std::size_t row, int matrix_
 
 RigidTransform parameters_of_row(const CsvTable& table, std::size_t row, const PoseFrame& frame) {
   std::array<double, 6> values{};
-  for (std::size_t i = 0; i < values.size(); ++i)
-    values[i] = table.number(row, kParameterColumns[i]);
+  for (std::size_t i = 0; i < values.size(); ++i) values[i] = table.number(row, kParameterNames[i]);
   return pose_from_parameters(frame, PoseParameters::from_deg_and_mm(values));
 }
 
 void check_parameter_columns(const CsvTable& table, const std::string& file) {
   std::string missing;
-  for (const char* column : kParameterColumns)
+  for (const char* column : kParameterNames)
     if (!table.find_column(column)) missing += (missing.empty() ? "" : ", ") + std::string(column);
   if (!missing.empty())
     throw InputError(file + ":1: has no column " + missing +

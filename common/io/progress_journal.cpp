@@ -130,9 +130,9 @@ ProgressJournal::ProgressJournal(const fs::path& folder,
   }
   // Records without a manifest are of nobody knows what.
   for (const ShardFile& shard : shards_of(folder_, name_)) fs::remove(shard.path);
-  const nlohmann::json json = {
+  const nlohmann::json written = {
       {"format", kFormat}, {"format_version", kFormatVersion}, {"decides", decides}};
-  write_text_file(manifest, json.dump(2) + "\n");
+  write_text_file(manifest, written.dump(2) + "\n");
 }
 
 void ProgressJournal::visit(int shard_count, const Visit& visit) const {

@@ -32,6 +32,39 @@ Study read_study(const std::filesystem::path& path,
   return study;
 }
 
+CameraRig read_rig(const std::string& name_or_path,
+                   const Communicator& communicator,
+                   std::vector<std::string>* warnings) {
+  std::string text;
+  CameraRig rig = all_or_none(communicator, [&] {
+    if (!communicator.is_root()) return CameraRig();
+    CameraRig found = read_rig(name_or_path, warnings);
+    text = rig_to_toml(found);
+    return found;
+  });
+  communicator.broadcast(text);
+  all_or_none(communicator, [&] {
+    if (!communicator.is_root()) rig = parse_rig(text, name_or_path);
+  });
+  return rig;
+}
+
+std::vector<RigidTransform> shared_poses(const Communicator& communicator,
+                                         const std::function<std::vector<RigidTransform>()>& read) {
+  constexpr std::size_t kPoseBytes = 16 * sizeof(double);
+  std::vector<RigidTransform> poses = all_or_none(communicator, [&] {
+    return communicator.is_root() ? read() : std::vector<RigidTransform>();
+  });
+  std::vector<std::byte> bytes(poses.size() * kPoseBytes);
+  for (std::size_t i = 0; i < poses.size(); ++i)
+    std::memcpy(bytes.data() + i * kPoseBytes, poses[i].matrix().data(), kPoseBytes);
+  communicator.broadcast(bytes);
+  poses.resize(bytes.size() / kPoseBytes);
+  for (std::size_t i = 0; i < poses.size(); ++i)
+    std::memcpy(poses[i].matrix().data(), bytes.data() + i * kPoseBytes, kPoseBytes);
+  return poses;
+}
+
 void broadcast(Image2d& image, const Communicator& communicator) {
   const std::size_t head_bytes = 2 * sizeof(int);
   std::vector<std::byte> bytes;

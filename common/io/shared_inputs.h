@@ -3,9 +3,11 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
+#include "geometry/rigid_transform.h"
 #include "image/image2d.h"
 #include "io/study_file.h"
 #include "parallel/communicator.h"
@@ -17,6 +19,16 @@ namespace af {
 Study read_study(const std::filesystem::path& path,
                  const Communicator& communicator,
                  std::vector<std::string>* warnings = nullptr);
+
+/// Collective. read_rig() on rank 0, in the same way.
+CameraRig read_rig(const std::string& name_or_path,
+                   const Communicator& communicator,
+                   std::vector<std::string>* warnings = nullptr);
+
+/// Collective. What `read` returns on rank 0, to the last bit, on every rank; `read` is called
+/// there alone, and what it throws, every rank throws.
+std::vector<RigidTransform> shared_poses(const Communicator& communicator,
+                                         const std::function<std::vector<RigidTransform>()>& read);
 
 /// Collective. Rank 0's image, to the last bit, on every rank.
 void broadcast(Image2d& image, const Communicator& communicator);

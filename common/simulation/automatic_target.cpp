@@ -12,7 +12,6 @@ namespace af {
 
 namespace {
 
-constexpr int kBoneHu = 250;
 constexpr int kAirBelowHu = -900;
 constexpr double kCellMm = 5.0;
 constexpr int kMarginCells = 3;  // between box and CT: a region of interest sees a little more

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "base/hash_random.h"
+#include "simulation/automatic_target.h"
 
 namespace af {
 
@@ -15,7 +16,6 @@ namespace {
 constexpr double kTetrahedronEdgeMm = 25.0;
 constexpr double kLeastDistanceMm = 15.0;
 constexpr double kSearchRadiusMm = 10.0;
-constexpr int kBoneHu = 250;
 
 struct Interval {
   double first = 0.0;

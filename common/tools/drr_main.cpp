@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <iostream>
 
+#include <CLI/CLI.hpp>
+
 #include "base/error.h"
 #include "cli/app_main.h"
 #include "drr/field_renderer.h"

@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include <CLI/CLI.hpp>
+
 #include "cli/app_main.h"
 #include "io/study_template.h"
 #include "tools/inspection.h"

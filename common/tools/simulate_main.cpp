@@ -3,6 +3,8 @@
 #include <optional>
 #include <string>
 
+#include <CLI/CLI.hpp>
+
 #include "base/error.h"
 #include "cli/app_main.h"
 #include "cli/progress_printer.h"

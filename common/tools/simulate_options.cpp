@@ -4,6 +4,8 @@
 #include <cmath>
 #include <filesystem>
 
+#include <CLI/CLI.hpp>
+
 #include "simulation/range_check.h"
 
 namespace af::tools {

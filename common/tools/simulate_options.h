@@ -5,8 +5,7 @@
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
-
+#include "cli/app_forward.h"
 #include "simulation/phantom.h"
 #include "simulation/stress.h"
 #include "simulation/xray_simulator.h"

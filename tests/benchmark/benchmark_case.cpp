@@ -5,6 +5,8 @@
 #include <sys/utsname.h>
 #include <unistd.h>
 
+#include <CLI/CLI.hpp>
+
 #include "base/build_info.h"
 #include "base/error.h"
 #include "base/vector_width.h"

@@ -7,8 +7,7 @@
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
-
+#include "cli/app_forward.h"
 #include "drr/drr_renderer.h"
 #include "field/attenuation_quantizer.h"
 #include "geometry/slab_sizing.h"

@@ -2,6 +2,8 @@
 // Seconds of one DRR looked up in a field, one core, beside casting it through the CT.
 #include <functional>
 
+#include <CLI/CLI.hpp>
+
 #include "base/error.h"
 #include "base/hash_random.h"
 #include "benchmark/alternating_rounds.h"

@@ -5,6 +5,8 @@
 #include <numeric>
 #include <random>
 
+#include <CLI/CLI.hpp>
+
 #include "base/error.h"
 #include "base/vector_width.h"
 #include "benchmark/alternating_rounds.h"

@@ -7,6 +7,8 @@
 #include <cstdio>
 #include <limits>
 
+#include <CLI/CLI.hpp>
+
 #include "base/hash_random.h"
 #include "benchmark/benchmark_case.h"
 #include "cli/app_main.h"

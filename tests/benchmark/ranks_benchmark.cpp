@@ -6,6 +6,8 @@
 #include <filesystem>
 #include <unistd.h>
 
+#include <CLI/CLI.hpp>
+
 #include "base/error.h"
 #include "benchmark/alternating_rounds.h"
 #include "benchmark/benchmark_case.h"

@@ -7,6 +7,8 @@
 #include <iostream>
 #include <optional>
 
+#include <CLI/CLI.hpp>
+
 #include "base/error.h"
 #include "benchmark/benchmark_case.h"
 #include "cli/app_main.h"

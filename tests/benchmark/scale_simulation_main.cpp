@@ -6,6 +6,8 @@
 #include <iomanip>
 #include <iostream>
 
+#include <CLI/CLI.hpp>
+
 #include "base/error.h"
 #include "benchmark/benchmark_case.h"
 #include "benchmark/queue_costs.h"

@@ -3,6 +3,8 @@
 // measurements.
 #include <iostream>
 
+#include <CLI/CLI.hpp>
+
 #include "benchmark/benchmark_case.h"
 #include "benchmark/scaling_model.h"
 #include "cli/app_main.h"

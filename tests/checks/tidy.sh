@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 # clang-tidy over the first-party sources of a build (tests left out), as .clang-tidy says; any finding fails.
-# Minutes, so it is not a CTest entry. Usage: tidy.sh BUILD-FOLDER [PATH-PATTERN]
+# Minutes, so it is not a CTest entry. Usage, after cmake --preset dev: tidy.sh build/dev [PATH-PATTERN]
+# (A release build compiles several sources at once and does not name them.)
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR
 source "$(dirname "$0")/source_files.sh"
@@ -14,7 +15,7 @@ root=$(sed -n 's/^CMAKE_HOME_DIRECTORY:INTERNAL=//p' "$build/CMakeCache.txt")
 # Kernels appear once per vector width: each file once.
 mapfile -t files < <(sed -n 's/^ *"file": "\(.*\)",\{0,1\}$/\1/p' "$database" | LC_ALL=C sort -u |
   sed -n "s|^$root/||p" | grep -E "$pattern" | grep -v '^build/')
-((${#files[@]} > 0)) || { echo "no sources match $pattern" >&2; exit 1; }
+((${#files[@]} > 0)) || { echo "no sources match $pattern in $database: use that of build/dev" >&2; exit 1; }
 cd "$root"
 printf '%s\0' "${files[@]}" |
   xargs -0 -n 1 -P "$(nproc)" clang-tidy-14 --quiet --warnings-as-errors='*' -p "$build" \

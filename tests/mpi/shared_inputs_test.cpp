@@ -50,6 +50,31 @@ TEST(SharedInputs, StudyAndRigAreReadByRankZeroAlone) {
   EXPECT_EQ(study.cases.front().views.front().roi.height, 201);
 }
 
+TEST(SharedInputs, RigsAndPosesAreReadByRankZeroAlone) {
+  const Communicator world = Communicator::world();
+  const test::SharedFolder folder;
+  CameraRig rig = read_rig("c-arm-12in");
+  rig.isocenter_point.x() = 1.0 / 3.0;
+  if (world.is_root()) write_text_file(folder / "rig.toml", rig_to_toml(rig));
+  const std::string here = (folder / "rig.toml").string();
+  const CameraRig read = read_rig(world.is_root() ? here : "/nowhere/rig.toml", world);
+  EXPECT_EQ(rig_to_toml(read), rig_to_toml(rig));
+
+  RigidTransform pose = RigidTransform::Identity();
+  pose.translation() = Eigen::Vector3d(1.0 / 3.0, -0.0, 1e-300);
+  int calls = 0;
+  const auto read_two = [&] {
+    ++calls;
+    return std::vector{RigidTransform(RigidTransform::Identity()), pose};
+  };
+  const std::vector<RigidTransform> poses = shared_poses(world, read_two);
+  EXPECT_EQ(calls, world.is_root() ? 1 : 0);
+  ASSERT_EQ(poses.size(), 2U);
+  EXPECT_EQ(poses[1].matrix(), pose.matrix());
+  EXPECT_TRUE(std::signbit(poses[1].translation().y()));
+  EXPECT_TRUE(shared_poses(world, [] { return std::vector<RigidTransform>(); }).empty());
+}
+
 TEST(SharedInputs, WhatRankZeroCannotReadIsTheSameErrorOnEveryRank) {
   const Communicator world = Communicator::world();
   try {

@@ -38,6 +38,13 @@ inline void write_input(const std::filesystem::path& path, const std::string& te
   std::ofstream(path, std::ios::binary) << text;
 }
 
+/// `text` with its first `from`, which must be there, replaced.
+inline std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  const std::size_t place = text.find(from);
+  EXPECT_NE(place, std::string::npos) << from;
+  return text.replace(place, from.size(), to);
+}
+
 /// Feeds a reader with damaged copies of a good text: every `step`-th truncation and `count` copies
 /// with a few bytes changed, removed or doubled. Each must be read or refused with an af::Error.
 /// Returns how many were refused.

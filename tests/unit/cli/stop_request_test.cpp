@@ -6,6 +6,7 @@
 #include <csignal>
 #include <thread>
 
+#include <CLI/CLI.hpp>
 #include <gtest/gtest.h>
 
 namespace af::cli {

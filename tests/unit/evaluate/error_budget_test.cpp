@@ -13,7 +13,7 @@ namespace {
 using Ends = std::vector<std::optional<PoseParameters>>;
 
 // Sums and means of a few values of up to 10 mm.
-constexpr double kRoundingMm = 1e-13;
+constexpr double kBudgetRoundingMm = 1e-13;
 
 const std::vector<Eigen::Vector3d> kTarget = {{10, 0, 0}, {-10, 0, 0}, {0, 10, 0}, {0, -10, 0}};
 
@@ -33,19 +33,19 @@ TEST(ErrorBudget, OfHandBuiltEndsIsTheKnownOne) {
   const BudgetStep& ideal = budget.steps[0];
   EXPECT_EQ(ideal.successes, 3u);
   EXPECT_TRUE(std::isnan(ideal.shift_mm));
-  EXPECT_NEAR(ideal.bias_mm, 1.0, kRoundingMm);
-  EXPECT_NEAR(ideal.scatter_mm, 0.5, kRoundingMm);
-  EXPECT_NEAR(ideal.tre_mm, 1.0, kRoundingMm);
+  EXPECT_NEAR(ideal.bias_mm, 1.0, kBudgetRoundingMm);
+  EXPECT_NEAR(ideal.scatter_mm, 0.5, kBudgetRoundingMm);
+  EXPECT_NEAR(ideal.tre_mm, 1.0, kBudgetRoundingMm);
   const BudgetStep& blurred = budget.steps[1];
   EXPECT_EQ(blurred.successes, 2u);
-  EXPECT_NEAR(blurred.shift_mm, 2.0, kRoundingMm);
+  EXPECT_NEAR(blurred.shift_mm, 2.0, kBudgetRoundingMm);
   // Both starts moved alike.
-  EXPECT_NEAR(blurred.shift_standard_error_mm, 0.0, kRoundingMm);
-  EXPECT_NEAR(blurred.bias_mm, std::sqrt(5.0), kRoundingMm);
+  EXPECT_NEAR(blurred.shift_standard_error_mm, 0.0, kBudgetRoundingMm);
+  EXPECT_NEAR(blurred.bias_mm, std::sqrt(5.0), kBudgetRoundingMm);
   const BudgetStep& field = budget.steps[2];
-  EXPECT_NEAR(field.shift_mm, 3.0, kRoundingMm);
+  EXPECT_NEAR(field.shift_mm, 3.0, kBudgetRoundingMm);
   // Changes of 4.5 and 1.5 mm: SD 3 / sqrt(2), standard error 1.5.
-  EXPECT_NEAR(field.shift_standard_error_mm, 1.5, kRoundingMm);
+  EXPECT_NEAR(field.shift_standard_error_mm, 1.5, kBudgetRoundingMm);
 }
 
 TEST(ErrorBudget, ShiftsAddUpToTheLastBias) {
@@ -60,7 +60,7 @@ TEST(ErrorBudget, ShiftsAddUpToTheLastBias) {
       sum[p] +=
           budget.steps[i].mean_end.deg_and_mm()[p] - budget.steps[i - 1].mean_end.deg_and_mm()[p];
   for (std::size_t p = 0; p < 6; ++p)
-    EXPECT_NEAR(sum[p], budget.steps.back().mean_end.deg_and_mm()[p], kRoundingMm) << p;
+    EXPECT_NEAR(sum[p], budget.steps.back().mean_end.deg_and_mm()[p], kBudgetRoundingMm) << p;
   // A step is never longer than the way there and back.
   EXPECT_LE(budget.steps[2].bias_mm, budget.steps[1].bias_mm + budget.steps[2].shift_mm + 1e-9);
 }

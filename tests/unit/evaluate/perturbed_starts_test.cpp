@@ -70,8 +70,8 @@ TEST(PerturbedStarts, AreTheContractsFormulaRelativeToGold) {
                                      rotation_from_angles(start.parameters.rotation_rad) *
                                          frame.gold_room_from_ct.linear() *
                                          (point - frame.center_ct_mm);
-    constexpr double kRoundingMm = 1e-10;
-    EXPECT_LT((start.room_from_ct * point - expected).norm(), kRoundingMm);
+    constexpr double kStartRoundingMm = 1e-10;
+    EXPECT_LT((start.room_from_ct * point - expected).norm(), kStartRoundingMm);
   }
 }
 
@@ -188,7 +188,7 @@ TEST(PerturbedStarts, UniformInTreHaveThatDistribution) {
 TEST(PerturbedStarts, AtGivenPosesKeepThem) {
   const StartFrame frame = example_frame();
   const auto points = target_points(frame.target_box_ct, 20.0);
-  const std::vector<PerturbedStart> drawn =
+  const SharedArray<PerturbedStart> drawn =
       stratified_starts(frame, StartOptions{8, 2.0, 1, 1}, points, anything).starts;
   std::vector<RigidTransform> poses;
   for (const PerturbedStart& start : drawn) poses.push_back(start.room_from_ct);

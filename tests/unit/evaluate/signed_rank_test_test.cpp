@@ -13,7 +13,7 @@
 namespace af::evaluation {
 namespace {
 
-constexpr double kRounding = 1e-12;
+constexpr double kProbabilityRounding = 1e-12;
 
 TEST(SignedRankTest, EqualsPublishedValues) {
   // Hollander and Wolfe (1973), depression scale of nine patients before and after tranquilliser;
@@ -26,14 +26,14 @@ TEST(SignedRankTest, EqualsPublishedValues) {
   EXPECT_EQ(result.pairs_used, 9u);
   EXPECT_EQ(result.positive_ranks, 40.0);
   EXPECT_TRUE(result.is_exact);
-  EXPECT_NEAR(result.p, 20.0 / 512, kRounding);
+  EXPECT_NEAR(result.p, 20.0 / 512, kProbabilityRounding);
 }
 
 TEST(SignedRankTest, CountsSignsByHandForThreeDifferences) {
   // Ranks 1, 2, 3, all positive: one of eight sign patterns on either side.
-  EXPECT_NEAR(signed_rank_test(std::vector{0.1, 0.5, 0.2}).p, 2.0 / 8, kRounding);
+  EXPECT_NEAR(signed_rank_test(std::vector{0.1, 0.5, 0.2}).p, 2.0 / 8, kProbabilityRounding);
   // Negative rank 1: patterns with a sum of at most 1 are two of eight.
-  EXPECT_NEAR(signed_rank_test(std::vector{-0.1, 0.5, 0.2}).p, 4.0 / 8, kRounding);
+  EXPECT_NEAR(signed_rank_test(std::vector{-0.1, 0.5, 0.2}).p, 4.0 / 8, kProbabilityRounding);
 }
 
 TEST(SignedRankTest, GivesTiesTheirMeanRankAndLeavesZerosOut) {
@@ -42,7 +42,7 @@ TEST(SignedRankTest, GivesTiesTheirMeanRankAndLeavesZerosOut) {
   const SignedRankTest result = signed_rank_test(std::vector{-1.0, 0.0, 1.0, 2.0, 0.0});
   EXPECT_EQ(result.zeros, 2u);
   EXPECT_EQ(result.positive_ranks, 4.5);
-  EXPECT_NEAR(result.p, 6.0 / 8, kRounding);
+  EXPECT_NEAR(result.p, 6.0 / 8, kProbabilityRounding);
 }
 
 TEST(SignedRankTest, OfNothingOrZerosOnlyIsNotSignificant) {
@@ -74,8 +74,8 @@ TEST(SignedRankTest, RefusesWhatIsNotFinite) {
 TEST(McNemar, IsTheBinomialTailOfDiscordantPairs) {
   EXPECT_EQ(mcnemar_exact_p(0, 0), 1.0);
   EXPECT_EQ(mcnemar_exact_p(3, 3), 1.0);
-  EXPECT_NEAR(mcnemar_exact_p(0, 5), 2.0 / 32, kRounding);
-  EXPECT_NEAR(mcnemar_exact_p(6, 1), 2.0 * (1 + 7) / 128, kRounding);
+  EXPECT_NEAR(mcnemar_exact_p(0, 5), 2.0 / 32, kProbabilityRounding);
+  EXPECT_NEAR(mcnemar_exact_p(6, 1), 2.0 * (1 + 7) / 128, kProbabilityRounding);
 }
 
 }  // namespace

@@ -16,7 +16,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kRoundingMm = 1e-10;  // a few dozen double operations on values below 1000 mm
+constexpr double kTreRoundingMm = 1e-10;  // a few dozen double operations on values below 1000 mm
 
 const CtBox kCube{{-30, -30, -30}, {30, 30, 30}};
 
@@ -24,9 +24,9 @@ TEST(TargetBox, PointsAreTheCentresOfEqualCells) {
   // 3 mm in cells of at most 2 mm: two cells of 1.5 mm; 2 mm: one; 5 mm: three of 5/3 mm.
   const std::vector<Vector3d> points = target_points({{0, 10, -5}, {3, 12, 0}}, 2.0);
   ASSERT_EQ(points.size(), 6u);
-  EXPECT_LT((points[0] - Vector3d(0.75, 11, -5 + 5.0 / 6)).norm(), kRoundingMm);
-  EXPECT_LT((points[1] - Vector3d(2.25, 11, -5 + 5.0 / 6)).norm(), kRoundingMm);
-  EXPECT_LT((points[5] - Vector3d(2.25, 11, -5.0 / 6)).norm(), kRoundingMm);
+  EXPECT_LT((points[0] - Vector3d(0.75, 11, -5 + 5.0 / 6)).norm(), kTreRoundingMm);
+  EXPECT_LT((points[1] - Vector3d(2.25, 11, -5 + 5.0 / 6)).norm(), kTreRoundingMm);
+  EXPECT_LT((points[5] - Vector3d(2.25, 11, -5.0 / 6)).norm(), kTreRoundingMm);
 }
 
 TEST(TargetBox, RefusesABoxWithoutVolume) {
@@ -54,7 +54,7 @@ TEST(MeanTre, OfATranslationIsItsLength) {
       PoseFrame{}, PoseParameters::from_deg_and_mm({20, -40, 70, 100, 200, -300}));
   RigidTransform moved = gold;
   moved.translation() += Vector3d(3, 4, 12);
-  EXPECT_NEAR(mean_tre_mm(moved, gold, target_points(kCube)), 13.0, kRoundingMm);
+  EXPECT_NEAR(mean_tre_mm(moved, gold, target_points(kCube)), 13.0, kTreRoundingMm);
 }
 
 TEST(MeanTre, LiesWithinItsBounds) {
@@ -110,7 +110,7 @@ TEST(MeanTre, OfATurnByHalfACircleAboutOneTargetPointIsTwiceItsDistance) {
   EXPECT_NEAR(
       mean_tre_mm(pose_from_parameters(PoseFrame{}, turn), RigidTransform::Identity(), points),
       5.0,
-      kRoundingMm);
+      kTreRoundingMm);
 }
 
 TEST(MeanTre, OverCellsIsThatOverTheVoxelsOfACt) {
@@ -141,7 +141,7 @@ TEST(MeanTre, DoesNotChangeWhenBothPosesAreMovedInTheRoom) {
       pose_from_parameters(PoseFrame{}, PoseParameters::from_deg_and_mm({3, -5, 9, 11, 18, -33}));
   const RigidTransform move = pose_from_parameters(
       PoseFrame{}, PoseParameters::from_deg_and_mm({60, 50, -120, 400, 0, 70}));
-  EXPECT_NEAR(mean_tre_mm(move * a, move * b, points), mean_tre_mm(a, b, points), kRoundingMm);
+  EXPECT_NEAR(mean_tre_mm(move * a, move * b, points), mean_tre_mm(a, b, points), kTreRoundingMm);
 }
 
 TEST(MeanTre, OfAPoseThatIsNotFiniteIsNan) {

@@ -17,6 +17,7 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 using test::message_of;
+using test::replaced;
 using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -26,12 +27,6 @@ using testing::Not;
 // A shipped rig's numbers carry 16 digits: lengths up to 4000 mm round by 5e-13 mm each.
 constexpr double kLengthToleranceMm = 1e-11;
 constexpr double kPixelTolerance = 1e-10;
-
-std::string replaced(std::string text, const std::string& from, const std::string& to) {
-  const std::size_t place = text.find(from);
-  EXPECT_NE(place, std::string::npos) << from;
-  return text.replace(place, from.size(), to);
-}
 
 void expect_identical(const CameraGeometry& a, const CameraGeometry& b) {
   EXPECT_EQ(a.name, b.name);

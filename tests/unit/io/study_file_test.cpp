@@ -19,6 +19,7 @@ namespace fs = std::filesystem;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 using test::message_of;
+using test::replaced;
 using testing::AllOf;
 using testing::HasSubstr;
 
@@ -46,12 +47,6 @@ roi_px = [0, 0, 512, 512]
 fiducials_px = [[10,20], [30,40], [50,60], [70,80]]
 mask = "B-mask.png"
 )";
-
-std::string replaced(std::string text, const std::string& from, const std::string& to) {
-  const std::size_t place = text.find(from);
-  EXPECT_NE(place, std::string::npos) << from;
-  return text.replace(place, from.size(), to);
-}
 
 class StudyFile : public testing::Test {
  protected:

@@ -13,13 +13,13 @@
 namespace af {
 namespace {
 
-constexpr std::uint64_t kSeed = 7;
+constexpr std::uint64_t kTileSeed = 7;
 
 /// Tiles as a field has them: a level, a slope along each axis, and noise; some faint, some flat.
 std::vector<Tile> field_like_tiles(std::size_t count, std::uint64_t stream, double level_scale) {
   std::vector<Tile> tiles(count);
   for (std::size_t i = 0; i < count; ++i) {
-    HashRandom random(kSeed, stream, i);
+    HashRandom random(kTileSeed, stream, i);
     const double level = level_scale * random.uniform() * random.uniform();
     std::array<double, 4> slope{};
     for (double& of_axis : slope) of_axis = 0.05 * level * random.normal();
@@ -67,7 +67,7 @@ void expect_equals_brute_force(const Codebook& codebook, const std::vector<Tile>
     search.search(tiles, SearchHint::None, nearest, errors);
     std::vector<std::uint32_t> from_bad_hints(tiles.size());
     for (std::size_t i = 0; i < tiles.size(); ++i)
-      from_bad_hints[i] = static_cast<std::uint32_t>(hash64(kSeed, i) % codebook.size());
+      from_bad_hints[i] = static_cast<std::uint32_t>(hash64(kTileSeed, i) % codebook.size());
     std::vector<std::uint64_t> errors_from_bad_hints(tiles.size());
     search.search(tiles, SearchHint::PerTile, from_bad_hints, errors_from_bad_hints);
     for (std::size_t i = 0; i < tiles.size(); ++i) {
@@ -90,7 +90,7 @@ TEST(NearestCodeword, EqualsBruteForceOnEveryWidth) {
 TEST(NearestCodeword, EqualsBruteForceAtTheExtremesOfTheRange) {
   std::vector<Tile> corners;
   for (std::uint64_t i = 0; i < 300; ++i) {
-    const std::uint64_t bits = hash64(kSeed, i);
+    const std::uint64_t bits = hash64(kTileSeed, i);
     Tile tile{};
     for (unsigned element = 0; element < 16; ++element)
       tile[element] = ((bits >> element) & 1u) != 0 ? std::uint16_t{65535}
@@ -112,7 +112,7 @@ TEST(NearestCodeword, TiesTakeTheLowestIndex) {
     std::vector<Tile> tiles(count);
     for (std::size_t i = 0; i < count; ++i)
       for (unsigned element = 0; element < 16; ++element)
-        tiles[i][element] = static_cast<std::uint16_t>(hash64(kSeed, stream, i, element) % 3);
+        tiles[i][element] = static_cast<std::uint16_t>(hash64(kTileSeed, stream, i, element) % 3);
     return tiles;
   };
   std::vector<Tile> codewords = coarse(200, 3);

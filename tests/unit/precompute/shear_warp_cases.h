@@ -55,6 +55,11 @@ inline std::vector<Eigen::Matrix3d> aligned_rotations() {
 inline std::vector<Eigen::Matrix3d> oblique_rotations() {
   return {rotation_from_angles({0.2, -0.3, 0.4}), rotation_from_angles({0.02, 0.7, -0.03})};
 }
+inline std::vector<Eigen::Matrix3d> all_rotations() {
+  auto rotations = aligned_rotations();
+  for (const auto& oblique : oblique_rotations()) rotations.push_back(oblique);
+  return rotations;
+}
 
 /// 5 x 4 viewpoints before a lattice of 83 x 77 nodes (more than two tiles of columns), of which an
 /// odd part is stored.

@@ -12,12 +12,6 @@
 namespace af {
 namespace {
 
-std::vector<Eigen::Matrix3d> all_rotations() {
-  auto rotations = test::aligned_rotations();
-  for (const auto& oblique : test::oblique_rotations()) rotations.push_back(oblique);
-  return rotations;
-}
-
 /// One of each kind, for tests that cast many plans.
 std::vector<Eigen::Matrix3d> two_rotations() {
   return {test::aligned_rotations()[1], test::oblique_rotations()[0]};
@@ -112,7 +106,7 @@ TEST(ShearWarpFieldCaster, EllipsoidGivesMuTimesChordLength) {
   // Where a ray enters and leaves, the surface is known to half a voxel; chords beyond the mean
   // semi-axis keep rays steeper than 45 degrees to it.
   const double end_error_mm = 2.0 * 0.5 * std::sqrt(2.0);
-  for (const Eigen::Matrix3d& rotation : all_rotations()) {
+  for (const Eigen::Matrix3d& rotation : test::all_rotations()) {
     const CastCase ellipsoid(ct, test::small_light_slab(rotation));
     int compared = 0;
     double error_sum = 0.0;
@@ -155,7 +149,7 @@ TEST(ShearWarpFieldCaster, AgreesWithTheReferenceOnSmoothBodies) {
   // (sigma 7 mm = some 6 voxels) one linear interpolation is off by h^2/8 mu'' <= 1/8 * (1/6)^2 =
   // 3.5e-3 of mu at most; alternating over some 40 slices it averages to below 1e-4 of their sum.
   constexpr double kRequiredDb = 75.0;
-  for (const Eigen::Matrix3d& rotation : all_rotations()) {
+  for (const Eigen::Matrix3d& rotation : test::all_rotations()) {
     const CastCase smooth(test::smooth_ct(), test::small_light_slab(rotation));
     EXPECT_GT(psnr_against_reference(smooth, cast_plan(smooth.caster(), smooth.light_slab)),
               kRequiredDb)
@@ -164,7 +158,7 @@ TEST(ShearWarpFieldCaster, AgreesWithTheReferenceOnSmoothBodies) {
 }
 
 TEST(ShearWarpFieldCaster, AgreesWithTheReferenceWhereTheLatticeCutsTheBody) {
-  for (const Eigen::Matrix3d& rotation : all_rotations()) {
+  for (const Eigen::Matrix3d& rotation : test::all_rotations()) {
     LightSlab light_slab = test::small_light_slab(rotation);
     SlabGeometry& slab = light_slab.slabs[0];
     slab.s = {-7.0, 6.0, 15};
@@ -179,7 +173,7 @@ TEST(ShearWarpFieldCaster, AgreesWithTheReferenceWhereTheLatticeCutsTheBody) {
 TEST(ShearWarpFieldCaster, RaysBesideTheBodyAreExactlyZero) {
   const CtVolume ct = box_phantom(
       test::centered_grid({30, 31, 32}, {1.0, 1.2, 1.4}), {8, 9, 10}, {20, 19, 22}, 3000);
-  for (const Eigen::Matrix3d& rotation : all_rotations()) {
+  for (const Eigen::Matrix3d& rotation : test::all_rotations()) {
     const CastCase box(ct, test::small_light_slab(rotation));
     const RayCaster reference(box.volume, {0.25});
     int beside = 0;
@@ -211,7 +205,7 @@ TEST(ShearWarpFieldCaster, NeverLosesASingleVoxel) {
   // wherever it lies between the nodes of the resampled grid.
   const double voxel_mm3 = 1.1 * 1.2 * 1.3;
   constexpr int kHu = 3000;
-  for (const Eigen::Matrix3d& rotation : all_rotations())
+  for (const Eigen::Matrix3d& rotation : test::all_rotations())
     for (int i = 0; i < 5; ++i) {
       LightSlab light_slab = test::small_light_slab(rotation);
       light_slab.slab_from_ct.translation() = Eigen::Vector3d(0.21 * i, 0.17 * i, 0.13 * i);

@@ -21,12 +21,6 @@ RigidTransform rotated(const Eigen::Matrix3d& rotation) {
   return slab_from_ct;
 }
 
-std::vector<Eigen::Matrix3d> all_rotations() {
-  auto rotations = test::aligned_rotations();
-  for (const auto& oblique : test::oblique_rotations()) rotations.push_back(oblique);
-  return rotations;
-}
-
 /// Levels of all nodes, [y][z][x].
 std::vector<std::int16_t> levels_of(const SlabAlignedVolume& volume) {
   const SlabAlignedGrid& grid = volume.grid();
@@ -131,7 +125,7 @@ TEST(SlabAlignedVolume, HasZerosOnItsFacesAndKnowsWhereRowsBeginAndEnd) {
   const CtVolume ct = box_phantom(
       test::centered_grid({24, 25, 26}, {1.0, 1.0, 1.0}), {0, 0, 0}, {23, 24, 25}, 3071);
   const AttenuationVolume volume(ct, AttenuationModel{});
-  for (const Eigen::Matrix3d& rotation : all_rotations()) {
+  for (const Eigen::Matrix3d& rotation : test::all_rotations()) {
     const SlabAlignedVolume resampled(volume, rotated(rotation));
     const SlabAlignedGrid& grid = resampled.grid();
     for (int y = 0; y < grid.size[1]; ++y)
@@ -182,7 +176,7 @@ TEST(SlabAlignedVolume, StoresAllThatIsNotZero) {
   for (std::size_t i = 0; i < hu.size(); ++i) hu[i] = std::max(hu[i], other.hu[i]);
   ct.hu = SharedArray<std::int16_t>(std::move(hu));
   const AttenuationVolume volume(ct, AttenuationModel{});
-  for (const Eigen::Matrix3d& rotation : all_rotations()) {
+  for (const Eigen::Matrix3d& rotation : test::all_rotations()) {
     const SlabAlignedVolume resampled(volume, rotated(rotation));
     const SlabAlignedVolume all = resampled_with_all_nodes(volume, rotated(rotation));
     EXPECT_EQ(levels_of(resampled), levels_of(all));
@@ -192,7 +186,7 @@ TEST(SlabAlignedVolume, StoresAllThatIsNotZero) {
 
 TEST(SlabAlignedVolume, DoesNotDependOnThePiecesOrTheVectorWidth) {
   const AttenuationVolume volume(test::smooth_ct(), AttenuationModel{});
-  for (const Eigen::Matrix3d& rotation : all_rotations()) {
+  for (const Eigen::Matrix3d& rotation : test::all_rotations()) {
     const RigidTransform slab_from_ct = rotated(rotation);
     const SlabAlignedVolume whole(volume, slab_from_ct);
     for (const VectorWidth width : supported_vector_widths()) {
@@ -248,7 +242,7 @@ TEST(SlabAlignedVolume, NoColumnOfLargestLevelsOverflowsTheCastersSums) {
   const CtVolume ct = box_phantom(
       test::centered_grid({20, 300, 20}, {1.0, 1.0, 1.0}), {0, 0, 0}, {19, 299, 19}, 32767);
   const AttenuationVolume volume(ct, AttenuationModel{});
-  for (const Eigen::Matrix3d& rotation : all_rotations()) {
+  for (const Eigen::Matrix3d& rotation : test::all_rotations()) {
     const SlabAlignedVolume resampled(volume, rotated(rotation));
     std::int64_t sum = 0;
     const SlabAlignedGrid& grid = resampled.grid();

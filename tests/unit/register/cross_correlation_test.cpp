@@ -5,20 +5,13 @@
 
 #include <gtest/gtest.h>
 
-#include "base/hash_random.h"
+#include "unit/register/noise_image.h"
 
 namespace af::registration {
 namespace {
 
 /// The reference is stored as floats: relative error 6e-8 per pixel, random in sign.
 constexpr double kFloatRounding = 1e-6;
-
-Image2d noise(int width, int height, std::uint64_t seed) {
-  Image2d image(width, height);
-  HashRandom random(seed);
-  for (float& pixel : image.pixels) pixel = static_cast<float>(random.uniform(0.0, 4.0));
-  return image;
-}
 
 double correlation(const SimilarityReference& reference, const std::vector<float>& drr) {
   const CrossCorrelation measure(reference);
@@ -27,7 +20,7 @@ double correlation(const SimilarityReference& reference, const std::vector<float
 }
 
 TEST(CrossCorrelation, IsOneForAnyRisingLinearMap) {
-  const Image2d xray = noise(23, 19, 1);
+  const Image2d xray = test::noise_image(23, 19, 1);
   std::vector<float> drr = xray.pixels;
   for (float& value : drr) value = 3.0f * value + 0.5f;
   EXPECT_NEAR(correlation({xray, {}, {0.0, 13.0}}, drr), 1.0, kFloatRounding);
@@ -52,8 +45,8 @@ TEST(CrossCorrelation, OfAHandComputedTableIsItsClosedForm) {
 }
 
 TEST(CrossCorrelation, IgnoresPixelsOutsideTheMask) {
-  const Image2d xray = noise(10, 10, 2);
-  std::vector<float> drr = noise(10, 10, 3).pixels;
+  const Image2d xray = test::noise_image(10, 10, 2);
+  std::vector<float> drr = test::noise_image(10, 10, 3).pixels;
   SimilarityReference reference{xray, std::vector<std::uint8_t>(100, 1), {0.0, 4.0}};
   for (std::size_t i = 50; i < 100; ++i) reference.used[i] = 0;
   const double expected = correlation(reference, drr);

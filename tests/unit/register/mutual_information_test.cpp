@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "base/hash_random.h"
+#include "unit/register/noise_image.h"
 
 namespace af::registration {
 namespace {
@@ -29,13 +30,6 @@ Image2d rows_of_levels(int levels, int width) {
   Image2d image(width, levels);
   for (int row = 0; row < levels; ++row)
     for (int column = 0; column < width; ++column) image.at(column, row) = static_cast<float>(row);
-  return image;
-}
-
-Image2d noise(int width, int height, std::uint64_t seed) {
-  Image2d image(width, height);
-  HashRandom random(seed);
-  for (float& pixel : image.pixels) pixel = static_cast<float>(random.uniform(0.0, 4.0));
   return image;
 }
 
@@ -95,7 +89,7 @@ TEST(MutualInformation, OfIndependentImagesIsZero) {
 }
 
 TEST(MutualInformation, OfAConstantDrrIsZero) {
-  const Image2d xray = noise(31, 17, 1);
+  const Image2d xray = test::noise_image(31, 17, 1);
   const SimilarityReference reference{xray, {}, {0.0, 4.0}};
   EXPECT_NEAR(mutual_information(reference, std::vector<float>(xray.pixels.size(), 2.0f)),
               0.0,
@@ -112,8 +106,8 @@ TEST(MutualInformation, OfAKnownTwoByTwoTableIsItsClosedForm) {
 }
 
 TEST(MutualInformation, EqualsTheDefinitionOnNoise) {
-  const Image2d xray = noise(61, 47, 2);
-  const Image2d other = noise(61, 47, 3);
+  const Image2d xray = test::noise_image(61, 47, 2);
+  const Image2d other = test::noise_image(61, 47, 3);
   std::vector<float> drr(xray.pixels.size());
   for (std::size_t i = 0; i < drr.size(); ++i) drr[i] = 0.7f * xray.pixels[i] + other.pixels[i];
   const auto [low, high] = std::minmax_element(xray.pixels.begin(), xray.pixels.end());
@@ -157,8 +151,8 @@ TEST(MutualInformation, IsSymmetricInItsTwoImages) {
 }
 
 TEST(MutualInformation, IgnoresPixelsOutsideTheMask) {
-  const Image2d xray = noise(20, 10, 6);
-  std::vector<float> drr = noise(20, 10, 7).pixels;
+  const Image2d xray = test::noise_image(20, 10, 6);
+  std::vector<float> drr = test::noise_image(20, 10, 7).pixels;
   std::vector<float> masked_drr = drr;
   SimilarityReference reference{xray, std::vector<std::uint8_t>(200, 1), {0.0, 4.0}};
   for (std::size_t i = 100; i < 200; ++i) reference.used[i] = 0;
@@ -176,7 +170,7 @@ TEST(MutualInformation, IgnoresPixelsOutsideTheMask) {
 }
 
 TEST(MutualInformation, StaysDefinedForADrrThatIsNotFinite) {
-  const Image2d xray = noise(16, 16, 9);
+  const Image2d xray = test::noise_image(16, 16, 9);
   std::vector<float> drr = xray.pixels;
   const SimilarityReference reference{xray, {}, {0.0, 4.0}};
   const double infinity = std::numeric_limits<double>::infinity();
@@ -191,7 +185,7 @@ TEST(MutualInformation, StaysDefinedForADrrThatIsNotFinite) {
 }
 
 TEST(MutualInformation, RefusesAnEmptyMaskAConstantXrayAndAnEmptyDrrRange) {
-  const Image2d xray = noise(4, 4, 8);
+  const Image2d xray = test::noise_image(4, 4, 8);
   EXPECT_THROW(MutualInformation({xray, std::vector<std::uint8_t>(16, 0), {0.0, 1.0}}, 64),
                InputError);
   EXPECT_THROW(MutualInformation({xray, std::vector<std::uint8_t>(15, 1), {0.0, 1.0}}, 64),

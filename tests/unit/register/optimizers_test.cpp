@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kFinalStepMm = 0.01;
 
-ScaledParameters optimum() {
+ScaledParameters quadratic_optimum() {
   ScaledParameters point;
   point << 3.1, -4.7, 0.33, 2.9, -0.06, 1.234;
   return point;
@@ -36,10 +36,10 @@ test::FunctionTarget quadratic(double condition, double limit = 1e300) {
   const ScaledMatrix matrix = curvature(condition);
   const auto value = [=](const ScaledParameters& p) -> std::optional<double> {
     if (p.norm() > limit) return std::nullopt;
-    return -0.5 * (p - optimum()).dot(matrix * (p - optimum()));
+    return -0.5 * (p - quadratic_optimum()).dot(matrix * (p - quadratic_optimum()));
   };
   const auto equations = [=](const ScaledParameters& p) {
-    return TargetValue{0.0, matrix * (optimum() - p), matrix};
+    return TargetValue{0.0, matrix * (quadratic_optimum() - p), matrix};
   };
   return test::FunctionTarget(value, equations);
 }
@@ -60,7 +60,7 @@ TEST_P(EveryOptimizer, FindsAQuadraticsMaximum) {
   const OptimizerResult result = search(GetParam(), target);
   EXPECT_EQ(result.stop_reason, StopReason::StepBelowFinal);
   // Steps of the final length stand still within a few of them in each of six coupled parameters.
-  EXPECT_LT((result.point - optimum()).norm(), 10.0 * kFinalStepMm);
+  EXPECT_LT((result.point - quadratic_optimum()).norm(), 10.0 * kFinalStepMm);
   EXPECT_EQ(result.value, *target.evaluate(result.point));
   EXPECT_FALSE(result.trace.empty());
 }
@@ -75,7 +75,7 @@ TEST_P(EveryOptimizer, CountsEveryEvaluationAndKeepsToTheBudget) {
   EXPECT_EQ(cut.stop_reason, StopReason::EvaluationBudgetSpent);
   EXPECT_EQ(cut.evaluations, budget);
   EXPECT_EQ(again.points.size(), static_cast<std::size_t>(budget));
-  EXPECT_GE(cut.value, -0.5 * optimum().dot(curvature(4.0) * optimum()));
+  EXPECT_GE(cut.value, -0.5 * quadratic_optimum().dot(curvature(4.0) * quadratic_optimum()));
 }
 
 TEST_P(EveryOptimizer, SaysThatTheStartIsInadmissible) {
@@ -131,13 +131,13 @@ TEST(GaussNewton, EndsAQuadraticInAFewSteps) {
   const OptimizerResult result = search("gauss-newton", target);
   // Four steps of 2 mm over 6.6 mm, and three that converge.
   EXPECT_LE(result.evaluations, 10);
-  EXPECT_LT((result.point - optimum()).norm(), kFinalStepMm);
+  EXPECT_LT((result.point - quadratic_optimum()).norm(), kFinalStepMm);
 }
 
 TEST(GradientAscent, FindsAnIllConditionedMaximum) {
   test::FunctionTarget target = quadratic(1000.0);
   const OptimizerResult result = search("gradient", target);
-  EXPECT_LT((result.point - optimum()).norm(), 10.0 * kFinalStepMm);
+  EXPECT_LT((result.point - quadratic_optimum()).norm(), 10.0 * kFinalStepMm);
   EXPECT_LT(result.evaluations, 200);
 }
 

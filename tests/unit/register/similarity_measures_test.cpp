@@ -182,16 +182,17 @@ INSTANTIATE_TEST_SUITE_P(All,
                          [](const auto& chosen) { return chosen.param; });
 
 /// Gains of single-precision images round each pixel by 6e-8 of its value.
-constexpr double kFloatRounding = 1e-5;
+constexpr double kSimilarityRounding = 1e-5;
 
 TEST(SimilarityMeasures, GainAndOffsetDoNotCountWhereTheyAreEliminated) {
   const SimilarityReference reference = reference_of(blobs());
   const Image2d moved = blobs(0.7, 0.4);
   for (const char* name : {"ncc", "tncc", "gc", "gd", "rg", "pi", "entropy", "go"})
-    EXPECT_NEAR(similarity(name, reference, mapped(moved, 1.7f, 0.4f)),
-                similarity(name, reference, moved.pixels),
-                // A histogram's or a median's few pixels on a border may change sides.
-                std::string(name) == "entropy" || std::string(name) == "go" ? 0.02 : kFloatRounding)
+    EXPECT_NEAR(
+        similarity(name, reference, mapped(moved, 1.7f, 0.4f)),
+        similarity(name, reference, moved.pixels),
+        // A histogram's or a median's few pixels on a border may change sides.
+        std::string(name) == "entropy" || std::string(name) == "go" ? 0.02 : kSimilarityRounding)
         << name;
 }
 
@@ -199,16 +200,16 @@ TEST(SimilarityMeasures, ScaledXraysReachTheBestValue) {
   const SimilarityReference reference = reference_of(blobs());
   const std::vector<float> scaled = mapped(blobs(), 1.7f, 0.4f);
   for (const char* name : {"ncc", "tncc", "gc", "gd", "rg", "pi"})
-    EXPECT_NEAR(similarity(name, reference, scaled), 1.0, kFloatRounding) << name;
-  EXPECT_NEAR(similarity("entropy", reference, scaled), 0.0, kFloatRounding);
+    EXPECT_NEAR(similarity(name, reference, scaled), 1.0, kSimilarityRounding) << name;
+  EXPECT_NEAR(similarity("entropy", reference, scaled), 0.0, kSimilarityRounding);
 }
 
 TEST(SimilarityMeasures, NothingToCompareIsWorthNothing) {
   const SimilarityReference reference = reference_of(blobs());
   const std::vector<float> flat(reference.xray.pixels.size(), 0.7f);
   for (const char* name : {"mi", "ncc", "tncc", "gc", "rg", "go"})
-    EXPECT_NEAR(similarity(name, reference, flat), 0.0, kFloatRounding) << name;
-  EXPECT_NEAR(similarity("nmi", reference, flat), 1.0, kFloatRounding);
+    EXPECT_NEAR(similarity(name, reference, flat), 0.0, kSimilarityRounding) << name;
+  EXPECT_NEAR(similarity("nmi", reference, flat), 1.0, kSimilarityRounding);
 }
 
 TEST(NormalizedMutualInformation, IsTwoForAnImageWithItself) {
@@ -221,7 +222,8 @@ TEST(NormalizedMutualInformation, IsTwoForAnImageWithItself) {
 
 TEST(SumOfSquaredDifferences, OfAShiftedImageIsMinusTheSquaredShift) {
   const SimilarityReference reference = reference_of(blobs());
-  EXPECT_NEAR(similarity("ssd", reference, mapped(blobs(), 1.0f, 0.25f)), -0.0625, kFloatRounding);
+  EXPECT_NEAR(
+      similarity("ssd", reference, mapped(blobs(), 1.0f, 0.25f)), -0.0625, kSimilarityRounding);
 }
 
 TEST(GradientCorrelation, HardlyNoticesASlowRamp) {
@@ -233,8 +235,9 @@ TEST(GradientCorrelation, HardlyNoticesASlowRamp) {
     for (int column = 0; column < kWidth; ++column)
       ramped.at(column, row) += 0.05f * static_cast<float>(column);
   const std::vector<float> drr = blobs(0.7, 0.4).pixels;
-  EXPECT_NEAR(
-      similarity("gc", reference_of(ramped), drr), similarity("gc", plain, drr), kFloatRounding);
+  EXPECT_NEAR(similarity("gc", reference_of(ramped), drr),
+              similarity("gc", plain, drr),
+              kSimilarityRounding);
 }
 
 TEST(TiledCorrelation, IgnoresAnOffsetAndAGainOfItsOwnInEveryTile) {
@@ -248,7 +251,7 @@ TEST(TiledCorrelation, IgnoresAnOffsetAndAGainOfItsOwnInEveryTile) {
       drr.at(column, row) = (1.0f + 0.3f * static_cast<float>(in_tile)) * drr.at(column, row) +
                             0.2f * static_cast<float>(in_tile);
     }
-  EXPECT_NEAR(similarity("tncc", reference, drr.pixels), expected, kFloatRounding);
+  EXPECT_NEAR(similarity("tncc", reference, drr.pixels), expected, kSimilarityRounding);
 }
 
 TEST(RobustGradient, OccludersCostABoundedPrice) {

@@ -4,12 +4,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "simulation/automatic_target.h"
+
 namespace af {
 namespace {
 
 using Eigen::Vector3d;
-
-constexpr int kBoneHu = 250;
 
 /// One coarse phantom for all tests here.
 const CtVolume& phantom() {
