@@ -12,6 +12,7 @@
 #include <optional>
 #include <span>
 #include <tuple>
+#include <type_traits>
 #include <utility>
 
 #include "base/error.h"
@@ -75,6 +76,8 @@ StratifiedStarts draw_starts(const RegistrationStudyOptions& options,
 /// fill a node.
 SharedArray<PerturbedStart> held_per_node(const SharedArray<PerturbedStart>& starts,
                                           const Communicator& world) {
+  static_assert(std::is_trivially_destructible_v<PerturbedStart> &&
+                alignof(PerturbedStart) <= Communicator::kNodeMemoryAlignment);
   if (world.size() == 1) return starts;
   std::array<std::uint64_t, 1> count = {world.is_root() ? starts.size() : 0};
   world.maximum(count);
@@ -83,8 +86,6 @@ SharedArray<PerturbedStart> held_per_node(const SharedArray<PerturbedStart>& sta
       count[0] * sizeof(PerturbedStart), [&](std::span<std::byte> memory) {
         std::memcpy(memory.data(), starts.data(), memory.size());
       });
-  check(reinterpret_cast<std::uintptr_t>(owner.get()) % alignof(PerturbedStart) == 0,
-        "memory of a node is aligned");
   return {owner, {reinterpret_cast<const PerturbedStart*>(owner.get()), count[0]}};
 }
 
@@ -107,6 +108,7 @@ void assign_starts(const RegistrationStudyOptions& options,
   const int per_interval =
       is_reduced ? options.raycast_starts_per_interval.value_or(options.starts_per_interval)
                  : options.starts_per_interval;
+  if (!is_reduced) method.start_indices.reserve(starts.starts.size());
   // Of the others every start counts, also those of a file that lie beyond the intervals.
   for (std::size_t i = 0; i < starts.starts.size(); ++i)
     if (!is_reduced ||
@@ -156,8 +158,8 @@ RegistrationRow traced_row(Method& method,
 /// What of a method remains when its fields are let go.
 struct MethodRows {
   std::string renderer;
-  std::vector<std::int64_t> start_indices;
-  cli::ResumableItems items;  ///< one per start index
+  std::vector<std::int64_t> start_indices;  ///< rank 0
+  cli::ResumableItems items;                ///< one per start index
 
   /// Rank 0: calls `receive` with the row of every start.
   void visit(
@@ -349,13 +351,14 @@ std::vector<MethodRows> begin_registrations(const RegistrationStudyOptions& opti
                                             const std::vector<Method>& methods,
                                             const Communicator& world) {
   const std::string name = file_name_part(evaluation.case_name);
-  DecidingValues decides;
-  if (world.is_root()) decides = deciding_values(options, evaluation);
+  const DecidingValues decides = all_or_none(world, [&] {
+    return world.is_root() ? deciding_values(options, evaluation) : DecidingValues();
+  });
   std::vector<MethodRows> begun;
   begun.reserve(methods.size());
   for (const Method& method : methods)
     begun.push_back({method.renderer,
-                     method.start_indices,
+                     world.is_root() ? method.start_indices : std::vector<std::int64_t>(),
                      {{progress_folder(options.output_folder),
                        name + "-" + method.renderer,
                        decides,
@@ -449,7 +452,10 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
   std::vector<MethodRows> rows;
   if (!options.is_starts_only) rows = begin_registrations(options, evaluation, methods, world);
   all_or_none(world, [&] { on_starts(evaluation); });
-  if (options.is_starts_only) return evaluation;
+  if (options.is_starts_only) {
+    evaluation.starts.starts = {};
+    return evaluation;
+  }
   const Yardstick yardstick = yardstick_of(study, study_case, evaluation.gold);
   announce_times(methods, study_case.name, evaluation.starts, world);
   phase.reset();

@@ -19,7 +19,7 @@
 
 namespace af::evaluation {
 
-/// What one case of a study gave.
+/// What one case of a study gave; all of it on rank 0, on the others what their work needs.
 struct CaseEvaluation {
   std::string case_name;
   GoldStandard gold;

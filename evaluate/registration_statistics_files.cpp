@@ -247,13 +247,18 @@ bool is_earlier_start(const RegistrationRow* a, const RegistrationRow* b) {
   return std::tie(a->case_name, a->start_index) < std::tie(b->case_name, b->start_index);
 }
 
-/// By case and start index. Millions of rows are looked at through pointers: a map of them would
-/// need more memory than they.
+/// By case and start index, the last of those that are repeated. Millions of rows are looked at
+/// through pointers: a map of them would need more memory than they.
 Rows rows_by_start(const std::vector<RegistrationRow>& rows, const std::string& renderer) {
   Rows found;
   for (const RegistrationRow& row : rows)
     if (row.renderer == renderer) found.push_back(&row);
-  std::sort(found.begin(), found.end(), is_earlier_start);
+  std::stable_sort(found.begin(), found.end(), is_earlier_start);
+  const auto kept = std::unique(
+      found.rbegin(), found.rend(), [](const RegistrationRow* later, const RegistrationRow* row) {
+        return !is_earlier_start(row, later);
+      });
+  found.erase(found.begin(), kept.base());
   return found;
 }
 

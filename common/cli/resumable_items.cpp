@@ -55,6 +55,7 @@ std::vector<std::int64_t> ResumableItems::unfinished(const std::vector<std::int6
       flags[i] = std::byte{std::binary_search(finished_.begin(), finished_.end(), items[i])};
   communicator_.broadcast(flags);
   std::vector<std::int64_t> left;
+  left.reserve(static_cast<std::size_t>(std::count(flags.begin(), flags.end(), std::byte{0})));
   for (std::size_t i = 0; i < items.size(); ++i)
     if (flags[i] == std::byte{0}) left.push_back(items[i]);
   return left;

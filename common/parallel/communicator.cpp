@@ -191,7 +191,9 @@ std::shared_ptr<const std::byte> Communicator::allocate_on_node_together(
   const Communicator on_node = node();
   auto owner = std::make_shared<NodeWindow>();
   std::byte* base = nullptr;
-  const auto my_bytes = static_cast<MPI_Aint>(on_node.is_root() ? bytes : 0);
+  // Open MPI aligns as it likes, to 8 bytes on two ranks.
+  const auto my_bytes =
+      static_cast<MPI_Aint>(on_node.is_root() ? bytes + kNodeMemoryAlignment - 1 : 0);
   require_success(MPI_Win_allocate_shared(
                       my_bytes, 1, MPI_INFO_NULL, on_node.impl_->handle, &base, &owner->window),
                   "MPI_Win_allocate_shared");
@@ -199,6 +201,11 @@ std::shared_ptr<const std::byte> Communicator::allocate_on_node_together(
   int unit = 1;
   require_success(MPI_Win_shared_query(owner->window, 0, &shared_bytes, &unit, &base),
                   "MPI_Win_shared_query");
+  const auto beyond = reinterpret_cast<std::uintptr_t>(base) % kNodeMemoryAlignment;
+  std::array<std::uint64_t, 1> skipped = {
+      on_node.is_root() ? (kNodeMemoryAlignment - beyond) % kNodeMemoryAlignment : 0};
+  on_node.maximum(skipped);
+  base += skipped[0];
   // All nodes: ranks of another would go on to a collective call that these never reach.
   all_or_none(*this,
               [&] { fill(std::span<std::byte>(base, bytes), on_node.rank(), on_node.size()); });

@@ -39,11 +39,15 @@ class Communicator {
   /// Collective. Every rank's bytes, in rank order, on every rank.
   [[nodiscard]] std::vector<std::vector<std::byte>> all_gather(
       std::span<const std::byte> mine) const;
+  /// A cache line.
+  static constexpr std::size_t kNodeMemoryAlignment = 64;
+
   /// Collective. The ranks that share this rank's memory.
   [[nodiscard]] Communicator node() const;
 
-  /// Collective. Memory of `bytes` bytes held once per node; `fill` runs on each node's first rank
-  /// only, and all wait for it. An exception in `fill` is thrown on every rank of every node.
+  /// Collective. Memory of `bytes` bytes held once per node, aligned to kNodeMemoryAlignment;
+  /// `fill` runs on each node's first rank only, and all wait for it. An exception in `fill` is
+  /// thrown on every rank of every node.
   [[nodiscard]] std::shared_ptr<const std::byte> allocate_on_node(
       std::size_t bytes, const std::function<void(std::span<std::byte>)>& fill) const;
   /// The same, filled together: `fill` runs on every rank of the node and gets all the memory, its

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-
-#include <CLI/CLI.hpp>
 // What one core of this machine can do at most: reading from each level of the memory, the
 // arithmetic of the casters and of the codeword search. A profile holds phases against these.
+#include <CLI/CLI.hpp>
+
 #include "base/vector_width.h"
 #include "benchmark/alternating_rounds.h"
 #include "benchmark/benchmark_case.h"

@@ -44,6 +44,19 @@ TEST(Communicator, NodeMemoryIsFilledOnceAndSeenByAll) {
   EXPECT_EQ(memory.get()[999], std::byte(7));
 }
 
+TEST(Communicator, NodeMemoryIsAlignedWhateverItsSize) {
+  const Communicator world = Communicator::world();
+  for (const std::size_t bytes : {1U, 8U, 63U, 64U, 65U, 4096U, 100001U}) {
+    const auto memory = world.allocate_on_node(bytes, [](std::span<std::byte> all) {
+      for (std::size_t i = 0; i < all.size(); ++i) all[i] = std::byte(i % 251);
+    });
+    EXPECT_EQ(reinterpret_cast<std::uintptr_t>(memory.get()) % Communicator::kNodeMemoryAlignment,
+              0U)
+        << bytes;
+    for (std::size_t i = 0; i < bytes; ++i) ASSERT_EQ(memory.get()[i], std::byte(i % 251)) << i;
+  }
+}
+
 TEST(Communicator, NodeMemoryFromRankZeroIsFilledThereAloneAndSeenByAll) {
   const Communicator world = Communicator::world();
   int fills = 0;

@@ -83,6 +83,10 @@ TEST(SharedInputs, WhatRankZeroCannotReadIsTheSameErrorOnEveryRank) {
   } catch (const Error& error) {
     EXPECT_EQ(error.exit_code(), ExitCode::File);
   }
+  EXPECT_THROW(static_cast<void>(read_rig("/nowhere/rig.toml", world)), Error);
+  EXPECT_THROW(static_cast<void>(shared_poses(
+                   world, []() -> std::vector<RigidTransform> { throw FileError("p", "torn"); })),
+               Error);
 }
 
 TEST(SharedInputs, ImagesReachEveryRankToTheLastBit) {

@@ -355,7 +355,8 @@ TEST_F(EvaluateProgram, MeasuresPosesOfAnotherProgramLikeItsOwn) {
   // As a table of its own parameters: the same errors, without X-rays or fields.
   const test::ProgramRun again =
       evaluate(study + "--starts-from " + path("own/starts.csv") + " --poses-from " +
-               path("own/registrations.csv") + " --method-name again -o " + path("again"));
+                   path("own/registrations.csv") + " --method-name again -o " + path("again"),
+               2);
   ASSERT_EQ(again.exit_code, 0) << again.output;
   const CsvTable rows = CsvTable::read(path("again/registrations.csv"));
   ASSERT_EQ(rows.row_count(), own.row_count());
@@ -380,7 +381,8 @@ TEST_F(EvaluateProgram, MeasuresPosesOfAnotherProgramLikeItsOwn) {
   }
   const test::ProgramRun folder =
       evaluate(study + "--starts-from " + path("own/starts.csv") + " --poses-from " + path("tfm") +
-               " -o " + path("from-tfm"));
+                   " -o " + path("from-tfm"),
+               2);
   ASSERT_EQ(folder.exit_code, 0) << folder.output;
   const CsvTable found = CsvTable::read(path("from-tfm/registrations.csv"));
   EXPECT_EQ(found.text(0, "stop_reason"), "no-pose");
@@ -393,14 +395,16 @@ TEST_F(EvaluateProgram, MeasuresPosesOfAnotherProgramLikeItsOwn) {
 
 TEST_F(EvaluateProgram, RegistersFromTheStartsOfAFile) {
   const std::string study = "registration --study " + path("study.toml") + fields();
-  const test::ProgramRun only = evaluate(study +
-                                         "--start-rule uniform --intervals 2 --starts-per-interval "
-                                         "2 --starts-only -o " +
-                                         path("only"));
+  const test::ProgramRun only =
+      evaluate(study +
+                   "--start-rule uniform --intervals 2 --starts-per-interval "
+                   "2 --starts-only -o " +
+                   path("only"),
+               2);
   ASSERT_EQ(only.exit_code, 0) << only.output;
   EXPECT_FALSE(std::filesystem::exists(path("only/registrations.csv")));
   ASSERT_EQ(
-      evaluate(study + "--starts-from " + path("only/starts.csv") + " -o " + path("from-file"))
+      evaluate(study + "--starts-from " + path("only/starts.csv") + " -o " + path("from-file"), 2)
           .exit_code,
       0);
   const CsvTable starts = CsvTable::read(path("only/starts.csv"));
@@ -408,6 +412,15 @@ TEST_F(EvaluateProgram, RegistersFromTheStartsOfAFile) {
   ASSERT_EQ(rows.row_count(), 4u);
   for (std::size_t i = 0; i < 4; ++i)
     EXPECT_EQ(rows.text(i, "initial_tre_mm"), starts.text(i, "initial_tre_mm"));
+  // What rank 0 alone reads and finds bad ends all.
+  expect_refused(evaluate(study + "--starts-from " + path("missing.csv") + " -o " + path("bad"), 2),
+                 4,
+                 "missing.csv");
+  expect_refused(evaluate(study + "--starts-from " + path("only/starts.csv") +
+                              " --only-start 4 -o " + path("bad"),
+                          2),
+                 3,
+                 "less than the number of starts, 4");
 }
 
 TEST_F(EvaluateProgram, DrawsSimilarityAboutTheGoldPoseAlikeOnAnyRankCount) {
