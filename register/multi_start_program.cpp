@@ -106,7 +106,8 @@ std::vector<std::byte> bytes_of(const RegistrationRecord& record) {
   const std::vector<PlainTraceRow> rows = plain(record.result.trace);
   std::vector<std::byte> bytes(sizeof(head) + rows.size() * sizeof(PlainTraceRow));
   std::memcpy(bytes.data(), &head, sizeof(head));
-  std::memcpy(bytes.data() + sizeof(head), rows.data(), bytes.size() - sizeof(head));
+  const auto trace = std::as_bytes(std::span(rows));
+  std::copy(trace.begin(), trace.end(), bytes.begin() + sizeof(head));
   return bytes;
 }
 

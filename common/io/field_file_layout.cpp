@@ -416,7 +416,8 @@ CompressedAttenuationField field_of(std::span<const Dataset> datasets, const std
   field.quantizer_step = reader.next<float>()[0];
   const auto levels = reader.next<std::uint16_t>();
   field.codebook.codewords.resize(levels.size() / kTileElements);
-  std::memcpy(field.codebook.codewords.data(), levels.data(), levels.size() * 2);
+  if (!levels.empty())
+    std::memcpy(field.codebook.codewords.data(), levels.data(), levels.size() * 2);
   const auto found = header_problems(field);
   if (!found.empty()) throw FileError(path, found.front());
   return field;
