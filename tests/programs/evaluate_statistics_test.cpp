@@ -260,7 +260,8 @@ TEST_F(HandBuiltResults, ReportWhatIsMissingTwiceNotFiniteOrOfNobody) {
                   where(3) + ": start_index '0.5' is not a whole number; left out",
                   where(4) + ": start_index '' is not a whole number; left out",
                   file + ": 1 poses of case 'mixde', which the study does not have; left out"));
-  for (const json& problem : summary()["row_problems"])
+  const json problems = summary()["row_problems"];
+  for (const json& problem : problems)
     EXPECT_THAT(run.output, HasSubstr(problem.get<std::string>()));
 }
 

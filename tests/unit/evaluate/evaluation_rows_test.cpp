@@ -30,7 +30,7 @@ RegistrationRow row(const std::string& renderer,
   result.case_name = case_name;
   result.renderer = renderer;
   result.start_index = start;
-  result.interval = static_cast<int>(initial_tre_mm / 2);
+  if (std::isfinite(initial_tre_mm)) result.interval = static_cast<int>(initial_tre_mm / 2);
   result.initial_tre_mm = initial_tre_mm;
   result.tre_mm = tre_mm;
   result.stop_reason = std::isnan(tre_mm) ? "error" : "step-below-final";
