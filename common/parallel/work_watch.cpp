@@ -45,6 +45,7 @@ struct RankNote {
   std::atomic<std::int64_t> since_ns = 0;        ///< the last progress; 0: nothing in work
   std::atomic<std::int64_t> limit_ns = 0;        ///< of what is in work; 0: the watchdog's own
   std::atomic<std::int64_t> waits_since_ns = 0;  ///< in a call that waits for others; 0: not
+  std::atomic<std::int64_t> ticked_ns = 0;       ///< when its own watchdog last ran; 0: not watched
   std::int32_t rank = 0;
   std::int32_t process = 0;
   std::atomic<bool> has_reported = false;  ///< of the first rank of a host: why the job ends
@@ -75,6 +76,11 @@ std::string set_text(const std::string& what) {
 }
 
 constexpr double kNsPerMinute = 60e9;
+
+// In limits: a thread of a busy machine may be late, but not by as much as that; and when nobody of
+// a host works, the host of who does has had the time to say so.
+constexpr std::int64_t kPatienceWithStopped = 2;
+constexpr std::int64_t kPatienceWithHosts = 3;
 
 std::int64_t nanoseconds_of(double minutes) {
   return static_cast<std::int64_t>(minutes * kNsPerMinute);
@@ -143,6 +149,12 @@ struct StallWatch::Board {
   std::span<RankNote> notes;
 };
 
+struct StallWatch::Stuck {
+  const RankNote* note;
+  std::int64_t ns;
+  bool is_stopped;
+};
+
 StallWatch::StallWatch(const Communicator& communicator, double limit_minutes, OnStall on_stall)
     : board_(std::make_unique<Board>()),
       limit_ns_(nanoseconds_of(limit_minutes)),
@@ -161,6 +173,7 @@ StallWatch::StallWatch(const Communicator& communicator, double limit_minutes, O
   my_note = notes + node.rank();
   first_note = notes;
   set_text(set_text({}));
+  (*my_note).ticked_ns = now_ns();
   thread_ = std::thread([this] { watch(); });
 }
 
@@ -183,37 +196,59 @@ void StallWatch::watch() {
     // A batch system may stop and continue whole jobs: that time does not count.
     if (tick - last_tick_ns > limit_ns_ / 2) watched_since_ns = tick;
     last_tick_ns = tick;
+    (*my_note).ticked_ns = tick;
     const std::string text = stall_text(watched_since_ns);
     if (!text.empty() && claim_report()) on_stall_(text);
   }
+  (*my_note).ticked_ns = 0;
+}
+
+/// Who is stuck, the longest of them: at one thing for too long without waiting, or not running at
+/// all (stopped), wherever it was then.
+std::optional<StallWatch::Stuck> StallWatch::longest_stuck(std::int64_t watched_since_ns) const {
+  const std::int64_t now = now_ns();
+  const auto age_of = [&](std::int64_t since_ns) {
+    return since_ns == 0 ? 0 : now - std::max(since_ns, watched_since_ns);
+  };
+  std::optional<Stuck> longest;
+  for (const RankNote& note : board_->notes) {
+    const std::int64_t own_limit = note.limit_ns;
+    const std::int64_t limit = own_limit == 0 ? limit_ns_ : std::min(own_limit, limit_ns_);
+    // Who waits is not stuck. A busy machine lets a thread wait, too, but not as long as that.
+    const std::int64_t works_ns = note.waits_since_ns != 0 ? 0 : age_of(note.since_ns);
+    const std::int64_t still_ns = age_of(note.ticked_ns);
+    const bool is_stopped = still_ns > kPatienceWithStopped * limit_ns_;
+    if (works_ns <= limit && !is_stopped) continue;
+    const std::int64_t ns = is_stopped ? still_ns : works_ns;
+    if (!longest || ns > longest->ns) longest = Stuck{&note, ns, is_stopped};
+  }
+  return longest;
+}
+
+/// For how long all ranks of this host have been waiting for others; 0 when one of them works.
+std::int64_t StallWatch::all_wait_ns(std::int64_t watched_since_ns) const {
+  std::int64_t shortest = std::numeric_limits<std::int64_t>::max();
+  for (const RankNote& note : board_->notes) {
+    const std::int64_t since = note.waits_since_ns;
+    shortest = std::min(shortest, since == 0 ? 0 : now_ns() - std::max(since, watched_since_ns));
+  }
+  return shortest;
 }
 
 std::string StallWatch::stall_text(std::int64_t watched_since_ns) const {
-  const std::int64_t now = now_ns();
-  const RankNote* stuck = nullptr;
-  std::int64_t stuck_ns = 0;
-  std::int64_t all_wait_ns = std::numeric_limits<std::int64_t>::max();
-  for (const RankNote& note : board_->notes) {
-    const std::int64_t waits_since = note.waits_since_ns;
-    const std::int64_t since = waits_since != 0 ? waits_since : note.since_ns.load();
-    const std::int64_t ns = since == 0 ? 0 : now - std::max(since, watched_since_ns);
-    all_wait_ns = std::min(all_wait_ns, waits_since == 0 ? 0 : ns);
-    const std::int64_t own_limit = note.limit_ns;
-    const std::int64_t limit = own_limit == 0 ? limit_ns_ : std::min(own_limit, limit_ns_);
-    // Who waits is not stuck.
-    if (waits_since != 0 || ns <= std::max(limit, stuck_ns)) continue;
-    stuck = &note;
-    stuck_ns = ns;
-  }
-  if (stuck != nullptr)
-    return "rank " + std::to_string(stuck->rank) + " on " + host_name() + " (process " +
-           std::to_string(stuck->process) + "): " + stuck->what.get() + ": no progress for " +
-           minutes_text(stuck_ns);
-  // When nobody of this host works, the host of who does has had the time to say so.
-  constexpr std::int64_t kPatience = 3;
-  if (all_wait_ns <= kPatience * limit_ns_) return {};
-  return "all ranks on " + host_name() + ": " + board_->notes[0].what.get() +
-         ": waiting for others for " + minutes_text(all_wait_ns);
+  const auto at = [](const RankNote& note) {
+    const std::string what = note.what.get();
+    return what.empty() ? what : ": " + what;
+  };
+  if (const std::optional<Stuck> stuck = longest_stuck(watched_since_ns))
+    return "rank " + std::to_string(stuck->note->rank) + " on " + host_name() + " (process " +
+           std::to_string(stuck->note->process) + ")" + at(*stuck->note) +
+           (stuck->is_stopped ? ": is stopped: has not run for " : ": no progress for ") +
+           minutes_text(stuck->ns);
+  const std::int64_t waited_ns = all_wait_ns(watched_since_ns);
+  if (waited_ns <= kPatienceWithHosts * limit_ns_) return {};
+  return "all ranks on " + host_name() + at(board_->notes[0]) + ": waiting for others for " +
+         minutes_text(waited_ns);
 }
 
 }  // namespace af

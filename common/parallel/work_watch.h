@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
 
@@ -64,7 +65,8 @@ std::string host_name();
 
 /// Watches the ranks of every host from a thread of each: when one makes no progress, for whatever
 /// reason (it computes for ever, hangs in the file system, is stopped), `on_stall` is called on one
-/// rank of its host with a text that names rank, host and unit. It must end the job.
+/// rank of its host with a text that names rank, host and unit. It must end the job. A process that
+/// is stopped is found by its watching thread, which does not run either: also while it waits.
 /// \test WorkWatch.NamesTheRankThatIsStuckNotThoseThatWaitForIt
 class StallWatch {
  public:
@@ -79,7 +81,10 @@ class StallWatch {
 
  private:
   struct Board;
+  struct Stuck;
   void watch();
+  [[nodiscard]] std::optional<Stuck> longest_stuck(std::int64_t watched_since_ns) const;
+  [[nodiscard]] std::int64_t all_wait_ns(std::int64_t watched_since_ns) const;
   [[nodiscard]] std::string stall_text(std::int64_t watched_since_ns) const;
 
   std::unique_ptr<Board> board_;

@@ -4,8 +4,10 @@
 #include <array>
 #include <atomic>
 #include <chrono>
+#include <csignal>
 #include <string>
 #include <thread>
+#include <unistd.h>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -17,7 +19,7 @@ namespace {
 
 using testing::HasSubstr;
 
-constexpr double kLimitMinutes = 0.2 / 60.0;
+constexpr double kLimitMinutes = 0.4 / 60.0;
 constexpr double kLongLimitMinutes = 1.0 / 60.0;  // many steps, on a busy machine, too
 constexpr std::chrono::milliseconds kStep{50};
 constexpr int kSteps = 40;  // well above any limit here
@@ -115,6 +117,35 @@ TEST(WorkWatch, IsSilentWhileEverybodyMakesProgress) {
     world.barrier();
   }
   EXPECT_EQ(reports, 0);
+}
+
+TEST(WorkWatch, NamesARankThatIsStoppedAlsoWhileItWaits) {
+  const Communicator world = Communicator::world();
+  const Communicator node = world.node();
+  if (node.size() == 1) GTEST_SKIP() << "needs a rank that watches another";
+  const bool is_stopped = node.rank() == node.size() - 1;
+  const auto stopped =
+      static_cast<pid_t>(sum_on_host(node, is_stopped ? static_cast<std::uint64_t>(getpid()) : 0));
+  std::atomic<int> reports = 0;
+  std::string said;
+  {
+    const StallWatch watch(world, kLimitMinutes, [&](const std::string& message) {
+      said = message;
+      ++reports;
+    });
+    world.barrier();
+    const WaitNote waits;
+    if (node.rank() == 0) {
+      ASSERT_EQ(kill(stopped, SIGSTOP), 0);
+      std::this_thread::sleep_for(kSteps * kStep);
+      ASSERT_EQ(kill(stopped, SIGCONT), 0);
+    }
+    world.barrier();
+  }
+  EXPECT_EQ(sum_on_host(node, static_cast<std::uint64_t>(reports)), 1u);
+  if (reports == 0) return;
+  EXPECT_THAT(said,
+              HasSubstr("(process " + std::to_string(stopped) + "): is stopped: has not run"));
 }
 
 TEST(WorkWatch, SaysWhenAllRanksOfAHostWaitForOthers) {
