@@ -19,7 +19,6 @@
 #include "cli/app_main.h"
 #include "cli/progress_printer.h"
 #include "cli/resumable_items.h"
-#include "evaluate/failure_trace_files.h"
 #include "evaluate/method_loading.h"
 #include "evaluate/row_gathering_program.h"
 #include "gold/target_box.h"
@@ -135,12 +134,14 @@ void add_result(const RegistrationResult& result,
 }
 
 /// The row of one start, without its case; of a failure with its trace.
-RegistrationRow traced_row(Method& method,
-                           const PerturbedStart& start,
-                           std::int64_t index,
-                           const Yardstick& yardstick) {
+TracedRow traced_row(Method& method,
+                     const PerturbedStart& start,
+                     std::int64_t index,
+                     const Yardstick& yardstick) {
   std::vector<registration::TraceRow> trace;
-  RegistrationRow row = registered_row(
+  TracedRow traced;
+  RegistrationRow& row = traced.row;
+  row = registered_row(
       [&](const RigidTransform& room_from_ct) {
         RegistrationResult result = method.runner.run(room_from_ct, index);
         trace = result.trace;
@@ -151,8 +152,8 @@ RegistrationRow traced_row(Method& method,
   row.renderer = method.renderer;
   row.start_index = index;
   if (!row.is_success())
-    row.trace = trace_points(trace, method.runner.problem().frame(), yardstick);
-  return row;
+    traced.trace = trace_points(trace, method.runner.problem().frame(), yardstick);
+  return traced;
 }
 
 /// What of a method remains when its fields are let go.
@@ -162,8 +163,7 @@ struct MethodRows {
   cli::ResumableItems items;                ///< one per start index
 
   /// Rank 0: calls `receive` with the row of every start.
-  void visit(
-      const std::function<void(std::int64_t start_index, RegistrationRow row)>& receive) const {
+  void visit(const std::function<void(std::int64_t start_index, TracedRow traced)>& receive) const {
     items.visit([&](std::int64_t index, std::span<const std::byte> record) {
       receive(index, row_of_record(record, renderer + " rows"));
     });
@@ -181,31 +181,28 @@ void register_with(Method& method,
   items.complete(method.start_indices,
                  "case " + case_name + ", " + method.renderer + " registrations",
                  [&](std::int64_t index) {
-                   RegistrationRow row = traced_row(
+                   TracedRow traced_start = traced_row(
                        method, starts.starts[static_cast<std::size_t>(index)], index, yardstick);
-                   row.case_name = case_name;
+                   traced_start.row.case_name = case_name;
                    // Items come in order: a rank's first failures are its share of the first of
                    // all.
-                   if (!row.trace.empty() && ++traced > kMostTraces) row.trace.clear();
-                   return cbor_bytes(packed_row(row));
+                   if (!traced_start.trace.empty() && ++traced > kMostTraces)
+                     traced_start.trace.clear();
+                   return cbor_bytes(packed_row(traced_start));
                  });
 }
 
-/// Rank 0: the rows of all methods, by method and start index.
-std::vector<RegistrationRow> rows_of(const std::vector<MethodRows>& methods) {
-  std::size_t count = 0;
-  for (const MethodRows& method : methods) count += method.start_indices.size();
-  std::vector<RegistrationRow> rows(count);
-  std::size_t first = 0;
-  for (const MethodRows& method : methods) {
-    const std::vector<std::int64_t>& indices = method.start_indices;
-    method.visit([&](std::int64_t index, RegistrationRow row) {
-      const auto place = std::lower_bound(indices.begin(), indices.end(), index);
-      rows[first + static_cast<std::size_t>(place - indices.begin())] = std::move(row);
-    });
-    first += indices.size();
-  }
-  return rows;
+/// Rank 0: adds the rows of a method, by start index; returns its traces.
+FirstTraces add_rows(const MethodRows& method, FileBackedArray<RegistrationRow>& rows) {
+  FirstTraces traces;
+  const std::vector<std::int64_t>& indices = method.start_indices;
+  const std::span<RegistrationRow> mine = rows.append(indices.size());
+  method.visit([&](std::int64_t index, TracedRow traced) {
+    const auto place = std::lower_bound(indices.begin(), indices.end(), index);
+    mine[static_cast<std::size_t>(place - indices.begin())] = traced.row;
+    keep_if_first(index, std::move(traced.trace), traces);
+  });
+  return traces;
 }
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
@@ -292,8 +289,8 @@ struct ChosenRow {
 /// pose. Rows are visited twice instead of held: memory holds fields at this point.
 std::vector<ChosenRow> chosen_rows(const MethodRows& method) {
   std::vector<std::pair<double, std::int64_t>> by_tre;
-  method.visit([&](std::int64_t index, const RegistrationRow& row) {
-    if (std::isfinite(row.tre_mm)) by_tre.emplace_back(row.tre_mm, index);
+  method.visit([&](std::int64_t index, const TracedRow& traced) {
+    if (std::isfinite(traced.row.tre_mm)) by_tre.emplace_back(traced.row.tre_mm, index);
   });
   if (by_tre.empty()) return {};
   std::sort(by_tre.begin(), by_tre.end());
@@ -304,9 +301,9 @@ std::vector<ChosenRow> chosen_rows(const MethodRows& method) {
        {"worst", by_tre.back().second}}};
   std::vector<ChosenRow> chosen;
   for (const auto& [which, index] : wanted) chosen.push_back({which, {}});
-  method.visit([&](std::int64_t index, const RegistrationRow& row) {
+  method.visit([&](std::int64_t index, const TracedRow& traced) {
     for (std::size_t i = 0; i < wanted.size(); ++i)
-      if (index == wanted[i].second) chosen[i].row = row;
+      if (index == wanted[i].second) chosen[i].row = traced.row;
   });
   return chosen;
 }
@@ -337,7 +334,7 @@ void draw_overlays(const Method& method,
                                      {"which", which},
                                      {"camera", camera},
                                      {"slicer", slicer},
-                                     {"renderer", row.renderer},
+                                     {"renderer", row.renderer.text()},
                                      {"start_index", row.start_index},
                                      {"initial_tre_mm", row.initial_tre_mm},
                                      {"tre_mm", row.tre_mm}});
@@ -427,7 +424,8 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
                              const Study& study,
                              const StudyCase& study_case,
                              const Communicator& world,
-                             const std::function<void(const CaseEvaluation&)>& on_starts) {
+                             const std::function<void(const CaseEvaluation&)>& on_starts,
+                             FileBackedArray<RegistrationRow>& all_rows) {
   CaseEvaluation evaluation;
   evaluation.case_name = study_case.name;
   std::optional<WorkNote> phase(
@@ -472,8 +470,8 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
   all_or_none(world, [&] {
     if (!world.is_root()) return;
     const WorkNote note("reading the rows of case " + study_case.name, WorkNote::Kind::Phase);
-    evaluation.rows = rows_of(rows);
-    for (const MethodRows& method : rows) keep_first_traces(evaluation.rows, method.renderer);
+    for (const MethodRows& method : rows)
+      evaluation.traces[method.renderer] = add_rows(method, all_rows);
   });
   return evaluation;
 }

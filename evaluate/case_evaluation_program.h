@@ -7,12 +7,14 @@
 #include <string>
 #include <vector>
 
+#include "evaluate/failure_trace_files.h"
 #include "evaluate/perturbed_starts.h"
 #include "evaluate/registration_command.h"
 #include "evaluate/registration_rows_files.h"
 #include "evaluate/start_pose_files.h"
 #include "evaluate/yardstick_files.h"
 #include "gold/gold_standard_files.h"
+#include "io/file_backed_array.h"
 #include "io/study_file.h"
 #include "parallel/communicator.h"
 #include "register/registration.h"
@@ -26,7 +28,7 @@ struct CaseEvaluation {
   /// Rank 0; the list of starts on every rank, until they are registered.
   StratifiedStarts starts;
   std::size_t start_count = 0;
-  std::vector<RegistrationRow> rows;  ///< rank 0: by renderer, start index
+  std::map<std::string, FirstTraces> traces;  ///< rank 0: of each renderer
   std::map<std::string, std::string> input_sha256;
   std::vector<std::string> pose_problems;             ///< of poses that were read, in words
   nlohmann::json pictures = nlohmann::json::array();  ///< rank 0: files and what they show
@@ -58,11 +60,12 @@ RegistrationRow registered_row(
 /// before anything is registered), registers from every start with every renderer, the work shared
 /// over the ranks as these become free, and draws the X-rays and the overlays of the best, median
 /// and worst result. A registration that throws becomes a row without a pose. With --starts-only
-/// nothing is registered and drawn.
+/// nothing is registered and drawn. Rank 0 adds the rows, by renderer and start index, to `rows`.
 CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
                              const Study& study,
                              const StudyCase& study_case,
                              const Communicator& world,
-                             const std::function<void(const CaseEvaluation&)>& on_starts);
+                             const std::function<void(const CaseEvaluation&)>& on_starts,
+                             FileBackedArray<RegistrationRow>& rows);
 
 }  // namespace af::evaluation

@@ -2,6 +2,8 @@
 #include "evaluate/failure_trace_files.h"
 
 #include <algorithm>
+#include <iterator>
+#include <string>
 #include <utility>
 
 #include "gold/tre.h"
@@ -27,10 +29,10 @@ std::vector<TracePoint> trace_points(const std::vector<registration::TraceRow>& 
   return points;
 }
 
-void keep_first_traces(std::vector<RegistrationRow>& rows, const std::string& renderer) {
-  std::size_t kept = 0;
-  for (RegistrationRow& row : rows)
-    if (row.renderer == renderer && !row.trace.empty() && ++kept > kMostTraces) row.trace = {};
+void keep_if_first(std::int64_t start_index, std::vector<TracePoint> trace, FirstTraces& kept) {
+  if (trace.empty()) return;
+  kept[start_index] = std::move(trace);
+  if (kept.size() > kMostTraces) kept.erase(std::prev(kept.end()));
 }
 
 CsvTable trace_table(const std::vector<TracePoint>& trace) {

@@ -3,7 +3,8 @@
 #pragma once
 
 #include <cstddef>
-#include <string>
+#include <cstdint>
+#include <map>
 #include <vector>
 
 #include "evaluate/registration_rows_files.h"
@@ -23,9 +24,12 @@ std::vector<TracePoint> trace_points(const std::vector<registration::TraceRow>& 
                                      const PoseFrame& frame,
                                      const Yardstick& yardstick);
 
-/// Drops all but the first `kMostTraces` traces of a renderer's rows, which are those of one case.
-/// \test FailureTraces.AreKeptOfTheFirstFailuresOfAMethodOnly
-void keep_first_traces(std::vector<RegistrationRow>& rows, const std::string& renderer);
+/// The failures of one case and method that keep their traces, by start index.
+using FirstTraces = std::map<std::int64_t, std::vector<TracePoint>>;
+
+/// Adds the trace of a start, unless it is empty or there are `kMostTraces` of lower indices.
+/// Starts come in any order. \test FailureTraces.AreKeptOfTheFirstFailuresOfAMethodOnly
+void keep_if_first(std::int64_t start_index, std::vector<TracePoint> trace, FirstTraces& kept);
 
 /// stage, step_mm, poses_tried, similarity, rx_deg ... tz_mm (relative to gold), tre_mm.
 CsvTable trace_table(const std::vector<TracePoint>& trace);

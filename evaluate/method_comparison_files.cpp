@@ -22,11 +22,6 @@ namespace {
 
 constexpr std::size_t kBands = std::size(kBandEndsMm) - 1;
 
-double number_or_nan(const CsvTable& table, std::size_t row, const char* column) {
-  return table.text(row, column) == "nan" ? std::numeric_limits<double>::quiet_NaN()
-                                          : table.number(row, column);
-}
-
 /// Registrations of one case by one renderer.
 struct Sums {
   std::array<IntervalSuccess, kBands> bands{};
@@ -39,7 +34,7 @@ struct Sums {
 
 void add_row(const CsvTable& table, std::size_t row, Sums& sums) {
   const double initial_mm = table.number(row, "initial_tre_mm");
-  const double tre_mm = number_or_nan(table, row, "tre_mm");
+  const double tre_mm = table.number_or_nan(row, "tre_mm");
   const bool is_success = tre_mm < kSuccessTreMm;
   ++sums.starts;
   for (std::size_t band = 0; band < kBands; ++band) {
@@ -48,7 +43,7 @@ void add_row(const CsvTable& table, std::size_t row, Sums& sums) {
     sums.bands[band].successes += is_success ? 1 : 0;
   }
   sums.drr_counts.push_back(table.number(row, "drr_count"));
-  const double seconds = number_or_nan(table, row, "seconds");
+  const double seconds = table.number_or_nan(row, "seconds");
   if (std::isfinite(seconds)) sums.seconds.push_back(seconds);
   if (!is_success) return;
   sums.tre_mm.push_back(tre_mm);
@@ -153,10 +148,11 @@ std::vector<MethodRow> method_rows(const std::vector<EvaluationRun>& runs) {
   std::vector<MethodRow> rows;
   for (const EvaluationRun& run : runs) {
     if (run.kind != "registration") continue;
-    const CsvTable table = run.table("registrations.csv");
     std::map<std::pair<std::string, std::string>, Sums> sums;
-    for (std::size_t i = 0; i < table.row_count(); ++i)
-      add_row(table, i, sums[{table.text(i, "case"), table.text(i, "renderer")}]);
+    run.read_in_parts("registrations.csv", [&](const CsvTable& table) {
+      for (std::size_t i = 0; i < table.row_count(); ++i)
+        add_row(table, i, sums[{table.text(i, "case"), table.text(i, "renderer")}]);
+    });
     for (const auto& [key, value] : sums) rows.push_back(row_of(run, key.first, key.second, value));
   }
   return rows;

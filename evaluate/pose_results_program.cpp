@@ -44,7 +44,8 @@ std::vector<std::string> missing_pose_problems(const std::string& case_name,
 CaseEvaluation evaluate_found_poses(const RegistrationStudyOptions& options,
                                     const Study& study,
                                     const StudyCase& study_case,
-                                    const std::function<void(const CaseEvaluation&)>& on_starts) {
+                                    const std::function<void(const CaseEvaluation&)>& on_starts,
+                                    FileBackedArray<RegistrationRow>& rows) {
   CaseEvaluation evaluation;
   evaluation.case_name = study_case.name;
   evaluation.gold = gold_standard(study, study_case, options.gold);
@@ -56,13 +57,14 @@ CaseEvaluation evaluate_found_poses(const RegistrationStudyOptions& options,
   evaluation.pose_problems = found.problems;
   evaluation.start_count = evaluation.starts.starts.size();
   const auto count = static_cast<std::int64_t>(evaluation.start_count);
+  const std::span<RegistrationRow> mine = rows.append(evaluation.start_count);
   for (std::int64_t index = 0; index < count; ++index) {
     RegistrationRow row = found_row(found, index, yardstick);
     set_start(evaluation.starts.starts[static_cast<std::size_t>(index)], row);
     row.case_name = study_case.name;
     row.renderer = options.method_name;
     row.start_index = index;
-    evaluation.rows.push_back(row);
+    mine[static_cast<std::size_t>(index)] = row;
   }
   for (const std::string& text : missing_pose_problems(study_case.name, found, count))
     evaluation.pose_problems.push_back(text);

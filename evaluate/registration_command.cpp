@@ -128,8 +128,7 @@ void add_gold_uncertainty(const std::vector<CaseEvaluation>& evaluations, json& 
   }
 }
 
-void draw_figures(const RegistrationStudyOptions& options,
-                  const std::vector<RegistrationRow>& rows) {
+void draw_figures(const RegistrationStudyOptions& options, std::span<const RegistrationRow> rows) {
   std::vector<OutcomeGroup> groups;
   for (const std::string& renderer : options.renderers())
     groups.push_back(
@@ -143,7 +142,7 @@ void draw_figures(const RegistrationStudyOptions& options,
 json summary_json(const RegistrationStudyOptions& options,
                   const Study& study,
                   const std::vector<CaseEvaluation>& evaluations,
-                  const std::vector<RegistrationRow>& rows) {
+                  std::span<const RegistrationRow> rows) {
   json summary = {{"format", "attenuation-fields evaluation"},
                   {"format_version", 1},
                   {"kind", "registration"},
@@ -185,15 +184,17 @@ json summary_json(const RegistrationStudyOptions& options,
   return summary;
 }
 
-void write_traces(const std::filesystem::path& folder, const std::vector<RegistrationRow>& rows) {
+void write_traces(const std::filesystem::path& folder,
+                  const std::vector<CaseEvaluation>& evaluations) {
   // Those of an earlier run would be taken for this one's.
   std::filesystem::remove_all(folder / "traces");
-  for (const RegistrationRow& row : rows) {
-    if (row.trace.empty()) continue;
-    make_output_folder(folder / "traces");
-    write_text_file(folder / trace_file(row.case_name, row.renderer, row.start_index),
-                    trace_table(row.trace).to_text());
-  }
+  for (const CaseEvaluation& evaluation : evaluations)
+    for (const auto& [renderer, traces] : evaluation.traces)
+      for (const auto& [start_index, trace] : traces) {
+        make_output_folder(folder / "traces");
+        write_text_file(folder / trace_file(evaluation.case_name, renderer, start_index),
+                        trace_table(trace).to_text());
+      }
 }
 
 /// The mean TRE of successes beside the gold standard's own error; empty without a success.
@@ -392,6 +393,7 @@ void run_registration(const RegistrationStudyOptions& options,
     starts_file.emplace(folder / "starts.csv");
   });
 
+  FileBackedArray<RegistrationRow> rows(folder);
   std::vector<CaseEvaluation> evaluations;
   for (const StudyCase& study_case : cases) {
     const auto on_starts = [&](const CaseEvaluation& so_far) {
@@ -401,13 +403,14 @@ void run_registration(const RegistrationStudyOptions& options,
       starts_file->add(so_far.case_name, so_far.starts.starts.view());
       if (&study_case == &cases.back()) starts_file->finish();
     };
-    evaluations.push_back(
-        options.poses_from.empty()
-            ? evaluate_case(options, study, study_case, world, on_starts)
-            : all_or_none(world, [&] {
-                return world.is_root() ? evaluate_found_poses(options, study, study_case, on_starts)
-                                       : CaseEvaluation{};
-              }));
+    evaluations.push_back(options.poses_from.empty()
+                              ? evaluate_case(options, study, study_case, world, on_starts, rows)
+                              : all_or_none(world, [&] {
+                                  return world.is_root()
+                                             ? evaluate_found_poses(
+                                                   options, study, study_case, on_starts, rows)
+                                             : CaseEvaluation{};
+                                }));
   }
   if (options.is_starts_only) {
     if (world.is_root()) std::cout << "starts: " << (folder / "starts.csv").string() << '\n';
@@ -416,26 +419,20 @@ void run_registration(const RegistrationStudyOptions& options,
   all_or_none(world, [&] {
     if (!world.is_root()) return;
     const WorkNote note("writing the results", WorkNote::Kind::Phase);
-    std::vector<RegistrationRow> rows;
     Provenance provenance = {"af-evaluate registration",
                              command_line,
                              to_toml(options),
                              options.method.seed,
                              world.size(),
                              {{"study", sha256_of_file(study.path.string())}}};
-    for (CaseEvaluation& evaluation : evaluations) {
-      rows.insert(rows.end(),
-                  std::make_move_iterator(evaluation.rows.begin()),
-                  std::make_move_iterator(evaluation.rows.end()));
-      evaluation.rows = {};
+    for (const CaseEvaluation& evaluation : evaluations)
       provenance.input_sha256.insert(evaluation.input_sha256.begin(),
                                      evaluation.input_sha256.end());
-    }
-    write_registrations(folder / "registrations.csv", rows);
-    write_traces(folder, rows);
-    draw_figures(options, rows);
+    write_registrations(folder / "registrations.csv", rows.view());
+    write_traces(folder, evaluations);
+    draw_figures(options, rows.view());
     write_reproduce_script(folder, provenance);
-    json summary = summary_json(options, study, evaluations, rows);
+    json summary = summary_json(options, study, evaluations, rows.view());
     write_text_file(folder / "cases.csv", case_table(summary["renderers"]).to_text());
     summary["provenance"] = af::to_json(provenance);
     // Last: when it is there, everything is.

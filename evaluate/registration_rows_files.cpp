@@ -85,9 +85,10 @@ std::vector<std::string> start_fields(const std::string& case_name,
 
 }  // namespace
 
-json packed_row(const RegistrationRow& row) {
-  return {row.case_name,
-          row.renderer,
+json packed_row(const TracedRow& traced) {
+  const RegistrationRow& row = traced.row;
+  return {row.case_name.text(),
+          row.renderer.text(),
           row.start_index,
           row.draw_index,
           row.interval,
@@ -96,13 +97,14 @@ json packed_row(const RegistrationRow& row) {
           {row.initial_tre_mm, row.tre_mm, row.stated_pose_tre_mm, row.similarity, row.seconds},
           row.errors.values(),
           {row.evaluations, row.inadmissible, row.drr_count},
-          row.stop_reason,
-          row.error,
-          packed_trace(row.trace)};
+          row.stop_reason.text(),
+          row.error.text(),
+          packed_trace(traced.trace)};
 }
 
-RegistrationRow row_of(const json& packed) {
-  RegistrationRow row;
+TracedRow row_of(const json& packed) {
+  TracedRow traced;
+  RegistrationRow& row = traced.row;
   row.case_name = packed.at(0).get<std::string>();
   row.renderer = packed.at(1).get<std::string>();
   row.start_index = integer_of<std::int64_t>(packed.at(2));
@@ -122,11 +124,11 @@ RegistrationRow row_of(const json& packed) {
   row.drr_count = integer_of<std::int64_t>(packed.at(9).at(2));
   row.stop_reason = packed.at(10).get<std::string>();
   row.error = packed.at(11).get<std::string>();
-  row.trace = trace_of(packed.at(12));
-  return row;
+  traced.trace = trace_of(packed.at(12));
+  return traced;
 }
 
-RegistrationRow row_of_record(std::span<const std::byte> record, const std::string& file) {
+TracedRow row_of_record(std::span<const std::byte> record, const std::string& file) {
   const json packed = json_of_cbor(record, file);
   try {
     return row_of(packed);
@@ -135,7 +137,7 @@ RegistrationRow row_of_record(std::span<const std::byte> record, const std::stri
   }
 }
 
-CsvTable registrations_table(const std::vector<RegistrationRow>& rows) {
+CsvTable registrations_table(std::span<const RegistrationRow> rows) {
   std::vector<std::string> columns = {"case", "start_index", "renderer"};
   for (const char* when : {"start_", "final_"})
     for (const char* name : kParameterNames) columns.push_back(std::string(when) + name);
@@ -183,12 +185,9 @@ CsvTable registrations_table(const std::vector<RegistrationRow>& rows) {
   return table;
 }
 
-void write_registrations(const std::filesystem::path& path,
-                         const std::vector<RegistrationRow>& rows) {
+void write_registrations(const std::filesystem::path& path, std::span<const RegistrationRow> rows) {
   write_csv_in_parts(path, rows.size(), [&](std::size_t first, std::size_t end) {
-    const auto begin = rows.begin();
-    return registrations_table(
-        {begin + static_cast<std::ptrdiff_t>(first), begin + static_cast<std::ptrdiff_t>(end)});
+    return registrations_table(rows.subspan(first, end - first));
   });
 }
 
@@ -212,7 +211,7 @@ void StartsFile::finish() {
   move_into_place(partial_, path_);
 }
 
-std::vector<TreOutcome> outcomes_of(const std::vector<RegistrationRow>& rows,
+std::vector<TreOutcome> outcomes_of(std::span<const RegistrationRow> rows,
                                     const std::string& renderer) {
   std::vector<TreOutcome> outcomes;
   for (const RegistrationRow& row : rows)

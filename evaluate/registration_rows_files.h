@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "base/interned_text.h"
 #include "evaluate/perturbed_starts.h"
 #include "evaluate/registration_errors.h"
 #include "evaluate/success_rate.h"
@@ -30,12 +31,13 @@ struct TracePoint {
 };
 
 /// One registration as evaluated. Without an end pose (stop reasons of failed registrations)
-/// similarity, TRE and final parameters are NaN.
+/// similarity, TRE and final parameters are NaN. Trivially copyable: millions are held in
+/// file-backed memory.
 struct RegistrationRow {
   static constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 
-  std::string case_name;
-  std::string renderer;          ///< "field" or "raycast"
+  InternedText case_name;
+  InternedText renderer;         ///< "field" or "raycast"
   std::int64_t start_index = 0;  ///< row of the case's starts in starts.csv
   std::uint64_t draw_index = 0;
   int interval = 0;                      ///< of initial TRE
@@ -49,26 +51,30 @@ struct RegistrationRow {
   std::int64_t evaluations = 0;
   std::int64_t inadmissible = 0;
   std::int64_t drr_count = 0;
-  std::string stop_reason;
-  std::string error;              ///< message of a registration that threw
-  double seconds = 0.0;           ///< wall time
-  std::vector<TracePoint> trace;  ///< of some failures, see failure_trace_files.h
+  InternedText stop_reason;
+  InternedText error;    ///< message of a registration that threw
+  double seconds = 0.0;  ///< wall time
 
   [[nodiscard]] bool is_success() const { return tre_mm < kSuccessTreMm; }
 };
 
+/// A row and how the search went: of some failures, see failure_trace_files.h; else empty.
+struct TracedRow {
+  RegistrationRow row;
+  std::vector<TracePoint> trace;
+};
+
 /// A row as it is kept while others are unfinished, and back.
-nlohmann::json packed_row(const RegistrationRow& row);
-RegistrationRow row_of(const nlohmann::json& packed);
+nlohmann::json packed_row(const TracedRow& traced);
+TracedRow row_of(const nlohmann::json& packed);
 /// The same from a record of a file, in CBOR; FileError naming `file` when it holds no row.
-RegistrationRow row_of_record(std::span<const std::byte> record, const std::string& file);
+TracedRow row_of_record(std::span<const std::byte> record, const std::string& file);
 
 /// registrations.csv with the contract's columns, in the given order; timings last.
-CsvTable registrations_table(const std::vector<RegistrationRow>& rows);
+CsvTable registrations_table(std::span<const RegistrationRow> rows);
 
 /// registrations.csv of any length, a part at a time.
-void write_registrations(const std::filesystem::path& path,
-                         const std::vector<RegistrationRow>& rows);
+void write_registrations(const std::filesystem::path& path, std::span<const RegistrationRow> rows);
 
 /// starts.csv: the starts of all cases, in order, of any number. It has its name once finished.
 class StartsFile {
@@ -85,7 +91,7 @@ class StartsFile {
 };
 
 /// Starts and TREs of one renderer, in row order.
-std::vector<TreOutcome> outcomes_of(const std::vector<RegistrationRow>& rows,
+std::vector<TreOutcome> outcomes_of(std::span<const RegistrationRow> rows,
                                     const std::string& renderer);
 
 }  // namespace af::evaluation

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <span>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -249,7 +250,7 @@ bool is_earlier_start(const RegistrationRow* a, const RegistrationRow* b) {
 
 /// By case and start index, the last of those that are repeated. Millions of rows are looked at
 /// through pointers: a map of them would need more memory than they.
-Rows rows_by_start(const std::vector<RegistrationRow>& rows, const std::string& renderer) {
+Rows rows_by_start(std::span<const RegistrationRow> rows, const std::string& renderer) {
   Rows found;
   for (const RegistrationRow& row : rows)
     if (row.renderer == renderer) found.push_back(&row);
@@ -262,7 +263,7 @@ Rows rows_by_start(const std::vector<RegistrationRow>& rows, const std::string& 
   return found;
 }
 
-std::vector<StartPair> pairs_of(const std::vector<RegistrationRow>& rows) {
+std::vector<StartPair> pairs_of(std::span<const RegistrationRow> rows) {
   const Rows raycast = rows_by_start(rows, "raycast");
   if (raycast.empty()) return {};
   std::vector<StartPair> pairs;
@@ -276,7 +277,7 @@ std::vector<StartPair> pairs_of(const std::vector<RegistrationRow>& rows) {
 }
 
 /// Those of a renderer, case and start index that another row has before them, ascending.
-Rows repeated_rows(const std::vector<RegistrationRow>& rows) {
+Rows repeated_rows(std::span<const RegistrationRow> rows) {
   const auto key = [](const RegistrationRow* row) {
     return std::tie(row->case_name, row->renderer, row->start_index);
   };
@@ -328,7 +329,7 @@ std::string failure_reason(const RegistrationRow& row) {
   return "other optimum";
 }
 
-json renderer_statistics(const std::vector<RegistrationRow>& rows,
+json renderer_statistics(std::span<const RegistrationRow> rows,
                          const std::string& renderer,
                          const StatisticsOptions& options) {
   Rows mine;
@@ -362,7 +363,7 @@ json renderer_statistics(const std::vector<RegistrationRow>& rows,
   return result;
 }
 
-json paired_statistics(const std::vector<RegistrationRow>& rows,
+json paired_statistics(std::span<const RegistrationRow> rows,
                        double margin_mm,
                        std::uint64_t seed) {
   std::array<std::vector<double>, 2> seconds;
@@ -401,12 +402,12 @@ json paired_statistics(const std::vector<RegistrationRow>& rows,
   return result;
 }
 
-std::vector<std::string> row_problems(const std::vector<RegistrationRow>& rows) {
+std::vector<std::string> row_problems(std::span<const RegistrationRow> rows) {
   std::vector<std::string> found;
   const Rows repeated = repeated_rows(rows);
   for (const RegistrationRow& row : rows) {
     const auto add = [&](const char* problem) {
-      found.push_back(row.case_name + ", " + row.renderer + ", start " +
+      found.push_back(row.case_name.text() + ", " + row.renderer.text() + ", start " +
                       std::to_string(row.start_index) + ": " + problem);
     };
     if (std::binary_search(repeated.begin(), repeated.end(), &row)) add("occurs more than once");

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <nlohmann/json.hpp>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -31,7 +32,7 @@ std::string failure_reason(const RegistrationRow& row);
 /// capture range, TRE over all runs (no pose counts as infinitely far) and over successes, bias,
 /// the other errors, stop reasons and times of one renderer; per case, too; bootstrap intervals
 /// over cases. docs/errors.md defines each.
-nlohmann::json renderer_statistics(const std::vector<RegistrationRow>& rows,
+nlohmann::json renderer_statistics(std::span<const RegistrationRow> rows,
                                    const std::string& renderer,
                                    const StatisticsOptions& options);
 
@@ -39,13 +40,13 @@ nlohmann::json renderer_statistics(const std::vector<RegistrationRow>& rows,
 /// each, McNemar's test of success; on those from which both succeeded ("pairs"), if there are two
 /// or more, paired t-test, signed-rank test, and equivalence of TRE with its power, and intervals
 /// of the mean difference over cases. null when no start was given to both.
-nlohmann::json paired_statistics(const std::vector<RegistrationRow>& rows,
+nlohmann::json paired_statistics(std::span<const RegistrationRow> rows,
                                  double margin_mm,
                                  std::uint64_t seed = 1);
 
 /// What is wrong with a set of rows, in words: registrations that occur twice, values that are NaN
 /// beside a pose, initial TREs that are not finite. Empty when nothing is.
-std::vector<std::string> row_problems(const std::vector<RegistrationRow>& rows);
+std::vector<std::string> row_problems(std::span<const RegistrationRow> rows);
 
 /// What so few cases do not allow, in words; empty when they are enough.
 std::vector<std::string> warnings_about_cases(std::size_t cases);

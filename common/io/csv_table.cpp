@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <limits>
 #include <set>
 #include <utility>
 
@@ -15,81 +16,11 @@ namespace af {
 namespace {
 
 constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+constexpr std::size_t kRowsPerPart = 4096;
 
 struct Record {
   std::vector<std::string> fields;
   std::size_t line = 0;  ///< where it begins, from 1
-};
-
-/// Splits CSV text into records (RFC 4180; LF or CRLF).
-class CsvParser {
- public:
-  CsvParser(std::string_view text, const std::string& path) : text_(text), path_(path) {
-    if (text_.starts_with(kByteOrderMark)) text_.remove_prefix(kByteOrderMark.size());
-    if (const std::size_t nul = text_.find('\0'); nul != std::string_view::npos)
-      throw FileError(path_, "is not text: it has a zero byte at offset " + std::to_string(nul));
-  }
-
-  [[nodiscard]] bool at_end() const { return position_ >= text_.size(); }
-
-  Record next_record() {
-    Record record{{}, line_};
-    for (;;) {
-      record.fields.push_back(peek() == '"' ? quoted_field() : plain_field());
-      if (peek() != ',') break;
-      ++position_;
-    }
-    if (peek() == '\r') ++position_;
-    if (peek() == '\n') ++position_;
-    ++line_;
-    return record;
-  }
-
- private:
-  /// The next character, or a line end after the last one.
-  [[nodiscard]] char peek() const { return at_end() ? '\n' : text_[position_]; }
-
-  [[nodiscard]] std::string here() const { return path_ + ":" + std::to_string(line_); }
-
-  std::string plain_field() {
-    const std::size_t start = position_;
-    while (!at_end() && peek() != ',' && peek() != '\n' && !at_carriage_return()) {
-      if (peek() == '"')
-        throw FileError(here(), "a quote inside a field that does not begin with one");
-      ++position_;
-    }
-    return std::string(text_.substr(start, position_ - start));
-  }
-
-  /// True at the carriage return of a CRLF pair (or of a file's last line).
-  [[nodiscard]] bool at_carriage_return() const {
-    return peek() == '\r' && (position_ + 1 >= text_.size() || text_[position_ + 1] == '\n');
-  }
-
-  std::string quoted_field() {
-    const std::string start = here();
-    std::string field;
-    for (++position_;; ++position_) {
-      if (at_end()) throw FileError(start, "a quote is opened here and never closed");
-      const char character = text_[position_];
-      if (character == '\n') ++line_;
-      if (character != '"') {
-        field.push_back(character);
-        continue;
-      }
-      ++position_;
-      if (at_end() || text_[position_] != '"') break;
-      field.push_back('"');
-    }
-    if (!at_end() && peek() != ',' && peek() != '\n' && !at_carriage_return())
-      throw FileError(here(), "text after the closing quote of a field");
-    return field;
-  }
-
-  std::string_view text_;
-  const std::string& path_;
-  std::size_t position_ = 0;
-  std::size_t line_ = 1;
 };
 
 std::string quoted_if_needed(const std::string& field) {
@@ -141,31 +72,151 @@ std::string non_finite_text(double value) {
 
 }  // namespace
 
-CsvTable CsvTable::read(const std::filesystem::path& path) {
-  const std::string name = path.string();
-  const std::string text = read_text_file(path);
-  CsvParser parser(text, name);
-  if (parser.at_end()) throw FileError(name, "is empty; a header line was expected");
+/// Splits CSV text into records (RFC 4180; LF or CRLF).
+class CsvTable::Parser {
+ public:
+  /// `next_part` gives the text, in parts; empty at its end.
+  Parser(std::function<std::string_view()> next_part, const std::string& path)
+      : next_part_(std::move(next_part)), path_(path), part_(next_part_()) {
+    if (part_.starts_with(kByteOrderMark)) part_.remove_prefix(kByteOrderMark.size());
+  }
+
+  [[nodiscard]] bool at_end() {
+    if (position_ == part_.size() && !part_.empty()) {
+      offset_ += part_.size();
+      part_ = next_part_();
+      position_ = 0;
+    }
+    return part_.empty();
+  }
+
+  Record next_record() {
+    Record record{{}, line_};
+    begin_ = offset_ + position_;
+    do record.fields.push_back(peek() == '"' ? quoted_field() : plain_field());
+    while (take(','));
+    take('\n');
+    ++line_;
+    return record;
+  }
+
+ private:
+  /// The next character, or a line end after the last one.
+  [[nodiscard]] char peek() {
+    if (at_end()) return '\n';
+    const char next = part_[position_];
+    const std::size_t offset = offset_ + position_;
+    if (next == '\0')
+      throw FileError(path_, "is not text: it has a zero byte at offset " + std::to_string(offset));
+    if (offset - begin_ > kMostBytesOfARow)
+      throw FileError(
+          here(),
+          "a row is larger than the " + std::to_string(kMostBytesOfARow) + " bytes allowed here");
+    return next;
+  }
+
+  bool take(char expected) {
+    if (at_end() || peek() != expected) return false;
+    ++position_;
+    return true;
+  }
+
+  [[nodiscard]] bool is_at_separator() { return peek() == ',' || peek() == '\n'; }
+
+  [[nodiscard]] std::string here() const { return path_ + ":" + std::to_string(line_); }
+
+  std::string plain_field() {
+    std::string field;
+    for (; !is_at_separator(); ++position_) {
+      if (peek() == '"')
+        throw FileError(here(), "a quote inside a field that does not begin with one");
+      field.push_back(peek());
+    }
+    // A carriage return that ends a line is not of the field.
+    if (field.ends_with('\r') && peek() == '\n') field.pop_back();
+    return field;
+  }
+
+  std::string quoted_field() {
+    const std::string start = here();
+    std::string field;
+    for (++position_;; ++position_) {
+      if (at_end()) throw FileError(start, "a quote is opened here and never closed");
+      const char character = peek();
+      if (character == '\n') ++line_;
+      if (character != '"') {
+        field.push_back(character);
+        continue;
+      }
+      ++position_;
+      if (at_end() || peek() != '"') break;
+      field.push_back('"');
+    }
+    const bool is_end_of_line = take('\r');
+    if (is_end_of_line ? peek() != '\n' : !is_at_separator())
+      throw FileError(here(), "text after the closing quote of a field");
+    return field;
+  }
+
+  static constexpr std::size_t kMostBytesOfARow = std::size_t{64} << 20;
+
+  std::function<std::string_view()> next_part_;
+  const std::string& path_;
+  std::string_view part_;
+  std::size_t position_ = 0;  ///< in the part
+  std::size_t offset_ = 0;    ///< of the part in the text
+  std::size_t begin_ = 0;     ///< of the row in the text
+  std::size_t line_ = 1;
+};
+
+CsvTable CsvTable::header_of(Parser& parser, const std::string& path) {
+  if (parser.at_end()) throw FileError(path, "is empty; a header line was expected");
   CsvTable table(parser.next_record().fields);
-  table.path_ = name;
+  table.path_ = path;
   std::set<std::string_view> seen;
   for (const std::string& column : table.columns_)
     if (!seen.insert(column).second)
-      throw FileError(name + ":1", "the column name '" + column + "' is repeated");
-  while (!parser.at_end()) {
+      throw FileError(path + ":1", "the column name '" + column + "' is repeated");
+  return table;
+}
+
+void CsvTable::add_rows(Parser& parser, std::size_t most) {
+  while (rows_.size() < most && !parser.at_end()) {
     Record record = parser.next_record();
     const bool blank_last_line = parser.at_end() && record.fields.size() == 1 &&
-                                 trimmed(record.fields[0]).empty() && table.columns_.size() > 1;
+                                 trimmed(record.fields[0]).empty() && columns_.size() > 1;
     if (blank_last_line) break;
-    if (record.fields.size() != table.columns_.size())
-      throw FileError(name + ":" + std::to_string(record.line),
+    if (record.fields.size() != columns_.size())
+      throw FileError(path_ + ":" + std::to_string(record.line),
                       "number of fields",
-                      std::to_string(table.columns_.size()),
+                      std::to_string(columns_.size()),
                       std::to_string(record.fields.size()));
-    table.rows_.push_back(std::move(record.fields));
-    table.lines_.push_back(record.line);
+    rows_.push_back(std::move(record.fields));
+    lines_.push_back(record.line);
   }
+}
+
+CsvTable CsvTable::read(const std::filesystem::path& path) {
+  const std::string name = path.string();
+  const std::string text = read_text_file(path);
+  std::string_view rest = text;
+  Parser parser([&] { return std::exchange(rest, {}); }, name);
+  CsvTable table = header_of(parser, name);
+  table.add_rows(parser, std::numeric_limits<std::size_t>::max());
   return table;
+}
+
+void CsvTable::read_in_parts(const std::filesystem::path& path,
+                             const std::function<void(const CsvTable& part)>& receive) {
+  const std::string name = path.string();
+  TextParts text(path);
+  Parser parser([&] { return text.next(); }, name);
+  const CsvTable header = header_of(parser, name);
+  do {
+    CsvTable part = header;
+    part.add_rows(parser, kRowsPerPart);
+    receive(part);
+  } while (!parser.at_end());
 }
 
 void CsvTable::add_row(std::vector<std::string> fields) {
@@ -195,6 +246,11 @@ double CsvTable::number(std::size_t row, std::string_view column) const {
   throw FileError(where(row), std::string(column), "a finite number", "'" + value + "'");
 }
 
+double CsvTable::number_or_nan(std::size_t row, std::string_view column) const {
+  return text(row, column) == "nan" ? std::numeric_limits<double>::quiet_NaN()
+                                    : number(row, column);
+}
+
 std::string CsvTable::where(std::size_t row) const {
   check(row < rows_.size(), "CSV row beyond the table");
   return (path_.empty() ? "table" : path_) + ":" + std::to_string(lines_[row]);
@@ -216,7 +272,6 @@ void write_csv_in_parts(
     const std::filesystem::path& path,
     std::size_t row_count,
     const std::function<CsvTable(std::size_t first, std::size_t end)>& table_of) {
-  constexpr std::size_t kRowsPerPart = 4096;
   std::size_t first = 0;
   bool has_header = false;
   write_text_in_parts(path, [&]() -> std::string {

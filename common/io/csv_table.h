@@ -18,6 +18,11 @@ class CsvTable {
   /// FileError naming path and line when a row has the wrong number of fields, quotes are
   /// unbalanced, a column name is repeated, or the file is empty.
   static CsvTable read(const std::filesystem::path& path);
+  /// Tables of a few thousand rows each, in order, of a file too long to be held; at least one.
+  /// FileError as of read(), once the rows before have been received.
+  /// \test CsvTable.IsReadInPartsLikeAsAWhole
+  static void read_in_parts(const std::filesystem::path& path,
+                            const std::function<void(const CsvTable& part)>& receive);
 
   void add_row(std::vector<std::string> fields);
   [[nodiscard]] std::size_t row_count() const { return rows_.size(); }
@@ -26,6 +31,8 @@ class CsvTable {
   [[nodiscard]] const std::string& text(std::size_t row, std::string_view column) const;
   /// FileError naming path, line, column and value when it is not a finite number.
   [[nodiscard]] double number(std::size_t row, std::string_view column) const;
+  /// The same, or NaN where it says "nan".
+  [[nodiscard]] double number_or_nan(std::size_t row, std::string_view column) const;
   /// "PATH:LINE" of a row, for messages.
   [[nodiscard]] std::string where(std::size_t row) const;
   [[nodiscard]] std::string to_text() const;
@@ -33,6 +40,11 @@ class CsvTable {
   [[nodiscard]] std::string rows_text() const;
 
  private:
+  class Parser;
+  static CsvTable header_of(Parser& parser, const std::string& path);
+  /// Adds rows up to the end of the file, or until there are `most`.
+  void add_rows(Parser& parser, std::size_t most);
+
   std::vector<std::string> columns_;
   std::vector<std::vector<std::string>> rows_;
   std::vector<std::size_t> lines_;  ///< of the file, where each row begins

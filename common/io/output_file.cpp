@@ -162,15 +162,28 @@ void move_into_place(const fs::path& partial, const fs::path& path) {
   sync_path(folder_of(path));
 }
 
+struct TextParts::File {
+  Descriptor descriptor;
+  std::vector<char> buffer = std::vector<char>(std::size_t{64} << 10);
+};
+
+TextParts::TextParts(const std::filesystem::path& path)
+    : file_(new File{Descriptor(path, O_RDONLY)}) {}
+
+TextParts::~TextParts() = default;
+
+std::string_view TextParts::next() {
+  return {file_->buffer.data(), file_->descriptor.read(file_->buffer)};
+}
+
 std::string read_text_file(const std::filesystem::path& path, std::size_t max_bytes) {
-  const Descriptor file(path, O_RDONLY);
-  std::vector<char> buffer(std::size_t{64} << 10);
+  TextParts parts(path);
   std::string text;
-  while (const std::size_t count = file.read(buffer)) {
-    if (count > max_bytes - text.size())
+  for (std::string_view part = parts.next(); !part.empty(); part = parts.next()) {
+    if (part.size() > max_bytes - text.size())
       throw FileError(path.string(),
                       "is larger than the " + std::to_string(max_bytes) + " bytes allowed here");
-    text.append(buffer.data(), count);
+    text += part;
   }
   return text;
 }

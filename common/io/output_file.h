@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <string>
 #include <string_view>
 
@@ -29,6 +30,19 @@ void sync_path(const std::filesystem::path& path);
 
 /// Syncs a complete file and gives it its name, in one step. FileError when it cannot.
 void move_into_place(const std::filesystem::path& partial, const std::filesystem::path& path);
+
+/// A file's text from its beginning, for files of any length. FileError when unreadable.
+class TextParts {
+ public:
+  explicit TextParts(const std::filesystem::path& path);
+  ~TextParts();
+  /// Valid until the next call; empty at the end of the file.
+  std::string_view next();
+
+ private:
+  struct File;
+  std::unique_ptr<File> file_;
+};
 
 /// The whole file as text; FileError when unreadable or larger than `max_bytes`.
 std::string read_text_file(const std::filesystem::path& path, std::size_t max_bytes = 256u << 20);

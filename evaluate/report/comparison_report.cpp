@@ -81,14 +81,13 @@ std::string comparison_table(const std::vector<const EvaluationRun*>& runs) {
 
 /// Initial and final TRE of one renderer's rows.
 std::vector<TreOutcome> outcomes_of_run(const EvaluationRun& run, const std::string& renderer) {
-  const CsvTable rows = run.table("registrations.csv");
   std::vector<TreOutcome> outcomes;
-  for (std::size_t i = 0; i < rows.row_count(); ++i) {
-    if (rows.text(i, "renderer") != renderer) continue;
-    const bool has_pose = rows.text(i, "tre_mm") != "nan";
-    outcomes.push_back(
-        {rows.number(i, "initial_tre_mm"), has_pose ? rows.number(i, "tre_mm") : std::nan("")});
-  }
+  run.read_in_parts("registrations.csv", [&](const CsvTable& rows) {
+    for (std::size_t i = 0; i < rows.row_count(); ++i) {
+      if (rows.text(i, "renderer") != renderer) continue;
+      outcomes.push_back({rows.number(i, "initial_tre_mm"), rows.number_or_nan(i, "tre_mm")});
+    }
+  });
   return outcomes;
 }
 

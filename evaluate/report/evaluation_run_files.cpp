@@ -94,6 +94,11 @@ CsvTable EvaluationRun::table(const std::string& relative) const {
   return CsvTable::read(existing(relative));
 }
 
+void EvaluationRun::read_in_parts(const std::string& relative,
+                                  const std::function<void(const CsvTable& part)>& receive) const {
+  CsvTable::read_in_parts(existing(relative), receive);
+}
+
 std::filesystem::path EvaluationRun::existing(const std::string& relative) const {
   if (!has_file(relative)) throw FileError((folder / relative).string(), "is missing, or no file");
   return path_of(relative);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -28,6 +29,9 @@ struct EvaluationRun {
   [[nodiscard]] std::string file(const std::string& file_name) const;
   /// A table of the run, named by its path below the folder. FileError as of file(), or no CSV.
   [[nodiscard]] CsvTable table(const std::string& relative) const;
+  /// The same of a table of any length, in parts; table() is refused one of 256 MB.
+  void read_in_parts(const std::string& relative,
+                     const std::function<void(const CsvTable& part)>& receive) const;
   /// A link from the page to a file or folder of the run, named by its path below the folder.
   /// FileError when that leads out of it.
   [[nodiscard]] std::string link(const std::string& relative) const;

@@ -29,11 +29,6 @@ struct SparkPoint {
   double tre_mm = 0.0;
 };
 
-/// A number of a table that may hold "nan".
-double number_or_nan(const CsvTable& table, std::size_t row, const char* column) {
-  return table.text(row, column) == "nan" ? std::nan("") : table.number(row, column);
-}
-
 std::int64_t start_index_of(const CsvTable& rows, std::size_t row) {
   const double index = rows.number(row, "start_index");
   constexpr double kMost = 1e15;  // far below where doubles skip whole numbers
@@ -46,7 +41,7 @@ std::int64_t start_index_of(const CsvTable& rows, std::size_t row) {
 std::vector<SparkPoint> spark_points(const CsvTable& trace, double initial_tre_mm) {
   std::vector<SparkPoint> points = {{0.0, initial_tre_mm}};
   for (std::size_t i = 0; i < trace.row_count(); ++i) {
-    const SparkPoint point = {trace.number(i, "poses_tried"), number_or_nan(trace, i, "tre_mm")};
+    const SparkPoint point = {trace.number(i, "poses_tried"), trace.number_or_nan(i, "tre_mm")};
     if (std::isfinite(point.tre_mm)) points.push_back(point);
   }
   return points;
@@ -102,7 +97,7 @@ void add_failure(const EvaluationRun& run,
                  method_title({{"renderer", rows.text(row, "renderer")}}),
                  escaped(rows.text(row, "start_index")),
                  decimals(rows.number(row, "initial_tre_mm"), 2),
-                 decimals(number_json(number_or_nan(rows, row, "tre_mm")), 2),
+                 decimals(number_json(rows.number_or_nan(row, "tre_mm")), 2),
                  escaped(error.empty() ? rows.text(row, "stop_reason") : error),
                  trace_cell(run, rows, row),
                  repeat_cell(run, rows, row)});
@@ -111,7 +106,6 @@ void add_failure(const EvaluationRun& run,
 }  // namespace
 
 std::string failures_text(const EvaluationRun& run) {
-  const CsvTable rows = run.table("registrations.csv");
   HtmlTable table({{"Case", false},
                    {"Method", false},
                    {"Start", true},
@@ -124,9 +118,11 @@ std::string failures_text(const EvaluationRun& run) {
                       decimals(kSuccessTreMm, 1) +
                       " mm; each can be repeated alone by its command");
   std::int64_t failures = 0;
-  for (std::size_t i = 0; i < rows.row_count(); ++i)
-    if (rows.text(i, "success") != "1" && ++failures <= kMostFailuresListed)
-      add_failure(run, rows, i, table);
+  run.read_in_parts("registrations.csv", [&](const CsvTable& rows) {
+    for (std::size_t i = 0; i < rows.row_count(); ++i)
+      if (rows.text(i, "success") != "1" && ++failures <= kMostFailuresListed)
+        add_failure(run, rows, i, table);
+  });
   if (failures == 0) return element("p", "No registration failed.");
   const std::string rest = failures > kMostFailuresListed
                                ? "The first " + std::to_string(kMostFailuresListed) +

@@ -121,12 +121,12 @@ void write_other_seeds(const fs::path& folder) {
   write_seed(folder / "journal" / "records", "\1AFR1\4\0\0\0\1\2\3\4\5\6\7\x08"s + "abcd");
   write_seed(folder / "journal" / "damaged",
              "\2\3\0\4\0abcd\0\0\5\0hello\2\0\x15\0\0\x77\x20\0\1\x44"s);
-  evaluation::RegistrationRow row;
-  row.case_name = "skull";
-  row.renderer = "field";
-  row.stop_reason = "step-below-final";
-  row.trace.push_back({1, 2.0, 13, 0.5, {}, 4.0});
-  const auto bytes = nlohmann::json::to_cbor(evaluation::packed_row(row));
+  evaluation::TracedRow traced;
+  traced.row.case_name = "skull";
+  traced.row.renderer = "field";
+  traced.row.stop_reason = "step-below-final";
+  traced.trace.push_back({1, 2.0, 13, 0.5, {}, 4.0});
+  const auto bytes = nlohmann::json::to_cbor(evaluation::packed_row(traced));
   write_seed(folder / "rows" / "row", std::string(bytes.begin(), bytes.end()));
   write_seed(folder / "field_values" / "sound", "");
   write_seed(folder / "field_values" / "shifted",

@@ -20,6 +20,7 @@ namespace af::evaluation {
 namespace {
 
 using nlohmann::json;
+using Rows = std::vector<RegistrationRow>;
 
 RegistrationRow row(const std::string& renderer,
                     std::int64_t start,
@@ -48,7 +49,7 @@ TEST(RegistrationRows, TravelWithEveryBit) {
   sent.start_deg_mm = {0.1, -1.0 / 3, 1e-300, std::numeric_limits<double>::denorm_min(), 5, -0.0};
   sent.errors = {0.5, 1.0 / 3, 2.0, std::nan(""), 1e-300};
   sent.error = "numerics; \"failed\"\n";
-  const RegistrationRow received = row_of(through_cbor(packed_row(sent)));
+  const RegistrationRow received = row_of(through_cbor(packed_row({sent, {}}))).row;
   EXPECT_EQ(received.case_name, sent.case_name);
   EXPECT_EQ(received.draw_index, sent.draw_index);
   EXPECT_EQ(received.start_deg_mm, sent.start_deg_mm);
@@ -72,7 +73,7 @@ TEST(RegistrationRows, ARecordThatIsNoRowIsAFileError) {
     }
     return std::string("was read");
   };
-  const json good = packed_row(row("field", 7, 3.3, 1.0));
+  const json good = packed_row({row("field", 7, 3.3, 1.0), {}});
   EXPECT_EQ(refusal(good), "was read");
   EXPECT_THAT(refusal(json::array({1, "skull"})), testing::HasSubstr("skull.records"));
   EXPECT_THAT(refusal("text"), testing::HasSubstr("no row"));
@@ -84,7 +85,7 @@ TEST(RegistrationRows, ARecordThatIsNoRowIsAFileError) {
 }
 
 TEST(RegistrationRows, TableHasTheContractsColumnsWithTimingsLast) {
-  const CsvTable table = registrations_table({row("field", 0, 1.5, 0.3)});
+  const CsvTable table = registrations_table(Rows{row("field", 0, 1.5, 0.3)});
   const std::vector<std::string> first(table.columns().begin(), table.columns().begin() + 20);
   EXPECT_THAT(first,
               testing::ElementsAre("case",
@@ -112,11 +113,11 @@ TEST(RegistrationRows, TableHasTheContractsColumnsWithTimingsLast) {
 }
 
 TEST(RegistrationStatistics, OfHandBuiltRowsAreTheKnownOnes) {
-  const std::vector<RegistrationRow> rows = {row("field", 0, 0.5, 0.2),
-                                             row("field", 1, 1.5, 0.6),
-                                             row("field", 2, 2.5, 9.0),
-                                             row("field", 3, 3.5, std::nan("")),
-                                             row("raycast", 0, 0.5, 0.1)};
+  const Rows rows = {row("field", 0, 0.5, 0.2),
+                     row("field", 1, 1.5, 0.6),
+                     row("field", 2, 2.5, 9.0),
+                     row("field", 3, 3.5, std::nan("")),
+                     row("raycast", 0, 0.5, 0.1)};
   const json result = renderer_statistics(rows, "field", {8, 2.0});
   EXPECT_EQ(result["starts"], 4);
   EXPECT_EQ(result["successes"], 2);
@@ -136,7 +137,7 @@ TEST(RegistrationStatistics, OfHandBuiltRowsAreTheKnownOnes) {
 }
 
 TEST(RegistrationStatistics, KeepEveryFailureInTheDenominatorAndNameItsReason) {
-  std::vector<RegistrationRow> rows;
+  Rows rows;
   for (std::int64_t i = 0; i < 10; ++i)
     rows.push_back(row("field", i, 0.5 + static_cast<double>(i), 0.5));
   const auto fail = [&](std::size_t i, const char* reason, double tre_mm) {
@@ -167,8 +168,7 @@ TEST(RegistrationStatistics, KeepEveryFailureInTheDenominatorAndNameItsReason) {
 }
 
 TEST(RegistrationStatistics, OfOtherErrorsKeepEveryFailureToo) {
-  std::vector<RegistrationRow> rows = {
-      row("field", 0, 1, 0.1), row("field", 1, 1, 9.0), row("field", 2, 1, std::nan(""))};
+  Rows rows = {row("field", 0, 1, 0.1), row("field", 1, 1, 9.0), row("field", 2, 1, std::nan(""))};
   rows[0].errors.mrpd_mm = 0.5;
   rows[1].errors.mrpd_mm = 4.0;
   const json result = renderer_statistics(rows, "field", {8, 2.0});
@@ -180,8 +180,7 @@ TEST(RegistrationStatistics, OfOtherErrorsKeepEveryFailureToo) {
 }
 
 TEST(RegistrationStatistics, BiasIsTheMeanSignedErrorOfSuccesses) {
-  std::vector<RegistrationRow> rows = {
-      row("field", 0, 1, 0.1), row("field", 1, 1, 0.2), row("field", 2, 1, 9.0)};
+  Rows rows = {row("field", 0, 1, 0.1), row("field", 1, 1, 0.2), row("field", 2, 1, 9.0)};
   rows[0].final_deg_mm = {0.1, 0, 0, -1.0, 0, 0};
   rows[1].final_deg_mm = {0.3, 0, 0, 2.0, 0, 0};
   rows[2].final_deg_mm = {50, 50, 50, 50, 50, 50};
@@ -194,7 +193,7 @@ TEST(RegistrationStatistics, BiasIsTheMeanSignedErrorOfSuccesses) {
 }
 
 TEST(RegistrationStatistics, IntervalsOverCasesNeedSeveral) {
-  std::vector<RegistrationRow> rows = {row("field", 0, 1, 0.2, "a"), row("field", 1, 1, 9.0, "a")};
+  Rows rows = {row("field", 0, 1, 0.2, "a"), row("field", 1, 1, 9.0, "a")};
   EXPECT_TRUE(renderer_statistics(rows, "field", {})["over_cases"]["rate"]["low"].is_null());
   rows.push_back(row("field", 0, 1, 0.4, "b"));
   const json over = renderer_statistics(rows, "field", {})["over_cases"];
@@ -224,8 +223,7 @@ TEST(RegistrationStatistics, OfNoRowsHaveNoRateInsteadOfAWrongOne) {
 }
 
 TEST(RegistrationStatistics, OfCasesThatAllSucceedHaveNoSpreadOverCases) {
-  const std::vector<RegistrationRow> rows = {row("field", 0, 1, 0.2, "a"),
-                                             row("field", 0, 1, 0.2, "b")};
+  const Rows rows = {row("field", 0, 1, 0.2, "a"), row("field", 0, 1, 0.2, "b")};
   const json rate = renderer_statistics(rows, "field", {})["over_cases"]["rate"];
   EXPECT_EQ(rate["low"], 1.0);
   EXPECT_TRUE(rate["student_low"].is_null());
@@ -243,22 +241,22 @@ TEST(RowProblems, NameDuplicatesAndRowsThatContradictThemselves) {
   RegistrationRow twice = good;
   RegistrationRow without_parameters = row("field", 1, 1, 0.2);
   RegistrationRow without_initial = row("field", 2, std::nan(""), std::nan(""));
-  EXPECT_THAT(row_problems({good}), testing::IsEmpty());
+  EXPECT_THAT(row_problems(Rows{good}), testing::IsEmpty());
   EXPECT_THAT(
-      row_problems({good, twice, without_parameters, without_initial}),
+      row_problems(Rows{good, twice, without_parameters, without_initial}),
       testing::ElementsAre("skull, field, start 0: occurs more than once",
                            "skull, field, start 1: final pose and TRE do not belong together",
                            "skull, field, start 2: has no initial TRE"));
 }
 
 TEST(PairedStatistics, TakeOnlyStartsThatBothWereGiven) {
-  const std::vector<RegistrationRow> rows = {row("field", 0, 0.5, 0.2),
-                                             row("field", 1, 1.5, 0.6),
-                                             row("field", 2, 2.5, 0.4),
-                                             row("field", 3, 2.5, 9.0),
-                                             row("raycast", 0, 0.5, 0.3),
-                                             row("raycast", 1, 1.5, 0.6),
-                                             row("raycast", 3, 2.5, 0.1)};
+  const Rows rows = {row("field", 0, 0.5, 0.2),
+                     row("field", 1, 1.5, 0.6),
+                     row("field", 2, 2.5, 0.4),
+                     row("field", 3, 2.5, 9.0),
+                     row("raycast", 0, 0.5, 0.3),
+                     row("raycast", 1, 1.5, 0.6),
+                     row("raycast", 3, 2.5, 0.1)};
   const json result = paired_statistics(rows, 0.5);
   EXPECT_EQ(result["common_starts"], 3);
   EXPECT_EQ(result["successes"], json({2, 3}));
@@ -277,10 +275,10 @@ TEST(PairedStatistics, TakeOnlyStartsThatBothWereGiven) {
 }
 
 TEST(PairedStatistics, OverCasesResampleCases) {
-  const std::vector<RegistrationRow> rows = {row("field", 0, 1, 0.5, "a"),
-                                             row("raycast", 0, 1, 0.25, "a"),
-                                             row("field", 0, 1, 0.5, "b"),
-                                             row("raycast", 0, 1, 0.75, "b")};
+  const Rows rows = {row("field", 0, 1, 0.5, "a"),
+                     row("raycast", 0, 1, 0.25, "a"),
+                     row("field", 0, 1, 0.5, "b"),
+                     row("raycast", 0, 1, 0.75, "b")};
   const json over = paired_statistics(rows, 0.5)["mean_difference_over_cases_mm"];
   EXPECT_EQ(over["low"], -0.25);
   EXPECT_EQ(over["high"], 0.25);
@@ -288,7 +286,7 @@ TEST(PairedStatistics, OverCasesResampleCases) {
 }
 
 TEST(PairedStatistics, TieInEveryPairAtOnceIsEquivalenceWithoutSpread) {
-  std::vector<RegistrationRow> rows;
+  Rows rows;
   for (std::int64_t i = 0; i < 3; ++i) {
     rows.push_back(row("field", i, 1, 0.5));
     rows.push_back(row("raycast", i, 1, 0.5));
@@ -300,11 +298,12 @@ TEST(PairedStatistics, TieInEveryPairAtOnceIsEquivalenceWithoutSpread) {
 }
 
 TEST(PairedStatistics, DoNotExistWithoutCommonStarts) {
-  EXPECT_TRUE(paired_statistics({row("field", 0, 1, 1), row("raycast", 1, 1, 1)}, 0.5).is_null());
-  // The same start number of another patient is another start.
   EXPECT_TRUE(
-      paired_statistics({row("field", 0, 1, 1, "a"), row("raycast", 0, 1, 1, "b")}, 0.5).is_null());
-  const json one = paired_statistics({row("field", 0, 1, 1), row("raycast", 0, 1, 1)}, 0.5);
+      paired_statistics(Rows{row("field", 0, 1, 1), row("raycast", 1, 1, 1)}, 0.5).is_null());
+  // The same start number of another patient is another start.
+  EXPECT_TRUE(paired_statistics(Rows{row("field", 0, 1, 1, "a"), row("raycast", 0, 1, 1, "b")}, 0.5)
+                  .is_null());
+  const json one = paired_statistics(Rows{row("field", 0, 1, 1), row("raycast", 0, 1, 1)}, 0.5);
   EXPECT_EQ(one["pairs"], 1);
   EXPECT_FALSE(one.contains("test"));
 }
@@ -357,7 +356,7 @@ TEST(RegisteredRow, OfARegistrationThatThrowsIsAFailure) {
   EXPECT_EQ(found.stop_reason, "error");
   EXPECT_EQ(found.error, "the histogram is empty");
   EXPECT_TRUE(std::isnan(found.tre_mm));
-  EXPECT_EQ(registrations_table({found}).text(0, "success"), "0");
+  EXPECT_EQ(registrations_table(Rows{found}).text(0, "success"), "0");
 }
 
 TEST(RegisteredRow, OfAStartThatNeverMovedIsAFailureHoweverCloseItWas) {
@@ -377,11 +376,11 @@ TEST(RegisteredRow, OfAStartThatNeverMovedIsAFailureHoweverCloseItWas) {
 
 TEST(MethodComparison, OfAHandBuiltRunIsTheKnownOne) {
   const test::ScratchFolder folder;
-  std::vector<RegistrationRow> rows = {row("field", 0, 1, 0.2),
-                                       row("field", 1, 7, 0.4),
-                                       row("field", 2, 8, 9.0),
-                                       row("field", 3, 29, std::nan("")),
-                                       row("field", 4, 31, 0.3)};
+  Rows rows = {row("field", 0, 1, 0.2),
+               row("field", 1, 7, 0.4),
+               row("field", 2, 8, 9.0),
+               row("field", 3, 29, std::nan("")),
+               row("field", 4, 31, 0.3)};
   rows[0].final_deg_mm = {0.3, 0, 0, 0, 1, 0};
   rows[1].final_deg_mm = {0, 0.6, 0, 0, 2, 0};
   rows[4].final_deg_mm = {0, 0, 0, 0, 3, 0};
@@ -416,7 +415,7 @@ TEST(MethodComparison, OfAHandBuiltRunIsTheKnownOne) {
 TEST(MethodComparison, OfARunWithoutSuccessHasNoErrors) {
   const test::ScratchFolder folder;
   write_text_file(folder / "registrations.csv",
-                  registrations_table({row("field", 0, 1, 5.0)}).to_text());
+                  registrations_table(Rows{row("field", 0, 1, 5.0)}).to_text());
   const MethodRow method =
       method_rows({EvaluationRun{folder.path(), "registration", json::object()}}).front();
   EXPECT_TRUE(std::isnan(method.mean_tre_mm));
@@ -463,7 +462,7 @@ TEST(MethodComparison, StudiesHaveALineEachAndAColumnPerMethod) {
 }
 
 TEST(MethodComparison, PairsTellTheTestOfTheSummary) {
-  std::vector<RegistrationRow> rows;
+  Rows rows;
   for (const auto& [field_mm, raycast_mm] :
        std::vector<std::pair<double, double>>{{0.2, 0.1}, {0.4, 0.3}, {0.3, 5.0}}) {
     const auto start = static_cast<std::int64_t>(rows.size() / 2);

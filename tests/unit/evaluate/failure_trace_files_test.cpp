@@ -53,15 +53,15 @@ TEST(FailureTraces, OfLongSearchesKeepBothEndsAndAStatedNumberOfSteps) {
 }
 
 TEST(FailureTraces, AreKeptOfTheFirstFailuresOfAMethodOnly) {
-  std::vector<RegistrationRow> rows(2 * kMostTraces + 4);
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    rows[i].renderer = i % 2 == 0 ? "field" : "raycast";
-    rows[i].trace = {{1, 2.0, 3, 0.5, {}, 9.0}};
-  }
-  keep_first_traces(rows, "field");
-  EXPECT_EQ(rows[2 * kMostTraces - 2].trace.size(), 1u);
-  EXPECT_TRUE(rows[2 * kMostTraces].trace.empty());
-  EXPECT_EQ(rows[2 * kMostTraces + 1].trace.size(), 1u) << "of the other method";
+  FirstTraces kept;
+  const auto count = static_cast<std::int64_t>(kMostTraces);
+  for (std::int64_t start = 3 * count; start-- > 0;)  // the first come last
+    keep_if_first(start, {{1, 2.0, start, 0.5, {}, 9.0}}, kept);
+  keep_if_first(1, {}, kept);
+  keep_if_first(count, {{1, 2.0, 0, 0.5, {}, 9.0}}, kept);
+  ASSERT_EQ(kept.size(), kMostTraces);
+  EXPECT_EQ(kept.rbegin()->first, count - 1);
+  EXPECT_EQ(kept.at(1).front().poses_tried, 1);
 }
 
 TEST(FailureTraces, AreNamedAfterCaseMethodAndStart) {

@@ -140,6 +140,47 @@ TEST_F(CsvTableFile, WrittenInPartsIsTheSameFile) {
   }
 }
 
+TEST_F(CsvTableFile, IsReadInPartsLikeAsAWhole) {
+  // Files are read 64 KiB at a time: a first row one byte longer each time moves that seam over all
+  // that a row has.
+  const std::string rows = "plain,\"quoted\",\"a \"\"b\"\", c\"\r\n1,\"two\r\nlines\",\r\r\n";
+  for (std::size_t shift = 0; shift < rows.size(); ++shift) {
+    std::string text = "a,b,c\n" + std::string(shift, 'x') + ",,\n";
+    while (text.size() < (std::size_t{200} << 10)) text += rows;
+    const CsvTable whole = read(text);
+    std::size_t row = 0;
+    CsvTable::read_in_parts(path(), [&](const CsvTable& part) {
+      for (std::size_t i = 0; i < part.row_count(); ++i, ++row) {
+        ASSERT_EQ(part.where(i), whole.where(row));
+        for (const std::string& column : whole.columns())
+          ASSERT_EQ(part.text(i, column), whole.text(row, column)) << part.where(i);
+      }
+    });
+    ASSERT_EQ(row, whole.row_count());
+  }
+}
+
+TEST_F(CsvTableFile, ReadInPartsIsRefusedLikeAsAWhole) {
+  const auto refusal_in_parts = [&](const std::string& text) {
+    test::write_input(path(), text);
+    return message_of<FileError>([&] { CsvTable::read_in_parts(path(), [](const CsvTable&) {}); });
+  };
+  std::string many = "a,b\n";
+  for (int i = 0; i < 100'000; ++i) many += "1,2\n";
+  for (const std::string& text :
+       {std::string(), many + "1\n", many + "1,\"2\n", many + '\0', std::string("a,a\n")})
+    EXPECT_EQ(refusal_in_parts(text), refusal(text));
+  EXPECT_THAT(refusal_in_parts(many + "1,\"" + std::string(std::size_t{65} << 20, 'x')),
+              AllOf(HasSubstr(path() + ":100002"), HasSubstr("a row is larger than")));
+  int parts = 0;
+  test::write_input(path(), "a,b\n");
+  CsvTable::read_in_parts(path(), [&](const CsvTable& part) {
+    EXPECT_EQ(part.row_count(), 0U);
+    ++parts;
+  });
+  EXPECT_EQ(parts, 1);
+}
+
 TEST(CsvTable, RowsMustFitTheColumns) {
   CsvTable table({"a", "b"});
   EXPECT_THROW(table.add_row({"1"}), std::logic_error);
