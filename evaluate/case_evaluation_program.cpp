@@ -21,6 +21,7 @@
 #include "cli/resumable_items.h"
 #include "evaluate/method_loading.h"
 #include "evaluate/row_gathering_program.h"
+#include "evaluate/shared_measuring_program.h"
 #include "gold/target_box.h"
 #include "io/cbor_json.h"
 #include "io/output_file.h"
@@ -62,13 +63,15 @@ StartFrame start_frame(const StudyCase& study_case, const GoldStandard& gold) {
 StratifiedStarts draw_starts(const RegistrationStudyOptions& options,
                              const StudyCase& study_case,
                              const GoldStandard& gold,
-                             const std::vector<Method>& methods) {
+                             const std::vector<Method>& methods,
+                             std::span<const Eigen::Vector3d> target_points_ct_mm,
+                             const MeasureTres& measure_tres) {
   const auto admissible = [&](const RigidTransform& pose) { return is_admissible(methods, pose); };
-  const auto& draw = options.start_rule == "uniform" ? uniform_starts : stratified_starts;
-  return draw(start_frame(study_case, gold),
-              options.start_options(),
-              target_points(study_case.target_box_ct),
-              admissible);
+  const StartFrame frame = start_frame(study_case, gold);
+  const StartOptions rule = options.start_options();
+  return options.start_rule == "uniform"
+             ? uniform_starts(frame, rule, target_points_ct_mm, admissible)
+             : stratified_starts(frame, rule, target_points_ct_mm, admissible, measure_tres);
 }
 
 /// Collective. Rank 0's starts on every rank, held once per node: a rank each, ten million would
@@ -391,11 +394,13 @@ PoseTableFrames pose_table_frames(const Study& study,
 StratifiedStarts given_starts(const RegistrationStudyOptions& options,
                               const Study& study,
                               const StudyCase& study_case,
-                              const GoldStandard& gold) {
+                              const GoldStandard& gold,
+                              const MeasureTres& measure_tres) {
   return starts_at(start_frame(study_case, gold),
                    options.start_options(),
                    target_points(study_case.target_box_ct),
-                   read_starts(options.starts_from, pose_table_frames(study, study_case, gold)));
+                   read_starts(options.starts_from, pose_table_frames(study, study_case, gold)),
+                   measure_tres);
 }
 
 void set_start(const PerturbedStart& start, RegistrationRow& row) {
@@ -434,13 +439,15 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
   for (LoadedMethod& method :
        load_methods(options, study, study_case, world, evaluation.input_sha256))
     methods.push_back({method.renderer, std::move(method.runner), {}});
-  all_or_none(world, [&] {
-    evaluation.gold = gold_standard(study, study_case, options.gold);
-    if (!world.is_root()) return;
-    evaluation.starts = options.starts_from.empty()
-                            ? draw_starts(options, study_case, evaluation.gold, methods)
-                            : given_starts(options, study, study_case, evaluation.gold);
-  });
+  all_or_none(world, [&] { evaluation.gold = gold_standard(study, study_case, options.gold); });
+  const std::vector<Eigen::Vector3d> points_ct_mm = target_points(study_case.target_box_ct);
+  evaluation.starts = starts_measured_together(
+      world, evaluation.gold.room_from_ct, points_ct_mm, [&](const MeasureTres& measure_tres) {
+        return options.starts_from.empty()
+                   ? draw_starts(
+                         options, study_case, evaluation.gold, methods, points_ct_mm, measure_tres)
+                   : given_starts(options, study, study_case, evaluation.gold, measure_tres);
+      });
   evaluation.starts.starts = held_per_node(evaluation.starts.starts, world);
   evaluation.start_count = evaluation.starts.starts.size();
   all_or_none(world, [&] {

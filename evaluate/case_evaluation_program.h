@@ -43,7 +43,8 @@ PoseTableFrames pose_table_frames(const Study& study,
 StratifiedStarts given_starts(const RegistrationStudyOptions& options,
                               const Study& study,
                               const StudyCase& study_case,
-                              const GoldStandard& gold);
+                              const GoldStandard& gold,
+                              const MeasureTres& measure_tres = {});
 
 /// The start of a row.
 void set_start(const PerturbedStart& start, RegistrationRow& row);

@@ -51,6 +51,31 @@ void measure(const StartFrame& frame,
   start.interval = interval_of(start.initial_tre_mm, options);
 }
 
+/// The same of many, by `measure_tres` when that is given.
+void measure(const StartFrame& frame,
+             const StartOptions& options,
+             std::span<const Eigen::Vector3d> target_points_ct_mm,
+             const MeasureTres& measure_tres,
+             std::span<PerturbedStart> starts) {
+  constexpr std::size_t kAtOnce = 65536;
+  std::vector<RigidTransform> poses;
+  for (; !starts.empty(); starts = starts.subspan(std::min(kAtOnce, starts.size()))) {
+    const std::span<PerturbedStart> some = starts.first(std::min(kAtOnce, starts.size()));
+    if (!measure_tres) {
+      for (PerturbedStart& start : some) measure(frame, options, target_points_ct_mm, start);
+      continue;
+    }
+    poses.clear();
+    for (const PerturbedStart& start : some) poses.push_back(start.room_from_ct);
+    const std::vector<double> tres_mm = measure_tres(poses);
+    check(tres_mm.size() == some.size(), "there must be a TRE of every pose");
+    for (std::size_t i = 0; i < some.size(); ++i) {
+      some[i].initial_tre_mm = tres_mm[i];
+      some[i].interval = interval_of(tres_mm[i], options);
+    }
+  }
+}
+
 /// The same of one whose parameters are set.
 void locate(const StartFrame& frame,
             const StartOptions& options,
@@ -83,20 +108,25 @@ class Stratification {
  public:
   Stratification(const StartFrame& frame,
                  const StartOptions& options,
-                 std::span<const Eigen::Vector3d> target_points_ct_mm)
+                 std::span<const Eigen::Vector3d> target_points_ct_mm,
+                 const MeasureTres& measure_tres)
       : frame_(frame),
         options_(options),
         points_(target_points_ct_mm),
-        bounder_(target_points_ct_mm),
+        measure_tres_(measure_tres),
+        coarse_(target_points_ct_mm),
+        fine_(target_points_ct_mm, kFineCells),
         largest_magnitude_mm_(kMagnitudeOverTre * options.intervals * options.interval_width_mm) {}
 
   /// The interval of a draw. Most need no mean over all points: bounds of the TRE suffice.
   [[nodiscard]] int interval_of_draw(PerturbedStart& start) const {
     place(start);
-    const TreBounds bounds = bounder_.bounds(start.room_from_ct, frame_.gold_room_from_ct);
-    const int lowest = interval_of(bounds.low_mm, options_);
-    if (lowest >= options_.intervals || lowest == interval_of(bounds.high_mm, options_))
-      return lowest;
+    for (const TreBounder* bounder : {&coarse_, &fine_}) {
+      const TreBounds bounds = bounder->bounds(start.room_from_ct, frame_.gold_room_from_ct);
+      const int lowest = interval_of(bounds.low_mm, options_);
+      if (lowest >= options_.intervals || lowest == interval_of(bounds.high_mm, options_))
+        return lowest;
+    }
     measure(frame_, options_, points_, start);
     return start.interval;
   }
@@ -113,11 +143,12 @@ class Stratification {
       start.draw_index = candidates[i].draw_index;
       start.rank_in_interval = static_cast<int>(i);
       place(start);
-      measure(frame_, options_, points_, start);
     }
-    std::sort(starts.begin() + static_cast<std::ptrdiff_t>(first),
-              starts.end(),
-              [](const auto& a, const auto& b) { return a.draw_index < b.draw_index; });
+    const std::span<PerturbedStart> picked = std::span(starts).subspan(first);
+    measure(frame_, options_, points_, measure_tres_, picked);
+    std::sort(picked.begin(), picked.end(), [](const auto& a, const auto& b) {
+      return a.draw_index < b.draw_index;
+    });
   }
 
  private:
@@ -131,7 +162,10 @@ class Stratification {
   const StartFrame& frame_;
   const StartOptions& options_;
   std::span<const Eigen::Vector3d> points_;
-  TreBounder bounder_;
+  const MeasureTres& measure_tres_;
+  static constexpr int kFineCells = 12;
+  TreBounder coarse_;
+  TreBounder fine_;
   double largest_magnitude_mm_;
 };
 
@@ -185,9 +219,10 @@ StratifiedStarts stratified_starts(
     const StartFrame& frame,
     const StartOptions& options,
     std::span<const Eigen::Vector3d> target_points_ct_mm,
-    const std::function<bool(const RigidTransform& room_from_ct)>& is_admissible) {
+    const std::function<bool(const RigidTransform& room_from_ct)>& is_admissible,
+    const MeasureTres& measure_tres) {
   throw_if_any(problems(options));
-  const Stratification stratification(frame, options, target_points_ct_mm);
+  const Stratification stratification(frame, options, target_points_ct_mm, measure_tres);
   const std::uint64_t case_key = hash_name(frame.case_name);
   const auto wanted = static_cast<std::size_t>(options.starts_per_interval);
   std::vector<std::vector<Candidate>> by_interval(static_cast<std::size_t>(options.intervals));
@@ -262,20 +297,22 @@ StratifiedStarts uniform_starts(
 StratifiedStarts starts_at(const StartFrame& frame,
                            const StartOptions& options,
                            std::span<const Eigen::Vector3d> target_points_ct_mm,
-                           std::span<const RigidTransform> poses) {
+                           std::span<const RigidTransform> poses,
+                           const MeasureTres& measure_tres) {
   StratifiedStarts result;
-  std::map<int, int> found;
   std::vector<PerturbedStart> starts;
   starts.reserve(poses.size());
   for (const RigidTransform& pose : poses) {
-    PerturbedStart start;
+    PerturbedStart& start = starts.emplace_back();
     start.draw_index = result.draws++;
     start.parameters = parameters_from_pose(frame.pose_frame(), pose);
     start.room_from_ct = pose;
-    measure(frame, options, target_points_ct_mm, start);
+  }
+  measure(frame, options, target_points_ct_mm, measure_tres, starts);
+  std::map<int, int> found;
+  for (PerturbedStart& start : starts) {
     start.rank_in_interval = found[start.interval]++;
     if (start.interval >= options.intervals) ++result.draws_beyond;
-    starts.push_back(start);
   }
   result.starts = SharedArray<PerturbedStart>(std::move(starts));
   return result;

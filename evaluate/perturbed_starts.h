@@ -56,6 +56,11 @@ struct PerturbedStart {
   int rank_in_interval = 0;
 };
 
+/// Mean TREs of poses against the gold pose, in their order: for millions of starts the caller may
+/// share the work. Each must be what mean_tre_mm() gives.
+using MeasureTres =
+    std::function<std::vector<double>(std::span<const RigidTransform> room_from_ct)>;
+
 struct StratifiedStarts {
   SharedArray<PerturbedStart> starts;  ///< by interval, then draw index
   std::uint64_t draws = 0;
@@ -69,12 +74,14 @@ struct StratifiedStarts {
 /// The paper's rule: draws until every interval has enough, then picks at random that many in each.
 /// `is_admissible` says whether registrations may start at a pose. Throws InputError when an
 /// interval stays too empty after 1000 draws per wanted start (at least 100000): the predicate
-/// leaves too little room there. \test PerturbedStarts.FillEveryIntervalWithExactlyTheStatedCount
+/// leaves too little room there. `measure_tres`, when given, measures the starts that were picked.
+/// \test PerturbedStarts.FillEveryIntervalWithExactlyTheStatedCount
 StratifiedStarts stratified_starts(
     const StartFrame& frame,
     const StartOptions& options,
     std::span<const Eigen::Vector3d> target_points_ct_mm,
-    const std::function<bool(const RigidTransform& room_from_ct)>& is_admissible);
+    const std::function<bool(const RigidTransform& room_from_ct)>& is_admissible,
+    const MeasureTres& measure_tres = {});
 
 /// As many starts in all, with initial TREs uniform over all intervals together: start i has a TRE
 /// of its own, drawn by (seed, case name, i), and a direction that is drawn again while
@@ -87,9 +94,11 @@ StratifiedStarts uniform_starts(
     const std::function<bool(const RigidTransform& room_from_ct)>& is_admissible);
 
 /// The starts at given poses, in their order; intervals may lie beyond the last one.
+/// `measure_tres`: as for stratified_starts().
 StratifiedStarts starts_at(const StartFrame& frame,
                            const StartOptions& options,
                            std::span<const Eigen::Vector3d> target_points_ct_mm,
-                           std::span<const RigidTransform> poses);
+                           std::span<const RigidTransform> poses,
+                           const MeasureTres& measure_tres = {});
 
 }  // namespace af::evaluation

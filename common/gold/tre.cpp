@@ -21,19 +21,20 @@ double mean_tre_mm(const RigidTransform& room_from_ct,
          static_cast<double>(points_ct_mm.size());
 }
 
-TreBounder::TreBounder(std::span<const Eigen::Vector3d> points_ct_mm) {
+TreBounder::TreBounder(std::span<const Eigen::Vector3d> points_ct_mm, int cells_per_axis) {
+  check(cells_per_axis >= 1, "there must be a cell");
   if (points_ct_mm.empty()) throw InputError("target points: there must be at least one");
   Eigen::AlignedBox3d box;
   for (const Eigen::Vector3d& point : points_ct_mm) box.extend(point);
-  constexpr std::size_t kCellsPerAxis = 4;
-  const Eigen::Vector3d cell_mm = (box.sizes() / static_cast<double>(kCellsPerAxis)).cwiseMax(1e-9);
-  cells_.resize(kCellsPerAxis * kCellsPerAxis * kCellsPerAxis);
+  const auto per_axis = static_cast<std::size_t>(cells_per_axis);
+  const Eigen::Vector3d cell_mm = (box.sizes() / cells_per_axis).cwiseMax(1e-9);
+  cells_.resize(per_axis * per_axis * per_axis);
   const Eigen::Vector3d center = box.center();
   for (const Eigen::Vector3d& point : points_ct_mm) {
     const Eigen::Vector3d place = (point - box.min()).cwiseQuotient(cell_mm);
     std::size_t index = 0;
     for (const double along : {place.z(), place.y(), place.x()})
-      index = index * kCellsPerAxis + std::min(static_cast<std::size_t>(along), kCellsPerAxis - 1);
+      index = index * per_axis + std::min(static_cast<std::size_t>(along), per_axis - 1);
     Cell& cell = cells_[index];
     cell.share += 1.0;
     cell.mean_mm += point - center;

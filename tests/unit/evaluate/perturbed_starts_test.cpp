@@ -185,6 +185,37 @@ TEST(PerturbedStarts, UniformInTreHaveThatDistribution) {
             result.starts[39].parameters.deg_and_mm());
 }
 
+TEST(PerturbedStarts, MayBeMeasuredByTheCaller) {
+  const StartFrame frame = example_frame();
+  const auto points = target_points(frame.target_box_ct, 20.0);
+  const StartOptions options{3, 2.0, 40, 1};
+  std::size_t measured = 0;
+  const MeasureTres measure = [&](std::span<const RigidTransform> poses) {
+    measured += poses.size();
+    std::vector<double> tres_mm;
+    for (const RigidTransform& pose : poses)
+      tres_mm.push_back(mean_tre_mm(pose, frame.gold_room_from_ct, points));
+    return tres_mm;
+  };
+  const auto expect_equal = [](const StratifiedStarts& a, const StratifiedStarts& b) {
+    ASSERT_EQ(a.starts.size(), b.starts.size());
+    for (std::size_t i = 0; i < a.starts.size(); ++i) {
+      EXPECT_EQ(a.starts[i].initial_tre_mm, b.starts[i].initial_tre_mm);
+      EXPECT_EQ(a.starts[i].interval, b.starts[i].interval);
+      EXPECT_EQ(a.starts[i].draw_index, b.starts[i].draw_index);
+      EXPECT_EQ(a.starts[i].rank_in_interval, b.starts[i].rank_in_interval);
+    }
+  };
+  const StratifiedStarts alone = stratified_starts(frame, options, points, anything);
+  expect_equal(stratified_starts(frame, options, points, anything, measure), alone);
+  EXPECT_EQ(measured, 120U);
+  std::vector<RigidTransform> poses;
+  for (const PerturbedStart& start : alone.starts) poses.push_back(start.room_from_ct);
+  expect_equal(starts_at(frame, options, points, poses, measure),
+               starts_at(frame, options, points, poses));
+  EXPECT_EQ(measured, 240U);
+}
+
 TEST(PerturbedStarts, AtGivenPosesKeepThem) {
   const StartFrame frame = example_frame();
   const auto points = target_points(frame.target_box_ct, 20.0);

@@ -60,6 +60,7 @@ TEST(MeanTre, OfATranslationIsItsLength) {
 TEST(MeanTre, LiesWithinItsBounds) {
   const std::vector<Vector3d> points = target_points({{-10, 0, -30}, {60, 20, 15}}, 5.0);
   const TreBounder bounder(points);
+  const TreBounder finer(points, 12);
   HashRandom random(1, 2, 3);
   for (int draw = 0; draw < 1000; ++draw) {
     std::array<double, 6> deg_mm{};
@@ -74,6 +75,10 @@ TEST(MeanTre, LiesWithinItsBounds) {
     EXPECT_LE(bounds.low_mm, tre_mm);
     EXPECT_GE(bounds.high_mm, tre_mm);
     EXPECT_LT(bounds.high_mm - bounds.low_mm, 0.1 * tre_mm);
+    const TreBounds closer = finer.bounds(pose, RigidTransform::Identity());
+    EXPECT_LE(closer.low_mm, tre_mm);
+    EXPECT_GE(closer.high_mm, tre_mm);
+    EXPECT_LT(closer.high_mm - closer.low_mm, 0.02 * tre_mm);
     if (draw % 10 == 0) {
       EXPECT_LT(bounds.high_mm - bounds.low_mm, 1e-6);
     }
