@@ -56,22 +56,25 @@ bool is_admissible(const std::vector<Method>& methods, const RigidTransform& roo
   return true;
 }
 
-StartFrame start_frame(const StudyCase& study_case, const GoldStandard& gold) {
-  return {study_case.name, gold.room_from_ct, study_case.center_ct_mm, study_case.target_box_ct};
+StartFrame start_frame(const StudyCase& study_case, const Yardstick& yardstick) {
+  return {study_case.name,
+          yardstick.gold_room_from_ct,
+          study_case.center_ct_mm,
+          study_case.target_box_ct};
 }
 
 StratifiedStarts draw_starts(const RegistrationStudyOptions& options,
                              const StudyCase& study_case,
-                             const GoldStandard& gold,
+                             const Yardstick& yardstick,
                              const std::vector<Method>& methods,
-                             std::span<const Eigen::Vector3d> target_points_ct_mm,
                              const MeasureTres& measure_tres) {
   const auto admissible = [&](const RigidTransform& pose) { return is_admissible(methods, pose); };
-  const StartFrame frame = start_frame(study_case, gold);
+  const StartFrame frame = start_frame(study_case, yardstick);
+  const std::span<const Eigen::Vector3d> points_ct_mm = yardstick.points_ct_mm;
   const StartOptions rule = options.start_options();
   return options.start_rule == "uniform"
-             ? uniform_starts(frame, rule, target_points_ct_mm, admissible)
-             : stratified_starts(frame, rule, target_points_ct_mm, admissible, measure_tres);
+             ? uniform_starts(frame, rule, points_ct_mm, admissible)
+             : stratified_starts(frame, rule, points_ct_mm, admissible, measure_tres);
 }
 
 /// Collective. Rank 0's starts on every rank, held once per node: a rank each, ten million would
@@ -384,22 +387,23 @@ void draw_pictures(const RegistrationStudyOptions& options,
 
 PoseTableFrames pose_table_frames(const Study& study,
                                   const StudyCase& study_case,
-                                  const GoldStandard& gold) {
+                                  const RigidTransform& gold_room_from_ct) {
   return {study_case.name,
           study.cases.size() == 1,
-          PoseFrame::about(gold.room_from_ct, study_case.center_ct_mm),
+          PoseFrame::about(gold_room_from_ct, study_case.center_ct_mm),
           PoseFrame::about(study_case.nominal_room_from_ct, study_case.center_ct_mm)};
 }
 
 StratifiedStarts given_starts(const RegistrationStudyOptions& options,
                               const Study& study,
                               const StudyCase& study_case,
-                              const GoldStandard& gold,
+                              const Yardstick& yardstick,
                               const MeasureTres& measure_tres) {
-  return starts_at(start_frame(study_case, gold),
+  return starts_at(start_frame(study_case, yardstick),
                    options.start_options(),
-                   target_points(study_case.target_box_ct),
-                   read_starts(options.starts_from, pose_table_frames(study, study_case, gold)),
+                   yardstick.points_ct_mm,
+                   read_starts(options.starts_from,
+                               pose_table_frames(study, study_case, yardstick.gold_room_from_ct)),
                    measure_tres);
 }
 
@@ -439,14 +443,15 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
   for (LoadedMethod& method :
        load_methods(options, study, study_case, world, evaluation.input_sha256))
     methods.push_back({method.renderer, std::move(method.runner), {}});
-  all_or_none(world, [&] { evaluation.gold = gold_standard(study, study_case, options.gold); });
-  const std::vector<Eigen::Vector3d> points_ct_mm = target_points(study_case.target_box_ct);
-  evaluation.starts = starts_measured_together(
-      world, evaluation.gold.room_from_ct, points_ct_mm, [&](const MeasureTres& measure_tres) {
+  const Yardstick yardstick = all_or_none(world, [&] {
+    evaluation.gold = gold_standard(study, study_case, options.gold);
+    return yardstick_of(study, study_case, evaluation.gold);
+  });
+  evaluation.starts =
+      starts_measured_together(world, yardstick, [&](const MeasureTres& measure_tres) {
         return options.starts_from.empty()
-                   ? draw_starts(
-                         options, study_case, evaluation.gold, methods, points_ct_mm, measure_tres)
-                   : given_starts(options, study, study_case, evaluation.gold, measure_tres);
+                   ? draw_starts(options, study_case, yardstick, methods, measure_tres)
+                   : given_starts(options, study, study_case, yardstick, measure_tres);
       });
   evaluation.starts.starts = held_per_node(evaluation.starts.starts, world);
   evaluation.start_count = evaluation.starts.starts.size();
@@ -461,7 +466,6 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
     evaluation.starts.starts = {};
     return evaluation;
   }
-  const Yardstick yardstick = yardstick_of(study, study_case, evaluation.gold);
   announce_times(methods, study_case.name, evaluation.starts, world);
   phase.reset();
   for (std::size_t i = 0; i < methods.size(); ++i)

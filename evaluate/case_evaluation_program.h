@@ -37,13 +37,13 @@ struct CaseEvaluation {
 /// What poses in files of one case are relative to.
 PoseTableFrames pose_table_frames(const Study& study,
                                   const StudyCase& study_case,
-                                  const GoldStandard& gold);
+                                  const RigidTransform& gold_room_from_ct);
 
 /// The starts of --starts-from for one case.
 StratifiedStarts given_starts(const RegistrationStudyOptions& options,
                               const Study& study,
                               const StudyCase& study_case,
-                              const GoldStandard& gold,
+                              const Yardstick& yardstick,
                               const MeasureTres& measure_tres = {});
 
 /// The start of a row.

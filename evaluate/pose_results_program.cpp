@@ -49,11 +49,11 @@ CaseEvaluation evaluate_found_poses(const RegistrationStudyOptions& options,
   CaseEvaluation evaluation;
   evaluation.case_name = study_case.name;
   evaluation.gold = gold_standard(study, study_case, options.gold);
-  evaluation.starts = given_starts(options, study, study_case, evaluation.gold);
-  on_starts(evaluation);
   const Yardstick yardstick = yardstick_of(study, study_case, evaluation.gold);
-  const FoundPoses found =
-      read_found_poses(options.poses_from, pose_table_frames(study, study_case, evaluation.gold));
+  evaluation.starts = given_starts(options, study, study_case, yardstick);
+  on_starts(evaluation);
+  const FoundPoses found = read_found_poses(
+      options.poses_from, pose_table_frames(study, study_case, yardstick.gold_room_from_ct));
   evaluation.pose_problems = found.problems;
   evaluation.start_count = evaluation.starts.starts.size();
   const auto count = static_cast<std::int64_t>(evaluation.start_count);

@@ -4,10 +4,10 @@
 #include <cmath>
 #include <iomanip>
 #include <iostream>
-#include <iterator>
 #include <map>
 #include <optional>
 #include <set>
+#include <span>
 #include <sstream>
 
 #include <CLI/CLI.hpp>

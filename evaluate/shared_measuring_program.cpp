@@ -5,10 +5,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
-#include <utility>
+#include <span>
 #include <vector>
 
-#include "base/error.h"
 #include "gold/tre.h"
 
 namespace af::evaluation {
@@ -28,8 +27,7 @@ std::vector<std::byte> bytes_of(std::span<const RigidTransform> poses) {
 
 /// Collective. The TREs of rank 0's poses, on every rank.
 std::vector<double> tres_of_all(const Communicator& world,
-                                const RigidTransform& gold_room_from_ct,
-                                std::span<const Eigen::Vector3d> target_points_ct_mm,
+                                const Yardstick& yardstick,
                                 std::span<const RigidTransform> poses) {
   std::vector<std::byte> bytes = bytes_of(poses);
   world.broadcast(bytes);
@@ -41,8 +39,8 @@ std::vector<double> tres_of_all(const Communicator& world,
     std::memcpy(matrix.data(), bytes.data() + i * kMatrixBytes, kMatrixBytes);
     RigidTransform pose = RigidTransform::Identity();
     pose.affine() = matrix;
-    bits[i] =
-        std::bit_cast<std::uint64_t>(mean_tre_mm(pose, gold_room_from_ct, target_points_ct_mm));
+    bits[i] = std::bit_cast<std::uint64_t>(
+        mean_tre_mm(pose, yardstick.gold_room_from_ct, yardstick.points_ct_mm));
   }
   world.sum(bits);
   std::vector<double> tres_mm;
@@ -55,12 +53,10 @@ std::vector<double> tres_of_all(const Communicator& world,
 
 StratifiedStarts starts_measured_together(
     const Communicator& world,
-    const RigidTransform& gold_room_from_ct,
-    std::span<const Eigen::Vector3d> target_points_ct_mm,
+    const Yardstick& yardstick,
     const std::function<StratifiedStarts(const MeasureTres& measure_tres)>& make) {
-  if (target_points_ct_mm.empty()) throw InputError("target points: there must be at least one");
   const MeasureTres measure = [&](std::span<const RigidTransform> poses) {
-    return tres_of_all(world, gold_room_from_ct, target_points_ct_mm, poses);
+    return tres_of_all(world, yardstick, poses);
   };
   return all_or_none(world, [&]() -> StratifiedStarts {
     if (world.size() == 1) return make({});

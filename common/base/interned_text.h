@@ -8,7 +8,7 @@
 namespace af {
 
 /// One of few texts that are repeated millions of times, in eight bytes: equal texts are kept once,
-/// until the program ends. Trivially copyable, and empty when all its bytes are zero.
+/// all of them until the program ends. Trivially copyable, and empty when all its bytes are zero.
 /// \test InternedText.KeepsEqualTextsOnce
 class InternedText {
  public:

@@ -16,10 +16,10 @@ class CsvTable {
  public:
   explicit CsvTable(std::vector<std::string> columns) : columns_(std::move(columns)) {}
   /// FileError naming path and line when a row has the wrong number of fields, quotes are
-  /// unbalanced, a column name is repeated, or the file is empty.
+  /// unbalanced, a column name is repeated, a row has more than 64 MiB, or the file is empty.
   static CsvTable read(const std::filesystem::path& path);
   /// Tables of a few thousand rows each, in order, of a file too long to be held; at least one.
-  /// FileError as of read(), once the rows before have been received.
+  /// FileError as of read(), once the parts before have been received.
   /// \test CsvTable.IsReadInPartsLikeAsAWhole
   static void read_in_parts(const std::filesystem::path& path,
                             const std::function<void(const CsvTable& part)>& receive);

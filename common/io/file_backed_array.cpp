@@ -45,8 +45,11 @@ void FileBackedMemory::grow(std::size_t bytes) {
   if (file_ < 0) file_ = open_nameless(folder_);
   if (file_ < 0) refuse(errno);
   // A page without a place on the disk would end the program when it is written to.
-  if (const int error = posix_fallocate(file_, 0, static_cast<off_t>(bytes)); error != 0)
-    refuse(error);
+  int error = EINTR;
+  while (error == EINTR)
+    error = posix_fallocate(
+        file_, static_cast<off_t>(size_), static_cast<off_t>(bytes) - static_cast<off_t>(size_));
+  if (error != 0) refuse(error);
   void* const mapped = data_ == nullptr
                            ? mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_SHARED, file_, 0)
                            : mremap(data_, size_, bytes, MREMAP_MAYMOVE);

@@ -197,16 +197,18 @@ void StallWatch::watch() {
     if (tick - last_tick_ns > limit_ns_ / 2) watched_since_ns = tick;
     last_tick_ns = tick;
     (*my_note).ticked_ns = tick;
-    const std::string text = stall_text(watched_since_ns);
+    const std::string text = stall_text(tick, watched_since_ns);
     if (!text.empty() && claim_report()) on_stall_(text);
   }
   (*my_note).ticked_ns = 0;
 }
 
+// `now`: of the tick. Read later, it would count time for which the job was stopped in between.
+
 /// Who is stuck, the longest of them: at one thing for too long without waiting, or not running at
 /// all (stopped), wherever it was then.
-std::optional<StallWatch::Stuck> StallWatch::longest_stuck(std::int64_t watched_since_ns) const {
-  const std::int64_t now = now_ns();
+std::optional<StallWatch::Stuck> StallWatch::longest_stuck(std::int64_t now,
+                                                           std::int64_t watched_since_ns) const {
   const auto age_of = [&](std::int64_t since_ns) {
     return since_ns == 0 ? 0 : now - std::max(since_ns, watched_since_ns);
   };
@@ -226,26 +228,26 @@ std::optional<StallWatch::Stuck> StallWatch::longest_stuck(std::int64_t watched_
 }
 
 /// For how long all ranks of this host have been waiting for others; 0 when one of them works.
-std::int64_t StallWatch::all_wait_ns(std::int64_t watched_since_ns) const {
+std::int64_t StallWatch::all_wait_ns(std::int64_t now, std::int64_t watched_since_ns) const {
   std::int64_t shortest = std::numeric_limits<std::int64_t>::max();
   for (const RankNote& note : board_->notes) {
     const std::int64_t since = note.waits_since_ns;
-    shortest = std::min(shortest, since == 0 ? 0 : now_ns() - std::max(since, watched_since_ns));
+    shortest = std::min(shortest, since == 0 ? 0 : now - std::max(since, watched_since_ns));
   }
   return shortest;
 }
 
-std::string StallWatch::stall_text(std::int64_t watched_since_ns) const {
+std::string StallWatch::stall_text(std::int64_t now, std::int64_t watched_since_ns) const {
   const auto at = [](const RankNote& note) {
     const std::string what = note.what.get();
     return what.empty() ? what : ": " + what;
   };
-  if (const std::optional<Stuck> stuck = longest_stuck(watched_since_ns))
+  if (const std::optional<Stuck> stuck = longest_stuck(now, watched_since_ns))
     return "rank " + std::to_string(stuck->note->rank) + " on " + host_name() + " (process " +
            std::to_string(stuck->note->process) + ")" + at(*stuck->note) +
            (stuck->is_stopped ? ": is stopped: has not run for " : ": no progress for ") +
            minutes_text(stuck->ns);
-  const std::int64_t waited_ns = all_wait_ns(watched_since_ns);
+  const std::int64_t waited_ns = all_wait_ns(now, watched_since_ns);
   if (waited_ns <= kPatienceWithHosts * limit_ns_) return {};
   return "all ranks on " + host_name() + at(board_->notes[0]) + ": waiting for others for " +
          minutes_text(waited_ns);

@@ -65,9 +65,9 @@ std::string host_name();
 
 /// Watches the ranks of every host from a thread of each: when one makes no progress, for whatever
 /// reason (it computes for ever, hangs in the file system, is stopped), `on_stall` is called on one
-/// rank of its host with a text that names rank, host and unit. It must end the job. A process that
-/// is stopped is found by its watching thread, which does not run either: also while it waits.
-/// \test WorkWatch.NamesTheRankThatIsStuckNotThoseThatWaitForIt
+/// rank of its host with a text that names rank, host and unit. It must end the job. The others
+/// of its host find a process that is stopped, also while it waits: its watching thread stands,
+/// too. \test WorkWatch.NamesTheRankThatIsStuckNotThoseThatWaitForIt
 class StallWatch {
  public:
   using OnStall = std::function<void(const std::string& message)>;
@@ -83,9 +83,10 @@ class StallWatch {
   struct Board;
   struct Stuck;
   void watch();
-  [[nodiscard]] std::optional<Stuck> longest_stuck(std::int64_t watched_since_ns) const;
-  [[nodiscard]] std::int64_t all_wait_ns(std::int64_t watched_since_ns) const;
-  [[nodiscard]] std::string stall_text(std::int64_t watched_since_ns) const;
+  [[nodiscard]] std::optional<Stuck> longest_stuck(std::int64_t now,
+                                                   std::int64_t watched_since_ns) const;
+  [[nodiscard]] std::int64_t all_wait_ns(std::int64_t now, std::int64_t watched_since_ns) const;
+  [[nodiscard]] std::string stall_text(std::int64_t now, std::int64_t watched_since_ns) const;
 
   std::unique_ptr<Board> board_;
   std::int64_t limit_ns_;

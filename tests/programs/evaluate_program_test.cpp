@@ -698,11 +698,14 @@ TEST_F(EvaluateProgram, HasABrowserThatTellsOfErrors) {
 }
 
 TEST_F(EvaluateProgram, SaysWhenTheFieldHasNoRoomForTheStarts) {
-  const test::ProgramRun run =
-      evaluate("registration --study " + path("study.toml") + fields() +
-               "--intervals 20 --starts-per-interval 1 -o " + path("too-far"));
-  expect_refused(run, 3, "starts_per_interval = 1: not reached in every interval");
-  EXPECT_FALSE(std::filesystem::exists(path("too-far/registrations.csv")));
+  for (const int ranks : {1, 2}) {
+    const test::ProgramRun run =
+        evaluate("registration --study " + path("study.toml") + fields() +
+                     "--intervals 20 --starts-per-interval 1 -o " + path("too-far"),
+                 ranks);
+    expect_refused(run, 3, "starts_per_interval = 1: not reached in every interval");
+    EXPECT_FALSE(std::filesystem::exists(path("too-far/registrations.csv")));
+  }
 }
 
 TEST_F(EvaluateProgram, RefusesBadInputWithTheContractsCodes) {
