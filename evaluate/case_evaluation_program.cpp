@@ -215,27 +215,30 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-/// Rank 0 says how long each method will take, from a sample: one registration by fields; by ray
-/// casting, where that would be long, one similarity for each of the poses that the sample tried.
-/// A sample that fails says nothing: the run itself will tell why.
+/// Rank 0 says how long each method will take, from a sample: one row by fields; by ray casting,
+/// where that would be long, one similarity for each of the poses that the sample tried. A sample
+/// that fails says nothing: the run itself will tell why.
 void announce_times(std::vector<Method>& methods,
                     const std::string& case_name,
                     const StratifiedStarts& starts,
+                    const Yardstick& yardstick,
                     const Communicator& world) {
   // What the presets try at the median, where no field gives a sample.
   double poses_tried = 400.0;
   for (Method& method : methods) {
     if (!world.is_root() || method.start_indices.size() < 2) continue;
     const std::int64_t index = method.start_indices[method.start_indices.size() / 2];
-    const RigidTransform& start = starts.starts[static_cast<std::size_t>(index)].room_from_ct;
+    const PerturbedStart& start = starts.starts[static_cast<std::size_t>(index)];
     double seconds = 0.0;
     try {
       const auto begin = std::chrono::steady_clock::now();
       if (method.renderer == "field") {
-        poses_tried = method.runner.run(start, index).evaluations;
+        const RegistrationRow row = traced_row(method, start, index, yardstick).row;
         seconds = seconds_since(begin);
+        if (row.error != InternedText()) continue;
+        poses_tried = static_cast<double>(row.evaluations);
       } else {
-        std::ignore = method.runner.similarity_at(start);
+        std::ignore = method.runner.similarity_at(start.room_from_ct);
         seconds = poses_tried * seconds_since(begin);
       }
     } catch (const std::exception&) {
@@ -466,7 +469,7 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
     evaluation.starts.starts = {};
     return evaluation;
   }
-  announce_times(methods, study_case.name, evaluation.starts, world);
+  announce_times(methods, study_case.name, evaluation.starts, yardstick, world);
   phase.reset();
   for (std::size_t i = 0; i < methods.size(); ++i)
     register_with(methods[i], study_case.name, evaluation.starts, yardstick, rows[i].items);

@@ -23,6 +23,7 @@
 #include "evaluate/method_loading.h"
 #include "evaluate/pose_results_program.h"
 #include "evaluate/registration_statistics_files.h"
+#include "evaluate/report/number_html.h"
 #include "evaluate/summary_files.h"
 #include "io/gnuplot_figure.h"
 #include "io/json_text.h"
@@ -217,7 +218,7 @@ void print_outcome(const json& summary,
               << number_text(kSuccessTreMm) << " mm)";
     std::cout << mean_text(renderer);
     const double seconds = number_of(renderer["seconds"]["median"]);
-    if (std::isfinite(seconds)) std::cout << ", median " << fixed_text(seconds, 2) << " s each";
+    if (std::isfinite(seconds)) std::cout << ", median " << seconds_text(seconds) << " each";
     std::cout << '\n';
   }
   for (const json& warning : summary["warnings"]) cli::warn(world, warning.get<std::string>());
