@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tables: CSV as such, poses for DRRs, starts of registrations, and poses that were found.
 #include <optional>
+#include <string>
 
 #include "evaluate/start_pose_files.h"
 #include "fuzz/fuzz_input.h"
@@ -11,7 +12,14 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   using namespace af;
   const auto path = fuzz::written("poses.csv", fuzz::as_text({data, size}));
   std::optional<CsvTable> table;
-  if (!fuzz::is_accepted([&] { table = CsvTable::read(path); })) return 0;
+  std::string parts;
+  const bool is_accepted_in_parts = fuzz::is_accepted([&] {
+    CsvTable::read_in_parts(path, [&](const CsvTable& part) { parts += part.rows_text(); });
+  });
+  const bool is_accepted = fuzz::is_accepted([&] { table = CsvTable::read(path); });
+  fuzz::require(is_accepted == is_accepted_in_parts, "a table is refused in parts, or as a whole");
+  if (!is_accepted) return 0;
+  fuzz::require(parts == table->rows_text(), "a table in parts is the same table");
   const auto again = CsvTable::read(fuzz::written("again.csv", table->to_text()));
   fuzz::require(again.columns() == table->columns() && again.row_count() == table->row_count() &&
                     again.to_text() == table->to_text(),
