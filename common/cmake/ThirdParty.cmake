@@ -7,6 +7,9 @@ find_package(Eigen3 3.4 REQUIRED NO_MODULE)
 find_package(CLI11 REQUIRED)
 find_package(nlohmann_json REQUIRED)
 find_package(MPI REQUIRED COMPONENTS C)
+if(AF_BUILD_TESTS)
+  find_package(GTest REQUIRED)
+endif()
 find_package(Boost 1.74 REQUIRED) # Boost.Math, headers only
 # The C interface only: mpi.h would otherwise pull in the removed C++ bindings and their library.
 set_property(TARGET MPI::MPI_C APPEND PROPERTY INTERFACE_COMPILE_DEFINITIONS OMPI_SKIP_MPICXX MPICH_SKIP_MPICXX)

@@ -22,27 +22,27 @@ std::string text_of(const Vector& vector) {
   return out.str();
 }
 
-/// K and R of M = K R with K upper triangular with positive diagonal (RQ decomposition by QR of the
-/// reversed matrix).
+/// K and R of M = K R with K upper triangular with positive diagonal (RQ decomposition:
+/// Gram-Schmidt from the last row on; Hartley and Zisserman, Multiple View Geometry, 2nd
+/// ed., 6.2.4). M has an inverse.
 struct RqFactors {
   Eigen::Matrix3d intrinsics;
   Eigen::Matrix3d camera_from_room;
 };
 
 RqFactors rq_decomposition(const Eigen::Matrix3d& matrix) {
-  const Eigen::Matrix3d reversal =
-      Eigen::Vector3d::Ones().asDiagonal().toDenseMatrix().rowwise().reverse();
-  const Eigen::HouseholderQR<Eigen::Matrix3d> qr((reversal * matrix).transpose());
-  const Eigen::Matrix3d q = qr.householderQ();
-  const Eigen::Matrix3d upper = qr.matrixQR().triangularView<Eigen::Upper>();
-  Eigen::Matrix3d intrinsics = reversal * upper.transpose() * reversal;
-  Eigen::Matrix3d rotation = reversal * q.transpose();
-  for (int i = 0; i < 3; ++i) {
-    if (intrinsics(i, i) >= 0.0) continue;
-    intrinsics.col(i) *= -1.0;
-    rotation.row(i) *= -1.0;
-  }
-  return {intrinsics, rotation};
+  const Eigen::Vector3d z = matrix.row(2).normalized();
+  Eigen::Vector3d y = matrix.row(1).transpose() - matrix.row(1).dot(z) * z;
+  y -= y.dot(z) * z;  // what rounding left of z, should the rows be nearly parallel
+  y.normalize();
+  Eigen::Vector3d x = y.cross(z).normalized();
+  if (matrix.row(0).dot(x) < 0.0) x = -x;
+
+  RqFactors factors;
+  factors.camera_from_room << x.transpose(), y.transpose(), z.transpose();
+  factors.intrinsics =
+      (matrix * factors.camera_from_room.transpose()).triangularView<Eigen::Upper>();
+  return factors;
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 #include "geometry/rigid_transform.h"
 
 #include <cmath>
+#include <numbers>
 
 namespace af {
 
@@ -102,9 +103,25 @@ RigidTransform rigid_from_matrix(const Eigen::Matrix4d& matrix) {
   transform.translation() = matrix.topRightCorner<3, 1>();
   constexpr double kRounding = 1e-14;
   if (orthonormality_error(rotation) <= kRounding) return transform;
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(rotation, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Eigen::JacobiSVD<Eigen::Matrix3d, Eigen::NoQRPreconditioner> svd(
+      rotation, Eigen::ComputeFullU | Eigen::ComputeFullV);
   transform.linear() = svd.matrixU() * svd.matrixV().transpose();
   return transform;
+}
+
+Eigen::Matrix3d rotation_between(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+  // Eigen's FromTwoVectors has an SVD for opposite vectors, which takes 6 s to compile.
+  const Eigen::Vector3d a = from.normalized();
+  const Eigen::Vector3d b = to.normalized();
+  const double cosine = a.dot(b);
+  constexpr double kOpposite = -1.0 + 1e-12;
+  if (cosine < kOpposite)
+    return Eigen::AngleAxisd(std::numbers::pi, a.unitOrthogonal()).toRotationMatrix();
+  const double twice_w = std::sqrt((1.0 + cosine) * 2.0);
+  Eigen::Quaterniond rotation;
+  rotation.vec() = a.cross(b) * (1.0 / twice_w);
+  rotation.w() = twice_w * 0.5;
+  return rotation.toRotationMatrix();
 }
 
 double rotation_angle_between_rad(const RigidTransform& a, const RigidTransform& b) {

@@ -99,7 +99,8 @@ RigidFit fit_rigid(std::span<const Vector3d> target_points,
   for (std::size_t i = 0; i < source_points.size(); ++i)
     covariance +=
         (target_points[i] - target_center) * (source_points[i] - source_center).transpose();
-  const Eigen::JacobiSVD<Matrix3d> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Eigen::JacobiSVD<Matrix3d, Eigen::NoQRPreconditioner> svd(
+      covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
   Matrix3d handedness = Matrix3d::Identity();
   handedness(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0.0 ? -1.0 : 1.0;
 

@@ -66,7 +66,8 @@ bool are_collinear(const std::vector<Eigen::Vector3d>& points) {
     centered.col(static_cast<Eigen::Index>(i)) = points[i];
   centered.colwise() -= Eigen::Vector3d(centered.rowwise().mean());
   const Eigen::Vector3d singular_values =
-      Eigen::JacobiSVD<Eigen::Matrix3d>(centered * centered.transpose()).singularValues();
+      Eigen::JacobiSVD<Eigen::Matrix3d, Eigen::NoQRPreconditioner>(centered * centered.transpose())
+          .singularValues();
   // The second largest extent against the largest, as variances.
   constexpr double kLeastWidth = 1e-3;
   return !(singular_values[1] > kLeastWidth * kLeastWidth * singular_values[0]);

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "geometry/rigid_transform.h"
+
 namespace af {
 
 namespace {
@@ -173,7 +175,7 @@ void add_prosthesis(std::vector<Solid>& solids) {
   add(capsule_between(hip_mm, {112.0, 4.0, -12.0}, 17.0, kMuscleHu));
   Solid cup = ellipsoid(hip_mm, Vector3d::Constant(27.0), kTitaniumHu);
   cup.shape = Solid::Shape::HalfEllipsoid;
-  cup.rotation = Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), -opening).toRotationMatrix();
+  cup.rotation = rotation_between(Vector3d::UnitZ(), -opening);
   add(cup);
   Solid liner = cup;
   liner.half_sizes_mm = Vector3d::Constant(23.5);

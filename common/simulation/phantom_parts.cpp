@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "geometry/rigid_transform.h"
 #include "simulation/range_check.h"
 
 namespace af {
@@ -37,8 +38,7 @@ void add_spinous_process(const Vertebra& v, BonePainter& bone) {
   Solid blade = ellipsoid(0.5 * (root + tip),
                           {3.4, 0.5 * (tip - root).norm() + 3.0, v.has_ribs() ? 6.0 : 9.0},
                           kCorticalHu);
-  blade.rotation =
-      Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitY(), tip - root).toRotationMatrix();
+  blade.rotation = rotation_between(Vector3d::UnitY(), tip - root);
   bone.add(blade);
 }
 

@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "base/hash_random.h"
+#include "geometry/rigid_transform.h"
 #include "simulation/parallel_rows.h"
 
 namespace af {
@@ -127,9 +128,7 @@ Solid capsule_between(const Eigen::Vector3d& a,
   solid.shape = Solid::Shape::Capsule;
   solid.center_mm = 0.5 * (a + b);
   solid.half_sizes_mm = {radius_mm, radius_mm, 0.5 * (b - a).norm()};
-  if (a != b)
-    solid.rotation =
-        Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), b - a).toRotationMatrix();
+  if (a != b) solid.rotation = rotation_between(Eigen::Vector3d::UnitZ(), b - a);
   solid.hu = hu;
   return solid;
 }

@@ -25,19 +25,18 @@ af_add_test(
           unit/evaluate/failure_trace_files_test.cpp unit/evaluate/study_runs_test.cpp
   LIBS af_evaluation_program af_evaluation_report af_io_basics)
 
-add_executable(evaluate_statistics_program_tests programs/evaluate_statistics_test.cpp)
-target_link_libraries(evaluate_statistics_program_tests PRIVATE af_compile_options af_test_support GTest::gtest_main
-                                                                af_io_basics nlohmann_json::nlohmann_json)
-target_compile_definitions(evaluate_statistics_program_tests PRIVATE AF_PROGRAM_FOLDER="${PROJECT_BINARY_DIR}/bin")
-add_dependencies(evaluate_statistics_program_tests af-evaluate)
-gtest_discover_tests(evaluate_statistics_program_tests PROPERTIES LABELS programs TIMEOUT 120 DISCOVERY_TIMEOUT 60)
+af_add_program_tests(
+  evaluate_statistics_program_tests EACH_TEST
+  SOURCES programs/evaluate_statistics_test.cpp
+  LIBS af_io_basics nlohmann_json::nlohmann_json
+  PROGRAMS af-evaluate
+  TIMEOUT 120)
 
-# One CTest entry for all: the tests share a study and its fields, which take longer than they do.
-add_executable(evaluate_program_tests programs/evaluate_program_test.cpp support/launched_job.cpp)
-target_link_libraries(evaluate_program_tests PRIVATE af_compile_options af_test_support GTest::gtest_main
-                                                     af_registration_case)
-target_compile_definitions(evaluate_program_tests PRIVATE AF_PROGRAM_FOLDER="${PROJECT_BINARY_DIR}/bin"
-                                                          AF_MPIEXEC="${MPIEXEC_EXECUTABLE}")
-add_dependencies(evaluate_program_tests af-evaluate af-precompute)
-add_test(NAME evaluate_program_tests COMMAND evaluate_program_tests)
-set_tests_properties(evaluate_program_tests PROPERTIES LABELS "programs;mpi" TIMEOUT 600 PROCESSORS 2)
+af_add_program_tests(
+  evaluate_program_tests
+  SOURCES programs/evaluate_program_test.cpp support/launched_job.cpp
+  LIBS af_registration_case
+  PROGRAMS af-evaluate af-precompute
+  LABELS programs mpi
+  TIMEOUT 600
+  PROCESSORS 2)

@@ -14,3 +14,4 @@ target_compile_definitions(shear_warp_accuracy_test PRIVATE AF_DEFAULT_CT_PATH="
 # The table of precompute/README.md, one row at a time.
 add_executable(caster_accuracy physics/caster_accuracy_main.cpp physics/caster_accuracy.cpp)
 target_link_libraries(caster_accuracy PRIVATE af_compile_options af_test_support af_precompute af_io_ct af_io_basics)
+af_compile_as(quick caster_accuracy)

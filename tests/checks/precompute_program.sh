@@ -2,11 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 # Runs af-precompute as a person would: exit codes, dry run, stop and resume, the same payload on other ranks and widths.
 #
-#   precompute_program.sh AF_PRECOMPUTE MPIEXEC
+#   precompute_program.sh AF_PRECOMPUTE MPIEXEC [sanitized]
+#
+# sanitized: the program was compiled with a sanitizer, which takes memory and time of its own: what memory it takes is not
+# judged, and it runs on at most 4 ranks.
 set -euo pipefail
 
 program=$1
 mpiexec=$2
+sanitized=${3:-}
+rank_counts=(2 3 4 8)
+[[ -z $sanitized ]] || rank_counts=(2 3 4)
 export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMPI_MCA_hwloc_base_binding_policy=none
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
@@ -103,7 +109,7 @@ for sizes in '9 61' '8 64'; do
         AF_VECTOR_BITS=$bits "$program" "${options[@]}" -o bits.h5 >bits.txt 2>/dev/null
         [[ $(hash_of bits.txt) == "$expected" ]] || fail "another payload with $bits-bit vectors: ${options[*]}"
       done
-      for ranks in 2 3 4 8; do same_hash "$ranks" "$expected" "${options[@]}"; done
+      for ranks in "${rank_counts[@]}"; do same_hash "$ranks" "$expected" "${options[@]}"; done
     done
   done
 done
@@ -127,7 +133,7 @@ for overflow in read-back cast-again; do
   grep -q "the others are ${overflow%%-*}" bound.err || fail "it did not $overflow: $(cat bound.err)"
   [[ $(hash_of bound.txt) == "$(hash_of kept.txt)" ]] || fail "another payload with --overflow $overflow"
   peak=$(sed -n 's/.*peak memory \([0-9]*\)[.0-9]* MB of one rank.*/\1/p' bound.err)
-  [[ -n $peak && $peak -lt $limit ]] || fail "a rank took ${peak:-?} MB of $limit MB"
+  [[ -n $peak && ($peak -lt $limit || -n $sanitized) ]] || fail "a rank took ${peak:-?} MB of $limit MB"
 done
 
 [[ $(printf '%s\n' "${hashes[@]}" | sort -u | wc -l) == 8 ]] || fail 'sizes, casters or slabs make no difference'

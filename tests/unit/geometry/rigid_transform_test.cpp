@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -194,6 +195,26 @@ TEST(RigidFromMatrix, KeepsTheBitsOfAnExactRotation) {
     const Matrix4d matrix = random_frame(random).nominal_room_from_ct().matrix();
     EXPECT_EQ(rigid_from_matrix(matrix).matrix(), matrix);
   }
+}
+
+TEST(RotationBetween, TakesOneDirectionToTheOther) {
+  const std::vector<Eigen::Vector3d> directions = {
+      {1.0, 0.0, 0.0}, {-2.0, 0.0, 0.0}, {0.3, -4.0, 0.2}, {-0.3, 4.0, -0.2}, {1e-9, 1.0, 1e-9}};
+  for (const Eigen::Vector3d& from : directions)
+    for (const Eigen::Vector3d& to : directions) {
+      const Eigen::Matrix3d rotation = rotation_between(from, to);
+      // The cosine rounds by some 1e-16, against its distance from -1; opposite directions turn by
+      // pi.
+      const double from_opposite = 1.0 + from.normalized().dot(to.normalized());
+      const double rounding = 1e-15 + (from_opposite > 1e-12 ? 4e-16 / from_opposite : 0.0);
+      EXPECT_LT((rotation * from.normalized() - to.normalized()).norm(), rounding);
+      EXPECT_LT((rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).norm(),
+                2.0 * rounding);
+      EXPECT_GT(rotation.determinant(), 0.0);
+      // By the smallest angle: what is across both stays.
+      const Eigen::Vector3d across = from.cross(to);
+      EXPECT_LT((rotation * across - across).norm(), 1e-14 * (1.0 + across.norm()));
+    }
 }
 
 TEST(RotationAngleBetween, IsTheAngleOfTheRelativeRotation) {
