@@ -75,7 +75,7 @@ build_preset() {
   local launcher=()
   if command -v ccache >/dev/null; then
     # Precompiled headers are cached only so.
-    launcher=("-DCMAKE_CXX_COMPILER_LAUNCHER=env;CCACHE_SLOPPINESS=pch_defines,time_macros;ccache")
+    launcher=("-DCMAKE_CXX_COMPILER_LAUNCHER=env;CCACHE_SLOPPINESS=${CCACHE_SLOPPINESS:+$CCACHE_SLOPPINESS,}pch_defines,time_macros;ccache")
   fi
   if ! (cd "$af_root" && { [[ -f "$folder/build.ninja" ]] || cmake --preset "$preset" "${launcher[@]}"; } &&
     cmake --build "$folder" --parallel "$(build_job_count)" ${1+--target "$@"}) 2>&1 |

@@ -37,8 +37,8 @@ endif()
 
 # Four ways to compile. Each has the headers of other libraries that nearly all its sources include precompiled
 # (AF_PRECOMPILE_HEADERS; off in the preset dev, where a source that misses an include fails).
-#   numerics: as optimized as the build type says; under a sanitizer -O3: with -O2 what is watched of Eigen is not
-#             inlined, and loops take eight times as long
+#   numerics: as optimized as the build type says; for the address and undefined-behaviour sanitizers (Debug) -O3: with -O2
+#             what is watched of Eigen is not inlined, and loops take eight times as long
 #   quick:    what only calls numerics (options, texts, files): -O3 takes a third longer to compile
 #   programs: as quick, with CLI11, which takes its time also where it is not used
 #   tests:    as quick, with GoogleTest
@@ -69,7 +69,9 @@ if(AF_PRECOMPILE_HEADERS)
   af_precompile_headers(quick HEADERS ${headers} <nlohmann/json.hpp> LIBS Eigen3::Eigen nlohmann_json::nlohmann_json)
   af_precompile_headers(programs HEADERS ${headers} <nlohmann/json.hpp> <CLI/CLI.hpp>
                         LIBS Eigen3::Eigen nlohmann_json::nlohmann_json CLI11::CLI11)
-  af_precompile_headers(tests HEADERS ${headers} <gmock/gmock.h> <gtest/gtest.h> LIBS Eigen3::Eigen GTest::gtest)
+  if(TARGET GTest::gtest)
+    af_precompile_headers(tests HEADERS ${headers} <gmock/gmock.h> <gtest/gtest.h> LIBS Eigen3::Eigen GTest::gtest)
+  endif()
 endif()
 
 # af_compile_as(<way> <target>)

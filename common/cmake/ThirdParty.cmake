@@ -7,7 +7,7 @@ find_package(Eigen3 3.4 REQUIRED NO_MODULE)
 find_package(CLI11 REQUIRED)
 find_package(nlohmann_json REQUIRED)
 find_package(MPI REQUIRED COMPONENTS C)
-if(AF_BUILD_TESTS)
+if(AF_BUILD_TESTS AND NOT AF_BUILD_FUZZERS)
   find_package(GTest REQUIRED)
 endif()
 find_package(Boost 1.74 REQUIRED) # Boost.Math, headers only

@@ -121,6 +121,7 @@ Eigen::Matrix3d rotation_between(const Eigen::Vector3d& from, const Eigen::Vecto
   Eigen::Quaterniond rotation;
   rotation.vec() = a.cross(b) * (1.0 / twice_w);
   rotation.w() = twice_w * 0.5;
+  if (1.0 + cosine < 1e-3) rotation.normalize();  // the sum has lost digits
   return rotation.toRotationMatrix();
 }
 

@@ -66,7 +66,7 @@ RigidTransform rigid_from_matrix(const Eigen::Matrix4d& matrix);
 
 /// The rotation by the smallest angle that takes the direction of `from` to that of `to` (neither
 /// is zero; ones within 1.4e-6 rad of opposite: half a turn about an axis across). Orthonormal to
-/// some 1e-16 / (1 + cosine of the angle).
+/// 1e-11.
 Eigen::Matrix3d rotation_between(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
 
 /// Angle of the rotation a^-1 b, in rad.

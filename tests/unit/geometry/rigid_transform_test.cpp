@@ -198,22 +198,25 @@ TEST(RigidFromMatrix, KeepsTheBitsOfAnExactRotation) {
 }
 
 TEST(RotationBetween, TakesOneDirectionToTheOther) {
-  const std::vector<Eigen::Vector3d> directions = {
-      {1.0, 0.0, 0.0}, {-2.0, 0.0, 0.0}, {0.3, -4.0, 0.2}, {-0.3, 4.0, -0.2}, {1e-9, 1.0, 1e-9}};
-  for (const Eigen::Vector3d& from : directions)
-    for (const Eigen::Vector3d& to : directions) {
-      const Eigen::Matrix3d rotation = rotation_between(from, to);
-      // The cosine rounds by some 1e-16, against its distance from -1; opposite directions turn by
-      // pi.
-      const double from_opposite = 1.0 + from.normalized().dot(to.normalized());
-      const double rounding = 1e-15 + (from_opposite > 1e-12 ? 4e-16 / from_opposite : 0.0);
-      EXPECT_LT((rotation * from.normalized() - to.normalized()).norm(), rounding);
-      EXPECT_LT((rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).norm(),
-                2.0 * rounding);
+  // Also ones that are nearly, or quite, opposite.
+  std::vector<Vector3d> directions = {{1.0, 0.0, 0.0}, {-2.0, 0.0, 0.0}, {0.3, -4.0, 0.2}};
+  for (const double aside : {0.0, 1e-8, 3e-6, 1e-4, 0.03, 0.05})
+    directions.emplace_back(-0.3 + aside, 4.0, -0.2);
+  for (const Vector3d& from : directions)
+    for (const Vector3d& to : directions) {
+      const Matrix3d rotation = rotation_between(from, to);
+      // Within 1.4e-6 rad of opposite it is half a turn; further away the cosine's rounding by some
+      // 1e-16, against its distance from -1 (above 1e-3; below, the quaternion is normalized).
+      const bool is_half_turn = from.normalized().dot(to.normalized()) < -1.0 + 1e-12;
+      EXPECT_LT((rotation * from.normalized() - to.normalized()).norm(),
+                is_half_turn ? 1.5e-6 : 1e-9);
+      EXPECT_LT((rotation.transpose() * rotation - Matrix3d::Identity()).norm(), 1e-11);
       EXPECT_GT(rotation.determinant(), 0.0);
       // By the smallest angle: what is across both stays.
-      const Eigen::Vector3d across = from.cross(to);
-      EXPECT_LT((rotation * across - across).norm(), 1e-14 * (1.0 + across.norm()));
+      if (!is_half_turn) {
+        const Vector3d across = from.cross(to);
+        EXPECT_LT((rotation * across - across).norm(), 1e-9 * across.norm() + 1e-300);
+      }
     }
 }
 
