@@ -13,7 +13,7 @@ Installs missing packages, builds everything in build/release and runs all tests
 ranks. The last lines are CTest's summary; the exit code is 0 only when every test passed.
 
   --fast            without the tests labelled physics or regression (minutes)
-  --sanitize        in build/sanitize, with the address and undefined-behaviour sanitizers; takes long
+  --sanitize        in build/sanitize, with the address and undefined-behaviour sanitizers; about an hour
   --sanitize-threads  in build/sanitize-threads, with the thread sanitizer, without the physics tests; takes long
   --skip-packages   do not look for missing packages
   -- ...            passed on to ctest, for example: -- -R RayCaster
