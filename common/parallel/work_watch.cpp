@@ -98,7 +98,7 @@ std::string minutes_text(std::int64_t ns) {
 WorkNote::WorkNote(const std::string& what, Kind kind, double limit_minutes)
     : what_(what), before_(set_text(what)), kind_(kind), exceptions_(std::uncaught_exceptions()) {
   failed_unit.clear();
-  (*my_note).limit_ns = nanoseconds_of(limit_minutes);
+  limit_before_ns_ = (*my_note).limit_ns.exchange(nanoseconds_of(limit_minutes));
 }
 
 WorkNote::~WorkNote() {
@@ -107,8 +107,8 @@ WorkNote::~WorkNote() {
     failed_unit.clear();
   else if (kind_ == Kind::Unit && failed_unit.empty())
     failed_unit = what_;
-  (*my_note).limit_ns = 0;
   set_text(before_);
+  (*my_note).limit_ns = limit_before_ns_;
 }
 
 void WorkNote::change(const std::string& what) {
@@ -118,7 +118,10 @@ void WorkNote::change(const std::string& what) {
 
 void note_progress() {
   RankNote& note = *my_note;
-  if (note.since_ns != 0) note.since_ns = now_ns();
+  std::int64_t since_ns = note.since_ns;
+  // Another thread may end the work meanwhile: that must not begin again.
+  while (since_ns != 0 && !note.since_ns.compare_exchange_weak(since_ns, now_ns())) {
+  }
 }
 
 WaitNote::WaitNote() : before_((*my_note).waits_since_ns) {
@@ -126,8 +129,8 @@ WaitNote::WaitNote() : before_((*my_note).waits_since_ns) {
 }
 
 WaitNote::~WaitNote() {
+  note_progress();  // first: a rank that waits no more must not look as if it had worked since
   (*my_note).waits_since_ns = before_;
-  note_progress();
 }
 
 std::string take_failed_unit() {

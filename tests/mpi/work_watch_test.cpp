@@ -101,8 +101,12 @@ TEST(WorkWatch, NamesTheRankThatIsStuckNotThoseThatWaitForIt) {
 TEST(WorkWatch, IsSilentWhileEverybodyMakesProgress) {
   const Communicator world = Communicator::world();
   std::atomic<int> reports = 0;
+  std::string said;
   {
-    const StallWatch watch(world, kLongLimitMinutes, [&](const std::string&) { ++reports; });
+    const StallWatch watch(world, kLongLimitMinutes, [&](const std::string& message) {
+      said = message;
+      ++reports;
+    });
     const WorkNote note("many steps");
     for (int i = 0; i < kSteps; ++i) {
       std::this_thread::sleep_for(kStep);
@@ -116,7 +120,7 @@ TEST(WorkWatch, IsSilentWhileEverybodyMakesProgress) {
       }
     world.barrier();
   }
-  EXPECT_EQ(reports, 0);
+  EXPECT_EQ(reports, 0) << said;
 }
 
 TEST(WorkWatch, NamesARankThatIsStoppedAlsoWhileItWaits) {
@@ -146,6 +150,19 @@ TEST(WorkWatch, NamesARankThatIsStoppedAlsoWhileItWaits) {
   if (reports == 0) return;
   EXPECT_THAT(said,
               HasSubstr("(process " + std::to_string(stopped) + "): is stopped: has not run"));
+}
+
+TEST(WorkWatch, KeepsTheLimitOfANoteWhenOneWithinEnds) {
+  const Communicator world = Communicator::world();
+  std::atomic<int> reports = 0;
+  {
+    const StallWatch watch(world, 10.0 * kLongLimitMinutes, [&](const std::string&) { ++reports; });
+    const WorkNote note("testing", WorkNote::Kind::Phase, kLimitMinutes);
+    { const WorkNote within("a step"); }
+    std::this_thread::sleep_for(kSteps / 2 * kStep);
+    world.barrier();
+  }
+  EXPECT_EQ(sum_on_host(world.node(), static_cast<std::uint64_t>(reports)), 1u);
 }
 
 TEST(WorkWatch, SaysWhenAllRanksOfAHostWaitForOthers) {

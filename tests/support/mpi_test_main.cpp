@@ -17,14 +17,17 @@ class FailurePrinter : public testing::EmptyTestEventListener {
   explicit FailurePrinter(int rank) : rank_(rank) {}
 
  private:
+  void OnTestStart(const testing::TestInfo& test) override {
+    test_ = std::string(test.test_suite_name()) + "." + test.name();
+  }
+  // GoogleTest holds its lock here: asking it for the current test would wait for ever.
   void OnTestPartResult(const testing::TestPartResult& result) override {
     if (!result.failed()) return;
-    const testing::TestInfo* const test = testing::UnitTest::GetInstance()->current_test_info();
-    std::cout << "rank " << rank_ << ": "
-              << (test == nullptr ? "" : std::string(test->test_suite_name()) + "." + test->name())
-              << ": " << (result.file_name() == nullptr ? "" : result.file_name()) << ':'
+    std::cout << "rank " << rank_ << ": " << test_ << ": "
+              << (result.file_name() == nullptr ? "" : result.file_name()) << ':'
               << result.line_number() << ": " << result.message() << std::endl;
   }
+  std::string test_;
   int rank_;
 };
 
