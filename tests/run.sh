@@ -49,6 +49,8 @@ build_preset "$preset" "$af_root/build/$preset.log"
 say "        $(duration $((SECONDS - build_start)))"
 
 export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
+# Jobs of Open MPI 4.1 side by side share this folder; one that ends removes it, when it is empty, under one that starts.
+(umask 077 && mkdir -p "${TMPDIR:-/tmp}/ompi.$(hostname).$(id -u)/keep")
 if [[ "$preset" == sanitize ]]; then
   export LSAN_OPTIONS="suppressions=$af_root/tests/support/lsan.supp:print_suppressions=0"
   export ASAN_OPTIONS="fast_unwind_on_malloc=0" UBSAN_OPTIONS="print_stacktrace=1"

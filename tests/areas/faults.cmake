@@ -6,7 +6,7 @@ af_add_program_tests(
   LIBS af_registration_case
   PROGRAMS af-evaluate af-precompute af-inspect
   LABELS programs mpi
-  TIMEOUT 600
+  TIMEOUT 1800
   PROCESSORS 2)
 
 af_add_program_tests(
@@ -15,5 +15,5 @@ af_add_program_tests(
   LIBS af_registration_case
   PROGRAMS af-precompute af-inspect
   LABELS programs mpi
-  TIMEOUT 600
+  TIMEOUT 1800
   PROCESSORS 2)

@@ -29,7 +29,7 @@ using testing::ContainsRegex;
 using testing::HasSubstr;
 using testing::Not;
 
-constexpr std::chrono::seconds kEndsWithin{60};
+constexpr std::chrono::seconds kEndsWithin{300};
 constexpr int kRanks = 3;
 
 class Faults : public testing::Test {
@@ -116,7 +116,10 @@ TEST_F(Faults, TimeThatIsOverStopsTheJobByItself) {
 TEST_F(Faults, ASecondJobIsRefusedAndToldOfTheFirst) {
   test::LaunchedJob first(precompute(2), output());
   ASSERT_TRUE(first.wait_until([] { return unit_bytes() > 0; }));
+  // Or it may have ended before the second looks.
+  for (const pid_t rank : first.ranks()) kill(rank, SIGSTOP);
   const test::ProgramRun second = test::run_command(words(precompute(1)));
+  for (const pid_t rank : first.ranks()) kill(rank, SIGCONT);
   EXPECT_EQ(second.exit_code, 3) << second.output;
   EXPECT_THAT(second.output,
               AllOf(HasSubstr("another job writes it: process "), HasSubstr(", since 20")));
@@ -125,8 +128,10 @@ TEST_F(Faults, ASecondJobIsRefusedAndToldOfTheFirst) {
 }
 
 TEST_F(Faults, AStoppedRankIsNamedAndTheJobEnded) {
-  test::LaunchedJob job(precompute(kRanks, {"--stall-minutes", "0.05"}), output());
-  ASSERT_TRUE(job.wait_until([] { return unit_bytes() > 0; }));
+  // On a busy machine a collective write may well take some seconds.
+  test::LaunchedJob job(precompute(kRanks, {"--stall-minutes", "0.15"}), output());
+  ASSERT_TRUE(job.wait_until([] { return unit_bytes() > 0; })) << said();
+  ASSERT_FALSE(job.ranks().empty());
   kill(job.ranks().back(), SIGSTOP);
   EXPECT_EQ(job.wait(kEndsWithin), 75) << said();
   EXPECT_THAT(said(), ContainsRegex("rank [0-9] on .*: (no progress|is stopped: has not run) for"));
@@ -149,7 +154,8 @@ TEST_F(Faults, AFullDiskWhileTheFieldIsWrittenEndsTheJobAtOnce) {
   // Ranks within a collective write of which one fails would wait for ever.
   for (const int ranks : {1, kRanks}) {
     test::LaunchedJob job(precompute(ranks, {"--no-checkpoint"}), output());
-    ASSERT_TRUE(job.wait_until([] { return fs::exists(field().string() + ".partial"); }));
+    // Said after casting: training still follows.
+    ASSERT_TRUE(job.wait_until([] { return said().find("tiles: ") != std::string::npos; }));
     limit_files(job.ranks(), 800'000);  // more than the codebook has
     EXPECT_EQ(job.wait(kEndsWithin), 4) << said();
     EXPECT_THAT(said(),

@@ -79,7 +79,7 @@ bool LaunchedJob::has_ended() {
 }
 
 bool LaunchedJob::wait_until(const std::function<bool()>& condition) {
-  const auto deadline = Clock::now() + std::chrono::minutes(1);
+  const auto deadline = Clock::now() + std::chrono::minutes(5);
   while (!condition()) {
     if (has_ended() || Clock::now() > deadline) return false;
     std::this_thread::sleep_for(kPoll);

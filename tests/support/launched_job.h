@@ -25,7 +25,7 @@ class LaunchedJob {
   [[nodiscard]] std::vector<pid_t> ranks() const;
   [[nodiscard]] bool has_ended();
 
-  /// Polls `condition` every millisecond; false when the job ended first, or after a minute.
+  /// Polls `condition` every millisecond; false when the job ended first, or after five minutes.
   bool wait_until(const std::function<bool()>& condition);
 
   /// Exit code of the launcher (128 + signal when it was killed), once it and all its ranks are
