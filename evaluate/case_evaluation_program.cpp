@@ -56,25 +56,24 @@ bool is_admissible(const std::vector<Method>& methods, const RigidTransform& roo
   return true;
 }
 
-StartFrame start_frame(const StudyCase& study_case, const Yardstick& yardstick) {
-  return {study_case.name,
-          yardstick.gold_room_from_ct,
-          study_case.center_ct_mm,
-          study_case.target_box_ct};
-}
-
-StratifiedStarts draw_starts(const RegistrationStudyOptions& options,
+/// Collective. Draws or reads a case's starts: on rank 0, the others share the work.
+StratifiedStarts make_starts(const RegistrationStudyOptions& options,
+                             const Study& study,
                              const StudyCase& study_case,
                              const Yardstick& yardstick,
                              const std::vector<Method>& methods,
-                             const MeasureTres& measure_tres) {
-  const auto admissible = [&](const RigidTransform& pose) { return is_admissible(methods, pose); };
-  const StartFrame frame = start_frame(study_case, yardstick);
-  const std::span<const Eigen::Vector3d> points_ct_mm = yardstick.points_ct_mm;
-  const StartOptions rule = options.start_options();
-  return options.start_rule == "uniform"
-             ? uniform_starts(frame, rule, points_ct_mm, admissible)
-             : stratified_starts(frame, rule, points_ct_mm, admissible, measure_tres);
+                             const Communicator& world) {
+  SharedStartMeasures measures(
+      world,
+      start_frame(study_case, yardstick),
+      options.start_options(),
+      yardstick.points_ct_mm,
+      [&](const RigidTransform& pose) { return is_admissible(methods, pose); });
+  return starts_measured_together(world, measures, [&](StartMeasures& shared) {
+    if (!options.starts_from.empty())
+      return given_starts(options, study, study_case, yardstick, shared);
+    return options.start_rule == "uniform" ? uniform_starts(shared) : stratified_starts(shared);
+  });
 }
 
 /// Collective. Rank 0's starts on every rank, held once per node: a rank each, ten million would
@@ -388,6 +387,13 @@ void draw_pictures(const RegistrationStudyOptions& options,
 
 }  // namespace
 
+StartFrame start_frame(const StudyCase& study_case, const Yardstick& yardstick) {
+  return {study_case.name,
+          yardstick.gold_room_from_ct,
+          study_case.center_ct_mm,
+          study_case.target_box_ct};
+}
+
 PoseTableFrames pose_table_frames(const Study& study,
                                   const StudyCase& study_case,
                                   const RigidTransform& gold_room_from_ct) {
@@ -401,13 +407,10 @@ StratifiedStarts given_starts(const RegistrationStudyOptions& options,
                               const Study& study,
                               const StudyCase& study_case,
                               const Yardstick& yardstick,
-                              const MeasureTres& measure_tres) {
-  return starts_at(start_frame(study_case, yardstick),
-                   options.start_options(),
-                   yardstick.points_ct_mm,
+                              StartMeasures& measures) {
+  return starts_at(measures,
                    read_starts(options.starts_from,
-                               pose_table_frames(study, study_case, yardstick.gold_room_from_ct)),
-                   measure_tres);
+                               pose_table_frames(study, study_case, yardstick.gold_room_from_ct)));
 }
 
 void set_start(const PerturbedStart& start, RegistrationRow& row) {
@@ -450,12 +453,7 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
     evaluation.gold = gold_standard(study, study_case, options.gold);
     return yardstick_of(study, study_case, evaluation.gold);
   });
-  evaluation.starts =
-      starts_measured_together(world, yardstick, [&](const MeasureTres& measure_tres) {
-        return options.starts_from.empty()
-                   ? draw_starts(options, study_case, yardstick, methods, measure_tres)
-                   : given_starts(options, study, study_case, yardstick, measure_tres);
-      });
+  evaluation.starts = make_starts(options, study, study_case, yardstick, methods, world);
   evaluation.starts.starts = held_per_node(evaluation.starts.starts, world);
   evaluation.start_count = evaluation.starts.starts.size();
   all_or_none(world, [&] {

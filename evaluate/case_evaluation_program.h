@@ -39,12 +39,15 @@ PoseTableFrames pose_table_frames(const Study& study,
                                   const StudyCase& study_case,
                                   const RigidTransform& gold_room_from_ct);
 
+/// What the starts of a case are relative to.
+StartFrame start_frame(const StudyCase& study_case, const Yardstick& yardstick);
+
 /// The starts of --starts-from for one case.
 StratifiedStarts given_starts(const RegistrationStudyOptions& options,
                               const Study& study,
                               const StudyCase& study_case,
                               const Yardstick& yardstick,
-                              const MeasureTres& measure_tres = {});
+                              StartMeasures& measures);
 
 /// The start of a row.
 void set_start(const PerturbedStart& start, RegistrationRow& row);

@@ -5,11 +5,11 @@
 #include <cmath>
 #include <cstddef>
 #include <map>
+#include <utility>
 
 #include "base/error.h"
 #include "base/hash_random.h"
 #include "gold/target_box.h"
-#include "gold/tre.h"
 
 namespace af::evaluation {
 namespace {
@@ -36,138 +36,53 @@ struct Candidate {
   std::uint64_t draw_index = 0;
 };
 
-int interval_of(double initial_tre_mm, const StartOptions& options) {
-  constexpr double kFarthestInterval = 1e9;
-  return static_cast<int>(std::min(initial_tre_mm / options.interval_width_mm, kFarthestInterval));
+/// Calls `function` with parts of [0, count), in order.
+template <typename Function>
+void in_parts(std::uint64_t count, const Function& function) {
+  constexpr std::uint64_t kAtOnce = 65536;
+  for (std::uint64_t first = 0; first < count; first += kAtOnce)
+    function(IndexRange{first, std::min(kAtOnce, count - first)});
 }
 
-/// TRE and interval of a start whose pose is set.
-void measure(const StartFrame& frame,
-             const StartOptions& options,
-             std::span<const Eigen::Vector3d> target_points_ct_mm,
-             PerturbedStart& start) {
-  start.initial_tre_mm =
-      mean_tre_mm(start.room_from_ct, frame.gold_room_from_ct, target_points_ct_mm);
-  start.interval = interval_of(start.initial_tre_mm, options);
-}
-
-/// The same of many, by `measure_tres` when that is given.
-void measure(const StartFrame& frame,
-             const StartOptions& options,
-             std::span<const Eigen::Vector3d> target_points_ct_mm,
-             const MeasureTres& measure_tres,
-             std::span<PerturbedStart> starts) {
-  constexpr std::size_t kAtOnce = 65536;
+/// TREs and intervals of starts whose poses are set.
+void measure(StartMeasures& measures, std::span<PerturbedStart> starts) {
   std::vector<RigidTransform> poses;
-  for (; !starts.empty(); starts = starts.subspan(std::min(kAtOnce, starts.size()))) {
-    const std::span<PerturbedStart> some = starts.first(std::min(kAtOnce, starts.size()));
-    if (!measure_tres) {
-      for (PerturbedStart& start : some) measure(frame, options, target_points_ct_mm, start);
-      continue;
-    }
+  in_parts(starts.size(), [&](const IndexRange& part) {
+    const std::span<PerturbedStart> some = starts.subspan(part.first, part.count);
     poses.clear();
     for (const PerturbedStart& start : some) poses.push_back(start.room_from_ct);
-    const std::vector<double> tres_mm = measure_tres(poses);
+    const std::vector<double> tres_mm = measures.tres_mm(poses);
     check(tres_mm.size() == some.size(), "there must be a TRE of every pose");
     for (std::size_t i = 0; i < some.size(); ++i) {
       some[i].initial_tre_mm = tres_mm[i];
-      some[i].interval = interval_of(tres_mm[i], options);
+      some[i].interval = measures.interval_of(tres_mm[i]);
     }
-  }
+  });
 }
 
-/// The same of one whose parameters are set.
-void locate(const StartFrame& frame,
-            const StartOptions& options,
-            std::span<const Eigen::Vector3d> target_points_ct_mm,
-            PerturbedStart& start) {
-  start.room_from_ct = pose_from_parameters(frame.pose_frame(), start.parameters);
-  measure(frame, options, target_points_ct_mm, start);
+/// Picks as many as wanted at random and appends them by draw index.
+void pick(StartMeasures& measures,
+          std::vector<Candidate> candidates,
+          std::vector<PerturbedStart>& starts) {
+  std::sort(candidates.begin(), candidates.end(), [](const auto& a, const auto& b) {
+    return a.order < b.order;
+  });
+  candidates.resize(static_cast<std::size_t>(measures.options().starts_per_interval));
+  const PoseFrame pose_frame = measures.frame().pose_frame();
+  const std::size_t first = starts.size();
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    PerturbedStart& start = starts.emplace_back();
+    start.draw_index = candidates[i].draw_index;
+    start.rank_in_interval = static_cast<int>(i);
+    start.parameters = measures.stratified_draw(start.draw_index);
+    start.room_from_ct = pose_from_parameters(pose_frame, start.parameters);
+  }
+  const std::span<PerturbedStart> picked = std::span(starts).subspan(first);
+  measure(measures, picked);
+  std::sort(picked.begin(), picked.end(), [](const auto& a, const auto& b) {
+    return a.draw_index < b.draw_index;
+  });
 }
-
-/// Scales the parameters until the initial TRE is `tre_mm`. TRE is a mean of distances that grow
-/// with the scale almost in proportion, so each step gains some digits.
-void scale_to_tre(const StartFrame& frame,
-                  const StartOptions& options,
-                  std::span<const Eigen::Vector3d> target_points_ct_mm,
-                  double tre_mm,
-                  PerturbedStart& start) {
-  constexpr double kToleranceMm = 1e-9;
-  constexpr int kMostSteps = 50;
-  for (int step = 0; step < kMostSteps; ++step) {
-    locate(frame, options, target_points_ct_mm, start);
-    if (std::abs(start.initial_tre_mm - tre_mm) < kToleranceMm) return;
-    const double factor = tre_mm / start.initial_tre_mm;
-    start.parameters.rotation_rad *= factor;
-    start.parameters.translation_mm *= factor;
-  }
-}
-
-/// Draws of one case by stratified_starts().
-class Stratification {
- public:
-  Stratification(const StartFrame& frame,
-                 const StartOptions& options,
-                 std::span<const Eigen::Vector3d> target_points_ct_mm,
-                 const MeasureTres& measure_tres)
-      : frame_(frame),
-        options_(options),
-        points_(target_points_ct_mm),
-        measure_tres_(measure_tres),
-        coarse_(target_points_ct_mm),
-        fine_(target_points_ct_mm, kFineCells),
-        largest_magnitude_mm_(kMagnitudeOverTre * options.intervals * options.interval_width_mm) {}
-
-  /// The interval of a draw. Most need no mean over all points: bounds of the TRE suffice.
-  [[nodiscard]] int interval_of_draw(PerturbedStart& start) const {
-    place(start);
-    for (const TreBounder* bounder : {&coarse_, &fine_}) {
-      const TreBounds bounds = bounder->bounds(start.room_from_ct, frame_.gold_room_from_ct);
-      const int lowest = interval_of(bounds.low_mm, options_);
-      if (lowest >= options_.intervals || lowest == interval_of(bounds.high_mm, options_))
-        return lowest;
-    }
-    measure(frame_, options_, points_, start);
-    return start.interval;
-  }
-
-  /// Picks as many as wanted at random and appends them by draw index.
-  void pick(std::vector<Candidate> candidates, std::vector<PerturbedStart>& starts) const {
-    std::sort(candidates.begin(), candidates.end(), [](const auto& a, const auto& b) {
-      return a.order < b.order;
-    });
-    candidates.resize(static_cast<std::size_t>(options_.starts_per_interval));
-    const std::size_t first = starts.size();
-    for (std::size_t i = 0; i < candidates.size(); ++i) {
-      PerturbedStart& start = starts.emplace_back();
-      start.draw_index = candidates[i].draw_index;
-      start.rank_in_interval = static_cast<int>(i);
-      place(start);
-    }
-    const std::span<PerturbedStart> picked = std::span(starts).subspan(first);
-    measure(frame_, options_, points_, measure_tres_, picked);
-    std::sort(picked.begin(), picked.end(), [](const auto& a, const auto& b) {
-      return a.draw_index < b.draw_index;
-    });
-  }
-
- private:
-  /// Parameters and pose of a start whose draw index is set.
-  void place(PerturbedStart& start) const {
-    start.parameters =
-        draw_perturbation(frame_, largest_magnitude_mm_, options_.seed, start.draw_index);
-    start.room_from_ct = pose_from_parameters(frame_.pose_frame(), start.parameters);
-  }
-
-  const StartFrame& frame_;
-  const StartOptions& options_;
-  std::span<const Eigen::Vector3d> points_;
-  const MeasureTres& measure_tres_;
-  static constexpr int kFineCells = 12;
-  TreBounder coarse_;
-  TreBounder fine_;
-  double largest_magnitude_mm_;
-};
 
 [[noreturn]] void throw_too_empty(const std::vector<std::vector<Candidate>>& by_interval,
                                   const StartOptions& options,
@@ -215,104 +130,192 @@ PoseParameters draw_perturbation(const StartFrame& frame,
   return parameters;
 }
 
-StratifiedStarts stratified_starts(
-    const StartFrame& frame,
-    const StartOptions& options,
-    std::span<const Eigen::Vector3d> target_points_ct_mm,
-    const std::function<bool(const RigidTransform& room_from_ct)>& is_admissible,
-    const MeasureTres& measure_tres) {
+StartMeasures::StartMeasures(StartFrame frame,
+                             const StartOptions& options,
+                             std::span<const Eigen::Vector3d> target_points_ct_mm,
+                             IsAdmissible is_admissible)
+    : frame_(std::move(frame)),
+      options_(options),
+      points_ct_mm_(target_points_ct_mm),
+      is_admissible_(std::move(is_admissible)) {
   throw_if_any(problems(options));
-  const Stratification stratification(frame, options, target_points_ct_mm, measure_tres);
-  const std::uint64_t case_key = hash_name(frame.case_name);
+}
+
+int StartMeasures::interval_of(double initial_tre_mm) const {
+  constexpr double kFarthestInterval = 1e9;
+  return static_cast<int>(std::min(initial_tre_mm / options_.interval_width_mm, kFarthestInterval));
+}
+
+PoseParameters StartMeasures::stratified_draw(std::uint64_t draw_index) const {
+  return draw_perturbation(frame_, kMagnitudeOverTre * largest_tre_mm(), options_.seed, draw_index);
+}
+
+/// Most need no mean over all points: bounds of the TRE suffice.
+int StartMeasures::interval_of_draw(const RigidTransform& room_from_ct) const {
+  for (const TreBounder& bounder : bounders_) {
+    const TreBounds bounds = bounder.bounds(room_from_ct, frame_.gold_room_from_ct);
+    const int lowest = interval_of(bounds.low_mm);
+    if (lowest >= options_.intervals || lowest == interval_of(bounds.high_mm)) return lowest;
+  }
+  return interval_of(mean_tre_mm(room_from_ct, frame_.gold_room_from_ct, points_ct_mm_));
+}
+
+std::vector<DrawVerdict> StartMeasures::judge_draws(IndexRange draws) {
+  constexpr int kCoarseCells = 4;
+  constexpr int kFineCells = 12;
+  if (bounders_.empty())
+    for (const int cells : {kCoarseCells, kFineCells}) bounders_.emplace_back(points_ct_mm_, cells);
+  const PoseFrame pose_frame = frame_.pose_frame();
+  std::vector<DrawVerdict> verdicts(draws.count);
+  for (std::uint64_t i = 0; i < draws.count; ++i) {
+    const RigidTransform pose = pose_from_parameters(pose_frame, stratified_draw(draws.first + i));
+    DrawVerdict& verdict = verdicts[i];
+    verdict.interval = interval_of_draw(pose);
+    verdict.is_admissible = verdict.interval >= options_.intervals || is_admissible_(pose);
+  }
+  return verdicts;
+}
+
+std::vector<double> StartMeasures::tres_mm(std::span<const RigidTransform> room_from_ct) {
+  std::vector<double> tres_mm;
+  tres_mm.reserve(room_from_ct.size());
+  for (const RigidTransform& pose : room_from_ct)
+    tres_mm.push_back(mean_tre_mm(pose, frame_.gold_room_from_ct, points_ct_mm_));
+  return tres_mm;
+}
+
+/// Scales the parameters until the initial TRE is `tre_mm`; returns what it is then. TRE is a mean
+/// of distances that grow with the scale almost in proportion, so each step gains some digits.
+double StartMeasures::scale_to_tre(double tre_mm, PoseParameters& parameters) const {
+  constexpr double kToleranceMm = 1e-9;
+  constexpr int kMostSteps = 50;
+  const PoseFrame pose_frame = frame_.pose_frame();
+  double found_mm = 0.0;
+  for (int step = 0; step < kMostSteps; ++step) {
+    found_mm = mean_tre_mm(
+        pose_from_parameters(pose_frame, parameters), frame_.gold_room_from_ct, points_ct_mm_);
+    if (std::abs(found_mm - tre_mm) < kToleranceMm) break;
+    const double factor = tre_mm / found_mm;
+    parameters.rotation_rad *= factor;
+    parameters.translation_mm *= factor;
+  }
+  return found_mm;
+}
+
+UniformStart StartMeasures::draw_uniform(std::uint64_t index) const {
+  HashRandom random(options_.seed, hash64(kTreStream, hash_name(frame_.case_name)), index);
+  const double tre_mm = random.uniform(0.0, largest_tre_mm());
+  const PoseFrame pose_frame = frame_.pose_frame();
+  UniformStart start;
+  for (; start.refused < kMostUniformDraws; ++start.refused) {
+    start.parameters = draw_perturbation(
+        frame_, largest_tre_mm(), options_.seed, index * kMostUniformDraws + start.refused);
+    start.initial_tre_mm = scale_to_tre(tre_mm, start.parameters);
+    if (is_admissible_(pose_from_parameters(pose_frame, start.parameters))) break;
+  }
+  return start;
+}
+
+std::vector<UniformStart> StartMeasures::draw_uniform(IndexRange starts) {
+  std::vector<UniformStart> drawn;
+  drawn.reserve(starts.count);
+  for (std::uint64_t i = 0; i < starts.count; ++i) drawn.push_back(draw_uniform(starts.first + i));
+  return drawn;
+}
+
+StratifiedStarts stratified_starts(StartMeasures& measures) {
+  const StartOptions& options = measures.options();
+  const std::uint64_t case_key = hash_name(measures.frame().case_name);
   const auto wanted = static_cast<std::size_t>(options.starts_per_interval);
   std::vector<std::vector<Candidate>> by_interval(static_cast<std::size_t>(options.intervals));
   StratifiedStarts result;
   result.inadmissible_per_interval.resize(by_interval.size());
   std::size_t full_intervals = 0;
+  // A few of those that will be needed: the last ones may be judged in vain.
+  const std::uint64_t at_once =
+      std::clamp<std::uint64_t>(by_interval.size() * wanted / 8, 8, 65536);
+  std::vector<DrawVerdict> verdicts;
+  std::size_t judged = 0;
   while (full_intervals < by_interval.size()) {
     if (result.draws == most_draws(options)) throw_too_empty(by_interval, options, result);
-    PerturbedStart start;
-    start.draw_index = result.draws++;
-    const auto interval = static_cast<std::size_t>(stratification.interval_of_draw(start));
+    if (judged == verdicts.size()) {
+      verdicts = measures.judge_draws({result.draws, at_once});
+      judged = 0;
+    }
+    const DrawVerdict& verdict = verdicts[judged++];
+    const std::uint64_t draw_index = result.draws++;
+    const auto interval = static_cast<std::size_t>(verdict.interval);
     if (interval >= by_interval.size()) {
       ++result.draws_beyond;
-    } else if (!is_admissible(start.room_from_ct)) {
+    } else if (!verdict.is_admissible) {
       ++result.inadmissible_draws;
       ++result.inadmissible_per_interval[interval];
     } else {
       by_interval[interval].push_back(
-          {hash64(options.seed, kPickStream, case_key, start.draw_index), start.draw_index});
+          {hash64(options.seed, kPickStream, case_key, draw_index), draw_index});
       if (by_interval[interval].size() == wanted) ++full_intervals;
     }
   }
   std::vector<PerturbedStart> starts;
   starts.reserve(by_interval.size() * wanted);
   for (std::vector<Candidate>& candidates : by_interval)
-    stratification.pick(std::move(candidates), starts);
+    pick(measures, std::move(candidates), starts);
   result.starts = SharedArray<PerturbedStart>(std::move(starts));
   return result;
 }
 
-StratifiedStarts uniform_starts(
-    const StartFrame& frame,
-    const StartOptions& options,
-    std::span<const Eigen::Vector3d> target_points_ct_mm,
-    const std::function<bool(const RigidTransform& room_from_ct)>& is_admissible) {
-  throw_if_any(problems(options));
-  constexpr std::uint64_t kMostAttempts = 1000;
+StratifiedStarts uniform_starts(StartMeasures& measures) {
+  const StartOptions& options = measures.options();
+  const PoseFrame pose_frame = measures.frame().pose_frame();
   const auto count = static_cast<std::uint64_t>(options.intervals) *
                      static_cast<std::uint64_t>(options.starts_per_interval);
-  const double largest_tre_mm = options.intervals * options.interval_width_mm;
   StratifiedStarts result;
   result.inadmissible_per_interval.resize(static_cast<std::size_t>(options.intervals));
   std::vector<int> found(static_cast<std::size_t>(options.intervals));
   std::vector<PerturbedStart> starts;
   starts.reserve(count);
-  for (std::uint64_t index = 0; index < count; ++index) {
-    HashRandom random(options.seed, hash64(kTreStream, hash_name(frame.case_name)), index);
-    const double tre_mm = random.uniform(0.0, largest_tre_mm);
-    PerturbedStart start;
-    for (std::uint64_t attempt = 0;; ++attempt) {
-      if (attempt == kMostAttempts)
-        throw InputError("starts",
-                         std::to_string(tre_mm) + " mm",
-                         "every one of 1000 draws of this initial TRE lies outside the motion "
-                         "range: use fewer intervals or fields of a larger range");
-      start.draw_index = index * kMostAttempts + attempt;
-      start.parameters = draw_perturbation(frame, largest_tre_mm, options.seed, start.draw_index);
-      scale_to_tre(frame, options, target_points_ct_mm, tre_mm, start);
-      start.interval = std::min(start.interval, options.intervals - 1);
-      ++result.draws;
-      if (is_admissible(start.room_from_ct)) break;
-      ++result.inadmissible_draws;
-      ++result.inadmissible_per_interval[static_cast<std::size_t>(start.interval)];
-    }
-    start.rank_in_interval = found[static_cast<std::size_t>(start.interval)]++;
-    starts.push_back(start);
-  }
+  const auto add = [&](const UniformStart& drawn, std::uint64_t index) {
+    if (drawn.refused == StartMeasures::kMostUniformDraws)
+      throw InputError("starts",
+                       std::to_string(drawn.initial_tre_mm) + " mm",
+                       "every one of 1000 draws of this initial TRE lies outside the motion "
+                       "range: use fewer intervals or fields of a larger range");
+    PerturbedStart& start = starts.emplace_back();
+    start.draw_index = index * StartMeasures::kMostUniformDraws + drawn.refused;
+    start.parameters = drawn.parameters;
+    start.room_from_ct = pose_from_parameters(pose_frame, drawn.parameters);
+    start.initial_tre_mm = drawn.initial_tre_mm;
+    start.interval = std::min(measures.interval_of(drawn.initial_tre_mm), options.intervals - 1);
+    const auto interval = static_cast<std::size_t>(start.interval);
+    start.rank_in_interval = found[interval]++;
+    result.draws += drawn.refused + 1;
+    result.inadmissible_draws += drawn.refused;
+    result.inadmissible_per_interval[interval] += drawn.refused;
+  };
+  in_parts(count, [&](const IndexRange& part) {
+    const std::vector<UniformStart> drawn = measures.draw_uniform(part);
+    for (std::uint64_t i = 0; i < part.count; ++i) add(drawn[i], part.first + i);
+  });
   result.starts = SharedArray<PerturbedStart>(std::move(starts));
   return result;
 }
 
-StratifiedStarts starts_at(const StartFrame& frame,
-                           const StartOptions& options,
-                           std::span<const Eigen::Vector3d> target_points_ct_mm,
-                           std::span<const RigidTransform> poses,
-                           const MeasureTres& measure_tres) {
+StratifiedStarts starts_at(StartMeasures& measures, std::span<const RigidTransform> poses) {
+  const PoseFrame pose_frame = measures.frame().pose_frame();
   StratifiedStarts result;
   std::vector<PerturbedStart> starts;
   starts.reserve(poses.size());
   for (const RigidTransform& pose : poses) {
     PerturbedStart& start = starts.emplace_back();
     start.draw_index = result.draws++;
-    start.parameters = parameters_from_pose(frame.pose_frame(), pose);
+    start.parameters = parameters_from_pose(pose_frame, pose);
     start.room_from_ct = pose;
   }
-  measure(frame, options, target_points_ct_mm, measure_tres, starts);
+  measure(measures, starts);
   std::map<int, int> found;
   for (PerturbedStart& start : starts) {
     start.rank_in_interval = found[start.interval]++;
-    if (start.interval >= options.intervals) ++result.draws_beyond;
+    if (start.interval >= measures.options().intervals) ++result.draws_beyond;
   }
   result.starts = SharedArray<PerturbedStart>(std::move(starts));
   return result;

@@ -10,6 +10,7 @@
 #include "base/shared_array.h"
 #include "geometry/rigid_transform.h"
 #include "geometry/slab_sizing.h"
+#include "gold/tre.h"
 
 namespace af::evaluation {
 
@@ -56,10 +57,72 @@ struct PerturbedStart {
   int rank_in_interval = 0;
 };
 
-/// Mean TREs of poses against the gold pose, in their order: for millions of starts the caller may
-/// share the work. Each must be what mean_tre_mm() gives.
-using MeasureTres =
-    std::function<std::vector<double>(std::span<const RigidTransform> room_from_ct)>;
+/// Whether a registration may start at a pose.
+using IsAdmissible = std::function<bool(const RigidTransform& room_from_ct)>;
+
+/// Numbers first, first + 1 ... first + count - 1.
+struct IndexRange {
+  std::uint64_t first = 0;
+  std::uint64_t count = 0;
+};
+
+/// Where a draw of stratified_starts() falls.
+struct DrawVerdict {
+  int interval = 0;           ///< the number of intervals or more: beyond the last
+  bool is_admissible = true;  ///< beyond the last: not asked
+};
+
+/// A start of uniform_starts().
+struct UniformStart {
+  PoseParameters parameters;
+  double initial_tre_mm = 0.0;
+  std::uint64_t refused = 0;  ///< draws before it that were not admissible
+};
+
+/// What is computed of every draw or pose by itself, which takes nearly all of the time: for
+/// millions of starts a derived class shares it out and gives the same numbers.
+class StartMeasures {
+ public:
+  /// The points must outlive it. Throws InputError for options that are not valid.
+  StartMeasures(StartFrame frame,
+                const StartOptions& options,
+                std::span<const Eigen::Vector3d> target_points_ct_mm,
+                IsAdmissible is_admissible);
+  virtual ~StartMeasures() = default;
+  StartMeasures(const StartMeasures&) = delete;
+  StartMeasures& operator=(const StartMeasures&) = delete;
+
+  [[nodiscard]] const StartFrame& frame() const { return frame_; }
+  [[nodiscard]] const StartOptions& options() const { return options_; }
+  [[nodiscard]] double largest_tre_mm() const {
+    return options_.intervals * options_.interval_width_mm;
+  }
+
+  /// From 0.
+  [[nodiscard]] int interval_of(double initial_tre_mm) const;
+  /// Draw `draw_index` of stratified_starts().
+  [[nodiscard]] PoseParameters stratified_draw(std::uint64_t draw_index) const;
+
+  /// In order.
+  virtual std::vector<DrawVerdict> judge_draws(IndexRange draws);
+  /// Mean TREs against the gold pose, in the order of the poses.
+  virtual std::vector<double> tres_mm(std::span<const RigidTransform> room_from_ct);
+  /// In order.
+  virtual std::vector<UniformStart> draw_uniform(IndexRange starts);
+
+  static constexpr std::uint64_t kMostUniformDraws = 1000;  ///< of one start
+
+ private:
+  [[nodiscard]] int interval_of_draw(const RigidTransform& room_from_ct) const;
+  [[nodiscard]] UniformStart draw_uniform(std::uint64_t index) const;
+  [[nodiscard]] double scale_to_tre(double tre_mm, PoseParameters& parameters) const;
+
+  StartFrame frame_;
+  StartOptions options_;
+  std::span<const Eigen::Vector3d> points_ct_mm_;
+  IsAdmissible is_admissible_;
+  std::vector<TreBounder> bounders_;  ///< coarse to fine; made by the first draw
+};
 
 struct StratifiedStarts {
   SharedArray<PerturbedStart> starts;  ///< by interval, then draw index
@@ -72,33 +135,18 @@ struct StratifiedStarts {
 };
 
 /// The paper's rule: draws until every interval has enough, then picks at random that many in each.
-/// `is_admissible` says whether registrations may start at a pose. Throws InputError when an
-/// interval stays too empty after 1000 draws per wanted start (at least 100000): the predicate
-/// leaves too little room there. `measure_tres`, when given, measures the starts that were picked.
+/// Throws InputError when an interval stays too empty after 1000 draws per wanted start (at least
+/// 100000): what is admissible leaves too little room there.
 /// \test PerturbedStarts.FillEveryIntervalWithExactlyTheStatedCount
-StratifiedStarts stratified_starts(
-    const StartFrame& frame,
-    const StartOptions& options,
-    std::span<const Eigen::Vector3d> target_points_ct_mm,
-    const std::function<bool(const RigidTransform& room_from_ct)>& is_admissible,
-    const MeasureTres& measure_tres = {});
+StratifiedStarts stratified_starts(StartMeasures& measures);
 
 /// As many starts in all, with initial TREs uniform over all intervals together: start i has a TRE
-/// of its own, drawn by (seed, case name, i), and a direction that is drawn again while
-/// `is_admissible` refuses it, so that the distribution stays uniform. Throws InputError after 1000
-/// refusals of one start. \test PerturbedStarts.UniformInTreHaveThatDistribution
-StratifiedStarts uniform_starts(
-    const StartFrame& frame,
-    const StartOptions& options,
-    std::span<const Eigen::Vector3d> target_points_ct_mm,
-    const std::function<bool(const RigidTransform& room_from_ct)>& is_admissible);
+/// of its own, drawn by (seed, case name, i), and a direction that is drawn again while it is not
+/// admissible, so that the distribution stays uniform. Throws InputError after 1000 refusals of one
+/// start. \test PerturbedStarts.UniformInTreHaveThatDistribution
+StratifiedStarts uniform_starts(StartMeasures& measures);
 
 /// The starts at given poses, in their order; intervals may lie beyond the last one.
-/// `measure_tres`: as for stratified_starts().
-StratifiedStarts starts_at(const StartFrame& frame,
-                           const StartOptions& options,
-                           std::span<const Eigen::Vector3d> target_points_ct_mm,
-                           std::span<const RigidTransform> poses,
-                           const MeasureTres& measure_tres = {});
+StratifiedStarts starts_at(StartMeasures& measures, std::span<const RigidTransform> poses);
 
 }  // namespace af::evaluation

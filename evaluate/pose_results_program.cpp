@@ -50,7 +50,11 @@ CaseEvaluation evaluate_found_poses(const RegistrationStudyOptions& options,
   evaluation.case_name = study_case.name;
   evaluation.gold = gold_standard(study, study_case, options.gold);
   const Yardstick yardstick = yardstick_of(study, study_case, evaluation.gold);
-  evaluation.starts = given_starts(options, study, study_case, yardstick);
+  StartMeasures measures(start_frame(study_case, yardstick),
+                         options.start_options(),
+                         yardstick.points_ct_mm,
+                         [](const RigidTransform&) { return true; });
+  evaluation.starts = given_starts(options, study, study_case, yardstick, measures);
   on_starts(evaluation);
   const FoundPoses found = read_found_poses(
       options.poses_from, pose_table_frames(study, study_case, yardstick.gold_room_from_ct));

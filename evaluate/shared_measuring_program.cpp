@@ -2,13 +2,12 @@
 #include "evaluate/shared_measuring_program.h"
 
 #include <bit>
-#include <cstddef>
 #include <cstdint>
 #include <cstring>
 #include <span>
-#include <vector>
+#include <utility>
 
-#include "gold/tre.h"
+#include "base/error.h"
 
 namespace af::evaluation {
 namespace {
@@ -16,62 +15,183 @@ namespace {
 using Matrix = Eigen::Matrix<double, 3, 4>;
 constexpr std::size_t kMatrixBytes = sizeof(double) * Matrix::SizeAtCompileTime;
 
-std::vector<std::byte> bytes_of(std::span<const RigidTransform> poses) {
-  std::vector<std::byte> bytes(poses.size() * kMatrixBytes);
-  for (std::size_t i = 0; i < poses.size(); ++i) {
-    const Matrix matrix = poses[i].affine();
-    std::memcpy(bytes.data() + i * kMatrixBytes, matrix.data(), kMatrixBytes);
-  }
-  return bytes;
+// Answers travel as words of 64 bits of which one rank's alone are not zero: their sums over the
+// ranks keep every bit.
+
+std::uint64_t word_of(const DrawVerdict& verdict) {
+  return static_cast<std::uint64_t>(verdict.interval) << 1 |
+         static_cast<std::uint64_t>(verdict.is_admissible);
 }
 
-/// Collective. The TREs of rank 0's poses, on every rank.
-std::vector<double> tres_of_all(const Communicator& world,
-                                const Yardstick& yardstick,
-                                std::span<const RigidTransform> poses) {
-  std::vector<std::byte> bytes = bytes_of(poses);
-  world.broadcast(bytes);
-  // Of every sum one term alone is not zero: the bits are kept.
-  std::vector<std::uint64_t> bits(bytes.size() / kMatrixBytes);
-  for (auto i = static_cast<std::size_t>(world.rank()); i < bits.size();
-       i += static_cast<std::size_t>(world.size())) {
-    Matrix matrix;
-    std::memcpy(matrix.data(), bytes.data() + i * kMatrixBytes, kMatrixBytes);
-    RigidTransform pose = RigidTransform::Identity();
-    pose.affine() = matrix;
-    bits[i] = std::bit_cast<std::uint64_t>(
-        mean_tre_mm(pose, yardstick.gold_room_from_ct, yardstick.points_ct_mm));
+DrawVerdict verdict_of(std::uint64_t word) {
+  return {static_cast<int>(word >> 1), (word & 1) != 0};
+}
+
+constexpr std::size_t kUniformWords = 8;
+using UniformWords = std::array<std::uint64_t, kUniformWords>;
+
+UniformWords words_of(const UniformStart& start) {
+  UniformWords words{};
+  for (int i = 0; i < 3; ++i) {
+    words[static_cast<std::size_t>(i)] =
+        std::bit_cast<std::uint64_t>(start.parameters.rotation_rad[i]);
+    words[static_cast<std::size_t>(i + 3)] =
+        std::bit_cast<std::uint64_t>(start.parameters.translation_mm[i]);
   }
-  world.sum(bits);
-  std::vector<double> tres_mm;
-  tres_mm.reserve(bits.size());
-  for (const std::uint64_t value : bits) tres_mm.push_back(std::bit_cast<double>(value));
-  return tres_mm;
+  words[6] = std::bit_cast<std::uint64_t>(start.initial_tre_mm);
+  words[7] = start.refused;
+  return words;
+}
+
+UniformStart uniform_start_of(std::span<const std::uint64_t> words) {
+  UniformStart start;
+  for (int i = 0; i < 3; ++i) {
+    start.parameters.rotation_rad[i] = std::bit_cast<double>(words[static_cast<std::size_t>(i)]);
+    start.parameters.translation_mm[i] =
+        std::bit_cast<double>(words[static_cast<std::size_t>(i + 3)]);
+  }
+  start.initial_tre_mm = std::bit_cast<double>(words[6]);
+  start.refused = words[7];
+  return start;
+}
+
+std::vector<RigidTransform> poses_of(std::span<const std::byte> bytes, IndexRange part) {
+  std::vector<RigidTransform> poses(part.count, RigidTransform::Identity());
+  for (std::uint64_t i = 0; i < part.count; ++i) {
+    Matrix matrix;
+    std::memcpy(matrix.data(), bytes.data() + (part.first + i) * kMatrixBytes, kMatrixBytes);
+    poses[i].affine() = matrix;
+  }
+  return poses;
 }
 
 }  // namespace
 
+SharedStartMeasures::SharedStartMeasures(const Communicator& world,
+                                         StartFrame frame,
+                                         const StartOptions& options,
+                                         std::span<const Eigen::Vector3d> target_points_ct_mm,
+                                         IsAdmissible is_admissible)
+    : StartMeasures(std::move(frame), options, target_points_ct_mm, std::move(is_admissible)),
+      world_(world) {}
+
+std::vector<DrawVerdict> SharedStartMeasures::judge_draws(IndexRange draws) {
+  std::vector<DrawVerdict> verdicts;
+  verdicts.reserve(draws.count);
+  for (const std::uint64_t word : ask(Task::JudgeDraws, draws))
+    verdicts.push_back(verdict_of(word));
+  return verdicts;
+}
+
+std::vector<double> SharedStartMeasures::tres_mm(std::span<const RigidTransform> room_from_ct) {
+  std::vector<double> tres_mm;
+  tres_mm.reserve(room_from_ct.size());
+  for (const std::uint64_t word : ask(Task::Tres, {0, room_from_ct.size()}, room_from_ct))
+    tres_mm.push_back(std::bit_cast<double>(word));
+  return tres_mm;
+}
+
+std::vector<UniformStart> SharedStartMeasures::draw_uniform(IndexRange starts) {
+  const Words words = ask(Task::DrawUniform, starts);
+  std::vector<UniformStart> drawn;
+  drawn.reserve(starts.count);
+  for (std::uint64_t i = 0; i < starts.count; ++i)
+    drawn.push_back(uniform_start_of(std::span(words).subspan(i * kUniformWords, kUniformWords)));
+  return drawn;
+}
+
+void SharedStartMeasures::serve() {
+  while (!is_over_) answer({});
+}
+
+void SharedStartMeasures::end() {
+  if (!is_over_) ask(Task::End, {});
+}
+
+SharedStartMeasures::Words SharedStartMeasures::ask(Task task,
+                                                    IndexRange items,
+                                                    std::span<const RigidTransform> poses) {
+  const Question question{task, items};
+  std::vector<std::byte> bytes(sizeof(question) + poses.size() * kMatrixBytes);
+  std::memcpy(bytes.data(), &question, sizeof(question));
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const Matrix matrix = poses[i].affine();
+    std::memcpy(bytes.data() + sizeof(question) + i * kMatrixBytes, matrix.data(), kMatrixBytes);
+  }
+  return answer(std::move(bytes));
+}
+
+/// Collective. Rank 0's question, answered together: a word of every item, or kUniformWords.
+SharedStartMeasures::Words SharedStartMeasures::answer(std::vector<std::byte> bytes) {
+  world_.broadcast(bytes);
+  Question question;
+  std::memcpy(&question, bytes.data(), sizeof(question));
+  if (question.task == Task::End) {
+    is_over_ = true;
+    return {};
+  }
+  const std::size_t per_item = question.task == Task::DrawUniform ? kUniformWords : 1;
+  const std::uint64_t count = question.items.count;
+  Words words(count * per_item);
+  const auto rank = static_cast<std::uint64_t>(world_.rank());
+  const auto ranks = static_cast<std::uint64_t>(world_.size());
+  const std::uint64_t first = count * rank / ranks;
+  const IndexRange part{first, count * (rank + 1) / ranks - first};
+  try {
+    all_or_none(world_, [&] {
+      add_part(question,
+               part,
+               std::span(bytes).subspan(sizeof(question)),
+               std::span(words).subspan(part.first * per_item, part.count * per_item));
+    });
+  } catch (...) {
+    is_over_ = true;  // on every rank
+    throw;
+  }
+  world_.sum(words);
+  return words;
+}
+
+/// Items [part.first, part.first + part.count) of those that were asked for.
+void SharedStartMeasures::add_part(const Question& question,
+                                   IndexRange part,
+                                   std::span<const std::byte> poses,
+                                   std::span<std::uint64_t> words) {
+  const IndexRange items{question.items.first + part.first, part.count};
+  std::size_t next = 0;
+  switch (question.task) {
+    case Task::End:
+      return;
+    case Task::JudgeDraws:
+      for (const DrawVerdict& verdict : StartMeasures::judge_draws(items))
+        words[next++] = word_of(verdict);
+      return;
+    case Task::Tres:
+      for (const double tre_mm : StartMeasures::tres_mm(poses_of(poses, part)))
+        words[next++] = std::bit_cast<std::uint64_t>(tre_mm);
+      return;
+    case Task::DrawUniform:
+      for (const UniformStart& start : StartMeasures::draw_uniform(items))
+        for (const std::uint64_t word : words_of(start)) words[next++] = word;
+      return;
+  }
+}
+
 StratifiedStarts starts_measured_together(
     const Communicator& world,
-    const Yardstick& yardstick,
-    const std::function<StratifiedStarts(const MeasureTres& measure_tres)>& make) {
-  const MeasureTres measure = [&](std::span<const RigidTransform> poses) {
-    return tres_of_all(world, yardstick, poses);
-  };
+    SharedStartMeasures& measures,
+    const std::function<StratifiedStarts(StartMeasures& measures)>& make) {
   return all_or_none(world, [&]() -> StratifiedStarts {
-    if (world.size() == 1) return make({});
     if (!world.is_root()) {
-      while (!measure({}).empty()) continue;
+      measures.serve();
       return {};
     }
-    // No poses: the others need not wait for more.
-    const auto end = [&] { static_cast<void>(measure({})); };
     try {
-      StratifiedStarts starts = make(measure);
-      end();
+      StratifiedStarts starts = make(measures);
+      measures.end();
       return starts;
     } catch (...) {
-      end();
+      measures.end();
       throw;
     }
   });

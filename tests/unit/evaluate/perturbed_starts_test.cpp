@@ -32,7 +32,9 @@ bool anything(const RigidTransform&) {
 }
 
 StratifiedStarts draw(const StartFrame& frame, const StartOptions& options) {
-  return stratified_starts(frame, options, target_points(frame.target_box_ct), anything);
+  const auto points = target_points(frame.target_box_ct);
+  StartMeasures measures(frame, options, points, anything);
+  return stratified_starts(measures);
 }
 
 TEST(PerturbedStarts, FillEveryIntervalWithExactlyTheStatedCount) {
@@ -131,16 +133,26 @@ TEST(PerturbedStarts, CountDrawsThatThePredicateRefuses) {
   const StartFrame frame = example_frame();
   StartOptions options;
   options.starts_per_interval = 5;
-  std::uint64_t refused = 0;
   const auto limited = [&](const RigidTransform& pose) {
-    const bool fits =
-        parameters_from_pose(frame.pose_frame(), pose).rotation_rad.cwiseAbs().maxCoeff() <
-        6.0 * kRadPerDeg;
-    refused += fits ? 0 : 1;
-    return fits;
+    return parameters_from_pose(frame.pose_frame(), pose).rotation_rad.cwiseAbs().maxCoeff() <
+           6.0 * kRadPerDeg;
   };
-  const StratifiedStarts result =
-      stratified_starts(frame, options, target_points(frame.target_box_ct), limited);
+  const auto points = target_points(frame.target_box_ct);
+  StartMeasures measures(frame, options, points, limited);
+  const StratifiedStarts result = stratified_starts(measures);
+  // The same draws, one by one.
+  std::uint64_t refused = 0;
+  std::uint64_t beyond = 0;
+  for (std::uint64_t index = 0; index < result.draws; ++index) {
+    const RigidTransform pose =
+        pose_from_parameters(frame.pose_frame(), measures.stratified_draw(index));
+    const bool is_beyond = mean_tre_mm(pose, frame.gold_room_from_ct, points) >= 16.0;
+    if (is_beyond)
+      ++beyond;
+    else if (!limited(pose))
+      ++refused;
+  }
+  EXPECT_EQ(result.draws_beyond, beyond);
   EXPECT_EQ(result.starts.size(), 40u);
   EXPECT_EQ(result.inadmissible_draws, refused);
   EXPECT_GT(refused, 0u);
@@ -164,7 +176,8 @@ TEST(PerturbedStarts, UniformInTreHaveThatDistribution) {
   const auto admissible = [&](const RigidTransform& pose) {
     return parameters_from_pose(frame.pose_frame(), pose).translation_mm.x() < 5.0;
   };
-  const StratifiedStarts result = uniform_starts(frame, options, points, admissible);
+  StartMeasures measures(frame, options, points, admissible);
+  const StratifiedStarts result = uniform_starts(measures);
   ASSERT_EQ(result.starts.size(), 400u);
   EXPECT_EQ(result.draws, 400u + result.inadmissible_draws);
   EXPECT_GT(result.inadmissible_draws, 0u);
@@ -181,49 +194,34 @@ TEST(PerturbedStarts, UniformInTreHaveThatDistribution) {
   EXPECT_NEAR(sum / 400, 8.0, 5 * 16 / std::sqrt(12.0 * 400));
   // A shorter study is the beginning of a longer one.
   options.starts_per_interval = 5;
-  EXPECT_EQ(uniform_starts(frame, options, points, admissible).starts[39].parameters.deg_and_mm(),
+  StartMeasures fewer(frame, options, points, admissible);
+  EXPECT_EQ(uniform_starts(fewer).starts[39].parameters.deg_and_mm(),
             result.starts[39].parameters.deg_and_mm());
 }
 
-TEST(PerturbedStarts, MayBeMeasuredByTheCaller) {
+TEST(PerturbedStarts, UniformSayWhichTreHasNoAdmissibleStart) {
   const StartFrame frame = example_frame();
-  const auto points = target_points(frame.target_box_ct, 20.0);
-  const StartOptions options{3, 2.0, 40, 1};
-  std::size_t measured = 0;
-  const MeasureTres measure = [&](std::span<const RigidTransform> poses) {
-    measured += poses.size();
-    std::vector<double> tres_mm;
-    for (const RigidTransform& pose : poses)
-      tres_mm.push_back(mean_tre_mm(pose, frame.gold_room_from_ct, points));
-    return tres_mm;
-  };
-  const auto expect_equal = [](const StratifiedStarts& a, const StratifiedStarts& b) {
-    ASSERT_EQ(a.starts.size(), b.starts.size());
-    for (std::size_t i = 0; i < a.starts.size(); ++i) {
-      EXPECT_EQ(a.starts[i].initial_tre_mm, b.starts[i].initial_tre_mm);
-      EXPECT_EQ(a.starts[i].interval, b.starts[i].interval);
-      EXPECT_EQ(a.starts[i].draw_index, b.starts[i].draw_index);
-      EXPECT_EQ(a.starts[i].rank_in_interval, b.starts[i].rank_in_interval);
-    }
-  };
-  const StratifiedStarts alone = stratified_starts(frame, options, points, anything);
-  expect_equal(stratified_starts(frame, options, points, anything, measure), alone);
-  EXPECT_EQ(measured, 120U);
-  std::vector<RigidTransform> poses;
-  for (const PerturbedStart& start : alone.starts) poses.push_back(start.room_from_ct);
-  expect_equal(starts_at(frame, options, points, poses, measure),
-               starts_at(frame, options, points, poses));
-  EXPECT_EQ(measured, 240U);
+  const auto points = target_points(frame.target_box_ct, 30.0);
+  StartMeasures measures(
+      frame, StartOptions{2, 2.0, 3, 1}, points, [](const RigidTransform&) { return false; });
+  try {
+    uniform_starts(measures);
+    FAIL() << "found starts where none is admissible";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("starts"));
+    EXPECT_THAT(error.what(), testing::HasSubstr("every one of 1000 draws"));
+  }
 }
 
 TEST(PerturbedStarts, AtGivenPosesKeepThem) {
   const StartFrame frame = example_frame();
   const auto points = target_points(frame.target_box_ct, 20.0);
-  const SharedArray<PerturbedStart> drawn =
-      stratified_starts(frame, StartOptions{8, 2.0, 1, 1}, points, anything).starts;
+  StartMeasures of_drawn(frame, StartOptions{8, 2.0, 1, 1}, points, anything);
+  const SharedArray<PerturbedStart> drawn = stratified_starts(of_drawn).starts;
   std::vector<RigidTransform> poses;
   for (const PerturbedStart& start : drawn) poses.push_back(start.room_from_ct);
-  const StratifiedStarts result = starts_at(frame, StartOptions{4, 2.0, 1, 1}, points, poses);
+  StartMeasures measures(frame, StartOptions{4, 2.0, 1, 1}, points, anything);
+  const StratifiedStarts result = starts_at(measures, poses);
   ASSERT_EQ(result.starts.size(), 8u);
   EXPECT_EQ(result.draws_beyond, 4u);
   for (std::size_t i = 0; i < 8; ++i) {
@@ -240,9 +238,11 @@ TEST(PerturbedStarts, SayWhichIntervalsStayEmpty) {
   const auto close_only = [&](const RigidTransform& pose) {
     return parameters_from_pose(frame.pose_frame(), pose).translation_mm.norm() < 0.01;
   };
+  // A coarse grid: this test draws 100000 times.
+  const auto points = target_points(frame.target_box_ct, 30.0);
+  StartMeasures measures(frame, options, points, close_only);
   try {
-    // A coarse grid: this test draws 100000 times.
-    stratified_starts(frame, options, target_points(frame.target_box_ct, 30.0), close_only);
+    stratified_starts(measures);
     FAIL() << "filled intervals that cannot be filled";
   } catch (const InputError& error) {
     EXPECT_THAT(error.what(), testing::HasSubstr("starts_per_interval"));
