@@ -37,14 +37,14 @@ endif()
 
 # Four ways to compile. Each has the headers of other libraries that nearly all its sources include precompiled
 # (AF_PRECOMPILE_HEADERS; off in the preset dev, where a source that misses an include fails).
-#   numerics: as optimized as the build type says; for the address and undefined-behaviour sanitizers (Debug) -O3: with -O2
-#             what is watched of Eigen is not inlined, and loops take eight times as long
+#   numerics: as optimized as the build type says; with sanitizers -O3: with -O2 what is watched of Eigen is not inlined, and
+#             loops take eight times as long
 #   quick:    what only calls numerics (options, texts, files): -O3 takes a third longer to compile
 #   programs: as quick, with CLI11, which takes its time also where it is not used
 #   tests:    as quick, with GoogleTest
 set(af_options_numerics "")
 if(AF_SANITIZE)
-  set(af_options_numerics $<$<CONFIG:Debug>:-O3>)
+  set(af_options_numerics -O3)
 endif()
 foreach(way quick programs tests)
   set(af_options_${way} $<$<CONFIG:Release>:-O1>)
