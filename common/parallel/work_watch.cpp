@@ -96,9 +96,17 @@ std::string minutes_text(std::int64_t ns) {
 }  // namespace
 
 WorkNote::WorkNote(const std::string& what, Kind kind, double limit_minutes)
-    : what_(what), before_(set_text(what)), kind_(kind), exceptions_(std::uncaught_exceptions()) {
+    : what_(what),
+      kind_(kind),
+      exceptions_(std::uncaught_exceptions()),
+      limit_before_ns_((*my_note).limit_ns),
+      limit_is_of_outer_(limit_before_ns_ != 0 && limit_minutes == 0.0) {
   failed_unit.clear();
-  limit_before_ns_ = (*my_note).limit_ns.exchange(nanoseconds_of(limit_minutes));
+  before_ = set_text(what);
+  if (limit_is_of_outer_)
+    set_text(before_ + ": " + what);
+  else
+    (*my_note).limit_ns = nanoseconds_of(limit_minutes);
 }
 
 WorkNote::~WorkNote() {
@@ -113,7 +121,7 @@ WorkNote::~WorkNote() {
 
 void WorkNote::change(const std::string& what) {
   what_ = what;
-  set_text(what);
+  set_text(limit_is_of_outer_ ? before_ + ": " + what : what);
 }
 
 void note_progress() {

@@ -21,8 +21,8 @@ class WorkNote {
  public:
   enum class Kind { Phase, Unit };
 
-  /// `limit_minutes`: of the watchdog for this note, when it is less than the watchdog's own. Notes
-  /// within have their own limits.
+  /// `limit_minutes`: of the watchdog for this note, when it is less than the watchdog's own. A
+  /// note within without one shares it and is named after this.
   explicit WorkNote(const std::string& what, Kind kind = Kind::Unit, double limit_minutes = 0.0);
   ~WorkNote();
   WorkNote(const WorkNote&) = delete;
@@ -36,7 +36,8 @@ class WorkNote {
   std::string before_;
   Kind kind_;
   int exceptions_;
-  std::int64_t limit_before_ns_ = 0;
+  std::int64_t limit_before_ns_;
+  bool limit_is_of_outer_;
 };
 
 /// A unit that takes long has come a step further.

@@ -188,18 +188,22 @@ TEST(WorkWatch, NamesARankThatIsStoppedAlsoWhileItWaits) {
               HasSubstr("(process " + std::to_string(stopped) + "): is stopped: has not run"));
 }
 
-TEST(WorkWatch, KeepsTheLimitOfANoteWhenOneWithinEnds) {
+TEST(WorkWatch, KeepsTheLimitOfANoteBesideAndWithinOthers) {
   const Communicator world = Communicator::world();
   Reports reports(world);
   {
     constexpr double kTooLongMinutes = 60.0;
     const StallWatch watch(world, kTooLongMinutes, reports.add());
     const WorkNote note("testing", WorkNote::Kind::Phase, kLimitMinutes);
-    { const WorkNote within("a step"); }
+    { const WorkNote over("a step"); }
+    const WorkNote within("another step");
     reports.wait_for_one();
     world.barrier();
   }
   EXPECT_EQ(reports.of_host(), 1);
+  if (!reports.said().empty()) {
+    EXPECT_THAT(reports.said(), HasSubstr(": testing: another step: no progress for"));
+  }
 }
 
 TEST(WorkWatch, SaysWhenAllRanksOfAHostWaitForOthers) {
