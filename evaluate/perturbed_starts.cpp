@@ -147,7 +147,10 @@ int StartMeasures::interval_of(double initial_tre_mm) const {
 }
 
 PoseParameters StartMeasures::stratified_draw(std::uint64_t draw_index) const {
-  return draw_perturbation(frame_, kMagnitudeOverTre * largest_tre_mm(), options_.seed, draw_index);
+  return draw_perturbation(frame_,
+                           kMagnitudeOverTre * options_.intervals * options_.interval_width_mm,
+                           options_.seed,
+                           draw_index);
 }
 
 /// Most need no mean over all points: bounds of the TRE suffice.
@@ -207,9 +210,9 @@ UniformStart StartMeasures::draw_uniform(std::uint64_t index) const {
   const double tre_mm = random.uniform(0.0, largest_tre_mm());
   const PoseFrame pose_frame = frame_.pose_frame();
   UniformStart start;
-  for (; start.refused < kMostUniformDraws; ++start.refused) {
+  for (; start.refused < UniformStart::kMostDraws; ++start.refused) {
     start.parameters = draw_perturbation(
-        frame_, largest_tre_mm(), options_.seed, index * kMostUniformDraws + start.refused);
+        frame_, largest_tre_mm(), options_.seed, index * UniformStart::kMostDraws + start.refused);
     start.initial_tre_mm = scale_to_tre(tre_mm, start.parameters);
     if (is_admissible_(pose_from_parameters(pose_frame, start.parameters))) break;
   }
@@ -217,9 +220,11 @@ UniformStart StartMeasures::draw_uniform(std::uint64_t index) const {
 }
 
 std::vector<UniformStart> StartMeasures::draw_uniform(IndexRange starts) {
-  std::vector<UniformStart> drawn;
-  drawn.reserve(starts.count);
-  for (std::uint64_t i = 0; i < starts.count; ++i) drawn.push_back(draw_uniform(starts.first + i));
+  std::vector<UniformStart> drawn(starts.count);
+  for (std::uint64_t i = 0; i < starts.count; ++i) {
+    drawn[i] = draw_uniform(starts.first + i);
+    if (drawn[i].is_exhausted()) break;
+  }
   return drawn;
 }
 
@@ -231,15 +236,16 @@ StratifiedStarts stratified_starts(StartMeasures& measures) {
   StratifiedStarts result;
   result.inadmissible_per_interval.resize(by_interval.size());
   std::size_t full_intervals = 0;
-  // A few of those that will be needed: the last ones may be judged in vain.
-  const std::uint64_t at_once =
-      std::clamp<std::uint64_t>(by_interval.size() * wanted / 8, 8, 65536);
   std::vector<DrawVerdict> verdicts;
   std::size_t judged = 0;
   while (full_intervals < by_interval.size()) {
     if (result.draws == most_draws(options)) throw_too_empty(by_interval, options, result);
     if (judged == verdicts.size()) {
-      verdicts = measures.judge_draws({result.draws, at_once});
+      // Few beside those that are needed: the last ones may be judged in vain.
+      const std::uint64_t needed =
+          std::max<std::uint64_t>(by_interval.size() * wanted, result.draws);
+      verdicts =
+          measures.judge_draws({result.draws, std::clamp<std::uint64_t>(needed / 8, 8, 65536)});
       judged = 0;
     }
     const DrawVerdict& verdict = verdicts[judged++];
@@ -275,13 +281,13 @@ StratifiedStarts uniform_starts(StartMeasures& measures) {
   std::vector<PerturbedStart> starts;
   starts.reserve(count);
   const auto add = [&](const UniformStart& drawn, std::uint64_t index) {
-    if (drawn.refused == StartMeasures::kMostUniformDraws)
+    if (drawn.is_exhausted())
       throw InputError("starts",
                        std::to_string(drawn.initial_tre_mm) + " mm",
                        "every one of 1000 draws of this initial TRE lies outside the motion "
                        "range: use fewer intervals or fields of a larger range");
     PerturbedStart& start = starts.emplace_back();
-    start.draw_index = index * StartMeasures::kMostUniformDraws + drawn.refused;
+    start.draw_index = index * UniformStart::kMostDraws + drawn.refused;
     start.parameters = drawn.parameters;
     start.room_from_ct = pose_from_parameters(pose_frame, drawn.parameters);
     start.initial_tre_mm = drawn.initial_tre_mm;

@@ -77,6 +77,10 @@ struct UniformStart {
   PoseParameters parameters;
   double initial_tre_mm = 0.0;
   std::uint64_t refused = 0;  ///< draws before it that were not admissible
+
+  static constexpr std::uint64_t kMostDraws = 1000;
+  /// No draw was admissible.
+  [[nodiscard]] bool is_exhausted() const { return refused == kMostDraws; }
 };
 
 /// What is computed of every draw or pose by itself, which takes nearly all of the time: for
@@ -107,10 +111,8 @@ class StartMeasures {
   virtual std::vector<DrawVerdict> judge_draws(IndexRange draws);
   /// Mean TREs against the gold pose, in the order of the poses.
   virtual std::vector<double> tres_mm(std::span<const RigidTransform> room_from_ct);
-  /// In order.
+  /// In order. After one that is exhausted nothing is drawn.
   virtual std::vector<UniformStart> draw_uniform(IndexRange starts);
-
-  static constexpr std::uint64_t kMostUniformDraws = 1000;  ///< of one start
 
  private:
   [[nodiscard]] int interval_of_draw(const RigidTransform& room_from_ct) const;

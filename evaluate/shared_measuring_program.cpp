@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "evaluate/shared_measuring_program.h"
 
+#include <algorithm>
+#include <array>
 #include <bit>
 #include <cstdint>
 #include <cstring>
 #include <span>
 #include <utility>
 
-#include "base/error.h"
+#include "parallel/work_watch.h"
 
 namespace af::evaluation {
 namespace {
@@ -121,7 +123,7 @@ SharedStartMeasures::Words SharedStartMeasures::ask(Task task,
   return answer(std::move(bytes));
 }
 
-/// Collective. Rank 0's question, answered together: a word of every item, or kUniformWords.
+/// Collective. Rank 0's question, answered together: kUniformWords of every item, or one.
 SharedStartMeasures::Words SharedStartMeasures::answer(std::vector<std::byte> bytes) {
   world_.broadcast(bytes);
   Question question;
@@ -130,19 +132,10 @@ SharedStartMeasures::Words SharedStartMeasures::answer(std::vector<std::byte> by
     is_over_ = true;
     return {};
   }
-  const std::size_t per_item = question.task == Task::DrawUniform ? kUniformWords : 1;
-  const std::uint64_t count = question.items.count;
-  Words words(count * per_item);
-  const auto rank = static_cast<std::uint64_t>(world_.rank());
-  const auto ranks = static_cast<std::uint64_t>(world_.size());
-  const std::uint64_t first = count * rank / ranks;
-  const IndexRange part{first, count * (rank + 1) / ranks - first};
+  Words words;
   try {
-    all_or_none(world_, [&] {
-      add_part(question,
-               part,
-               std::span(bytes).subspan(sizeof(question)),
-               std::span(words).subspan(part.first * per_item, part.count * per_item));
+    words = all_or_none(world_, [&] {
+      return part_of_answer(question, std::span(bytes).subspan(sizeof(question)));
     });
   } catch (...) {
     is_over_ = true;  // on every rank
@@ -152,29 +145,51 @@ SharedStartMeasures::Words SharedStartMeasures::answer(std::vector<std::byte> by
   return words;
 }
 
+/// Words of all items; those of other ranks are zero.
+SharedStartMeasures::Words SharedStartMeasures::part_of_answer(const Question& question,
+                                                               std::span<const std::byte> poses) {
+  // Progress is noted so often: a TRE takes some 0.1 ms, a uniform start up to thousands of them.
+  constexpr std::uint64_t kFewItems = 256;
+  const bool is_uniform = question.task == Task::DrawUniform;
+  const std::uint64_t count = question.items.count;
+  const auto rank = static_cast<std::uint64_t>(world_.rank());
+  const auto ranks = static_cast<std::uint64_t>(world_.size());
+  const std::uint64_t end = count * (rank + 1) / ranks;
+  const std::uint64_t step = is_uniform ? 1 : kFewItems;
+  Words words(count * (is_uniform ? kUniformWords : 1));
+  for (std::uint64_t first = count * rank / ranks; first < end; first += step) {
+    const Words found = answer_alone(question, {first, std::min(step, end - first)}, poses);
+    const std::size_t at = first * (is_uniform ? kUniformWords : 1);
+    std::copy(found.begin(), found.end(), words.begin() + static_cast<std::ptrdiff_t>(at));
+    note_progress();
+    if (is_uniform && uniform_start_of(found).is_exhausted()) break;
+  }
+  return words;
+}
+
 /// Items [part.first, part.first + part.count) of those that were asked for.
-void SharedStartMeasures::add_part(const Question& question,
-                                   IndexRange part,
-                                   std::span<const std::byte> poses,
-                                   std::span<std::uint64_t> words) {
+SharedStartMeasures::Words SharedStartMeasures::answer_alone(const Question& question,
+                                                             IndexRange part,
+                                                             std::span<const std::byte> poses) {
   const IndexRange items{question.items.first + part.first, part.count};
-  std::size_t next = 0;
+  Words words;
   switch (question.task) {
     case Task::End:
-      return;
+      break;
     case Task::JudgeDraws:
       for (const DrawVerdict& verdict : StartMeasures::judge_draws(items))
-        words[next++] = word_of(verdict);
-      return;
+        words.push_back(word_of(verdict));
+      break;
     case Task::Tres:
       for (const double tre_mm : StartMeasures::tres_mm(poses_of(poses, part)))
-        words[next++] = std::bit_cast<std::uint64_t>(tre_mm);
-      return;
+        words.push_back(std::bit_cast<std::uint64_t>(tre_mm));
+      break;
     case Task::DrawUniform:
       for (const UniformStart& start : StartMeasures::draw_uniform(items))
-        for (const std::uint64_t word : words_of(start)) words[next++] = word;
-      return;
+        for (const std::uint64_t word : words_of(start)) words.push_back(word);
+      break;
   }
+  return words;
 }
 
 StratifiedStarts starts_measured_together(

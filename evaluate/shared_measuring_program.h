@@ -2,7 +2,9 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
+#include <span>
 #include <vector>
 
 #include "evaluate/perturbed_starts.h"
@@ -38,10 +40,8 @@ class SharedStartMeasures final : public StartMeasures {
   };
   Words ask(Task task, IndexRange items, std::span<const RigidTransform> poses = {});
   Words answer(std::vector<std::byte> bytes);
-  void add_part(const Question& question,
-                IndexRange part,
-                std::span<const std::byte> poses,
-                std::span<std::uint64_t> words);
+  Words part_of_answer(const Question& question, std::span<const std::byte> poses);
+  Words answer_alone(const Question& question, IndexRange part, std::span<const std::byte> poses);
 
   const Communicator& world_;
   bool is_over_ = false;

@@ -202,14 +202,34 @@ TEST(PerturbedStarts, UniformInTreHaveThatDistribution) {
 TEST(PerturbedStarts, UniformSayWhichTreHasNoAdmissibleStart) {
   const StartFrame frame = example_frame();
   const auto points = target_points(frame.target_box_ct, 30.0);
-  StartMeasures measures(
-      frame, StartOptions{2, 2.0, 3, 1}, points, [](const RigidTransform&) { return false; });
+  std::uint64_t asked = 0;
+  StartMeasures measures(frame, StartOptions{2, 2.0, 3, 1}, points, [&](const RigidTransform&) {
+    ++asked;
+    return false;
+  });
   try {
     uniform_starts(measures);
     FAIL() << "found starts where none is admissible";
   } catch (const InputError& error) {
     EXPECT_THAT(error.what(), testing::HasSubstr("starts"));
     EXPECT_THAT(error.what(), testing::HasSubstr("every one of 1000 draws"));
+  }
+  EXPECT_EQ(asked, UniformStart::kMostDraws) << "went on after the first";
+}
+
+TEST(PerturbedStarts, AreTheSameInManyParts) {
+  // More than are asked for at once; few points, for time.
+  const StartFrame frame = example_frame();
+  const auto points = target_points(frame.target_box_ct, 60.0);
+  const StartOptions options{2, 2.0, 35000, 1};
+  StartMeasures measures(frame, options, points, anything);
+  const StratifiedStarts result = uniform_starts(measures);
+  ASSERT_EQ(result.starts.size(), 70000u);
+  for (const std::uint64_t index : {65535u, 65536u, 69999u}) {
+    const UniformStart expected = measures.draw_uniform({index, 1}).front();
+    EXPECT_EQ(result.starts[index].parameters.deg_and_mm(), expected.parameters.deg_and_mm());
+    EXPECT_EQ(result.starts[index].initial_tre_mm, expected.initial_tre_mm);
+    EXPECT_EQ(result.starts[index].draw_index, index * UniformStart::kMostDraws);
   }
 }
 
