@@ -10,25 +10,17 @@
 #include "base/error.h"
 #include "evaluate/shared_measuring_program.h"
 #include "gold/target_box.h"
+#include "support/start_frame.h"
 
 namespace af::evaluation {
 namespace {
 
 using MakeStarts = std::function<StratifiedStarts(StartMeasures& measures)>;
 
-StartFrame example_frame() {
-  StartFrame frame;
-  frame.case_name = "skull-01";
-  frame.gold_room_from_ct =
-      pose_from_parameters(PoseFrame{}, PoseParameters::from_deg_and_mm({5, -8, 12, 30, -20, 10}));
-  frame.center_ct_mm = {10, 20, -30};
-  frame.target_box_ct = {{-20, -10, -60}, {40, 50, 0}};
-  return frame;
-}
-
 /// Some draws are refused.
 bool is_left(const RigidTransform& pose) {
-  return parameters_from_pose(example_frame().pose_frame(), pose).translation_mm.x() < 1.0;
+  return parameters_from_pose(test::example_start_frame().pose_frame(), pose).translation_mm.x() <
+         1.0;
 }
 
 void expect_same(const StratifiedStarts& a, const StratifiedStarts& b) {
@@ -50,7 +42,7 @@ void expect_same(const StratifiedStarts& a, const StratifiedStarts& b) {
 class SharedMeasures : public testing::Test {
  protected:
   const Communicator world_ = Communicator::world();
-  const StartFrame frame_ = example_frame();
+  const StartFrame frame_ = test::example_start_frame();
   const std::vector<Eigen::Vector3d> points_ = target_points(frame_.target_box_ct, 20.0);
   const StartOptions options_{3, 2.0, 7, 1};
 

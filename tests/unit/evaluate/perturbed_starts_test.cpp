@@ -13,19 +13,10 @@
 #include "base/error.h"
 #include "gold/target_box.h"
 #include "gold/tre.h"
+#include "support/start_frame.h"
 
 namespace af::evaluation {
 namespace {
-
-StartFrame example_frame() {
-  StartFrame frame;
-  frame.case_name = "skull-01";
-  frame.gold_room_from_ct =
-      pose_from_parameters(PoseFrame{}, PoseParameters::from_deg_and_mm({5, -8, 12, 30, -20, 10}));
-  frame.center_ct_mm = {10, 20, -30};
-  frame.target_box_ct = {{-20, -10, -60}, {40, 50, 0}};
-  return frame;
-}
 
 bool anything(const RigidTransform&) {
   return true;
@@ -38,7 +29,7 @@ StratifiedStarts draw(const StartFrame& frame, const StartOptions& options) {
 }
 
 TEST(PerturbedStarts, FillEveryIntervalWithExactlyTheStatedCount) {
-  const StartFrame frame = example_frame();
+  const StartFrame frame = test::example_start_frame();
   StartOptions options;
   options.starts_per_interval = 7;
   const StratifiedStarts result = draw(frame, options);
@@ -61,7 +52,7 @@ TEST(PerturbedStarts, FillEveryIntervalWithExactlyTheStatedCount) {
 }
 
 TEST(PerturbedStarts, AreTheContractsFormulaRelativeToGold) {
-  const StartFrame frame = example_frame();
+  const StartFrame frame = test::example_start_frame();
   StartOptions options;
   options.starts_per_interval = 1;
   const Eigen::Vector3d gold_center = frame.gold_room_from_ct * frame.center_ct_mm;
@@ -78,7 +69,7 @@ TEST(PerturbedStarts, AreTheContractsFormulaRelativeToGold) {
 }
 
 TEST(PerturbedStarts, ADrawDependsOnSeedCaseAndIndexAlone) {
-  StartFrame frame = example_frame();
+  StartFrame frame = test::example_start_frame();
   const auto at = [&](std::uint64_t seed, std::uint64_t index) {
     return draw_perturbation(frame, 24.0, seed, index).deg_and_mm();
   };
@@ -93,7 +84,7 @@ TEST(PerturbedStarts, ADrawDependsOnSeedCaseAndIndexAlone) {
 
 TEST(PerturbedStarts, DrawsPointEverywhereAlike) {
   // Each of the six scaled components of a uniform direction has mean 0 and mean square 1/6.
-  const StartFrame frame = example_frame();
+  const StartFrame frame = test::example_start_frame();
   const double radius_mm = rms_radius_mm(frame.target_box_ct, frame.center_ct_mm);
   constexpr int kDraws = 20000;
   Eigen::Matrix<double, 6, 1> mean = Eigen::Matrix<double, 6, 1>::Zero();
@@ -121,7 +112,7 @@ TEST(PerturbedStarts, ASmallerStudyIsTheLowRankedPartOfTheSameDraws) {
   StartOptions options;
   options.starts_per_interval = 12;
   std::map<int, std::set<int>> ranks;
-  for (const PerturbedStart& start : draw(example_frame(), options).starts)
+  for (const PerturbedStart& start : draw(test::example_start_frame(), options).starts)
     ranks[start.interval].insert(start.rank_in_interval);
   for (const auto& [interval, found] : ranks) {
     EXPECT_EQ(found.size(), 12u) << interval;
@@ -130,7 +121,7 @@ TEST(PerturbedStarts, ASmallerStudyIsTheLowRankedPartOfTheSameDraws) {
 }
 
 TEST(PerturbedStarts, CountDrawsThatThePredicateRefuses) {
-  const StartFrame frame = example_frame();
+  const StartFrame frame = test::example_start_frame();
   StartOptions options;
   options.starts_per_interval = 5;
   const auto limited = [&](const RigidTransform& pose) {
@@ -168,7 +159,7 @@ TEST(PerturbedStarts, CountDrawsThatThePredicateRefuses) {
 }
 
 TEST(PerturbedStarts, UniformInTreHaveThatDistribution) {
-  const StartFrame frame = example_frame();
+  const StartFrame frame = test::example_start_frame();
   StartOptions options;
   options.starts_per_interval = 50;
   // A coarse grid: 400 starts, several scalings each.
@@ -200,7 +191,7 @@ TEST(PerturbedStarts, UniformInTreHaveThatDistribution) {
 }
 
 TEST(PerturbedStarts, UniformSayWhichTreHasNoAdmissibleStart) {
-  const StartFrame frame = example_frame();
+  const StartFrame frame = test::example_start_frame();
   const auto points = target_points(frame.target_box_ct, 30.0);
   std::uint64_t asked = 0;
   StartMeasures measures(frame, StartOptions{2, 2.0, 3, 1}, points, [&](const RigidTransform&) {
@@ -219,7 +210,7 @@ TEST(PerturbedStarts, UniformSayWhichTreHasNoAdmissibleStart) {
 
 TEST(PerturbedStarts, AreTheSameInManyParts) {
   // More than are asked for at once; few points, for time.
-  const StartFrame frame = example_frame();
+  const StartFrame frame = test::example_start_frame();
   const auto points = target_points(frame.target_box_ct, 60.0);
   const StartOptions options{2, 2.0, 35000, 1};
   StartMeasures measures(frame, options, points, anything);
@@ -234,7 +225,7 @@ TEST(PerturbedStarts, AreTheSameInManyParts) {
 }
 
 TEST(PerturbedStarts, AtGivenPosesKeepThem) {
-  const StartFrame frame = example_frame();
+  const StartFrame frame = test::example_start_frame();
   const auto points = target_points(frame.target_box_ct, 20.0);
   StartMeasures of_drawn(frame, StartOptions{8, 2.0, 1, 1}, points, anything);
   const SharedArray<PerturbedStart> drawn = stratified_starts(of_drawn).starts;
@@ -252,7 +243,7 @@ TEST(PerturbedStarts, AtGivenPosesKeepThem) {
 }
 
 TEST(PerturbedStarts, SayWhichIntervalsStayEmpty) {
-  const StartFrame frame = example_frame();
+  const StartFrame frame = test::example_start_frame();
   StartOptions options;
   options.starts_per_interval = 1;
   const auto close_only = [&](const RigidTransform& pose) {
