@@ -54,7 +54,7 @@ std::optional<RigidTransform> parameter_pose(const CsvTable& table,
     values[i] = number_or_nan(table, row, prefix + kParameterNames[i]);
   if (!std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); }))
     return std::nullopt;
-  return pose_from_parameters(frame, PoseParameters::from_deg_and_mm(values));
+  return pose_of_deg_and_mm(frame, values, table.where(row));
 }
 
 /// The start a row is of; nullopt when its start_index is not a whole number.

@@ -5,6 +5,8 @@
 #include <array>
 #include <charconv>
 
+#include "base/plausible.h"
+
 namespace af {
 
 namespace {
@@ -86,6 +88,9 @@ std::vector<std::string> problems(const PrecomputeOptions& options) {
   if (!options.center_ct_mm.empty() && options.center_ct_mm.size() != 3)
     found.push_back("center_ct_mm has " + std::to_string(options.center_ct_mm.size()) +
                     " numbers: must be x,y,z");
+  for (const double coordinate : options.center_ct_mm)
+    if (!is_plausible_room_mm(coordinate))
+      found.push_back("center_ct_mm = " + exact_text(coordinate) + ": " + kPlausibleRoom);
   return found;
 }
 

@@ -111,10 +111,11 @@ void scan_shard(const std::filesystem::path& folder,
                 std::span<const WorkUnit> units,
                 FoundUnits& found) {
   const std::filesystem::path path = folder / shard_name(shard.run, shard.rank);
-  std::ifstream file(path, std::ios::binary);
   std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) return;  // lost, or no file: as if damaged
+  std::ifstream file(path, std::ios::binary);
   const std::uint64_t size = std::filesystem::file_size(path, error);
-  if (error) return;  // lost, or no file: as if damaged
+  if (error) return;
   UnitPlace place = shard;
   RecordHeader header;
   while (size - place.offset >= sizeof(RecordHeader)) {

@@ -154,7 +154,7 @@ std::vector<RigidTransform> start_poses(const RegisterOptions& options, const Po
     if (options.start_translation_mm.has_value())
       values[i + 3] = (*options.start_translation_mm)[i];
   }
-  return {pose_from_parameters(frame, PoseParameters::from_deg_and_mm(values))};
+  return {pose_of_deg_and_mm(frame, values, "--start-rotation-deg, --start-translation-mm")};
 }
 
 std::map<std::string, std::string> hashes_of_files(const RegisterOptions& options) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "geometry/camera_geometry.h"
 
+#include <algorithm>
 #include <cmath>
 #include <set>
 #include <sstream>
@@ -8,6 +9,7 @@
 #include <Eigen/Dense>
 
 #include "base/error.h"
+#include "base/plausible.h"
 
 namespace af {
 
@@ -154,10 +156,12 @@ std::vector<std::string> problems(const CameraGeometry& camera) {
         found.push_back("camera '" + camera.name + "': " + key + " = " + value + ": " + constraint);
       };
   if (camera.name.empty()) add("name", "\"\"", "must not be empty");
-  if (!camera.source_point.allFinite())
-    add("source_point", text_of(camera.source_point), "must be finite");
-  if (!camera.detector_origin_point.allFinite())
-    add("detector_origin_point", text_of(camera.detector_origin_point), "must be finite");
+  const auto check_point = [&](const std::string& key, const Eigen::Vector3d& point) {
+    if (!std::all_of(point.begin(), point.end(), is_plausible_room_mm))
+      add(key, text_of(point), kPlausibleRoom);
+  };
+  check_point("source_point", camera.source_point);
+  check_point("detector_origin_point", camera.detector_origin_point);
   const bool column_unit = std::abs(camera.column_direction.norm() - 1.0) < kUnitTolerance;
   const bool row_unit = std::abs(camera.row_direction.norm() - 1.0) < kUnitTolerance;
   if (!column_unit) add("column_direction", text_of(camera.column_direction), "must have length 1");
@@ -171,11 +175,14 @@ std::vector<std::string> problems(const CameraGeometry& camera) {
     else if (!(std::abs(camera.source_detector_distance_mm()) > 1e-3))
       add("source_point", text_of(camera.source_point), "must not lie on the detector plane");
   }
-  if (!(camera.pixel_spacing_mm.minCoeff() > 0.0) || !camera.pixel_spacing_mm.allFinite())
-    add("pixel_spacing_mm", text_of(camera.pixel_spacing_mm), "must be positive");
+  if (!std::all_of(
+          camera.pixel_spacing_mm.begin(), camera.pixel_spacing_mm.end(), is_plausible_spacing_mm))
+    add("pixel_spacing_mm", text_of(camera.pixel_spacing_mm), kPlausibleSpacing);
   constexpr int kMaxSide = 32768;
-  if (camera.size_px.minCoeff() < 1 || camera.size_px.maxCoeff() > kMaxSide)
-    add("size_px", text_of(camera.size_px), "must be within 1 and 32768");
+  constexpr double kMaxPixels = 1 << 28;  // 1 GB as float
+  if (camera.size_px.minCoeff() < 1 || camera.size_px.maxCoeff() > kMaxSide ||
+      camera.size_px.cast<double>().prod() > kMaxPixels)
+    add("size_px", text_of(camera.size_px), "must be within 1 and 32768, at most 2^28 pixels");
   return found;
 }
 
@@ -208,7 +215,9 @@ const CameraGeometry& CameraRig::camera(const std::string& name) const {
 
 std::vector<std::string> problems(const CameraRig& rig) {
   std::vector<std::string> found;
-  if (!rig.isocenter_point.allFinite()) found.emplace_back("isocenter_point must be finite");
+  const Eigen::Vector3d& isocenter = rig.isocenter_point;
+  if (!std::all_of(isocenter.begin(), isocenter.end(), is_plausible_room_mm))
+    found.push_back("isocenter_point = " + text_of(isocenter) + ": " + kPlausibleRoom);
   if (rig.cameras.empty()) found.emplace_back("the rig has no [[camera]]");
   std::set<std::string> names;
   for (const CameraGeometry& camera : rig.cameras) {

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "base/plausible.h"
+
 namespace af {
 
 namespace {
@@ -83,6 +85,8 @@ std::vector<std::string> rigidity_problems(const Eigen::Matrix4d& matrix) {
   constexpr double kTolerance = 1e-5;
   std::vector<std::string> problems;
   if (!matrix.allFinite()) return {"pose has values that are not finite"};
+  if (!(matrix.topRightCorner<3, 1>().cwiseAbs().maxCoeff() <= kMaxRoomMm))
+    problems.push_back(std::string("the pose's translation ") + kPlausibleRoom);
   if (!(matrix.row(3) - Eigen::RowVector4d(0, 0, 0, 1)).isZero(kTolerance))
     problems.emplace_back("the pose's last row must be 0 0 0 1");
   const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();

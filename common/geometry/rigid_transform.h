@@ -56,8 +56,8 @@ Eigen::Vector3d angles_from_rotation(const Eigen::Matrix3d& rotation);
 RigidTransform pose_from_parameters(const PoseFrame& frame, const PoseParameters& parameters);
 PoseParameters parameters_from_pose(const PoseFrame& frame, const RigidTransform& room_from_ct);
 
-/// Why the 4x4 matrix is not a rigid transform (tolerance 1e-5 on orthonormality); empty when it is
-/// one.
+/// Why the 4x4 matrix is not a rigid transform (tolerance 1e-5 on orthonormality) within 1 km;
+/// empty when it is one.
 std::vector<std::string> rigidity_problems(const Eigen::Matrix4d& matrix);
 
 /// The nearest rigid transform of a matrix that passed rigidity_problems() (re-orthonormalised by

@@ -13,11 +13,14 @@
 #include <Eigen/LU>
 
 #include "base/error.h"
+#include "base/plausible.h"
+#include "io/csv_table.h"
 #include "io/dicom_series.h"
 #include "io/hu_values.h"
 #include "io/image_header.h"
 #include "io/itk_image_io.h"
 #include "io/sha256.h"
+#include "io/stored_image.h"
 
 namespace af {
 
@@ -34,8 +37,13 @@ constexpr double kMaxAffineDifferenceMm = 0.05;
 constexpr double kAxisOrderMargin = 1e-3;
 
 std::string triple(const auto& values) {
-  return "(" + std::to_string(values[0]) + ", " + std::to_string(values[1]) + ", " +
-         std::to_string(values[2]) + ")";
+  const auto text = [](const auto value) {
+    if constexpr (std::is_floating_point_v<decltype(value)>)
+      return number_text(static_cast<double>(value));
+    else
+      return std::to_string(value);
+  };
+  return "(" + text(values[0]) + ", " + text(values[1]) + ", " + text(values[2]) + ")";
 }
 
 void check_grid(const CtGrid& grid, const std::string& file) {
@@ -46,10 +54,11 @@ void check_grid(const CtGrid& grid, const std::string& file) {
                          ": must be at least 2 voxels on each axis");
       break;
     }
-  if (!grid.spacing_mm.allFinite() || !(grid.spacing_mm.minCoeff() > 0.0))
-    problems.push_back("spacing = " + triple(grid.spacing_mm) + " mm: must be positive and finite");
-  if (!grid.origin_mm.allFinite())
-    problems.push_back("origin = " + triple(grid.origin_mm) + " mm: must be finite");
+  if (!std::all_of(grid.spacing_mm.begin(), grid.spacing_mm.end(), is_plausible_spacing_mm))
+    problems.push_back("spacing = " + triple(grid.spacing_mm) + " mm: " + kPlausibleSpacing);
+  if (!(grid.origin_mm.cwiseAbs().maxCoeff() <= kMaxCtOriginMm))
+    problems.push_back("origin = " + triple(grid.origin_mm) +
+                       " mm: must be finite and within 1e4 mm (10 m)");
   const Eigen::Matrix3d gram = grid.direction.transpose() * grid.direction;
   if (!((gram - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() <= kMaxDirectionError))
     problems.push_back("direction columns " + triple(grid.direction.col(0)) + ", " +
@@ -139,41 +148,15 @@ void add_values(ValueType type, std::span<const std::byte> bytes, HuValues& valu
   visit_values(type, bytes, [&](const auto span) { values.add_all(span); });
 }
 
-/// Voxels of any format: the whole image is held in its own type meanwhile, by some of ITK's
-/// readers twice.
-RawImage read_values_by_itk(const fs::path& path,
-                            const ImageHeader& header,
-                            HuValues& values,
-                            std::vector<std::string>& warnings) {
-  check_image_payload(path, header, &warnings);
-  RawImage image =
-      read_raw_image(path, header.format, [&](const RawImage& seen) { check_is_ct(seen, path); });
-  values.reserve(image.voxel_count());
-  add_values(image.type, image.values, values);
-  image.values = {};
-  return image;
-}
-
-/// Voxels that are the values as they stand, converted piece by piece while the file is read and
-/// checked, once. No values in the image returned.
-RawImage read_plain_values(const fs::path& path,
-                           const ImageHeader& header,
-                           HuValues& values,
-                           std::vector<std::string>& warnings) {
-  RawImage image;
-  try {
-    image = read_raw_image_header(path, header.format);
-  } catch (const FileError&) {
-    check_image_payload(path, header, nullptr);  // says more of a damaged stream than ITK does
-    throw;
-  }
-  check_is_ct(image, path);
-  if (value_bytes(image.type) != header.value_bytes)
-    throw FileError(path.string(),
-                    "bytes of a voxel",
-                    std::to_string(value_bytes(image.type)),
-                    std::to_string(header.value_bytes));
-  read_image_payload(path, header, &warnings, [&](std::span<const std::byte> piece) {
+/// Voxels are converted piece by piece while the file is read and checked, once. No values in the
+/// image returned.
+RawImage read_values(const fs::path& path,
+                     const ImageHeader& header,
+                     HuValues& values,
+                     std::vector<std::string>& warnings) {
+  const RawImage image =
+      read_image_description(path, header, [&](const RawImage& seen) { check_is_ct(seen, path); });
+  read_described_values(path, header, image, &warnings, [&](std::span<const std::byte> piece) {
     if (values.hu().empty()) values.reserve(image.voxel_count());
     add_values(image.type, piece, values);
   });
@@ -196,9 +179,9 @@ CtVolume read_ct_image(const fs::path& path, HuValues& values, std::vector<std::
                      " picture has no HU values and no patient frame; a CT is DICOM, NIfTI, "
                      "MetaImage or NRRD");
   const ImageHeader header = read_image_header(path, *format);
-  const RawImage image = header.has_plain_values
-                             ? read_plain_values(path, header, values, warnings)
-                             : read_values_by_itk(path, header, values, warnings);
+  if (!header.has_spacing)
+    throw InputError("spacing", "none", "a CT's header must state it (mm)", file);
+  const RawImage image = read_values(path, header, values, warnings);
   CtVolume ct;
   ct.grid = grid_of(image);
   if (header.format == ImageFormat::Nifti && header.has_orientation)
@@ -225,6 +208,12 @@ void check_values(const CtGrid& grid,
         "NaN or infinite",
         "HU must be finite (" + std::to_string(values.non_finite_count()) + " such voxels)",
         file);
+  if (values.implausible_count() > 0)
+    throw InputError("voxel " + triple(voxel_index(grid, values.first_implausible())),
+                     number_text(values.first_implausible_hu()),
+                     "HU must be within 1e6 (" + std::to_string(values.implausible_count()) +
+                         " voxels are beyond)",
+                     file);
   const auto [low, high] = std::minmax_element(values.hu().begin(), values.hu().end());
   if (*high < kAirBelowHu)
     throw InputError(
@@ -297,7 +286,6 @@ CtVolume read_ct(const fs::path& path,
                  std::vector<std::string>* warnings) {
   std::vector<std::string> found;
   std::error_code error;
-  if (!fs::exists(path, error)) throw FileError(path.string(), "does not exist");
   CtVolume ct;
   HuValues values;
   if (fs::is_directory(path, error)) {

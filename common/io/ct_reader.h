@@ -16,8 +16,9 @@ struct CtReadOptions {
 /// Reads a CT (DICOM folder, NIfTI, MetaImage, NRRD) as HU in int16, in DICOM LPS; rescale applied,
 /// values rounded and clamped to int16. InputError (exit 3): several series (lists UID,
 /// description, slice count of each), missing or uneven slices (names the position), gantry tilt,
-/// modality other than CT, not 3-D, NaN or infinite values, all air (no voxel
-/// >= -900 HU), non-positive or non-finite spacing, direction not orthonormal, fewer than 2 voxels
+/// modality other than CT, not 3-D, NaN or infinite values, HU beyond 1e6, all air (no voxel
+/// >= -900 HU), no spacing or one that is not 0.01 to 100 mm, an origin beyond 10 m, direction not
+/// orthonormal, fewer than 2 voxels
 /// on an axis. FileError (exit 4): missing, not an image, truncated, corrupt. Warnings (for example
 /// values that do not look like HU) go to `warnings` when given.
 CtVolume read_ct(const std::filesystem::path& path,

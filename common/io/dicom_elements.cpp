@@ -11,6 +11,7 @@
 #include <string_view>
 
 #include "base/error.h"
+#include "io/input_file.h"
 
 namespace af {
 
@@ -73,8 +74,7 @@ bool is_unsigned_short(DicomTag tag) {
 class DicomWalker {
  public:
   explicit DicomWalker(const fs::path& path)
-      : path_(path.string()), file_(path, std::ios::binary), size_(fs::file_size(path)) {
-    if (!file_) throw FileError(path_, "cannot be opened");
+      : path_(path.string()), file_(open_input_file(path)), size_(fs::file_size(path)) {
     elements_.path_ = path;
   }
 
@@ -295,7 +295,7 @@ std::optional<double> DicomElements::number_or_none(DicomTag tag, const char* na
 }
 
 bool is_marked_dicom(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
+  std::ifstream file = open_input_file(path);
   std::array<char, kPreambleBytes> start{};
   file.read(start.data(), start.size());
   return file.gcount() == static_cast<std::streamsize>(start.size()) &&
@@ -304,7 +304,7 @@ bool is_marked_dicom(const fs::path& path) {
 
 bool may_be_bare_dicom(const fs::path& path) {
   // Such files begin directly with an element of group 0002 or 0008.
-  std::ifstream file(path, std::ios::binary);
+  std::ifstream file = open_input_file(path);
   std::array<unsigned char, 4> start{};
   file.read(reinterpret_cast<char*>(start.data()), start.size());
   return file.gcount() == 4 && (start[0] == 0x08 || start[0] == 0x02) && start[1] == 0 &&

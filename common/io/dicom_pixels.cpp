@@ -8,6 +8,7 @@
 #include <string>
 
 #include "base/error.h"
+#include "io/input_file.h"
 
 namespace af {
 
@@ -94,7 +95,7 @@ void check_bytes(const DicomElements& header, const DicomPixelLayout& layout) {
 }
 
 std::vector<char> part_of_file(const std::filesystem::path& path, const DicomPart& part) {
-  std::ifstream file(path, std::ios::binary);
+  std::ifstream file = open_input_file(path);
   file.seekg(static_cast<std::streamoff>(part.offset));
   std::vector<char> bytes(part.bytes);
   file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));

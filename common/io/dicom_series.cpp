@@ -57,7 +57,7 @@ std::vector<fs::path> files_of(const fs::path& folder) {
   std::error_code error;
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
        entry.increment(error))
-    if (entry->is_regular_file()) files.push_back(entry->path());
+    if (std::error_code ignored; entry->is_regular_file(ignored)) files.push_back(entry->path());
   if (error) throw FileError(folder.string(), "cannot be listed: " + error.message());
   std::sort(files.begin(), files.end());
   return files;

@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "io/field_file_access.h"
 #include "io/field_file_layout.h"
+#include "io/input_file.h"
 #include "io/output_file.h"
 #include "io/sha256.h"
 #include "parallel/mpi_environment.h"
@@ -415,10 +416,8 @@ struct FileHeader {
 };
 
 void check_is_hdf5(const std::filesystem::path& path) {
+  require_regular_file(path);
   std::error_code error;
-  if (!std::filesystem::exists(path, error)) throw FileError(path.string(), "no such file");
-  if (!std::filesystem::is_regular_file(path, error))
-    throw FileError(path.string(), "is not a file");
   if (std::filesystem::file_size(path, error) == 0) throw FileError(path.string(), "is empty");
   if (::access(path.c_str(), R_OK) != 0)
     throw FileError(path.string(), std::string("cannot be read: ") + std::strerror(errno));

@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "base/plausible.h"
+
 namespace af {
 
 /// Collects voxels as int16 HU and counts what does not fit.
@@ -31,6 +33,10 @@ class HuValues {
       hu_.push_back(0);
       return;
     }
+    if (!(std::abs(hu) <= kMaxHu) && implausible_count_++ == 0) {
+      first_implausible_ = hu_.size();
+      first_implausible_hu_ = hu;
+    }
     ++clamped_count_;
     hu_.push_back(static_cast<std::int16_t>(rounded < kLow ? kLow : kHigh));
   }
@@ -47,6 +53,10 @@ class HuValues {
   [[nodiscard]] std::size_t non_finite_count() const { return non_finite_count_; }
   /// Voxel number of the first NaN or infinite value.
   [[nodiscard]] std::size_t first_non_finite() const { return first_non_finite_; }
+  /// Voxels beyond kMaxHu.
+  [[nodiscard]] std::size_t implausible_count() const { return implausible_count_; }
+  [[nodiscard]] std::size_t first_implausible() const { return first_implausible_; }
+  [[nodiscard]] double first_implausible_hu() const { return first_implausible_hu_; }
   [[nodiscard]] const std::vector<std::int16_t>& hu() const { return hu_; }
   [[nodiscard]] std::vector<std::int16_t> take() { return std::move(hu_); }
 
@@ -55,6 +65,9 @@ class HuValues {
   std::size_t clamped_count_ = 0;
   std::size_t non_finite_count_ = 0;
   std::size_t first_non_finite_ = 0;
+  std::size_t implausible_count_ = 0;
+  std::size_t first_implausible_ = 0;
+  double first_implausible_hu_ = 0.0;
 };
 
 }  // namespace af

@@ -12,6 +12,7 @@
 #include "io/dicom_pixels.h"
 #include "io/image_header.h"
 #include "io/itk_image_io.h"
+#include "io/stored_image.h"
 
 namespace af {
 
@@ -81,6 +82,18 @@ void check_is_image(const Image2d& image) {
         "an image to write has pixels for its size");
 }
 
+void check_is_finite(const Image2d& image, const fs::path& path) {
+  const auto found = std::find_if_not(
+      image.pixels.begin(), image.pixels.end(), [](float value) { return std::isfinite(value); });
+  if (found == image.pixels.end()) return;
+  const auto at = static_cast<int>(found - image.pixels.begin());
+  throw InputError(
+      "pixel (" + std::to_string(at % image.width) + ", " + std::to_string(at / image.width) + ")",
+      std::to_string(*found),
+      "must be finite",
+      path.string());
+}
+
 Image2d read_dicom_image(const fs::path& path) {
   const DicomPixelLayout layout = dicom_pixel_layout(DicomElements::read(path));
   const std::vector<double> values = read_dicom_pixels(layout);
@@ -88,6 +101,7 @@ Image2d read_dicom_image(const fs::path& path) {
   std::transform(values.begin(), values.end(), image.pixels.begin(), [](const double value) {
     return static_cast<float>(value);
   });
+  check_is_finite(image, path);
   return image;
 }
 
@@ -105,15 +119,15 @@ Image2d read_image(const fs::path& path) {
                     "DICOM");
   if (*format == ImageFormat::Dicom) return read_dicom_image(path);
   const ImageHeader header = read_image_header(path, *format);
-  check_image_payload(path, header, nullptr);
-  const RawImage raw =
-      read_raw_image(path, *format, [&](const RawImage& seen) { check_is_2d(seen, path); });
+  const RawImage raw = read_stored_image(
+      path, header, nullptr, [&](const RawImage& seen) { check_is_2d(seen, path); });
   Image2d image(static_cast<int>(raw.size[0]), static_cast<int>(raw.size[1]));
   visit_values(raw, [&](const auto values) {
     std::transform(values.begin(), values.end(), image.pixels.begin(), [](const auto value) {
       return static_cast<float>(value);
     });
   });
+  check_is_finite(image, path);
   return image;
 }
 

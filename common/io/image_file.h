@@ -14,7 +14,8 @@ namespace af {
 
 /// Reads a 2-D image of any ITK format (mha, nii.gz, nrrd, tif, png 8/16-bit, single-slice DICOM)
 /// as float, row 0 on top, values as stored (a DICOM file's own rescale is applied). FileError when
-/// it cannot be parsed or is truncated; InputError when it is not 2-D or has several channels.
+/// it cannot be parsed or is truncated; InputError when it is not 2-D, has several channels or
+/// pixels that are not finite.
 Image2d read_image(const std::filesystem::path& path);
 
 /// Writes float pixels unscaled: .mha .nii.gz .nrrd .tif, atomically. Pixel spacing (mm) is written

@@ -98,6 +98,23 @@ class PayloadPieces {
   std::vector<std::byte> piece_;
 };
 
+/// A stream of another length than stated is another stream, or was cut and mended. What stands
+/// behind it is said, not read.
+void check_compressed_bytes(const fs::path& path,
+                            const ImageHeader& header,
+                            std::uint64_t found,
+                            std::uint64_t stored,
+                            std::vector<std::string>* warnings) {
+  if (header.compressed_bytes.value_or(found) != found)
+    throw FileError(path.string(),
+                    "CompressedDataSize",
+                    std::to_string(found) + ", the length of the compressed voxels",
+                    std::to_string(*header.compressed_bytes));
+  if (found < stored && warnings != nullptr)
+    warnings->push_back(header.data_file.string() + ": " + std::to_string(stored - found) +
+                        " bytes behind the compressed voxels are ignored");
+}
+
 }  // namespace
 
 std::string_view format_name(ImageFormat format) {
@@ -180,10 +197,13 @@ void read_image_payload(const fs::path& path,
     if (visit) pieces.add(bytes);
   };
   std::uint64_t found = stored;
-  if (header.compressed)
-    found = inflate_file(header.data_file, header.payload_offset, take);
-  else if (visit && stored >= expected)
+  if (header.compressed) {
+    const InflatedBytes bytes = inflate_file(header.data_file, header.payload_offset, take);
+    check_compressed_bytes(path, header, bytes.compressed, stored, warnings);
+    found = bytes.inflated;
+  } else if (visit && stored >= expected) {
     found = read_plain_file(header.data_file, header.payload_offset, take);
+  }
   if (found < expected)
     throw FileError(header.data_file.string(),
                     "truncated: voxel data",

@@ -17,6 +17,8 @@ namespace af {
 /// Image files that the project reads, told apart by content, not by name.
 enum class ImageFormat { MetaImage, Nifti, Nrrd, Png, Tiff, Dicom };
 
+enum class ValueType { Int8, UInt8, Int16, UInt16, Int32, UInt32, Int64, UInt64, Float32, Float64 };
+
 std::string_view format_name(ImageFormat format);
 
 /// The format of a file by its first bytes; nullopt when it is none of them. FileError when it
@@ -40,11 +42,17 @@ struct ImageHeader {
   std::uint64_t payload_offset = 0;  ///< where the (compressed) voxels begin
   std::uint64_t skip_bytes = 0;      ///< in front of the voxels, after decompression
   bool compressed = false;
+  /// Of the compressed stream, where the header states them.
+  std::optional<std::uint64_t> compressed_bytes;
   std::filesystem::path data_file;  ///< the file that holds the voxels
-  /// The stored voxels are the values: this machine's byte order, not rescaled. Known of NIfTI
-  /// only.
-  bool has_plain_values = false;
+  /// Of one channel, as stored. This and what follows is known of MetaImage, NRRD and NIfTI only.
+  ValueType value_type = ValueType::Int16;
+  bool is_byte_swapped = false;  ///< against this machine
+  bool is_rescaled = false;      ///< values are stored * slope + intercept
+  double slope = 1.0;
+  double intercept = 0.0;
   bool has_orientation = true;
+  bool has_spacing = true;
   NiftiOrientation nifti;
 };
 

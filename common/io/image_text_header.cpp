@@ -22,6 +22,11 @@ std::uint64_t checked_extent(const std::string& path, const std::string& text) {
 
 }  // namespace
 
+void TextHeader::add(const std::string& key, const std::string& value) {
+  if (!fields.emplace(key, value).second)
+    throw FileError(path, "header field '" + key + "' stands twice");
+}
+
 const std::string* TextHeader::find(const std::string& key) const {
   const auto found = fields.find(key);
   return found == fields.end() ? nullptr : &found->second;

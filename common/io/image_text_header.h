@@ -21,6 +21,8 @@ struct TextHeader {
   std::map<std::string, std::string> fields;
   std::uint64_t end_offset = 0;
 
+  /// FileError when the key stands already: readers differ in which of two they take.
+  void add(const std::string& key, const std::string& value);
   /// nullptr when the header does not have it.
   [[nodiscard]] const std::string* find(const std::string& key) const;
   /// FileError when the header does not have it.

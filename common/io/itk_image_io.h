@@ -14,8 +14,6 @@
 
 namespace af {
 
-enum class ValueType { Int8, UInt8, Int16, UInt16, Int32, UInt32, Int64, UInt64, Float32, Float64 };
-
 /// An image as ITK hands it over: axes in file order (the first is fastest), LPS mm, values in
 /// their own type.
 struct RawImage {

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <bit>
 #include <charconv>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <sstream>
 
 #include "base/error.h"
 #include "io/image_formats.h"
 #include "io/image_text_header.h"
+#include "io/itk_image_io.h"
 #include "io/stored_bytes.h"
 
 namespace af::image_formats {
@@ -34,7 +37,7 @@ TextHeader parse_meta_text(const fs::path& path) {
       break;
     }
     const std::string key = trimmed(line.substr(0, separator));
-    header.fields[key] = trimmed(line.substr(separator + 1));
+    header.add(key, trimmed(line.substr(separator + 1)));
     if (key == "ElementDataFile") {
       header.end_offset = at;
       return header;
@@ -43,22 +46,23 @@ TextHeader parse_meta_text(const fs::path& path) {
   throw FileError(path.string(), "MetaImage header ends without ElementDataFile");
 }
 
-std::uint64_t meta_type_bytes(const TextHeader& header) {
-  static const std::map<std::string, std::uint64_t> bytes_of_type = {{"MET_CHAR", 1},
-                                                                     {"MET_UCHAR", 1},
-                                                                     {"MET_SHORT", 2},
-                                                                     {"MET_USHORT", 2},
-                                                                     {"MET_INT", 4},
-                                                                     {"MET_UINT", 4},
-                                                                     {"MET_LONG", 4},
-                                                                     {"MET_ULONG", 4},
-                                                                     {"MET_LONG_LONG", 8},
-                                                                     {"MET_ULONG_LONG", 8},
-                                                                     {"MET_FLOAT", 4},
-                                                                     {"MET_DOUBLE", 8}};
+ValueType meta_value_type(const TextHeader& header) {
+  static const std::map<std::string, ValueType> type_of_name = {
+      {"MET_CHAR", ValueType::Int8},
+      {"MET_UCHAR", ValueType::UInt8},
+      {"MET_SHORT", ValueType::Int16},
+      {"MET_USHORT", ValueType::UInt16},
+      {"MET_INT", ValueType::Int32},
+      {"MET_UINT", ValueType::UInt32},
+      {"MET_LONG", ValueType::Int32},  // 4 bytes in MetaImage files
+      {"MET_ULONG", ValueType::UInt32},
+      {"MET_LONG_LONG", ValueType::Int64},
+      {"MET_ULONG_LONG", ValueType::UInt64},
+      {"MET_FLOAT", ValueType::Float32},
+      {"MET_DOUBLE", ValueType::Float64}};
   const std::string& type = header.require("ElementType");
-  const auto found = bytes_of_type.find(type);
-  if (found == bytes_of_type.end())
+  const auto found = type_of_name.find(type);
+  if (found == type_of_name.end())
     throw FileError(header.path, "ElementType", "one of MET_CHAR ... MET_DOUBLE", type);
   return found->second;
 }
@@ -96,6 +100,47 @@ void check_meta_numbers(const TextHeader& header, std::int64_t dimension) {
     check_meta_numbers(header, key, dimension);
 }
 
+/// Whether the voxels are in the other byte order than this machine's.
+bool is_meta_byte_swapped(const TextHeader& header) {
+  const bool binary = is_true(header, "BinaryDataByteOrderMSB", false);
+  const bool element = is_true(header, "ElementByteOrderMSB", binary);
+  if (header.find("BinaryDataByteOrderMSB") != nullptr && binary != element)
+    throw FileError(header.path, "BinaryDataByteOrderMSB and ElementByteOrderMSB disagree");
+  return element != (std::endian::native == std::endian::big);
+}
+
+/// Where the voxels begin. HeaderSize counts from the beginning of their file, -1 means its end
+/// less the voxels.
+std::uint64_t meta_payload_offset(const TextHeader& text,
+                                  const ImageHeader& header,
+                                  bool is_local,
+                                  std::uint64_t file_bytes) {
+  const std::uint64_t header_end = is_local ? text.end_offset : 0;
+  const std::int64_t size = text.integer("HeaderSize", 0);
+  if (size == 0) return header_end;
+  if (size > 0 && static_cast<std::uint64_t>(size) >= header_end)
+    return static_cast<std::uint64_t>(size);
+  const std::uint64_t payload = checked_payload_bytes(text.path, header);
+  if (size != -1 || header.compressed || file_bytes < header_end + payload)
+    throw FileError(text.path,
+                    "HeaderSize",
+                    "0, the beginning of the voxels in their file, or -1 (their file's last bytes, "
+                    "not compressed)",
+                    std::to_string(size));
+  return file_bytes - payload;
+}
+
+/// The length of the compressed voxels. MetaIO needs it where they stand behind the header, and
+/// reads zeros without it.
+std::optional<std::uint64_t> meta_compressed_bytes(const TextHeader& header, bool is_local) {
+  if (header.find("CompressedDataSize") == nullptr && !is_local) return std::nullopt;
+  (void)header.require("CompressedDataSize");
+  const std::int64_t bytes = header.integer("CompressedDataSize", 0);
+  if (bytes < 1)
+    throw FileError(header.path, "CompressedDataSize", "at least 1", std::to_string(bytes));
+  return static_cast<std::uint64_t>(bytes);
+}
+
 }  // namespace
 
 ImageHeader read_meta_header(const fs::path& path) {
@@ -108,7 +153,11 @@ ImageHeader read_meta_header(const fs::path& path) {
   const std::int64_t channels = text.integer("ElementNumberOfChannels", 1);
   if (channels < 1 || channels > 1024)
     throw FileError(text.path, "ElementNumberOfChannels", "1 to 1024", std::to_string(channels));
-  header.value_bytes = meta_type_bytes(text) * static_cast<std::uint64_t>(channels);
+  header.value_type = meta_value_type(text);
+  header.value_bytes = value_bytes(header.value_type) * static_cast<std::uint64_t>(channels);
+  header.is_byte_swapped = is_meta_byte_swapped(text);
+  header.has_spacing =
+      text.find("ElementSpacing") != nullptr || text.find("ElementSize") != nullptr;
   if (!is_true(text, "BinaryData", true))
     throw FileError(text.path, "BinaryData = False: text voxels are not supported");
   header.compressed = is_true(text, "CompressedData", false);
@@ -123,12 +172,8 @@ ImageHeader read_meta_header(const fs::path& path) {
   const bool local = kind == "local";
   header.data_file = local ? path : beside(path, data_file);
   const std::uint64_t bytes = existing_file_size(path, header.data_file);
-  const std::int64_t header_size = text.integer("HeaderSize", 0);
-  const std::uint64_t payload = checked_payload_bytes(path, header);
-  header.payload_offset = local ? text.end_offset : 0;
-  if (header_size > 0) header.payload_offset = static_cast<std::uint64_t>(header_size);
-  if (header_size == -1 && !header.compressed)
-    header.payload_offset = bytes > payload ? bytes - payload : 0;
+  header.payload_offset = meta_payload_offset(text, header, local, bytes);
+  if (header.compressed) header.compressed_bytes = meta_compressed_bytes(text, local);
   return header;
 }
 

@@ -9,8 +9,10 @@
 #include <Eigen/LU>
 
 #include "base/error.h"
+#include "base/plausible.h"
 #include "io/csv_table.h"
 #include "io/image_formats.h"
+#include "io/itk_image_io.h"
 #include "io/stored_bytes.h"
 
 namespace af::image_formats {
@@ -21,6 +23,7 @@ namespace {
 
 constexpr float kMaxOrientation = 1e6f;
 constexpr float kMinOrientation = 1e-30f;
+constexpr float kMaxSlope = 1e6f;
 constexpr std::size_t kNifti2HeaderBytes = 540;
 
 template <typename T>
@@ -31,21 +34,27 @@ T load(std::string_view bytes, std::size_t offset, bool swapped) {
   return std::bit_cast<T>(raw);
 }
 
-std::uint64_t nifti_type_bytes(const std::string& path, int datatype) {
-  static const std::map<int, std::uint64_t> bytes_of_type = {{2, 1},
-                                                             {4, 2},
-                                                             {8, 4},
-                                                             {16, 4},
-                                                             {64, 8},
-                                                             {128, 3},
-                                                             {256, 1},
-                                                             {512, 2},
-                                                             {768, 4},
-                                                             {1024, 8},
-                                                             {1280, 8},
-                                                             {2304, 4}};
-  const auto found = bytes_of_type.find(datatype);
-  if (found == bytes_of_type.end())
+/// A voxel's type: of each channel, and how many there are.
+struct NiftiType {
+  ValueType type = ValueType::Int16;
+  std::uint64_t channels = 1;
+};
+
+NiftiType nifti_type(const std::string& path, int datatype) {
+  static const std::map<int, NiftiType> type_of_code = {{2, {ValueType::UInt8}},
+                                                        {4, {ValueType::Int16}},
+                                                        {8, {ValueType::Int32}},
+                                                        {16, {ValueType::Float32}},
+                                                        {64, {ValueType::Float64}},
+                                                        {128, {ValueType::UInt8, 3}},
+                                                        {256, {ValueType::Int8}},
+                                                        {512, {ValueType::UInt16}},
+                                                        {768, {ValueType::UInt32}},
+                                                        {1024, {ValueType::Int64}},
+                                                        {1280, {ValueType::UInt64}},
+                                                        {2304, {ValueType::UInt8, 4}}};
+  const auto found = type_of_code.find(datatype);
+  if (found == type_of_code.end())
     throw FileError(path, "datatype", "a real number type of NIfTI-1", std::to_string(datatype));
   return found->second;
 }
@@ -111,10 +120,10 @@ void check_nifti_numbers(const std::string& path, std::string_view raw, bool swa
   for (std::size_t axis = 1; axis <= 3; ++axis) {
     const float spacing = load<float>(raw, 76 + 4 * axis, swapped);
     if (axis <= static_cast<std::size_t>(load<std::int16_t>(raw, 40, swapped)) &&
-        !(spacing > 0.0f && std::isfinite(spacing)))
+        !is_plausible_spacing_mm(static_cast<double>(spacing)))
       throw InputError("pixdim[" + std::to_string(axis) + "]",
-                       std::to_string(spacing),
-                       "spacing must be positive and finite (mm)",
+                       number_text(static_cast<double>(spacing)),
+                       std::string("spacing ") + kPlausibleSpacing,
                        path);
   }
   // Quaternion, offsets, and the rows of the sform. What is not finite makes ITK's singular value
@@ -129,10 +138,13 @@ void check_nifti_numbers(const std::string& path, std::string_view raw, bool swa
   }
   const float slope = load<float>(raw, 112, swapped);
   const float intercept = load<float>(raw, 116, swapped);
-  if (!std::isfinite(slope) || !std::isfinite(intercept))
+  // ITK takes a next to nothing slope for none.
+  if (!(std::abs(slope) <= kMaxSlope && std::abs(intercept) <= kMaxSlope) ||
+      (slope != 0.0f && std::abs(slope) < 1.0f / kMaxSlope))
     throw InputError("scl_slope, scl_inter",
-                     std::to_string(slope) + ", " + std::to_string(intercept),
-                     "must be finite",
+                     number_text(static_cast<double>(slope)) + ", " +
+                         number_text(static_cast<double>(intercept)),
+                     "must be at most 1e6, the slope 0 or at least 1e-6",
                      path);
 }
 
@@ -167,7 +179,9 @@ ImageHeader read_nifti_header(const fs::path& path) {
           name, "dim[" + std::to_string(axis) + "]", "at least 1", std::to_string(extent));
     header.size.push_back(static_cast<std::uint64_t>(extent));
   }
-  header.value_bytes = nifti_type_bytes(name, load<std::int16_t>(raw, 70, swapped));
+  const NiftiType type = nifti_type(name, load<std::int16_t>(raw, 70, swapped));
+  header.value_type = type.type;
+  header.value_bytes = value_bytes(type.type) * type.channels;
   const int bits = load<std::int16_t>(raw, 72, swapped);
   if (static_cast<std::uint64_t>(bits) != 8 * header.value_bytes)
     throw FileError(name, "bitpix", std::to_string(8 * header.value_bytes), std::to_string(bits));
@@ -178,8 +192,11 @@ ImageHeader read_nifti_header(const fs::path& path) {
   check_nifti_numbers(name, raw, swapped);
   const float slope = load<float>(raw, 112, swapped);
   const float intercept = load<float>(raw, 116, swapped);
+  header.is_byte_swapped = swapped;
   // A slope of 0 means that there is none.
-  header.has_plain_values = !swapped && (slope == 0.0f || slope == 1.0f) && intercept == 0.0f;
+  header.slope = slope == 0.0f ? 1.0 : static_cast<double>(slope);
+  header.intercept = slope == 0.0f ? 0.0 : static_cast<double>(intercept);
+  header.is_rescaled = header.slope != 1.0 || header.intercept != 0.0;
   header.nifti = nifti_orientation(raw, swapped);
   if (header.nifti.sform) check_is_orthogonal(name, "sform", *header.nifti.sform);
   header.has_orientation = header.nifti.qform.has_value() || header.nifti.sform.has_value();

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "io/input_file.h"
 
 namespace af {
 
@@ -168,7 +169,10 @@ struct TextParts::File {
 };
 
 TextParts::TextParts(const std::filesystem::path& path)
-    : file_(new File{Descriptor(path, O_RDONLY)}) {}
+    : file_([&path] {
+        require_regular_file(path);
+        return new File{Descriptor(path, O_RDONLY)};
+      }()) {}
 
 TextParts::~TextParts() = default;
 

@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "io/image_formats.h"
+#include "io/input_file.h"
 
 namespace af::image_formats {
 
@@ -48,7 +49,7 @@ void check_png_header(const std::string& path, std::string_view data) {
 
 void check_png(const fs::path& path) {
   const std::uint64_t file_bytes = existing_file_size(path, path);
-  std::ifstream file(path, std::ios::binary);
+  std::ifstream file = open_input_file(path);
   std::uint64_t at = 8;  // behind the signature
   for (bool is_first = true;; is_first = false) {
     std::array<char, 8> head{};

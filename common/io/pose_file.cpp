@@ -178,7 +178,7 @@ RigidTransform matrix_of_row(const CsvTable& table, std::size_t row, int matrix_
 RigidTransform parameters_of_row(const CsvTable& table, std::size_t row, const PoseFrame& frame) {
   std::array<double, 6> values{};
   for (std::size_t i = 0; i < values.size(); ++i) values[i] = table.number(row, kParameterNames[i]);
-  return pose_from_parameters(frame, PoseParameters::from_deg_and_mm(values));
+  return pose_of_deg_and_mm(frame, values, table.where(row));
 }
 
 void check_parameter_columns(const CsvTable& table, const std::string& file) {
@@ -202,6 +202,13 @@ RigidTransform read_pose(const std::filesystem::path& path) {
   if (path.extension() == ".toml" || text.find(kPoseKey) != std::string::npos)
     return pose_of_toml(text, file);
   return pose_of_plain_numbers(text, file);
+}
+
+RigidTransform pose_of_deg_and_mm(const PoseFrame& frame,
+                                  const std::array<double, 6>& values,
+                                  const std::string& where) {
+  const RigidTransform pose = pose_from_parameters(frame, PoseParameters::from_deg_and_mm(values));
+  return rigid_or_throw(pose.matrix(), where);
 }
 
 std::string pose_to_toml(const RigidTransform& room_from_ct) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -14,6 +15,12 @@ namespace af {
 /// (.tfm, holding ct_from_room), or plain text with 16 numbers row by row. InputError when it is
 /// not rigid, FileError when unreadable.
 RigidTransform read_pose(const std::filesystem::path& path);
+
+/// The pose of six numbers (rx_deg ... tz_mm) relative to `frame`. InputError, beginning with
+/// `where`, when it is not finite or leads out of the world (rigidity_problems()).
+RigidTransform pose_of_deg_and_mm(const PoseFrame& frame,
+                                  const std::array<double, 6>& values,
+                                  const std::string& where);
 
 /// TOML text with room_from_ct as 4x4, 17 significant digits.
 std::string pose_to_toml(const RigidTransform& room_from_ct);

@@ -102,7 +102,9 @@ std::vector<ShardFile> shards_of(const fs::path& folder, const std::string& name
 }
 
 /// Visits the sound records up to the first that is not; returns their size with their headers.
+/// What is named like a shard and is no file has none.
 std::uint64_t visit_shard(const fs::path& path, const ProgressJournal::Visit& visit) {
+  if (!fs::is_regular_file(path)) return 0;
   std::ifstream file(path, std::ios::binary);
   const std::uint64_t size = fs::file_size(path);
   std::uint64_t sound_bytes = 0;
@@ -147,7 +149,8 @@ void ProgressJournal::visit(int shard_count, const Visit& visit) const {
 void ProgressJournal::mend_and_visit(const Visit& visit) {
   for (const ShardFile& shard : shards_of(folder_, name_)) {
     const std::uint64_t sound_bytes = visit_shard(shard.path, visit);
-    if (sound_bytes < fs::file_size(shard.path)) fs::resize_file(shard.path, sound_bytes);
+    if (fs::is_regular_file(shard.path) && sound_bytes < fs::file_size(shard.path))
+      fs::resize_file(shard.path, sound_bytes);
   }
 }
 

@@ -112,6 +112,9 @@ void check_camera_name(const std::string& name, TomlTableReader& reader) {
                        "characters, no '-' in front");
 }
 
+/// Pixels times mm, at any scale whose third power is finite.
+constexpr double kMaxProjection = 1e90;
+
 std::optional<CameraGeometry> camera_from_matrix(TomlTableReader& reader,
                                                  const CameraGeometry& stated,
                                                  const Eigen::Vector3d& isocenter_point,
@@ -119,7 +122,8 @@ std::optional<CameraGeometry> camera_from_matrix(TomlTableReader& reader,
   for (const char* key : kGeometryKeys)
     if (reader.has(key))
       reader.add_problem(key, "must not stand beside projection_matrix, which already fixes it");
-  const auto matrix = reader.get_matrix("projection_matrix", 3, 4, Presence::Required);
+  const auto matrix =
+      reader.get_matrix("projection_matrix", 3, 4, Presence::Required, kMaxProjection);
   if (!matrix || !(stated.pixel_spacing_mm.minCoeff() > 0.0)) return std::nullopt;
   try {
     return CameraGeometry::from_projection_matrix(
@@ -232,7 +236,8 @@ CameraRig read_rig(const std::string& name_or_path, std::vector<std::string>* wa
   if (const auto found = builtin_rigs().find(name_or_path); found != builtin_rigs().end())
     return parse_rig(found->second, name_or_path, warnings);
   std::error_code ignored;
-  if (!std::filesystem::exists(name_or_path, ignored))
+  if (std::filesystem::status(name_or_path, ignored).type() ==
+      std::filesystem::file_type::not_found)
     throw FileError(name_or_path,
                     "no such file, and not a shipped rig (" + joined(builtin_rig_names()) + ")");
   return rig_from_table(read_toml_file(name_or_path), name_or_path, warnings);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "io/input_file.h"
 
 namespace af {
 
@@ -59,8 +60,7 @@ std::string sha256_hex(std::span<const std::byte> bytes) {
 }
 
 std::string sha256_of_file(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw FileError(path, std::string("cannot be opened: ") + strerror(errno));
+  std::ifstream file = open_input_file(path);
   Sha256 hash;
   std::vector<char> buffer(std::size_t{1} << 20);
   while (file) {
@@ -68,7 +68,7 @@ std::string sha256_of_file(const std::string& path) {
     file.read(buffer.data(), static_cast<std::streamsize>(buffer.size()));
     hash.update(std::as_bytes(std::span(buffer).first(static_cast<std::size_t>(file.gcount()))));
   }
-  // A folder opens, and fails only here; a plain end of file sets no badbit.
+  // A plain end of file sets no badbit.
   if (file.bad()) throw FileError(path, std::string("cannot be read: ") + strerror(errno));
   return hash.hex_digest();
 }

@@ -2,20 +2,23 @@
 #include "io/stored_bytes.h"
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
+#include <cstdio>
 #include <fstream>
 #include <new>
 #include <vector>
 #include <zlib.h>
 
 #include "base/error.h"
+#include "io/input_file.h"
 
 namespace af {
 
 namespace fs = std::filesystem;
 
 namespace {
+
+/// The first byte of every gzip member, and of no zlib stream.
+constexpr int kGzipMark = 0x1f;
 
 /// An inflating zlib stream (zlib or gzip wrapped) that releases itself.
 class Inflater {
@@ -35,11 +38,7 @@ class Inflater {
 }  // namespace
 
 std::string read_prefix(const fs::path& path, std::size_t bytes) {
-  std::error_code error;
-  if (!fs::exists(path, error)) throw FileError(path.string(), "does not exist");
-  if (fs::is_directory(path, error)) throw FileError(path.string(), "is a folder, not a file");
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw FileError(path.string(), "cannot be opened: " + std::string(strerror(errno)));
+  std::ifstream file = open_input_file(path);
   std::string prefix(bytes, '\0');
   file.read(prefix.data(), static_cast<std::streamsize>(bytes));
   prefix.resize(static_cast<std::size_t>(file.gcount()));
@@ -66,19 +65,20 @@ std::string read_inflated_prefix(const fs::path& path, std::size_t bytes) {
   return prefix;
 }
 
-std::uint64_t inflate_file(const fs::path& path, std::uint64_t offset, const ByteVisitor& visit) {
-  std::ifstream file(path, std::ios::binary);
+InflatedBytes inflate_file(const fs::path& path, std::uint64_t offset, const ByteVisitor& visit) {
+  std::ifstream file = open_input_file(path);
   file.seekg(static_cast<std::streamoff>(offset));
   Inflater inflater;
   z_stream& stream = inflater.stream();
   std::vector<unsigned char> input(1u << 16);
   std::vector<unsigned char> output(1u << 18);
-  std::uint64_t total = 0;
+  InflatedBytes total;
   bool finished = false;
   while (file && !finished) {
     file.read(reinterpret_cast<char*>(input.data()), static_cast<std::streamsize>(input.size()));
     stream.next_in = input.data();
     stream.avail_in = static_cast<unsigned>(file.gcount());
+    total.compressed += stream.avail_in;
     // A full output buffer may hide more output that needs no more input.
     do {
       stream.next_out = output.data();
@@ -86,15 +86,16 @@ std::uint64_t inflate_file(const fs::path& path, std::uint64_t offset, const Byt
       const int status = inflate(&stream, Z_NO_FLUSH);
       const std::size_t inflated = output.size() - stream.avail_out;
       visit(std::as_bytes(std::span(output).first(inflated)));
-      total += inflated;
+      total.inflated += inflated;
       finished = status == Z_STREAM_END;
       // Z_BUF_ERROR: nothing was left to do; the next input goes on.
       if (!finished && status != Z_OK && status != Z_BUF_ERROR)
         throw FileError(path.string(),
-                        "compressed data are corrupt after " + std::to_string(total) +
+                        "compressed data are corrupt after " + std::to_string(total.inflated) +
                             " bytes: " + (stream.msg != nullptr ? stream.msg : "bad stream"));
-      // Another gzip member may follow; anything else is padding that readers ignore.
-      if (finished && stream.avail_in > 0 && stream.next_in[0] == 0x1f) {
+      // Another gzip member may follow; anything else does not belong to the stream.
+      const int next = stream.avail_in > 0 ? stream.next_in[0] : finished ? file.peek() : EOF;
+      if (finished && next == kGzipMark) {
         inflateReset(&stream);
         finished = false;
       }
@@ -102,15 +103,16 @@ std::uint64_t inflate_file(const fs::path& path, std::uint64_t offset, const Byt
   }
   if (!finished)
     throw FileError(path.string(),
-                    "truncated: the compressed data end after " + std::to_string(total) +
+                    "truncated: the compressed data end after " + std::to_string(total.inflated) +
                         " bytes without their end mark");
+  total.compressed -= stream.avail_in;
   return total;
 }
 
 std::uint64_t read_plain_file(const fs::path& path,
                               std::uint64_t offset,
                               const ByteVisitor& visit) {
-  std::ifstream file(path, std::ios::binary);
+  std::ifstream file = open_input_file(path);
   file.seekg(static_cast<std::streamoff>(offset));
   std::vector<char> piece(kPieceBytes);
   std::uint64_t total = 0;

@@ -26,9 +26,16 @@ bool is_gzip(std::string_view bytes);
 /// First bytes of a file, inflated when it is gzip; fewer when there are not as many.
 std::string read_inflated_prefix(const std::filesystem::path& path, std::size_t bytes);
 
-/// Bytes that a compressed stream inflates to, handed to `visit` on the way; FileError when it is
+/// The lengths of a compressed stream.
+struct InflatedBytes {
+  std::uint64_t inflated = 0;
+  std::uint64_t compressed = 0;
+};
+
+/// Inflates a zlib stream, or all members of a gzip file, that begins at `offset`, handing the
+/// bytes to `visit` on the way. What stands behind its end is not looked at. FileError when it is
 /// cut or its checksum is wrong.
-std::uint64_t inflate_file(const std::filesystem::path& path,
+InflatedBytes inflate_file(const std::filesystem::path& path,
                            std::uint64_t offset,
                            const ByteVisitor& visit);
 

@@ -101,24 +101,28 @@ std::string nearest_name(std::string_view name, const std::set<std::string>& kno
   return nearest;
 }
 
-std::optional<double> finite_number(const toml::node& node) {
+std::optional<double> number_within(const toml::node& node, double most) {
   if (!node.is_number()) return std::nullopt;
   const auto value = node.value<double>();
-  if (!value || !std::isfinite(*value)) return std::nullopt;
+  if (!value || !(std::abs(*value) <= most)) return std::nullopt;
   return value;
 }
 
-/// The numbers of a list of `count` finite numbers; nullopt for anything else.
-std::optional<std::vector<double>> finite_numbers(const toml::node& node, int count) {
+/// The numbers of a list of `count` numbers that are not beyond `most`; nullopt for anything else.
+std::optional<std::vector<double>> numbers_within(const toml::node& node, int count, double most) {
   const toml::array* list = node.as_array();
   if (list == nullptr || list->size() != static_cast<std::size_t>(count)) return std::nullopt;
   std::vector<double> numbers;
   for (const toml::node& element : *list) {
-    const auto number = finite_number(element);
+    const auto number = number_within(element, most);
     if (!number) return std::nullopt;
     numbers.push_back(*number);
   }
   return numbers;
+}
+
+std::string wanted_numbers(double most) {
+  return " finite numbers, none beyond " + number_text(most);
 }
 
 }  // namespace
@@ -204,8 +208,9 @@ std::optional<std::vector<double>> TomlTableReader::get_numbers(const char* key,
                                                                 Presence presence) {
   const toml::node* found = find(key, presence);
   if (found == nullptr) return std::nullopt;
-  auto numbers = finite_numbers(*found, count);
-  if (!numbers) add_problem(key, "must be a list of " + std::to_string(count) + " finite numbers");
+  auto numbers = numbers_within(*found, count, kMaxRoomMm);
+  if (!numbers)
+    add_problem(key, "must be a list of " + std::to_string(count) + wanted_numbers(kMaxRoomMm));
   return numbers;
 }
 
@@ -216,9 +221,9 @@ std::optional<std::vector<int>> TomlTableReader::get_integers(const char* key,
   if (found == nullptr) return std::nullopt;
   constexpr double kLargest = std::numeric_limits<int>::max();
   std::vector<int> integers;
-  const auto numbers = finite_numbers(*found, count);
+  const auto numbers = numbers_within(*found, count, kLargest);
   for (const double number : numbers.value_or(std::vector<double>())) {
-    if (number != std::round(number) || std::abs(number) > kLargest) break;
+    if (number != std::round(number)) break;
     integers.push_back(static_cast<int>(number));
   }
   if (integers.size() == static_cast<std::size_t>(count)) return integers;
@@ -226,10 +231,8 @@ std::optional<std::vector<int>> TomlTableReader::get_integers(const char* key,
   return std::nullopt;
 }
 
-std::optional<Eigen::MatrixXd> TomlTableReader::get_matrix(const char* key,
-                                                           int rows,
-                                                           int columns,
-                                                           Presence presence) {
+std::optional<Eigen::MatrixXd> TomlTableReader::get_matrix(
+    const char* key, int rows, int columns, Presence presence, double most) {
   const toml::node* found = find(key, presence);
   if (found == nullptr) return std::nullopt;
   const toml::array* list = found->as_array();
@@ -237,14 +240,14 @@ std::optional<Eigen::MatrixXd> TomlTableReader::get_matrix(const char* key,
       list != nullptr && (rows < 0 || list->size() == static_cast<std::size_t>(rows));
   const std::string wanted = "must be a list of " +
                              (rows < 0 ? std::string() : std::to_string(rows) + " ") + "lists of " +
-                             std::to_string(columns) + " finite numbers";
+                             std::to_string(columns) + wanted_numbers(most);
   if (!size_fits) {
     add_problem(key, wanted);
     return std::nullopt;
   }
   Eigen::MatrixXd matrix(static_cast<Eigen::Index>(list->size()), columns);
   for (std::size_t i = 0; i < list->size(); ++i) {
-    const auto row = finite_numbers(*list->get(i), columns);
+    const auto row = numbers_within(*list->get(i), columns, most);
     if (!row) {
       problems_.add(*list->get(i),
                     prefix_ + key + "[" + std::to_string(i) + "] = " + value_text(*list->get(i)) +

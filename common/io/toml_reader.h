@@ -11,6 +11,7 @@
 
 #include <Eigen/Core>
 
+#include "base/plausible.h"
 #include "geometry/rigid_transform.h"
 
 // Internal to common/io: toml++ stays out of every public header.
@@ -58,7 +59,7 @@ class TomlTableReader {
       : table_(table), prefix_(std::move(prefix)), problems_(problems) {}
 
   std::optional<std::string> get_string(const char* key, Presence presence);
-  /// A list of exactly `Size` finite numbers.
+  /// A list of exactly `Size` numbers within kMaxRoomMm: points, directions, spacings.
   template <int Size>
   std::optional<Eigen::Matrix<double, Size, 1>> get_vector(const char* key, Presence presence) {
     const auto numbers = get_numbers(key, Size, presence);
@@ -67,11 +68,10 @@ class TomlTableReader {
   }
   /// A list of exactly `count` whole numbers that fit an int.
   std::optional<std::vector<int>> get_integers(const char* key, int count, Presence presence);
-  /// A list of rows of `columns` finite numbers each; `rows` = -1: any number of rows.
-  std::optional<Eigen::MatrixXd> get_matrix(const char* key,
-                                            int rows,
-                                            int columns,
-                                            Presence presence);
+  /// A list of rows of `columns` numbers each, finite and not beyond `most`; `rows` = -1: any
+  /// number of rows.
+  std::optional<Eigen::MatrixXd> get_matrix(
+      const char* key, int rows, int columns, Presence presence, double most = kMaxRoomMm);
   /// A rigid 4x4 transform.
   std::optional<RigidTransform> get_pose(const char* key, Presence presence);
   /// The tables of [[key]]; none is a problem when the key is required.

@@ -50,13 +50,11 @@ void check_values(const Image2d& image, const StudyView& view) {
   const std::string file = view.xray.string();
   for (std::size_t i = 0; i < image.pixels.size(); ++i) {
     const float value = image.pixels[i];
-    const bool negative = view.xray_domain == XrayDomain::Intensity && value < 0.0f;
-    if (std::isfinite(value) && !negative) continue;
+    if (view.xray_domain != XrayDomain::Intensity || value >= 0.0f) continue;
     const auto width = static_cast<std::size_t>(image.width);
     throw InputError("pixel (" + std::to_string(i % width) + ", " + std::to_string(i / width) + ")",
                      std::to_string(value),
-                     negative ? "intensities must not be negative (xray_domain = \"attenuation\"?)"
-                              : "must be finite",
+                     "intensities must not be negative (xray_domain = \"attenuation\"?)",
                      file);
   }
   const auto [low, high] = std::minmax_element(image.pixels.begin(), image.pixels.end());

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <filesystem>
 #include <stdexcept>
 
 #include "base/error.h"
@@ -79,6 +80,10 @@ RankFailure plain_failure_of(const std::exception_ptr& error) {
     return {static_cast<int>(known.exit_code()), known.what()};
   } catch (const std::bad_alloc&) {
     return {static_cast<int>(ExitCode::Internal), "out of memory"};
+  } catch (const std::filesystem::filesystem_error& error_of_file) {
+    // A name too long, links in a circle, a folder that may not be listed: the path is at fault.
+    return {static_cast<int>(ExitCode::File),
+            error_of_file.path1().string() + ": " + error_of_file.code().message()};
   } catch (const std::exception& unknown) {
     return {static_cast<int>(ExitCode::Internal), std::string("internal error: ") + unknown.what()};
   } catch (...) {

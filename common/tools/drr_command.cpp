@@ -160,7 +160,7 @@ std::vector<RigidTransform> requested_poses(const DrrOptions& options, const Pos
     if (options.rotation_deg.has_value()) values[i] = (*options.rotation_deg)[i];
     if (options.translation_mm.has_value()) values[i + 3] = (*options.translation_mm)[i];
   }
-  return {pose_from_parameters(frame, PoseParameters::from_deg_and_mm(values))};
+  return {pose_of_deg_and_mm(frame, values, "--rotation-deg, --translation-mm")};
 }
 
 std::vector<Image2d> render_poses(const DrrRenderer& renderer,
@@ -187,14 +187,17 @@ std::string write_drrs(const std::vector<Image2d>& drrs,
   std::ostringstream line;
   line << options.output.string() << ": " << drrs.front().width << " x " << drrs.front().height;
   if (ends_with(options.output, ".png")) {
-    const auto [low, high] =
+    const auto [low, percentile] =
         percentile_window(drrs.front(), options.window_percent[0], options.window_percent[1]);
+    // A DRR of one value shows nothing, as when the CT is out of view.
+    const double high = percentile > low ? percentile : low + 1.0;
     // Bright is attenuated, as in the other formats; --invert gives the look of a film.
     if (options.invert)
       write_png_image(negated(drrs.front()), options.output, -high, -low);
     else
       write_png_image(drrs.front(), options.output, low, high);
-    line << ", U " << fixed_text(low, 3) << (options.invert ? " (white) to " : " (black) to ")
+    line << (percentile > low ? "" : ", constant: the CT is out of view") << ", U "
+         << fixed_text(low, 3) << (options.invert ? " (white) to " : " (black) to ")
          << fixed_text(high, 3)
          << (options.invert ? " (black), percentiles " : " (white), percentiles ")
          << number_text(options.window_percent[0]) << " and "

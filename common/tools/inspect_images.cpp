@@ -12,6 +12,7 @@
 #include "io/image_header.h"
 #include "io/itk_image_io.h"
 #include "io/sha256.h"
+#include "io/stored_image.h"
 #include "tools/inspect_kinds.h"
 
 namespace af {
@@ -246,9 +247,8 @@ void inspect_image(const fs::path& path, const InspectOptions& options, Inspecti
       header.size.begin(), header.size.end(), [](std::uint64_t extent) { return extent > 1; });
   if (long_axes > 2 && header.value_bytes != sizeof(float))
     return inspect_ct(path, options, inspection);
-  check_image_payload(path, header, nullptr);
   bool is_volume = false;
-  const RawImage image = read_raw_image(path, *format, [&](const RawImage& seen) {
+  const RawImage image = read_stored_image(path, header, nullptr, [&](const RawImage& seen) {
     is_volume = used_dimensions(seen) > 2;
     if (seen.voxel_count() > kMaxPixels * (is_volume ? 16 : 1))
       throw InputError("size", std::to_string(seen.voxel_count()) + " voxels", "is too large");

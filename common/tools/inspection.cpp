@@ -9,6 +9,7 @@
 
 #include "io/dicom_series.h"
 #include "io/image_header.h"
+#include "io/input_file.h"
 #include "io/rig_file.h"
 #include "io/study_file.h"
 #include "tools/inspect_kinds.h"
@@ -28,8 +29,7 @@ constexpr const char* kWhatWasTried =
     "CSV table, ITK transform, pose of 16 numbers, name of a shipped rig";
 
 std::string first_bytes(const fs::path& path, std::size_t count) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw FileError(path.string(), "cannot be opened");
+  std::ifstream file = open_input_file(path);
   std::string bytes(count, '\0');
   file.read(bytes.data(), static_cast<std::streamsize>(count));
   bytes.resize(static_cast<std::size_t>(file.gcount()));
@@ -89,13 +89,14 @@ void inspect_file(const fs::path& path,
 /// The files of a folder that mean something to this project, in the order of their names.
 std::vector<fs::path> known_files(const fs::path& folder) {
   std::vector<fs::path> files;
+  std::error_code error;  // of a link that leads nowhere or in circles
   for (const auto& entry : fs::directory_iterator(folder)) {
     const std::string name = entry.path().filename().string();
     const bool known = name == "result.json" || name == "summary.json" ||
                        name == "registrations.csv" || name == "image-quality.csv" ||
                        name == "study.toml" || name == "rig.toml" || name == "pose.toml" ||
                        name.ends_with(".tfm") || name.ends_with(".af.h5");
-    if (known && entry.is_regular_file()) files.push_back(entry.path());
+    if (known && entry.is_regular_file(error)) files.push_back(entry.path());
   }
   std::sort(files.begin(), files.end());
   return files;

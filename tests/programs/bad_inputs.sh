@@ -95,6 +95,45 @@ of_ct 4 'empty' 'folder without DICOM' empty
 gzip --decompress --stdout valid/ct.nii.gz >metres.nii
 printf '\001' | dd of=metres.nii bs=1 seek=123 conv=notrunc status=none
 of_ct 3 'metres.nii' 'NIfTI in metres' metres.nii
+of_ct 4 'CompressedDataSize' 'compressed without its length' no-compressed-size.mha
+of_ct 4 'CompressedDataSize' 'compressed, wrong length' wrong-compressed-size.mha
+of_ct 3 'spacing = (1, 1e+300, 1) mm: must be 0.01 to 100 mm' 'spacing of 1e300 mm' huge-spacing.mha
+of_ct 3 'origin = (0, 1e+300, 0) mm' 'origin at 1e300 mm' huge-offset.mha
+of_ct 3 'HU must be within 1e6' 'HU of 1e30' huge-hu.mha
+
+printf -- '--- no file ---\n'
+# What would be waited for, or never ends; each command ends by itself long before the limit.
+mkfifo pipe
+ln -s loop loop
+long_name=$(printf 'x%.0s' {1..303})
+in_time() { timeout 60 "$@"; }
+drr=(in_time "$bin/af-drr" -o out/drr.mha)
+drr_of_ct=("${drr[@]}" --ct valid/ct.nii.gz --rig valid/rig.toml --camera AP)
+register_one=(in_time "$bin/af-register" --study valid/study.toml --renderer raycast -o out/result)
+# not_a_file PART PATH: PATH as each kind of input; every message says PART.
+not_a_file() {
+  local part=$1 path=$2
+  row 4 "$part" "$path as ct" "${drr[@]}" --ct "$path" --rig valid/rig.toml --camera AP
+  row 4 "$part" "$path as rig" "${drr[@]}" --ct valid/ct.nii.gz --rig "$path" --camera AP
+  row 4 "$part" "$path as field" "${drr[@]}" --field "$path"
+  row 4 "$part" "$path as pose" "${drr_of_ct[@]}" --pose "$path"
+  row 4 "$part" "$path as poses" "${drr_of_ct[@]}" --poses "$path"
+  row 4 "$part" "$path as nominal pose" in_time "${precompute[@]}" --ct valid/ct.nii.gz --rig valid/rig.toml \
+    --camera AP --nominal-pose "$path"
+  row 4 "$part" "$path as study" in_time "$bin/af-register" --study "$path" --renderer raycast -o out/result
+  row 4 "$part" "$path as study of poses" in_time "${precompute[@]}" --study "$path" --camera AP
+  row 4 "$part" "$path as start pose" "${register_one[@]}" --start-pose "$path"
+  row 4 "$part" "$path as starts" "${register_one[@]}" --starts "$path"
+  row 4 "$part" "$path as X-ray" in_time "$bin/af-register" --renderer raycast -o out/result \
+    --study "$(edited study.toml "0,/^xray = .*/s//xray = \"..\\/$path\"/")"
+}
+not_a_file 'is a pipe' pipe
+not_a_file 'Too many levels of symbolic links' loop
+not_a_file 'File name too long' "$long_name"
+row 4 'is a device' 'endless device as rig' "${drr[@]}" --ct valid/ct.nii.gz --rig /dev/zero --camera AP
+row 4 'is a folder' 'folder as rig' "${drr[@]}" --ct valid/ct.nii.gz --rig empty --camera AP
+row 4 'is a folder' 'folder as poses' "${drr_of_ct[@]}" --poses empty
+row 4 'is no regular file' 'pipe to inspect' in_time "$bin/af-inspect" pipe
 
 printf -- '--- rig ---\n'
 of_rig 3 'column_direction' 'axis not unit' "$(edited rig.toml '0,/^column_direction = .*/s//column_direction = [1.1, 0, 0]/')"
@@ -102,6 +141,8 @@ of_rig 3 'row_direction' 'axes not orthogonal' "$(edited rig.toml '0,/^row_direc
 of_rig 3 'AP' 'duplicate camera names' "$(edited rig.toml 's/"LAT"/"AP"/')"
 of_rig 3 'source_point' 'source on the detector plane' "$(edited rig.toml '0,/^source_point = .*/s//source_point = [0, 350, 0]/')"
 of_rig 3 'pixel_spacing' 'unknown key (typo)' "$(edited rig.toml '0,/^pixel_spacing_mm/s//pixel_spacing/')"
+of_rig 3 'source_point' 'source at 1e300 mm' "$(edited rig.toml '0,/^source_point = .*/s//source_point = [0, 1e300, 0]/')"
+of_rig 3 'pixel_spacing_mm' 'pixels of 1e300 mm' "$(edited rig.toml '0,/^pixel_spacing_mm = .*/s//pixel_spacing_mm = [1e300, 3]/')"
 of_rig 4 'c-arm-9in' 'unknown shipped rig' c-arm-9in
 of_rig 4 'edited-rig.toml' 'not TOML' "$(edited rig.toml '1s/^.*$/= 3/')"
 row 3 "XY" 'unknown camera' "${precompute[@]}" --study valid/study.toml --camera XY
@@ -109,6 +150,9 @@ row 3 "XY" 'unknown camera' "${precompute[@]}" --study valid/study.toml --camera
 printf -- '--- study ---\n'
 of_study 3 'nominal_room_from_ct' 'pose not rigid' "$(edited study.toml 's/^nominal_room_from_ct = .*/nominal_room_from_ct = [[1,0,0,0],[0,2,0,0],[0,0,1,0],[0,0,0,1]]/')"
 of_study 3 'roi_px' 'ROI off the detector' "$(edited study.toml '0,/^roi_px = .*/s//roi_px = [40, 40, 20, 20]/')"
+of_study 3 'target_box_ct_mm' 'target box to 1e308' "$(edited study.toml 's/^target_box_ct_mm = .*/target_box_ct_mm = [[-1e308,0,0],[1,1,1]]/')"
+of_study 3 'translation' 'pose 1e300 mm away' "$(edited study.toml 's/^nominal_room_from_ct = .*/nominal_room_from_ct = [[1,0,0,1e300],[0,1,0,0],[0,0,1,0],[0,0,0,1]]/')"
+of_study 3 'roi_px' 'ROI of huge numbers' "$(edited study.toml '0,/^roi_px = .*/s//roi_px = [2147483647, 0, 2147483647, 1]/')"
 of_study 3 'collinear' 'collinear fiducials' "$(edited study.toml 's/^name = .*/&\nfiducials_ct_mm = [[0,0,0],[1,1,1],[2,2,2],[3,3,3]]/; s/^roi_px = .*/&\nfiducials_px = [[10,10],[20,20],[30,30],[40,41]]/')"
 of_study 4 'gone.mha' 'X-ray missing' "$(edited study.toml '0,/^xray = .*/s//xray = "gone.mha"/')"
 of_study 4 'edited-study.toml' 'not TOML' "$(edited study.toml '1s/^.*$/rig = /')"
@@ -122,6 +166,10 @@ of_option 3 'codewords' 'codewords > 65536' --codewords 70000
 of_option 3 'codewords' 'codewords > training tiles' --codewords 60000
 of_option 3 'max_rotation_deg' 'rotation range too large' --max-rotation-deg 85
 of_option 3 'max_translation_mm' 'source inside the CT within the range' --max-translation-mm 640
+row 3 'center_ct_mm = nan' 'centre that is no number' "${precompute[@]}" --ct valid/ct.nii.gz --rig valid/rig.toml \
+  --camera AP --center-ct-mm nan,0,0
+row 3 "translation" 'DRR 1e308 mm away' "${drr_of_ct[@]}" --translation-mm 1e308,0,0
+row 3 "translation" 'start 1e308 mm away' "${register_one[@]}" --start-translation-mm 1e308,0,0
 of_option 3 'memory' 'memory limit' --memory-limit 1kb
 
 printf -- '--- field ---\n'

@@ -5,8 +5,10 @@
 #include <fstream>
 #include <iostream>
 #include <limits>
+#include <span>
 #include <string>
 #include <vector>
+#include <zlib.h>
 
 #include "programs/small_study.h"
 #include "unit/io/ct_test_data.h"
@@ -56,6 +58,43 @@ void write_meta(const fs::path& path, const std::string& type, int dimensions, T
   if (!out.flush()) throw std::runtime_error("cannot write " + path.string());
 }
 
+std::string deflated(std::span<const std::int16_t> voxels) {
+  const auto raw = std::as_bytes(voxels);
+  uLongf size = compressBound(raw.size());
+  std::string stream(size, '\0');
+  compress(reinterpret_cast<Bytef*>(stream.data()),
+           &size,
+           reinterpret_cast<const Bytef*>(raw.data()),
+           raw.size());
+  stream.resize(size);
+  return stream;
+}
+
+/// MetaImages with sound compressed voxels and one thing wrong in the header.
+void write_broken_meta(const fs::path& folder) {
+  const CtVolume ct = test::asymmetric_ct(test::small_grid());
+  const std::string voxels = deflated(ct.hu.view());
+  const auto write = [&](const std::string& name,
+                         const std::string& lines,
+                         const std::string& spacing = "1 1 1",
+                         const std::string& offset = "0 0 0") {
+    std::ofstream out(folder / name, std::ios::binary);
+    out << "ObjectType = Image\nNDims = 3\nBinaryData = True\nCompressedData = True\n"
+        << lines << "Offset = " << offset << "\nElementSpacing = " << spacing
+        << "\nDimSize = " << ct.grid.size[0] << ' ' << ct.grid.size[1] << ' ' << ct.grid.size[2]
+        << "\nElementType = MET_SHORT\nElementDataFile = LOCAL\n"
+        << voxels;
+    if (!out.flush()) throw std::runtime_error("cannot write " + name);
+  };
+  const auto size_line = [&](std::size_t size) {
+    return "CompressedDataSize = " + std::to_string(size) + "\n";
+  };
+  write("no-compressed-size.mha", "");
+  write("wrong-compressed-size.mha", size_line(voxels.size() - 20));
+  write("huge-spacing.mha", size_line(voxels.size()), "1 1e300 1");
+  write("huge-offset.mha", size_line(voxels.size()), "1 1 1", "0 1e300 0");
+}
+
 void write_inputs(const fs::path& folder) {
   fs::create_directories(folder / "valid");
   test::write_small_study(folder / "valid");
@@ -63,6 +102,8 @@ void write_inputs(const fs::path& folder) {
   write_meta<float>(folder / "nan.mha", "MET_FLOAT", 3, std::numeric_limits<float>::quiet_NaN(), 0);
   write_meta<short>(folder / "all-air.mha", "MET_SHORT", 3, -1000, -1000);
   write_meta<short>(folder / "four-d.mha", "MET_SHORT", 4, 40, 40);
+  write_meta<float>(folder / "huge-hu.mha", "MET_FLOAT", 3, 1e30f, 0);
+  write_broken_meta(folder);
   // A second CT, of the valid one's size, that the valid one's field does not belong to.
   CtVolume other = test::five_ellipsoids();
   std::vector<std::int16_t> hu(other.hu.view().begin(), other.hu.view().end());

@@ -7,6 +7,8 @@
 #include <fstream>
 #include <limits>
 #include <span>
+#include <sys/stat.h>
+#include <zlib.h>
 
 #include <Eigen/Geometry>
 #include <gmock/gmock.h>
@@ -193,6 +195,37 @@ TEST(CtReader, HonoursDirectionOriginAndSpacingOfAnMhdWithARawFile) {
   EXPECT_EQ(ct.hu[5], 50);
 }
 
+std::string deflated(const std::string& bytes) {
+  uLongf size = compressBound(bytes.size());
+  std::string stream(size, '\0');
+  compress(reinterpret_cast<Bytef*>(stream.data()),
+           &size,
+           reinterpret_cast<const Bytef*>(bytes.data()),
+           bytes.size());
+  stream.resize(size);
+  return stream;
+}
+
+TEST(CtReader, ReadsCompressedVoxelsOfEitherByteOrder) {
+  const ScratchFolder folder;
+  std::string swapped = bytes_of(small_voxels());
+  for (std::size_t i = 0; i < swapped.size(); i += 2) std::swap(swapped[i], swapped[i + 1]);
+  const std::string stream = deflated(swapped);
+  for (const char* key : {"BinaryDataByteOrderMSB", "ElementByteOrderMSB"}) {
+    SCOPED_TRACE(key);
+    std::map<std::string, std::string> lines = {
+        {"CompressedData", "True"},
+        {"CompressedDataSize", std::to_string(stream.size())},
+        {"BinaryDataByteOrderMSB", ""}};
+    lines[key] = "True";
+    write_bytes(folder / "ct.mha", meta_header(lines) + stream + "rest");
+    std::vector<std::string> warnings;
+    const CtVolume ct = read_ct(folder / "ct.mha", {}, &warnings);
+    EXPECT_EQ(std::vector(ct.hu.view().begin(), ct.hu.view().end()), small_voxels());
+    EXPECT_THAT(warnings, testing::Contains(HasSubstr("4 bytes behind the compressed voxels")));
+  }
+}
+
 TEST(CtReader, ReadsTheRowsOfAMetaTransformAsAxisDirections) {
   const ScratchFolder folder;
   // MetaIO stores one axis direction after the other: i along P, j along S, k along L.
@@ -373,6 +406,23 @@ std::vector<float> floats_with(float value) {
   return voxels;
 }
 
+/// A compressed MetaImage whose CompressedDataSize is wrong by some bytes; 0: it has none.
+auto compressed_meta(int wrong_by, std::map<std::string, std::string> changes) {
+  const std::string bytes = deflated(bytes_of(small_voxels()));
+  changes["CompressedData"] = "True";
+  if (wrong_by != 0)
+    changes["CompressedDataSize"] = std::to_string(static_cast<int>(bytes.size()) + wrong_by);
+  return meta(changes, bytes);
+}
+
+/// A NRRD of 4 x 3 x 2 voxels with these "space directions", and lines that follow them.
+auto nrrd(const std::string& directions, const std::string& more_lines = "") {
+  return text_file(
+      "NRRD0004\ntype: short\ndimension: 3\nspace: left-posterior-superior\nsizes: 4 3 2\n"
+      "encoding: raw\nendian: little\nspace directions: " +
+      directions + "\n" + more_lines + "\n" + bytes_of(small_voxels()));
+}
+
 std::vector<BadCt> bad_cts() {
   constexpr auto kInput = ExitCode::Input;
   constexpr auto kFile = ExitCode::File;
@@ -435,8 +485,8 @@ std::vector<BadCt> bad_cts() {
        kInput,
        "channels = 3"},
       {"MetaOneSlice", meta({{"DimSize", "4 6 1"}}), kInput, "at least 2 voxels"},
-      {"MetaZeroSpacing", meta({{"ElementSpacing", "1 1 0"}}), kInput, "must be positive"},
-      {"MetaNegativeSpacing", meta({{"ElementSpacing", "1 -1 1"}}), kInput, "must be positive"},
+      {"MetaZeroSpacing", meta({{"ElementSpacing", "1 1 0"}}), kInput, "0.01 to 100 mm"},
+      {"MetaNegativeSpacing", meta({{"ElementSpacing", "1 -1 1"}}), kInput, "0.01 to 100 mm"},
       {"MetaNanSpacing", meta({{"ElementSpacing", "1 nan 1"}}), kInput, "must be finite"},
       {"MetaTextSpacing", meta({{"ElementSpacing", "1 one 1"}}), kFile, "ElementSpacing"},
       {"MetaShearedDirection",
@@ -470,9 +520,51 @@ std::vector<BadCt> bad_cts() {
        kFile,
        "LIST"},
       {"MetaCorruptCompression",
-       meta({{"CompressedData", "True"}}, "\x78\x9c this is no zlib stream"),
+       meta({{"CompressedData", "True"}, {"CompressedDataSize", "25"}},
+            "\x78\x9c this is no zlib stream"),
        kFile,
        "corrupt"},
+      {"MetaCompressedWithoutItsLength", compressed_meta(0, {}), kFile, "no 'CompressedDataSize'"},
+      {"MetaCompressedLengthTooSmall", compressed_meta(-9, {}), kFile, "CompressedDataSize"},
+      {"MetaCompressedLengthTooLarge", compressed_meta(9, {}), kFile, "CompressedDataSize"},
+      {"MetaCompressedAtTheEnd",
+       compressed_meta(0, {{"HeaderSize", "-1"}, {"CompressedDataSize", "9"}}),
+       kFile,
+       "HeaderSize"},
+      {"MetaHeaderTakenForVoxels", meta({{"HeaderSize", "8"}}), kFile, "HeaderSize"},
+      {"MetaHeaderSizeUnknown", meta({{"HeaderSize", "-2"}}), kFile, "HeaderSize"},
+      {"MetaKeyTwice", meta({{"Offset", "0 0 0\nDimSize = 2 6 2"}}), kFile, "stands twice"},
+      {"MetaByteOrdersDisagree",
+       meta({{"ElementByteOrderMSB", "True"}}),
+       kFile,
+       "BinaryDataByteOrderMSB and ElementByteOrderMSB"},
+      // Numbers that no scanner gives.
+      {"MetaNoSpacing", meta({{"ElementSpacing", ""}}), kInput, "spacing = none"},
+      {"MetaHugeSpacing", meta({{"ElementSpacing", "1 1e300 1"}}), kInput, "0.01 to 100 mm"},
+      {"MetaTinySpacing", meta({{"ElementSpacing", "1 1e-5 1"}}), kInput, "0.01 to 100 mm"},
+      {"MetaHugeOffset", meta({{"Offset", "0 1e300 0"}}), kInput, "origin = (0, 1e+300, 0)"},
+      {"HugeHu",
+       meta({{"ElementType", "MET_FLOAT"}}, bytes_of(floats_with(1e30f))),
+       kInput,
+       "voxel (1, 0, 1) = 1.0000000150474662e+30: HU must be within 1e6"},
+      {"NrrdDirectionOverflows", nrrd("(1e300,0,0) (0,1,0) (0,0,1)"), kInput, "space directions"},
+      {"NrrdDirectionNone", nrrd("none (0,1,0) (0,0,1)"), kInput, "space directions"},
+      {"NrrdDirectionNan", nrrd("(nan,0,0) (0,1,0) (0,0,1)"), kInput, "space directions"},
+      {"NrrdInMetres",
+       nrrd("(1,0,0) (0,1,0) (0,0,1)", "space units: \"m\" \"m\" \"m\"\n"),
+       kInput,
+       "space units"},
+      {"NrrdKeyTwice", nrrd("(1,0,0) (0,1,0) (0,0,1)", "encoding: gzip\n"), kFile, "stands twice"},
+      {"NiftiHugeSlope", nifti_with<float>(112, {1e30f}), kInput, "scl_slope"},
+      {"NiftiSlopeNextToNothing", nifti_with<float>(112, {1e-30f}), kInput, "scl_slope"},
+      {"NiftiHugeSpacing", nifti_with<float>(80, {1e30f}), kInput, "pixdim[1]"},
+      {"NotAFile",
+       [](const fs::path& f) {
+         if (mkfifo((f / "bad.mha").c_str(), 0600) != 0) throw std::runtime_error("no pipe");
+         return f / "bad.mha";
+       },
+       kFile,
+       "is a pipe"},
       // Values.
       {"Nan",
        meta({{"ElementType", "MET_FLOAT"}}, bytes_of(floats_with(nan))),

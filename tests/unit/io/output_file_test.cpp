@@ -11,6 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "io/input_file.h"
 #include "support/io_checks.h"
 
 namespace af {
@@ -157,13 +158,31 @@ TEST(WriteTextFile, KeepsEveryByte) {
 TEST(ReadTextFile, RefusesMissingFilesFoldersAndFilesBeyondTheLimit) {
   const ScratchFolder folder;
   EXPECT_THAT(message_of<FileError>([&] { read_text_file(folder / "missing"); }),
-              HasSubstr("No such file"));
+              HasSubstr("does not exist"));
   EXPECT_THAT(message_of<FileError>([&] { read_text_file(folder.path()); }),
-              HasSubstr("Is a directory"));
+              HasSubstr("is a folder"));
   write_text_file(folder / "a", "12345");
   EXPECT_EQ(read_text_file(folder / "a", 5), "12345");
   EXPECT_THROW(read_text_file(folder / "a", 4), FileError);
-  EXPECT_THROW(read_text_file("/dev/zero", 1000), FileError);
+  EXPECT_THAT(message_of<FileError>([] { read_text_file("/dev/zero", 1000); }),
+              HasSubstr("is a device"));
+}
+
+TEST(InputFile, IsARegularFileAndNothingIsWaitedFor) {
+  const ScratchFolder folder;
+  write_text_file(folder / "a", "12345");
+  fs::create_symlink("a", folder / "link");
+  EXPECT_EQ(read_text_file(folder / "link"), "12345");
+  ASSERT_EQ(mkfifo((folder / "pipe").c_str(), 0600), 0);
+  fs::create_symlink("loop", folder / "loop");
+  const auto message_for = [](const std::string& path) {
+    return message_of<FileError>([&] { (void)open_input_file(path); });
+  };
+  EXPECT_THAT(message_for(folder / "pipe"), HasSubstr("is a pipe"));
+  EXPECT_THAT(message_for(folder / "loop"), HasSubstr("Too many levels of symbolic links"));
+  EXPECT_THAT(message_for(folder / std::string(303, 'x')), HasSubstr("File name too long"));
+  EXPECT_THAT(message_for(folder / "a/b"), HasSubstr("does not exist"));
+  EXPECT_THAT(message_for(folder.path()), HasSubstr("is a folder"));
 }
 
 TEST(MakeOutputFolder, MakesParentsAndAcceptsAnExistingFolder) {

@@ -175,7 +175,7 @@ TEST_F(StudyFile, RoundTripKeepsEveryBit) {
   second.nominal_room_from_ct.linear() = rotation_from_angles({0.1, 0.2, 0.3});
   second.gold_room_from_ct =
       pose_from_parameters(second.frame(), PoseParameters::from_deg_and_mm({1, 2, 3, 4, 5, 6}));
-  second.center_ct_mm = Vector3d(1.0 / 3.0, -1e-300, 1e300);
+  second.center_ct_mm = Vector3d(1.0 / 3.0, -1e-300, 1e6);
   second.fiducials_ct_mm.clear();
   for (StudyView& view : second.views) view.fiducials_px.clear();
   study.cases.push_back(second);
