@@ -37,7 +37,8 @@ Image2d block_image(const Image2d& image, const BlockGrid& grid, bool take_minim
   return blocks;
 }
 
-/// First and count of detector pixels along one axis: a whole number of stage pixels.
+/// First and count of detector pixels along one axis: a whole number of stage pixels, on the
+/// detector.
 struct Extent {
   int first;
   int count;
@@ -49,8 +50,14 @@ Extent scaled_extent(int first, int count, const StageGrid& grid, int limit) {
   const int begin = std::max(0, static_cast<int>(std::lround(middle - half)));
   const int end = std::min(limit, static_cast<int>(std::lround(middle + half)));
   const int whole = std::max(1, (end - begin) / grid.pixel_step) * grid.pixel_step;
+  if (whole > limit)
+    throw InputError("size_px",
+                     std::to_string(limit),
+                     "the detector must hold a pixel of this stage, " + std::to_string(whole) +
+                         " detector pixels wide (pixel_step)");
+  // A region narrower than a stage pixel, at the detector's edge, moves inwards.
   const int spare = end - begin - whole;
-  return {begin + std::max(0, spare) / 2, whole};
+  return {std::min(begin + std::max(0, spare) / 2, limit - whole), whole};
 }
 
 RegionOfInterest scaled_region(const View& view, const StageGrid& grid) {

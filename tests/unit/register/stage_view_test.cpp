@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "base/error.h"
 #include "image/gaussian_blur.h"
 #include "unit/register/registration_cases.h"
 
@@ -50,6 +51,14 @@ TEST(StageView, ScalesTheRegionAboutItsCentreAndStaysOnTheDetector) {
   const View huge = stage_view(view, {1, 4.0, 0.0});
   EXPECT_EQ(huge.roi.column, 0);
   EXPECT_EQ(huge.roi.width, 48);
+}
+
+TEST(StageView, OfARegionNarrowerThanItsPixelsAtTheEdgeStaysOnTheDetector) {
+  const View view{test::small_camera(false), {47, 47, 1, 1}};
+  const StageGrid grid{4, 1.0, 0.0};
+  EXPECT_EQ(stage_view(view, grid).roi.width, 1);
+  EXPECT_EQ(stage_reference(ramp(48, 48), {}, view, grid).xray.pixels.size(), 1u);
+  EXPECT_THROW((void)stage_view(view, {49, 1.0, 0.0}), InputError);
 }
 
 TEST(StageView, PixelsLieOnTheMeansThatTheReferenceTakes) {
