@@ -2,7 +2,6 @@
 #include "io/stored_bytes.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <fstream>
 #include <new>
 #include <vector>
@@ -19,6 +18,7 @@ namespace {
 
 /// The first byte of every gzip member, and of no zlib stream.
 constexpr int kGzipMark = 0x1f;
+constexpr int kNoByte = -1;
 
 /// An inflating zlib stream (zlib or gzip wrapped) that releases itself.
 class Inflater {
@@ -94,7 +94,7 @@ InflatedBytes inflate_file(const fs::path& path, std::uint64_t offset, const Byt
                         "compressed data are corrupt after " + std::to_string(total.inflated) +
                             " bytes: " + (stream.msg != nullptr ? stream.msg : "bad stream"));
       // Another gzip member may follow; anything else does not belong to the stream.
-      const int next = stream.avail_in > 0 ? stream.next_in[0] : finished ? file.peek() : EOF;
+      const int next = stream.avail_in > 0 ? stream.next_in[0] : finished ? file.peek() : kNoByte;
       if (finished && next == kGzipMark) {
         inflateReset(&stream);
         finished = false;
