@@ -169,6 +169,8 @@ of_option 3 'max_rotation_deg' 'rotation range too large' --max-rotation-deg 85
 of_option 3 'max_translation_mm' 'source inside the CT within the range' --max-translation-mm 640
 row 3 'center_ct_mm = nan' 'centre that is no number' "${precompute[@]}" --ct valid/ct.nii.gz --rig valid/rig.toml \
   --camera AP --center-ct-mm nan,0,0
+row 0 'constant: the CT is out of view' 'PNG of a DRR that shows nothing' "$bin/af-drr" -o nothing.png \
+  --ct valid/ct.nii.gz --rig valid/rig.toml --camera AP --translation-mm 500,0,0
 row 3 "translation" 'DRR 1e308 mm away' "${drr_of_ct[@]}" --translation-mm 1e308,0,0
 row 3 "translation" 'start 1e308 mm away' "${register_one[@]}" --start-translation-mm 1e308,0,0
 of_option 3 'memory' 'memory limit' --memory-limit 1kb
