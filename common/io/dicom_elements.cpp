@@ -11,6 +11,7 @@
 #include <string_view>
 
 #include "base/error.h"
+#include "io/input_guard.h"
 
 namespace af {
 
@@ -257,6 +258,7 @@ class DicomWalker {
 };
 
 DicomElements DicomElements::read(const fs::path& path) {
+  note_input(path);
   return DicomWalker(path).walk();
 }
 

@@ -10,6 +10,7 @@
 #include <zlib.h>
 
 #include "base/error.h"
+#include "io/input_guard.h"
 
 namespace af {
 
@@ -38,6 +39,7 @@ std::string read_prefix(const fs::path& path, std::size_t bytes) {
   std::error_code error;
   if (!fs::exists(path, error)) throw FileError(path.string(), "does not exist");
   if (fs::is_directory(path, error)) throw FileError(path.string(), "is a folder, not a file");
+  note_input(path);
   std::ifstream file(path, std::ios::binary);
   if (!file) throw FileError(path.string(), "cannot be opened: " + std::string(strerror(errno)));
   std::string prefix(bytes, '\0');
