@@ -30,6 +30,10 @@ CLI::App* bind_compare(CLI::App& app, CompareOptions& options) {
 void run_compare(const CompareOptions& options, const Communicator& world) {
   all_or_none(world, [&] {
     if (!world.is_root()) return;
+    std::filesystem::path csv = options.output;
+    csv.replace_extension(".csv");
+    announce_output(csv);
+    announce_output(options.output);
     const std::vector<EvaluationRun> runs = find_runs(options.runs);
     const std::vector<MethodRow> rows = method_rows(runs);
     if (rows.empty())
@@ -41,8 +45,7 @@ void run_compare(const CompareOptions& options, const Communicator& world) {
     parts.push_back(pairs_markdown(runs));
     for (const std::string& part : parts)
       if (!part.empty()) text += (text.empty() ? "" : "\n") + part;
-    std::filesystem::path csv = options.output;
-    write_text_file(csv.replace_extension(".csv"), methods_table(rows).to_text());
+    write_text_file(csv, methods_table(rows).to_text());
     write_text_file(options.output, text);
     std::cout << text;
   });

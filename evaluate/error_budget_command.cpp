@@ -191,6 +191,8 @@ void run_error_budget(const ErrorBudgetOptions& options,
                       const Communicator& world) {
   all_or_none(world, [&] {
     if (!world.is_root()) return;
+    announce_outputs(options.output_folder,
+                     {"error-budget.md", "error-budget.csv", "reproduce.sh", "summary.json"});
     std::vector<ChainRun> runs;
     Provenance provenance = {"af-evaluate error-budget",
                              command_line,

@@ -29,6 +29,7 @@
 #include "io/output_file.h"
 #include "io/output_lock.h"
 #include "io/provenance.h"
+#include "io/resource_check.h"
 #include "io/study_file.h"
 #include "precompute/precompute_program.h"
 #include "register/case_loading.h"
@@ -98,6 +99,11 @@ std::vector<DrrComparison> compare(const FieldParametersOptions& options,
                                    const Communicator& world) {
   const TwoPassAfDrr tested(field);
   DrrComparer comparer(tested, reference, View::whole_detector(field->identity.camera));
+  all_or_none(world, [&] {
+    require_memory(
+        "--pose-count",
+        static_cast<double>(options.pose_count) * static_cast<double>(sizeof(DrrComparison)));
+  });
   std::vector<DrrComparison> comparisons(static_cast<std::size_t>(options.pose_count));
   collect_rows(
       world,
@@ -146,7 +152,7 @@ void write_results(const FieldParametersOptions& options,
                    const Provenance& provenance) {
   const std::filesystem::path& folder = options.output_folder;
   // What an earlier run left here is whole no more.
-  std::filesystem::remove(folder / "summary.json");
+  remove_output(folder / "summary.json");
   json summary = write_sweep(results, folder);
   write_reproduce_script(folder, provenance);
   summary["format"] = "attenuation-fields evaluation";
@@ -349,6 +355,7 @@ void run_field_parameters(const FieldParametersOptions& options,
     if (world.is_root()) {
       require_gnuplot();
       make_output_folder(options.output_folder);
+      announce_outputs(options.output_folder, {"reproduce.sh", "summary.json"});
       lock.emplace(options.output_folder);
       make_output_folder(fields);
     }

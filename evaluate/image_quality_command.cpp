@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iomanip>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -13,6 +12,7 @@
 #include <CLI/CLI.hpp>
 
 #include "base/error.h"
+#include "base/toml_text.h"
 #include "cli/app_main.h"
 #include "cli/stop_request.h"
 #include "drr/field_renderer.h"
@@ -32,6 +32,7 @@
 #include "io/picture.h"
 #include "io/pose_file.h"
 #include "io/provenance.h"
+#include "io/resource_check.h"
 #include "io/sha256.h"
 #include "io/study_file.h"
 
@@ -43,15 +44,16 @@ using nlohmann::json;
 std::string to_toml(const ImageQualityOptions& options) {
   std::ostringstream out;
   if (options.study.empty())
-    out << "field = " << std::quoted(options.field.string())
-        << "\nct = " << std::quoted(options.ct.string());
+    out << "field = " << toml_text(options.field.string())
+        << "\nct = " << toml_text(options.ct.string());
   else
-    out << "study = " << std::quoted(options.study.string())
+    out << "study = " << toml_text(options.study.string())
         << "\ncase = " << toml_list(options.cases);
   if (options.poses.empty())
     out << "\npose_count = " << options.pose_count;
   else
-    out << "\nposes = " << std::quoted(options.poses.string());
+    out << "\nposes = " << toml_text(options.poses.string());
+  if (!options.series_uid.empty()) out << "\nseries = " << toml_text(options.series_uid);
   out << "\nlook_up = \"" << options.look_up
       << "\"\nsplit_loss_poses = " << options.split_loss_poses
       << "\nstep_mm = " << number_text(options.step_mm) << "\nseed = " << options.seed << '\n';
@@ -190,7 +192,7 @@ void write_results(const ImageQualityOptions& options,
   const std::filesystem::path& folder = target.folder;
   const std::vector<DrrComparison>& comparisons = result.comparisons;
   // What an earlier run left here is whole no more.
-  std::filesystem::remove(folder / "summary.json");
+  remove_output(folder / "summary.json");
   write_text_file(folder / "image-quality.csv", image_quality_table(comparisons).to_text());
   const PsnrGroup group = group_of(result);
   draw_psnr_boxes({group}, folder / "psnr");
@@ -300,6 +302,10 @@ TargetResult evaluate_target(const ImageQualityOptions& options,
             options.restarts};
   };
   const std::int64_t count = setup.pose_count(options);
+  all_or_none(world, [&] {
+    require_memory("--pose-count",
+                   static_cast<double>(count) * static_cast<double>(sizeof(DrrComparison)));
+  });
   TargetResult result{target.case_name, setup.view.camera.name, {}, {}};
   result.comparisons.resize(static_cast<std::size_t>(count));
   announce_time(
@@ -449,6 +455,8 @@ void run_image_quality(const ImageQualityOptions& options,
     if (world.is_root()) {
       require_gnuplot();
       make_output_folder(options.output_folder);
+      announce_outputs(options.output_folder,
+                       {"image-quality.csv", "reproduce.sh", "summary.json"});
       lock.emplace(options.output_folder);
     }
     return targets_of(options);

@@ -69,6 +69,7 @@ Study joined_study(const std::vector<Study>& studies,
 void run_join_studies(const JoinStudiesOptions& options, const Communicator& world) {
   all_or_none(world, [&] {
     if (!world.is_root()) return;
+    announce_output(options.output);
     std::vector<Study> studies;
     for (const std::filesystem::path& path : options.studies) {
       std::vector<std::string> warnings;

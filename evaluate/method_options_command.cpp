@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "evaluate/method_options_command.h"
 
-#include <iomanip>
 #include <iostream>
 #include <set>
 #include <sstream>
@@ -9,6 +8,7 @@
 #include <CLI/CLI.hpp>
 
 #include "base/error.h"
+#include "base/toml_text.h"
 #include "io/csv_table.h"
 #include "register/method_command.h"
 #include "volume/attenuation_volume.h"
@@ -50,19 +50,20 @@ std::string toml_list(const std::vector<std::string>& values) {
   std::ostringstream out;
   out << '[';
   for (std::size_t i = 0; i < values.size(); ++i)
-    out << (i == 0 ? "" : ", ") << std::quoted(values[i]);
+    out << (i == 0 ? "" : ", ") << toml_text(values[i]);
   out << ']';
   return out.str();
 }
 
 std::string to_toml(const MethodOptions& options) {
   std::ostringstream out;
-  out << "study = " << std::quoted(options.study.string()) << "\nrenderer = \"" << options.renderer
+  out << "study = " << toml_text(options.study.string()) << "\nrenderer = \"" << options.renderer
       << "\"\ngold = \"" << options.gold
       << "\"\nwater_mu_per_mm = " << number_text(options.water_mu_per_mm)
       << "\nstep_mm = " << number_text(options.step_mm) << "\nfield = " << toml_list(options.fields)
-      << '\n'
-      << to_toml(options.method, registration::resolve(options.method));
+      << '\n';
+  if (!options.series_uid.empty()) out << "series = " << toml_text(options.series_uid) << '\n';
+  out << to_toml(options.method, registration::resolve(options.method));
   return out.str();
 }
 

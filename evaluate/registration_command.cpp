@@ -2,7 +2,6 @@
 #include "evaluate/registration_command.h"
 
 #include <cmath>
-#include <iomanip>
 #include <iostream>
 #include <map>
 #include <optional>
@@ -13,6 +12,7 @@
 #include <CLI/CLI.hpp>
 
 #include "base/error.h"
+#include "base/toml_text.h"
 #include "cli/app_main.h"
 #include "cli/stop_request.h"
 #include "evaluate/case_evaluation_program.h"
@@ -289,11 +289,11 @@ std::string to_toml(const RegistrationStudyOptions& options) {
       << "\ninterval_width_mm = " << number_text(options.interval_width_mm) << "\nstart_rule = \""
       << options.start_rule << "\"\n";
   if (!options.starts_from.empty())
-    out << "starts_from = " << std::quoted(options.starts_from.string()) << '\n';
+    out << "starts_from = " << toml_text(options.starts_from.string()) << '\n';
   if (options.only_start.has_value()) out << "only_start = " << *options.only_start << '\n';
   if (!options.poses_from.empty())
-    out << "poses_from = " << std::quoted(options.poses_from.string())
-        << "\nmethod_name = " << std::quoted(options.method_name) << '\n';
+    out << "poses_from = " << toml_text(options.poses_from.string())
+        << "\nmethod_name = " << toml_text(options.method_name) << '\n';
   if (options.renderer == "both")
     out << "raycast_starts_per_interval = "
         << options.raycast_starts_per_interval.value_or(options.starts_per_interval)
@@ -379,7 +379,12 @@ void run_registration(const RegistrationStudyOptions& options,
   const std::filesystem::path& folder = options.output_folder;
   cli::listen_for_stop_requests();
   std::vector<std::string> study_warnings;
-  all_or_none(world, [&] { throw_if_any(problems(options)); });
+  all_or_none(world, [&] {
+    throw_if_any(problems(options));
+    if (world.is_root())
+      announce_outputs(
+          folder, {"starts.csv", "registrations.csv", "cases.csv", "reproduce.sh", "summary.json"});
+  });
   const Study study = read_study(options.study, world, &study_warnings);
   for (const std::string& text : study_warnings) cli::warn(world, text);
   const std::vector<StudyCase> cases =
@@ -400,7 +405,7 @@ void run_registration(const RegistrationStudyOptions& options,
     const auto on_starts = [&](const CaseEvaluation& so_far) {
       if (!world.is_root()) return;
       // What an earlier run left here is whole no more.
-      std::filesystem::remove(folder / "summary.json");
+      remove_output(folder / "summary.json");
       starts_file->add(so_far.case_name, so_far.starts.starts.view());
       if (&study_case == &cases.back()) starts_file->finish();
     };

@@ -192,7 +192,9 @@ void write_registrations(const std::filesystem::path& path, std::span<const Regi
 }
 
 StartsFile::StartsFile(std::filesystem::path path)
-    : path_(std::move(path)), partial_(path_.string() + ".partial"), file_(partial_) {
+    : path_(std::move(path)), partial_(path_.string() + ".partial") {
+  check_output_file(path_, partial_);
+  file_.open(partial_);
   file_ << CsvTable(start_columns()).to_text();
 }
 

@@ -29,6 +29,7 @@ void run_report(const ReportOptions& options, const Communicator& world) {
   all_or_none(world, [&] {
     if (!world.is_root()) return;
     require_gnuplot();
+    announce_output(options.output);
     const std::vector<EvaluationRun> runs = find_runs(options.runs);
     write_text_file(options.output, report_page(runs, options.output, options.title));
     std::cout << "report of " << runs.size() << " run(s): " << options.output.string() << '\n';

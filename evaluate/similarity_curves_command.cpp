@@ -288,6 +288,8 @@ void run_similarity_curves(const SimilarityCurvesOptions& options,
     if (world.is_root()) {
       require_gnuplot();
       make_output_folder(folder);
+      announce_outputs(folder,
+                       {"similarity-curves.csv", "maxima.csv", "reproduce.sh", "summary.json"});
       lock.emplace(folder);
     }
   });
@@ -319,7 +321,7 @@ void run_similarity_curves(const SimilarityCurvesOptions& options,
     find_peaks(curves);
     const double radius_mm = rms_radius_mm(study_case.target_box_ct, study_case.center_ct_mm);
     // What an earlier run left here is whole no more.
-    std::filesystem::remove(folder / "summary.json");
+    remove_output(folder / "summary.json");
     write_text_file(folder / "similarity-curves.csv", curves_table(curves).to_text());
     write_text_file(folder / "maxima.csv", maxima_table(curves, radius_mm).to_text());
     draw_curve_panels(panels_of(curves),

@@ -209,6 +209,11 @@ std::string memory_text(const DryRun& run, const FieldForecast& need) {
   if (run.options.has_checkpoint)
     text += "  progress folder    " + megabytes_text(need.tile_bytes + need.payload_bytes) +
             " on disk until the field is complete\n";
+  const std::uint64_t disk_bytes =
+      need.file_bytes + (run.options.has_checkpoint ? need.tile_bytes + need.payload_bytes : 0);
+  text += "  disk               " + megabytes_text(run.disk.available_bytes) + " left for " +
+          megabytes_text(disk_bytes) +
+          (disk_bytes > run.disk.available_bytes ? ": NOT ENOUGH\n" : "\n");
   return text;
 }
 

@@ -6,28 +6,11 @@
 #include <charconv>
 
 #include "base/plausible.h"
+#include "base/toml_text.h"
 
 namespace af {
 
 namespace {
-
-/// A TOML basic string.
-std::string quoted(const std::string& text) {
-  constexpr const char* kHexDigits = "0123456789ABCDEF";
-  std::string result = "\"";
-  for (const char character : text) {
-    const auto code = static_cast<unsigned char>(character);
-    if (character == '"' || character == '\\') {
-      result += '\\';
-      result += character;
-    } else if (code < 0x20) {
-      result += std::string("\\u00") + kHexDigits[code >> 4u] + kHexDigits[code & 15u];
-    } else {
-      result += character;
-    }
-  }
-  return result + "\"";
-}
 
 void append(const std::vector<std::string>& more, std::vector<std::string>& found) {
   found.insert(found.end(), more.begin(), more.end());
@@ -103,15 +86,16 @@ TrainingSelection PrecomputeOptions::training_selection() const {
 }
 
 NamedValues casting_options(const PrecomputeOptions& options) {
-  return {{"max_rotation_deg", exact_text(options.max_rotation_deg)},
-          {"max_translation_mm", exact_text(options.max_translation_mm)},
-          {"slabs", std::to_string(options.slabs)},
-          {"st_plane", quoted(options.st_plane_rule() == StPlane::Centre ? "centre" : "centroid")},
-          {"uv_nodes", std::to_string(options.uv_nodes)},
-          {"st_nodes", std::to_string(options.st_nodes)},
-          {"caster", quoted(options.caster)},
-          {"step_mm", exact_text(options.step_mm)},
-          {"water_mu_per_mm", exact_text(options.water_mu_per_mm)}};
+  return {
+      {"max_rotation_deg", exact_text(options.max_rotation_deg)},
+      {"max_translation_mm", exact_text(options.max_translation_mm)},
+      {"slabs", std::to_string(options.slabs)},
+      {"st_plane", toml_text(options.st_plane_rule() == StPlane::Centre ? "centre" : "centroid")},
+      {"uv_nodes", std::to_string(options.uv_nodes)},
+      {"st_nodes", std::to_string(options.st_nodes)},
+      {"caster", toml_text(options.caster)},
+      {"step_mm", exact_text(options.step_mm)},
+      {"water_mu_per_mm", exact_text(options.water_mu_per_mm)}};
 }
 
 NamedValues codebook_options(const PrecomputeOptions& options) {
@@ -128,7 +112,7 @@ NamedValues codebook_options(const PrecomputeOptions& options) {
 std::string to_toml(const PrecomputeOptions& options) {
   std::string text;
   const auto add_text = [&](const char* name, const std::string& value) {
-    if (!value.empty()) text += std::string(name) + " = " + quoted(value) + "\n";
+    if (!value.empty()) text += std::string(name) + " = " + toml_text(value) + "\n";
   };
   add_text("ct", options.ct);
   add_text("series", options.series_uid);
@@ -148,7 +132,7 @@ std::string to_toml(const PrecomputeOptions& options) {
   add_text("overflow", options.overflow);
   if (!options.mpi_io_hints.empty()) {
     text += "mpi_io_hints = [";
-    for (const std::string& hint : options.mpi_io_hints) text += quoted(hint) + ", ";
+    for (const std::string& hint : options.mpi_io_hints) text += toml_text(hint) + ", ";
     text += "]\n";
   }
   text += std::string("checkpoint = ") + (options.has_checkpoint ? "true" : "false") + "\n";

@@ -196,6 +196,7 @@ class PrecomputeRun {
     if (std::filesystem::is_directory(output))
       throw FileError(options_.output, "is a folder, not a field file");
     make_output_folder(output.has_parent_path() ? output.parent_path() : ".");
+    announce_field(output);
   }
 
   void load() {

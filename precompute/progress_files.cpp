@@ -246,7 +246,7 @@ std::string manifest_text(const ProgressManifest& manifest) {
 
 ProgressManifest read_manifest(const std::filesystem::path& path) {
   try {
-    const nlohmann::json json = nlohmann::json::parse(read_text_file(path));
+    const nlohmann::json json = nlohmann::json::parse(read_own_text_file(path));
     if (json.at("format") != kFormat || json.at("format_version") != kFormatVersion)
       throw FileError(path.string(), "format", kFormat, "another, or another version");
     return {json.at("decides").get<std::map<std::string, std::string>>(),

@@ -156,6 +156,9 @@ DiskSample sample_disk(const std::filesystem::path& folder) {
   std::vector<std::uint64_t> noise(kBytes / sizeof(std::uint64_t));
   for (std::size_t i = 0; i < noise.size(); ++i) noise[i] = hash64(kSampleSeed, i);
   DiskSample sample;
+  std::error_code error;
+  const std::filesystem::space_info space = std::filesystem::space(folder, error);
+  if (!error) sample.available_bytes = space.available;
   const Stopwatch writing;
   bool is_good = ::write(descriptor, noise.data(), kBytes) == static_cast<ssize_t>(kBytes) &&
                  ::fsync(descriptor) == 0;

@@ -32,6 +32,7 @@ SpeedSample sample_speed(const FieldCaster& caster,
 struct DiskSample {
   double write_bytes_per_second = 0.0;  ///< to the disk itself
   double read_bytes_per_second = 0.0;   ///< past the system's cache, where it lets go
+  std::uint64_t available_bytes = 0;    ///< left for new files
 };
 
 /// Both 0 when nothing can be written there.

@@ -62,16 +62,14 @@ StageOptions stage_from_text(const std::string& text) {
   return stage;
 }
 
-/// The shortest text that reads back to the same number.
-template <typename Number>
-std::string shortest(Number value) {
+}  // namespace
+
+std::string shortest_text(double value) {
   std::array<char, 32> text{};
   const auto [end, error] = std::to_chars(text.data(), text.data() + text.size(), value);
   check(error == std::errc(), "a number fits its text");
   return {text.data(), end};
 }
-
-}  // namespace
 
 std::string stage_text(const StageOptions& stage) {
   StageOptions mine = stage;
@@ -81,9 +79,9 @@ std::string stage_text(const StageOptions& stage) {
   const auto defaults = stage_keys(plain);
   for (std::size_t i = 0; i < keys.size(); ++i) {
     if (keys[i].whole != nullptr && *keys[i].whole != *defaults[i].whole)
-      text += std::string(" ") + keys[i].name + "=" + shortest(*keys[i].whole);
+      text += std::string(" ") + keys[i].name + "=" + std::to_string(*keys[i].whole);
     if (keys[i].real != nullptr && *keys[i].real != *defaults[i].real)
-      text += std::string(" ") + keys[i].name + "=" + shortest(*keys[i].real);
+      text += std::string(" ") + keys[i].name + "=" + shortest_text(*keys[i].real);
   }
   return text;
 }

@@ -32,6 +32,7 @@ void run(const RegisterOptions& options,
   af::cli::listen_for_stop_requests();
   const RegistrationOptions method = af::all_or_none(world, [&] {
     af::throw_if_any(problems(options));
+    if (world.is_root()) af::announce_outputs(options.output_folder, result_file_names());
     return resolve(options.method);
   });
   std::vector<std::string> study_warnings;

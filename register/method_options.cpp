@@ -66,10 +66,8 @@ RegistrationOptions resolve(const MethodOptions& options) {
   std::vector<std::string> found = problems(result);
   for (const std::string& text : thread_problems(options.threads)) found.push_back(text);
   if (!(options.fiducial_mask_mm >= 0.0 && options.fiducial_mask_mm <= kMostFiducialMaskMm)) {
-    std::ostringstream text;
-    text << "--fiducial-mask-mm = " << options.fiducial_mask_mm << ": must be within 0 and "
-         << kMostFiducialMaskMm;
-    found.push_back(text.str());
+    found.push_back("--fiducial-mask-mm = " + shortest_text(options.fiducial_mask_mm) +
+                    ": must be within 0 and " + shortest_text(kMostFiducialMaskMm));
   }
   throw_if_any(found);
   return result;
@@ -79,16 +77,16 @@ std::string to_toml(const MethodOptions& options, const RegistrationOptions& res
   std::ostringstream out;
   out << "preset = \"" << options.preset_name()
       << "\"\nmax_evaluations = " << resolved.max_evaluations << "\nseed = " << resolved.seed
-      << "\nthreads = " << options.threads << "\nfiducial_mask_mm = " << options.fiducial_mask_mm
-      << "\nchain = [";
+      << "\nthreads = " << options.threads
+      << "\nfiducial_mask_mm = " << shortest_text(options.fiducial_mask_mm) << "\nchain = [";
   for (const ChainOptions& chain : resolved.chains) out << "\n  \"" << chain_text(chain) << "\",";
   out << "\n]\n";
   if (!resolved.finish.stages.empty())
     out << "finish = \"" << chain_text(resolved.finish) << "\"\n";
   if (resolved.chains.size() > 1)
     out << "judge = \"" << stage_text(resolved.judge.stage)
-        << "\"\njudge_least_value = " << resolved.judge.least_value
-        << "\njudge_enough_value = " << resolved.judge.enough_value << '\n';
+        << "\"\njudge_least_value = " << shortest_text(resolved.judge.least_value)
+        << "\njudge_enough_value = " << shortest_text(resolved.judge.enough_value) << '\n';
   return out.str();
 }
 

@@ -7,6 +7,7 @@
 #include <CLI/CLI.hpp>
 
 #include "base/error.h"
+#include "base/toml_text.h"
 #include "cli/stop_request.h"
 #include "io/csv_table.h"
 #include "io/pose_file.h"
@@ -21,15 +22,6 @@ std::optional<std::pair<std::string, std::string>> split_field(const std::string
   const std::size_t equals = text.find('=');
   if (equals == std::string::npos || equals == 0 || equals + 1 == text.size()) return std::nullopt;
   return std::pair(text.substr(0, equals), text.substr(equals + 1));
-}
-
-std::string quoted(const std::string& text) {
-  std::string result = "\"";
-  for (const char character : text) {
-    if (character == '"' || character == '\\') result += '\\';
-    result += character;
-  }
-  return result + "\"";
 }
 
 std::string triple(const std::array<double, 3>& values) {
@@ -165,20 +157,25 @@ std::map<std::string, std::string> hashes_of_files(const RegisterOptions& option
 
 std::string to_toml(const RegisterOptions& options, const RegistrationOptions& registration) {
   std::ostringstream out;
-  out << "study = " << quoted(options.study.string()) << '\n'
-      << "case = " << quoted(options.case_name) << '\n'
-      << "renderer = " << quoted(options.renderer) << '\n'
+  out << "study = " << toml_text(options.study.string()) << '\n'
+      << "case = " << toml_text(options.case_name) << '\n'
+      << "renderer = " << toml_text(options.renderer) << '\n'
       << "water_mu_per_mm = " << number_text(options.water_mu_per_mm) << '\n'
       << "step_mm = " << number_text(options.step_mm) << '\n'
       << "skip_ct_check = " << (options.skip_ct_check ? "true" : "false") << '\n';
-  for (const std::string& field : options.fields) out << "# --field " << field << '\n';
+  if (!options.series_uid.empty()) out << "series = " << toml_text(options.series_uid) << '\n';
+  // No key: the fields' content decides, see input_sha256.
+  for (const std::string& field : options.fields) {
+    const std::string quoted = toml_text(field);
+    out << "# --field " << quoted.substr(1, quoted.size() - 2) << '\n';
+  }
   if (options.start_rotation_deg.has_value())
     out << "start_rotation_deg = " << triple(*options.start_rotation_deg) << '\n';
   if (options.start_translation_mm.has_value())
     out << "start_translation_mm = " << triple(*options.start_translation_mm) << '\n';
   if (!options.start_pose.empty())
-    out << "start_pose = " << quoted(options.start_pose.string()) << '\n';
-  if (!options.starts.empty()) out << "starts = " << quoted(options.starts.string()) << '\n';
+    out << "start_pose = " << toml_text(options.start_pose.string()) << '\n';
+  if (!options.starts.empty()) out << "starts = " << toml_text(options.starts.string()) << '\n';
   out << to_toml(options.method, registration);
   return out.str();
 }

@@ -253,7 +253,7 @@ std::string write_run(const std::vector<RegistrationRecord>& records,
                       const std::filesystem::path& folder) {
   const RegistrationRecord& best = records[best_record(records)];
   // What an earlier run left here is whole no more.
-  std::filesystem::remove(folder / "result.json");
+  remove_output(folder / "result.json");
   std::ostringstream summary;
   summary << "case " << run.case_name << ", renderer " << run.renderer << '\n';
   if (records.size() > 1) {
@@ -265,6 +265,10 @@ std::string write_run(const std::vector<RegistrationRecord>& records,
   write_result_files(best, problem, run, folder);
   summary << summary_text(best, problem) << "results     " << folder.string() << '\n';
   return summary.str();
+}
+
+std::vector<std::string> result_file_names() {
+  return {"pose.toml", "result.tfm", "result.json", "registrations.csv", "reproduce.sh"};
 }
 
 std::string summary_text(const RegistrationRecord& record, const RegistrationProblem& problem) {

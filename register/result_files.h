@@ -75,6 +75,9 @@ std::string write_run(const std::vector<RegistrationRecord>& records,
                       const RunDescription& run,
                       const std::filesystem::path& folder);
 
+/// Those that a run replaces in its folder, whatever the cameras' names.
+std::vector<std::string> result_file_names();
+
 /// A few lines for a person at the terminal.
 std::string summary_text(const RegistrationRecord& record, const RegistrationProblem& problem);
 

@@ -18,14 +18,19 @@ enum class ExitCode : int {
   Stopped = 75,  ///< stopped on request, progress saved: run the same command again
 };
 
+/// A message of which no line is longer than some thousand bytes: from the middle of longer ones it
+/// leaves out what a file or the command line put there, and says how much that is.
+std::string shortened(const std::string& message);
+
 /// Base of all errors the project throws on purpose; carries the exit code that app_main returns.
+/// The message is shortened().
 class Error : public std::runtime_error {
  public:
   [[nodiscard]] ExitCode exit_code() const noexcept { return exit_code_; }
 
  protected:
   Error(ExitCode exit_code, const std::string& message)
-      : std::runtime_error(message), exit_code_(exit_code) {}
+      : std::runtime_error(shortened(message)), exit_code_(exit_code) {}
 
  private:
   ExitCode exit_code_;

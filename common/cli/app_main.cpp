@@ -1,17 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/app_main.h"
 
+#include <cerrno>
 #include <chrono>
 #include <csignal>
 #include <iostream>
 #include <optional>
 #include <sstream>
+#include <system_error>
 #include <thread>
 
 #include <CLI/CLI.hpp>
 
 #include "base/build_info.h"
 #include "base/error.h"
+#include "cli/option_values.h"
 #include "cli/stop_request.h"
 #include "parallel/mpi_environment.h"
 #include "parallel/work_watch.h"
@@ -31,10 +34,21 @@ int report_parse_result(const CLI::App& app, const CLI::ParseError& error, bool 
     if (is_success)
       app.exit(error, std::cout, std::cerr);
     else
-      std::cerr << app.get_name() << ": " << error.what()
+      std::cerr << app.get_name() << ": " << shortened(error.what())
                 << "\nRun with --help for more information.\n";
   }
   return static_cast<int>(is_success ? ExitCode::Done : ExitCode::Usage);
+}
+
+/// Results on standard output that were not written are a failure: a full disk must not look like a
+/// success.
+int with_output_written(const CLI::App& app, int exit_code) {
+  errno = 0;
+  if (std::cout.flush()) return exit_code;
+  const std::string reason = errno == 0 ? "" : ": " + std::generic_category().message(errno);
+  std::cerr << app.get_name() << ": standard output: cannot be written" << reason << std::endl;
+  return exit_code == static_cast<int>(ExitCode::Done) ? static_cast<int>(ExitCode::File)
+                                                       : exit_code;
 }
 
 /// What asked for a stop.
@@ -71,8 +85,9 @@ int app_main(CLI::App& app,
   app.set_version_flag("--version", app.get_name() + " " + std::string(program_version()));
   try {
     app.parse(argc, argv);
+    check_option_values(app);
   } catch (const CLI::ParseError& error) {
-    return report_parse_result(app, error, world.is_root());
+    return with_output_written(app, report_parse_result(app, error, world.is_root()));
   }
   // A write beyond a limit of file sizes is an error to report, not a signal to die from.
   std::signal(SIGXFSZ, SIG_IGN);
@@ -84,7 +99,7 @@ int app_main(CLI::App& app,
   bool is_known_everywhere = false;
   try {
     run(world);
-    return static_cast<int>(ExitCode::Done);
+    return with_output_written(app, static_cast<int>(ExitCode::Done));
   } catch (const RemoteError& error) {
     failure = {static_cast<int>(error.exit_code()), error.what()};
     is_known_everywhere = true;
@@ -96,7 +111,7 @@ int app_main(CLI::App& app,
   if (is_known_everywhere || world.size() == 1) {
     if (world.is_root())
       std::cerr << app.get_name() << ": " << failure.message << reason_text(failure) << std::endl;
-    if (!MpiEnvironment::is_abort_required()) return failure.exit_code;
+    if (!MpiEnvironment::is_abort_required()) return with_output_written(app, failure.exit_code);
     end_after_report(failure.exit_code, world.is_root());
   }
   const bool is_reporting = claim_report();

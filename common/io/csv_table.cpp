@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "io/input_guard.h"
 #include "io/output_file.h"
 
 namespace af {
@@ -209,6 +210,7 @@ CsvTable CsvTable::read(const std::filesystem::path& path) {
 void CsvTable::read_in_parts(const std::filesystem::path& path,
                              const std::function<void(const CsvTable& part)>& receive) {
   const std::string name = path.string();
+  note_input(path);
   TextParts text(path);
   Parser parser([&] { return text.next(); }, name);
   const CsvTable header = header_of(parser, name);

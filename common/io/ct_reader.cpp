@@ -18,6 +18,7 @@
 #include "io/dicom_series.h"
 #include "io/hu_values.h"
 #include "io/image_header.h"
+#include "io/input_guard.h"
 #include "io/itk_image_io.h"
 #include "io/sha256.h"
 #include "io/stored_image.h"
@@ -288,6 +289,7 @@ CtVolume read_ct(const fs::path& path,
   std::error_code error;
   CtVolume ct;
   HuValues values;
+  note_input(path);
   if (fs::is_directory(path, error)) {
     DicomCt series = read_dicom_series(path, options.series_uid, &found);
     ct.grid = series.grid;

@@ -12,6 +12,7 @@
 
 #include "base/error.h"
 #include "io/input_file.h"
+#include "io/input_guard.h"
 
 namespace af {
 
@@ -257,6 +258,7 @@ class DicomWalker {
 };
 
 DicomElements DicomElements::read(const fs::path& path) {
+  note_input(path);
   return DicomWalker(path).walk();
 }
 

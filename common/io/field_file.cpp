@@ -12,6 +12,7 @@
 #include "io/field_file_access.h"
 #include "io/field_file_layout.h"
 #include "io/input_file.h"
+#include "io/input_guard.h"
 #include "io/output_file.h"
 #include "io/sha256.h"
 #include "parallel/mpi_environment.h"
@@ -454,6 +455,7 @@ void check_plausible_size(const DatasetRule& rule,
 /// Rank 0 alone.
 FileHeader read_header(const std::filesystem::path& path) {
   check_is_hdf5(path);
+  note_input(path);
   const Handle file = hdf5::open_file(path, H5F_ACC_RDONLY);
   check_format(file, path);
   FileHeader header;
@@ -556,6 +558,14 @@ CompressedSlab read_slab(const std::filesystem::path& path,
 
 }  // namespace
 
+void announce_field(const std::filesystem::path& path) {
+  for (const std::filesystem::path& written : {path, field_layout::io_test_path(path)}) {
+    check_output_file(written, field_layout::unfinished_path(written));
+    announce_output_file(written);
+    announce_output_file(field_layout::unfinished_path(written));
+  }
+}
+
 FieldFileInfo write_field(const CompressedAttenuationField& field,
                           const NextBlocks& next_blocks,
                           const MakeProvenance& make_provenance,
@@ -563,10 +573,14 @@ FieldFileInfo write_field(const CompressedAttenuationField& field,
                           const Communicator& communicator,
                           const MpiIoHints& hints) {
   const hdf5::QuietErrors quiet;
-  const std::filesystem::path partial = path.string() + ".partial";
+  const std::filesystem::path partial = field_layout::unfinished_path(path);
   const auto rules = index_rules(field);
   FieldFileInfo info;
   info.payload_bytes = field_layout::payload_bytes(field);
+  // Before the part that removes the partial file when it fails: it may be none of ours.
+  all_or_none(communicator, [&] {
+    if (communicator.is_root()) check_output_file(path, partial);
+  });
   try {
     all_or_none(communicator, [&] {
       if (!communicator.is_root()) return;

@@ -73,6 +73,10 @@ FieldFileInfo write_field(const CompressedAttenuationField& field,
                           const Communicator& communicator,
                           const MpiIoHints& hints = {});
 
+/// Rank 0 alone, before the work: announce_output() of a field and of what write_field() and
+/// check_parallel_writing() put beside it.
+void announce_field(const std::filesystem::path& path);
+
 /// Collective. Writes about a megabyte to "PATH.io-test" as write_field() will write a field to
 /// `path`, with ranks that have nothing to write, verifies it and removes it. A file system, HDF5
 /// or MPI-IO that cannot do this is found before the work, not after it. FileError with their

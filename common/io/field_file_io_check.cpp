@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "io/field_file.h"
+#include "io/field_file_layout.h"
 #include "parallel/work_watch.h"
 
 namespace af {
@@ -73,7 +74,7 @@ void check_parallel_writing(const std::filesystem::path& path,
   constexpr double kLimitMinutes = 2.0;
   const std::string advice =
       " (" + versions_text() + "): precompute/README.md has what to try, under Parallel writing";
-  const std::filesystem::path test = path.string() + ".io-test";
+  const std::filesystem::path test = field_layout::io_test_path(path);
   const WorkNote note("testing collective writes to " + test.string() + advice,
                       WorkNote::Kind::Phase,
                       kLimitMinutes);

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <span>
 #include <string>
 #include <vector>
@@ -18,6 +19,15 @@ inline constexpr int kFormatVersion = 1;
 inline constexpr int kMaxSlabs = 64;
 inline constexpr int kMaxNodes = 65536;
 inline constexpr std::uint64_t kMaxTextBytes = 16u << 20;
+
+/// Where a field is written until it is whole.
+inline std::filesystem::path unfinished_path(const std::filesystem::path& path) {
+  return path.string() + ".partial";
+}
+/// The field that check_parallel_writing() makes.
+inline std::filesystem::path io_test_path(const std::filesystem::path& path) {
+  return path.string() + ".io-test";
+}
 
 enum class ElementType { Float64, Float32, Int32, UInt16, Text };
 

@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include "base/error.h"
+#include "io/captured_output.h"
 #include "io/csv_table.h"
 #include "io/output_file.h"
 
@@ -48,14 +49,15 @@ class TemporaryFile {
   std::filesystem::path path_;
 };
 
-/// Exit status of "gnuplot ARGUMENT", its output going to `log`; throws when it cannot be started.
-int run_gnuplot(const std::string& argument, const std::filesystem::path& log) {
+/// Exit status of "gnuplot ARGUMENT", what it says going to `log`, its standard output to an open
+/// file; throws when it cannot be started.
+int run_gnuplot(const std::string& argument, const std::filesystem::path& log, int output) {
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
   posix_spawn_file_actions_addopen(
-      &actions, STDOUT_FILENO, log.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
-  posix_spawn_file_actions_adddup2(&actions, STDOUT_FILENO, STDERR_FILENO);
+      &actions, STDERR_FILENO, log.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
+  posix_spawn_file_actions_adddup2(&actions, output, STDOUT_FILENO);
   // -d: no personal or system-wide settings.
   std::array<std::string, 3> words = {"gnuplot", "-d", argument};
   std::array<char*, 4> arguments = {words[0].data(), words[1].data(), words[2].data(), nullptr};
@@ -70,15 +72,19 @@ int run_gnuplot(const std::string& argument, const std::filesystem::path& log) {
   return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
 }
 
-void run_script(const std::string& script, const std::filesystem::path& figure) {
+/// What a script draws. gnuplot does not notice a full disk, so it is not let near one.
+std::string drawn(const std::string& script, const std::filesystem::path& figure) {
   const TemporaryFile script_file;
   const TemporaryFile log;
   write_text_file(script_file.path(), script);
-  const int status = run_gnuplot(script_file.path().string(), log.path());
-  if (status == 0) return;
-  throw FileError(
-      figure.string(),
-      "gnuplot failed with status " + std::to_string(status) + ": " + read_text_file(log.path()));
+  int status = 0;
+  std::string content = captured_output(figure.string(), [&](int output) {
+    status = run_gnuplot(script_file.path().string(), log.path(), output);
+  });
+  if (status == 0) return content;
+  throw FileError(figure.string(),
+                  "gnuplot failed with status " + std::to_string(status) + ": " +
+                      read_own_text_file(log.path()));
 }
 
 void replace_first(std::string& text, const std::string& from, const std::string& to) {
@@ -117,11 +123,10 @@ constexpr const char* kDarkStyle =
     "[color='white'] { color: #12171D }"
     "}</style>\n";
 
-void finish_svg(const std::filesystem::path& path, const std::string& title) {
-  std::string svg = read_text_file(path);
+std::string finished_svg(std::string svg, const std::string& title) {
   replace_first(
       svg, "<title>Gnuplot</title>", "<title>" + xml_escaped(title) + "</title>\n" + kDarkStyle);
-  write_text_file(path, svg);
+  return svg;
 }
 
 }  // namespace
@@ -139,7 +144,10 @@ std::string gnuplot_quoted(std::string_view text) {
 
 void require_gnuplot() {
   const TemporaryFile log;
-  if (run_gnuplot("--version", log.path()) != 0) throw FileError("gnuplot", kNotFound);
+  int status = 0;
+  captured_output("gnuplot",
+                  [&](int output) { status = run_gnuplot("--version", log.path(), output); });
+  if (status != 0) throw FileError("gnuplot", kNotFound);
 }
 
 GnuplotFigure::GnuplotFigure(std::string title, int width_px, int height_px)
@@ -162,12 +170,11 @@ void GnuplotFigure::add(const std::string& script_lines) {
   body_ += script_lines + "\n";
 }
 
-std::string GnuplotFigure::script(const std::string& terminal,
-                                  const std::filesystem::path& output) const {
+std::string GnuplotFigure::script(const std::string& terminal) const {
   const std::string ink = "rgb '" + std::string(palette::kInk) + "'";
   const std::string grid = "rgb '" + std::string(palette::kGrid) + "'";
-  return "set encoding utf8\nset terminal " + terminal + "\nset output " +
-         gnuplot_quoted(output.string()) + "\nset datafile missing 'NaN'\nset border 3 lc " + ink +
+  return "set encoding utf8\nset terminal " + terminal +
+         "\nset datafile missing 'NaN'\nset border 3 lc " + ink +
          "\nset xtics nomirror out scale 0.6 textcolor " + ink +
          "\nset ytics nomirror out scale 0.6 textcolor " + ink + "\nset grid ytics lt 1 lc " +
          grid + " dt 1 lw 1\nset key textcolor " + ink + "\nset title " + gnuplot_quoted(title_) +
@@ -180,21 +187,14 @@ void GnuplotFigure::write(const std::filesystem::path& path_without_extension) c
   const std::string height = std::to_string(height_px_);
   const std::filesystem::path svg = path_without_extension.string() + ".svg";
   const std::filesystem::path png = path_without_extension.string() + ".png";
-  write_atomically(svg, [&](const std::filesystem::path& partial) {
-    run_script(script("svg size " + width + "," + height +
-                          " dynamic noenhanced font 'DejaVu Sans,Helvetica,sans-serif,14'",
-                      partial),
-               svg);
-    finish_svg(partial, title_);
-  });
-  write_atomically(png, [&](const std::filesystem::path& partial) {
-    run_script(script("pngcairo size " + std::to_string(2 * width_px_) + "," +
-                          std::to_string(2 * height_px_) +
-                          " noenhanced font 'DejaVu Sans,11' fontscale 2 linewidth 2 pointscale 2 "
-                          "background '#FFFFFF'",
-                      partial),
-               png);
-  });
+  const std::string svg_terminal = "svg size " + width + "," + height +
+                                   " dynamic noenhanced font 'DejaVu Sans,Helvetica,sans-serif,14'";
+  const std::string png_terminal =
+      "pngcairo size " + std::to_string(2 * width_px_) + "," + std::to_string(2 * height_px_) +
+      " noenhanced font 'DejaVu Sans,11' fontscale 2 linewidth 2 pointscale 2 "
+      "background '#FFFFFF'";
+  write_text_file(svg, finished_svg(drawn(script(svg_terminal), svg), title_));
+  write_text_file(png, drawn(script(png_terminal), png));
 }
 
 }  // namespace af

@@ -40,8 +40,7 @@ class GnuplotFigure {
   void write(const std::filesystem::path& path_without_extension) const;
 
  private:
-  [[nodiscard]] std::string script(const std::string& terminal,
-                                   const std::filesystem::path& output) const;
+  [[nodiscard]] std::string script(const std::string& terminal) const;
 
   std::string title_;
   int width_px_;

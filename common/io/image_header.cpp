@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "io/image_formats.h"
+#include "io/input_guard.h"
 #include "io/stored_bytes.h"
 
 namespace af {
@@ -35,6 +36,7 @@ std::uint64_t existing_file_size(const fs::path& header_path, const fs::path& da
   if (error)
     throw FileError(header_path.string(),
                     "its voxel file '" + data_file.string() + "': " + error.message());
+  note_input(data_file);
   return bytes;
 }
 

@@ -2,6 +2,8 @@
 #include "io/itk_image_io.h"
 
 #include <array>
+#include <cstdint>
+#include <fstream>
 #include <string_view>
 #include <utility>
 
@@ -13,6 +15,7 @@
 #include <itkTIFFImageIO.h>
 
 #include "base/error.h"
+#include "io/captured_output.h"
 #include "io/output_file.h"
 
 namespace af {
@@ -149,6 +152,42 @@ WritableFormat writable_format(const fs::path& path) {
                    ": unknown image extension; known: .mha .nii.gz .nii .nrrd .tif .tiff .png");
 }
 
+/// Whether a .nii.gz ends as it must: with its unpacked size, which is not read on the way.
+bool has_gzip_end(const RawImage& image, const fs::path& file) {
+  constexpr std::size_t kHeaderBytes = 352;
+  const auto expected = static_cast<std::uint32_t>(kHeaderBytes + image.values.size());
+  std::array<unsigned char, 4> end{};
+  std::ifstream stream(file, std::ios::binary);
+  stream.seekg(-static_cast<std::streamoff>(end.size()), std::ios::end);
+  stream.read(reinterpret_cast<char*>(end.data()), end.size());
+  std::uint32_t found = 0;
+  for (std::size_t i = 0; i < end.size(); ++i) found |= std::uint32_t{end[i]} << (8u * i);
+  return stream.good() && found == expected;
+}
+
+/// ITK does not notice a full disk: it leaves a shorter file and says nothing.
+void check_is_whole(const RawImage& image, const fs::path& file, ImageFormat format) {
+  bool is_whole = false;
+  try {
+    const RawImage found = read_raw_image(file, format, [&](const RawImage& header) {
+      is_whole = header.voxel_count() == image.voxel_count();
+    });
+    is_whole = is_whole && found.type == image.type && found.values == image.values &&
+               (file.extension() != ".gz" || has_gzip_end(image, file));
+  } catch (const FileError&) {
+    is_whole = false;
+  }
+  if (is_whole) return;
+  std::error_code error;
+  const fs::space_info space =
+      fs::space(file.parent_path().empty() ? "." : file.parent_path(), error);
+  throw FileError(file.string(),
+                  "cannot be written whole: other voxels are read back" +
+                      (error ? std::string()
+                             : " (" + std::to_string(space.available) +
+                                   " bytes are left on its disk; ulimit -f may set a limit, too)"));
+}
+
 void write_by_itk(const RawImage& image, const fs::path& file, ImageFormat format) {
   const itk::ImageIOBase::Pointer io = make_image_io(format);
   io->SetFileName(file.string());
@@ -235,8 +274,18 @@ RawImage read_raw_image(const fs::path& path,
 
 void write_raw_image(const RawImage& image, const fs::path& path) {
   const WritableFormat target = writable_format(path);
-  write_atomically(path,
-                   [&](const fs::path& partial) { write_by_itk(image, partial, target.format); });
+  if (target.format == ImageFormat::Png) {
+    // ITK crashes when a PNG file cannot be written.
+    write_text_file(path, captured_output(path.string(), [&](int descriptor) {
+                      write_by_itk(
+                          image, "/proc/self/fd/" + std::to_string(descriptor), target.format);
+                    }));
+    return;
+  }
+  write_atomically(path, [&](const fs::path& partial) {
+    write_by_itk(image, partial, target.format);
+    check_is_whole(image, partial, target.format);
+  });
 }
 
 }  // namespace af

@@ -14,6 +14,7 @@
 
 #include "base/error.h"
 #include "io/input_file.h"
+#include "io/input_guard.h"
 
 namespace af {
 
@@ -84,17 +85,17 @@ fs::path partial_path(const fs::path& path) {
   return path.parent_path() / (stem.string() + ".partial" + extension);
 }
 
-void check_output_path(const fs::path& path) {
-  if (!path.has_filename()) throw FileError(path.string(), "is not the name of a file to write");
+/// What a rename or a removal would destroy.
+void check_may_be_replaced(const fs::path& path) {
   std::error_code ignored;
-  const fs::path folder = folder_of(path);
-  if (!fs::exists(folder, ignored))
-    throw FileError(path.string(), "its folder '" + folder.string() + "' does not exist");
-  if (!fs::is_directory(folder, ignored))
-    throw FileError(path.string(), "'" + folder.string() + "' is not a folder");
   // A rename would put a plain file in the place of a folder or of a device such as /dev/null.
   if (fs::exists(path, ignored) && !fs::is_regular_file(path, ignored))
     throw FileError(path.string(), "exists and is not a regular file");
+  if (!fs::exists(path, ignored) && fs::is_symlink(path, ignored))
+    throw FileError(
+        path.string(),
+        "is a link to '" + fs::read_symlink(path, ignored).string() + "', which does not exist");
+  refuse_input(path);
 }
 
 void write_and_rename(const fs::path& path,
@@ -119,10 +120,42 @@ void write_new_file(const fs::path& path, const std::function<void(const Descrip
 
 }  // namespace
 
+void check_output_file(const fs::path& path, const fs::path& partial) {
+  if (!path.has_filename()) throw FileError(path.string(), "is not the name of a file to write");
+  std::error_code ignored;
+  const fs::path folder = folder_of(path);
+  if (!fs::exists(folder, ignored))
+    throw FileError(path.string(), "its folder '" + folder.string() + "' does not exist");
+  if (!fs::is_directory(folder, ignored))
+    throw FileError(path.string(), "'" + folder.string() + "' is not a folder");
+  check_may_be_replaced(path);
+  check_may_be_replaced(partial);
+}
+
+void announce_output(const fs::path& path) {
+  const fs::path partial = partial_path(path);
+  check_output_file(path, partial);
+  announce_output_file(path);
+  announce_output_file(partial);
+}
+
+void announce_outputs(const fs::path& folder, const std::vector<std::string>& names) {
+  std::error_code ignored;
+  if (!fs::exists(fs::symlink_status(folder, ignored))) return;
+  if (!fs::is_directory(folder, ignored))
+    throw FileError(folder.string(), "exists and is not a folder");
+  for (const std::string& name : names) announce_output(folder / name);
+}
+
+void remove_output(const fs::path& path) {
+  refuse_input(path);
+  fs::remove(path);
+}
+
 void write_atomically(const std::filesystem::path& path,
                       const std::function<void(const std::filesystem::path& partial)>& write) {
-  check_output_path(path);
   const fs::path partial = partial_path(path);
+  check_output_file(path, partial);
   const auto remove_partial = [&] {
     std::error_code ignored;
     fs::remove(partial, ignored);
@@ -157,9 +190,11 @@ void sync_path(const fs::path& path) {
 }
 
 void move_into_place(const fs::path& partial, const fs::path& path) {
+  check_may_be_replaced(path);
   sync_path(partial);
   if (rename(partial.c_str(), path.c_str()) != 0)
     throw FileError(path.string(), because("cannot be renamed from " + partial.string(), errno));
+  note_written(path);
   sync_path(folder_of(path));
 }
 
@@ -181,6 +216,11 @@ std::string_view TextParts::next() {
 }
 
 std::string read_text_file(const std::filesystem::path& path, std::size_t max_bytes) {
+  note_input(path);
+  return read_own_text_file(path, max_bytes);
+}
+
+std::string read_own_text_file(const std::filesystem::path& path, std::size_t max_bytes) {
   TextParts parts(path);
   std::string text;
   for (std::string_view part = parts.next(); !part.empty(); part = parts.next()) {

@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace af {
 
@@ -15,6 +16,20 @@ namespace af {
 /// naming the path and the system's reason.
 void write_atomically(const std::filesystem::path& path,
                       const std::function<void(const std::filesystem::path& partial)>& write);
+
+/// Whether write_atomically() and move_into_place() may put a file there: FileError when its folder
+/// does not exist, or when the name or that of the unfinished file is one of a folder, a device, a
+/// pipe, a socket or a link that leads nowhere; InputError when it is an input (input_guard.h).
+void check_output_file(const std::filesystem::path& path, const std::filesystem::path& partial);
+
+/// Before the work: check_output_file(), and from now on the file is refused as input, too.
+void announce_output(const std::filesystem::path& path);
+/// announce_output() of files that will stand in a folder, if it exists already; FileError when it
+/// is no folder.
+void announce_outputs(const std::filesystem::path& folder, const std::vector<std::string>& names);
+
+/// Removes a file of an earlier run, if there is one; InputError when it is an input.
+void remove_output(const std::filesystem::path& path);
 
 /// write_atomically() of a text.
 void write_text_file(const std::filesystem::path& path, std::string_view text);
@@ -28,7 +43,8 @@ void write_text_in_parts(const std::filesystem::path& path,
 /// when it cannot.
 void sync_path(const std::filesystem::path& path);
 
-/// Syncs a complete file and gives it its name, in one step. FileError when it cannot.
+/// Syncs a complete file and gives it its name, in one step. FileError when it cannot, or when what
+/// has that name must not be replaced, see check_output_file().
 void move_into_place(const std::filesystem::path& partial, const std::filesystem::path& path);
 
 /// A file's text from its beginning, for files of any length. FileError when unreadable.
@@ -44,8 +60,11 @@ class TextParts {
   std::unique_ptr<File> file_;
 };
 
-/// The whole file as text; FileError when unreadable or larger than `max_bytes`.
+/// The whole file as text, noted as an input; FileError when unreadable or larger than `max_bytes`.
 std::string read_text_file(const std::filesystem::path& path, std::size_t max_bytes = 256u << 20);
+/// The same of what the program itself keeps for later, such as unfinished work: no input.
+std::string read_own_text_file(const std::filesystem::path& path,
+                               std::size_t max_bytes = 256u << 20);
 
 /// A name (of a case, a camera) as part of a file name: all but letters, digits, - and _ become _.
 std::string file_name_part(std::string name);

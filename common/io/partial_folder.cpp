@@ -4,6 +4,7 @@
 #include <system_error>
 
 #include "base/error.h"
+#include "io/input_guard.h"
 #include "io/output_file.h"
 
 namespace af {
@@ -50,6 +51,10 @@ PartialFolder::PartialFolder(const fs::path& folder, Existing existing)
       throw InputError(
           "output folder", folder_.string(), "exists: choose another name or replace it (--force)");
   }
+  for (const fs::path& replaced : {folder_, partial_, with_suffix(folder_, ".old")}) {
+    refuse_inputs_within(replaced);
+    announce_replaced_folder(replaced);
+  }
   fs::remove_all(partial_, error);
   if (error) throw FileError(partial_.string(), "cannot be removed: " + error.message());
   make_output_folder(partial_);
@@ -64,6 +69,7 @@ void PartialFolder::commit() {
   check(!committed_, "a folder is committed once");
   const fs::path old = with_suffix(folder_, ".old");
   const bool replaces = !is_free(folder_);
+  if (replaces) refuse_inputs_within(folder_);
   std::error_code ignored;
   if (replaces) {
     fs::remove_all(old, ignored);

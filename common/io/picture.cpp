@@ -8,6 +8,7 @@
 #include <cstring>
 #include <functional>
 #include <memory>
+#include <stdexcept>
 #include <string_view>
 
 #include "base/error.h"
@@ -134,12 +135,18 @@ class Canvas {
     }
     cairo_surface_mark_dirty(surface_.get());
   }
-  void write_png(const std::filesystem::path& path) {
+  /// The content of a PNG file.
+  [[nodiscard]] std::string png() {
     check_status();
-    const cairo_status_t status = cairo_surface_write_to_png(surface_.get(), path.c_str());
+    std::string bytes;
+    const auto append = [](void* target, const unsigned char* data, unsigned length) {
+      static_cast<std::string*>(target)->append(reinterpret_cast<const char*>(data), length);
+      return CAIRO_STATUS_SUCCESS;
+    };
+    const cairo_status_t status = cairo_surface_write_to_png_stream(surface_.get(), append, &bytes);
     if (status != CAIRO_STATUS_SUCCESS)
-      throw FileError(path.string(),
-                      std::string("cannot be written: ") + cairo_status_to_string(status));
+      throw std::runtime_error(std::string("cairo: ") + cairo_status_to_string(status));
+    return bytes;
   }
 
  private:
@@ -451,7 +458,7 @@ void write_picture(const std::vector<PicturePanel>& panels,
     draw_row(canvas, panels, texts, row, layout, y, zoom);
     y += row.height(layout) + kGap;
   }
-  write_atomically(path, [&](const std::filesystem::path& partial) { canvas.write_png(partial); });
+  write_text_file(path, canvas.png());
 }
 
 Image2d checkerboard(const Image2d& a, const Image2d& b, int field_px) {

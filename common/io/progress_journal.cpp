@@ -53,7 +53,7 @@ bool read_record(std::ifstream& file, std::uint64_t bytes_left, std::vector<std:
 
 DecidingValues read_manifest(const fs::path& path) {
   try {
-    const nlohmann::json json = nlohmann::json::parse(read_text_file(path));
+    const nlohmann::json json = nlohmann::json::parse(read_own_text_file(path));
     if (json.at("format") != kFormat || json.at("format_version") != kFormatVersion)
       throw FileError(path.string(), "format", kFormat, "another, or another version");
     return json.at("decides").get<DecidingValues>();

@@ -11,6 +11,7 @@
 
 #include "base/error.h"
 #include "base/file_name.h"
+#include "base/toml_text.h"
 #include "io/output_file.h"
 #include "io/toml_reader.h"
 
@@ -252,7 +253,7 @@ CameraRig parse_rig(const std::string& text,
 std::string rig_to_toml(const CameraRig& rig) {
   std::string text = "isocenter_point = " + toml_numbers(rig.isocenter_point) + "\n";
   for (const CameraGeometry& camera : rig.cameras) {
-    text += "\n[[camera]]\nname = " + toml_string(camera.name) + "\n";
+    text += "\n[[camera]]\nname = " + toml_text(camera.name) + "\n";
     text += "source_point = " + toml_numbers(camera.source_point) + "\n";
     text += "detector_origin_point = " + toml_numbers(camera.detector_origin_point) + "\n";
     text += "column_direction = " + toml_numbers(camera.column_direction) + "\n";

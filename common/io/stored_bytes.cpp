@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "io/input_file.h"
+#include "io/input_guard.h"
 
 namespace af {
 
@@ -38,6 +39,7 @@ class Inflater {
 }  // namespace
 
 std::string read_prefix(const fs::path& path, std::size_t bytes) {
+  note_input(path);
   std::ifstream file = open_input_file(path);
   std::string prefix(bytes, '\0');
   file.read(prefix.data(), static_cast<std::streamsize>(bytes));

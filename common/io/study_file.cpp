@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "base/file_name.h"
+#include "base/toml_text.h"
 #include "io/output_file.h"
 #include "io/rig_file.h"
 #include "io/toml_reader.h"
@@ -244,9 +245,9 @@ std::string points_text(const std::vector<Eigen::Matrix<double, Size, 1>>& point
 }
 
 std::string view_text(const StudyView& view, const fs::path& folder) {
-  std::string text = "\n[[case.view]]\ncamera = " + toml_string(view.camera) + "\n";
+  std::string text = "\n[[case.view]]\ncamera = " + toml_text(view.camera) + "\n";
   const auto add_path = [&](const char* key, const fs::path& path) {
-    text += std::string(key) + " = " + toml_string(relative_if_below(path, folder)) + "\n";
+    text += std::string(key) + " = " + toml_text(relative_if_below(path, folder)) + "\n";
   };
   add_path("xray", view.xray);
   text += view.xray_domain == XrayDomain::Intensity ? "xray_domain = \"intensity\"\n"
@@ -260,9 +261,9 @@ std::string view_text(const StudyView& view, const fs::path& folder) {
 }
 
 std::string case_text(const StudyCase& study_case, const fs::path& folder) {
-  std::string text = "\n[[case]]\nname = " + toml_string(study_case.name) + "\n";
-  if (!study_case.note.empty()) text += "note = " + toml_string(study_case.note) + "\n";
-  text += "ct = " + toml_string(relative_if_below(study_case.ct, folder)) + "\n";
+  std::string text = "\n[[case]]\nname = " + toml_text(study_case.name) + "\n";
+  if (!study_case.note.empty()) text += "note = " + toml_text(study_case.note) + "\n";
+  text += "ct = " + toml_text(relative_if_below(study_case.ct, folder)) + "\n";
   text += "nominal_room_from_ct = " + toml_matrix(study_case.nominal_room_from_ct.matrix()) + "\n";
   text += "center_ct_mm = " + toml_numbers(study_case.center_ct_mm) + "\n";
   text += "target_box_ct_mm = [" + toml_numbers(study_case.target_box_ct.low_mm) + ", " +
@@ -333,8 +334,8 @@ std::string study_to_toml(const Study& study, const std::filesystem::path& folde
       std::find(names.begin(), names.end(), study.rig_name_or_path) != names.end();
   std::string text =
       "rig = " +
-      toml_string(is_builtin ? study.rig_name_or_path
-                             : relative_if_below(study.rig_name_or_path, absolute_folder)) +
+      toml_text(is_builtin ? study.rig_name_or_path
+                           : relative_if_below(study.rig_name_or_path, absolute_folder)) +
       "\n";
   for (const StudyCase& study_case : study.cases) text += case_text(study_case, absolute_folder);
   return text;

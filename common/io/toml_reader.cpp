@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "base/error.h"
+#include "base/toml_text.h"
 #include "io/csv_table.h"
 #include "io/output_file.h"
 
@@ -46,7 +47,7 @@ void append_value(std::string& text, const toml::node& node) {
     }
     text += ']';
   } else if (const auto* string = node.as_string()) {
-    text += toml_string(string->get().substr(0, kLongEnough));
+    text += toml_text(string->get().substr(0, kLongEnough));
   } else if (const auto* number = node.as_floating_point()) {
     text += number_text(number->get());
   } else if (node.is_table()) {
@@ -297,24 +298,6 @@ void TomlTableReader::refuse_unknown_keys() {
                   owner + (owner.empty() ? "" : " ") + "unknown key \"" +
                       name.substr(0, kLongestKey) + "\"" + hint);
   }
-}
-
-std::string toml_string(std::string_view text) {
-  std::ostringstream out;
-  out << '"';
-  for (const char character : text) {
-    const auto code = static_cast<unsigned char>(character);
-    constexpr char kDigits[] = "0123456789ABCDEF";
-    constexpr unsigned char kDelete = 0x7F;
-    if (character == '"' || character == '\\')
-      out << '\\' << character;
-    else if (code < ' ' || code == kDelete)
-      out << "\\u00" << kDigits[code >> 4] << kDigits[code & 15];
-    else
-      out << character;
-  }
-  out << '"';
-  return out.str();
 }
 
 std::string toml_number(double value) {

@@ -98,8 +98,6 @@ class TomlTableReader {
   std::set<std::string> known_keys_;
 };
 
-/// A TOML string in double quotes, escaped.
-std::string toml_string(std::string_view text);
 /// A TOML float that reads back to the same double.
 std::string toml_number(double value);
 /// "[1.0, 2.0]"

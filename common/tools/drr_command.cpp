@@ -15,6 +15,7 @@
 #include "io/image_file.h"
 #include "io/picture.h"
 #include "io/pose_file.h"
+#include "io/resource_check.h"
 #include "io/rig_file.h"
 
 namespace af::tools {
@@ -161,6 +162,16 @@ std::vector<RigidTransform> requested_poses(const DrrOptions& options, const Pos
     if (options.translation_mm.has_value()) values[i + 3] = (*options.translation_mm)[i];
   }
   return {pose_of_deg_and_mm(frame, values, "--rotation-deg, --translation-mm")};
+}
+
+void require_room(std::size_t poses, const View& view, const std::filesystem::path& output) {
+  const double bytes = static_cast<double>(poses) * static_cast<double>(view.pixel_count()) *
+                       static_cast<double>(sizeof(float));
+  // The DRRs, in one block for the writer, and read back to verify them.
+  constexpr double kCopies = 3.0;
+  require_memory(std::to_string(poses) + " DRRs", kCopies * bytes);
+  const bool is_compressed = ends_with(output, ".gz") || ends_with(output, ".png");
+  if (!is_compressed) require_disk_space(output, bytes);
 }
 
 std::vector<Image2d> render_poses(const DrrRenderer& renderer,

@@ -53,6 +53,9 @@ DrrScene load_scene(const DrrOptions& options, const Communicator& communicator)
 /// Poses in the order of the options or the CSV file.
 std::vector<RigidTransform> requested_poses(const DrrOptions& options, const PoseFrame& frame);
 
+/// InputError when so many DRRs fit neither into memory nor on the disk of the output.
+void require_room(std::size_t poses, const View& view, const std::filesystem::path& output);
+
 /// DRRs of all poses, shared by the threads of the pool; InputError when any ray of any pose is
 /// outside the field.
 std::vector<Image2d> render_poses(const DrrRenderer& renderer,

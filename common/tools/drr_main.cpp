@@ -6,6 +6,7 @@
 #include "base/error.h"
 #include "cli/app_main.h"
 #include "drr/field_renderer.h"
+#include "io/output_file.h"
 #include "tools/drr_command.h"
 
 namespace {
@@ -79,6 +80,7 @@ void bind_output(CLI::App& app, DrrOptions& options) {
 
 void run(const DrrOptions& options, const af::Communicator& world) {
   af::throw_if_any(problems(options));
+  if (world.is_root()) af::announce_output(options.output);
   const af::tools::DrrScene scene = af::tools::load_scene(options, world);
   const std::vector<af::RigidTransform> poses = af::tools::requested_poses(options, scene.frame);
   if (!world.is_root()) return;
@@ -87,6 +89,7 @@ void run(const DrrOptions& options, const af::Communicator& world) {
     std::cout << options.output.string() << ": " << words << '\n';
     return;
   }
+  af::tools::require_room(poses.size(), scene.view, options.output);
   const std::vector<af::Image2d> drrs =
       af::tools::render_poses(*scene.renderer, scene.view, poses, *scene.pool);
   std::cout << af::tools::write_drrs(drrs, scene.view, options) << '\n';

@@ -10,6 +10,7 @@
 #include "cli/progress_printer.h"
 #include "io/csv_table.h"
 #include "io/ct_reader.h"
+#include "io/input_guard.h"
 #include "io/partial_folder.h"
 #include "io/rig_file.h"
 #include "tools/simulate_options.h"
@@ -101,6 +102,7 @@ void run(const SimulateOptions& options,
   if (!world.is_root()) return;  // the work is small; a launcher with several ranks does no harm
   throw_if_any(problems(options));
   const CameraRig rig = cameras(options, world);
+  if (!options.ct.empty()) note_input(options.ct);
   PartialFolder folder(
       options.output,
       options.replaces_output ? PartialFolder::Existing::Replace : PartialFolder::Existing::Refuse);

@@ -174,6 +174,17 @@ row 0 'constant: the CT is out of view' 'PNG of a DRR that shows nothing' "$bin/
 row 3 "translation" 'DRR 1e308 mm away' "${drr_of_ct[@]}" --translation-mm 1e308,0,0
 row 3 "translation" 'start 1e308 mm away' "${register_one[@]}" --start-translation-mm 1e308,0,0
 of_option 3 'memory' 'memory limit' --memory-limit 1kb
+of_option 2 '--memory-limit' 'negative memory limit' --memory-limit -5
+of_option 2 '--memory-limit' 'memory limit of 2^64 and more' --memory-limit 99999999999999999999
+of_option 2 '--seed' 'negative seed' --seed -1
+of_option 2 '--seed' 'seed beyond 64 bits' --seed 18446744073709551616
+of_option 2 '--uv-nodes' 'number with rubbish behind it' --uv-nodes 6x
+of_option 2 '--uv-nodes' 'octal number' --uv-nodes 010
+of_option 2 '--max-training-tiles' 'hexadecimal number' --max-training-tiles 0x1000
+of_option 2 '--max-rotation-deg' 'NaN' --max-rotation-deg nan
+of_option 2 '--max-translation-mm' 'infinity' --max-translation-mm inf
+of_option 2 '--max-hours' 'infinite time' --max-hours inf
+row 2 '--camera' 'empty text' "${precompute[@]}" --study valid/study.toml --camera ''
 
 printf -- '--- field ---\n'
 register=("$bin/af-register" --study valid/study.toml -o out/result)
@@ -193,8 +204,65 @@ row 4 'valid/study.toml' 'a study given as a field' "$bin/af-drr" --field valid/
 row 3 'outside' 'DRR of a pose outside the field' "$bin/af-drr" --field AP.af.h5 --translation-mm 80,0,0 -o out/drr.mha
 
 printf -- '--- output ---\n'
+new_field=("$bin/af-precompute" "${small[@]}")
+of_valid_ct=(--ct valid/ct.nii.gz --rig valid/rig.toml --camera AP)
+mkfifo pipe.mha f.partial g.io-test
+ln -s nowhere dangling
 row 4 'out/no-folder' 'output folder that does not exist' "$bin/af-drr" --field AP.af.h5 -o out/no-folder/drr.mha
 row 3 'drr.jpg' 'format that cannot hold a DRR' "$bin/af-drr" --field AP.af.h5 -o out/drr.jpg
+
+row 4 'exists and is not a regular file' 'a DRR into a pipe' "$bin/af-drr" --field AP.af.h5 -o pipe.mha
+row 4 'exists and is not a regular file' 'a field into a pipe' "${new_field[@]}" "${of_valid_ct[@]}" -o pipe.mha
+row 4 'exists and is not a regular file' 'a pipe has the name of the unfinished field' "${new_field[@]}" "${of_valid_ct[@]}" -o f
+row 4 'exists and is not a regular file' 'a pipe has the name of the test file' "${new_field[@]}" "${of_valid_ct[@]}" -o g
+row 4 'is a link to' 'a link that leads nowhere' "${new_field[@]}" "${of_valid_ct[@]}" -o dangling
+row 4 'is not a folder' 'results of registration into a pipe' "$bin/af-register" --study valid/study.toml --renderer raycast -o pipe.mha
+row 4 'is not a folder' 'results of registration into a file' "$bin/af-register" --study valid/study.toml --renderer raycast -o AP.af.h5
+row 4 'is not a folder' 'results of evaluation into a pipe' "$bin/af-evaluate" registration --study valid/study.toml -o pipe.mha
+row 3 'is the name of a file' 'a study into a pipe' "$bin/af-simulate" --phantom spine -o pipe.mha
+awk 'BEGIN { print "rx_deg,ry_deg,rz_deg,tx_mm,ty_mm,tz_mm"; for (i = 0; i < 40; ++i) print "1,1,1,0,0,0" }' >forty.csv
+limited() { (
+  ulimit -f "$1"
+  shift
+  "$@"
+); }
+# MPI itself needs files of a few megabytes.
+row 4 'cannot be written' 'DRRs that the disk cannot hold' limited 6000 "$bin/af-drr" --ct valid/ct.nii.gz --rig c-arm-12in --camera AP --poses forty.csv -o out/drrs.mha
+# Of a terminal or a file that takes no more.
+full() { "$@" >/dev/full; }
+row 4 'standard output: cannot be written' 'a report onto a full disk' full "$bin/af-inspect" AP.af.h5
+row 4 'standard output: cannot be written' 'JSON onto a full disk' full "$bin/af-inspect" --json AP.af.h5
+row 4 'standard output: cannot be written' 'a template onto a full disk' full "$bin/af-inspect" --template study
+row 4 'standard output: cannot be written' 'help onto a full disk' full "$bin/af-drr" --help
+row 4 'standard output: cannot be written' 'a version onto a full disk' full "$bin/af-register" --version
+awk 'BEGIN { print "rx_deg,ry_deg,rz_deg,tx_mm,ty_mm,tz_mm"; for (i = 0; i < 400000; ++i) print "1,1,1,0,0,0" }' >poses.csv
+row 3 'must fit' 'more DRRs than the machine can hold' "$bin/af-drr" --field AP.af.h5 --rig c-arm-12in --camera AP --poses poses.csv -o out/drrs.mha
+row 3 'must fit' 'more poses than the machine can hold' "$bin/af-evaluate" image-quality --field AP.af.h5 --ct valid/ct.nii.gz --pose-count 2000000000 -o out
+
+printf -- '--- outputs that are inputs ---\n'
+ln valid/ct.nii.gz hard.nii.gz
+ln -s valid/rig.toml soft.toml
+mkdir -p raw again.partial
+cp valid/ct.nii.gz again.partial
+printf '%s\n' 'ObjectType = Image' 'NDims = 3' 'DimSize = 4 4 4' 'ElementSpacing = 1 1 1' 'ElementType = MET_SHORT' \
+  'ElementDataFile = voxels.raw' >raw/ct.mhd
+head -c 128 /dev/zero >raw/voxels.raw
+head -n 3 forty.csv >few.csv
+ln few.csv few.mha
+find . -type f -not -name message.txt -not -path './out*' -print0 | sort -z | xargs -0 sha256sum >sums.txt
+row 3 'would replace the input' "a field instead of its CT" "${new_field[@]}" "${of_valid_ct[@]}" -o valid/ct.nii.gz
+row 3 'would replace the input' "a field instead of its CT, by another link" "${new_field[@]}" "${of_valid_ct[@]}" -o hard.nii.gz
+row 3 'would replace the input' "a field instead of its study" "${new_field[@]}" --study valid/study.toml --camera AP -o valid/study.toml
+row 3 'would replace the input' "a field instead of its rig, by a link" "${new_field[@]}" --study valid/study.toml --camera AP -o soft.toml
+row 3 'would replace the input' "a field instead of a CT's raw voxels" "${new_field[@]}" --ct raw/ct.mhd --rig c-arm-12in --camera AP -o raw/voxels.raw
+row 3 'would replace the input' "a field instead of a slice" "${new_field[@]}" --ct two-series --rig c-arm-12in --camera AP -o "$(find two-series -type f | head -n 1)"
+row 3 'would replace the input' 'a DRR instead of the CT' "$bin/af-drr" --ct valid/ct.nii.gz --rig valid/rig.toml --camera AP -o hard.nii.gz
+row 3 'would replace the input' 'a DRR instead of the poses' "$bin/af-drr" --field AP.af.h5 --poses few.csv -o few.mha
+row 3 'would replace the input' 'a study instead of the one of its CT' "$bin/af-simulate" --ct valid/ct.nii.gz --force -o valid
+row 3 'would replace the input' 'a study instead of the DICOM folder' "$bin/af-simulate" --ct two-series --force -o two-series
+row 3 'would replace the input' 'a study whose unfinished folder holds the CT' "$bin/af-simulate" --ct again.partial/ct.nii.gz -o again
+row 3 'would replace the input' 'a joined study instead of a part' "$bin/af-evaluate" join-studies valid/study.toml -o valid/study.toml
+sha256sum --quiet --check sums.txt || failures=$((failures + 1))
 
 echo "$rows cases, $failures failures"
 ((failures == 0))

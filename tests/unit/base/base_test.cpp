@@ -2,6 +2,8 @@
 #include <array>
 #include <cmath>
 #include <set>
+#include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -84,6 +86,40 @@ TEST(DurationText, ReadsLikeAPersonWouldSay) {
             "poses compared: 99, about 1 min 20 s on 2 ranks (1.6 s each)");
   EXPECT_EQ(cli::expected_time_text("registrations", 10, 0.05, 1),
             "registrations: 10, about 0.5 s on 1 rank (50 ms each)");
+}
+
+TEST(Errors, QuoteNoMoreOfALongTextThanItsEnds) {
+  constexpr std::size_t kLength = 50'000'000;
+  const std::string cell = std::string(kLength, 'x') + "END";
+  const std::string message = FileError("a.csv:3", "rx_deg", "a number", "'" + cell + "'").what();
+  EXPECT_LT(message.size(), 2000u);
+  EXPECT_TRUE(message.starts_with("a.csv:3: rx_deg: expected a number, found 'xxx")) << message;
+  EXPECT_TRUE(message.ends_with("xEND'")) << message;
+  EXPECT_NE(message.find(" bytes left out) "), std::string::npos) << message;
+}
+
+TEST(Errors, KeepMessagesOfManyLinesAndWholeCharacters) {
+  std::vector<std::string> problems;
+  for (int i = 0; i < 100; ++i) problems.push_back("problem " + std::to_string(i));
+  const std::string all = [&] {
+    try {
+      throw_if_any(problems, std::string(30, 'f'));
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  }();
+  EXPECT_EQ(shortened(all), all);
+  EXPECT_NE(all.find("problem 99"), std::string::npos);
+  for (std::size_t shift = 0; shift < 3; ++shift) {
+    std::string euros(shift, 'a');
+    for (int i = 0; i < 1000; ++i) euros += "\xE2\x82\xAC";
+    const std::string text = shortened(euros);
+    const std::size_t gap = text.find(" ... ");
+    ASSERT_NE(gap, std::string::npos);
+    EXPECT_EQ((gap - shift) % 3, 0u);
+    EXPECT_EQ(text.substr(text.find(") ... ") + 6).size() % 3, 0u);
+  }
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include "io/csv_table.h"
 #include "io/gnuplot_figure.h"
 #include "io/output_file.h"
+#include "support/file_size_limit.h"
 #include "support/test_paths.h"
 
 namespace af::evaluation {
@@ -47,6 +48,17 @@ TEST(GnuplotFigure, NamesGnuplotsMessageAndLeavesNothingWhenAScriptIsWrong) {
     EXPECT_THAT(error.what(), HasSubstr("nonsense("));
   }
   EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+}
+
+TEST(GnuplotFigure, IsWrittenWholeOrNotAtAll) {
+  const test::ScratchFolder folder;
+  GnuplotFigure figure("full disk", 400, 300);
+  figure.add("plot x");
+  for (const rlim_t limit : {2000u, 6000u}) {
+    const test::FileSizeLimit full_disk(limit);
+    EXPECT_THROW(figure.write(folder / "a"), FileError) << limit;
+    EXPECT_TRUE(std::filesystem::is_empty(folder.path())) << limit;
+  }
 }
 
 TEST(GnuplotFigure, CannotBeLedToRunCommandsByItsTexts) {

@@ -8,7 +8,9 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "base/hash_random.h"
 #include "io/ct_reader.h"
+#include "support/file_size_limit.h"
 #include "support/test_paths.h"
 #include "unit/io/ct_test_data.h"
 
@@ -16,6 +18,7 @@ namespace af {
 namespace {
 
 namespace fs = std::filesystem;
+using test::FileSizeLimit;
 using test::ScratchFolder;
 using testing::HasSubstr;
 
@@ -53,6 +56,49 @@ TEST_P(FloatImageFormats, GiveTheSameBytesWhenWrittenTwice) {
   EXPECT_EQ(read_bytes(folder / GetParam()), read_bytes(folder / "again" / GetParam()));
 }
 
+/// Writes with all limits of file sizes from nothing to what is needed, as disks with less and less
+/// room would have it.
+template <typename Write>
+void expect_whole_or_nothing(const std::string& name, const Write& write) {
+  const ScratchFolder folder;
+  write(folder / name);
+  const std::string whole = read_bytes(folder / name);
+  fs::remove(folder / name);
+  for (std::size_t limit = 0; limit < whole.size(); limit += 1 + whole.size() / 37) {
+    const FileSizeLimit full_disk(limit);
+    EXPECT_THROW(write(folder / name), FileError) << name << ' ' << limit;
+    EXPECT_TRUE(fs::is_empty(folder.path())) << name << ' ' << limit;
+  }
+  {
+    const FileSizeLimit full_disk(whole.size() - 1);
+    EXPECT_THROW(write(folder / name), FileError) << name;
+  }
+  const FileSizeLimit just_enough(whole.size());
+  write(folder / name);
+  EXPECT_EQ(read_bytes(folder / name), whole);
+}
+
+/// Does not shrink much, and is larger than the buffers of libraries.
+Image2d noisy_image() {
+  Image2d image(170, 130);
+  HashRandom random(1);
+  for (float& pixel : image.pixels) pixel = static_cast<float>(65535.0 * random.uniform());
+  return image;
+}
+
+TEST_P(FloatImageFormats, AreWrittenWholeOrNotAtAll) {
+  expect_whole_or_nothing(GetParam(), [](const fs::path& path) {
+    write_image_stack({noisy_image(), noisy_image()}, path, 0.4, 0.5);
+  });
+}
+
+TEST(PictureFiles, AreWrittenWholeOrNotAtAll) {
+  expect_whole_or_nothing(
+      "a.png", [](const fs::path& path) { write_png_image(noisy_image(), path, 0.0, 65535.0); });
+  expect_whole_or_nothing(
+      "b.png", [](const fs::path& path) { write_image_u16(noisy_image(), path, 0.4, 0.5); });
+}
+
 TEST_P(FloatImageFormats, HoldStacksThatAreNoSingleImage) {
   const ScratchFolder folder;
   write_image_stack({uneven_image(), uneven_image()}, folder / GetParam(), 0.4, 0.5);
@@ -73,6 +119,7 @@ TEST_P(FloatImageFormats, ThatAreCutShortAreRefused) {
     testing::internal::CaptureStderr();
     EXPECT_THROW((void)read_image(path), FileError);
     EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+    fs::remove(path);  // changed and read, it is an input
   }
 }
 

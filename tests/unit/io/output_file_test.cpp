@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/output_file.h"
 
-#include <csignal>
 #include <fstream>
-#include <sys/resource.h>
 #include <sys/stat.h>
 #include <vector>
 
@@ -12,12 +10,14 @@
 
 #include "base/error.h"
 #include "io/input_file.h"
+#include "support/file_size_limit.h"
 #include "support/io_checks.h"
 
 namespace af {
 namespace {
 
 namespace fs = std::filesystem;
+using test::FileSizeLimit;
 using test::message_of;
 using test::ScratchFolder;
 using testing::AllOf;
@@ -27,28 +27,6 @@ std::size_t entry_count(const fs::path& folder) {
   return static_cast<std::size_t>(
       std::distance(fs::directory_iterator(folder), fs::directory_iterator()));
 }
-
-/// Limits the size of files this process can write, as a full disk would.
-class FileSizeLimit {
- public:
-  explicit FileSizeLimit(rlim_t bytes) {
-    old_handler_ = std::signal(SIGXFSZ, SIG_IGN);
-    getrlimit(RLIMIT_FSIZE, &old_limit_);
-    rlimit limit = old_limit_;
-    limit.rlim_cur = bytes;
-    setrlimit(RLIMIT_FSIZE, &limit);
-  }
-  ~FileSizeLimit() {
-    setrlimit(RLIMIT_FSIZE, &old_limit_);
-    std::signal(SIGXFSZ, old_handler_);
-  }
-  FileSizeLimit(const FileSizeLimit&) = delete;
-  FileSizeLimit& operator=(const FileSizeLimit&) = delete;
-
- private:
-  rlimit old_limit_{};
-  void (*old_handler_)(int) = nullptr;
-};
 
 TEST(WriteAtomically, KeepsTheExtensionOfThePartialFileLast) {
   const ScratchFolder folder;

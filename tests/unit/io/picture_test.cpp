@@ -11,6 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "support/file_size_limit.h"
 #include "support/io_checks.h"
 
 namespace af {
@@ -254,6 +255,16 @@ TEST(PercentileWindow, LeavesOutValuesThatAreNotFinite) {
   image.pixels = {kNan, kNan, kNan, kNan};
   EXPECT_EQ(percentile_window(image), (std::array{0.0, 0.0}));
   EXPECT_THROW(percentile_window(image, 90.0, 10.0), std::logic_error);
+}
+
+TEST(WritePicture, WritesAWholePictureOrNone) {
+  const test::ScratchFolder folder;
+  const PicturePanel panel{ramp(64, 64), 0.0, 4095.0, "A", "", {}, {}};
+  for (const rlim_t limit : {0u, 100u, 1000u, 2000u}) {
+    const test::FileSizeLimit full_disk(limit);
+    EXPECT_THROW(write_picture({panel}, 1, "", folder / "a.png", 2), FileError) << limit;
+    EXPECT_TRUE(std::filesystem::is_empty(folder.path())) << limit;
+  }
 }
 
 }  // namespace

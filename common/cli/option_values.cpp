@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cli/option_values.h"
+
+#include <charconv>
+#include <cmath>
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include <CLI/CLI.hpp>
+
+namespace af::cli {
+
+namespace {
+
+template <typename Number>
+bool is_whole_number(std::string_view text) {
+  if (text.starts_with('+')) text.remove_prefix(1);
+  const std::string_view digits = text.substr(text.starts_with('-') ? 1 : 0);
+  // CLI11 takes a leading zero for octal or hexadecimal digits.
+  if (digits.size() > 1 && digits.front() == '0') return false;
+  Number value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  return error == std::errc() && end == text.data() + text.size();
+}
+
+bool is_finite_number(std::string_view text) {
+  if (text.starts_with('+')) text.remove_prefix(1);
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  return error == std::errc() && end == text.data() + text.size() && std::isfinite(value);
+}
+
+/// "8 GB" -> "8".
+std::string_view without_unit(std::string_view text) {
+  const std::size_t unit = text.find_first_not_of("+-0123456789");
+  return text.substr(0, unit);
+}
+
+/// What a value must be but is not; empty when it is sound.
+std::string problem_of(const std::string& type, const std::string& value) {
+  const auto is_of = [&](const char* name) { return type.find(name) != std::string::npos; };
+  if (value.empty()) return "must not be empty";
+  if (is_of("FLOAT") && !is_finite_number(value)) return "must be a finite number";
+  if (is_of("UINT")) {
+    const bool has_unit = is_of("SIZE");
+    if (!is_whole_number<std::uint64_t>(has_unit ? without_unit(value) : value))
+      return "must be a whole number from 0 to 18446744073709551615, in decimal digits";
+  } else if (is_of("INT") && !is_whole_number<std::int64_t>(value)) {
+    return "must be a whole number in decimal digits";
+  }
+  return {};
+}
+
+void check_values(const CLI::Option& option) {
+  if (option.get_expected_max() == 0) return;  // a flag
+  for (const std::string& value : option.results())
+    if (const std::string problem = problem_of(option.get_type_name(), value); !problem.empty())
+      throw CLI::ValidationError(option.get_name(), "'" + value + "' " + problem);
+}
+
+}  // namespace
+
+void check_option_values(const CLI::App& app) {
+  for (const CLI::Option* option : app.get_options())
+    if (option->count() > 0) check_values(*option);
+  for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; }))
+    check_option_values(*command);
+}
+
+}  // namespace af::cli

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a program reads it does not overwrite. Readers note the files they open; whatever gives a
+// file its name or removes one asks here. Files are told apart by device and inode, so that links
+// and other spellings of a path are seen through. A file that this process has written itself is
+// no input: it may be read back and written again.
+#pragma once
+
+#include <filesystem>
+
+namespace af {
+
+/// Notes a file or folder that is read as input; InputError when it is, or lies in, an announced
+/// output. Nothing when there is no such file: its reader will say so.
+void note_input(const std::filesystem::path& path);
+
+/// InputError when `path` is a file noted as input.
+void refuse_input(const std::filesystem::path& path);
+
+/// InputError when a noted input is `folder` or lies within it: before the folder is replaced or
+/// removed as a whole.
+void refuse_inputs_within(const std::filesystem::path& folder);
+
+/// From now on note_input() refuses this file, if there is one, as well.
+void announce_output_file(const std::filesystem::path& path);
+
+/// From now on note_input() refuses this folder and whatever lies within.
+void announce_replaced_folder(const std::filesystem::path& folder);
+
+/// The file of this name has been written by this process.
+void note_written(const std::filesystem::path& path);
+
+}  // namespace af
