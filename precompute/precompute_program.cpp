@@ -318,7 +318,7 @@ class PrecomputeRun {
     CastPhase cast = cast_phase(build);
     const OverflowChoice choice = overflow_choice(build, cast);
     CompressedAttenuationField field = field_without_indices();
-    const TrainedCodebook trained = train_phase(build, manifest, cast);
+    const TrainedCodebook trained = train_or_give_way(build, manifest, cast);
     field.codebook = trained.codebook;
     write_phase(build, cast, trained, choice, field);
   }
@@ -369,6 +369,28 @@ class PrecomputeRun {
 
   static std::string tile_bytes_text(const CastPhase& cast) {
     return megabytes_text(cast.occupied_tiles * sizeof(Tile));
+  }
+
+  /// Collective. Options that are refused only now must not stand in the way of better ones.
+  TrainedCodebook train_or_give_way(const FieldBuild& build,
+                                    const ProgressManifest& manifest,
+                                    CastPhase& cast) {
+    try {
+      all_or_none(world_, [&] { require_something_seen(cast); });
+      return train_phase(build, manifest, cast);
+    } catch (const Error& error) {
+      if (error.exit_code() == ExitCode::Input && build.progress != nullptr)
+        build.progress->give_way();
+      throw;
+    }
+  }
+
+  void require_something_seen(const CastPhase& cast) const {
+    if (cast.occupied_tiles > 0) return;
+    throw InputError("camera",
+                     source_.camera.name,
+                     "its detector misses the CT: no ray to it meets anything but air, wherever "
+                     "the CT is within the range; check the rig, the nominal pose and the centre");
   }
 
   TrainedCodebook train_phase(const FieldBuild& build,

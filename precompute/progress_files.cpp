@@ -18,6 +18,7 @@ namespace af {
 namespace {
 
 constexpr const char* kFormat = "af-precompute-progress";
+constexpr const char* kManifestName = "manifest.json";
 constexpr int kFormatVersion = 3;  // 2: units are cut along t, too; 3: indices
 using Magic = std::array<char, 8>;
 constexpr Magic kTilesMagic = {'A', 'F', 'U', 'N', 'I', 'T', '0', '1'};
@@ -112,10 +113,11 @@ void scan_shard(const std::filesystem::path& folder,
                 FoundUnits& found) {
   const std::filesystem::path path = folder / shard_name(shard.run, shard.rank);
   std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error)) return;  // lost, or no file: as if damaged
-  std::ifstream file(path, std::ios::binary);
+  // Lost, or no file: as if damaged. Opening a pipe would wait for its writer.
+  if (!std::filesystem::is_regular_file(path, error)) return;
   const std::uint64_t size = std::filesystem::file_size(path, error);
   if (error) return;
+  std::ifstream file(path, std::ios::binary);
   UnitPlace place = shard;
   RecordHeader header;
   while (size - place.offset >= sizeof(RecordHeader)) {
@@ -245,16 +247,24 @@ std::string manifest_text(const ProgressManifest& manifest) {
 }
 
 ProgressManifest read_manifest(const std::filesystem::path& path) {
-  try {
-    const nlohmann::json json = nlohmann::json::parse(read_own_text_file(path));
-    if (json.at("format") != kFormat || json.at("format_version") != kFormatVersion)
-      throw FileError(path.string(), "format", kFormat, "another, or another version");
-    return {json.at("decides").get<std::map<std::string, std::string>>(),
-            json.at("rays_per_unit").get<std::int64_t>()};
-  } catch (const nlohmann::json::exception& error) {
-    throw FileError(path.string(),
-                    std::string("damaged (") + error.what() + "): start over with --restart");
-  }
+  ProgressManifest manifest;
+  read_progress_manifest(path, kFormat, kFormatVersion, [&](const nlohmann::json& json) {
+    manifest = {json.at("decides").get<DecidingValues>(),
+                json.at("rays_per_unit").get<std::int64_t>()};
+  });
+  return manifest;
+}
+
+/// Stands in the folder when the options of its work were refused: others may replace it.
+constexpr const char* kRefusedName = "refused";
+
+/// Takes the note away, and the work with it when that was begun with other options.
+void clear_refused(const std::filesystem::path& folder, const ProgressManifest& manifest) {
+  if (!std::filesystem::exists(folder / kRefusedName)) return;
+  const std::filesystem::path manifest_path = folder / kManifestName;
+  const bool is_other = has_progress_manifest(manifest_path) &&
+                        read_manifest(manifest_path).decides != manifest.decides;
+  std::filesystem::remove_all(is_other ? folder : folder / kRefusedName);
 }
 
 /// Rank 0 alone; returns the plan to use.
@@ -262,9 +272,10 @@ std::int64_t open_folder(const std::filesystem::path& folder,
                          bool restart,
                          const ProgressManifest& manifest) {
   if (restart) std::filesystem::remove_all(folder);
+  clear_refused(folder, manifest);
   make_output_folder(folder);
-  const std::filesystem::path manifest_path = folder / "manifest.json";
-  if (std::filesystem::exists(manifest_path)) {
+  const std::filesystem::path manifest_path = folder / kManifestName;
+  if (has_progress_manifest(manifest_path)) {
     const ProgressManifest earlier = read_manifest(manifest_path);
     require_same(earlier.decides, manifest.decides, folder);
     if (earlier.rays_per_unit < 1)
@@ -275,7 +286,7 @@ std::int64_t open_folder(const std::filesystem::path& folder,
     return earlier.rays_per_unit;
   }
   for (const UnitPlace& orphan : shards_of(folder))
-    std::filesystem::remove(folder / shard_name(orphan.run, orphan.rank));
+    std::filesystem::remove_all(folder / shard_name(orphan.run, orphan.rank));
   write_text_file(manifest_path, manifest_text(manifest));
   return manifest.rays_per_unit;
 }
@@ -412,6 +423,10 @@ void ProgressFolder::forget_cached() const {
 void ProgressFolder::sync() {
   if (file_.is_open()) sync_path(path_of(shard_));
   last_sync_ = std::chrono::steady_clock::now();
+}
+
+void ProgressFolder::give_way() const {
+  if (communicator_.is_root()) write_text_file(path_ / kRefusedName, "");
 }
 
 void ProgressFolder::remove() {

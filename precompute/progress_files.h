@@ -85,6 +85,10 @@ class ProgressFolder {
   /// Makes sure that what was appended survives (fsync).
   void sync();
 
+  /// The options of this work have been refused: the next run may replace it by work of other
+  /// options, and goes on with it when only those differ that do not decide what is kept.
+  void give_way() const;
+
   /// Collective. Removes the folder: the field is complete.
   void remove();
 

@@ -1,23 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/output_lock.h"
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
-#include <chrono>
-#include <csignal>
 #include <cstdlib>
 #include <ctime>
 #include <fcntl.h>
 #include <fstream>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <sstream>
+#include <stdexcept>
 #include <sys/stat.h>
+#include <sys/statfs.h>
 #include <system_error>
 #include <unistd.h>
 #include <utility>
 
 #include "base/error.h"
-#include "io/output_file.h"
+#include "io/process_state.h"
 
 namespace af {
 
@@ -57,20 +59,6 @@ std::string time_text() {
   return text.data();
 }
 
-/// When a process of this host began; 0 when there is none.
-std::uint64_t start_of(int process) {
-  std::ifstream file("/proc/" + std::to_string(process) + "/stat");
-  std::string stat;
-  if (!std::getline(file, stat)) return 0;
-  // Fields after the name, which may hold anything: 3 is the first, 22 the start.
-  std::istringstream fields(stat.substr(std::min(stat.size(), stat.rfind(')') + 1)));
-  std::string skipped;
-  for (int field = 3; field < 22; ++field) fields >> skipped;
-  std::uint64_t start = 0;
-  fields >> start;
-  return start;
-}
-
 std::string own_command() {
   std::ifstream file("/proc/self/cmdline", std::ios::binary);
   std::string command;
@@ -82,7 +70,8 @@ std::string own_command() {
   return command.substr(0, kLongest);
 }
 
-/// The line of /proc/self/mountinfo for the file system that holds an open file.
+/// The line of /proc/self/mountinfo for the file system that holds an open file; empty when there
+/// is none: without /proc, and in a chroot whose root is no mount point.
 std::string mount_line(int descriptor) {
   std::ifstream info("/proc/self/fdinfo/" + std::to_string(descriptor));
   std::string mount;
@@ -92,6 +81,35 @@ std::string mount_line(int descriptor) {
   for (std::string line; std::getline(mounts, line);)
     if (!mount.empty() && line.rfind(mount + " ", 0) == 0) return line;
   return {};
+}
+
+/// A file system by both of its names: in /proc/self/mountinfo and of statfs().
+struct FileSystem {
+  const char* type;
+  std::uint32_t magic;
+};
+
+/// Those whose locks are seen by every host that mounts them, however they are mounted: shared ones
+/// that say so, and those of one host, for which there are no others.
+constexpr std::array kLocksReach = {FileSystem{"gpfs", 0x47504653},
+                                    FileSystem{"ceph", 0x00C36400},
+                                    FileSystem{"ext2", 0xEF53},
+                                    FileSystem{"ext3", 0xEF53},
+                                    FileSystem{"ext4", 0xEF53},
+                                    FileSystem{"xfs", 0x58465342},
+                                    FileSystem{"btrfs", 0x9123683E},
+                                    FileSystem{"zfs", 0x2FC12FC1},
+                                    FileSystem{"f2fs", 0xF2F52010},
+                                    FileSystem{"tmpfs", 0x01021994},
+                                    FileSystem{"overlay", 0x794C7630}};
+
+/// Asks the mount, which tells its options, and where it is not listed the file system itself.
+bool locks_of_reach_other_hosts(int descriptor) {
+  if (const std::string line = mount_line(descriptor); !line.empty())
+    return locks_reach_other_hosts(line);
+  struct statfs found {};
+  return fstatfs(descriptor, &found) == 0 &&
+         locks_reach_other_hosts(static_cast<std::uint32_t>(found.f_type));
 }
 
 enum class Locked { Yes, ByAnother, NotSupported };
@@ -131,10 +149,47 @@ void write_text(int descriptor, const std::string& text, const fs::path& path) {
     throw FileError(path.string(), "cannot be written: " + std::generic_category().message(errno));
 }
 
+/// As a message may show it: another user may have written the file.
+std::string printable(std::string text) {
+  constexpr std::size_t kLongest = 1000;
+  text.resize(std::min(text.size(), kLongest));
+  for (char& character : text)
+    if (static_cast<unsigned char>(character) < 0x20 || character == 0x7f) character = '?';
+  return text;
+}
+
+/// A number that the type holds; std::out_of_range for any other, such as 1e300.
+template <typename T>
+T whole_number(const nlohmann::json& json) {
+  const bool is_natural = json.is_number_unsigned();
+  const std::uint64_t value = is_natural ? json.get<std::uint64_t>() : 0;
+  if (!is_natural || value > static_cast<std::uint64_t>(std::numeric_limits<T>::max()))
+    throw std::out_of_range("not a whole number");
+  return static_cast<T>(value);
+}
+
 std::string words_of(const LockHolder& holder) {
   return "process " + std::to_string(holder.process) + " on " + holder.host +
          (holder.job.empty() ? "" : ", job " + holder.job) + ", since " + holder.since + " (" +
          holder.command + ")";
+}
+
+/// FileError when something else has the name of the lock.
+void require_regular_file(const fs::path& path) {
+  struct stat named {};
+  if (lstat(path.c_str(), &named) == 0 && !S_ISREG(named.st_mode))
+    throw FileError(path.string(),
+                    "is not a regular file, so it cannot be the lock of the output: remove it, or "
+                    "choose another output");
+}
+
+/// Who has a lock that may only be read: another user's, for example.
+std::string readable_holder(const fs::path& path) {
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
+  if (descriptor < 0) return {};
+  const std::optional<LockHolder> holder = lock_holder_of(text_of(descriptor));
+  ::close(descriptor);
+  return holder ? "; it is the lock of " + words_of(*holder) : "";
 }
 
 [[noreturn]] void refuse(const fs::path& output,
@@ -156,13 +211,20 @@ std::string words_of(const LockHolder& holder) {
 
 LockHolder this_process() {
   const int process = getpid();
-  return {host(), process, start_of(process), batch_job(), time_text(), own_command()};
+  return {host(),
+          process,
+          process_start(process),
+          process_space(),
+          batch_job(),
+          time_text(),
+          own_command()};
 }
 
 std::string to_json(const LockHolder& holder) {
   return nlohmann::json{{"host", holder.host},
                         {"process", holder.process},
                         {"process_start", holder.process_start},
+                        {"process_space", holder.process_space},
                         {"job", holder.job},
                         {"since", holder.since},
                         {"command", holder.command}}
@@ -173,21 +235,28 @@ std::string to_json(const LockHolder& holder) {
 std::optional<LockHolder> lock_holder_of(const std::string& json) {
   try {
     const nlohmann::json holder = nlohmann::json::parse(json);
-    return LockHolder{holder.at("host").get<std::string>(),
-                      holder.at("process").get<int>(),
-                      holder.at("process_start").get<std::uint64_t>(),
-                      holder.at("job").get<std::string>(),
-                      holder.at("since").get<std::string>(),
-                      holder.at("command").get<std::string>()};
+    return LockHolder{printable(holder.at("host").get<std::string>()),
+                      whole_number<int>(holder.at("process")),
+                      whole_number<std::uint64_t>(holder.at("process_start")),
+                      holder.value("process_space", ""),
+                      printable(holder.at("job").get<std::string>()),
+                      printable(holder.at("since").get<std::string>()),
+                      printable(holder.at("command").get<std::string>())};
   } catch (const nlohmann::json::exception&) {
+    return std::nullopt;
+  } catch (const std::out_of_range&) {
     return std::nullopt;
   }
 }
 
 bool is_known_gone(const LockHolder& holder, const LockHolder& mine) {
+  const bool sees_it = holder.host == mine.host && holder.process_space == mine.process_space &&
+                       !mine.process_space.empty();
+  const ProcessState state =
+      sees_it ? process_state(holder.process, holder.process_start) : ProcessState::NotTold;
+  if (state != ProcessState::NotTold) return state == ProcessState::HasEnded;
   // A batch system does not run a job twice at a time.
-  if (!holder.job.empty() && holder.job == mine.job) return true;
-  return holder.host == mine.host && start_of(holder.process) != holder.process_start;
+  return !holder.job.empty() && holder.job == mine.job;
 }
 
 bool locks_reach_other_hosts(const std::string& mountinfo_line) {
@@ -203,13 +272,15 @@ bool locks_reach_other_hosts(const std::string& mountinfo_line) {
   if (type == "nfs" || type == "nfs4")
     return !has("nolock") && !has("local_lock=all") && !has("local_lock=posix");
   if (type == "lustre") return has("flock");
-  for (const char* whole : {"gpfs", "ceph"})
-    if (type == whole) return true;
-  // Of one host alone: there are no others.
-  for (const char* local :
-       {"ext2", "ext3", "ext4", "xfs", "btrfs", "zfs", "tmpfs", "overlay", "f2fs"})
-    if (type == local) return true;
-  return false;
+  return std::any_of(kLocksReach.begin(), kLocksReach.end(), [&](const FileSystem& known) {
+    return type == known.type;
+  });
+}
+
+bool locks_reach_other_hosts(std::uint32_t file_system_magic) {
+  return std::any_of(kLocksReach.begin(), kLocksReach.end(), [&](const FileSystem& known) {
+    return file_system_magic == known.magic;
+  });
 }
 
 OutputLock::OutputLock(const fs::path& output) {
@@ -229,7 +300,7 @@ bool OutputLock::try_to_take(const fs::path& output) {
   const bool has_vanished = !is_current(descriptor_, path_);
   const LockHolder mine = this_process();
   const std::optional<LockHolder> holder = lock_holder_of(text_of(descriptor_));
-  const bool reaches = locked == Locked::Yes && locks_reach_other_hosts(mount_line(descriptor_));
+  const bool reaches = locked == Locked::Yes && locks_of_reach_other_hosts(descriptor_);
   const bool is_left = reaches || (holder && is_known_gone(*holder, mine));
   const bool is_mine = locked != Locked::ByAnother && !has_vanished && (is_new || is_left);
   if (is_mine) {
@@ -243,21 +314,27 @@ bool OutputLock::try_to_take(const fs::path& output) {
 
 bool OutputLock::open_file() {
   constexpr mode_t kMode = 0666;  // before the umask
-  constexpr int kFlags = O_RDWR | O_CLOEXEC | O_NOFOLLOW;
+  // Whatever has taken the name of the lock must not be followed, waited for or become a terminal.
+  constexpr int kFlags = O_RDWR | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY;
   while (true) {
     descriptor_ = ::open(path_.c_str(), kFlags | O_CREAT | O_EXCL, kMode);
     if (descriptor_ >= 0) return true;
-    if (errno == EEXIST) descriptor_ = ::open(path_.c_str(), kFlags);
-    if (descriptor_ >= 0) return false;
-    if (errno != ENOENT)  // removed in between: once more
-      throw FileError(path_.string(),
-                      "cannot be opened: " + std::generic_category().message(errno));
+    if (errno == EEXIST) {
+      require_regular_file(path_);
+      descriptor_ = ::open(path_.c_str(), kFlags);
+      if (descriptor_ >= 0) return false;
+      if (errno == ENOENT) continue;  // removed in between: once more
+    }
+    const std::string reason = std::generic_category().message(errno);
+    throw FileError(path_.string(),
+                    "cannot be opened for writing: " + reason + readable_holder(path_));
   }
 }
 
 OutputLock::~OutputLock() {
   if (descriptor_ < 0) return;
-  ::unlink(path_.c_str());
+  // Whoever removed the file meanwhile may have let another job make it anew.
+  if (is_current(descriptor_, path_)) ::unlink(path_.c_str());
   ::close(descriptor_);
 }
 

@@ -52,14 +52,19 @@ bool read_record(std::ifstream& file, std::uint64_t bytes_left, std::vector<std:
 }
 
 DecidingValues read_manifest(const fs::path& path) {
+  DecidingValues decides;
+  read_progress_manifest(path, kFormat, kFormatVersion, [&](const nlohmann::json& json) {
+    decides = json.at("decides").get<DecidingValues>();
+  });
+  return decides;
+}
+
+/// What the file system refuses, as an error of the folder.
+void on_files_of(const fs::path& folder, const std::function<void()>& work) {
   try {
-    const nlohmann::json json = nlohmann::json::parse(read_own_text_file(path));
-    if (json.at("format") != kFormat || json.at("format_version") != kFormatVersion)
-      throw FileError(path.string(), "format", kFormat, "another, or another version");
-    return json.at("decides").get<DecidingValues>();
-  } catch (const nlohmann::json::exception& error) {
-    throw FileError(path.string(),
-                    std::string("damaged (") + error.what() + "): start over with --restart");
+    work();
+  } catch (const fs::filesystem_error& error) {
+    throw FileError(folder.string(), error.what());
   }
 }
 
@@ -102,10 +107,12 @@ std::vector<ShardFile> shards_of(const fs::path& folder, const std::string& name
 }
 
 /// Visits the sound records up to the first that is not; returns their size with their headers.
-/// What is named like a shard and is no file has none.
+/// Whatever else has the name of a shard holds none.
 std::uint64_t visit_shard(const fs::path& path, const ProgressJournal::Visit& visit) {
-  if (!fs::is_regular_file(path)) return 0;
+  std::error_code unreachable;
+  if (!fs::is_regular_file(path, unreachable)) return 0;
   std::ifstream file(path, std::ios::binary);
+  if (!file) throw FileError(path.string(), "cannot be read");
   const std::uint64_t size = fs::file_size(path);
   std::uint64_t sound_bytes = 0;
   for (std::vector<std::byte> record; read_record(file, size - sound_bytes, record);) {
@@ -123,15 +130,19 @@ ProgressJournal::ProgressJournal(const fs::path& folder,
                                  bool restart)
     : folder_(folder), name_(name) {
   make_output_folder(folder_);
+  on_files_of(folder_, [&] { open(decides, restart); });
+}
+
+void ProgressJournal::open(const DecidingValues& decides, bool restart) {
   const fs::path manifest = manifest_path(folder_, name_);
-  if (restart) fs::remove(manifest);
-  if (fs::exists(manifest)) {
+  if (restart) fs::remove_all(manifest);
+  if (has_progress_manifest(manifest)) {
     require_same(read_manifest(manifest), decides, folder_);
     for (const ShardFile& shard : shards_of(folder_, name_)) run_ = std::max(run_, shard.run + 1);
     return;
   }
-  // Records without a manifest are of nobody knows what.
-  for (const ShardFile& shard : shards_of(folder_, name_)) fs::remove(shard.path);
+  // Without a manifest we cannot tell what records belong to.
+  for (const ShardFile& shard : shards_of(folder_, name_)) fs::remove_all(shard.path);
   const nlohmann::json written = {
       {"format", kFormat}, {"format_version", kFormatVersion}, {"decides", decides}};
   write_text_file(manifest, written.dump(2) + "\n");
@@ -147,17 +158,20 @@ void ProgressJournal::visit(int shard_count, const Visit& visit) const {
 }
 
 void ProgressJournal::mend_and_visit(const Visit& visit) {
-  for (const ShardFile& shard : shards_of(folder_, name_)) {
-    const std::uint64_t sound_bytes = visit_shard(shard.path, visit);
-    if (fs::is_regular_file(shard.path) && sound_bytes < fs::file_size(shard.path))
-      fs::resize_file(shard.path, sound_bytes);
-  }
+  on_files_of(folder_, [&] {
+    for (const ShardFile& shard : shards_of(folder_, name_)) {
+      const std::uint64_t sound_bytes = visit_shard(shard.path, visit);
+      std::error_code unreachable;
+      if (fs::is_regular_file(shard.path, unreachable) && sound_bytes < fs::file_size(shard.path))
+        fs::resize_file(shard.path, sound_bytes);
+    }
+  });
 }
 
 void ProgressJournal::remove() {
   // The manifest first: shards alone are of nothing.
   fs::remove(manifest_path(folder_, name_));
-  for (const ShardFile& shard : shards_of(folder_, name_)) fs::remove(shard.path);
+  for (const ShardFile& shard : shards_of(folder_, name_)) fs::remove_all(shard.path);
   std::error_code not_empty;
   fs::remove(folder_, not_empty);
 }

@@ -48,6 +48,8 @@ class ProgressJournal {
   void remove();
 
  private:
+  void open(const DecidingValues& decides, bool restart);
+
   std::filesystem::path folder_;
   std::string name_;
   int run_ = 0;

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/progress_manifest.h"
 
+#include <nlohmann/json.hpp>
 #include <sstream>
+#include <system_error>
 #include <vector>
 
 #include "base/build_info.h"
 #include "base/error.h"
+#include "io/output_file.h"
 #include "io/sha256.h"
 
 namespace af {
@@ -58,6 +61,32 @@ DecidingValues deciding_values(const std::string& options_toml,
   values["program"] = program_build();
   for (const auto& [name, hash] : input_sha256) values["SHA-256 of " + name] = hash;
   return values;
+}
+
+bool has_progress_manifest(const std::filesystem::path& path) {
+  return std::filesystem::symlink_status(path).type() != std::filesystem::file_type::not_found;
+}
+
+void read_progress_manifest(const std::filesystem::path& path,
+                            const std::string& format,
+                            int version,
+                            const std::function<void(const nlohmann::json&)>& take) {
+  const auto unusable = [&](const std::string& why) {
+    return FileError(path.string(), why + ": start over with --restart");
+  };
+  constexpr std::uintmax_t kMostBytes = 16u << 20;
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) throw unusable("is not a regular file");
+  if (std::filesystem::file_size(path, error) > kMostBytes)
+    throw unusable("is larger than any such file");
+  try {
+    const nlohmann::json manifest = nlohmann::json::parse(read_own_text_file(path));
+    if (manifest.at("format") != format || manifest.at("format_version") != version)
+      throw unusable("is not of the format " + format + " " + std::to_string(version));
+    take(manifest);
+  } catch (const nlohmann::json::exception& damage) {
+    throw unusable(std::string("damaged (") + damage.what() + ")");
+  }
 }
 
 void require_same(const DecidingValues& earlier,

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <map>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 namespace af {
@@ -22,6 +24,17 @@ std::string program_build();
 /// count.
 DecidingValues deciding_values(const std::string& options_toml,
                                const std::map<std::string, std::string>& input_sha256);
+
+/// Whether anything has the name of a manifest, be it a link to nowhere or to itself.
+bool has_progress_manifest(const std::filesystem::path& path);
+
+/// Reads the manifest of unfinished work: `take` gets it when it says that it is of this format and
+/// version, and may take values out of it as if all were there. FileError that says what to do when
+/// it is not a regular file, larger than any manifest, damaged or of another format.
+void read_progress_manifest(const std::filesystem::path& path,
+                            const std::string& format,
+                            int version,
+                            const std::function<void(const nlohmann::json&)>& take);
 
 /// InputError that names every difference between what earlier work in `folder` was begun with and
 /// what is asked for now.

@@ -144,6 +144,16 @@ done
 [[ $(printf '%s\n' "${hashes[@]}" | sort -u | wc -l) == 8 ]] || fail 'sizes, casters or slabs make no difference'
 [[ ! -e ranks.h5.progress && ! -e ranks.h5.partial ]] || fail 'work files are left'
 
+# What was refused after casting does not stand in the way of better options: they use its units or replace them.
+for better in '9 61 200' '8 64 100'; do
+  read -r uv st codewords <<<"$better"
+  refuse 3 'more codewords than training tiles' --codewords 60000 -o corrected.h5
+  [[ -e corrected.h5.progress ]] || fail 'the cast units of refused codewords are not kept'
+  "$program" "${common[@]:0:8}" --uv-nodes "$uv" --st-nodes "$st" --codewords "$codewords" -o corrected.h5 >corrected.txt 2>err ||
+    fail "better options after refused ones: $(cat err)"
+  [[ ! -e corrected.h5.progress ]] || fail 'the progress folder is left'
+done
+
 # A slow run (fine steps), stopped by SIGUSR1 on two ranks, resumed on one; another sampling in between is refused.
 slow=(--ct ct.mha --rig c-arm-12in --camera AP --uv-nodes 25 --st-nodes 161 --codewords 200)
 slow+=(--max-translation-mm 30 --caster trilinear --step-mm 0.05)

@@ -263,6 +263,30 @@ TEST_F(FieldBuildTest, ProgressOfOtherOptionsIsRefusedByNameAndRestartThrowsItAw
                        [](const UnitTiles&) { ADD_FAILURE() << "a unit is left"; });
 }
 
+TEST_F(FieldBuildTest, ProgressOfRefusedOptionsGivesWayToOthersAndIsUsedByTheSame) {
+  const auto progress_path = folder_ / "a.h5.progress";
+  const auto units = plan_units(light_slab_, {kUnitRays});
+  const auto units_found = [&](const std::string& step_mm) {
+    ProgressManifest wanted = manifest(kUnitRays);
+    wanted.decides["step_mm"] = step_mm;
+    ProgressFolder progress(progress_path, false, wanted, world_);
+    std::array<std::uint64_t, 1> found{};
+    progress.visit_finished(units, [&](const UnitTiles&) { ++found[0]; });
+    world_.sum(found);
+    return found[0];
+  };
+  stop_after(progress_path, 2);
+  ProgressManifest same = manifest(kUnitRays);
+  ProgressFolder(progress_path, false, same, world_).give_way();
+  world_.barrier();
+  EXPECT_GT(units_found("3"), 0u);
+  EXPECT_THROW(units_found("4"), Error);  // it has been taken up again
+  world_.barrier();
+  ProgressFolder(progress_path, false, same, world_).give_way();
+  world_.barrier();
+  EXPECT_EQ(units_found("4"), 0u);
+}
+
 TEST_F(FieldBuildTest, ADamagedManifestIsAFileError) {
   const auto progress_path = folder_ / "a.h5.progress";
   stop_after(progress_path, 1);

@@ -140,6 +140,7 @@ of_rig 3 'column_direction' 'axis not unit' "$(edited rig.toml '0,/^column_direc
 of_rig 3 'row_direction' 'axes not orthogonal' "$(edited rig.toml '0,/^row_direction = .*/s//row_direction = [0.6, 0, -0.8]/')"
 of_rig 3 'AP' 'duplicate camera names' "$(edited rig.toml 's/"LAT"/"AP"/')"
 of_rig 3 'source_point' 'source on the detector plane' "$(edited rig.toml '0,/^source_point = .*/s//source_point = [0, 350, 0]/')"
+of_rig 3 'its detector misses the CT' 'detector beside the CT' "$(edited rig.toml '0,/^detector_origin_point = .*/s//detector_origin_point = [0, 350, 9000]/')"
 of_rig 3 'pixel_spacing' 'unknown key (typo)' "$(edited rig.toml '0,/^pixel_spacing_mm/s//pixel_spacing/')"
 of_rig 3 'source_point' 'source at 1e300 mm' "$(edited rig.toml '0,/^source_point = .*/s//source_point = [0, 1e300, 0]/')"
 of_rig 3 'pixel_spacing_mm' 'pixels of 1e300 mm' "$(edited rig.toml '0,/^pixel_spacing_mm = .*/s//pixel_spacing_mm = [1e300, 3]/')"

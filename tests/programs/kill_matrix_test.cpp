@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Jobs cut short at random moments within every stage, and gone on with on other rank counts:
-// nothing lost, nothing done twice, the same bytes. A seeded handful; AF_KILLS=100 kills as many
-// times, AF_KILL_SEED draws others.
+// nothing lost, nothing done twice, the same bytes. What befalls the files in between is mended or
+// refused. A seeded handful; AF_KILLS=100 kills as many times, AF_KILL_SEED draws others.
 #include <algorithm>
 #include <array>
 #include <csignal>
@@ -24,6 +24,7 @@
 
 #include "io/csv_table.h"
 #include "io/output_file.h"
+#include "programs/progress_damage.h"
 #include "programs/slow_jobs.h"
 #include "programs/small_study.h"
 #include "support/kept_records.h"
@@ -123,6 +124,7 @@ struct Plan {
   Cut cut = Cut::Usr1;
   int ranks = 1;
   int other_ranks = 2;
+  std::optional<test::Damage> damage = std::nullopt;  ///< before it goes on
 };
 
 class KillMatrix : public testing::Test {
@@ -278,6 +280,35 @@ class KillMatrix : public testing::Test {
     encoded_kept_ += kept.encoded.size();
   }
 
+  /// Runs a command to its end: whether it did the work, or refused and said what to do.
+  static bool is_done(const std::vector<std::string>& command) {
+    test::LaunchedJob job(command, path("output.txt"));
+    const int exit_code = job.wait(kEndsWithin);
+    const std::string said = read_text_file(path("output.txt"));
+    if (exit_code == 0) return true;
+    EXPECT_TRUE(exit_code == 3 || exit_code == 4) << exit_code << said;
+    EXPECT_NE(said.find("--restart"), std::string::npos) << said;
+    return false;
+  }
+
+  /// Goes on with damaged progress: the same bytes, at the latest when told to start over.
+  void expect_same_or_refused(const Plan& plan, const fs::path& output) {
+    const bool is_evaluation = plan.stage == Stage::Evaluate;
+    std::vector<std::string> command = is_evaluation ? registration(plan.other_ranks, output)
+                                                     : precompute(plan.other_ranks, output);
+    if (!is_done(command)) {
+      ++refusals_;
+      command.emplace_back("--restart");
+      ASSERT_TRUE(is_done(command)) << read_text_file(path("output.txt"));
+    }
+    if (is_evaluation) {
+      EXPECT_EQ(rows_without_seconds(output), rows_);
+    } else {
+      EXPECT_EQ(inspected(output)["payload_sha256"], payload_);
+    }
+    EXPECT_FALSE(fs::exists(output.string() + ".progress"));
+  }
+
   static void make_fields() {
     for (const std::string camera : {"AP", "LAT"}) {
       if (fs::exists(path(camera + ".af.h5"))) continue;
@@ -349,10 +380,16 @@ class KillMatrix : public testing::Test {
       fs::remove_all(output.string() + ".progress");
       if (!(is_evaluation ? cut_registration(plan, output) : cut_field(plan, output))) continue;
       ++cuts_made_;
-      if (is_evaluation)
+      if (plan.damage) {
+        const std::string damaged =
+            test::damage_a_file(output.string() + ".progress", *plan.damage, random_);
+        SCOPED_TRACE(damaged);
+        expect_same_or_refused(plan, output);
+      } else if (is_evaluation) {
         expect_whole_registration(plan, output);
-      else
+      } else {
         expect_whole(plan, output);
+      }
       fs::remove_all(output);
       return;
     }
@@ -373,6 +410,7 @@ class KillMatrix : public testing::Test {
   std::uint64_t units_kept_ = 0;
   std::uint64_t iterations_kept_ = 0;
   std::uint64_t encoded_kept_ = 0;
+  std::uint64_t refusals_ = 0;
 
  private:
   static inline test::ScratchFolder* folder_ = nullptr;
@@ -389,8 +427,26 @@ TEST_F(KillMatrix, GoesOnToTheSameBytesOnAnotherRankCount) {
   for (const Stage stage : kCastTrainEncode)
     for (const Cut cut : kCuts) {
       const int ranks = kRankCounts[turn++ % kRankCounts.size()];
-      go_through({stage, cut, ranks, other_than(ranks)});
+      go_through({stage, cut, ranks, other_than(ranks), std::nullopt});
     }
+}
+
+/// Every kind of damage, or AF_KILLS times; stages, cuts and rank counts are drawn.
+TEST_F(KillMatrix, MendsOrRefusesDamagedProgress) {
+  std::cout << "AF_KILL_SEED=" << setting("AF_KILL_SEED", 1) << '\n';
+  constexpr std::size_t kStages = 4;
+  const std::uint64_t kills = setting("AF_KILLS", test::kDamages.size());
+  const std::uint64_t turn = random_() % kStages;
+  for (std::uint64_t i = 0; i < kills && !HasFailure(); ++i) {
+    const int ranks = kRankCounts[random_() % kRankCounts.size()];
+    go_through({static_cast<Stage>((turn + i) % kStages),
+                kCuts[random_() % kCuts.size()],
+                ranks,
+                other_than(ranks),
+                test::kDamages[i % test::kDamages.size()]});
+    std::cout << cuts_made_ << " runs cut short and damaged, " << refusals_ << " refused"
+              << std::endl;
+  }
 }
 
 /// AF_KILLS times: stages, cuts and rank counts in turn, so that each of the 48 comes up.
@@ -402,7 +458,7 @@ TEST_F(KillMatrix, LosesNothingOverManyKills) {
     const int ranks = kRankCounts[i % kRankCounts.size()];
     const Cut cut = kCuts[i / kRankCounts.size() % kCuts.size()];
     const auto stage = static_cast<Stage>(i / (kRankCounts.size() * kCuts.size()) % kStages);
-    go_through({stage, cut, ranks, other_than(ranks)});
+    go_through({stage, cut, ranks, other_than(ranks), std::nullopt});
   }
   std::cout << cuts_made_ << " runs cut short; kept and not done again: " << units_kept_
             << " cast units, " << iterations_kept_ << " iterations, " << encoded_kept_

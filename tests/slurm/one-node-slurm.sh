@@ -62,6 +62,23 @@ PartitionName=main Nodes=$host Default=YES MaxTime=INFINITE State=UP
 TEXT
 }
 
+# start_daemon FOLDER COMMAND...: a daemon that detaches; says why when it cannot start. Nothing that the caller holds
+# open may stay open in it.
+start_daemon() {
+  local folder=$1
+  shift
+  "$@" </dev/null >"$folder/$1.out" 2>&1 || die "$1 does not start: $(last_words "$folder" "$1")"
+}
+
+# last_words FOLDER DAEMON...: what the daemons said and logged last.
+last_words() {
+  local folder=$1 file
+  shift
+  for file in "${@/%/.out}" "${@/%/.log}"; do
+    [[ ! -s "$folder/$file" ]] || printf '\n%s:\n%s' "$folder/$file" "$(tail -n 8 "$folder/$file")"
+  done
+}
+
 start() {
   local folder=$1 host
   host=$(hostname -s)
@@ -84,10 +101,9 @@ start() {
   fi
   write_configuration "$folder" "$host"
   export SLURM_CONF=$folder/slurm.conf
-  # The daemons detach; nothing that the caller holds open may stay open in them.
-  slurmctld -f "$SLURM_CONF" </dev/null >"$folder/slurmctld.out" 2>&1
-  slurmd -f "$SLURM_CONF" -N "$host" </dev/null >"$folder/slurmd.out" 2>&1
-  wait_for 30 node_is_ready || die "the node did not come up; logs are in $folder"
+  start_daemon "$folder" slurmctld -f "$SLURM_CONF"
+  start_daemon "$folder" slurmd -f "$SLURM_CONF" -N "$host"
+  wait_for 30 node_is_ready || die "the node did not come up:$(last_words "$folder" slurmctld slurmd)"
 }
 
 # A zombie has ended, even where no init process buries it.

@@ -2,7 +2,9 @@
 #include "io/progress_journal.h"
 
 #include <fstream>
+#include <functional>
 #include <string>
+#include <sys/stat.h>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -147,6 +149,48 @@ TEST(ProgressJournal, RefusesADamagedManifest) {
   three_records(folder / "p");
   std::ofstream(folder / "p/case.json") << "{";
   EXPECT_THROW(ProgressJournal(folder / "p", "case", kDecides, false), FileError);
+}
+
+TEST(ProgressJournal, SaysHowToGoOnFromAManifestThatCannotBeOne) {
+  const test::ScratchFolder folder;
+  const fs::path manifest = folder / "p/case.json";
+  const std::vector<std::function<void()>> replacements = {
+      [&] { std::ofstream(manifest) << "{"; },
+      [&] { std::ofstream(manifest) << R"({"format": "af-other", "format_version": 3})"; },
+      [&] { fs::resize_file(manifest, 300u << 20); },
+      [&] { fs::create_directories(manifest / "full"); },
+      [&] { ASSERT_EQ(mkfifo(manifest.c_str(), 0600), 0); },
+      [&] { fs::create_symlink("nowhere", manifest); },
+      [&] { fs::create_symlink("case.json", manifest); }};
+  for (std::size_t i = 0; i < replacements.size(); ++i) {
+    three_records(folder / "p");
+    if (i > 2) fs::remove(manifest);
+    replacements[i]();
+    try {
+      ProgressJournal(folder / "p", "case", kDecides, false);
+      FAIL() << i << " was accepted";
+    } catch (const FileError& error) {
+      EXPECT_THAT(error.what(), HasSubstr("start over with --restart")) << i;
+    }
+    ProgressJournal restarted(folder / "p", "case", kDecides, true);
+    EXPECT_TRUE(finished(restarted).empty()) << i;
+    fs::remove_all(folder / "p");
+  }
+}
+
+TEST(ProgressJournal, PassesOverWhateverElseHasTheNameOfAShard) {
+  const test::ScratchFolder folder;
+  const fs::path first = three_records(folder / "p");
+  fs::create_directories(folder / "p/case.0001-000000.records" / "full");
+  ASSERT_EQ(mkfifo((folder / "p/case.0002-000000.records").c_str(), 0600), 0);
+  fs::create_symlink("nowhere", folder / "p/case.0003-000000.records");
+  fs::create_symlink(first.filename(), folder / "p/case.0004-000000.records");
+  fs::create_symlink("case.0005-000000.records", folder / "p/case.0005-000000.records");
+  ProgressJournal journal(folder / "p", "case", kDecides, false);
+  EXPECT_EQ(journal.run(), 6);
+  EXPECT_EQ(finished(journal).size(), 6u);  // those of the first, twice
+  journal.remove();
+  EXPECT_FALSE(fs::exists(folder / "p"));
 }
 
 }  // namespace
