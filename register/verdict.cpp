@@ -3,16 +3,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <optional>
 
 namespace af::registration {
 namespace {
 
+/// With two decimals, 0 or more: "0.05".
 std::string value_text(double value) {
-  char text[32];
-  std::snprintf(text, sizeof(text), "%.2f", value);
-  return text;
+  const std::string hundredths = std::to_string(std::lround(100.0 * std::max(0.0, value)) + 1000);
+  return hundredths.substr(1, 1) + "." + hundredths.substr(2);
 }
 
 /// "0.05 of 1 (right poses have 0.08 or more)"
