@@ -165,6 +165,8 @@ run_stage() {
   "$@" 2>&1 | tee -a "$log" | sed -u 's/^/        /' || status=${PIPESTATUS[0]}
   if ((status == 75)); then
     die 75 "stage \"$title\" was stopped with its progress saved: run the same command again"
+  elif ((status == not_found)); then
+    say "        Nothing was found; the results say why: $(dirname "$result")"
   elif ((status != 0)); then
     die "$status" "stage \"$title\" failed with exit code $status; its log is $log"
   fi

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <sstream>
 #include <utility>
 
@@ -136,15 +137,26 @@ FieldLevelMemory node_memory(const Communicator& communicator, ThreadPool& pool)
   };
 }
 
+/// The levels to make of a field: those of the method, and for judging as many as there are nodes.
+int level_count(const CompressedAttenuationField& field, const CaseLoadOptions& options) {
+  int nodes = std::numeric_limits<int>::max();
+  for (const SlabGeometry& slab : field.light_slab.slabs)
+    nodes = std::min({nodes, slab.s.nodes, slab.t.nodes});
+  int possible = 0;
+  for (; possible < options.judging_level && nodes > 2; ++possible) nodes = (nodes + 1) / 2;
+  return std::max(options.coarsest_level, possible);
+}
+
 /// Collective. The coarse levels of a field's pyramid, held once per node.
 std::vector<RendererLevel> coarse_field_levels(const CompressedAttenuationField& field,
                                                const CaseLoadOptions& options,
                                                const Communicator& communicator) {
   std::vector<RendererLevel> levels;
-  if (options.coarsest_level < 1) return levels;
+  const int coarsest_level = level_count(field, options);
+  if (coarsest_level < 1) return levels;
   const auto pool = options.pool ? options.pool : std::make_shared<ThreadPool>();
   for (const auto& level :
-       make_field_pyramid(field, options.coarsest_level, node_memory(communicator, *pool)))
+       make_field_pyramid(field, coarsest_level, node_memory(communicator, *pool)))
     levels.push_back({std::make_shared<const TwoPassAfDrr>(level, TwoPassOptions{}, pool),
                       level->blur_sigma_mm(true)});
   return levels;
@@ -171,7 +183,8 @@ std::vector<RendererLevel> coarse_ray_casts(const AttenuationVolume& volume,
                                             const CaseLoadOptions& options,
                                             const Communicator& communicator) {
   std::vector<RendererLevel> levels;
-  for (int level = 1; level <= options.coarsest_level; ++level) {
+  const int coarsest_level = std::max(options.coarsest_level, options.judging_level);
+  for (int level = 1; level <= coarsest_level; ++level) {
     const auto at = static_cast<std::size_t>(level - 1);
     const double sigma_mm = at < options.level_blur_sigma_mm.size()
                                 ? options.level_blur_sigma_mm[at]

@@ -45,6 +45,7 @@ void run(const RegisterOptions& options,
   const auto gold = af::all_or_none(world, [&] { return known_gold(study, study_case); });
   const auto pool = std::make_shared<af::ThreadPool>(af::thread_count(options.method.threads));
   CaseLoadOptions load_options = case_load_options(options, method.coarsest_level());
+  load_options.judging_level = method.judge.stage.level;
   load_options.pool = pool;
   const LoadedCase loaded = [&] {
     const af::WorkNote note("loading case " + study_case.name, af::WorkNote::Kind::Phase);
@@ -53,6 +54,7 @@ void run(const RegisterOptions& options,
   for (const std::string& text : loaded.warnings) af::cli::warn(world, text);
   RegistrationRunner runner =
       af::all_or_none(world, [&] { return RegistrationRunner(loaded.problem, method, pool); });
+  PoseExaminer examiner = af::all_or_none(world, [&] { return PoseExaminer(loaded.problem); });
   // Before the work, so that an unwritable folder does not cost it; after the inputs, so that bad
   // ones leave nothing behind.
   std::optional<af::OutputLock> lock;
@@ -75,6 +77,7 @@ void run(const RegisterOptions& options,
   });
   std::vector<RegistrationRecord> records =
       register_starts(runner,
+                      examiner,
                       starts,
                       {af::progress_folder(options.output_folder),
                        "registrations",
@@ -84,13 +87,25 @@ void run(const RegisterOptions& options,
   af::all_or_none(world, [&] {
     if (!world.is_root()) return;
     add_target_errors(gold, study_case.target_box_ct, records);
+    RegistrationRecord& best = records[best_record(records)];
+    if (!best.view_values.empty() && best.result.evaluations > 0)
+      best.diagnosis = diagnose_views(loaded.problem,
+                                      best.result.start_room_from_ct,
+                                      best.result.room_from_ct,
+                                      best.view_values);
+    for (const std::string& text : best.diagnosis.sayings) af::cli::warn(world, text);
+    const Judgement judgement = judgement_of(best);
     // Before result.json: when that is there, everything is.
-    write_slicer_folder(*loaded.problem,
-                        records[best_record(records)].result.room_from_ct,
-                        study_case,
-                        options.output_folder / "slicer");
+    const std::filesystem::path slicer = options.output_folder / "slicer";
+    if (judgement.verdict == Verdict::NotFound)
+      std::filesystem::remove_all(slicer);  // an earlier run's
+    else
+      write_slicer_folder(*loaded.problem, best.result.room_from_ct, study_case, slicer);
     std::cout << write_run(records, *loaded.problem, description, options.output_folder);
     std::filesystem::remove_all(af::progress_folder(options.output_folder));
+    if (judgement.verdict == Verdict::NotFound)
+      throw af::NotFoundError("nothing was found (see the verdict); what was searched is in " +
+                              options.output_folder.string());
   });
 }
 
@@ -104,7 +119,8 @@ int main(int argc, char** argv) {
       "Finds the pose of a CT in the room from calibrated X-rays (2D-3D registration).\n"
       "Writes result.json, pose.toml, result.tfm (ct_from_room, for Slicer), one overlay picture "
       "per view, slicer/ (a folder that 3D Slicer loads) and reproduce.sh; with --starts also "
-      "registrations.csv."};
+      "registrations.csv. A verdict says whether the pose is found, doubtful or not found. Not "
+      "found, of any start, is exit code 7: result.tfm, pose.toml and slicer/ are not written."};
   bind_options(app, options);
   const std::string command_line = af::cli::command_line(argc, argv);
   return af::cli::app_main(

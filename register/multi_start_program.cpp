@@ -26,6 +26,7 @@ struct PlainRecord {
   int evaluations;
   int inadmissible;
   int stop_reason;
+  int view_count;
 };
 static_assert(std::is_trivially_copyable_v<PlainRecord>);
 
@@ -59,7 +60,8 @@ PlainRecord plain(const RegistrationRecord& record) {
           result.rays_outside,
           result.evaluations,
           result.inadmissible,
-          static_cast<int>(result.stop_reason)};
+          static_cast<int>(result.stop_reason),
+          static_cast<int>(record.view_values.size())};
 }
 
 RegistrationRecord record_of(const PlainRecord& from) {
@@ -100,30 +102,39 @@ TraceRow trace_row_of(const PlainTraceRow& from) {
   return row;
 }
 
-/// As it is kept: the record, then its trace.
+template <typename T>
+void append_bytes(std::span<const T> values, std::vector<std::byte>& bytes) {
+  const auto more = std::as_bytes(values);
+  bytes.insert(bytes.end(), more.begin(), more.end());
+}
+
+/// As it is kept: the record, its views' values, then its trace.
 std::vector<std::byte> bytes_of(const RegistrationRecord& record) {
   const PlainRecord head = plain(record);
-  const std::vector<PlainTraceRow> rows = plain(record.result.trace);
-  std::vector<std::byte> bytes(sizeof(head) + rows.size() * sizeof(PlainTraceRow));
-  std::memcpy(bytes.data(), &head, sizeof(head));
-  const auto trace = std::as_bytes(std::span(rows));
-  std::copy(trace.begin(), trace.end(), bytes.begin() + sizeof(head));
+  std::vector<std::byte> bytes;
+  append_bytes(std::span(&head, 1), bytes);
+  append_bytes(std::span(record.view_values), bytes);
+  append_bytes(std::span<const PlainTraceRow>(plain(record.result.trace)), bytes);
   return bytes;
 }
 
-RegistrationRecord record_of(std::span<const std::byte> bytes) {
-  PlainRecord head{};
-  if (bytes.size() < sizeof(head) || (bytes.size() - sizeof(head)) % sizeof(PlainTraceRow) != 0)
+/// Takes a value from the front of `bytes`.
+template <typename T>
+T take(std::span<const std::byte>& bytes) {
+  T value{};
+  if (bytes.size() < sizeof(value))
     throw FileError("unfinished registrations",
                     "a record is of another size: start over with --restart");
-  std::memcpy(&head, bytes.data(), sizeof(head));
+  std::memcpy(&value, bytes.data(), sizeof(value));
+  bytes = bytes.subspan(sizeof(value));
+  return value;
+}
+
+RegistrationRecord record_of(std::span<const std::byte> bytes) {
+  const auto head = take<PlainRecord>(bytes);
   RegistrationRecord record = record_of(head);
-  bytes = bytes.subspan(sizeof(head));
-  for (; !bytes.empty(); bytes = bytes.subspan(sizeof(PlainTraceRow))) {
-    PlainTraceRow row{};
-    std::memcpy(&row, bytes.data(), sizeof(row));
-    record.result.trace.push_back(trace_row_of(row));
-  }
+  for (int i = 0; i < head.view_count; ++i) record.view_values.push_back(take<ViewValue>(bytes));
+  while (!bytes.empty()) record.result.trace.push_back(trace_row_of(take<PlainTraceRow>(bytes)));
   return record;
 }
 
@@ -145,12 +156,16 @@ std::vector<RegistrationRecord> records_of(const cli::ResumableItems& items, std
 }  // namespace
 
 std::vector<RegistrationRecord> register_starts(RegistrationRunner& runner,
+                                                PoseExaminer& examiner,
                                                 std::span<const RigidTransform> starts,
                                                 const cli::UnfinishedWork& unfinished,
                                                 const Communicator& communicator) {
   const auto run = [&](std::int64_t index) {
-    return RegistrationRecord{
-        index, runner.run(starts[static_cast<std::size_t>(index)], index), std::nullopt};
+    RegistrationRecord record;
+    record.start_index = index;
+    record.result = runner.run(starts[static_cast<std::size_t>(index)], index);
+    record.view_values = examiner.view_values(record.result.room_from_ct);
+    return record;
   };
   std::vector<RegistrationRecord> records;
   if (starts.empty()) return records;

@@ -6,17 +6,19 @@
 
 #include "cli/resumable_items.h"
 #include "parallel/communicator.h"
+#include "register/pose_examiner.h"
 #include "register/registration.h"
 #include "register/result_files.h"
 
 namespace af::registration {
 
-/// Collective. Registers from every start, the starts shared over the ranks as these become free.
-/// Of several starts the finished ones are kept (see ResumableItems): a stopped or killed run
-/// goes on. Rank 0 returns one record per start, in the order of starts; the others return none.
-/// Only the record of the highest similarity (ties: the lowest start index) keeps its trace, so
-/// that memory does not grow with the number of starts.
+/// Collective. Registers from every start and examines the end, the starts shared over the ranks as
+/// these become free. Of several starts the finished ones are kept (see ResumableItems): a stopped
+/// or killed run goes on. Rank 0 returns one record per start, in the order of starts; the others
+/// return none. Only the record of the highest similarity (ties: the lowest start index) keeps its
+/// trace, so that memory does not grow with the number of starts.
 std::vector<RegistrationRecord> register_starts(RegistrationRunner& runner,
+                                                PoseExaminer& examiner,
                                                 std::span<const RigidTransform> starts,
                                                 const cli::UnfinishedWork& unfinished,
                                                 const Communicator& communicator);

@@ -90,12 +90,38 @@ std::string parameters_line(const PoseParameters& parameters) {
   return line + " mm";
 }
 
+/// "3 found, 1 doubtful, 0 not found"
+std::string counts_text(const std::vector<RegistrationRecord>& records) {
+  std::array<int, 3> counts{};
+  for (const RegistrationRecord& record : records)
+    ++counts[static_cast<std::size_t>(judgement_of(record).verdict)];
+  std::string text;
+  for (const Verdict verdict : {Verdict::Found, Verdict::Doubtful, Verdict::NotFound})
+    text += (text.empty() ? "" : ", ") + std::to_string(counts[static_cast<std::size_t>(verdict)]) +
+            " " + to_string(verdict);
+  return text;
+}
+
 }  // namespace
+
+Judgement judgement_of(const RegistrationRecord& record) {
+  Judgement judgement = judged_end(record.result.stop_reason, record.view_values);
+  if (record.diagnosis.sayings.empty()) return judgement;
+  std::string sayings;
+  for (const std::string& saying : record.diagnosis.sayings)
+    sayings += (sayings.empty() ? "" : "; ") + saying;
+  if (judgement.verdict == Verdict::NotFound)
+    return {Verdict::NotFound, judgement.reason + "; " + sayings};
+  return {Verdict::Doubtful, sayings};
+}
 
 bool is_better(const RegistrationRecord& a, const RegistrationRecord& b) {
   const bool a_has = std::isfinite(a.result.similarity);
   const bool b_has = std::isfinite(b.result.similarity);
   if (a_has != b_has) return a_has;
+  const bool a_is_found = judgement_of(a).verdict != Verdict::NotFound;
+  const bool b_is_found = judgement_of(b).verdict != Verdict::NotFound;
+  if (a_is_found != b_is_found) return a_is_found;
   if (a_has && a.result.similarity != b.result.similarity)
     return a.result.similarity > b.result.similarity;
   return a.start_index < b.start_index;
@@ -106,6 +132,31 @@ std::size_t best_record(const std::vector<RegistrationRecord>& records) {
   const auto best = std::min_element(records.begin(), records.end(), is_better);
   return static_cast<std::size_t>(best - records.begin());
 }
+
+namespace {
+
+bool is_not_found(const RegistrationRecord& record) {
+  return judgement_of(record).verdict == Verdict::NotFound;
+}
+
+json views_json(const RegistrationRecord& record, const RegistrationProblem& problem) {
+  const std::vector<ViewValue>& values = record.view_values;
+  json views = json::array();
+  bool agree = record.diagnosis.sayings.empty();
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const bool agrees = !disagrees(i, values);
+    agree = agree && agrees;
+    views.push_back({{"camera", problem.views[i].view.camera.name},
+                     {"judge_value", number_or_null(values[i].coarse)},
+                     {"judge_value_fine", number_or_null(values[i].fine)},
+                     {"agrees", agrees}});
+  }
+  return {{"verdict", agree ? "nothing found" : "suspicious"},
+          {"findings", record.diagnosis.sayings},
+          {"cameras", views}};
+}
+
+}  // namespace
 
 json result_json(const RegistrationRecord& record,
                  const RegistrationProblem& problem,
@@ -118,12 +169,18 @@ json result_json(const RegistrationRecord& record,
   output["case"] = run.case_name;
   output["renderer"] = run.renderer;
   output["start_index"] = record.start_index;
-  output["room_from_ct"] = matrix_json(result.room_from_ct);
+  const Judgement judgement = judgement_of(record);
+  const bool is_rejected = judgement.verdict == Verdict::NotFound;
+  output["verdict"] = to_string(judgement.verdict);
+  output["verdict_reason"] = judgement.reason;
+  output["views"] = views_json(record, problem);
+  output[is_rejected ? "rejected_room_from_ct" : "room_from_ct"] = matrix_json(result.room_from_ct);
   output["start_room_from_ct"] = matrix_json(result.start_room_from_ct);
   output["nominal_room_from_ct"] = matrix_json(problem.nominal_room_from_ct);
   output["center_ct_mm"] = {
       problem.center_ct_mm.x(), problem.center_ct_mm.y(), problem.center_ct_mm.z()};
-  output["parameters_relative_to_nominal"] =
+  output[is_rejected ? "rejected_parameters_relative_to_nominal"
+                     : "parameters_relative_to_nominal"] =
       parameters_json(parameters_from_pose(frame, result.room_from_ct));
   output["start_parameters_relative_to_nominal"] =
       parameters_json(parameters_from_pose(frame, result.start_room_from_ct));
@@ -163,6 +220,11 @@ CsvTable registrations_table(std::vector<RegistrationRecord> records,
                              "inadmissible",
                              "drr_count",
                              "relative_to",
+                             "verdict",
+                             "judge_mean",
+                             "judge_lowest_view",
+                             "judge_fine_mean",
+                             "judge_fine_lowest_view",
                              "seconds"})
     columns.emplace_back(column);
   CsvTable table(columns);
@@ -182,6 +244,12 @@ CsvTable registrations_table(std::vector<RegistrationRecord> records,
     fields.push_back(std::to_string(result.inadmissible));
     fields.push_back(std::to_string(result.drr_count));
     fields.emplace_back("nominal");
+    fields.emplace_back(to_string(judgement_of(record).verdict));
+    for (double ViewValue::*const value : {&ViewValue::coarse, &ViewValue::fine}) {
+      const ViewSummary summary = summary_of(record.view_values, value);
+      fields.push_back(number_text(summary.mean));
+      fields.push_back(number_text(summary.lowest));
+    }
     fields.push_back(number_text(result.seconds));
     table.add_row(std::move(fields));
   }
@@ -229,18 +297,37 @@ void write_overlay(const RegistrationView& view,
   write_picture({xray_panel, drr_panel, checker_panel, difference_panel}, 2, heading, path, zoom);
 }
 
+namespace {
+
+/// The pose's files under names that say whether it is one; those of an earlier run are gone.
+void write_pose_files(const RegistrationRecord& record, const std::filesystem::path& folder) {
+  for (const char* name : {"pose.toml", "result.tfm", "rejected-pose.toml"})
+    std::filesystem::remove(folder / name);
+  const RigidTransform& pose = record.result.room_from_ct;
+  if (is_not_found(record)) {
+    write_text_file(folder / "rejected-pose.toml",
+                    "# Not found: " + judgement_of(record).reason + "\n" + pose_to_toml(pose));
+    return;
+  }
+  write_text_file(folder / "pose.toml", pose_to_toml(pose));
+  write_text_file(folder / "result.tfm", pose_to_itk_transform(pose));
+}
+
+}  // namespace
+
 void write_result_files(const RegistrationRecord& record,
                         const RegistrationProblem& problem,
                         const RunDescription& run,
                         const std::filesystem::path& folder) {
-  const RigidTransform& pose = record.result.room_from_ct;
-  write_text_file(folder / "pose.toml", pose_to_toml(pose));
-  write_text_file(folder / "result.tfm", pose_to_itk_transform(pose));
+  write_pose_files(record, folder);
+  const Verdict verdict = judgement_of(record).verdict;
+  const std::string label =
+      verdict == Verdict::Found ? "" : std::string(" (") + to_string(verdict) + ")";
   for (const RegistrationView& view : problem.views) {
     const std::string& camera = view.view.camera.name;
     write_overlay(view,
-                  pose,
-                  run.case_name + ", view " + camera,
+                  record.result.room_from_ct,
+                  run.case_name + ", view " + camera + label,
                   folder / (file_name_part(camera) + "-overlay.png"));
   }
   write_reproduce_script(folder, run.provenance);
@@ -255,12 +342,15 @@ std::string write_run(const std::vector<RegistrationRecord>& records,
   // What an earlier run left here is whole no more.
   remove_output(folder / "result.json");
   std::ostringstream summary;
-  summary << "case " << run.case_name << ", renderer " << run.renderer << '\n';
+  const Judgement judgement = judgement_of(best);
+  summary << "verdict     " << to_string(judgement.verdict) << ": " << judgement.reason << '\n'
+          << "case " << run.case_name << ", renderer " << run.renderer << '\n';
   if (records.size() > 1) {
     write_text_file(folder / "registrations.csv",
                     registrations_table(records, problem, run).to_text());
     summary << records.size() << " starts (" << (folder / "registrations.csv").string()
-            << "); highest similarity: start " << best.start_index << '\n';
+            << "): " << counts_text(records) << "; highest similarity: start " << best.start_index
+            << '\n';
   }
   write_result_files(best, problem, run, folder);
   summary << summary_text(best, problem) << "results     " << folder.string() << '\n';

@@ -10,6 +10,8 @@
 #include "io/csv_table.h"
 #include "io/provenance.h"
 #include "register/registration.h"
+#include "register/verdict.h"
+#include "register/view_diagnosis.h"
 
 namespace af::registration {
 
@@ -24,11 +26,16 @@ struct TargetErrors {
 struct RegistrationRecord {
   std::int64_t start_index = 0;
   RegistrationResult result;
+  std::vector<ViewValue> view_values;  ///< of PoseExaminer, at the end
+  ViewDiagnosis diagnosis;             ///< of a run's best record
   std::optional<TargetErrors> errors;  ///< when the gold pose is known
 };
 
-/// Order of records by similarity, highest first; those without one come last, ties go by start
-/// index.
+/// The verdict on a record: at least doubtful where the diagnosis found something.
+Judgement judgement_of(const RegistrationRecord& record);
+
+/// Order of records by similarity, highest first; those that are not found come after the others,
+/// those without a similarity last, ties go by start index.
 bool is_better(const RegistrationRecord& a, const RegistrationRecord& b);
 
 /// Index of the best record; `records` is not empty.
@@ -41,9 +48,10 @@ struct RunDescription {
   Provenance provenance;
 };
 
-/// result.json: poses as 4x4 (`room_from_ct`, which read_pose() reads) and as six parameters
-/// relative to the nominal pose about the ROI centre, similarity, counts, stop reason, trace,
-/// seconds, TRE, provenance. Numbers that do not exist are null.
+/// result.json: verdict, poses as 4x4 (`room_from_ct`, which read_pose() reads) and as six
+/// parameters relative to the nominal pose about the ROI centre, similarity, counts, stop reason,
+/// trace, seconds, TRE, provenance. Numbers that do not exist are null. What is not found is no
+/// pose for read_pose(): its key is `rejected_room_from_ct`.
 nlohmann::json result_json(const RegistrationRecord& record,
                            const RegistrationProblem& problem,
                            const RunDescription& run);
@@ -62,7 +70,8 @@ void write_overlay(const RegistrationView& view,
                    const std::filesystem::path& path);
 
 /// result.json, pose.toml, result.tfm, VIEW-overlay.png and reproduce.sh in `folder`, result.json
-/// last: when it is there, all are.
+/// last: when it is there, all are. Of what is not found there is no result.tfm, and
+/// rejected-pose.toml instead of pose.toml, so that no script takes its pose for a result.
 void write_result_files(const RegistrationRecord& record,
                         const RegistrationProblem& problem,
                         const RunDescription& run,

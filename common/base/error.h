@@ -15,6 +15,7 @@ enum class ExitCode : int {
   File = 4,
   Numeric = 5,
   Internal = 6,
+  NotFound = 7,  ///< a search is done, its files are written, and what it sought is not found
   Stopped = 75,  ///< stopped on request, progress saved: run the same command again
 };
 
@@ -69,6 +70,12 @@ class FileError : public Error {
 class NumericError : public Error {
  public:
   explicit NumericError(const std::string& message) : Error(ExitCode::Numeric, message) {}
+};
+
+/// A search that has come to its end without finding what it sought; its results say so.
+class NotFoundError : public Error {
+ public:
+  explicit NotFoundError(const std::string& message) : Error(ExitCode::NotFound, message) {}
 };
 
 /// Stopped by SIGUSR1 or a time limit with progress saved.

@@ -70,7 +70,8 @@ std::string description(Stress effect, const StressOptions& o) {
                       o.degraded_ct.noise_hu,
                       " HU and steps of ",
                       o.degraded_ct.step_hu,
-                      " HU; the X-rays show the original CT");
+                      " HU; the X-rays show the original CT",
+                      o.has(Stress::Motion) ? ", moved" : "");
     case Stress::Calibration:
       return sentence("the rig of the study misses the one of the X-rays by ",
                       o.calibration_error_px,

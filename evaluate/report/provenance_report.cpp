@@ -72,6 +72,20 @@ bool has_stress(const json& simulation, const std::string& name) {
       stress.begin(), stress.end(), [&](const json& e) { return e.value("name", "") == name; });
 }
 
+/// What the X-rays were taken of: the registered CT, or what the stress made of one of both.
+const char* imaged_ct_text(const json& simulation) {
+  const bool is_degraded = has_stress(simulation, "degraded-ct");
+  const bool is_moved = has_stress(simulation, "motion");
+  if (is_degraded && is_moved)
+    return " through the original CT after a motion that deformed it (the CT that is registered is "
+           "a degraded one, from before the motion),";
+  if (is_degraded) return " through the original CT (the CT that is registered is a degraded one),";
+  if (is_moved)
+    return " through the CT after a motion that deformed it (the CT that is registered is from "
+           "before the motion),";
+  return " through the CT itself,";
+}
+
 std::string simulation_text(const json& simulation) {
   const auto options = option_lines(simulation.value("options_toml", ""));
   std::vector<std::pair<std::string, std::string>> items;
@@ -81,23 +95,24 @@ std::string simulation_text(const json& simulation) {
                          escaped(found->second) + (*label.unit ? " " : "") + label.unit);
   const auto ideal = options.find("ideal");
   const bool is_ideal = ideal != options.end() && ideal->second == "true";
+  const std::string stress = stress_text(simulation);
   std::string text = element(
       "p",
       "The X-rays were simulated by <code>af-simulate</code> " +
-          escaped(simulation.value("program_version", "")) +
-          (has_stress(simulation, "degraded-ct") || has_stress(simulation, "motion")
-               ? " through the original CT, which is not the one that is registered,"
-               : " through the CT itself,") +
+          escaped(simulation.value("program_version", "")) + imaged_ct_text(simulation) +
           " by an exact projector (Siddon) instead of the ray caster that "
           "made the fields, with a polychromatic spectrum, scatter, noise and detector blur, so "
           "that the images differ from any DRR as X-rays do.");
   if (is_ideal)
-    text = element("p",
-                   "The X-rays were simulated by <code>af-simulate</code> " +
-                       escaped(simulation.value("program_version", "")) +
-                       " with <strong>every effect switched off</strong> (<code>--ideal</code>): "
-                       "they are line integrals, and errors are smaller than with X-rays.");
-  return text + (is_ideal ? "" : definition_list(items)) + stress_text(simulation);
+    text =
+        element("p",
+                "The X-rays were simulated by <code>af-simulate</code> " +
+                    escaped(simulation.value("program_version", "")) + imaged_ct_text(simulation) +
+                    " with <strong>every effect switched off</strong> (<code>--ideal</code>)" +
+                    (stress.empty() ? ": they are line integrals, and errors are smaller than "
+                                      "with X-rays."
+                                    : " but those named below."));
+  return text + (is_ideal ? "" : definition_list(items)) + stress;
 }
 
 std::string hashes_text(const json& hashes) {

@@ -12,6 +12,7 @@ af_add_test(
           unit/register/parameter_scaling_test.cpp
           unit/register/multi_view_objective_test.cpp
           unit/register/registration_test.cpp
+          unit/register/verdict_test.cpp
   LIBS af_registration)
 af_add_test(
   register_program_unit_tests

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // af-register and af-drr as a user meets them: files, exit codes, messages.
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <string>
 
@@ -240,12 +242,61 @@ TEST_F(RegisterProgram, RefusesWhatDoesNotExist) {
   EXPECT_FALSE(fs::exists(path("refused")));
 }
 
-TEST_F(RegisterProgram, AStartOutsideTheFieldIsReportedNotFatal) {
+TEST_F(RegisterProgram, AStartOutsideTheFieldIsNotFound) {
   const test::ProgramRun run =
       run_register(fields() + " --start-translation-mm 0,0,13 -o " + path("outside"));
-  EXPECT_EQ(run.exit_code, 0) << run.output;
+  expect_refused(run, 7, "verdict     not found: nothing was searched");
   EXPECT_NE(run.output.find("start-inadmissible"), std::string::npos) << run.output;
   EXPECT_TRUE(result("outside").at("similarity").is_null());
+  EXPECT_EQ(result("outside").at("verdict"), "not found");
+  for (const char* name : {"outside/result.tfm", "outside/pose.toml", "outside/slicer"})
+    EXPECT_FALSE(fs::exists(path(name))) << name;
+  EXPECT_TRUE(fs::exists(path("outside/AP-overlay.png")));
+  const test::ProgramRun by_ranks = test::run_command(
+      "OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 mpirun -n 2 --oversubscribe " +
+      program("af-register") + " --study " + path("study.toml") + fields() +
+      " --start-translation-mm 0,0,13 -o " + path("outside-2"));
+  EXPECT_EQ(by_ranks.exit_code, 7) << by_ranks.output;
+}
+
+/// The study with one X-ray changed, as NAME.toml.
+void write_study_with_defect(const fs::path& folder,
+                             const std::string& name,
+                             const std::function<void(Image2d&)>& harm) {
+  Study study = read_study(folder / "study.toml");
+  StudyView& view = study.cases.front().views.back();
+  Image2d xray = read_image(view.xray);
+  harm(xray);
+  view.xray = folder / (name + ".mha");
+  write_image(xray, view.xray, 3.0, 3.0);
+  write_text_file(folder / (name + ".toml"), study_to_toml(study, folder));
+}
+
+TEST_F(RegisterProgram, NamesAnXrayThatDisagreesAndWhatWouldMendIt) {
+  const test::ScratchFolder folder;
+  test::write_small_study(folder.path(), test::bones_in_a_corner());
+  write_study_with_defect(folder.path(), "turned", [](Image2d& xray) {
+    std::reverse(xray.pixels.begin(), xray.pixels.end());
+  });
+  write_study_with_defect(folder.path(), "inverted", [](Image2d& xray) {
+    for (float& value : xray.pixels) value = 3.0f - value;
+  });
+  const std::string command =
+      program("af-register") + " --renderer raycast --preset robust --study ";
+  for (const auto& [study, remedy] :
+       {std::pair("turned", "turned by 180 degrees"), std::pair("inverted", "inverted")}) {
+    const fs::path input = folder / (std::string(study) + ".toml");
+    const test::ProgramRun run = test::run_command(command + input.string() + " -o " + path(study));
+    EXPECT_NE(run.output.find("the X-ray of view 'LAT' " + std::string(remedy)), std::string::npos)
+        << run.output;
+    EXPECT_NE(result(study).at("verdict"), "found");
+    EXPECT_EQ(result(study).at("views").at("verdict"), "suspicious");
+  }
+  const test::ProgramRun sound =
+      test::run_command(command + (folder / "study.toml").string() + " -o " + path("sound"));
+  EXPECT_EQ(sound.exit_code, 0) << sound.output;
+  EXPECT_EQ(result("sound").at("verdict"), "found") << sound.output;
+  EXPECT_EQ(sound.output.find("warning: "), std::string::npos) << sound.output;
 }
 
 class DrrProgram : public ProgramTest {};

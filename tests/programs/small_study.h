@@ -12,10 +12,12 @@
 
 namespace af::test {
 
-/// The ellipsoids and their two views as files: ct.nii.gz, rig.toml, AP.mha, LAT.mha, study.toml.
-inline void write_small_study(const std::filesystem::path& folder) {
-  const SmallCase small = small_case();
-  write_ct(five_ellipsoids(), folder / "ct.nii.gz");
+/// A CT of small_case() and its two views as files: ct.nii.gz, rig.toml, AP.mha, LAT.mha,
+/// study.toml.
+inline void write_small_study(const std::filesystem::path& folder,
+                              const CtVolume& ct = five_ellipsoids()) {
+  const SmallCase small = small_case(ct);
+  write_ct(ct, folder / "ct.nii.gz");
   Study study;
   study.path = folder / "study.toml";
   study.rig_name_or_path = "rig.toml";

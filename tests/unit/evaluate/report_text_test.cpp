@@ -139,6 +139,41 @@ TEST(XraySection, NamesEveryEffectOfStressAndWhichCtTheXraysShow) {
   EXPECT_NE(text.find("<strong>motion</strong>: by up to 6 mm"), std::string::npos);
 }
 
+/// The section on X-rays that were simulated with these effects.
+std::string xray_text_with(const std::vector<std::string>& effects, const std::string& options) {
+  EvaluationRun run;
+  run.kind = "registration";
+  run.summary["simulation"] = {{"program_version", "1.0"}, {"options_toml", options}};
+  for (const std::string& effect : effects)
+    run.summary["simulation"]["stress"].push_back({{"name", effect}, {"text", "so much"}});
+  return xray_section({run});
+}
+
+TEST(XraySection, SaysWhatTheXraysWereTakenOf) {
+  const auto expect_ct = [](const std::vector<std::string>& effects, const std::string& expected) {
+    for (const char* options : {"ideal = false\n", "ideal = true\n"})
+      EXPECT_NE(xray_text_with(effects, options).find(expected), std::string::npos)
+          << options << xray_text_with(effects, options);
+  };
+  expect_ct({}, "through the CT itself,");
+  for (const char* effect : {"rods", "fiducials", "heel", "scatter", "noise", "calibration"})
+    expect_ct({effect}, "through the CT itself,");
+  expect_ct({"degraded-ct"},
+            "through the original CT (the CT that is registered is a degraded one)");
+  expect_ct({"motion"}, "through the CT after a motion that deformed it (");
+  EXPECT_EQ(xray_text_with({"motion"}, "").find("original CT"), std::string::npos);
+  expect_ct({"degraded-ct", "motion"},
+            "through the original CT after a motion that deformed it (the CT that is registered is "
+            "a degraded one, from before the motion)");
+}
+
+TEST(XraySection, DoesNotCallXraysLineIntegralsThatStressMadeOthers) {
+  const std::string ideal = "ideal = true\n";
+  EXPECT_NE(xray_text_with({}, ideal).find("they are line integrals"), std::string::npos);
+  EXPECT_EQ(xray_text_with({"noise"}, ideal).find("they are line integrals"), std::string::npos);
+  EXPECT_NE(xray_text_with({"noise"}, ideal).find("but those named below"), std::string::npos);
+}
+
 TEST(FindRuns, FindsRunsBelowAFolderOnceAndInAFixedOrder) {
   const test::ScratchFolder folder;
   write_summary(folder, "b/quality", minimal_summary("image-quality"));

@@ -41,14 +41,23 @@ inline CtVolume five_ellipsoids() {
                            2);
 }
 
+/// Bones without soft tissue, all towards one corner: no mirror image of a view looks like it.
+inline CtVolume bones_in_a_corner() {
+  return ellipsoid_phantom(five_ellipsoids().grid,
+                           {{{12, -8, 20}, {9, 6, 14}, Eigen::Matrix3d::Identity(), 900},
+                            {{-4, 19, 6}, {7, 12, 8}, Eigen::Matrix3d::Identity(), 700},
+                            {{22, 12, -12}, {14, 5, 5}, Eigen::Matrix3d::Identity(), 1100},
+                            {{1, 2, 30}, {6, 8, 5}, Eigen::Matrix3d::Identity(), 800}},
+                           2);
+}
+
 struct SmallCase {
   std::shared_ptr<registration::RegistrationProblem> problem;
   RigidTransform gold_room_from_ct;
 };
 
-/// Two views of the ellipsoids; the X-rays are DRRs at the gold pose, made by the same ray caster.
-inline SmallCase small_case() {
-  const CtVolume ct = five_ellipsoids();
+/// Two views of a CT; the X-rays are DRRs at the gold pose, made by the same ray caster.
+inline SmallCase small_case(const CtVolume& ct = five_ellipsoids()) {
   const auto volume = std::make_shared<const AttenuationVolume>(ct, AttenuationModel{});
   const auto renderer = std::make_shared<const RayCastDrr>(volume, RayCasterOptions{2.0});
   SmallCase small;

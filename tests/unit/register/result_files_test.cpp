@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "base/error.h"
 #include "io/output_file.h"
 #include "io/pose_file.h"
 #include "support/test_paths.h"
@@ -30,6 +31,52 @@ RunDescription some_run() {
   run.provenance.program = "af-register";
   run.provenance.command_line = "af-register --study s";
   return run;
+}
+
+/// A record as record_of(), with views that say it is, or is not, found.
+RegistrationRecord judged_record(std::int64_t start_index, double similarity, double value) {
+  RegistrationRecord record = record_of(start_index, similarity);
+  record.view_values = {{value, value}, {value, value}};
+  return record;
+}
+
+TEST(BestRecord, IsNoneThatIsNotFoundBesideOthers) {
+  EXPECT_EQ(best_record({judged_record(0, 9.0, 0.0), judged_record(1, 2.0, 0.4)}), 1U);
+  EXPECT_EQ(best_record({judged_record(0, 9.0, 0.0), judged_record(1, 2.0, 0.1)}), 0U);
+}
+
+TEST(ResultFiles, WhatIsNotFoundHasNoPoseThatAScriptCouldTake) {
+  const test::ScratchFolder folder;
+  const test::SmallCase small = test::small_case();
+  write_result_files(judged_record(0, 1.5, 0.8), *small.problem, some_run(), folder.path());
+  nlohmann::json json = result_json(judged_record(0, 1.5, 0.8), *small.problem, some_run());
+  EXPECT_EQ(json.at("verdict"), "found");
+  // What an earlier run found goes.
+  write_result_files(judged_record(0, 1.5, 0.0), *small.problem, some_run(), folder.path());
+  for (const char* name : {"pose.toml", "result.tfm"})
+    EXPECT_FALSE(std::filesystem::exists(folder / name)) << name;
+  EXPECT_TRUE(std::filesystem::exists(folder / "rejected-pose.toml"));
+  EXPECT_THROW(read_pose(folder / "result.json"), InputError);
+  json = result_json(judged_record(0, 1.5, 0.0), *small.problem, some_run());
+  EXPECT_EQ(json.at("verdict"), "not found");
+  EXPECT_FALSE(json.at("verdict_reason").get<std::string>().empty());
+  EXPECT_TRUE(json.contains("rejected_room_from_ct"));
+  EXPECT_FALSE(json.contains("room_from_ct"));
+  // And back.
+  write_result_files(judged_record(0, 1.5, 0.8), *small.problem, some_run(), folder.path());
+  EXPECT_TRUE(std::filesystem::exists(folder / "result.tfm"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "rejected-pose.toml"));
+}
+
+TEST(ResultFiles, AFindingAboutTheXraysMakesAResultDoubtful) {
+  const test::SmallCase small = test::small_case();
+  RegistrationRecord record = judged_record(0, 1.5, 0.8);
+  record.diagnosis.sayings = {"views 'AP' and 'LAT' have the same X-ray, pixel for pixel"};
+  const nlohmann::json json = result_json(record, *small.problem, some_run());
+  EXPECT_EQ(json.at("verdict"), "doubtful");
+  EXPECT_EQ(json.at("views").at("verdict"), "suspicious");
+  EXPECT_EQ(json.at("views").at("findings").size(), 1U);
+  EXPECT_EQ(json.at("views").at("cameras").at(1).at("camera"), "LAT");
 }
 
 TEST(BestRecord, IsTheHighestFiniteSimilarityAndTheFirstOfEquals) {
@@ -81,6 +128,8 @@ TEST(ResultFiles, TableRowsAreSortedByStartIndex) {
   EXPECT_EQ(table.text(1, "start_index"), "2");
   EXPECT_EQ(table.number(0, "tre_mm"), 0.25);
   EXPECT_EQ(table.text(1, "tre_mm"), "nan");
+  EXPECT_EQ(table.text(0, "verdict"), "doubtful");
+  EXPECT_EQ(table.columns().back(), "seconds");
   EXPECT_NEAR(table.number(0, "final_rz_deg"), 30.0, 1e-9);
   EXPECT_EQ(table.text(0, "renderer"), "raycast");
 }
@@ -90,6 +139,8 @@ TEST(ResultFiles, ARunOfSeveralStartsLeavesATableAndTheBestResult) {
   const test::SmallCase small = test::small_case();
   const std::string summary =
       write_run({record_of(0, 1.0), record_of(1, 2.0)}, *small.problem, some_run(), folder.path());
+  EXPECT_EQ(summary.find("verdict     doubtful: "), 0U) << summary;
+  EXPECT_NE(summary.find("0 found, 2 doubtful, 0 not found"), std::string::npos) << summary;
   EXPECT_NE(summary.find("highest similarity: start 1"), std::string::npos) << summary;
   EXPECT_EQ(CsvTable::read(folder / "registrations.csv").row_count(), 2U);
   EXPECT_NE(read_text_file(folder / "result.json").find("\"start_index\": 1"), std::string::npos);

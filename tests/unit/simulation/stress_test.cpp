@@ -17,6 +17,7 @@ namespace {
 
 using Eigen::Vector3d;
 using ::testing::ElementsAre;
+using ::testing::EndsWith;
 using ::testing::HasSubstr;
 
 /// Two orthogonal cameras, 900 mm from source to detector, magnification 1.5 at the isocentre.
@@ -350,6 +351,17 @@ TEST(StressOptions, AllNamesEveryEffect) {
   EXPECT_THAT(two[0].text, HasSubstr("2 steel rods of 4 mm"));
   options.names = {"all"};
   EXPECT_EQ(descriptions(options).size() + 1, stress_names().size());
+}
+
+TEST(StressOptions, ADegradedCtLeavesTheXraysWithTheOriginalOneUnlessThatMoved) {
+  const auto text_of = [](const std::vector<std::string>& names) {
+    StressOptions options;
+    options.names = names;
+    return descriptions(options).front().text;
+  };
+  EXPECT_THAT(text_of({"degraded-ct"}), EndsWith("the X-rays show the original CT"));
+  EXPECT_THAT(text_of({"degraded-ct", "motion"}),
+              EndsWith("the X-rays show the original CT, moved"));
 }
 
 TEST(StressOptions, ChangeOnlyTheWantedPartsOfTheDetector) {
