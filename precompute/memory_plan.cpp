@@ -13,6 +13,8 @@ namespace {
 
 /// Indices of one round: the blocks, HDF5's chunks and what they compress to.
 constexpr std::uint64_t kRoundBytes = std::uint64_t{32} << 20;
+/// HDF5's index of the chunks while they are written, 100 bytes for a chunk of 8192 tiles.
+constexpr double kChunkIndexBytesPerTile = 100.0 / 8192.0;
 /// A rank's part of all tiles may exceed the mean by this.
 constexpr double kLargestShare = 1.3;
 /// Held-out tiles come on top of the training tiles.
@@ -73,7 +75,9 @@ MemoryPlan plan_memory(const LightSlab& light_slab,
   // The candidates are still there while the share is copied from them.
   plan.training_bytes = static_cast<std::uint64_t>(
       std::max(kTrainingBytes * share + codebook, kCandidateBytes * (candidates + share)));
-  plan.encoding_bytes = static_cast<std::uint64_t>(codebook + unit) + kRoundBytes;
+  const double chunk_index =
+      kChunkIndexBytesPerTile * static_cast<double>(stored_tile_count(light_slab));
+  plan.encoding_bytes = static_cast<std::uint64_t>(codebook + unit + chunk_index) + kRoundBytes;
   return plan;
 }
 

@@ -173,6 +173,7 @@ class PrecomputeRun {
       print_dry_run(*caster);
       return;
     }
+    check_writing_many_chunks(light_slab_, options_.output, world_, hints());
     build(*caster);
   }
 

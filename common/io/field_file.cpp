@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "io/field_file_access.h"
+#include "io/field_file_chunks.h"
 #include "io/field_file_layout.h"
 #include "io/input_file.h"
 #include "io/input_guard.h"
@@ -25,13 +26,11 @@ namespace {
 
 using field_layout::Dataset;
 using field_layout::DatasetRule;
+using field_layout::index_rules;
 using hdf5::checked;
 using hdf5::Handle;
 
 constexpr std::size_t kSha256Digits = 64;
-/// Tiles along s and t of a chunk, 16 KiB: units of precompute begin and end at chunks.
-constexpr std::uint64_t kChunkRows = kIndexChunkTiles[0];
-constexpr std::uint64_t kChunkColumns = kIndexChunkTiles[1];
 constexpr unsigned kDeflateLevel = 4;
 /// Deflate shrinks nothing by more than this.
 constexpr std::uint64_t kMaxDeflateRatio = 1032;
@@ -93,13 +92,6 @@ void for_each_run(const IndexBlock& block, const DatasetRule& rule, Visit&& visi
 
 // --- writing -------------------------------------------------------------------------------------
 
-std::vector<DatasetRule> index_rules(const CompressedAttenuationField& field) {
-  std::vector<DatasetRule> rules;
-  for (std::size_t k = 0; k < field.light_slab.slabs.size(); ++k)
-    rules.push_back(field_layout::index_rule(field, k));
-  return rules;
-}
-
 void check_blocks(const std::vector<IndexBlock>& blocks, const std::vector<DatasetRule>& rules) {
   for (const IndexBlock& block : blocks) {
     check(block.slab < rules.size(), "an index block names a slab of the field");
@@ -117,24 +109,20 @@ void check_blocks(const std::vector<IndexBlock>& blocks, const std::vector<Datas
   }
 }
 
-/// One chunk holds the (s,t) plane of one (u,v) tile, or a part of it: a unit of precompute writes
-/// whole chunks, and a look-up of one viewpoint reads few.
-Handle index_creation(const DatasetRule& rule) {
+Handle index_creation(const hdf5::ChunkShape& chunk) {
   Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose, "H5Pcreate");
-  const std::array<hsize_t, 4> chunk = {
-      1, 1, std::min(kChunkRows, rule.extents[2]), std::min(kChunkColumns, rule.extents[3])};
   checked(H5Pset_chunk(creation, 4, chunk.data()), "H5Pset_chunk");
   checked(H5Pset_shuffle(creation), "H5Pset_shuffle");
   checked(H5Pset_deflate(creation, kDeflateLevel), "H5Pset_deflate");
   return creation;
 }
 
-void create_index_dataset(hid_t file, const DatasetRule& rule) {
+void create_index_dataset(hid_t file, const DatasetRule& rule, const hdf5::ChunkShape& chunk) {
   const std::vector<hsize_t> extents(rule.extents.begin(), rule.extents.end());
   const Handle space(H5Screate_simple(4, extents.data(), nullptr), H5Sclose, "H5Screate_simple");
   const Handle links(H5Pcreate(H5P_LINK_CREATE), H5Pclose, "H5Pcreate");
   checked(H5Pset_create_intermediate_group(links, 1), "H5Pset_create_intermediate_group");
-  const Handle creation = index_creation(rule);
+  const Handle creation = index_creation(chunk);
   const Handle type = hdf5::file_type(rule);
   const Handle dataset(
       H5Dcreate2(file, rule.name.c_str(), type, space, links, creation, H5P_DEFAULT),
@@ -156,7 +144,9 @@ void create_file_without_indices(const CompressedAttenuationField& field,
   hdf5::write_text_attribute(file, "payload_sha256", std::string(kSha256Digits, '0'));
   for (const Dataset& dataset : field_layout::datasets_of(field))
     hdf5::write_dataset(file, dataset, sha256_hex(dataset.bytes));
-  for (const DatasetRule& rule : index_rules(field)) create_index_dataset(file, rule);
+  const std::vector<DatasetRule> rules = index_rules(field);
+  const std::vector<hdf5::ChunkShape> chunks = hdf5::index_chunks(rules);
+  for (std::size_t k = 0; k < rules.size(); ++k) create_index_dataset(file, rules[k], chunks[k]);
   file.close("H5Fclose");
 }
 
@@ -239,6 +229,7 @@ class SharedFile {
       naming_file(path_, [&] {
         const Handle access = hdf5::file_access();
         const MpiInfo info(hints);
+        hdf5::hold_chunk_index(access, hdf5::chunk_count(rules_));
         checked(H5Pset_fapl_mpio(access, communicator_.impl().handle, info.handle()),
                 "H5Pset_fapl_mpio");
         file_ = checked(H5Fopen(path_.c_str(), H5F_ACC_RDWR, access), "H5Fopen");

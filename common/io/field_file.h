@@ -40,7 +40,8 @@ struct IndexBlock {
 };
 
 /// Tiles along s and along t that one chunk of an index dataset spans, where the slab has as many.
-/// Blocks that begin and end at multiples of them are written without reading chunks back.
+/// Blocks that begin and end at multiples of them are written without reading chunks back. Chunks
+/// of fields of more than 8 GiB are larger.
 inline constexpr std::array<int, 2> kIndexChunkTiles = {128, 64};
 
 /// This rank's next blocks, none when it has no more. Called on every rank equally often, until no
@@ -84,6 +85,13 @@ void announce_field(const std::filesystem::path& path);
 void check_parallel_writing(const std::filesystem::path& path,
                             const Communicator& communicator,
                             const MpiIoHints& hints = {});
+/// Collective. The same for a field of so many chunks that HDF5's index of them has to be held in a
+/// larger metadata cache than its own: little data in as many chunks, but at most 131072. Does
+/// nothing for smaller fields.
+void check_writing_many_chunks(const LightSlab& light_slab,
+                               const std::filesystem::path& path,
+                               const Communicator& communicator,
+                               const MpiIoHints& hints = {});
 
 /// Collective. Rank 0 reads and verifies (extents against dataspaces before allocating, checksums,
 /// index range), the rest receive it; indices are held once per node. FileError (exit 4) on

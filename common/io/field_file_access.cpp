@@ -5,6 +5,7 @@
 #include <span>
 
 #include "base/error.h"
+#include "io/field_file_chunks.h"
 #include "io/sha256.h"
 
 namespace af::hdf5 {
@@ -16,8 +17,6 @@ using field_layout::ElementType;
 namespace {
 
 constexpr std::size_t kMaxAttributeBytes = 1u << 20;
-/// Of a chunk, which HDF5 holds whole; ours have 8192.
-constexpr std::uint64_t kMaxChunkElements = 1u << 20;
 
 /// The innermost message of HDF5's error stack: the true reason.
 herr_t keep_first(unsigned position, const H5E_error2_t* error, void* text) {

@@ -370,6 +370,13 @@ DatasetRule index_rule(const CompressedAttenuationField& field, std::size_t slab
           "tiles (u, v, s, t)"};
 }
 
+std::vector<DatasetRule> index_rules(const CompressedAttenuationField& field) {
+  std::vector<DatasetRule> rules;
+  for (std::size_t k = 0; k < field.light_slab.slabs.size(); ++k)
+    rules.push_back(index_rule(field, k));
+  return rules;
+}
+
 std::vector<DatasetRule> provenance_rules() {
   std::vector<DatasetRule> rules;
   for (const char* name : {"source_version", "command_line", "options_toml", "provenance_json"})

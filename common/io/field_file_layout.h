@@ -55,6 +55,8 @@ struct Dataset {
 std::vector<DatasetRule> payload_rules(int slab_count);
 DatasetRule slab_count_rule();
 DatasetRule index_rule(const CompressedAttenuationField& field, std::size_t slab);
+/// One per slab.
+std::vector<DatasetRule> index_rules(const CompressedAttenuationField& field);
 std::vector<DatasetRule> provenance_rules();
 
 /// The small payload datasets of a field, in the order of payload_rules().

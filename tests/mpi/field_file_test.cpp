@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/field_file.h"
 
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -11,6 +12,7 @@
 #include "base/error.h"
 #include "base/hash_random.h"
 #include "io/field_file_access.h"
+#include "io/field_file_chunks.h"
 #include "io/sha256.h"
 #include "support/shared_folder.h"
 
@@ -218,6 +220,118 @@ TEST(FieldFile, TheTestOfCollectiveWritesLeavesNothingAndSaysWhatFailed) {
   }
   EXPECT_NE(said.find("/nowhere/a.af.h5.io-test"), std::string::npos) << said;
   EXPECT_NE(said.find("HDF5 1."), std::string::npos) << said;
+}
+
+/// As small_field(), but one slab with one tile, a chunk, for every viewpoint tile.
+CompressedAttenuationField field_of_chunks(int tiles_u, int tiles_v) {
+  CompressedAttenuationField field = small_field();
+  field.light_slab.u.nodes = 2 * tiles_u;
+  field.light_slab.v.nodes = 2 * tiles_v;
+  field.light_slab.slabs.resize(1);
+  field.light_slab.slabs[0].stored_s = {2, 2};
+  field.light_slab.slabs[0].stored_t = {4, 2};
+  return field;
+}
+
+/// HDF5 1.10's own metadata cache holds the index of 65536 chunks; it failed beyond.
+TEST(FieldFile, HoldsMoreChunksThanFitIntoTheCacheOfHdf5) {
+  constexpr int kTilesU = 288;
+  constexpr int kTilesV = 256;
+  const test::SharedFolder folder;
+  const Communicator world = Communicator::world();
+  const CompressedAttenuationField field = field_of_chunks(kTilesU, kTilesV);
+  EXPECT_GT(hdf5::chunk_count(field_layout::index_rules(field)), 65536u);
+  std::vector<IndexBlock> blocks;
+  for (int a = 0; a < kTilesU; ++a) {
+    blocks.push_back({0, {a, 0, 0, 0}, {1, kTilesV, 1, 1}, {}});
+    for (int b = 0; b < kTilesV; ++b) blocks.back().indices.push_back(index_at({a, b, 0, 0}, 0));
+  }
+  write_field(field, dealt(blocks, world), some_provenance(), folder / "a.af.h5", world);
+  const auto read = read_field(folder / "a.af.h5", world);
+  std::size_t next = 0;
+  for (int a = 0; a < kTilesU; ++a)
+    for (int b = 0; b < kTilesV; ++b)
+      ASSERT_EQ(read->slabs[0].indices[next++], index_at({a, b, 0, 0}, 0));
+}
+
+TEST(FieldFile, TheTestOfManyChunksLeavesNothing) {
+  const test::SharedFolder folder;
+  const Communicator world = Communicator::world();
+  check_writing_many_chunks(field_of_chunks(288, 256).light_slab, folder / "a.af.h5", world);
+  // A small field is not tested once more: it would fail here.
+  check_writing_many_chunks(small_field().light_slab, "/nowhere/a.af.h5", world);
+  world.barrier();
+  EXPECT_TRUE(std::filesystem::is_empty(folder / ""));
+  world.barrier();
+}
+
+/// Left out unless AF_LARGE_FIELD_GB says how many GB of indices to write and verify: fields beyond
+/// what memory holds. Every unit of 32 viewpoint tiles along u has 1 MiB.
+TEST(FieldFile, HoldsALargeField) {
+  const char* const gigabytes = std::getenv("AF_LARGE_FIELD_GB");
+  if (gigabytes == nullptr) GTEST_SKIP() << "AF_LARGE_FIELD_GB is not set";
+  constexpr std::array<int, 4> kTiles = {32, 1, 256, 64};
+  constexpr std::size_t kTilesOfUnit = 32u * 256u * 64u;
+  const test::SharedFolder folder;
+  const Communicator world = Communicator::world();
+  const auto units = static_cast<int>(std::stod(gigabytes) * 1e9 / (2.0 * kTilesOfUnit));
+  CompressedAttenuationField field = field_of_chunks(kTiles[0], units);
+  SlabGeometry& slab = field.light_slab.slabs[0];
+  slab.s.nodes = 2 * kTiles[2];
+  slab.t.nodes = 2 * kTiles[3];
+  slab.stored_s = {0, slab.s.nodes};
+  slab.stored_t = {0, slab.t.nodes};
+  int next = world.rank();
+  const auto next_blocks = [&] {
+    std::vector<IndexBlock> blocks;
+    for (; next < units && blocks.size() < 8; next += world.size()) {
+      blocks.push_back({0, {0, next, 0, 0}, kTiles, std::vector<std::uint16_t>(kTilesOfUnit)});
+      for (std::size_t i = 0; i < kTilesOfUnit; i += 16)
+        blocks.back().indices[i] =
+            static_cast<std::uint16_t>(hash64(kSeed, static_cast<std::uint64_t>(next), i) % 50);
+    }
+    return blocks;
+  };
+  const FieldFileInfo info =
+      write_field(field, next_blocks, some_provenance, folder / "large.af.h5", world);
+  EXPECT_GT(info.payload_bytes, static_cast<std::uint64_t>(std::stod(gigabytes) * 0.99e9));
+}
+
+/// The chunks of fields whose slabs have these tiles.
+std::vector<hdf5::ChunkShape> chunks_of(
+    const std::vector<std::vector<std::uint64_t>>& extents_of_slabs) {
+  std::vector<field_layout::DatasetRule> rules;
+  for (const auto& extents : extents_of_slabs) {
+    rules.emplace_back();
+    rules.back().extents = extents;
+  }
+  EXPECT_LE(hdf5::chunk_count(rules), hdf5::kMostSmallChunks);
+  const auto shapes = hdf5::index_chunks(rules);
+  for (std::size_t k = 0; k < shapes.size(); ++k) {
+    std::uint64_t elements = 1;
+    for (std::size_t axis = 0; axis < 4; ++axis) {
+      EXPECT_LE(shapes[k][axis], extents_of_slabs[k][axis]);
+      elements *= shapes[k][axis];
+    }
+    EXPECT_LE(elements, hdf5::kMaxChunkElements);
+  }
+  return shapes;
+}
+
+TEST(FieldFile, ChunksGrowAlongVOnlyWhereThereWouldBeTooMany) {
+  using hdf5::ChunkShape;
+  EXPECT_EQ(chunks_of({{32, 32, 128, 118}})[0], (ChunkShape{1, 1, 128, 64}));
+  EXPECT_EQ(chunks_of({{64, 64, 512, 320}})[0], (ChunkShape{1, 1, 128, 64}));
+  EXPECT_EQ(chunks_of({{5, 4, 3, 7}})[0], (ChunkShape{1, 1, 3, 7}));
+  // 8 GiB of indices, and one column more.
+  EXPECT_EQ(chunks_of({{128, 128, 512, 512}})[0], (ChunkShape{1, 1, 128, 64}));
+  EXPECT_EQ(chunks_of({{128, 128, 512, 513}})[0], (ChunkShape{1, 2, 128, 64}));
+  // Slabs count together.
+  EXPECT_EQ(chunks_of(std::vector(64, std::vector<std::uint64_t>{64, 64, 300, 100}))[63],
+            (ChunkShape{1, 4, 128, 64}));
+  // No more viewpoints along v than there are; chunks of 2^20 elements at most.
+  EXPECT_EQ(chunks_of({{2048, 3, 2048, 2048}})[0], (ChunkShape{1, 3, 256, 64}));
+  EXPECT_EQ(chunks_of({{512, 2048, 1024, 512}})[0], (ChunkShape{1, 128, 128, 64}));
 }
 
 TEST(FieldFile, AnUnwritableFolderIsAFileErrorOnEveryRank) {
