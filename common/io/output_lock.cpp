@@ -175,7 +175,7 @@ std::string words_of(const LockHolder& holder) {
 }
 
 /// FileError when something else has the name of the lock.
-void require_regular_file(const fs::path& path) {
+void require_lock_is_a_file(const fs::path& path) {
   struct stat named {};
   if (lstat(path.c_str(), &named) == 0 && !S_ISREG(named.st_mode))
     throw FileError(path.string(),
@@ -320,7 +320,7 @@ bool OutputLock::open_file() {
     descriptor_ = ::open(path_.c_str(), kFlags | O_CREAT | O_EXCL, kMode);
     if (descriptor_ >= 0) return true;
     if (errno == EEXIST) {
-      require_regular_file(path_);
+      require_lock_is_a_file(path_);
       descriptor_ = ::open(path_.c_str(), kFlags);
       if (descriptor_ >= 0) return false;
       if (errno == ENOENT) continue;  // removed in between: once more
