@@ -2,15 +2,16 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/app_main.h"
-#include "evaluate/compare_command.h"
-#include "evaluate/error_budget_command.h"
-#include "evaluate/field_parameters_command.h"
-#include "evaluate/image_quality_command.h"
-#include "evaluate/join_studies_command.h"
-#include "evaluate/method_options_command.h"
-#include "evaluate/registration_command.h"
-#include "evaluate/report_command.h"
-#include "evaluate/similarity_curves_command.h"
+#include "evaluate/image_quality/evaluate_image_quality.h"
+#include "evaluate/methods/evaluated_methods.h"
+#include "evaluate/registration/compare_methods.h"
+#include "evaluate/registration/evaluate_registrations.h"
+#include "evaluate/registration/join_studies.h"
+#include "evaluate/report/make_report.h"
+#include "evaluate/sweeps/draw_similarity_curves.h"
+#include "evaluate/sweeps/make_error_budget.h"
+#include "evaluate/sweeps/sweep_field_parameters.h"
+#include "text/shell_words.h"
 
 int main(int argc, char** argv) {
   CLI::App app{
@@ -36,7 +37,7 @@ int main(int argc, char** argv) {
   af::registration::MethodOptions method;
   const CLI::App* method_command = af::evaluation::bind_show_method(app, method);
   const std::string command_line = af::cli::command_line(argc, argv);
-  registration.program = af::cli::shell_quoted(argv[0]);
+  registration.program = af::shell_quoted(argv[0]);
   return af::cli::app_main(app, argc, argv, [&](const af::Communicator& world) {
     if (image_quality_command->parsed()) run_image_quality(image_quality, command_line, world);
     if (registration_command->parsed()) run_registration(registration, command_line, world);

@@ -2,8 +2,8 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/app_main.h"
-#include "cli/stop_request.h"
-#include "precompute/precompute_program.h"
+#include "cli/run_limits.h"
+#include "precompute/precompute_field.h"
 
 namespace {
 

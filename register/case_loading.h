@@ -9,10 +9,10 @@
 #include <vector>
 
 #include "base/thread_pool.h"
-#include "io/ct_reader.h"
-#include "io/study_file.h"
+#include "image_files/ct_reader.h"
 #include "parallel/communicator.h"
-#include "register/registration.h"
+#include "register/method/registration.h"
+#include "study/study_file.h"
 #include "volume/ray_caster.h"
 
 namespace af::registration {

@@ -8,17 +8,18 @@
 
 #include "base/error.h"
 #include "cli/app_main.h"
-#include "cli/stop_request.h"
-#include "io/csv_table.h"
-#include "io/output_file.h"
-#include "io/output_lock.h"
-#include "io/shared_inputs.h"
+#include "files/output_file.h"
 #include "parallel/work_watch.h"
-#include "register/method_command.h"
-#include "register/multi_start_program.h"
-#include "register/register_command.h"
-#include "register/slicer_files.h"
-#include "register/target_errors_program.h"
+#include "register/method_arguments.h"
+#include "register/multi_start.h"
+#include "register/register_options.h"
+#include "register/results/slicer_folder.h"
+#include "register/results/target_errors.h"
+#include "run/output_lock.h"
+#include "run/stop_request.h"
+#include "run/terminal.h"
+#include "study/shared_inputs.h"
+#include "text/csv_table.h"
 
 namespace {
 
@@ -29,7 +30,7 @@ void run(const RegisterOptions& options,
          const std::string& command_line,
          const Communicator& world) {
   using namespace af::registration;
-  af::cli::listen_for_stop_requests();
+  af::listen_for_stop_requests();
   const RegistrationOptions method = af::all_or_none(world, [&] {
     af::throw_if_any(problems(options));
     if (world.is_root()) af::announce_outputs(options.output_folder, result_file_names());
@@ -37,7 +38,7 @@ void run(const RegisterOptions& options,
   });
   std::vector<std::string> study_warnings;
   const af::Study study = af::read_study(options.study, world, &study_warnings);
-  for (const std::string& text : study_warnings) af::cli::warn(world, text);
+  for (const std::string& text : study_warnings) af::warn(world, text);
   const af::StudyCase study_case =
       af::all_or_none(world, [&] { return study.find_case(options.case_name); });
   const std::vector<af::RigidTransform> starts =
@@ -51,7 +52,7 @@ void run(const RegisterOptions& options,
     const af::WorkNote note("loading case " + study_case.name, af::WorkNote::Kind::Phase);
     return load_case(study, study_case, load_options, world);
   }();
-  for (const std::string& text : loaded.warnings) af::cli::warn(world, text);
+  for (const std::string& text : loaded.warnings) af::warn(world, text);
   RegistrationRunner runner =
       af::all_or_none(world, [&] { return RegistrationRunner(loaded.problem, method, pool); });
   PoseExaminer examiner = af::all_or_none(world, [&] { return PoseExaminer(loaded.problem); });
@@ -93,7 +94,7 @@ void run(const RegisterOptions& options,
                                       best.result.start_room_from_ct,
                                       best.result.room_from_ct,
                                       best.view_values);
-    for (const std::string& text : best.diagnosis.sayings) af::cli::warn(world, text);
+    for (const std::string& text : best.diagnosis.sayings) af::warn(world, text);
     const Judgement judgement = judgement_of(best);
     // Before result.json: when that is there, everything is.
     const std::filesystem::path slicer = options.output_folder / "slicer";

@@ -15,9 +15,10 @@
 #include "base/build_info.h"
 #include "base/error.h"
 #include "cli/option_values.h"
-#include "cli/stop_request.h"
 #include "parallel/mpi_environment.h"
 #include "parallel/work_watch.h"
+#include "run/stop_request.h"
+#include "text/shell_words.h"
 
 namespace af::cli {
 
@@ -92,9 +93,10 @@ int app_main(CLI::App& app,
   // A write beyond a limit of file sizes is an error to report, not a signal to die from.
   std::signal(SIGXFSZ, SIG_IGN);
   std::optional<StallWatch> watch;
-  if (stall_minutes() > 0.0)
-    watch.emplace(
-        world, stall_minutes(), [&app](const std::string& stall) { end_job(app, stall); });
+  if (run_limits().stall_minutes > 0.0)
+    watch.emplace(world, run_limits().stall_minutes, [&app](const std::string& stall) {
+      end_job(app, stall);
+    });
   RankFailure failure;
   bool is_known_everywhere = false;
   try {
@@ -121,16 +123,6 @@ int app_main(CLI::App& app,
   end_after_report(failure.exit_code, is_reporting);
 }
 
-std::string shell_quoted(const std::string& word) {
-  const std::string plain =
-      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-+=:,./@%";
-  if (!word.empty() && word.find_first_not_of(plain) == std::string::npos) return word;
-  std::string quoted = "'";
-  for (const char character : word)
-    quoted += character == '\'' ? std::string("'\\''") : std::string(1, character);
-  return quoted + "'";
-}
-
 std::string given_options(const CLI::App& command, const std::set<std::string>& left_out) {
   std::string line;
   for (const CLI::Option* option : command.get_options()) {
@@ -147,14 +139,6 @@ std::string command_line(int argc, char** argv) {
   std::string line;
   for (int i = 0; i < argc; ++i) line += (i > 0 ? " " : "") + shell_quoted(argv[i]);
   return line;
-}
-
-void info(const Communicator& communicator, const std::string& message) {
-  if (communicator.is_root()) std::cerr << message << '\n';
-}
-
-void warn(const Communicator& communicator, const std::string& message) {
-  if (communicator.is_root()) std::cerr << "warning: " << message << '\n';
 }
 
 }  // namespace af::cli

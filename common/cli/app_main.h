@@ -32,16 +32,8 @@ int app_main(CLI::App& app,
 /// The command line as typed, quoted for a shell; goes into every output and reproduce.sh.
 std::string command_line(int argc, char** argv);
 
-/// A word quoted for a shell where it must be.
-std::string shell_quoted(const std::string& word);
-
 /// The options given to a parsed (sub)command but those named, as words for a shell: " --seed 3
 /// --field A=a.h5". \test GivenOptions.AreThoseTypedButTheOnesLeftOut
 std::string given_options(const CLI::App& command, const std::set<std::string>& left_out);
-
-/// Information for the person at the terminal, on standard error, from rank 0 only. Results go to
-/// standard output.
-void info(const Communicator& communicator, const std::string& message);
-void warn(const Communicator& communicator, const std::string& message);
 
 }  // namespace af::cli

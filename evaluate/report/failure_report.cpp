@@ -5,14 +5,14 @@
 #include <vector>
 
 #include "base/error.h"
-#include "evaluate/failed_start_files.h"
+#include "evaluate/outputs/failed_start.h"
+#include "evaluate/outputs/sample_summary_json.h"
 #include "evaluate/report/html_text.h"
 #include "evaluate/report/number_html.h"
 #include "evaluate/report/run_report.h"
 #include "evaluate/report/sections_report.h"
-#include "evaluate/success_rate.h"
-#include "evaluate/summary_files.h"
-#include "io/csv_table.h"
+#include "evaluate/statistics/success_rate.h"
+#include "text/csv_table.h"
 
 namespace af::evaluation {
 

@@ -3,13 +3,13 @@
 #include <filesystem>
 
 #include "base/error.h"
-#include "evaluate/figure_files.h"
+#include "evaluate/outputs/result_figures.h"
+#include "evaluate/outputs/sample_summary_json.h"
 #include "evaluate/report/html_text.h"
 #include "evaluate/report/number_html.h"
 #include "evaluate/report/sections_report.h"
-#include "evaluate/summary_files.h"
-#include "io/csv_table.h"
-#include "io/output_file.h"
+#include "files/output_file.h"
+#include "text/csv_table.h"
 
 namespace af::evaluation {
 

@@ -6,11 +6,11 @@
 #include <limits>
 #include <set>
 
+#include "evaluate/outputs/sample_summary_json.h"
 #include "evaluate/report/html_text.h"
 #include "evaluate/report/number_html.h"
 #include "evaluate/report/run_report.h"
 #include "evaluate/report/sections_report.h"
-#include "evaluate/summary_files.h"
 
 namespace af::evaluation {
 

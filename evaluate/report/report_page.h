@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "evaluate/report/evaluation_run_files.h"
+#include "evaluate/report/evaluation_run.h"
 
 namespace af::evaluation {
 

@@ -2,7 +2,7 @@
 #include "evaluate/report/run_report.h"
 
 #include "evaluate/report/html_text.h"
-#include "io/output_file.h"
+#include "files/output_file.h"
 
 namespace af::evaluation {
 

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "evaluate/report/evaluation_run_files.h"
+#include "evaluate/report/evaluation_run.h"
 
 namespace af::evaluation {
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "evaluate/outputs/sample_summary_json.h"
 #include "evaluate/report/html_text.h"
 #include "evaluate/report/number_html.h"
 #include "evaluate/report/sections_report.h"
-#include "evaluate/summary_files.h"
 
 namespace af::evaluation {
 

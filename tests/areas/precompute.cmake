@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 af_add_test(
   precompute_test
-  SOURCES unit/precompute/planner_test.cpp unit/precompute/unit_tiles_test.cpp unit/precompute/nearest_codeword_test.cpp
-          unit/precompute/precompute_options_test.cpp unit/precompute/field_caster_test.cpp unit/precompute/codebook_training_test.cpp
+  SOURCES unit/precompute/units/unit_planner_test.cpp unit/precompute/units/unit_tiles_test.cpp unit/precompute/codebook/nearest_codeword_test.cpp
+          unit/precompute/plan/precompute_options_test.cpp unit/precompute/casting/field_caster_test.cpp unit/precompute/codebook/codebook_training_test.cpp
   LIBS af_precompute)
 
 af_add_mpi_test(
   field_file_test
   SOURCES mpi/field_file_test.cpp
-  LIBS af_io_field af_io_basics MPI::MPI_C PkgConfig::hdf5_openmpi
+  LIBS af_field_file af_study af_run MPI::MPI_C PkgConfig::hdf5_openmpi
   RANKS 1 2 3 4)
 
 af_add_mpi_test(

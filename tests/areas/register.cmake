@@ -1,25 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
 af_add_test(
   register_tests
-  SOURCES unit/register/mutual_information_test.cpp
-          unit/register/cross_correlation_test.cpp
-          unit/register/similarity_measures_test.cpp
-          unit/register/best_neighbor_search_test.cpp
-          unit/register/optimizers_test.cpp
-          unit/register/stage_view_test.cpp
-          unit/register/fiducial_mask_test.cpp
-          unit/register/method_options_test.cpp
-          unit/register/parameter_scaling_test.cpp
-          unit/register/multi_view_objective_test.cpp
-          unit/register/registration_test.cpp
-          unit/register/verdict_test.cpp
+  SOURCES unit/register/similarity/mutual_information_test.cpp
+          unit/register/similarity/cross_correlation_test.cpp
+          unit/register/similarity/similarity_measures_test.cpp
+          unit/register/optimizer/best_neighbor_search_test.cpp
+          unit/register/optimizer/optimizers_test.cpp
+          unit/register/problem/stage_view_test.cpp
+          unit/register/problem/fiducial_mask_test.cpp
+          unit/register/method/method_options_test.cpp
+          unit/register/problem/parameter_scaling_test.cpp
+          unit/register/problem/multi_view_objective_test.cpp
+          unit/register/method/registration_test.cpp
+          unit/register/verdict/verdict_test.cpp
   LIBS af_registration)
 af_add_test(
   register_program_unit_tests
-  SOURCES unit/register/register_command_test.cpp unit/register/result_files_test.cpp
-          unit/register/slicer_files_test.cpp
-  LIBS af_registration_program af_io_itk)
-af_add_mpi_test(register_mpi_tests SOURCES mpi/register/multi_start_mpi_test.cpp LIBS af_registration_program RANKS 1 2 3 4)
+  SOURCES unit/register/register_options_test.cpp unit/register/results/registration_results_test.cpp
+          unit/register/results/slicer_folder_test.cpp
+  LIBS af_registration_program af_image_itk)
+af_add_mpi_test(register_mpi_tests SOURCES mpi/multi_start_test.cpp LIBS af_registration_program RANKS 1 2 3 4)
 # Its own operator new belongs into a file of its own.
 set_source_files_properties(support/counted_allocations.cpp PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
 af_add_test(

@@ -14,12 +14,12 @@ af_add_test(
   LIBS af_simulation)
 af_add_test(
   partial_folder_test
-  SOURCES unit/io/partial_folder_test.cpp
-  LIBS af_io_basics)
+  SOURCES unit/files/partial_folder_test.cpp
+  LIBS af_study af_run)
 af_add_test(
   af_simulate_test
   SOURCES unit/simulation/af_simulate_test.cpp
-  LIBS af_simulation af_gold af_io_ct
+  LIBS af_simulation af_gold_standard af_study_contents
   TIMEOUT 300)
 target_compile_definitions(af_simulate_test PRIVATE AF_SIMULATE_PROGRAM="$<TARGET_FILE:af-simulate>")
 add_dependencies(af_simulate_test af-simulate)

@@ -10,9 +10,9 @@
 #include "base/build_info.h"
 #include "base/error.h"
 #include "base/vector_width.h"
-#include "io/ct_reader.h"
-#include "io/rig_file.h"
-#include "precompute/shear_warp_caster.h"
+#include "image_files/ct_reader.h"
+#include "precompute/casting/shear_warp_caster.h"
+#include "study/rig_file.h"
 #include "support/itk_comparison.h"
 
 namespace af::benchmark {

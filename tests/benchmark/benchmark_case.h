@@ -11,9 +11,9 @@
 #include "drr/drr_renderer.h"
 #include "field/attenuation_quantizer.h"
 #include "geometry/slab_sizing.h"
-#include "precompute/slab_aligned_volume.h"
-#include "precompute/unit_tiles.h"
-#include "precompute/work_unit.h"
+#include "precompute/casting/slab_aligned_volume.h"
+#include "precompute/units/unit_tiles.h"
+#include "precompute/units/work_unit.h"
 
 namespace af::benchmark {
 

@@ -15,7 +15,7 @@
 #include "cli/app_main.h"
 #include "drr/ray_cast_drr.h"
 #include "image/psnr.h"
-#include "precompute/shear_warp_caster.h"
+#include "precompute/casting/shear_warp_caster.h"
 #include "support/itk_comparison.h"
 
 namespace af::benchmark {

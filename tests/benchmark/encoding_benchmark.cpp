@@ -14,9 +14,9 @@
 #include "benchmark/brute_force_kernel.h"
 #include "benchmark/faiss_search.h"
 #include "cli/app_main.h"
-#include "precompute/codebook_training.h"
-#include "precompute/nearest_codeword.h"
-#include "precompute/shear_warp_caster.h"
+#include "precompute/casting/shear_warp_caster.h"
+#include "precompute/codebook/codebook_training.h"
+#include "precompute/codebook/nearest_codeword.h"
 
 namespace af::benchmark {
 

@@ -14,9 +14,9 @@
 #include "cli/app_main.h"
 #include "drr/ray_cast_drr.h"
 #include "drr/two_pass_af_drr.h"
+#include "field_file/field_file.h"
 #include "image/psnr.h"
-#include "io/field_file.h"
-#include "precompute/shear_warp_caster.h"
+#include "precompute/casting/shear_warp_caster.h"
 #include "support/plane_products.h"
 #include "volume/blurred_volume.h"
 

@@ -8,9 +8,10 @@
 #include <mpi.h>
 
 #include "benchmark/alternating_rounds.h"
-#include "evaluate/registration_rows_files.h"
-#include "io/progress_journal.h"
+#include "evaluate/registration/registration_rows.h"
 #include "parallel/mpi_handle.h"
+#include "run/progress_journal.h"
+#include "run/stop_request.h"
 #include "support/test_paths.h"
 
 namespace af::benchmark {

@@ -8,7 +8,7 @@
 #include "benchmark/benchmark_case.h"
 #include "benchmark/scaling_model.h"
 #include "cli/app_main.h"
-#include "io/gnuplot_figure.h"
+#include "figures/gnuplot_figure.h"
 
 namespace {
 

@@ -1,152 +1,212 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Checks every first-party #include, and every one of MPI, HDF5 and ITK, against the layers of the project:
-# numerics never see MPI, HDF5, ITK, the terminal or files.
+# Holds every first-party #include, and those of the watched libraries, against the table of ARCHITECTURE.md.
 #
-#   layering.sh ROOT         checks the tree at ROOT; exit 1 and one line per violation
-#   layering.sh --self-test  plants violations in a scratch tree and checks that each is found
+#   layering.sh ROOT          checks the tree at ROOT; exit 1 and one line per violation
+#   layering.sh --graph ROOT  prints the includes between folders as a graph for Graphviz (dot -Tsvg)
+#   layering.sh --self-test   plants violations in a scratch tree and checks that each is found
 set -euo pipefail
 
-# First matching row wins: path pattern (awk regular expression on the path below ROOT) | folders it may include from |
-# of MPI, HDF5, ITK, IOSTREAM what it may include. "*" allows every folder.
-table='
-^common/base/        | base |
-^common/geometry/    | geometry base |
-^common/image/       | image base |
-^common/volume/      | volume geometry base |
-^common/field/       | field geometry base |
-^common/drr/         | drr volume field image geometry base |
-^common/simulation/  | simulation drr volume field image geometry base |
-^common/gold/gold_standard_files[.] | gold io geometry base |
-^common/gold/        | gold geometry base |
-^common/parallel/    | parallel base | MPI
-^common/cli/resumable_items[.] | cli io parallel base |
-^common/cli/         | cli parallel base | IOSTREAM
-^common/io/(itk_image_io|dicom_pixels)[.] | io base | ITK
-^common/io/(ct_reader|dicom_series|xray_reader)[.] | io volume image geometry base |
-^common/io/(node_ct|shared_inputs)[.] | io parallel volume image geometry base |
-^common/io/field_file[a-z0-9_]*[.] | io field parallel image geometry base | MPI HDF5
-^common/io/          | io image geometry base |
-^common/tools/       | * | IOSTREAM
-/main[.]cpp$         | * | IOSTREAM
-/[a-z_]+_(command|commands|main|program|report|output|files|loading)[.](h|cpp)$ | * | IOSTREAM
-^precompute/         | precompute volume field geometry base |
-^register/           | register drr volume field image geometry base |
-^evaluate/           | evaluate register gold drr volume field image geometry base |
-'
-
+# check_tree ROOT [graph]
 check_tree() {
-  local root=$1
+  local root=$1 mode=${2:-check}
+  [[ -f "$root/ARCHITECTURE.md" ]] || { echo "$root/ARCHITECTURE.md: no such file" >&2; return 1; }
   {
     cd "$root"
     # A scratch tree has only some of the folders.
     find common precompute register evaluate -type f \( -name '*.h' -o -name '*.cpp' \) 2>/dev/null || true
   } | LC_ALL=C sort |
-    AF_TABLE="$table" awk -v root="$root" '
-      BEGIN {
-        rows = 0
-        line_count = split(ENVIRON["AF_TABLE"], lines, "\n")
-        for (l = 1; l <= line_count; ++l) {
-          if (lines[l] !~ /[^ ]/) continue
-          # The last two bars separate the columns; a pattern may hold bars of its own.
-          field_count = split(lines[l], fields, /[ ]+[|][ ]*/)
-          ++rows
-          pattern[rows] = fields[1]
-          gsub(/ /, "", pattern[rows])
-          folders[rows] = " " fields[2] " "
-          third[rows] = " " (field_count > 2 ? fields[3] : "") " "
-        }
+    awk -v root="$root" -v mode="$mode" '
+      function report(where, what) { printf "%s: %s\n", where, what; ++violations }
+      function trimmed(text) { gsub(/^[ `]+|[ `]+$/, "", text); return text }
+      function long_name(folder) {
+        return folder ~ /^(precompute|register|evaluate)(\/|$)/ ? folder : "common/" folder
       }
-      function report(what) { printf "%s:%d: %s\n", path, number, what; ++violations }
-      function third_party(name) {
+      function library_of(name) {
         if (name ~ /^mpi[.]h$/) return "MPI"
         if (name ~ /^(hdf5|H5[A-Za-z]*)[.]h/) return "HDF5"
-        if (name ~ /^(itk|gdcm|vnl)/) return "ITK"
-        if (name ~ /^(iostream|cstdio|print)$/) return "IOSTREAM"
+        if (name ~ /^(itk|vnl)/) return "ITK"
+        if (name ~ /^gdcm/) return "GDCM"
+        if (name ~ /^CLI\//) return "CLI11"
+        if (name ~ /^nlopt/) return "NLopt"
+        if (name ~ /^boost\//) return "Boost"
+        if (name ~ /^openssl\//) return "OpenSSL"
+        if (name ~ /^cairo/) return "cairo"
+        if (name ~ /^toml\+\+\//) return "toml++"
+        if (name ~ /^nlohmann\//) return "nlohmann-json"
+        if (name ~ /^zlib[.]h$/) return "zlib"
+        if (name ~ /^(iostream|cstdio|print)$/) return "terminal"
         return ""
       }
+      function read_table(file,    text, cell, number, names, count, n) {
+        while ((getline text < file) > 0) {
+          ++number
+          if (text !~ /^[|] `/) continue
+          split(text, cell, "|")
+          folder = trimmed(cell[2])
+          if (folder in row) report("ARCHITECTURE.md:" number, folder " has two rows")
+          row[folder] = number
+          count = split(trimmed(cell[4]), names, " ")
+          for (n = 1; n <= count; ++n) {
+            named = long_name(names[n])
+            if (!(named in row)) report("ARCHITECTURE.md:" number, folder " includes " names[n] ", which stands in no row above it")
+            may[folder, named] = number
+          }
+          count = split(trimmed(cell[5]), names, " ")
+          for (n = 1; n <= count; ++n) library[folder, names[n]] = number
+        }
+        close(file)
+        for (folder in row) ++rows
+        if (!rows) report("ARCHITECTURE.md", "holds no table of folders")
+      }
+      # The folder of an included file: beside the including one, below common/, or below the root.
+      function folder_of_include(name, folder,    place) {
+        if (name !~ /\//) return folder
+        sub(/\/[^\/]*$/, "", name)
+        if (name ~ /^common\//) return name
+        return name ~ /^(precompute|register|evaluate)(\/|$)/ ? name : "common/" name
+      }
+      BEGIN { read_table(root "/ARCHITECTURE.md") }
       {
         path = $0
         ++files
-        row = 0
-        for (r = 1; r <= rows && !row; ++r) if (path ~ pattern[r]) row = r
-        if (!row) { number = 0; report("no row of the layer table covers this file"); next }
-        file = root "/" path
+        folder = path
+        sub(/\/[^\/]*$/, "", folder)
+        if (!(folder in row)) report(path ":0", "no row of the table in ARCHITECTURE.md covers its folder")
         number = 0
-        while ((getline text < file) > 0) {
+        while ((getline text < (root "/" path)) > 0) {
           ++number
-          if (match(text, /^[ \t]*#[ \t]*include[ \t]*"[^"]+"/)) {
-            name = text; sub(/^[^"]*"/, "", name); sub(/".*/, "", name)
-            kind = third_party(name)
-            if (kind == "" && folders[row] !~ /[*]/) {
-              folder = name
-              if (folder !~ /\//) continue        # beside the including file
-              sub(/^common\//, "", folder); sub(/\/.*/, "", folder)
-              if (index(folders[row], " " folder " ") == 0)
-                report("includes \"" name "\", but may include only from:" folders[row])
-              else if (name == "parallel/mpi_handle.h" && index(third[row], " MPI ") == 0)
-                report("includes the raw MPI handle")
-            }
-          } else if (match(text, /^[ \t]*#[ \t]*include[ \t]*<[^>]+>/)) {
-            name = text; sub(/^[^<]*</, "", name); sub(/>.*/, "", name)
-            kind = third_party(name)
-          } else continue
-          if (kind != "" && index(third[row], " " kind " ") == 0) report("includes <" name "> (" kind "), which its layer must not see")
+          ++lines[folder]
+          if (text !~ /^[ \t]*#[ \t]*include[ \t]*["<]/) continue
+          is_quoted = text ~ /include[ \t]*"/
+          name = text
+          sub(/^[^"<]*["<]/, "", name)
+          sub(/[">].*/, "", name)
+          kind = library_of(name)
+          if (kind != "") {
+            if ((folder, kind) in library) used_library[folder, kind] = 1
+            else report(path ":" number, "includes " name " (" kind "), which the row of " folder " does not name")
+            continue
+          }
+          if (!is_quoted) continue
+          included = folder_of_include(name, folder)
+          if (name == "parallel/mpi_handle.h" && folder != "common/parallel" && !((folder, "MPI") in library))
+            report(path ":" number, "includes the raw MPI handle")
+          if (included == folder) continue
+          used[folder, included] = 1
+          if (!((folder, included) in may))
+            report(path ":" number, "includes \"" name "\", but the row of " folder " does not name " included)
         }
-        close(file)
+        close(root "/" path)
       }
       END {
         if (files == 0) { print "no sources found below " root; exit 1 }
-        printf "layering: %d files, %d violations\n", files, violations
+        if (mode == "graph") {
+          print "digraph folders {\n  rankdir = BT;\n  node [shape = box];"
+          for (pair in used) { split(pair, ends, SUBSEP); printf "  \"%s\" -> \"%s\";\n", ends[1], ends[2] }
+          print "}"
+          exit violations > 0
+        }
+        for (folder in row) if (!(folder in lines)) report("ARCHITECTURE.md:" row[folder], folder " holds no sources")
+        for (pair in may) if (!(pair in used)) {
+          split(pair, ends, SUBSEP)
+          report("ARCHITECTURE.md:" may[pair], ends[1] " never includes " ends[2])
+        }
+        for (pair in library) if (!(pair in used_library)) {
+          split(pair, ends, SUBSEP)
+          report("ARCHITECTURE.md:" library[pair], ends[1] " never includes " ends[2])
+        }
+        for (folder in lines) all += lines[folder]
+        for (folder in lines) if (files >= 100 && lines[folder] > 0.15 * all) report(folder, "holds more than 15 % of the code")
+        printf "layering: %d files in %d folders, %d violations\n", files, rows, violations
         exit violations > 0
       }'
 }
 
-# expect_violation WHAT PATH INCLUDE_LINE: a tree with that one file must be refused, and the message must name it.
-expect_violation() {
-  local what=$1 path=$2 line=$3 output
+# plant PATH LINE: a file of the scratch tree, whose second line is LINE.
+plant() {
+  mkdir -p "$scratch/tree/$(dirname "$1")"
+  printf '%s\n' '#include <vector>' "$2" >"$scratch/tree/$1"
+}
+
+# new_tree: five folders that keep to their table.
+new_tree() {
   rm -rf "$scratch/tree"
-  mkdir -p "$scratch/tree/$(dirname "$path")"
-  printf '%s\n' '#include <vector>' "$line" >"$scratch/tree/$path"
+  mkdir -p "$scratch/tree"
+  cat >"$scratch/tree/ARCHITECTURE.md" <<'TABLE'
+| Folder | Holds | Includes | Libraries |
+|---|---|---|---|
+| `common/base` | errors | | |
+| `common/geometry` | cameras | base | |
+| `common/parallel` | MPI | base | MPI |
+| `common/field_file` | HDF5 | parallel | HDF5 MPI |
+| `register/method` | numerics | geometry | |
+TABLE
+  plant common/base/error.h '#include <string>'
+  plant common/geometry/ray.h '#include "base/error.h"'
+  plant common/parallel/communicator.cpp '#include <mpi.h>'
+  printf '%s\n' '#include "base/error.h"' >>"$scratch/tree/common/parallel/communicator.cpp"
+  plant common/field_file/field_file.cpp '#include <hdf5.h>'
+  printf '%s\n' '#include "parallel/mpi_handle.h"' '#include <mpi.h>' >>"$scratch/tree/common/field_file/field_file.cpp"
+  plant register/method/registration.cpp '#include "geometry/ray.h"'
+}
+
+planted=0
+# expect_violation WHAT WHERE: the scratch tree is refused, and a message begins with WHERE.
+expect_violation() {
+  local output
   if output=$(check_tree "$scratch/tree"); then
-    echo "self-test: NOT found: $what" >&2
+    echo "self-test: NOT found: $1" >&2
     return 1
   fi
-  if ! grep -q "^$path:2: " <<<"$output"; then
-    echo "self-test: $what: the message does not name $path:2: $output" >&2
+  if ! grep -q "^$2: " <<<"$output"; then
+    echo "self-test: $1: no message begins with $2: $output" >&2
     return 1
   fi
+  planted=$((planted + 1))
+  new_tree
 }
 
 self_test() {
   scratch=$(mktemp -d)
   trap 'rm -rf "$scratch"' EXIT
-  expect_violation 'geometry uses a higher layer' common/geometry/ray.h '#include "volume/ct_volume.h"'
-  expect_violation 'the same by its long name' common/geometry/ray.h '#include "common/volume/ct_volume.h"'
-  expect_violation 'numerics use files' register/registration.cpp '#include "io/study_file.h"'
-  expect_violation 'io uses cli' common/io/csv_table.cpp '#include "cli/app_main.h"'
-  expect_violation 'numerics use MPI' precompute/field_builder.cpp '#include <mpi.h>'
-  expect_violation 'numerics use HDF5' common/field/tile.h '#  include <hdf5.h>'
-  expect_violation 'numerics use ITK' common/gold/tre.cpp '#include <itkImage.h>'
-  expect_violation 'the CT reader uses HDF5' common/io/itk_image_io.cpp '#include "hdf5.h"'
-  expect_violation 'a library prints' common/drr/af_drr.cpp '#include <iostream>'
-  expect_violation 'a program uses MPI directly' precompute/main.cpp '#include <mpi.h>'
-  expect_violation 'io uses the raw MPI handle' common/io/provenance.cpp '#include "parallel/mpi_handle.h"'
-  rm -rf "$scratch/tree"
-  mkdir -p "$scratch/tree/common/io" "$scratch/tree/register"
-  printf '%s\n' '#include <hdf5.h>' '#include "parallel/mpi_handle.h"' >"$scratch/tree/common/io/field_file.cpp"
-  printf '%s\n' '#include "io/study_file.h"' >"$scratch/tree/register/main.cpp"
+  new_tree
   check_tree "$scratch/tree" >/dev/null || { echo 'self-test: a clean tree is refused' >&2; return 1; }
-  mkdir "$scratch/empty"
-  if check_tree "$scratch/empty" >/dev/null; then
+  plant common/geometry/slab.h '#include "parallel/communicator.h"'
+  expect_violation 'a folder that the row does not name' common/geometry/slab.h:2
+  plant common/geometry/slab.h '#include "common/parallel/communicator.h"'
+  expect_violation 'the same by its long name' common/geometry/slab.h:2
+  plant register/method/registration.cpp '#include "register/main.h"'
+  expect_violation 'a part of a program uses its top' register/method/registration.cpp:2
+  plant common/geometry/slab.h '#include <mpi.h>'
+  expect_violation 'numerics use MPI' common/geometry/slab.h:2
+  plant common/geometry/slab.h '#  include "hdf5.h"'
+  expect_violation 'numerics use HDF5' common/geometry/slab.h:2
+  plant common/geometry/slab.h '#include <itkImage.h>'
+  expect_violation 'numerics use ITK' common/geometry/slab.h:2
+  plant common/geometry/slab.h '#include <iostream>'
+  expect_violation 'a library prints' common/geometry/slab.h:2
+  plant register/method/judge.h '#include "parallel/mpi_handle.h"'
+  expect_violation 'the raw MPI handle' register/method/judge.h:2
+  plant common/volume/ct.h '#include <string>'
+  expect_violation 'a folder without a row' common/volume/ct.h:0
+  rm -r "$scratch/tree/register"
+  expect_violation 'a row without a folder' ARCHITECTURE.md:7
+  plant register/method/registration.cpp '#include <string>'
+  expect_violation 'a folder that is named and not included' ARCHITECTURE.md:7
+  sed -i 's/| errors | |/| errors | geometry |/' "$scratch/tree/ARCHITECTURE.md"
+  expect_violation 'a row that names a folder below it' ARCHITECTURE.md:3
+  rm -rf "$scratch/tree/common" "$scratch/tree/register"
+  if check_tree "$scratch/tree" >/dev/null; then
     echo 'self-test: an empty tree passes' >&2
     return 1
   fi
-  echo 'self-test: 11 planted violations found, clean tree accepted'
+  echo "self-test: $planted planted violations found, clean tree accepted"
 }
 
 case "${1:-}" in
   --self-test) self_test ;;
-  '') echo "usage: layering.sh ROOT | --self-test" >&2; exit 2 ;;
+  --graph) check_tree "${2:-.}" graph ;;
+  '') echo "usage: layering.sh [--graph] ROOT | --self-test" >&2; exit 2 ;;
   *) check_tree "$1" ;;
 esac

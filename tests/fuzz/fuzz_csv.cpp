@@ -3,10 +3,10 @@
 #include <optional>
 #include <string>
 
-#include "evaluate/start_pose_files.h"
+#include "evaluate/registration/start_tables.h"
 #include "fuzz/fuzz_input.h"
-#include "io/csv_table.h"
-#include "io/pose_file.h"
+#include "study/pose_file.h"
+#include "text/csv_table.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace af;

@@ -3,8 +3,8 @@
 #include <optional>
 
 #include "fuzz/fuzz_input.h"
-#include "io/dicom_elements.h"
-#include "io/dicom_pixels.h"
+#include "image_files/dicom_elements.h"
+#include "image_files/dicom_pixels.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace af;

@@ -7,10 +7,10 @@
 #include <iterator>
 #include <memory>
 
+#include "field_file/hdf5_calls.h"
+#include "files/sha256.h"
 #include "fuzz/fuzz_input.h"
 #include "fuzz/sample_field.h"
-#include "io/field_file_access.h"
-#include "io/sha256.h"
 #include "parallel/mpi_environment.h"
 
 namespace {

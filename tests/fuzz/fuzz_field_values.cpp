@@ -5,9 +5,9 @@
 #include <optional>
 
 #include "drr/af_drr.h"
+#include "field_file/field_layout.h"
 #include "fuzz/fuzz_input.h"
 #include "fuzz/sample_field.h"
-#include "io/field_file_layout.h"
 
 namespace {
 

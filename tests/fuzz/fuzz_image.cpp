@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "fuzz/fuzz_input.h"
-#include "io/image_header.h"
+#include "image_files/image_header.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace af;

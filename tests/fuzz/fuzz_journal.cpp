@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "fuzz/fuzz_input.h"
-#include "io/progress_journal.h"
+#include "run/progress_journal.h"
 
 namespace {
 

@@ -14,8 +14,8 @@
 
 #include "evaluate/report/html_text.h"
 #include "evaluate/report/report_page.h"
+#include "files/output_file.h"
 #include "fuzz/fuzz_input.h"
-#include "io/output_file.h"
 
 namespace {
 

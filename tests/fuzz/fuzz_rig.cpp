@@ -4,7 +4,7 @@
 
 #include "base/file_name.h"
 #include "fuzz/fuzz_input.h"
-#include "io/rig_file.h"
+#include "study/rig_file.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace af;

@@ -2,7 +2,7 @@
 // A record of a journal of registrations.
 #include <optional>
 
-#include "evaluate/registration_rows_files.h"
+#include "evaluate/registration/registration_rows.h"
 #include "fuzz/fuzz_input.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -10,8 +10,8 @@
 #include "base/crc32c.h"
 #include "fuzz/fuzz_input.h"
 #include "parallel/mpi_environment.h"
-#include "precompute/progress_files.h"
-#include "precompute/training_files.h"
+#include "precompute/build/training_checkpoints.h"
+#include "precompute/build/unit_shards.h"
 
 namespace {
 

@@ -4,7 +4,7 @@
 
 #include "base/file_name.h"
 #include "fuzz/fuzz_input.h"
-#include "io/study_file.h"
+#include "study/study_file.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace af;

@@ -8,13 +8,13 @@
 #include <stdexcept>
 #include <string>
 
-#include "evaluate/registration_rows_files.h"
-#include "io/ct_reader.h"
-#include "io/image_file.h"
-#include "io/pose_file.h"
-#include "io/rig_file.h"
-#include "io/study_template.h"
-#include "unit/io/ct_test_data.h"
+#include "evaluate/registration/registration_rows.h"
+#include "image_files/ct_reader.h"
+#include "image_files/image_file.h"
+#include "study/pose_file.h"
+#include "study/rig_file.h"
+#include "study/study_template.h"
+#include "unit/image_files/ct_test_data.h"
 #include "volume/ct_volume.h"
 
 namespace {

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "field/compressed_attenuation_field.h"
-#include "io/field_file.h"
+#include "field_file/field_file.h"
 
 namespace af::fuzz {
 

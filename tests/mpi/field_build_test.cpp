@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "precompute/build/field_build.h"
+
 #include <array>
 #include <atomic>
 #include <filesystem>
@@ -8,9 +10,8 @@
 
 #include "base/error.h"
 #include "base/vector_width.h"
-#include "precompute/field_build_program.h"
-#include "precompute/planner.h"
-#include "precompute/training_files.h"
+#include "precompute/build/training_checkpoints.h"
+#include "precompute/units/unit_planner.h"
 #include "support/shared_folder.h"
 #include "volume/phantoms.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/field_file.h"
+#include "field_file/field_file.h"
 
 #include <cstdlib>
 #include <filesystem>
@@ -11,9 +11,9 @@
 
 #include "base/error.h"
 #include "base/hash_random.h"
-#include "io/field_file_access.h"
-#include "io/field_file_chunks.h"
-#include "io/sha256.h"
+#include "field_file/chunk_index.h"
+#include "field_file/hdf5_calls.h"
+#include "files/sha256.h"
 #include "support/shared_folder.h"
 
 namespace af {

@@ -2,8 +2,8 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
-#include "precompute/resampling_program.h"
-#include "unit/precompute/shear_warp_cases.h"
+#include "precompute/build/shared_resampling.h"
+#include "unit/precompute/casting/shear_warp_cases.h"
 
 namespace af {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/shared_inputs.h"
+#include "study/shared_inputs.h"
 
 #include <cmath>
 #include <cstdint>
@@ -8,8 +8,8 @@
 
 #include <gtest/gtest.h>
 
-#include "io/output_file.h"
-#include "io/rig_file.h"
+#include "files/output_file.h"
+#include "study/rig_file.h"
 #include "support/shared_folder.h"
 
 namespace af {

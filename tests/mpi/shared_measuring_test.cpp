@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "evaluate/registration/shared_measuring.h"
+
 #include <functional>
 #include <stdexcept>
 #include <string>
@@ -8,8 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
-#include "evaluate/shared_measuring_program.h"
-#include "gold/target_box.h"
+#include "gold_standard/target_box.h"
 #include "support/start_frame.h"
 
 namespace af::evaluation {

@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "precompute/shear_warp_caster.h"
+#include "precompute/casting/shear_warp_caster.h"
 #include "volume/ray_caster.h"
 
 namespace af::test {

@@ -4,9 +4,9 @@
 #include <cstdio>
 #include <string>
 
-#include "io/ct_reader.h"
-#include "io/rig_file.h"
+#include "image_files/ct_reader.h"
 #include "physics/caster_accuracy.h"
+#include "study/rig_file.h"
 
 int main(int argc, char** argv) {
   using namespace af;

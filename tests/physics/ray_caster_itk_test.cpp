@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "image/psnr.h"
-#include "io/ct_reader.h"
+#include "image_files/ct_reader.h"
 #include "support/itk_comparison.h"
 #include "volume/ray_caster.h"
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
-#include "io/ct_reader.h"
-#include "io/rig_file.h"
+#include "image_files/ct_reader.h"
 #include "physics/caster_accuracy.h"
+#include "study/rig_file.h"
 
 namespace af {
 namespace {

@@ -14,17 +14,18 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "io/csv_table.h"
-#include "io/output_file.h"
-#include "io/output_lock.h"
-#include "io/pose_file.h"
-#include "io/study_file.h"
+#include "files/output_file.h"
 #include "programs/small_study.h"
+#include "run/output_lock.h"
+#include "run/stop_request.h"
+#include "study/pose_file.h"
+#include "study/study_file.h"
 #include "support/browser.h"
 #include "support/kept_records.h"
 #include "support/launched_job.h"
 #include "support/run_program.h"
 #include "support/test_paths.h"
+#include "text/csv_table.h"
 
 namespace af {
 namespace {

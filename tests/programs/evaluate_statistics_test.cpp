@@ -12,12 +12,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "io/csv_table.h"
-#include "io/output_file.h"
-#include "io/rig_file.h"
-#include "io/study_file.h"
+#include "files/output_file.h"
+#include "study/rig_file.h"
+#include "study/study_file.h"
 #include "support/run_program.h"
 #include "support/test_paths.h"
+#include "text/csv_table.h"
 
 namespace af {
 namespace {

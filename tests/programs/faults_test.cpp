@@ -13,7 +13,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "io/output_file.h"
+#include "files/output_file.h"
 #include "programs/slow_jobs.h"
 #include "programs/small_study.h"
 #include "support/launched_job.h"

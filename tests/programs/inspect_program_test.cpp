@@ -11,12 +11,12 @@
 #include <gtest/gtest.h>
 
 #include "base/build_info.h"
-#include "io/csv_table.h"
-#include "io/pose_file.h"
 #include "programs/small_study.h"
+#include "study/pose_file.h"
 #include "support/run_program.h"
 #include "support/test_paths.h"
-#include "unit/io/ct_test_data.h"
+#include "text/csv_table.h"
+#include "unit/image_files/ct_test_data.h"
 
 namespace af {
 namespace {

@@ -22,8 +22,7 @@
 
 #include <gtest/gtest.h>
 
-#include "io/csv_table.h"
-#include "io/output_file.h"
+#include "files/output_file.h"
 #include "programs/progress_damage.h"
 #include "programs/slow_jobs.h"
 #include "programs/small_study.h"
@@ -31,6 +30,7 @@
 #include "support/launched_job.h"
 #include "support/run_program.h"
 #include "support/test_paths.h"
+#include "text/csv_table.h"
 
 namespace af {
 namespace {

@@ -11,7 +11,7 @@
 #include <zlib.h>
 
 #include "programs/small_study.h"
-#include "unit/io/ct_test_data.h"
+#include "unit/image_files/ct_test_data.h"
 
 namespace {
 

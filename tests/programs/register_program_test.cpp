@@ -10,11 +10,11 @@
 
 #include <gtest/gtest.h>
 
-#include "io/csv_table.h"
-#include "io/image_file.h"
+#include "image_files/image_file.h"
 #include "programs/small_study.h"
 #include "support/run_program.h"
 #include "support/test_paths.h"
+#include "text/csv_table.h"
 
 namespace af {
 namespace {

@@ -3,12 +3,12 @@
 
 #include <filesystem>
 
-#include "io/ct_reader.h"
-#include "io/image_file.h"
-#include "io/output_file.h"
-#include "io/rig_file.h"
-#include "io/study_file.h"
-#include "unit/register/registration_cases.h"
+#include "files/output_file.h"
+#include "image_files/ct_reader.h"
+#include "image_files/image_file.h"
+#include "study/rig_file.h"
+#include "study/study_file.h"
+#include "unit/register/method/registration_cases.h"
 
 namespace af::test {
 

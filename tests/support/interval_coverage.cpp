@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "base/hash_random.h"
-#include "evaluate/bootstrap.h"
-#include "evaluate/statistics.h"
-#include "evaluate/success_rate.h"
+#include "evaluate/statistics/bootstrap.h"
+#include "evaluate/statistics/statistics.h"
+#include "evaluate/statistics/success_rate.h"
 
 namespace af::test {
 namespace {

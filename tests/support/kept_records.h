@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <string>
 
-#include "io/output_file.h"
+#include "files/output_file.h"
 
 namespace af::test {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "evaluate/perturbed_starts.h"
+#include "evaluate/starts/perturbed_starts.h"
 
 namespace af::test {
 

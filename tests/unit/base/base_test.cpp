@@ -10,7 +10,7 @@
 #include "base/error.h"
 #include "base/hash_random.h"
 #include "base/vector_width.h"
-#include "cli/progress_printer.h"
+#include "run/progress_printer.h"
 
 namespace af {
 namespace {
@@ -79,12 +79,12 @@ TEST(VectorWidth, ForcedWidthIsUsedUntilReleased) {
 }
 
 TEST(DurationText, ReadsLikeAPersonWouldSay) {
-  EXPECT_EQ(cli::duration_text(12.34), "12.3 s");
-  EXPECT_EQ(cli::duration_text(200), "3 min 20 s");
-  EXPECT_EQ(cli::duration_text(3900), "1 h 05 min");
-  EXPECT_EQ(cli::expected_time_text("poses compared", 99, 1.6, 2),
+  EXPECT_EQ(duration_text(12.34), "12.3 s");
+  EXPECT_EQ(duration_text(200), "3 min 20 s");
+  EXPECT_EQ(duration_text(3900), "1 h 05 min");
+  EXPECT_EQ(expected_time_text("poses compared", 99, 1.6, 2),
             "poses compared: 99, about 1 min 20 s on 2 ranks (1.6 s each)");
-  EXPECT_EQ(cli::expected_time_text("registrations", 10, 0.05, 1),
+  EXPECT_EQ(expected_time_text("registrations", 10, 0.05, 1),
             "registrations: 10, about 0.5 s on 1 rank (50 ms each)");
 }
 

@@ -6,10 +6,10 @@
 
 #include "drr/field_level.h"
 #include "drr/two_pass_af_drr.h"
-#include "register/multi_view_objective.h"
+#include "register/problem/multi_view_objective.h"
 #include "support/counted_allocations.h"
 #include "unit/drr/small_fields.h"
-#include "unit/register/registration_cases.h"
+#include "unit/register/method/registration_cases.h"
 
 namespace af::registration {
 namespace {

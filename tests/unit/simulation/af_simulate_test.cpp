@@ -9,15 +9,15 @@
 
 #include <gtest/gtest.h>
 
-#include "gold/fiducial_registration.h"
-#include "io/ct_reader.h"
-#include "io/image_file.h"
-#include "io/output_file.h"
-#include "io/pose_file.h"
-#include "io/rig_file.h"
-#include "io/study_file.h"
-#include "io/xray_reader.h"
+#include "files/output_file.h"
+#include "gold_standard/fiducial_registration.h"
+#include "image_files/ct_reader.h"
+#include "image_files/image_file.h"
 #include "simulation/siddon_projector.h"
+#include "study/pose_file.h"
+#include "study/rig_file.h"
+#include "study/study_file.h"
+#include "study/xray_reader.h"
 #include "support/test_paths.h"
 
 namespace af {

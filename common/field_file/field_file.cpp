@@ -1,0 +1,649 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "field_file/field_file.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <numeric>
+#include <sstream>
+#include <utility>
+
+#include "base/error.h"
+#include "field_file/chunk_index.h"
+#include "field_file/field_layout.h"
+#include "field_file/hdf5_calls.h"
+#include "files/input_file.h"
+#include "files/input_guard.h"
+#include "files/output_file.h"
+#include "files/sha256.h"
+#include "parallel/mpi_environment.h"
+#include "parallel/mpi_handle.h"
+#include "parallel/work_watch.h"
+
+namespace af {
+
+namespace {
+
+using field_layout::Dataset;
+using field_layout::DatasetRule;
+using field_layout::index_rules;
+using hdf5::checked;
+using hdf5::Handle;
+
+constexpr std::size_t kSha256Digits = 64;
+constexpr unsigned kDeflateLevel = 4;
+/// Deflate shrinks nothing by more than this.
+constexpr std::uint64_t kMaxDeflateRatio = 1032;
+
+/// Runs `function` and turns whatever HDF5 or a missing attribute makes of it into a FileError.
+template <typename Function>
+auto naming_file(const std::filesystem::path& path, Function&& function) {
+  try {
+    return function();
+  } catch (const Error&) {
+    throw;
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (const std::logic_error&) {
+    throw;
+  } catch (const std::exception& error) {
+    throw FileError(path.string(), error.what());
+  }
+}
+
+std::uint64_t tile_count_of(const DatasetRule& rule) {
+  return std::accumulate(
+      rule.extents.begin(), rule.extents.end(), std::uint64_t{1}, std::multiplies<>());
+}
+
+// --- checksums of index arrays, independent of who holds which block ---------------------------
+
+/// Adding this over all tiles gives a sum that a lost, doubled, moved or changed index changes.
+std::uint64_t position_hash(std::uint64_t tile, std::uint16_t index) {
+  std::uint64_t x = (tile << 16u | index) + 0x9E3779B97F4A7C15ull;
+  x = (x ^ (x >> 30u)) * 0xBF58476D1CE4E5B9ull;
+  x = (x ^ (x >> 27u)) * 0x94D049BB133111EBull;
+  return x ^ (x >> 31u);
+}
+
+std::uint64_t hash_sum(std::uint64_t first_tile, std::span<const std::uint16_t> indices) {
+  std::uint64_t sum = 0;
+  for (const std::uint16_t index : indices) sum += position_hash(first_tile++, index);
+  return sum;
+}
+
+/// Calls visit(first tile number within the slab, indices) for every run of tiles along t.
+template <typename Visit>
+void for_each_run(const IndexBlock& block, const DatasetRule& rule, Visit&& visit) {
+  std::span<const std::uint16_t> rest(block.indices);
+  const auto run = static_cast<std::size_t>(block.tile_count[3]);
+  const auto position = [&](std::size_t axis, int local) {
+    return static_cast<std::uint64_t>(block.first_tile[axis]) + static_cast<std::uint64_t>(local);
+  };
+  for (int a = 0; a < block.tile_count[0]; ++a)
+    for (int b = 0; b < block.tile_count[1]; ++b)
+      for (int c = 0; c < block.tile_count[2]; ++c) {
+        const std::uint64_t row =
+            (position(0, a) * rule.extents[1] + position(1, b)) * rule.extents[2] + position(2, c);
+        visit(row * rule.extents[3] + position(3, 0), rest.first(run));
+        rest = rest.subspan(run);
+      }
+}
+
+// --- writing -------------------------------------------------------------------------------------
+
+void check_blocks(const std::vector<IndexBlock>& blocks, const std::vector<DatasetRule>& rules) {
+  for (const IndexBlock& block : blocks) {
+    check(block.slab < rules.size(), "an index block names a slab of the field");
+    std::size_t tiles = 1;
+    for (std::size_t axis = 0; axis < 4; ++axis) {
+      const int first = block.first_tile[axis];
+      const int count = block.tile_count[axis];
+      check(first >= 0 && count >= 1 &&
+                static_cast<std::uint64_t>(first) + static_cast<std::uint64_t>(count) <=
+                    rules[block.slab].extents[axis],
+            "an index block lies within its slab");
+      tiles *= static_cast<std::size_t>(count);
+    }
+    check(block.indices.size() == tiles, "an index block has one index per tile");
+  }
+}
+
+Handle index_creation(const hdf5::ChunkShape& chunk) {
+  Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose, "H5Pcreate");
+  checked(H5Pset_chunk(creation, 4, chunk.data()), "H5Pset_chunk");
+  checked(H5Pset_shuffle(creation), "H5Pset_shuffle");
+  checked(H5Pset_deflate(creation, kDeflateLevel), "H5Pset_deflate");
+  return creation;
+}
+
+void create_index_dataset(hid_t file, const DatasetRule& rule, const hdf5::ChunkShape& chunk) {
+  const std::vector<hsize_t> extents(rule.extents.begin(), rule.extents.end());
+  const Handle space(H5Screate_simple(4, extents.data(), nullptr), H5Sclose, "H5Screate_simple");
+  const Handle links(H5Pcreate(H5P_LINK_CREATE), H5Pclose, "H5Pcreate");
+  checked(H5Pset_create_intermediate_group(links, 1), "H5Pset_create_intermediate_group");
+  const Handle creation = index_creation(chunk);
+  const Handle type = hdf5::file_type(rule);
+  const Handle dataset(
+      H5Dcreate2(file, rule.name.c_str(), type, space, links, creation, H5P_DEFAULT),
+      H5Dclose,
+      "H5Dcreate2");
+  hdf5::write_text_attribute(dataset, "units", rule.units);
+  hdf5::write_text_attribute(dataset, "frame", rule.frame);
+  // The true hash replaces this once the data are there.
+  hdf5::write_text_attribute(dataset, "sha256", std::string(kSha256Digits, '0'));
+}
+
+/// Rank 0 alone: everything but the indices and the provenance.
+void create_file_without_indices(const CompressedAttenuationField& field,
+                                 const std::filesystem::path& path) {
+  Handle file = hdf5::create_file(path);
+  hdf5::write_text_attribute(file, "format", field_layout::kFormat);
+  hdf5::write_int_attribute(file, "format_version", field_layout::kFormatVersion);
+  hdf5::write_text_attribute(file, "ct_sha256", field.identity.ct_content_sha256);
+  hdf5::write_text_attribute(file, "payload_sha256", std::string(kSha256Digits, '0'));
+  for (const Dataset& dataset : field_layout::datasets_of(field))
+    hdf5::write_dataset(file, dataset, sha256_hex(dataset.bytes));
+  const std::vector<DatasetRule> rules = index_rules(field);
+  const std::vector<hdf5::ChunkShape> chunks = hdf5::index_chunks(rules);
+  for (std::size_t k = 0; k < rules.size(); ++k) create_index_dataset(file, rules[k], chunks[k]);
+  file.close("H5Fclose");
+}
+
+/// Collective. Writes one block, or none where `block` is null. One plain hyperslab with a memory
+/// space of the same shape: collective filtered writes of unions of hyperslabs from a 1-D memory
+/// space crash or hang in HDF5 1.10.8 now and then.
+void write_block(hid_t dataset, IndexBlock* block) {
+  const Handle in_file(H5Dget_space(dataset), H5Sclose, "H5Dget_space");
+  const Handle transfer(H5Pcreate(H5P_DATASET_XFER), H5Pclose, "H5Pcreate");
+  checked(H5Pset_dxpl_mpio(transfer, H5FD_MPIO_COLLECTIVE), "H5Pset_dxpl_mpio");
+  std::array<hsize_t, 4> start{};
+  std::array<hsize_t, 4> count = {1, 1, 1, 1};
+  for (std::size_t axis = 0; block != nullptr && axis < 4; ++axis) {
+    start[axis] = static_cast<hsize_t>(block->first_tile[axis]);
+    count[axis] = static_cast<hsize_t>(block->tile_count[axis]);
+  }
+  const Handle in_memory(H5Screate_simple(4, count.data(), nullptr), H5Sclose, "H5Screate_simple");
+  const std::uint16_t nothing = 0;
+  const std::uint16_t* indices = &nothing;
+  if (block != nullptr) {
+    indices = block->indices.data();
+    checked(
+        H5Sselect_hyperslab(in_file, H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr),
+        "H5Sselect_hyperslab");
+  } else {
+    checked(H5Sselect_none(in_file), "H5Sselect_none");
+    checked(H5Sselect_none(in_memory), "H5Sselect_none");
+  }
+  checked(H5Dwrite(dataset, H5T_NATIVE_UINT16, in_memory, in_file, transfer, indices), "H5Dwrite");
+  if (block != nullptr) block->indices = {};
+}
+
+/// Hints as MPI wants them.
+class MpiInfo {
+ public:
+  explicit MpiInfo(const MpiIoHints& hints) {
+    if (hints.empty()) return;
+    MPI_Info_create(&info_);
+    for (const auto& [key, value] : hints) MPI_Info_set(info_, key.c_str(), value.c_str());
+  }
+  ~MpiInfo() {
+    if (info_ != MPI_INFO_NULL) MPI_Info_free(&info_);
+  }
+  MpiInfo(const MpiInfo&) = delete;
+  MpiInfo& operator=(const MpiInfo&) = delete;
+
+  [[nodiscard]] MPI_Info handle() const { return info_; }
+
+ private:
+  MPI_Info info_ = MPI_INFO_NULL;
+};
+
+/// Rank 0 alone. Hints of how a file is laid out (stripes) count when it is made: MPI-IO makes it
+/// where there are hints, and HDF5 writes into it.
+void lay_out(const std::filesystem::path& path, const MpiIoHints& hints) {
+  if (hints.empty()) return;
+  std::error_code ignored;
+  std::filesystem::remove(path, ignored);
+  const MpiInfo info(hints);
+  MPI_File file = MPI_FILE_NULL;
+  if (MPI_File_open(
+          MPI_COMM_SELF, path.c_str(), MPI_MODE_CREATE | MPI_MODE_WRONLY, info.handle(), &file) !=
+      MPI_SUCCESS)
+    throw FileError(path.string(), "cannot be made by MPI-IO");
+  MPI_File_close(&file);
+}
+
+/// The open file of all ranks. After a failed write it can neither be written nor closed: some
+/// ranks know of the failure and others wait for them within MPI-IO. So a rank that fails throws at
+/// once, the file stays open, and the job must end by abort.
+class SharedFile {
+ public:
+  /// Collective.
+  SharedFile(const std::filesystem::path& path,
+             const std::vector<DatasetRule>& rules,
+             const Communicator& communicator,
+             const MpiIoHints& hints)
+      : path_(path), rules_(rules), communicator_(communicator) {
+    all_or_none(communicator_, [&] {
+      naming_file(path_, [&] {
+        const Handle access = hdf5::file_access();
+        const MpiInfo info(hints);
+        hdf5::hold_chunk_index(access, hdf5::chunk_count(rules_));
+        checked(H5Pset_fapl_mpio(access, communicator_.impl().handle, info.handle()),
+                "H5Pset_fapl_mpio");
+        file_ = checked(H5Fopen(path_.c_str(), H5F_ACC_RDWR, access), "H5Fopen");
+      });
+    });
+  }
+
+  /// Collective. Writes the blocks of all ranks, slab by slab, one block of every rank at a time.
+  void write(std::vector<IndexBlock>& blocks) {
+    std::vector<std::uint64_t> most_blocks(rules_.size(), 0);
+    for (const IndexBlock& block : blocks) ++most_blocks[block.slab];
+    communicator_.maximum(most_blocks);
+    for (std::size_t k = 0; k < rules_.size(); ++k) {
+      if (most_blocks[k] == 0) continue;
+      std::vector<IndexBlock*> of_slab;
+      for (IndexBlock& block : blocks)
+        if (block.slab == k) of_slab.push_back(&block);
+      naming_file(path_, [&] {
+        const Handle dataset(
+            H5Dopen2(file_, rules_[k].name.c_str(), H5P_DEFAULT), H5Dclose, "H5Dopen2");
+        for (std::size_t i = 0; i < most_blocks[k]; ++i)
+          write_block(dataset, i < of_slab.size() ? of_slab[i] : nullptr);
+      });
+    }
+  }
+
+  /// Collective.
+  void close() {
+    naming_file(path_,
+                [&] { checked(H5Fclose(std::exchange(file_, H5I_INVALID_HID)), "H5Fclose"); });
+  }
+
+ private:
+  const std::filesystem::path& path_;
+  const std::vector<DatasetRule>& rules_;
+  const Communicator& communicator_;
+  hid_t file_ = H5I_INVALID_HID;
+};
+
+/// Collective. Writes blocks in rounds until no rank has any; returns the hash sums of each slab
+/// over all ranks.
+std::vector<std::uint64_t> write_rounds(SharedFile& file,
+                                        const std::vector<DatasetRule>& rules,
+                                        const NextBlocks& next_blocks,
+                                        const Communicator& communicator) {
+  std::vector<std::uint64_t> sums(rules.size(), 0);
+  for (int round = 1;; ++round) {
+    std::vector<IndexBlock> blocks = all_or_none(communicator, [&] {
+      std::vector<IndexBlock> next = next_blocks();
+      check_blocks(next, rules);
+      return next;
+    });
+    std::array<std::uint64_t, 1> any{blocks.empty() ? std::uint64_t{0} : 1};
+    communicator.maximum(any);
+    if (any[0] == 0) break;
+    for (const IndexBlock& block : blocks)
+      for_each_run(block,
+                   rules[block.slab],
+                   [&](std::uint64_t first_tile, std::span<const std::uint16_t> indices) {
+                     sums[block.slab] += hash_sum(first_tile, indices);
+                   });
+    const WorkNote note("writing round " + std::to_string(round) + " of the indices");
+    file.write(blocks);
+  }
+  communicator.sum(sums);
+  return sums;
+}
+
+/// Collective.
+std::vector<std::uint64_t> write_indices(const std::filesystem::path& path,
+                                         const std::vector<DatasetRule>& rules,
+                                         const NextBlocks& next_blocks,
+                                         const Communicator& communicator,
+                                         const MpiIoHints& hints) {
+  SharedFile file(path, rules, communicator, hints);
+  try {
+    auto sums = write_rounds(file, rules, next_blocks, communicator);
+    file.close();
+    return sums;
+  } catch (const Error& error) {
+    // A stop is thrown on every rank, and nothing is wrong with the file.
+    if (error.exit_code() == ExitCode::Stopped) file.close();
+    throw;
+  }
+}
+
+// --- reading back --------------------------------------------------------------------------------
+
+/// Reads the planes [u] of an index dataset one after the other into `plane_of(u)`, which returns
+/// memory for one plane, and calls `done(u, plane)`.
+template <typename PlaneOf, typename Done>
+void read_planes(hid_t dataset, const DatasetRule& rule, PlaneOf&& plane_of, Done&& done) {
+  const Handle in_file(H5Dget_space(dataset), H5Sclose, "H5Dget_space");
+  std::array<hsize_t, 4> start{};
+  const std::array<hsize_t, 4> count = {1, rule.extents[1], rule.extents[2], rule.extents[3]};
+  const Handle in_memory(H5Screate_simple(4, count.data(), nullptr), H5Sclose, "H5Screate_simple");
+  for (std::uint64_t u = 0; u < rule.extents[0]; ++u) {
+    start[0] = u;
+    checked(
+        H5Sselect_hyperslab(in_file, H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr),
+        "H5Sselect_hyperslab");
+    const std::span<std::uint16_t> plane = plane_of(u);
+    checked(H5Dread(dataset, H5T_NATIVE_UINT16, in_memory, in_file, H5P_DEFAULT, plane.data()),
+            "H5Dread");
+    done(u, std::span<const std::uint16_t>(plane));
+    note_progress();
+  }
+}
+
+std::string payload_hash(std::span<const Dataset> datasets,
+                         const std::vector<DatasetRule>& rules,
+                         const std::vector<std::string>& index_sha256) {
+  std::string lines;
+  for (const Dataset& dataset : datasets)
+    lines += field_layout::payload_line(dataset.rule, sha256_hex(dataset.bytes));
+  for (std::size_t k = 0; k < rules.size(); ++k)
+    lines += field_layout::payload_line(rules[k], index_sha256[k]);
+  return sha256_hex(std::as_bytes(std::span(lines)));
+}
+
+/// Rank 0 alone: reads every index back, compares with what the ranks wrote, and stores the hashes
+/// and the provenance.
+std::string verify_and_seal(const CompressedAttenuationField& field,
+                            const FieldProvenance& provenance,
+                            const std::vector<std::uint64_t>& written_sums,
+                            const std::filesystem::path& path) {
+  Handle file = hdf5::open_file(path, H5F_ACC_RDWR);
+  const auto rules = index_rules(field);
+  std::vector<std::string> index_sha256;
+  for (std::size_t k = 0; k < rules.size(); ++k) {
+    const Handle dataset(H5Dopen2(file, rules[k].name.c_str(), H5P_DEFAULT), H5Dclose, "H5Dopen2");
+    const std::uint64_t plane_tiles = tile_count_of(rules[k]) / rules[k].extents[0];
+    std::vector<std::uint16_t> plane(plane_tiles);
+    Sha256 sha256;
+    std::uint64_t sum = 0;
+    read_planes(
+        dataset,
+        rules[k],
+        [&](std::uint64_t) { return std::span(plane); },
+        [&](std::uint64_t u, std::span<const std::uint16_t> indices) {
+          sha256.update(std::as_bytes(indices));
+          sum += hash_sum(u * plane_tiles, indices);
+        });
+    if (sum != written_sums[k])
+      throw FileError(
+          path.string(), rules[k].name, "the indices written", "others on reading back");
+    index_sha256.push_back(sha256.hex_digest());
+    hdf5::replace_text_attribute(dataset, "sha256", index_sha256.back());
+  }
+  std::string payload = payload_hash(field_layout::datasets_of(field), rules, index_sha256);
+  hdf5::replace_text_attribute(file, "payload_sha256", payload);
+  hdf5::write_text_attribute(file, "options_toml", provenance.options_toml);
+  hdf5::write_text_attribute(file, "source_version", provenance.source_version);
+  for (const Dataset& dataset : field_layout::datasets_of(provenance))
+    hdf5::write_dataset(file, dataset, sha256_hex(dataset.bytes));
+  file.close("H5Fclose");
+  return payload;
+}
+
+void share(FieldFileInfo& info, const Communicator& communicator) {
+  communicator.broadcast(info.payload_sha256);
+  std::array<std::uint64_t, 1> bytes{communicator.is_root() ? info.file_bytes : 0};
+  communicator.maximum(bytes);
+  info.file_bytes = bytes[0];
+}
+
+// --- reading -------------------------------------------------------------------------------------
+
+/// What rank 0 knows of a file before the indices are read.
+struct FileHeader {
+  std::vector<Dataset> payload;
+  std::vector<Dataset> provenance;
+  std::vector<std::string> index_sha256;
+  std::string payload_sha256;
+  std::uint64_t file_bytes = 0;
+};
+
+void check_is_hdf5(const std::filesystem::path& path) {
+  require_regular_file(path);
+  std::error_code error;
+  if (std::filesystem::file_size(path, error) == 0) throw FileError(path.string(), "is empty");
+  if (::access(path.c_str(), R_OK) != 0)
+    throw FileError(path.string(), std::string("cannot be read: ") + std::strerror(errno));
+  if (H5Fis_hdf5(path.c_str()) <= 0)
+    throw FileError(path.string(), "is not an HDF5 file (or its first bytes are damaged)");
+}
+
+void check_format(hid_t file, const std::filesystem::path& path) {
+  if (H5Aexists(file, "format") <= 0)
+    throw FileError(path.string(), "attribute format", field_layout::kFormat, "none");
+  const std::string format = hdf5::read_text_attribute(file, "format");
+  if (format != field_layout::kFormat)
+    throw FileError(path.string(), "attribute format", field_layout::kFormat, format);
+  const int version = hdf5::read_int_attribute(file, "format_version");
+  if (version != field_layout::kFormatVersion)
+    throw FileError(path.string(),
+                    "attribute format_version",
+                    std::to_string(field_layout::kFormatVersion),
+                    std::to_string(version));
+}
+
+/// Whether a file of this size can hold so many indices at all; refuses before memory is asked for.
+void check_plausible_size(const DatasetRule& rule,
+                          std::uint64_t file_bytes,
+                          const std::filesystem::path& path) {
+  const std::uint64_t needed = tile_count_of(rule) * sizeof(std::uint16_t) / kMaxDeflateRatio;
+  if (needed > file_bytes)
+    throw FileError(path.string(),
+                    rule.name,
+                    "at least " + std::to_string(needed) + " bytes",
+                    "a file of " + std::to_string(file_bytes));
+}
+
+/// Rank 0 alone.
+FileHeader read_header(const std::filesystem::path& path) {
+  check_is_hdf5(path);
+  note_input(path);
+  const Handle file = hdf5::open_file(path, H5F_ACC_RDONLY);
+  check_format(file, path);
+  FileHeader header;
+  header.file_bytes = std::filesystem::file_size(path);
+  const int slab_count = field_layout::slab_count_of(
+      hdf5::read_dataset(file, field_layout::slab_count_rule(), path.string()), path.string());
+  for (const DatasetRule& rule : field_layout::payload_rules(slab_count))
+    header.payload.push_back(hdf5::read_dataset(file, rule, path.string()));
+  for (const DatasetRule& rule : field_layout::provenance_rules())
+    header.provenance.push_back(hdf5::read_dataset(file, rule, path.string()));
+  const CompressedAttenuationField field = field_layout::field_of(header.payload, path.string());
+  const std::vector<DatasetRule> rules = index_rules(field);
+  for (const DatasetRule& rule : rules) {
+    check_plausible_size(rule, header.file_bytes, path);
+    std::vector<std::uint64_t> extents;
+    const Handle dataset = hdf5::open_dataset(file, rule, path.string(), extents);
+    header.index_sha256.push_back(hdf5::read_text_attribute(dataset, "sha256"));
+  }
+  header.payload_sha256 = hdf5::read_text_attribute(file, "payload_sha256");
+  const std::string computed = payload_hash(header.payload, rules, header.index_sha256);
+  if (header.payload_sha256 != computed)
+    throw FileError(path.string(), "payload_sha256", header.payload_sha256, computed);
+  const std::string ct_sha256 = hdf5::read_text_attribute(file, "ct_sha256");
+  if (ct_sha256 != field.identity.ct_content_sha256)
+    throw FileError(
+        path.string(), "attribute ct_sha256", field.identity.ct_content_sha256, ct_sha256);
+  return header;
+}
+
+/// Collective. Rank 0's header on every rank.
+void share(FileHeader& header, const Communicator& communicator) {
+  std::vector<std::byte> payload = field_layout::packed(header.payload);
+  std::vector<std::byte> provenance = field_layout::packed(header.provenance);
+  std::string lines = header.payload_sha256 + "\n" + std::to_string(header.file_bytes) + "\n";
+  for (const std::string& sha256 : header.index_sha256) lines += sha256 + "\n";
+  communicator.broadcast(payload);
+  communicator.broadcast(provenance);
+  communicator.broadcast(lines);
+  if (communicator.is_root()) return;
+  header.payload = field_layout::unpacked(payload);
+  header.provenance = field_layout::unpacked(provenance);
+  std::istringstream stream(lines);
+  std::getline(stream, header.payload_sha256);
+  std::string line;
+  std::getline(stream, line);
+  header.file_bytes = std::stoull(line);
+  while (std::getline(stream, line)) header.index_sha256.push_back(line);
+}
+
+/// Reads and verifies the indices of one slab into memory for all of them.
+void read_indices(const std::filesystem::path& path,
+                  const DatasetRule& rule,
+                  const std::string& expected_sha256,
+                  std::size_t codewords,
+                  std::span<std::uint16_t> indices) {
+  const Handle file = hdf5::open_file(path, H5F_ACC_RDONLY);
+  std::vector<std::uint64_t> extents;
+  const Handle dataset = hdf5::open_dataset(file, rule, path.string(), extents);
+  const std::size_t plane = indices.size() / rule.extents[0];
+  Sha256 sha256;
+  std::uint16_t largest = 0;
+  read_planes(
+      dataset,
+      rule,
+      [&](std::uint64_t u) { return indices.subspan(u * plane, plane); },
+      [&](std::uint64_t, std::span<const std::uint16_t> values) {
+        sha256.update(std::as_bytes(values));
+        largest = std::max(largest, *std::max_element(values.begin(), values.end()));
+      });
+  const std::string computed = sha256.hex_digest();
+  if (computed != expected_sha256)
+    throw FileError(path.string(), rule.name, "sha256 " + expected_sha256, computed);
+  if (largest >= codewords)
+    throw FileError(path.string(),
+                    rule.name,
+                    "indices below the " + std::to_string(codewords) + " codewords",
+                    std::to_string(largest));
+}
+
+/// Collective. The indices of one slab, held once per node; rank 0 reads them for all.
+CompressedSlab read_slab(const std::filesystem::path& path,
+                         const DatasetRule& rule,
+                         const std::string& sha256,
+                         std::size_t codewords,
+                         const Communicator& communicator) {
+  const std::size_t tiles = tile_count_of(rule);
+  const auto memory = communicator.allocate_on_nodes_from_root(
+      tiles * sizeof(std::uint16_t), [&](std::span<std::byte> bytes) {
+        naming_file(path, [&] {
+          read_indices(path,
+                       rule,
+                       sha256,
+                       codewords,
+                       {reinterpret_cast<std::uint16_t*>(bytes.data()), tiles});
+        });
+      });
+  const auto* first = reinterpret_cast<const std::uint16_t*>(memory.get());
+  return {SharedArray<std::uint16_t>(memory, {first, tiles})};
+}
+
+}  // namespace
+
+void announce_field(const std::filesystem::path& path) {
+  for (const std::filesystem::path& written : {path, field_layout::io_test_path(path)}) {
+    check_output_file(written, field_layout::unfinished_path(written));
+    announce_output_file(written);
+    announce_output_file(field_layout::unfinished_path(written));
+  }
+}
+
+FieldFileInfo write_field(const CompressedAttenuationField& field,
+                          const NextBlocks& next_blocks,
+                          const MakeProvenance& make_provenance,
+                          const std::filesystem::path& path,
+                          const Communicator& communicator,
+                          const MpiIoHints& hints) {
+  const hdf5::QuietErrors quiet;
+  const std::filesystem::path partial = field_layout::unfinished_path(path);
+  const auto rules = index_rules(field);
+  FieldFileInfo info;
+  info.payload_bytes = field_layout::payload_bytes(field);
+  // Before the part that removes the partial file when it fails: it may be none of ours.
+  all_or_none(communicator, [&] {
+    if (communicator.is_root()) check_output_file(path, partial);
+  });
+  try {
+    all_or_none(communicator, [&] {
+      if (!communicator.is_root()) return;
+      const WorkNote note("making " + partial.string());
+      lay_out(partial, hints);
+      naming_file(partial, [&] { create_file_without_indices(field, partial); });
+    });
+    const auto sums = write_indices(partial, rules, next_blocks, communicator, hints);
+    info.provenance = make_provenance();
+    all_or_none(communicator, [&] {
+      if (!communicator.is_root()) return;
+      const WorkNote note("reading " + partial.string() + " back to verify it");
+      info.payload_sha256 = naming_file(
+          partial, [&] { return verify_and_seal(field, info.provenance, sums, partial); });
+      move_into_place(partial, path);
+      info.file_bytes = std::filesystem::file_size(path);
+    });
+  } catch (const Error& error) {
+    // HDF5 would try again to write what could not be written, when MPI is finalised.
+    if (error.exit_code() != ExitCode::Stopped) MpiEnvironment::require_abort();
+    std::error_code ignored;
+    if (communicator.is_root()) std::filesystem::remove(partial, ignored);
+    throw;
+  }
+  share(info, communicator);
+  return info;
+}
+
+FieldFileInfo write_field(const CompressedAttenuationField& field,
+                          const std::vector<IndexBlock>& my_blocks,
+                          const FieldProvenance& provenance,
+                          const std::filesystem::path& path,
+                          const Communicator& communicator,
+                          const MpiIoHints& hints) {
+  std::vector<IndexBlock> left = my_blocks;
+  return write_field(
+      field,
+      [&] { return std::exchange(left, {}); },
+      [&] { return provenance; },
+      path,
+      communicator,
+      hints);
+}
+
+std::shared_ptr<const CompressedAttenuationField> read_field(const std::filesystem::path& path,
+                                                             const Communicator& communicator,
+                                                             FieldFileInfo* info) {
+  const hdf5::QuietErrors quiet;
+  FileHeader header;
+  all_or_none(communicator, [&] {
+    if (communicator.is_root()) header = naming_file(path, [&] { return read_header(path); });
+  });
+  share(header, communicator);
+  auto field = std::make_shared<CompressedAttenuationField>(
+      field_layout::field_of(header.payload, path.string()));
+  const auto rules = index_rules(*field);
+  for (std::size_t k = 0; k < rules.size(); ++k)
+    field->slabs.push_back(all_or_none(communicator, [&] {
+      return read_slab(
+          path, rules[k], header.index_sha256[k], field->codebook.size(), communicator);
+    }));
+  all_or_none(communicator, [&] {
+    if (!communicator.is_root()) return;
+    const auto found = problems(*field);
+    if (!found.empty()) throw FileError(path.string(), found.front());
+  });
+  if (info != nullptr)
+    *info = {field_layout::provenance_of(header.provenance),
+             header.payload_sha256,
+             header.file_bytes,
+             field_layout::payload_bytes(*field)};
+  return field;
+}
+
+}  // namespace af

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+// Internal to field_file: which datasets a field file holds and what they mean. No HDF5 here.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "field/compressed_attenuation_field.h"
+#include "field_file/field_file.h"
+
+namespace af::field_layout {
+
+inline constexpr const char* kFormat = "attenuation-field";
+inline constexpr int kFormatVersion = 1;
+inline constexpr int kMaxSlabs = 64;
+inline constexpr int kMaxNodes = 65536;
+inline constexpr std::uint64_t kMaxTextBytes = 16u << 20;
+
+/// Where a field is written until it is whole.
+inline std::filesystem::path unfinished_path(const std::filesystem::path& path) {
+  return path.string() + ".partial";
+}
+/// The field that check_parallel_writing() makes.
+inline std::filesystem::path io_test_path(const std::filesystem::path& path) {
+  return path.string() + ".io-test";
+}
+
+enum class ElementType { Float64, Float32, Int32, UInt16, Text };
+
+std::size_t element_bytes(ElementType type);
+const char* to_string(ElementType type);
+
+/// What a dataset must look like. A text has one extent, its length in bytes.
+struct DatasetRule {
+  std::string name;  ///< path within the file
+  ElementType type = ElementType::Float64;
+  std::vector<std::uint64_t> extents;  ///< for a text and the codebook: the largest first extent
+  bool is_first_extent_free = false;   ///< the first extent may be 1 ... extents[0]
+  std::string units;
+  std::string frame;
+};
+
+/// A small dataset, held whole.
+struct Dataset {
+  DatasetRule rule;  ///< with its true extents
+  std::vector<std::byte> bytes;
+};
+
+/// The rules of all small datasets that count as payload, in the fixed order of the payload hash;
+/// the indices of the slabs follow them.
+std::vector<DatasetRule> payload_rules(int slab_count);
+DatasetRule slab_count_rule();
+DatasetRule index_rule(const CompressedAttenuationField& field, std::size_t slab);
+/// One per slab.
+std::vector<DatasetRule> index_rules(const CompressedAttenuationField& field);
+std::vector<DatasetRule> provenance_rules();
+
+/// The small payload datasets of a field, in the order of payload_rules().
+std::vector<Dataset> datasets_of(const CompressedAttenuationField& field);
+std::vector<Dataset> datasets_of(const FieldProvenance& provenance);
+
+/// The field of datasets that satisfy payload_rules(), without indices. FileError when values make
+/// no sense: NaN, bad geometry, a codebook out of order, ranges outside the lattice.
+CompressedAttenuationField field_of(std::span<const Dataset> datasets, const std::string& path);
+FieldProvenance provenance_of(std::span<const Dataset> datasets);
+int slab_count_of(const Dataset& dataset, const std::string& path);
+
+/// One line per dataset that takes part in the payload hash.
+std::string payload_line(const DatasetRule& rule, const std::string& sha256);
+
+/// Datasets as bytes, to be broadcast.
+std::vector<std::byte> packed(std::span<const Dataset> datasets);
+std::vector<Dataset> unpacked(std::span<const std::byte> bytes);
+
+/// Bytes of indices and codebook, as stored.
+std::uint64_t payload_bytes(const CompressedAttenuationField& field);
+
+}  // namespace af::field_layout

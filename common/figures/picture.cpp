@@ -1,0 +1,503 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "figures/picture.h"
+
+#include <algorithm>
+#include <cairo.h>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <functional>
+#include <memory>
+#include <stdexcept>
+#include <string_view>
+
+#include "base/error.h"
+#include "files/output_file.h"
+#include "text/csv_table.h"
+
+namespace af {
+
+namespace {
+
+struct Color {
+  double red, green, blue;
+};
+
+constexpr Color kPaper{1.0, 1.0, 1.0};
+constexpr Color kInk{0.13, 0.13, 0.13};
+constexpr Color kFaintInk{0.38, 0.38, 0.38};
+constexpr Color kBox{1.0, 0.76, 0.03};
+constexpr Color kBoxShadow{0.0, 0.0, 0.0};
+constexpr Color kNotFinite{1.0, 0.55, 0.0};
+
+// ---- Text
+// ----------------------------------------------------------------------------------------
+
+/// Bytes of the UTF-8 character at `position`; 0 when it is not valid there.
+std::size_t utf8_length(std::string_view text, std::size_t position) {
+  const auto byte = [&](std::size_t offset) {
+    return static_cast<unsigned char>(text[position + offset]);
+  };
+  std::size_t length = 0;
+  if (byte(0) < 0x80) length = 1;
+  if (byte(0) >= 0xC2 && byte(0) < 0xE0) length = 2;
+  if (byte(0) >= 0xE0 && byte(0) < 0xF0) length = 3;
+  if (byte(0) >= 0xF0 && byte(0) < 0xF5) length = 4;
+  if (position + length > text.size()) return 0;
+  for (std::size_t i = 1; i < length; ++i)
+    if ((byte(i) & 0xC0) != 0x80) return 0;
+  if (length == 3 && byte(0) == 0xE0 && byte(1) < 0xA0) return 0;   // overlong
+  if (length == 3 && byte(0) == 0xED && byte(1) >= 0xA0) return 0;  // surrogate
+  if (length == 4 && byte(0) == 0xF0 && byte(1) < 0x90) return 0;   // overlong
+  if (length == 4 && byte(0) == 0xF4 && byte(1) >= 0x90) return 0;  // beyond Unicode
+  return length;
+}
+
+/// Characters of a text, one string each; what is not UTF-8 (cairo would refuse all of it) becomes
+/// '?', and control characters but the line feed become blanks.
+std::vector<std::string> characters_of(std::string_view text) {
+  std::vector<std::string> characters;
+  for (std::size_t i = 0; i < text.size();) {
+    const std::size_t length = utf8_length(text, i);
+    if (length == 0) {
+      characters.emplace_back("?");
+    } else {
+      const bool is_control = static_cast<unsigned char>(text[i]) < ' ' && text[i] != '\n';
+      characters.emplace_back(is_control ? " " : std::string(text.substr(i, length)));
+    }
+    i += std::max<std::size_t>(length, 1);
+  }
+  return characters;
+}
+
+struct Font {
+  double size_px = 13.0;
+  bool bold = false;
+
+  [[nodiscard]] double line_height_px() const { return std::ceil(1.35 * size_px); }
+};
+
+/// A rectangle of the picture's pixels.
+struct Area {
+  int x, y, width, height;
+};
+
+/// A cairo image surface with its context.
+class Canvas {
+ public:
+  Canvas(int width, int height)
+      : surface_(cairo_image_surface_create(CAIRO_FORMAT_RGB24, width, height)),
+        context_(cairo_create(surface_.get())) {
+    check_status();
+  }
+
+  void fill(const Color& color) {
+    set_color(color);
+    cairo_paint(context_.get());
+  }
+  void fill_rectangle(double x, double y, double width, double height, const Color& color) {
+    set_color(color);
+    cairo_rectangle(context_.get(), x, y, width, height);
+    cairo_fill(context_.get());
+  }
+  void outline(double x, double y, double width, double height, const Color& color, double line) {
+    set_color(color);
+    cairo_set_line_width(context_.get(), line);
+    cairo_rectangle(context_.get(), x, y, width, height);
+    cairo_stroke(context_.get());
+  }
+  [[nodiscard]] double text_width(const std::string& text, const Font& font) {
+    set_font(font);
+    cairo_text_extents_t extents;
+    cairo_text_extents(context_.get(), text.c_str(), &extents);
+    return extents.x_advance;
+  }
+  /// `baseline_y` is where the letters stand.
+  void text(
+      double x, double baseline_y, const std::string& text, const Font& font, const Color& color) {
+    set_font(font);
+    set_color(color);
+    cairo_move_to(context_.get(), x, baseline_y);
+    cairo_show_text(context_.get(), text.c_str());
+  }
+  /// Sets single pixels; `color_at(x, y)` gives 0xRRGGBB, x and y counted from the area's corner.
+  void set_pixels(const Area& area, const std::function<std::uint32_t(int, int)>& color_at) {
+    cairo_surface_flush(surface_.get());
+    unsigned char* data = cairo_image_surface_get_data(surface_.get());
+    const int stride = cairo_image_surface_get_stride(surface_.get());
+    for (int y = 0; y < area.height; ++y) {
+      unsigned char* row =
+          data + static_cast<std::ptrdiff_t>(area.y + y) * stride + std::ptrdiff_t{4} * area.x;
+      for (int x = 0; x < area.width; ++x) {
+        const std::uint32_t color = color_at(x, y);
+        std::memcpy(row + std::ptrdiff_t{4} * x, &color, sizeof color);
+      }
+    }
+    cairo_surface_mark_dirty(surface_.get());
+  }
+  /// The content of a PNG file.
+  [[nodiscard]] std::string png() {
+    check_status();
+    std::string bytes;
+    const auto append = [](void* target, const unsigned char* data, unsigned length) {
+      static_cast<std::string*>(target)->append(reinterpret_cast<const char*>(data), length);
+      return CAIRO_STATUS_SUCCESS;
+    };
+    const cairo_status_t status = cairo_surface_write_to_png_stream(surface_.get(), append, &bytes);
+    if (status != CAIRO_STATUS_SUCCESS)
+      throw std::runtime_error(std::string("cairo: ") + cairo_status_to_string(status));
+    return bytes;
+  }
+
+ private:
+  struct Destroy {
+    void operator()(cairo_surface_t* surface) const { cairo_surface_destroy(surface); }
+    void operator()(cairo_t* context) const { cairo_destroy(context); }
+  };
+
+  void set_color(const Color& color) {
+    cairo_set_source_rgb(context_.get(), color.red, color.green, color.blue);
+  }
+  void set_font(const Font& font) {
+    cairo_select_font_face(context_.get(),
+                           "DejaVu Sans",
+                           CAIRO_FONT_SLANT_NORMAL,
+                           font.bold ? CAIRO_FONT_WEIGHT_BOLD : CAIRO_FONT_WEIGHT_NORMAL);
+    cairo_set_font_size(context_.get(), font.size_px);
+  }
+  void check_status() const {
+    const cairo_status_t status = cairo_status(context_.get());
+    if (status == CAIRO_STATUS_NO_MEMORY) throw std::bad_alloc();
+    check(status == CAIRO_STATUS_SUCCESS, cairo_status_to_string(status));
+  }
+
+  std::unique_ptr<cairo_surface_t, Destroy> surface_;
+  std::unique_ptr<cairo_t, Destroy> context_;
+};
+
+/// Breaks a text into lines of at most `width` px: at blanks, inside words that are longer than a
+/// line, and at line feeds.
+std::vector<std::string> wrapped(Canvas& canvas,
+                                 const std::string& text,
+                                 const Font& font,
+                                 double width) {
+  std::vector<std::string> lines;
+  if (text.empty()) return lines;
+  std::string line;
+  std::size_t last_blank = std::string::npos;
+  for (const std::string& character : characters_of(text)) {
+    if (character == "\n") {
+      lines.push_back(line);
+      line.clear();
+      last_blank = std::string::npos;
+      continue;
+    }
+    if (character == " ") last_blank = line.size();
+    line += character;
+    if (line == character || character == " " || canvas.text_width(line, font) <= width) continue;
+    const bool at_blank = last_blank != std::string::npos;
+    const std::size_t cut = at_blank ? last_blank : line.size() - character.size();
+    lines.push_back(line.substr(0, cut));
+    line = line.substr(cut + (at_blank ? 1 : 0));
+    last_blank = std::string::npos;
+  }
+  lines.push_back(line);
+  return lines;
+}
+
+/// Draws lines below `y`, and returns where they end.
+double draw_lines(Canvas& canvas,
+                  const std::vector<std::string>& lines,
+                  double x,
+                  double y,
+                  const Font& font,
+                  const Color& color) {
+  for (const std::string& line : lines) {
+    canvas.text(x, y + font.size_px, line, font, color);
+    y += font.line_height_px();
+  }
+  return y;
+}
+
+// ---- Colors
+// --------------------------------------------------------------------------------------
+
+/// Place of a value in a window, clamped to [0, 1]; an empty window counts as a step.
+double window_position(double value, double low, double high) {
+  if (high > low) return std::clamp((value - low) / (high - low), 0.0, 1.0);
+  return value > low ? 1.0 : 0.0;
+}
+
+std::uint32_t packed(const Color& color) {
+  const auto byte = [](double part) {
+    return static_cast<std::uint32_t>(std::lround(255.0 * part));
+  };
+  return byte(color.red) << 16 | byte(color.green) << 8 | byte(color.blue);
+}
+
+Color mixed(const Color& a, const Color& b, double share_of_b) {
+  return {std::lerp(a.red, b.red, share_of_b),
+          std::lerp(a.green, b.green, share_of_b),
+          std::lerp(a.blue, b.blue, share_of_b)};
+}
+
+/// Grey from black to white, or blue through white to red (ends as in ColorBrewer's RdBu).
+std::uint32_t color_of(double position, PicturePanel::Colors colors) {
+  if (colors == PicturePanel::Colors::Grey) return packed({position, position, position});
+  constexpr Color kBlue{0.13, 0.40, 0.67};
+  constexpr Color kWhite{1.0, 1.0, 1.0};
+  constexpr Color kRed{0.70, 0.09, 0.17};
+  return packed(position < 0.5 ? mixed(kBlue, kWhite, 2.0 * position)
+                               : mixed(kWhite, kRed, 2.0 * position - 1.0));
+}
+
+// ---- Layout
+// --------------------------------------------------------------------------------------
+
+constexpr int kMargin = 18;
+constexpr int kGap = 22;
+constexpr int kSmallGap = 6;
+constexpr int kBarHeight = 8;
+constexpr int kMinCellWidth = 180;
+
+struct Layout {
+  int cell_width = kMinCellWidth;
+  Font heading, title, caption, scale;
+};
+
+Layout layout_of(const std::vector<PicturePanel>& panels, int zoom) {
+  Layout layout;
+  for (const PicturePanel& panel : panels)
+    layout.cell_width = std::max(layout.cell_width, panel.image.width * zoom);
+  // Letters grow with the panels, so that a picture scaled to fit a page stays readable.
+  const double size = std::clamp(layout.cell_width / 32.0, 12.0, 30.0);
+  layout.heading = {std::round(1.35 * size), true};
+  layout.title = {std::round(1.1 * size), true};
+  layout.caption = {std::round(size), false};
+  layout.scale = {std::round(0.9 * size), false};
+  return layout;
+}
+
+/// One panel's texts broken into lines.
+struct PanelText {
+  std::vector<std::string> title;
+  std::vector<std::string> caption;
+};
+
+/// One row of the grid and the heights that its tallest panels need.
+struct PanelRow {
+  std::size_t first = 0, count = 0;
+  int title_height = 0, image_height = 0, caption_height = 0;
+
+  [[nodiscard]] int height(const Layout& layout) const {
+    const int scale = kSmallGap + kBarHeight + static_cast<int>(layout.scale.line_height_px());
+    return title_height + image_height + scale + kSmallGap + caption_height;
+  }
+};
+
+int lines_height(const std::vector<std::string>& lines, const Font& font) {
+  return static_cast<int>(static_cast<double>(lines.size()) * font.line_height_px());
+}
+
+std::vector<PanelRow> rows_of(const std::vector<PicturePanel>& panels,
+                              const std::vector<PanelText>& texts,
+                              const Layout& layout,
+                              int columns,
+                              int zoom) {
+  std::vector<PanelRow> rows;
+  const auto step = static_cast<std::size_t>(columns);
+  for (std::size_t first = 0; first < panels.size(); first += step) {
+    PanelRow row{first, std::min(step, panels.size() - first)};
+    for (std::size_t i = first; i < first + row.count; ++i) {
+      const int title = lines_height(texts[i].title, layout.title);
+      row.title_height = std::max(row.title_height, title > 0 ? title + kSmallGap : 0);
+      row.image_height = std::max(row.image_height, panels[i].image.height * zoom);
+      row.caption_height =
+          std::max(row.caption_height, lines_height(texts[i].caption, layout.caption));
+    }
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+// ---- Drawing
+// -------------------------------------------------------------------------------------
+
+void draw_image(Canvas& canvas, const PicturePanel& panel, int x0, int y0, int zoom) {
+  canvas.set_pixels({x0, y0, panel.image.width * zoom, panel.image.height * zoom},
+                    [&](int x, int y) {
+                      const double value = static_cast<double>(panel.image.at(x / zoom, y / zoom));
+                      if (!std::isfinite(value)) return packed(kNotFinite);
+                      return color_of(window_position(value, panel.low, panel.high), panel.colors);
+                    });
+  for (const RegionOfInterest& box : panel.boxes) {
+    const double x = x0 + box.column * zoom, y = y0 + box.row * zoom;
+    const double width = box.width * zoom, height = box.height * zoom;
+    canvas.outline(x, y, width, height, kBoxShadow, 3.5);
+    canvas.outline(x, y, width, height, kBox, 1.8);
+  }
+  canvas.outline(x0 - 0.5,
+                 y0 - 0.5,
+                 panel.image.width * zoom + 1,
+                 panel.image.height * zoom + 1,
+                 kFaintInk,
+                 1.0);
+}
+
+/// The window as a bar of its colors between its two values.
+void draw_scale(
+    Canvas& canvas, const PicturePanel& panel, int x0, int y0, int width, const Font& font) {
+  canvas.set_pixels({x0, y0, width, kBarHeight}, [&](int x, int) {
+    return color_of(width > 1 ? static_cast<double>(x) / (width - 1) : 0.5, panel.colors);
+  });
+  canvas.outline(x0 - 0.5, y0 - 0.5, width + 1, kBarHeight + 1, kFaintInk, 1.0);
+  // Both ends to the same decimals, which tell a hundredth of the window.
+  const double span = std::abs(panel.high - panel.low);
+  const int decimals = span > 0.0 && std::isfinite(span)
+                           ? std::clamp(2 - static_cast<int>(std::floor(std::log10(span))), 0, 9)
+                           : 3;
+  const auto short_text = [decimals](double value) {
+    const std::string exact = number_text(value);
+    const std::string rounded = std::isfinite(value) ? fixed_text(value, decimals) : exact;
+    return exact.size() < rounded.size() ? exact : rounded;
+  };
+  const double baseline = y0 + kBarHeight + 3 + font.size_px;
+  const std::string high = short_text(panel.high);
+  canvas.text(x0, baseline, short_text(panel.low), font, kFaintInk);
+  canvas.text(x0 + width - canvas.text_width(high, font), baseline, high, font, kFaintInk);
+}
+
+void draw_row(Canvas& canvas,
+              const std::vector<PicturePanel>& panels,
+              const std::vector<PanelText>& texts,
+              const PanelRow& row,
+              const Layout& layout,
+              int y,
+              int zoom) {
+  for (std::size_t i = 0; i < row.count; ++i) {
+    const PicturePanel& panel = panels[row.first + i];
+    const PanelText& text = texts[row.first + i];
+    const int x = kMargin + static_cast<int>(i) * (layout.cell_width + kGap);
+    // Titles stand on their image, however many lines the neighbours' need.
+    const int title_height = lines_height(text.title, layout.title) + kSmallGap;
+    const int image_y = y + row.title_height;
+    draw_lines(canvas, text.title, x, image_y - title_height, layout.title, kInk);
+    draw_image(canvas, panel, x, image_y, zoom);
+    const int bar_y = image_y + panel.image.height * zoom + kSmallGap;
+    const int bar_width = std::max(panel.image.width * zoom, kMinCellWidth / 2);
+    draw_scale(canvas, panel, x, bar_y, bar_width, layout.scale);
+    const double caption_y = bar_y + kBarHeight + layout.scale.line_height_px() + kSmallGap;
+    draw_lines(canvas, text.caption, x, caption_y, layout.caption, kInk);
+  }
+}
+
+void check_panels(const std::vector<PicturePanel>& panels, int columns, int zoom) {
+  check(!panels.empty(), "write_picture needs a panel");
+  check(columns > 0 && zoom > 0, "write_picture needs positive columns and zoom");
+  for (const PicturePanel& panel : panels) {
+    const Image2d& image = panel.image;
+    check(image.width > 0 && image.height > 0, "write_picture needs images that are not empty");
+    check(image.pixels.size() ==
+              static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height),
+          "an image's size and pixels differ");
+  }
+}
+
+/// Refuses what cairo or memory could not hold. In 64 bits: zoomed sizes may overflow an int.
+void check_size(const std::vector<PicturePanel>& panels, int columns, int zoom) {
+  constexpr std::int64_t kMaxSide = 30000;
+  constexpr std::int64_t kMaxArea = 400'000'000;
+  std::int64_t width = 0;
+  std::int64_t height = 0;
+  for (const PicturePanel& panel : panels) {
+    width = std::max(width, std::int64_t{panel.image.width} * zoom);
+    height = std::max(height, std::int64_t{panel.image.height} * zoom);
+  }
+  const auto count = static_cast<std::int64_t>(panels.size());
+  const std::int64_t rows = (count + columns - 1) / columns;
+  width = (std::max<std::int64_t>(width, kMinCellWidth) + kGap) *
+          std::min<std::int64_t>(columns, count);
+  height *= rows;
+  if (width > kMaxSide || height > kMaxSide || width * height > kMaxArea)
+    throw InputError("picture size",
+                     std::to_string(width) + " x " + std::to_string(height) + " pixels",
+                     "must be within 30000 pixels on a side and 4e8 in all");
+}
+
+}  // namespace
+
+void write_picture(const std::vector<PicturePanel>& panels,
+                   int columns,
+                   const std::string& heading,
+                   const std::filesystem::path& path,
+                   int zoom) {
+  check_panels(panels, columns, zoom);
+  columns = std::min(columns, static_cast<int>(panels.size()));
+  check_size(panels, columns, zoom);
+  const Layout layout = layout_of(panels, zoom);
+  const int inner_width = columns * layout.cell_width + (columns - 1) * kGap;
+
+  Canvas measure(1, 1);
+  const auto heading_lines = wrapped(measure, heading, layout.heading, inner_width);
+  std::vector<PanelText> texts;
+  texts.reserve(panels.size());
+  for (const PicturePanel& panel : panels)
+    texts.push_back({wrapped(measure, panel.title, layout.title, layout.cell_width),
+                     wrapped(measure, panel.caption, layout.caption, layout.cell_width)});
+  const auto rows = rows_of(panels, texts, layout, columns, zoom);
+
+  int y = kMargin + lines_height(heading_lines, layout.heading);
+  if (!heading_lines.empty()) y += 2 * kSmallGap;
+  int height = y + kMargin - kGap;
+  for (const PanelRow& row : rows) height += row.height(layout) + kGap;
+
+  Canvas canvas(inner_width + 2 * kMargin, height);
+  canvas.fill(kPaper);
+  draw_lines(canvas, heading_lines, kMargin, kMargin, layout.heading, kInk);
+  for (const PanelRow& row : rows) {
+    draw_row(canvas, panels, texts, row, layout, y, zoom);
+    y += row.height(layout) + kGap;
+  }
+  write_text_file(path, canvas.png());
+}
+
+Image2d checkerboard(const Image2d& a, const Image2d& b, int field_px) {
+  check(a.width == b.width && a.height == b.height, "checkerboard() needs images of one size");
+  check(field_px > 0, "checkerboard() needs fields of at least one pixel");
+  const auto [a_low, a_high] = percentile_window(a);
+  const auto [b_low, b_high] = percentile_window(b);
+  Image2d board(a.width, a.height);
+  for (int row = 0; row < a.height; ++row)
+    for (int column = 0; column < a.width; ++column) {
+      const bool shows_a = (row / field_px + column / field_px) % 2 == 0;
+      const double value = static_cast<double>((shows_a ? a : b).at(column, row));
+      board.at(column, row) = static_cast<float>(shows_a ? window_position(value, a_low, a_high)
+                                                         : window_position(value, b_low, b_high));
+    }
+  return board;
+}
+
+std::array<double, 2> percentile_window(const Image2d& image,
+                                        double low_percent,
+                                        double high_percent) {
+  check(low_percent >= 0.0 && low_percent <= high_percent && high_percent <= 100.0,
+        "percentiles must be ordered within 0 and 100");
+  std::vector<float> values;
+  values.reserve(image.pixels.size());
+  std::copy_if(image.pixels.begin(), image.pixels.end(), std::back_inserter(values), [](float v) {
+    return std::isfinite(v);
+  });
+  if (values.empty()) return {0.0, 0.0};
+  const auto percentile = [&values](double percent) {
+    const double position = percent / 100.0 * static_cast<double>(values.size() - 1);
+    const auto below = values.begin() + static_cast<std::ptrdiff_t>(position);
+    std::nth_element(values.begin(), below, values.end());
+    const double at_below = static_cast<double>(*below);
+    if (below + 1 == values.end()) return at_below;
+    const double above = static_cast<double>(*std::min_element(below + 1, values.end()));
+    return std::lerp(at_below, above, position - std::floor(position));
+  };
+  return {percentile(low_percent), percentile(high_percent)};
+}
+
+}  // namespace af

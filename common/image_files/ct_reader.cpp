@@ -1,0 +1,360 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "image_files/ct_reader.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <optional>
+#include <span>
+
+#include <Eigen/LU>
+
+#include "base/error.h"
+#include "base/plausible.h"
+#include "files/input_guard.h"
+#include "files/sha256.h"
+#include "image_files/dicom_series.h"
+#include "image_files/hu_values.h"
+#include "image_files/image_header.h"
+#include "image_files/itk_image_io.h"
+#include "image_files/stored_image.h"
+#include "text/csv_table.h"
+
+namespace af {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr int kAirBelowHu = -900;
+/// From orthonormal; single-precision quaternions and rows of NIfTI stay well below.
+constexpr double kMaxDirectionError = 1e-4;
+/// Between the affine of a NIfTI header and what ITK makes of it, at any corner of the volume.
+constexpr double kMaxAffineDifferenceMm = 0.05;
+/// Two axis orders whose fit differs by less than this are a tie (directions near 45 degrees).
+constexpr double kAxisOrderMargin = 1e-3;
+
+std::string triple(const auto& values) {
+  const auto text = [](const auto value) {
+    if constexpr (std::is_floating_point_v<decltype(value)>)
+      return number_text(static_cast<double>(value));
+    else
+      return std::to_string(value);
+  };
+  return "(" + text(values[0]) + ", " + text(values[1]) + ", " + text(values[2]) + ")";
+}
+
+void check_grid(const CtGrid& grid, const std::string& file) {
+  std::vector<std::string> problems;
+  for (const int extent : grid.size)
+    if (extent < 2) {
+      problems.push_back("size = " + triple(grid.size) +
+                         ": must be at least 2 voxels on each axis");
+      break;
+    }
+  if (!std::all_of(grid.spacing_mm.begin(), grid.spacing_mm.end(), is_plausible_spacing_mm))
+    problems.push_back("spacing = " + triple(grid.spacing_mm) + " mm: " + kPlausibleSpacing);
+  if (!(grid.origin_mm.cwiseAbs().maxCoeff() <= kMaxCtOriginMm))
+    problems.push_back("origin = " + triple(grid.origin_mm) +
+                       " mm: must be finite and within 1e4 mm (10 m)");
+  const Eigen::Matrix3d gram = grid.direction.transpose() * grid.direction;
+  if (!((gram - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() <= kMaxDirectionError))
+    problems.push_back("direction columns " + triple(grid.direction.col(0)) + ", " +
+                       triple(grid.direction.col(1)) + ", " + triple(grid.direction.col(2)) +
+                       ": must be orthonormal (a sheared or scaled grid is not supported; resample "
+                       "the CT)");
+  throw_if_any(problems, file);
+}
+
+/// Refuses what is no scalar volume; runs before voxels are allocated.
+void check_is_scalar_volume(const RawImage& image, const fs::path& path) {
+  if (image.channels != 1)
+    throw InputError("channels",
+                     std::to_string(image.channels),
+                     "a CT has one value per voxel (RGB, vector or complex image?)",
+                     path.string());
+  std::size_t used = image.size.size();
+  while (used > 3 && image.size[used - 1] == 1) --used;
+  if (used > 3)
+    throw InputError("dimensions",
+                     std::to_string(used),
+                     "a CT is 3-D; this is a series of volumes (4-D)",
+                     path.string());
+  if (used < 3) throw InputError("dimensions", std::to_string(used), "a CT is 3-D", path.string());
+}
+
+CtGrid grid_of(const RawImage& image) {
+  CtGrid grid;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto i = static_cast<Eigen::Index>(axis);
+    grid.size[axis] = static_cast<int>(image.size[axis]);
+    grid.spacing_mm[i] = image.spacing_mm[axis];
+    grid.origin_mm[i] = image.origin_mm[axis];
+    for (std::size_t row = 0; row < 3; ++row)
+      grid.direction(static_cast<Eigen::Index>(row), i) =
+          image.directions[axis][row] + 0.0;  // no -0
+  }
+  return grid;
+}
+
+/// Largest distance between a grid and an affine map (voxel index to RAS mm) over the corners.
+double largest_difference_mm(const CtGrid& grid, const RasAffine& ras_affine) {
+  const auto ras = [&](std::size_t row, const Eigen::Vector3d& index) {
+    const auto& r = ras_affine[row];
+    return r[0] * index.x() + r[1] * index.y() + r[2] * index.z() + r[3];
+  };
+  double largest = 0.0;
+  for (unsigned corner = 0; corner < 8; ++corner) {
+    Eigen::Vector3d index;
+    for (unsigned axis = 0; axis < 3; ++axis)
+      index[axis] = (corner >> axis & 1u) != 0 ? grid.size[axis] - 1 : 0;
+    const Eigen::Vector3d lps(-ras(0, index), -ras(1, index), ras(2, index));
+    const double distance = (lps - grid.point_mm(index)).norm();
+    if (!(distance <= largest)) largest = distance;
+  }
+  return largest;
+}
+
+/// NIfTI may hold two maps to the patient, and either may be sheared: says which one is used, and
+/// refuses when it is neither.
+void check_nifti_orientation(const CtGrid& grid,
+                             const NiftiOrientation& orientation,
+                             const std::string& file,
+                             std::vector<std::string>& warnings) {
+  const auto agrees = [&](const std::optional<RasAffine>& affine) {
+    return affine.has_value() && largest_difference_mm(grid, *affine) <= kMaxAffineDifferenceMm;
+  };
+  const bool uses_qform = agrees(orientation.qform);
+  const bool uses_sform = agrees(orientation.sform);
+  if (uses_qform == orientation.qform.has_value() && uses_sform == orientation.sform.has_value())
+    return;
+  if (!uses_qform && !uses_sform)
+    throw InputError(orientation.sform ? "sform" : "qform",
+                     "not rigid with voxel spacing",
+                     "a sheared or scaled grid is not supported; resample the CT",
+                     file);
+  warnings.push_back(file + ": sform and qform place the CT differently; the " +
+                     (uses_qform ? "qform" : "sform") + " is used");
+}
+
+void check_is_ct(const RawImage& image, const fs::path& path) {
+  check_is_scalar_volume(image, path);
+  check_grid(grid_of(image), path.string());
+}
+
+void add_values(ValueType type, std::span<const std::byte> bytes, HuValues& values) {
+  visit_values(type, bytes, [&](const auto span) { values.add_all(span); });
+}
+
+/// Voxels are converted piece by piece while the file is read and checked, once. No values in the
+/// image returned.
+RawImage read_values(const fs::path& path,
+                     const ImageHeader& header,
+                     HuValues& values,
+                     std::vector<std::string>& warnings) {
+  const RawImage image =
+      read_image_description(path, header, [&](const RawImage& seen) { check_is_ct(seen, path); });
+  read_described_values(path, header, image, &warnings, [&](std::span<const std::byte> piece) {
+    if (values.hu().empty()) values.reserve(image.voxel_count());
+    add_values(image.type, piece, values);
+  });
+  return image;
+}
+
+CtVolume read_ct_image(const fs::path& path, HuValues& values, std::vector<std::string>& warnings) {
+  const std::string file = path.string();
+  const std::optional<ImageFormat> format = sniff_image_format(path);
+  if (!format)
+    throw FileError(file,
+                    "not a CT image: its content is none of NIfTI, MetaImage, NRRD; a DICOM series "
+                    "is given as a folder");
+  if (*format == ImageFormat::Dicom)
+    throw InputError(file + ": a single DICOM file (" + describe_dicom_file(path) +
+                     "); give the folder that holds the series" +
+                     "; multi-frame CT is not supported, convert it to NIfTI");
+  if (*format == ImageFormat::Png || *format == ImageFormat::Tiff)
+    throw InputError(file + ": a " + std::string(format_name(*format)) +
+                     " picture has no HU values and no patient frame; a CT is DICOM, NIfTI, "
+                     "MetaImage or NRRD");
+  const ImageHeader header = read_image_header(path, *format);
+  if (!header.has_spacing)
+    throw InputError("spacing", "none", "a CT's header must state it (mm)", file);
+  const RawImage image = read_values(path, header, values, warnings);
+  CtVolume ct;
+  ct.grid = grid_of(image);
+  if (header.format == ImageFormat::Nifti && header.has_orientation)
+    check_nifti_orientation(ct.grid, header.nifti, file, warnings);
+  if (!header.has_orientation)
+    warnings.push_back(file + ": no patient orientation is stored; axes are taken as LPS by " +
+                       std::string(format_name(*format)) + "'s default");
+  return ct;
+}
+
+std::array<std::size_t, 3> voxel_index(const CtGrid& grid, std::size_t number) {
+  const auto width = static_cast<std::size_t>(grid.size[0]);
+  const auto height = static_cast<std::size_t>(grid.size[1]);
+  return {number % width, number / width % height, number / (width * height)};
+}
+
+void check_values(const CtGrid& grid,
+                  const HuValues& values,
+                  const std::string& file,
+                  std::vector<std::string>& warnings) {
+  if (values.non_finite_count() > 0)
+    throw InputError(
+        "voxel " + triple(voxel_index(grid, values.first_non_finite())),
+        "NaN or infinite",
+        "HU must be finite (" + std::to_string(values.non_finite_count()) + " such voxels)",
+        file);
+  if (values.implausible_count() > 0)
+    throw InputError("voxel " + triple(voxel_index(grid, values.first_implausible())),
+                     number_text(values.first_implausible_hu()),
+                     "HU must be within 1e6 (" + std::to_string(values.implausible_count()) +
+                         " voxels are beyond)",
+                     file);
+  const auto [low, high] = std::minmax_element(values.hu().begin(), values.hu().end());
+  if (*high < kAirBelowHu)
+    throw InputError(
+        "highest HU",
+        std::to_string(*high),
+        "nothing but air: some voxel must reach " + std::to_string(kAirBelowHu) + " HU",
+        file);
+  if (values.clamped_count() > 0)
+    warnings.push_back(file + ": " + std::to_string(values.clamped_count()) +
+                       " voxels beyond int16 were clamped");
+  const std::string range = std::to_string(*low) + " to " + std::to_string(*high);
+  if (*low >= -200)
+    warnings.push_back(file + ": values " + range +
+                       " do not look like HU: no voxel is near air (-1000)");
+  else if (*high < 100)
+    warnings.push_back(file + ": values " + range + " do not look like a CT of a body: no bone");
+}
+
+/// Permutation and signs that bring a grid's axes to ascending L, P, S.
+struct AxisOrder {
+  std::array<int, 3> axis = {0, 1, 2};  ///< of the grid, for L, P, S
+  std::array<bool, 3> reversed = {false, false, false};
+};
+
+AxisOrder ascending_lps_order(const Eigen::Matrix3d& direction) {
+  AxisOrder best;
+  double best_fit = -1.0;
+  std::array<int, 3> axis = {0, 1, 2};
+  do {
+    double fit = 0.0;
+    for (int world = 0; world < 3; ++world)
+      fit += std::abs(direction(world, axis[static_cast<std::size_t>(world)]));
+    if (fit > best_fit + kAxisOrderMargin) {
+      best_fit = fit;
+      best.axis = axis;
+    }
+  } while (std::next_permutation(axis.begin(), axis.end()));
+  for (std::size_t world = 0; world < 3; ++world)
+    best.reversed[world] = direction(static_cast<Eigen::Index>(world), best.axis[world]) < 0.0;
+  return best;
+}
+
+template <typename T>
+void append_little_endian(std::vector<std::byte>& bytes, T value) {
+  const std::uint64_t bits = static_cast<std::make_unsigned_t<T>>(value);
+  for (std::size_t i = 0; i < sizeof(T); ++i)
+    bytes.push_back(static_cast<std::byte>(bits >> (8 * i) & 0xffU));
+}
+
+RawImage raw_image_of(const CtVolume& ct) {
+  RawImage image;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto i = static_cast<Eigen::Index>(axis);
+    image.size.push_back(static_cast<std::size_t>(ct.grid.size[axis]));
+    image.spacing_mm.push_back(ct.grid.spacing_mm[i]);
+    image.origin_mm.push_back(ct.grid.origin_mm[i]);
+    const Eigen::Vector3d direction = ct.grid.direction.col(i);
+    image.directions.push_back({direction.x(), direction.y(), direction.z()});
+  }
+  image.type = ValueType::Int16;
+  const auto bytes = std::as_bytes(ct.hu.view());
+  image.values.assign(bytes.begin(), bytes.end());
+  return image;
+}
+
+}  // namespace
+
+CtVolume read_ct(const fs::path& path,
+                 const CtReadOptions& options,
+                 std::vector<std::string>* warnings) {
+  std::vector<std::string> found;
+  std::error_code error;
+  CtVolume ct;
+  HuValues values;
+  note_input(path);
+  if (fs::is_directory(path, error)) {
+    DicomCt series = read_dicom_series(path, options.series_uid, &found);
+    ct.grid = series.grid;
+    values = std::move(series.values);
+    check_grid(ct.grid, path.string());
+  } else {
+    ct = read_ct_image(path, values, found);
+  }
+  check_values(ct.grid, values, path.string(), found);
+  ct.hu = SharedArray<std::int16_t>(values.take());
+  if (warnings != nullptr) warnings->insert(warnings->end(), found.begin(), found.end());
+  return ct;
+}
+
+void write_ct(const CtVolume& ct, const fs::path& path) {
+  const std::string name = path.filename().string();
+  if (!name.ends_with(".mha") && !name.ends_with(".nii.gz") && !name.ends_with(".nrrd"))
+    throw UsageError(path.string() + ": a CT is written as .mha, .nii.gz or .nrrd");
+  write_raw_image(raw_image_of(ct), path);
+}
+
+CtGrid ascending_lps_grid(const CtGrid& grid) {
+  const AxisOrder order = ascending_lps_order(grid.direction);
+  CtGrid sorted;
+  Eigen::Vector3d first_index = Eigen::Vector3d::Zero();
+  for (std::size_t world = 0; world < 3; ++world) {
+    const auto to = static_cast<Eigen::Index>(world);
+    const int from = order.axis[world];
+    const int extent = grid.size[static_cast<std::size_t>(from)];
+    sorted.size[world] = extent;
+    sorted.spacing_mm[to] = grid.spacing_mm[from];
+    sorted.direction.col(to) = (order.reversed[world] ? -1.0 : 1.0) * grid.direction.col(from);
+    if (order.reversed[world]) first_index[from] = extent - 1;
+  }
+  sorted.origin_mm = grid.point_mm(first_index);
+  return sorted;
+}
+
+std::string ct_content_sha256(const CtVolume& ct) {
+  const AxisOrder order = ascending_lps_order(ct.grid.direction);
+  const std::array<std::ptrdiff_t, 3> stride = {
+      1, ct.grid.size[0], std::ptrdiff_t{ct.grid.size[0]} * ct.grid.size[1]};
+  std::array<int, 3> size{};
+  std::array<std::ptrdiff_t, 3> step{};
+  std::ptrdiff_t first = 0;
+  for (std::size_t world = 0; world < 3; ++world) {
+    const auto from = static_cast<std::size_t>(order.axis[world]);
+    size[world] = ct.grid.size[from];
+    step[world] = order.reversed[world] ? -stride[from] : stride[from];
+    if (order.reversed[world]) first += stride[from] * (size[world] - 1);
+  }
+  Sha256 hash;
+  std::vector<std::byte> bytes;
+  for (const int extent : size) append_little_endian(bytes, static_cast<std::int32_t>(extent));
+  hash.update(bytes);
+  const std::int16_t* hu = ct.hu.data();
+  for (int k = 0; k < size[2]; ++k) {
+    bytes.clear();
+    for (int j = 0; j < size[1]; ++j) {
+      const std::int16_t* row = hu + first + k * step[2] + j * step[1];
+      for (int i = 0; i < size[0]; ++i) append_little_endian(bytes, row[i * step[0]]);
+    }
+    hash.update(bytes);
+  }
+  return hash.hex_digest();
+}
+
+}  // namespace af

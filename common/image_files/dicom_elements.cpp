@@ -1,0 +1,316 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "image_files/dicom_elements.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <limits>
+#include <string_view>
+
+#include "base/error.h"
+#include "files/input_file.h"
+#include "files/input_guard.h"
+
+namespace af {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr std::uint32_t kUndefinedLength = 0xffffffffu;
+constexpr std::uint64_t kPreambleBytes = 132;
+constexpr std::uint64_t kLongestKeptValue = 4096;
+constexpr int kMaxDepth = 16;
+constexpr DicomTag kItem = {0xfffe, 0xe000};
+constexpr DicomTag kItemEnd = {0xfffe, 0xe00d};
+constexpr DicomTag kSequenceEnd = {0xfffe, 0xe0dd};
+constexpr DicomTag kTransferSyntax = {0x0002, 0x0010};
+constexpr DicomTag kPixelData = {0x7fe0, 0x0010};
+
+/// Value representations with a 4-byte length, and those with a 2-byte one (PS3.5, 7.1.2).
+constexpr std::string_view kLongForms = "OB OD OF OL OV OW SQ SV UC UN UR UT UV ";
+constexpr std::string_view kShortForms =
+    "AE AS AT CS DA DS DT FL FD IS LO LT PN SH SL SS ST TM UI UL US ";
+
+bool is_one_of(std::string_view forms, std::string_view form) {
+  for (std::size_t at = 0; at < forms.size(); at += 3)
+    if (forms.substr(at, 2) == form) return true;
+  return false;
+}
+
+/// Bytes of one number of a binary form; 1 for text.
+std::uint32_t unit_bytes(std::string_view form) {
+  if (form == "US" || form == "SS") return 2;
+  if (form == "UL" || form == "SL" || form == "FL" || form == "AT") return 4;
+  return form == "FD" ? 8 : 1;
+}
+
+std::string trimmed(std::string text) {
+  const auto is_padding = [](char c) { return c == ' ' || c == '\0' || c == '\t'; };
+  while (!text.empty() && is_padding(text.back())) text.pop_back();
+  std::size_t first = 0;
+  while (first < text.size() && is_padding(text[first])) ++first;
+  return text.substr(first);
+}
+
+struct Encoding {
+  bool is_explicit = true;
+  bool is_big_endian = false;
+};
+
+/// Group 0028 elements that are unsigned short in implicit files, whose forms are not written.
+bool is_unsigned_short(DicomTag tag) {
+  constexpr std::array<std::uint16_t, 7> kElements = {
+      0x0002, 0x0010, 0x0011, 0x0100, 0x0101, 0x0102, 0x0103};
+  return tag.first == 0x0028 &&
+         std::find(kElements.begin(), kElements.end(), tag.second) != kElements.end();
+}
+
+}  // namespace
+
+/// Walks the elements of one file, never past its end.
+class DicomWalker {
+ public:
+  explicit DicomWalker(const fs::path& path)
+      : path_(path.string()), file_(open_input_file(path)), size_(fs::file_size(path)) {
+    elements_.path_ = path;
+  }
+
+  DicomElements walk() {
+    at_ = is_marked_dicom(elements_.path_) ? kPreambleBytes : 0;
+    while (at_ < size_ && peek_group() == 0x0002) read_element({}, size_, 0);
+    const Encoding encoding = data_encoding();
+    elements_.is_big_endian_ = encoding.is_big_endian;
+    while (at_ < size_ && !elements_.has_pixels()) read_element(encoding, size_, 0);
+    return std::move(elements_);
+  }
+
+ private:
+  struct Header {
+    DicomTag tag;
+    std::string form;  ///< empty in implicit files
+    std::uint32_t length = 0;
+  };
+
+  [[noreturn]] void fail(const std::string& what) const {
+    throw FileError(path_, "broken DICOM at byte " + std::to_string(at_) + ": " + what);
+  }
+
+  void need(std::uint64_t bytes, std::uint64_t end) const {
+    if (bytes <= end - at_) return;
+    if (end == size_)
+      throw FileError(path_,
+                      "truncated: byte " + std::to_string(at_ + bytes) +
+                          " is needed, the file has " + std::to_string(size_));
+    fail("an element reaches beyond the one it stands in");
+  }
+
+  std::string take(std::uint64_t bytes, std::uint64_t end) {
+    need(bytes, end);
+    std::string value(bytes, '\0');
+    file_.seekg(static_cast<std::streamoff>(at_));
+    file_.read(value.data(), static_cast<std::streamsize>(bytes));
+    if (!file_) fail("cannot be read");
+    at_ += bytes;
+    return value;
+  }
+
+  static std::uint32_t number(std::string_view bytes, bool is_big_endian) {
+    std::uint32_t value = 0;
+    for (std::size_t i = 0; i < bytes.size(); ++i) {
+      const auto byte = static_cast<unsigned char>(bytes[is_big_endian ? i : bytes.size() - 1 - i]);
+      value = value << 8 | byte;
+    }
+    return value;
+  }
+
+  std::uint16_t peek_group() {
+    const std::uint64_t start = at_;
+    const auto group = static_cast<std::uint16_t>(number(take(2, size_), false));
+    at_ = start;
+    return group;
+  }
+
+  Encoding data_encoding() {
+    const std::string syntax = elements_.text(kTransferSyntax);
+    if (syntax == "1.2.840.10008.1.2") return {false, false};
+    if (syntax == "1.2.840.10008.1.2.2") return {true, true};
+    if (syntax == "1.2.840.10008.1.2.1.99")
+      throw InputError("transfer syntax", syntax, "deflated DICOM is not supported", path_);
+    if (!syntax.empty() && !syntax.starts_with("1.2.840.10008.1.2."))
+      throw InputError("transfer syntax", syntax, "is not known", path_);
+    if (!syntax.empty() || size_ - at_ < 6) return {};
+    // Without file header: explicit when a known form stands behind the first tag.
+    const std::uint64_t start = at_;
+    const std::string first = take(6, size_);
+    at_ = start;
+    const std::string form = first.substr(4);
+    return {is_one_of(kLongForms, form) || is_one_of(kShortForms, form), false};
+  }
+
+  Header read_header(const Encoding& encoding, std::uint64_t end) {
+    Header header;
+    const std::string bytes = take(8, end);
+    const bool big = encoding.is_big_endian;
+    const std::string_view view(bytes);
+    header.tag = {static_cast<std::uint16_t>(number(view.substr(0, 2), big)),
+                  static_cast<std::uint16_t>(number(view.substr(2, 2), big))};
+    if (!encoding.is_explicit || header.tag.first == 0xfffe) {
+      header.length = number(view.substr(4, 4), big);
+      return header;
+    }
+    header.form = bytes.substr(4, 2);
+    if (is_one_of(kLongForms, header.form))
+      header.length = number(take(4, end), big);
+    else if (is_one_of(kShortForms, header.form))
+      header.length = number(view.substr(6, 2), big);
+    else
+      fail("unknown value representation");
+    return header;
+  }
+
+  void read_element(const Encoding& encoding, std::uint64_t end, int depth) {
+    const Header header = read_header(encoding, end);
+    if (header.tag.first == 0xfffe) fail("an item outside of a sequence");
+    const bool is_pixels = depth == 0 && header.tag == kPixelData;
+    if (header.length == kUndefinedLength) {
+      if (is_pixels)
+        read_fragments(encoding, end);
+      else  // an unknown form of undefined length holds implicit elements (PS3.5, 6.2.2)
+        read_items(header.form == "UN" ? Encoding{false, false} : encoding, end, true, depth + 1);
+    } else {
+      need(header.length, end);
+      if (header.length % unit_bytes(header.form) != 0) fail("a length that does not fit its form");
+      if (header.form == "SQ")
+        read_items(encoding, at_ + header.length, false, depth + 1);
+      else if (depth == 0 && header.length <= kLongestKeptValue && !is_pixels)
+        keep(header, take(header.length, end), encoding.is_big_endian);
+      else
+        skip(header.length, is_pixels);
+    }
+  }
+
+  void read_items(const Encoding& encoding, std::uint64_t end, bool until_mark, int depth) {
+    if (depth > kMaxDepth) fail("sequences are nested too deeply");
+    while (until_mark || at_ < end) {
+      const Header item = read_header(encoding, end);
+      if (until_mark && item.tag == kSequenceEnd) return;
+      if (item.tag != kItem) fail("a sequence holds something that is no item");
+      if (item.length == kUndefinedLength) {
+        while (!at_item_end(encoding, end)) read_element(encoding, end, depth);
+      } else {
+        need(item.length, end);
+        const std::uint64_t item_end = at_ + item.length;
+        while (at_ < item_end) read_element(encoding, item_end, depth);
+      }
+    }
+  }
+
+  bool at_item_end(const Encoding& encoding, std::uint64_t end) {
+    const std::uint64_t start = at_;
+    const std::string bytes = take(8, end);
+    const std::string_view view(bytes);
+    const bool big = encoding.is_big_endian;
+    if (number(view.substr(0, 2), big) == kItemEnd.first &&
+        number(view.substr(2, 2), big) == kItemEnd.second)
+      return true;
+    at_ = start;
+    return false;
+  }
+
+  void skip(std::uint32_t bytes, bool is_pixels) {
+    if (is_pixels) elements_.pixel_parts_.push_back({at_, bytes});
+    at_ += bytes;
+  }
+
+  void read_fragments(const Encoding& encoding, std::uint64_t end) {
+    elements_.has_compressed_pixels_ = true;
+    for (;;) {
+      const Header fragment = read_header(encoding, end);
+      if (fragment.tag == kSequenceEnd) return;
+      if (fragment.tag != kItem || fragment.length == kUndefinedLength)
+        fail("compressed pixels hold something that is no fragment");
+      need(fragment.length, end);
+      skip(fragment.length, true);
+    }
+  }
+
+  void keep(const Header& header, const std::string& bytes, bool is_big_endian) {
+    if (header.form != "US" && !(header.form.empty() && is_unsigned_short(header.tag))) {
+      elements_.texts_[header.tag] = trimmed(bytes);
+      return;
+    }
+    std::string text;
+    for (std::size_t i = 0; i + 2 <= bytes.size(); i += 2)
+      text += (i > 0 ? "\\" : "") +
+              std::to_string(number(std::string_view(bytes).substr(i, 2), is_big_endian));
+    elements_.texts_[header.tag] = text;
+  }
+
+  std::string path_;
+  std::ifstream file_;
+  std::uint64_t size_ = 0;
+  std::uint64_t at_ = 0;
+  DicomElements elements_;
+};
+
+DicomElements DicomElements::read(const fs::path& path) {
+  note_input(path);
+  return DicomWalker(path).walk();
+}
+
+std::uint64_t DicomElements::pixel_bytes() const {
+  std::uint64_t bytes = 0;
+  for (const DicomPart& part : pixel_parts_) bytes += part.bytes;
+  return bytes;
+}
+
+std::string DicomElements::text(DicomTag tag) const {
+  const auto found = texts_.find(tag);
+  return found == texts_.end() ? std::string() : found->second;
+}
+
+std::vector<double> DicomElements::numbers(DicomTag tag, const char* name) const {
+  const std::string all = text(tag);
+  std::vector<double> values;
+  for (std::size_t at = 0; at < all.size();) {
+    const std::size_t end = std::min(all.find('\\', at), all.size());
+    std::string word = trimmed(all.substr(at, end - at));
+    if (word.starts_with('+')) word.erase(0, 1);
+    double value = 0.0;
+    const auto [rest, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+    if (error != std::errc() || rest != word.data() + word.size() || !std::isfinite(value))
+      throw InputError(name, "'" + all + "'", "must be finite numbers", path_.string());
+    values.push_back(value);
+    at = end + 1;
+  }
+  return values;
+}
+
+std::optional<double> DicomElements::number_or_none(DicomTag tag, const char* name) const {
+  const std::vector<double> values = numbers(tag, name);
+  if (values.empty()) return std::nullopt;
+  return values.front();
+}
+
+bool is_marked_dicom(const fs::path& path) {
+  std::ifstream file = open_input_file(path);
+  std::array<char, kPreambleBytes> start{};
+  file.read(start.data(), start.size());
+  return file.gcount() == static_cast<std::streamsize>(start.size()) &&
+         std::memcmp(start.data() + 128, "DICM", 4) == 0;
+}
+
+bool may_be_bare_dicom(const fs::path& path) {
+  // Such files begin directly with an element of group 0002 or 0008.
+  std::ifstream file = open_input_file(path);
+  std::array<unsigned char, 4> start{};
+  file.read(reinterpret_cast<char*>(start.data()), start.size());
+  return file.gcount() == 4 && (start[0] == 0x08 || start[0] == 0x02) && start[1] == 0 &&
+         start[3] == 0;
+}
+
+}  // namespace af

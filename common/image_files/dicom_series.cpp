@@ -1,0 +1,350 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "image_files/dicom_series.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <sstream>
+
+#include <Eigen/Geometry>
+
+#include "base/error.h"
+#include "image_files/dicom_elements.h"
+#include "image_files/dicom_pixels.h"
+
+namespace af {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+// Tolerances on what one scanner writes for one stack.
+constexpr double kMaxCosineDifference = 1e-4;  ///< of direction cosines between slices (0.006 deg)
+constexpr double kMaxCosineError = 1e-3;       ///< from orthonormal; decimal strings are rounded
+constexpr double kMaxSpacingShare = 1e-3;      ///< of in-plane pixel spacing between slices
+constexpr double kUnevenShare = 0.01;          ///< of the slice distance
+constexpr double kUnevenMm = 0.01;
+constexpr double kMaxDriftPixels = 0.1;  ///< of a slice from the line along the normal
+constexpr double kMaxDriftMm = 0.05;
+constexpr double kMaxGantryTiltDeg = 0.01;
+constexpr std::size_t kMaxVoxels = std::size_t{1} << 32;
+
+constexpr std::string_view kMediaStorageDirectory = "1.2.840.10008.1.3.10";
+
+std::string number(double value) {
+  std::ostringstream text;
+  text << value;  // six significant digits
+  return text.str();
+}
+
+template <std::size_t N>
+std::array<double, N> required(const DicomElements& header, DicomTag tag, const char* name) {
+  const std::vector<double> values = header.numbers(tag, name);
+  if (values.size() != N)
+    throw InputError(name,
+                     values.empty() ? "(absent)" : "'" + header.text(tag) + "'",
+                     "a CT slice needs " + std::to_string(N) + " numbers here",
+                     header.path().string());
+  std::array<double, N> result{};
+  std::copy(values.begin(), values.end(), result.begin());
+  return result;
+}
+
+std::vector<fs::path> files_of(const fs::path& folder) {
+  std::vector<fs::path> files;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error))
+    if (std::error_code ignored; entry->is_regular_file(ignored)) files.push_back(entry->path());
+  if (error) throw FileError(folder.string(), "cannot be listed: " + error.message());
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+void warn(std::vector<std::string>* warnings, const std::string& message) {
+  if (warnings != nullptr) warnings->push_back(message);
+}
+
+/// "a, b, c and 9 more".
+std::string some_of(const std::vector<std::string>& names) {
+  constexpr std::size_t kShown = 5;
+  std::string text;
+  for (std::size_t i = 0; i < std::min(kShown, names.size()); ++i)
+    text += (i == 0 ? "" : ", ") + names[i];
+  if (names.size() > kShown) text += " and " + std::to_string(names.size() - kShown) + " more";
+  return text;
+}
+
+std::vector<DicomElements> image_headers(const fs::path& folder,
+                                         std::vector<std::string>* warnings) {
+  std::vector<DicomElements> headers;
+  std::vector<std::string> other_files;
+  std::vector<std::string> other_objects;
+  for (const fs::path& path : files_of(folder)) {
+    const std::string name = path.filename().string();
+    const bool is_marked = is_marked_dicom(path);
+    if (!is_marked && !may_be_bare_dicom(path)) {
+      other_files.push_back(name);
+      continue;
+    }
+    DicomElements header = DicomElements::read(path);
+    // DICOMDIR, reports, structure sets have no rows of pixels.
+    if (header.text({0x0002, 0x0002}) == kMediaStorageDirectory ||
+        header.text({0x0028, 0x0010}).empty())
+      other_objects.push_back(name);
+    else
+      headers.push_back(std::move(header));
+  }
+  if (!other_files.empty())
+    warn(warnings, folder.string() + ": skipped, not DICOM: " + some_of(other_files));
+  if (!other_objects.empty())
+    warn(warnings, folder.string() + ": skipped, DICOM but no image: " + some_of(other_objects));
+  if (headers.empty())
+    throw FileError(folder.string(), "no DICOM image in this folder (subfolders are not searched)");
+  return headers;
+}
+
+std::string describe(const DicomElements& header) {
+  std::string description = header.text({0x0008, 0x103e});
+  if (description.empty()) description = "no description";
+  return "'" + description + "', modality " + header.text({0x0008, 0x0060});
+}
+
+/// The files of the one series, or of the one that was chosen.
+std::vector<DicomElements> chosen_series(const fs::path& folder,
+                                         std::vector<DicomElements> headers,
+                                         const std::string& series_uid) {
+  std::map<std::string, std::vector<DicomElements>> by_uid;
+  for (DicomElements& header : headers) {
+    const std::string uid = header.text({0x0020, 0x000e});
+    by_uid[uid].push_back(std::move(header));
+  }
+  if (series_uid.empty() && by_uid.size() == 1) return std::move(by_uid.begin()->second);
+  if (const auto found = by_uid.find(series_uid); !series_uid.empty() && found != by_uid.end())
+    return std::move(found->second);
+  std::string list;
+  for (const auto& [uid, files] : by_uid)
+    list += "\n  " + (uid.empty() ? "(no SeriesInstanceUID)" : uid) + "  " +
+            std::to_string(files.size()) + (files.size() == 1 ? " slice, " : " slices, ") +
+            describe(files.front());
+  if (series_uid.empty())
+    throw InputError(folder.string() + ": " + std::to_string(by_uid.size()) +
+                     " DICOM series in this folder; choose one with --series UID:" + list);
+  throw InputError(
+      "--series", series_uid, "no such series; the folder holds:" + list, folder.string());
+}
+
+/// One slice's place in the patient.
+struct Slice {
+  Eigen::Vector3d position_mm = Eigen::Vector3d::Zero();
+  Eigen::Vector3d row_direction = Eigen::Vector3d::UnitX();     ///< of increasing column index
+  Eigen::Vector3d column_direction = Eigen::Vector3d::UnitY();  ///< of increasing row index
+  Eigen::Vector2d spacing_mm = Eigen::Vector2d::Ones();  ///< along columns' index, rows' index
+  DicomPixelLayout pixels;
+};
+
+void check_is_plain_ct(const DicomElements& header, std::vector<std::string>* warnings) {
+  const std::string file = header.path().string();
+  if (const std::string modality = header.text({0x0008, 0x0060}); modality != "CT")
+    throw InputError("Modality", "'" + modality + "'", "must be CT", file);
+  if (const std::string meaning = header.text({0x0028, 0x0004}); meaning != "MONOCHROME2")
+    throw InputError("PhotometricInterpretation", "'" + meaning + "'", "must be MONOCHROME2", file);
+  if (const auto tilt = header.number_or_none({0x0018, 0x1120}, "GantryDetectorTilt");
+      std::abs(tilt.value_or(0.0)) > kMaxGantryTiltDeg)
+    throw InputError("GantryDetectorTilt",
+                     number(*tilt) + " deg",
+                     "tilted gantries are not supported; resample the CT to upright slices",
+                     file);
+  if (const std::string units = header.text({0x0028, 0x1054}); !units.empty() && units != "HU")
+    warn(warnings, file + ": RescaleType = '" + units + "', read as HU");
+}
+
+Slice slice_of(const DicomElements& header) {
+  const std::string file = header.path().string();
+  Slice slice;
+  slice.pixels = dicom_pixel_layout(header);
+  const auto position = required<3>(header, {0x0020, 0x0032}, "ImagePositionPatient");
+  const auto cosines = required<6>(header, {0x0020, 0x0037}, "ImageOrientationPatient");
+  const auto spacing = required<2>(header, {0x0028, 0x0030}, "PixelSpacing");
+  slice.position_mm = Eigen::Vector3d(position[0], position[1], position[2]);
+  slice.row_direction = Eigen::Vector3d(cosines[0], cosines[1], cosines[2]);
+  slice.column_direction = Eigen::Vector3d(cosines[3], cosines[4], cosines[5]);
+  // DICOM gives the distance between rows first.
+  slice.spacing_mm = Eigen::Vector2d(spacing[1], spacing[0]);
+  if (!(spacing[0] > 0.0 && spacing[1] > 0.0))
+    throw InputError(
+        "PixelSpacing", "'" + header.text({0x0028, 0x0030}) + "'", "must be positive (mm)", file);
+  if (std::abs(slice.row_direction.norm() - 1.0) > kMaxCosineError ||
+      std::abs(slice.column_direction.norm() - 1.0) > kMaxCosineError ||
+      std::abs(slice.row_direction.dot(slice.column_direction)) > kMaxCosineError)
+    throw InputError("ImageOrientationPatient",
+                     "'" + header.text({0x0020, 0x0037}) + "'",
+                     "must be two orthogonal unit vectors",
+                     file);
+  return slice;
+}
+
+std::string vector_text(const Eigen::Vector3d& v) {
+  return "(" + number(v.x()) + ", " + number(v.y()) + ", " + number(v.z()) + ")";
+}
+
+void check_alike(const Slice& first, const Slice& slice) {
+  const std::string file = slice.pixels.path().string();
+  const std::string as_first = "must be as in " + first.pixels.path().filename().string();
+  if (slice.pixels.rows != first.pixels.rows || slice.pixels.columns != first.pixels.columns)
+    throw InputError(
+        "Columns x Rows",
+        std::to_string(slice.pixels.columns) + " x " + std::to_string(slice.pixels.rows),
+        as_first + ": " + std::to_string(first.pixels.columns) + " x " +
+            std::to_string(first.pixels.rows),
+        file);
+  if ((slice.spacing_mm - first.spacing_mm).norm() > kMaxSpacingShare * first.spacing_mm.norm())
+    throw InputError("PixelSpacing",
+                     number(slice.spacing_mm.x()) + ", " + number(slice.spacing_mm.y()),
+                     as_first + ": " + number(first.spacing_mm.x()) + ", " +
+                         number(first.spacing_mm.y()) + " mm",
+                     file);
+  if ((slice.row_direction - first.row_direction).norm() > kMaxCosineDifference ||
+      (slice.column_direction - first.column_direction).norm() > kMaxCosineDifference)
+    throw InputError("ImageOrientationPatient",
+                     vector_text(slice.row_direction) + ", " + vector_text(slice.column_direction),
+                     as_first + ": " + vector_text(first.row_direction) + ", " +
+                         vector_text(first.column_direction) + " (a localizer among the slices?)",
+                     file);
+}
+
+/// Nearest rotation with the given in-plane axes; the third column is the slice normal.
+Eigen::Matrix3d orthonormal_axes(const Slice& slice) {
+  const Eigen::Vector3d normal = slice.row_direction.cross(slice.column_direction).normalized();
+  const Eigen::Vector3d sum =
+      (slice.row_direction.normalized() + slice.column_direction.normalized());
+  const Eigen::Vector3d difference =
+      (slice.row_direction.normalized() - slice.column_direction.normalized());
+  // Rows and columns share what they lack of a right angle.
+  const Eigen::Vector3d row = (sum.normalized() + difference.normalized()) / std::sqrt(2.0);
+  Eigen::Matrix3d axes;
+  axes.col(0) = row;
+  axes.col(1) = normal.cross(row);
+  axes.col(2) = normal;
+  return axes;
+}
+
+std::string place(std::size_t slice, double height) {
+  return "slice " + std::to_string(slice + 1) + " (" + number(height) + " mm)";
+}
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// Distance between slices; InputError when it is not the same everywhere. `heights` ascend.
+double even_distance(const fs::path& folder,
+                     const std::vector<Slice>& slices,
+                     const std::vector<double>& heights) {
+  std::vector<double> gaps;
+  for (std::size_t i = 1; i < heights.size(); ++i) gaps.push_back(heights[i] - heights[i - 1]);
+  const double usual = median(gaps);
+  for (std::size_t i = 0; i < gaps.size(); ++i) {
+    if (gaps[i] < kUnevenMm)
+      throw InputError(folder.string() + ": two slices at one position, " +
+                       place(i + 1, heights[i + 1]) +
+                       " along the slice normal: " + slices[i].pixels.path().filename().string() +
+                       " and " + slices[i + 1].pixels.path().filename().string());
+    if (std::abs(gaps[i] - usual) > std::max(kUnevenShare * usual, kUnevenMm))
+      throw InputError(
+          folder.string() + ": between " + place(i, heights[i]) + " and " +
+          place(i + 1, heights[i + 1]) + " the distance is " + number(gaps[i]) + " mm, elsewhere " +
+          number(usual) + " mm: " +
+          (gaps[i] > 1.5 * usual ? "a slice is missing" : "slices are not evenly spaced") +
+          " (positions along the slice normal)");
+  }
+  return (heights.back() - heights.front()) / static_cast<double>(gaps.size());
+}
+
+void check_not_sheared(const fs::path& folder,
+                       const std::vector<Slice>& slices,
+                       const Eigen::Vector3d& normal) {
+  const Eigen::Vector3d way = slices.back().position_mm - slices.front().position_mm;
+  const double limit =
+      std::max(kMaxDriftMm, kMaxDriftPixels * slices.front().spacing_mm.minCoeff());
+  for (const Slice& slice : slices) {
+    const Eigen::Vector3d from_first = slice.position_mm - slices.front().position_mm;
+    const Eigen::Vector3d drift = from_first - normal * normal.dot(from_first);
+    if (drift.norm() <= limit) continue;
+    const double angle_deg =
+        std::acos(std::clamp(std::abs(way.normalized().dot(normal)), 0.0, 1.0)) * 180.0 / M_PI;
+    throw InputError(folder.string() + ": gantry tilt or shifted slices: " +
+                     slice.pixels.path().filename().string() + " lies " + number(drift.norm()) +
+                     " mm beside the line along the slice normal (limit " + number(limit) +
+                     " mm; the stack leans by " + number(angle_deg) +
+                     " deg); resample the CT to upright slices");
+  }
+}
+
+CtGrid sorted_grid(const fs::path& folder, std::vector<Slice>& slices) {
+  const Eigen::Matrix3d axes = orthonormal_axes(slices.front());
+  const Eigen::Vector3d normal = axes.col(2);
+  std::stable_sort(slices.begin(), slices.end(), [&](const Slice& a, const Slice& b) {
+    return normal.dot(a.position_mm) < normal.dot(b.position_mm);
+  });
+  std::vector<double> heights;
+  heights.reserve(slices.size());
+  for (const Slice& slice : slices) heights.push_back(normal.dot(slice.position_mm));
+  CtGrid grid;
+  grid.size = {
+      slices.front().pixels.columns, slices.front().pixels.rows, static_cast<int>(slices.size())};
+  grid.spacing_mm.head<2>() = slices.front().spacing_mm;
+  grid.spacing_mm.z() = even_distance(folder, slices, heights);
+  check_not_sheared(folder, slices, normal);
+  grid.origin_mm = slices.front().position_mm;
+  grid.direction = axes;
+  return grid;
+}
+
+}  // namespace
+
+bool holds_dicom(const fs::path& folder) {
+  const std::vector<fs::path> files = files_of(folder);
+  return std::any_of(files.begin(), files.end(), is_marked_dicom);
+}
+
+DicomCt read_dicom_series(const fs::path& folder,
+                          const std::string& series_uid,
+                          std::vector<std::string>* warnings) {
+  const std::vector<DicomElements> headers =
+      chosen_series(folder, image_headers(folder, warnings), series_uid);
+  std::vector<Slice> slices;
+  bool rescale_missing = false;
+  for (const DicomElements& header : headers) {
+    check_is_plain_ct(header, slices.empty() ? warnings : nullptr);
+    rescale_missing = rescale_missing || header.text({0x0028, 0x1053}).empty();
+    slices.push_back(slice_of(header));
+    check_alike(slices.front(), slices.back());
+  }
+  if (rescale_missing)
+    warn(warnings, folder.string() + ": no RescaleSlope: stored values are taken as HU");
+  if (slices.size() < 2)
+    throw InputError(folder.string() + ": the series has one slice; a CT needs at least 2");
+  DicomCt ct;
+  ct.grid = sorted_grid(folder, slices);
+  if (ct.grid.voxel_count() > kMaxVoxels)
+    throw InputError(folder.string() + ": more than " + std::to_string(kMaxVoxels) + " voxels");
+  for (const Slice& slice : slices) {
+    for (const double hu : read_dicom_pixels(slice.pixels)) ct.values.add(hu);
+    // Only now is it known that the pixels are there which the headers promise.
+    if (&slice == &slices.front()) ct.values.reserve(ct.grid.voxel_count());
+  }
+  return ct;
+}
+
+std::string describe_dicom_file(const fs::path& path) {
+  const DicomElements header = DicomElements::read(path);
+  const std::string frames = header.text({0x0028, 0x0008});
+  return describe(header) + ", " + (frames.empty() ? "1" : frames) + " frame(s)";
+}
+
+}  // namespace af

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "image_files/hu_values.h"
+#include "volume/ct_volume.h"
+
+namespace af {
+
+/// What a DICOM folder's CT says besides its voxels.
+struct DicomCt {
+  CtGrid grid;
+  HuValues values;  ///< rescaled, i fastest, slices ascending along the slice normal
+};
+
+/// True when a folder holds at least one DICOM file.
+bool holds_dicom(const std::filesystem::path& folder);
+
+/// Reads the CT series of a DICOM folder (GDCM). Slices are ordered by position along the slice
+/// normal, never by name or number. Errors as read_ct() says; files that are no images of a series
+/// are skipped with a warning.
+DicomCt read_dicom_series(const std::filesystem::path& folder,
+                          const std::string& series_uid,
+                          std::vector<std::string>* warnings);
+
+/// What a single DICOM image says of itself, for messages.
+std::string describe_dicom_file(const std::filesystem::path& path);
+
+}  // namespace af

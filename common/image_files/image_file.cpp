@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "image_files/image_file.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <optional>
+
+#include <Eigen/Geometry>
+
+#include "base/error.h"
+#include "image_files/dicom_pixels.h"
+#include "image_files/image_header.h"
+#include "image_files/itk_image_io.h"
+#include "image_files/stored_image.h"
+
+namespace af {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr std::size_t kMaxPixels = std::size_t{1} << 28;  ///< 1 GB as float
+/// Deflate and LZW cannot expand a byte to more than this many.
+constexpr std::size_t kMaxExpansion = 4096;
+
+void check_is_2d(const RawImage& image, const fs::path& path) {
+  std::size_t used = image.size.size();
+  while (used > 2 && image.size[used - 1] == 1) --used;
+  if (used != 2)
+    throw InputError("dimensions", std::to_string(used), "must be a 2-D image", path.string());
+  if (image.channels != 1)
+    throw InputError(
+        "channels", std::to_string(image.channels), "must be grey (one channel)", path.string());
+  const std::size_t columns = image.size[0];
+  const std::size_t rows = image.size[1];
+  if (columns == 0 || rows == 0 || columns > kMaxPixels / rows)
+    throw InputError("size",
+                     std::to_string(columns) + " x " + std::to_string(rows),
+                     "must be 1 to 2^28 pixels",
+                     path.string());
+  const std::size_t bytes = columns * rows * value_bytes(image.type);
+  std::error_code error;
+  if (bytes / kMaxExpansion > fs::file_size(path, error) && image.directions.size() < 3 &&
+      path.extension() != ".mhd" && path.extension() != ".nhdr")
+    throw FileError(path.string(),
+                    "truncated: the file is too small for its " + std::to_string(columns) + " x " +
+                        std::to_string(rows) + " pixels");
+}
+
+RawImage raw_image_of(std::vector<std::size_t> size, ValueType type, double dx_mm, double dy_mm) {
+  RawImage image;
+  const std::size_t dimensions = size.size();
+  image.size = std::move(size);
+  image.type = type;
+  image.spacing_mm = {dx_mm, dy_mm};
+  image.spacing_mm.resize(dimensions, 1.0);
+  image.origin_mm.assign(dimensions, 0.0);
+  for (std::size_t axis = 0; axis < dimensions; ++axis) {
+    image.directions.emplace_back(dimensions, 0.0);
+    image.directions.back()[axis] = 1.0;
+  }
+  return image;
+}
+
+void append(std::vector<std::byte>& bytes, std::span<const float> values) {
+  const auto raw = std::as_bytes(values);
+  bytes.insert(bytes.end(), raw.begin(), raw.end());
+}
+
+void refuse_png(const fs::path& path) {
+  if (path.extension() == ".png")
+    throw UsageError(path.string() +
+                     ": float pixels do not fit into PNG; use .mha, .nii.gz, .nrrd or .tif, or "
+                     "write_png_image() for an 8-bit picture with a stated window");
+}
+
+void check_is_image(const Image2d& image) {
+  check(image.width > 0 && image.height > 0 &&
+            image.pixels.size() ==
+                static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height),
+        "an image to write has pixels for its size");
+}
+
+void check_is_finite(const Image2d& image, const fs::path& path) {
+  const auto found = std::find_if_not(
+      image.pixels.begin(), image.pixels.end(), [](float value) { return std::isfinite(value); });
+  if (found == image.pixels.end()) return;
+  const auto at = static_cast<int>(found - image.pixels.begin());
+  throw InputError(
+      "pixel (" + std::to_string(at % image.width) + ", " + std::to_string(at / image.width) + ")",
+      std::to_string(*found),
+      "must be finite",
+      path.string());
+}
+
+Image2d read_dicom_image(const fs::path& path) {
+  const DicomPixelLayout layout = dicom_pixel_layout(DicomElements::read(path));
+  const std::vector<double> values = read_dicom_pixels(layout);
+  Image2d image(layout.columns, layout.rows);
+  std::transform(values.begin(), values.end(), image.pixels.begin(), [](const double value) {
+    return static_cast<float>(value);
+  });
+  check_is_finite(image, path);
+  return image;
+}
+
+std::size_t extent(int value) {
+  return static_cast<std::size_t>(value);
+}
+
+}  // namespace
+
+Image2d read_image(const fs::path& path) {
+  const std::optional<ImageFormat> format = sniff_image_format(path);
+  if (!format)
+    throw FileError(path.string(),
+                    "not an image: its content is none of MetaImage, NIfTI, NRRD, TIFF, PNG, "
+                    "DICOM");
+  if (*format == ImageFormat::Dicom) return read_dicom_image(path);
+  const ImageHeader header = read_image_header(path, *format);
+  const RawImage raw = read_stored_image(
+      path, header, nullptr, [&](const RawImage& seen) { check_is_2d(seen, path); });
+  Image2d image(static_cast<int>(raw.size[0]), static_cast<int>(raw.size[1]));
+  visit_values(raw, [&](const auto values) {
+    std::transform(values.begin(), values.end(), image.pixels.begin(), [](const auto value) {
+      return static_cast<float>(value);
+    });
+  });
+  check_is_finite(image, path);
+  return image;
+}
+
+void write_image(const Image2d& image,
+                 const fs::path& path,
+                 double column_spacing_mm,
+                 double row_spacing_mm) {
+  refuse_png(path);
+  check_is_image(image);
+  RawImage raw = raw_image_of({extent(image.width), extent(image.height)},
+                              ValueType::Float32,
+                              column_spacing_mm,
+                              row_spacing_mm);
+  append(raw.values, image.pixels);
+  write_raw_image(raw, path);
+}
+
+void write_image_in_space(const Image2d& image, const fs::path& path, const ImagePlane& plane) {
+  refuse_png(path);
+  check_is_image(image);
+  RawImage raw = raw_image_of({extent(image.width), extent(image.height), 1},
+                              ValueType::Float32,
+                              plane.spacing_mm.x(),
+                              plane.spacing_mm.y());
+  const auto values_of = [](const Eigen::Vector3d& vector) {
+    return std::vector<double>(vector.begin(), vector.end());
+  };
+  raw.origin_mm = values_of(plane.origin_mm);
+  raw.directions = {values_of(plane.column_direction),
+                    values_of(plane.row_direction),
+                    values_of(plane.column_direction.cross(plane.row_direction))};
+  append(raw.values, image.pixels);
+  write_raw_image(raw, path);
+}
+
+void write_image_stack(const std::vector<Image2d>& images,
+                       const fs::path& path,
+                       double column_spacing_mm,
+                       double row_spacing_mm) {
+  refuse_png(path);
+  check(!images.empty(), "an image stack to write is not empty");
+  RawImage raw = raw_image_of({extent(images[0].width), extent(images[0].height), images.size()},
+                              ValueType::Float32,
+                              column_spacing_mm,
+                              row_spacing_mm);
+  for (const Image2d& image : images) {
+    check_is_image(image);
+    check(image.width == images[0].width && image.height == images[0].height,
+          "the images of a stack have one size");
+    append(raw.values, image.pixels);
+  }
+  write_raw_image(raw, path);
+}
+
+void write_image_u16(const Image2d& image,
+                     const fs::path& path,
+                     double column_spacing_mm,
+                     double row_spacing_mm) {
+  check_is_image(image);
+  RawImage raw = raw_image_of({extent(image.width), extent(image.height)},
+                              ValueType::UInt16,
+                              column_spacing_mm,
+                              row_spacing_mm);
+  std::vector<std::uint16_t> levels;
+  levels.reserve(image.pixels.size());
+  for (const float pixel : image.pixels)
+    levels.push_back(static_cast<std::uint16_t>(std::nearbyint(std::clamp(pixel, 0.0f, 65535.0f))));
+  const auto bytes = std::as_bytes(std::span<const std::uint16_t>(levels));
+  raw.values.assign(bytes.begin(), bytes.end());
+  write_raw_image(raw, path);
+}
+
+void write_png_image(const Image2d& image, const fs::path& path, double low, double high) {
+  check_is_image(image);
+  check(high > low, "a picture's white value is above its black value");
+  if (path.extension() != ".png")
+    throw UsageError(path.string() + ": an 8-bit picture is written as .png");
+  RawImage raw =
+      raw_image_of({extent(image.width), extent(image.height)}, ValueType::UInt8, 1.0, 1.0);
+  raw.values.reserve(image.pixels.size());
+  for (const float pixel : image.pixels) {
+    const double share = (static_cast<double>(pixel) - low) / (high - low);
+    // NaN becomes black.
+    const double level = share >= 0.0 ? std::min(share, 1.0) * 255.0 : 0.0;
+    raw.values.push_back(static_cast<std::byte>(std::nearbyint(level)));
+  }
+  write_raw_image(raw, path);
+}
+
+}  // namespace af

@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <bit>
+#include <charconv>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <sstream>
+
+#include "base/error.h"
+#include "image_files/image_formats.h"
+#include "image_files/image_text_header.h"
+#include "image_files/itk_image_io.h"
+#include "image_files/stored_bytes.h"
+
+namespace af::image_formats {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+TextHeader parse_meta_text(const fs::path& path) {
+  const std::string text = read_prefix(path, kMaxTextHeaderBytes);
+  TextHeader header{path.string(), {}, 0};
+  std::size_t at = 0;
+  while (at < text.size()) {
+    const std::size_t end = text.find('\n', at);
+    if (end == std::string::npos) {
+      // A header file may end without a newline after its last line.
+      if (text.size() == kMaxTextHeaderBytes || text.find('\0', at) != std::string::npos) break;
+    }
+    const std::string_view line =
+        std::string_view(text).substr(at, end == std::string::npos ? std::string::npos : end - at);
+    at = end == std::string::npos ? text.size() : end + 1;
+    const auto separator = line.find_first_of("=:");
+    if (separator == std::string_view::npos) {
+      if (trimmed(line).empty()) continue;
+      break;
+    }
+    const std::string key = trimmed(line.substr(0, separator));
+    header.add(key, trimmed(line.substr(separator + 1)));
+    if (key == "ElementDataFile") {
+      header.end_offset = at;
+      return header;
+    }
+  }
+  throw FileError(path.string(), "MetaImage header ends without ElementDataFile");
+}
+
+ValueType meta_value_type(const TextHeader& header) {
+  static const std::map<std::string, ValueType> type_of_name = {
+      {"MET_CHAR", ValueType::Int8},
+      {"MET_UCHAR", ValueType::UInt8},
+      {"MET_SHORT", ValueType::Int16},
+      {"MET_USHORT", ValueType::UInt16},
+      {"MET_INT", ValueType::Int32},
+      {"MET_UINT", ValueType::UInt32},
+      {"MET_LONG", ValueType::Int32},  // 4 bytes in MetaImage files
+      {"MET_ULONG", ValueType::UInt32},
+      {"MET_LONG_LONG", ValueType::Int64},
+      {"MET_ULONG_LONG", ValueType::UInt64},
+      {"MET_FLOAT", ValueType::Float32},
+      {"MET_DOUBLE", ValueType::Float64}};
+  const std::string& type = header.require("ElementType");
+  const auto found = type_of_name.find(type);
+  if (found == type_of_name.end())
+    throw FileError(header.path, "ElementType", "one of MET_CHAR ... MET_DOUBLE", type);
+  return found->second;
+}
+
+bool is_true(const TextHeader& header, const std::string& key, bool fallback) {
+  const std::string* value = header.find(key);
+  if (value == nullptr || value->empty()) return fallback;
+  return (*value)[0] == 'T' || (*value)[0] == 't' || (*value)[0] == '1';
+}
+
+void check_meta_numbers(const TextHeader& header, const std::string& key, std::int64_t expected) {
+  const std::string* text = header.find(key);
+  if (text == nullptr) return;
+  std::int64_t count = 0;
+  std::istringstream words(*text);
+  for (std::string word; words >> word; ++count) {
+    double value = 0.0;
+    const char* first = word.data() + (word[0] == '+' ? 1 : 0);
+    const auto [end, error] = std::from_chars(first, word.data() + word.size(), value);
+    if (error != std::errc() || end != word.data() + word.size())
+      throw FileError(header.path, key, "numbers", "'" + *text + "'");
+    if (!std::isfinite(value))
+      throw InputError(key, "'" + *text + "'", "must be finite", header.path);
+  }
+  if (count != expected)
+    throw FileError(header.path, key, std::to_string(expected) + " numbers", "'" + *text + "'");
+}
+
+/// MetaIO prints to the terminal when numbers are missing or are none.
+void check_meta_numbers(const TextHeader& header, std::int64_t dimension) {
+  for (const char* key : {"TransformMatrix", "Rotation", "Orientation"})
+    check_meta_numbers(header, key, dimension * dimension);
+  for (const char* key :
+       {"ElementSpacing", "ElementSize", "Offset", "Position", "Origin", "CenterOfRotation"})
+    check_meta_numbers(header, key, dimension);
+}
+
+/// Whether the voxels are in the other byte order than this machine's.
+bool is_meta_byte_swapped(const TextHeader& header) {
+  const bool binary = is_true(header, "BinaryDataByteOrderMSB", false);
+  const bool element = is_true(header, "ElementByteOrderMSB", binary);
+  if (header.find("BinaryDataByteOrderMSB") != nullptr && binary != element)
+    throw FileError(header.path, "BinaryDataByteOrderMSB and ElementByteOrderMSB disagree");
+  return element != (std::endian::native == std::endian::big);
+}
+
+/// Where the voxels begin. HeaderSize counts from the beginning of their file, -1 means its end
+/// less the voxels.
+std::uint64_t meta_payload_offset(const TextHeader& text,
+                                  const ImageHeader& header,
+                                  bool is_local,
+                                  std::uint64_t file_bytes) {
+  const std::uint64_t header_end = is_local ? text.end_offset : 0;
+  const std::int64_t size = text.integer("HeaderSize", 0);
+  if (size == 0) return header_end;
+  if (size > 0 && static_cast<std::uint64_t>(size) >= header_end)
+    return static_cast<std::uint64_t>(size);
+  const std::uint64_t payload = checked_payload_bytes(text.path, header);
+  if (size != -1 || header.compressed || file_bytes < header_end + payload)
+    throw FileError(text.path,
+                    "HeaderSize",
+                    "0, the beginning of the voxels in their file, or -1 (their file's last bytes, "
+                    "not compressed)",
+                    std::to_string(size));
+  return file_bytes - payload;
+}
+
+/// The length of the compressed voxels. MetaIO needs it where they stand behind the header, and
+/// reads zeros without it.
+std::optional<std::uint64_t> meta_compressed_bytes(const TextHeader& header, bool is_local) {
+  if (header.find("CompressedDataSize") == nullptr && !is_local) return std::nullopt;
+  (void)header.require("CompressedDataSize");
+  const std::int64_t bytes = header.integer("CompressedDataSize", 0);
+  if (bytes < 1)
+    throw FileError(header.path, "CompressedDataSize", "at least 1", std::to_string(bytes));
+  return static_cast<std::uint64_t>(bytes);
+}
+
+}  // namespace
+
+ImageHeader read_meta_header(const fs::path& path) {
+  const TextHeader text = parse_meta_text(path);
+  ImageHeader header;
+  header.format = ImageFormat::MetaImage;
+  const std::int64_t dimension = checked_dimension(text, "NDims");
+  header.size = parse_sizes(text.path, text.require("DimSize"), dimension);
+  check_meta_numbers(text, dimension);
+  const std::int64_t channels = text.integer("ElementNumberOfChannels", 1);
+  if (channels < 1 || channels > 1024)
+    throw FileError(text.path, "ElementNumberOfChannels", "1 to 1024", std::to_string(channels));
+  header.value_type = meta_value_type(text);
+  header.value_bytes = value_bytes(header.value_type) * static_cast<std::uint64_t>(channels);
+  header.is_byte_swapped = is_meta_byte_swapped(text);
+  header.has_spacing =
+      text.find("ElementSpacing") != nullptr || text.find("ElementSize") != nullptr;
+  if (!is_true(text, "BinaryData", true))
+    throw FileError(text.path, "BinaryData = False: text voxels are not supported");
+  header.compressed = is_true(text, "CompressedData", false);
+  header.has_orientation = text.find("TransformMatrix") != nullptr ||
+                           text.find("Rotation") != nullptr || text.find("Orientation") != nullptr;
+  const std::string& data_file = text.require("ElementDataFile");
+  const std::string kind = lower(data_file);
+  if (kind.starts_with("list") || data_file.find('%') != std::string::npos)
+    throw FileError(text.path,
+                    "ElementDataFile = " + data_file +
+                        ": one file per slice is not supported; give one raw file");
+  const bool local = kind == "local";
+  header.data_file = local ? path : beside(path, data_file);
+  const std::uint64_t bytes = existing_file_size(path, header.data_file);
+  header.payload_offset = meta_payload_offset(text, header, local, bytes);
+  if (header.compressed) header.compressed_bytes = meta_compressed_bytes(text, local);
+  return header;
+}
+
+}  // namespace af::image_formats

@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <bit>
+#include <charconv>
+#include <cmath>
+#include <map>
+#include <sstream>
+
+#include "base/error.h"
+#include "base/plausible.h"
+#include "image_files/image_formats.h"
+#include "image_files/image_text_header.h"
+#include "image_files/itk_image_io.h"
+#include "image_files/stored_bytes.h"
+
+namespace af::image_formats {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+TextHeader parse_nrrd_text(const fs::path& path) {
+  const std::string text = read_prefix(path, kMaxTextHeaderBytes);
+  TextHeader header{path.string(), {}, 0};
+  std::size_t at = text.find('\n');
+  if (at == std::string::npos) throw FileError(path.string(), "NRRD header is cut short");
+  for (++at; at < text.size();) {
+    const std::size_t end = std::min(text.find('\n', at), text.size());
+    const std::string line = trimmed(std::string_view(text).substr(at, end - at));
+    at = std::min(end + 1, text.size());
+    if (line.empty()) {
+      header.end_offset = at;
+      return header;
+    }
+    const auto separator = line.find(':');
+    if (line[0] == '#' || separator == std::string::npos) continue;
+    if (line.compare(separator, 2, ":=") == 0) continue;  // a key/value pair, not a field
+    header.add(lower(line.substr(0, separator)),
+               trimmed(std::string_view(line).substr(separator + 1)));
+  }
+  // A detached header may end with its last line.
+  if (text.size() == kMaxTextHeaderBytes ||
+      (header.find("data file") == nullptr && header.find("datafile") == nullptr))
+    throw FileError(path.string(), "NRRD header is cut short");
+  header.end_offset = text.size();
+  return header;
+}
+
+ValueType nrrd_value_type(const TextHeader& header) {
+  static const std::map<std::string, ValueType> type_of_name = {
+      {"signed char", ValueType::Int8},
+      {"int8", ValueType::Int8},
+      {"int8_t", ValueType::Int8},
+      {"uchar", ValueType::UInt8},
+      {"unsigned char", ValueType::UInt8},
+      {"uint8", ValueType::UInt8},
+      {"uint8_t", ValueType::UInt8},
+      {"short", ValueType::Int16},
+      {"short int", ValueType::Int16},
+      {"signed short", ValueType::Int16},
+      {"signed short int", ValueType::Int16},
+      {"int16", ValueType::Int16},
+      {"int16_t", ValueType::Int16},
+      {"ushort", ValueType::UInt16},
+      {"unsigned short", ValueType::UInt16},
+      {"unsigned short int", ValueType::UInt16},
+      {"uint16", ValueType::UInt16},
+      {"uint16_t", ValueType::UInt16},
+      {"int", ValueType::Int32},
+      {"signed int", ValueType::Int32},
+      {"int32", ValueType::Int32},
+      {"int32_t", ValueType::Int32},
+      {"uint", ValueType::UInt32},
+      {"unsigned int", ValueType::UInt32},
+      {"uint32", ValueType::UInt32},
+      {"uint32_t", ValueType::UInt32},
+      {"longlong", ValueType::Int64},
+      {"long long", ValueType::Int64},
+      {"long long int", ValueType::Int64},
+      {"signed long long", ValueType::Int64},
+      {"signed long long int", ValueType::Int64},
+      {"int64", ValueType::Int64},
+      {"int64_t", ValueType::Int64},
+      {"ulonglong", ValueType::UInt64},
+      {"unsigned long long", ValueType::UInt64},
+      {"unsigned long long int", ValueType::UInt64},
+      {"uint64", ValueType::UInt64},
+      {"uint64_t", ValueType::UInt64},
+      {"float", ValueType::Float32},
+      {"double", ValueType::Float64}};
+  const std::string type = lower(header.require("type"));
+  const auto found = type_of_name.find(type);
+  if (found == type_of_name.end())
+    throw FileError(header.path, "type", "a number type of NRRD", "'" + type + "'");
+  return found->second;
+}
+
+const std::string* either(const TextHeader& header, const char* a, const char* b) {
+  const std::string* value = header.find(a);
+  return value != nullptr ? value : header.find(b);
+}
+
+/// Whether the voxels are in the other byte order than this machine's.
+bool is_nrrd_byte_swapped(const TextHeader& header, ValueType type) {
+  if (value_bytes(type) == 1) return false;
+  const std::string endian = lower(header.require("endian"));
+  if (endian != "little" && endian != "big")
+    throw FileError(header.path, "endian", "little or big", "'" + endian + "'");
+  return (endian == "big") != (std::endian::native == std::endian::big);
+}
+
+/// Length of the vector "(x,y,z"; NaN when it is none.
+double nrrd_vector_length(const std::string& text) {
+  if (!text.starts_with('(')) return std::nan("");
+  double length = 0.0;
+  std::istringstream numbers(text.substr(1));
+  for (std::string number; std::getline(numbers, number, ',');) {
+    const std::string word = trimmed(number);
+    double value = 0.0;
+    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+    if (error != std::errc() || end != word.data() + word.size()) return std::nan("");
+    length = std::hypot(length, value);
+  }
+  return length;
+}
+
+/// ITK takes a spacing of 1 for axes whose vector is "none" or too long for its sum of squares.
+void check_nrrd_directions(const TextHeader& header, std::int64_t dimension) {
+  const std::string* text = header.find("space directions");
+  if (text == nullptr || dimension > 3) return;
+  std::int64_t count = 0;
+  std::istringstream vectors(*text);
+  bool plausible = true;
+  for (std::string vector; std::getline(vectors, vector, ')'); ++count)
+    plausible = plausible && is_plausible_spacing_mm(nrrd_vector_length(trimmed(vector)));
+  if (!plausible || count != dimension)
+    throw InputError("space directions",
+                     "'" + *text + "'",
+                     std::string("each axis needs a vector, whose length ") + kPlausibleSpacing,
+                     header.path);
+}
+
+void check_nrrd_units(const TextHeader& header) {
+  const std::string* text = header.find("space units");
+  if (text == nullptr) return;
+  std::istringstream words(*text);
+  for (std::string word; words >> word;)
+    if (word != "\"mm\"" && word != "\"\"")
+      throw InputError("space units", *text, "lengths must be in \"mm\"", header.path);
+}
+
+/// Whether ITK knows how the axes lie in the patient.
+bool has_patient_space(const TextHeader& header) {
+  const std::string* text = header.find("space");
+  const std::string space = text == nullptr ? "" : lower(*text);
+  return space.starts_with("left-") || space.starts_with("right-") || space == "lps" ||
+         space == "ras" || space == "las";
+}
+
+}  // namespace
+
+ImageHeader read_nrrd_header(const fs::path& path) {
+  const TextHeader text = parse_nrrd_text(path);
+  ImageHeader header;
+  header.format = ImageFormat::Nrrd;
+  const std::int64_t dimension = checked_dimension(text, "dimension");
+  header.size = parse_sizes(text.path, text.require("sizes"), dimension);
+  header.value_type = nrrd_value_type(text);
+  header.value_bytes = value_bytes(header.value_type);
+  check_nrrd_directions(text, dimension);
+  check_nrrd_units(text);
+  const bool has_directions = text.find("space directions") != nullptr;
+  header.has_spacing = has_directions || text.find("spacings") != nullptr;
+  header.has_orientation = has_directions && has_patient_space(text);
+  const std::string encoding = lower(text.require("encoding"));
+  header.compressed = encoding == "gzip" || encoding == "gz";
+  if (!header.compressed && encoding != "raw")
+    throw FileError(text.path, "encoding", "raw or gzip", "'" + encoding + "'");
+  if (text.integer("line skip", 0) != 0 || text.integer("lineskip", 0) != 0)
+    throw FileError(text.path, "'line skip' is not supported");
+  const std::string* data_file = either(text, "data file", "datafile");
+  if (data_file != nullptr &&
+      (data_file->starts_with("LIST") || data_file->find('%') != std::string::npos))
+    throw FileError(text.path,
+                    "data file: " + *data_file + ": one file per slice is not supported");
+  header.data_file = data_file == nullptr ? path : beside(path, *data_file);
+  header.payload_offset = data_file == nullptr ? text.end_offset : 0;
+  const std::uint64_t bytes = existing_file_size(path, header.data_file);
+  const std::int64_t skip = text.integer("byte skip", text.integer("byteskip", 0));
+  const std::uint64_t payload = checked_payload_bytes(path, header);
+  if (skip < (header.compressed ? 0 : -1))
+    throw FileError(text.path,
+                    "byte skip",
+                    header.compressed ? "at least 0" : "at least -1",
+                    std::to_string(skip));
+  header.is_byte_swapped = is_nrrd_byte_swapped(text, header.value_type);
+  if (skip > 0) header.skip_bytes = static_cast<std::uint64_t>(skip);
+  if (skip == -1 && !header.compressed)
+    header.payload_offset = bytes > payload ? bytes - payload : 0;
+  return header;
+}
+
+}  // namespace af::image_formats

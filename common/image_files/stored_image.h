@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+// Images read so that their voxels are those that the file holds.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "image_files/image_header.h"
+#include "image_files/itk_image_io.h"
+#include "image_files/stored_bytes.h"
+
+namespace af {
+
+/// Throws when the reader does not want the image; sees it without values.
+using AcceptImage = std::function<void(const RawImage&)>;
+
+/// An image (not DICOM) without values. FileError when it is damaged or its header reads
+/// differently to us and to ITK.
+RawImage read_image_description(const std::filesystem::path& path,
+                                const ImageHeader& header,
+                                const AcceptImage& accept);
+
+/// The values of a described MetaImage, NRRD or NIfTI, in pieces of whole values, in their order,
+/// in the description's type: byte order and NIfTI's slope and intercept are seen to. We do this
+/// and not ITK, whose libraries take zeros for voxels that they do not find, and for NaN.
+void read_described_values(const std::filesystem::path& path,
+                           const ImageHeader& header,
+                           const RawImage& description,
+                           std::vector<std::string>* warnings,
+                           const ByteVisitor& visit);
+
+/// An image (not DICOM) with its values; those of PNG and TIFF are read by ITK after
+/// check_image_payload().
+RawImage read_stored_image(const std::filesystem::path& path,
+                           const ImageHeader& header,
+                           std::vector<std::string>* warnings,
+                           const AcceptImage& accept);
+
+}  // namespace af

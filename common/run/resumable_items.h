@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+// Numbered items of work shared over ranks, each finished one kept, so that a stopped or killed run
+// goes on.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "parallel/communicator.h"
+#include "run/progress_journal.h"
+
+namespace af {
+
+/// Work as it is begun, or gone on with.
+struct UnfinishedWork {
+  std::filesystem::path folder;  ///< progress_folder() of the output
+  std::string name;              ///< of its files; several may share a folder
+  DecidingValues decides;        ///< what every result depends on
+  bool restarts = false;         ///< throws away what there is
+};
+
+/// What every rank finishes goes to a shard of one journal: no result passes through rank 0 until
+/// all are there. The result of an item must not depend on who makes it, nor on anything that
+/// `decides` does not say. \test ResumableItems.DoesOnlyWhatNoEarlierRunFinished
+class ResumableItems {
+ public:
+  using Work = std::function<std::vector<std::byte>(std::int64_t item)>;
+  using Receive = std::function<void(std::int64_t item, std::span<const std::byte> result)>;
+
+  /// Collective. Opens or creates the journal. InputError that names the difference when it was
+  /// begun with other options or inputs.
+  ResumableItems(const UnfinishedWork& work, const Communicator& communicator);
+
+  /// Collective. Does those of `items` (ascending, each at least 0, the same on every rank) that no
+  /// run has finished, shared over the ranks as these become free; `work` must not call MPI. Says
+  /// on rank 0 how far `what` ("case skull, field registrations"; empty: silent) has come. When a
+  /// stop was asked for on any rank, items are passed over and StoppedError is thrown on every
+  /// rank, with what is finished saved.
+  void complete(const std::vector<std::int64_t>& items, const std::string& what, const Work& work);
+
+  /// Rank 0, after complete(): calls `receive` with each of its items' results, in any order, more
+  /// than once when several runs made one: they are alike. FileError when some are gone.
+  void visit(const Receive& receive) const;
+
+ private:
+  /// Collective. Those of `items` that no earlier run finished.
+  [[nodiscard]] std::vector<std::int64_t> unfinished(const std::vector<std::int64_t>& items) const;
+  void append(std::int64_t item, std::span<const std::byte> result);
+  /// Collective. Makes what was appended survive the machine; StoppedError when one was asked for.
+  void save(const std::string& what);
+
+  std::filesystem::path folder_;
+  Communicator communicator_;
+  std::unique_ptr<ProgressJournal> journal_;  ///< rank 0 alone
+  std::optional<ProgressShard> shard_;        ///< this rank's
+  std::vector<std::int64_t> finished_;        ///< rank 0: by earlier runs, ascending
+  std::vector<std::int64_t> items_;           ///< rank 0: of complete()
+  std::uint64_t saved_ = 0;        ///< of items_, by this rank; on rank 0 by earlier runs too
+  std::vector<std::byte> record_;  ///< memory to be used again
+};
+
+}  // namespace af

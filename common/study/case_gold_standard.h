@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+
+#include "gold_standard/fiducial_registration.h"
+#include "gold_standard/gold_uncertainty.h"
+#include "study/study_file.h"
+
+namespace af {
+
+/// What a case's registrations are measured against.
+struct GoldStandard {
+  RigidTransform room_from_ct = RigidTransform::Identity();
+  std::string source;                            ///< "fiducials" or "study"
+  std::optional<FiducialGold> fiducials;         ///< when at least two views show them
+  std::optional<GoldUncertainty> uncertainty;    ///< of the fiducials' pose at the target
+  std::optional<RigidTransform> stated_pose;     ///< the study's gold_room_from_ct
+  std::optional<double> stated_to_fiducials_mm;  ///< mean TRE between the two, when both exist
+};
+
+/// The gold standard of a case. `choice`: "fiducials", "study" (gold_room_from_ct) or "auto":
+/// fiducials when the case has them, else the stated pose. Throws InputError when the chosen one
+/// does not exist.
+GoldStandard gold_standard(const Study& study,
+                           const StudyCase& study_case,
+                           const std::string& choice);
+
+/// What stands beside every TRE that is measured against this pose: the mean TRE (mm) that the gold
+/// standard has by itself. NaN for a stated pose, whose uncertainty nothing tells.
+double own_tre_mm(const GoldStandard& gold);
+
+/// Source, fiducial registration error, ray gaps, residuals, leave-one-out errors, uncertainty at
+/// the target, distance between both golds.
+nlohmann::json to_json(const GoldStandard& gold);
+
+}  // namespace af

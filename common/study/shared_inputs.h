@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+// Small inputs that rank 0 reads for all: ten thousand ranks do not open one file.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "geometry/rigid_transform.h"
+#include "image/image2d.h"
+#include "parallel/communicator.h"
+#include "study/study_file.h"
+
+namespace af {
+
+/// Collective. read_study() on rank 0; the others are sent what it read. What it throws, every rank
+/// throws. `warnings` are rank 0's.
+Study read_study(const std::filesystem::path& path,
+                 const Communicator& communicator,
+                 std::vector<std::string>* warnings = nullptr);
+
+/// Collective. read_rig() on rank 0, in the same way.
+CameraRig read_rig(const std::string& name_or_path,
+                   const Communicator& communicator,
+                   std::vector<std::string>* warnings = nullptr);
+
+/// Collective. What `read` returns on rank 0, to the last bit, on every rank; `read` is called
+/// there alone, and what it throws, every rank throws.
+std::vector<RigidTransform> shared_poses(const Communicator& communicator,
+                                         const std::function<std::vector<RigidTransform>()>& read);
+
+/// Collective. Rank 0's image, to the last bit, on every rank.
+void broadcast(Image2d& image, const Communicator& communicator);
+
+}  // namespace af

@@ -1,0 +1,344 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "study/study_file.h"
+
+#include <algorithm>
+#include <map>
+
+#include <Eigen/Dense>
+
+#include "base/error.h"
+#include "base/file_name.h"
+#include "base/toml_text.h"
+#include "files/output_file.h"
+#include "study/rig_file.h"
+#include "text/toml_reader.h"
+
+namespace af {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// What reading any part of a study needs to know.
+struct StudyContext {
+  fs::path folder;  ///< absolute; paths of the study are relative to it
+  const CameraRig& rig;
+  TomlProblems& problems;
+};
+
+/// Without "." and doubled slashes. A ".." stays: removing it as text would be wrong behind a
+/// symbolic link.
+fs::path tidied(const fs::path& path) {
+  const bool goes_up = std::find(path.begin(), path.end(), "..") != path.end();
+  return goes_up ? path : path.lexically_normal();
+}
+
+fs::path resolved(const fs::path& folder, const std::string& path) {
+  return tidied(folder / path);
+}
+
+/// Its place goes to `places`.
+std::optional<fs::path> get_path(TomlTableReader& reader,
+                                 const char* key,
+                                 Presence presence,
+                                 const fs::path& folder,
+                                 StudyPlaces& places) {
+  const auto text = reader.get_string(key, presence);
+  if (!text) return std::nullopt;
+  places[key] = reader.place(key);
+  return resolved(folder, *text);
+}
+
+template <int Size>
+std::vector<Eigen::Matrix<double, Size, 1>> get_points(TomlTableReader& reader, const char* key) {
+  std::vector<Eigen::Matrix<double, Size, 1>> points;
+  if (const auto matrix = reader.get_matrix(key, -1, Size, Presence::Optional))
+    for (Eigen::Index i = 0; i < matrix->rows(); ++i)
+      points.emplace_back(matrix->row(i).transpose());
+  return points;
+}
+
+/// True when the points lie on one line (or are fewer than three): a rotation about that line would
+/// stay free.
+bool are_collinear(const std::vector<Eigen::Vector3d>& points) {
+  if (points.size() < 3) return true;
+  Eigen::Matrix3Xd centered(3, static_cast<Eigen::Index>(points.size()));
+  for (std::size_t i = 0; i < points.size(); ++i)
+    centered.col(static_cast<Eigen::Index>(i)) = points[i];
+  centered.colwise() -= Eigen::Vector3d(centered.rowwise().mean());
+  const Eigen::Vector3d singular_values =
+      Eigen::JacobiSVD<Eigen::Matrix3d, Eigen::NoQRPreconditioner>(centered * centered.transpose())
+          .singularValues();
+  // The second largest extent against the largest, as variances.
+  constexpr double kLeastWidth = 1e-3;
+  return !(singular_values[1] > kLeastWidth * kLeastWidth * singular_values[0]);
+}
+
+CtBox get_target_box(TomlTableReader& reader) {
+  CtBox box{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
+  const auto corners = reader.get_matrix("target_box_ct_mm", 2, 3, Presence::Required);
+  if (!corners) return box;
+  box = {corners->row(0).transpose(), corners->row(1).transpose()};
+  if (!(box.low_mm.array() < box.high_mm.array()).all())
+    reader.add_problem("target_box_ct_mm",
+                       "must be [[low x, y, z], [high x, y, z]] with low < high on every axis");
+  return box;
+}
+
+XrayDomain get_xray_domain(TomlTableReader& reader) {
+  const auto text = reader.get_string("xray_domain", Presence::Required);
+  if (text && *text != "intensity" && *text != "attenuation")
+    reader.add_problem("xray_domain", "must be \"intensity\" or \"attenuation\"");
+  return text == "attenuation" ? XrayDomain::Attenuation : XrayDomain::Intensity;
+}
+
+RegionOfInterest get_roi(TomlTableReader& reader, const CameraGeometry* camera) {
+  RegionOfInterest roi;
+  const auto numbers = reader.get_integers("roi_px", 4, Presence::Required);
+  if (!numbers) return roi;
+  roi = {(*numbers)[0], (*numbers)[1], (*numbers)[2], (*numbers)[3]};
+  if (camera != nullptr && !problems(roi, camera->size_px.x(), camera->size_px.y()).empty())
+    reader.add_problem("roi_px",
+                       "must be [column, row, width, height] and lie on the detector of camera '" +
+                           camera->name + "', " + std::to_string(camera->size_px.x()) + " x " +
+                           std::to_string(camera->size_px.y()) + " pixels");
+  return roi;
+}
+
+const CameraGeometry* get_camera(TomlTableReader& reader, const CameraRig& rig) {
+  const auto name = reader.get_string("camera", Presence::Required);
+  if (!name) return nullptr;
+  std::string known;
+  for (const CameraGeometry& camera : rig.cameras) {
+    if (camera.name == *name) return &camera;
+    known += (known.empty() ? "" : ", ") + camera.name;
+  }
+  reader.add_problem("camera", "must be a camera of the rig, which has " + known);
+  return nullptr;
+}
+
+void check_fiducials(TomlTableReader& reader,
+                     const StudyView& view,
+                     std::size_t expected,
+                     const CameraGeometry* camera) {
+  if (view.fiducials_px.size() != expected)
+    reader.add_problem("fiducials_px",
+                       "has " + std::to_string(view.fiducials_px.size()) +
+                           " points, but the case has " + std::to_string(expected) +
+                           " fiducials_ct_mm; they must be as many, in the same order");
+  if (camera == nullptr) return;
+  const Eigen::Array2d edge = camera->size_px.cast<double>().array() - 0.5;
+  for (const Eigen::Vector2d& point : view.fiducials_px)
+    if (!((point.array() >= -0.5).all() && (point.array() <= edge).all())) {
+      reader.add_problem("fiducials_px",
+                         "point " + toml_numbers(point) + " must lie on the detector of camera '" +
+                             camera->name + "'");
+      return;
+    }
+}
+
+StudyView read_view(const toml::table& table,
+                    const std::string& prefix,
+                    std::size_t fiducial_count,
+                    const StudyContext& context) {
+  TomlTableReader reader(table, prefix, context.problems);
+  StudyView view;
+  const CameraGeometry* camera = get_camera(reader, context.rig);
+  if (camera != nullptr) view.camera = camera->name;
+  const auto path = [&](const char* key, Presence presence) {
+    return get_path(reader, key, presence, context.folder, view.places);
+  };
+  view.xray = path("xray", Presence::Required).value_or(fs::path());
+  view.xray_domain = get_xray_domain(reader);
+  view.roi = get_roi(reader, camera);
+  view.fiducials_px = get_points<2>(reader, "fiducials_px");
+  view.field = path("field", Presence::Optional);
+  view.mask = path("mask", Presence::Optional);
+  check_fiducials(reader, view, fiducial_count, camera);
+  reader.refuse_unknown_keys();
+  return view;
+}
+
+/// Case names become parts of file names.
+void check_case_name(TomlTableReader& reader, const std::string& name) {
+  if (!name.empty() && !is_plain_file_name(name))
+    reader.add_problem(
+        "name", "must be usable as a file name: at most 100 bytes, no '/' or control characters");
+}
+
+void read_views(TomlTableReader& reader,
+                const std::string& prefix,
+                StudyCase& study_case,
+                const StudyContext& context) {
+  std::map<std::string, std::string> place_of_camera;
+  for (const toml::table* view_table : reader.get_tables("view", Presence::Required)) {
+    const std::string view_prefix =
+        prefix + "view[" + std::to_string(study_case.views.size()) + "].";
+    study_case.views.push_back(
+        read_view(*view_table, view_prefix, study_case.fiducials_ct_mm.size(), context));
+    const std::string& camera = study_case.views.back().camera;
+    const auto [earlier, is_new] =
+        place_of_camera.emplace(camera, context.problems.where(*view_table));
+    if (!is_new && !camera.empty())
+      context.problems.add(*view_table,
+                           view_prefix + "camera = '" + camera + "': has another view of this " +
+                               "case at " + earlier->second);
+  }
+}
+
+StudyCase read_case(const toml::table& table,
+                    const std::string& prefix,
+                    const StudyContext& context) {
+  TomlTableReader reader(table, prefix, context.problems);
+  StudyCase study_case;
+  study_case.name = reader.get_string("name", Presence::Required).value_or("");
+  check_case_name(reader, study_case.name);
+  study_case.note = reader.get_string("note", Presence::Optional).value_or("");
+  study_case.ct =
+      get_path(reader, "ct", Presence::Required, context.folder, study_case.places).value_or("");
+  study_case.nominal_room_from_ct = reader.get_pose("nominal_room_from_ct", Presence::Required)
+                                        .value_or(RigidTransform::Identity());
+  study_case.center_ct_mm =
+      reader.get_vector<3>("center_ct_mm", Presence::Required).value_or(Eigen::Vector3d::Zero());
+  study_case.target_box_ct = get_target_box(reader);
+  study_case.fiducials_ct_mm = get_points<3>(reader, "fiducials_ct_mm");
+  if (!study_case.fiducials_ct_mm.empty() && are_collinear(study_case.fiducials_ct_mm))
+    reader.add_problem("fiducials_ct_mm", "must be at least 3 points that are not collinear");
+  study_case.gold_room_from_ct = reader.get_pose("gold_room_from_ct", Presence::Optional);
+  read_views(reader, prefix, study_case, context);
+  reader.refuse_unknown_keys();
+  return study_case;
+}
+
+void read_cases(TomlTableReader& reader, Study& study, const StudyContext& context) {
+  std::map<std::string, std::string> place_of_name;
+  for (const toml::table* table : reader.get_tables("case", Presence::Required)) {
+    const std::string prefix = "case[" + std::to_string(study.cases.size()) + "].";
+    study.cases.push_back(read_case(*table, prefix, context));
+    const std::string& name = study.cases.back().name;
+    const auto [earlier, is_new] = place_of_name.emplace(name, context.problems.where(*table));
+    if (!is_new && !name.empty())
+      context.problems.add(
+          *table, prefix + "name = '" + name + "': is the name of the case at " + earlier->second);
+  }
+}
+
+/// The rig's shipped name, or its path made absolute.
+std::string resolved_rig(const std::string& rig, const fs::path& folder) {
+  const auto names = builtin_rig_names();
+  if (std::find(names.begin(), names.end(), rig) != names.end()) return rig;
+  return resolved(folder, rig).string();
+}
+
+std::string relative_if_below(const fs::path& path, const fs::path& folder) {
+  const fs::path relative = path.lexically_relative(folder);
+  const bool is_below = !relative.empty() && relative != "." && *relative.begin() != "..";
+  return (is_below ? relative : path).generic_string();
+}
+
+template <int Size>
+std::string points_text(const std::vector<Eigen::Matrix<double, Size, 1>>& points) {
+  std::string text = "[";
+  for (std::size_t i = 0; i < points.size(); ++i)
+    text += (i > 0 ? ", " : "") + toml_numbers(points[i]);
+  return text + "]";
+}
+
+std::string view_text(const StudyView& view, const fs::path& folder) {
+  std::string text = "\n[[case.view]]\ncamera = " + toml_text(view.camera) + "\n";
+  const auto add_path = [&](const char* key, const fs::path& path) {
+    text += std::string(key) + " = " + toml_text(relative_if_below(path, folder)) + "\n";
+  };
+  add_path("xray", view.xray);
+  text += view.xray_domain == XrayDomain::Intensity ? "xray_domain = \"intensity\"\n"
+                                                    : "xray_domain = \"attenuation\"\n";
+  text += "roi_px = [" + std::to_string(view.roi.column) + ", " + std::to_string(view.roi.row) +
+          ", " + std::to_string(view.roi.width) + ", " + std::to_string(view.roi.height) + "]\n";
+  if (!view.fiducials_px.empty()) text += "fiducials_px = " + points_text(view.fiducials_px) + "\n";
+  if (view.field) add_path("field", *view.field);
+  if (view.mask) add_path("mask", *view.mask);
+  return text;
+}
+
+std::string case_text(const StudyCase& study_case, const fs::path& folder) {
+  std::string text = "\n[[case]]\nname = " + toml_text(study_case.name) + "\n";
+  if (!study_case.note.empty()) text += "note = " + toml_text(study_case.note) + "\n";
+  text += "ct = " + toml_text(relative_if_below(study_case.ct, folder)) + "\n";
+  text += "nominal_room_from_ct = " + toml_matrix(study_case.nominal_room_from_ct.matrix()) + "\n";
+  text += "center_ct_mm = " + toml_numbers(study_case.center_ct_mm) + "\n";
+  text += "target_box_ct_mm = [" + toml_numbers(study_case.target_box_ct.low_mm) + ", " +
+          toml_numbers(study_case.target_box_ct.high_mm) + "]\n";
+  if (!study_case.fiducials_ct_mm.empty())
+    text += "fiducials_ct_mm = " + points_text(study_case.fiducials_ct_mm) + "\n";
+  if (study_case.gold_room_from_ct)
+    text += "gold_room_from_ct = " + toml_matrix(study_case.gold_room_from_ct->matrix()) + "\n";
+  for (const StudyView& view : study_case.views) text += view_text(view, folder);
+  return text;
+}
+
+}  // namespace
+
+const StudyCase& Study::find_case(const std::string& name) const {
+  std::string known;
+  for (const StudyCase& candidate : cases) {
+    if (candidate.name == name) return candidate;
+    known += (known.empty() ? "" : ", ") + candidate.name;
+  }
+  if (name.empty() && cases.size() == 1) return cases.front();
+  if (name.empty()) throw InputError(path.string() + ": name one of its cases: " + known);
+  throw InputError("case", name, "the study has only: " + known, path.string());
+}
+
+std::vector<const StudyCase*> Study::chosen_cases(const std::vector<std::string>& names) const {
+  std::map<std::string, const StudyCase*> chosen;
+  for (const std::string& name : names) chosen.emplace(name, &find_case(name));
+  if (names.empty())
+    for (const StudyCase& study_case : cases) chosen.emplace(study_case.name, &study_case);
+  std::vector<const StudyCase*> result;
+  for (const auto& [name, study_case] : chosen) result.push_back(study_case);
+  return result;
+}
+
+Study read_study(const std::filesystem::path& path, std::vector<std::string>* warnings) {
+  return parse_study(read_text_file(path, kMostTomlBytes), path, [&](const std::string& rig) {
+    return read_rig(rig, warnings);
+  });
+}
+
+Study parse_study(const std::string& text,
+                  const std::filesystem::path& path,
+                  const std::function<CameraRig(const std::string& name_or_path)>& read_rig_of) {
+  const toml::table table = parse_toml(text, path.string());
+  TomlProblems problems(path.string());
+  TomlTableReader reader(table, "", problems);
+  Study study;
+  study.path = tidied(fs::absolute(path));
+  const fs::path folder = study.path.parent_path();
+  const auto rig = reader.get_string("rig", Presence::Required);
+  if (!rig) problems.throw_if_any();  // without cameras nothing else can be judged
+  study.rig_name_or_path = resolved_rig(*rig, folder);
+  study.rig = used_from(
+      {{"rig", reader.place("rig")}}, "rig", [&] { return read_rig_of(study.rig_name_or_path); });
+  read_cases(reader, study, {folder, study.rig, problems});
+  reader.refuse_unknown_keys();
+  problems.throw_if_any();
+  return study;
+}
+
+std::string study_to_toml(const Study& study, const std::filesystem::path& folder) {
+  // A folder named with a trailing slash is the same folder.
+  const fs::path absolute_folder =
+      tidied(fs::absolute(folder.empty() ? fs::path("./") : folder / "")).parent_path();
+  const auto names = builtin_rig_names();
+  const bool is_builtin =
+      std::find(names.begin(), names.end(), study.rig_name_or_path) != names.end();
+  std::string text =
+      "rig = " +
+      toml_text(is_builtin ? study.rig_name_or_path
+                           : relative_if_below(study.rig_name_or_path, absolute_folder)) +
+      "\n";
+  for (const StudyCase& study_case : study.cases) text += case_text(study_case, absolute_folder);
+  return text;
+}
+
+}  // namespace af

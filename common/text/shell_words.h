@@ -1,0 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+namespace af {
+
+/// A word quoted for a shell where it must be.
+std::string shell_quoted(const std::string& word);
+
+}  // namespace af

@@ -1,0 +1,263 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/drr/drr_request.h"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include "base/error.h"
+#include "drr/field_renderer.h"
+#include "drr/ray_cast_drr.h"
+#include "field_file/field_file.h"
+#include "figures/picture.h"
+#include "files/resource_check.h"
+#include "image/psnr.h"
+#include "image_files/ct_reader.h"
+#include "image_files/image_file.h"
+#include "study/pose_file.h"
+#include "study/rig_file.h"
+#include "text/csv_table.h"
+
+namespace af::tools {
+namespace {
+
+bool ends_with(const std::filesystem::path& path, const std::string& ending) {
+  const std::string name = path.filename().string();
+  return name.size() > ending.size() &&
+         name.compare(name.size() - ending.size(), ending.size(), ending) == 0;
+}
+
+bool is_known_format(const std::filesystem::path& path) {
+  for (const char* ending : {".mha", ".nii.gz", ".nrrd", ".tif", ".png"})
+    if (ends_with(path, ending)) return true;
+  return false;
+}
+
+void append_source_problems(const DrrOptions& options, std::vector<std::string>& found) {
+  const bool has_field = !options.field.empty();
+  const bool has_ct = !options.ct.empty();
+  if (options.compare && !(has_field && has_ct))
+    found.emplace_back("--compare = set: needs both --field and --ct");
+  if (!options.compare && has_field == has_ct)
+    found.emplace_back("source = " + std::string(has_field ? "--field and --ct" : "none") +
+                       ": give --field, or --ct with --rig and --camera (both only for --compare)");
+  if (!has_field && has_ct && (options.rig.empty() || options.camera.empty()))
+    found.emplace_back("--ct = set: needs --rig and --camera");
+  if (options.rig.empty() != options.camera.empty())
+    found.emplace_back("--rig, --camera = one of them: go together");
+  if (!has_field && options.interpolation != "linear")
+    found.push_back("--interpolation = " + options.interpolation + ": is of fields; give --field");
+}
+
+void append_pose_problems(const DrrOptions& options, std::vector<std::string>& found) {
+  const bool has_parameters =
+      options.rotation_deg.has_value() || options.translation_mm.has_value();
+  const int ways =
+      (has_parameters ? 1 : 0) + (options.pose.empty() ? 0 : 1) + (options.poses.empty() ? 0 : 1);
+  if (ways > 1)
+    found.emplace_back(
+        "pose = given in several ways: use one of --rotation-deg/--translation-mm, --pose, "
+        "--poses");
+  for (const auto& values : {options.rotation_deg, options.translation_mm})
+    if (values.has_value() &&
+        !std::all_of(values->begin(), values->end(), [](double v) { return std::isfinite(v); }))
+      found.emplace_back("pose = not finite: must be finite numbers");
+  if (options.compare && !options.poses.empty())
+    found.emplace_back("--compare = set: shows one pose, not --poses");
+}
+
+void append_output_problems(const DrrOptions& options, std::vector<std::string>& found) {
+  const bool is_png = ends_with(options.output, ".png");
+  if (!is_known_format(options.output))
+    found.push_back("output = " + options.output.string() +
+                    ": must end in .mha, .nii.gz, .nrrd, .tif or .png");
+  if (is_png && !options.poses.empty())
+    found.push_back("output = " + options.output.string() +
+                    ": a stack of poses must be .mha, .nii.gz, .nrrd or .tif");
+  if (options.compare && !is_png)
+    found.push_back("output = " + options.output.string() + ": a comparison must be .png");
+  const auto [low, high] = options.window_percent;
+  if (!(low >= 0.0 && high <= 100.0 && low < high))
+    found.push_back("--window-percent = " + number_text(low) + "," + number_text(high) +
+                    ": must be 0 <= low < high <= 100");
+}
+
+struct CastCt {
+  std::shared_ptr<const DrrRenderer> renderer;
+  Eigen::Vector3d center_ct_mm;
+};
+
+CastCt ray_caster(const DrrOptions& options,
+                  const CompressedAttenuationField* field,
+                  const std::shared_ptr<ThreadPool>& pool) {
+  const CtVolume ct = read_ct(options.ct, {options.series_uid});
+  AttenuationModel model;
+  model.mu_water_per_mm = options.water_mu_per_mm;
+  if (field != nullptr) {
+    const std::string hash = ct_content_sha256(ct);
+    if (hash != field->identity.ct_content_sha256)
+      throw FileError(options.field.string(),
+                      "CT of the field (ct_content_sha256)",
+                      hash + " (" + options.ct.string() + ")",
+                      field->identity.ct_content_sha256);
+    // A comparison is of rendering: the reference takes the field's HU model.
+    model = {field->identity.mu_water_per_mm, field->identity.air_below_hu};
+  }
+  return {std::make_shared<const RayCastDrr>(std::make_shared<const AttenuationVolume>(ct, model),
+                                             RayCasterOptions{options.step_mm},
+                                             pool),
+          ct.grid.center_mm()};
+}
+
+Image2d negated(Image2d image) {
+  for (float& value : image.pixels) value = -value;
+  return image;
+}
+
+}  // namespace
+
+std::vector<std::string> problems(const DrrOptions& options) {
+  std::vector<std::string> found;
+  append_source_problems(options, found);
+  append_pose_problems(options, found);
+  append_output_problems(options, found);
+  for (const std::string& text : thread_problems(options.threads)) found.push_back(text);
+  AttenuationModel model;
+  model.mu_water_per_mm = options.water_mu_per_mm;
+  for (const std::string& text : af::problems(model)) found.push_back(text);
+  for (const std::string& text : af::problems(RayCasterOptions{options.step_mm}))
+    found.push_back(text);
+  return found;
+}
+
+DrrScene load_scene(const DrrOptions& options, const Communicator& communicator) {
+  DrrScene scene;
+  scene.pool = std::make_shared<ThreadPool>(thread_count(options.threads));
+  std::shared_ptr<const CompressedAttenuationField> field;
+  if (!options.field.empty()) {
+    field = read_field(options.field, communicator);
+    scene.view = View::whole_detector(field->identity.camera);
+    scene.frame = field->identity.frame;
+    scene.renderer = make_field_renderer(field, options.interpolation, scene.pool);
+  }
+  if (!options.rig.empty()) {
+    const CameraRig rig = read_rig(options.rig);
+    scene.view = View::whole_detector(rig.camera(options.camera));
+    if (!field) scene.frame.center_room_mm = rig.isocenter_point;
+  }
+  if (!options.ct.empty()) {
+    const CastCt cast = ray_caster(options, field.get(), scene.pool);
+    (field ? scene.reference : scene.renderer) = cast.renderer;
+    if (!field) scene.frame.center_ct_mm = cast.center_ct_mm;
+  }
+  return scene;
+}
+
+std::vector<RigidTransform> requested_poses(const DrrOptions& options, const PoseFrame& frame) {
+  if (!options.poses.empty()) return read_poses_csv(options.poses, frame);
+  if (!options.pose.empty()) return {read_pose(options.pose)};
+  std::array<double, 6> values{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (options.rotation_deg.has_value()) values[i] = (*options.rotation_deg)[i];
+    if (options.translation_mm.has_value()) values[i + 3] = (*options.translation_mm)[i];
+  }
+  return {pose_of_deg_and_mm(frame, values, "--rotation-deg, --translation-mm")};
+}
+
+void require_room(std::size_t poses, const View& view, const std::filesystem::path& output) {
+  const double bytes = static_cast<double>(poses) * static_cast<double>(view.pixel_count()) *
+                       static_cast<double>(sizeof(float));
+  // The DRRs, in one block for the writer, and read back to verify them.
+  constexpr double kCopies = 3.0;
+  require_memory(std::to_string(poses) + " DRRs", kCopies * bytes);
+  const bool is_compressed = ends_with(output, ".gz") || ends_with(output, ".png");
+  if (!is_compressed) require_disk_space(output, bytes);
+}
+
+std::vector<Image2d> render_poses(const DrrRenderer& renderer,
+                                  const View& view,
+                                  const std::vector<RigidTransform>& poses,
+                                  ThreadPool& pool) {
+  std::vector<Image2d> drrs(poses.size());
+  pool.for_each(static_cast<int>(poses.size()), [&](int task, int /*slot*/) {
+    const auto i = static_cast<std::size_t>(task);
+    std::int64_t rays_outside = 0;
+    drrs[i] = render_image(renderer, poses[i], view, &rays_outside);
+    if (rays_outside > 0)
+      throw InputError("pose " + std::to_string(i) + " = outside the field: " +
+                       std::to_string(rays_outside) + " of " + std::to_string(view.pixel_count()) +
+                       " rays miss its planes; must be within the motion range it was made for");
+  });
+  return drrs;
+}
+
+std::string write_drrs(const std::vector<Image2d>& drrs,
+                       const View& view,
+                       const DrrOptions& options) {
+  const Eigen::Vector2d& spacing = view.camera.pixel_spacing_mm;
+  std::ostringstream line;
+  line << options.output.string() << ": " << drrs.front().width << " x " << drrs.front().height;
+  if (ends_with(options.output, ".png")) {
+    const auto [low, percentile] =
+        percentile_window(drrs.front(), options.window_percent[0], options.window_percent[1]);
+    // A DRR of one value shows nothing, as when the CT is out of view.
+    const double high = percentile > low ? percentile : low + 1.0;
+    // Bright is attenuated, as in the other formats; --invert gives the look of a film.
+    if (options.invert)
+      write_png_image(negated(drrs.front()), options.output, -high, -low);
+    else
+      write_png_image(drrs.front(), options.output, low, high);
+    line << (percentile > low ? "" : ", constant: the CT is out of view") << ", U "
+         << fixed_text(low, 3) << (options.invert ? " (white) to " : " (black) to ")
+         << fixed_text(high, 3)
+         << (options.invert ? " (black), percentiles " : " (white), percentiles ")
+         << number_text(options.window_percent[0]) << " and "
+         << number_text(options.window_percent[1]);
+  } else if (options.poses.empty()) {
+    write_image(drrs.front(), options.output, spacing.x(), spacing.y());
+    line << ", total attenuation U as float32";
+  } else {
+    write_image_stack(drrs, options.output, spacing.x(), spacing.y());
+    line << " x " << drrs.size() << ", total attenuation U as float32";
+  }
+  return line.str();
+}
+
+std::string write_comparison(const DrrScene& scene,
+                             const RigidTransform& room_from_ct,
+                             const std::filesystem::path& path) {
+  const Image2d field =
+      render_poses(*scene.renderer, scene.view, {room_from_ct}, *scene.pool).front();
+  const Image2d cast =
+      render_poses(*scene.reference, scene.view, {room_from_ct}, *scene.pool).front();
+  const std::optional<Psnr> quality = psnr(field.pixels, cast.pixels);
+  Image2d difference = field;
+  for (std::size_t i = 0; i < difference.pixels.size(); ++i) difference.pixels[i] -= cast.pixels[i];
+  const auto window = percentile_window(cast, 0.5, 99.5);
+  const auto limits = percentile_window(difference, 0.5, 99.5);
+  const double largest = std::max({std::abs(limits[0]), std::abs(limits[1]), 1e-6});
+  std::string words = "no pixel in the foreground";
+  if (quality.has_value())
+    words = "PSNR " + fixed_text(quality->psnr_db, 2) + " dB, RMS difference " +
+            fixed_text(quality->rms_difference, 4) + ", largest U " +
+            fixed_text(quality->reference_maximum, 2) + ", foreground " +
+            fixed_text(100.0 * quality->foreground_fraction, 1) + " %";
+  const std::string range = "U " + fixed_text(window[0], 2) + " to " + fixed_text(window[1], 2);
+  const PicturePanel field_panel{field, window[0], window[1], "Field", range, {}, {}};
+  const PicturePanel cast_panel{cast, window[0], window[1], "Ray cast", range, {}, {}};
+  const PicturePanel difference_panel{difference,
+                                      -largest,
+                                      largest,
+                                      "Field - ray cast",
+                                      "+-" + fixed_text(largest, 4),
+                                      PicturePanel::Colors::Diverging,
+                                      {}};
+  write_picture({field_panel, cast_panel, difference_panel},
+                3,
+                "Camera " + scene.view.camera.name + ": " + words,
+                path,
+                std::max(1, 384 / std::max(1, cast.width)));
+  return words;
+}
+
+}  // namespace af::tools

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "base/error.h"
+#include "field_file/field_file.h"
+#include "text/json_text.h"
+#include "tools/inspect/inspect_kinds.h"
+
+namespace af {
+
+using nlohmann::ordered_json;
+
+namespace {
+
+constexpr double kBytesPerMegabyte = 1e6;
+constexpr std::uint64_t kBytesPerSample = 2;  ///< attenuation is quantised to 16 bits
+
+ordered_json camera_json(const CameraGeometry& camera) {
+  ordered_json json;
+  json["name"] = camera.name;
+  json["source_point_mm"] = vector_json(camera.source_point);
+  json["source_detector_distance_mm"] = camera.source_detector_distance_mm();
+  json["size_px"] = {camera.size_px.x(), camera.size_px.y()};
+  json["pixel_spacing_mm"] = vector_json(camera.pixel_spacing_mm);
+  return json;
+}
+
+ordered_json plane_json(const GridAxis& first, const GridAxis& second) {
+  return {{"size_mm", {first.last_mm - first.first_mm, second.last_mm - second.first_mm}},
+          {"nodes", {first.nodes, second.nodes}},
+          {"node_spacing_mm", {first.spacing_mm(), second.spacing_mm()}}};
+}
+
+ordered_json slab_json(const SlabGeometry& slab) {
+  ordered_json json;
+  json["st_plane_y_mm"] = slab.st_plane_y_mm;
+  json["st_plane"] = plane_json(slab.s, slab.t);
+  json["stored_nodes"] = {slab.stored_s.count, slab.stored_t.count};
+  json["stored_from_node"] = {slab.stored_s.begin, slab.stored_t.begin};
+  return json;
+}
+
+std::uint64_t product(int a, int b) {
+  return static_cast<std::uint64_t>(a) * static_cast<std::uint64_t>(b);
+}
+
+ordered_json sizes_json(const CompressedAttenuationField& field, const FieldFileInfo& info) {
+  const std::uint64_t viewpoints = product(field.light_slab.u.nodes, field.light_slab.v.nodes);
+  std::uint64_t whole = 0;
+  std::uint64_t cropped = 0;
+  for (const SlabGeometry& slab : field.light_slab.slabs) {
+    whole += kBytesPerSample * viewpoints * product(slab.s.nodes, slab.t.nodes);
+    cropped += kBytesPerSample * viewpoints * product(slab.stored_s.count, slab.stored_t.count);
+  }
+  const auto ratio = [](std::uint64_t raw, std::uint64_t stored) {
+    return static_cast<double>(raw) / static_cast<double>(stored);
+  };
+  ordered_json json;
+  json["uncompressed_mb"] = static_cast<double>(whole) / kBytesPerMegabyte;
+  json["uncompressed_stored_part_mb"] = static_cast<double>(cropped) / kBytesPerMegabyte;
+  json["payload_mb"] = static_cast<double>(info.payload_bytes) / kBytesPerMegabyte;
+  json["file_mb"] = static_cast<double>(info.file_bytes) / kBytesPerMegabyte;
+  json["payload_compression_ratio"] = ratio(whole, info.payload_bytes);
+  json["file_compression_ratio"] = ratio(whole, info.file_bytes);
+  json["payload_compression_ratio_of_stored_part"] = ratio(cropped, info.payload_bytes);
+  json["file_compression_ratio_of_stored_part"] = ratio(cropped, info.file_bytes);
+  return json;
+}
+
+ordered_json provenance_json(const FieldProvenance& provenance) {
+  ordered_json json;
+  json["source_version"] = provenance.source_version;
+  json["command_line"] = provenance.command_line;
+  json["options_toml"] = provenance.options_toml;
+  ordered_json details;
+  try {
+    details = ordered_json_of_text(provenance.provenance_json, "provenance");
+  } catch (const FileError&) {  // shown as it is
+  }
+  if (!details.is_object()) {
+    json["details"] = provenance.provenance_json;
+    return json;
+  }
+  // Stand above already.
+  details.erase("command_line");
+  details.erase("options_toml");
+  // A summary needs how the training ended, not each step.
+  if (details.contains("training") && details["training"].is_object()) {
+    ordered_json& training = details["training"];
+    const ordered_json steps = training.value("iterations", ordered_json::array());
+    if (steps.is_array() && !steps.empty()) {
+      training["iterations"] = steps.size();
+      training["last_iteration"] = steps.back();
+    }
+  }
+  json["details"] = details;
+  return json;
+}
+
+}  // namespace
+
+void inspect_field(const std::filesystem::path& path,
+                   const Communicator& communicator,
+                   Inspection& inspection) {
+  inspection.kind = "field";
+  FieldFileInfo info;
+  const auto field = read_field(path, communicator, &info);
+  const FieldIdentity& identity = field->identity;
+  ordered_json& facts = inspection.facts;
+  facts["checksums"] = "verified";
+  facts["payload_sha256"] = info.payload_sha256;
+  facts["camera"] = camera_json(identity.camera);
+  facts["center_ct_mm"] = vector_json(identity.frame.center_ct_mm);
+  facts["center_room_mm"] = vector_json(identity.frame.center_room_mm);
+  facts["max_rotation_deg"] = identity.range.max_rotation_rad * kDegPerRad;
+  facts["max_translation_mm"] = identity.range.max_translation_mm;
+  facts["ct_content_sha256"] = identity.ct_content_sha256;
+  facts["mu_water_per_mm"] = identity.mu_water_per_mm;
+  facts["air_below_hu"] = identity.air_below_hu;
+  facts["uv_plane_y_mm"] = field->light_slab.uv_plane_y_mm;
+  facts["uv_plane"] = plane_json(field->light_slab.u, field->light_slab.v);
+  for (const SlabGeometry& slab : field->light_slab.slabs)
+    facts["slabs"].push_back(slab_json(slab));
+  facts["codewords"] = field->codebook.size();
+  facts["quantizer_step"] = field->quantizer_step;
+  facts["sizes"] = sizes_json(*field, info);
+  facts["provenance"] = provenance_json(info.provenance);
+}
+
+}  // namespace af

@@ -1,0 +1,286 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/inspect/inspection.h"
+
+#include <algorithm>
+#include <fstream>
+#include <new>
+#include <sstream>
+#include <string_view>
+
+#include "files/input_file.h"
+#include "image_files/dicom_series.h"
+#include "image_files/image_header.h"
+#include "study/rig_file.h"
+#include "study/study_file.h"
+#include "tools/inspect/inspect_kinds.h"
+
+namespace af {
+
+namespace fs = std::filesystem;
+using nlohmann::ordered_json;
+
+namespace {
+
+constexpr std::string_view kHdf5Mark = "\x89HDF\r\n\x1a\n";
+
+constexpr const char* kWhatWasTried =
+    "not recognised; tried: DICOM folder, result folder, unfinished work (NAME.progress), HDF5 "
+    "field, NIfTI, MetaImage, NRRD, TIFF, PNG, DICOM file, TOML rig, study or pose, JSON result, "
+    "CSV table, ITK transform, pose of 16 numbers, name of a shipped rig";
+
+std::string first_bytes(const fs::path& path, std::size_t count) {
+  std::ifstream file = open_input_file(path);
+  std::string bytes(count, '\0');
+  file.read(bytes.data(), static_cast<std::streamsize>(count));
+  bytes.resize(static_cast<std::size_t>(file.gcount()));
+  return bytes;
+}
+
+bool is_text(std::string_view bytes) {
+  return !bytes.empty() && std::all_of(bytes.begin(), bytes.end(), [](char c) {
+    return static_cast<unsigned char>(c) >= ' ' || c == '\n' || c == '\r' || c == '\t';
+  });
+}
+
+/// True when some line begins with `start` (after blanks).
+bool has_line(std::string_view text, std::string_view start) {
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t first = text.find_first_not_of(" \t", at);
+    if (first != std::string_view::npos && text.substr(first).starts_with(start)) return true;
+    const std::size_t end = text.find('\n', at);
+    if (end == std::string_view::npos) break;
+    at = end + 1;
+  }
+  return false;
+}
+
+bool is_sixteen_numbers(const std::string& text) {
+  std::istringstream words(text);
+  std::size_t count = 0;
+  for (double number = 0.0; words >> number;) ++count;
+  return words.eof() && count == 16;
+}
+
+void inspect_text(const fs::path& path, Inspection& inspection) {
+  constexpr std::size_t kTextBytes = 1u << 18;
+  const std::string text = first_bytes(path, kTextBytes);
+  if (!is_text(text)) throw FileError(path.string(), kWhatWasTried);
+  if (has_line(text, "[[case]]")) return inspect_study(path, inspection);
+  if (has_line(text, "[[camera]]")) return inspect_rig(path.string(), inspection);
+  const std::size_t first = text.find_first_not_of(" \t\r\n");
+  if (first != std::string::npos && text[first] == '{') return inspect_json(path, inspection);
+  if (text.starts_with("#Insight Transform") || has_line(text, "room_from_ct") ||
+      is_sixteen_numbers(text))
+    return inspect_pose(path, inspection);
+  if (path.extension() == ".csv") return inspect_csv(path, inspection);
+  throw FileError(path.string(), kWhatWasTried);
+}
+
+void inspect_file(const fs::path& path,
+                  const InspectOptions& options,
+                  const Communicator& communicator,
+                  Inspection& inspection) {
+  if (first_bytes(path, kHdf5Mark.size()) == kHdf5Mark)
+    return inspect_field(path, communicator, inspection);
+  if (sniff_image_format(path)) return inspect_image(path, options, inspection);
+  inspect_text(path, inspection);
+}
+
+/// The files of a folder that mean something to this project, in the order of their names.
+std::vector<fs::path> known_files(const fs::path& folder) {
+  std::vector<fs::path> files;
+  std::error_code error;  // of a link that leads nowhere or in circles
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    const std::string name = entry.path().filename().string();
+    const bool known = name == "result.json" || name == "summary.json" ||
+                       name == "registrations.csv" || name == "image-quality.csv" ||
+                       name == "study.toml" || name == "rig.toml" || name == "pose.toml" ||
+                       name.ends_with(".tfm") || name.ends_with(".af.h5");
+    if (known && entry.is_regular_file(error)) files.push_back(entry.path());
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+void inspect_folder(const fs::path& folder,
+                    const InspectOptions& options,
+                    const Communicator& communicator,
+                    Inspection& inspection) {
+  if (holds_dicom(folder)) return inspect_ct(folder, options, inspection);
+  if (fs::exists(folder / "manifest.json") &&
+      folder.string().find(".progress") != std::string::npos) {
+    inspection.kind = "unfinished work";
+    inspection.facts["next_step"] = "run the same command again to go on from here";
+    return;
+  }
+  const std::vector<fs::path> files = known_files(folder);
+  if (files.empty()) throw FileError(folder.string(), kWhatWasTried);
+  inspection.kind = "folder of results";
+  inspection.facts["has_report"] = fs::exists(folder / "report.html");
+  inspection.facts["has_reproduce_script"] = fs::exists(folder / "reproduce.sh");
+  for (const fs::path& file : files)
+    inspection.items.push_back(inspect_path(file, options, communicator));
+}
+
+void inspect_anything(const fs::path& path,
+                      const InspectOptions& options,
+                      const Communicator& communicator,
+                      Inspection& inspection) {
+  std::error_code error;
+  if (fs::is_directory(path, error)) return inspect_folder(path, options, communicator, inspection);
+  if (fs::is_regular_file(path, error))
+    return inspect_file(path, options, communicator, inspection);
+  const std::vector<std::string> rigs = builtin_rig_names();
+  if (std::find(rigs.begin(), rigs.end(), path.string()) != rigs.end())
+    return inspect_rig(path.string(), inspection);
+  throw FileError(path.string(), fs::exists(path, error) ? "is no regular file" : "does not exist");
+}
+
+bool is_short_list(const ordered_json& json) {
+  return json.is_array() && std::all_of(json.begin(), json.end(), [](const ordered_json& entry) {
+           return entry.is_primitive() &&
+                  (!entry.is_string() ||
+                   entry.get_ref<const std::string&>().find('\n') == std::string::npos);
+         });
+}
+
+std::string scalar_text(const ordered_json& json) {
+  if (json.is_string()) return json.get<std::string>();
+  if (json.is_number_float()) {
+    std::ostringstream text;
+    text.precision(8);
+    text << json.get<double>();
+    return text.str();
+  }
+  if (json.is_boolean()) return json.get<bool>() ? "yes" : "no";
+  if (json.is_null()) return "none";
+  return json.dump();
+}
+
+std::string indented(const std::string& text, const std::string& indent) {
+  std::string result;
+  for (const char c : text) {
+    result += c;
+    if (c == '\n') result += indent;
+  }
+  while (!result.empty() && (result.back() == ' ' || result.back() == '\n')) result.pop_back();
+  return result;
+}
+
+void append_facts(const ordered_json& json, const std::string& indent, std::string& text);
+
+void append_fact(const std::string& name,
+                 const ordered_json& value,
+                 const std::string& indent,
+                 std::string& text) {
+  if (is_short_list(value)) {
+    std::string list;
+    for (const auto& entry : value) list += (list.empty() ? "" : ", ") + scalar_text(entry);
+    text += indent + name + ": " + list + "\n";
+  } else if (value.is_structured()) {
+    text += indent + name + ":\n";
+    append_facts(value, indent + "  ", text);
+  } else {
+    const std::string scalar = scalar_text(value);
+    const bool has_lines = scalar.find('\n') != std::string::npos;
+    text += indent + name + ":" + (has_lines ? "\n" + indent + "  " : " ") +
+            indented(scalar, indent + "  ") + "\n";
+  }
+}
+
+void append_facts(const ordered_json& json, const std::string& indent, std::string& text) {
+  if (json.is_array()) {
+    for (std::size_t i = 0; i < json.size(); ++i)
+      append_fact(std::to_string(i + 1), json[i], indent, text);
+    return;
+  }
+  for (const auto& [name, value] : json.items()) {
+    std::string words = name;
+    std::replace(words.begin(), words.end(), '_', ' ');
+    append_fact(words, value, indent, text);
+  }
+}
+
+std::string text_at(const Inspection& inspection, const std::string& indent) {
+  std::string text = indent + inspection.path + ": " + inspection.kind +
+                     (inspection.error.empty() ? "" : ", NOT USABLE") + "\n";
+  if (!inspection.error.empty())
+    text += indent + "  error: " + indented(inspection.error, indent + "  ") + "\n";
+  append_facts(inspection.facts, indent + "  ", text);
+  for (const std::string& warning : inspection.warnings)
+    text.append(indent).append("  warning: ").append(warning).append("\n");
+  for (const Inspection& item : inspection.items) text += text_at(item, indent + "  ");
+  return text;
+}
+
+}  // namespace
+
+Inspection inspect_path(const fs::path& path,
+                        const InspectOptions& options,
+                        const Communicator& communicator) {
+  Inspection inspection;
+  inspection.path = path.string();
+  try {
+    inspect_anything(path, options, communicator, inspection);
+  } catch (const Error& error) {
+    inspection.error = error.what();
+    inspection.exit_code = error.exit_code();
+  } catch (const fs::filesystem_error& error) {
+    inspection.error = error.what();
+    inspection.exit_code = ExitCode::File;
+  } catch (const std::bad_alloc&) {
+    inspection.error = inspection.path + ": needs more memory than there is";
+    inspection.exit_code = ExitCode::Input;
+  }
+  return inspection;
+}
+
+ExitCode worst_exit_code(const Inspection& inspection) {
+  ExitCode worst = inspection.exit_code;
+  for (const Inspection& item : inspection.items) worst = std::max(worst, worst_exit_code(item));
+  return worst;
+}
+
+ordered_json to_json(const Inspection& inspection) {
+  ordered_json json;
+  json["path"] = inspection.path;
+  json["kind"] = inspection.kind;
+  json["ok"] = worst_exit_code(inspection) == ExitCode::Done;
+  json["exit_code"] = static_cast<int>(worst_exit_code(inspection));
+  if (!inspection.error.empty()) json["error"] = inspection.error;
+  json["warnings"] = inspection.warnings;
+  json["facts"] = inspection.facts;
+  for (const Inspection& item : inspection.items) json["items"].push_back(to_json(item));
+  return json;
+}
+
+std::string to_text(const Inspection& inspection) {
+  return text_at(inspection, "");
+}
+
+std::string view_lines(const fs::path& study_path) {
+  std::string lines;
+  for (const StudyCase& study_case : read_study(study_path).cases)
+    for (const StudyView& view : study_case.views)
+      lines += study_case.name + '\t' + view.camera + '\n';
+  return lines;
+}
+
+std::string input_lines(const fs::path& study_path) {
+  std::string lines;
+  const Study study = read_study(study_path);
+  for (const StudyCase& study_case : study.cases) {
+    const auto add = [&](const fs::path& path) {
+      lines += study_case.name + '\t' + path.string() + '\n';
+    };
+    add(study_case.ct);
+    if (fs::exists(study.rig_name_or_path)) add(study.rig_name_or_path);
+    for (const StudyView& view : study_case.views) {
+      add(view.xray);
+      if (view.mask.has_value()) add(*view.mask);
+    }
+  }
+  return lines;
+}
+
+}  // namespace af

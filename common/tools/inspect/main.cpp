@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <iostream>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "cli/app_main.h"
+#include "study/study_template.h"
+#include "tools/inspect/inspection.h"
+
+namespace {
+
+using af::Communicator;
+
+struct Options {
+  std::vector<std::string> paths;
+  std::string template_name;
+  af::InspectOptions inspect;
+  bool as_json = false;
+  bool lists_views = false;
+  bool lists_inputs = false;
+};
+
+/// The report of each path as soon as it is known; JSON is one array.
+void print(const Options& options, const std::vector<af::Inspection>& inspections) {
+  if (!options.as_json) {
+    for (const af::Inspection& inspection : inspections) std::cout << af::to_text(inspection);
+    return;
+  }
+  auto array = nlohmann::ordered_json::array();
+  for (const af::Inspection& inspection : inspections) array.push_back(af::to_json(inspection));
+  // File headers may hold text of any encoding.
+  std::cout << array.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) << '\n';
+}
+
+void run(const Options& options, const Communicator& world) {
+  if (!options.template_name.empty()) {
+    if (world.is_root()) std::cout << af::template_text(options.template_name);
+    return;
+  }
+  if (options.lists_views || options.lists_inputs) {
+    for (const std::string& path : options.paths) {
+      const std::string lines = af::all_or_none(world, [&] {
+        return options.lists_views ? af::view_lines(path) : af::input_lines(path);
+      });
+      if (world.is_root()) std::cout << lines;
+    }
+    return;
+  }
+  std::vector<af::Inspection> inspections;
+  af::ExitCode worst = af::ExitCode::Done;
+  std::size_t bad = 0;
+  for (const std::string& path : options.paths) {
+    inspections.push_back(af::inspect_path(path, options.inspect, world));
+    const af::ExitCode code = af::worst_exit_code(inspections.back());
+    worst = std::max(worst, code);
+    bad += code == af::ExitCode::Done ? 0 : 1;
+  }
+  if (world.is_root()) print(options, inspections);
+  if (worst == af::ExitCode::Done) return;
+  std::cout.flush();
+  // Every rank knows the same; said once.
+  throw af::RemoteError(worst,
+                        std::to_string(bad) + " of " + std::to_string(options.paths.size()) +
+                            " paths not usable; the reasons are in the report");
+}
+
+}  // namespace
+
+// Binding options can throw only by a defect, which may well end the program.
+// NOLINTNEXTLINE(bugprone-exception-escape)
+int main(int argc, char** argv) {
+  Options options;
+  CLI::App app{
+      "Says what files are, whether they are sane, and what they were made from: CTs (image file "
+      "or DICOM folder), X-rays and DRRs, rigs, studies, poses, fields (every checksum verified), "
+      "results and folders of results. The exit code is the worst over all paths: 0 usable, 3 "
+      "readable but unacceptable, 4 not readable or damaged."};
+  auto* what = app.add_option_group("What", "one of");
+  what->add_option("PATH", options.paths, "Files, folders or names of shipped rigs");
+  what->add_option(
+          "--template",
+          options.template_name,
+          "Print a file to fill in, every key with a comment: study (af-inspect --template "
+          "study > study.toml) or rig")
+      ->check(CLI::IsMember(af::template_names()));
+  what->require_option(1);
+  app.add_flag("--json", options.as_json, "Print one JSON array instead of text");
+  app.add_flag("--list-views",
+               options.lists_views,
+               "Of studies, for scripts: one line per view, its case and its camera with a tab "
+               "between them")
+      ->excludes("--json");
+  app.add_flag("--list-inputs",
+               options.lists_inputs,
+               "Of studies, for scripts: one line per case and file that it reads, with a tab "
+               "between them")
+      ->excludes("--json")
+      ->excludes("--list-views");
+  app.add_option("--series",
+                 options.inspect.series_uid,
+                 "SeriesInstanceUID to read from a DICOM folder that holds several series");
+  return af::cli::app_main(
+      app, argc, argv, [&](const Communicator& world) { run(options, world); });
+}

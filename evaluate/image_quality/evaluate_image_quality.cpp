@@ -1,0 +1,476 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluate/image_quality/evaluate_image_quality.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <sstream>
+#include <tuple>
+
+#include <CLI/CLI.hpp>
+
+#include "base/error.h"
+#include "base/toml_text.h"
+#include "cli/run_limits.h"
+#include "drr/field_renderer.h"
+#include "drr/ray_cast_drr.h"
+#include "evaluate/image_quality/image_quality_tables.h"
+#include "evaluate/image_quality/loss_split.h"
+#include "evaluate/image_quality/loss_split_tables.h"
+#include "evaluate/methods/evaluated_methods.h"
+#include "evaluate/outputs/result_figures.h"
+#include "evaluate/outputs/row_gathering.h"
+#include "evaluate/outputs/sample_summary_json.h"
+#include "field_file/field_file.h"
+#include "figures/gnuplot_figure.h"
+#include "figures/picture.h"
+#include "files/output_file.h"
+#include "files/resource_check.h"
+#include "files/sha256.h"
+#include "run/output_lock.h"
+#include "run/provenance.h"
+#include "run/stop_request.h"
+#include "run/terminal.h"
+#include "study/node_ct.h"
+#include "study/pose_file.h"
+#include "study/study_file.h"
+
+namespace af::evaluation {
+namespace {
+
+using nlohmann::json;
+
+std::string to_toml(const ImageQualityOptions& options) {
+  std::ostringstream out;
+  if (options.study.empty())
+    out << "field = " << toml_text(options.field.string())
+        << "\nct = " << toml_text(options.ct.string());
+  else
+    out << "study = " << toml_text(options.study.string())
+        << "\ncase = " << toml_list(options.cases);
+  if (options.poses.empty())
+    out << "\npose_count = " << options.pose_count;
+  else
+    out << "\nposes = " << toml_text(options.poses.string());
+  if (!options.series_uid.empty()) out << "\nseries = " << toml_text(options.series_uid);
+  out << "\nlook_up = \"" << options.look_up
+      << "\"\nsplit_loss_poses = " << options.split_loss_poses
+      << "\nstep_mm = " << number_text(options.step_mm) << "\nseed = " << options.seed << '\n';
+  return out.str();
+}
+
+/// One field to compare.
+struct Target {
+  std::string case_name;  ///< empty when the field stands alone
+  std::filesystem::path field;
+  std::filesystem::path ct;
+  std::filesystem::path folder;  ///< of its results
+};
+
+/// What a study shows together.
+struct TargetResult {
+  std::string case_name;
+  std::string camera;
+  std::vector<DrrComparison> comparisons;
+  std::vector<PicturePanel> worst_pair;
+
+  [[nodiscard]] std::string label() const {
+    return (case_name.empty() ? "camera" : case_name) + " " + camera;
+  }
+};
+
+/// Everything a comparison needs, the same on every rank.
+struct Setup {
+  std::shared_ptr<const CompressedAttenuationField> field;
+  FieldFileInfo field_info;
+  NodeCt ct;
+  std::vector<RigidTransform> poses;  ///< empty: random ones
+  View view;
+
+  [[nodiscard]] std::int64_t pose_count(const ImageQualityOptions& options) const {
+    return poses.empty() ? options.pose_count : static_cast<std::int64_t>(poses.size());
+  }
+};
+
+Setup load(const ImageQualityOptions& options, const Target& target, const Communicator& world) {
+  Setup setup;
+  setup.field = read_field(target.field, world, &setup.field_info);
+  const FieldIdentity& identity = setup.field->identity;
+  std::vector<std::string> warnings;
+  setup.ct = read_ct_per_node(target.ct,
+                              {options.series_uid},
+                              {identity.mu_water_per_mm, identity.air_below_hu},
+                              world,
+                              warnings);
+  for (const std::string& text : warnings) warn(world, text);
+  all_or_none(world, [&] {
+    if (setup.ct.facts.content_sha256 != identity.ct_content_sha256)
+      throw FileError(target.field.string(),
+                      "CT of the field (ct_content_sha256)",
+                      setup.ct.facts.content_sha256 + " (" + target.ct.string() + ")",
+                      identity.ct_content_sha256);
+    if (options.split_loss_poses > 0 && setup.field->light_slab.slabs.size() != 1)
+      throw InputError("--split-loss-poses",
+                       std::to_string(options.split_loss_poses),
+                       "needs a field of one slab; this has " +
+                           std::to_string(setup.field->light_slab.slabs.size()),
+                       target.field.string());
+    if (options.poses.empty()) return;
+    setup.poses = read_poses_csv(options.poses, identity.frame);
+    if (setup.poses.empty())
+      throw InputError("poses", "no row", "must hold at least one pose", options.poses.string());
+  });
+  setup.view = View::whole_detector(identity.camera);
+  return setup;
+}
+
+DrrComparison compare(const ImageQualityOptions& options,
+                      const Setup& setup,
+                      DrrComparer& comparer,
+                      std::int64_t index) {
+  const FieldIdentity& identity = setup.field->identity;
+  if (setup.poses.empty())
+    return comparer.at_random_pose(
+        identity.frame, identity.range, options.seed, static_cast<std::uint64_t>(index));
+  const RigidTransform& pose = setup.poses[static_cast<std::size_t>(index)];
+  return comparer.at_pose(identity.frame, parameters_from_pose(identity.frame, pose));
+}
+
+/// Field, ray casting and their difference at one pose.
+std::vector<PicturePanel> pair_panels(const DrrComparison& comparison,
+                                      const DrrComparer& comparer,
+                                      const std::string& what) {
+  const Image2d& field = comparer.tested_image();
+  const Image2d& cast = comparer.reference_image();
+  Image2d difference = field;
+  for (std::size_t i = 0; i < difference.pixels.size(); ++i) difference.pixels[i] -= cast.pixels[i];
+  const double top = comparison.reference_maximum;
+  constexpr double kDifferenceShare = 0.05;
+  const std::string before = what.empty() ? "" : what + ": ";
+  return {{field, 0.0, top, before + "field", "look-up in the compressed field", {}, {}},
+          {cast, 0.0, top, before + "ray casting", "the reference", {}, {}},
+          {difference,
+           -kDifferenceShare * top,
+           kDifferenceShare * top,
+           before + "difference, PSNR " + fixed_text(comparison.psnr_db, 1) + " dB",
+           "field - ray casting, window +-5 % of the maximum",
+           PicturePanel::Colors::Diverging,
+           {}}};
+}
+
+int zoom_of(const Image2d& image) {
+  return std::max(1, 360 / std::max(image.width, image.height));
+}
+
+void write_pair(const std::vector<PicturePanel>& panels,
+                const std::string& which,
+                std::size_t index,
+                std::size_t count,
+                const std::filesystem::path& folder) {
+  write_picture(panels,
+                3,
+                "Pose " + std::to_string(index) + ", the " + which + " of " + std::to_string(count),
+                folder / (which + "-pair.png"),
+                zoom_of(panels.front().image));
+}
+
+PsnrGroup group_of(const TargetResult& result) {
+  PsnrGroup group{result.label(), {}};
+  for (const DrrComparison& comparison : result.comparisons)
+    group.psnr_db.push_back(comparison.psnr_db);
+  return group;
+}
+
+void write_results(const ImageQualityOptions& options,
+                   const Target& target,
+                   const Setup& setup,
+                   DrrComparer& comparer,
+                   const std::vector<LossSplit>& splits,
+                   TargetResult& result,
+                   const Provenance& provenance) {
+  const std::filesystem::path& folder = target.folder;
+  const std::vector<DrrComparison>& comparisons = result.comparisons;
+  // What an earlier run left here is whole no more.
+  remove_output(folder / "summary.json");
+  write_text_file(folder / "image-quality.csv", image_quality_table(comparisons).to_text());
+  const PsnrGroup group = group_of(result);
+  draw_psnr_boxes({group}, folder / "psnr");
+  json summary = {{"format", "attenuation-fields evaluation"},
+                  {"format_version", 1},
+                  {"kind", "image-quality"}};
+  summary["figures"] = {"psnr"};
+  summary["pictures"] = json::array();
+  for (const auto& [which, share] : {std::pair("worst", 0.0), std::pair("median", 0.5)}) {
+    const auto index = comparison_at(comparisons, share);
+    if (!index.has_value()) continue;
+    const DrrComparison comparison =
+        compare(options, setup, comparer, static_cast<std::int64_t>(*index));
+    write_pair(pair_panels(comparison, comparer, ""), which, *index, comparisons.size(), folder);
+    if (std::string(which) == "worst")
+      result.worst_pair = pair_panels(comparison, comparer, result.label());
+    summary["pictures"].push_back({{"file", std::string(which) + "-pair.png"},
+                                   {"which", which},
+                                   {"pose_index", *index},
+                                   {"psnr_db", number_json(comparisons[*index].psnr_db)}});
+  }
+  if (!target.case_name.empty()) summary["case"] = target.case_name;
+  if (!splits.empty()) {
+    summary["loss_split"] = write_loss_split(splits, folder);
+    summary["figures"].push_back("loss-split");
+  }
+  summary["field"] = field_description(*setup.field);
+  summary["field"]["file_bytes"] = setup.field_info.file_bytes;
+  summary["field"]["payload_bytes"] = setup.field_info.payload_bytes;
+  summary["look_up"] = options.look_up;
+  summary.update(image_quality_statistics(comparisons));
+  summary["provenance"] = af::to_json(provenance);
+  write_reproduce_script(folder, provenance);
+  // Last: when it is there, everything is.
+  write_text_file(folder / "summary.json", summary.dump(2) + "\n");
+
+  const SampleSummary psnr = [&] {
+    std::vector<double> values;
+    for (const double value : group.psnr_db)
+      if (!std::isnan(value)) values.push_back(value);
+    return summarize(values);
+  }();
+  std::cout << group.label << ": PSNR median " << fixed_text(psnr.median, 2)
+            << " dB, 5th percentile " << fixed_text(psnr.percentile_5, 2) << ", minimum "
+            << fixed_text(psnr.minimum, 2) << " over " << psnr.count
+            << " poses\nresults: " << folder.string() << '\n';
+}
+
+/// Collective. The losses of the first poses, on rank 0.
+std::vector<LossSplit> split_losses(const ImageQualityOptions& options,
+                                    const Setup& setup,
+                                    const DrrRenderer& field,
+                                    const DrrRenderer& reference,
+                                    DrrComparer& comparer,
+                                    const UnfinishedWork& unfinished,
+                                    const Communicator& world) {
+  const std::int64_t count =
+      std::min<std::int64_t>(options.split_loss_poses, setup.pose_count(options));
+  std::vector<LossSplit> splits(static_cast<std::size_t>(count));
+  if (count == 0) return splits;
+  const LossSplitter splitter(
+      field, reference, setup.ct.volume, {options.step_mm}, setup.field->light_slab, setup.view);
+  collect_rows(
+      world,
+      unfinished,
+      count,
+      "losses split",
+      [&](std::int64_t index) -> json {
+        const PoseParameters parameters = compare(options, setup, comparer, index).parameters;
+        return splitter.at_pose(pose_from_parameters(setup.field->identity.frame, parameters))
+            .mean_square;
+      },
+      [&](std::int64_t index, const json& row) {
+        row.get_to(splits[static_cast<std::size_t>(index)].mean_square);
+      });
+  return splits;
+}
+
+/// Collective. Compares one field and writes its folder; the result is rank 0's.
+TargetResult evaluate_target(const ImageQualityOptions& options,
+                             const Target& target,
+                             const std::string& command_line,
+                             const Communicator& world) {
+  all_or_none(world, [&] {
+    if (world.is_root()) make_output_folder(target.folder);
+  });
+  const Setup setup = load(options, target, world);
+  const auto field = make_field_renderer(setup.field, options.look_up);
+  const RayCastDrr ray_cast(setup.ct.volume, {options.step_mm});
+  DrrComparer comparer(*field, ray_cast, setup.view);
+  Provenance provenance = {"af-evaluate image-quality",
+                           command_line,
+                           to_toml(options),
+                           options.seed,
+                           world.size(),
+                           {{"field " + setup.view.camera.name, setup.field_info.payload_sha256},
+                            {"ct", setup.ct.facts.content_sha256}}};
+  all_or_none(world, [&] {
+    if (world.is_root() && !options.poses.empty())
+      provenance.input_sha256["poses"] = sha256_of_file(options.poses.string());
+  });
+  const std::string name = target.folder.filename().string();
+  const auto unfinished = [&](const std::string& what) -> UnfinishedWork {
+    return {progress_folder(options.output_folder),
+            name + what,
+            deciding_values(provenance.options_toml, provenance.input_sha256),
+            options.restarts};
+  };
+  const std::int64_t count = setup.pose_count(options);
+  all_or_none(world, [&] {
+    require_memory("--pose-count",
+                   static_cast<double>(count) * static_cast<double>(sizeof(DrrComparison)));
+  });
+  TargetResult result{target.case_name, setup.view.camera.name, {}, {}};
+  result.comparisons.resize(static_cast<std::size_t>(count));
+  announce_time(
+      world, "poses compared", count, [&] { std::ignore = compare(options, setup, comparer, 0); });
+  collect_rows(
+      world,
+      unfinished("-poses"),
+      count,
+      "poses compared",
+      [&](std::int64_t index) { return comparison_row(compare(options, setup, comparer, index)); },
+      [&](std::int64_t index, const json& row) {
+        result.comparisons[static_cast<std::size_t>(index)] = comparison_of(row);
+      });
+  const std::vector<LossSplit> splits =
+      split_losses(options, setup, *field, ray_cast, comparer, unfinished("-losses"), world);
+  all_or_none(world, [&] {
+    if (world.is_root())
+      write_results(options, target, setup, comparer, splits, result, provenance);
+  });
+  return result;
+}
+
+/// The fields to compare: the one of --field, or those of the study's views.
+std::vector<Target> targets_of(const ImageQualityOptions& options) {
+  const bool has_field = !options.field.empty() && !options.ct.empty();
+  const bool has_any = !options.field.empty() || !options.ct.empty();
+  if (options.study.empty() ? !has_field : has_any)
+    throw UsageError("name a field and its CT, --field FIELD --ct CT, or --study STUDY alone");
+  if (options.study.empty()) return {{"", options.field, options.ct, options.output_folder}};
+  const Study study = read_study(options.study);
+  std::vector<Target> targets;
+  for (const StudyCase* study_case : study.chosen_cases(options.cases))
+    for (const StudyView& view : study_case->views) {
+      if (!view.field.has_value())
+        throw InputError("case '" + study_case->name + "', view '" + view.camera + "': field",
+                         "none",
+                         "must be in the study",
+                         study.path.string());
+      targets.push_back({study_case->name,
+                         *view.field,
+                         study_case->ct,
+                         options.output_folder / (study_case->name + "-" + view.camera)});
+    }
+  return targets;
+}
+
+/// One table, box plot and sheet of pairs of all fields of a study.
+void write_together(const std::vector<TargetResult>& results, const std::filesystem::path& folder) {
+  std::vector<std::string> columns = {"case", "camera"};
+  const std::vector<std::string> own_columns = image_quality_table({}).columns();
+  columns.insert(columns.end(), own_columns.begin(), own_columns.end());
+  CsvTable table(columns);
+  std::vector<PsnrGroup> groups;
+  std::vector<PicturePanel> panels;
+  for (const TargetResult& result : results) {
+    const CsvTable own = image_quality_table(result.comparisons);
+    for (std::size_t row = 0; row < own.row_count(); ++row) {
+      std::vector<std::string> fields = {result.case_name, result.camera};
+      for (const std::string& column : own_columns) fields.push_back(own.text(row, column));
+      table.add_row(std::move(fields));
+    }
+    groups.push_back(group_of(result));
+    panels.insert(panels.end(), result.worst_pair.begin(), result.worst_pair.end());
+  }
+  write_text_file(folder / "image-quality.csv", table.to_text());
+  draw_psnr_boxes(groups, folder / "psnr");
+  write_picture(panels,
+                3,
+                "The worst pair of every field",
+                folder / "worst-pairs.png",
+                zoom_of(panels.front().image));
+  std::cout << "all fields: " << (folder / "psnr.svg").string() << ", "
+            << (folder / "worst-pairs.png").string() << '\n';
+}
+
+}  // namespace
+
+std::vector<std::string> problems(const ImageQualityOptions& options) {
+  std::vector<std::string> found;
+  if (options.pose_count < 1)
+    found.push_back("--pose-count = " + std::to_string(options.pose_count) + ": must be >= 1");
+  if (!options.study.empty() && !options.poses.empty())
+    found.push_back("--poses = '" + options.poses.string() + "': must not be given with --study");
+  if (options.split_loss_poses < 0 || (options.split_loss_poses > 0 && options.look_up != "linear"))
+    found.push_back("--split-loss-poses = " + std::to_string(options.split_loss_poses) +
+                    ": must not be negative, and 0 for a look-up other than linear");
+  for (const std::string& text : af::problems(RayCasterOptions{options.step_mm}))
+    found.push_back(text);
+  return found;
+}
+
+CLI::App* bind_image_quality(CLI::App& app, ImageQualityOptions& options) {
+  CLI::App* command = app.add_subcommand(
+      "image-quality",
+      "DRRs of a field against ray casting at random poses of its motion range (the paper's Fig. "
+      "8): PSNR, statistics, box plot, worst pair");
+  command->add_option("--field", options.field, "Field file of one camera");
+  command->add_option(
+      "--ct", options.ct, "The CT the field was made from: image file or DICOM folder");
+  command->add_option(
+      "--study",
+      options.study,
+      "Instead of both: study.toml whose views name their fields (key `field`); one "
+      "box plot of all, the worst pairs side by side");
+  command->add_option("--case", options.cases, "Case of the study, may be repeated (default: all)")
+      ->take_all();
+  auto* count =
+      command
+          ->add_option(
+              "--pose-count", options.pose_count, "Random poses, uniform in the six parameters")
+          ->capture_default_str();
+  command
+      ->add_option("--poses",
+                   options.poses,
+                   "CSV of poses instead of random ones: rx_deg ... tz_mm relative to the field's "
+                   "frame, or m00 ... m23 of room_from_ct")
+      ->excludes(count);
+  command
+      ->add_option("--look-up",
+                   options.look_up,
+                   "linear in two passes (what registration uses), cubic in (s,t), cubic-uv in "
+                   "(u,v) too, quadrilinear (the paper's, literal) or nearest")
+      ->check(CLI::IsMember(field_look_up_names()))
+      ->capture_default_str();
+  command
+      ->add_option("--split-loss-poses",
+                   options.split_loss_poses,
+                   "Split the loss at so many of the poses into interpolation over (u,v), over "
+                   "(s,t), and quantisation; some ten ray-cast DRRs each")
+      ->capture_default_str();
+  command->add_option("--step-mm", options.step_mm, "Longest step of ray casting, mm")
+      ->capture_default_str();
+  command->add_option(
+      "--series", options.series_uid, "DICOM series UID, when the folder has several");
+  command->add_option("--seed", options.seed, "Of the random poses")->capture_default_str();
+  cli::bind_resume(*command, options.restarts);
+  command->add_option("-o,--output", options.output_folder, "Folder for the results")->required();
+  return command;
+}
+
+void run_image_quality(const ImageQualityOptions& options,
+                       const std::string& command_line,
+                       const Communicator& world) {
+  std::optional<OutputLock> lock;
+  const std::vector<Target> targets = all_or_none(world, [&] {
+    throw_if_any(problems(options));
+    if (world.is_root()) {
+      require_gnuplot();
+      make_output_folder(options.output_folder);
+      announce_outputs(options.output_folder,
+                       {"image-quality.csv", "reproduce.sh", "summary.json"});
+      lock.emplace(options.output_folder);
+    }
+    return targets_of(options);
+  });
+  listen_for_stop_requests();
+  std::vector<TargetResult> results;
+  for (const Target& target : targets)
+    results.push_back(evaluate_target(options, target, command_line, world));
+  all_or_none(world, [&] {
+    if (!world.is_root()) return;
+    if (!options.study.empty()) write_together(results, options.output_folder);
+    std::filesystem::remove_all(progress_folder(options.output_folder));
+  });
+}
+
+}  // namespace af::evaluation

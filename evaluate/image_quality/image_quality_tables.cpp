@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluate/image_quality/image_quality_tables.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "evaluate/outputs/sample_summary_json.h"
+#include "evaluate/statistics/statistics.h"
+
+namespace af::evaluation {
+
+using nlohmann::json;
+
+namespace {
+
+constexpr double kGoodPsnrDb = 40.0;  // the paper: almost all above
+constexpr double kPoorPsnrDb = 36.0;  // the paper: very few below
+
+/// Of the comparisons that were possible.
+std::vector<double> psnr_values(const std::vector<DrrComparison>& comparisons) {
+  std::vector<double> values;
+  for (const DrrComparison& comparison : comparisons)
+    if (!std::isnan(comparison.psnr_db)) values.push_back(comparison.psnr_db);
+  return values;
+}
+
+template <typename Value>
+json summary_of(const std::vector<DrrComparison>& comparisons, Value value) {
+  std::vector<double> values;
+  for (const DrrComparison& comparison : comparisons)
+    if (!std::isnan(value(comparison))) values.push_back(value(comparison));
+  return to_json(summarize(std::move(values)));
+}
+
+json share_where(const std::vector<double>& values, const auto& predicate) {
+  if (values.empty()) return nullptr;
+  return static_cast<double>(std::count_if(values.begin(), values.end(), predicate)) /
+         static_cast<double>(values.size());
+}
+
+}  // namespace
+
+json comparison_row(const DrrComparison& comparison) {
+  const auto& rotation = comparison.parameters.rotation_rad;
+  const auto& translation = comparison.parameters.translation_mm;
+  return {{rotation.x(), rotation.y(), rotation.z()},
+          {translation.x(), translation.y(), translation.z()},
+          comparison.redrawn,
+          comparison.rays_outside,
+          {comparison.psnr_db,
+           comparison.rms_difference,
+           comparison.mean_difference,
+           comparison.largest_difference,
+           comparison.reference_maximum,
+           comparison.foreground_fraction,
+           comparison.tested_seconds,
+           comparison.reference_seconds}};
+}
+
+DrrComparison comparison_of(const json& row) {
+  const auto vector_of = [](const json& values) {
+    return Eigen::Vector3d(
+        values[0].get<double>(), values[1].get<double>(), values[2].get<double>());
+  };
+  const auto values = row[4].get<std::array<double, 8>>();
+  DrrComparison comparison;
+  comparison.parameters = {vector_of(row[0]), vector_of(row[1])};
+  comparison.redrawn = row[2].get<int>();
+  comparison.rays_outside = row[3].get<std::int64_t>();
+  comparison.psnr_db = values[0];
+  comparison.rms_difference = values[1];
+  comparison.mean_difference = values[2];
+  comparison.largest_difference = values[3];
+  comparison.reference_maximum = values[4];
+  comparison.foreground_fraction = values[5];
+  comparison.tested_seconds = values[6];
+  comparison.reference_seconds = values[7];
+  return comparison;
+}
+
+CsvTable image_quality_table(const std::vector<DrrComparison>& comparisons) {
+  CsvTable table({"pose_index",
+                  "rx_deg",
+                  "ry_deg",
+                  "rz_deg",
+                  "tx_mm",
+                  "ty_mm",
+                  "tz_mm",
+                  "psnr_db",
+                  "rms_difference",
+                  "mean_difference",
+                  "largest_difference",
+                  "reference_maximum",
+                  "foreground_fraction",
+                  "rays_outside",
+                  "redrawn"});
+  for (std::size_t i = 0; i < comparisons.size(); ++i) {
+    const DrrComparison& comparison = comparisons[i];
+    std::vector<std::string> fields = {std::to_string(i)};
+    for (const double value : comparison.parameters.deg_and_mm())
+      fields.push_back(number_text(value));
+    for (const double value : {comparison.psnr_db,
+                               comparison.rms_difference,
+                               comparison.mean_difference,
+                               comparison.largest_difference,
+                               comparison.reference_maximum,
+                               comparison.foreground_fraction})
+      fields.push_back(number_text(value));
+    fields.push_back(std::to_string(comparison.rays_outside));
+    fields.push_back(std::to_string(comparison.redrawn));
+    table.add_row(std::move(fields));
+  }
+  return table;
+}
+
+std::optional<std::size_t> comparison_at(const std::vector<DrrComparison>& comparisons,
+                                         double share) {
+  std::vector<std::size_t> order;
+  for (std::size_t i = 0; i < comparisons.size(); ++i)
+    if (!std::isnan(comparisons[i].psnr_db)) order.push_back(i);
+  if (order.empty()) return std::nullopt;
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return comparisons[a].psnr_db < comparisons[b].psnr_db;
+  });
+  return order[static_cast<std::size_t>(share * static_cast<double>(order.size() - 1))];
+}
+
+json image_quality_statistics(const std::vector<DrrComparison>& comparisons) {
+  const std::vector<double> values = psnr_values(comparisons);
+  std::int64_t redrawn = 0;
+  for (const DrrComparison& comparison : comparisons) redrawn += comparison.redrawn;
+  json result;
+  result["poses"] = comparisons.size();
+  result["compared"] = values.size();
+  result["redrawn"] = redrawn;
+  result["outside_or_empty"] = comparisons.size() - values.size();
+  result["psnr_db"] = to_json(summarize(values));
+  result["share_above_40_db"] =
+      share_where(values, [](double value) { return value > kGoodPsnrDb; });
+  result["share_below_36_db"] =
+      share_where(values, [](double value) { return value < kPoorPsnrDb; });
+  result["reference_maximum"] =
+      summary_of(comparisons, [](const auto& row) { return row.reference_maximum; });
+  result["mean_difference"] =
+      summary_of(comparisons, [](const auto& row) { return row.mean_difference; });
+  result["rms_difference"] =
+      summary_of(comparisons, [](const auto& row) { return row.rms_difference; });
+  result["seconds_per_drr_field"] =
+      summary_of(comparisons, [](const auto& row) { return row.tested_seconds; });
+  result["seconds_per_drr_raycast"] =
+      summary_of(comparisons, [](const auto& row) { return row.reference_seconds; });
+  return result;
+}
+
+json field_description(const CompressedAttenuationField& field) {
+  const FieldIdentity& identity = field.identity;
+  return {{"camera", identity.camera.name},
+          {"detector_px", {identity.camera.size_px.x(), identity.camera.size_px.y()}},
+          {"uv_nodes", {field.light_slab.u.nodes, field.light_slab.v.nodes}},
+          {"st_nodes",
+           {field.light_slab.slabs.front().s.nodes, field.light_slab.slabs.front().t.nodes}},
+          {"slabs", field.light_slab.slabs.size()},
+          {"codewords", field.codebook.size()},
+          {"max_rotation_deg", identity.range.max_rotation_rad * kDegPerRad},
+          {"max_translation_mm", identity.range.max_translation_mm},
+          {"mu_water_per_mm", identity.mu_water_per_mm}};
+}
+
+}  // namespace af::evaluation

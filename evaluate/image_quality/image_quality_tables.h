@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <vector>
+
+#include "evaluate/image_quality/drr_comparison.h"
+#include "field/compressed_attenuation_field.h"
+#include "text/csv_table.h"
+
+namespace af::evaluation {
+
+/// A comparison as a row to be sent between ranks, and back.
+nlohmann::json comparison_row(const DrrComparison& comparison);
+DrrComparison comparison_of(const nlohmann::json& row);
+
+/// image-quality.csv: one row per pose, in order; no timings.
+CsvTable image_quality_table(const std::vector<DrrComparison>& comparisons);
+
+/// Index of the comparison at `share` of the ascending PSNRs (0: the worst); nullopt when none was
+/// possible. Ties go to the lower index.
+std::optional<std::size_t> comparison_at(const std::vector<DrrComparison>& comparisons,
+                                         double share);
+
+/// Counts and statistics of summary.json.
+nlohmann::json image_quality_statistics(const std::vector<DrrComparison>& comparisons);
+
+/// Resolution, range and size of a field, as tables show them.
+nlohmann::json field_description(const CompressedAttenuationField& field);
+
+}  // namespace af::evaluation

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <memory>
+
+#include "drr/drr_renderer.h"
+#include "evaluate/image_quality/interpolated_ray_cast.h"
+
+namespace af::evaluation {
+
+/// What a field's DRR loses at one pose, each against ray casting: by interpolation over (u,v)
+/// alone, over (s,t) alone, over both, by what comes after it (16 bits, codebook, caster of the
+/// field), and in all. Mean squared differences over the reference's foreground, in units of its
+/// squared maximum; psnr_db = -10 log10(these), as eq. (12).
+struct LossSplit {
+  static constexpr std::size_t kParts = 5;
+  static constexpr std::array<const char*, kParts> kNames = {
+      "uv", "st", "uv_st", "quantisation", "total"};
+
+  std::array<double, kParts> mean_square{};
+
+  [[nodiscard]] std::array<double, kParts> psnr_db() const;
+};
+
+/// Splits the loss of one view's field. One object per thread.
+/// \test LossSplitter.AFieldWithoutQuantisationLosesByInterpolationAlone
+class LossSplitter {
+ public:
+  /// The two-pass linear look-up of a field of one slab, and the reference; both outlive this.
+  LossSplitter(const DrrRenderer& field,
+               const DrrRenderer& reference,
+               std::shared_ptr<const AttenuationVolume> volume,
+               const RayCasterOptions& ray_caster,
+               const LightSlab& light_slab,
+               const View& view);
+
+  /// NaN when a ray is outside or nothing is in the foreground.
+  [[nodiscard]] LossSplit at_pose(const RigidTransform& room_from_ct) const;
+
+ private:
+  [[nodiscard]] std::vector<float> rendered(const DrrRenderer& renderer,
+                                            const RigidTransform& room_from_ct,
+                                            bool& is_inside) const;
+
+  const DrrRenderer& field_;
+  const DrrRenderer& reference_;
+  InterpolatedRayCast uv_;
+  InterpolatedRayCast st_;
+  InterpolatedRayCast both_;
+  View view_;
+};
+
+}  // namespace af::evaluation

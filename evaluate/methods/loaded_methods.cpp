@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluate/methods/loaded_methods.h"
+
+#include <utility>
+
+#include "base/error.h"
+#include "register/case_loading.h"
+#include "run/terminal.h"
+
+namespace af::evaluation {
+namespace {
+
+registration::CaseLoadOptions load_options(const MethodOptions& options,
+                                           const std::string& renderer,
+                                           int coarsest_level,
+                                           const std::vector<double>& level_blur_sigma_mm) {
+  registration::CaseLoadOptions result;
+  result.coarsest_level = coarsest_level;
+  result.level_blur_sigma_mm = level_blur_sigma_mm;
+  result.renderer =
+      renderer == "field" ? registration::RendererKind::Field : registration::RendererKind::RayCast;
+  if (renderer == "field")
+    for (const std::string& text : options.fields) {
+      const std::size_t equals = text.find('=');
+      result.field_paths[text.substr(0, equals)] = text.substr(equals + 1);
+    }
+  result.ct.series_uid = options.series_uid;
+  result.fiducial_mask_mm = options.method.fiducial_mask_mm;
+  result.water_mu_per_mm = options.water_mu_per_mm;
+  result.ray_caster.step_mm = options.step_mm;
+  return result;
+}
+
+/// Blurs of a problem's levels, means over the views.
+std::vector<double> level_blurs_mm(const registration::RegistrationProblem& problem) {
+  std::vector<double> blurs(problem.views.front().coarse_levels.size(), 0.0);
+  for (const registration::RegistrationView& view : problem.views)
+    for (std::size_t i = 0; i < blurs.size(); ++i)
+      blurs[i] += view.coarse_levels[i].blur_sigma_mm / static_cast<double>(problem.views.size());
+  return blurs;
+}
+
+}  // namespace
+
+std::vector<LoadedMethod> load_methods(const MethodOptions& options,
+                                       const Study& study,
+                                       const StudyCase& study_case,
+                                       const Communicator& world,
+                                       std::map<std::string, std::string>& input_sha256) {
+  std::vector<LoadedMethod> methods;
+  const registration::RegistrationOptions method =
+      all_or_none(world, [&] { return registration::resolve(options.method); });
+  const auto pool = std::make_shared<ThreadPool>(thread_count(options.method.threads));
+  // Ray casting after a field takes its levels' blurs, so that both run the same method.
+  std::vector<double> blurs_mm;
+  for (const std::string& renderer : options.chosen_renderers()) {
+    registration::CaseLoadOptions loading =
+        load_options(options, renderer, method.coarsest_level(), blurs_mm);
+    loading.pool = pool;
+    const registration::LoadedCase loaded =
+        registration::load_case(study, study_case, loading, world);
+    blurs_mm = level_blurs_mm(*loaded.problem);
+    for (const std::string& text : loaded.warnings) warn(world, text);
+    for (const auto& [name, hash] : loaded.input_sha256)
+      input_sha256[study_case.name + ": " + name] = hash;
+    registration::RegistrationRunner runner = all_or_none(
+        world, [&] { return registration::RegistrationRunner(loaded.problem, method, pool); });
+    methods.push_back({renderer, std::move(runner)});
+  }
+  return methods;
+}
+
+}  // namespace af::evaluation

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "evaluate/methods/evaluated_methods.h"
+#include "parallel/communicator.h"
+#include "register/method/registration.h"
+
+namespace af::evaluation {
+
+/// One renderer with everything to register a case by it.
+struct LoadedMethod {
+  std::string renderer;  ///< "field" or "raycast"
+  registration::RegistrationRunner runner;
+};
+
+/// Collective. The methods of a case, in the order of chosen_renderers(); hashes of the inputs go
+/// to `input_sha256`, as "CASE: what". Throws as load_case() does.
+std::vector<LoadedMethod> load_methods(const MethodOptions& options,
+                                       const Study& study,
+                                       const StudyCase& study_case,
+                                       const Communicator& world,
+                                       std::map<std::string, std::string>& input_sha256);
+
+}  // namespace af::evaluation

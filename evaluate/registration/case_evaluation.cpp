@@ -1,0 +1,491 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluate/registration/case_evaluation.h"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <exception>
+#include <map>
+#include <optional>
+#include <span>
+#include <tuple>
+#include <type_traits>
+#include <utility>
+
+#include "base/error.h"
+#include "evaluate/methods/loaded_methods.h"
+#include "evaluate/outputs/row_gathering.h"
+#include "evaluate/registration/shared_measuring.h"
+#include "figures/picture.h"
+#include "files/output_file.h"
+#include "files/sha256.h"
+#include "gold_standard/target_box.h"
+#include "parallel/work_watch.h"
+#include "register/results/registration_results.h"
+#include "register/results/slicer_folder.h"
+#include "run/progress_printer.h"
+#include "run/resumable_items.h"
+#include "run/stop_request.h"
+#include "run/terminal.h"
+#include "text/cbor_json.h"
+
+namespace af::evaluation {
+namespace {
+
+using nlohmann::json;
+using registration::RegistrationResult;
+using registration::RegistrationRunner;
+using registration::StopReason;
+
+/// One renderer's share of a case.
+struct Method {
+  std::string renderer;
+  RegistrationRunner runner;
+  std::vector<std::int64_t> start_indices;  ///< ascending
+};
+
+/// Inside the motion range of every field in use.
+bool is_admissible(const std::vector<Method>& methods, const RigidTransform& room_from_ct) {
+  for (const Method& method : methods)
+    for (const registration::RegistrationView& view : method.runner.problem().views)
+      if (view.limit.has_value() &&
+          !view.limit->range.contains(parameters_from_pose(view.limit->frame, room_from_ct)))
+        return false;
+  return true;
+}
+
+/// Collective. Draws or reads a case's starts: on rank 0, the others share the work.
+StratifiedStarts make_starts(const RegistrationStudyOptions& options,
+                             const Study& study,
+                             const StudyCase& study_case,
+                             const Yardstick& yardstick,
+                             const std::vector<Method>& methods,
+                             const Communicator& world) {
+  SharedStartMeasures measures(
+      world,
+      start_frame(study_case, yardstick),
+      options.start_options(),
+      yardstick.points_ct_mm,
+      [&](const RigidTransform& pose) { return is_admissible(methods, pose); });
+  return starts_measured_together(world, measures, [&](StartMeasures& shared) {
+    if (!options.starts_from.empty())
+      return given_starts(options, study, study_case, yardstick, shared);
+    return options.start_rule == "uniform" ? uniform_starts(shared) : stratified_starts(shared);
+  });
+}
+
+/// Collective. Rank 0's starts on every rank, held once per node: a rank each, ten million would
+/// fill a node.
+SharedArray<PerturbedStart> held_per_node(const SharedArray<PerturbedStart>& starts,
+                                          const Communicator& world) {
+  static_assert(std::is_trivially_destructible_v<PerturbedStart> &&
+                alignof(PerturbedStart) <= Communicator::kNodeMemoryAlignment);
+  if (world.size() == 1) return starts;
+  std::array<std::uint64_t, 1> count = {world.is_root() ? starts.size() : 0};
+  world.maximum(count);
+  if (count[0] == 0) return {};
+  const auto owner = world.allocate_on_nodes_from_root(
+      count[0] * sizeof(PerturbedStart), [&](std::span<std::byte> memory) {
+        std::memcpy(memory.data(), starts.data(), memory.size());
+      });
+  return {owner, {reinterpret_cast<const PerturbedStart*>(owner.get()), count[0]}};
+}
+
+/// With both renderers, ray casting may be given fewer intervals and starts.
+void assign_starts(const RegistrationStudyOptions& options,
+                   const StratifiedStarts& starts,
+                   Method& method) {
+  if (options.only_start.has_value()) {
+    if (static_cast<std::size_t>(*options.only_start) >= starts.starts.size())
+      throw InputError(
+          "--only-start",
+          std::to_string(*options.only_start),
+          "must be less than the number of starts, " + std::to_string(starts.starts.size()));
+    method.start_indices = {*options.only_start};
+    return;
+  }
+  const bool is_reduced = options.renderer == "both" && method.renderer == "raycast";
+  const int intervals =
+      is_reduced ? options.raycast_intervals.value_or(options.intervals) : options.intervals;
+  const int per_interval =
+      is_reduced ? options.raycast_starts_per_interval.value_or(options.starts_per_interval)
+                 : options.starts_per_interval;
+  if (!is_reduced) method.start_indices.reserve(starts.starts.size());
+  // Of the others every start counts, also those of a file that lie beyond the intervals.
+  for (std::size_t i = 0; i < starts.starts.size(); ++i)
+    if (!is_reduced ||
+        (starts.starts[i].interval < intervals && starts.starts[i].rank_in_interval < per_interval))
+      method.start_indices.push_back(static_cast<std::int64_t>(i));
+}
+
+/// Whether a registration ended with a pose that means anything.
+bool has_pose(const RegistrationResult& result) {
+  return std::isfinite(result.similarity) && result.room_from_ct.matrix().allFinite();
+}
+
+void add_result(const RegistrationResult& result,
+                const Yardstick& yardstick,
+                RegistrationRow& row) {
+  row.evaluations = result.evaluations;
+  row.inadmissible = result.inadmissible;
+  row.drr_count = result.drr_count;
+  row.stop_reason = to_string(result.stop_reason);
+  row.seconds = result.seconds;
+  if (!has_pose(result)) return;
+  row.similarity = result.similarity;
+  measure_pose(result.room_from_ct, yardstick, row);
+}
+
+/// The row of one start, without its case; of a failure with its trace.
+TracedRow traced_row(Method& method,
+                     const PerturbedStart& start,
+                     std::int64_t index,
+                     const Yardstick& yardstick) {
+  std::vector<registration::TraceRow> trace;
+  TracedRow traced;
+  RegistrationRow& row = traced.row;
+  row = registered_row(
+      [&](const RigidTransform& room_from_ct) {
+        RegistrationResult result = method.runner.run(room_from_ct, index);
+        trace = result.trace;
+        return result;
+      },
+      start,
+      yardstick);
+  row.renderer = method.renderer;
+  row.start_index = index;
+  if (!row.is_success())
+    traced.trace = trace_points(trace, method.runner.problem().frame(), yardstick);
+  return traced;
+}
+
+/// What of a method remains when its fields are let go.
+struct MethodRows {
+  std::string renderer;
+  std::vector<std::int64_t> start_indices;  ///< rank 0
+  ResumableItems items;                     ///< one per start index
+
+  /// Rank 0: calls `receive` with the row of every start.
+  void visit(const std::function<void(std::int64_t start_index, TracedRow traced)>& receive) const {
+    items.visit([&](std::int64_t index, std::span<const std::byte> record) {
+      receive(index, row_of_record(record, renderer + " rows"));
+    });
+  }
+};
+
+/// Collective. Registers every start of one method that is not finished. Methods go one after the
+/// other: blocks of the work queue then hold work of one duration.
+void register_with(Method& method,
+                   const std::string& case_name,
+                   const StratifiedStarts& starts,
+                   const Yardstick& yardstick,
+                   ResumableItems& items) {
+  std::size_t traced = 0;
+  items.complete(method.start_indices,
+                 "case " + case_name + ", " + method.renderer + " registrations",
+                 [&](std::int64_t index) {
+                   TracedRow traced_start = traced_row(
+                       method, starts.starts[static_cast<std::size_t>(index)], index, yardstick);
+                   traced_start.row.case_name = case_name;
+                   // Items come in order: a rank's first failures are its share of the first of
+                   // all.
+                   if (!traced_start.trace.empty() && ++traced > kMostTraces)
+                     traced_start.trace.clear();
+                   return cbor_bytes(packed_row(traced_start));
+                 });
+}
+
+/// Rank 0: adds the rows of a method, by start index; returns its traces.
+FirstTraces add_rows(const MethodRows& method, FileBackedArray<RegistrationRow>& rows) {
+  FirstTraces traces;
+  const std::vector<std::int64_t>& indices = method.start_indices;
+  const std::span<RegistrationRow> mine = rows.append(indices.size());
+  method.visit([&](std::int64_t index, TracedRow traced) {
+    const auto place = std::lower_bound(indices.begin(), indices.end(), index);
+    mine[static_cast<std::size_t>(place - indices.begin())] = traced.row;
+    keep_if_first(index, std::move(traced.trace), traces);
+  });
+  return traces;
+}
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// Rank 0 says how long each method will take, from a sample: one row by fields; by ray casting,
+/// where that would be long, one similarity for each of the poses that the sample tried. A sample
+/// that fails says nothing: the run itself will tell why.
+void announce_times(std::vector<Method>& methods,
+                    const std::string& case_name,
+                    const StratifiedStarts& starts,
+                    const Yardstick& yardstick,
+                    const Communicator& world) {
+  // What the presets try at the median, where no field gives a sample.
+  double poses_tried = 400.0;
+  for (Method& method : methods) {
+    if (!world.is_root() || method.start_indices.size() < 2) continue;
+    const std::int64_t index = method.start_indices[method.start_indices.size() / 2];
+    const PerturbedStart& start = starts.starts[static_cast<std::size_t>(index)];
+    double seconds = 0.0;
+    try {
+      const auto begin = std::chrono::steady_clock::now();
+      if (method.renderer == "field") {
+        const RegistrationRow row = traced_row(method, start, index, yardstick).row;
+        seconds = seconds_since(begin);
+        if (row.error != InternedText()) continue;
+        poses_tried = static_cast<double>(row.evaluations);
+      } else {
+        std::ignore = method.runner.similarity_at(start.room_from_ct);
+        seconds = poses_tried * seconds_since(begin);
+      }
+    } catch (const std::exception&) {
+      continue;
+    }
+    inform(world,
+           expected_time_text("case " + case_name + ", " + method.renderer + " registrations",
+                              static_cast<std::int64_t>(method.start_indices.size()),
+                              seconds,
+                              world.size()));
+  }
+}
+
+/// Every option, input and start that decides a case's rows.
+DecidingValues deciding_values(const RegistrationStudyOptions& options,
+                               const CaseEvaluation& evaluation) {
+  DecidingValues values = af::deciding_values(to_toml(options), evaluation.input_sha256);
+  values["case name"] = evaluation.case_name;
+  Sha256 starts;
+  for (const PerturbedStart& start : evaluation.starts.starts) {
+    const Eigen::Matrix4d matrix = start.room_from_ct.matrix();
+    starts.update(std::as_bytes(std::span(matrix.data(), 16)));
+  }
+  values["SHA-256 of the starts"] = starts.hex_digest();
+  return values;
+}
+
+void draw_xrays(const registration::RegistrationProblem& problem,
+                const std::filesystem::path& folder,
+                CaseEvaluation& evaluation) {
+  std::vector<PicturePanel> panels;
+  for (const registration::RegistrationView& view : problem.views) {
+    const auto [low, high] = percentile_window(view.xray);
+    panels.push_back({view.xray,
+                      low,
+                      high,
+                      "X-ray " + view.view.camera.name,
+                      "attenuation; the frame is the region of interest",
+                      PicturePanel::Colors::Grey,
+                      {view.view.roi}});
+  }
+  const std::string name = file_name_part(evaluation.case_name) + "-xrays.png";
+  write_picture(
+      panels, static_cast<int>(panels.size()), "Case " + evaluation.case_name, folder / name);
+  evaluation.pictures.push_back(
+      {{"file", name}, {"case", evaluation.case_name}, {"which", "xrays"}});
+}
+
+/// A row worth a look.
+struct ChosenRow {
+  const char* which;
+  RegistrationRow row;
+};
+
+/// Rank 0: the rows of the best, median and worst registration of a method; none when none has a
+/// pose. Rows are visited twice instead of held: memory holds fields at this point.
+std::vector<ChosenRow> chosen_rows(const MethodRows& method) {
+  std::vector<std::pair<double, std::int64_t>> by_tre;
+  method.visit([&](std::int64_t index, const TracedRow& traced) {
+    if (std::isfinite(traced.row.tre_mm)) by_tre.emplace_back(traced.row.tre_mm, index);
+  });
+  if (by_tre.empty()) return {};
+  std::sort(by_tre.begin(), by_tre.end());
+  by_tre.erase(std::unique(by_tre.begin(), by_tre.end()), by_tre.end());
+  const std::array<std::pair<const char*, std::int64_t>, 3> wanted = {
+      {{"best", by_tre.front().second},
+       {"median", by_tre[(by_tre.size() - 1) / 2].second},
+       {"worst", by_tre.back().second}}};
+  std::vector<ChosenRow> chosen;
+  for (const auto& [which, index] : wanted) chosen.push_back({which, {}});
+  method.visit([&](std::int64_t index, const TracedRow& traced) {
+    for (std::size_t i = 0; i < wanted.size(); ++i)
+      if (index == wanted[i].second) chosen[i].row = traced.row;
+  });
+  return chosen;
+}
+
+/// Overlays of chosen registrations, and what Slicer loads of each.
+void draw_overlays(const Method& method,
+                   const std::vector<ChosenRow>& chosen,
+                   const StudyCase& study_case,
+                   const Yardstick& yardstick,
+                   const std::filesystem::path& folder,
+                   CaseEvaluation& evaluation) {
+  for (const auto& [which, row] : chosen) {
+    const RigidTransform pose = pose_from_parameters(
+        yardstick.gold_frame, PoseParameters::from_deg_and_mm(row.final_deg_mm));
+    const std::string slicer = "slicer/" + file_name_part(evaluation.case_name) + "-" + which;
+    registration::write_slicer_folder(method.runner.problem(), pose, study_case, folder / slicer);
+    for (const registration::RegistrationView& view : method.runner.problem().views) {
+      const std::string& camera = view.view.camera.name;
+      const std::string name = file_name_part(evaluation.case_name) + "-" + which + "-" +
+                               file_name_part(camera) + ".png";
+      registration::write_overlay(view,
+                                  pose,
+                                  evaluation.case_name + ", view " + camera + ", " + which +
+                                      " result: TRE " + fixed_text(row.tre_mm, 2) + " mm",
+                                  folder / name);
+      evaluation.pictures.push_back({{"file", name},
+                                     {"case", evaluation.case_name},
+                                     {"which", which},
+                                     {"camera", camera},
+                                     {"slicer", slicer},
+                                     {"renderer", row.renderer.text()},
+                                     {"start_index", row.start_index},
+                                     {"initial_tre_mm", row.initial_tre_mm},
+                                     {"tre_mm", row.tre_mm}});
+    }
+  }
+}
+
+/// Collective. What of each method is finished; nothing of it is done yet.
+std::vector<MethodRows> begin_registrations(const RegistrationStudyOptions& options,
+                                            const CaseEvaluation& evaluation,
+                                            const std::vector<Method>& methods,
+                                            const Communicator& world) {
+  const std::string name = file_name_part(evaluation.case_name);
+  const DecidingValues decides = all_or_none(world, [&] {
+    return world.is_root() ? deciding_values(options, evaluation) : DecidingValues();
+  });
+  std::vector<MethodRows> begun;
+  begun.reserve(methods.size());
+  for (const Method& method : methods)
+    begun.push_back({method.renderer,
+                     world.is_root() ? method.start_indices : std::vector<std::int64_t>(),
+                     {{progress_folder(options.output_folder),
+                       name + "-" + method.renderer,
+                       decides,
+                       options.restarts},
+                      world}});
+  return begun;
+}
+
+/// Rank 0: the pictures of a case, by its first method.
+void draw_pictures(const RegistrationStudyOptions& options,
+                   const StudyCase& study_case,
+                   const Method& method,
+                   const MethodRows& rows,
+                   const Yardstick& yardstick,
+                   CaseEvaluation& evaluation) {
+  const WorkNote note("drawing case " + study_case.name, WorkNote::Kind::Phase);
+  draw_xrays(method.runner.problem(), options.output_folder, evaluation);
+  draw_overlays(
+      method, chosen_rows(rows), study_case, yardstick, options.output_folder, evaluation);
+}
+
+}  // namespace
+
+StartFrame start_frame(const StudyCase& study_case, const Yardstick& yardstick) {
+  return {study_case.name,
+          yardstick.gold_room_from_ct,
+          study_case.center_ct_mm,
+          study_case.target_box_ct};
+}
+
+PoseTableFrames pose_table_frames(const Study& study,
+                                  const StudyCase& study_case,
+                                  const RigidTransform& gold_room_from_ct) {
+  return {study_case.name,
+          study.cases.size() == 1,
+          PoseFrame::about(gold_room_from_ct, study_case.center_ct_mm),
+          PoseFrame::about(study_case.nominal_room_from_ct, study_case.center_ct_mm)};
+}
+
+StratifiedStarts given_starts(const RegistrationStudyOptions& options,
+                              const Study& study,
+                              const StudyCase& study_case,
+                              const Yardstick& yardstick,
+                              StartMeasures& measures) {
+  return starts_at(measures,
+                   read_starts(options.starts_from,
+                               pose_table_frames(study, study_case, yardstick.gold_room_from_ct)));
+}
+
+void set_start(const PerturbedStart& start, RegistrationRow& row) {
+  row.draw_index = start.draw_index;
+  row.interval = start.interval;
+  row.start_deg_mm = start.parameters.deg_and_mm();
+  row.initial_tre_mm = start.initial_tre_mm;
+}
+
+RegistrationRow registered_row(
+    const std::function<RegistrationResult(const RigidTransform& start)>& run,
+    const PerturbedStart& start,
+    const Yardstick& yardstick) {
+  RegistrationRow row;
+  set_start(start, row);
+  try {
+    add_result(run(start.room_from_ct), yardstick, row);
+  } catch (const std::exception& error) {
+    row.stop_reason = "error";
+    row.error = error.what();
+  }
+  return row;
+}
+
+CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
+                             const Study& study,
+                             const StudyCase& study_case,
+                             const Communicator& world,
+                             const std::function<void(const CaseEvaluation&)>& on_starts,
+                             FileBackedArray<RegistrationRow>& all_rows) {
+  CaseEvaluation evaluation;
+  evaluation.case_name = study_case.name;
+  std::optional<WorkNote> phase(
+      std::in_place, "loading case " + study_case.name, WorkNote::Kind::Phase);
+  std::vector<Method> methods;
+  for (LoadedMethod& method :
+       load_methods(options, study, study_case, world, evaluation.input_sha256))
+    methods.push_back({method.renderer, std::move(method.runner), {}});
+  const Yardstick yardstick = all_or_none(world, [&] {
+    evaluation.gold = gold_standard(study, study_case, options.gold);
+    return yardstick_of(study, study_case, evaluation.gold);
+  });
+  evaluation.starts = make_starts(options, study, study_case, yardstick, methods, world);
+  evaluation.starts.starts = held_per_node(evaluation.starts.starts, world);
+  evaluation.start_count = evaluation.starts.starts.size();
+  all_or_none(world, [&] {
+    for (Method& method : methods) assign_starts(options, evaluation.starts, method);
+  });
+  // Refusals first: they leave the results of an earlier run alone.
+  std::vector<MethodRows> rows;
+  if (!options.is_starts_only) rows = begin_registrations(options, evaluation, methods, world);
+  all_or_none(world, [&] { on_starts(evaluation); });
+  if (options.is_starts_only) {
+    evaluation.starts.starts = {};
+    return evaluation;
+  }
+  announce_times(methods, study_case.name, evaluation.starts, yardstick, world);
+  phase.reset();
+  for (std::size_t i = 0; i < methods.size(); ++i)
+    register_with(methods[i], study_case.name, evaluation.starts, yardstick, rows[i].items);
+  // Rows take their place: memory holds one or the other.
+  evaluation.starts.starts = {};
+  all_or_none(world, [&] {
+    if (world.is_root())
+      draw_pictures(options, study_case, methods.front(), rows.front(), yardstick, evaluation);
+  });
+  // Rows take the place of fields and CT: memory holds one or the other.
+  methods.clear();
+  all_or_none(world, [&] {
+    if (!world.is_root()) return;
+    const WorkNote note("reading the rows of case " + study_case.name, WorkNote::Kind::Phase);
+    for (const MethodRows& method : rows)
+      evaluation.traces[method.renderer] = add_rows(method, all_rows);
+  });
+  return evaluation;
+}
+
+}  // namespace af::evaluation

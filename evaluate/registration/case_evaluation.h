@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "evaluate/registration/evaluate_registrations.h"
+#include "evaluate/registration/failure_traces.h"
+#include "evaluate/registration/registration_rows.h"
+#include "evaluate/registration/start_tables.h"
+#include "evaluate/registration/yardstick.h"
+#include "evaluate/starts/perturbed_starts.h"
+#include "files/file_backed_array.h"
+#include "parallel/communicator.h"
+#include "register/method/registration.h"
+#include "study/case_gold_standard.h"
+#include "study/study_file.h"
+
+namespace af::evaluation {
+
+/// What one case of a study gave; all of it on rank 0, on the others what their work needs.
+struct CaseEvaluation {
+  std::string case_name;
+  GoldStandard gold;
+  /// Rank 0; the list of starts on every rank, until they are registered.
+  StratifiedStarts starts;
+  std::size_t start_count = 0;
+  std::map<std::string, FirstTraces> traces;  ///< rank 0: of each renderer
+  std::map<std::string, std::string> input_sha256;
+  std::vector<std::string> pose_problems;             ///< of poses that were read, in words
+  nlohmann::json pictures = nlohmann::json::array();  ///< rank 0: files and what they show
+};
+
+/// What poses in files of one case are relative to.
+PoseTableFrames pose_table_frames(const Study& study,
+                                  const StudyCase& study_case,
+                                  const RigidTransform& gold_room_from_ct);
+
+/// What the starts of a case are relative to.
+StartFrame start_frame(const StudyCase& study_case, const Yardstick& yardstick);
+
+/// The starts of --starts-from for one case.
+StratifiedStarts given_starts(const RegistrationStudyOptions& options,
+                              const Study& study,
+                              const StudyCase& study_case,
+                              const Yardstick& yardstick,
+                              StartMeasures& measures);
+
+/// The start of a row.
+void set_start(const PerturbedStart& start, RegistrationRow& row);
+
+/// The row of one registration, without case, renderer and start index. Never throws for `run`: an
+/// exception becomes stop reason "error" with its message; a result without similarity has no pose.
+/// \test RegisteredRow.OfARegistrationThatThrowsIsAFailure
+RegistrationRow registered_row(
+    const std::function<registration::RegistrationResult(const RigidTransform& start)>& run,
+    const PerturbedStart& start,
+    const Yardstick& yardstick);
+
+/// Collective. Draws a case's starts, calls `on_starts` with the evaluation so far (on every rank,
+/// before anything is registered), registers from every start with every renderer, the work shared
+/// over the ranks as these become free, and draws the X-rays and the overlays of the best, median
+/// and worst result. A registration that throws becomes a row without a pose. With --starts-only
+/// nothing is registered and drawn. Rank 0 adds the rows, by renderer and start index, to `rows`.
+CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
+                             const Study& study,
+                             const StudyCase& study_case,
+                             const Communicator& world,
+                             const std::function<void(const CaseEvaluation&)>& on_starts,
+                             FileBackedArray<RegistrationRow>& rows);
+
+}  // namespace af::evaluation

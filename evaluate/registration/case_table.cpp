@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluate/registration/case_table.h"
+
+#include <string>
+#include <vector>
+
+#include "evaluate/outputs/sample_summary_json.h"
+
+namespace af::evaluation {
+
+using nlohmann::json;
+
+CsvTable case_table(const json& renderers) {
+  CsvTable table({"renderer",
+                  "case",
+                  "starts",
+                  "successes",
+                  "success_rate",
+                  "mean_tre_of_successes_mm",
+                  "sd_tre_of_successes_mm",
+                  "median_tre_of_all_mm",
+                  "p95_tre_of_all_mm"});
+  const auto add = [&](const std::string& renderer, const std::string& name, const json& part) {
+    const json& successes = part.at("tre_of_successes_mm");
+    const json& all = part.at("tre_of_all_mm");
+    table.add_row({renderer,
+                   name,
+                   part.at("starts").dump(),
+                   part.at("successes").dump(),
+                   number_text(number_of(part.at("rate"))),
+                   number_text(number_of(successes.at("mean"))),
+                   number_text(number_of(successes.at("sd"))),
+                   number_text(number_of(all.at("median"))),
+                   number_text(number_of(all.at("p95")))});
+  };
+  for (const json& renderer : renderers) {
+    const auto name = renderer.at("renderer").get<std::string>();
+    for (const json& entry : renderer.at("cases"))
+      add(name, entry.at("case").get<std::string>(), entry);
+    add(name, "all", renderer);
+  }
+  return table;
+}
+
+}  // namespace af::evaluation

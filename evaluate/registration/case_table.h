@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include "text/csv_table.h"
+
+namespace af::evaluation {
+
+/// The paper's Table II, cases.csv: a row per method and case, and one over all cases ("all"), of
+/// the "renderers" of summary.json. TREs in mm; failures stay in rates and in the last columns.
+CsvTable case_table(const nlohmann::json& renderers);
+
+}  // namespace af::evaluation

@@ -1,0 +1,454 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluate/registration/evaluate_registrations.h"
+
+#include <cmath>
+#include <iostream>
+#include <map>
+#include <optional>
+#include <set>
+#include <span>
+#include <sstream>
+
+#include <CLI/CLI.hpp>
+
+#include "base/error.h"
+#include "base/toml_text.h"
+#include "cli/app_main.h"
+#include "cli/run_limits.h"
+#include "evaluate/methods/loaded_methods.h"
+#include "evaluate/outputs/failed_start.h"
+#include "evaluate/outputs/result_figures.h"
+#include "evaluate/outputs/sample_summary_json.h"
+#include "evaluate/registration/case_evaluation.h"
+#include "evaluate/registration/case_table.h"
+#include "evaluate/registration/failure_traces.h"
+#include "evaluate/registration/found_poses.h"
+#include "evaluate/registration/registration_statistics.h"
+#include "evaluate/report/number_html.h"
+#include "figures/gnuplot_figure.h"
+#include "files/output_file.h"
+#include "files/sha256.h"
+#include "parallel/work_watch.h"
+#include "run/output_lock.h"
+#include "run/progress_manifest.h"
+#include "run/provenance.h"
+#include "run/stop_request.h"
+#include "run/terminal.h"
+#include "study/shared_inputs.h"
+#include "text/json_text.h"
+#include "text/shell_words.h"
+
+namespace af::evaluation {
+namespace {
+
+using nlohmann::json;
+
+/// What af-simulate left in a folder; null when it did not make it.
+json simulation_in(const std::filesystem::path& folder) {
+  const std::filesystem::path path = folder / "provenance.json";
+  if (!std::filesystem::exists(path)) return nullptr;
+  const std::string text = read_text_file(path);
+  try {
+    json provenance = json_of_text(text, path.string());
+    if (provenance.is_object() && provenance.value("program", json()) == "af-simulate")
+      return provenance;
+  } catch (const FileError&) {  // another program's
+  }
+  return nullptr;
+}
+
+/// Options that the command for one start alone has of its own, or does not need.
+const std::set<std::string> kNotOfRepeats = {"--case",
+                                             "--renderer",
+                                             "--starts-from",
+                                             "--starts-per-interval",
+                                             "--start-rule",
+                                             "--starts-only",
+                                             "--only-start",
+                                             "--restart",
+                                             "--max-hours",
+                                             "--stall-minutes",
+                                             "--raycast-starts-per-interval",
+                                             "--raycast-intervals",
+                                             "--output"};
+
+/// What repeat_command() makes the command for one start of; null for another program's poses.
+json repeat_json(const RegistrationStudyOptions& options) {
+  if (!options.poses_from.empty()) return nullptr;
+  const std::filesystem::path folder =
+      std::filesystem::absolute(options.output_folder).lexically_normal();
+  return {{"command",
+           "cd " + shell_quoted(std::filesystem::current_path().string()) + " && " +
+               options.program + " registration" + options.shared_by_repeats + " --starts-from " +
+               shell_quoted((folder / "starts.csv").string())},
+          {"renderer", options.renderer},
+          {"output", (folder / "repeats").string()}};
+}
+
+/// How the study's X-rays were simulated, if they were: the provenance that af-simulate leaves
+/// beside study.toml, or beside the X-rays when studies were joined. Then that of the first case
+/// speaks, and the commands of all are listed.
+json simulation_of(const Study& study) {
+  if (json simulation = simulation_in(study.path.parent_path()); simulation.is_object())
+    return simulation;
+  json first;
+  json commands = json::object();
+  for (const StudyCase& study_case : study.cases) {
+    const json simulation = simulation_in(study_case.views.front().xray.parent_path());
+    if (!simulation.is_object()) continue;
+    if (first.is_null()) first = simulation;
+    commands[study_case.name] = simulation.value("command_line", "");
+  }
+  if (first.is_object()) first["commands_of_cases"] = commands;
+  return first;
+}
+
+json case_json(const CaseEvaluation& evaluation) {
+  return {{"case", evaluation.case_name},
+          {"gold", to_json(evaluation.gold)},
+          {"starts", evaluation.start_count},
+          {"draws", evaluation.starts.draws},
+          {"inadmissible_draws", evaluation.starts.inadmissible_draws},
+          {"inadmissible_draws_per_interval", evaluation.starts.inadmissible_per_interval},
+          {"draws_beyond_last_interval", evaluation.starts.draws_beyond}};
+}
+
+/// Beside every TRE what the gold standard has by itself: of a case, and the mean over a renderer's
+/// starts; null when a case's gold pose is a stated one.
+void add_gold_uncertainty(const std::vector<CaseEvaluation>& evaluations, json& renderers) {
+  std::map<std::string, double> own_mm;
+  for (const CaseEvaluation& evaluation : evaluations)
+    own_mm[evaluation.case_name] = own_tre_mm(evaluation.gold);
+  for (json& renderer : renderers) {
+    double sum_mm = 0.0;
+    double starts = 0.0;
+    for (json& entry : renderer["cases"]) {
+      const double case_mm = own_mm.at(entry["case"].get<std::string>());
+      entry["gold_uncertainty_mm"] = number_json(case_mm);
+      sum_mm += case_mm * entry["starts"].get<double>();
+      starts += entry["starts"].get<double>();
+    }
+    renderer["gold_uncertainty_mm"] = number_json(sum_mm / starts);
+  }
+}
+
+void draw_figures(const RegistrationStudyOptions& options, std::span<const RegistrationRow> rows) {
+  std::vector<OutcomeGroup> groups;
+  for (const std::string& renderer : options.renderers())
+    groups.push_back(
+        {renderer == "raycast" ? "ray casting" : renderer, outcomes_of(rows, renderer)});
+  const std::filesystem::path& folder = options.output_folder;
+  draw_success_rates(groups, options.intervals, options.interval_width_mm, folder / "success-rate");
+  draw_tre_histogram(groups, folder / "tre-histogram");
+  draw_tre_scatter(groups, options.intervals * options.interval_width_mm, folder / "tre-scatter");
+}
+
+json summary_json(const RegistrationStudyOptions& options,
+                  const Study& study,
+                  const std::vector<CaseEvaluation>& evaluations,
+                  std::span<const RegistrationRow> rows) {
+  json summary = {{"format", "attenuation-fields evaluation"},
+                  {"format_version", 1},
+                  {"kind", "registration"},
+                  {"study", study.path.string()},
+                  {"success_tre_mm", kSuccessTreMm}};
+  const registration::RegistrationOptions method = registration::resolve(options.method);
+  summary["method"] = {
+      {"preset", options.method.chains.empty() ? options.method.preset_name() : "chain"},
+      {"similarity", method.similarity_list()},
+      {"optimizer", method.optimizer_list()}};
+  summary["simulation"] = simulation_of(study);
+  summary["cases"] = json::array();
+  summary["pictures"] = json::array();
+  for (const CaseEvaluation& evaluation : evaluations) {
+    summary["cases"].push_back(case_json(evaluation));
+    for (const json& picture : evaluation.pictures) summary["pictures"].push_back(picture);
+  }
+  summary["renderers"] = json::array();
+  for (const std::string& renderer : options.renderers())
+    summary["renderers"].push_back(renderer_statistics(
+        rows, renderer, {options.intervals, options.interval_width_mm, options.method.seed}));
+  add_gold_uncertainty(evaluations, summary["renderers"]);
+  std::vector<std::string> found = row_problems(rows);
+  for (const CaseEvaluation& evaluation : evaluations)
+    found.insert(found.end(), evaluation.pose_problems.begin(), evaluation.pose_problems.end());
+  if (!options.poses_from.empty()) {
+    std::set<std::string> known;
+    for (const StudyCase& study_case : study.cases) known.insert(study_case.name);
+    for (const std::string& text : unknown_case_problems(options.poses_from, known))
+      found.push_back(text);
+  }
+  summary["row_problems"] = found;
+  summary["warnings"] = warnings_about_cases(evaluations.size());
+  summary["field_against_raycast"] =
+      paired_statistics(rows, options.equivalence_margin_mm, options.method.seed);
+  summary["figures"] = {"success-rate", "tre-histogram", "tre-scatter"};
+  summary["repeat"] = repeat_json(options);
+  if (options.only_start.has_value()) summary["only_start"] = *options.only_start;
+  return summary;
+}
+
+void write_traces(const std::filesystem::path& folder,
+                  const std::vector<CaseEvaluation>& evaluations) {
+  // Those of an earlier run would be taken for this one's.
+  std::filesystem::remove_all(folder / "traces");
+  for (const CaseEvaluation& evaluation : evaluations)
+    for (const auto& [renderer, traces] : evaluation.traces)
+      for (const auto& [start_index, trace] : traces) {
+        make_output_folder(folder / "traces");
+        write_text_file(folder / trace_file(evaluation.case_name, renderer, start_index),
+                        trace_table(trace).to_text());
+      }
+}
+
+/// The mean TRE of successes beside the gold standard's own error; empty without a success.
+std::string mean_text(const json& renderer) {
+  const double mean_mm = number_of(renderer["tre_of_successes_mm"]["mean"]);
+  const double gold_mm = number_of(renderer["gold_uncertainty_mm"]);
+  if (!std::isfinite(mean_mm)) return "";
+  return ", mean TRE of these " + fixed_text(mean_mm, 2) + " mm" +
+         (std::isfinite(gold_mm) ? " (gold standard by itself: " + fixed_text(gold_mm, 2) + " mm)"
+                                 : "");
+}
+
+void print_outcome(const json& summary,
+                   const std::filesystem::path& folder,
+                   const Communicator& world) {
+  for (const json& renderer : summary["renderers"]) {
+    std::cout << renderer["renderer"].get<std::string>() << ": "
+              << renderer["successes"].get<std::int64_t>() << " of "
+              << renderer["starts"].get<std::int64_t>() << " starts succeeded (TRE < "
+              << number_text(kSuccessTreMm) << " mm)";
+    std::cout << mean_text(renderer);
+    const double seconds = number_of(renderer["seconds"]["median"]);
+    if (std::isfinite(seconds)) std::cout << ", median " << seconds_text(seconds) << " each";
+    std::cout << '\n';
+  }
+  for (const json& warning : summary["warnings"]) warn(world, warning.get<std::string>());
+  for (const json& problem : summary["row_problems"])
+    std::cout << "problem: " << problem.get<std::string>() << '\n';
+  std::cout << "results: " << folder.string() << '\n';
+}
+
+std::vector<StudyCase> chosen_cases(const RegistrationStudyOptions& options, const Study& study) {
+  std::vector<StudyCase> cases;
+  for (const StudyCase* study_case : study.chosen_cases(options.cases))
+    cases.push_back(*study_case);
+  if (cases.size() > 1 && !options.fields.empty())
+    throw InputError("--field",
+                     options.fields.front(),
+                     "a field belongs to one CT: with several cases put the key `field` into the "
+                     "study, or choose one by --case",
+                     study.path.string());
+  return cases;
+}
+
+}  // namespace
+
+std::vector<std::string> RegistrationStudyOptions::renderers() const {
+  if (!poses_from.empty()) return {method_name};
+  return chosen_renderers();
+}
+
+std::vector<std::string> problems(const RegistrationStudyOptions& options) {
+  std::vector<std::string> found = problems(options.start_options());
+  append_problems(options, found);
+  const auto require_part = [&](const char* name, const std::optional<int>& part, int whole) {
+    if (part.has_value() && !(*part >= 1 && *part <= whole))
+      found.push_back(std::string(name) + " = " + std::to_string(*part) + ": must be from 1 to " +
+                      std::to_string(whole));
+    if (part.has_value() && options.renderer != "both")
+      found.push_back(std::string(name) + " = " + std::to_string(*part) +
+                      ": must not be given without --renderer both");
+  };
+  require_part("--raycast-starts-per-interval",
+               options.raycast_starts_per_interval,
+               options.starts_per_interval);
+  require_part("--raycast-intervals", options.raycast_intervals, options.intervals);
+  if (!(options.equivalence_margin_mm > 0.0) || !std::isfinite(options.equivalence_margin_mm))
+    found.push_back("--equivalence-margin-mm = " + number_text(options.equivalence_margin_mm) +
+                    ": must be positive");
+  if (options.only_start.has_value() && *options.only_start < 0)
+    found.push_back("--only-start = " + std::to_string(*options.only_start) + ": must be >= 0");
+  if (!options.poses_from.empty() && options.starts_from.empty())
+    found.push_back("--poses-from = '" + options.poses_from.string() +
+                    "': needs --starts-from, the starts.csv that the poses were found from");
+  if (options.method_name.empty() ||
+      options.method_name.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
+                                            "0123456789 ._+-") != std::string::npos)
+    found.push_back("--method-name = '" + options.method_name +
+                    "': must hold letters, digits, blanks and . _ + - only");
+  if (options.poses_from.empty() && options.method_name != RegistrationStudyOptions{}.method_name)
+    found.push_back("--method-name = '" + options.method_name +
+                    "': must not be given without --poses-from");
+  return found;
+}
+
+std::string to_toml(const RegistrationStudyOptions& options) {
+  std::ostringstream out;
+  out << to_toml(static_cast<const MethodOptions&>(options))
+      << "starts_per_interval = " << options.starts_per_interval
+      << "\nintervals = " << options.intervals
+      << "\ninterval_width_mm = " << number_text(options.interval_width_mm) << "\nstart_rule = \""
+      << options.start_rule << "\"\n";
+  if (!options.starts_from.empty())
+    out << "starts_from = " << toml_text(options.starts_from.string()) << '\n';
+  if (options.only_start.has_value()) out << "only_start = " << *options.only_start << '\n';
+  if (!options.poses_from.empty())
+    out << "poses_from = " << toml_text(options.poses_from.string())
+        << "\nmethod_name = " << toml_text(options.method_name) << '\n';
+  if (options.renderer == "both")
+    out << "raycast_starts_per_interval = "
+        << options.raycast_starts_per_interval.value_or(options.starts_per_interval)
+        << "\nraycast_intervals = " << options.raycast_intervals.value_or(options.intervals)
+        << '\n';
+  out << "equivalence_margin_mm = " << number_text(options.equivalence_margin_mm)
+      << "\ncase = " << toml_list(options.cases) << '\n';
+  return out.str();
+}
+
+CLI::App* bind_registration(CLI::App& app, RegistrationStudyOptions& options) {
+  CLI::App* command = app.add_subcommand(
+      "registration",
+      "Registers the cases of a study from starts at stated distances from the gold pose and "
+      "reports TRE and success (the paper's Table II, Figs. 15 and 16)");
+  bind_method(*command, options);
+  command->add_option("--case", options.cases, "Case of the study, may be repeated (default: all)")
+      ->take_all();
+  command
+      ->add_option("--starts-per-interval",
+                   options.starts_per_interval,
+                   "Starts in each interval of initial TRE")
+      ->capture_default_str();
+  command
+      ->add_option(
+          "--intervals", options.intervals, "Number of intervals of initial TRE, from 0 mm")
+      ->capture_default_str();
+  command->add_option("--interval-width-mm", options.interval_width_mm, "Width of an interval, mm")
+      ->capture_default_str();
+  command
+      ->add_option("--start-rule",
+                   options.start_rule,
+                   "stratified: as many starts in each interval (the paper); uniform: as many in "
+                   "all, their initial TREs uniform over all intervals")
+      ->check(CLI::IsMember({"stratified", "uniform"}))
+      ->capture_default_str();
+  command->add_option("--starts-from",
+                      options.starts_from,
+                      "starts.csv of another run instead of drawn starts: [case,] and m00 ... m23 "
+                      "of room_from_ct, or start_rx_deg ... start_tz_mm relative to gold");
+  command->add_flag("--starts-only",
+                    options.is_starts_only,
+                    "Write starts.csv, for other programs, and register nothing");
+  command->add_option("--only-start",
+                      options.only_start,
+                      "Register from this start alone, its start_index in starts.csv, by every "
+                      "renderer: repeats one row of a run");
+  command->add_option("--poses-from",
+                      options.poses_from,
+                      "Evaluate the poses that another program found from --starts-from, without "
+                      "registering: CSV of start_index, [case, seconds] and m00 ... m23 of "
+                      "room_from_ct, or rx_deg ... tz_mm relative to the nominal pose, or "
+                      "final_rx_deg ... relative to gold; or a folder of [CASE-]INDEX.tfm");
+  command->add_option("--method-name", options.method_name, "With --poses-from: what to call them")
+      ->capture_default_str();
+  command->add_option("--raycast-starts-per-interval",
+                      options.raycast_starts_per_interval,
+                      "With --renderer both: so many of each interval's starts also by ray casting "
+                      "(default: all)");
+  command->add_option("--raycast-intervals",
+                      options.raycast_intervals,
+                      "With --renderer both: ray casting only in the first so many intervals "
+                      "(default: all)");
+  command
+      ->add_option("--equivalence-margin-mm",
+                   options.equivalence_margin_mm,
+                   "Field and ray casting count as equal when their mean TREs differ by less, mm: "
+                   "two one-sided tests")
+      ->capture_default_str();
+  command->add_option("--seed", options.method.seed, "Of the starts, and of what cma-es draws")
+      ->capture_default_str();
+  cli::bind_resume(*command, options.restarts);
+  command->add_option("-o,--output", options.output_folder, "Folder for the results")->required();
+  command->parse_complete_callback([&options, command] {
+    options.shared_by_repeats = cli::given_options(*command, kNotOfRepeats);
+  });
+  return command;
+}
+
+void run_registration(const RegistrationStudyOptions& options,
+                      const std::string& command_line,
+                      const Communicator& world) {
+  const std::filesystem::path& folder = options.output_folder;
+  listen_for_stop_requests();
+  std::vector<std::string> study_warnings;
+  all_or_none(world, [&] {
+    throw_if_any(problems(options));
+    if (world.is_root())
+      announce_outputs(
+          folder, {"starts.csv", "registrations.csv", "cases.csv", "reproduce.sh", "summary.json"});
+  });
+  const Study study = read_study(options.study, world, &study_warnings);
+  for (const std::string& text : study_warnings) warn(world, text);
+  const std::vector<StudyCase> cases =
+      all_or_none(world, [&] { return chosen_cases(options, study); });
+  std::optional<OutputLock> lock;
+  std::optional<StartsFile> starts_file;
+  all_or_none(world, [&] {
+    if (!world.is_root()) return;
+    require_gnuplot();
+    make_output_folder(folder);
+    lock.emplace(folder);
+    starts_file.emplace(folder / "starts.csv");
+  });
+
+  FileBackedArray<RegistrationRow> rows(folder);
+  std::vector<CaseEvaluation> evaluations;
+  for (const StudyCase& study_case : cases) {
+    const auto on_starts = [&](const CaseEvaluation& so_far) {
+      if (!world.is_root()) return;
+      // What an earlier run left here is whole no more.
+      remove_output(folder / "summary.json");
+      starts_file->add(so_far.case_name, so_far.starts.starts.view());
+      if (&study_case == &cases.back()) starts_file->finish();
+    };
+    evaluations.push_back(options.poses_from.empty()
+                              ? evaluate_case(options, study, study_case, world, on_starts, rows)
+                              : all_or_none(world, [&] {
+                                  return world.is_root()
+                                             ? evaluate_found_poses(
+                                                   options, study, study_case, on_starts, rows)
+                                             : CaseEvaluation{};
+                                }));
+  }
+  if (options.is_starts_only) {
+    if (world.is_root()) std::cout << "starts: " << (folder / "starts.csv").string() << '\n';
+    return;
+  }
+  all_or_none(world, [&] {
+    if (!world.is_root()) return;
+    const WorkNote note("writing the results", WorkNote::Kind::Phase);
+    Provenance provenance = {"af-evaluate registration",
+                             command_line,
+                             to_toml(options),
+                             options.method.seed,
+                             world.size(),
+                             {{"study", sha256_of_file(study.path.string())}}};
+    for (const CaseEvaluation& evaluation : evaluations)
+      provenance.input_sha256.insert(evaluation.input_sha256.begin(),
+                                     evaluation.input_sha256.end());
+    write_registrations(folder / "registrations.csv", rows.view());
+    write_traces(folder, evaluations);
+    draw_figures(options, rows.view());
+    write_reproduce_script(folder, provenance);
+    json summary = summary_json(options, study, evaluations, rows.view());
+    write_text_file(folder / "cases.csv", case_table(summary["renderers"]).to_text());
+    summary["provenance"] = af::to_json(provenance);
+    // Last: when it is there, everything is.
+    write_text_file(folder / "summary.json", summary.dump(2) + "\n");
+    std::filesystem::remove_all(progress_folder(folder));
+    print_outcome(summary, folder, world);
+  });
+}
+
+}  // namespace af::evaluation

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "cli/app_forward.h"
+#include "evaluate/methods/evaluated_methods.h"
+#include "evaluate/starts/perturbed_starts.h"
+#include "parallel/communicator.h"
+
+namespace af::evaluation {
+
+/// `af-evaluate registration` as typed; method.seed is the seed of the starts, too.
+struct RegistrationStudyOptions : MethodOptions {
+  std::vector<std::string> cases;  ///< empty: all
+  int starts_per_interval = 30;
+  int intervals = 8;
+  double interval_width_mm = 2.0;
+  std::optional<int> raycast_starts_per_interval;  ///< with "both"; default: as many
+  std::optional<int> raycast_intervals;            ///< with "both"; default: as many
+  std::string start_rule = "stratified";           ///< or "uniform" in initial TRE
+  std::filesystem::path starts_from;               ///< starts.csv instead of drawn ones
+  bool is_starts_only = false;                     ///< write starts.csv and register nothing
+  std::optional<std::int64_t> only_start;          ///< of the table of starts, by every renderer
+  std::filesystem::path poses_from;                ///< poses that another program found
+  std::string method_name = "poses";               ///< what these are called
+  double equivalence_margin_mm = 0.1;
+  bool restarts = false;  ///< throw unfinished work away
+  std::filesystem::path output_folder;
+  std::string program = "af-evaluate";  ///< as typed, quoted for a shell
+  std::string shared_by_repeats;        ///< options as typed but those of starts and output
+
+  /// Methods in the order of rows: "field" before "raycast"; with poses_from method_name alone.
+  [[nodiscard]] std::vector<std::string> renderers() const;
+  [[nodiscard]] StartOptions start_options() const {
+    return {intervals, interval_width_mm, starts_per_interval, method.seed};
+  }
+};
+
+std::vector<std::string> problems(const RegistrationStudyOptions& options);
+
+std::string to_toml(const RegistrationStudyOptions& options);
+
+/// Adds the subcommand; returns it.
+CLI::App* bind_registration(CLI::App& app, RegistrationStudyOptions& options);
+
+/// Collective. Registers a study's cases from starts about gold (Sec. IV-B), or takes the poses
+/// that another program found, and writes starts.csv (before anything is registered),
+/// registrations.csv, figures, overlays, summary.json and reproduce.sh. Finished registrations are
+/// kept in OUTPUT.progress/ until all is written; StoppedError when SIGUSR1 asked for a stop.
+void run_registration(const RegistrationStudyOptions& options,
+                      const std::string& command_line,
+                      const Communicator& world);
+
+}  // namespace af::evaluation

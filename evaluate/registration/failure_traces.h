@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+// How registrations that failed searched: kept within stated bounds.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <vector>
+
+#include "evaluate/registration/registration_rows.h"
+#include "evaluate/registration/yardstick.h"
+#include "register/method/registration.h"
+#include "text/csv_table.h"
+
+namespace af::evaluation {
+
+/// So many failures of each case and method keep their traces: those of the lowest start indices.
+inline constexpr std::size_t kMostTraces = 60;
+/// So many steps of a trace are kept: of longer ones the first, the last and evenly spread others.
+inline constexpr std::size_t kMostTracePoints = 200;
+
+/// A search as seen from the gold pose. `frame` is what the trace's parameters are relative to.
+std::vector<TracePoint> trace_points(const std::vector<registration::TraceRow>& trace,
+                                     const PoseFrame& frame,
+                                     const Yardstick& yardstick);
+
+/// The failures of one case and method that keep their traces, by start index.
+using FirstTraces = std::map<std::int64_t, std::vector<TracePoint>>;
+
+/// Adds the trace of a start, unless it is empty or there are `kMostTraces` of lower indices.
+/// Starts come in any order. \test FailureTraces.AreKeptOfTheFirstFailuresOfAMethodOnly
+void keep_if_first(std::int64_t start_index, std::vector<TracePoint> trace, FirstTraces& kept);
+
+/// stage, step_mm, poses_tried, similarity, rx_deg ... tz_mm (relative to gold), tre_mm.
+CsvTable trace_table(const std::vector<TracePoint>& trace);
+
+}  // namespace af::evaluation

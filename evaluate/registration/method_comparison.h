@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+// Finished registration runs side by side: one row per run, case and renderer.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "evaluate/report/evaluation_run.h"
+#include "evaluate/statistics/success_rate.h"
+#include "text/csv_table.h"
+
+namespace af::evaluation {
+
+/// What one method did on one case of one run.
+struct MethodRow {
+  std::string run;  ///< its folder's name
+  std::string case_name;
+  std::string method;  ///< "PRESET SIMILARITY OPTIMIZER", or the name of other programs' poses
+  std::string preset, similarity, optimizer;  ///< the parts of it; empty for other programs' poses
+  std::string renderer;
+  std::vector<IntervalSuccess> bands;  ///< of initial TRE, see kBandEndsMm
+  std::int64_t starts = 0;
+  double mean_tre_mm = 0.0;  ///< of successes, as the rest
+  double median_tre_mm = 0.0;
+  double rotation_bias_deg = 0.0;    ///< length of the mean signed rotation
+  double translation_bias_mm = 0.0;  ///< length of the mean signed translation
+  double median_drr_count = 0.0;     ///< of all starts, as the seconds
+  double median_seconds = 0.0;
+};
+
+/// Bands of initial TRE: 0 to 8, 8 to 16, 16 to 30 mm.
+inline constexpr double kBandEndsMm[] = {0.0, 8.0, 16.0, 30.0};
+
+/// Rows of all registration runs, by run, case and renderer. FileError when a run's table or
+/// summary lacks something.
+std::vector<MethodRow> method_rows(const std::vector<EvaluationRun>& runs);
+
+/// With Wilson intervals and counts.
+CsvTable methods_table(const std::vector<MethodRow>& rows);
+
+/// The same for people, as a table in Markdown.
+std::string methods_markdown(const std::vector<MethodRow>& rows);
+
+/// Success for the first two bands and median TRE, as a table in Markdown of measures against
+/// optimisers: one line per case, renderer, preset and measure.
+std::string screen_markdown(const std::vector<MethodRow>& rows);
+
+/// The same rows as one line per study and one column per method: success for the three bands (%),
+/// median TRE of successes (mm), median milliseconds. A run's folder is named STUDY-PRESET...;
+/// others are left out. Empty with fewer than two methods.
+std::string studies_markdown(const std::vector<MethodRow>& rows);
+
+/// Field against ray casting from the same starts, of the runs that have both: success, the paired
+/// TRE difference with its 90 % interval, two one-sided tests and their power, as a table in
+/// Markdown; empty without such a run.
+std::string pairs_markdown(const std::vector<EvaluationRun>& runs);
+
+}  // namespace af::evaluation

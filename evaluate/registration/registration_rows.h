@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/interned_text.h"
+#include "evaluate/registration/registration_errors.h"
+#include "evaluate/starts/perturbed_starts.h"
+#include "evaluate/statistics/success_rate.h"
+#include "text/csv_table.h"
+
+namespace af::evaluation {
+
+/// One step of a search that failed.
+struct TracePoint {
+  int stage = 0;  ///< from 1, counted over the chains
+  double step_mm = 0.0;
+  std::int64_t poses_tried = 0;  ///< so far, all stages
+  double similarity = 0.0;
+  std::array<double, 6> deg_mm{};  ///< relative to gold, about the ROI centre
+  double tre_mm = 0.0;
+};
+
+/// One registration as evaluated. Without an end pose (stop reasons of failed registrations)
+/// similarity, TRE and final parameters are NaN. Trivially copyable: millions are held in
+/// file-backed memory.
+struct RegistrationRow {
+  static constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
+
+  InternedText case_name;
+  InternedText renderer;         ///< "field" or "raycast"
+  std::int64_t start_index = 0;  ///< row of the case's starts in starts.csv
+  std::uint64_t draw_index = 0;
+  int interval = 0;                      ///< of initial TRE
+  std::array<double, 6> start_deg_mm{};  ///< relative to gold, about the ROI centre
+  std::array<double, 6> final_deg_mm = {kMissing, kMissing, kMissing, kMissing, kMissing, kMissing};
+  double initial_tre_mm = kMissing;
+  double tre_mm = kMissing;
+  double stated_pose_tre_mm = kMissing;  ///< against gold_room_from_ct when gold is the fiducials'
+  RegistrationErrors errors;
+  double similarity = kMissing;
+  std::int64_t evaluations = 0;
+  std::int64_t inadmissible = 0;
+  std::int64_t drr_count = 0;
+  InternedText stop_reason;
+  InternedText error;    ///< message of a registration that threw
+  double seconds = 0.0;  ///< wall time
+
+  [[nodiscard]] bool is_success() const { return tre_mm < kSuccessTreMm; }
+};
+
+/// A row and how the search went: of some failures, see failure_traces.h; else empty.
+struct TracedRow {
+  RegistrationRow row;
+  std::vector<TracePoint> trace;
+};
+
+/// A row as it is kept while others are unfinished, and back.
+nlohmann::json packed_row(const TracedRow& traced);
+TracedRow row_of(const nlohmann::json& packed);
+/// The same from a record of a file, in CBOR; FileError naming `file` when it holds no row.
+TracedRow row_of_record(std::span<const std::byte> record, const std::string& file);
+
+/// registrations.csv with the contract's columns, in the given order; timings last.
+CsvTable registrations_table(std::span<const RegistrationRow> rows);
+
+/// registrations.csv of any length, a part at a time.
+void write_registrations(const std::filesystem::path& path, std::span<const RegistrationRow> rows);
+
+/// starts.csv: the starts of all cases, in order, of any number. It has its name once finished.
+class StartsFile {
+ public:
+  explicit StartsFile(std::filesystem::path path);
+  void add(const std::string& case_name, std::span<const PerturbedStart> starts);
+  /// FileError when it cannot be written whole.
+  void finish();
+
+ private:
+  std::filesystem::path path_;
+  std::filesystem::path partial_;
+  std::ofstream file_;
+};
+
+/// Starts and TREs of one renderer, in row order.
+std::vector<TreOutcome> outcomes_of(std::span<const RegistrationRow> rows,
+                                    const std::string& renderer);
+
+}  // namespace af::evaluation

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "evaluate/starts/perturbed_starts.h"
+#include "parallel/communicator.h"
+
+namespace af::evaluation {
+
+/// Shares what rank 0 asks for: an equal part of the draws or poses on every rank.
+class SharedStartMeasures final : public StartMeasures {
+ public:
+  SharedStartMeasures(const Communicator& world,
+                      StartFrame frame,
+                      const StartOptions& options,
+                      std::span<const Eigen::Vector3d> target_points_ct_mm,
+                      IsAdmissible is_admissible);
+
+  // Rank 0, while the others serve(). An error on any rank is thrown on all and ends the sharing.
+  std::vector<DrawVerdict> judge_draws(IndexRange draws) override;
+  std::vector<double> tres_mm(std::span<const RigidTransform> room_from_ct) override;
+  std::vector<UniformStart> draw_uniform(IndexRange starts) override;
+
+  /// The other ranks: computes parts until rank 0 calls end().
+  void serve();
+  /// Rank 0. Does nothing when an error has ended the sharing.
+  void end();
+
+ private:
+  using Words = std::vector<std::uint64_t>;
+  enum class Task : std::uint64_t { End, JudgeDraws, Tres, DrawUniform };
+  struct Question {
+    Task task = Task::End;
+    IndexRange items;
+  };
+  Words ask(Task task, IndexRange items, std::span<const RigidTransform> poses = {});
+  Words answer(std::vector<std::byte> bytes);
+  Words part_of_answer(const Question& question, std::span<const std::byte> poses);
+  Words answer_alone(const Question& question, IndexRange part, std::span<const std::byte> poses);
+
+  const Communicator& world_;
+  bool is_over_ = false;
+};
+
+/// Collective. The starts that `make` gives on rank 0, none on the other ranks, which share its
+/// measures meanwhile. Errors are thrown on every rank.
+StratifiedStarts starts_measured_together(
+    const Communicator& world,
+    SharedStartMeasures& measures,
+    const std::function<StratifiedStarts(StartMeasures& measures)>& make);
+
+}  // namespace af::evaluation

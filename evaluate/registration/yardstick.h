@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+// What poses are measured with, our own registrations' and those of other programs alike.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "evaluate/registration/registration_rows.h"
+#include "geometry/camera_geometry.h"
+#include "study/case_gold_standard.h"
+#include "study/study_file.h"
+
+namespace af::evaluation {
+
+/// The gold pose of one case and all that errors are defined by.
+struct Yardstick {
+  PoseFrame gold_frame;
+  RigidTransform gold_room_from_ct = RigidTransform::Identity();
+  std::optional<RigidTransform> stated_pose;  ///< only beside fiducials
+  std::vector<Eigen::Vector3d> points_ct_mm;
+  Eigen::Vector3d center_ct_mm = Eigen::Vector3d::Zero();  ///< c_roi
+  CameraRig rig;                                           ///< the cameras of the case's views
+};
+
+Yardstick yardstick_of(const Study& study, const StudyCase& study_case, const GoldStandard& gold);
+
+/// Final parameters and all errors of a pose into its row.
+void measure_pose(const RigidTransform& room_from_ct,
+                  const Yardstick& yardstick,
+                  RegistrationRow& row);
+
+}  // namespace af::evaluation

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluate/report/make_report.h"
+
+#include <iostream>
+
+#include <CLI/CLI.hpp>
+
+#include "evaluate/report/report_page.h"
+#include "figures/gnuplot_figure.h"
+#include "files/output_file.h"
+
+namespace af::evaluation {
+
+CLI::App* bind_report(CLI::App& app, ReportOptions& options) {
+  CLI::App* command = app.add_subcommand(
+      "report",
+      "One self-contained HTML page of finished runs, side by side when there are several: "
+      "findings "
+      "in plain words, figures, tables that sort, overlays, failures with their searches and the "
+      "commands that repeat them, provenance; opens offline, prints well");
+  command->add_option("RUN", options.runs, "Folders of finished runs, searched with all below them")
+      ->required();
+  command->add_option("-o,--output", options.output, "The page to write")->capture_default_str();
+  command->add_option("--title", options.title, "Its title (default: made from the cases' names)");
+  return command;
+}
+
+void run_report(const ReportOptions& options, const Communicator& world) {
+  all_or_none(world, [&] {
+    if (!world.is_root()) return;
+    require_gnuplot();
+    announce_output(options.output);
+    const std::vector<EvaluationRun> runs = find_runs(options.runs);
+    write_text_file(options.output, report_page(runs, options.output, options.title));
+    std::cout << "report of " << runs.size() << " run(s): " << options.output.string() << '\n';
+  });
+}
+
+}  // namespace af::evaluation

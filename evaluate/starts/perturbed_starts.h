@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/shared_array.h"
+#include "geometry/rigid_transform.h"
+#include "geometry/slab_sizing.h"
+#include "gold_standard/tre.h"
+
+namespace af::evaluation {
+
+/// How starts are drawn: as many as wanted in every interval of initial TRE (Sec. IV-B: eight
+/// intervals of 2 mm, 30 starts each).
+struct StartOptions {
+  int intervals = 8;
+  double interval_width_mm = 2.0;
+  int starts_per_interval = 30;
+  std::uint64_t seed = 1;
+};
+
+std::vector<std::string> problems(const StartOptions& options);
+
+/// What the starts of one case are relative to.
+struct StartFrame {
+  std::string case_name;
+  RigidTransform gold_room_from_ct = RigidTransform::Identity();
+  Eigen::Vector3d center_ct_mm = Eigen::Vector3d::Zero();  ///< c_roi: origin of the rotations
+  CtBox target_box_ct;
+
+  /// Zero parameters give the gold pose; rotations are about c_roi along the room's axes.
+  [[nodiscard]] PoseFrame pose_frame() const {
+    return PoseFrame::about(gold_room_from_ct, center_ct_mm);
+  }
+};
+
+/// Draw `index` of a case: a direction uniform in the six parameters, rotations scaled by the
+/// target box's RMS radius about c_roi, and a magnitude uniform in [0, largest_magnitude_mm).
+/// Depends on (seed, case name, index) alone.
+PoseParameters draw_perturbation(const StartFrame& frame,
+                                 double largest_magnitude_mm,
+                                 std::uint64_t seed,
+                                 std::uint64_t index);
+
+struct PerturbedStart {
+  std::uint64_t draw_index = 0;
+  int interval = 0;           ///< from 0: initial TRE in [interval, interval + 1) * width
+  PoseParameters parameters;  ///< relative to gold: StartFrame::pose_frame()
+  RigidTransform room_from_ct = RigidTransform::Identity();
+  double initial_tre_mm = 0.0;
+  /// Its place in the random order of the starts of its interval, from 0: a smaller study takes the
+  /// starts of low rank and so a random part of this one.
+  int rank_in_interval = 0;
+};
+
+/// Whether a registration may start at a pose.
+using IsAdmissible = std::function<bool(const RigidTransform& room_from_ct)>;
+
+/// Numbers first, first + 1 ... first + count - 1.
+struct IndexRange {
+  std::uint64_t first = 0;
+  std::uint64_t count = 0;
+};
+
+/// Where a draw of stratified_starts() falls.
+struct DrawVerdict {
+  int interval = 0;           ///< the number of intervals or more: beyond the last
+  bool is_admissible = true;  ///< beyond the last: not asked
+};
+
+/// A start of uniform_starts().
+struct UniformStart {
+  PoseParameters parameters;
+  double initial_tre_mm = 0.0;
+  std::uint64_t refused = 0;  ///< draws before it that were not admissible
+
+  static constexpr std::uint64_t kMostDraws = 1000;
+  /// No draw was admissible.
+  [[nodiscard]] bool is_exhausted() const { return refused == kMostDraws; }
+};
+
+/// What is computed of every draw or pose by itself, which takes nearly all of the time: for
+/// millions of starts a derived class shares it out and gives the same numbers.
+class StartMeasures {
+ public:
+  /// The points must outlive it. Throws InputError for options that are not valid.
+  StartMeasures(StartFrame frame,
+                const StartOptions& options,
+                std::span<const Eigen::Vector3d> target_points_ct_mm,
+                IsAdmissible is_admissible);
+  virtual ~StartMeasures() = default;
+  StartMeasures(const StartMeasures&) = delete;
+  StartMeasures& operator=(const StartMeasures&) = delete;
+
+  [[nodiscard]] const StartFrame& frame() const { return frame_; }
+  [[nodiscard]] const StartOptions& options() const { return options_; }
+  [[nodiscard]] double largest_tre_mm() const {
+    return options_.intervals * options_.interval_width_mm;
+  }
+
+  /// From 0.
+  [[nodiscard]] int interval_of(double initial_tre_mm) const;
+  /// Draw `draw_index` of stratified_starts().
+  [[nodiscard]] PoseParameters stratified_draw(std::uint64_t draw_index) const;
+
+  /// In order.
+  virtual std::vector<DrawVerdict> judge_draws(IndexRange draws);
+  /// Mean TREs against the gold pose, in the order of the poses.
+  virtual std::vector<double> tres_mm(std::span<const RigidTransform> room_from_ct);
+  /// In order. After one that is exhausted nothing is drawn.
+  virtual std::vector<UniformStart> draw_uniform(IndexRange starts);
+
+ private:
+  [[nodiscard]] int interval_of_draw(const RigidTransform& room_from_ct) const;
+  [[nodiscard]] UniformStart draw_uniform(std::uint64_t index) const;
+  [[nodiscard]] double scale_to_tre(double tre_mm, PoseParameters& parameters) const;
+
+  StartFrame frame_;
+  StartOptions options_;
+  std::span<const Eigen::Vector3d> points_ct_mm_;
+  IsAdmissible is_admissible_;
+  std::vector<TreBounder> bounders_;  ///< coarse to fine; made by the first draw
+};
+
+struct StratifiedStarts {
+  SharedArray<PerturbedStart> starts;  ///< by interval, then draw index
+  std::uint64_t draws = 0;
+  std::uint64_t inadmissible_draws = 0;  ///< refused by the predicate
+  std::uint64_t draws_beyond = 0;        ///< initial TRE past the last interval
+  /// Refused by the predicate, by the interval that the draw would have been in; a start counts in
+  /// full intervals, too.
+  std::vector<std::uint64_t> inadmissible_per_interval;
+};
+
+/// The paper's rule: draws until every interval has enough, then picks at random that many in each.
+/// Throws InputError when an interval stays too empty after 1000 draws per wanted start (at least
+/// 100000): what is admissible leaves too little room there.
+/// \test PerturbedStarts.FillEveryIntervalWithExactlyTheStatedCount
+StratifiedStarts stratified_starts(StartMeasures& measures);
+
+/// As many starts in all, with initial TREs uniform over all intervals together: start i has a TRE
+/// of its own, drawn by (seed, case name, i), and a direction that is drawn again while it is not
+/// admissible, so that the distribution stays uniform. Throws InputError after 1000 refusals of one
+/// start. \test PerturbedStarts.UniformInTreHaveThatDistribution
+StratifiedStarts uniform_starts(StartMeasures& measures);
+
+/// The starts at given poses, in their order; intervals may lie beyond the last one.
+StratifiedStarts starts_at(StartMeasures& measures, std::span<const RigidTransform> poses);
+
+}  // namespace af::evaluation

@@ -1,0 +1,353 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluate/sweeps/draw_similarity_curves.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <iostream>
+#include <limits>
+#include <optional>
+#include <sstream>
+#include <tuple>
+
+#include <CLI/CLI.hpp>
+
+#include "base/error.h"
+#include "cli/run_limits.h"
+#include "evaluate/methods/loaded_methods.h"
+#include "evaluate/outputs/result_figures.h"
+#include "evaluate/outputs/row_gathering.h"
+#include "evaluate/outputs/sample_summary_json.h"
+#include "evaluate/sweeps/similarity_curve.h"
+#include "figures/gnuplot_figure.h"
+#include "files/output_file.h"
+#include "files/sha256.h"
+#include "gold_standard/target_box.h"
+#include "run/output_lock.h"
+#include "run/provenance.h"
+#include "run/stop_request.h"
+#include "run/terminal.h"
+#include "study/case_gold_standard.h"
+#include "study/shared_inputs.h"
+#include "text/csv_table.h"
+
+namespace af::evaluation {
+namespace {
+
+using nlohmann::json;
+
+constexpr std::array<const char*, kPoseParameters> kAxisNames = {
+    "rx", "ry", "rz", "tx", "ty", "tz"};
+
+const char* unit_of(int axis) {
+  return axis < 3 ? "deg" : "mm";
+}
+
+std::string to_toml(const SimilarityCurvesOptions& options) {
+  std::ostringstream out;
+  out << to_toml(static_cast<const MethodOptions&>(options))
+      << "case = " << toml_list({options.case_name})
+      << "\nhalf_width_mm = " << number_text(options.half_width_mm)
+      << "\nhalf_width_deg = " << number_text(options.half_width_deg)
+      << "\ncurve_step_mm = " << number_text(options.curve_step_mm)
+      << "\ncurve_step_deg = " << number_text(options.curve_step_deg) << '\n';
+  return out.str();
+}
+
+/// Similarity along one axis by one renderer.
+struct Curve {
+  std::string renderer;
+  int axis = 0;
+  std::vector<double> offsets;
+  std::vector<double> similarity;  ///< NaN: outside the field
+  CurvePeak peak;
+};
+
+std::vector<Curve> empty_curves(const SimilarityCurvesOptions& options) {
+  std::vector<Curve> curves;
+  for (const std::string& renderer : options.chosen_renderers())
+    for (int axis = 0; axis < kPoseParameters; ++axis) {
+      Curve curve{renderer, axis, {}, {}, {}};
+      curve.offsets = axis < 3 ? curve_offsets(options.half_width_deg, options.curve_step_deg)
+                               : curve_offsets(options.half_width_mm, options.curve_step_mm);
+      curve.similarity.resize(curve.offsets.size());
+      curves.push_back(std::move(curve));
+    }
+  return curves;
+}
+
+/// Collective. Fills the curves on rank 0. One method after the other, so that blocks of the work
+/// queue hold work of one duration.
+void measure_curves(std::vector<LoadedMethod>& methods,
+                    const PoseFrame& gold_frame,
+                    UnfinishedWork unfinished,
+                    const Communicator& world,
+                    std::vector<Curve>& curves) {
+  for (LoadedMethod& method : methods) {
+    std::vector<std::pair<std::size_t, std::size_t>> items;
+    for (std::size_t c = 0; c < curves.size(); ++c)
+      for (std::size_t i = 0; curves[c].renderer == method.renderer && i < curves[c].offsets.size();
+           ++i)
+        items.emplace_back(c, i);
+    announce_time(
+        world, method.renderer + " similarities", static_cast<std::int64_t>(items.size()), [&] {
+          std::ignore =
+              method.runner.similarity_at(pose_from_parameters(gold_frame, PoseParameters()));
+        });
+    unfinished.name = method.renderer;
+    collect_rows(
+        world,
+        unfinished,
+        static_cast<std::int64_t>(items.size()),
+        method.renderer + " similarities",
+        [&](std::int64_t item) -> json {
+          const auto [c, i] = items[static_cast<std::size_t>(item)];
+          const RigidTransform pose =
+              pose_from_parameters(gold_frame, along_axis(curves[c].axis, curves[c].offsets[i]));
+          const registration::ObjectiveValue value = method.runner.similarity_at(pose);
+          return value.is_admissible ? value.similarity : std::numeric_limits<double>::quiet_NaN();
+        },
+        [&](std::int64_t item, const json& similarity) {
+          const auto [c, i] = items[static_cast<std::size_t>(item)];
+          curves[c].similarity[i] = similarity.get<double>();
+        });
+  }
+}
+
+/// The level that widths are measured against: the lowest similarity of any curve of the renderer,
+/// so that axes compare.
+double base_of(const std::vector<Curve>& curves, const std::string& renderer) {
+  double base = std::numeric_limits<double>::infinity();
+  for (const Curve& curve : curves)
+    if (curve.renderer == renderer)
+      for (const double value : curve.similarity)
+        if (value < base) base = value;
+  return base;
+}
+
+void find_peaks(std::vector<Curve>& curves) {
+  for (Curve& curve : curves)
+    curve.peak = find_peak(curve.offsets, curve.similarity, base_of(curves, curve.renderer));
+}
+
+CsvTable curves_table(const std::vector<Curve>& curves) {
+  CsvTable table({"renderer", "parameter", "unit", "offset", "similarity"});
+  for (const Curve& curve : curves)
+    for (std::size_t i = 0; i < curve.offsets.size(); ++i)
+      table.add_row({curve.renderer,
+                     kAxisNames[static_cast<std::size_t>(curve.axis)],
+                     unit_of(curve.axis),
+                     number_text(curve.offsets[i]),
+                     number_text(curve.similarity[i])});
+  return table;
+}
+
+/// Width in mm: of angles, at the target box's RMS radius about the centre of rotation.
+double width_mm(const Curve& curve, double radius_mm) {
+  return curve.axis < 3 ? curve.peak.width * kRadPerDeg * radius_mm : curve.peak.width;
+}
+
+CsvTable maxima_table(const std::vector<Curve>& curves, double radius_mm) {
+  CsvTable table({"renderer",
+                  "parameter",
+                  "unit",
+                  "offset_of_maximum",
+                  "similarity_at_maximum",
+                  "at_edge",
+                  "width",
+                  "width_mm_at_target"});
+  for (const Curve& curve : curves)
+    table.add_row({curve.renderer,
+                   kAxisNames[static_cast<std::size_t>(curve.axis)],
+                   unit_of(curve.axis),
+                   number_text(curve.peak.offset),
+                   number_text(curve.peak.similarity),
+                   curve.peak.is_at_edge ? "1" : "0",
+                   number_text(curve.peak.width),
+                   number_text(width_mm(curve, radius_mm))});
+  return table;
+}
+
+/// The axis of the widest peak, a width that leaves the window counting as widest. Empty when two
+/// or more do.
+std::string broadest_axis(const std::vector<Curve>& curves,
+                          const std::string& renderer,
+                          double radius_mm,
+                          int first_axis,
+                          int last_axis) {
+  std::string broadest;
+  double widest_mm = -1.0;
+  for (const Curve& curve : curves) {
+    if (curve.renderer != renderer || curve.axis < first_axis || curve.axis > last_axis) continue;
+    const double width = width_mm(curve, radius_mm);
+    const double rank = std::isfinite(width) ? width : std::numeric_limits<double>::infinity();
+    if (rank > widest_mm) {
+      widest_mm = rank;
+      broadest = kAxisNames[static_cast<std::size_t>(curve.axis)];
+    } else if (rank == widest_mm) {
+      broadest.clear();
+    }
+  }
+  return broadest;
+}
+
+json renderer_json(const std::vector<Curve>& curves,
+                   const std::string& renderer,
+                   double radius_mm) {
+  json maxima = json::array();
+  for (const Curve& curve : curves)
+    if (curve.renderer == renderer)
+      maxima.push_back({{"parameter", kAxisNames[static_cast<std::size_t>(curve.axis)]},
+                        {"unit", unit_of(curve.axis)},
+                        {"offset", curve.peak.offset},
+                        {"similarity", curve.peak.similarity},
+                        {"is_at_edge", curve.peak.is_at_edge},
+                        {"width", number_json(curve.peak.width)},
+                        {"width_mm_at_target", number_json(width_mm(curve, radius_mm))}});
+  return {{"renderer", renderer},
+          {"maxima", maxima},
+          {"broadest_rotation", broadest_axis(curves, renderer, radius_mm, 0, 2)},
+          {"broadest_translation", broadest_axis(curves, renderer, radius_mm, 3, 5)}};
+}
+
+std::vector<CurvePanel> panels_of(const std::vector<Curve>& curves) {
+  std::vector<CurvePanel> panels(kPoseParameters);
+  // Translations above rotations, as the paper's figure has them.
+  for (const Curve& curve : curves) {
+    CurvePanel& panel = panels[static_cast<std::size_t>((curve.axis + 3) % kPoseParameters)];
+    panel.x_label = std::string(kAxisNames[static_cast<std::size_t>(curve.axis)]) + " (" +
+                    unit_of(curve.axis) + ")";
+    panel.curves.push_back({curve.renderer == "field" ? "field" : "ray casting",
+                            curve.offsets,
+                            curve.similarity,
+                            curve.peak.offset,
+                            curve.peak.similarity});
+  }
+  return panels;
+}
+
+void print_maxima(const std::vector<Curve>& curves, const json& renderers) {
+  for (const json& renderer : renderers) {
+    const std::string name = renderer["renderer"].get<std::string>();
+    std::cout << name << ": maxima at";
+    for (const Curve& curve : curves)
+      if (curve.renderer == name)
+        std::cout << ' ' << kAxisNames[static_cast<std::size_t>(curve.axis)] << ' '
+                  << fixed_text(curve.peak.offset, 2) << ' ' << unit_of(curve.axis)
+                  << (curve.axis == kPoseParameters - 1 ? "" : ",");
+    std::cout << "; broadest rotation " << renderer["broadest_rotation"].get<std::string>()
+              << ", translation " << renderer["broadest_translation"].get<std::string>() << '\n';
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> problems(const SimilarityCurvesOptions& options) {
+  std::vector<std::string> found;
+  append_problems(options, found);
+  const auto require_curve = [&](const char* unit, double half_width, double step) {
+    constexpr double kMostSteps = 100000;
+    if (!(half_width > 0.0) || !(step > 0.0) || !(step <= half_width) ||
+        !(half_width / step <= kMostSteps))
+      found.push_back(std::string("--curve-step-") + unit + " = " + number_text(step) +
+                      ": must be positive, at most --half-width-" + unit + " = " +
+                      number_text(half_width) + " and at least a 100000th of it");
+  };
+  require_curve("mm", options.half_width_mm, options.curve_step_mm);
+  require_curve("deg", options.half_width_deg, options.curve_step_deg);
+  return found;
+}
+
+CLI::App* bind_similarity_curves(CLI::App& app, SimilarityCurvesOptions& options) {
+  CLI::App* command = app.add_subcommand(
+      "similarity-curves",
+      "Similarity along each of the six pose parameters about the gold pose, by field and by ray "
+      "casting (the paper's Fig. 14): where the maxima lie and which axis is broadest");
+  bind_method(*command, options);
+  command->add_option("--case", options.case_name, "Case of the study (default: its only one)");
+  command->add_option("--half-width-mm", options.half_width_mm, "Translations reach so far, mm")
+      ->capture_default_str();
+  command->add_option("--half-width-deg", options.half_width_deg, "Rotations reach so far, degrees")
+      ->capture_default_str();
+  command->add_option("--curve-step-mm", options.curve_step_mm, "Step of translations, mm")
+      ->capture_default_str();
+  command->add_option("--curve-step-deg", options.curve_step_deg, "Step of rotations, degrees")
+      ->capture_default_str();
+  cli::bind_resume(*command, options.restarts);
+  command->add_option("-o,--output", options.output_folder, "Folder for the results")->required();
+  return command;
+}
+
+void run_similarity_curves(const SimilarityCurvesOptions& options,
+                           const std::string& command_line,
+                           const Communicator& world) {
+  const std::filesystem::path& folder = options.output_folder;
+  std::vector<std::string> warnings;
+  std::optional<OutputLock> lock;
+  all_or_none(world, [&] {
+    throw_if_any(problems(options));
+    if (world.is_root()) {
+      require_gnuplot();
+      make_output_folder(folder);
+      announce_outputs(folder,
+                       {"similarity-curves.csv", "maxima.csv", "reproduce.sh", "summary.json"});
+      lock.emplace(folder);
+    }
+  });
+  const Study study = read_study(options.study, world, &warnings);
+  listen_for_stop_requests();
+  for (const std::string& text : warnings) warn(world, text);
+  const StudyCase study_case =
+      all_or_none(world, [&] { return study.find_case(options.case_name); });
+  const GoldStandard gold =
+      all_or_none(world, [&] { return gold_standard(study, study_case, options.gold); });
+  Provenance provenance = {
+      "af-evaluate similarity-curves", command_line, to_toml(options), 0, world.size(), {}};
+  std::vector<LoadedMethod> methods =
+      load_methods(options, study, study_case, world, provenance.input_sha256);
+  all_or_none(world, [&] {
+    if (world.is_root()) provenance.input_sha256["study"] = sha256_of_file(study.path.string());
+  });
+  std::vector<Curve> curves = empty_curves(options);
+  measure_curves(methods,
+                 PoseFrame::about(gold.room_from_ct, study_case.center_ct_mm),
+                 {progress_folder(folder),
+                  "",
+                  deciding_values(provenance.options_toml, provenance.input_sha256),
+                  options.restarts},
+                 world,
+                 curves);
+  all_or_none(world, [&] {
+    if (!world.is_root()) return;
+    find_peaks(curves);
+    const double radius_mm = rms_radius_mm(study_case.target_box_ct, study_case.center_ct_mm);
+    // What an earlier run left here is whole no more.
+    remove_output(folder / "summary.json");
+    write_text_file(folder / "similarity-curves.csv", curves_table(curves).to_text());
+    write_text_file(folder / "maxima.csv", maxima_table(curves, radius_mm).to_text());
+    draw_curve_panels(panels_of(curves),
+                      "Similarity about the gold pose",
+                      "similarity (" + methods.front().runner.options().final_similarity() + ")",
+                      folder / "similarity-curves");
+    write_reproduce_script(folder, provenance);
+    json summary = {{"format", "attenuation-fields evaluation"},
+                    {"format_version", 1},
+                    {"kind", "similarity-curves"},
+                    {"case", study_case.name},
+                    {"gold", to_json(gold)},
+                    {"similarity", methods.front().runner.options().final_similarity()},
+                    {"rms_radius_mm", radius_mm},
+                    {"figures", {"similarity-curves"}}};
+    summary["renderers"] = json::array();
+    for (const std::string& renderer : options.chosen_renderers())
+      summary["renderers"].push_back(renderer_json(curves, renderer, radius_mm));
+    summary["provenance"] = af::to_json(provenance);
+    // Last: when it is there, everything is.
+    write_text_file(folder / "summary.json", summary.dump(2) + "\n");
+    std::filesystem::remove_all(progress_folder(folder));
+    print_maxima(curves, summary["renderers"]);
+    std::cout << "results: " << folder.string() << '\n';
+  });
+}
+
+}  // namespace af::evaluation

@@ -1,0 +1,222 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluate/sweeps/make_error_budget.h"
+
+#include <array>
+#include <iostream>
+#include <sstream>
+
+#include <CLI/CLI.hpp>
+
+#include "base/error.h"
+#include "evaluate/methods/evaluated_methods.h"
+#include "evaluate/outputs/sample_summary_json.h"
+#include "evaluate/report/evaluation_run.h"
+#include "evaluate/statistics/success_rate.h"
+#include "evaluate/sweeps/error_budget.h"
+#include "files/output_file.h"
+#include "files/sha256.h"
+#include "gold_standard/target_box.h"
+#include "run/provenance.h"
+#include "study/case_gold_standard.h"
+#include "study/study_file.h"
+#include "text/csv_table.h"
+
+namespace af::evaluation {
+namespace {
+
+using nlohmann::json;
+
+/// A run of the chain as its folder has it.
+struct ChainRun {
+  EvaluationRun files;
+  std::string starts_text;
+  BudgetRun budget;
+};
+
+std::optional<PoseParameters> end_of(const CsvTable& table, std::size_t row) {
+  if (table.text(row, "success") != "1") return std::nullopt;
+  std::array<double, 6> values{};
+  for (std::size_t i = 0; i < values.size(); ++i)
+    values[i] = table.number(row, std::string("final_") + kParameterNames[i]);
+  return PoseParameters::from_deg_and_mm(values);
+}
+
+ChainRun read_run(const std::string& step) {
+  const std::size_t equals = step.find('=');
+  if (equals == std::string::npos || equals == 0)
+    throw InputError("--step", step, "must be LABEL=RUN");
+  const std::vector<EvaluationRun> found = find_runs({step.substr(equals + 1)});
+  if (found.size() != 1 || found.front().kind != "registration")
+    throw InputError("--step", step, "must name the folder of one finished registration run");
+  const EvaluationRun& files = found.front();
+  if (files.summary.at("cases").size() != 1 || files.summary.at("renderers").size() != 1)
+    throw InputError("--step", step, "must be of one case and one renderer");
+  const CsvTable table = CsvTable::read(files.folder / "registrations.csv");
+  BudgetRun budget = {step.substr(0, equals), {}};
+  for (std::size_t row = 0; row < table.row_count(); ++row)
+    budget.ends.push_back(end_of(table, row));
+  return {files, read_text_file(files.folder / "starts.csv"), budget};
+}
+
+/// Starts are poses: the same ones mean the same case and gold pose, too.
+void require_same_starts(const std::vector<ChainRun>& runs) {
+  for (const ChainRun& run : runs)
+    if (run.starts_text != runs.front().starts_text)
+      throw InputError(
+          "--step",
+          run.budget.label,
+          "must be from the same starts and gold pose as the first run; the starts.csv "
+          "differ",
+          run.files.folder.string());
+}
+
+ErrorBudget budget_of(const std::vector<ChainRun>& runs) {
+  const Study study = read_study(runs.front().files.summary.at("study").get<std::string>());
+  const json& of_case = runs.front().files.summary.at("cases").front();
+  const StudyCase& study_case = study.find_case(of_case.at("case").get<std::string>());
+  const GoldStandard gold =
+      gold_standard(study, study_case, of_case.at("gold").at("source").get<std::string>());
+  std::vector<BudgetRun> budget_runs;
+  budget_runs.reserve(runs.size());
+  for (const ChainRun& run : runs) budget_runs.push_back(run.budget);
+  return error_budget(budget_runs,
+                      PoseFrame::about(gold.room_from_ct, study_case.center_ct_mm),
+                      target_points(study_case.target_box_ct));
+}
+
+json step_json(const BudgetStep& step) {
+  return {{"label", step.label},
+          {"starts", step.starts},
+          {"successes", step.successes},
+          {"shift_mm", number_json(step.shift_mm)},
+          {"shift_standard_error_mm", number_json(step.shift_standard_error_mm)},
+          {"bias_mm", step.bias_mm},
+          {"scatter_mm", step.scatter_mm},
+          {"tre_mm", step.tre_mm},
+          {"mean_end_deg_mm", step.mean_end.deg_and_mm()}};
+}
+
+CsvTable budget_table(const ErrorBudget& budget) {
+  std::vector<std::string> columns = {"step",
+                                      "starts",
+                                      "successes",
+                                      "shift_mm",
+                                      "shift_standard_error_mm",
+                                      "bias_mm",
+                                      "scatter_mm",
+                                      "tre_mm"};
+  for (const char* name : kParameterNames) columns.push_back(std::string("mean_") + name);
+  CsvTable table(columns);
+  for (const BudgetStep& step : budget.steps) {
+    std::vector<std::string> fields = {
+        step.label, std::to_string(step.starts), std::to_string(step.successes)};
+    for (const double value :
+         {step.shift_mm, step.shift_standard_error_mm, step.bias_mm, step.scatter_mm, step.tre_mm})
+      fields.push_back(number_text(value));
+    for (const double value : step.mean_end.deg_and_mm()) fields.push_back(number_text(value));
+    table.add_row(std::move(fields));
+  }
+  return table;
+}
+
+/// The gold standard's own error, of the chain's last run that has fiducials.
+json gold_of(const std::vector<ChainRun>& runs) {
+  json result;
+  for (const ChainRun& run : runs) {
+    const json& gold = run.files.summary.at("cases").front().at("gold");
+    if (gold.contains("uncertainty")) result = gold;
+  }
+  return result;
+}
+
+json summary_json(const std::vector<ChainRun>& runs, const ErrorBudget& budget) {
+  json summary = {{"format", "attenuation-fields evaluation"},
+                  {"format_version", 1},
+                  {"kind", "error-budget"},
+                  {"case", runs.front().files.summary.at("cases").front().at("case")},
+                  {"method", runs.back().files.summary.at("method")},
+                  {"common_starts", budget.common_starts},
+                  {"gold", gold_of(runs)}};
+  for (const BudgetStep& step : budget.steps) summary["steps"].push_back(step_json(step));
+  return summary;
+}
+
+std::string millimetres(const json& value) {
+  return value.is_number() ? fixed_text(value.get<double>(), 3) : "-";
+}
+
+std::string markdown(const json& summary) {
+  std::string text =
+      "| Run | Succeeded | Moves the mean end by, mm | Bias, mm | Scatter, mm | TRE, mm |\n"
+      "|---|---|---|---|---|---|\n";
+  for (const json& step : summary["steps"])
+    text += "| " + step["label"].get<std::string>() + " | " + step["successes"].dump() + " of " +
+            step["starts"].dump() + " | " +
+            (step["shift_mm"].is_number() ? millimetres(step["shift_mm"]) + " +- " +
+                                                millimetres(step["shift_standard_error_mm"])
+                                          : "") +
+            " | " + millimetres(step["bias_mm"]) + " | " + millimetres(step["scatter_mm"]) + " | " +
+            millimetres(step["tre_mm"]) + " |\n";
+  const json& gold = summary["gold"];
+  if (gold.is_object())
+    text += "| gold standard by fiducials, by itself | | " +
+            millimetres(gold["uncertainty"]["mean_tre_mm"]) + " expected, " +
+            millimetres(gold.value("stated_to_fiducials_mm", json())) +
+            " from the stated pose | | | |\n";
+  return text + "\nOver the " + summary["common_starts"].dump() +
+         " starts from which every run succeeded.\n";
+}
+
+}  // namespace
+
+CLI::App* bind_error_budget(CLI::App& app, ErrorBudgetOptions& options) {
+  CLI::App* command = app.add_subcommand(
+      "error-budget",
+      "What each part of the chain from CT to pose adds to the error: finished registration runs "
+      "of "
+      "one case from the same starts, each different from the one before in one thing "
+      "(jobs/error-budget.sh makes them)");
+  command
+      ->add_option("--step",
+                   options.steps,
+                   "LABEL=RUN: a run's folder and what is different from the run before; in order")
+      ->required()
+      ->take_all();
+  command->add_option("-o,--output", options.output_folder, "Folder for the results")->required();
+  return command;
+}
+
+void run_error_budget(const ErrorBudgetOptions& options,
+                      const std::string& command_line,
+                      const Communicator& world) {
+  all_or_none(world, [&] {
+    if (!world.is_root()) return;
+    announce_outputs(options.output_folder,
+                     {"error-budget.md", "error-budget.csv", "reproduce.sh", "summary.json"});
+    std::vector<ChainRun> runs;
+    Provenance provenance = {"af-evaluate error-budget",
+                             command_line,
+                             "step = " + toml_list(options.steps) + "\n",
+                             0,
+                             world.size(),
+                             {}};
+    for (const std::string& step : options.steps) {
+      runs.push_back(read_run(step));
+      provenance.input_sha256[runs.back().budget.label] =
+          sha256_of_file((runs.back().files.folder / "registrations.csv").string());
+    }
+    require_same_starts(runs);
+    const ErrorBudget budget = budget_of(runs);
+    json summary = summary_json(runs, budget);
+    summary["provenance"] = af::to_json(provenance);
+    make_output_folder(options.output_folder);
+    const std::string text = markdown(summary);
+    write_text_file(options.output_folder / "error-budget.md", text);
+    write_text_file(options.output_folder / "error-budget.csv", budget_table(budget).to_text());
+    write_reproduce_script(options.output_folder, provenance);
+    write_text_file(options.output_folder / "summary.json", summary.dump(2) + "\n");
+    std::cout << text << "results: " << options.output_folder.string() << '\n';
+  });
+}
+
+}  // namespace af::evaluation

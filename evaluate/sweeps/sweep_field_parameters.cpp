@@ -1,0 +1,384 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluate/sweeps/sweep_field_parameters.h"
+
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <set>
+#include <sstream>
+
+#include <CLI/CLI.hpp>
+
+#include "base/error.h"
+#include "cli/run_limits.h"
+#include "drr/ray_cast_drr.h"
+#include "drr/two_pass_af_drr.h"
+#include "evaluate/image_quality/image_quality_tables.h"
+#include "evaluate/outputs/row_gathering.h"
+#include "evaluate/sweeps/difference_images.h"
+#include "evaluate/sweeps/field_parameter_tables.h"
+#include "field_file/field_file.h"
+#include "figures/gnuplot_figure.h"
+#include "files/output_file.h"
+#include "files/resource_check.h"
+#include "precompute/precompute_field.h"
+#include "register/case_loading.h"
+#include "run/output_lock.h"
+#include "run/progress_printer.h"
+#include "run/provenance.h"
+#include "run/stop_request.h"
+#include "run/terminal.h"
+#include "study/node_ct.h"
+#include "study/study_file.h"
+#include "text/csv_table.h"
+
+namespace af::evaluation {
+namespace {
+
+using nlohmann::json;
+
+/// Settings of a sweep, each once, in the order of sweeps; the base setting first.
+std::vector<PrecomputeOptions> settings_of(const FieldParametersOptions& options,
+                                           const PrecomputeOptions& base) {
+  std::vector<PrecomputeOptions> settings = {base};
+  const auto add = [&](const auto& values, auto member) {
+    for (const auto value : values) {
+      PrecomputeOptions setting = base;
+      setting.*member = value;
+      const bool is_base = setting.*member == base.*member;
+      if (!is_base) settings.push_back(setting);
+    }
+  };
+  add(options.uv_nodes, &PrecomputeOptions::uv_nodes);
+  add(options.st_nodes, &PrecomputeOptions::st_nodes);
+  add(options.codewords, &PrecomputeOptions::codewords);
+  add(options.training_fractions, &PrecomputeOptions::training_fraction);
+  return settings;
+}
+
+std::string field_name(const PrecomputeOptions& setting) {
+  return (setting.case_name.empty() ? "" : setting.case_name + "-") + setting.camera + "-uv" +
+         std::to_string(setting.uv_nodes) + "-st" + std::to_string(setting.st_nodes) + "-n" +
+         std::to_string(setting.codewords) + "-t" + number_text(training_share(setting)) + ".af.h5";
+}
+
+/// What decides a field's content, without where it goes.
+std::string deciding_options(const std::string& toml) {
+  std::string result;
+  std::istringstream lines(toml);
+  for (std::string line; std::getline(lines, line);)
+    if (!line.starts_with("output =")) result += line + "\n";
+  return result;
+}
+
+/// Collective. The field of a setting, made unless it is there. FileError when one of that name was
+/// made with other options.
+std::shared_ptr<const CompressedAttenuationField> field_of(const PrecomputeOptions& setting,
+                                                           const std::string& command_line,
+                                                           const Communicator& world,
+                                                           FieldFileInfo& info) {
+  const bool exists = all_or_none(world, [&] { return std::filesystem::exists(setting.output); });
+  if (!exists) run_precompute(setting, command_line, world);
+  const auto field = read_field(setting.output, world, &info);
+  all_or_none(world, [&] {
+    const std::string expected = deciding_options(to_toml(setting));
+    const std::string found = deciding_options(info.provenance.options_toml);
+    if (found != expected)
+      throw FileError(setting.output, "options of the field to reuse", expected, found);
+  });
+  return field;
+}
+
+/// Collective. Comparisons at the same random poses for every setting.
+std::vector<DrrComparison> compare(const FieldParametersOptions& options,
+                                   const std::shared_ptr<const CompressedAttenuationField>& field,
+                                   const RayCastDrr& reference,
+                                   const UnfinishedWork& unfinished,
+                                   const Communicator& world) {
+  const TwoPassAfDrr tested(field);
+  DrrComparer comparer(tested, reference, View::whole_detector(field->identity.camera));
+  all_or_none(world, [&] {
+    require_memory(
+        "--pose-count",
+        static_cast<double>(options.pose_count) * static_cast<double>(sizeof(DrrComparison)));
+  });
+  std::vector<DrrComparison> comparisons(static_cast<std::size_t>(options.pose_count));
+  collect_rows(
+      world,
+      unfinished,
+      options.pose_count,
+      "",
+      [&](std::int64_t index) {
+        return comparison_row(comparer.at_random_pose(field->identity.frame,
+                                                      field->identity.range,
+                                                      options.seed,
+                                                      static_cast<std::uint64_t>(index)));
+      },
+      [&](std::int64_t index, const json& row) {
+        comparisons[static_cast<std::size_t>(index)] = comparison_of(row);
+      });
+  return comparisons;
+}
+
+/// What decides the comparisons of one field.
+std::string comparison_toml(const FieldParametersOptions& options) {
+  return "pose_count = " + std::to_string(options.pose_count) +
+         "\ndrr_step_mm = " + number_text(options.drr_step_mm) +
+         "\npose_seed = " + std::to_string(options.seed) + "\n";
+}
+
+std::string to_toml(const FieldParametersOptions& options) {
+  std::ostringstream out;
+  const auto list = [&](const char* name, const auto& values) {
+    out << name << " = [";
+    for (std::size_t i = 0; i < values.size(); ++i)
+      out << (i == 0 ? "" : ", ") << number_text(static_cast<double>(values[i]));
+    out << "]\n";
+  };
+  out << af::to_toml(options.base);
+  list("sweep_uv_nodes", options.uv_nodes);
+  list("sweep_st_nodes", options.st_nodes);
+  list("sweep_codewords", options.codewords);
+  list("sweep_training_fraction", options.training_fractions);
+  out << comparison_toml(options);
+  return out.str();
+}
+
+void write_results(const FieldParametersOptions& options,
+                   const std::vector<SettingResult>& results,
+                   const json& difference_images,
+                   const Provenance& provenance) {
+  const std::filesystem::path& folder = options.output_folder;
+  // What an earlier run left here is whole no more.
+  remove_output(folder / "summary.json");
+  json summary = write_sweep(results, folder);
+  write_reproduce_script(folder, provenance);
+  summary["format"] = "attenuation-fields evaluation";
+  summary["format_version"] = 1;
+  summary["kind"] = "field-parameters";
+  summary["difference_images"] = difference_images;
+  summary["provenance"] = af::to_json(provenance);
+  // Last: when it is there, everything is.
+  write_text_file(folder / "summary.json", summary.dump(2) + "\n");
+  std::cout << sweep_text(results) << "results: " << folder.string() << '\n';
+}
+
+/// One camera of a CT, with the base setting, and where its CT lies.
+struct Target {
+  PrecomputeOptions base;
+  std::string ct_path;
+};
+
+/// The named camera, or all views of the study's chosen cases.
+std::vector<Target> targets_of(const FieldParametersOptions& options) {
+  const PrecomputeOptions& base = options.base;
+  if (!base.ct.empty()) return {{base, base.ct}};
+  const Study study = read_study(base.study);
+  if (!base.camera.empty()) return {{base, study.find_case(base.case_name).ct.string()}};
+  std::vector<std::string> names;
+  if (!base.case_name.empty()) names.push_back(base.case_name);
+  std::vector<Target> targets;
+  for (const StudyCase* study_case : study.chosen_cases(names))
+    for (const StudyView& view : study_case->views) {
+      Target& target = targets.emplace_back(Target{base, study_case->ct.string()});
+      target.base.case_name = study_case->name;
+      target.base.camera = view.camera;
+    }
+  return targets;
+}
+
+/// What a setting costs relative to another: the rays of its field.
+double rays_of(const PrecomputeOptions& setting) {
+  return std::pow(static_cast<double>(setting.uv_nodes) * setting.st_nodes, 2.0);
+}
+
+/// Says how long the settings after the first will take, from that one's time: fields by their
+/// rays, comparisons alike.
+void announce_rest(const std::vector<PrecomputeOptions>& settings,
+                   double field_seconds,
+                   double comparison_seconds,
+                   const Communicator& world) {
+  if (settings.size() < 2) return;
+  double seconds = 0.0;
+  for (std::size_t i = 1; i < settings.size(); ++i)
+    seconds +=
+        comparison_seconds + (std::filesystem::exists(settings[i].output)
+                                  ? 0.0
+                                  : field_seconds * rays_of(settings[i]) / rays_of(settings[0]));
+  inform(world,
+         "after the first field " + std::to_string(settings.size() - 1) + " more, about " +
+             duration_text(seconds));
+}
+
+/// Collective. Every setting's field of one target, made or reused, and its comparisons.
+void sweep_target(const FieldParametersOptions& options,
+                  const Target& target,
+                  const std::filesystem::path& fields,
+                  const std::string& command_line,
+                  const Communicator& world,
+                  std::vector<SettingResult>& results,
+                  Provenance& provenance) {
+  std::vector<std::string> warnings;
+  const NodeCt ct = read_ct_per_node(
+      target.ct_path, {target.base.series_uid}, target.base.attenuation_model(), world, warnings);
+  for (const std::string& text : warnings) warn(world, text);
+  const RayCastDrr reference(ct.volume, {options.drr_step_mm});
+  std::vector<PrecomputeOptions> settings = settings_of(options, target.base);
+  for (PrecomputeOptions& setting : settings) {
+    setting.output = (fields / field_name(setting)).string();
+    setting.is_restart = options.restarts;
+  }
+  using Clock = std::chrono::steady_clock;
+  for (const PrecomputeOptions& setting : settings) {
+    const bool is_made = !std::filesystem::exists(setting.output);
+    const Clock::time_point start = Clock::now();
+    SettingResult& result = results.emplace_back();
+    result.setting = setting;
+    const auto field = field_of(setting, command_line, world, result.info);
+    all_or_none(world, [&] {
+      if (field->identity.ct_content_sha256 != ct.facts.content_sha256)
+        throw FileError(setting.output,
+                        "CT of the field (ct_content_sha256)",
+                        ct.facts.content_sha256,
+                        field->identity.ct_content_sha256);
+    });
+    result.field = field_description(*field);
+    result.uncompressed_bytes = uncompressed_bytes_of(setting);
+    read_creation(result);
+    const Clock::time_point compared = Clock::now();
+    result.comparisons = compare(options,
+                                 field,
+                                 reference,
+                                 {progress_folder(options.output_folder),
+                                  field_name(setting),
+                                  deciding_values(comparison_toml(options),
+                                                  {{"the field", result.info.payload_sha256},
+                                                   {"the CT", ct.facts.content_sha256}}),
+                                  options.restarts},
+                                 world);
+    if (is_made && &setting == &settings.front())
+      announce_rest(settings,
+                    std::chrono::duration<double>(compared - start).count(),
+                    std::chrono::duration<double>(Clock::now() - compared).count(),
+                    world);
+    provenance.input_sha256["field " + field_name(setting)] = result.info.payload_sha256;
+  }
+  provenance.input_sha256["ct " + results.back().target()] = ct.facts.content_sha256;
+}
+
+}  // namespace
+
+std::vector<std::string> problems(const FieldParametersOptions& options) {
+  std::vector<std::string> found;
+  std::set<std::string> distinct;
+  for (const PrecomputeOptions& setting : settings_of(options, options.base))
+    for (const std::string& text : af::problems(setting))
+      if (distinct.insert(text).second) found.push_back(text);
+  if (options.base.camera.empty() && options.base.study.empty())
+    found.emplace_back("--camera = '': must name a camera");
+  if (options.base.ct.empty() == options.base.study.empty())
+    found.emplace_back("--ct or --study: exactly one must be given");
+  if (options.pose_count < 1)
+    found.push_back("--pose-count = " + std::to_string(options.pose_count) + ": must be >= 1");
+  for (const std::string& text : af::problems(RayCasterOptions{options.drr_step_mm}))
+    found.push_back(text);
+  return found;
+}
+
+CLI::App* bind_field_parameters(CLI::App& app, FieldParametersOptions& options) {
+  CLI::App* command = app.add_subcommand(
+      "field-parameters",
+      "PSNR of a camera's fields against each of the four field parameters, with memory, creation "
+      "time and compression (the paper's Fig. 10 and Table I); builds the fields that are missing");
+  PrecomputeOptions& base = options.base;
+  base.max_translation_mm = 30.0;
+  base.training_fraction = 0.1;  // the paper's
+  auto* ct = command->add_option("--ct", base.ct, "CT: image file or DICOM folder");
+  command->add_option("--series", base.series_uid, "DICOM series UID, when there are several");
+  command->add_option("--rig", base.rig, "rig.toml, or c-arm-12in, treatment-room");
+  command->add_option("--study", base.study, "study.toml that names CT, rig and pose instead")
+      ->excludes(ct);
+  command->add_option(
+      "--case", base.case_name, "Case of the study (default: its only one; without --camera all)");
+  command->add_option("--camera",
+                      base.camera,
+                      "Camera of the rig (default with --study: all views, their DRRs pooled as in "
+                      "the paper)");
+  command->add_option("--max-rotation-deg", base.max_rotation_deg, "Range of every field, degrees")
+      ->capture_default_str();
+  command->add_option("--max-translation-mm", base.max_translation_mm, "Range of every field, mm")
+      ->capture_default_str();
+  command->add_option("--slabs", base.slabs, "Depth slabs of every field")->capture_default_str();
+  command->add_option("--base-uv-nodes", base.uv_nodes, "(u,v) nodes while others vary")
+      ->capture_default_str();
+  command->add_option("--base-st-nodes", base.st_nodes, "(s,t) nodes while others vary")
+      ->capture_default_str();
+  command->add_option("--base-codewords", base.codewords, "Codewords while others vary")
+      ->capture_default_str();
+  command
+      ->add_option("--base-training-fraction",
+                   *base.training_fraction,
+                   "Share of the tiles for training while others vary")
+      ->capture_default_str();
+  const auto add_sweep = [&](const char* name, auto& values, const char* what) {
+    command->add_option(name, values, std::string("Comma-separated: ") + what)
+        ->delimiter(',')
+        ->capture_default_str();
+  };
+  add_sweep("--uv-nodes", options.uv_nodes, "(u,v) nodes per side to try");
+  add_sweep("--st-nodes", options.st_nodes, "(s,t) nodes per side to try");
+  add_sweep("--codewords", options.codewords, "codebook sizes to try");
+  add_sweep("--training-fraction", options.training_fractions, "training shares to try");
+  command->add_option("--pose-count", options.pose_count, "Random poses, the same for every field")
+      ->capture_default_str();
+  command->add_option("--step-mm", options.drr_step_mm, "Longest step of the reference DRRs, mm")
+      ->capture_default_str();
+  command->add_option("--seed", options.seed, "Of the random poses")->capture_default_str();
+  command->add_option("--fields",
+                      options.fields_folder,
+                      "Where fields are kept and looked for (default: OUTPUT/fields)");
+  cli::bind_resume(*command, options.restarts);
+  command->add_option("-o,--output", options.output_folder, "Folder for the results")->required();
+  return command;
+}
+
+void run_field_parameters(const FieldParametersOptions& options,
+                          const std::string& command_line,
+                          const Communicator& world) {
+  const std::filesystem::path fields =
+      options.fields_folder.empty() ? options.output_folder / "fields" : options.fields_folder;
+  std::optional<OutputLock> lock;
+  const std::vector<Target> targets = all_or_none(world, [&] {
+    throw_if_any(problems(options));
+    if (world.is_root()) {
+      require_gnuplot();
+      make_output_folder(options.output_folder);
+      announce_outputs(options.output_folder, {"reproduce.sh", "summary.json"});
+      lock.emplace(options.output_folder);
+      make_output_folder(fields);
+    }
+    return targets_of(options);
+  });
+  listen_for_stop_requests();
+  Provenance provenance = {"af-evaluate field-parameters",
+                           command_line,
+                           to_toml(options),
+                           options.seed,
+                           world.size(),
+                           {}};
+  std::vector<SettingResult> results;
+  for (const Target& target : targets)
+    sweep_target(options, target, fields, command_line, world, results, provenance);
+  const json difference_images =
+      write_difference_images(results, options.drr_step_mm, options.output_folder, world);
+  all_or_none(world, [&] {
+    if (!world.is_root()) return;
+    write_results(options, results, difference_images, provenance);
+    std::filesystem::remove_all(progress_folder(options.output_folder));
+  });
+}
+
+}  // namespace af::evaluation

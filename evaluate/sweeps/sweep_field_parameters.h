@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "cli/app_forward.h"
+#include "parallel/communicator.h"
+#include "precompute/plan/precompute_options.h"
+
+namespace af::evaluation {
+
+/// `af-evaluate field-parameters` as typed.
+struct FieldParametersOptions {
+  PrecomputeOptions base;  ///< the setting that all sweeps share; CT, range; camera (none: all)
+  std::vector<int> uv_nodes = {16, 32, 64};
+  std::vector<int> st_nodes = {128, 256, 512};
+  std::vector<int> codewords = {1024, 4096, 16384, 65536};
+  std::vector<double> training_fractions = {0.01, 0.1, 0.3};
+  int pose_count = 20;
+  double drr_step_mm = 1.0;  ///< of the reference DRRs
+  std::uint64_t seed = 1;
+  std::filesystem::path fields_folder;  ///< empty: OUTPUT/fields
+  bool restarts = false;
+  std::filesystem::path output_folder;
+};
+
+std::vector<std::string> problems(const FieldParametersOptions& options);
+
+/// Adds the subcommand; returns it.
+CLI::App* bind_field_parameters(CLI::App& app, FieldParametersOptions& options);
+
+/// Collective. Image quality of fields against each of the four field parameters, the others as in
+/// the base setting (Fig. 10), with memory, creation time and compression (Table I), and difference
+/// images at three qualities (Fig. 9): of one camera, or of all views of a study together. Fields
+/// are built once and kept in a folder; one that is there with the same options is reused. Writes
+/// what write_sweep() and write_difference_images() write, summary.json and reproduce.sh.
+void run_field_parameters(const FieldParametersOptions& options,
+                          const std::string& command_line,
+                          const Communicator& world);
+
+}  // namespace af::evaluation

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <vector>
+
+#include "parallel/communicator.h"
+#include "precompute/codebook/codebook_training.h"
+#include "run/progress_journal.h"
+
+namespace af {
+
+/// The iterations of an unfinished training, in a journal that rank 0 keeps in the progress folder.
+class TrainingJournal {
+ public:
+  /// Collective. Opens or creates the journal. Iterations with other options are thrown away: the
+  /// codebook may be changed between a stop and going on, the cast units stay. So are those whose
+  /// codebook is not usable, or not of so many codewords.
+  TrainingJournal(const std::filesystem::path& progress_folder,
+                  const DecidingValues& decides,
+                  std::size_t codewords,
+                  const Communicator& communicator);
+
+  /// What the last sound iteration of earlier runs gave, the same on every rank; none without one.
+  [[nodiscard]] const std::optional<TrainedCodebook>& begun() const { return begun_; }
+
+  /// Collective. Keeps the training after an iteration.
+  void append(const TrainedCodebook& so_far);
+
+ private:
+  Communicator communicator_;
+  std::optional<ProgressShard> shard_;  ///< of rank 0
+  std::optional<TrainedCodebook> begun_;
+};
+
+/// A training as bytes, and back; nothing when the bytes are not of one with a usable codebook.
+std::vector<std::byte> packed_training(const TrainedCodebook& training);
+std::optional<TrainedCodebook> unpacked_training(std::span<const std::byte> bytes);
+
+}  // namespace af

@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "precompute/casting/shear_warp_kernel.h"
+
+#include "base/vec16.h"
+
+namespace af::AF_KERNEL_NAMESPACE {
+
+namespace {
+
+AF_KERNEL_INLINE F16 mix(F16 a, F16 b, F16 weight) {
+  return a + weight * (b - a);
+}
+
+/// The cell that holds a position along one axis of `size` voxels, and the weight of its upper end.
+/// Positions beyond the border are moved onto it, where voxels are 0 and so is every interpolant.
+struct Cell {
+  I16 index;
+  F16 weight;
+};
+
+AF_KERNEL_INLINE Cell cell_of(F16 position, int32_t size) {
+  const F16 inside = minimum(maximum(position, splat(0.0f)), to_float(splat(size - 1)));
+  const I16 index = minimum(to_int(inside), splat(size - 2));
+  return {index, inside - to_float(index)};
+}
+
+struct Pair {
+  F16 low;
+  F16 high;
+};
+
+AF_KERNEL_INLINE Pair unpack(I16 pairs) {
+  return {to_float(pairs & 0xFFFF),
+          to_float(reinterpret_cast<I16>(reinterpret_cast<U16>(pairs) >> 16))};
+}
+
+AF_KERNEL_INLINE F16 sample(const ResampledVolume& volume, F16 x, F16 y, F16 z) {
+  const Cell i = cell_of(x, volume.size[0]);
+  const Cell j = cell_of(y, volume.size[1]);
+  const Cell k = cell_of(z, volume.size[2]);
+  const int32_t row_stride = volume.size[0];
+  const int32_t slice_stride = volume.size[0] * volume.size[1];
+  const I16 offset = i.index + j.index * row_stride + k.index * slice_stride;
+  const uint16_t* next_slice = volume.voxels + slice_stride;
+  const Pair row_00 = unpack(gather_pairs(volume.voxels, offset));
+  const Pair row_10 = unpack(gather_pairs(volume.voxels + row_stride, offset));
+  const Pair row_01 = unpack(gather_pairs(next_slice, offset));
+  const Pair row_11 = unpack(gather_pairs(next_slice + row_stride, offset));
+  const F16 low =
+      mix(mix(row_00.low, row_10.low, j.weight), mix(row_01.low, row_11.low, j.weight), k.weight);
+  const F16 high = mix(
+      mix(row_00.high, row_10.high, j.weight), mix(row_01.high, row_11.high, j.weight), k.weight);
+  return mix(low, high, i.weight);
+}
+
+constexpr int16_t kZeros[kShearColumns] = {};
+
+/// The levels of a row from x on, a multiple of kShearColumns.
+template <bool kIsStored>
+AF_KERNEL_INLINE const int16_t* block_of(const int16_t* values, const ShearRow& row, int32_t x) {
+  const bool is_stored =
+      kIsStored || static_cast<uint32_t>(x - row.begin) < static_cast<uint32_t>(row.count);
+  return is_stored ? values + (row.origin + x) : kZeros;
+}
+
+/// Eight columns from `group` on for kShearColumns places from x on.
+template <bool kIsStored>
+AF_KERNEL_INLINE void interpolate_block(const ShearColumns& columns,
+                                        int group,
+                                        int32_t x,
+                                        S32 (&block)[8]) {
+  for (int i = 0; i < 8; ++i) {
+    const int j = group + i;
+    const S32 lower = load<S32>(block_of<kIsStored>(columns.values, columns.lower[j], x));
+    const S32 upper = load<S32>(block_of<kIsStored>(columns.values, columns.upper[j], x));
+    block[i] = lower + multiply_fraction(upper - lower, columns.weight[j] - S32{});
+  }
+}
+
+/// Transposes 8 x 8 lanes within each of the four groups: rows of x become rows of t.
+AF_KERNEL_INLINE void transpose_groups(S32 (&rows)[8]) {
+  S32 pairs[8];
+  for (int i = 0; i < 4; ++i) {
+    pairs[2 * i] = interleave_low(rows[2 * i], rows[2 * i + 1]);
+    pairs[2 * i + 1] = interleave_high(rows[2 * i], rows[2 * i + 1]);
+  }
+  S32 fours[8];
+  for (int half = 0; half < 8; half += 4)
+    for (int i = 0; i < 2; ++i) {
+      fours[half + 2 * i] = interleave_pairs_low(pairs[half + i], pairs[half + i + 2]);
+      fours[half + 2 * i + 1] = interleave_pairs_high(pairs[half + i], pairs[half + i + 2]);
+    }
+  for (int i = 0; i < 4; ++i) {
+    rows[2 * i] = interleave_fours_low(fours[i], fours[i + 4]);
+    rows[2 * i + 1] = interleave_fours_high(fours[i], fours[i + 4]);
+  }
+}
+
+/// Adds all slices of one node s to the sums of the columns of one register: within each group of
+/// eight the first four columns to `low`, the others to `high`. Single registers, because GCC keeps
+/// arrays and emulated vectors that are carried around a loop in memory.
+AF_KERNEL_INLINE void add_slices(const int16_t* columns,
+                                 const int32_t* offsets,
+                                 const int32_t* weights,
+                                 int32_t slices,
+                                 int32_t* low,
+                                 int32_t* high) {
+  IntegerRegister low_sum;
+  IntegerRegister high_sum;
+  memcpy(&low_sum, low, sizeof(low_sum));
+  memcpy(&high_sum, high, sizeof(high_sum));
+  for (int k = 0; k < slices; ++k) {
+    const int16_t* row = columns + offsets[k];
+    IntegerRegister lower;
+    IntegerRegister upper;
+    memcpy(&lower, row, sizeof(lower));
+    memcpy(&upper, row + kShearColumns, sizeof(upper));
+    const IntegerRegister weight = AF_INTRINSIC(set1_epi32)(weights[k]);
+    low_sum = AF_INTRINSIC(add_epi32)(
+        low_sum, AF_INTRINSIC(madd_epi16)(AF_INTRINSIC(unpacklo_epi16)(lower, upper), weight));
+    high_sum = AF_INTRINSIC(add_epi32)(
+        high_sum, AF_INTRINSIC(madd_epi16)(AF_INTRINSIC(unpackhi_epi16)(lower, upper), weight));
+  }
+  memcpy(low, &low_sum, sizeof(low_sum));
+  memcpy(high, &high_sum, sizeof(high_sum));
+}
+
+}  // namespace
+
+void resample_row(const ResampledVolume& volume, const ResampledRow& row, int16_t* out) {
+  F16 index = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+  index += static_cast<float>(row.first);
+  const F16 scale = splat(row.scale);
+  for (int32_t i = 0; i < row.count; i += kLanes, index += static_cast<float>(kLanes)) {
+    const F16 value = sample(volume,
+                             row.start[0] + index * row.step[0],
+                             row.start[1] + index * row.step[1],
+                             row.start[2] + index * row.step[2]);
+    const I16 level = to_int(value * scale + 0.5f);
+    for (int lane = 0; lane < kLanes; ++lane) out[i + lane] = static_cast<int16_t>(level[lane]);
+  }
+}
+
+void interpolate_columns(const ShearColumns& columns,
+                         int32_t first_x,
+                         int32_t row_count,
+                         int16_t* rows) {
+  // Groups of columns outside: few rows at a time are read, each to its end, which is what
+  // prefetchers of memory want.
+  for (int group = 0; group < kShearColumns; group += 8)
+    for (int32_t row = 0; row < row_count; row += kShearColumns) {
+      const int32_t x = first_x + row;
+      S32 block[8];
+      if (x >= columns.whole_begin && x < columns.whole_end)
+        interpolate_block<true>(columns, group, x, block);
+      else
+        interpolate_block<false>(columns, group, x, block);
+      transpose_groups(block);
+      for (int i = 0; i < 8; ++i)
+        store_groups(rows + (row + i) * kShearColumns + group, 8 * kShearColumns, block[i]);
+    }
+}
+
+void accumulate_nodes(const int16_t* rows,
+                      const ShearBlock& block,
+                      int32_t first_node,
+                      int32_t end_node,
+                      int32_t* sums) {
+  const F16 start = load<F16>(block.start);
+  const F16 step = load<F16>(block.step);
+  const F16 low = load<F16>(block.low);
+  const F16 high = load<F16>(block.high);
+  const I16 origin = load<I16>(block.origin);
+  int32_t offsets[kShearSlices];
+  int32_t weights[kShearSlices];
+  for (int32_t node = first_node; node < end_node; ++node, sums += kShearColumns) {
+    const I16 x = to_int(minimum(maximum(start + step * static_cast<float>(node), low), high));
+    store(offsets, (x >> 8) * kShearColumns + origin);
+    const I16 weight = x & 255;
+    store(weights, (256 - weight) | (weight << 16));
+    // Through memory on purpose: loads that broadcast are cheaper than taking registers apart.
+    asm volatile("" : : : "memory");
+    for (int i = 0; i < kRegisters; ++i) {
+      int32_t* low_sums = sums + i * kLanes / kRegisters;
+      add_slices(rows + i * kShearColumns / kRegisters,
+                 offsets,
+                 weights,
+                 block.slices,
+                 low_sums,
+                 low_sums + kLanes);
+    }
+  }
+}
+
+void quantize_node(const int32_t* sums,
+                   const ShearScale& scale,
+                   float slope_squared_s,
+                   uint16_t* samples) {
+  I16 levels[2];
+  for (int half = 0; half < 2; ++half) {
+    const F16 slope_squared = load<F16>(scale.slope_squared_t + half * kLanes) + slope_squared_s;
+    const F16 total_attenuation = to_float(load<I16>(sums + half * kLanes)) *
+                                  scale.attenuation_per_unit * square_root(slope_squared + 1.0f);
+    const F16 level = total_attenuation / scale.quantizer_step + 0.5f;
+    levels[half] = to_int(minimum(level, splat(65535.0f)));
+  }
+  store(reinterpret_cast<int16_t*>(samples), pack_unsigned(levels[0], levels[1]));
+}
+
+}  // namespace af::AF_KERNEL_NAMESPACE

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/progress.h"
+#include "field/codebook.h"
+#include "precompute/codebook/tile_selection.h"
+
+namespace af {
+
+struct CodebookOptions {
+  int codewords = 16384;  ///< with the zero tile
+  int max_iterations = 12;
+  double min_relative_improvement = 0.005;  ///< of the training tiles' squared error
+  std::uint64_t seed = 1;
+};
+
+std::vector<std::string> problems(const CodebookOptions& options);
+
+/// What one iteration measured with the codebook it began with, over all ranks, in squared levels.
+struct TrainingIteration {
+  std::uint64_t training_squared_error = 0;
+  std::uint64_t held_out_squared_error = 0;
+  std::uint64_t codewords_repaired = 0;  ///< unused or equal ones replaced by the worst-coded tiles
+};
+
+enum class TrainingStop { ImprovementBelowLimit, MaxIterations };
+
+const char* to_string(TrainingStop stop);
+
+struct TrainedCodebook {
+  Codebook codebook;  ///< of the size asked for, sorted, codeword 0 the zero tile
+  std::uint64_t training_tiles = 0;
+  std::uint64_t held_out_tiles = 0;
+  std::vector<TrainingIteration> iterations;
+  TrainingStop stop = TrainingStop::MaxIterations;
+};
+
+/// How a training that was cut short goes on.
+struct TrainingCheckpoints {
+  /// What on_iteration() was last given, by an earlier run on any number of ranks; none: from the
+  /// start. The same tiles and options give the same codebook as a training without a stop.
+  std::optional<TrainedCodebook> begun;
+  /// Called on every rank after every iteration; when it throws, it must on all ranks.
+  std::function<void(const TrainedCodebook& so_far)> on_iteration;
+};
+
+/// Collective. Trains a codebook by the generalised Lloyd algorithm (Sec. II-D) on the shares of
+/// all ranks. Sums, counts and errors are exact integers and centroids are rounded to levels, so
+/// the codebook is the same on any number of ranks and on any vector width. Codeword 0 is and stays
+/// the zero tile. Initial codewords are distinct tiles drawn by weighted_sampling_key(); codewords
+/// that end up unused or equal to another are replaced by the worst-coded training tiles. Only when
+/// there are no such tiles left do equal codewords remain (the higher ones are then never used), so
+/// the size is always the one asked for. InputError when there are fewer distinct training tiles
+/// than codewords to draw. \test CodebookTraining.IsBitIdenticalOnAnyRankCount
+TrainedCodebook train_codebook(const TrainingShare& mine,
+                               const CodebookOptions& options,
+                               const CodebookReduction& reduction,
+                               const ProgressCallback& on_progress = {},
+                               const TrainingCheckpoints& checkpoints = {});
+
+}  // namespace af

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "precompute/codebook/nearest_codeword.h"
+#include "precompute/units/unit_tiles.h"
+
+namespace af {
+
+/// Codeword indices of one unit's tiles, [u][v][s][t], and the exact sum of their squared errors in
+/// levels; empty tiles get codeword 0.
+struct EncodedUnit {
+  std::vector<std::uint16_t> indices;
+  std::uint64_t squared_error = 0;
+};
+
+EncodedUnit encode_unit(const NearestCodeword& search,
+                        const WorkUnit& unit,
+                        const UnitTiles& tiles);
+
+}  // namespace af

@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: Apache-2.0
+// Exact nearest codeword (see nearest_codeword.h). Compiled once per vector width.
+#include "precompute/codebook/nearest_codeword_kernel.h"
+
+#include <immintrin.h>
+
+#include "base/vec16.h"
+
+namespace af::AF_KERNEL_NAMESPACE {
+
+namespace {
+
+/// Bits of the lanes whose comparison result is set.
+AF_KERNEL_INLINE uint32_t lane_bits(I16 mask) {
+#if AF_VECTOR_BITS == 512
+  __m512i lanes;
+  memcpy(&lanes, &mask, sizeof(lanes));
+  return _mm512_movepi32_mask(lanes);
+#elif AF_VECTOR_BITS == 256
+  __m256 halves[2];
+  memcpy(halves, &mask, sizeof(halves));
+  return static_cast<uint32_t>(_mm256_movemask_ps(halves[0])) |
+         static_cast<uint32_t>(_mm256_movemask_ps(halves[1])) << 8u;
+#else
+  __m128 quarters[4];
+  memcpy(quarters, &mask, sizeof(quarters));
+  uint32_t bits = 0;
+  for (uint32_t i = 0; i < 4; ++i)
+    bits |= static_cast<uint32_t>(_mm_movemask_ps(quarters[i])) << (4u * i);
+  return bits;
+#endif
+}
+
+/// Every lane's value from the lane whose number differs in bit `kStride`.
+template <int kStride, typename Vector>
+AF_KERNEL_INLINE Vector exchanged(Vector values) {
+  return __builtin_shufflevector(values,
+                                 values,
+                                 0 ^ kStride,
+                                 1 ^ kStride,
+                                 2 ^ kStride,
+                                 3 ^ kStride,
+                                 4 ^ kStride,
+                                 5 ^ kStride,
+                                 6 ^ kStride,
+                                 7 ^ kStride,
+                                 8 ^ kStride,
+                                 9 ^ kStride,
+                                 10 ^ kStride,
+                                 11 ^ kStride,
+                                 12 ^ kStride,
+                                 13 ^ kStride,
+                                 14 ^ kStride,
+                                 15 ^ kStride);
+}
+
+template <int kStride>
+AF_KERNEL_INLINE F16 smaller_of_pairs(F16 lanes) {
+  const F16 other = exchanged<kStride>(lanes);
+  return lanes < other ? lanes : other;
+}
+
+AF_KERNEL_INLINE float smallest(F16 lanes) {
+  return smaller_of_pairs<1>(
+      smaller_of_pairs<2>(smaller_of_pairs<4>(smaller_of_pairs<8>(lanes))))[0];
+}
+
+/// Exact: 16 squares below 2^32 each.
+AF_KERNEL_INLINE uint64_t squared_error(const uint16_t* a, const uint16_t* b) {
+  uint64_t sum = 0;
+  for (int i = 0; i < 16; ++i) {
+    const int32_t difference = static_cast<int32_t>(a[i]) - static_cast<int32_t>(b[i]);
+    const uint32_t magnitude = static_cast<uint32_t>(difference < 0 ? -difference : difference);
+    sum += static_cast<uint64_t>(magnitude * magnitude);
+  }
+  return sum;
+}
+
+template <int kStride>
+AF_KERNEL_INLINE I16 butterfly(I16 values) {
+  const I16 lanes = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+  const I16 is_upper = lanes & splat(int32_t{kStride});
+  const I16 other = exchanged<kStride>(values);
+  return is_upper != 0 ? other - values : values + other;
+}
+
+/// 4-D Hadamard transform of a tile; integers below 2^21, exact also as floats.
+AF_KERNEL_INLINE void hadamard(const uint16_t* tile, float* coefficients) {
+  using Levels = uint16_t __attribute__((vector_size(32)));
+  Levels levels;
+  memcpy(&levels, tile, sizeof(levels));
+  const I16 values =
+      butterfly<8>(butterfly<4>(butterfly<2>(butterfly<1>(__builtin_convertvector(levels, I16)))));
+  const I16 ordered = __builtin_shufflevector(values,
+                                              values,
+                                              kCoefficientOrder[0],
+                                              kCoefficientOrder[1],
+                                              kCoefficientOrder[2],
+                                              kCoefficientOrder[3],
+                                              kCoefficientOrder[4],
+                                              kCoefficientOrder[5],
+                                              kCoefficientOrder[6],
+                                              kCoefficientOrder[7],
+                                              kCoefficientOrder[8],
+                                              kCoefficientOrder[9],
+                                              kCoefficientOrder[10],
+                                              kCoefficientOrder[11],
+                                              kCoefficientOrder[12],
+                                              kCoefficientOrder[13],
+                                              kCoefficientOrder[14],
+                                              kCoefficientOrder[15]);
+  store(coefficients, to_float(ordered));
+}
+
+/// The best codeword of one tile so far, and the bound that a better one must meet.
+struct Best {
+  uint64_t squared_error;
+  uint32_t index;
+  float limit;
+};
+
+/// A sum of squares of exact differences of integers is exact as a float while it stays below 2^24,
+/// in any order of summation.
+constexpr float kExactBelow = 0x1.0p24f;
+/// Above any sum of a codeword, below those of the padding and of the guards.
+constexpr float kNoLimit = 1e30f;
+constexpr Best kNothing{~uint64_t{0}, ~uint32_t{0}, kNoLimit};
+
+AF_KERNEL_INLINE float limit_of(uint64_t error) {
+  // The transform scales squared distances by 16. A float sum of 16 squares of exact differences
+  // errs by less than 17 * 2^-24 of itself; 2^-18 = 64 * 2^-24 covers that and this product.
+  return static_cast<float>(16 * error) * (1.0f + 0x1.0p-18f);
+}
+
+AF_KERNEL_INLINE Best guessed(const CodewordBlocks& blocks, const uint16_t* tile, uint32_t index) {
+  const uint64_t error = squared_error(tile, blocks.codewords + static_cast<size_t>(index) * 16);
+  return {error, index, limit_of(error)};
+}
+
+/// Ties take the lowest index.
+AF_KERNEL_INLINE void offer(Best& best, uint64_t error, uint32_t candidate) {
+  if (error > best.squared_error || (error == best.squared_error && candidate >= best.index))
+    return;
+  best = {error, candidate, limit_of(error)};
+}
+
+AF_KERNEL_INLINE F16 add_squared_difference(F16 sum, float coefficient, const float* lanes) {
+  const F16 difference = splat(coefficient) - load<F16>(lanes);
+  return sum + difference * difference;
+}
+
+/// Offers the codewords of a block whose sums are within the limit, the nearest first: exact sums
+/// need no other, the rest are decided by integers.
+AF_KERNEL_INLINE void offer_lanes(
+    const CodewordBlocks& blocks, uint32_t block, const uint16_t* tile, F16 sums, Best& best) {
+  uint32_t near_bits = lane_bits(sums <= splat(best.limit));
+  while (near_bits != 0) {
+    const float nearest = smallest(sums);
+    const uint32_t lane =
+        static_cast<uint32_t>(__builtin_ctz(lane_bits(sums == splat(nearest)) & near_bits));
+    const uint32_t candidate = block * 16 + lane;
+    const uint64_t error =
+        nearest < kExactBelow
+            ? static_cast<uint64_t>(nearest) / 16
+            : squared_error(tile, blocks.codewords + static_cast<size_t>(candidate) * 16);
+    offer(best, error, candidate);
+    if (nearest < kExactBelow) return;
+    sums[lane] = kNoLimit;
+    near_bits = lane_bits(sums <= splat(best.limit));
+  }
+}
+
+/// Compares a tile with the 16 codewords of one block; gives up after five coefficients when all
+/// are too far.
+AF_KERNEL_INLINE void search_block(const CodewordBlocks& blocks,
+                                   uint32_t block,
+                                   const uint16_t* tile,
+                                   const float* coefficients,
+                                   Best& best) {
+  const float* lanes = blocks.coefficients + static_cast<size_t>(block) * 256;
+  F16 sum = {};
+  for (int i = 0; i < 5; ++i) sum = add_squared_difference(sum, coefficients[i], lanes + 16 * i);
+  if (lane_bits(sum <= splat(best.limit)) == 0) return;
+  for (int i = 5; i < 16; ++i) sum = add_squared_difference(sum, coefficients[i], lanes + 16 * i);
+  offer_lanes(blocks, block, tile, sum, best);
+}
+
+AF_KERNEL_INLINE float squared_gap(float gap) {
+  return gap > 0.0f ? gap * gap : 0.0f;
+}
+
+/// Walks outwards from the tile's DC, a block above and a block below in turn (a branch on which
+/// is nearer would be a coin toss), until the DC alone is too far.
+AF_KERNEL_INLINE Best search_tile(const CodewordBlocks& blocks, const uint16_t* tile, Best best) {
+  float coefficients[16];
+  hadamard(tile, coefficients);
+  const float dc = coefficients[0];
+
+  int64_t above = blocks.start_block[static_cast<uint32_t>(dc) >> kStartShift];
+  while (blocks.high_dc[above] < dc) ++above;
+  int64_t below = above - 1;
+  bool go_above = true;
+  bool go_below = true;
+  do {
+    go_above = go_above && squared_gap(blocks.low_dc[above] - dc) <= best.limit;
+    if (go_above) search_block(blocks, static_cast<uint32_t>(above++), tile, coefficients, best);
+    go_below = go_below && squared_gap(dc - blocks.high_dc[below]) <= best.limit;
+    if (go_below) search_block(blocks, static_cast<uint32_t>(below--), tile, coefficients, best);
+  } while (go_above || go_below);
+  return best;
+}
+
+}  // namespace
+
+void find_nearest(const CodewordBlocks& blocks, const NearestRequest& request) {
+  for (size_t i = 0; i < request.tile_count; ++i) {
+    const uint16_t* tile = request.tiles + 16 * i;
+    const Best guess = request.has_hints ? guessed(blocks, tile, request.nearest[i]) : kNothing;
+    const Best best = search_tile(blocks, tile, guess);
+    request.nearest[i] = best.index;
+    request.squared_errors[i] = best.squared_error;
+  }
+}
+
+}  // namespace af::AF_KERNEL_NAMESPACE

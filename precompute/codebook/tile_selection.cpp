@@ -1,0 +1,276 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "precompute/codebook/tile_selection.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <numeric>
+#include <tuple>
+
+#include "base/error.h"
+#include "base/hash_random.h"
+
+namespace af {
+
+namespace {
+
+// Keys of the random streams of one seed.
+constexpr std::uint64_t kTrainingStream = 0x7472'6169'6E69'6E67;  // "training"
+constexpr std::uint64_t kInitialStream = 0x696E'6974'6961'6C00;   // "initial"
+
+constexpr std::size_t kBins = 65536;
+constexpr std::uint64_t kEverything = ~std::uint64_t{0};
+
+/// Largest hash that still trains, for a fraction within (0, 1].
+std::uint64_t last_hash_of_fraction(double fraction) {
+  if (fraction >= 1.0) return kEverything;
+  const auto threshold = static_cast<std::uint64_t>(std::ldexp(fraction, 64));
+  return threshold == 0 ? 0 : threshold - 1;
+}
+
+std::uint64_t capped_last_hash(std::span<const std::uint64_t> histogram,
+                               std::uint64_t last_hash,
+                               std::uint64_t max_tiles) {
+  std::uint64_t tiles = 0;
+  for (std::size_t bin = 0; bin < kBins; ++bin) {
+    tiles += histogram[bin];
+    if (tiles > max_tiles) return bin == 0 ? 0 : (static_cast<std::uint64_t>(bin) << 48u) - 1;
+  }
+  return last_hash;
+}
+
+/// Hashes above this are held out when the last training hash is `last_training`.
+std::uint64_t first_held_out(std::uint64_t last_training) {
+  return kEverything - std::min(last_training / 8, (kEverything - last_training) / 2);
+}
+
+/// The lowest of first_held_out(x) for all x up to `last_training`.
+std::uint64_t lowest_held_out(std::uint64_t last_training) {
+  constexpr std::uint64_t kMostHeldOut = kEverything / 10 * 8;  // where the two halves meet
+  return first_held_out(std::min(last_training, kMostHeldOut)) - 8;
+}
+
+/// How many of this rank's tiles others take over, and at which of all tiles moved its own begin.
+struct Move {
+  std::uint64_t given = 0;
+  std::uint64_t first_taken = 0;
+  std::uint64_t taken = 0;
+};
+
+/// `counts[r]`: tiles of rank r. Every rank ends with the mean, the first ones with one more.
+Move move_of_rank(std::span<const std::uint64_t> counts, std::size_t rank) {
+  const std::uint64_t all = std::accumulate(counts.begin(), counts.end(), std::uint64_t{0});
+  Move move;
+  for (std::size_t r = 0; r <= rank; ++r) {
+    const std::uint64_t target = all / counts.size() + (r < all % counts.size() ? 1 : 0);
+    move.first_taken += move.taken;
+    move.given = counts[r] > target ? counts[r] - target : 0;
+    move.taken = counts[r] < target ? target - counts[r] : 0;
+  }
+  return move;
+}
+
+void level_out_tiles(std::vector<NumberedTile>& tiles, const CodebookReduction& reduction) {
+  const std::uint64_t mine = tiles.size();
+  std::vector<std::uint64_t> counts;
+  for (const auto& bytes : reduction.all_gather(std::as_bytes(std::span(&mine, 1)))) {
+    counts.emplace_back();
+    std::memcpy(&counts.back(), bytes.data(), sizeof(std::uint64_t));
+  }
+  const Move move = move_of_rank(counts, reduction.rank);
+  const std::size_t kept = tiles.size() - move.given;
+  std::uint64_t position = 0;
+  std::vector<NumberedTile> taken(move.taken);
+  for (const auto& bytes : reduction.all_gather(std::as_bytes(std::span(tiles).subspan(kept)))) {
+    const std::uint64_t end = position + bytes.size() / sizeof(NumberedTile);
+    const std::uint64_t from = std::max(position, move.first_taken);
+    const std::uint64_t to = std::min(end, move.first_taken + move.taken);
+    if (from < to)
+      std::memcpy(&taken[from - move.first_taken],
+                  bytes.data() + (from - position) * sizeof(NumberedTile),
+                  (to - from) * sizeof(NumberedTile));
+    position = end;
+  }
+  tiles.resize(kept);
+  tiles.insert(tiles.end(), taken.begin(), taken.end());
+}
+
+/// Natural logarithm for (0, 1], accurate to about 1e-12: exponent and an atanh series, in
+/// correctly rounded operations only (libm's last bit differs between processors).
+double portable_log(double value) {
+  int exponent = 0;
+  double mantissa = std::frexp(value, &exponent);  // exact
+  if (mantissa < 0.70710678118654752) {
+    mantissa *= 2.0;
+    --exponent;
+  }
+  const double z = (mantissa - 1.0) / (mantissa + 1.0);
+  const double square = z * z;
+  double series = 0.0;
+  for (int denominator = 17; denominator >= 1; denominator -= 2)
+    series = series * square + 1.0 / denominator;
+  return 2.0 * z * series + 0.69314718055994531 * exponent;
+}
+
+/// The four summed histograms of a radix search: finds the key of the `count`-th smallest.
+std::uint64_t key_of_rank(std::span<const std::uint64_t> keys,
+                          std::uint64_t count,
+                          const CodebookReduction& reduction) {
+  std::uint64_t prefix = 0;
+  std::uint64_t remaining = count;
+  for (int shift = 48; shift >= 0; shift -= 16) {
+    std::vector<std::uint64_t> histogram(kBins, 0);
+    for (const std::uint64_t key : keys)
+      if (key == kNeverPicked)
+        continue;
+      else if (shift == 48 || (key >> (shift + 16)) == (prefix >> (shift + 16)))
+        ++histogram[(key >> shift) & 0xFFFFu];
+    reduction.sum(histogram);
+    std::uint64_t bin = 0;
+    while (bin + 1 < kBins && histogram[bin] < remaining) remaining -= histogram[bin++];
+    prefix |= bin << shift;
+  }
+  return prefix;
+}
+
+}  // namespace
+
+CodebookReduction serial_reduction() {
+  return {[](std::span<std::uint64_t>) {},
+          [](std::span<const std::byte> mine) {
+            return std::vector<std::vector<std::byte>>{{mine.begin(), mine.end()}};
+          },
+          0};
+}
+
+std::vector<std::string> problems(const TrainingSelection& selection) {
+  std::vector<std::string> found;
+  if (!(selection.fraction > 0.0 && selection.fraction <= 1.0))
+    found.push_back("training_fraction = " + std::to_string(selection.fraction) +
+                    ": must be above 0 and at most 1");
+  if (selection.max_training_tiles < 1)
+    found.emplace_back("max_training_tiles = 0: must be at least 1");
+  return found;
+}
+
+TrainingTilePicker::TrainingTilePicker(const TrainingSelection& selection,
+                                       const LightSlab& light_slab)
+    : selection_(selection), light_slab_(light_slab), histogram_(kBins, 0) {
+  throw_if_any(problems(selection));
+  lower_threshold(last_hash_of_fraction(selection.fraction));
+  // Only what is used of it becomes memory. An eighth above the cap, so that dropping is rare.
+  constexpr std::uint64_t kMostReserved = std::uint64_t{1} << 24;
+  const std::uint64_t most = std::min(selection.max_training_tiles, kMostReserved);
+  candidates_.training.reserve(most + most / 8 + 1);
+}
+
+void TrainingTilePicker::lower_threshold(std::uint64_t last_training) {
+  last_training_ = last_training;
+  first_held_out_ = lowest_held_out(last_training);
+}
+
+void TrainingTilePicker::add(const UnitTiles& tiles, const WorkUnit& unit) {
+  const TileLattice lattice(light_slab_, unit.slab);
+  tiles.for_each([&](std::size_t local_tile, const Tile& tile) {
+    const NumberedTile numbered{lattice.global_index(unit, light_slab_, local_tile), tile};
+    const std::uint64_t hash = hash_of(numbered);
+    if (hash <= last_training_) {
+      ++histogram_[hash >> 48u];
+      candidates_.training.push_back(numbered);
+      if (candidates_.training.size() == candidates_.training.capacity()) keep_within_cap();
+    } else if (hash > first_held_out_) {
+      candidates_.held_out.push_back(numbered);
+    }
+  });
+}
+
+void TrainingTilePicker::keep_within_cap() {
+  // What one rank's tiles alone push over the cap, those of all ranks do, too.
+  lower_threshold(capped_last_hash(histogram_, last_training_, selection_.max_training_tiles));
+  drop_beyond();
+}
+
+void TrainingTilePicker::drop_beyond() {
+  std::vector<NumberedTile>& held_out = candidates_.held_out;
+  std::erase_if(held_out,
+                [&](const NumberedTile& tile) { return hash_of(tile) <= first_held_out_; });
+  std::erase_if(candidates_.training, [&](const NumberedTile& tile) {
+    const std::uint64_t hash = hash_of(tile);
+    if (hash > last_training_ && hash > first_held_out_) held_out.push_back(tile);
+    return hash > last_training_;
+  });
+}
+
+TrainingShare TrainingTilePicker::take(const CodebookReduction& reduction) {
+  // Above a rank's own threshold its histogram lacks tiles, but the common one lies below it.
+  reduction.sum(histogram_);
+  last_training_ = capped_last_hash(
+      histogram_, last_hash_of_fraction(selection_.fraction), selection_.max_training_tiles);
+  first_held_out_ = first_held_out(last_training_);
+  drop_beyond();
+  candidates_.training.shrink_to_fit();
+  candidates_.held_out.shrink_to_fit();
+  return std::move(candidates_);
+}
+
+std::uint64_t TrainingTilePicker::hash_of(const NumberedTile& tile) const {
+  return hash64(selection_.seed, kTrainingStream, static_cast<std::uint64_t>(tile.global_index));
+}
+
+TrainingShare select_training_tiles(std::span<const UnitTiles> tiles,
+                                    std::span<const WorkUnit> units,
+                                    const LightSlab& light_slab,
+                                    const TrainingSelection& selection,
+                                    const CodebookReduction& reduction) {
+  TrainingTilePicker picker(selection, light_slab);
+  for (const UnitTiles& of_unit : tiles) picker.add(of_unit, units[of_unit.unit_id]);
+  return picker.take(reduction);
+}
+
+void level_out(TrainingShare& share, const CodebookReduction& reduction) {
+  level_out_tiles(share.training, reduction);
+  level_out_tiles(share.held_out, reduction);
+}
+
+std::vector<KeyedTile> smallest_keyed_tiles(std::span<const std::uint64_t> keys,
+                                            std::span<const NumberedTile> tiles,
+                                            std::uint64_t count,
+                                            const CodebookReduction& reduction) {
+  check(keys.size() == tiles.size(), "one key per tile");
+  const std::uint64_t last_key = key_of_rank(keys, count, reduction);
+  std::vector<KeyedTile> mine;
+  for (std::size_t i = 0; i < keys.size(); ++i)
+    if (keys[i] <= last_key && keys[i] != kNeverPicked) mine.push_back({keys[i], tiles[i]});
+  std::vector<KeyedTile> picked;
+  for (const auto& bytes : reduction.all_gather(std::as_bytes(std::span(mine)))) {
+    const std::size_t first = picked.size();
+    picked.resize(first + bytes.size() / sizeof(KeyedTile));
+    if (!bytes.empty()) std::memcpy(&picked[first], bytes.data(), bytes.size());
+  }
+  std::sort(picked.begin(), picked.end(), [](const KeyedTile& a, const KeyedTile& b) {
+    return std::tie(a.key, a.numbered.global_index) < std::tie(b.key, b.numbered.global_index);
+  });
+  if (picked.size() > count) picked.resize(count);
+  return picked;
+}
+
+std::uint64_t weighted_sampling_key(std::uint64_t seed, const NumberedTile& tile) {
+  std::uint64_t sum = 0;
+  std::uint64_t sum_of_squares = 0;
+  for (const std::uint64_t level : tile.tile) {
+    sum += level;
+    sum_of_squares += level * level;
+  }
+  // 16 times the squared AC norm; at least that of a norm of one level, so that flat tiles may be
+  // drawn.
+  const std::uint64_t energy = std::max<std::uint64_t>(16 * sum_of_squares - sum * sum, 16);
+  const double weight = std::sqrt(std::sqrt(static_cast<double>(energy)));
+  const std::uint64_t bits =
+      hash64(seed, kInitialStream, static_cast<std::uint64_t>(tile.global_index));
+  const double uniform = (static_cast<double>(bits >> 11u) + 0.5) * 0x1.0p-53;
+  // Positive doubles order like their bits; log(uniform) < 0.
+  return std::bit_cast<std::uint64_t>(-portable_log(uniform) / weight);
+}
+
+}  // namespace af

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "field/tile.h"
+#include "precompute/codebook/codebook_reduction.h"
+#include "precompute/units/unit_tiles.h"
+
+namespace af {
+
+/// A tile of the field and its number over all slabs (TileLattice::global_index).
+struct NumberedTile {
+  std::int64_t global_index = 0;
+  Tile tile{};
+};
+
+/// Tiles that a rank trains on, and tiles it only measures the codebook with.
+struct TrainingShare {
+  std::vector<NumberedTile> training;
+  std::vector<NumberedTile> held_out;
+};
+
+/// The largest share of the tiles that may train: an eighth as many again are held out.
+inline constexpr double kLargestTrainingFraction = 8.0 / 9.0;
+
+struct TrainingSelection {
+  double fraction = kLargestTrainingFraction;  ///< of the tiles that are not empty
+  std::uint64_t max_training_tiles = 2000000;  ///< over all ranks
+  std::uint64_t seed = 1;
+};
+
+std::vector<std::string> problems(const TrainingSelection& selection);
+
+/// Picks a rank's training tiles while units are cast, so that no others need be kept: tile i
+/// trains when hash(seed, i) lies below a threshold, so that the choice depends on neither ranks
+/// nor plan. The threshold is the fraction's, or the highest of 65536 steps that keeps the number
+/// of training tiles of all ranks within the cap. An eighth as many again are held out. Empty tiles
+/// take no part: they are codeword 0. Never holds much more candidates than the cap and a quarter.
+/// \test TileSelection.*
+class TrainingTilePicker {
+ public:
+  /// `light_slab` must outlive the picker.
+  TrainingTilePicker(const TrainingSelection& selection, const LightSlab& light_slab);
+
+  void add(const UnitTiles& tiles, const WorkUnit& unit);
+
+  /// Collective. This rank's share of all units added on any rank, leaving the picker empty.
+  [[nodiscard]] TrainingShare take(const CodebookReduction& reduction);
+
+ private:
+  void lower_threshold(std::uint64_t last_training);
+  void keep_within_cap();
+  void drop_beyond();
+  [[nodiscard]] std::uint64_t hash_of(const NumberedTile& tile) const;
+
+  TrainingSelection selection_;
+  const LightSlab& light_slab_;
+  std::uint64_t last_training_;   ///< no hash above it trains: the fraction's, or this rank's cap's
+  std::uint64_t first_held_out_;  ///< no hash below it is held out
+  std::vector<std::uint64_t> histogram_;  ///< of the hashes at most last_training_, by bin
+  TrainingShare candidates_;
+};
+
+/// The same for units at hand, one after the other.
+TrainingShare select_training_tiles(std::span<const UnitTiles> tiles,
+                                    std::span<const WorkUnit> units,
+                                    const LightSlab& light_slab,
+                                    const TrainingSelection& selection,
+                                    const CodebookReduction& reduction);
+
+/// Collective. Moves tiles from ranks that have more than the mean to ranks that have fewer, so
+/// that all take equally long to train; only the tiles moved travel.
+void level_out(TrainingShare& share, const CodebookReduction& reduction);
+
+/// A tile with the key it is picked by.
+struct KeyedTile {
+  std::uint64_t key = 0;
+  NumberedTile numbered;
+};
+
+inline constexpr std::uint64_t kNeverPicked = ~std::uint64_t{0};
+
+/// Collective. The `count` tiles with the smallest keys over all ranks (ties: smallest global
+/// index), sorted by (key, index), the same on every rank; all of them when there are fewer.
+/// `keys[i]` belongs to `tiles[i]`; kNeverPicked keeps a tile out. Only the tiles picked travel:
+/// the largest key is found by four summed histograms.
+std::vector<KeyedTile> smallest_keyed_tiles(std::span<const std::uint64_t> keys,
+                                            std::span<const NumberedTile> tiles,
+                                            std::uint64_t count,
+                                            const CodebookReduction& reduction);
+
+/// Key whose smallest values are a sample without replacement with probabilities proportional to
+/// the square root of the tiles' AC norm (Efraimidis and Spirakis 2006: an exponential variate over
+/// the weight). From correctly rounded operations only, hence the same bits everywhere.
+std::uint64_t weighted_sampling_key(std::uint64_t seed, const NumberedTile& tile);
+
+}  // namespace af

@@ -1,0 +1,273 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "precompute/dry_run.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+
+#include "precompute/units/unit_planner.h"
+
+namespace af {
+
+namespace {
+
+template <typename... Values>
+std::string formatted(const char* format, Values... values) {
+  std::array<char, 512> text{};
+  const int length = std::snprintf(text.data(), text.size(), format, values...);
+  return {text.data(), std::min(text.size() - 1, static_cast<std::size_t>(std::max(0, length)))};
+}
+
+std::uint64_t uncropped_ray_count(const LightSlab& light_slab) {
+  std::uint64_t rays = 0;
+  for (const SlabGeometry& slab : light_slab.slabs)
+    rays += static_cast<std::uint64_t>(slab.s.nodes) * static_cast<std::uint64_t>(slab.t.nodes);
+  return rays * static_cast<std::uint64_t>(light_slab.u.nodes) *
+         static_cast<std::uint64_t>(light_slab.v.nodes);
+}
+
+double stored_fraction(const LightSlab& light_slab) {
+  return static_cast<double>(stored_ray_count(light_slab)) /
+         static_cast<double>(uncropped_ray_count(light_slab));
+}
+
+std::string axis_text(const char* name, const GridAxis& first, const GridAxis& second) {
+  return formatted("  %s plane        %.1f x %.1f mm, %d x %d nodes, %.2f x %.2f mm apart\n",
+                   name,
+                   first.last_mm - first.first_mm,
+                   second.last_mm - second.first_mm,
+                   first.nodes,
+                   second.nodes,
+                   first.spacing_mm(),
+                   second.spacing_mm());
+}
+
+std::string plane_text(const LightSlab& light_slab) {
+  std::string text = axis_text("(u,v)", light_slab.u, light_slab.v);
+  for (const SlabGeometry& slab : light_slab.slabs) {
+    text += axis_text("(s,t)", slab.s, slab.t);
+    text += formatted("  stored part        s nodes %d to %d, t nodes %d to %d (%.0f %%)\n",
+                      slab.stored_s.begin,
+                      slab.stored_s.end() - 1,
+                      slab.stored_t.begin,
+                      slab.stored_t.end() - 1,
+                      100.0 * slab.stored_s.count * slab.stored_t.count /
+                          (static_cast<double>(slab.s.nodes) * slab.t.nodes));
+  }
+  return text;
+}
+
+/// The spacing that half the translation range would give with the same nodes.
+std::string advice_text(const FieldSource& source,
+                        const LightSlab& light_slab,
+                        const PrecomputeOptions& options) {
+  const SlabGeometry& slab = light_slab.slabs.front();
+  std::string text = formatted(
+      "Advice\n  Your range uses %.0f %% of the (s,t) plane; the rest holds no shadow of the CT "
+      "and costs nothing.\n",
+      100.0 * stored_fraction(light_slab));
+  MotionRange narrower = options.range();
+  narrower.max_translation_mm /= 2.0;
+  if (narrower.max_translation_mm >= 5.0) {
+    const LightSlab alternative =
+        make_light_slab(source.camera,
+                        source.frame,
+                        narrower,
+                        source.volume->corner_points(),
+                        options.light_slab_spec({{}, {slab.st_plane_y_mm}}));
+    text += formatted(
+        "  With --max-translation-mm %.0f the same nodes would stand %.2f instead of %.2f mm apart "
+        "on the (s,t) plane: sharper DRRs for the same size.\n",
+        narrower.max_translation_mm,
+        alternative.slabs.front().s.spacing_mm(),
+        slab.s.spacing_mm());
+  }
+  const double pixel_mm = source.camera.pixel_spacing_mm.minCoeff() *
+                          source.camera.depth_mm(source.frame.center_room_mm) /
+                          source.camera.source_detector_distance_mm();
+  if (slab.s.spacing_mm() > 2.0 * pixel_mm)
+    text += formatted(
+        "  A pixel of %s is %.2f mm wide at the centre, the (s,t) nodes are %.2f mm apart: more "
+        "--st-nodes buy more than more --uv-nodes.\n",
+        source.camera.name.c_str(),
+        pixel_mm,
+        slab.s.spacing_mm());
+  return text;
+}
+
+}  // namespace
+
+std::string megabytes_text(std::uint64_t bytes) {
+  const double megabytes = static_cast<double>(bytes) / 1e6;
+  return formatted(megabytes < 10.0 ? "%.2f MB" : "%.1f MB", megabytes);
+}
+
+std::string seconds_text(const PhaseSeconds& seconds) {
+  std::string text;
+  for (const auto& [phase, of_phase] : seconds)
+    text += (text.empty() ? "" : ", ") + phase +
+            formatted(of_phase < 9.95 ? " %.1f" : " %.0f", of_phase);
+  return text;
+}
+
+double FieldForecast::all_seconds() const {
+  double all = 0.0;
+  for (const auto& [phase, of_phase] : seconds) all += of_phase;
+  return all;
+}
+
+namespace {
+
+/// Tiles of a field and how many are worked on.
+struct TileCounts {
+  double all = 0.0;
+  double occupied = 0.0;
+  double training = 0.0;  ///< with those held out
+
+  TileCounts(const DryRun& run)
+      : all(static_cast<double>(stored_tile_count(run.light_slab))),
+        occupied(all * run.speed.occupied_fraction),
+        training(training_tiles(run.options.training_selection())) {}
+
+ private:
+  [[nodiscard]] double training_tiles(const TrainingSelection& selection) const {
+    return 1.125 * std::min(occupied * selection.fraction,
+                            static_cast<double>(selection.max_training_tiles));
+  }
+};
+
+double seconds_at(double amount, double per_second) {
+  return per_second > 0.0 ? amount / per_second : 0.0;
+}
+
+void forecast_memory(const DryRun& run, const TileCounts& tiles, FieldForecast& need) {
+  need.limit_bytes = memory_limit(run.options, run.memory);
+  const std::uint64_t kept_per_rank = run.memory.kept_tile_bytes(need.limit_bytes);
+  need.tile_bytes = static_cast<std::uint64_t>(sizeof(Tile) * tiles.occupied);
+  need.kept_bytes =
+      std::min(need.tile_bytes, kept_per_rank * static_cast<std::uint64_t>(run.ranks));
+  need.bytes_per_rank =
+      run.memory.least_bytes() + need.kept_bytes / static_cast<std::uint64_t>(run.ranks);
+  // As choose_overflow(): the disk is shared by the ranks, the casting is not.
+  const double cast_bytes_per_second =
+      2.0 * run.speed.rays_per_second * run.speed.occupied_fraction * run.ranks;
+  if (run.options.has_checkpoint && run.options.overflow != "cast-again" &&
+      (run.options.overflow == "read-back" ||
+       run.disk.read_bytes_per_second >= cast_bytes_per_second))
+    need.overflow = TileOverflow::ReadBack;
+}
+
+void forecast_seconds(const DryRun& run, const TileCounts& tiles, FieldForecast& need) {
+  const SpeedSample& speed = run.speed;
+  const auto tile_bytes = static_cast<double>(need.tile_bytes);
+  const double cast_seconds =
+      static_cast<double>(stored_ray_count(run.light_slab)) / speed.rays_per_second / run.ranks;
+  const double checkpoint_seconds =
+      run.options.has_checkpoint ? seconds_at(tile_bytes, run.disk.write_bytes_per_second) : 0.0;
+  // Most trainings end after about so many iterations.
+  const double iterations = std::min(10, run.options.max_iterations);
+  const double overflow_fraction =
+      tile_bytes > 0.0 ? 1.0 - static_cast<double>(need.kept_bytes) / tile_bytes : 0.0;
+  const double overflow_seconds =
+      need.overflow == TileOverflow::ReadBack
+          ? seconds_at(overflow_fraction * tile_bytes, run.disk.read_bytes_per_second)
+          : overflow_fraction * cast_seconds;
+  const double index_bytes = 2.0 * tiles.occupied;
+  const double compress_seconds = index_bytes * speed.compress_seconds_per_byte;
+  // Rank 0 reads the file back: inflating takes about a fifth of deflating, SHA-256 some 2 ns a
+  // byte.
+  const double verify_seconds = 0.2 * compress_seconds + 2e-9 * 2.0 * tiles.all;
+  need.seconds = run.past;
+  need.seconds.emplace_back("cast", cast_seconds + checkpoint_seconds);
+  need.seconds.emplace_back("train",
+                            iterations * (speed.codebook_seconds + speed.train_seconds_per_tile *
+                                                                       tiles.training / run.ranks));
+  need.seconds.emplace_back(
+      "encode", speed.encode_seconds_per_tile * tiles.occupied / run.ranks + overflow_seconds);
+  need.seconds.emplace_back(
+      "write",
+      compress_seconds / run.ranks + verify_seconds +
+          seconds_at(static_cast<double>(need.file_bytes), run.disk.write_bytes_per_second));
+}
+
+std::string memory_text(const DryRun& run, const FieldForecast& need) {
+  std::string text = "  memory             " + megabytes_text(run.volume_bytes) +
+                     " per node for the CT and its grid, up to " +
+                     megabytes_text(need.bytes_per_rank) + " per rank (limit " +
+                     megabytes_text(need.limit_bytes) + ")\n";
+  text += "  tiles in memory    " + megabytes_text(need.kept_bytes) + " of " +
+          megabytes_text(need.tile_bytes);
+  if (need.kept_bytes < need.tile_bytes) {
+    text += need.overflow == TileOverflow::ReadBack
+                ? "; the rest is read back from the progress folder"
+                : "; the rest is cast again";
+    text += formatted(" (disk %.0f MB/s, casting %.0f MB/s)",
+                      run.disk.read_bytes_per_second / 1e6,
+                      2e-6 * run.speed.rays_per_second * run.speed.occupied_fraction * run.ranks);
+  }
+  text += "\n";
+  if (run.options.has_checkpoint)
+    text += "  progress folder    " + megabytes_text(need.tile_bytes + need.payload_bytes) +
+            " on disk until the field is complete\n";
+  const std::uint64_t disk_bytes =
+      need.file_bytes + (run.options.has_checkpoint ? need.tile_bytes + need.payload_bytes : 0);
+  text += "  disk               " + megabytes_text(run.disk.available_bytes) + " left for " +
+          megabytes_text(disk_bytes) +
+          (disk_bytes > run.disk.available_bytes ? ": NOT ENOUGH\n" : "\n");
+  return text;
+}
+
+}  // namespace
+
+FieldForecast forecast(const DryRun& run) {
+  const TileCounts tiles(run);
+  const double codebook_bytes = 32.0 * run.options.codewords;
+  FieldForecast need;
+  need.uncropped_bytes = 2 * uncropped_ray_count(run.light_slab);
+  need.cropped_bytes = 2 * static_cast<std::uint64_t>(stored_ray_count(run.light_slab));
+  need.payload_bytes = static_cast<std::uint64_t>(2.0 * tiles.all + codebook_bytes);
+  need.file_bytes = static_cast<std::uint64_t>(
+      2.0 * run.speed.compressed_fraction * tiles.occupied + codebook_bytes);
+  forecast_memory(run, tiles, need);
+  forecast_seconds(run, tiles, need);
+  return need;
+}
+
+std::string dry_run_text(const DryRun& run) {
+  const FieldForecast need = forecast(run);
+  const auto ratio = [](std::uint64_t raw, std::uint64_t stored) {
+    return static_cast<double>(raw) / static_cast<double>(stored);
+  };
+  std::string text =
+      "Field of camera " + run.source.camera.name + " for " + run.source.ct_path + "\n";
+  text += formatted("  range              +-%g degrees, +-%g mm\n",
+                    run.options.max_rotation_deg,
+                    run.options.max_translation_mm);
+  text += plane_text(run.light_slab);
+  text += formatted("  rays               %.1f million stored of %.1f million\n",
+                    static_cast<double>(stored_ray_count(run.light_slab)) / 1e6,
+                    static_cast<double>(uncropped_ray_count(run.light_slab)) / 1e6);
+  text += formatted("  tiles              %.2f million, about %.0f %% not empty\n",
+                    static_cast<double>(stored_tile_count(run.light_slab)) / 1e6,
+                    100.0 * run.speed.occupied_fraction);
+  text += formatted("  work               %zu units on %d ranks\n", run.units.size(), run.ranks);
+  text += memory_text(run, need);
+  text += "  raw field, 16 bit  " + megabytes_text(need.uncropped_bytes) + " uncropped, " +
+          megabytes_text(need.cropped_bytes) + " cropped to the CT's shadow\n";
+  text += "  payload            " + megabytes_text(need.payload_bytes) +
+          formatted(" (1 : %.1f of uncropped, 1 : %.1f of cropped)\n",
+                    ratio(need.uncropped_bytes, need.payload_bytes),
+                    ratio(need.cropped_bytes, need.payload_bytes));
+  text += "  file               about " + megabytes_text(need.file_bytes) +
+          formatted(" (1 : %.1f of uncropped, 1 : %.1f of cropped)\n",
+                    ratio(need.uncropped_bytes, need.file_bytes),
+                    ratio(need.cropped_bytes, need.file_bytes));
+  text +=
+      formatted("  time               about %.1f s (%s; %.1f million rays per second and rank)\n",
+                need.all_seconds(),
+                seconds_text(need.seconds).c_str(),
+                run.speed.rays_per_second / 1e6);
+  return text + advice_text(run.source, run.light_slab, run.options);
+}
+
+}  // namespace af

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "precompute/field_source.h"
+
+#include <optional>
+
+#include "base/error.h"
+#include "study/node_ct.h"
+#include "study/pose_file.h"
+#include "study/rig_file.h"
+#include "study/shared_inputs.h"
+
+namespace af {
+
+namespace {
+
+/// What is known before the CT is read; the default centre is the CT's.
+struct NamedSource {
+  std::string ct_path;
+  StudyPlaces places;  ///< where the study names its files
+  CameraRig rig;
+  std::string camera;
+  std::optional<PoseFrame> frame;
+  std::optional<RigidTransform> nominal_room_from_ct;
+};
+
+std::string only_camera(const std::vector<std::string>& cameras, const std::string& where) {
+  if (cameras.size() == 1) return cameras.front();
+  std::string known;
+  for (const std::string& camera : cameras) known += (known.empty() ? "" : ", ") + camera;
+  throw UsageError("--camera is needed: a field belongs to one camera, and " + where + " has " +
+                   known);
+}
+
+NamedSource source_of_study(const PrecomputeOptions& options, const Study& study) {
+  const StudyCase& study_case = study.find_case(options.case_name);
+  NamedSource source;
+  source.ct_path = study_case.ct.string();
+  source.places = study_case.places;
+  source.rig = study.rig;
+  source.frame = study_case.frame();
+  std::vector<std::string> cameras;
+  for (const StudyView& view : study_case.views) cameras.push_back(view.camera);
+  source.camera = options.camera.empty() ? only_camera(cameras, "case '" + study_case.name + "'")
+                                         : options.camera;
+  return source;
+}
+
+/// Collective.
+NamedSource source_of_options(const PrecomputeOptions& options,
+                              const Communicator& communicator,
+                              std::vector<std::string>& warnings) {
+  NamedSource source;
+  source.ct_path = options.ct;
+  source.rig = read_rig(options.rig, communicator, &warnings);
+  source.camera = options.camera;
+  if (options.camera.empty()) {
+    std::vector<std::string> cameras;
+    for (const CameraGeometry& camera : source.rig.cameras) cameras.push_back(camera.name);
+    source.camera =
+        all_or_none(communicator, [&] { return only_camera(cameras, "rig " + options.rig); });
+  }
+  if (!options.nominal_pose.empty())
+    source.nominal_room_from_ct = shared_poses(communicator, [&] {
+                                    return std::vector{read_pose(options.nominal_pose)};
+                                  }).front();
+  return source;
+}
+
+/// Collective.
+NamedSource named_source(const PrecomputeOptions& options,
+                         const Communicator& communicator,
+                         std::vector<std::string>& warnings) {
+  if (!options.study.empty()) {
+    const Study study = read_study(options.study, communicator, &warnings);
+    return all_or_none(communicator, [&] { return source_of_study(options, study); });
+  }
+  all_or_none(communicator, [&] {
+    if (options.ct.empty() || options.rig.empty())
+      throw UsageError("name a CT and a camera: --ct CT --rig RIG --camera NAME, or --study STUDY");
+  });
+  return source_of_options(options, communicator, warnings);
+}
+
+PoseFrame frame_of(const NamedSource& source,
+                   const PrecomputeOptions& options,
+                   const CtGrid& ct_grid) {
+  if (source.frame.has_value()) return *source.frame;
+  const Eigen::Vector3d center =
+      options.center_ct_mm.empty()
+          ? ct_grid.center_mm()
+          : Eigen::Vector3d(
+                options.center_ct_mm[0], options.center_ct_mm[1], options.center_ct_mm[2]);
+  if (source.nominal_room_from_ct.has_value())
+    return PoseFrame::about(*source.nominal_room_from_ct, center);
+  return {Eigen::Matrix3d::Identity(), center, source.rig.isocenter_point};
+}
+
+}  // namespace
+
+FieldSource load_source(const PrecomputeOptions& options, const Communicator& communicator) {
+  FieldSource source;
+  const NamedSource named = named_source(options, communicator, source.warnings);
+  source.camera = all_or_none(communicator, [&] { return named.rig.camera(named.camera); });
+  CtReadOptions ct_options;
+  ct_options.series_uid = options.series_uid;
+  const NodeCt ct = used_from(named.places, "ct", [&] {
+    return read_ct_per_node(
+        named.ct_path, ct_options, options.attenuation_model(), communicator, source.warnings);
+  });
+  source.volume = ct.volume;
+  source.ct_path = named.ct_path;
+  source.ct_content_sha256 = ct.facts.content_sha256;
+  source.frame = frame_of(named, options, ct.facts.grid);
+  return source;
+}
+
+}  // namespace af

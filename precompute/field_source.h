@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "geometry/camera_geometry.h"
+#include "geometry/rigid_transform.h"
+#include "parallel/communicator.h"
+#include "precompute/plan/precompute_options.h"
+#include "volume/attenuation_volume.h"
+
+namespace af {
+
+/// What a field is made from: the CT's attenuation (held once per node), the camera, the nominal
+/// pose.
+struct FieldSource {
+  std::shared_ptr<const AttenuationVolume> volume;
+  std::string ct_path;
+  std::string ct_content_sha256;
+  CameraGeometry camera;
+  PoseFrame frame;
+  std::vector<std::string> warnings;
+};
+
+/// Collective. Reads what the options name. UsageError when they name too little; InputError and
+/// FileError as the readers.
+FieldSource load_source(const PrecomputeOptions& options, const Communicator& communicator);
+
+}  // namespace af

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "geometry/slab_sizing.h"
+#include "precompute/casting/depth_slabs.h"
+#include "precompute/codebook/codebook_training.h"
+#include "precompute/codebook/tile_selection.h"
+#include "precompute/units/unit_planner.h"
+#include "volume/attenuation_volume.h"
+#include "volume/ray_caster.h"
+
+namespace af {
+
+/// What a rank may take beside what every node holds once, when nothing else is said.
+inline constexpr std::uint64_t kDefaultMemoryLimitBytes = std::uint64_t{300} << 20;
+
+/// Options of af-precompute: what is cast, how it is compressed, where it goes. Angles in degrees,
+/// as at every interface.
+struct PrecomputeOptions {
+  // The CT, the camera and the pose about which the CT moves: named one by one ...
+  std::string ct;
+  std::string series_uid;
+  std::string rig;
+  std::string camera;
+  std::vector<double> center_ct_mm;  ///< empty: the CT's centre
+  std::string nominal_pose;          ///< file; empty: R0 = identity, at the rig's isocentre
+  // ... or by a case of a study.
+  std::string study;
+  std::string case_name;
+
+  double max_rotation_deg = 10.0;
+  double max_translation_mm = 100.0;
+  int slabs = 1;
+  std::string
+      st_plane;  ///< "centre", "centroid"; empty: the centre for one slab, else the centroid
+  int uv_nodes = 64;
+  int st_nodes = 256;
+  std::string caster = "shear-warp";
+  double step_mm = RayCasterOptions{}.step_mm;  ///< of the trilinear caster
+  double water_mu_per_mm = AttenuationModel{}.mu_water_per_mm;
+
+  int codewords = CodebookOptions{}.codewords;
+  int max_iterations = CodebookOptions{}.max_iterations;
+  std::optional<double> training_fraction;  ///< none: kTrainingTilesPerCodeword decide
+  std::uint64_t max_training_tiles = TrainingSelection{}.max_training_tiles;
+  std::uint64_t seed = 1;
+
+  std::uint64_t memory_limit_bytes = 0;  ///< per rank beside the CT; 0: kDefaultMemoryLimitBytes
+  std::string overflow = "auto";         ///< of tiles beyond it: "auto", "read-back", "cast-again"
+  std::string output;
+  std::vector<std::string> mpi_io_hints;  ///< KEY=VALUE
+  bool is_dry_run = false;
+  bool is_restart = false;
+  bool has_checkpoint = true;
+
+  [[nodiscard]] MotionRange range() const {
+    return {max_rotation_deg * kRadPerDeg, max_translation_mm};
+  }
+  [[nodiscard]] AttenuationModel attenuation_model() const {
+    return {water_mu_per_mm, AttenuationModel{}.air_below_hu};
+  }
+  [[nodiscard]] TrainingSelection training_selection() const;
+  [[nodiscard]] CodebookOptions codebook_options() const;
+  [[nodiscard]] StPlane st_plane_rule() const;
+  [[nodiscard]] bool is_shear_warp() const { return caster == "shear-warp"; }
+  [[nodiscard]] LightSlabSpec light_slab_spec(const DepthSlabs& depth_slabs) const;
+};
+
+/// Training tiles where no share is stated: enough that unseen tiles come out nearly as training
+/// tiles do (precompute/README.md has what more and fewer give).
+inline constexpr std::uint64_t kTrainingTilesPerCodeword = 64;
+/// Whatever the codebook: so that 65536 codewords do not take more than twice the time of 16384.
+inline constexpr std::uint64_t kTrainingTilesUnlessStated = std::uint64_t{1} << 20u;
+
+/// Every broken constraint of the values themselves (not of files).
+std::vector<std::string> problems(const PrecomputeOptions& options);
+
+using NamedValues = std::vector<std::pair<std::string, std::string>>;
+
+/// Name and value of every option that decides the cast samples, apart from CT, camera and pose.
+NamedValues casting_options(const PrecomputeOptions& options);
+
+/// Name and value of every option that decides what the codebook makes of the samples.
+NamedValues codebook_options(const PrecomputeOptions& options);
+
+/// All options in force as TOML, stored in the field.
+std::string to_toml(const PrecomputeOptions& options);
+
+/// Shortest text that reads back as the same double.
+std::string exact_text(double value);
+
+}  // namespace af

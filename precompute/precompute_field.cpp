@@ -1,0 +1,576 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "precompute/precompute_field.h"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <numeric>
+#include <optional>
+#include <sstream>
+
+#include "base/build_info.h"
+#include "base/error.h"
+#include "files/output_file.h"
+#include "parallel/work_watch.h"
+#include "precompute/build/field_build.h"
+#include "precompute/build/shared_resampling.h"
+#include "precompute/build/training_checkpoints.h"
+#include "precompute/casting/shear_warp_caster.h"
+#include "precompute/dry_run.h"
+#include "precompute/field_source.h"
+#include "run/output_lock.h"
+#include "run/progress_printer.h"
+#include "run/provenance.h"
+#include "run/stop_request.h"
+#include "run/terminal.h"
+
+namespace af {
+
+namespace {
+
+/// Seconds of each phase, in order.
+class PhaseClock {
+ public:
+  void end(const std::string& phase) {
+    const auto now = std::chrono::steady_clock::now();
+    seconds_.emplace_back(phase, std::chrono::duration<double>(now - start_).count());
+    start_ = now;
+  }
+  /// Takes part of what has passed since the last end as a phase of its own.
+  void split(const std::string& phase, double seconds) {
+    seconds_.emplace_back(phase, seconds);
+    start_ += std::chrono::duration_cast<std::chrono::steady_clock::duration>(
+        std::chrono::duration<double>(seconds));
+  }
+  [[nodiscard]] const PhaseSeconds& phases() const { return seconds_; }
+  [[nodiscard]] double seconds_of(const std::string& phase) const {
+    for (const auto& [name, seconds] : seconds_)
+      if (name == phase) return seconds;
+    return 0.0;
+  }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  PhaseSeconds seconds_;
+};
+
+std::string numbers_text(const double* values, Eigen::Index count) {
+  std::string text = "[";
+  for (Eigen::Index i = 0; i < count; ++i) text += (i > 0 ? ", " : "") + exact_text(values[i]);
+  return text + "]";
+}
+
+template <typename Derived>
+std::string numbers_text(const Eigen::PlainObjectBase<Derived>& matrix) {
+  return numbers_text(matrix.data(), matrix.size());
+}
+
+/// Everything that decides the cast samples. Options of the codebook may change between a stop and
+/// its resume, for example after "more codewords than training tiles".
+ProgressManifest manifest_of(const PrecomputeOptions& options,
+                             const FieldSource& source,
+                             const PlanOptions& plan) {
+  ProgressManifest manifest;
+  for (const auto& [name, value] : casting_options(options)) manifest.decides[name] = value;
+  const CameraGeometry& camera = source.camera;
+  manifest.decides["program"] = program_build();
+  manifest.decides["ct_content_sha256"] = source.ct_content_sha256;
+  manifest.decides["camera"] = camera.name;
+  manifest.decides["camera source_point"] = numbers_text(camera.source_point);
+  manifest.decides["camera detector_origin_point"] = numbers_text(camera.detector_origin_point);
+  manifest.decides["camera column_direction"] = numbers_text(camera.column_direction);
+  manifest.decides["camera row_direction"] = numbers_text(camera.row_direction);
+  manifest.decides["camera pixel_spacing_mm"] = numbers_text(camera.pixel_spacing_mm);
+  manifest.decides["camera size_px"] =
+      std::to_string(camera.size_px.x()) + " x " + std::to_string(camera.size_px.y());
+  manifest.decides["nominal rotation"] = numbers_text(source.frame.rotation);
+  manifest.decides["center_ct_mm"] = numbers_text(source.frame.center_ct_mm);
+  manifest.decides["nominal center_room_mm"] = numbers_text(source.frame.center_room_mm);
+  manifest.rays_per_unit = plan.rays_per_unit;
+  return manifest;
+}
+
+nlohmann::json training_json(const TrainedCodebook& trained) {
+  nlohmann::json iterations = nlohmann::json::array();
+  for (const TrainingIteration& iteration : trained.iterations)
+    iterations.push_back({{"training_squared_error", iteration.training_squared_error},
+                          {"held_out_squared_error", iteration.held_out_squared_error},
+                          {"codewords_repaired", iteration.codewords_repaired}});
+  return {{"training_tiles", trained.training_tiles},
+          {"held_out_tiles", trained.held_out_tiles},
+          {"stop", to_string(trained.stop)},
+          {"iterations", iterations}};
+}
+
+/// Root mean square error of one element, in units of total attenuation.
+double rms_attenuation(std::uint64_t squared_error, std::uint64_t tiles, float step) {
+  if (tiles == 0) return 0.0;
+  const double elements = static_cast<double>(tiles) * static_cast<double>(kTileElements);
+  return static_cast<double>(step) * std::sqrt(static_cast<double>(squared_error) / elements);
+}
+
+std::string training_text(const TrainedCodebook& trained, float step) {
+  std::ostringstream text;
+  text << "codebook: " << trained.codebook.size() << " codewords from " << trained.training_tiles
+       << " tiles, " << trained.iterations.size() << " iterations (" << to_string(trained.stop)
+       << ")\n  rms error of training / unseen tiles per iteration:";
+  text.precision(4);
+  for (const TrainingIteration& iteration : trained.iterations)
+    text << "  " << rms_attenuation(iteration.training_squared_error, trained.training_tiles, step)
+         << " / "
+         << rms_attenuation(iteration.held_out_squared_error, trained.held_out_tiles, step);
+  return text.str();
+}
+
+/// What a build measured, over all ranks.
+struct BuildStatistics {
+  std::uint64_t squared_error = 0;  ///< in squared levels
+  double rms_error = 0.0;           ///< total attenuation
+  std::vector<double> encode_seconds;
+  std::uint64_t units_encoded_before = 0;  ///< by earlier runs
+  std::uint64_t peak_bytes_per_rank = 0;   ///< beside the CT and its grid
+};
+
+double largest_of(const std::vector<double>& seconds) {
+  return *std::max_element(seconds.begin(), seconds.end());
+}
+
+/// Mean over largest: 1 when all ranks were equally long at work.
+double balance_of(const std::vector<double>& seconds) {
+  const double largest = largest_of(seconds);
+  if (!(largest > 0.0)) return 1.0;
+  return std::accumulate(seconds.begin(), seconds.end(), 0.0) /
+         (largest * static_cast<double>(seconds.size()));
+}
+
+/// One run, phase by phase.
+class PrecomputeRun {
+ public:
+  PrecomputeRun(const PrecomputeOptions& options,
+                std::string command_line,
+                const Communicator& communicator)
+      : options_(options), command_line_(std::move(command_line)), world_(communicator) {}
+
+  void run() {
+    all_or_none(world_, [&] {
+      throw_if_any(problems(options_));
+      if (!options_.is_dry_run && options_.output.empty())
+        throw UsageError("-o FIELD.h5 is needed (or --dry-run)");
+      if (options_.is_dry_run || !world_.is_root()) return;
+      require_output_folder();
+      lock_ = std::make_unique<OutputLock>(options_.output);
+    });
+    if (options_.has_checkpoint && !options_.is_dry_run) listen_for_stop_requests();
+    if (!options_.is_dry_run) check_parallel_writing(options_.output, world_, hints());
+    load();
+    stop_if_requested("before the first unit");
+    const std::unique_ptr<const FieldCaster> caster = make_caster();
+    if (options_.is_dry_run) {
+      print_dry_run(*caster);
+      return;
+    }
+    check_writing_many_chunks(light_slab_, options_.output, world_, hints());
+    build(*caster);
+  }
+
+ private:
+  [[nodiscard]] AttenuationQuantizer quantizer() const {
+    return AttenuationQuantizer::for_maximum(source_.volume->max_total_attenuation());
+  }
+
+  [[nodiscard]] MpiIoHints hints() const {
+    MpiIoHints pairs;
+    for (const std::string& hint : options_.mpi_io_hints) {
+      const std::size_t equals = hint.find('=');
+      pairs.emplace_back(hint.substr(0, equals), hint.substr(equals + 1));
+    }
+    return pairs;
+  }
+
+  /// Before the work, not after it.
+  void require_output_folder() const {
+    const std::filesystem::path output(options_.output);
+    if (std::filesystem::is_directory(output))
+      throw FileError(options_.output, "is a folder, not a field file");
+    make_output_folder(output.has_parent_path() ? output.parent_path() : ".");
+    announce_field(output);
+  }
+
+  void load() {
+    WorkNote note("reading the CT", WorkNote::Kind::Phase);
+    source_ = load_source(options_, world_);
+    for (const std::string& warning : source_.warnings) warn(world_, warning);
+    size_planes(DepthSlabs{{}, {0.0}});
+    clock_.end("read");
+    const StPlane st_plane = options_.st_plane_rule();
+    const bool is_default = options_.slabs == 1 && st_plane == StPlane::Centre;
+    if (!options_.is_shear_warp() && is_default) return;
+    note.change("resampling the CT");
+    resampled_ = std::make_shared<const SlabAlignedVolume>(
+        resample_on_node(*source_.volume, light_slab_.slab_from_ct, SlabAlignedOptions{}, world_));
+    if (!is_default)
+      size_planes(all_or_none(
+          world_, [&] { return choose_depth_slabs(*resampled_, options_.slabs, st_plane); }));
+    if (!options_.is_shear_warp()) resampled_ = nullptr;
+    clock_.end("resample");
+  }
+
+  /// Collective.
+  void size_planes(const DepthSlabs& depth_slabs) {
+    const LightSlab light_slab = all_or_none(world_, [&] {
+      return make_light_slab(source_.camera,
+                             source_.frame,
+                             options_.range(),
+                             source_.volume->corner_points(),
+                             options_.light_slab_spec(depth_slabs));
+    });
+    light_slab_ = shared_light_slab(light_slab, world_);
+  }
+
+  [[nodiscard]] std::unique_ptr<const FieldCaster> make_caster() const {
+    if (options_.is_shear_warp())
+      return std::make_unique<ShearWarpFieldCaster>(*resampled_, light_slab_, quantizer());
+    return std::make_unique<RayCastFieldCaster>(
+        *source_.volume, light_slab_, quantizer(), RayCasterOptions{options_.step_mm});
+  }
+
+  [[nodiscard]] PlanOptions plan() const {
+    return plan_options_for_ranks(
+        light_slab_, world_.size(), options_.is_shear_warp() ? kShearWarpPlan : PlanOptions{});
+  }
+
+  /// Units whose casting tells the speed: small ones, where size does not matter to the caster.
+  [[nodiscard]] PlanOptions sample_plan() const {
+    constexpr std::int64_t kSmallUnitRays = 4096;
+    return options_.is_shear_warp() ? plan() : PlanOptions{kSmallUnitRays};
+  }
+
+  [[nodiscard]] std::uint64_t volume_bytes() const {
+    return source_.volume->voxels().size_bytes() +
+           (resampled_ == nullptr ? 0 : resampled_->bytes());
+  }
+
+  /// Collective. Memory of the rank that has most of its own.
+  [[nodiscard]] std::uint64_t largest_over_ranks(std::uint64_t bytes) const {
+    std::array<std::uint64_t, 1> largest{bytes};
+    world_.maximum(largest);
+    return largest[0];
+  }
+
+  /// Alone on its node, a rank holds the CT and its grid as memory of its own.
+  [[nodiscard]] std::uint64_t without_volume(std::uint64_t own_bytes) const {
+    return ranks_on_node_ > 1 ? own_bytes : own_bytes - std::min(own_bytes, volume_bytes());
+  }
+
+  /// Collective.
+  [[nodiscard]] MemoryPlan memory_plan(const std::vector<WorkUnit>& units) const {
+    // The program's pages are shared by the ranks of a node, but the first rank counts, too.
+    const ProcessMemory now = process_memory();
+    const std::uint64_t fixed =
+        largest_over_ranks(without_volume(now.own_bytes) + now.program_bytes);
+    return plan_memory(light_slab_, units, options_, fixed, world_.size());
+  }
+
+  [[nodiscard]] std::filesystem::path output_folder() const {
+    const std::filesystem::path output(options_.output);
+    return output.has_parent_path() ? output.parent_path() : ".";
+  }
+
+  void print_dry_run(const FieldCaster& caster) const {
+    constexpr double kSampleSeconds = 1.0;
+    std::vector<WorkUnit> units = plan_units(light_slab_, plan());
+    const MemoryPlan memory = memory_plan(units);
+    all_or_none(world_, [&] {
+      if (!world_.is_root()) return;
+      const SpeedSample speed =
+          sample_speed(caster, light_slab_, sample_plan(), options_, kSampleSeconds);
+      std::cout << dry_run_text({source_,
+                                 light_slab_,
+                                 options_,
+                                 std::move(units),
+                                 volume_bytes(),
+                                 speed,
+                                 sample_disk(output_folder()),
+                                 memory,
+                                 clock_.phases(),
+                                 world_.size()});
+    });
+  }
+
+  void build(const FieldCaster& caster) {
+    // A limit that is too low is refused before anything is made.
+    const MemoryPlan memory = memory_plan(plan_units(light_slab_, plan()));
+    all_or_none(world_, [&] { (void)memory_limit(options_, memory); });
+    ProgressManifest manifest = manifest_of(options_, source_, plan());
+    std::optional<ProgressFolder> progress;
+    if (options_.has_checkpoint)
+      progress.emplace(options_.output + ".progress", options_.is_restart, manifest, world_);
+    const auto units = plan_units(light_slab_, {manifest.rays_per_unit});
+    const FieldBuild build{caster,
+                           light_slab_,
+                           units,
+                           unit_costs(units, light_slab_, source_.volume->corner_points()),
+                           progress.has_value() ? &*progress : nullptr,
+                           world_};
+    CastPhase cast = cast_phase(build);
+    const OverflowChoice choice = overflow_choice(build, cast);
+    CompressedAttenuationField field = field_without_indices();
+    const TrainedCodebook trained = train_or_give_way(build, manifest, cast);
+    field.codebook = trained.codebook;
+    write_phase(build, cast, trained, choice, field);
+  }
+
+  CastPhase cast_phase(const FieldBuild& build) {
+    const MemoryPlan plan = memory_plan(build.units);
+    const std::uint64_t limit = all_or_none(world_, [&] { return memory_limit(options_, plan); });
+    forget_peak();
+    ProgressPrinter printer("casting", world_.is_root());
+    CastPhase cast = cast_field(build,
+                                {options_.training_selection(), plan.kept_tile_bytes(limit)},
+                                stop_requested(),
+                                printer.callback());
+    clock_.end("cast");
+    if (cast.units_resumed > 0)
+      inform(world_,
+             "resumed " + std::to_string(cast.units_resumed) + " of " +
+                 std::to_string(build.units.size()) + " units from " +
+                 build.progress->path().string());
+    stop_if_requested("with all units saved");
+    return cast;
+  }
+
+  /// Collective. Says where the tiles are.
+  OverflowChoice overflow_choice(const FieldBuild& build, const CastPhase& cast) {
+    const std::size_t units = build.units.size();
+    if (cast.units_kept == units) {
+      inform(world_, "tiles: all " + tile_bytes_text(cast) + " kept in memory");
+      return {};
+    }
+    OverflowChoice choice = choose_overflow(build, cast);
+    if (options_.overflow == "cast-again") choice.overflow = TileOverflow::CastAgain;
+    if (options_.overflow == "read-back" && build.progress != nullptr)
+      choice.overflow = TileOverflow::ReadBack;
+    std::ostringstream text;
+    text.precision(3);
+    text << "tiles: " << cast.units_kept << " of " << units << " units (" << tile_bytes_text(cast)
+         << " in all) kept in memory; the others are "
+         << (choice.overflow == TileOverflow::ReadBack
+                 ? "read back from " + build.progress->path().string()
+                 : "cast again");
+    if (choice.read_bytes_per_second > 0.0)
+      text << " (a rank reads " << choice.read_bytes_per_second / 1e6 << " MB/s, casts "
+           << choice.cast_bytes_per_second / 1e6 << " MB/s)";
+    inform(world_, text.str());
+    return choice;
+  }
+
+  static std::string tile_bytes_text(const CastPhase& cast) {
+    return megabytes_text(cast.occupied_tiles * sizeof(Tile));
+  }
+
+  /// Collective. Options that are refused only now must not stand in the way of better ones.
+  TrainedCodebook train_or_give_way(const FieldBuild& build,
+                                    const ProgressManifest& manifest,
+                                    CastPhase& cast) {
+    try {
+      all_or_none(world_, [&] { require_something_seen(cast); });
+      return train_phase(build, manifest, cast);
+    } catch (const Error& error) {
+      if (error.exit_code() == ExitCode::Input && build.progress != nullptr)
+        build.progress->give_way();
+      throw;
+    }
+  }
+
+  void require_something_seen(const CastPhase& cast) const {
+    if (cast.occupied_tiles > 0) return;
+    throw InputError("camera",
+                     source_.camera.name,
+                     "its detector misses the CT: no ray to it meets anything but air, wherever "
+                     "the CT is within the range; check the rig, the nominal pose and the centre");
+  }
+
+  TrainedCodebook train_phase(const FieldBuild& build,
+                              const ProgressManifest& manifest,
+                              CastPhase& cast) {
+    ProgressPrinter printer("training the codebook", world_.is_root());
+    const auto iteration = [](std::size_t done) {
+      return "training the codebook, iteration " + std::to_string(done + 1);
+    };
+    std::optional<TrainingJournal> journal;
+    TrainingCheckpoints checkpoints;
+    WorkNote note(iteration(0));
+    if (build.progress != nullptr) {
+      DecidingValues decides = manifest.decides;
+      for (const auto& [name, value] : codebook_options(options_)) decides[name] = value;
+      journal.emplace(build.progress->path(),
+                      decides,
+                      static_cast<std::size_t>(options_.codebook_options().codewords),
+                      world_);
+      checkpoints.begun = journal->begun();
+      checkpoints.on_iteration = [&](const TrainedCodebook& so_far) {
+        journal->append(so_far);
+        note.change(iteration(so_far.iterations.size()));
+        stop_if_requested("with all units and " + std::to_string(so_far.iterations.size()) +
+                          " iterations of the training saved");
+      };
+    }
+    iterations_resumed_ = checkpoints.begun ? checkpoints.begun->iterations.size() : 0;
+    if (iterations_resumed_ > 0)
+      inform(world_,
+             "resumed " + std::to_string(iterations_resumed_) + " iterations of the training");
+    TrainedCodebook trained =
+        train_field(build, cast, options_.codebook_options(), printer.callback(), checkpoints);
+    clock_.end("train");
+    return trained;
+  }
+
+  /// Encoding and writing take turns, so that no rank holds more than a round of indices.
+  void write_phase(const FieldBuild& build,
+                   CastPhase& cast,
+                   const TrainedCodebook& trained,
+                   const OverflowChoice& choice,
+                   const CompressedAttenuationField& field) {
+    FieldEncoder encoder(build, cast, trained.codebook, choice.overflow);
+    BuildStatistics statistics;
+    std::optional<ProgressPrinter> printer;
+    printer.emplace("encoding and writing", world_.is_root());
+    const FieldFileInfo info = write_field(
+        field,
+        [&] { return encoder.next_blocks(printer->callback(), stop_requested()); },
+        [&] {
+          statistics = statistics_of(cast, encoder);
+          clock_.split("encode", largest_of(statistics.encode_seconds));
+          return provenance_of(trained, cast, statistics);
+        },
+        options_.output,
+        world_,
+        hints());
+    printer.reset();
+    if (build.progress != nullptr) build.progress->remove();
+    clock_.end("write");
+    report(info, cast, trained, statistics);
+  }
+
+  /// Without a progress folder there is nothing to stop for.
+  [[nodiscard]] StopRequested stop_requested() const {
+    return [is_heard = options_.has_checkpoint] { return is_heard && is_stop_requested(); };
+  }
+
+  /// Collective. StoppedError on every rank when a stop was asked for on any; `state` says what of
+  /// the work is saved.
+  void stop_if_requested(const std::string& state) const {
+    if (!options_.has_checkpoint) return;
+    std::array<std::uint64_t, 1> stops{is_stop_requested() ? 1U : 0U};
+    world_.maximum(stops);
+    if (stops[0] == 0) return;
+    all_or_none(world_, [&] {
+      throw StoppedError("stopped " + state + ": run the same command again to go on");
+    });
+  }
+
+  [[nodiscard]] CompressedAttenuationField field_without_indices() const {
+    CompressedAttenuationField field;
+    const AttenuationModel model = options_.attenuation_model();
+    field.identity = {source_.camera,
+                      source_.frame,
+                      options_.range(),
+                      source_.ct_content_sha256,
+                      model.mu_water_per_mm,
+                      model.air_below_hu};
+    field.light_slab = light_slab_;
+    field.quantizer_step = quantizer().step();
+    return field;
+  }
+
+  /// Collective.
+  [[nodiscard]] BuildStatistics statistics_of(const CastPhase& cast,
+                                              const FieldEncoder& encoder) const {
+    BuildStatistics statistics;
+    statistics.squared_error = encoder.squared_error();
+    statistics.rms_error =
+        rms_attenuation(statistics.squared_error, cast.occupied_tiles, quantizer().step());
+    statistics.encode_seconds = encoder.busy_seconds();
+    statistics.units_encoded_before = encoder.units_resumed();
+    statistics.peak_bytes_per_rank =
+        largest_over_ranks(without_volume(process_memory().peak_own_bytes));
+    return statistics;
+  }
+
+  [[nodiscard]] FieldProvenance provenance_of(const TrainedCodebook& trained,
+                                              const CastPhase& cast,
+                                              const BuildStatistics& statistics) const {
+    Provenance provenance;
+    provenance.program = "af-precompute";
+    provenance.command_line = command_line_;
+    provenance.options_toml = to_toml(options_);
+    provenance.seed = options_.seed;
+    provenance.rank_count = world_.size();
+    provenance.input_sha256[source_.ct_path] = source_.ct_content_sha256;
+    nlohmann::json json = to_json(provenance);
+    json["training"] = training_json(trained);
+    json["occupied_tiles"] = cast.occupied_tiles;
+    json["rms_attenuation_error"] = statistics.rms_error;
+    json["rays_cast"] = cast.rays_cast;
+    json["units_resumed"] = cast.units_resumed;
+    json["training_iterations_resumed"] = iterations_resumed_;
+    json["units_encoded_before"] = statistics.units_encoded_before;
+    json["units_kept_in_memory"] = cast.units_kept;
+    json["busy_seconds"] = {{"cast", cast.busy_seconds}, {"encode", statistics.encode_seconds}};
+    json["peak_bytes"] = {{"per_rank", statistics.peak_bytes_per_rank},
+                          {"ct_and_grid_per_node", volume_bytes()}};
+    for (const auto& [phase, seconds] : clock_.phases()) json["seconds"][phase] = seconds;
+    return {std::string(program_version()), command_line_, provenance.options_toml, json.dump(2)};
+  }
+
+  void report(const FieldFileInfo& info,
+              const CastPhase& cast,
+              const TrainedCodebook& trained,
+              const BuildStatistics& statistics) const {
+    const auto rate = static_cast<double>(cast.rays_cast) / clock_.seconds_of("cast") / 1e6;
+    const auto raw_bytes = static_cast<double>(2 * stored_ray_count(light_slab_));
+    std::ostringstream text;
+    text.precision(3);
+    text << training_text(trained, quantizer().step())
+         << "\nwhole field: " << static_cast<double>(cast.occupied_tiles) / 1e6
+         << " million tiles not empty, rms error " << statistics.rms_error
+         << " (total attenuation)\nseconds: " << seconds_text(clock_.phases()) << "; cast " << rate
+         << " million rays/s on " << world_.size() << " ranks\nbalance (mean / slowest rank): cast "
+         << balance_of(cast.busy_seconds) << ", encode " << balance_of(statistics.encode_seconds)
+         << "; peak memory " << megabytes_text(statistics.peak_bytes_per_rank)
+         << " of one rank beside " << megabytes_text(volume_bytes())
+         << " per node for the CT\nratio of 16-bit samples stored: payload 1 : "
+         << raw_bytes / static_cast<double>(info.payload_bytes)
+         << ", file 1 : " << raw_bytes / static_cast<double>(info.file_bytes);
+    inform(world_, text.str());
+    if (world_.is_root())
+      std::cout << options_.output << "  " << megabytes_text(info.file_bytes) << "  payload "
+                << megabytes_text(info.payload_bytes) << "  sha256 " << info.payload_sha256
+                << std::endl;
+  }
+
+  const PrecomputeOptions& options_;
+  std::string command_line_;
+  const Communicator& world_;
+  int ranks_on_node_ = world_.node().size();
+  std::unique_ptr<OutputLock> lock_;  ///< rank 0
+  FieldSource source_;
+  LightSlab light_slab_;
+  std::shared_ptr<const SlabAlignedVolume> resampled_;  ///< for the shear-warp caster
+  std::size_t iterations_resumed_ = 0;                  ///< of the training, by earlier runs
+  PhaseClock clock_;
+};
+
+}  // namespace
+
+void run_precompute(const PrecomputeOptions& options,
+                    const std::string& command_line,
+                    const Communicator& communicator) {
+  PrecomputeRun(options, command_line, communicator).run();
+}
+
+}  // namespace af

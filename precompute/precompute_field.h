@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+#include "parallel/communicator.h"
+#include "precompute/plan/precompute_options.h"
+
+namespace af {
+
+/// Collective. af-precompute: reads, casts, trains, encodes and writes one field, or prints the
+/// dry run.
+void run_precompute(const PrecomputeOptions& options,
+                    const std::string& command_line,
+                    const Communicator& communicator);
+
+}  // namespace af

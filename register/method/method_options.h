@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "register/method/registration_options.h"
+
+namespace af::registration {
+
+/// How to register, as typed: a preset, and what replaces parts of it.
+struct MethodOptions {
+  std::optional<std::string> preset;  ///< see preset_name()
+  std::vector<std::string> chains;    ///< chain_from_text(): replace the preset's chains and finish
+  std::optional<std::string> finish;  ///< chain_from_text(): replaces the preset's finish
+  std::optional<std::string> judge;   ///< one stage's text: replaces the portfolio's judge
+  std::optional<std::string> similarity;     ///< of every stage
+  std::optional<std::string> optimizer;      ///< of every stage
+  std::optional<int> bins;                   ///< of every stage
+  std::optional<double> smoothing_sigma_mm;  ///< of each chain's first stage
+  std::optional<double> coarse_roi_scale;    ///< of stages that look beyond the region
+  std::optional<int> max_evaluations;
+  /// Radius, mm on the isocentre plane, of the discs about fiducials that registration does not
+  /// see.
+  double fiducial_mask_mm = 4.0;
+  std::uint64_t seed = 1;
+  int threads = 1;  ///< that one registration spreads over; 0: every processor of this process
+
+  /// The preset that was typed; else robust, or paper when a measure or an optimiser was typed:
+  /// one of them in every stage suits the paper's method only.
+  [[nodiscard]] std::string preset_name() const;
+};
+
+/// The preset with the replacements; InputError for unknown names and values out of range.
+RegistrationOptions resolve(const MethodOptions& options);
+
+/// Lines of the options in force: preset, budget, seed, and every chain, finish and judge as text.
+std::string to_toml(const MethodOptions& options, const RegistrationOptions& resolved);
+
+}  // namespace af::registration

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "register/method/presets.h"
+
+#include <array>
+
+#include "base/error.h"
+#include "register/method/chain_text.h"
+
+namespace af::registration {
+namespace {
+
+RegistrationOptions one_chain(ChainOptions chain) {
+  RegistrationOptions options;
+  options.chains = {std::move(chain)};
+  return options;
+}
+
+RegistrationOptions paper_preset() {
+  return one_chain(paper_chain());
+}
+
+RegistrationOptions fast_preset() {
+  return one_chain(chain_from_text("fast",
+                                   "ncc gauss-newton level=2 pixels=8 roi=2 step=10;"
+                                   "gc gauss-newton level=2 pixels=8 roi=2 final=0.2;"
+                                   "gc gauss-newton level=2 pixels=4 final=0.1;"
+                                   "gc gauss-newton level=1 pixels=2 step=2 final=0.02"));
+}
+
+/// Ends of chains that explain this share of the X-rays' gradients convince: where X-rays were
+/// clean, wrong vertebrae came to 0.51 and right poses to 0.69 or more.
+constexpr double kConvincingValue = 0.6;
+
+RegistrationOptions robust_preset() {
+  RegistrationOptions options;
+  options.chains = {chain_from_text("edges",
+                                    "ncc gauss-newton level=2 pixels=8 roi=2 step=10;"
+                                    "gc gauss-newton level=2 pixels=8 roi=2 final=0.2;"
+                                    "rg gauss-newton level=2 pixels=4 final=0.1"),
+                    chain_from_text("tiles",
+                                    "ncc gauss-newton level=2 pixels=8 roi=2 step=10;"
+                                    "tncc gauss-newton level=2 pixels=8 roi=2 final=0.2;"
+                                    "rg gauss-newton level=2 pixels=4 final=0.1"),
+                    chain_from_text("wide",
+                                    "rg cma-es level=2 pixels=8 roi=2 step=8 final=1;"
+                                    "rg gauss-newton level=2 pixels=8 roi=2 final=0.2;"
+                                    "rg gauss-newton level=2 pixels=4 final=0.1")};
+  options.finish = chain_from_text("finish",
+                                   "rg gauss-newton level=1 pixels=2 step=2 final=0.05;"
+                                   "rg gauss-newton pixels=2 step=2 final=0.02");
+  options.judge.enough_value = kConvincingValue;
+  return options;
+}
+
+struct Preset {
+  const char* name;
+  const char* help;
+  RegistrationOptions (*make)();
+};
+
+constexpr std::array kPresets = {
+    Preset{"paper", "mutual information with best neighbour in two passes", paper_preset},
+    Preset{"fast", "Gauss-Newton on correlations, coarse to fine", fast_preset},
+    Preset{"robust",
+           "a portfolio: Gauss-Newton on correlations or tiles, or CMA-ES, then on robust gradient "
+           "residuals",
+           robust_preset},
+};
+
+}  // namespace
+
+ChainOptions paper_chain() {
+  StageOptions smoothed;
+  smoothed.smoothing_sigma_mm = 1.0;
+  smoothed.search.initial_step_mm = 5.0;
+  smoothed.search.final_step_mm = 0.5;
+  StageOptions sharp;
+  sharp.search.initial_step_mm = 2.0;
+  sharp.search.final_step_mm = 0.1;
+  return {"paper", {smoothed, sharp}};
+}
+
+std::vector<std::string> preset_names() {
+  std::vector<std::string> names;
+  names.reserve(kPresets.size());
+  for (const Preset& preset : kPresets) names.emplace_back(preset.name);
+  return names;
+}
+
+std::string preset_help() {
+  std::string text;
+  for (const Preset& preset : kPresets)
+    text += (text.empty() ? "" : "; ") + std::string(preset.name) + ": " + preset.help;
+  return text;
+}
+
+RegistrationOptions preset_options(const std::string& name) {
+  for (const Preset& preset : kPresets)
+    if (name == preset.name) return preset.make();
+  std::string list;
+  for (const std::string& known : preset_names()) list += (list.empty() ? "" : ", ") + known;
+  throw InputError("preset", "'" + name + "'", "must be one of " + list);
+}
+
+}  // namespace af::registration

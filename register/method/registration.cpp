@@ -1,0 +1,410 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "register/method/registration.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "base/error.h"
+#include "base/hash_random.h"
+#include "register/problem/parameter_scaling.h"
+#include "register/problem/pose_target.h"
+#include "register/problem/stage_view.h"
+
+namespace af::registration {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+std::string view_name(const RegistrationView& view) {
+  return "view '" + view.view.camera.name + "': ";
+}
+
+bool has_size_of(const Image2d& image, const CameraGeometry& camera) {
+  return image.width == camera.size_px.x() && image.height == camera.size_px.y();
+}
+
+void append_view_problems(const RegistrationView& view, std::vector<std::string>& found) {
+  const CameraGeometry& camera = view.view.camera;
+  if (!view.renderer) found.push_back(view_name(view) + "renderer = none: must be given");
+  for (const std::string& text : problems(view.view.roi, camera.size_px.x(), camera.size_px.y()))
+    found.push_back(view_name(view) + text);
+  const auto size_text = [](int width, int height) {
+    return std::to_string(width) + " x " + std::to_string(height);
+  };
+  const std::string expected = size_text(camera.size_px.x(), camera.size_px.y());
+  if (!has_size_of(view.xray, camera))
+    found.push_back(view_name(view) +
+                    "X-ray size = " + size_text(view.xray.width, view.xray.height) +
+                    ": must be the camera's " + expected);
+  if (!view.mask.pixels.empty() && !has_size_of(view.mask, camera))
+    found.push_back(view_name(view) +
+                    "mask size = " + size_text(view.mask.width, view.mask.height) +
+                    ": must be the camera's " + expected);
+}
+
+/// The region grown by half its size to every side, cut at the detector's edges.
+RegionOfInterest grown(const RegionOfInterest& roi, const Eigen::Vector2i& size_px) {
+  const int left = std::max(0, roi.column - roi.width / 2);
+  const int top = std::max(0, roi.row - roi.height / 2);
+  const int right = std::min(size_px.x(), roi.column + roi.width + roi.width / 2);
+  const int bottom = std::min(size_px.y(), roi.row + roi.height + roi.height / 2);
+  return {left, top, right - left, bottom - top};
+}
+
+ValueRange drr_range_at_nominal(const RegistrationProblem& problem, const RegistrationView& view) {
+  const View wide{view.view.camera, grown(view.view.roi, view.view.camera.size_px)};
+  std::int64_t rays_outside = 0;
+  const Image2d drr =
+      render_image(*view.renderer, problem.nominal_room_from_ct, wide, &rays_outside);
+  if (rays_outside > 0)
+    throw InputError(view_name(view) + "nominal_room_from_ct = a pose outside the field (" +
+                     std::to_string(rays_outside) +
+                     " rays miss its planes): must lie inside the field");
+  const auto [low, high] = std::minmax_element(drr.pixels.begin(), drr.pixels.end());
+  return {static_cast<double>(*low), static_cast<double>(*high)};
+}
+
+StageGrid stage_grid(const RegistrationProblem& problem,
+                     const RegistrationView& view,
+                     const StageOptions& stage) {
+  double variance_mm2 = stage.smoothing_sigma_mm * stage.smoothing_sigma_mm;
+  if (stage.level > 0) {
+    const auto coarse = static_cast<std::size_t>(stage.level) - 1;
+    variance_mm2 += std::pow(view.coarse_levels[coarse].blur_sigma_mm, 2);
+  }
+  return {stage.pixel_step,
+          stage.roi_scale,
+          std::sqrt(variance_mm2) * pixels_per_mm(view.view.camera, problem.isocenter_point)};
+}
+
+std::shared_ptr<const DrrRenderer> stage_renderer(const RegistrationView& view, int level) {
+  return level == 0 ? view.renderer
+                    : view.coarse_levels[static_cast<std::size_t>(level) - 1].renderer;
+}
+
+/// Hiding markers must leave three quarters of so many pixels of a stage: coarse pixels of a small
+/// region may nearly all touch one.
+constexpr std::size_t kLeastPixelsToHideIn = 400;
+
+/// The X-ray of a stage with the markers hidden, if that leaves enough of it.
+SimilarityReference visible_reference(const RegistrationView& view, const StageGrid& grid) {
+  SimilarityReference plain = stage_reference(view.xray, view.mask, view.view, grid);
+  if (view.mask_without_markers.pixels.empty()) return plain;
+  SimilarityReference hidden =
+      stage_reference(view.xray, view.mask_without_markers, view.view, grid);
+  const auto used = static_cast<std::size_t>(std::count(hidden.used.begin(), hidden.used.end(), 1));
+  const std::size_t pixels = hidden.used.size();
+  return pixels >= kLeastPixelsToHideIn && 4 * used >= 3 * pixels ? hidden : plain;
+}
+
+ObjectiveView prepare_view(const RegistrationProblem& problem,
+                           const RegistrationView& view,
+                           const ValueRange& drr_range,
+                           const StageOptions& stage) {
+  const StageGrid grid = stage_grid(problem, view, stage);
+  SimilarityReference reference = visible_reference(view, grid);
+  reference.drr_range = drr_range;
+  std::vector<std::string> found = problems(reference);
+  for (std::string& text : found) text.insert(0, view_name(view));
+  throw_if_any(found);
+  SimilarityOptions similarity = stage.similarity;
+  similarity.has_smooth_histogram |=
+      make_optimizer(stage.optimizer)->needs() == Derivatives::Gradient;
+  return {stage_view(view.view, grid),
+          stage_renderer(view, stage.level),
+          make_similarity(similarity, reference),
+          view.limit};
+}
+
+/// Points enough for the lengths of steps that derivatives choose.
+std::vector<Eigen::Vector3d> some_points(const std::vector<Eigen::Vector3d>& points) {
+  constexpr std::size_t kPoints = 512;
+  // Odd, so that it walks through all rows and layers of an even lattice.
+  const std::size_t stride = std::max<std::size_t>(1, points.size() / kPoints) | 1;
+  std::vector<Eigen::Vector3d> some;
+  for (std::size_t i = 0; i < points.size(); i += stride) some.push_back(points[i]);
+  return some;
+}
+
+/// Where a chain ended.
+struct ChainEnd {
+  RigidTransform room_from_ct;
+  double similarity = std::numeric_limits<double>::quiet_NaN();
+  StopReason stop_reason = StopReason::StepBelowFinal;
+};
+
+struct PreparedStage {
+  StageOptions options;
+  std::shared_ptr<const Optimizer> optimizer;
+  MultiViewObjective objective;
+
+  [[nodiscard]] PreparedStage copy() const {
+    return {options, optimizer, MultiViewObjective(objective.views())};
+  }
+};
+
+}  // namespace
+
+std::vector<std::string> problems(const RegistrationProblem& problem) {
+  std::vector<std::string> found;
+  if (problem.views.empty()) found.emplace_back("views = none: there must be at least one");
+  if (problem.scaling_points_ct.empty())
+    found.emplace_back("scaling_points_ct = none: there must be at least one");
+  for (const RegistrationView& view : problem.views) append_view_problems(view, found);
+  return found;
+}
+
+struct RegistrationRunner::Impl {
+  std::shared_ptr<const RegistrationProblem> problem;
+  RegistrationOptions options;
+  std::shared_ptr<ThreadPool> pool;
+  std::vector<View> views;
+  std::vector<Eigen::Vector3d> some_points_ct;
+  std::vector<PreparedStage> stages;         ///< of all chains and the finish, in this order
+  std::optional<PreparedStage> judge;        ///< of a portfolio
+  OptimizerResult search;                    ///< reused
+  std::optional<ParameterScaling> at_start;  ///< by some_points_ct, at the run's start
+
+  void prepare();
+  [[nodiscard]] PreparedStage prepare(const StageOptions& stage,
+                                      const std::vector<ValueRange>& drr_ranges) const;
+  [[nodiscard]] std::optional<ParameterScaling> scaling_at(
+      const RigidTransform& room_from_ct, std::span<const Eigen::Vector3d> points_ct) const;
+  /// Runs the stages of a chain, the first of which is `first`, from `end`; false when one of them
+  /// was the last that makes sense.
+  bool run_chain(const ChainOptions& chain,
+                 std::size_t first,
+                 std::int64_t start_index,
+                 ChainEnd& end,
+                 RegistrationResult& result);
+  /// Searches one stage from `end`; false when no further stage makes sense.
+  bool run_stage(std::size_t index,
+                 std::int64_t start_index,
+                 ChainEnd& end,
+                 RegistrationResult& result);
+  void run_portfolio(std::int64_t start_index, RegistrationResult& result);
+  /// The finish, from `end`.
+  void run_finish(std::int64_t start_index, ChainEnd& end, RegistrationResult& result) {
+    run_chain(
+        options.finish, stages.size() - options.finish.stages.size(), start_index, end, result);
+  }
+  ObjectiveValue judged(const RigidTransform& room_from_ct);
+  /// NaN when inadmissible; counted in `result`.
+  double judged(const RigidTransform& room_from_ct, RegistrationResult& result);
+  void append_trace(std::size_t index, const PoseTarget& target, RegistrationResult& result) const;
+};
+
+PreparedStage RegistrationRunner::Impl::prepare(const StageOptions& stage,
+                                                const std::vector<ValueRange>& drr_ranges) const {
+  std::vector<ObjectiveView> stage_views;
+  for (std::size_t i = 0; i < problem->views.size(); ++i)
+    stage_views.push_back(prepare_view(*problem, problem->views[i], drr_ranges[i], stage));
+  return {stage, make_optimizer(stage.optimizer), MultiViewObjective(std::move(stage_views), pool)};
+}
+
+void RegistrationRunner::Impl::prepare() {
+  const int coarsest = options.coarsest_level();
+  std::vector<ValueRange> drr_ranges;
+  for (const RegistrationView& view : problem->views) {
+    if (static_cast<int>(view.coarse_levels.size()) < coarsest)
+      throw InputError(view_name(view) +
+                       "coarse_levels = " + std::to_string(view.coarse_levels.size()) +
+                       ": the stages need " + std::to_string(coarsest));
+    views.push_back(view.view);
+    drr_ranges.push_back(drr_range_at_nominal(*problem, view));
+  }
+  some_points_ct = some_points(problem->scaling_points_ct);
+  for (const ChainOptions& chain : options.chains)
+    for (const StageOptions& stage : chain.stages) stages.push_back(prepare(stage, drr_ranges));
+  for (const StageOptions& stage : options.finish.stages)
+    stages.push_back(prepare(stage, drr_ranges));
+  if (options.chains.size() > 1) judge = prepare(options.judge.stage, drr_ranges);
+}
+
+std::optional<ParameterScaling> RegistrationRunner::Impl::scaling_at(
+    const RigidTransform& room_from_ct, std::span<const Eigen::Vector3d> points_ct) const {
+  return projected_motion_scaling(
+      room_from_ct, problem->center_ct_mm, points_ct, views, problem->isocenter_point);
+}
+
+void RegistrationRunner::Impl::append_trace(std::size_t index,
+                                            const PoseTarget& target,
+                                            RegistrationResult& result) const {
+  const PoseFrame frame = problem->frame();
+  for (const OptimizerIteration& iteration : search.trace)
+    result.trace.push_back({static_cast<int>(index),
+                            iteration.step_mm,
+                            result.evaluations + iteration.evaluations,
+                            iteration.value,
+                            parameters_from_pose(frame, target.pose(iteration.point))});
+}
+
+bool RegistrationRunner::Impl::run_stage(std::size_t index,
+                                         std::int64_t start_index,
+                                         ChainEnd& end,
+                                         RegistrationResult& result) {
+  PreparedStage& stage = stages[index];
+  const std::optional<ParameterScaling> scaling =
+      stage.optimizer->needs() == Derivatives::None
+          ? scaling_at(end.room_from_ct, problem->scaling_points_ct)
+          : at_start;
+  if (!scaling.has_value()) {
+    end.stop_reason = StopReason::CtOutsideRoi;
+    return false;
+  }
+  PoseTarget target(
+      stage.objective, PoseFrame::about(end.room_from_ct, problem->center_ct_mm), *scaling);
+  const SearchBudget budget{options.max_evaluations - result.evaluations,
+                            hash64(options.seed,
+                                   hash_name(problem->case_name),
+                                   static_cast<std::uint64_t>(start_index),
+                                   index)};
+  stage.optimizer->maximize(target, stage.options.search, budget, search);
+  append_trace(index, target, result);
+  result.evaluations += search.evaluations;
+  result.inadmissible += search.inadmissible;
+  result.drr_count += target.drr_count();
+  end.stop_reason = search.stop_reason;
+  end.similarity = search.value;
+  if (search.stop_reason == StopReason::StartInadmissible) {
+    result.rays_outside = target.rays_outside();
+    return false;
+  }
+  end.room_from_ct = target.pose(search.point);
+  return search.stop_reason == StopReason::StepBelowFinal ||
+         search.stop_reason == StopReason::PinnedAtLimit;
+}
+
+bool RegistrationRunner::Impl::run_chain(const ChainOptions& chain,
+                                         std::size_t first,
+                                         std::int64_t start_index,
+                                         ChainEnd& end,
+                                         RegistrationResult& result) {
+  for (std::size_t i = 0; i < chain.stages.size(); ++i) {
+    if (run_stage(first + i, start_index, end, result)) continue;
+    // The stage before ended on the very limit, and rounding put its end beyond.
+    if (i > 0 && end.stop_reason == StopReason::StartInadmissible)
+      end.stop_reason = StopReason::PinnedAtLimit;
+    return false;
+  }
+  return true;
+}
+
+ObjectiveValue RegistrationRunner::Impl::judged(const RigidTransform& room_from_ct) {
+  ObjectiveValue value = judge->objective.evaluate(room_from_ct);
+  value.similarity /= static_cast<double>(views.size());
+  return value;
+}
+
+double RegistrationRunner::Impl::judged(const RigidTransform& room_from_ct,
+                                        RegistrationResult& result) {
+  const ObjectiveValue value = judged(room_from_ct);
+  result.drr_count += value.drr_count;
+  return value.similarity;
+}
+
+void RegistrationRunner::Impl::run_portfolio(std::int64_t start_index, RegistrationResult& result) {
+  std::size_t first = 0;
+  std::optional<ChainEnd> best;
+  for (const ChainOptions& chain : options.chains) {
+    ChainEnd end{result.start_room_from_ct};
+    run_chain(chain, first, start_index, end, result);
+    first += chain.stages.size();
+    end.similarity = judged(end.room_from_ct, result);
+    if (!std::isfinite(end.similarity)) {
+      if (!best.has_value()) result.stop_reason = end.stop_reason;
+      continue;
+    }
+    if (!best.has_value() || end.similarity > best->similarity) {
+      best = end;
+      result.chain = chain.name;
+    }
+    if (best->similarity >= options.judge.enough_value) break;
+  }
+  if (!best.has_value()) return;
+  if (!options.finish.stages.empty()) {
+    run_finish(start_index, *best, result);
+    best->similarity = judged(best->room_from_ct, result);
+  }
+  result.similarity = best->similarity;
+  result.room_from_ct = best->room_from_ct;
+  result.stop_reason = best->similarity <= options.judge.least_value ? StopReason::NoBetterThanNoDrr
+                                                                     : best->stop_reason;
+}
+
+RegistrationRunner::RegistrationRunner(std::shared_ptr<const RegistrationProblem> problem,
+                                       const RegistrationOptions& options,
+                                       std::shared_ptr<ThreadPool> pool)
+    : impl_(std::make_unique<Impl>()) {
+  check(problem != nullptr, "a registration needs a problem");
+  throw_if_any(problems(options));
+  throw_if_any(problems(*problem));
+  impl_->options = options;
+  impl_->pool = std::move(pool);
+  impl_->problem = std::move(problem);
+  impl_->prepare();
+}
+
+RegistrationRunner::RegistrationRunner(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+RegistrationRunner::~RegistrationRunner() = default;
+RegistrationRunner::RegistrationRunner(RegistrationRunner&&) noexcept = default;
+RegistrationRunner& RegistrationRunner::operator=(RegistrationRunner&&) noexcept = default;
+
+RegistrationRunner RegistrationRunner::share_preparation() const {
+  auto impl = std::make_unique<Impl>();
+  impl->problem = impl_->problem;
+  impl->options = impl_->options;
+  impl->views = impl_->views;
+  impl->some_points_ct = impl_->some_points_ct;
+  for (const PreparedStage& stage : impl_->stages) impl->stages.push_back(stage.copy());
+  if (impl_->judge.has_value()) impl->judge = impl_->judge->copy();
+  return RegistrationRunner(std::move(impl));
+}
+
+RegistrationResult RegistrationRunner::run(const RigidTransform& start_room_from_ct,
+                                           std::int64_t start_index) {
+  const Clock::time_point begin = Clock::now();
+  Impl& impl = *impl_;
+  RegistrationResult result;
+  result.start_room_from_ct = start_room_from_ct;
+  result.room_from_ct = start_room_from_ct;
+  result.similarity = std::numeric_limits<double>::quiet_NaN();
+  impl.at_start = impl.scaling_at(start_room_from_ct, impl.some_points_ct);
+  if (impl.judge.has_value()) {
+    impl.run_portfolio(start_index, result);
+  } else {
+    const ChainOptions& chain = impl.options.chains.front();
+    ChainEnd end{start_room_from_ct};
+    if (impl.run_chain(chain, 0, start_index, end, result))
+      impl.run_finish(start_index, end, result);
+    result.room_from_ct = end.room_from_ct;
+    result.similarity = end.similarity;
+    result.stop_reason = end.stop_reason;
+    result.chain = chain.name;
+  }
+  result.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
+  return result;
+}
+
+ObjectiveValue RegistrationRunner::similarity_at(const RigidTransform& room_from_ct) {
+  return impl_->judge.has_value() ? impl_->judged(room_from_ct)
+                                  : similarity_at(room_from_ct, impl_->stages.size() - 1);
+}
+
+ObjectiveValue RegistrationRunner::similarity_at(const RigidTransform& room_from_ct,
+                                                 std::size_t stage) {
+  check(stage < impl_->stages.size(), "no such stage");
+  return impl_->stages[stage].objective.evaluate(room_from_ct);
+}
+
+const RegistrationProblem& RegistrationRunner::problem() const {
+  return *impl_->problem;
+}
+const RegistrationOptions& RegistrationRunner::options() const {
+  return impl_->options;
+}
+
+}  // namespace af::registration

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/thread_pool.h"
+#include "drr/drr_renderer.h"
+#include "register/method/presets.h"
+#include "register/method/registration_options.h"
+#include "register/problem/multi_view_objective.h"
+
+namespace af::registration {
+
+/// A coarser renderer of a view's image pyramid.
+struct RendererLevel {
+  std::shared_ptr<const DrrRenderer> renderer;
+  double blur_sigma_mm = 0.0;  ///< of its DRRs, in mm on the isocentre plane
+};
+
+/// One X-ray of the problem. Pixels are the camera's; nothing is cropped yet.
+struct RegistrationView {
+  View view;     ///< camera and region of interest
+  Image2d xray;  ///< whole detector, attenuation domain (bright = attenuated)
+  Image2d mask;  ///< whole detector, non-zero = used; empty: every pixel of the region
+  /// `mask` without the gold standard's markers; empty: the same. It counts in stages of 400 pixels
+  /// or more where it leaves three quarters of them.
+  Image2d mask_without_markers;
+  std::shared_ptr<const DrrRenderer> renderer;
+  std::vector<RendererLevel> coarse_levels;  ///< levels 1, 2, ... as far as stages need them
+  std::optional<MotionLimit> limit;  ///< motion box of the renderer's field; none for ray casting
+};
+
+/// Everything that does not change between the starts of one case.
+struct RegistrationProblem {
+  std::string case_name;  ///< a key of random numbers
+  RigidTransform nominal_room_from_ct = RigidTransform::Identity();
+  Eigen::Vector3d center_ct_mm = Eigen::Vector3d::Zero();     ///< c_roi: origin of all rotations
+  Eigen::Vector3d isocenter_point = Eigen::Vector3d::Zero();  ///< room, mm
+  std::vector<Eigen::Vector3d> scaling_points_ct;             ///< see ct_lattice_points()
+  std::vector<RegistrationView> views;
+
+  /// What the parameters in results are relative to.
+  [[nodiscard]] PoseFrame frame() const {
+    return PoseFrame::about(nominal_room_from_ct, center_ct_mm);
+  }
+};
+
+std::vector<std::string> problems(const RegistrationProblem& problem);
+
+struct TraceRow {
+  int pass = 0;  ///< stage, from 0, counted over the chains
+  double step_mm = 0.0;
+  int evaluations = 0;  ///< so far, all stages
+  double similarity = 0.0;
+  PoseParameters parameters;  ///< relative to RegistrationProblem::frame()
+};
+
+struct RegistrationResult {
+  RigidTransform start_room_from_ct = RigidTransform::Identity();
+  RigidTransform room_from_ct = RigidTransform::Identity();
+  double similarity = 0.0;        ///< at the end: of the chain's last stage, of a portfolio by its
+                                  ///< judge (mean over views); NaN if it has none
+  std::string chain;              ///< the one that the result is from
+  int evaluations = 0;            ///< poses tried
+  int inadmissible = 0;           ///< of these, outside the field or its motion range
+  std::int64_t drr_count = 0;     ///< DRRs rendered
+  std::int64_t rays_outside = 0;  ///< at the start, when that is why it is inadmissible
+  StopReason stop_reason = StopReason::StepBelowFinal;
+  std::vector<TraceRow> trace;
+  double seconds = 0.0;  ///< wall time
+};
+
+/// Registers one case from any number of starts. Construction does what all starts share (smoothed
+/// and decimated references, histograms' ranges, X-ray bins); runs reuse the buffers. One run at a
+/// time spreads over the threads of a pool: views, and poses that do not depend on each other. For
+/// runs at the same time share_preparation() makes another runner cheaply. A result depends on
+/// problem, options and start alone (its seconds excepted), not on the number of threads. The DRR
+/// range of a case is that of the DRR at the nominal pose over the region of interest grown by half
+/// its size to every side. \test Registration.TwoViewsRecoverAKnownPose
+class RegistrationRunner {
+ public:
+  /// InputError when options or problem have problems, or when the nominal pose is outside a field.
+  /// `pool`: none means the calling thread alone.
+  RegistrationRunner(std::shared_ptr<const RegistrationProblem> problem,
+                     const RegistrationOptions& options,
+                     std::shared_ptr<ThreadPool> pool = nullptr);
+  ~RegistrationRunner();
+  RegistrationRunner(RegistrationRunner&&) noexcept;
+  RegistrationRunner& operator=(RegistrationRunner&&) noexcept;
+
+  /// A runner for another thread, on that thread alone; references and bins are shared.
+  [[nodiscard]] RegistrationRunner share_preparation() const;
+
+  /// `start_index` is a key of random numbers.
+  [[nodiscard]] RegistrationResult run(const RigidTransform& start_room_from_ct,
+                                       std::int64_t start_index = 0);
+
+  /// What RegistrationResult::similarity is at a pose.
+  [[nodiscard]] ObjectiveValue similarity_at(const RigidTransform& room_from_ct);
+  /// The objective of one stage, counted over the chains, at a pose.
+  [[nodiscard]] ObjectiveValue similarity_at(const RigidTransform& room_from_ct, std::size_t stage);
+
+  [[nodiscard]] const RegistrationProblem& problem() const;
+  [[nodiscard]] const RegistrationOptions& options() const;
+
+ private:
+  struct Impl;
+  explicit RegistrationRunner(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace af::registration

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "parallel/communicator.h"
+#include "register/method/registration.h"
+#include "register/results/registration_results.h"
+#include "register/verdict/pose_examiner.h"
+#include "run/resumable_items.h"
+
+namespace af::registration {
+
+/// Collective. Registers from every start and examines the end, the starts shared over the ranks as
+/// these become free. Of several starts the finished ones are kept (see ResumableItems): a stopped
+/// or killed run goes on. Rank 0 returns one record per start, in the order of starts; the others
+/// return none. Only the record of the highest similarity (ties: the lowest start index) keeps its
+/// trace, so that memory does not grow with the number of starts.
+std::vector<RegistrationRecord> register_starts(RegistrationRunner& runner,
+                                                PoseExaminer& examiner,
+                                                std::span<const RigidTransform> starts,
+                                                const UnfinishedWork& unfinished,
+                                                const Communicator& communicator);
+
+}  // namespace af::registration

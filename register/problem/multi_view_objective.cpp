@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "register/problem/multi_view_objective.h"
+
+#include <algorithm>
+#include <atomic>
+#include <limits>
+#include <utility>
+
+#include "base/error.h"
+#include "register/similarity/pixel_sums.h"
+
+namespace af::registration {
+namespace {
+
+/// Value and gradient from the derivative by every pixel.
+NormalEquations gradient_equations(const SimilarityMeasure& measure,
+                                   std::span<const float> drr,
+                                   std::span<const float> planes,
+                                   std::span<float> by_pixel,
+                                   SimilarityWorkspace& workspace) {
+  NormalEquations result;
+  result.value = measure.evaluate_with_derivative(drr, by_pixel, workspace);
+  const PixelSumKernels kernels = pixel_sum_kernels();
+  for (int k = 0; k < 6; ++k)
+    result.gradient[k] =
+        kernels
+            .correlation_sums(planes.data() + static_cast<std::size_t>(k) * drr.size(),
+                              by_pixel.data(),
+                              nullptr,
+                              0.0f,
+                              static_cast<std::int32_t>(drr.size()))
+            .product;
+  return result;
+}
+
+}  // namespace
+
+MultiViewObjective::MultiViewObjective(std::vector<ObjectiveView> views,
+                                       std::shared_ptr<ThreadPool> pool)
+    : views_(std::move(views)),
+      pool_(pool ? std::move(pool) : std::make_shared<ThreadPool>()),
+      scratch_(views_.size() * static_cast<std::size_t>(pool_->threads())) {
+  check(!views_.empty(), "an objective needs at least one view");
+}
+
+bool MultiViewObjective::is_in_range(const RigidTransform& room_from_ct) const {
+  return std::all_of(views_.begin(), views_.end(), [&](const ObjectiveView& view) {
+    return !view.limit.has_value() ||
+           view.limit->range.contains(parameters_from_pose(view.limit->frame, room_from_ct));
+  });
+}
+
+void MultiViewObjective::prepare(std::span<const RigidTransform> room_from_ct) {
+  poses_.clear();
+  for (const RigidTransform& pose : room_from_ct)
+    poses_.push_back({is_in_range(pose), static_cast<int>(views_.size())});
+  if (parts_.size() < poses_.size() * views_.size()) parts_.resize(poses_.size() * views_.size());
+}
+
+MultiViewObjective::Scratch& MultiViewObjective::scratch_of(int slot, std::size_t view) {
+  Scratch& scratch = scratch_[static_cast<std::size_t>(slot) * views_.size() + view];
+  if (!scratch.render)
+    scratch = {views_[view].renderer->make_workspace(),
+               views_[view].measure->make_workspace(),
+               std::vector<float>(views_[view].view.pixel_count()),
+               {},
+               {}};
+  return scratch;
+}
+
+template <typename Compare>
+void MultiViewObjective::evaluate_view(std::size_t i,
+                                       const RigidTransform& room_from_ct,
+                                       std::size_t view,
+                                       Scratch& scratch,
+                                       const std::optional<PoseGradients>& gradients,
+                                       const Compare& compare) {
+  std::atomic_ref<int> first_outside(poses_[i].first_outside);
+  const int me = static_cast<int>(view);
+  if (first_outside < me) return;
+  Part& part = parts_[i * views_.size() + view];
+  part.rays_outside =
+      views_[view]
+          .renderer
+          ->render(room_from_ct, views_[view].view, *scratch.render, scratch.drr, gradients)
+          .rays_outside;
+  if (part.rays_outside == 0) {
+    compare(part.equations);
+    return;
+  }
+  for (int seen = first_outside; me < seen;)
+    if (first_outside.compare_exchange_weak(seen, me)) return;
+}
+
+ObjectiveValue MultiViewObjective::sum_of(std::size_t i, NormalEquations& equations) const {
+  ObjectiveValue value;
+  value.similarity = std::numeric_limits<double>::quiet_NaN();
+  equations = {};
+  const PoseState& pose = poses_[i];
+  if (!pose.is_in_range) return value;
+  const auto first_outside = static_cast<std::size_t>(pose.first_outside);
+  const Part* const parts = parts_.data() + i * views_.size();
+  if (first_outside < views_.size()) {
+    value.drr_count = pose.first_outside + 1;
+    value.rays_outside = parts[first_outside].rays_outside;
+    return value;
+  }
+  for (std::size_t view = 0; view < views_.size(); ++view) equations += parts[view].equations;
+  value.drr_count = static_cast<int>(views_.size());
+  value.similarity = equations.value;
+  value.is_admissible = true;
+  return value;
+}
+
+ObjectiveValue MultiViewObjective::evaluate(const RigidTransform& room_from_ct) {
+  ObjectiveValue value;
+  evaluate_all({&room_from_ct, 1}, {&value, 1});
+  return value;
+}
+
+void MultiViewObjective::evaluate_all(std::span<const RigidTransform> room_from_ct,
+                                      std::span<ObjectiveValue> values) {
+  check(room_from_ct.size() == values.size(), "one value per pose");
+  prepare(room_from_ct);
+  const auto view_count = static_cast<int>(views_.size());
+  const auto pose_count = static_cast<int>(room_from_ct.size());
+  pool_->for_each(pose_count * view_count, [&](int task, int slot) {
+    const auto i = static_cast<std::size_t>(task / view_count);
+    const auto view = static_cast<std::size_t>(task % view_count);
+    if (!poses_[i].is_in_range) return;
+    // Views of one pose keep their memory to themselves, whichever thread takes them.
+    Scratch& scratch = scratch_of(pose_count == 1 ? 0 : slot, view);
+    evaluate_view(i, room_from_ct[i], view, scratch, std::nullopt, [&](NormalEquations& part) {
+      part.value = views_[view].measure->evaluate(scratch.drr, *scratch.similarity);
+    });
+  });
+  NormalEquations equations;
+  for (std::size_t i = 0; i < values.size(); ++i) values[i] = sum_of(i, equations);
+}
+
+ObjectiveValue MultiViewObjective::evaluate_with(const RigidTransform& room_from_ct,
+                                                 const Eigen::Vector3d& pivot_room_point,
+                                                 Derivatives derivatives,
+                                                 NormalEquations& result) {
+  prepare({&room_from_ct, 1});
+  if (poses_[0].is_in_range)
+    pool_->for_each(static_cast<int>(views_.size()), [&](int task, int /*slot*/) {
+      const auto view = static_cast<std::size_t>(task);
+      const SimilarityMeasure& measure = *views_[view].measure;
+      Scratch& scratch = scratch_of(0, view);
+      scratch.planes.resize(6 * scratch.drr.size());
+      const PoseGradients gradients{pivot_room_point, scratch.planes};
+      evaluate_view(0, room_from_ct, view, scratch, gradients, [&](NormalEquations& part) {
+        if (derivatives == Derivatives::NormalEquations) {
+          part = measure.normal_equations(scratch.drr, scratch.planes, *scratch.similarity);
+          return;
+        }
+        scratch.by_pixel.resize(scratch.drr.size());
+        part = gradient_equations(
+            measure, scratch.drr, scratch.planes, scratch.by_pixel, *scratch.similarity);
+      });
+    });
+  return sum_of(0, result);
+}
+
+}  // namespace af::registration

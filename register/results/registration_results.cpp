@@ -1,0 +1,384 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "register/results/registration_results.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <sstream>
+
+#include "base/error.h"
+#include "figures/picture.h"
+#include "files/output_file.h"
+#include "study/pose_file.h"
+
+namespace af::registration {
+namespace {
+
+using nlohmann::json;
+
+constexpr int kCheckerFields = 8;  ///< along the region's longer side
+
+json number_or_null(double value) {
+  return std::isfinite(value) ? json(value) : json(nullptr);
+}
+
+json matrix_json(const RigidTransform& transform) {
+  json rows = json::array();
+  for (int row = 0; row < 4; ++row) {
+    json values = json::array();
+    for (int column = 0; column < 4; ++column) values.push_back(transform.matrix()(row, column));
+    rows.push_back(values);
+  }
+  return rows;
+}
+
+json parameters_json(const PoseParameters& parameters) {
+  const std::array<double, 6> values = parameters.deg_and_mm();
+  return {{"rotation_deg", {values[0], values[1], values[2]}},
+          {"translation_mm", {values[3], values[4], values[5]}}};
+}
+
+json trace_json(const std::vector<TraceRow>& trace) {
+  json rows = json::array();
+  for (const TraceRow& row : trace) {
+    json entry = parameters_json(row.parameters);
+    entry["pass"] = row.pass + 1;
+    entry["step_mm"] = row.step_mm;
+    entry["evaluations"] = row.evaluations;
+    entry["similarity"] = number_or_null(row.similarity);
+    rows.push_back(entry);
+  }
+  return rows;
+}
+
+/// gain and offset that bring `from` to `to` by least squares; gain 0 when `from` is constant.
+std::array<double, 2> linear_fit(const Image2d& from, const Image2d& to) {
+  const auto n = static_cast<double>(from.pixels.size());
+  double sum_from = 0.0;
+  double sum_to = 0.0;
+  for (std::size_t i = 0; i < from.pixels.size(); ++i) {
+    sum_from += static_cast<double>(from.pixels[i]);
+    sum_to += static_cast<double>(to.pixels[i]);
+  }
+  double variance = 0.0;
+  double covariance = 0.0;
+  for (std::size_t i = 0; i < from.pixels.size(); ++i) {
+    const double centred = static_cast<double>(from.pixels[i]) - sum_from / n;
+    variance += centred * centred;
+    covariance += centred * (static_cast<double>(to.pixels[i]) - sum_to / n);
+  }
+  const double gain = variance > 0.0 ? covariance / variance : 0.0;
+  return {gain, (sum_to - gain * sum_from) / n};
+}
+
+std::string short_text(double value) {
+  std::ostringstream out;
+  out.precision(3);
+  out << value;
+  return out.str();
+}
+
+void append_fixed(std::vector<std::string>& fields, const std::array<double, 6>& values) {
+  for (const double value : values) fields.push_back(number_text(value));
+}
+
+std::string parameters_line(const PoseParameters& parameters) {
+  const std::array<double, 6> values = parameters.deg_and_mm();
+  std::string line;
+  for (std::size_t i = 0; i < values.size(); ++i)
+    line += (i == 0 ? "" : i == 3 ? " deg,  " : ", ") + fixed_text(values[i], 2);
+  return line + " mm";
+}
+
+/// "3 found, 1 doubtful, 0 not found"
+std::string counts_text(const std::vector<RegistrationRecord>& records) {
+  std::array<int, 3> counts{};
+  for (const RegistrationRecord& record : records)
+    ++counts[static_cast<std::size_t>(judgement_of(record).verdict)];
+  std::string text;
+  for (const Verdict verdict : {Verdict::Found, Verdict::Doubtful, Verdict::NotFound})
+    text += (text.empty() ? "" : ", ") + std::to_string(counts[static_cast<std::size_t>(verdict)]) +
+            " " + to_string(verdict);
+  return text;
+}
+
+}  // namespace
+
+Judgement judgement_of(const RegistrationRecord& record) {
+  Judgement judgement = judged_end(record.result.stop_reason, record.view_values);
+  if (record.diagnosis.sayings.empty()) return judgement;
+  std::string sayings;
+  for (const std::string& saying : record.diagnosis.sayings)
+    sayings += (sayings.empty() ? "" : "; ") + saying;
+  if (judgement.verdict == Verdict::NotFound)
+    return {Verdict::NotFound, judgement.reason + "; " + sayings};
+  return {Verdict::Doubtful, sayings};
+}
+
+bool is_better(const RegistrationRecord& a, const RegistrationRecord& b) {
+  const bool a_has = std::isfinite(a.result.similarity);
+  const bool b_has = std::isfinite(b.result.similarity);
+  if (a_has != b_has) return a_has;
+  const bool a_is_found = judgement_of(a).verdict != Verdict::NotFound;
+  const bool b_is_found = judgement_of(b).verdict != Verdict::NotFound;
+  if (a_is_found != b_is_found) return a_is_found;
+  if (a_has && a.result.similarity != b.result.similarity)
+    return a.result.similarity > b.result.similarity;
+  return a.start_index < b.start_index;
+}
+
+std::size_t best_record(const std::vector<RegistrationRecord>& records) {
+  check(!records.empty(), "a run has at least one record");
+  const auto best = std::min_element(records.begin(), records.end(), is_better);
+  return static_cast<std::size_t>(best - records.begin());
+}
+
+namespace {
+
+bool is_not_found(const RegistrationRecord& record) {
+  return judgement_of(record).verdict == Verdict::NotFound;
+}
+
+json views_json(const RegistrationRecord& record, const RegistrationProblem& problem) {
+  const std::vector<ViewValue>& values = record.view_values;
+  json views = json::array();
+  bool agree = record.diagnosis.sayings.empty();
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const bool agrees = !disagrees(i, values);
+    agree = agree && agrees;
+    views.push_back({{"camera", problem.views[i].view.camera.name},
+                     {"judge_value", number_or_null(values[i].coarse)},
+                     {"judge_value_fine", number_or_null(values[i].fine)},
+                     {"agrees", agrees}});
+  }
+  return {{"verdict", agree ? "nothing found" : "suspicious"},
+          {"findings", record.diagnosis.sayings},
+          {"cameras", views}};
+}
+
+}  // namespace
+
+json result_json(const RegistrationRecord& record,
+                 const RegistrationProblem& problem,
+                 const RunDescription& run) {
+  const RegistrationResult& result = record.result;
+  const PoseFrame frame = problem.frame();
+  json output;
+  output["format"] = "attenuation-fields registration result";
+  output["format_version"] = 1;
+  output["case"] = run.case_name;
+  output["renderer"] = run.renderer;
+  output["start_index"] = record.start_index;
+  const Judgement judgement = judgement_of(record);
+  const bool is_rejected = judgement.verdict == Verdict::NotFound;
+  output["verdict"] = to_string(judgement.verdict);
+  output["verdict_reason"] = judgement.reason;
+  output["views"] = views_json(record, problem);
+  output[is_rejected ? "rejected_room_from_ct" : "room_from_ct"] = matrix_json(result.room_from_ct);
+  output["start_room_from_ct"] = matrix_json(result.start_room_from_ct);
+  output["nominal_room_from_ct"] = matrix_json(problem.nominal_room_from_ct);
+  output["center_ct_mm"] = {
+      problem.center_ct_mm.x(), problem.center_ct_mm.y(), problem.center_ct_mm.z()};
+  output[is_rejected ? "rejected_parameters_relative_to_nominal"
+                     : "parameters_relative_to_nominal"] =
+      parameters_json(parameters_from_pose(frame, result.room_from_ct));
+  output["start_parameters_relative_to_nominal"] =
+      parameters_json(parameters_from_pose(frame, result.start_room_from_ct));
+  output["similarity"] = number_or_null(result.similarity);
+  output["evaluations"] = result.evaluations;
+  output["inadmissible_evaluations"] = result.inadmissible;
+  output["drr_count"] = result.drr_count;
+  output["rays_outside_at_start"] = result.rays_outside;
+  output["stop_reason"] = to_string(result.stop_reason);
+  output["seconds"] = result.seconds;
+  output["initial_tre_mm"] =
+      record.errors.has_value() ? number_or_null(record.errors->initial_tre_mm) : json(nullptr);
+  output["tre_mm"] =
+      record.errors.has_value() ? number_or_null(record.errors->tre_mm) : json(nullptr);
+  output["gold_source"] =
+      record.errors.has_value() ? json(record.errors->gold_source) : json(nullptr);
+  output["trace"] = trace_json(result.trace);
+  output["provenance"] = to_json(run.provenance);
+  return output;
+}
+
+CsvTable registrations_table(std::vector<RegistrationRecord> records,
+                             const RegistrationProblem& problem,
+                             const RunDescription& run) {
+  std::sort(records.begin(), records.end(), [](const auto& a, const auto& b) {
+    return a.start_index < b.start_index;
+  });
+  std::vector<std::string> columns = {"case", "start_index", "renderer"};
+  for (const char* when : {"start", "final"})
+    for (const char* parameter : kParameterNames)
+      columns.push_back(std::string(when) + "_" + parameter);
+  for (const char* column : {"initial_tre_mm",
+                             "tre_mm",
+                             "similarity",
+                             "evaluations",
+                             "stop_reason",
+                             "inadmissible",
+                             "drr_count",
+                             "relative_to",
+                             "verdict",
+                             "judge_mean",
+                             "judge_lowest_view",
+                             "judge_fine_mean",
+                             "judge_fine_lowest_view",
+                             "seconds"})
+    columns.emplace_back(column);
+  CsvTable table(columns);
+  const PoseFrame frame = problem.frame();
+  for (const RegistrationRecord& record : records) {
+    const RegistrationResult& result = record.result;
+    std::vector<std::string> fields = {
+        run.case_name, std::to_string(record.start_index), run.renderer};
+    append_fixed(fields, parameters_from_pose(frame, result.start_room_from_ct).deg_and_mm());
+    append_fixed(fields, parameters_from_pose(frame, result.room_from_ct).deg_and_mm());
+    const double missing = std::nan("");
+    fields.push_back(number_text(record.errors ? record.errors->initial_tre_mm : missing));
+    fields.push_back(number_text(record.errors ? record.errors->tre_mm : missing));
+    fields.push_back(number_text(result.similarity));
+    fields.push_back(std::to_string(result.evaluations));
+    fields.emplace_back(to_string(result.stop_reason));
+    fields.push_back(std::to_string(result.inadmissible));
+    fields.push_back(std::to_string(result.drr_count));
+    fields.emplace_back("nominal");
+    fields.emplace_back(to_string(judgement_of(record).verdict));
+    for (double ViewValue::*const value : {&ViewValue::coarse, &ViewValue::fine}) {
+      const ViewSummary summary = summary_of(record.view_values, value);
+      fields.push_back(number_text(summary.mean));
+      fields.push_back(number_text(summary.lowest));
+    }
+    fields.push_back(number_text(result.seconds));
+    table.add_row(std::move(fields));
+  }
+  return table;
+}
+
+void write_overlay(const RegistrationView& view,
+                   const RigidTransform& room_from_ct,
+                   const std::string& heading,
+                   const std::filesystem::path& path) {
+  const Image2d xray = crop(view.xray, view.view.roi);
+  std::int64_t rays_outside = 0;
+  Image2d drr = render_image(*view.renderer, room_from_ct, view.view, &rays_outside);
+  const auto drr_window = percentile_window(drr);
+  PicturePanel drr_panel{drr, drr_window[0], drr_window[1], "DRR", "", {}, {}};
+  drr_panel.caption = "attenuation";
+  if (rays_outside > 0)
+    drr_panel.caption += ", " + std::to_string(rays_outside) + " rays outside the field";
+  const auto [gain, offset] = linear_fit(drr, xray);
+  Image2d difference = xray;
+  for (std::size_t i = 0; i < difference.pixels.size(); ++i)
+    difference.pixels[i] -= static_cast<float>(gain) * drr.pixels[i] + static_cast<float>(offset);
+  const auto xray_window = percentile_window(xray);
+  const double half_range = (xray_window[1] - xray_window[0]) / 4.0;
+  const int field_px = std::max(1, std::max(xray.width, xray.height) / kCheckerFields);
+  const PicturePanel xray_panel{
+      xray, xray_window[0], xray_window[1], "X-ray", "attenuation", {}, {}};
+  const PicturePanel checker_panel{checkerboard(xray, drr, field_px),
+                                   0.0,
+                                   1.0,
+                                   "Checkerboard",
+                                   "X-ray first, 1st to 99th percentile each",
+                                   {},
+                                   {}};
+  const PicturePanel difference_panel{difference,
+                                      -half_range,
+                                      half_range,
+                                      "Difference",
+                                      "X-ray - (" + short_text(gain) + " DRR " +
+                                          (offset < 0.0 ? "- " : "+ ") +
+                                          short_text(std::abs(offset)) + "), attenuation",
+                                      PicturePanel::Colors::Diverging,
+                                      {}};
+  const int zoom = std::max(1, 300 / std::max(1, std::max(xray.width, xray.height)));
+  write_picture({xray_panel, drr_panel, checker_panel, difference_panel}, 2, heading, path, zoom);
+}
+
+namespace {
+
+/// The pose's files under names that say whether it is one; those of an earlier run are gone.
+void write_pose_files(const RegistrationRecord& record, const std::filesystem::path& folder) {
+  for (const char* name : {"pose.toml", "result.tfm", "rejected-pose.toml"})
+    std::filesystem::remove(folder / name);
+  const RigidTransform& pose = record.result.room_from_ct;
+  if (is_not_found(record)) {
+    write_text_file(folder / "rejected-pose.toml",
+                    "# Not found: " + judgement_of(record).reason + "\n" + pose_to_toml(pose));
+    return;
+  }
+  write_text_file(folder / "pose.toml", pose_to_toml(pose));
+  write_text_file(folder / "result.tfm", pose_to_itk_transform(pose));
+}
+
+}  // namespace
+
+void write_result_files(const RegistrationRecord& record,
+                        const RegistrationProblem& problem,
+                        const RunDescription& run,
+                        const std::filesystem::path& folder) {
+  write_pose_files(record, folder);
+  const Verdict verdict = judgement_of(record).verdict;
+  const std::string label =
+      verdict == Verdict::Found ? "" : std::string(" (") + to_string(verdict) + ")";
+  for (const RegistrationView& view : problem.views) {
+    const std::string& camera = view.view.camera.name;
+    write_overlay(view,
+                  record.result.room_from_ct,
+                  run.case_name + ", view " + camera + label,
+                  folder / (file_name_part(camera) + "-overlay.png"));
+  }
+  write_reproduce_script(folder, run.provenance);
+  write_text_file(folder / "result.json", result_json(record, problem, run).dump(2) + "\n");
+}
+
+std::string write_run(const std::vector<RegistrationRecord>& records,
+                      const RegistrationProblem& problem,
+                      const RunDescription& run,
+                      const std::filesystem::path& folder) {
+  const RegistrationRecord& best = records[best_record(records)];
+  // What an earlier run left here is whole no more.
+  remove_output(folder / "result.json");
+  std::ostringstream summary;
+  const Judgement judgement = judgement_of(best);
+  summary << "verdict     " << to_string(judgement.verdict) << ": " << judgement.reason << '\n'
+          << "case " << run.case_name << ", renderer " << run.renderer << '\n';
+  if (records.size() > 1) {
+    write_text_file(folder / "registrations.csv",
+                    registrations_table(records, problem, run).to_text());
+    summary << records.size() << " starts (" << (folder / "registrations.csv").string()
+            << "): " << counts_text(records) << "; highest similarity: start " << best.start_index
+            << '\n';
+  }
+  write_result_files(best, problem, run, folder);
+  summary << summary_text(best, problem) << "results     " << folder.string() << '\n';
+  return summary.str();
+}
+
+std::vector<std::string> result_file_names() {
+  return {"pose.toml", "result.tfm", "result.json", "registrations.csv", "reproduce.sh"};
+}
+
+std::string summary_text(const RegistrationRecord& record, const RegistrationProblem& problem) {
+  const RegistrationResult& result = record.result;
+  const PoseFrame frame = problem.frame();
+  std::ostringstream out;
+  out << "start       " << parameters_line(parameters_from_pose(frame, result.start_room_from_ct))
+      << "   (rx, ry, rz, tx, ty, tz from nominal)\n"
+      << "result      " << parameters_line(parameters_from_pose(frame, result.room_from_ct)) << '\n'
+      << "similarity  " << fixed_text(result.similarity, 4) << '\n';
+  if (record.errors.has_value())
+    out << "TRE         " << fixed_text(record.errors->initial_tre_mm, 2) << " mm at the start, "
+        << fixed_text(record.errors->tre_mm, 2)
+        << " mm at the end (gold pose: " << record.errors->gold_source << ")\n";
+  out << "stopped     " << to_string(result.stop_reason);
+  if (result.stop_reason == StopReason::StartInadmissible)
+    out << " (" << result.rays_outside << " rays outside the field; 0: beyond its motion range)";
+  out << " after " << result.evaluations << " poses (" << result.inadmissible << " inadmissible), "
+      << result.drr_count << " DRRs, " << fixed_text(result.seconds, 2) << " s\n";
+  return out.str();
+}
+
+}  // namespace af::registration

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "register/method/registration.h"
+#include "register/verdict/verdict.h"
+#include "register/verdict/view_diagnosis.h"
+#include "run/provenance.h"
+#include "text/csv_table.h"
+
+namespace af::registration {
+
+/// Distances of a registration's start and end from the gold pose.
+struct TargetErrors {
+  std::string gold_source;  ///< "fiducials" or "study" (its gold_room_from_ct)
+  double initial_tre_mm = 0.0;
+  double tre_mm = 0.0;
+};
+
+/// One registration among those of a run.
+struct RegistrationRecord {
+  std::int64_t start_index = 0;
+  RegistrationResult result;
+  std::vector<ViewValue> view_values;  ///< of PoseExaminer, at the end
+  ViewDiagnosis diagnosis;             ///< of a run's best record
+  std::optional<TargetErrors> errors;  ///< when the gold pose is known
+};
+
+/// The verdict on a record: at least doubtful where the diagnosis found something.
+Judgement judgement_of(const RegistrationRecord& record);
+
+/// Order of records by similarity, highest first; those that are not found come after the others,
+/// those without a similarity last, ties go by start index.
+bool is_better(const RegistrationRecord& a, const RegistrationRecord& b);
+
+/// Index of the best record; `records` is not empty.
+std::size_t best_record(const std::vector<RegistrationRecord>& records);
+
+/// What all records of a run share.
+struct RunDescription {
+  std::string case_name;
+  std::string renderer;  ///< "field" or "raycast"
+  Provenance provenance;
+};
+
+/// result.json: verdict, poses as 4x4 (`room_from_ct`, which read_pose() reads) and as six
+/// parameters relative to the nominal pose about the ROI centre, similarity, counts, stop reason,
+/// trace, seconds, TRE, provenance. Numbers that do not exist are null. What is not found is no
+/// pose for read_pose(): its key is `rejected_room_from_ct`.
+nlohmann::json result_json(const RegistrationRecord& record,
+                           const RegistrationProblem& problem,
+                           const RunDescription& run);
+
+/// registrations.csv with the contract's columns, rows sorted by start index. Parameters are
+/// relative to the nominal pose, which the column `relative_to` says.
+CsvTable registrations_table(std::vector<RegistrationRecord> records,
+                             const RegistrationProblem& problem,
+                             const RunDescription& run);
+
+/// Picture of one view at a pose: X-ray region, DRR (brought to the X-ray's scale by least
+/// squares), checkerboard of both, and their difference.
+void write_overlay(const RegistrationView& view,
+                   const RigidTransform& room_from_ct,
+                   const std::string& heading,
+                   const std::filesystem::path& path);
+
+/// result.json, pose.toml, result.tfm, VIEW-overlay.png and reproduce.sh in `folder`, result.json
+/// last: when it is there, all are. Of what is not found there is no result.tfm, and
+/// rejected-pose.toml instead of pose.toml, so that no script takes its pose for a result.
+void write_result_files(const RegistrationRecord& record,
+                        const RegistrationProblem& problem,
+                        const RunDescription& run,
+                        const std::filesystem::path& folder);
+
+/// What a whole run leaves in `folder`: the files of its best record, and registrations.csv before
+/// them when there were several starts. Returns the summary for the terminal.
+std::string write_run(const std::vector<RegistrationRecord>& records,
+                      const RegistrationProblem& problem,
+                      const RunDescription& run,
+                      const std::filesystem::path& folder);
+
+/// Those that a run replaces in its folder, whatever the cameras' names.
+std::vector<std::string> result_file_names();
+
+/// A few lines for a person at the terminal.
+std::string summary_text(const RegistrationRecord& record, const RegistrationProblem& problem);
+
+}  // namespace af::registration

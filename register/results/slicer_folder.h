@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+// A result as a folder that 3D Slicer loads.
+#pragma once
+
+#include <filesystem>
+
+#include "register/method/registration.h"
+#include "study/study_file.h"
+
+namespace af::registration {
+
+/// Writes into `folder`: ct-to-room.tfm (ITK transform, ct_from_room: applied to the CT it shows it
+/// in the room), fiducials.mrk.json (when the case has any) and target-box.mrk.json (Slicer
+/// markups, ct frame, LPS mm), per view xray-CAMERA.nrrd and drr-CAMERA.nrrd (whole detector, as
+/// attenuation, placed on the detector in the room, LPS mm), and README.md, which says where the CT
+/// is and how to load all. \test SlicerFiles.AreWhatItkAndJsonReadBack
+void write_slicer_folder(const RegistrationProblem& problem,
+                         const RigidTransform& room_from_ct,
+                         const StudyCase& study_case,
+                         const std::filesystem::path& folder);
+
+}  // namespace af::registration

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "register/results/registration_results.h"
+#include "study/case_gold_standard.h"
+#include "study/study_file.h"
+
+namespace af::registration {
+
+/// The case's gold pose as af-evaluate takes it (from its fiducials if two views show them, else
+/// the one the study states); nullopt when the study knows none.
+std::optional<GoldStandard> known_gold(const Study& study, const StudyCase& study_case);
+
+/// Fills in every record's TRE: the mean over the target box.
+void add_target_errors(const std::optional<GoldStandard>& gold,
+                       const CtBox& target_box_ct,
+                       std::vector<RegistrationRecord>& records);
+
+}  // namespace af::registration

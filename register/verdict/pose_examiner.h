@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "register/method/registration.h"
+#include "register/verdict/verdict.h"
+
+namespace af::registration {
+
+/// Judges poses view by view, whatever the method that found them: by the judge of portfolios
+/// (RobustGradient), at its own level, or the coarsest that the problem's views have, and at level
+/// 0. For one thread at a time. \test PoseExaminer.TellsARightPoseFromAWrongOneInEveryView
+class PoseExaminer {
+ public:
+  /// `problem`: as for a RegistrationRunner.
+  explicit PoseExaminer(std::shared_ptr<const RegistrationProblem> problem);
+
+  /// One per view; NaN where the pose is outside a field, or the X-ray has no gradients to explain.
+  [[nodiscard]] std::vector<ViewValue> view_values(const RigidTransform& room_from_ct);
+
+ private:
+  std::vector<std::unique_ptr<RegistrationRunner>> views_;  ///< none where nothing can be judged
+};
+
+}  // namespace af::registration

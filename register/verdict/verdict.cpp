@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "register/verdict/verdict.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+namespace af::registration {
+namespace {
+
+/// With two decimals, 0 or more: "0.05".
+std::string value_text(double value) {
+  const std::string hundredths = std::to_string(std::lround(100.0 * std::max(0.0, value)) + 1000);
+  return hundredths.substr(1, 1) + "." + hundredths.substr(2);
+}
+
+/// "0.05 of 1 (right poses have 0.08 or more)"
+std::string share_text(double value, double limit) {
+  return value_text(value) + " of 1 (right poses have " + value_text(limit) + " or more)";
+}
+
+/// What stop reasons say of an end that no view speaks against.
+std::optional<std::string> doubt_of(StopReason stop_reason) {
+  switch (stop_reason) {
+    case StopReason::PinnedAtLimit:
+      return "the search ended at the limit of the field: the optimum may lie outside";
+    case StopReason::EvaluationBudgetSpent:
+      return "the search was not finished: --max-evaluations is spent";
+    default:
+      return std::nullopt;
+  }
+}
+
+/// Why there is no end at all.
+std::optional<std::string> failure_of(StopReason stop_reason) {
+  switch (stop_reason) {
+    case StopReason::StartInadmissible:
+      return "nothing was searched: the start is outside the field or its motion range";
+    case StopReason::CtOutsideRoi:
+      return "nothing was searched: no CT point projects into the region of interest at the start";
+    case StopReason::NonFiniteSimilarity:
+      return "the similarity is not a finite number";
+    case StopReason::NoBetterThanNoDrr:
+      return "no pose explains the X-rays' gradients better than no DRR at all";
+    default:
+      return std::nullopt;
+  }
+}
+
+Judgement judged_values(const ViewSummary& coarse, const ViewSummary& fine) {
+  const std::string too_little =
+      "on average the pose explains too little of the X-rays' gradients: ";
+  if (coarse.mean < kLeastCoarseMean)
+    return {Verdict::NotFound, too_little + share_text(coarse.mean, kLeastCoarseMean)};
+  if (fine.mean < kLeastFineMean)
+    return {Verdict::NotFound, too_little + share_text(fine.mean, kLeastFineMean) + " in detail"};
+  const std::string little = "the pose explains little of an X-ray's gradients: ";
+  if (coarse.lowest < kLeastCoarseOfFound)
+    return {Verdict::Doubtful, little + share_text(coarse.lowest, kLeastCoarseOfFound)};
+  if (fine.lowest < kLeastFineOfFound)
+    return {Verdict::Doubtful,
+            little + value_text(fine.lowest) + " of 1 in detail (" + value_text(kLeastFineOfFound) +
+                " or more leaves no doubt)"};
+  return {Verdict::Found,
+          "of every X-ray's gradients the pose explains " + value_text(coarse.lowest) +
+              " of 1 or more, " + value_text(fine.lowest) + " in detail"};
+}
+
+bool is_far_below_others(std::size_t view,
+                         std::span<const ViewValue> values,
+                         double ViewValue::*value,
+                         double least_of_found) {
+  double highest = 0.0;
+  for (std::size_t i = 0; i < values.size(); ++i)
+    if (i != view && values[i].*value > highest) highest = values[i].*value;
+  return highest >= least_of_found &&
+         values[view].*value < std::min(least_of_found, kLeastShareOfOthers * highest);
+}
+
+}  // namespace
+
+const char* to_string(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::Found:
+      return "found";
+    case Verdict::Doubtful:
+      return "doubtful";
+    case Verdict::NotFound:
+      return "not found";
+  }
+  return "";
+}
+
+Judgement judged_end(StopReason stop_reason, std::span<const ViewValue> values) {
+  if (const auto failure = failure_of(stop_reason); failure.has_value())
+    return {Verdict::NotFound, *failure};
+  const ViewSummary coarse = summary_of(values, &ViewValue::coarse);
+  const auto doubt = doubt_of(stop_reason);
+  if (!std::isfinite(coarse.mean))
+    return {Verdict::Doubtful, doubt.value_or("no X-ray has gradients to judge the pose by")};
+  const Judgement judgement = judged_values(coarse, summary_of(values, &ViewValue::fine));
+  if (!doubt.has_value()) return judgement;
+  if (judgement.verdict == Verdict::Found) return {Verdict::Doubtful, *doubt};
+  return {judgement.verdict, judgement.reason + "; " + *doubt};
+}
+
+bool disagrees(std::size_t view, std::span<const ViewValue> values) {
+  return is_far_below_others(view, values, &ViewValue::coarse, kLeastCoarseOfFound) ||
+         is_far_below_others(view, values, &ViewValue::fine, kLeastFineOfFound);
+}
+
+ViewSummary summary_of(std::span<const ViewValue> values, double ViewValue::*value) {
+  ViewSummary summary = {0.0, std::nan("")};
+  int count = 0;
+  for (const ViewValue& view : values) {
+    if (!std::isfinite(view.*value)) continue;
+    summary.mean += view.*value;
+    ++count;
+    summary.lowest = std::fmin(summary.lowest, view.*value);
+  }
+  summary.mean = count > 0 ? summary.mean / count : std::nan("");
+  return summary;
+}
+
+}  // namespace af::registration

@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "register/verdict/view_diagnosis.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <optional>
+
+#include "base/error.h"
+#include "register/verdict/pose_examiner.h"
+#include "register/verdict/verdict.h"
+
+namespace af::registration {
+namespace {
+
+/// So much more of the gradients must be explained, on average over the views, for a change to be
+/// named: a wrong change gains next to nothing.
+constexpr double kLeastGain = 0.15;
+
+std::string percent_text(double share) {
+  return std::isfinite(share) ? std::to_string(std::lround(100.0 * std::max(0.0, share))) + " %"
+                              : "nothing";
+}
+
+/// A change of the X-rays, not made, with which a pose would explain far more of them.
+struct Remedy {
+  std::string text;  ///< "the X-ray of view 'B' mirrored left-right"
+  std::vector<ViewValue> view_values;
+};
+
+/// The mean coarse value, NaN counting as 0.
+double mean_of(const std::vector<ViewValue>& values) {
+  double sum = 0.0;
+  for (const ViewValue& view : values) sum += std::isfinite(view.coarse) ? view.coarse : 0.0;
+  return sum / static_cast<double>(values.size());
+}
+
+/// The lowest of one of the values, NaN counting as 0.
+double lowest_of(const std::vector<ViewValue>& values, double ViewValue::*value) {
+  double lowest = 1.0;
+  for (const ViewValue& view : values)
+    lowest = std::min(lowest, std::isfinite(view.*value) ? view.*value : 0.0);
+  return lowest;
+}
+
+/// The image with its columns, its rows or both in the other order.
+Image2d mirrored(const Image2d& image, bool columns, bool rows) {
+  Image2d result = image;
+  if (image.pixels.empty()) return result;
+  for (int row = 0; row < image.height; ++row)
+    for (int column = 0; column < image.width; ++column)
+      result.at(column, row) = image.at(columns ? image.width - 1 - column : column,
+                                        rows ? image.height - 1 - row : row);
+  return result;
+}
+
+void mirror(RegistrationView& view, bool columns, bool rows) {
+  view.xray = mirrored(view.xray, columns, rows);
+  view.mask = mirrored(view.mask, columns, rows);
+  view.mask_without_markers = mirrored(view.mask_without_markers, columns, rows);
+}
+
+void negate(RegistrationView& view) {
+  for (float& value : view.xray.pixels) value = -value;
+}
+
+/// What the X-ray is when its intensities, not their logarithms, were inverted.
+void invert_intensities(RegistrationView& view) {
+  const auto [low, high] = std::minmax_element(view.xray.pixels.begin(), view.xray.pixels.end());
+  const float brightest = std::exp(-*low);
+  // Half the darkest level, about what a detector tells from nothing.
+  const float least = std::max(0.5f * std::exp(-*high), 1e-4f * brightest);
+  for (float& value : view.xray.pixels)
+    value = -std::log(std::max(brightest - std::exp(-value), least) / brightest);
+}
+
+struct Change {
+  std::string text;
+  std::function<void(RegistrationProblem&)> make;
+};
+
+void append_changes_of_view(const RegistrationProblem& problem,
+                            std::size_t view,
+                            std::vector<Change>& changes) {
+  const std::string name = "the X-ray of view '" + problem.views[view].view.camera.name + "' ";
+  const auto add = [&](const char* how, const std::function<void(RegistrationView&)>& make) {
+    changes.push_back({name + how, [make, view](RegistrationProblem& p) { make(p.views[view]); }});
+  };
+  const char* const inverted = "inverted (see xray_domain in the study, and which grey is bone)";
+  add(inverted, negate);
+  add(inverted, invert_intensities);
+  add("mirrored left-right", [](RegistrationView& v) { mirror(v, true, false); });
+  add("mirrored up-down", [](RegistrationView& v) { mirror(v, false, true); });
+  add("turned by 180 degrees", [](RegistrationView& v) { mirror(v, true, true); });
+}
+
+void exchange_xrays(RegistrationView& a, RegistrationView& b) {
+  std::swap(a.xray, b.xray);
+  std::swap(a.mask, b.mask);
+  std::swap(a.mask_without_markers, b.mask_without_markers);
+}
+
+std::vector<Change> changes_of(const RegistrationProblem& problem) {
+  std::vector<Change> changes;
+  for (std::size_t i = 0; i < problem.views.size(); ++i) {
+    append_changes_of_view(problem, i, changes);
+    for (std::size_t j = 0; j < i; ++j) {
+      const CameraGeometry& a = problem.views[j].view.camera;
+      const CameraGeometry& b = problem.views[i].view.camera;
+      if (a.size_px != b.size_px) continue;
+      changes.push_back(
+          {"the X-rays of views '" + a.name + "' and '" + b.name + "' exchanged",
+           [i, j](RegistrationProblem& p) { exchange_xrays(p.views[j], p.views[i]); }});
+    }
+  }
+  return changes;
+}
+
+/// The coarse chains of the default method that need few poses.
+std::optional<RegistrationOptions> coarse_options(const RegistrationProblem& problem) {
+  RegistrationOptions options = preset_options("robust");
+  options.chains.resize(2);
+  options.finish.stages.clear();
+  for (const RegistrationView& view : problem.views)
+    if (static_cast<int>(view.coarse_levels.size()) < options.coarsest_level()) return std::nullopt;
+  return options;
+}
+
+/// The best values that the changed problem comes to; none when it cannot be registered.
+std::optional<std::vector<ViewValue>> values_with(const Change& change,
+                                                  const RegistrationProblem& problem,
+                                                  const RegistrationOptions& options,
+                                                  const std::vector<RigidTransform>& starts) {
+  const auto changed = std::make_shared<RegistrationProblem>(problem);
+  change.make(*changed);
+  std::optional<std::vector<ViewValue>> best;
+  try {
+    RegistrationRunner runner(changed, options);
+    PoseExaminer examiner(changed);
+    for (const RigidTransform& start : starts) {
+      std::vector<ViewValue> values = examiner.view_values(runner.run(start).room_from_ct);
+      if (!best.has_value() || mean_of(values) > mean_of(*best)) best = std::move(values);
+    }
+  } catch (const InputError&) {  // an X-ray without gradients
+    return std::nullopt;
+  }
+  return best;
+}
+
+std::optional<Remedy> remedy_of(const RegistrationProblem& problem,
+                                const std::vector<RigidTransform>& starts,
+                                const std::vector<ViewValue>& view_values) {
+  const auto options = coarse_options(problem);
+  if (!options.has_value()) return std::nullopt;
+  std::optional<Remedy> best;
+  for (const Change& change : changes_of(problem)) {
+    auto values = values_with(change, problem, *options, starts);
+    if (!values.has_value() || lowest_of(*values, &ViewValue::coarse) < kLeastCoarseOfFound)
+      continue;
+    const double least =
+        best.has_value() ? mean_of(best->view_values) : mean_of(view_values) + kLeastGain;
+    if (mean_of(*values) > least) best = Remedy{change.text, std::move(*values)};
+  }
+  return best;
+}
+
+std::string shares_text(const RegistrationProblem& problem, const std::vector<ViewValue>& values) {
+  std::string text;
+  for (std::size_t i = 0; i < values.size(); ++i)
+    text += (i == 0 ? "'" : ", '") + problem.views[i].view.camera.name + "' " +
+            percent_text(values[i].coarse) + " (in detail " + percent_text(values[i].fine) + ")";
+  return text;
+}
+
+void append_same_xrays(const RegistrationProblem& problem, std::vector<std::string>& sayings) {
+  for (std::size_t i = 0; i < problem.views.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j)
+      if (problem.views[i].xray.pixels == problem.views[j].xray.pixels)
+        sayings.push_back("views '" + problem.views[j].view.camera.name + "' and '" +
+                          problem.views[i].view.camera.name +
+                          "' have the same X-ray, pixel for pixel");
+}
+
+}  // namespace
+
+ViewDiagnosis diagnose_views(const std::shared_ptr<const RegistrationProblem>& problem,
+                             const RigidTransform& start_room_from_ct,
+                             const RigidTransform& room_from_ct,
+                             const std::vector<ViewValue>& view_values) {
+  ViewDiagnosis diagnosis;
+  append_same_xrays(*problem, diagnosis.sayings);
+  const bool has_copy = !diagnosis.sayings.empty();
+  for (std::size_t i = 0; i < view_values.size(); ++i) {
+    if (disagrees(i, view_values))
+      diagnosis.sayings.push_back("view '" + problem->views[i].view.camera.name +
+                                  "' does not agree with the others: shares of the X-rays' "
+                                  "gradients that the pose explains: " +
+                                  shares_text(*problem, view_values));
+  }
+  const bool is_sound = lowest_of(view_values, &ViewValue::coarse) >= kLeastCoarseOfFound &&
+                        lowest_of(view_values, &ViewValue::fine) >= kLeastFineOfFound;
+  // No change mends a copy: what seems to is a body's symmetry.
+  if (is_sound || has_copy) return diagnosis;
+  const auto remedy = remedy_of(*problem, {start_room_from_ct, room_from_ct}, view_values);
+  if (remedy.has_value())
+    diagnosis.sayings.push_back(
+        remedy->text + " would explain more: " + shares_text(*problem, remedy->view_values) +
+        " instead of " + shares_text(*problem, view_values));
+  return diagnosis;
+}
+
+}  // namespace af::registration

@@ -1,0 +1,526 @@
+// SPDX-License-Identifier: Apache-2.0
+// Rows of registrations and of image comparisons: transport, tables, statistics with known answers.
+#include <cmath>
+#include <limits>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+#include "evaluate/image_quality/image_quality_tables.h"
+#include "evaluate/registration/case_evaluation.h"
+#include "evaluate/registration/method_comparison.h"
+#include "evaluate/registration/registration_rows.h"
+#include "evaluate/registration/registration_statistics.h"
+#include "files/output_file.h"
+#include "support/test_paths.h"
+#include "unit/evaluate/camera_along_z.h"
+
+namespace af::evaluation {
+namespace {
+
+using nlohmann::json;
+using Rows = std::vector<RegistrationRow>;
+
+RegistrationRow row(const std::string& renderer,
+                    std::int64_t start,
+                    double initial_tre_mm,
+                    double tre_mm,
+                    const std::string& case_name = "skull") {
+  RegistrationRow result;
+  result.case_name = case_name;
+  result.renderer = renderer;
+  result.start_index = start;
+  if (std::isfinite(initial_tre_mm)) result.interval = static_cast<int>(initial_tre_mm / 2);
+  result.initial_tre_mm = initial_tre_mm;
+  result.tre_mm = tre_mm;
+  result.stop_reason = std::isnan(tre_mm) ? "error" : "step-below-final";
+  result.seconds = renderer == "field" ? 0.2 : 40.0;
+  return result;
+}
+
+json through_cbor(const json& value) {
+  return json::from_cbor(json::to_cbor(value));
+}
+
+TEST(RegistrationRows, TravelWithEveryBit) {
+  RegistrationRow sent = row("field", 7, 3.3, std::nan(""));
+  sent.draw_index = 0xFFFFFFFFFFFFFFF0u;
+  sent.start_deg_mm = {0.1, -1.0 / 3, 1e-300, std::numeric_limits<double>::denorm_min(), 5, -0.0};
+  sent.errors = {0.5, 1.0 / 3, 2.0, std::nan(""), 1e-300};
+  sent.error = "numerics; \"failed\"\n";
+  const RegistrationRow received = row_of(through_cbor(packed_row({sent, {}}))).row;
+  EXPECT_EQ(received.case_name, sent.case_name);
+  EXPECT_EQ(received.draw_index, sent.draw_index);
+  EXPECT_EQ(received.start_deg_mm, sent.start_deg_mm);
+  EXPECT_TRUE(std::signbit(received.start_deg_mm[5]));
+  EXPECT_TRUE(std::isnan(received.tre_mm));
+  EXPECT_TRUE(std::isnan(received.final_deg_mm[0]));
+  EXPECT_EQ(received.errors.projection_detector_mm, 1.0 / 3);
+  EXPECT_TRUE(std::isnan(received.errors.rotation_deg));
+  EXPECT_EQ(received.errors.translation_mm, 1e-300);
+  EXPECT_EQ(received.error, sent.error);
+  EXPECT_EQ(received.seconds, sent.seconds);
+}
+
+TEST(RegistrationRows, ARecordThatIsNoRowIsAFileError) {
+  const auto refusal = [](const json& value) {
+    const auto bytes = json::to_cbor(value);
+    try {
+      row_of_record(std::as_bytes(std::span(bytes)), "skull.records");
+    } catch (const FileError& error) {
+      return std::string(error.what());
+    }
+    return std::string("was read");
+  };
+  const json good = packed_row({row("field", 7, 3.3, 1.0), {}});
+  EXPECT_EQ(refusal(good), "was read");
+  EXPECT_THAT(refusal(json::array({1, "skull"})), testing::HasSubstr("skull.records"));
+  EXPECT_THAT(refusal("text"), testing::HasSubstr("no row"));
+  for (const json& start : std::initializer_list<json>{"7", 7.5, 1e300, 0xFFFFFFFFFFFFFFF0u}) {
+    json wrong = good;
+    wrong[2] = start;
+    EXPECT_THAT(refusal(wrong), testing::HasSubstr("no row")) << start;
+  }
+}
+
+TEST(RegistrationRows, TableHasTheContractsColumnsWithTimingsLast) {
+  const CsvTable table = registrations_table(Rows{row("field", 0, 1.5, 0.3)});
+  const std::vector<std::string> first(table.columns().begin(), table.columns().begin() + 20);
+  EXPECT_THAT(first,
+              testing::ElementsAre("case",
+                                   "start_index",
+                                   "renderer",
+                                   "start_rx_deg",
+                                   "start_ry_deg",
+                                   "start_rz_deg",
+                                   "start_tx_mm",
+                                   "start_ty_mm",
+                                   "start_tz_mm",
+                                   "final_rx_deg",
+                                   "final_ry_deg",
+                                   "final_rz_deg",
+                                   "final_tx_mm",
+                                   "final_ty_mm",
+                                   "final_tz_mm",
+                                   "initial_tre_mm",
+                                   "tre_mm",
+                                   "similarity",
+                                   "evaluations",
+                                   "stop_reason"));
+  EXPECT_EQ(table.columns().back(), "seconds");
+  EXPECT_EQ(table.text(0, "success"), "1");
+}
+
+TEST(RegistrationStatistics, OfHandBuiltRowsAreTheKnownOnes) {
+  const Rows rows = {row("field", 0, 0.5, 0.2),
+                     row("field", 1, 1.5, 0.6),
+                     row("field", 2, 2.5, 9.0),
+                     row("field", 3, 3.5, std::nan("")),
+                     row("raycast", 0, 0.5, 0.1)};
+  const json result = renderer_statistics(rows, "field", {8, 2.0});
+  EXPECT_EQ(result["starts"], 4);
+  EXPECT_EQ(result["successes"], 2);
+  EXPECT_EQ(result["rate"], 0.5);
+  EXPECT_EQ(result["without_pose"], 1);
+  EXPECT_DOUBLE_EQ(result["tre_of_successes_mm"]["mean"].get<double>(), 0.4);
+  EXPECT_DOUBLE_EQ(result["tre_mm"]["median"].get<double>(), 0.6);
+  EXPECT_EQ(result["tre_mm"]["count"], 3);
+  EXPECT_EQ(result["intervals"][0]["successes"], 2);
+  EXPECT_EQ(result["intervals"][1]["starts"], 2);
+  EXPECT_EQ(result["intervals"][1]["successes"], 0);
+  EXPECT_TRUE(result["intervals"][2]["rate"].is_null());
+  EXPECT_EQ(result["thresholds"].back()["threshold_mm"], 10.0);
+  EXPECT_EQ(result["thresholds"].back()["successes"], 3);
+  EXPECT_EQ(result["stop_reasons"]["error"], 1);
+  EXPECT_EQ(result["cases"].size(), 1u);
+}
+
+TEST(RegistrationStatistics, KeepEveryFailureInTheDenominatorAndNameItsReason) {
+  Rows rows;
+  for (std::int64_t i = 0; i < 10; ++i)
+    rows.push_back(row("field", i, 0.5 + static_cast<double>(i), 0.5));
+  const auto fail = [&](std::size_t i, const char* reason, double tre_mm) {
+    rows[i].stop_reason = reason;
+    rows[i].tre_mm = tre_mm;
+  };
+  fail(9, "pinned-at-limit", 4.0);
+  fail(8, "start-inadmissible", std::nan(""));
+  fail(7, "evaluation-budget-spent", 12.0);
+  fail(6, "error", std::nan(""));
+  fail(5, "step-below-final", 10.0);
+  const json result = renderer_statistics(rows, "field", {4, 2.0});
+  EXPECT_EQ(result["starts"], 10);
+  EXPECT_EQ(result["failures_by_reason"],
+            json({{"left range", 2}, {"budget", 1}, {"numerics", 1}, {"other optimum", 1}}));
+  // 10.0 and 12.0 mm and the two without a pose.
+  EXPECT_EQ(result["gross_failures"]["successes"], 4);
+  EXPECT_EQ(result["gross_failures"]["starts"], 10);
+  // Ten values, the last two infinite: 0.5 x 5, 4, 10, 12, inf, inf.
+  EXPECT_EQ(result["tre_of_all_mm"]["median"], (0.5 + 4.0) / 2);
+  EXPECT_EQ(result["tre_of_all_mm"]["q3"], 10.0 + 0.75 * 2.0);
+  EXPECT_EQ(result["tre_of_all_mm"]["p95"], "inf");
+  EXPECT_EQ(result["capture_range"]["initial_tre_mm"], 4.5);
+  EXPECT_EQ(result["capture_range"]["starts"], 5);
+  EXPECT_EQ(result["capture_range"]["is_whole_study"], false);
+  // 8.5 and 9.5 mm.
+  EXPECT_EQ(result["starts_beyond_last_interval"], 2);
+}
+
+TEST(RegistrationStatistics, OfOtherErrorsKeepEveryFailureToo) {
+  Rows rows = {row("field", 0, 1, 0.1), row("field", 1, 1, 9.0), row("field", 2, 1, std::nan(""))};
+  rows[0].errors.mrpd_mm = 0.5;
+  rows[1].errors.mrpd_mm = 4.0;
+  const json result = renderer_statistics(rows, "field", {8, 2.0});
+  EXPECT_EQ(result["errors_of_successes"]["mrpd_mm"]["count"], 1);
+  EXPECT_EQ(result["errors_of_successes"]["mrpd_mm"]["mean"], 0.5);
+  EXPECT_EQ(result["errors_of_all"]["mrpd_mm"]["count"], 3);
+  EXPECT_EQ(result["errors_of_all"]["mrpd_mm"]["median"], 4.0);
+  EXPECT_EQ(result["errors_of_all"]["mrpd_mm"]["max"], "inf");
+}
+
+TEST(RegistrationStatistics, BiasIsTheMeanSignedErrorOfSuccesses) {
+  Rows rows = {row("field", 0, 1, 0.1), row("field", 1, 1, 0.2), row("field", 2, 1, 9.0)};
+  rows[0].final_deg_mm = {0.1, 0, 0, -1.0, 0, 0};
+  rows[1].final_deg_mm = {0.3, 0, 0, 2.0, 0, 0};
+  rows[2].final_deg_mm = {50, 50, 50, 50, 50, 50};
+  const json bias = renderer_statistics(rows, "field", {8, 2.0})["bias"];
+  EXPECT_DOUBLE_EQ(bias["rx_deg"]["mean"].get<double>(), 0.2);
+  EXPECT_DOUBLE_EQ(bias["tx_mm"]["mean"].get<double>(), 0.5);
+  EXPECT_DOUBLE_EQ(bias["tx_mm"]["sd"].get<double>(), std::sqrt(4.5));
+  EXPECT_DOUBLE_EQ(bias["tx_mm"]["standard_error"].get<double>(), 1.5);
+  EXPECT_EQ(bias["tz_mm"]["mean"], 0.0);
+}
+
+TEST(RegistrationStatistics, IntervalsOverCasesNeedSeveral) {
+  Rows rows = {row("field", 0, 1, 0.2, "a"), row("field", 1, 1, 9.0, "a")};
+  EXPECT_TRUE(renderer_statistics(rows, "field", {})["over_cases"]["rate"]["low"].is_null());
+  rows.push_back(row("field", 0, 1, 0.4, "b"));
+  const json over = renderer_statistics(rows, "field", {})["over_cases"];
+  // Drawn are a and a, a and b, or b and b: rates 1/2, 2/3, 1; mean TRE 0.2, 0.3, 0.4.
+  EXPECT_EQ(over["rate"]["low"], 0.5);
+  EXPECT_EQ(over["rate"]["high"], 1.0);
+  EXPECT_EQ(over["rate"]["cases"], 2);
+  EXPECT_EQ(over["rate"]["is_optimistic"], true);
+  EXPECT_DOUBLE_EQ(over["mean_tre_of_successes_mm"]["low"].get<double>(), 0.2);
+  EXPECT_DOUBLE_EQ(over["mean_tre_of_successes_mm"]["high"].get<double>(), 0.4);
+  // Student's quantile of one degree of freedom is tan(0.475 pi) = 12.7062: 0.3 +- 12.7062 * 0.1 of
+  // the TRE; a rate of 0.75 +- 12.7062 * 0.25 ends at 0 and 1.
+  EXPECT_NEAR(over["mean_tre_of_successes_mm"]["student_high"].get<double>(), 1.57062, 1e-5);
+  EXPECT_EQ(over["rate"]["student_low"], 0.0);
+  EXPECT_EQ(over["rate"]["student_high"], 1.0);
+}
+
+TEST(RegistrationStatistics, OfNoRowsHaveNoRateInsteadOfAWrongOne) {
+  const json result = renderer_statistics({}, "field", {});
+  EXPECT_EQ(result["starts"], 0);
+  EXPECT_TRUE(result["rate"].is_null());
+  EXPECT_EQ(result["wilson_low"], 0.0);
+  EXPECT_EQ(result["wilson_high"], 1.0);
+  EXPECT_TRUE(result["capture_range"].is_null());
+  EXPECT_TRUE(result["tre_of_all_mm"]["median"].is_null());
+  EXPECT_TRUE(result["over_cases"]["rate"]["low"].is_null());
+}
+
+TEST(RegistrationStatistics, OfCasesThatAllSucceedHaveNoSpreadOverCases) {
+  const Rows rows = {row("field", 0, 1, 0.2, "a"), row("field", 0, 1, 0.2, "b")};
+  const json rate = renderer_statistics(rows, "field", {})["over_cases"]["rate"];
+  EXPECT_EQ(rate["low"], 1.0);
+  EXPECT_TRUE(rate["student_low"].is_null());
+}
+
+TEST(Warnings, AreGivenWhereCasesAreTooFew) {
+  EXPECT_THAT(warnings_about_cases(1), testing::ElementsAre(testing::HasSubstr("one case")));
+  EXPECT_THAT(warnings_about_cases(4), testing::ElementsAre(testing::HasSubstr("4 cases: ")));
+  EXPECT_THAT(warnings_about_cases(30), testing::IsEmpty());
+}
+
+TEST(RowProblems, NameDuplicatesAndRowsThatContradictThemselves) {
+  RegistrationRow good = row("field", 0, 1, 0.2);
+  good.final_deg_mm = {};
+  RegistrationRow twice = good;
+  RegistrationRow without_parameters = row("field", 1, 1, 0.2);
+  RegistrationRow without_initial = row("field", 2, std::nan(""), std::nan(""));
+  EXPECT_THAT(row_problems(Rows{good}), testing::IsEmpty());
+  EXPECT_THAT(
+      row_problems(Rows{good, twice, without_parameters, without_initial}),
+      testing::ElementsAre("skull, field, start 0: occurs more than once",
+                           "skull, field, start 1: final pose and TRE do not belong together",
+                           "skull, field, start 2: has no initial TRE"));
+}
+
+TEST(PairedStatistics, TakeOnlyStartsThatBothWereGiven) {
+  const Rows rows = {row("field", 0, 0.5, 0.2),
+                     row("field", 1, 1.5, 0.6),
+                     row("field", 2, 2.5, 0.4),
+                     row("field", 3, 2.5, 9.0),
+                     row("raycast", 0, 0.5, 0.3),
+                     row("raycast", 1, 1.5, 0.6),
+                     row("raycast", 3, 2.5, 0.1)};
+  const json result = paired_statistics(rows, 0.5);
+  EXPECT_EQ(result["common_starts"], 3);
+  EXPECT_EQ(result["successes"], json({2, 3}));
+  // Start 3 alone is discordant: both of the two ways are equally probable.
+  EXPECT_EQ(result["mcnemar_p"], 1.0);
+  EXPECT_EQ(result["median_seconds"], json({0.2, 40.0}));
+  EXPECT_EQ(result["pairs"], 2);
+  const json& test = result["test"];
+  EXPECT_NEAR(test["mean_difference_mm"].get<double>(), -0.05, 1e-15);
+  // Differences -0.1 and 0: one that is not zero cannot be significant.
+  EXPECT_EQ(test["signed_rank_p"], 1.0);
+  EXPECT_EQ(test["margin_mm"], 0.5);
+  EXPECT_GT(test["equivalence_power"].get<double>(), 0.0);
+  // One case says nothing about others.
+  EXPECT_TRUE(result["mean_difference_over_cases_mm"]["low"].is_null());
+}
+
+TEST(PairedStatistics, OverCasesResampleCases) {
+  const Rows rows = {row("field", 0, 1, 0.5, "a"),
+                     row("raycast", 0, 1, 0.25, "a"),
+                     row("field", 0, 1, 0.5, "b"),
+                     row("raycast", 0, 1, 0.75, "b")};
+  const json over = paired_statistics(rows, 0.5)["mean_difference_over_cases_mm"];
+  EXPECT_EQ(over["low"], -0.25);
+  EXPECT_EQ(over["high"], 0.25);
+  EXPECT_NEAR(over["student_high"].get<double>(), 12.7062 * 0.25, 1e-4);
+}
+
+TEST(PairedStatistics, TieInEveryPairAtOnceIsEquivalenceWithoutSpread) {
+  Rows rows;
+  for (std::int64_t i = 0; i < 3; ++i) {
+    rows.push_back(row("field", i, 1, 0.5));
+    rows.push_back(row("raycast", i, 1, 0.5));
+  }
+  const json test = paired_statistics(rows, 0.1)["test"];
+  EXPECT_EQ(test["t_test_p"], 1.0);
+  EXPECT_EQ(test["signed_rank_p"], 1.0);
+  EXPECT_EQ(test["equivalence_p"], 0.0);
+}
+
+TEST(PairedStatistics, DoNotExistWithoutCommonStarts) {
+  EXPECT_TRUE(
+      paired_statistics(Rows{row("field", 0, 1, 1), row("raycast", 1, 1, 1)}, 0.5).is_null());
+  // The same start number of another patient is another start.
+  EXPECT_TRUE(paired_statistics(Rows{row("field", 0, 1, 1, "a"), row("raycast", 0, 1, 1, "b")}, 0.5)
+                  .is_null());
+  const json one = paired_statistics(Rows{row("field", 0, 1, 1), row("raycast", 0, 1, 1)}, 0.5);
+  EXPECT_EQ(one["pairs"], 1);
+  EXPECT_FALSE(one.contains("test"));
+}
+
+Yardstick yardstick_at_origin() {
+  Yardstick yardstick;
+  yardstick.stated_pose = RigidTransform(Eigen::Translation3d(0, 0, 1));
+  yardstick.points_ct_mm = {{0, 0, 0}, {10, 0, 0}};
+  yardstick.rig.cameras = {test::camera_along_z()};
+  return yardstick;
+}
+
+PerturbedStart start_beside(double distance_mm) {
+  PerturbedStart start;
+  start.draw_index = 42;
+  start.room_from_ct.translation().x() = distance_mm;
+  start.parameters.translation_mm.x() = distance_mm;
+  start.initial_tre_mm = distance_mm;
+  return start;
+}
+
+TEST(RegisteredRow, MeasuresTheEndAgainstBothPoses) {
+  const RegistrationRow found = registered_row(
+      [](const RigidTransform& start) {
+        registration::RegistrationResult result;
+        result.room_from_ct = start;
+        result.room_from_ct.translation() = Eigen::Vector3d(0, 0, 0.25);
+        result.similarity = 1.5;
+        return result;
+      },
+      start_beside(4.0),
+      yardstick_at_origin());
+  EXPECT_EQ(found.draw_index, 42u);
+  EXPECT_EQ(found.initial_tre_mm, 4.0);
+  EXPECT_EQ(found.start_deg_mm[3], 4.0);
+  EXPECT_EQ(found.tre_mm, 0.25);
+  EXPECT_EQ(found.stated_pose_tre_mm, 0.75);
+  EXPECT_EQ(found.final_deg_mm[5], 0.25);
+  EXPECT_EQ(found.errors.translation_mm, 0.25);
+  EXPECT_EQ(found.errors.rotation_deg, 0.0);
+}
+
+TEST(RegisteredRow, OfARegistrationThatThrowsIsAFailure) {
+  const RegistrationRow found = registered_row(
+      [](const RigidTransform&) -> registration::RegistrationResult {
+        throw NumericError("the histogram is empty");
+      },
+      start_beside(1.0),
+      yardstick_at_origin());
+  EXPECT_EQ(found.stop_reason, "error");
+  EXPECT_EQ(found.error, "the histogram is empty");
+  EXPECT_TRUE(std::isnan(found.tre_mm));
+  EXPECT_EQ(registrations_table(Rows{found}).text(0, "success"), "0");
+}
+
+TEST(RegisteredRow, OfAStartThatNeverMovedIsAFailureHoweverCloseItWas) {
+  const RegistrationRow found = registered_row(
+      [](const RigidTransform& start) {
+        registration::RegistrationResult result;
+        result.room_from_ct = start;
+        result.similarity = std::nan("");
+        result.stop_reason = registration::StopReason::StartInadmissible;
+        return result;
+      },
+      start_beside(1.0),
+      yardstick_at_origin());
+  EXPECT_EQ(found.stop_reason, "start-inadmissible");
+  EXPECT_TRUE(std::isnan(found.tre_mm));
+}
+
+TEST(MethodComparison, OfAHandBuiltRunIsTheKnownOne) {
+  const test::ScratchFolder folder;
+  Rows rows = {row("field", 0, 1, 0.2),
+               row("field", 1, 7, 0.4),
+               row("field", 2, 8, 9.0),
+               row("field", 3, 29, std::nan("")),
+               row("field", 4, 31, 0.3)};
+  rows[0].final_deg_mm = {0.3, 0, 0, 0, 1, 0};
+  rows[1].final_deg_mm = {0, 0.6, 0, 0, 2, 0};
+  rows[4].final_deg_mm = {0, 0, 0, 0, 3, 0};
+  for (RegistrationRow& each : rows) each.drr_count = 100 + each.start_index;
+  write_text_file(folder / "registrations.csv", registrations_table(rows).to_text());
+  EvaluationRun run{folder.path(), "registration", {}};
+  run.summary["method"] = {{"preset", "fast"}, {"similarity", "gc"}, {"optimizer", "gradient"}};
+  const std::vector<MethodRow> found = method_rows({run});
+  ASSERT_EQ(found.size(), 1u);
+  const MethodRow& method = found.front();
+  EXPECT_EQ(method.method, "fast gc gradient");
+  EXPECT_EQ(method.starts, 5);
+  EXPECT_EQ(method.bands[0].successes, 2);
+  EXPECT_EQ(method.bands[0].trials, 2);
+  EXPECT_EQ(method.bands[1].successes, 0);
+  EXPECT_EQ(method.bands[1].trials, 1);  // 8 mm belongs to the band that begins there
+  EXPECT_EQ(method.bands[2].trials, 1);  // 31 mm lies beyond all
+  EXPECT_DOUBLE_EQ(method.mean_tre_mm, 0.3);
+  EXPECT_DOUBLE_EQ(method.median_tre_mm, 0.3);
+  EXPECT_DOUBLE_EQ(method.translation_bias_mm, 2.0);
+  EXPECT_DOUBLE_EQ(method.rotation_bias_deg, std::hypot(0.1, 0.2));
+  EXPECT_EQ(method.median_drr_count, 102.0);
+  EXPECT_EQ(method.median_seconds, 0.2);
+  const std::string text = methods_markdown(found);
+  // Wilson's interval of 2 of 2 begins at 2 / (2 + 1.96^2) = 34 %, that of 0 of 1 ends at 79 %.
+  EXPECT_THAT(text,
+              testing::HasSubstr("| 100 [34, 100] / 0 [0, 79] / 0 [0, 79] | 2 / 1 / 1 | 0.300, "
+                                 "0.300 | 0.224, 2.000 | 102 |"));
+  EXPECT_EQ(methods_table(found).text(0, "successes_0_8_mm"), "2");
+}
+
+TEST(MethodComparison, OfARunWithoutSuccessHasNoErrors) {
+  const test::ScratchFolder folder;
+  write_text_file(folder / "registrations.csv",
+                  registrations_table(Rows{row("field", 0, 1, 5.0)}).to_text());
+  const MethodRow method =
+      method_rows({EvaluationRun{folder.path(), "registration", json::object()}}).front();
+  EXPECT_TRUE(std::isnan(method.mean_tre_mm));
+  EXPECT_THAT(methods_markdown({method}), testing::HasSubstr("| -, - | -, - |"));
+}
+
+TEST(MethodComparison, ScreenHasALinePerMeasureAndAColumnPerOptimizer) {
+  MethodRow a;
+  a.case_name = "skull";
+  a.renderer = "field";
+  a.preset = "paper";
+  a.similarity = "mi";
+  a.optimizer = "bobyqa";
+  a.bands = {{0, 8, 4, 4, {}}, {8, 16, 4, 1, {}}, {16, 30, 0, 0, {}}};
+  a.median_tre_mm = 0.25;
+  MethodRow b = a;
+  b.similarity = "ncc";
+  b.optimizer = "nelder-mead";
+  EXPECT_EQ(screen_markdown({a, b}),
+            "| Case | Renderer | Preset | Measure | bobyqa | nelder-mead |\n"
+            "|---|---|---|---|---|---|\n"
+            "| skull | field | paper | mi | 100 / 25, 0.250 |  |\n"
+            "| skull | field | paper | ncc |  | 100 / 25, 0.250 |\n");
+}
+
+TEST(MethodComparison, StudiesHaveALineEachAndAColumnPerMethod) {
+  MethodRow a;
+  a.run = "skull-clean-paper";
+  a.renderer = "field";
+  a.preset = "paper";
+  a.bands = {{0, 8, 4, 4, {}}, {8, 16, 4, 1, {}}, {16, 30, 0, 0, {}}};
+  a.median_tre_mm = 0.25;
+  a.median_seconds = 0.0625;
+  EXPECT_EQ(studies_markdown({a}), "");
+  MethodRow b = a;
+  b.run = "skull-heel-paper-mi-bobyqa";
+  MethodRow other_program = a;
+  other_program.run = "skull-clean-theirs";
+  EXPECT_EQ(studies_markdown({a, b, other_program}),
+            "| Study | Renderer | paper | paper-mi-bobyqa |\n"
+            "|---|---|---|---|\n"
+            "| skull-clean | field | 100 / 25 / -, 0.250, 62.5 |  |\n"
+            "| skull-heel | field |  | 100 / 25 / -, 0.250, 62.5 |\n");
+}
+
+TEST(MethodComparison, PairsTellTheTestOfTheSummary) {
+  Rows rows;
+  for (const auto& [field_mm, raycast_mm] :
+       std::vector<std::pair<double, double>>{{0.2, 0.1}, {0.4, 0.3}, {0.3, 5.0}}) {
+    const auto start = static_cast<std::int64_t>(rows.size() / 2);
+    rows.push_back(row("field", start, 1, field_mm));
+    rows.push_back(row("raycast", start, 1, raycast_mm));
+  }
+  EvaluationRun run{"runs/skull-fast", "registration", {}};
+  run.summary["field_against_raycast"] = paired_statistics(rows, 0.5);
+  // Equal differences of 0.1 mm have no spread; one success of three differs.
+  EXPECT_THAT(pairs_markdown({run}),
+              testing::HasSubstr("| skull-fast | 3 | 3, 2 | 1.00 | 2 | 0.100 [0.100, 0.100] | "
+                                 "< 0.0001 at 0.50 mm | 1.00 |"));
+  run.summary["field_against_raycast"] = nullptr;
+  EXPECT_EQ(pairs_markdown({run}), "");
+}
+
+std::vector<DrrComparison> comparisons(const std::vector<double>& psnr_db) {
+  std::vector<DrrComparison> result;
+  for (const double value : psnr_db) {
+    DrrComparison comparison;
+    comparison.psnr_db = value;
+    comparison.redrawn = 1;
+    result.push_back(comparison);
+  }
+  return result;
+}
+
+TEST(ImageQualityStatistics, OfHandBuiltComparisonsAreTheKnownOnes) {
+  const json result = image_quality_statistics(comparisons({35.0, 40.0, 41.0, 42.0, std::nan("")}));
+  EXPECT_EQ(result["poses"], 5);
+  EXPECT_EQ(result["compared"], 4);
+  EXPECT_EQ(result["outside_or_empty"], 1);
+  EXPECT_EQ(result["redrawn"], 5);
+  EXPECT_EQ(result["psnr_db"]["median"], 40.5);
+  EXPECT_EQ(result["psnr_db"]["min"], 35.0);
+  EXPECT_EQ(result["share_above_40_db"], 0.5);  // 40 itself is not above
+  EXPECT_EQ(result["share_below_36_db"], 0.25);
+}
+
+TEST(ImageQualityStatistics, FindTheWorstAndTheMedianPair) {
+  const auto found = comparisons({43.0, std::nan(""), 35.0, 41.0});
+  EXPECT_EQ(comparison_at(found, 0.0), 2u);
+  EXPECT_EQ(comparison_at(found, 0.5), 3u);
+  EXPECT_EQ(comparison_at(comparisons({std::nan("")}), 0.0), std::nullopt);
+}
+
+TEST(ImageQualityRows, TravelWithEveryBit) {
+  DrrComparison sent;
+  sent.parameters = PoseParameters::from_deg_and_mm({1, 2, 3, 4, 5, 1.0 / 3});
+  sent.psnr_db = std::numeric_limits<double>::infinity();
+  sent.rays_outside = 12;
+  const DrrComparison received = comparison_of(through_cbor(comparison_row(sent)));
+  EXPECT_EQ(received.parameters.rotation_rad, sent.parameters.rotation_rad);
+  EXPECT_EQ(received.parameters.translation_mm, sent.parameters.translation_mm);
+  EXPECT_TRUE(std::isinf(received.psnr_db));
+  EXPECT_TRUE(std::isnan(received.reference_maximum));
+  EXPECT_EQ(received.rays_outside, 12);
+}
+
+}  // namespace
+}  // namespace af::evaluation

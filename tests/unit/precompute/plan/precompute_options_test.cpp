@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "precompute/plan/precompute_options.h"
+
+#include <gtest/gtest.h>
+
+namespace af {
+namespace {
+
+TEST(PrecomputeOptions, TrainsOn64TilesPerCodewordUnlessAShareIsStated) {
+  PrecomputeOptions options;
+  options.codewords = 1000;
+  EXPECT_EQ(options.training_selection().max_training_tiles, 64000u);
+  EXPECT_EQ(options.training_selection().fraction, kLargestTrainingFraction);
+  options.training_fraction = 0.1;
+  EXPECT_EQ(options.training_selection().max_training_tiles, 2000000u);
+  EXPECT_EQ(options.training_selection().fraction, 0.1);
+}
+
+TEST(PrecomputeOptions, TrainOnNoMoreTilesThanTheCap) {
+  PrecomputeOptions options;
+  options.codewords = 65536;
+  EXPECT_EQ(options.training_selection().max_training_tiles, kTrainingTilesUnlessStated);
+  options.max_training_tiles = 5;
+  EXPECT_EQ(options.training_selection().max_training_tiles, 5u);
+}
+
+TEST(PrecomputeOptions, FieldsRecordWhichRuleChoseTheTrainingTiles) {
+  PrecomputeOptions options;
+  EXPECT_NE(to_toml(options).find("training_tiles_per_codeword = 64"), std::string::npos);
+  options.training_fraction = 0.25;
+  EXPECT_NE(to_toml(options).find("training_fraction = 0.25"), std::string::npos);
+  EXPECT_EQ(to_toml(options).find("per_codeword"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace af

@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "register/method/method_options.h"
+
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+#include "register/method/chain_text.h"
+#include "register/method/presets.h"
+
+namespace af::registration {
+namespace {
+
+TEST(MethodOptions, ReplaceWhatThePresetSays) {
+  MethodOptions options;
+  options.similarity = "ncc";
+  options.smoothing_sigma_mm = 2.5;
+  options.max_evaluations = 77;
+  options.seed = 9;
+  const RegistrationOptions method = resolve(options);
+  ASSERT_EQ(method.chains.size(), 1U);
+  const std::vector<StageOptions>& stages = method.chains[0].stages;
+  EXPECT_EQ(stages[0].similarity.name, "ncc");
+  EXPECT_EQ(stages[1].similarity.name, "ncc");
+  EXPECT_EQ(stages[0].smoothing_sigma_mm, 2.5);
+  EXPECT_EQ(stages[1].smoothing_sigma_mm, 0.0);
+  EXPECT_EQ(stages[0].optimizer, "best-neighbor");
+  EXPECT_EQ(method.max_evaluations, 77);
+  EXPECT_EQ(method.seed, 9U);
+  options.bins = 1;
+  EXPECT_THROW(resolve(options), InputError);
+}
+
+TEST(MethodOptions, TakeTheRobustPresetUnlessAMeasureOrAnOptimizerIsChosen) {
+  MethodOptions options;
+  EXPECT_EQ(options.preset_name(), "robust");
+  EXPECT_EQ(resolve(options).chains.size(), preset_options("robust").chains.size());
+  options.similarity = "mi";
+  EXPECT_EQ(options.preset_name(), "paper");
+  options.similarity.reset();
+  options.optimizer = "bobyqa";
+  EXPECT_EQ(options.preset_name(), "paper");
+  options.preset = "fast";
+  EXPECT_EQ(options.preset_name(), "fast");
+}
+
+TEST(MethodOptions, ChainsLeaveThePresetsFinishBehindUnlessOneIsTyped) {
+  MethodOptions options;
+  options.preset = "robust";
+  options.judge = "rg gauss-newton level=1 pixels=3";
+  EXPECT_FALSE(resolve(options).finish.stages.empty());
+  options.chains = {"ncc gauss-newton", "gc gauss-newton"};
+  EXPECT_TRUE(resolve(options).finish.stages.empty());
+  options.finish = "ssd gauss-newton; rg gauss-newton";
+  const RegistrationOptions method = resolve(options);
+  ASSERT_EQ(method.finish.stages.size(), 2U);
+  EXPECT_EQ(method.similarity_list(), "ncc, gc, ssd, rg");
+  EXPECT_EQ(method.judge.stage.pixel_step, 3);
+  const std::string text = to_toml(options, method);
+  EXPECT_NE(text.find("finish = \"" + *options.finish + "\""), std::string::npos) << text;
+  options.judge = "mi best-neighbor";
+  EXPECT_THROW(resolve(options), InputError);
+  options.judge = "rg gauss-newton; rg gauss-newton";
+  EXPECT_THROW(resolve(options), InputError);
+}
+
+TEST(MethodOptions, RefuseAnUnknownPreset) {
+  MethodOptions options;
+  options.preset = "unheard-of";
+  EXPECT_THROW(resolve(options), InputError);
+}
+
+TEST(MethodOptions, RefuseAFiducialMaskOfNoSize) {
+  for (const double radius_mm : {-1.0, 51.0, std::numeric_limits<double>::quiet_NaN()}) {
+    MethodOptions options;
+    options.fiducial_mask_mm = radius_mm;
+    EXPECT_THROW(resolve(options), InputError) << radius_mm;
+  }
+}
+
+TEST(MethodOptions, ThatDifferInAnyDigitHaveOtherTexts) {
+  MethodOptions options;
+  options.fiducial_mask_mm = 4.0000001;
+  const std::string one = to_toml(options, resolve(options));
+  options.fiducial_mask_mm = 4.0000002;
+  EXPECT_NE(to_toml(options, resolve(options)), one);
+  EXPECT_NE(one.find("fiducial_mask_mm = 4.0000001\n"), std::string::npos) << one;
+}
+
+TEST(MethodOptions, ScaleOnlyTheRegionsOfCoarseStages) {
+  MethodOptions options;
+  options.preset = "fast";
+  options.coarse_roi_scale = 1.5;
+  const RegistrationOptions plain = preset_options("fast");
+  const RegistrationOptions method = resolve(options);
+  for (std::size_t i = 0; i < plain.chains[0].stages.size(); ++i) {
+    const double before = plain.chains[0].stages[i].roi_scale;
+    EXPECT_EQ(method.chains[0].stages[i].roi_scale, before > 1.0 ? 1.5 : before);
+  }
+}
+
+TEST(MethodOptions, ChainsTakeThePlaceOfThePresets) {
+  MethodOptions options;
+  options.preset = "fast";
+  options.chains = {"ssd cma-es population=9 step=7", "mi bobyqa; ncc gradient level=1 pixels=2"};
+  const RegistrationOptions method = resolve(options);
+  ASSERT_EQ(method.chains.size(), 2U);
+  EXPECT_EQ(method.chains[0].stages[0].search.population, 9);
+  EXPECT_EQ(method.chains[0].stages[0].search.initial_step_mm, 7.0);
+  EXPECT_EQ(method.chains[1].stages[1].level, 1);
+}
+
+TEST(ChainText, ReadsWhatItWrites) {
+  for (const std::string& name : preset_names())
+    for (const ChainOptions& chain : preset_options(name).chains) {
+      const std::string text = chain_text(chain);
+      const ChainOptions read = chain_from_text(chain.name, text);
+      EXPECT_EQ(chain_text(read), text);
+      EXPECT_EQ(read.stages.size(), chain.stages.size());
+    }
+}
+
+TEST(ChainText, RefusesWhatItDoesNotKnow) {
+  for (const char* text :
+       {"", "mi", "mi bobyqa levle=1", "mi bobyqa level=x", "mi bobyqa level", "mi bobyqa;;"})
+    EXPECT_THROW(
+        {
+          const ChainOptions chain = chain_from_text("c", text);
+          if (chain.stages.empty()) throw InputError("no stage");
+        },
+        InputError)
+        << text;
+}
+
+}  // namespace
+}  // namespace af::registration

@@ -1,0 +1,447 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "register/method/registration.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <thread>
+
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+#include "register/problem/pose_target.h"
+#include "unit/register/method/registration_cases.h"
+
+namespace af::registration {
+namespace {
+
+/// Mean distance in space between two poses over the phantom's inner lattice.
+double mean_distance_mm(const RigidTransform& a, const RigidTransform& b) {
+  const std::vector<Eigen::Vector3d> points =
+      ct_lattice_points(CtBox{{-20, -20, -20}, {20, 20, 20}}, 4);
+  double sum = 0.0;
+  for (const Eigen::Vector3d& point : points) sum += (a * point - b * point).norm();
+  return sum / static_cast<double>(points.size());
+}
+
+/// The search ends within about one final step (0.1 mm of mean projected motion) of the optimum in
+/// each of its six parameters, and half of them at random signs: sqrt(6) steps, doubled because a
+/// step is a mean over two views and a motion along one view's beam shows in the other only.
+constexpr double kFinalStepErrorMm = 2.0 * 2.45 * 0.1;
+
+RigidTransform start_near(const test::SmallCase& small) {
+  const PoseFrame about_gold =
+      PoseFrame::about(small.gold_room_from_ct, small.problem->center_ct_mm);
+  return pose_from_parameters(about_gold,
+                              PoseParameters::from_deg_and_mm({-3.0, 2.0, 2.5, -3.0, 2.5, 2.0}));
+}
+
+void use_bins(int bins, RegistrationOptions& options) {
+  for (ChainOptions& chain : options.chains)
+    for (StageOptions& stage : chain.stages) stage.similarity.bins = bins;
+}
+
+TEST(Registration, TwoViewsRecoverAKnownPose) {
+  const test::SmallCase small = test::small_case();
+  for (const char* similarity : {"mi", "ncc"}) {
+    RegistrationOptions options;
+    options.use_similarity(similarity);
+    // 1296 pixels per view are few for 64 x 64 bins.
+    use_bins(24, options);
+    RegistrationRunner runner(small.problem, options);
+    const RigidTransform start = start_near(small);
+    ASSERT_GT(mean_distance_mm(start, small.gold_room_from_ct), 4.0);
+    const RegistrationResult result = runner.run(start);
+    EXPECT_EQ(result.stop_reason, StopReason::StepBelowFinal);
+    EXPECT_LT(mean_distance_mm(result.room_from_ct, small.gold_room_from_ct), kFinalStepErrorMm)
+        << similarity;
+    EXPECT_EQ(result.drr_count, 2 * result.evaluations);
+    EXPECT_EQ(result.start_room_from_ct.matrix(), start.matrix());
+    EXPECT_EQ(result.similarity, runner.similarity_at(result.room_from_ct).similarity);
+  }
+}
+
+TEST(Registration, TheTraceTellsBothPasses) {
+  const test::SmallCase small = test::small_case();
+  RegistrationRunner runner(small.problem, RegistrationOptions());
+  const RegistrationResult result = runner.run(start_near(small));
+  ASSERT_FALSE(result.trace.empty());
+  EXPECT_EQ(result.trace.front().pass, 0);
+  EXPECT_EQ(result.trace.front().step_mm, 5.0);
+  EXPECT_EQ(result.trace.back().pass, 1);
+  EXPECT_EQ(result.trace.back().step_mm, 0.1);
+  EXPECT_EQ(result.trace.back().evaluations, result.evaluations);
+  const RigidTransform last =
+      pose_from_parameters(small.problem->frame(), result.trace.back().parameters);
+  EXPECT_NEAR(mean_distance_mm(last, result.room_from_ct), 0.0, 1e-9);
+  for (std::size_t i = 1; i < result.trace.size(); ++i) {
+    if (result.trace[i].pass != result.trace[i - 1].pass) continue;
+    EXPECT_GE(result.trace[i].similarity, result.trace[i - 1].similarity);
+  }
+}
+
+TEST(Registration, RepeatsAndThreadsGiveTheSameBits) {
+  const test::SmallCase small = test::small_case();
+  RegistrationOptions options;
+  options.max_evaluations = 200;
+  RegistrationRunner runner(small.problem, options);
+  const RegistrationResult first = runner.run(start_near(small));
+  EXPECT_EQ(first.stop_reason, StopReason::EvaluationBudgetSpent);
+  EXPECT_EQ(first.evaluations, 200);
+  (void)runner.run(small.gold_room_from_ct);
+  const RegistrationResult again = runner.run(start_near(small));
+  RegistrationResult in_thread;
+  RegistrationRunner other = runner.share_preparation();
+  std::thread thread([&] { in_thread = other.run(start_near(small)); });
+  (void)runner.run(small.gold_room_from_ct);
+  thread.join();
+  for (const RegistrationResult* const result :
+       std::initializer_list<const RegistrationResult*>{&again, &in_thread}) {
+    EXPECT_EQ(result->room_from_ct.matrix(), first.room_from_ct.matrix());
+    EXPECT_EQ(result->similarity, first.similarity);
+    EXPECT_EQ(result->trace.size(), first.trace.size());
+  }
+}
+
+TEST(Registration, AStartOutsideTheMotionRangeIsReported) {
+  const test::SmallCase small = test::small_case();
+  for (RegistrationView& view : small.problem->views)
+    view.limit = MotionLimit{small.problem->frame(), {3.0 * kRadPerDeg, 1.0}};
+  RegistrationRunner runner(small.problem, RegistrationOptions());
+  const RigidTransform start = start_near(small);
+  const RegistrationResult result = runner.run(start);
+  EXPECT_EQ(result.stop_reason, StopReason::StartInadmissible);
+  EXPECT_EQ(result.room_from_ct.matrix(), start.matrix());
+  EXPECT_TRUE(std::isnan(result.similarity));
+  EXPECT_EQ(result.evaluations, 1);
+  EXPECT_EQ(result.drr_count, 0);
+}
+
+TEST(Registration, AnEndAtTheLimitIsReportedAndStaysInside) {
+  const test::SmallCase small = test::small_case();
+  // The gold pose has |t| = 2.5 mm along x; the box ends at 1.5 mm.
+  const MotionLimit limit{small.problem->frame(), {5.0 * kRadPerDeg, 1.5}};
+  for (RegistrationView& view : small.problem->views) view.limit = limit;
+  RegistrationRunner runner(small.problem, RegistrationOptions());
+  const RegistrationResult result = runner.run(small.problem->nominal_room_from_ct);
+  EXPECT_EQ(result.stop_reason, StopReason::PinnedAtLimit);
+  EXPECT_GT(result.inadmissible, 0);
+  EXPECT_TRUE(limit.range.contains(parameters_from_pose(limit.frame, result.room_from_ct)));
+}
+
+TEST(Registration, ACtFarFromTheRegionsIsReported) {
+  const test::SmallCase small = test::small_case();
+  RegistrationRunner runner(small.problem, RegistrationOptions());
+  RigidTransform far_away = RigidTransform::Identity();
+  far_away.translation() = Eigen::Vector3d(0, 0, 400);
+  EXPECT_EQ(runner.run(far_away).stop_reason, StopReason::CtOutsideRoi);
+}
+
+TEST(Registration, AMaskedSpotDoesNotMoveTheResult) {
+  test::SmallCase small = test::small_case();
+  RegistrationOptions options;
+  use_bins(24, options);
+  for (RegistrationView& view : small.problem->views) {
+    view.mask = Image2d(48, 48);
+    std::fill(view.mask.pixels.begin(), view.mask.pixels.end(), 1.0f);
+    // A marker that the CT does not have. The smoothed reference spreads it, hence the margin.
+    for (int row = 20; row < 24; ++row)
+      for (int column = 26; column < 30; ++column) view.xray.at(column, row) += 4.0f;
+    for (int row = 17; row < 27; ++row)
+      for (int column = 23; column < 33; ++column) view.mask.at(column, row) = 0.0f;
+  }
+  RegistrationRunner runner(small.problem, options);
+  const RegistrationResult result = runner.run(start_near(small));
+  EXPECT_LT(mean_distance_mm(result.room_from_ct, small.gold_room_from_ct), kFinalStepErrorMm);
+}
+
+TEST(RegistrationProblem, NamesEverythingThatIsWrong) {
+  const test::SmallCase small = test::small_case();
+  small.problem->views[0].xray = Image2d(3, 4);
+  small.problem->views[1].view.roi.column = 40;
+  small.problem->views[1].mask = Image2d(2, 2);
+  small.problem->scaling_points_ct.clear();
+  try {
+    const RegistrationRunner runner(small.problem, RegistrationOptions());
+    FAIL() << "must throw";
+  } catch (const InputError& error) {
+    const std::string message = error.what();
+    for (const char* part : {"view 'AP': X-ray size = 3 x 4: must be the camera's 48 x 48",
+                             "view 'LAT': mask size = 2 x 2",
+                             "scaling_points_ct"})
+      EXPECT_NE(message.find(part), std::string::npos) << part << "\nin " << message;
+    EXPECT_NE(message.find("roi"), std::string::npos) << message;
+  }
+}
+
+TEST(RegistrationOptions, NamesEverythingThatIsWrong) {
+  RegistrationOptions options;
+  StageOptions& first = options.chains[0].stages[0];
+  StageOptions& second = options.chains[0].stages[1];
+  first.similarity.name = "unheard-of";
+  first.smoothing_sigma_mm = std::numeric_limits<double>::quiet_NaN();
+  first.level = -1;
+  second.optimizer = "unheard-of";
+  second.search.final_step_mm = 0.0;
+  options.max_evaluations = 0;
+  EXPECT_EQ(problems(options).size(), 6U);
+  for (const std::string& name : preset_names())
+    EXPECT_TRUE(problems(preset_options(name)).empty()) << name;
+  EXPECT_THROW(preset_options("unheard-of"), InputError);
+}
+
+TEST(RegistrationOptions, RefuseAnOptimizerThatItsMeasureCannotServe) {
+  RegistrationOptions options;
+  options.use_optimizer("gauss-newton");
+  options.use_similarity("mi");
+  EXPECT_EQ(problems(options).size(), 2U);
+  options.use_similarity("ncc");
+  EXPECT_TRUE(problems(options).empty());
+  options.use_optimizer("gradient");
+  options.use_similarity("pi");
+  EXPECT_EQ(problems(options).size(), 2U);
+  options.use_similarity("mi");
+  EXPECT_TRUE(problems(options).empty());
+}
+
+/// Two stages of one measure and optimiser that suit the small case.
+RegistrationOptions two_stages(const std::string& similarity, const std::string& optimizer) {
+  RegistrationOptions options;
+  options.use_similarity(similarity);
+  options.use_optimizer(optimizer);
+  use_bins(24, options);
+  for (StageOptions& stage : options.chains[0].stages) stage.smoothing_sigma_mm = 0.0;
+  options.chains[0].stages[0].search.initial_step_mm = 3.0;
+  return options;
+}
+
+TEST(Registration, EveryOptimizerRecoversAKnownPose) {
+  const test::SmallCase small = test::small_case();
+  const std::vector<std::pair<std::string, std::string>> methods = {{"gauss-newton", "ncc"},
+                                                                    {"gauss-newton", "gc"},
+                                                                    {"gauss-newton", "rg"},
+                                                                    {"gauss-newton", "tncc"},
+                                                                    {"gauss-newton", "ssd"},
+                                                                    {"gradient", "mi"},
+                                                                    {"gradient", "ncc"},
+                                                                    {"bobyqa", "ncc"},
+                                                                    {"nelder-mead", "ncc"},
+                                                                    {"cma-es", "ncc"}};
+  for (const auto& [optimizer, similarity] : methods) {
+    RegistrationRunner runner(small.problem, two_stages(similarity, optimizer));
+    const RegistrationResult result = runner.run(start_near(small));
+    EXPECT_EQ(result.stop_reason, StopReason::StepBelowFinal) << optimizer << ' ' << similarity;
+    EXPECT_LT(mean_distance_mm(result.room_from_ct, small.gold_room_from_ct), kFinalStepErrorMm)
+        << optimizer << ' ' << similarity;
+    EXPECT_EQ(result.similarity, result.trace.back().similarity);
+  }
+}
+
+TEST(Registration, EveryMeasureIsBestNearTheKnownPose) {
+  const test::SmallCase small = test::small_case();
+  for (const std::string& similarity : similarity_names()) {
+    RegistrationOptions options = two_stages(similarity, "best-neighbor");
+    RegistrationRunner runner(small.problem, options);
+    const double at_gold = runner.similarity_at(small.gold_room_from_ct).similarity;
+    EXPECT_GT(at_gold, runner.similarity_at(start_near(small)).similarity) << similarity;
+    const RegistrationResult result = runner.run(start_near(small));
+    EXPECT_LT(mean_distance_mm(result.room_from_ct, small.gold_room_from_ct),
+              0.5 * mean_distance_mm(start_near(small), small.gold_room_from_ct))
+        << similarity;
+  }
+}
+
+TEST(Registration, DrawnSearchesDependOnSeedAndStartIndexAlone) {
+  const test::SmallCase small = test::small_case();
+  RegistrationOptions options = two_stages("ncc", "cma-es");
+  options.max_evaluations = 120;
+  RegistrationRunner runner(small.problem, options);
+  const RegistrationResult first = runner.run(start_near(small), 3);
+  (void)runner.run(start_near(small), 4);
+  EXPECT_EQ(runner.run(start_near(small), 3).room_from_ct.matrix(), first.room_from_ct.matrix());
+  EXPECT_NE(runner.run(start_near(small), 4).room_from_ct.matrix(), first.room_from_ct.matrix());
+  options.seed = 2;
+  RegistrationRunner other(small.problem, options);
+  EXPECT_NE(other.run(start_near(small), 3).room_from_ct.matrix(), first.room_from_ct.matrix());
+}
+
+TEST(Registration, APortfolioTakesTheChainThatItsJudgePrefers) {
+  const test::SmallCase small = test::small_case();
+  RegistrationOptions good = two_stages("ncc", "gauss-newton");
+  ChainOptions idle = good.chains[0];
+  idle.name = "idle";
+  // Steps so small that it ends where it began.
+  for (StageOptions& stage : idle.stages) stage.search = {1e-6, 1e-6, 16};
+  good.chains[0].name = "good";
+  RegistrationOptions options = good;
+  options.chains = {idle, good.chains[0], idle};
+  options.judge.stage = StageOptions();
+  options.judge.stage.similarity.name = "rg";
+  RegistrationRunner runner(small.problem, options);
+  const RegistrationResult result = runner.run(start_near(small));
+  EXPECT_EQ(result.chain, "good");
+  EXPECT_LT(mean_distance_mm(result.room_from_ct, small.gold_room_from_ct), kFinalStepErrorMm);
+  EXPECT_EQ(result.similarity, runner.similarity_at(result.room_from_ct).similarity);
+  // An end that explains nothing is said to.
+  options.judge.least_value = 2.0;
+  EXPECT_EQ(RegistrationRunner(small.problem, options).run(start_near(small)).stop_reason,
+            StopReason::NoBetterThanNoDrr);
+}
+
+TEST(Registration, APortfolioEndsAtTheFirstConvincingChain) {
+  const test::SmallCase small = test::small_case();
+  RegistrationOptions options = two_stages("ncc", "gauss-newton");
+  options.chains.push_back(options.chains[0]);
+  options.chains[0].name = "first";
+  options.chains[1].name = "second";
+  options.judge.stage = StageOptions();
+  options.judge.stage.similarity.name = "rg";
+  options.judge.enough_value = 2.0;  // never
+  RegistrationOptions one = options;
+  one.chains.pop_back();
+  const int alone = RegistrationRunner(small.problem, one).run(start_near(small)).evaluations;
+  RegistrationRunner all(small.problem, options);
+  const RegistrationResult both = all.run(start_near(small));
+  EXPECT_EQ(both.evaluations, 2 * alone);
+  // Just convincing, and just not: the value at the end itself is enough.
+  for (const bool is_convincing : {true, false}) {
+    options.judge.enough_value = both.similarity + (is_convincing ? 0.0 : 1e-9);
+    RegistrationRunner runner(small.problem, options);
+    const RegistrationResult result = runner.run(start_near(small));
+    EXPECT_EQ(result.evaluations, is_convincing ? alone : 2 * alone);
+    EXPECT_EQ(result.chain, "first");
+    EXPECT_EQ(result.room_from_ct.matrix(), both.room_from_ct.matrix());
+  }
+}
+
+/// Everything but the seconds.
+void expect_same(const RegistrationResult& a, const RegistrationResult& b) {
+  EXPECT_EQ(a.room_from_ct.matrix(), b.room_from_ct.matrix());
+  EXPECT_EQ(a.similarity, b.similarity);
+  EXPECT_EQ(a.evaluations, b.evaluations);
+  EXPECT_EQ(a.inadmissible, b.inadmissible);
+  EXPECT_EQ(a.drr_count, b.drr_count);
+  EXPECT_EQ(a.stop_reason, b.stop_reason);
+  ASSERT_EQ(a.trace.size(), b.trace.size());
+  for (std::size_t i = 0; i < a.trace.size(); ++i) {
+    EXPECT_EQ(a.trace[i].similarity, b.trace[i].similarity);
+    EXPECT_EQ(a.trace[i].evaluations, b.trace[i].evaluations);
+    EXPECT_EQ(a.trace[i].parameters.rotation_rad, b.trace[i].parameters.rotation_rad);
+    EXPECT_EQ(a.trace[i].parameters.translation_mm, b.trace[i].parameters.translation_mm);
+  }
+}
+
+TEST(Registration, AnyNumberOfThreadsGivesTheSameBits) {
+  const test::SmallCase small = test::small_case();
+  const std::vector<std::pair<std::string, std::string>> methods = {{"best-neighbor", "mi"},
+                                                                    {"cma-es", "ncc"},
+                                                                    {"gauss-newton", "rg"},
+                                                                    {"gradient", "ncc"},
+                                                                    {"nelder-mead", "gd"}};
+  for (const auto& [optimizer, similarity] : methods) {
+    SCOPED_TRACE(optimizer);
+    RegistrationOptions options = two_stages(similarity, optimizer);
+    options.max_evaluations = 60;
+    const RegistrationResult alone =
+        RegistrationRunner(small.problem, options).run(start_near(small));
+    for (const int threads : {2, 5}) {
+      RegistrationRunner runner(small.problem, options, std::make_shared<ThreadPool>(threads));
+      expect_same(runner.run(start_near(small)), alone);
+    }
+  }
+}
+
+TEST(Registration, ThreadsAgreeWhereTheMotionRangeEnds) {
+  const test::SmallCase small = test::small_case();
+  const MotionLimit limit{small.problem->frame(), {5.0 * kRadPerDeg, 4.2}};
+  for (RegistrationView& view : small.problem->views) view.limit = limit;
+  RegistrationOptions options = two_stages("ncc", "best-neighbor");
+  const RegistrationResult alone =
+      RegistrationRunner(small.problem, options).run(start_near(small));
+  EXPECT_GT(alone.inadmissible, 0);
+  RegistrationRunner runner(small.problem, options, std::make_shared<ThreadPool>(3));
+  expect_same(runner.run(start_near(small)), alone);
+}
+
+TEST(Registration, TheFinishFollowsTheBestEndOnly) {
+  const test::SmallCase small = test::small_case();
+  RegistrationOptions options = two_stages("ncc", "gauss-newton");
+  ChainOptions rough{"rough", {options.chains[0].stages[0]}};
+  rough.stages[0].search.final_step_mm = 1.0;
+  const ChainOptions finish{"finish", {options.chains[0].stages[1]}};
+  options.chains = {rough};
+  const int alone = RegistrationRunner(small.problem, options).run(start_near(small)).evaluations;
+  options.finish = finish;
+  const RegistrationResult chain =
+      RegistrationRunner(small.problem, options).run(start_near(small));
+  EXPECT_GT(chain.evaluations, alone);
+  EXPECT_LT(mean_distance_mm(chain.room_from_ct, small.gold_room_from_ct), kFinalStepErrorMm);
+  // A portfolio of the same chain twice pays for it twice, and once for the finish.
+  options.chains = {rough, rough};
+  options.judge.stage = StageOptions();
+  options.judge.stage.similarity.name = "rg";
+  options.judge.enough_value = 2.0;  // never
+  RegistrationRunner runner(small.problem, options);
+  const RegistrationResult portfolio = runner.run(start_near(small));
+  EXPECT_EQ(portfolio.evaluations, chain.evaluations + alone);
+  EXPECT_EQ(portfolio.room_from_ct.matrix(), chain.room_from_ct.matrix());
+  EXPECT_EQ(portfolio.similarity, runner.similarity_at(portfolio.room_from_ct).similarity);
+}
+
+TEST(Registration, AStageOfAMissingLevelIsRefused) {
+  const test::SmallCase small = test::small_case();
+  EXPECT_THROW(RegistrationRunner(small.problem, preset_options("fast")), InputError);
+}
+
+TEST(Registration, GaussNewtonStaysInsideTheMotionRange) {
+  const test::SmallCase small = test::small_case();
+  const MotionLimit limit{small.problem->frame(), {5.0 * kRadPerDeg, 1.5}};
+  for (RegistrationView& view : small.problem->views) view.limit = limit;
+  RegistrationRunner runner(small.problem, two_stages("ncc", "gauss-newton"));
+  const RegistrationResult result = runner.run(small.problem->nominal_room_from_ct);
+  const PoseParameters end = parameters_from_pose(limit.frame, result.room_from_ct);
+  EXPECT_TRUE(limit.range.contains(end));
+  // The gold pose is at 2.5 mm along x: the search goes to the wall and along it.
+  EXPECT_NEAR(end.translation_mm.x(), 1.5, 1e-3);
+}
+
+TEST(PoseTarget, DerivativesAreThoseOfItsValue) {
+  const test::SmallCase small = test::small_case();
+  for (const char* similarity : {"ncc", "gc", "rg", "ssd", "tncc"}) {
+    RegistrationRunner runner(small.problem, two_stages(similarity, "gauss-newton"));
+    const RegistrationProblem& problem = runner.problem();
+    std::vector<ObjectiveView> views;
+    for (const RegistrationView& view : problem.views) {
+      SimilarityReference reference{crop(view.xray, view.view.roi), {}, {0.0, 5.0}};
+      SimilarityOptions options;
+      options.name = similarity;
+      views.push_back(
+          {view.view, view.renderer, make_similarity(options, reference), std::nullopt});
+    }
+    MultiViewObjective objective(views);
+    ParameterScaling scaling;
+    scaling.displacement_mm << 40.0, 30.0, 20.0, 1.0, 0.8, 1.2;
+    PoseTarget target(
+        objective, PoseFrame::about(start_near(small), problem.center_ct_mm), scaling);
+    ScaledParameters point;
+    point << 1.0, -0.7, 0.5, 0.3, -0.2, 0.4;
+    const auto with = target.evaluate_with(point, Derivatives::NormalEquations);
+    ASSERT_TRUE(with.has_value());
+    for (int k = 0; k < 6; ++k) {
+      // The renderer's own derivatives are differences over 1e-3 rad and 0.1 mm.
+      const double step = 0.05;
+      ScaledParameters up = point;
+      ScaledParameters down = point;
+      up[k] += step;
+      down[k] -= step;
+      const double slope = (*target.evaluate(up) - *target.evaluate(down)) / (2.0 * step);
+      // Kinks of ray-cast DRRs and differences of second order: a few percent of the largest slope.
+      constexpr double kSlopeShare = 0.05;
+      EXPECT_NEAR(with->gradient[k], slope, kSlopeShare * with->gradient.cwiseAbs().maxCoeff())
+          << similarity << ' ' << k;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace af::registration

@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: Apache-2.0
+// What all optimisers must do, and what each is for.
+#include <cmath>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+#include "register/optimizer/optimizer.h"
+#include "unit/register/optimizer/function_target.h"
+
+namespace af::registration {
+namespace {
+
+constexpr double kFinalStepMm = 0.01;
+
+ScaledParameters quadratic_optimum() {
+  ScaledParameters point;
+  point << 3.1, -4.7, 0.33, 2.9, -0.06, 1.234;
+  return point;
+}
+
+/// Curvatures from 1 to `condition`, the axes not those of the parameters.
+ScaledMatrix curvature(double condition) {
+  ScaledMatrix matrix = ScaledMatrix::Zero();
+  for (int k = 0; k < 6; ++k) matrix(k, k) = std::pow(condition, k / 5.0);
+  ScaledParameters mirror;
+  mirror << 1, 2, -1, 0.5, 1, -0.3;
+  mirror.normalize();
+  const ScaledMatrix reflect = ScaledMatrix::Identity() - 2.0 * mirror * mirror.transpose();
+  return reflect * matrix * reflect;
+}
+
+/// -(p - optimum)' C (p - optimum) / 2, inadmissible where |p| > `limit`.
+test::FunctionTarget quadratic(double condition, double limit = 1e300) {
+  const ScaledMatrix matrix = curvature(condition);
+  const auto value = [=](const ScaledParameters& p) -> std::optional<double> {
+    if (p.norm() > limit) return std::nullopt;
+    return -0.5 * (p - quadratic_optimum()).dot(matrix * (p - quadratic_optimum()));
+  };
+  const auto equations = [=](const ScaledParameters& p) {
+    return TargetValue{0.0, matrix * (quadratic_optimum() - p), matrix};
+  };
+  return test::FunctionTarget(value, equations);
+}
+
+OptimizerResult search(const std::string& name,
+                       test::FunctionTarget& target,
+                       int max_evaluations = 20000,
+                       std::uint64_t key = 1) {
+  OptimizerResult result;
+  make_optimizer(name)->maximize(target, {2.0, kFinalStepMm, 16}, {max_evaluations, key}, result);
+  return result;
+}
+
+class EveryOptimizer : public testing::TestWithParam<std::string> {};
+
+TEST_P(EveryOptimizer, FindsAQuadraticsMaximum) {
+  test::FunctionTarget target = quadratic(4.0);
+  const OptimizerResult result = search(GetParam(), target);
+  EXPECT_EQ(result.stop_reason, StopReason::StepBelowFinal);
+  // Steps of the final length stand still within a few of them in each of six coupled parameters.
+  EXPECT_LT((result.point - quadratic_optimum()).norm(), 10.0 * kFinalStepMm);
+  EXPECT_EQ(result.value, *target.evaluate(result.point));
+  EXPECT_FALSE(result.trace.empty());
+}
+
+TEST_P(EveryOptimizer, CountsEveryEvaluationAndKeepsToTheBudget) {
+  test::FunctionTarget target = quadratic(4.0);
+  const OptimizerResult whole = search(GetParam(), target);
+  EXPECT_EQ(static_cast<std::size_t>(whole.evaluations), target.points.size());
+  const int budget = whole.evaluations - 2;
+  test::FunctionTarget again = quadratic(4.0);
+  const OptimizerResult cut = search(GetParam(), again, budget);
+  EXPECT_EQ(cut.stop_reason, StopReason::EvaluationBudgetSpent);
+  EXPECT_EQ(cut.evaluations, budget);
+  EXPECT_EQ(again.points.size(), static_cast<std::size_t>(budget));
+  EXPECT_GE(cut.value, -0.5 * quadratic_optimum().dot(curvature(4.0) * quadratic_optimum()));
+}
+
+TEST_P(EveryOptimizer, SaysThatTheStartIsInadmissible) {
+  test::FunctionTarget target = quadratic(4.0, -1.0);
+  const OptimizerResult result = search(GetParam(), target);
+  EXPECT_EQ(result.stop_reason, StopReason::StartInadmissible);
+  EXPECT_EQ(result.evaluations, 1);
+  EXPECT_EQ(result.inadmissible, 1);
+  EXPECT_TRUE(std::isnan(result.value));
+}
+
+TEST_P(EveryOptimizer, NeverEndsAtAnInadmissiblePoint) {
+  // The optimum has length 6.6: it lies outside.
+  constexpr double kLimit = 4.0;
+  test::FunctionTarget target = quadratic(4.0, kLimit);
+  const OptimizerResult result = search(GetParam(), target);
+  EXPECT_LE(result.point.norm(), kLimit);
+  EXPECT_GT(result.inadmissible, 0);
+  EXPECT_GT(result.value, *quadratic(4.0).evaluate(ScaledParameters::Zero()));
+}
+
+TEST_P(EveryOptimizer, StopsAtAValueThatIsNotFinite) {
+  const auto value = [](const ScaledParameters& p) -> std::optional<double> {
+    return p.norm() > 0.5 ? std::numeric_limits<double>::quiet_NaN() : p[0];
+  };
+  const auto equations = [](const ScaledParameters&) {
+    return TargetValue{0.0, ScaledParameters::Unit(0), ScaledMatrix::Identity()};
+  };
+  test::FunctionTarget target(value, equations);
+  const OptimizerResult result = search(GetParam(), target);
+  EXPECT_EQ(result.stop_reason, StopReason::NonFiniteSimilarity);
+  EXPECT_TRUE(std::isfinite(result.value));
+}
+
+TEST_P(EveryOptimizer, RepeatsItself) {
+  test::FunctionTarget first = quadratic(4.0);
+  test::FunctionTarget second = quadratic(4.0);
+  EXPECT_EQ(search(GetParam(), first).point, search(GetParam(), second).point);
+}
+
+INSTANTIATE_TEST_SUITE_P(All,
+                         EveryOptimizer,
+                         testing::ValuesIn(optimizer_names()),
+                         [](const auto& chosen) {
+                           std::string name = chosen.param;
+                           for (char& letter : name)
+                             if (letter == '-') letter = '_';
+                           return name;
+                         });
+
+TEST(GaussNewton, EndsAQuadraticInAFewSteps) {
+  test::FunctionTarget target = quadratic(1000.0);
+  const OptimizerResult result = search("gauss-newton", target);
+  // Four steps of 2 mm over 6.6 mm, and three that converge.
+  EXPECT_LE(result.evaluations, 10);
+  EXPECT_LT((result.point - quadratic_optimum()).norm(), kFinalStepMm);
+}
+
+TEST(GradientAscent, FindsAnIllConditionedMaximum) {
+  test::FunctionTarget target = quadratic(1000.0);
+  const OptimizerResult result = search("gradient", target);
+  EXPECT_LT((result.point - quadratic_optimum()).norm(), 10.0 * kFinalStepMm);
+  EXPECT_LT(result.evaluations, 200);
+}
+
+TEST(CmaEs, FindsTheHighestOfManyPeaks) {
+  // Rastrigin's function: peaks 1 apart, the highest at 0, here 2.4 away along every axis.
+  const auto value = [](const ScaledParameters& p) -> std::optional<double> {
+    double sum = 0.0;
+    for (int k = 0; k < 6; ++k) {
+      const double x = p[k] - 2.4;
+      sum -= x * x + 2.0 * (1.0 - std::cos(2.0 * M_PI * x));
+    }
+    return sum;
+  };
+  test::FunctionTarget target(value);
+  OptimizerResult result;
+  make_optimizer("cma-es")->maximize(target, {3.0, 1e-3, 100}, {100000, 7}, result);
+  EXPECT_LT((result.point - ScaledParameters::Constant(2.4)).norm(), 0.01);
+  test::FunctionTarget other(value);
+  OptimizerResult other_key;
+  make_optimizer("cma-es")->maximize(other, {3.0, 1e-3, 100}, {100000, 8}, other_key);
+  EXPECT_NE(other.points[1], target.points[1]);
+}
+
+TEST(Optimizers, RefuseUnknownNames) {
+  EXPECT_THROW(make_optimizer("unheard-of"), InputError);
+}
+
+}  // namespace
+}  // namespace af::registration

@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: Apache-2.0
+// Verdicts on the ends of registrations, and what is said of X-rays that do not fit.
+#include "register/verdict/verdict.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include <gtest/gtest.h>
+
+#include "base/hash_random.h"
+#include "register/verdict/pose_examiner.h"
+#include "register/verdict/view_diagnosis.h"
+#include "unit/register/method/registration_cases.h"
+
+namespace af::registration {
+namespace {
+
+Verdict verdict_of(const std::vector<ViewValue>& values,
+                   StopReason stop_reason = StopReason::StepBelowFinal) {
+  const Judgement judgement = judged_end(stop_reason, values);
+  EXPECT_FALSE(judgement.reason.empty());
+  return judgement.verdict;
+}
+
+TEST(Judgement, AFoundPoseIsGoodInEveryView) {
+  EXPECT_EQ(verdict_of({{0.7, 0.6}, {0.6, 0.5}}), Verdict::Found);
+  EXPECT_EQ(verdict_of({{0.7, 0.6}, {0.29, 0.5}}), Verdict::Doubtful);
+  EXPECT_EQ(verdict_of({{0.7, 0.6}, {0.6, 0.29}}), Verdict::Doubtful);
+  EXPECT_EQ(verdict_of({{0.7, 0.6}, {0.0, 0.0}}), Verdict::Doubtful);
+  EXPECT_EQ(verdict_of({{0.7, 0.6}}), Verdict::Found);
+}
+
+TEST(Judgement, APoseThatExplainsNextToNothingIsNotFound) {
+  EXPECT_EQ(verdict_of({{0.3, 0.2}, {0.09, 0.1}}), Verdict::NotFound);
+  EXPECT_EQ(verdict_of({{0.4, 0.1}, {0.3, 0.05}}), Verdict::NotFound);
+  EXPECT_EQ(verdict_of({{0.1, 0.1}}), Verdict::NotFound);
+}
+
+TEST(Judgement, WhatWasNotSearchedIsNotFoundWhateverItsValue) {
+  const std::vector<ViewValue> good = {{0.9, 0.9}, {0.9, 0.9}};
+  for (const StopReason reason : {StopReason::StartInadmissible,
+                                  StopReason::CtOutsideRoi,
+                                  StopReason::NonFiniteSimilarity,
+                                  StopReason::NoBetterThanNoDrr})
+    EXPECT_EQ(verdict_of(good, reason), Verdict::NotFound) << to_string(reason);
+  for (const StopReason reason : {StopReason::PinnedAtLimit, StopReason::EvaluationBudgetSpent})
+    EXPECT_EQ(verdict_of(good, reason), Verdict::Doubtful) << to_string(reason);
+  EXPECT_EQ(verdict_of({{0.1, 0.1}}, StopReason::PinnedAtLimit), Verdict::NotFound);
+}
+
+TEST(Judgement, ViewsThatCannotBeJudgedDoNotCountAndNoneAtAllIsDoubtful) {
+  const double nan = std::nan("");
+  EXPECT_EQ(verdict_of({{nan, nan}, {0.6, 0.5}}), Verdict::Found);
+  EXPECT_EQ(verdict_of({{nan, nan}}), Verdict::Doubtful);
+  EXPECT_EQ(verdict_of({}), Verdict::Doubtful);
+}
+
+TEST(Disagreement, IsOneViewFarBelowAnotherThatIsGood) {
+  const std::vector<ViewValue> one_bad = {{0.7, 0.6}, {0.1, 0.0}, {0.6, 0.5}};
+  EXPECT_FALSE(disagrees(0, one_bad));
+  EXPECT_TRUE(disagrees(1, one_bad));
+  const std::vector<ViewValue> bad_in_detail = {{0.9, 0.8}, {0.4, 0.1}};
+  EXPECT_TRUE(disagrees(1, bad_in_detail));
+  const std::vector<ViewValue> both_bad = {{0.25, 0.1}, {0.1, 0.0}};
+  EXPECT_FALSE(disagrees(1, both_bad));
+  const std::vector<ViewValue> alike = {{0.45, 0.2}, {0.29, 0.0}};
+  EXPECT_FALSE(disagrees(1, alike));
+}
+
+/// A small case with pyramids (of the same renderer), which the diagnosis needs.
+test::SmallCase case_with_levels() {
+  test::SmallCase small = test::small_case(test::bones_in_a_corner());
+  for (RegistrationView& view : small.problem->views)
+    view.coarse_levels = {{view.renderer, 0.0}, {view.renderer, 0.0}};
+  return small;
+}
+
+RigidTransform beside_gold(const test::SmallCase& small, double mm) {
+  const PoseFrame frame = PoseFrame::about(small.gold_room_from_ct, small.problem->center_ct_mm);
+  return pose_from_parameters(frame, PoseParameters::from_deg_and_mm({0, 0, 0, mm, mm, mm}));
+}
+
+TEST(PoseExaminer, TellsARightPoseFromAWrongOneInEveryView) {
+  const test::SmallCase small = case_with_levels();
+  PoseExaminer examiner(small.problem);
+  const auto right = examiner.view_values(small.gold_room_from_ct);
+  const auto wrong = examiner.view_values(beside_gold(small, 8.0));
+  ASSERT_EQ(right.size(), 2U);
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_GT(right[i].coarse, kLeastCoarseOfFound);
+    EXPECT_GT(right[i].fine, kLeastFineOfFound);
+    EXPECT_LT(wrong[i].coarse, 0.5 * right[i].coarse);
+  }
+}
+
+TEST(PoseExaminer, DoesNotJudgeAnXrayWithoutGradients) {
+  const test::SmallCase small = case_with_levels();
+  for (float& value : small.problem->views[1].xray.pixels) value = 1.0f;
+  const auto values = PoseExaminer(small.problem).view_values(small.gold_room_from_ct);
+  EXPECT_TRUE(std::isfinite(values[0].coarse));
+  EXPECT_TRUE(std::isnan(values[1].coarse));
+}
+
+/// All that is said about a case whose X-rays `harm` changed, from a start beside the gold pose.
+std::string sayings_of(const std::function<void(RegistrationProblem&)>& harm) {
+  const test::SmallCase small = case_with_levels();
+  harm(*small.problem);
+  std::string text;
+  const auto values = PoseExaminer(small.problem).view_values(small.gold_room_from_ct);
+  const ViewDiagnosis diagnosis =
+      diagnose_views(small.problem, beside_gold(small, 1.0), small.gold_room_from_ct, values);
+  for (const std::string& saying : diagnosis.sayings) text += saying + '\n';
+  return text;
+}
+
+void turn(Image2d& image) {
+  std::reverse(image.pixels.begin(), image.pixels.end());
+}
+
+void flip_columns(Image2d& image) {
+  for (int row = 0; row < image.height; ++row) {
+    const auto begin = image.pixels.begin() + static_cast<std::ptrdiff_t>(row) * image.width;
+    std::reverse(begin, begin + image.width);
+  }
+}
+
+TEST(ViewDiagnosis, NamesTheViewAndWhatWouldMendIt) {
+  struct Defect {
+    const char* expected;
+    std::function<void(Image2d&)> make;
+  };
+  for (const Defect& defect : {Defect{"inverted",
+                                      [](Image2d& image) {
+                                        for (float& value : image.pixels) value = 3.0f - value;
+                                      }},
+                               Defect{"mirrored left-right", flip_columns},
+                               Defect{"mirrored up-down",
+                                      [](Image2d& image) {
+                                        flip_columns(image);
+                                        turn(image);
+                                      }},
+                               Defect{"turned by 180 degrees", turn}})
+    for (const std::size_t view : {0U, 1U}) {
+      const std::string name = view == 0 ? "'AP'" : "'LAT'";
+      const std::string text =
+          sayings_of([&](RegistrationProblem& p) { defect.make(p.views[view].xray); });
+      EXPECT_NE(text.find("view " + name + " does not agree"), std::string::npos) << text;
+      EXPECT_NE(text.find("the X-ray of view " + name + " " + defect.expected), std::string::npos)
+          << defect.expected << '\n'
+          << text;
+    }
+}
+
+TEST(ViewDiagnosis, NamesNoRemedyForNoise) {
+  const std::string text = sayings_of([](RegistrationProblem& problem) {
+    HashRandom random(3, 0);
+    for (float& value : problem.views[1].xray.pixels)
+      value = static_cast<float>(random.uniform(0.0, 3.0));
+  });
+  EXPECT_NE(text.find("view 'LAT' does not agree"), std::string::npos) << text;
+  EXPECT_EQ(text.find("would explain more"), std::string::npos) << text;
+}
+
+TEST(ViewDiagnosis, NamesExchangedXraysAndTheSameXrayTwice) {
+  const std::string exchanged = sayings_of([](RegistrationProblem& problem) {
+    std::swap(problem.views[0].xray, problem.views[1].xray);
+  });
+  EXPECT_NE(exchanged.find("the X-rays of views 'AP' and 'LAT' exchanged"), std::string::npos)
+      << exchanged;
+  const std::string same = sayings_of(
+      [](RegistrationProblem& problem) { problem.views[1].xray = problem.views[0].xray; });
+  EXPECT_NE(same.find("views 'AP' and 'LAT' have the same X-ray"), std::string::npos) << same;
+}
+
+TEST(ViewDiagnosis, SaysNothingOfSoundXrays) {
+  EXPECT_EQ(sayings_of([](RegistrationProblem&) {}), "");
+}
+
+}  // namespace
+}  // namespace af::registration

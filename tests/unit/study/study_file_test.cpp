@@ -1,0 +1,368 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "study/study_file.h"
+
+#include <filesystem>
+#include <regex>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+#include "study/rig_file.h"
+#include "study/study_template.h"
+#include "support/io_checks.h"
+
+namespace af {
+namespace {
+
+namespace fs = std::filesystem;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using test::message_of;
+using test::replaced;
+using testing::AllOf;
+using testing::HasSubstr;
+
+// The line numbers below are those of this text.
+const char* const kGoodStudy = R"(rig = "treatment-room"
+[[case]]
+name = "skull-01"
+ct = "ct.nii.gz"
+nominal_room_from_ct = [[1,0,0,10],[0,0,-1,20],[0,1,0,30],[0,0,0,1]]
+center_ct_mm = [1.0, 2.0, 3.0]
+target_box_ct_mm = [[-30,-31,-32],[30,31,32]]
+fiducials_ct_mm = [[0,0,0], [50,0,0], [0,50,0], [0,0,50]]
+[[case.view]]
+camera = "A"
+xray = "A.mha"
+xray_domain = "intensity"
+roi_px = [150, 160, 200, 201]
+fiducials_px = [[1,2], [3,4], [5,6], [7.5,8.25]]
+field = "fields/A.af.h5"
+[[case.view]]
+camera = "B"
+xray = "/elsewhere/B.mha"
+xray_domain = "attenuation"
+roi_px = [0, 0, 512, 512]
+fiducials_px = [[10,20], [30,40], [50,60], [70,80]]
+mask = "B-mask.png"
+)";
+
+class StudyFile : public testing::Test {
+ protected:
+  Study read(const std::string& text) {
+    test::write_input(path(), text);
+    return read_study(path());
+  }
+  /// The refusal of the good study with one text replaced.
+  std::string refusal(const std::string& from, const std::string& to) {
+    return message_of<InputError>([&] { read(replaced(kGoodStudy, from, to)); });
+  }
+  [[nodiscard]] std::string path() const { return folder_ / "study.toml"; }
+  [[nodiscard]] const test::ScratchFolder& folder() const { return folder_; }
+
+ private:
+  test::ScratchFolder folder_;
+};
+
+void expect_identical(const StudyView& a, const StudyView& b) {
+  EXPECT_EQ(a.camera, b.camera);
+  EXPECT_EQ(a.xray, b.xray);
+  EXPECT_EQ(a.xray_domain, b.xray_domain);
+  EXPECT_EQ(a.roi.column, b.roi.column);
+  EXPECT_EQ(a.roi.row, b.roi.row);
+  EXPECT_EQ(a.roi.width, b.roi.width);
+  EXPECT_EQ(a.roi.height, b.roi.height);
+  EXPECT_EQ(a.fiducials_px, b.fiducials_px);
+  EXPECT_EQ(a.field, b.field);
+  EXPECT_EQ(a.mask, b.mask);
+}
+
+void expect_identical(const StudyCase& a, const StudyCase& b) {
+  EXPECT_EQ(a.name, b.name);
+  EXPECT_EQ(a.note, b.note);
+  EXPECT_EQ(a.ct, b.ct);
+  EXPECT_EQ(a.nominal_room_from_ct.matrix(), b.nominal_room_from_ct.matrix());
+  EXPECT_EQ(a.center_ct_mm, b.center_ct_mm);
+  EXPECT_EQ(a.target_box_ct.low_mm, b.target_box_ct.low_mm);
+  EXPECT_EQ(a.target_box_ct.high_mm, b.target_box_ct.high_mm);
+  EXPECT_EQ(a.fiducials_ct_mm, b.fiducials_ct_mm);
+  ASSERT_EQ(a.gold_room_from_ct.has_value(), b.gold_room_from_ct.has_value());
+  if (a.gold_room_from_ct) {
+    EXPECT_EQ(a.gold_room_from_ct->matrix(), b.gold_room_from_ct->matrix());
+  }
+  ASSERT_EQ(a.views.size(), b.views.size());
+  for (std::size_t i = 0; i < a.views.size(); ++i) expect_identical(a.views[i], b.views[i]);
+}
+
+TEST_F(StudyFile, EveryKeyIsReadAndPathsAreRelativeToTheFile) {
+  const Study study = read(kGoodStudy);
+  EXPECT_EQ(study.path, path());
+  EXPECT_EQ(study.rig.cameras.size(), 2U);
+  const StudyCase& study_case = study.find_case("skull-01");
+  EXPECT_EQ(study_case.ct, folder() / "ct.nii.gz");
+  EXPECT_EQ(study_case.nominal_room_from_ct * Vector3d(1.0, 2.0, 3.0), Vector3d(11.0, 17.0, 32.0));
+  EXPECT_EQ(study_case.center_ct_mm, Vector3d(1.0, 2.0, 3.0));
+  EXPECT_EQ(study_case.target_box_ct.low_mm, Vector3d(-30.0, -31.0, -32.0));
+  EXPECT_EQ(study_case.target_box_ct.high_mm, Vector3d(30.0, 31.0, 32.0));
+  EXPECT_EQ(study_case.fiducials_ct_mm.at(2), Vector3d(0.0, 50.0, 0.0));
+  EXPECT_FALSE(study_case.gold_room_from_ct.has_value());
+  ASSERT_EQ(study_case.views.size(), 2U);
+  const StudyView& a = study_case.views[0];
+  EXPECT_EQ(a.camera, "A");
+  EXPECT_EQ(a.xray, folder() / "A.mha");
+  EXPECT_EQ(a.xray_domain, XrayDomain::Intensity);
+  EXPECT_EQ(a.roi.column, 150);
+  EXPECT_EQ(a.roi.row, 160);
+  EXPECT_EQ(a.roi.width, 200);
+  EXPECT_EQ(a.roi.height, 201);
+  EXPECT_EQ(a.fiducials_px.at(3), Vector2d(7.5, 8.25));
+  EXPECT_EQ(a.field, fs::path(folder() / "fields/A.af.h5"));
+  EXPECT_EQ(a.mask, std::nullopt);
+  const StudyView& b = study_case.views[1];
+  EXPECT_EQ(b.xray, "/elsewhere/B.mha");
+  EXPECT_EQ(b.xray_domain, XrayDomain::Attenuation);
+  EXPECT_EQ(b.mask, fs::path(folder() / "B-mask.png"));
+}
+
+TEST_F(StudyFile, NoteIsFreeTextThatSurvivesWriting) {
+  EXPECT_EQ(read(kGoodStudy).find_case("").note, "");
+  const Study study = read(replaced(kGoodStudy, "ct = ", "note = \"two \\\"views\\\"\"\nct = "));
+  EXPECT_EQ(study.find_case("").note, "two \"views\"");
+  expect_identical(read(study_to_toml(study, folder().path())).find_case(""), study.find_case(""));
+}
+
+TEST_F(StudyFile, WarningsOfTheRigReachTheCaller) {
+  const std::string rig = builtin_rig_text("treatment-room");
+  std::vector<std::string> warnings;
+  std::ofstream(folder() / "rig.toml") << rig;
+  std::ofstream(path()) << replaced(kGoodStudy, "\"treatment-room\"", "\"rig.toml\"");
+  read_study(path(), &warnings);
+  EXPECT_TRUE(warnings.empty());
+  CameraRig mirrored = read_rig("treatment-room");
+  CameraGeometry& camera = mirrored.cameras.front();
+  camera.row_direction = -camera.row_direction;
+  std::ofstream(folder() / "rig.toml") << rig_to_toml(mirrored);
+  read_study(path(), &warnings);
+  ASSERT_EQ(warnings.size(), 1U);
+  EXPECT_THAT(warnings.front(), HasSubstr("mirrored"));
+}
+
+TEST_F(StudyFile, RelativePathOfTheStudyGivesAbsolutePaths) {
+  read(kGoodStudy);
+  const fs::path before = fs::current_path();
+  fs::current_path(folder().path());
+  const Study study = read_study("study.toml");
+  fs::current_path(before);
+  EXPECT_TRUE(study.find_case("").ct.is_absolute());
+  EXPECT_TRUE(fs::equivalent(study.path, path()));
+}
+
+TEST_F(StudyFile, RigPathIsRelativeToTheFile) {
+  fs::create_directory(folder() / "rigs");
+  test::write_input(folder() / "rigs/my.toml", builtin_rig_text("treatment-room"));
+  const Study study = read(replaced(kGoodStudy, "treatment-room", "rigs/my.toml"));
+  EXPECT_EQ(study.rig_name_or_path, folder() / "rigs/my.toml");
+  EXPECT_THAT(study_to_toml(study, folder().path()), HasSubstr("rig = \"rigs/my.toml\"\n"));
+  const std::string missing = replaced(kGoodStudy, "treatment-room", "gone.toml");
+  EXPECT_THAT(message_of<FileError>([&] { read(missing); }), HasSubstr(folder() / "gone.toml"));
+}
+
+TEST_F(StudyFile, RoundTripKeepsEveryBit) {
+  Study study = read(kGoodStudy);
+  StudyCase second = study.cases.front();
+  second.name = "quote \" and µ";
+  second.nominal_room_from_ct.linear() = rotation_from_angles({0.1, 0.2, 0.3});
+  second.gold_room_from_ct =
+      pose_from_parameters(second.frame(), PoseParameters::from_deg_and_mm({1, 2, 3, 4, 5, 6}));
+  second.center_ct_mm = Vector3d(1.0 / 3.0, -1e-300, 1e6);
+  second.fiducials_ct_mm.clear();
+  for (StudyView& view : second.views) view.fiducials_px.clear();
+  study.cases.push_back(second);
+  const Study back = read(study_to_toml(study, folder().path()));
+  ASSERT_EQ(back.cases.size(), 2U);
+  for (std::size_t i = 0; i < 2; ++i) expect_identical(back.cases[i], study.cases[i]);
+}
+
+TEST_F(StudyFile, PathsBelowTheFolderAreWrittenRelativeAndOthersAbsolute) {
+  const Study study = read(kGoodStudy);
+  EXPECT_THAT(study_to_toml(study, folder().path()),
+              AllOf(HasSubstr("ct = \"ct.nii.gz\"\n"),
+                    HasSubstr("field = \"fields/A.af.h5\"\n"),
+                    HasSubstr("xray = \"/elsewhere/B.mha\"\n")));
+  EXPECT_EQ(study_to_toml(study, folder().path() / ""), study_to_toml(study, folder().path()));
+  EXPECT_THAT(study_to_toml(study, "/another"),
+              HasSubstr("ct = \"" + (folder() / "ct.nii.gz").string() + "\""));
+}
+
+TEST_F(StudyFile, FrameTurnsAboutTheRegionsCentre) {
+  const Study study = read(kGoodStudy);
+  const StudyCase& study_case = study.find_case("");
+  const RigidTransform turned = pose_from_parameters(
+      study_case.frame(), PoseParameters::from_deg_and_mm({10, 20, 30, 0, 0, 0}));
+  const Vector3d moved =
+      turned * study_case.center_ct_mm - study_case.nominal_room_from_ct * study_case.center_ct_mm;
+  EXPECT_LT(moved.norm(), 1e-12);
+}
+
+TEST_F(StudyFile, FindCaseListsTheKnownNames) {
+  const Study study = read(kGoodStudy);
+  EXPECT_EQ(study.find_case("").name, "skull-01");
+  EXPECT_THAT(message_of<InputError>([&] { static_cast<void>(study.find_case("x")); }),
+              HasSubstr("skull-01"));
+  Study two = study;
+  two.cases.push_back(two.cases.front());
+  two.cases.back().name = "pelvis";
+  EXPECT_THAT(message_of<InputError>([&] { static_cast<void>(two.find_case("")); }),
+              HasSubstr("skull-01, pelvis"));
+}
+
+TEST_F(StudyFile, BadValuesAreRefusedWithLineKeyValueAndConstraint) {
+  EXPECT_THAT(
+      refusal("[0,0,-1,20]", "[0,0,-1.2,20]"),
+      AllOf(HasSubstr(path() + ":5: case[0].nominal_room_from_ct"), HasSubstr("not rigid")));
+  EXPECT_THAT(refusal("[0,1,0,30]", "[0,-1,0,30]"), HasSubstr("reflection"));
+  EXPECT_THAT(refusal("[0,1,0,30],[0,0,0,1]", "[0,1,0,30]"),
+              HasSubstr("4 lists of 4 finite numbers"));
+  EXPECT_THAT(
+      refusal("[1.0, 2.0, 3.0]", "[1.0, inf, 3.0]"),
+      HasSubstr(":6: case[0].center_ct_mm = [1, inf, 3]: must be a list of 3 finite numbers"));
+  EXPECT_THAT(refusal("[30,31,32]", "[30,-31,32]"), HasSubstr(":7: case[0].target_box_ct_mm"));
+  EXPECT_THAT(refusal("\"ct.nii.gz\"", "\"\""), HasSubstr(":4: case[0].ct = \"\""));
+  EXPECT_THAT(refusal("\"skull-01\"", "\"a/b\""), HasSubstr(":3: case[0].name = \"a/b\""));
+  EXPECT_THAT(refusal("[150, 160, 200, 201]", "[313, 160, 200, 201]"),
+              AllOf(HasSubstr(":13: case[0].view[0].roi_px = [313, 160, 200, 201]: must"),
+                    HasSubstr("512 x 512")));
+  EXPECT_THAT(refusal("[150, 160, 200, 201]", "[2147483647, 1, 2147483647, 1]"),
+              HasSubstr("roi_px"));
+  EXPECT_THAT(refusal("[150, 160, 200, 201]", "[-1, 1, 5, 5]"), HasSubstr("roi_px"));
+  EXPECT_THAT(refusal("[150, 160, 200, 201]", "[1, 1, 0, 5]"), HasSubstr("roi_px"));
+  EXPECT_THAT(refusal("\"intensity\"", "\"bright\""),
+              HasSubstr(":12: case[0].view[0].xray_domain = \"bright\": must be \"intensity\" or"));
+  EXPECT_THAT(
+      refusal("camera = \"A\"", "camera = \"C\""),
+      HasSubstr(
+          ":10: case[0].view[0].camera = \"C\": must be a camera of the rig, which has A, B"));
+  EXPECT_THAT(refusal("camera = \"B\"", "camera = \"A\""), HasSubstr("another view"));
+}
+
+TEST_F(StudyFile, FiducialsMustBeEnoughNotCollinearAndEquallyMany) {
+  EXPECT_THAT(refusal("[[0,0,0], [50,0,0], [0,50,0], [0,0,50]]",
+                      "[[0,0,0], [50,0,0], [100,0.01,0], [9,0,0]]"),
+              AllOf(HasSubstr(":8: case[0].fiducials_ct_mm"), HasSubstr("not collinear")));
+  EXPECT_THAT(
+      refusal("[[0,0,0], [50,0,0], [0,50,0], [0,0,50]]", "[[7,7,7], [7,7,7], [7,7,7], [7,7,7]]"),
+      HasSubstr("not collinear"));
+  EXPECT_THAT(
+      refusal("[5,6], [7.5,8.25]]", "[5,6]]"),
+      HasSubstr(":14: case[0].view[0].fiducials_px = [[1, 2], [3, 4], [5, 6]]: has 3 points, "
+                "but the case has 4"));
+  EXPECT_THAT(refusal("fiducials_px = [[1,2], [3,4], [5,6], [7.5,8.25]]\n", ""),
+              HasSubstr(":9: case[0].view[0].fiducials_px: has 0 points"));
+  EXPECT_THAT(refusal("[7.5,8.25]", "[7.5,512]"),
+              HasSubstr("point [7.5, 512.0] must lie on the detector"));
+  EXPECT_THAT(refusal("[7.5,8.25]", "[7.5,nan]"),
+              HasSubstr(":14: case[0].view[0].fiducials_px[3]"));
+}
+
+TEST_F(StudyFile, CaseWithNeitherFiducialsNorGoldPoseIsAccepted) {
+  std::string text =
+      replaced(kGoodStudy, "fiducials_ct_mm = [[0,0,0], [50,0,0], [0,50,0], [0,0,50]]\n", "");
+  text = replaced(text, "fiducials_px = [[1,2], [3,4], [5,6], [7.5,8.25]]\n", "");
+  text = replaced(text, "fiducials_px = [[10,20], [30,40], [50,60], [70,80]]\n", "");
+  EXPECT_TRUE(read(text).find_case("").fiducials_ct_mm.empty());
+}
+
+TEST_F(StudyFile, GoldPoseMustBeRigid) {
+  const std::string gold =
+      "gold_room_from_ct = [[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]\n[[case.view]]";
+  EXPECT_TRUE(read(replaced(kGoodStudy, "[[case.view]]", gold)).find_case("").gold_room_from_ct);
+  EXPECT_THAT(refusal("[[case.view]]", replaced(gold, "[0,1,0,0]", "[0,1,1,0]")),
+              HasSubstr(":9: case[0].gold_room_from_ct"));
+}
+
+TEST_F(StudyFile, UnknownKeysAreRefusedWithTheNearestName) {
+  EXPECT_THAT(
+      refusal("xray_domain", "xray_domian"),
+      AllOf(HasSubstr(
+                ":12: case[0].view[0]: unknown key \"xray_domian\": did you mean \"xray_domain\"?"),
+            HasSubstr("xray_domain is missing")));
+  EXPECT_THAT(refusal("center_ct_mm", "centre_ct_mm"), HasSubstr("did you mean \"center_ct_mm\"?"));
+  EXPECT_THAT(refusal("rig = \"treatment-room\"", "rig = \"treatment-room\"\ncasse = 1"),
+              HasSubstr(":2: unknown key \"casse\": did you mean \"case\"?"));
+}
+
+TEST_F(StudyFile, MissingPartsAreAllNamed) {
+  const std::string message =
+      message_of<InputError>([&] { read("rig = \"treatment-room\"\n[[case]]\nname = \"x\"\n"); });
+  for (const char* key : {"ct", "nominal_room_from_ct", "center_ct_mm", "target_box_ct_mm", "view"})
+    EXPECT_THAT(message, HasSubstr(path() + ":2: case[0]." + key + " is missing"));
+  EXPECT_THAT(message_of<InputError>([&] { read("rig = \"treatment-room\"\n"); }),
+              HasSubstr("case is missing"));
+  EXPECT_THAT(message_of<InputError>([&] { read("[[case]]\n"); }), HasSubstr("rig is missing"));
+}
+
+TEST_F(StudyFile, RepeatedCaseNameIsRefused) {
+  const std::string body = kGoodStudy;
+  const std::string twice = body + body.substr(body.find("[[case]]"));
+  EXPECT_THAT(message_of<InputError>([&] { read(twice); }),
+              AllOf(HasSubstr("case[1].name"), HasSubstr("study.toml:2")));
+}
+
+TEST_F(StudyFile, ErrorsOfItsFilesNameTheLine) {
+  const Study study = read(kGoodStudy);
+  const StudyView& view = study.cases.front().views.front();
+  const auto fails = [] { throw FileError("A.mha", "is gone"); };
+  EXPECT_EQ(message_of<FileError>([&] { used_from(view.places, "xray", fails); }),
+            path() + ":11: case[0].view[0].xray: A.mha: is gone");
+  EXPECT_EQ(message_of<InputError>([&] {
+              used_from(study.cases.front().places, "ct", [] { throw InputError("no HU"); });
+            }),
+            path() + ":4: case[0].ct: no HU");
+  // Of what the study does not name, and of other defects, nothing is said.
+  EXPECT_EQ(message_of<FileError>([&] { used_from(view.places, "mask", fails); }),
+            "A.mha: is gone");
+  EXPECT_THAT(
+      message_of<FileError>([&] { read(replaced(kGoodStudy, "treatment-room", "gone.toml")); }),
+      HasSubstr(path() + ":1: rig: "));
+}
+
+/// The template with every optional key in force.
+std::string uncommented(const std::string& text) {
+  return std::regex_replace(text, std::regex("(^|\n)# ([a-z_]+ = )"), "$1$2");
+}
+
+TEST_F(StudyFile, TemplateIsAValidStudyWithAndWithoutItsOptionalKeys) {
+  const Study plain = read(template_text("study"));
+  ASSERT_EQ(plain.cases.size(), 2U);
+  EXPECT_TRUE(plain.cases.front().fiducials_ct_mm.empty());
+  const StudyCase full = read(uncommented(template_text("study"))).cases.front();
+  EXPECT_EQ(full.fiducials_ct_mm.size(), 4U);
+  EXPECT_TRUE(full.gold_room_from_ct.has_value());
+  EXPECT_FALSE(full.note.empty());
+  EXPECT_TRUE(full.views.front().field.has_value());
+  EXPECT_TRUE(full.views.front().mask.has_value());
+  EXPECT_EQ(full.views.back().fiducials_px.size(), 4U);
+  EXPECT_THROW(template_text("patient"), InputError);
+}
+
+TEST_F(StudyFile, TemplateOfARigIsAValidRig) {
+  test::write_input(folder() / "rig.toml", template_text("rig"));
+  EXPECT_EQ(read_rig(folder() / "rig.toml").cameras.size(), 2U);
+}
+
+TEST_F(StudyFile, WhatIsNotTomlIsAFileError) {
+  EXPECT_THROW(read(""), FileError);
+  EXPECT_THROW(read(std::string("\0\1\2\3\xFF", 5)), FileError);
+  EXPECT_THROW(read_study(folder() / "missing.toml"), FileError);
+  EXPECT_THROW(read_study(folder().path()), FileError);
+}
+
+TEST_F(StudyFile, DamagedFilesAreReadOrRefused) {
+  const std::size_t refused = test::refused_damaged_copies(
+      kGoodStudy, 7, 1000, [&](const std::string& text) { read(text); });
+  EXPECT_GT(refused, 300U);
+}
+
+}  // namespace
+}  // namespace af
