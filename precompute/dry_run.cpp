@@ -148,7 +148,7 @@ void forecast_memory(const DryRun& run, const TileCounts& tiles, FieldForecast& 
       std::min(need.tile_bytes, kept_per_rank * static_cast<std::uint64_t>(run.ranks));
   need.bytes_per_rank =
       run.memory.least_bytes() + need.kept_bytes / static_cast<std::uint64_t>(run.ranks);
-  // As choose_overflow(): the disk is shared by the ranks, the casting is not.
+  // The same rule as in choose_overflow(): ranks share the disk, but not the casting.
   const double cast_bytes_per_second =
       2.0 * run.speed.rays_per_second * run.speed.occupied_fraction * run.ranks;
   if (run.options.has_checkpoint && run.options.overflow != "cast-again" &&

@@ -13,7 +13,7 @@ namespace af {
 
 namespace {
 
-/// What is known before the CT is read; the default centre is the CT's.
+/// The facts that are known before the CT is read; the default centre is the CT's.
 struct NamedSource {
   std::string ct_path;
   StudyPlaces places;  ///< where the study names its files

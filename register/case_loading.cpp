@@ -31,7 +31,7 @@ constexpr double kCameraToleranceMm = 1e-3;
 /// Half the side of the cube about the ROI centre that stands for the CT when it is not read.
 constexpr double kAssumedCtHalfSideMm = 100.0;
 
-/// Between the nodes of the field whose levels ray casting imitates, when there is none: about that
+/// Spacing of nodes of the field whose levels ray casting imitates when there is none: about that
 /// of the paper's field of a head or a spine.
 constexpr double kAssumedNodeMm = 1.0;
 
@@ -99,7 +99,7 @@ std::vector<RegistrationView> read_views(const Study& study,
   return views;
 }
 
-/// What the study says of the case, and the rig of its cameras, but for the paths of files.
+/// The study's entry for the case, and the rig of its cameras, without the paths of files.
 std::string case_sha256(const Study& study, const StudyCase& study_case) {
   Study one;
   one.rig = study.rig;

@@ -37,7 +37,7 @@ struct CaseLoadOptions {
   /// Ray casting: blurs of levels 1, 2, ..., in mm on the isocentre plane; of missing ones, those
   /// of a field with 1 mm between its nodes.
   std::vector<double> level_blur_sigma_mm;
-  /// Threads that make the levels together; none: the calling thread alone.
+  /// Threads that make the levels together; none: only the calling thread.
   std::shared_ptr<ThreadPool> pool = nullptr;
 };
 

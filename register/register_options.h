@@ -38,7 +38,7 @@ struct RegisterOptions {
 /// Adds the options to the program.
 void bind_options(CLI::App& app, RegisterOptions& options);
 
-/// All combinations and values that cannot be; empty when the options are sound.
+/// All impossible values and combinations of options; empty when the options are sound.
 std::vector<std::string> problems(const RegisterOptions& options);
 
 /// `coarsest_level`: of the method.
@@ -51,7 +51,7 @@ std::vector<RigidTransform> start_poses(const RegisterOptions& options, const Po
 /// SHA-256 of the study and, if given, the file of starts, by name.
 std::map<std::string, std::string> hashes_of_files(const RegisterOptions& options);
 
-/// The options in force as TOML, presets resolved.
+/// The options that are used, as TOML, with presets resolved.
 std::string to_toml(const RegisterOptions& options, const RegistrationOptions& registration);
 
 }  // namespace af::registration

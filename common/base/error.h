@@ -90,9 +90,9 @@ class RemoteError : public Error {
   RemoteError(ExitCode exit_code, const std::string& message) : Error(exit_code, message) {}
 };
 
-/// A broken promise of the caller (a defect, not bad input); becomes exit code 6. The builtins,
-/// which GCC and Clang share, stand where std::source_location would: Clang 14, whose tools check
-/// this code, does not have it.
+/// A broken promise of the caller (a defect, not bad input); becomes exit code 6. The place is
+/// stated by builtins that GCC and Clang share, not by std::source_location: Clang 14, whose tools
+/// check this code, does not have that.
 void check(bool condition,
            const char* message,
            const char* file = __builtin_FILE(),

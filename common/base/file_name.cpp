@@ -6,7 +6,8 @@
 namespace af {
 
 bool is_plain_file_name(std::string_view name) {
-  // File systems allow 255; suffixes and a camera's name may stand behind a case's.
+  // File systems allow 255 bytes; a file's name may hold a case's name, a camera's name and a
+  // suffix.
   constexpr std::size_t kMaxBytes = 100;
   constexpr unsigned char kDelete = 0x7F;
   const auto is_bad = [](char character) {

@@ -7,8 +7,8 @@
 
 namespace af {
 
-/// One of few texts that are repeated millions of times, in eight bytes: equal texts are kept once,
-/// all of them until the program ends. Trivially copyable, and empty when all its bytes are zero.
+/// A text in eight bytes, for few texts that are repeated millions of times: equal texts are kept
+/// once, until the program ends. Trivially copyable, and empty when all its bytes are zero.
 /// \test InternedText.KeepsEqualTextsOnce
 class InternedText {
  public:

@@ -5,8 +5,8 @@
 
 namespace af {
 
-/// Numerics report progress through this callable (work done, work in all); programs print it with
-/// an ETA. May be empty.
+/// Numerics report progress through this callable (work done, whole work); programs print it with
+/// an ETA. It may be empty.
 using ProgressCallback = std::function<void(double done, double total)>;
 
 }  // namespace af

@@ -8,7 +8,7 @@
 
 namespace af {
 
-/// What a sample too small for it has as a statistic.
+/// Value of a statistic for which the sample is too small.
 inline constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 /// Quantile `p` in [0, 1] by linear interpolation between order statistics (Hyndman and Fan's type
@@ -29,7 +29,7 @@ struct SampleSummary {
   double maximum = 0.0;
 };
 
-/// Throws InputError when a value is NaN: what is missing must be counted, not averaged.
+/// Throws InputError when a value is NaN: callers must count missing values, not average them.
 SampleSummary summarize(std::vector<double> values);
 
 /// NaN for an empty sample.

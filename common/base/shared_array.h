@@ -9,8 +9,8 @@
 
 namespace af {
 
-/// An immutable array and whoever keeps it alive: a vector of this process, or memory shared by the
-/// ranks of a node.
+/// An immutable array and the owner of its memory: a vector of this process, or memory shared by
+/// the ranks of a node.
 template <typename T>
 class SharedArray {
  public:

@@ -12,8 +12,8 @@ namespace {
 
 constexpr int kMostThreads = 1024;
 
-/// How long a thread watches for work before it sleeps. Waking it takes about as long; between two
-/// evaluations of a registration less passes.
+/// How long a thread watches for work before it sleeps. Waking it takes about as long; the time
+/// between two evaluations of a registration is shorter.
 constexpr std::chrono::microseconds kWatchTime{100};
 
 /// Which pool the running thread helps in, and its slot there.
@@ -23,7 +23,7 @@ struct Membership {
 };
 thread_local Membership my_membership;
 
-/// Waits until `is_over()`, at most for kWatchTime. Whether it was.
+/// Waits until `is_over()`, at most for kWatchTime. Returns whether it is over.
 template <typename Condition>
 bool watch(Condition is_over) {
   constexpr int kChecksPerLook = 32;
@@ -43,7 +43,7 @@ int usable_processors() {
   cpu_set_t mine;
   CPU_ZERO(&mine);
   if (sched_getaffinity(0, sizeof(mine), &mine) == 0) return std::max(1, CPU_COUNT(&mine));
-  // More processors than the set holds.
+  // The machine has more processors than the set holds.
   return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
 }
 
@@ -59,7 +59,7 @@ std::vector<std::string> thread_problems(int requested) {
 
 ThreadPool::ThreadPool(int threads) {
   check(threads >= 1, "a pool has at least one thread");
-  // Loops nest a few deep.
+  // Loops are nested only a few deep.
   open_.reserve(4 * static_cast<std::size_t>(threads));
   helpers_.reserve(static_cast<std::size_t>(threads) - 1);
   for (int slot = 1; slot < threads; ++slot) helpers_.emplace_back([this, slot] { help(slot); });
@@ -92,7 +92,7 @@ void ThreadPool::run_tasks(Loop& loop, int slot) {
       loop.call(loop.work, task, slot);
     } catch (...) {
       const std::scoped_lock lock(mutex_);
-      // Tasks start in order: all lower ones have begun and will tell.
+      // Tasks start in order: all lower ones have begun and will report their errors.
       if (!loop.failure || task < loop.failed_task) {
         loop.failure = std::current_exception();
         loop.failed_task = task;

@@ -35,8 +35,8 @@ class ThreadPool {
   [[nodiscard]] int threads() const { return static_cast<int>(helpers_.size()) + 1; }
 
   /// Calls work(task, slot) once for every task in [0, count), in any order and at the same time.
-  /// `slot`, below threads(), is another one for each thread: a key to scratch memory. The
-  /// exception of the lowest task that failed is thrown here; tasks after it may not have run.
+  /// `slot`, below threads(), differs between threads: it is a key to scratch memory. Throws the
+  /// exception of the lowest task that failed; tasks after it may not have run.
   template <typename Work>
   void for_each(int count, Work&& work) {
     const auto call = [](void* context, int task, int slot) {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// For kernels only (see af_add_kernel): vectors of one register, 4, 8 or 16 lanes. For code whose
-// lanes do not meet each other; operations are per lane and never fused, so every width gives
-// identical bits. Beside vec16.h, whose vectors have 16 lanes at every width: GCC keeps those that
-// take several registers in memory.
+// For kernels only (see af_add_kernel): vectors of one register, 4, 8 or 16 lanes, for code whose
+// lanes do not meet each other. Operations are per lane and never fused, so every width gives
+// identical bits. The vectors of vec16.h have 16 lanes at every width; GCC keeps in memory those
+// that take several registers, so this file stands beside it.
 #pragma once
 
 #include <immintrin.h>

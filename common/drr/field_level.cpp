@@ -25,7 +25,7 @@ GridAxis halved_axis(const GridAxis& axis, const char* name) {
   return {first_mm, first_mm + 2.0 * axis.spacing_mm() * (nodes - 1), nodes};
 }
 
-/// All coarse nodes that a stored node of the level below touches.
+/// All coarse nodes that a stored node of the level below affects.
 NodeRange halved_range(const NodeRange& fine, const GridAxis& coarse) {
   const int begin = std::max(0, fine.begin - 1) / 2;
   const int end = std::min(coarse.nodes, fine.end() / 2 + 1);
@@ -54,7 +54,7 @@ class BorderedPlane {
 
   [[nodiscard]] int width() const { return width_; }
   [[nodiscard]] const std::uint16_t* samples() const { return samples_.data(); }
-  /// Where the first stored sample stands.
+  /// Where the first stored sample is.
   [[nodiscard]] std::uint16_t* stored() {
     return at(fine_.stored_s.begin - first_s_, fine_.stored_t.begin - first_t_);
   }

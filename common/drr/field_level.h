@@ -57,8 +57,8 @@ struct FieldLevel {
   [[nodiscard]] double blur_sigma_mm(bool with_resampling = false) const;
 };
 
-/// Fills memory in parts that may run at the same time, each knowing its number and how many there
-/// are.
+/// Fills memory in parts that may run at the same time. Each call gets its number and the number of
+/// parts.
 using FieldLevelFill = std::function<void(std::span<std::uint16_t> samples, int part, int parts)>;
 
 /// Provides memory for `count` samples and has it filled: by one call (samples, 0, 1), by several

@@ -16,8 +16,8 @@ namespace af {
 /// each ray's 16 neighbours.
 const std::vector<std::string>& field_look_up_names();
 
-/// The renderer of a way of field_look_up_names(); InputError when it is none of them. The threads
-/// of `pool` share a large DRR, but for "nearest" and "quadrilinear".
+/// The renderer for a name of field_look_up_names(); InputError for any other name. The threads of
+/// `pool` share a large DRR, except for "nearest" and "quadrilinear".
 std::shared_ptr<const DrrRenderer> make_field_renderer(
     std::shared_ptr<const CompressedAttenuationField> field,
     const std::string& look_up,

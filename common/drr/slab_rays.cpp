@@ -88,7 +88,8 @@ NodeRange Footprint::s_needed(const NodeRange& t) const {
 NodeRange Footprint::needed(const NodeRange& across, std::size_t axis) const {
   const NodeRange& box_across = axis == 0 ? s_ : t_;
   const NodeRange& box = axis == 0 ? t_ : s_;
-  // A node serves the cells on both its sides. Coordinates beyond the box are clamped to its edge.
+  // A node serves the cells on both of its sides. Coordinates beyond the box are clamped to its
+  // edge.
   constexpr double kRounding = 1e-3;
   double first = across.begin - 1 - margin_ - kRounding;
   double last = across.end() + margin_ + kRounding;

@@ -20,7 +20,7 @@ struct SlabRays {
   SlabRays(const RigidTransform& slab_from_room, const View& view);
 
   [[nodiscard]] std::array<Eigen::Vector3d, 4> corner_directions() const;
-  /// No ray is parallel to the planes or rises from them.
+  /// Whether all rays descend: none is parallel to the planes or rises from them.
   [[nodiscard]] bool all_descend() const;
   /// The hit points of a view's rays form a convex quadrilateral on each plane, so its corner rays
   /// decide.
@@ -51,7 +51,7 @@ class Footprint {
   /// Where the rays of the region's corners meet the plane, in node coordinates (s, t), in order
   /// around the quadrilateral.
   std::array<std::array<double, 2>, 4> corners_{};
-  /// Of the side from corner i to the next: change of the other coordinate with coordinate 0 or 1.
+  /// For the side from corner i to the next: change of the other coordinate with coordinate 0 or 1.
   std::array<std::array<double, 2>, 4> side_slopes_{};
   NodeRange s_;
   NodeRange t_;
@@ -60,8 +60,8 @@ class Footprint {
   [[nodiscard]] NodeRange needed(const NodeRange& across, std::size_t axis) const;
 };
 
-/// Counts the rays that miss a plane and zeroes their pixels in both outputs, each of any number of
-/// planes of the region's pixels.
+/// Counts the rays that miss a plane and zeroes their pixels in both outputs. Each output has any
+/// number of planes of the region's pixels.
 std::int64_t blank_rays_outside(const LightSlab& light_slab,
                                 const SlabRays& rays,
                                 std::span<float> planes,

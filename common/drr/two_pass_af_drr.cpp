@@ -101,7 +101,7 @@ Homography nodes_from_pixels(const NodeGrid& grid, const SlabRays& rays) {
   return homography;
 }
 
-/// What the gradients of a pose need of a slab's images (PoseSlopes has the mechanics).
+/// The values of a slab's images that the gradients of a pose need (PoseSlopes has the mechanics).
 PoseSlopes pose_slopes(const SlabImages& slab,
                        const SlabRays& rays,
                        const Eigen::Matrix3d& slab_from_room,
@@ -130,7 +130,7 @@ PoseSlopes pose_slopes(const SlabImages& slab,
   return slopes;
 }
 
-/// What the second pass needs of the first.
+/// The results of the first pass that the second pass needs.
 struct BlendNeeds {
   int margin;  ///< nodes around those that the rays hit
   bool slopes;
@@ -180,7 +180,8 @@ SlabImages upsampled(const SlabImages& slab, Workspace& workspace) {
   return fine;
 }
 
-/// Sobel's slopes of the value image along s and t, in the place of those along the source.
+/// Sobel's slopes of the value image along s and t, stored where the slopes along the source would
+/// be.
 SlabImages with_sobel_slopes(const SlabImages& slab, Workspace& workspace) {
   const auto sobel_slopes = select_kernel<SobelSlopes>(
       kernels_128::sobel_slopes, kernels_256::sobel_slopes, kernels_512::sobel_slopes);
@@ -191,11 +192,11 @@ SlabImages with_sobel_slopes(const SlabImages& slab, Workspace& workspace) {
   return {grid, {slab.images[0], along_s, along_t}};
 }
 
-/// Calls work(PixelGrid) for bands of the view's rows, shared by the threads of a pool. The first
-/// pass is not worth sharing: it takes as long for any detector.
+/// Calls work(PixelGrid) for bands of the view's rows, shared by the threads of a pool. Sharing the
+/// first pass does not pay: it takes the same time for any detector.
 template <typename Work>
 void for_each_band(const View& view, bool adds, ThreadPool& pool, const Work& work) {
-  // Smaller bands gain little or lose: another processor first has to fetch the node image.
+  // Smaller bands gain little, or lose: another processor first has to fetch the node image.
   constexpr int kPixelsPerBand = 65536;
   const int rows = std::max(1, kPixelsPerBand / view.roi.width);
   pool.for_each_block(view.roi.height, rows, [&](int begin, int end) {

@@ -28,8 +28,8 @@ CubicTaps cubic_slopes(double x) {
           0.5 * x * (3.0 * x - 2.0)};
 }
 
-/// Taps that lie inside: the weight of a node beyond the first or last one goes to the nodes that
-/// it continues linearly. At least four nodes.
+/// Moves the taps inside: the weight of a node beyond the first or last one goes to the nodes that
+/// it continues linearly. There are at least four nodes.
 CubicTaps folded(const CubicTaps& taps, int lower, int nodes) {
   if (lower == 0) return {taps[1] + 2.0 * taps[0], taps[2] - taps[0], taps[3], 0.0};
   if (lower == nodes - 2) return {0.0, taps[0], taps[1] - taps[3], taps[2] + 2.0 * taps[3]};
@@ -162,7 +162,7 @@ class AnyBlender : public ViewpointBlender {
   AxisInterpolation uv_;
 };
 
-/// Where a node's image values stand.
+/// Where the image values of a node are.
 BlendedImages at_node(const BlendedImages& images, const Footprint& footprint, int s, int t) {
   const std::ptrdiff_t offset =
       (t - footprint.t().begin) * images.stride + (s - footprint.s().begin);
@@ -224,7 +224,7 @@ class CompressedBlender final : public AnyBlender {
     }
   }
 
-  /// What viewpoints 2 tile and 2 tile + 1 add to a pair of nodes, unless that is nothing.
+  /// The contribution of viewpoints 2 tile and 2 tile + 1 to a pair of nodes, unless it is zero.
   void append_tile_tap(const ViewpointTap* pair,
                        int tile,
                        const TileAxis& axis,

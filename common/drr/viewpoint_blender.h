@@ -14,7 +14,7 @@ namespace af {
 /// in (u,v), where the field continues linearly beyond its first and last node.
 enum class AxisInterpolation { Linear, Cubic };
 
-/// Where one (s or t) coordinate's rays through the source meet the viewpoints along one axis.
+/// Where the rays of one (s or t) coordinate through the source meet the viewpoints along one axis.
 struct ViewpointTap {
   int first;                 ///< viewpoint of weights[0]
   float weights[kMostTaps];  ///< of first, first + 1, ...
@@ -41,22 +41,22 @@ struct BlendedImages {
   std::ptrdiff_t stride = 0;
 };
 
-/// First pass of a look-up: all rays of a DRR meet in the source, so the viewpoint (u, v) of a ray
-/// is an affine function of its (s, t), u of s and v of t alone. Blends the viewpoints around it
-/// for every (s,t) node.
+/// First pass of a look-up. All rays of a DRR meet in the source, so the viewpoint (u, v) of a ray
+/// is an affine function of its (s, t): u depends on s alone, v on t alone. For every (s,t) node
+/// this blends the viewpoints around it.
 class ViewpointBlender {
  public:
   virtual ~ViewpointBlender() = default;
 
-  /// Decides which rays are outside.
+  /// This geometry decides which rays are outside.
   [[nodiscard]] virtual const LightSlab& coverage() const = 0;
   /// The (s,t) nodes of slab k, in the order of coverage().slabs.
   [[nodiscard]] virtual const SlabGeometry& lattice(std::size_t k) const = 0;
   [[nodiscard]] virtual Footprint footprint(std::size_t k,
                                             const SlabRays& rays,
                                             int margin) const = 0;
-  /// Total attenuation of the rays from rays.source through the needed nodes of `footprint`; nodes
-  /// that are not stored are 0, those not needed are unspecified.
+  /// Total attenuation of the rays from rays.source through the needed nodes of `footprint`. Nodes
+  /// that are not stored are 0; nodes that are not needed are unspecified.
   virtual void blend(std::size_t k,
                      const SlabRays& rays,
                      const Footprint& footprint,

@@ -31,8 +31,8 @@ WarpRow row_of(const Homography& h, int32_t row) {
           static_cast<float>(h.d[1])};
 }
 
-/// A row's lanes in which the coordinates are least: along a row of pixels they run one way, but
-/// for rounding.
+/// The lanes of a row in which the coordinates are least: along a row of pixels they grow or fall,
+/// except for rounding.
 struct LeastLanes {
   Ints s, t;
 };
@@ -54,7 +54,7 @@ struct Cells {
   Window window;
 };
 
-/// What clamps coordinates: the largest numbers below the last node's.
+/// Upper limits for clamped coordinates: the largest numbers below those of the last node.
 struct Limits {
   float s, t;
 };
@@ -96,7 +96,7 @@ AF_NATIVE_INLINE Window window_of(const Cells& cells, const LeastLanes& least, i
   return window;
 }
 #else
-// Without instructions that pick lanes everything is gathered.
+// Without instructions that pick lanes, all values are gathered.
 AF_NATIVE_INLINE LeastLanes least_lanes(const WarpRow& /*row*/) {
   return LeastLanes();
 }
@@ -204,7 +204,7 @@ AF_NATIVE_INLINE void put(const PixelRun& run, float* values, Floats value) {
 }
 
 /// Calls work(row, cells, run) for all pixels. Arguments come as copies: the compiler cannot know
-/// that stores to pixels leave what references refer to alone, and would load it again and again.
+/// that stores to pixels do not change what references refer to, and would load it again and again.
 template <typename Work>
 AF_NATIVE_INLINE void for_each_run(NodeImage image,
                                    Homography homography,

@@ -46,7 +46,8 @@ struct PoseSlopes {
   float nodes_per_mm[2];  ///< along s, t
   float m_scale[2];       ///< m_x = m_scale[0] s + m_offset[0], m_z likewise of t
   float m_offset[2];
-  /// One row per room axis: what F + G, and (m_x, 1, m_z) x F and F + G, do to the derivatives.
+  /// One row per room axis: the share that F + G, and (m_x, 1, m_z) x F and F + G, have in the
+  /// derivatives.
   float translation_of_force[3][3];
   float rotation_of_moment[3][3];
   float rotation_of_force[3][3];

@@ -105,8 +105,8 @@ std::string xml_escaped(std::string_view text) {
   return result;
 }
 
-/// gnuplot writes colours as rgb(...), with and without blanks; this makes the neutral ones, blue
-/// and vermilion follow the reader's colour scheme.
+/// gnuplot writes colours as rgb(...), with and without blanks. This replaces the neutral ones,
+/// blue and vermilion, so that they follow the reader's colour scheme.
 constexpr const char* kDarkStyle =
     "<style>@media (prefers-color-scheme: dark) {"
     "[fill='rgb(31,41,51)'], [fill='rgb( 31,  41,  51)'] { fill: #DDE4EC }"

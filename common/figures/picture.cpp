@@ -53,8 +53,8 @@ std::size_t utf8_length(std::string_view text, std::size_t position) {
   return length;
 }
 
-/// Characters of a text, one string each; what is not UTF-8 (cairo would refuse all of it) becomes
-/// '?', and control characters but the line feed become blanks.
+/// Characters of a text, one string each. Bytes that are not UTF-8 (cairo would refuse the whole
+/// text) become '?'; control characters except the line feed become blanks.
 std::vector<std::string> characters_of(std::string_view text) {
   std::vector<std::string> characters;
   for (std::size_t i = 0; i < text.size();) {
@@ -351,7 +351,7 @@ void draw_scale(
     return color_of(width > 1 ? static_cast<double>(x) / (width - 1) : 0.5, panel.colors);
   });
   canvas.outline(x0 - 0.5, y0 - 0.5, width + 1, kBarHeight + 1, kFaintInk, 1.0);
-  // Both ends to the same decimals, which tell a hundredth of the window.
+  // Both ends get the same decimals, enough to tell a hundredth of the window.
   const double span = std::abs(panel.high - panel.low);
   const int decimals = span > 0.0 && std::isfinite(span)
                            ? std::clamp(2 - static_cast<int>(std::floor(std::log10(span))), 0, 9)
@@ -378,7 +378,7 @@ void draw_row(Canvas& canvas,
     const PicturePanel& panel = panels[row.first + i];
     const PanelText& text = texts[row.first + i];
     const int x = kMargin + static_cast<int>(i) * (layout.cell_width + kGap);
-    // Titles stand on their image, however many lines the neighbours' need.
+    // Titles stand directly above their image, however many lines the neighbours' titles need.
     const int title_height = lines_height(text.title, layout.title) + kSmallGap;
     const int image_y = y + row.title_height;
     draw_lines(canvas, text.title, x, image_y - title_height, layout.title, kInk);
@@ -403,7 +403,8 @@ void check_panels(const std::vector<PicturePanel>& panels, int columns, int zoom
   }
 }
 
-/// Refuses what cairo or memory could not hold. In 64 bits: zoomed sizes may overflow an int.
+/// Refuses pictures that cairo or memory could not hold. In 64 bits, because zoomed sizes may
+/// overflow an int.
 void check_size(const std::vector<PicturePanel>& panels, int columns, int zoom) {
   constexpr std::int64_t kMaxSide = 30000;
   constexpr std::int64_t kMaxArea = 400'000'000;

@@ -17,8 +17,8 @@ namespace {
 
 constexpr mode_t kOwnerOnly = 0600;
 
-/// A file in `folder` that no name leads to; -1 with errno. Network file systems cannot make one
-/// without a name: there it loses its name at once.
+/// Opens a file in `folder` that has no name; -1 with errno. Network file systems cannot make a
+/// file without a name: there this removes the name at once.
 int open_nameless(const std::filesystem::path& folder) {
   const int file = open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, kOwnerOnly);
   if (file >= 0 || (errno != EOPNOTSUPP && errno != EISDIR)) return file;
@@ -44,7 +44,7 @@ void FileBackedMemory::grow(std::size_t bytes) {
   };
   if (file_ < 0) file_ = open_nameless(folder_);
   if (file_ < 0) refuse(errno);
-  // A page without a place on the disk would end the program when it is written to.
+  // Writing to a page that has no place on the disk would end the program.
   int error = EINTR;
   while (error == EINTR)
     error = posix_fallocate(

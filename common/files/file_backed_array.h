@@ -9,17 +9,18 @@
 
 namespace af {
 
-/// Memory with a file behind it, to which the system writes what does not fit: there can be more of
-/// it than the machine, or its batch job, has. The file has no name and ends with the program.
+/// Memory backed by a file, to which the system writes what does not fit. So there can be more of
+/// it than the machine, or its batch job, has. The file has no name and disappears with the
+/// program.
 class FileBackedMemory {
  public:
-  /// `folder` must exist once resize() is called.
+  /// `folder` must exist when resize() is called.
   explicit FileBackedMemory(std::filesystem::path folder) : folder_(std::move(folder)) {}
   ~FileBackedMemory();
   FileBackedMemory(const FileBackedMemory&) = delete;
   FileBackedMemory& operator=(const FileBackedMemory&) = delete;
 
-  /// What there is stays, perhaps at another address; what is new is zero. FileError naming the
+  /// Existing content stays, perhaps at another address; new content is zero. FileError naming the
   /// folder when its disk has no room.
   void grow(std::size_t bytes);
   [[nodiscard]] std::byte* data() const { return data_; }
@@ -40,7 +41,7 @@ class FileBackedArray {
  public:
   explicit FileBackedArray(std::filesystem::path folder) : memory_(std::move(folder)) {}
 
-  /// Elements whose bytes are zero, to be assigned; valid until the next call. FileError.
+  /// Elements whose bytes are zero, for the caller to assign; valid until the next call. FileError.
   std::span<T> append(std::size_t count) {
     const std::size_t before = view().size();
     memory_.grow((before + count) * sizeof(T));

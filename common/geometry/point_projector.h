@@ -5,8 +5,9 @@
 
 namespace af {
 
-/// Projects many points by one camera, with the very bits of CameraGeometry's depth_mm() and
-/// project(): what these work out anew for each point is worked out once. The camera outlives it.
+/// Projects many points by one camera, with exactly the bits of CameraGeometry's depth_mm() and
+/// project(). Those compute some values anew for each point; this computes them once. The camera
+/// outlives it.
 class PointProjector {
  public:
   explicit PointProjector(const CameraGeometry& camera)

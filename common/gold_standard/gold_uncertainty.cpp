@@ -19,7 +19,7 @@ using Eigen::Vector3d;
 constexpr std::uint64_t kGoldStream = 0x676F6C64;  // "gold"
 constexpr std::size_t kPoseParameters = 6;
 
-/// The views as the gold pose itself would be seen.
+/// The views in which the gold pose itself would show the fiducials.
 std::vector<FiducialView> projected_views(const FiducialGold& gold,
                                           std::span<const FiducialView> views,
                                           std::span<const Vector3d> fiducials_ct_mm) {
@@ -58,7 +58,7 @@ double replicate_tre_mm(const FiducialGold& gold,
                        gold.room_from_ct,
                        target_points_ct_mm);
   } catch (const InputError&) {
-    // Noise that leaves no pose at all.
+    // This noise leaves no pose at all.
     return std::numeric_limits<double>::infinity();
   }
 }

@@ -91,8 +91,9 @@ RankFailure plain_failure_of(const std::exception_ptr& error) {
   }
 }
 
-/// A shared-memory window and the handle that frees it on every rank. Freeing waits for all ranks:
-/// it is left to the end of the process when an error passes, which may be of this rank alone.
+/// A shared-memory window and the handle that frees it on every rank. Freeing waits for all ranks.
+/// When an exception passes, it may be on this rank alone; then freeing is left to the end of the
+/// process.
 struct NodeWindow {
   MPI_Win window = MPI_WIN_NULL;
   int exceptions = std::uncaught_exceptions();
@@ -196,7 +197,7 @@ std::shared_ptr<const std::byte> Communicator::allocate_on_node_together(
   const Communicator on_node = node();
   auto owner = std::make_shared<NodeWindow>();
   std::byte* base = nullptr;
-  // Open MPI aligns as it likes, to 8 bytes on two ranks.
+  // Open MPI chooses the alignment, on two ranks 8 bytes.
   const auto my_bytes =
       static_cast<MPI_Aint>(on_node.is_root() ? bytes + kNodeMemoryAlignment - 1 : 0);
   require_success(MPI_Win_allocate_shared(
@@ -211,7 +212,8 @@ std::shared_ptr<const std::byte> Communicator::allocate_on_node_together(
       on_node.is_root() ? (kNodeMemoryAlignment - beyond) % kNodeMemoryAlignment : 0};
   on_node.maximum(skipped);
   base += skipped[0];
-  // All nodes: ranks of another would go on to a collective call that these never reach.
+  // On all nodes: ranks of another node would otherwise go on to a collective call that these ranks
+  // never reach.
   all_or_none(*this,
               [&] { fill(std::span<std::byte>(base, bytes), on_node.rank(), on_node.size()); });
   on_node.barrier();
@@ -244,7 +246,7 @@ std::shared_ptr<const std::byte> Communicator::allocate_on_nodes_from_root(
 }
 
 RankFailure first_failure(const Communicator& communicator, const RankFailure& mine) {
-  // The common case costs one small reduction; texts travel only when somebody failed.
+  // The common case costs one small reduction; texts are sent only when a rank failed.
   std::array<std::uint64_t, 1> any{mine.exit_code != 0 ? std::uint64_t{1} : std::uint64_t{0}};
   communicator.maximum(any);
   if (any[0] == 0) return {};
@@ -253,7 +255,7 @@ RankFailure first_failure(const Communicator& communicator, const RankFailure& m
   for (std::size_t rank = 0; rank < parts.size(); ++rank) {
     RankFailure failure = failure_from(parts[rank]);
     if (failure.exit_code == 0) continue;
-    // When every rank met the same error, as with a bad option, its rank says nothing.
+    // When every rank met the same error, for example a bad option, the message names no rank.
     const bool is_shared = std::all_of(
         parts.begin(), parts.end(), [&](const auto& part) { return part == parts[rank]; });
     if (!is_shared && parts.size() > 1)
@@ -266,7 +268,7 @@ RankFailure first_failure(const Communicator& communicator, const RankFailure& m
 
 RankFailure failure_of(const std::exception_ptr& error) {
   RankFailure failure = plain_failure_of(error);
-  // What a rank was at tells more than its number; a stop is no failure.
+  // The unit that a rank was at tells more than its number; a stop is not a failure.
   const std::string unit = take_failed_unit();
   if (!unit.empty() && failure.exit_code != static_cast<int>(ExitCode::Stopped))
     failure.message = unit + ": " + failure.message;

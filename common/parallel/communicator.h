@@ -32,8 +32,7 @@ class Communicator {
   void sum(std::span<std::uint64_t> values) const;
   /// Collective. Element-wise maxima, in place.
   void maximum(std::span<std::uint64_t> values) const;
-  /// Collective. `bytes` of rank 0 replace those of every rank (any size; sent in pieces below 2
-  /// GiB).
+  /// Collective. Copies `bytes` of rank 0 to every rank (any size; sent in pieces below 2 GiB).
   void broadcast(std::vector<std::byte>& bytes) const;
   void broadcast(std::string& text) const;
   /// Collective. Every rank's bytes, in rank order, on every rank.
@@ -50,8 +49,8 @@ class Communicator {
   /// thrown on every rank of every node.
   [[nodiscard]] std::shared_ptr<const std::byte> allocate_on_node(
       std::size_t bytes, const std::function<void(std::span<std::byte>)>& fill) const;
-  /// The same, filled together: `fill` runs on every rank of the node and gets all the memory, its
-  /// own number and how many they are.
+  /// Collective. The same, filled together: `fill` runs on every rank of the node and gets the
+  /// whole memory, its own number and the number of ranks.
   [[nodiscard]] std::shared_ptr<const std::byte> allocate_on_node_together(
       std::size_t bytes,
       const std::function<void(std::span<std::byte>, int part, int parts)>& fill) const;
@@ -85,9 +84,9 @@ RankFailure failure_of(const std::exception_ptr& error);
 /// Throws the failure as a RemoteError with its exit code.
 [[noreturn]] void throw_failure(const RankFailure& failure);
 
-/// Collective. Runs `function` on every rank; when it throws on any, every rank throws the same
-/// error. Wrap whatever may fail on some ranks only, before the next collective call, or the others
-/// wait for ever.
+/// Collective. Runs `function` on every rank; when it throws on any rank, every rank throws the
+/// same error. Before the next collective call, wrap everything that may fail on some ranks only;
+/// otherwise the other ranks wait for ever.
 template <typename Function>
 std::invoke_result_t<Function> all_or_none(const Communicator& communicator, Function&& function) {
   using Result = std::invoke_result_t<Function>;

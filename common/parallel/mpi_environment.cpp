@@ -16,7 +16,7 @@ std::atomic<bool> abort_required = false;
 
 MpiEnvironment::MpiEnvironment(int& argc, char**& argv) {
   // Open MPI would make a file per rank beside each file that ranks open together, for shared file
-  // pointers, which nothing here uses. What the user has set stays.
+  // pointers, which we never use. A setting by the user stays.
   setenv("OMPI_MCA_sharedfp", "^lockedfile", 0);
   int provided = 0;
   MPI_Init_thread(&argc, &argv, MPI_THREAD_FUNNELED, &provided);
@@ -29,7 +29,7 @@ MpiEnvironment::~MpiEnvironment() {
 void MpiEnvironment::abort(int exit_code) {
   int ranks = 1;
   MPI_Comm_size(MPI_COMM_WORLD, &ranks);
-  // A rank alone has nobody to tell.
+  // With one rank there is nobody to notify.
   if (ranks > 1) MPI_Abort(MPI_COMM_WORLD, exit_code);
   std::_Exit(exit_code);
 }

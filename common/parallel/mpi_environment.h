@@ -15,7 +15,7 @@ class MpiEnvironment {
   /// Ends every rank of the job with `exit_code`, at once.
   [[noreturn]] static void abort(int exit_code);
 
-  /// From now on this rank can only end by abort(): a library is in a state in which finalising
+  /// From now on this rank can only end by abort(): a library is in a state in which finalising MPI
   /// would hang or crash.
   static void require_abort();
   [[nodiscard]] static bool is_abort_required();

@@ -20,7 +20,7 @@ namespace {
 constexpr int kRequestTag = 11;
 constexpr int kGrantTag = 12;
 
-/// What all ranks do.
+/// What every rank needs to do items.
 struct Job {
   std::int64_t count = 0;
   const std::function<void(std::int64_t item)>& work;
@@ -80,16 +80,16 @@ class Ledger {
   std::int64_t done_ = 0;
 };
 
-/// What a worker says when it asks for work: how many items it has finished since, and whether one
-/// failed.
+/// The message by which a worker asks for work: how many items it has finished since the last one,
+/// and whether one failed.
 struct Request {
   std::int64_t finished = 0;
   std::int64_t has_failed = 0;
 };
 
-/// Answers one request when there is one; `active_workers` falls when a worker is sent home.
-/// Messages, not one-sided windows: those fail across hosts over TCP or stall while the target
-/// computes.
+/// Answers one request when there is one; `active_workers` falls when a worker gets no more work.
+/// This uses messages, not one-sided windows: those fail across hosts over TCP, or stall while the
+/// target computes.
 bool answer_request(MPI_Comm handle, Ledger& ledger, int& active_workers) {
   int arrived = 0;
   MPI_Status status;
@@ -120,8 +120,8 @@ RankFailure work_until_empty(const Job& job, Ledger& ledger) {
   return {};
 }
 
-/// Rank 0 computes in a second thread, so that a long item does not keep other ranks waiting; MPI
-/// stays in this one.
+/// Rank 0 computes in a second thread, so that a long item does not keep other ranks waiting. MPI
+/// stays in this thread.
 RankFailure run_as_manager(const Communicator& communicator, const Job& job) {
   Ledger ledger(job.count, communicator.size());
   RankFailure failure;

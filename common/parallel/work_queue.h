@@ -8,12 +8,12 @@
 
 namespace af {
 
-/// Hands out item numbers 0 ... count - 1 to whichever rank is free, each exactly once, in
-/// shrinking blocks. Rank 0 answers and works too, in a thread of its own: `work` must not call
-/// MPI. What an item yields must not depend on who does it. Collective: returns on every rank when
-/// all items are done. When `work` throws on one rank no further items are handed out and the error
-/// is thrown on every rank. `on_progress` is called on rank 0, outside that thread, with the number
-/// of finished items.
+/// Hands out item numbers 0 ... count - 1 to the ranks as they become free, each exactly once, in
+/// shrinking blocks. Rank 0 answers requests and works too, in a thread of its own: `work` must not
+/// call MPI. The result of an item must not depend on the rank that computes it. Collective:
+/// returns on every rank when all items are done. When `work` throws on one rank, no further items
+/// are handed out, and every rank throws the error. `on_progress` is called on rank 0, outside that
+/// thread, with the number of finished items.
 void for_each_item(const Communicator& communicator,
                    std::int64_t count,
                    const std::function<void(std::int64_t item)>& work,

@@ -18,7 +18,8 @@ namespace af {
 
 namespace {
 
-/// Written and read letter by letter, without a lock: only for messages, half of it may be new.
+/// Written and read letter by letter, without a lock. It serves messages only, so a text that is
+/// half old and half new does no harm.
 class SharedText {
  public:
   void set(std::string_view text) {
@@ -40,7 +41,7 @@ class SharedText {
   std::array<std::atomic<char>, 255> letters_{};
 };
 
-/// What one rank is at, seen by the others of its host.
+/// What one rank is doing, seen by the others of its host.
 struct RankNote {
   std::atomic<std::int64_t> since_ns = 0;        ///< the last progress; 0: nothing in work
   std::atomic<std::int64_t> limit_ns = 0;        ///< of what is in work; 0: the watchdog's own
@@ -77,8 +78,8 @@ std::string set_text(const std::string& what) {
 
 constexpr double kNsPerMinute = 60e9;
 
-// In limits: a thread of a busy machine may be late, but not by as much as that; and when nobody of
-// a host works, the host of who does has had the time to say so.
+// In limits. A thread of a busy machine may be late, but not by as much as this. And when no rank
+// of a host works, the host of the stuck rank has had the time to report it.
 constexpr std::int64_t kPatienceWithStopped = 2;
 constexpr std::int64_t kPatienceWithHosts = 3;
 
@@ -127,7 +128,7 @@ void WorkNote::change(const std::string& what) {
 void note_progress() {
   RankNote& note = *my_note;
   std::int64_t since_ns = note.since_ns;
-  // Another thread may end the work meanwhile: that must not begin again.
+  // Another thread may end the work meanwhile; then it must not begin again.
   while (since_ns != 0 && !note.since_ns.compare_exchange_weak(since_ns, now_ns())) {
   }
 }
@@ -214,10 +215,11 @@ void StallWatch::watch() {
   (*my_note).ticked_ns = 0;
 }
 
-// `now`: of the tick. Read later, it would count time for which the job was stopped in between.
+// `now` is the time of the tick. A later reading would count time for which the job was stopped in
+// between.
 
-/// Who is stuck, the longest of them: at one thing for too long without waiting, or not running at
-/// all (stopped), wherever it was then.
+/// The rank that has been stuck for longest: busy with one thing for too long without waiting, or
+/// not running at all (stopped), wherever it was then.
 std::optional<StallWatch::Stuck> StallWatch::longest_stuck(std::int64_t now,
                                                            std::int64_t watched_since_ns) const {
   const auto age_of = [&](std::int64_t since_ns) {
@@ -227,7 +229,8 @@ std::optional<StallWatch::Stuck> StallWatch::longest_stuck(std::int64_t now,
   for (const RankNote& note : board_->notes) {
     const std::int64_t own_limit = note.limit_ns;
     const std::int64_t limit = own_limit == 0 ? limit_ns_ : std::min(own_limit, limit_ns_);
-    // Who waits is not stuck. A busy machine lets a thread wait, too, but not as long as that.
+    // A waiting rank is not stuck. A busy machine makes a thread wait, too, but not for as long as
+    // this.
     const std::int64_t works_ns = note.waits_since_ns != 0 ? 0 : age_of(note.since_ns);
     const std::int64_t still_ns = age_of(note.ticked_ns);
     const bool is_stopped = still_ns > kPatienceWithStopped * limit_ns_;

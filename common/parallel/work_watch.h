@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What every rank is at, for messages and for the watchdog.
+// What every rank is doing, for messages and for the watchdog.
 #pragma once
 
 #include <atomic>
@@ -21,8 +21,8 @@ class WorkNote {
  public:
   enum class Kind { Phase, Unit };
 
-  /// `limit_minutes`: of the watchdog for this note, when it is less than the watchdog's own. A
-  /// note within without one shares it and is named after this.
+  /// `limit_minutes`: the watchdog's limit for this note, when it is less than the watchdog's own.
+  /// An inner note without a limit shares this limit, and is reported under this note's text.
   explicit WorkNote(const std::string& what, Kind kind = Kind::Unit, double limit_minutes = 0.0);
   ~WorkNote();
   WorkNote(const WorkNote&) = delete;
@@ -40,11 +40,11 @@ class WorkNote {
   bool limit_is_of_outer_;
 };
 
-/// A unit that takes long has come a step further.
+/// A unit that takes long has made progress.
 void note_progress();
 
-/// This rank is in a call that waits for other ranks as long as the note lives: if that takes long,
-/// it is others who are stuck.
+/// As long as the note lives, this rank is in a call that waits for other ranks. If that takes
+/// long, other ranks are stuck.
 class WaitNote {
  public:
   WaitNote();
@@ -59,18 +59,19 @@ class WaitNote {
 /// The unit that the exception just caught in this thread has left, once; empty when there is none.
 std::string take_failed_unit();
 
-/// Whether this rank is the one to report why the job ends: the first of its host that asks, as far
-/// as there is a StallWatch.
+/// Whether this rank is the one that reports why the job ends: the first of its host that asks, if
+/// there is a StallWatch.
 bool claim_report();
 
 /// Name of this host.
 std::string host_name();
 
-/// Watches the ranks of every host from a thread of each: when one makes no progress, for whatever
-/// reason (it computes for ever, hangs in the file system, is stopped), `on_stall` is called on one
-/// rank of its host with a text that names rank, host and unit. It must end the job. The others
-/// of its host find a process that is stopped, also while it waits: its watching thread stands,
-/// too. \test WorkWatch.NamesTheRankThatIsStuckNotThoseThatWaitForIt
+/// Watches the ranks of every host from a thread of each rank. When a rank makes no progress, for
+/// whatever reason (it computes for ever, hangs in the file system, is stopped), `on_stall` is
+/// called on one rank of its host with a text that names rank, host and unit; it must end the job.
+/// When a process is stopped, its own watching thread stands still, too; the other ranks of its
+/// host find it, also when it was waiting.
+/// \test WorkWatch.NamesTheRankThatIsStuckNotThoseThatWaitForIt
 class StallWatch {
  public:
   using OnStall = std::function<void(const std::string& message)>;

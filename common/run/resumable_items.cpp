@@ -100,7 +100,7 @@ void ResumableItems::append(std::int64_t item, std::span<const std::byte> result
 
 void ResumableItems::save(const std::string& what) {
   all_or_none(communicator_, [&] { shard_->sync(); });
-  // Ranks may have seen the request at different times: one that did is enough.
+  // Ranks may see the request at different times; it is enough that one has seen it.
   std::array<std::uint64_t, 1> stops = {is_stop_requested() ? 1U : 0U};
   communicator_.maximum(stops);
   if (stops[0] == 0) return;

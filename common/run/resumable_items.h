@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Numbered items of work shared over ranks, each finished one kept, so that a stopped or killed run
-// goes on.
+// Numbered items of work shared over ranks. Finished items are kept, so that a stopped or killed
+// run can continue.
 #pragma once
 
 #include <cstddef>
@@ -18,7 +18,7 @@
 
 namespace af {
 
-/// Work as it is begun, or gone on with.
+/// Work as a new run begins it, or as a later run continues it.
 struct UnfinishedWork {
   std::filesystem::path folder;  ///< progress_folder() of the output
   std::string name;              ///< of its files; several may share a folder
@@ -26,34 +26,37 @@ struct UnfinishedWork {
   bool restarts = false;         ///< throws away what there is
 };
 
-/// What every rank finishes goes to a shard of one journal: no result passes through rank 0 until
-/// all are there. The result of an item must not depend on who makes it, nor on anything that
-/// `decides` does not say. \test ResumableItems.DoesOnlyWhatNoEarlierRunFinished
+/// Every rank appends what it finishes to a shard of its own in one journal: no result passes
+/// through rank 0 until all are there. The result of an item must not depend on the rank that makes
+/// it, nor on anything that `decides` does not name.
+/// \test ResumableItems.DoesOnlyWhatNoEarlierRunFinished
 class ResumableItems {
  public:
   using Work = std::function<std::vector<std::byte>(std::int64_t item)>;
   using Receive = std::function<void(std::int64_t item, std::span<const std::byte> result)>;
 
-  /// Collective. Opens or creates the journal. InputError that names the difference when it was
-  /// begun with other options or inputs.
+  /// Collective. Opens or creates the journal. InputError that names the difference when an earlier
+  /// run began it with other options or inputs.
   ResumableItems(const UnfinishedWork& work, const Communicator& communicator);
 
   /// Collective. Does those of `items` (ascending, each at least 0, the same on every rank) that no
-  /// run has finished, shared over the ranks as these become free; `work` must not call MPI. Says
-  /// on rank 0 how far `what` ("case skull, field registrations"; empty: silent) has come. When a
-  /// stop was asked for on any rank, items are passed over and StoppedError is thrown on every
-  /// rank, with what is finished saved.
+  /// run has finished, shared over the ranks as these become free; `work` must not call MPI. Rank 0
+  /// reports the progress of `what` ("case skull, field registrations"; empty: no report). When any
+  /// rank was asked to stop, the remaining items are passed over and every rank throws
+  /// StoppedError, with everything finished saved.
   void complete(const std::vector<std::int64_t>& items, const std::string& what, const Work& work);
 
-  /// Rank 0, after complete(): calls `receive` with each of its items' results, in any order, more
-  /// than once when several runs made one: they are alike. FileError when some are gone.
+  /// Rank 0, after complete(): calls `receive` with the result of each of its items, in any order.
+  /// When several runs made the same item, it is called with each of the results, which are equal.
+  /// FileError when some are missing.
   void visit(const Receive& receive) const;
 
  private:
   /// Collective. Those of `items` that no earlier run finished.
   [[nodiscard]] std::vector<std::int64_t> unfinished(const std::vector<std::int64_t>& items) const;
   void append(std::int64_t item, std::span<const std::byte> result);
-  /// Collective. Makes what was appended survive the machine; StoppedError when one was asked for.
+  /// Collective. Makes the appended items survive a crash of the machine; StoppedError when a stop
+  /// was asked for.
   void save(const std::string& what);
 
   std::filesystem::path folder_;

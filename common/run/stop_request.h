@@ -22,8 +22,7 @@ void listen_for_stop_requests();
 /// from any thread. \test StopRequest.ComesWhenTheHoursAreOver
 bool is_stop_requested();
 
-/// What asked for the stop that has come: "SIGUSR1", "--max-hours 2"; empty when this rank does not
-/// know.
+/// What asked for the stop: "SIGUSR1", "--max-hours 2"; empty when this rank does not know.
 std::string stop_reason();
 
 }  // namespace af

@@ -9,10 +9,11 @@
 
 namespace af {
 
-/// The camera as it truly stands when calibration missed it: moved detector (in its plane, turned
-/// about its middle) and source (along the beam), drawn with independent normal errors keyed by
-/// (seed, key), then scaled together so that the projections of the box's corners move by exactly
-/// `error_px` RMS. \test CalibrationError.MovesTheTargetBoxByTheStatedRms
+/// The true camera behind a wrong calibration. Its detector is moved in its plane and turned about
+/// its middle, its source is moved along the beam. The errors are drawn from independent normal
+/// distributions keyed by (seed, key), and then scaled together so that the projections of the
+/// box's corners move by exactly `error_px` RMS.
+/// \test CalibrationError.MovesTheTargetBoxByTheStatedRms
 CameraGeometry camera_with_calibration_error(const CameraGeometry& camera,
                                              const RigidTransform& room_from_ct,
                                              const CtBox& box_ct,

@@ -9,7 +9,7 @@
 
 namespace af {
 
-/// What scatters: the object alone, or the open beam beside it as well (air, walls, glare).
+/// The source of scatter: the object alone, or also the open beam beside it (air, walls, glare).
 enum class ScatterSource { Object, ObjectAndOpenBeam };
 
 /// What the detector adds to the primary beam. A value of 0 switches its effect off.

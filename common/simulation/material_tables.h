@@ -23,8 +23,8 @@ double density_g_per_cm3(Material material);
 /// Linear attenuation coefficient (1/mm) at that density.
 double linear_attenuation_per_mm(Material material, double energy_kev);
 
-/// The energy (keV) at which water attenuates with `mu_water_per_mm`: what a CT's HU scale with
-/// that constant stands for. Throws InputError when no energy of the tables does.
+/// The energy (keV) at which water attenuates with `mu_water_per_mm`: the effective energy of a CT
+/// whose HU scale has that constant. Throws InputError when the tables have no such energy.
 double effective_energy_kev(double mu_water_per_mm);
 
 }  // namespace af

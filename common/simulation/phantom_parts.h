@@ -30,7 +30,7 @@ struct Phantom {
 /// Voxels of a phantom; metal at its full HU.
 CtVolume sample_phantom(const Phantom& phantom, const PhantomOptions& options);
 
-/// What a scanner of 12 bits writes: values above 3071 HU, metal's, become 3071.
+/// Clips values above 3071 HU (metal) to 3071, as a scanner of 12 bits does.
 CtVolume with_scanner_range(const CtVolume& ct);
 
 /// HU of tissues, typical at 120 kV, and of titanium at the effective energy of the HU scale.
@@ -52,9 +52,9 @@ Solid elliptic_cylinder(const Eigen::Vector3d& center, const Eigen::Vector3d& ha
 /// The other half of a body that has a mirror image: x changes sign.
 Eigen::Vector3d mirrored(const Eigen::Vector3d& point, double side);
 
-/// Appends a bone as cortical shell and textured cancellous core: shells of all parts of a bone
-/// come first, so that no shell cuts through the core of a part it is joined to. Cores are appended
-/// when the painter goes.
+/// Appends a bone as cortical shell and textured cancellous core. The shells of all parts of a bone
+/// come first, so that no shell cuts through the core of a part that it joins. Cores are appended
+/// when the painter is destroyed.
 class BonePainter {
  public:
   explicit BonePainter(std::vector<Solid>& solids, double shell_mm = 1.6)

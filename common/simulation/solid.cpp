@@ -17,7 +17,7 @@ namespace {
 constexpr double kTextureScaleMm = 3.0;
 constexpr int kAirHu = -1000;
 
-/// The points that one slice of voxels is the mean of.
+/// The sample points whose mean is one slice of voxels.
 struct SliceSamples {
   Eigen::Vector3d first_point;
   Eigen::Vector3d step_mm;

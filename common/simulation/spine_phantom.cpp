@@ -143,7 +143,7 @@ std::vector<Solid> spine_phantom_solids(bool has_metal) {
   std::vector<Solid> solids;
   add_soft_tissue(solids);
   add_ribs(solids);
-  // One vertebra more at each end: the volume cuts through them, as a scan does.
+  // One more vertebra at each end: the volume cuts through them, as a scan does.
   for (int level = -kVertebraeEachSide - 1; level <= kVertebraeEachSide; ++level)
     add_disc(level, solids);
   for (int level = -kVertebraeEachSide - 1; level <= kVertebraeEachSide + 1; ++level)

@@ -76,7 +76,7 @@ std::string non_finite_text(double value) {
 /// Splits CSV text into records (RFC 4180; LF or CRLF).
 class CsvTable::Parser {
  public:
-  /// `next_part` gives the text, in parts; empty at its end.
+  /// `next_part` gives the text in parts, and an empty one at its end.
   Parser(std::function<std::string_view()> next_part, const std::string& path)
       : next_part_(std::move(next_part)), path_(path), part_(next_part_()) {
     if (part_.starts_with(kByteOrderMark)) part_.remove_prefix(kByteOrderMark.size());
@@ -133,7 +133,7 @@ class CsvTable::Parser {
         throw FileError(here(), "a quote inside a field that does not begin with one");
       field.push_back(peek());
     }
-    // A carriage return that ends a line is not of the field.
+    // A carriage return that ends a line does not belong to the field.
     if (field.ends_with('\r') && peek() == '\n') field.pop_back();
     return field;
   }

@@ -18,8 +18,8 @@ class CsvTable {
   /// FileError naming path and line when a row has the wrong number of fields, quotes are
   /// unbalanced, a column name is repeated, a row has more than 64 MiB, or the file is empty.
   static CsvTable read(const std::filesystem::path& path);
-  /// Tables of a few thousand rows each, in order, of a file too long to be held; at least one.
-  /// FileError as of read(), once the parts before have been received.
+  /// Reads a file that is too long to be held, in tables of a few thousand rows each, in order; at
+  /// least one. FileError as read(), after the parts before the error have been received.
   /// \test CsvTable.IsReadInPartsLikeAsAWhole
   static void read_in_parts(const std::filesystem::path& path,
                             const std::function<void(const CsvTable& part)>& receive);

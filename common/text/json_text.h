@@ -6,9 +6,10 @@
 
 namespace af {
 
-/// The value of a JSON text from `file`; FileError naming the file when it is none, or nests deeper
-/// than 64 levels: copying, comparing and writing a value call themselves for every level, so that
-/// deep ones would exhaust the stack. \test JsonText.RefusesWhatIsNestedTooDeeply
+/// The value of a JSON text from `file`. FileError naming the file when the text is not JSON, or
+/// nests deeper than 64 levels: copying, comparing and writing a value are recursive, so that deep
+/// nesting would exhaust the stack.
+/// \test JsonText.RefusesWhatIsNestedTooDeeply
 nlohmann::json json_of_text(const std::string& text, const std::string& file);
 
 /// The same with the keys in the order of the text.

@@ -5,7 +5,7 @@
 
 namespace af {
 
-/// A word quoted for a shell where it must be.
+/// A word, quoted for a shell where it needs quotes.
 std::string shell_quoted(const std::string& word);
 
 }  // namespace af

@@ -35,7 +35,7 @@ std::string line_and_column(const toml::source_position& position) {
   return std::to_string(position.line) + ":" + std::to_string(position.column);
 }
 
-/// Appends a value as TOML on one line; stops where messages end anyway.
+/// Appends a value as TOML on one line; stops at the length at which messages are cut.
 void append_value(std::string& text, const toml::node& node) {
   constexpr std::size_t kLongEnough = 200;
   if (text.size() > kLongEnough) return;
@@ -88,7 +88,7 @@ int edit_distance(std::string_view a, std::string_view b) {
   return at(a.size(), b.size());
 }
 
-/// The known name that `name` probably means; empty when none is near.
+/// The known name that `name` probably means; empty when none is similar.
 std::string nearest_name(std::string_view name, const std::set<std::string>& known) {
   std::string nearest;
   int least = std::max(2, static_cast<int>(name.size()) / 3) + 1;

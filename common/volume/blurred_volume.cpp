@@ -46,7 +46,7 @@ VolumeBlur::Axis VolumeBlur::make_axis(double spacing_mm, double sigma_mm) {
   axis.factor = std::max(1, static_cast<int>(0.5 * sigma_mm / spacing_mm));
   const double interpolation = (axis.factor * axis.factor - 1) / 6.0;
   axis.weights = weights_of_variance(std::pow(sigma_mm / spacing_mm, 2) - interpolation);
-  // The fine volume's outermost voxels are 0: so is the coarse one's first.
+  // The outermost voxels of the fine volume are 0; so is the first voxel of the coarse one.
   axis.first = -axis.radius();
   return axis;
 }
@@ -109,7 +109,7 @@ void VolumeBlur::fill(const AttenuationVolume& from, std::span<std::uint16_t> vo
       static_cast<std::size_t>(fine_size_[0]) * static_cast<std::size_t>(fine_size_[1]);
   std::vector<float> along_rows(static_cast<std::size_t>(grid_.size[0]) *
                                 static_cast<std::size_t>(fine_size_[1]));
-  // The slices that one coarse slice needs, each in its turn's place.
+  // The slices that one coarse slice needs, each at its place in the rotation.
   std::vector<std::vector<float>> slices(z.weights.size(), std::vector<float>(area));
   std::vector<float> sums(area);
   int next = 0;

@@ -54,7 +54,7 @@ class BundleMaker {
     for (int axis = 0; axis < 3; ++axis) {
       const int last = grid.size[static_cast<std::size_t>(axis)] - 1;
       // Keeps single precision positions inside the border cells, whose outermost part attenuates
-      // next to nothing.
+      // almost nothing.
       const double margin = std::max(1e-3, 2e-6 * last);
       low_[axis] = margin;
       high_[axis] = last - margin;

@@ -12,7 +12,7 @@
 
 namespace af::evaluation {
 
-/// Poses with less foreground than this say nothing about a field and are drawn again.
+/// Poses with less foreground than this say nothing about a field, and are drawn again.
 inline constexpr double kLeastForegroundFraction = 0.01;
 
 /// Random pose `attempt` of item `index`: uniform and independent in the six parameters over the

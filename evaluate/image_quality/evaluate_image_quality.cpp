@@ -69,7 +69,7 @@ struct Target {
   std::filesystem::path folder;  ///< of its results
 };
 
-/// What a study shows together.
+/// The output that all fields of a study share.
 struct TargetResult {
   std::string case_name;
   std::string camera;
@@ -192,7 +192,7 @@ void write_results(const ImageQualityOptions& options,
                    const Provenance& provenance) {
   const std::filesystem::path& folder = target.folder;
   const std::vector<DrrComparison>& comparisons = result.comparisons;
-  // What an earlier run left here is whole no more.
+  // From here on the results of an earlier run in this folder are incomplete.
   remove_output(folder / "summary.json");
   write_text_file(folder / "image-quality.csv", image_quality_table(comparisons).to_text());
   const PsnrGroup group = group_of(result);
@@ -227,7 +227,7 @@ void write_results(const ImageQualityOptions& options,
   summary.update(image_quality_statistics(comparisons));
   summary["provenance"] = af::to_json(provenance);
   write_reproduce_script(folder, provenance);
-  // Last: when it is there, everything is.
+  // Written last: when summary.json is there, everything is.
   write_text_file(folder / "summary.json", summary.dump(2) + "\n");
 
   const SampleSummary psnr = [&] {

@@ -20,7 +20,7 @@ struct AxisTap {
   double weight = 0.0;
 };
 
-/// Of a coordinate on the axis, or on its nearest end.
+/// For a coordinate on the axis; beyond it, for the nearest end.
 AxisTap axis_tap(const GridAxis& axis, double position_mm) {
   const double coordinate =
       std::clamp(axis.node_coordinate(position_mm), 0.0, static_cast<double>(axis.nodes - 1));

@@ -12,11 +12,12 @@ namespace af::evaluation {
 /// On which planes of a field rays are replaced by those through the nodes around them.
 enum class InterpolatedPlanes { Uv, St, Both };
 
-/// Ray casting that makes the interpolation error of a field's look-up and no other: it has the
-/// field's nodes, but neither its codebook nor its 16 bits. As TwoPassAfDrr: with (u,v), a ray's
+/// Ray casting with only the interpolation error of a field's look-up: it has the field's nodes,
+/// but neither its codebook nor its 16 bits. It interpolates as TwoPassAfDrr. With (u,v), a ray's
 /// value is blended from those of the four viewpoints around it, seen through its own (s,t) point;
 /// with (s,t), a pixel's value is bilinear in the image of the nodes, seen from the source. For
-/// fields of one slab. \test InterpolatedRayCast.EqualsTheRaysThroughTheNodesAround
+/// fields of one slab.
+/// \test InterpolatedRayCast.EqualsTheRaysThroughTheNodesAround
 class InterpolatedRayCast final : public DrrRenderer {
  public:
   InterpolatedRayCast(std::shared_ptr<const AttenuationVolume> volume,

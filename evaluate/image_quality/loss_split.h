@@ -10,9 +10,9 @@
 namespace af::evaluation {
 
 /// What a field's DRR loses at one pose, each against ray casting: by interpolation over (u,v)
-/// alone, over (s,t) alone, over both, by what comes after it (16 bits, codebook, caster of the
-/// field), and in all. Mean squared differences over the reference's foreground, in units of its
-/// squared maximum; psnr_db = -10 log10(these), as eq. (12).
+/// alone, over (s,t) alone, over both, by everything after interpolation (16 bits, codebook, caster
+/// of the field), and in all. Mean squared differences over the reference's foreground, in units of
+/// its squared maximum; psnr_db = -10 log10(these), as eq. (12).
 struct LossSplit {
   static constexpr std::size_t kParts = 5;
   static constexpr std::array<const char*, kParts> kNames = {

@@ -12,8 +12,8 @@
 
 namespace af::evaluation {
 
-/// What is compared with a case's X-rays, and how: options of every subcommand that registers or
-/// measures similarity.
+/// Which methods are compared with a case's X-rays, and how: options of every subcommand that
+/// registers or measures similarity.
 struct MethodOptions {
   std::filesystem::path study;
   std::vector<std::string> fields;  ///< CAMERA=PATH each
@@ -30,7 +30,7 @@ struct MethodOptions {
 
 void append_problems(const MethodOptions& options, std::vector<std::string>& found);
 
-/// The options in force as lines of TOML.
+/// The options that are used, as lines of TOML.
 std::string to_toml(const MethodOptions& options);
 
 /// ["a", "b"] as in TOML.
@@ -41,7 +41,7 @@ void bind_method(CLI::App& command, MethodOptions& options);
 /// Adds the subcommand `method`; returns it.
 CLI::App* bind_show_method(CLI::App& app, registration::MethodOptions& options);
 
-/// Prints what a preset and the options that replace parts of it stand for, as TOML.
+/// Prints the chains of a preset, with the options that replace parts of it, as TOML.
 void show_method(const registration::MethodOptions& options, const Communicator& world);
 
 }  // namespace af::evaluation

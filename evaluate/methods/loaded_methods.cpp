@@ -51,7 +51,8 @@ std::vector<LoadedMethod> load_methods(const MethodOptions& options,
   const registration::RegistrationOptions method =
       all_or_none(world, [&] { return registration::resolve(options.method); });
   const auto pool = std::make_shared<ThreadPool>(thread_count(options.method.threads));
-  // Ray casting after a field takes its levels' blurs, so that both run the same method.
+  // Ray casting after a field takes the blurs of the field's levels, so that both run the same
+  // method.
   std::vector<double> blurs_mm;
   for (const std::string& renderer : options.chosen_renderers()) {
     registration::CaseLoadOptions loading =

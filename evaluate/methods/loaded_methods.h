@@ -11,7 +11,7 @@
 
 namespace af::evaluation {
 
-/// One renderer with everything to register a case by it.
+/// One renderer with everything that is needed to register a case with it.
 struct LoadedMethod {
   std::string renderer;  ///< "field" or "raycast"
   registration::RegistrationRunner runner;

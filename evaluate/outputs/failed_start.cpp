@@ -33,7 +33,7 @@ std::string repeat_command(const json& summary,
                            std::int64_t start_index) {
   const json repeat = summary.value("repeat", json());
   if (!repeat.is_object()) return "";
-  // Ray casting beside fields has the blur of their levels: it is repeated beside them.
+  // Ray casting beside fields has the blur of their levels, so it is repeated beside them.
   const bool is_beside_fields = renderer == "raycast" && repeat.at("renderer") == "both";
   const std::filesystem::path output =
       std::filesystem::path(repeat.at("output").get<std::string>()) /

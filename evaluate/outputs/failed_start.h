@@ -13,9 +13,10 @@ std::string trace_file(const std::string& case_name,
                        const std::string& renderer,
                        std::int64_t start_index);
 
-/// One line for a shell that repeats one start of a run alone and gives the same row; empty when
-/// the run's summary.json has nothing to repeat it by (key `repeat`: the poses are another
-/// program's). \test EvaluateProgram.RepeatsAFailedStartByTheCommandInTheReport
+/// One line for a shell that repeats one start of a run alone and gives the same row. Empty when
+/// the run's summary.json (key `repeat`) has nothing to repeat: the poses come from another
+/// program.
+/// \test EvaluateProgram.RepeatsAFailedStartByTheCommandInTheReport
 std::string repeat_command(const nlohmann::json& summary,
                            const std::string& case_name,
                            const std::string& renderer,

@@ -196,7 +196,7 @@ void draw_tre_histogram(const std::vector<OutcomeGroup>& groups,
     for (const TreOutcome& outcome : groups[g].outcomes) counts[bar_of(outcome.tre_mm)] += 1.0;
     std::vector<std::vector<double>> rows;
     for (std::size_t bar = 0; bar <= kBars; ++bar) {
-      // The bar for all beyond stands half a millimetre apart.
+      // The bar for all TREs beyond stands half a millimetre apart.
       const double center_mm =
           (static_cast<double>(bar) + 0.5) * kBarWidthMm + (bar == kBars ? 0.25 : 0.0);
       const auto total = static_cast<double>(groups[g].outcomes.size());
@@ -237,7 +237,7 @@ void draw_tre_scatter(const std::vector<OutcomeGroup>& groups,
                       const std::filesystem::path& path_without_extension) {
   std::size_t most = 0;
   for (const OutcomeGroup& group : groups) most = std::max(most, group.outcomes.size());
-  // More dots tell no more, and make a page of many megabytes.
+  // More dots would tell nothing more, and make a page of many megabytes.
   constexpr std::size_t kMostDots = 4000;
   const std::size_t stride = std::max<std::size_t>(1, (most + kMostDots - 1) / kMostDots);
   GnuplotFigure figure(
@@ -247,7 +247,7 @@ void draw_tre_scatter(const std::vector<OutcomeGroup>& groups,
       kHeightPx);
   std::vector<std::string> parts;
   CsvTable table({"group", "initial_tre_mm", "tre_mm"});
-  // Below 0.05 mm nothing more is told apart; the axis ends there.
+  // Differences below 0.05 mm do not matter; the axis ends there.
   constexpr double kLowestMm = 0.05;
   for (std::size_t g = 0; g < groups.size(); ++g) {
     std::vector<std::vector<double>> rows;

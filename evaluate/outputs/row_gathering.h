@@ -22,8 +22,8 @@ void collect_rows(const Communicator& world,
                   const std::function<nlohmann::json(std::int64_t item)>& row_of_item,
                   const std::function<void(std::int64_t item, const nlohmann::json& row)>& receive);
 
-/// Rank 0 does one item, forgets what it gave, and says how long `count` of them will take on all
-/// ranks. An item that fails says nothing: the run itself will tell why.
+/// Rank 0 does one item, discards the result, and says how long `count` of them will take on all
+/// ranks. When the item fails, nothing is said: the run itself will report why.
 void announce_time(const Communicator& world,
                    const std::string& what,
                    std::int64_t count,

@@ -77,8 +77,8 @@ StratifiedStarts make_starts(const RegistrationStudyOptions& options,
   });
 }
 
-/// Collective. Rank 0's starts on every rank, held once per node: a rank each, ten million would
-/// fill a node.
+/// Collective. Makes rank 0's starts known to every rank, held once per node: one copy per rank
+/// would fill a node with ten million starts.
 SharedArray<PerturbedStart> held_per_node(const SharedArray<PerturbedStart>& starts,
                                           const Communicator& world) {
   static_assert(std::is_trivially_destructible_v<PerturbedStart> &&
@@ -114,7 +114,7 @@ void assign_starts(const RegistrationStudyOptions& options,
       is_reduced ? options.raycast_starts_per_interval.value_or(options.starts_per_interval)
                  : options.starts_per_interval;
   if (!is_reduced) method.start_indices.reserve(starts.starts.size());
-  // Of the others every start counts, also those of a file that lie beyond the intervals.
+  // For the other methods every start counts, also those of a file that lie beyond the intervals.
   for (std::size_t i = 0; i < starts.starts.size(); ++i)
     if (!is_reduced ||
         (starts.starts[i].interval < intervals && starts.starts[i].rank_in_interval < per_interval))
@@ -139,7 +139,7 @@ void add_result(const RegistrationResult& result,
   measure_pose(result.room_from_ct, yardstick, row);
 }
 
-/// The row of one start, without its case; of a failure with its trace.
+/// The row of one start, without its case; for a failure with its trace.
 TracedRow traced_row(Method& method,
                      const PerturbedStart& start,
                      std::int64_t index,
@@ -162,7 +162,7 @@ TracedRow traced_row(Method& method,
   return traced;
 }
 
-/// What of a method remains when its fields are let go.
+/// What is kept of a method when its fields are released.
 struct MethodRows {
   std::string renderer;
   std::vector<std::int64_t> start_indices;  ///< rank 0
@@ -190,8 +190,8 @@ void register_with(Method& method,
                    TracedRow traced_start = traced_row(
                        method, starts.starts[static_cast<std::size_t>(index)], index, yardstick);
                    traced_start.row.case_name = case_name;
-                   // Items come in order: a rank's first failures are its share of the first of
-                   // all.
+                   // Items come in order, so the first failures of a rank are its share of the
+                   // first failures of all.
                    if (!traced_start.trace.empty() && ++traced > kMostTraces)
                      traced_start.trace.clear();
                    return cbor_bytes(packed_row(traced_start));
@@ -216,14 +216,14 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
 }
 
 /// Rank 0 says how long each method will take, from a sample: one row by fields; by ray casting,
-/// where that would be long, one similarity for each of the poses that the sample tried. A sample
-/// that fails says nothing: the run itself will tell why.
+/// where that would be long, one similarity for each of the poses that the sample tried. When the
+/// sample fails, nothing is said: the run itself will report why.
 void announce_times(std::vector<Method>& methods,
                     const std::string& case_name,
                     const StratifiedStarts& starts,
                     const Yardstick& yardstick,
                     const Communicator& world) {
-  // What the presets try at the median, where no field gives a sample.
+  // The median number of poses that the presets try, for use where no field gives a sample.
   double poses_tried = 400.0;
   for (Method& method : methods) {
     if (!world.is_root() || method.start_indices.size() < 2) continue;
@@ -350,7 +350,7 @@ void draw_overlays(const Method& method,
   }
 }
 
-/// Collective. What of each method is finished; nothing of it is done yet.
+/// Collective. Finds out which items of each method are finished; does none yet.
 std::vector<MethodRows> begin_registrations(const RegistrationStudyOptions& options,
                                             const CaseEvaluation& evaluation,
                                             const std::vector<Method>& methods,
@@ -459,7 +459,7 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
   all_or_none(world, [&] {
     for (Method& method : methods) assign_starts(options, evaluation.starts, method);
   });
-  // Refusals first: they leave the results of an earlier run alone.
+  // Refusals come first: they leave the results of an earlier run alone.
   std::vector<MethodRows> rows;
   if (!options.is_starts_only) rows = begin_registrations(options, evaluation, methods, world);
   all_or_none(world, [&] { on_starts(evaluation); });
@@ -471,13 +471,13 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
   phase.reset();
   for (std::size_t i = 0; i < methods.size(); ++i)
     register_with(methods[i], study_case.name, evaluation.starts, yardstick, rows[i].items);
-  // Rows take their place: memory holds one or the other.
+  // The starts go before the rows come: memory has room for only one of the two.
   evaluation.starts.starts = {};
   all_or_none(world, [&] {
     if (world.is_root())
       draw_pictures(options, study_case, methods.front(), rows.front(), yardstick, evaluation);
   });
-  // Rows take the place of fields and CT: memory holds one or the other.
+  // Fields and CT go before the rows come: memory has room for only one of the two.
   methods.clear();
   all_or_none(world, [&] {
     if (!world.is_root()) return;

@@ -21,7 +21,8 @@
 
 namespace af::evaluation {
 
-/// What one case of a study gave; all of it on rank 0, on the others what their work needs.
+/// The results of one case of a study. Rank 0 has all of them; the others have what their work
+/// needs.
 struct CaseEvaluation {
   std::string case_name;
   GoldStandard gold;

@@ -57,7 +57,7 @@ json simulation_in(const std::filesystem::path& folder) {
   return nullptr;
 }
 
-/// Options that the command for one start alone has of its own, or does not need.
+/// Options that the command for one start sets itself, or does not need.
 const std::set<std::string> kNotOfRepeats = {"--case",
                                              "--renderer",
                                              "--starts-from",
@@ -72,7 +72,7 @@ const std::set<std::string> kNotOfRepeats = {"--case",
                                              "--raycast-intervals",
                                              "--output"};
 
-/// What repeat_command() makes the command for one start of; null for another program's poses.
+/// From what repeat_command() makes the command for one start; null for another program's poses.
 json repeat_json(const RegistrationStudyOptions& options) {
   if (!options.poses_from.empty()) return nullptr;
   const std::filesystem::path folder =
@@ -86,8 +86,8 @@ json repeat_json(const RegistrationStudyOptions& options) {
 }
 
 /// How the study's X-rays were simulated, if they were: the provenance that af-simulate leaves
-/// beside study.toml, or beside the X-rays when studies were joined. Then that of the first case
-/// speaks, and the commands of all are listed.
+/// beside study.toml, or beside the X-rays when studies were joined. For a joined study it is the
+/// provenance of the first case, and the commands of all cases are listed.
 json simulation_of(const Study& study) {
   if (json simulation = simulation_in(study.path.parent_path()); simulation.is_object())
     return simulation;
@@ -113,8 +113,8 @@ json case_json(const CaseEvaluation& evaluation) {
           {"draws_beyond_last_interval", evaluation.starts.draws_beyond}};
 }
 
-/// Beside every TRE what the gold standard has by itself: of a case, and the mean over a renderer's
-/// starts; null when a case's gold pose is a stated one.
+/// The gold standard's own error, to stand beside every TRE: that of a case, and the mean over a
+/// renderer's starts. null when a case's gold pose is a stated one.
 void add_gold_uncertainty(const std::vector<CaseEvaluation>& evaluations, json& renderers) {
   std::map<std::string, double> own_mm;
   for (const CaseEvaluation& evaluation : evaluations)
@@ -190,7 +190,7 @@ json summary_json(const RegistrationStudyOptions& options,
 
 void write_traces(const std::filesystem::path& folder,
                   const std::vector<CaseEvaluation>& evaluations) {
-  // Those of an earlier run would be taken for this one's.
+  // Traces of an earlier run would be taken for those of this run.
   std::filesystem::remove_all(folder / "traces");
   for (const CaseEvaluation& evaluation : evaluations)
     for (const auto& [renderer, traces] : evaluation.traces)
@@ -407,7 +407,7 @@ void run_registration(const RegistrationStudyOptions& options,
   for (const StudyCase& study_case : cases) {
     const auto on_starts = [&](const CaseEvaluation& so_far) {
       if (!world.is_root()) return;
-      // What an earlier run left here is whole no more.
+      // From here on the results of an earlier run in this folder are incomplete.
       remove_output(folder / "summary.json");
       starts_file->add(so_far.case_name, so_far.starts.starts.view());
       if (&study_case == &cases.back()) starts_file->finish();
@@ -444,7 +444,7 @@ void run_registration(const RegistrationStudyOptions& options,
     json summary = summary_json(options, study, evaluations, rows.view());
     write_text_file(folder / "cases.csv", case_table(summary["renderers"]).to_text());
     summary["provenance"] = af::to_json(provenance);
-    // Last: when it is there, everything is.
+    // Written last: when summary.json is there, everything is.
     write_text_file(folder / "summary.json", summary.dump(2) + "\n");
     std::filesystem::remove_all(progress_folder(folder));
     print_outcome(summary, folder, world);

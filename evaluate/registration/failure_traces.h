@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How registrations that failed searched: kept within stated bounds.
+// How failed registrations searched, kept within stated bounds.
 #pragma once
 
 #include <cstddef>
@@ -14,9 +14,10 @@
 
 namespace af::evaluation {
 
-/// So many failures of each case and method keep their traces: those of the lowest start indices.
+/// The number of failures of each case and method that keep their traces: those of the lowest start
+/// indices.
 inline constexpr std::size_t kMostTraces = 60;
-/// So many steps of a trace are kept: of longer ones the first, the last and evenly spread others.
+/// The number of steps that are kept of a trace: the first, the last, and others evenly spread.
 inline constexpr std::size_t kMostTracePoints = 200;
 
 /// A search as seen from the gold pose. `frame` is what the trace's parameters are relative to.

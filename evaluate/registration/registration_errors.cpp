@@ -22,7 +22,7 @@ RegistrationErrors registration_errors(const RigidTransform& room_from_ct,
   double detector_mm = 0.0;
   double isocenter_mm = 0.0;
   for (const CameraGeometry& camera : rig.cameras) {
-    // Parallel planes: distances on them are as their depths.
+    // The planes are parallel, so distances on them are in proportion to their depths.
     const double demagnification =
         camera.depth_mm(rig.isocenter_point) / camera.source_detector_distance_mm();
     const ProjectionDistances sums =

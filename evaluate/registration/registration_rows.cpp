@@ -35,7 +35,7 @@ json packed_trace(const std::vector<TracePoint>& trace) {
   return packed;
 }
 
-/// What get() does not look at: that a number is whole and fits.
+/// get() does not check this: that a number is whole and fits.
 template <typename Integer>
 Integer integer_of(const json& value) {
   const bool fits =

@@ -58,13 +58,13 @@ struct RegistrationRow {
   [[nodiscard]] bool is_success() const { return tre_mm < kSuccessTreMm; }
 };
 
-/// A row and how the search went: of some failures, see failure_traces.h; else empty.
+/// A row, and for some failures how the search went (see failure_traces.h; empty for other rows).
 struct TracedRow {
   RegistrationRow row;
   std::vector<TracePoint> trace;
 };
 
-/// A row as it is kept while others are unfinished, and back.
+/// A row as it is kept while other rows are unfinished, and back.
 nlohmann::json packed_row(const TracedRow& traced);
 TracedRow row_of(const nlohmann::json& packed);
 /// The same from a record of a file, in CBOR; FileError naming `file` when it holds no row.

@@ -105,7 +105,7 @@ json thresholds_json(const std::vector<TreOutcome>& outcomes) {
   return result;
 }
 
-/// Quartiles, median and 95th percentile where what is missing counts as infinitely far.
+/// Quartiles, median and 95th percentile, where missing values count as infinitely far.
 json summary_of_all(std::vector<double> values) {
   for (double& value : values)
     if (!std::isfinite(value)) value = std::numeric_limits<double>::infinity();
@@ -163,7 +163,7 @@ json statistics_of(const Rows& rows) {
   std::map<std::string, int> stop_reasons;
   std::map<std::string, int> failures;
   for (const RegistrationRow* row : rows) {
-    // Other programs need not tell.
+    // Other programs need not state this.
     if (std::isfinite(row->seconds)) seconds.push_back(row->seconds);
     evaluations.push_back(static_cast<double>(row->evaluations));
     drr_counts.push_back(static_cast<double>(row->drr_count));
@@ -187,13 +187,14 @@ json bootstrap_json(const CaseBootstrap& bootstrap) {
           {"is_optimistic", bootstrap.is_optimistic()}};
 }
 
-/// A mean over one case, as the sum and the number of what it is taken over.
+/// A mean over one case, as a sum and the number of its terms.
 struct CaseMean {
   double sum = 0.0;
   double count = 0.0;
 };
 
-/// By bootstrap over cases, and Student's interval of the cases' own means, each counting alike.
+/// Intervals by bootstrap over cases, and Student's interval of the cases' own means, in which
+/// every case has the same weight.
 json interval_over_cases(const std::vector<CaseMean>& cases, std::uint64_t seed) {
   json result = bootstrap_json(bootstrap_over_cases(
       cases.size(),
@@ -248,8 +249,8 @@ bool is_earlier_start(const RegistrationRow* a, const RegistrationRow* b) {
   return std::tie(a->case_name, a->start_index) < std::tie(b->case_name, b->start_index);
 }
 
-/// By case and start index, the last of those that are repeated. Millions of rows are looked at
-/// through pointers: a map of them would need more memory than they.
+/// Rows by case and start index; of repeated rows the last. Millions of rows are looked at through
+/// pointers: a map of them would need more memory than they do.
 Rows rows_by_start(std::span<const RegistrationRow> rows, const std::string& renderer) {
   Rows found;
   for (const RegistrationRow& row : rows)
@@ -276,7 +277,7 @@ std::vector<StartPair> pairs_of(std::span<const RegistrationRow> rows) {
   return pairs;
 }
 
-/// Those of a renderer, case and start index that another row has before them, ascending.
+/// Rows whose renderer, case and start index an earlier row has, too; ascending.
 Rows repeated_rows(std::span<const RegistrationRow> rows) {
   const auto key = [](const RegistrationRow* row) {
     return std::tie(row->case_name, row->renderer, row->start_index);

@@ -48,7 +48,7 @@ nlohmann::json paired_statistics(std::span<const RegistrationRow> rows,
 /// beside a pose, initial TREs that are not finite. Empty when nothing is.
 std::vector<std::string> row_problems(std::span<const RegistrationRow> rows);
 
-/// What so few cases do not allow, in words; empty when they are enough.
+/// Conclusions that so few cases do not allow, in words; empty when there are enough cases.
 std::vector<std::string> warnings_about_cases(std::size_t cases);
 
 }  // namespace af::evaluation

@@ -17,7 +17,7 @@ namespace {
 using Matrix = Eigen::Matrix<double, 3, 4>;
 constexpr std::size_t kMatrixBytes = sizeof(double) * Matrix::SizeAtCompileTime;
 
-// Answers travel as words of 64 bits of which one rank's alone are not zero: their sums over the
+// Answers are sent as words of 64 bits that are zero on all ranks but one: their sums over the
 // ranks keep every bit.
 
 std::uint64_t word_of(const DrawVerdict& verdict) {
@@ -123,7 +123,8 @@ SharedStartMeasures::Words SharedStartMeasures::ask(Task task,
   return answer(std::move(bytes));
 }
 
-/// Collective. Rank 0's question, answered together: kUniformWords of every item, or one.
+/// Collective. All ranks together answer rank 0's question: kUniformWords for every item, or one
+/// word.
 SharedStartMeasures::Words SharedStartMeasures::answer(std::vector<std::byte> bytes) {
   world_.broadcast(bytes);
   Question question;
@@ -148,7 +149,8 @@ SharedStartMeasures::Words SharedStartMeasures::answer(std::vector<std::byte> by
 /// Words of all items; those of other ranks are zero.
 SharedStartMeasures::Words SharedStartMeasures::part_of_answer(const Question& question,
                                                                std::span<const std::byte> poses) {
-  // Progress is noted so often: a TRE takes some 0.1 ms, a uniform start up to thousands of them.
+  // The interval at which progress is noted: a TRE takes some 0.1 ms, a uniform start up to
+  // thousands of them.
   constexpr std::uint64_t kFewItems = 256;
   const bool is_uniform = question.task == Task::DrawUniform;
   const std::uint64_t count = question.items.count;

@@ -12,7 +12,7 @@
 
 namespace af::evaluation {
 
-/// Shares what rank 0 asks for: an equal part of the draws or poses on every rank.
+/// Shares the measures that rank 0 asks for: every rank takes an equal part of the draws or poses.
 class SharedStartMeasures final : public StartMeasures {
  public:
   SharedStartMeasures(const Communicator& world,
@@ -21,14 +21,15 @@ class SharedStartMeasures final : public StartMeasures {
                       std::span<const Eigen::Vector3d> target_points_ct_mm,
                       IsAdmissible is_admissible);
 
-  // Rank 0, while the others serve(). An error on any rank is thrown on all and ends the sharing.
+  // Called by rank 0, while the others serve(). An error on any rank is thrown on all ranks and
+  // ends the sharing.
   std::vector<DrawVerdict> judge_draws(IndexRange draws) override;
   std::vector<double> tres_mm(std::span<const RigidTransform> room_from_ct) override;
   std::vector<UniformStart> draw_uniform(IndexRange starts) override;
 
-  /// The other ranks: computes parts until rank 0 calls end().
+  /// Called by the other ranks: computes parts until rank 0 calls end().
   void serve();
-  /// Rank 0. Does nothing when an error has ended the sharing.
+  /// Called by rank 0. Does nothing when an error has ended the sharing.
   void end();
 
  private:
@@ -47,8 +48,8 @@ class SharedStartMeasures final : public StartMeasures {
   bool is_over_ = false;
 };
 
-/// Collective. The starts that `make` gives on rank 0, none on the other ranks, which share its
-/// measures meanwhile. Errors are thrown on every rank.
+/// Collective. The starts that `make` gives on rank 0. The other ranks get none; meanwhile they
+/// share rank 0's measures. Errors are thrown on every rank.
 StratifiedStarts starts_measured_together(
     const Communicator& world,
     SharedStartMeasures& measures,

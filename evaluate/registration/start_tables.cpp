@@ -57,7 +57,7 @@ std::optional<RigidTransform> parameter_pose(const CsvTable& table,
   return pose_of_deg_and_mm(frame, values, table.where(row));
 }
 
-/// The start a row is of; nullopt when its start_index is not a whole number.
+/// The start to which a row belongs; nullopt when its start_index is not a whole number.
 std::optional<std::int64_t> start_index_of(const CsvTable& table, std::size_t row) {
   const double value = number_or_nan(table, row, "start_index");
   // Whole numbers beyond 2^53 are not exact in a double.

@@ -44,8 +44,8 @@ struct FoundPoses {
 /// start_index that is not a whole number is no start: all are reported as problems.
 FoundPoses read_found_poses(const std::filesystem::path& path, const PoseTableFrames& frames);
 
-/// What a table or folder of poses holds of cases that are not among `known`, in words: nobody
-/// would miss them otherwise. Empty when there are none, and for a table without cases.
+/// The cases in a table or folder of poses that are not among `known`, in words: otherwise nobody
+/// would notice that they are left out. Empty when there are none, and for a table without cases.
 std::vector<std::string> unknown_case_problems(const std::filesystem::path& path,
                                                const std::set<std::string>& known);
 

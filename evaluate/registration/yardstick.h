@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What poses are measured with, our own registrations' and those of other programs alike.
+// What poses are measured against; the same for our own registrations and for poses of other
+// programs.
 #pragma once
 
 #include <optional>

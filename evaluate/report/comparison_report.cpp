@@ -16,7 +16,7 @@ using nlohmann::json;
 
 namespace {
 
-/// The figure has colours for no more methods than this.
+/// The most methods for which the figure has colours.
 constexpr std::size_t kMostCurves = 6;
 
 std::string case_names(const json& summary) {
@@ -29,7 +29,7 @@ std::string case_names(const json& summary) {
   return names;
 }
 
-/// What our own renderers' runs searched with; nothing of another program's poses.
+/// The methods of our own renderers' runs; empty for another program's poses.
 std::string search_text(const json& summary, const json& renderer) {
   const json method = summary.value("method", json::object());
   const std::string name = renderer.at("renderer").get<std::string>();

@@ -43,7 +43,7 @@ bool leads_down(const std::filesystem::path& relative) {
 }
 
 /// The paths below the deepest folder that all runs share. Where several registration runs end
-/// alike ("skull/registration", "thorax/registration") the end tells nothing and is left out.
+/// alike ("skull/registration", "thorax/registration"), the end tells nothing and is left out.
 void set_names(std::vector<EvaluationRun>& runs) {
   std::filesystem::path shared = runs.front().folder.parent_path();
   for (const EvaluationRun& run : runs)
@@ -141,7 +141,7 @@ std::vector<EvaluationRun> find_runs(const std::vector<std::filesystem::path>& f
           "image-quality, registration, similarity-curves, field-parameters or error-budget",
           kind.is_string() ? kind.get<std::string>() : "no text");
     run.kind = kind.get<std::string>();
-    // Asked for by its own folder, the repeat of a start is a run like others.
+    // When its own folder was named, the repeat of a start is a run like any other.
     if (run.summary.contains("only_start") && !named.contains(run.folder)) continue;
     runs.push_back(std::move(run));
   }

@@ -47,7 +47,8 @@ std::vector<SparkPoint> spark_points(const CsvTable& trace, double initial_tre_m
   return points;
 }
 
-/// TRE against the poses tried as a small line, with a dashed one where success begins.
+/// TRE against the poses tried as a small line; a dashed line shows below which TRE a start
+/// succeeds.
 std::string spark(const std::vector<SparkPoint>& points) {
   double highest_mm = 2 * kSuccessTreMm;
   for (const SparkPoint& point : points) highest_mm = std::max(highest_mm, point.tre_mm);

@@ -46,8 +46,8 @@ class HtmlTable {
 /// A definition list of (text, HTML) pairs.
 std::string definition_list(const std::vector<std::pair<std::string, std::string>>& items);
 
-/// A figure whose picture, of MIME type `type`, is part of the page; `caption` is HTML,
-/// `alternative` text for those who cannot see it.
+/// A figure whose picture, of MIME type `type`, is part of the page. `caption` is HTML;
+/// `alternative` is text for readers who cannot see the picture.
 std::string figure(std::string_view picture_bytes,
                    const char* type,
                    std::string_view alternative,

@@ -22,7 +22,7 @@ constexpr const char* kBoxPlotCaption =
     "and "
     "95th percentile; dots: every pose.";
 
-/// One box plot of all fields; of several drawn anew from their tables.
+/// One box plot of all fields. For several runs it is drawn anew from their tables.
 std::string joint_box_plot(const std::vector<const EvaluationRun*>& runs,
                            const std::filesystem::path& figures) {
   constexpr const char* kAlternative = "Box plots of PSNR";

@@ -164,7 +164,7 @@ std::string other_errors_table(const json& renderers) {
   return table.html();
 }
 
-/// What few cases do to the bootstrap, and the interval to take instead.
+/// How few cases affect the bootstrap, and which interval to take instead.
 std::string optimism_text(const json& rate) {
   if (!rate.at("is_optimistic").get<bool>()) return "";
   std::string text =
@@ -329,7 +329,7 @@ std::string overlay_figures(const EvaluationRun& run) {
   return element("div", figures, "figures");
 }
 
-/// Where the starts are from, as far as the run says.
+/// Where the starts come from, as far as the run says.
 std::string starts_text(const json& summary) {
   if (summary.contains("only_start")) return "One start of another run, repeated alone.";
   return "Starts are poses about the gold pose at stated initial target registration errors (TRE), "

@@ -15,7 +15,7 @@ namespace {
 
 using nlohmann::json;
 
-/// "Registration of skull" or what else the runs are about.
+/// "Registration of skull", or another title that fits the runs.
 std::string default_title(const std::vector<EvaluationRun>& runs) {
   const auto is_only = [&](const char* kind) { return runs_of(runs, kind).size() == runs.size(); };
   if (is_only("error-budget")) return "Error budget of registrations";

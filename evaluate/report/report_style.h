@@ -8,7 +8,7 @@ namespace af::evaluation {
 /// The report's style sheet, report.css.
 std::string_view report_style();
 
-/// What makes the report's tables sort, report.js.
+/// report.js, the script that sorts the report's tables.
 std::string_view report_script();
 
 }  // namespace af::evaluation

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the sections of the page share about runs.
+// What the sections of the page have in common.
 #pragma once
 
 #include <filesystem>

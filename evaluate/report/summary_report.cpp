@@ -13,7 +13,7 @@ using nlohmann::json;
 
 namespace {
 
-/// Beyond so many runs tables tell more than sentences and tiles.
+/// With more runs than this, tables tell more than sentences and tiles.
 constexpr std::size_t kMostSentences = 4;
 constexpr std::size_t kMostTiles = 4;
 
@@ -85,7 +85,7 @@ std::string registration_sentences(const EvaluationRun& run) {
   return items;
 }
 
-/// One of several runs: its first method, and how long the others take; a table says the rest.
+/// One of several runs: its first method, and how long the others take. A table has the rest.
 std::string run_sentences(const EvaluationRun& run) {
   const json& summary = run.summary;
   return element("li",
@@ -133,7 +133,7 @@ std::string seconds_tile(const json& renderer) {
               method_title(renderer) + ", median");
 }
 
-/// What the gold standard adds by itself, to stand beside an error.
+/// The gold standard's own error, to stand beside another error.
 std::string gold_text(const json& renderer) {
   const json gold_mm = renderer.value("gold_uncertainty_mm", json());
   return gold_mm.is_number() ? "; the gold standard by itself: " + decimals(gold_mm, 2) + " mm"

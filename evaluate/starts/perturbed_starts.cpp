@@ -153,7 +153,7 @@ PoseParameters StartMeasures::stratified_draw(std::uint64_t draw_index) const {
                            draw_index);
 }
 
-/// Most need no mean over all points: bounds of the TRE suffice.
+/// Most draws need no mean over all points: bounds of their TRE suffice.
 int StartMeasures::interval_of_draw(const RigidTransform& room_from_ct) const {
   for (const TreBounder& bounder : bounders_) {
     const TreBounds bounds = bounder.bounds(room_from_ct, frame_.gold_room_from_ct);
@@ -241,7 +241,7 @@ StratifiedStarts stratified_starts(StartMeasures& measures) {
   while (full_intervals < by_interval.size()) {
     if (result.draws == most_draws(options)) throw_too_empty(by_interval, options, result);
     if (judged == verdicts.size()) {
-      // Few beside those that are needed: the last ones may be judged in vain.
+      // Draws only a few more than are needed; the last of them may be judged in vain.
       const std::uint64_t needed =
           std::max<std::uint64_t>(by_interval.size() * wanted, result.draws);
       verdicts =

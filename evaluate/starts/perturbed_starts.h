@@ -52,8 +52,8 @@ struct PerturbedStart {
   PoseParameters parameters;  ///< relative to gold: StartFrame::pose_frame()
   RigidTransform room_from_ct = RigidTransform::Identity();
   double initial_tre_mm = 0.0;
-  /// Its place in the random order of the starts of its interval, from 0: a smaller study takes the
-  /// starts of low rank and so a random part of this one.
+  /// Its place in the random order of the starts of its interval, from 0. A smaller study takes the
+  /// starts of low rank, which are a random part of this one.
   int rank_in_interval = 0;
 };
 
@@ -83,8 +83,8 @@ struct UniformStart {
   [[nodiscard]] bool is_exhausted() const { return refused == kMostDraws; }
 };
 
-/// What is computed of every draw or pose by itself, which takes nearly all of the time: for
-/// millions of starts a derived class shares it out and gives the same numbers.
+/// The computations on single draws or poses, which take nearly all of the time. For millions of
+/// starts a derived class shares them out and gives the same numbers.
 class StartMeasures {
  public:
   /// The points must outlive it. Throws InputError for options that are not valid.
@@ -111,7 +111,7 @@ class StartMeasures {
   virtual std::vector<DrawVerdict> judge_draws(IndexRange draws);
   /// Mean TREs against the gold pose, in the order of the poses.
   virtual std::vector<double> tres_mm(std::span<const RigidTransform> room_from_ct);
-  /// In order. After one that is exhausted nothing is drawn.
+  /// In order. When a start is exhausted, nothing is drawn after it.
   virtual std::vector<UniformStart> draw_uniform(IndexRange starts);
 
  private:
@@ -131,8 +131,8 @@ struct StratifiedStarts {
   std::uint64_t draws = 0;
   std::uint64_t inadmissible_draws = 0;  ///< refused by the predicate
   std::uint64_t draws_beyond = 0;        ///< initial TRE past the last interval
-  /// Refused by the predicate, by the interval that the draw would have been in; a start counts in
-  /// full intervals, too.
+  /// Draws that the predicate refused, by the interval that they would have been in; draws
+  /// for intervals that are already full count, too.
   std::vector<std::uint64_t> inadmissible_per_interval;
 };
 
@@ -142,10 +142,10 @@ struct StratifiedStarts {
 /// \test PerturbedStarts.FillEveryIntervalWithExactlyTheStatedCount
 StratifiedStarts stratified_starts(StartMeasures& measures);
 
-/// As many starts in all, with initial TREs uniform over all intervals together: start i has a TRE
-/// of its own, drawn by (seed, case name, i), and a direction that is drawn again while it is not
-/// admissible, so that the distribution stays uniform. Throws InputError after 1000 refusals of one
-/// start. \test PerturbedStarts.UniformInTreHaveThatDistribution
+/// As many starts in all, with initial TREs uniform over all intervals together. Start i has a TRE
+/// of its own, drawn by (seed, case name, i). Its direction is drawn again until it is admissible,
+/// so the distribution stays uniform. Throws InputError after 1000 refusals of one start.
+/// \test PerturbedStarts.UniformInTreHaveThatDistribution
 StratifiedStarts uniform_starts(StartMeasures& measures);
 
 /// The starts at given poses, in their order; intervals may lie beyond the last one.

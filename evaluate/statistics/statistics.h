@@ -14,8 +14,8 @@ struct MeanInterval {
   double high = 0.0;
 };
 
-/// Student's 95 % interval of a mean, of few values that vary like a normal distribution. NaN for
-/// fewer than two values and for equal ones, whose spread nothing tells.
+/// Student's 95 % interval of a mean of few, normally distributed values. NaN for fewer than two
+/// values and for equal ones, which tell nothing about the spread.
 /// \test StudentInterval.EqualsStudentsSleepData
 MeanInterval student_interval(std::span<const double> values);
 

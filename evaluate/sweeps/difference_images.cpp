@@ -27,8 +27,8 @@ const std::vector<double>& paper_levels_db() {
   return levels;
 }
 
-/// Rank 0 knows the comparisons; everybody needs the choice. A DRR that is nearest to several
-/// levels is shown once.
+/// Rank 0 knows the comparisons; all ranks need the choice. A DRR that is nearest to several levels
+/// is shown once.
 std::vector<SweepDrr> shared_choice(const std::vector<SettingResult>& results,
                                     const Communicator& world) {
   std::string text;
@@ -84,7 +84,7 @@ void write_files(const std::vector<SettingResult>& results,
   write_text_file(folder / "difference-images.csv", table.to_text());
 }
 
-/// The DRR of the best field, then the differences; rank 0 has the comparisons.
+/// The DRR of the best field, then the differences. Rank 0 has the comparisons.
 std::vector<PicturePanel> panels_of(const std::vector<SettingResult>& results,
                                     const std::vector<SweepDrr>& drrs,
                                     const std::vector<Image2d>& field_images,

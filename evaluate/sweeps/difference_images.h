@@ -16,8 +16,9 @@ struct SweepDrr {
   std::size_t pose = 0;
 };
 
-/// Per PSNR level the setting nearest to it, all of one target and pose: the target and pose for
-/// which the three are nearest together. Empty when nothing could be compared.
+/// For each PSNR level the setting nearest to it. All settings are of one target and pose, namely
+/// those for which the three come nearest to the levels together. Empty when nothing could be
+/// compared.
 /// \test DifferenceImages.AreThoseNearestToTheLevelsAtOnePose
 std::vector<SweepDrr> drrs_at_levels(const std::vector<SettingResult>& results,
                                      const std::vector<double>& levels_db);

@@ -114,8 +114,8 @@ void measure_curves(std::vector<LoadedMethod>& methods,
   }
 }
 
-/// The level that widths are measured against: the lowest similarity of any curve of the renderer,
-/// so that axes compare.
+/// The level against which widths are measured: the lowest similarity of any curve of the renderer,
+/// so that axes can be compared.
 double base_of(const std::vector<Curve>& curves, const std::string& renderer) {
   double base = std::numeric_limits<double>::infinity();
   for (const Curve& curve : curves)
@@ -168,8 +168,8 @@ CsvTable maxima_table(const std::vector<Curve>& curves, double radius_mm) {
   return table;
 }
 
-/// The axis of the widest peak, a width that leaves the window counting as widest. Empty when two
-/// or more do.
+/// The axis of the widest peak. A width that leaves the window counts as widest; when two or more
+/// leave it, the result is empty.
 std::string broadest_axis(const std::vector<Curve>& curves,
                           const std::string& renderer,
                           double radius_mm,
@@ -321,7 +321,7 @@ void run_similarity_curves(const SimilarityCurvesOptions& options,
     if (!world.is_root()) return;
     find_peaks(curves);
     const double radius_mm = rms_radius_mm(study_case.target_box_ct, study_case.center_ct_mm);
-    // What an earlier run left here is whole no more.
+    // From here on the results of an earlier run in this folder are incomplete.
     remove_output(folder / "summary.json");
     write_text_file(folder / "similarity-curves.csv", curves_table(curves).to_text());
     write_text_file(folder / "maxima.csv", maxima_table(curves, radius_mm).to_text());
@@ -342,7 +342,7 @@ void run_similarity_curves(const SimilarityCurvesOptions& options,
     for (const std::string& renderer : options.chosen_renderers())
       summary["renderers"].push_back(renderer_json(curves, renderer, radius_mm));
     summary["provenance"] = af::to_json(provenance);
-    // Last: when it is there, everything is.
+    // Written last: when summary.json is there, everything is.
     write_text_file(folder / "summary.json", summary.dump(2) + "\n");
     std::filesystem::remove_all(progress_folder(folder));
     print_maxima(curves, summary["renderers"]);

@@ -14,11 +14,11 @@ namespace af::evaluation {
 /// The ends of one way of registering, from a table of starts that all ways share.
 struct BudgetRun {
   std::string label;  ///< what is different from the run before
-  /// Per start, relative to the gold pose; nullopt: no success.
+  /// Per start, relative to the gold pose; nullopt where the start did not succeed.
   std::vector<std::optional<PoseParameters>> ends;
 };
 
-/// What one change did. Distances are mean TREs (mm) between two poses over the target points.
+/// The effect of one change. Distances are mean TREs (mm) between two poses over the target points.
 struct BudgetStep {
   std::string label;
   std::size_t starts = 0;

@@ -27,7 +27,7 @@ struct SettingResult {
   [[nodiscard]] std::string target() const;
 };
 
-/// Of the tiles: sweeps always state it.
+/// Share of the tiles; sweeps always state it.
 double training_share(const PrecomputeOptions& setting);
 
 /// All samples of the uncropped planes at 16 bits, what the paper calls the uncompressed field.

@@ -58,7 +58,7 @@ ChainRun read_run(const std::string& step) {
   return {files, read_text_file(files.folder / "starts.csv"), budget};
 }
 
-/// Starts are poses: the same ones mean the same case and gold pose, too.
+/// Starts are poses, so equal starts also mean the same case and gold pose.
 void require_same_starts(const std::vector<ChainRun>& runs) {
   for (const ChainRun& run : runs)
     if (run.starts_text != runs.front().starts_text)

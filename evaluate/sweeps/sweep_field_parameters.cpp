@@ -65,7 +65,7 @@ std::string field_name(const PrecomputeOptions& setting) {
          std::to_string(setting.codewords) + "-t" + number_text(training_share(setting)) + ".af.h5";
 }
 
-/// What decides a field's content, without where it goes.
+/// The options that decide a field's content, without its path.
 std::string deciding_options(const std::string& toml) {
   std::string result;
   std::istringstream lines(toml);
@@ -123,7 +123,7 @@ std::vector<DrrComparison> compare(const FieldParametersOptions& options,
   return comparisons;
 }
 
-/// What decides the comparisons of one field.
+/// The options that decide the comparisons of one field.
 std::string comparison_toml(const FieldParametersOptions& options) {
   return "pose_count = " + std::to_string(options.pose_count) +
          "\ndrr_step_mm = " + number_text(options.drr_step_mm) +
@@ -152,7 +152,7 @@ void write_results(const FieldParametersOptions& options,
                    const json& difference_images,
                    const Provenance& provenance) {
   const std::filesystem::path& folder = options.output_folder;
-  // What an earlier run left here is whole no more.
+  // From here on the results of an earlier run in this folder are incomplete.
   remove_output(folder / "summary.json");
   json summary = write_sweep(results, folder);
   write_reproduce_script(folder, provenance);
@@ -161,7 +161,7 @@ void write_results(const FieldParametersOptions& options,
   summary["kind"] = "field-parameters";
   summary["difference_images"] = difference_images;
   summary["provenance"] = af::to_json(provenance);
-  // Last: when it is there, everything is.
+  // Written last: when summary.json is there, everything is.
   write_text_file(folder / "summary.json", summary.dump(2) + "\n");
   std::cout << sweep_text(results) << "results: " << folder.string() << '\n';
 }
@@ -190,13 +190,13 @@ std::vector<Target> targets_of(const FieldParametersOptions& options) {
   return targets;
 }
 
-/// What a setting costs relative to another: the rays of its field.
+/// The cost of a setting relative to that of another: the rays of its field.
 double rays_of(const PrecomputeOptions& setting) {
   return std::pow(static_cast<double>(setting.uv_nodes) * setting.st_nodes, 2.0);
 }
 
-/// Says how long the settings after the first will take, from that one's time: fields by their
-/// rays, comparisons alike.
+/// Says how long the settings after the first will take. It scales the time of the first one:
+/// fields by their rays, comparisons as they are.
 void announce_rest(const std::vector<PrecomputeOptions>& settings,
                    double field_seconds,
                    double comparison_seconds,

@@ -15,11 +15,12 @@ struct DepthSlabs {
   std::vector<double> st_plane_y_mm;    ///< K, ascending
 };
 
-/// Cuts slices of given attenuation into `slabs` runs such that the attenuation-weighted mean
-/// squared distance of slices from their slab's centroid is least: what a coarse (u,v) grid blurs
-/// grows with that distance. Returns the first slice of each run but the first. Exact (dynamic
+/// Cuts slices of given attenuation into `slabs` runs, so that the attenuation-weighted mean
+/// squared distance of slices from their slab's centroid is least: the blur of a coarse (u,v) grid
+/// grows with that distance. Returns the first slice of each run except the first. Exact (dynamic
 /// programming, slabs * slices^2 steps). Every slab attenuates; throws InputError when there are
-/// fewer attenuating slices than slabs. \test DepthSlabs.CutIsTheBestOfAllCuts
+/// fewer attenuating slices than slabs.
+/// \test DepthSlabs.CutIsTheBestOfAllCuts
 std::vector<int> best_slice_cuts(std::span<const std::int64_t> slice_sums, int slabs);
 
 /// Where the (s,t) planes stand.

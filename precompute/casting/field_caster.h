@@ -21,7 +21,7 @@ class FieldCaster {
   /// in. Re-entrant.
   virtual void cast(const WorkUnit& unit, std::span<std::uint16_t> samples) const = 0;
 
-  /// As in options and files.
+  /// The name, as in options and files.
   [[nodiscard]] virtual const char* name() const = 0;
 };
 

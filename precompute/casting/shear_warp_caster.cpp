@@ -45,12 +45,12 @@ struct Slice {
   int y = 0;
   NodeMap x_of_s;
   NodeMap z_of_t;
-  /// Columns that the unit's rays can meet; the first pass goes no farther.
+  /// Columns that the unit's rays can meet; the first pass computes no others.
   int first_x = 0;
   int last_x = 0;
 };
 
-/// A slice that matters for one tile of t nodes, and where its rows stand in the buffer.
+/// A slice that matters for one tile of t nodes, and where its rows are in the buffer.
 struct ActiveSlice {
   const Slice* slice = nullptr;
   int first_x = 0;  ///< of the rows in the buffer: a multiple of kRowGroup
@@ -115,7 +115,7 @@ class UnitCast {
     const Eigen::Vector3d origin_mm = grid.slice_origin_mm(y);
     slice.x_of_s = NodeMap(slab_.s, nearness, origin_mm.x(), grid.spacing_mm.x());
     slice.z_of_t = NodeMap(slab_.t, nearness, origin_mm.z(), grid.spacing_mm.z());
-    // x is linear in u and in s: the corners of the unit decide.
+    // x is linear in u and in s, so the corners of the unit decide.
     double low = grid.size[0];
     double high = 0.0;
     for (const int u : {unit_.u.begin, unit_.u.end() - 1})
@@ -151,7 +151,7 @@ class UnitCast {
     write_samples(v, first_t, t_count, is_empty);
   }
 
-  /// Where the slice's columns lie for a tile; no rows when the tile's rays meet only zeros in it.
+  /// Where the slice's columns are for a tile; no rows when the tile's rays meet only zeros in it.
   [[nodiscard]] ActiveSlice activate(const Slice& slice,
                                      double v_mm,
                                      int first_t,
@@ -176,7 +176,7 @@ class UnitCast {
     active.high_x = std::min(end, slice.last_x);
     if (active.high_x <= active.low_x) return active;
     active.first_x = active.low_x / kRowGroup * kRowGroup;
-    // Up to and with the row after high_x: it is read with a weight of 0.
+    // Up to and including the row after high_x, which is read with a weight of 0.
     active.row_count = (active.high_x + 1 - active.first_x + kRowGroup) / kRowGroup * kRowGroup;
     fill_columns(slice, v_mm, first_t, t_count, active.columns);
     return active;
@@ -191,7 +191,7 @@ class UnitCast {
     columns.whole_end = grid.size[0];
     const double last_row = grid.size[2] - 2.0;
     for (int j = 0; j < kShearColumns; ++j) {
-      // Beyond the grid, and beyond the last node, stands the row of zeros at z = 0.
+      // Beyond the grid, and beyond the last node, rows point to the row of zeros at z = 0.
       const double z = j < t_count ? slice.z_of_t.index(v_mm, first_t + j) : 0.0;
       const bool is_inside = z > 0.0 && z < last_row + 1.0;
       const auto fixed = is_inside
@@ -287,7 +287,7 @@ class UnitCast {
     }
   }
 
-  /// Column whose sum stands at `position` of an accumulator: the two interleaves deal out fours of
+  /// The column whose sum is at `position` of an accumulator: the two interleaves deal out fours of
   /// each group of eight.
   static int column_at(int position) {
     const int half = position / 16;

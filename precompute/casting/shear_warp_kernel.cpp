@@ -145,8 +145,8 @@ void interpolate_columns(const ShearColumns& columns,
                          int32_t first_x,
                          int32_t row_count,
                          int16_t* rows) {
-  // Groups of columns outside: few rows at a time are read, each to its end, which is what
-  // prefetchers of memory want.
+  // Groups of columns are the outer loop: then few rows at a time are read, each to its end, which
+  // suits memory prefetchers.
   for (int group = 0; group < kShearColumns; group += 8)
     for (int32_t row = 0; row < row_count; row += kShearColumns) {
       const int32_t x = first_x + row;

@@ -39,7 +39,7 @@ struct ShearBlock {
   int32_t origin[kShearSlices] = {};  ///< elements from `rows` to (the possibly absent) row x = 0
 };
 
-/// What turns the accumulators of one viewpoint and a tile of t nodes into samples.
+/// The values that turn the accumulators of one viewpoint and a tile of t nodes into samples.
 struct ShearScale {
   float attenuation_per_unit;  ///< of a ray perpendicular to the planes
   float quantizer_step;

@@ -40,8 +40,8 @@ Eigen::Vector3d resampled_spacing(const CtGrid& grid,
   const std::array<bool, 3> is_resampled = resampled_axes(grid, slab_from_ct);
   if (is_resampled[0]) spacing_mm.x() *= relative_spacing;
   if (is_resampled[2]) spacing_mm.z() *= relative_spacing;
-  // Voxels that are tilted every way have less room between what a slice must keep and what it
-  // must suppress (SliceSampler).
+  // Voxels that are tilted about every axis leave less room between the frequencies that a slice
+  // must keep and those that it must suppress (SliceSampler).
   constexpr double kTiltedSpacing = 0.8;
   if (is_resampled[0] && is_resampled[1] && is_resampled[2]) spacing_mm.y() *= kTiltedSpacing;
   // From slice to slice a ray moves sideways by up to its slope times their distance; between
@@ -98,7 +98,7 @@ SlabAlignedGrid grid_of_spacing(const AttenuationVolume& volume,
     last_mm[axis] += kNodeFilterReach * grid.spacing_mm[axis];
   }
   for (int axis = 0; axis < 3; ++axis) {
-    // Rounding must not cost a node: attenuation within 1e-6 of a cell of the border is next to 0.
+    // Rounding must not cost a node: attenuation within 1e-6 of a cell of the border is almost 0.
     const double cells =
         std::ceil((last_mm[axis] - grid.origin_mm[axis]) / grid.spacing_mm[axis] - 1e-6);
     constexpr double kMostCells = 32000.0;
@@ -114,7 +114,7 @@ SlabAlignedGrid grid_of_spacing(const AttenuationVolume& volume,
   return grid;
 }
 
-/// What can differ from 0 in the rows of a grid, found without sampling them.
+/// The parts of a grid's rows that can differ from 0, found without sampling them.
 class RowFinder {
  public:
   RowFinder(const AttenuationVolume& volume,
@@ -150,8 +150,8 @@ class RowFinder {
   /// Nodes of a row that are looked at together, from the middle.
   static constexpr int kStep = 4;
 
-  /// How far the voxels that nodes depend on lie from the middle of their step: other nodes of the
-  /// step, the filters, and a cell of trilinear interpolation.
+  /// How far the voxels on which nodes depend lie from the middle of their step. It covers the
+  /// other nodes of the step, the filters, and a cell of trilinear interpolation.
   static std::array<int, 3> reach_voxels(const Eigen::Matrix3d& index_from_slab,
                                          const SlabAlignedGrid& grid) {
     const auto filter_reach = [&](std::size_t axis, double reach) {

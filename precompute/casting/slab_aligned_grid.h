@@ -15,8 +15,8 @@ namespace af {
 struct SlabAlignedOptions {
   double turned_spacing = 0.5;   ///< when one slab axis runs along an axis of the CT
   double tilted_spacing = 0.35;  ///< when none does
-  /// Coarser spacing, at most the CT's own, is taken where the grid would need more memory; 0 means
-  /// 6 bytes per voxel of the CT, or 96 MiB if that is more.
+  /// Where the grid would need more memory than this, the spacing is coarser, at most the CT's own;
+  /// 0 means 6 bytes per voxel of the CT, or 96 MiB if that is more.
   std::size_t largest_bytes = 0;
 };
 
@@ -82,7 +82,7 @@ struct IndexFromSlab {
 
 /// Rows are stored from a multiple of this x to another: one 64-byte vector of 16-bit levels.
 inline constexpr int kRowBlock = 32;
-/// What the filters of resampled axes reach: nodes along x and z, and spacings along y.
+/// How far the filters of resampled axes reach: nodes along x and z, and spacings along y.
 inline constexpr int kNodeFilterReach = 2;
 inline constexpr double kSliceFilterReach = 1.5;
 

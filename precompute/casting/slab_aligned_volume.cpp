@@ -130,7 +130,8 @@ class RowSharpener {
       // Rounds half away from zero.
       const float half = sum < 0.0f ? -0.5f : 0.5f;
       const auto level = static_cast<std::int16_t>(sum * kNormalization + half);
-      // No attenuation where there was none: what rays beside the volume sum up stays below 0.
+      // A node that did not attenuate must not attenuate now, so that the sums of rays beside the
+      // volume do not rise above 0.
       sharpened[x] = levels[x] <= 0 ? std::min(level, std::int16_t{0}) : level;
     }
   }
@@ -144,7 +145,7 @@ class RowSharpener {
            2 * (level[-2 * step] + level[2 * step]);
   }
 
-  /// Filtered twice, levels reach 2^15 * 180^2 at most: scaled_levels() sees to it.
+  /// Levels that are filtered twice reach 2^15 * 180^2 at most; scaled_levels() ensures this.
   void filter_along_z(const std::int16_t* levels, int begin, int end) {
     const auto stride = static_cast<std::ptrdiff_t>(stride_);
     std::int32_t* out = along_z_.data();
@@ -159,7 +160,7 @@ class RowSharpener {
   std::vector<std::int32_t> along_z_;
 };
 
-/// Narrows a row to what is not 0.
+/// Narrows a row to its nodes that are not 0.
 void narrow(GridRow& row, const std::int16_t* values) {
   const std::int16_t* levels = values + row.origin_offset();
   while (row.begin < row.end && levels[row.begin] == 0) ++row.begin;

@@ -10,8 +10,8 @@
 namespace af {
 
 /// Resamples slices [first_slice, end_slice). `values` and `rows` are those of the whole layout;
-/// rows of the slices are narrowed to what is not 0. Slices may be filled by several ranks; the
-/// values do not depend on who fills which or on the vector width.
+/// rows of the slices are narrowed to their nodes that are not 0. Several ranks may fill slices;
+/// the values depend neither on the rank that fills them nor on the vector width.
 void fill_slices(const AttenuationVolume& volume,
                  const RigidTransform& slab_from_ct,
                  const SlabAlignedGrid& grid,

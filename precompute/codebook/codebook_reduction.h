@@ -9,7 +9,7 @@
 
 namespace af {
 
-/// How the ranks that train one codebook combine what they know; the algorithms never see MPI. All
+/// How the ranks that train one codebook combine their results; the algorithms never see MPI. All
 /// ranks call in the same order.
 struct CodebookReduction {
   /// Exact element-wise sums over the ranks, in place.
@@ -19,7 +19,7 @@ struct CodebookReduction {
   std::size_t rank = 0;  ///< this rank's place in that order
 };
 
-/// One rank alone.
+/// For one rank.
 CodebookReduction serial_reduction();
 
 }  // namespace af

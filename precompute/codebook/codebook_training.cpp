@@ -52,7 +52,7 @@ struct CodedTiles {
   explicit CodedTiles(const std::vector<NumberedTile>& numbered)
       : tiles(numbered), nearest(numbered.size(), 0), squared_errors(numbered.size(), 0) {}
 
-  /// Piece by piece: the search wants tiles alone, and a copy of all would cost memory.
+  /// Piece by piece: the search takes tiles only, and a copy of all tiles would cost memory.
   void encode(const NearestCodeword& search, SearchHint hint) {
     constexpr std::size_t kPiece = 4096;
     std::vector<Tile> piece;
@@ -152,7 +152,7 @@ class CodebookUpdate {
     keys.reserve(coded.squared_errors.size());
     for (const std::uint64_t error : coded.squared_errors) keys.push_back(~error);
     static_assert(kNeverPicked == ~std::uint64_t{0}, "a tile without error repairs nothing");
-    // Some spare: a tile may equal another or a centroid.
+    // Some are to spare: a tile may equal another one or a centroid.
     const auto worst = smallest_keyed_tiles(keys, coded.tiles, 2 * free_.size() + 16, reduction);
     std::set<Tile> taken;
     for (const TrackedCodeword& codeword : codewords_) taken.insert(codeword.tile);
@@ -226,7 +226,7 @@ class CodebookIterations {
   const CodebookReduction& reduction_;
 };
 
-/// Whether another iteration is not worth while, or not allowed; says why.
+/// Whether to stop: another iteration would not pay, or is not allowed. Says why.
 bool has_ended(TrainedCodebook& training, const CodebookOptions& options) {
   const std::size_t done = training.iterations.size();
   if (done >= 2) {

@@ -41,10 +41,10 @@ struct TrainedCodebook {
   TrainingStop stop = TrainingStop::MaxIterations;
 };
 
-/// How a training that was cut short goes on.
+/// Where an interrupted training continues.
 struct TrainingCheckpoints {
-  /// What on_iteration() was last given, by an earlier run on any number of ranks; none: from the
-  /// start. The same tiles and options give the same codebook as a training without a stop.
+  /// The last state that an earlier run, on any number of ranks, gave to on_iteration(); none: from
+  /// the start. The same tiles and options give the same codebook as a training without a stop.
   std::optional<TrainedCodebook> begun;
   /// Called on every rank after every iteration; when it throws, it must on all ranks.
   std::function<void(const TrainedCodebook& so_far)> on_iteration;

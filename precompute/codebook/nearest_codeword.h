@@ -9,7 +9,7 @@
 
 namespace af {
 
-/// Where the search for a tile takes its first guess from; only speed depends on it.
+/// Where the search for a tile takes its first guess from. It affects only speed.
 enum class SearchHint {
   None,     ///< the codewords next to the tile's DC serve: nearer than a neighbour's answer
   PerTile,  ///< the caller's guess, for example the answer of the last training iteration

@@ -122,7 +122,7 @@ struct Best {
 /// A sum of squares of exact differences of integers is exact as a float while it stays below 2^24,
 /// in any order of summation.
 constexpr float kExactBelow = 0x1.0p24f;
-/// Above any sum of a codeword, below those of the padding and of the guards.
+/// Greater than any sum of a codeword, less than those of the padding and of the guards.
 constexpr float kNoLimit = 1e30f;
 constexpr Best kNothing{~uint64_t{0}, ~uint32_t{0}, kNoLimit};
 

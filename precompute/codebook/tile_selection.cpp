@@ -51,7 +51,8 @@ std::uint64_t lowest_held_out(std::uint64_t last_training) {
   return first_held_out(std::min(last_training, kMostHeldOut)) - 8;
 }
 
-/// How many of this rank's tiles others take over, and at which of all tiles moved its own begin.
+/// How many of this rank's tiles other ranks take over, and where its own begin among all tiles
+/// that are moved.
 struct Move {
   std::uint64_t given = 0;
   std::uint64_t first_taken = 0;
@@ -159,7 +160,7 @@ TrainingTilePicker::TrainingTilePicker(const TrainingSelection& selection,
     : selection_(selection), light_slab_(light_slab), histogram_(kBins, 0) {
   throw_if_any(problems(selection));
   lower_threshold(last_hash_of_fraction(selection.fraction));
-  // Only what is used of it becomes memory. An eighth above the cap, so that dropping is rare.
+  // Only the used part becomes memory. An eighth above the cap, so that dropping is rare.
   constexpr std::uint64_t kMostReserved = std::uint64_t{1} << 24;
   const std::uint64_t most = std::min(selection.max_training_tiles, kMostReserved);
   candidates_.training.reserve(most + most / 8 + 1);
@@ -186,7 +187,7 @@ void TrainingTilePicker::add(const UnitTiles& tiles, const WorkUnit& unit) {
 }
 
 void TrainingTilePicker::keep_within_cap() {
-  // What one rank's tiles alone push over the cap, those of all ranks do, too.
+  // When one rank's tiles alone exceed the cap, those of all ranks do, too.
   lower_threshold(capped_last_hash(histogram_, last_training_, selection_.max_training_tiles));
   drop_beyond();
 }

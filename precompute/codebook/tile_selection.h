@@ -18,7 +18,7 @@ struct NumberedTile {
   Tile tile{};
 };
 
-/// Tiles that a rank trains on, and tiles it only measures the codebook with.
+/// Tiles on which a rank trains, and tiles with which it only measures the codebook.
 struct TrainingShare {
   std::vector<NumberedTile> training;
   std::vector<NumberedTile> held_out;
@@ -35,11 +35,12 @@ struct TrainingSelection {
 
 std::vector<std::string> problems(const TrainingSelection& selection);
 
-/// Picks a rank's training tiles while units are cast, so that no others need be kept: tile i
-/// trains when hash(seed, i) lies below a threshold, so that the choice depends on neither ranks
-/// nor plan. The threshold is the fraction's, or the highest of 65536 steps that keeps the number
+/// Picks a rank's training tiles while units are cast, so that it need not keep the others. Tile i
+/// trains when hash(seed, i) lies below a threshold, so the choice depends on neither ranks nor
+/// plan. The threshold is that of the fraction, or the highest of 65536 steps that keeps the number
 /// of training tiles of all ranks within the cap. An eighth as many again are held out. Empty tiles
-/// take no part: they are codeword 0. Never holds much more candidates than the cap and a quarter.
+/// take no part: they are codeword 0. The picker never holds many more candidates than five
+/// quarters of the cap.
 /// \test TileSelection.*
 class TrainingTilePicker {
  public:
@@ -65,7 +66,7 @@ class TrainingTilePicker {
   TrainingShare candidates_;
 };
 
-/// The same for units at hand, one after the other.
+/// The same for units that are all there, one after the other.
 TrainingShare select_training_tiles(std::span<const UnitTiles> tiles,
                                     std::span<const WorkUnit> units,
                                     const LightSlab& light_slab,
@@ -76,7 +77,7 @@ TrainingShare select_training_tiles(std::span<const UnitTiles> tiles,
 /// that all take equally long to train; only the tiles moved travel.
 void level_out(TrainingShare& share, const CodebookReduction& reduction);
 
-/// A tile with the key it is picked by.
+/// A tile with the key by which it is picked.
 struct KeyedTile {
   std::uint64_t key = 0;
   NumberedTile numbered;
@@ -93,9 +94,9 @@ std::vector<KeyedTile> smallest_keyed_tiles(std::span<const std::uint64_t> keys,
                                             std::uint64_t count,
                                             const CodebookReduction& reduction);
 
-/// Key whose smallest values are a sample without replacement with probabilities proportional to
+/// A key whose smallest values are a sample without replacement, with probabilities proportional to
 /// the square root of the tiles' AC norm (Efraimidis and Spirakis 2006: an exponential variate over
-/// the weight). From correctly rounded operations only, hence the same bits everywhere.
+/// the weight). It uses correctly rounded operations only, so it has the same bits everywhere.
 std::uint64_t weighted_sampling_key(std::uint64_t seed, const NumberedTile& tile);
 
 }  // namespace af

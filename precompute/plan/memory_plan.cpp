@@ -64,7 +64,7 @@ MemoryPlan plan_memory(const LightSlab& light_slab,
   const double candidates =
       kWithHeldOut * std::min(1.125 * cap, kLargestShare * fraction_tiles / ranks);
   const double share = kWithHeldOut * std::min(cap, fraction_tiles) / ranks;
-  // With nearest codeword, error and a key.
+  // Tiles with nearest codeword, error and a key.
   constexpr double kTrainingBytes = kCandidateBytes + 4.0 + 8.0 + 8.0;
   // Sums and their reduction, search coefficients, codewords drawn.
   constexpr double kBytesPerCodeword = 600.0;
@@ -72,7 +72,7 @@ MemoryPlan plan_memory(const LightSlab& light_slab,
   MemoryPlan plan;
   plan.fixed_bytes = fixed_bytes;
   plan.casting_bytes = static_cast<std::uint64_t>(kCandidateBytes * candidates + unit);
-  // The candidates are still there while the share is copied from them.
+  // While the share is copied from the candidates, these are still there.
   plan.training_bytes = static_cast<std::uint64_t>(
       std::max(kTrainingBytes * share + codebook, kCandidateBytes * (candidates + share)));
   const double chunk_index =

@@ -29,8 +29,8 @@ MemoryPlan plan_memory(const LightSlab& light_slab,
                        std::uint64_t fixed_bytes,
                        int ranks);
 
-/// The limit in force: the option's, or the default, or more where even no tiles kept would need
-/// it. InputError when the option's own limit is less than that.
+/// The limit that applies: the option's, or the default, or more where a rank would need it even
+/// without keeping any tiles. InputError when the option's own limit is less than that.
 std::uint64_t memory_limit(const PrecomputeOptions& options, const MemoryPlan& plan);
 
 /// Memory of this process, from the system (0 where it does not tell).

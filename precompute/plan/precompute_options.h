@@ -17,7 +17,8 @@
 
 namespace af {
 
-/// What a rank may take beside what every node holds once, when nothing else is said.
+/// The memory that a rank may take beside what every node holds once, unless an option says
+/// otherwise.
 inline constexpr std::uint64_t kDefaultMemoryLimitBytes = std::uint64_t{300} << 20;
 
 /// Options of af-precompute: what is cast, how it is compressed, where it goes. Angles in degrees,
@@ -72,10 +73,11 @@ struct PrecomputeOptions {
   [[nodiscard]] LightSlabSpec light_slab_spec(const DepthSlabs& depth_slabs) const;
 };
 
-/// Training tiles where no share is stated: enough that unseen tiles come out nearly as training
-/// tiles do (precompute/README.md has what more and fewer give).
+/// The number of training tiles where no share is stated: enough that unseen tiles come out nearly
+/// as training tiles do (precompute/README.md has the effect of more and fewer).
 inline constexpr std::uint64_t kTrainingTilesPerCodeword = 64;
-/// Whatever the codebook: so that 65536 codewords do not take more than twice the time of 16384.
+/// A limit for every codebook, so that 65536 codewords do not take more than twice the time of
+/// 16384.
 inline constexpr std::uint64_t kTrainingTilesUnlessStated = std::uint64_t{1} << 20u;
 
 /// Every broken constraint of the values themselves (not of files).
@@ -89,7 +91,7 @@ NamedValues casting_options(const PrecomputeOptions& options);
 /// Name and value of every option that decides what the codebook makes of the samples.
 NamedValues codebook_options(const PrecomputeOptions& options);
 
-/// All options in force as TOML, stored in the field.
+/// All options that are used, as TOML; stored in the field.
 std::string to_toml(const PrecomputeOptions& options);
 
 /// Shortest text that reads back as the same double.

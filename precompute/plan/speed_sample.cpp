@@ -31,7 +31,7 @@ class Stopwatch {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-/// Units in an order that depends on nothing but their number.
+/// Units in an order that depends only on their number.
 std::vector<std::size_t> shuffled(std::size_t count) {
   std::vector<std::size_t> order(count);
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -41,8 +41,8 @@ std::vector<std::size_t> shuffled(std::size_t count) {
   return order;
 }
 
-/// Tiles of sampled units: one run of neighbours to code, and others spread over all units to draw
-/// codewords from.
+/// Tiles of sampled units: one run of neighbours to encode, and others, spread over all units, to
+/// draw codewords from.
 struct SampledTiles {
   std::vector<Tile> run;
   std::vector<Tile> spread;
@@ -60,7 +60,7 @@ struct SampledTiles {
   }
 };
 
-/// Every so many of the spread tiles, as many as asked for when there are enough.
+/// Every n-th of the spread tiles, so that there are as many as asked for, if there are enough.
 Codebook drawn_codebook(std::vector<Tile> tiles, int codewords) {
   Codebook codebook{{Tile{}}};
   const std::size_t wanted = static_cast<std::size_t>(codewords) - 1;

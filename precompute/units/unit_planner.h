@@ -28,15 +28,15 @@ inline constexpr int kLargestT = 128;
 /// caster little, then along u. Along t it begins at a multiple of kRunOfT nodes of what is stored.
 std::vector<WorkUnit> plan_units(const LightSlab& light_slab, const PlanOptions& options);
 
-/// Unit size that leaves every rank enough units to end together: not more than `largest`, at least
-/// 16 units a rank.
+/// A unit size that leaves every rank enough units for all ranks to end together: not more than
+/// `largest`, at least 16 units a rank.
 PlanOptions plan_options_for_ranks(const LightSlab& light_slab,
                                    int ranks,
                                    const PlanOptions& largest = {});
 
-/// What casting each unit costs, in units of one ray through the whole CT: rays that miss the box
-/// of all attenuation (`attenuating_corners_ct`, ct frame) cost little, and of a thin slab less is
-/// summed. To hand out the costly units first.
+/// The cost of casting each unit, in units of one ray through the whole CT, for handing out the
+/// costly units first. Rays that miss the box of all attenuation (`attenuating_corners_ct`, ct
+/// frame) cost little, and a thin slab costs less, because fewer slices are summed.
 std::vector<double> unit_costs(const std::vector<WorkUnit>& units,
                                const LightSlab& light_slab,
                                const std::array<Eigen::Vector3d, 8>& attenuating_corners_ct);

@@ -67,7 +67,7 @@ UnitTiles make_unit_tiles(const WorkUnit& unit, std::span<const std::uint16_t> s
     result.occupied[local_tile / 64] |= std::uint64_t{1} << (local_tile % 64);
     ++count;
   });
-  // Counted first: a vector that grows would take three times the memory for a while.
+  // Tiles are counted first: a vector that grows would take three times the memory for a while.
   result.tiles.reserve(count);
   for_each_occupied_tile(
       unit, samples, [&](std::size_t, const Tile& tile) { result.tiles.push_back(tile); });

@@ -11,7 +11,7 @@
 namespace af::registration {
 namespace {
 
-/// Larger discs would hide what is to be registered.
+/// Larger discs would hide the anatomy that is to be registered.
 constexpr double kMostFiducialMaskMm = 50.0;
 
 void replace_in_chain(const MethodOptions& options, ChainOptions& chain) {

@@ -28,8 +28,8 @@ struct MethodOptions {
   std::uint64_t seed = 1;
   int threads = 1;  ///< that one registration spreads over; 0: every processor of this process
 
-  /// The preset that was typed; else robust, or paper when a measure or an optimiser was typed:
-  /// one of them in every stage suits the paper's method only.
+  /// The preset that was typed. Without one: robust, or paper when a measure or an optimiser was
+  /// typed, because one measure or optimiser for every stage suits the paper's method only.
   [[nodiscard]] std::string preset_name() const;
 };
 

@@ -27,8 +27,8 @@ RegistrationOptions fast_preset() {
                                    "gc gauss-newton level=1 pixels=2 step=2 final=0.02"));
 }
 
-/// Ends of chains that explain this share of the X-rays' gradients convince: where X-rays were
-/// clean, wrong vertebrae came to 0.51 and right poses to 0.69 or more.
+/// The end of a chain convinces when it explains this share of the X-rays' gradients: where X-rays
+/// were clean, wrong vertebrae came to 0.51 and right poses to 0.69 or more.
 constexpr double kConvincingValue = 0.6;
 
 RegistrationOptions robust_preset() {

@@ -14,8 +14,8 @@ constexpr double kFirstDamping = 1e-3;
 constexpr double kLeastDamping = 1e-6;
 constexpr double kDampingFactor = 10.0;
 
-/// A parameter that the residuals hardly know (a translation along the only view's beam) is damped
-/// as if its curvature were this share of the largest one: its steps stay finite.
+/// A parameter that hardly changes the residuals (a translation along the only view's beam) is
+/// damped as if its curvature were this share of the largest one, so that its steps stay finite.
 constexpr double kLeastCurvatureShare = 1e-6;
 
 ScaledParameters damped_step(const TargetValue& at, double damping, double longest_mm) {

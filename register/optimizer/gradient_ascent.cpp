@@ -42,7 +42,7 @@ ScaledParameters ascent_direction(const std::deque<Change>& changes,
   return direction;
 }
 
-/// The first step of a search, and any too long one, has the longest length allowed.
+/// The first step of a search has the longest length allowed; so has any step that would be longer.
 ScaledParameters bounded_step(const std::deque<Change>& changes,
                               const ScaledParameters& gradient,
                               double longest_mm) {
@@ -103,7 +103,8 @@ void GradientAscent::maximize(OptimizationTarget& target,
       run.converge(met_limit);
       return;
     }
-    // A memory of well-known directions gives short steps, too: the gradient has the last word.
+    // A memory of well-known directions gives short steps, too; therefore the gradient decides
+    // last.
     changes.clear();
     step = at->gradient.normalized() * (kRestartLength * options.final_step_mm);
   }

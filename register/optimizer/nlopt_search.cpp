@@ -16,7 +16,7 @@ struct OptimizerDeleter {
 };
 using OptimizerHandle = std::unique_ptr<nlopt_opt_s, OptimizerDeleter>;
 
-/// What NLopt's callback works on. Exceptions wait here: they must not cross C code.
+/// The state of NLopt's callback. It keeps exceptions, which must not cross C code.
 struct Callback {
   SearchRun& run;
   nlopt_opt optimizer;
@@ -78,8 +78,8 @@ void NloptSearch::maximize(OptimizationTarget& target,
                   "NLopt takes a final step");
   ScaledParameters point = ScaledParameters::Zero();
   double value = 0.0;
-  // Its verdict does not matter beyond what the callback saw: BOBYQA calls steps that rounding
-  // stopped a failure, too.
+  // NLopt's own result does not matter, only what the callback saw: BOBYQA also reports a failure
+  // when rounding stopped its steps.
   nlopt_optimize(optimizer.get(), point.data(), &value);
   if (callback.failure) std::rethrow_exception(callback.failure);
   run.trace(options.final_step_mm);

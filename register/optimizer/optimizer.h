@@ -32,14 +32,14 @@ const char* to_string(StopReason reason);
 using ScaledParameters = Eigen::Matrix<double, 6, 1>;
 using ScaledMatrix = Eigen::Matrix<double, 6, 6>;
 
-/// What an optimiser asks of its target, each including the ones before.
+/// What an optimiser asks of its target; each value includes the ones before.
 enum class Derivatives {
   None,
   Gradient,         ///< first derivatives
   NormalEquations,  ///< and a positive semi-definite stand-in for the negative Hessian
 };
 
-/// A target at a point, as far as was asked for.
+/// A target at a point, with the derivatives that were asked for.
 struct TargetValue {
   double value = 0.0;
   ScaledParameters gradient = ScaledParameters::Zero();
@@ -91,7 +91,7 @@ struct OptimizerResult {
   std::vector<OptimizerIteration> trace;
 };
 
-/// What one search may spend, and its random numbers' key.
+/// What one search may spend, and the key of its random numbers.
 struct SearchBudget {
   int max_evaluations = 5000;    ///< calls of the target; derivatives do not count extra
   std::uint64_t random_key = 0;  ///< of (seed, case, start); only cma-es draws

@@ -28,8 +28,8 @@ class SearchRun {
   /// One evaluation; Ended when the budget is spent or the value is not finite, which the result
   /// then says.
   Evaluation evaluate(const ScaledParameters& point, Derivatives derivatives = Derivatives::None);
-  /// The same, without derivatives, for points that do not depend on each other. Counted in their
-  /// order: after one that ends the search all are Ended.
+  /// The same, without derivatives, for points that do not depend on each other. They are counted
+  /// in their order: after a point that ends the search, all others are Ended.
   std::span<const Evaluation> evaluate_all(std::span<const ScaledParameters> points);
 
   /// The point that a step from the best one leads to, inside known limits.
@@ -42,7 +42,8 @@ class SearchRun {
   /// The same when it beats the best.
   void offer(const ScaledParameters& point, double value);
   void trace(double step_mm);
-  /// Converged: pinned when the points that could have been better were inadmissible.
+  /// The search has converged: it is pinned when the points that could have been better were
+  /// inadmissible.
   void converge(bool met_limit);
 
   [[nodiscard]] const OptimizerResult& result() const { return result_; }

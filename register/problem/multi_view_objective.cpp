@@ -128,7 +128,7 @@ void MultiViewObjective::evaluate_all(std::span<const RigidTransform> room_from_
     const auto i = static_cast<std::size_t>(task / view_count);
     const auto view = static_cast<std::size_t>(task % view_count);
     if (!poses_[i].is_in_range) return;
-    // Views of one pose keep their memory to themselves, whichever thread takes them.
+    // Every view of one pose has memory of its own, whichever thread takes it.
     Scratch& scratch = scratch_of(pose_count == 1 ? 0 : slot, view);
     evaluate_view(i, room_from_ct[i], view, scratch, std::nullopt, [&](NormalEquations& part) {
       part.value = views_[view].measure->evaluate(scratch.drr, *scratch.similarity);

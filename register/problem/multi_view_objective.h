@@ -69,12 +69,12 @@ class MultiViewObjective {
     std::vector<float> planes;    ///< six, once derivatives were asked for
     std::vector<float> by_pixel;  ///< likewise
   };
-  /// What is known of one pose before its views are summed.
+  /// What is known about one pose before its views are summed.
   struct PoseState {
     bool is_in_range = false;
     int first_outside = 0;  ///< first view with rays outside; those after it do not count
   };
-  /// What one view adds to the value of one pose.
+  /// The contribution of one view to the value of one pose.
   struct Part {
     std::int64_t rays_outside = 0;
     NormalEquations equations;  ///< or the value alone
@@ -83,8 +83,8 @@ class MultiViewObjective {
   [[nodiscard]] bool is_in_range(const RigidTransform& room_from_ct) const;
   void prepare(std::span<const RigidTransform> room_from_ct);
   Scratch& scratch_of(int slot, std::size_t view);
-  /// Renders a view of pose `i` and has `compare` fill its part, unless an earlier view of the pose
-  /// is known to have rays outside.
+  /// Renders a view of pose `i` and lets `compare` fill its part, unless an earlier view of the
+  /// pose is known to have rays outside.
   template <typename Compare>
   void evaluate_view(std::size_t i,
                      const RigidTransform& room_from_ct,

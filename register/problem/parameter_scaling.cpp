@@ -6,8 +6,8 @@
 namespace af::registration {
 namespace {
 
-/// A parameter that moves projections less than this (a translation along the only view's beam,
-/// say) is scaled as if it moved them so far, which keeps its steps finite.
+/// A parameter that moves projections by less than this (for example a translation along the only
+/// view's beam) is scaled as if it moved them by this much, which keeps its steps finite.
 constexpr double kSmallestDisplacementMm = 1e-3;
 
 bool projects_into(const PointProjector& projector,
@@ -91,7 +91,7 @@ std::optional<ParameterScaling> projected_motion_scaling(const RigidTransform& r
       is_seen = projects_into(projectors[i], views[i].roi, point);
     if (!is_seen) continue;
     for (const PointProjector& projector : projectors) {
-      // A point beside the source of another view has no image there.
+      // For another view, a point beside its source has no image.
       if (!(projector.depth_mm(point) > 0.0)) continue;
       sums +=
           image_speeds(projector, point, center_room_point, projector.depth_mm(isocenter_point));

@@ -23,7 +23,8 @@ PoseMatrix motions_from_parameters(const PoseParameters& parameters) {
   return motions;
 }
 
-/// A box edge is kept away from by this share, so that rounding does not put a pose beyond it.
+/// Poses keep this share of a box's size away from its edge, so that rounding does not put them
+/// beyond it.
 constexpr double kInsideShare = 1e-9;
 
 double clamped(double value, double limit) {

@@ -18,8 +18,8 @@ struct StageGrid {
 double pixels_per_mm(const CameraGeometry& camera, const Eigen::Vector3d& room_point);
 
 /// The view of a stage: the region, scaled about its centre and cut at the detector's edges, seen
-/// by pixels of pixel_step detector pixels (View::coarser). Never beyond the detector, so that a
-/// field made for it holds every ray.
+/// by pixels of pixel_step detector pixels (View::coarser). It never reaches beyond the detector,
+/// so a field made for the detector holds every ray.
 View stage_view(const View& view, const StageGrid& grid);
 
 /// The X-ray of a whole detector as the DRRs of stage_view(view, grid) see it: block means, blurred

@@ -211,8 +211,8 @@ void count_histogram(const HistogramRequest& request, int32_t count) {
     const I16 cells = to_int(clamped) + load<I16>(request.row_offsets + i);
     int32_t cell[kLanes];
     store(cell, cells);
-    // Neighbouring pixels tend to fall into the same cell; counting them in turn into several
-    // histograms keeps an increment from waiting for the one before it.
+    // Neighbouring pixels tend to fall into the same cell. They are counted into several histograms
+    // in turn, so that no increment waits for the one before it.
 #pragma GCC unroll 16
     for (int lane = 0; lane < kLanes; ++lane)
       ++counts[cell[lane] + lane % kHistogramCopies * request.cells];

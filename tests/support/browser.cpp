@@ -15,7 +15,7 @@ std::string text_of(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
-/// The lines that are the page's own, of all that a browser logs.
+/// Of all lines that a browser logs, those of the page itself.
 std::string console_lines(const std::string& log) {
   std::istringstream lines(log);
   std::string found;
@@ -34,7 +34,7 @@ BrowserPage open_in_browser(const std::filesystem::path& page,
                             const std::filesystem::path& scratch) {
   const std::filesystem::path log = scratch / "browser.log";
   const std::filesystem::path document = scratch / "browser.html";
-  // A name server that finds nothing: whatever the page asked for over a network would fail.
+  // A name server that finds nothing: every request of the page over a network fails.
   const ProgramRun run = run_command(
       "( timeout 120 chromium --headless --no-sandbox --disable-gpu --disable-dev-shm-usage "
       "--host-resolver-rules='MAP * ~NOTFOUND' --enable-logging=stderr --user-data-dir='" +

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The operators stand apart from what calls them: inlined, GCC 12 takes malloc and free for
-// mismatched.
+// The operators are in a file of their own: where GCC 12 inlines them, it reports that malloc and
+// free do not match.
 #include "support/counted_allocations.h"
 
 #include <atomic>

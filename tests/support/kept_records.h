@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finished work as it lies on disk, read by other code than that under test.
+// Finished work as it is on disk, read by other code than the code under test.
 #pragma once
 
 #include <cstdint>

@@ -17,7 +17,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 constexpr std::chrono::milliseconds kPoll{1};
 
-/// A process that is gone, or a zombie that nobody has waited for.
+/// A process that has ended, or a zombie for which nobody has waited.
 bool is_gone(pid_t process) {
   std::ifstream file("/proc/" + std::to_string(process) + "/stat");
   std::string stat;

@@ -15,7 +15,7 @@ class LaunchedJob {
  public:
   /// Starts `command` (program and arguments) in the background; what it prints goes to `output`.
   LaunchedJob(const std::vector<std::string>& command, const std::filesystem::path& output);
-  /// Kills whatever of it still runs.
+  /// Kills all processes of the job that still run.
   ~LaunchedJob();
   LaunchedJob(const LaunchedJob&) = delete;
   LaunchedJob& operator=(const LaunchedJob&) = delete;

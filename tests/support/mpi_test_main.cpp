@@ -11,7 +11,7 @@
 
 namespace {
 
-/// What failed on a rank whose results nobody else prints.
+/// The failures of a rank whose results nobody else prints.
 class FailurePrinter : public testing::EmptyTestEventListener {
  public:
   explicit FailurePrinter(int rank) : rank_(rank) {}
@@ -20,7 +20,7 @@ class FailurePrinter : public testing::EmptyTestEventListener {
   void OnTestStart(const testing::TestInfo& test) override {
     test_ = std::string(test.test_suite_name()) + "." + test.name();
   }
-  // GoogleTest holds its lock here: asking it for the current test would wait for ever.
+  // GoogleTest holds its lock here; asking it for the current test would wait for ever.
   void OnTestPartResult(const testing::TestPartResult& result) override {
     if (!result.failed()) return;
     std::cout << "rank " << rank_ << ": " << test_ << ": "

@@ -100,7 +100,7 @@ CastCt ray_caster(const DrrOptions& options,
                       "CT of the field (ct_content_sha256)",
                       hash + " (" + options.ct.string() + ")",
                       field->identity.ct_content_sha256);
-    // A comparison is of rendering: the reference takes the field's HU model.
+    // --compare compares ways to render, so the reference takes the field's HU model.
     model = {field->identity.mu_water_per_mm, field->identity.air_below_hu};
   }
   return {std::make_shared<const RayCastDrr>(std::make_shared<const AttenuationVolume>(ct, model),
@@ -202,7 +202,7 @@ std::string write_drrs(const std::vector<Image2d>& drrs,
         percentile_window(drrs.front(), options.window_percent[0], options.window_percent[1]);
     // A DRR of one value shows nothing, as when the CT is out of view.
     const double high = percentile > low ? percentile : low + 1.0;
-    // Bright is attenuated, as in the other formats; --invert gives the look of a film.
+    // Attenuated pixels are bright, as in the other formats; --invert gives the look of a film.
     if (options.invert)
       write_png_image(negated(drrs.front()), options.output, -high, -low);
     else

@@ -35,7 +35,7 @@ struct DrrOptions {
   std::filesystem::path output;
 };
 
-/// All combinations and values that cannot be; empty when the options are sound.
+/// All impossible values and combinations of options; empty when the options are sound.
 std::vector<std::string> problems(const DrrOptions& options);
 
 /// What renders, for which camera, and what pose parameters are relative to.

@@ -193,7 +193,7 @@ void inspect_csv(const fs::path& path, Inspection& inspection) {
   if (has_columns(table, {"rx_deg", "ry_deg", "rz_deg", "tx_mm", "ty_mm", "tz_mm"}) ||
       has_columns(table, {"m00", "m23"})) {
     inspection.kind = "poses";
-    // The frame only places the parameters; any is good enough to check them.
+    // The frame only gives the parameters a place; any frame is good enough to check them.
     inspection.facts["poses"] = read_poses_csv(path, PoseFrame{}).size();
     return;
   }

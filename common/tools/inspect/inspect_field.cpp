@@ -79,7 +79,7 @@ ordered_json provenance_json(const FieldProvenance& provenance) {
     json["details"] = provenance.provenance_json;
     return json;
   }
-  // Stand above already.
+  // These are printed above already.
   details.erase("command_line");
   details.erase("options_toml");
   // A summary needs how the training ended, not each step.

@@ -154,7 +154,7 @@ void warn_of_ct(const CtVolume& ct, const HuStatistics& hu, Inspection& inspecti
   warn_of_cut_body(ct, inspection);
 }
 
-/// Smallest value that at least `share` of the values do not exceed; spoils their order.
+/// Smallest value that at least `share` of the values do not exceed. Changes the order of `values`.
 double quantile_of(std::vector<float>& values, double share) {
   const auto rank = static_cast<std::size_t>(
       std::max(1.0, std::ceil(share * static_cast<double>(values.size()))));
@@ -242,7 +242,7 @@ void inspect_image(const fs::path& path, const InspectOptions& options, Inspecti
   if (*format == ImageFormat::Dicom) return inspect_picture(path, inspection);
   inspection.kind = "image";
   const ImageHeader header = read_image_header(path, *format);
-  // Volumes that cannot hold floats are read once, as CTs.
+  // Volumes whose values cannot be floats are read once, as CTs.
   const auto long_axes = std::count_if(
       header.size.begin(), header.size.end(), [](std::uint64_t extent) { return extent > 1; });
   if (long_axes > 2 && header.value_bytes != sizeof(float))

@@ -61,7 +61,7 @@ void run(const Options& options, const Communicator& world) {
   if (world.is_root()) print(options, inspections);
   if (worst == af::ExitCode::Done) return;
   std::cout.flush();
-  // Every rank knows the same; said once.
+  // Every rank knows the same; only one says it.
   throw af::RemoteError(worst,
                         std::to_string(bad) + " of " + std::to_string(options.paths.size()) +
                             " paths not usable; the reasons are in the report");

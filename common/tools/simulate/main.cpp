@@ -23,7 +23,7 @@ using namespace af;
 using tools::SimulatedCase;
 using tools::SimulateOptions;
 
-/// A patient as X-rays and as the CT show them; they differ only where the CT clips metal.
+/// A patient as X-rays and as the CT show them. The two differ only where the CT clips metal.
 struct Patient {
   CtVolume anatomy;
   CtVolume ct;

@@ -41,7 +41,7 @@ struct SimulateOptions {
   bool is_ideal = false;
   StressOptions stress;
 
-  /// The imaging chain in force: `xray`, or all its effects off when is_ideal, with the wanted
+  /// The imaging chain that is used: `xray`, or all its effects off when is_ideal, with the wanted
   /// stress.
   [[nodiscard]] XraySimulationOptions xray_in_force() const;
   /// case_name, or one made from the CT's file name or the phantom.

@@ -118,7 +118,7 @@ void add_fiducials(const SimulateOptions& options,
     simulated.exact_fiducials_px.push_back(detected(0.0));
     refuse_pins_off_detector(camera, simulated.exact_fiducials_px.back());
     study_case.views[i].fiducials_px = detected(options.fiducial_sigma_px);
-    // Who evaluates knows only the study's cameras.
+    // An evaluation knows only the study's cameras.
     views.push_back({rig.cameras[i], study_case.views[i].fiducials_px});
   }
   if (views.size() >= 2)
