@@ -6,14 +6,14 @@
 
 study="" resources="$af_root/jobs/slurm/resources.sh"
 
-# take_study WORD: the word of the command line that is no option.
+# take_study WORD: takes WORD, which is no option, as the study.
 take_study() {
   [[ "$1" != -* ]] || die 2 "unknown option '$1' (try --help)"
   [[ -z "$study" ]] || die 2 "one study at a time: '$study' and '$1' were given"
   study=$1
 }
 
-# open_study: checks study and resources, and reads the latter.
+# open_study: checks the study and the resources, and reads the resources.
 open_study() {
   [[ -n "$study" ]] || die 2 "which study? Give a study.toml (try --help)"
   [[ -f "$study" ]] || die 4 "$study: no such file"
@@ -28,7 +28,7 @@ open_study() {
 declare -A cameras_of=()
 case_names=() most_views=0
 
-# read_chain: cases and cameras of the study; says what is wrong with it, if anything.
+# read_chain: reads cases and cameras of the study; reports what is wrong with it.
 read_chain() {
   local views case_name camera view_count
   # One line per view: case, camera.
@@ -43,12 +43,14 @@ read_chain() {
   done
 }
 
-# forget_progress: throws away what earlier runs of this chain left unfinished in `output`; every stage is done again.
+# forget_progress: removes what earlier runs of this chain left unfinished in `output`, so that every stage is done
+# again.
 forget_progress() {
   rm -rf "$output"/.stages/*.done "$output"/fields/*.progress "$output"/registration/*.progress
 }
 
-# Each of these sets `command`. precompute_command CASE VIEW: of the VIEW-th camera, `true` when the case has not so many.
+# Each of these sets `command`. precompute_command CASE VIEW: for the camera of the case's VIEW-th view; `true` when the
+# case has fewer views.
 precompute_command() {
   local case_name=$1 view=$2 camera
   camera=$(sed -n "$((view + 1))p" <<<"${cameras_of[$case_name]}")

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# What each part of the chain from CT to pose adds to the error of a registration: one thing is changed after the other,
-# and every change is registered from the same starts.
+# What each part of the chain from CT to pose adds to the error of a registration: changes one thing after the other,
+# and registers from the same starts after every change.
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR
 source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
@@ -63,7 +63,7 @@ fi
 mkdir -p "$output/logs" "$output/studies" "$output/fields" "$output/runs"
 output="$(cd "$output" && pwd)"
 
-# make RESULT COMMAND...: unless RESULT is there, which the programs put in place only when it is complete.
+# make RESULT COMMAND...: runs the command unless RESULT exists. The programs put it in place only when it is complete.
 make() {
   local result="$output/$1" log="$output/logs/${1//\//-}.log" start=$SECONDS status=0
   shift

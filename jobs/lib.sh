@@ -46,7 +46,7 @@ program_folder() {
   fi
 }
 
-# need_programs FOLDER PROGRAM...: ends when one is missing.
+# need_programs FOLDER PROGRAM...: ends the script when one is missing.
 need_programs() {
   local folder=$1 program
   shift
@@ -78,7 +78,7 @@ build_preset() {
   mkdir -p "$folder"
   local launcher=()
   if command -v ccache >/dev/null; then
-    # Precompiled headers are cached only so.
+    # Without this, ccache does not cache precompiled headers.
     launcher=("-DCMAKE_CXX_COMPILER_LAUNCHER=env;CCACHE_SLOPPINESS=${CCACHE_SLOPPINESS:+$CCACHE_SLOPPINESS,}pch_defines,time_macros;ccache")
   fi
   if ! (cd "$af_root" && { [[ -f "$folder/build.ninja" ]] || cmake --preset "$preset" "${launcher[@]}"; } &&
@@ -106,7 +106,8 @@ need_value() { (($2 >= 2)) || die 2 "option $1 needs a value (try --help)"; }
 need_count() { [[ "$2" =~ ^[1-9][0-9]{0,6}$ ]] || die 2 "$1 = '$2' must be a whole number from 1 to 9999999"; }
 need_seed() { [[ "$2" =~ ^[0-9]{1,18}$ ]] || die 2 "$1 = '$2' must be a whole number"; }
 
-# program_path NAME: of a built program (or an installed one, PREFIX/bin beside PREFIX/share/attenuation-fields/jobs).
+# program_path NAME: path of a built program (or of an installed one, PREFIX/bin beside
+# PREFIX/share/attenuation-fields/jobs).
 program_path() {
   local folder="$af_root/build/release/bin"
   [[ -f "$af_root/CMakeLists.txt" ]] || folder="$(cd "$af_root/../.." && pwd)/bin"

@@ -132,9 +132,9 @@ on_exit() {
 }
 trap on_exit EXIT
 
-# run_stage OUTPUT_PATH COMMAND...: runs the next planned stage unless it was finished with the same command,
-# program and earlier stages. A stage that was cut short keeps its output, for the program to resume from; one whose
-# inputs changed starts from nothing.
+# run_stage OUTPUT_PATH COMMAND...: runs the next planned stage, unless it was finished with the same command, program
+# and earlier stages. An interrupted stage keeps its output, from which the program continues; a stage whose inputs
+# changed starts from nothing.
 run_stage() {
   local result=$1
   shift
@@ -152,7 +152,7 @@ run_stage() {
   fi
   rm -f "$stamp.done"
   if [[ ! -f "$stamp.started" || "$(<"$stamp.started")" != "$stage_chain" ]]; then
-    # A result inside a folder of its own takes that folder with it.
+    # When a result has a folder of its own, this folder is removed with it.
     local old=$result
     [[ "$(dirname "$result")" == "$output" ]] || old=$(dirname "$result")
     rm -rf "$old" "$old.progress" "$old.partial"
@@ -202,7 +202,7 @@ if [[ -z "$ct" && -z "$phantom" ]]; then
   plan_stage ct 1 "Unpack the default CT"
 elif [[ -n "$ct" ]]; then
   ct="$(realpath "$ct")"
-  # A CT that changes under its name starts the study anew.
+  # When the CT's file changes, the study starts anew.
   stage_chain=$(find "$ct" -type f -printf '%P %s %T@\n' | LC_ALL=C sort | sha256sum)
 fi
 field_seconds=40

@@ -63,7 +63,7 @@ done
 ((${#experiments[@]} > 0)) || experiments=("${all_experiments[@]}")
 [[ -n "$ranks" ]] || ranks=$(core_count)
 
-# What a preset stands for; the fields have the paper's resolutions.
+# The settings of a preset; the fields have the paper's resolutions.
 field_size=(--uv-nodes 64 --st-nodes 256 --codewords 16384 --training-fraction 0.1)
 starts_per_interval=30
 case "$preset" in

@@ -97,7 +97,7 @@ while (($# > 0)); do
   shift
 done
 
-# stress_of VARIANT: what af-simulate --stress is given; nothing for clean.
+# stress_of VARIANT: the value of af-simulate --stress; nothing for clean.
 stress_of() {
   case "$1" in
     clean) ;;
@@ -120,7 +120,7 @@ flock --nonblock 9 || die 3 "another run is at work in $output"
 # What the stages of an anatomy depend on beyond their own command lines.
 chain=""
 
-# run_stage NAME COMMAND...: unless it was finished with the same command and chain; its output goes to a log.
+# run_stage NAME COMMAND...: runs it unless it was finished with the same command and chain; its output goes to a log.
 run_stage() {
   local name=$1 stamp="$output/.stages/${1//\//-}.done" log="$output/logs/${1//\//-}.log" start=$SECONDS status=0
   shift
@@ -168,7 +168,8 @@ make_study() {
   sed -i "s/^roi_px.*/roi_px = [$corner, $corner, $roi_px, $roi_px]/" "$study"
 }
 
-# method_options METHOD: sets method_options to what af-evaluate is given, and method_text to what that stands for.
+# method_options METHOD: sets method_options to the options of af-evaluate, and method_text to the chains that they
+# mean.
 method_options() {
   local preset similarity optimizer text
   method_options=()
@@ -209,7 +210,7 @@ screen_methods() {
   done
 }
 
-# On the clean study.
+# This is for the clean study.
 screen() {
   local method
   run_stage "starts of the screen" "$bin/af-evaluate" registration --study "$study" "${field_options[@]}" --gold study \

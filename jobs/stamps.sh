@@ -16,7 +16,7 @@ value_of() {
   done
 }
 
-# result_of COMMAND...: the file that stands there when the command has done all of its work.
+# result_of COMMAND...: the file that exists when the command has done all of its work.
 result_of() {
   local output
   output=$(value_of -o "$@")
@@ -27,11 +27,11 @@ result_of() {
 # progress_of COMMAND...: the folder of its unfinished work.
 progress_of() { echo "$(value_of -o "$@").progress"; }
 
-# bytes_in FOLDER: of all files; 0 when there is none.
+# bytes_in FOLDER: the size of all files together; 0 when there is none.
 bytes_in() { { find "$1" -type f -printf '%s\n' 2>/dev/null || true; } | awk '{sum += $1} END {print sum + 0}'; }
 
-# state_of PATH...: name, size and time of a file (of the voxels beside a header, too) or of all files of a folder; of what
-# is missing, that.
+# state_of PATH...: name, size and time of a file (also of the voxels beside a header) or of all files of a folder; for
+# a missing file, that it is missing.
 state_of() {
   local path paths
   for path in "$@"; do

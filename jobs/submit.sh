@@ -41,7 +41,7 @@ while (($# > 0)); do
   shift
 done
 
-# task_state STAGE TASK JOB: of one array task, in a word or two.
+# task_state STAGE TASK JOB: the state of one array task, in a word or two.
 task_state() {
   local stage=$1 task=$2 job=$3 log="$output/logs/$1-$2.log" state
   state=$(squeue --noheader --jobs "${job}_$task" --format %T 2>/dev/null || true)
@@ -106,7 +106,7 @@ submit() {
   say "$stage: job $job_id"
 }
 
-# typed FUNCTION [ARGUMENT...]: the command that FUNCTION sets, as one types it.
+# typed FUNCTION [ARGUMENT...]: the command that FUNCTION sets, as a user would type it.
 typed() {
   local command=()
   "$@"
@@ -145,7 +145,7 @@ for ((view = 0; view < most_views; ++view)); do
   after_fields+="${after_fields:+,}aftercorr:$job_id"
 done
 submit evaluate "$(lines evaluate_command)" "$evaluate_ranks" "$evaluate_memory" "$evaluate_time" "$after_fields"
-# The report is of what there is, also when a case failed; it says which cases it has.
+# The report shows what there is, also when a case failed, and says which cases it has.
 submit report "$(typed report_command)" 1 "$report_memory" \
   "$report_time" "afterany:$job_id"
 [[ "$dry_run" == yes ]] || say "Watch: squeue --me; or: jobs/submit.sh --status --output $(printf '%q' "$output"); logs: $output/logs; at the end: $output/report.html"

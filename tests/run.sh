@@ -51,16 +51,18 @@ say "        $(duration $((SECONDS - build_start)))"
 export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
 # In a chroot without /sys hwloc complains on standard error of every program, amid what the tests read there.
 export HWLOC_HIDE_ERRORS="${HWLOC_HIDE_ERRORS:-2}"
-# Jobs of Open MPI 4.1 side by side share this folder; one that ends removes it, when it is empty, under one that starts.
+# Jobs of Open MPI 4.1 that run side by side share this folder. A job that ends removes it when it is empty, even while
+# another one starts.
 (umask 077 && mkdir -p "${TMPDIR:-/tmp}/ompi.$(hostname).$(id -u)/keep")
 if [[ "$preset" == sanitize ]]; then
   export LSAN_OPTIONS="suppressions=$af_root/tests/support/lsan.supp:print_suppressions=0"
   export ASAN_OPTIONS="fast_unwind_on_malloc=0" UBSAN_OPTIONS="print_stacktrace=1"
-  # The checks of the tree run nothing that is compiled.
+  # The checks of the tree run no compiled program.
   ctest_options+=(--label-exclude checks)
 fi
 if [[ "$preset" == sanitize-threads ]]; then
-  # Open MPI and HDF5 are not compiled for it: what they do by themselves is not looked at. Physics tests have no threads.
+  # Open MPI and HDF5 are not compiled for the sanitizer: it ignores what they do by themselves. Physics tests have no
+  # threads.
   export TSAN_OPTIONS="halt_on_error=1:ignore_noninstrumented_modules=1"
   ctest_options+=(--label-exclude 'checks|physics')
 fi

@@ -16,13 +16,14 @@ precompute_ranks=8 precompute_memory=2G precompute_time=02:00:00
 evaluate_ranks=8 evaluate_memory=2G evaluate_time=08:00:00
 report_memory=4G report_time=00:30:00
 
-# So many seconds before its time limit (and when it is pre-empted) a job gets TERM, saves, and is queued again.
+# A job gets TERM this many seconds before its time limit (and when it is pre-empted); then it saves and is queued
+# again.
 stop_seconds=120
-# After so many times it is given up, and after so many in a row in which nothing was finished: a job that never gets
-# further is not left going round for ever.
+# A job is queued again at most this many times, and at most this many times in a row in which nothing was finished: a
+# job that never gets further must not go round for ever.
 most_requeues=50 most_fruitless=3
 
-# What the programs are asked for, beside study, case, camera and output. Among their options: --stall-minutes 60 (the
-# watchdog's limit), --max-hours 7.5 (a stop where no signal comes before the time limit).
+# Options of the programs, beside study, case, camera and output. For example: --stall-minutes 60 (the watchdog's
+# limit), --max-hours 7.5 (a stop where no signal comes before the time limit).
 precompute_options=(--max-rotation-deg 10 --max-translation-mm 30)
 evaluate_options=(--preset robust --renderer field)

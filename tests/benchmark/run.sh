@@ -71,9 +71,9 @@ if [[ -z "$ct" ]]; then
 fi
 [[ -e "$ct" ]] || die 4 "$ct does not exist"
 
-# One BLAS thread: everything is per core.
+# One BLAS thread, because all numbers are per core.
 export OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
-# Faiss shall have OpenBLAS's best: Debian's takes AVX2 kernels on processors newer than itself.
+# Faiss gets OpenBLAS's best kernels: Debian's takes AVX2 kernels on processors newer than itself.
 unset OPENBLAS_CORETYPE OPENBLAS_L2_SIZE
 if grep -q avx512vl /proc/cpuinfo 2>/dev/null; then
   export OPENBLAS_CORETYPE=SkylakeX

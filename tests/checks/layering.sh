@@ -129,7 +129,7 @@ plant() {
   printf '%s\n' '#include <vector>' "$2" >"$scratch/tree/$1"
 }
 
-# new_tree: five folders that keep to their table.
+# new_tree: five folders that obey their table.
 new_tree() {
   rm -rf "$scratch/tree"
   mkdir -p "$scratch/tree"

@@ -16,6 +16,6 @@ for program in "$@"; do
     esac
   done
 done
-# Otherwise this check could not fail.
+# Without this, the check could never fail.
 [[ "$parallel_seen" == yes ]] || { echo "no program maps libhdf5_openmpi: $*" >&2; exit 1; }
 echo "one_hdf5: $# programs map only the parallel HDF5"

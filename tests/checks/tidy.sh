@@ -12,7 +12,7 @@ pattern=${2:-^(common|precompute|register|evaluate)/}
 database="$build/compile_commands.json"
 [[ -f "$database" ]] || { echo "$database is missing: configure first" >&2; exit 4; }
 root=$(sed -n 's/^CMAKE_HOME_DIRECTORY:INTERNAL=//p' "$build/CMakeCache.txt")
-# Kernels appear once per vector width: each file once.
+# Kernels appear once per vector width; each file is checked once.
 mapfile -t files < <(sed -n 's/^ *"file": "\(.*\)",\{0,1\}$/\1/p' "$database" | LC_ALL=C sort -u |
   sed -n "s|^$root/||p" | grep -E "$pattern" | grep -v '^build/')
 ((${#files[@]} > 0)) || { echo "no sources match $pattern in $database: use that of build/dev" >&2; exit 1; }

@@ -10,7 +10,7 @@ mapfile -d '' -t files < <(list_sources "$root" '*.h' '*.cpp' '*.in' '*.txt' '*.
 ((${#files[@]} > 0)) || { echo "no sources found below $root" >&2; exit 1; }
 cd "$root"
 failed=no
-# A home folder, a scratch folder of one session, or a mount of one machine.
+# A home folder, a scratch folder, or a mount of one machine.
 if grep -nE '(^|[^[:alnum:]._$}/-])/(home/[a-z]|root/|work/|mnt/|Users/|tmp/[a-z]+/)' -- "${files[@]}"; then
   echo "tree: the lines above hold a path of one machine" >&2
   failed=yes
