@@ -16,7 +16,7 @@ void bind_source(CLI::App& app, PrecomputeOptions& options) {
       "--rig", options.rig, "Cameras: a rig.toml, or a shipped rig: c-arm-12in, treatment-room");
   app.add_option("--camera",
                  options.camera,
-                 "Which camera of the rig, in letters of any case (a field belongs to one)");
+                 "Camera of the rig, in upper or lower case (a field belongs to one camera)");
   auto* center = app.add_option("--center-ct-mm",
                                 options.center_ct_mm,
                                 "x,y,z: point of the CT (DICOM LPS, mm) about which it turns and "
@@ -103,11 +103,10 @@ void bind_run(CLI::App& app, PrecomputeOptions& options) {
          "once, e.g. 8GB. Tiles that do not fit are read back or cast again, see --overflow "
          "[300 MiB]")
       ->transform(CLI::AsSizeValue(true));
-  app.add_option(
-         "--overflow",
-         options.overflow,
-         "What is done once the codebook is trained about tiles that did not fit: read-back "
-         "(from FIELD.h5.progress), cast-again, or auto (what is faster, measured)")
+  app.add_option("--overflow",
+                 options.overflow,
+                 "What happens, once the codebook is trained, to tiles that did not fit: read-back "
+                 "(from FIELD.h5.progress), cast-again, or auto (what is faster, measured)")
       ->capture_default_str();
   app.add_option("--mpi-io-hint",
                  options.mpi_io_hints,
@@ -117,7 +116,7 @@ void bind_run(CLI::App& app, PrecomputeOptions& options) {
   app.add_flag("--dry-run",
                options.is_dry_run,
                "Print sizes, memory, compression, expected time and advice; write nothing");
-  app.add_flag("--restart", options.is_restart, "Throw unfinished work in FIELD.h5.progress away");
+  app.add_flag("--restart", options.is_restart, "Throw away unfinished work in FIELD.h5.progress");
   app.add_flag_callback(
       "--no-checkpoint",
       [&options] { options.has_checkpoint = false; },
@@ -132,7 +131,7 @@ int main(int argc, char** argv) {
       "Makes an attenuation field: all line integrals through a CT that one camera can see while "
       "the CT moves within a range, vector-quantised, in one HDF5 file. Run it alone or under "
       "mpirun; the result does not depend on the number of ranks. Stopped by SIGUSR1 or killed, it "
-      "goes on where it was when the same command is run again."};
+      "continues where it was when the same command is run again."};
   bind_source(app, options);
   bind_field(app, options);
   bind_codebook(app, options);

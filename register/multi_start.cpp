@@ -124,7 +124,7 @@ T take(std::span<const std::byte>& bytes) {
   T value{};
   if (bytes.size() < sizeof(value))
     throw FileError("unfinished registrations",
-                    "a record is of another size: start over with --restart");
+                    "a record does not have the right size: start over with --restart");
   std::memcpy(&value, bytes.data(), sizeof(value));
   bytes = bytes.subspan(sizeof(value));
   return value;

@@ -55,7 +55,7 @@ void bind_renderer(CLI::App& app, RegisterOptions& options) {
       ->check(CLI::IsMember({"field", "raycast"}))
       ->capture_default_str();
   bind_method(app, options.method);
-  app.add_option("--seed", options.method.seed, "Of the random numbers that cma-es draws")
+  app.add_option("--seed", options.method.seed, "Seed of the random numbers that cma-es draws")
       ->capture_default_str();
 }
 

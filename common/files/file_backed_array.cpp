@@ -40,7 +40,7 @@ void FileBackedMemory::grow(std::size_t bytes) {
   const auto refuse = [&](int error) {
     throw FileError(folder_.string(),
                     "no room for " + std::to_string(bytes) +
-                        " bytes that memory is written out to: " + std::strerror(error));
+                        " bytes of the file that backs memory: " + std::strerror(error));
   };
   if (file_ < 0) file_ = open_nameless(folder_);
   if (file_ < 0) refuse(errno);

@@ -434,7 +434,7 @@ CLI::App* bind_image_quality(CLI::App& app, ImageQualityOptions& options) {
   command
       ->add_option("--split-loss-poses",
                    options.split_loss_poses,
-                   "Split the loss at so many of the poses into interpolation over (u,v), over "
+                   "Number of poses at which the loss is split into interpolation over (u,v), over "
                    "(s,t), and quantisation; some ten ray-cast DRRs each")
       ->capture_default_str();
   command->add_option("--step-mm", options.step_mm, "Longest step of ray casting, mm")

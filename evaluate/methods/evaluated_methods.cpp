@@ -102,7 +102,7 @@ void bind_method(CLI::App& command, MethodOptions& options) {
 
 CLI::App* bind_show_method(CLI::App& app, registration::MethodOptions& options) {
   CLI::App* command = app.add_subcommand(
-      "method", "What a preset and the options that replace parts of it stand for: its chains");
+      "method", "Prints the chains of a preset, with the options that replace parts of it");
   bind_method(*command, options);
   return command;
 }

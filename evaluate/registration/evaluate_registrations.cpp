@@ -350,23 +350,29 @@ CLI::App* bind_registration(CLI::App& app, RegistrationStudyOptions& options) {
                       "registering: CSV of start_index, [case, seconds] and m00 ... m23 of "
                       "room_from_ct, or rx_deg ... tz_mm relative to the nominal pose, or "
                       "final_rx_deg ... relative to gold; or a folder of [CASE-]INDEX.tfm");
-  command->add_option("--method-name", options.method_name, "With --poses-from: what to call them")
+  command
+      ->add_option("--method-name",
+                   options.method_name,
+                   "With --poses-from: name of the method that found them")
       ->capture_default_str();
   command->add_option("--raycast-starts-per-interval",
                       options.raycast_starts_per_interval,
-                      "With --renderer both: so many of each interval's starts also by ray casting "
-                      "(default: all)");
+                      "With --renderer both: how many starts of each interval are also registered "
+                      "by ray casting (default: all)");
   command->add_option("--raycast-intervals",
                       options.raycast_intervals,
-                      "With --renderer both: ray casting only in the first so many intervals "
-                      "(default: all)");
+                      "With --renderer both: number of intervals, from the first, that ray casting "
+                      "registers (default: all)");
   command
       ->add_option("--equivalence-margin-mm",
                    options.equivalence_margin_mm,
                    "Field and ray casting count as equal when their mean TREs differ by less, mm: "
                    "two one-sided tests")
       ->capture_default_str();
-  command->add_option("--seed", options.method.seed, "Of the starts, and of what cma-es draws")
+  command
+      ->add_option("--seed",
+                   options.method.seed,
+                   "Seed of the starts, and of the random numbers that cma-es draws")
       ->capture_default_str();
   cli::bind_resume(*command, options.restarts);
   command->add_option("-o,--output", options.output_folder, "Folder for the results")->required();

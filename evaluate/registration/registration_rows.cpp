@@ -42,7 +42,7 @@ Integer integer_of(const json& value) {
       value.is_number_unsigned()
           ? std::in_range<Integer>(value.get<std::uint64_t>())
           : value.is_number_integer() && std::in_range<Integer>(value.get<std::int64_t>());
-  if (!fits) throw std::runtime_error("a whole number is not one, or too large");
+  if (!fits) throw std::runtime_error("a number that must be whole is not, or is too large");
   return value.get<Integer>();
 }
 

@@ -60,7 +60,7 @@ std::string comparison_table(const std::vector<const EvaluationRun*>& runs) {
                    {"Gross failures", true},
                    {"Capture range (mm)", true},
                    {"Median time", true}},
-                  "Every run and method; titles sort");
+                  "Every run and method; a click on a title sorts");
   for (const EvaluationRun* run : runs)
     for (const json& renderer : run->summary.at("renderers"))
       table.add_row({"<a href=\"#" + run_id(*run) + "\">" + escaped(run->name) + "</a>",

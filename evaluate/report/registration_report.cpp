@@ -277,7 +277,7 @@ std::string test_text(const json& test) {
          " mm, two one-sided tests: " + p_text(equivalence_p) +
          (equivalence_p < 0.05 ? ", equivalent at the 5 % level."
                                : ", not shown: too few pairs or too different ones.") +
-         " The power of this test, were there no difference, is " +
+         " If there were no difference, the power of this test would be " +
          percent(test.at("equivalence_power").get<double>()) + " with these " +
          "pairs and their standard deviation of " + decimals(test.at("sd_mm"), 3) + " mm.";
 }
@@ -346,8 +346,8 @@ std::string registration_figures(const EvaluationRun& run) {
                      run_figure(run,
                                 "tre-scatter",
                                 "Initial against final error",
-                                "<b>Where registrations started and ended</b>, a mark each (of "
-                                "very many a part, as the title says).") +
+                                "<b>Where registrations started and ended</b>, one mark each; of "
+                                "very many only a part, as the title says.") +
                      run_figure(run,
                                 "tre-histogram",
                                 "Histogram of the error after registration",

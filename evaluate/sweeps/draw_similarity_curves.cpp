@@ -265,9 +265,12 @@ CLI::App* bind_similarity_curves(CLI::App& app, SimilarityCurvesOptions& options
       "casting (the paper's Fig. 14): where the maxima lie and which axis is broadest");
   bind_method(*command, options);
   command->add_option("--case", options.case_name, "Case of the study (default: its only one)");
-  command->add_option("--half-width-mm", options.half_width_mm, "Translations reach so far, mm")
+  command
+      ->add_option("--half-width-mm", options.half_width_mm, "Largest offset of translations, mm")
       ->capture_default_str();
-  command->add_option("--half-width-deg", options.half_width_deg, "Rotations reach so far, degrees")
+  command
+      ->add_option(
+          "--half-width-deg", options.half_width_deg, "Largest offset of rotations, degrees")
       ->capture_default_str();
   command->add_option("--curve-step-mm", options.curve_step_mm, "Step of translations, mm")
       ->capture_default_str();

@@ -136,7 +136,7 @@ std::vector<std::string> problems(const RegistrationOptions& options) {
     for (const std::string& text : problems(options.judge.stage)) found.push_back("judge: " + text);
     if (options.judge.stage.similarity.name != "rg")
       found.push_back("judge: similarity = '" + options.judge.stage.similarity.name +
-                      "': must be rg, which knows what no DRR is worth");
+                      "': must be rg, the measure whose value is 0 without any DRR");
   }
   if (options.max_evaluations < 1)
     found.push_back("max_evaluations = " + std::to_string(options.max_evaluations) +

@@ -16,7 +16,7 @@ GradientDifference::GradientDifference(const SimilarityReference& reference)
     const double mean = sums.value / reference_.used_pixels;
     const double variance = sums.square / reference_.used_pixels - mean * mean;
     if (!(variance > 0.0))
-      throw InputError("X-ray = without gradient along an axis of the region: gd needs some");
+      throw InputError("X-ray = no gradient along an axis of the region: gd needs one");
     variance_[static_cast<std::size_t>(direction)] = variance;
   }
 }

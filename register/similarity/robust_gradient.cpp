@@ -29,7 +29,7 @@ RobustGradient::RobustGradient(const SimilarityReference& reference, double resi
     : reference_(reference),
       squared_scale_(std::pow(residual_scale * median_gradient(reference_), 2)) {
   if (!(squared_scale_ > 0.0))
-    throw InputError("X-ray = without gradient over most of the region of interest: rg needs some");
+    throw InputError("X-ray = no gradient over most of the region of interest: rg needs one");
   cost_without_drr_ = sums_at(reference_.xray, 0.0).cost;
 }
 

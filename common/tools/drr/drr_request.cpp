@@ -44,9 +44,10 @@ void append_source_problems(const DrrOptions& options, std::vector<std::string>&
   if (!has_field && has_ct && (options.rig.empty() || options.camera.empty()))
     found.emplace_back("--ct = set: needs --rig and --camera");
   if (options.rig.empty() != options.camera.empty())
-    found.emplace_back("--rig, --camera = one of them: go together");
+    found.emplace_back("--rig, --camera = only one of them: give both");
   if (!has_field && options.interpolation != "linear")
-    found.push_back("--interpolation = " + options.interpolation + ": is of fields; give --field");
+    found.push_back("--interpolation = " + options.interpolation +
+                    ": applies to fields only; give --field");
 }
 
 void append_pose_problems(const DrrOptions& options, std::vector<std::string>& found) {

@@ -135,7 +135,8 @@ void warn_of_cut_body(const CtVolume& ct, Inspection& inspection) {
       inspection.warnings.push_back(
           "truncated field of view: " + std::to_string(percent) + " % of the " +
           patient_letters(at_end ? direction : Eigen::Vector3d(-direction)) +
-          " face is tissue (or table) that goes on outside; rays through it miss attenuation");
+          " face is tissue (or table) that continues outside the CT; rays through it miss "
+          "attenuation");
     }
   }
 }

@@ -229,7 +229,7 @@ Inspection inspect_path(const fs::path& path,
     inspection.error = error.what();
     inspection.exit_code = ExitCode::File;
   } catch (const std::bad_alloc&) {
-    inspection.error = inspection.path + ": needs more memory than there is";
+    inspection.error = inspection.path + ": needs more memory than is available";
     inspection.exit_code = ExitCode::Input;
   }
   return inspection;

@@ -88,15 +88,15 @@ int main(int argc, char** argv) {
       ->check(CLI::IsMember(af::template_names()));
   what->require_option(1);
   app.add_flag("--json", options.as_json, "Print one JSON array instead of text");
-  app.add_flag("--list-views",
-               options.lists_views,
-               "Of studies, for scripts: one line per view, its case and its camera with a tab "
-               "between them")
+  app.add_flag(
+         "--list-views",
+         options.lists_views,
+         "For scripts: print one line per view of a study, with its case, a tab and its camera")
       ->excludes("--json");
   app.add_flag("--list-inputs",
                options.lists_inputs,
-               "Of studies, for scripts: one line per case and file that it reads, with a tab "
-               "between them")
+               "For scripts: print one line per file that a study reads, with its case, a tab and "
+               "the file")
       ->excludes("--json")
       ->excludes("--list-views");
   app.add_option("--series",

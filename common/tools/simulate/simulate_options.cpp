@@ -38,7 +38,7 @@ void bind_input(CLI::App& app, SimulateOptions& o) {
       ->capture_default_str();
   app.add_option("--water-mu-per-mm",
                  o.attenuation.mu_water_per_mm,
-                 "What 0 HU stands for, 1/mm; fixes the effective energy of the HU scale")
+                 "Attenuation at 0 HU, 1/mm; fixes the effective energy of the HU scale")
       ->capture_default_str();
 }
 
@@ -188,8 +188,10 @@ void bind_stress(CLI::App& app, SimulateOptions& o) {
   add("--motion-wavelength-mm", stress.motion.wavelength_mm, "motion: wavelength, mm");
   add("--motion-margin-mm",
       stress.motion.margin_mm,
-      "motion: what stays still around the target box, mm");
-  add("--motion-ramp-mm", stress.motion.ramp_mm, "motion: from still to full displacement, mm");
+      "motion: margin around the target box that stays still, mm");
+  add("--motion-ramp-mm",
+      stress.motion.ramp_mm,
+      "motion: distance over which the displacement grows to its full size, mm");
 }
 
 }  // namespace
