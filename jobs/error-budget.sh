@@ -17,10 +17,10 @@ per camera, draws starts, registers seven times from these and prints the error 
   --ct PATH                 the CT                                                   [a patient's skull CT]
   --starts-per-interval N   in each of --intervals intervals of 2 mm                                     [6]
   --intervals N                                                                                          [4]
-  --fine-step-mm X          step of ray casting where casting shall add nothing                       [0.25]
+  --fine-step-mm X          step of ray casting where casting must add nothing                        [0.25]
   --ranks N                 MPI ranks                                                           [all cores]
   --seed N                  of everything random                                                         [1]
-  --quick                   small fields, 2 starts, coarse steps: whether it works
+  --quick                   small fields, 2 starts, coarse steps: to see whether it works
   --help
 
 The method is a pyramid of gradient correlation by Gauss-Newton that ends on the pixels of the X-rays themselves, unless

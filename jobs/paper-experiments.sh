@@ -21,9 +21,9 @@ Makes the paper's tables and figures on simulated patients, one EXPERIMENT each,
   table-2     TRE per patient
   fig-16      success against initial TRE
 
-What an experiment needs is made first: patients (jobs/four-patients.sh), fields. What is finished is kept, so a command
-that was stopped goes on when repeated. DIR/paper/ holds every result under the paper's name (fig-8.svg, .png, .csv,
-...), DIR/report.html all of it. Needs the programs in build/release/bin (or installed).
+First it makes what an experiment needs: patients (jobs/four-patients.sh) and fields. What is finished is kept, so the
+same command continues after a stop. DIR/paper/ holds every result under the paper's name (fig-8.svg, .png, .csv, ...);
+DIR/report.html shows all of them. Needs the programs in build/release/bin (or installed).
 
   --preset NAME    laptop: fields of 30 mm, 10 poses, one field's parameters, two ray-cast registrations per patient;
                    cluster: the paper's numbers, fields of 100 mm, 100 poses, the parameters of all fields,

@@ -11,8 +11,8 @@ Usage: jobs/registration-study.sh [OPTIONS]
 
 Simulates one study per anatomy and variant, builds the fields, draws one table of starts per anatomy, registers from
 these same starts with every method, and writes methods.md and methods.csv: success for starts 0-8, 8-16 and 16-30 mm
-from the true pose, TRE of successes, bias, DRRs, seconds. What is finished is kept, so the same command goes on where
-it was stopped, and a method that is added or changed costs only itself. Needs the programs in build/release/bin (or installed).
+from the true pose, TRE of successes, bias, DRRs, seconds. What is finished is kept, so the same command continues after
+a stop, and a method that is added or changed costs only itself. Needs the programs in build/release/bin (or installed).
 
   --output DIR              where everything goes                                     [./registration-study]
   --ct NAME=PATH            an anatomy: a CT file or DICOM folder; may be repeated
@@ -35,7 +35,7 @@ it was stopped, and a method that is added or changed costs only itself. Needs t
   --intervals N             intervals of 2 mm, from 0                                                  [15]
   --max-rotation-deg X      range of the fields, degrees                                               [12]
   --max-translation-mm X    range of the fields, mm                                                    [40]
-  --quick                   2 starts in each of 8 intervals and small fields: whether it works
+  --quick                   2 starts in each of 8 intervals and small fields: to see whether it works
   --ranks N                 MPI ranks of fields and registrations                               [all cores]
   --seed N                  of everything random                                                        [1]
   --help

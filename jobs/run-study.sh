@@ -13,9 +13,9 @@ usage() {
   cat <<'TEXT'
 Usage: jobs/run-study.sh STUDY.toml [OPTIONS]        (or jobs/local.sh STUDY.toml [OPTIONS])
 
-Takes every case of a study from its CT to a report: a field for each view, registrations, report.html. The same
-commands as jobs/submit.sh submits to a cluster, with the options of the same resources file; its numbers of ranks are
-those of a cluster and not used here. Stopped (Ctrl-C, kill), it goes on when the same command is run again.
+Takes every case of a study from its CT to a report: a field for each view, registrations, report.html. It runs the
+commands that jobs/submit.sh submits to a cluster, with the options of the same resources file; the numbers of ranks in
+that file are for a cluster and are not used here. After a stop (Ctrl-C, kill), run the same command again to continue.
 
   --output DIR        where everything goes                                                   [./af-run]
   --resources FILE    what the programs are asked for                          [jobs/slurm/resources.sh]

@@ -13,8 +13,8 @@ Usage: jobs/submit.sh STUDY.toml [OPTIONS]
 
 Submits a chain of Slurm jobs and returns: one array per camera with one MPI job per case that computes its field, an
 array over the cases that registers them, each as soon as its own fields are there, and a report when all have ended. A
-job that Slurm stops (time limit, pre-emption) saves what is finished and is queued again. Run again, it submits the
-same chain; what was finished by the same commands is not done twice.
+job that Slurm stops (time limit, pre-emption) saves what is finished and is queued again. Run the same command again to
+submit the same chain; work that the same commands finished is not done twice.
 
   --output DIR        where everything goes; must be seen by all nodes                        [./af-run]
   --resources FILE    ranks, memory, time limits, partition, programs' options   [jobs/slurm/resources.sh]
