@@ -287,9 +287,6 @@ OutputLock::OutputLock(const fs::path& output) {
   fs::path name = output.lexically_normal();
   if (!name.has_filename()) name = name.parent_path();
   path_ = name += ".lock";
-  std::error_code ignored;
-  if (fs::exists(path_, ignored) && !fs::is_regular_file(path_, ignored))
-    throw FileError(path_.string(), "exists and is not a regular file");
   while (!try_to_take(output)) {
   }
 }

@@ -107,6 +107,10 @@ FieldProvenance some_provenance() {
 
 FieldFileInfo write(const CompressedAttenuationField& field, const std::filesystem::path& path) {
   const Communicator world = Communicator::world();
+  // A program never replaces what it has read.
+  std::error_code ignored;
+  if (world.is_root()) std::filesystem::remove(path, ignored);
+  world.barrier();
   return write_field(field, dealt(all_blocks(field), world), some_provenance(), path, world);
 }
 

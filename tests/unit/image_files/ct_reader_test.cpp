@@ -875,10 +875,11 @@ TEST(CtReader, ReadsFloatNiftiInPiecesWhereverTheVoxelsBegin) {
     voxels[i] = static_cast<float>(i * 7919 % 3001) - 1000.0f;
   // 3: floats no longer begin at multiples of 4 bytes of the file.
   for (const std::size_t extra : {std::size_t{0}, std::size_t{3}}) {
-    write_float_nifti(voxels, size, extra, folder / "ct.nii");
-    ASSERT_EQ(std::system(("gzip -kf " + (folder / "ct.nii").string()).c_str()), 0);
-    for (const char* name : {"ct.nii", "ct.nii.gz"}) {
-      const CtVolume ct = read_ct(folder / name);
+    const fs::path plain = folder / ("ct-" + std::to_string(extra) + ".nii");
+    write_float_nifti(voxels, size, extra, plain);
+    ASSERT_EQ(std::system(("gzip -k " + plain.string()).c_str()), 0);
+    for (const std::string& name : {plain.string(), plain.string() + ".gz"}) {
+      const CtVolume ct = read_ct(name);
       ASSERT_EQ(ct.hu.size(), voxels.size());
       for (std::size_t i = 0; i < voxels.size(); ++i)
         ASSERT_EQ(static_cast<float>(ct.hu[i]), voxels[i]) << name << ", voxel " << i;
