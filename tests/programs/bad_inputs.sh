@@ -140,7 +140,7 @@ of_rig 3 'column_direction' 'axis not unit' "$(edited rig.toml '0,/^column_direc
 of_rig 3 'row_direction' 'axes not orthogonal' "$(edited rig.toml '0,/^row_direction = .*/s//row_direction = [0.6, 0, -0.8]/')"
 of_rig 3 'AP' 'duplicate camera names' "$(edited rig.toml 's/"LAT"/"AP"/')"
 of_rig 3 'source_point' 'source on the detector plane' "$(edited rig.toml '0,/^source_point = .*/s//source_point = [0, 350, 0]/')"
-of_rig 3 'its detector misses the CT' 'detector beside the CT' "$(edited rig.toml '0,/^detector_origin_point = .*/s//detector_origin_point = [0, 350, 9000]/')"
+of_rig 3 'its detector misses the CT' 'detector beside the CT' "$(edited rig.toml '0,/^detector_origin_point = .*/s//detector_origin_point = [0, 350, 1500]/')"
 of_rig 3 'pixel_spacing' 'unknown key (typo)' "$(edited rig.toml '0,/^pixel_spacing_mm/s//pixel_spacing/')"
 of_rig 3 'source_point' 'source at 1e300 mm' "$(edited rig.toml '0,/^source_point = .*/s//source_point = [0, 1e300, 0]/')"
 of_rig 3 'pixel_spacing_mm' 'pixels of 1e300 mm' "$(edited rig.toml '0,/^pixel_spacing_mm = .*/s//pixel_spacing_mm = [1e300, 3]/')"
@@ -168,7 +168,7 @@ of_option 3 'codewords' 'codewords > 65536' --codewords 70000
 of_option 3 'codewords' 'codewords > training tiles' --codewords 60000
 of_option 3 'max_rotation_deg' 'rotation range too large' --max-rotation-deg 85
 of_option 3 'max_translation_mm' 'source inside the CT within the range' --max-translation-mm 640
-row 3 'center_ct_mm = nan' 'centre that is no number' "${precompute[@]}" --ct valid/ct.nii.gz --rig valid/rig.toml \
+row 2 'must be a finite number' 'centre that is no number' "${precompute[@]}" --ct valid/ct.nii.gz --rig valid/rig.toml \
   --camera AP --center-ct-mm nan,0,0
 row 0 'constant: the CT is out of view' 'PNG of a DRR that shows nothing' "$bin/af-drr" -o nothing.png \
   --ct valid/ct.nii.gz --rig valid/rig.toml --camera AP --translation-mm 500,0,0
@@ -250,7 +250,7 @@ printf '%s\n' 'ObjectType = Image' 'NDims = 3' 'DimSize = 4 4 4' 'ElementSpacing
 head -c 128 /dev/zero >raw/voxels.raw
 head -n 3 forty.csv >few.csv
 ln few.csv few.mha
-find . -type f -not -name message.txt -not -path './out*' -print0 | sort -z | xargs -0 sha256sum >sums.txt
+find . -type f -not -name message.txt -not -name sums.txt -not -path './out*' -print0 | sort -z | xargs -0 sha256sum >sums.txt
 row 3 'would replace the input' "a field instead of its CT" "${new_field[@]}" "${of_valid_ct[@]}" -o valid/ct.nii.gz
 row 3 'would replace the input' "a field instead of its CT, by another link" "${new_field[@]}" "${of_valid_ct[@]}" -o hard.nii.gz
 row 3 'would replace the input' "a field instead of its study" "${new_field[@]}" --study valid/study.toml --camera AP -o valid/study.toml
