@@ -64,13 +64,6 @@ std::optional<double> finite_number(std::string_view text) {
   return value;
 }
 
-/// "nan", "inf" or "-inf"; empty for finite values.
-std::string non_finite_text(double value) {
-  if (std::isnan(value)) return "nan";
-  if (std::isinf(value)) return value > 0.0 ? "inf" : "-inf";
-  return {};
-}
-
 }  // namespace
 
 /// Splits CSV text into records (RFC 4180; LF or CRLF).
@@ -284,17 +277,8 @@ void write_csv_in_parts(
   });
 }
 
-std::string number_text(double value) {
-  if (!std::isfinite(value)) return non_finite_text(value);
-  std::string text(32, '\0');
-  const auto [end, error] = std::to_chars(text.data(), text.data() + text.size(), value);
-  check(error == std::errc(), "number_text: buffer too small");
-  text.resize(static_cast<std::size_t>(end - text.data()));
-  return text;
-}
-
 std::string fixed_text(double value, int decimals) {
-  if (!std::isfinite(value)) return non_finite_text(value);
+  if (!std::isfinite(value)) return number_text(value);
   constexpr int kMaxDecimals = 60;
   check(decimals >= 0 && decimals <= kMaxDecimals, "fixed_text: decimals must be within 0 and 60");
   std::string text(400, '\0');  // 1.8e308 has 309 digits before the point

@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "base/number_text.h"
+
 namespace af {
 
 /// A CSV file with a header line, in memory; values as text. RFC 4180 quoting.
@@ -58,8 +60,6 @@ void write_csv_in_parts(
     std::size_t row_count,
     const std::function<CsvTable(std::size_t first, std::size_t end)>& table_of);
 
-/// Shortest text that reads back to the same double ("nan", "inf" for those).
-std::string number_text(double value);
 /// Fixed number of decimals, for columns that people read.
 std::string fixed_text(double value, int decimals);
 

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cli/bind_options.h"
+
+#include <cstdlib>
+#include <sstream>
+#include <type_traits>
+
+#include <CLI/CLI.hpp>
+
+namespace af::cli {
+
+namespace {
+
+/// Whether --help shows the value as the default.
+template <typename T>
+bool is_given(const T& value) {
+  if constexpr (requires { value.has_value(); })
+    return value.has_value();
+  else if constexpr (requires { value.empty(); })
+    return !value.empty();
+  else
+    return true;
+}
+
+template <typename T>
+CLI::Option* add_option(CLI::App& app, const Field& field, T& value) {
+  CLI::Option* option = app.add_option(field.option, value, field.help);
+  if (!field.shows_default || !is_given(value)) return option;
+  if constexpr (requires { std::ostringstream() << *value; }) {
+    std::ostringstream text;
+    text << *value;
+    return option->default_str(text.str());
+  } else {
+    return option->capture_default_str();
+  }
+}
+
+CLI::Option* add_option(CLI::App& app, const Field& field, bool& value) {
+  if (!field.is_off_switch) return app.add_flag(field.option, value, field.help);
+  return app.add_flag_callback(
+      field.option, [&value] { value = false; }, field.help);
+}
+
+/// Refuses numbers that break a constraint of the field.
+CLI::Validator check_of(const Field& field) {
+  return {[constraints = field.constraints](const std::string& text) {
+            char* end = nullptr;
+            const double value = std::strtod(text.c_str(), &end);
+            for (const Constraint& constraint : constraints)
+              if (*end != '\0' || !constraint.accepts_number(value))
+                return text + " is not " + constraint.words;
+            return std::string();
+          },
+          ""};
+}
+
+/// The group's options must be given exactly once.
+CLI::App& group_of(CLI::App& app, const std::string& name) {
+  for (CLI::App* group : app.get_subcommands([](CLI::App*) { return true; }))
+    if (group->get_group() == name || group->get_name() == name) return *group;
+  CLI::App* group = app.add_option_group(name, "exactly one of");
+  group->require_option(1);
+  return *group;
+}
+
+void bind_field(CLI::App& app, const Field& field) {
+  CLI::App& owner = field.exactly_one_of.empty() ? app : group_of(app, field.exactly_one_of);
+  CLI::Option* option =
+      std::visit([&](auto* value) { return add_option(owner, field, *value); }, field.value);
+  if (!field.group.empty()) option->group(field.group);
+  if (!field.choices.empty()) option->check(CLI::IsMember(field.choices));
+  if (field.is_checked_when_typed) option->check(check_of(field));
+  if (field.number_count > 0) option->expected(field.number_count);
+  if (field.is_comma_separated) option->delimiter(',');
+  if (field.takes_one_at_a_time) option->allow_extra_args(false);
+  if (field.is_size) option->transform(CLI::AsSizeValue(true));
+  option->required(field.is_required);
+}
+
+}  // namespace
+
+void bind_fields(CLI::App& app, const Fields& fields) {
+  for (const Field& field : fields)
+    if (!field.option.empty()) bind_field(app, field);
+  for (const Field& field : fields) {
+    if (field.option.empty()) continue;
+    for (const std::string& other : field.excluded)
+      app.get_option(field.option)->excludes(app.get_option(other));
+    for (const std::string& other : field.needed)
+      app.get_option(field.option)->needs(app.get_option(other));
+  }
+}
+
+}  // namespace af::cli

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "base/described_fields.h"
+#include "cli/app_forward.h"
+
+namespace af::cli {
+
+/// Adds an option for every field that has one.
+void bind_fields(CLI::App& app, const Fields& fields);
+
+/// The options of a struct that describes itself; `options` must outlive the parsing.
+template <Described T>
+void bind_options(CLI::App& app, T& options) {
+  bind_fields(app, fields_of(options));
+}
+
+}  // namespace af::cli

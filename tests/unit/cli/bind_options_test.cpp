@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cli/bind_options.h"
+
+#include <CLI/CLI.hpp>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace af::cli {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::Not;
+
+struct Options {
+  std::string ct;
+  std::string phantom;
+  int uv_nodes = 64;
+  std::uint64_t memory_bytes = 0;
+  bool has_checkpoint = true;
+  std::vector<int> sides;
+  std::vector<std::string> hints;
+  std::optional<std::string> preset;
+  std::optional<double> share = 0.1;
+  double hours = 5.0;
+  std::string internal = "x";
+
+  void describe(Fields& field) {
+    field("ct", ct, "A CT").one_of_group("Patient");
+    field("phantom", phantom, "A phantom").one_of_group("Patient");
+    field("uv_nodes", uv_nodes, "Nodes").excludes({"--preset"});
+    field("memory_bytes", memory_bytes, "Memory").as("-m,--memory").size().default_in_help();
+    field("checkpoint", has_checkpoint, "None").as("--no-checkpoint").off_switch();
+    field("sides", sides, "Sides").count(2).comma_separated();
+    field("hints", hints, "Hints").as("--hint").one_at_a_time();
+    field("preset", preset, "Preset").choice({"fast", "paper"});
+    field("share", share, "Share");
+    field("hours", hours, "Hours").above(0.0).checked_when_typed();
+    field("internal", internal, "").no_option("a test");
+  }
+};
+
+struct Parsed {
+  Options options;
+  std::string help;
+};
+
+Parsed parsed(const std::string& line) {
+  Parsed result;
+  CLI::App app{"test"};
+  bind_options(app, result.options);
+  result.help = app.help();
+  app.parse(line, false);
+  return result;
+}
+
+TEST(BindOptions, ReadsEveryKindOfField) {
+  const Options options =
+      parsed(
+          "--ct a.mha --uv-nodes 9 -m 2kb --no-checkpoint --sides 3,4 --hint a=1 --hint b=2 "
+          "--share 0.25")
+          .options;
+  EXPECT_EQ(options.ct, "a.mha");
+  EXPECT_EQ(options.uv_nodes, 9);
+  EXPECT_EQ(options.memory_bytes, 2000U);
+  EXPECT_FALSE(options.has_checkpoint);
+  EXPECT_THAT(options.sides, ElementsAre(3, 4));
+  EXPECT_THAT(options.hints, ElementsAre("a=1", "b=2"));
+  EXPECT_EQ(options.share, 0.25);
+}
+
+TEST(BindOptions, RefusesWhatTheDescriptionExcludes) {
+  EXPECT_THROW(parsed("--uv-nodes 9"), CLI::RequiredError);
+  EXPECT_THROW(parsed("--ct a --phantom b"), CLI::RequiredError);
+  EXPECT_THROW(parsed("--ct a --uv-nodes 9 --preset fast"), CLI::ExcludesError);
+  EXPECT_THROW(parsed("--ct a --preset slow"), CLI::ValidationError);
+  EXPECT_THROW(parsed("--ct a --hours 0"), CLI::ValidationError);
+  EXPECT_THROW(parsed("--ct a --hours 1x"), CLI::ParseError);
+  EXPECT_THROW(parsed("--ct a --sides 3"), CLI::ParseError);
+  EXPECT_THROW(parsed("--ct a --hint a=1 b=2"), CLI::ExtrasError);
+  EXPECT_THROW(parsed("--ct a --internal y"), CLI::ExtrasError);
+}
+
+TEST(BindOptions, HelpShowsDefaults) {
+  const std::string help = parsed("--ct a").help;
+  EXPECT_THAT(help, HasSubstr("--uv-nodes INT=64"));
+  EXPECT_THAT(help, HasSubstr("--share FLOAT=0.1"));
+  EXPECT_THAT(help, HasSubstr("--preset TEXT:{fast,paper} "));
+  EXPECT_THAT(help, Not(HasSubstr("=0 ")));
+}
+
+}  // namespace
+}  // namespace af::cli
