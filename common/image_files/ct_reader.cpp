@@ -282,6 +282,10 @@ RawImage raw_image_of(const CtVolume& ct) {
 
 }  // namespace
 
+void CtReadOptions::describe(Fields& field) {
+  field("series", series_uid, "DICOM series UID, when the CT's folder has several").input();
+}
+
 CtVolume read_ct(const fs::path& path,
                  const CtReadOptions& options,
                  std::vector<std::string>* warnings) {

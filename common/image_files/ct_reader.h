@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <string>
 
+#include "base/described_fields.h"
 #include "volume/ct_volume.h"
 
 namespace af {
@@ -11,6 +12,8 @@ namespace af {
 struct CtReadOptions {
   std::string series_uid;  ///< chooses one of several DICOM series in a folder; empty: there must
                            ///< be only one
+
+  void describe(Fields& field);
 };
 
 /// Reads a CT (DICOM folder, NIfTI, MetaImage, NRRD) as HU in int16, in DICOM LPS; rescale applied,

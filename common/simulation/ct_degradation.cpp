@@ -24,6 +24,15 @@ std::int16_t rounded_hu(double hu, int step_hu) {
 
 }  // namespace
 
+void CtDegradationOptions::describe(Fields& field) {
+  field("ct_slice_mm",
+        slice_mm,
+        "degraded-ct: slices are averaged in groups of about this thickness, mm");
+  field("ct_noise_hu", noise_hu, "degraded-ct: noise, HU");
+  field("ct_step_hu", step_hu, "degraded-ct: steps of the values, HU");
+  field.leave_out(threads, "voxels do not depend on it");
+}
+
 std::vector<std::string> problems(const CtDegradationOptions& options) {
   return RangeCheck()
       .require("slice_mm", options.slice_mm, 0.1, 50.0)

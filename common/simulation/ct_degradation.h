@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "base/described_fields.h"
 #include "volume/ct_volume.h"
 
 namespace af {
@@ -15,6 +16,8 @@ struct CtDegradationOptions {
   double noise_hu = 30.0;  ///< standard deviation, independent from voxel to voxel
   int step_hu = 20;        ///< values are rounded to multiples of this
   int threads = 0;         ///< 0: as many as the hardware has; voxels do not depend on it
+
+  void describe(Fields& field);
 };
 
 std::vector<std::string> problems(const CtDegradationOptions& options);

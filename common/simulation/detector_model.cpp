@@ -66,6 +66,23 @@ double mean_within(const Image2d& image, const RegionOfInterest& roi) {
 
 }  // namespace
 
+void DetectorOptions::describe(Fields& field) {
+  field("scatter_to_primary",
+        scatter_to_primary_ratio,
+        "Mean scatter / mean primary within the region of interest");
+  field("scatter_sigma_mm", scatter_sigma_mm, "Width of the scatter kernel, mm");
+  field.leave_out(scatter_source, "a stress");
+  field.leave_out(heel_ramp, "a stress");
+  field("photons_per_pixel",
+        photons_per_pixel,
+        "Photons per pixel in the open beam, for Poisson noise");
+  field("blur_sigma_px", blur_sigma_px, "Gaussian detector blur, px");
+  field("bits", bits, "Grey level bits, 8 to 16; 0: float pixels");
+  field("open_beam_level",
+        open_beam_level,
+        "Grey level of the open beam; beyond the bits it saturates");
+}
+
 std::vector<std::string> problems(const DetectorOptions& options) {
   std::vector<std::string> found;
   const auto require = [&](bool holds,

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "base/described_fields.h"
 #include "image/image2d.h"
 
 namespace af {
@@ -22,6 +23,8 @@ struct DetectorOptions {
   double blur_sigma_px = 0.6;
   int bits = 12;                    ///< 0: pixels are not quantised
   double open_beam_level = 4000.0;  ///< grey value of the open beam
+
+  void describe(Fields& field);
 };
 
 std::vector<std::string> problems(const DetectorOptions& options);

@@ -89,6 +89,14 @@ double SteelBodies::chord_length_mm(const Eigen::Vector3d& source_point,
   return sum_mm;
 }
 
+void OccluderOptions::describe(Fields& field) {
+  field("rod_count", rod_count, "rods: how many");
+  field("rod_diameter_mm", rod_diameter_mm, "rods: diameter, mm");
+  field("rod_length_mm", rod_length_mm, "rods: length, mm");
+  field("ball_count", ball_count, "fiducials: how many balls");
+  field("ball_diameter_mm", ball_diameter_mm, "fiducials: diameter, mm");
+}
+
 std::vector<std::string> problems(const OccluderOptions& options) {
   RangeCheck check_range;
   check_range.require("rod_count", options.rod_count, 0, 100);

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "base/described_fields.h"
 #include "drr/drr_renderer.h"
 #include "simulation/fiducials.h"
 
@@ -37,6 +38,8 @@ struct OccluderOptions {
   double rod_length_mm = 150.0;
   int ball_count = 8;
   double ball_diameter_mm = 3.0;
+
+  void describe(Fields& field);
 };
 
 std::vector<std::string> problems(const OccluderOptions& options);

@@ -44,6 +44,17 @@ void add_spinous_process(const Vertebra& v, BonePainter& bone) {
 
 }  // namespace
 
+void PhantomOptions::describe(Fields& field) {
+  field("phantom_voxel_mm", voxel_mm, "Voxel side of the phantom, mm");
+  field.leave_out(samples_per_axis, "studies have one");
+  field.leave_out(threads, "voxels do not depend on it");
+  field("metal",
+        has_metal,
+        "Phantoms only: with pedicle screws and rods (spine), a hip prosthesis (pelvis) or "
+        "fillings and a plate (head). The X-rays show metal as dense as it is, the CT clips it at "
+        "3071 HU as scanners do");
+}
+
 std::vector<std::string> problems(const PhantomOptions& options) {
   return RangeCheck()
       .require("voxel_mm", options.voxel_mm, 0.5, 5.0)

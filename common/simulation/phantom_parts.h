@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "base/described_fields.h"
 #include "simulation/automatic_target.h"
 #include "simulation/solid.h"
 
@@ -16,6 +17,8 @@ struct PhantomOptions {
   int samples_per_axis = 2;  ///< points per voxel and axis
   int threads = 0;           ///< 0: as many as the hardware has; voxels do not depend on it
   bool has_metal = false;    ///< implants: screws and rods, a hip prosthesis, fillings
+
+  void describe(Fields& field);
 };
 
 std::vector<std::string> problems(const PhantomOptions& options);

@@ -48,6 +48,14 @@ double hu_at(const CtVolume& ct, const Eigen::Vector3d& index) {
 
 }  // namespace
 
+void SmoothMotionOptions::describe(Fields& field) {
+  field("motion_mm", amplitude_mm, "motion: largest displacement along an axis, mm");
+  field("motion_wavelength_mm", wavelength_mm, "motion: wavelength, mm");
+  field("motion_margin_mm", margin_mm, "motion: what stays still around the target box, mm");
+  field("motion_ramp_mm", ramp_mm, "motion: from still to full displacement, mm");
+  field.leave_out(threads, "voxels do not depend on it");
+}
+
 std::vector<std::string> problems(const SmoothMotionOptions& options) {
   RangeCheck check_range;
   check_range.require("motion wavelength_mm", options.wavelength_mm, 1.0, 10000.0);

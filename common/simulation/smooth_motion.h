@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "base/described_fields.h"
 #include "geometry/slab_sizing.h"
 #include "volume/ct_volume.h"
 
@@ -17,6 +18,8 @@ struct SmoothMotionOptions {
   double margin_mm = 5.0;        ///< around the target box that stays still, too
   double ramp_mm = 40.0;         ///< from still to full displacement
   int threads = 0;               ///< 0: as many as the hardware has; voxels do not depend on it
+
+  void describe(Fields& field);
 };
 
 /// The amplitude is limited so that the displacement cannot fold space: the slopes of wave and

@@ -113,6 +113,28 @@ DetectorOptions StressOptions::detector(DetectorOptions detector) const {
   return detector;
 }
 
+void StressOptions::describe(Fields& field) {
+  field("stress",
+        names,
+        "Comma separated: rods, fiducials (steel in the X-rays, not in the CT), heel (ramp over "
+        "the detector), scatter (heavy, from the open beam too), noise, degraded-ct (the study's "
+        "CT; X-rays show the good one), calibration (the study's rig is slightly wrong), motion "
+        "(non-rigid, away from the target); or all")
+      .comma_separated()
+      .choice(stress_names());
+  field.part(occluders);
+  field("heel_ramp", heel_ramp, "heel: share by which the beam varies, 0.25 for +-25 %");
+  field("open_scatter_to_primary",
+        scatter_to_primary_ratio,
+        "scatter: mean scatter / mean primary within the region of interest");
+  field("noisy_photons_per_pixel", photons_per_pixel, "noise: photons per pixel in the open beam");
+  field.part(degraded_ct);
+  field("calibration_error_px",
+        calibration_error_px,
+        "calibration: RMS shift of the target box's projections, px");
+  field.part(motion);
+}
+
 std::vector<std::string> problems(const StressOptions& options) {
   RangeCheck check_range;
   const std::vector<std::string> known = stress_names();

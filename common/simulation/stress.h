@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "base/described_fields.h"
 #include "simulation/calibration_error.h"
 #include "simulation/ct_degradation.h"
 #include "simulation/detector_model.h"
@@ -33,6 +34,8 @@ struct StressOptions {
   [[nodiscard]] bool has(Stress effect) const;
   /// The detector with the wanted ones of ramp, scatter and noise.
   [[nodiscard]] DetectorOptions detector(DetectorOptions detector) const;
+
+  void describe(Fields& field);
 };
 
 std::vector<std::string> problems(const StressOptions& options);

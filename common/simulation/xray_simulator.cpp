@@ -17,6 +17,15 @@ XraySimulationOptions XraySimulationOptions::ideal() {
   return options;
 }
 
+void XraySimulationOptions::describe(Fields& field) {
+  field.start_group("Imaging (0 switches an effect off)");
+  field.part(spectrum);
+  field.part(detector);
+  field("rays_per_pixel_side", rays_per_pixel_side, "n: a pixel is the mean of n x n rays");
+  field.start_group("");
+  field("threads", threads, "Threads (0: all of the machine); results do not depend on them");
+}
+
 std::vector<std::string> problems(const XraySimulationOptions& options) {
   constexpr int kMostRaysPerSide = 16;
   constexpr int kMostThreads = 1024;

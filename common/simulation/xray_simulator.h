@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "base/described_fields.h"
 #include "base/progress.h"
 #include "drr/drr_renderer.h"
 #include "simulation/detector_model.h"
@@ -24,6 +25,8 @@ struct XraySimulationOptions {
   /// One energy, one ray per pixel, no scatter, noise, blur or quantisation: Beer and Lambert's
   /// law.
   static XraySimulationOptions ideal();
+
+  void describe(Fields& field);
 };
 
 std::vector<std::string> problems(const XraySimulationOptions& options);

@@ -7,6 +7,12 @@
 
 namespace af {
 
+void SpectrumOptions::describe(Fields& field) {
+  field("tube_kvp", tube_kvp, "Tube voltage, kV; 0: only the HU scale's effective energy");
+  field("aluminium_mm", aluminium_mm, "Filtration, mm of aluminium");
+  field("energy_bins", energy_bins, "Energy bins of the spectrum, at least 20");
+}
+
 std::vector<std::string> problems(const SpectrumOptions& options) {
   constexpr int kFewestBins = 20;
   constexpr int kMostBins = 1000;

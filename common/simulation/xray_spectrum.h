@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "base/described_fields.h"
 #include "simulation/tissue_model.h"
 
 namespace af {
@@ -13,6 +14,8 @@ struct SpectrumOptions {
   double tube_kvp = 100.0;    ///< 0: one energy, the effective energy of the CT's HU scale
   double aluminium_mm = 3.0;  ///< total filtration
   int energy_bins = 40;       ///< of equal width between 10 keV and the tube voltage
+
+  void describe(Fields& field);
 };
 
 std::vector<std::string> problems(const SpectrumOptions& options);

@@ -69,15 +69,20 @@ void require_castable(const CtGrid& bordered_grid) {
                      "the attenuating part must have fewer than 2^31 voxels");
 }
 
+void AttenuationModel::describe(Fields& field) {
+  field("water_mu_per_mm",
+        mu_water_per_mm,
+        "Attenuation of water, 1/mm: mu = this * max(0, 1 + HU/1000)")
+      .above(0.0)
+      .at_most(1.0);
+  field("air_below_hu", air_below_hu, "Lower HU attenuate nothing")
+      .within(-1000, 0)
+      .no_option("all programs have one")
+      .not_recorded("it never changes");
+}
+
 std::vector<std::string> problems(const AttenuationModel& model) {
-  std::vector<std::string> found;
-  if (!(model.mu_water_per_mm > 0.0 && model.mu_water_per_mm <= 1.0))
-    found.push_back("water_mu_per_mm = " + std::to_string(model.mu_water_per_mm) +
-                    ": must be above 0 and at most 1");
-  if (model.air_below_hu < -1000 || model.air_below_hu > 0)
-    found.push_back("air_below_hu = " + std::to_string(model.air_below_hu) +
-                    ": must be within -1000 and 0");
-  return found;
+  return field_problems(model);
 }
 
 CtGrid AttenuationVolume::bordered_grid_of(const CtVolume& ct, const AttenuationModel& model) {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <span>
 
+#include "base/described_fields.h"
 #include "geometry/slab_sizing.h"
 #include "volume/ct_volume.h"
 
@@ -21,6 +22,8 @@ struct AttenuationModel {
                                            : static_cast<std::uint16_t>(1000 + hu);
   }
   [[nodiscard]] double mu_per_mm_per_unit() const { return mu_water_per_mm / 1000.0; }
+
+  void describe(Fields& field);
 };
 
 std::vector<std::string> problems(const AttenuationModel& model);

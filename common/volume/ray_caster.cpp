@@ -101,9 +101,12 @@ class BundleMaker {
 
 }  // namespace
 
+void RayCasterOptions::describe(Fields& field) {
+  field("step_mm", step_mm, "Longest step of ray casting, mm").within(0.01, 100.0);
+}
+
 std::vector<std::string> problems(const RayCasterOptions& options) {
-  if (options.step_mm >= 0.01 && options.step_mm <= 100.0) return {};
-  return {"step_mm = " + std::to_string(options.step_mm) + ": must be within 0.01 and 100"};
+  return field_problems(options);
 }
 
 RayCaster::RayCaster(const AttenuationVolume& volume, const RayCasterOptions& options)

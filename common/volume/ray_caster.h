@@ -27,6 +27,8 @@ struct RayFan {
 
 struct RayCasterOptions {
   double step_mm = 1.0;  ///< largest distance between samples along a ray
+
+  void describe(Fields& field);
 };
 
 std::vector<std::string> problems(const RayCasterOptions& options);

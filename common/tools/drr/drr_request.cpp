@@ -21,6 +21,63 @@
 namespace af::tools {
 namespace {
 
+void describe_source(Fields& field, DrrOptions& options) {
+  field("field",
+        options.field,
+        "Look DRRs up in this field; its own camera is used unless --rig and --camera name "
+        "another");
+  field("ct", options.ct, "Cast rays through this CT (DICOM folder, NIfTI, MetaImage, NRRD)");
+  field.part(options.ct_reading);
+  field("rig", options.rig, "Rig file, or c-arm-12in, or treatment-room");
+  field("camera", options.camera, "Camera of the rig");
+  field("interpolation",
+        options.interpolation,
+        "Look-up in the field: 'nearest' node; 'linear' in u, v, s and t in two quick passes (as "
+        "af-register does); 'cubic' in s and t, 'cubic-uv' in all four; or 'quadrilinear', "
+        "literally over each ray's 16 neighbours")
+      .choice(field_look_up_names());
+  field.part(options.attenuation);
+  field.at("water_mu_per_mm").help =
+      "Attenuation of water, 1/mm, for ray casting (with --compare the field's own)";
+  field.part(options.ray_caster);
+}
+
+void describe_pose(Fields& field, DrrOptions& options) {
+  field("rotation_deg",
+        options.rotation_deg,
+        "rx,ry,rz about the room's axes, degrees, relative to the nominal pose: the field's, or "
+        "the CT's centre at the rig's isocentre (default 0,0,0)")
+      .comma_separated();
+  field("translation_mm",
+        options.translation_mm,
+        "tx,ty,tz along the room's axes, mm (default 0,0,0)")
+      .comma_separated();
+  field("pose", options.pose, "File with room_from_ct (TOML, result.json, ITK .tfm or 16 numbers)");
+  field("poses",
+        options.poses,
+        "CSV of poses (rx_deg ... tz_mm, or m00 ... m23): one 3-D stack comes out");
+}
+
+void describe_output(Fields& field, DrrOptions& options) {
+  field("compare",
+        options.compare,
+        "Field, ray cast, difference and PSNR in one PNG (needs --field and --ct)");
+  field("invert", options.invert, "PNG: dark is attenuated, the look of a film");
+  field("window_percent",
+        options.window_percent,
+        "PNG: low,high percentile of the DRR that become black and white")
+      .comma_separated();
+  field("threads",
+        options.threads,
+        "Threads that share a large DRR, or the DRRs of --poses; 0: every processor");
+  field("output",
+        options.output,
+        "OUT.mha, .nii.gz, .nrrd, .tif: total attenuation, float32, not scaled; OUT.png: 8 bits, "
+        "row 0 on top, bright is attenuated")
+      .as("-o,--output")
+      .required();
+}
+
 bool ends_with(const std::filesystem::path& path, const std::string& ending) {
   const std::string name = path.filename().string();
   return name.size() > ending.size() &&
@@ -91,9 +148,8 @@ struct CastCt {
 CastCt ray_caster(const DrrOptions& options,
                   const CompressedAttenuationField* field,
                   const std::shared_ptr<ThreadPool>& pool) {
-  const CtVolume ct = read_ct(options.ct, {options.series_uid});
-  AttenuationModel model;
-  model.mu_water_per_mm = options.water_mu_per_mm;
+  const CtVolume ct = read_ct(options.ct, options.ct_reading);
+  AttenuationModel model = options.attenuation;
   if (field != nullptr) {
     const std::string hash = ct_content_sha256(ct);
     if (hash != field->identity.ct_content_sha256)
@@ -104,9 +160,8 @@ CastCt ray_caster(const DrrOptions& options,
     // --compare compares ways to render, so the reference takes the field's HU model.
     model = {field->identity.mu_water_per_mm, field->identity.air_below_hu};
   }
-  return {std::make_shared<const RayCastDrr>(std::make_shared<const AttenuationVolume>(ct, model),
-                                             RayCasterOptions{options.step_mm},
-                                             pool),
+  return {std::make_shared<const RayCastDrr>(
+              std::make_shared<const AttenuationVolume>(ct, model), options.ray_caster, pool),
           ct.grid.center_mm()};
 }
 
@@ -117,17 +172,19 @@ Image2d negated(Image2d image) {
 
 }  // namespace
 
+void DrrOptions::describe(Fields& field_list) {
+  describe_source(field_list, *this);
+  describe_pose(field_list, *this);
+  describe_output(field_list, *this);
+}
+
 std::vector<std::string> problems(const DrrOptions& options) {
   std::vector<std::string> found;
   append_source_problems(options, found);
   append_pose_problems(options, found);
   append_output_problems(options, found);
   for (const std::string& text : thread_problems(options.threads)) found.push_back(text);
-  AttenuationModel model;
-  model.mu_water_per_mm = options.water_mu_per_mm;
-  for (const std::string& text : af::problems(model)) found.push_back(text);
-  for (const std::string& text : af::problems(RayCasterOptions{options.step_mm}))
-    found.push_back(text);
+  for (const std::string& text : field_problems(options)) found.push_back(text);
   return found;
 }
 

@@ -10,7 +10,9 @@
 
 #include "base/thread_pool.h"
 #include "drr/drr_renderer.h"
+#include "image_files/ct_reader.h"
 #include "parallel/communicator.h"
+#include "volume/ray_caster.h"
 
 namespace af::tools {
 
@@ -18,7 +20,7 @@ namespace af::tools {
 struct DrrOptions {
   std::filesystem::path field;
   std::filesystem::path ct;
-  std::string series_uid;
+  CtReadOptions ct_reading;
   std::string rig;
   std::string camera;
   std::optional<std::array<double, 3>> rotation_deg;
@@ -26,13 +28,15 @@ struct DrrOptions {
   std::filesystem::path pose;
   std::filesystem::path poses;
   std::string interpolation = "linear";
-  double water_mu_per_mm = 0.0200;
-  double step_mm = 1.0;
+  AttenuationModel attenuation;
+  RayCasterOptions ray_caster;
   bool compare = false;
   bool invert = false;
   std::array<double, 2> window_percent = {0.5, 99.5};  ///< of PNG files
   int threads = 1;                                     ///< 0: every processor
   std::filesystem::path output;
+
+  void describe(Fields& field_list);
 };
 
 /// All impossible values and combinations of options; empty when the options are sound.

@@ -217,11 +217,9 @@ void inspect_picture(const fs::path& path, Inspection& inspection) {
 
 }  // namespace
 
-void inspect_ct(const fs::path& path, const InspectOptions& options, Inspection& inspection) {
+void inspect_ct(const fs::path& path, const CtReadOptions& options, Inspection& inspection) {
   inspection.kind = "CT";
-  CtReadOptions read_options;
-  read_options.series_uid = options.series_uid;
-  const CtVolume ct = read_ct(path, read_options, &inspection.warnings);
+  const CtVolume ct = read_ct(path, options, &inspection.warnings);
   const HuStatistics hu(ct.hu.view());
   inspection.facts["geometry"] = grid_json(ct.grid);
   ordered_json& values = inspection.facts["values"];
@@ -235,7 +233,7 @@ void inspect_ct(const fs::path& path, const InspectOptions& options, Inspection&
   warn_of_ct(ct, hu, inspection);
 }
 
-void inspect_image(const fs::path& path, const InspectOptions& options, Inspection& inspection) {
+void inspect_image(const fs::path& path, const CtReadOptions& options, Inspection& inspection) {
   const std::optional<ImageFormat> format = sniff_image_format(path);
   check(format.has_value(), "inspect_image() is for image files");
   inspection.facts["format"] = format_name(*format);

@@ -10,11 +10,11 @@
 namespace af {
 
 void inspect_ct(const std::filesystem::path& path,
-                const InspectOptions& options,
+                const CtReadOptions& options,
                 Inspection& inspection);
 /// A 2-D image, or a stack of DRRs; a 3-D image of HU is handed to inspect_ct().
 void inspect_image(const std::filesystem::path& path,
-                   const InspectOptions& options,
+                   const CtReadOptions& options,
                    Inspection& inspection);
 /// Collective.
 void inspect_field(const std::filesystem::path& path,

@@ -77,7 +77,7 @@ void inspect_text(const fs::path& path, Inspection& inspection) {
 }
 
 void inspect_file(const fs::path& path,
-                  const InspectOptions& options,
+                  const CtReadOptions& options,
                   const Communicator& communicator,
                   Inspection& inspection) {
   if (first_bytes(path, kHdf5Mark.size()) == kHdf5Mark)
@@ -103,7 +103,7 @@ std::vector<fs::path> known_files(const fs::path& folder) {
 }
 
 void inspect_folder(const fs::path& folder,
-                    const InspectOptions& options,
+                    const CtReadOptions& options,
                     const Communicator& communicator,
                     Inspection& inspection) {
   if (holds_dicom(folder)) return inspect_ct(folder, options, inspection);
@@ -123,7 +123,7 @@ void inspect_folder(const fs::path& folder,
 }
 
 void inspect_anything(const fs::path& path,
-                      const InspectOptions& options,
+                      const CtReadOptions& options,
                       const Communicator& communicator,
                       Inspection& inspection) {
   std::error_code error;
@@ -216,7 +216,7 @@ std::string text_at(const Inspection& inspection, const std::string& indent) {
 }  // namespace
 
 Inspection inspect_path(const fs::path& path,
-                        const InspectOptions& options,
+                        const CtReadOptions& options,
                         const Communicator& communicator) {
   Inspection inspection;
   inspection.path = path.string();

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "image_files/ct_reader.h"
 #include "parallel/communicator.h"
 
 namespace af {
@@ -22,14 +23,10 @@ struct Inspection {
   std::vector<Inspection> items;  ///< the known files of a folder
 };
 
-struct InspectOptions {
-  std::string series_uid;  ///< of a DICOM folder with several series
-};
-
 /// Collective. Recognises a path by content and checks it completely (fields: every checksum).
 /// Problems of the file come in the result, never as exceptions.
 Inspection inspect_path(const std::filesystem::path& path,
-                        const InspectOptions& options,
+                        const CtReadOptions& options,
                         const Communicator& communicator);
 
 /// The worst exit code of an inspection and its items.

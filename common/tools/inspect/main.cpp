@@ -7,6 +7,7 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/app_main.h"
+#include "cli/bind_options.h"
 #include "study/study_template.h"
 #include "tools/inspect/inspection.h"
 
@@ -17,11 +18,36 @@ using af::Communicator;
 struct Options {
   std::vector<std::string> paths;
   std::string template_name;
-  af::InspectOptions inspect;
   bool as_json = false;
   bool lists_views = false;
   bool lists_inputs = false;
+  af::CtReadOptions ct;
+
+  void describe(af::Fields& field);
 };
+
+void Options::describe(af::Fields& field) {
+  field("paths", paths, "Files, folders or names of shipped rigs").as("PATH").one_of_group("What");
+  field("template",
+        template_name,
+        "Print a file to fill in, every key with a comment: study (af-inspect --template study > "
+        "study.toml) or rig")
+      .choice(af::template_names())
+      .one_of_group("What");
+  field("json", as_json, "Print one JSON array instead of text");
+  field("list_views",
+        lists_views,
+        "Of studies, for scripts: one line per view, its case and its camera with a tab between "
+        "them")
+      .excludes({"--json"});
+  field("list_inputs",
+        lists_inputs,
+        "Of studies, for scripts: one line per case and file that it reads, with a tab between "
+        "them")
+      .excludes({"--json", "--list-views"});
+  field.part(ct);
+  field.last().help = "SeriesInstanceUID to read from a DICOM folder that holds several series";
+}
 
 /// The report of each path as soon as it is known; JSON is one array.
 void print(const Options& options, const std::vector<af::Inspection>& inspections) {
@@ -53,7 +79,7 @@ void run(const Options& options, const Communicator& world) {
   af::ExitCode worst = af::ExitCode::Done;
   std::size_t bad = 0;
   for (const std::string& path : options.paths) {
-    inspections.push_back(af::inspect_path(path, options.inspect, world));
+    inspections.push_back(af::inspect_path(path, options.ct, world));
     const af::ExitCode code = af::worst_exit_code(inspections.back());
     worst = std::max(worst, code);
     bad += code == af::ExitCode::Done ? 0 : 1;
@@ -78,30 +104,7 @@ int main(int argc, char** argv) {
       "or DICOM folder), X-rays and DRRs, rigs, studies, poses, fields (every checksum verified), "
       "results and folders of results. The exit code is the worst over all paths: 0 usable, 3 "
       "readable but unacceptable, 4 not readable or damaged."};
-  auto* what = app.add_option_group("What", "one of");
-  what->add_option("PATH", options.paths, "Files, folders or names of shipped rigs");
-  what->add_option(
-          "--template",
-          options.template_name,
-          "Print a file to fill in, every key with a comment: study (af-inspect --template "
-          "study > study.toml) or rig")
-      ->check(CLI::IsMember(af::template_names()));
-  what->require_option(1);
-  app.add_flag("--json", options.as_json, "Print one JSON array instead of text");
-  app.add_flag(
-         "--list-views",
-         options.lists_views,
-         "For scripts: print one line per view of a study, with its case, a tab and its camera")
-      ->excludes("--json");
-  app.add_flag("--list-inputs",
-               options.lists_inputs,
-               "For scripts: print one line per file that a study reads, with its case, a tab and "
-               "the file")
-      ->excludes("--json")
-      ->excludes("--list-views");
-  app.add_option("--series",
-                 options.inspect.series_uid,
-                 "SeriesInstanceUID to read from a DICOM folder that holds several series");
+  af::cli::bind_options(app, options);
   return af::cli::app_main(
       app, argc, argv, [&](const Communicator& world) { run(options, world); });
 }

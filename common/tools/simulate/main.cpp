@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "cli/app_main.h"
+#include "cli/bind_options.h"
 #include "files/input_guard.h"
 #include "files/partial_folder.h"
 #include "image_files/ct_reader.h"
@@ -14,6 +15,7 @@
 #include "run/terminal.h"
 #include "study/rig_file.h"
 #include "text/csv_table.h"
+#include "text/options_toml.h"
 #include "tools/simulate/simulate_options.h"
 #include "tools/simulate/simulated_study.h"
 
@@ -38,7 +40,7 @@ Patient patient(const SimulateOptions& options, const Communicator& world) {
     return {anatomy, phantom.has_metal ? with_scanner_range(anatomy) : anatomy};
   }
   std::vector<std::string> warnings;
-  const CtVolume ct = read_ct(options.ct, {options.series_uid}, &warnings);
+  const CtVolume ct = read_ct(options.ct, options.ct_reading, &warnings);
   for (const std::string& warning : warnings) warn(world, warning);
   return {ct, ct};
 }
@@ -97,7 +99,6 @@ std::string summary(const SimulatedCase& simulated, const std::filesystem::path&
 }
 
 void run(const SimulateOptions& options,
-         const CLI::App& app,
          const std::string& command_line,
          const Communicator& world) {
   if (!world.is_root()) return;  // the work is small; a launcher with several ranks does no harm
@@ -117,7 +118,7 @@ void run(const SimulateOptions& options,
   Provenance provenance;
   provenance.program = "af-simulate";
   provenance.command_line = command_line;
-  provenance.options_toml = app.config_to_str(true);
+  provenance.options_toml = to_toml(options);
   provenance.seed = options.seed;
   provenance.rank_count = world.size();
   provenance.input_sha256["ct_content"] = ct_content_sha256(imaged.ct);
@@ -136,8 +137,8 @@ int main(int argc, char** argv) {
       "Makes a registration study with a known answer: X-rays of a CT or phantom by an exact "
       "polyenergetic projector with scatter, noise, blur and grey levels, steel fiducials and "
       "their detections, regions of interest, and the true pose."};
-  tools::bind_options(app, options);
+  cli::bind_options(app, options);
   const std::string command_line = cli::command_line(argc, argv);
   return cli::app_main(
-      app, argc, argv, [&](const Communicator& world) { run(options, app, command_line, world); });
+      app, argc, argv, [&](const Communicator& world) { run(options, command_line, world); });
 }

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "cli/app_forward.h"
+#include "image_files/ct_reader.h"
 #include "simulation/phantom.h"
 #include "simulation/stress.h"
 #include "simulation/xray_simulator.h"
@@ -16,7 +16,7 @@ namespace af::tools {
 /// What af-simulate is asked for. Empty strings and vectors mean: not given.
 struct SimulateOptions {
   std::string ct;
-  std::string series_uid;
+  CtReadOptions ct_reading;
   std::string phantom;
   PhantomOptions phantom_options;
   std::string rig = "treatment-room";
@@ -33,7 +33,7 @@ struct SimulateOptions {
 
   double max_offset_rotation_deg = 5.0;
   double max_offset_translation_mm = 10.0;
-  bool has_fiducials = true;
+  bool omits_fiducials = false;
   double fiducial_sigma_px = 0.2;
 
   AttenuationModel attenuation;
@@ -46,10 +46,9 @@ struct SimulateOptions {
   [[nodiscard]] XraySimulationOptions xray_in_force() const;
   /// case_name, or one made from the CT's file name or the phantom.
   [[nodiscard]] std::string case_name_in_force() const;
+  void describe(Fields& field);
 };
 
 std::vector<std::string> problems(const SimulateOptions& options);
-
-void bind_options(CLI::App& app, SimulateOptions& options);
 
 }  // namespace af::tools

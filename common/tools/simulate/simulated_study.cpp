@@ -246,7 +246,7 @@ SimulatedCase plan_case(const SimulateOptions& options,
     study_case.views.push_back(view);
   }
   simulated.true_rig = true_rig(options, rig, study_case);
-  if (options.has_fiducials) add_fiducials(options, ct, rig, simulated);
+  if (!options.omits_fiducials) add_fiducials(options, ct, rig, simulated);
   add_occluders(options, rig, simulated);
   study_case.note = note_text(options);
   return simulated;
