@@ -105,7 +105,7 @@ FieldSource load_source(const PrecomputeOptions& options, const Communicator& co
   ct_options.series_uid = options.series_uid;
   const NodeCt ct = used_from(named.places, "ct", [&] {
     return read_ct_per_node(
-        named.ct_path, ct_options, options.attenuation_model(), communicator, source.warnings);
+        named.ct_path, ct_options, options.attenuation, communicator, source.warnings);
   });
   source.volume = ct.volume;
   source.ct_path = named.ct_path;

@@ -27,6 +27,7 @@
 #include "run/provenance.h"
 #include "run/stop_request.h"
 #include "run/terminal.h"
+#include "text/options_toml.h"
 
 namespace af {
 
@@ -60,7 +61,7 @@ class PhaseClock {
 
 std::string numbers_text(const double* values, Eigen::Index count) {
   std::string text = "[";
-  for (Eigen::Index i = 0; i < count; ++i) text += (i > 0 ? ", " : "") + exact_text(values[i]);
+  for (Eigen::Index i = 0; i < count; ++i) text += (i > 0 ? ", " : "") + toml_float(values[i]);
   return text + "]";
 }
 
@@ -75,7 +76,7 @@ ProgressManifest manifest_of(const PrecomputeOptions& options,
                              const FieldSource& source,
                              const PlanOptions& plan) {
   ProgressManifest manifest;
-  for (const auto& [name, value] : casting_options(options)) manifest.decides[name] = value;
+  manifest.decides = deciding_options(options, kCastingStage);
   const CameraGeometry& camera = source.camera;
   manifest.decides["program"] = program_build();
   manifest.decides["ct_content_sha256"] = source.ct_content_sha256;
@@ -235,7 +236,7 @@ class PrecomputeRun {
     if (options_.is_shear_warp())
       return std::make_unique<ShearWarpFieldCaster>(*resampled_, light_slab_, quantizer());
     return std::make_unique<RayCastFieldCaster>(
-        *source_.volume, light_slab_, quantizer(), RayCasterOptions{options_.step_mm});
+        *source_.volume, light_slab_, quantizer(), options_.ray_caster);
   }
 
   [[nodiscard]] PlanOptions plan() const {
@@ -406,7 +407,7 @@ class PrecomputeRun {
     WorkNote note(iteration(0));
     if (build.progress != nullptr) {
       DecidingValues decides = manifest.decides;
-      for (const auto& [name, value] : codebook_options(options_)) decides[name] = value;
+      decides.merge(deciding_options(options_, kCodebookStage));
       journal.emplace(build.progress->path(),
                       decides,
                       static_cast<std::size_t>(options_.codebook_options().codewords),
@@ -475,7 +476,7 @@ class PrecomputeRun {
 
   [[nodiscard]] CompressedAttenuationField field_without_indices() const {
     CompressedAttenuationField field;
-    const AttenuationModel model = options_.attenuation_model();
+    const AttenuationModel& model = options_.attenuation;
     field.identity = {source_.camera,
                       source_.frame,
                       options_.range(),

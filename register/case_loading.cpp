@@ -293,10 +293,9 @@ LoadedCase load_case(const Study& study,
 
   std::optional<CtFacts> ct;
   if (options.renderer == RendererKind::RayCast) {
-    AttenuationModel model;
-    model.mu_water_per_mm = options.water_mu_per_mm;
     const NodeCt node_ct = used_from(study_case.places, "ct", [&] {
-      return read_ct_per_node(study_case.ct, options.ct, model, communicator, loaded.warnings);
+      return read_ct_per_node(
+          study_case.ct, options.ct, options.attenuation, communicator, loaded.warnings);
     });
     ct = node_ct.facts;
     const auto renderer =

@@ -26,7 +26,7 @@ struct CaseLoadOptions {
   RendererKind renderer = RendererKind::Field;
   std::map<std::string, std::filesystem::path> field_paths;  ///< camera -> field, over the study's
   CtReadOptions ct;
-  double water_mu_per_mm = 0.0200;  ///< of ray casting
+  AttenuationModel attenuation;  ///< of ray casting
   RayCasterOptions ray_caster;
   bool skip_ct_check = false;  ///< with fields: do not read the CT (it may be absent)
   /// Radius, mm on the isocentre plane, of the discs about the study's fiducials that registration

@@ -8,9 +8,9 @@
 
 #include "base/error.h"
 #include "cli/app_main.h"
+#include "cli/bind_options.h"
 #include "files/output_file.h"
 #include "parallel/work_watch.h"
-#include "register/method_arguments.h"
 #include "register/multi_start.h"
 #include "register/register_options.h"
 #include "register/results/slicer_folder.h"
@@ -20,6 +20,7 @@
 #include "run/terminal.h"
 #include "study/shared_inputs.h"
 #include "text/csv_table.h"
+#include "text/options_toml.h"
 
 namespace {
 
@@ -65,10 +66,12 @@ void run(const RegisterOptions& options,
     lock.emplace(options.output_folder);
   });
 
+  RegisterOptions in_force = options.in_force();
+  in_force.case_name = study_case.name;
   RunDescription description{study_case.name, options.renderer, {}};
   description.provenance = {"af-register",
                             command_line,
-                            to_toml(options, method),
+                            af::to_toml(in_force),
                             options.method.seed,
                             world.size(),
                             loaded.input_sha256};
@@ -82,8 +85,8 @@ void run(const RegisterOptions& options,
                       starts,
                       {af::progress_folder(options.output_folder),
                        "registrations",
-                       af::deciding_values(description.provenance.options_toml, input_sha256),
-                       options.restarts},
+                       af::deciding_values(af::deciding_options(in_force), input_sha256),
+                       options.resume.restarts},
                       world);
   af::all_or_none(world, [&] {
     if (!world.is_root()) return;
@@ -122,7 +125,8 @@ int main(int argc, char** argv) {
       "per view, slicer/ (a folder that 3D Slicer loads) and reproduce.sh; with --starts also "
       "registrations.csv. A verdict says whether the pose is found, doubtful or not found. Not "
       "found, of any start, is exit code 7: result.tfm, pose.toml and slicer/ are not written."};
-  bind_options(app, options);
+  af::cli::bind_options(app, options);
+  af::cli::bind_run_limits(app);
   const std::string command_line = af::cli::command_line(argc, argv);
   return af::cli::app_main(
       app, argc, argv, [&](const Communicator& world) { run(options, command_line, world); });

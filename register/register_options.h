@@ -9,8 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "cli/app_forward.h"
+#include "cli/run_limits.h"
 #include "register/case_loading.h"
+#include "register/field_paths.h"
 #include "register/method/method_options.h"
 #include "register/method/registration.h"
 
@@ -20,23 +21,24 @@ namespace af::registration {
 struct RegisterOptions {
   std::filesystem::path study;
   std::string case_name;
-  std::vector<std::string> fields;  ///< CAMERA=PATH each
+  FieldPaths fields;
   std::string renderer = "field";
   MethodOptions method;
   std::optional<std::array<double, 3>> start_rotation_deg;
   std::optional<std::array<double, 3>> start_translation_mm;
   std::filesystem::path start_pose;
   std::filesystem::path starts;
-  double water_mu_per_mm = 0.0200;
-  double step_mm = 1.0;
-  std::string series_uid;
+  AttenuationModel attenuation;  ///< of ray casting
+  RayCasterOptions ray_caster;
+  CtReadOptions ct;
   bool skip_ct_check = false;
-  bool restarts = false;
+  cli::ResumeOptions resume;
   std::filesystem::path output_folder;
-};
 
-/// Adds the options to the program.
-void bind_options(CLI::App& app, RegisterOptions& options);
+  void describe(Fields& field);
+  /// With the preset resolved.
+  [[nodiscard]] RegisterOptions in_force() const;
+};
 
 /// All impossible values and combinations of options; empty when the options are sound.
 std::vector<std::string> problems(const RegisterOptions& options);
@@ -50,8 +52,5 @@ std::vector<RigidTransform> start_poses(const RegisterOptions& options, const Po
 
 /// SHA-256 of the study and, if given, the file of starts, by name.
 std::map<std::string, std::string> hashes_of_files(const RegisterOptions& options);
-
-/// The options that are used, as TOML, with presets resolved.
-std::string to_toml(const RegisterOptions& options, const RegistrationOptions& registration);
 
 }  // namespace af::registration

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "base/described_fields.h"
 #include "cli/app_forward.h"
 
 namespace af::cli {
@@ -9,8 +10,11 @@ namespace af::cli {
 /// stop.
 void bind_run_limits(CLI::App& app);
 
-/// Adds --restart, --max-hours and --stall-minutes to a program, or a sub-command, whose unfinished
-/// work lies in progress_folder(OUTPUT).
-void bind_resume(CLI::App& app, bool& restarts);
+/// Of a program, or a sub-command, whose unfinished work lies in progress_folder(OUTPUT).
+struct ResumeOptions {
+  bool restarts = false;  ///< throw unfinished work away
+
+  void describe(Fields& field);
+};
 
 }  // namespace af::cli

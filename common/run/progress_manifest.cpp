@@ -12,27 +12,6 @@
 #include "files/sha256.h"
 
 namespace af {
-namespace {
-
-/// Lines "key = value"; lines of a list go with the line that began it, comments nowhere.
-DecidingValues values_of_lines(const std::string& toml) {
-  DecidingValues values;
-  std::string* last = nullptr;
-  std::istringstream lines(toml);
-  for (std::string line; std::getline(lines, line);) {
-    if (line.starts_with('#')) continue;
-    const std::size_t equals = line.find(" = ");
-    const bool begins = equals != std::string::npos && line.front() != ' ';
-    if (begins)
-      last = &(values[line.substr(0, equals)] = line.substr(equals + 3));
-    else if (last != nullptr)
-      *last += line;
-  }
-  return values;
-}
-
-}  // namespace
-
 std::filesystem::path progress_folder(const std::filesystem::path& output) {
   std::filesystem::path folder = output.lexically_normal();
   if (!folder.has_filename()) folder = folder.parent_path();
@@ -46,21 +25,11 @@ std::string program_build() {
   return build;
 }
 
-DecidingValues deciding_values(const std::string& options_toml,
+DecidingValues deciding_values(DecidingValues options,
                                const std::map<std::string, std::string>& input_sha256) {
-  DecidingValues values = values_of_lines(options_toml);
-  for (const char* key : {"threads",
-                          "study",
-                          "ct",
-                          "field",
-                          "poses",
-                          "starts",
-                          "starts_from",
-                          "equivalence_margin_mm"})
-    values.erase(key);
-  values["program"] = program_build();
-  for (const auto& [name, hash] : input_sha256) values["SHA-256 of " + name] = hash;
-  return values;
+  options["program"] = program_build();
+  for (const auto& [name, hash] : input_sha256) options["SHA-256 of " + name] = hash;
+  return options;
 }
 
 bool has_progress_manifest(const std::filesystem::path& path) {

@@ -19,10 +19,9 @@ std::filesystem::path progress_folder(const std::filesystem::path& output);
 /// something else.
 std::string program_build();
 
-/// What decides every result of a run: this program's build, the inputs' SHA-256 by name, and the
-/// options in force as TOML but for threads, comments and the paths of inputs, whose contents
-/// count.
-DecidingValues deciding_values(const std::string& options_toml,
+/// What decides every result of a run: this program's build, the inputs' SHA-256 by name, and
+/// deciding_options().
+DecidingValues deciding_values(DecidingValues options,
                                const std::map<std::string, std::string>& input_sha256);
 
 /// Whether anything has the name of a manifest, be it a link to nowhere or to itself.

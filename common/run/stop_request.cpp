@@ -39,6 +39,25 @@ void listen_for_stop_requests() {
   if (std::getenv("OMPI_COMM_WORLD_SIZE") == nullptr) std::signal(SIGTERM, remember_signal);
 }
 
+void RunLimits::describe(Fields& field) {
+  const char* const why = "results are the same";
+  field("max_hours",
+        max_hours,
+        "Stop by itself so many hours after the start, as on SIGUSR1: what is finished is saved, "
+        "exit code 75, and the same command goes on [no limit]")
+      .above(0.0)
+      .checked_when_typed()
+      .default_in_help()
+      .not_recorded(why);
+  field("stall_minutes",
+        stall_minutes,
+        "End the job, with exit code 75, when a rank makes no progress for so many minutes: longer "
+        "than any unit of work takes; 0: never")
+      .at_least(0.0)
+      .checked_when_typed()
+      .not_recorded(why);
+}
+
 RunLimits& run_limits() {
   return limits;
 }

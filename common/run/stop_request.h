@@ -4,12 +4,16 @@
 #include <limits>
 #include <string>
 
+#include "base/described_fields.h"
+
 namespace af {
 
 /// When a long run ends by itself. The command line sets them (cli/run_limits.h).
 struct RunLimits {
   double max_hours = std::numeric_limits<double>::infinity();  ///< since the program started
   double stall_minutes = 0.0;  ///< without progress, after which a job is ended; 0: never
+
+  void describe(Fields& field);
 };
 RunLimits& run_limits();
 

@@ -6,20 +6,19 @@
 #include <iostream>
 #include <memory>
 #include <optional>
-#include <sstream>
 #include <tuple>
 
 #include <CLI/CLI.hpp>
 
 #include "base/error.h"
 #include "base/toml_text.h"
+#include "cli/bind_options.h"
 #include "cli/run_limits.h"
 #include "drr/field_renderer.h"
 #include "drr/ray_cast_drr.h"
 #include "evaluate/image_quality/image_quality_tables.h"
 #include "evaluate/image_quality/loss_split.h"
 #include "evaluate/image_quality/loss_split_tables.h"
-#include "evaluate/methods/evaluated_methods.h"
 #include "evaluate/outputs/result_figures.h"
 #include "evaluate/outputs/row_gathering.h"
 #include "evaluate/outputs/sample_summary_json.h"
@@ -36,30 +35,12 @@
 #include "study/node_ct.h"
 #include "study/pose_file.h"
 #include "study/study_file.h"
+#include "text/options_toml.h"
 
 namespace af::evaluation {
 namespace {
 
 using nlohmann::json;
-
-std::string to_toml(const ImageQualityOptions& options) {
-  std::ostringstream out;
-  if (options.study.empty())
-    out << "field = " << toml_text(options.field.string())
-        << "\nct = " << toml_text(options.ct.string());
-  else
-    out << "study = " << toml_text(options.study.string())
-        << "\ncase = " << toml_list(options.cases);
-  if (options.poses.empty())
-    out << "\npose_count = " << options.pose_count;
-  else
-    out << "\nposes = " << toml_text(options.poses.string());
-  if (!options.series_uid.empty()) out << "\nseries = " << toml_text(options.series_uid);
-  out << "\nlook_up = \"" << options.look_up
-      << "\"\nsplit_loss_poses = " << options.split_loss_poses
-      << "\nstep_mm = " << number_text(options.step_mm) << "\nseed = " << options.seed << '\n';
-  return out.str();
-}
 
 /// One field to compare.
 struct Target {
@@ -100,7 +81,7 @@ Setup load(const ImageQualityOptions& options, const Target& target, const Commu
   const FieldIdentity& identity = setup.field->identity;
   std::vector<std::string> warnings;
   setup.ct = read_ct_per_node(target.ct,
-                              {options.series_uid},
+                              options.ct_reading,
                               {identity.mu_water_per_mm, identity.air_below_hu},
                               world,
                               warnings);
@@ -255,7 +236,7 @@ std::vector<LossSplit> split_losses(const ImageQualityOptions& options,
   std::vector<LossSplit> splits(static_cast<std::size_t>(count));
   if (count == 0) return splits;
   const LossSplitter splitter(
-      field, reference, setup.ct.volume, {options.step_mm}, setup.field->light_slab, setup.view);
+      field, reference, setup.ct.volume, options.ray_caster, setup.field->light_slab, setup.view);
   collect_rows(
       world,
       unfinished,
@@ -282,7 +263,7 @@ TargetResult evaluate_target(const ImageQualityOptions& options,
   });
   const Setup setup = load(options, target, world);
   const auto field = make_field_renderer(setup.field, options.look_up);
-  const RayCastDrr ray_cast(setup.ct.volume, {options.step_mm});
+  const RayCastDrr ray_cast(setup.ct.volume, options.ray_caster);
   DrrComparer comparer(*field, ray_cast, setup.view);
   Provenance provenance = {"af-evaluate image-quality",
                            command_line,
@@ -299,8 +280,8 @@ TargetResult evaluate_target(const ImageQualityOptions& options,
   const auto unfinished = [&](const std::string& what) -> UnfinishedWork {
     return {progress_folder(options.output_folder),
             name + what,
-            deciding_values(provenance.options_toml, provenance.input_sha256),
-            options.restarts};
+            deciding_values(deciding_options(options), provenance.input_sha256),
+            options.resume.restarts};
   };
   const std::int64_t count = setup.pose_count(options);
   all_or_none(world, [&] {
@@ -384,17 +365,49 @@ void write_together(const std::vector<TargetResult>& results, const std::filesys
 
 }  // namespace
 
+void ImageQualityOptions::describe(Fields& field_list) {
+  field_list("field", field, "Field file of one camera").input();
+  field_list("ct", ct, "The CT the field was made from: image file or DICOM folder").input();
+  field_list("study",
+             study,
+             "Instead of both: study.toml whose views name their fields (key `field`); one box "
+             "plot of all, the worst pairs side by side")
+      .input();
+  field_list("case", cases, "Case of the study, may be repeated (default: all)");
+  field_list("pose_count", pose_count, "Random poses, uniform in the six parameters").at_least(1);
+  field_list("poses",
+             poses,
+             "CSV of poses instead of random ones: rx_deg ... tz_mm relative to the field's frame, "
+             "or m00 ... m23 of room_from_ct")
+      .excludes({"--pose-count"})
+      .input();
+  field_list("look_up",
+             look_up,
+             "linear in two passes (what registration uses), cubic in (s,t), cubic-uv in (u,v) "
+             "too, quadrilinear (the paper's, literal) or nearest")
+      .choice(field_look_up_names());
+  field_list("split_loss_poses",
+             split_loss_poses,
+             "Split the loss at so many of the poses into interpolation over (u,v), over (s,t), "
+             "and quantisation; some ten ray-cast DRRs each")
+      .at_least(0);
+  field_list.part(ray_caster);
+  field_list.part(ct_reading);
+  field_list("seed", seed, "Of the random poses");
+  field_list.part(resume);
+  field_list("output", output_folder, "Folder for the results")
+      .as("-o,--output")
+      .required()
+      .not_deciding("results are the same");
+}
+
 std::vector<std::string> problems(const ImageQualityOptions& options) {
-  std::vector<std::string> found;
-  if (options.pose_count < 1)
-    found.push_back("--pose-count = " + std::to_string(options.pose_count) + ": must be >= 1");
+  std::vector<std::string> found = field_problems(options);
   if (!options.study.empty() && !options.poses.empty())
     found.push_back("--poses = '" + options.poses.string() + "': must not be given with --study");
-  if (options.split_loss_poses < 0 || (options.split_loss_poses > 0 && options.look_up != "linear"))
+  if (options.split_loss_poses > 0 && options.look_up != "linear")
     found.push_back("--split-loss-poses = " + std::to_string(options.split_loss_poses) +
-                    ": must not be negative, and 0 for a look-up other than linear");
-  for (const std::string& text : af::problems(RayCasterOptions{options.step_mm}))
-    found.push_back(text);
+                    ": must be 0 for a look-up other than linear");
   return found;
 }
 
@@ -403,47 +416,8 @@ CLI::App* bind_image_quality(CLI::App& app, ImageQualityOptions& options) {
       "image-quality",
       "DRRs of a field against ray casting at random poses of its motion range (the paper's Fig. "
       "8): PSNR, statistics, box plot, worst pair");
-  command->add_option("--field", options.field, "Field file of one camera");
-  command->add_option(
-      "--ct", options.ct, "The CT the field was made from: image file or DICOM folder");
-  command->add_option(
-      "--study",
-      options.study,
-      "Instead of both: study.toml whose views name their fields (key `field`); one "
-      "box plot of all, the worst pairs side by side");
-  command->add_option("--case", options.cases, "Case of the study, may be repeated (default: all)")
-      ->take_all();
-  auto* count =
-      command
-          ->add_option(
-              "--pose-count", options.pose_count, "Random poses, uniform in the six parameters")
-          ->capture_default_str();
-  command
-      ->add_option("--poses",
-                   options.poses,
-                   "CSV of poses instead of random ones: rx_deg ... tz_mm relative to the field's "
-                   "frame, or m00 ... m23 of room_from_ct")
-      ->excludes(count);
-  command
-      ->add_option("--look-up",
-                   options.look_up,
-                   "linear in two passes (what registration uses), cubic in (s,t), cubic-uv in "
-                   "(u,v) too, quadrilinear (the paper's, literal) or nearest")
-      ->check(CLI::IsMember(field_look_up_names()))
-      ->capture_default_str();
-  command
-      ->add_option("--split-loss-poses",
-                   options.split_loss_poses,
-                   "Number of poses at which the loss is split into interpolation over (u,v), over "
-                   "(s,t), and quantisation; some ten ray-cast DRRs each")
-      ->capture_default_str();
-  command->add_option("--step-mm", options.step_mm, "Longest step of ray casting, mm")
-      ->capture_default_str();
-  command->add_option(
-      "--series", options.series_uid, "DICOM series UID, when the folder has several");
-  command->add_option("--seed", options.seed, "Of the random poses")->capture_default_str();
-  cli::bind_resume(*command, options.restarts);
-  command->add_option("-o,--output", options.output_folder, "Folder for the results")->required();
+  cli::bind_options(*command, options);
+  cli::bind_run_limits(*command);
   return command;
 }
 

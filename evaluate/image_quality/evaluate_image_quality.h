@@ -7,7 +7,10 @@
 #include <vector>
 
 #include "cli/app_forward.h"
+#include "cli/run_limits.h"
+#include "image_files/ct_reader.h"
 #include "parallel/communicator.h"
+#include "volume/ray_caster.h"
 
 namespace af::evaluation {
 
@@ -21,11 +24,13 @@ struct ImageQualityOptions {
   std::filesystem::path poses;
   std::string look_up = "linear";
   int split_loss_poses = 0;  ///< so many poses' losses are split
-  double step_mm = 1.0;
-  std::string series_uid;
+  RayCasterOptions ray_caster;
+  CtReadOptions ct_reading;
   std::uint64_t seed = 1;
-  bool restarts = false;
+  cli::ResumeOptions resume;
   std::filesystem::path output_folder;
+
+  void describe(Fields& field_list);
 };
 
 std::vector<std::string> problems(const ImageQualityOptions& options);

@@ -6,9 +6,12 @@
 #include <vector>
 
 #include "cli/app_forward.h"
+#include "image_files/ct_reader.h"
 #include "parallel/communicator.h"
+#include "register/field_paths.h"
 #include "register/method/method_options.h"
 #include "study/study_file.h"
+#include "volume/ray_caster.h"
 
 namespace af::evaluation {
 
@@ -16,27 +19,21 @@ namespace af::evaluation {
 /// registers or measures similarity.
 struct MethodOptions {
   std::filesystem::path study;
-  std::vector<std::string> fields;  ///< CAMERA=PATH each
-  std::string renderer = "field";   ///< "field", "raycast" or "both"
+  registration::FieldPaths fields;
+  std::string renderer = "field";  ///< "field", "raycast" or "both"
   std::string gold = "auto";
   registration::MethodOptions method;
-  double water_mu_per_mm = 0.0200;
-  double step_mm = 1.0;
-  std::string series_uid;
+  AttenuationModel attenuation;  ///< of ray casting
+  RayCasterOptions ray_caster;
+  CtReadOptions ct;
 
   /// Renderers in the order of rows: "field" before "raycast".
   [[nodiscard]] std::vector<std::string> chosen_renderers() const;
+  void describe(Fields& field);
 };
 
+/// Problems of the fields' paths.
 void append_problems(const MethodOptions& options, std::vector<std::string>& found);
-
-/// The options that are used, as lines of TOML.
-std::string to_toml(const MethodOptions& options);
-
-/// ["a", "b"] as in TOML.
-std::string toml_list(const std::vector<std::string>& values);
-
-void bind_method(CLI::App& command, MethodOptions& options);
 
 /// Adds the subcommand `method`; returns it.
 CLI::App* bind_show_method(CLI::App& app, registration::MethodOptions& options);

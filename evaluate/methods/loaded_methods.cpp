@@ -19,15 +19,11 @@ registration::CaseLoadOptions load_options(const MethodOptions& options,
   result.level_blur_sigma_mm = level_blur_sigma_mm;
   result.renderer =
       renderer == "field" ? registration::RendererKind::Field : registration::RendererKind::RayCast;
-  if (renderer == "field")
-    for (const std::string& text : options.fields) {
-      const std::size_t equals = text.find('=');
-      result.field_paths[text.substr(0, equals)] = text.substr(equals + 1);
-    }
-  result.ct.series_uid = options.series_uid;
+  if (renderer == "field") result.field_paths = options.fields.by_camera();
+  result.ct = options.ct;
   result.fiducial_mask_mm = options.method.fiducial_mask_mm;
-  result.water_mu_per_mm = options.water_mu_per_mm;
-  result.ray_caster.step_mm = options.step_mm;
+  result.attenuation = options.attenuation;
+  result.ray_caster = options.ray_caster;
   return result;
 }
 

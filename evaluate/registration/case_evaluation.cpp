@@ -31,6 +31,7 @@
 #include "run/stop_request.h"
 #include "run/terminal.h"
 #include "text/cbor_json.h"
+#include "text/options_toml.h"
 
 namespace af::evaluation {
 namespace {
@@ -255,7 +256,7 @@ void announce_times(std::vector<Method>& methods,
 /// Every option, input and start that decides a case's rows.
 DecidingValues deciding_values(const RegistrationStudyOptions& options,
                                const CaseEvaluation& evaluation) {
-  DecidingValues values = af::deciding_values(to_toml(options), evaluation.input_sha256);
+  DecidingValues values = af::deciding_values(deciding_options(options), evaluation.input_sha256);
   values["case name"] = evaluation.case_name;
   Sha256 starts;
   for (const PerturbedStart& start : evaluation.starts.starts) {
@@ -367,7 +368,7 @@ std::vector<MethodRows> begin_registrations(const RegistrationStudyOptions& opti
                      {{progress_folder(options.output_folder),
                        name + "-" + method.renderer,
                        decides,
-                       options.restarts},
+                       options.resume.restarts},
                       world}});
   return begun;
 }

@@ -6,24 +6,26 @@
 #include <CLI/CLI.hpp>
 
 #include "base/error.h"
+#include "cli/bind_options.h"
 #include "evaluate/registration/method_comparison.h"
 #include "files/output_file.h"
 
 namespace af::evaluation {
+
+void CompareOptions::describe(Fields& field) {
+  field("runs", runs, "Folders of finished runs, searched with all below them")
+      .as("RUN")
+      .required();
+  field("output", output, "The Markdown file; the CSV takes its name, .csv").as("-o,--output");
+  field("screen", is_screen, "In Markdown, measures against optimisers instead of a row per run");
+}
 
 CLI::App* bind_compare(CLI::App& app, CompareOptions& options) {
   CLI::App* command = app.add_subcommand(
       "compare",
       "One table of finished registration runs: success for starts 0-8, 8-16 and 16-30 mm from "
       "gold, TRE, bias, DRRs and seconds, and field against ray casting, as Markdown and CSV");
-  command->add_option("RUN", options.runs, "Folders of finished runs, searched with all below them")
-      ->required();
-  command
-      ->add_option("-o,--output", options.output, "The Markdown file; the CSV takes its name, .csv")
-      ->capture_default_str();
-  command->add_flag("--screen",
-                    options.is_screen,
-                    "In Markdown, measures against optimisers instead of a row per run");
+  cli::bind_options(*command, options);
   return command;
 }
 

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <vector>
 
+#include "base/described_fields.h"
 #include "cli/app_forward.h"
 #include "parallel/communicator.h"
 
@@ -14,6 +15,8 @@ struct CompareOptions {
   std::vector<std::filesystem::path> runs;
   std::filesystem::path output = "methods.md";
   bool is_screen = false;  ///< Markdown of measures against optimisers
+
+  void describe(Fields& field);
 };
 
 /// Adds the subcommand; returns it.

@@ -7,13 +7,13 @@
 #include <optional>
 #include <set>
 #include <span>
-#include <sstream>
 
 #include <CLI/CLI.hpp>
 
 #include "base/error.h"
 #include "base/toml_text.h"
 #include "cli/app_main.h"
+#include "cli/bind_options.h"
 #include "cli/run_limits.h"
 #include "evaluate/methods/loaded_methods.h"
 #include "evaluate/outputs/failed_start.h"
@@ -36,6 +36,7 @@
 #include "run/terminal.h"
 #include "study/shared_inputs.h"
 #include "text/json_text.h"
+#include "text/options_toml.h"
 #include "text/shell_words.h"
 
 namespace af::evaluation {
@@ -234,9 +235,9 @@ std::vector<StudyCase> chosen_cases(const RegistrationStudyOptions& options, con
   std::vector<StudyCase> cases;
   for (const StudyCase* study_case : study.chosen_cases(options.cases))
     cases.push_back(*study_case);
-  if (cases.size() > 1 && !options.fields.empty())
+  if (cases.size() > 1 && !options.fields.texts.empty())
     throw InputError("--field",
-                     options.fields.front(),
+                     options.fields.texts.front(),
                      "a field belongs to one CT: with several cases put the key `field` into the "
                      "study, or choose one by --case",
                      study.path.string());
@@ -253,6 +254,7 @@ std::vector<std::string> RegistrationStudyOptions::renderers() const {
 std::vector<std::string> problems(const RegistrationStudyOptions& options) {
   std::vector<std::string> found = problems(options.start_options());
   append_problems(options, found);
+  for (const std::string& text : field_problems(options)) found.push_back(text);
   const auto require_part = [&](const char* name, const std::optional<int>& part, int whole) {
     if (part.has_value() && !(*part >= 1 && *part <= whole))
       found.push_back(std::string(name) + " = " + std::to_string(*part) + ": must be from 1 to " +
@@ -265,46 +267,98 @@ std::vector<std::string> problems(const RegistrationStudyOptions& options) {
                options.raycast_starts_per_interval,
                options.starts_per_interval);
   require_part("--raycast-intervals", options.raycast_intervals, options.intervals);
-  if (!(options.equivalence_margin_mm > 0.0) || !std::isfinite(options.equivalence_margin_mm))
-    found.push_back("--equivalence-margin-mm = " + number_text(options.equivalence_margin_mm) +
-                    ": must be positive");
-  if (options.only_start.has_value() && *options.only_start < 0)
-    found.push_back("--only-start = " + std::to_string(*options.only_start) + ": must be >= 0");
   if (!options.poses_from.empty() && options.starts_from.empty())
     found.push_back("--poses-from = '" + options.poses_from.string() +
                     "': needs --starts-from, the starts.csv that the poses were found from");
-  if (options.method_name.empty() ||
-      options.method_name.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
-                                            "0123456789 ._+-") != std::string::npos)
-    found.push_back("--method-name = '" + options.method_name +
-                    "': must hold letters, digits, blanks and . _ + - only");
   if (options.poses_from.empty() && options.method_name != RegistrationStudyOptions{}.method_name)
     found.push_back("--method-name = '" + options.method_name +
                     "': must not be given without --poses-from");
   return found;
 }
 
-std::string to_toml(const RegistrationStudyOptions& options) {
-  std::ostringstream out;
-  out << to_toml(static_cast<const MethodOptions&>(options))
-      << "starts_per_interval = " << options.starts_per_interval
-      << "\nintervals = " << options.intervals
-      << "\ninterval_width_mm = " << number_text(options.interval_width_mm) << "\nstart_rule = \""
-      << options.start_rule << "\"\n";
-  if (!options.starts_from.empty())
-    out << "starts_from = " << toml_text(options.starts_from.string()) << '\n';
-  if (options.only_start.has_value()) out << "only_start = " << *options.only_start << '\n';
-  if (!options.poses_from.empty())
-    out << "poses_from = " << toml_text(options.poses_from.string())
-        << "\nmethod_name = " << toml_text(options.method_name) << '\n';
-  if (options.renderer == "both")
-    out << "raycast_starts_per_interval = "
-        << options.raycast_starts_per_interval.value_or(options.starts_per_interval)
-        << "\nraycast_intervals = " << options.raycast_intervals.value_or(options.intervals)
-        << '\n';
-  out << "equivalence_margin_mm = " << number_text(options.equivalence_margin_mm)
-      << "\ncase = " << toml_list(options.cases) << '\n';
-  return out.str();
+namespace {
+
+void describe_starts(Fields& field, RegistrationStudyOptions& options) {
+  field("case", options.cases, "Case of the study, may be repeated (default: all)");
+  field(
+      "starts_per_interval", options.starts_per_interval, "Starts in each interval of initial TRE");
+  field("intervals", options.intervals, "Number of intervals of initial TRE, from 0 mm");
+  field("interval_width_mm", options.interval_width_mm, "Width of an interval, mm");
+  field("start_rule",
+        options.start_rule,
+        "stratified: as many starts in each interval (the paper); uniform: as many in all, their "
+        "initial TREs uniform over all intervals")
+      .choice({"stratified", "uniform"});
+  field("starts_from",
+        options.starts_from,
+        "starts.csv of another run instead of drawn starts: [case,] and m00 ... m23 of "
+        "room_from_ct, or start_rx_deg ... start_tz_mm relative to gold")
+      .input();
+  field("starts_only",
+        options.is_starts_only,
+        "Write starts.csv, for other programs, and register nothing")
+      .not_recorded("without registrations nothing records options");
+  field("only_start",
+        options.only_start,
+        "Register from this start alone, its start_index in starts.csv, by every renderer: repeats "
+        "one row of a run")
+      .at_least(0);
+}
+
+void describe_methods(Fields& field, RegistrationStudyOptions& options) {
+  field("poses_from",
+        options.poses_from,
+        "Evaluate the poses that another program found from --starts-from, without registering: "
+        "CSV of start_index, [case, seconds] and m00 ... m23 of room_from_ct, or rx_deg ... tz_mm "
+        "relative to the nominal pose, or final_rx_deg ... relative to gold; or a folder of "
+        "[CASE-]INDEX.tfm");
+  field("method_name", options.method_name, "With --poses-from: what to call them")
+      .of_form("letters, digits, blanks and . _ + - only", [](const std::string& name) {
+        return !name.empty() && name.find_first_not_of(
+                                    "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
+                                    "0123456789 ._+-") == std::string::npos;
+      });
+  field("raycast_starts_per_interval",
+        options.raycast_starts_per_interval,
+        "With --renderer both: so many of each interval's starts also by ray casting (default: "
+        "all)");
+  field("raycast_intervals",
+        options.raycast_intervals,
+        "With --renderer both: ray casting only in the first so many intervals (default: all)");
+  field("equivalence_margin_mm",
+        options.equivalence_margin_mm,
+        "Field and ray casting count as equal when their mean TREs differ by less, mm: two "
+        "one-sided tests")
+      .above(0.0)
+      .finite()
+      .not_deciding("rows do not depend on it");
+}
+
+}  // namespace
+
+void RegistrationStudyOptions::describe(Fields& field) {
+  field.part<MethodOptions>(*this);
+  describe_starts(field, *this);
+  describe_methods(field, *this);
+  field.at("seed").as("--seed", "Of the starts, and of what cma-es draws");
+  field.part(resume);
+  field("output", output_folder, "Folder for the results")
+      .as("-o,--output")
+      .required()
+      .not_deciding("results are the same");
+  field.leave_out(program, "main() knows it");
+  field.leave_out(shared_by_repeats, "the options as typed");
+}
+
+RegistrationStudyOptions RegistrationStudyOptions::in_force() const {
+  RegistrationStudyOptions options = *this;
+  options.method = method.in_force();
+  if (poses_from.empty()) options.method_name.clear();
+  if (renderer == "both") {
+    options.raycast_starts_per_interval = raycast_starts_per_interval.value_or(starts_per_interval);
+    options.raycast_intervals = raycast_intervals.value_or(intervals);
+  }
+  return options;
 }
 
 CLI::App* bind_registration(CLI::App& app, RegistrationStudyOptions& options) {
@@ -312,70 +366,8 @@ CLI::App* bind_registration(CLI::App& app, RegistrationStudyOptions& options) {
       "registration",
       "Registers the cases of a study from starts at stated distances from the gold pose and "
       "reports TRE and success (the paper's Table II, Figs. 15 and 16)");
-  bind_method(*command, options);
-  command->add_option("--case", options.cases, "Case of the study, may be repeated (default: all)")
-      ->take_all();
-  command
-      ->add_option("--starts-per-interval",
-                   options.starts_per_interval,
-                   "Starts in each interval of initial TRE")
-      ->capture_default_str();
-  command
-      ->add_option(
-          "--intervals", options.intervals, "Number of intervals of initial TRE, from 0 mm")
-      ->capture_default_str();
-  command->add_option("--interval-width-mm", options.interval_width_mm, "Width of an interval, mm")
-      ->capture_default_str();
-  command
-      ->add_option("--start-rule",
-                   options.start_rule,
-                   "stratified: as many starts in each interval (the paper); uniform: as many in "
-                   "all, their initial TREs uniform over all intervals")
-      ->check(CLI::IsMember({"stratified", "uniform"}))
-      ->capture_default_str();
-  command->add_option("--starts-from",
-                      options.starts_from,
-                      "starts.csv of another run instead of drawn starts: [case,] and m00 ... m23 "
-                      "of room_from_ct, or start_rx_deg ... start_tz_mm relative to gold");
-  command->add_flag("--starts-only",
-                    options.is_starts_only,
-                    "Write starts.csv, for other programs, and register nothing");
-  command->add_option("--only-start",
-                      options.only_start,
-                      "Register from this start alone, its start_index in starts.csv, by every "
-                      "renderer: repeats one row of a run");
-  command->add_option("--poses-from",
-                      options.poses_from,
-                      "Evaluate the poses that another program found from --starts-from, without "
-                      "registering: CSV of start_index, [case, seconds] and m00 ... m23 of "
-                      "room_from_ct, or rx_deg ... tz_mm relative to the nominal pose, or "
-                      "final_rx_deg ... relative to gold; or a folder of [CASE-]INDEX.tfm");
-  command
-      ->add_option("--method-name",
-                   options.method_name,
-                   "With --poses-from: name of the method that found them")
-      ->capture_default_str();
-  command->add_option("--raycast-starts-per-interval",
-                      options.raycast_starts_per_interval,
-                      "With --renderer both: how many starts of each interval are also registered "
-                      "by ray casting (default: all)");
-  command->add_option("--raycast-intervals",
-                      options.raycast_intervals,
-                      "With --renderer both: number of intervals, from the first, that ray casting "
-                      "registers (default: all)");
-  command
-      ->add_option("--equivalence-margin-mm",
-                   options.equivalence_margin_mm,
-                   "Field and ray casting count as equal when their mean TREs differ by less, mm: "
-                   "two one-sided tests")
-      ->capture_default_str();
-  command
-      ->add_option("--seed",
-                   options.method.seed,
-                   "Seed of the starts, and of the random numbers that cma-es draws")
-      ->capture_default_str();
-  cli::bind_resume(*command, options.restarts);
-  command->add_option("-o,--output", options.output_folder, "Folder for the results")->required();
+  cli::bind_options(*command, options);
+  cli::bind_run_limits(*command);
   command->parse_complete_callback([&options, command] {
     options.shared_by_repeats = cli::given_options(*command, kNotOfRepeats);
   });

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "cli/app_forward.h"
+#include "cli/run_limits.h"
 #include "evaluate/methods/evaluated_methods.h"
 #include "evaluate/starts/perturbed_starts.h"
 #include "parallel/communicator.h"
@@ -29,7 +30,7 @@ struct RegistrationStudyOptions : MethodOptions {
   std::filesystem::path poses_from;                ///< poses that another program found
   std::string method_name = "poses";               ///< what these are called
   double equivalence_margin_mm = 0.1;
-  bool restarts = false;  ///< throw unfinished work away
+  cli::ResumeOptions resume;
   std::filesystem::path output_folder;
   std::string program = "af-evaluate";  ///< as typed, quoted for a shell
   std::string shared_by_repeats;        ///< options as typed but those of starts and output
@@ -39,11 +40,13 @@ struct RegistrationStudyOptions : MethodOptions {
   [[nodiscard]] StartOptions start_options() const {
     return {intervals, interval_width_mm, starts_per_interval, method.seed};
   }
+  void describe(Fields& field);
+  /// With the preset resolved, and what counts for ray casting or another program's poses only
+  /// where there is that.
+  [[nodiscard]] RegistrationStudyOptions in_force() const;
 };
 
 std::vector<std::string> problems(const RegistrationStudyOptions& options);
-
-std::string to_toml(const RegistrationStudyOptions& options);
 
 /// Adds the subcommand; returns it.
 CLI::App* bind_registration(CLI::App& app, RegistrationStudyOptions& options);

@@ -7,6 +7,7 @@
 #include <CLI/CLI.hpp>
 
 #include "base/error.h"
+#include "cli/bind_options.h"
 #include "files/output_file.h"
 #include "run/terminal.h"
 #include "study/rig_file.h"
@@ -23,18 +24,21 @@ std::string replaced(std::string text, const std::string& from, const std::strin
 
 }  // namespace
 
+void JoinStudiesOptions::describe(Fields& field) {
+  field("studies", studies, "study.toml files").as("STUDY").required();
+  field("fields",
+        fields,
+        "Name every view's field: a path, relative to the new study, with {case} and {camera}, "
+        "such as fields/{case}-{camera}.af.h5 (default: as the studies do)");
+  field("output", output, "The study to write").as("-o,--output");
+}
+
 CLI::App* bind_join_studies(CLI::App& app, JoinStudiesOptions& options) {
   CLI::App* command = app.add_subcommand(
       "join-studies",
       "One study.toml of the cases of several, which must have the same cameras: a study of many "
       "patients, for `registration`, `image-quality` and `field-parameters`");
-  command->add_option("STUDY", options.studies, "study.toml files")->required();
-  command->add_option(
-      "--fields",
-      options.fields,
-      "Name every view's field: a path, relative to the new study, with {case} and "
-      "{camera}, such as fields/{case}-{camera}.af.h5 (default: as the studies do)");
-  command->add_option("-o,--output", options.output, "The study to write")->capture_default_str();
+  cli::bind_options(*command, options);
   return command;
 }
 

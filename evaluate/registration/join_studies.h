@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "base/described_fields.h"
 #include "cli/app_forward.h"
 #include "parallel/communicator.h"
 #include "study/study_file.h"
@@ -16,6 +17,8 @@ struct JoinStudiesOptions {
   std::vector<std::filesystem::path> studies;
   std::string fields;  ///< path of every view's field with {case} and {camera}; empty: as they are
   std::filesystem::path output = "study.toml";
+
+  void describe(Fields& field);
 };
 
 /// Adds the subcommand; returns it.

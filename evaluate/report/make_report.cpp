@@ -5,11 +5,20 @@
 
 #include <CLI/CLI.hpp>
 
+#include "cli/bind_options.h"
 #include "evaluate/report/report_page.h"
 #include "figures/gnuplot_figure.h"
 #include "files/output_file.h"
 
 namespace af::evaluation {
+
+void ReportOptions::describe(Fields& field) {
+  field("runs", runs, "Folders of finished runs, searched with all below them")
+      .as("RUN")
+      .required();
+  field("output", output, "The page to write").as("-o,--output");
+  field("title", title, "Its title (default: made from the cases' names)");
+}
 
 CLI::App* bind_report(CLI::App& app, ReportOptions& options) {
   CLI::App* command = app.add_subcommand(
@@ -18,10 +27,7 @@ CLI::App* bind_report(CLI::App& app, ReportOptions& options) {
       "findings "
       "in plain words, figures, tables that sort, overlays, failures with their searches and the "
       "commands that repeat them, provenance; opens offline, prints well");
-  command->add_option("RUN", options.runs, "Folders of finished runs, searched with all below them")
-      ->required();
-  command->add_option("-o,--output", options.output, "The page to write")->capture_default_str();
-  command->add_option("--title", options.title, "Its title (default: made from the cases' names)");
+  cli::bind_options(*command, options);
   return command;
 }
 

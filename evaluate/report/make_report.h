@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "base/described_fields.h"
 #include "cli/app_forward.h"
 #include "parallel/communicator.h"
 
@@ -15,6 +16,8 @@ struct ReportOptions {
   std::vector<std::filesystem::path> runs;
   std::filesystem::path output = "report.html";
   std::string title;
+
+  void describe(Fields& field);
 };
 
 /// Adds the subcommand; returns it.

@@ -32,6 +32,12 @@ std::map<std::string, std::string> option_lines(const std::string& text) {
   return options;
 }
 
+/// "100" of "100.0".
+std::string plain_number(std::string text) {
+  if (text.ends_with(".0")) text.resize(text.size() - 2);
+  return text;
+}
+
 struct OptionLabel {
   const char* key;
   const char* label;
@@ -91,8 +97,9 @@ std::string simulation_text(const json& simulation) {
   std::vector<std::pair<std::string, std::string>> items;
   for (const OptionLabel& label : kSimulationLabels)
     if (const auto found = options.find(label.key); found != options.end())
-      items.emplace_back(label.label,
-                         escaped(found->second) + (*label.unit ? " " : "") + label.unit);
+      items.emplace_back(
+          label.label,
+          escaped(plain_number(found->second)) + (*label.unit ? " " : "") + label.unit);
   const auto ideal = options.find("ideal");
   const bool is_ideal = ideal != options.end() && ideal->second == "true";
   const std::string stress = stress_text(simulation);

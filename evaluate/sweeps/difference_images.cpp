@@ -158,7 +158,7 @@ json write_difference_images(const std::vector<SettingResult>& results,
       setting.ct.empty() ? read_study(setting.study).find_case(setting.case_name).ct.string()
                          : setting.ct,
       {setting.series_uid},
-      setting.attenuation_model(),
+      setting.attenuation,
       world,
       warnings);
   std::vector<Image2d> field_images;

@@ -7,13 +7,12 @@
 #include <iostream>
 #include <limits>
 #include <optional>
-#include <sstream>
 #include <tuple>
 
 #include <CLI/CLI.hpp>
 
 #include "base/error.h"
-#include "cli/run_limits.h"
+#include "cli/bind_options.h"
 #include "evaluate/methods/loaded_methods.h"
 #include "evaluate/outputs/result_figures.h"
 #include "evaluate/outputs/row_gathering.h"
@@ -30,6 +29,7 @@
 #include "study/case_gold_standard.h"
 #include "study/shared_inputs.h"
 #include "text/csv_table.h"
+#include "text/options_toml.h"
 
 namespace af::evaluation {
 namespace {
@@ -41,17 +41,6 @@ constexpr std::array<const char*, kPoseParameters> kAxisNames = {
 
 const char* unit_of(int axis) {
   return axis < 3 ? "deg" : "mm";
-}
-
-std::string to_toml(const SimilarityCurvesOptions& options) {
-  std::ostringstream out;
-  out << to_toml(static_cast<const MethodOptions&>(options))
-      << "case = " << toml_list({options.case_name})
-      << "\nhalf_width_mm = " << number_text(options.half_width_mm)
-      << "\nhalf_width_deg = " << number_text(options.half_width_deg)
-      << "\ncurve_step_mm = " << number_text(options.curve_step_mm)
-      << "\ncurve_step_deg = " << number_text(options.curve_step_deg) << '\n';
-  return out.str();
 }
 
 /// Similarity along one axis by one renderer.
@@ -243,7 +232,7 @@ void print_maxima(const std::vector<Curve>& curves, const json& renderers) {
 }  // namespace
 
 std::vector<std::string> problems(const SimilarityCurvesOptions& options) {
-  std::vector<std::string> found;
+  std::vector<std::string> found = field_problems(options);
   append_problems(options, found);
   const auto require_curve = [&](const char* unit, double half_width, double step) {
     constexpr double kMostSteps = 100000;
@@ -258,26 +247,35 @@ std::vector<std::string> problems(const SimilarityCurvesOptions& options) {
   return found;
 }
 
+void SimilarityCurvesOptions::describe(Fields& field) {
+  field.part<MethodOptions>(*this);
+  field("case", case_name, "Case of the study (default: its only one)");
+  field("half_width_mm", half_width_mm, "Translations reach so far, mm");
+  field("half_width_deg", half_width_deg, "Rotations reach so far, degrees");
+  field("curve_step_mm", curve_step_mm, "Step of translations, mm");
+  field("curve_step_deg", curve_step_deg, "Step of rotations, degrees");
+  field.part(resume);
+  field("output", output_folder, "Folder for the results")
+      .as("-o,--output")
+      .required()
+      .not_deciding("results are the same");
+}
+
+SimilarityCurvesOptions SimilarityCurvesOptions::in_force() const {
+  SimilarityCurvesOptions options = *this;
+  options.method = method.in_force();
+  return options;
+}
+
 CLI::App* bind_similarity_curves(CLI::App& app, SimilarityCurvesOptions& options) {
   CLI::App* command = app.add_subcommand(
       "similarity-curves",
       "Similarity along each of the six pose parameters about the gold pose, by field and by ray "
       "casting (the paper's Fig. 14): where the maxima lie and which axis is broadest");
-  bind_method(*command, options);
-  command->add_option("--case", options.case_name, "Case of the study (default: its only one)");
-  command
-      ->add_option("--half-width-mm", options.half_width_mm, "Largest offset of translations, mm")
-      ->capture_default_str();
-  command
-      ->add_option(
-          "--half-width-deg", options.half_width_deg, "Largest offset of rotations, degrees")
-      ->capture_default_str();
-  command->add_option("--curve-step-mm", options.curve_step_mm, "Step of translations, mm")
-      ->capture_default_str();
-  command->add_option("--curve-step-deg", options.curve_step_deg, "Step of rotations, degrees")
-      ->capture_default_str();
-  cli::bind_resume(*command, options.restarts);
-  command->add_option("-o,--output", options.output_folder, "Folder for the results")->required();
+  options.renderer = "both";
+  options.method.preset = "paper";
+  cli::bind_options(*command, options);
+  cli::bind_run_limits(*command);
   return command;
 }
 
@@ -304,8 +302,10 @@ void run_similarity_curves(const SimilarityCurvesOptions& options,
       all_or_none(world, [&] { return study.find_case(options.case_name); });
   const GoldStandard gold =
       all_or_none(world, [&] { return gold_standard(study, study_case, options.gold); });
+  SimilarityCurvesOptions in_force = all_or_none(world, [&] { return options.in_force(); });
+  in_force.case_name = study_case.name;
   Provenance provenance = {
-      "af-evaluate similarity-curves", command_line, to_toml(options), 0, world.size(), {}};
+      "af-evaluate similarity-curves", command_line, to_toml(in_force), 0, world.size(), {}};
   std::vector<LoadedMethod> methods =
       load_methods(options, study, study_case, world, provenance.input_sha256);
   all_or_none(world, [&] {
@@ -316,8 +316,8 @@ void run_similarity_curves(const SimilarityCurvesOptions& options,
                  PoseFrame::about(gold.room_from_ct, study_case.center_ct_mm),
                  {progress_folder(folder),
                   "",
-                  deciding_values(provenance.options_toml, provenance.input_sha256),
-                  options.restarts},
+                  deciding_values(deciding_options(in_force), provenance.input_sha256),
+                  options.resume.restarts},
                  world,
                  curves);
   all_or_none(world, [&] {

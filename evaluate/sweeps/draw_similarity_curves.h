@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "cli/run_limits.h"
 #include "evaluate/methods/evaluated_methods.h"
 #include "parallel/communicator.h"
 
@@ -12,23 +13,23 @@ namespace af::evaluation {
 
 /// `af-evaluate similarity-curves` as typed.
 struct SimilarityCurvesOptions : MethodOptions {
-  SimilarityCurvesOptions() {
-    renderer = "both";
-    method.preset = "paper";  // a curve is of one measure
-  }
-
   std::string case_name;  ///< empty: the study's only one
   double half_width_mm = 5.0;
   double half_width_deg = 5.0;
   double curve_step_mm = 0.1;
   double curve_step_deg = 0.1;
-  bool restarts = false;
+  cli::ResumeOptions resume;
   std::filesystem::path output_folder;
+
+  void describe(Fields& field);
+  /// With the preset resolved.
+  [[nodiscard]] SimilarityCurvesOptions in_force() const;
 };
 
 std::vector<std::string> problems(const SimilarityCurvesOptions& options);
 
-/// Adds the subcommand; returns it.
+/// Adds the subcommand; returns it. Its defaults are both renderers and the preset paper: a curve
+/// is of one measure.
 CLI::App* bind_similarity_curves(CLI::App& app, SimilarityCurvesOptions& options);
 
 /// Collective. The similarity along each pose parameter about the gold pose (Fig. 14), by the

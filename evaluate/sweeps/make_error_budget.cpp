@@ -8,7 +8,7 @@
 #include <CLI/CLI.hpp>
 
 #include "base/error.h"
-#include "evaluate/methods/evaluated_methods.h"
+#include "cli/bind_options.h"
 #include "evaluate/outputs/sample_summary_json.h"
 #include "evaluate/report/evaluation_run.h"
 #include "evaluate/statistics/success_rate.h"
@@ -20,6 +20,7 @@
 #include "study/case_gold_standard.h"
 #include "study/study_file.h"
 #include "text/csv_table.h"
+#include "text/options_toml.h"
 
 namespace af::evaluation {
 namespace {
@@ -169,6 +170,14 @@ std::string markdown(const json& summary) {
 
 }  // namespace
 
+void ErrorBudgetOptions::describe(Fields& field) {
+  field("step",
+        steps,
+        "LABEL=RUN: a run's folder and what is different from the run before; in order")
+      .required();
+  field("output", output_folder, "Folder for the results").as("-o,--output").required();
+}
+
 CLI::App* bind_error_budget(CLI::App& app, ErrorBudgetOptions& options) {
   CLI::App* command = app.add_subcommand(
       "error-budget",
@@ -176,13 +185,7 @@ CLI::App* bind_error_budget(CLI::App& app, ErrorBudgetOptions& options) {
       "of "
       "one case from the same starts, each different from the one before in one thing "
       "(jobs/error-budget.sh makes them)");
-  command
-      ->add_option("--step",
-                   options.steps,
-                   "LABEL=RUN: a run's folder and what is different from the run before; in order")
-      ->required()
-      ->take_all();
-  command->add_option("-o,--output", options.output_folder, "Folder for the results")->required();
+  cli::bind_options(*command, options);
   return command;
 }
 
@@ -194,12 +197,8 @@ void run_error_budget(const ErrorBudgetOptions& options,
     announce_outputs(options.output_folder,
                      {"error-budget.md", "error-budget.csv", "reproduce.sh", "summary.json"});
     std::vector<ChainRun> runs;
-    Provenance provenance = {"af-evaluate error-budget",
-                             command_line,
-                             "step = " + toml_list(options.steps) + "\n",
-                             0,
-                             world.size(),
-                             {}};
+    Provenance provenance = {
+        "af-evaluate error-budget", command_line, to_toml(options), 0, world.size(), {}};
     for (const std::string& step : options.steps) {
       runs.push_back(read_run(step));
       provenance.input_sha256[runs.back().budget.label] =

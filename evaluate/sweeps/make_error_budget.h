@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "base/described_fields.h"
 #include "cli/app_forward.h"
 #include "parallel/communicator.h"
 
@@ -14,6 +15,8 @@ namespace af::evaluation {
 struct ErrorBudgetOptions {
   std::vector<std::string> steps;  ///< LABEL=RUN each, in the order of the chain
   std::filesystem::path output_folder;
+
+  void describe(Fields& field);
 };
 
 /// Adds the subcommand; returns it.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "evaluate/sweeps/sweep_field_parameters.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
@@ -8,12 +9,11 @@
 #include <memory>
 #include <optional>
 #include <set>
-#include <sstream>
 
 #include <CLI/CLI.hpp>
 
 #include "base/error.h"
-#include "cli/run_limits.h"
+#include "cli/bind_options.h"
 #include "drr/ray_cast_drr.h"
 #include "drr/two_pass_af_drr.h"
 #include "evaluate/image_quality/image_quality_tables.h"
@@ -34,11 +34,14 @@
 #include "study/node_ct.h"
 #include "study/study_file.h"
 #include "text/csv_table.h"
+#include "text/options_toml.h"
 
 namespace af::evaluation {
 namespace {
 
 using nlohmann::json;
+
+constexpr const char* kComparisonStage = "comparison";
 
 /// Settings of a sweep, each once, in the order of sweeps; the base setting first.
 std::vector<PrecomputeOptions> settings_of(const FieldParametersOptions& options,
@@ -65,13 +68,11 @@ std::string field_name(const PrecomputeOptions& setting) {
          std::to_string(setting.codewords) + "-t" + number_text(training_share(setting)) + ".af.h5";
 }
 
-/// The options that decide a field's content, without its path.
-std::string deciding_options(const std::string& toml) {
-  std::string result;
-  std::istringstream lines(toml);
-  for (std::string line; std::getline(lines, line);)
-    if (!line.starts_with("output =")) result += line + "\n";
-  return result;
+/// The options of a field, without where it goes.
+OptionTexts options_of_field(const std::string& toml) {
+  OptionTexts options = option_texts(toml);
+  options.erase("output");
+  return options;
 }
 
 /// Collective. The field of a setting, made unless it is there. FileError when one of that name was
@@ -84,9 +85,9 @@ std::shared_ptr<const CompressedAttenuationField> field_of(const PrecomputeOptio
   if (!exists) run_precompute(setting, command_line, world);
   const auto field = read_field(setting.output, world, &info);
   all_or_none(world, [&] {
-    const std::string expected = deciding_options(to_toml(setting));
-    const std::string found = deciding_options(info.provenance.options_toml);
-    if (found != expected)
+    const std::string expected = to_toml(setting);
+    const std::string& found = info.provenance.options_toml;
+    if (options_of_field(found) != options_of_field(expected))
       throw FileError(setting.output, "options of the field to reuse", expected, found);
   });
   return field;
@@ -121,30 +122,6 @@ std::vector<DrrComparison> compare(const FieldParametersOptions& options,
         comparisons[static_cast<std::size_t>(index)] = comparison_of(row);
       });
   return comparisons;
-}
-
-/// The options that decide the comparisons of one field.
-std::string comparison_toml(const FieldParametersOptions& options) {
-  return "pose_count = " + std::to_string(options.pose_count) +
-         "\ndrr_step_mm = " + number_text(options.drr_step_mm) +
-         "\npose_seed = " + std::to_string(options.seed) + "\n";
-}
-
-std::string to_toml(const FieldParametersOptions& options) {
-  std::ostringstream out;
-  const auto list = [&](const char* name, const auto& values) {
-    out << name << " = [";
-    for (std::size_t i = 0; i < values.size(); ++i)
-      out << (i == 0 ? "" : ", ") << number_text(static_cast<double>(values[i]));
-    out << "]\n";
-  };
-  out << af::to_toml(options.base);
-  list("sweep_uv_nodes", options.uv_nodes);
-  list("sweep_st_nodes", options.st_nodes);
-  list("sweep_codewords", options.codewords);
-  list("sweep_training_fraction", options.training_fractions);
-  out << comparison_toml(options);
-  return out.str();
 }
 
 void write_results(const FieldParametersOptions& options,
@@ -223,13 +200,13 @@ void sweep_target(const FieldParametersOptions& options,
                   Provenance& provenance) {
   std::vector<std::string> warnings;
   const NodeCt ct = read_ct_per_node(
-      target.ct_path, {target.base.series_uid}, target.base.attenuation_model(), world, warnings);
+      target.ct_path, {target.base.series_uid}, target.base.attenuation, world, warnings);
   for (const std::string& text : warnings) warn(world, text);
-  const RayCastDrr reference(ct.volume, {options.drr_step_mm});
+  const RayCastDrr reference(ct.volume, options.reference);
   std::vector<PrecomputeOptions> settings = settings_of(options, target.base);
   for (PrecomputeOptions& setting : settings) {
     setting.output = (fields / field_name(setting)).string();
-    setting.is_restart = options.restarts;
+    setting.is_restart = options.resume.restarts;
   }
   using Clock = std::chrono::steady_clock;
   for (const PrecomputeOptions& setting : settings) {
@@ -254,10 +231,10 @@ void sweep_target(const FieldParametersOptions& options,
                                  reference,
                                  {progress_folder(options.output_folder),
                                   field_name(setting),
-                                  deciding_values(comparison_toml(options),
+                                  deciding_values(deciding_options(options, kComparisonStage),
                                                   {{"the field", result.info.payload_sha256},
                                                    {"the CT", ct.facts.content_sha256}}),
-                                  options.restarts},
+                                  options.resume.restarts},
                                  world);
     if (is_made && &setting == &settings.front())
       announce_rest(settings,
@@ -281,11 +258,76 @@ std::vector<std::string> problems(const FieldParametersOptions& options) {
     found.emplace_back("--camera = '': must name a camera");
   if (options.base.ct.empty() == options.base.study.empty())
     found.emplace_back("--ct or --study: exactly one must be given");
-  if (options.pose_count < 1)
-    found.push_back("--pose-count = " + std::to_string(options.pose_count) + ": must be >= 1");
-  for (const std::string& text : af::problems(RayCasterOptions{options.drr_step_mm}))
-    found.push_back(text);
+  for (const std::string& text : field_problems(options))
+    if (distinct.insert(text).second) found.push_back(text);
   return found;
+}
+
+namespace {
+
+/// The setting that all sweeps share: few of the options of af-precompute, some by other names.
+void describe_base(Fields& field, PrecomputeOptions& base) {
+  const char* const why = "the sweeps have the defaults of af-precompute";
+  field.part(base);
+  field.without_options(why);
+  for (const char* name : {"output", "restart", "dry_run"}) field.at(name).not_recorded(why);
+  field.at("ct").as("--ct");
+  field.at("series").as("--series");
+  field.at("rig").as("--rig");
+  field.at("study")
+      .as("--study", "study.toml that names CT, rig and pose instead")
+      .excludes({"--ct"});
+  field.at("case")
+      .as("--case", "Case of the study (default: its only one; without --camera all)")
+      .needs({});
+  field.at("camera").as("--camera",
+                        "Camera of the rig (default with --study: all views, their DRRs pooled as "
+                        "in the paper)");
+  field.at("max_rotation_deg").as("--max-rotation-deg", "Range of every field, degrees");
+  field.at("max_translation_mm").as("--max-translation-mm", "Range of every field, mm");
+  field.at("slabs").as("--slabs", "Depth slabs of every field");
+  field.at("uv_nodes").as("--base-uv-nodes", "(u,v) nodes while others vary");
+  field.at("st_nodes").as("--base-st-nodes", "(s,t) nodes while others vary");
+  field.at("codewords").as("--base-codewords", "Codewords while others vary");
+  field.at("training_fraction")
+      .as("--base-training-fraction", "Share of the tiles for training while others vary");
+}
+
+}  // namespace
+
+void FieldParametersOptions::describe(Fields& field) {
+  describe_base(field, base);
+  const auto sweep = [&](const std::string& what, auto& values, const std::string& help) {
+    std::string option = "--" + what;
+    std::replace(option.begin(), option.end(), '_', '-');
+    field("sweep_" + what, values, "Comma-separated: " + help).as(option).comma_separated();
+  };
+  sweep("uv_nodes", uv_nodes, "(u,v) nodes per side to try");
+  sweep("st_nodes", st_nodes, "(s,t) nodes per side to try");
+  sweep("codewords", codewords, "codebook sizes to try");
+  sweep("training_fraction", training_fractions, "training shares to try");
+  field("pose_count", pose_count, "Random poses, the same for every field")
+      .at_least(1)
+      .decides(kComparisonStage);
+  field.part(reference);
+  field.last()
+      .as("--step-mm", "Longest step of the reference DRRs, mm")
+      .decides(kComparisonStage)
+      .name = "drr_step_mm";
+  field("pose_seed", seed, "Of the random poses").as("--seed").decides(kComparisonStage);
+  field("fields", fields_folder, "Where fields are kept and looked for (default: OUTPUT/fields)")
+      .not_deciding("a field that is there is the one to make");
+  field.part(resume);
+  field("output", output_folder, "Folder for the results")
+      .as("-o,--output")
+      .required()
+      .not_deciding("results are the same");
+}
+
+FieldParametersOptions FieldParametersOptions::in_force() const {
+  FieldParametersOptions options = *this;
+  options.base = base.in_force();
+  return options;
 }
 
 CLI::App* bind_field_parameters(CLI::App& app, FieldParametersOptions& options) {
@@ -296,52 +338,8 @@ CLI::App* bind_field_parameters(CLI::App& app, FieldParametersOptions& options) 
   PrecomputeOptions& base = options.base;
   base.max_translation_mm = 30.0;
   base.training_fraction = 0.1;  // the paper's
-  auto* ct = command->add_option("--ct", base.ct, "CT: image file or DICOM folder");
-  command->add_option("--series", base.series_uid, "DICOM series UID, when there are several");
-  command->add_option("--rig", base.rig, "rig.toml, or c-arm-12in, treatment-room");
-  command->add_option("--study", base.study, "study.toml that names CT, rig and pose instead")
-      ->excludes(ct);
-  command->add_option(
-      "--case", base.case_name, "Case of the study (default: its only one; without --camera all)");
-  command->add_option("--camera",
-                      base.camera,
-                      "Camera of the rig (default with --study: all views, their DRRs pooled as in "
-                      "the paper)");
-  command->add_option("--max-rotation-deg", base.max_rotation_deg, "Range of every field, degrees")
-      ->capture_default_str();
-  command->add_option("--max-translation-mm", base.max_translation_mm, "Range of every field, mm")
-      ->capture_default_str();
-  command->add_option("--slabs", base.slabs, "Depth slabs of every field")->capture_default_str();
-  command->add_option("--base-uv-nodes", base.uv_nodes, "(u,v) nodes while others vary")
-      ->capture_default_str();
-  command->add_option("--base-st-nodes", base.st_nodes, "(s,t) nodes while others vary")
-      ->capture_default_str();
-  command->add_option("--base-codewords", base.codewords, "Codewords while others vary")
-      ->capture_default_str();
-  command
-      ->add_option("--base-training-fraction",
-                   *base.training_fraction,
-                   "Share of the tiles for training while others vary")
-      ->capture_default_str();
-  const auto add_sweep = [&](const char* name, auto& values, const char* what) {
-    command->add_option(name, values, std::string("Comma-separated: ") + what)
-        ->delimiter(',')
-        ->capture_default_str();
-  };
-  add_sweep("--uv-nodes", options.uv_nodes, "(u,v) nodes per side to try");
-  add_sweep("--st-nodes", options.st_nodes, "(s,t) nodes per side to try");
-  add_sweep("--codewords", options.codewords, "codebook sizes to try");
-  add_sweep("--training-fraction", options.training_fractions, "training shares to try");
-  command->add_option("--pose-count", options.pose_count, "Random poses, the same for every field")
-      ->capture_default_str();
-  command->add_option("--step-mm", options.drr_step_mm, "Longest step of the reference DRRs, mm")
-      ->capture_default_str();
-  command->add_option("--seed", options.seed, "Of the random poses")->capture_default_str();
-  command->add_option("--fields",
-                      options.fields_folder,
-                      "Where fields are kept and looked for (default: OUTPUT/fields)");
-  cli::bind_resume(*command, options.restarts);
-  command->add_option("-o,--output", options.output_folder, "Folder for the results")->required();
+  cli::bind_options(*command, options);
+  cli::bind_run_limits(*command);
   return command;
 }
 
@@ -373,7 +371,7 @@ void run_field_parameters(const FieldParametersOptions& options,
   for (const Target& target : targets)
     sweep_target(options, target, fields, command_line, world, results, provenance);
   const json difference_images =
-      write_difference_images(results, options.drr_step_mm, options.output_folder, world);
+      write_difference_images(results, options.reference.step_mm, options.output_folder, world);
   all_or_none(world, [&] {
     if (!world.is_root()) return;
     write_results(options, results, difference_images, provenance);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "cli/app_forward.h"
+#include "cli/run_limits.h"
 #include "parallel/communicator.h"
 #include "precompute/plan/precompute_options.h"
 
@@ -20,11 +21,15 @@ struct FieldParametersOptions {
   std::vector<int> codewords = {1024, 4096, 16384, 65536};
   std::vector<double> training_fractions = {0.01, 0.1, 0.3};
   int pose_count = 20;
-  double drr_step_mm = 1.0;  ///< of the reference DRRs
+  RayCasterOptions reference;  ///< of the reference DRRs
   std::uint64_t seed = 1;
   std::filesystem::path fields_folder;  ///< empty: OUTPUT/fields
-  bool restarts = false;
+  cli::ResumeOptions resume;
   std::filesystem::path output_folder;
+
+  void describe(Fields& field);
+  /// With the rule that places the (s,t) planes.
+  [[nodiscard]] FieldParametersOptions in_force() const;
 };
 
 std::vector<std::string> problems(const FieldParametersOptions& options);

@@ -2,8 +2,6 @@
 #include "precompute/plan/precompute_options.h"
 
 #include <algorithm>
-#include <array>
-#include <charconv>
 
 #include "base/plausible.h"
 #include "base/toml_text.h"
@@ -16,14 +14,153 @@ void append(const std::vector<std::string>& more, std::vector<std::string>& foun
   found.insert(found.end(), more.begin(), more.end());
 }
 
-void append_node_problems(const char* name, int nodes, std::vector<std::string>& found) {
-  constexpr int kMaxNodes = 4096;
-  if (nodes < 2 || nodes > kMaxNodes)
-    found.push_back(std::string(name) + " = " + std::to_string(nodes) +
-                    ": must be within 2 and 4096");
+void describe_source(Fields& field, PrecomputeOptions& options) {
+  field("ct", options.ct, "CT: image file or DICOM folder").input();
+  field("series", options.series_uid, "DICOM series UID, when the CT's folder has several").input();
+  field("rig", options.rig, "Cameras: a rig.toml, or a shipped rig: c-arm-12in, treatment-room")
+      .input();
+  field("camera",
+        options.camera,
+        "Which camera of the rig, in letters of any case (a field belongs to one)")
+      .input();
+  field("center_ct_mm",
+        options.center_ct_mm,
+        "x,y,z: point of the CT (DICOM LPS, mm) about which it turns and which the nominal pose "
+        "puts at the isocentre [CT centre]")
+      .comma_separated()
+      .input();
+  field("nominal_pose",
+        options.nominal_pose,
+        "File with room_from_ct about which the range is taken [identity rotation, centre at the "
+        "rig's isocentre]")
+      .input();
+  field("study", options.study, "study.toml that names CT, rig, pose and centre instead")
+      .excludes({"--ct", "--rig", "--center-ct-mm", "--nominal-pose"})
+      .input();
+  field("case", options.case_name, "Case of the study [the only one]").needs({"--study"}).input();
+}
+
+void describe_casting(Fields& field, PrecomputeOptions& options) {
+  field("max_rotation_deg",
+        options.max_rotation_deg,
+        "Range: largest angle about each room axis, degrees")
+      .decides(kCastingStage);
+  field("max_translation_mm",
+        options.max_translation_mm,
+        "Range: largest shift along each room axis, mm")
+      .decides(kCastingStage);
+  field("slabs",
+        options.slabs,
+        "Depth slabs K, each with its own (s,t) plane: with 8, some 8 --uv-nodes suffice; 1 is the "
+        "paper's field")
+      .within(1, 64)
+      .decides(kCastingStage);
+  field("st_plane",
+        options.st_plane,
+        "Where the (s,t) planes stand: centre (all through the field's centre) or centroid (each "
+        "where its slab's attenuation is) [centre for one slab, else centroid]")
+      .one_of({"centre", "centroid"})
+      .decides(kCastingStage);
+  field("uv_nodes",
+        options.uv_nodes,
+        "Viewpoints along each side of the (u,v) plane, both edges included")
+      .within(2, 4096)
+      .decides(kCastingStage);
+  field("st_nodes",
+        options.st_nodes,
+        "Nodes along each side of the uncropped (s,t) plane, both edges included")
+      .within(2, 4096)
+      .decides(kCastingStage);
+  field("caster",
+        options.caster,
+        "How line integrals are made: shear-warp (the CT resampled once, then slice by slice; some "
+        "100 times faster) or trilinear (the reference: samples along every ray)")
+      .one_of({"trilinear", "shear-warp"})
+      .decides(kCastingStage);
+  field.part(options.ray_caster);
+  Field& step = field.at("step_mm").decides(kCastingStage);
+  step.help = "Trilinear caster: largest distance of samples along a ray, mm";
+  field.part(options.attenuation);
+  field.at("water_mu_per_mm").decides(kCastingStage);
+}
+
+void describe_codebook(Fields& field, PrecomputeOptions& options) {
+  field("codewords", options.codewords, "Size of the codebook, 2 to 65536").decides(kCodebookStage);
+  field("max_iterations",
+        options.max_iterations,
+        "Most iterations of the training; it ends when one gains less than 0.5 %")
+      .decides(kCodebookStage);
+  field("training_fraction",
+        options.training_fraction,
+        "Share of the tiles that are not empty on which the codebook is trained; the paper's was "
+        "0.1 [64 tiles per codeword, at most a million, at most 8 of 9 tiles]")
+      .recorded_when_unset("training_tiles_per_codeword", std::to_string(kTrainingTilesPerCodeword))
+      .decides(kCodebookStage);
+  field("max_training_tiles", options.max_training_tiles, "Most training tiles, whatever the share")
+      .decides(kCodebookStage);
+  field("seed", options.seed, "Seed of every random choice").decides(kCodebookStage);
+}
+
+bool is_key_and_value(const std::string& hint) {
+  const std::size_t equals = hint.find('=');
+  return equals != std::string::npos && equals != 0 && equals + 1 != hint.size();
+}
+
+void describe_run(Fields& field, PrecomputeOptions& options) {
+  const char* const why = "every way of making it gives the same field";
+  field("output", options.output, "The field file to write, FIELD.h5")
+      .as("-o,--output")
+      .not_deciding(why);
+  field("memory_limit_bytes",
+        options.memory_limit_bytes,
+        "Memory that each rank may take beside the CT and its grid, which every node holds once, "
+        "e.g. 8GB. Tiles that do not fit are read back or cast again, see --overflow [300 MiB]")
+      .as("--memory-limit")
+      .size()
+      .default_in_help()
+      .not_deciding(why);
+  field("overflow",
+        options.overflow,
+        "What is done once the codebook is trained about tiles that did not fit: read-back (from "
+        "FIELD.h5.progress), cast-again, or auto (what is faster, measured)")
+      .one_of({"auto", "read-back", "cast-again"})
+      .not_deciding(why);
+  field("mpi_io_hints",
+        options.mpi_io_hints,
+        "KEY=VALUE, once per hint to MPI-IO: cb_nodes, cb_buffer_size, striping_factor, ...; "
+        "precompute/README.md has which and when [MPI's own choice]")
+      .as("--mpi-io-hint")
+      .one_at_a_time()
+      .of_form("KEY=VALUE", is_key_and_value)
+      .not_deciding(why);
+  field("dry_run",
+        options.is_dry_run,
+        "Print sizes, memory, compression, expected time and advice; write nothing")
+      .not_recorded("it writes nothing");
+  field("restart", options.is_restart, "Throw unfinished work in FIELD.h5.progress away")
+      .not_recorded(why);
+  field("checkpoint",
+        options.has_checkpoint,
+        "Do not keep unfinished work in FIELD.h5.progress; tiles that do not fit are cast again")
+      .as("--no-checkpoint")
+      .off_switch()
+      .not_deciding(why);
 }
 
 }  // namespace
+
+void PrecomputeOptions::describe(Fields& field) {
+  describe_source(field, *this);
+  describe_casting(field, *this);
+  describe_codebook(field, *this);
+  describe_run(field, *this);
+}
+
+PrecomputeOptions PrecomputeOptions::in_force() const {
+  PrecomputeOptions options = *this;
+  options.st_plane = st_plane_rule() == StPlane::Centre ? "centre" : "centroid";
+  return options;
+}
 
 CodebookOptions PrecomputeOptions::codebook_options() const {
   CodebookOptions options;
@@ -34,8 +171,8 @@ CodebookOptions PrecomputeOptions::codebook_options() const {
 }
 
 StPlane PrecomputeOptions::st_plane_rule() const {
-  if (st_plane.empty()) return slabs == 1 ? StPlane::Centre : StPlane::Centroid;
-  return st_plane == "centre" ? StPlane::Centre : StPlane::Centroid;
+  if (!st_plane.has_value()) return slabs == 1 ? StPlane::Centre : StPlane::Centroid;
+  return *st_plane == "centre" ? StPlane::Centre : StPlane::Centroid;
 }
 
 LightSlabSpec PrecomputeOptions::light_slab_spec(const DepthSlabs& depth_slabs) const {
@@ -49,23 +186,7 @@ LightSlabSpec PrecomputeOptions::light_slab_spec(const DepthSlabs& depth_slabs) 
 
 std::vector<std::string> problems(const PrecomputeOptions& options) {
   std::vector<std::string> found = problems(options.range());
-  constexpr int kMostSlabs = 64;
-  if (options.slabs < 1 || options.slabs > kMostSlabs)
-    found.push_back("slabs = " + std::to_string(options.slabs) + ": must be within 1 and 64");
-  append_node_problems("uv_nodes", options.uv_nodes, found);
-  append_node_problems("st_nodes", options.st_nodes, found);
-  if (options.caster != "trilinear" && !options.is_shear_warp())
-    found.push_back("caster = " + options.caster + ": must be trilinear or shear-warp");
-  if (!options.st_plane.empty() && options.st_plane != "centre" && options.st_plane != "centroid")
-    found.push_back("st_plane = " + options.st_plane + ": must be centre or centroid");
-  if (options.overflow != "auto" && options.overflow != "read-back" &&
-      options.overflow != "cast-again")
-    found.push_back("overflow = " + options.overflow + ": must be auto, read-back or cast-again");
-  for (const std::string& hint : options.mpi_io_hints)
-    if (const std::size_t equals = hint.find('='); equals == 0 || equals >= hint.size() - 1)
-      found.push_back("mpi_io_hint = " + hint + ": must be KEY=VALUE");
-  append(problems(RayCasterOptions{options.step_mm}), found);
-  append(problems(options.attenuation_model()), found);
+  append(field_problems(options), found);
   append(problems(options.codebook_options()), found);
   append(problems(options.training_selection()), found);
   if (!options.center_ct_mm.empty() && options.center_ct_mm.size() != 3)
@@ -83,69 +204,6 @@ TrainingSelection PrecomputeOptions::training_selection() const {
   return {kLargestTrainingFraction,
           std::min({max_training_tiles, per_codeword, kTrainingTilesUnlessStated}),
           seed};
-}
-
-NamedValues casting_options(const PrecomputeOptions& options) {
-  return {
-      {"max_rotation_deg", exact_text(options.max_rotation_deg)},
-      {"max_translation_mm", exact_text(options.max_translation_mm)},
-      {"slabs", std::to_string(options.slabs)},
-      {"st_plane", toml_text(options.st_plane_rule() == StPlane::Centre ? "centre" : "centroid")},
-      {"uv_nodes", std::to_string(options.uv_nodes)},
-      {"st_nodes", std::to_string(options.st_nodes)},
-      {"caster", toml_text(options.caster)},
-      {"step_mm", exact_text(options.step_mm)},
-      {"water_mu_per_mm", exact_text(options.water_mu_per_mm)}};
-}
-
-NamedValues codebook_options(const PrecomputeOptions& options) {
-  return {{"codewords", std::to_string(options.codewords)},
-          {"max_iterations", std::to_string(options.max_iterations)},
-          options.training_fraction
-              ? NamedValues::value_type{"training_fraction", exact_text(*options.training_fraction)}
-              : NamedValues::value_type{"training_tiles_per_codeword",
-                                        std::to_string(kTrainingTilesPerCodeword)},
-          {"max_training_tiles", std::to_string(options.max_training_tiles)},
-          {"seed", std::to_string(options.seed)}};
-}
-
-std::string to_toml(const PrecomputeOptions& options) {
-  std::string text;
-  const auto add_text = [&](const char* name, const std::string& value) {
-    if (!value.empty()) text += std::string(name) + " = " + toml_text(value) + "\n";
-  };
-  add_text("ct", options.ct);
-  add_text("series", options.series_uid);
-  add_text("rig", options.rig);
-  add_text("camera", options.camera);
-  add_text("nominal_pose", options.nominal_pose);
-  add_text("study", options.study);
-  add_text("case", options.case_name);
-  if (options.center_ct_mm.size() == 3)
-    text += "center_ct_mm = [" + exact_text(options.center_ct_mm[0]) + ", " +
-            exact_text(options.center_ct_mm[1]) + ", " + exact_text(options.center_ct_mm[2]) +
-            "]\n";
-  for (const NamedValues& values : {casting_options(options), codebook_options(options)})
-    for (const auto& [name, value] : values) text.append(name).append(" = ").append(value) += '\n';
-  add_text("output", options.output);
-  text += "memory_limit_bytes = " + std::to_string(options.memory_limit_bytes) + "\n";
-  add_text("overflow", options.overflow);
-  if (!options.mpi_io_hints.empty()) {
-    text += "mpi_io_hints = [";
-    for (const std::string& hint : options.mpi_io_hints) text += toml_text(hint) + ", ";
-    text += "]\n";
-  }
-  text += std::string("checkpoint = ") + (options.has_checkpoint ? "true" : "false") + "\n";
-  return text;
-}
-
-std::string exact_text(double value) {
-  std::array<char, 32> text{};
-  const auto end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
-  std::string digits(text.data(), end);
-  // TOML tells floats from integers by the point or exponent.
-  if (digits.find_first_of(".en") == std::string::npos) digits += ".0";
-  return digits;
 }
 
 }  // namespace af

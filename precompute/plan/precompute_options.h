@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
+#include "base/described_fields.h"
 #include "geometry/slab_sizing.h"
 #include "precompute/casting/depth_slabs.h"
 #include "precompute/codebook/codebook_training.h"
@@ -38,13 +38,13 @@ struct PrecomputeOptions {
   double max_rotation_deg = 10.0;
   double max_translation_mm = 100.0;
   int slabs = 1;
-  std::string
-      st_plane;  ///< "centre", "centroid"; empty: the centre for one slab, else the centroid
+  /// "centre", "centroid"; none: the centre for one slab, else the centroid
+  std::optional<std::string> st_plane;
   int uv_nodes = 64;
   int st_nodes = 256;
   std::string caster = "shear-warp";
-  double step_mm = RayCasterOptions{}.step_mm;  ///< of the trilinear caster
-  double water_mu_per_mm = AttenuationModel{}.mu_water_per_mm;
+  RayCasterOptions ray_caster;  ///< of the trilinear caster
+  AttenuationModel attenuation;
 
   int codewords = CodebookOptions{}.codewords;
   int max_iterations = CodebookOptions{}.max_iterations;
@@ -63,18 +63,23 @@ struct PrecomputeOptions {
   [[nodiscard]] MotionRange range() const {
     return {max_rotation_deg * kRadPerDeg, max_translation_mm};
   }
-  [[nodiscard]] AttenuationModel attenuation_model() const {
-    return {water_mu_per_mm, AttenuationModel{}.air_below_hu};
-  }
   [[nodiscard]] TrainingSelection training_selection() const;
   [[nodiscard]] CodebookOptions codebook_options() const;
   [[nodiscard]] StPlane st_plane_rule() const;
   [[nodiscard]] bool is_shear_warp() const { return caster == "shear-warp"; }
   [[nodiscard]] LightSlabSpec light_slab_spec(const DepthSlabs& depth_slabs) const;
+
+  void describe(Fields& field);
+  /// With the rule that places the (s,t) planes.
+  [[nodiscard]] PrecomputeOptions in_force() const;
 };
 
-/// The number of training tiles where no share is stated: enough that unseen tiles come out nearly
-/// as training tiles do (precompute/README.md has the effect of more and fewer).
+/// Stages that options decide.
+inline constexpr const char* kCastingStage = "casting";  ///< the samples, with CT, camera and pose
+inline constexpr const char* kCodebookStage = "codebook";  ///< what is made of them
+
+/// Training tiles where no share is stated: enough that unseen tiles come out nearly as training
+/// tiles do (precompute/README.md has what more and fewer give).
 inline constexpr std::uint64_t kTrainingTilesPerCodeword = 64;
 /// A limit for every codebook, so that 65536 codewords do not take more than twice the time of
 /// 16384.
@@ -82,19 +87,5 @@ inline constexpr std::uint64_t kTrainingTilesUnlessStated = std::uint64_t{1} << 
 
 /// Every broken constraint of the values themselves (not of files).
 std::vector<std::string> problems(const PrecomputeOptions& options);
-
-using NamedValues = std::vector<std::pair<std::string, std::string>>;
-
-/// Name and value of every option that decides the cast samples, apart from CT, camera and pose.
-NamedValues casting_options(const PrecomputeOptions& options);
-
-/// Name and value of every option that decides what the codebook makes of the samples.
-NamedValues codebook_options(const PrecomputeOptions& options);
-
-/// All options that are used, as TOML; stored in the field.
-std::string to_toml(const PrecomputeOptions& options);
-
-/// Shortest text that reads back as the same double.
-std::string exact_text(double value);
 
 }  // namespace af

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "register/method/method_options.h"
 
-#include <sstream>
-
 #include "base/error.h"
 #include "base/thread_pool.h"
 #include "register/method/chain_text.h"
@@ -10,9 +8,6 @@
 
 namespace af::registration {
 namespace {
-
-/// Larger discs would hide the anatomy that is to be registered.
-constexpr double kMostFiducialMaskMm = 50.0;
 
 void replace_in_chain(const MethodOptions& options, ChainOptions& chain) {
   for (StageOptions& stage : chain.stages) {
@@ -43,6 +38,9 @@ void replace_chains(const MethodOptions& options, RegistrationOptions& result) {
     result.chains.push_back(
         chain_from_text("chain-" + std::to_string(result.chains.size() + 1), text));
   if (options.finish.has_value()) result.finish = chain_from_text("finish", *options.finish);
+  if (options.judge_least_value.has_value()) result.judge.least_value = *options.judge_least_value;
+  if (options.judge_enough_value.has_value())
+    result.judge.enough_value = *options.judge_enough_value;
   if (!options.judge.has_value()) return;
   const ChainOptions judge = chain_from_text("judge", *options.judge);
   if (judge.stages.size() != 1)
@@ -50,7 +48,70 @@ void replace_chains(const MethodOptions& options, RegistrationOptions& result) {
   result.judge.stage = judge.stages.front();
 }
 
+void describe_chains(Fields& field, MethodOptions& options) {
+  const char* const why = "the chains in force hold it";
+  field("preset",
+        options.preset,
+        "Method as a whole; the options below replace parts of it. " + preset_help() +
+            ". Default: robust; paper with --similarity or --optimizer")
+      .choice(preset_names());
+  field("similarity", options.similarity, "Similarity measure of every stage")
+      .choice(similarity_names())
+      .not_recorded(why);
+  field("optimizer", options.optimizer, "Optimiser of every stage")
+      .choice(optimizer_names())
+      .not_recorded(why);
+  field("chain",
+        options.chains,
+        "Stages in place of the preset's, separated by ';': measure, optimiser, then any of "
+        "level=, pixels=, roi=, sigma=, step=, final=, bins=, scale=, tiles=, population=. Given "
+        "several times, the chains are a portfolio: a judge chooses among their ends");
+  field("finish",
+        options.finish,
+        "Stages, written as for --chain, that follow the chain, or a portfolio's best one "
+        "(default: the preset's; none with --chain)");
+  field("judge",
+        options.judge,
+        "Of a portfolio: what ends are compared by, one stage written as for --chain; its measure "
+        "is rg, its optimiser does not count (default: the preset's)");
+  field("judge_least_value", options.judge_least_value, "Ends below it are failures")
+      .no_option("the preset's");
+  field("judge_enough_value", options.judge_enough_value, "An end above it is taken")
+      .no_option("the preset's");
+  field("bins", options.bins, "Histogram bins per axis, 2 to 256 (default: 64)").not_recorded(why);
+  field("smoothing_sigma_mm",
+        options.smoothing_sigma_mm,
+        "First stage: Gaussian on the X-rays, mm on the isocentre plane (paper: 1)")
+      .not_recorded(why);
+  field("coarse_roi_scale",
+        options.coarse_roi_scale,
+        "Coarse stages look at this many times the region's sides (fast, robust: 2), cut at the "
+        "detector's edges. A field holds every ray of its camera's whole detector, so none is made "
+        "for it")
+      .not_recorded(why);
+}
+
 }  // namespace
+
+void MethodOptions::describe(Fields& field) {
+  field.start_group("Method");
+  describe_chains(field, *this);
+  field("max_evaluations", max_evaluations, "Most poses tried per registration (default: 5000)");
+  field("fiducial_mask_mm",
+        fiducial_mask_mm,
+        "Radius of the discs about the study's fiducials that registration does not see, mm on the "
+        "isocentre plane: the markers of the gold standard must neither help nor hinder what it "
+        "judges. 0: it sees them")
+      // Larger discs would hide what is to be registered.
+      .within(0.0, 50.0);
+  field("threads",
+        threads,
+        "Threads that one registration spreads over, on every rank; 0: as many as there are "
+        "processors for the rank. Many starts are better shared by ranks")
+      .not_deciding("results do not depend on it");
+  field.start_group("");
+  field("seed", seed, "Of the random numbers that cma-es draws").no_option("programs add it");
+}
 
 std::string MethodOptions::preset_name() const {
   if (preset.has_value()) return *preset;
@@ -65,29 +126,27 @@ RegistrationOptions resolve(const MethodOptions& options) {
   result.seed = options.seed;
   std::vector<std::string> found = problems(result);
   for (const std::string& text : thread_problems(options.threads)) found.push_back(text);
-  if (!(options.fiducial_mask_mm >= 0.0 && options.fiducial_mask_mm <= kMostFiducialMaskMm)) {
-    found.push_back("--fiducial-mask-mm = " + shortest_text(options.fiducial_mask_mm) +
-                    ": must be within 0 and " + shortest_text(kMostFiducialMaskMm));
-  }
+  for (const std::string& text : field_problems(options)) found.push_back(text);
   throw_if_any(found);
   return result;
 }
 
-std::string to_toml(const MethodOptions& options, const RegistrationOptions& resolved) {
-  std::ostringstream out;
-  out << "preset = \"" << options.preset_name()
-      << "\"\nmax_evaluations = " << resolved.max_evaluations << "\nseed = " << resolved.seed
-      << "\nthreads = " << options.threads
-      << "\nfiducial_mask_mm = " << shortest_text(options.fiducial_mask_mm) << "\nchain = [";
-  for (const ChainOptions& chain : resolved.chains) out << "\n  \"" << chain_text(chain) << "\",";
-  out << "\n]\n";
-  if (!resolved.finish.stages.empty())
-    out << "finish = \"" << chain_text(resolved.finish) << "\"\n";
-  if (resolved.chains.size() > 1)
-    out << "judge = \"" << stage_text(resolved.judge.stage)
-        << "\"\njudge_least_value = " << shortest_text(resolved.judge.least_value)
-        << "\njudge_enough_value = " << shortest_text(resolved.judge.enough_value) << '\n';
-  return out.str();
+MethodOptions MethodOptions::in_force() const {
+  const RegistrationOptions resolved = resolve(*this);
+  MethodOptions options;
+  options.preset = preset_name();
+  options.max_evaluations = resolved.max_evaluations;
+  options.seed = seed;
+  options.threads = threads;
+  options.fiducial_mask_mm = fiducial_mask_mm;
+  for (const ChainOptions& chain : resolved.chains) options.chains.push_back(chain_text(chain));
+  if (!resolved.finish.stages.empty()) options.finish = chain_text(resolved.finish);
+  if (resolved.chains.size() > 1) {
+    options.judge = stage_text(resolved.judge.stage);
+    options.judge_least_value = resolved.judge.least_value;
+    options.judge_enough_value = resolved.judge.enough_value;
+  }
+  return options;
 }
 
 }  // namespace af::registration

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "base/described_fields.h"
 #include "register/method/registration_options.h"
 
 namespace af::registration {
@@ -25,18 +26,23 @@ struct MethodOptions {
   /// Radius, mm on the isocentre plane, of the discs about fiducials that registration does not
   /// see.
   double fiducial_mask_mm = 4.0;
+  // Of a portfolio's judge: ends below the one are failures, an end above the other is taken.
+  std::optional<double> judge_least_value;
+  std::optional<double> judge_enough_value;
   std::uint64_t seed = 1;
   int threads = 1;  ///< that one registration spreads over; 0: every processor of this process
 
   /// The preset that was typed. Without one: robust, or paper when a measure or an optimiser was
   /// typed, because one measure or optimiser for every stage suits the paper's method only.
   [[nodiscard]] std::string preset_name() const;
+
+  void describe(Fields& field);
+  /// With preset and budget, and every chain, finish and judge as text: they hold what else
+  /// replaces parts of the preset. Throws as resolve().
+  [[nodiscard]] MethodOptions in_force() const;
 };
 
 /// The preset with the replacements; InputError for unknown names and values out of range.
 RegistrationOptions resolve(const MethodOptions& options);
-
-/// Lines of the options in force: preset, budget, seed, and every chain, finish and judge as text.
-std::string to_toml(const MethodOptions& options, const RegistrationOptions& resolved);
 
 }  // namespace af::registration

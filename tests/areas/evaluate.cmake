@@ -42,3 +42,10 @@ af_add_program_tests(
   PROCESSORS 2)
 
 af_add_mpi_test(shared_measuring_test SOURCES mpi/shared_measuring_test.cpp LIBS af_evaluation_program RANKS 1 2 3 4)
+
+# Of all programs: whoever builds these tests has every library of options.
+af_add_test(
+  described_options_test
+  SOURCES unit/described_options_test.cpp
+  LIBS af_evaluation_program af_registration_program af_precompute_program af_drr_request af_simulated_study
+       PkgConfig::tomlplusplus)

@@ -13,7 +13,7 @@ af_add_test(
           unit/register/problem/multi_view_objective_test.cpp
           unit/register/method/registration_test.cpp
           unit/register/verdict/verdict_test.cpp
-  LIBS af_registration)
+  LIBS af_registration af_text)
 af_add_test(
   register_program_unit_tests
   SOURCES unit/register/register_options_test.cpp unit/register/results/registration_results_test.cpp

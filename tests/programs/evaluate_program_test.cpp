@@ -721,7 +721,7 @@ TEST_F(EvaluateProgram, RefusesBadInputWithTheContractsCodes) {
   expect_refused(evaluate(field + "--ct " + path("ct.nii.gz") + " --pose-count 0 --step-mm -1 -o " +
                           path("x")),
                  3,
-                 "--pose-count = 0");
+                 "pose_count = 0");
   expect_refused(
       evaluate(field + "--ct " + path("missing.nii.gz") + " -o " + path("x")), 4, "missing.nii.gz");
   write_text_file(path("damaged.h5"), text("AP.af.h5").substr(0, 3000));

@@ -8,20 +8,21 @@
 
 #include "base/error.h"
 #include "support/test_paths.h"
+#include "text/options_toml.h"
 
 namespace af::registration {
 namespace {
 
 TEST(RegisterOptions, ListsEveryBrokenConstraint) {
   RegisterOptions options;
-  options.fields = {"A", "=a.h5", "B=b.h5", "B=c.h5"};
+  options.fields.texts = {"A", "=a.h5", "B=b.h5", "B=c.h5"};
   options.start_rotation_deg = {{0.0, 0.0, std::numeric_limits<double>::infinity()}};
   options.start_pose = "pose.toml";
   options.starts = "starts.csv";
   options.renderer = "raycast";
   options.skip_ct_check = true;
-  options.water_mu_per_mm = -1.0;
-  options.step_mm = 0.0;
+  options.attenuation.mu_water_per_mm = -1.0;
+  options.ray_caster.step_mm = 0.0;
   std::string all;
   for (const std::string& text : problems(options)) all += text + "\n";
   for (const char* part : {"--field = 'A': must be CAMERA=PATH",
@@ -38,8 +39,34 @@ TEST(RegisterOptions, ListsEveryBrokenConstraint) {
 
 TEST(RegisterOptions, FieldsAreSplitAtTheFirstEqualsSign) {
   RegisterOptions options;
-  options.fields = {"A=x=y.h5"};
+  options.fields.texts = {"A=x=y.h5"};
   EXPECT_EQ(case_load_options(options).field_paths.at("A"), "x=y.h5");
+}
+
+TEST(RegisterOptions, InForceAreTomlWithTheSeries) {
+  RegisterOptions options;
+  options.study = "a\tb\n\x7f\"\\.toml";
+  options.fields.texts = {"A=line\nbreak.h5"};
+  EXPECT_EQ(to_toml(options).find("series"), std::string::npos);
+  options.ct.series_uid = "1.2.3";
+  const std::string text = to_toml(options);
+  for (const char* line : {"series = \"1.2.3\"\n",
+                           R"(study = "a\u0009b\u000A\u007F\"\\.toml")",
+                           "field = [\"A=line\\u000Abreak.h5\"]\n"})
+    EXPECT_NE(text.find(line), std::string::npos) << line << " in " << text;
+}
+
+TEST(RegisterOptions, InputsDecideByTheirContentAlone) {
+  RegisterOptions options;
+  const OptionTexts before = deciding_options(options);
+  options.study = "other.toml";
+  options.fields.texts = {"A=a.h5"};
+  options.starts = "starts.csv";
+  options.ct.series_uid = "1.2.3";
+  options.method.threads = 3;
+  EXPECT_EQ(deciding_options(options), before);
+  options.ray_caster.step_mm = 0.7;
+  EXPECT_NE(deciding_options(options), before);
 }
 
 PoseFrame some_frame() {

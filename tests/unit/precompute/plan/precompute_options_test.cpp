@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "text/options_toml.h"
+
 namespace af {
 namespace {
 
@@ -30,6 +32,26 @@ TEST(PrecomputeOptions, FieldsRecordWhichRuleChoseTheTrainingTiles) {
   options.training_fraction = 0.25;
   EXPECT_NE(to_toml(options).find("training_fraction = 0.25"), std::string::npos);
   EXPECT_EQ(to_toml(options).find("per_codeword"), std::string::npos);
+}
+
+TEST(PrecomputeOptions, DecideTheSamplesOrWhatTheCodebookMakesOfThem) {
+  const PrecomputeOptions options;
+  EXPECT_EQ(deciding_options(options, kCastingStage),
+            (OptionTexts{{"max_rotation_deg", "10.0"},
+                         {"max_translation_mm", "100.0"},
+                         {"slabs", "1"},
+                         {"st_plane", "\"centre\""},
+                         {"uv_nodes", "64"},
+                         {"st_nodes", "256"},
+                         {"caster", "\"shear-warp\""},
+                         {"step_mm", "1.0"},
+                         {"water_mu_per_mm", "0.02"}}));
+  EXPECT_EQ(deciding_options(options, kCodebookStage),
+            (OptionTexts{{"codewords", "16384"},
+                         {"max_iterations", "12"},
+                         {"training_tiles_per_codeword", "64"},
+                         {"max_training_tiles", "2000000"},
+                         {"seed", "1"}}));
 }
 
 }  // namespace

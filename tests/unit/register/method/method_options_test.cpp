@@ -8,6 +8,7 @@
 #include "base/error.h"
 #include "register/method/chain_text.h"
 #include "register/method/presets.h"
+#include "text/options_toml.h"
 
 namespace af::registration {
 namespace {
@@ -57,12 +58,33 @@ TEST(MethodOptions, ChainsLeaveThePresetsFinishBehindUnlessOneIsTyped) {
   ASSERT_EQ(method.finish.stages.size(), 2U);
   EXPECT_EQ(method.similarity_list(), "ncc, gc, ssd, rg");
   EXPECT_EQ(method.judge.stage.pixel_step, 3);
-  const std::string text = to_toml(options, method);
+  const std::string text = to_toml(options);
   EXPECT_NE(text.find("finish = \"" + *options.finish + "\""), std::string::npos) << text;
   options.judge = "mi best-neighbor";
   EXPECT_THROW(resolve(options), InputError);
   options.judge = "rg gauss-newton; rg gauss-newton";
   EXPECT_THROW(resolve(options), InputError);
+}
+
+TEST(MethodOptions, InForceAreTheSameMethodAgain) {
+  for (const std::string& preset : preset_names()) {
+    MethodOptions options;
+    options.preset = preset;
+    options.bins = 32;
+    options.max_evaluations = 77;
+    const std::string text = to_toml(options);
+    EXPECT_EQ(to_toml(options.in_force()), text);
+    EXPECT_EQ(text.find("\nbins"), std::string::npos) << text;
+  }
+}
+
+TEST(MethodOptions, ThatDifferInAnyDigitHaveOtherTexts) {
+  MethodOptions options;
+  options.fiducial_mask_mm = 4.0000001;
+  const std::string one = to_toml(options);
+  options.fiducial_mask_mm = 4.0000002;
+  EXPECT_NE(to_toml(options), one);
+  EXPECT_NE(one.find("fiducial_mask_mm = 4.0000001\n"), std::string::npos) << one;
 }
 
 TEST(MethodOptions, RefuseAnUnknownPreset) {
