@@ -102,7 +102,7 @@ void expect_recorded(const Fields& fields, bool expects_all) {
     if (!field.is_recorded) continue;
     if (node == nullptr) {
       EXPECT_FALSE(expects_all) << field.name << " is not in\n" << text;
-      recorded += table.contains(field.name_when_unset) ? 1 : 0;
+      recorded += table.contains(field.name_when_unset) ? 1U : 0U;
       continue;
     }
     ++recorded;
@@ -135,8 +135,12 @@ TYPED_TEST(DescribedOptions, NameEveryMemberOnce) {
   std::set<std::string> recorded;
   std::set<std::string> typed;
   for (const Field& field : fields_of(options)) {
-    if (field.is_recorded) EXPECT_TRUE(recorded.insert(field.name).second) << field.name;
-    if (!field.option.empty()) EXPECT_TRUE(typed.insert(field.option).second) << field.option;
+    if (field.is_recorded) {
+      EXPECT_TRUE(recorded.insert(field.name).second) << field.name;
+    }
+    if (!field.option.empty()) {
+      EXPECT_TRUE(typed.insert(field.option).second) << field.option;
+    }
     EXPECT_FALSE(field.help.empty()) << field.name;
   }
 }
