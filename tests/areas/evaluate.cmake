@@ -35,7 +35,7 @@ af_add_program_tests(
 af_add_program_tests(
   evaluate_program_tests
   SOURCES programs/evaluate_program_test.cpp support/launched_job.cpp
-  LIBS af_registration_case
+  LIBS af_registration_case af_run
   PROGRAMS af-evaluate af-precompute
   LABELS programs mpi
   TIMEOUT 1800
