@@ -11,6 +11,7 @@
 
 #include "base/error.h"
 #include "files/output_file.h"
+#include "register/results/registration_columns.h"
 #include "text/cbor_json.h"
 
 namespace af::evaluation {
@@ -83,6 +84,35 @@ std::vector<std::string> start_fields(const std::string& case_name,
   return fields;
 }
 
+registration::NamedCells cells_of(const RegistrationRow& row) {
+  const registration::RegistrationCells cells = {.case_name = row.case_name,
+                                                 .start_index = row.start_index,
+                                                 .renderer = row.renderer,
+                                                 .start_deg_mm = row.start_deg_mm,
+                                                 .final_deg_mm = row.final_deg_mm,
+                                                 .initial_tre_mm = row.initial_tre_mm,
+                                                 .tre_mm = row.tre_mm,
+                                                 .similarity = row.similarity,
+                                                 .evaluations = row.evaluations,
+                                                 .stop_reason = row.stop_reason,
+                                                 .inadmissible = row.inadmissible,
+                                                 .drr_count = row.drr_count,
+                                                 .seconds = row.seconds};
+  const RegistrationErrors& errors = row.errors;
+  return registration::registration_row(
+      cells,
+      {{"success", row.is_success() ? "1" : "0"},
+       {"interval", std::to_string(row.interval)},
+       {"draw_index", std::to_string(row.draw_index)},
+       {"stated_pose_tre_mm", number_text(row.stated_pose_tre_mm)}},
+      {{"mrpd_mm", number_text(errors.mrpd_mm)},
+       {"projection_detector_mm", number_text(errors.projection_detector_mm)},
+       {"projection_isocenter_mm", number_text(errors.projection_isocenter_mm)},
+       {"rotation_error_deg", number_text(errors.rotation_deg)},
+       {"translation_error_mm", number_text(errors.translation_mm)},
+       {"error", row.error}});
+}
+
 }  // namespace
 
 json packed_row(const TracedRow& traced) {
@@ -138,50 +168,8 @@ TracedRow row_of_record(std::span<const std::byte> record, const std::string& fi
 }
 
 CsvTable registrations_table(std::span<const RegistrationRow> rows) {
-  std::vector<std::string> columns = {"case", "start_index", "renderer"};
-  for (const char* when : {"start_", "final_"})
-    for (const char* name : kParameterNames) columns.push_back(std::string(when) + name);
-  for (const char* name : {"initial_tre_mm",
-                           "tre_mm",
-                           "similarity",
-                           "evaluations",
-                           "stop_reason",
-                           "success",
-                           "interval",
-                           "draw_index",
-                           "stated_pose_tre_mm",
-                           "inadmissible",
-                           "drr_count",
-                           "mrpd_mm",
-                           "projection_detector_mm",
-                           "projection_isocenter_mm",
-                           "rotation_error_deg",
-                           "translation_error_mm",
-                           "error",
-                           "seconds"})
-    columns.emplace_back(name);
-  CsvTable table(columns);
-  for (const RegistrationRow& row : rows) {
-    std::vector<std::string> fields = {
-        row.case_name, std::to_string(row.start_index), row.renderer};
-    append_numbers(fields, row.start_deg_mm);
-    append_numbers(fields, row.final_deg_mm);
-    fields.push_back(number_text(row.initial_tre_mm));
-    fields.push_back(number_text(row.tre_mm));
-    fields.push_back(number_text(row.similarity));
-    fields.push_back(std::to_string(row.evaluations));
-    fields.push_back(row.stop_reason);
-    fields.emplace_back(row.is_success() ? "1" : "0");
-    fields.push_back(std::to_string(row.interval));
-    fields.push_back(std::to_string(row.draw_index));
-    fields.push_back(number_text(row.stated_pose_tre_mm));
-    fields.push_back(std::to_string(row.inadmissible));
-    fields.push_back(std::to_string(row.drr_count));
-    for (const double value : row.errors.values()) fields.push_back(number_text(value));
-    fields.push_back(row.error);
-    fields.push_back(number_text(row.seconds));
-    table.add_row(std::move(fields));
-  }
+  CsvTable table(registration::names_of(cells_of(RegistrationRow())));
+  for (const RegistrationRow& row : rows) table.add_row(registration::texts_of(cells_of(row)));
   return table;
 }
 

@@ -9,6 +9,7 @@
 #include "base/error.h"
 #include "figures/picture.h"
 #include "files/output_file.h"
+#include "register/results/registration_columns.h"
 #include "study/pose_file.h"
 
 namespace af::registration {
@@ -76,10 +77,6 @@ std::string short_text(double value) {
   out.precision(3);
   out << value;
   return out.str();
-}
-
-void append_fixed(std::vector<std::string>& fields, const std::array<double, 6>& values) {
-  for (const double value : values) fields.push_back(number_text(value));
 }
 
 std::string parameters_line(const PoseParameters& parameters) {
@@ -202,57 +199,52 @@ json result_json(const RegistrationRecord& record,
   return output;
 }
 
+namespace {
+
+NamedCells cells_of(const RegistrationRecord& record,
+                    const PoseFrame& frame,
+                    const RunDescription& run) {
+  const RegistrationResult& result = record.result;
+  RegistrationCells row;
+  row.case_name = run.case_name;
+  row.start_index = record.start_index;
+  row.renderer = run.renderer;
+  row.start_deg_mm = parameters_from_pose(frame, result.start_room_from_ct).deg_and_mm();
+  row.final_deg_mm = parameters_from_pose(frame, result.room_from_ct).deg_and_mm();
+  if (record.errors.has_value()) {
+    row.initial_tre_mm = record.errors->initial_tre_mm;
+    row.tre_mm = record.errors->tre_mm;
+  }
+  row.similarity = result.similarity;
+  row.evaluations = result.evaluations;
+  row.stop_reason = to_string(result.stop_reason);
+  row.inadmissible = result.inadmissible;
+  row.drr_count = result.drr_count;
+  row.seconds = result.seconds;
+  const ViewSummary coarse = summary_of(record.view_values, &ViewValue::coarse);
+  const ViewSummary fine = summary_of(record.view_values, &ViewValue::fine);
+  return registration_row(row,
+                          {},
+                          {{"relative_to", "nominal"},
+                           {"verdict", to_string(judgement_of(record).verdict)},
+                           {"judge_mean", number_text(coarse.mean)},
+                           {"judge_lowest_view", number_text(coarse.lowest)},
+                           {"judge_fine_mean", number_text(fine.mean)},
+                           {"judge_fine_lowest_view", number_text(fine.lowest)}});
+}
+
+}  // namespace
+
 CsvTable registrations_table(std::vector<RegistrationRecord> records,
                              const RegistrationProblem& problem,
                              const RunDescription& run) {
   std::sort(records.begin(), records.end(), [](const auto& a, const auto& b) {
     return a.start_index < b.start_index;
   });
-  std::vector<std::string> columns = {"case", "start_index", "renderer"};
-  for (const char* when : {"start", "final"})
-    for (const char* parameter : kParameterNames)
-      columns.push_back(std::string(when) + "_" + parameter);
-  for (const char* column : {"initial_tre_mm",
-                             "tre_mm",
-                             "similarity",
-                             "evaluations",
-                             "stop_reason",
-                             "inadmissible",
-                             "drr_count",
-                             "relative_to",
-                             "verdict",
-                             "judge_mean",
-                             "judge_lowest_view",
-                             "judge_fine_mean",
-                             "judge_fine_lowest_view",
-                             "seconds"})
-    columns.emplace_back(column);
-  CsvTable table(columns);
   const PoseFrame frame = problem.frame();
-  for (const RegistrationRecord& record : records) {
-    const RegistrationResult& result = record.result;
-    std::vector<std::string> fields = {
-        run.case_name, std::to_string(record.start_index), run.renderer};
-    append_fixed(fields, parameters_from_pose(frame, result.start_room_from_ct).deg_and_mm());
-    append_fixed(fields, parameters_from_pose(frame, result.room_from_ct).deg_and_mm());
-    const double missing = std::nan("");
-    fields.push_back(number_text(record.errors ? record.errors->initial_tre_mm : missing));
-    fields.push_back(number_text(record.errors ? record.errors->tre_mm : missing));
-    fields.push_back(number_text(result.similarity));
-    fields.push_back(std::to_string(result.evaluations));
-    fields.emplace_back(to_string(result.stop_reason));
-    fields.push_back(std::to_string(result.inadmissible));
-    fields.push_back(std::to_string(result.drr_count));
-    fields.emplace_back("nominal");
-    fields.emplace_back(to_string(judgement_of(record).verdict));
-    for (double ViewValue::*const value : {&ViewValue::coarse, &ViewValue::fine}) {
-      const ViewSummary summary = summary_of(record.view_values, value);
-      fields.push_back(number_text(summary.mean));
-      fields.push_back(number_text(summary.lowest));
-    }
-    fields.push_back(number_text(result.seconds));
-    table.add_row(std::move(fields));
-  }
+  CsvTable table(names_of(cells_of(records.front(), frame, run)));
+  for (const RegistrationRecord& record : records)
+    table.add_row(texts_of(cells_of(record, frame, run)));
   return table;
 }
 

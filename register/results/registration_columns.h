@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// The columns of registrations.csv, which af-register and af-evaluate write.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace af::registration {
+
+/// What every registrations.csv says of a registration. NaN: not known.
+struct RegistrationCells {
+  std::string case_name;
+  std::int64_t start_index = 0;
+  std::string renderer;
+  std::array<double, 6> start_deg_mm{};
+  std::array<double, 6> final_deg_mm{};
+  double initial_tre_mm = std::numeric_limits<double>::quiet_NaN();
+  double tre_mm = std::numeric_limits<double>::quiet_NaN();
+  double similarity = std::numeric_limits<double>::quiet_NaN();
+  std::int64_t evaluations = 0;
+  std::string stop_reason;
+  std::int64_t inadmissible = 0;
+  std::int64_t drr_count = 0;
+  double seconds = 0.0;
+};
+
+/// Name of a column, which must last, and the text in it.
+using NamedCells = std::vector<std::pair<std::string_view, std::string>>;
+
+/// A row in the order of the columns: the contract's, and what a program adds to them behind the
+/// stop reason and before the time.
+NamedCells registration_row(const RegistrationCells& row,
+                            const NamedCells& behind_stop_reason,
+                            const NamedCells& before_seconds);
+
+/// The names or the texts alone.
+std::vector<std::string> names_of(const NamedCells& cells);
+std::vector<std::string> texts_of(NamedCells cells);
+
+}  // namespace af::registration
