@@ -20,13 +20,6 @@ std::string words_of_list(const std::vector<std::string>& names) {
   return text;
 }
 
-Constraint number_constraint(std::string words, std::function<bool(double)> accepts) {
-  Constraint constraint;
-  constraint.words = std::move(words);
-  constraint.accepts_number = std::move(accepts);
-  return constraint;
-}
-
 /// Hands one value, or those of a list or an optional one, on.
 struct ElementVisitor {
   const std::function<void(double)>& number;
@@ -62,32 +55,30 @@ struct ElementVisitor {
 }  // namespace
 
 Field& Field::at_least(double low) {
-  constraints.push_back(
-      number_constraint("at least " + number_text(low), [low](double v) { return v >= low; }));
-  return *this;
+  return such_that("at least " + number_text(low), [low](double v) { return v >= low; });
 }
 
 Field& Field::above(double low) {
-  constraints.push_back(
-      number_constraint("above " + number_text(low), [low](double v) { return v > low; }));
-  return *this;
+  return such_that("above " + number_text(low), [low](double v) { return v > low; });
 }
 
 Field& Field::at_most(double high) {
-  constraints.push_back(
-      number_constraint("at most " + number_text(high), [high](double v) { return v <= high; }));
-  return *this;
+  return such_that("at most " + number_text(high), [high](double v) { return v <= high; });
 }
 
 Field& Field::within(double low, double high) {
-  constraints.push_back(
-      number_constraint("within " + number_text(low) + " and " + number_text(high),
-                        [low, high](double v) { return v >= low && v <= high; }));
-  return *this;
+  return such_that("within " + number_text(low) + " and " + number_text(high),
+                   [low, high](double v) { return v >= low && v <= high; });
 }
 
 Field& Field::finite() {
-  constraints.push_back(number_constraint("finite", [](double v) { return std::isfinite(v); }));
+  return such_that("finite", [](double v) { return std::isfinite(v); });
+}
+
+Field& Field::such_that(std::string words, std::function<bool(double)> accepts) {
+  Constraint& constraint = constraints.emplace_back();
+  constraint.words = std::move(words);
+  constraint.accepts_number = std::move(accepts);
   return *this;
 }
 

@@ -92,6 +92,7 @@ struct Field {
   Field& within(double low, double high);
   Field& finite();
   Field& one_of(std::vector<std::string> names);
+  Field& such_that(std::string words, std::function<bool(double)> accepts);
   Field& of_form(std::string words, std::function<bool(const std::string&)> accepts);
 
   // The command line.

@@ -9,7 +9,6 @@
 #include "base/error.h"
 #include "base/hash_random.h"
 #include "simulation/parallel_rows.h"
-#include "simulation/range_check.h"
 
 namespace af {
 
@@ -27,18 +26,15 @@ std::int16_t rounded_hu(double hu, int step_hu) {
 void CtDegradationOptions::describe(Fields& field) {
   field("ct_slice_mm",
         slice_mm,
-        "degraded-ct: slices are averaged in groups of about this thickness, mm");
-  field("ct_noise_hu", noise_hu, "degraded-ct: noise, HU");
-  field("ct_step_hu", step_hu, "degraded-ct: steps of the values, HU");
+        "degraded-ct: slices are averaged in groups of about this thickness, mm")
+      .within(0.1, 50.0);
+  field("ct_noise_hu", noise_hu, "degraded-ct: noise, HU").within(0.0, 1000.0);
+  field("ct_step_hu", step_hu, "degraded-ct: steps of the values, HU").within(1, 1000);
   field.leave_out(threads, "voxels do not depend on it");
 }
 
 std::vector<std::string> problems(const CtDegradationOptions& options) {
-  return RangeCheck()
-      .require("slice_mm", options.slice_mm, 0.1, 50.0)
-      .require("noise_hu", options.noise_hu, 0.0, 1000.0)
-      .require("step_hu", options.step_hu, 1, 1000)
-      .problems();
+  return field_problems(options);
 }
 
 int slices_per_group(const CtGrid& grid, double slice_mm) {

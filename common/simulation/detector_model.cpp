@@ -69,60 +69,33 @@ double mean_within(const Image2d& image, const RegionOfInterest& roi) {
 void DetectorOptions::describe(Fields& field) {
   field("scatter_to_primary",
         scatter_to_primary_ratio,
-        "Mean scatter / mean primary within the region of interest");
-  field("scatter_sigma_mm", scatter_sigma_mm, "Width of the scatter kernel, mm");
+        "Mean scatter / mean primary within the region of interest")
+      .within(0.0, 100.0);
+  field("scatter_sigma_mm", scatter_sigma_mm, "Width of the scatter kernel, mm")
+      .within(1.0, 1000.0);
   field.leave_out(scatter_source, "a stress");
-  field.leave_out(heel_ramp, "a stress");
+  field("heel_ramp", heel_ramp, "The beam grows by (1+h)/(1-h) from first to last row")
+      .within(0.0, 0.9)
+      .no_option("a stress")
+      .not_recorded("a stress");
   field("photons_per_pixel",
         photons_per_pixel,
-        "Photons per pixel in the open beam, for Poisson noise");
-  field("blur_sigma_px", blur_sigma_px, "Gaussian detector blur, px");
-  field("bits", bits, "Grey level bits, 8 to 16; 0: float pixels");
+        "Photons per pixel in the open beam, for Poisson noise")
+      .such_that("within 1 and 1e12, or 0 for no noise", [](double photons) {
+        return photons == 0.0 || (photons >= 1.0 && photons <= 1e12);
+      });
+  field("blur_sigma_px", blur_sigma_px, "Gaussian detector blur, px").within(0.0, 50.0);
+  field("bits", bits, "Grey level bits, 8 to 16; 0: float pixels")
+      .such_that("within 8 and 16, or 0 for no quantisation",
+                 [](double count) { return count == 0.0 || (count >= 8.0 && count <= 16.0); });
   field("open_beam_level",
         open_beam_level,
-        "Grey level of the open beam; beyond the bits it saturates");
+        "Grey level of the open beam; beyond the bits it saturates")
+      .within(1.0, 1e6);
 }
 
 std::vector<std::string> problems(const DetectorOptions& options) {
-  std::vector<std::string> found;
-  const auto require = [&](bool holds,
-                           const std::string& name,
-                           const std::string& value,
-                           const std::string& constraint) {
-    if (!holds) found.push_back(name + " = " + value + ": must be " + constraint);
-  };
-  const auto within = [](double value, double low, double high) {
-    return value >= low && value <= high;
-  };
-  require(within(options.scatter_to_primary_ratio, 0.0, 100.0),
-          "scatter_to_primary_ratio",
-          std::to_string(options.scatter_to_primary_ratio),
-          "within 0 and 100");
-  require(within(options.scatter_sigma_mm, 1.0, 1000.0),
-          "scatter_sigma_mm",
-          std::to_string(options.scatter_sigma_mm),
-          "within 1 and 1000");
-  require(within(options.heel_ramp, 0.0, 0.9),
-          "heel_ramp",
-          std::to_string(options.heel_ramp),
-          "within 0 and 0.9");
-  require(options.photons_per_pixel == 0.0 || within(options.photons_per_pixel, 1.0, 1e12),
-          "photons_per_pixel",
-          std::to_string(options.photons_per_pixel),
-          "within 1 and 1e12, or 0 for no noise");
-  require(within(options.blur_sigma_px, 0.0, 50.0),
-          "blur_sigma_px",
-          std::to_string(options.blur_sigma_px),
-          "within 0 and 50");
-  require(options.bits == 0 || (options.bits >= 8 && options.bits <= 16),
-          "bits",
-          std::to_string(options.bits),
-          "within 8 and 16, or 0 for no quantisation");
-  require(within(options.open_beam_level, 1.0, 1e6),
-          "open_beam_level",
-          std::to_string(options.open_beam_level),
-          "within 1 and 1e6");
-  return found;
+  return field_problems(options);
 }
 
 Image2d scatter_image(const Image2d& primary,

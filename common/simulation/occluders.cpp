@@ -7,7 +7,6 @@
 
 #include "base/error.h"
 #include "base/hash_random.h"
-#include "simulation/range_check.h"
 
 namespace af {
 
@@ -90,21 +89,15 @@ double SteelBodies::chord_length_mm(const Eigen::Vector3d& source_point,
 }
 
 void OccluderOptions::describe(Fields& field) {
-  field("rod_count", rod_count, "rods: how many");
-  field("rod_diameter_mm", rod_diameter_mm, "rods: diameter, mm");
-  field("rod_length_mm", rod_length_mm, "rods: length, mm");
-  field("ball_count", ball_count, "fiducials: how many balls");
-  field("ball_diameter_mm", ball_diameter_mm, "fiducials: diameter, mm");
+  field("rod_count", rod_count, "rods: how many").within(0, 100);
+  field("rod_diameter_mm", rod_diameter_mm, "rods: diameter, mm").within(0.1, 50.0);
+  field("rod_length_mm", rod_length_mm, "rods: length, mm").within(1.0, 1000.0);
+  field("ball_count", ball_count, "fiducials: how many balls").within(0, 1000);
+  field("ball_diameter_mm", ball_diameter_mm, "fiducials: diameter, mm").within(0.1, 50.0);
 }
 
 std::vector<std::string> problems(const OccluderOptions& options) {
-  RangeCheck check_range;
-  check_range.require("rod_count", options.rod_count, 0, 100);
-  check_range.require("rod_diameter_mm", options.rod_diameter_mm, 0.1, 50.0);
-  check_range.require("rod_length_mm", options.rod_length_mm, 1.0, 1000.0);
-  check_range.require("ball_count", options.ball_count, 0, 1000);
-  check_range.require("ball_diameter_mm", options.ball_diameter_mm, 0.1, 50.0);
-  return check_range.problems();
+  return field_problems(options);
 }
 
 OccluderSite occluder_site(const std::vector<View>& views,

@@ -7,7 +7,6 @@
 
 #include "base/error.h"
 #include "geometry/rigid_transform.h"
-#include "simulation/range_check.h"
 
 namespace af {
 
@@ -45,8 +44,12 @@ void add_spinous_process(const Vertebra& v, BonePainter& bone) {
 }  // namespace
 
 void PhantomOptions::describe(Fields& field) {
-  field("phantom_voxel_mm", voxel_mm, "Voxel side of the phantom, mm");
-  field.leave_out(samples_per_axis, "studies have one");
+  field("phantom_voxel_mm", voxel_mm, "Voxel side of the phantom, mm").within(0.5, 5.0);
+  const char* const why = "all studies have one";
+  field("samples_per_axis", samples_per_axis, "Points per voxel and axis")
+      .within(1, 8)
+      .no_option(why)
+      .not_recorded(why);
   field.leave_out(threads, "voxels do not depend on it");
   field("metal",
         has_metal,
@@ -56,10 +59,7 @@ void PhantomOptions::describe(Fields& field) {
 }
 
 std::vector<std::string> problems(const PhantomOptions& options) {
-  return RangeCheck()
-      .require("voxel_mm", options.voxel_mm, 0.5, 5.0)
-      .require("samples_per_axis", options.samples_per_axis, 1, 8)
-      .problems();
+  return field_problems(options);
 }
 
 CtVolume sample_phantom(const Phantom& phantom, const PhantomOptions& options) {

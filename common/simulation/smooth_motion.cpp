@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "base/hash_random.h"
+#include "base/number_text.h"
 #include "simulation/parallel_rows.h"
-#include "simulation/range_check.h"
 
 namespace af {
 
@@ -50,23 +50,24 @@ double hu_at(const CtVolume& ct, const Eigen::Vector3d& index) {
 
 void SmoothMotionOptions::describe(Fields& field) {
   field("motion_mm", amplitude_mm, "motion: largest displacement along an axis, mm");
-  field("motion_wavelength_mm", wavelength_mm, "motion: wavelength, mm");
-  field("motion_margin_mm", margin_mm, "motion: what stays still around the target box, mm");
-  field("motion_ramp_mm", ramp_mm, "motion: from still to full displacement, mm");
+  field("motion_wavelength_mm", wavelength_mm, "motion: wavelength, mm").within(1.0, 10000.0);
+  field("motion_margin_mm", margin_mm, "motion: what stays still around the target box, mm")
+      .within(0.0, 1000.0);
+  field("motion_ramp_mm", ramp_mm, "motion: from still to full displacement, mm")
+      .within(1.0, 1000.0);
   field.leave_out(threads, "voxels do not depend on it");
 }
 
 std::vector<std::string> problems(const SmoothMotionOptions& options) {
-  RangeCheck check_range;
-  check_range.require("motion wavelength_mm", options.wavelength_mm, 1.0, 10000.0);
-  check_range.require("motion margin_mm", options.margin_mm, 0.0, 1000.0);
-  check_range.require("motion ramp_mm", options.ramp_mm, 1.0, 1000.0);
-  if (!check_range.problems().empty()) return check_range.problems();
+  std::vector<std::string> found = field_problems(options);
+  if (!found.empty()) return found;
   // Three components, each with these slopes at worst in one direction.
   const double slope_per_mm =
       std::sqrt(3.0) * (kTwoPi / options.wavelength_mm + kRampSlope / options.ramp_mm);
-  check_range.require("motion amplitude_mm", options.amplitude_mm, 0.0, 1.0 / slope_per_mm);
-  return check_range.problems();
+  if (!(options.amplitude_mm >= 0.0 && options.amplitude_mm <= 1.0 / slope_per_mm))
+    found.push_back("motion_mm = " + number_text(options.amplitude_mm) + ": must be within 0 and " +
+                    number_text(1.0 / slope_per_mm));
+  return found;
 }
 
 SmoothMotion::SmoothMotion(const CtBox& still_box_ct,

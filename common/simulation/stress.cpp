@@ -5,8 +5,6 @@
 #include <array>
 #include <sstream>
 
-#include "simulation/range_check.h"
-
 namespace af {
 
 namespace {
@@ -121,6 +119,7 @@ void StressOptions::describe(Fields& field) {
         "CT; X-rays show the good one), calibration (the study's rig is slightly wrong), motion "
         "(non-rigid, away from the target); or all")
       .comma_separated()
+      .one_of(stress_names())
       .choice(stress_names());
   field.part(occluders);
   field("heel_ramp", heel_ramp, "heel: share by which the beam varies, 0.25 for +-25 %");
@@ -131,25 +130,19 @@ void StressOptions::describe(Fields& field) {
   field.part(degraded_ct);
   field("calibration_error_px",
         calibration_error_px,
-        "calibration: RMS shift of the target box's projections, px");
+        "calibration: RMS shift of the target box's projections, px")
+      .within(1e-6, 20.0);
   field.part(motion);
 }
 
 std::vector<std::string> problems(const StressOptions& options) {
-  RangeCheck check_range;
-  const std::vector<std::string> known = stress_names();
-  for (const std::string& name : options.names)
-    if (std::find(known.begin(), known.end(), name) == known.end())
-      check_range.add("stress = " + name + ": is not a name of an effect");
-  check_range.append(problems(options.occluders));
-  check_range.append(problems(options.degraded_ct));
-  check_range.append(problems(options.motion));
+  std::vector<std::string> found = field_problems(options);
+  if (found.empty()) found = problems(options.motion);
   // Strengths of detector effects keep the detector's limits, wanted or not.
   StressOptions all = options;
   all.names = {"all"};
-  check_range.append(problems(all.detector({})));
-  check_range.require("calibration_error_px", options.calibration_error_px, 1e-6, 20.0);
-  return check_range.problems();
+  for (const std::string& text : problems(all.detector({}))) found.push_back(text);
+  return found;
 }
 
 std::vector<StressDescription> descriptions(const StressOptions& options) {

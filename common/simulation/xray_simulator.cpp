@@ -21,23 +21,15 @@ void XraySimulationOptions::describe(Fields& field) {
   field.start_group("Imaging (0 switches an effect off)");
   field.part(spectrum);
   field.part(detector);
-  field("rays_per_pixel_side", rays_per_pixel_side, "n: a pixel is the mean of n x n rays");
+  field("rays_per_pixel_side", rays_per_pixel_side, "n: a pixel is the mean of n x n rays")
+      .within(1, 16);
   field.start_group("");
-  field("threads", threads, "Threads (0: all of the machine); results do not depend on them");
+  field("threads", threads, "Threads (0: all of the machine); results do not depend on them")
+      .within(0, 1024);
 }
 
 std::vector<std::string> problems(const XraySimulationOptions& options) {
-  constexpr int kMostRaysPerSide = 16;
-  constexpr int kMostThreads = 1024;
-  std::vector<std::string> found = problems(options.spectrum);
-  const std::vector<std::string> of_detector = problems(options.detector);
-  found.insert(found.end(), of_detector.begin(), of_detector.end());
-  if (options.rays_per_pixel_side < 1 || options.rays_per_pixel_side > kMostRaysPerSide)
-    found.push_back("rays_per_pixel_side = " + std::to_string(options.rays_per_pixel_side) +
-                    ": must be within 1 and 16");
-  if (options.threads < 0 || options.threads > kMostThreads)
-    found.push_back("threads = " + std::to_string(options.threads) + ": must be within 0 and 1024");
-  return found;
+  return field_problems(options);
 }
 
 XraySimulator::XraySimulator(const AttenuationVolume& volume,

@@ -8,26 +8,16 @@
 namespace af {
 
 void SpectrumOptions::describe(Fields& field) {
-  field("tube_kvp", tube_kvp, "Tube voltage, kV; 0: only the HU scale's effective energy");
-  field("aluminium_mm", aluminium_mm, "Filtration, mm of aluminium");
-  field("energy_bins", energy_bins, "Energy bins of the spectrum, at least 20");
+  field("tube_kvp", tube_kvp, "Tube voltage, kV; 0: only the HU scale's effective energy")
+      .such_that("within 30 and 200, or 0 for a single energy", [](double kvp) {
+        return kvp == 0.0 || (kvp >= 30.0 && kvp <= kHighestTableEnergyKev);
+      });
+  field("aluminium_mm", aluminium_mm, "Filtration, mm of aluminium").within(0.0, 50.0);
+  field("energy_bins", energy_bins, "Energy bins of the spectrum, at least 20").within(20, 1000);
 }
 
 std::vector<std::string> problems(const SpectrumOptions& options) {
-  constexpr int kFewestBins = 20;
-  constexpr int kMostBins = 1000;
-  std::vector<std::string> found;
-  if (options.tube_kvp != 0.0 &&
-      !(options.tube_kvp >= 30.0 && options.tube_kvp <= kHighestTableEnergyKev))
-    found.push_back("tube_kvp = " + std::to_string(options.tube_kvp) +
-                    ": must be within 30 and 200, or 0 for a single energy");
-  if (!(options.aluminium_mm >= 0.0 && options.aluminium_mm <= 50.0))
-    found.push_back("aluminium_mm = " + std::to_string(options.aluminium_mm) +
-                    ": must be within 0 and 50");
-  if (options.energy_bins < kFewestBins || options.energy_bins > kMostBins)
-    found.push_back("energy_bins = " + std::to_string(options.energy_bins) +
-                    ": must be within 20 and 1000");
-  return found;
+  return field_problems(options);
 }
 
 std::vector<SpectrumBin> tube_spectrum(const SpectrumOptions& options,

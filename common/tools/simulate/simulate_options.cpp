@@ -4,8 +4,6 @@
 #include <cmath>
 #include <filesystem>
 
-#include "simulation/range_check.h"
-
 namespace af::tools {
 
 namespace {
@@ -112,23 +110,20 @@ std::string SimulateOptions::case_name_in_force() const {
 }
 
 std::vector<std::string> problems(const SimulateOptions& options) {
-  RangeCheck check_range;
-  check_range.append(field_problems(options));
-  check_range.append(problems(options.xray));
-  check_range.append(problems(options.phantom_options));
-  check_range.append(problems(options.stress));
+  std::vector<std::string> found = field_problems(options);
+  if (found.empty()) found = problems(options.stress);
   if (options.phantom_options.has_metal && options.phantom.empty())
-    check_range.add("metal: needs a phantom; a CT has its own");
+    found.push_back("metal: needs a phantom; a CT has its own");
   for (const double value : options.center_ct_mm)
-    if (!std::isfinite(value)) check_range.add("center_ct_mm must be finite");
+    if (!std::isfinite(value)) found.push_back("center_ct_mm must be finite");
   const std::vector<double>& box = options.target_box_ct_mm;
   for (std::size_t axis = 0; box.size() == 6 && axis < 3; ++axis)
     if (!(box[axis] < box[axis + 3]) || !std::isfinite(box[axis + 3] - box[axis]))
-      check_range.add("target_box_ct_mm: low " + std::to_string(box[axis]) +
+      found.push_back("target_box_ct_mm: low " + std::to_string(box[axis]) +
                       " must be below high " + std::to_string(box[axis + 3]));
   if (options.case_name.find_first_of("/\\\"\n") != std::string::npos)
-    check_range.add("case = " + options.case_name + ": must not hold / \\ \" or line ends");
-  return check_range.problems();
+    found.push_back("case = " + options.case_name + ": must not hold / \\ \" or line ends");
+  return found;
 }
 
 void SimulateOptions::describe(Fields& field) {

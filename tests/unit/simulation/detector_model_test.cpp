@@ -175,7 +175,7 @@ TEST(DetectorOptions, ReportsEveryBrokenConstraint) {
   bad.bits = 7;
   bad.open_beam_level = 0.0;
   EXPECT_THAT(problems(bad),
-              ::testing::ElementsAre(::testing::HasSubstr("scatter_to_primary_ratio = -0.1"),
+              ::testing::ElementsAre(::testing::HasSubstr("scatter_to_primary = -0.1"),
                                      ::testing::HasSubstr("scatter_sigma_mm = 0"),
                                      ::testing::HasSubstr("photons_per_pixel = nan"),
                                      ::testing::HasSubstr("blur_sigma_px = 51"),

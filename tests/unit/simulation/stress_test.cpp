@@ -276,7 +276,7 @@ TEST(SmoothMotion, NeverFoldsSpace) {
               kStepMm);
   }
   options.amplitude_mm = 7.0;
-  EXPECT_THAT(problems(options), ElementsAre(HasSubstr("motion amplitude_mm")));
+  EXPECT_THAT(problems(options), ElementsAre(HasSubstr("motion_mm = 7: must be within 0 and")));
 }
 
 TEST(SmoothMotion, MovesVoxelsOutsideTheBoxAndKeepsThoseWithin) {
@@ -392,9 +392,9 @@ TEST(StressOptions, CollectsTheProblemsOfAllParts) {
               ElementsAre(HasSubstr("bones"),
                           HasSubstr("rod_count"),
                           HasSubstr("step_hu"),
-                          HasSubstr("ramp_mm"),
-                          HasSubstr("heel_ramp"),
-                          HasSubstr("calibration_error_px")));
+                          HasSubstr("calibration_error_px"),
+                          HasSubstr("motion_ramp_mm"),
+                          HasSubstr("heel_ramp")));
 }
 
 }  // namespace
