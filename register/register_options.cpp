@@ -5,7 +5,6 @@
 
 #include "base/error.h"
 #include "base/toml_text.h"
-#include "cli/run_limits.h"
 #include "files/sha256.h"
 #include "study/pose_file.h"
 

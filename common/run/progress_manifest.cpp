@@ -2,7 +2,6 @@
 #include "run/progress_manifest.h"
 
 #include <nlohmann/json.hpp>
-#include <sstream>
 #include <system_error>
 #include <vector>
 

@@ -13,7 +13,6 @@
 #include "base/error.h"
 #include "base/toml_text.h"
 #include "cli/bind_options.h"
-#include "cli/run_limits.h"
 #include "drr/field_renderer.h"
 #include "drr/ray_cast_drr.h"
 #include "evaluate/image_quality/image_quality_tables.h"

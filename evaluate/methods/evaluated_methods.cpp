@@ -6,13 +6,8 @@
 #include <CLI/CLI.hpp>
 
 #include "base/error.h"
-#include "base/toml_text.h"
 #include "cli/bind_options.h"
-#include "register/method_arguments.h"
-#include "text/csv_table.h"
 #include "text/options_toml.h"
-#include "volume/attenuation_volume.h"
-#include "volume/ray_caster.h"
 
 namespace af::evaluation {
 

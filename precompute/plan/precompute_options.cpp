@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "base/number_text.h"
 #include "base/plausible.h"
 #include "base/toml_text.h"
 
@@ -194,7 +195,7 @@ std::vector<std::string> problems(const PrecomputeOptions& options) {
                     " numbers: must be x,y,z");
   for (const double coordinate : options.center_ct_mm)
     if (!is_plausible_room_mm(coordinate))
-      found.push_back("center_ct_mm = " + exact_text(coordinate) + ": " + kPlausibleRoom);
+      found.push_back("center_ct_mm = " + number_text(coordinate) + ": " + kPlausibleRoom);
   return found;
 }
 

@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "base/error.h"
+#include "base/number_text.h"
 
 namespace af::registration {
 namespace {
@@ -64,13 +65,6 @@ StageOptions stage_from_text(const std::string& text) {
 
 }  // namespace
 
-std::string shortest_text(double value) {
-  std::array<char, 32> text{};
-  const auto [end, error] = std::to_chars(text.data(), text.data() + text.size(), value);
-  check(error == std::errc(), "a number fits its text");
-  return {text.data(), end};
-}
-
 std::string stage_text(const StageOptions& stage) {
   StageOptions mine = stage;
   StageOptions plain;
@@ -81,7 +75,7 @@ std::string stage_text(const StageOptions& stage) {
     if (keys[i].whole != nullptr && *keys[i].whole != *defaults[i].whole)
       text += std::string(" ") + keys[i].name + "=" + std::to_string(*keys[i].whole);
     if (keys[i].real != nullptr && *keys[i].real != *defaults[i].real)
-      text += std::string(" ") + keys[i].name + "=" + shortest_text(*keys[i].real);
+      text += std::string(" ") + keys[i].name + "=" + number_text(*keys[i].real);
   }
   return text;
 }

@@ -17,9 +17,6 @@ namespace af::registration {
 std::string chain_text(const ChainOptions& chain);
 std::string stage_text(const StageOptions& stage);
 
-/// The shortest text that reads back to the same number.
-std::string shortest_text(double value);
-
 /// The chain of a line. InputError for a line that is not of this form; whether its values fit is
 /// for problems() to say. \test ChainText.ReadsWhatItWrites
 ChainOptions chain_from_text(const std::string& name, const std::string& text);

@@ -13,10 +13,6 @@ af_add_test(
           unit/simulation/xray_simulator_test.cpp
   LIBS af_simulation)
 af_add_test(
-  partial_folder_test
-  SOURCES unit/files/partial_folder_test.cpp
-  LIBS af_study af_run)
-af_add_test(
   af_simulate_test
   SOURCES unit/simulation/af_simulate_test.cpp
   LIBS af_simulation af_gold_standard af_study_contents

@@ -51,7 +51,7 @@ expect() {
   "$program" "$@" >out 2>err || found=$?
   [[ $found == "$code" ]] || fail "$* gave $found instead of $code: $(cat err)"
   grep -q -- "$pattern" err || fail "$* did not say '$pattern': $(cat err)"
-  [[ -z $(find . -name 'refused*') ]] || fail "$* left $(find . -name 'refused*')"
+  [[ -z $(find . -name 'refused.h5*') ]] || fail "$* left $(find . -name 'refused.h5*')"
 }
 common=(--ct ct.mha --rig c-arm-12in --camera AP --max-translation-mm 30 --uv-nodes 9 --st-nodes 61 --codewords 200 --training-fraction 0.5)
 

@@ -250,7 +250,7 @@ printf '%s\n' 'ObjectType = Image' 'NDims = 3' 'DimSize = 4 4 4' 'ElementSpacing
 head -c 128 /dev/zero >raw/voxels.raw
 head -n 3 forty.csv >few.csv
 ln few.csv few.mha
-find . -type f -not -name message.txt -not -name sums.txt -not -path './out*' -print0 | sort -z | xargs -0 sha256sum >sums.txt
+sums=$(find . -type f -not -name message.txt -not -path "./out*" -print0 | sort -z | xargs -0 sha256sum)
 row 3 'would replace the input' "a field instead of its CT" "${new_field[@]}" "${of_valid_ct[@]}" -o valid/ct.nii.gz
 row 3 'would replace the input' "a field instead of its CT, by another link" "${new_field[@]}" "${of_valid_ct[@]}" -o hard.nii.gz
 row 3 'would replace the input' "a field instead of its study" "${new_field[@]}" --study valid/study.toml --camera AP -o valid/study.toml
@@ -263,7 +263,7 @@ row 3 'would replace the input' 'a study instead of the one of its CT' "$bin/af-
 row 3 'would replace the input' 'a study instead of the DICOM folder' "$bin/af-simulate" --ct two-series --force -o two-series
 row 3 'would replace the input' 'a study whose unfinished folder holds the CT' "$bin/af-simulate" --ct again.partial/ct.nii.gz -o again
 row 3 'would replace the input' 'a joined study instead of a part' "$bin/af-evaluate" join-studies valid/study.toml -o valid/study.toml
-sha256sum --quiet --check sums.txt || failures=$((failures + 1))
+sha256sum --quiet --check <<<"$sums" || failures=$((failures + 1))
 
 echo "$rows cases, $failures failures"
 ((failures == 0))

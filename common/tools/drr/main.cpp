@@ -6,7 +6,6 @@
 #include "base/error.h"
 #include "cli/app_main.h"
 #include "cli/bind_options.h"
-#include "drr/field_renderer.h"
 #include "files/output_file.h"
 #include "tools/drr/drr_request.h"
 

@@ -108,19 +108,5 @@ TEST(StartPoses, OfAFileAreItsRowsInOrder) {
   EXPECT_THROW(start_poses(options, some_frame()), FileError);
 }
 
-TEST(RegisterOptions, InForceAreTomlWithTheSeries) {
-  RegisterOptions options;
-  options.study = "a\tb\n\x7f\"\\.toml";
-  options.fields = {"A=line\nbreak.h5"};
-  const RegistrationOptions method = resolve(options.method);
-  EXPECT_EQ(to_toml(options, method).find("series"), std::string::npos);
-  options.series_uid = "1.2.3";
-  const std::string text = to_toml(options, method);
-  for (const char* line : {"series = \"1.2.3\"\n",
-                           R"(study = "a\u0009b\u000A\u007F\"\\.toml")",
-                           "# --field A=line\\u000Abreak.h5\n"})
-    EXPECT_NE(text.find(line), std::string::npos) << line << " in " << text;
-}
-
 }  // namespace
 }  // namespace af::registration

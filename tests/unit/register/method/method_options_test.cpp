@@ -101,15 +101,6 @@ TEST(MethodOptions, RefuseAFiducialMaskOfNoSize) {
   }
 }
 
-TEST(MethodOptions, ThatDifferInAnyDigitHaveOtherTexts) {
-  MethodOptions options;
-  options.fiducial_mask_mm = 4.0000001;
-  const std::string one = to_toml(options, resolve(options));
-  options.fiducial_mask_mm = 4.0000002;
-  EXPECT_NE(to_toml(options, resolve(options)), one);
-  EXPECT_NE(one.find("fiducial_mask_mm = 4.0000001\n"), std::string::npos) << one;
-}
-
 TEST(MethodOptions, ScaleOnlyTheRegionsOfCoarseStages) {
   MethodOptions options;
   options.preset = "fast";
