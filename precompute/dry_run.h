@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "geometry/light_slab.h"
-#include "precompute/build/field_build.h"
+#include "precompute/pipeline/field_build.h"
 #include "precompute/field_source.h"
 #include "precompute/plan/memory_plan.h"
 #include "precompute/plan/precompute_options.h"

@@ -182,7 +182,7 @@ std::string GnuplotFigure::script(const std::string& terminal) const {
          "\n" + body_;
 }
 
-void GnuplotFigure::write(const std::filesystem::path& path_without_extension) const {
+void GnuplotFigure::draw(const std::filesystem::path& path_without_extension) const {
   const std::string width = std::to_string(width_px_);
   const std::string height = std::to_string(height_px_);
   const std::filesystem::path svg = path_without_extension.string() + ".svg";

@@ -37,7 +37,7 @@ class GnuplotFigure {
 
   /// Writes PATH.svg and PATH.png, atomically. FileError when gnuplot cannot be run or fails: names
   /// its message.
-  void write(const std::filesystem::path& path_without_extension) const;
+  void draw(const std::filesystem::path& path_without_extension) const;
 
  private:
   [[nodiscard]] std::string script(const std::string& terminal) const;

@@ -135,7 +135,7 @@ void draw_psnr_boxes(const std::vector<PsnrGroup>& groups,
                   color_of(0));
   parts.push_back("$boxes using 1:6:6:6:6 with candlesticks lw 4 lc " + color_of(1));
   figure.add("set style fill empty\nplot " + joined(parts));
-  figure.write(path_without_extension);
+  figure.draw(path_without_extension);
   write_figure_table(path_without_extension, table);
 }
 
@@ -180,7 +180,7 @@ void draw_success_rates(const std::vector<OutcomeGroup>& groups,
              "\nset yrange [0:102]\nset ytics 20\nset key bottom left reverse Left samplen 1.5\n"
              "plot " +
              joined(parts));
-  figure.write(path_without_extension);
+  figure.draw(path_without_extension);
   write_figure_table(path_without_extension, table);
 }
 
@@ -228,7 +228,7 @@ void draw_tre_histogram(const std::vector<OutcomeGroup>& groups,
                       "first " + number_text(kSuccessTreMm) + ", graph 0.97",
                       "right offset -0.7,0"));
   figure.add("plot " + joined(parts));
-  figure.write(path_without_extension);
+  figure.draw(path_without_extension);
   write_figure_table(path_without_extension, table);
 }
 
@@ -279,7 +279,7 @@ void draw_tre_scatter(const std::vector<OutcomeGroup>& groups,
   figure.add(label_at(
       "no change", "graph 0.985, first " + number_text(largest_initial_mm * 1.25), "right"));
   figure.add("plot " + joined(parts));
-  figure.write(path_without_extension);
+  figure.draw(path_without_extension);
   write_figure_table(path_without_extension, table);
 }
 
@@ -320,7 +320,7 @@ void draw_curve_panels(const std::vector<CurvePanel>& panels,
                gnuplot_quoted(p % 3 == 0 ? y_label : "") + "\nplot " + joined(parts));
   }
   figure.add("unset multiplot");
-  figure.write(path_without_extension);
+  figure.draw(path_without_extension);
 }
 
 void draw_sweep_panels(const std::vector<SweepPanel>& panels,
@@ -367,7 +367,7 @@ void draw_sweep_panels(const std::vector<SweepPanel>& panels,
                     color_of(base.empty() ? 0 : 1)}));
   }
   figure.add("unset multiplot");
-  figure.write(path_without_extension);
+  figure.draw(path_without_extension);
 }
 
 }  // namespace af::evaluation

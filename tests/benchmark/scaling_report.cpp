@@ -114,7 +114,7 @@ void draw(const ReportOptions& options,
              line("large", 5, palette::kGreen, "") + "'encoding', " +
              line("large", 6, palette::kPurple, "") + "'writing', " +
              line("paper", 7, palette::kQuiet, "dt 2") + "'64x64 x 256x256: total'");
-  figure.write(options.figure);
+  figure.draw(options.figure);
 }
 
 void run(const ReportOptions& options) {

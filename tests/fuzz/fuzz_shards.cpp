@@ -10,8 +10,8 @@
 #include "base/crc32c.h"
 #include "fuzz/fuzz_input.h"
 #include "parallel/mpi_environment.h"
-#include "precompute/build/training_checkpoints.h"
-#include "precompute/build/unit_shards.h"
+#include "precompute/pipeline/training_checkpoints.h"
+#include "precompute/pipeline/unit_shards.h"
 
 namespace {
 

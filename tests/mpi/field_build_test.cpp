@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "precompute/build/field_build.h"
+#include "precompute/pipeline/field_build.h"
 
 #include <array>
 #include <atomic>
@@ -10,7 +10,7 @@
 
 #include "base/error.h"
 #include "base/vector_width.h"
-#include "precompute/build/training_checkpoints.h"
+#include "precompute/pipeline/training_checkpoints.h"
 #include "precompute/units/unit_planner.h"
 #include "support/shared_folder.h"
 #include "volume/phantoms.h"

@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
-#include "precompute/build/shared_resampling.h"
+#include "precompute/pipeline/shared_resampling.h"
 #include "unit/precompute/casting/shear_warp_cases.h"
 
 namespace af {

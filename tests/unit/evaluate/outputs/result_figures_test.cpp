@@ -27,7 +27,7 @@ TEST(GnuplotFigure, WritesTheSameBytesEveryTime) {
     GnuplotFigure figure("A title with 'quotes' & <angles>", 400, 300);
     figure.add_data("points", {{1, 2}, {2, std::nan("")}, {3, 4}});
     figure.add("plot $points using 1:2 with points");
-    figure.write(folder / name);
+    figure.draw(folder / name);
   }
   EXPECT_EQ(read_text_file(folder / "a.svg"), read_text_file(folder / "b.svg"));
   EXPECT_EQ(read_text_file(folder / "a.png"), read_text_file(folder / "b.png"));
@@ -41,7 +41,7 @@ TEST(GnuplotFigure, NamesGnuplotsMessageAndLeavesNothingWhenAScriptIsWrong) {
   GnuplotFigure figure("wrong", 400, 300);
   figure.add("plot nonsense(");
   try {
-    figure.write(folder / "wrong");
+    figure.draw(folder / "wrong");
     FAIL() << "drew nonsense";
   } catch (const FileError& error) {
     EXPECT_THAT(error.what(), HasSubstr("wrong.svg"));
@@ -56,7 +56,7 @@ TEST(GnuplotFigure, IsWrittenWholeOrNotAtAll) {
   figure.add("plot x");
   for (const rlim_t limit : {2000u, 6000u}) {
     const test::FileSizeLimit full_disk(limit);
-    EXPECT_THROW(figure.write(folder / "a"), FileError) << limit;
+    EXPECT_THROW(figure.draw(folder / "a"), FileError) << limit;
     EXPECT_TRUE(std::filesystem::is_empty(folder.path())) << limit;
   }
 }

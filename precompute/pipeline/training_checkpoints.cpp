@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "precompute/build/training_checkpoints.h"
+#include "precompute/pipeline/training_checkpoints.h"
 
 #include <cstdint>
 #include <cstring>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "precompute/build/unit_shards.h"
+#include "precompute/pipeline/unit_shards.h"
 
 #include <algorithm>
 #include <array>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "precompute/build/shared_resampling.h"
+#include "precompute/pipeline/shared_resampling.h"
 
 #include <algorithm>
 #include <array>

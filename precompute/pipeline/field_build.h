@@ -11,10 +11,10 @@
 #include "base/progress.h"
 #include "field_file/field_file.h"
 #include "parallel/communicator.h"
-#include "precompute/build/unit_shards.h"
 #include "precompute/casting/field_caster.h"
 #include "precompute/codebook/codebook_training.h"
 #include "precompute/codebook/nearest_codeword.h"
+#include "precompute/pipeline/unit_shards.h"
 
 namespace af {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "precompute/build/field_build.h"
+#include "precompute/pipeline/field_build.h"
 
 #include <algorithm>
 #include <array>
