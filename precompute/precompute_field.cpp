@@ -310,6 +310,10 @@ class PrecomputeRun {
     std::optional<ProgressFolder> progress;
     if (options_.has_checkpoint)
       progress.emplace(options_.output + ".progress", options_.is_restart, manifest, world_);
+    if (progress.has_value() && progress->has_replaced_refused())
+      inform(world_,
+             "unfinished work in " + progress->path().string() +
+                 " is thrown away: its options were refused, and these are others");
     const auto units = plan_units(light_slab_, {manifest.rays_per_unit});
     const FieldBuild build{caster,
                            light_slab_,

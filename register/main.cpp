@@ -47,7 +47,7 @@ void run(const RegisterOptions& options,
   const auto gold = af::all_or_none(world, [&] { return known_gold(study, study_case); });
   const auto pool = std::make_shared<af::ThreadPool>(af::thread_count(options.method.threads));
   CaseLoadOptions load_options = case_load_options(options, method.coarsest_level());
-  load_options.judging_level = method.judge.stage.level;
+  load_options.judging_level = PoseExaminer::coarsest_level();
   load_options.pool = pool;
   const LoadedCase loaded = [&] {
     const af::WorkNote note("loading case " + study_case.name, af::WorkNote::Kind::Phase);
@@ -60,8 +60,11 @@ void run(const RegisterOptions& options,
   // Before the work, so that an unwritable folder does not cost it; after the inputs, so that bad
   // ones leave nothing behind.
   std::optional<af::OutputLock> lock;
+  const std::filesystem::path slicer = options.output_folder / "slicer";
   af::all_or_none(world, [&] {
     if (!world.is_root()) return;
+    af::announce_outputs(options.output_folder, overlay_file_names(*loaded.problem));
+    af::announce_outputs(slicer, slicer_file_names(*loaded.problem));
     af::make_output_folder(options.output_folder);
     lock.emplace(options.output_folder);
   });
@@ -100,9 +103,8 @@ void run(const RegisterOptions& options,
     for (const std::string& text : best.diagnosis.sayings) af::warn(world, text);
     const Judgement judgement = judgement_of(best);
     // Before result.json: when that is there, everything is.
-    const std::filesystem::path slicer = options.output_folder / "slicer";
     if (judgement.verdict == Verdict::NotFound)
-      std::filesystem::remove_all(slicer);  // an earlier run's
+      remove_slicer_files(*loaded.problem, slicer);  // an earlier run's
     else
       write_slicer_folder(*loaded.problem, best.result.room_from_ct, study_case, slicer);
     std::cout << write_run(records, *loaded.problem, description, options.output_folder);

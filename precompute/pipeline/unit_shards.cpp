@@ -258,21 +258,24 @@ ProgressManifest read_manifest(const std::filesystem::path& path) {
 /// Stands in the folder when the options of its work were refused: others may replace it.
 constexpr const char* kRefusedName = "refused";
 
-/// Takes the note away, and the work with it when that was begun with other options.
-void clear_refused(const std::filesystem::path& folder, const ProgressManifest& manifest) {
-  if (!std::filesystem::exists(folder / kRefusedName)) return;
+/// Takes the note away, and the work with it when that was begun with other options: returns
+/// whether it was.
+bool clear_refused(const std::filesystem::path& folder, const ProgressManifest& manifest) {
+  if (!std::filesystem::exists(folder / kRefusedName)) return false;
   const std::filesystem::path manifest_path = folder / kManifestName;
   const bool is_other = has_progress_manifest(manifest_path) &&
                         read_manifest(manifest_path).decides != manifest.decides;
   std::filesystem::remove_all(is_other ? folder : folder / kRefusedName);
+  return is_other;
 }
 
 /// Rank 0 alone; returns the plan to use.
 std::int64_t open_folder(const std::filesystem::path& folder,
                          bool restart,
-                         const ProgressManifest& manifest) {
+                         const ProgressManifest& manifest,
+                         bool& has_replaced_refused) {
   if (restart) std::filesystem::remove_all(folder);
-  clear_refused(folder, manifest);
+  has_replaced_refused = clear_refused(folder, manifest);
   make_output_folder(folder);
   const std::filesystem::path manifest_path = folder / kManifestName;
   if (has_progress_manifest(manifest_path)) {
@@ -314,7 +317,7 @@ ProgressFolder::ProgressFolder(const std::filesystem::path& path,
   all_or_none(communicator_, [&] {
     if (!communicator_.is_root()) return;
     try {
-      manifest.rays_per_unit = open_folder(path_, restart, manifest);
+      manifest.rays_per_unit = open_folder(path_, restart, manifest, has_replaced_refused_);
       run = next_run(path_);
     } catch (const std::filesystem::filesystem_error& error) {
       throw FileError(path_.string(), error.what());
@@ -426,7 +429,12 @@ void ProgressFolder::sync() {
 }
 
 void ProgressFolder::give_way() const {
-  if (communicator_.is_root()) write_text_file(path_ / kRefusedName, "");
+  if (!communicator_.is_root()) return;
+  try {
+    write_text_file(path_ / kRefusedName, "");
+  } catch (const Error&) {
+    // What the options were refused for is the error to tell; without the note --restart helps.
+  }
 }
 
 void ProgressFolder::remove() {

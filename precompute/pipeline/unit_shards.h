@@ -55,6 +55,10 @@ class ProgressFolder {
                  ProgressManifest& manifest,
                  const Communicator& communicator);
 
+  /// Rank 0: whether unfinished work was thrown away because its options had been refused, and
+  /// these are others.
+  [[nodiscard]] bool has_replaced_refused() const { return has_replaced_refused_; }
+
   using Visit = std::function<void(UnitTiles)>;
   /// Collective. Calls `visit` with the verified units of earlier runs, one at a time, each on one
   /// rank, dealt out evenly.
@@ -98,6 +102,7 @@ class ProgressFolder {
   [[nodiscard]] std::filesystem::path path_of(const UnitPlace& place) const;
   void append(std::initializer_list<std::span<const std::byte>> parts);
 
+  bool has_replaced_refused_ = false;
   std::filesystem::path path_;
   Communicator communicator_;
   UnitPlace shard_;  ///< this rank's, and where its next unit will lie

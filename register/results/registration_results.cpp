@@ -141,12 +141,13 @@ json views_json(const RegistrationRecord& record, const RegistrationProblem& pro
   json views = json::array();
   bool agree = record.diagnosis.sayings.empty();
   for (std::size_t i = 0; i < values.size(); ++i) {
+    const bool is_judged = std::isfinite(values[i].coarse) && std::isfinite(values[i].fine);
     const bool agrees = !disagrees(i, values);
     agree = agree && agrees;
     views.push_back({{"camera", problem.views[i].view.camera.name},
                      {"judge_value", number_or_null(values[i].coarse)},
                      {"judge_value_fine", number_or_null(values[i].fine)},
-                     {"agrees", agrees}});
+                     {"agrees", is_judged ? json(agrees) : json()}});
   }
   return {{"verdict", agree ? "nothing found" : "suspicious"},
           {"findings", record.diagnosis.sayings},
@@ -294,7 +295,7 @@ namespace {
 /// The pose's files under names that say whether it is one; those of an earlier run are gone.
 void write_pose_files(const RegistrationRecord& record, const std::filesystem::path& folder) {
   for (const char* name : {"pose.toml", "result.tfm", "rejected-pose.toml"})
-    std::filesystem::remove(folder / name);
+    remove_output(folder / name);
   const RigidTransform& pose = record.result.room_from_ct;
   if (is_not_found(record)) {
     write_text_file(folder / "rejected-pose.toml",
@@ -315,13 +316,12 @@ void write_result_files(const RegistrationRecord& record,
   const Verdict verdict = judgement_of(record).verdict;
   const std::string label =
       verdict == Verdict::Found ? "" : std::string(" (") + to_string(verdict) + ")";
-  for (const RegistrationView& view : problem.views) {
-    const std::string& camera = view.view.camera.name;
-    write_overlay(view,
+  const std::vector<std::string> overlays = overlay_file_names(problem);
+  for (std::size_t i = 0; i < overlays.size(); ++i)
+    write_overlay(problem.views[i],
                   record.result.room_from_ct,
-                  run.case_name + ", view " + camera + label,
-                  folder / (file_name_part(camera) + "-overlay.png"));
-  }
+                  run.case_name + ", view " + problem.views[i].view.camera.name + label,
+                  folder / overlays[i]);
   write_reproduce_script(folder, run.provenance);
   write_text_file(folder / "result.json", result_json(record, problem, run).dump(2) + "\n");
 }
@@ -350,7 +350,19 @@ std::string write_run(const std::vector<RegistrationRecord>& records,
 }
 
 std::vector<std::string> result_file_names() {
-  return {"pose.toml", "result.tfm", "result.json", "registrations.csv", "reproduce.sh"};
+  return {"pose.toml",
+          "result.tfm",
+          "rejected-pose.toml",
+          "result.json",
+          "registrations.csv",
+          "reproduce.sh"};
+}
+
+std::vector<std::string> overlay_file_names(const RegistrationProblem& problem) {
+  std::vector<std::string> names;
+  for (const RegistrationView& view : problem.views)
+    names.push_back(file_name_part(view.view.camera.name) + "-overlay.png");
+  return names;
 }
 
 std::string summary_text(const RegistrationRecord& record, const RegistrationProblem& problem) {

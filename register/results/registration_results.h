@@ -86,6 +86,8 @@ std::string write_run(const std::vector<RegistrationRecord>& records,
 
 /// Those that a run replaces in its folder, whatever the cameras' names.
 std::vector<std::string> result_file_names();
+/// The pictures that it replaces, one per view.
+std::vector<std::string> overlay_file_names(const RegistrationProblem& problem);
 
 /// A few lines for a person at the terminal.
 std::string summary_text(const RegistrationRecord& record, const RegistrationProblem& problem);

@@ -76,6 +76,10 @@ std::string readme_text(const StudyCase& study_case) {
          "to the volume plane.\n";
 }
 
+std::string image_name(const RegistrationView& view) {
+  return file_name_part(view.view.camera.name) + ".nrrd";
+}
+
 }  // namespace
 
 void write_slicer_folder(const RegistrationProblem& problem,
@@ -93,13 +97,27 @@ void write_slicer_folder(const RegistrationProblem& problem,
                               camera.column_direction,
                               camera.row_direction,
                               camera.pixel_spacing_mm};
-    const std::string name = file_name_part(camera.name) + ".nrrd";
+    const std::string name = image_name(view);
     write_image_in_space(view.xray, folder / ("xray-" + name), plane);
     write_image_in_space(render_image(*view.renderer, room_from_ct, View::whole_detector(camera)),
                          folder / ("drr-" + name),
                          plane);
   }
   write_text_file(folder / "README.md", readme_text(study_case));
+}
+
+std::vector<std::string> slicer_file_names(const RegistrationProblem& problem) {
+  std::vector<std::string> names = {
+      "ct-to-room.tfm", "fiducials.mrk.json", "target-box.mrk.json", "README.md"};
+  for (const RegistrationView& view : problem.views)
+    for (const char* kind : {"xray-", "drr-"}) names.push_back(kind + image_name(view));
+  return names;
+}
+
+void remove_slicer_files(const RegistrationProblem& problem, const std::filesystem::path& folder) {
+  for (const std::string& name : slicer_file_names(problem)) remove_output(folder / name);
+  std::error_code not_empty;
+  std::filesystem::remove(folder, not_empty);
 }
 
 }  // namespace af::registration

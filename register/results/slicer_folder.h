@@ -3,6 +3,8 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
+#include <vector>
 
 #include "register/method/registration.h"
 #include "study/study_file.h"
@@ -18,5 +20,12 @@ void write_slicer_folder(const RegistrationProblem& problem,
                          const RigidTransform& room_from_ct,
                          const StudyCase& study_case,
                          const std::filesystem::path& folder);
+
+/// The names of all files that it may write.
+std::vector<std::string> slicer_file_names(const RegistrationProblem& problem);
+
+/// Removes these files, and the folder when nothing else is in it: what somebody saved there stays.
+/// \test SlicerFiles.AreRemovedButNothingElse
+void remove_slicer_files(const RegistrationProblem& problem, const std::filesystem::path& folder);
 
 }  // namespace af::registration

@@ -35,6 +35,10 @@ std::unique_ptr<RegistrationRunner> judge_of(const RegistrationProblem& problem,
 
 }  // namespace
 
+int PoseExaminer::coarsest_level() {
+  return RegistrationOptions().judge.stage.level;
+}
+
 PoseExaminer::PoseExaminer(std::shared_ptr<const RegistrationProblem> problem) {
   for (std::size_t i = 0; i < problem->views.size(); ++i) views_.push_back(judge_of(*problem, i));
 }

@@ -14,6 +14,9 @@ namespace af::registration {
 /// 0. For one thread at a time. \test PoseExaminer.TellsARightPoseFromAWrongOneInEveryView
 class PoseExaminer {
  public:
+  /// The level of the image pyramids that it looks at where views have it.
+  static int coarsest_level();
+
   /// `problem`: as for a RegistrationRunner.
   explicit PoseExaminer(std::shared_ptr<const RegistrationProblem> problem);
 

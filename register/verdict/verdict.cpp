@@ -66,6 +66,15 @@ Judgement judged_values(const ViewSummary& coarse, const ViewSummary& fine) {
               " of 1 or more, " + value_text(fine.lowest) + " in detail"};
 }
 
+/// "X-ray 2 of 2 cannot be judged: ..."; nothing where every view has both values.
+std::optional<std::string> unjudged_view(std::span<const ViewValue> values) {
+  for (std::size_t i = 0; i < values.size(); ++i)
+    if (!std::isfinite(values[i].coarse) || !std::isfinite(values[i].fine))
+      return "X-ray " + std::to_string(i + 1) + " of " + std::to_string(values.size()) +
+             " cannot be judged: it shows no gradients over most of twice the region";
+  return std::nullopt;
+}
+
 bool is_far_below_others(std::size_t view,
                          std::span<const ViewValue> values,
                          double ViewValue::*value,
@@ -95,10 +104,12 @@ Judgement judged_end(StopReason stop_reason, std::span<const ViewValue> values) 
   if (const auto failure = failure_of(stop_reason); failure.has_value())
     return {Verdict::NotFound, *failure};
   const ViewSummary coarse = summary_of(values, &ViewValue::coarse);
-  const auto doubt = doubt_of(stop_reason);
-  if (!std::isfinite(coarse.mean))
+  const ViewSummary fine = summary_of(values, &ViewValue::fine);
+  auto doubt = doubt_of(stop_reason);
+  if (!std::isfinite(coarse.mean) || !std::isfinite(fine.mean))
     return {Verdict::Doubtful, doubt.value_or("no X-ray has gradients to judge the pose by")};
-  const Judgement judgement = judged_values(coarse, summary_of(values, &ViewValue::fine));
+  if (!doubt.has_value()) doubt = unjudged_view(values);
+  const Judgement judgement = judged_values(coarse, fine);
   if (!doubt.has_value()) return judgement;
   if (judgement.verdict == Verdict::Found) return {Verdict::Doubtful, *doubt};
   return {judgement.verdict, judgement.reason + "; " + *doubt};

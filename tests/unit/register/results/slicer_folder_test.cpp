@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "register/results/slicer_folder.h"
 
+#include <filesystem>
+#include <iterator>
 #include <nlohmann/json.hpp>
 
 #include <gtest/gtest.h>
@@ -79,6 +81,19 @@ TEST(SlicerFiles, OfACaseWithoutFiducialsHaveNone) {
   study_case.fiducials_ct_mm.clear();
   write_slicer_folder(*small.problem, small.gold_room_from_ct, study_case, folder.path());
   EXPECT_FALSE(std::filesystem::exists(folder / "fiducials.mrk.json"));
+}
+
+TEST(SlicerFiles, AreRemovedButNothingElse) {
+  const test::ScratchFolder folder;
+  const test::SmallCase small = test::small_case();
+  write_slicer_folder(*small.problem, small.gold_room_from_ct, some_case(), folder / "slicer");
+  write_text_file(folder / "slicer/scene.mrml", "somebody's");
+  remove_slicer_files(*small.problem, folder / "slicer");
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder / "slicer"), {}), 1);
+  EXPECT_TRUE(std::filesystem::exists(folder / "slicer/scene.mrml"));
+  std::filesystem::remove(folder / "slicer/scene.mrml");
+  remove_slicer_files(*small.problem, folder / "slicer");
+  EXPECT_FALSE(std::filesystem::exists(folder / "slicer"));
 }
 
 }  // namespace

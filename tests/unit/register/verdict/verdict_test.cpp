@@ -49,9 +49,12 @@ TEST(Judgement, WhatWasNotSearchedIsNotFoundWhateverItsValue) {
   EXPECT_EQ(verdict_of({{0.1, 0.1}}, StopReason::PinnedAtLimit), Verdict::NotFound);
 }
 
-TEST(Judgement, ViewsThatCannotBeJudgedDoNotCountAndNoneAtAllIsDoubtful) {
+TEST(Judgement, AViewThatCannotBeJudgedLeavesADoubt) {
   const double nan = std::nan("");
-  EXPECT_EQ(verdict_of({{nan, nan}, {0.6, 0.5}}), Verdict::Found);
+  EXPECT_EQ(verdict_of({{nan, nan}, {0.6, 0.5}}), Verdict::Doubtful);
+  EXPECT_EQ(verdict_of({{0.6, nan}, {0.6, 0.5}}), Verdict::Doubtful);
+  EXPECT_EQ(verdict_of({{0.6, nan}}), Verdict::Doubtful);
+  EXPECT_EQ(verdict_of({{nan, nan}, {0.1, 0.1}}), Verdict::NotFound);
   EXPECT_EQ(verdict_of({{nan, nan}}), Verdict::Doubtful);
   EXPECT_EQ(verdict_of({}), Verdict::Doubtful);
 }
