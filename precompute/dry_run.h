@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "geometry/light_slab.h"
-#include "precompute/pipeline/field_build.h"
 #include "precompute/field_source.h"
+#include "precompute/pipeline/field_build.h"
 #include "precompute/plan/memory_plan.h"
 #include "precompute/plan/precompute_options.h"
 #include "precompute/plan/speed_sample.h"
