@@ -14,9 +14,9 @@ namespace af::hdf5 {
 
 /// Most elements of a chunk, which HDF5 holds whole, that is read or written.
 inline constexpr std::uint64_t kMaxChunkElements = 1u << 20;
-/// Chunks of all slabs together beyond which chunks grow: 8 GiB of indices in chunks of 16 KiB.
+/// Chunks of all slabs together beyond which chunks grow: 16 GiB of indices in chunks of 16 KiB.
 /// While a field is written every rank holds about 100 bytes per chunk.
-inline constexpr std::uint64_t kMostSmallChunks = 1u << 19;
+inline constexpr std::uint64_t kMostSmallChunks = 1u << 20;
 
 using ChunkShape = std::array<hsize_t, 4>;
 

@@ -41,7 +41,7 @@ struct IndexBlock {
 
 /// Tiles along s and along t that one chunk of an index dataset spans, where the slab has as many.
 /// Blocks that begin and end at multiples of them are written without reading chunks back. Chunks
-/// of fields of more than 8 GiB are larger.
+/// of fields of more than 16 GiB are larger.
 inline constexpr std::array<int, 2> kIndexChunkTiles = {128, 64};
 
 /// This rank's next blocks, none when it has no more. Called on every rank equally often, until no

@@ -327,15 +327,15 @@ TEST(FieldFile, ChunksGrowAlongVOnlyWhereThereWouldBeTooMany) {
   EXPECT_EQ(chunks_of({{32, 32, 128, 118}})[0], (ChunkShape{1, 1, 128, 64}));
   EXPECT_EQ(chunks_of({{64, 64, 512, 320}})[0], (ChunkShape{1, 1, 128, 64}));
   EXPECT_EQ(chunks_of({{5, 4, 3, 7}})[0], (ChunkShape{1, 1, 3, 7}));
-  // 8 GiB of indices, and one column more.
-  EXPECT_EQ(chunks_of({{128, 128, 512, 512}})[0], (ChunkShape{1, 1, 128, 64}));
-  EXPECT_EQ(chunks_of({{128, 128, 512, 513}})[0], (ChunkShape{1, 2, 128, 64}));
+  // 16 GiB of indices, and one column more.
+  EXPECT_EQ(chunks_of({{128, 128, 1024, 512}})[0], (ChunkShape{1, 1, 128, 64}));
+  EXPECT_EQ(chunks_of({{128, 128, 1024, 513}})[0], (ChunkShape{1, 2, 128, 64}));
   // Slabs count together.
   EXPECT_EQ(chunks_of(std::vector(64, std::vector<std::uint64_t>{64, 64, 300, 100}))[63],
-            (ChunkShape{1, 4, 128, 64}));
+            (ChunkShape{1, 2, 128, 64}));
   // No more viewpoints along v than there are; chunks of 2^20 elements at most.
-  EXPECT_EQ(chunks_of({{2048, 3, 2048, 2048}})[0], (ChunkShape{1, 3, 256, 64}));
-  EXPECT_EQ(chunks_of({{512, 2048, 1024, 512}})[0], (ChunkShape{1, 128, 128, 64}));
+  EXPECT_EQ(chunks_of({{2048, 3, 4096, 2048}})[0], (ChunkShape{1, 3, 256, 64}));
+  EXPECT_EQ(chunks_of({{1024, 2048, 1024, 512}})[0], (ChunkShape{1, 128, 128, 64}));
 }
 
 TEST(FieldFile, AnUnwritableFolderIsAFileErrorOnEveryRank) {
