@@ -269,8 +269,8 @@ TEST(FieldFile, TheTestOfManyChunksLeavesNothing) {
   world.barrier();
 }
 
-/// Left out unless AF_LARGE_FIELD_GB says how many GB of indices to write and verify: fields beyond
-/// what memory holds. Every unit of 32 viewpoint tiles along u has 1 MiB.
+/// Left out unless AF_LARGE_FIELD_GB says how many GB of indices to write, verify and look up:
+/// the node needs as much memory for the last. Every unit of 32 viewpoint tiles along u has 1 MiB.
 TEST(FieldFile, HoldsALargeField) {
   const char* const gigabytes = std::getenv("AF_LARGE_FIELD_GB");
   if (gigabytes == nullptr) GTEST_SKIP() << "AF_LARGE_FIELD_GB is not set";
@@ -299,6 +299,19 @@ TEST(FieldFile, HoldsALargeField) {
   const FieldFileInfo info =
       write_field(field, next_blocks, some_provenance, folder / "large.af.h5", world);
   EXPECT_GT(info.payload_bytes, static_cast<std::uint64_t>(std::stod(gigabytes) * 0.99e9));
+  // Read back as af-drr does, all of it into the node's memory, and looked up in every unit.
+  const auto read = read_field(folder / "large.af.h5", world);
+  std::uint64_t wrong = 0;
+  for (int unit = 0; unit < units; ++unit)
+    for (std::size_t u = 0; u < 32; ++u) {
+      const std::size_t in_unit = u * 256 * 64 + 16 * (static_cast<std::size_t>(unit) % 64);
+      const std::size_t in_slab =
+          (u * static_cast<std::size_t>(units) + static_cast<std::size_t>(unit)) * 256 * 64 +
+          16 * (static_cast<std::size_t>(unit) % 64);
+      const std::uint64_t expected = hash64(kSeed, static_cast<std::uint64_t>(unit), in_unit) % 50;
+      wrong += read->slabs[0].indices[in_slab] != expected ? 1u : 0u;
+    }
+  EXPECT_EQ(wrong, 0u);
 }
 
 /// The chunks of fields whose slabs have these tiles.
