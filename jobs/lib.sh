@@ -9,10 +9,6 @@ af_root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
 # shellcheck disable=SC2034  # for the scripts that source this file
 af_programs=(af-precompute af-drr af-simulate af-register af-evaluate af-inspect)
 
-# Exit code of a search that is done and has found nothing: its results are there and say so.
-# shellcheck disable=SC2034  # for the scripts that source this file
-not_found=7
-
 say() { printf '%s\n' "$*"; }
 
 die() {
@@ -139,7 +135,7 @@ once() {
   rm -f "$stamp"
   say "$name ..."
   "$@" 2>&1 | tee "$output/logs/$name.log" | sed -u 's/^/    /' || status=${PIPESTATUS[0]}
-  ((status == 0 || status == not_found)) || die "$status" "$name failed with exit code $status; its log is $output/logs/$name.log"
+  ((status == 0)) || die "$status" "$name failed with exit code $status; its log is $output/logs/$name.log"
   printf '%s\n' "$key" >"$stamp"
   say "    $(duration $((SECONDS - start)))"
 }

@@ -132,6 +132,9 @@ on_exit() {
 }
 trap on_exit EXIT
 
+# Exit code of af-register when it is done and has found nothing: its results are there and say so.
+not_found=7
+
 # run_stage OUTPUT_PATH COMMAND...: runs the next planned stage, unless it was finished with the same command, program
 # and earlier stages. An interrupted stage keeps its output, from which the program continues; a stage whose inputs
 # changed starts from nothing.
