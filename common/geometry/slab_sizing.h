@@ -66,24 +66,4 @@ LightSlab make_light_slab(const CameraGeometry& camera,
                           const std::array<Eigen::Vector3d, 8>& attenuating_corners_ct,
                           const LightSlabSpec& spec);
 
-/// The paper's symmetric special case: eqs. (3)-(10) for a camera on the y axis moved by T = T_t Rz
-/// Ry Rx.
-struct SymmetricPlaneSizes {
-  double uv_side_mm = 0.0;
-  double st_side_mm = 0.0;
-};
-
-struct SymmetricCamera {
-  double half_field_of_view_rad = 0.0;  ///< phi
-  double plane_separation_mm = 650.0;   ///< f
-};
-
-/// Closed form, eqs. (4)-(6), (8)-(9). Throws InputError when the range makes the denominator D <=
-/// 0.
-SymmetricPlaneSizes closed_form_plane_sizes(const SymmetricCamera& camera,
-                                            const MotionRange& range);
-/// Small-angle form, eqs. (7), (10).
-SymmetricPlaneSizes small_angle_plane_sizes(const SymmetricCamera& camera,
-                                            const MotionRange& range);
-
 }  // namespace af

@@ -9,11 +9,11 @@
 #include "drr/field_level.h"
 #include "drr/ray_cast_drr.h"
 #include "drr/two_pass_af_drr.h"
+#include "support/ct_phantoms.h"
 #include "support/cube_grid.h"
 #include "support/plane_products.h"
 #include "unit/drr/small_fields.h"
 #include "volume/blurred_volume.h"
-#include "volume/phantoms.h"
 
 namespace af {
 namespace {

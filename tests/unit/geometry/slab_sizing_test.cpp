@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "base/hash_random.h"
+#include "unit/geometry/closed_form_plane_sizes.h"
 
 namespace af {
 namespace {
@@ -62,29 +63,29 @@ constexpr double kTableRounding = 0.006;
 
 TEST(ClosedFormPlaneSizes, GiveThePapersCaseToTheTablesRounding) {
   for (const PaperRow& row : kCameraMoved) {
-    const auto sizes = closed_form_plane_sizes({half_field_of_view_rad(), 650.0},
-                                               range_of(row.degrees, row.translation_mm));
+    const auto sizes = test::closed_form_plane_sizes({half_field_of_view_rad(), 650.0},
+                                                     range_of(row.degrees, row.translation_mm));
     EXPECT_NEAR(sizes.st_side_mm, row.st_mm, kTableRounding) << row.degrees << " deg";
     EXPECT_NEAR(sizes.uv_side_mm, row.uv_mm, kTableRounding) << row.degrees << " deg";
   }
 }
 
 TEST(ClosedFormPlaneSizes, RefuseARangeThatMakesRaysParallelToThePlanes) {
-  EXPECT_THROW(closed_form_plane_sizes({half_field_of_view_rad(), 650.0}, range_of(50, 0)),
+  EXPECT_THROW(test::closed_form_plane_sizes({half_field_of_view_rad(), 650.0}, range_of(50, 0)),
                InputError);
 }
 
 TEST(SmallAnglePlaneSizes, FallShortByTheStatedShares) {
   // Shares stated for the first-order form: 6.5 % and 5.2 % at 10 degrees, 19 % and 16 % at 20
   // degrees, to two digits.
-  const SymmetricCamera camera{half_field_of_view_rad(), 650.0};
+  const test::SymmetricCamera camera{half_field_of_view_rad(), 650.0};
   const auto shortfall = [&](double degrees, auto side) {
     const auto range = range_of(degrees, 100);
-    return 1.0 - side(small_angle_plane_sizes(camera, range)) /
-                     side(closed_form_plane_sizes(camera, range));
+    return 1.0 - side(test::small_angle_plane_sizes(camera, range)) /
+                     side(test::closed_form_plane_sizes(camera, range));
   };
-  const auto st = [](const SymmetricPlaneSizes& sizes) { return sizes.st_side_mm; };
-  const auto uv = [](const SymmetricPlaneSizes& sizes) { return sizes.uv_side_mm; };
+  const auto st = [](const test::SymmetricPlaneSizes& sizes) { return sizes.st_side_mm; };
+  const auto uv = [](const test::SymmetricPlaneSizes& sizes) { return sizes.uv_side_mm; };
   EXPECT_NEAR(shortfall(10, st), 0.065, 0.0005);
   EXPECT_NEAR(shortfall(10, uv), 0.052, 0.0005);
   EXPECT_NEAR(shortfall(20, st), 0.19, 0.005);

@@ -5,7 +5,7 @@
 
 #include "base/error.h"
 #include "simulation/spine_phantom.h"
-#include "volume/phantoms.h"
+#include "support/ct_phantoms.h"
 
 namespace af {
 namespace {

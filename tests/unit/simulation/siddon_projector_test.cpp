@@ -10,7 +10,7 @@
 
 #include "base/error.h"
 #include "base/hash_random.h"
-#include "volume/phantoms.h"
+#include "support/ct_phantoms.h"
 
 namespace af {
 namespace {

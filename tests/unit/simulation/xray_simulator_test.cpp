@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "simulation/material_tables.h"
-#include "volume/phantoms.h"
+#include "support/ct_phantoms.h"
 
 namespace af {
 namespace {

@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
-#include "volume/phantoms.h"
+#include "support/ct_phantoms.h"
 
 namespace af {
 namespace {

@@ -9,8 +9,8 @@
 #include "base/error.h"
 #include "base/hash_random.h"
 #include "base/vector_width.h"
+#include "support/ct_phantoms.h"
 #include "support/cube_grid.h"
-#include "volume/phantoms.h"
 
 namespace af {
 namespace {

@@ -8,8 +8,8 @@
 
 #include "drr/ray_cast_drr.h"
 #include "geometry/slab_sizing.h"
+#include "support/ct_phantoms.h"
 #include "support/cube_grid.h"
-#include "volume/phantoms.h"
 
 namespace af::evaluation {
 namespace {

@@ -5,8 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include "support/ct_phantoms.h"
 #include "unit/precompute/casting/shear_warp_cases.h"
-#include "volume/phantoms.h"
 
 namespace af {
 namespace {

@@ -7,8 +7,8 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "support/ct_phantoms.h"
 #include "unit/precompute/casting/shear_warp_cases.h"
-#include "volume/phantoms.h"
 
 namespace af {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "base/vector_width.h"
 #include "precompute/units/unit_planner.h"
-#include "volume/phantoms.h"
+#include "support/ct_phantoms.h"
 
 namespace af {
 namespace {

@@ -6,8 +6,8 @@
 #include <gtest/gtest.h>
 
 #include "base/vector_width.h"
+#include "support/ct_phantoms.h"
 #include "unit/precompute/casting/shear_warp_cases.h"
-#include "volume/phantoms.h"
 
 namespace af {
 namespace {

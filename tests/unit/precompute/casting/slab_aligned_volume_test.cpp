@@ -8,8 +8,8 @@
 
 #include "base/error.h"
 #include "base/vector_width.h"
+#include "support/ct_phantoms.h"
 #include "unit/precompute/casting/shear_warp_cases.h"
-#include "volume/phantoms.h"
 
 namespace af {
 namespace {

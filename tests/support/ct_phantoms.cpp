@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "volume/phantoms.h"
+#include "support/ct_phantoms.h"
 
 #include <cmath>
 
