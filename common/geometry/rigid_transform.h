@@ -4,6 +4,7 @@
 #include <array>
 #include <numbers>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -26,6 +27,7 @@ struct PoseParameters {
   /// (rx, ry, rz in degrees, tx, ty, tz in mm): the order of every CSV file and report.
   [[nodiscard]] std::array<double, 6> deg_and_mm() const;
   static PoseParameters from_deg_and_mm(const std::array<double, 6>& values);
+  auto members() { return std::tie(rotation_rad, translation_mm); }
 };
 
 /// Names of deg_and_mm() in files.

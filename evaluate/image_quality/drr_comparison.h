@@ -35,6 +35,20 @@ struct DrrComparison {
   double foreground_fraction = std::numeric_limits<double>::quiet_NaN();
   double tested_seconds = 0.0;  ///< wall time of the two DRRs
   double reference_seconds = 0.0;
+
+  auto members() {
+    return std::tie(parameters,
+                    redrawn,
+                    rays_outside,
+                    psnr_db,
+                    rms_difference,
+                    mean_difference,
+                    largest_difference,
+                    reference_maximum,
+                    foreground_fraction,
+                    tested_seconds,
+                    reference_seconds);
+  }
 };
 
 /// Compares two renderers of one view. One object per thread.

@@ -232,24 +232,14 @@ std::vector<LossSplit> split_losses(const ImageQualityOptions& options,
                                     const Communicator& world) {
   const std::int64_t count =
       std::min<std::int64_t>(options.split_loss_poses, setup.pose_count(options));
-  std::vector<LossSplit> splits(static_cast<std::size_t>(count));
-  if (count == 0) return splits;
+  if (count == 0) return {};
   const LossSplitter splitter(
       field, reference, setup.ct.volume, options.ray_caster, setup.field->light_slab, setup.view);
-  collect_rows(
-      world,
-      unfinished,
-      count,
-      "losses split",
-      [&](std::int64_t index) -> json {
+  return collected_rows<LossSplit>(
+      world, unfinished, count, "losses split", [&](std::int64_t index) {
         const PoseParameters parameters = compare(options, setup, comparer, index).parameters;
-        return splitter.at_pose(pose_from_parameters(setup.field->identity.frame, parameters))
-            .mean_square;
-      },
-      [&](std::int64_t index, const json& row) {
-        row.get_to(splits[static_cast<std::size_t>(index)].mean_square);
+        return splitter.at_pose(pose_from_parameters(setup.field->identity.frame, parameters));
       });
-  return splits;
 }
 
 /// Collective. Compares one field and writes its folder; the result is rank 0's.
@@ -288,17 +278,11 @@ TargetResult evaluate_target(const ImageQualityOptions& options,
                    static_cast<double>(count) * static_cast<double>(sizeof(DrrComparison)));
   });
   TargetResult result{target.case_name, setup.view.camera.name, {}, {}};
-  result.comparisons.resize(static_cast<std::size_t>(count));
   announce_time(
       world, "poses compared", count, [&] { std::ignore = compare(options, setup, comparer, 0); });
-  collect_rows(
-      world,
-      unfinished("-poses"),
-      count,
-      "poses compared",
-      [&](std::int64_t index) { return comparison_row(compare(options, setup, comparer, index)); },
-      [&](std::int64_t index, const json& row) {
-        result.comparisons[static_cast<std::size_t>(index)] = comparison_of(row);
+  result.comparisons = collected_rows<DrrComparison>(
+      world, unfinished("-poses"), count, "poses compared", [&](std::int64_t index) {
+        return compare(options, setup, comparer, index);
       });
   const std::vector<LossSplit> splits =
       split_losses(options, setup, *field, ray_cast, comparer, unfinished("-losses"), world);

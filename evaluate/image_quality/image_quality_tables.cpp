@@ -41,44 +41,6 @@ json share_where(const std::vector<double>& values, const auto& predicate) {
 
 }  // namespace
 
-json comparison_row(const DrrComparison& comparison) {
-  const auto& rotation = comparison.parameters.rotation_rad;
-  const auto& translation = comparison.parameters.translation_mm;
-  return {{rotation.x(), rotation.y(), rotation.z()},
-          {translation.x(), translation.y(), translation.z()},
-          comparison.redrawn,
-          comparison.rays_outside,
-          {comparison.psnr_db,
-           comparison.rms_difference,
-           comparison.mean_difference,
-           comparison.largest_difference,
-           comparison.reference_maximum,
-           comparison.foreground_fraction,
-           comparison.tested_seconds,
-           comparison.reference_seconds}};
-}
-
-DrrComparison comparison_of(const json& row) {
-  const auto vector_of = [](const json& values) {
-    return Eigen::Vector3d(
-        values[0].get<double>(), values[1].get<double>(), values[2].get<double>());
-  };
-  const auto values = row[4].get<std::array<double, 8>>();
-  DrrComparison comparison;
-  comparison.parameters = {vector_of(row[0]), vector_of(row[1])};
-  comparison.redrawn = row[2].get<int>();
-  comparison.rays_outside = row[3].get<std::int64_t>();
-  comparison.psnr_db = values[0];
-  comparison.rms_difference = values[1];
-  comparison.mean_difference = values[2];
-  comparison.largest_difference = values[3];
-  comparison.reference_maximum = values[4];
-  comparison.foreground_fraction = values[5];
-  comparison.tested_seconds = values[6];
-  comparison.reference_seconds = values[7];
-  return comparison;
-}
-
 CsvTable image_quality_table(const std::vector<DrrComparison>& comparisons) {
   CsvTable table({"pose_index",
                   "rx_deg",

@@ -11,10 +11,6 @@
 
 namespace af::evaluation {
 
-/// A comparison as a row to be sent between ranks, and back.
-nlohmann::json comparison_row(const DrrComparison& comparison);
-DrrComparison comparison_of(const nlohmann::json& row);
-
 /// image-quality.csv: one row per pose, in order; no timings.
 CsvTable image_quality_table(const std::vector<DrrComparison>& comparisons);
 

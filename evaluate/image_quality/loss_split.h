@@ -19,6 +19,7 @@ struct LossSplit {
       "uv", "st", "uv_st", "quantisation", "total"};
 
   std::array<double, kParts> mean_square{};
+  auto members() { return std::tie(mean_square); }
 
   [[nodiscard]] std::array<double, kParts> psnr_db() const;
 };

@@ -1,26 +1,42 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <nlohmann/json.hpp>
+#include <numeric>
+#include <span>
 #include <string>
+#include <vector>
 
+#include "base/stored_bytes.h"
 #include "parallel/communicator.h"
 #include "run/resumable_items.h"
 
 namespace af::evaluation {
 
-/// Collective. The rows of items 0 ... count - 1 that no earlier run has finished, shared over the
-/// ranks and kept (see ResumableItems); then `receive` gets every item's row on rank 0, in any
-/// order. Rows are kept as CBOR: doubles keep every bit, NaN and infinity. Rank 0 prints the
-/// progress of `what`, unless that is empty.
-void collect_rows(const Communicator& world,
-                  const UnfinishedWork& unfinished,
-                  std::int64_t count,
-                  const std::string& what,
-                  const std::function<nlohmann::json(std::int64_t item)>& row_of_item,
-                  const std::function<void(std::int64_t item, const nlohmann::json& row)>& receive);
+/// Collective. The rows of items 0 ... count - 1: those that no earlier run has finished are shared
+/// over the ranks and kept (see ResumableItems). Rank 0 gets all, the other ranks as many empty
+/// ones. Rank 0 prints the progress of `what`, unless that is empty.
+template <typename Row, typename RowOfItem>
+std::vector<Row> collected_rows(const Communicator& world,
+                                const UnfinishedWork& unfinished,
+                                std::int64_t count,
+                                const std::string& what,
+                                const RowOfItem& row_of_item) {
+  ResumableItems items(unfinished, world);
+  std::vector<std::int64_t> all(static_cast<std::size_t>(count));
+  std::iota(all.begin(), all.end(), 0);
+  items.complete(all, what, [&](std::int64_t item) { return bytes_of<Row>(row_of_item(item)); });
+  std::vector<Row> rows(all.size());
+  all_or_none(world, [&] {
+    if (!world.is_root()) return;
+    items.visit([&](std::int64_t item, std::span<const std::byte> row) {
+      rows[static_cast<std::size_t>(item)] = value_of<Row>(row, unfinished.folder.string());
+    });
+  });
+  return rows;
+}
 
 /// Rank 0 does one item, discards the result, and says how long `count` of them will take on all
 /// ranks. When the item fails, nothing is said: the run itself will report why.

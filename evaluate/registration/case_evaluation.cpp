@@ -16,6 +16,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/stored_bytes.h"
 #include "evaluate/methods/loaded_methods.h"
 #include "evaluate/outputs/row_gathering.h"
 #include "evaluate/registration/shared_measuring.h"
@@ -30,7 +31,6 @@
 #include "run/resumable_items.h"
 #include "run/stop_request.h"
 #include "run/terminal.h"
-#include "text/cbor_json.h"
 #include "text/options_toml.h"
 
 namespace af::evaluation {
@@ -172,7 +172,7 @@ struct MethodRows {
   /// Rank 0: calls `receive` with the row of every start.
   void visit(const std::function<void(std::int64_t start_index, TracedRow traced)>& receive) const {
     items.visit([&](std::int64_t index, std::span<const std::byte> record) {
-      receive(index, row_of_record(record, renderer + " rows"));
+      receive(index, value_of<TracedRow>(record, renderer + " rows"));
     });
   }
 };
@@ -195,7 +195,7 @@ void register_with(Method& method,
                    // first failures of all.
                    if (!traced_start.trace.empty() && ++traced > kMostTraces)
                      traced_start.trace.clear();
-                   return cbor_bytes(packed_row(traced_start));
+                   return bytes_of(traced_start);
                  });
 }
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <limits>
 #include <span>
+#include <tuple>
 
 #include "geometry/camera_geometry.h"
 #include "geometry/rigid_transform.h"
@@ -22,12 +23,13 @@ struct RegistrationErrors {
   double rotation_deg = kMissing;             ///< angle of the rotation between the two poses
   double translation_mm = kMissing;           ///< distance of T c from G c, c the ROI centre
 
-  /// In the order of the members, the order of columns.
+  /// In the order of columns.
   [[nodiscard]] std::array<double, 5> values() const {
     return {mrpd_mm, projection_detector_mm, projection_isocenter_mm, rotation_deg, translation_mm};
   }
-  static RegistrationErrors of_values(const std::array<double, 5>& values) {
-    return {values[0], values[1], values[2], values[3], values[4]};
+  auto members() {
+    return std::tie(
+        mrpd_mm, projection_detector_mm, projection_isocenter_mm, rotation_deg, translation_mm);
   }
 };
 

@@ -6,57 +6,18 @@
 #include <cerrno>
 #include <cstddef>
 #include <cstring>
-#include <stdexcept>
 #include <utility>
 
 #include "base/error.h"
 #include "files/output_file.h"
 #include "register/results/registration_columns.h"
-#include "text/cbor_json.h"
 
 namespace af::evaluation {
-
-using nlohmann::json;
 
 namespace {
 
 void append_numbers(std::vector<std::string>& fields, const std::array<double, 6>& values) {
   for (const double value : values) fields.push_back(number_text(value));
-}
-
-json packed_trace(const std::vector<TracePoint>& trace) {
-  json packed = json::array();
-  for (const TracePoint& point : trace)
-    packed.push_back({point.stage,
-                      point.step_mm,
-                      point.poses_tried,
-                      point.similarity,
-                      point.deg_mm,
-                      point.tre_mm});
-  return packed;
-}
-
-/// get() does not check this: that a number is whole and fits.
-template <typename Integer>
-Integer integer_of(const json& value) {
-  const bool fits =
-      value.is_number_unsigned()
-          ? std::in_range<Integer>(value.get<std::uint64_t>())
-          : value.is_number_integer() && std::in_range<Integer>(value.get<std::int64_t>());
-  if (!fits) throw std::runtime_error("a number that must be whole is not, or is too large");
-  return value.get<Integer>();
-}
-
-std::vector<TracePoint> trace_of(const json& packed) {
-  std::vector<TracePoint> trace;
-  for (const json& point : packed)
-    trace.push_back({integer_of<int>(point.at(0)),
-                     point.at(1).get<double>(),
-                     integer_of<std::int64_t>(point.at(2)),
-                     point.at(3).get<double>(),
-                     point.at(4).get<std::array<double, 6>>(),
-                     point.at(5).get<double>()});
-  return trace;
 }
 
 std::vector<std::string> start_columns() {
@@ -114,58 +75,6 @@ registration::NamedCells cells_of(const RegistrationRow& row) {
 }
 
 }  // namespace
-
-json packed_row(const TracedRow& traced) {
-  const RegistrationRow& row = traced.row;
-  return {row.case_name.text(),
-          row.renderer.text(),
-          row.start_index,
-          row.draw_index,
-          row.interval,
-          row.start_deg_mm,
-          row.final_deg_mm,
-          {row.initial_tre_mm, row.tre_mm, row.stated_pose_tre_mm, row.similarity, row.seconds},
-          row.errors.values(),
-          {row.evaluations, row.inadmissible, row.drr_count},
-          row.stop_reason.text(),
-          row.error.text(),
-          packed_trace(traced.trace)};
-}
-
-TracedRow row_of(const json& packed) {
-  TracedRow traced;
-  RegistrationRow& row = traced.row;
-  row.case_name = packed.at(0).get<std::string>();
-  row.renderer = packed.at(1).get<std::string>();
-  row.start_index = integer_of<std::int64_t>(packed.at(2));
-  row.draw_index = integer_of<std::uint64_t>(packed.at(3));
-  row.interval = integer_of<int>(packed.at(4));
-  row.start_deg_mm = packed.at(5).get<std::array<double, 6>>();
-  row.final_deg_mm = packed.at(6).get<std::array<double, 6>>();
-  const auto values = packed.at(7).get<std::array<double, 5>>();
-  row.initial_tre_mm = values[0];
-  row.tre_mm = values[1];
-  row.stated_pose_tre_mm = values[2];
-  row.similarity = values[3];
-  row.seconds = values[4];
-  row.errors = RegistrationErrors::of_values(packed.at(8).get<std::array<double, 5>>());
-  row.evaluations = integer_of<std::int64_t>(packed.at(9).at(0));
-  row.inadmissible = integer_of<std::int64_t>(packed.at(9).at(1));
-  row.drr_count = integer_of<std::int64_t>(packed.at(9).at(2));
-  row.stop_reason = packed.at(10).get<std::string>();
-  row.error = packed.at(11).get<std::string>();
-  traced.trace = trace_of(packed.at(12));
-  return traced;
-}
-
-TracedRow row_of_record(std::span<const std::byte> record, const std::string& file) {
-  const json packed = json_of_cbor(record, file);
-  try {
-    return row_of(packed);
-  } catch (const std::exception& error) {
-    throw FileError(file, std::string("a record is no row: ") + error.what());
-  }
-}
 
 CsvTable registrations_table(std::span<const RegistrationRow> rows) {
   CsvTable table(registration::names_of(cells_of(RegistrationRow())));

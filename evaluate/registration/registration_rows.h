@@ -7,9 +7,9 @@
 #include <filesystem>
 #include <fstream>
 #include <limits>
-#include <nlohmann/json.hpp>
 #include <span>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "base/interned_text.h"
@@ -28,6 +28,8 @@ struct TracePoint {
   double similarity = 0.0;
   std::array<double, 6> deg_mm{};  ///< relative to gold, about the ROI centre
   double tre_mm = 0.0;
+
+  auto members() { return std::tie(stage, step_mm, poses_tried, similarity, deg_mm, tre_mm); }
 };
 
 /// One registration as evaluated. Without an end pose (stop reasons of failed registrations)
@@ -56,19 +58,35 @@ struct RegistrationRow {
   double seconds = 0.0;  ///< wall time
 
   [[nodiscard]] bool is_success() const { return tre_mm < kSuccessTreMm; }
+  auto members() {
+    return std::tie(case_name,
+                    renderer,
+                    start_index,
+                    draw_index,
+                    interval,
+                    start_deg_mm,
+                    final_deg_mm,
+                    initial_tre_mm,
+                    tre_mm,
+                    stated_pose_tre_mm,
+                    errors,
+                    similarity,
+                    evaluations,
+                    inadmissible,
+                    drr_count,
+                    stop_reason,
+                    error,
+                    seconds);
+  }
 };
 
 /// A row, and for some failures how the search went (see failure_traces.h; empty for other rows).
 struct TracedRow {
   RegistrationRow row;
   std::vector<TracePoint> trace;
-};
 
-/// A row as it is kept while other rows are unfinished, and back.
-nlohmann::json packed_row(const TracedRow& traced);
-TracedRow row_of(const nlohmann::json& packed);
-/// The same from a record of a file, in CBOR; FileError naming `file` when it holds no row.
-TracedRow row_of_record(std::span<const std::byte> record, const std::string& file);
+  auto members() { return std::tie(row, trace); }
+};
 
 /// registrations.csv with the contract's columns, in the given order; timings last.
 CsvTable registrations_table(std::span<const RegistrationRow> rows);

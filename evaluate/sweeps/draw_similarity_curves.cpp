@@ -84,22 +84,20 @@ void measure_curves(std::vector<LoadedMethod>& methods,
               method.runner.similarity_at(pose_from_parameters(gold_frame, PoseParameters()));
         });
     unfinished.name = method.renderer;
-    collect_rows(
+    const std::vector<double> similarities = collected_rows<double>(
         world,
         unfinished,
         static_cast<std::int64_t>(items.size()),
         method.renderer + " similarities",
-        [&](std::int64_t item) -> json {
+        [&](std::int64_t item) {
           const auto [c, i] = items[static_cast<std::size_t>(item)];
           const RigidTransform pose =
               pose_from_parameters(gold_frame, along_axis(curves[c].axis, curves[c].offsets[i]));
           const registration::ObjectiveValue value = method.runner.similarity_at(pose);
           return value.is_admissible ? value.similarity : std::numeric_limits<double>::quiet_NaN();
-        },
-        [&](std::int64_t item, const json& similarity) {
-          const auto [c, i] = items[static_cast<std::size_t>(item)];
-          curves[c].similarity[i] = similarity.get<double>();
         });
+    for (std::size_t k = 0; k < items.size(); ++k)
+      curves[items[k].first].similarity[items[k].second] = similarities[k];
   }
 }
 

@@ -106,22 +106,13 @@ std::vector<DrrComparison> compare(const FieldParametersOptions& options,
         "--pose-count",
         static_cast<double>(options.pose_count) * static_cast<double>(sizeof(DrrComparison)));
   });
-  std::vector<DrrComparison> comparisons(static_cast<std::size_t>(options.pose_count));
-  collect_rows(
-      world,
-      unfinished,
-      options.pose_count,
-      "",
-      [&](std::int64_t index) {
-        return comparison_row(comparer.at_random_pose(field->identity.frame,
-                                                      field->identity.range,
-                                                      options.seed,
-                                                      static_cast<std::uint64_t>(index)));
-      },
-      [&](std::int64_t index, const json& row) {
-        comparisons[static_cast<std::size_t>(index)] = comparison_of(row);
+  return collected_rows<DrrComparison>(
+      world, unfinished, options.pose_count, "", [&](std::int64_t index) {
+        return comparer.at_random_pose(field->identity.frame,
+                                       field->identity.range,
+                                       options.seed,
+                                       static_cast<std::uint64_t>(index));
       });
-  return comparisons;
 }
 
 void write_results(const FieldParametersOptions& options,

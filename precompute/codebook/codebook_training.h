@@ -27,6 +27,10 @@ struct TrainingIteration {
   std::uint64_t training_squared_error = 0;
   std::uint64_t held_out_squared_error = 0;
   std::uint64_t codewords_repaired = 0;  ///< unused or equal ones replaced by the worst-coded tiles
+
+  auto members() {
+    return std::tie(training_squared_error, held_out_squared_error, codewords_repaired);
+  }
 };
 
 enum class TrainingStop { ImprovementBelowLimit, MaxIterations };
@@ -39,6 +43,10 @@ struct TrainedCodebook {
   std::uint64_t held_out_tiles = 0;
   std::vector<TrainingIteration> iterations;
   TrainingStop stop = TrainingStop::MaxIterations;
+
+  auto members() {
+    return std::tie(training_tiles, held_out_tiles, iterations, codebook.codewords);
+  }
 };
 
 /// Where an interrupted training continues.

@@ -35,8 +35,7 @@ class TrainingJournal {
   std::optional<TrainedCodebook> begun_;
 };
 
-/// A training as bytes, and back; nothing when the bytes are not of one with a usable codebook.
-std::vector<std::byte> packed_training(const TrainedCodebook& training);
-std::optional<TrainedCodebook> unpacked_training(std::span<const std::byte> bytes);
+/// The training of bytes_of(); nothing when they are not of one with a usable codebook.
+std::optional<TrainedCodebook> training_of(std::span<const std::byte> bytes);
 
 }  // namespace af

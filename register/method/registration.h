@@ -57,6 +57,8 @@ struct TraceRow {
   int evaluations = 0;  ///< so far, all stages
   double similarity = 0.0;
   PoseParameters parameters;  ///< relative to RegistrationProblem::frame()
+
+  auto members() { return std::tie(pass, step_mm, evaluations, similarity, parameters); }
 };
 
 struct RegistrationResult {
@@ -72,6 +74,20 @@ struct RegistrationResult {
   StopReason stop_reason = StopReason::StepBelowFinal;
   std::vector<TraceRow> trace;
   double seconds = 0.0;  ///< wall time
+
+  auto members() {
+    return std::tie(start_room_from_ct,
+                    room_from_ct,
+                    similarity,
+                    chain,
+                    evaluations,
+                    inadmissible,
+                    drr_count,
+                    rays_outside,
+                    stop_reason,
+                    trace,
+                    seconds);
+  }
 };
 
 /// Registers one case from any number of starts. Construction does what all starts share (smoothed

@@ -29,6 +29,9 @@ struct RegistrationRecord {
   std::vector<ViewValue> view_values;  ///< of PoseExaminer, at the end
   ViewDiagnosis diagnosis;             ///< of a run's best record
   std::optional<TargetErrors> errors;  ///< when the gold pose is known
+
+  /// What the registration itself found; the rest follows from it once all are there.
+  auto members() { return std::tie(start_index, result, view_values); }
 };
 
 /// The verdict on a record: at least doubtful where the diagnosis found something.

@@ -26,6 +26,8 @@ struct Judgement {
 struct ViewValue {
   double coarse = 0.0;
   double fine = 0.0;
+
+  auto members() { return std::tie(coarse, fine); }
 };
 
 /// Limits by what was measured (docs/registration-study.md, Verdicts). An end whose means over the

@@ -7,6 +7,7 @@
 
 #include <mpi.h>
 
+#include "base/stored_bytes.h"
 #include "benchmark/alternating_rounds.h"
 #include "evaluate/registration/registration_rows.h"
 #include "parallel/mpi_handle.h"
@@ -21,7 +22,6 @@ namespace {
 constexpr int kRequestTag = 21;
 constexpr int kGrantTag = 22;
 using evaluation::RegistrationRow;
-using nlohmann::json;
 
 RegistrationRow some_row(std::int64_t index) {
   RegistrationRow row;
@@ -41,11 +41,6 @@ RegistrationRow some_row(std::int64_t index) {
 
 /// Results of as many items would travel in one message, were they sent to rank 0.
 constexpr int kMostCollectedPerBlock = 64;
-
-void append(ProgressShard& shard, const json& row) {
-  const auto bytes = json::to_cbor(row);
-  shard.append(std::as_bytes(std::span(bytes)));
-}
 
 /// Rank 0's side of one request; seconds from seeing it to having answered it.
 double answer_seconds(MPI_Comm handle, std::vector<std::byte>& buffer) {
@@ -105,14 +100,13 @@ void measure_rows(int repetitions, QueueCosts& costs) {
   std::vector<double> write_seconds;
   for (int round = 0; round * kRows < repetitions; ++round) {
     write_seconds.push_back(seconds_of([&] {
-      for (int i = 0; i < kRows; ++i) append(own, evaluation::packed_row({some_row(i), {}}));
+      for (int i = 0; i < kRows; ++i) own.append(bytes_of(evaluation::TracedRow{some_row(i), {}}));
     }));
-    const auto packed = json::to_cbor(evaluation::packed_row({some_row(round), {}}));
+    const auto packed = bytes_of(evaluation::TracedRow{some_row(round), {}});
     receive_seconds.push_back(seconds_of([&] {
       for (RegistrationRow& row : kept) {
-        const json received = json::from_cbor(packed);
-        append(on_rank_zero, received);
-        row = evaluation::row_of(received).row;
+        on_rank_zero.append(packed);
+        row = value_of<evaluation::TracedRow>(packed, "journal").row;
       }
     }));
     costs.row_bytes = static_cast<double>(packed.size() + 2 * sizeof(std::int64_t));

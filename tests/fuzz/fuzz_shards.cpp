@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/crc32c.h"
+#include "base/stored_bytes.h"
 #include "fuzz/fuzz_input.h"
 #include "parallel/mpi_environment.h"
 #include "precompute/pipeline/training_checkpoints.h"
@@ -191,7 +192,7 @@ void go_on_training(fuzz::InputBytes& input) {
     tile[3] = static_cast<std::uint16_t>(tile[3] + input.take<std::uint8_t>());
     begun.codebook.codewords.push_back(tile);
   }
-  std::vector<std::byte> bytes = packed_training(begun);
+  std::vector<std::byte> bytes = bytes_of(begun);
   if (input.take_below(4) == 0) bytes[input.take_below(bytes.size())] ^= input.take<std::byte>();
   opened(true);
   const DecidingValues decides = {{"codewords", std::to_string(kCodewords)}};
@@ -236,7 +237,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       fuzz::is_accepted([&] { go_on_training(input); });
       return 0;
     case 3:
-      (void)unpacked_training(std::as_bytes(input.rest()));
+      (void)training_of(std::as_bytes(input.rest()));
       return 0;
     default:
       opened();

@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "base/stored_bytes.h"
 #include "evaluate/registration/registration_rows.h"
 #include "image_files/ct_reader.h"
 #include "image_files/image_file.h"
@@ -126,8 +127,9 @@ void write_other_seeds(const fs::path& folder) {
   traced.row.renderer = "field";
   traced.row.stop_reason = "step-below-final";
   traced.trace.push_back({1, 2.0, 13, 0.5, {}, 4.0});
-  const auto bytes = nlohmann::json::to_cbor(evaluation::packed_row(traced));
-  write_seed(folder / "rows" / "row", std::string(bytes.begin(), bytes.end()));
+  const auto bytes = bytes_of(traced);
+  write_seed(folder / "rows" / "row",
+             std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
   write_seed(folder / "field_values" / "sound", "");
   write_seed(folder / "field_values" / "shifted",
              "\2\0\3\0\1\0\0\0\0\0\0\0\x59\x40\5\0\2\0\0\0\x06\0\0\0"s);

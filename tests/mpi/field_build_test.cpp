@@ -9,11 +9,12 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "base/stored_bytes.h"
 #include "base/vector_width.h"
 #include "precompute/pipeline/training_checkpoints.h"
 #include "precompute/units/unit_planner.h"
+#include "support/ct_phantoms.h"
 #include "support/shared_folder.h"
-#include "volume/phantoms.h"
 
 namespace af {
 namespace {
@@ -356,13 +357,13 @@ TEST(TrainingFiles, BytesThatAreNotOfATrainingAreNone) {
   TrainedCodebook training;
   training.codebook.codewords = {Tile{}};
   training.iterations = {{5, 6, 0}};
-  std::vector<std::byte> bytes = packed_training(training);
-  EXPECT_TRUE(unpacked_training(bytes).has_value());
+  std::vector<std::byte> bytes = bytes_of(training);
+  EXPECT_TRUE(training_of(bytes).has_value());
   bytes.pop_back();
-  EXPECT_FALSE(unpacked_training(bytes).has_value());
-  EXPECT_FALSE(unpacked_training({}).has_value());
+  EXPECT_FALSE(training_of(bytes).has_value());
+  EXPECT_FALSE(training_of({}).has_value());
   std::fill(bytes.begin(), bytes.end(), std::byte{0xFF});  // sizes that would overflow
-  EXPECT_FALSE(unpacked_training(bytes).has_value());
+  EXPECT_FALSE(training_of(bytes).has_value());
 }
 
 TEST_F(FieldBuildTest, EncodedUnitsAreReadForTheirCodebookOnly) {

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "base/stored_bytes.h"
 #include "evaluate/image_quality/image_quality_tables.h"
 #include "evaluate/registration/case_evaluation.h"
 #include "evaluate/registration/method_comparison.h"
@@ -39,17 +40,14 @@ RegistrationRow row(const std::string& renderer,
   return result;
 }
 
-json through_cbor(const json& value) {
-  return json::from_cbor(json::to_cbor(value));
-}
-
 TEST(RegistrationRows, TravelWithEveryBit) {
   RegistrationRow sent = row("field", 7, 3.3, std::nan(""));
   sent.draw_index = 0xFFFFFFFFFFFFFFF0u;
   sent.start_deg_mm = {0.1, -1.0 / 3, 1e-300, std::numeric_limits<double>::denorm_min(), 5, -0.0};
   sent.errors = {0.5, 1.0 / 3, 2.0, std::nan(""), 1e-300};
   sent.error = "numerics; \"failed\"\n";
-  const RegistrationRow received = row_of(through_cbor(packed_row({sent, {}}))).row;
+  const RegistrationRow received =
+      value_of<TracedRow>(bytes_of(TracedRow{sent, {}}), "journal").row;
   EXPECT_EQ(received.case_name, sent.case_name);
   EXPECT_EQ(received.draw_index, sent.draw_index);
   EXPECT_EQ(received.start_deg_mm, sent.start_deg_mm);
@@ -61,27 +59,6 @@ TEST(RegistrationRows, TravelWithEveryBit) {
   EXPECT_EQ(received.errors.translation_mm, 1e-300);
   EXPECT_EQ(received.error, sent.error);
   EXPECT_EQ(received.seconds, sent.seconds);
-}
-
-TEST(RegistrationRows, ARecordThatIsNoRowIsAFileError) {
-  const auto refusal = [](const json& value) {
-    const auto bytes = json::to_cbor(value);
-    try {
-      row_of_record(std::as_bytes(std::span(bytes)), "skull.records");
-    } catch (const FileError& error) {
-      return std::string(error.what());
-    }
-    return std::string("was read");
-  };
-  const json good = packed_row({row("field", 7, 3.3, 1.0), {}});
-  EXPECT_EQ(refusal(good), "was read");
-  EXPECT_THAT(refusal(json::array({1, "skull"})), testing::HasSubstr("skull.records"));
-  EXPECT_THAT(refusal("text"), testing::HasSubstr("no row"));
-  for (const json& start : std::initializer_list<json>{"7", 7.5, 1e300, 0xFFFFFFFFFFFFFFF0u}) {
-    json wrong = good;
-    wrong[2] = start;
-    EXPECT_THAT(refusal(wrong), testing::HasSubstr("no row")) << start;
-  }
 }
 
 TEST(RegistrationRows, TableHasTheContractsColumnsWithTimingsLast) {
@@ -514,7 +491,7 @@ TEST(ImageQualityRows, TravelWithEveryBit) {
   sent.parameters = PoseParameters::from_deg_and_mm({1, 2, 3, 4, 5, 1.0 / 3});
   sent.psnr_db = std::numeric_limits<double>::infinity();
   sent.rays_outside = 12;
-  const DrrComparison received = comparison_of(through_cbor(comparison_row(sent)));
+  const DrrComparison received = value_of<DrrComparison>(bytes_of(sent), "journal");
   EXPECT_EQ(received.parameters.rotation_rad, sent.parameters.rotation_rad);
   EXPECT_EQ(received.parameters.translation_mm, sent.parameters.translation_mm);
   EXPECT_TRUE(std::isinf(received.psnr_db));

@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: Apache-2.0
+// A struct that is kept in a journal of unfinished work, or sent between ranks, lists its members
+// once, in the order of its bytes:
+//
+//     struct TracePoint {
+//       int stage = 0;
+//       double step_mm = 0.0;
+//       auto members() { return std::tie(stage, step_mm); }
+//     };
+//
+// bytes_of() and value_of() follow from that. Numbers keep every bit, NaN and infinity. Bytes are
+// those of this machine: they are for the same program (a journal names its build).
+#pragma once
+
+#include <array>
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <span>
+#include <string>
+#include <string_view>
+#include <tuple>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "base/error.h"
+
+namespace af {
+
+template <typename T>
+concept StoredStruct = requires(T& value) {
+  value.members();
+};
+
+/// Eigen's matrices and transforms of fixed size.
+template <typename T>
+concept FixedMatrix = requires {
+  requires T::SizeAtCompileTime >
+  0;
+}
+|| requires {
+  requires T::Dim >
+  0;
+};
+
+/// Texts that are stored as such but are no std::string.
+template <typename T>
+concept TextLike = requires(T& value, std::string_view text) {
+  value = text;
+  { value.text() } -> std::convertible_to<const std::string&>;
+};
+
+/// Appends values to bytes.
+class ByteWriter {
+ public:
+  template <typename T>
+  void add(T& value) {
+    if constexpr (StoredStruct<T>) {
+      std::apply([this](auto&... member) { (add(member), ...); }, value.members());
+    } else if constexpr (TextLike<T>) {
+      add_list(value.text());
+    } else if constexpr (std::is_arithmetic_v<T> || std::is_enum_v<T>) {
+      add_raw(&value, sizeof(value));
+    } else if constexpr (FixedMatrix<T>) {
+      add_raw(value.data(), sizeof(value));
+    } else if constexpr (requires { std::tuple_size<T>::value; }) {
+      for (auto& element : value) add(element);
+    } else {
+      add_list(value);
+    }
+  }
+  std::vector<std::byte> take() { return std::move(bytes_); }
+
+ private:
+  void add_raw(const void* first, std::size_t count) {
+    const auto* const bytes = static_cast<const std::byte*>(first);
+    bytes_.insert(bytes_.end(), bytes, bytes + count);
+  }
+  template <typename List>
+  void add_list(List& list) {
+    std::uint64_t count = list.size();
+    add(count);
+    for (auto& element : list) add(element);
+  }
+
+  std::vector<std::byte> bytes_;
+};
+
+/// Takes values from the front of bytes.
+class ByteReader {
+ public:
+  /// `source` is what errors name.
+  ByteReader(std::span<const std::byte> bytes, std::string source)
+      : bytes_(bytes), source_(std::move(source)) {}
+
+  template <typename T>
+  void take(T& value) {
+    if constexpr (StoredStruct<T>) {
+      std::apply([this](auto&... member) { (take(member), ...); }, value.members());
+    } else if constexpr (TextLike<T>) {
+      std::string text;
+      take_list(text);
+      value = text;
+    } else if constexpr (std::is_arithmetic_v<T> || std::is_enum_v<T>) {
+      take_raw(&value, sizeof(value));
+    } else if constexpr (FixedMatrix<T>) {
+      take_raw(value.data(), sizeof(value));
+    } else if constexpr (requires { std::tuple_size<T>::value; }) {
+      for (auto& element : value) take(element);
+    } else {
+      take_list(value);
+    }
+  }
+  void require_end() const { require(bytes_.empty()); }
+
+ private:
+  void require(bool is_whole) const {
+    if (!is_whole)
+      throw FileError(source_, "a record does not have the right size: start over with --restart");
+  }
+  void take_raw(void* first, std::size_t count) {
+    require(count <= bytes_.size());
+    std::memcpy(first, bytes_.data(), count);
+    bytes_ = bytes_.subspan(count);
+  }
+  template <typename List>
+  void take_list(List& list) {
+    std::uint64_t count = 0;
+    take(count);
+    // Every element takes a byte at least, so a hostile count asks for no more than the record has.
+    require(count <= bytes_.size());
+    list.resize(static_cast<std::size_t>(count));
+    for (auto& element : list) take(element);
+  }
+
+  std::span<const std::byte> bytes_;
+  std::string source_;
+};
+
+template <typename T>
+std::vector<std::byte> bytes_of(T value) {
+  ByteWriter writer;
+  writer.add(value);
+  return writer.take();
+}
+
+/// FileError naming `source` when the bytes are too few or too many.
+template <typename T>
+T value_of(std::span<const std::byte> bytes, const std::string& source) {
+  T value{};
+  ByteReader reader(bytes, source);
+  reader.take(value);
+  reader.require_end();
+  return value;
+}
+
+}  // namespace af

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "base/stored_bytes.h"
+
+#include <cmath>
+#include <limits>
+
+#include <Eigen/Geometry>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/interned_text.h"
+
+namespace af {
+namespace {
+
+enum class Colour { Red, Green };
+
+struct Inner {
+  int count = 0;
+  std::vector<double> values;
+  auto members() { return std::tie(count, values); }
+};
+
+struct Outer {
+  std::uint64_t large = 0;
+  bool is_set = false;
+  Colour colour = Colour::Red;
+  std::string text;
+  InternedText name;
+  std::array<double, 3> numbers{};
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  std::vector<Inner> list;
+  auto members() { return std::tie(large, is_set, colour, text, name, numbers, pose, list); }
+};
+
+Outer example() {
+  Outer outer;
+  outer.large = 0xFFFFFFFFFFFFFFF0u;
+  outer.is_set = true;
+  outer.colour = Colour::Green;
+  outer.text = std::string("a\0b", 3);
+  outer.name = "skull";
+  outer.numbers = {std::nan(""), -0.0, std::numeric_limits<double>::denorm_min()};
+  outer.pose.translate(Eigen::Vector3d(1.0, 2.0, 1.0 / 3));
+  outer.list = {{1, {}}, {2, {std::numeric_limits<double>::infinity(), 5.0}}};
+  return outer;
+}
+
+TEST(StoredBytes, KeepEveryBitOfEveryMember) {
+  const Outer back = value_of<Outer>(bytes_of(example()), "journal");
+  EXPECT_EQ(back.large, 0xFFFFFFFFFFFFFFF0u);
+  EXPECT_TRUE(back.is_set);
+  EXPECT_EQ(back.colour, Colour::Green);
+  EXPECT_EQ(back.text, std::string("a\0b", 3));
+  EXPECT_EQ(back.name, "skull");
+  EXPECT_TRUE(std::isnan(back.numbers[0]));
+  EXPECT_TRUE(std::signbit(back.numbers[1]));
+  EXPECT_EQ(back.numbers[2], std::numeric_limits<double>::denorm_min());
+  EXPECT_EQ(back.pose.matrix(), example().pose.matrix());
+  ASSERT_EQ(back.list.size(), 2u);
+  EXPECT_EQ(back.list[0].count, 1);
+  EXPECT_TRUE(back.list[0].values.empty());
+  EXPECT_EQ(back.list[1].values, (std::vector<double>{INFINITY, 5.0}));
+  EXPECT_EQ(bytes_of(back), bytes_of(example()));
+}
+
+TEST(StoredBytes, AnyOtherNumberOfThemIsAFileErrorThatNamesTheSource) {
+  std::vector<std::byte> bytes = bytes_of(example());
+  for (std::size_t count = 0; count < bytes.size(); ++count)
+    EXPECT_THROW(value_of<Outer>(std::span(bytes).first(count), "journal"), FileError) << count;
+  bytes.push_back(std::byte{0});
+  try {
+    value_of<Outer>(bytes, "skull.journal");
+    FAIL() << "was read";
+  } catch (const FileError& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("skull.journal"));
+  }
+}
+
+TEST(StoredBytes, ACountThatTheRecordCannotHoldAsksForNoMemory) {
+  const std::vector<std::byte> bytes = bytes_of(std::numeric_limits<std::uint64_t>::max());
+  EXPECT_THROW(value_of<std::vector<double>>(bytes, "journal"), FileError);
+  EXPECT_THROW(value_of<std::string>(bytes, "journal"), FileError);
+}
+
+}  // namespace
+}  // namespace af
