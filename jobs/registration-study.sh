@@ -196,18 +196,23 @@ register() {
   chain=$base_chain
 }
 
-# Measures and the optimisers that can use them: local ones that need only values in the paper's two passes, those that
-# need derivatives, bobyqa for comparison and the costly cma-es on the pyramid of `fast`. Pattern intensity
-# takes seconds a registration.
+# Every measure with every optimiser that can use it: local ones that need only values in the paper's two passes, those
+# that need derivatives, bobyqa for comparison and the costly cma-es on the pyramid of `fast`. Pattern intensity, which
+# takes seconds a registration, only as the paper would.
 screen_methods() {
-  local similarity optimizer
-  for similarity in ncc tncc gc rg ssd; do echo "fast:$similarity:gauss-newton"; done
-  for similarity in mi nmi ncc gc rg ssd; do echo "fast:$similarity:gradient"; done
-  echo paper:pi:best-neighbor
-  for similarity in mi nmi ncc tncc gc rg ssd gd go entropy; do
-    for optimizer in best-neighbor bobyqa nelder-mead; do echo "paper:$similarity:$optimizer"; done
-    for optimizer in bobyqa cma-es; do echo "fast:$similarity:$optimizer"; done
-  done
+  local optimizer needs similarity gradient equations
+  while IFS=$'\t' read -r optimizer needs _; do
+    while IFS=$'\t' read -r similarity gradient equations _; do
+      case "$similarity:$optimizer:$needs" in
+        pi:best-neighbor:*) echo "paper:$similarity:$optimizer" ;;
+        pi:*) ;;
+        *:cma-es:*) echo "fast:$similarity:$optimizer" ;;
+        *:bobyqa:*) printf '%s\n' "paper:$similarity:$optimizer" "fast:$similarity:$optimizer" ;;
+        *:-) echo "paper:$similarity:$optimizer" ;;
+        "$similarity:$optimizer:$gradient" | "$similarity:$optimizer:$equations") echo "fast:$similarity:$optimizer" ;;
+      esac
+    done < <("$bin/af-register" --list measures)
+  done < <("$bin/af-register" --list optimizers)
 }
 
 # This is for the clean study.

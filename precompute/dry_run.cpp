@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdio>
 
+#include "base/joined.h"
 #include "precompute/units/unit_planner.h"
 
 namespace af {
@@ -103,11 +104,9 @@ std::string megabytes_text(std::uint64_t bytes) {
 }
 
 std::string seconds_text(const PhaseSeconds& seconds) {
-  std::string text;
-  for (const auto& [phase, of_phase] : seconds)
-    text += (text.empty() ? "" : ", ") + phase +
-            formatted(of_phase < 9.95 ? " %.1f" : " %.0f", of_phase);
-  return text;
+  return joined(seconds, ", ", [](const auto& phase) {
+    return phase.first + formatted(phase.second < 9.95 ? " %.1f" : " %.0f", phase.second);
+  });
 }
 
 double FieldForecast::all_seconds() const {

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "base/error.h"
+#include "base/joined.h"
 #include "study/node_ct.h"
 #include "study/pose_file.h"
 #include "study/rig_file.h"
@@ -25,10 +26,8 @@ struct NamedSource {
 
 std::string only_camera(const std::vector<std::string>& cameras, const std::string& where) {
   if (cameras.size() == 1) return cameras.front();
-  std::string known;
-  for (const std::string& camera : cameras) known += (known.empty() ? "" : ", ") + camera;
   throw UsageError("--camera is needed: a field belongs to one camera, and " + where + " has " +
-                   known);
+                   joined(cameras));
 }
 
 NamedSource source_of_study(const PrecomputeOptions& options, const Study& study) {

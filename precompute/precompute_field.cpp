@@ -16,7 +16,7 @@
 #include "base/error.h"
 #include "files/output_file.h"
 #include "parallel/work_watch.h"
-#include "precompute/casting/shear_warp_caster.h"
+#include "precompute/casting/casters.h"
 #include "precompute/dry_run.h"
 #include "precompute/field_source.h"
 #include "precompute/pipeline/field_build.h"
@@ -209,14 +209,15 @@ class PrecomputeRun {
     clock_.end("read");
     const StPlane st_plane = options_.st_plane_rule();
     const bool is_default = options_.slabs == 1 && st_plane == StPlane::Centre;
-    if (!options_.is_shear_warp() && is_default) return;
+    const bool is_for_casting = caster_named(options_.caster).needs_resampled;
+    if (!is_for_casting && is_default) return;
     note.change("resampling the CT");
     resampled_ = std::make_shared<const SlabAlignedVolume>(
         resample_on_node(*source_.volume, light_slab_.slab_from_ct, SlabAlignedOptions{}, world_));
     if (!is_default)
       size_planes(all_or_none(
           world_, [&] { return choose_depth_slabs(*resampled_, options_.slabs, st_plane); }));
-    if (!options_.is_shear_warp()) resampled_ = nullptr;
+    if (!is_for_casting) resampled_ = nullptr;
     clock_.end("resample");
   }
 
@@ -233,21 +234,18 @@ class PrecomputeRun {
   }
 
   [[nodiscard]] std::unique_ptr<const FieldCaster> make_caster() const {
-    if (options_.is_shear_warp())
-      return std::make_unique<ShearWarpFieldCaster>(*resampled_, light_slab_, quantizer());
-    return std::make_unique<RayCastFieldCaster>(
-        *source_.volume, light_slab_, quantizer(), options_.ray_caster);
+    return caster_named(options_.caster)
+        .make({*source_.volume, resampled_.get(), light_slab_, quantizer(), options_.ray_caster});
   }
 
   [[nodiscard]] PlanOptions plan() const {
-    return plan_options_for_ranks(
-        light_slab_, world_.size(), options_.is_shear_warp() ? kShearWarpPlan : PlanOptions{});
+    return plan_options_for_ranks(light_slab_, world_.size(), caster_named(options_.caster).plan);
   }
 
-  /// Units whose casting tells the speed: small ones, where size does not matter to the caster.
+  /// Units whose casting tells the speed.
   [[nodiscard]] PlanOptions sample_plan() const {
-    constexpr std::int64_t kSmallUnitRays = 4096;
-    return options_.is_shear_warp() ? plan() : PlanOptions{kSmallUnitRays};
+    const PlanOptions sample = caster_named(options_.caster).sample;
+    return sample.rays_per_unit < plan().rays_per_unit ? sample : plan();
   }
 
   [[nodiscard]] std::uint64_t volume_bytes() const {
@@ -565,7 +563,7 @@ class PrecomputeRun {
   std::unique_ptr<OutputLock> lock_;  ///< rank 0
   FieldSource source_;
   LightSlab light_slab_;
-  std::shared_ptr<const SlabAlignedVolume> resampled_;  ///< for the shear-warp caster
+  std::shared_ptr<const SlabAlignedVolume> resampled_;  ///< for casters that need it
   std::size_t iterations_resumed_ = 0;                  ///< of the training, by earlier runs
   PhaseClock clock_;
 };

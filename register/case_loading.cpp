@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/joined.h"
 #include "drr/field_level.h"
 #include "drr/ray_cast_drr.h"
 #include "drr/two_pass_af_drr.h"
@@ -47,8 +48,7 @@ std::filesystem::path field_path_of(const StudyCase& study_case,
 }
 
 void require_known_field_cameras(const StudyCase& study_case, const CaseLoadOptions& options) {
-  std::string known;
-  for (const StudyView& view : study_case.views) known += (known.empty() ? "" : ", ") + view.camera;
+  const std::string known = joined(study_case.views, ", ", &StudyView::camera);
   for (const auto& given : options.field_paths) {
     const bool found =
         std::any_of(study_case.views.begin(), study_case.views.end(), [&](const StudyView& view) {

@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "cli/app_main.h"
+#include "cli/bind_lists.h"
 #include "cli/bind_options.h"
 #include "files/output_file.h"
 #include "parallel/work_watch.h"
@@ -129,6 +130,9 @@ int main(int argc, char** argv) {
       "found, of any start, is exit code 7: result.tfm, pose.toml and slicer/ are not written."};
   af::cli::bind_options(app, options);
   af::cli::bind_run_limits(app);
+  af::cli::bind_lists(app,
+                      {{"measures", af::registration::similarity_list()},
+                       {"optimizers", af::registration::optimizer_list()}});
   const std::string command_line = af::cli::command_line(argc, argv);
   return af::cli::app_main(
       app, argc, argv, [&](const Communicator& world) { run(options, command_line, world); });

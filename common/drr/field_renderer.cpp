@@ -1,34 +1,62 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "drr/field_renderer.h"
 
-#include "base/error.h"
+#include <array>
+
+#include "base/named_rows.h"
 #include "drr/af_drr.h"
 #include "drr/two_pass_af_drr.h"
 
 namespace af {
+namespace {
 
-const std::vector<std::string>& field_look_up_names() {
-  static const std::vector<std::string> names{
-      "nearest", "linear", "cubic", "cubic-uv", "quadrilinear"};
-  return names;
+using FieldPointer = std::shared_ptr<const CompressedAttenuationField>;
+using RendererPointer = std::shared_ptr<const DrrRenderer>;
+using PoolPointer = std::shared_ptr<ThreadPool>;
+
+struct KnownLookUp {
+  const char* name;
+  const char* help;
+  RendererPointer (*make)(FieldPointer field, PoolPointer pool);
+};
+
+template <FieldInterpolation interpolation>
+RendererPointer make_literal(FieldPointer field, PoolPointer /*pool*/) {
+  return std::make_shared<const AfDrr>(std::move(field), interpolation);
+}
+template <AxisInterpolation st, AxisInterpolation uv>
+RendererPointer make_two_pass(FieldPointer field, PoolPointer pool) {
+  return std::make_shared<const TwoPassAfDrr>(
+      std::move(field), TwoPassOptions{st, uv}, std::move(pool));
 }
 
-std::shared_ptr<const DrrRenderer> make_field_renderer(
-    std::shared_ptr<const CompressedAttenuationField> field,
-    const std::string& look_up,
-    std::shared_ptr<ThreadPool> pool) {
-  using enum AxisInterpolation;
-  const auto make = [&](const TwoPassOptions& options) {
-    return std::make_shared<const TwoPassAfDrr>(std::move(field), options, std::move(pool));
-  };
-  if (look_up == "nearest")
-    return std::make_shared<const AfDrr>(std::move(field), FieldInterpolation::Nearest);
-  if (look_up == "quadrilinear")
-    return std::make_shared<const AfDrr>(std::move(field), FieldInterpolation::Quadrilinear);
-  if (look_up == "linear") return make(TwoPassOptions{Linear, Linear});
-  if (look_up == "cubic") return make(TwoPassOptions{Cubic, Linear});
-  if (look_up == "cubic-uv") return make(TwoPassOptions{Cubic, Cubic});
-  throw InputError("look-up", look_up, "must be nearest, linear, cubic, cubic-uv or quadrilinear");
+using enum AxisInterpolation;
+
+/// Every way of looking up there is; a new one joins here.
+constexpr std::array kLookUps = {
+    KnownLookUp{"nearest", "nearest node", make_literal<FieldInterpolation::Nearest>},
+    KnownLookUp{"linear", "linear, in two passes", make_two_pass<Linear, Linear>},
+    KnownLookUp{"cubic", "cubic over (s,t)", make_two_pass<Cubic, Linear>},
+    KnownLookUp{"cubic-uv", "cubic over (s,t) and (u,v)", make_two_pass<Cubic, Cubic>},
+    KnownLookUp{"quadrilinear",
+                "over each ray's 16 nodes, the definition",
+                make_literal<FieldInterpolation::Quadrilinear>},
+};
+
+}  // namespace
+
+std::vector<std::string> field_look_up_names() {
+  return names_of(kLookUps);
+}
+
+std::string field_look_up_help() {
+  return help_of(kLookUps);
+}
+
+RendererPointer make_field_renderer(FieldPointer field,
+                                    const std::string& look_up,
+                                    PoolPointer pool) {
+  return required_row(kLookUps, "look-up", look_up).make(std::move(field), std::move(pool));
 }
 
 }  // namespace af

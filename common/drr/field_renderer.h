@@ -11,10 +11,9 @@
 
 namespace af {
 
-/// The ways of looking DRRs up that programs offer: "nearest" node, "linear" and "cubic" in (s,t)
-/// by two passes, "cubic-uv" by two passes and cubic in (u,v) too, "quadrilinear" literally over
-/// each ray's 16 neighbours.
-const std::vector<std::string>& field_look_up_names();
+/// The ways of looking DRRs up that programs offer, and one line that explains them.
+std::vector<std::string> field_look_up_names();
+std::string field_look_up_help();
 
 /// The renderer for a name of field_look_up_names(); InputError for any other name. The threads of
 /// `pool` share a large DRR, except for "nearest" and "quadrilinear".

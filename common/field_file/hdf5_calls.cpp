@@ -5,6 +5,7 @@
 #include <span>
 
 #include "base/error.h"
+#include "base/joined.h"
 #include "field_file/chunk_index.h"
 #include "files/sha256.h"
 
@@ -63,10 +64,9 @@ Handle dataspace_of(const DatasetRule& rule) {
 }
 
 std::string text_of(const std::vector<std::uint64_t>& extents) {
-  std::string text;
-  for (const std::uint64_t extent : extents)
-    text += (text.empty() ? "" : " x ") + std::to_string(extent);
-  return text.empty() ? "scalar" : text;
+  return extents.empty()
+             ? "scalar"
+             : joined(extents, " x ", [](std::uint64_t extent) { return std::to_string(extent); });
 }
 
 std::vector<std::uint64_t> extents_of(hid_t dataset, const DatasetRule& rule, hid_t type) {

@@ -9,6 +9,7 @@
 #include <Eigen/Dense>
 
 #include "base/error.h"
+#include "base/named_rows.h"
 #include "base/plausible.h"
 
 namespace af {
@@ -199,18 +200,16 @@ bool is_equal_but_for_case(const std::string& a, const std::string& b) {
 }  // namespace
 
 const CameraGeometry& CameraRig::camera(const std::string& name) const {
-  std::string known;
   const CameraGeometry* alike = nullptr;
   int alike_count = 0;
   for (const CameraGeometry& candidate : cameras) {
     if (candidate.name == name) return candidate;
-    known += (known.empty() ? "" : ", ") + candidate.name;
     if (!is_equal_but_for_case(candidate.name, name)) continue;
     alike = &candidate;
     ++alike_count;
   }
   if (alike_count == 1) return *alike;
-  throw InputError("camera", name, "the rig has only: " + known);
+  throw InputError("camera", name, "the rig has only: " + joined(names_of(cameras)));
 }
 
 std::vector<std::string> problems(const CameraRig& rig) {

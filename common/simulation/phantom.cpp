@@ -1,22 +1,42 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "simulation/phantom.h"
 
-#include "base/error.h"
+#include <array>
+
+#include "base/named_rows.h"
 #include "simulation/head_phantom.h"
 #include "simulation/pelvis_phantom.h"
 #include "simulation/spine_phantom.h"
 
 namespace af {
 
+namespace {
+
+struct KnownPhantom {
+  const char* name;
+  const char* help;
+  Phantom (*make)(bool has_metal);
+};
+
+/// Every phantom there is; a new one joins here.
+constexpr std::array kPhantoms = {
+    KnownPhantom{"spine", "trunk from T8 to L4 with ribs and organs", spine_phantom},
+    KnownPhantom{"pelvis", "L4 to the upper thighs", pelvis_phantom},
+    KnownPhantom{"head", "vault to C4", head_phantom},
+};
+
+}  // namespace
+
 std::vector<std::string> phantom_names() {
-  return {"spine", "pelvis", "head"};
+  return names_of(kPhantoms);
+}
+
+std::string phantom_help() {
+  return help_of(kPhantoms);
 }
 
 Phantom make_phantom(const std::string& name, bool has_metal) {
-  if (name == "spine") return spine_phantom(has_metal);
-  if (name == "pelvis") return pelvis_phantom(has_metal);
-  if (name == "head") return head_phantom(has_metal);
-  throw InputError("phantom", name, "must be spine, pelvis or head");
+  return required_row(kPhantoms, "phantom", name).make(has_metal);
 }
 
 }  // namespace af

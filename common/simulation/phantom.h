@@ -5,8 +5,9 @@
 
 namespace af {
 
-/// Names of the phantoms: spine, pelvis, head.
+/// Names of the phantoms, and one line that explains them.
 std::vector<std::string> phantom_names();
+std::string phantom_help();
 
 /// A phantom by its name; InputError for any other.
 Phantom make_phantom(const std::string& name, bool has_metal);

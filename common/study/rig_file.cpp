@@ -11,6 +11,7 @@
 
 #include "base/error.h"
 #include "base/file_name.h"
+#include "base/joined.h"
 #include "base/toml_text.h"
 #include "files/output_file.h"
 #include "text/toml_reader.h"
@@ -136,7 +137,9 @@ std::optional<CameraGeometry> camera_from_matrix(TomlTableReader& reader,
 }
 
 std::optional<CameraGeometry> camera_from_keys(TomlTableReader& reader,
-                                               const CameraGeometry& stated) {
+                                               const CameraGeometry& stated,
+                                               const Eigen::Vector3d& /*isocenter_point*/,
+                                               TomlProblems& /*problems*/) {
   const auto source = reader.get_vector<3>("source_point", Presence::Required);
   const auto origin = reader.get_vector<3>("detector_origin_point", Presence::Required);
   const auto column = reader.get_vector<3>("column_direction", Presence::Required);
@@ -148,6 +151,31 @@ std::optional<CameraGeometry> camera_from_keys(TomlTableReader& reader,
   camera.column_direction = *column;
   camera.row_direction = *row;
   return camera;
+}
+
+using CameraMaker = std::optional<CameraGeometry> (*)(TomlTableReader& reader,
+                                                      const CameraGeometry& stated,
+                                                      const Eigen::Vector3d& isocenter_point,
+                                                      TomlProblems& problems);
+
+/// A way of stating a camera, told by a key that only it has.
+struct CameraForm {
+  const char* key;
+  CameraMaker make;
+};
+
+/// Every form there is; a new one joins here. The first is that of tables without such a key, and
+/// the one in which rigs are written.
+constexpr std::array kCameraForms = {
+    CameraForm{"source_point", camera_from_keys},
+    CameraForm{"projection_matrix", camera_from_matrix},
+};
+
+const CameraForm& form_of(TomlTableReader& reader) {
+  // From the last, because keys of the first beside another form are an error of that form.
+  for (auto form = kCameraForms.rbegin(); form != kCameraForms.rend(); ++form)
+    if (reader.has(form->key)) return *form;
+  return kCameraForms.front();
 }
 
 std::optional<CameraGeometry> read_camera(const toml::table& table,
@@ -163,9 +191,7 @@ std::optional<CameraGeometry> read_camera(const toml::table& table,
   stated.name = name.value_or("");
   stated.pixel_spacing_mm = spacing.value_or(Eigen::Vector2d::Ones());
   stated.size_px = size ? Eigen::Vector2i((*size)[0], (*size)[1]) : Eigen::Vector2i(1, 1);
-  auto camera = reader.has("projection_matrix")
-                    ? camera_from_matrix(reader, stated, isocenter_point, problems)
-                    : camera_from_keys(reader, stated);
+  auto camera = form_of(reader).make(reader, stated, isocenter_point, problems);
   reader.refuse_unknown_keys();
   if (!camera || !name) return std::nullopt;
   // Missing sizes stand in as ones, so that the rest is checked too.
@@ -209,12 +235,6 @@ CameraRig rig_from_table(const toml::table& table,
   problems.throw_if_any();
   throw_if_any(af::problems(rig), file);
   return rig;
-}
-
-std::string joined(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text;
 }
 
 }  // namespace

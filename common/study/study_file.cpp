@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "base/file_name.h"
+#include "base/named_rows.h"
 #include "base/toml_text.h"
 #include "files/output_file.h"
 #include "study/rig_file.h"
@@ -108,13 +109,11 @@ RegionOfInterest get_roi(TomlTableReader& reader, const CameraGeometry* camera) 
 const CameraGeometry* get_camera(TomlTableReader& reader, const CameraRig& rig) {
   const auto name = reader.get_string("camera", Presence::Required);
   if (!name) return nullptr;
-  std::string known;
-  for (const CameraGeometry& camera : rig.cameras) {
-    if (camera.name == *name) return &camera;
-    known += (known.empty() ? "" : ", ") + camera.name;
-  }
-  reader.add_problem("camera", "must be a camera of the rig, which has " + known);
-  return nullptr;
+  const CameraGeometry* const camera = find_row(rig.cameras, *name);
+  if (camera == nullptr)
+    reader.add_problem("camera",
+                       "must be a camera of the rig, which has " + joined(names_of(rig.cameras)));
+  return camera;
 }
 
 void check_fiducials(TomlTableReader& reader,
@@ -279,12 +278,9 @@ std::string case_text(const StudyCase& study_case, const fs::path& folder) {
 }  // namespace
 
 const StudyCase& Study::find_case(const std::string& name) const {
-  std::string known;
-  for (const StudyCase& candidate : cases) {
-    if (candidate.name == name) return candidate;
-    known += (known.empty() ? "" : ", ") + candidate.name;
-  }
+  if (const StudyCase* const found = find_row(cases, name); found != nullptr) return *found;
   if (name.empty() && cases.size() == 1) return cases.front();
+  const std::string known = joined(names_of(cases));
   if (name.empty()) throw InputError(path.string() + ": name one of its cases: " + known);
   throw InputError("case", name, "the study has only: " + known, path.string());
 }

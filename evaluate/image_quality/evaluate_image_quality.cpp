@@ -366,8 +366,7 @@ void ImageQualityOptions::describe(Fields& field_list) {
       .input();
   field_list("look_up",
              look_up,
-             "linear in two passes (what registration uses), cubic in (s,t), cubic-uv in (u,v) "
-             "too, quadrilinear (the paper's, literal) or nearest")
+             "How DRRs are looked up (registration takes linear). " + field_look_up_help())
       .choice(field_look_up_names());
   field_list("split_loss_poses",
              split_loss_poses,

@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "base/hash_random.h"
+#include "base/joined.h"
 #include "evaluate/statistics/statistics.h"
 #include "figures/gnuplot_figure.h"
 #include "files/output_file.h"
@@ -47,11 +48,9 @@ std::vector<double> finite_of(const std::vector<double>& values) {
   return result;
 }
 
-/// "a, b" of a plot command's parts.
-std::string joined(const std::vector<std::string>& parts) {
-  std::string result;
-  for (const std::string& part : parts) result += (result.empty() ? "" : ", \\\n  ") + part;
-  return result;
+/// Of a plot command's parts, one a line.
+std::string plots(const std::vector<std::string>& parts) {
+  return joined(parts, ", \\\n  ");
 }
 
 std::vector<double> box_row(double x, std::vector<double> values) {
@@ -134,7 +133,7 @@ void draw_psnr_boxes(const std::vector<PsnrGroup>& groups,
   parts.push_back("$boxes using 1:2:3:4:5 with candlesticks whiskerbars 0.5 lw 2 lc " +
                   color_of(0));
   parts.push_back("$boxes using 1:6:6:6:6 with candlesticks lw 4 lc " + color_of(1));
-  figure.add("set style fill empty\nplot " + joined(parts));
+  figure.add("set style fill empty\nplot " + plots(parts));
   figure.draw(path_without_extension);
   write_figure_table(path_without_extension, table);
 }
@@ -179,7 +178,7 @@ void draw_success_rates(const std::vector<OutcomeGroup>& groups,
              number_text(intervals * width_mm) + "]\nset xtics " + number_text(width_mm) +
              "\nset yrange [0:102]\nset ytics 20\nset key bottom left reverse Left samplen 1.5\n"
              "plot " +
-             joined(parts));
+             plots(parts));
   figure.draw(path_without_extension);
   write_figure_table(path_without_extension, table);
 }
@@ -227,7 +226,7 @@ void draw_tre_histogram(const std::vector<OutcomeGroup>& groups,
   figure.add(label_at("success: below " + number_text(kSuccessTreMm) + " mm",
                       "first " + number_text(kSuccessTreMm) + ", graph 0.97",
                       "right offset -0.7,0"));
-  figure.add("plot " + joined(parts));
+  figure.add("plot " + plots(parts));
   figure.draw(path_without_extension);
   write_figure_table(path_without_extension, table);
 }
@@ -278,7 +277,7 @@ void draw_tre_scatter(const std::vector<OutcomeGroup>& groups,
       "success below", "graph 0.99, first " + number_text(kSuccessTreMm), "right offset 0,-0.6"));
   figure.add(label_at(
       "no change", "graph 0.985, first " + number_text(largest_initial_mm * 1.25), "right"));
-  figure.add("plot " + joined(parts));
+  figure.add("plot " + plots(parts));
   figure.draw(path_without_extension);
   write_figure_table(path_without_extension, table);
 }
@@ -317,7 +316,7 @@ void draw_curve_panels(const std::vector<CurvePanel>& panels,
                       std::to_string(c == 0 ? 7 : 4) + " ps 0.9 lc " + color_of(c) + " notitle");
     }
     figure.add("set xlabel " + gnuplot_quoted(panels[p].x_label) + "\nset ylabel " +
-               gnuplot_quoted(p % 3 == 0 ? y_label : "") + "\nplot " + joined(parts));
+               gnuplot_quoted(p % 3 == 0 ? y_label : "") + "\nplot " + plots(parts));
   }
   figure.add("unset multiplot");
   figure.draw(path_without_extension);
@@ -361,10 +360,10 @@ void draw_sweep_panels(const std::vector<SweepPanel>& panels,
         "\nset xrange [" + number_text(panels[p].is_logarithmic ? low_x / room : low_x - room) +
         ":" + number_text(panels[p].is_logarithmic ? high_x * room : high_x + room) +
         "]\nset xtics (" + tics + ")\nset xlabel " + gnuplot_quoted(panels[p].x_label) + "\nplot " +
-        joined({"$" + name + " using 1:2 with lines lw 1.5 dt 3 lc " + color_of(0),
-                "$" + name + " using 1:2:3:4 with yerrorbars pt 7 ps 0.8 lw 2 lc " + color_of(0),
-                "$" + name + "_base using 1:2:3:4 with yerrorbars pt 7 ps 0.9 lw 2 lc " +
-                    color_of(base.empty() ? 0 : 1)}));
+        plots({"$" + name + " using 1:2 with lines lw 1.5 dt 3 lc " + color_of(0),
+               "$" + name + " using 1:2:3:4 with yerrorbars pt 7 ps 0.8 lw 2 lc " + color_of(0),
+               "$" + name + "_base using 1:2:3:4 with yerrorbars pt 7 ps 0.9 lw 2 lc " +
+                   color_of(base.empty() ? 0 : 1)}));
   }
   figure.add("unset multiplot");
   figure.draw(path_without_extension);

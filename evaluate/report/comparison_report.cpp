@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "base/error.h"
+#include "base/joined.h"
 #include "evaluate/outputs/result_figures.h"
 #include "evaluate/outputs/sample_summary_json.h"
 #include "evaluate/report/html_text.h"
@@ -23,10 +24,8 @@ std::string case_names(const json& summary) {
   constexpr std::size_t kMostNamed = 4;
   const json& cases = summary.at("cases");
   if (cases.size() > kMostNamed) return std::to_string(cases.size()) + " cases";
-  std::string names;
-  for (const json& entry : cases)
-    names += (names.empty() ? "" : ", ") + escaped(entry.at("case").get<std::string>());
-  return names;
+  return joined(
+      cases, ", ", [](const json& entry) { return escaped(entry.at("case").get<std::string>()); });
 }
 
 /// The methods of our own renderers' runs; empty for another program's poses.

@@ -6,6 +6,7 @@
 
 #include "base/build_info.h"
 #include "base/error.h"
+#include "base/joined.h"
 #include "evaluate/report/html_text.h"
 #include "evaluate/report/report_style.h"
 #include "evaluate/report/sections_report.h"
@@ -26,9 +27,7 @@ std::string default_title(const std::vector<EvaluationRun>& runs) {
       cases.insert(entry.at("case").get<std::string>());
   if (cases.empty()) return "Image quality of attenuation fields";
   if (cases.size() > 4) return "Registration of " + std::to_string(cases.size()) + " cases";
-  std::string names;
-  for (const std::string& name : cases) names += (names.empty() ? "" : ", ") + name;
-  return "Registration of " + names;
+  return "Registration of " + joined(cases);
 }
 
 std::string header(const std::vector<EvaluationRun>& runs, const std::string& title) {

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "base/joined.h"
 #include "evaluate/outputs/sample_summary_json.h"
 #include "evaluate/report/html_text.h"
 #include "evaluate/report/number_html.h"
@@ -58,9 +59,9 @@ std::string broadest_text(const json& summary) {
 std::string difference_text(const EvaluationRun& run) {
   const json images = run.summary.value("difference_images", json());
   if (!images.is_object()) return "";
-  std::string levels;
-  for (const json& image : images.at("images"))
-    levels += (levels.empty() ? "" : ", ") + decimals(image.at("psnr_db"), 1);
+  const std::string levels = joined(images.at("images"), ", ", [](const json& image) {
+    return decimals(image.at("psnr_db"), 1);
+  });
   return figure(run.file(images.at("file").get<std::string>()),
                 "image/png",
                 "a field DRR and difference images",

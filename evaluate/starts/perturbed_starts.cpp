@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "base/hash_random.h"
+#include "base/joined.h"
 #include "gold_standard/target_box.h"
 
 namespace af::evaluation {
@@ -87,9 +88,8 @@ void pick(StartMeasures& measures,
 [[noreturn]] void throw_too_empty(const std::vector<std::vector<Candidate>>& by_interval,
                                   const StartOptions& options,
                                   const StratifiedStarts& counts) {
-  std::string found;
-  for (const auto& candidates : by_interval)
-    found += (found.empty() ? "" : ", ") + std::to_string(candidates.size());
+  const std::string found = joined(
+      by_interval, ", ", [](const auto& candidates) { return std::to_string(candidates.size()); });
   throw InputError("starts_per_interval",
                    std::to_string(options.starts_per_interval),
                    "not reached in every interval after " + std::to_string(counts.draws) +

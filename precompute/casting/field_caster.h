@@ -20,9 +20,6 @@ class FieldCaster {
   /// unit.sample_count() values. A sample depends on its node alone, never on the unit it is cast
   /// in. Re-entrant.
   virtual void cast(const WorkUnit& unit, std::span<std::uint16_t> samples) const = 0;
-
-  /// The name, as in options and files.
-  [[nodiscard]] virtual const char* name() const = 0;
 };
 
 /// The reference: trilinear samples along every ray (RayCaster), cut to the unit's slab.
@@ -36,7 +33,6 @@ class RayCastFieldCaster final : public FieldCaster {
                      const RayCasterOptions& options);
 
   void cast(const WorkUnit& unit, std::span<std::uint16_t> samples) const override;
-  [[nodiscard]] const char* name() const override { return "trilinear"; }
 
  private:
   const LightSlab& light_slab_;

@@ -28,7 +28,6 @@ class ShearWarpFieldCaster final : public FieldCaster {
                        const AttenuationQuantizer& quantizer);
 
   void cast(const WorkUnit& unit, std::span<std::uint16_t> samples) const override;
-  [[nodiscard]] const char* name() const override { return "shear-warp"; }
 
  private:
   const SlabAlignedVolume& volume_;

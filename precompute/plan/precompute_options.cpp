@@ -6,6 +6,7 @@
 #include "base/number_text.h"
 #include "base/plausible.h"
 #include "base/toml_text.h"
+#include "precompute/casting/casters.h"
 
 namespace af {
 
@@ -72,11 +73,8 @@ void describe_casting(Fields& field, PrecomputeOptions& options) {
         "Nodes along each side of the uncropped (s,t) plane, both edges included")
       .within(2, 4096)
       .decides(kCastingStage);
-  field("caster",
-        options.caster,
-        "How line integrals are made: shear-warp (the CT resampled once, then slice by slice; some "
-        "100 times faster) or trilinear (the reference: samples along every ray)")
-      .one_of({"trilinear", "shear-warp"})
+  field("caster", options.caster, "How line integrals are made. " + caster_help())
+      .one_of(caster_names())
       .decides(kCastingStage);
   field.part(options.ray_caster);
   Field& step = field.at("step_mm").decides(kCastingStage);

@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "base/error.h"
+#include "base/joined.h"
 #include "base/number_text.h"
 
 namespace af::registration {
@@ -81,10 +82,7 @@ std::string stage_text(const StageOptions& stage) {
 }
 
 std::string chain_text(const ChainOptions& chain) {
-  std::string text;
-  for (const StageOptions& stage : chain.stages)
-    text += (text.empty() ? "" : "; ") + stage_text(stage);
-  return text;
+  return joined(chain.stages, "; ", stage_text);
 }
 
 ChainOptions chain_from_text(const std::string& name, const std::string& text) {

@@ -55,10 +55,10 @@ void describe_chains(Fields& field, MethodOptions& options) {
         "Method as a whole; the options below replace parts of it. " + preset_help() +
             ". Default: robust; paper with --similarity or --optimizer")
       .choice(preset_names());
-  field("similarity", options.similarity, "Similarity measure of every stage")
+  field("similarity", options.similarity, "Similarity measure of every stage. " + similarity_help())
       .choice(similarity_names())
       .not_recorded(why);
-  field("optimizer", options.optimizer, "Optimiser of every stage")
+  field("optimizer", options.optimizer, "Optimiser of every stage. " + optimizer_help())
       .choice(optimizer_names())
       .not_recorded(why);
   field("chain",

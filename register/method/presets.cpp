@@ -3,7 +3,7 @@
 
 #include <array>
 
-#include "base/error.h"
+#include "base/named_rows.h"
 #include "register/method/chain_text.h"
 
 namespace af::registration {
@@ -81,25 +81,15 @@ ChainOptions paper_chain() {
 }
 
 std::vector<std::string> preset_names() {
-  std::vector<std::string> names;
-  names.reserve(kPresets.size());
-  for (const Preset& preset : kPresets) names.emplace_back(preset.name);
-  return names;
+  return names_of(kPresets);
 }
 
 std::string preset_help() {
-  std::string text;
-  for (const Preset& preset : kPresets)
-    text += (text.empty() ? "" : "; ") + std::string(preset.name) + ": " + preset.help;
-  return text;
+  return help_of(kPresets);
 }
 
 RegistrationOptions preset_options(const std::string& name) {
-  for (const Preset& preset : kPresets)
-    if (name == preset.name) return preset.make();
-  std::string list;
-  for (const std::string& known : preset_names()) list += (list.empty() ? "" : ", ") + known;
-  throw InputError("preset", "'" + name + "'", "must be one of " + list);
+  return required_row(kPresets, "preset", name).make();
 }
 
 }  // namespace af::registration

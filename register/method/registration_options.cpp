@@ -4,16 +4,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/named_rows.h"
 #include "register/method/presets.h"
 
 namespace af::registration {
 namespace {
-
-std::string list_of(const std::vector<std::string>& names) {
-  std::string list;
-  for (const std::string& name : names) list += (list.empty() ? "" : ", ") + name;
-  return list;
-}
 
 void add_once(const std::string& name, std::vector<std::string>& names) {
   if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
@@ -23,7 +18,7 @@ void add_once(const std::string& name, std::vector<std::string>& names) {
 void append_optimizer_problems(const StageOptions& stage, std::vector<std::string>& found) {
   const std::vector<std::string> names = optimizer_names();
   if (std::find(names.begin(), names.end(), stage.optimizer) == names.end()) {
-    found.push_back("optimizer = '" + stage.optimizer + "': must be one of " + list_of(names));
+    found.push_back("optimizer = '" + stage.optimizer + "': must be one of " + joined(names));
     return;
   }
   const Derivatives needs = make_optimizer(stage.optimizer)->needs();
@@ -38,7 +33,7 @@ void append_optimizer_problems(const StageOptions& stage, std::vector<std::strin
                                        : similarity_has_normal_equations(name))
       fitting.push_back(name);
   found.push_back("similarity = '" + stage.similarity.name + "': optimizer '" + stage.optimizer +
-                  "' needs derivatives, which these have: " + list_of(fitting));
+                  "' needs derivatives, which these have: " + joined(fitting));
 }
 
 void append_chain_problems(const ChainOptions& chain, std::vector<std::string>& found) {
@@ -104,13 +99,13 @@ void RegistrationOptions::use_optimizer(const std::string& name) {
 std::string RegistrationOptions::similarity_list() const {
   std::vector<std::string> names;
   for (const StageOptions* const stage : stages()) add_once(stage->similarity.name, names);
-  return list_of(names);
+  return joined(names);
 }
 
 std::string RegistrationOptions::optimizer_list() const {
   std::vector<std::string> names;
   for (const StageOptions* const stage : stages()) add_once(stage->optimizer, names);
-  return list_of(names);
+  return joined(names);
 }
 
 std::string RegistrationOptions::final_similarity() const {

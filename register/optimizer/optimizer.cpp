@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "register/optimizer/optimizer.h"
 
+#include <array>
 #include <cmath>
 #include <sstream>
 
-#include "base/error.h"
+#include "base/named_rows.h"
 #include "register/optimizer/best_neighbor_search.h"
 #include "register/optimizer/cma_es.h"
 #include "register/optimizer/gauss_newton.h"
@@ -12,6 +13,38 @@
 #include "register/optimizer/nlopt_search.h"
 
 namespace af::registration {
+namespace {
+
+using OptimizerPointer = std::unique_ptr<Optimizer>;
+
+struct KnownOptimizer {
+  const char* name;
+  const char* help;
+  OptimizerPointer (*make)();
+};
+
+template <typename Search>
+OptimizerPointer make_search() {
+  return std::make_unique<Search>();
+}
+template <NloptAlgorithm algorithm>
+OptimizerPointer make_nlopt() {
+  return std::make_unique<NloptSearch>(algorithm);
+}
+
+/// Every optimiser there is; a new one joins here.
+constexpr std::array kOptimizers = {
+    KnownOptimizer{
+        "best-neighbor", "the paper's: best of 12 neighbours", make_search<BestNeighborSearch>},
+    KnownOptimizer{"gauss-newton", "steps from normal equations", make_search<GaussNewton>},
+    KnownOptimizer{"gradient", "steps along the gradient", make_search<GradientAscent>},
+    KnownOptimizer{
+        "bobyqa", "quadratic models in a trust region", make_nlopt<NloptAlgorithm::Bobyqa>},
+    KnownOptimizer{"nelder-mead", "simplex", make_nlopt<NloptAlgorithm::NelderMead>},
+    KnownOptimizer{"cma-es", "random populations, for far starts", make_search<CmaEs>},
+};
+
+}  // namespace
 
 const char* to_string(StopReason reason) {
   switch (reason) {
@@ -65,19 +98,24 @@ std::optional<TargetValue> OptimizationTarget::evaluate_with(const ScaledParamet
 }
 
 std::vector<std::string> optimizer_names() {
-  return {"best-neighbor", "gauss-newton", "gradient", "bobyqa", "nelder-mead", "cma-es"};
+  return names_of(kOptimizers);
+}
+
+std::string optimizer_help() {
+  return help_of(kOptimizers);
+}
+
+std::string optimizer_list() {
+  const std::array needs{"-", "gradient", "normal-equations"};
+  std::string text;
+  for (const KnownOptimizer& row : kOptimizers)
+    text += std::string(row.name) + "\t" + needs.at(static_cast<std::size_t>(row.make()->needs())) +
+            "\t" + row.help + "\n";
+  return text;
 }
 
 std::unique_ptr<Optimizer> make_optimizer(const std::string& name) {
-  if (name == "best-neighbor") return std::make_unique<BestNeighborSearch>();
-  if (name == "gauss-newton") return std::make_unique<GaussNewton>();
-  if (name == "gradient") return std::make_unique<GradientAscent>();
-  if (name == "bobyqa") return std::make_unique<NloptSearch>(NloptAlgorithm::Bobyqa);
-  if (name == "nelder-mead") return std::make_unique<NloptSearch>(NloptAlgorithm::NelderMead);
-  if (name == "cma-es") return std::make_unique<CmaEs>();
-  std::string list;
-  for (const std::string& known : optimizer_names()) list += (list.empty() ? "" : ", ") + known;
-  throw InputError("optimizer", "'" + name + "'", "must be one of " + list);
+  return required_row(kOptimizers, "optimizer", name).make();
 }
 
 }  // namespace af::registration

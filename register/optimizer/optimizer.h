@@ -112,8 +112,12 @@ class Optimizer {
                         OptimizerResult& result) const = 0;
 };
 
-/// Names that make_optimizer() knows.
+/// Names that make_optimizer() knows, and one line that explains them.
 std::vector<std::string> optimizer_names();
+std::string optimizer_help();
+/// One line per optimiser: name, what it needs of a measure ("-", "gradient", "normal-equations"),
+/// help; tabs between.
+std::string optimizer_list();
 
 /// InputError that lists the known names.
 std::unique_ptr<Optimizer> make_optimizer(const std::string& name);

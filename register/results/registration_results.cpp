@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "base/error.h"
+#include "base/joined.h"
 #include "figures/picture.h"
 #include "files/output_file.h"
 #include "register/results/registration_columns.h"
@@ -92,11 +93,10 @@ std::string counts_text(const std::vector<RegistrationRecord>& records) {
   std::array<int, 3> counts{};
   for (const RegistrationRecord& record : records)
     ++counts[static_cast<std::size_t>(judgement_of(record).verdict)];
-  std::string text;
-  for (const Verdict verdict : {Verdict::Found, Verdict::Doubtful, Verdict::NotFound})
-    text += (text.empty() ? "" : ", ") + std::to_string(counts[static_cast<std::size_t>(verdict)]) +
-            " " + to_string(verdict);
-  return text;
+  const std::array verdicts{Verdict::Found, Verdict::Doubtful, Verdict::NotFound};
+  return joined(verdicts, ", ", [&](Verdict verdict) {
+    return std::to_string(counts[static_cast<std::size_t>(verdict)]) + " " + to_string(verdict);
+  });
 }
 
 }  // namespace
@@ -104,9 +104,7 @@ std::string counts_text(const std::vector<RegistrationRecord>& records) {
 Judgement judgement_of(const RegistrationRecord& record) {
   Judgement judgement = judged_end(record.result.stop_reason, record.view_values);
   if (record.diagnosis.sayings.empty()) return judgement;
-  std::string sayings;
-  for (const std::string& saying : record.diagnosis.sayings)
-    sayings += (sayings.empty() ? "" : "; ") + saying;
+  const std::string sayings = joined(record.diagnosis.sayings, "; ");
   if (judgement.verdict == Verdict::NotFound)
     return {Verdict::NotFound, judgement.reason + "; " + sayings};
   return {Verdict::Doubtful, sayings};

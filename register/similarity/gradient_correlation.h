@@ -19,11 +19,9 @@ class GradientCorrelation final : public SimilarityMeasure {
 
   [[nodiscard]] double evaluate(std::span<const float> drr,
                                 SimilarityWorkspace& workspace) const override;
-  [[nodiscard]] bool has_derivative() const override { return true; }
   double evaluate_with_derivative(std::span<const float> drr,
                                   std::span<float> derivative,
                                   SimilarityWorkspace& workspace) const override;
-  [[nodiscard]] bool has_normal_equations() const override { return true; }
   [[nodiscard]] NormalEquations normal_equations(std::span<const float> drr,
                                                  std::span<const float> planes,
                                                  SimilarityWorkspace& workspace) const override;

@@ -38,7 +38,6 @@ class JointHistogramMeasure : public SimilarityMeasure {
  public:
   [[nodiscard]] double evaluate(std::span<const float> drr,
                                 SimilarityWorkspace& workspace) const override;
-  [[nodiscard]] bool has_derivative() const override { return is_smooth_; }
   double evaluate_with_derivative(std::span<const float> drr,
                                   std::span<float> derivative,
                                   SimilarityWorkspace& workspace) const override;

@@ -5,7 +5,7 @@
 #include <array>
 #include <cmath>
 
-#include "base/error.h"
+#include "base/named_rows.h"
 #include "register/similarity/cross_correlation.h"
 #include "register/similarity/difference_entropy.h"
 #include "register/similarity/gradient_correlation.h"
@@ -52,6 +52,7 @@ using MeasurePointer = std::unique_ptr<SimilarityMeasure>;
 
 struct KnownMeasure {
   const char* name;
+  const char* help;
   bool has_derivative;
   bool has_normal_equations;
   MeasurePointer (*make)(const SimilarityOptions& options, const SimilarityReference& reference);
@@ -80,25 +81,23 @@ MeasurePointer make_robust(const SimilarityOptions& options, const SimilarityRef
 
 /// Every measure there is; a new one joins here.
 constexpr std::array kMeasures = {
-    KnownMeasure{"mi", true, false, make_histogram<MutualInformation>},
-    KnownMeasure{"nmi", true, false, make_histogram<NormalizedMutualInformation>},
-    KnownMeasure{"ncc", true, true, make_plain<CrossCorrelation>},
-    KnownMeasure{"tncc", false, true, make_tiled},
-    KnownMeasure{"gc", true, true, make_plain<GradientCorrelation>},
-    KnownMeasure{"gd", false, false, make_plain<GradientDifference>},
-    KnownMeasure{"rg", true, true, make_robust},
-    KnownMeasure{"pi", false, false, make_plain<PatternIntensity>},
-    KnownMeasure{"entropy", false, false, make_entropy},
-    KnownMeasure{"ssd", true, true, make_plain<SumOfSquaredDifferences>},
-    KnownMeasure{"go", false, false, make_plain<GradientOrientation>},
+    KnownMeasure{"mi", "mutual information", true, false, make_histogram<MutualInformation>},
+    KnownMeasure{"nmi",
+                 "normalised mutual information",
+                 true,
+                 false,
+                 make_histogram<NormalizedMutualInformation>},
+    KnownMeasure{"ncc", "cross-correlation", true, true, make_plain<CrossCorrelation>},
+    KnownMeasure{"tncc", "cross-correlation of tiles", false, true, make_tiled},
+    KnownMeasure{"gc", "correlation of gradients", true, true, make_plain<GradientCorrelation>},
+    KnownMeasure{"gd", "gradient difference", false, false, make_plain<GradientDifference>},
+    KnownMeasure{"rg", "robust residuals of gradients", true, true, make_robust},
+    KnownMeasure{"pi", "pattern intensity", false, false, make_plain<PatternIntensity>},
+    KnownMeasure{"entropy", "entropy of the difference", false, false, make_entropy},
+    KnownMeasure{
+        "ssd", "sum of squared differences", true, true, make_plain<SumOfSquaredDifferences>},
+    KnownMeasure{"go", "gradient orientation", false, false, make_plain<GradientOrientation>},
 };
-
-const KnownMeasure* find_measure(const std::string& name) {
-  const auto found = std::find_if(kMeasures.begin(), kMeasures.end(), [&](const auto& measure) {
-    return name == measure.name;
-  });
-  return found == kMeasures.end() ? nullptr : &*found;
-}
 
 }  // namespace
 
@@ -146,11 +145,8 @@ NormalEquations SimilarityMeasure::normal_equations(std::span<const float> /*drr
 
 std::vector<std::string> problems(const SimilarityOptions& options) {
   std::vector<std::string> found;
-  if (find_measure(options.name) == nullptr) {
-    std::string list;
-    for (const std::string& name : similarity_names()) list += (list.empty() ? "" : ", ") + name;
-    found.push_back("similarity = '" + options.name + "': must be one of " + list);
-  }
+  if (find_row(kMeasures, options.name) == nullptr)
+    found.push_back(unknown_name_text(kMeasures, "similarity", options.name));
   const int fewest = options.has_smooth_histogram ? 4 : 2;
   if (options.bins < fewest || options.bins > kMaxHistogramBins)
     found.push_back("bins = " + std::to_string(options.bins) + ": must be " +
@@ -164,25 +160,35 @@ std::vector<std::string> problems(const SimilarityOptions& options) {
 }
 
 std::vector<std::string> similarity_names() {
-  std::vector<std::string> names;
-  for (const KnownMeasure& measure : kMeasures) names.emplace_back(measure.name);
-  return names;
+  return names_of(kMeasures);
+}
+
+std::string similarity_help() {
+  return help_of(kMeasures);
+}
+
+std::string similarity_list() {
+  std::string text;
+  for (const KnownMeasure& row : kMeasures)
+    text += std::string(row.name) + "\t" + (row.has_derivative ? "gradient" : "-") + "\t" +
+            (row.has_normal_equations ? "normal-equations" : "-") + "\t" + row.help + "\n";
+  return text;
 }
 
 bool similarity_has_derivative(const std::string& name) {
-  const KnownMeasure* const measure = find_measure(name);
+  const KnownMeasure* const measure = find_row(kMeasures, name);
   return measure != nullptr && measure->has_derivative;
 }
 
 bool similarity_has_normal_equations(const std::string& name) {
-  const KnownMeasure* const measure = find_measure(name);
+  const KnownMeasure* const measure = find_row(kMeasures, name);
   return measure != nullptr && measure->has_normal_equations;
 }
 
 std::unique_ptr<SimilarityMeasure> make_similarity(const SimilarityOptions& options,
                                                    const SimilarityReference& reference) {
   throw_if_any(problems(options));
-  return find_measure(options.name)->make(options, reference);
+  return find_row(kMeasures, options.name)->make(options, reference);
 }
 
 }  // namespace af::registration

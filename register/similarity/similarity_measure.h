@@ -64,17 +64,14 @@ class SimilarityMeasure {
   [[nodiscard]] virtual double evaluate(std::span<const float> drr,
                                         SimilarityWorkspace& workspace) const = 0;
 
-  /// Whether evaluate_with_derivative() may be called.
-  [[nodiscard]] virtual bool has_derivative() const { return false; }
-  /// The value, and in `derivative` (as many pixels) its derivative by every DRR pixel. The value
-  /// is evaluate()'s up to rounding.
+  /// Only of measures with similarity_has_derivative(). The value, and in `derivative` (as many
+  /// pixels) its derivative by every DRR pixel. The value is evaluate()'s up to rounding.
   virtual double evaluate_with_derivative(std::span<const float> drr,
                                           std::span<float> derivative,
                                           SimilarityWorkspace& workspace) const;
 
-  /// Whether normal_equations() may be called: the measure is a sum of squared residuals.
-  [[nodiscard]] virtual bool has_normal_equations() const { return false; }
-  /// `planes`: derivatives of every DRR pixel by six parameters, six planes one after the other.
+  /// Only of measures with similarity_has_normal_equations(): sums of squared residuals. `planes`:
+  /// derivatives of every DRR pixel by six parameters, six planes one after the other.
   [[nodiscard]] virtual NormalEquations normal_equations(std::span<const float> drr,
                                                          std::span<const float> planes,
                                                          SimilarityWorkspace& workspace) const;
@@ -95,8 +92,11 @@ struct SimilarityOptions {
 
 std::vector<std::string> problems(const SimilarityOptions& options);
 
-/// Names that make_similarity() knows.
+/// Names that make_similarity() knows, and one line that explains them.
 std::vector<std::string> similarity_names();
+std::string similarity_help();
+/// One line per measure: name, "gradient" or "-", "normal-equations" or "-", help; tabs between.
+std::string similarity_list();
 
 /// What optimisers may ask of a measure, by its name.
 bool similarity_has_derivative(const std::string& name);

@@ -24,7 +24,6 @@ class TiledCorrelation final : public SimilarityMeasure {
 
   [[nodiscard]] double evaluate(std::span<const float> drr,
                                 SimilarityWorkspace& workspace) const override;
-  [[nodiscard]] bool has_normal_equations() const override { return true; }
   [[nodiscard]] NormalEquations normal_equations(std::span<const float> drr,
                                                  std::span<const float> planes,
                                                  SimilarityWorkspace& workspace) const override;

@@ -220,6 +220,19 @@ TEST_F(RegisterProgram, RefusesAFieldOfAnotherCtAndNamesBothHashes) {
   EXPECT_NE(unchecked.output.find("warning"), std::string::npos) << unchecked.output;
 }
 
+TEST_F(RegisterProgram, ListsWhatThereIsToChooseFromWithoutACase) {
+  const std::string name = program("af-register");
+  const test::ProgramRun measures = test::run_command(name + " --list measures");
+  EXPECT_EQ(measures.exit_code, 0);
+  EXPECT_NE(measures.output.find("ncc\tgradient\tnormal-equations\tcross-correlation\n"),
+            std::string::npos)
+      << measures.output;
+  const test::ProgramRun optimizers = test::run_command(name + " --list optimizers");
+  EXPECT_NE(optimizers.output.find("gauss-newton\tnormal-equations\t"), std::string::npos)
+      << optimizers.output;
+  expect_refused(test::run_command(name + " --list presses"), 2, "measures");
+}
+
 TEST_F(RegisterProgram, RefusesWhatDoesNotExist) {
   const std::string out = " -o " + path("refused");
   expect_refused(run_register(fields() + " --similarity psnr" + out), 2, "mi");

@@ -32,9 +32,7 @@ void describe_source(Fields& field, DrrOptions& options) {
   field("camera", options.camera, "Camera of the rig");
   field("interpolation",
         options.interpolation,
-        "Look-up in the field: 'nearest' node; 'linear' in u, v, s and t in two quick passes (as "
-        "af-register does); 'cubic' in s and t, 'cubic-uv' in all four; or 'quadrilinear', "
-        "literally over each ray's 16 neighbours")
+        "Look-up in the field (af-register takes linear). " + field_look_up_help())
       .choice(field_look_up_names());
   field.part(options.attenuation);
   field.at("water_mu_per_mm").help =

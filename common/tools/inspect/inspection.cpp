@@ -7,6 +7,7 @@
 #include <sstream>
 #include <string_view>
 
+#include "base/joined.h"
 #include "files/input_file.h"
 #include "image_files/dicom_series.h"
 #include "image_files/image_header.h"
@@ -174,9 +175,7 @@ void append_fact(const std::string& name,
                  const std::string& indent,
                  std::string& text) {
   if (is_short_list(value)) {
-    std::string list;
-    for (const auto& entry : value) list += (list.empty() ? "" : ", ") + scalar_text(entry);
-    text += indent + name + ": " + list + "\n";
+    text += indent + name + ": " + joined(value, ", ", scalar_text) + "\n";
   } else if (value.is_structured()) {
     text += indent + name + ":\n";
     append_facts(value, indent + "  ", text);

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <filesystem>
 
+#include "simulation/phantom.h"
+
 namespace af::tools {
 
 namespace {
@@ -11,10 +13,7 @@ namespace {
 void describe_patient(Fields& field, SimulateOptions& o) {
   field("ct", o.ct, "CT to image: DICOM folder, NIfTI, MetaImage or NRRD, in HU")
       .one_of_group("Patient");
-  field("phantom",
-        o.phantom,
-        "Built-in synthetic patient instead of a CT: spine (trunk from T8 to L4 with ribs and "
-        "organs), pelvis (L4 to the upper thighs) or head (vault to C4)")
+  field("phantom", o.phantom, "Built-in synthetic patient instead of a CT. " + phantom_help())
       .choice(phantom_names())
       .one_of_group("Patient");
   field.part(o.ct_reading);

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+// A family of things that are chosen by name (measures, optimisers, casters, ...) is one array of
+// rows, each with a `name`, a `help` and whatever makes it. Options, their help, error texts,
+// listings and tests iterate that array, so an addition is one row.
+#pragma once
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "base/error.h"
+#include "base/joined.h"
+
+namespace af {
+
+/// Also of cameras, cases and the like.
+template <typename Rows>
+std::vector<std::string> names_of(const Rows& rows) {
+  std::vector<std::string> names;
+  for (const auto& row : rows) names.emplace_back(row.name);
+  return names;
+}
+
+/// "name: help; name: help"
+template <typename Rows>
+std::string help_of(const Rows& rows) {
+  return joined(
+      rows, "; ", [](const auto& row) { return std::string(row.name) + ": " + row.help; });
+}
+
+/// nullptr: there is none of that name.
+template <typename Rows>
+auto find_row(const Rows& rows, const std::string& name) {
+  const auto found = std::ranges::find_if(rows, [&](const auto& row) { return name == row.name; });
+  return found == std::ranges::end(rows) ? nullptr : &*found;
+}
+
+/// "field = 'name': must be one of a, b, c"
+template <typename Rows>
+std::string unknown_name_text(const Rows& rows, const std::string& field, const std::string& name) {
+  return field + " = '" + name + "': must be one of " + joined(names_of(rows));
+}
+
+/// InputError with that text when there is none of that name.
+template <typename Rows>
+const auto& required_row(const Rows& rows, const std::string& field, const std::string& name) {
+  const auto* const row = find_row(rows, name);
+  if (row == nullptr) throw InputError(unknown_name_text(rows, field, name));
+  return *row;
+}
+
+}  // namespace af

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cli/bind_lists.h"
+
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+namespace af::cli {
+
+void bind_lists(CLI::App& app, const std::map<std::string, std::string>& lists) {
+  std::vector<std::string> names;
+  for (const auto& [name, text] : lists) names.push_back(name);
+  app.add_option_function<std::string>(
+         "--list",
+         // CLI11 prints the text of this "error" as it is, on one rank, with exit code 0.
+         [lists](const std::string& name) { throw CLI::CallForVersion(lists.at(name), 0); },
+         "Print what there is to choose from, one a line, columns between tabs, and exit")
+      ->check(CLI::IsMember(names))
+      ->trigger_on_parse();
+}
+
+}  // namespace af::cli

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "precompute/casting/field_caster.h"
+#include "precompute/casting/slab_aligned_volume.h"
+#include "precompute/units/unit_planner.h"
+
+namespace af {
+
+/// What casters are made of. All of it must outlive the caster.
+struct CasterInputs {
+  const AttenuationVolume& volume;
+  const SlabAlignedVolume* resampled;  ///< only for casters that need it
+  const LightSlab& light_slab;
+  AttenuationQuantizer quantizer;
+  RayCasterOptions ray_caster;  ///< of the trilinear caster
+};
+
+struct KnownCaster {
+  const char* name;  ///< as in options and files
+  const char* help;
+  bool needs_resampled;  ///< the CT resampled to the light slab's frame
+  PlanOptions plan;      ///< units that suit it
+  PlanOptions sample;    ///< units of which few tell its speed
+  std::unique_ptr<const FieldCaster> (*make)(const CasterInputs& inputs);
+};
+
+/// InputError when there is none of that name.
+const KnownCaster& caster_named(const std::string& name);
+
+/// Names that caster_named() knows, and one line that explains them.
+std::vector<std::string> caster_names();
+std::string caster_help();
+
+}  // namespace af
