@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "register/method/chain_text.h"
 
-#include <array>
 #include <charconv>
-#include <optional>
 #include <sstream>
+#include <variant>
 
 #include "base/error.h"
 #include "base/joined.h"
@@ -13,26 +12,6 @@
 namespace af::registration {
 namespace {
 
-/// One key of a stage: exactly one of the members.
-struct StageKey {
-  const char* name;
-  int* whole;
-  double* real;
-};
-
-std::array<StageKey, 10> stage_keys(StageOptions& stage) {
-  return {{{"level", &stage.level, nullptr},
-           {"pixels", &stage.pixel_step, nullptr},
-           {"roi", nullptr, &stage.roi_scale},
-           {"sigma", nullptr, &stage.smoothing_sigma_mm},
-           {"step", nullptr, &stage.search.initial_step_mm},
-           {"final", nullptr, &stage.search.final_step_mm},
-           {"bins", &stage.similarity.bins, nullptr},
-           {"scale", nullptr, &stage.similarity.residual_scale},
-           {"tiles", &stage.similarity.tiles, nullptr},
-           {"population", &stage.search.population, nullptr}}};
-}
-
 template <typename Number>
 bool parse(const std::string& text, Number& value) {
   const char* const end = text.data() + text.size();
@@ -40,10 +19,22 @@ bool parse(const std::string& text, Number& value) {
   return error == std::errc() && stop == end;
 }
 
-bool set_key(StageOptions& stage, const std::string& name, const std::string& value) {
-  for (const StageKey& key : stage_keys(stage))
-    if (name == key.name)
-      return key.whole != nullptr ? parse(value, *key.whole) : parse(value, *key.real);
+/// A number of a stage; stages have int and double ones only.
+template <typename Visitor>
+auto visit_number(const Field& field, const Visitor& visitor) {
+  if (int* const* const whole = std::get_if<int*>(&field.value)) return visitor(**whole);
+  return visitor(*std::get<double*>(field.value));
+}
+
+/// As it is typed in a chain.
+std::string key_of(const Field& field) {
+  return field.option.substr(field.option.find_first_not_of('-'));
+}
+
+bool set_key(StageOptions& stage, const std::string& key, const std::string& value) {
+  for (const Field& field : fields_of(stage))
+    if (key == key_of(field))
+      return visit_number(field, [&](auto& number) { return parse(value, number); });
   return false;
 }
 
@@ -58,8 +49,7 @@ StageOptions stage_from_text(const std::string& text) {
         !set_key(stage, word.substr(0, equals), word.substr(equals + 1)))
       throw InputError("chain",
                        "'" + word + "'",
-                       "must be KEY=NUMBER with one of level, pixels, roi, sigma, step, final, "
-                       "bins, scale, tiles, population");
+                       "must be KEY=NUMBER with one of " + joined(fields_of(stage), ", ", key_of));
   }
   return stage;
 }
@@ -69,16 +59,21 @@ StageOptions stage_from_text(const std::string& text) {
 std::string stage_text(const StageOptions& stage) {
   StageOptions mine = stage;
   StageOptions plain;
+  const Fields defaults = fields_of(plain);
   std::string text = stage.similarity.name + " " + stage.optimizer;
-  const auto keys = stage_keys(mine);
-  const auto defaults = stage_keys(plain);
-  for (std::size_t i = 0; i < keys.size(); ++i) {
-    if (keys[i].whole != nullptr && *keys[i].whole != *defaults[i].whole)
-      text += std::string(" ") + keys[i].name + "=" + std::to_string(*keys[i].whole);
-    if (keys[i].real != nullptr && *keys[i].real != *defaults[i].real)
-      text += std::string(" ") + keys[i].name + "=" + number_text(*keys[i].real);
+  auto default_field = defaults.begin();
+  for (const Field& field : fields_of(mine)) {
+    const auto text_of = [](const auto& number) { return number_text(number); };
+    const std::string value = visit_number(field, text_of);
+    if (value != visit_number(*default_field++, text_of)) text += " " + key_of(field) + "=" + value;
   }
   return text;
+}
+
+std::string chain_keys_help() {
+  StageOptions stage;
+  return joined(
+      fields_of(stage), "; ", [](const Field& field) { return key_of(field) + "= " + field.help; });
 }
 
 std::string chain_text(const ChainOptions& chain) {

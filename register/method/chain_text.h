@@ -12,10 +12,11 @@ namespace af::registration {
 ///
 ///     ncc gauss-newton level=2 pixels=8 roi=2 step=10 final=0.5; gc gauss-newton level=1 pixels=2
 ///
-/// Keys (defaults: those of StageOptions): level, pixels (detector pixels per stage pixel), roi
-/// (scale), sigma (mm), step and final (mm), bins, scale (rg), tiles (tncc), population (cma-es).
+/// Keys are the options that StageOptions describes.
 std::string chain_text(const ChainOptions& chain);
 std::string stage_text(const StageOptions& stage);
+/// The keys, each with what it means, for --help.
+std::string chain_keys_help();
 
 /// The chain of a line. InputError for a line that is not of this form; whether its values fit is
 /// for problems() to say. \test ChainText.ReadsWhatItWrites

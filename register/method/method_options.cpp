@@ -63,9 +63,10 @@ void describe_chains(Fields& field, MethodOptions& options) {
       .not_recorded(why);
   field("chain",
         options.chains,
-        "Stages in place of the preset's, separated by ';': measure, optimiser, then any of "
-        "level=, pixels=, roi=, sigma=, step=, final=, bins=, scale=, tiles=, population=. Given "
-        "several times, the chains are a portfolio: a judge chooses among their ends");
+        "Stages in place of the preset's, separated by ';': measure, optimiser, then any of these "
+        "keys with a number. " +
+            chain_keys_help() +
+            ". Given several times, the chains are a portfolio: a judge chooses among their ends");
   field("finish",
         options.finish,
         "Stages, written as for --chain, that follow the chain, or a portfolio's best one "

@@ -42,26 +42,39 @@ void append_chain_problems(const ChainOptions& chain, std::vector<std::string>& 
       found.push_back("chain '" + chain.name + "', stage " + std::to_string(i + 1) + ": " + text);
 }
 
-bool is_non_negative(double value) {
-  return value >= 0.0 && std::isfinite(value);
-}
-
 }  // namespace
+
+void StageOptions::describe(Fields& field) {
+  field("level",
+        level,
+        "of the pyramid: nodes of the field 2^level as far apart, X-rays blurred to match")
+      .within(0, kCoarsestLevel);
+  field("pixel_step", pixel_step, "detector pixels per stage pixel, along each axis")
+      .as("pixels")
+      .within(1, 64);
+  field("roi_scale", roi_scale, "sides of the region over those of the study's")
+      .as("roi")
+      .within(0.1, 4.0);
+  field("smoothing_sigma_mm",
+        smoothing_sigma_mm,
+        "mm on the isocentre plane: Gaussian on the X-rays (not on the DRRs), besides the level's")
+      .as("sigma")
+      .at_least(0.0)
+      .finite();
+  field.part(similarity);
+  field.leave_out(optimizer, "stands before the keys");
+  field.part(search);
+}
 
 std::vector<std::string> problems(const StageOptions& stage) {
   std::vector<std::string> found = problems(stage.similarity);
   if (found.empty()) append_optimizer_problems(stage, found);
   for (const std::string& text : problems(stage.search)) found.push_back(text);
-  if (stage.level < 0 || stage.level > kCoarsestLevel)
-    found.push_back("level = " + std::to_string(stage.level) + ": must be 0 ... " +
-                    std::to_string(kCoarsestLevel));
-  if (stage.pixel_step < 1 || stage.pixel_step > 64)
-    found.push_back("pixel_step = " + std::to_string(stage.pixel_step) + ": must be 1 ... 64");
-  if (!(stage.roi_scale >= 0.1 && stage.roi_scale <= 4.0))
-    found.push_back("roi_scale = " + std::to_string(stage.roi_scale) + ": must be 0.1 ... 4");
-  if (!is_non_negative(stage.smoothing_sigma_mm))
-    found.push_back("smoothing_sigma_mm = " + std::to_string(stage.smoothing_sigma_mm) +
-                    ": must be >= 0");
+  StageOptions of_stage = stage;
+  // Those two have spoken; a copy with sound ones is left to the stage's own.
+  of_stage.similarity = {};
+  of_stage.search = {};
+  for (const std::string& text : field_problems(of_stage)) found.push_back(text);
   return found;
 }
 

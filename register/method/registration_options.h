@@ -15,15 +15,16 @@ inline constexpr int kCoarsestLevel = 3;
 
 /// One stage of a chain: what is compared, how finely, and how it is searched.
 struct StageOptions {
-  /// Of the pyramid: nodes of the field 2^level as far apart, X-rays blurred to match.
   int level = 0;
-  int pixel_step = 1;               ///< detector pixels per stage pixel, along each axis
-  double roi_scale = 1.0;           ///< sides of the region over those of the study's
-  double smoothing_sigma_mm = 0.0;  ///< Gaussian on the X-rays (not on the DRRs), in mm on the
-                                    ///< isocentre plane, besides the level's
+  int pixel_step = 1;
+  double roi_scale = 1.0;
+  double smoothing_sigma_mm = 0.0;
   SimilarityOptions similarity;
   std::string optimizer = "best-neighbor";
   OptimizerOptions search;  ///< steps in mm of mean projected motion
+
+  /// Its options are the keys of chain_text().
+  void describe(Fields& field);
 };
 
 std::vector<std::string> problems(const StageOptions& stage);

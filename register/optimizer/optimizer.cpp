@@ -2,10 +2,9 @@
 #include "register/optimizer/optimizer.h"
 
 #include <array>
-#include <cmath>
-#include <sstream>
 
 #include "base/named_rows.h"
+#include "base/number_text.h"
 #include "register/optimizer/best_neighbor_search.h"
 #include "register/optimizer/cma_es.h"
 #include "register/optimizer/gauss_newton.h"
@@ -66,22 +65,22 @@ const char* to_string(StopReason reason) {
   return "unknown";
 }
 
+void OptimizerOptions::describe(Fields& field) {
+  field("initial_step_mm", initial_step_mm, "mm: first, and with derivatives longest, step")
+      .as("step")
+      .finite();
+  field("final_step_mm", final_step_mm, "mm: a search whose steps fall below has converged")
+      .as("final")
+      .above(0.0)
+      .finite();
+  field("population", population, "cma-es: points per generation").within(4, 100000);
+}
+
 std::vector<std::string> problems(const OptimizerOptions& options) {
-  std::vector<std::string> found;
-  const auto text = [](double value) {
-    std::ostringstream out;
-    out << value;
-    return out.str();
-  };
-  if (!(options.final_step_mm > 0.0) || !std::isfinite(options.final_step_mm))
-    found.push_back("final_step_mm = " + text(options.final_step_mm) + ": must be > 0");
-  if (!(options.initial_step_mm >= options.final_step_mm) ||
-      !std::isfinite(options.initial_step_mm))
-    found.push_back("initial_step_mm = " + text(options.initial_step_mm) +
-                    ": must be >= final_step_mm = " + text(options.final_step_mm));
-  if (options.population < 4 || options.population > 100000)
-    found.push_back("population = " + std::to_string(options.population) +
-                    ": must be 4 ... 100000");
+  std::vector<std::string> found = field_problems(options);
+  if (options.initial_step_mm < options.final_step_mm)
+    found.push_back("initial_step_mm = " + number_text(options.initial_step_mm) +
+                    ": must be >= final_step_mm = " + number_text(options.final_step_mm));
   return found;
 }
 

@@ -10,6 +10,8 @@
 
 #include <Eigen/Core>
 
+#include "base/described_fields.h"
+
 namespace af::registration {
 
 /// Why a search ended.
@@ -67,9 +69,11 @@ class OptimizationTarget {
 };
 
 struct OptimizerOptions {
-  double initial_step_mm = 5.0;  ///< first, and with derivatives longest, step
-  double final_step_mm = 0.5;    ///< a search whose steps fall below has converged
-  int population = 16;           ///< cma-es: points per generation
+  double initial_step_mm = 5.0;
+  double final_step_mm = 0.5;
+  int population = 16;
+
+  void describe(Fields& field);
 };
 
 std::vector<std::string> problems(const OptimizerOptions& options);

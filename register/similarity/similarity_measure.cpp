@@ -143,19 +143,26 @@ NormalEquations SimilarityMeasure::normal_equations(std::span<const float> /*drr
   return {};
 }
 
+void SimilarityOptions::describe(Fields& field) {
+  field.leave_out(name, "stands before the keys of a stage");
+  field("bins", bins, "per axis of the joint histogram (mi, nmi), of the difference (entropy)")
+      // Smooth windows are four bins wide.
+      .within(has_smooth_histogram ? 4 : 2, kMaxHistogramBins);
+  field.leave_out(has_smooth_histogram, "follows from the optimiser");
+  field("residual_scale",
+        residual_scale,
+        "rg: residuals of this many times the typical X-ray gradient count half")
+      .as("scale")
+      .above(0.0)
+      .finite();
+  field("tiles", tiles, "tncc: per axis").within(1, 64);
+}
+
 std::vector<std::string> problems(const SimilarityOptions& options) {
   std::vector<std::string> found;
   if (find_row(kMeasures, options.name) == nullptr)
     found.push_back(unknown_name_text(kMeasures, "similarity", options.name));
-  const int fewest = options.has_smooth_histogram ? 4 : 2;
-  if (options.bins < fewest || options.bins > kMaxHistogramBins)
-    found.push_back("bins = " + std::to_string(options.bins) + ": must be " +
-                    std::to_string(fewest) + " ... " + std::to_string(kMaxHistogramBins));
-  if (!(options.residual_scale > 0.0) || !std::isfinite(options.residual_scale))
-    found.push_back("residual_scale = " + std::to_string(options.residual_scale) +
-                    ": must be positive");
-  if (options.tiles < 1 || options.tiles > 64)
-    found.push_back("tiles = " + std::to_string(options.tiles) + ": must be 1 ... 64");
+  for (const std::string& text : field_problems(options)) found.push_back(text);
   return found;
 }
 

@@ -9,6 +9,7 @@
 
 #include <Eigen/Core>
 
+#include "base/described_fields.h"
 #include "image/image2d.h"
 
 namespace af::registration {
@@ -81,13 +82,14 @@ class SimilarityMeasure {
 
 struct SimilarityOptions {
   std::string name = "mi";
-  int bins = 64;  ///< per axis of the joint histogram (mi, nmi) or of the difference (entropy)
+  int bins = 64;
   /// mi, nmi: DRR values are counted through cubic B-spline windows, which makes the measure
   /// differentiable; optimisers that need derivatives set it.
   bool has_smooth_histogram = false;
-  /// rg: residuals of this many times the typical X-ray gradient count half.
   double residual_scale = 1.0;
-  int tiles = 4;  ///< tncc: tiles per axis
+  int tiles = 4;
+
+  void describe(Fields& field);
 };
 
 std::vector<std::string> problems(const SimilarityOptions& options);

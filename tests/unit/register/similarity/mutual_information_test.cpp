@@ -207,7 +207,7 @@ TEST(SimilarityOptions, AnUnknownMeasureIsRefusedWithTheKnownOnes) {
   EXPECT_EQ(
       found[0],
       "similarity = 'psnr': must be one of mi, nmi, ncc, tncc, gc, gd, rg, pi, entropy, ssd, go");
-  EXPECT_EQ(found[1], "bins = 1: must be 2 ... 256");
+  EXPECT_EQ(found[1], "bins = 1: must be within 2 and 256");
   EXPECT_THROW(make_similarity(options, {}), InputError);
 }
 
