@@ -4,11 +4,14 @@
 #include <cerrno>
 #include <chrono>
 #include <csignal>
+#include <cstdlib>
+#include <functional>
 #include <iostream>
 #include <optional>
 #include <sstream>
 #include <system_error>
 #include <thread>
+#include <utility>
 
 #include <CLI/CLI.hpp>
 
@@ -74,12 +77,35 @@ void end_job(const CLI::App& app, const std::string& stall) {
   MpiEnvironment::abort(static_cast<int>(ExitCode::Stopped));
 }
 
+/// Without MPI, which waits for the other ranks itself. Whatever a program has made is complete by
+/// then, or kept.
+void end_alone(const CLI::App& app, const std::string& when) {
+  std::ostringstream text;
+  text << app.get_name() << ": other ranks of the job hang or are stopped while " << when
+       << " (--stall-minutes): the job is ended; run the same command again\n";
+  std::cerr << text.str() << std::flush;
+  std::_Exit(static_cast<int>(ExitCode::Stopped));
+}
+
+/// What happens first when a scope is left.
+class OnLeaving {
+ public:
+  explicit OnLeaving(std::function<void()> action) : action_(std::move(action)) {}
+  ~OnLeaving() { action_(); }
+  OnLeaving(const OnLeaving&) = delete;
+  OnLeaving& operator=(const OnLeaving&) = delete;
+
+ private:
+  std::function<void()> action_;
+};
+
 }  // namespace
 
 int app_main(CLI::App& app,
              int argc,
              char** argv,
              const std::function<void(const Communicator&)>& run) {
+  std::optional<WaitAlarm> alarm;  // outlives MPI
   const MpiEnvironment environment(argc, argv);
   const Communicator world = Communicator::world();
   app.name(program_name(argv[0]));
@@ -93,10 +119,15 @@ int app_main(CLI::App& app,
   // A write beyond a limit of file sizes is an error to report, not a signal to die from.
   std::signal(SIGXFSZ, SIG_IGN);
   std::optional<StallWatch> watch;
-  if (run_limits().stall_minutes > 0.0)
-    watch.emplace(world, run_limits().stall_minutes, [&app](const std::string& stall) {
-      end_job(app, stall);
-    });
+  const double stall_minutes = run_limits().stall_minutes;
+  if (stall_minutes > 0.0) {
+    alarm.emplace(stall_minutes, [&app] { end_alone(app, "it begins"); });
+    watch.emplace(world, stall_minutes, [&app](const std::string& stall) { end_job(app, stall); });
+    alarm.reset();
+  }
+  const OnLeaving begin_to_end([&] {
+    if (watch.has_value()) alarm.emplace(stall_minutes, [&app] { end_alone(app, "it ends"); });
+  });
   RankFailure failure;
   bool is_known_everywhere = false;
   try {

@@ -167,6 +167,22 @@ struct StallWatch::Stuck {
   bool is_stopped;
 };
 
+WaitAlarm::WaitAlarm(double limit_minutes, std::function<void()> on_end)
+    : thread_([this, limit_minutes, on_end = std::move(on_end)] {
+        constexpr std::chrono::milliseconds kTick(10);
+        const auto ticks = static_cast<std::int64_t>(limit_minutes * kNsPerMinute / 1e7) + 1;
+        for (std::int64_t i = 0; i < ticks; ++i) {
+          if (is_over_) return;
+          std::this_thread::sleep_for(kTick);
+        }
+        if (!is_over_) on_end();
+      }) {}
+
+WaitAlarm::~WaitAlarm() {
+  is_over_ = true;
+  thread_.join();
+}
+
 StallWatch::StallWatch(const Communicator& communicator, double limit_minutes, OnStall on_stall)
     : board_(std::make_unique<Board>()),
       limit_ns_(nanoseconds_of(limit_minutes)),

@@ -66,6 +66,22 @@ bool claim_report();
 /// Name of this host.
 std::string host_name();
 
+/// Calls `on_end`, which must end the process, when it lives for longer than a limit: for the
+/// moments in which ranks wait for each other and no StallWatch sees them, while that one is made
+/// and unmade and while MPI ends. Time for which the whole job is stopped does not count.
+/// \test Faults.ARankThatIsStoppedWhileOthersEndDoesNotKeepTheJob
+class WaitAlarm {
+ public:
+  WaitAlarm(double limit_minutes, std::function<void()> on_end);
+  ~WaitAlarm();
+  WaitAlarm(const WaitAlarm&) = delete;
+  WaitAlarm& operator=(const WaitAlarm&) = delete;
+
+ private:
+  std::atomic<bool> is_over_ = false;
+  std::thread thread_;
+};
+
 /// Watches the ranks of every host from a thread of each rank. When a rank makes no progress, for
 /// whatever reason (it computes for ever, hangs in the file system, is stopped), `on_stall` is
 /// called on one rank of its host with a text that names rank, host and unit; it must end the job.

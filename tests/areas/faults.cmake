@@ -13,7 +13,11 @@ af_add_program_tests(
   fault_tests
   SOURCES programs/faults_test.cpp support/launched_job.cpp
   LIBS af_registration_case
-  PROGRAMS af-precompute af-inspect
+  PROGRAMS af-precompute af-inspect stopped_rank
   LABELS programs mpi
   TIMEOUT 1800
   PROCESSORS 2)
+target_compile_definitions(fault_tests PRIVATE AF_STOPPED_RANK_PROGRAM="$<TARGET_FILE:stopped_rank>")
+add_executable(stopped_rank programs/stopped_rank.cpp)
+target_link_libraries(stopped_rank PRIVATE af_compile_options af_cli)
+af_compile_as(programs stopped_rank)

@@ -139,6 +139,20 @@ TEST_F(Faults, AStoppedRankIsNamedAndTheJobEnded) {
   expect_going_on();
 }
 
+TEST_F(Faults, ARankThatIsStoppedWhileOthersEndDoesNotKeepTheJob) {
+  // Rank 1 stops itself while rank 0, which has nothing more to do, waits for it in MPI's end.
+  test::LaunchedJob job({AF_MPIEXEC,
+                         "--oversubscribe",
+                         "-n",
+                         "2",
+                         AF_STOPPED_RANK_PROGRAM,
+                         "--stall-minutes",
+                         "0.05"},
+                        output());
+  EXPECT_EQ(job.wait(kEndsWithin), 75) << said();
+  EXPECT_THAT(said(), HasSubstr("(--stall-minutes): the job is ended"));
+}
+
 TEST_F(Faults, AFullDiskWhileCastingNamesTheUnit) {
   test::LaunchedJob job(precompute(kRanks), output());
   ASSERT_TRUE(job.wait_until([] { return unit_bytes() > 0; }));
