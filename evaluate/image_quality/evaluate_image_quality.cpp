@@ -91,12 +91,12 @@ Setup load(const ImageQualityOptions& options, const Target& target, const Commu
                       "CT of the field (ct_content_sha256)",
                       setup.ct.facts.content_sha256 + " (" + target.ct.string() + ")",
                       identity.ct_content_sha256);
-    if (options.split_loss_poses > 0 && setup.field->light_slab.slabs.size() != 1)
-      throw InputError("--split-loss-poses",
-                       std::to_string(options.split_loss_poses),
-                       "needs a field of one slab; this has " +
-                           std::to_string(setup.field->light_slab.slabs.size()),
-                       target.field.string());
+    if (options.split_loss_poses > 0 && setup.field->slabs.size() != 1)
+      throw InputError(
+          "--split-loss-poses",
+          std::to_string(options.split_loss_poses),
+          "needs a field of one slab; this has " + std::to_string(setup.field->slabs.size()),
+          target.field.string());
     if (options.poses.empty()) return;
     setup.poses = read_poses_csv(options.poses, identity.frame);
     if (setup.poses.empty())
@@ -235,7 +235,10 @@ std::vector<LossSplit> split_losses(const ImageQualityOptions& options,
   std::vector<LossSplit> splits(static_cast<std::size_t>(count));
   if (count == 0) return splits;
   const LossSplitter splitter(
-      field, reference, setup.ct.volume, options.ray_caster, setup.field->light_slab, setup.view);
+      field,
+      reference,
+      {setup.ct.volume, options.ray_caster, setup.field->light_slab, InterpolatedPlanes::Both},
+      setup.view);
   collect_rows(
       world,
       unfinished,
