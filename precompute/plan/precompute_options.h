@@ -67,7 +67,6 @@ struct PrecomputeOptions {
   [[nodiscard]] CodebookOptions codebook_options() const;
   [[nodiscard]] StPlane st_plane_rule() const;
   [[nodiscard]] bool is_shear_warp() const { return caster == "shear-warp"; }
-  [[nodiscard]] LightSlabSpec light_slab_spec(const DepthSlabs& depth_slabs) const;
 
   void describe(Fields& field);
   /// With the rule that places the (s,t) planes.
