@@ -2,101 +2,11 @@
 #include "precompute/dry_run.h"
 
 #include <algorithm>
-#include <array>
-#include <cstdio>
 
 #include "base/joined.h"
-#include "precompute/units/unit_planner.h"
+#include "precompute/formatted_text.h"
 
 namespace af {
-
-namespace {
-
-template <typename... Values>
-std::string formatted(const char* format, Values... values) {
-  std::array<char, 512> text{};
-  const int length = std::snprintf(text.data(), text.size(), format, values...);
-  return {text.data(), std::min(text.size() - 1, static_cast<std::size_t>(std::max(0, length)))};
-}
-
-std::uint64_t uncropped_ray_count(const LightSlab& light_slab) {
-  std::uint64_t rays = 0;
-  for (const SlabGeometry& slab : light_slab.slabs)
-    rays += static_cast<std::uint64_t>(slab.s.nodes) * static_cast<std::uint64_t>(slab.t.nodes);
-  return rays * static_cast<std::uint64_t>(light_slab.u.nodes) *
-         static_cast<std::uint64_t>(light_slab.v.nodes);
-}
-
-double stored_fraction(const LightSlab& light_slab) {
-  return static_cast<double>(stored_ray_count(light_slab)) /
-         static_cast<double>(uncropped_ray_count(light_slab));
-}
-
-std::string axis_text(const char* name, const GridAxis& first, const GridAxis& second) {
-  return formatted("  %s plane        %.1f x %.1f mm, %d x %d nodes, %.2f x %.2f mm apart\n",
-                   name,
-                   first.last_mm - first.first_mm,
-                   second.last_mm - second.first_mm,
-                   first.nodes,
-                   second.nodes,
-                   first.spacing_mm(),
-                   second.spacing_mm());
-}
-
-std::string plane_text(const LightSlab& light_slab) {
-  std::string text = axis_text("(u,v)", light_slab.u, light_slab.v);
-  for (const SlabGeometry& slab : light_slab.slabs) {
-    text += axis_text("(s,t)", slab.s, slab.t);
-    text += formatted("  stored part        s nodes %d to %d, t nodes %d to %d (%.0f %%)\n",
-                      slab.stored_s.begin,
-                      slab.stored_s.end() - 1,
-                      slab.stored_t.begin,
-                      slab.stored_t.end() - 1,
-                      100.0 * slab.stored_s.count * slab.stored_t.count /
-                          (static_cast<double>(slab.s.nodes) * slab.t.nodes));
-  }
-  return text;
-}
-
-/// The spacing that half the translation range would give with the same nodes.
-std::string advice_text(const FieldSource& source,
-                        const LightSlab& light_slab,
-                        const PrecomputeOptions& options) {
-  const SlabGeometry& slab = light_slab.slabs.front();
-  std::string text = formatted(
-      "Advice\n  Your range uses %.0f %% of the (s,t) plane; the rest holds no shadow of the CT "
-      "and costs nothing.\n",
-      100.0 * stored_fraction(light_slab));
-  MotionRange narrower = options.range();
-  narrower.max_translation_mm /= 2.0;
-  if (narrower.max_translation_mm >= 5.0) {
-    const LightSlab alternative =
-        make_light_slab(source.camera,
-                        source.frame,
-                        narrower,
-                        source.volume->corner_points(),
-                        options.light_slab_spec({{}, {slab.st_plane_y_mm}}));
-    text += formatted(
-        "  With --max-translation-mm %.0f the same nodes would stand %.2f instead of %.2f mm apart "
-        "on the (s,t) plane: sharper DRRs for the same size.\n",
-        narrower.max_translation_mm,
-        alternative.slabs.front().s.spacing_mm(),
-        slab.s.spacing_mm());
-  }
-  const double pixel_mm = source.camera.pixel_spacing_mm.minCoeff() *
-                          source.camera.depth_mm(source.frame.center_room_mm) /
-                          source.camera.source_detector_distance_mm();
-  if (slab.s.spacing_mm() > 2.0 * pixel_mm)
-    text += formatted(
-        "  A pixel of %s is %.2f mm wide at the centre, the (s,t) nodes are %.2f mm apart: more "
-        "--st-nodes buy more than more --uv-nodes.\n",
-        source.camera.name.c_str(),
-        pixel_mm,
-        slab.s.spacing_mm());
-  return text;
-}
-
-}  // namespace
 
 std::string megabytes_text(std::uint64_t bytes) {
   const double megabytes = static_cast<double>(bytes) / 1e6;
@@ -124,7 +34,7 @@ struct TileCounts {
   double training = 0.0;  ///< with those held out
 
   TileCounts(const DryRun& run)
-      : all(static_cast<double>(stored_tile_count(run.light_slab))),
+      : all(static_cast<double>(run.lattice.tile_count())),
         occupied(all * run.speed.occupied_fraction),
         training(training_tiles(run.options.training_selection())) {}
 
@@ -160,7 +70,7 @@ void forecast_seconds(const DryRun& run, const TileCounts& tiles, FieldForecast&
   const SpeedSample& speed = run.speed;
   const auto tile_bytes = static_cast<double>(need.tile_bytes);
   const double cast_seconds =
-      static_cast<double>(stored_ray_count(run.light_slab)) / speed.rays_per_second / run.ranks;
+      static_cast<double>(run.lattice.stored_node_count()) / speed.rays_per_second / run.ranks;
   const double checkpoint_seconds =
       run.options.has_checkpoint ? seconds_at(tile_bytes, run.disk.write_bytes_per_second) : 0.0;
   // Most trainings end after about so many iterations.
@@ -222,8 +132,8 @@ FieldForecast forecast(const DryRun& run) {
   const TileCounts tiles(run);
   const double codebook_bytes = 32.0 * run.options.codewords;
   FieldForecast need;
-  need.uncropped_bytes = 2 * uncropped_ray_count(run.light_slab);
-  need.cropped_bytes = 2 * static_cast<std::uint64_t>(stored_ray_count(run.light_slab));
+  need.uncropped_bytes = 2 * static_cast<std::uint64_t>(run.lattice.node_count());
+  need.cropped_bytes = 2 * static_cast<std::uint64_t>(run.lattice.stored_node_count());
   need.payload_bytes = static_cast<std::uint64_t>(2.0 * tiles.all + codebook_bytes);
   need.file_bytes = static_cast<std::uint64_t>(
       2.0 * run.speed.compressed_fraction * tiles.occupied + codebook_bytes);
@@ -242,12 +152,12 @@ std::string dry_run_text(const DryRun& run) {
   text += formatted("  range              +-%g degrees, +-%g mm\n",
                     run.options.max_rotation_deg,
                     run.options.max_translation_mm);
-  text += plane_text(run.light_slab);
+  text += run.planes;
   text += formatted("  rays               %.1f million stored of %.1f million\n",
-                    static_cast<double>(stored_ray_count(run.light_slab)) / 1e6,
-                    static_cast<double>(uncropped_ray_count(run.light_slab)) / 1e6);
+                    static_cast<double>(run.lattice.stored_node_count()) / 1e6,
+                    static_cast<double>(run.lattice.node_count()) / 1e6);
   text += formatted("  tiles              %.2f million, about %.0f %% not empty\n",
-                    static_cast<double>(stored_tile_count(run.light_slab)) / 1e6,
+                    static_cast<double>(run.lattice.tile_count()) / 1e6,
                     100.0 * run.speed.occupied_fraction);
   text += formatted("  work               %zu units on %d ranks\n", run.units.size(), run.ranks);
   text += memory_text(run, need);
@@ -266,7 +176,7 @@ std::string dry_run_text(const DryRun& run) {
                 need.all_seconds(),
                 seconds_text(need.seconds).c_str(),
                 run.speed.rays_per_second / 1e6);
-  return text + advice_text(run.source, run.light_slab, run.options);
+  return text + run.advice;
 }
 
 }  // namespace af

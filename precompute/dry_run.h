@@ -6,7 +6,6 @@
 #include <utility>
 #include <vector>
 
-#include "geometry/light_slab.h"
 #include "precompute/field_source.h"
 #include "precompute/pipeline/field_build.h"
 #include "precompute/plan/memory_plan.h"
@@ -20,7 +19,7 @@ using PhaseSeconds = std::vector<std::pair<std::string, double>>;
 /// What a forecast is made from.
 struct DryRun {
   const FieldSource& source;
-  const LightSlab& light_slab;
+  const FieldLattice& lattice;
   const PrecomputeOptions& options;
   std::vector<WorkUnit> units;
   std::uint64_t volume_bytes = 0;  ///< of the CT and its resampled grid, once per node
@@ -29,6 +28,8 @@ struct DryRun {
   MemoryPlan memory;
   PhaseSeconds past;  ///< phases that a dry run goes through itself: reading and resampling
   int ranks = 1;
+  std::string planes;  ///< planes_text()
+  std::string advice;  ///< advice_text()
 };
 
 /// What the field would need.

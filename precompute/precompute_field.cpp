@@ -18,10 +18,11 @@
 #include "parallel/work_watch.h"
 #include "precompute/casting/casters.h"
 #include "precompute/dry_run.h"
-#include "precompute/field_source.h"
+#include "precompute/field_planes.h"
 #include "precompute/pipeline/field_build.h"
 #include "precompute/pipeline/shared_resampling.h"
 #include "precompute/pipeline/training_checkpoints.h"
+#include "precompute/units/unit_planner.h"
 #include "run/output_lock.h"
 #include "run/progress_printer.h"
 #include "run/provenance.h"
@@ -174,7 +175,7 @@ class PrecomputeRun {
       print_dry_run(*caster);
       return;
     }
-    check_writing_many_chunks(light_slab_, options_.output, world_, hints());
+    check_writing_many_chunks(lattice_, options_.output, world_, hints());
     build(*caster);
   }
 
@@ -212,8 +213,8 @@ class PrecomputeRun {
     const bool is_for_casting = caster_named(options_.caster).needs_resampled;
     if (!is_for_casting && is_default) return;
     note.change("resampling the CT");
-    resampled_ = std::make_shared<const SlabAlignedVolume>(
-        resample_on_node(*source_.volume, light_slab_.slab_from_ct, SlabAlignedOptions{}, world_));
+    resampled_ = std::make_shared<const SlabAlignedVolume>(resample_on_node(
+        *source_.volume, field_.light_slab.slab_from_ct, SlabAlignedOptions{}, world_));
     if (!is_default)
       size_planes(all_or_none(
           world_, [&] { return choose_depth_slabs(*resampled_, options_.slabs, st_plane); }));
@@ -223,23 +224,23 @@ class PrecomputeRun {
 
   /// Collective.
   void size_planes(const DepthSlabs& depth_slabs) {
-    const LightSlab light_slab = all_or_none(world_, [&] {
-      return make_light_slab(source_.camera,
-                             source_.frame,
-                             options_.range(),
-                             source_.volume->corner_points(),
-                             options_.light_slab_spec(depth_slabs));
-    });
-    light_slab_ = shared_light_slab(light_slab, world_);
+    field_.light_slab = all_or_none(
+        world_, [&] { return sized_planes(source_, options_, options_.range(), depth_slabs); });
+    share_geometry(field_, world_);
+    lattice_ = field_.lattice();
   }
 
   [[nodiscard]] std::unique_ptr<const FieldCaster> make_caster() const {
     return caster_named(options_.caster)
-        .make({*source_.volume, resampled_.get(), light_slab_, quantizer(), options_.ray_caster});
+        .make({*source_.volume,
+               resampled_.get(),
+               field_.light_slab,
+               quantizer(),
+               options_.ray_caster});
   }
 
   [[nodiscard]] PlanOptions plan() const {
-    return plan_options_for_ranks(light_slab_, world_.size(), caster_named(options_.caster).plan);
+    return plan_options_for_ranks(lattice_, world_.size(), caster_named(options_.caster).plan);
   }
 
   /// Units whose casting tells the speed.
@@ -271,7 +272,7 @@ class PrecomputeRun {
     const ProcessMemory now = process_memory();
     const std::uint64_t fixed =
         largest_over_ranks(without_volume(now.own_bytes) + now.program_bytes);
-    return plan_memory(light_slab_, units, options_, fixed, world_.size());
+    return plan_memory(lattice_, units, options_, fixed, world_.size());
   }
 
   [[nodiscard]] std::filesystem::path output_folder() const {
@@ -281,14 +282,14 @@ class PrecomputeRun {
 
   void print_dry_run(const FieldCaster& caster) const {
     constexpr double kSampleSeconds = 1.0;
-    std::vector<WorkUnit> units = plan_units(light_slab_, plan());
+    std::vector<WorkUnit> units = plan_units(lattice_, plan());
     const MemoryPlan memory = memory_plan(units);
     all_or_none(world_, [&] {
       if (!world_.is_root()) return;
       const SpeedSample speed =
-          sample_speed(caster, light_slab_, sample_plan(), options_, kSampleSeconds);
+          sample_speed(caster, lattice_, sample_plan(), options_, kSampleSeconds);
       std::cout << dry_run_text({source_,
-                                 light_slab_,
+                                 lattice_,
                                  options_,
                                  std::move(units),
                                  volume_bytes(),
@@ -296,13 +297,15 @@ class PrecomputeRun {
                                  sample_disk(output_folder()),
                                  memory,
                                  clock_.phases(),
-                                 world_.size()});
+                                 world_.size(),
+                                 planes_text(field_.light_slab),
+                                 advice_text(source_, field_.light_slab, options_)});
     });
   }
 
   void build(const FieldCaster& caster) {
     // A limit that is too low is refused before anything is made.
-    const MemoryPlan memory = memory_plan(plan_units(light_slab_, plan()));
+    const MemoryPlan memory = memory_plan(plan_units(lattice_, plan()));
     all_or_none(world_, [&] { (void)memory_limit(options_, memory); });
     ProgressManifest manifest = manifest_of(options_, source_, plan());
     std::optional<ProgressFolder> progress;
@@ -312,19 +315,18 @@ class PrecomputeRun {
       inform(world_,
              "unfinished work in " + progress->path().string() +
                  " is thrown away: its options were refused, and these are others");
-    const auto units = plan_units(light_slab_, {manifest.rays_per_unit});
+    const auto units = plan_units(lattice_, {manifest.rays_per_unit});
     const FieldBuild build{caster,
-                           light_slab_,
+                           lattice_,
                            units,
-                           unit_costs(units, light_slab_, source_.volume->corner_points()),
+                           unit_costs(units, field_.light_slab, source_.volume->corner_points()),
                            progress.has_value() ? &*progress : nullptr,
                            world_};
     CastPhase cast = cast_phase(build);
     const OverflowChoice choice = overflow_choice(build, cast);
-    CompressedAttenuationField field = field_without_indices();
     const TrainedCodebook trained = train_or_give_way(build, manifest, cast);
-    field.codebook = trained.codebook;
-    write_phase(build, cast, trained, choice, field);
+    complete_field(trained.codebook);
+    write_phase(build, cast, trained, choice);
   }
 
   CastPhase cast_phase(const FieldBuild& build) {
@@ -436,14 +438,13 @@ class PrecomputeRun {
   void write_phase(const FieldBuild& build,
                    CastPhase& cast,
                    const TrainedCodebook& trained,
-                   const OverflowChoice& choice,
-                   const CompressedAttenuationField& field) {
+                   const OverflowChoice& choice) {
     FieldEncoder encoder(build, cast, trained.codebook, choice.overflow);
     BuildStatistics statistics;
     std::optional<ProgressPrinter> printer;
     printer.emplace("encoding and writing", world_.is_root());
     const FieldFileInfo info = write_field(
-        field,
+        field_,
         [&] { return encoder.next_blocks(printer->callback(), stop_requested()); },
         [&] {
           statistics = statistics_of(cast, encoder);
@@ -476,18 +477,16 @@ class PrecomputeRun {
     });
   }
 
-  [[nodiscard]] CompressedAttenuationField field_without_indices() const {
-    CompressedAttenuationField field;
+  void complete_field(const Codebook& codebook) {
     const AttenuationModel& model = options_.attenuation;
-    field.identity = {source_.camera,
-                      source_.frame,
-                      options_.range(),
-                      source_.ct_content_sha256,
-                      model.mu_water_per_mm,
-                      model.air_below_hu};
-    field.light_slab = light_slab_;
-    field.quantizer_step = quantizer().step();
-    return field;
+    field_.identity = {source_.camera,
+                       source_.frame,
+                       options_.range(),
+                       source_.ct_content_sha256,
+                       model.mu_water_per_mm,
+                       model.air_below_hu};
+    field_.quantizer_step = quantizer().step();
+    field_.codebook = codebook;
   }
 
   /// Collective.
@@ -535,7 +534,7 @@ class PrecomputeRun {
               const TrainedCodebook& trained,
               const BuildStatistics& statistics) const {
     const auto rate = static_cast<double>(cast.rays_cast) / clock_.seconds_of("cast") / 1e6;
-    const auto raw_bytes = static_cast<double>(2 * stored_ray_count(light_slab_));
+    const auto raw_bytes = static_cast<double>(2 * lattice_.stored_node_count());
     std::ostringstream text;
     text.precision(3);
     text << training_text(trained, quantizer().step())
@@ -562,7 +561,8 @@ class PrecomputeRun {
   int ranks_on_node_ = world_.node().size();
   std::unique_ptr<OutputLock> lock_;  ///< rank 0
   FieldSource source_;
-  LightSlab light_slab_;
+  CompressedAttenuationField field_;                    ///< without indices
+  FieldLattice lattice_;                                ///< of the field
   std::shared_ptr<const SlabAlignedVolume> resampled_;  ///< for casters that need it
   std::size_t iterations_resumed_ = 0;                  ///< of the training, by earlier runs
   PhaseClock clock_;

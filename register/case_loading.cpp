@@ -140,7 +140,7 @@ FieldLevelMemory node_memory(const Communicator& communicator, ThreadPool& pool)
 /// The levels to make of a field: those of the method, and for judging as many as there are nodes.
 int level_count(const CompressedAttenuationField& field, const CaseLoadOptions& options) {
   int nodes = std::numeric_limits<int>::max();
-  for (const SlabGeometry& slab : field.light_slab.slabs)
+  for (const SlabLattice& slab : field.lattice().slabs)
     nodes = std::min({nodes, slab.s.nodes, slab.t.nodes});
   int possible = 0;
   for (; possible < options.judging_level && nodes > 2; ++possible) nodes = (nodes + 1) / 2;

@@ -52,6 +52,13 @@ concept TextLike = requires(T& value, std::string_view text) {
   { value.text() } -> std::convertible_to<const std::string&>;
 };
 
+/// Numbers or letters one after the other in memory.
+template <typename T>
+concept PlainList = requires(T& list) {
+  requires std::is_arithmetic_v<std::remove_cvref_t<decltype(*list.data())>> ||
+      std::is_enum_v<std::remove_cvref_t<decltype(*list.data())>>;
+};
+
 /// Appends values to bytes.
 class ByteWriter {
  public:
@@ -82,7 +89,10 @@ class ByteWriter {
   void add_list(List& list) {
     std::uint64_t count = list.size();
     add(count);
-    for (auto& element : list) add(element);
+    if constexpr (PlainList<List>)
+      add_raw(list.data(), list.size() * sizeof(*list.data()));
+    else
+      for (auto& element : list) add(element);
   }
 
   std::vector<std::byte> bytes_;
@@ -132,7 +142,10 @@ class ByteReader {
     // Every element takes a byte at least, so a hostile count asks for no more than the record has.
     require(count <= bytes_.size());
     list.resize(static_cast<std::size_t>(count));
-    for (auto& element : list) take(element);
+    if constexpr (PlainList<List>)
+      take_raw(list.data(), list.size() * sizeof(*list.data()));
+    else
+      for (auto& element : list) take(element);
   }
 
   std::span<const std::byte> bytes_;

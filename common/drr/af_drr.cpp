@@ -35,26 +35,24 @@ struct FieldSample {
 FieldSample nearest_sample(const CompressedAttenuationField& field,
                            std::size_t k,
                            const RayNodes& nodes) {
-  const LightSlab& light_slab = field.light_slab;
-  const SlabGeometry& slab = light_slab.slabs[k];
+  const SlabLattice lattice = field.lattice(k);
   FieldSample sample;
   sample.value = static_cast<double>(field.node_value(k,
-                                                      {nearest_node(nodes.u, light_slab.u.nodes),
-                                                       nearest_node(nodes.v, light_slab.v.nodes),
-                                                       nearest_node(nodes.s, slab.s.nodes),
-                                                       nearest_node(nodes.t, slab.t.nodes)}));
+                                                      {nearest_node(nodes.u, lattice.u.nodes),
+                                                       nearest_node(nodes.v, lattice.v.nodes),
+                                                       nearest_node(nodes.s, lattice.s.nodes),
+                                                       nearest_node(nodes.t, lattice.t.nodes)}));
   return sample;
 }
 
 FieldSample quadrilinear_sample(const CompressedAttenuationField& field,
                                 std::size_t k,
                                 const RayNodes& nodes) {
-  const LightSlab& light_slab = field.light_slab;
-  const SlabGeometry& slab = light_slab.slabs[k];
-  const std::array<AxisTap, 4> taps = {axis_tap(nodes.u, light_slab.u.nodes),
-                                       axis_tap(nodes.v, light_slab.v.nodes),
-                                       axis_tap(nodes.s, slab.s.nodes),
-                                       axis_tap(nodes.t, slab.t.nodes)};
+  const SlabLattice lattice = field.lattice(k);
+  const std::array<AxisTap, 4> taps = {axis_tap(nodes.u, lattice.u.nodes),
+                                       axis_tap(nodes.v, lattice.v.nodes),
+                                       axis_tap(nodes.s, lattice.s.nodes),
+                                       axis_tap(nodes.t, lattice.t.nodes)};
   FieldSample sample;
   for (unsigned corner = 0; corner < 16; ++corner) {
     std::array<int, 4> node{};
@@ -77,43 +75,20 @@ FieldSample quadrilinear_sample(const CompressedAttenuationField& field,
   return sample;
 }
 
-/// A ray of the view in the slab frame: from the source through a detector point.
-struct SlabRay {
-  Eigen::Vector3d source;
-  Eigen::Vector3d direction;  ///< not normalised
-};
-
-/// Derivatives of the ray's source and direction (slab frame) with respect to the six pose
-/// parameters of PoseGradients.
-struct RayDerivatives {
-  std::array<Eigen::Vector3d, 6> source;
-  std::array<Eigen::Vector3d, 6> direction;
-};
-
-/// A CT moved by t + R about p sees a room point x at x - t - omega x (x - p), to first order.
-RayDerivatives ray_derivatives(const Eigen::Matrix3d& slab_from_room_axes,
-                               const Eigen::Vector3d& source_from_pivot,
-                               const Eigen::Vector3d& direction_in_room) {
-  RayDerivatives derivatives;
+/// Derivatives of a ray (slab frame) with respect to the six pose parameters of PoseGradients. A CT
+/// moved by t + R about p sees a room point x at x - t - omega x (x - p), to first order.
+std::array<Ray, 6> ray_derivatives(const Eigen::Matrix3d& slab_from_room_axes,
+                                   const Eigen::Vector3d& source_from_pivot,
+                                   const Eigen::Vector3d& direction_in_room) {
+  std::array<Ray, 6> derivatives;
   for (int axis = 0; axis < 3; ++axis) {
     const Eigen::Vector3d unit = Eigen::Vector3d::Unit(axis);
     const auto rotation = static_cast<std::size_t>(axis);
-    derivatives.source[rotation] = slab_from_room_axes * -unit.cross(source_from_pivot);
-    derivatives.direction[rotation] = slab_from_room_axes * -unit.cross(direction_in_room);
-    derivatives.source[rotation + 3] = slab_from_room_axes * -unit;
-    derivatives.direction[rotation + 3] = Eigen::Vector3d::Zero();
+    derivatives[rotation] = {slab_from_room_axes * -unit.cross(source_from_pivot),
+                             slab_from_room_axes * -unit.cross(direction_in_room)};
+    derivatives[rotation + 3] = {slab_from_room_axes * -unit, Eigen::Vector3d::Zero()};
   }
   return derivatives;
-}
-
-/// Derivative of where a ray meets the plane y = plane_y, as the ray changes.
-Eigen::Vector3d hit_derivative(const SlabRay& ray,
-                               double plane_y,
-                               const Eigen::Vector3d& d_source,
-                               const Eigen::Vector3d& d_direction) {
-  const double scale = (plane_y - ray.source.y()) / ray.direction.y();
-  const double d_scale = (-d_source.y() - scale * d_direction.y()) / ray.direction.y();
-  return d_source + scale * d_direction + d_scale * ray.direction;
 }
 
 }  // namespace
@@ -135,8 +110,8 @@ RenderStatus AfDrr::render(const RigidTransform& room_from_ct,
   check(total_attenuation.size() == pixels, "one value per pixel of the view");
   check(!gradients || gradients->planes.size() == 6 * pixels,
         "six gradient planes of the view's size");
-  const LightSlab& light_slab = field_->light_slab;
-  const RigidTransform slab_from_room = light_slab.slab_from_ct * room_from_ct.inverse();
+  const auto& geometry = field_->light_slab;
+  const RigidTransform slab_from_room = geometry.slab_from_ct * room_from_ct.inverse();
   const Eigen::Vector3d source = slab_from_room * view.camera.source_point;
   RenderStatus status;
   std::size_t pixel = 0;
@@ -145,13 +120,12 @@ RenderStatus AfDrr::render(const RigidTransform& room_from_ct,
       const Eigen::Vector3d direction_in_room =
           view.camera.detector_point(view.roi.column + column, view.roi.row + row) -
           view.camera.source_point;
-      const SlabRay ray{source, slab_from_room.linear() * direction_in_room};
+      const Ray ray{source, slab_from_room.linear() * direction_in_room};  // not normalised
       double value = 0.0;
       std::array<double, 6> slopes{};
       bool is_outside = false;
-      for (std::size_t k = 0; k < light_slab.slabs.size() && !is_outside; ++k) {
-        const SlabGeometry& slab = light_slab.slabs[k];
-        const auto nodes = light_slab.intersect({ray.source, ray.direction}, slab);
+      for (std::size_t k = 0; k < geometry.slabs.size() && !is_outside; ++k) {
+        const auto nodes = geometry.intersect(ray, geometry.slabs[k]);
         if (!nodes) {
           is_outside = true;
           break;
@@ -161,20 +135,12 @@ RenderStatus AfDrr::render(const RigidTransform& room_from_ct,
                                        : quadrilinear_sample(*field_, k, *nodes);
         value += sample.value;
         if (!gradients) continue;
-        const RayDerivatives change =
+        const std::array<Ray, 6> changes =
             ray_derivatives(slab_from_room.linear(),
                             view.camera.source_point - gradients->pivot_room_point,
                             direction_in_room);
-        for (std::size_t p = 0; p < 6; ++p) {
-          const Eigen::Vector3d at_uv =
-              hit_derivative(ray, light_slab.uv_plane_y_mm, change.source[p], change.direction[p]);
-          const Eigen::Vector3d at_st =
-              hit_derivative(ray, slab.st_plane_y_mm, change.source[p], change.direction[p]);
-          slopes[p] += sample.slope[0] * at_uv.x() / light_slab.u.spacing_mm() +
-                       sample.slope[1] * at_uv.z() / light_slab.v.spacing_mm() +
-                       sample.slope[2] * at_st.x() / slab.s.spacing_mm() +
-                       sample.slope[3] * at_st.z() / slab.t.spacing_mm();
-        }
+        for (std::size_t p = 0; p < 6; ++p)
+          slopes[p] += geometry.slope_along(sample.slope, ray, changes[p], geometry.slabs[k]);
       }
       status.rays_outside += is_outside ? 1 : 0;
       total_attenuation[pixel] = is_outside ? 0.0f : static_cast<float>(value);

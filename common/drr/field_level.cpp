@@ -98,15 +98,14 @@ Share share_of(int count, int part, int parts) {
 
 /// Where the samples of viewpoint (u, v) begin; null when the tiles' padding goes beyond the last
 /// viewpoint.
-std::uint16_t* viewpoint_samples(const LightSlab& light_slab,
+std::uint16_t* viewpoint_samples(const SlabLattice& lattice,
                                  int u,
                                  int v,
                                  std::size_t samples_per_viewpoint,
                                  std::span<std::uint16_t> samples) {
-  if (u >= light_slab.u.nodes || v >= light_slab.v.nodes) return nullptr;
-  const auto viewpoint =
-      static_cast<std::size_t>(u) * static_cast<std::size_t>(light_slab.v.nodes) +
-      static_cast<std::size_t>(v);
+  if (u >= lattice.u.nodes || v >= lattice.v.nodes) return nullptr;
+  const auto viewpoint = static_cast<std::size_t>(u) * static_cast<std::size_t>(lattice.v.nodes) +
+                         static_cast<std::size_t>(v);
   return samples.data() + viewpoint * samples_per_viewpoint;
 }
 
@@ -148,21 +147,22 @@ void decode_slab(const CompressedAttenuationField& field,
                                       BorderedPlane(fine, coarse),
                                       BorderedPlane(fine, coarse)};
   Halving halve(coarse);
-  const std::size_t st_tiles = field.tile_count(k) / static_cast<std::size_t>(field.tiles_u()) /
-                               static_cast<std::size_t>(field.tiles_v());
+  const SlabLattice lattice = field.lattice(k);
+  const int v_tiles = lattice.v.stored.tiles();
+  const auto st_tiles = static_cast<std::size_t>(lattice.s.stored.tiles()) *
+                        static_cast<std::size_t>(lattice.t.stored.tiles());
   for (int a = u_tiles.begin; a < u_tiles.end; ++a)
-    for (int b = 0; b < field.tiles_v(); ++b) {
+    for (int b = 0; b < v_tiles; ++b) {
       std::array<std::uint16_t*, 4> targets{};
       std::array<std::uint16_t*, 4> decoded{};
       for (int i = 0; i < 4; ++i) {
         const auto at = static_cast<std::size_t>(i);
         targets[at] = viewpoint_samples(
-            field.light_slab, 2 * a + i / 2, 2 * b + i % 2, to.samples_per_viewpoint(), samples);
+            lattice, 2 * a + i / 2, 2 * b + i % 2, to.samples_per_viewpoint(), samples);
         if (targets[at] != nullptr) decoded[at] = planes[at].stored();
       }
-      const std::size_t uv_tile =
-          static_cast<std::size_t>(a) * static_cast<std::size_t>(field.tiles_v()) +
-          static_cast<std::size_t>(b);
+      const std::size_t uv_tile = static_cast<std::size_t>(a) * static_cast<std::size_t>(v_tiles) +
+                                  static_cast<std::size_t>(b);
       decode_tiles({field.slabs[k].indices.data() + uv_tile * st_tiles,
                     field.codebook.codewords.data()->data(),
                     fine.stored_s.tiles(),
@@ -253,7 +253,8 @@ FieldLevel decode_field_level(const CompressedAttenuationField& field,
     const SlabGeometry& fine = field.light_slab.slabs[k];
     FieldLevelSlab slab{level == 0 ? fine : halved_lattice(fine), {}};
     slab.samples = padded_samples(result, slab, memory, [&](auto samples, int part, int parts) {
-      decode_slab(field, k, slab, level, share_of(field.tiles_u(), part, parts), samples);
+      const int u_tiles = field.lattice(k).u.stored.tiles();
+      decode_slab(field, k, slab, level, share_of(u_tiles, part, parts), samples);
     });
     result.slabs.push_back(std::move(slab));
   }

@@ -6,14 +6,18 @@
 
 namespace af {
 
-SlabRays::SlabRays(const RigidTransform& slab_from_room, const View& view)
-    : source(slab_from_room * view.camera.source_point),
+SlabRays::SlabRays(const LightSlab& light_slab,
+                   const RigidTransform& room_from_ct,
+                   const View& view)
+    : slab_from_room(light_slab.slab_from_ct * room_from_ct.inverse()),
+      source(slab_from_room * view.camera.source_point),
       first(slab_from_room * view.camera.detector_point(view.roi.column, view.roi.row) - source),
       column_step(slab_from_room.linear() *
                   (view.camera.pixel_spacing_mm.x() * view.camera.column_direction)),
       row_step(slab_from_room.linear() *
                (view.camera.pixel_spacing_mm.y() * view.camera.row_direction)),
-      roi(view.roi) {}
+      roi(view.roi),
+      light_slab_(light_slab) {}
 
 std::array<Eigen::Vector3d, 4> SlabRays::corner_directions() const {
   const Eigen::Vector3d right = (roi.width - 1) * column_step;
@@ -27,11 +31,30 @@ bool SlabRays::all_descend() const {
       corners.begin(), corners.end(), [](const Eigen::Vector3d& d) { return d.y() < 0.0; });
 }
 
-bool SlabRays::all_inside(const LightSlab& light_slab) const {
-  for (const Eigen::Vector3d& direction : corner_directions())
-    for (const SlabGeometry& slab : light_slab.slabs)
-      if (!light_slab.intersect({source, direction}, slab)) return false;
-  return true;
+bool SlabRays::is_inside(const Eigen::Vector3d& direction) const {
+  return std::all_of(
+      light_slab_.slabs.begin(), light_slab_.slabs.end(), [&](const SlabGeometry& slab) {
+        return light_slab_.intersect({source, direction}, slab).has_value();
+      });
+}
+
+bool SlabRays::all_inside() const {
+  const auto corners = corner_directions();
+  return std::all_of(
+      corners.begin(), corners.end(), [&](const Eigen::Vector3d& d) { return is_inside(d); });
+}
+
+std::int64_t SlabRays::blank_outside(std::span<float> planes, std::span<float> more_planes) const {
+  std::int64_t outside = 0;
+  std::size_t pixel = 0;
+  for (int row = 0; row < roi.height; ++row)
+    for (int column = 0; column < roi.width; ++column, ++pixel) {
+      if (is_inside(first + column * column_step + row * row_step)) continue;
+      for (const std::span<float>& output : {planes, more_planes})
+        for (std::size_t at = pixel; at < output.size(); at += roi.pixel_count()) output[at] = 0.0f;
+      ++outside;
+    }
+  return outside;
 }
 
 namespace {
@@ -116,28 +139,6 @@ NodeRange Footprint::needed(const NodeRange& across, std::size_t axis) const {
   const int begin = std::max(box.begin, lower_node(low - kRounding) - margin_);
   const int end = std::min(box.end(), lower_node(high + kRounding) + 2 + margin_);
   return {begin, end - begin};
-}
-
-std::int64_t blank_rays_outside(const LightSlab& light_slab,
-                                const SlabRays& rays,
-                                std::span<float> planes,
-                                std::span<float> more_planes) {
-  std::int64_t outside = 0;
-  std::size_t pixel = 0;
-  for (int row = 0; row < rays.roi.height; ++row)
-    for (int column = 0; column < rays.roi.width; ++column, ++pixel) {
-      const Ray ray{rays.source, rays.first + column * rays.column_step + row * rays.row_step};
-      const bool is_inside = std::all_of(
-          light_slab.slabs.begin(), light_slab.slabs.end(), [&](const SlabGeometry& slab) {
-            return light_slab.intersect(ray, slab).has_value();
-          });
-      if (is_inside) continue;
-      for (const std::span<float>& output : {planes, more_planes})
-        for (std::size_t at = pixel; at < output.size(); at += rays.roi.pixel_count())
-          output[at] = 0.0f;
-      ++outside;
-    }
-  return outside;
 }
 
 }  // namespace af

@@ -9,22 +9,33 @@
 namespace af {
 
 /// The rays of a view's region of interest in the slab frame (mm): from `source` along first +
-/// column * column_step + row * row_step, column and row counted from the region's corner.
+/// column * column_step + row * row_step, column and row counted from the region's corner. The
+/// light slab must outlive them.
 struct SlabRays {
+  RigidTransform slab_from_room;
   Eigen::Vector3d source;
   Eigen::Vector3d first;
   Eigen::Vector3d column_step;
   Eigen::Vector3d row_step;
   RegionOfInterest roi;
 
-  SlabRays(const RigidTransform& slab_from_room, const View& view);
+  SlabRays(const LightSlab& light_slab, const RigidTransform& room_from_ct, const View& view);
 
   [[nodiscard]] std::array<Eigen::Vector3d, 4> corner_directions() const;
   /// Whether all rays descend: none is parallel to the planes or rises from them.
   [[nodiscard]] bool all_descend() const;
   /// The hit points of a view's rays form a convex quadrilateral on each plane, so its corner rays
   /// decide.
-  [[nodiscard]] bool all_inside(const LightSlab& light_slab) const;
+  [[nodiscard]] bool all_inside() const;
+  /// Counts the rays that miss a plane and zeroes their pixels in both outputs. Each output has any
+  /// number of planes of the region's pixels.
+  [[nodiscard]] std::int64_t blank_outside(std::span<float> planes,
+                                           std::span<float> more_planes = {}) const;
+
+ private:
+  [[nodiscard]] bool is_inside(const Eigen::Vector3d& direction) const;
+
+  const LightSlab& light_slab_;
 };
 
 /// Nodes of an (s,t) lattice that a view's rays need: a quadrilateral and its bounding box.
@@ -59,12 +70,5 @@ class Footprint {
 
   [[nodiscard]] NodeRange needed(const NodeRange& across, std::size_t axis) const;
 };
-
-/// Counts the rays that miss a plane and zeroes their pixels in both outputs. Each output has any
-/// number of planes of the region's pixels.
-std::int64_t blank_rays_outside(const LightSlab& light_slab,
-                                const SlabRays& rays,
-                                std::span<float> planes,
-                                std::span<float> more_planes = {});
 
 }  // namespace af

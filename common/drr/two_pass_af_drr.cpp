@@ -234,12 +234,12 @@ RenderStatus TwoPassAfDrr::render(const RigidTransform& room_from_ct,
   check(!gradients || gradients->planes.size() == 6 * pixels,
         "six gradient planes of the view's size");
   auto& scratch = dynamic_cast<Workspace&>(workspace);
-  const LightSlab& light_slab = blender_->coverage();
-  const RigidTransform slab_from_room = light_slab.slab_from_ct * room_from_ct.inverse();
-  const SlabRays rays(slab_from_room, view);
-  if (!rays.all_descend())
-    return {blank_rays_outside(
-        light_slab, rays, total_attenuation, gradients ? gradients->planes : std::span<float>{})};
+  const SlabRays rays(blender_->coverage(), room_from_ct, view);
+  const auto blank_outside = [&] {
+    return rays.blank_outside(total_attenuation,
+                              gradients ? gradients->planes : std::span<float>{});
+  };
+  if (!rays.all_descend()) return {blank_outside()};
   const auto warp_image = select_kernel<WarpImage>(
       kernels_128::warp_image, kernels_256::warp_image, kernels_512::warp_image);
   const auto warp_with_pose_slopes =
@@ -248,7 +248,7 @@ RenderStatus TwoPassAfDrr::render(const RigidTransform& room_from_ct,
                                         kernels_512::warp_with_pose_slopes);
   const bool is_cubic = options_.st == AxisInterpolation::Cubic;
   const BlendNeeds needs{is_cubic ? kUpsampleReach - 1 : 0, gradients.has_value()};
-  for (std::size_t k = 0; k < light_slab.slabs.size(); ++k) {
+  for (std::size_t k = 0; k < blender_->coverage().slabs.size(); ++k) {
     SlabImages slab = blended_images(*blender_, k, rays, needs, scratch);
     if (is_cubic) slab = upsampled(slab, scratch);
     const Homography homography = nodes_from_pixels(slab.grid, rays);
@@ -260,7 +260,7 @@ RenderStatus TwoPassAfDrr::render(const RigidTransform& room_from_ct,
     }
     const PoseSlopes slopes = pose_slopes(slab,
                                           rays,
-                                          slab_from_room.linear(),
+                                          rays.slab_from_room.linear(),
                                           view.camera.source_point - gradients->pivot_room_point);
     for_each_band(view, k > 0, *pool_, [&](const PixelGrid& band) {
       warp_with_pose_slopes(slab.image(0),
@@ -272,9 +272,8 @@ RenderStatus TwoPassAfDrr::render(const RigidTransform& room_from_ct,
                             static_cast<std::int64_t>(pixels));
     });
   }
-  if (rays.all_inside(light_slab)) return {};
-  return {blank_rays_outside(
-      light_slab, rays, total_attenuation, gradients ? gradients->planes : std::span<float>{})};
+  if (rays.all_inside()) return {};
+  return {blank_outside()};
 }
 
 RenderStatus TwoPassAfDrr::render_gradient_images(const RigidTransform& room_from_ct,
@@ -285,13 +284,11 @@ RenderStatus TwoPassAfDrr::render_gradient_images(const RigidTransform& room_fro
   check(column_gradient.size() == view.pixel_count() && row_gradient.size() == view.pixel_count(),
         "one value per pixel of the view");
   auto& scratch = dynamic_cast<Workspace&>(workspace);
-  const LightSlab& light_slab = blender_->coverage();
-  const SlabRays rays(light_slab.slab_from_ct * room_from_ct.inverse(), view);
-  if (!rays.all_descend())
-    return {blank_rays_outside(light_slab, rays, column_gradient, row_gradient)};
+  const SlabRays rays(blender_->coverage(), room_from_ct, view);
+  if (!rays.all_descend()) return {rays.blank_outside(column_gradient, row_gradient)};
   const auto warp_slopes = select_kernel<WarpSlopes>(
       kernels_128::warp_slopes, kernels_256::warp_slopes, kernels_512::warp_slopes);
-  for (std::size_t k = 0; k < light_slab.slabs.size(); ++k) {
+  for (std::size_t k = 0; k < blender_->coverage().slabs.size(); ++k) {
     const SlabImages slab =
         with_sobel_slopes(blended_images(*blender_, k, rays, {1, false}, scratch), scratch);
     for_each_band(view, k > 0, *pool_, [&](const PixelGrid& band) {
@@ -303,8 +300,8 @@ RenderStatus TwoPassAfDrr::render_gradient_images(const RigidTransform& room_fro
                   row_gradient.data());
     });
   }
-  if (rays.all_inside(light_slab)) return {};
-  return {blank_rays_outside(light_slab, rays, column_gradient, row_gradient)};
+  if (rays.all_inside()) return {};
+  return {rays.blank_outside(column_gradient, row_gradient)};
 }
 
 }  // namespace af

@@ -126,12 +126,11 @@ class AnyBlender : public ViewpointBlender {
     const SlabGeometry& slab = lattice(k);
     const StoredNodes stored = stored_nodes(slab, footprint);
     if (stored.s.count > 0 && stored.t.count > 0) {
-      const LightSlab& light_slab = coverage();
       const double ratio =
-          (light_slab.uv_plane_y_mm - rays.source.y()) / (slab.st_plane_y_mm - rays.source.y());
-      ViewpointLine(slab.s, rays.source.x(), ratio, light_slab.u, interpolation())
+          (coverage().uv_plane_y_mm - rays.source.y()) / (slab.st_plane_y_mm - rays.source.y());
+      ViewpointLine(slab.s, rays.source.x(), ratio, coverage().u, interpolation())
           .make_taps(stored.s, scratch.u_taps);
-      ViewpointLine(slab.t, rays.source.z(), ratio, light_slab.v, interpolation())
+      ViewpointLine(slab.t, rays.source.z(), ratio, coverage().v, interpolation())
           .make_taps(stored.t, scratch.v_taps);
       blend_stored(k, footprint, stored, scratch, images);
     }
@@ -267,7 +266,7 @@ class CompressedBlender final : public AnyBlender {
     const SlabGeometry& slab = lattice(k);
     const std::int64_t t_tiles = slab.stored_t.tiles();
     const std::int64_t v_stride = slab.stored_s.tiles() * t_tiles;
-    const std::int64_t u_stride = v_stride * field_->tiles_v();
+    const std::int64_t u_stride = v_stride * field_->lattice(k).v.stored.tiles();
     const auto blend_tiles = select_kernel<BlendTiles>(
         kernels_128::blend_tiles, kernels_256::blend_tiles, kernels_512::blend_tiles);
     make_tile_taps(

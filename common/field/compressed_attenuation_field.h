@@ -25,7 +25,7 @@ struct FieldIdentity {
 };
 
 /// Codeword indices of one slab, [Tu][Tv][Ts][Tt] with Tt fastest; tile (a, b, c, d) holds nodes
-/// (2a.., 2b.., stored_s.begin + 2c.., stored_t.begin + 2d..). Odd ends are padded by edge
+/// 2a.., 2b.., 2c.., 2d.. of what is stored along each axis. Odd ends are padded by edge
 /// replication.
 struct CompressedSlab {
   SharedArray<std::uint16_t> indices;
@@ -42,14 +42,13 @@ struct NodeIndex {
 /// A vector-quantised attenuation field: sum over slabs of decoded tiles times the quantiser step.
 struct CompressedAttenuationField {
   FieldIdentity identity;
-  LightSlab light_slab;
+  LightSlab light_slab;         ///< for what asks where nodes lie; all else takes lattice()
   float quantizer_step = 0.0f;  ///< one for all slabs
   Codebook codebook;
   std::vector<CompressedSlab> slabs;  ///< in the order of light_slab.slabs
 
-  [[nodiscard]] int tiles_u() const { return (light_slab.u.nodes + 1) / 2; }
-  [[nodiscard]] int tiles_v() const { return (light_slab.v.nodes + 1) / 2; }
-  [[nodiscard]] std::size_t tile_count(std::size_t slab) const;
+  [[nodiscard]] SlabLattice lattice(std::size_t slab) const { return light_slab.lattice(slab); }
+  [[nodiscard]] FieldLattice lattice() const { return light_slab.lattice(); }
   /// Decoded total attenuation at a stored or unstored lattice node of one slab (0 outside the
   /// stored range).
   [[nodiscard]] float node_value(std::size_t slab, const NodeIndex& node) const;

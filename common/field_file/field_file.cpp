@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/stored_bytes.h"
 #include "field_file/chunk_index.h"
 #include "field_file/field_layout.h"
 #include "field_file/hdf5_calls.h"
@@ -27,10 +28,10 @@ namespace {
 using field_layout::Dataset;
 using field_layout::DatasetRule;
 using field_layout::index_rules;
+using field_layout::kSha256Digits;
 using hdf5::checked;
 using hdf5::Handle;
 
-constexpr std::size_t kSha256Digits = 64;
 constexpr unsigned kDeflateLevel = 4;
 /// Deflate shrinks nothing by more than this.
 constexpr std::uint64_t kMaxDeflateRatio = 1032;
@@ -144,7 +145,7 @@ void create_file_without_indices(const CompressedAttenuationField& field,
   hdf5::write_text_attribute(file, "payload_sha256", std::string(kSha256Digits, '0'));
   for (const Dataset& dataset : field_layout::datasets_of(field))
     hdf5::write_dataset(file, dataset, sha256_hex(dataset.bytes));
-  const std::vector<DatasetRule> rules = index_rules(field);
+  const std::vector<DatasetRule> rules = index_rules(field.lattice());
   const std::vector<hdf5::ChunkShape> chunks = hdf5::index_chunks(rules);
   for (std::size_t k = 0; k < rules.size(); ++k) create_index_dataset(file, rules[k], chunks[k]);
   file.close("H5Fclose");
@@ -357,7 +358,7 @@ std::string verify_and_seal(const CompressedAttenuationField& field,
                             const std::vector<std::uint64_t>& written_sums,
                             const std::filesystem::path& path) {
   Handle file = hdf5::open_file(path, H5F_ACC_RDWR);
-  const auto rules = index_rules(field);
+  const auto rules = index_rules(field.lattice());
   std::vector<std::string> index_sha256;
   for (std::size_t k = 0; k < rules.size(); ++k) {
     const Handle dataset(H5Dopen2(file, rules[k].name.c_str(), H5P_DEFAULT), H5Dclose, "H5Dopen2");
@@ -458,7 +459,7 @@ FileHeader read_header(const std::filesystem::path& path) {
   for (const DatasetRule& rule : field_layout::provenance_rules())
     header.provenance.push_back(hdf5::read_dataset(file, rule, path.string()));
   const CompressedAttenuationField field = field_layout::field_of(header.payload, path.string());
-  const std::vector<DatasetRule> rules = index_rules(field);
+  const std::vector<DatasetRule> rules = index_rules(field.lattice());
   for (const DatasetRule& rule : rules) {
     check_plausible_size(rule, header.file_bytes, path);
     std::vector<std::uint64_t> extents;
@@ -478,16 +479,16 @@ FileHeader read_header(const std::filesystem::path& path) {
 
 /// Collective. Rank 0's header on every rank.
 void share(FileHeader& header, const Communicator& communicator) {
-  std::vector<std::byte> payload = field_layout::packed(header.payload);
-  std::vector<std::byte> provenance = field_layout::packed(header.provenance);
+  std::vector<std::byte> payload = bytes_of(header.payload);
+  std::vector<std::byte> provenance = bytes_of(header.provenance);
   std::string lines = header.payload_sha256 + "\n" + std::to_string(header.file_bytes) + "\n";
   for (const std::string& sha256 : header.index_sha256) lines += sha256 + "\n";
   communicator.broadcast(payload);
   communicator.broadcast(provenance);
   communicator.broadcast(lines);
   if (communicator.is_root()) return;
-  header.payload = field_layout::unpacked(payload);
-  header.provenance = field_layout::unpacked(provenance);
+  header.payload = value_of<std::vector<Dataset>>(payload, "the header from rank 0");
+  header.provenance = value_of<std::vector<Dataset>>(provenance, "the header from rank 0");
   std::istringstream stream(lines);
   std::getline(stream, header.payload_sha256);
   std::string line;
@@ -565,7 +566,7 @@ FieldFileInfo write_field(const CompressedAttenuationField& field,
                           const MpiIoHints& hints) {
   const hdf5::QuietErrors quiet;
   const std::filesystem::path partial = field_layout::unfinished_path(path);
-  const auto rules = index_rules(field);
+  const auto rules = index_rules(field.lattice());
   FieldFileInfo info;
   info.payload_bytes = field_layout::payload_bytes(field);
   // Before the part that removes the partial file when it fails: it may be none of ours.
@@ -616,6 +617,14 @@ FieldFileInfo write_field(const CompressedAttenuationField& field,
       hints);
 }
 
+void share_geometry(CompressedAttenuationField& field, const Communicator& communicator) {
+  std::vector<std::byte> bytes = bytes_of(field_layout::geometry_datasets(field));
+  communicator.broadcast(bytes);
+  field_layout::set_geometry(value_of<std::vector<Dataset>>(bytes, "the geometry of rank 0"),
+                             "the geometry of rank 0",
+                             field);
+}
+
 std::shared_ptr<const CompressedAttenuationField> read_field(const std::filesystem::path& path,
                                                              const Communicator& communicator,
                                                              FieldFileInfo* info) {
@@ -627,7 +636,7 @@ std::shared_ptr<const CompressedAttenuationField> read_field(const std::filesyst
   share(header, communicator);
   auto field = std::make_shared<CompressedAttenuationField>(
       field_layout::field_of(header.payload, path.string()));
-  const auto rules = index_rules(*field);
+  const auto rules = index_rules(field->lattice());
   for (std::size_t k = 0; k < rules.size(); ++k)
     field->slabs.push_back(all_or_none(communicator, [&] {
       return read_slab(

@@ -88,10 +88,14 @@ void check_parallel_writing(const std::filesystem::path& path,
 /// Collective. The same for a field of so many chunks that HDF5's index of them has to be held in a
 /// larger metadata cache than its own: little data in as many chunks, but at most 131072. Does
 /// nothing for smaller fields.
-void check_writing_many_chunks(const LightSlab& light_slab,
+void check_writing_many_chunks(const FieldLattice& lattice,
                                const std::filesystem::path& path,
                                const Communicator& communicator,
                                const MpiIoHints& hints = {});
+
+/// Collective. Rank 0's geometry on every rank: sizing uses libm, whose last bit may differ between
+/// processors.
+void share_geometry(CompressedAttenuationField& field, const Communicator& communicator);
 
 /// Collective. Rank 0 reads and verifies (extents against dataspaces before allocating, checksums,
 /// index range), the rest receive it; indices are held once per node. FileError (exit 4) on

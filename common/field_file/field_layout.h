@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <span>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "field/compressed_attenuation_field.h"
@@ -17,7 +18,7 @@ namespace af::field_layout {
 inline constexpr const char* kFormat = "attenuation-field";
 inline constexpr int kFormatVersion = 1;
 inline constexpr int kMaxSlabs = 64;
-inline constexpr int kMaxNodes = 65536;
+inline constexpr std::size_t kSha256Digits = 64;
 inline constexpr std::uint64_t kMaxTextBytes = 16u << 20;
 
 /// Where a field is written until it is whole.
@@ -48,21 +49,30 @@ struct DatasetRule {
 struct Dataset {
   DatasetRule rule;  ///< with its true extents
   std::vector<std::byte> bytes;
+
+  /// What other ranks need of it.
+  auto members() { return std::tie(rule.name, rule.type, rule.extents, bytes); }
 };
 
 /// The rules of all small datasets that count as payload, in the fixed order of the payload hash;
 /// the indices of the slabs follow them.
 std::vector<DatasetRule> payload_rules(int slab_count);
 DatasetRule slab_count_rule();
-DatasetRule index_rule(const CompressedAttenuationField& field, std::size_t slab);
+DatasetRule index_rule(const FieldLattice& lattice, std::size_t slab);
 /// One per slab.
-std::vector<DatasetRule> index_rules(const CompressedAttenuationField& field);
+std::vector<DatasetRule> index_rules(const FieldLattice& lattice);
 std::vector<DatasetRule> provenance_rules();
 
 /// The small payload datasets of a field, in the order of payload_rules().
 std::vector<Dataset> datasets_of(const CompressedAttenuationField& field);
 std::vector<Dataset> datasets_of(const FieldProvenance& provenance);
+/// Of its geometry alone, the number of slabs first.
+std::vector<Dataset> geometry_datasets(const CompressedAttenuationField& field);
 
+/// Takes the geometry from the first datasets; returns the others. FileError on NaN and infinity.
+std::span<const Dataset> set_geometry(std::span<const Dataset> datasets,
+                                      const std::string& path,
+                                      CompressedAttenuationField& field);
 /// The field of datasets that satisfy payload_rules(), without indices. FileError when values make
 /// no sense: NaN, bad geometry, a codebook out of order, ranges outside the lattice.
 CompressedAttenuationField field_of(std::span<const Dataset> datasets, const std::string& path);
@@ -71,10 +81,6 @@ int slab_count_of(const Dataset& dataset, const std::string& path);
 
 /// One line per dataset that takes part in the payload hash.
 std::string payload_line(const DatasetRule& rule, const std::string& sha256);
-
-/// Datasets as bytes, to be broadcast.
-std::vector<std::byte> packed(std::span<const Dataset> datasets);
-std::vector<Dataset> unpacked(std::span<const std::byte> bytes);
 
 /// Bytes of indices and codebook, as stored.
 std::uint64_t payload_bytes(const CompressedAttenuationField& field);

@@ -124,13 +124,11 @@ void check_parallel_writing(const std::filesystem::path& path,
   write_to_test({blocks, 1, kTestTiles[0], kTestTiles[1]}, path, communicator, hints);
 }
 
-void check_writing_many_chunks(const LightSlab& light_slab,
+void check_writing_many_chunks(const FieldLattice& lattice,
                                const std::filesystem::path& path,
                                const Communicator& communicator,
                                const MpiIoHints& hints) {
-  CompressedAttenuationField field;
-  field.light_slab = light_slab;
-  const std::uint64_t chunks = hdf5::chunk_count(field_layout::index_rules(field));
+  const std::uint64_t chunks = hdf5::chunk_count(field_layout::index_rules(lattice));
   if (chunks <= kFewChunks) return;
   const auto rows = static_cast<int>(std::min(chunks, kMostTestChunks) / kTestChunksOfBlock + 1);
   write_to_test({rows, kTestChunksOfBlock, 1, 1}, path, communicator, hints);

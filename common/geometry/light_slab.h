@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <limits>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "geometry/camera_geometry.h"
+#include "geometry/field_lattice.h"
 #include "geometry/rigid_transform.h"
 
 namespace af {
@@ -25,16 +28,6 @@ struct GridAxis {
   [[nodiscard]] bool contains(double position_mm) const {
     return position_mm >= first_mm && position_mm <= last_mm;
   }
-};
-
-/// Half-open, even-aligned range of lattice nodes that a slab stores; the rest of the lattice is
-/// exactly 0.
-struct NodeRange {
-  int begin = 0;  ///< even
-  int count = 0;  ///< may be odd only where the range ends at the lattice's last node
-
-  [[nodiscard]] int end() const { return begin + count; }
-  [[nodiscard]] int tiles() const { return (count + 1) / 2; }
 };
 
 /// One slab of the CT between two planes y = const of the slab frame, seen through its own (s,t)
@@ -77,7 +70,25 @@ struct LightSlab {
   /// descend in y.
   [[nodiscard]] std::optional<RayNodes> intersect(const Ray& ray_in_slab,
                                                   const SlabGeometry& slab) const;
+  /// Derivative of a value as its ray's origin and direction change, from its `slopes` with respect
+  /// to the node coordinates (u, v, s, t).
+  [[nodiscard]] double slope_along(const std::array<double, 4>& slopes,
+                                   const Ray& ray_in_slab,
+                                   const Ray& change,
+                                   const SlabGeometry& slab) const;
+
+  /// The nodes alone: all of u and v, and the part of s and t that slab `k` stores.
+  [[nodiscard]] SlabLattice lattice(std::size_t k) const {
+    return {{u.nodes, {0, u.nodes}},
+            {v.nodes, {0, v.nodes}},
+            {slabs[k].s.nodes, slabs[k].stored_s},
+            {slabs[k].t.nodes, slabs[k].stored_t}};
+  }
+  [[nodiscard]] FieldLattice lattice() const;
 };
+
+/// Why it cannot be a field's geometry; empty when it can.
+std::vector<std::string> problems(const LightSlab& light_slab);
 
 /// Slab frame of a camera at the nominal pose of `frame`: slab_from_ct.
 RigidTransform slab_from_ct_at_nominal(const CameraGeometry& camera, const PoseFrame& frame);

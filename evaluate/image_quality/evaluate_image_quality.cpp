@@ -91,12 +91,12 @@ Setup load(const ImageQualityOptions& options, const Target& target, const Commu
                       "CT of the field (ct_content_sha256)",
                       setup.ct.facts.content_sha256 + " (" + target.ct.string() + ")",
                       identity.ct_content_sha256);
-    if (options.split_loss_poses > 0 && setup.field->light_slab.slabs.size() != 1)
-      throw InputError("--split-loss-poses",
-                       std::to_string(options.split_loss_poses),
-                       "needs a field of one slab; this has " +
-                           std::to_string(setup.field->light_slab.slabs.size()),
-                       target.field.string());
+    if (options.split_loss_poses > 0 && setup.field->slabs.size() != 1)
+      throw InputError(
+          "--split-loss-poses",
+          std::to_string(options.split_loss_poses),
+          "needs a field of one slab; this has " + std::to_string(setup.field->slabs.size()),
+          target.field.string());
     if (options.poses.empty()) return;
     setup.poses = read_poses_csv(options.poses, identity.frame);
     if (setup.poses.empty())
@@ -234,7 +234,10 @@ std::vector<LossSplit> split_losses(const ImageQualityOptions& options,
       std::min<std::int64_t>(options.split_loss_poses, setup.pose_count(options));
   if (count == 0) return {};
   const LossSplitter splitter(
-      field, reference, setup.ct.volume, options.ray_caster, setup.field->light_slab, setup.view);
+      field,
+      reference,
+      {setup.ct.volume, options.ray_caster, setup.field->light_slab, InterpolatedPlanes::Both},
+      setup.view);
   return collected_rows<LossSplit>(
       world, unfinished, count, "losses split", [&](std::int64_t index) {
         const PoseParameters parameters = compare(options, setup, comparer, index).parameters;

@@ -117,12 +117,12 @@ json image_quality_statistics(const std::vector<DrrComparison>& comparisons) {
 
 json field_description(const CompressedAttenuationField& field) {
   const FieldIdentity& identity = field.identity;
+  const SlabLattice lattice = field.lattice(0);
   return {{"camera", identity.camera.name},
           {"detector_px", {identity.camera.size_px.x(), identity.camera.size_px.y()}},
-          {"uv_nodes", {field.light_slab.u.nodes, field.light_slab.v.nodes}},
-          {"st_nodes",
-           {field.light_slab.slabs.front().s.nodes, field.light_slab.slabs.front().t.nodes}},
-          {"slabs", field.light_slab.slabs.size()},
+          {"uv_nodes", {lattice.u.nodes, lattice.v.nodes}},
+          {"st_nodes", {lattice.s.nodes, lattice.t.nodes}},
+          {"slabs", field.slabs.size()},
           {"codewords", field.codebook.size()},
           {"max_rotation_deg", identity.range.max_rotation_rad * kDegPerRad},
           {"max_translation_mm", identity.range.max_translation_mm},

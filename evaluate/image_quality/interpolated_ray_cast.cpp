@@ -210,6 +210,12 @@ InterpolatedRayCast::InterpolatedRayCast(std::shared_ptr<const AttenuationVolume
   check(light_slab_.slabs.size() == 1, "interpolated ray casting is for fields of one slab");
 }
 
+InterpolatedRayCast InterpolatedRayCast::on(InterpolatedPlanes planes) const {
+  InterpolatedRayCast other = *this;
+  other.planes_ = planes;
+  return other;
+}
+
 std::unique_ptr<RenderWorkspace> InterpolatedRayCast::make_workspace() const {
   return std::make_unique<RenderWorkspace>();
 }

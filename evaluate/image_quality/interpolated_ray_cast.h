@@ -25,6 +25,9 @@ class InterpolatedRayCast final : public DrrRenderer {
                       const LightSlab& light_slab,
                       InterpolatedPlanes planes);
 
+  /// The same on other planes.
+  [[nodiscard]] InterpolatedRayCast on(InterpolatedPlanes planes) const;
+
   /// Without gradients.
   RenderStatus render(const RigidTransform& room_from_ct,
                       const View& view,

@@ -38,15 +38,13 @@ std::array<double, LossSplit::kParts> LossSplit::psnr_db() const {
 
 LossSplitter::LossSplitter(const DrrRenderer& field,
                            const DrrRenderer& reference,
-                           std::shared_ptr<const AttenuationVolume> volume,
-                           const RayCasterOptions& ray_caster,
-                           const LightSlab& light_slab,
+                           const InterpolatedRayCast& interpolated,
                            const View& view)
     : field_(field),
       reference_(reference),
-      uv_(volume, ray_caster, light_slab, InterpolatedPlanes::Uv),
-      st_(volume, ray_caster, light_slab, InterpolatedPlanes::St),
-      both_(std::move(volume), ray_caster, light_slab, InterpolatedPlanes::Both),
+      uv_(interpolated.on(InterpolatedPlanes::Uv)),
+      st_(interpolated.on(InterpolatedPlanes::St)),
+      both_(interpolated.on(InterpolatedPlanes::Both)),
       view_(view) {}
 
 std::vector<float> LossSplitter::rendered(const DrrRenderer& renderer,

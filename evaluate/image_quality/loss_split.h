@@ -28,12 +28,11 @@ struct LossSplit {
 /// \test LossSplitter.AFieldWithoutQuantisationLosesByInterpolationAlone
 class LossSplitter {
  public:
-  /// The two-pass linear look-up of a field of one slab, and the reference; both outlive this.
+  /// The two-pass linear look-up of a field of one slab, and the reference, which both outlive
+  /// this; and ray casting with the interpolation of that field.
   LossSplitter(const DrrRenderer& field,
                const DrrRenderer& reference,
-               std::shared_ptr<const AttenuationVolume> volume,
-               const RayCasterOptions& ray_caster,
-               const LightSlab& light_slab,
+               const InterpolatedRayCast& interpolated,
                const View& view);
 
   /// NaN when a ray is outside or nothing is in the foreground.

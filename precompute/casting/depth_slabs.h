@@ -9,7 +9,7 @@
 
 namespace af {
 
-/// Where a CT is cut into K depth slabs, and the (s,t) plane of each; for LightSlabSpec.
+/// Where a CT is cut into K depth slabs, and the (s,t) plane of each: what make_light_slab() takes.
 struct DepthSlabs {
   std::vector<double> boundaries_y_mm;  ///< K - 1, ascending, midway between two slices
   std::vector<double> st_plane_y_mm;    ///< K, ascending

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "field/attenuation_quantizer.h"
+#include "geometry/light_slab.h"
 #include "precompute/units/work_unit.h"
 #include "volume/ray_caster.h"
 
@@ -40,5 +43,12 @@ class RayCastFieldCaster final : public FieldCaster {
   RayCaster caster_;
   RigidTransform ct_from_slab_;
 };
+
+/// The cost of casting each unit, in units of one ray through the whole CT, for handing out the
+/// costly units first. Rays that miss the box of all attenuation (`attenuating_corners_ct`, ct
+/// frame) cost little, and a thin slab costs less, because fewer slices are summed.
+std::vector<double> unit_costs(const std::vector<WorkUnit>& units,
+                               const LightSlab& light_slab,
+                               const std::array<Eigen::Vector3d, 8>& attenuating_corners_ct);
 
 }  // namespace af

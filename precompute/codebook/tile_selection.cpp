@@ -156,8 +156,8 @@ std::vector<std::string> problems(const TrainingSelection& selection) {
 }
 
 TrainingTilePicker::TrainingTilePicker(const TrainingSelection& selection,
-                                       const LightSlab& light_slab)
-    : selection_(selection), light_slab_(light_slab), histogram_(kBins, 0) {
+                                       const FieldLattice& lattice)
+    : selection_(selection), lattice_(lattice), histogram_(kBins, 0) {
   throw_if_any(problems(selection));
   lower_threshold(last_hash_of_fraction(selection.fraction));
   // Only the used part becomes memory. An eighth above the cap, so that dropping is rare.
@@ -172,9 +172,9 @@ void TrainingTilePicker::lower_threshold(std::uint64_t last_training) {
 }
 
 void TrainingTilePicker::add(const UnitTiles& tiles, const WorkUnit& unit) {
-  const TileLattice lattice(light_slab_, unit.slab);
+  const TilePlaces places(lattice_, unit);
   tiles.for_each([&](std::size_t local_tile, const Tile& tile) {
-    const NumberedTile numbered{lattice.global_index(unit, light_slab_, local_tile), tile};
+    const NumberedTile numbered{places.global_index(local_tile), tile};
     const std::uint64_t hash = hash_of(numbered);
     if (hash <= last_training_) {
       ++histogram_[hash >> 48u];
@@ -221,10 +221,10 @@ std::uint64_t TrainingTilePicker::hash_of(const NumberedTile& tile) const {
 
 TrainingShare select_training_tiles(std::span<const UnitTiles> tiles,
                                     std::span<const WorkUnit> units,
-                                    const LightSlab& light_slab,
+                                    const FieldLattice& lattice,
                                     const TrainingSelection& selection,
                                     const CodebookReduction& reduction) {
-  TrainingTilePicker picker(selection, light_slab);
+  TrainingTilePicker picker(selection, lattice);
   for (const UnitTiles& of_unit : tiles) picker.add(of_unit, units[of_unit.unit_id]);
   return picker.take(reduction);
 }

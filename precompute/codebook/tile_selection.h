@@ -12,7 +12,7 @@
 
 namespace af {
 
-/// A tile of the field and its number over all slabs (TileLattice::global_index).
+/// A tile of the field and its number over all slabs (TilePlaces::global_index).
 struct NumberedTile {
   std::int64_t global_index = 0;
   Tile tile{};
@@ -44,8 +44,7 @@ std::vector<std::string> problems(const TrainingSelection& selection);
 /// \test TileSelection.*
 class TrainingTilePicker {
  public:
-  /// `light_slab` must outlive the picker.
-  TrainingTilePicker(const TrainingSelection& selection, const LightSlab& light_slab);
+  TrainingTilePicker(const TrainingSelection& selection, const FieldLattice& lattice);
 
   void add(const UnitTiles& tiles, const WorkUnit& unit);
 
@@ -59,7 +58,7 @@ class TrainingTilePicker {
   [[nodiscard]] std::uint64_t hash_of(const NumberedTile& tile) const;
 
   TrainingSelection selection_;
-  const LightSlab& light_slab_;
+  FieldLattice lattice_;
   std::uint64_t last_training_;   ///< no hash above it trains: the fraction's, or this rank's cap's
   std::uint64_t first_held_out_;  ///< no hash below it is held out
   std::vector<std::uint64_t> histogram_;  ///< of the hashes at most last_training_, by bin
@@ -69,7 +68,7 @@ class TrainingTilePicker {
 /// The same for units that are all there, one after the other.
 TrainingShare select_training_tiles(std::span<const UnitTiles> tiles,
                                     std::span<const WorkUnit> units,
-                                    const LightSlab& light_slab,
+                                    const FieldLattice& lattice,
                                     const TrainingSelection& selection,
                                     const CodebookReduction& reduction);
 

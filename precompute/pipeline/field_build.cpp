@@ -15,7 +15,6 @@
 #include "parallel/work_queue.h"
 #include "parallel/work_watch.h"
 #include "precompute/codebook/field_encoder.h"
-#include "precompute/units/unit_planner.h"
 
 namespace af {
 
@@ -88,14 +87,6 @@ class TileKeeper {
   CastPhase& cast_;
 };
 
-std::array<int, 4> first_tile_of(const WorkUnit& unit, const LightSlab& light_slab) {
-  const SlabGeometry& slab = light_slab.slabs[unit.slab];
-  return {unit.u.begin / 2,
-          unit.v.begin / 2,
-          (unit.s.begin - slab.stored_s.begin) / 2,
-          (unit.t.begin - slab.stored_t.begin) / 2};
-}
-
 /// "unit 3 of 32 (slab 0, viewpoints u 0 to 7, v 2 to 3)".
 std::string name_of(const WorkUnit& unit, std::size_t units) {
   const auto range = [](const NodeRange& nodes) {
@@ -104,69 +95,6 @@ std::string name_of(const WorkUnit& unit, std::size_t units) {
   return "unit " + std::to_string(unit.id) + " of " + std::to_string(units) + " (slab " +
          std::to_string(unit.slab) + ", viewpoints u " + range(unit.u) + ", v " + range(unit.v) +
          ")";
-}
-
-void append_axis(const GridAxis& axis, std::vector<double>& numbers) {
-  numbers.insert(numbers.end(), {axis.first_mm, axis.last_mm, static_cast<double>(axis.nodes)});
-}
-
-/// Takes numbers one after the other.
-class NumberReader {
- public:
-  explicit NumberReader(std::span<const double> numbers) : numbers_(numbers) {}
-  double next() { return numbers_[position_++]; }
-  int next_int() { return static_cast<int>(next()); }
-  GridAxis next_axis() {
-    const double first = next();
-    const double last = next();
-    return {first, last, next_int()};
-  }
-  NodeRange next_range() {
-    const int begin = next_int();
-    return {begin, next_int()};
-  }
-
- private:
-  std::span<const double> numbers_;
-  std::size_t position_ = 0;
-};
-
-std::vector<double> numbers_of(const LightSlab& light_slab) {
-  const auto& matrix = light_slab.slab_from_ct.matrix();
-  std::vector<double> numbers(matrix.data(), matrix.data() + matrix.size());
-  numbers.push_back(light_slab.uv_plane_y_mm);
-  append_axis(light_slab.u, numbers);
-  append_axis(light_slab.v, numbers);
-  for (const SlabGeometry& slab : light_slab.slabs) {
-    numbers.insert(numbers.end(), {slab.st_plane_y_mm, slab.y_low_mm, slab.y_high_mm});
-    append_axis(slab.s, numbers);
-    append_axis(slab.t, numbers);
-    for (const NodeRange& range : {slab.stored_s, slab.stored_t})
-      numbers.insert(numbers.end(),
-                     {static_cast<double>(range.begin), static_cast<double>(range.count)});
-  }
-  return numbers;
-}
-
-LightSlab light_slab_of(std::span<const double> numbers, std::size_t slabs) {
-  NumberReader reader(numbers);
-  LightSlab light_slab;
-  for (Eigen::Index i = 0; i < 16; ++i) light_slab.slab_from_ct.matrix().data()[i] = reader.next();
-  light_slab.uv_plane_y_mm = reader.next();
-  light_slab.u = reader.next_axis();
-  light_slab.v = reader.next_axis();
-  for (std::size_t k = 0; k < slabs; ++k) {
-    SlabGeometry slab;
-    slab.st_plane_y_mm = reader.next();
-    slab.y_low_mm = reader.next();
-    slab.y_high_mm = reader.next();
-    slab.s = reader.next_axis();
-    slab.t = reader.next_axis();
-    slab.stored_s = reader.next_range();
-    slab.stored_t = reader.next_range();
-    light_slab.slabs.push_back(slab);
-  }
-  return light_slab;
 }
 
 void require_all(const FieldBuild& build, std::uint64_t finished) {
@@ -221,7 +149,7 @@ CastPhase cast_field(const FieldBuild& build,
                      const StopRequested& stop_requested,
                      const ProgressCallback& on_progress) {
   const Communicator& communicator = build.communicator;
-  CastPhase cast(TrainingTilePicker(limits.selection, build.light_slab));
+  CastPhase cast(TrainingTilePicker(limits.selection, build.lattice));
   cast.unit_tiles.assign(build.units.size(), 0);
   TileKeeper keeper(build, limits.kept_tile_bytes, cast);
   std::vector<std::uint64_t> is_finished(build.units.size(), 0);
@@ -381,7 +309,7 @@ IndexBlock FieldEncoder::next_block() {
   tiles_done_ += static_cast<double>(cast_.unit_tiles[unit.id]);
   squared_error_ += of_unit.squared_error;
   return {unit.slab,
-          first_tile_of(unit, build_.light_slab),
+          TilePlaces(build_.lattice, unit).first(),
           unit.tile_counts(),
           std::move(of_unit.indices)};
 }
@@ -419,16 +347,6 @@ std::uint64_t FieldEncoder::units_resumed() const {
 
 std::vector<double> FieldEncoder::busy_seconds() const {
   return gathered(build_.communicator, busy_seconds_);
-}
-
-LightSlab shared_light_slab(const LightSlab& light_slab, const Communicator& communicator) {
-  std::vector<double> numbers = numbers_of(light_slab);
-  const auto raw = std::as_bytes(std::span(numbers));
-  std::vector<std::byte> bytes(raw.begin(), raw.end());
-  communicator.broadcast(bytes);
-  numbers.resize(bytes.size() / sizeof(double));
-  std::memcpy(numbers.data(), bytes.data(), bytes.size());
-  return light_slab_of(numbers, light_slab.slabs.size());
 }
 
 }  // namespace af

@@ -21,10 +21,10 @@ namespace af {
 /// Asked between units; true ends casting with progress saved.
 using StopRequested = std::function<bool()>;
 
-/// What the phases work on. All of it must outlive them.
+/// What the phases work on. What it refers to must outlive them.
 struct FieldBuild {
   const FieldCaster& caster;
-  const LightSlab& light_slab;
+  FieldLattice lattice;
   const std::vector<WorkUnit>& units;
   std::vector<double> unit_costs;      ///< relative, of casting each unit; empty: all alike
   ProgressFolder* progress = nullptr;  ///< may be null
@@ -128,9 +128,5 @@ class FieldEncoder {
   std::uint64_t units_resumed_ = 0;
   std::vector<std::uint16_t> samples_;
 };
-
-/// Collective. Rank 0's geometry on every rank: sizing uses libm, whose last bit may differ between
-/// processors.
-LightSlab shared_light_slab(const LightSlab& light_slab, const Communicator& communicator);
 
 }  // namespace af

@@ -49,15 +49,14 @@ std::uint64_t MemoryPlan::kept_tile_bytes(std::uint64_t limit_bytes) const {
   return limit_bytes - std::min(limit_bytes, least_bytes());
 }
 
-MemoryPlan plan_memory(const LightSlab& light_slab,
+MemoryPlan plan_memory(const FieldLattice& lattice,
                        const std::vector<WorkUnit>& units,
                        const PrecomputeOptions& options,
                        std::uint64_t fixed_bytes,
                        int ranks) {
   const double unit = unit_bytes(units);
   const TrainingSelection training = options.training_selection();
-  const double fraction_tiles =
-      training.fraction * static_cast<double>(stored_tile_count(light_slab));
+  const double fraction_tiles = training.fraction * static_cast<double>(lattice.tile_count());
   const auto cap = static_cast<double>(training.max_training_tiles);
   constexpr double kCandidateBytes = sizeof(NumberedTile);
   // The picker holds up to an eighth above the cap before it drops what lies beyond.
@@ -75,8 +74,7 @@ MemoryPlan plan_memory(const LightSlab& light_slab,
   // While the share is copied from the candidates, these are still there.
   plan.training_bytes = static_cast<std::uint64_t>(
       std::max(kTrainingBytes * share + codebook, kCandidateBytes * (candidates + share)));
-  const double chunk_index =
-      kChunkIndexBytesPerTile * static_cast<double>(stored_tile_count(light_slab));
+  const double chunk_index = kChunkIndexBytesPerTile * static_cast<double>(lattice.tile_count());
   plan.encoding_bytes = static_cast<std::uint64_t>(codebook + unit + chunk_index) + kRoundBytes;
   return plan;
 }

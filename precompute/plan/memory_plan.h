@@ -23,7 +23,7 @@ struct MemoryPlan {
 };
 
 /// `fixed_bytes`: of a rank before it casts.
-MemoryPlan plan_memory(const LightSlab& light_slab,
+MemoryPlan plan_memory(const FieldLattice& lattice,
                        const std::vector<WorkUnit>& units,
                        const PrecomputeOptions& options,
                        std::uint64_t fixed_bytes,

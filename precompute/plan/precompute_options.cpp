@@ -174,15 +174,6 @@ StPlane PrecomputeOptions::st_plane_rule() const {
   return *st_plane == "centre" ? StPlane::Centre : StPlane::Centroid;
 }
 
-LightSlabSpec PrecomputeOptions::light_slab_spec(const DepthSlabs& depth_slabs) const {
-  LightSlabSpec spec;
-  spec.uv_nodes = uv_nodes;
-  spec.st_nodes = st_nodes;
-  spec.slab_boundaries_y_mm = depth_slabs.boundaries_y_mm;
-  spec.st_plane_y_mm = depth_slabs.st_plane_y_mm;
-  return spec;
-}
-
 std::vector<std::string> problems(const PrecomputeOptions& options) {
   std::vector<std::string> found = problems(options.range());
   append(field_problems(options), found);

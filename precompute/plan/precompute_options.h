@@ -66,7 +66,6 @@ struct PrecomputeOptions {
   [[nodiscard]] TrainingSelection training_selection() const;
   [[nodiscard]] CodebookOptions codebook_options() const;
   [[nodiscard]] StPlane st_plane_rule() const;
-  [[nodiscard]] LightSlabSpec light_slab_spec(const DepthSlabs& depth_slabs) const;
 
   void describe(Fields& field);
   /// With the rule that places the (s,t) planes.

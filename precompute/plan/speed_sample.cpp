@@ -116,11 +116,11 @@ void sample_search(const SampledTiles& tiles, int codewords, SpeedSample& sample
 }  // namespace
 
 SpeedSample sample_speed(const FieldCaster& caster,
-                         const LightSlab& light_slab,
+                         const FieldLattice& lattice,
                          const PlanOptions& plan,
                          const PrecomputeOptions& options,
                          double seconds) {
-  const auto units = plan_units(light_slab, plan);
+  const auto units = plan_units(lattice, plan);
   double elapsed = 0.0;
   std::size_t rays = 0;
   std::size_t tiles = 0;

@@ -23,7 +23,7 @@ struct SpeedSample {
 /// Casts units of a plan in pseudo-random order for about `seconds`, and codes some of their tiles
 /// with others as codewords.
 SpeedSample sample_speed(const FieldCaster& caster,
-                         const LightSlab& light_slab,
+                         const FieldLattice& lattice,
                          const PlanOptions& plan,
                          const PrecomputeOptions& options,
                          double seconds);

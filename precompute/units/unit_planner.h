@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
 #include <string>
 #include <vector>
 
@@ -26,25 +25,12 @@ inline constexpr int kLargestT = 128;
 /// shear-warp caster's first pass) over one chunk of the field file. With too few rays it grows
 /// along v; with too many it is cut first along t and s to runs of kRunOfT nodes, which costs that
 /// caster little, then along u. Along t it begins at a multiple of kRunOfT nodes of what is stored.
-std::vector<WorkUnit> plan_units(const LightSlab& light_slab, const PlanOptions& options);
+std::vector<WorkUnit> plan_units(const FieldLattice& lattice, const PlanOptions& options);
 
 /// A unit size that leaves every rank enough units for all ranks to end together: not more than
 /// `largest`, at least 16 units a rank.
-PlanOptions plan_options_for_ranks(const LightSlab& light_slab,
+PlanOptions plan_options_for_ranks(const FieldLattice& lattice,
                                    int ranks,
                                    const PlanOptions& largest = {});
-
-/// The cost of casting each unit, in units of one ray through the whole CT, for handing out the
-/// costly units first. Rays that miss the box of all attenuation (`attenuating_corners_ct`, ct
-/// frame) cost little, and a thin slab costs less, because fewer slices are summed.
-std::vector<double> unit_costs(const std::vector<WorkUnit>& units,
-                               const LightSlab& light_slab,
-                               const std::array<Eigen::Vector3d, 8>& attenuating_corners_ct);
-
-/// Rays of all slabs' stored nodes.
-std::int64_t stored_ray_count(const LightSlab& light_slab);
-
-/// Tiles of all slabs.
-std::int64_t stored_tile_count(const LightSlab& light_slab);
 
 }  // namespace af

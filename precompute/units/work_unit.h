@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "geometry/light_slab.h"
+#include "geometry/field_lattice.h"
 
 namespace af {
 
@@ -19,10 +19,10 @@ inline constexpr int kRunOfT = 32;
 struct WorkUnit {
   std::uint32_t id = 0;  ///< position in the plan
   std::size_t slab = 0;
-  NodeRange u;  ///< of LightSlab::u
+  NodeRange u;  ///< lattice nodes within what the slab stores
   NodeRange v;
-  NodeRange s;  ///< lattice nodes within the slab's stored_s
-  NodeRange t;  ///< within stored_t
+  NodeRange s;
+  NodeRange t;
 
   /// Samples [u][v][s][t], t fastest.
   [[nodiscard]] std::size_t sample_count() const {
@@ -38,21 +38,22 @@ struct WorkUnit {
   }
 };
 
-/// Where the tiles of a slab stand: position of tile (a, b, c, d) in the slab's [Tu][Tv][Ts][Tt]
-/// array.
-struct TileLattice {
-  std::array<std::int64_t, 4> counts = {0, 0, 0, 0};
-  std::int64_t first_global_index = 0;  ///< tiles of all slabs before this one
+/// Where a unit's tiles stand in the field.
+class TilePlaces {
+ public:
+  TilePlaces(const FieldLattice& lattice, const WorkUnit& unit);
 
-  TileLattice(const LightSlab& light_slab, std::size_t slab);
-  [[nodiscard]] std::int64_t tile_count() const {
-    return counts[0] * counts[1] * counts[2] * counts[3];
-  }
-  /// Number of a unit's tile over all slabs; `local_tile` counts within the unit, [u][v][s][t].
-  /// Random choices are keyed by it.
-  [[nodiscard]] std::int64_t global_index(const WorkUnit& unit,
-                                          const LightSlab& light_slab,
-                                          std::size_t local_tile) const;
+  /// The unit's first tile in the slab's [Tu][Tv][Ts][Tt] array.
+  [[nodiscard]] const std::array<int, 4>& first() const { return first_; }
+  /// Number of a tile over all slabs; `local_tile` counts within the unit, [u][v][s][t]. Random
+  /// choices are keyed by it.
+  [[nodiscard]] std::int64_t global_index(std::size_t local_tile) const;
+
+ private:
+  std::int64_t tiles_before_slab_;
+  std::array<int, 4> counts_of_slab_;
+  std::array<int, 4> counts_of_unit_;
+  std::array<int, 4> first_{};
 };
 
 }  // namespace af

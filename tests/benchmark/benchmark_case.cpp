@@ -65,7 +65,8 @@ AttenuationQuantizer BenchmarkCase::quantizer() const {
 }
 
 std::vector<WorkUnit> BenchmarkCase::units() const {
-  return plan_units(light_slab_, plan_options_for_ranks(light_slab_, 1, kShearWarpPlan));
+  const FieldLattice lattice = light_slab_.lattice();
+  return plan_units(lattice, plan_options_for_ranks(lattice, 1, kShearWarpPlan));
 }
 
 nlohmann::json BenchmarkCase::description() const {
@@ -78,8 +79,8 @@ nlohmann::json BenchmarkCase::description() const {
           {"detector_px", {view_.roi.width, view_.roi.height}},
           {"uv_nodes", options_.uv_nodes},
           {"st_nodes", options_.st_nodes},
-          {"stored_rays", stored_ray_count(light_slab_)},
-          {"stored_tiles", stored_tile_count(light_slab_)}};
+          {"stored_rays", light_slab_.lattice().stored_node_count()},
+          {"stored_tiles", light_slab_.lattice().tile_count()}};
 }
 
 nlohmann::json machine_description() {

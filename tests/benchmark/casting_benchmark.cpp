@@ -144,7 +144,7 @@ void run(const CaseOptions& options, const std::string& work_folder) {
   const std::vector<WorkUnit> units = benchmark_case.units();
   const std::vector<WorkUnit> some_units = evenly_spread(units, options.is_quick ? 1 : 4);
   const std::vector<WorkUnit> small_units = {
-      middle_unit(plan_units(benchmark_case.light_slab(), {}))};
+      middle_unit(plan_units(benchmark_case.light_slab().lattice(), {}))};
   std::vector<std::uint16_t> samples;
 
   std::vector<Contender> contenders = {

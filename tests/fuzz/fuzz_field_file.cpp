@@ -219,7 +219,7 @@ void mend_payload_hash(hid_t file) {
   for (const Dataset& dataset : datasets)
     lines += field_layout::payload_line(dataset.rule, sha256_hex(dataset.bytes));
   for (std::size_t k = 0; k < 2; ++k) {
-    const DatasetRule rule = field_layout::index_rule(field, k);
+    const DatasetRule rule = field_layout::index_rule(field.lattice(), k);
     const Handle dataset(H5Dopen2(file, rule.name.c_str(), H5P_DEFAULT), H5Dclose, "H5Dopen2");
     lines += field_layout::payload_line(rule, hdf5::read_text_attribute(dataset, "sha256"));
   }

@@ -47,13 +47,9 @@ CompressedAttenuationField sample_field() {
 std::vector<IndexBlock> sample_blocks(const CompressedAttenuationField& field) {
   std::vector<IndexBlock> blocks;
   for (std::size_t k = 0; k < field.light_slab.slabs.size(); ++k) {
-    const SlabGeometry& slab = field.light_slab.slabs[k];
-    blocks.push_back(
-        {k,
-         {0, 0, 0, 0},
-         {field.tiles_u(), field.tiles_v(), slab.stored_s.tiles(), slab.stored_t.tiles()},
-         {}});
-    for (std::size_t tile = 0; tile < field.tile_count(k); ++tile)
+    const SlabLattice slab = field.lattice(k);
+    blocks.push_back({k, {0, 0, 0, 0}, slab.tile_counts(), {}});
+    for (std::int64_t tile = 0; tile < slab.tile_count(); ++tile)
       blocks.back().indices.push_back(static_cast<std::uint16_t>(tile % kCodewords));
   }
   return blocks;

@@ -55,7 +55,7 @@ class FieldBuildTest : public testing::Test {
       std::int64_t rays_per_unit,
       ProgressFolder* progress = nullptr,
       const StopRequested& stop = [] { return false; }) {
-    const auto units = plan_units(light_slab_, {rays_per_unit});
+    const auto units = plan_units(light_slab_.lattice(), {rays_per_unit});
     const FieldBuild build = build_of(units, progress);
     CastPhase cast = cast_field(build, {kSelection, kept_tile_bytes_}, stop, {});
     units_resumed_ = cast.units_resumed;
@@ -84,7 +84,7 @@ class FieldBuildTest : public testing::Test {
   [[nodiscard]] FieldBuild build_of(const std::vector<WorkUnit>& units,
                                     ProgressFolder* progress) const {
     return {caster_,
-            light_slab_,
+            light_slab_.lattice(),
             units,
             unit_costs(units, light_slab_, volume_.corner_points()),
             progress,
@@ -157,7 +157,7 @@ TEST_F(FieldBuildTest, PayloadIsTheSameWhereverTheTilesAreKept) {
 }
 
 TEST_F(FieldBuildTest, TilesThatCannotBeReadBackAreCastAgain) {
-  const auto units = plan_units(light_slab_, {kUnitRays});
+  const auto units = plan_units(light_slab_.lattice(), {kUnitRays});
   ProgressManifest expected = manifest(kUnitRays);
   ProgressFolder progress(folder_ / "a.h5.progress", false, expected, world_);
   const FieldBuild build = build_of(units, &progress);
@@ -261,13 +261,13 @@ TEST_F(FieldBuildTest, ProgressOfOtherOptionsIsRefusedByNameAndRestartThrowsItAw
   }
   world_.barrier();
   ProgressFolder fresh(progress_path, true, other, world_);
-  fresh.visit_finished(plan_units(light_slab_, {kUnitRays}),
+  fresh.visit_finished(plan_units(light_slab_.lattice(), {kUnitRays}),
                        [](const UnitTiles&) { ADD_FAILURE() << "a unit is left"; });
 }
 
 TEST_F(FieldBuildTest, ProgressOfRefusedOptionsGivesWayToOthersAndIsUsedByTheSame) {
   const auto progress_path = folder_ / "a.h5.progress";
-  const auto units = plan_units(light_slab_, {kUnitRays});
+  const auto units = plan_units(light_slab_.lattice(), {kUnitRays});
   const auto units_found = [&](const std::string& step_mm) {
     ProgressManifest wanted = manifest(kUnitRays);
     wanted.decides["step_mm"] = step_mm;
@@ -307,7 +307,7 @@ TEST_F(FieldBuildTest, ADamagedManifestIsAFileError) {
 }
 
 TEST_F(FieldBuildTest, TooManyCodewordsAreOneErrorOfTheWholeJob) {
-  const auto units = plan_units(light_slab_, {kUnitRays});
+  const auto units = plan_units(light_slab_.lattice(), {kUnitRays});
   const FieldBuild build = build_of(units, nullptr);
   CastPhase cast = cast_field(build, {{0.001, 100000, 3}}, [] { return false; }, {});
   try {
@@ -367,7 +367,7 @@ TEST(TrainingFiles, BytesThatAreNotOfATrainingAreNone) {
 }
 
 TEST_F(FieldBuildTest, EncodedUnitsAreReadForTheirCodebookOnly) {
-  const auto units = plan_units(light_slab_, {kUnitRays});
+  const auto units = plan_units(light_slab_.lattice(), {kUnitRays});
   ProgressManifest expected = manifest(kUnitRays);
   const EncodedUnit encoded{std::vector<std::uint16_t>(units[1].tile_count(), 7), 99};
   constexpr std::uint32_t kCodebookCrc = 5;
@@ -396,7 +396,7 @@ TEST_F(FieldBuildTest, EncodedUnitsAreReadForTheirCodebookOnly) {
 }
 
 TEST_F(FieldBuildTest, AUnitCastAgainForItsDamagedRecordIsFoundByTheNextRun) {
-  const auto units = plan_units(light_slab_, {kUnitRays});
+  const auto units = plan_units(light_slab_.lattice(), {kUnitRays});
   ProgressManifest expected = manifest(kUnitRays);
   const UnitTiles tiles =
       make_unit_tiles(units[0], std::vector<std::uint16_t>(units[0].sample_count(), 3));
@@ -425,16 +425,18 @@ TEST_F(FieldBuildTest, AUnitCastAgainForItsDamagedRecordIsFoundByTheNextRun) {
 }
 
 TEST_F(FieldBuildTest, GeometryOfRankZeroIsTakenOver) {
-  LightSlab mine = small_light_slab();
-  mine.u.first_mm += 1e-13 * world_.rank();
-  mine.slabs[0].y_high_mm = 12.5;
-  const LightSlab shared = shared_light_slab(mine, world_);
+  CompressedAttenuationField field;
+  field.light_slab = small_light_slab();
+  field.light_slab.u.first_mm += 1e-13 * world_.rank();
+  field.light_slab.slabs[0].y_high_mm = 12.5;
+  share_geometry(field, world_);
+  const LightSlab& shared = field.light_slab;
   EXPECT_EQ(shared.u.first_mm, -90.0);
   EXPECT_EQ(shared.v.nodes, 6);
   EXPECT_EQ(shared.slabs[0].stored_t.count, 16);
   EXPECT_EQ(shared.slabs[0].y_high_mm, 12.5);
   EXPECT_EQ(shared.slabs[0].t.last_mm, 55.0);
-  EXPECT_EQ(shared.slab_from_ct.matrix(), mine.slab_from_ct.matrix());
+  EXPECT_EQ(shared.slab_from_ct.matrix(), small_light_slab().slab_from_ct.matrix());
 }
 
 }  // namespace

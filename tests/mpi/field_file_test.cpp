@@ -70,17 +70,14 @@ std::uint16_t index_at(const std::array<int, 4>& tile, std::size_t slab) {
 std::vector<IndexBlock> all_blocks(const CompressedAttenuationField& field) {
   std::vector<IndexBlock> blocks;
   for (std::size_t k = 0; k < field.light_slab.slabs.size(); ++k) {
-    const SlabGeometry& slab = field.light_slab.slabs[k];
-    for (int a = 0; a < field.tiles_u(); ++a)
-      for (int b = 0; b < field.tiles_v(); b += 2)
-        for (int c = 0; c < slab.stored_s.tiles(); c += 3) {
+    const std::array<int, 4> tiles = field.lattice(k).tile_counts();
+    for (int a = 0; a < tiles[0]; ++a)
+      for (int b = 0; b < tiles[1]; b += 2)
+        for (int c = 0; c < tiles[2]; c += 3) {
           IndexBlock block;
           block.slab = k;
           block.first_tile = {a, b, c, 0};
-          block.tile_count = {1,
-                              std::min(2, field.tiles_v() - b),
-                              std::min(3, slab.stored_s.tiles() - c),
-                              slab.stored_t.tiles()};
+          block.tile_count = {1, std::min(2, tiles[1] - b), std::min(3, tiles[2] - c), tiles[3]};
           for (int j = 0; j < block.tile_count[1]; ++j)
             for (int s = 0; s < block.tile_count[2]; ++s)
               for (int t = 0; t < block.tile_count[3]; ++t)
@@ -165,10 +162,11 @@ TEST(FieldFile, ReadsBackWhatRanksWroteTogether) {
     EXPECT_EQ(found.stored_s.begin, expected.stored_s.begin);
     EXPECT_EQ(found.stored_t.count, expected.stored_t.count);
     std::size_t next = 0;
-    for (int a = 0; a < field.tiles_u(); ++a)
-      for (int b = 0; b < field.tiles_v(); ++b)
-        for (int c = 0; c < expected.stored_s.tiles(); ++c)
-          for (int d = 0; d < expected.stored_t.tiles(); ++d)
+    const std::array<int, 4> tiles = field.lattice(k).tile_counts();
+    for (int a = 0; a < tiles[0]; ++a)
+      for (int b = 0; b < tiles[1]; ++b)
+        for (int c = 0; c < tiles[2]; ++c)
+          for (int d = 0; d < tiles[3]; ++d)
             ASSERT_EQ(read->slabs[k].indices[next++], index_at({a, b, c, d}, k));
   }
 }
@@ -244,7 +242,7 @@ TEST(FieldFile, HoldsMoreChunksThanFitIntoTheCacheOfHdf5) {
   const test::SharedFolder folder;
   const Communicator world = Communicator::world();
   const CompressedAttenuationField field = field_of_chunks(kTilesU, kTilesV);
-  EXPECT_GT(hdf5::chunk_count(field_layout::index_rules(field)), 65536u);
+  EXPECT_GT(hdf5::chunk_count(field_layout::index_rules(field.lattice())), 65536u);
   std::vector<IndexBlock> blocks;
   for (int a = 0; a < kTilesU; ++a) {
     blocks.push_back({0, {a, 0, 0, 0}, {1, kTilesV, 1, 1}, {}});
@@ -261,9 +259,9 @@ TEST(FieldFile, HoldsMoreChunksThanFitIntoTheCacheOfHdf5) {
 TEST(FieldFile, TheTestOfManyChunksLeavesNothing) {
   const test::SharedFolder folder;
   const Communicator world = Communicator::world();
-  check_writing_many_chunks(field_of_chunks(288, 256).light_slab, folder / "a.af.h5", world);
+  check_writing_many_chunks(field_of_chunks(288, 256).lattice(), folder / "a.af.h5", world);
   // A small field is not tested once more: it would fail here.
-  check_writing_many_chunks(small_field().light_slab, "/nowhere/a.af.h5", world);
+  check_writing_many_chunks(small_field().lattice(), "/nowhere/a.af.h5", world);
   world.barrier();
   EXPECT_TRUE(std::filesystem::is_empty(folder / ""));
   world.barrier();

@@ -38,18 +38,10 @@ ordered_json slab_json(const SlabGeometry& slab) {
   return json;
 }
 
-std::uint64_t product(int a, int b) {
-  return static_cast<std::uint64_t>(a) * static_cast<std::uint64_t>(b);
-}
-
 ordered_json sizes_json(const CompressedAttenuationField& field, const FieldFileInfo& info) {
-  const std::uint64_t viewpoints = product(field.light_slab.u.nodes, field.light_slab.v.nodes);
-  std::uint64_t whole = 0;
-  std::uint64_t cropped = 0;
-  for (const SlabGeometry& slab : field.light_slab.slabs) {
-    whole += kBytesPerSample * viewpoints * product(slab.s.nodes, slab.t.nodes);
-    cropped += kBytesPerSample * viewpoints * product(slab.stored_s.count, slab.stored_t.count);
-  }
+  const FieldLattice lattice = field.lattice();
+  const auto whole = kBytesPerSample * static_cast<std::uint64_t>(lattice.node_count());
+  const auto cropped = kBytesPerSample * static_cast<std::uint64_t>(lattice.stored_node_count());
   const auto ratio = [](std::uint64_t raw, std::uint64_t stored) {
     return static_cast<double>(raw) / static_cast<double>(stored);
   };

@@ -98,7 +98,8 @@ TEST(AfDrr, ValuesOutsideTheStoredRangeAreZero) {
   auto cropped = std::make_shared<CompressedAttenuationField>(*field);
   SlabGeometry& slab = cropped->light_slab.slabs[0];
   slab.stored_s = {4, 2};
-  std::vector<std::uint16_t> indices(cropped->tile_count(0), std::uint16_t{1});
+  std::vector<std::uint16_t> indices(static_cast<std::size_t>(cropped->lattice(0).tile_count()),
+                                     std::uint16_t{1});
   cropped->slabs[0].indices = SharedArray<std::uint16_t>(indices);
   EXPECT_EQ(cropped->node_value(0, {0, 0, 3, 0}), 0.0f);
   EXPECT_EQ(cropped->node_value(0, {0, 0, 4, 0}), 2.0f);

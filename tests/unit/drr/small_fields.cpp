@@ -73,7 +73,8 @@ void crop_stored(CompressedAttenuationField& field, const NodeRange& s, const No
   const int s_tiles = slab.stored_s.tiles();
   const int t_tiles = slab.stored_t.tiles();
   std::vector<std::uint16_t> indices;
-  for (int uv = 0; uv < field.tiles_u() * field.tiles_v(); ++uv)
+  const SlabLattice lattice = field.lattice(0);
+  for (int uv = 0; uv < lattice.u.stored.tiles() * lattice.v.stored.tiles(); ++uv)
     for (int c = 0; c < s.tiles(); ++c)
       for (int d = 0; d < t.tiles(); ++d)
         indices.push_back(field.slabs[0].indices[static_cast<std::size_t>(

@@ -163,7 +163,7 @@ TEST(LossSplitter, AFieldWithoutQuantisationLosesByInterpolationAlone) {
   const auto split_with = [&](int uv_nodes, int st_nodes) {
     const LightSlab nodes = light_slab(uv_nodes, st_nodes);
     const InterpolatedRayCast field(volume, kCaster, nodes, InterpolatedPlanes::Both);
-    return LossSplitter(field, reference, volume, kCaster, nodes, view).at_pose(pose());
+    return LossSplitter(field, reference, field, view).at_pose(pose());
   };
   const LossSplit coarse = split_with(8, 24);
   EXPECT_EQ(coarse.mean_square[3], 0.0);

@@ -45,7 +45,7 @@ using NodeSamples = std::map<std::array<int, 4>, std::uint16_t>;
 
 NodeSamples cast_plan(const FieldCaster& caster, const LightSlab& light_slab, PlanOptions plan) {
   NodeSamples by_node;
-  for (const WorkUnit& unit : plan_units(light_slab, plan)) {
+  for (const WorkUnit& unit : plan_units(light_slab.lattice(), plan)) {
     std::vector<std::uint16_t> samples(unit.sample_count());
     caster.cast(unit, samples);
     auto sample = samples.begin();
@@ -121,7 +121,7 @@ TEST_F(RayCastFieldCasterTest, SlabsSumToTheWhole) {
   std::map<std::array<int, 4>, double> sums;
   int in_all_slabs = 0;
   for (std::size_t k = 0; k < 3; ++k)
-    for (WorkUnit unit : plan_units(light_slab_, {1000000})) {
+    for (WorkUnit unit : plan_units(light_slab_.lattice(), {1000000})) {
       unit.slab = k;
       std::vector<std::uint16_t> samples(unit.sample_count());
       caster.cast(unit, samples);
@@ -139,6 +139,30 @@ TEST_F(RayCastFieldCasterTest, SlabsSumToTheWhole) {
   for (const auto& [node, sample] : expected)
     EXPECT_NEAR(sums[node], quantizer_.dequantize(sample), kStepping);
   EXPECT_GT(in_all_slabs, 1000);
+}
+
+TEST(UnitCosts, RaysThroughTheBoxCostMoreThanRaysBesideIt) {
+  LightSlab light_slab;
+  light_slab.uv_plane_y_mm = 650.0;
+  light_slab.u = light_slab.v = {-10.0, 10.0, 4};
+  SlabGeometry slab;
+  slab.s = slab.t = {-10.0, 10.0, 40};
+  slab.stored_s = slab.stored_t = {0, 40};
+  light_slab.slabs.push_back(slab);
+  const auto units = plan_units(light_slab.lattice(), {4 * 2 * 2 * kRunOfT});
+  const CtBox box{{-9.0, -1.0, -1.0}, {-2.0, 1.0, 9.0}};
+  const auto costs = unit_costs(units, light_slab, box.corner_points());
+  double beside = 0.0;
+  double inside = 0.0;
+  for (std::size_t i = 0; i < units.size(); ++i) {
+    const double cost = costs[i] / static_cast<double>(units[i].sample_count());
+    // The lattice spans -10 to 10 mm in x; the box ends at -2 mm, and its shadow moves by up to
+    // 20 mm * 1 mm / 650 mm.
+    if (light_slab.slabs[0].s.position_mm(units[i].s.begin) > -1.9) beside = std::max(beside, cost);
+    inside = std::max(inside, cost);
+  }
+  EXPECT_GT(inside, 5.0 * beside);
+  EXPECT_GT(beside, 0.0);
 }
 
 }  // namespace

@@ -26,7 +26,7 @@ NodeSamples cast_plan(const FieldCaster& caster,
                       const PlanOptions& plan = kShearWarpPlan,
                       std::size_t slab = 0) {
   NodeSamples by_node;
-  for (const WorkUnit& unit : plan_units(light_slab, plan)) {
+  for (const WorkUnit& unit : plan_units(light_slab.lattice(), plan)) {
     if (unit.slab != slab) continue;
     std::vector<std::uint16_t> samples(unit.sample_count());
     caster.cast(unit, samples);

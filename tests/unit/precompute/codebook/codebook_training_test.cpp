@@ -271,19 +271,8 @@ TEST(TileSelection, StrongTilesAreDrawnInProportionToTheirWeight) {
   EXPECT_NEAR(static_cast<double>(strong), 0.8 * kDrawn, 5 * 12.6 + 10.0);
 }
 
-LightSlab one_slab() {
-  LightSlab light_slab;
-  light_slab.u = {0.0, 1.0, 16};
-  light_slab.v = {0.0, 1.0, 16};
-  SlabGeometry slab;
-  slab.s = slab.t = {0.0, 1.0, 64};
-  slab.stored_s = slab.stored_t = {0, 64};
-  light_slab.slabs.push_back(slab);
-  return light_slab;
-}
-
 struct CastField {
-  LightSlab light_slab = one_slab();
+  FieldLattice lattice{{{{16, {0, 16}}, {16, {0, 16}}, {64, {0, 64}}, {64, {0, 64}}}}};
   std::vector<WorkUnit> units;
   std::vector<UnitTiles> tiles;
   std::uint64_t occupied = 0;
@@ -292,7 +281,7 @@ struct CastField {
 /// Samples that are empty on a third of the (s,t) plane.
 CastField cast_field(std::int64_t rays_per_unit) {
   CastField field;
-  field.units = plan_units(field.light_slab, {rays_per_unit});
+  field.units = plan_units(field.lattice, {rays_per_unit});
   for (const WorkUnit& unit : field.units) {
     std::vector<std::uint16_t> samples;
     for (int u = unit.u.begin; u < unit.u.end(); ++u)
@@ -317,7 +306,7 @@ TEST(TileSelection, DependsOnlyOnSeedAndTileNumber) {
   const CastField fine = cast_field(3000);
   const auto select = [](const CastField& field, std::uint64_t seed) {
     return select_training_tiles(
-        field.tiles, field.units, field.light_slab, {0.2, 1000000, seed}, serial_reduction());
+        field.tiles, field.units, field.lattice, {0.2, 1000000, seed}, serial_reduction());
   };
   const TrainingShare share = select(coarse, 1);
   EXPECT_EQ(indices_of(share.training), indices_of(select(fine, 1).training));
@@ -328,7 +317,7 @@ TEST(TileSelection, DependsOnlyOnSeedAndTileNumber) {
 TEST(TileSelection, TakesTheFractionOfOccupiedTilesAndHoldsOutOthers) {
   const CastField field = cast_field(100000);
   const TrainingShare share = select_training_tiles(
-      field.tiles, field.units, field.light_slab, {0.2, 1000000, 1}, serial_reduction());
+      field.tiles, field.units, field.lattice, {0.2, 1000000, 1}, serial_reduction());
   const double expected = 0.2 * static_cast<double>(field.occupied);
   // Five binomial standard deviations.
   EXPECT_NEAR(static_cast<double>(share.training.size()), expected, 5 * std::sqrt(0.8 * expected));
@@ -343,7 +332,7 @@ TEST(TileSelection, TakesTheFractionOfOccupiedTilesAndHoldsOutOthers) {
 TEST(TileSelection, TakesEveryTileAtFractionOneAndNoneIsHeldOut) {
   const CastField field = cast_field(100000);
   const TrainingShare share = select_training_tiles(
-      field.tiles, field.units, field.light_slab, {1.0, 1000000, 1}, serial_reduction());
+      field.tiles, field.units, field.lattice, {1.0, 1000000, 1}, serial_reduction());
   EXPECT_EQ(share.training.size(), field.occupied);
   EXPECT_TRUE(share.held_out.empty());
 }
@@ -352,7 +341,7 @@ TEST(TileSelection, StaysWithinTheCap) {
   const CastField field = cast_field(100000);
   for (const std::uint64_t cap : {100u, 1000u, 5000u}) {
     const TrainingShare share = select_training_tiles(
-        field.tiles, field.units, field.light_slab, {1.0, cap, 1}, serial_reduction());
+        field.tiles, field.units, field.lattice, {1.0, cap, 1}, serial_reduction());
     EXPECT_LE(share.training.size(), cap);
     // One of 65536 steps short at most: far less than one tile here, but bins are not equally full.
     EXPECT_GE(share.training.size(), cap * 9 / 10);

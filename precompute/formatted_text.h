@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <string>
+
+namespace af {
+
+/// As std::snprintf(), up to 511 bytes.
+template <typename... Values>
+std::string formatted(const char* format, Values... values) {
+  std::array<char, 512> text{};
+  const int length = std::snprintf(text.data(), text.size(), format, values...);
+  return {text.data(), std::min(text.size() - 1, static_cast<std::size_t>(std::max(0, length)))};
+}
+
+}  // namespace af
