@@ -5,14 +5,13 @@
 #include <cstring>
 #include <span>
 #include <type_traits>
+#include <utility>
 
 #include "base/error.h"
 
 namespace af {
 
 namespace {
-
-constexpr const char* kName = "training";
 
 /// Stands before the iterations and the codewords.
 struct TrainingHeader {
@@ -39,13 +38,9 @@ void take_bytes(std::span<const std::byte>& bytes, std::span<T> values) {
   bytes = bytes.subspan(values.size_bytes());
 }
 
-/// Of other options: thrown away. Other faults are the caller's.
-ProgressJournal opened(const std::filesystem::path& folder, const DecidingValues& decides) {
-  try {
-    return {folder, kName, decides, false};
-  } catch (const InputError&) {
-    return {folder, kName, decides, true};
-  }
+UnfinishedWork giving_way(UnfinishedWork work) {
+  work.gives_way = true;
+  return work;
 }
 
 }  // namespace
@@ -82,18 +77,16 @@ std::optional<TrainedCodebook> unpacked_training(std::span<const std::byte> byte
   return training;
 }
 
-TrainingJournal::TrainingJournal(const std::filesystem::path& progress_folder,
-                                 const DecidingValues& decides,
+TrainingJournal::TrainingJournal(UnfinishedWork work,
                                  std::size_t codewords,
                                  const Communicator& communicator)
-    : communicator_(communicator) {
+    : communicator_(communicator), store_(giving_way(std::move(work)), communicator) {
   std::vector<std::byte> last;
   all_or_none(communicator_, [&] {
     if (!communicator_.is_root()) return;
-    ProgressJournal journal = opened(progress_folder, decides);
-    journal.mend_and_visit(
-        [&](std::span<const std::byte> record) { last.assign(record.begin(), record.end()); });
-    shard_.emplace(progress_folder, kName, journal.run(), 0);
+    store_.visit([&](std::int64_t, std::span<const std::byte> training) {
+      last.assign(training.begin(), training.end());
+    });
   });
   communicator_.broadcast(last);
   begun_ = unpacked_training(last);
@@ -103,8 +96,9 @@ TrainingJournal::TrainingJournal(const std::filesystem::path& progress_folder,
 void TrainingJournal::append(const TrainedCodebook& so_far) {
   all_or_none(communicator_, [&] {
     if (!communicator_.is_root()) return;
-    shard_->append(packed_training(so_far));
-    shard_->sync();
+    store_.shard().append(static_cast<std::int64_t>(so_far.iterations.size()),
+                          {packed_training(so_far)});
+    store_.shard().sync();
   });
 }
 

@@ -44,7 +44,7 @@ constexpr int kMostCollectedPerBlock = 64;
 
 void append(ProgressShard& shard, const json& row) {
   const auto bytes = json::to_cbor(row);
-  shard.append(std::as_bytes(std::span(bytes)));
+  shard.append(0, {std::as_bytes(std::span(bytes))});
 }
 
 /// Rank 0's side of one request; seconds from seeing it to having answered it.
@@ -95,9 +95,9 @@ void measure_messages(const Communicator& world, int repetitions, QueueCosts& co
 
 void measure_rows(int repetitions, QueueCosts& costs) {
   const test::ScratchFolder folder;
-  const ProgressJournal journal(folder.path(), "case", {}, true);
-  ProgressShard on_rank_zero(folder.path(), "case", 0, 0);
-  ProgressShard own(folder.path(), "case", 0, 1);
+  const ProgressJournal journal({folder.path(), "case", {}});
+  ProgressShard on_rank_zero(journal.files(), {0, 0});
+  ProgressShard own(journal.files(), {0, 1});
   // Medians over rounds: now and then the disk takes its time.
   constexpr int kRows = 500;
   std::vector<RegistrationRow> kept(kRows);
