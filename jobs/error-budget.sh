@@ -5,6 +5,8 @@
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR
 source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
+# shellcheck source=stages.sh
+source "$af_root/jobs/stages.sh"
 
 usage() {
   cat <<'TEXT'
@@ -33,7 +35,6 @@ ranks=$(core_count)
 field_size=(--uv-nodes 64 --st-nodes 256) codewords=16384 most_codewords=65536
 method=(--chain "gc gauss-newton level=2 pixels=8 roi=2 final=0.2; gc gauss-newton level=1 pixels=4 final=0.1; gc gauss-newton pixels=2 step=2 final=0.01")
 
-need_value() { (($2 >= 2)) || die 2 "option $1 needs a value (try --help)"; }
 while (($# > 0)); do
   case "$1" in
     --output | -o) need_value "$1" $#; output=$2; shift ;;
@@ -54,32 +55,15 @@ while (($# > 0)); do
   shift
 done
 
-if [[ -f "$af_root/CMakeLists.txt" ]]; then
-  bin="$af_root/build/release/bin"
-else
-  bin="$(cd "$af_root/../.." && pwd)/bin"
-fi
-[[ -x "$bin/af-evaluate" ]] || die 1 "$bin/af-evaluate is missing: build it first"
-mkdir -p "$output/logs" "$output/studies" "$output/fields" "$output/runs"
-output="$(cd "$output" && pwd)"
-
-# make RESULT COMMAND...: runs the command unless RESULT exists. The programs put it in place only when it is complete.
-make() {
-  local result="$output/$1" log="$output/logs/${1//\//-}.log" start=$SECONDS status=0
-  shift
-  [[ ! -e "$result" ]] || return 0
-  say "${result#"$output"/} ..."
-  "$@" >"$log" 2>&1 || status=$?
-  if ((status != 0)); then
-    tail -n 5 "$log" >&2
-    die "$status" "it failed with exit code $status; its log is $log"
-  fi
-  say "    $(duration $((SECONDS - start)))"
-}
+bin=$(program_folder)
+need_programs "$bin" af-simulate af-precompute af-evaluate
+open_output "$output"
+mkdir -p "$output/studies" "$output/fields" "$output/runs"
+stages_are_a_chain=yes stages_of_any_build=yes
 
 if [[ -z "$ct" ]]; then
   ct="$output/skull.mhd"
-  make skull.mhd "$af_root/jobs/default-ct.sh" "$ct"
+  stage skull.mhd "$ct" "$af_root/jobs/default-ct.sh" "$ct"
 fi
 
 # --- the same patient, pose and cameras in three pairs of X-rays ---------------------------------------------------
@@ -87,7 +71,8 @@ fi
 simulate() {
   local name=$1
   shift
-  make "studies/$name" "$bin/af-simulate" --ct "$ct" --case patient --seed "$seed" -o "$output/studies/$name" "$@"
+  stage "studies/$name" "$output/studies/$name/study.toml" \
+    "$bin/af-simulate" --ct "$ct" --case patient --seed "$seed" --force -o "$output/studies/$name" "$@"
 }
 nothing=(--no-fiducials --scatter-to-primary 0 --photons-per-pixel 0 --blur-sigma-px 0 --bits 0)
 simulate ideal "${nothing[@]}" --tube-kvp 0
@@ -102,8 +87,9 @@ field() {
   shift
   field_options=()
   for camera in A B; do
-    make "fields/$name-$camera.af.h5" run_ranks "$ranks" "$bin/af-precompute" --study "$output/studies/xrays/study.toml" \
-      --camera "$camera" --max-rotation-deg 10 --max-translation-mm 30 "${field_size[@]}" --seed "$seed" "$@" \
+    stage "fields/$name-$camera.af.h5" "$output/fields/$name-$camera.af.h5" run_ranks "$ranks" \
+      "$bin/af-precompute" --study "$output/studies/xrays/study.toml" --camera "$camera" \
+      --max-rotation-deg 10 --max-translation-mm 30 "${field_size[@]}" --seed "$seed" "$@" \
       -o "$output/fields/$name-$camera.af.h5"
     field_options+=(--field "$camera=$output/fields/$name-$camera.af.h5")
   done
@@ -115,13 +101,14 @@ starts=()
 register() {
   local name=$1 study=$2
   shift 2
-  make "runs/$name/summary.json" run_ranks "$ranks" "$bin/af-evaluate" registration \
+  stage "runs/$name" "$output/runs/$name/summary.json" run_ranks "$ranks" "$bin/af-evaluate" registration \
     --study "$output/studies/$study/study.toml" --gold study "${method[@]}" --intervals "$intervals" \
     --starts-per-interval "$starts_per_interval" --seed "$seed" "${starts[@]}" "$@" -o "$output/runs/$name"
 }
 
 field shipped --codewords "$codewords"
-make runs/starts/starts.csv "$bin/af-evaluate" registration --study "$output/studies/xrays/study.toml" --gold study \
+stage runs/starts "$output/runs/starts/starts.csv" \
+  "$bin/af-evaluate" registration --study "$output/studies/xrays/study.toml" --gold study \
   "${field_options[@]}" --intervals "$intervals" --starts-per-interval "$starts_per_interval" --seed "$seed" \
   --starts-only -o "$output/runs/starts"
 starts=(--starts-from "$output/runs/starts/starts.csv")

@@ -4,6 +4,8 @@
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR
 source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
+# shellcheck source=stages.sh
+source "$af_root/jobs/stages.sh"
 
 usage() {
   cat <<'TEXT'
@@ -42,15 +44,16 @@ while (($# > 0)); do
   shift
 done
 
-simulator=$(program_path af-simulate)
-evaluator=$(program_path af-evaluate)
+bin=$(program_folder)
+need_programs "$bin" af-simulate af-evaluate
 open_output "$target"
 studies=()
 # simulate NAME OPTIONS...
 simulate() {
   local name=$1
   shift
-  once "simulate-$name" "$output/$name/study.toml" "$simulator" "$@" --case "$name" --rig treatment-room --seed "$seed" \
+  stage "simulate-$name" "$output/$name/study.toml" \
+    "$bin/af-simulate" "$@" --case "$name" --rig treatment-room --seed "$seed" \
     --force -o "$output/$name"
   studies+=("$output/$name/study.toml")
 }
@@ -59,7 +62,7 @@ IFS=, read -r -a chosen <<<"$patients"
 for patient in "${chosen[@]}"; do
   case "$patient" in
     skull)
-      once skull-ct "$output/skull.mhd" "$af_root/jobs/default-ct.sh" "$output/skull.mhd"
+      stage skull-ct "$output/skull.mhd" "$af_root/jobs/default-ct.sh" "$output/skull.mhd"
       simulate skull --ct "$output/skull.mhd"
       ;;
     spine | pelvis | head) simulate "$patient" --phantom "$patient" "${metal_option[@]}" ;;
@@ -69,5 +72,5 @@ done
 for ct in "${cts[@]}"; do
   simulate "${ct%%=*}" --ct "${ct#*=}"
 done
-once join "$output/study.toml" "$evaluator" join-studies "${studies[@]}" -o "$output/study.toml"
+stage join "$output/study.toml" "$bin/af-evaluate" join-studies "${studies[@]}" -o "$output/study.toml"
 say "Study: $output/study.toml"

@@ -4,6 +4,8 @@
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR
 source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
+# shellcheck source=stages.sh
+source "$af_root/jobs/stages.sh"
 
 usage() {
   cat <<'TEXT'
@@ -122,82 +124,21 @@ print_plan() {
   say "  After the build about $(duration "$total")."
 }
 
-stage_number=0 stage_chain="" current_stage="" stage_report=()
-
-on_exit() {
-  local status=$?
-  if ((status == 130 || status == 143)) && [[ -n "$current_stage" ]]; then
-    printf '\nStopped in stage "%s". Run the same command again to go on.\n' "$current_stage" >&2
-  fi
-}
-trap on_exit EXIT
-
-# Exit code of af-register when it is done and has found nothing: its results are there and say so.
-not_found=7
-
-# run_stage OUTPUT_PATH COMMAND...: runs the next planned stage, unless it was finished with the same command, program
-# and earlier stages. An interrupted stage keeps its output, from which the program continues; a stage whose inputs
-# changed starts from nothing.
-run_stage() {
-  local result=$1
-  shift
-  local name=${stage_names[stage_number]} title=${stage_titles[stage_number]} log program
+# next_stage RESULT COMMAND...: runs the next planned stage.
+stage_number=0 stages_are_a_chain=yes stages_start_anew=yes
+next_stage() {
+  local name=${stage_names[stage_number]}
+  stage_title="[$((stage_number + 1))/${#stage_names[@]}] ${stage_titles[stage_number]}"
   stage_number=$((stage_number + 1))
-  current_stage=$title
-  log="$output/logs/$name.log"
-  program=$(stage_program "$@")
-  stage_chain=$(printf '%s\n' "$stage_chain" "$(sha256sum <"$program")" "$@" | sha256sum | cut -d ' ' -f 1)
-
-  local stamp="$output/.stages/$name"
-  if [[ -f "$stamp.done" && "$(<"$stamp.done")" == "$stage_chain" && -e "$result" ]]; then
-    say "[$stage_number/${#stage_names[@]}] $title: done before, skipped"
-    return
-  fi
-  rm -f "$stamp.done"
-  if [[ ! -f "$stamp.started" || "$(<"$stamp.started")" != "$stage_chain" ]]; then
-    # When a result has a folder of its own, this folder is removed with it.
-    local old=$result
-    [[ "$(dirname "$result")" == "$output" ]] || old=$(dirname "$result")
-    rm -rf "$old" "$old.progress" "$old.partial"
-  fi
-  printf '%s\n' "$stage_chain" >"$stamp.started"
-
-  say "[$stage_number/${#stage_names[@]}] $title"
-  local start=$SECONDS status=0
-  { printf '# '; printf '%q ' "$@"; printf '\n'; } >"$log"
-  "$@" 2>&1 | tee -a "$log" | sed -u 's/^/        /' || status=${PIPESTATUS[0]}
-  if ((status == 75)); then
-    die 75 "stage \"$title\" was stopped with its progress saved: run the same command again"
-  elif ((status == not_found)); then
-    say "        Nothing was found; the results say why: $(dirname "$result")"
-  elif ((status != 0)); then
-    die "$status" "stage \"$title\" failed with exit code $status; its log is $log"
-  fi
-  [[ -e "$result" ]] || die 6 "stage \"$title\" ended without its output $result; its log is $log"
-  local seconds=$((SECONDS - start))
-  say "        $(duration "$seconds")"
-  stage_report+=("$(printf '  %-76s %s' "$title" "$(duration "$seconds")")")
-  printf '%s\n' "$stage_chain" >"$stamp.done"
-}
-
-# The program file behind a stage's command, for the stamp: run_ranks N PROGRAM ... or PROGRAM ...
-stage_program() {
-  if [[ "$1" == run_ranks ]]; then
-    echo "$3"
-  else
-    echo "$1"
-  fi
+  stage "$name" "$@"
 }
 
 # --- the plan ----------------------------------------------------------------------------------------------------
 
-mkdir -p "$output/.stages" "$output/logs"
-output="$(cd "$output" && pwd)"
+open_output "$output"
 if [[ "$force" == yes ]]; then
   rm -f "$output"/.stages/*.done "$output"/.stages/*.started
 fi
-exec 9>"$output/.stages/lock"
-flock --nonblock 9 || die 3 "another run is at work in $output"
 default_ct_note=""
 if [[ -z "$ct" && -z "$phantom" ]]; then
   ct="$output/skull.mhd"
@@ -206,7 +147,7 @@ if [[ -z "$ct" && -z "$phantom" ]]; then
 elif [[ -n "$ct" ]]; then
   ct="$(realpath "$ct")"
   # When the CT's file changes, the study starts anew.
-  stage_chain=$(find "$ct" -type f -printf '%P %s %T@\n' | LC_ALL=C sort | sha256sum)
+  stage_inputs=$(find "$ct" -type f -printf '%P %s %T@\n' | LC_ALL=C sort | sha256sum)
 fi
 field_seconds=40
 [[ "$preset" == quick ]] || field_seconds=60
@@ -242,36 +183,35 @@ need_programs "$bin" "${af_programs[@]}"
 study_start=$SECONDS
 
 if [[ -n "$default_ct_note" ]]; then
-  run_stage "$ct" "$af_root/jobs/default-ct.sh" "$ct"
+  next_stage "$ct" "$af_root/jobs/default-ct.sh" "$ct"
 fi
 study="$output/study/study.toml"
 if [[ -n "$phantom" ]]; then
-  run_stage "$study" "$bin/af-simulate" --phantom "$phantom" --rig treatment-room --seed "$seed" --force \
+  next_stage "$study" "$bin/af-simulate" --phantom "$phantom" --rig treatment-room --seed "$seed" --force \
     -o "$output/study"
 else
-  run_stage "$study" "$bin/af-simulate" --ct "$ct" "${series_option[@]}" --rig treatment-room --seed "$seed" --force \
+  next_stage "$study" "$bin/af-simulate" --ct "$ct" "${series_option[@]}" --rig treatment-room --seed "$seed" --force \
     -o "$output/study"
 fi
 [[ -z "$phantom" ]] || ct="$output/study/ct.nii.gz"
 case_name=$(sed -n 's/^ *name *= *"\(.*\)" *$/\1/p' "$study" | head -n 1)
 for camera in A B; do
-  run_stage "$output/$camera.af.h5" run_ranks "$ranks" "$bin/af-precompute" --study "$study" --case "$case_name" \
+  next_stage "$output/$camera.af.h5" run_ranks "$ranks" "$bin/af-precompute" --study "$study" --case "$case_name" \
     --camera "$camera" "${series_option[@]}" "${field_options[@]}" --seed "$seed" -o "$output/$camera.af.h5"
 done
 fields=(--field "A=$output/A.af.h5" --field "B=$output/B.af.h5")
 for camera in A B; do
-  run_stage "$output/image-quality-$camera/summary.json" run_ranks "$ranks" "$bin/af-evaluate" image-quality \
+  next_stage "$output/image-quality-$camera/summary.json" run_ranks "$ranks" "$bin/af-evaluate" image-quality \
     --field "$output/$camera.af.h5" --ct "$ct" "${series_option[@]}" --pose-count "$pose_count" --seed "$seed" \
     -o "$output/image-quality-$camera"
 done
-run_stage "$output/registration/summary.json" run_ranks "$ranks" "$bin/af-evaluate" registration --study "$study" \
+next_stage "$output/registration/summary.json" run_ranks "$ranks" "$bin/af-evaluate" registration --study "$study" \
   "${series_option[@]}" "${fields[@]}" --preset paper --renderer both --starts-per-interval "$starts_per_interval" \
   --raycast-starts-per-interval "$raycast_starts" --raycast-intervals 2 --seed "$seed" -o "$output/registration"
-run_stage "$output/overlay/result.json" "$bin/af-register" --study "$study" --case "$case_name" "${series_option[@]}" \
+next_stage "$output/overlay/result.json" "$bin/af-register" --study "$study" --case "$case_name" "${series_option[@]}" \
   "${fields[@]}" --preset paper \
   --start-rotation-deg 2,-2,2 --start-translation-mm 3,3,-3 -o "$output/overlay"
-run_stage "$output/report.html" "$bin/af-evaluate" report -o "$output/report.html" "$output"
-current_stage=""
+next_stage "$output/report.html" "$bin/af-evaluate" report -o "$output/report.html" "$output"
 
 say ""
 if ((${#stage_report[@]} > 0)); then

@@ -4,6 +4,8 @@
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR
 source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
+# shellcheck source=stages.sh
+source "$af_root/jobs/stages.sh"
 
 usage() {
   cat <<'TEXT'
@@ -98,8 +100,8 @@ esac
 
 # --- what several experiments need -------------------------------------------------------------------------------
 
-precompute=$(program_path af-precompute)
-evaluator=$(program_path af-evaluate)
+bin=$(program_folder)
+need_programs "$bin" af-precompute af-evaluate
 open_output "$target"
 mkdir -p "$output/fields" "$output/runs" "$output/paper"
 
@@ -113,7 +115,7 @@ make_patients() {
   have_patients=yes
   say "Patients"
   "$af_root/jobs/four-patients.sh" --output "$output/patients" --seed "$seed" "${patient_options[@]}" | sed -u 's/^/    /'
-  once_inputs=$(cat "$output/patients/.stages"/*.done)
+  stage_inputs=$(cat "$output/patients/.stages"/*.done)
 }
 
 make_fields() {
@@ -123,10 +125,11 @@ make_fields() {
   make_patients
   while read -r case_name camera; do
     field="$output/fields/$case_name-$camera.af.h5"
-    once "field-$case_name-$camera" "$field" run_ranks "$ranks" "$precompute" --study "$output/patients/study.toml" \
-      --case "$case_name" --camera "$camera" "${range[@]}" "${field_size[@]}" --seed "$seed" -o "$field" </dev/null
+    stage "field-$case_name-$camera" "$field" run_ranks "$ranks" \
+      "$bin/af-precompute" --study "$output/patients/study.toml" \
+      --case "$case_name" --camera "$camera" "${range[@]}" "${field_size[@]}" --seed "$seed" -o "$field"
   done < <(views)
-  once study "$output/study.toml" "$evaluator" join-studies "$output/patients/study.toml" \
+  stage study "$output/study.toml" "$bin/af-evaluate" join-studies "$output/patients/study.toml" \
     --fields 'fields/{case}-{camera}.af.h5' -o "$output/study.toml"
 }
 
@@ -150,14 +153,15 @@ make_sweep() {
     first_case=$(views | sed -n '1s/ .*//p')
     options+=(--case "$first_case")
   fi
-  once field-parameters "$output/runs/field-parameters/summary.json" run_ranks "$ranks" "$evaluator" field-parameters \
-    --study "$output/patients/study.toml" "${range[@]}" "${options[@]}" --fields "$output/sweep-fields-$preset" --seed "$seed" \
+  stage field-parameters "$output/runs/field-parameters/summary.json" run_ranks "$ranks" \
+    "$bin/af-evaluate" field-parameters --study "$output/patients/study.toml" "${range[@]}" "${options[@]}" \
+    --fields "$output/sweep-fields-$preset" --seed "$seed" \
     -o "$output/runs/field-parameters"
 }
 
 make_image_quality() {
   make_fields
-  once image-quality "$output/runs/image-quality/worst-pairs.png" run_ranks "$ranks" "$evaluator" image-quality \
+  stage image-quality "$output/runs/image-quality/worst-pairs.png" run_ranks "$ranks" "$bin/af-evaluate" image-quality \
     --study "$output/study.toml" "${poses[@]}" --seed "$seed" -o "$output/runs/image-quality"
 }
 
@@ -165,9 +169,10 @@ make_curves() {
   local case_name
   make_fields
   while read -r case_name; do
-    once "similarity-$case_name" "$output/runs/similarity-$case_name/summary.json" run_ranks "$ranks" "$evaluator" \
-      similarity-curves --study "$output/study.toml" --case "$case_name" --preset paper --renderer both "${curves[@]}" \
-      -o "$output/runs/similarity-$case_name" </dev/null
+    stage "similarity-$case_name" "$output/runs/similarity-$case_name/summary.json" run_ranks "$ranks" \
+      "$bin/af-evaluate" similarity-curves --study "$output/study.toml" --case "$case_name" \
+      --preset paper --renderer both "${curves[@]}" \
+      -o "$output/runs/similarity-$case_name"
     publish "fig-14-$case_name" "similarity-$case_name" similarity-curves.svg similarity-curves.png similarity-curves.csv
     cp "$output/runs/similarity-$case_name/maxima.csv" "$output/paper/fig-14-$case_name-maxima.csv"
   done < <(views | cut -d ' ' -f 1 | uniq)
@@ -176,7 +181,7 @@ make_curves() {
 # The paper's protocol: starts in eight intervals of initial TRE, 30 each, for every patient.
 make_registrations() {
   make_fields
-  once registration "$output/runs/registration/summary.json" run_ranks "$ranks" "$evaluator" registration \
+  stage registration "$output/runs/registration/summary.json" run_ranks "$ranks" "$bin/af-evaluate" registration \
     --study "$output/study.toml" --preset paper --renderer both --starts-per-interval "$starts_per_interval" --intervals 8 "${raycast[@]}" \
     --seed "$seed" -o "$output/runs/registration"
 }
@@ -207,4 +212,4 @@ for experiment in "${experiments[@]}"; do
     fig-16) make_registrations; publish fig-16 registration success-rate.svg success-rate.png registrations.csv ;;
   esac
 done
-"$evaluator" report "$output/runs" -o "$output/report.html"
+"$bin/af-evaluate" report "$output/runs" -o "$output/report.html"

@@ -4,6 +4,8 @@
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR
 source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
+# shellcheck source=stages.sh
+source "$af_root/jobs/stages.sh"
 
 usage() {
   cat <<'TEXT'
@@ -51,8 +53,6 @@ declare -A pairs=() chains=()
 field_size=(--uv-nodes 64 --st-nodes 256 --codewords 16384)
 ranks=$(core_count)
 
-need_value() { (($2 >= 2)) || die 2 "option $1 needs a value (try --help)"; }
-need_count() { [[ "$2" =~ ^[1-9][0-9]{0,6}$ ]] || die 2 "$1 = '$2' must be a whole number from 1 to 9999999"; }
 need_number() { [[ "$2" =~ ^[0-9]+([.][0-9]+)?$ ]] || die 2 "$1 = '$2' must be a number"; }
 
 while (($# > 0)); do
@@ -90,7 +90,7 @@ while (($# > 0)); do
     --max-translation-mm) need_value "$1" $#; need_number "$1" "$2"; max_translation_mm=$2; shift ;;
     --quick) starts_per_interval=2 intervals=8 field_size=(--uv-nodes 24 --st-nodes 128 --codewords 2048) ;;
     --ranks | -n) need_value "$1" $#; need_count "$1" "$2"; ranks=$2; shift ;;
-    --seed) need_value "$1" $#; [[ "$2" =~ ^[0-9]{1,18}$ ]] || die 2 "--seed = '$2' must be a whole number"; seed=$2; shift ;;
+    --seed) need_value "$1" $#; need_seed "$1" "$2"; seed=$2; shift ;;
     --help | -h) usage; exit 0 ;;
     *) die 2 "unknown option '$1' (try --help)" ;;
   esac
@@ -110,48 +110,24 @@ stress_of() {
 # --- stages ------------------------------------------------------------------------------------------------------
 
 bin=$(program_folder)
-need_programs "$bin" af-simulate af-precompute af-evaluate
+need_programs "$bin" af-simulate af-precompute af-evaluate af-register
 
-mkdir -p "$output/.stages" "$output/logs"
-output="$(cd "$output" && pwd)"
-exec 9>"$output/.stages/lock"
-flock --nonblock 9 || die 3 "another run is at work in $output"
-
-# What the stages of an anatomy depend on beyond their own command lines.
-chain=""
-
-# run_stage NAME COMMAND...: runs it unless it was finished with the same command and chain; its output goes to a log.
-run_stage() {
-  local name=$1 stamp="$output/.stages/${1//\//-}.done" log="$output/logs/${1//\//-}.log" start=$SECONDS status=0
-  shift
-  if [[ -f "$stamp" && "$(<"$stamp")" == "$chain$*" ]]; then
-    return
-  fi
-  rm -f "$stamp"
-  say "$name ..."
-  "$@" >"$log" 2>&1 || status=$?
-  if ((status != 0)); then
-    tail -n 5 "$log" >&2
-    die "$status" "$name failed with exit code $status; its log is $log"
-  fi
-  printf '%s\n' "$chain$*" >"$stamp"
-  say "    $(duration $((SECONDS - start)))"
-}
+open_output "$output"
+# A method that is added or changed, and the program with it, costs only itself.
+stages_of_any_build=yes
 
 # build_fields NAME STUDY: one field per camera, NAME/A.af.h5 and NAME/B.af.h5.
 build_fields() {
   local name=$1 study=$2 camera
   for camera in A B; do
-    run_stage "field $camera of $name" run_ranks "$ranks" "$bin/af-precompute" --study "$study" --camera "$camera" \
-      --max-rotation-deg "$max_rotation_deg" --max-translation-mm "$max_translation_mm" "${field_size[@]}" \
-      --seed "$seed" -o "$output/fields/$name/$camera.af.h5"
+    stage "field $camera of $name" "$output/fields/$name/$camera.af.h5" run_ranks "$ranks" \
+      "$bin/af-precompute" --study "$study" --camera "$camera" --max-rotation-deg "$max_rotation_deg" \
+      --max-translation-mm "$max_translation_mm" "${field_size[@]}" --seed "$seed" -o "$output/fields/$name/$camera.af.h5"
   done
 }
 
 if ((${#anatomies[@]} == 0)); then
-  if [[ ! -f "$output/skull.mhd" ]]; then
-    run_stage "the default CT" "$af_root/jobs/default-ct.sh" "$output/skull.mhd"
-  fi
+  stage "the default CT" "$output/skull.mhd" "$af_root/jobs/default-ct.sh" "$output/skull.mhd"
   anatomies=("skull=ct=$output/skull.mhd")
 fi
 mkdir -p "$output/studies" "$output/fields" "$output/starts" "$output/runs" "$output/screen" "$output/pairs"
@@ -163,9 +139,9 @@ IFS=, read -r -a pair_method_list <<<"${pair_methods:-$methods}"
 make_study() {
   local name=$1 kind=$2 source=$3 stress=$4 study="$output/studies/$1/study.toml" corner=$(((512 - roi_px) / 2))
   "$bin/af-simulate" "--$kind" "$source" --case "${name%%-*}" --rig treatment-room --seed "$seed" --no-fiducials \
-    --roi-px "$roi_px" "$roi_px" ${stress:+--stress "$stress"} --force -o "$output/studies/$name"
-  # af-simulate lets regions grow until they hold the target box.
-  sed -i "s/^roi_px.*/roi_px = [$corner, $corner, $roi_px, $roi_px]/" "$study"
+    --roi-px "$roi_px" "$roi_px" ${stress:+--stress "$stress"} --force -o "$output/studies/$name" &&
+    # af-simulate lets regions grow until they hold the target box.
+    sed -i "s/^roi_px.*/roi_px = [$corner, $corner, $roi_px, $roi_px]/" "$study"
 }
 
 # method_options METHOD: sets method_options to the options of af-evaluate, and method_text to the chains that they
@@ -187,13 +163,14 @@ method_options() {
 # register FOLDER METHOD OPTIONS...: registers the current study, unless it was done with the same options by a method of
 # the same chains.
 register() {
-  local folder=$1 method=$2 base_chain=$chain
+  local folder=$1 method=$2 inputs=$stage_inputs
   shift 2
   method_options "$method"
-  chain="$base_chain$method_text "
-  run_stage "$folder" run_ranks "$ranks" "$bin/af-evaluate" registration --study "$study" "${field_options[@]}" \
-    --gold study "${method_options[@]}" --seed "$seed" -o "$output/$folder" "$@"
-  chain=$base_chain
+  stage_inputs="$inputs$method_text"
+  stage "$folder" "$output/$folder/summary.json" run_ranks "$ranks" \
+    "$bin/af-evaluate" registration --study "$study" "${field_options[@]}" --gold study \
+    "${method_options[@]}" --seed "$seed" -o "$output/$folder" "$@"
+  stage_inputs=$inputs
 }
 
 # Every measure with every optimiser that can use it: local ones that need only values in the paper's two passes, those
@@ -218,7 +195,8 @@ screen_methods() {
 # This is for the clean study.
 screen() {
   local method
-  run_stage "starts of the screen" "$bin/af-evaluate" registration --study "$study" "${field_options[@]}" --gold study \
+  stage "starts of the screen" "$output/starts/screen/starts.csv" \
+    "$bin/af-evaluate" registration --study "$study" "${field_options[@]}" --gold study \
     --intervals 8 --starts-per-interval 10 --seed "$seed" --starts-only -o "$output/starts/screen"
   for method in $(screen_methods); do
     register "screen/${method//:/-}" "$method" --intervals 8 --starts-per-interval 10 \
@@ -230,13 +208,13 @@ screen() {
 run_folders=() screen_folders=() pair_folders=()
 for anatomy in "${anatomies[@]}"; do
   IFS='=' read -r name kind source <<<"$anatomy"
-  chain="$kind $source, ${field_size[*]}, $max_rotation_deg deg, $max_translation_mm mm, $roi_px px: "
+  stage_inputs="$kind $source, ${field_size[*]}, $max_rotation_deg deg, $max_translation_mm mm, $roi_px px: "
   starts=""
   for variant in clean "${variant_list[@]/#clean/}"; do
     [[ -n "$variant" ]] || continue
     stress=$(stress_of "$variant")
     study="$output/studies/$name-$variant/study.toml"
-    run_stage "study $name-$variant" make_study "$name-$variant" "$kind" "$source" "$stress"
+    stage "study $name-$variant" "$study" make_study "$name-$variant" "$kind" "$source" "$stress"
     # Only a degraded CT and a wrong rig need fields of their own.
     fields="$name-clean"
     [[ ! ",$stress," =~ ,(degraded-ct|calibration), ]] || fields="$name-$variant"
@@ -244,7 +222,8 @@ for anatomy in "${anatomies[@]}"; do
     field_options=(--field "A=$output/fields/$fields/A.af.h5" --field "B=$output/fields/$fields/B.af.h5")
     if [[ -z "$starts" ]]; then
       starts="$output/starts/$name/starts.csv"
-      run_stage "starts of $name" "$bin/af-evaluate" registration --study "$study" "${field_options[@]}" --gold study \
+      stage "starts of $name" "$starts" \
+        "$bin/af-evaluate" registration --study "$study" "${field_options[@]}" --gold study \
         --intervals "$intervals" --starts-per-interval "$starts_per_interval" --seed "$seed" --starts-only \
         -o "$output/starts/$name"
     fi

@@ -6,8 +6,8 @@ set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
 # shellcheck source=chain.sh
 source "$af_root/jobs/chain.sh"
-# shellcheck source=stamps.sh
-source "$af_root/jobs/stamps.sh"
+# shellcheck source=stages.sh
+source "$af_root/jobs/stages.sh"
 
 usage() {
   cat <<'TEXT'
@@ -46,10 +46,10 @@ mkdir -p "$output"/{fields,registration}
 
 [[ "$restart" == no ]] || forget_progress
 
-# stage NAME: runs `command` unless it has been done from the same inputs.
-stage() {
-  once_inputs=$(inputs_of "$bin/af-inspect" "${command[@]}")
-  once "$1" "$(result_of "${command[@]}")" run_ranks "$ranks" "${command[@]}"
+# run_command NAME: runs `command` unless it has been done from the same inputs.
+run_command() {
+  stage_inputs=$(inputs_of "$bin/af-inspect" "${command[@]}")
+  stage "$1" "$(result_of "${command[@]}")" run_ranks "$ranks" "${command[@]}"
 }
 
 command=()
@@ -57,10 +57,10 @@ for case_name in "${case_names[@]}"; do
   for ((view = 0; view < most_views; ++view)); do
     precompute_command "$case_name" "$view"
     [[ "${command[0]}" != true ]] || continue
-    stage "$(basename "$(result_of "${command[@]}")" .af.h5)"
+    run_command "$(basename "$(result_of "${command[@]}")" .af.h5)"
   done
   evaluate_command "$case_name"
-  stage "registration-$case_name"
+  run_command "registration-$case_name"
 done
 report_command
 "${command[@]}"

@@ -135,7 +135,7 @@ if [[ "$dry_run" == no ]]; then
   rm -f "$output"/.stages/*.fruitless "$output/jobs/submitted"
   [[ "$restart" == no ]] || forget_progress
   cp "$resources" "$output/jobs/resources.sh"
-  cp "$af_root/jobs/stamps.sh" "$output/jobs/stamps.sh"
+  cp "$af_root/jobs/stages.sh" "$output/jobs/stages.sh"
 fi
 
 # A case waits for its own fields only (aftercorr: the task of the same number).

@@ -23,10 +23,8 @@
 #include "precompute/pipeline/shared_resampling.h"
 #include "precompute/pipeline/training_checkpoints.h"
 #include "precompute/units/unit_planner.h"
-#include "run/output_lock.h"
 #include "run/progress_printer.h"
-#include "run/provenance.h"
-#include "run/stop_request.h"
+#include "run/run_folder.h"
 #include "run/terminal.h"
 #include "text/options_toml.h"
 
@@ -73,27 +71,22 @@ std::string numbers_text(const Eigen::PlainObjectBase<Derived>& matrix) {
 
 /// Everything that decides the cast samples. Options of the codebook may change between a stop and
 /// its resume, for example after "more codewords than training tiles".
-ProgressManifest manifest_of(const PrecomputeOptions& options,
-                             const FieldSource& source,
-                             const PlanOptions& plan) {
-  ProgressManifest manifest;
-  manifest.decides = deciding_options(options, kCastingStage);
+DecidingValues casting_decides(const PrecomputeOptions& options, const FieldSource& source) {
+  DecidingValues decides = deciding_values(deciding_options(options, kCastingStage), {});
   const CameraGeometry& camera = source.camera;
-  manifest.decides["program"] = program_build();
-  manifest.decides["ct_content_sha256"] = source.ct_content_sha256;
-  manifest.decides["camera"] = camera.name;
-  manifest.decides["camera source_point"] = numbers_text(camera.source_point);
-  manifest.decides["camera detector_origin_point"] = numbers_text(camera.detector_origin_point);
-  manifest.decides["camera column_direction"] = numbers_text(camera.column_direction);
-  manifest.decides["camera row_direction"] = numbers_text(camera.row_direction);
-  manifest.decides["camera pixel_spacing_mm"] = numbers_text(camera.pixel_spacing_mm);
-  manifest.decides["camera size_px"] =
+  decides["ct_content_sha256"] = source.ct_content_sha256;
+  decides["camera"] = camera.name;
+  decides["camera source_point"] = numbers_text(camera.source_point);
+  decides["camera detector_origin_point"] = numbers_text(camera.detector_origin_point);
+  decides["camera column_direction"] = numbers_text(camera.column_direction);
+  decides["camera row_direction"] = numbers_text(camera.row_direction);
+  decides["camera pixel_spacing_mm"] = numbers_text(camera.pixel_spacing_mm);
+  decides["camera size_px"] =
       std::to_string(camera.size_px.x()) + " x " + std::to_string(camera.size_px.y());
-  manifest.decides["nominal rotation"] = numbers_text(source.frame.rotation);
-  manifest.decides["center_ct_mm"] = numbers_text(source.frame.center_ct_mm);
-  manifest.decides["nominal center_room_mm"] = numbers_text(source.frame.center_room_mm);
-  manifest.rays_per_unit = plan.rays_per_unit;
-  return manifest;
+  decides["nominal rotation"] = numbers_text(source.frame.rotation);
+  decides["center_ct_mm"] = numbers_text(source.frame.center_ct_mm);
+  decides["nominal center_room_mm"] = numbers_text(source.frame.center_room_mm);
+  return decides;
 }
 
 nlohmann::json training_json(const TrainedCodebook& trained) {
@@ -155,21 +148,20 @@ class PrecomputeRun {
   PrecomputeRun(const PrecomputeOptions& options,
                 std::string command_line,
                 const Communicator& communicator)
-      : options_(options), command_line_(std::move(command_line)), world_(communicator) {}
+      : options_(options),
+        command_line_(std::move(command_line)),
+        world_(communicator),
+        run_({options.output, {}, options.is_restart, keeps_progress(options)}, communicator) {}
 
   void run() {
     all_or_none(world_, [&] {
       throw_if_any(problems(options_));
       if (!options_.is_dry_run && options_.output.empty())
         throw UsageError("-o FIELD.h5 is needed (or --dry-run)");
-      if (options_.is_dry_run || !world_.is_root()) return;
-      require_output_folder();
-      lock_ = std::make_unique<OutputLock>(options_.output);
     });
-    if (options_.has_checkpoint && !options_.is_dry_run) listen_for_stop_requests();
-    if (!options_.is_dry_run) check_parallel_writing(options_.output, world_, hints());
+    if (!options_.is_dry_run) open_output();
     load();
-    stop_if_requested("before the first unit");
+    run_.stop_if_requested("before the first unit");
     const std::unique_ptr<const FieldCaster> caster = make_caster();
     if (options_.is_dry_run) {
       print_dry_run(*caster);
@@ -180,6 +172,11 @@ class PrecomputeRun {
   }
 
  private:
+  /// Without progress there is nothing to stop for.
+  static bool keeps_progress(const PrecomputeOptions& options) {
+    return options.has_checkpoint && !options.is_dry_run;
+  }
+
   [[nodiscard]] AttenuationQuantizer quantizer() const {
     return AttenuationQuantizer::for_maximum(source_.volume->max_total_attenuation());
   }
@@ -193,13 +190,17 @@ class PrecomputeRun {
     return pairs;
   }
 
-  /// Before the work, not after it.
-  void require_output_folder() const {
-    const std::filesystem::path output(options_.output);
-    if (std::filesystem::is_directory(output))
-      throw FileError(options_.output, "is a folder, not a field file");
-    make_output_folder(output.has_parent_path() ? output.parent_path() : ".");
-    announce_field(output);
+  /// Collective. Before the work, not after it.
+  void open_output() {
+    all_or_none(world_, [&] {
+      if (world_.is_root() && std::filesystem::is_directory(options_.output))
+        throw FileError(options_.output, "is a folder, not a field file");
+    });
+    run_.open();
+    all_or_none(world_, [&] {
+      if (world_.is_root()) announce_field(options_.output);
+    });
+    check_parallel_writing(options_.output, world_, hints());
   }
 
   void load() {
@@ -307,15 +308,17 @@ class PrecomputeRun {
     // A limit that is too low is refused before anything is made.
     const MemoryPlan memory = memory_plan(plan_units(lattice_, plan()));
     all_or_none(world_, [&] { (void)memory_limit(options_, memory); });
-    ProgressManifest manifest = manifest_of(options_, source_, plan());
-    std::optional<ProgressFolder> progress;
-    if (options_.has_checkpoint)
-      progress.emplace(options_.output + ".progress", options_.is_restart, manifest, world_);
+    const DecidingValues decides = casting_decides(options_, source_);
+    UnfinishedWork work = run_.unfinished("units", decides);
+    work.plan = plan().rays_per_unit;
+    std::optional<UnitStore> progress;
+    if (options_.has_checkpoint) progress.emplace(work, world_);
     if (progress.has_value() && progress->has_replaced_refused())
       inform(world_,
              "unfinished work in " + progress->path().string() +
                  " is thrown away: its options were refused, and these are others");
-    const auto units = plan_units(lattice_, {manifest.rays_per_unit});
+    const auto units =
+        plan_units(lattice_, {progress.has_value() ? progress->rays_per_unit() : work.plan});
     const FieldBuild build{caster,
                            lattice_,
                            units,
@@ -324,7 +327,7 @@ class PrecomputeRun {
                            world_};
     CastPhase cast = cast_phase(build);
     const OverflowChoice choice = overflow_choice(build, cast);
-    const TrainedCodebook trained = train_or_give_way(build, manifest, cast);
+    const TrainedCodebook trained = train_or_give_way(build, decides, cast);
     complete_field(trained.codebook);
     write_phase(build, cast, trained, choice);
   }
@@ -344,7 +347,7 @@ class PrecomputeRun {
              "resumed " + std::to_string(cast.units_resumed) + " of " +
                  std::to_string(build.units.size()) + " units from " +
                  build.progress->path().string());
-    stop_if_requested("with all units saved");
+    run_.stop_if_requested("with all units saved");
     return cast;
   }
 
@@ -379,11 +382,11 @@ class PrecomputeRun {
 
   /// Collective. Options that are refused only now must not stand in the way of better ones.
   TrainedCodebook train_or_give_way(const FieldBuild& build,
-                                    const ProgressManifest& manifest,
+                                    const DecidingValues& decides,
                                     CastPhase& cast) {
     try {
       all_or_none(world_, [&] { require_something_seen(cast); });
-      return train_phase(build, manifest, cast);
+      return train_phase(build, decides, cast);
     } catch (const Error& error) {
       if (error.exit_code() == ExitCode::Input && build.progress != nullptr)
         build.progress->give_way();
@@ -399,9 +402,7 @@ class PrecomputeRun {
                      "the CT is within the range; check the rig, the nominal pose and the centre");
   }
 
-  TrainedCodebook train_phase(const FieldBuild& build,
-                              const ProgressManifest& manifest,
-                              CastPhase& cast) {
+  TrainedCodebook train_phase(const FieldBuild& build, DecidingValues decides, CastPhase& cast) {
     ProgressPrinter printer("training the codebook", world_.is_root());
     const auto iteration = [](std::size_t done) {
       return "training the codebook, iteration " + std::to_string(done + 1);
@@ -410,18 +411,16 @@ class PrecomputeRun {
     TrainingCheckpoints checkpoints;
     WorkNote note(iteration(0));
     if (build.progress != nullptr) {
-      DecidingValues decides = manifest.decides;
       decides.merge(deciding_options(options_, kCodebookStage));
-      journal.emplace(build.progress->path(),
-                      decides,
+      journal.emplace(run_.unfinished("training", decides),
                       static_cast<std::size_t>(options_.codebook_options().codewords),
                       world_);
       checkpoints.begun = journal->begun();
       checkpoints.on_iteration = [&](const TrainedCodebook& so_far) {
         journal->append(so_far);
         note.change(iteration(so_far.iterations.size()));
-        stop_if_requested("with all units and " + std::to_string(so_far.iterations.size()) +
-                          " iterations of the training saved");
+        run_.stop_if_requested("with all units and " + std::to_string(so_far.iterations.size()) +
+                               " iterations of the training saved");
       };
     }
     iterations_resumed_ = checkpoints.begun ? checkpoints.begun->iterations.size() : 0;
@@ -455,26 +454,22 @@ class PrecomputeRun {
         world_,
         hints());
     printer.reset();
-    if (build.progress != nullptr) build.progress->remove();
+    if (build.progress != nullptr) remove_progress(*build.progress);
     clock_.end("write");
     report(info, cast, trained, statistics);
   }
 
-  /// Without a progress folder there is nothing to stop for.
-  [[nodiscard]] StopRequested stop_requested() const {
-    return [is_heard = options_.has_checkpoint] { return is_heard && is_stop_requested(); };
+  /// Collective. On NFS a folder cannot be removed while a rank has a file of it open.
+  void remove_progress(UnitStore& progress) const {
+    progress.close();
+    world_.barrier();
+    all_or_none(world_, [&] {
+      if (world_.is_root()) run_.finish();
+    });
   }
 
-  /// Collective. StoppedError on every rank when a stop was asked for on any; `state` says what of
-  /// the work is saved.
-  void stop_if_requested(const std::string& state) const {
-    if (!options_.has_checkpoint) return;
-    std::array<std::uint64_t, 1> stops{is_stop_requested() ? 1U : 0U};
-    world_.maximum(stops);
-    if (stops[0] == 0) return;
-    all_or_none(world_, [&] {
-      throw StoppedError("stopped " + state + ": run the same command again to go on");
-    });
+  [[nodiscard]] StopRequested stop_requested() const {
+    return [this] { return run_.is_stop_requested(); };
   }
 
   void complete_field(const Codebook& codebook) {
@@ -506,13 +501,12 @@ class PrecomputeRun {
   [[nodiscard]] FieldProvenance provenance_of(const TrainedCodebook& trained,
                                               const CastPhase& cast,
                                               const BuildStatistics& statistics) const {
-    Provenance provenance;
-    provenance.program = "af-precompute";
-    provenance.command_line = command_line_;
-    provenance.options_toml = to_toml(options_);
-    provenance.seed = options_.seed;
-    provenance.rank_count = world_.size();
-    provenance.input_sha256[source_.ct_path] = source_.ct_content_sha256;
+    const Provenance provenance = {"af-precompute",
+                                   command_line_,
+                                   to_toml(options_),
+                                   options_.seed,
+                                   world_.size(),
+                                   {{source_.ct_path, source_.ct_content_sha256}}};
     nlohmann::json json = to_json(provenance);
     json["training"] = training_json(trained);
     json["occupied_tiles"] = cast.occupied_tiles;
@@ -558,8 +552,8 @@ class PrecomputeRun {
   const PrecomputeOptions& options_;
   std::string command_line_;
   const Communicator& world_;
+  RunFolder run_;
   int ranks_on_node_ = world_.node().size();
-  std::unique_ptr<OutputLock> lock_;  ///< rank 0
   FieldSource source_;
   CompressedAttenuationField field_;                    ///< without indices
   FieldLattice lattice_;                                ///< of the field

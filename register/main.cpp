@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <filesystem>
 #include <iostream>
-#include <optional>
 #include <string>
 
 #include <CLI/CLI.hpp>
@@ -16,8 +15,7 @@
 #include "register/register_options.h"
 #include "register/results/slicer_folder.h"
 #include "register/results/target_errors.h"
-#include "run/output_lock.h"
-#include "run/stop_request.h"
+#include "run/run_folder.h"
 #include "run/terminal.h"
 #include "study/shared_inputs.h"
 #include "text/csv_table.h"
@@ -32,12 +30,12 @@ void run(const RegisterOptions& options,
          const std::string& command_line,
          const Communicator& world) {
   using namespace af::registration;
-  af::listen_for_stop_requests();
   const RegistrationOptions method = af::all_or_none(world, [&] {
     af::throw_if_any(problems(options));
-    if (world.is_root()) af::announce_outputs(options.output_folder, result_file_names());
     return resolve(options.method);
   });
+  af::RunFolder folder({options.output_folder, result_file_names(), options.resume.restarts},
+                       world);
   std::vector<std::string> study_warnings;
   const af::Study study = af::read_study(options.study, world, &study_warnings);
   for (const std::string& text : study_warnings) af::warn(world, text);
@@ -58,17 +56,13 @@ void run(const RegisterOptions& options,
   RegistrationRunner runner =
       af::all_or_none(world, [&] { return RegistrationRunner(loaded.problem, method, pool); });
   PoseExaminer examiner = af::all_or_none(world, [&] { return PoseExaminer(loaded.problem); });
-  // Before the work, so that an unwritable folder does not cost it; after the inputs, so that bad
-  // ones leave nothing behind.
-  std::optional<af::OutputLock> lock;
   const std::filesystem::path slicer = options.output_folder / "slicer";
   af::all_or_none(world, [&] {
     if (!world.is_root()) return;
     af::announce_outputs(options.output_folder, overlay_file_names(*loaded.problem));
     af::announce_outputs(slicer, slicer_file_names(*loaded.problem));
-    af::make_output_folder(options.output_folder);
-    lock.emplace(options.output_folder);
   });
+  folder.open();
 
   RegisterOptions in_force = options.in_force();
   in_force.case_name = study_case.name;
@@ -83,15 +77,13 @@ void run(const RegisterOptions& options,
   af::all_or_none(world, [&] {
     if (world.is_root()) input_sha256.merge(hashes_of_files(options));
   });
-  std::vector<RegistrationRecord> records =
-      register_starts(runner,
-                      examiner,
-                      starts,
-                      {af::progress_folder(options.output_folder),
-                       "registrations",
-                       af::deciding_values(af::deciding_options(in_force), input_sha256),
-                       options.resume.restarts},
-                      world);
+  std::vector<RegistrationRecord> records = register_starts(
+      runner,
+      examiner,
+      starts,
+      folder.unfinished("registrations",
+                        af::deciding_values(af::deciding_options(in_force), input_sha256)),
+      world);
   af::all_or_none(world, [&] {
     if (!world.is_root()) return;
     add_target_errors(gold, study_case.target_box_ct, records);
@@ -109,7 +101,7 @@ void run(const RegisterOptions& options,
     else
       write_slicer_folder(*loaded.problem, best.result.room_from_ct, study_case, slicer);
     std::cout << write_run(records, *loaded.problem, description, options.output_folder);
-    std::filesystem::remove_all(af::progress_folder(options.output_folder));
+    folder.finish();
     if (judgement.verdict == Verdict::NotFound)
       throw af::NotFoundError("nothing was found (see the verdict); what was searched is in " +
                               options.output_folder.string());

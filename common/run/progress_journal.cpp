@@ -6,12 +6,11 @@
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
-#include <limits>
+#include <fcntl.h>
 #include <nlohmann/json.hpp>
-#include <set>
 #include <system_error>
-#include <tuple>
-#include <vector>
+#include <unistd.h>
+#include <utility>
 
 #include "base/crc32c.h"
 #include "base/error.h"
@@ -23,180 +22,273 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kFormat = "af-progress-journal";
-constexpr int kFormatVersion = 3;  // 3: one file of records per run and process
+constexpr int kFormatVersion = 4;  // 4: records have keys; fields keep their units so, too
 
-/// Stands before every record.
+/// Stands before the content of every record.
 struct RecordHeader {
-  std::array<char, 4> magic = {'A', 'F', 'R', '1'};
-  std::uint32_t content_bytes = 0;
+  std::array<char, 8> magic = {'A', 'F', 'R', 'E', 'C', 'O', 'R', '4'};
+  std::int64_t key = 0;
+  std::uint64_t content_bytes = 0;
   std::uint32_t content_crc = 0;
-  std::uint32_t header_crc = 0;  ///< of the fields before it
+  std::uint32_t header_crc = 0;  ///< of the journal's name and the fields before it
 
-  [[nodiscard]] std::uint32_t computed_crc() const {
-    return crc32c(std::as_bytes(std::span(this, 1)).first(offsetof(RecordHeader, header_crc)));
+  [[nodiscard]] std::uint32_t computed_crc(const std::string& journal) const {
+    return crc32c(std::as_bytes(std::span(this, 1)).first(offsetof(RecordHeader, header_crc)),
+                  crc32c(std::as_bytes(std::span(journal))));
   }
 };
-static_assert(sizeof(RecordHeader) == 16);
+static_assert(sizeof(RecordHeader) == 32);
 
-/// The next record; false at the end and where something is not sound.
-bool read_record(std::ifstream& file, std::uint64_t bytes_left, std::vector<std::byte>& record) {
-  RecordHeader header;
-  if (bytes_left < sizeof(header)) return false;
-  file.read(reinterpret_cast<char*>(&header), sizeof(header));
-  if (!file || header.magic != RecordHeader{}.magic || header.header_crc != header.computed_crc() ||
-      header.content_bytes > bytes_left - sizeof(header))
-    return false;
-  record.resize(header.content_bytes);
-  file.read(reinterpret_cast<char*>(record.data()), static_cast<std::streamsize>(record.size()));
-  return file.good() && crc32c(record) == header.content_crc;
-}
+/// Records of one shard, from front to back or at known places.
+class ShardReader {
+ public:
+  ShardReader(const JournalFiles& files, const JournalShard& shard)
+      : journal_(files.name), path_(files.shard(shard)) {
+    std::error_code unreachable;
+    // Opening a pipe would wait for its writer.
+    if (!fs::is_regular_file(path_, unreachable)) return;
+    size_ = fs::file_size(path_, unreachable);
+    if (unreachable) size_ = 0;
+    file_.open(path_, std::ios::binary);
+  }
 
-DecidingValues read_manifest(const fs::path& path) {
-  DecidingValues decides;
-  read_progress_manifest(path, kFormat, kFormatVersion, [&](const nlohmann::json& json) {
-    decides = json.at("decides").get<DecidingValues>();
-  });
-  return decides;
-}
+  [[nodiscard]] bool is_unreadable() const { return size_ > 0 && !file_.is_open(); }
+  [[nodiscard]] const fs::path& path() const { return path_; }
 
-/// What the file system refuses, as an error of the folder.
-void on_files_of(const fs::path& folder, const std::function<void()>& work) {
-  try {
-    work();
-  } catch (const fs::filesystem_error& error) {
-    throw FileError(folder.string(), error.what());
+  /// Whether there is a sound header; its content is read next.
+  bool read_header(std::uint64_t offset) {
+    if (!file_.is_open() || offset > size_ || size_ - offset < sizeof(header_)) return false;
+    file_.clear();
+    file_.seekg(static_cast<std::streamoff>(offset));
+    read({reinterpret_cast<std::byte*>(&header_), sizeof(header_)});
+    return file_.good() && header_.magic == RecordHeader{}.magic &&
+           header_.header_crc == header_.computed_crc(journal_) &&
+           header_.content_bytes <= size_ - offset - sizeof(header_);
+  }
+  [[nodiscard]] const RecordHeader& header() const { return header_; }
+
+  bool read_content(std::initializer_list<std::span<std::byte>> parts) {
+    std::uint64_t bytes = 0;
+    std::uint32_t crc = 0;
+    for (const std::span<std::byte> part : parts) bytes += part.size();
+    if (bytes != header_.content_bytes) return false;
+    for (const std::span<std::byte> part : parts) {
+      read(part);
+      crc = crc32c(part, crc);
+    }
+    return file_.good() && crc == header_.content_crc;
+  }
+
+ private:
+  void read(std::span<std::byte> bytes) {
+    file_.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  }
+
+  const std::string& journal_;
+  fs::path path_;
+  std::uint64_t size_ = 0;
+  std::ifstream file_;
+  RecordHeader header_;
+};
+
+/// Calls `take` at every record of a shard, by its header.
+void for_each_record(const JournalFiles& files,
+                     const JournalShard& shard,
+                     const std::function<void(ShardReader&, const RecordPlace&)>& take) {
+  ShardReader reader(files, shard);
+  if (reader.is_unreadable()) throw FileError(reader.path().string(), "cannot be read");
+  RecordPlace place{shard};
+  while (reader.read_header(place.offset)) {
+    place.key = reader.header().key;
+    place.bytes = reader.header().content_bytes;
+    take(reader, place);
+    place.offset += sizeof(RecordHeader) + place.bytes;
   }
 }
 
-fs::path manifest_path(const fs::path& folder, const std::string& name) {
-  return folder / (name + ".json");
-}
-
-std::string padded(int number, std::size_t width) {
+std::string padded(std::int64_t number, std::size_t width) {
   const std::string digits = std::to_string(number);
   return std::string(width - std::min(width, digits.size()), '0') + digits;
 }
 
-/// "NAME.0002-000012.records".
-fs::path shard_path(const fs::path& folder, const std::string& name, int run, int shard) {
-  return folder / (name + "." + padded(run, 4) + "-" + padded(shard, 6) + ".records");
+/// Be it a link to nowhere or to itself.
+bool is_there(const fs::path& path) {
+  return fs::symlink_status(path).type() != fs::file_type::not_found;
 }
 
-struct ShardFile {
-  fs::path path;
-  int run = 0;
-};
-
-/// The shards of a journal, by run and name. Another journal's name may begin alike.
-std::vector<ShardFile> shards_of(const fs::path& folder, const std::string& name) {
-  std::vector<ShardFile> shards;
-  for (const auto& entry : fs::directory_iterator(folder)) {
-    const std::string file = entry.path().filename().string();
-    if (!file.starts_with(name + ".")) continue;
-    const char* const number = file.c_str() + name.size() + 1;
-    const int run = std::atoi(number);
-    const char* const dash = std::strchr(number, '-');
-    if (dash == nullptr || run < 0 || run == std::numeric_limits<int>::max()) continue;
-    if (entry.path() == shard_path(folder, name, run, std::atoi(dash + 1)))
-      shards.push_back({entry.path(), run});
+/// The manifest; FileError that says what to do when it cannot be one.
+UnfinishedWork read_manifest(const fs::path& path, std::int64_t least_plan) {
+  const auto unusable = [&](const std::string& why) {
+    return FileError(path.string(), why + ": start over with --restart");
+  };
+  constexpr std::uintmax_t kMostBytes = 16u << 20;
+  std::error_code error;
+  if (!fs::is_regular_file(path, error)) throw unusable("is not a regular file");
+  if (fs::file_size(path, error) > kMostBytes) throw unusable("is larger than any such file");
+  try {
+    const nlohmann::json manifest = nlohmann::json::parse(read_own_text_file(path));
+    if (manifest.at("format") != kFormat || manifest.at("format_version") != kFormatVersion)
+      throw unusable("is not of the format " + std::string(kFormat) + " " +
+                     std::to_string(kFormatVersion));
+    UnfinishedWork work;
+    work.decides = manifest.at("decides").get<DecidingValues>();
+    work.plan = manifest.at("plan").get<std::int64_t>();
+    if (work.plan < least_plan)
+      throw unusable("plan = " + std::to_string(work.plan) + ": must be at least " +
+                     std::to_string(least_plan));
+    return work;
+  } catch (const nlohmann::json::exception& damage) {
+    throw unusable(std::string("damaged (") + damage.what() + ")");
   }
-  std::sort(shards.begin(), shards.end(), [](const ShardFile& a, const ShardFile& b) {
-    return std::tie(a.run, a.path) < std::tie(b.run, b.path);
-  });
-  return shards;
 }
 
-/// Visits the sound records up to the first that is not; returns their size with their headers.
-/// Whatever else has the name of a shard holds none.
-std::uint64_t visit_shard(const fs::path& path, const ProgressJournal::Visit& visit) {
-  std::error_code unreachable;
-  if (!fs::is_regular_file(path, unreachable)) return 0;
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw FileError(path.string(), "cannot be read");
-  const std::uint64_t size = fs::file_size(path);
-  std::uint64_t sound_bytes = 0;
-  for (std::vector<std::byte> record; read_record(file, size - sound_bytes, record);) {
-    visit(record);
-    sound_bytes += sizeof(RecordHeader) + record.size();
-  }
-  return sound_bytes;
+/// Stands beside the manifest when the options of the work were refused.
+fs::path refused_path(const JournalFiles& files) {
+  return files.folder / (files.name + ".refused");
 }
 
 }  // namespace
 
-ProgressJournal::ProgressJournal(const fs::path& folder,
-                                 const std::string& name,
-                                 const DecidingValues& decides,
-                                 bool restart)
-    : folder_(folder), name_(name) {
-  make_output_folder(folder_);
-  on_files_of(folder_, [&] { open(decides, restart); });
+fs::path JournalFiles::manifest() const {
+  return folder / (name + ".json");
 }
 
-void ProgressJournal::open(const DecidingValues& decides, bool restart) {
-  const fs::path manifest = manifest_path(folder_, name_);
-  if (restart) fs::remove_all(manifest);
-  if (has_progress_manifest(manifest)) {
-    require_same(read_manifest(manifest), decides, folder_);
-    for (const ShardFile& shard : shards_of(folder_, name_)) run_ = std::max(run_, shard.run + 1);
+fs::path JournalFiles::shard(const JournalShard& shard) const {
+  return folder / (name + "." + padded(shard.run, 4) + "-" + padded(shard.rank, 6) + ".records");
+}
+
+std::vector<JournalShard> JournalFiles::shards() const {
+  // The next run's number must be higher than all.
+  constexpr std::int64_t kMost = 1'000'000'000;
+  std::vector<JournalShard> found;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    const std::string file = entry.path().filename().string();
+    if (!file.starts_with(name + ".")) continue;  // another journal's name may begin alike
+    char* end = nullptr;
+    const std::int64_t run = std::strtoll(file.c_str() + name.size() + 1, &end, 10);
+    const std::int64_t rank = *end == '-' ? std::strtoll(end + 1, nullptr, 10) : -1;
+    const bool is_possible = run >= 0 && run <= kMost && rank >= 0 && rank <= kMost;
+    if (is_possible && entry.path() == shard({run, rank})) found.push_back({run, rank});
+  }
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+std::vector<RecordPlace> JournalFiles::records(const JournalShard& shard) const {
+  std::vector<RecordPlace> places;
+  for_each_record(
+      *this, shard, [&](ShardReader&, const RecordPlace& place) { places.push_back(place); });
+  return places;
+}
+
+bool JournalFiles::read(const RecordPlace& place,
+                        std::initializer_list<std::span<std::byte>> parts) const {
+  ShardReader reader(*this, place.shard);
+  return reader.read_header(place.offset) && reader.header().key == place.key &&
+         reader.read_content(parts);
+}
+
+ProgressJournal::ProgressJournal(const UnfinishedWork& work)
+    : files_{work.folder, work.name}, plan_(work.plan) {
+  make_output_folder(files_.folder);
+  try {
+    open(work);
+  } catch (const fs::filesystem_error& error) {
+    throw FileError(files_.folder.string(), error.what());
+  }
+}
+
+void ProgressJournal::open(const UnfinishedWork& work) {
+  const bool goes_on = is_there(files_.manifest()) && takes_over(work);
+  fs::remove_all(refused_path(files_));
+  if (goes_on) {
+    for (const JournalShard& shard : files_.shards()) run_ = shard.run + 1;
     return;
   }
   // Without a manifest we cannot tell what records belong to.
-  for (const ShardFile& shard : shards_of(folder_, name_)) fs::remove_all(shard.path);
-  const nlohmann::json written = {
-      {"format", kFormat}, {"format_version", kFormatVersion}, {"decides", decides}};
-  write_text_file(manifest, written.dump(2) + "\n");
+  for (const JournalShard& shard : files_.shards()) fs::remove_all(files_.shard(shard));
+  const nlohmann::json written = {{"format", kFormat},
+                                  {"format_version", kFormatVersion},
+                                  {"decides", work.decides},
+                                  {"plan", work.plan}};
+  write_text_file(files_.manifest(), written.dump(2) + "\n");
 }
 
-void ProgressJournal::visit(int shard_count, const Visit& visit) const {
-  std::set<fs::path> shards;
-  for (const ShardFile& shard : shards_of(folder_, name_)) shards.insert(shard.path);
-  for (int shard = 0; shard < shard_count; ++shard)
-    if (const fs::path path = shard_path(folder_, name_, run_, shard); fs::exists(path))
-      shards.insert(path);
-  for (const fs::path& shard : shards) visit_shard(shard, visit);
+/// Whether this run goes on with the work that is there.
+bool ProgressJournal::takes_over(const UnfinishedWork& work) {
+  const UnfinishedWork earlier = read_manifest(files_.manifest(), work.plan > 0 ? 1 : 0);
+  std::vector<std::string> problems = differences(earlier.decides, work.decides);
+  if (problems.empty()) {
+    plan_ = earlier.plan;
+    return true;
+  }
+  if (!work.gives_way && !fs::exists(refused_path(files_))) {
+    problems.emplace_back(
+        "repeat the earlier options to go on with it, or give --restart to throw it away");
+    throw_if_any(problems, files_.folder.string());
+  }
+  has_replaced_ = true;
+  fs::remove_all(files_.manifest());
+  return false;
 }
 
-void ProgressJournal::mend_and_visit(const Visit& visit) {
-  on_files_of(folder_, [&] {
-    for (const ShardFile& shard : shards_of(folder_, name_)) {
-      const std::uint64_t sound_bytes = visit_shard(shard.path, visit);
-      std::error_code unreachable;
-      if (fs::is_regular_file(shard.path, unreachable) && sound_bytes < fs::file_size(shard.path))
-        fs::resize_file(shard.path, sound_bytes);
-    }
-  });
+void ProgressJournal::visit(int rank_count, const Visit& visit) const {
+  std::vector<JournalShard> shards = files_.shards();
+  for (int rank = 0; rank < rank_count; ++rank) shards.push_back({run_, rank});
+  std::sort(shards.begin(), shards.end());
+  shards.erase(std::unique(shards.begin(), shards.end()), shards.end());
+  std::vector<std::byte> content;
+  for (const JournalShard& shard : shards)
+    for_each_record(files_, shard, [&](ShardReader& reader, const RecordPlace& place) {
+      content.resize(place.bytes);
+      if (reader.read_content({content})) visit(place.key, content);
+    });
 }
 
-void ProgressJournal::remove() {
-  // The manifest first: shards alone are of nothing.
-  fs::remove(manifest_path(folder_, name_));
-  for (const ShardFile& shard : shards_of(folder_, name_)) fs::remove_all(shard.path);
-  std::error_code not_empty;
-  fs::remove(folder_, not_empty);
+void ProgressJournal::give_way() const {
+  write_text_file(refused_path(files_), "");
 }
 
-ProgressShard::ProgressShard(const fs::path& folder, const std::string& name, int run, int shard)
-    : path_(shard_path(folder, name, run, shard)), last_sync_(std::chrono::steady_clock::now()) {}
+ProgressShard::ProgressShard(JournalFiles files, const JournalShard& shard)
+    : files_(std::move(files)), path_(files_.shard(shard)), next_{shard} {}
 
-void ProgressShard::append(std::span<const std::byte> record) {
+RecordPlace ProgressShard::append(std::int64_t key,
+                                  std::initializer_list<std::span<const std::byte>> parts) {
   if (!file_.is_open()) file_.open(path_, std::ios::binary | std::ios::app);
+  const auto write = [&](std::span<const std::byte> bytes) {
+    file_.write(reinterpret_cast<const char*>(bytes.data()),
+                static_cast<std::streamsize>(bytes.size()));
+  };
   RecordHeader header;
-  header.content_bytes = static_cast<std::uint32_t>(record.size());
-  header.content_crc = crc32c(record);
-  header.header_crc = header.computed_crc();
-  for (const auto part : {std::as_bytes(std::span(&header, 1)), record})
-    file_.write(reinterpret_cast<const char*>(part.data()),
-                static_cast<std::streamsize>(part.size()));
+  header.key = key;
+  for (const std::span<const std::byte> part : parts) {
+    header.content_bytes += part.size();
+    header.content_crc = crc32c(part, header.content_crc);
+  }
+  header.header_crc = header.computed_crc(files_.name);
+  write(std::as_bytes(std::span(&header, 1)));
+  for (const std::span<const std::byte> part : parts) write(part);
   file_.flush();
   if (!file_)
     throw FileError(path_.string(), std::string("cannot be written: ") + std::strerror(errno));
   if (std::chrono::steady_clock::now() - last_sync_ > std::chrono::minutes(1)) sync();
+  next_.key = key;
+  next_.bytes = header.content_bytes;
+  const RecordPlace written = next_;
+  next_.offset += sizeof(header) + header.content_bytes;
+  return written;
 }
 
 void ProgressShard::sync() {
   if (file_.is_open()) sync_path(path_);
   last_sync_ = std::chrono::steady_clock::now();
+}
+
+void ProgressShard::forget_cached() const {
+  const int descriptor = ::open(path_.c_str(), O_RDONLY);
+  if (descriptor < 0) return;
+  ::posix_fadvise(descriptor, 0, 0, POSIX_FADV_DONTNEED);
+  ::close(descriptor);
 }
 
 }  // namespace af

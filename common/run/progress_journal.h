@@ -1,76 +1,130 @@
 // SPDX-License-Identifier: Apache-2.0
+// The one store of unfinished work: small rows of an evaluation as well as the large blocks of a
+// field.
 #pragma once
 
 #include <chrono>
+#include <compare>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <initializer_list>
 #include <span>
 #include <string>
+#include <vector>
 
-#include "run/progress_manifest.h"
+#include "run/deciding_values.h"
 
 namespace af {
 
-/// Finished records of unfinished work: FOLDER/NAME.json says what they are valid for; to
-/// FOLDER/NAME.RUN-SHARD.records each process appends its own, each with its size and CRC-32C, so
-/// that nothing passes through one process. Every run has files of its own: what a process of an
-/// earlier run still writes, on a host that was lost and came back, meets nobody. Whatever a killed
-/// run left torn or damaged is cut off when the journal is opened again. This side is for one
-/// process alone.
+/// Work as a new run begins it, or as a later run continues it.
+struct UnfinishedWork {
+  std::filesystem::path folder;  ///< "OUTPUT.progress": RunFolder::unfinished()
+  std::string name;              ///< of its files; several may share a folder
+  DecidingValues decides;        ///< what every result depends on
+  std::int64_t plan = 0;         ///< how it is cut up; later runs take over the first one's
+  bool gives_way = false;        ///< is thrown away, not refused, when begun with other options
+};
+
+/// What one process has written in one run.
+struct JournalShard {
+  std::int64_t run = 0;
+  std::int64_t rank = 0;
+
+  auto operator<=>(const JournalShard&) const = default;
+};
+
+/// Where a record lies whose header is sound. Its content may be damaged.
+struct RecordPlace {
+  JournalShard shard;
+  std::uint64_t offset = 0;
+  std::int64_t key = 0;
+  std::uint64_t bytes = 0;  ///< of its content
+
+  auto operator<=>(const RecordPlace&) const = default;
+};
+
+/// The files of a journal: FOLDER/NAME.json says what it is valid for; to FOLDER/NAME.RUN-RANK
+/// .records each process appends its finished records, so that nothing passes through one process.
+/// A record has a key, its size, and CRC-32Cs of its header and its content. A reader comes to a
+/// record through the headers before it, so a torn or damaged header ends its file, while damaged
+/// content is the loss of one record. Nobody appends to the files of an earlier run; and what a
+/// process of such a run still writes, on a host that was lost and came back, harms nobody.
+struct JournalFiles {
+  std::filesystem::path folder;
+  std::string name;
+
+  [[nodiscard]] std::filesystem::path manifest() const;
+  [[nodiscard]] std::filesystem::path shard(const JournalShard& shard) const;
+
+  /// In order. Files of names that no run can have are passed over.
+  [[nodiscard]] std::vector<JournalShard> shards() const;
+  /// The records of a shard, by their headers; none when it is not there or no regular file.
+  [[nodiscard]] std::vector<RecordPlace> records(const JournalShard& shard) const;
+  /// Reads a record's content into parts, which together have its size; false when it is damaged.
+  [[nodiscard]] bool read(const RecordPlace& place,
+                          std::initializer_list<std::span<std::byte>> parts) const;
+};
+
+/// A journal as it is opened or created, by one process.
 class ProgressJournal {
  public:
-  using Visit = std::function<void(std::span<const std::byte> record)>;
+  using Visit = std::function<void(std::int64_t key, std::span<const std::byte> content)>;
 
-  /// Opens or creates a journal. InputError that names the difference when earlier records were
-  /// about something else; `restart` throws them away. FileError when files cannot be read or
-  /// written.
-  ProgressJournal(const std::filesystem::path& folder,
-                  const std::string& name,
-                  const DecidingValues& decides,
-                  bool restart);
+  /// InputError that names the difference when earlier records were about something else and do not
+  /// give way. FileError when files cannot be read or written.
+  explicit ProgressJournal(const UnfinishedWork& work);
 
+  [[nodiscard]] const JournalFiles& files() const { return files_; }
   /// The number of this run, one more than any before.
-  [[nodiscard]] int run() const { return run_; }
+  [[nodiscard]] std::int64_t run() const { return run_; }
+  /// Of the work; of the run that began it, when this one goes on.
+  [[nodiscard]] std::int64_t plan() const { return plan_; }
+  /// Whether work of other options was thrown away.
+  [[nodiscard]] bool has_replaced() const { return has_replaced_; }
 
-  /// The sound records of all shards, by shard and in the order in which they were appended. Shards
-  /// 0 ... shard_count - 1 are looked for by name: a network file system may list late what another
-  /// host has just made.
-  void visit(int shard_count, const Visit& visit) const;
+  /// The sound records, by run, rank and in the order in which they were appended. Ranks 0 ...
+  /// rank_count - 1 of this run are looked for by name: a network file system may list late what
+  /// another host has just made.
+  void visit(int rank_count, const Visit& visit) const;
 
-  /// The same of what earlier runs left; what follows the first unsound record of a shard is cut
-  /// off. To be called before any process appends.
-  void mend_and_visit(const Visit& visit);
-
-  /// Removes the journal, and the folder when nothing else is in it: the work is complete.
-  void remove();
+  /// The options of this work have been refused: it gives way to a later run with others.
+  void give_way() const;
 
  private:
-  void open(const DecidingValues& decides, bool restart);
+  void open(const UnfinishedWork& work);
+  bool takes_over(const UnfinishedWork& work);
 
-  std::filesystem::path folder_;
-  std::string name_;
-  int run_ = 0;
+  JournalFiles files_;
+  std::int64_t run_ = 0;
+  std::int64_t plan_ = 0;
+  bool has_replaced_ = false;
 };
 
 /// What one process appends to a journal that exists.
 class ProgressShard {
  public:
-  /// `run`: of the journal. Shards of one run must differ.
-  ProgressShard(const std::filesystem::path& folder, const std::string& name, int run, int shard);
+  ProgressShard(JournalFiles files, const JournalShard& shard);
 
-  /// The record survives the end of this process from now on; of the machine after sync(), or a
-  /// minute later with the next record. FileError when it cannot be written.
-  void append(std::span<const std::byte> record);
+  /// Appends a record of these parts. It survives the end of this process from now on; the end of
+  /// the machine after sync(), or a minute later with the next record. FileError when it cannot be
+  /// written.
+  RecordPlace append(std::int64_t key, std::initializer_list<std::span<const std::byte>> parts);
 
   void sync();
+  void close() { file_.close(); }
+
+  /// Asks the system to drop the file from its cache, so that reading shows what it costs.
+  void forget_cached() const;
 
  private:
+  JournalFiles files_;
   std::filesystem::path path_;
+  RecordPlace next_;
   std::ofstream file_;
-  std::chrono::steady_clock::time_point last_sync_;
+  std::chrono::steady_clock::time_point last_sync_ = std::chrono::steady_clock::now();
 };
 
 }  // namespace af

@@ -99,4 +99,12 @@ void write_reproduce_script(const std::filesystem::path& folder, const Provenanc
   });
 }
 
+void write_results_last(const std::filesystem::path& file,
+                        nlohmann::json summary,
+                        const Provenance& provenance) {
+  write_reproduce_script(file.parent_path(), provenance);
+  summary["provenance"] = to_json(provenance);
+  write_text_file(file, summary.dump(2) + "\n");
+}
+
 }  // namespace af

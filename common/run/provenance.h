@@ -27,4 +27,10 @@ nlohmann::json to_json(const Provenance& provenance);
 /// it was run in and runs the same command.
 void write_reproduce_script(const std::filesystem::path& folder, const Provenance& provenance);
 
+/// Writes reproduce.sh beside `file`, then `file`: the summary with its provenance. Written last,
+/// it says that everything is there.
+void write_results_last(const std::filesystem::path& file,
+                        nlohmann::json summary,
+                        const Provenance& provenance);
+
 }  // namespace af

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cstring>
 #include <optional>
 
 #include "base/error.h"
@@ -16,16 +15,6 @@
 namespace af {
 namespace {
 
-/// A record is the item's number, then its result.
-std::int64_t item_of(std::span<const std::byte> record, const std::filesystem::path& folder) {
-  std::int64_t item = 0;
-  if (record.size() < sizeof(item))
-    throw FileError(folder.string(),
-                    "damaged (a record without a number): start over with --restart");
-  std::memcpy(&item, record.data(), sizeof(item));
-  return item;
-}
-
 std::string of_all(std::size_t part, std::size_t all) {
   return std::to_string(part) + " of " + std::to_string(all);
 }
@@ -33,19 +22,12 @@ std::string of_all(std::size_t part, std::size_t all) {
 }  // namespace
 
 ResumableItems::ResumableItems(const UnfinishedWork& work, const Communicator& communicator)
-    : folder_(work.folder), communicator_(communicator) {
-  std::array<std::uint64_t, 1> run{};
+    : communicator_(communicator), store_(work, communicator) {
   all_or_none(communicator_, [&] {
     if (!communicator_.is_root()) return;
-    journal_ =
-        std::make_unique<ProgressJournal>(work.folder, work.name, work.decides, work.restarts);
-    journal_->mend_and_visit(
-        [&](std::span<const std::byte> record) { finished_.push_back(item_of(record, folder_)); });
+    store_.visit([&](std::int64_t item, std::span<const std::byte>) { finished_.push_back(item); });
     std::sort(finished_.begin(), finished_.end());
-    run[0] = static_cast<std::uint64_t>(journal_->run());
   });
-  communicator_.maximum(run);
-  shard_.emplace(work.folder, work.name, static_cast<int>(run[0]), communicator_.rank());
 }
 
 std::vector<std::int64_t> ResumableItems::unfinished(const std::vector<std::int64_t>& items) const {
@@ -82,7 +64,8 @@ void ResumableItems::complete(const std::vector<std::int64_t>& items,
         const WorkNote note((what.empty() ? "" : what + ": ") + "item " + std::to_string(item) +
                             " (" + of_all(done_before + static_cast<std::size_t>(place) + 1, all) +
                             ")");
-        append(item, work(item));
+        store_.shard().append(item, {work(item)});
+        ++saved_;
       },
       [&](std::int64_t done) {
         if (printer) printer->update(static_cast<double>(done), static_cast<double>(to_do.size()));
@@ -90,20 +73,9 @@ void ResumableItems::complete(const std::vector<std::int64_t>& items,
   save(what);
 }
 
-void ResumableItems::append(std::int64_t item, std::span<const std::byte> result) {
-  record_.resize(sizeof(item) + result.size());
-  std::memcpy(record_.data(), &item, sizeof(item));
-  std::copy(result.begin(), result.end(), record_.begin() + sizeof(item));
-  shard_->append(record_);
-  ++saved_;
-}
-
 void ResumableItems::save(const std::string& what) {
-  all_or_none(communicator_, [&] { shard_->sync(); });
-  // Ranks may see the request at different times; it is enough that one has seen it.
-  std::array<std::uint64_t, 1> stops = {is_stop_requested() ? 1U : 0U};
-  communicator_.maximum(stops);
-  if (stops[0] == 0) return;
+  all_or_none(communicator_, [&] { store_.shard().sync(); });
+  if (!is_stop_requested(communicator_)) return;
   std::array<std::uint64_t, 1> saved = {saved_};
   communicator_.sum(saved);
   all_or_none(communicator_, [&] {
@@ -116,17 +88,16 @@ void ResumableItems::save(const std::string& what) {
 
 void ResumableItems::visit(const Receive& receive) const {
   std::vector<bool> is_there(items_.size());
-  journal_->visit(communicator_.size(), [&](std::span<const std::byte> record) {
-    const std::int64_t item = item_of(record, folder_);
+  store_.visit([&](std::int64_t item, std::span<const std::byte> result) {
     const auto place = std::lower_bound(items_.begin(), items_.end(), item);
     if (place == items_.end() || *place != item) return;
     is_there[static_cast<std::size_t>(place - items_.begin())] = true;
-    receive(item, record.subspan(sizeof(item)));
+    receive(item, result);
   });
   const auto lost = std::count(is_there.begin(), is_there.end(), false);
   if (lost > 0)
     throw FileError(
-        folder_.string(),
+        store_.folder().string(),
         std::to_string(lost) + " finished items are no longer there: run the same command again");
 }
 

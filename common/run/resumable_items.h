@@ -5,26 +5,15 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <filesystem>
 #include <functional>
-#include <memory>
-#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "parallel/communicator.h"
-#include "run/progress_journal.h"
+#include "run/progress_store.h"
 
 namespace af {
-
-/// Work as a new run begins it, or as a later run continues it.
-struct UnfinishedWork {
-  std::filesystem::path folder;  ///< progress_folder() of the output
-  std::string name;              ///< of its files; several may share a folder
-  DecidingValues decides;        ///< what every result depends on
-  bool restarts = false;         ///< throws away what there is
-};
 
 /// Every rank appends what it finishes to a shard of its own in one journal: no result passes
 /// through rank 0 until all are there. The result of an item must not depend on the rank that makes
@@ -33,7 +22,7 @@ struct UnfinishedWork {
 class ResumableItems {
  public:
   using Work = std::function<std::vector<std::byte>(std::int64_t item)>;
-  using Receive = std::function<void(std::int64_t item, std::span<const std::byte> result)>;
+  using Receive = ProgressJournal::Visit;
 
   /// Collective. Opens or creates the journal. InputError that names the difference when an earlier
   /// run began it with other options or inputs.
@@ -54,19 +43,15 @@ class ResumableItems {
  private:
   /// Collective. Those of `items` that no earlier run finished.
   [[nodiscard]] std::vector<std::int64_t> unfinished(const std::vector<std::int64_t>& items) const;
-  void append(std::int64_t item, std::span<const std::byte> result);
   /// Collective. Makes the appended items survive a crash of the machine; StoppedError when a stop
   /// was asked for.
   void save(const std::string& what);
 
-  std::filesystem::path folder_;
   Communicator communicator_;
-  std::unique_ptr<ProgressJournal> journal_;  ///< rank 0 alone
-  std::optional<ProgressShard> shard_;        ///< this rank's
-  std::vector<std::int64_t> finished_;        ///< rank 0: by earlier runs, ascending
-  std::vector<std::int64_t> items_;           ///< rank 0: of complete()
-  std::uint64_t saved_ = 0;        ///< of items_, by this rank; on rank 0 by earlier runs too
-  std::vector<std::byte> record_;  ///< memory to be used again
+  ProgressStore store_;                 ///< keys are items
+  std::vector<std::int64_t> finished_;  ///< rank 0: by earlier runs, ascending
+  std::vector<std::int64_t> items_;     ///< rank 0: of complete()
+  std::uint64_t saved_ = 0;             ///< of items_, by this rank; on rank 0 by earlier runs too
 };
 
 }  // namespace af

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "run/stop_request.h"
 
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <csignal>
@@ -64,6 +65,12 @@ RunLimits& run_limits() {
 
 bool is_stop_requested() {
   return stop_signal != 0 || is_time_over();
+}
+
+bool is_stop_requested(const Communicator& communicator) {
+  std::array<std::uint64_t, 1> stops{is_stop_requested() ? 1U : 0U};
+  communicator.maximum(stops);
+  return stops[0] != 0;
 }
 
 std::string stop_reason() {

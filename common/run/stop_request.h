@@ -5,6 +5,7 @@
 #include <string>
 
 #include "base/described_fields.h"
+#include "parallel/communicator.h"
 
 namespace af {
 
@@ -25,6 +26,9 @@ void listen_for_stop_requests();
 /// differently for a moment: they must agree before a collective call depends on it. May be called
 /// from any thread. \test StopRequest.ComesWhenTheHoursAreOver
 bool is_stop_requested();
+
+/// Collective. Whether a stop was asked for on any rank.
+bool is_stop_requested(const Communicator& communicator);
 
 /// What asked for the stop: "SIGUSR1", "--max-hours 2"; empty when this rank does not know.
 std::string stop_reason();

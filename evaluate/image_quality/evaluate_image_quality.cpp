@@ -27,9 +27,7 @@
 #include "files/output_file.h"
 #include "files/resource_check.h"
 #include "files/sha256.h"
-#include "run/output_lock.h"
-#include "run/provenance.h"
-#include "run/stop_request.h"
+#include "run/run_folder.h"
 #include "run/terminal.h"
 #include "study/node_ct.h"
 #include "study/pose_file.h"
@@ -205,10 +203,7 @@ void write_results(const ImageQualityOptions& options,
   summary["field"]["payload_bytes"] = setup.field_info.payload_bytes;
   summary["look_up"] = options.look_up;
   summary.update(image_quality_statistics(comparisons));
-  summary["provenance"] = af::to_json(provenance);
-  write_reproduce_script(folder, provenance);
-  // Written last: when summary.json is there, everything is.
-  write_text_file(folder / "summary.json", summary.dump(2) + "\n");
+  write_results_last(folder / "summary.json", std::move(summary), provenance);
 
   const SampleSummary psnr = [&] {
     std::vector<double> values;
@@ -249,6 +244,7 @@ std::vector<LossSplit> split_losses(const ImageQualityOptions& options,
 TargetResult evaluate_target(const ImageQualityOptions& options,
                              const Target& target,
                              const std::string& command_line,
+                             const RunFolder& run,
                              const Communicator& world) {
   all_or_none(world, [&] {
     if (world.is_root()) make_output_folder(target.folder);
@@ -269,11 +265,9 @@ TargetResult evaluate_target(const ImageQualityOptions& options,
       provenance.input_sha256["poses"] = sha256_of_file(options.poses.string());
   });
   const std::string name = target.folder.filename().string();
-  const auto unfinished = [&](const std::string& what) -> UnfinishedWork {
-    return {progress_folder(options.output_folder),
-            name + what,
-            deciding_values(deciding_options(options), provenance.input_sha256),
-            options.resume.restarts};
+  const auto unfinished = [&](const std::string& what) {
+    return run.unfinished(name + what,
+                          deciding_values(deciding_options(options), provenance.input_sha256));
   };
   const std::int64_t count = setup.pose_count(options);
   all_or_none(world, [&] {
@@ -409,26 +403,23 @@ CLI::App* bind_image_quality(CLI::App& app, ImageQualityOptions& options) {
 void run_image_quality(const ImageQualityOptions& options,
                        const std::string& command_line,
                        const Communicator& world) {
-  std::optional<OutputLock> lock;
-  const std::vector<Target> targets = all_or_none(world, [&] {
+  all_or_none(world, [&] {
     throw_if_any(problems(options));
-    if (world.is_root()) {
-      require_gnuplot();
-      make_output_folder(options.output_folder);
-      announce_outputs(options.output_folder,
-                       {"image-quality.csv", "reproduce.sh", "summary.json"});
-      lock.emplace(options.output_folder);
-    }
-    return targets_of(options);
+    if (world.is_root()) require_gnuplot();
   });
-  listen_for_stop_requests();
+  RunFolder run({options.output_folder,
+                 {"image-quality.csv", "reproduce.sh", "summary.json"},
+                 options.resume.restarts},
+                world);
+  run.open();
+  const std::vector<Target> targets = all_or_none(world, [&] { return targets_of(options); });
   std::vector<TargetResult> results;
   for (const Target& target : targets)
-    results.push_back(evaluate_target(options, target, command_line, world));
+    results.push_back(evaluate_target(options, target, command_line, run, world));
   all_or_none(world, [&] {
     if (!world.is_root()) return;
     if (!options.study.empty()) write_together(results, options.output_folder);
-    std::filesystem::remove_all(progress_folder(options.output_folder));
+    run.finish();
   });
 }
 

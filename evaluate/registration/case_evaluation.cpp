@@ -355,6 +355,7 @@ void draw_overlays(const Method& method,
 std::vector<MethodRows> begin_registrations(const RegistrationStudyOptions& options,
                                             const CaseEvaluation& evaluation,
                                             const std::vector<Method>& methods,
+                                            const RunFolder& run,
                                             const Communicator& world) {
   const std::string name = file_name_part(evaluation.case_name);
   const DecidingValues decides = all_or_none(world, [&] {
@@ -365,11 +366,7 @@ std::vector<MethodRows> begin_registrations(const RegistrationStudyOptions& opti
   for (const Method& method : methods)
     begun.push_back({method.renderer,
                      world.is_root() ? method.start_indices : std::vector<std::int64_t>(),
-                     {{progress_folder(options.output_folder),
-                       name + "-" + method.renderer,
-                       decides,
-                       options.resume.restarts},
-                      world}});
+                     {run.unfinished(name + "-" + method.renderer, decides), world}});
   return begun;
 }
 
@@ -439,6 +436,7 @@ RegistrationRow registered_row(
 CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
                              const Study& study,
                              const StudyCase& study_case,
+                             const RunFolder& run,
                              const Communicator& world,
                              const std::function<void(const CaseEvaluation&)>& on_starts,
                              FileBackedArray<RegistrationRow>& all_rows) {
@@ -462,7 +460,7 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
   });
   // Refusals come first: they leave the results of an earlier run alone.
   std::vector<MethodRows> rows;
-  if (!options.is_starts_only) rows = begin_registrations(options, evaluation, methods, world);
+  if (!options.is_starts_only) rows = begin_registrations(options, evaluation, methods, run, world);
   all_or_none(world, [&] { on_starts(evaluation); });
   if (options.is_starts_only) {
     evaluation.starts.starts = {};

@@ -16,6 +16,7 @@
 #include "files/file_backed_array.h"
 #include "parallel/communicator.h"
 #include "register/method/registration.h"
+#include "run/run_folder.h"
 #include "study/case_gold_standard.h"
 #include "study/study_file.h"
 
@@ -69,6 +70,7 @@ RegistrationRow registered_row(
 CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
                              const Study& study,
                              const StudyCase& study_case,
+                             const RunFolder& run,
                              const Communicator& world,
                              const std::function<void(const CaseEvaluation&)>& on_starts,
                              FileBackedArray<RegistrationRow>& rows);

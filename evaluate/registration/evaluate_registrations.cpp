@@ -29,10 +29,7 @@
 #include "files/output_file.h"
 #include "files/sha256.h"
 #include "parallel/work_watch.h"
-#include "run/output_lock.h"
-#include "run/progress_manifest.h"
-#include "run/provenance.h"
-#include "run/stop_request.h"
+#include "run/run_folder.h"
 #include "run/terminal.h"
 #include "study/shared_inputs.h"
 #include "text/json_text.h"
@@ -378,26 +375,23 @@ void run_registration(const RegistrationStudyOptions& options,
                       const std::string& command_line,
                       const Communicator& world) {
   const std::filesystem::path& folder = options.output_folder;
-  listen_for_stop_requests();
   std::vector<std::string> study_warnings;
   all_or_none(world, [&] {
     throw_if_any(problems(options));
-    if (world.is_root())
-      announce_outputs(
-          folder, {"starts.csv", "registrations.csv", "cases.csv", "reproduce.sh", "summary.json"});
+    if (world.is_root()) require_gnuplot();
   });
+  RunFolder run({folder,
+                 {"starts.csv", "registrations.csv", "cases.csv", "reproduce.sh", "summary.json"},
+                 options.resume.restarts},
+                world);
   const Study study = read_study(options.study, world, &study_warnings);
   for (const std::string& text : study_warnings) warn(world, text);
   const std::vector<StudyCase> cases =
       all_or_none(world, [&] { return chosen_cases(options, study); });
-  std::optional<OutputLock> lock;
+  run.open();
   std::optional<StartsFile> starts_file;
   all_or_none(world, [&] {
-    if (!world.is_root()) return;
-    require_gnuplot();
-    make_output_folder(folder);
-    lock.emplace(folder);
-    starts_file.emplace(folder / "starts.csv");
+    if (world.is_root()) starts_file.emplace(folder / "starts.csv");
   });
 
   FileBackedArray<RegistrationRow> rows(folder);
@@ -405,19 +399,18 @@ void run_registration(const RegistrationStudyOptions& options,
   for (const StudyCase& study_case : cases) {
     const auto on_starts = [&](const CaseEvaluation& so_far) {
       if (!world.is_root()) return;
-      // From here on the results of an earlier run in this folder are incomplete.
-      remove_output(folder / "summary.json");
+      run.begin_results();
       starts_file->add(so_far.case_name, so_far.starts.starts.view());
       if (&study_case == &cases.back()) starts_file->finish();
     };
-    evaluations.push_back(options.poses_from.empty()
-                              ? evaluate_case(options, study, study_case, world, on_starts, rows)
-                              : all_or_none(world, [&] {
-                                  return world.is_root()
-                                             ? evaluate_found_poses(
-                                                   options, study, study_case, on_starts, rows)
-                                             : CaseEvaluation{};
-                                }));
+    evaluations.push_back(
+        options.poses_from.empty()
+            ? evaluate_case(options, study, study_case, run, world, on_starts, rows)
+            : all_or_none(world, [&] {
+                return world.is_root()
+                           ? evaluate_found_poses(options, study, study_case, on_starts, rows)
+                           : CaseEvaluation{};
+              }));
   }
   if (options.is_starts_only) {
     if (world.is_root()) std::cout << "starts: " << (folder / "starts.csv").string() << '\n';
@@ -438,13 +431,9 @@ void run_registration(const RegistrationStudyOptions& options,
     write_registrations(folder / "registrations.csv", rows.view());
     write_traces(folder, evaluations);
     draw_figures(options, rows.view());
-    write_reproduce_script(folder, provenance);
-    json summary = summary_json(options, study, evaluations, rows.view());
+    const json summary = summary_json(options, study, evaluations, rows.view());
     write_text_file(folder / "cases.csv", case_table(summary["renderers"]).to_text());
-    summary["provenance"] = af::to_json(provenance);
-    // Written last: when summary.json is there, everything is.
-    write_text_file(folder / "summary.json", summary.dump(2) + "\n");
-    std::filesystem::remove_all(progress_folder(folder));
+    run.finish(summary, provenance);
     print_outcome(summary, folder, world);
   });
 }

@@ -22,9 +22,7 @@
 #include "files/output_file.h"
 #include "files/sha256.h"
 #include "gold_standard/target_box.h"
-#include "run/output_lock.h"
-#include "run/provenance.h"
-#include "run/stop_request.h"
+#include "run/run_folder.h"
 #include "run/terminal.h"
 #include "study/case_gold_standard.h"
 #include "study/shared_inputs.h"
@@ -69,7 +67,8 @@ std::vector<Curve> empty_curves(const SimilarityCurvesOptions& options) {
 /// queue hold work of one duration.
 void measure_curves(std::vector<LoadedMethod>& methods,
                     const PoseFrame& gold_frame,
-                    UnfinishedWork unfinished,
+                    const RunFolder& run,
+                    const DecidingValues& decides,
                     const Communicator& world,
                     std::vector<Curve>& curves) {
   for (LoadedMethod& method : methods) {
@@ -83,10 +82,9 @@ void measure_curves(std::vector<LoadedMethod>& methods,
           std::ignore =
               method.runner.similarity_at(pose_from_parameters(gold_frame, PoseParameters()));
         });
-    unfinished.name = method.renderer;
     const std::vector<double> similarities = collected_rows<double>(
         world,
-        unfinished,
+        run.unfinished(method.renderer, decides),
         static_cast<std::int64_t>(items.size()),
         method.renderer + " similarities",
         [&](std::int64_t item) {
@@ -282,19 +280,16 @@ void run_similarity_curves(const SimilarityCurvesOptions& options,
                            const Communicator& world) {
   const std::filesystem::path& folder = options.output_folder;
   std::vector<std::string> warnings;
-  std::optional<OutputLock> lock;
   all_or_none(world, [&] {
     throw_if_any(problems(options));
-    if (world.is_root()) {
-      require_gnuplot();
-      make_output_folder(folder);
-      announce_outputs(folder,
-                       {"similarity-curves.csv", "maxima.csv", "reproduce.sh", "summary.json"});
-      lock.emplace(folder);
-    }
+    if (world.is_root()) require_gnuplot();
   });
+  RunFolder run({folder,
+                 {"similarity-curves.csv", "maxima.csv", "reproduce.sh", "summary.json"},
+                 options.resume.restarts},
+                world);
+  run.open();
   const Study study = read_study(options.study, world, &warnings);
-  listen_for_stop_requests();
   for (const std::string& text : warnings) warn(world, text);
   const StudyCase study_case =
       all_or_none(world, [&] { return study.find_case(options.case_name); });
@@ -312,25 +307,21 @@ void run_similarity_curves(const SimilarityCurvesOptions& options,
   std::vector<Curve> curves = empty_curves(options);
   measure_curves(methods,
                  PoseFrame::about(gold.room_from_ct, study_case.center_ct_mm),
-                 {progress_folder(folder),
-                  "",
-                  deciding_values(deciding_options(in_force), provenance.input_sha256),
-                  options.resume.restarts},
+                 run,
+                 deciding_values(deciding_options(in_force), provenance.input_sha256),
                  world,
                  curves);
   all_or_none(world, [&] {
     if (!world.is_root()) return;
     find_peaks(curves);
     const double radius_mm = rms_radius_mm(study_case.target_box_ct, study_case.center_ct_mm);
-    // From here on the results of an earlier run in this folder are incomplete.
-    remove_output(folder / "summary.json");
+    run.begin_results();
     write_text_file(folder / "similarity-curves.csv", curves_table(curves).to_text());
     write_text_file(folder / "maxima.csv", maxima_table(curves, radius_mm).to_text());
     draw_curve_panels(panels_of(curves),
                       "Similarity about the gold pose",
                       "similarity (" + methods.front().runner.options().final_similarity() + ")",
                       folder / "similarity-curves");
-    write_reproduce_script(folder, provenance);
     json summary = {{"format", "attenuation-fields evaluation"},
                     {"format_version", 1},
                     {"kind", "similarity-curves"},
@@ -342,10 +333,7 @@ void run_similarity_curves(const SimilarityCurvesOptions& options,
     summary["renderers"] = json::array();
     for (const std::string& renderer : options.chosen_renderers())
       summary["renderers"].push_back(renderer_json(curves, renderer, radius_mm));
-    summary["provenance"] = af::to_json(provenance);
-    // Written last: when summary.json is there, everything is.
-    write_text_file(folder / "summary.json", summary.dump(2) + "\n");
-    std::filesystem::remove_all(progress_folder(folder));
+    run.finish(summary, provenance);
     print_maxima(curves, summary["renderers"]);
     std::cout << "results: " << folder.string() << '\n';
   });

@@ -206,14 +206,12 @@ void run_error_budget(const ErrorBudgetOptions& options,
     }
     require_same_starts(runs);
     const ErrorBudget budget = budget_of(runs);
-    json summary = summary_json(runs, budget);
-    summary["provenance"] = af::to_json(provenance);
+    const json summary = summary_json(runs, budget);
     make_output_folder(options.output_folder);
     const std::string text = markdown(summary);
     write_text_file(options.output_folder / "error-budget.md", text);
     write_text_file(options.output_folder / "error-budget.csv", budget_table(budget).to_text());
-    write_reproduce_script(options.output_folder, provenance);
-    write_text_file(options.output_folder / "summary.json", summary.dump(2) + "\n");
+    write_results_last(options.output_folder / "summary.json", summary, provenance);
     std::cout << text << "results: " << options.output_folder.string() << '\n';
   });
 }

@@ -26,10 +26,8 @@
 #include "files/resource_check.h"
 #include "precompute/precompute_field.h"
 #include "register/case_loading.h"
-#include "run/output_lock.h"
 #include "run/progress_printer.h"
-#include "run/provenance.h"
-#include "run/stop_request.h"
+#include "run/run_folder.h"
 #include "run/terminal.h"
 #include "study/node_ct.h"
 #include "study/study_file.h"
@@ -118,19 +116,16 @@ std::vector<DrrComparison> compare(const FieldParametersOptions& options,
 void write_results(const FieldParametersOptions& options,
                    const std::vector<SettingResult>& results,
                    const json& difference_images,
+                   const RunFolder& run,
                    const Provenance& provenance) {
   const std::filesystem::path& folder = options.output_folder;
-  // From here on the results of an earlier run in this folder are incomplete.
-  remove_output(folder / "summary.json");
+  run.begin_results();
   json summary = write_sweep(results, folder);
-  write_reproduce_script(folder, provenance);
   summary["format"] = "attenuation-fields evaluation";
   summary["format_version"] = 1;
   summary["kind"] = "field-parameters";
   summary["difference_images"] = difference_images;
-  summary["provenance"] = af::to_json(provenance);
-  // Written last: when summary.json is there, everything is.
-  write_text_file(folder / "summary.json", summary.dump(2) + "\n");
+  run.finish(std::move(summary), provenance);
   std::cout << sweep_text(results) << "results: " << folder.string() << '\n';
 }
 
@@ -186,6 +181,7 @@ void sweep_target(const FieldParametersOptions& options,
                   const Target& target,
                   const std::filesystem::path& fields,
                   const std::string& command_line,
+                  const RunFolder& run,
                   const Communicator& world,
                   std::vector<SettingResult>& results,
                   Provenance& provenance) {
@@ -217,16 +213,11 @@ void sweep_target(const FieldParametersOptions& options,
     result.uncompressed_bytes = uncompressed_bytes_of(setting);
     read_creation(result);
     const Clock::time_point compared = Clock::now();
-    result.comparisons = compare(options,
-                                 field,
-                                 reference,
-                                 {progress_folder(options.output_folder),
-                                  field_name(setting),
-                                  deciding_values(deciding_options(options, kComparisonStage),
-                                                  {{"the field", result.info.payload_sha256},
-                                                   {"the CT", ct.facts.content_sha256}}),
-                                  options.resume.restarts},
-                                 world);
+    const DecidingValues decides = deciding_values(
+        deciding_options(options, kComparisonStage),
+        {{"the field", result.info.payload_sha256}, {"the CT", ct.facts.content_sha256}});
+    result.comparisons =
+        compare(options, field, reference, run.unfinished(field_name(setting), decides), world);
     if (is_made && &setting == &settings.front())
       announce_rest(settings,
                     std::chrono::duration<double>(compared - start).count(),
@@ -339,19 +330,17 @@ void run_field_parameters(const FieldParametersOptions& options,
                           const Communicator& world) {
   const std::filesystem::path fields =
       options.fields_folder.empty() ? options.output_folder / "fields" : options.fields_folder;
-  std::optional<OutputLock> lock;
-  const std::vector<Target> targets = all_or_none(world, [&] {
+  all_or_none(world, [&] {
     throw_if_any(problems(options));
-    if (world.is_root()) {
-      require_gnuplot();
-      make_output_folder(options.output_folder);
-      announce_outputs(options.output_folder, {"reproduce.sh", "summary.json"});
-      lock.emplace(options.output_folder);
-      make_output_folder(fields);
-    }
+    if (world.is_root()) require_gnuplot();
+  });
+  RunFolder run({options.output_folder, {"reproduce.sh", "summary.json"}, options.resume.restarts},
+                world);
+  run.open();
+  const std::vector<Target> targets = all_or_none(world, [&] {
+    if (world.is_root()) make_output_folder(fields);
     return targets_of(options);
   });
-  listen_for_stop_requests();
   Provenance provenance = {"af-evaluate field-parameters",
                            command_line,
                            to_toml(options),
@@ -360,13 +349,12 @@ void run_field_parameters(const FieldParametersOptions& options,
                            {}};
   std::vector<SettingResult> results;
   for (const Target& target : targets)
-    sweep_target(options, target, fields, command_line, world, results, provenance);
+    sweep_target(options, target, fields, command_line, run, world, results, provenance);
   const json difference_images =
       write_difference_images(results, options.reference.step_mm, options.output_folder, world);
   all_or_none(world, [&] {
     if (!world.is_root()) return;
-    write_results(options, results, difference_images, provenance);
-    std::filesystem::remove_all(progress_folder(options.output_folder));
+    write_results(options, results, difference_images, run, provenance);
   });
 }
 

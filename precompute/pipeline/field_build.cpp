@@ -39,15 +39,6 @@ std::uint64_t sum_over(const Communicator& communicator, std::uint64_t value) {
   return total[0];
 }
 
-std::vector<double> gathered(const Communicator& communicator, double value) {
-  std::vector<double> values;
-  for (const auto& bytes : communicator.all_gather(std::as_bytes(std::span(&value, 1)))) {
-    values.emplace_back();
-    std::memcpy(&values.back(), bytes.data(), sizeof(double));
-  }
-  return values;
-}
-
 /// Units that no rank holds yet, the costly ones first; the same list everywhere.
 std::vector<std::uint32_t> missing_units(const FieldBuild& build,
                                          const std::vector<std::uint64_t>& is_finished) {
@@ -111,7 +102,7 @@ void add_up(CastPhase& cast, double busy_seconds, const Communicator& communicat
   cast.rays_cast = sum_over(communicator, cast.rays_cast);
   cast.occupied_tiles_cast = sum_over(communicator, cast.occupied_tiles_cast);
   cast.units_kept = sum_over(communicator, cast.kept.size());
-  cast.busy_seconds = gathered(communicator, busy_seconds);
+  cast.busy_seconds = from_all<double>({busy_seconds}, communicator);
   communicator.sum(cast.unit_tiles);
   cast.occupied_tiles =
       std::accumulate(cast.unit_tiles.begin(), cast.unit_tiles.end(), std::uint64_t{0});
@@ -213,7 +204,8 @@ OverflowChoice choose_overflow(const FieldBuild& build, const CastPhase& cast) {
   for (std::size_t i = 0; i < std::min(kUnitsRead, cast.let_go.size()); ++i)
     if (const auto tiles = build.progress->read(build.units[cast.let_go[i]]))
       bytes += tiles->memory_bytes();
-  const auto seconds = gathered(build.communicator, bytes > 0 ? seconds_since(start) : 0.0);
+  const auto seconds =
+      from_all<double>({bytes > 0 ? seconds_since(start) : 0.0}, build.communicator);
   const double read_seconds = std::accumulate(seconds.begin(), seconds.end(), 0.0);
   bytes = sum_over(build.communicator, bytes);
   if (read_seconds > 0.0) choice.read_bytes_per_second = static_cast<double>(bytes) / read_seconds;
@@ -346,7 +338,7 @@ std::uint64_t FieldEncoder::units_resumed() const {
 }
 
 std::vector<double> FieldEncoder::busy_seconds() const {
-  return gathered(build_.communicator, busy_seconds_);
+  return from_all<double>({busy_seconds_}, build_.communicator);
 }
 
 }  // namespace af

@@ -14,7 +14,7 @@
 #include "precompute/casting/field_caster.h"
 #include "precompute/codebook/codebook_training.h"
 #include "precompute/codebook/nearest_codeword.h"
-#include "precompute/pipeline/unit_shards.h"
+#include "precompute/pipeline/unit_store.h"
 
 namespace af {
 
@@ -26,8 +26,8 @@ struct FieldBuild {
   const FieldCaster& caster;
   FieldLattice lattice;
   const std::vector<WorkUnit>& units;
-  std::vector<double> unit_costs;      ///< relative, of casting each unit; empty: all alike
-  ProgressFolder* progress = nullptr;  ///< may be null
+  std::vector<double> unit_costs;  ///< relative, of casting each unit; empty: all alike
+  UnitStore* progress = nullptr;   ///< may be null
   const Communicator& communicator;
 };
 

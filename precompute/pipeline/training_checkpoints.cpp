@@ -2,6 +2,7 @@
 #include "precompute/pipeline/training_checkpoints.h"
 
 #include <span>
+#include <utility>
 
 #include "base/error.h"
 #include "base/stored_bytes.h"
@@ -12,13 +13,9 @@ namespace {
 
 constexpr const char* kName = "training";
 
-/// Of other options: thrown away. Other faults are the caller's.
-ProgressJournal opened(const std::filesystem::path& folder, const DecidingValues& decides) {
-  try {
-    return {folder, kName, decides, false};
-  } catch (const InputError&) {
-    return {folder, kName, decides, true};
-  }
+UnfinishedWork giving_way(UnfinishedWork work) {
+  work.gives_way = true;
+  return work;
 }
 
 }  // namespace
@@ -34,18 +31,16 @@ std::optional<TrainedCodebook> training_of(std::span<const std::byte> bytes) {
   return std::nullopt;
 }
 
-TrainingJournal::TrainingJournal(const std::filesystem::path& progress_folder,
-                                 const DecidingValues& decides,
+TrainingJournal::TrainingJournal(UnfinishedWork work,
                                  std::size_t codewords,
                                  const Communicator& communicator)
-    : communicator_(communicator) {
+    : communicator_(communicator), store_(giving_way(std::move(work)), communicator) {
   std::vector<std::byte> last;
   all_or_none(communicator_, [&] {
     if (!communicator_.is_root()) return;
-    ProgressJournal journal = opened(progress_folder, decides);
-    journal.mend_and_visit(
-        [&](std::span<const std::byte> record) { last.assign(record.begin(), record.end()); });
-    shard_.emplace(progress_folder, kName, journal.run(), 0);
+    store_.visit([&](std::int64_t, std::span<const std::byte> training) {
+      last.assign(training.begin(), training.end());
+    });
   });
   communicator_.broadcast(last);
   begun_ = training_of(last);
@@ -55,8 +50,8 @@ TrainingJournal::TrainingJournal(const std::filesystem::path& progress_folder,
 void TrainingJournal::append(const TrainedCodebook& so_far) {
   all_or_none(communicator_, [&] {
     if (!communicator_.is_root()) return;
-    shard_->append(bytes_of(so_far));
-    shard_->sync();
+    store_.shard().append(static_cast<std::int64_t>(so_far.iterations.size()), {bytes_of(so_far)});
+    store_.shard().sync();
   });
 }
 

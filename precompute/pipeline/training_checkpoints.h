@@ -2,13 +2,12 @@
 #pragma once
 
 #include <cstddef>
-#include <filesystem>
 #include <optional>
 #include <vector>
 
 #include "parallel/communicator.h"
 #include "precompute/codebook/codebook_training.h"
-#include "run/progress_journal.h"
+#include "run/progress_store.h"
 
 namespace af {
 
@@ -18,10 +17,7 @@ class TrainingJournal {
   /// Collective. Opens or creates the journal. Iterations with other options are thrown away: the
   /// codebook may be changed between a stop and going on, the cast units stay. So are those whose
   /// codebook is not usable, or not of so many codewords.
-  TrainingJournal(const std::filesystem::path& progress_folder,
-                  const DecidingValues& decides,
-                  std::size_t codewords,
-                  const Communicator& communicator);
+  TrainingJournal(UnfinishedWork work, std::size_t codewords, const Communicator& communicator);
 
   /// What the last sound iteration of earlier runs gave, the same on every rank; none without one.
   [[nodiscard]] const std::optional<TrainedCodebook>& begun() const { return begun_; }
@@ -31,7 +27,7 @@ class TrainingJournal {
 
  private:
   Communicator communicator_;
-  std::optional<ProgressShard> shard_;  ///< of rank 0
+  ProgressStore store_;  ///< keys are counts of iterations
   std::optional<TrainedCodebook> begun_;
 };
 

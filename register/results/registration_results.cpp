@@ -194,7 +194,6 @@ json result_json(const RegistrationRecord& record,
   output["gold_source"] =
       record.errors.has_value() ? json(record.errors->gold_source) : json(nullptr);
   output["trace"] = trace_json(result.trace);
-  output["provenance"] = to_json(run.provenance);
   return output;
 }
 
@@ -320,8 +319,7 @@ void write_result_files(const RegistrationRecord& record,
                   record.result.room_from_ct,
                   run.case_name + ", view " + problem.views[i].view.camera.name + label,
                   folder / overlays[i]);
-  write_reproduce_script(folder, run.provenance);
-  write_text_file(folder / "result.json", result_json(record, problem, run).dump(2) + "\n");
+  write_results_last(folder / "result.json", result_json(record, problem, run), run.provenance);
 }
 
 std::string write_run(const std::vector<RegistrationRecord>& records,

@@ -10,6 +10,7 @@ af_add_check(layering ${af_checks}/layering.sh ${PROJECT_SOURCE_DIR})
 af_add_check(layering_self_test ${af_checks}/layering.sh --self-test)
 af_add_check(format ${af_checks}/format.sh ${PROJECT_SOURCE_DIR})
 af_add_check(scripts ${af_checks}/scripts.sh ${PROJECT_SOURCE_DIR})
+af_add_check(stages ${af_checks}/stages.sh ${PROJECT_SOURCE_DIR})
 af_add_check(tree ${af_checks}/tree.sh ${PROJECT_SOURCE_DIR})
 
 set(af_program_files)

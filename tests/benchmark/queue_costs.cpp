@@ -90,9 +90,9 @@ void measure_messages(const Communicator& world, int repetitions, QueueCosts& co
 
 void measure_rows(int repetitions, QueueCosts& costs) {
   const test::ScratchFolder folder;
-  const ProgressJournal journal(folder.path(), "case", {}, true);
-  ProgressShard on_rank_zero(folder.path(), "case", 0, 0);
-  ProgressShard own(folder.path(), "case", 0, 1);
+  const ProgressJournal journal({folder.path(), "case", {}});
+  ProgressShard on_rank_zero(journal.files(), {0, 0});
+  ProgressShard own(journal.files(), {0, 1});
   // Medians over rounds: now and then the disk takes its time.
   constexpr int kRows = 500;
   std::vector<RegistrationRow> kept(kRows);
@@ -100,12 +100,13 @@ void measure_rows(int repetitions, QueueCosts& costs) {
   std::vector<double> write_seconds;
   for (int round = 0; round * kRows < repetitions; ++round) {
     write_seconds.push_back(seconds_of([&] {
-      for (int i = 0; i < kRows; ++i) own.append(bytes_of(evaluation::TracedRow{some_row(i), {}}));
+      for (int i = 0; i < kRows; ++i)
+        own.append(i, {bytes_of(evaluation::TracedRow{some_row(i), {}})});
     }));
     const auto packed = bytes_of(evaluation::TracedRow{some_row(round), {}});
     receive_seconds.push_back(seconds_of([&] {
       for (RegistrationRow& row : kept) {
-        on_rank_zero.append(packed);
+        on_rank_zero.append(0, {packed});
         row = value_of<evaluation::TracedRow>(packed, "journal").row;
       }
     }));

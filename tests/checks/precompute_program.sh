@@ -160,7 +160,7 @@ slow+=(--max-translation-mm 30 --caster trilinear --step-mm 0.05)
 "$mpiexec" -n 2 --oversubscribe "$program" "${slow[@]}" -o slow.h5 >slow.txt 2>slow.err &
 job=$!
 for ((i = 0; i < 600; ++i)); do
-  [[ -n $(find . -path './slow.h5.progress/*.shard' -size +0) ]] && break
+  [[ -n $(find . -path './slow.h5.progress/*.records' -size +0) ]] && break
   sleep 0.1
 done
 kill -USR1 "$job"

@@ -12,7 +12,7 @@
 #include "fuzz/fuzz_input.h"
 #include "parallel/mpi_environment.h"
 #include "precompute/pipeline/training_checkpoints.h"
-#include "precompute/pipeline/unit_shards.h"
+#include "precompute/pipeline/unit_store.h"
 
 namespace {
 
@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 
 constexpr std::uint32_t kCodebookCrc = 7;
 constexpr std::int64_t kRaysPerUnit = 1000;
-const std::string kFirstShard = "0000-000000.shard";
+const std::string kFirstShard = "units.0000-000000.records";
 
 Communicator world() {
   static int argc = 1;
@@ -53,12 +53,11 @@ const std::vector<WorkUnit>& units() {
   return some;
 }
 
-ProgressFolder opened(bool restart = false) {
-  ProgressManifest manifest{{{"step_mm", "3"}, {"ct", "b"}}, kRaysPerUnit};
-  return {folder(), restart, manifest, world()};
+UnitStore opened() {
+  return {{folder(), "units", {{"step_mm", "3"}, {"ct", "b"}}, kRaysPerUnit}, world()};
 }
 
-std::map<std::uint32_t, UnitTiles> found_in(ProgressFolder& progress) {
+std::map<std::uint32_t, UnitTiles> found_in(UnitStore& progress) {
   std::map<std::uint32_t, UnitTiles> found;
   progress.visit_finished(units(), [&](UnitTiles tiles) {
     fuzz::require(tiles.unit_id < units().size(), "a unit that was found is one of the plan");
@@ -79,7 +78,7 @@ void read_and_go_on() {
   std::map<std::uint32_t, UnitTiles> found;
   UnitTiles more = make_unit_tiles(units()[0], std::vector<std::uint16_t>(16, 5));
   {
-    ProgressFolder progress = opened();
+    UnitStore progress = opened();
     found = found_in(progress);
     for (const WorkUnit& unit : units())
       if (const auto encoded = progress.read_encoded(unit, kCodebookCrc))
@@ -87,7 +86,7 @@ void read_and_go_on() {
     if (!found.contains(0)) progress.append(more);
   }
   if (!found.contains(0)) found.emplace(0, std::move(more));
-  ProgressFolder again = opened();
+  UnitStore again = opened();
   const auto found_again = found_in(again);
   fuzz::require(found_again.size() == found.size(), "the next run finds what this one had");
   for (const auto& [id, tiles] : found)
@@ -102,7 +101,7 @@ UnitTiles any_tiles(const WorkUnit& unit, fuzz::InputBytes& input) {
 }
 
 void append_sound_records(fuzz::InputBytes& input, std::map<std::uint32_t, UnitTiles>& appended) {
-  ProgressFolder progress = opened();
+  UnitStore progress = opened();
   for (const WorkUnit& unit : units()) {
     if (input.take_below(4) == 0) continue;
     const UnitTiles tiles = any_tiles(unit, input);
@@ -138,34 +137,35 @@ void put(std::string& bytes, T value) {
 
 /// The checksums of a record agree with what it says; its fields need not make sense.
 std::string forged_record(fuzz::InputBytes& input) {
-  constexpr std::array<const char*, 3> kMagics = {"AFUNIT01", "AFCODE01", "AFUNIT02"};
-  const std::size_t magic = input.take_below(16) % kMagics.size();
-  const auto unit = static_cast<std::uint32_t>(input.take_below(4));
-  const std::size_t tiles = units()[unit % units().size()].tile_count();
-  auto detail = magic == 1 ? kCodebookCrc : static_cast<std::uint32_t>((tiles + 63) / 64);
-  auto count = static_cast<std::uint64_t>(magic == 1 ? tiles : input.take_below(tiles + 1));
-  if (input.take_below(4) == 0) detail = input.take<std::uint32_t>();
-  if (input.take_below(4) == 0) count = input.take<std::uint64_t>();
+  constexpr std::array<const char*, 2> kMagics = {"AFRECOR4", "AFRECOR5"};
+  const std::size_t magic = input.take_below(16) == 0 ? 1 : 0;
+  auto key = static_cast<std::int64_t>(input.take_below(8));
+  const std::size_t tiles =
+      units()[static_cast<std::size_t>(key) / 2 % units().size()].tile_count();
   std::string content(fuzz::as_text(input.take_bytes(input.take_below(64))));
+  constexpr std::size_t kIndicesHeadBytes = 16;
+  auto bytes = key % 2 == 1 ? kIndicesHeadBytes + 2 * tiles
+                            : (tiles + 63) / 64 * 8 + sizeof(Tile) * input.take_below(tiles + 1);
+  if (input.take_below(4) == 0) key = input.take<std::int64_t>();
+  if (input.take_below(4) == 0) bytes = input.take<std::uint64_t>();
   constexpr std::size_t kMostBytes = 1u << 14;
-  const std::uint64_t wanted = magic == 1 ? 8 + 2 * count : 8ull * detail + sizeof(Tile) * count;
-  if (wanted <= kMostBytes) content.resize(wanted, '\x11');
+  if (bytes <= kMostBytes) content.resize(bytes, '\x11');
   std::string record = kMagics[magic];
-  put(record, unit);
-  put(record, detail);
-  put(record, count);
+  put(record, key);
+  put(record, static_cast<std::uint64_t>(bytes));
   put(record, crc32c(std::as_bytes(std::span(content))));
-  put(record, crc32c(std::as_bytes(std::span(record))));
+  const std::string journal = "units";
+  put(record, crc32c(std::as_bytes(std::span(record)), crc32c(std::as_bytes(std::span(journal)))));
   return record + content;
 }
 
 void write_shards(fuzz::InputBytes& input) {
   const std::array<std::string, 6> names = {kFirstShard,
-                                            "0001-000002.shard",
-                                            "12345-1234567.shard",
-                                            "18446744073709551615-000000.shard",
-                                            "0000-18446744073709551615.shard",
-                                            "0000-000001.shard"};
+                                            "units.0001-000002.records",
+                                            "units.12345-1234567.records",
+                                            "units.9223372036854775807-000000.records",
+                                            "units.0000-9223372036854775807.records",
+                                            "units.0000-000001.records"};
   const std::string& name = names[input.take_below(names.size())];
   if (input.take_below(8) == 7) {
     fs::create_directory(folder() / name);
@@ -194,11 +194,10 @@ void go_on_training(fuzz::InputBytes& input) {
   }
   std::vector<std::byte> bytes = bytes_of(begun);
   if (input.take_below(4) == 0) bytes[input.take_below(bytes.size())] ^= input.take<std::byte>();
-  opened(true);
-  const DecidingValues decides = {{"codewords", std::to_string(kCodewords)}};
-  { const TrainingJournal journal(folder(), decides, kCodewords, world()); }
-  ProgressShard(folder(), "training", 0, 0).append(bytes);
-  const TrainingJournal journal(folder(), decides, kCodewords, world());
+  const UnfinishedWork work = {folder(), "training", {{"codewords", std::to_string(kCodewords)}}};
+  { const TrainingJournal journal(work, kCodewords, world()); }
+  ProgressShard({work.folder, work.name}, {}).append(1, {bytes});
+  const TrainingJournal journal(work, kCodewords, world());
   TrainingShare share;
   for (std::uint16_t i = 1; i < 12; ++i) {
     NumberedTile tile{i, {}};
@@ -220,14 +219,14 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   switch (input.take_below(5)) {
     case 0:
       fs::create_directories(folder());
-      fuzz::written("progress/manifest.json", fuzz::as_text(input.rest()));
+      fuzz::written("progress/units.json", fuzz::as_text(input.rest()));
       fuzz::is_accepted([&] { opened(); });
       return 0;
     case 1: {
       std::map<std::uint32_t, UnitTiles> appended;
       append_sound_records(input, appended);
       damage(input);
-      ProgressFolder progress = opened();
+      UnitStore progress = opened();
       for (const auto& [id, tiles] : found_in(progress))
         fuzz::require(appended.contains(id) && appended.at(id).tiles == tiles.tiles,
                       "tiles are those that were appended");

@@ -117,9 +117,10 @@ void write_dicom_seeds(const fs::path& folder) {
 
 void write_other_seeds(const fs::path& folder) {
   write_seed(folder / "journal" / "manifest",
-             "\0{\"format\": \"af-progress-journal\", \"format_version\": 1, \"decides\": "
-             "{\"seed\": \"1\", \"ct\": \"0123\"}}"s);
-  write_seed(folder / "journal" / "records", "\1AFR1\4\0\0\0\1\2\3\4\5\6\7\x08"s + "abcd");
+             "\0{\"format\": \"af-progress-journal\", \"format_version\": 4, \"decides\": "
+             "{\"seed\": \"1\", \"ct\": \"0123\"}, \"plan\": 0}"s);
+  write_seed(folder / "journal" / "records",
+             "\1AFRECOR4\1\0\0\0\0\0\0\0\4\0\0\0\0\0\0\0\1\2\3\4\5\6\7\x08"s + "abcd");
   write_seed(folder / "journal" / "damaged",
              "\2\3\0\4\0abcd\0\0\5\0hello\2\0\x15\0\0\x77\x20\0\1\x44"s);
   evaluation::TracedRow traced;
@@ -164,8 +165,8 @@ void write_report_seeds(const fs::path& folder) {
 
 void write_shard_seeds(const fs::path& folder) {
   write_seed(folder / "shards" / "manifest",
-             "\0\0{\"format\": \"af-precompute-progress\", \"format_version\": 3, \"decides\": "
-             "{\"step_mm\": \"3\", \"ct\": \"b\"}, \"rays_per_unit\": 1000}"s);
+             "\0\0{\"format\": \"af-progress-journal\", \"format_version\": 4, \"decides\": "
+             "{\"step_mm\": \"3\", \"ct\": \"b\"}, \"plan\": 1000}"s);
   write_seed(folder / "shards" / "sound",
              "\1\0\1\0\2\0\3\0\x11\1\1\0\2\0\1\0\0\0\2\0\1\0\5\0\x11\1\0\0"s);
   write_seed(folder / "shards" / "damaged",

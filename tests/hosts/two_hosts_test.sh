@@ -175,7 +175,7 @@ lose_cast() {
   while [[ "$1" != -- ]]; do options+=("$1"); shift; done
   shift
   program=("$@" -o "$name")
-  lose_host "$name" '*.shard' "$enough" 300 "${options[@]}" -- "${program[@]}"
+  lose_host "$name" 'units.*.records' "$enough" 300 "${options[@]}" -- "${program[@]}"
   [[ ! -e "$name" ]] || fail "$name exists"
   on_one_host "${program[@]}" >"$name.log" 2>&1 || { tail -5 "$name.log"; fail "going on"; }
   grep -o 'resumed .*' "$name.log" | cut -c1-150 | sed 's/^/    /' || fail "$name: began anew"

@@ -53,7 +53,7 @@ class FieldBuildTest : public testing::Test {
   FieldFileInfo build(
       const std::filesystem::path& path,
       std::int64_t rays_per_unit,
-      ProgressFolder* progress = nullptr,
+      UnitStore* progress = nullptr,
       const StopRequested& stop = [] { return false; }) {
     const auto units = plan_units(light_slab_.lattice(), {rays_per_unit});
     const FieldBuild build = build_of(units, progress);
@@ -81,8 +81,7 @@ class FieldBuildTest : public testing::Test {
     return info;
   }
 
-  [[nodiscard]] FieldBuild build_of(const std::vector<WorkUnit>& units,
-                                    ProgressFolder* progress) const {
+  [[nodiscard]] FieldBuild build_of(const std::vector<WorkUnit>& units, UnitStore* progress) const {
     return {caster_,
             light_slab_.lattice(),
             units,
@@ -91,19 +90,17 @@ class FieldBuildTest : public testing::Test {
             world_};
   }
 
-  [[nodiscard]] ProgressManifest manifest(std::int64_t rays_per_unit) const {
-    return {{{"step_mm", "3"}, {"ct_content_sha256", "b"}}, rays_per_unit};
+  [[nodiscard]] static UnfinishedWork work_in(const std::filesystem::path& folder,
+                                              std::int64_t rays_per_unit = kUnitRays) {
+    return {folder, "units", {{"step_mm", "3"}, {"ct_content_sha256", "b"}}, rays_per_unit};
   }
 
   /// Casts with progress until some units are done, then stops as SIGUSR1 does.
   void stop_after(const std::filesystem::path& path, std::uint64_t units_per_rank) {
-    ProgressManifest expected = manifest(kUnitRays);
-    ProgressFolder progress(path, false, expected, world_);
+    UnitStore progress(work_in(path), world_);
     std::atomic<std::uint64_t> asked = 0;
     try {
-      build("/nowhere/unused.h5", expected.rays_per_unit, &progress, [&] {
-        return asked++ >= units_per_rank;
-      });
+      build("/nowhere/unused.h5", kUnitRays, &progress, [&] { return asked++ >= units_per_rank; });
       FAIL() << "it did not stop";
     } catch (const Error& error) {
       EXPECT_EQ(error.exit_code(), ExitCode::Stopped) << error.what();
@@ -144,11 +141,9 @@ TEST_F(FieldBuildTest, PayloadIsTheSameWhereverTheTilesAreKept) {
     overflow_ = TileOverflow::CastAgain;
     EXPECT_EQ(build(folder_ / "cast-again.h5", kUnitRays).payload_sha256, kFrozenPayload);
     overflow_ = TileOverflow::ReadBack;
-    ProgressManifest expected = manifest(kUnitRays);
-    ProgressFolder progress(folder_ / "read-back.h5.progress", false, expected, world_);
+    UnitStore progress(work_in(folder_ / (std::to_string(room) + ".progress")), world_);
     EXPECT_EQ(build(folder_ / "read-back.h5", kUnitRays, &progress).payload_sha256, kFrozenPayload);
     EXPECT_EQ(units_damaged_, 0u);
-    progress.remove();
     if (room == 0)
       EXPECT_EQ(units_kept_, 0u);
     else
@@ -158,8 +153,7 @@ TEST_F(FieldBuildTest, PayloadIsTheSameWhereverTheTilesAreKept) {
 
 TEST_F(FieldBuildTest, TilesThatCannotBeReadBackAreCastAgain) {
   const auto units = plan_units(light_slab_.lattice(), {kUnitRays});
-  ProgressManifest expected = manifest(kUnitRays);
-  ProgressFolder progress(folder_ / "a.h5.progress", false, expected, world_);
+  UnitStore progress(work_in(folder_ / "a.h5.progress"), world_);
   const FieldBuild build = build_of(units, &progress);
   CastPhase cast = cast_field(build, {kSelection, 0}, [] { return false; }, {});
   const OverflowChoice choice = choose_overflow(build, cast);
@@ -169,7 +163,7 @@ TEST_F(FieldBuildTest, TilesThatCannotBeReadBackAreCastAgain) {
   world_.barrier();
   if (world_.is_root())
     for (const auto& entry : std::filesystem::directory_iterator(progress.path()))
-      if (entry.path().extension() == ".shard") std::filesystem::resize_file(entry.path(), 0);
+      if (entry.path().extension() == ".records") std::filesystem::resize_file(entry.path(), 0);
   world_.barrier();
   std::size_t mine = 0;
   for (auto blocks = encoder.next_blocks(); !blocks.empty(); blocks = encoder.next_blocks())
@@ -208,14 +202,12 @@ TEST_F(FieldBuildTest, AStoppedRunIsResumedToTheSamePayload) {
   const auto progress_path = folder_ / "a.h5.progress";
   stop_after(progress_path, 2);
   stop_after(progress_path, 3);
-  ProgressManifest expected = manifest(999);  // another plan, as another rank count would make
-  ProgressFolder progress(progress_path, false, expected, world_);
-  EXPECT_EQ(expected.rays_per_unit, kUnitRays);
-  EXPECT_EQ(build(folder_ / "a.h5", expected.rays_per_unit, &progress).payload_sha256,
+  // Another plan, as another rank count would make.
+  UnitStore progress(work_in(progress_path, 999), world_);
+  EXPECT_EQ(progress.rays_per_unit(), kUnitRays);
+  EXPECT_EQ(build(folder_ / "a.h5", progress.rays_per_unit(), &progress).payload_sha256,
             kFrozenPayload);
   EXPECT_GE(units_resumed_, 5u);
-  progress.remove();
-  EXPECT_FALSE(std::filesystem::exists(progress_path));
 }
 
 TEST_F(FieldBuildTest, DamagedAndTornShardsAreCastAgain) {
@@ -224,7 +216,7 @@ TEST_F(FieldBuildTest, DamagedAndTornShardsAreCastAgain) {
   if (world_.is_root()) {
     int shard = 0;
     for (const auto& entry : std::filesystem::directory_iterator(progress_path)) {
-      if (entry.path().extension() != ".shard") continue;
+      if (entry.path().extension() != ".records") continue;
       const auto size = std::filesystem::file_size(entry.path());
       if (shard++ == 0) {
         std::filesystem::resize_file(entry.path(), size - 5);  // torn at the end
@@ -235,23 +227,21 @@ TEST_F(FieldBuildTest, DamagedAndTornShardsAreCastAgain) {
         std::ofstream(entry.path(), std::ios::app) << "garbage that is no record header at all";
       }
     }
-    std::ofstream(progress_path / "0009-000000.shard");
+    std::ofstream(progress_path / "units.0009-000000.records");
   }
   world_.barrier();
-  ProgressManifest expected = manifest(kUnitRays);
-  ProgressFolder progress(progress_path, false, expected, world_);
-  EXPECT_EQ(build(folder_ / "a.h5", expected.rays_per_unit, &progress).payload_sha256,
-            kFrozenPayload);
+  UnitStore progress(work_in(progress_path), world_);
+  EXPECT_EQ(build(folder_ / "a.h5", kUnitRays, &progress).payload_sha256, kFrozenPayload);
   EXPECT_GE(units_resumed_, 1u);
 }
 
-TEST_F(FieldBuildTest, ProgressOfOtherOptionsIsRefusedByNameAndRestartThrowsItAway) {
+TEST_F(FieldBuildTest, ProgressOfOtherOptionsIsRefusedByName) {
   const auto progress_path = folder_ / "a.h5.progress";
   stop_after(progress_path, 2);
-  ProgressManifest other = manifest(kUnitRays);
+  UnfinishedWork other = work_in(progress_path);
   other.decides["step_mm"] = "4";
   try {
-    const ProgressFolder refused(progress_path, false, other, world_);
+    const UnitStore refused(other, world_);
     FAIL() << "it was accepted";
   } catch (const Error& error) {
     EXPECT_EQ(error.exit_code(), ExitCode::Input);
@@ -259,32 +249,27 @@ TEST_F(FieldBuildTest, ProgressOfOtherOptionsIsRefusedByNameAndRestartThrowsItAw
               std::string::npos)
         << error.what();
   }
-  world_.barrier();
-  ProgressFolder fresh(progress_path, true, other, world_);
-  fresh.visit_finished(plan_units(light_slab_.lattice(), {kUnitRays}),
-                       [](const UnitTiles&) { ADD_FAILURE() << "a unit is left"; });
 }
 
 TEST_F(FieldBuildTest, ProgressOfRefusedOptionsGivesWayToOthersAndIsUsedByTheSame) {
   const auto progress_path = folder_ / "a.h5.progress";
   const auto units = plan_units(light_slab_.lattice(), {kUnitRays});
   const auto units_found = [&](const std::string& step_mm) {
-    ProgressManifest wanted = manifest(kUnitRays);
+    UnfinishedWork wanted = work_in(progress_path);
     wanted.decides["step_mm"] = step_mm;
-    ProgressFolder progress(progress_path, false, wanted, world_);
+    UnitStore progress(wanted, world_);
     std::array<std::uint64_t, 1> found{};
     progress.visit_finished(units, [&](const UnitTiles&) { ++found[0]; });
     world_.sum(found);
     return found[0];
   };
   stop_after(progress_path, 2);
-  ProgressManifest same = manifest(kUnitRays);
-  ProgressFolder(progress_path, false, same, world_).give_way();
+  UnitStore(work_in(progress_path), world_).give_way();
   world_.barrier();
   EXPECT_GT(units_found("3"), 0u);
   EXPECT_THROW(units_found("4"), Error);  // it has been taken up again
   world_.barrier();
-  ProgressFolder(progress_path, false, same, world_).give_way();
+  UnitStore(work_in(progress_path), world_).give_way();
   world_.barrier();
   EXPECT_EQ(units_found("4"), 0u);
 }
@@ -293,11 +278,10 @@ TEST_F(FieldBuildTest, ADamagedManifestIsAFileError) {
   const auto progress_path = folder_ / "a.h5.progress";
   stop_after(progress_path, 1);
   for (const char* text : {"", "{", "{\"format\": 3}", "[1, 2]"}) {
-    if (world_.is_root()) std::ofstream(progress_path / "manifest.json") << text;
+    if (world_.is_root()) std::ofstream(progress_path / "units.json") << text;
     world_.barrier();
-    ProgressManifest expected = manifest(kUnitRays);
     try {
-      const ProgressFolder refused(progress_path, false, expected, world_);
+      const UnitStore refused(work_in(progress_path), world_);
       ADD_FAILURE() << text << " was accepted";
     } catch (const Error& error) {
       EXPECT_EQ(error.exit_code(), ExitCode::File) << error.what();
@@ -326,26 +310,26 @@ TEST_F(FieldBuildTest, TrainingIsKeptForTheSameOptionsOnly) {
   training.codebook.codewords = {Tile{}, Tile{1, 2, 3}};
   training.training_tiles = 70;
   training.iterations = {{500, 60, 1}, {400, 50, 0}};
-  const DecidingValues decides = {{"codewords", "2"}};
-  EXPECT_FALSE(TrainingJournal(folder_ / "progress", decides, 2, world_).begun().has_value());
-  TrainingJournal(folder_ / "progress", decides, 2, world_).append(training);
-  const auto begun = TrainingJournal(folder_ / "progress", decides, 2, world_).begun();
+  const UnfinishedWork work = {folder_ / "progress", "training", {{"codewords", "2"}}};
+  EXPECT_FALSE(TrainingJournal(work, 2, world_).begun().has_value());
+  TrainingJournal(work, 2, world_).append(training);
+  const auto begun = TrainingJournal(work, 2, world_).begun();
   ASSERT_TRUE(begun.has_value());
   EXPECT_EQ(begun->codebook.codewords, training.codebook.codewords);
   EXPECT_EQ(begun->training_tiles, 70u);
   ASSERT_EQ(begun->iterations.size(), 2u);
   EXPECT_EQ(begun->iterations[1].training_squared_error, 400u);
-  const TrainingJournal other(folder_ / "progress", {{"codewords", "3"}}, 3, world_);
+  const TrainingJournal other({work.folder, work.name, {{"codewords", "3"}}}, 3, world_);
   EXPECT_FALSE(other.begun().has_value());
 }
 
 TEST_F(FieldBuildTest, ATrainingWithAnotherCodebookThanItSaysIsThrownAway) {
-  const DecidingValues decides = {{"codewords", "2"}};
+  const UnfinishedWork work = {folder_ / "progress", "training", {{"codewords", "2"}}};
   const auto begun_with = [&](const std::vector<Tile>& codewords) {
     TrainedCodebook training;
     training.codebook.codewords = codewords;
-    TrainingJournal(folder_ / "progress", decides, 2, world_).append(training);
-    return TrainingJournal(folder_ / "progress", decides, 2, world_).begun().has_value();
+    TrainingJournal(work, 2, world_).append(training);
+    return TrainingJournal(work, 2, world_).begun().has_value();
   };
   EXPECT_TRUE(begun_with({Tile{}, Tile{1}}));
   EXPECT_FALSE(begun_with({Tile{}, Tile{1}, Tile{2}}));  // too many
@@ -368,15 +352,14 @@ TEST(TrainingFiles, BytesThatAreNotOfATrainingAreNone) {
 
 TEST_F(FieldBuildTest, EncodedUnitsAreReadForTheirCodebookOnly) {
   const auto units = plan_units(light_slab_.lattice(), {kUnitRays});
-  ProgressManifest expected = manifest(kUnitRays);
   const EncodedUnit encoded{std::vector<std::uint16_t>(units[1].tile_count(), 7), 99};
   constexpr std::uint32_t kCodebookCrc = 5;
   {
-    ProgressFolder progress(folder_ / "a.h5.progress", false, expected, world_);
+    UnitStore progress(work_in(folder_ / "a.h5.progress"), world_);
     if (world_.is_root()) progress.append(units[1], encoded, kCodebookCrc);
     world_.barrier();
   }
-  ProgressFolder progress(folder_ / "a.h5.progress", false, expected, world_);
+  UnitStore progress(work_in(folder_ / "a.h5.progress"), world_);
   progress.visit_finished(units, [](const UnitTiles&) { ADD_FAILURE() << "no tiles were kept"; });
   const auto read = progress.read_encoded(units[1], kCodebookCrc);
   ASSERT_TRUE(read.has_value());
@@ -386,9 +369,9 @@ TEST_F(FieldBuildTest, EncodedUnitsAreReadForTheirCodebookOnly) {
   EXPECT_FALSE(progress.read_encoded(units[0], kCodebookCrc).has_value());
   world_.barrier();
   if (world_.is_root()) {
-    std::fstream shard(progress.path() / "0000-000000.shard",
+    std::fstream shard(progress.path() / "units.0000-000000.records",
                        std::ios::in | std::ios::out | std::ios::binary);
-    shard.seekp(41);  // behind the header and the error: in the indices
+    shard.seekp(49);  // behind the header, the error and the CRC: in the indices
     shard.put('\x5A');
   }
   world_.barrier();
@@ -397,11 +380,10 @@ TEST_F(FieldBuildTest, EncodedUnitsAreReadForTheirCodebookOnly) {
 
 TEST_F(FieldBuildTest, AUnitCastAgainForItsDamagedRecordIsFoundByTheNextRun) {
   const auto units = plan_units(light_slab_.lattice(), {kUnitRays});
-  ProgressManifest expected = manifest(kUnitRays);
   const UnitTiles tiles =
       make_unit_tiles(units[0], std::vector<std::uint16_t>(units[0].sample_count(), 3));
   const auto run = [&](bool appends) {
-    ProgressFolder progress(folder_ / "a.h5.progress", false, expected, world_);
+    UnitStore progress(work_in(folder_ / "a.h5.progress"), world_);
     std::array<std::uint64_t, 1> found{0};
     progress.visit_finished(units, [&](const UnitTiles&) { ++found[0]; });
     world_.sum(found);
@@ -411,13 +393,13 @@ TEST_F(FieldBuildTest, AUnitCastAgainForItsDamagedRecordIsFoundByTheNextRun) {
   };
   EXPECT_EQ(run(true), 0u);
   if (world_.is_root()) {
-    std::fstream shard(folder_ / "a.h5.progress" / "0000-000000.shard",
+    std::fstream shard(folder_ / "a.h5.progress" / "units.0000-000000.records",
                        std::ios::in | std::ios::out | std::ios::binary);
     shard.seekp(-1, std::ios::end);
     shard.put('\x5A');
     // No shards, though they are called so: a folder, and a run that none can follow.
-    std::filesystem::create_directory(folder_ / "a.h5.progress" / "0000-000009.shard");
-    std::ofstream(folder_ / "a.h5.progress" / "18446744073709551615-000000.shard") << "x";
+    std::filesystem::create_directory(folder_ / "a.h5.progress" / "units.0000-000009.records");
+    std::ofstream(folder_ / "a.h5.progress" / "units.9223372036854775807-000000.records") << "x";
   }
   world_.barrier();
   EXPECT_EQ(run(true), 0u);

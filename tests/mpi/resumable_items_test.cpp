@@ -116,7 +116,7 @@ TEST(ResumableItems, MissesWhatIsGone) {
   EXPECT_THROW(visited(items), FileError);
 }
 
-TEST(ResumableItems, RefusesOtherOptionsOnEveryRankUnlessRestarted) {
+TEST(ResumableItems, RefusesOtherOptionsOnEveryRank) {
   const Communicator world = Communicator::world();
   const test::SharedFolder folder;
   UnfinishedWork work = {folder / "p", "rows", kDecides};
@@ -132,9 +132,6 @@ TEST(ResumableItems, RefusesOtherOptionsOnEveryRankUnlessRestarted) {
     EXPECT_EQ(error.exit_code(), ExitCode::Input);
     EXPECT_THAT(error.what(), testing::HasSubstr("seed = 2"));
   }
-  work.restarts = true;
-  ResumableItems items(work, world);
-  EXPECT_EQ(completed(items, first_items(5)), 5U);
 }
 
 // Last: a stop request cannot be taken back.

@@ -72,7 +72,7 @@ class Faults : public testing::Test {
     std::uint64_t bytes = 0;
     std::error_code gone;
     for (const auto& entry : fs::directory_iterator(progress(), gone))
-      if (entry.path().extension() == ".shard") bytes += fs::file_size(entry.path(), gone);
+      if (entry.path().extension() == ".records") bytes += fs::file_size(entry.path(), gone);
     return bytes;
   }
 
@@ -159,7 +159,7 @@ TEST_F(Faults, AFullDiskWhileCastingNamesTheUnit) {
   limit_files(job.ranks(), 300'000);
   EXPECT_EQ(job.wait(kEndsWithin), 4) << said();
   EXPECT_THAT(said(),
-              ContainsRegex("rank [0-9] on .*: casting unit .*shard: cannot be written: File too "
+              ContainsRegex("rank [0-9] on .*: casting unit .*records: cannot be written: File too "
                             "large"));
   expect_going_on();
 }

@@ -66,11 +66,12 @@ struct ProgressBytes {
   std::uint64_t training = 0;  ///< iterations; rows of registrations
 };
 
-std::uint64_t bytes_of_files(const fs::path& folder, const std::string& extension) {
+std::uint64_t bytes_of_journals(const fs::path& folder, bool are_of_units) {
   std::uint64_t bytes = 0;
   std::error_code gone;
   for (const auto& entry : fs::directory_iterator(folder, gone))
-    if (entry.path().extension() == extension)
+    if (test::is_of_journal(entry.path(), "") &&
+        test::is_of_journal(entry.path(), "units.") == are_of_units)
       if (const std::uintmax_t size = fs::file_size(entry.path(), gone); !gone) bytes += size;
   return bytes;
 }
@@ -78,36 +79,24 @@ std::uint64_t bytes_of_files(const fs::path& folder, const std::string& extensio
 /// Units first: as long as there is no training after them, they are cast ones.
 ProgressBytes progress_bytes(const fs::path& folder) {
   ProgressBytes bytes;
-  bytes.units = bytes_of_files(folder, ".shard");
-  bytes.training = bytes_of_files(folder, ".records");
+  bytes.units = bytes_of_journals(folder, true);
+  bytes.training = bytes_of_journals(folder, false);
   return bytes;
 }
 
 /// Records that are whole in the progress of af-precompute, counted from the bytes.
 struct KeptWork {
-  std::set<std::uint32_t> cast;
-  std::set<std::uint32_t> encoded;
+  std::set<std::int64_t> cast;
+  std::set<std::int64_t> encoded;
   std::uint64_t iterations = 0;
 };
 
-void count_units(const std::string& shard, KeptWork& kept) {
-  constexpr std::size_t kHeaderBytes = 32;
-  for (std::size_t at = 0; at + kHeaderBytes <= shard.size();) {
-    const bool is_cast = shard.substr(at, 8) == "AFUNIT01";
-    const auto unit = test::number_at<std::uint32_t>(shard, at + 8);
-    const auto words = test::number_at<std::uint32_t>(shard, at + 12);
-    const auto count = test::number_at<std::uint64_t>(shard, at + 16);
-    at += kHeaderBytes + (is_cast ? 8 * words + 32 * count : 8 + 2 * count);
-    if (at > shard.size()) return;
-    (is_cast ? kept.cast : kept.encoded).insert(unit);
-  }
-}
-
+/// A unit has two keys: 2 n of its tiles, 2 n + 1 of its indices.
 KeptWork kept_work(const fs::path& folder) {
   KeptWork kept;
-  for (const auto& entry : fs::directory_iterator(folder))
-    if (entry.path().extension() == ".shard") count_units(read_text_file(entry.path()), kept);
-  kept.iterations = test::kept_records(folder);
+  for (const std::int64_t key : test::kept_keys(folder, "units."))
+    (key % 2 == 0 ? kept.cast : kept.encoded).insert(key / 2);
+  kept.iterations = test::kept_records(folder, "training.");
   return kept;
 }
 

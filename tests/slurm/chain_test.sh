@@ -95,7 +95,7 @@ submit "$disturbed" >"$scratch/second.log" 2>&1 || refused=$?
 if ((refused != 3)) || ! grep -q 'still in the queue' "$scratch/second.log"; then
   fail "a second chain in the same folder was not refused"
 fi
-stop_job af-precompute-1 "$disturbed/fields/patient-1-A.af.h5.progress/0000-000000.shard"
+stop_job af-precompute-1 "$disturbed/fields/patient-1-A.af.h5.progress/units.0000-000000.records"
 stop_job af-evaluate "$disturbed/registration/patient-1.progress/patient-1-field.0000-000000.records"
 wait_until "the disturbed chain" no_jobs_left
 [[ -s "$disturbed/report.html" ]] || fail "no report.html after the disturbed chain"

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "files/output_file.h"
 
@@ -18,19 +19,32 @@ T number_at(const std::string& bytes, std::size_t position) {
   return number;
 }
 
-/// Whole records of all processes and runs in a journal's folder.
-inline std::uint64_t kept_records(const std::filesystem::path& folder) {
-  std::uint64_t count = 0;
+/// Whether a file holds records of the journal of this name; of any journal, if it is empty.
+inline bool is_of_journal(const std::filesystem::path& file, const std::string& journal) {
+  return file.extension() == ".records" && file.filename().string().starts_with(journal);
+}
+
+/// The keys of the whole records of all processes and runs in a folder: of one journal, or of all.
+inline std::vector<std::int64_t> kept_keys(const std::filesystem::path& folder,
+                                           const std::string& journal = {}) {
+  std::vector<std::int64_t> keys;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-    if (entry.path().extension() != ".records") continue;
+    if (!is_of_journal(entry.path(), journal)) continue;
     const std::string records = read_text_file(entry.path());
-    constexpr std::size_t kHeaderBytes = 16;
-    for (std::size_t at = 0; at + kHeaderBytes <= records.size(); ++count) {
-      at += kHeaderBytes + number_at<std::uint32_t>(records, at + 4);
+    constexpr std::size_t kHeaderBytes = 32;
+    for (std::size_t at = 0; at + kHeaderBytes <= records.size();) {
+      const auto key = number_at<std::int64_t>(records, at + 8);
+      at += kHeaderBytes + number_at<std::uint64_t>(records, at + 16);
       if (at > records.size()) break;
+      keys.push_back(key);
     }
   }
-  return count;
+  return keys;
+}
+
+inline std::uint64_t kept_records(const std::filesystem::path& folder,
+                                  const std::string& journal = {}) {
+  return kept_keys(folder, journal).size();
 }
 
 }  // namespace af::test

@@ -115,13 +115,12 @@ void run(const SimulateOptions& options,
   inform(world, "Writing the study");
   simulated.study_case.ct = ct_of_study(options, imaged.ct, simulated, folder.path());
 
-  Provenance provenance;
-  provenance.program = "af-simulate";
-  provenance.command_line = command_line;
-  provenance.options_toml = to_toml(options);
-  provenance.seed = options.seed;
-  provenance.rank_count = world.size();
-  provenance.input_sha256["ct_content"] = ct_content_sha256(imaged.ct);
+  const Provenance provenance = {"af-simulate",
+                                 command_line,
+                                 to_toml(options),
+                                 options.seed,
+                                 world.size(),
+                                 {{"ct_content", ct_content_sha256(imaged.ct)}}};
   write_study_files(options, rig, simulated, provenance, folder.path());
   folder.commit();
   inform(world, summary(simulated, folder.final_path()));

@@ -1,0 +1,167 @@
+# shellcheck shell=bash
+# SPDX-License-Identifier: Apache-2.0
+# Stages of a study: each is one command, and is done again only when what it is made from has changed. Every script of
+# jobs/ that runs several commands sources this file, after lib.sh. jobs/slurm/stage.sbatch sources it alone, because a
+# batch job sees no other file of jobs/; it runs its command itself, and calls nothing below `open_output`.
+
+# What the next stage depends on beyond its words; the caller sets it.
+stage_inputs=""
+# yes: every stage depends on all before it, too.
+stages_are_a_chain=no
+# yes: a new build of the programs makes no difference.
+stages_of_any_build=no
+# yes: a stage whose inputs have changed starts from nothing. no: the program refuses to go on with unfinished work of
+# other options, and says so.
+stages_start_anew=no
+
+# stage_key INPUTS COMMAND...: a hash of what a stage is made from.
+stage_key() {
+  local program=$2
+  [[ "$program" != run_ranks ]] || program=$4
+  {
+    printf '%s\n' "$@"
+    [[ "$stages_of_any_build" == yes ]] || sha256sum <"$program"
+  } | sha256sum | cut -d ' ' -f 1
+}
+
+# is_stage_done STAMP KEY RESULT
+is_stage_done() { [[ -f "$1.done" && "$(<"$1.done")" == "$2" && -e "$3" ]]; }
+
+# mark_stage STAMP KEY STATE: STATE is done or started.
+mark_stage() {
+  printf '%s\n' "$2" >"$1.partial"
+  mv "$1.partial" "$1.$3"
+}
+
+# value_of OPTION WORDS...: the word after OPTION, if it is there.
+value_of() {
+  local option=$1
+  shift
+  while (($# > 1)); do
+    if [[ "$1" == "$option" ]]; then
+      echo "$2"
+      return
+    fi
+    shift
+  done
+}
+
+# result_of COMMAND...: the file that exists when the command has done all of its work.
+result_of() {
+  local output
+  output=$(value_of -o "$@")
+  [[ " $* " != *" registration "* ]] || output+=/summary.json
+  echo "$output"
+}
+
+# progress_of COMMAND...: the folder of its unfinished work.
+progress_of() { echo "$(value_of -o "$@").progress"; }
+
+# bytes_in FOLDER: the size of all files together; 0 when there is none.
+bytes_in() { { find "$1" -type f -printf '%s\n' 2>/dev/null || true; } | awk '{sum += $1} END {print sum + 0}'; }
+
+# state_of PATH...: name, size and time of a file (also of the voxels beside a header) or of all files of a folder; for
+# a missing file, that it is missing.
+state_of() {
+  local path paths
+  for path in "$@"; do
+    paths=("$path")
+    [[ "$path" != *.mhd && "$path" != *.nhdr ]] || paths=("${path%.*}".*)
+    find -L "${paths[@]}" -type f -printf '%p %s %T@\n' 2>&1 | LC_ALL=C sort || true
+  done
+}
+
+# inputs_of AF_INSPECT COMMAND...: a hash of the study, of the state of its case's CT, X-rays, masks and rig, and of the
+# fields that the command reads.
+inputs_of() {
+  local inspect=$1 study case_name lines name path paths=()
+  shift
+  study=$(value_of --study "$@")
+  case_name=$(value_of --case "$@")
+  lines=$("$inspect" --list-inputs "$study") || return
+  while IFS=$'\t' read -r name path; do
+    [[ "$name" != "$case_name" ]] || paths+=("$path")
+  done <<<"$lines"
+  while (($# > 1)); do
+    [[ "$1" != --field ]] || paths+=("${2#*=}")
+    shift
+  done
+  { sha256sum <"$study" && state_of "${paths[@]}"; } | sha256sum
+}
+
+# open_output DIR: makes the folder, sets output to its full path and keeps other runs out of it.
+open_output() {
+  mkdir -p "$1/.stages" "$1/logs"
+  output="$(cd "$1" && pwd)"
+  exec {output_lock}>"$output/.stages/lock"
+  flock --nonblock "$output_lock" || die 3 "another run is at work in $output"
+  trap 'tell_of_stop $?' EXIT
+}
+
+# stage_title: what a stage is called on the screen, if not by its name. stage_report: lines of what was done, and how
+# long it took.
+stage_title="" current_stage="" stage_report=()
+
+# tell_of_stop STATUS: on the way out.
+tell_of_stop() {
+  if (($1 == 130 || $1 == 143)) && [[ -n "$current_stage" ]]; then
+    printf '\nStopped in stage "%s". Run the same command again to go on.\n' "$current_stage" >&2
+  fi
+}
+
+# forget_stage COMMAND...: removes what another command has made, or begun, in place of this one's output.
+forget_stage() {
+  local old
+  old=$(value_of -o "$@")
+  [[ -z "$old" ]] || rm -rf "$old" "$old.progress" "$old.partial"
+}
+
+# run_logged LOG COMMAND...: its output goes to LOG, below the command, and indented to the screen.
+run_logged() {
+  local log=$1
+  shift
+  { printf '# ' && printf '%q ' "$@" && printf '\n'; } >"$log"
+  "$@" </dev/null 2>&1 | tee -a "$log" | sed -u 's/^/        /'
+  return "${PIPESTATUS[0]}"
+}
+
+# stage NAME RESULT COMMAND...: runs a command unless it made RESULT before with the same words, from the same
+# stage_inputs. An interrupted stage keeps its output, from which the program goes on.
+stage() {
+  local title=${stage_title:-$1} name=${1//[\/ ]/-} result=$2 start=$SECONDS status=0 key
+  shift 2
+  local stamp="$output/.stages/$name" log="$output/logs/$name.log"
+  key=$(stage_key "$stage_inputs" "$@")
+  [[ "$stages_are_a_chain" == no ]] || stage_inputs=$key
+  if is_stage_done "$stamp" "$key" "$result"; then
+    say "$title: done before"
+    return
+  fi
+  rm -f "$stamp.done"
+  if [[ "$stages_start_anew" == yes && "$(cat "$stamp.started" 2>/dev/null)" != "$key" ]]; then
+    forget_stage "$@"
+  fi
+  mark_stage "$stamp" "$key" started
+  current_stage=$title
+  say "$title"
+  run_logged "$log" "$@" || status=$?
+  end_stage "$status" "$@"
+  [[ -e "$result" ]] || die 6 "$title ended without its output $result; its log is $log"
+  mark_stage "$stamp" "$key" "done"
+  current_stage=""
+  say "        $(duration $((SECONDS - start)))"
+  stage_report+=("$(printf '  %-76s %s' "$title" "$(duration $((SECONDS - start)))")")
+}
+
+# end_stage STATUS COMMAND...: ends the script, unless the command has done its work.
+end_stage() {
+  local status=$1
+  shift
+  if ((status == 7)) && [[ "$(basename "$1")" == af-register ]]; then
+    say "        Nothing was found; the results say why: $(value_of -o "$@")"
+  elif ((status == 75)); then
+    die 75 "$current_stage was stopped with its progress saved: run the same command again"
+  elif ((status != 0)); then
+    die "$status" "$current_stage failed with exit code $status; its log is $log"
+  fi
+}
