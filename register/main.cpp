@@ -35,7 +35,9 @@ void run(const RegisterOptions& options,
   const RegistrationOptions method = af::all_or_none(world, [&] {
     af::throw_if_any(problems(options));
     if (world.is_root()) af::announce_outputs(options.output_folder, result_file_names());
-    return resolve(options.method);
+    RegistrationOptions resolved = resolve(options.method);
+    resolved.correction = options.correction;
+    return resolved;
   });
   std::vector<std::string> study_warnings;
   const af::Study study = af::read_study(options.study, world, &study_warnings);
@@ -46,7 +48,8 @@ void run(const RegisterOptions& options,
       af::shared_poses(world, [&] { return start_poses(options, study_case.frame()); });
   const auto gold = af::all_or_none(world, [&] { return known_gold(study, study_case); });
   const auto pool = std::make_shared<af::ThreadPool>(af::thread_count(options.method.threads));
-  CaseLoadOptions load_options = case_load_options(options, method.coarsest_level());
+  CaseLoadOptions load_options =
+      case_load_options(options, method.coarsest_level(), method.last_levels());
   load_options.judging_level = PoseExaminer::coarsest_level();
   load_options.pool = pool;
   const LoadedCase loaded = [&] {

@@ -27,6 +27,8 @@ struct PlainRecord {
   int inadmissible;
   int stop_reason;
   int view_count;
+  bool has_correction;
+  CorrectionReport correction;
 };
 static_assert(std::is_trivially_copyable_v<PlainRecord>);
 
@@ -61,7 +63,9 @@ PlainRecord plain(const RegistrationRecord& record) {
           result.evaluations,
           result.inadmissible,
           static_cast<int>(result.stop_reason),
-          static_cast<int>(record.view_values.size())};
+          static_cast<int>(record.view_values.size()),
+          result.correction.has_value(),
+          result.correction.value_or(CorrectionReport())};
 }
 
 RegistrationRecord record_of(const PlainRecord& from) {
@@ -77,6 +81,7 @@ RegistrationRecord record_of(const PlainRecord& from) {
   result.evaluations = from.evaluations;
   result.inadmissible = from.inadmissible;
   result.stop_reason = static_cast<StopReason>(from.stop_reason);
+  if (from.has_correction) result.correction = from.correction;
   return record;
 }
 
