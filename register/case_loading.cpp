@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "base/joined.h"
+#include "base/number_text.h"
 #include "drr/field_level.h"
 #include "drr/ray_cast_drr.h"
 #include "drr/two_pass_af_drr.h"
@@ -31,6 +32,10 @@ constexpr double kCameraToleranceMm = 1e-3;
 
 /// Half the side of the cube about the ROI centre that stands for the CT when it is not read.
 constexpr double kAssumedCtHalfSideMm = 100.0;
+
+/// Points of the target box whose mean motion tells whether a corrected pose stands still: 64 cells
+/// give the mean over the box to a few percent.
+constexpr int kTargetPointsPerAxis = 4;
 
 /// Spacing of nodes of the field whose levels ray casting imitates when there is none: about that
 /// of the paper's field of a head or a spine.
@@ -177,8 +182,19 @@ std::shared_ptr<const AttenuationVolume> blurred_per_node(const AttenuationVolum
       blur.grid(), volume.model(), SharedArray<std::uint16_t>(owner, {voxels, count}));
 }
 
-/// Collective. Levels 1 ... coarsest_level of ray casting: the CT blurred as the fields' levels
-/// blur DRRs, sampled twice per sigma.
+/// Collective. A level of ray casting: the CT blurred as the fields' level blurs DRRs, sampled
+/// twice per sigma.
+std::shared_ptr<const DrrRenderer> coarse_ray_cast(const AttenuationVolume& volume,
+                                                   double sigma_mm,
+                                                   const CaseLoadOptions& options,
+                                                   const Communicator& communicator) {
+  RayCasterOptions caster = options.ray_caster;
+  caster.step_mm = std::max(caster.step_mm, 0.5 * sigma_mm);
+  return std::make_shared<const RayCastDrr>(
+      blurred_per_node(volume, sigma_mm, communicator), caster, options.pool);
+}
+
+/// Collective. Levels 1 ... coarsest_level of ray casting.
 std::vector<RendererLevel> coarse_ray_casts(const AttenuationVolume& volume,
                                             const CaseLoadOptions& options,
                                             const Communicator& communicator) {
@@ -189,24 +205,41 @@ std::vector<RendererLevel> coarse_ray_casts(const AttenuationVolume& volume,
     const double sigma_mm = at < options.level_blur_sigma_mm.size()
                                 ? options.level_blur_sigma_mm[at]
                                 : kAssumedNodeMm * level_blur_sigma_in_nodes(level, true);
-    const auto blurred = blurred_per_node(volume, sigma_mm, communicator);
-    RayCasterOptions caster = options.ray_caster;
-    caster.step_mm = std::max(caster.step_mm, 0.5 * sigma_mm);
-    levels.push_back({std::make_shared<const RayCastDrr>(blurred, caster, options.pool), sigma_mm});
+    levels.push_back({coarse_ray_cast(volume, sigma_mm, options, communicator), sigma_mm});
   }
   return levels;
+}
+
+/// Rays are cast through the attenuation that the field was made with.
+void require_same_attenuation(const FieldIdentity& field,
+                              const CaseLoadOptions& options,
+                              const std::string& path) {
+  const auto text = [](double water, int air) {
+    return number_text(water) + " per mm, air below " + std::to_string(air) + " HU";
+  };
+  const AttenuationModel& model = options.attenuation;
+  if (options.correction_levels.empty() ||
+      (model.mu_water_per_mm == field.mu_water_per_mm && model.air_below_hu == field.air_below_hu))
+    return;
+  throw InputError(
+      "attenuation of water",
+      text(model.mu_water_per_mm, model.air_below_hu),
+      "with --correct it must be the field's, " + text(field.mu_water_per_mm, field.air_below_hu),
+      path);
 }
 
 /// Collective. A field, checked against the view's camera and the CT.
 std::shared_ptr<const CompressedAttenuationField> field_of_view(const std::string& path,
                                                                 const StudyCase& study_case,
                                                                 const RegistrationView& view,
+                                                                const CaseLoadOptions& options,
                                                                 const std::optional<CtFacts>& ct,
                                                                 const Communicator& communicator,
                                                                 FieldFileInfo& info) {
   auto field = read_field(path, communicator, &info);
   all_or_none(communicator, [&] {
     require_same_camera(field->identity.camera, view.view.camera, path);
+    require_same_attenuation(field->identity, options, path);
     if (ct.has_value() && ct->content_sha256 != field->identity.ct_content_sha256)
       throw FileError(path,
                       "CT of the field (ct_content_sha256)",
@@ -232,13 +265,48 @@ void use_fields(const StudyCase& study_case,
     FieldFileInfo info;
     const auto field =
         used_from(is_of_study ? study_case.views[i].places : StudyPlaces(), "field", [&] {
-          return field_of_view(path, study_case, view, ct, communicator, info);
+          return field_of_view(path, study_case, view, options, ct, communicator, info);
         });
     view.renderer = std::make_shared<const TwoPassAfDrr>(field, TwoPassOptions{}, options.pool);
     view.coarse_levels = coarse_field_levels(*field, options, communicator);
     view.limit = MotionLimit{field->identity.frame, field->identity.range};
     input_sha256["field " + view.view.camera.name] = info.payload_sha256;
   }
+}
+
+/// Blur of a level, mean over the views, mm.
+double mean_blur_mm(const RegistrationProblem& problem, int level) {
+  double sum = 0.0;
+  for (const RegistrationView& view : problem.views)
+    sum += view.coarse_levels[static_cast<std::size_t>(level) - 1].blur_sigma_mm;
+  return sum / static_cast<double>(problem.views.size());
+}
+
+/// Collective. Ray casting beside the fields, at the levels that a correction needs.
+void add_ray_casts(const AttenuationVolume& volume,
+                   const std::shared_ptr<const DrrRenderer>& renderer,
+                   const CaseLoadOptions& options,
+                   const Communicator& communicator,
+                   RegistrationProblem& problem) {
+  for (const int level : options.correction_levels) {
+    const auto ray_cast =
+        level == 0 ? renderer
+                   : coarse_ray_cast(volume, mean_blur_mm(problem, level), options, communicator);
+    for (RegistrationView& view : problem.views) {
+      view.ray_casts.resize(static_cast<std::size_t>(level) + 1);
+      view.ray_casts.back() = ray_cast;
+    }
+  }
+}
+
+/// Collective. The CT's attenuation, for ray casting.
+NodeCt read_node_ct(const StudyCase& study_case,
+                    const CaseLoadOptions& options,
+                    const Communicator& communicator,
+                    std::vector<std::string>& warnings) {
+  return used_from(study_case.places, "ct", [&] {
+    return read_ct_per_node(study_case.ct, options.ct, options.attenuation, communicator, warnings);
+  });
 }
 
 }  // namespace
@@ -291,27 +359,31 @@ LoadedCase load_case(const Study& study,
   problem->views =
       read_views(study, study_case, options.fiducial_mask_mm, communicator, loaded.input_sha256);
 
+  problem->target_points_ct = ct_lattice_points(study_case.target_box_ct, kTargetPointsPerAxis);
+  const bool looks_up = options.renderer == RendererKind::Field;
   std::optional<CtFacts> ct;
-  if (options.renderer == RendererKind::RayCast) {
-    const NodeCt node_ct = used_from(study_case.places, "ct", [&] {
-      return read_ct_per_node(
-          study_case.ct, options.ct, options.attenuation, communicator, loaded.warnings);
-    });
+  std::shared_ptr<const AttenuationVolume> volume;
+  std::shared_ptr<const DrrRenderer> ray_cast;
+  if (!looks_up || !options.correction_levels.empty()) {
+    const NodeCt node_ct = read_node_ct(study_case, options, communicator, loaded.warnings);
     ct = node_ct.facts;
-    const auto renderer =
-        std::make_shared<const RayCastDrr>(node_ct.volume, options.ray_caster, options.pool);
-    const auto levels = coarse_ray_casts(*node_ct.volume, options, communicator);
-    for (RegistrationView& view : problem->views) {
-      view.renderer = renderer;
-      view.coarse_levels = levels;
-    }
+    volume = node_ct.volume;
+    ray_cast = std::make_shared<const RayCastDrr>(volume, options.ray_caster, options.pool);
   } else if (!options.skip_ct_check) {
     ct = used_from(study_case.places, "ct", [&] {
       return read_ct_facts(study_case.ct, options.ct, communicator, loaded.warnings);
     });
   }
-  if (options.renderer == RendererKind::Field)
+  if (looks_up) {
     use_fields(study_case, options, communicator, ct, *problem, loaded.input_sha256);
+    if (volume) add_ray_casts(*volume, ray_cast, options, communicator, *problem);
+  } else {
+    const auto levels = coarse_ray_casts(*volume, options, communicator);
+    for (RegistrationView& view : problem->views) {
+      view.renderer = ray_cast;
+      view.coarse_levels = levels;
+    }
+  }
 
   if (ct.has_value()) {
     loaded.input_sha256["ct"] = ct->content_sha256;

@@ -37,6 +37,8 @@ struct CaseLoadOptions {
   /// Ray casting: blurs of levels 1, 2, ..., in mm on the isocentre plane; of missing ones, those
   /// of a field with 1 mm between its nodes.
   std::vector<double> level_blur_sigma_mm;
+  /// With fields: levels that are cast, too, for a correction: RegistrationOptions::last_levels().
+  std::vector<int> correction_levels;
   /// Threads that make the levels together; none: only the calling thread.
   std::shared_ptr<ThreadPool> pool = nullptr;
 };
@@ -51,8 +53,9 @@ struct LoadedCase {
 /// X-rays and masks (on every rank), fields or the CT's attenuation, and their coarser levels, held
 /// once per node. The levels of ray casting are the CT, blurred as the levels of fields blur DRRs.
 /// With fields the CT is read by rank 0 alone, for its hash and grid (skip_ct_check: not at all;
-/// steps are then scaled as if it filled 200 mm about the ROI centre). FileError (exit 4) when a
-/// field was made from another CT (both hashes are named) or for another camera (geometry to 1e-3
+/// steps are then scaled as if it filled 200 mm about the ROI centre), unless a correction casts
+/// rays through it: its attenuation must then be the fields' (InputError). FileError (exit 4) when
+/// a field was made from another CT (both hashes are named) or for another camera (geometry to 1e-3
 /// mm); InputError when a view has no field or the field's range does not hold the nominal pose.
 LoadedCase load_case(const Study& study,
                      const StudyCase& study_case,

@@ -32,7 +32,9 @@ void run(const RegisterOptions& options,
   using namespace af::registration;
   const RegistrationOptions method = af::all_or_none(world, [&] {
     af::throw_if_any(problems(options));
-    return resolve(options.method);
+    RegistrationOptions resolved = resolve(options.method);
+    resolved.correction = options.correction;
+    return resolved;
   });
   af::RunFolder folder({options.output_folder, result_file_names(), options.resume.restarts},
                        world);
@@ -45,7 +47,8 @@ void run(const RegisterOptions& options,
       af::shared_poses(world, [&] { return start_poses(options, study_case.frame()); });
   const auto gold = af::all_or_none(world, [&] { return known_gold(study, study_case); });
   const auto pool = std::make_shared<af::ThreadPool>(af::thread_count(options.method.threads));
-  CaseLoadOptions load_options = case_load_options(options, method.coarsest_level());
+  CaseLoadOptions load_options =
+      case_load_options(options, method.coarsest_level(), method.last_levels());
   load_options.judging_level = PoseExaminer::coarsest_level();
   load_options.pool = pool;
   const LoadedCase loaded = [&] {

@@ -43,6 +43,7 @@ void RegisterOptions::describe(Fields& field) {
       .choice({"field", "raycast"});
   field.part(method);
   field.at("seed").as("--seed");
+  field.part(correction);
   describe_start(field, *this);
   field.part(attenuation);
   field.at("water_mu_per_mm").help =
@@ -81,11 +82,19 @@ std::vector<std::string> problems(const RegisterOptions& options) {
         if (!std::isfinite(value)) found.emplace_back("start = not finite: must be finite numbers");
   if (options.skip_ct_check && options.renderer == "raycast")
     found.emplace_back("--skip-ct-check = set: ray casting needs the CT; leave it out");
+  if (options.correction.is_wanted && options.skip_ct_check)
+    found.emplace_back(
+        "--correct = set: must not be given with --skip-ct-check, because it casts rays through "
+        "the CT");
+  if (options.correction.is_wanted && options.renderer == "raycast")
+    found.emplace_back(kCorrectsRayCasting);
   for (const std::string& text : field_problems(options)) found.push_back(text);
   return found;
 }
 
-CaseLoadOptions case_load_options(const RegisterOptions& options, int coarsest_level) {
+CaseLoadOptions case_load_options(const RegisterOptions& options,
+                                  int coarsest_level,
+                                  const std::vector<int>& last_levels) {
   CaseLoadOptions result;
   result.coarsest_level = coarsest_level;
   result.renderer = options.renderer == "raycast" ? RendererKind::RayCast : RendererKind::Field;
@@ -95,6 +104,7 @@ CaseLoadOptions case_load_options(const RegisterOptions& options, int coarsest_l
   result.ray_caster = options.ray_caster;
   result.skip_ct_check = options.skip_ct_check;
   result.fiducial_mask_mm = options.method.fiducial_mask_mm;
+  if (options.correction.is_wanted) result.correction_levels = last_levels;
   return result;
 }
 

@@ -24,6 +24,7 @@ struct RegisterOptions {
   FieldPaths fields;
   std::string renderer = "field";
   MethodOptions method;
+  CorrectionOptions correction;
   std::optional<std::array<double, 3>> start_rotation_deg;
   std::optional<std::array<double, 3>> start_translation_mm;
   std::filesystem::path start_pose;
@@ -43,8 +44,10 @@ struct RegisterOptions {
 /// All impossible values and combinations of options; empty when the options are sound.
 std::vector<std::string> problems(const RegisterOptions& options);
 
-/// `coarsest_level`: of the method.
-CaseLoadOptions case_load_options(const RegisterOptions& options, int coarsest_level = 0);
+/// `coarsest_level` and `last_levels`: of the method.
+CaseLoadOptions case_load_options(const RegisterOptions& options,
+                                  int coarsest_level = 0,
+                                  const std::vector<int>& last_levels = {});
 
 /// The starts of a run: of --starts, or the one of --start-pose, or nominal with
 /// --start-rotation-deg and --start-translation-mm.

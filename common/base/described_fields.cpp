@@ -197,13 +197,13 @@ Field& Field::recorded_when_unset(std::string other_name, std::string text) {
   return *this;
 }
 
-Field& Fields::add(std::string name, FieldValue value, std::string help) {
+Field& Fields::add(const std::string& name, FieldValue value, const std::string& help) {
   Field& field = fields_.emplace_back();
   field.option = "--" + name;
   std::replace(field.option.begin(), field.option.end(), '_', '-');
-  field.name = std::move(name);
+  field.name = name;
   field.value = value;
-  field.help = std::move(help);
+  field.help = help;
   field.group = group_;
   return field;
 }
@@ -243,7 +243,9 @@ std::vector<std::string> field_problems(const Fields& fields) {
     for (const Constraint& constraint : field.constraints)
       words += (words.empty() ? "" : " and ") + constraint.words;
     const auto require = [&](bool is_accepted, const std::string& value) {
-      if (!is_accepted) found.push_back(field.name + " = " + value + ": must be " + words);
+      if (!is_accepted)
+        found.push_back(std::string(field.name).append(" = ").append(value).append(": must be ") +
+                        words);
     };
     const auto all = [&](const auto& accepts) {
       return std::all_of(field.constraints.begin(), field.constraints.end(), accepts);

@@ -136,9 +136,9 @@ concept Described = requires(T options, Fields& fields) {
 class Fields {
  public:
   template <typename T>
-  Field& operator()(std::string name, T& value, std::string help) {
+  Field& operator()(const std::string& name, T& value, const std::string& help) {
     ++own_count_;
-    return add(std::move(name), &value, std::move(help));
+    return add(name, &value, help);
   }
 
   /// The fields of a described member or base class as if they were the struct's own.
@@ -166,7 +166,7 @@ class Fields {
   [[nodiscard]] auto end() const { return fields_.end(); }
 
  private:
-  Field& add(std::string name, FieldValue value, std::string help);
+  Field& add(const std::string& name, FieldValue value, const std::string& help);
   void append(const Fields& part);
 
   std::deque<Field> fields_;  ///< whose elements stay where they are

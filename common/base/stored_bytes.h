@@ -52,6 +52,12 @@ concept TextLike = requires(T& value, std::string_view text) {
   { value.text() } -> std::convertible_to<const std::string&>;
 };
 
+template <typename T>
+concept Optional = requires(T& value) {
+  value.has_value();
+  value.emplace();
+};
+
 /// Numbers or letters one after the other in memory.
 template <typename T>
 concept PlainList = requires(T& list) {
@@ -74,6 +80,10 @@ class ByteWriter {
       add_raw(value.data(), sizeof(value));
     } else if constexpr (requires { std::tuple_size<T>::value; }) {
       for (auto& element : value) add(element);
+    } else if constexpr (Optional<T>) {
+      bool has_value = value.has_value();
+      add(has_value);
+      if (has_value) add(*value);
     } else {
       add_list(value);
     }
@@ -113,12 +123,21 @@ class ByteReader {
       std::string text;
       take_list(text);
       value = text;
+    } else if constexpr (std::is_same_v<T, bool>) {
+      // Of a damaged record, a byte may be neither 0 nor 1, which no bool can hold.
+      std::uint8_t byte = 0;
+      take(byte);
+      value = byte != 0;
     } else if constexpr (std::is_arithmetic_v<T> || std::is_enum_v<T>) {
       take_raw(&value, sizeof(value));
     } else if constexpr (FixedMatrix<T>) {
       take_raw(value.data(), sizeof(value));
     } else if constexpr (requires { std::tuple_size<T>::value; }) {
       for (auto& element : value) take(element);
+    } else if constexpr (Optional<T>) {
+      bool has_value = false;
+      take(has_value);
+      if (has_value) take(value.emplace());
     } else {
       take_list(value);
     }

@@ -9,6 +9,7 @@ namespace af::cli {
 
 void bind_lists(CLI::App& app, const std::map<std::string, std::string>& lists) {
   std::vector<std::string> names;
+  names.reserve(lists.size());
   for (const auto& [name, text] : lists) names.push_back(name);
   app.add_option_function<std::string>(
          "--list",

@@ -39,6 +39,7 @@ std::vector<double> level_blurs_mm(const registration::RegistrationProblem& prob
 }  // namespace
 
 std::vector<LoadedMethod> load_methods(const MethodOptions& options,
+                                       const registration::CorrectionOptions& correction,
                                        const Study& study,
                                        const StudyCase& study_case,
                                        const Communicator& world,
@@ -51,8 +52,11 @@ std::vector<LoadedMethod> load_methods(const MethodOptions& options,
   // method.
   std::vector<double> blurs_mm;
   for (const std::string& renderer : options.chosen_renderers()) {
+    registration::RegistrationOptions its_method = method;
+    if (renderer == "field") its_method.correction = correction;
     registration::CaseLoadOptions loading =
         load_options(options, renderer, method.coarsest_level(), blurs_mm);
+    if (its_method.correction.is_wanted) loading.correction_levels = method.last_levels();
     loading.pool = pool;
     const registration::LoadedCase loaded =
         registration::load_case(study, study_case, loading, world);
@@ -61,7 +65,7 @@ std::vector<LoadedMethod> load_methods(const MethodOptions& options,
     for (const auto& [name, hash] : loaded.input_sha256)
       input_sha256[study_case.name + ": " + name] = hash;
     registration::RegistrationRunner runner = all_or_none(
-        world, [&] { return registration::RegistrationRunner(loaded.problem, method, pool); });
+        world, [&] { return registration::RegistrationRunner(loaded.problem, its_method, pool); });
     methods.push_back({renderer, std::move(runner)});
   }
   return methods;

@@ -135,6 +135,8 @@ void add_result(const RegistrationResult& result,
   row.drr_count = result.drr_count;
   row.stop_reason = to_string(result.stop_reason);
   row.seconds = result.seconds;
+  row.is_corrected = result.correction.has_value();
+  row.correction = result.correction.value_or(registration::CorrectionReport());
   if (!has_pose(result)) return;
   row.similarity = result.similarity;
   measure_pose(result.room_from_ct, yardstick, row);
@@ -446,7 +448,7 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
       std::in_place, "loading case " + study_case.name, WorkNote::Kind::Phase);
   std::vector<Method> methods;
   for (LoadedMethod& method :
-       load_methods(options, study, study_case, world, evaluation.input_sha256))
+       load_methods(options, options.correction, study, study_case, world, evaluation.input_sha256))
     methods.push_back({method.renderer, std::move(method.runner), {}});
   const Yardstick yardstick = all_or_none(world, [&] {
     evaluation.gold = gold_standard(study, study_case, options.gold);

@@ -8,6 +8,7 @@
 #include "base/error.h"
 #include "cli/bind_options.h"
 #include "evaluate/registration/method_comparison.h"
+#include "evaluate/registration/pose_distances.h"
 #include "files/output_file.h"
 
 namespace af::evaluation {
@@ -18,6 +19,11 @@ void CompareOptions::describe(Fields& field) {
       .required();
   field("output", output, "The Markdown file; the CSV takes its name, .csv").as("-o,--output");
   field("screen", is_screen, "In Markdown, measures against optimisers instead of a row per run");
+  field("pose_distances",
+        with_pose_distances,
+        "Also the distance between the end poses of every two methods from the same starts (mean "
+        "over the target box: median, 95th percentile, maximum), as a table below and in a CSV "
+        "beside, ...-pose-distances.csv");
 }
 
 CLI::App* bind_compare(CLI::App& app, CompareOptions& options) {
@@ -36,6 +42,9 @@ void run_compare(const CompareOptions& options, const Communicator& world) {
     csv.replace_extension(".csv");
     announce_output(csv);
     announce_output(options.output);
+    std::filesystem::path distances_csv = csv;
+    distances_csv.replace_filename(csv.stem().string() + "-pose-distances.csv");
+    if (options.with_pose_distances) announce_output(distances_csv);
     const std::vector<EvaluationRun> runs = find_runs(options.runs);
     const std::vector<MethodRow> rows = method_rows(runs);
     if (rows.empty())
@@ -45,8 +54,13 @@ void run_compare(const CompareOptions& options, const Communicator& world) {
     std::string text;
     if (!options.is_screen) parts.push_back(studies_markdown(rows));
     parts.push_back(pairs_markdown(runs));
+    const std::vector<PoseDistanceRow> distances =
+        options.with_pose_distances ? pose_distances(runs) : std::vector<PoseDistanceRow>();
+    parts.push_back(pose_distances_markdown(distances));
     for (const std::string& part : parts)
       if (!part.empty()) text += (text.empty() ? "" : "\n") + part;
+    if (options.with_pose_distances)
+      write_text_file(distances_csv, pose_distances_table(distances).to_text());
     write_text_file(csv, methods_table(rows).to_text());
     write_text_file(options.output, text);
     std::cout << text;

@@ -16,6 +16,8 @@ struct CompareOptions {
   std::filesystem::path output = "methods.md";
   bool is_screen = false;  ///< Markdown of measures against optimisers
 
+  bool with_pose_distances = false;
+
   void describe(Fields& field);
 };
 

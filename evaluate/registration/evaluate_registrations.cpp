@@ -101,6 +101,22 @@ json simulation_of(const Study& study) {
   return first;
 }
 
+json point_json(const Eigen::Vector3d& point) {
+  return {point.x(), point.y(), point.z()};
+}
+
+/// What the rows' parameters are relative to, and the box that distances are means over.
+void add_target(const CaseEvaluation& evaluation, const StudyCase& study_case, json& of_case) {
+  const Eigen::Matrix4d gold = evaluation.gold.room_from_ct.matrix();
+  json rows = json::array();
+  for (int row = 0; row < 4; ++row)
+    rows.push_back({gold(row, 0), gold(row, 1), gold(row, 2), gold(row, 3)});
+  of_case["gold_room_from_ct"] = rows;
+  of_case["center_ct_mm"] = point_json(study_case.center_ct_mm);
+  of_case["target_box_ct_mm"] = {point_json(study_case.target_box_ct.low_mm),
+                                 point_json(study_case.target_box_ct.high_mm)};
+}
+
 json case_json(const CaseEvaluation& evaluation) {
   return {{"case", evaluation.case_name},
           {"gold", to_json(evaluation.gold)},
@@ -155,11 +171,13 @@ json summary_json(const RegistrationStudyOptions& options,
       {"preset", options.method.chains.empty() ? options.method.preset_name() : "chain"},
       {"similarity", method.similarity_list()},
       {"optimizer", method.optimizer_list()}};
+  if (options.correction.is_wanted) summary["method"]["corrected"] = true;
   summary["simulation"] = simulation_of(study);
   summary["cases"] = json::array();
   summary["pictures"] = json::array();
   for (const CaseEvaluation& evaluation : evaluations) {
     summary["cases"].push_back(case_json(evaluation));
+    add_target(evaluation, study.find_case(evaluation.case_name), summary["cases"].back());
     for (const json& picture : evaluation.pictures) summary["pictures"].push_back(picture);
   }
   summary["renderers"] = json::array();
@@ -267,6 +285,11 @@ std::vector<std::string> problems(const RegistrationStudyOptions& options) {
   if (!options.poses_from.empty() && options.starts_from.empty())
     found.push_back("--poses-from = '" + options.poses_from.string() +
                     "': needs --starts-from, the starts.csv that the poses were found from");
+  if (options.correction.is_wanted && options.renderer == "raycast")
+    found.emplace_back(registration::kCorrectsRayCasting);
+  if (options.correction.is_wanted && !options.poses_from.empty())
+    found.emplace_back(
+        "--correct = set: must not be given with --poses-from, which registers nothing");
   if (options.poses_from.empty() && options.method_name != RegistrationStudyOptions{}.method_name)
     found.push_back("--method-name = '" + options.method_name +
                     "': must not be given without --poses-from");
@@ -335,6 +358,7 @@ void describe_methods(Fields& field, RegistrationStudyOptions& options) {
 
 void RegistrationStudyOptions::describe(Fields& field) {
   field.part<MethodOptions>(*this);
+  field.part(correction);
   describe_starts(field, *this);
   describe_methods(field, *this);
   field.at("seed").as("--seed", "Of the starts, and of what cma-es draws");

@@ -17,7 +17,8 @@ namespace af::evaluation {
 
 /// `af-evaluate registration` as typed; method.seed is the seed of the starts, too.
 struct RegistrationStudyOptions : MethodOptions {
-  std::vector<std::string> cases;  ///< empty: all
+  registration::CorrectionOptions correction;  ///< of the field's ends
+  std::vector<std::string> cases;              ///< empty: all
   int starts_per_interval = 30;
   int intervals = 8;
   double interval_width_mm = 2.0;

@@ -60,6 +60,7 @@ void name_method(const EvaluationRun& run, MethodRow& row) {
   row.similarity = method.value("similarity", "?");
   row.optimizer = method.value("optimizer", "?");
   row.method = row.preset + " " + row.similarity + " " + row.optimizer;
+  if (row.renderer == "field" && method.value("corrected", false)) row.method += " corrected";
 }
 
 MethodRow row_of(const EvaluationRun& run,

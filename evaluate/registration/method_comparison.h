@@ -15,7 +15,8 @@ namespace af::evaluation {
 struct MethodRow {
   std::string run;  ///< its folder's name
   std::string case_name;
-  std::string method;  ///< "PRESET SIMILARITY OPTIMIZER", or the name of other programs' poses
+  std::string
+      method;  ///< "PRESET SIMILARITY OPTIMIZER[ corrected]", or the name of other programs' poses
   std::string preset, similarity, optimizer;  ///< the parts of it; empty for other programs' poses
   std::string renderer;
   std::vector<IntervalSuccess> bands;  ///< of initial TRE, see kBandEndsMm

@@ -20,6 +20,11 @@ void append_numbers(std::vector<std::string>& fields, const std::array<double, 6
   for (const double value : values) fields.push_back(number_text(value));
 }
 
+bool is_any_corrected(std::span<const RegistrationRow> rows) {
+  return std::any_of(
+      rows.begin(), rows.end(), [](const RegistrationRow& row) { return row.is_corrected; });
+}
+
 std::vector<std::string> start_columns() {
   std::vector<std::string> columns = {"case", "start_index", "interval", "draw_index"};
   for (const char* name : kParameterNames) columns.push_back(std::string("start_") + name);
@@ -45,7 +50,7 @@ std::vector<std::string> start_fields(const std::string& case_name,
   return fields;
 }
 
-registration::NamedCells cells_of(const RegistrationRow& row) {
+registration::NamedCells cells_of(const RegistrationRow& row, bool with_correction) {
   const registration::RegistrationCells cells = {.case_name = row.case_name,
                                                  .start_index = row.start_index,
                                                  .renderer = row.renderer,
@@ -60,31 +65,43 @@ registration::NamedCells cells_of(const RegistrationRow& row) {
                                                  .drr_count = row.drr_count,
                                                  .seconds = row.seconds};
   const RegistrationErrors& errors = row.errors;
+  registration::NamedCells before_seconds = {
+      {"mrpd_mm", number_text(errors.mrpd_mm)},
+      {"projection_detector_mm", number_text(errors.projection_detector_mm)},
+      {"projection_isocenter_mm", number_text(errors.projection_isocenter_mm)},
+      {"rotation_error_deg", number_text(errors.rotation_deg)},
+      {"translation_error_mm", number_text(errors.translation_mm)},
+      {"error", row.error}};
+  if (with_correction)
+    registration::append(registration::correction_cells(
+                             row.is_corrected ? std::optional(row.correction) : std::nullopt),
+                         before_seconds);
   return registration::registration_row(
       cells,
       {{"success", row.is_success() ? "1" : "0"},
        {"interval", std::to_string(row.interval)},
        {"draw_index", std::to_string(row.draw_index)},
        {"stated_pose_tre_mm", number_text(row.stated_pose_tre_mm)}},
-      {{"mrpd_mm", number_text(errors.mrpd_mm)},
-       {"projection_detector_mm", number_text(errors.projection_detector_mm)},
-       {"projection_isocenter_mm", number_text(errors.projection_isocenter_mm)},
-       {"rotation_error_deg", number_text(errors.rotation_deg)},
-       {"translation_error_mm", number_text(errors.translation_mm)},
-       {"error", row.error}});
+      before_seconds);
+}
+
+CsvTable table_of(std::span<const RegistrationRow> rows, bool with_correction) {
+  CsvTable table(registration::names_of(cells_of(RegistrationRow(), with_correction)));
+  for (const RegistrationRow& row : rows)
+    table.add_row(registration::texts_of(cells_of(row, with_correction)));
+  return table;
 }
 
 }  // namespace
 
 CsvTable registrations_table(std::span<const RegistrationRow> rows) {
-  CsvTable table(registration::names_of(cells_of(RegistrationRow())));
-  for (const RegistrationRow& row : rows) table.add_row(registration::texts_of(cells_of(row)));
-  return table;
+  return table_of(rows, is_any_corrected(rows));
 }
 
 void write_registrations(const std::filesystem::path& path, std::span<const RegistrationRow> rows) {
+  const bool with_correction = is_any_corrected(rows);
   write_csv_in_parts(path, rows.size(), [&](std::size_t first, std::size_t end) {
-    return registrations_table(rows.subspan(first, end - first));
+    return table_of(rows.subspan(first, end - first), with_correction);
   });
 }
 

@@ -16,6 +16,7 @@
 #include "evaluate/registration/registration_errors.h"
 #include "evaluate/starts/perturbed_starts.h"
 #include "evaluate/statistics/success_rate.h"
+#include "register/method/correction_report.h"
 #include "text/csv_table.h"
 
 namespace af::evaluation {
@@ -53,6 +54,8 @@ struct RegistrationRow {
   std::int64_t evaluations = 0;
   std::int64_t inadmissible = 0;
   std::int64_t drr_count = 0;
+  bool is_corrected = false;  ///< a correction was wanted
+  registration::CorrectionReport correction;
   InternedText stop_reason;
   InternedText error;    ///< message of a registration that threw
   double seconds = 0.0;  ///< wall time
@@ -76,6 +79,8 @@ struct RegistrationRow {
                     drr_count,
                     stop_reason,
                     error,
+                    is_corrected,
+                    correction,
                     seconds);
   }
 };
@@ -88,7 +93,8 @@ struct TracedRow {
   auto members() { return std::tie(row, trace); }
 };
 
-/// registrations.csv with the contract's columns, in the given order; timings last.
+/// registrations.csv with the contract's columns, in the given order; timings last. Where a
+/// correction was wanted, every row has its columns.
 CsvTable registrations_table(std::span<const RegistrationRow> rows);
 
 /// registrations.csv of any length, a part at a time.

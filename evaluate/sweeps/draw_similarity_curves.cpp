@@ -300,7 +300,7 @@ void run_similarity_curves(const SimilarityCurvesOptions& options,
   Provenance provenance = {
       "af-evaluate similarity-curves", command_line, to_toml(in_force), 0, world.size(), {}};
   std::vector<LoadedMethod> methods =
-      load_methods(options, study, study_case, world, provenance.input_sha256);
+      load_methods(options, {}, study, study_case, world, provenance.input_sha256);
   all_or_none(world, [&] {
     if (world.is_root()) provenance.input_sha256["study"] = sha256_of_file(study.path.string());
   });

@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "base/hash_random.h"
+#include "gold_standard/tre.h"
 #include "register/problem/parameter_scaling.h"
 #include "register/problem/pose_target.h"
 #include "register/problem/stage_view.h"
@@ -134,7 +135,12 @@ struct ChainEnd {
   RigidTransform room_from_ct;
   double similarity = std::numeric_limits<double>::quiet_NaN();
   StopReason stop_reason = StopReason::StepBelowFinal;
+  std::size_t stage = 0;  ///< the last one searched
 };
+
+bool is_converged(StopReason reason) {
+  return reason == StopReason::StepBelowFinal || reason == StopReason::PinnedAtLimit;
+}
 
 struct PreparedStage {
   StageOptions options;
@@ -145,6 +151,33 @@ struct PreparedStage {
     return {options, optimizer, MultiViewObjective(objective.views())};
   }
 };
+
+std::shared_ptr<const DrrRenderer> ray_cast_of(const RegistrationView& view, int level) {
+  const auto at = static_cast<std::size_t>(level);
+  return at < view.ray_casts.size() ? view.ray_casts[at] : nullptr;
+}
+
+std::vector<std::shared_ptr<const DrrRenderer>> ray_casts_of(const RegistrationProblem& problem,
+                                                             int level) {
+  std::vector<std::shared_ptr<const DrrRenderer>> ray_casts;
+  for (const RegistrationView& view : problem.views) ray_casts.push_back(ray_cast_of(view, level));
+  return ray_casts;
+}
+
+/// What the problem lacks that a correction needs.
+std::vector<std::string> correction_problems(const RegistrationProblem& problem,
+                                             const RegistrationOptions& options) {
+  std::vector<std::string> found;
+  if (!options.correction.is_wanted) return found;
+  if (problem.target_points_ct.empty())
+    found.emplace_back("target_points_ct = none: a correction needs at least one");
+  for (const RegistrationView& view : problem.views)
+    for (const int level : options.last_levels())
+      if (!ray_cast_of(view, level))
+        found.push_back(view_name(view) + "ray_casts = none for level " + std::to_string(level) +
+                        ": a correction needs it");
+  return found;
+}
 
 }  // namespace
 
@@ -180,8 +213,10 @@ struct RegistrationRunner::Impl {
                  std::int64_t start_index,
                  ChainEnd& end,
                  RegistrationResult& result);
-  /// Searches one stage from `end`; false when no further stage makes sense.
-  bool run_stage(std::size_t index,
+  /// Searches one stage from `end`; false when no further stage makes sense. `index`: in the trace,
+  /// and a key of random numbers.
+  bool run_stage(PreparedStage& stage,
+                 std::size_t index,
                  std::int64_t start_index,
                  ChainEnd& end,
                  RegistrationResult& result);
@@ -191,6 +226,15 @@ struct RegistrationRunner::Impl {
     run_chain(
         options.finish, stages.size() - options.finish.stages.size(), start_index, end, result);
   }
+  /// The correction, from an end that converged.
+  void correct(std::int64_t start_index, ChainEnd& end, RegistrationResult& result);
+  /// One round of it: false when it cannot go on.
+  bool correct_once(StageDefect& defect,
+                    DefectSlopes slopes,
+                    std::size_t index,
+                    std::int64_t start_index,
+                    ChainEnd& end,
+                    RegistrationResult& result);
   ObjectiveValue judged(const RigidTransform& room_from_ct);
   /// NaN when inadmissible; counted in `result`.
   double judged(const RigidTransform& room_from_ct, RegistrationResult& result);
@@ -242,11 +286,11 @@ void RegistrationRunner::Impl::append_trace(std::size_t index,
                             parameters_from_pose(frame, target.pose(iteration.point))});
 }
 
-bool RegistrationRunner::Impl::run_stage(std::size_t index,
+bool RegistrationRunner::Impl::run_stage(PreparedStage& stage,
+                                         std::size_t index,
                                          std::int64_t start_index,
                                          ChainEnd& end,
                                          RegistrationResult& result) {
-  PreparedStage& stage = stages[index];
   const std::optional<ParameterScaling> scaling =
       stage.optimizer->needs() == Derivatives::None
           ? scaling_at(end.room_from_ct, problem->scaling_points_ct)
@@ -274,8 +318,7 @@ bool RegistrationRunner::Impl::run_stage(std::size_t index,
     return false;
   }
   end.room_from_ct = target.pose(search.point);
-  return search.stop_reason == StopReason::StepBelowFinal ||
-         search.stop_reason == StopReason::PinnedAtLimit;
+  return is_converged(search.stop_reason);
 }
 
 bool RegistrationRunner::Impl::run_chain(const ChainOptions& chain,
@@ -284,13 +327,61 @@ bool RegistrationRunner::Impl::run_chain(const ChainOptions& chain,
                                          ChainEnd& end,
                                          RegistrationResult& result) {
   for (std::size_t i = 0; i < chain.stages.size(); ++i) {
-    if (run_stage(first + i, start_index, end, result)) continue;
+    end.stage = first + i;
+    if (run_stage(stages[end.stage], end.stage, start_index, end, result)) continue;
     // The stage before ended on the very limit, and rounding put its end beyond.
     if (i > 0 && end.stop_reason == StopReason::StartInadmissible)
       end.stop_reason = StopReason::PinnedAtLimit;
     return false;
   }
   return true;
+}
+
+bool RegistrationRunner::Impl::correct_once(StageDefect& defect,
+                                            DefectSlopes slopes,
+                                            std::size_t index,
+                                            std::int64_t start_index,
+                                            ChainEnd& end,
+                                            RegistrationResult& result) {
+  CorrectionReport& report = *result.correction;
+  if (!defect.measure(end.room_from_ct, slopes)) return false;
+  ++report.casts;
+  report.defect_rms = defect.rms();
+  report.defect_change = defect.change();
+  result.drr_count += 2 * static_cast<std::int64_t>(views.size());  // cast and looked up
+  const PreparedStage& last = stages[end.stage];
+  PreparedStage corrected{
+      last.options, last.optimizer, MultiViewObjective(defect.corrected_views(), pool)};
+  const RigidTransform before = end.room_from_ct;
+  const bool goes_on = run_stage(corrected, index, start_index, end, result);
+  // The end was on the very limit, and rounding put it beyond.
+  if (end.stop_reason == StopReason::StartInadmissible) end.stop_reason = StopReason::PinnedAtLimit;
+  report.last_mm = mean_tre_mm(before, end.room_from_ct, problem->target_points_ct);
+  return goes_on;
+}
+
+void RegistrationRunner::Impl::correct(std::int64_t start_index,
+                                       ChainEnd& end,
+                                       RegistrationResult& result) {
+  const CorrectionOptions& wanted = options.correction;
+  if (!wanted.is_wanted) return;
+  CorrectionReport& report = result.correction.emplace();
+  if (!is_converged(end.stop_reason)) return;
+  const auto ray_casts = ray_casts_of(*problem, stages[end.stage].options.level);
+  // A chain that ended early, at the limit.
+  if (std::count(ray_casts.begin(), ray_casts.end(), nullptr) > 0) return;
+  const RigidTransform looked_up = end.room_from_ct;
+  StageDefect defect(
+      stages[end.stage].objective.views(), ray_casts, looked_up * problem->center_ct_mm);
+  while (report.casts < wanted.max_casts && !report.stood_still) {
+    const DefectSlopes slopes = wanted.slopes_of_cast(report.casts);
+    const std::size_t index = stages.size() + static_cast<std::size_t>(report.casts);
+    if (!correct_once(defect, slopes, index, start_index, end, result)) break;
+    // A pose that stands still for want of slopes may yet move.
+    report.stood_still = report.last_mm <= wanted.tolerance_mm &&
+                         (slopes == DefectSlopes::Taken || !wanted.takes_slopes);
+  }
+  report.moved_mm = mean_tre_mm(looked_up, end.room_from_ct, problem->target_points_ct);
 }
 
 ObjectiveValue RegistrationRunner::Impl::judged(const RigidTransform& room_from_ct) {
@@ -325,10 +416,10 @@ void RegistrationRunner::Impl::run_portfolio(std::int64_t start_index, Registrat
     if (best->similarity >= options.judge.enough_value) break;
   }
   if (!best.has_value()) return;
-  if (!options.finish.stages.empty()) {
-    run_finish(start_index, *best, result);
+  if (!options.finish.stages.empty()) run_finish(start_index, *best, result);
+  correct(start_index, *best, result);
+  if (!options.finish.stages.empty() || options.correction.is_wanted)
     best->similarity = judged(best->room_from_ct, result);
-  }
   result.similarity = best->similarity;
   result.room_from_ct = best->room_from_ct;
   result.stop_reason = best->similarity <= options.judge.least_value ? StopReason::NoBetterThanNoDrr
@@ -342,6 +433,7 @@ RegistrationRunner::RegistrationRunner(std::shared_ptr<const RegistrationProblem
   check(problem != nullptr, "a registration needs a problem");
   throw_if_any(problems(options));
   throw_if_any(problems(*problem));
+  throw_if_any(correction_problems(*problem, options));
   impl_->options = options;
   impl_->pool = std::move(pool);
   impl_->problem = std::move(problem);
@@ -380,6 +472,7 @@ RegistrationResult RegistrationRunner::run(const RigidTransform& start_room_from
     ChainEnd end{start_room_from_ct};
     if (impl.run_chain(chain, 0, start_index, end, result))
       impl.run_finish(start_index, end, result);
+    impl.correct(start_index, end, result);
     result.room_from_ct = end.room_from_ct;
     result.similarity = end.similarity;
     result.stop_reason = end.stop_reason;

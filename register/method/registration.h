@@ -32,6 +32,8 @@ struct RegistrationView {
   std::shared_ptr<const DrrRenderer> renderer;
   std::vector<RendererLevel> coarse_levels;  ///< levels 1, 2, ... as far as stages need them
   std::optional<MotionLimit> limit;  ///< motion box of the renderer's field; none for ray casting
+  /// [level] Ray casting, where a correction needs it; else none.
+  std::vector<std::shared_ptr<const DrrRenderer>> ray_casts;
 };
 
 /// Everything that does not change between the starts of one case.
@@ -42,6 +44,7 @@ struct RegistrationProblem {
   Eigen::Vector3d isocenter_point = Eigen::Vector3d::Zero();  ///< room, mm
   std::vector<Eigen::Vector3d> scaling_points_ct;             ///< see ct_lattice_points()
   std::vector<RegistrationView> views;
+  std::vector<Eigen::Vector3d> target_points_ct;  ///< of the target box; a correction needs them
 
   /// What the parameters in results are relative to.
   [[nodiscard]] PoseFrame frame() const {
@@ -52,7 +55,7 @@ struct RegistrationProblem {
 std::vector<std::string> problems(const RegistrationProblem& problem);
 
 struct TraceRow {
-  int pass = 0;  ///< stage, from 0, counted over the chains
+  int pass = 0;  ///< stage, from 0, counted over the chains; after them the rounds of a correction
   double step_mm = 0.0;
   int evaluations = 0;  ///< so far, all stages
   double similarity = 0.0;
@@ -64,16 +67,18 @@ struct TraceRow {
 struct RegistrationResult {
   RigidTransform start_room_from_ct = RigidTransform::Identity();
   RigidTransform room_from_ct = RigidTransform::Identity();
-  double similarity = 0.0;        ///< at the end: of the chain's last stage, of a portfolio by its
-                                  ///< judge (mean over views); NaN if it has none
+  double similarity = 0.0;        ///< at the end: of the chain's last stage (corrected, if it was),
+                                  ///< of a portfolio by its judge (mean over views); NaN if it has
+                                  ///< none
   std::string chain;              ///< the one that the result is from
   int evaluations = 0;            ///< poses tried
   int inadmissible = 0;           ///< of these, outside the field or its motion range
-  std::int64_t drr_count = 0;     ///< DRRs rendered
+  std::int64_t drr_count = 0;     ///< DRRs rendered, those of a correction included
   std::int64_t rays_outside = 0;  ///< at the start, when that is why it is inadmissible
   StopReason stop_reason = StopReason::StepBelowFinal;
   std::vector<TraceRow> trace;
-  double seconds = 0.0;  ///< wall time
+  std::optional<CorrectionReport> correction;  ///< when one was wanted
+  double seconds = 0.0;                        ///< wall time
 
   auto members() {
     return std::tie(start_room_from_ct,
@@ -86,6 +91,7 @@ struct RegistrationResult {
                     rays_outside,
                     stop_reason,
                     trace,
+                    correction,
                     seconds);
   }
 };

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "base/named_rows.h"
 #include "register/method/presets.h"
@@ -129,6 +130,17 @@ int RegistrationOptions::coarsest_level() const {
   int coarsest = chains.size() > 1 ? judge.stage.level : 0;
   for (const StageOptions* const stage : stages()) coarsest = std::max(coarsest, stage->level);
   return coarsest;
+}
+
+std::vector<int> RegistrationOptions::last_levels() const {
+  std::set<int> levels;
+  if (!finish.stages.empty()) {
+    levels.insert(finish.stages.back().level);
+  } else {
+    for (const ChainOptions& chain : chains)
+      if (!chain.stages.empty()) levels.insert(chain.stages.back().level);
+  }
+  return {levels.begin(), levels.end()};
 }
 
 std::vector<std::string> problems(const RegistrationOptions& options) {

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "register/method/correction.h"
 #include "register/optimizer/optimizer.h"
 #include "register/similarity/similarity_measure.h"
 
@@ -51,6 +52,7 @@ struct RegistrationOptions {
   JudgeOptions judge;          ///< of a portfolio; not used with one chain
   int max_evaluations = 5000;  ///< pose evaluations per registration, all chains together
   std::uint64_t seed = 1;      ///< of optimisers that draw random numbers
+  CorrectionOptions correction;
 
   /// The paper's method.
   RegistrationOptions();
@@ -65,6 +67,8 @@ struct RegistrationOptions {
   [[nodiscard]] std::string final_similarity() const;
   /// Highest level of any stage.
   [[nodiscard]] int coarsest_level() const;
+  /// Levels of the stages that a registration can end with, ascending: a correction casts there.
+  [[nodiscard]] std::vector<int> last_levels() const;
 
  private:
   /// Of all chains and of the finish, in this order.

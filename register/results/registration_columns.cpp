@@ -38,12 +38,29 @@ NamedCells registration_row(const RegistrationCells& row,
   cells.emplace_back("similarity", number_text(row.similarity));
   cells.emplace_back("evaluations", std::to_string(row.evaluations));
   cells.emplace_back("stop_reason", row.stop_reason);
-  cells.insert(cells.end(), behind_stop_reason.begin(), behind_stop_reason.end());
+  append(behind_stop_reason, cells);
   cells.emplace_back("inadmissible", std::to_string(row.inadmissible));
   cells.emplace_back("drr_count", std::to_string(row.drr_count));
-  cells.insert(cells.end(), before_seconds.begin(), before_seconds.end());
+  append(before_seconds, cells);
   cells.emplace_back("seconds", number_text(row.seconds));
   return cells;
+}
+
+NamedCells correction_cells(const std::optional<CorrectionReport>& correction) {
+  const CorrectionReport report = correction.value_or(CorrectionReport());
+  NamedCells cells = {{"correction_casts", std::to_string(report.casts)},
+                      {"correction_moved_mm", number_text(report.moved_mm)},
+                      {"correction_last_mm", number_text(report.last_mm)},
+                      {"correction_defect_rms", number_text(report.defect_rms)},
+                      {"correction_defect_change", number_text(report.defect_change)},
+                      {"correction_stood_still", report.stood_still ? "1" : "0"}};
+  if (!correction.has_value())
+    for (auto& [name, text] : cells) text.clear();
+  return cells;
+}
+
+void append(const NamedCells& more, NamedCells& cells) {
+  cells.insert(cells.end(), more.begin(), more.end());
 }
 
 std::vector<std::string> names_of(const NamedCells& cells) {

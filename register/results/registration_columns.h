@@ -5,10 +5,13 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
+
+#include "register/method/correction_report.h"
 
 namespace af::registration {
 
@@ -37,6 +40,11 @@ using NamedCells = std::vector<std::pair<std::string_view, std::string>>;
 NamedCells registration_row(const RegistrationCells& row,
                             const NamedCells& behind_stop_reason,
                             const NamedCells& before_seconds);
+
+/// What a correction adds before the time; empty cells where there was none.
+NamedCells correction_cells(const std::optional<CorrectionReport>& correction);
+
+void append(const NamedCells& more, NamedCells& cells);
 
 /// The names or the texts alone.
 std::vector<std::string> names_of(const NamedCells& cells);

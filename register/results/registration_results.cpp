@@ -88,6 +88,17 @@ std::string parameters_line(const PoseParameters& parameters) {
   return line + " mm";
 }
 
+/// "by 2 ray-cast DRRs per view, which moved the end 0.041 mm; it stands still"
+std::string correction_text(const CorrectionReport& correction) {
+  if (correction.casts == 0) return "no: there is no converged end to correct";
+  return "by " + std::to_string(correction.casts) + " ray-cast DRR" +
+         (correction.casts == 1 ? "" : "s") + " per view, which moved the end " +
+         fixed_text(correction.moved_mm, 3) + " mm; " +
+         (correction.stood_still ? "it stands still"
+                                 : "it does not stand still, the last moved it " +
+                                       fixed_text(correction.last_mm, 3) + " mm");
+}
+
 /// "3 found, 1 doubtful, 0 not found"
 std::string counts_text(const std::vector<RegistrationRecord>& records) {
   std::array<int, 3> counts{};
@@ -152,6 +163,15 @@ json views_json(const RegistrationRecord& record, const RegistrationProblem& pro
           {"cameras", views}};
 }
 
+json correction_json(const CorrectionReport& correction) {
+  return {{"casts_per_view", correction.casts},
+          {"moved_mm", number_or_null(correction.moved_mm)},
+          {"last_mm", number_or_null(correction.last_mm)},
+          {"defect_rms", number_or_null(correction.defect_rms)},
+          {"defect_change", number_or_null(correction.defect_change)},
+          {"stood_still", correction.stood_still}};
+}
+
 }  // namespace
 
 json result_json(const RegistrationRecord& record,
@@ -191,6 +211,7 @@ json result_json(const RegistrationRecord& record,
       record.errors.has_value() ? number_or_null(record.errors->initial_tre_mm) : json(nullptr);
   output["tre_mm"] =
       record.errors.has_value() ? number_or_null(record.errors->tre_mm) : json(nullptr);
+  if (result.correction.has_value()) output["correction"] = correction_json(*result.correction);
   output["gold_source"] =
       record.errors.has_value() ? json(record.errors->gold_source) : json(nullptr);
   output["trace"] = trace_json(result.trace);
@@ -221,14 +242,14 @@ NamedCells cells_of(const RegistrationRecord& record,
   row.seconds = result.seconds;
   const ViewSummary coarse = summary_of(record.view_values, &ViewValue::coarse);
   const ViewSummary fine = summary_of(record.view_values, &ViewValue::fine);
-  return registration_row(row,
-                          {},
-                          {{"relative_to", "nominal"},
-                           {"verdict", to_string(judgement_of(record).verdict)},
-                           {"judge_mean", number_text(coarse.mean)},
-                           {"judge_lowest_view", number_text(coarse.lowest)},
-                           {"judge_fine_mean", number_text(fine.mean)},
-                           {"judge_fine_lowest_view", number_text(fine.lowest)}});
+  NamedCells before_seconds = {{"relative_to", "nominal"},
+                               {"verdict", to_string(judgement_of(record).verdict)},
+                               {"judge_mean", number_text(coarse.mean)},
+                               {"judge_lowest_view", number_text(coarse.lowest)},
+                               {"judge_fine_mean", number_text(fine.mean)},
+                               {"judge_fine_lowest_view", number_text(fine.lowest)}};
+  if (result.correction.has_value()) append(correction_cells(result.correction), before_seconds);
+  return registration_row(row, {}, before_seconds);
 }
 
 }  // namespace
@@ -373,6 +394,8 @@ std::string summary_text(const RegistrationRecord& record, const RegistrationPro
     out << "TRE         " << fixed_text(record.errors->initial_tre_mm, 2) << " mm at the start, "
         << fixed_text(record.errors->tre_mm, 2)
         << " mm at the end (gold pose: " << record.errors->gold_source << ")\n";
+  if (result.correction.has_value())
+    out << "corrected   " << correction_text(*result.correction) << '\n';
   out << "stopped     " << to_string(result.stop_reason);
   if (result.stop_reason == StopReason::StartInadmissible)
     out << " (" << result.rays_outside << " rays outside the field; 0: beyond its motion range)";

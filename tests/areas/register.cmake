@@ -11,9 +11,10 @@ af_add_test(
           unit/register/method/method_options_test.cpp
           unit/register/problem/parameter_scaling_test.cpp
           unit/register/problem/multi_view_objective_test.cpp
+          unit/register/method/correction_test.cpp
           unit/register/method/registration_test.cpp
           unit/register/verdict/verdict_test.cpp
-  LIBS af_registration af_text)
+  LIBS af_registration af_gold_standard af_text)
 af_add_test(
   register_program_unit_tests
   SOURCES unit/register/register_options_test.cpp unit/register/results/registration_results_test.cpp

@@ -568,6 +568,46 @@ TEST_F(EvaluateProgram, ComparesRunsInOneTable) {
   expect_refused(evaluate("compare " + path("nowhere")), 4, "nowhere");
 }
 
+TEST_F(EvaluateProgram, CorrectsLookedUpEndsAndMeasuresHowFarMethodsEndApart) {
+  const std::string study = "registration --study " + path("study.toml") + fields() +
+                            "--preset fast --intervals 2 --starts-per-interval 1 -o ";
+  ASSERT_EQ(evaluate(study + path("apart/plain")).exit_code, 0);
+  const test::ProgramRun both =
+      evaluate(study + path("apart/corrected") + " --correct --renderer both");
+  ASSERT_EQ(both.exit_code, 0) << both.output;
+  const CsvTable rows = CsvTable::read(path("apart/corrected/registrations.csv"));
+  ASSERT_EQ(rows.row_count(), 4u);
+  for (std::size_t i = 0; i < 4; ++i) {
+    const bool is_field = rows.text(i, "renderer") == "field";
+    EXPECT_EQ(rows.text(i, "correction_casts").empty(), !is_field);
+    EXPECT_EQ(rows.text(i, "correction_stood_still").empty(), !is_field);
+  }
+  const test::ProgramRun run =
+      evaluate("compare " + path("apart") + " --pose-distances -o " + path("apart/table.md"));
+  ASSERT_EQ(run.exit_code, 0) << run.output;
+  EXPECT_THAT(run.output, HasSubstr("ncc, gc gauss-newton corrected"));
+  const CsvTable table = CsvTable::read(path("apart/table-pose-distances.csv"));
+  ASSERT_EQ(table.row_count(), 3u);
+  double corrected_mm = 0.0;
+  double plain_mm = 0.0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(table.text(i, "starts"), "2");
+    const std::string pair = table.text(i, "run_a") + table.text(i, "renderer_a") + " " +
+                             table.text(i, "run_b") + table.text(i, "renderer_b");
+    if (pair == "correctedfield correctedraycast")
+      corrected_mm = table.number(i, "median_distance_mm");
+    if (pair == "correctedraycast plainfield") plain_mm = table.number(i, "median_distance_mm");
+  }
+  EXPECT_GT(corrected_mm, 0.0);
+  EXPECT_LT(corrected_mm, 0.5 * plain_mm);
+  expect_refused(evaluate(study + path("x") + " --correct --renderer raycast --field AP=x"),
+                 3,
+                 "must not be given with --renderer raycast");
+  expect_refused(evaluate(study + path("x") + " --correct --starts-from s.csv --poses-from p.csv"),
+                 3,
+                 "must not be given with --poses-from");
+}
+
 TEST_F(EvaluateProgram, WritesOneSelfContainedReport) {
   make_runs_of_every_kind();
   const std::string page = text("runs/report.html");

@@ -10,8 +10,11 @@
 
 #include <gtest/gtest.h>
 
+#include "gold_standard/target_box.h"
+#include "gold_standard/tre.h"
 #include "image_files/image_file.h"
 #include "programs/small_study.h"
+#include "study/pose_file.h"
 #include "support/run_program.h"
 #include "support/test_paths.h"
 #include "text/csv_table.h"
@@ -96,6 +99,67 @@ TEST_F(RegisterProgram, RegistersByFieldAndByRayCasting) {
   const nlohmann::json provenance = result("by-field").at("provenance");
   // Study, its case, CT, two fields, two X-rays.
   EXPECT_EQ(provenance.at("input_sha256").size(), 7U) << provenance;
+}
+
+TEST_F(RegisterProgram, CorrectsALookedUpEndByRayCasting) {
+  const std::string start =
+      " --preset robust --start-rotation-deg -1,0.5,2.5 --start-translation-mm 0.5,1,4 ";
+  const auto pose_of = [&](const std::string& folder) {
+    return read_pose(path(folder + "/result.json"));
+  };
+  ASSERT_EQ(run_register(fields() + start + "-o " + path("looked-up")).exit_code, 0);
+  ASSERT_EQ(run_register("--renderer raycast" + start + "-o " + path("cast")).exit_code, 0);
+  const test::ProgramRun run = run_register(fields() + start + "--correct -o " + path("corrected"));
+  ASSERT_EQ(run.exit_code, 0) << run.output;
+  EXPECT_NE(run.output.find("corrected   by "), std::string::npos) << run.output;
+  const std::vector<Eigen::Vector3d> points = target_points({{-20, -20, -20}, {20, 20, 20}});
+  const double before_mm = mean_tre_mm(pose_of("looked-up"), pose_of("cast"), points);
+  const double after_mm = mean_tre_mm(pose_of("corrected"), pose_of("cast"), points);
+  // Both searches end when steps fall below 0.02 mm, in each of six parameters.
+  constexpr double kTwoSearchesMm = 2.0 * 2.45 * 0.02;
+  EXPECT_LT(after_mm, kTwoSearchesMm);
+  EXPECT_LT(after_mm, 0.5 * before_mm);
+  EXPECT_FALSE(result("looked-up").contains("correction"));
+  const nlohmann::json correction = result("corrected").at("correction");
+  EXPECT_GE(correction.at("casts_per_view"), 1);
+  EXPECT_GT(correction.at("moved_mm"), 0.0);
+}
+
+TEST_F(RegisterProgram, CorrectsEveryStartOfATableOnAnyRankCount) {
+  write_text_file(path("two-starts.csv"),
+                  "rx_deg,ry_deg,rz_deg,tx_mm,ty_mm,tz_mm\n0,0,0,0,0,0\n1,0,1,2,0,1\n");
+  const std::string run =
+      " --preset fast --correct --correct-max-casts 1 --starts " + path("two-starts.csv") + " -o ";
+  ASSERT_EQ(run_register(fields() + run + path("each-1")).exit_code, 0);
+  const CsvTable rows = CsvTable::read(path("each-1/registrations.csv"));
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_EQ(rows.text(i, "correction_casts"), "1");
+    EXPECT_EQ(rows.number(i, "correction_moved_mm"), rows.number(i, "correction_last_mm"));
+  }
+  const test::ProgramRun together = test::run_command(
+      "OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 mpirun -n 2 --oversubscribe " +
+      program("af-register") + " --study " + path("study.toml") + " " + fields() + run +
+      path("each-2"));
+  ASSERT_EQ(together.exit_code, 0) << together.output;
+  const CsvTable shared = CsvTable::read(path("each-2/registrations.csv"));
+  for (const std::string& column : rows.columns())
+    for (std::size_t i = 0; i < 2 && column != "seconds"; ++i)
+      EXPECT_EQ(shared.text(i, column), rows.text(i, column)) << column;
+}
+
+TEST_F(RegisterProgram, RefusesACorrectionThatCannotBe) {
+  const std::string wanted = fields() + " --correct -o " + path("x");
+  expect_refused(run_register(wanted + " --skip-ct-check"), 3, "--skip-ct-check");
+  expect_refused(run_register("--renderer raycast --correct -o " + path("x")),
+                 3,
+                 "must not be given with --renderer raycast");
+  expect_refused(run_register(wanted + " --water-mu-per-mm 0.019"), 3, "it must be the field's");
+  expect_refused(run_register(wanted + " --correct-max-casts 0"), 3, "correct_max_casts = 0");
+  expect_refused(run_register(wanted + " --correct-tolerance-mm 0"), 3, "correct_tolerance_mm = 0");
+  std::filesystem::rename(path("ct.nii.gz"), path("hidden.nii.gz"));
+  expect_refused(run_register(wanted), 4, "ct.nii.gz");
+  std::filesystem::rename(path("hidden.nii.gz"), path("ct.nii.gz"));
+  EXPECT_FALSE(std::filesystem::exists(path("x")));
 }
 
 TEST_F(RegisterProgram, ManyStartsGiveTheSameRowsOnAnyRankCount) {

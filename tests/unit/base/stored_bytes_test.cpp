@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include <Eigen/Geometry>
 #include <gmock/gmock.h>
@@ -30,7 +31,11 @@ struct Outer {
   std::array<double, 3> numbers{};
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   std::vector<Inner> list;
-  auto members() { return std::tie(large, is_set, colour, text, name, numbers, pose, list); }
+  std::optional<Inner> given;
+  std::optional<Inner> missing;
+  auto members() {
+    return std::tie(large, is_set, colour, text, name, numbers, pose, list, given, missing);
+  }
 };
 
 Outer example() {
@@ -43,6 +48,7 @@ Outer example() {
   outer.numbers = {std::nan(""), -0.0, std::numeric_limits<double>::denorm_min()};
   outer.pose.translate(Eigen::Vector3d(1.0, 2.0, 1.0 / 3));
   outer.list = {{1, {}}, {2, {std::numeric_limits<double>::infinity(), 5.0}}};
+  outer.given = Inner{7, {0.5}};
   return outer;
 }
 
@@ -61,6 +67,9 @@ TEST(StoredBytes, KeepEveryBitOfEveryMember) {
   EXPECT_EQ(back.list[0].count, 1);
   EXPECT_TRUE(back.list[0].values.empty());
   EXPECT_EQ(back.list[1].values, (std::vector<double>{INFINITY, 5.0}));
+  ASSERT_TRUE(back.given.has_value());
+  EXPECT_EQ(back.given->count, 7);
+  EXPECT_FALSE(back.missing.has_value());
   EXPECT_EQ(bytes_of(back), bytes_of(example()));
 }
 

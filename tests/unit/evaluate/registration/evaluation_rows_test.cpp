@@ -11,6 +11,7 @@
 #include "evaluate/image_quality/image_quality_tables.h"
 #include "evaluate/registration/case_evaluation.h"
 #include "evaluate/registration/method_comparison.h"
+#include "evaluate/registration/pose_distances.h"
 #include "evaluate/registration/registration_rows.h"
 #include "evaluate/registration/registration_statistics.h"
 #include "files/output_file.h"
@@ -59,6 +60,31 @@ TEST(RegistrationRows, TravelWithEveryBit) {
   EXPECT_EQ(received.errors.translation_mm, 1e-300);
   EXPECT_EQ(received.error, sent.error);
   EXPECT_EQ(received.seconds, sent.seconds);
+}
+
+TEST(RegistrationRows, OfACorrectionTravelAndHaveColumnsOnlyWhereOneWasWanted) {
+  RegistrationRow corrected = row("field", 7, 3.3, 1.0);
+  corrected.is_corrected = true;
+  corrected.correction = {2, 0.25, 0.125, 1.0 / 3, std::nan(""), true};
+  const RegistrationRow plain = row("raycast", 7, 3.3, 1.0);
+  const RegistrationRow received =
+      value_of<TracedRow>(bytes_of(TracedRow{corrected, {}}), "journal").row;
+  EXPECT_TRUE(received.is_corrected);
+  EXPECT_FALSE(value_of<TracedRow>(bytes_of(TracedRow{plain, {}}), "journal").row.is_corrected);
+  const CsvTable table = registrations_table(Rows{received, plain});
+  EXPECT_EQ(table.columns().back(), "seconds");
+  const std::vector<std::pair<const char*, const char*>> cells = {
+      {"correction_casts", "2"},
+      {"correction_moved_mm", "0.25"},
+      {"correction_last_mm", "0.125"},
+      {"correction_defect_change", "nan"},
+      {"correction_stood_still", "1"}};
+  for (const auto& [name, text] : cells) EXPECT_EQ(table.text(0, name), text) << name;
+  EXPECT_EQ(table.number(0, "correction_defect_rms"), 1.0 / 3);
+  EXPECT_EQ(table.text(1, "correction_casts"), "");
+  EXPECT_EQ(table.text(1, "correction_stood_still"), "");
+  const CsvTable without = registrations_table(Rows{plain});
+  EXPECT_EQ(without.columns().size() + 6, table.columns().size());
 }
 
 TEST(RegistrationRows, TableHasTheContractsColumnsWithTimingsLast) {
@@ -387,6 +413,68 @@ TEST(MethodComparison, OfAHandBuiltRunIsTheKnownOne) {
               testing::HasSubstr("| 100 [34, 100] / 0 [0, 79] / 0 [0, 79] | 2 / 1 / 1 | 0.300, "
                                  "0.300 | 0.224, 2.000 | 102 |"));
   EXPECT_EQ(methods_table(found).text(0, "successes_0_8_mm"), "2");
+}
+
+/// A run of one case whose gold pose turns the CT by a right angle about z.
+EvaluationRun run_with_ends(const test::ScratchFolder& folder, const Rows& rows) {
+  write_text_file(folder / "registrations.csv", registrations_table(rows).to_text());
+  EvaluationRun run{folder.path(), "registration", {}};
+  const json gold = {{0, -1, 0, 5}, {1, 0, 0, 6}, {0, 0, 1, 7}, {0, 0, 0, 1}};
+  run.summary["cases"] = json::array({{{"case", "skull"},
+                                       {"gold_room_from_ct", gold},
+                                       {"center_ct_mm", {1, 2, 3}},
+                                       {"target_box_ct_mm", {{-9, -8, -7}, {11, 12, 13}}}}});
+  return run;
+}
+
+TEST(PoseDistances, OfTwoRunsAreThoseOfTheirEndsFromTheSameStarts) {
+  const test::ScratchFolder a;
+  const test::ScratchFolder b;
+  Rows first = {row("field", 0, 1, 0.2),
+                row("field", 1, 1, 0.2),
+                row("field", 2, 1, 0.2),
+                row("field", 3, 1, std::nan(""))};
+  for (RegistrationRow& each : first)
+    if (each.start_index < 3) each.final_deg_mm = {1, 2, 3, 4, 5, 6};
+  Rows second = first;
+  // Translations: the distance is their length, for every point of the box.
+  second[0].final_deg_mm = {1, 2, 3, 4 + 0.3, 5, 6 - 0.4};
+  second[1].final_deg_mm = {1, 2, 3, 4, 5 + 0.1, 6};
+  second[2].start_deg_mm[0] = 1.0;  // another start
+  const std::vector<PoseDistanceRow> found =
+      pose_distances({run_with_ends(a, first), run_with_ends(b, second)});
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].case_name, "skull");
+  EXPECT_EQ(found[0].distance_mm.count, 2u);
+  // Sums of coordinates of some 10 mm in double precision.
+  constexpr double kRounding = 1e-12;
+  EXPECT_NEAR(found[0].distance_mm.median, 0.3, kRounding);
+  EXPECT_NEAR(found[0].distance_mm.maximum, 0.5, kRounding);
+  EXPECT_EQ(pose_distances_table(found).text(0, "starts"), "2");
+  EXPECT_THAT(pose_distances_markdown(found), testing::HasSubstr("| 2 | 0.3000, "));
+}
+
+TEST(PoseDistances, OfARotationDependOnWhereTheBoxIs) {
+  const test::ScratchFolder a;
+  const test::ScratchFolder b;
+  Rows first = {row("field", 0, 1, 0.2)};
+  first[0].final_deg_mm = {0, 0, 0, 0, 0, 0};
+  Rows second = first;
+  second[0].final_deg_mm = {0, 0, 1, 0, 0, 0};
+  EvaluationRun far = run_with_ends(a, first);
+  // A box of 2 mm about a point 100 mm from the centre along the CT's x: chords of 100 mm.
+  far.summary["cases"][0]["target_box_ct_mm"] = {{100, 1, 2}, {102, 3, 4}};
+  const std::vector<PoseDistanceRow> found = pose_distances({far, run_with_ends(b, second)});
+  EXPECT_NEAR(found.at(0).distance_mm.median, 200 * std::sin(0.5 * kRadPerDeg), 1e-3);
+}
+
+TEST(PoseDistances, OfARunThatStatesNoTargetAreAFileError) {
+  const test::ScratchFolder folder;
+  EvaluationRun run = run_with_ends(folder, {row("field", 0, 1, 0.2)});
+  run.summary["cases"][0].erase("center_ct_mm");
+  EXPECT_THROW(pose_distances({run}), FileError);
+  run.summary["cases"] = json::array();
+  EXPECT_THROW(pose_distances({run}), FileError);
 }
 
 TEST(MethodComparison, OfARunWithoutSuccessHasNoErrors) {

@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluate/registration/pose_distances.h"
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "base/error.h"
+#include "geometry/rigid_transform.h"
+#include "gold_standard/target_box.h"
+#include "gold_standard/tre.h"
+
+namespace af::evaluation {
+namespace {
+
+using nlohmann::json;
+
+/// What the poses of a case's rows are relative to, and what moves with them.
+struct CaseTarget {
+  PoseFrame gold_frame;
+  std::vector<Eigen::Vector3d> points_ct_mm;
+};
+
+struct EndPose {
+  std::string start;  ///< its six cells
+  RigidTransform room_from_ct;
+};
+
+/// The registrations of one case by one renderer of a run.
+struct MethodEnds {
+  std::string run, renderer, case_name;
+  std::vector<Eigen::Vector3d> points_ct_mm;
+  std::map<std::int64_t, EndPose> ends;  ///< by start index; those with a pose
+};
+
+Eigen::Vector3d point_of(const json& values) {
+  return {values.at(0).get<double>(), values.at(1).get<double>(), values.at(2).get<double>()};
+}
+
+CaseTarget target_of(const json& of_case) {
+  RigidTransform gold = RigidTransform::Identity();
+  const json& rows = of_case.at("gold_room_from_ct");
+  for (int row = 0; row < 3; ++row)
+    for (int column = 0; column < 4; ++column)
+      gold.matrix()(row, column) =
+          rows.at(static_cast<std::size_t>(row)).at(static_cast<std::size_t>(column)).get<double>();
+  const json& box = of_case.at("target_box_ct_mm");
+  return {PoseFrame::about(gold, point_of(of_case.at("center_ct_mm"))),
+          target_points({point_of(box.at(0)), point_of(box.at(1))})};
+}
+
+std::map<std::string, CaseTarget> targets_of(const EvaluationRun& run) {
+  std::map<std::string, CaseTarget> targets;
+  try {
+    for (const json& of_case : run.summary.at("cases"))
+      targets[of_case.at("case").get<std::string>()] = target_of(of_case);
+  } catch (const json::exception&) {
+    throw FileError((run.folder / "summary.json").string(),
+                    "cases",
+                    "gold_room_from_ct, center_ct_mm and target_box_ct_mm of every case",
+                    "a run of an earlier version, or damage: --pose-distances needs them");
+  }
+  return targets;
+}
+
+std::array<double, 6> numbers_of(const CsvTable& table, std::size_t row, const char* prefix) {
+  std::array<double, 6> values{};
+  for (std::size_t i = 0; i < values.size(); ++i)
+    values[i] = table.number_or_nan(row, std::string(prefix) + kParameterNames[i]);
+  return values;
+}
+
+std::string start_text(const CsvTable& table, std::size_t row) {
+  std::string text;
+  for (const char* name : kParameterNames)
+    text += table.text(row, std::string("start_") + name) + ' ';
+  return text;
+}
+
+std::vector<MethodEnds> ends_of(const EvaluationRun& run) {
+  const std::map<std::string, CaseTarget> targets = targets_of(run);
+  std::map<std::pair<std::string, std::string>, MethodEnds> methods;
+  run.read_in_parts("registrations.csv", [&](const CsvTable& table) {
+    for (std::size_t row = 0; row < table.row_count(); ++row) {
+      const std::string& name = table.text(row, "case");
+      const auto target = targets.find(name);
+      if (target == targets.end())
+        throw FileError((run.folder / "summary.json").string(),
+                        "cases",
+                        "the case '" + name + "' of registrations.csv",
+                        "none of this name");
+      const std::string& renderer = table.text(row, "renderer");
+      MethodEnds& method = methods[{name, renderer}];
+      if (method.run.empty())
+        method = {run.folder.filename().string(), renderer, name, target->second.points_ct_mm, {}};
+      const RigidTransform pose =
+          pose_from_parameters(target->second.gold_frame,
+                               PoseParameters::from_deg_and_mm(numbers_of(table, row, "final_")));
+      if (pose.matrix().allFinite())
+        method.ends[static_cast<std::int64_t>(table.number(row, "start_index"))] = {
+            start_text(table, row), pose};
+    }
+  });
+  std::vector<MethodEnds> all;
+  for (auto& [key, method] : methods) all.push_back(std::move(method));
+  return all;
+}
+
+/// Of starts that both have.
+std::vector<double> distances_mm(const MethodEnds& a, const MethodEnds& b) {
+  std::vector<double> distances;
+  for (const auto& [index, end] : a.ends) {
+    const auto other = b.ends.find(index);
+    if (other == b.ends.end() || other->second.start != end.start) continue;
+    distances.push_back(mean_tre_mm(end.room_from_ct, other->second.room_from_ct, a.points_ct_mm));
+  }
+  return distances;
+}
+
+}  // namespace
+
+std::vector<PoseDistanceRow> pose_distances(const std::vector<EvaluationRun>& runs) {
+  std::vector<MethodEnds> methods;
+  for (const EvaluationRun& run : runs)
+    if (run.kind == "registration")
+      for (MethodEnds& method : ends_of(run)) methods.push_back(std::move(method));
+  std::vector<PoseDistanceRow> rows;
+  for (std::size_t i = 0; i < methods.size(); ++i)
+    for (std::size_t k = i + 1; k < methods.size(); ++k) {
+      const MethodEnds& a = methods[i];
+      const MethodEnds& b = methods[k];
+      if (a.case_name != b.case_name) continue;
+      const std::vector<double> distances = distances_mm(a, b);
+      if (!distances.empty())
+        rows.push_back({a.case_name, a.run, a.renderer, b.run, b.renderer, summarize(distances)});
+    }
+  return rows;
+}
+
+CsvTable pose_distances_table(const std::vector<PoseDistanceRow>& rows) {
+  CsvTable table({"case",
+                  "run_a",
+                  "renderer_a",
+                  "run_b",
+                  "renderer_b",
+                  "starts",
+                  "median_distance_mm",
+                  "p95_distance_mm",
+                  "max_distance_mm"});
+  for (const PoseDistanceRow& row : rows)
+    table.add_row({row.case_name,
+                   row.run_a,
+                   row.renderer_a,
+                   row.run_b,
+                   row.renderer_b,
+                   std::to_string(row.distance_mm.count),
+                   number_text(row.distance_mm.median),
+                   number_text(row.distance_mm.percentile_95),
+                   number_text(row.distance_mm.maximum)});
+  return table;
+}
+
+std::string pose_distances_markdown(const std::vector<PoseDistanceRow>& rows) {
+  if (rows.empty()) return "";
+  std::string text =
+      "| Case | End poses of | and of | Starts | Distance, mm: median, 95th percentile, maximum "
+      "|\n|---|---|---|---|---|\n";
+  for (const PoseDistanceRow& row : rows)
+    text += "| " + row.case_name + " | " + row.run_a + " " + row.renderer_a + " | " + row.run_b +
+            " " + row.renderer_b + " | " + std::to_string(row.distance_mm.count) + " | " +
+            fixed_text(row.distance_mm.median, 4) + ", " +
+            fixed_text(row.distance_mm.percentile_95, 4) + ", " +
+            fixed_text(row.distance_mm.maximum, 4) + " |\n";
+  return text;
+}
+
+}  // namespace af::evaluation
