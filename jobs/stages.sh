@@ -155,9 +155,10 @@ stage() {
 
 # end_stage STATUS COMMAND...: ends the script, unless the command has done its work.
 end_stage() {
-  local status=$1
+  local status=$1 program=$2
   shift
-  if ((status == 7)) && [[ "$(basename "$1")" == af-register ]]; then
+  [[ "$program" != run_ranks ]] || program=$3
+  if ((status == 7)) && [[ "$(basename "$program")" == af-register ]]; then
     say "        Nothing was found; the results say why: $(value_of -o "$@")"
   elif ((status == 75)); then
     die 75 "$current_stage was stopped with its progress saved: run the same command again"

@@ -50,7 +50,7 @@ NamedSource source_of_options(const PrecomputeOptions& options,
                               std::vector<std::string>& warnings) {
   NamedSource source;
   source.ct_path = options.ct;
-  source.rig = read_rig(options.rig, communicator, &warnings);
+  source.rig = shared_rig(options.rig, communicator, &warnings);
   source.camera = options.camera;
   if (options.camera.empty()) {
     std::vector<std::string> cameras;
@@ -70,7 +70,7 @@ NamedSource named_source(const PrecomputeOptions& options,
                          const Communicator& communicator,
                          std::vector<std::string>& warnings) {
   if (!options.study.empty()) {
-    const Study study = read_study(options.study, communicator, &warnings);
+    const Study study = shared_study(options.study, communicator, &warnings);
     return all_or_none(communicator, [&] { return source_of_study(options, study); });
   }
   all_or_none(communicator, [&] {

@@ -39,7 +39,7 @@ void run(const RegisterOptions& options,
   af::RunFolder folder({options.output_folder, result_file_names(), options.resume.restarts},
                        world);
   std::vector<std::string> study_warnings;
-  const af::Study study = af::read_study(options.study, world, &study_warnings);
+  const af::Study study = af::shared_study(options.study, world, &study_warnings);
   for (const std::string& text : study_warnings) af::warn(world, text);
   const af::StudyCase study_case =
       af::all_or_none(world, [&] { return study.find_case(options.case_name); });

@@ -151,7 +151,7 @@ class ByteReader {
   }
   void take_raw(void* first, std::size_t count) {
     require(count <= bytes_.size());
-    std::memcpy(first, bytes_.data(), count);
+    if (count > 0) std::memcpy(first, bytes_.data(), count);
     bytes_ = bytes_.subspan(count);
   }
   template <typename List>
@@ -160,11 +160,13 @@ class ByteReader {
     take(count);
     // Every element takes a byte at least, so a hostile count asks for no more than the record has.
     require(count <= bytes_.size());
-    list.resize(static_cast<std::size_t>(count));
-    if constexpr (PlainList<List>)
+    if constexpr (PlainList<List>) {
+      list.resize(static_cast<std::size_t>(count));
       take_raw(list.data(), list.size() * sizeof(*list.data()));
-    else
-      for (auto& element : list) take(element);
+    } else {
+      // One by one: an element in memory may be far larger than the byte that it takes at least.
+      for (std::uint64_t i = 0; i < count; ++i) take(list.emplace_back());
+    }
   }
 
   std::span<const std::byte> bytes_;

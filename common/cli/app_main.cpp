@@ -121,12 +121,13 @@ int app_main(CLI::App& app,
   std::optional<StallWatch> watch;
   const double stall_minutes = run_limits().stall_minutes;
   if (stall_minutes > 0.0) {
-    alarm.emplace(stall_minutes, [&app] { end_alone(app, "it begins"); });
+    if (world.size() > 1) alarm.emplace(stall_minutes, [&app] { end_alone(app, "it begins"); });
     watch.emplace(world, stall_minutes, [&app](const std::string& stall) { end_job(app, stall); });
     alarm.reset();
   }
   const OnLeaving begin_to_end([&] {
-    if (watch.has_value()) alarm.emplace(stall_minutes, [&app] { end_alone(app, "it ends"); });
+    if (watch.has_value() && world.size() > 1)
+      alarm.emplace(stall_minutes, [&app] { end_alone(app, "it ends"); });
   });
   RankFailure failure;
   bool is_known_everywhere = false;

@@ -13,8 +13,11 @@ void bind_lists(CLI::App& app, const std::map<std::string, std::string>& lists) 
   for (const auto& [name, text] : lists) names.push_back(name);
   app.add_option_function<std::string>(
          "--list",
-         // CLI11 prints the text of this "error" as it is, on one rank, with exit code 0.
-         [lists](const std::string& name) { throw CLI::CallForVersion(lists.at(name), 0); },
+         // CLI11 prints the text of this "error" and ends the line, on one rank, with exit code 0.
+         [lists](const std::string& name) {
+           const std::string& text = lists.at(name);
+           throw CLI::CallForVersion(text.substr(0, text.find_last_not_of('\n') + 1), 0);
+         },
          "Print what there is to choose from, one a line, columns between tabs, and exit")
       ->check(CLI::IsMember(names))
       ->trigger_on_parse();

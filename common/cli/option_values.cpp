@@ -56,7 +56,8 @@ void check_values(const CLI::Option& option) {
   if (option.get_expected_max() == 0) return;  // a flag
   for (const std::string& value : option.results())
     if (const std::string problem = problem_of(option.get_type_name(), value); !problem.empty())
-      throw CLI::ValidationError(option.get_name(), "'" + value + "' " + problem);
+      throw CLI::ValidationError(option.get_name(),
+                                 std::string("'").append(value).append("' ").append(problem));
 }
 
 }  // namespace

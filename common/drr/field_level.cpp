@@ -32,7 +32,7 @@ NodeRange halved_range(const NodeRange& fine, const GridAxis& coarse) {
   return {begin, end - begin};
 }
 
-SlabGeometry halved_lattice(const SlabGeometry& fine) {
+SlabGeometry halved_geometry(const SlabGeometry& fine) {
   SlabGeometry coarse = fine;
   coarse.s = halved_axis(fine.s, "s");
   coarse.t = halved_axis(fine.t, "t");
@@ -141,7 +141,7 @@ void decode_slab(const CompressedAttenuationField& field,
   const SlabGeometry& fine = field.light_slab.slabs[k];
   const auto decode_tiles = select_kernel<DecodeTiles>(
       kernels_128::decode_tiles, kernels_256::decode_tiles, kernels_512::decode_tiles);
-  const SlabGeometry coarse = halved_lattice(fine);
+  const SlabGeometry coarse = halved_geometry(fine);
   std::array<BorderedPlane, 4> planes{BorderedPlane(fine, coarse),
                                       BorderedPlane(fine, coarse),
                                       BorderedPlane(fine, coarse),
@@ -188,9 +188,9 @@ void halve_slab(const FieldLevelSlab& from,
                 const FieldLevelSlab& to,
                 Share viewpoints,
                 std::span<std::uint16_t> samples) {
-  const SlabGeometry& fine = from.lattice;
-  BorderedPlane plane(fine, to.lattice);
-  Halving halve(to.lattice);
+  const SlabGeometry& fine = from.geometry;
+  BorderedPlane plane(fine, to.geometry);
+  Halving halve(to.geometry);
   for (int viewpoint = viewpoints.begin; viewpoint < viewpoints.end; ++viewpoint) {
     const auto at = static_cast<std::size_t>(viewpoint);
     const std::uint16_t* source = from.samples.data() + at * from.samples_per_viewpoint();
@@ -251,7 +251,7 @@ FieldLevel decode_field_level(const CompressedAttenuationField& field,
   FieldLevel result{level, field.light_slab, field.quantizer_step, {}};
   for (std::size_t k = 0; k < field.slabs.size(); ++k) {
     const SlabGeometry& fine = field.light_slab.slabs[k];
-    FieldLevelSlab slab{level == 0 ? fine : halved_lattice(fine), {}};
+    FieldLevelSlab slab{level == 0 ? fine : halved_geometry(fine), {}};
     slab.samples = padded_samples(result, slab, memory, [&](auto samples, int part, int parts) {
       const int u_tiles = field.lattice(k).u.stored.tiles();
       decode_slab(field, k, slab, level, share_of(u_tiles, part, parts), samples);
@@ -264,7 +264,7 @@ FieldLevel decode_field_level(const CompressedAttenuationField& field,
 FieldLevel next_field_level(const FieldLevel& level, const FieldLevelMemory& memory) {
   FieldLevel result{level.level + 1, level.coverage, level.quantizer_step, {}};
   for (const FieldLevelSlab& from : level.slabs) {
-    FieldLevelSlab slab{halved_lattice(from.lattice), {}};
+    FieldLevelSlab slab{halved_geometry(from.geometry), {}};
     slab.samples = padded_samples(result, slab, memory, [&](auto samples, int part, int parts) {
       const auto viewpoints = static_cast<int>(level.viewpoint_count());
       halve_slab(from, slab, share_of(viewpoints, part, parts), samples);

@@ -18,12 +18,12 @@ inline constexpr std::size_t kFieldLevelPadding = 16;
 /// One slab of a field that is held as plain 16-bit samples, [u][v][t][s] with s fastest (s runs
 /// along the detector's columns, so a row of viewpoint samples is a row of a DRR).
 struct FieldLevelSlab {
-  SlabGeometry lattice;                ///< this level's (s,t) nodes; stored ranges need not be even
+  SlabGeometry geometry;               ///< this level's (s,t) nodes; stored ranges need not be even
   SharedArray<std::uint16_t> samples;  ///< kFieldLevelPadding more than the nodes
 
   [[nodiscard]] std::size_t samples_per_viewpoint() const {
-    return static_cast<std::size_t>(lattice.stored_s.count) *
-           static_cast<std::size_t>(lattice.stored_t.count);
+    return static_cast<std::size_t>(geometry.stored_s.count) *
+           static_cast<std::size_t>(geometry.stored_t.count);
   }
 };
 

@@ -17,17 +17,16 @@ using PoolPointer = std::shared_ptr<ThreadPool>;
 struct KnownLookUp {
   const char* name;
   const char* help;
-  RendererPointer (*make)(FieldPointer field, PoolPointer pool);
+  RendererPointer (*make)(FieldPointer field, const PoolPointer& pool);
 };
 
 template <FieldInterpolation interpolation>
-RendererPointer make_literal(FieldPointer field, PoolPointer /*pool*/) {
+RendererPointer make_literal(FieldPointer field, const PoolPointer& /*pool*/) {
   return std::make_shared<const AfDrr>(std::move(field), interpolation);
 }
 template <AxisInterpolation st, AxisInterpolation uv>
-RendererPointer make_two_pass(FieldPointer field, PoolPointer pool) {
-  return std::make_shared<const TwoPassAfDrr>(
-      std::move(field), TwoPassOptions{st, uv}, std::move(pool));
+RendererPointer make_two_pass(FieldPointer field, const PoolPointer& pool) {
+  return std::make_shared<const TwoPassAfDrr>(std::move(field), TwoPassOptions{st, uv}, pool);
 }
 
 using enum AxisInterpolation;
@@ -56,7 +55,7 @@ std::string field_look_up_help() {
 RendererPointer make_field_renderer(FieldPointer field,
                                     const std::string& look_up,
                                     PoolPointer pool) {
-  return required_row(kLookUps, "look-up", look_up).make(std::move(field), std::move(pool));
+  return required_row(kLookUps, "look-up", look_up).make(std::move(field), pool);
 }
 
 }  // namespace af

@@ -152,7 +152,7 @@ SlabImages blended_images(const ViewpointBlender& blender,
     images.source_z = workspace.blended[2].reserve(stride, footprint.t().count);
   }
   blender.blend(k, rays, footprint, workspace.scratch, images);
-  return {grid_of(blender.lattice(k), footprint, stride),
+  return {grid_of(blender.slab(k), footprint, stride),
           {images.value, images.source_x, images.source_z}};
 }
 

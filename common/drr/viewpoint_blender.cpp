@@ -123,7 +123,7 @@ class AnyBlender : public ViewpointBlender {
              const Footprint& footprint,
              BlendScratch& scratch,
              const BlendedImages& images) const final {
-    const SlabGeometry& slab = lattice(k);
+    const SlabGeometry& slab = this->slab(k);
     const StoredNodes stored = stored_nodes(slab, footprint);
     if (stored.s.count > 0 && stored.t.count > 0) {
       const double ratio =
@@ -183,13 +183,13 @@ class CompressedBlender final : public AnyBlender {
   }
 
   [[nodiscard]] const LightSlab& coverage() const override { return field_->light_slab; }
-  [[nodiscard]] const SlabGeometry& lattice(std::size_t k) const override {
+  [[nodiscard]] const SlabGeometry& slab(std::size_t k) const override {
     return field_->light_slab.slabs[k];
   }
   [[nodiscard]] Footprint footprint(std::size_t k,
                                     const SlabRays& rays,
                                     int margin) const override {
-    return {lattice(k), rays, {margin, true}};
+    return {slab(k), rays, {margin, true}};
   }
 
  private:
@@ -263,7 +263,7 @@ class CompressedBlender final : public AnyBlender {
                     const StoredNodes& stored,
                     BlendScratch& scratch,
                     const BlendedImages& images) const override {
-    const SlabGeometry& slab = lattice(k);
+    const SlabGeometry& slab = this->slab(k);
     const std::int64_t t_tiles = slab.stored_t.tiles();
     const std::int64_t v_stride = slab.stored_s.tiles() * t_tiles;
     const std::int64_t u_stride = v_stride * field_->lattice(k).v.stored.tiles();
@@ -308,13 +308,13 @@ class LevelBlender final : public AnyBlender {
   }
 
   [[nodiscard]] const LightSlab& coverage() const override { return level_->coverage; }
-  [[nodiscard]] const SlabGeometry& lattice(std::size_t k) const override {
-    return level_->slabs[k].lattice;
+  [[nodiscard]] const SlabGeometry& slab(std::size_t k) const override {
+    return level_->slabs[k].geometry;
   }
   [[nodiscard]] Footprint footprint(std::size_t k,
                                     const SlabRays& rays,
                                     int margin) const override {
-    return {lattice(k), rays, {margin, false}};
+    return {slab(k), rays, {margin, false}};
   }
 
  private:
@@ -375,8 +375,8 @@ class LevelBlender final : public AnyBlender {
     run.samples =
         slab.samples.data() + scratch.u_taps[first_tap].first * run.u_stride +
         v.first * run.v_stride +
-        static_cast<std::int64_t>(t - slab.lattice.stored_t.begin) * slab.lattice.stored_s.count +
-        (s.begin - slab.lattice.stored_s.begin);
+        static_cast<std::int64_t>(t - slab.geometry.stored_t.begin) * slab.geometry.stored_s.count +
+        (s.begin - slab.geometry.stored_s.begin);
     run.taps = tap_count();
     for (std::size_t tap = 0; tap < static_cast<std::size_t>(run.taps); ++tap) {
       run.u_weights[tap] = scratch.run_weights.data() + 2 * tap * row_length + first_tap;

@@ -51,7 +51,7 @@ class ViewpointBlender {
   /// This geometry decides which rays are outside.
   [[nodiscard]] virtual const LightSlab& coverage() const = 0;
   /// The (s,t) nodes of slab k, in the order of coverage().slabs.
-  [[nodiscard]] virtual const SlabGeometry& lattice(std::size_t k) const = 0;
+  [[nodiscard]] virtual const SlabGeometry& slab(std::size_t k) const = 0;
   [[nodiscard]] virtual Footprint footprint(std::size_t k,
                                             const SlabRays& rays,
                                             int margin) const = 0;

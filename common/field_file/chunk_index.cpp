@@ -35,6 +35,7 @@ ChunkShape chunk_shape(const DatasetRule& rule, int doublings) {
 
 std::vector<ChunkShape> chunk_shapes(const std::vector<DatasetRule>& rules, int doublings) {
   std::vector<ChunkShape> shapes;
+  shapes.reserve(rules.size());
   for (const DatasetRule& rule : rules) shapes.push_back(chunk_shape(rule, doublings));
   return shapes;
 }

@@ -180,6 +180,7 @@ void append_datasets(Struct described, std::vector<Dataset>& datasets) {
             return dataset_of<char>(value.rule, stored_text(*places));
           } else {
             std::vector<std::remove_pointer_t<typename Places::value_type>> numbers;
+            numbers.reserve(places.size());
             for (const auto* place : places) numbers.push_back(*place);
             return dataset_of<typename decltype(numbers)::value_type>(value.rule, numbers);
           }

@@ -11,11 +11,10 @@
 
 namespace af {
 
-/// Half-open, even-aligned range of lattice nodes that a slab stores; the rest of the lattice is
-/// exactly 0.
+/// Half-open range of lattice nodes.
 struct NodeRange {
-  int begin = 0;  ///< even
-  int count = 0;  ///< may be odd only where the range ends at the lattice's last node
+  int begin = 0;
+  int count = 0;
 
   [[nodiscard]] int end() const { return begin + count; }
   [[nodiscard]] int tiles() const { return (count + 1) / 2; }
@@ -23,8 +22,10 @@ struct NodeRange {
 
 /// One axis of a slab's lattice.
 struct LatticeAxis {
-  int nodes = 0;     ///< of the whole lattice
-  NodeRange stored;  ///< of them
+  int nodes = 0;  ///< of the whole lattice
+  /// Of them; the others are exactly 0. It begins at an even node, and its count is odd only where
+  /// it ends at the last node.
+  NodeRange stored;
 };
 
 /// The four axes of one slab's lattice. Its tiles are numbered [u][v][s][t], t fastest.

@@ -155,7 +155,7 @@ RawImage read_values(const fs::path& path,
                      const ImageHeader& header,
                      HuValues& values,
                      std::vector<std::string>& warnings) {
-  const RawImage image =
+  RawImage image =
       read_image_description(path, header, [&](const RawImage& seen) { check_is_ct(seen, path); });
   read_described_values(path, header, image, &warnings, [&](std::span<const std::byte> piece) {
     if (values.hu().empty()) values.reserve(image.voxel_count());

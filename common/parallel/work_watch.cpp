@@ -83,8 +83,10 @@ constexpr double kNsPerMinute = 60e9;
 constexpr std::int64_t kPatienceWithStopped = 2;
 constexpr std::int64_t kPatienceWithHosts = 3;
 
+/// Of more than a year, a year.
 std::int64_t nanoseconds_of(double minutes) {
-  return static_cast<std::int64_t>(minutes * kNsPerMinute);
+  constexpr double kMinutesPerYear = 525600.0;
+  return static_cast<std::int64_t>(std::min(minutes, kMinutesPerYear) * kNsPerMinute);
 }
 
 std::string minutes_text(std::int64_t ns) {
@@ -170,7 +172,7 @@ struct StallWatch::Stuck {
 WaitAlarm::WaitAlarm(double limit_minutes, std::function<void()> on_end)
     : thread_([this, limit_minutes, on_end = std::move(on_end)] {
         constexpr std::chrono::milliseconds kTick(10);
-        const auto ticks = static_cast<std::int64_t>(limit_minutes * kNsPerMinute / 1e7) + 1;
+        const std::int64_t ticks = nanoseconds_of(limit_minutes) / 10'000'000 + 1;
         for (std::int64_t i = 0; i < ticks; ++i) {
           if (is_over_) return;
           std::this_thread::sleep_for(kTick);

@@ -142,6 +142,15 @@ UnfinishedWork read_manifest(const fs::path& path, std::int64_t least_plan) {
   }
 }
 
+/// Programs before this format kept a field's units so.
+std::vector<fs::path> files_of_older_programs(const fs::path& folder) {
+  std::vector<fs::path> found;
+  for (const auto& entry : fs::directory_iterator(folder))
+    if (entry.path().filename() == "manifest.json" || entry.path().extension() == ".shard")
+      found.push_back(entry.path());
+  return found;
+}
+
 /// Stands beside the manifest when the options of the work were refused.
 fs::path refused_path(const JournalFiles& files) {
   return files.folder / (files.name + ".refused");
@@ -190,6 +199,8 @@ bool JournalFiles::read(const RecordPlace& place,
 
 ProgressJournal::ProgressJournal(const UnfinishedWork& work)
     : files_{work.folder, work.name}, plan_(work.plan) {
+  if (work.restarts && is_there(files_.folder) && !fs::is_directory(files_.folder))
+    fs::remove_all(files_.folder);
   make_output_folder(files_.folder);
   try {
     open(work);
@@ -199,7 +210,12 @@ ProgressJournal::ProgressJournal(const UnfinishedWork& work)
 }
 
 void ProgressJournal::open(const UnfinishedWork& work) {
-  const bool goes_on = is_there(files_.manifest()) && takes_over(work);
+  if (work.restarts)
+    for (const fs::path& older : files_of_older_programs(files_.folder)) fs::remove_all(older);
+  else if (!work.gives_way && !files_of_older_programs(files_.folder).empty())
+    throw FileError(files_.folder.string(),
+                    "holds unfinished work of an older program: start over with --restart");
+  const bool goes_on = !work.restarts && is_there(files_.manifest()) && takes_over(work);
   fs::remove_all(refused_path(files_));
   if (goes_on) {
     for (const JournalShard& shard : files_.shards()) run_ = shard.run + 1;
@@ -207,6 +223,7 @@ void ProgressJournal::open(const UnfinishedWork& work) {
   }
   // Without a manifest we cannot tell what records belong to.
   for (const JournalShard& shard : files_.shards()) fs::remove_all(files_.shard(shard));
+  fs::remove_all(files_.manifest());
   const nlohmann::json written = {{"format", kFormat},
                                   {"format_version", kFormatVersion},
                                   {"decides", work.decides},
@@ -216,7 +233,14 @@ void ProgressJournal::open(const UnfinishedWork& work) {
 
 /// Whether this run goes on with the work that is there.
 bool ProgressJournal::takes_over(const UnfinishedWork& work) {
-  const UnfinishedWork earlier = read_manifest(files_.manifest(), work.plan > 0 ? 1 : 0);
+  UnfinishedWork earlier;
+  try {
+    earlier = read_manifest(files_.manifest(), work.plan > 0 ? 1 : 0);
+  } catch (const FileError&) {
+    if (!work.gives_way) throw;
+    has_replaced_ = true;
+    return false;
+  }
   std::vector<std::string> problems = differences(earlier.decides, work.decides);
   if (problems.empty()) {
     plan_ = earlier.plan;
@@ -228,7 +252,6 @@ bool ProgressJournal::takes_over(const UnfinishedWork& work) {
     throw_if_any(problems, files_.folder.string());
   }
   has_replaced_ = true;
-  fs::remove_all(files_.manifest());
   return false;
 }
 

@@ -37,14 +37,13 @@ void RunFolder::open() {
     const fs::path parent = output_.path.has_parent_path() ? output_.path.parent_path() : ".";
     make_output_folder(output_.files.empty() ? parent : output_.path);
     lock_ = std::make_unique<OutputLock>(output_.path);
-    std::error_code error;
-    if (output_.restarts) fs::remove_all(progress_, error);
-    if (error) throw FileError(progress_.string(), "cannot be removed: " + error.message());
   });
 }
 
 UnfinishedWork RunFolder::unfinished(const std::string& name, DecidingValues decides) const {
-  return {progress_, name, std::move(decides)};
+  UnfinishedWork work{progress_, name, std::move(decides)};
+  work.restarts = output_.restarts;
+  return work;
 }
 
 bool RunFolder::is_stop_requested() const {

@@ -10,9 +10,9 @@
 
 namespace af {
 
-Study read_study(const std::filesystem::path& path,
-                 const Communicator& communicator,
-                 std::vector<std::string>* warnings) {
+Study shared_study(const std::filesystem::path& path,
+                   const Communicator& communicator,
+                   std::vector<std::string>* warnings) {
   std::string study_text;
   std::string rig_text;
   Study study = all_or_none(communicator, [&] {
@@ -32,9 +32,9 @@ Study read_study(const std::filesystem::path& path,
   return study;
 }
 
-CameraRig read_rig(const std::string& name_or_path,
-                   const Communicator& communicator,
-                   std::vector<std::string>* warnings) {
+CameraRig shared_rig(const std::string& name_or_path,
+                     const Communicator& communicator,
+                     std::vector<std::string>* warnings) {
   std::string text;
   CameraRig rig = all_or_none(communicator, [&] {
     if (!communicator.is_root()) return CameraRig();

@@ -16,14 +16,14 @@ namespace af {
 
 /// Collective. read_study() on rank 0; the others are sent what it read. What it throws, every rank
 /// throws. `warnings` are rank 0's.
-Study read_study(const std::filesystem::path& path,
-                 const Communicator& communicator,
-                 std::vector<std::string>* warnings = nullptr);
-
-/// Collective. read_rig() on rank 0, in the same way.
-CameraRig read_rig(const std::string& name_or_path,
+Study shared_study(const std::filesystem::path& path,
                    const Communicator& communicator,
                    std::vector<std::string>* warnings = nullptr);
+
+/// Collective. read_rig() on rank 0, in the same way.
+CameraRig shared_rig(const std::string& name_or_path,
+                     const Communicator& communicator,
+                     std::vector<std::string>* warnings = nullptr);
 
 /// Collective. What `read` returns on rank 0, to the last bit, on every rank; `read` is called
 /// there alone, and what it throws, every rank throws.

@@ -408,7 +408,7 @@ void run_registration(const RegistrationStudyOptions& options,
                  {"starts.csv", "registrations.csv", "cases.csv", "reproduce.sh", "summary.json"},
                  options.resume.restarts},
                 world);
-  const Study study = read_study(options.study, world, &study_warnings);
+  const Study study = shared_study(options.study, world, &study_warnings);
   for (const std::string& text : study_warnings) warn(world, text);
   const std::vector<StudyCase> cases =
       all_or_none(world, [&] { return chosen_cases(options, study); });

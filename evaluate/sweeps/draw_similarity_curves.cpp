@@ -289,7 +289,7 @@ void run_similarity_curves(const SimilarityCurvesOptions& options,
                  options.resume.restarts},
                 world);
   run.open();
-  const Study study = read_study(options.study, world, &warnings);
+  const Study study = shared_study(options.study, world, &warnings);
   for (const std::string& text : warnings) warn(world, text);
   const StudyCase study_case =
       all_or_none(world, [&] { return study.find_case(options.case_name); });

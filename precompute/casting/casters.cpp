@@ -5,6 +5,7 @@
 
 #include "base/named_rows.h"
 #include "precompute/casting/shear_warp_caster.h"
+#include "precompute/casting/trilinear_caster.h"
 
 namespace af {
 namespace {
@@ -12,7 +13,7 @@ namespace {
 using CasterPointer = std::unique_ptr<const FieldCaster>;
 
 CasterPointer make_trilinear(const CasterInputs& inputs) {
-  return std::make_unique<RayCastFieldCaster>(
+  return std::make_unique<TrilinearFieldCaster>(
       inputs.volume, inputs.light_slab, inputs.quantizer, inputs.ray_caster);
 }
 

@@ -1,15 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <span>
-#include <vector>
 
-#include "field/attenuation_quantizer.h"
-#include "geometry/light_slab.h"
 #include "precompute/units/work_unit.h"
-#include "volume/ray_caster.h"
 
 namespace af {
 
@@ -24,31 +19,5 @@ class FieldCaster {
   /// in. Re-entrant.
   virtual void cast(const WorkUnit& unit, std::span<std::uint16_t> samples) const = 0;
 };
-
-/// The reference: trilinear samples along every ray (RayCaster), cut to the unit's slab.
-/// \test RayCastFieldCaster.SamplesEqualSingleRays
-class RayCastFieldCaster final : public FieldCaster {
- public:
-  /// `volume` and `light_slab` must outlive the caster.
-  RayCastFieldCaster(const AttenuationVolume& volume,
-                     const LightSlab& light_slab,
-                     const AttenuationQuantizer& quantizer,
-                     const RayCasterOptions& options);
-
-  void cast(const WorkUnit& unit, std::span<std::uint16_t> samples) const override;
-
- private:
-  const LightSlab& light_slab_;
-  AttenuationQuantizer quantizer_;
-  RayCaster caster_;
-  RigidTransform ct_from_slab_;
-};
-
-/// The cost of casting each unit, in units of one ray through the whole CT, for handing out the
-/// costly units first. Rays that miss the box of all attenuation (`attenuating_corners_ct`, ct
-/// frame) cost little, and a thin slab costs less, because fewer slices are summed.
-std::vector<double> unit_costs(const std::vector<WorkUnit>& units,
-                               const LightSlab& light_slab,
-                               const std::array<Eigen::Vector3d, 8>& attenuating_corners_ct);
 
 }  // namespace af

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "field/attenuation_quantizer.h"
+#include "geometry/light_slab.h"
 #include "precompute/casting/field_caster.h"
 #include "precompute/casting/slab_aligned_volume.h"
 #include "precompute/units/unit_planner.h"

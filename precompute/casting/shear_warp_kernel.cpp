@@ -34,7 +34,7 @@ AF_KERNEL_INLINE Pair unpack(I16 pairs) {
           to_float(reinterpret_cast<I16>(reinterpret_cast<U16>(pairs) >> 16))};
 }
 
-AF_KERNEL_INLINE F16 sample(const ResampledVolume& volume, F16 x, F16 y, F16 z) {
+AF_KERNEL_INLINE F16 sample(const VoxelsToResample& volume, F16 x, F16 y, F16 z) {
   const Cell i = cell_of(x, volume.size[0]);
   const Cell j = cell_of(y, volume.size[1]);
   const Cell k = cell_of(z, volume.size[2]);
@@ -127,7 +127,7 @@ AF_KERNEL_INLINE void add_slices(const int16_t* columns,
 
 }  // namespace
 
-void resample_row(const ResampledVolume& volume, const ResampledRow& row, int16_t* out) {
+void resample_row(const VoxelsToResample& volume, const RowToResample& row, int16_t* out) {
   F16 index = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
   index += static_cast<float>(row.first);
   const F16 scale = splat(row.scale);

@@ -47,7 +47,7 @@ struct ShearScale {
 };
 
 /// A row of trilinear samples of the CT: sample i at start + i * step, in voxel indices.
-struct ResampledRow {
+struct RowToResample {
   float start[3];
   float step[3];
   int32_t first;  ///< the i to begin with
@@ -56,7 +56,7 @@ struct ResampledRow {
 };
 
 /// Voxels of a bordered volume, i fastest.
-struct ResampledVolume {
+struct VoxelsToResample {
   const uint16_t* voxels;
   int32_t size[3];
 };
@@ -65,7 +65,9 @@ namespace shear_warp {
 
 /// out[n] = round(scale * trilinear sample first + n); exactly 0 outside the volume. Writes whole
 /// vectors of 16.
-using ResampleRow = void (*)(const ResampledVolume& volume, const ResampledRow& row, int16_t* out);
+using ResampleRow = void (*)(const VoxelsToResample& volume,
+                             const RowToResample& row,
+                             int16_t* out);
 
 /// First pass: rows[x - first_x][j] = slice interpolated in z, for x in [first_x, first_x +
 /// row_count); both are multiples of kShearColumns.
@@ -75,8 +77,8 @@ using InterpolateColumns = void (*)(const ShearColumns& columns,
                                     int16_t* rows);
 
 /// Second pass: adds 256 times the sum over the block's slices, interpolated in x, to the
-/// accumulators of nodes [first_node, end_node). `sums` is that of node 0 of the tile: [i -
-/// first_row_node][kShearColumns].
+/// accumulators of nodes [first_node, end_node), of which `sums_of_first_node` is the first's:
+/// kShearColumns sums per node.
 using AccumulateNodes = void (*)(const int16_t* rows,
                                  const ShearBlock& block,
                                  int32_t first_node,
@@ -91,22 +93,22 @@ using QuantizeNode = void (*)(const int32_t* sums,
 
 }  // namespace shear_warp
 
-#define AF_DECLARE_SHEAR_WARP_KERNELS(name_space)                                          \
-  namespace name_space {                                                                   \
-  void resample_row(const ResampledVolume& volume, const ResampledRow& row, int16_t* out); \
-  void interpolate_columns(const ShearColumns& columns,                                    \
-                           int32_t first_x,                                                \
-                           int32_t row_count,                                              \
-                           int16_t* rows);                                                 \
-  void accumulate_nodes(const int16_t* rows,                                               \
-                        const ShearBlock& block,                                           \
-                        int32_t first_node,                                                \
-                        int32_t end_node,                                                  \
-                        int32_t* sums);                                                    \
-  void quantize_node(const int32_t* sums,                                                  \
-                     const ShearScale& scale,                                              \
-                     float slope_squared_s,                                                \
-                     uint16_t* samples);                                                   \
+#define AF_DECLARE_SHEAR_WARP_KERNELS(name_space)                                            \
+  namespace name_space {                                                                     \
+  void resample_row(const VoxelsToResample& volume, const RowToResample& row, int16_t* out); \
+  void interpolate_columns(const ShearColumns& columns,                                      \
+                           int32_t first_x,                                                  \
+                           int32_t row_count,                                                \
+                           int16_t* rows);                                                   \
+  void accumulate_nodes(const int16_t* rows,                                                 \
+                        const ShearBlock& block,                                             \
+                        int32_t first_node,                                                  \
+                        int32_t end_node,                                                    \
+                        int32_t* sums);                                                      \
+  void quantize_node(const int32_t* sums,                                                    \
+                     const ShearScale& scale,                                                \
+                     float slope_squared_s,                                                  \
+                     uint16_t* samples);                                                     \
   }
 AF_DECLARE_SHEAR_WARP_KERNELS(kernels_128)
 AF_DECLARE_SHEAR_WARP_KERNELS(kernels_256)

@@ -96,8 +96,8 @@ class RowSampler {
   const SlabAlignedGrid& grid_;
   IndexFromSlab index_from_slab_;
   std::array<int, 3> size_;
-  ResampledVolume voxels_;
-  ResampledRow kernel_row_{};
+  VoxelsToResample voxels_;
+  RowToResample kernel_row_{};
   std::vector<std::int16_t> tap_;
   std::vector<std::int32_t> sums_;
   shear_warp::ResampleRow resample_row_ = select_kernel<shear_warp::ResampleRow>(

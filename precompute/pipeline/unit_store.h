@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "parallel/communicator.h"
-#include "precompute/codebook/field_encoder.h"
+#include "precompute/codebook/unit_encoding.h"
 #include "precompute/units/unit_tiles.h"
 #include "run/progress_store.h"
 

@@ -19,33 +19,6 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-std::string view_name(const RegistrationView& view) {
-  return "view '" + view.view.camera.name + "': ";
-}
-
-bool has_size_of(const Image2d& image, const CameraGeometry& camera) {
-  return image.width == camera.size_px.x() && image.height == camera.size_px.y();
-}
-
-void append_view_problems(const RegistrationView& view, std::vector<std::string>& found) {
-  const CameraGeometry& camera = view.view.camera;
-  if (!view.renderer) found.push_back(view_name(view) + "renderer = none: must be given");
-  for (const std::string& text : problems(view.view.roi, camera.size_px.x(), camera.size_px.y()))
-    found.push_back(view_name(view) + text);
-  const auto size_text = [](int width, int height) {
-    return std::to_string(width) + " x " + std::to_string(height);
-  };
-  const std::string expected = size_text(camera.size_px.x(), camera.size_px.y());
-  if (!has_size_of(view.xray, camera))
-    found.push_back(view_name(view) +
-                    "X-ray size = " + size_text(view.xray.width, view.xray.height) +
-                    ": must be the camera's " + expected);
-  if (!view.mask.pixels.empty() && !has_size_of(view.mask, camera))
-    found.push_back(view_name(view) +
-                    "mask size = " + size_text(view.mask.width, view.mask.height) +
-                    ": must be the camera's " + expected);
-}
-
 /// The region grown by half its size to every side, cut at the detector's edges.
 RegionOfInterest grown(const RegionOfInterest& roi, const Eigen::Vector2i& size_px) {
   const int left = std::max(0, roi.column - roi.width / 2);
@@ -180,15 +153,6 @@ std::vector<std::string> correction_problems(const RegistrationProblem& problem,
 }
 
 }  // namespace
-
-std::vector<std::string> problems(const RegistrationProblem& problem) {
-  std::vector<std::string> found;
-  if (problem.views.empty()) found.emplace_back("views = none: there must be at least one");
-  if (problem.scaling_points_ct.empty())
-    found.emplace_back("scaling_points_ct = none: there must be at least one");
-  for (const RegistrationView& view : problem.views) append_view_problems(view, found);
-  return found;
-}
 
 struct RegistrationRunner::Impl {
   std::shared_ptr<const RegistrationProblem> problem;

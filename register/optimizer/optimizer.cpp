@@ -73,7 +73,7 @@ void OptimizerOptions::describe(Fields& field) {
       .as("final")
       .above(0.0)
       .finite();
-  field("population", population, "cma-es: points per generation").within(4, 100000);
+  field("population", population, "cma-es: points per generation").within(4, 99999);
 }
 
 std::vector<std::string> problems(const OptimizerOptions& options) {

@@ -16,6 +16,7 @@
 #include "drr/ray_cast_drr.h"
 #include "image/psnr.h"
 #include "precompute/casting/shear_warp_caster.h"
+#include "precompute/casting/trilinear_caster.h"
 #include "support/itk_comparison.h"
 
 namespace af::benchmark {
@@ -26,7 +27,7 @@ constexpr const char* kReference = "reference RayCaster, DRR, 1 mm";
 constexpr const char* kItk = "itk::RayCastInterpolateImageFunction, DRR";
 constexpr const char* kPlastimatch = "plastimatch drr exact, DRR";
 constexpr const char* kShearWarp = "ShearWarpFieldCaster, field";
-constexpr const char* kFieldReference = "RayCastFieldCaster, field, 1 mm";
+constexpr const char* kFieldReference = "TrilinearFieldCaster, field, 1 mm";
 
 std::size_t rays_of(const std::vector<WorkUnit>& units) {
   return std::accumulate(
@@ -139,7 +140,7 @@ void run(const CaseOptions& options, const std::string& work_folder) {
   });
   const ShearWarpFieldCaster shear_warp(
       *resampled, benchmark_case.light_slab(), benchmark_case.quantizer());
-  const RayCastFieldCaster field_reference(
+  const TrilinearFieldCaster field_reference(
       *benchmark_case.volume(), benchmark_case.light_slab(), benchmark_case.quantizer(), {});
   const std::vector<WorkUnit> units = benchmark_case.units();
   const std::vector<WorkUnit> some_units = evenly_spread(units, options.is_quick ? 1 : 4);

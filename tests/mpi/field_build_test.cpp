@@ -11,6 +11,9 @@
 #include "base/error.h"
 #include "base/stored_bytes.h"
 #include "base/vector_width.h"
+#include "precompute/casting/trilinear_caster.h"
+#include "precompute/casting/unit_costs.h"
+#include "precompute/pipeline/field_encoder.h"
 #include "precompute/pipeline/training_checkpoints.h"
 #include "precompute/units/unit_planner.h"
 #include "support/ct_phantoms.h"
@@ -116,7 +119,7 @@ class FieldBuildTest : public testing::Test {
   AttenuationQuantizer quantizer_ =
       AttenuationQuantizer::for_maximum(volume_.max_total_attenuation());
   LightSlab light_slab_ = small_light_slab();
-  RayCastFieldCaster caster_{volume_, light_slab_, quantizer_, RayCasterOptions{2.0}};
+  TrilinearFieldCaster caster_{volume_, light_slab_, quantizer_, RayCasterOptions{2.0}};
   static constexpr TrainingSelection kSelection{0.5, 100000, 3};
   std::uint64_t kept_tile_bytes_ = ~std::uint64_t{0};
   TileOverflow overflow_ = TileOverflow::CastAgain;

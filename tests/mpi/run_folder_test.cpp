@@ -134,6 +134,26 @@ TEST(RunFolder, OtherOptionsAreRefusedUntilRestarted) {
   EXPECT_EQ(done_in(restarted, other), 5u);
 }
 
+TEST(RunFolder, RestartKeepsWhatIsThereUntilTheWorkBegins) {
+  const Communicator world = Communicator::world();
+  const test::SharedFolder folder;
+  {
+    RunFolder run(output_in(folder), world);
+    run.open();
+    EXPECT_EQ(done_in(run), 5u);
+  }
+  world.barrier();
+  {
+    // A run whose inputs turn out to be bad comes no further than this.
+    RunFolder restarted(output_in(folder, true), world);
+    restarted.open();
+  }
+  world.barrier();
+  RunFolder again(output_in(folder), world);
+  again.open();
+  EXPECT_EQ(done_in(again), 0u);
+}
+
 TEST(RunFolder, RestartThrowsAwayWhateverHasTheNameOfUnfinishedWork) {
   const Communicator world = Communicator::world();
   using std::filesystem::create_directories;

@@ -40,7 +40,7 @@ TEST(SharedInputs, StudyAndRigAreReadByRankZeroAlone) {
     write_text_file(folder / "study.toml", kStudy);
   }
   // Nothing is there for the others.
-  const Study study = read_study(
+  const Study study = shared_study(
       world.is_root() ? folder / "study.toml" : std::filesystem::path("/nowhere/study.toml"),
       world);
   EXPECT_EQ(study.rig.isocenter_point.x(), 1.0 / 3.0);
@@ -57,7 +57,7 @@ TEST(SharedInputs, RigsAndPosesAreReadByRankZeroAlone) {
   rig.isocenter_point.x() = 1.0 / 3.0;
   if (world.is_root()) write_text_file(folder / "rig.toml", rig_to_toml(rig));
   const std::string here = (folder / "rig.toml").string();
-  const CameraRig read = read_rig(world.is_root() ? here : "/nowhere/rig.toml", world);
+  const CameraRig read = shared_rig(world.is_root() ? here : "/nowhere/rig.toml", world);
   EXPECT_EQ(rig_to_toml(read), rig_to_toml(rig));
 
   RigidTransform pose = RigidTransform::Identity();
@@ -78,12 +78,12 @@ TEST(SharedInputs, RigsAndPosesAreReadByRankZeroAlone) {
 TEST(SharedInputs, WhatRankZeroCannotReadIsTheSameErrorOnEveryRank) {
   const Communicator world = Communicator::world();
   try {
-    static_cast<void>(read_study("/nowhere/study.toml", world));
+    static_cast<void>(shared_study("/nowhere/study.toml", world));
     ADD_FAILURE() << "no error on rank " << world.rank();
   } catch (const Error& error) {
     EXPECT_EQ(error.exit_code(), ExitCode::File);
   }
-  EXPECT_THROW(static_cast<void>(read_rig("/nowhere/rig.toml", world)), Error);
+  EXPECT_THROW(static_cast<void>(shared_rig("/nowhere/rig.toml", world)), Error);
   EXPECT_THROW(static_cast<void>(shared_poses(
                    world, []() -> std::vector<RigidTransform> { throw FileError("p", "torn"); })),
                Error);

@@ -101,6 +101,16 @@ TEST(AfInspect, RefusesADicomFolderWithTwoSeriesUntilOneIsChosen) {
   EXPECT_EQ(entry["facts"]["ct_content_sha256"], ct_content_sha256(ct));
 }
 
+TEST(AfInspect, KnowsUnfinishedWork) {
+  const ScratchFolder folder;
+  std::filesystem::create_directories(folder / "f.h5.progress");
+  std::ofstream(folder / "f.h5.progress" / "units.json")
+      << R"({"decides": {"seed": "1"}, "format": "af-progress-journal", "format_version": 4})";
+  const test::ProgramRun run = inspect((folder / "f.h5.progress").string());
+  EXPECT_EQ(run.exit_code, 0) << run.output;
+  EXPECT_NE(run.output.find("unfinished work"), std::string::npos) << run.output;
+}
+
 TEST(AfInspect, TellsImagesStacksAndCtsApart) {
   const ScratchFolder folder;
   Image2d image(4, 3);

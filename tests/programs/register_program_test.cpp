@@ -288,6 +288,7 @@ TEST_F(RegisterProgram, ListsWhatThereIsToChooseFromWithoutACase) {
   const std::string name = program("af-register");
   const test::ProgramRun measures = test::run_command(name + " --list measures");
   EXPECT_EQ(measures.exit_code, 0);
+  EXPECT_EQ(measures.output.find("\n\n"), std::string::npos) << measures.output;
   EXPECT_NE(measures.output.find("ncc\tgradient\tnormal-equations\tcross-correlation\n"),
             std::string::npos)
       << measures.output;

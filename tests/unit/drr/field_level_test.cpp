@@ -34,8 +34,8 @@ std::shared_ptr<CompressedAttenuationField> cropped_noise(int st_nodes,
 /// A level's sample by its node on the level's lattice; 0 where nothing is stored.
 int sample(const FieldLevel& level, const NodeIndex& node) {
   const FieldLevelSlab& slab = level.slabs[0];
-  const NodeRange& s = slab.lattice.stored_s;
-  const NodeRange& t = slab.lattice.stored_t;
+  const NodeRange& s = slab.geometry.stored_s;
+  const NodeRange& t = slab.geometry.stored_t;
   if (node.s < s.begin || node.s >= s.end() || node.t < t.begin || node.t >= t.end()) return 0;
   const int viewpoint = node.u * level.coverage.v.nodes + node.v;
   const int index = (viewpoint * t.count + node.t - t.begin) * s.count + node.s - s.begin;
@@ -45,14 +45,14 @@ int sample(const FieldLevel& level, const NodeIndex& node) {
 /// Level + 1 by the definition: (1 3 3 1)/8 on both axes, replicated beyond the lattice.
 int halved_sample(const FieldLevel& level, const NodeIndex& node) {
   constexpr std::array<int, 4> kWeights{1, 3, 3, 1};
-  const SlabGeometry& lattice = level.slabs[0].lattice;
+  const SlabGeometry& geometry = level.slabs[0].geometry;
   int sum = 0;
   for (int i = 0; i < 4; ++i)
     for (int j = 0; j < 4; ++j) {
       const NodeIndex fine{node.u,
                            node.v,
-                           std::clamp(2 * node.s - 1 + i, 0, lattice.s.nodes - 1),
-                           std::clamp(2 * node.t - 1 + j, 0, lattice.t.nodes - 1)};
+                           std::clamp(2 * node.s - 1 + i, 0, geometry.s.nodes - 1),
+                           std::clamp(2 * node.t - 1 + j, 0, geometry.t.nodes - 1)};
       sum += kWeights[static_cast<std::size_t>(i)] * kWeights[static_cast<std::size_t>(j)] *
              sample(level, fine);
     }
@@ -60,13 +60,13 @@ int halved_sample(const FieldLevel& level, const NodeIndex& node) {
 }
 
 void expect_halved(const FieldLevel& fine, const FieldLevel& coarse) {
-  const SlabGeometry& lattice = coarse.slabs[0].lattice;
+  const SlabGeometry& geometry = coarse.slabs[0].geometry;
   EXPECT_EQ(coarse.level, fine.level + 1);
-  ASSERT_EQ(lattice.s.nodes, (fine.slabs[0].lattice.s.nodes + 1) / 2);
+  ASSERT_EQ(geometry.s.nodes, (fine.slabs[0].geometry.s.nodes + 1) / 2);
   for (int u = 0; u < coarse.coverage.u.nodes; ++u)
     for (int v = 0; v < coarse.coverage.v.nodes; ++v)
-      for (int s = 0; s < lattice.s.nodes; ++s)
-        for (int t = 0; t < lattice.t.nodes; ++t)
+      for (int s = 0; s < geometry.s.nodes; ++s)
+        for (int t = 0; t < geometry.t.nodes; ++t)
           ASSERT_EQ(sample(coarse, {u, v, s, t}), halved_sample(fine, {u, v, s, t}))
               << u << ' ' << v << ' ' << s << ' ' << t;
 }
@@ -105,8 +105,8 @@ TEST(FieldLevel, CoarseNodesLieMidwayBetweenFineNodes) {
   const auto field = small_field(noise, 1, 5, 12);
   const auto pyramid = make_field_pyramid(*field, 2);
   const GridAxis& fine = field->light_slab.slabs[0].s;
-  const GridAxis& half = pyramid[0]->slabs[0].lattice.s;
-  const GridAxis& quarter = pyramid[1]->slabs[0].lattice.s;
+  const GridAxis& half = pyramid[0]->slabs[0].geometry.s;
+  const GridAxis& quarter = pyramid[1]->slabs[0].geometry.s;
   constexpr double kRounding = 1e-9;  // of double arithmetic on hundreds of mm
   for (int i = 0; i < half.nodes; ++i)
     EXPECT_NEAR(half.position_mm(i), fine.first_mm + (2 * i + 0.5) * fine.spacing_mm(), kRounding);

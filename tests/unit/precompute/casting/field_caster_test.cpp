@@ -6,6 +6,8 @@
 #include <gtest/gtest.h>
 
 #include "base/vector_width.h"
+#include "precompute/casting/trilinear_caster.h"
+#include "precompute/casting/unit_costs.h"
 #include "precompute/units/unit_planner.h"
 #include "support/ct_phantoms.h"
 
@@ -57,7 +59,7 @@ NodeSamples cast_plan(const FieldCaster& caster, const LightSlab& light_slab, Pl
   return by_node;
 }
 
-class RayCastFieldCasterTest : public testing::Test {
+class TrilinearFieldCasterTest : public testing::Test {
  protected:
   RayCasterOptions options_{2.0};
   AttenuationVolume volume_{small_ct(), AttenuationModel{}};
@@ -66,8 +68,8 @@ class RayCastFieldCasterTest : public testing::Test {
   LightSlab light_slab_ = small_light_slab();
 };
 
-TEST_F(RayCastFieldCasterTest, SamplesEqualSingleRays) {
-  const RayCastFieldCaster caster(volume_, light_slab_, quantizer_, options_);
+TEST_F(TrilinearFieldCasterTest, SamplesEqualSingleRays) {
+  const TrilinearFieldCaster caster(volume_, light_slab_, quantizer_, options_);
   const RayCaster single(volume_, options_);
   const RigidTransform ct_from_slab = light_slab_.slab_from_ct.inverse();
   int occupied = 0;
@@ -90,8 +92,8 @@ TEST_F(RayCastFieldCasterTest, SamplesEqualSingleRays) {
   EXPECT_LE(turned_over, 3);
 }
 
-TEST_F(RayCastFieldCasterTest, SamplesDoNotDependOnThePlanOrTheVectorWidth) {
-  const RayCastFieldCaster caster(volume_, light_slab_, quantizer_, options_);
+TEST_F(TrilinearFieldCasterTest, SamplesDoNotDependOnThePlanOrTheVectorWidth) {
+  const TrilinearFieldCaster caster(volume_, light_slab_, quantizer_, options_);
   const NodeSamples expected = cast_plan(caster, light_slab_, {1000000});
   for (const VectorWidth width : supported_vector_widths()) {
     force_vector_width(width);
@@ -101,23 +103,23 @@ TEST_F(RayCastFieldCasterTest, SamplesDoNotDependOnThePlanOrTheVectorWidth) {
   force_vector_width(std::nullopt);
 }
 
-TEST_F(RayCastFieldCasterTest, RaysRunPastThePlane) {
+TEST_F(TrilinearFieldCasterTest, RaysRunPastThePlane) {
   // With the (s,t) plane above the whole CT nothing would be met before it.
   light_slab_.slabs[0].st_plane_y_mm = 300.0;
-  const RayCastFieldCaster caster(volume_, light_slab_, quantizer_, options_);
+  const TrilinearFieldCaster caster(volume_, light_slab_, quantizer_, options_);
   const NodeSamples samples = cast_plan(caster, light_slab_, {1000000});
   EXPECT_TRUE(std::any_of(
       samples.begin(), samples.end(), [](const auto& sample) { return sample.second > 0; }));
 }
 
-TEST_F(RayCastFieldCasterTest, SlabsSumToTheWhole) {
-  const RayCastFieldCaster whole(volume_, light_slab_, quantizer_, options_);
+TEST_F(TrilinearFieldCasterTest, SlabsSumToTheWhole) {
+  const TrilinearFieldCaster whole(volume_, light_slab_, quantizer_, options_);
   const NodeSamples expected = cast_plan(whole, light_slab_, {1000000});
   LightSlab cut = light_slab_;
   cut.slabs.assign(3, light_slab_.slabs[0]);
   cut.slabs[0].y_high_mm = cut.slabs[1].y_low_mm = -8.0;
   cut.slabs[1].y_high_mm = cut.slabs[2].y_low_mm = 5.5;
-  const RayCastFieldCaster caster(volume_, cut, quantizer_, options_);
+  const TrilinearFieldCaster caster(volume_, cut, quantizer_, options_);
   std::map<std::array<int, 4>, double> sums;
   int in_all_slabs = 0;
   for (std::size_t k = 0; k < 3; ++k)

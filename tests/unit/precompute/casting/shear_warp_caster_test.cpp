@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "base/vector_width.h"
+#include "precompute/casting/trilinear_caster.h"
 #include "support/ct_phantoms.h"
 #include "unit/precompute/casting/shear_warp_cases.h"
 
@@ -291,7 +292,7 @@ TEST(ShearWarpFieldCaster, AgreesWithTheReferenceInEverySlab) {
   const LightSlab light_slab = test::cut_at(test::small_light_slab(test::aligned_rotations()[0]),
                                             {-6.6 - 2.1 - kShiftMm, 6.6 - 2.1 - kShiftMm});
   const CastCase cut(test::smooth_ct(), light_slab);
-  const RayCastFieldCaster reference(cut.volume, light_slab, cut.quantizer, {0.25});
+  const TrilinearFieldCaster reference(cut.volume, light_slab, cut.quantizer, {0.25});
   // Boundaries lie midway between slices. There the reference ends sharply where the trapezoidal
   // rule ends with a weight of 1: on a slope mu' the two differ by dy^2 / 8 mu' per boundary. Here
   // mu' <= 0.6 * 2.5 mu_water / 7 mm and dy = 1.2 mm: 0.0008, obliquity included 0.0009.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "precompute/codebook/field_encoder.h"
+#include "precompute/codebook/unit_encoding.h"
 
 #include <numeric>
 

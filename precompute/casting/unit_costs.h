@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "geometry/light_slab.h"
+#include "precompute/units/work_unit.h"
+
+namespace af {
+
+/// The cost of casting each unit, in units of one ray through the whole CT, for handing out the
+/// costly units first. Rays that miss the box of all attenuation (`attenuating_corners_ct`, ct
+/// frame) cost little, and a thin slab costs less, because fewer slices are summed.
+std::vector<double> unit_costs(const std::vector<WorkUnit>& units,
+                               const LightSlab& light_slab,
+                               const std::array<Eigen::Vector3d, 8>& attenuating_corners_ct);
+
+}  // namespace af

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "field_file/field_file.h"
+#include "precompute/codebook/nearest_codeword.h"
+#include "precompute/codebook/unit_encoding.h"
+#include "precompute/pipeline/field_build.h"
+
+namespace af {
+
+/// Encodes units in rounds, for write_field(). Every rank encodes the tiles it has kept; the others
+/// are dealt out such that all ranks have equally many.
+class FieldEncoder {
+ public:
+  /// Collective. `cast` is emptied while encoding and must outlive the encoder.
+  FieldEncoder(const FieldBuild& build,
+               CastPhase& cast,
+               const Codebook& codebook,
+               TileOverflow overflow);
+
+  /// This rank's next units, about kRoundBytes of indices; none when it has no more. Units that an
+  /// earlier run encoded with the same codebook are read. StoppedError, with what is encoded saved,
+  /// when `stop_requested` says so.
+  std::vector<IndexBlock> next_blocks(const ProgressCallback& on_progress = {},
+                                      const StopRequested& stop_requested = {});
+
+  /// Collective. Over all ranks, in squared levels; once all blocks are made.
+  [[nodiscard]] std::uint64_t squared_error() const;
+  /// Collective. Seconds of every rank spent in next_blocks().
+  [[nodiscard]] std::vector<double> busy_seconds() const;
+  /// Units that were to be read back but were damaged, and cast again; this rank's.
+  [[nodiscard]] std::uint64_t units_damaged() const { return units_damaged_; }
+  /// Collective. Units that an earlier run had encoded, over all ranks.
+  [[nodiscard]] std::uint64_t units_resumed() const;
+
+  static constexpr std::size_t kRoundBytes = std::size_t{8} << 20;
+
+ private:
+  void deal_out_others();
+  [[nodiscard]] UnitTiles tiles_again(const WorkUnit& unit);
+  IndexBlock next_block();
+  EncodedUnit encoded(const WorkUnit& unit, bool is_kept);
+
+  const FieldBuild& build_;
+  CastPhase& cast_;
+  NearestCodeword search_;
+  std::uint32_t codebook_crc_;
+  TileOverflow overflow_;
+  std::vector<std::uint32_t> others_;  ///< this rank's units that are not in memory
+  double tiles_in_all_ = 0.0;
+  double tiles_done_ = 0.0;
+  double busy_seconds_ = 0.0;
+  std::uint64_t squared_error_ = 0;
+  std::uint64_t units_damaged_ = 0;
+  std::uint64_t units_resumed_ = 0;
+  std::vector<std::uint16_t> samples_;
+};
+
+}  // namespace af

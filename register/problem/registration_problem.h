@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "drr/drr_renderer.h"
+#include "geometry/rigid_transform.h"
+#include "image/image2d.h"
+#include "register/problem/multi_view_objective.h"
+
+namespace af::registration {
+
+/// A coarser renderer of a view's image pyramid.
+struct RendererLevel {
+  std::shared_ptr<const DrrRenderer> renderer;
+  double blur_sigma_mm = 0.0;  ///< of its DRRs, in mm on the isocentre plane
+};
+
+/// One X-ray of the problem. Pixels are the camera's; nothing is cropped yet.
+struct RegistrationView {
+  View view;     ///< camera and region of interest
+  Image2d xray;  ///< whole detector, attenuation domain (bright = attenuated)
+  Image2d mask;  ///< whole detector, non-zero = used; empty: every pixel of the region
+  /// `mask` without the gold standard's markers; empty: the same. It counts in stages of 400 pixels
+  /// or more where it leaves three quarters of them.
+  Image2d mask_without_markers;
+  std::shared_ptr<const DrrRenderer> renderer;
+  std::vector<RendererLevel> coarse_levels;  ///< levels 1, 2, ... as far as stages need them
+  std::optional<MotionLimit> limit;  ///< motion box of the renderer's field; none for ray casting
+  /// [level] Ray casting, where a correction needs it; else none.
+  std::vector<std::shared_ptr<const DrrRenderer>> ray_casts;
+};
+
+/// "view 'AP': ", before what is wrong with it.
+std::string view_name(const RegistrationView& view);
+
+/// Everything that does not change between the starts of one case.
+struct RegistrationProblem {
+  std::string case_name;  ///< a key of random numbers
+  RigidTransform nominal_room_from_ct = RigidTransform::Identity();
+  Eigen::Vector3d center_ct_mm = Eigen::Vector3d::Zero();     ///< c_roi: origin of all rotations
+  Eigen::Vector3d isocenter_point = Eigen::Vector3d::Zero();  ///< room, mm
+  std::vector<Eigen::Vector3d> scaling_points_ct;             ///< see ct_lattice_points()
+  std::vector<RegistrationView> views;
+  std::vector<Eigen::Vector3d> target_points_ct;  ///< of the target box; a correction needs them
+
+  /// What the parameters in results are relative to.
+  [[nodiscard]] PoseFrame frame() const {
+    return PoseFrame::about(nominal_room_from_ct, center_ct_mm);
+  }
+};
+
+std::vector<std::string> problems(const RegistrationProblem& problem);
+
+}  // namespace af::registration
