@@ -180,8 +180,11 @@ void read_views(TomlTableReader& reader,
         place_of_camera.emplace(camera, context.problems.where(*view_table));
     if (!is_new && !camera.empty())
       context.problems.add(*view_table,
-                           view_prefix + "camera = '" + camera + "': has another view of this " +
-                               "case at " + earlier->second);
+                           std::string(view_prefix)
+                               .append("camera = '")
+                               .append(camera)
+                               .append("': has another view of this case at ")
+                               .append(earlier->second));
   }
 }
 
@@ -217,8 +220,12 @@ void read_cases(TomlTableReader& reader, Study& study, const StudyContext& conte
     const std::string& name = study.cases.back().name;
     const auto [earlier, is_new] = place_of_name.emplace(name, context.problems.where(*table));
     if (!is_new && !name.empty())
-      context.problems.add(
-          *table, prefix + "name = '" + name + "': is the name of the case at " + earlier->second);
+      context.problems.add(*table,
+                           std::string(prefix)
+                               .append("name = '")
+                               .append(name)
+                               .append("': is the name of the case at ")
+                               .append(earlier->second));
   }
 }
 
@@ -291,6 +298,7 @@ std::vector<const StudyCase*> Study::chosen_cases(const std::vector<std::string>
   if (names.empty())
     for (const StudyCase& study_case : cases) chosen.emplace(study_case.name, &study_case);
   std::vector<const StudyCase*> result;
+  result.reserve(chosen.size());
   for (const auto& [name, study_case] : chosen) result.push_back(study_case);
   return result;
 }

@@ -294,9 +294,12 @@ void TomlTableReader::refuse_unknown_keys() {
     const std::string hint = nearest.empty() ? "" : ": did you mean \"" + nearest + "\"?";
     std::string owner = prefix_;
     if (!owner.empty()) owner.back() = ':';  // "case[0]." -> "case[0]:"
+    if (!owner.empty()) owner += ' ';
     problems_.add(value,
-                  owner + (owner.empty() ? "" : " ") + "unknown key \"" +
-                      name.substr(0, kLongestKey) + "\"" + hint);
+                  owner.append("unknown key \"")
+                      .append(name.substr(0, kLongestKey))
+                      .append("\"")
+                      .append(hint));
   }
 }
 

