@@ -3,6 +3,10 @@
 
 #include <algorithm>
 #include <chrono>
+#include <functional>
+#include <numeric>
+#include <queue>
+#include <span>
 #include <utility>
 
 #include "base/crc32c.h"
