@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <barrier>
+#include <cmath>
 #include <set>
 #include <thread>
 
