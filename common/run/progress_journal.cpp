@@ -197,6 +197,19 @@ bool JournalFiles::read(const RecordPlace& place,
          reader.read_content(parts);
 }
 
+bool holds_progress_journal(const fs::path& folder) {
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    if (entry.path().extension() != ".json") continue;
+    try {
+      (void)read_manifest(entry.path(), 0);
+      return true;
+    } catch (const FileError&) {
+      // Another kind of file.
+    }
+  }
+  return false;
+}
+
 ProgressJournal::ProgressJournal(const UnfinishedWork& work)
     : files_{work.folder, work.name}, plan_(work.plan) {
   if (work.restarts && is_there(files_.folder) && !fs::is_directory(files_.folder))

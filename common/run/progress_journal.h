@@ -69,6 +69,9 @@ struct JournalFiles {
                           std::initializer_list<std::span<std::byte>> parts) const;
 };
 
+/// Whether a journal's manifest lies in a folder.
+bool holds_progress_journal(const std::filesystem::path& folder);
+
 /// A journal as it is opened or created, by one process.
 class ProgressJournal {
  public:

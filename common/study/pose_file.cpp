@@ -63,21 +63,8 @@ RigidTransform pose_of_plain_numbers(const std::string& text, const std::string&
 
 RigidTransform pose_of_json(const std::string& text, const std::string& file) {
   const nlohmann::json json = json_of_text(text, file);
-  const auto bad_shape = [&file] {
-    return InputError(file + ": " + kPoseKey + " must be a list of 4 lists of 4 numbers");
-  };
   if (!json.contains(kPoseKey)) throw InputError(file + ": has no \"" + kPoseKey + "\"");
-  const nlohmann::json& rows = json[kPoseKey];
-  if (!rows.is_array() || rows.size() != 4) throw bad_shape();
-  Eigen::Matrix4d matrix;
-  for (std::size_t i = 0; i < 4; ++i) {
-    if (!rows[i].is_array() || rows[i].size() != 4) throw bad_shape();
-    for (std::size_t j = 0; j < 4; ++j) {
-      if (!rows[i][j].is_number()) throw bad_shape();
-      matrix(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = rows[i][j].get<double>();
-    }
-  }
-  return rigid_or_throw(matrix, file + ": " + kPoseKey);
+  return pose_of_rows(json[kPoseKey], file + ": " + kPoseKey);
 }
 
 RigidTransform pose_of_toml(const std::string& text, const std::string& file) {
@@ -209,6 +196,32 @@ RigidTransform pose_of_deg_and_mm(const PoseFrame& frame,
                                   const std::string& where) {
   const RigidTransform pose = pose_from_parameters(frame, PoseParameters::from_deg_and_mm(values));
   return rigid_or_throw(pose.matrix(), where);
+}
+
+nlohmann::json pose_rows(const RigidTransform& pose) {
+  nlohmann::json rows = nlohmann::json::array();
+  for (int row = 0; row < 4; ++row) {
+    nlohmann::json values = nlohmann::json::array();
+    for (int column = 0; column < 4; ++column) values.push_back(pose.matrix()(row, column));
+    rows.push_back(values);
+  }
+  return rows;
+}
+
+RigidTransform pose_of_rows(const nlohmann::json& rows, const std::string& where) {
+  const auto bad_shape = [&where] {
+    return InputError(where + " must be a list of 4 lists of 4 numbers");
+  };
+  if (!rows.is_array() || rows.size() != 4) throw bad_shape();
+  Eigen::Matrix4d matrix;
+  for (std::size_t i = 0; i < 4; ++i) {
+    if (!rows[i].is_array() || rows[i].size() != 4) throw bad_shape();
+    for (std::size_t j = 0; j < 4; ++j) {
+      if (!rows[i][j].is_number()) throw bad_shape();
+      matrix(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = rows[i][j].get<double>();
+    }
+  }
+  return rigid_or_throw(matrix, where);
 }
 
 std::string pose_to_toml(const RigidTransform& room_from_ct) {

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <filesystem>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,11 @@ namespace af {
 /// (.tfm, holding ct_from_room), or plain text with 16 numbers row by row. InputError when it is
 /// not rigid, FileError when unreadable.
 RigidTransform read_pose(const std::filesystem::path& path);
+
+/// A pose as the rows of its matrix, as result.json and summaries hold it, and back: InputError
+/// that begins with `where` when these are not four rows of four numbers, or not rigid.
+nlohmann::json pose_rows(const RigidTransform& pose);
+RigidTransform pose_of_rows(const nlohmann::json& rows, const std::string& where);
 
 /// The pose of six numbers (rx_deg ... tz_mm) relative to `frame`. InputError, beginning with
 /// `where`, when it is not finite or leads out of the world (rigidity_problems()).

@@ -31,6 +31,7 @@
 #include "parallel/work_watch.h"
 #include "run/run_folder.h"
 #include "run/terminal.h"
+#include "study/pose_file.h"
 #include "study/shared_inputs.h"
 #include "text/json_text.h"
 #include "text/options_toml.h"
@@ -107,11 +108,7 @@ json point_json(const Eigen::Vector3d& point) {
 
 /// What the rows' parameters are relative to, and the box that distances are means over.
 void add_target(const CaseEvaluation& evaluation, const StudyCase& study_case, json& of_case) {
-  const Eigen::Matrix4d gold = evaluation.gold.room_from_ct.matrix();
-  json rows = json::array();
-  for (int row = 0; row < 4; ++row)
-    rows.push_back({gold(row, 0), gold(row, 1), gold(row, 2), gold(row, 3)});
-  of_case["gold_room_from_ct"] = rows;
+  of_case["gold_room_from_ct"] = pose_rows(evaluation.gold.room_from_ct);
   of_case["center_ct_mm"] = point_json(study_case.center_ct_mm);
   of_case["target_box_ct_mm"] = {point_json(study_case.target_box_ct.low_mm),
                                  point_json(study_case.target_box_ct.high_mm)};

@@ -12,6 +12,7 @@
 #include "geometry/rigid_transform.h"
 #include "gold_standard/target_box.h"
 #include "gold_standard/tre.h"
+#include "study/pose_file.h"
 
 namespace af::evaluation {
 namespace {
@@ -25,9 +26,13 @@ struct CaseTarget {
 };
 
 struct EndPose {
-  std::string start;  ///< its six cells
+  RigidTransform start_room_from_ct;
   RigidTransform room_from_ct;
 };
+
+/// Starts that one run drew and another read from its starts.csv differ by rounding, which stays
+/// far below this; starts that were drawn apart are further from each other.
+constexpr double kSameStartMm = 1e-6;
 
 /// The registrations of one case by one renderer of a run.
 struct MethodEnds {
@@ -41,43 +46,39 @@ Eigen::Vector3d point_of(const json& values) {
 }
 
 CaseTarget target_of(const json& of_case) {
-  RigidTransform gold = RigidTransform::Identity();
-  const json& rows = of_case.at("gold_room_from_ct");
-  for (int row = 0; row < 3; ++row)
-    for (int column = 0; column < 4; ++column)
-      gold.matrix()(row, column) =
-          rows.at(static_cast<std::size_t>(row)).at(static_cast<std::size_t>(column)).get<double>();
+  const RigidTransform gold = pose_of_rows(of_case.at("gold_room_from_ct"), "gold_room_from_ct");
   const json& box = of_case.at("target_box_ct_mm");
   return {PoseFrame::about(gold, point_of(of_case.at("center_ct_mm"))),
           target_points({point_of(box.at(0)), point_of(box.at(1))})};
 }
 
 std::map<std::string, CaseTarget> targets_of(const EvaluationRun& run) {
+  const auto unusable = [&] {
+    return FileError((run.folder / "summary.json").string(),
+                     "cases",
+                     "gold_room_from_ct, center_ct_mm and target_box_ct_mm of every case",
+                     "a run of an earlier version, or damage: --pose-distances needs them");
+  };
   std::map<std::string, CaseTarget> targets;
   try {
     for (const json& of_case : run.summary.at("cases"))
       targets[of_case.at("case").get<std::string>()] = target_of(of_case);
   } catch (const json::exception&) {
-    throw FileError((run.folder / "summary.json").string(),
-                    "cases",
-                    "gold_room_from_ct, center_ct_mm and target_box_ct_mm of every case",
-                    "a run of an earlier version, or damage: --pose-distances needs them");
+    throw unusable();
+  } catch (const InputError&) {
+    throw unusable();
   }
   return targets;
 }
 
-std::array<double, 6> numbers_of(const CsvTable& table, std::size_t row, const char* prefix) {
+RigidTransform pose_of(const CsvTable& table,
+                       std::size_t row,
+                       const char* prefix,
+                       const PoseFrame& frame) {
   std::array<double, 6> values{};
   for (std::size_t i = 0; i < values.size(); ++i)
     values[i] = table.number_or_nan(row, std::string(prefix) + kParameterNames[i]);
-  return values;
-}
-
-std::string start_text(const CsvTable& table, std::size_t row) {
-  std::string text;
-  for (const char* name : kParameterNames)
-    text += table.text(row, std::string("start_") + name) + ' ';
-  return text;
+  return pose_from_parameters(frame, PoseParameters::from_deg_and_mm(values));
 }
 
 std::vector<MethodEnds> ends_of(const EvaluationRun& run) {
@@ -96,12 +97,11 @@ std::vector<MethodEnds> ends_of(const EvaluationRun& run) {
       MethodEnds& method = methods[{name, renderer}];
       if (method.run.empty())
         method = {run.folder.filename().string(), renderer, name, target->second.points_ct_mm, {}};
-      const RigidTransform pose =
-          pose_from_parameters(target->second.gold_frame,
-                               PoseParameters::from_deg_and_mm(numbers_of(table, row, "final_")));
+      const PoseFrame& frame = target->second.gold_frame;
+      const RigidTransform pose = pose_of(table, row, "final_", frame);
       if (pose.matrix().allFinite())
         method.ends[static_cast<std::int64_t>(table.number(row, "start_index"))] = {
-            start_text(table, row), pose};
+            pose_of(table, row, "start_", frame), pose};
     }
   });
   std::vector<MethodEnds> all;
@@ -114,8 +114,10 @@ std::vector<double> distances_mm(const MethodEnds& a, const MethodEnds& b) {
   std::vector<double> distances;
   for (const auto& [index, end] : a.ends) {
     const auto other = b.ends.find(index);
-    if (other == b.ends.end() || other->second.start != end.start) continue;
-    distances.push_back(mean_tre_mm(end.room_from_ct, other->second.room_from_ct, a.points_ct_mm));
+    if (other == b.ends.end()) continue;
+    const EndPose& its = other->second;
+    if (mean_tre_mm(end.start_room_from_ct, its.start_room_from_ct, a.points_ct_mm) < kSameStartMm)
+      distances.push_back(mean_tre_mm(end.room_from_ct, its.room_from_ct, a.points_ct_mm));
   }
   return distances;
 }

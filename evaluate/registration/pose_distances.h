@@ -21,7 +21,8 @@ struct PoseDistanceRow {
 };
 
 /// Every two methods of the runs that began at the same starts: rows of one case whose start index
-/// and start are equal. FileError when a run does not state its cases' gold pose and target box.
+/// is equal, and whose start is up to rounding. FileError when a run does not state its cases' gold
+/// pose and target box.
 std::vector<PoseDistanceRow> pose_distances(const std::vector<EvaluationRun>& runs);
 
 CsvTable pose_distances_table(const std::vector<PoseDistanceRow>& rows);

@@ -68,14 +68,9 @@ void StageOptions::describe(Fields& field) {
 }
 
 std::vector<std::string> problems(const StageOptions& stage) {
-  std::vector<std::string> found = problems(stage.similarity);
+  std::vector<std::string> found = similarity_name_problems(stage.similarity.name);
   if (found.empty()) append_optimizer_problems(stage, found);
-  for (const std::string& text : problems(stage.search)) found.push_back(text);
-  StageOptions of_stage = stage;
-  // Those two have spoken; a copy with sound ones is left to the stage's own.
-  of_stage.similarity = {};
-  of_stage.search = {};
-  for (const std::string& text : field_problems(of_stage)) found.push_back(text);
+  for (const std::string& text : field_problems(stage)) found.push_back(text);
   return found;
 }
 

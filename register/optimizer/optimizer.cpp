@@ -2,6 +2,7 @@
 #include "register/optimizer/optimizer.h"
 
 #include <array>
+#include <cmath>
 
 #include "base/named_rows.h"
 #include "base/number_text.h"
@@ -68,20 +69,13 @@ const char* to_string(StopReason reason) {
 void OptimizerOptions::describe(Fields& field) {
   field("initial_step_mm", initial_step_mm, "mm: first, and with derivatives longest, step")
       .as("step")
-      .finite();
+      .such_that(">= final_step_mm = " + number_text(final_step_mm),
+                 [least = final_step_mm](double v) { return v >= least && std::isfinite(v); });
   field("final_step_mm", final_step_mm, "mm: a search whose steps fall below has converged")
       .as("final")
       .above(0.0)
       .finite();
   field("population", population, "cma-es: points per generation").within(4, 99999);
-}
-
-std::vector<std::string> problems(const OptimizerOptions& options) {
-  std::vector<std::string> found = field_problems(options);
-  if (options.initial_step_mm < options.final_step_mm)
-    found.push_back("initial_step_mm = " + number_text(options.initial_step_mm) +
-                    ": must be >= final_step_mm = " + number_text(options.final_step_mm));
-  return found;
 }
 
 void OptimizationTarget::evaluate_all(std::span<const ScaledParameters> points,

@@ -76,8 +76,6 @@ struct OptimizerOptions {
   void describe(Fields& field);
 };
 
-std::vector<std::string> problems(const OptimizerOptions& options);
-
 /// One accepted move or one change of the step.
 struct OptimizerIteration {
   double step_mm = 0.0;  ///< of the points examined

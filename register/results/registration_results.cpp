@@ -24,16 +24,6 @@ json number_or_null(double value) {
   return std::isfinite(value) ? json(value) : json(nullptr);
 }
 
-json matrix_json(const RigidTransform& transform) {
-  json rows = json::array();
-  for (int row = 0; row < 4; ++row) {
-    json values = json::array();
-    for (int column = 0; column < 4; ++column) values.push_back(transform.matrix()(row, column));
-    rows.push_back(values);
-  }
-  return rows;
-}
-
 json parameters_json(const PoseParameters& parameters) {
   const std::array<double, 6> values = parameters.deg_and_mm();
   return {{"rotation_deg", {values[0], values[1], values[2]}},
@@ -190,9 +180,9 @@ json result_json(const RegistrationRecord& record,
   output["verdict"] = to_string(judgement.verdict);
   output["verdict_reason"] = judgement.reason;
   output["views"] = views_json(record, problem);
-  output[is_rejected ? "rejected_room_from_ct" : "room_from_ct"] = matrix_json(result.room_from_ct);
-  output["start_room_from_ct"] = matrix_json(result.start_room_from_ct);
-  output["nominal_room_from_ct"] = matrix_json(problem.nominal_room_from_ct);
+  output[is_rejected ? "rejected_room_from_ct" : "room_from_ct"] = pose_rows(result.room_from_ct);
+  output["start_room_from_ct"] = pose_rows(result.start_room_from_ct);
+  output["nominal_room_from_ct"] = pose_rows(problem.nominal_room_from_ct);
   output["center_ct_mm"] = {
       problem.center_ct_mm.x(), problem.center_ct_mm.y(), problem.center_ct_mm.z()};
   output[is_rejected ? "rejected_parameters_relative_to_nominal"

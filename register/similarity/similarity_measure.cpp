@@ -158,10 +158,13 @@ void SimilarityOptions::describe(Fields& field) {
   field("tiles", tiles, "tncc: per axis").within(1, 64);
 }
 
+std::vector<std::string> similarity_name_problems(const std::string& name) {
+  if (find_row(kMeasures, name) != nullptr) return {};
+  return {unknown_name_text(kMeasures, "similarity", name)};
+}
+
 std::vector<std::string> problems(const SimilarityOptions& options) {
-  std::vector<std::string> found;
-  if (find_row(kMeasures, options.name) == nullptr)
-    found.push_back(unknown_name_text(kMeasures, "similarity", options.name));
+  std::vector<std::string> found = similarity_name_problems(options.name);
   for (const std::string& text : field_problems(options)) found.push_back(text);
   return found;
 }

@@ -92,6 +92,8 @@ struct SimilarityOptions {
   void describe(Fields& field);
 };
 
+/// One problem, that lists the known names, or none.
+std::vector<std::string> similarity_name_problems(const std::string& name);
 std::vector<std::string> problems(const SimilarityOptions& options);
 
 /// Names that make_similarity() knows, and one line that explains them.

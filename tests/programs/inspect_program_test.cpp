@@ -104,8 +104,10 @@ TEST(AfInspect, RefusesADicomFolderWithTwoSeriesUntilOneIsChosen) {
 TEST(AfInspect, KnowsUnfinishedWork) {
   const ScratchFolder folder;
   std::filesystem::create_directories(folder / "f.h5.progress");
+  // Options may be long, and stand before the format.
   std::ofstream(folder / "f.h5.progress" / "units.json")
-      << R"({"decides": {"seed": "1"}, "format": "af-progress-journal", "format_version": 4})";
+      << R"({"decides": {"seed": ")" << std::string(10000, '1')
+      << R"("}, "format": "af-progress-journal", "format_version": 4, "plan": 1})";
   const test::ProgramRun run = inspect((folder / "f.h5.progress").string());
   EXPECT_EQ(run.exit_code, 0) << run.output;
   EXPECT_NE(run.output.find("unfinished work"), std::string::npos) << run.output;

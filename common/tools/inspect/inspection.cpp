@@ -11,6 +11,7 @@
 #include "files/input_file.h"
 #include "image_files/dicom_series.h"
 #include "image_files/image_header.h"
+#include "run/progress_journal.h"
 #include "study/rig_file.h"
 #include "study/study_file.h"
 #include "tools/inspect/inspect_kinds.h"
@@ -103,22 +104,12 @@ std::vector<fs::path> known_files(const fs::path& folder) {
   return files;
 }
 
-/// Whether a journal of unfinished work lies in the folder.
-bool is_unfinished_work(const fs::path& folder) {
-  constexpr std::size_t kBeginning = 4096;
-  for (const auto& entry : fs::directory_iterator(folder))
-    if (entry.path().extension() == ".json" && entry.is_regular_file() &&
-        first_bytes(entry.path(), kBeginning).find("\"af-progress-journal\"") != std::string::npos)
-      return true;
-  return false;
-}
-
 void inspect_folder(const fs::path& folder,
                     const CtReadOptions& options,
                     const Communicator& communicator,
                     Inspection& inspection) {
   if (holds_dicom(folder)) return inspect_ct(folder, options, inspection);
-  if (is_unfinished_work(folder)) {
+  if (holds_progress_journal(folder)) {
     inspection.kind = "unfinished work";
     inspection.facts["next_step"] = "run the same command again to go on from here";
     return;

@@ -440,6 +440,9 @@ TEST(PoseDistances, OfTwoRunsAreThoseOfTheirEndsFromTheSameStarts) {
   // Translations: the distance is their length, for every point of the box.
   second[0].final_deg_mm = {1, 2, 3, 4 + 0.3, 5, 6 - 0.4};
   second[1].final_deg_mm = {1, 2, 3, 4, 5 + 0.1, 6};
+  // As read back from the other run's starts.csv.
+  first[1].start_deg_mm[0] = 0.9193596395490815;
+  second[1].start_deg_mm[0] = 0.9193596395490825;
   second[2].start_deg_mm[0] = 1.0;  // another start
   const std::vector<PoseDistanceRow> found =
       pose_distances({run_with_ends(a, first), run_with_ends(b, second)});

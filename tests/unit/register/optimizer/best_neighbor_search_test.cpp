@@ -124,11 +124,11 @@ TEST(BestNeighborSearch, StopsAtANonFiniteValue) {
 }
 
 TEST(OptimizerOptions, NamesStepsThatCannotBe) {
-  const std::vector<std::string> found = problems(OptimizerOptions{0.1, 0.5});
+  const std::vector<std::string> found = field_problems(OptimizerOptions{0.1, 0.5});
   ASSERT_EQ(found.size(), 1U);
   EXPECT_EQ(found[0], "initial_step_mm = 0.1: must be >= final_step_mm = 0.5");
-  EXPECT_EQ(problems(OptimizerOptions{1.0, 0.0}).size(), 1U);
-  EXPECT_EQ(problems(OptimizerOptions{std::nan(""), std::nan("")}).size(), 2U);
+  EXPECT_EQ(field_problems(OptimizerOptions{1.0, 0.0}).size(), 1U);
+  EXPECT_EQ(field_problems(OptimizerOptions{std::nan(""), std::nan("")}).size(), 2U);
 }
 
 TEST(Optimizer, AnUnknownNameIsRefusedWithTheKnownOnes) {
