@@ -142,29 +142,46 @@ FieldLevelMemory node_memory(const Communicator& communicator, ThreadPool& pool)
   };
 }
 
-/// The levels to make of a field: those of the method, and for judging as many as there are nodes.
+/// The levels of a method to make of a field: those of its stages, and for judging as many as there
+/// are nodes.
 int level_count(const CompressedAttenuationField& field, const CaseLoadOptions& options) {
   int nodes = std::numeric_limits<int>::max();
   for (const SlabLattice& slab : field.lattice().slabs)
     nodes = std::min({nodes, slab.s.nodes, slab.t.nodes});
+  nodes >>= halvings_to_usual_nodes(field.light_slab);
   int possible = 0;
   for (; possible < options.judging_level && nodes > 2; ++possible) nodes = (nodes + 1) / 2;
   return std::max(options.coarsest_level, possible);
 }
 
-/// Collective. The coarse levels of a field's pyramid, held once per node.
-std::vector<RendererLevel> coarse_field_levels(const CompressedAttenuationField& field,
-                                               const CaseLoadOptions& options,
-                                               const Communicator& communicator) {
-  std::vector<RendererLevel> levels;
-  const int coarsest_level = level_count(field, options);
-  if (coarsest_level < 1) return levels;
+/// Collective. A field's renderers for a view: its own, and levels 1, 2, ... of its pyramid, held
+/// once per node. A method's levels are those of a field of about 256 nodes: a finer field begins
+/// with more halvings, so that a level has about the same blur. The samples of several slabs are
+/// decoded: they have few viewpoints, so they are small, and many nodes, which are blended faster
+/// from samples than from codewords.
+void use_field(const std::shared_ptr<const CompressedAttenuationField>& field,
+               const CaseLoadOptions& options,
+               const Communicator& communicator,
+               RegistrationView& view) {
   const auto pool = options.pool ? options.pool : std::make_shared<ThreadPool>();
-  for (const auto& level :
-       make_field_pyramid(field, coarsest_level, node_memory(communicator, *pool)))
-    levels.push_back({std::make_shared<const TwoPassAfDrr>(level, TwoPassOptions{}, pool),
-                      level->blur_sigma_mm(true)});
-  return levels;
+  const auto memory = node_memory(communicator, *pool);
+  const int more_halvings = halvings_to_usual_nodes(field->light_slab);
+  const int coarsest_level = level_count(*field, options);
+  FieldLevels pyramid;
+  if (field->slabs.size() > 1) {
+    const auto samples = std::make_shared<const FieldLevel>(decode_field(*field, memory));
+    view.renderer = std::make_shared<const TwoPassAfDrr>(samples, TwoPassOptions{}, options.pool);
+    if (coarsest_level > 0)
+      pyramid = make_field_pyramid(*samples, coarsest_level + more_halvings, memory);
+  } else {
+    view.renderer = std::make_shared<const TwoPassAfDrr>(field, TwoPassOptions{}, options.pool);
+    if (coarsest_level > 0)
+      pyramid = make_field_pyramid(*field, coarsest_level + more_halvings, memory);
+  }
+  for (auto i = static_cast<std::size_t>(more_halvings); i < pyramid.size(); ++i)
+    view.coarse_levels.push_back(
+        {std::make_shared<const TwoPassAfDrr>(pyramid[i], TwoPassOptions{}, pool),
+         pyramid[i]->blur_sigma_mm(true)});
 }
 
 /// Collective. The same CT, its attenuation blurred by sigma_mm, held once per node.
@@ -267,8 +284,7 @@ void use_fields(const StudyCase& study_case,
         used_from(is_of_study ? study_case.views[i].places : StudyPlaces(), "field", [&] {
           return field_of_view(path, study_case, view, options, ct, communicator, info);
         });
-    view.renderer = std::make_shared<const TwoPassAfDrr>(field, TwoPassOptions{}, options.pool);
-    view.coarse_levels = coarse_field_levels(*field, options, communicator);
+    use_field(field, options, communicator, view);
     view.limit = MotionLimit{field->identity.frame, field->identity.range};
     input_sha256["field " + view.view.camera.name] = info.payload_sha256;
   }

@@ -10,20 +10,11 @@
 #include "base/thread_pool.h"
 #include "base/vector_width.h"
 #include "drr/field_level_kernel.h"
+#include "drr/slab_merging.h"
 
 namespace af {
 
 namespace {
-
-GridAxis halved_axis(const GridAxis& axis, const char* name) {
-  const int nodes = (axis.nodes + 1) / 2;
-  if (nodes < 2)
-    throw InputError(std::string(name) + " nodes of a field level",
-                     std::to_string(axis.nodes),
-                     "too few to halve: must be at least 3");
-  const double first_mm = axis.first_mm + 0.5 * axis.spacing_mm();
-  return {first_mm, first_mm + 2.0 * axis.spacing_mm() * (nodes - 1), nodes};
-}
 
 /// All coarse nodes that a stored node of the level below affects.
 NodeRange halved_range(const NodeRange& fine, const GridAxis& coarse) {
@@ -215,11 +206,76 @@ SharedArray<std::uint16_t> padded_samples(const FieldLevel& level,
                 });
 }
 
+/// Level 0 or 1 of a field, slab by slab.
+FieldLevel decoded_level(const CompressedAttenuationField& field,
+                         int level,
+                         const FieldLevelMemory& memory) {
+  FieldLevel result{level, field.light_slab, field.quantizer_step, {}};
+  for (std::size_t k = 0; k < field.slabs.size(); ++k) {
+    const SlabGeometry& fine = field.light_slab.slabs[k];
+    FieldLevelSlab slab{level == 0 ? fine : halved_geometry(fine), {}};
+    slab.samples = padded_samples(result, slab, memory, [&](auto samples, int part, int parts) {
+      const int u_tiles = field.lattice(k).u.stored.tiles();
+      decode_slab(field, k, slab, level, share_of(u_tiles, part, parts), samples);
+    });
+    result.slabs.push_back(std::move(slab));
+  }
+  return result;
+}
+
+FieldLevelSlab halved_slab(const FieldLevelSlab& from,
+                           const FieldLevel& level,
+                           const FieldLevelMemory& memory) {
+  FieldLevelSlab slab{halved_geometry(from.geometry), {}};
+  slab.samples = padded_samples(level, slab, memory, [&](auto samples, int part, int parts) {
+    const auto viewpoints = static_cast<int>(level.viewpoint_count());
+    halve_slab(from, slab, share_of(viewpoints, part, parts), samples);
+  });
+  return slab;
+}
+
+FieldLevelSlab merged_slab(const LightSlab& coverage,
+                           std::span<const FieldLevelSlab> from,
+                           const FieldLevel& level,
+                           const FieldLevelMemory& memory) {
+  const SlabMerging merging(coverage, from);
+  FieldLevelSlab slab{merging.geometry(), {}};
+  slab.samples = padded_samples(level, slab, memory, [&](auto samples, int part, int parts) {
+    const Share share = share_of(static_cast<int>(level.viewpoint_count()), part, parts);
+    merging.merge(share.begin, share.end, samples);
+  });
+  return slab;
+}
+
+/// Up to coarsest_level, each from the one before.
+void append_levels(int coarsest_level, const FieldLevelMemory& memory, FieldLevels& levels) {
+  while (static_cast<int>(levels.size()) < coarsest_level)
+    levels.push_back(std::make_shared<const FieldLevel>(next_field_level(*levels.back(), memory)));
+}
+
 }  // namespace
+
+GridAxis halved_axis(const GridAxis& axis, const char* name) {
+  const int nodes = (axis.nodes + 1) / 2;
+  if (nodes < 2)
+    throw InputError(std::string(name) + " nodes of a field level",
+                     std::to_string(axis.nodes),
+                     "too few to halve: must be at least 3");
+  const double first_mm = axis.first_mm + 0.5 * axis.spacing_mm();
+  return {first_mm, first_mm + 2.0 * axis.spacing_mm() * (nodes - 1), nodes};
+}
 
 double level_blur_sigma_in_nodes(int level, bool with_resampling) {
   const double variance_per_step = 1.0 / 4.0 + (with_resampling ? 1.0 / 6.0 : 0.0);
   return std::sqrt((std::pow(4.0, level) - 1.0) * variance_per_step);
+}
+
+int halvings_to_usual_nodes(const LightSlab& light_slab) {
+  int nodes = 0;
+  for (const SlabGeometry& slab : light_slab.slabs)
+    nodes = std::max({nodes, slab.s.nodes, slab.t.nodes});
+  constexpr double kUsualNodes = 256.0;
+  return std::max(0, static_cast<int>(std::lround(std::log2(nodes / kUsualNodes))));
 }
 
 double FieldLevel::blur_sigma_mm(bool with_resampling) const {
@@ -244,43 +300,50 @@ FieldLevelMemory process_memory(int threads) {
   };
 }
 
-FieldLevel decode_field_level(const CompressedAttenuationField& field,
-                              int level,
-                              const FieldLevelMemory& memory) {
-  check(level == 0 || level == 1, "levels beyond 1 are made from the level below");
-  FieldLevel result{level, field.light_slab, field.quantizer_step, {}};
-  for (std::size_t k = 0; k < field.slabs.size(); ++k) {
-    const SlabGeometry& fine = field.light_slab.slabs[k];
-    FieldLevelSlab slab{level == 0 ? fine : halved_geometry(fine), {}};
-    slab.samples = padded_samples(result, slab, memory, [&](auto samples, int part, int parts) {
-      const int u_tiles = field.lattice(k).u.stored.tiles();
-      decode_slab(field, k, slab, level, share_of(u_tiles, part, parts), samples);
-    });
-    result.slabs.push_back(std::move(slab));
-  }
-  return result;
+FieldLevel decode_field(const CompressedAttenuationField& field, const FieldLevelMemory& memory) {
+  return decoded_level(field, 0, memory);
+}
+
+FieldLevel decode_halved_field(const CompressedAttenuationField& field,
+                               const FieldLevelMemory& memory) {
+  check(field.slabs.size() == 1, "several slabs are merged from their decoded samples");
+  return decoded_level(field, 1, memory);
 }
 
 FieldLevel next_field_level(const FieldLevel& level, const FieldLevelMemory& memory) {
   FieldLevel result{level.level + 1, level.coverage, level.quantizer_step, {}};
-  for (const FieldLevelSlab& from : level.slabs) {
-    FieldLevelSlab slab{halved_geometry(from.geometry), {}};
-    slab.samples = padded_samples(result, slab, memory, [&](auto samples, int part, int parts) {
-      const auto viewpoints = static_cast<int>(level.viewpoint_count());
-      halve_slab(from, slab, share_of(viewpoints, part, parts), samples);
-    });
-    result.slabs.push_back(std::move(slab));
+  const std::span slabs(level.slabs);
+  // Level 1 keeps the slabs: with half the nodes they bear half the parallax, in nodes, and so do
+  // the merged slabs of all further levels.
+  if (result.level == 1) {
+    for (const FieldLevelSlab& slab : slabs)
+      result.slabs.push_back(halved_slab(slab, result, memory));
+    return result;
   }
+  for (std::size_t k = 0; k < slabs.size(); k += 2)
+    result.slabs.push_back(k + 1 < slabs.size()
+                               ? merged_slab(level.coverage, slabs.subspan(k, 2), result, memory)
+                               : halved_slab(slabs[k], result, memory));
   return result;
 }
 
-std::vector<std::shared_ptr<const FieldLevel>> make_field_pyramid(
-    const CompressedAttenuationField& field, int coarsest_level, const FieldLevelMemory& memory) {
+FieldLevels make_field_pyramid(const CompressedAttenuationField& field,
+                               int coarsest_level,
+                               const FieldLevelMemory& memory) {
+  if (field.slabs.size() > 1)
+    return make_field_pyramid(decode_field(field, memory), coarsest_level, memory);
   check(coarsest_level >= 1, "a pyramid begins at level 1");
-  std::vector<std::shared_ptr<const FieldLevel>> levels{
-      std::make_shared<const FieldLevel>(decode_field_level(field, 1, memory))};
-  while (static_cast<int>(levels.size()) < coarsest_level)
-    levels.push_back(std::make_shared<const FieldLevel>(next_field_level(*levels.back(), memory)));
+  FieldLevels levels{std::make_shared<const FieldLevel>(decode_halved_field(field, memory))};
+  append_levels(coarsest_level, memory, levels);
+  return levels;
+}
+
+FieldLevels make_field_pyramid(const FieldLevel& level_0,
+                               int coarsest_level,
+                               const FieldLevelMemory& memory) {
+  check(coarsest_level >= 1, "a pyramid begins at level 1");
+  FieldLevels levels{std::make_shared<const FieldLevel>(next_field_level(level_0, memory))};
+  append_levels(coarsest_level, memory, levels);
   return levels;
 }
 

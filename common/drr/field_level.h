@@ -15,6 +15,10 @@ namespace af {
 /// Samples beyond the last one, 0, so that kernels may load whole vectors.
 inline constexpr std::size_t kFieldLevelPadding = 16;
 
+/// How often a field's (s,t) axes must be halved until the longest has about 256 nodes, the paper's
+/// number.
+int halvings_to_usual_nodes(const LightSlab& light_slab);
+
 /// One slab of a field that is held as plain 16-bit samples, [u][v][t][s] with s fastest (s runs
 /// along the detector's columns, so a row of viewpoint samples is a row of a DRR).
 struct FieldLevelSlab {
@@ -41,11 +45,14 @@ double level_blur_sigma_in_nodes(int level, bool with_resampling = false);
 /// are replicated; nodes that are not stored count as 0. (u,v) nodes stay. Memory: 2 bytes a
 /// sample, 134 MB for level 1 and 34 MB for level 2 of 64x64 x 256x256 nodes (uncropped). \test
 /// FieldLevel.HalvingTakesBinomialWeights
+///
+/// Of a field of several slabs, each level above 1 merges neighbours into half as many
+/// (SlabMerging); an odd one out is halved.
 struct FieldLevel {
   int level = 0;
   LightSlab coverage;  ///< the field's geometry: it decides which rays are outside, at every level
   float quantizer_step = 0.0f;
-  std::vector<FieldLevelSlab> slabs;  ///< in the order of coverage.slabs
+  std::vector<FieldLevelSlab> slabs;  ///< ascending in depth, as coverage.slabs
 
   [[nodiscard]] std::size_t viewpoint_count() const {
     return static_cast<std::size_t>(coverage.u.nodes) * static_cast<std::size_t>(coverage.v.nodes);
@@ -69,20 +76,33 @@ using FieldLevelMemory =
 /// Memory of this process, filled by `threads` threads.
 FieldLevelMemory process_memory(int threads = 1);
 
-/// Level 0 or 1 of a compressed field. Level 0 of 64x64 x 256x256 nodes is 537 MB. InputError when
-/// an axis has too few nodes to halve.
-FieldLevel decode_field_level(const CompressedAttenuationField& field,
-                              int level,
-                              const FieldLevelMemory& memory = process_memory());
+/// Level 0 of a compressed field: 537 MB for 64x64 x 256x256 nodes, 67 MB for 8x8 x 256x256 in two
+/// slabs.
+FieldLevel decode_field(const CompressedAttenuationField& field,
+                        const FieldLevelMemory& memory = process_memory());
 
-/// The level above.
+/// Level 1 of a compressed field of one slab, without the memory of its level 0. InputError when an
+/// axis has too few nodes to halve.
+FieldLevel decode_halved_field(const CompressedAttenuationField& field,
+                               const FieldLevelMemory& memory = process_memory());
+
+/// The level above. InputError when an axis has too few nodes to halve.
 FieldLevel next_field_level(const FieldLevel& level,
                             const FieldLevelMemory& memory = process_memory());
 
+using FieldLevels = std::vector<std::shared_ptr<const FieldLevel>>;
+
 /// Levels 1 ... coarsest_level of a compressed field, [0] being level 1; coarsest_level >= 1.
-std::vector<std::shared_ptr<const FieldLevel>> make_field_pyramid(
-    const CompressedAttenuationField& field,
-    int coarsest_level,
-    const FieldLevelMemory& memory = process_memory());
+FieldLevels make_field_pyramid(const CompressedAttenuationField& field,
+                               int coarsest_level,
+                               const FieldLevelMemory& memory = process_memory());
+/// The same from a field's level 0.
+FieldLevels make_field_pyramid(const FieldLevel& level_0,
+                               int coarsest_level,
+                               const FieldLevelMemory& memory = process_memory());
+
+/// An axis with half the nodes, midway between pairs of the given ones; InputError, which names the
+/// axis, when there are too few.
+GridAxis halved_axis(const GridAxis& axis, const char* name);
 
 }  // namespace af

@@ -6,6 +6,7 @@
 #include "base/error.h"
 #include "base/vector_width.h"
 #include "drr/node_image_kernel.h"
+#include "drr/slab_sum.h"
 #include "drr/warp_kernel.h"
 
 namespace af {
@@ -19,6 +20,10 @@ constexpr std::size_t kImagePadding = 64;
 std::ptrdiff_t rounded_up(std::ptrdiff_t count, std::ptrdiff_t multiple) {
   return (count + multiple - 1) / multiple * multiple;
 }
+
+/// Nodes of a slab that its sum with others takes around those that the rays hit: a node of the sum
+/// lies up to one of its own nodes outside, and takes two more on that side.
+constexpr int kSumMargin = 3;
 
 /// A node image's memory, grown when a larger one is needed and never shrunk.
 class ImageBuffer {
@@ -40,27 +45,15 @@ class Workspace final : public RenderWorkspace {
  public:
   BlendScratch scratch;
   ImageBuffers blended;
+  SlabSumScratch sum_scratch;
+  ImageBuffers summed;
   ImageBuffers fine;
   std::vector<float> row;
 };
 
-/// The nodes that the second pass reads: a slab's lattice, or one twice as fine.
-struct NodeGrid {
-  double s_first_mm, s_spacing_mm;
-  double t_first_mm, t_spacing_mm;
-  double plane_y_mm;
-  std::int32_t stride, s_count, t_count;
-};
-
-/// Blended images of one slab, ready for the second pass.
-struct SlabImages {
-  NodeGrid grid;
-  std::array<const float*, 3> images;
-
-  [[nodiscard]] NodeImage image(std::size_t i) const {
-    return {images[i], grid.stride, grid.s_count, grid.t_count};
-  }
-};
+NodeImage image_of(const NodeImages& nodes, std::size_t i) {
+  return {nodes.images[i], nodes.grid.stride, nodes.grid.s_count, nodes.grid.t_count};
+}
 
 NodeGrid grid_of(const SlabGeometry& slab, const Footprint& footprint, std::ptrdiff_t stride) {
   return {slab.s.position_mm(footprint.s().begin),
@@ -102,7 +95,7 @@ Homography nodes_from_pixels(const NodeGrid& grid, const SlabRays& rays) {
 }
 
 /// The values of a slab's images that the gradients of a pose need (PoseSlopes has the mechanics).
-PoseSlopes pose_slopes(const SlabImages& slab,
+PoseSlopes pose_slopes(const NodeImages& slab,
                        const SlabRays& rays,
                        const Eigen::Matrix3d& slab_from_room,
                        const Eigen::Vector3d& source_from_pivot) {
@@ -137,7 +130,7 @@ struct BlendNeeds {
 };
 
 /// First pass of slab k: images of the value and, when wanted, of its slopes along the source.
-SlabImages blended_images(const ViewpointBlender& blender,
+NodeImages blended_images(const ViewpointBlender& blender,
                           std::size_t k,
                           const SlabRays& rays,
                           const BlendNeeds& needs,
@@ -156,13 +149,32 @@ SlabImages blended_images(const ViewpointBlender& blender,
           {images.value, images.source_x, images.source_z}};
 }
 
+/// First pass of all slabs: the images of the only one, or their sum on the plane of `sum_slab`.
+NodeImages summed_images(const ViewpointBlender& blender,
+                         const SlabGeometry& sum_slab,
+                         const SlabRays& rays,
+                         const BlendNeeds& needs,
+                         Workspace& workspace) {
+  if (blender.slab_count() == 1) return blended_images(blender, 0, rays, needs, workspace);
+  const Footprint footprint(sum_slab, rays, {needs.margin, false});
+  const std::ptrdiff_t stride = rounded_up(footprint.s().count, 16);
+  std::array<float*, 3> images{};
+  for (std::size_t i = 0; i < (needs.slopes ? 3u : 1u); ++i)
+    images[i] = workspace.summed[i].reserve(stride, footprint.t().count);
+  SlabSum sum(grid_of(sum_slab, footprint, stride), rays.source, images, workspace.sum_scratch);
+  const BlendNeeds more{needs.margin + kSumMargin, needs.slopes};
+  for (std::size_t k = 0; k < blender.slab_count(); ++k)
+    sum.add(blended_images(blender, k, rays, more, workspace));
+  return sum.images();
+}
+
 /// The same images with a node inserted between any two neighbours.
-SlabImages upsampled(const SlabImages& slab, Workspace& workspace) {
+NodeImages upsampled(const NodeImages& slab, Workspace& workspace) {
   const auto upsample_image = select_kernel<UpsampleImage>(
       kernels_128::upsample_image, kernels_256::upsample_image, kernels_512::upsample_image);
   const NodeGrid& grid = slab.grid;
   const std::ptrdiff_t stride = 2 * rounded_up(grid.s_count, 16);
-  SlabImages fine{twice_as_fine(grid, stride), {}};
+  NodeImages fine{twice_as_fine(grid, stride), {}};
   workspace.row.resize(
       std::max(workspace.row.size(), static_cast<std::size_t>(grid.s_count) + kImagePadding));
   for (std::size_t i = 0; i < 3; ++i) {
@@ -182,7 +194,7 @@ SlabImages upsampled(const SlabImages& slab, Workspace& workspace) {
 
 /// Sobel's slopes of the value image along s and t, stored where the slopes along the source would
 /// be.
-SlabImages with_sobel_slopes(const SlabImages& slab, Workspace& workspace) {
+NodeImages with_sobel_slopes(const NodeImages& slab, Workspace& workspace) {
   const auto sobel_slopes = select_kernel<SobelSlopes>(
       kernels_128::sobel_slopes, kernels_256::sobel_slopes, kernels_512::sobel_slopes);
   const NodeGrid& grid = slab.grid;
@@ -195,30 +207,51 @@ SlabImages with_sobel_slopes(const SlabImages& slab, Workspace& workspace) {
 /// Calls work(PixelGrid) for bands of the view's rows, shared by the threads of a pool. Sharing the
 /// first pass does not pay: it takes the same time for any detector.
 template <typename Work>
-void for_each_band(const View& view, bool adds, ThreadPool& pool, const Work& work) {
+void for_each_band(const View& view, ThreadPool& pool, const Work& work) {
   // Smaller bands gain little, or lose: another processor first has to fetch the node image.
   constexpr int kPixelsPerBand = 65536;
   const int rows = std::max(1, kPixelsPerBand / view.roi.width);
   pool.for_each_block(view.roi.height, rows, [&](int begin, int end) {
-    work(PixelGrid{view.roi.width, begin, end, adds});
+    work(PixelGrid{view.roi.width, begin, end});
   });
+}
+
+/// The lattice of a sum of slabs: midway between the outermost planes. A ray's place on a plane is
+/// an affine function of the plane's depth, so the edges are those between the slabs', too.
+SlabGeometry sum_geometry(const ViewpointBlender& blender) {
+  SlabGeometry sum = blender.slab(0);
+  const SlabGeometry& last = blender.slab(blender.slab_count() - 1);
+  sum.st_plane_y_mm = 0.5 * (sum.st_plane_y_mm + last.st_plane_y_mm);
+  for (GridAxis SlabGeometry::*axis : {&SlabGeometry::s, &SlabGeometry::t}) {
+    (sum.*axis).first_mm = 0.5 * ((sum.*axis).first_mm + (last.*axis).first_mm);
+    (sum.*axis).last_mm = 0.5 * ((sum.*axis).last_mm + (last.*axis).last_mm);
+    (sum.*axis).nodes = std::max((sum.*axis).nodes, (last.*axis).nodes);
+  }
+  sum.y_high_mm = last.y_high_mm;
+  return sum;
 }
 
 }  // namespace
 
+TwoPassAfDrr::TwoPassAfDrr(std::unique_ptr<const ViewpointBlender> blender,
+                           const TwoPassOptions& options,
+                           std::shared_ptr<ThreadPool> pool)
+    : blender_(std::move(blender)),
+      sum_slab_(sum_geometry(*blender_)),
+      options_(options),
+      pool_(pool ? std::move(pool) : std::make_shared<ThreadPool>()) {}
+
 TwoPassAfDrr::TwoPassAfDrr(std::shared_ptr<const CompressedAttenuationField> field,
                            const TwoPassOptions& options,
                            std::shared_ptr<ThreadPool> pool)
-    : blender_(make_viewpoint_blender(std::move(field), options.uv)),
-      options_(options),
-      pool_(pool ? std::move(pool) : std::make_shared<ThreadPool>()) {}
+    : TwoPassAfDrr(make_viewpoint_blender(std::move(field), options.uv), options, std::move(pool)) {
+}
 
 TwoPassAfDrr::TwoPassAfDrr(std::shared_ptr<const FieldLevel> level,
                            const TwoPassOptions& options,
                            std::shared_ptr<ThreadPool> pool)
-    : blender_(make_viewpoint_blender(std::move(level), options.uv)),
-      options_(options),
-      pool_(pool ? std::move(pool) : std::make_shared<ThreadPool>()) {}
+    : TwoPassAfDrr(make_viewpoint_blender(std::move(level), options.uv), options, std::move(pool)) {
+}
 
 std::unique_ptr<RenderWorkspace> TwoPassAfDrr::make_workspace() const {
   return std::make_unique<Workspace>();
@@ -248,28 +281,26 @@ RenderStatus TwoPassAfDrr::render(const RigidTransform& room_from_ct,
                                         kernels_512::warp_with_pose_slopes);
   const bool is_cubic = options_.st == AxisInterpolation::Cubic;
   const BlendNeeds needs{is_cubic ? kUpsampleReach - 1 : 0, gradients.has_value()};
-  for (std::size_t k = 0; k < blender_->coverage().slabs.size(); ++k) {
-    SlabImages slab = blended_images(*blender_, k, rays, needs, scratch);
-    if (is_cubic) slab = upsampled(slab, scratch);
-    const Homography homography = nodes_from_pixels(slab.grid, rays);
-    if (!gradients) {
-      for_each_band(view, k > 0, *pool_, [&](const PixelGrid& band) {
-        warp_image(slab.image(0), homography, band, total_attenuation.data());
-      });
-      continue;
-    }
-    const PoseSlopes slopes = pose_slopes(slab,
+  NodeImages nodes = summed_images(*blender_, sum_slab_, rays, needs, scratch);
+  if (is_cubic) nodes = upsampled(nodes, scratch);
+  const Homography homography = nodes_from_pixels(nodes.grid, rays);
+  if (gradients) {
+    const PoseSlopes slopes = pose_slopes(nodes,
                                           rays,
                                           rays.slab_from_room.linear(),
                                           view.camera.source_point - gradients->pivot_room_point);
-    for_each_band(view, k > 0, *pool_, [&](const PixelGrid& band) {
-      warp_with_pose_slopes(slab.image(0),
+    for_each_band(view, *pool_, [&](const PixelGrid& band) {
+      warp_with_pose_slopes(image_of(nodes, 0),
                             slopes,
                             homography,
                             band,
                             total_attenuation.data(),
                             gradients->planes.data(),
                             static_cast<std::int64_t>(pixels));
+    });
+  } else {
+    for_each_band(view, *pool_, [&](const PixelGrid& band) {
+      warp_image(image_of(nodes, 0), homography, band, total_attenuation.data());
     });
   }
   if (rays.all_inside()) return {};
@@ -288,18 +319,17 @@ RenderStatus TwoPassAfDrr::render_gradient_images(const RigidTransform& room_fro
   if (!rays.all_descend()) return {rays.blank_outside(column_gradient, row_gradient)};
   const auto warp_slopes = select_kernel<WarpSlopes>(
       kernels_128::warp_slopes, kernels_256::warp_slopes, kernels_512::warp_slopes);
-  for (std::size_t k = 0; k < blender_->coverage().slabs.size(); ++k) {
-    const SlabImages slab =
-        with_sobel_slopes(blended_images(*blender_, k, rays, {1, false}, scratch), scratch);
-    for_each_band(view, k > 0, *pool_, [&](const PixelGrid& band) {
-      warp_slopes(slab.image(1),
-                  slab.images[2],
-                  nodes_from_pixels(slab.grid, rays),
-                  band,
-                  column_gradient.data(),
-                  row_gradient.data());
-    });
-  }
+  const NodeImages nodes =
+      with_sobel_slopes(summed_images(*blender_, sum_slab_, rays, {1, false}, scratch), scratch);
+  const Homography homography = nodes_from_pixels(nodes.grid, rays);
+  for_each_band(view, *pool_, [&](const PixelGrid& band) {
+    warp_slopes(image_of(nodes, 1),
+                nodes.images[2],
+                homography,
+                band,
+                column_gradient.data(),
+                row_gradient.data());
+  });
   if (rays.all_inside()) return {};
   return {rays.blank_outside(column_gradient, row_gradient)};
 }

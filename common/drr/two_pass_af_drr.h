@@ -17,13 +17,14 @@ struct TwoPassOptions {
   AxisInterpolation uv = AxisInterpolation::Linear;
 };
 
-/// DRRs by look-up in two cheap passes per slab. All rays of a DRR meet in the source, so a ray's
-/// (u,v) is an affine function of its (s,t): first the viewpoints around it are blended once per
-/// (s,t) node of the detector's footprint, then that image is resampled to the detector through one
-/// homography. Differs from the paper: (u,v) weights are taken at the (s,t) nodes instead of at the
-/// ray itself. Against ray casting both are equally good; AfDrr is the literal quadrilinear look-up
-/// and this class's oracle. Pose derivatives are analytic, from the slopes of both passes.
-/// \test TwoPassAfDrr.AgreesWithQuadrilinearLookup
+/// DRRs by look-up in two cheap passes. All rays of a DRR meet in the source, so a ray's (u,v) is
+/// an affine function of its (s,t): first the viewpoints around it are blended once per (s,t) node
+/// of the detector's footprint, then that image is resampled to the detector through one
+/// homography. The blended images of several slabs are summed on one plane in between (SlabSum).
+/// Differs from the paper: (u,v) weights are taken at the (s,t) nodes instead of at the ray itself.
+/// Against ray casting both are equally good; AfDrr is the literal quadrilinear look-up and this
+/// class's oracle. Pose derivatives are analytic, from the slopes of both passes. \test
+/// TwoPassAfDrr.AgreesWithQuadrilinearLookup
 class TwoPassAfDrr final : public DrrRenderer {
  public:
   /// `pool`: threads that share a large DRR; none means the calling thread alone.
@@ -55,7 +56,12 @@ class TwoPassAfDrr final : public DrrRenderer {
   [[nodiscard]] const char* name() const override { return "field"; }
 
  private:
+  TwoPassAfDrr(std::unique_ptr<const ViewpointBlender> blender,
+               const TwoPassOptions& options,
+               std::shared_ptr<ThreadPool> pool);
+
   std::unique_ptr<const ViewpointBlender> blender_;
+  SlabGeometry sum_slab_;  ///< the lattice on which several slabs are summed
   TwoPassOptions options_;
   std::shared_ptr<ThreadPool> pool_;
 };

@@ -183,6 +183,7 @@ class CompressedBlender final : public AnyBlender {
   }
 
   [[nodiscard]] const LightSlab& coverage() const override { return field_->light_slab; }
+  [[nodiscard]] std::size_t slab_count() const override { return field_->slabs.size(); }
   [[nodiscard]] const SlabGeometry& slab(std::size_t k) const override {
     return field_->light_slab.slabs[k];
   }
@@ -308,6 +309,7 @@ class LevelBlender final : public AnyBlender {
   }
 
   [[nodiscard]] const LightSlab& coverage() const override { return level_->coverage; }
+  [[nodiscard]] std::size_t slab_count() const override { return level_->slabs.size(); }
   [[nodiscard]] const SlabGeometry& slab(std::size_t k) const override {
     return level_->slabs[k].geometry;
   }

@@ -50,7 +50,9 @@ class ViewpointBlender {
 
   /// This geometry decides which rays are outside.
   [[nodiscard]] virtual const LightSlab& coverage() const = 0;
-  /// The (s,t) nodes of slab k, in the order of coverage().slabs.
+  /// Slabs to sum over; fewer than the coverage's where a level has merged them.
+  [[nodiscard]] virtual std::size_t slab_count() const = 0;
+  /// The (s,t) nodes of slab k.
   [[nodiscard]] virtual const SlabGeometry& slab(std::size_t k) const = 0;
   [[nodiscard]] virtual Footprint footprint(std::size_t k,
                                             const SlabRays& rays,

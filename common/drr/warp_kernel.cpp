@@ -37,12 +37,21 @@ struct LeastLanes {
   Ints s, t;
 };
 
+/// What a window holds. A pick from two registers tells 2 kLanes nodes apart: kLanes of two rows,
+/// or twice as many of one.
+enum WindowShape : int32_t {
+  kNoWindow,  ///< registers cannot hold the cells: their nodes are gathered one by one
+  kTwoRows,   ///< lower nodes lie in kLanes columns and two rows
+  kFourRows,  ///< in kLanes columns and four rows
+  kWide,      ///< in 2 kLanes columns and two rows
+};
+
 /// The part of a node image that registers hold for the cells of neighbouring pixels.
 struct Window {
   int64_t first;  ///< of its nodes in the image
-  Ints lane;      ///< of each cell's lower s node; kLanes on for cells in an odd row
+  Ints lane;      ///< of each cell's lower s node; unless wide, kLanes on for cells in an odd row
   Ints row;       ///< of each cell's lower t node, from the window's first
-  int32_t rows;   ///< that lower nodes may be in: 2 or 4; 0 when registers cannot hold the cells
+  WindowShape shape;
 };
 
 /// The cells of a node image that neighbouring pixels fall into, one per lane.
@@ -85,14 +94,21 @@ AF_NATIVE_INLINE Window window_of(const Cells& cells, const LeastLanes& least, i
   const Ints first_t = native::pick(cells.t_node, least.t);
   const Ints column = cells.s_node - first_s;
   const Ints row = cells.t_node - first_t;
-  Window window{
-      static_cast<int64_t>(first_t[0]) * stride + first_s[0], column + row * kLanes, row, 0};
-  // No high bit is set exactly when both are at least 0, column < kLanes and row < 2, or 4.
+  Window window{static_cast<int64_t>(first_t[0]) * stride + first_s[0],
+                column + row * kLanes,
+                row,
+                kNoWindow};
+  // No high bit is set exactly when both are at least 0, column < kLanes and row < 2, or 4, or
+  // column < 2 kLanes and row < 2.
   constexpr int32_t kHighBits = ~(kLanes - 1);
-  if (!native::any_bit(column | row * (kLanes / 2), kHighBits))
-    window.rows = 2;
-  else if (!native::any_bit(column | row * (kLanes / 4), kHighBits))
-    window.rows = 4;
+  if (!native::any_bit(column | row * (kLanes / 2), kHighBits)) {
+    window.shape = kTwoRows;
+  } else if (!native::any_bit(column | row * (kLanes / 4), kHighBits)) {
+    window.shape = kFourRows;
+  } else if (!native::any_bit(column | row * kLanes, kHighBits * 2)) {
+    window.shape = kWide;
+    window.lane = column;
+  }
   return window;
 }
 #else
@@ -131,13 +147,23 @@ struct Column {
 };
 
 #if AF_VECTOR_BITS >= 256
+AF_NATIVE_INLINE Floats pick_wide(const float* nodes, const Window& window) {
+  return native::pick(load(nodes), load(nodes + kLanes), window.lane);
+}
+
 AF_NATIVE_INLINE Column pick_column(const float* nodes, int64_t stride, const Window& window) {
+  if (window.shape == kWide) {
+    const Floats row_1 = pick_wide(nodes + stride, window);
+    const Ints is_upper = window.row >= 1;
+    return {is_upper ? row_1 : pick_wide(nodes, window),
+            is_upper ? pick_wide(nodes + 2 * stride, window) : row_1};
+  }
   const Floats row_0 = load(nodes);
   const Floats row_1 = load(nodes + stride);
   const Floats row_2 = load(nodes + 2 * stride);
   const Column column{native::pick(row_0, row_1, window.lane),
                       native::pick(row_1, row_2, window.lane)};
-  if (window.rows == 2) return column;
+  if (window.shape == kTwoRows) return column;
   const Floats row_3 = load(nodes + 3 * stride);
   const Floats row_4 = load(nodes + 4 * stride);
   const Ints is_upper = window.row >= 2;
@@ -159,7 +185,7 @@ AF_NATIVE_INLINE Corners gather_corners(const float* values, int32_t stride, con
 
 AF_NATIVE_INLINE Corners corners_of(const float* values, int32_t stride, const Cells& cells) {
 #if AF_VECTOR_BITS >= 256
-  if (cells.window.rows > 0) {
+  if (cells.window.shape != kNoWindow) {
     const float* first = values + cells.window.first;
     return {pick_column(first, stride, cells.window), pick_column(first + 1, stride, cells.window)};
   }
@@ -189,18 +215,17 @@ AF_NATIVE_INLINE Floats product(const float (&factors)[3], const Floats (&vector
 struct PixelRun {
   int64_t offset;
   int32_t count;
-  bool adds;
 };
 
 AF_NATIVE_INLINE void put(const PixelRun& run, float* values, Floats value) {
   float* to = values + run.offset;
   if (run.count == kLanes) {
-    store(to, run.adds ? load(to) + value : value);
+    store(to, value);
     return;
   }
   float lanes[kLanes];
   store(lanes, value);
-  for (int32_t i = 0; i < run.count; ++i) to[i] = run.adds ? to[i] + lanes[i] : lanes[i];
+  for (int32_t i = 0; i < run.count; ++i) to[i] = lanes[i];
 }
 
 /// Calls work(row, cells, run) for all pixels. Arguments come as copies: the compiler cannot know
@@ -218,8 +243,7 @@ AF_NATIVE_INLINE void for_each_run(NodeImage image,
     Floats column = to_float(native::lane_numbers());
     for (int32_t c = 0; c < grid.columns; c += kLanes) {
       const int32_t left = grid.columns - c;
-      const PixelRun run{
-          static_cast<int64_t>(r) * grid.columns + c, left < kLanes ? left : kLanes, grid.adds};
+      const PixelRun run{static_cast<int64_t>(r) * grid.columns + c, left < kLanes ? left : kLanes};
       Cells cells = cells_of(limits, row, native::minimum(column, last_column));
       cells.window = window_of(cells, least, image.stride);
       work(row, cells, run);

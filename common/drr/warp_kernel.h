@@ -27,7 +27,6 @@ struct PixelGrid {
   int32_t columns;
   int32_t row_begin;
   int32_t row_end;
-  bool adds;  ///< to what stands there, instead of replacing it
 };
 
 /// Resamples a node image bilinearly. Coordinates are clamped to the image.

@@ -128,6 +128,7 @@ void run(const CaseOptions& options,
   const TwoPassAfDrr cubic(field, {AxisInterpolation::Cubic, AxisInterpolation::Linear});
   const TwoPassAfDrr cubic_uv(field, {AxisInterpolation::Cubic, AxisInterpolation::Cubic});
   const auto pyramid = make_field_pyramid(*field, 2);
+  const TwoPassAfDrr decoded(std::make_shared<const FieldLevel>(decode_field(*field)));
   const TwoPassAfDrr half(pyramid[0]);
   const TwoPassAfDrr quarter(pyramid[1]);
   const View region = middle_of(view);
@@ -146,6 +147,9 @@ void run(const CaseOptions& options,
       renderer_contender(
           "TwoPassAfDrr, cubic, six gradients", cubic, series, view, Derivatives::OfThePose),
       gradient_image_contender("TwoPassAfDrr, gradient images", two_pass, series, view),
+      renderer_contender("TwoPassAfDrr, decoded", decoded, series, view),
+      renderer_contender(
+          "TwoPassAfDrr, decoded, six gradients", decoded, series, view, Derivatives::OfThePose),
       renderer_contender(region_name, two_pass, series, region),
       renderer_contender(region_name + ", level 1", half, series, region.coarser(2)),
       renderer_contender(region_name + ", level 2", quarter, series, region.coarser(4)),

@@ -67,22 +67,28 @@ double relative_difference(const std::vector<float>& a,
 TEST(TwoPassAfDrr, EveryVectorWidthGivesTheSameBits) {
   for (const TwoPassOptions& options : {kLinear, kCubicInSt, kCubic})
     for (const int slabs : {1, 2}) {
-      const auto field = small_field(waves, slabs, 7, 21);
+      const auto field = small_field(waves, slabs, 7, 51);
       const TwoPassAfDrr compressed(field, options);
       const TwoPassAfDrr level(make_field_pyramid(*field, 1).front(), options);
-      for (const TwoPassAfDrr* renderer : {&compressed, &level}) {
-        const View view = View::whole_detector(small_camera());
-        const RigidTransform pose = pose_from_parameters({}, small_pose(8));
-        const auto workspace = renderer->make_workspace();
-        Outputs first;
-        for (const VectorWidth width : supported_vector_widths()) {
-          force_vector_width(width);
-          const Outputs outputs = all_outputs(*renderer, pose, view, *workspace);
-          if (first.values.empty()) first = outputs;
-          EXPECT_EQ(outputs, first) << to_string(width) << " bits";
+      // Pixels 1, 1.5 and 4 times as far apart as nodes: kernels read these in different ways.
+      const View whole = View::whole_detector(small_camera());
+      View apart = whole;
+      apart.camera.pixel_spacing_mm *= 1.5;
+      apart.camera.detector_origin_point = apart.camera.detector_point(-3.0, -2.5);
+      apart.roi = {5, 4, 20, 16};
+      for (const View& view : {whole, apart, whole.coarser(4)})
+        for (const TwoPassAfDrr* renderer : {&compressed, &level}) {
+          const RigidTransform pose = pose_from_parameters({}, small_pose(8));
+          const auto workspace = renderer->make_workspace();
+          Outputs first;
+          for (const VectorWidth width : supported_vector_widths()) {
+            force_vector_width(width);
+            const Outputs outputs = all_outputs(*renderer, pose, view, *workspace);
+            if (first.values.empty()) first = outputs;
+            EXPECT_EQ(outputs, first) << to_string(width) << " bits";
+          }
+          force_vector_width(std::nullopt);
         }
-        force_vector_width(std::nullopt);
-      }
     }
 }
 
@@ -246,10 +252,9 @@ TEST(TwoPassAfDrr, CroppedFieldEqualsOneThatStoresItsZeros) {
     for (const TwoPassOptions& options : {kLinear, kCubic}) {
       const TwoPassAfDrr expected(whole, options);
       const TwoPassAfDrr renderer(cropped, options);
-      const TwoPassAfDrr level(std::make_shared<const FieldLevel>(decode_field_level(*cropped, 0)),
-                               options);
-      const TwoPassAfDrr level_of_whole(
-          std::make_shared<const FieldLevel>(decode_field_level(*whole, 0)), options);
+      const TwoPassAfDrr level(std::make_shared<const FieldLevel>(decode_field(*cropped)), options);
+      const TwoPassAfDrr level_of_whole(std::make_shared<const FieldLevel>(decode_field(*whole)),
+                                        options);
       for (std::uint64_t i = 0; i < 30; ++i) {
         const RigidTransform pose = pose_from_parameters({}, small_pose(i));
         const View view{small_camera(), {3, 2, 25, 20}};

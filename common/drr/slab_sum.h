@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "drr/slab_sum_kernel.h"
+
+namespace af {
+
+/// Equidistant nodes of an image on a plane y = plane_y_mm of the slab frame.
+struct NodeGrid {
+  double s_first_mm, s_spacing_mm;
+  double t_first_mm, t_spacing_mm;
+  double plane_y_mm;
+  std::int32_t stride, s_count, t_count;
+};
+
+/// Images of the nodes of one grid: the value and, unless null, its slopes along the source's x and
+/// z (per mm).
+struct NodeImages {
+  NodeGrid grid;
+  std::array<const float*, 3> images;
+};
+
+/// Scratch memory of a sum.
+struct SlabSumScratch {
+  std::vector<std::int32_t> columns;
+  std::vector<float> column_weights;
+  std::vector<SumRow> rows;
+  std::array<std::vector<float>, 3> row_images;
+};
+
+/// Sums images of several slabs on one plane. From one source the nodes of the sum are scaled and
+/// shifted against those of each slab, along s and t separately, so a slab is resampled by two
+/// passes of four taps (Lagrange's cubic): far cheaper than resampling each slab to the detector.
+/// What is seen through the sum's nodes is what is seen through the slabs: depth keeps its
+/// parallax, as the sum is made for this source alone.
+/// \test SlabSum.OfOneSlabInItsOwnPlaneIsTheSlab
+class SlabSum {
+ public:
+  /// Sums to `images` (the slopes null: not wanted), of grid.t_count rows, writable for 16 values
+  /// beyond each. `source`: in the slab frame.
+  SlabSum(const NodeGrid& grid,
+          const Eigen::Vector3d& source,
+          const std::array<float*, 3>& images,
+          SlabSumScratch& scratch)
+      : grid_(grid), source_(source), images_(images), scratch_(scratch) {}
+
+  /// Beyond the slab's image its edge goes on linearly for a node.
+  void add(const NodeImages& slab);
+  [[nodiscard]] NodeImages images() const { return {grid_, {images_[0], images_[1], images_[2]}}; }
+
+ private:
+  void make_columns(const NodeGrid& slab, double reach_ratio, SumColumns& columns);
+  void make_rows(const NodeGrid& slab, double reach_ratio);
+
+  NodeGrid grid_;
+  Eigen::Vector3d source_;
+  std::array<float*, 3> images_;
+  SlabSumScratch& scratch_;
+  bool is_empty_ = true;
+};
+
+}  // namespace af

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <stdint.h>
+
+namespace af {
+
+/// Nodes that an interpolation takes along one axis.
+inline constexpr int kSumTaps = 4;
+
+/// Where each column of the sum lies in a slab's image, ascending; all arrays readable for 16
+/// entries beyond the last column.
+struct SumColumns {
+  const int32_t* first;  ///< column of the slab's image that the first tap takes
+  const float* weights[kSumTaps];
+  const float* slopes[kSumTaps];  ///< their derivatives, per column of the slab's image
+};
+
+struct SumRow {
+  int32_t first;
+  float weights[kSumTaps];
+  float slopes[kSumTaps];
+};
+
+/// One slab that is added to a sum: images of the value and, when wanted, of its slopes along the
+/// source's x and z. Images are readable for 32 values beyond the columns that taps take.
+struct SlabTerm {
+  const float* images[3];  ///< of the slab; [1] and [2] null: not wanted
+  int32_t stride;
+  int32_t columns;
+  SumColumns s;
+  const SumRow* t;
+  /// Slopes of the value per node along s and t, times these, belong to the slopes along the
+  /// source's x and z: as the source moves and a node of the sum stays, the place in the slab's
+  /// image where it is seen moves.
+  float drift[2];
+  float* rows[3];  ///< room for the slab's images between two rows, and 48 values more
+  float* sum[3];
+  int32_t sum_stride;
+  int32_t sum_columns;
+  int32_t sum_rows;
+  bool adds;  ///< to the sum, instead of replacing it
+};
+
+using AddSlab = void (*)(const SlabTerm& term);
+
+#define AF_DECLARE_KERNELS(space)      \
+  namespace space {                    \
+  void add_slab(const SlabTerm& term); \
+  }
+AF_DECLARE_KERNELS(kernels_128)
+AF_DECLARE_KERNELS(kernels_256)
+AF_DECLARE_KERNELS(kernels_512)
+#undef AF_DECLARE_KERNELS
+
+}  // namespace af
