@@ -14,6 +14,7 @@
 #include "drr/field_level.h"
 #include "drr/ray_cast_drr.h"
 #include "drr/two_pass_af_drr.h"
+#include "field/tile.h"
 #include "field_file/field_file.h"
 #include "files/sha256.h"
 #include "register/problem/fiducial_mask.h"
@@ -154,11 +155,21 @@ int level_count(const CompressedAttenuationField& field, const CaseLoadOptions& 
   return std::max(options.coarsest_level, possible);
 }
 
+/// The samples of several slabs are decoded when they take no more than this: they have few
+/// viewpoints, so they are small, and many nodes, which are blended faster from samples than from
+/// codewords.
+constexpr std::size_t kMostDecodedBytes = std::size_t{512} << 20;
+
+bool pays_to_decode(const CompressedAttenuationField& field) {
+  constexpr std::size_t kTileBytes = sizeof(Tile);
+  std::size_t tiles = 0;
+  for (const CompressedSlab& slab : field.slabs) tiles += slab.indices.size();
+  return field.slabs.size() > 1 && tiles <= kMostDecodedBytes / kTileBytes;
+}
+
 /// Collective. A field's renderers for a view: its own, and levels 1, 2, ... of its pyramid, held
 /// once per node. A method's levels are those of a field of about 256 nodes: a finer field begins
-/// with more halvings, so that a level has about the same blur. The samples of several slabs are
-/// decoded: they have few viewpoints, so they are small, and many nodes, which are blended faster
-/// from samples than from codewords.
+/// with more halvings, so that a level has about the same blur.
 void use_field(const std::shared_ptr<const CompressedAttenuationField>& field,
                const CaseLoadOptions& options,
                const Communicator& communicator,
@@ -167,16 +178,15 @@ void use_field(const std::shared_ptr<const CompressedAttenuationField>& field,
   const auto memory = node_memory(communicator, *pool);
   const int more_halvings = halvings_to_usual_nodes(field->light_slab);
   const int coarsest_level = level_count(*field, options);
+  const int halvings = coarsest_level > 0 ? coarsest_level + more_halvings : 0;
   FieldLevels pyramid;
-  if (field->slabs.size() > 1) {
+  if (pays_to_decode(*field)) {
     const auto samples = std::make_shared<const FieldLevel>(decode_field(*field, memory));
     view.renderer = std::make_shared<const TwoPassAfDrr>(samples, TwoPassOptions{}, options.pool);
-    if (coarsest_level > 0)
-      pyramid = make_field_pyramid(*samples, coarsest_level + more_halvings, memory);
+    if (halvings > 0) pyramid = make_field_pyramid(*samples, halvings, memory);
   } else {
     view.renderer = std::make_shared<const TwoPassAfDrr>(field, TwoPassOptions{}, options.pool);
-    if (coarsest_level > 0)
-      pyramid = make_field_pyramid(*field, coarsest_level + more_halvings, memory);
+    if (halvings > 0) pyramid = make_field_pyramid(*field, halvings, memory);
   }
   for (auto i = static_cast<std::size_t>(more_halvings); i < pyramid.size(); ++i)
     view.coarse_levels.push_back(
