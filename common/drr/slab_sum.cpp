@@ -63,7 +63,7 @@ void SlabSum::make_columns(const NodeGrid& slab, double reach_ratio, SumColumns&
   const auto count = static_cast<std::size_t>(grid_.s_count);
   const std::size_t padded = count + kBeyond;
   scratch_.columns.resize(padded);
-  scratch_.column_weights.resize(2 * kSumTaps * padded);
+  scratch_.column_weights.resize(std::size_t{2} * kSumTaps * padded);
   columns.first = scratch_.columns.data();
   for (std::size_t tap = 0; tap < kSumTaps; ++tap) {
     columns.weights[tap] = scratch_.column_weights.data() + tap * padded;
