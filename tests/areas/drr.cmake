@@ -2,5 +2,5 @@
 af_add_test(
   drr_test
   SOURCES unit/drr/af_drr_test.cpp unit/drr/corrected_drr_test.cpp unit/drr/field_level_test.cpp unit/drr/two_pass_af_drr_test.cpp
-          unit/drr/ray_cast_level_test.cpp unit/drr/small_fields.cpp
+          unit/drr/ray_cast_drr_test.cpp unit/drr/ray_cast_level_test.cpp unit/drr/small_fields.cpp
   LIBS af_drr_core)
