@@ -77,20 +77,4 @@ Image2d render_image(const DrrRenderer& renderer,
                      const View& view,
                      std::int64_t* rays_outside = nullptr);
 
-/// Steps of central_difference_gradients(): by default large compared with single-precision noise
-/// of a DRR, small compared with its structures.
-struct DifferenceSteps {
-  double rotation_rad = 1e-3;
-  double translation_mm = 0.1;
-};
-
-/// Derivatives by central differences of render(): for renderers without analytic derivatives, and
-/// as the oracle of renderers with them.
-RenderStatus central_difference_gradients(const DrrRenderer& renderer,
-                                          const RigidTransform& room_from_ct,
-                                          const View& view,
-                                          RenderWorkspace& workspace,
-                                          const PoseGradients& gradients,
-                                          const DifferenceSteps& steps = {});
-
 }  // namespace af

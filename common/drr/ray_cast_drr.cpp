@@ -21,11 +21,20 @@ RayCastDrr::RayCastDrr(std::shared_ptr<const AttenuationVolume> volume,
 
 RenderStatus RayCastDrr::render(const RigidTransform& room_from_ct,
                                 const View& view,
-                                RenderWorkspace& workspace,
+                                RenderWorkspace& /*workspace*/,
                                 std::span<float> total_attenuation,
                                 const std::optional<PoseGradients>& gradients) const {
-  caster_.cast(ray_fan(room_from_ct, view), total_attenuation, pool_.get());
-  if (gradients) central_difference_gradients(*this, room_from_ct, view, workspace, *gradients);
+  const RayFan fan = ray_fan(room_from_ct, view);
+  if (!gradients) {
+    caster_.cast(fan, total_attenuation, pool_.get());
+    return {};
+  }
+  const RigidTransform ct_from_room = room_from_ct.inverse();
+  caster_.cast_with_slopes(
+      fan,
+      total_attenuation,
+      {ct_from_room * gradients->pivot_room_point, ct_from_room.linear(), gradients->planes},
+      pool_.get());
   return {};
 }
 

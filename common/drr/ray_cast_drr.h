@@ -8,7 +8,8 @@
 
 namespace af {
 
-/// DRRs by the reference ray caster; no ray is ever outside.
+/// DRRs by the reference ray caster, with its derivatives (RayCaster::cast_with_slopes); no ray is
+/// ever outside. \test RayCastDrr.GradientsAgreeWithCentralDifferences
 class RayCastDrr final : public DrrRenderer {
  public:
   /// `pool`: threads that share the rows of a DRR; none means the calling thread alone.

@@ -9,6 +9,7 @@
 #include "base/error.h"
 #include "base/vector_width.h"
 #include "volume/ray_caster_kernel.h"
+#include "volume/ray_slopes.h"
 
 namespace af {
 
@@ -19,6 +20,8 @@ namespace {
 struct Interval {
   double begin;
   double end;
+  int begin_axis = RayPath::kNoFace;  ///< of the face that cuts it off there
+  int end_axis = RayPath::kNoFace;
 };
 
 Interval clip_to_volume(Interval inside,
@@ -33,11 +36,19 @@ Interval clip_to_volume(Interval inside,
     }
     const double a = (low[axis] - origin[axis]) / direction[axis];
     const double b = (high[axis] - origin[axis]) / direction[axis];
-    inside.begin = std::max(inside.begin, std::min(a, b));
-    inside.end = std::min(inside.end, std::max(a, b));
+    if (std::min(a, b) > inside.begin) {
+      inside.begin = std::min(a, b);
+      inside.begin_axis = axis;
+    }
+    if (std::max(a, b) < inside.end) {
+      inside.end = std::max(a, b);
+      inside.end_axis = axis;
+    }
   }
   return inside;
 }
+
+using LaneValues = std::array<float, RayBundle::kRays>;
 
 /// Turns a fan given in mm into bundles of rays in voxel indices.
 class BundleMaker {
@@ -61,18 +72,59 @@ class BundleMaker {
     }
   }
 
+  /// The sums of one lane as the mechanics want them.
+  [[nodiscard]] RaySums ray_sums(const SlopeSums& sums,
+                                 std::size_t lane,
+                                 float weight_mm,
+                                 float mu_per_mm_per_unit) const {
+    const auto mu_per_mm = static_cast<double>(mu_per_mm_per_unit);
+    const double scale = static_cast<double>(weight_mm) * mu_per_mm;
+    const auto in_mm = [&](const float(&per_voxel)[3][RayBundle::kRays]) {
+      const Eigen::Vector3d slopes(per_voxel[0][lane], per_voxel[1][lane], per_voxel[2][lane]);
+      return Eigen::Vector3d(scale * slopes.cwiseQuotient(mm_from_index_));
+    };
+    return {in_mm(sums.slopes),
+            in_mm(sums.numbered_slopes),
+            mu_per_mm * static_cast<double>(sums.stretched_begin[lane]),
+            mu_per_mm * static_cast<double>(sums.stretched_end[lane])};
+  }
+
+  /// The path of ray (column, row).
+  [[nodiscard]] RayPath path(int column, int row) const {
+    const Eigen::Vector3d direction = direction_of(column, row);
+    const Interval inside = inside_of(direction);
+    if (!(inside.end > inside.begin)) return {};
+    return {mm_from_index_.cwiseProduct(origin_ + inside.begin * direction),
+            mm_from_index_.cwiseProduct(origin_ + inside.end * direction),
+            inside.begin_axis,
+            inside.end_axis,
+            static_cast<int>(samples_of(length_mm(inside, direction)))};
+  }
+
+  /// Fills a bundle with `count` rays of a row from `column` on, and the weights of their samples.
+  void fill(int column, int row, int count, RayBundle& bundle, LaneValues& weights_mm) const {
+    for (int lane = 0; lane < RayBundle::kRays; ++lane) {
+      const auto i = static_cast<std::size_t>(lane);
+      weights_mm[i] = 0.0f;
+      if (lane < count)
+        weights_mm[i] = fill_lane(column + lane, row, lane, bundle);
+      else
+        clear_lane(lane, bundle);
+    }
+  }
+
+ private:
   /// Fills lane `lane` with ray (column, row); returns the weight of its samples in mm (0 when it
   /// misses).
   float fill_lane(int column, int row, int lane, RayBundle& bundle) const {
-    const Eigen::Vector3d direction = first_ + column * column_step_ + row * row_step_;
-    const Interval inside = clip_to_volume(layer_, origin_, direction, low_, high_);
+    const Eigen::Vector3d direction = direction_of(column, row);
+    const Interval inside = inside_of(direction);
     if (!(inside.end > inside.begin)) {
       clear_lane(lane, bundle);
       return 0.0f;
     }
-    const double length_mm =
-        (inside.end - inside.begin) * direction.cwiseProduct(mm_from_index_).norm();
-    const double samples = std::max(1.0, std::ceil(length_mm / step_mm_));
+    const double length = length_mm(inside, direction);
+    const double samples = samples_of(length);
     const Eigen::Vector3d step = direction * ((inside.end - inside.begin) / samples);
     const Eigen::Vector3d start = origin_ + inside.begin * direction + 0.5 * step;
     for (int axis = 0; axis < 3; ++axis) {
@@ -80,7 +132,7 @@ class BundleMaker {
       bundle.step[axis][lane] = static_cast<float>(step[axis]);
     }
     bundle.samples[lane] = static_cast<std::int32_t>(samples);
-    return static_cast<float>(length_mm / samples);
+    return static_cast<float>(length / samples);
   }
 
   static void clear_lane(int lane, RayBundle& bundle) {
@@ -91,13 +143,114 @@ class BundleMaker {
     bundle.samples[lane] = 0;
   }
 
- private:
+  [[nodiscard]] Eigen::Vector3d direction_of(int column, int row) const {
+    return first_ + column * column_step_ + row * row_step_;
+  }
+  [[nodiscard]] Interval inside_of(const Eigen::Vector3d& direction) const {
+    return clip_to_volume(layer_, origin_, direction, low_, high_);
+  }
+  [[nodiscard]] double length_mm(const Interval& inside, const Eigen::Vector3d& direction) const {
+    return (inside.end - inside.begin) * direction.cwiseProduct(mm_from_index_).norm();
+  }
+  [[nodiscard]] double samples_of(double length_mm) const {
+    return std::max(1.0, std::ceil(length_mm / step_mm_));
+  }
+
   double step_mm_;
   Interval layer_;
   Eigen::Vector3d mm_from_index_;
   Eigen::Vector3d origin_, first_, column_step_, row_step_;
   Eigen::Vector3d low_, high_;
 };
+
+/// Casts the rows of a fan.
+class FanCaster {
+ public:
+  FanCaster(const AttenuationVolume& volume, const RayFan& fan, double step_mm)
+      : maker_(volume.grid(), fan, step_mm),
+        columns_(fan.columns),
+        voxels_{volume.voxels().data(),
+                volume.grid().size[0],
+                volume.grid().size[0] * volume.grid().size[1]},
+        mu_per_mm_per_unit_(static_cast<float>(volume.model().mu_per_mm_per_unit())) {}
+
+  void cast_row(int row, std::span<float> values) const {
+    LaneValues sums{};
+    for_each_bundle(row,
+                    [&](const RayBundle& bundle, const Run& run, const LaneValues& weights_mm) {
+                      sum_bundle_(voxels_, bundle, sums.data());
+                      for (std::size_t i = 0; i < run.count; ++i)
+                        values[run.offset + i] = sums[i] * (weights_mm[i] * mu_per_mm_per_unit_);
+                    });
+  }
+
+  /// `planes`: six of as many values.
+  void cast_row(int row,
+                const RayMechanics& mechanics,
+                std::span<float> values,
+                std::span<float> planes) const {
+    SlopeSums sums{};
+    for_each_bundle(
+        row, [&](const RayBundle& bundle, const Run& run, const LaneValues& weights_mm) {
+          sum_bundle_with_slopes_(voxels_, bundle, sums);
+          for (std::size_t i = 0; i < run.count; ++i) {
+            values[run.offset + i] = sums.values[i] * (weights_mm[i] * mu_per_mm_per_unit_);
+            const RayPath path = maker_.path(run.column + static_cast<int>(i), row);
+            const auto slopes = mechanics.slopes_of(
+                path, maker_.ray_sums(sums, i, weights_mm[i], mu_per_mm_per_unit_));
+            for (std::size_t k = 0; k < slopes.size(); ++k)
+              planes[k * values.size() + run.offset + i] = slopes[k];
+          }
+        });
+  }
+
+ private:
+  /// Neighbouring rays of a row.
+  struct Run {
+    int column;
+    std::size_t offset;  ///< of the first one's value
+    std::size_t count;
+  };
+
+  /// Calls work(bundle, run, weights_mm) for the rays of a row.
+  template <typename Work>
+  void for_each_bundle(int row, const Work& work) const {
+    RayBundle bundle{};
+    LaneValues weights_mm{};
+    const auto first = static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_);
+    for (int column = 0; column < columns_; column += RayBundle::kRays) {
+      const int count = std::min(RayBundle::kRays, columns_ - column);
+      maker_.fill(column, row, count, bundle, weights_mm);
+      const auto offset = first + static_cast<std::size_t>(column);
+      work(bundle, Run{column, offset, static_cast<std::size_t>(count)}, weights_mm);
+    }
+  }
+
+  BundleMaker maker_;
+  int columns_;
+  VoxelView voxels_;
+  float mu_per_mm_per_unit_;
+  SumBundle sum_bundle_ = select_kernel<SumBundle>(
+      kernels_128::sum_bundle, kernels_256::sum_bundle, kernels_512::sum_bundle);
+  SumBundleWithSlopes sum_bundle_with_slopes_ =
+      select_kernel<SumBundleWithSlopes>(kernels_128::sum_bundle_with_slopes,
+                                         kernels_256::sum_bundle_with_slopes,
+                                         kernels_512::sum_bundle_with_slopes);
+};
+
+/// Calls work(row) for the rows of a fan, shared by the threads of a pool, when there is one.
+template <typename Work>
+void for_each_row(const RayFan& fan, ThreadPool* pool, const Work& work) {
+  if (pool != nullptr)
+    pool->for_each(fan.rows, [&](int row, int /*slot*/) { work(row); });
+  else
+    for (int row = 0; row < fan.rows; ++row) work(row);
+}
+
+void require_value_per_ray(const RayFan& fan, std::span<const float> values) {
+  check(values.size() == static_cast<std::size_t>(fan.columns) * static_cast<std::size_t>(fan.rows),
+        "one value per ray of the fan");
+}
 
 }  // namespace
 
@@ -117,41 +270,22 @@ RayCaster::RayCaster(const AttenuationVolume& volume, const RayCasterOptions& op
 void RayCaster::cast(const RayFan& fan,
                      std::span<float> total_attenuation,
                      ThreadPool* pool) const {
-  check(total_attenuation.size() ==
-            static_cast<std::size_t>(fan.columns) * static_cast<std::size_t>(fan.rows),
-        "one value per ray of the fan");
-  const CtGrid& grid = volume_.grid();
-  const BundleMaker maker(grid, fan, options_.step_mm);
-  const VoxelView voxels{volume_.voxels().data(), grid.size[0], grid.size[0] * grid.size[1]};
-  const SumBundle sum_bundle = select_kernel<SumBundle>(
-      kernels_128::sum_bundle, kernels_256::sum_bundle, kernels_512::sum_bundle);
-  const auto mu_per_mm_per_unit = static_cast<float>(volume_.model().mu_per_mm_per_unit());
-  const auto cast_row = [&](int row, int /*slot*/) {
-    RayBundle bundle{};
-    std::array<float, RayBundle::kRays> weights_mm{};
-    std::array<float, RayBundle::kRays> sums{};
-    auto next = static_cast<std::size_t>(row) * static_cast<std::size_t>(fan.columns);
-    for (int first = 0; first < fan.columns; first += RayBundle::kRays) {
-      const int count = std::min(RayBundle::kRays, fan.columns - first);
-      for (int lane = 0; lane < RayBundle::kRays; ++lane) {
-        const auto i = static_cast<std::size_t>(lane);
-        weights_mm[i] = 0.0f;
-        if (lane < count)
-          weights_mm[i] = maker.fill_lane(first + lane, row, lane, bundle);
-        else
-          BundleMaker::clear_lane(lane, bundle);
-      }
-      sum_bundle(voxels, bundle, sums.data());
-      for (int lane = 0; lane < count; ++lane) {
-        const auto i = static_cast<std::size_t>(lane);
-        total_attenuation[next++] = sums[i] * (weights_mm[i] * mu_per_mm_per_unit);
-      }
-    }
-  };
-  if (pool != nullptr)
-    pool->for_each(fan.rows, cast_row);
-  else
-    for (int row = 0; row < fan.rows; ++row) cast_row(row, 0);
+  require_value_per_ray(fan, total_attenuation);
+  const FanCaster caster(volume_, fan, options_.step_mm);
+  for_each_row(fan, pool, [&](int row) { caster.cast_row(row, total_attenuation); });
+}
+
+void RayCaster::cast_with_slopes(const RayFan& fan,
+                                 std::span<float> total_attenuation,
+                                 const MotionSlopes& slopes,
+                                 ThreadPool* pool) const {
+  require_value_per_ray(fan, total_attenuation);
+  check(slopes.planes.size() == 6 * total_attenuation.size(), "six planes of one value per ray");
+  const FanCaster caster(volume_, fan, options_.step_mm);
+  const RayMechanics mechanics(volume_.grid(), slopes);
+  for_each_row(fan, pool, [&](int row) {
+    caster.cast_row(row, mechanics, total_attenuation, slopes.planes);
+  });
 }
 
 float RayCaster::total_attenuation(const Eigen::Vector3d& source_point,

@@ -21,7 +21,29 @@ AF_KERNEL_INLINE F16 mix(F16 a, F16 b, F16 weight) {
   return a + weight * (b - a);
 }
 
-AF_KERNEL_INLINE F16 sample(const VoxelView& volume, F16 x, F16 y, F16 z) {
+/// The interpolant on a face of a cell, i fixed.
+struct Face {
+  F16 value;
+  F16 slope_y;
+  F16 slope_z;
+};
+
+AF_KERNEL_INLINE Face
+face_of(F16 at_00, F16 at_10, F16 at_01, F16 at_11, F16 weight_y, F16 weight_z) {
+  const F16 edge_0 = at_10 - at_00;
+  const F16 edge_1 = at_11 - at_01;
+  const F16 value_0 = at_00 + weight_y * edge_0;
+  const F16 slope_z = at_01 + weight_y * edge_1 - value_0;
+  return {value_0 + weight_z * slope_z, mix(edge_0, edge_1, weight_z), slope_z};
+}
+
+/// The interpolant at one point of each ray, its slopes per voxel.
+struct Sample {
+  F16 value;
+  F16 slope[3];
+};
+
+AF_KERNEL_INLINE Sample sample(const VoxelView& volume, F16 x, F16 y, F16 z) {
   const I16 i = to_int(x);
   const I16 j = to_int(y);
   const I16 k = to_int(z);
@@ -34,36 +56,95 @@ AF_KERNEL_INLINE F16 sample(const VoxelView& volume, F16 x, F16 y, F16 z) {
   const Row row_10 = unpack(gather_pairs(volume.voxels + volume.row_stride, offset));
   const Row row_01 = unpack(gather_pairs(next_slice, offset));
   const Row row_11 = unpack(gather_pairs(next_slice + volume.row_stride, offset));
-  const F16 low =
-      mix(mix(row_00.low, row_10.low, weight_y), mix(row_01.low, row_11.low, weight_y), weight_z);
-  const F16 high = mix(
-      mix(row_00.high, row_10.high, weight_y), mix(row_01.high, row_11.high, weight_y), weight_z);
-  return mix(low, high, weight_x);
+  const Face low = face_of(row_00.low, row_10.low, row_01.low, row_11.low, weight_y, weight_z);
+  const Face high = face_of(row_00.high, row_10.high, row_01.high, row_11.high, weight_y, weight_z);
+  return {mix(low.value, high.value, weight_x),
+          {high.value - low.value,
+           mix(low.slope_y, high.slope_y, weight_x),
+           mix(low.slope_z, high.slope_z, weight_x)}};
+}
+
+/// A bundle in registers.
+struct Rays {
+  F16 start[3];
+  F16 step[3];
+  I16 samples;
+};
+
+AF_KERNEL_INLINE Rays rays_of(const RayBundle& bundle) {
+  return {{load<F16>(bundle.start[0]), load<F16>(bundle.start[1]), load<F16>(bundle.start[2])},
+          {load<F16>(bundle.step[0]), load<F16>(bundle.step[1]), load<F16>(bundle.step[2])},
+          load<I16>(bundle.samples)};
+}
+
+AF_KERNEL_INLINE Sample sample(const VoxelView& volume, const Rays& rays, F16 number) {
+  return sample(volume,
+                rays.start[0] + number * rays.step[0],
+                rays.start[1] + number * rays.step[1],
+                rays.start[2] + number * rays.step[2]);
+}
+
+/// Calls add(sample, number, is_inside) for the samples of all rays in turn. Lanes that are done
+/// sample their first position again.
+template <typename Add>
+AF_KERNEL_INLINE void for_each_sample(const VoxelView& volume, const Rays& rays, Add add) {
+  for (int32_t k = 0;; ++k) {
+    const I16 is_inside = rays.samples > k;
+    if (!any(is_inside)) break;
+    const F16 number = to_float(is_inside ? splat(k) : splat(0));
+    add(sample(volume, rays, number), number, is_inside);
+  }
+}
+
+/// SlopeSums::stretched_begin or, by a growth of 1 and numbers backwards from the last, the end.
+template <typename NumberOf>
+AF_KERNEL_INLINE F16
+stretched(const VoxelView& volume, const Rays& rays, float growth, NumberOf number_of) {
+  const I16 count = minimum(rays.samples, splat(int32_t{SlopeSums::kStretched}));
+  const F16 share = splat(1.0f) / to_float(count);
+  F16 sum = splat(0.0f);
+  for (int32_t k = 0; k < SlopeSums::kStretched; ++k) {
+    const I16 is_inside = count > k;
+    if (!any(is_inside)) break;
+    const Sample at = sample(volume, rays, to_float(is_inside ? number_of(k) : splat(0)));
+    const F16 along =
+        at.slope[0] * rays.step[0] + at.slope[1] * rays.step[1] + at.slope[2] * rays.step[2];
+    const F16 moved = splat(1.0f) - (static_cast<float>(k) + 0.5f) * share;
+    sum += is_inside ? moved * along + growth * share * at.value : splat(0.0f);
+  }
+  return sum;
 }
 
 }  // namespace
 
 void sum_bundle(const VoxelView& volume, const RayBundle& bundle, float* sums) {
-  const F16 start_x = load<F16>(bundle.start[0]);
-  const F16 start_y = load<F16>(bundle.start[1]);
-  const F16 start_z = load<F16>(bundle.start[2]);
-  const F16 step_x = load<F16>(bundle.step[0]);
-  const F16 step_y = load<F16>(bundle.step[1]);
-  const F16 step_z = load<F16>(bundle.step[2]);
-  const I16 samples = load<I16>(bundle.samples);
   F16 sum = splat(0.0f);
-  for (int32_t k = 0;; ++k) {
-    const I16 is_inside = samples > k;
-    if (!any(is_inside)) break;
-    // Lanes that are done sample their first position again and add nothing.
-    const F16 position = to_float(is_inside ? splat(k) : splat(0));
-    const F16 value = sample(volume,
-                             start_x + position * step_x,
-                             start_y + position * step_y,
-                             start_z + position * step_z);
-    sum += is_inside ? value : splat(0.0f);
-  }
+  for_each_sample(volume, rays_of(bundle), [&](const Sample& at, F16 /*number*/, I16 is_inside) {
+    sum += is_inside ? at.value : splat(0.0f);
+  });
   store(sums, sum);
+}
+
+void sum_bundle_with_slopes(const VoxelView& volume, const RayBundle& bundle, SlopeSums& sums) {
+  const Rays rays = rays_of(bundle);
+  F16 value = splat(0.0f);
+  F16 slope[3] = {splat(0.0f), splat(0.0f), splat(0.0f)};
+  F16 numbered[3] = {splat(0.0f), splat(0.0f), splat(0.0f)};
+  for_each_sample(volume, rays, [&](const Sample& at, F16 number, I16 is_inside) {
+    value += is_inside ? at.value : splat(0.0f);
+    for (int axis = 0; axis < 3; ++axis) {
+      slope[axis] += is_inside ? at.slope[axis] : splat(0.0f);
+      numbered[axis] += number * at.slope[axis];  // done lanes have number 0
+    }
+  });
+  store(sums.values, value);
+  for (int axis = 0; axis < 3; ++axis) {
+    store(sums.slopes[axis], slope[axis]);
+    store(sums.numbered_slopes[axis], numbered[axis]);
+  }
+  store(sums.stretched_begin, stretched(volume, rays, -1.0f, [](int32_t k) { return splat(k); }));
+  store(sums.stretched_end,
+        stretched(volume, rays, 1.0f, [&](int32_t k) { return rays.samples - 1 - k; }));
 }
 
 }  // namespace af::AF_KERNEL_NAMESPACE

@@ -24,14 +24,35 @@ struct VoxelView {
 /// Sums of the trilinear samples of each ray, in units of the voxels.
 using SumBundle = void (*)(const VoxelView& volume, const RayBundle& bundle, float* sums);
 
+/// Sums over the samples of each ray, in units of the voxels.
+struct SlopeSums {
+  float values[RayBundle::kRays];
+  float slopes[3][RayBundle::kRays];           ///< of the interpolant, per voxel along i, j, k
+  float numbered_slopes[3][RayBundle::kRays];  ///< each times the sample's number k
+  /// What moving an end along the ray by one step gives: its first (last) kStretched samples, or
+  /// all when there are fewer, move along with it, less and less, and their weights make up for it.
+  /// About 0 at air, and the attenuation there where the volume's face cuts a body.
+  static constexpr int kStretched = 16;
+  float stretched_begin[RayBundle::kRays];
+  float stretched_end[RayBundle::kRays];
+};
+
+/// The same values, bit for bit, with the sums of slopes.
+using SumBundleWithSlopes = void (*)(const VoxelView& volume,
+                                     const RayBundle& bundle,
+                                     SlopeSums& sums);
+
 namespace kernels_128 {
 void sum_bundle(const VoxelView& volume, const RayBundle& bundle, float* sums);
-}
+void sum_bundle_with_slopes(const VoxelView& volume, const RayBundle& bundle, SlopeSums& sums);
+}  // namespace kernels_128
 namespace kernels_256 {
 void sum_bundle(const VoxelView& volume, const RayBundle& bundle, float* sums);
-}
+void sum_bundle_with_slopes(const VoxelView& volume, const RayBundle& bundle, SlopeSums& sums);
+}  // namespace kernels_256
 namespace kernels_512 {
 void sum_bundle(const VoxelView& volume, const RayBundle& bundle, float* sums);
-}
+void sum_bundle_with_slopes(const VoxelView& volume, const RayBundle& bundle, SlopeSums& sums);
+}  // namespace kernels_512
 
 }  // namespace af

@@ -18,25 +18,19 @@ void CorrectionOptions::describe(Fields& field) {
       "Correct the end by ray casting: cast a DRR per view there, add what look-up lacks of it to "
       "every looked-up DRR, let the last stage converge again, and repeat until the pose stands "
       "still. It is then close to where ray casting ends. Needs the CT. Costs, at the last "
-      "stage's pixels and per view, one ray-cast DRR for the first cast and 13 for each further "
-      "one: tenths of a second");
+      "stage's pixels, one ray-cast DRR per view and cast, with derivatives from the second cast "
+      "on: a tenth of a second, or a few");
   field("correct_tolerance_mm",
         tolerance_mm,
         "With --correct: a pose that moves no more, mean over the target box, stands still, mm")
       .above(0.0)
       .finite();
   field("correct_max_casts", max_casts, "With --correct: most casts").within(1, 100);
-  field("correct_without_slopes",
-        takes_slopes,
-        "With --correct: cast no derivatives, one DRR per view and cast. Hundredths of a second, "
-        "and less close to ray casting")
-      .off_switch();
   field.start_group("");
 }
 
 DefectSlopes CorrectionOptions::slopes_of_cast(int casts_before) const {
-  return takes_slopes && (casts_before > 0 || max_casts == 1) ? DefectSlopes::Taken
-                                                              : DefectSlopes::LeftOut;
+  return casts_before > 0 || max_casts == 1 ? DefectSlopes::Taken : DefectSlopes::LeftOut;
 }
 
 StageDefect::StageDefect(std::vector<ObjectiveView> stage,

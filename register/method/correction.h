@@ -18,12 +18,11 @@ struct CorrectionOptions {
   bool is_wanted = false;
   /// A pose that moves no more, mean over the target box, stands still.
   double tolerance_mm = 0.002;
-  int max_casts = 4;         ///< ray-cast DRRs per view, those for slopes not counted
-  bool takes_slopes = true;  ///< derivatives are cast, too
+  int max_casts = 4;  ///< ray-cast DRRs per view
 
   void describe(Fields& field);
-  /// The first cast has no slopes, unless it is the only one: the pose moves most after it, and
-  /// with it ray casting's derivatives.
+  /// The first cast has no slopes, unless it is the only one: the pose moves most after it, with
+  /// one view by millimetres, and there the derivatives are others.
   [[nodiscard]] DefectSlopes slopes_of_cast(int casts_before) const;
 };
 

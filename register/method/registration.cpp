@@ -342,8 +342,7 @@ void RegistrationRunner::Impl::correct(std::int64_t start_index,
     const std::size_t index = stages.size() + static_cast<std::size_t>(report.casts);
     if (!correct_once(defect, slopes, index, start_index, end, result)) break;
     // A pose that stands still for want of slopes may yet move.
-    report.stood_still = report.last_mm <= wanted.tolerance_mm &&
-                         (slopes == DefectSlopes::Taken || !wanted.takes_slopes);
+    report.stood_still = report.last_mm <= wanted.tolerance_mm && slopes == DefectSlopes::Taken;
   }
   report.moved_mm = mean_tre_mm(looked_up, end.room_from_ct, problem->target_points_ct);
 }

@@ -157,7 +157,9 @@ void run(const CaseOptions& options,
       renderer_contender(
           "TwoPassAfDrr, 16 times the pixels, two threads", on_two_threads, {poses, 2}, fine),
       renderer_contender("AfDrr, 16 taps", quadrilinear, {poses, 1}, view),
-      renderer_contender("RayCastDrr", ray_cast, {few_poses, 1}, view)};
+      renderer_contender("RayCastDrr", ray_cast, {few_poses, 1}, view),
+      renderer_contender(
+          "RayCastDrr, six gradients", ray_cast, {few_poses, 1}, view, Derivatives::OfThePose)};
   const auto plastimatch = PlastimatchDrr::prepare(benchmark_case, work, options.is_quick ? 1 : 3);
   if (plastimatch)
     contenders.push_back({"plastimatch drr exact", 1.0 * plastimatch->drrs_per_call(), "DRRs", [&] {

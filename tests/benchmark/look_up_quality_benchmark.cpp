@@ -17,6 +17,7 @@
 #include "field_file/field_file.h"
 #include "image/psnr.h"
 #include "precompute/casting/shear_warp_caster.h"
+#include "support/central_differences.h"
 #include "support/plane_products.h"
 #include "volume/blurred_volume.h"
 
@@ -103,10 +104,10 @@ GradientQuality gradient_quality(const Way& way,
   std::array<af::test::PlaneProducts, 6> with_cast{};
   std::array<af::test::PlaneProducts, 6> with_own{};
   // Small, since slopes jump at the borders of cells.
-  const DifferenceSteps steps{5e-5, 0.005};
+  const test::DifferenceSteps steps{5e-5, 0.005};
   for (std::size_t pose = 0; pose < cast_gradients.size(); ++pose) {
     way.renderer->render(poses[pose], view, *workspace, value, PoseGradients{pivot, analytic});
-    central_difference_gradients(
+    test::central_difference_gradients(
         *way.renderer, poses[pose], view, *workspace, {pivot, differences}, steps);
     for (std::size_t p = 0; p < 6; ++p) {
       const auto plane = std::span<const float>(analytic).subspan(p * pixels, pixels);
@@ -149,7 +150,7 @@ std::vector<std::vector<float>> cast_gradients_at(const std::vector<RigidTransfo
   for (std::size_t i = 0; i < count; ++i) {
     gradients[i].resize(6 * view.pixel_count());
     // Larger than the ray caster's noise from its step of 1 mm.
-    central_difference_gradients(
+    test::central_difference_gradients(
         ray_cast, poses[i], view, *workspace, {pivot, gradients[i]}, {2e-3, 0.5});
   }
   return gradients;

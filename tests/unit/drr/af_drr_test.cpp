@@ -8,6 +8,7 @@
 
 #include "base/vector_width.h"
 #include "drr/two_pass_af_drr.h"
+#include "support/central_differences.h"
 #include "unit/drr/small_fields.h"
 
 namespace af {
@@ -122,7 +123,7 @@ TEST(AfDrr, GradientsAgreeWithCentralDifferences) {
     std::vector<float> differences(6 * view.pixel_count());
     const Eigen::Vector3d pivot(10.0, -20.0, 30.0);
     renderer.render(pose, view, *workspace, values, PoseGradients{pivot, analytic});
-    central_difference_gradients(renderer, pose, view, *workspace, {pivot, differences});
+    test::central_difference_gradients(renderer, pose, view, *workspace, {pivot, differences});
     for (std::size_t parameter = 0; parameter < 6; ++parameter) {
       double error = 0.0;
       double norm = 0.0;

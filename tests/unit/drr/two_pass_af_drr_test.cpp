@@ -11,6 +11,7 @@
 
 #include "base/vector_width.h"
 #include "drr/af_drr.h"
+#include "support/central_differences.h"
 #include "unit/drr/small_fields.h"
 
 namespace af {
@@ -179,7 +180,7 @@ TEST(TwoPassAfDrr, GradientsAgreeWithCentralDifferences) {
   // Slopes jump at the borders between cells: in a share of pixels of about twice the step over the
   // spacing (0.02 mm of 14 mm nodes, as wide as the pixels) the difference mixes two slopes.
   // Single-precision noise is 1e-7 of the value over 1e-6 of it per step.
-  const DifferenceSteps steps{1e-4, 0.05};
+  const test::DifferenceSteps steps{1e-4, 0.05};
   constexpr double kRelativeTolerance = 0.03;
   for (const TwoPassOptions& options : {kLinear, kCubicInSt, kCubic})
     for (const int slabs : {1, 2}) {
@@ -192,12 +193,12 @@ TEST(TwoPassAfDrr, GradientsAgreeWithCentralDifferences) {
         const auto workspace = renderer->make_workspace();
         const Outputs outputs = all_outputs(*renderer, pose, view, *workspace);
         std::vector<float> differences(outputs.planes.size());
-        central_difference_gradients(*renderer,
-                                     pose,
-                                     view,
-                                     *workspace,
-                                     {Eigen::Vector3d(10.0, -20.0, 30.0), differences},
-                                     steps);
+        test::central_difference_gradients(*renderer,
+                                           pose,
+                                           view,
+                                           *workspace,
+                                           {Eigen::Vector3d(10.0, -20.0, 30.0), differences},
+                                           steps);
         const std::size_t pixels = view.pixel_count();
         for (std::size_t parameter = 0; parameter < 6; ++parameter)
           EXPECT_LT(relative_difference(
