@@ -130,7 +130,7 @@ std::string memory_text(const DryRun& run, const FieldForecast& need) {
 
 FieldForecast forecast(const DryRun& run) {
   const TileCounts tiles(run);
-  const double codebook_bytes = 32.0 * run.options.codewords;
+  const double codebook_bytes = 32.0 * run.options.design().codewords;
   FieldForecast need;
   need.uncropped_bytes = 2 * static_cast<std::uint64_t>(run.lattice.node_count());
   need.cropped_bytes = 2 * static_cast<std::uint64_t>(run.lattice.stored_node_count());

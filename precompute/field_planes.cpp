@@ -25,12 +25,13 @@ LightSlab sized_planes(const FieldSource& source,
                        const PrecomputeOptions& options,
                        const MotionRange& range,
                        const DepthSlabs& depth_slabs) {
+  const FieldDesign design = options.design();
   return make_light_slab(
       source.camera,
       source.frame,
       range,
       source.volume->corner_points(),
-      {options.uv_nodes, options.st_nodes, depth_slabs.boundaries_y_mm, depth_slabs.st_plane_y_mm});
+      {design.uv_nodes, design.st_nodes, depth_slabs.boundaries_y_mm, depth_slabs.st_plane_y_mm});
 }
 
 std::string planes_text(const LightSlab& planes) {

@@ -19,6 +19,7 @@
 #include "parallel/work_watch.h"
 #include "precompute/casting/casters.h"
 #include "precompute/casting/unit_costs.h"
+#include "precompute/design_choice.h"
 #include "precompute/dry_run.h"
 #include "precompute/field_planes.h"
 #include "precompute/pipeline/field_build.h"
@@ -104,6 +105,24 @@ nlohmann::json training_json(const TrainedCodebook& trained) {
           {"iterations", iterations}};
 }
 
+nlohmann::json forecast_json(const DesignForecast& forecast) {
+  return {{"design", to_text(forecast.design)},
+          {"psnr_db", forecast.psnr_db},
+          {"interpolation_db", forecast.interpolation_db},
+          {"quantisation_db", forecast.quantisation_db},
+          {"file_bytes", forecast.file_bytes},
+          {"drr_ms", forecast.drr_ms}};
+}
+
+nlohmann::json design_json(const DesignChoice& choice) {
+  nlohmann::json measured = nlohmann::json::array();
+  for (const DesignForecast& forecast : choice.chosen.measured)
+    measured.push_back(forecast_json(forecast));
+  return {{"asked", choice.asked},
+          {"chosen", forecast_json(choice.chosen.forecast)},
+          {"measured", measured}};
+}
+
 /// Root mean square error of one element, in units of total attenuation.
 double rms_attenuation(std::uint64_t squared_error, std::uint64_t tiles, float step) {
   if (tiles == 0) return 0.0;
@@ -151,7 +170,7 @@ class PrecomputeRun {
   PrecomputeRun(const PrecomputeOptions& options,
                 std::string command_line,
                 const Communicator& communicator)
-      : options_(options),
+      : options_(options.in_force()),
         command_line_(std::move(command_line)),
         world_(communicator),
         run_({options.output, {}, options.is_restart, keeps_progress(options)}, communicator) {}
@@ -212,18 +231,31 @@ class PrecomputeRun {
     for (const std::string& warning : source_.warnings) warn(world_, warning);
     size_planes(DepthSlabs{{}, {0.0}});
     clock_.end("read");
-    const StPlane st_plane = options_.st_plane_rule();
-    const bool is_default = options_.slabs == 1 && st_plane == StPlane::Centre;
     const bool is_for_casting = caster_named(options_.caster).needs_resampled;
-    if (!is_for_casting && is_default) return;
+    if (!is_for_casting && !options_.needs_probe() && has_one_central_slab()) return;
     note.change("resampling the CT");
     resampled_ = std::make_shared<const SlabAlignedVolume>(resample_on_node(
         *source_.volume, field_.light_slab.slab_from_ct, SlabAlignedOptions{}, world_));
-    if (!is_default)
-      size_planes(all_or_none(
-          world_, [&] { return choose_depth_slabs(*resampled_, options_.slabs, st_plane); }));
-    if (!is_for_casting) resampled_ = nullptr;
     clock_.end("resample");
+    if (options_.needs_probe()) choose();
+    size_planes(has_one_central_slab() ? DepthSlabs{{}, {0.0}} : all_or_none(world_, [&] {
+      return choose_depth_slabs(*resampled_, options_.design().slabs, options_.st_plane_rule());
+    }));
+    if (!is_for_casting) resampled_ = nullptr;
+  }
+
+  [[nodiscard]] bool has_one_central_slab() const {
+    return options_.design().slabs == 1 && options_.st_plane_rule() == StPlane::Centre;
+  }
+
+  /// Collective. The design within the budget.
+  void choose() {
+    WorkNote note("probing designs", WorkNote::Kind::Phase);
+    choice_ = all_or_none(
+        world_, [&] { return choose_design(source_, *resampled_, options_, quantizer(), world_); });
+    options_ = options_.with_design(choice_->chosen.forecast.design).in_force();
+    inform(world_, choice_text(*choice_));
+    clock_.end("probe");
   }
 
   /// Collective.
@@ -512,6 +544,7 @@ class PrecomputeRun {
                                    {{source_.ct_path, source_.ct_content_sha256}}};
     nlohmann::json json = to_json(provenance);
     json["training"] = training_json(trained);
+    if (choice_) json["design"] = design_json(*choice_);
     json["occupied_tiles"] = cast.occupied_tiles;
     json["rms_attenuation_error"] = statistics.rms_error;
     json["rays_cast"] = cast.rays_cast;
@@ -552,7 +585,8 @@ class PrecomputeRun {
                 << std::endl;
   }
 
-  const PrecomputeOptions& options_;
+  PrecomputeOptions options_;  ///< with the design, once it is chosen
+  std::optional<DesignChoice> choice_;
   std::string command_line_;
   const Communicator& world_;
   RunFolder run_;

@@ -42,11 +42,11 @@ std::string problem_of(const std::string& type, const std::string& value) {
   const auto is_of = [&](const char* name) { return type.find(name) != std::string::npos; };
   if (value.empty()) return "must not be empty";
   if (is_of("FLOAT") && !is_finite_number(value)) return "must be a finite number";
+  const std::string_view number = is_of("SIZE") ? without_unit(value) : std::string_view(value);
   if (is_of("UINT")) {
-    const bool has_unit = is_of("SIZE");
-    if (!is_whole_number<std::uint64_t>(has_unit ? without_unit(value) : value))
+    if (!is_whole_number<std::uint64_t>(number))
       return "must be a whole number from 0 to 18446744073709551615, in decimal digits";
-  } else if (is_of("INT") && !is_whole_number<std::int64_t>(value)) {
+  } else if (is_of("INT") && !is_whole_number<std::int64_t>(number)) {
     return "must be a whole number in decimal digits";
   }
   return {};

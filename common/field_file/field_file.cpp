@@ -647,11 +647,15 @@ std::shared_ptr<const CompressedAttenuationField> read_field(const std::filesyst
     const auto found = problems(*field);
     if (!found.empty()) throw FileError(path.string(), found.front());
   });
+  const FieldProvenance provenance = field_layout::provenance_of(header.provenance);
+  const std::string look_up = all_or_none(
+      communicator, [&] { return field_layout::look_up_of(provenance, path.string()); });
   if (info != nullptr)
-    *info = {field_layout::provenance_of(header.provenance),
+    *info = {provenance,
              header.payload_sha256,
              header.file_bytes,
-             field_layout::payload_bytes(*field)};
+             field_layout::payload_bytes(*field),
+             look_up};
   return field;
 }
 

@@ -28,6 +28,9 @@ struct FieldFileInfo {
   std::string payload_sha256;  ///< over the named datasets in fixed order
   std::uint64_t file_bytes = 0;
   std::uint64_t payload_bytes = 0;  ///< indices + codebook, by the bits stored
+  /// How DRRs are meant to be looked up, by its options: "linear", also where they do not say, or
+  /// "cubic".
+  std::string look_up = "linear";
 };
 
 /// A block of tile indices of one slab that one rank has: half-open tile ranges and the indices,

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstring>
+#include <sstream>
 #include <type_traits>
 #include <variant>
 
@@ -372,6 +373,19 @@ CompressedAttenuationField field_of(std::span<const Dataset> datasets, const std
 FieldProvenance provenance_of(std::span<const Dataset> datasets) {
   check(datasets.size() == 4, "a dataset per rule");
   return {text_of(datasets[0]), text_of(datasets[1]), text_of(datasets[2]), text_of(datasets[3])};
+}
+
+std::string look_up_of(const FieldProvenance& provenance, const std::string& path) {
+  const std::string key = "look_up = ";
+  std::istringstream lines(provenance.options_toml);
+  for (std::string line; std::getline(lines, line);) {
+    if (!line.starts_with(key)) continue;
+    const std::string value = line.substr(key.size());
+    for (const char* known : {"linear", "cubic"})
+      if (value == '"' + std::string(known) + '"') return known;
+    throw FileError(path, "/provenance/options_toml: look_up", "\"linear\" or \"cubic\"", value);
+  }
+  return "linear";
 }
 
 int slab_count_of(const Dataset& dataset, const std::string& path) {

@@ -77,6 +77,9 @@ std::span<const Dataset> set_geometry(std::span<const Dataset> datasets,
 /// no sense: NaN, bad geometry, a codebook out of order, ranges outside the lattice.
 CompressedAttenuationField field_of(std::span<const Dataset> datasets, const std::string& path);
 FieldProvenance provenance_of(std::span<const Dataset> datasets);
+/// The look-up that a field's options name, "linear" where they name none. FileError when there is
+/// no such way.
+std::string look_up_of(const FieldProvenance& provenance, const std::string& path);
 int slab_count_of(const Dataset& dataset, const std::string& path);
 
 /// One line per dataset that takes part in the payload hash.

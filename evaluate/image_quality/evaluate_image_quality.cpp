@@ -67,6 +67,9 @@ struct Setup {
   std::vector<RigidTransform> poses;  ///< empty: random ones
   View view;
 
+  [[nodiscard]] std::string look_up(const ImageQualityOptions& options) const {
+    return options.look_up.empty() ? field_info.look_up : options.look_up;
+  }
   [[nodiscard]] std::int64_t pose_count(const ImageQualityOptions& options) const {
     return poses.empty() ? options.pose_count : static_cast<std::int64_t>(poses.size());
   }
@@ -95,6 +98,12 @@ Setup load(const ImageQualityOptions& options, const Target& target, const Commu
           std::to_string(options.split_loss_poses),
           "needs a field of one slab; this has " + std::to_string(setup.field->slabs.size()),
           target.field.string());
+    if (options.split_loss_poses > 0 && setup.look_up(options) != "linear")
+      throw InputError("--split-loss-poses",
+                       std::to_string(options.split_loss_poses),
+                       "is for linear look-up; the field's own is " + setup.look_up(options) +
+                           ": give --look-up linear",
+                       target.field.string());
     if (options.poses.empty()) return;
     setup.poses = read_poses_csv(options.poses, identity.frame);
     if (setup.poses.empty())
@@ -201,7 +210,7 @@ void write_results(const ImageQualityOptions& options,
   summary["field"] = field_description(*setup.field);
   summary["field"]["file_bytes"] = setup.field_info.file_bytes;
   summary["field"]["payload_bytes"] = setup.field_info.payload_bytes;
-  summary["look_up"] = options.look_up;
+  summary["look_up"] = setup.look_up(options);
   summary.update(image_quality_statistics(comparisons));
   write_results_last(folder / "summary.json", std::move(summary), provenance);
 
@@ -250,7 +259,7 @@ TargetResult evaluate_target(const ImageQualityOptions& options,
     if (world.is_root()) make_output_folder(target.folder);
   });
   const Setup setup = load(options, target, world);
-  const auto field = make_field_renderer(setup.field, options.look_up);
+  const auto field = make_field_renderer(setup.field, setup.look_up(options));
   const RayCastDrr ray_cast(setup.ct.volume, options.ray_caster);
   DrrComparer comparer(*field, ray_cast, setup.view);
   Provenance provenance = {"af-evaluate image-quality",
@@ -361,9 +370,8 @@ void ImageQualityOptions::describe(Fields& field_list) {
              "or m00 ... m23 of room_from_ct")
       .excludes({"--pose-count"})
       .input();
-  field_list("look_up",
-             look_up,
-             "How DRRs are looked up (registration takes linear). " + field_look_up_help())
+  field_list(
+      "look_up", look_up, "How DRRs are looked up [the field's own way]. " + field_look_up_help())
       .choice(field_look_up_names());
   field_list("split_loss_poses",
              split_loss_poses,
@@ -384,7 +392,7 @@ std::vector<std::string> problems(const ImageQualityOptions& options) {
   std::vector<std::string> found = field_problems(options);
   if (!options.study.empty() && !options.poses.empty())
     found.push_back("--poses = '" + options.poses.string() + "': must not be given with --study");
-  if (options.split_loss_poses > 0 && options.look_up != "linear")
+  if (options.split_loss_poses > 0 && !options.look_up.empty() && options.look_up != "linear")
     found.push_back("--split-loss-poses = " + std::to_string(options.split_loss_poses) +
                     ": must be 0 for a look-up other than linear");
   return found;

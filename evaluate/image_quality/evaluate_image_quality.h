@@ -22,7 +22,7 @@ struct ImageQualityOptions {
   std::vector<std::string> cases;  ///< of the study; empty: all
   int pose_count = 100;
   std::filesystem::path poses;
-  std::string look_up = "linear";
+  std::string look_up;       ///< empty: the field's own
   int split_loss_poses = 0;  ///< so many poses' losses are split
   RayCasterOptions ray_caster;
   CtReadOptions ct_reading;

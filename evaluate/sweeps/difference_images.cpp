@@ -47,8 +47,9 @@ std::vector<SweepDrr> shared_choice(const std::vector<SettingResult>& results,
 }
 
 std::string setting_text(const PrecomputeOptions& setting) {
-  return "(u,v) " + std::to_string(setting.uv_nodes) + ", (s,t) " +
-         std::to_string(setting.st_nodes) + ", " + std::to_string(setting.codewords) + " codewords";
+  return "(u,v) " + std::to_string(setting.design().uv_nodes) + ", (s,t) " +
+         std::to_string(setting.design().st_nodes) + ", " +
+         std::to_string(setting.design().codewords) + " codewords";
 }
 
 void write_files(const std::vector<SettingResult>& results,
@@ -76,9 +77,9 @@ void write_files(const std::vector<SettingResult>& results,
                    result.setting.case_name,
                    result.setting.camera,
                    std::to_string(drr.pose),
-                   std::to_string(result.setting.uv_nodes),
-                   std::to_string(result.setting.st_nodes),
-                   std::to_string(result.setting.codewords),
+                   std::to_string(result.setting.design().uv_nodes),
+                   std::to_string(result.setting.design().st_nodes),
+                   std::to_string(result.setting.design().codewords),
                    number_text(training_share(result.setting))});
   }
   write_text_file(folder / "difference-images.csv", table.to_text());

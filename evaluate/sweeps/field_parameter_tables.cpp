@@ -72,11 +72,11 @@ std::vector<PooledSetting> pooled_settings(const std::vector<SettingResult>& res
 }
 
 std::vector<std::string> setting_fields(const PrecomputeOptions& setting) {
-  return {std::to_string(setting.uv_nodes),
-          std::to_string(setting.st_nodes),
-          std::to_string(setting.codewords),
+  return {std::to_string(setting.design().uv_nodes),
+          std::to_string(setting.design().st_nodes),
+          std::to_string(setting.design().codewords),
           number_text(training_share(setting)),
-          std::to_string(setting.slabs)};
+          std::to_string(setting.design().slabs)};
 }
 
 const std::vector<std::string>& setting_columns() {
@@ -150,6 +150,11 @@ CsvTable poses_table(const std::vector<SettingResult>& results) {
   return table;
 }
 
+/// A part of the design of a setting.
+auto design_part(int FieldDesign::*part) {
+  return [part](const PrecomputeOptions& setting) { return setting.design().*part; };
+}
+
 /// One panel of the figure: the settings that differ from the base in this parameter alone.
 template <typename ValueOf>
 SweepPanel panel_of(const std::vector<PooledSetting>& pools,
@@ -175,9 +180,9 @@ SweepPanel panel_of(const std::vector<PooledSetting>& pools,
 json pooled_json(const PooledSetting& pool) {
   json files = json::array();
   for (const SettingResult* field : pool.fields) files.push_back(field->setting.output);
-  return {{"uv_nodes", pool.setting.uv_nodes},
-          {"st_nodes", pool.setting.st_nodes},
-          {"codewords", pool.setting.codewords},
+  return {{"uv_nodes", pool.setting.design().uv_nodes},
+          {"st_nodes", pool.setting.design().st_nodes},
+          {"codewords", pool.setting.design().codewords},
           {"training_fraction", training_share(pool.setting)},
           {"field", pool.fields.front()->field},
           {"field_files", files},
@@ -203,8 +208,8 @@ std::uint64_t uncompressed_bytes_of(const PrecomputeOptions& setting) {
   const auto square = [](int nodes) {
     return static_cast<std::uint64_t>(nodes) * static_cast<std::uint64_t>(nodes);
   };
-  return 2 * static_cast<std::uint64_t>(setting.slabs) * square(setting.uv_nodes) *
-         square(setting.st_nodes);
+  return 2 * static_cast<std::uint64_t>(setting.design().slabs) *
+         square(setting.design().uv_nodes) * square(setting.design().st_nodes);
 }
 
 void read_creation(SettingResult& result) {
@@ -220,9 +225,9 @@ json write_sweep(const std::vector<SettingResult>& results, const std::filesyste
   write_text_file(folder / "field-parameters.csv", settings_table(pools).to_text());
   write_text_file(folder / "field-parameters-fields.csv", fields_table(results).to_text());
   write_text_file(folder / "field-parameters-poses.csv", poses_table(results).to_text());
-  draw_sweep_panels({panel_of(pools, "(u,v) nodes per side", &PrecomputeOptions::uv_nodes),
-                     panel_of(pools, "(s,t) nodes per side", &PrecomputeOptions::st_nodes),
-                     panel_of(pools, "codewords", &PrecomputeOptions::codewords),
+  draw_sweep_panels({panel_of(pools, "(u,v) nodes per side", design_part(&FieldDesign::uv_nodes)),
+                     panel_of(pools, "(s,t) nodes per side", design_part(&FieldDesign::st_nodes)),
+                     panel_of(pools, "codewords", design_part(&FieldDesign::codewords)),
                      panel_of(pools, "share of tiles for training", training_share)},
                     "DRR quality against the field's parameters",
                     "PSNR (dB)",
@@ -242,9 +247,10 @@ std::string sweep_text(const std::vector<SettingResult>& results) {
   constexpr double kBytesPerMb = 1e6;
   std::string text;
   for (const PooledSetting& pool : pooled_settings(results))
-    text += "uv " + std::to_string(pool.setting.uv_nodes) + ", st " +
-            std::to_string(pool.setting.st_nodes) + ", " + std::to_string(pool.setting.codewords) +
-            " codewords, training " + number_text(training_share(pool.setting)) + ": PSNR median " +
+    text += "uv " + std::to_string(pool.setting.design().uv_nodes) + ", st " +
+            std::to_string(pool.setting.design().st_nodes) + ", " +
+            std::to_string(pool.setting.design().codewords) + " codewords, training " +
+            number_text(training_share(pool.setting)) + ": PSNR median " +
             fixed_text(pool.psnr_db.median, 2) + " dB, " +
             fixed_text(pool.payload_bytes / kBytesPerMb, 1) + " MB, compression " +
             fixed_text(pool.uncompressed_bytes / pool.payload_bytes, 1) + ", " +

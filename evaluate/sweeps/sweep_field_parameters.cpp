@@ -43,7 +43,8 @@ constexpr const char* kComparisonStage = "comparison";
 
 /// Settings of a sweep, each once, in the order of sweeps; the base setting first.
 std::vector<PrecomputeOptions> settings_of(const FieldParametersOptions& options,
-                                           const PrecomputeOptions& base) {
+                                           const PrecomputeOptions& stated) {
+  const PrecomputeOptions base = stated.in_force();
   std::vector<PrecomputeOptions> settings = {base};
   const auto add = [&](const auto& values, auto member) {
     for (const auto value : values) {
@@ -62,8 +63,10 @@ std::vector<PrecomputeOptions> settings_of(const FieldParametersOptions& options
 
 std::string field_name(const PrecomputeOptions& setting) {
   return (setting.case_name.empty() ? "" : setting.case_name + "-") + setting.camera + "-uv" +
-         std::to_string(setting.uv_nodes) + "-st" + std::to_string(setting.st_nodes) + "-n" +
-         std::to_string(setting.codewords) + "-t" + number_text(training_share(setting)) + ".af.h5";
+         std::to_string(setting.design().uv_nodes) + "-st" +
+         std::to_string(setting.design().st_nodes) + "-n" +
+         std::to_string(setting.design().codewords) + "-t" + number_text(training_share(setting)) +
+         ".af.h5";
 }
 
 /// The options of a field, without where it goes.
@@ -155,7 +158,7 @@ std::vector<Target> targets_of(const FieldParametersOptions& options) {
 
 /// The cost of a setting relative to that of another: the rays of its field.
 double rays_of(const PrecomputeOptions& setting) {
-  return std::pow(static_cast<double>(setting.uv_nodes) * setting.st_nodes, 2.0);
+  return std::pow(static_cast<double>(setting.design().uv_nodes) * setting.design().st_nodes, 2.0);
 }
 
 /// Says how long the settings after the first will take. It scales the time of the first one:
@@ -267,10 +270,10 @@ void describe_base(Fields& field, PrecomputeOptions& base) {
                         "in the paper)");
   field.at("max_rotation_deg").as("--max-rotation-deg", "Range of every field, degrees");
   field.at("max_translation_mm").as("--max-translation-mm", "Range of every field, mm");
-  field.at("slabs").as("--slabs", "Depth slabs of every field");
-  field.at("uv_nodes").as("--base-uv-nodes", "(u,v) nodes while others vary");
-  field.at("st_nodes").as("--base-st-nodes", "(s,t) nodes while others vary");
-  field.at("codewords").as("--base-codewords", "Codewords while others vary");
+  field.at("slabs").as("--slabs", "Depth slabs of every field [1]");
+  field.at("uv_nodes").as("--base-uv-nodes", "(u,v) nodes while others vary [64]");
+  field.at("st_nodes").as("--base-st-nodes", "(s,t) nodes while others vary [256]");
+  field.at("codewords").as("--base-codewords", "Codewords while others vary [16384]");
   field.at("training_fraction")
       .as("--base-training-fraction", "Share of the tiles for training while others vary");
 }
@@ -319,6 +322,7 @@ CLI::App* bind_field_parameters(CLI::App& app, FieldParametersOptions& options) 
       "time and compression (the paper's Fig. 10 and Table I); builds the fields that are missing");
   PrecomputeOptions& base = options.base;
   base.max_translation_mm = 30.0;
+  base.preset = "paper";
   base.training_fraction = 0.1;  // the paper's
   cli::bind_options(*command, options);
   cli::bind_run_limits(*command);

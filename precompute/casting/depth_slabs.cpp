@@ -88,9 +88,14 @@ std::vector<int> best_slice_cuts(std::span<const std::int64_t> slice_sums, int s
 }
 
 DepthSlabs choose_depth_slabs(const SlabAlignedVolume& volume, int slabs, StPlane st_plane) {
-  const auto sums = volume.slice_sums();
+  return choose_depth_slabs(volume.grid(), volume.slice_sums(), slabs, st_plane);
+}
+
+DepthSlabs choose_depth_slabs(const SlabAlignedGrid& grid,
+                              std::span<const std::int64_t> sums,
+                              int slabs,
+                              StPlane st_plane) {
   const std::vector<int> cuts = best_slice_cuts(sums, slabs);
-  const SlabAlignedGrid& grid = volume.grid();
   const RunMoments moments(sums);
   DepthSlabs depth_slabs;
   std::size_t begin = 0;

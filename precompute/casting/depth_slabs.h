@@ -31,5 +31,10 @@ enum class StPlane {
 
 /// The best cuts into `slabs` slabs, and their (s,t) planes.
 DepthSlabs choose_depth_slabs(const SlabAlignedVolume& volume, int slabs, StPlane st_plane);
+/// The same from the volume's slice_sums().
+DepthSlabs choose_depth_slabs(const SlabAlignedGrid& grid,
+                              std::span<const std::int64_t> slice_sums,
+                              int slabs,
+                              StPlane st_plane);
 
 }  // namespace af

@@ -26,13 +26,6 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-CodebookReduction reduction_over(const Communicator& communicator) {
-  return {
-      [&communicator](std::span<std::uint64_t> values) { communicator.sum(values); },
-      [&communicator](std::span<const std::byte> mine) { return communicator.all_gather(mine); },
-      static_cast<std::size_t>(communicator.rank())};
-}
-
 /// Units that no rank holds yet, the costly ones first; the same list everywhere.
 std::vector<std::uint32_t> missing_units(const FieldBuild& build,
                                          const std::vector<std::uint64_t>& is_finished) {
@@ -93,6 +86,13 @@ void add_up(CastPhase& cast, double busy_seconds, const Communicator& communicat
 }
 
 }  // namespace
+
+CodebookReduction reduction_over(const Communicator& communicator) {
+  return {
+      [&communicator](std::span<std::uint64_t> values) { communicator.sum(values); },
+      [&communicator](std::span<const std::byte> mine) { return communicator.all_gather(mine); },
+      static_cast<std::size_t>(communicator.rank())};
+}
 
 CastPhase cast_field(const FieldBuild& build,
                      const CastLimits& limits,

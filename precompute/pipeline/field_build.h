@@ -12,10 +12,14 @@
 #include "base/progress.h"
 #include "parallel/communicator.h"
 #include "precompute/casting/field_caster.h"
+#include "precompute/codebook/codebook_reduction.h"
 #include "precompute/codebook/codebook_training.h"
 #include "precompute/pipeline/unit_store.h"
 
 namespace af {
+
+/// How the ranks of a communicator, which must outlive it, combine their results.
+CodebookReduction reduction_over(const Communicator& communicator);
 
 /// Asked between units; true ends casting with progress saved.
 using StopRequested = std::function<bool()>;

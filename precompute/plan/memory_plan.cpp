@@ -67,7 +67,7 @@ MemoryPlan plan_memory(const FieldLattice& lattice,
   constexpr double kTrainingBytes = kCandidateBytes + 4.0 + 8.0 + 8.0;
   // Sums and their reduction, search coefficients, codewords drawn.
   constexpr double kBytesPerCodeword = 600.0;
-  const double codebook = kBytesPerCodeword * options.codewords;
+  const double codebook = kBytesPerCodeword * options.design().codewords;
   MemoryPlan plan;
   plan.fixed_bytes = fixed_bytes;
   plan.casting_bytes = static_cast<std::uint64_t>(kCandidateBytes * candidates + unit);

@@ -51,10 +51,20 @@ void describe_casting(Fields& field, PrecomputeOptions& options) {
         options.max_translation_mm,
         "Range: largest shift along each room axis, mm")
       .decides(kCastingStage);
+  field("preset",
+        options.preset,
+        "Design of the field, by name. " + design_preset_help() + " [" + kDefaultPreset +
+            "; paper where parts of the design are stated]")
+      .one_of(design_preset_names())
+      .excludes({"--target-psnr-db", "--max-field-size", "--max-drr-ms"})
+      .not_recorded("the design that it stands for is");
+  field.part(options.budget);
+  for (const char* name : {"target_psnr_db", "max_field_bytes", "max_drr_ms"})
+    field.at(name).not_deciding("the design that it chooses decides");
   field("slabs",
         options.slabs,
         "Depth slabs K, each with its own (s,t) plane: with 8, some 8 --uv-nodes suffice; 1 is the "
-        "paper's field")
+        "paper's field [1, or as chosen]")
       .within(1, 64)
       .decides(kCastingStage);
   field("st_plane",
@@ -65,14 +75,21 @@ void describe_casting(Fields& field, PrecomputeOptions& options) {
       .decides(kCastingStage);
   field("uv_nodes",
         options.uv_nodes,
-        "Viewpoints along each side of the (u,v) plane, both edges included")
+        "Viewpoints along each side of the (u,v) plane, both edges included [64, or as chosen]")
       .within(2, 4096)
       .decides(kCastingStage);
   field("st_nodes",
         options.st_nodes,
-        "Nodes along each side of the uncropped (s,t) plane, both edges included")
+        "Nodes along each side of the uncropped (s,t) plane, both edges included [256, or as "
+        "chosen]")
       .within(2, 4096)
       .decides(kCastingStage);
+  field("look_up",
+        options.look_up,
+        "How DRRs are to be looked up in the field, unless a program is told otherwise [linear for "
+        "the paper's design, else cubic]")
+      .one_of({"linear", "cubic"})
+      .not_deciding("samples and indices are the same");
   field("caster", options.caster, "How line integrals are made. " + caster_help())
       .one_of(caster_names())
       .decides(kCastingStage);
@@ -84,7 +101,8 @@ void describe_casting(Fields& field, PrecomputeOptions& options) {
 }
 
 void describe_codebook(Fields& field, PrecomputeOptions& options) {
-  field("codewords", options.codewords, "Size of the codebook, 2 to 65536").decides(kCodebookStage);
+  field("codewords", options.codewords, "Size of the codebook, 2 to 65536 [16384, or as chosen]")
+      .decides(kCodebookStage);
   field("max_iterations",
         options.max_iterations,
         "Most iterations of the training; it ends when one gains less than 0.5 %")
@@ -156,21 +174,50 @@ void PrecomputeOptions::describe(Fields& field) {
 }
 
 PrecomputeOptions PrecomputeOptions::in_force() const {
-  PrecomputeOptions options = *this;
+  if (needs_probe()) return *this;
+  PrecomputeOptions options = with_design(design());
   options.st_plane = st_plane_rule() == StPlane::Centre ? "centre" : "centroid";
+  return options;
+}
+
+DesignParts PrecomputeOptions::stated_parts() const {
+  return {slabs, uv_nodes, st_nodes, codewords, look_up};
+}
+
+const DesignPreset& PrecomputeOptions::design_preset() const {
+  const bool has_parts = slabs || uv_nodes || st_nodes || codewords || look_up;
+  return design_preset_named(preset.value_or(has_parts ? "paper" : kDefaultPreset));
+}
+
+bool PrecomputeOptions::needs_probe() const {
+  if (slabs && uv_nodes && st_nodes && codewords) return false;
+  return budget.is_stated() || design_preset().budget.is_stated();
+}
+
+PrecomputeOptions PrecomputeOptions::with_design(const FieldDesign& design) const {
+  PrecomputeOptions options = *this;
+  options.slabs = design.slabs;
+  options.uv_nodes = design.uv_nodes;
+  options.st_nodes = design.st_nodes;
+  options.codewords = design.codewords;
+  // Fields that do not say it are for linear look-up.
+  if (design.look_up == "linear")
+    options.look_up.reset();
+  else
+    options.look_up = design.look_up;
   return options;
 }
 
 CodebookOptions PrecomputeOptions::codebook_options() const {
   CodebookOptions options;
-  options.codewords = codewords;
+  options.codewords = design().codewords;
   options.max_iterations = max_iterations;
   options.seed = seed;
   return options;
 }
 
 StPlane PrecomputeOptions::st_plane_rule() const {
-  if (!st_plane.has_value()) return slabs == 1 ? StPlane::Centre : StPlane::Centroid;
+  if (!st_plane.has_value()) return design().slabs == 1 ? StPlane::Centre : StPlane::Centroid;
   return *st_plane == "centre" ? StPlane::Centre : StPlane::Centroid;
 }
 
@@ -188,9 +235,9 @@ std::vector<std::string> problems(const PrecomputeOptions& options) {
   return found;
 }
 
-TrainingSelection PrecomputeOptions::training_selection() const {
+TrainingSelection PrecomputeOptions::training_selection(int for_codewords) const {
   if (training_fraction) return {*training_fraction, max_training_tiles, seed};
-  const auto per_codeword = kTrainingTilesPerCodeword * static_cast<std::uint64_t>(codewords);
+  const auto per_codeword = kTrainingTilesPerCodeword * static_cast<std::uint64_t>(for_codewords);
   return {kLargestTrainingFraction,
           std::min({max_training_tiles, per_codeword, kTrainingTilesUnlessStated}),
           seed};

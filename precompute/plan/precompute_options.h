@@ -11,6 +11,7 @@
 #include "precompute/casting/depth_slabs.h"
 #include "precompute/codebook/codebook_training.h"
 #include "precompute/codebook/tile_selection.h"
+#include "precompute/design/design_presets.h"
 #include "precompute/units/unit_planner.h"
 #include "volume/attenuation_volume.h"
 #include "volume/ray_caster.h"
@@ -37,16 +38,20 @@ struct PrecomputeOptions {
 
   double max_rotation_deg = 10.0;
   double max_translation_mm = 100.0;
-  int slabs = 1;
+  /// The design: a preset or a budget, and parts that are stated.
+  std::optional<std::string> preset;
+  DesignBudget budget;
+  std::optional<int> slabs;
   /// "centre", "centroid"; none: the centre for one slab, else the centroid
   std::optional<std::string> st_plane;
-  int uv_nodes = 64;
-  int st_nodes = 256;
+  std::optional<int> uv_nodes;
+  std::optional<int> st_nodes;
+  std::optional<std::string> look_up;
   std::string caster = "shear-warp";
   RayCasterOptions ray_caster;  ///< of the trilinear caster
   AttenuationModel attenuation;
 
-  int codewords = CodebookOptions{}.codewords;
+  std::optional<int> codewords;
   int max_iterations = CodebookOptions{}.max_iterations;
   std::optional<double> training_fraction;  ///< none: kTrainingTilesPerCodeword decide
   std::uint64_t max_training_tiles = TrainingSelection{}.max_training_tiles;
@@ -63,12 +68,25 @@ struct PrecomputeOptions {
   [[nodiscard]] MotionRange range() const {
     return {max_rotation_deg * kRadPerDeg, max_translation_mm};
   }
-  [[nodiscard]] TrainingSelection training_selection() const;
+  /// The parts of the design that are stated.
+  [[nodiscard]] DesignParts stated_parts() const;
+  /// The preset that is asked for: where parts alone are stated, the paper's.
+  [[nodiscard]] const DesignPreset& design_preset() const;
+  /// Whether a probe of the CT has to choose what is not stated.
+  [[nodiscard]] bool needs_probe() const;
+  /// The design: of the preset, with the parts that are stated.
+  [[nodiscard]] FieldDesign design() const { return stated_parts().over(design_preset().design); }
+  /// These options with the design stated.
+  [[nodiscard]] PrecomputeOptions with_design(const FieldDesign& design) const;
+  [[nodiscard]] TrainingSelection training_selection() const {
+    return training_selection(design().codewords);
+  }
+  [[nodiscard]] TrainingSelection training_selection(int for_codewords) const;
   [[nodiscard]] CodebookOptions codebook_options() const;
   [[nodiscard]] StPlane st_plane_rule() const;
 
   void describe(Fields& field);
-  /// With the rule that places the (s,t) planes.
+  /// With the design, unless a probe has to choose it, and the rule that places the (s,t) planes.
   [[nodiscard]] PrecomputeOptions in_force() const;
 };
 

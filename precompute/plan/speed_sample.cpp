@@ -143,7 +143,7 @@ SpeedSample sample_speed(const FieldCaster& caster,
   SpeedSample sample;
   sample.rays_per_second = static_cast<double>(rays) / std::max(elapsed, 1e-9);
   sample.occupied_fraction = static_cast<double>(occupied) / static_cast<double>(tiles);
-  sample_search(sampled, options.codewords, sample);
+  sample_search(sampled, options.design().codewords, sample);
   return sample;
 }
 

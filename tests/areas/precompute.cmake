@@ -5,6 +5,11 @@ af_add_test(
           unit/precompute/plan/precompute_options_test.cpp unit/precompute/casting/field_caster_test.cpp unit/precompute/codebook/codebook_training_test.cpp
   LIBS af_precompute af_text)
 
+af_add_test(
+  field_design_test
+  SOURCES unit/precompute/design/design_search_test.cpp unit/precompute/design/design_probe_test.cpp
+  LIBS af_precompute af_drr_core)
+
 af_add_mpi_test(
   field_file_test
   SOURCES mpi/field_file_test.cpp

@@ -146,6 +146,22 @@ of_rig 3 'source_point' 'source at 1e300 mm' "$(edited rig.toml '0,/^source_poin
 of_rig 3 'pixel_spacing_mm' 'pixels of 1e300 mm' "$(edited rig.toml '0,/^pixel_spacing_mm = .*/s//pixel_spacing_mm = [1e300, 3]/')"
 of_rig 4 'c-arm-9in' 'unknown shipped rig' c-arm-9in
 of_rig 4 'edited-rig.toml' 'not TOML' "$(edited rig.toml '1s/^.*$/= 3/')"
+of_design() { row "$1" "$2" "$3" "${precompute[@]}" --study valid/study.toml --camera AP "${@:4}"; }
+of_design 3 'max_field_bytes = 0: must be at least 1' 'no size' --max-field-size 0
+of_design 2 '--max-field-size' 'size below nothing' --max-field-size=-5MB
+of_design 2 '--max-field-size' 'size that is no number' --max-field-size much
+of_design 2 '--max-field-size' 'size of an unknown unit' --max-field-size 8XB
+of_design 2 '--max-field-size' 'size beyond all numbers' --max-field-size 99999999999GB
+of_design 2 '--max-field-size' 'empty size' --max-field-size ''
+of_design 3 'target_psnr_db = 1000: must be within 10 and 90' 'PSNR beyond 16 bits' --target-psnr-db 1000
+of_design 2 'must be a finite number' 'PSNR that is no number' --target-psnr-db nan
+of_design 3 'max_drr_ms = -1: must be above 0' 'DRR in less than no time' --max-drr-ms -1
+of_design 3 'no field keeps at least 89 dB' 'PSNR that no design gives' --target-psnr-db 89
+of_design 3 'no field keeps at most 0.001 MB; the smallest file' 'size that no field has' --max-field-size 1kB
+of_design 3 '; the fastest DRR: ' 'time that no DRR keeps' --max-drr-ms 0.000001
+of_design 3 "preset = 'nonsense': must be one of paper" 'unknown preset' --preset nonsense
+of_design 2 '--preset excludes' 'preset and budget' --preset paper --max-field-size 8MB
+of_design 3 'look_up = nearest: must be linear or cubic' 'look-up that no field is for' --look-up nearest
 row 3 "XY" 'unknown camera' "${precompute[@]}" --study valid/study.toml --camera XY
 
 printf -- '--- study ---\n'

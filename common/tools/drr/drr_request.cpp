@@ -30,9 +30,10 @@ void describe_source(Fields& field, DrrOptions& options) {
   field.part(options.ct_reading);
   field("rig", options.rig, "Rig file, or c-arm-12in, or treatment-room");
   field("camera", options.camera, "Camera of the rig");
-  field("interpolation",
-        options.interpolation,
-        "Look-up in the field (af-register takes linear). " + field_look_up_help())
+  field("look_up",
+        options.look_up,
+        "How DRRs are looked up [the field's own way]. " + field_look_up_help())
+      .as("--look-up,--interpolation")
       .choice(field_look_up_names());
   field.part(options.attenuation);
   field.at("water_mu_per_mm").help =
@@ -100,9 +101,8 @@ void append_source_problems(const DrrOptions& options, std::vector<std::string>&
     found.emplace_back("--ct = set: needs --rig and --camera");
   if (options.rig.empty() != options.camera.empty())
     found.emplace_back("--rig, --camera = only one of them: give both");
-  if (!has_field && options.interpolation != "linear")
-    found.push_back("--interpolation = " + options.interpolation +
-                    ": applies to fields only; give --field");
+  if (!has_field && !options.look_up.empty())
+    found.push_back("--look-up = " + options.look_up + ": applies to fields only; give --field");
 }
 
 void append_pose_problems(const DrrOptions& options, std::vector<std::string>& found) {
@@ -191,10 +191,12 @@ DrrScene load_scene(const DrrOptions& options, const Communicator& communicator)
   scene.pool = std::make_shared<ThreadPool>(thread_count(options.threads));
   std::shared_ptr<const CompressedAttenuationField> field;
   if (!options.field.empty()) {
-    field = read_field(options.field, communicator);
+    FieldFileInfo info;
+    field = read_field(options.field, communicator, &info);
     scene.view = View::whole_detector(field->identity.camera);
     scene.frame = field->identity.frame;
-    scene.renderer = make_field_renderer(field, options.interpolation, scene.pool);
+    scene.renderer = make_field_renderer(
+        field, options.look_up.empty() ? info.look_up : options.look_up, scene.pool);
   }
   if (!options.rig.empty()) {
     const CameraRig rig = read_rig(options.rig);

@@ -27,7 +27,7 @@ struct DrrOptions {
   std::optional<std::array<double, 3>> translation_mm;
   std::filesystem::path pose;
   std::filesystem::path poses;
-  std::string interpolation = "linear";
+  std::string look_up;  ///< empty: the field's own
   AttenuationModel attenuation;
   RayCasterOptions ray_caster;
   bool compare = false;

@@ -54,5 +54,52 @@ TEST(PrecomputeOptions, DecideTheSamplesOrWhatTheCodebookMakesOfThem) {
                          {"seed", "1"}}));
 }
 
+TEST(FieldDesignOfOptions, IsThePapersByName) {
+  PrecomputeOptions options;
+  options.preset = "paper";
+  EXPECT_EQ(options.design(), (FieldDesign{1, 64, 256, 16384, "linear"}));
+  EXPECT_FALSE(options.needs_probe());
+  EXPECT_FALSE(options.in_force().look_up.has_value());
+}
+
+TEST(FieldDesignOfOptions, IsThePapersWithThePartsThatAreStated) {
+  PrecomputeOptions options;
+  options.uv_nodes = 32;
+  options.look_up = "cubic";
+  EXPECT_EQ(options.design(), (FieldDesign{1, 32, 256, 16384, "cubic"}));
+  EXPECT_FALSE(options.needs_probe());
+  EXPECT_EQ(option_texts(to_toml(options)).at("uv_nodes"), "32");
+  EXPECT_EQ(option_texts(to_toml(options)).at("st_nodes"), "256");
+  EXPECT_EQ(option_texts(to_toml(options)).at("look_up"), "\"cubic\"");
+}
+
+TEST(FieldDesignOfOptions, IsProbedForWithinABudgetUnlessAllIsStated) {
+  PrecomputeOptions options;
+  options.budget.max_field_bytes = 8000000;
+  EXPECT_TRUE(options.needs_probe());
+  options.slabs = 4;
+  EXPECT_TRUE(options.needs_probe());
+  EXPECT_EQ(options.stated_parts().slabs, 4);
+  EXPECT_FALSE(options.stated_parts().uv_nodes.has_value());
+  EXPECT_FALSE(options.with_design({4, 16, 384, 16384, "cubic"}).needs_probe());
+}
+
+TEST(FieldDesignOfOptions, ABudgetDecidesNothingButTheDesign) {
+  const FieldDesign design{4, 16, 384, 16384, "cubic"};
+  PrecomputeOptions options;
+  PrecomputeOptions probed;
+  probed.budget.target_psnr_db = 50.0;
+  EXPECT_EQ(deciding_options(options.with_design(design)),
+            deciding_options(probed.with_design(design)));
+}
+
+TEST(FieldDesignOfOptions, EveryPresetIsSound) {
+  for (const std::string& name : design_preset_names()) {
+    PrecomputeOptions options;
+    options.preset = name;
+    EXPECT_TRUE(problems(options).empty()) << name;
+  }
+}
+
 }  // namespace
 }  // namespace af

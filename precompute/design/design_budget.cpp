@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "precompute/design/design_budget.h"
+
+#include "base/joined.h"
+#include "base/number_text.h"
+
+namespace af {
+
+void DesignBudget::describe(Fields& field) {
+  field("target_psnr_db",
+        target_psnr_db,
+        "Choose the design by a probe: the smallest file whose DRRs have this PSNR against ray "
+        "casting, the "
+        "median over poses of the range, dB")
+      .within(10.0, 90.0);
+  field("max_field_bytes",
+        max_field_bytes,
+        "Choose the design by a probe: the best DRRs that a file of at most this size gives, e.g. "
+        "8MB")
+      .as("--max-field-size")
+      .size()
+      .at_least(1.0);
+  field("max_drr_ms",
+        max_drr_ms,
+        "Choose the design by a probe: at most so many milliseconds per DRR of the whole detector "
+        "on one "
+        "core, by an estimate")
+      .above(0.0)
+      .finite();
+}
+
+std::string to_text(const DesignBudget& budget) {
+  std::vector<std::string> limits;
+  if (budget.target_psnr_db)
+    limits.push_back("at least " + number_text(*budget.target_psnr_db) + " dB");
+  if (budget.max_field_bytes)
+    limits.push_back("at most " + number_text(static_cast<double>(*budget.max_field_bytes) / 1e6) +
+                     " MB");
+  if (budget.max_drr_ms)
+    limits.push_back("at most " + number_text(*budget.max_drr_ms) + " ms per DRR");
+  return joined(limits);
+}
+
+FieldDesign DesignParts::over(FieldDesign design) const {
+  design.slabs = slabs.value_or(design.slabs);
+  design.uv_nodes = uv_nodes.value_or(design.uv_nodes);
+  design.st_nodes = st_nodes.value_or(design.st_nodes);
+  design.codewords = codewords.value_or(design.codewords);
+  design.look_up = look_up.value_or(design.look_up);
+  return design;
+}
+
+}  // namespace af

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/described_fields.h"
+#include "precompute/design/field_design.h"
+
+namespace af {
+
+/// What a field may cost and what it must give. Any of them chooses the design by a probe.
+struct DesignBudget {
+  std::optional<double> target_psnr_db;  ///< the least; the smallest file that gives it is chosen
+  std::optional<std::int64_t> max_field_bytes;  ///< of the file
+  std::optional<double> max_drr_ms;             ///< estimated, the whole detector on one core
+
+  [[nodiscard]] bool is_stated() const {
+    return target_psnr_db.has_value() || max_field_bytes.has_value() || max_drr_ms.has_value();
+  }
+  void describe(Fields& field);
+};
+
+/// "at least 50 dB, at most 8.00 MB"
+std::string to_text(const DesignBudget& budget);
+
+/// The parts of a design that are stated; a search keeps them.
+struct DesignParts {
+  std::optional<int> slabs;
+  std::optional<int> uv_nodes;
+  std::optional<int> st_nodes;
+  std::optional<int> codewords;
+  std::optional<std::string> look_up;
+
+  /// `design` with these parts replaced.
+  [[nodiscard]] FieldDesign over(FieldDesign design) const;
+};
+
+}  // namespace af

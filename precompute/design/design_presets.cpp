@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "precompute/design/design_presets.h"
+
+#include <array>
+
+#include "base/named_rows.h"
+
+namespace af {
+namespace {
+
+constexpr std::int64_t kMegabyte = 1000000;
+constexpr double kNeverEnough = 1e9;
+
+/// Every preset there is; a new one joins here.
+const std::array kPresets = {
+    DesignPreset{"paper",
+                 "one slab of 64 x 64 x 256 x 256 nodes, 16384 codewords, linear look-up",
+                 {1, 64, 256, 16384, "linear"},
+                 {},
+                 kNeverEnough},
+    DesignPreset{"compact",
+                 "what a probe of the CT finds best within 4 MB, up to 50 dB",
+                 {8, 8, 384, 16384, "cubic"},
+                 {std::nullopt, 4 * kMegabyte, std::nullopt},
+                 50.0},
+    DesignPreset{"standard",
+                 "within 8 MB, up to 52 dB",
+                 {4, 16, 384, 16384, "cubic"},
+                 {std::nullopt, 8 * kMegabyte, std::nullopt},
+                 52.0},
+    DesignPreset{"fine",
+                 "within 24 MB, up to 56 dB",
+                 {6, 12, 512, 65536, "cubic"},
+                 {std::nullopt, 24 * kMegabyte, std::nullopt},
+                 56.0},
+};
+
+}  // namespace
+
+const DesignPreset& design_preset_named(const std::string& name) {
+  return required_row(kPresets, "preset", name);
+}
+
+std::vector<std::string> design_preset_names() {
+  return names_of(kPresets);
+}
+
+std::string design_preset_help() {
+  return help_of(kPresets);
+}
+
+}  // namespace af

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "precompute/design/design_budget.h"
+
+namespace af {
+
+/// A design by name: fixed, or chosen by a probe within a budget.
+struct DesignPreset {
+  const char* name;
+  const char* help;
+  FieldDesign design;     ///< fixed, or where a probe may not be made
+  DesignBudget budget;    ///< none stated: the design is fixed
+  double enough_psnr_db;  ///< beyond it a probe saves file size
+};
+
+/// What a field gets when nothing is said about its design.
+inline constexpr const char* kDefaultPreset = "paper";
+
+/// InputError when there is none of that name.
+const DesignPreset& design_preset_named(const std::string& name);
+
+/// Names that design_preset_named() knows, and one line that explains them.
+std::vector<std::string> design_preset_names();
+std::string design_preset_help();
+
+}  // namespace af

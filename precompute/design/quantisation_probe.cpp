@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "precompute/design/quantisation_probe.h"
+
+#include <algorithm>
+#include <cmath>
+#include <zlib.h>
+
+#include "base/error.h"
+#include "precompute/codebook/codebook_training.h"
+#include "precompute/codebook/unit_encoding.h"
+
+namespace af {
+
+namespace {
+
+constexpr int kIterations = 5;
+/// Excess of the squared error of unseen tiles over that of a boundless training, times tiles per
+/// codeword: 1.16 at 14 and 1.05 at 64 (precompute/README.md). Tiles trained on fall short by about
+/// as much.
+constexpr double kUnseenExcess = 2.5;
+
+double trained_share_factor(double per_codeword, double trained_share) {
+  return 1.0 + kUnseenExcess / std::max(per_codeword, 4.0) * (1.0 - 2.0 * trained_share);
+}
+
+}  // namespace
+
+Codebook small_codebook(std::span<const NumberedTile> shuffled, int codewords, std::uint64_t seed) {
+  const std::size_t wanted = kProbeTilesPerCodeword * static_cast<std::size_t>(codewords);
+  const auto training = shuffled.first(std::min(shuffled.size(), wanted));
+  std::vector<Tile> distinct;
+  for (const NumberedTile& tile : training) distinct.push_back(tile.tile);
+  std::sort(distinct.begin(), distinct.end());
+  const auto count = std::unique(distinct.begin(), distinct.end()) - distinct.begin();
+  CodebookOptions options;
+  options.codewords = static_cast<int>(std::min<std::ptrdiff_t>(codewords, count));
+  options.max_iterations = kIterations;
+  options.seed = seed;
+  if (options.codewords < 2) return {{Tile{}}};
+  return train_codebook({{training.begin(), training.end()}, {}}, options, serial_reduction())
+      .codebook;
+}
+
+double squared_error(std::span<const NumberedTile> tiles, const Codebook& codebook) {
+  std::vector<Tile> plain;
+  for (const NumberedTile& tile : tiles) plain.push_back(tile.tile);
+  std::vector<std::uint32_t> nearest(plain.size());
+  std::vector<std::uint64_t> errors(plain.size());
+  NearestCodeword(codebook).search(plain, SearchHint::None, nearest, errors);
+  double sum = 0.0;
+  for (const std::uint64_t error : errors) sum += static_cast<double>(error);
+  return std::max(sum, 1.0);
+}
+
+Codebook drawn_codebook(std::span<const NumberedTile> shuffled, int codewords, std::uint64_t seed) {
+  std::vector<std::uint64_t> keys;
+  keys.reserve(shuffled.size());
+  for (const NumberedTile& tile : shuffled) keys.push_back(weighted_sampling_key(seed, tile));
+  const std::size_t wanted =
+      std::min(static_cast<std::size_t>(codewords), shuffled.size() / 2 + 1) - 1;
+  const auto drawn = smallest_keyed_tiles(keys, shuffled, wanted, serial_reduction());
+  Codebook codebook{{Tile{}}};
+  for (const KeyedTile& tile : drawn) codebook.codewords.push_back(tile.numbered.tile);
+  std::sort(codebook.codewords.begin(), codebook.codewords.end(), codeword_less);
+  return codebook;
+}
+
+double error_ratio(const std::array<double, kProbeCodewords.size()>& errors_of_small,
+                   int codewords,
+                   const TrainingTiles& tiles) {
+  // Some -0.45 in practice; a field of few tiles has hardly any errors to tell it from.
+  const double falls = std::clamp(std::log(errors_of_small[1] / errors_of_small[0]) /
+                                      std::log(1.0 * kProbeCodewords[1] / kProbeCodewords[0]),
+                                  -0.8,
+                                  0.0);
+  const double sum = falls * std::log(1.0 * codewords / kProbeCodewords[1]);
+  const double share = std::min(1.0, tiles.training / std::max(tiles.occupied, 1.0));
+  // A probe's training is short and sees few viewpoints.
+  constexpr double kProbeExcess = 1.1;
+  return std::exp(sum) / kProbeExcess * trained_share_factor(tiles.training / codewords, share) /
+         trained_share_factor(static_cast<double>(kProbeTilesPerCodeword), 0.0);
+}
+
+IndexBytes index_bytes(const FieldSample::Chunk& chunk, const NearestCodeword& search) {
+  const EncodedUnit encoded = encode_unit(search, chunk.unit, chunk.tiles);
+  const std::size_t count = encoded.indices.size();
+  // As HDF5's shuffle and deflate filters do it.
+  std::vector<Bytef> low_then_high(2 * count);
+  for (std::size_t i = 0; i < count; ++i) {
+    low_then_high[i] = static_cast<Bytef>(encoded.indices[i] & 0xFFu);
+    low_then_high[count + i] = static_cast<Bytef>(encoded.indices[i] >> 8u);
+  }
+  uLongf bytes = compressBound(low_then_high.size());
+  std::vector<Bytef> compressed(bytes);
+  constexpr int kDeflateLevel = 4;
+  check(compress2(
+            compressed.data(), &bytes, low_then_high.data(), low_then_high.size(), kDeflateLevel) ==
+            Z_OK,
+        "zlib compresses what fits");
+  return {static_cast<double>(bytes), static_cast<double>(chunk.tiles.tiles.size())};
+}
+
+}  // namespace af

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "field/codebook.h"
+#include "precompute/codebook/nearest_codeword.h"
+#include "precompute/codebook/tile_selection.h"
+#include "precompute/design/field_sample.h"
+
+namespace af {
+
+/// Sizes of the small codebooks that a probe trains; real ones would take too long.
+inline constexpr std::array<int, 2> kProbeCodewords = {512, 2048};
+/// Training tiles per codeword of each.
+inline constexpr std::size_t kProbeTilesPerCodeword = 32;
+/// Tiles on which none of them is trained, where there are so many.
+inline constexpr std::size_t kProbeUnseenTiles = 8192;
+
+/// Tiles that a probe needs for a field of so many codewords: for the largest small codebook, and
+/// to draw from.
+constexpr std::size_t probe_tiles(int codewords) {
+  return std::max(
+      kProbeTilesPerCodeword * static_cast<std::size_t>(kProbeCodewords.back()) + kProbeUnseenTiles,
+      2 * static_cast<std::size_t>(codewords));
+}
+
+/// A codebook trained as a field's is on the first tiles of `shuffled`, kProbeTilesPerCodeword per
+/// codeword. Of fewer codewords when there are not so many tiles.
+Codebook small_codebook(std::span<const NumberedTile> shuffled, int codewords, std::uint64_t seed);
+
+/// A codebook of the size of a field's whose codewords are drawn, not trained: its indices compress
+/// as a field's do. Of fewer codewords when there are not twice as many tiles.
+Codebook drawn_codebook(std::span<const NumberedTile> shuffled, int codewords, std::uint64_t seed);
+
+/// Sum over tiles of the squared distance to the nearest codeword, in levels.
+double squared_error(std::span<const NumberedTile> tiles, const Codebook& codebook);
+
+/// What a field's codebook will be trained on.
+struct TrainingTiles {
+  double training = 0.0;
+  double occupied = 0.0;  ///< of the whole field: not empty
+};
+
+/// The squared error of a field with `codewords` over that with the largest small codebook, from
+/// the errors with the small ones: a straight line in the logarithms. Tiles that were
+/// trained on are coded better than unseen ones, the more the fewer there are per codeword.
+double error_ratio(const std::array<double, kProbeCodewords.size()>& errors_of_small,
+                   int codewords,
+                   const TrainingTiles& tiles);
+
+/// Bytes of the indices of chunks, deflated as in a field's file, and their tiles that are not
+/// empty.
+struct IndexBytes {
+  double bytes = 0.0;
+  double tiles = 0.0;
+};
+IndexBytes index_bytes(const FieldSample::Chunk& chunk, const NearestCodeword& search);
+
+}  // namespace af
