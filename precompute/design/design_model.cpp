@@ -79,9 +79,11 @@ void DesignModel::fit() {
         sum += residual;
         sum_of_squares += residual * residual;
       }
+      // Two or three points prove little: an extreme has to explain some decibels.
+      constexpr double kCaution = 12.0;
       const double excess = (value - middle) / (high - low);
-      const double cost =
-          sum_of_squares - sum * sum / static_cast<double>(points_.size()) + excess * excess;
+      const double cost = sum_of_squares - sum * sum / static_cast<double>(points_.size()) +
+                          kCaution * excess * excess;
       if (!(cost < best)) continue;
       best = cost;
       best_value = value;

@@ -16,7 +16,9 @@ namespace {
 
 /// Of the size asked for, left to the error of the forecast.
 constexpr double kSizeMargin = 0.97;
-constexpr int kMostMeasured = 4;
+constexpr int kMostMeasured = 5;
+/// After so many, one of them is taken also when another looks better by more than a little.
+constexpr int kEnoughMeasured = 3;
 
 /// A number with so many digits after the point.
 std::string fixed(double value, int digits) {
@@ -95,6 +97,11 @@ class Judge {
     return fits_size(forecast) && fits_time(forecast) &&
            (!budget_.target_psnr_db || forecast.psnr_db >= *budget_.target_psnr_db);
   }
+  /// Not much better than was asked for.
+  [[nodiscard]] bool is_near_target(const DesignForecast& forecast) const {
+    constexpr double kNearDb = 0.3;
+    return !budget_.target_psnr_db || forecast.psnr_db <= *budget_.target_psnr_db + kNearDb;
+  }
   /// Smaller is better.
   [[nodiscard]] double cost(const DesignForecast& forecast) const {
     // A DRR of twice the time must save a sixth of the file, or give 0.3 dB more.
@@ -111,11 +118,24 @@ class Judge {
   const SearchSpace& space_;
 };
 
+/// Whether the probe need not measure `design`: it has measured one with almost the same nodes.
+bool is_measured(const FieldDesign& design, const DesignModel& model) {
+  return std::ranges::any_of(model.points(), [&](const DesignPoint& point) {
+    const FieldDesign& known = point.forecast.design;
+    const double st_change = std::abs(std::log(1.0 * design.st_nodes / known.st_nodes));
+    constexpr double kSmallChange = 0.12;
+    return known.slabs == design.slabs && known.uv_nodes == design.uv_nodes &&
+           known.codewords == design.codewords && known.look_up == design.look_up &&
+           st_change < kSmallChange;
+  });
+}
+
 struct Choice {
   std::optional<DesignForecast> best;
-  std::optional<DesignForecast> other_slabs;  ///< the best of another number of slabs
-  DesignForecast highest_psnr;                ///< of those that fit size and time
-  DesignForecast smallest;                    ///< of those with the PSNR
+  std::optional<DesignForecast> best_measured;  ///< of those that are all but measured
+  std::optional<DesignForecast> other_slabs;    ///< the best of another number of slabs
+  DesignForecast highest_psnr;                  ///< of those that fit size and time
+  DesignForecast smallest;                      ///< of those with the PSNR
   std::optional<DesignForecast> fastest;
   bool has_highest = false;
   bool has_smallest = false;
@@ -142,6 +162,9 @@ Choice choice_of(const Family& family,
       choice.has_smallest = true;
     }
     if (!judge.fits(forecast)) return;
+    if ((!choice.best_measured || judge.cost(forecast) < judge.cost(*choice.best_measured)) &&
+        is_measured(design, model))
+      choice.best_measured = forecast;
     const auto same_slabs = std::ranges::find_if(best_of_slabs, [&](const DesignForecast& best) {
       return best.design.slabs == design.slabs;
     });
@@ -156,18 +179,6 @@ Choice choice_of(const Family& family,
   if (!best_of_slabs.empty()) choice.best = best_of_slabs.front();
   if (best_of_slabs.size() > 1) choice.other_slabs = best_of_slabs[1];
   return choice;
-}
-
-/// Whether the probe need not measure `design`: it has measured one that is all but the same.
-bool is_measured(const FieldDesign& design, const DesignModel& model) {
-  return std::ranges::any_of(model.points(), [&](const DesignPoint& point) {
-    const FieldDesign& known = point.forecast.design;
-    const double st_change = std::abs(std::log(1.0 * design.st_nodes / known.st_nodes));
-    constexpr double kSmallChange = 0.06;
-    return known.slabs == design.slabs && known.uv_nodes == design.uv_nodes &&
-           known.codewords == design.codewords && known.look_up == design.look_up &&
-           st_change < kSmallChange;
-  });
 }
 
 [[noreturn]] void refuse(const DesignBudget& budget, const Choice& choice) {
@@ -185,8 +196,8 @@ bool is_measured(const FieldDesign& design, const DesignModel& model) {
 
 /// Where a search begins: between the designs that usually win.
 FieldDesign first_guess(const SearchSpace& space) {
-  FieldDesign guess{4, 16, 384, 16384, "cubic"};
-  if (space.most_slabs < 16) guess = {1, 64, 256, 16384, "cubic"};
+  FieldDesign guess{8, 10, 288, 16384, "cubic"};
+  if (space.most_slabs < 32) guess = {1, 64, 256, 16384, "cubic"};
   guess = space.fixed.over(guess);
   if (space.fixed.slabs && !space.fixed.uv_nodes)
     guess.uv_nodes = std::clamp((64 / guess.slabs + 1) / 2 * 2, 6, 64);
@@ -209,6 +220,15 @@ ChosenDesign search_design(const DesignBudget& budget,
     model.fit();
     chosen.measured.push_back(model.forecast(next));
     choice = choice_of(family, judge, model, budget);
+    // What is measured is known better than what is only told to be a little better.
+    constexpr double kLittle = 0.06;
+    const double allowed = measured + 1 < kEnoughMeasured ? kLittle : 3.0 * kLittle;
+    if (choice.best_measured &&
+        judge.cost(*choice.best_measured) <= judge.cost(*choice.best) + allowed &&
+        judge.is_near_target(*choice.best_measured)) {
+      choice.best = choice.best_measured;
+      break;
+    }
     // A budget that looks impossible may only look so: measure at its edge.
     if (choice.best)
       next = choice.best->design;

@@ -32,7 +32,7 @@ struct ProbePose {
 
 /// How many rays are drawn.
 struct ProbeRayCount {
-  int poses = 24;
+  int poses = 32;
   int patches_per_pose = 6;
 };
 

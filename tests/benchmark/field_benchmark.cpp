@@ -80,6 +80,7 @@ std::vector<std::string> precompute_command(const FieldOptions& options, const J
                   options.of_case.rig,
                   "--camera",
                   options.of_case.camera});
+  command.insert(command.end(), {"--preset", "paper"});
   if (options.of_case.is_quick)
     command.insert(command.end(), {"--uv-nodes", "8", "--st-nodes", "64"});
   command.insert(command.end(), job.arguments.begin(), job.arguments.end());

@@ -126,6 +126,17 @@ done
 "$program" --ct ct.mha --rig c-arm-12in --camera ap "${common[@]:6}" --st-plane centre -o plane.h5 >plane.txt 2>/dev/null
 [[ $(hash_of plane.txt) == "${hashes[0]}" ]] || fail '--camera ap or --st-plane centre gives another field'
 
+# A budget chooses the design by a probe: the same on any number of ranks, near the size asked for, the same in a dry run,
+# and what is stated stays.
+budget=("${common[@]:0:8}" --max-field-size 1500kB --slabs 2)
+"$program" "${budget[@]}" -o budget.h5 >budget.txt 2>budget.err || fail "a budget: $(cat budget.err)"
+grep -q 'chosen .*: 2 slabs, ' budget.err || fail "it does not say what it chose: $(cat budget.err)"
+bytes=$(stat -c %s budget.h5)
+((bytes <= 1650000)) || fail "$bytes bytes are more than 10 % beyond the size asked for"
+for ranks in "${rank_counts[@]}"; do same_hash "$ranks" "$(hash_of budget.txt)" "${budget[@]}"; done
+"$program" "${budget[@]}" --dry-run >dry.txt 2>dry.err || fail "a dry run with a budget: $(cat dry.err)"
+[[ $(grep chosen dry.err) == "$(grep chosen budget.err)" ]] || fail 'a dry run chooses another design'
+
 # Tiles of 200 MB under a limit that holds a fraction of them: read back and cast again give the payload of tiles kept,
 # and no rank exceeds the limit.
 large=(--ct ct.mha --rig c-arm-12in --camera AP --max-translation-mm 5 --uv-nodes 48 --st-nodes 900 --codewords 500)

@@ -171,6 +171,26 @@ TEST(FieldFile, ReadsBackWhatRanksWroteTogether) {
   }
 }
 
+TEST(FieldFile, NamesTheLookUpThatItIsMeantFor) {
+  const test::SharedFolder folder;
+  const Communicator world = Communicator::world();
+  const CompressedAttenuationField field = small_field();
+  FieldProvenance provenance = some_provenance();
+  const auto look_up_of = [&](const std::string& options) {
+    provenance.options_toml = options;
+    write_field(field, dealt(all_blocks(field), world), provenance, folder / "a.af.h5", world);
+    FieldFileInfo info;
+    read_field(folder / "a.af.h5", world, &info);
+    return info.look_up;
+  };
+  EXPECT_EQ(look_up_of("slabs = 1\n"), "linear");
+  EXPECT_EQ(look_up_of("slabs = 4\nlook_up = \"cubic\"\nseed = 1\n"), "cubic");
+  EXPECT_EQ(look_up_of("look_up = \"linear\""), "linear");
+  provenance.options_toml = "look_up = \"$(reboot)\"\n";
+  write_field(field, dealt(all_blocks(field), world), provenance, folder / "b.af.h5", world);
+  EXPECT_NE(refusal(folder / "b.af.h5").find("look_up"), std::string::npos);
+}
+
 TEST(FieldFile, PayloadHashIsTheSameOnEveryRankCount) {
   const test::SharedFolder folder;
   // Frozen: made by this test on one rank with format version 1.

@@ -113,6 +113,7 @@ void inspect_field(const std::filesystem::path& path,
     facts["slabs"].push_back(slab_json(slab));
   facts["codewords"] = field->codebook.size();
   facts["quantizer_step"] = field->quantizer_step;
+  facts["look_up"] = info.look_up;
   facts["sizes"] = sizes_json(*field, info);
   facts["provenance"] = provenance_json(info.provenance);
 }
