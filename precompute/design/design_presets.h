@@ -18,7 +18,7 @@ struct DesignPreset {
 };
 
 /// What a field gets when nothing is said about its design.
-inline constexpr const char* kDefaultPreset = "paper";
+inline constexpr const char* kDefaultPreset = "standard";
 
 /// InputError when there is none of that name.
 const DesignPreset& design_preset_named(const std::string& name);

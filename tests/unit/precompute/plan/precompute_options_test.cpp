@@ -35,7 +35,8 @@ TEST(PrecomputeOptions, FieldsRecordWhichRuleChoseTheTrainingTiles) {
 }
 
 TEST(PrecomputeOptions, DecideTheSamplesOrWhatTheCodebookMakesOfThem) {
-  const PrecomputeOptions options;
+  PrecomputeOptions options;
+  options.preset = "paper";
   EXPECT_EQ(deciding_options(options, kCastingStage),
             (OptionTexts{{"max_rotation_deg", "10.0"},
                          {"max_translation_mm", "100.0"},
@@ -91,6 +92,11 @@ TEST(FieldDesignOfOptions, ABudgetDecidesNothingButTheDesign) {
   probed.budget.target_psnr_db = 50.0;
   EXPECT_EQ(deciding_options(options.with_design(design)),
             deciding_options(probed.with_design(design)));
+}
+
+TEST(FieldDesignOfOptions, IsProbedForWhenNothingIsSaid) {
+  EXPECT_TRUE(PrecomputeOptions{}.needs_probe());
+  EXPECT_EQ(std::string(PrecomputeOptions{}.design_preset().name), "standard");
 }
 
 TEST(FieldDesignOfOptions, EveryPresetIsSound) {
