@@ -15,7 +15,6 @@
 #include "drr/field_renderer.h"
 #include "drr/ray_cast_drr.h"
 #include "drr/two_pass_af_drr.h"
-#include "field/tile.h"
 #include "field_file/field_file.h"
 #include "files/sha256.h"
 #include "register/problem/fiducial_mask.h"
@@ -162,10 +161,7 @@ int level_count(const CompressedAttenuationField& field, const CaseLoadOptions& 
 constexpr std::size_t kMostDecodedBytes = std::size_t{512} << 20;
 
 bool pays_to_decode(const CompressedAttenuationField& field) {
-  constexpr std::size_t kTileBytes = sizeof(Tile);
-  std::size_t tiles = 0;
-  for (const CompressedSlab& slab : field.slabs) tiles += slab.indices.size();
-  return field.slabs.size() > 1 && tiles <= kMostDecodedBytes / kTileBytes;
+  return field.slabs.size() > 1 && decoded_bytes(field) <= kMostDecodedBytes;
 }
 
 /// Collective. A field's renderers for a view: its own, with the look-up that it is meant for, and

@@ -300,6 +300,12 @@ FieldLevelMemory process_memory(int threads) {
   };
 }
 
+std::size_t decoded_bytes(const CompressedAttenuationField& field) {
+  std::size_t tiles = 0;
+  for (const CompressedSlab& slab : field.slabs) tiles += slab.indices.size();
+  return tiles * sizeof(Tile);
+}
+
 FieldLevel decode_field(const CompressedAttenuationField& field, const FieldLevelMemory& memory) {
   return decoded_level(field, 0, memory);
 }

@@ -76,6 +76,9 @@ using FieldLevelMemory =
 /// Memory of this process, filled by `threads` threads.
 FieldLevelMemory process_memory(int threads = 1);
 
+/// Memory of a field's level 0.
+std::size_t decoded_bytes(const CompressedAttenuationField& field);
+
 /// Level 0 of a compressed field: 537 MB for 64x64 x 256x256 nodes, 67 MB for 8x8 x 256x256 in two
 /// slabs.
 FieldLevel decode_field(const CompressedAttenuationField& field,

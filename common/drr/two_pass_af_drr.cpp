@@ -2,6 +2,7 @@
 #include "drr/two_pass_af_drr.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "base/error.h"
 #include "base/vector_width.h"
@@ -216,6 +217,10 @@ void for_each_band(const View& view, ThreadPool& pool, const Work& work) {
   });
 }
 
+/// A sum's nodes per node of a slab: two interpolations in turn lose more than one, up to 1.2 dB in
+/// the worst DRRs with as many nodes; with a quarter more they lose nothing.
+constexpr double kSumNodesPerNode = 1.25;
+
 /// The lattice of a sum of slabs: midway between the outermost planes. A ray's place on a plane is
 /// an affine function of the plane's depth, so the edges are those between the slabs', too.
 SlabGeometry sum_geometry(const ViewpointBlender& blender) {
@@ -225,7 +230,9 @@ SlabGeometry sum_geometry(const ViewpointBlender& blender) {
   for (GridAxis SlabGeometry::*axis : {&SlabGeometry::s, &SlabGeometry::t}) {
     (sum.*axis).first_mm = 0.5 * ((sum.*axis).first_mm + (last.*axis).first_mm);
     (sum.*axis).last_mm = 0.5 * ((sum.*axis).last_mm + (last.*axis).last_mm);
-    (sum.*axis).nodes = std::max((sum.*axis).nodes, (last.*axis).nodes);
+    const int nodes = std::max((sum.*axis).nodes, (last.*axis).nodes);
+    if (blender.slab_count() > 1)
+      (sum.*axis).nodes = 1 + static_cast<int>(std::ceil(kSumNodesPerNode * (nodes - 1)));
   }
   sum.y_high_mm = last.y_high_mm;
   return sum;

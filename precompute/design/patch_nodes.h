@@ -19,7 +19,9 @@ struct PatchValues {
 };
 
 /// The nodes of one field around one patch of rays, in every slab, cast: whole tiles. Looks the
-/// patch up as TwoPassAfDrr does, before and after quantisation. \test PatchNodes.*
+/// patch up as TwoPassAfDrr does, before and after quantisation; several slabs one by one, where
+/// TwoPassAfDrr sums them on one plane first, which is about as good.
+/// \test DesignProbeTest.LooksPatchesOfOneSlabUpAsTwoPassAfDrrDoes
 class PatchNodes {
  public:
   /// `planes` must outlive it.

@@ -144,8 +144,8 @@ class DesignProbeTest : public testing::Test {
 /// dB; the six patches of a pose add as much.
 constexpr double kSamplingDb = 1.0;
 
-TEST_F(DesignProbeTest, LooksPatchesUpAsTwoPassAfDrrDoes) {
-  const FieldDesign design{3, 6, 40, 512, "cubic"};
+TEST_F(DesignProbeTest, LooksPatchesOfOneSlabUpAsTwoPassAfDrrDoes) {
+  const FieldDesign design{1, 6, 40, 512, "cubic"};
   const auto field = field_of(design, 0);
   ASSERT_LE(field->codebook.size(), kMaxCodewords);
   const auto caster = scene_.make_caster(field->light_slab);

@@ -94,8 +94,8 @@ TEST(FieldDesignOfOptions, ABudgetDecidesNothingButTheDesign) {
             deciding_options(probed.with_design(design)));
 }
 
-TEST(FieldDesignOfOptions, IsProbedForWhenNothingIsSaid) {
-  EXPECT_TRUE(PrecomputeOptions{}.needs_probe());
+TEST(FieldDesignOfOptions, IsTheStandardOneWithoutAProbeWhenNothingIsSaid) {
+  EXPECT_FALSE(PrecomputeOptions{}.needs_probe());
   EXPECT_EQ(std::string(PrecomputeOptions{}.design_preset().name), "standard");
 }
 
