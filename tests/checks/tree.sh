@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# The tree holds no path of anybody's machine, every source names its licence, and every text file ends with a line
+# The tree holds no path of anybody's machine and no mark of an unfinished merge, every source names its licence, and every text file ends with a line
 # end. Usage: tree.sh ROOT
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR
@@ -13,6 +13,10 @@ failed=no
 # A home folder, a scratch folder, or a mount of one machine.
 if grep -nE '(^|[^[:alnum:]._$}/-])/(home/[a-z]|root/|work/|mnt/|Users/|tmp/[a-z]+/)' -- "${files[@]}"; then
   echo "tree: the lines above hold a path of one machine" >&2
+  failed=yes
+fi
+if grep -nE '^(<{7}|>{7}) ' -- "${files[@]}"; then
+  echo "tree: the lines above are marks of an unfinished merge" >&2
   failed=yes
 fi
 for file in "${files[@]}"; do
