@@ -12,7 +12,6 @@
 #include "base/joined.h"
 #include "base/number_text.h"
 #include "drr/field_level.h"
-#include "drr/field_renderer.h"
 #include "drr/ray_cast_drr.h"
 #include "drr/two_pass_af_drr.h"
 #include "field_file/field_file.h"
@@ -164,12 +163,11 @@ bool pays_to_decode(const CompressedAttenuationField& field) {
   return field.slabs.size() > 1 && decoded_bytes(field) <= kMostDecodedBytes;
 }
 
-/// Collective. A field's renderers for a view: its own, with the look-up that it is meant for, and
-/// levels 1, 2, ... of its pyramid, held once per node. A method's levels are those of a field of
-/// about 256 nodes: a finer field begins with more halvings, so that a level has about the same
-/// blur.
+/// Collective. A field's renderers for a view: its own, and levels 1, 2, ... of its pyramid, held
+/// once per node. A method's levels are those of a field of about 256 nodes: a finer field begins
+/// with more halvings, so that a level has about the same blur. Look-up is linear, whatever a field
+/// is meant for: cubic gives better DRRs, but not better poses (register/README.md).
 void use_field(const std::shared_ptr<const CompressedAttenuationField>& field,
-               const std::string& look_up,
                const CaseLoadOptions& options,
                const Communicator& communicator,
                RegistrationView& view) {
@@ -181,10 +179,10 @@ void use_field(const std::shared_ptr<const CompressedAttenuationField>& field,
   FieldLevels pyramid;
   if (pays_to_decode(*field)) {
     const auto samples = std::make_shared<const FieldLevel>(decode_field(*field, memory));
-    view.renderer = make_level_renderer(samples, look_up, options.pool);
+    view.renderer = std::make_shared<const TwoPassAfDrr>(samples, TwoPassOptions{}, options.pool);
     if (halvings > 0) pyramid = make_field_pyramid(*samples, halvings, memory);
   } else {
-    view.renderer = make_field_renderer(field, look_up, options.pool);
+    view.renderer = std::make_shared<const TwoPassAfDrr>(field, TwoPassOptions{}, options.pool);
     if (halvings > 0) pyramid = make_field_pyramid(*field, halvings, memory);
   }
   for (auto i = static_cast<std::size_t>(more_halvings); i < pyramid.size(); ++i)
@@ -293,7 +291,7 @@ void use_fields(const StudyCase& study_case,
         used_from(is_of_study ? study_case.views[i].places : StudyPlaces(), "field", [&] {
           return field_of_view(path, study_case, view, options, ct, communicator, info);
         });
-    use_field(field, info.look_up, options, communicator, view);
+    use_field(field, options, communicator, view);
     view.limit = MotionLimit{field->identity.frame, field->identity.range};
     input_sha256["field " + view.view.camera.name] = info.payload_sha256;
   }

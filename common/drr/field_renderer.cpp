@@ -3,7 +3,6 @@
 
 #include <array>
 
-#include "base/error.h"
 #include "base/named_rows.h"
 #include "drr/af_drr.h"
 #include "drr/two_pass_af_drr.h"
@@ -15,13 +14,10 @@ using FieldPointer = std::shared_ptr<const CompressedAttenuationField>;
 using RendererPointer = std::shared_ptr<const DrrRenderer>;
 using PoolPointer = std::shared_ptr<ThreadPool>;
 
-using LevelPointer = std::shared_ptr<const FieldLevel>;
-
 struct KnownLookUp {
   const char* name;
   const char* help;
   RendererPointer (*make)(FieldPointer field, const PoolPointer& pool);
-  RendererPointer (*make_of_level)(LevelPointer level, const PoolPointer& pool);
 };
 
 template <FieldInterpolation interpolation>
@@ -33,36 +29,17 @@ RendererPointer make_two_pass(FieldPointer field, const PoolPointer& pool) {
   return std::make_shared<const TwoPassAfDrr>(std::move(field), TwoPassOptions{st, uv}, pool);
 }
 
-template <AxisInterpolation st, AxisInterpolation uv>
-RendererPointer make_two_pass_of_level(LevelPointer level, const PoolPointer& pool) {
-  return std::make_shared<const TwoPassAfDrr>(std::move(level), TwoPassOptions{st, uv}, pool);
-}
-RendererPointer refuse_level(LevelPointer /*level*/, const PoolPointer& /*pool*/) {
-  check(false, "samples are looked up in two passes only");
-  return nullptr;
-}
-
 using enum AxisInterpolation;
 
 /// Every way of looking up there is; a new one joins here.
 constexpr std::array kLookUps = {
-    KnownLookUp{"nearest", "nearest node", make_literal<FieldInterpolation::Nearest>, refuse_level},
-    KnownLookUp{"linear",
-                "linear, in two passes",
-                make_two_pass<Linear, Linear>,
-                make_two_pass_of_level<Linear, Linear>},
-    KnownLookUp{"cubic",
-                "cubic over (s,t)",
-                make_two_pass<Cubic, Linear>,
-                make_two_pass_of_level<Cubic, Linear>},
-    KnownLookUp{"cubic-uv",
-                "cubic over (s,t) and (u,v)",
-                make_two_pass<Cubic, Cubic>,
-                make_two_pass_of_level<Cubic, Cubic>},
+    KnownLookUp{"nearest", "nearest node", make_literal<FieldInterpolation::Nearest>},
+    KnownLookUp{"linear", "linear, in two passes", make_two_pass<Linear, Linear>},
+    KnownLookUp{"cubic", "cubic over (s,t)", make_two_pass<Cubic, Linear>},
+    KnownLookUp{"cubic-uv", "cubic over (s,t) and (u,v)", make_two_pass<Cubic, Cubic>},
     KnownLookUp{"quadrilinear",
                 "over each ray's 16 nodes, the definition",
-                make_literal<FieldInterpolation::Quadrilinear>,
-                refuse_level},
+                make_literal<FieldInterpolation::Quadrilinear>},
 };
 
 }  // namespace
@@ -79,12 +56,6 @@ RendererPointer make_field_renderer(FieldPointer field,
                                     const std::string& look_up,
                                     PoolPointer pool) {
   return required_row(kLookUps, "look-up", look_up).make(std::move(field), pool);
-}
-
-RendererPointer make_level_renderer(LevelPointer level,
-                                    const std::string& look_up,
-                                    PoolPointer pool) {
-  return required_row(kLookUps, "look-up", look_up).make_of_level(std::move(level), pool);
 }
 
 }  // namespace af

@@ -7,7 +7,6 @@
 
 #include "base/thread_pool.h"
 #include "drr/drr_renderer.h"
-#include "drr/field_level.h"
 #include "field/compressed_attenuation_field.h"
 
 namespace af {
@@ -22,10 +21,5 @@ std::shared_ptr<const DrrRenderer> make_field_renderer(
     std::shared_ptr<const CompressedAttenuationField> field,
     const std::string& look_up,
     std::shared_ptr<ThreadPool> pool = nullptr);
-
-/// The same from a field's samples; only "linear", "cubic" and "cubic-uv".
-std::shared_ptr<const DrrRenderer> make_level_renderer(std::shared_ptr<const FieldLevel> level,
-                                                       const std::string& look_up,
-                                                       std::shared_ptr<ThreadPool> pool = nullptr);
 
 }  // namespace af
