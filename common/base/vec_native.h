@@ -49,6 +49,9 @@ AF_NATIVE_INLINE Floats load(const uint16_t* from) {
 AF_NATIVE_INLINE void store(float* to, Floats vector) {
   memcpy(to, &vector, sizeof(vector));
 }
+AF_NATIVE_INLINE void store(int32_t* to, Ints vector) {
+  memcpy(to, &vector, sizeof(vector));
+}
 
 /// Truncation towards zero.
 AF_NATIVE_INLINE Ints to_int(Floats value) {
@@ -88,6 +91,10 @@ AF_NATIVE_INLINE Floats minimum(Floats a, Floats b) {
 }
 AF_NATIVE_INLINE Ints minimum(Ints a, Ints b) {
   return reinterpret_cast<Ints>(AF_NATIVE(min_epi32)(reinterpret_cast<IntegerRegister>(a),
+                                                     reinterpret_cast<IntegerRegister>(b)));
+}
+AF_NATIVE_INLINE Ints maximum(Ints a, Ints b) {
+  return reinterpret_cast<Ints>(AF_NATIVE(max_epi32)(reinterpret_cast<IntegerRegister>(a),
                                                      reinterpret_cast<IntegerRegister>(b)));
 }
 /// a > b ? a : b per lane.

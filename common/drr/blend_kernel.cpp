@@ -98,9 +98,18 @@ AF_NATIVE_INLINE void blend_tile(const TileStrip& strip, int32_t d) {
   store_nodes(v_slope, strip.images[2] + at, strip.stride);
 }
 
+/// kLanes columns of a block from column c on.
 template <bool kWithSlopes, int kTaps>
-AF_NATIVE_INLINE void blend_run(const SampleRun& run) {
-  for (int32_t i = 0; i < run.count; i += kLanes) {
+AF_NATIVE_INLINE void blend_columns(const SampleBlock& block, int32_t c) {
+  Floats u_weights[kMostTaps];
+  Floats u_slopes[kMostTaps];
+  for (int a = 0; a < kTaps; ++a) {
+    u_weights[a] = load(block.u_weights[a] + c);
+    u_slopes[a] = load(block.u_slopes[a] + c);
+  }
+  for (int32_t row = 0; row < block.rows; ++row) {
+    const uint16_t* const samples = block.samples + row * block.t_stride + c;
+    const ViewpointTap& v = block.v_taps[row];
     Floats value = splat(0.0f);
     Floats u_slope = splat(0.0f);
     Floats v_slope = splat(0.0f);
@@ -108,20 +117,28 @@ AF_NATIVE_INLINE void blend_run(const SampleRun& run) {
       Floats over_v = splat(0.0f);
       Floats slope_over_v = splat(0.0f);
       for (int b = 0; b < kTaps; ++b) {
-        const Floats samples = load(run.samples + a * run.u_stride + b * run.v_stride + i);
-        over_v += samples * run.v_weights[b];
-        if (kWithSlopes) slope_over_v += samples * run.v_slopes[b];
+        const Floats sample = load(samples + a * block.u_stride + b * block.v_stride);
+        over_v += sample * v.weights[b];
+        if (kWithSlopes) slope_over_v += sample * v.slopes[b];
       }
-      value += over_v * load(run.u_weights[a] + i);
+      value += over_v * u_weights[a];
       if (!kWithSlopes) continue;
-      u_slope += over_v * load(run.u_slopes[a] + i);
-      v_slope += slope_over_v * load(run.u_weights[a] + i);
+      u_slope += over_v * u_slopes[a];
+      v_slope += slope_over_v * u_weights[a];
     }
-    store(run.images[0] + i, value);
+    const int64_t at = row * block.image_stride + c;
+    store(block.images[0] + at, value);
     if (!kWithSlopes) continue;
-    store(run.images[1] + i, u_slope);
-    store(run.images[2] + i, v_slope);
+    store(block.images[1] + at, u_slope);
+    store(block.images[2] + at, v_slope);
   }
+}
+
+template <bool kWithSlopes, int kTaps>
+AF_NATIVE_INLINE void blend_block(const SampleBlock& given) {
+  // A copy that no store can change.
+  const SampleBlock block = given;
+  for (int32_t c = 0; c < block.columns; c += kLanes) blend_columns<kWithSlopes, kTaps>(block, c);
 }
 
 }  // namespace
@@ -135,12 +152,12 @@ void blend_tiles(const TileStrip& given) {
     for (int32_t d = strip.tile_begin; d < strip.tile_end; ++d) blend_tile<true>(strip, d);
 }
 
-void blend_samples(const SampleRun& run) {
-  const bool has_slopes = run.images[1] != nullptr;
-  if (run.taps == 2)
-    has_slopes ? blend_run<true, 2>(run) : blend_run<false, 2>(run);
+void blend_samples(const SampleBlock& block) {
+  const bool has_slopes = block.images[1] != nullptr;
+  if (block.taps == 2)
+    has_slopes ? blend_block<true, 2>(block) : blend_block<false, 2>(block);
   else
-    has_slopes ? blend_run<true, 4>(run) : blend_run<false, 4>(run);
+    has_slopes ? blend_block<true, 4>(block) : blend_block<false, 4>(block);
 }
 
 }  // namespace af::AF_KERNEL_NAMESPACE

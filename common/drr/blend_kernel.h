@@ -34,28 +34,37 @@ using BlendTiles = void (*)(const TileStrip& strip);
 /// Most viewpoints that an interpolation takes along one axis.
 inline constexpr int kMostTaps = 4;
 
-/// A run of (s,t) nodes along s whose rays pass between the same viewpoints.
-struct SampleRun {
-  const uint16_t* samples;  ///< of the run's first viewpoint; readable for 16 beyond the run
-  int64_t u_stride;         ///< from viewpoint to viewpoint
-  int64_t v_stride;
-  int32_t taps;                       ///< viewpoints along each axis
-  const float* u_weights[kMostTaps];  ///< one per node
-  const float* u_slopes[kMostTaps];   ///< their derivatives with respect to the source
-  float v_weights[kMostTaps];
-  float v_slopes[kMostTaps];
-  /// Rows of images: value, slopes along u and v (null: not wanted); written for up to 15 nodes
-  /// beyond the run.
-  float* images[3];
-  int32_t count;
+/// Where the rays of one (s or t) coordinate through the source meet the viewpoints along one axis.
+struct ViewpointTap {
+  int32_t first;             ///< viewpoint of weights[0]
+  float weights[kMostTaps];  ///< of first, first + 1, ...
+  float slopes[kMostTaps];   ///< their derivatives with respect to the source, per mm
 };
 
-using BlendSamples = void (*)(const SampleRun& run);
+/// A rectangle of (s,t) nodes whose rays pass between the same viewpoints.
+struct SampleBlock {
+  const uint16_t* samples;  ///< of the first node and viewpoint; readable for 16 beyond each row
+  int64_t u_stride;         ///< from viewpoint to viewpoint
+  int64_t v_stride;
+  int64_t t_stride;                   ///< from row to row of the nodes
+  int32_t taps;                       ///< viewpoints along each axis
+  const float* u_weights[kMostTaps];  ///< one per column of nodes
+  const float* u_slopes[kMostTaps];   ///< their derivatives with respect to the source
+  const ViewpointTap* v_taps;         ///< one per row of nodes
+  /// Images: value, slopes along u and v (null: not wanted); written for up to 15 nodes beyond each
+  /// row of the block.
+  float* images[3];
+  int64_t image_stride;
+  int32_t columns;
+  int32_t rows;
+};
 
-#define AF_DECLARE_KERNELS(space)           \
-  namespace space {                         \
-  void blend_tiles(const TileStrip& strip); \
-  void blend_samples(const SampleRun& run); \
+using BlendSamples = void (*)(const SampleBlock& block);
+
+#define AF_DECLARE_KERNELS(space)               \
+  namespace space {                             \
+  void blend_tiles(const TileStrip& strip);     \
+  void blend_samples(const SampleBlock& block); \
   }
 AF_DECLARE_KERNELS(kernels_128)
 AF_DECLARE_KERNELS(kernels_256)

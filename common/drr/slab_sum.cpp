@@ -10,86 +10,74 @@ namespace af {
 
 namespace {
 
-/// Values that kernels load beyond the last column.
+/// Entries that kernels load beyond the last column.
 constexpr std::size_t kBeyond = 48;
 
 /// Linear between, or beyond, the two nodes around a coordinate.
-SumRow linear_taps(double coordinate, int nodes) {
-  const int lower = std::clamp(static_cast<int>(std::floor(coordinate)), 0, nodes - 2);
-  SumRow taps{};
-  taps.first = std::clamp(lower, 0, std::max(0, nodes - kSumTaps));
-  const auto at = static_cast<std::size_t>(lower - taps.first);
-  const auto x = static_cast<float>(coordinate - lower);
-  taps.weights[at] = 1.0f - x;
-  taps.weights[at + 1] = x;
-  taps.slopes[at] = -1.0f;
-  taps.slopes[at + 1] = 1.0f;
-  return taps;
+void place_linear_taps(double coordinate, int nodes, std::size_t i, const SumTaps& taps) {
+  const double limited = std::clamp(coordinate, -1.0, static_cast<double>(nodes));
+  const int lower = std::clamp(static_cast<int>(std::floor(limited)), 0, nodes - 2);
+  taps.first[i] = std::clamp(lower, 0, std::max(0, nodes - kSumTaps));
+  for (std::size_t tap = 0; tap < kSumTaps; ++tap)
+    taps.weights[tap][i] = taps.slopes[tap][i] = 0.0f;
+  const auto at = static_cast<std::size_t>(lower - taps.first[i]);
+  const auto x = static_cast<float>(limited - lower);
+  taps.weights[at][i] = 1.0f - x;
+  taps.weights[at + 1][i] = x;
+  taps.slopes[at][i] = -1.0f;
+  taps.slopes[at + 1][i] = 1.0f;
 }
 
-/// Lagrange's polynomial through the four nodes around a coordinate.
-SumRow cubic_taps(double coordinate, int nodes) {
-  SumRow taps{};
-  taps.first = std::clamp(static_cast<int>(coordinate) - 1, 0, nodes - kSumTaps);
-  const double x = coordinate - taps.first;
-  const double a = x - 1.0;
-  const double b = x - 2.0;
-  const double c = x - 3.0;
-  const std::array<double, 4> weights{
-      -a * b * c / 6.0, x * b * c / 2.0, -x * a * c / 2.0, x * a * b / 6.0};
-  const std::array<double, 4> slopes{-(a * b + a * c + b * c) / 6.0,
-                                     (x * b + x * c + b * c) / 2.0,
-                                     -(x * a + x * c + a * c) / 2.0,
-                                     (x * a + x * b + a * b) / 6.0};
-  for (std::size_t i = 0; i < weights.size(); ++i) {
-    taps.weights[i] = static_cast<float>(weights[i]);
-    taps.slopes[i] = static_cast<float>(slopes[i]);
-  }
-  return taps;
-}
+/// The nodes of a sum along one axis, in the coordinates of a slab's image.
+struct NodesInSlab {
+  double start, step;
+  int count;
+  int slab_nodes;
+};
 
 /// Beyond the image it goes on linearly for a node: the outermost cells of a sum have corners
 /// there.
-SumRow taps_at(double coordinate, int nodes) {
-  const double limited = std::clamp(coordinate, -1.0, static_cast<double>(nodes));
-  if (nodes < kSumTaps || limited < 0.0 || limited > nodes - 1.0)
-    return linear_taps(limited, nodes);
-  return cubic_taps(limited, nodes);
+void place_all_taps(const NodesInSlab& nodes, const SumTaps& taps) {
+  const auto place_linear = [&](int i) {
+    place_linear_taps(
+        nodes.start + nodes.step * i, nodes.slab_nodes, static_cast<std::size_t>(i), taps);
+  };
+  // Kernels load entries beyond the last one.
+  const int padded = nodes.count + static_cast<int>(kBeyond) / 2;
+  if (nodes.slab_nodes < kSumTaps) {
+    for (int i = 0; i < padded; ++i) place_linear(i);
+    return;
+  }
+  select_kernel<PlaceTaps>(kernels_128::place_taps,
+                           kernels_256::place_taps,
+                           kernels_512::place_taps)(static_cast<float>(nodes.start),
+                                                    static_cast<float>(nodes.step),
+                                                    nodes.slab_nodes,
+                                                    padded,
+                                                    taps);
+  const auto is_beyond = [&](int i) {
+    const double at = nodes.start + nodes.step * i;
+    return at < 0.0 || at > nodes.slab_nodes - 1.0;
+  };
+  for (int i = 0; i < nodes.count && is_beyond(i); ++i) place_linear(i);
+  for (int i = nodes.count - 1; i >= 0 && is_beyond(i); --i) place_linear(i);
+}
+
+/// Memory for the taps of `count` columns or rows.
+SumTaps reserve_taps(int count, std::vector<std::int32_t>& first, std::vector<float>& weights) {
+  const std::size_t padded = static_cast<std::size_t>(count) + kBeyond;
+  first.resize(std::max(first.size(), padded));
+  weights.resize(std::max(weights.size(), std::size_t{2} * kSumTaps * padded));
+  SumTaps taps{};
+  taps.first = first.data();
+  for (std::size_t tap = 0; tap < kSumTaps; ++tap) {
+    taps.weights[tap] = weights.data() + tap * padded;
+    taps.slopes[tap] = weights.data() + (kSumTaps + tap) * padded;
+  }
+  return taps;
 }
 
 }  // namespace
-
-void SlabSum::make_columns(const NodeGrid& slab, double reach_ratio, SumColumns& columns) {
-  const auto count = static_cast<std::size_t>(grid_.s_count);
-  const std::size_t padded = count + kBeyond;
-  scratch_.columns.resize(padded);
-  scratch_.column_weights.resize(std::size_t{2} * kSumTaps * padded);
-  columns.first = scratch_.columns.data();
-  for (std::size_t tap = 0; tap < kSumTaps; ++tap) {
-    columns.weights[tap] = scratch_.column_weights.data() + tap * padded;
-    columns.slopes[tap] = scratch_.column_weights.data() + (kSumTaps + tap) * padded;
-  }
-  for (std::size_t i = 0; i < padded; ++i) {
-    const double sum_mm =
-        grid_.s_first_mm + grid_.s_spacing_mm * static_cast<double>(std::min(i, count - 1));
-    const double slab_mm = source_.x() + reach_ratio * (sum_mm - source_.x());
-    const SumRow taps = taps_at((slab_mm - slab.s_first_mm) / slab.s_spacing_mm, slab.s_count);
-    scratch_.columns[i] = taps.first;
-    for (std::size_t tap = 0; tap < kSumTaps; ++tap) {
-      scratch_.column_weights[tap * padded + i] = taps.weights[tap];
-      scratch_.column_weights[(kSumTaps + tap) * padded + i] = taps.slopes[tap];
-    }
-  }
-}
-
-void SlabSum::make_rows(const NodeGrid& slab, double reach_ratio) {
-  scratch_.rows.clear();
-  for (int i = 0; i < grid_.t_count; ++i) {
-    const double sum_mm = grid_.t_first_mm + grid_.t_spacing_mm * i;
-    const double slab_mm = source_.z() + reach_ratio * (sum_mm - source_.z());
-    scratch_.rows.push_back(taps_at((slab_mm - slab.t_first_mm) / slab.t_spacing_mm, slab.t_count));
-  }
-}
 
 void SlabSum::add(const NodeImages& slab) {
   const auto add_slab =
@@ -99,9 +87,23 @@ void SlabSum::add(const NodeImages& slab) {
   SlabTerm term{};
   term.stride = slab.grid.stride;
   term.columns = slab.grid.s_count;
-  make_columns(slab.grid, reach_ratio, term.s);
-  make_rows(slab.grid, reach_ratio);
-  term.t = scratch_.rows.data();
+  // A node p of the sum is seen at source + reach_ratio (p - source) on the slab's plane.
+  term.s = reserve_taps(grid_.s_count, scratch_.first[0], scratch_.weights[0]);
+  place_all_taps(
+      {(source_.x() + reach_ratio * (grid_.s_first_mm - source_.x()) - slab.grid.s_first_mm) /
+           slab.grid.s_spacing_mm,
+       reach_ratio * grid_.s_spacing_mm / slab.grid.s_spacing_mm,
+       grid_.s_count,
+       slab.grid.s_count},
+      term.s);
+  term.t = reserve_taps(grid_.t_count, scratch_.first[1], scratch_.weights[1]);
+  place_all_taps(
+      {(source_.z() + reach_ratio * (grid_.t_first_mm - source_.z()) - slab.grid.t_first_mm) /
+           slab.grid.t_spacing_mm,
+       reach_ratio * grid_.t_spacing_mm / slab.grid.t_spacing_mm,
+       grid_.t_count,
+       slab.grid.t_count},
+      term.t);
   term.drift[0] = static_cast<float>((1.0 - reach_ratio) / slab.grid.s_spacing_mm);
   term.drift[1] = static_cast<float>((1.0 - reach_ratio) / slab.grid.t_spacing_mm);
   for (std::size_t i = 0; i < 3; ++i) {

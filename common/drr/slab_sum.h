@@ -27,9 +27,9 @@ struct NodeImages {
 
 /// Scratch memory of a sum.
 struct SlabSumScratch {
-  std::vector<std::int32_t> columns;
-  std::vector<float> column_weights;
-  std::vector<SumRow> rows;
+  /// Of the sum's columns and rows.
+  std::array<std::vector<std::int32_t>, 2> first;
+  std::array<std::vector<float>, 2> weights;
   std::array<std::vector<float>, 3> row_images;
 };
 
@@ -54,9 +54,6 @@ class SlabSum {
   [[nodiscard]] NodeImages images() const { return {grid_, {images_[0], images_[1], images_[2]}}; }
 
  private:
-  void make_columns(const NodeGrid& slab, double reach_ratio, SumColumns& columns);
-  void make_rows(const NodeGrid& slab, double reach_ratio);
-
   NodeGrid grid_;
   Eigen::Vector3d source_;
   std::array<float*, 3> images_;

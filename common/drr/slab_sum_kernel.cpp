@@ -20,57 +20,74 @@ AF_NATIVE_INLINE Ints load_ints(const int32_t* from) {
   return vector;
 }
 
-/// Sum of an image's rows by their weights, kLanes columns from c on.
+/// Sum of an image's rows by the weights of row r, kLanes columns from c on.
 AF_NATIVE_INLINE Floats weighted_rows(const float* image,
                                       int64_t stride,
-                                      const float (&weights)[kSumTaps],
+                                      const float* const (&weights)[kSumTaps],
+                                      int32_t r,
                                       int32_t c) {
   Floats sum = splat(0.0f);
-  for (int tap = 0; tap < kSumTaps; ++tap) sum += weights[tap] * load(image + tap * stride + c);
+  for (int tap = 0; tap < kSumTaps; ++tap) sum += weights[tap][r] * load(image + tap * stride + c);
   return sum;
 }
 
-/// The slab's images at one row of the sum.
+/// The slab's images at row r of the sum.
 template <bool kWithSlopes>
-AF_NATIVE_INLINE void make_rows(const SlabTerm& term, const SumRow& row) {
+AF_NATIVE_INLINE void make_rows(const SlabTerm& term, int32_t r) {
+  const float* const weights[kSumTaps] = {
+      term.t.weights[0], term.t.weights[1], term.t.weights[2], term.t.weights[3]};
+  const float* const slopes[kSumTaps] = {
+      term.t.slopes[0], term.t.slopes[1], term.t.slopes[2], term.t.slopes[3]};
   const int64_t stride = term.stride;
-  const float* const value = term.images[0] + row.first * stride;
+  const int64_t first = term.t.first[r] * stride;
   for (int32_t c = 0; c < term.columns; c += kLanes) {
-    store(term.rows[0] + c, weighted_rows(value, stride, row.weights, c));
+    const float* const value = term.images[0] + first;
+    store(term.rows[0] + c, weighted_rows(value, stride, weights, r, c));
     if (!kWithSlopes) continue;
-    const float* const x = term.images[1] + row.first * stride;
-    const float* const z = term.images[2] + row.first * stride;
-    store(term.rows[1] + c, weighted_rows(x, stride, row.weights, c));
+    store(term.rows[1] + c, weighted_rows(term.images[1] + first, stride, weights, r, c));
     store(term.rows[2] + c,
-          weighted_rows(z, stride, row.weights, c) +
-              term.drift[1] * weighted_rows(value, stride, row.slopes, c));
+          weighted_rows(term.images[2] + first, stride, weights, r, c) +
+              term.drift[1] * weighted_rows(value, stride, slopes, r, c));
   }
 }
 
-/// A row's values that a tap takes for kLanes columns of the sum.
-class Taps {
+/// Values of a row that taps take for kLanes columns of the sum.
+class Window {
  public:
-  AF_NATIVE_INLINE Taps make(const int32_t* first) {
-    Taps taps;
-    taps.base = first[0];
-    taps.lane = load_ints(first) - first[0];
+  AF_NATIVE_INLINE Window of(const int32_t* first) {
+    Window window;
+    window.base = first[0];
+    window.lane = load_ints(first) - first[0];
     // Ascending, so that the last one is furthest.
-    taps.fit = first[kLanes - 1] - first[0] < 2 * kLanes;
-    return taps;
+    window.fits = first[kLanes - 1] - first[0] + kSumTaps <= 2 * kLanes;
+    return window;
   }
-  AF_NATIVE_INLINE Floats take(const Taps& taps, const float* row, int tap) {
-    const float* from = row + taps.base + tap;
+  AF_NATIVE_INLINE void take(const Window& window, const float* row, Floats (&values)[kSumTaps]) {
+    const float* const from = row + window.base;
 #if AF_VECTOR_BITS >= 256
-    if (taps.fit) return native::pick(load(from), load(from + kLanes), taps.lane);
+    if (window.fits) {
+      const Floats low = load(from);
+      const Floats high = load(from + kLanes);
+      for (int tap = 0; tap < kSumTaps; ++tap)
+        values[tap] = native::pick(low, high, window.lane + tap);
+      return;
+    }
 #endif
-    return native::gather(from, taps.lane);
+    for (int tap = 0; tap < kSumTaps; ++tap) values[tap] = native::gather(from + tap, window.lane);
   }
 
  private:
   int32_t base;
   Ints lane;
-  bool fit;
+  bool fits;
 };
+
+AF_NATIVE_INLINE Floats weighted(const Floats (&weights)[kSumTaps],
+                                 const Floats (&values)[kSumTaps]) {
+  Floats sum = splat(0.0f);
+  for (int tap = 0; tap < kSumTaps; ++tap) sum += weights[tap] * values[tap];
+  return sum;
+}
 
 AF_NATIVE_INLINE void put(const SlabTerm& term, int image, int64_t at, Floats value) {
   float* to = term.sum[image] + at;
@@ -82,31 +99,53 @@ AF_NATIVE_INLINE void add(const SlabTerm& given) {
   // A copy that no store can change.
   const SlabTerm term = given;
   for (int32_t r = 0; r < term.sum_rows; ++r) {
-    make_rows<kWithSlopes>(term, term.t[r]);
+    make_rows<kWithSlopes>(term, r);
     const int64_t row = static_cast<int64_t>(r) * term.sum_stride;
     for (int32_t c = 0; c < term.sum_columns; c += kLanes) {
-      const Taps taps = Taps::make(term.s.first + c);
-      Floats value = splat(0.0f);
-      Floats x = splat(0.0f);
-      Floats z = splat(0.0f);
-      for (int tap = 0; tap < kSumTaps; ++tap) {
-        const Floats weight = load(term.s.weights[tap] + c);
-        const Floats of_row = Taps::take(taps, term.rows[0], tap);
-        value += weight * of_row;
-        if (!kWithSlopes) continue;
-        x += weight * Taps::take(taps, term.rows[1], tap) +
-             term.drift[0] * load(term.s.slopes[tap] + c) * of_row;
-        z += weight * Taps::take(taps, term.rows[2], tap);
-      }
-      put(term, 0, row + c, value);
+      const Window window = Window::of(term.s.first + c);
+      Floats weights[kSumTaps];
+      Floats values[kSumTaps];
+      for (int tap = 0; tap < kSumTaps; ++tap) weights[tap] = load(term.s.weights[tap] + c);
+      Window::take(window, term.rows[0], values);
+      put(term, 0, row + c, weighted(weights, values));
       if (!kWithSlopes) continue;
+      Floats slopes[kSumTaps];
+      for (int tap = 0; tap < kSumTaps; ++tap) slopes[tap] = load(term.s.slopes[tap] + c);
+      Floats x = term.drift[0] * weighted(slopes, values);
+      Window::take(window, term.rows[1], values);
+      x += weighted(weights, values);
       put(term, 1, row + c, x);
-      put(term, 2, row + c, z);
+      Window::take(window, term.rows[2], values);
+      put(term, 2, row + c, weighted(weights, values));
     }
   }
 }
 
 }  // namespace
+
+void place_taps(float start, float step, int32_t nodes, int32_t count, const SumTaps& taps) {
+  const Floats last = splat(static_cast<float>(nodes - 1));
+  for (int32_t i = 0; i < count; i += kLanes) {
+    const Floats number = native::to_float(native::lane_numbers() + i);
+    const Floats at = native::minimum(native::maximum(start + step * number, splat(0.0f)), last);
+    const Ints lower =
+        native::minimum(native::maximum(native::to_int(at) - 1, splat(0)), splat(nodes - kSumTaps));
+    store(taps.first + i, lower);
+    const Floats x = at - native::to_float(lower);
+    const Floats a = x - 1.0f;
+    const Floats b = x - 2.0f;
+    const Floats c = x - 3.0f;
+    constexpr float kSixth = 1.0f / 6.0f;
+    store(taps.weights[0] + i, -kSixth * (a * b * c));
+    store(taps.weights[1] + i, 0.5f * (x * b * c));
+    store(taps.weights[2] + i, -0.5f * (x * a * c));
+    store(taps.weights[3] + i, kSixth * (x * a * b));
+    store(taps.slopes[0] + i, -kSixth * (a * b + a * c + b * c));
+    store(taps.slopes[1] + i, 0.5f * (x * b + x * c + b * c));
+    store(taps.slopes[2] + i, -0.5f * (x * a + x * c + a * c));
+    store(taps.slopes[3] + i, kSixth * (x * a + x * b + a * b));
+  }
+}
 
 void add_slab(const SlabTerm& term) {
   if (term.images[1] == nullptr)

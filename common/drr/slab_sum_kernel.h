@@ -8,19 +8,18 @@ namespace af {
 /// Nodes that an interpolation takes along one axis.
 inline constexpr int kSumTaps = 4;
 
-/// Where each column of the sum lies in a slab's image, ascending; all arrays readable for 16
-/// entries beyond the last column.
-struct SumColumns {
-  const int32_t* first;  ///< column of the slab's image that the first tap takes
-  const float* weights[kSumTaps];
-  const float* slopes[kSumTaps];  ///< their derivatives, per column of the slab's image
+/// Where each column or row of the sum lies in a slab's image, ascending; all arrays readable for
+/// 48 entries beyond the last one.
+struct SumTaps {
+  int32_t* first;            ///< column or row of the slab's image that the first tap takes
+  float* weights[kSumTaps];  ///< Lagrange's polynomial through the four nodes around
+  float* slopes[kSumTaps];   ///< their derivatives, per column or row of the slab's image
 };
 
-struct SumRow {
-  int32_t first;
-  float weights[kSumTaps];
-  float slopes[kSumTaps];
-};
+/// Fills `count` entries, at start + i step (limited to the image) in a slab's image of at least
+/// kSumTaps columns or rows.
+using PlaceTaps =
+    void (*)(float start, float step, int32_t nodes, int32_t count, const SumTaps& taps);
 
 /// One slab that is added to a sum: images of the value and, when wanted, of its slopes along the
 /// source's x and z. Images are readable for 32 values beyond the columns that taps take.
@@ -28,8 +27,7 @@ struct SlabTerm {
   const float* images[3];  ///< of the slab; [1] and [2] null: not wanted
   int32_t stride;
   int32_t columns;
-  SumColumns s;
-  const SumRow* t;
+  SumTaps s, t;
   /// Slopes of the value per node along s and t, times these, belong to the slopes along the
   /// source's x and z: as the source moves and a node of the sum stays, the place in the slab's
   /// image where it is seen moves.
@@ -44,9 +42,10 @@ struct SlabTerm {
 
 using AddSlab = void (*)(const SlabTerm& term);
 
-#define AF_DECLARE_KERNELS(space)      \
-  namespace space {                    \
-  void add_slab(const SlabTerm& term); \
+#define AF_DECLARE_KERNELS(space)                                                              \
+  namespace space {                                                                            \
+  void place_taps(float start, float step, int32_t nodes, int32_t count, const SumTaps& taps); \
+  void add_slab(const SlabTerm& term);                                                         \
   }
 AF_DECLARE_KERNELS(kernels_128)
 AF_DECLARE_KERNELS(kernels_256)

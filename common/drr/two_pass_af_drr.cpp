@@ -137,7 +137,7 @@ NodeImages blended_images(const ViewpointBlender& blender,
                           const BlendNeeds& needs,
                           Workspace& workspace) {
   const Footprint footprint = blender.footprint(k, rays, needs.margin);
-  const std::ptrdiff_t stride = rounded_up(footprint.s().count, 16);
+  const std::ptrdiff_t stride = rounded_up(footprint.s().count + 15, 16);
   BlendedImages images;
   images.stride = stride;
   images.value = workspace.blended[0].reserve(stride, footprint.t().count);

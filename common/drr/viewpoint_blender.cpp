@@ -89,15 +89,15 @@ NodeRange overlap(const NodeRange& a, const NodeRange& b) {
   return {begin, std::max(0, std::min(a.end(), b.end()) - begin)};
 }
 
-/// The nodes of an image that a blender fills.
-struct StoredNodes {
+/// A rectangle of nodes, such as those of an image that a blender fills.
+struct NodeRectangle {
   NodeRange s;
   NodeRange t;
 };
 
 /// Zeroes the nodes of the footprint's box that are not stored.
 void clear_unstored(const Footprint& footprint,
-                    const StoredNodes& stored,
+                    const NodeRectangle& stored,
                     float* image,
                     std::ptrdiff_t stride) {
   const int s_count = footprint.s().count;
@@ -124,7 +124,7 @@ class AnyBlender : public ViewpointBlender {
              BlendScratch& scratch,
              const BlendedImages& images) const final {
     const SlabGeometry& slab = this->slab(k);
-    const StoredNodes stored = stored_nodes(slab, footprint);
+    const NodeRectangle stored = stored_nodes(slab, footprint);
     if (stored.s.count > 0 && stored.t.count > 0) {
       const double ratio =
           (coverage().uv_plane_y_mm - rays.source.y()) / (slab.st_plane_y_mm - rays.source.y());
@@ -141,11 +141,11 @@ class AnyBlender : public ViewpointBlender {
 
  protected:
   /// The nodes that the footprint and the field share.
-  [[nodiscard]] virtual StoredNodes stored_nodes(const SlabGeometry& slab,
-                                                 const Footprint& footprint) const = 0;
+  [[nodiscard]] virtual NodeRectangle stored_nodes(const SlabGeometry& slab,
+                                                   const Footprint& footprint) const = 0;
   virtual void blend_stored(std::size_t k,
                             const Footprint& footprint,
-                            const StoredNodes& stored,
+                            const NodeRectangle& stored,
                             BlendScratch& scratch,
                             const BlendedImages& images) const = 0;
 
@@ -194,8 +194,8 @@ class CompressedBlender final : public AnyBlender {
   }
 
  private:
-  [[nodiscard]] StoredNodes stored_nodes(const SlabGeometry& slab,
-                                         const Footprint& footprint) const override {
+  [[nodiscard]] NodeRectangle stored_nodes(const SlabGeometry& slab,
+                                           const Footprint& footprint) const override {
     const NodeRange s{slab.stored_s.begin, 2 * slab.stored_s.tiles()};
     const NodeRange t{slab.stored_t.begin, 2 * slab.stored_t.tiles()};
     return {overlap(s, footprint.s()), overlap(t, footprint.t())};
@@ -261,7 +261,7 @@ class CompressedBlender final : public AnyBlender {
 
   void blend_stored(std::size_t k,
                     const Footprint& footprint,
-                    const StoredNodes& stored,
+                    const NodeRectangle& stored,
                     BlendScratch& scratch,
                     const BlendedImages& images) const override {
     const SlabGeometry& slab = this->slab(k);
@@ -320,77 +320,91 @@ class LevelBlender final : public AnyBlender {
   }
 
  private:
-  [[nodiscard]] StoredNodes stored_nodes(const SlabGeometry& slab,
-                                         const Footprint& footprint) const override {
+  [[nodiscard]] NodeRectangle stored_nodes(const SlabGeometry& slab,
+                                           const Footprint& footprint) const override {
     return {overlap(slab.stored_s, footprint.s()), overlap(slab.stored_t, footprint.t())};
   }
 
   void blend_stored(std::size_t k,
                     const Footprint& footprint,
-                    const StoredNodes& stored,
+                    const NodeRectangle& stored,
                     BlendScratch& scratch,
                     const BlendedImages& images) const override {
     const FieldLevelSlab& slab = level_->slabs[k];
     const auto blend_samples = select_kernel<BlendSamples>(
         kernels_128::blend_samples, kernels_256::blend_samples, kernels_512::blend_samples);
-    // One row of weights and one of slopes per tap, readable for a vector beyond their ends.
-    const std::size_t row_length = scratch.u_taps.size() + kFieldLevelPadding;
-    const auto taps = static_cast<std::size_t>(tap_count());
-    scratch.run_weights.resize(2 * taps * row_length);
-    for (std::size_t i = 0; i < scratch.u_taps.size(); ++i)
-      for (std::size_t tap = 0; tap < taps; ++tap) {
-        float* weight = scratch.run_weights.data() + 2 * tap * row_length + i;
-        weight[0] = level_->quantizer_step * scratch.u_taps[i].weights[tap];
-        weight[row_length] = level_->quantizer_step * scratch.u_taps[i].slopes[tap];
-      }
-    for (int t = stored.t.begin; t < stored.t.end(); ++t) {
-      const NodeRange needed = overlap(footprint.s_needed({t, 1}), stored.s);
-      // Runs of nodes that lie between the same viewpoints.
+    make_u_weights(scratch);
+    const auto viewpoint_of = [](const std::vector<ViewpointTap>& taps, int node) {
+      return taps[static_cast<std::size_t>(node)].first;
+    };
+    // Blocks of nodes that lie between the same viewpoints. Those of a row go from left to right:
+    // each writes beyond its right edge.
+    const NodeRange &s = stored.s, &t = stored.t;
+    for (int t_begin = t.begin, t_end = t_begin; t_begin < t.end(); t_begin = t_end) {
+      const int v = viewpoint_of(scratch.v_taps, t_begin - t.begin);
+      while (t_end < t.end() && viewpoint_of(scratch.v_taps, t_end - t.begin) == v) ++t_end;
+      const NodeRange rows{t_begin, t_end - t_begin};
+      const NodeRange needed = overlap(footprint.s_needed(rows), s);
       for (int begin = needed.begin, end = begin; begin < needed.end(); begin = end) {
-        const auto tap_of = [&](int s) -> const ViewpointTap& {
-          return scratch.u_taps[static_cast<std::size_t>(s - stored.s.begin)];
-        };
-        while (end < needed.end() && tap_of(end).first == tap_of(begin).first) ++end;
-        blend_samples(run_of(slab,
-                             scratch,
-                             row_length,
-                             stored,
-                             {begin, end - begin},
-                             t,
-                             at_node(images, footprint, begin, t)));
+        const int u = viewpoint_of(scratch.u_taps, begin - s.begin);
+        while (end < needed.end() && viewpoint_of(scratch.u_taps, end - s.begin) == u) ++end;
+        blend_samples(block_of(slab,
+                               scratch,
+                               stored,
+                               {{begin, end - begin}, rows},
+                               at_node(images, footprint, begin, t_begin)));
       }
     }
   }
 
-  [[nodiscard]] SampleRun run_of(const FieldLevelSlab& slab,
-                                 const BlendScratch& scratch,
-                                 std::size_t row_length,
-                                 const StoredNodes& stored,
-                                 const NodeRange& s,
-                                 int t,
-                                 const BlendedImages& images) const {
-    const auto first_tap = static_cast<std::size_t>(s.begin - stored.s.begin);
-    const ViewpointTap& v = scratch.v_taps[static_cast<std::size_t>(t - stored.t.begin)];
-    SampleRun run{};
-    run.v_stride = static_cast<std::int64_t>(slab.samples_per_viewpoint());
-    run.u_stride = run.v_stride * level_->coverage.v.nodes;
-    run.samples =
-        slab.samples.data() + scratch.u_taps[first_tap].first * run.u_stride +
-        v.first * run.v_stride +
-        static_cast<std::int64_t>(t - slab.geometry.stored_t.begin) * slab.geometry.stored_s.count +
-        (s.begin - slab.geometry.stored_s.begin);
-    run.taps = tap_count();
-    for (std::size_t tap = 0; tap < static_cast<std::size_t>(run.taps); ++tap) {
-      run.u_weights[tap] = scratch.run_weights.data() + 2 * tap * row_length + first_tap;
-      run.u_slopes[tap] = run.u_weights[tap] + row_length;
-      run.v_weights[tap] = v.weights[tap];
-      run.v_slopes[tap] = v.slopes[tap];
+  /// Numbers of weights of one tap: one per node, readable for a vector beyond their end.
+  static std::size_t weight_count(const BlendScratch& scratch) {
+    return scratch.u_taps.size() + kFieldLevelPadding;
+  }
+
+  /// One row of weights and one of slopes per tap.
+  void make_u_weights(BlendScratch& scratch) const {
+    const std::size_t row_length = weight_count(scratch);
+    const auto taps = static_cast<std::size_t>(tap_count());
+    scratch.u_weights.resize(2 * taps * row_length);
+    for (std::size_t i = 0; i < scratch.u_taps.size(); ++i)
+      for (std::size_t tap = 0; tap < taps; ++tap) {
+        float* weight = scratch.u_weights.data() + 2 * tap * row_length + i;
+        weight[0] = level_->quantizer_step * scratch.u_taps[i].weights[tap];
+        weight[row_length] = level_->quantizer_step * scratch.u_taps[i].slopes[tap];
+      }
+  }
+
+  [[nodiscard]] SampleBlock block_of(const FieldLevelSlab& slab,
+                                     const BlendScratch& scratch,
+                                     const NodeRectangle& stored,
+                                     const NodeRectangle& nodes,
+                                     const BlendedImages& images) const {
+    const auto first_s = static_cast<std::size_t>(nodes.s.begin - stored.s.begin);
+    const auto first_t = static_cast<std::size_t>(nodes.t.begin - stored.t.begin);
+    const SlabGeometry& geometry = slab.geometry;
+    SampleBlock block{};
+    block.t_stride = geometry.stored_s.count;
+    block.v_stride = static_cast<std::int64_t>(slab.samples_per_viewpoint());
+    block.u_stride = block.v_stride * level_->coverage.v.nodes;
+    block.samples = slab.samples.data() + scratch.u_taps[first_s].first * block.u_stride +
+                    scratch.v_taps[first_t].first * block.v_stride +
+                    (nodes.t.begin - geometry.stored_t.begin) * block.t_stride +
+                    (nodes.s.begin - geometry.stored_s.begin);
+    block.taps = tap_count();
+    const std::size_t row_length = weight_count(scratch);
+    for (std::size_t tap = 0; tap < static_cast<std::size_t>(block.taps); ++tap) {
+      block.u_weights[tap] = scratch.u_weights.data() + 2 * tap * row_length + first_s;
+      block.u_slopes[tap] = block.u_weights[tap] + row_length;
     }
-    run.images[0] = images.value;
-    run.images[1] = images.source_x;
-    run.images[2] = images.source_z;
-    run.count = s.count;
-    return run;
+    block.v_taps = scratch.v_taps.data() + first_t;
+    block.images[0] = images.value;
+    block.images[1] = images.source_x;
+    block.images[2] = images.source_z;
+    block.image_stride = images.stride;
+    block.columns = nodes.s.count;
+    block.rows = nodes.t.count;
+    return block;
   }
 
   std::shared_ptr<const FieldLevel> level_;

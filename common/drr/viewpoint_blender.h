@@ -14,24 +14,17 @@ namespace af {
 /// in (u,v), where the field continues linearly beyond its first and last node.
 enum class AxisInterpolation { Linear, Cubic };
 
-/// Where the rays of one (s or t) coordinate through the source meet the viewpoints along one axis.
-struct ViewpointTap {
-  int first;                 ///< viewpoint of weights[0]
-  float weights[kMostTaps];  ///< of first, first + 1, ...
-  float slopes[kMostTaps];   ///< their derivatives with respect to the source, per mm
-};
-
 /// Scratch memory of the first pass; one per thread.
 struct BlendScratch {
   std::vector<ViewpointTap> u_taps;  ///< one per s node
   std::vector<ViewpointTap> v_taps;  ///< one per t node
   std::vector<TileTap> u_tiles, v_tiles;
   std::vector<std::int32_t> u_begin, v_begin;
-  std::vector<float> run_weights;
+  std::vector<float> u_weights;
 };
 
-/// Images of the nodes of a footprint, [t][s] with `stride` values from row to row, each writable
-/// for 32 values beyond its end.
+/// Images of the nodes of a footprint, [t][s] with `stride` values from row to row: at least 15
+/// more than nodes, which are written, too.
 struct BlendedImages {
   float* value = nullptr;
   /// Derivatives with respect to the source's x and z, per mm, as the source moves parallel to the

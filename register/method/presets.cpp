@@ -45,9 +45,7 @@ RegistrationOptions robust_preset() {
                                     "rg cma-es level=2 pixels=8 roi=2 step=8 final=1;"
                                     "rg gauss-newton level=2 pixels=8 roi=2 final=0.2;"
                                     "rg gauss-newton level=2 pixels=4 final=0.1")};
-  options.finish = chain_from_text("finish",
-                                   "rg gauss-newton level=1 pixels=2 step=2 final=0.05;"
-                                   "rg gauss-newton pixels=2 step=2 final=0.02");
+  options.finish = chain_from_text("finish", "rg quasi-newton pixels=2 step=2 final=0.02");
   options.judge.enough_value = kConvincingValue;
   return options;
 }

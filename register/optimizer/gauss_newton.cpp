@@ -5,6 +5,7 @@
 
 #include <Eigen/Cholesky>
 
+#include "register/optimizer/learned_curvature.h"
 #include "register/optimizer/search_run.h"
 
 namespace af::registration {
@@ -18,11 +19,14 @@ constexpr double kDampingFactor = 10.0;
 /// damped as if its curvature were this share of the largest one, so that its steps stay finite.
 constexpr double kLeastCurvatureShare = 1e-6;
 
-ScaledParameters damped_step(const TargetValue& at, double damping, double longest_mm) {
+ScaledParameters damped_step(const TargetValue& at,
+                             const LearnedCurvature& learned,
+                             double damping,
+                             double longest_mm) {
   const double least = kLeastCurvatureShare * at.matrix.diagonal().maxCoeff();
   ScaledMatrix matrix = at.matrix;
   matrix.diagonal() += damping * at.matrix.diagonal().cwiseMax(least);
-  ScaledParameters step = matrix.ldlt().solve(at.gradient);
+  ScaledParameters step = learned.added_to(matrix).ldlt().solve(at.gradient);
   if (!step.allFinite()) step = at.gradient;
   const double length = step.norm();
   return length > longest_mm ? ScaledParameters(step * (longest_mm / length)) : step;
@@ -37,28 +41,35 @@ void GaussNewton::maximize(OptimizationTarget& target,
   SearchRun run(target, budget, result);
   std::optional<TargetValue> at = run.begin(needs());
   if (!at) return;
+  LearnedCurvature learned;
   double damping = kFirstDamping;
   bool met_limit = false;
   for (;;) {
-    const ScaledParameters point = run.stepped(damped_step(*at, damping, options.initial_step_mm));
-    const double length = (point - result.point).norm();
-    const SearchRun::Evaluation next = run.evaluate(point, needs());
+    const ScaledParameters point =
+        run.stepped(damped_step(*at, learned, damping, options.initial_step_mm));
+    const ScaledParameters step = point - result.point;
+    // No step follows the last one: it needs no derivatives.
+    const bool is_last = step.norm() < options.final_step_mm;
+    const SearchRun::Evaluation next = run.evaluate(point, is_last ? Derivatives::None : needs());
     if (next.outcome == SearchRun::Outcome::Ended) {
-      run.trace(length);
+      run.trace(step.norm());
       return;
     }
     const bool is_inadmissible = next.outcome == SearchRun::Outcome::Inadmissible;
     if (!is_inadmissible && next.target.value > result.value) {
       run.accept(point, next.target.value);
+      if (curvature_ == Curvature::Learned && !is_last) learned.learn(step, *at, next.target);
       at = next.target;
       damping = std::max(damping / kDampingFactor, kLeastDamping);
       met_limit = false;
     } else {
-      damping *= kDampingFactor;
+      // First without what was learned: it may have made the step too long.
+      if (learned.is_empty()) damping *= kDampingFactor;
+      learned.clear();
       met_limit = is_inadmissible;
     }
-    run.trace(length);
-    if (length < options.final_step_mm) {
+    run.trace(step.norm());
+    if (is_last) {
       run.converge(met_limit);
       return;
     }

@@ -27,6 +27,10 @@ template <typename Search>
 OptimizerPointer make_search() {
   return std::make_unique<Search>();
 }
+template <GaussNewton::Curvature curvature>
+OptimizerPointer make_gauss_newton() {
+  return std::make_unique<GaussNewton>(curvature);
+}
 template <NloptAlgorithm algorithm>
 OptimizerPointer make_nlopt() {
   return std::make_unique<NloptSearch>(algorithm);
@@ -36,7 +40,12 @@ OptimizerPointer make_nlopt() {
 constexpr std::array kOptimizers = {
     KnownOptimizer{
         "best-neighbor", "the paper's: best of 12 neighbours", make_search<BestNeighborSearch>},
-    KnownOptimizer{"gauss-newton", "steps from normal equations", make_search<GaussNewton>},
+    KnownOptimizer{"gauss-newton",
+                   "steps from normal equations",
+                   make_gauss_newton<GaussNewton::Curvature::NormalEquations>},
+    KnownOptimizer{"quasi-newton",
+                   "gauss-newton that learns missing curvature from its steps",
+                   make_gauss_newton<GaussNewton::Curvature::Learned>},
     KnownOptimizer{"gradient", "steps along the gradient", make_search<GradientAscent>},
     KnownOptimizer{
         "bobyqa", "quadratic models in a trust region", make_nlopt<NloptAlgorithm::Bobyqa>},

@@ -136,9 +136,10 @@ TEST(Optimizer, AnUnknownNameIsRefusedWithTheKnownOnes) {
     make_optimizer("newton");
     FAIL() << "must throw";
   } catch (const InputError& error) {
-    EXPECT_STREQ(error.what(),
-                 "optimizer = 'newton': must be one of best-neighbor, gauss-newton, gradient, "
-                 "bobyqa, nelder-mead, cma-es");
+    EXPECT_STREQ(
+        error.what(),
+        "optimizer = 'newton': must be one of best-neighbor, gauss-newton, quasi-newton, gradient, "
+        "bobyqa, nelder-mead, cma-es");
   }
 }
 

@@ -134,6 +134,51 @@ TEST(GaussNewton, EndsAQuadraticInAFewSteps) {
   EXPECT_LT((result.point - quadratic_optimum()).norm(), kFinalStepMm);
 }
 
+TEST(QuasiNewton, LearnsMissingCurvature) {
+  // Normal equations that overstate the curvature twofold: every plain step goes half of the way,
+  // so that 6.6 mm take seven of them after the three that are limited to 2 mm.
+  const ScaledMatrix matrix = curvature(4.0);
+  const auto overstated = [&] {
+    return test::FunctionTarget(
+        [=](const ScaledParameters& p) -> std::optional<double> {
+          return -0.5 * (p - quadratic_optimum()).dot(matrix * (p - quadratic_optimum()));
+        },
+        [=](const ScaledParameters& p) {
+          return TargetValue{0.0, matrix * (quadratic_optimum() - p), 2.0 * matrix};
+        });
+  };
+  test::FunctionTarget plain = overstated();
+  const OptimizerResult by_gauss_newton = search("gauss-newton", plain);
+  test::FunctionTarget learned = overstated();
+  const OptimizerResult by_quasi_newton = search("quasi-newton", learned);
+  EXPECT_GE(by_gauss_newton.evaluations, 10);
+  EXPECT_LE(by_quasi_newton.evaluations, by_gauss_newton.evaluations - 3);
+  EXPECT_LT((by_quasi_newton.point - quadratic_optimum()).norm(), 0.1 * kFinalStepMm);
+}
+
+TEST(QuasiNewton, ForgetsWhatMadeAStepTooLong) {
+  // The curvature vanishes and comes back tenfold: what the first steps teach misleads.
+  const auto value = [](double x) {
+    return x < 2.0 ? 0.05 * x : 0.1 - 5.0 * (x - 2.0) * (x - 2.0);
+  };
+  const auto slope = [](double x) { return x < 2.0 ? 0.05 : -10.0 * (x - 2.0); };
+  ScaledMatrix matrix = ScaledMatrix::Identity();
+  matrix(0, 0) = 0.1;
+  test::FunctionTarget target(
+      [=](const ScaledParameters& p) -> std::optional<double> {
+        return value(p[0]) - 0.5 * p.tail<5>().squaredNorm();
+      },
+      [=](const ScaledParameters& p) {
+        TargetValue at;
+        at.gradient << slope(p[0]), -p.tail<5>();
+        at.matrix = matrix;
+        return at;
+      });
+  const OptimizerResult result = search("quasi-newton", target);
+  EXPECT_EQ(result.stop_reason, StopReason::StepBelowFinal);
+  EXPECT_NEAR(result.point[0], 2.0, 0.1);
+}
+
 TEST(GradientAscent, FindsAnIllConditionedMaximum) {
   test::FunctionTarget target = quadratic(1000.0);
   const OptimizerResult result = search("gradient", target);
