@@ -54,7 +54,7 @@ std::string field_look_up_help() {
 
 RendererPointer make_field_renderer(FieldPointer field,
                                     const std::string& look_up,
-                                    PoolPointer pool) {
+                                    const PoolPointer& pool) {
   return required_row(kLookUps, "look-up", look_up).make(std::move(field), pool);
 }
 

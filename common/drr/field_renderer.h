@@ -20,6 +20,6 @@ std::string field_look_up_help();
 std::shared_ptr<const DrrRenderer> make_field_renderer(
     std::shared_ptr<const CompressedAttenuationField> field,
     const std::string& look_up,
-    std::shared_ptr<ThreadPool> pool = nullptr);
+    const std::shared_ptr<ThreadPool>& pool = nullptr);
 
 }  // namespace af

@@ -51,36 +51,32 @@ AF_NATIVE_INLINE void make_rows(const SlabTerm& term, int32_t r) {
   }
 }
 
-/// Values of a row that taps take for kLanes columns of the sum.
-class Window {
- public:
-  AF_NATIVE_INLINE Window of(const int32_t* first) {
-    Window window;
-    window.base = first[0];
-    window.lane = load_ints(first) - first[0];
-    // Ascending, so that the last one is furthest.
-    window.fits = first[kLanes - 1] - first[0] + kSumTaps <= 2 * kLanes;
-    return window;
-  }
-  AF_NATIVE_INLINE void take(const Window& window, const float* row, Floats (&values)[kSumTaps]) {
-    const float* const from = row + window.base;
-#if AF_VECTOR_BITS >= 256
-    if (window.fits) {
-      const Floats low = load(from);
-      const Floats high = load(from + kLanes);
-      for (int tap = 0; tap < kSumTaps; ++tap)
-        values[tap] = native::pick(low, high, window.lane + tap);
-      return;
-    }
-#endif
-    for (int tap = 0; tap < kSumTaps; ++tap) values[tap] = native::gather(from + tap, window.lane);
-  }
-
- private:
+/// Where taps find their values for kLanes columns of the sum.
+struct Window {
   int32_t base;
   Ints lane;
-  bool fits;
+  bool fits;  ///< two vectors from `base` on hold all of them
 };
+
+AF_NATIVE_INLINE Window window_of(const int32_t* first) {
+  // Ascending, so that the last one is furthest.
+  return {
+      first[0], load_ints(first) - first[0], first[kLanes - 1] - first[0] + kSumTaps <= 2 * kLanes};
+}
+
+AF_NATIVE_INLINE void take(const Window& window, const float* row, Floats (&values)[kSumTaps]) {
+  const float* const from = row + window.base;
+#if AF_VECTOR_BITS >= 256
+  if (window.fits) {
+    const Floats low = load(from);
+    const Floats high = load(from + kLanes);
+    for (int tap = 0; tap < kSumTaps; ++tap)
+      values[tap] = native::pick(low, high, window.lane + tap);
+    return;
+  }
+#endif
+  for (int tap = 0; tap < kSumTaps; ++tap) values[tap] = native::gather(from + tap, window.lane);
+}
 
 AF_NATIVE_INLINE Floats weighted(const Floats (&weights)[kSumTaps],
                                  const Floats (&values)[kSumTaps]) {
@@ -102,20 +98,20 @@ AF_NATIVE_INLINE void add(const SlabTerm& given) {
     make_rows<kWithSlopes>(term, r);
     const int64_t row = static_cast<int64_t>(r) * term.sum_stride;
     for (int32_t c = 0; c < term.sum_columns; c += kLanes) {
-      const Window window = Window::of(term.s.first + c);
+      const Window window = window_of(term.s.first + c);
       Floats weights[kSumTaps];
       Floats values[kSumTaps];
       for (int tap = 0; tap < kSumTaps; ++tap) weights[tap] = load(term.s.weights[tap] + c);
-      Window::take(window, term.rows[0], values);
+      take(window, term.rows[0], values);
       put(term, 0, row + c, weighted(weights, values));
       if (!kWithSlopes) continue;
       Floats slopes[kSumTaps];
       for (int tap = 0; tap < kSumTaps; ++tap) slopes[tap] = load(term.s.slopes[tap] + c);
       Floats x = term.drift[0] * weighted(slopes, values);
-      Window::take(window, term.rows[1], values);
+      take(window, term.rows[1], values);
       x += weighted(weights, values);
       put(term, 1, row + c, x);
-      Window::take(window, term.rows[2], values);
+      take(window, term.rows[2], values);
       put(term, 2, row + c, weighted(weights, values));
     }
   }
