@@ -24,7 +24,7 @@ RegistrationOptions fast_preset() {
                                    "ncc gauss-newton level=2 pixels=8 roi=2 step=10;"
                                    "gc gauss-newton level=2 pixels=8 roi=2 final=0.2;"
                                    "gc gauss-newton level=2 pixels=4 final=0.1;"
-                                   "gc gauss-newton level=1 pixels=2 step=2 final=0.02"));
+                                   "gc quasi-newton level=1 pixels=2 step=2 final=0.02"));
 }
 
 /// The end of a chain convinces when it explains this share of the X-rays' gradients: where X-rays
