@@ -6,11 +6,12 @@
 namespace af {
 
 void inform(const Communicator& communicator, const std::string& message) {
-  if (communicator.is_root()) std::cerr << message << '\n';
+  // In one piece: mpirun forwards pieces as they come, with those of other ranks between.
+  if (communicator.is_root()) std::cerr << message + "\n";
 }
 
 void warn(const Communicator& communicator, const std::string& message) {
-  if (communicator.is_root()) std::cerr << "warning: " << message << '\n';
+  inform(communicator, "warning: " + message);
 }
 
 }  // namespace af

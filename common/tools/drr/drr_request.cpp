@@ -16,6 +16,7 @@
 #include "image_files/image_file.h"
 #include "study/pose_file.h"
 #include "study/rig_file.h"
+#include "study/study_file.h"
 #include "text/csv_table.h"
 
 namespace af::tools {
@@ -28,8 +29,13 @@ void describe_source(Fields& field, DrrOptions& options) {
         "another");
   field("ct", options.ct, "Cast rays through this CT (DICOM folder, NIfTI, MetaImage, NRRD)");
   field.part(options.ct_reading);
+  field("study",
+        options.study,
+        "study.toml in place of --ct and --rig: rays are cast through the case's CT, and poses are "
+        "relative to its nominal pose");
+  field("study_case", options.study_case, "Case of the study [the only one]").as("case");
   field("rig", options.rig, "Rig file, or c-arm-12in, or treatment-room");
-  field("camera", options.camera, "Camera of the rig");
+  field("camera", options.camera, "Camera of the rig or study");
   field("look_up",
         options.look_up,
         "How DRRs are looked up [the field's own way]. " + field_look_up_help())
@@ -91,15 +97,25 @@ bool is_known_format(const std::filesystem::path& path) {
 
 void append_source_problems(const DrrOptions& options, std::vector<std::string>& found) {
   const bool has_field = !options.field.empty();
-  const bool has_ct = !options.ct.empty();
+  const bool has_study = !options.study.empty();
+  const bool has_ct = !options.ct.empty() || has_study;
+  if (has_study && !(options.ct.empty() && options.rig.empty()))
+    found.emplace_back("--study = set: stands for --ct and --rig; leave these out");
+  if (has_study && options.camera.empty()) found.emplace_back("--study = set: needs --camera");
+  if (!has_study && !options.study_case.empty())
+    found.push_back("--case = " + options.study_case + ": applies to --study only");
   if (options.compare && !(has_field && has_ct))
-    found.emplace_back("--compare = set: needs both --field and --ct");
+    found.emplace_back("--compare = set: needs --field, and --ct or --study");
   if (!options.compare && has_field == has_ct)
-    found.emplace_back("source = " + std::string(has_field ? "--field and --ct" : "none") +
-                       ": give --field, or --ct with --rig and --camera (both only for --compare)");
-  if (!has_field && has_ct && (options.rig.empty() || options.camera.empty()))
+    found.push_back("source = " + std::string(has_field ? "--field and " : "none") +
+                    (!has_field  ? ""
+                     : has_study ? "--study"
+                                 : "--ct") +
+                    ": give --field, or --ct with --rig and --camera, or --study with --camera "
+                    "(two only for --compare)");
+  if (!has_field && !options.ct.empty() && (options.rig.empty() || options.camera.empty()))
     found.emplace_back("--ct = set: needs --rig and --camera");
-  if (options.rig.empty() != options.camera.empty())
+  if (!has_study && options.rig.empty() != options.camera.empty())
     found.emplace_back("--rig, --camera = only one of them: give both");
   if (!has_field && !options.look_up.empty())
     found.push_back("--look-up = " + options.look_up + ": applies to fields only; give --field");
@@ -143,17 +159,32 @@ struct CastCt {
   Eigen::Vector3d center_ct_mm;
 };
 
+DrrSource source_of(const DrrOptions& options) {
+  if (!options.study.empty()) {
+    const Study study = read_study(options.study);
+    const StudyCase& study_case = study.find_case(options.study_case);
+    return {study_case.ct,
+            study.rig.camera(options.camera),
+            study_case.frame(),
+            study.rig.isocenter_point};
+  }
+  if (options.rig.empty()) return {options.ct, {}, {}, {}};
+  const CameraRig rig = read_rig(options.rig);
+  return {options.ct, rig.camera(options.camera), {}, rig.isocenter_point};
+}
+
 CastCt ray_caster(const DrrOptions& options,
+                  const std::filesystem::path& path,
                   const CompressedAttenuationField* field,
                   const std::shared_ptr<ThreadPool>& pool) {
-  const CtVolume ct = read_ct(options.ct, options.ct_reading);
+  const CtVolume ct = read_ct(path, options.ct_reading);
   AttenuationModel model = options.attenuation;
   if (field != nullptr) {
     const std::string hash = ct_content_sha256(ct);
     if (hash != field->identity.ct_content_sha256)
       throw FileError(options.field.string(),
                       "CT of the field (ct_content_sha256)",
-                      hash + " (" + options.ct.string() + ")",
+                      hash + " (" + path.string() + ")",
                       field->identity.ct_content_sha256);
     // --compare compares ways to render, so the reference takes the field's HU model.
     model = {field->identity.mu_water_per_mm, field->identity.air_below_hu};
@@ -198,15 +229,16 @@ DrrScene load_scene(const DrrOptions& options, const Communicator& communicator)
     scene.renderer = make_field_renderer(
         field, options.look_up.empty() ? info.look_up : options.look_up, scene.pool);
   }
-  if (!options.rig.empty()) {
-    const CameraRig rig = read_rig(options.rig);
-    scene.view = View::whole_detector(rig.camera(options.camera));
-    if (!field) scene.frame.center_room_mm = rig.isocenter_point;
-  }
-  if (!options.ct.empty()) {
-    const CastCt cast = ray_caster(options, field.get(), scene.pool);
+  const DrrSource source = source_of(options);
+  if (source.camera.has_value()) scene.view = View::whole_detector(*source.camera);
+  if (source.frame.has_value())
+    scene.frame = *source.frame;
+  else if (!field)
+    scene.frame.center_room_mm = source.isocenter_point;
+  if (!source.ct.empty()) {
+    const CastCt cast = ray_caster(options, source.ct, field.get(), scene.pool);
     (field ? scene.reference : scene.renderer) = cast.renderer;
-    if (!field) scene.frame.center_ct_mm = cast.center_ct_mm;
+    if (!field && !source.frame.has_value()) scene.frame.center_ct_mm = cast.center_ct_mm;
   }
   return scene;
 }

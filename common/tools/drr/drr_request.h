@@ -21,6 +21,8 @@ struct DrrOptions {
   std::filesystem::path field;
   std::filesystem::path ct;
   CtReadOptions ct_reading;
+  std::filesystem::path study;  ///< instead of ct and rig
+  std::string study_case;       ///< empty: the only one
   std::string rig;
   std::string camera;
   std::optional<std::array<double, 3>> rotation_deg;
@@ -41,6 +43,14 @@ struct DrrOptions {
 
 /// All impossible values and combinations of options; empty when the options are sound.
 std::vector<std::string> problems(const DrrOptions& options);
+
+/// What DRRs are made of and for which camera.
+struct DrrSource {
+  std::filesystem::path ct;              ///< empty: none
+  std::optional<CameraGeometry> camera;  ///< none: the field's
+  std::optional<PoseFrame> frame;        ///< none: the field's, or of the CT's centre
+  Eigen::Vector3d isocenter_point = Eigen::Vector3d::Zero();
+};
 
 /// What renders, for which camera, and what pose parameters are relative to.
 struct DrrScene {

@@ -39,13 +39,16 @@ ordered_json camera_json(const CameraGeometry& camera, const Eigen::Vector3d& is
   return json;
 }
 
-ordered_json rig_json(const CameraRig& rig) {
+using AreUsedTogether = std::function<bool(const std::string& camera, const std::string& other)>;
+
+ordered_json rig_json(const CameraRig& rig, const AreUsedTogether& are_used_together) {
   ordered_json json;
   json["isocenter_point_mm"] = vector_json(rig.isocenter_point);
   for (const CameraGeometry& camera : rig.cameras)
     json["cameras"].push_back(camera_json(camera, rig.isocenter_point));
   for (std::size_t a = 0; a < rig.cameras.size(); ++a)
     for (std::size_t b = a + 1; b < rig.cameras.size(); ++b) {
+      if (!are_used_together(rig.cameras[a].name, rig.cameras[b].name)) continue;
       const double cosine = rig.cameras[a].beam_direction().dot(rig.cameras[b].beam_direction());
       json["angles_between_beams_deg"].push_back(
           {{"cameras", {rig.cameras[a].name, rig.cameras[b].name}},
@@ -54,11 +57,25 @@ ordered_json rig_json(const CameraRig& rig) {
   return json;
 }
 
+/// Whether any case has X-rays of both cameras.
+bool have_common_case(const Study& study, const std::string& camera, const std::string& other) {
+  const auto has = [](const StudyCase& study_case, const std::string& name) {
+    return std::any_of(study_case.views.begin(),
+                       study_case.views.end(),
+                       [&](const StudyView& view) { return view.camera == name; });
+  };
+  return std::any_of(study.cases.begin(), study.cases.end(), [&](const StudyCase& study_case) {
+    return has(study_case, camera) && has(study_case, other);
+  });
+}
+
 void require_existing(const fs::path& path) {
   if (!fs::exists(path)) throw FileError(path.string(), "does not exist");
 }
 
-ordered_json view_json(const StudyView& view, const CameraRig& rig) {
+ordered_json view_json(const StudyView& view,
+                       const CameraRig& rig,
+                       std::vector<std::string>& warnings) {
   ordered_json json;
   json["camera"] = view.camera;
   json["xray"] = view.xray.string();
@@ -70,11 +87,17 @@ ordered_json view_json(const StudyView& view, const CameraRig& rig) {
   used_from(view.places, "mask", [&] { (void)read_mask(view, camera); });
   if (!view.field) return json;
   json["field"] = view.field->string();
-  used_from(view.places, "field", [&] { require_existing(*view.field); });
+  // A study is written before its fields are made.
+  if (!fs::exists(*view.field))
+    warnings.push_back("field " + view.field->string() +
+                       " does not exist yet; af-precompute --study ... --camera " + view.camera +
+                       " -o makes it");
   return json;
 }
 
-ordered_json case_json(const StudyCase& study_case, const CameraRig& rig) {
+ordered_json case_json(const StudyCase& study_case,
+                       const CameraRig& rig,
+                       std::vector<std::string>& warnings) {
   ordered_json json;
   json["name"] = study_case.name;
   json["ct"] = study_case.ct.string();
@@ -84,7 +107,8 @@ ordered_json case_json(const StudyCase& study_case, const CameraRig& rig) {
                               vector_json(study_case.target_box_ct.high_mm)};
   json["fiducials"] = study_case.fiducials_ct_mm.size();
   json["has_gold_pose"] = study_case.gold_room_from_ct.has_value();
-  for (const StudyView& view : study_case.views) json["views"].push_back(view_json(view, rig));
+  for (const StudyView& view : study_case.views)
+    json["views"].push_back(view_json(view, rig, warnings));
   return json;
 }
 
@@ -160,15 +184,18 @@ ordered_json vector_json(const Eigen::Ref<const Eigen::VectorXd>& vector) {
 
 void inspect_rig(const std::string& name_or_path, Inspection& inspection) {
   inspection.kind = "rig";
-  inspection.facts = rig_json(read_rig(name_or_path, &inspection.warnings));
+  inspection.facts = rig_json(read_rig(name_or_path, &inspection.warnings),
+                              [](const auto& /*camera*/, const auto& /*other*/) { return true; });
 }
 
 void inspect_study(const fs::path& path, Inspection& inspection) {
   inspection.kind = "study";
   const Study study = read_study(path, &inspection.warnings);
-  inspection.facts["rig"] = rig_json(study.rig);
+  inspection.facts["rig"] = rig_json(study.rig, [&](const auto& camera, const auto& other) {
+    return have_common_case(study, camera, other);
+  });
   for (const StudyCase& study_case : study.cases)
-    inspection.facts["cases"].push_back(case_json(study_case, study.rig));
+    inspection.facts["cases"].push_back(case_json(study_case, study.rig, inspection.warnings));
 }
 
 void inspect_pose(const fs::path& path, Inspection& inspection) {
