@@ -81,6 +81,23 @@ double distance_mm(const test::SmallCase& small, const RigidTransform& a, const 
   return mean_tre_mm(a, b, small.problem->target_points_ct);
 }
 
+struct PlainAndBetter {
+  RegistrationResult plain;
+  RegistrationResult better;
+};
+
+/// Without and with a correction, which must end better by ray casting.
+PlainAndBetter plain_and_better(const test::SmallCase& small, const RegistrationOptions& options) {
+  const RegistrationResult plain =
+      RegistrationRunner(small.problem, options).run(start_near_gold(small));
+  const RegistrationResult better =
+      RegistrationRunner(small.problem, corrected(options)).run(start_near_gold(small));
+  RegistrationRunner by_ray_casting(test::small_case().problem, options);
+  EXPECT_GT(by_ray_casting.similarity_at(better.room_from_ct).similarity,
+            by_ray_casting.similarity_at(plain.room_from_ct).similarity);
+  return {plain, better};
+}
+
 /// X-rays are this ray caster's DRRs at the gold pose: that is its optimum for every measure.
 /// Gauss-Newton ends within a final step of 0.02 mm of it along each of six directions, which a
 /// motion along one view's beam, seen by the other alone, doubles.
@@ -93,13 +110,7 @@ TEST(Correction, OfAnImageThatStaysEndsBetterByEveryMeasureAndWhereRayCastingDoe
     const bool has_squares = similarity_has_normal_equations(similarity);
     RegistrationOptions options =
         one_stage(similarity, has_squares ? "gauss-newton" : "best-neighbor");
-    const RegistrationResult plain =
-        RegistrationRunner(small.problem, options).run(start_near_gold(small));
-    const RegistrationResult better =
-        RegistrationRunner(small.problem, corrected(options)).run(start_near_gold(small));
-    RegistrationRunner by_ray_casting(test::small_case().problem, options);
-    EXPECT_GT(by_ray_casting.similarity_at(better.room_from_ct).similarity,
-              by_ray_casting.similarity_at(plain.room_from_ct).similarity);
+    const auto [plain, better] = plain_and_better(small, options);
     if (has_squares) {
       EXPECT_LT(distance_mm(small, better.room_from_ct, small.gold_room_from_ct),
                 kGaussNewtonErrorMm);
@@ -126,13 +137,7 @@ TEST(Correction, IsOfAnyOptimiserAndTheSearchThatItDoesByRayCasting) {
     const bool has_derivatives = make_optimizer(optimizer)->needs() != Derivatives::None;
     if (!has_derivatives) options.chains.front().stages.front().search.final_step_mm = 0.1;
     options.correction.max_casts = 1000;
-    const RegistrationResult plain =
-        RegistrationRunner(small.problem, options).run(start_near_gold(small));
-    const RegistrationResult better =
-        RegistrationRunner(small.problem, corrected(options)).run(start_near_gold(small));
-    RegistrationRunner by_ray_casting(test::small_case().problem, options);
-    EXPECT_GT(by_ray_casting.similarity_at(better.room_from_ct).similarity,
-              by_ray_casting.similarity_at(plain.room_from_ct).similarity);
+    const auto [plain, better] = plain_and_better(small, options);
     EXPECT_TRUE(better.correction->stood_still);
     // Derivatives spare casts.
     if (has_derivatives) {
