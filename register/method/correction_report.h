@@ -10,16 +10,12 @@ namespace af::registration {
 struct CorrectionReport {
   static constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
-  int casts = 0;                 ///< DRRs per view; 0: the search before had not converged
-  double moved_mm = kNone;       ///< end from the end of look-up, mean over the target box
-  double last_mm = kNone;        ///< likewise, by the last cast alone
-  double defect_rms = kNone;     ///< of the last ray-cast DRRs less looked-up ones, all views
-  double defect_change = kNone;  ///< rms of the last defect less the one before, over defect_rms
-  bool stood_still = false;      ///< last_mm is within the tolerance
+  int casts = 0;             ///< DRRs per view; 0: the search before had not converged
+  double moved_mm = kNone;   ///< end from the end of look-up, mean over the target box
+  double last_mm = kNone;    ///< likewise, by the last step alone
+  bool stood_still = false;  ///< the last step was within the tolerance, or the search's final step
 
-  auto members() {
-    return std::tie(casts, moved_mm, last_mm, defect_rms, defect_change, stood_still);
-  }
+  auto members() { return std::tie(casts, moved_mm, last_mm, stood_still); }
 };
 
 }  // namespace af::registration

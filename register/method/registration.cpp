@@ -10,6 +10,7 @@
 #include "base/error.h"
 #include "base/hash_random.h"
 #include "gold_standard/tre.h"
+#include "register/optimizer/newton_search.h"
 #include "register/problem/parameter_scaling.h"
 #include "register/problem/pose_target.h"
 #include "register/problem/stage_view.h"
@@ -130,12 +131,24 @@ std::shared_ptr<const DrrRenderer> ray_cast_of(const RegistrationView& view, int
   return at < view.ray_casts.size() ? view.ray_casts[at] : nullptr;
 }
 
-std::vector<std::shared_ptr<const DrrRenderer>> ray_casts_of(const RegistrationProblem& problem,
-                                                             int level) {
-  std::vector<std::shared_ptr<const DrrRenderer>> ray_casts;
-  for (const RegistrationView& view : problem.views) ray_casts.push_back(ray_cast_of(view, level));
-  return ray_casts;
+bool is_cast(const RegistrationProblem& problem, int level) {
+  return std::all_of(problem.views.begin(), problem.views.end(), [&](const RegistrationView& view) {
+    return ray_cast_of(view, level) != nullptr;
+  });
 }
+
+/// A stage with ray casting in place of look-up, inside the fields' ranges all the same.
+MultiViewObjective ray_cast_objective(const RegistrationProblem& problem,
+                                      const PreparedStage& stage) {
+  std::vector<ObjectiveView> views = stage.objective.views();
+  for (std::size_t i = 0; i < views.size(); ++i)
+    views[i].renderer = ray_cast_of(problem.views[i], stage.options.level);
+  return MultiViewObjective(std::move(views), stage.objective.pool());
+}
+
+/// Differences over this many mm to both sides average over a field's nodes, yet are small beside
+/// the way over which curvatures change.
+constexpr double kCurvatureStepMm = 0.2;
 
 /// What the problem lacks that a correction needs.
 std::vector<std::string> correction_problems(const RegistrationProblem& problem,
@@ -170,6 +183,10 @@ struct RegistrationRunner::Impl {
                                       const std::vector<ValueRange>& drr_ranges) const;
   [[nodiscard]] std::optional<ParameterScaling> scaling_at(
       const RigidTransform& room_from_ct, std::span<const Eigen::Vector3d> points_ct) const;
+  /// What a stage that begins at a pose is searched with.
+  [[nodiscard]] std::optional<ParameterScaling> scaling_of(
+      const PreparedStage& stage, const RigidTransform& room_from_ct) const;
+  [[nodiscard]] std::uint64_t random_key(std::int64_t start_index, std::size_t index) const;
   /// Runs the stages of a chain, the first of which is `first`, from `end`; false when one of them
   /// was the last that makes sense.
   bool run_chain(const ChainOptions& chain,
@@ -192,13 +209,11 @@ struct RegistrationRunner::Impl {
   }
   /// The correction, from an end that converged.
   void correct(std::int64_t start_index, ChainEnd& end, RegistrationResult& result);
-  /// One round of it: false when it cannot go on.
-  bool correct_once(StageDefect& defect,
-                    DefectSlopes slopes,
-                    std::size_t index,
-                    std::int64_t start_index,
-                    ChainEnd& end,
-                    RegistrationResult& result);
+  /// Searches the end's last stage with ray-cast DRRs, into `search`; the pose that it found.
+  RigidTransform search_by_casting(const ParameterScaling& scaling,
+                                   const SearchBudget& budget,
+                                   const ChainEnd& end,
+                                   RegistrationResult& result);
   ObjectiveValue judged(const RigidTransform& room_from_ct);
   /// NaN when inadmissible; counted in `result`.
   double judged(const RigidTransform& room_from_ct, RegistrationResult& result);
@@ -238,6 +253,19 @@ std::optional<ParameterScaling> RegistrationRunner::Impl::scaling_at(
       room_from_ct, problem->center_ct_mm, points_ct, views, problem->isocenter_point);
 }
 
+std::optional<ParameterScaling> RegistrationRunner::Impl::scaling_of(
+    const PreparedStage& stage, const RigidTransform& room_from_ct) const {
+  return stage.optimizer->needs() == Derivatives::None
+             ? scaling_at(room_from_ct, problem->scaling_points_ct)
+             : at_start;
+}
+
+std::uint64_t RegistrationRunner::Impl::random_key(std::int64_t start_index,
+                                                   std::size_t index) const {
+  return hash64(
+      options.seed, hash_name(problem->case_name), static_cast<std::uint64_t>(start_index), index);
+}
+
 void RegistrationRunner::Impl::append_trace(std::size_t index,
                                             const PoseTarget& target,
                                             RegistrationResult& result) const {
@@ -255,10 +283,7 @@ bool RegistrationRunner::Impl::run_stage(PreparedStage& stage,
                                          std::int64_t start_index,
                                          ChainEnd& end,
                                          RegistrationResult& result) {
-  const std::optional<ParameterScaling> scaling =
-      stage.optimizer->needs() == Derivatives::None
-          ? scaling_at(end.room_from_ct, problem->scaling_points_ct)
-          : at_start;
+  const std::optional<ParameterScaling> scaling = scaling_of(stage, end.room_from_ct);
   if (!scaling.has_value()) {
     end.stop_reason = StopReason::CtOutsideRoi;
     return false;
@@ -266,10 +291,7 @@ bool RegistrationRunner::Impl::run_stage(PreparedStage& stage,
   PoseTarget target(
       stage.objective, PoseFrame::about(end.room_from_ct, problem->center_ct_mm), *scaling);
   const SearchBudget budget{options.max_evaluations - result.evaluations,
-                            hash64(options.seed,
-                                   hash_name(problem->case_name),
-                                   static_cast<std::uint64_t>(start_index),
-                                   index)};
+                            random_key(start_index, index)};
   stage.optimizer->maximize(target, stage.options.search, budget, search);
   append_trace(index, target, result);
   result.evaluations += search.evaluations;
@@ -301,50 +323,70 @@ bool RegistrationRunner::Impl::run_chain(const ChainOptions& chain,
   return true;
 }
 
-bool RegistrationRunner::Impl::correct_once(StageDefect& defect,
-                                            DefectSlopes slopes,
-                                            std::size_t index,
-                                            std::int64_t start_index,
-                                            ChainEnd& end,
-                                            RegistrationResult& result) {
-  CorrectionReport& report = *result.correction;
-  if (!defect.measure(end.room_from_ct, slopes)) return false;
-  ++report.casts;
-  report.defect_rms = defect.rms();
-  report.defect_change = defect.change();
-  result.drr_count += 2 * static_cast<std::int64_t>(views.size());  // cast and looked up
-  const PreparedStage& last = stages[end.stage];
-  PreparedStage corrected{
-      last.options, last.optimizer, MultiViewObjective(defect.corrected_views(), pool)};
-  const RigidTransform before = end.room_from_ct;
-  const bool goes_on = run_stage(corrected, index, start_index, end, result);
-  // The end was on the very limit, and rounding put it beyond.
-  if (end.stop_reason == StopReason::StartInadmissible) end.stop_reason = StopReason::PinnedAtLimit;
-  report.last_mm = mean_tre_mm(before, end.room_from_ct, problem->target_points_ct);
-  return goes_on;
+RigidTransform RegistrationRunner::Impl::search_by_casting(const ParameterScaling& scaling,
+                                                           const SearchBudget& budget,
+                                                           const ChainEnd& end,
+                                                           RegistrationResult& result) {
+  PreparedStage& last = stages[end.stage];
+  const Derivatives needs = last.optimizer->needs();
+  MultiViewObjective casting = ray_cast_objective(*problem, last);
+  const PoseFrame frame = PoseFrame::about(end.room_from_ct, problem->center_ct_mm);
+  PoseTarget cast(casting, frame, scaling);
+  if (needs == Derivatives::None) {
+    OptimizerOptions final_step = last.options.search;
+    final_step.initial_step_mm = final_step.final_step_mm;
+    last.optimizer->maximize(cast, final_step, budget, search);
+  } else {
+    PoseTarget looked_up(last.objective, frame, scaling);
+    const ScaledMatrix curvature = measured_curvature(looked_up, needs, kCurvatureStepMm);
+    const auto length_mm = [&](const ScaledParameters& from, const ScaledParameters& to) {
+      return mean_tre_mm(cast.pose(from), cast.pose(to), problem->target_points_ct);
+    };
+    newton_search(
+        cast,
+        curvature,
+        {needs, last.options.search.initial_step_mm, options.correction.tolerance_mm, length_mm},
+        budget,
+        search);
+    result.drr_count += looked_up.drr_count();
+  }
+  append_trace(stages.size(), cast, result);
+  result.evaluations += search.evaluations;
+  result.inadmissible += search.inadmissible;
+  result.drr_count += cast.drr_count();
+  return cast.pose(search.point);
 }
 
 void RegistrationRunner::Impl::correct(std::int64_t start_index,
                                        ChainEnd& end,
                                        RegistrationResult& result) {
-  const CorrectionOptions& wanted = options.correction;
-  if (!wanted.is_wanted) return;
+  if (!options.correction.is_wanted) return;
   CorrectionReport& report = result.correction.emplace();
-  if (!is_converged(end.stop_reason)) return;
-  const auto ray_casts = ray_casts_of(*problem, stages[end.stage].options.level);
-  // A chain that ended early, at the limit.
-  if (std::count(ray_casts.begin(), ray_casts.end(), nullptr) > 0) return;
-  const RigidTransform looked_up = end.room_from_ct;
-  StageDefect defect(
-      stages[end.stage].objective.views(), ray_casts, looked_up * problem->center_ct_mm);
-  while (report.casts < wanted.max_casts && !report.stood_still) {
-    const DefectSlopes slopes = wanted.slopes_of_cast(report.casts);
-    const std::size_t index = stages.size() + static_cast<std::size_t>(report.casts);
-    if (!correct_once(defect, slopes, index, start_index, end, result)) break;
-    // A pose that stands still for want of slopes may yet move.
-    report.stood_still = report.last_mm <= wanted.tolerance_mm && slopes == DefectSlopes::Taken;
-  }
-  report.moved_mm = mean_tre_mm(looked_up, end.room_from_ct, problem->target_points_ct);
+  // A chain that ended early, at the limit, may have ended at a level that is not cast.
+  if (!is_converged(end.stop_reason) || !is_cast(*problem, stages[end.stage].options.level)) return;
+  const auto scaling = scaling_of(stages[end.stage], end.room_from_ct);
+  if (!scaling.has_value()) return;
+  const SearchBudget budget{
+      std::min(options.correction.max_casts, options.max_evaluations - result.evaluations),
+      random_key(start_index, stages.size())};
+  const RigidTransform found = search_by_casting(*scaling, budget, end, result);
+  report.casts = search.evaluations;
+  report.moved_mm = 0.0;
+  report.last_mm = 0.0;
+  // The value is look-up's, as that of ends that are not corrected; and the fields hold the pose.
+  const ObjectiveValue value = stages[end.stage].objective.evaluate(found);
+  result.drr_count += value.drr_count;
+  if (!std::isfinite(search.value) || !value.is_admissible) return;
+  const RigidTransform before_last =
+      search.trace.size() > 1
+          ? pose_from_parameters(problem->frame(), result.trace.end()[-2].parameters)
+          : end.room_from_ct;
+  report.moved_mm = mean_tre_mm(end.room_from_ct, found, problem->target_points_ct);
+  report.last_mm = mean_tre_mm(before_last, found, problem->target_points_ct);
+  report.stood_still = is_converged(search.stop_reason);
+  if (search.stop_reason == StopReason::PinnedAtLimit) end.stop_reason = StopReason::PinnedAtLimit;
+  end.room_from_ct = found;
+  end.similarity = value.similarity;
 }
 
 ObjectiveValue RegistrationRunner::Impl::judged(const RigidTransform& room_from_ct) {

@@ -9,6 +9,7 @@
 
 #include "base/thread_pool.h"
 #include "drr/drr_renderer.h"
+#include "register/method/correction_report.h"
 #include "register/method/presets.h"
 #include "register/method/registration_options.h"
 #include "register/problem/registration_problem.h"
@@ -16,7 +17,7 @@
 namespace af::registration {
 
 struct TraceRow {
-  int pass = 0;  ///< stage, from 0, counted over the chains; after them the rounds of a correction
+  int pass = 0;  ///< stage, from 0, counted over the chains; after them a correction
   double step_mm = 0.0;
   int evaluations = 0;  ///< so far, all stages
   double similarity = 0.0;
@@ -28,9 +29,8 @@ struct TraceRow {
 struct RegistrationResult {
   RigidTransform start_room_from_ct = RigidTransform::Identity();
   RigidTransform room_from_ct = RigidTransform::Identity();
-  double similarity = 0.0;        ///< at the end: of the chain's last stage (corrected, if it was),
-                                  ///< of a portfolio by its judge (mean over views); NaN if it has
-                                  ///< none
+  double similarity = 0.0;        ///< at the end: of the chain's last stage, of a portfolio by its
+                                  ///< judge (mean over views); NaN if it has none
   std::string chain;              ///< the one that the result is from
   int evaluations = 0;            ///< poses tried
   int inadmissible = 0;           ///< of these, outside the field or its motion range

@@ -51,8 +51,6 @@ NamedCells correction_cells(const std::optional<CorrectionReport>& correction) {
   NamedCells cells = {{"correction_casts", std::to_string(report.casts)},
                       {"correction_moved_mm", number_text(report.moved_mm)},
                       {"correction_last_mm", number_text(report.last_mm)},
-                      {"correction_defect_rms", number_text(report.defect_rms)},
-                      {"correction_defect_change", number_text(report.defect_change)},
                       {"correction_stood_still", report.stood_still ? "1" : "0"}};
   if (!correction.has_value())
     for (auto& [name, text] : cells) text.clear();

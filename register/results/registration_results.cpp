@@ -157,8 +157,6 @@ json correction_json(const CorrectionReport& correction) {
   return {{"casts_per_view", correction.casts},
           {"moved_mm", number_or_null(correction.moved_mm)},
           {"last_mm", number_or_null(correction.last_mm)},
-          {"defect_rms", number_or_null(correction.defect_rms)},
-          {"defect_change", number_or_null(correction.defect_change)},
           {"stood_still", correction.stood_still}};
 }
 

@@ -65,7 +65,7 @@ TEST(RegistrationRows, TravelWithEveryBit) {
 TEST(RegistrationRows, OfACorrectionTravelAndHaveColumnsOnlyWhereOneWasWanted) {
   RegistrationRow corrected = row("field", 7, 3.3, 1.0);
   corrected.is_corrected = true;
-  corrected.correction = {2, 0.25, 0.125, 1.0 / 3, std::nan(""), true};
+  corrected.correction = {2, 0.25, std::nan(""), true};
   const RegistrationRow plain = row("raycast", 7, 3.3, 1.0);
   const RegistrationRow received =
       value_of<TracedRow>(bytes_of(TracedRow{corrected, {}}), "journal").row;
@@ -73,18 +73,15 @@ TEST(RegistrationRows, OfACorrectionTravelAndHaveColumnsOnlyWhereOneWasWanted) {
   EXPECT_FALSE(value_of<TracedRow>(bytes_of(TracedRow{plain, {}}), "journal").row.is_corrected);
   const CsvTable table = registrations_table(Rows{received, plain});
   EXPECT_EQ(table.columns().back(), "seconds");
-  const std::vector<std::pair<const char*, const char*>> cells = {
-      {"correction_casts", "2"},
-      {"correction_moved_mm", "0.25"},
-      {"correction_last_mm", "0.125"},
-      {"correction_defect_change", "nan"},
-      {"correction_stood_still", "1"}};
+  const std::vector<std::pair<const char*, const char*>> cells = {{"correction_casts", "2"},
+                                                                  {"correction_moved_mm", "0.25"},
+                                                                  {"correction_last_mm", "nan"},
+                                                                  {"correction_stood_still", "1"}};
   for (const auto& [name, text] : cells) EXPECT_EQ(table.text(0, name), text) << name;
-  EXPECT_EQ(table.number(0, "correction_defect_rms"), 1.0 / 3);
   EXPECT_EQ(table.text(1, "correction_casts"), "");
   EXPECT_EQ(table.text(1, "correction_stood_still"), "");
   const CsvTable without = registrations_table(Rows{plain});
-  EXPECT_EQ(without.columns().size() + 6, table.columns().size());
+  EXPECT_EQ(without.columns().size() + 4, table.columns().size());
 }
 
 TEST(RegistrationRows, TableHasTheContractsColumnsWithTimingsLast) {

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "register/optimizer/newton_search.h"
 #include "register/optimizer/optimizer.h"
 #include "unit/register/optimizer/function_target.h"
 
@@ -208,6 +209,81 @@ TEST(CmaEs, FindsTheHighestOfManyPeaks) {
 
 TEST(Optimizers, RefuseUnknownNames) {
   EXPECT_THROW(make_optimizer("unheard-of"), InputError);
+}
+
+NewtonOptions newton_options() {
+  return {
+      Derivatives::NormalEquations,
+      20.0,
+      kFinalStepMm,
+      [](const ScaledParameters& from, const ScaledParameters& to) { return (to - from).norm(); }};
+}
+
+TEST(NewtonSearch, TakesFewEvaluationsWithACurvatureThatIsNearlyRight) {
+  constexpr double kCondition = 100.0;
+  OptimizerResult exact;
+  test::FunctionTarget target = quadratic(kCondition);
+  newton_search(target, curvature(kCondition), newton_options(), {100, 1}, exact);
+  EXPECT_EQ(exact.evaluations, 2);
+  EXPECT_EQ(exact.stop_reason, StopReason::StepBelowFinal);
+  EXPECT_LT((exact.point - quadratic_optimum()).norm(), 1e-9);
+  // Six corrections of rank one make any curvature of six parameters right.
+  const ScaledMatrix near = 1.3 * curvature(kCondition) + 2.0 * ScaledMatrix::Identity();
+  OptimizerResult learnt;
+  newton_search(target, near, newton_options(), {100, 1}, learnt);
+  EXPECT_LE(learnt.evaluations, 8);
+  EXPECT_LT((learnt.point - quadratic_optimum()).norm(), kFinalStepMm);
+}
+
+TEST(NewtonSearch, TakesTheStepForWhichNoBudgetIsLeft) {
+  test::FunctionTarget target = quadratic(4.0);
+  OptimizerResult result;
+  newton_search(target, curvature(4.0), newton_options(), {1, 1}, result);
+  EXPECT_EQ(result.stop_reason, StopReason::EvaluationBudgetSpent);
+  EXPECT_EQ(result.evaluations, 1);
+  EXPECT_EQ(result.trace.size(), 1u);
+  EXPECT_LT((result.point - quadratic_optimum()).norm(), 1e-9);
+}
+
+TEST(NewtonSearch, TakesShorterStepsWhereValuesFall) {
+  // Steps of a curvature that is a fifth of the true one go too far.
+  test::FunctionTarget target = quadratic(1.0);
+  OptimizerResult result;
+  newton_search(target, 0.2 * curvature(1.0), newton_options(), {100, 1}, result);
+  EXPECT_EQ(result.stop_reason, StopReason::StepBelowFinal);
+  EXPECT_LT((result.point - quadratic_optimum()).norm(), kFinalStepMm);
+  EXPECT_EQ(result.evaluations, 3);
+}
+
+TEST(MeasuredCurvature, IsThatOfAQuadraticAndBendsDownwardsWhereTheTargetDoesNot) {
+  constexpr double kCondition = 100.0;
+  test::FunctionTarget target = quadratic(kCondition);
+  const ScaledMatrix measured = measured_curvature(target, Derivatives::Gradient, 0.2);
+  EXPECT_LT((measured - curvature(kCondition)).norm(), 1e-9 * curvature(kCondition).norm());
+  // The matrix stands for Gauss and Newton's curvature.
+  ScaledMatrix saddle = ScaledMatrix::Identity();
+  saddle(0, 0) = 0.25;
+  saddle(2, 2) = -3.0;
+  saddle(4, 4) = 7.0;
+  test::FunctionTarget bent([](const ScaledParameters&) { return std::optional(0.0); },
+                            [&](const ScaledParameters& p) {
+                              return TargetValue{0.0, -saddle * p, 2.0 * ScaledMatrix::Identity()};
+                            });
+  ScaledMatrix downwards = saddle;
+  downwards(2, 2) = 2.0 * 0.03;
+  downwards(4, 4) = 2.0;
+  EXPECT_LT((measured_curvature(bent, Derivatives::NormalEquations, 0.2) - downwards).norm(), 1e-9);
+  // None is known to optimisers of gradients.
+  test::FunctionTarget only_gradient([](const ScaledParameters&) { return std::optional(0.0); },
+                                     [&](const ScaledParameters& p) {
+                                       return TargetValue{0.0, -saddle * p};
+                                     });
+  downwards(2, 2) = saddle.norm() * 1e-6;
+  downwards(4, 4) = 7.0;
+  EXPECT_LT((measured_curvature(only_gradient, Derivatives::Gradient, 0.2) - downwards).norm(),
+            1e-9);
+  test::FunctionTarget nowhere = quadratic(kCondition, -1.0);
+  EXPECT_EQ(measured_curvature(nowhere, Derivatives::Gradient, 0.2), ScaledMatrix::Identity());
 }
 
 }  // namespace
