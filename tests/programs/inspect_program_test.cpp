@@ -221,6 +221,38 @@ TEST(AfInspect, NamesTheStudysLineOfAFileThatIsGone) {
   EXPECT_THAT(run.output, testing::ContainsRegex("study.toml:[0-9]+: case.0..view.1..xray: "));
 }
 
+TEST(AfInspect, TakesAStudyWhoseFieldsAreStillToBeMade) {
+  const ScratchFolder folder;
+  test::write_small_study(folder.path());
+  Study study = read_study(folder / "study.toml");
+  study.cases[0].views[1].field = folder / "LAT.af.h5";
+  write_text_file(folder / "study.toml", study_to_toml(study, folder.path()));
+  const json entry = inspect_json((folder / "study.toml").string());
+  EXPECT_EQ(entry["ok"], true);
+  ASSERT_EQ(entry["warnings"].size(), 1u);
+  EXPECT_THAT(entry["warnings"][0].get<std::string>(), HasSubstr("LAT.af.h5 does not exist yet"));
+}
+
+TEST(AfInspect, ListsAnglesOfCamerasThatLookAtTheSamePatient) {
+  const ScratchFolder folder;
+  test::write_small_study(folder.path());
+  Study study = read_study(folder / "study.toml");
+  CameraGeometry third = study.rig.cameras[0];
+  third.name = "other";
+  study.rig.cameras.push_back(third);
+  write_text_file(folder / "rig.toml", rig_to_toml(study.rig));
+  StudyCase other = study.cases[0];
+  other.name = "second";
+  other.views.erase(other.views.begin() + 1);
+  other.views[0].camera = "other";
+  study.cases.push_back(other);
+  write_text_file(folder / "study.toml", study_to_toml(study, folder.path()));
+  const json angles =
+      inspect_json((folder / "study.toml").string())["facts"]["rig"]["angles_between_beams_deg"];
+  ASSERT_EQ(angles.size(), 1u);
+  EXPECT_EQ(angles[0]["cameras"], json::array({"AP", "LAT"}));
+}
+
 TEST(AfInspect, PrintsATemplateThatItAccepts) {
   const ScratchFolder folder;
   const test::ProgramRun printed = inspect("--template rig");

@@ -424,6 +424,22 @@ TEST_F(DrrProgram, ComparesFieldAndRayCast) {
   EXPECT_TRUE(fs::exists(path("compare.png")));
 }
 
+TEST_F(DrrProgram, CastsRaysForACaseOfAStudy) {
+  const std::string study = "--study " + path("study.toml") + " --camera AP";
+  const Study read = read_study(path("study.toml"));
+  write_text_file(path("nominal.toml"), pose_to_toml(read.cases[0].nominal_room_from_ct));
+  const std::string ct =
+      "--ct " + path("ct.nii.gz") + " --rig " + path("rig.toml") + " --camera AP";
+  ASSERT_EQ(run_drr(study + " --case ellipsoids -o " + path("case.mha")).exit_code, 0);
+  ASSERT_EQ(run_drr(ct + " --pose " + path("nominal.toml") + " -o " + path("ct.mha")).exit_code, 0);
+  EXPECT_EQ(read_image(path("case.mha")).pixels, read_image(path("ct.mha")).pixels);
+  const std::string out = " -o " + path("refused.mha");
+  expect_refused(run_drr(study + " --case bones" + out), 3, "ellipsoids");
+  expect_refused(run_drr(study + " --ct " + path("ct.nii.gz") + out), 3, "leave these out");
+  expect_refused(run_drr("--study " + path("study.toml") + out), 3, "needs --camera");
+  expect_refused(run_drr(ct + " --case ellipsoids" + out), 3, "applies to --study only");
+}
+
 TEST_F(DrrProgram, RefusesAPoseOutsideTheFieldWithTheRayCount) {
   const test::ProgramRun run = run_drr("--field " + path("AP.af.h5") +
                                        " --translation-mm 0,0,200 -o " + path("outside.mha"));
@@ -440,7 +456,7 @@ TEST_F(DrrProgram, RefusesWhatDoesNotFit) {
   expect_refused(run_drr(ct + out), 3, "needs --rig and --camera");
   expect_refused(run_drr(field + " --interpolation sinc" + out), 2, "nearest");
   expect_refused(run_drr(field + " -o " + path("a.jpg")), 3, "must end in");
-  expect_refused(run_drr(field + " --compare" + out), 3, "needs both");
+  expect_refused(run_drr(field + " --compare" + out), 3, "needs --field, and --ct or --study");
   expect_refused(run_drr(field + " --rotation-deg 1,2" + out), 2, "--rotation-deg");
   expect_refused(run_drr(field + " --pose " + path("absent.toml") + out), 4, "absent.toml");
   expect_refused(run_drr(ct + " --rig treatment-room --camera Z" + out), 3, "A, B");

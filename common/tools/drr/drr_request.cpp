@@ -33,7 +33,7 @@ void describe_source(Fields& field, DrrOptions& options) {
         options.study,
         "study.toml in place of --ct and --rig: rays are cast through the case's CT, and poses are "
         "relative to its nominal pose");
-  field("study_case", options.study_case, "Case of the study [the only one]").as("case");
+  field("study_case", options.study_case, "Case of the study [the only one]").as("--case");
   field("rig", options.rig, "Rig file, or c-arm-12in, or treatment-room");
   field("camera", options.camera, "Camera of the rig or study");
   field("look_up",
