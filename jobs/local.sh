@@ -149,15 +149,15 @@ elif [[ -n "$ct" ]]; then
   # When the CT's file changes, the study starts anew.
   stage_inputs=$(find "$ct" -type f -printf '%P %s %T@\n' | LC_ALL=C sort | sha256sum)
 fi
-field_seconds=40
-[[ "$preset" == quick ]] || field_seconds=60
+field_seconds=12
+[[ "$preset" == quick ]] || field_seconds=20
 plan_stage simulate 5 "Simulate the X-ray pair and its study"
 plan_stage field-A "$(parallel_seconds $field_seconds)" "Precompute the field of camera A"
 plan_stage field-B "$(parallel_seconds $field_seconds)" "Precompute the field of camera B"
 compare_seconds=$(parallel_seconds $((pose_count / 3 + 4)))
 plan_stage image-quality-A "$compare_seconds" "Compare $pose_count DRRs of field A with ray casting"
 plan_stage image-quality-B "$compare_seconds" "Compare $pose_count DRRs of field B with ray casting"
-plan_stage registration "$(parallel_seconds $((8 * starts_per_interval / 3 + 2 * raycast_starts * 60)))" \
+plan_stage registration "$(parallel_seconds $((8 * starts_per_interval / 8 + 2 * raycast_starts * 35)))" \
   "Register $((8 * starts_per_interval)) starts with fields, $((2 * raycast_starts)) of them also by ray casting"
 plan_stage overlay 5 "Register one start and draw its overlays"
 plan_stage report 5 "Write the report"
