@@ -14,7 +14,7 @@ usage() {
 Usage: jobs/rate-against-truth.sh [OPTIONS]
 
 Simulates studies, builds fields of several designs, compares their DRRs with ray casting, and registers from the same
-starts by each field and by ray casting. Writes rate-against-truth.csv, a table (.md) and curves (rate.svg,
+starts by each field and by ray casting. Writes rate-against-truth.csv, tables (.md) and curves (rate.svg,
 distance.svg) of all that is finished in DIR, also by commands with other options. What is finished is kept, so the
 same command continues after a stop; to do a part again, remove its folder or file below fields/, quality/, runs/ or
 lattice/.
@@ -27,7 +27,7 @@ lattice/.
                             names that af-simulate --stress takes, joined by +               [clean,stressed]
   --views LIST              comma separated: 2, 1 (camera A alone)                                      [2,1]
   --design NAME=OPTIONS     a design: options of af-precompute; may be repeated
-                            [the presets paper, standard, compact and fine, and a budget of 2 MB]
+                            [the presets paper, standard, compact and fine, and budgets of 2, 4 and 8 MB]
   --lattice LIST            comma separated: anatomies whose clean pair also tells, for the first two designs, whether
                             poses lean towards nodes (af-evaluate lattice-errors); none: no one    [skull,head]
   --preset NAME             of registration; it should end at level 0                                [robust]
@@ -83,7 +83,7 @@ while (($# > 0)); do
   shift
 done
 ((${#designs[@]} > 0)) || designs=(paper="--preset paper" standard="--preset standard" 2MB="--max-field-size 2MB"
-  compact="--preset compact" fine="--preset fine")
+  4MB="--max-field-size 4MB" 8MB="--max-field-size 8MB" compact="--preset compact" fine="--preset fine")
 IFS=, read -r -a anatomy_list <<<"$anatomies"
 IFS=, read -r -a variant_list <<<"$variants"
 IFS=, read -r -a view_list <<<"$views"
@@ -197,7 +197,7 @@ condition() {
   "$bin/af-evaluate" compare "$output/runs/$name-$count" --pose-distances -o "$output/runs/$name-$count/ends.md" >"$output/logs/compare.log"
 }
 
-# --- table and curves --------------------------------------------------------------------------------------------
+# --- tables and curves --------------------------------------------------------------------------------------------
 
 # json_number FILE REGEX: the number that the parenthesis of an extended regular expression holds, in the file without
 # white space.
@@ -248,31 +248,61 @@ all_rows() {
   done | sort -t, -k3,3nr -k2,2 -k1,1 -k9,9g
 }
 
-# markdown CSV: the rows of each pair of X-rays, a table.
-markdown() {
-  awk -F, '
-    NR == 1 {
-      print "| Anatomy, X-rays | Design | Slabs, (u,v), (s,t), codewords | MB per camera | PSNR, dB | DRR, ms | Registration, ms: field, ray casting |" \
-        " Distance from ray casting'"'"'s end, mm: median (largest) |"
-      print "|---|---|---|---|---|---|---|---|"
-      next
+# table CSV TITLE COLUMN...: for each kind of X-rays a table, a row per design, a column per anatomy; the cells hold the
+# columns.
+table() {
+  local csv=$1 title=$2
+  shift 2
+  awk -F, -v title="$title" -v columns="$*" '
+    NR == 1 { next }
+    {
+      group = $2 ", " ($3 == 2 ? "two views" : "one view")
+      if (!(group in groups)) group_names[++group_count] = group
+      groups[group]
+      if (!(($4) in designs)) design_names[++design_count] = $4
+      designs[$4]
+      if (!(($1) in anatomies)) anatomy_names[++anatomy_count] = $1
+      anatomies[$1]
+      count = split(columns, wanted, " ")
+      cell = ""
+      for (i = 1; i <= count; ++i) cell = cell (i > 1 ? ", " : "") $wanted[i]
+      cells[group, $4, $1] = cell
+      used[group, $4]
     }
-    { printf "| %s, %s, %s | %s | %s, %s, %s, %s | %s | %s | %s | %s, %s | %.3f (%.3f) |\n", $1, $2, $3 == 2 ? "two views" : "one view",
-        $4, $5, $6, $7, $8, $9, $10, $11, $12, $13, $15, $17 }' "$1"
+    END {
+      for (g = 1; g <= group_count; ++g) {
+        header = "| " group_names[g] ": " title " |"
+        line = "|---|"
+        for (a = 1; a <= anatomy_count; ++a) {
+          header = header " " anatomy_names[a] " |"
+          line = line "---|"
+        }
+        print header "\n" line
+        for (d = 1; d <= design_count; ++d) {
+          if (!((group_names[g], design_names[d]) in used)) continue
+          row = "| " design_names[d] " |"
+          for (a = 1; a <= anatomy_count; ++a) row = row " " cells[group_names[g], design_names[d], anatomy_names[a]] " |"
+          print row
+        }
+        print ""
+      }
+    }' "$csv"
 }
 
-# panel CSV COLUMN VARIANT VIEWS TITLE: data and plot command of one panel. Designs that a probe chose for a budget are
-# joined; the fixed ones, paper and standard, are marks. Nothing where there is no such row.
+# panel CSV COLUMN VARIANT VIEWS TITLE: data and plot command of one panel. Designs whose names are budgets, such as 2MB,
+# are joined; others are marks: a square is paper, a diamond standard, a circle any other. Nothing where there is no such
+# row.
 panel() {
   sort -t, -k9,9g "$1" | awk -F, -v column="$2" -v variant="$3" -v count="$4" -v title="$5" -v order="$(cut -d, -f 1 "$1" | sed 1d | sort -u | tr '\n' ' ')" '
     $2 == variant && $3 == count && $column > 0 {
-      kind = $4 == "paper" || $4 == "standard" ? $4 : "budgets"
+      kind = $4 ~ /MB$/ ? "budgets" : $4 == "paper" || $4 == "standard" ? $4 : "other"
       points[$1, kind] = points[$1, kind] $9 " " $column "\n"
     }
     END {
       split("#0072B2 #D55E00 #009E73 #CC79A7 #E69F00 #56B4E9", colors, " ")
       style["budgets"] = "with linespoints lw 2 pt 7 ps 0.5"
       style["standard"] = "with points pt 13 ps 1.7"
+      style["other"] = "with points pt 6 ps 0.9"
       style["paper"] = "with points pt 4 ps 1.2 lw 2"
       anatomies = split(order, names, " ")
       for (i = 1; i <= anatomies; ++i)
@@ -280,7 +310,7 @@ panel() {
           if (!((names[i], kind) in points)) continue
           printf "$%s%d << EOD\n%sEOD\n", kind, i, points[names[i], kind]
           plots = plots (plots == "" ? "" : ", ") sprintf("$%s%d %s lc rgb \"%s\" %s", kind, i, style[kind], colors[(i - 1) % 6 + 1],
-            kind == "budgets" ? "title \"" names[i] "\"" : "notitle")
+            kind == "standard" ? "title \"" names[i] "\"" : "notitle")
         }
       if (plots != "") printf "set title \"%s\"\nplot %s\n", title, plots
     }'
@@ -295,8 +325,9 @@ set border lc rgb "#6B7A8C"
 set grid lc rgb "#D8DEE6"
 set tics textcolor rgb "#6B7A8C"
 set title textcolor rgb "#6B7A8C"
-set key top right textcolor rgb "#6B7A8C" samplen 1
+set key textcolor rgb "#6B7A8C" samplen 1
 set logscale x 2
+set xrange [1:128]
 set xtics (1, 2, 4, 8, 16, 32)
 set xlabel "MB per camera" textcolor rgb "#6B7A8C"
 TEXT
@@ -324,11 +355,18 @@ csv="$output/rate-against-truth.csv"
   echo "anatomy,variant,views,design,slabs,uv_nodes,st_nodes,codewords,mb_per_camera,psnr_db,drr_ms,registration_ms,raycast_ms,starts,median_distance_mm,p95_distance_mm,max_distance_mm"
   all_rows
 } >"$csv"
-markdown "$csv" >"${csv%.csv}.md"
-for variant in clean stressed; do
-  panel "$csv" 10 "$variant" 2 "PSNR, dB, $variant"
-  panel "$csv" 12 "$variant" 2 "registration, ms, $variant, two views"
-done | figure rate 2
+{
+  table "$csv" "MB per camera, dB, mm" 9 10 15
+  table "$csv" "ms of a DRR, of a registration by field, by ray casting" 11 12 13
+} >"${csv%.csv}.md"
+{
+  panel "$csv" 10 clean 2 "PSNR, dB, clean"
+  echo "set logscale y 2"
+  panel "$csv" 11 clean 2 "DRR, ms, clean"
+  for variant in clean stressed; do
+    panel "$csv" 12 "$variant" 2 "registration, ms: $variant, two views"
+  done
+} | figure rate 2
 {
   echo "set logscale y"
   for count in 2 1; do
@@ -337,4 +375,4 @@ done | figure rate 2
     done
   done
 } | figure distance 2
-say "Table: ${csv%.csv}.md, $csv; curves: $output/rate.svg, $output/distance.svg"
+say "Tables: ${csv%.csv}.md, $csv; curves: $output/rate.svg, $output/distance.svg"
