@@ -14,9 +14,9 @@ usage() {
 Usage: jobs/rate-against-truth.sh [OPTIONS]
 
 Simulates studies, builds fields of several designs, compares their DRRs with ray casting, and registers from the same
-starts by each field and by ray casting. Writes rate-against-truth.csv, tables (.md) and curves (rate.svg,
-distance.svg) of all that is finished in DIR, also by commands with other options. What is finished is kept, so the
-same command continues after a stop; to do a part again, remove its folder or file below fields/, quality/, runs/ or
+starts by each field and by ray casting. Writes rate-against-truth.csv, tables (.md) and curves (rate and distance, PNG
+and SVG) of all that is finished in DIR, also by commands with other options. What is finished is kept, so the same
+command continues after a stop; to do a part again, remove its folder or file below fields/, quality/, runs/ or
 lattice/.
 
   --output DIR              where everything goes                                     [./rate-against-truth]
@@ -316,11 +316,14 @@ panel() {
     }'
 }
 
-# figure NAME ROWS: draws panels from the standard input, in rows of two.
+# figure NAME ROWS: draws panels from the standard input, in rows of two, as SVG and PNG.
 figure() {
-  {
-    printf 'set terminal svg size 900,%d font "sans-serif,12"\nset output "%s"\n' $((340 * $2)) "$output/$1.svg"
-    cat <<'TEXT'
+  local panels terminal
+  panels=$(cat)
+  for terminal in svg pngcairo; do
+    cat <<TEXT
+set terminal $terminal size 900,$((340 * $2)) font "sans-serif,12"
+set output "$output/$1.${terminal%cairo}"
 set border lc rgb "#6B7A8C"
 set grid lc rgb "#D8DEE6"
 set tics textcolor rgb "#6B7A8C"
@@ -330,10 +333,12 @@ set logscale x 2
 set xrange [1:128]
 set xtics (1, 2, 4, 8, 16, 32)
 set xlabel "MB per camera" textcolor rgb "#6B7A8C"
+set multiplot layout $2,2
+$panels
+unset multiplot
+reset
 TEXT
-    printf 'set multiplot layout %d,2\n' "$2"
-    cat
-  } >"$output/$1.gnuplot"
+  done >"$output/$1.gnuplot"
   gnuplot -d "$output/$1.gnuplot"
 }
 
@@ -375,4 +380,4 @@ csv="$output/rate-against-truth.csv"
     done
   done
 } | figure distance 2
-say "Tables: ${csv%.csv}.md, $csv; curves: $output/rate.svg, $output/distance.svg"
+say "Tables: ${csv%.csv}.md, $csv; curves: $output/rate.png, $output/distance.png, and SVG"
