@@ -28,8 +28,8 @@ lattice/.
   --views LIST              comma separated: 2, 1 (camera A alone)                                      [2,1]
   --design NAME=OPTIONS     a design: options of af-precompute; may be repeated
                             [the presets paper, standard, compact and fine, and budgets of 2, 4 and 8 MB]
-  --lattice LIST            comma separated: anatomies whose clean pair also tells, for the first two designs, whether
-                            poses lean towards nodes (af-evaluate lattice-errors); none: no one    [skull,head]
+  --lattice LIST            comma separated: anatomies whose clean pair also tells, for the first three designs,
+                            whether poses lean towards nodes (af-evaluate lattice-errors); none: no one    [skull,head]
   --preset NAME             of registration; it should end at level 0                                [robust]
   --starts N                starts, one in each interval of 2 mm from 0                                   [8]
   --poses N                 DRRs of camera A that are compared with ray casting                           [8]
@@ -156,10 +156,10 @@ ct_of() {
   echo "$ct"
 }
 
-# lattice_errors NAME-VARIANT: by the first two designs.
+# lattice_errors NAME-VARIANT: by the first three designs.
 lattice_errors() {
   local name=$1 design
-  for design in "${designs[@]:0:2}"; do
+  for design in "${designs[@]:0:3}"; do
     fields_of "$name" "$design" 2
     stage "lattice $name-${design%%=*}" "$output/lattice/$name-${design%%=*}.md" "$bin/af-evaluate" lattice-errors \
       --study "$output/studies/$name/study.toml" --gold study --preset "$preset" "${field_options[@]}" \
