@@ -10,6 +10,7 @@
 #include "evaluate/report/make_report.h"
 #include "evaluate/sweeps/draw_similarity_curves.h"
 #include "evaluate/sweeps/make_error_budget.h"
+#include "evaluate/sweeps/measure_lattice_errors.h"
 #include "evaluate/sweeps/sweep_field_parameters.h"
 #include "text/shell_words.h"
 
@@ -30,6 +31,8 @@ int main(int argc, char** argv) {
   const CLI::App* compare_command = bind_compare(app, compare);
   af::evaluation::ErrorBudgetOptions error_budget;
   const CLI::App* error_budget_command = bind_error_budget(app, error_budget);
+  af::evaluation::LatticeErrorsOptions lattice_errors;
+  const CLI::App* lattice_errors_command = bind_lattice_errors(app, lattice_errors);
   af::evaluation::JoinStudiesOptions join;
   const CLI::App* join_command = bind_join_studies(app, join);
   af::evaluation::ReportOptions report;
@@ -46,6 +49,7 @@ int main(int argc, char** argv) {
       run_field_parameters(field_parameters, command_line, world);
     if (compare_command->parsed()) run_compare(compare, world);
     if (error_budget_command->parsed()) run_error_budget(error_budget, command_line, world);
+    if (lattice_errors_command->parsed()) run_lattice_errors(lattice_errors, world);
     if (join_command->parsed()) run_join_studies(join, world);
     if (method_command->parsed()) af::evaluation::show_method(method, world);
     if (report_command->parsed()) run_report(report, world);

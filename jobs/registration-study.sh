@@ -6,6 +6,8 @@ set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
 # shellcheck source=stages.sh
 source "$af_root/jobs/stages.sh"
+# shellcheck source=anatomies.sh
+source "$af_root/jobs/anatomies.sh"
 
 usage() {
   cat <<'TEXT'
@@ -97,16 +99,6 @@ while (($# > 0)); do
   shift
 done
 
-# stress_of VARIANT: the value of af-simulate --stress; nothing for clean.
-stress_of() {
-  case "$1" in
-    clean) ;;
-    stressed) echo rods,fiducials,heel,noise,degraded-ct ;;
-    moving) echo rods,fiducials,heel,noise,degraded-ct,motion ;;
-    *) echo "${1//+/,}" ;;
-  esac
-}
-
 # --- stages ------------------------------------------------------------------------------------------------------
 
 bin=$(program_folder)
@@ -134,15 +126,6 @@ mkdir -p "$output/studies" "$output/fields" "$output/starts" "$output/runs" "$ou
 IFS=, read -r -a variant_list <<<"$variants"
 IFS=, read -r -a method_list <<<"$methods"
 IFS=, read -r -a pair_method_list <<<"${pair_methods:-$methods}"
-
-# make_study NAME-VARIANT KIND SOURCE STRESS: a simulated case whose regions have --roi-px, about the detectors' middles.
-make_study() {
-  local name=$1 kind=$2 source=$3 stress=$4 study="$output/studies/$1/study.toml" corner=$(((512 - roi_px) / 2))
-  "$bin/af-simulate" "--$kind" "$source" --case "${name%%-*}" --rig treatment-room --seed "$seed" --no-fiducials \
-    --roi-px "$roi_px" "$roi_px" ${stress:+--stress "$stress"} --force -o "$output/studies/$name" &&
-    # af-simulate lets regions grow until they hold the target box.
-    sed -i "s/^roi_px.*/roi_px = [$corner, $corner, $roi_px, $roi_px]/" "$study"
-}
 
 # method_options METHOD: sets method_options to the options of af-evaluate, and method_text to the chains that they
 # mean.

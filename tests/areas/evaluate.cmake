@@ -9,6 +9,7 @@ af_add_test(
           support/interval_coverage.cpp
           unit/evaluate/registration/registration_errors_test.cpp
           unit/evaluate/sweeps/error_budget_test.cpp
+          unit/evaluate/sweeps/lattice_errors_test.cpp
           unit/evaluate/sweeps/similarity_curve_test.cpp
           unit/evaluate/image_quality/drr_comparison_test.cpp
           unit/evaluate/image_quality/loss_split_test.cpp

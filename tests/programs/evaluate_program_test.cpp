@@ -459,6 +459,30 @@ TEST_F(EvaluateProgram, DrawsSimilarityAboutTheGoldPoseAlikeOnAnyRankCount) {
                  "--curve-step-deg = 0.1");
 }
 
+TEST_F(EvaluateProgram, MeasuresErrorsAgainstFractionsOfACell) {
+  const std::string arguments = "lattice-errors --study " + path("study.toml") + fields();
+  // The last stage sees the X-rays' own pixels, so that its optimum by ray casting is the truth.
+  const test::ProgramRun run = evaluate(
+      arguments + "--chain 'ncc gauss-newton level=1 pixels=2; gc gauss-newton final=0.005'" +
+          " --fractions 2 --renderer both -o " + path("cells.md"),
+      2);
+  ASSERT_EQ(run.exit_code, 0) << run.output;
+  EXPECT_THAT(run.output, HasSubstr("| field | u |"));
+  EXPECT_THAT(run.output, HasSubstr("raycast: 8 of 8 converged"));
+  const CsvTable cells = CsvTable::read(path("cells.csv"));
+  ASSERT_EQ(cells.row_count(), 2u * 8u);
+  // Some last steps of 0.005 mm, on a CT of about 60 mm.
+  constexpr double kConvergedMmOrDeg = 0.05;
+  for (std::size_t row = 8; row < 16; ++row) {
+    EXPECT_EQ(cells.text(row, "renderer"), "raycast");
+    for (const char* name : kParameterNames)
+      EXPECT_LT(std::abs(cells.number(row, std::string("error_") + name)), kConvergedMmOrDeg);
+  }
+  expect_refused(evaluate("lattice-errors --study " + path("study.toml") + " --renderer raycast"),
+                 3,
+                 "must be field or both");
+}
+
 TEST_F(EvaluateProgram, BuildsTheFieldsOfASweepOnceAndReusesThem) {
   const std::string arguments =
       "field-parameters --study " + path("study.toml") +

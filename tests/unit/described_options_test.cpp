@@ -13,6 +13,7 @@
 #include "evaluate/report/make_report.h"
 #include "evaluate/sweeps/draw_similarity_curves.h"
 #include "evaluate/sweeps/make_error_budget.h"
+#include "evaluate/sweeps/measure_lattice_errors.h"
 #include "evaluate/sweeps/sweep_field_parameters.h"
 #include "precompute/plan/precompute_options.h"
 #include "register/register_options.h"
@@ -124,6 +125,7 @@ using AllOptions = testing::Types<PrecomputeOptions,
                                   evaluation::FieldParametersOptions,
                                   evaluation::CompareOptions,
                                   evaluation::ErrorBudgetOptions,
+                                  evaluation::LatticeErrorsOptions,
                                   evaluation::JoinStudiesOptions,
                                   evaluation::ReportOptions,
                                   tools::DrrOptions,

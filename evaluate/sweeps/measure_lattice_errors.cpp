@@ -1,0 +1,230 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluate/sweeps/measure_lattice_errors.h"
+
+#include <algorithm>
+#include <array>
+#include <iostream>
+#include <limits>
+#include <map>
+#include <memory>
+
+#include <CLI/CLI.hpp>
+
+#include "base/error.h"
+#include "base/sample_summary.h"
+#include "base/thread_pool.h"
+#include "cli/bind_options.h"
+#include "drr/drr_renderer.h"
+#include "evaluate/methods/loaded_methods.h"
+#include "evaluate/sweeps/lattice_errors.h"
+#include "field_file/field_file.h"
+#include "files/output_file.h"
+#include "gold_standard/target_box.h"
+#include "gold_standard/tre.h"
+#include "run/progress_printer.h"
+#include "run/terminal.h"
+#include "study/case_gold_standard.h"
+#include "study/shared_inputs.h"
+#include "text/csv_table.h"
+
+namespace af::evaluation {
+namespace {
+
+/// Every start lies so from its true pose, about 1 mm over a target of 60 mm.
+constexpr std::array<double, 6> kStartDegAndMm = {0.3, -0.3, 0.3, 0.6, -0.5, 0.6};
+
+/// The ends of one renderer, in the order of the poses.
+struct LatticeEnds {
+  std::string renderer;
+  std::vector<std::array<double, 6>> errors;  ///< end from truth, deg and mm; NaN: did not converge
+  std::vector<double> distance_mm;            ///< mean over the target box, of those that converged
+};
+
+/// Collective. The cells of the fields of a case.
+std::vector<CellView> cells_of(const Study& study,
+                               const StudyCase& study_case,
+                               const LatticeErrorsOptions& options,
+                               const Communicator& world) {
+  const std::map<std::string, std::filesystem::path> given = options.fields.by_camera();
+  std::vector<CellView> views;
+  for (const StudyView& view : study_case.views) {
+    const auto path = given.find(view.camera);
+    const auto field = read_field(path != given.end() ? path->second : *view.field, world);
+    const LightSlab& planes = field->light_slab;
+    // The (s,t) nodes of several slabs are about equally far apart: their mean.
+    double s_mm = 0.0;
+    double t_mm = 0.0;
+    for (const SlabGeometry& slab : planes.slabs) {
+      s_mm += slab.s.spacing_mm() / static_cast<double>(planes.slabs.size());
+      t_mm += slab.t.spacing_mm() / static_cast<double>(planes.slabs.size());
+    }
+    views.push_back({study.rig.camera(view.camera),
+                     {planes.u.spacing_mm(), planes.v.spacing_mm(), s_mm, t_mm}});
+  }
+  return views;
+}
+
+/// The problem with X-rays that are ray casting's own DRRs at a pose, without masks.
+std::shared_ptr<registration::RegistrationProblem> with_ideal_xrays(
+    const registration::RegistrationProblem& problem,
+    const registration::RegistrationProblem& ray_casting,
+    const RigidTransform& room_from_ct) {
+  auto result = std::make_shared<registration::RegistrationProblem>(problem);
+  for (std::size_t i = 0; i < result->views.size(); ++i) {
+    registration::RegistrationView& view = result->views[i];
+    view.mask = view.mask_without_markers = Image2d();
+    view.xray = render_image(
+        *ray_casting.views[i].renderer, room_from_ct, View::whole_detector(view.view.camera));
+  }
+  return result;
+}
+
+/// The ends from the truth of every pose, by the methods that were asked for.
+std::vector<LatticeEnds> measured_ends(const std::vector<LoadedMethod>& methods,
+                                       const LatticeErrorsOptions& options,
+                                       const RigidTransform& gold_room_from_ct,
+                                       const StudyCase& study_case,
+                                       const std::vector<LatticePose>& poses) {
+  const PoseFrame gold_frame = PoseFrame::about(gold_room_from_ct, study_case.center_ct_mm);
+  const std::vector<Eigen::Vector3d> points = target_points(study_case.target_box_ct);
+  std::vector<LatticeEnds> ends;
+  for (const std::string& renderer : options.chosen_renderers()) ends.push_back({renderer, {}, {}});
+  const auto pool = std::make_shared<ThreadPool>(thread_count(options.method.threads));
+  ProgressPrinter progress("true poses", true);
+  int done = 0;
+  for (const LatticePose& pose : poses) {
+    const RigidTransform truth = pose_from_parameters(gold_frame, pose.parameters);
+    const PoseFrame frame = PoseFrame::about(truth, study_case.center_ct_mm);
+    const RigidTransform start =
+        pose_from_parameters(frame, PoseParameters::from_deg_and_mm(kStartDegAndMm));
+    for (std::size_t i = 0; i < ends.size(); ++i) {
+      registration::RegistrationRunner runner(
+          with_ideal_xrays(methods[i].runner.problem(), methods.back().runner.problem(), truth),
+          methods[i].runner.options(),
+          pool);
+      const registration::RegistrationResult result = runner.run(start);
+      if (result.stop_reason == registration::StopReason::StepBelowFinal) {
+        ends[i].errors.push_back(parameters_from_pose(frame, result.room_from_ct).deg_and_mm());
+        ends[i].distance_mm.push_back(mean_tre_mm(result.room_from_ct, truth, points));
+      } else {
+        ends[i].errors.emplace_back().fill(std::numeric_limits<double>::quiet_NaN());
+      }
+    }
+    progress.update(++done, static_cast<double>(poses.size()));
+  }
+  return ends;
+}
+
+CsvTable poses_table(const std::vector<LatticePose>& poses, const std::vector<LatticeEnds>& ends) {
+  std::vector<std::string> columns = {"renderer", "pose"};
+  for (const char* axis : kCellAxisNames) columns.push_back(std::string(axis) + "_fraction");
+  for (const char* name : kParameterNames) columns.push_back(std::string("error_") + name);
+  CsvTable table(columns);
+  for (const LatticeEnds& of : ends)
+    for (std::size_t i = 0; i < poses.size(); ++i) {
+      std::vector<std::string> row = {of.renderer, std::to_string(i)};
+      for (const int fraction : poses[i].fraction) row.push_back(std::to_string(fraction));
+      for (const double error : of.errors[i]) row.push_back(number_text(error));
+      table.add_row(row);
+    }
+  return table;
+}
+
+std::string markdown(const std::vector<LatticePose>& poses,
+                     const std::vector<LatticeEnds>& ends,
+                     const std::vector<CellView>& views,
+                     int fractions) {
+  std::string text =
+      "| Renderer | Cell of | mm, per camera | Amplitude, mm: tx, ty, tz | deg: rx, ry, rz "
+      "|\n|---|---|---|---|---|\n";
+  for (const LatticeEnds& of : ends)
+    for (int axis = 0; axis < kCellAxes; ++axis) {
+      const auto at = static_cast<std::size_t>(axis);
+      const std::array<double, 6> values = amplitude_along(axis, poses, of.errors, fractions);
+      text += "| " + of.renderer + " | " + kCellAxisNames[at] + " | ";
+      for (std::size_t i = 0; i < views.size(); ++i)
+        text += (i == 0 ? "" : ", ") + fixed_text(views[i].spacing_mm[at], 2);
+      text += " |";
+      for (const std::size_t first : {std::size_t{3}, std::size_t{0}})
+        text += " " + fixed_text(values[first], 4) + ", " + fixed_text(values[first + 1], 4) +
+                ", " + fixed_text(values[first + 2], 4) + " |";
+      text += "\n";
+    }
+  for (const LatticeEnds& of : ends) {
+    const SampleSummary distance = summarize(of.distance_mm);
+    text += "\n" + of.renderer + ": " + std::to_string(distance.count) + " of " +
+            std::to_string(poses.size()) +
+            " converged; distance of the end from the true pose, mm: median " +
+            fixed_text(distance.median, 4) + ", largest " + fixed_text(distance.maximum, 4) + "\n";
+  }
+  return text;
+}
+
+}  // namespace
+
+std::vector<std::string> problems(const LatticeErrorsOptions& options) {
+  std::vector<std::string> found = field_problems(options);
+  append_problems(options, found);
+  if (options.renderer == "raycast")
+    found.emplace_back(
+        "--renderer = raycast: must be field or both, because the cells are a field's");
+  return found;
+}
+
+void LatticeErrorsOptions::describe(Fields& field) {
+  field.part<MethodOptions>(*this);
+  field("case", case_name, "Case of the study (default: its only one)");
+  field("fractions",
+        fractions,
+        "Fractions of a cell along each of u, v, s and t; their cube is the number of true poses")
+      .within(2, 10);
+  field("output", output, "The Markdown file; the CSV takes its name, .csv").as("-o,--output");
+}
+
+CLI::App* bind_lattice_errors(CLI::App& app, LatticeErrorsOptions& options) {
+  CLI::App* command = app.add_subcommand(
+      "lattice-errors",
+      "Whether registrations lean towards the nodes of the fields: X-rays by ray casting at true "
+      "poses that step through a cell, each registered from 1 mm beside it; the error's dependence "
+      "on the fraction of a cell, and with --renderer both the same by ray casting");
+  cli::bind_options(*command, options);
+  return command;
+}
+
+void run_lattice_errors(const LatticeErrorsOptions& options, const Communicator& world) {
+  std::filesystem::path csv = options.output;
+  csv.replace_extension(".csv");
+  std::vector<std::string> warnings;
+  all_or_none(world, [&] {
+    throw_if_any(problems(options));
+    if (!world.is_root()) return;
+    announce_output(csv);
+    announce_output(options.output);
+  });
+  const Study study = shared_study(options.study, world, &warnings);
+  for (const std::string& text : warnings) warn(world, text);
+  const StudyCase study_case =
+      all_or_none(world, [&] { return study.find_case(options.case_name); });
+  const GoldStandard gold =
+      all_or_none(world, [&] { return gold_standard(study, study_case, options.gold); });
+  // Ray casting is loaded in any case: it makes the X-rays.
+  MethodOptions loading = options;
+  loading.renderer = "both";
+  std::map<std::string, std::string> ignored_hashes;
+  const std::vector<LoadedMethod> methods =
+      load_methods(loading, {}, study, study_case, world, ignored_hashes);
+  const std::vector<CellView> views = cells_of(study, study_case, options, world);
+  all_or_none(world, [&] {
+    if (!world.is_root()) return;
+    const std::vector<LatticePose> poses = lattice_poses(
+        cell_steps(views, gold.room_from_ct * study_case.center_ct_mm), options.fractions);
+    const std::vector<LatticeEnds> ends =
+        measured_ends(methods, options, gold.room_from_ct, study_case, poses);
+    const std::string text = markdown(poses, ends, views, options.fractions);
+    write_text_file(csv, poses_table(poses, ends).to_text());
+    write_text_file(options.output, text);
+    std::cout << text;
+  });
+}
+
+}  // namespace af::evaluation

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "evaluate/methods/evaluated_methods.h"
+#include "parallel/communicator.h"
+
+namespace af::evaluation {
+
+/// `af-evaluate lattice-errors` as typed.
+struct LatticeErrorsOptions : MethodOptions {
+  std::string case_name;  ///< empty: the study's only one
+  int fractions = 4;
+  std::filesystem::path output = "lattice-errors.md";
+
+  void describe(Fields& field);
+};
+
+std::vector<std::string> problems(const LatticeErrorsOptions& options);
+
+/// Adds the subcommand; returns it.
+CLI::App* bind_lattice_errors(CLI::App& app, LatticeErrorsOptions& options);
+
+/// Collective. Whether ends of registrations depend on where in the cells of the fields the true
+/// pose lies: makes X-rays by ray casting at poses that step through a cell, so that the fields are
+/// the only error, registers each from the same start beside it, and writes a table of amplitudes
+/// (Markdown) and the errors of all poses (CSV beside it). Rank 0 does the work.
+void run_lattice_errors(const LatticeErrorsOptions& options, const Communicator& world);
+
+}  // namespace af::evaluation
