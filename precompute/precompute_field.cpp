@@ -487,7 +487,8 @@ class PrecomputeRun {
         },
         options_.output,
         world_,
-        hints());
+        hints(),
+        options_.index_packing == "deflate" ? IndexPacking::Deflate : IndexPacking::CodebookTree);
     printer.reset();
     if (build.progress != nullptr) remove_progress(*build.progress);
     clock_.end("write");

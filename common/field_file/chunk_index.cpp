@@ -14,13 +14,22 @@ namespace {
 
 constexpr int kMostDoublings = 16;
 
+/// Viewpoints along u that a chunk spans: whoever reads a field holds so many planes of equal u.
+hsize_t viewpoints_of_chunk(const DatasetRule& rule) {
+  constexpr std::uint64_t kMostTilesAtOnce = std::uint64_t{16} << 20;
+  const std::uint64_t plane = rule.extents[1] * rule.extents[2] * rule.extents[3];
+  hsize_t viewpoints = kIndexChunkViewpoints;
+  while (viewpoints > 1 && viewpoints * plane > kMostTilesAtOnce) viewpoints /= 2;
+  return std::min<hsize_t>(viewpoints, rule.extents[0]);
+}
+
 /// The shape after some doublings, or after fewer where it can grow no more.
 ChunkShape chunk_shape(const DatasetRule& rule, int doublings) {
-  ChunkShape shape = {1,
+  ChunkShape shape = {viewpoints_of_chunk(rule),
                       1,
                       std::min<hsize_t>(kIndexChunkTiles[0], rule.extents[2]),
                       std::min<hsize_t>(kIndexChunkTiles[1], rule.extents[3])};
-  std::uint64_t elements = shape[2] * shape[3];
+  std::uint64_t elements = shape[0] * shape[2] * shape[3];
   for (const std::size_t axis : {1u, 2u, 3u, 0u})
     for (; doublings > 0 && shape[axis] < rule.extents[axis] && 2 * elements <= kMaxChunkElements;
          --doublings) {

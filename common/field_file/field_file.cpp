@@ -5,6 +5,7 @@
 #include <cerrno>
 #include <cstring>
 #include <numeric>
+#include <optional>
 #include <sstream>
 #include <utility>
 
@@ -13,6 +14,7 @@
 #include "field_file/chunk_index.h"
 #include "field_file/field_layout.h"
 #include "field_file/hdf5_calls.h"
+#include "field_file/index_filter.h"
 #include "files/input_file.h"
 #include "files/input_guard.h"
 #include "files/output_file.h"
@@ -33,8 +35,8 @@ using hdf5::checked;
 using hdf5::Handle;
 
 constexpr unsigned kDeflateLevel = 4;
-/// Deflate shrinks nothing by more than this.
-constexpr std::uint64_t kMaxDeflateRatio = 1032;
+/// Deflate shrinks nothing by more than this, and IndexCoding by less.
+constexpr std::uint64_t kMaxPackingRatio = 1032;
 
 /// Runs `function` and turns whatever HDF5 or a missing attribute makes of it into a FileError.
 template <typename Function>
@@ -110,20 +112,27 @@ void check_blocks(const std::vector<IndexBlock>& blocks, const std::vector<Datas
   }
 }
 
-Handle index_creation(const hdf5::ChunkShape& chunk) {
+Handle index_creation(const hdf5::ChunkShape& chunk, IndexPacking packing) {
   Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose, "H5Pcreate");
   checked(H5Pset_chunk(creation, 4, chunk.data()), "H5Pset_chunk");
+  if (packing == IndexPacking::CodebookTree) {
+    hdf5::add_index_filter(creation, chunk);
+    return creation;
+  }
   checked(H5Pset_shuffle(creation), "H5Pset_shuffle");
   checked(H5Pset_deflate(creation, kDeflateLevel), "H5Pset_deflate");
   return creation;
 }
 
-void create_index_dataset(hid_t file, const DatasetRule& rule, const hdf5::ChunkShape& chunk) {
+void create_index_dataset(hid_t file,
+                          const DatasetRule& rule,
+                          const hdf5::ChunkShape& chunk,
+                          IndexPacking packing) {
   const std::vector<hsize_t> extents(rule.extents.begin(), rule.extents.end());
   const Handle space(H5Screate_simple(4, extents.data(), nullptr), H5Sclose, "H5Screate_simple");
   const Handle links(H5Pcreate(H5P_LINK_CREATE), H5Pclose, "H5Pcreate");
   checked(H5Pset_create_intermediate_group(links, 1), "H5Pset_create_intermediate_group");
-  const Handle creation = index_creation(chunk);
+  const Handle creation = index_creation(chunk, packing);
   const Handle type = hdf5::file_type(rule);
   const Handle dataset(
       H5Dcreate2(file, rule.name.c_str(), type, space, links, creation, H5P_DEFAULT),
@@ -137,17 +146,19 @@ void create_index_dataset(hid_t file, const DatasetRule& rule, const hdf5::Chunk
 
 /// Rank 0 alone: everything but the indices and the provenance.
 void create_file_without_indices(const CompressedAttenuationField& field,
+                                 IndexPacking packing,
                                  const std::filesystem::path& path) {
   Handle file = hdf5::create_file(path);
   hdf5::write_text_attribute(file, "format", field_layout::kFormat);
-  hdf5::write_int_attribute(file, "format_version", field_layout::kFormatVersion);
+  hdf5::write_int_attribute(file, "format_version", field_layout::format_version_of(packing));
   hdf5::write_text_attribute(file, "ct_sha256", field.identity.ct_content_sha256);
   hdf5::write_text_attribute(file, "payload_sha256", std::string(kSha256Digits, '0'));
   for (const Dataset& dataset : field_layout::datasets_of(field))
     hdf5::write_dataset(file, dataset, sha256_hex(dataset.bytes));
   const std::vector<DatasetRule> rules = index_rules(field.lattice());
   const std::vector<hdf5::ChunkShape> chunks = hdf5::index_chunks(rules);
-  for (std::size_t k = 0; k < rules.size(); ++k) create_index_dataset(file, rules[k], chunks[k]);
+  for (std::size_t k = 0; k < rules.size(); ++k)
+    create_index_dataset(file, rules[k], chunks[k], packing);
   file.close("H5Fclose");
 }
 
@@ -319,23 +330,40 @@ std::vector<std::uint64_t> write_indices(const std::filesystem::path& path,
 
 // --- reading back --------------------------------------------------------------------------------
 
-/// Reads the planes [u] of an index dataset one after the other into `plane_of(u)`, which returns
-/// memory for one plane, and calls `done(u, plane)`.
-template <typename PlaneOf, typename Done>
-void read_planes(hid_t dataset, const DatasetRule& rule, PlaneOf&& plane_of, Done&& done) {
+/// Planes of equal u that the chunks of a dataset span.
+std::uint64_t planes_of_chunk(hid_t dataset) {
+  const Handle creation(H5Dget_create_plist(dataset), H5Pclose, "H5Dget_create_plist");
+  std::array<hsize_t, 4> chunk = {1, 1, 1, 1};
+  if (H5Pget_layout(creation) == H5D_CHUNKED)
+    checked(H5Pget_chunk(creation, 4, chunk.data()), "H5Pget_chunk");
+  return chunk[0];
+}
+
+/// Reads the planes [u] of an index dataset one after the other, as many at once as its chunks
+/// span, into `planes_of(u, count)`, which returns memory for them, and calls `done(u, planes)`.
+template <typename PlanesOf, typename Done>
+void read_planes(hid_t dataset, const DatasetRule& rule, PlanesOf&& planes_of, Done&& done) {
   const Handle in_file(H5Dget_space(dataset), H5Sclose, "H5Dget_space");
   std::array<hsize_t, 4> start{};
-  const std::array<hsize_t, 4> count = {1, rule.extents[1], rule.extents[2], rule.extents[3]};
-  const Handle in_memory(H5Screate_simple(4, count.data(), nullptr), H5Sclose, "H5Screate_simple");
-  for (std::uint64_t u = 0; u < rule.extents[0]; ++u) {
+  std::array<hsize_t, 4> count = {1, rule.extents[1], rule.extents[2], rule.extents[3]};
+  const std::uint64_t at_once = planes_of_chunk(dataset);
+  hdf5::ChunkShape chunk{};
+  const bool is_coded = hdf5::is_coded(dataset, chunk);
+  for (std::uint64_t u = 0; u < rule.extents[0]; u += count[0]) {
     start[0] = u;
+    count[0] = std::min(at_once, rule.extents[0] - u);
+    const Handle in_memory(
+        H5Screate_simple(4, count.data(), nullptr), H5Sclose, "H5Screate_simple");
     checked(
         H5Sselect_hyperslab(in_file, H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr),
         "H5Sselect_hyperslab");
-    const std::span<std::uint16_t> plane = plane_of(u);
-    checked(H5Dread(dataset, H5T_NATIVE_UINT16, in_memory, in_file, H5P_DEFAULT, plane.data()),
-            "H5Dread");
-    done(u, std::span<const std::uint16_t>(plane));
+    const std::span<std::uint16_t> planes = planes_of(u, count[0]);
+    if (is_coded)
+      hdf5::read_coded_planes(dataset, rule, chunk, u, count[0], planes);
+    else
+      checked(H5Dread(dataset, H5T_NATIVE_UINT16, in_memory, in_file, H5P_DEFAULT, planes.data()),
+              "H5Dread");
+    done(u, std::span<const std::uint16_t>(planes));
     note_progress();
   }
 }
@@ -363,13 +391,16 @@ std::string verify_and_seal(const CompressedAttenuationField& field,
   for (std::size_t k = 0; k < rules.size(); ++k) {
     const Handle dataset(H5Dopen2(file, rules[k].name.c_str(), H5P_DEFAULT), H5Dclose, "H5Dopen2");
     const std::uint64_t plane_tiles = tile_count_of(rules[k]) / rules[k].extents[0];
-    std::vector<std::uint16_t> plane(plane_tiles);
+    std::vector<std::uint16_t> planes;
     Sha256 sha256;
     std::uint64_t sum = 0;
     read_planes(
         dataset,
         rules[k],
-        [&](std::uint64_t) { return std::span(plane); },
+        [&](std::uint64_t, std::uint64_t count) {
+          planes.resize(count * plane_tiles);
+          return std::span(planes);
+        },
         [&](std::uint64_t u, std::span<const std::uint16_t> indices) {
           sha256.update(std::as_bytes(indices));
           sum += hash_sum(u * plane_tiles, indices);
@@ -406,6 +437,7 @@ struct FileHeader {
   std::vector<std::string> index_sha256;
   std::string payload_sha256;
   std::uint64_t file_bytes = 0;
+  IndexPacking packing = IndexPacking::CodebookTree;
 };
 
 void check_is_hdf5(const std::filesystem::path& path) {
@@ -418,25 +450,28 @@ void check_is_hdf5(const std::filesystem::path& path) {
     throw FileError(path.string(), "is not an HDF5 file (or its first bytes are damaged)");
 }
 
-void check_format(hid_t file, const std::filesystem::path& path) {
+IndexPacking check_format(hid_t file, const std::filesystem::path& path) {
   if (H5Aexists(file, "format") <= 0)
     throw FileError(path.string(), "attribute format", field_layout::kFormat, "none");
   const std::string format = hdf5::read_text_attribute(file, "format");
   if (format != field_layout::kFormat)
     throw FileError(path.string(), "attribute format", field_layout::kFormat, format);
   const int version = hdf5::read_int_attribute(file, "format_version");
-  if (version != field_layout::kFormatVersion)
+  if (version < 1 || version > field_layout::kFormatVersion)
     throw FileError(path.string(),
                     "attribute format_version",
-                    std::to_string(field_layout::kFormatVersion),
+                    "1 to " + std::to_string(field_layout::kFormatVersion),
                     std::to_string(version));
+  return version == field_layout::format_version_of(IndexPacking::Deflate)
+             ? IndexPacking::Deflate
+             : IndexPacking::CodebookTree;
 }
 
 /// Whether a file of this size can hold so many indices at all; refuses before memory is asked for.
 void check_plausible_size(const DatasetRule& rule,
                           std::uint64_t file_bytes,
                           const std::filesystem::path& path) {
-  const std::uint64_t needed = tile_count_of(rule) * sizeof(std::uint16_t) / kMaxDeflateRatio;
+  const std::uint64_t needed = tile_count_of(rule) * sizeof(std::uint16_t) / kMaxPackingRatio;
   if (needed > file_bytes)
     throw FileError(path.string(),
                     rule.name,
@@ -449,8 +484,8 @@ FileHeader read_header(const std::filesystem::path& path) {
   check_is_hdf5(path);
   note_input(path);
   const Handle file = hdf5::open_file(path, H5F_ACC_RDONLY);
-  check_format(file, path);
   FileHeader header;
+  header.packing = check_format(file, path);
   header.file_bytes = std::filesystem::file_size(path);
   const int slab_count = field_layout::slab_count_of(
       hdf5::read_dataset(file, field_layout::slab_count_rule(), path.string()), path.string());
@@ -481,7 +516,8 @@ FileHeader read_header(const std::filesystem::path& path) {
 void share(FileHeader& header, const Communicator& communicator) {
   std::vector<std::byte> payload = bytes_of(header.payload);
   std::vector<std::byte> provenance = bytes_of(header.provenance);
-  std::string lines = header.payload_sha256 + "\n" + std::to_string(header.file_bytes) + "\n";
+  std::string lines = header.payload_sha256 + "\n" + std::to_string(header.file_bytes) + "\n" +
+                      std::to_string(static_cast<int>(header.packing)) + "\n";
   for (const std::string& sha256 : header.index_sha256) lines += sha256 + "\n";
   communicator.broadcast(payload);
   communicator.broadcast(provenance);
@@ -494,6 +530,8 @@ void share(FileHeader& header, const Communicator& communicator) {
   std::string line;
   std::getline(stream, line);
   header.file_bytes = std::stoull(line);
+  std::getline(stream, line);
+  header.packing = static_cast<IndexPacking>(std::stoi(line));
   while (std::getline(stream, line)) header.index_sha256.push_back(line);
 }
 
@@ -512,7 +550,9 @@ void read_indices(const std::filesystem::path& path,
   read_planes(
       dataset,
       rule,
-      [&](std::uint64_t u) { return indices.subspan(u * plane, plane); },
+      [&](std::uint64_t u, std::uint64_t count) {
+        return indices.subspan(u * plane, count * plane);
+      },
       [&](std::uint64_t, std::span<const std::uint16_t> values) {
         sha256.update(std::as_bytes(values));
         largest = std::max(largest, *std::max_element(values.begin(), values.end()));
@@ -563,12 +603,15 @@ FieldFileInfo write_field(const CompressedAttenuationField& field,
                           const MakeProvenance& make_provenance,
                           const std::filesystem::path& path,
                           const Communicator& communicator,
-                          const MpiIoHints& hints) {
+                          const MpiIoHints& hints,
+                          IndexPacking packing) {
   const hdf5::QuietErrors quiet;
+  const hdf5::IndexFilter filter(field.codebook);
   const std::filesystem::path partial = field_layout::unfinished_path(path);
   const auto rules = index_rules(field.lattice());
   FieldFileInfo info;
   info.payload_bytes = field_layout::payload_bytes(field);
+  info.packing = packing;
   // Before the part that removes the partial file when it fails: it may be none of ours.
   all_or_none(communicator, [&] {
     if (communicator.is_root()) check_output_file(path, partial);
@@ -578,7 +621,7 @@ FieldFileInfo write_field(const CompressedAttenuationField& field,
       if (!communicator.is_root()) return;
       const WorkNote note("making " + partial.string());
       lay_out(partial, hints);
-      naming_file(partial, [&] { create_file_without_indices(field, partial); });
+      naming_file(partial, [&] { create_file_without_indices(field, packing, partial); });
     });
     const auto sums = write_indices(partial, rules, next_blocks, communicator, hints);
     info.provenance = make_provenance();
@@ -606,7 +649,8 @@ FieldFileInfo write_field(const CompressedAttenuationField& field,
                           const FieldProvenance& provenance,
                           const std::filesystem::path& path,
                           const Communicator& communicator,
-                          const MpiIoHints& hints) {
+                          const MpiIoHints& hints,
+                          IndexPacking packing) {
   std::vector<IndexBlock> left = my_blocks;
   return write_field(
       field,
@@ -614,7 +658,8 @@ FieldFileInfo write_field(const CompressedAttenuationField& field,
       [&] { return provenance; },
       path,
       communicator,
-      hints);
+      hints,
+      packing);
 }
 
 void share_geometry(CompressedAttenuationField& field, const Communicator& communicator) {
@@ -637,6 +682,8 @@ std::shared_ptr<const CompressedAttenuationField> read_field(const std::filesyst
   auto field = std::make_shared<CompressedAttenuationField>(
       field_layout::field_of(header.payload, path.string()));
   const auto rules = index_rules(field->lattice());
+  std::optional<hdf5::IndexFilter> filter;
+  if (communicator.is_root()) filter.emplace(field->codebook);
   for (std::size_t k = 0; k < rules.size(); ++k)
     field->slabs.push_back(all_or_none(communicator, [&] {
       return read_slab(
@@ -655,7 +702,8 @@ std::shared_ptr<const CompressedAttenuationField> read_field(const std::filesyst
              header.payload_sha256,
              header.file_bytes,
              field_layout::payload_bytes(*field),
-             look_up};
+             look_up,
+             header.packing};
   return field;
 }
 

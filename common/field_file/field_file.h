@@ -23,6 +23,12 @@ struct FieldProvenance {
   std::string provenance_json;
 };
 
+/// How the indices are packed in the file. Without loss: the payload is the same.
+enum class IndexPacking {
+  CodebookTree,  ///< by IndexCoding; needs these programs to be read
+  Deflate,       ///< by HDF5's shuffle and deflate; any reader of HDF5 can, and older programs
+};
+
 struct FieldFileInfo {
   FieldProvenance provenance;
   std::string payload_sha256;  ///< over the named datasets in fixed order
@@ -31,6 +37,7 @@ struct FieldFileInfo {
   /// How DRRs are meant to be looked up, by its options: "linear", also where they do not say, or
   /// "cubic".
   std::string look_up = "linear";
+  IndexPacking packing = IndexPacking::CodebookTree;
 };
 
 /// A block of tile indices of one slab that one rank has: half-open tile ranges and the indices,
@@ -42,10 +49,12 @@ struct IndexBlock {
   std::vector<std::uint16_t> indices;
 };
 
-/// Tiles along s and along t that one chunk of an index dataset spans, where the slab has as many.
-/// Blocks that begin and end at multiples of them are written without reading chunks back. Chunks
-/// of fields of more than 16 GiB are larger.
+/// Tiles along s and along t that one chunk of an index dataset spans, where the slab has as many;
+/// along u it spans kIndexChunkViewpoints where that does not make planes too large. Blocks that
+/// begin and end at multiples of them are written without reading chunks back. Chunks of fields of
+/// more than 16 GiB are larger.
 inline constexpr std::array<int, 2> kIndexChunkTiles = {128, 64};
+inline constexpr int kIndexChunkViewpoints = 8;
 
 /// This rank's next blocks, none when it has no more. Called on every rank equally often, until no
 /// rank has any left; what it throws is thrown on every rank.
@@ -57,7 +66,8 @@ using MakeProvenance = std::function<FieldProvenance()>;
 /// know it ignores.
 using MpiIoHints = std::vector<std::pair<std::string, std::string>>;
 
-/// Collective. Writes `field` (its slabs' index arrays are ignored) with the blocks of all ranks by
+/// Collective. Writes `field` (its slabs' index arrays are ignored; every rank gives its codebook)
+/// with the blocks of all ranks by
 /// parallel HDF5 to "PATH.partial", closes it, verifies it by reading it back on rank 0, syncs and
 /// renames. Blocks are asked for and written in rounds, one collective write per round and slab, so
 /// that no rank need hold more than one round's; ranks without a block take part. Returns the same
@@ -68,14 +78,16 @@ FieldFileInfo write_field(const CompressedAttenuationField& field,
                           const MakeProvenance& make_provenance,
                           const std::filesystem::path& path,
                           const Communicator& communicator,
-                          const MpiIoHints& hints = {});
+                          const MpiIoHints& hints = {},
+                          IndexPacking packing = IndexPacking::CodebookTree);
 /// Collective. The same in one round.
 FieldFileInfo write_field(const CompressedAttenuationField& field,
                           const std::vector<IndexBlock>& my_blocks,
                           const FieldProvenance& provenance,
                           const std::filesystem::path& path,
                           const Communicator& communicator,
-                          const MpiIoHints& hints = {});
+                          const MpiIoHints& hints = {},
+                          IndexPacking packing = IndexPacking::CodebookTree);
 
 /// Rank 0 alone, before the work: announce_output() of a field and of what write_field() and
 /// check_parallel_writing() put beside it.

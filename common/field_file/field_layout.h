@@ -16,7 +16,11 @@
 namespace af::field_layout {
 
 inline constexpr const char* kFormat = "attenuation-field";
-inline constexpr int kFormatVersion = 1;
+/// Version 2 has indices that IndexPacking::CodebookTree coded; else it is as version 1.
+inline constexpr int kFormatVersion = 2;
+inline constexpr int format_version_of(IndexPacking packing) {
+  return packing == IndexPacking::CodebookTree ? 2 : 1;
+}
 inline constexpr int kMaxSlabs = 64;
 inline constexpr std::size_t kSha256Digits = 64;
 inline constexpr std::uint64_t kMaxTextBytes = 16u << 20;

@@ -7,6 +7,7 @@
 #include "base/error.h"
 #include "base/joined.h"
 #include "field_file/chunk_index.h"
+#include "field_file/index_filter.h"
 #include "files/sha256.h"
 
 namespace af::hdf5 {
@@ -97,7 +98,8 @@ void check_is_of_this_file(hid_t file, const DatasetRule& rule, const std::strin
 }
 
 /// Contents of this file itself, in pieces that fit in memory, by filters that HDF5 has built in:
-/// not those of another file (external, virtual), and nothing that loads a plug-in.
+/// not those of another file (external, virtual), and nothing that loads a plug-in; or by the
+/// filter of indices.
 void check_storage(hid_t dataset, const DatasetRule& rule, const std::string& path) {
   const Handle creation(H5Dget_create_plist(dataset), H5Pclose, "H5Dget_create_plist");
   const H5D_layout_t layout = H5Pget_layout(creation);
@@ -109,6 +111,11 @@ void check_storage(hid_t dataset, const DatasetRule& rule, const std::string& pa
     std::size_t parameters = 0;
     const H5Z_filter_t filter = H5Pget_filter2(
         creation, static_cast<unsigned>(i), &flags, &parameters, nullptr, 0, nullptr, nullptr);
+    if (filter == kIndexFilter) {
+      if (const std::string problem = index_filter_problem(creation); !problem.empty())
+        throw FileError(path, rule.name, "indices coded as here", problem);
+      continue;
+    }
     if (filter != H5Z_FILTER_DEFLATE && filter != H5Z_FILTER_SHUFFLE &&
         filter != H5Z_FILTER_FLETCHER32)
       throw FileError(
@@ -126,6 +133,20 @@ void check_storage(hid_t dataset, const DatasetRule& rule, const std::string& pa
                       "larger ones");
     elements *= extent;
   }
+}
+
+/// The codebook is deflated, in one chunk; the others are too small to gain.
+Handle small_dataset_creation(const Dataset& dataset) {
+  constexpr std::size_t kWorthDeflating = 4096;
+  constexpr unsigned kLevel = 9;
+  Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose, "H5Pcreate");
+  if (dataset.rule.type != ElementType::UInt16 || dataset.bytes.size() < kWorthDeflating)
+    return creation;
+  const std::vector<hsize_t> chunk(dataset.rule.extents.begin(), dataset.rule.extents.end());
+  checked(H5Pset_chunk(creation, static_cast<int>(chunk.size()), chunk.data()), "H5Pset_chunk");
+  checked(H5Pset_shuffle(creation), "H5Pset_shuffle");
+  checked(H5Pset_deflate(creation, kLevel), "H5Pset_deflate");
+  return creation;
 }
 
 bool fits(const std::vector<std::uint64_t>& found, const DatasetRule& rule) {
@@ -239,8 +260,9 @@ void write_dataset(hid_t file, const Dataset& dataset, const std::string& sha256
   const Handle space = dataspace_of(rule);
   const Handle links(H5Pcreate(H5P_LINK_CREATE), H5Pclose, "H5Pcreate");
   checked(H5Pset_create_intermediate_group(links, 1), "H5Pset_create_intermediate_group");
+  const Handle creation = small_dataset_creation(dataset);
   const Handle object(
-      H5Dcreate2(file, rule.name.c_str(), type, space, links, H5P_DEFAULT, H5P_DEFAULT),
+      H5Dcreate2(file, rule.name.c_str(), type, space, links, creation, H5P_DEFAULT),
       H5Dclose,
       "H5Dcreate2");
   const Handle in_memory = memory_type(rule);

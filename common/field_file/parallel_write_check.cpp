@@ -26,7 +26,7 @@ constexpr std::size_t kTestCodewords = 256;
 /// far that it takes long.
 constexpr std::uint64_t kFewChunks = 1u << 15;
 constexpr std::uint64_t kMostTestChunks = 1u << 17;
-/// Viewpoint tiles along v, a chunk each: one block of a rank has so many.
+/// Viewpoint tiles along v, each of which begins a chunk: one block of a rank has so many.
 constexpr int kTestChunksOfBlock = 64;
 
 /// One slab, all of which is stored.
@@ -58,15 +58,16 @@ IndexBlock block_to_test(const std::array<int, 4>& first_tile, const std::array<
   return block;
 }
 
-/// This rank's blocks of a field of these tiles, each of one tile along u. The last of several
-/// ranks has none.
+/// This rank's blocks of a field of these tiles, each of `along_u` tiles along u. The last of
+/// several ranks has none.
 std::vector<IndexBlock> blocks_to_test(const std::array<int, 4>& tiles,
+                                       int along_u,
                                        const Communicator& communicator) {
   const int writers = std::max(1, communicator.size() - 1);
   std::vector<IndexBlock> blocks;
   if (communicator.rank() < writers)
-    for (int u = communicator.rank(); u < tiles[0]; u += writers)
-      blocks.push_back(block_to_test({u, 0, 0, 0}, {1, tiles[1], tiles[2], tiles[3]}));
+    for (int u = communicator.rank() * along_u; u < tiles[0]; u += writers * along_u)
+      blocks.push_back(block_to_test({u, 0, 0, 0}, {along_u, tiles[1], tiles[2], tiles[3]}));
   return blocks;
 }
 
@@ -85,6 +86,7 @@ std::string versions_text() {
 
 /// Collective. Writes a field of these tiles as any field is written, verifies it and removes it.
 void write_to_test(const std::array<int, 4>& tiles,
+                   int along_u,
                    const std::filesystem::path& path,
                    const Communicator& communicator,
                    const MpiIoHints& hints) {
@@ -101,7 +103,7 @@ void write_to_test(const std::array<int, 4>& tiles,
   };
   try {
     write_field(field_of_tiles(tiles),
-                blocks_to_test(tiles, communicator),
+                blocks_to_test(tiles, along_u, communicator),
                 {"0", "test", "", "{}"},
                 test,
                 communicator,
@@ -121,7 +123,7 @@ void check_parallel_writing(const std::filesystem::path& path,
                             const Communicator& communicator,
                             const MpiIoHints& hints) {
   const int blocks = std::clamp(communicator.size() - 1, 1, kMostTestBlocks);
-  write_to_test({blocks, 1, kTestTiles[0], kTestTiles[1]}, path, communicator, hints);
+  write_to_test({blocks, 1, kTestTiles[0], kTestTiles[1]}, 1, path, communicator, hints);
 }
 
 void check_writing_many_chunks(const FieldLattice& lattice,
@@ -131,7 +133,11 @@ void check_writing_many_chunks(const FieldLattice& lattice,
   const std::uint64_t chunks = hdf5::chunk_count(field_layout::index_rules(lattice));
   if (chunks <= kFewChunks) return;
   const auto rows = static_cast<int>(std::min(chunks, kMostTestChunks) / kTestChunksOfBlock + 1);
-  write_to_test({rows, kTestChunksOfBlock, 1, 1}, path, communicator, hints);
+  write_to_test({rows * kIndexChunkViewpoints, kTestChunksOfBlock, 1, 1},
+                kIndexChunkViewpoints,
+                path,
+                communicator,
+                hints);
 }
 
 }  // namespace af

@@ -225,13 +225,14 @@ DesignMeasurement DesignProbe::measure(const FieldDesign& design,
     // Some of the chunks tell.
     constexpr std::size_t kChunks = 8;
     const NearestCodeword search(codebook);
+    const IndexCoding coding(codebook);
     const std::size_t stride = 1 + sample.occupied_share.size() / kChunks;
     std::size_t at = 0;
     for (std::size_t number = 0; number < sample.occupied_share.size(); ++number) {
       if (!share_.has(number)) continue;
       const FieldSample::Chunk& chunk = sample.chunks[at++];
       if (number % stride != 0) continue;
-      const IndexBytes bytes = index_bytes(chunk, search);
+      const IndexBytes bytes = index_bytes(chunk, search, coding);
       sums[0] += static_cast<std::uint64_t>(bytes.bytes);
       sums[1] += static_cast<std::uint64_t>(bytes.tiles);
     }
@@ -239,8 +240,9 @@ DesignMeasurement DesignProbe::measure(const FieldDesign& design,
     // A smaller codebook stands for the one wanted.
     const double missing_bits = std::log2(1.0 * count / static_cast<double>(codebook.size()));
     measured.bytes_per_tile[count] =
-        static_cast<double>(sums[0]) / std::max(1.0, static_cast<double>(sums[1])) +
-        missing_bits / 8.0;
+        sharing_along_u(lattice.slabs[0].u.stored.tiles()) *
+        (static_cast<double>(sums[0]) / std::max(1.0, static_cast<double>(sums[1])) +
+         missing_bits / 8.0);
   }
   const CameraGeometry& camera = scene_.camera;
   measured.drr_pixels = 1.0 * camera.size_px.x() * camera.size_px.y();

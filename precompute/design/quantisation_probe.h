@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "field/codebook.h"
+#include "field/index_coding.h"
 #include "precompute/codebook/nearest_codeword.h"
 #include "precompute/codebook/tile_selection.h"
 #include "precompute/design/field_sample.h"
@@ -53,12 +54,17 @@ double error_ratio(const std::array<double, kProbeCodewords.size()>& errors_of_s
                    int codewords,
                    const TrainingTiles& tiles);
 
-/// Bytes of the indices of chunks, deflated as in a field's file, and their tiles that are not
-/// empty.
+/// Bytes of the indices of chunks, coded as in a field's file, and their tiles that are not empty.
 struct IndexBytes {
   double bytes = 0.0;
   double tiles = 0.0;
 };
-IndexBytes index_bytes(const FieldSample::Chunk& chunk, const NearestCodeword& search);
+IndexBytes index_bytes(const FieldSample::Chunk& chunk,
+                       const NearestCodeword& search,
+                       const IndexCoding& coding);
+
+/// The chunks of a file span several viewpoint tiles along u, which resemble each other: their
+/// bytes over those of chunks of one.
+double sharing_along_u(int viewpoint_tiles);
 
 }  // namespace af

@@ -142,6 +142,13 @@ void describe_run(Fields& field, PrecomputeOptions& options) {
         "FIELD.h5.progress), cast-again, or auto (what is faster, measured)")
       .one_of({"auto", "read-back", "cast-again"})
       .not_deciding(why);
+  field(
+      "index_packing",
+      options.index_packing,
+      "How the file holds the indices: codebook-tree (about half the bytes), or deflate (for other "
+      "readers of HDF5 and older programs); the payload is the same")
+      .one_of({"codebook-tree", "deflate"})
+      .not_deciding(why);
   field("mpi_io_hints",
         options.mpi_io_hints,
         "KEY=VALUE, once per hint to MPI-IO: cb_nodes, cb_buffer_size, striping_factor, ...; "

@@ -60,7 +60,8 @@ struct PrecomputeOptions {
   std::uint64_t memory_limit_bytes = 0;  ///< per rank beside the CT; 0: kDefaultMemoryLimitBytes
   std::string overflow = "auto";         ///< of tiles beyond it: "auto", "read-back", "cast-again"
   std::string output;
-  std::vector<std::string> mpi_io_hints;  ///< KEY=VALUE
+  std::string index_packing = "codebook-tree";  ///< or "deflate"
+  std::vector<std::string> mpi_io_hints;        ///< KEY=VALUE
   bool is_dry_run = false;
   bool is_restart = false;
   bool has_checkpoint = true;

@@ -9,9 +9,9 @@
 #include <string>
 #include <unistd.h>
 #include <vector>
-#include <zlib.h>
 
 #include "base/hash_random.h"
+#include "field/index_coding.h"
 #include "precompute/codebook/nearest_codeword.h"
 #include "precompute/units/unit_tiles.h"
 
@@ -73,26 +73,18 @@ Codebook drawn_codebook(std::vector<Tile> tiles, int codewords) {
   return codebook;
 }
 
-/// As HDF5's shuffle and deflate filters do it.
-void sample_compression(std::span<const std::uint32_t> nearest, SpeedSample& sample) {
-  std::vector<Bytef> low_then_high(2 * nearest.size());
-  for (std::size_t i = 0; i < nearest.size(); ++i) {
-    low_then_high[i] = static_cast<Bytef>(nearest[i] & 0xFFu);
-    low_then_high[nearest.size() + i] = static_cast<Bytef>(nearest[i] >> 8u);
-  }
-  uLongf compressed_bytes = compressBound(low_then_high.size());
-  std::vector<Bytef> compressed(compressed_bytes);
-  constexpr int kDeflateLevel = 4;
+/// As a field's file has them, but a row of tiles alone: there are no neighbours along u and s.
+void sample_compression(const Codebook& codebook,
+                        std::span<const std::uint32_t> nearest,
+                        SpeedSample& sample) {
+  constexpr double kShareOfNeighbours = 0.75;
+  const std::vector<std::uint16_t> indices(nearest.begin(), nearest.end());
+  const IndexCoding coding(codebook);
   const Stopwatch watch;
-  if (compress2(compressed.data(),
-                &compressed_bytes,
-                low_then_high.data(),
-                low_then_high.size(),
-                kDeflateLevel) != Z_OK)
-    return;
-  const auto bytes = static_cast<double>(low_then_high.size());
+  const std::vector<std::uint8_t> coded = coding.encode(indices, {1, 1, 1, indices.size()});
+  const auto bytes = 2.0 * static_cast<double>(indices.size());
   sample.compress_seconds_per_byte = watch.seconds() / bytes;
-  sample.compressed_fraction = static_cast<double>(compressed_bytes) / bytes;
+  sample.compressed_fraction = kShareOfNeighbours * static_cast<double>(coded.size()) / bytes;
 }
 
 void sample_search(const SampledTiles& tiles, int codewords, SpeedSample& sample) {
@@ -110,7 +102,7 @@ void sample_search(const SampledTiles& tiles, int codewords, SpeedSample& sample
   };
   sample.encode_seconds_per_tile = seconds_per_tile(SearchHint::None);
   sample.train_seconds_per_tile = seconds_per_tile(SearchHint::PerTile);
-  sample_compression(nearest, sample);
+  sample_compression(codebook, nearest, sample);
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <memory>
 
 #include "field_file/hdf5_calls.h"
+#include "field_file/index_filter.h"
 #include "files/sha256.h"
 #include "fuzz/fuzz_input.h"
 #include "fuzz/sample_field.h"
@@ -95,6 +96,12 @@ Handle any_creation(hid_t space, fuzz::InputBytes& input) {
       if (input.take_below(2) == 0) H5Pset_deflate(creation, 1);
       if (input.take_below(4) == 0) H5Pset_fletcher32(creation);
       if (input.take_below(4) == 0) H5Pset_nbit(creation);
+      if (input.take_below(4) == 0) {
+        std::array<unsigned, 5> parameters = {1};
+        std::copy(chunk.begin(), chunk.begin() + 4, parameters.begin() + 1);
+        if (input.take_below(4) == 0) parameters[input.take_below(5)] = input.take<std::uint16_t>();
+        H5Pset_filter(creation, hdf5::kIndexFilter, 0, parameters.size(), parameters.data());
+      }
       break;
     case 2:
       H5Pset_external(creation, (fuzz::scratch_folder() / kElsewhere).c_str(), 0, H5F_UNLIMITED);
@@ -246,6 +253,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   static const herr_t keeps_memory = H5set_free_list_limits(-1, -1, -1, -1, -1, -1);
   fuzz::require(keeps_memory >= 0, "HDF5 takes the limits");
   const hdf5::QuietErrors quiet;
+  static const hdf5::IndexFilter filter(fuzz::sample_field().codebook);
   const auto path = fuzz::written("field.af.h5", sound);
   {
     const Handle file = hdf5::open_file(path, H5F_ACC_RDWR);

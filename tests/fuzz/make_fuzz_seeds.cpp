@@ -10,6 +10,7 @@
 
 #include "base/stored_bytes.h"
 #include "evaluate/registration/registration_rows.h"
+#include "field/index_coding.h"
 #include "image_files/ct_reader.h"
 #include "image_files/image_file.h"
 #include "study/pose_file.h"
@@ -115,6 +116,18 @@ void write_dicom_seeds(const fs::path& folder) {
              "\x28\0\x10\0\2\0\0\0\1\0\x28\0\x11\0\2\0\0\0\1\0\xe0\x7f\x10\0\2\0\0\0\1\1"s);
 }
 
+/// As fuzz_index_coding takes it apart: two codewords, extents, a chunk.
+void write_index_coding_seeds(const fs::path& folder) {
+  Codebook codebook{{Tile{}, Tile{}, Tile{}}};
+  codebook.codewords[1].fill(0x0101);
+  codebook.codewords[2].fill(0x0202);
+  const std::vector<std::uint8_t> chunk =
+      IndexCoding(codebook).encode(std::vector<std::uint16_t>{0, 1, 1, 2, 0, 2}, {1, 1, 2, 3});
+  write_seed(folder / "index_coding" / "chunk",
+             "\2\0"s + std::string(32, '\1') + std::string(32, '\2') + "\0\0\0\0\1\0\2\0"s +
+                 std::string(chunk.begin(), chunk.end()));
+}
+
 void write_other_seeds(const fs::path& folder) {
   write_seed(folder / "journal" / "manifest",
              "\0{\"format\": \"af-progress-journal\", \"format_version\": 4, \"decides\": "
@@ -211,6 +224,7 @@ int main(int argc, char** argv) {
     write_pose_seeds(folder);
     write_image_seeds(folder);
     write_dicom_seeds(folder);
+    write_index_coding_seeds(folder);
     write_other_seeds(folder);
     write_report_seeds(folder);
     write_shard_seeds(folder);

@@ -13,6 +13,7 @@
 #include "base/hash_random.h"
 #include "field_file/chunk_index.h"
 #include "field_file/hdf5_calls.h"
+#include "field_file/index_filter.h"
 #include "files/sha256.h"
 #include "support/shared_folder.h"
 
@@ -20,6 +21,9 @@ namespace af {
 namespace {
 
 constexpr std::uint64_t kSeed = 5;
+/// Of small_field(). Frozen: made by these tests on one rank with format version 1.
+constexpr const char* kPayloadSha256 =
+    "c4d25e978a038a8745f6bf31cdafac62251aabc5e05d7d200ef51f96ca1d99f0";
 
 /// Two slabs of odd and even sizes; numbers chosen to be exact.
 CompressedAttenuationField small_field() {
@@ -102,13 +106,16 @@ FieldProvenance some_provenance() {
   return {"0.1.0", "af-precompute --ct x", "seed = 1\n", "{\"ranks\": 1}"};
 }
 
-FieldFileInfo write(const CompressedAttenuationField& field, const std::filesystem::path& path) {
+FieldFileInfo write(const CompressedAttenuationField& field,
+                    const std::filesystem::path& path,
+                    IndexPacking packing = IndexPacking::CodebookTree) {
   const Communicator world = Communicator::world();
   // A program never replaces what it has read.
   std::error_code ignored;
   if (world.is_root()) std::filesystem::remove(path, ignored);
   world.barrier();
-  return write_field(field, dealt(all_blocks(field), world), some_provenance(), path, world);
+  return write_field(
+      field, dealt(all_blocks(field), world), some_provenance(), path, world, {}, packing);
 }
 
 /// Runs `edit` on the file on rank 0.
@@ -193,9 +200,32 @@ TEST(FieldFile, NamesTheLookUpThatItIsMeantFor) {
 
 TEST(FieldFile, PayloadHashIsTheSameOnEveryRankCount) {
   const test::SharedFolder folder;
-  // Frozen: made by this test on one rank with format version 1.
-  EXPECT_EQ(write(small_field(), folder / "a.af.h5").payload_sha256,
-            "c4d25e978a038a8745f6bf31cdafac62251aabc5e05d7d200ef51f96ca1d99f0");
+  EXPECT_EQ(write(small_field(), folder / "a.af.h5").payload_sha256, kPayloadSha256);
+}
+
+TEST(FieldFile, DeflatedIndicesAreTheSamePayloadAndOfTheFirstVersion) {
+  const test::SharedFolder folder;
+  const Communicator world = Communicator::world();
+  const CompressedAttenuationField field = small_field();
+  for (const IndexPacking packing : {IndexPacking::Deflate, IndexPacking::CodebookTree}) {
+    const FieldFileInfo written = write_field(field,
+                                              dealt(all_blocks(field), world),
+                                              some_provenance(),
+                                              folder / "a.af.h5",
+                                              world,
+                                              {},
+                                              packing);
+    FieldFileInfo info;
+    const auto read = read_field(folder / "a.af.h5", world, &info);
+    EXPECT_EQ(info.packing, packing);
+    EXPECT_EQ(written.packing, packing);
+    EXPECT_EQ(info.payload_sha256, kPayloadSha256);
+    EXPECT_EQ(read->slabs[1].indices[0], index_at({0, 0, 0, 0}, 1));
+    const hdf5::Handle file = hdf5::open_file(folder / "a.af.h5", H5F_ACC_RDONLY);
+    EXPECT_EQ(hdf5::read_int_attribute(file, "format_version"),
+              packing == IndexPacking::Deflate ? 1 : 2);
+    world.barrier();
+  }
 }
 
 TEST(FieldFile, MissingBlocksAreNoticedAndLeaveNoFile) {
@@ -257,16 +287,18 @@ CompressedAttenuationField field_of_chunks(int tiles_u, int tiles_v) {
 
 /// HDF5 1.10's own metadata cache holds the index of 65536 chunks; it failed beyond.
 TEST(FieldFile, HoldsMoreChunksThanFitIntoTheCacheOfHdf5) {
-  constexpr int kTilesU = 288;
+  constexpr int kAlongU = kIndexChunkViewpoints;
+  constexpr int kTilesU = 288 * kAlongU;
   constexpr int kTilesV = 256;
   const test::SharedFolder folder;
   const Communicator world = Communicator::world();
   const CompressedAttenuationField field = field_of_chunks(kTilesU, kTilesV);
   EXPECT_GT(hdf5::chunk_count(field_layout::index_rules(field.lattice())), 65536u);
   std::vector<IndexBlock> blocks;
-  for (int a = 0; a < kTilesU; ++a) {
-    blocks.push_back({0, {a, 0, 0, 0}, {1, kTilesV, 1, 1}, {}});
-    for (int b = 0; b < kTilesV; ++b) blocks.back().indices.push_back(index_at({a, b, 0, 0}, 0));
+  for (int first = 0; first < kTilesU; first += kAlongU) {
+    blocks.push_back({0, {first, 0, 0, 0}, {kAlongU, kTilesV, 1, 1}, {}});
+    for (int a = first; a < first + kAlongU; ++a)
+      for (int b = 0; b < kTilesV; ++b) blocks.back().indices.push_back(index_at({a, b, 0, 0}, 0));
   }
   write_field(field, dealt(blocks, world), some_provenance(), folder / "a.af.h5", world);
   const auto read = read_field(folder / "a.af.h5", world);
@@ -279,7 +311,8 @@ TEST(FieldFile, HoldsMoreChunksThanFitIntoTheCacheOfHdf5) {
 TEST(FieldFile, TheTestOfManyChunksLeavesNothing) {
   const test::SharedFolder folder;
   const Communicator world = Communicator::world();
-  check_writing_many_chunks(field_of_chunks(288, 256).lattice(), folder / "a.af.h5", world);
+  check_writing_many_chunks(
+      field_of_chunks(288 * kIndexChunkViewpoints, 256).lattice(), folder / "a.af.h5", world);
   // A small field is not tested once more: it would fail here.
   check_writing_many_chunks(small_field().lattice(), "/nowhere/a.af.h5", world);
   world.barrier();
@@ -355,15 +388,17 @@ std::vector<hdf5::ChunkShape> chunks_of(
 
 TEST(FieldFile, ChunksGrowAlongVOnlyWhereThereWouldBeTooMany) {
   using hdf5::ChunkShape;
-  EXPECT_EQ(chunks_of({{32, 32, 128, 118}})[0], (ChunkShape{1, 1, 128, 64}));
+  EXPECT_EQ(chunks_of({{32, 32, 128, 118}})[0], (ChunkShape{8, 1, 128, 64}));
+  // As many planes of equal u as are 32 MiB.
+  EXPECT_EQ(chunks_of({{64, 64, 512, 128}})[0], (ChunkShape{4, 1, 128, 64}));
   EXPECT_EQ(chunks_of({{64, 64, 512, 320}})[0], (ChunkShape{1, 1, 128, 64}));
-  EXPECT_EQ(chunks_of({{5, 4, 3, 7}})[0], (ChunkShape{1, 1, 3, 7}));
+  EXPECT_EQ(chunks_of({{5, 4, 3, 7}})[0], (ChunkShape{5, 1, 3, 7}));
   // 16 GiB of indices, and one column more.
   EXPECT_EQ(chunks_of({{128, 128, 1024, 512}})[0], (ChunkShape{1, 1, 128, 64}));
   EXPECT_EQ(chunks_of({{128, 128, 1024, 513}})[0], (ChunkShape{1, 2, 128, 64}));
   // Slabs count together.
-  EXPECT_EQ(chunks_of(std::vector(64, std::vector<std::uint64_t>{64, 64, 300, 100}))[63],
-            (ChunkShape{1, 2, 128, 64}));
+  EXPECT_EQ(chunks_of(std::vector(64, std::vector<std::uint64_t>{64, 64, 600, 400}))[63],
+            (ChunkShape{1, 16, 128, 64}));
   // No more viewpoints along v than there are; chunks of 2^20 elements at most.
   EXPECT_EQ(chunks_of({{2048, 3, 4096, 2048}})[0], (ChunkShape{1, 3, 256, 64}));
   EXPECT_EQ(chunks_of({{1024, 2048, 1024, 512}})[0], (ChunkShape{1, 128, 128, 64}));
@@ -456,10 +491,10 @@ TEST(FieldFile, RefusesAnUnknownVersion) {
   write(small_field(), folder / "a.af.h5");
   edit_file(folder / "a.af.h5", [](hid_t file) {
     H5Adelete(file, "format_version");
-    hdf5::write_int_attribute(file, "format_version", 2);
+    hdf5::write_int_attribute(file, "format_version", 3);
   });
   const std::string message = refusal(folder / "a.af.h5");
-  EXPECT_NE(message.find("format_version: expected 1, found 2"), std::string::npos) << message;
+  EXPECT_NE(message.find("format_version: expected 1 to 2, found 3"), std::string::npos) << message;
 }
 
 TEST(FieldFile, RefusesAMissingDataset) {
@@ -562,6 +597,45 @@ TEST(FieldFile, RefusesContentsElsewhereAndFiltersOfPlugIns) {
   EXPECT_NE(filtered.find("filters deflate"), std::string::npos) << filtered;
 }
 
+TEST(FieldFile, RefusesIndicesCodedInAnotherWay) {
+  const test::SharedFolder folder;
+  const hdf5::IndexFilter filter(small_field().codebook);
+  const auto refusal_of = [&](const std::function<void(hid_t creation)>& set) {
+    return refusal_with(folder / "a.af.h5", "/field/slab_0", [&](hid_t file, const char* name) {
+      const std::array<hsize_t, 4> extents = {4, 3, 10, 6};
+      const hdf5::Handle space(
+          H5Screate_simple(4, extents.data(), nullptr), H5Sclose, "H5Screate_simple");
+      const hdf5::Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose, "H5Pcreate");
+      hdf5::checked(H5Pset_chunk(creation, 4, extents.data()), "H5Pset_chunk");
+      set(creation);
+      const hdf5::Handle dataset(
+          H5Dcreate2(file, name, H5T_STD_U16LE, space, H5P_DEFAULT, creation, H5P_DEFAULT),
+          H5Dclose,
+          "H5Dcreate2");
+    });
+  };
+  const auto set_filter = [](hid_t creation, const std::vector<unsigned>& parameters) {
+    hdf5::checked(
+        H5Pset_filter(
+            creation, hdf5::kIndexFilter, H5Z_FLAG_MANDATORY, parameters.size(), parameters.data()),
+        "H5Pset_filter");
+  };
+  const std::string version = refusal_of([&](hid_t creation) {
+    set_filter(creation, {2, 4, 3, 10, 6});
+  });
+  EXPECT_NE(version.find("an unknown coding"), std::string::npos) << version;
+  // Blocks that are smaller than chunks would leave HDF5 to read beyond them.
+  const std::string smaller = refusal_of([&](hid_t creation) {
+    set_filter(creation, {1, 4, 3, 10, 5});
+  });
+  EXPECT_NE(smaller.find("other than the chunks"), std::string::npos) << smaller;
+  const std::string twice = refusal_of([&](hid_t creation) {
+    set_filter(creation, {1, 4, 3, 10, 6});
+    H5Pset_deflate(creation, 1);
+  });
+  EXPECT_NE(twice.find("beside others"), std::string::npos) << twice;
+}
+
 TEST(FieldFile, RefusesChunksOfMoreThanAMillionElements) {
   const test::SharedFolder folder;
   const auto refusal_of = [&](const std::vector<hsize_t>& chunk) {
@@ -618,7 +692,7 @@ TEST(FieldFile, RefusesContentsThatMakeNoSenseThoughAllHashesAgree) {
   const auto refusal_of = [&](const std::function<void(CompressedAttenuationField&)>& spoil) {
     CompressedAttenuationField field = small_field();
     spoil(field);
-    write(field, folder / "a.af.h5");
+    write(field, folder / "a.af.h5", IndexPacking::Deflate);  // which can hold any index
     return refusal(folder / "a.af.h5");
   };
   const double nan = std::numeric_limits<double>::quiet_NaN();

@@ -114,6 +114,7 @@ void inspect_field(const std::filesystem::path& path,
   facts["codewords"] = field->codebook.size();
   facts["quantizer_step"] = field->quantizer_step;
   facts["look_up"] = info.look_up;
+  facts["index_packing"] = info.packing == IndexPacking::CodebookTree ? "codebook-tree" : "deflate";
   facts["sizes"] = sizes_json(*field, info);
   facts["provenance"] = provenance_json(info.provenance);
 }

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "field/codebook.h"
+
+namespace af {
+
+/// A tile in the coordinates of the 4-D Hadamard transform; coefficient j is the sum of the levels,
+/// negative where an element's number shares an odd number of bits with j. Exact.
+using TileCoefficients = std::array<float, kTileElements>;
+
+TileCoefficients hadamard_coefficients(const Tile& tile);
+
+/// In quarters of an octave, for comparing magnitudes: the steps are exact and the same everywhere.
+int quarter_octaves(float magnitude);
+
+/// A balanced tree over the codewords but codeword 0. Each node splits its codewords into halves at
+/// the median of the coefficient that varies most among them. Node 1 is the root, node n has the
+/// children 2n and 2n + 1. Follows from the codebook alone, so it is part of the format of files,
+/// but need not be stored.
+class CodewordTree {
+ public:
+  explicit CodewordTree(const Codebook& codebook);
+
+  struct Node {
+    float threshold = 0.0f;           ///< midway between the halves
+    std::uint16_t codeword = 0;       ///< of a leaf; 0 marks a node that splits
+    std::uint8_t coefficient = 0;     ///< that it splits
+    std::int8_t quarter_octaves = 0;  ///< of the standard deviation of that coefficient
+  };
+
+  [[nodiscard]] const Node& node(std::uint32_t number) const { return nodes_[number]; }
+  /// Fetches the node's great-grandchildren, which a way down will need next but two.
+  void prefetch_below(std::uint32_t number) const {
+    __builtin_prefetch(&nodes_[std::min<std::size_t>(8 * std::size_t{number}, nodes_.size() - 1)]);
+  }
+  [[nodiscard]] std::uint32_t leaf_of(std::uint16_t codeword) const { return leaves_[codeword]; }
+  [[nodiscard]] const TileCoefficients& coefficients(std::uint16_t codeword) const {
+    return coefficients_[codeword];
+  }
+  [[nodiscard]] std::size_t codeword_count() const { return coefficients_.size(); }
+
+ private:
+  void split(std::uint32_t number, std::uint32_t* begin, std::uint32_t* end);
+
+  std::vector<TileCoefficients> coefficients_;
+  std::vector<Node> nodes_;
+  std::vector<std::uint32_t> leaves_;
+};
+
+}  // namespace af

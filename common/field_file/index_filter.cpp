@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "field_file/index_filter.h"
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <stdexcept>
+#include <vector>
+
+#include "base/thread_pool.h"
+#include "field_file/hdf5_calls.h"
+
+namespace af::hdf5 {
+
+using field_layout::DatasetRule;
+
+namespace {
+
+/// What a dataset stores of the filter: version, chunk [u][v][s][t].
+constexpr std::size_t kParameters = 5;
+constexpr unsigned kVersion = 1;
+
+/// No encoder makes more of a chunk: a turn costs 11 bits at most, and a tile has 17 or fewer.
+constexpr hsize_t kMostChunkBytes = kMaxChunkElements * 24;
+
+const IndexCoding* coding_in_use = nullptr;
+
+/// Replaces HDF5's buffer; 0, which is HDF5's sign of failure, when there is no memory.
+std::size_t give(std::span<const std::byte> bytes, std::size_t* buffer_size, void** buffer) {
+  void* const replacement = H5allocate_memory(bytes.size(), false);
+  if (replacement == nullptr) return 0;
+  std::memcpy(replacement, bytes.data(), bytes.size());
+  H5free_memory(*buffer);
+  *buffer = replacement;
+  *buffer_size = bytes.size();
+  return bytes.size();
+}
+
+std::size_t code_chunk(bool reads,
+                       const std::array<std::size_t, 4>& tiles,
+                       std::size_t bytes,
+                       std::size_t* buffer_size,
+                       void** buffer) {
+  std::vector<std::uint16_t> indices(tiles[0] * tiles[1] * tiles[2] * tiles[3]);
+  if (reads) {
+    if (!coding_in_use->decode({static_cast<const std::uint8_t*>(*buffer), bytes}, tiles, indices))
+      return 0;
+    return give(std::as_bytes(std::span(indices)), buffer_size, buffer);
+  }
+  if (bytes != indices.size() * sizeof(std::uint16_t)) return 0;
+  std::memcpy(indices.data(), *buffer, bytes);
+  const std::vector<std::uint8_t> coded = coding_in_use->encode(indices, tiles);
+  return give(std::as_bytes(std::span(coded)), buffer_size, buffer);
+}
+
+/// As H5Z_func_t asks for. The machine and the file are little-endian.
+std::size_t filter_chunk(unsigned flags,
+                         std::size_t parameter_count,
+                         const unsigned* parameters,
+                         std::size_t bytes,
+                         std::size_t* buffer_size,
+                         void** buffer) {
+  if (coding_in_use == nullptr || parameter_count != kParameters) return 0;
+  std::array<std::size_t, 4> tiles{};
+  std::copy(parameters + 1, parameters + kParameters, tiles.begin());
+  try {
+    return code_chunk((flags & H5Z_FLAG_REVERSE) != 0, tiles, bytes, buffer_size, buffer);
+  } catch (...) {
+    return 0;  // nothing may be thrown through HDF5
+  }
+}
+
+/// A chunk as the file has it, and its first tile. No bytes where none was written: zeros.
+struct StoredChunk {
+  ChunkShape first;
+  std::vector<std::uint8_t> bytes;
+};
+
+StoredChunk stored_chunk(hid_t dataset, const ChunkShape& first) {
+  hsize_t size = 0;
+  checked(H5Dget_chunk_storage_size(dataset, first.data(), &size), "H5Dget_chunk_storage_size");
+  if (size > kMostChunkBytes) throw std::runtime_error("a chunk of indices is too large");
+  StoredChunk chunk{first, std::vector<std::uint8_t>(size)};
+  if (size == 0) return chunk;
+  std::uint32_t filters_left_out = 0;
+  checked(H5Dread_chunk(dataset, H5P_DEFAULT, first.data(), &filters_left_out, chunk.bytes.data()),
+          "H5Dread_chunk");
+  if (filters_left_out != 0) throw std::runtime_error("a chunk of indices is not coded");
+  return chunk;
+}
+
+/// The part of a chunk within the dataset, of `count` planes from the chunk's first.
+void decode_into(const StoredChunk& stored,
+                 const DatasetRule& rule,
+                 const ChunkShape& chunk,
+                 std::uint64_t count,
+                 std::span<std::uint16_t> planes) {
+  const std::array<std::size_t, 4> tiles = {chunk[0], chunk[1], chunk[2], chunk[3]};
+  std::vector<std::uint16_t> indices(tiles[0] * tiles[1] * tiles[2] * tiles[3]);
+  if (!stored.bytes.empty() && !coding_in_use->decode(stored.bytes, tiles, indices))
+    throw std::runtime_error("a chunk of indices cannot be decoded");
+  const ChunkShape& first = stored.first;
+  const auto run = static_cast<std::ptrdiff_t>(std::min(chunk[3], rule.extents[3] - first[3]));
+  for (std::size_t u = 0; u < count; ++u)
+    for (std::size_t v = 0; v < std::min(chunk[1], rule.extents[1] - first[1]); ++v)
+      for (std::size_t s = 0; s < std::min(chunk[2], rule.extents[2] - first[2]); ++s) {
+        const std::size_t from = ((u * tiles[1] + v) * tiles[2] + s) * tiles[3];
+        const std::size_t to =
+            ((u * rule.extents[1] + first[1] + v) * rule.extents[2] + first[2] + s) *
+                rule.extents[3] +
+            first[3];
+        std::copy_n(indices.begin() + static_cast<std::ptrdiff_t>(from),
+                    run,
+                    planes.begin() + static_cast<std::ptrdiff_t>(to));
+      }
+}
+
+void register_filter() {
+  constexpr H5Z_class2_t kClass = {H5Z_CLASS_T_VERS,
+                                   kIndexFilter,
+                                   1,
+                                   1,
+                                   "attenuation-field indices",
+                                   nullptr,
+                                   nullptr,
+                                   filter_chunk};
+  checked(H5Zregister(&kClass), "H5Zregister");
+}
+
+}  // namespace
+
+IndexFilter::IndexFilter(const Codebook& codebook) : coding_(codebook), outer_(coding_in_use) {
+  register_filter();
+  coding_in_use = &coding_;
+}
+
+IndexFilter::~IndexFilter() {
+  coding_in_use = outer_;
+}
+
+bool is_coded(hid_t dataset, ChunkShape& chunk) {
+  const Handle creation(H5Dget_create_plist(dataset), H5Pclose, "H5Dget_create_plist");
+  if (H5Pget_nfilters(creation) != 1) return false;
+  unsigned flags = 0;
+  std::size_t none = 0;
+  if (H5Pget_filter2(creation, 0, &flags, &none, nullptr, 0, nullptr, nullptr) != kIndexFilter)
+    return false;
+  return checked(H5Pget_chunk(creation, 4, chunk.data()), "H5Pget_chunk") == 4;
+}
+
+void read_coded_planes(hid_t dataset,
+                       const DatasetRule& rule,
+                       const ChunkShape& chunk,
+                       std::uint64_t u,
+                       std::uint64_t count,
+                       std::span<std::uint16_t> planes) {
+  static ThreadPool pool(usable_processors());
+  std::vector<StoredChunk> stored;
+  for (hsize_t v = 0; v < rule.extents[1]; v += chunk[1])
+    for (hsize_t s = 0; s < rule.extents[2]; s += chunk[2])
+      for (hsize_t t = 0; t < rule.extents[3]; t += chunk[3])
+        stored.push_back(stored_chunk(dataset, {u, v, s, t}));
+  pool.for_each(static_cast<int>(stored.size()), [&](int task, int /*slot*/) {
+    decode_into(stored[static_cast<std::size_t>(task)], rule, chunk, count, planes);
+  });
+}
+
+void add_index_filter(hid_t creation, const ChunkShape& chunk) {
+  std::array<unsigned, kParameters> parameters = {kVersion};
+  std::transform(chunk.begin(), chunk.end(), parameters.begin() + 1, [](hsize_t extent) {
+    return static_cast<unsigned>(extent);
+  });
+  checked(H5Pset_filter(
+              creation, kIndexFilter, H5Z_FLAG_MANDATORY, parameters.size(), parameters.data()),
+          "H5Pset_filter");
+}
+
+std::string index_filter_problem(hid_t creation) {
+  if (H5Pget_nfilters(creation) != 1) return "a filter of indices beside others";
+  std::array<unsigned, kParameters> parameters{};
+  std::size_t count = parameters.size();
+  unsigned flags = 0;
+  H5Pget_filter2(creation, 0, &flags, &count, parameters.data(), 0, nullptr, nullptr);
+  if (count != kParameters || parameters[0] != kVersion) return "an unknown coding of indices";
+  std::array<hsize_t, H5S_MAX_RANK> chunk{};
+  if (H5Pget_chunk(creation, H5S_MAX_RANK, chunk.data()) != 4 ||
+      !std::equal(parameters.begin() + 1, parameters.end(), chunk.begin()))
+    return "indices coded in blocks other than the chunks";
+  return {};
+}
+
+}  // namespace af::hdf5

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+// Internal to field_file: IndexCoding as a filter of HDF5, so that chunks of indices are coded
+// where HDF5 deflates others, on any number of ranks.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include <hdf5.h>
+
+#include "field/index_coding.h"
+#include "field_file/chunk_index.h"
+
+namespace af::hdf5 {
+
+/// Of the range that The HDF Group leaves for use within a program.
+inline constexpr H5Z_filter_t kIndexFilter = 411;
+
+/// While alive, datasets with the filter can be read and written: HDF5 hands a filter nothing but a
+/// chunk, so the codebook stands beside it. One may live within another and then takes its place.
+/// Not for several threads.
+class IndexFilter {
+ public:
+  explicit IndexFilter(const Codebook& codebook);
+  ~IndexFilter();
+  IndexFilter(const IndexFilter&) = delete;
+  IndexFilter& operator=(const IndexFilter&) = delete;
+
+ private:
+  IndexCoding coding_;
+  const IndexCoding* outer_;
+};
+
+/// Reads the chunks of a coded dataset that begin at plane u, and decodes them on all processors
+/// that this process may use: HDF5 would do so one after the other. `planes` has room for `count`
+/// planes of equal u, as many as a chunk spans or as are left. Throws std::runtime_error when
+/// chunks cannot be decoded.
+void read_coded_planes(hid_t dataset,
+                       const field_layout::DatasetRule& rule,
+                       const ChunkShape& chunk,
+                       std::uint64_t u,
+                       std::uint64_t count,
+                       std::span<std::uint16_t> planes);
+
+/// Puts the filter into the properties of a dataset to be made of such chunks.
+void add_index_filter(hid_t creation, const ChunkShape& chunk);
+
+/// Whether a dataset has the filter; `chunk` is then its chunks' shape.
+bool is_coded(hid_t dataset, ChunkShape& chunk);
+
+/// Why the only filter of these properties cannot be one that add_index_filter() put there: a
+/// version that is not known, a shape other than the chunks'; empty when it can.
+std::string index_filter_problem(hid_t creation);
+
+}  // namespace af::hdf5

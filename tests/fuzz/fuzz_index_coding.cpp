@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// A chunk of coded indices, and the codebook beside it.
+#include <algorithm>
+#include <array>
+#include <vector>
+
+#include "field/index_coding.h"
+#include "fuzz/fuzz_input.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace af;
+  fuzz::InputBytes input(data, size);
+  Codebook codebook{{Tile{}}};
+  const std::size_t codewords = input.take_below(40);
+  for (std::size_t i = 0; i < codewords; ++i) {
+    Tile tile{};
+    for (std::uint16_t& level : tile) level = input.take<std::uint16_t>();
+    codebook.codewords.push_back(tile);
+  }
+  std::sort(codebook.codewords.begin(), codebook.codewords.end(), codeword_less);
+  std::array<std::size_t, 4> tiles{};
+  for (std::size_t& extent : tiles) extent = 1 + input.take_below(9);
+  const IndexCoding coding(codebook);
+  std::vector<std::uint16_t> indices(tiles[0] * tiles[1] * tiles[2] * tiles[3]);
+  const bool is_accepted = coding.decode(input.rest(), tiles, indices);
+  for (const std::uint16_t index : indices)
+    fuzz::require(index < codebook.size(), "an index of the codebook");
+  if (!is_accepted) return 0;
+  const auto bytes = coding.encode(indices, tiles);
+  std::vector<std::uint16_t> back(indices.size());
+  fuzz::require(coding.decode(bytes, tiles, back) && back == indices,
+                "what was coded is given back");
+  return 0;
+}

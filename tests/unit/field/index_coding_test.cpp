@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "field/index_coding.h"
+
+#include <algorithm>
+
+#include <gtest/gtest.h>
+
+#include "base/crc32c.h"
+#include "base/error.h"
+#include "base/hash_random.h"
+#include "base/vector_width.h"
+
+namespace af {
+namespace {
+
+constexpr std::uint64_t kSeed = 3;
+using Extents = std::array<std::size_t, 4>;
+
+std::size_t count_of(const Extents& tiles) {
+  return tiles[0] * tiles[1] * tiles[2] * tiles[3];
+}
+
+/// Some codewords twice, some of the largest levels.
+Codebook some_codebook(std::size_t codewords) {
+  Codebook codebook{{Tile{}}};
+  for (std::size_t i = 1; i < codewords; ++i) {
+    HashRandom random(kSeed, i % 97, codewords);
+    const double level = i % 11 == 0 ? 65535.0 : 40000.0 * random.uniform();
+    Tile tile{};
+    for (std::uint16_t& element : tile)
+      element = static_cast<std::uint16_t>(std::min(level + 300.0 * random.uniform(), 65535.0));
+    codebook.codewords.push_back(tile);
+  }
+  std::sort(codebook.codewords.begin(), codebook.codewords.end(), codeword_less);
+  return codebook;
+}
+
+/// Every third tile is empty; the codewords change slowly along t.
+std::vector<std::uint16_t> some_indices(const Extents& tiles, std::size_t codewords) {
+  std::vector<std::uint16_t> indices(count_of(tiles));
+  for (std::size_t i = 0; i < indices.size(); ++i)
+    if (hash64(kSeed, i / 7) % 3 != 0)
+      indices[i] = static_cast<std::uint16_t>((i / 5 + hash64(kSeed, i) % 9) % codewords);
+  return indices;
+}
+
+TEST(IndexCoding, GivesIndicesBackAndTheSameBytesOnEveryWidth) {
+  for (const std::size_t codewords : {1u, 2u, 3u, 50u, 4096u, 65536u}) {
+    const IndexCoding coding(some_codebook(codewords));
+    for (const Extents& tiles :
+         {Extents{1, 1, 1, 1}, Extents{3, 2, 9, 11}, Extents{1, 2, 3, 64}, Extents{8, 1, 20, 5}}) {
+      const auto indices = some_indices(tiles, codewords);
+      std::vector<std::uint8_t> first;
+      for (const VectorWidth width : supported_vector_widths()) {
+        force_vector_width(width);
+        const auto bytes = coding.encode(indices, tiles);
+        if (first.empty()) first = bytes;
+        EXPECT_EQ(bytes, first) << to_string(width);
+        std::vector<std::uint16_t> back(indices.size(), 1);
+        EXPECT_TRUE(coding.decode(bytes, tiles, back)) << to_string(width);
+        EXPECT_EQ(back, indices) << codewords << " " << to_string(width);
+      }
+      force_vector_width({});
+    }
+  }
+}
+
+/// Files are read by later versions: when this fails, the filter needs a new version number, and
+/// the old coding has to stay.
+TEST(IndexCoding, KeepsItsFormat) {
+  const Extents tiles = {8, 1, 20, 12};
+  const auto bytes = IndexCoding(some_codebook(4096)).encode(some_indices(tiles, 4096), tiles);
+  EXPECT_EQ(crc32c(std::as_bytes(std::span(bytes))), 2924898820u) << bytes.size();
+}
+
+TEST(IndexCoding, RefusesBytesThatNoEncoderWrites) {
+  const Extents tiles = {4, 1, 20, 12};
+  constexpr std::size_t kCodewords = 50;
+  const IndexCoding coding(some_codebook(kCodewords));
+  const auto bytes = coding.encode(some_indices(tiles, kCodewords), tiles);
+  std::vector<std::uint16_t> back(count_of(tiles));
+  for (std::size_t size = 0; size < bytes.size(); ++size)
+    EXPECT_FALSE(coding.decode(std::span(bytes).first(size), tiles, back)) << size;
+  auto longer = bytes;
+  longer.push_back(0);
+  EXPECT_FALSE(coding.decode(longer, tiles, back));
+  // Noise decodes to something, which at least stays within the codebook.
+  for (std::uint64_t i = 0; i < 50; ++i) {
+    std::vector<std::uint8_t> noise(400);
+    for (std::size_t k = 0; k < noise.size(); ++k)
+      noise[k] = static_cast<std::uint8_t>(hash64(kSeed, i, k));
+    EXPECT_FALSE(coding.decode(noise, tiles, back));
+    EXPECT_LT(*std::max_element(back.begin(), back.end()), kCodewords);
+  }
+}
+
+TEST(IndexCoding, RefusesIndicesBeyondTheCodebook) {
+  const IndexCoding coding(some_codebook(50));
+  const std::vector<std::uint16_t> indices = {3, 50};
+  EXPECT_THROW((void)coding.encode(indices, {1, 1, 1, 2}), std::logic_error);
+  EXPECT_THROW((void)coding.encode(std::span(indices).first(1), {1, 1, 1, 2}), std::logic_error);
+}
+
+/// Readers refuse extents that a file is too small for before they ask for memory.
+TEST(IndexCoding, ShrinksNothingByMoreThanDeflateCan) {
+  constexpr std::size_t kMostRatio = 1032;
+  const Extents tiles = {8, 4, 128, 64};
+  const std::vector<std::uint16_t> empty(count_of(tiles), 0);
+  const auto bytes = IndexCoding(some_codebook(50)).encode(empty, tiles);
+  EXPECT_GE(bytes.size() * kMostRatio, 2 * empty.size());
+}
+
+TEST(CodewordTree, LeadsToEveryCodewordAndSplitsAtItsThresholds) {
+  const Codebook codebook = some_codebook(1000);
+  const CodewordTree tree(codebook);
+  for (std::uint16_t i = 1; i < 1000; ++i) {
+    const std::uint32_t leaf = tree.leaf_of(i);
+    ASSERT_EQ(tree.node(leaf).codeword, i);
+    for (std::uint32_t number = leaf; number > 1; number /= 2) {
+      const CodewordTree::Node& above = tree.node(number / 2);
+      ASSERT_EQ(above.codeword, 0);
+      const float value = tree.coefficients(i)[above.coefficient];
+      if (number % 2 == 0)
+        EXPECT_LE(value, above.threshold);
+      else
+        EXPECT_GE(value, above.threshold);
+    }
+  }
+}
+
+TEST(HadamardCoefficients, AreSumsAndDifferencesOfHalves) {
+  Tile tile{};
+  tile[tile_element(1, 0, 1, 0)] = 5;
+  const TileCoefficients coefficients = hadamard_coefficients(tile);
+  EXPECT_EQ(coefficients[0], 5.0f);
+  EXPECT_EQ(coefficients[tile_element(1, 0, 0, 0)], -5.0f);
+  EXPECT_EQ(coefficients[tile_element(0, 1, 0, 0)], 5.0f);
+  EXPECT_EQ(coefficients[tile_element(1, 0, 1, 0)], 5.0f);
+}
+
+}  // namespace
+}  // namespace af
