@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "base/joined.h"
+#include "precompute/design/quantisation_probe.h"
 #include "precompute/formatted_text.h"
 
 namespace af {
@@ -83,9 +84,8 @@ void forecast_seconds(const DryRun& run, const TileCounts& tiles, FieldForecast&
           : overflow_fraction * cast_seconds;
   const double index_bytes = 2.0 * tiles.occupied;
   const double compress_seconds = index_bytes * speed.compress_seconds_per_byte;
-  // Rank 0 reads the file back: inflating takes about a fifth of deflating, SHA-256 some 2 ns a
-  // byte.
-  const double verify_seconds = 0.2 * compress_seconds + 2e-9 * 2.0 * tiles.all;
+  // Rank 0 reads the file back: decoding takes as long as coding, SHA-256 some 2 ns a byte.
+  const double verify_seconds = compress_seconds + 2e-9 * 2.0 * tiles.all;
   need.seconds = run.past;
   need.seconds.emplace_back("cast", cast_seconds + checkpoint_seconds);
   need.seconds.emplace_back("train",
@@ -135,8 +135,9 @@ FieldForecast forecast(const DryRun& run) {
   need.uncropped_bytes = 2 * static_cast<std::uint64_t>(run.lattice.node_count());
   need.cropped_bytes = 2 * static_cast<std::uint64_t>(run.lattice.stored_node_count());
   need.payload_bytes = static_cast<std::uint64_t>(2.0 * tiles.all + codebook_bytes);
-  need.file_bytes = static_cast<std::uint64_t>(
-      2.0 * run.speed.compressed_fraction * tiles.occupied + codebook_bytes);
+  need.file_bytes =
+      static_cast<std::uint64_t>(2.0 * run.speed.compressed_fraction * tiles.occupied +
+                                 kFileBytesPerCodeword * run.options.design().codewords);
   forecast_memory(run, tiles, need);
   forecast_seconds(run, tiles, need);
   return need;

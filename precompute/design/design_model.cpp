@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "precompute/design/drr_time.h"
+#include "precompute/design/quantisation_probe.h"
 
 namespace af {
 
@@ -138,10 +139,10 @@ DesignForecast DesignModel::forecast(const FieldDesign& design) const {
   const double grown = tiles(design) / tiles(known.design);
   const double more_bits =
       kBitsPerDoubling * std::log2(1.0 * design.codewords / known.design.codewords);
-  const double codebook_bytes = 32.0 * known.design.codewords;
+  const double codebook_bytes = kFileBytesPerCodeword * known.design.codewords;
   forecast.file_bytes =
       (known.file_bytes - codebook_bytes + more_bits / 8.0 * point.occupied_tiles) * grown +
-      32.0 * design.codewords;
+      kFileBytesPerCodeword * design.codewords;
   const double node_ratio = (design.st_nodes - 1.0) / (known.design.st_nodes - 1.0);
   forecast.drr_ms =
       estimated_drr_ms(design, point.drr_pixels, point.footprint_nodes * node_ratio * node_ratio);

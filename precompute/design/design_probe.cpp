@@ -115,7 +115,7 @@ DesignForecast DesignMeasurement::forecast(int codewords, const std::string& loo
   forecast.quantisation_db = median_of(quantisation);
   constexpr double kOtherBytes = 30e3;
   const auto bytes = bytes_per_tile.find(codewords);
-  forecast.file_bytes = kOtherBytes + 32.0 * codewords +
+  forecast.file_bytes = kOtherBytes + kFileBytesPerCodeword * codewords +
                         (bytes == bytes_per_tile.end() ? 2.0 : bytes->second) * occupied_tiles;
   forecast.drr_ms = estimated_drr_ms(forecast.design, drr_pixels, footprint_nodes);
   return forecast;
@@ -222,6 +222,8 @@ DesignMeasurement DesignProbe::measure(const FieldDesign& design,
                                               selection.fraction * measured.occupied_tiles);
     const Codebook codebook = drawn_codebook(tiles, count, options_.seed);
     std::array<std::uint64_t, 2> sums{};
+    // A trained codebook's indices are coded in fewer bytes than a drawn one's.
+    constexpr double kTrainedCodebook = 0.83;
     // Some of the chunks tell.
     constexpr std::size_t kChunks = 8;
     const NearestCodeword search(codebook);
@@ -240,7 +242,7 @@ DesignMeasurement DesignProbe::measure(const FieldDesign& design,
     // A smaller codebook stands for the one wanted.
     const double missing_bits = std::log2(1.0 * count / static_cast<double>(codebook.size()));
     measured.bytes_per_tile[count] =
-        sharing_along_u(lattice.slabs[0].u.stored.tiles()) *
+        kTrainedCodebook * sharing_along_u(lattice.slabs[0].u.stored.tiles()) *
         (static_cast<double>(sums[0]) / std::max(1.0, static_cast<double>(sums[1])) +
          missing_bits / 8.0);
   }

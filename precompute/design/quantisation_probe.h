@@ -63,6 +63,9 @@ IndexBytes index_bytes(const FieldSample::Chunk& chunk,
                        const NearestCodeword& search,
                        const IndexCoding& coding);
 
+/// Bytes of a codebook in a file, deflated, per codeword.
+inline constexpr double kFileBytesPerCodeword = 17.0;
+
 /// The chunks of a file span several viewpoint tiles along u, which resemble each other: their
 /// bytes over those of chunks of one.
 double sharing_along_u(int viewpoint_tiles);
