@@ -488,7 +488,7 @@ class PrecomputeRun {
         options_.output,
         world_,
         hints(),
-        options_.index_packing == "deflate" ? IndexPacking::Deflate : IndexPacking::CodebookTree);
+        options_.packs_by_codebook_tree() ? IndexPacking::CodebookTree : IndexPacking::Deflate);
     printer.reset();
     if (build.progress != nullptr) remove_progress(*build.progress);
     clock_.end("write");

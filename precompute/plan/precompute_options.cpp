@@ -142,11 +142,12 @@ void describe_run(Fields& field, PrecomputeOptions& options) {
         "FIELD.h5.progress), cast-again, or auto (what is faster, measured)")
       .one_of({"auto", "read-back", "cast-again"})
       .not_deciding(why);
-  field(
-      "index_packing",
-      options.index_packing,
-      "How the file holds the indices: codebook-tree (about half the bytes), or deflate (for other "
-      "readers of HDF5 and older programs); the payload is the same")
+  field("index_packing",
+        options.index_packing,
+        "How the file holds the indices: deflate (quick, and any reader of HDF5 can), or "
+        "codebook-tree "
+        "(about half the bytes, a second or two more to write and read); the payload is the same "
+        "[codebook-tree for designs that a probe chooses, else deflate]")
       .one_of({"codebook-tree", "deflate"})
       .not_deciding(why);
   field("mpi_io_hints",
@@ -184,6 +185,7 @@ PrecomputeOptions PrecomputeOptions::in_force() const {
   if (needs_probe()) return *this;
   PrecomputeOptions options = with_design(design());
   options.st_plane = st_plane_rule() == StPlane::Centre ? "centre" : "centroid";
+  options.index_packing = packs_by_codebook_tree() ? "codebook-tree" : "deflate";
   return options;
 }
 
@@ -198,6 +200,11 @@ const DesignPreset& PrecomputeOptions::design_preset() const {
 
 bool PrecomputeOptions::needs_probe() const {
   if (slabs && uv_nodes && st_nodes && codewords) return false;
+  return budget.is_stated() || design_preset().budget.is_stated();
+}
+
+bool PrecomputeOptions::packs_by_codebook_tree() const {
+  if (index_packing) return *index_packing == "codebook-tree";
   return budget.is_stated() || design_preset().budget.is_stated();
 }
 
@@ -233,6 +240,10 @@ std::vector<std::string> problems(const PrecomputeOptions& options) {
   append(field_problems(options), found);
   append(problems(options.codebook_options()), found);
   append(problems(options.training_selection()), found);
+  if (options.budget.max_field_bytes && !options.packs_by_codebook_tree())
+    found.emplace_back(
+        "index_packing = deflate: --max-field-size is about files with codebook-tree; leave one "
+        "out");
   if (!options.center_ct_mm.empty() && options.center_ct_mm.size() != 3)
     found.push_back("center_ct_mm has " + std::to_string(options.center_ct_mm.size()) +
                     " numbers: must be x,y,z");

@@ -60,8 +60,8 @@ struct PrecomputeOptions {
   std::uint64_t memory_limit_bytes = 0;  ///< per rank beside the CT; 0: kDefaultMemoryLimitBytes
   std::string overflow = "auto";         ///< of tiles beyond it: "auto", "read-back", "cast-again"
   std::string output;
-  std::string index_packing = "codebook-tree";  ///< or "deflate"
-  std::vector<std::string> mpi_io_hints;        ///< KEY=VALUE
+  std::optional<std::string> index_packing;  ///< "codebook-tree" or "deflate"
+  std::vector<std::string> mpi_io_hints;     ///< KEY=VALUE
   bool is_dry_run = false;
   bool is_restart = false;
   bool has_checkpoint = true;
@@ -75,6 +75,8 @@ struct PrecomputeOptions {
   [[nodiscard]] const DesignPreset& design_preset() const;
   /// Whether a probe of the CT has to choose what is not stated.
   [[nodiscard]] bool needs_probe() const;
+  /// Else the indices are deflated.
+  [[nodiscard]] bool packs_by_codebook_tree() const;
   /// The design: of the preset, with the parts that are stated.
   [[nodiscard]] FieldDesign design() const { return stated_parts().over(design_preset().design); }
   /// These options with the design stated.

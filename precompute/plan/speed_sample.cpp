@@ -9,7 +9,9 @@
 #include <string>
 #include <unistd.h>
 #include <vector>
+#include <zlib.h>
 
+#include "base/error.h"
 #include "base/hash_random.h"
 #include "field/index_coding.h"
 #include "precompute/codebook/nearest_codeword.h"
@@ -74,29 +76,47 @@ Codebook drawn_codebook(std::vector<Tile> tiles, int codewords) {
   return codebook;
 }
 
+struct PackedSample {
+  double bytes = 0.0;
+  double seconds = 0.0;
+};
+
+/// As HDF5's shuffle and deflate filters do it.
+PackedSample deflated(const std::vector<std::uint16_t>& indices) {
+  std::vector<Bytef> low_then_high(2 * indices.size());
+  for (std::size_t i = 0; i < indices.size(); ++i) {
+    low_then_high[i] = static_cast<Bytef>(indices[i] & 0xFFu);
+    low_then_high[indices.size() + i] = static_cast<Bytef>(indices[i] >> 8u);
+  }
+  uLongf bytes = compressBound(low_then_high.size());
+  std::vector<Bytef> packed(bytes);
+  constexpr int kDeflateLevel = 4;
+  const Stopwatch watch;
+  const int status =
+      compress2(packed.data(), &bytes, low_then_high.data(), low_then_high.size(), kDeflateLevel);
+  check(status == Z_OK, "zlib compresses what fits");
+  return {static_cast<double>(bytes), watch.seconds()};
+}
+
 /// As a field's file has them, but a row of tiles alone: there are no neighbours along u and s.
 /// What those save was measured on fields of four slabs and of the paper's design.
-void sample_compression(const Codebook& codebook,
-                        std::span<const std::uint32_t> nearest,
-                        int viewpoint_tiles,
-                        SpeedSample& sample) {
+PackedSample coded_by_tree(const std::vector<std::uint16_t>& indices,
+                           const Codebook& codebook,
+                           int viewpoint_tiles) {
   constexpr double kShareOfNeighbours = 0.78;
-  const std::vector<std::uint16_t> indices(nearest.begin(), nearest.end());
   const IndexCoding coding(codebook);
   const Stopwatch watch;
   const std::vector<std::uint8_t> coded = coding.encode(indices, {1, 1, 1, indices.size()});
-  const auto bytes = 2.0 * static_cast<double>(indices.size());
-  sample.compress_seconds_per_byte = watch.seconds() / bytes;
-  sample.compressed_fraction = kShareOfNeighbours * sharing_along_u(viewpoint_tiles) *
-                               static_cast<double>(coded.size()) / bytes;
+  return {kShareOfNeighbours * sharing_along_u(viewpoint_tiles) * static_cast<double>(coded.size()),
+          watch.seconds()};
 }
 
 void sample_search(const SampledTiles& tiles,
-                   int codewords,
+                   const PrecomputeOptions& options,
                    int viewpoint_tiles,
                    SpeedSample& sample) {
   if (tiles.run.empty() || tiles.spread.empty()) return;
-  const Codebook codebook = drawn_codebook(tiles.spread, codewords);
+  const Codebook codebook = drawn_codebook(tiles.spread, options.design().codewords);
   const Stopwatch preparing;
   const NearestCodeword search(codebook);
   sample.codebook_seconds = preparing.seconds();
@@ -109,7 +129,13 @@ void sample_search(const SampledTiles& tiles,
   };
   sample.encode_seconds_per_tile = seconds_per_tile(SearchHint::None);
   sample.train_seconds_per_tile = seconds_per_tile(SearchHint::PerTile);
-  sample_compression(codebook, nearest, viewpoint_tiles, sample);
+  const std::vector<std::uint16_t> indices(nearest.begin(), nearest.end());
+  const PackedSample packed = options.packs_by_codebook_tree()
+                                  ? coded_by_tree(indices, codebook, viewpoint_tiles)
+                                  : deflated(indices);
+  const auto bytes = 2.0 * static_cast<double>(indices.size());
+  sample.compress_seconds_per_byte = packed.seconds / bytes;
+  sample.compressed_fraction = packed.bytes / bytes;
 }
 
 }  // namespace
@@ -142,8 +168,7 @@ SpeedSample sample_speed(const FieldCaster& caster,
   SpeedSample sample;
   sample.rays_per_second = static_cast<double>(rays) / std::max(elapsed, 1e-9);
   sample.occupied_fraction = static_cast<double>(occupied) / static_cast<double>(tiles);
-  sample_search(
-      sampled, options.design().codewords, lattice.slabs.front().u.stored.tiles(), sample);
+  sample_search(sampled, options, lattice.slabs.front().u.stored.tiles(), sample);
   return sample;
 }
 
