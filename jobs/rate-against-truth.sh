@@ -330,8 +330,8 @@ set tics textcolor rgb "#6B7A8C"
 set title textcolor rgb "#6B7A8C"
 set key textcolor rgb "#6B7A8C" samplen 1
 set logscale x 2
-set xrange [1:128]
-set xtics (1, 2, 4, 8, 16, 32)
+set xrange [*<1:128]
+set xtics (0.25, 0.5, 1, 2, 4, 8, 16, 32)
 set xlabel "MB per camera" textcolor rgb "#6B7A8C"
 set multiplot layout $2,2
 $panels
