@@ -66,7 +66,6 @@ DesignChoice choose_design(const FieldSource& source,
   SearchSpace space;
   space.fixed = options.stated_parts();
   space.most_slabs = scene.most_slabs();
-  if (!is_stated) space.enough_psnr_db = options.design_preset().enough_psnr_db;
   DesignChoice choice;
   choice.asked = to_text(budget);
   choice.chosen = search_design(budget, space, [&](const FieldDesign& design) {

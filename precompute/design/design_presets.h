@@ -12,9 +12,8 @@ namespace af {
 struct DesignPreset {
   const char* name;
   const char* help;
-  FieldDesign design;     ///< fixed, or where a probe may not be made
-  DesignBudget budget;    ///< none stated: the design is fixed
-  double enough_psnr_db;  ///< beyond it a probe saves file size
+  FieldDesign design;   ///< fixed, or where a probe may not be made
+  DesignBudget budget;  ///< none stated: the design is fixed
 };
 
 /// What a field gets when nothing is said about its design.

@@ -108,9 +108,8 @@ class Judge {
     const double doublings = std::log2(std::max(forecast.drr_ms, 1e-6));
     const double size = std::log(forecast.file_bytes);
     if (budget_.target_psnr_db) return size + 0.18 * doublings;
-    const double useful_db = std::min(forecast.psnr_db, space_.enough_psnr_db);
     // A file of twice the size must give 0.05 dB more.
-    return -useful_db + 0.3 * doublings + 0.07 * size;
+    return -forecast.psnr_db + 0.3 * doublings + 0.07 * size;
   }
 
  private:

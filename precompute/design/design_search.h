@@ -13,9 +13,6 @@ namespace af {
 struct SearchSpace {
   DesignParts fixed;    ///< parts that are stated
   int most_slabs = 12;  ///< slices of the CT that attenuate
-  /// Ends the wish for more: a design beyond it is as good as one that reaches it. The smallest
-  /// file then wins. Only where no PSNR is asked for.
-  double enough_psnr_db = 1e9;
 };
 
 /// Measures designs of these slabs and nodes: points for look-ups and codebooks that may be chosen.

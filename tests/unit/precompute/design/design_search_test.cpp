@@ -133,16 +133,6 @@ TEST(DesignSearch, MakesNoMoreSlabsThanSlicesAllow) {
   EXPECT_EQ(search_design(target(46.0), space, Measuring().function()).forecast.design.slabs, 1);
 }
 
-TEST(DesignSearch, SavesSizeWhereEnoughIsEnough) {
-  DesignBudget budget;
-  budget.max_field_bytes = 30000000;
-  SearchSpace space;
-  space.enough_psnr_db = 48.0;
-  const ChosenDesign chosen = search_design(budget, space, Measuring().function());
-  EXPECT_NEAR(chosen.forecast.psnr_db, 48.0, 1.0);
-  EXPECT_LT(chosen.forecast.file_bytes, 10e6);
-}
-
 TEST(DesignSearch, NamesTheBestWhereNothingFits) {
   DesignBudget budget = target(58.0);
   budget.max_field_bytes = 500000;
