@@ -11,9 +11,8 @@ double estimated_drr_ms(const FieldDesign& design, double pixels, double nodes) 
   constexpr double kNsPerNodeAndUvNode = 0.01;  // more viewpoints, more memory
   constexpr double kNsOfLargeCodebook = 0.6;    // which the second-level cache does not hold
   const double per_slab = kNsPerNode + kNsPerNodeAndUvNode * design.uv_nodes +
-                          (design.codewords > 16384 ? kNsOfLargeCodebook : 0.0) +
-                          (is_sum ? 0.5 : 0.0);
-  const double of_cubic = design.look_up == "linear" ? 0.0 : (is_sum ? 3.5 : 2.0);
+                          (design.codewords > 16384 ? kNsOfLargeCodebook : 0.0);
+  const double of_cubic = design.look_up == "linear" ? 0.0 : (is_sum ? 3.0 : 2.0);
   return 1e-6 * (kNsPerPixel * pixels + (design.slabs * per_slab + of_cubic) * nodes);
 }
 
