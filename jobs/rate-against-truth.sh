@@ -322,13 +322,13 @@ figure() {
   panels=$(cat)
   for terminal in svg pngcairo; do
     cat <<TEXT
-set terminal $terminal size 900,$((340 * $2)) font "sans-serif,12"
+set terminal $terminal size 1100,$((340 * $2)) font "sans-serif,12"
 set output "$output/$1.${terminal%cairo}"
 set border lc rgb "#6B7A8C"
 set grid lc rgb "#D8DEE6"
 set tics textcolor rgb "#6B7A8C"
 set title textcolor rgb "#6B7A8C"
-set key textcolor rgb "#6B7A8C" samplen 1
+set key outside right top textcolor rgb "#6B7A8C" samplen 1
 set logscale x 2
 set xrange [*<1:128]
 set xtics (0.25, 0.5, 1, 2, 4, 8, 16, 32)
