@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Prediction of a tile from its neighbours (see tile_prediction.h). Compiled once per vector width.
+// Prediction of a tile from its neighbours (see index_coding.cpp). Compiled once per vector width.
 #include "field/tile_prediction_kernel.h"
 
 #include "base/vec16.h"

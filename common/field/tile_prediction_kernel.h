@@ -6,7 +6,7 @@
 namespace af {
 
 /// Neighbours from which a tile is predicted, in the order of kPredictionSteps
-/// (tile_prediction.h).
+/// (index_coding.cpp).
 inline constexpr int kPredictors = 8;
 
 /// The Hadamard coefficients of a tile from those of its neighbours. `plain` serves the terms that

@@ -21,7 +21,10 @@ constexpr std::size_t kParameters = 5;
 constexpr unsigned kVersion = 1;
 
 /// No encoder makes more of a chunk: a turn costs 11 bits at most, and a tile has 17 or fewer.
-constexpr hsize_t kMostChunkBytes = kMaxChunkElements * 24;
+hsize_t most_chunk_bytes(const ChunkShape& chunk) {
+  constexpr hsize_t kOfItsEnd = 64;
+  return chunk[0] * chunk[1] * chunk[2] * chunk[3] * 24 + kOfItsEnd;
+}
 
 const IndexCoding* coding_in_use = nullptr;
 
@@ -76,10 +79,11 @@ struct StoredChunk {
   std::vector<std::uint8_t> bytes;
 };
 
-StoredChunk stored_chunk(hid_t dataset, const ChunkShape& first) {
+StoredChunk stored_chunk(hid_t dataset, const ChunkShape& chunk_shape, const ChunkShape& first) {
   hsize_t size = 0;
   checked(H5Dget_chunk_storage_size(dataset, first.data(), &size), "H5Dget_chunk_storage_size");
-  if (size > kMostChunkBytes) throw std::runtime_error("a chunk of indices is too large");
+  if (size > most_chunk_bytes(chunk_shape))
+    throw std::runtime_error("a chunk of indices is too large");
   StoredChunk chunk{first, std::vector<std::uint8_t>(size)};
   if (size == 0) return chunk;
   std::uint32_t filters_left_out = 0;
@@ -159,7 +163,7 @@ void read_coded_planes(hid_t dataset,
   for (hsize_t v = 0; v < rule.extents[1]; v += chunk[1])
     for (hsize_t s = 0; s < rule.extents[2]; s += chunk[2])
       for (hsize_t t = 0; t < rule.extents[3]; t += chunk[3])
-        stored.push_back(stored_chunk(dataset, {u, v, s, t}));
+        stored.push_back(stored_chunk(dataset, chunk, {u, v, s, t}));
   pool.for_each(static_cast<int>(stored.size()), [&](int task, int /*slot*/) {
     decode_into(stored[static_cast<std::size_t>(task)], rule, chunk, count, planes);
   });

@@ -147,7 +147,7 @@ void describe_run(Fields& field, PrecomputeOptions& options) {
         "How the file holds the indices: deflate (quick, and any reader of HDF5 can), or "
         "codebook-tree "
         "(about half the bytes, a second or two more to write and read); the payload is the same "
-        "[codebook-tree for designs that a probe chooses, else deflate]")
+        "[codebook-tree where limits, or a preset with limits, are given; else deflate]")
       .one_of({"codebook-tree", "deflate"})
       .not_deciding(why);
   field("mpi_io_hints",
@@ -203,9 +203,13 @@ bool PrecomputeOptions::needs_probe() const {
   return budget.is_stated() || design_preset().budget.is_stated();
 }
 
+const DesignBudget& PrecomputeOptions::limits() const {
+  return budget.is_stated() ? budget : design_preset().budget;
+}
+
 bool PrecomputeOptions::packs_by_codebook_tree() const {
   if (index_packing) return *index_packing == "codebook-tree";
-  return budget.is_stated() || design_preset().budget.is_stated();
+  return limits().is_stated();
 }
 
 PrecomputeOptions PrecomputeOptions::with_design(const FieldDesign& design) const {
@@ -240,10 +244,10 @@ std::vector<std::string> problems(const PrecomputeOptions& options) {
   append(field_problems(options), found);
   append(problems(options.codebook_options()), found);
   append(problems(options.training_selection()), found);
-  if (options.budget.max_field_bytes && !options.packs_by_codebook_tree())
+  if (options.limits().max_field_bytes && !options.packs_by_codebook_tree())
     found.emplace_back(
-        "index_packing = deflate: --max-field-size is about files with codebook-tree; leave one "
-        "out");
+        "index_packing = deflate: the size that --max-field-size or the preset allows is that of a "
+        "file with codebook-tree; leave one out");
   if (!options.center_ct_mm.empty() && options.center_ct_mm.size() != 3)
     found.push_back("center_ct_mm has " + std::to_string(options.center_ct_mm.size()) +
                     " numbers: must be x,y,z");

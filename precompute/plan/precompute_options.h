@@ -75,6 +75,8 @@ struct PrecomputeOptions {
   [[nodiscard]] const DesignPreset& design_preset() const;
   /// Whether a probe of the CT has to choose what is not stated.
   [[nodiscard]] bool needs_probe() const;
+  /// Of the design: those stated, or the preset's.
+  [[nodiscard]] const DesignBudget& limits() const;
   /// Else the indices are deflated.
   [[nodiscard]] bool packs_by_codebook_tree() const;
   /// The design: of the preset, with the parts that are stated.

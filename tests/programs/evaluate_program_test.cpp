@@ -609,7 +609,7 @@ TEST_F(EvaluateProgram, CorrectsLookedUpEndsAndMeasuresHowFarMethodsEndApart) {
   const test::ProgramRun run =
       evaluate("compare " + path("apart") + " --pose-distances -o " + path("apart/table.md"));
   ASSERT_EQ(run.exit_code, 0) << run.output;
-  EXPECT_THAT(run.output, HasSubstr("ncc, gc gauss-newton corrected"));
+  EXPECT_THAT(run.output, HasSubstr("gauss-newton, quasi-newton corrected"));
   const CsvTable table = CsvTable::read(path("apart/table-pose-distances.csv"));
   ASSERT_EQ(table.row_count(), 3u);
   double corrected_mm = 0.0;
