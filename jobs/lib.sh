@@ -7,7 +7,7 @@
 af_root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
 
 # shellcheck disable=SC2034  # for the scripts that source this file
-af_programs=(af-precompute af-drr af-simulate af-register af-evaluate af-inspect)
+af_programs=(af-precompute af-drr af-simulate af-scan af-register af-evaluate af-inspect)
 
 say() { printf '%s\n' "$*"; }
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <sstream>
 
 #include <Eigen/Dense>
@@ -40,29 +41,6 @@ Image2d cast_view(const AttenuationVolume& volume, const CameraGeometry& camera)
   Image2d image(fan.columns, fan.rows);
   RayCaster(volume, {volume.grid().spacing_mm.x()}).cast(fan, image.pixels);
   return image;
-}
-
-/// The radius within which nearly all that attenuates is, mm.
-double object_radius_mm(const MuVolume& volume) {
-  const CtGrid& grid = volume.grid;
-  const auto bins = static_cast<std::size_t>(grid.size[0]);
-  std::vector<double> mass(bins + 1, 0.0);
-  std::size_t next = 0;
-  for (int k = 0; k < grid.size[2]; ++k)
-    for (int j = 0; j < grid.size[1]; ++j)
-      for (int i = 0; i < grid.size[0]; ++i) {
-        const double mu = std::max(0.0F, volume.mu_per_mm[next++]);
-        const Eigen::Vector3d point = grid.point_mm(Eigen::Vector3d(i, j, k));
-        const double radius = point.head<2>().norm() / grid.spacing_mm.x();
-        mass[std::min(bins, static_cast<std::size_t>(radius))] += mu * mu;
-      }
-  constexpr double kNearlyAll = 0.98;
-  double all = 0.0;
-  for (const double bin : mass) all += bin;
-  double within = 0.0;
-  std::size_t bin = 0;
-  while (bin < bins && within < kNearlyAll * all) within += mass[bin++];
-  return static_cast<double>(bin) * grid.spacing_mm.x();
 }
 
 /// Half the height that every view sees at the axis, mm.
@@ -230,15 +208,6 @@ ScanImages turned_around(const ScanImages& images) {
   return result;
 }
 
-ScanCalibration started(const ScanImages& images,
-                        const std::vector<int>& used,
-                        const SelfCalibrationOptions& options) {
-  ScanCalibration calibration = ScanCalibration::nominal(images.scan, options.harmonics);
-  (images.scan.axis_along == AxisAlong::Columns ? calibration.row_px : calibration.column_px)
-      .coefficients[0] = axis_position_px(images, used);
-  return calibration;
-}
-
 void refuse_other_direction(const ScanImages& images,
                             const std::vector<int>& used,
                             const SelfCalibrationOptions& options,
@@ -246,7 +215,7 @@ void refuse_other_direction(const ScanImages& images,
                             double cost) {
   constexpr int kRounds = 3;
   const Rounds other(turned_around(images), used, options, pool);
-  ScanCalibration calibration = started(other.images(), used, options);
+  ScanCalibration calibration = stated_calibration(other.images(), used, options);
   const double other_cost = other.improve(calibration, kRounds);
   if (other_cost < cost) {
     std::ostringstream costs;
@@ -283,6 +252,37 @@ void SelfCalibrationOptions::describe(Fields& field) {
       .within(0.0, 0.3);
   field("tilt_deg", tilt_deg, "The detector's tilt is sought within so many degrees; 0: kept")
       .within(0.0, 10.0);
+}
+
+double object_radius_mm(const MuVolume& volume) {
+  const CtGrid& grid = volume.grid;
+  const auto bins = static_cast<std::size_t>(grid.size[0]);
+  std::vector<double> mass(bins + 1, 0.0);
+  std::size_t next = 0;
+  for (int k = 0; k < grid.size[2]; ++k)
+    for (int j = 0; j < grid.size[1]; ++j)
+      for (int i = 0; i < grid.size[0]; ++i) {
+        const double mu = std::max(0.0F, volume.mu_per_mm[next++]);
+        const Eigen::Vector3d point = grid.point_mm(Eigen::Vector3d(i, j, k));
+        const double radius = point.head<2>().norm() / grid.spacing_mm.x();
+        mass[std::min(bins, static_cast<std::size_t>(radius))] += mu * mu;
+      }
+  constexpr double kNearlyAll = 0.98;
+  double all = 0.0;
+  for (const double bin : mass) all += bin;
+  double within = 0.0;
+  std::size_t bin = 0;
+  while (bin < bins && within < kNearlyAll * all) within += mass[bin++];
+  return static_cast<double>(bin) * grid.spacing_mm.x();
+}
+
+ScanCalibration stated_calibration(const ScanImages& images,
+                                   const std::vector<int>& used,
+                                   const SelfCalibrationOptions& options) {
+  ScanCalibration calibration = ScanCalibration::nominal(images.scan, options.harmonics);
+  (images.scan.axis_along == AxisAlong::Columns ? calibration.row_px : calibration.column_px)
+      .coefficients[0] = axis_position_px(images, used);
+  return calibration;
 }
 
 ScanImages ScanImages::binned(int factor) const {
@@ -388,7 +388,7 @@ ScanCalibration self_calibrate(const ScanImages& images,
   constexpr int kFirstRounds = 4;
   const int search_bin = binning_for(images.scan, options.search_px);
   const Rounds search(images.binned(search_bin), used, options, pool);
-  ScanCalibration calibration = started(search.images(), used, options);
+  ScanCalibration calibration = stated_calibration(search.images(), used, options);
   double cost = search.improve(calibration, kFirstRounds);
   report(calibration_line("As stated", calibration, cost));
   refuse_other_direction(search.images(), used, options, pool, cost);
@@ -408,15 +408,22 @@ ScanCalibration self_calibrate(const ScanImages& images,
   const Rounds finer(images.binned(bin), used, options, pool);
   calibration = calibration.binned(static_cast<double>(bin) / search_bin);
   constexpr double kSmallStepPx = 0.005;
+  double lowest = std::numeric_limits<double>::infinity();
+  ScanCalibration best = calibration;
   for (int round = 0; round < options.rounds; ++round) {
+    const ScanCalibration before = calibration;
     const Rounds::Outcome outcome = finer.improve(calibration);
     std::ostringstream line;
-    line << "Round " << round + 1 << ": moved by " << outcome.step_px * bin << " px, cost "
-         << outcome.cost;
+    line << "Round " << round + 1 << ": cost " << outcome.cost << ", moves by "
+         << outcome.step_px * bin << " px";
     report(line.str());
+    // What goes on moving without a gain is where and how the object lies, not the geometry.
+    if (outcome.cost >= lowest) break;
+    lowest = outcome.cost;
+    best = before;
     if (outcome.step_px < kSmallStepPx) break;
   }
-  return calibration.binned(1.0 / bin);
+  return best.binned(1.0 / bin);
 }
 
 }  // namespace af

@@ -20,7 +20,7 @@ struct SelfCalibrationOptions {
   double coarse_px = 6.0;
   int working_px = 200;       ///< the larger side of the images that rounds work on, at most
   int search_px = 120;        ///< likewise for the search of what projections hardly tell
-  double focal_share = 0.10;  ///< source to detector is sought within this share of the stated one
+  double focal_share = 0.15;  ///< source to detector is sought within this share of the stated one
   double tilt_deg = 1.0;      ///< and the tilt within this
 
   void describe(Fields& field);
@@ -73,6 +73,15 @@ std::vector<unsigned char> fully_seen_pixels(const CircularScan& scan,
                                              const ScanCalibration& calibration,
                                              const std::vector<unsigned char>& is_lit,
                                              double radius_mm);
+
+/// The radius about the axis within which nearly all of what attenuates lies, mm.
+double object_radius_mm(const MuVolume& volume);
+
+/// The stated geometry, moved across the axis to where the views' common centre of attenuation
+/// lies: that of a full circle is on the axis. The best that is known without self-calibration.
+ScanCalibration stated_calibration(const ScanImages& images,
+                                   const std::vector<int>& used,
+                                   const SelfCalibrationOptions& options);
 
 /// Finds the geometry by which the views agree with each other: of the `used` views each half is
 /// predicted from the other's reconstruction, and cameras move to where the images are. Distance

@@ -14,7 +14,7 @@ af_add_check(stages ${af_checks}/stages.sh ${PROJECT_SOURCE_DIR})
 af_add_check(tree ${af_checks}/tree.sh ${PROJECT_SOURCE_DIR})
 
 set(af_program_files)
-foreach(program af-precompute af-drr af-simulate af-register af-evaluate af-inspect)
+foreach(program af-precompute af-drr af-simulate af-scan af-register af-evaluate af-inspect)
   if(TARGET ${program})
     list(APPEND af_program_files $<TARGET_FILE:${program}>)
   endif()

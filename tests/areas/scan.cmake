@@ -4,6 +4,15 @@ af_add_test(
   SOURCES unit/scan/simulated_scan.cpp
           unit/scan/fdk_test.cpp
           unit/scan/line_integrals_test.cpp
+          unit/scan/scan_file_test.cpp
           unit/scan/scan_geometry_test.cpp
           unit/scan/self_calibration_test.cpp
-  LIBS af_scan)
+  LIBS af_scan_study)
+af_add_program_tests(
+  scan_program_tests EACH_TEST
+  SOURCES programs/scan_program_test.cpp unit/scan/simulated_scan.cpp
+  LIBS af_scan_study af_study_contents
+  PROGRAMS af-scan
+  TIMEOUT 300)
+target_compile_definitions(scan_program_tests
+                           PRIVATE AF_CBCT_CYLINDER_TOML="${PROJECT_SOURCE_DIR}/docs/data/cbct-cylinder.toml")

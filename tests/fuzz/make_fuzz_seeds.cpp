@@ -55,6 +55,15 @@ void write_toml_seeds(const fs::path& folder) {
              "projection_matrix = [[4, 1000, 0, 4000], [4, 0, 1000, 4000], [1, 0, 0, 600]]\n");
   write_seed(folder / "rig" / "template", template_text("rig"));
   write_seed(folder / "study" / "template", template_text("study"));
+  const std::string scan =
+      "name = \"s\"\nsource_to_axis_mm = 300.0\naxis_to_detector_mm = 150\n"
+      "pixel_spacing_mm = [0.4, 0.4]\nsize_px = [64, 64]\nrotation_axis = \"columns\"\n"
+      "view_count = 36\nfirst_angle_deg = 5.0\nstep_deg = -10.0\nfiles = \"p{:03}.png\"\n"
+      "first_index = 1\n";
+  write_seed(folder / "scan" / "intensity",
+             scan + "xray_domain = \"intensity\"\ndark = \"d.png\"\nflat = \"f.png\"\n");
+  write_seed(folder / "scan" / "level", scan + "xray_domain = \"intensity\"\ndark_level = 8500\n");
+  write_seed(folder / "scan" / "attenuation", scan + "xray_domain = \"attenuation\"\n");
   write_seed(folder / "study" / "optional", uncommented(template_text("study")));
 }
 

@@ -256,6 +256,26 @@ awk 'BEGIN { print "rx_deg,ry_deg,rz_deg,tx_mm,ty_mm,tz_mm"; for (i = 0; i < 400
 row 3 'must fit' 'more DRRs than the machine can hold' "$bin/af-drr" --field AP.af.h5 --rig c-arm-12in --camera AP --poses poses.csv -o out/drrs.mha
 row 3 'must fit' 'more poses than the machine can hold' "$bin/af-evaluate" image-quality --field AP.af.h5 --ct valid/ct.nii.gz --pose-count 2000000000 -o out
 
+printf -- '--- scans ---\n'
+cat >valid/scan.toml <<'TEXT'
+source_to_axis_mm = 300.0
+axis_to_detector_mm = 150.0
+pixel_spacing_mm = [0.4, 0.4]
+size_px = [64, 64]
+rotation_axis = "rows"
+view_count = 36
+step_deg = 10.0
+files = "p{}.png"
+xray_domain = "intensity"
+TEXT
+of_scan() { row "$1" "$2" "$3" "$bin/af-scan" --scan "$4" -o out/study; }
+of_scan 4 'p35.png' 'a scan without images' valid/scan.toml
+of_scan 3 'size_px is missing' 'a scan without its size' "$(edited scan.toml '/^size_px/d')"
+of_scan 3 'must go all the way round' 'a scan of half a circle' "$(edited scan.toml 's/^step_deg.*/step_deg = 5.0/')"
+of_scan 3 'source_to_axis_mm' 'a source at 1e300 mm' "$(edited scan.toml 's/^source_to_axis_mm.*/source_to_axis_mm = 1e300/')"
+of_scan 3 'must hold {} once' 'a file pattern without an index' "$(edited scan.toml 's/p[{][}]/p/')"
+of_scan 4 'edited-scan.toml' 'a scan that is not TOML' "$(edited scan.toml '1s/^.*$/= 3/')"
+
 printf -- '--- outputs that are inputs ---\n'
 ln valid/ct.nii.gz hard.nii.gz
 ln -s valid/rig.toml soft.toml

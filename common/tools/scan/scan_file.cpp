@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/scan/scan_file.h"
+
+#include <cmath>
+
+#include "base/file_name.h"
+#include "files/output_file.h"
+#include "geometry/rigid_transform.h"
+#include "text/toml_reader.h"
+
+namespace af::tools {
+
+namespace {
+
+/// "{}" or "{:0N}" of a file pattern.
+struct IndexPlace {
+  std::size_t begin;
+  std::size_t length;
+  std::size_t digits;  ///< at least so many, filled with zeros
+};
+
+std::optional<IndexPlace> index_place(const std::string& pattern) {
+  const std::size_t open = pattern.find('{');
+  const std::size_t close = pattern.find('}');
+  if (open == std::string::npos || close == std::string::npos || close < open) return std::nullopt;
+  if (pattern.find_first_of("{}", close + 1) != std::string::npos ||
+      pattern.find('{', open + 1) != std::string::npos)
+    return std::nullopt;
+  const std::string inside = pattern.substr(open + 1, close - open - 1);
+  if (inside.empty()) return IndexPlace{open, 2, 1};
+  const bool has_form =
+      inside.size() == 3 && inside.starts_with(":0") && inside[2] >= '1' && inside[2] <= '9';
+  if (!has_form) return std::nullopt;
+  return IndexPlace{open, close - open + 1, static_cast<std::size_t>(inside[2] - '0')};
+}
+
+std::optional<double> get_number(TomlTableReader& reader, const char* key, Presence presence) {
+  if (!reader.has(key)) {
+    if (presence == Presence::Required) (void)reader.get_string(key, presence);  // notes it
+    return std::nullopt;
+  }
+  const toml::node& node = reader.node(key);
+  const auto value = node.is_number() ? node.value<double>() : std::nullopt;
+  if (!value || !std::isfinite(*value) || std::abs(*value) > kMaxRoomMm) {
+    reader.add_problem(key, "must be a number, finite and within 1e6");
+    return std::nullopt;
+  }
+  return value;
+}
+
+std::optional<int> get_index(TomlTableReader& reader,
+                             const char* key,
+                             int least,
+                             Presence presence) {
+  const auto value = get_number(reader, key, presence);
+  if (!value) return std::nullopt;
+  constexpr int kMost = 100000;
+  if (*value != std::floor(*value) || *value < least || *value > kMost) {
+    reader.add_problem(key,
+                       "must be a whole number within " + std::to_string(least) + " and 100000");
+    return std::nullopt;
+  }
+  return static_cast<int>(*value);
+}
+
+void read_geometry(TomlTableReader& reader, CircularScan& scan) {
+  const auto to_axis = get_number(reader, "source_to_axis_mm", Presence::Required);
+  const auto to_detector = get_number(reader, "axis_to_detector_mm", Presence::Required);
+  const auto spacing = reader.get_vector<2>("pixel_spacing_mm", Presence::Required);
+  const auto size = reader.get_integers("size_px", 2, Presence::Required);
+  const auto axis = reader.get_string("rotation_axis", Presence::Required);
+  if (axis && *axis != "columns" && *axis != "rows")
+    reader.add_problem("rotation_axis",
+                       "must be \"columns\" (it runs along increasing columns) or \"rows\"");
+  if (to_detector && !(*to_detector > 0.0))
+    reader.add_problem("axis_to_detector_mm", "must be above 0");
+  scan.source_to_axis_mm = to_axis.value_or(1.0);
+  scan.source_to_detector_mm = scan.source_to_axis_mm + to_detector.value_or(1.0);
+  scan.pixel_spacing_mm = spacing.value_or(Eigen::Vector2d::Ones());
+  scan.size_px = size ? Eigen::Vector2i((*size)[0], (*size)[1]) : Eigen::Vector2i(16, 16);
+  scan.axis_along = axis == "columns" ? AxisAlong::Columns : AxisAlong::Rows;
+}
+
+void read_angles(TomlTableReader& reader, CircularScan& scan) {
+  const auto count = get_index(reader, "view_count", 1, Presence::Required);
+  const auto step_deg = get_number(reader, "step_deg", Presence::Required);
+  const auto first_deg = get_number(reader, "first_angle_deg", Presence::Optional);
+  if (step_deg && (*step_deg == 0.0 || std::abs(*step_deg) > 90.0))
+    reader.add_problem("step_deg", "must be within -90 and 90 degrees, and not 0");
+  for (int view = 0; view < count.value_or(0); ++view)
+    scan.angles_rad.push_back((first_deg.value_or(0.0) + view * step_deg.value_or(1.0)) *
+                              kRadPerDeg);
+}
+
+void read_image_keys(TomlTableReader& reader, ScanFile& file) {
+  file.files = reader.get_string("files", Presence::Required).value_or("{}");
+  if (!index_place(file.files))
+    reader.add_problem("files",
+                       "must hold {} once, where the view's index stands; {:04} for four digits");
+  file.first_index = get_index(reader, "first_index", 0, Presence::Optional).value_or(0);
+  const auto domain = reader.get_string("xray_domain", Presence::Required);
+  if (domain && *domain != "intensity" && *domain != "attenuation")
+    reader.add_problem("xray_domain", "must be \"intensity\" or \"attenuation\"");
+  file.xray_domain = domain == "attenuation" ? XrayDomain::Attenuation : XrayDomain::Intensity;
+  const auto dark_level = get_number(reader, "dark_level", Presence::Optional);
+  file.dark_level = dark_level.value_or(0.0);
+  file.dark = reader.get_string("dark", Presence::Optional);
+  file.flat = reader.get_string("flat", Presence::Optional);
+  if (dark_level && file.dark)
+    reader.add_problem("dark", "must not stand beside dark_level, which says the same");
+  for (const char* const key : {"dark_level", "dark", "flat"})
+    if (file.xray_domain == XrayDomain::Attenuation && reader.has(key))
+      reader.add_problem(key, "is for xray_domain = \"intensity\" alone");
+}
+
+}  // namespace
+
+std::string ScanFile::file_of(int view) const {
+  const IndexPlace place = index_place(files).value();
+  std::string index = std::to_string(first_index + view);
+  if (index.size() < place.digits) index.insert(0, place.digits - index.size(), '0');
+  std::string path = files;
+  return path.replace(place.begin, place.length, index);
+}
+
+ScanFile parse_scan_file(const std::string& text, const std::string& file) {
+  const toml::table table = parse_toml(text, file);
+  TomlProblems problems(file);
+  TomlTableReader reader(table, "", problems);
+  ScanFile result;
+  result.name = reader.get_string("name", Presence::Optional).value_or("scan");
+  if (!is_plain_file_name(result.name)) reader.add_problem("name", "must be usable in a file name");
+  read_geometry(reader, result.scan);
+  read_angles(reader, result.scan);
+  read_image_keys(reader, result);
+  reader.refuse_unknown_keys();
+  problems.throw_if_any();
+  throw_if_any(af::problems(result.scan), file);
+  return result;
+}
+
+ScanFile read_scan_file(const std::filesystem::path& path) {
+  return parse_scan_file(read_text_file(path, kMostTomlBytes), path.string());
+}
+
+}  // namespace af::tools

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "scan/scan_geometry.h"
+#include "study/study_file.h"
+
+namespace af::tools {
+
+/// A scan as scan.toml states it: geometry, and where and what its images are.
+struct ScanFile {
+  std::string name;
+  CircularScan scan;
+  std::string files;  ///< "Projection{}.png"; {:04} writes the index with four digits
+  int first_index = 0;
+  XrayDomain xray_domain = XrayDomain::Intensity;
+  double dark_level = 0.0;  ///< counts of every pixel without beam, if there is no dark image
+  std::optional<std::string> dark;
+  std::optional<std::string> flat;
+
+  /// File name of a view, relative to the scan's folder.
+  [[nodiscard]] std::string file_of(int view) const;
+};
+
+/// Reads scan.toml: InputError (3) names file, line, key, value and constraint of everything that
+/// is unacceptable, FileError (4) when it cannot be parsed.
+ScanFile read_scan_file(const std::filesystem::path& path);
+
+/// The same from its text; messages name `file`.
+ScanFile parse_scan_file(const std::string& text, const std::string& file);
+
+}  // namespace af::tools

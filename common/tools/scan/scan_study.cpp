@@ -1,0 +1,312 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/scan/scan_study.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+#include "base/error.h"
+#include "base/hash_random.h"
+#include "base/number_text.h"
+#include "base/toml_text.h"
+#include "figures/picture.h"
+#include "files/output_file.h"
+#include "image_files/ct_reader.h"
+#include "image_files/image_file.h"
+#include "scan/image_sampling.h"
+#include "study/rig_file.h"
+#include "text/csv_table.h"
+#include "text/toml_reader.h"
+
+namespace af::tools {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string view_name(int view) {
+  std::string digits = std::to_string(view);
+  if (digits.size() < 3) digits.insert(0, 3 - digits.size(), '0');
+  return "view-" + digits;
+}
+
+std::string numbered(const char* what, std::size_t index) {
+  const std::string digits = std::to_string(index + 1);
+  return std::string(what) + (digits.size() < 2 ? "-0" : "-") + digits;
+}
+
+/// Angle between two directions on the circle, within 0 and pi.
+double angle_between_rad(double a, double b) {
+  return std::abs(std::remainder(a - b, 2.0 * std::numbers::pi));
+}
+
+CameraGeometry camera_of(const CalibratedScan& scan, int view) {
+  return scan_camera(scan.images.scan,
+                     scan.calibration,
+                     scan.images.scan.angles_rad[static_cast<std::size_t>(view)],
+                     view_name(view));
+}
+
+/// The smallest box that holds every pixel whose rays are seen from all around.
+RegionOfInterest seen_region(const CalibratedScan& scan) {
+  const CircularScan& geometry = scan.images.scan;
+  const std::vector<unsigned char> is_seen =
+      fully_seen_pixels(geometry, scan.calibration, scan.images.is_lit, scan.object_radius_mm);
+  int low_column = geometry.size_px.x();
+  int high_column = -1;
+  int low_row = geometry.size_px.y();
+  int high_row = -1;
+  std::size_t pixel = 0;
+  for (int row = 0; row < geometry.size_px.y(); ++row)
+    for (int column = 0; column < geometry.size_px.x(); ++column, ++pixel) {
+      if (is_seen[pixel] == 0) continue;
+      low_column = std::min(low_column, column);
+      high_column = std::max(high_column, column);
+      low_row = std::min(low_row, row);
+      high_row = std::max(high_row, row);
+    }
+  if (high_column <= low_column || high_row <= low_row)
+    throw InputError("no part of the detector sees what the scan reconstructs");
+  return {low_column, low_row, high_column - low_column + 1, high_row - low_row + 1};
+}
+
+/// The box within the object, over which errors are taken: 0.6 of its radius, 0.6 of the height
+/// that is seen from all around.
+CtBox target_box(const CalibratedScan& scan) {
+  constexpr double kShare = 0.6;
+  const CircularScan& geometry = scan.images.scan;
+  const double half_height = 0.5 * scan.ct.grid.size[2] * scan.ct.grid.spacing_mm.z();
+  const double seen = half_height * (geometry.source_to_axis_mm - scan.object_radius_mm) /
+                      (geometry.source_to_axis_mm + scan.object_radius_mm);
+  const Eigen::Vector3d half(
+      kShare * scan.object_radius_mm, kShare * scan.object_radius_mm, kShare * seen);
+  return {-half, half};
+}
+
+RigidTransform nominal_pose(const ScanOptions& options, const std::string& scan_name, int pair) {
+  HashRandom random(options.seed, hash_name(scan_name), static_cast<std::uint64_t>(pair));
+  PoseParameters offset;
+  for (double& angle : offset.rotation_rad)
+    angle = kRadPerDeg *
+            random.uniform(-options.max_offset_rotation_deg, options.max_offset_rotation_deg);
+  for (double& shift : offset.translation_mm)
+    shift = random.uniform(-options.max_offset_translation_mm, options.max_offset_translation_mm);
+  return pose_from_parameters(PoseFrame{}, offset);
+}
+
+StudyCase case_of(const CalibratedScan& scan,
+                  const std::string& name,
+                  const RigidTransform& nominal,
+                  const std::vector<int>& views,
+                  const RegionOfInterest& region,
+                  const fs::path& folder) {
+  StudyCase result;
+  result.name = name;
+  result.note =
+      "odd views of the scan " + scan.name +
+      "; the CT is reconstructed from the even ones, so the true pose is the identity, to "
+      "the held-out residual of " +
+      fixed_text(scan.calibrated.rms_mm_at_axis, 3) + " mm";
+  result.ct = folder / "ct.nii.gz";
+  result.nominal_room_from_ct = nominal;
+  result.target_box_ct = target_box(scan);
+  result.gold_room_from_ct = RigidTransform::Identity();
+  for (const int view : views) {
+    StudyView study_view;
+    study_view.camera = view_name(view);
+    study_view.xray = folder / (view_name(view) + ".mha");
+    study_view.xray_domain = XrayDomain::Attenuation;
+    study_view.roi = region;
+    study_view.mask = folder / (view_name(view) + "-mask.png");
+    result.views.push_back(std::move(study_view));
+  }
+  return result;
+}
+
+const JudgedView& judged(const CalibratedScan& scan, int view) {
+  const auto found = std::find_if(scan.calibrated.views.begin(),
+                                  scan.calibrated.views.end(),
+                                  [&](const JudgedView& row) { return row.view == view; });
+  check(found != scan.calibrated.views.end(), "an X-ray of a study must have been judged");
+  return *found;
+}
+
+/// Measured, mask and what the prediction leaves, side by side.
+void write_view_picture(const CalibratedScan& scan,
+                        int view,
+                        const Image2d& mask,
+                        const RegionOfInterest& region,
+                        const fs::path& path) {
+  const JudgedView& row = judged(scan, view);
+  const Image2d& xray = scan.images.line_integrals[static_cast<std::size_t>(view)];
+  const auto [low, high] = percentile_window(xray);
+  Image2d residual(xray.width, xray.height);
+  residual.pixels = row.alignment.residual;
+  using Colors = PicturePanel::Colors;
+  const PicturePanel measured = {
+      xray, low, high, "measured", "line integrals", Colors::Grey, {region}};
+  const PicturePanel used = {mask, 0.0, 1.0, "mask", "white: used", Colors::Grey, {region}};
+  const PicturePanel rest = {residual,
+                             -6.0,
+                             6.0,
+                             "measured - predicted",
+                             "robust standard deviations",
+                             Colors::Diverging,
+                             {region}};
+  write_picture({measured, used, rest},
+                3,
+                view_name(view) + ": shifted by " + fixed_text(row.shift_px.x(), 2) + ", " +
+                    fixed_text(row.shift_px.y(), 2) + " px",
+                path);
+}
+
+void write_view(const ScanOptions& options,
+                const CalibratedScan& scan,
+                int view,
+                const RegionOfInterest& region,
+                const fs::path& folder) {
+  const CircularScan& geometry = scan.images.scan;
+  const Eigen::Vector2d spacing = geometry.pixel_spacing_mm;
+  const std::string name = view_name(view);
+  write_image(scan.images.line_integrals[static_cast<std::size_t>(view)],
+              folder / (name + ".mha"),
+              spacing.x(),
+              spacing.y());
+  const Image2d mask = mask_of(
+      geometry, scan.images.is_lit, judged(scan, view).alignment.residual, options.mask_deviations);
+  write_png_image(mask, folder / (name + "-mask.png"), 0.0, 1.0);
+  write_view_picture(scan, view, mask, region, folder / (name + ".png"));
+}
+
+std::string series_text(const char* key, const AngleSeries& series) {
+  return std::string(key) + " = " + toml_numbers(series.coefficients) + "\n";
+}
+
+std::string calibration_text(const CalibratedScan& scan) {
+  const ScanCalibration& found = scan.calibration;
+  const HeldOutResidual& after = scan.calibrated;
+  std::string text =
+      "# Found from the even views of the scan, judged by the odd ones against the even ones' "
+      "reconstruction. Pixels are those of the X-rays here.\n# Series: constant, cos a, sin a, cos "
+      "2a, sin 2a, ... of the view angle a.\n";
+  text += "scan = " + toml_text(scan.name) + "\n";
+  text += "source_to_axis_mm = " + toml_number(scan.images.scan.source_to_axis_mm) + "\n";
+  text += "source_to_detector_mm = " + toml_number(found.source_to_detector_mm) + "\n";
+  text += "tilt_rad = " + toml_number(found.tilt_rad) + "\n";
+  text += series_text("beam_foot_column_px", found.column_px);
+  text += series_text("beam_foot_row_px", found.row_px);
+  text += series_text("detector_rotation_rad", found.rotation_rad);
+  text += "water_mu_per_mm = " + toml_number(scan.water_mu_per_mm) + "\n";
+  text += "gold_residual_px = " + toml_number(after.rms_px) + "\n";
+  text += "gold_residual_mm_at_axis = " + toml_number(after.rms_mm_at_axis) + "\n";
+  text += "stated_residual_px = " + toml_number(scan.as_stated.rms_px) + "\n";
+  text += "stated_residual_mm_at_axis = " + toml_number(scan.as_stated.rms_mm_at_axis) + "\n";
+  return text;
+}
+
+void write_held_out(const CalibratedScan& scan, const fs::path& path) {
+  std::string text =
+      "view,angle_deg,column_shift_px,row_shift_px,gain,response_column,response_row\n";
+  for (const JudgedView& row : scan.calibrated.views) {
+    const double angle = scan.images.scan.angles_rad[static_cast<std::size_t>(row.view)];
+    text += std::to_string(row.view) + "," + number_text(angle * kDegPerRad) + "," +
+            number_text(row.shift_px.x()) + "," + number_text(row.shift_px.y()) + "," +
+            number_text(row.alignment.gain) + "," + number_text(row.alignment.response.x()) + "," +
+            number_text(row.alignment.response.y()) + "\n";
+  }
+  write_text_file(path, text);
+}
+
+}  // namespace
+
+std::vector<ViewPair> odd_view_pairs(const CircularScan& scan, int pairs) {
+  const std::vector<int> odd = CircularScan::every(1, 2, static_cast<int>(scan.angles_rad.size()));
+  const auto angle = [&](int view) { return scan.angles_rad[static_cast<std::size_t>(view)]; };
+  // Pairs a quarter turn apart have each other's views half a turn on: an odd share of the circle
+  // keeps them apart.
+  std::vector<ViewPair> result;
+  for (int pair = 0; pair < pairs; ++pair) {
+    const double wanted = 2.0 * std::numbers::pi * pair / pairs + angle(odd.front());
+    const auto nearest = [&](double target_rad) {
+      return *std::min_element(odd.begin(), odd.end(), [&](int a, int b) {
+        return angle_between_rad(angle(a), target_rad) < angle_between_rad(angle(b), target_rad);
+      });
+    };
+    const int first = nearest(wanted);
+    result.push_back({first, nearest(angle(first) + 0.5 * std::numbers::pi)});
+  }
+  return result;
+}
+
+Image2d mask_of(const CircularScan& scan,
+                const std::vector<unsigned char>& is_lit,
+                const std::vector<float>& residual,
+                double most_deviations) {
+  Image2d beyond(scan.size_px.x(), scan.size_px.y());
+  for (std::size_t i = 0; i < residual.size(); ++i)
+    beyond.pixels[i] =
+        most_deviations > 0.0 && std::abs(static_cast<double>(residual[i])) > most_deviations
+            ? 1.0F
+            : 0.0F;
+  // What moved has a border of some pixels, where it was and is.
+  const int around = std::max(2, scan.size_px.maxCoeff() / 80);
+  Image2d mask(beyond.width, beyond.height);
+  for (std::size_t i = 0; i < mask.pixels.size(); ++i)
+    mask.pixels[i] = is_lit[i] != 0 ? 1.0F : 0.0F;
+  // Single pixels are noise.
+  constexpr float kFewestNeighbours = 3.0F;
+  for (int row = 1; row + 1 < beyond.height; ++row)
+    for (int column = 1; column + 1 < beyond.width; ++column) {
+      float neighbours = 0.0F;
+      for (int j = -1; j <= 1; ++j)
+        for (int i = -1; i <= 1; ++i) neighbours += beyond.at(column + i, row + j);
+      if (beyond.at(column, row) == 0.0F || neighbours < kFewestNeighbours) continue;
+      for (int j = -around; j <= around; ++j)
+        for (int i = -around; i <= around; ++i) {
+          const int x = std::clamp(column + i, 0, mask.width - 1);
+          const int y = std::clamp(row + j, 0, mask.height - 1);
+          if (i * i + j * j <= around * around) mask.at(x, y) = 0.0F;
+        }
+    }
+  return mask;
+}
+
+std::string write_scan_study(const ScanOptions& options,
+                             const CalibratedScan& scan,
+                             const Provenance& provenance,
+                             const fs::path& folder) {
+  const RegionOfInterest region = seen_region(scan);
+  const std::vector<ViewPair> pairs = odd_view_pairs(scan.images.scan, options.pairs);
+  Study study;
+  study.path = folder / "study.toml";
+  study.rig_name_or_path = (folder / "rig.toml").string();
+  std::vector<int> written;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const RigidTransform nominal = nominal_pose(options, scan.name, static_cast<int>(i));
+    study.cases.push_back(case_of(
+        scan, numbered("pair", i), nominal, {pairs[i].first, pairs[i].second}, region, folder));
+    study.cases.push_back(
+        case_of(scan, numbered("single", i), nominal, {pairs[i].first}, region, folder));
+    for (const int view : {pairs[i].first, pairs[i].second}) {
+      if (std::find(written.begin(), written.end(), view) != written.end()) continue;
+      written.push_back(view);
+      study.rig.cameras.push_back(camera_of(scan, view));
+      write_view(options, scan, view, region, folder);
+    }
+  }
+  write_ct(scan.ct, folder / "ct.nii.gz");
+  write_text_file(folder / "rig.toml", rig_to_toml(study.rig));
+  write_text_file(folder / "study.toml", study_to_toml(study, folder));
+  write_text_file(folder / "calibration.toml", calibration_text(scan));
+  write_held_out(scan, folder / "held-out.csv");
+  write_text_file(folder / "provenance.json", to_json(provenance).dump(2) + "\n");
+  write_reproduce_script(folder, provenance);
+  return "Gold residual on " + std::to_string(scan.calibrated.views.size()) +
+         " held-out views: " + fixed_text(scan.calibrated.rms_px, 3) + " px, " +
+         fixed_text(scan.calibrated.rms_mm_at_axis, 4) +
+         " mm at the axis (as stated: " + fixed_text(scan.as_stated.rms_px, 3) + " px, " +
+         fixed_text(scan.as_stated.rms_mm_at_axis, 4) + " mm)";
+}
+
+}  // namespace af::tools

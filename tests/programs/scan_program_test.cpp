@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: Apache-2.0
+// The program af-scan as people run it, on a simulated scan of balls.
+#include <cmath>
+#include <cstdlib>
+#include <iostream>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "files/output_file.h"
+#include "image_files/ct_reader.h"
+#include "image_files/image_file.h"
+#include "study/study_file.h"
+#include "study/xray_reader.h"
+#include "support/run_program.h"
+#include "support/test_paths.h"
+#include "tools/scan/scan_reading.h"
+#include "unit/scan/simulated_scan.h"
+
+namespace af {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+constexpr const char* kScan = R"(name = "balls"
+source_to_axis_mm = 200.0
+axis_to_detector_mm = 100.0
+pixel_spacing_mm = [0.9, 0.9]
+size_px = [72, 60]
+rotation_axis = "rows"
+view_count = 120
+first_angle_deg = 10.0
+step_deg = 3.0
+files = "p{:03}.png"
+xray_domain = "intensity"
+dark_level = 500
+)";
+
+/// A detector off its place with a wobble.
+ScanCalibration true_geometry(const CircularScan& scan) {
+  ScanCalibration truth = ScanCalibration::nominal(scan, 2);
+  truth.column_px.coefficients << 36.5, 0.0, 0.0, 0.4, -0.3;
+  truth.row_px.coefficients << 29.5, 0.0, 0.0, -0.3, 0.2;
+  truth.rotation_rad.coefficients << 0.01, 0.0, 0.0, 0.002, 0.001;
+  return truth;
+}
+
+/// Counts of 16 bits: a beam of 40000 that falls off to the sides, 500 without beam.
+Image2d counts_of(const Image2d& line_integrals) {
+  Image2d counts = line_integrals;
+  for (int row = 0; row < counts.height; ++row)
+    for (int column = 0; column < counts.width; ++column) {
+      const double x = 2.0 * column / counts.width - 1.0;
+      const double air = 40000.0 * (1.0 - 0.1 * x * x);
+      float& value = counts.at(column, row);
+      value = static_cast<float>(std::round(500.0 + air * std::exp(-static_cast<double>(value))));
+    }
+  return counts;
+}
+
+class AfScan : public testing::Test {
+ protected:
+  void SetUp() override {
+    const CircularScan scan = test::small_scan();
+    const ScanCalibration truth = true_geometry(scan);
+    for (std::size_t view = 0; view < 120; ++view)
+      write_image_u16(counts_of(test::ball_image(scan_camera(scan, truth, scan.angles_rad[view]),
+                                                 test::lopsided_balls())),
+                      image(view),
+                      0.9,
+                      0.9);
+    write_text_file(scratch_ / "scan.toml", kScan);
+  }
+  [[nodiscard]] fs::path image(std::size_t view) const {
+    std::string digits = std::to_string(view);
+    digits.insert(0, 3 - digits.size(), '0');
+    return scratch_ / ("p" + digits + ".png");
+  }
+  [[nodiscard]] test::ProgramRun run(const std::string& more = "") const {
+    return test::run_command(std::string(AF_PROGRAM_FOLDER) + "/af-scan --scan '" +
+                             (scratch_ / "scan.toml").string() + "' -o '" +
+                             (scratch_ / "study").string() +
+                             "' --harmonics 2 --rounds 3 --focal-share 0 --tilt-deg 0 --pairs 2 " +
+                             "--coarse-px 4 --working-px 72 --search-px 36 " + more);
+  }
+  /// A refused scan leaves nothing behind.
+  void expect_refused(int exit_code, const std::string& message) const {
+    const test::ProgramRun refused = run();
+    EXPECT_EQ(refused.exit_code, exit_code) << refused.output;
+    EXPECT_THAT(refused.output, HasSubstr(message));
+    EXPECT_FALSE(fs::exists(scratch_ / "study"));
+    EXPECT_FALSE(fs::exists(scratch_ / "study.partial"));
+  }
+
+  test::ScratchFolder scratch_;
+};
+
+TEST_F(AfScan, MakesAStudyWhoseGoldPoseIsTheIdentity) {
+  const test::ProgramRun done = run();
+  ASSERT_EQ(done.exit_code, 0) << done.output;
+  EXPECT_THAT(done.output, HasSubstr("Gold residual on 60 held-out views"));
+  const Study study = read_study(scratch_ / "study" / "study.toml");
+  ASSERT_EQ(study.cases.size(), 4U);
+  const CtVolume ct = read_ct(study.cases[0].ct);
+  for (const StudyCase& study_case : study.cases) {
+    EXPECT_TRUE(study_case.gold_room_from_ct->isApprox(RigidTransform::Identity()));
+    EXPECT_FALSE(study_case.nominal_room_from_ct.isApprox(RigidTransform::Identity(), 1e-3));
+    for (const StudyView& view : study_case.views)
+      EXPECT_NO_THROW(read_mask(view, study.rig.camera(view.camera)));
+  }
+  const StudyCase& pair = study.find_case("pair-01");
+  ASSERT_EQ(pair.views.size(), 2U);
+  EXPECT_NEAR(study.rig.camera(pair.views[0].camera)
+                  .beam_direction()
+                  .dot(study.rig.camera(pair.views[1].camera).beam_direction()),
+              0.0,
+              0.06);  // 3 degrees from a quarter turn, as odd views are 6 apart
+  // The CT shows the heaviest ball where the X-rays do: along the rays through it, in both views.
+  const Eigen::Vector3d ball = test::lopsided_balls()[2].center_mm;
+  for (const StudyView& view : pair.views) {
+    const Image2d xray = read_xray_attenuation(view, study.rig.camera(view.camera));
+    const Eigen::Vector2d pixel = study.rig.camera(view.camera).project(ball);
+    // 14 mm of 0.01 twice less the ball's, and 5 mm of 0.04 at least, next to 0.3 beside it.
+    EXPECT_GT(
+        xray.at(static_cast<int>(std::lround(pixel.x())), static_cast<int>(std::lround(pixel.y()))),
+        0.3F);
+  }
+  const Eigen::Vector3d index = ct.grid.index_of(ball);
+  const auto voxel = [&](int axis) { return static_cast<std::size_t>(std::lround(index[axis])); };
+  const auto size = [&](std::size_t axis) { return static_cast<std::size_t>(ct.grid.size[axis]); };
+  EXPECT_GT(ct.hu[(voxel(2) * size(1) + voxel(1)) * size(0) + voxel(0)], 400);
+}
+
+TEST_F(AfScan, GivesTheSameBytesOnAnyNumberOfThreads) {
+  ASSERT_EQ(run("--threads 1").exit_code, 0);
+  const std::string one = read_text_file(scratch_ / "study" / "calibration.toml");
+  ASSERT_EQ(run("--threads 3 --force").exit_code, 0);
+  EXPECT_EQ(read_text_file(scratch_ / "study" / "calibration.toml"), one);
+}
+
+TEST_F(AfScan, RefusesAMissingView) {
+  fs::remove(image(119));
+  expect_refused(4, "view_count = 120");
+}
+
+TEST_F(AfScan, RefusesAMissingViewInTheMiddle) {
+  fs::remove(image(50));
+  expect_refused(4, "p050.png");
+}
+
+TEST_F(AfScan, RefusesMoreFilesThanViews) {
+  fs::copy_file(image(0), image(120));
+  expect_refused(3, "p120.png exists, too");
+}
+
+TEST_F(AfScan, RefusesAnImageOfAnotherSize) {
+  write_image_u16(Image2d(72, 61), image(30), 0.9, 0.9);
+  expect_refused(3, "must be size_px of the scan: 72 x 60");
+}
+
+TEST_F(AfScan, RefusesATruncatedImage) {
+  fs::resize_file(image(30), fs::file_size(image(30)) / 2);
+  expect_refused(4, "p030.png");
+}
+
+TEST_F(AfScan, RefusesAScanThatTurnsTheOtherWay) {
+  std::string text = kScan;
+  text.replace(text.find("step_deg = 3.0"), 14, "step_deg = -3.0");
+  write_text_file(scratch_ / "scan.toml", text);
+  expect_refused(3, "change the sign of step_deg");
+}
+
+/// Real images, which are not part of this project: the folder that AF_CBCT_CYLINDER names.
+TEST(CbctCylinder, AnExcerptGivesTheNumbersThatWereMeasured) {
+  const char* const folder = std::getenv("AF_CBCT_CYLINDER");
+  if (folder == nullptr)
+    GTEST_SKIP() << "set AF_CBCT_CYLINDER to the folder of the scan that docs/real-xrays.md names";
+  const tools::ScanFile file = tools::read_scan_file(AF_CBCT_CYLINDER_TOML);
+  ThreadPool pool(2);
+  const ScanImages all = tools::read_scan_images(file, folder, 350, pool).binned(3);
+  // Every third view: 120, 3 degrees apart.
+  ScanImages images = all;
+  images.scan.angles_rad.clear();
+  images.line_integrals.clear();
+  for (std::size_t view = 0; view < 360; view += 3) {
+    images.scan.angles_rad.push_back(all.scan.angles_rad[view]);
+    images.line_integrals.push_back(all.line_integrals[view]);
+  }
+  SelfCalibrationOptions options;
+  options.rounds = 2;
+  options.search_px = 60;
+  options.focal_share = 0.0;
+  options.tilt_deg = 0.0;
+  const std::vector<int> even = CircularScan::every(0, 2, 120);
+  const std::vector<int> odd = CircularScan::every(1, 2, 120);
+  const ScanCalibration found = self_calibrate(images, even, options, pool, [](const auto&) {});
+  const HeldOutResidual stated = held_out_residual(
+      images, stated_calibration(images, even, options), even, odd, options, pool);
+  const HeldOutResidual after = held_out_residual(images, found, even, odd, options, pool);
+  RecordProperty("stated_mm", std::to_string(stated.rms_mm_at_axis));
+  RecordProperty("gold_mm", std::to_string(after.rms_mm_at_axis));
+  std::cout << "stated " << stated.rms_mm_at_axis << " mm, found " << after.rms_mm_at_axis
+            << " mm, rotation " << found.rotation_rad.coefficients[0] << " rad\n";
+  EXPECT_GT(stated.rms_mm_at_axis, 0.2);
+  EXPECT_LT(after.rms_mm_at_axis, 0.08);
+}
+
+}  // namespace
+}  // namespace af

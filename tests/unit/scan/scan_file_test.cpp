@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/scan/scan_file.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+
+namespace af::tools {
+namespace {
+
+using testing::HasSubstr;
+
+const std::string kValid = R"(name = "small"
+source_to_axis_mm = 200.0
+axis_to_detector_mm = 100
+pixel_spacing_mm = [0.9, 0.8]
+size_px = [72, 60]
+rotation_axis = "rows"
+view_count = 120
+first_angle_deg = 10
+step_deg = -3.0
+files = "p{:04}.png"
+first_index = 7
+xray_domain = "intensity"
+dark_level = 900
+flat = "flat.png"
+)";
+
+/// The valid text with `from` replaced.
+std::string with(const std::string& from, const std::string& to) {
+  std::string text = kValid;
+  const std::size_t at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  return text.replace(at, from.size(), to);
+}
+
+std::string message_of(const std::string& text) {
+  try {
+    parse_scan_file(text, "scan.toml");
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+TEST(ScanFile, ReadsEveryKey) {
+  const ScanFile file = parse_scan_file(kValid, "scan.toml");
+  EXPECT_EQ(file.name, "small");
+  EXPECT_EQ(file.scan.source_to_axis_mm, 200.0);
+  EXPECT_EQ(file.scan.source_to_detector_mm, 300.0);
+  EXPECT_EQ(file.scan.pixel_spacing_mm, Eigen::Vector2d(0.9, 0.8));
+  EXPECT_EQ(file.scan.size_px, Eigen::Vector2i(72, 60));
+  EXPECT_EQ(file.scan.axis_along, AxisAlong::Rows);
+  ASSERT_EQ(file.scan.angles_rad.size(), 120U);
+  EXPECT_NEAR(file.scan.angles_rad[2] * kDegPerRad, 4.0, 1e-12);
+  EXPECT_EQ(file.file_of(0), "p0007.png");
+  EXPECT_EQ(file.file_of(119), "p0126.png");
+  EXPECT_EQ(file.dark_level, 900.0);
+  EXPECT_EQ(file.flat, "flat.png");
+  EXPECT_FALSE(file.dark.has_value());
+}
+
+TEST(ScanFile, WritesIndicesWithoutZerosWhenNotAsked) {
+  const ScanFile file = parse_scan_file(with("p{:04}.png", "a/Projection{}.png"), "scan.toml");
+  EXPECT_EQ(file.file_of(0), "a/Projection7.png");
+  EXPECT_EQ(file.file_of(113), "a/Projection120.png");
+}
+
+class MissingKey : public testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(Keys,
+                         MissingKey,
+                         testing::Values("source_to_axis_mm",
+                                         "axis_to_detector_mm",
+                                         "pixel_spacing_mm",
+                                         "size_px",
+                                         "rotation_axis",
+                                         "view_count",
+                                         "step_deg",
+                                         "files",
+                                         "xray_domain"));
+
+TEST_P(MissingKey, IsNamed) {
+  const std::size_t begin = kValid.find(std::string("\n") + GetParam()) + 1;
+  const std::size_t end = kValid.find('\n', begin) + 1;
+  const std::string text = kValid.substr(0, begin) + kValid.substr(end);
+  EXPECT_THAT(message_of(text), HasSubstr(std::string(GetParam()) + " is missing"));
+}
+
+struct BadValue {
+  const char* from;
+  const char* to;
+  const char* message;
+};
+
+class BadScanFile : public testing::TestWithParam<BadValue> {};
+INSTANTIATE_TEST_SUITE_P(
+    Values,
+    BadScanFile,
+    testing::Values(
+        BadValue{"= 200.0", "= -200.0", "source_to_axis_mm"},
+        BadValue{"= 200.0", "= nan", "source_to_axis_mm"},
+        BadValue{"= 200.0", "= 1e300", "source_to_axis_mm"},
+        BadValue{"= 200.0", "= \"far\"", "source_to_axis_mm"},
+        BadValue{"= 200.0", "= true", "source_to_axis_mm"},
+        BadValue{"mm = 100", "mm = 0", "axis_to_detector_mm = 0: must be above 0"},
+        BadValue{"[0.9, 0.8]", "[0.9, 0.0]", "pixel_spacing_mm"},
+        BadValue{"[0.9, 0.8]", "[0.9]", "pixel_spacing_mm"},
+        BadValue{"[72, 60]", "[72, 2147483647]", "size_px"},
+        BadValue{"[72, 60]", "[72, -60]", "size_px"},
+        BadValue{"\"rows\"", "\"z\"", "rotation_axis = \"z\": must be"},
+        BadValue{"= 120", "= 12.5", "view_count"},
+        BadValue{"= 120", "= 1000000000000", "view_count"},
+        BadValue{"= 120", "= 60", "must go all the way round"},
+        BadValue{"= -3.0", "= 0", "step_deg"},
+        BadValue{"= -3.0", "= inf", "step_deg"},
+        BadValue{"p{:04}.png", "p.png", "must hold {} once"},
+        BadValue{"p{:04}.png", "p{}{}.png", "must hold {} once"},
+        BadValue{"p{:04}.png", "p{:4}.png", "must hold {} once"},
+        BadValue{"p{:04}.png", "p}{.png", "must hold {} once"},
+        BadValue{"= 7", "= -1", "first_index"},
+        BadValue{"\"intensity\"", "\"counts\"", "xray_domain"},
+        BadValue{"\"intensity\"", "\"attenuation\"", "is for xray_domain = \"intensity\" alone"},
+        BadValue{"flat = ", "dark = \"d.png\"\nflat = ", "must not stand beside dark_level"},
+        BadValue{"flat = ", "flatt = ", "flatt"},
+        BadValue{"\"small\"", "\"../small\"", "must be usable in a file name"}));
+
+TEST_P(BadScanFile, IsRefusedByName) {
+  EXPECT_THAT(message_of(with(GetParam().from, GetParam().to)), HasSubstr(GetParam().message));
+}
+
+TEST(ScanFile, ThatIsNotTomlIsAFileError) {
+  EXPECT_THROW(parse_scan_file("= 3", "scan.toml"), FileError);
+  EXPECT_THROW(parse_scan_file("", "scan.toml"), FileError);
+}
+
+}  // namespace
+}  // namespace af::tools
