@@ -87,7 +87,7 @@ TEST(CommunicatorAlone, NeedsNoMpi) {
     alone.broadcast(text);
     EXPECT_EQ(text, "mine");
     const std::vector<std::byte> bytes(5, std::byte{4});
-    EXPECT_EQ(alone.all_gather(bytes), std::vector{bytes});
+    EXPECT_EQ(alone.all_gather(bytes), (std::vector<std::vector<std::byte>>{bytes}));
     EXPECT_EQ(alone.node().size(), 1);
     const auto memory = alone.allocate_on_nodes_from_root(
         100, [](std::span<std::byte> all) { std::memset(all.data(), 7, all.size()); });
