@@ -8,8 +8,11 @@
 
 #include "cli/app_main.h"
 #include "cli/bind_options.h"
+#include "files/output_file.h"
+#include "run/terminal.h"
 #include "study/study_template.h"
 #include "tools/inspect/inspection.h"
+#include "tools/inspect/pose_conversion.h"
 
 namespace {
 
@@ -21,6 +24,8 @@ struct Options {
   bool as_json = false;
   bool lists_views = false;
   bool lists_inputs = false;
+  af::PoseConversion poses;
+  std::filesystem::path output;
   af::CtReadOptions ct;
 
   void describe(af::Fields& field);
@@ -45,6 +50,10 @@ void Options::describe(af::Fields& field) {
         "Of studies, for scripts: one line per case and file that it reads, with a tab between "
         "them")
       .excludes({"--json", "--list-views"});
+  field.part(poses);
+  field("output", output, "With --pose-to: the file to write")
+      .as("-o,--output")
+      .needs({"--pose-to"});
   field.part(ct);
   field.last().help = "SeriesInstanceUID to read from a DICOM folder that holds several series";
 }
@@ -61,7 +70,21 @@ void print(const Options& options, const std::vector<af::Inspection>& inspection
   std::cout << array.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) << '\n';
 }
 
+void convert_poses(const Options& options, const Communicator& world) {
+  if (options.paths.size() != 1 || options.output.empty())
+    throw af::UsageError("--pose-to takes one PATH, and -o names the file to write");
+  std::vector<std::string> notes;
+  const std::string bytes =
+      af::converted_poses(options.paths.front(), options.poses, options.ct, notes);
+  for (const std::string& note : notes) af::warn(world, note);
+  af::write_text_file(options.output, bytes);
+}
+
 void run(const Options& options, const Communicator& world) {
+  if (!options.poses.format.empty()) {
+    if (world.is_root()) convert_poses(options, world);
+    return;
+  }
   if (!options.template_name.empty()) {
     if (world.is_root()) std::cout << af::template_text(options.template_name);
     return;
