@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pose_files/project_poses.h"
 
+#include <algorithm>
 #include <array>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -134,7 +135,11 @@ PosesInFile read_json_pose(const PoseFileBytes& file, const PoseContext& /*conte
 }
 
 bool is_toml_pose(const PoseFileBytes& file) {
-  return file.path.extension() == ".toml" || file.bytes.find(kPoseKey) != std::string::npos;
+  const std::vector<std::string> lines = lines_of(file.bytes);
+  return file.path.extension() == ".toml" ||
+         std::ranges::any_of(lines, [](const std::string& line) {
+           return line.substr(line.find_first_not_of(" \t")).starts_with(kPoseKey);
+         });
 }
 
 PosesInFile read_toml_pose(const PoseFileBytes& file, const PoseContext& /*context*/) {

@@ -51,9 +51,7 @@ void Options::describe(af::Fields& field) {
         "them")
       .excludes({"--json", "--list-views"});
   field.part(poses);
-  field("output", output, "With --pose-to: the file to write")
-      .as("-o,--output")
-      .needs({"--pose-to"});
+  field("output", output, "With --pose-to: the file to write").as("-o,--output");
   field.part(ct);
   field.last().help = "SeriesInstanceUID to read from a DICOM folder that holds several series";
 }
@@ -81,6 +79,8 @@ void convert_poses(const Options& options, const Communicator& world) {
 }
 
 void run(const Options& options, const Communicator& world) {
+  if (options.poses.format.empty() && !options.output.empty())
+    throw af::UsageError("-o names the file that --pose-to writes: give both");
   if (!options.poses.format.empty()) {
     if (world.is_root()) convert_poses(options, world);
     return;
