@@ -25,6 +25,7 @@ constexpr double kMostOpaquePart = 0.02;   ///< of the picture, one body
 constexpr double kPenumbraShare = 0.06;    ///< of the shorter side: the widest penumbra
 constexpr double kRisen = 0.9;             ///< of the level inside: where the penumbra ends
 constexpr double kStraightShare = 0.15;    ///< of the shorter side
+constexpr double kMostStraight = 0.5;      ///< of a circle's edge, where anatomy crosses it
 constexpr double kCircleRmsShare = 0.02;   ///< of the radius
 constexpr double kNoiseSigmaPx = 1.5;
 
@@ -404,14 +405,20 @@ Image2d field_of(const Image2d& live, XrayBorders& borders) {
   }
   if (beyond > kLeastMasked * total) {
     std::vector<Point> edge;
+    double length_px = 0.0;
+    double straight_px = 0.0;
     for (std::size_t i = 0; i < sides.size(); ++i) {
       if (sides[i].is_picture_edge) continue;
-      borders.straight_sides +=
-          sides[i].length_px > kStraightShare * std::min(live.width, live.height) ? 1 : 0;
+      length_px += sides[i].length_px;
+      if (sides[i].length_px > kStraightShare * std::min(live.width, live.height)) {
+        straight_px += sides[i].length_px;
+        ++borders.straight_sides;
+      }
       edge.push_back(hull[i]);
       edge.push_back(hull[(i + 1) % hull.size()]);
     }
-    borders.circle = fitted_circle(edge);
+    // A circle goes through the corners of any rectangle.
+    if (straight_px < kMostStraight * length_px) borders.circle = fitted_circle(edge);
     if (borders.circle) sides = sides_of_circle(*borders.circle);
     borders.margin_px = 1 + penumbra_px(smooth, sides, levels.border) +
                         (borders.circle ? static_cast<int>(std::ceil(borders.circle->rms_px)) : 0);
