@@ -183,7 +183,7 @@ of_xray 3 'PixelIntensityRelationship' 'logarithms as intensities' logarithms.dc
 of_xray 3 'must be grey' 'X-ray in colour' colour.dcm ''
 of_xray 4 'pixel data' 'frames that are not there' promises-frames.dcm 'xray_frame = 1'
 of_study 3 'must be a positive number or one of percentile' 'unknown air level' "$(edited study.toml '0,/^xray_domain = .*/s//xray_domain = "intensity"\nair_level = "sky"/')"
-of_study 3 'beside `flat`' 'air level beside a flat field' "$(edited study.toml '0,/^xray_domain = .*/s//xray_domain = "intensity"\nair_level = 5.0\nflat = "f.mha"/')"
+of_study 3 'which gives it for every pixel' 'air level beside a flat field' "$(edited study.toml '0,/^xray_domain = .*/s//xray_domain = "intensity"\nair_level = 5.0\nflat = "f.mha"/')"
 of_study 3 'xray_frame' 'frame of a MetaImage' "$(edited study.toml '0,/^xray_domain = .*/s//&\nxray_frame = 2/')"
 row 3 'nobody' 'unknown case' "$bin/af-register" --study valid/study.toml --case nobody --renderer raycast -o out/result
 
