@@ -17,6 +17,7 @@
 #include "register/results/target_errors.h"
 #include "run/run_folder.h"
 #include "run/terminal.h"
+#include "study/pose_context.h"
 #include "study/shared_inputs.h"
 #include "text/csv_table.h"
 #include "text/options_toml.h"
@@ -43,8 +44,8 @@ void run(const RegisterOptions& options,
   for (const std::string& text : study_warnings) af::warn(world, text);
   const af::StudyCase study_case =
       af::all_or_none(world, [&] { return study.find_case(options.case_name); });
-  const std::vector<af::RigidTransform> starts =
-      af::shared_poses(world, [&] { return start_poses(options, study_case.frame()); });
+  const std::vector<af::RigidTransform> starts = af::shared_poses(
+      world, [&] { return start_poses(options, af::pose_context(study, study_case)); });
   const auto gold = af::all_or_none(world, [&] { return known_gold(study, study_case); });
   const auto pool = std::make_shared<af::ThreadPool>(af::thread_count(options.method.threads));
   CaseLoadOptions load_options =

@@ -14,7 +14,7 @@
 #include "field/index_coding.h"
 #include "image_files/ct_reader.h"
 #include "image_files/image_file.h"
-#include "study/pose_file.h"
+#include "pose_files/pose_file.h"
 #include "study/rig_file.h"
 #include "study/study_template.h"
 #include "unit/image_files/ct_test_data.h"
@@ -80,6 +80,21 @@ void write_pose_seeds(const fs::path& folder) {
   write_seed(folder / "pose" / "versor",
              "\2#Insight Transform File V1.0\nTransform: VersorRigid3DTransform_double_3_3\n"
              "Parameters: 0.1 0 0.2 1 2 3\nFixedParameters: 0 0 1\n"s);
+  PoseContext context;
+  context.ct_grid = [] {
+    CtGrid grid;
+    grid.size = {20, 30, 40};
+    return grid;
+  };
+  context.rig = [] { return parse_rig(builtin_rig_text("c-arm-12in"), "c-arm-12in"); };
+  const RigidTransform pose = some_pose();
+  for (const char* format : {"dicom", "itk-hdf5", "diffdrr", "csv"})
+    write_seed(folder / "pose" / format, "\0"s + pose_file_bytes(format, {&pose, 1}, context));
+  write_seed(folder / "pose" / "autoscoper",
+             "\4"s + pose_file_bytes("autoscoper", {&pose, 1}, context));
+  write_seed(folder / "pose" / "euler",
+             "\2#Insight\nTransform: Euler3DTransform_double_3_3\nParameters: 0.1 0.2 0.3 4 5 6\n"
+             "FixedParameters: 10 20 30 1\n"s);
   write_seed(folder / "pose" / "json",
              "\3{\"room_from_ct\": [[1,0,0,1],[0,1,0,2],[0,0,1,3],[0,0,0,1]], \"a\": [null]}"s);
 }

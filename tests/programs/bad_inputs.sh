@@ -267,6 +267,31 @@ awk 'BEGIN { print "rx_deg,ry_deg,rz_deg,tx_mm,ty_mm,tz_mm"; for (i = 0; i < 400
 row 3 'must fit' 'more DRRs than the machine can hold' "$bin/af-drr" --field AP.af.h5 --rig c-arm-12in --camera AP --poses poses.csv -o out/drrs.mha
 row 3 'must fit' 'more poses than the machine can hold' "$bin/af-evaluate" image-quality --field AP.af.h5 --ct valid/ct.nii.gz --pose-count 2000000000 -o out
 
+printf -- '--- poses of other programs ---\n'
+printf '%s\n' '1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1' >one.txt
+for format in dicom itk-hdf5; do
+  "$bin/af-inspect" one.txt --pose-to "$format" -o "one.$format"
+  for bytes in 100 400 900 1500; do
+    head -c "$bytes" "one.$format" >"cut-$bytes.$format"
+    row 4 "cut-$bytes.$format" "$format pose of $bytes bytes" "${drr_of_ct[@]}" --pose "cut-$bytes.$format"
+  done
+done
+sed 's/RIGID /AFFINE/' one.dicom >affine.dicom
+row 3 'must be RIGID' 'affine registration' "${drr_of_ct[@]}" --pose affine.dicom
+nans=NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN
+printf '%s\n' "$nans" "$nans" >nan.tra
+row 3 'holds no pose' 'Autoscoper frames that were not tracked' "${drr_of_ct[@]}" --pose nan.tra
+printf '%s\n' "$nans" '2 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1' >scaled.tra
+row 3 'frame 2' 'Autoscoper frame not rigid' "${drr_of_ct[@]}" --pose scaled.tra
+printf '%s\n' '1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1' '1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1' >two.tra
+row 3 'one is expected' 'two frames as one pose' "${drr_of_ct[@]}" --pose two.tra
+printf '%s\n' '#Insight' 'Transform: Euler3DTransform_double_3_3' 'Parameters: 1 2 3 4 5' 'FixedParameters: 0 0 0' >five.tfm
+row 4 'number of Parameters' 'Euler transform of five numbers' "${drr_of_ct[@]}" --pose five.tfm
+printf '%s\n' 'diffdrr_parameterization = "se3"' 'rotation_rad = [[0, 0, nan]]' 'translation_mm = [[0, 0]]' >bad-diffdrr.toml
+row 3 'diffdrr_parameterization' 'DiffDRR pose with mistakes' "${drr_of_ct[@]}" --pose bad-diffdrr.toml
+row 2 'needs' 'a case without a study' "$bin/af-inspect" one.txt --pose-to toml --case a -o out/one.toml
+row 3 'Autoscoper' 'Autoscoper pose of no CT' "$bin/af-inspect" one.txt --pose-to autoscoper -o out/one.tra
+
 printf -- '--- outputs that are inputs ---\n'
 ln valid/ct.nii.gz hard.nii.gz
 ln -s valid/rig.toml soft.toml
