@@ -57,6 +57,7 @@ void run(const RegisterOptions& options,
     return load_case(study, study_case, load_options, world);
   }();
   for (const std::string& text : loaded.warnings) af::warn(world, text);
+  for (const auto& [input, note] : loaded.input_notes) af::inform(world, input + ": " + note);
   RegistrationRunner runner =
       af::all_or_none(world, [&] { return RegistrationRunner(loaded.problem, method, pool); });
   PoseExaminer examiner = af::all_or_none(world, [&] { return PoseExaminer(loaded.problem); });
@@ -76,7 +77,8 @@ void run(const RegisterOptions& options,
                             af::to_toml(in_force),
                             options.method.seed,
                             world.size(),
-                            loaded.input_sha256};
+                            loaded.input_sha256,
+                            loaded.input_notes};
   auto& input_sha256 = description.provenance.input_sha256;
   af::all_or_none(world, [&] {
     if (world.is_root()) input_sha256.merge(hashes_of_files(options));

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iostream>
+#include <iterator>
 #include <stdexcept>
 #include <string>
 
@@ -131,6 +132,31 @@ void write_dicom_seeds(const fs::path& folder) {
              "\x28\0\x10\0\2\0\0\0\1\0\x28\0\x11\0\2\0\0\0\1\0\xe0\x7f\x10\0\2\0\0\0\1\1"s);
 }
 
+/// The first byte is how the study reads the file.
+void write_dicom_xray_seeds(const fs::path& folder) {
+  const fs::path scratch = folder / "dicom_xray.tmp";
+  std::vector<int> levels(12 * 12, 3000);
+  for (std::size_t i = 0; i < levels.size(); ++i)
+    if (i % 12 < 2 || i / 12 > 9) levels[i] = 10;
+  const auto write = [&](const std::string& name, char choice, test::DicomTestFile file) {
+    file.write(scratch);
+    std::ifstream written(scratch, std::ios::binary);
+    write_seed(folder / "dicom_xray" / name,
+               choice + std::string(std::istreambuf_iterator<char>(written), {}));
+    fs::remove(scratch);
+  };
+  write("plain", '\x22', test::xa_file(12, 12, 1, levels));
+  write("frames", '\x61', test::xa_file(12, 12, 3, levels));
+  test::DicomTestFile inverted = test::xa_file(12, 12, 1, levels);
+  inverted.set_text({0x0028, 0x0004}, "CS", "MONOCHROME1");
+  inverted.set_text({0x0028, 0x1041}, "SS", "\xff\xff");
+  inverted.set_text({0x0028, 0x1040}, "CS", "LOG");
+  inverted.set_text({0x0028, 0x1052}, "DS", "-5");
+  inverted.set_text({0x0028, 0x1053}, "DS", "0.5");
+  write("inverted", '\x3a', inverted);
+  write("attenuation", '\x24', inverted);
+}
+
 /// As fuzz_index_coding takes it apart: two codewords, extents, a chunk.
 void write_index_coding_seeds(const fs::path& folder) {
   Codebook codebook{{Tile{}, Tile{}, Tile{}}};
@@ -239,6 +265,7 @@ int main(int argc, char** argv) {
     write_pose_seeds(folder);
     write_image_seeds(folder);
     write_dicom_seeds(folder);
+    write_dicom_xray_seeds(folder);
     write_index_coding_seeds(folder);
     write_other_seeds(folder);
     write_report_seeds(folder);

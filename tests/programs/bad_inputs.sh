@@ -174,6 +174,17 @@ of_study 3 'roi_px' 'ROI of huge numbers' "$(edited study.toml '0,/^roi_px = .*/
 of_study 3 'collinear' 'collinear fiducials' "$(edited study.toml 's/^name = .*/&\nfiducials_ct_mm = [[0,0,0],[1,1,1],[2,2,2],[3,3,3]]/; s/^roi_px = .*/&\nfiducials_px = [[10,10],[20,20],[30,30],[40,41]]/')"
 of_study 4 'gone.mha' 'X-ray missing' "$(edited study.toml '0,/^xray = .*/s//xray = "gone.mha"/')"
 of_study 4 'edited-study.toml' 'not TOML' "$(edited study.toml '1s/^.*$/rig = /')"
+# of_xray CODE PART WHAT FILE KEYS: the valid study with another first X-ray, and keys beside it.
+of_xray() { of_study "$1" "$2" "$3" "$(edited study.toml "0,/^xray = .*/s//xray = \"..\/$4\"\n$5/; 0,/^xray_domain = .*/s//xray_domain = \"intensity\"/")"; }
+of_xray 3 'say which frame' 'X-ray of several frames' frames.dcm ''
+of_xray 3 'must be 1 to 2' 'frame that is not there' frames.dcm 'xray_frame = 3'
+of_xray 3 'pixel_spacing_mm of camera' "X-ray of another detector's pixels" other-spacing.dcm ''
+of_xray 3 'PixelIntensityRelationship' 'logarithms as intensities' logarithms.dcm ''
+of_xray 3 'must be grey' 'X-ray in colour' colour.dcm ''
+of_xray 4 'pixel data' 'frames that are not there' promises-frames.dcm 'xray_frame = 1'
+of_study 3 'must be a positive number or one of percentile' 'unknown air level' "$(edited study.toml '0,/^xray_domain = .*/s//xray_domain = "intensity"\nair_level = "sky"/')"
+of_study 3 'which gives it for every pixel' 'air level beside a flat field' "$(edited study.toml '0,/^xray_domain = .*/s//xray_domain = "intensity"\nair_level = 5.0\nflat = "f.mha"/')"
+of_study 3 'xray_frame' 'frame of a MetaImage' "$(edited study.toml '0,/^xray_domain = .*/s//&\nxray_frame = 2/')"
 row 3 'nobody' 'unknown case' "$bin/af-register" --study valid/study.toml --case nobody --renderer raycast -o out/result
 
 printf -- '--- options ---\n'

@@ -84,8 +84,9 @@ ordered_json view_json(const StudyView& view,
   json["roi_px"] = {view.roi.column, view.roi.row, view.roi.width, view.roi.height};
   json["fiducials"] = view.fiducials_px.size();
   const CameraGeometry& camera = rig.camera(view.camera);
-  used_from(view.places, "xray", [&] { (void)read_xray_attenuation(view, camera); });
-  used_from(view.places, "mask", [&] { (void)read_mask(view, camera); });
+  ViewXray xray = read_view_xray(view, camera);
+  json["xray_reading"] = xray.note;
+  for (std::string& warning : xray.warnings) warnings.push_back(std::move(warning));
   if (!view.field) return json;
   json["field"] = view.field->string();
   // A study is written before its fields are made.

@@ -303,7 +303,8 @@ std::string input_lines(const fs::path& study_path) {
     for (const fs::path& file : rig_files(study.rig_name_or_path)) add(file);
     for (const StudyView& view : study_case.views) {
       add(view.xray);
-      if (view.mask.has_value()) add(*view.mask);
+      for (const auto& path : {view.mask, view.reading.flat, view.reading.dark})
+        if (path.has_value()) add(*path);
     }
   }
   return lines;

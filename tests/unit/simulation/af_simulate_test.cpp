@@ -51,7 +51,7 @@ TEST_F(AfSimulate, MakesAStudyThatReadsBack) {
   ASSERT_EQ(patient.fiducials_ct_mm.size(), 4u);
   for (const StudyView& view : patient.views) {
     const CameraGeometry& camera = study.rig.camera(view.camera);
-    const Image2d attenuation = read_xray_attenuation(view, camera);
+    const Image2d attenuation = read_view_xray(view, camera).attenuation;
     EXPECT_EQ(attenuation.width, camera.size_px.x());
     EXPECT_GE(view.roi.column, 2);
     EXPECT_LE(view.roi.row + view.roi.height, camera.size_px.y() - 2);
