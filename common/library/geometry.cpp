@@ -5,7 +5,7 @@
 
 #include "base/error.h"
 #include "library/translation.h"
-#include "study/pose_file.h"
+#include "pose_files/pose_file.h"
 #include "study/rig_file.h"
 
 namespace af::library {

@@ -13,7 +13,7 @@
 #include "field_file/field_file.h"
 #include "library/ct_impl.h"
 #include "library/translation.h"
-#include "study/pose_file.h"
+#include "pose_files/pose_file.h"
 
 namespace attenuation_fields {
 

@@ -10,8 +10,8 @@
 #include "base/joined.h"
 #include "figures/picture.h"
 #include "files/output_file.h"
+#include "pose_files/pose_file.h"
 #include "register/results/registration_columns.h"
-#include "study/pose_file.h"
 
 namespace af::registration {
 namespace {
