@@ -2,6 +2,9 @@
 # What is installed beside the programs, and the Debian package that holds it: cmake --build build/release --target package.
 # What names no component of its own is of the component "programs", which is the package attenuation-fields.
 set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME programs)
+# Debian looks for copyright and changelog in a folder of the package's name.
+set(CMAKE_INSTALL_DOCDIR ${CMAKE_INSTALL_DATAROOTDIR}/doc/attenuation-fields)
+set(AF_PACKAGE_CONTACT "The authors of attenuation_fields <nobody@localhost>" CACHE STRING "Maintainer of the package")
 set(af_programs af-precompute af-drr af-simulate af-register af-evaluate af-inspect)
 
 # Manual pages and completions are asked of the programs when they are installed, so that they cannot differ from them.
@@ -37,13 +40,13 @@ install(FILES packaging/copyright DESTINATION ${CMAKE_INSTALL_DOCDIR})
 install(FILES packaging/lintian-overrides DESTINATION ${CMAKE_INSTALL_DATADIR}/lintian/overrides RENAME attenuation-fields)
 install(CODE "
   set(log \"${CMAKE_CURRENT_BINARY_DIR}/changelog\")
-  file(WRITE \"\${log}\" \"attenuation-fields (${PROJECT_VERSION}) bookworm; urgency=medium\\n\\n  * Built from source by CPack.\\n\\n -- The authors of attenuation_fields <nobody@localhost>  Thu, 01 Jan 1970 00:00:00 +0000\\n\")
+  file(WRITE \"\${log}\" \"attenuation-fields (${PROJECT_VERSION}) bookworm; urgency=medium\\n\\n  * Built from source by CPack.\\n\\n -- ${AF_PACKAGE_CONTACT}  Thu, 01 Jan 1970 00:00:00 +0000\\n\")
   execute_process(COMMAND gzip -9nf \"\${log}\" COMMAND_ERROR_IS_FATAL ANY)
   file(INSTALL \"\${log}.gz\" DESTINATION \"\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_DOCDIR}\")")
 
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME attenuation-fields)
-set(CPACK_PACKAGE_CONTACT "The authors of attenuation_fields <nobody@localhost>")
+set(CPACK_PACKAGE_CONTACT "${AF_PACKAGE_CONTACT}")
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "2D-3D registration of CTs and X-rays with attenuation fields")
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
@@ -60,8 +63,9 @@ set(CPACK_DEBIAN_PROGRAMS_PACKAGE_NAME attenuation-fields)
 set(CPACK_DEBIAN_PROGRAMS_PACKAGE_DEPENDS "openmpi-bin")
 set(CPACK_DEBIAN_PROGRAMS_PACKAGE_RECOMMENDS "gnuplot-nox")
 set(CPACK_DEBIAN_PROGRAMS_PACKAGE_SUGGESTS "invesalius-examples")
-set(CPACK_COMPONENT_PROGRAMS_DESCRIPTION "The programs af-precompute, af-drr, af-simulate, af-register, af-evaluate and af-inspect make
-compressed attenuation fields from CTs, look digitally reconstructed radiographs
-up in them, find the pose of a CT from calibrated X-rays, and measure how well
-that works. Research software: not a medical device.")
+set(CPACK_COMPONENT_PROGRAMS_DESCRIPTION "The programs af-precompute, af-drr, af-simulate, af-register, af-evaluate
+and af-inspect make compressed attenuation fields from CTs, look digitally
+reconstructed radiographs up in them, find the pose of a CT from calibrated
+X-rays, and measure how well that works. Research software: not a medical
+device.")
 include(CPack)

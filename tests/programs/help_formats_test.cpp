@@ -86,7 +86,7 @@ TEST(SlicerModule, RegistersFromATransformOfSlicer) {
 TEST(Option, IsFoundWithUnderscoresForDashes) {
   const test::ProgramRun known = run_command(program("af-drr") + " --window_percent=90,10");
   EXPECT_THAT(known.output, Not(HasSubstr("window_percent")));
-  const test::ProgramRun unknown = run_command(program("af-drr") + " --no_such_option");
+  const test::ProgramRun unknown = run_command(program("af-drr") + " -o x.mha --no_such_option");
   EXPECT_EQ(unknown.exit_code, 2);
   EXPECT_THAT(unknown.output, HasSubstr("--no_such_option"));
 }
