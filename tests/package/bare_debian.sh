@@ -34,7 +34,7 @@ fi
 
 if [[ -z "$root" ]]; then
   root=$(mktemp -d)
-  trap 'umount "$root/proc" "$root/dev" || true; rm -rf --one-file-system "$root"' EXIT
+  trap 'umount --recursive "$root/proc" "$root/dev" "$root/sys" || true; rm -rf --one-file-system "$root"' EXIT
 fi
 mirror=${AF_DEBIAN_MIRROR:-http://deb.debian.org/debian}
 if [[ ! -e "$root/etc/debian_version" ]]; then
@@ -43,6 +43,7 @@ if [[ ! -e "$root/etc/debian_version" ]]; then
 fi
 mount -t proc proc "$root/proc"
 mount --rbind /dev "$root/dev"
+mount --rbind /sys "$root/sys"
 cp /etc/resolv.conf "$root/etc/resolv.conf"
 rm -rf "$root/packages"
 mkdir "$root/packages"
@@ -78,7 +79,7 @@ af-precompute "${field[@]}" --camera AP -o AP.af.h5
 mpirun -n 2 --oversubscribe af-precompute "${field[@]}" --camera LAT -o LAT.af.h5
 af-drr --field AP.af.h5 -o drr.png
 af-register --study study/study.toml --field AP=AP.af.h5 --field LAT=LAT.af.h5 --start-rotation-deg 1,-1,1 -o result
-af-inspect AP.af.h5 result/pose.toml
+af-inspect AP.af.h5 result/pose.toml | grep -E 'field|checksums|pose'
 /usr/libexec/attenuation-fields/slicer/af-register --xml | head -n 1
 TEXT
 cat >"$root/packages/remove.sh" <<'TEXT'
