@@ -8,6 +8,8 @@
 
 #include <CLI/CLI.hpp>
 
+#include "cli/option_values.h"
+
 namespace af::cli {
 
 namespace {
@@ -80,7 +82,17 @@ void bind_field(CLI::App& app, const Field& field) {
   if (field.number_count > 0) option->expected(field.number_count);
   if (field.is_comma_separated) option->delimiter(',');
   if (field.takes_one_at_a_time) option->allow_extra_args(false);
-  if (field.is_size) option->transform(CLI::AsSizeValue(true));
+  if (field.is_size) {
+    option->transform(CLI::AsSizeValue(true));
+    // The transform added last comes first.
+    option->transform(CLI::Validator(
+        [](std::string& text) {
+          text = whole_bytes(text);
+          return std::string();
+        },
+        "",
+        "decimal size"));
+  }
   option->required(field.is_required);
   bound_fields().insert_or_assign(option, field);
 }
@@ -92,10 +104,11 @@ void bind_fields(CLI::App& app, const Fields& fields) {
     if (!field.option.empty()) bind_field(app, field);
   for (const Field& field : fields) {
     if (field.option.empty()) continue;
-    for (const std::string& other : field.excluded)
-      app.get_option(field.option)->excludes(app.get_option(other));
-    for (const std::string& other : field.needed)
-      app.get_option(field.option)->needs(app.get_option(other));
+    // Of "-o,--output" any one name finds the option.
+    CLI::Option* const option =
+        app.get_option(field.option.substr(field.option.find_last_of(',') + 1));
+    for (const std::string& other : field.excluded) option->excludes(app.get_option(other));
+    for (const std::string& other : field.needed) option->needs(app.get_option(other));
   }
 }
 

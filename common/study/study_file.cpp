@@ -136,6 +136,15 @@ void check_fiducials(TomlTableReader& reader,
     }
 }
 
+/// mask = "auto" or a file; a file of that name is "./auto".
+void read_mask_key(TomlTableReader& reader, const fs::path& folder, StudyView& view) {
+  const auto text = reader.get_string("mask", Presence::Optional);
+  if (!text) return;
+  view.reading.masks_borders = *text == "auto";
+  if (!view.reading.masks_borders)
+    view.mask = get_path(reader, "mask", Presence::Optional, folder, view.places);
+}
+
 StudyView read_view(const toml::table& table,
                     const std::string& prefix,
                     std::size_t fiducial_count,
@@ -152,7 +161,9 @@ StudyView read_view(const toml::table& table,
   view.roi = get_roi(reader, camera);
   view.fiducials_px = get_points<2>(reader, "fiducials_px");
   view.field = path("field", Presence::Optional);
-  view.mask = path("mask", Presence::Optional);
+  view.reading = read_xray_keys(
+      reader, view.xray_domain, [&](const char* key) { return path(key, Presence::Optional); });
+  read_mask_key(reader, context.folder, view);
   check_fiducials(reader, view, fiducial_count, camera);
   reader.refuse_unknown_keys();
   return view;
@@ -229,11 +240,14 @@ void read_cases(TomlTableReader& reader, Study& study, const StudyContext& conte
   }
 }
 
-/// The rig's shipped name, or its path made absolute.
+/// The rig's shipped name, or the paths of its files made absolute.
 std::string resolved_rig(const std::string& rig, const fs::path& folder) {
-  const auto names = builtin_rig_names();
-  if (std::find(names.begin(), names.end(), rig) != names.end()) return rig;
-  return resolved(folder, rig).string();
+  // A comma in the name of one file does not make it two.
+  if (fs::exists(resolved(folder, rig))) return resolved(folder, rig).string();
+  const std::vector<fs::path> files = rig_files(rig);
+  if (files.empty()) return rig;
+  return joined(
+      files, ",", [&](const fs::path& file) { return resolved(folder, file.string()).string(); });
 }
 
 std::string relative_if_below(const fs::path& path, const fs::path& folder) {
@@ -263,6 +277,9 @@ std::string view_text(const StudyView& view, const fs::path& folder) {
   if (!view.fiducials_px.empty()) text += "fiducials_px = " + points_text(view.fiducials_px) + "\n";
   if (view.field) add_path("field", *view.field);
   if (view.mask) add_path("mask", *view.mask);
+  if (view.reading.masks_borders) text += "mask = \"auto\"\n";
+  text += xray_keys_text(view.reading,
+                         [&](const fs::path& path) { return relative_if_below(path, folder); });
   return text;
 }
 
@@ -333,13 +350,15 @@ std::string study_to_toml(const Study& study, const std::filesystem::path& folde
   // A folder named with a trailing slash is the same folder.
   const fs::path absolute_folder =
       tidied(fs::absolute(folder.empty() ? fs::path("./") : folder / "")).parent_path();
-  const auto names = builtin_rig_names();
-  const bool is_builtin =
-      std::find(names.begin(), names.end(), study.rig_name_or_path) != names.end();
+  const std::vector<fs::path> rig = rig_files(study.rig_name_or_path);
   std::string text =
       "rig = " +
-      toml_text(is_builtin ? study.rig_name_or_path
-                           : relative_if_below(study.rig_name_or_path, absolute_folder)) +
+      toml_text(rig.empty() ? study.rig_name_or_path
+                            : joined(rig,
+                                     ",",
+                                     [&](const fs::path& file) {
+                                       return relative_if_below(file, absolute_folder);
+                                     })) +
       "\n";
   for (const StudyCase& study_case : study.cases) text += case_text(study_case, absolute_folder);
   return text;
