@@ -19,10 +19,15 @@ CsvTable case_table(const json& renderers) {
                   "mean_tre_of_successes_mm",
                   "sd_tre_of_successes_mm",
                   "median_tre_of_all_mm",
-                  "p95_tre_of_all_mm"});
+                  "p95_tre_of_all_mm",
+                  "gross_failures",
+                  "mrpd_successes",
+                  "capture_range_mm",
+                  "capture_range_ended_by"});
   const auto add = [&](const std::string& renderer, const std::string& name, const json& part) {
     const json& successes = part.at("tre_of_successes_mm");
     const json& all = part.at("tre_of_all_mm");
+    const json& range = part.at("capture_range");
     table.add_row({renderer,
                    name,
                    part.at("starts").dump(),
@@ -31,7 +36,11 @@ CsvTable case_table(const json& renderers) {
                    number_text(number_of(successes.at("mean"))),
                    number_text(number_of(successes.at("sd"))),
                    number_text(number_of(all.at("median"))),
-                   number_text(number_of(all.at("p95")))});
+                   number_text(number_of(all.at("p95"))),
+                   part.at("gross_failures").at("successes").dump(),
+                   part.at("mrpd_success").at("successes").dump(),
+                   range.is_object() ? number_text(number_of(range.at("initial_tre_mm"))) : "nan",
+                   range.is_object() ? range.at("ended_by").get<std::string>() : ""});
   };
   for (const json& renderer : renderers) {
     const auto name = renderer.at("renderer").get<std::string>();
