@@ -84,10 +84,11 @@ void bind_fields(CLI::App& app, const Fields& fields) {
     if (!field.option.empty()) bind_field(app, field);
   for (const Field& field : fields) {
     if (field.option.empty()) continue;
-    for (const std::string& other : field.excluded)
-      app.get_option(field.option)->excludes(app.get_option(other));
-    for (const std::string& other : field.needed)
-      app.get_option(field.option)->needs(app.get_option(other));
+    // Of "-o,--output" any one name finds the option.
+    CLI::Option* const option =
+        app.get_option(field.option.substr(field.option.find_last_of(',') + 1));
+    for (const std::string& other : field.excluded) option->excludes(app.get_option(other));
+    for (const std::string& other : field.needed) option->needs(app.get_option(other));
   }
 }
 

@@ -1,30 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
+// The rig that an option or a study names: a shipped one, a rig.toml, or camera files of any format
+// that is told by its content.
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <vector>
 
+#include "camera_files/rig_toml.h"
 #include "geometry/camera_geometry.h"
 
 namespace af {
 
-/// Rigs shipped by name: "c-arm-12in" (cameras AP, LAT) and "treatment-room" (cameras A, B).
-std::vector<std::string> builtin_rig_names();
+/// Reads a rig by shipped name, from a file, or from several files with commas between them
+/// ("cam01.txt,cam02.txt"), in any format of camera_formats(). InputError (exit 3) for a bad rig:
+/// names file, line, camera, key, value, constraint, and what a file leaves open with the option of
+/// af-inspect that states it; FileError (exit 4) when unreadable. `warnings` receives e.g. "camera
+/// 'A': mirrored ...".
+CameraRig read_rig(const std::string& name_or_paths, std::vector<std::string>* warnings = nullptr);
 
-/// TOML text of a shipped rig.
-std::string builtin_rig_text(const std::string& name);
-
-/// Reads a rig by shipped name or from a TOML file. InputError (exit 3) for a bad rig: names file,
-/// line, camera, key, value, constraint; FileError (exit 4) when unreadable or not TOML. `warnings`
-/// receives e.g. "camera 'A': mirrored ...".
-CameraRig read_rig(const std::string& name_or_path, std::vector<std::string>* warnings = nullptr);
-
-/// The same from its text; messages name `file`.
-CameraRig parse_rig(const std::string& text,
-                    const std::string& file,
-                    std::vector<std::string>* warnings = nullptr);
-
-/// The rig as TOML text that read_rig() reads back to the last bit.
-std::string rig_to_toml(const CameraRig& rig);
+/// The files that a rig's name stands for; empty for a shipped rig.
+std::vector<std::filesystem::path> rig_files(const std::string& name_or_paths);
 
 }  // namespace af

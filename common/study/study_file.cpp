@@ -229,11 +229,14 @@ void read_cases(TomlTableReader& reader, Study& study, const StudyContext& conte
   }
 }
 
-/// The rig's shipped name, or its path made absolute.
+/// The rig's shipped name, or the paths of its files made absolute.
 std::string resolved_rig(const std::string& rig, const fs::path& folder) {
-  const auto names = builtin_rig_names();
-  if (std::find(names.begin(), names.end(), rig) != names.end()) return rig;
-  return resolved(folder, rig).string();
+  // A comma in the name of one file does not make it two.
+  if (fs::exists(resolved(folder, rig))) return resolved(folder, rig).string();
+  const std::vector<fs::path> files = rig_files(rig);
+  if (files.empty()) return rig;
+  return joined(
+      files, ",", [&](const fs::path& file) { return resolved(folder, file.string()).string(); });
 }
 
 std::string relative_if_below(const fs::path& path, const fs::path& folder) {
@@ -333,13 +336,15 @@ std::string study_to_toml(const Study& study, const std::filesystem::path& folde
   // A folder named with a trailing slash is the same folder.
   const fs::path absolute_folder =
       tidied(fs::absolute(folder.empty() ? fs::path("./") : folder / "")).parent_path();
-  const auto names = builtin_rig_names();
-  const bool is_builtin =
-      std::find(names.begin(), names.end(), study.rig_name_or_path) != names.end();
+  const std::vector<fs::path> rig = rig_files(study.rig_name_or_path);
   std::string text =
       "rig = " +
-      toml_text(is_builtin ? study.rig_name_or_path
-                           : relative_if_below(study.rig_name_or_path, absolute_folder)) +
+      toml_text(rig.empty() ? study.rig_name_or_path
+                            : joined(rig,
+                                     ",",
+                                     [&](const fs::path& file) {
+                                       return relative_if_below(file, absolute_folder);
+                                     })) +
       "\n";
   for (const StudyCase& study_case : study.cases) text += case_text(study_case, absolute_folder);
   return text;

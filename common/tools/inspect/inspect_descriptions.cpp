@@ -4,6 +4,7 @@
 #include <map>
 #include <set>
 
+#include "camera_files/camera_formats.h"
 #include "files/output_file.h"
 #include "files/sha256.h"
 #include "image_files/image_file.h"
@@ -186,6 +187,17 @@ void inspect_rig(const std::string& name_or_path, Inspection& inspection) {
   inspection.kind = "rig";
   inspection.facts = rig_json(read_rig(name_or_path, &inspection.warnings),
                               [](const auto& /*camera*/, const auto& /*other*/) { return true; });
+}
+
+void inspect_camera_file(const fs::path& path, Inspection& inspection) {
+  inspection.kind = "cameras";
+  const CameraFormat* const format = recognised_camera_format(CameraFile::open(path));
+  if (format == nullptr) throw FileError(path.string(), "states no camera in a known format");
+  inspection.facts["format"] = format->name;
+  inspection.facts["format_is"] = format->help;
+  const auto rig = rig_json(read_camera_files({path}, {}, &inspection.warnings),
+                            [](const auto& /*camera*/, const auto& /*other*/) { return true; });
+  for (const auto& [key, value] : rig.items()) inspection.facts[key] = value;
 }
 
 void inspect_study(const fs::path& path, Inspection& inspection) {

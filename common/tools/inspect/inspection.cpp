@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "base/joined.h"
+#include "camera_files/camera_formats.h"
 #include "files/input_file.h"
 #include "image_files/dicom_series.h"
 #include "image_files/image_header.h"
@@ -28,7 +29,8 @@ constexpr std::string_view kHdf5Mark = "\x89HDF\r\n\x1a\n";
 constexpr const char* kWhatWasTried =
     "not recognised; tried: DICOM folder, result folder, unfinished work (NAME.progress), HDF5 "
     "field, NIfTI, MetaImage, NRRD, TIFF, PNG, DICOM file, TOML rig, study or pose, JSON result, "
-    "CSV table, ITK transform, pose of 16 numbers, name of a shipped rig";
+    "CSV table, ITK transform, pose of 16 numbers, name of a shipped rig, and cameras as MayaCam, "
+    "OpenCV YAML or 3x4 matrices";
 
 std::string first_bytes(const fs::path& path, std::size_t count) {
   std::ifstream file = open_input_file(path);
@@ -78,6 +80,12 @@ void inspect_text(const fs::path& path, Inspection& inspection) {
   throw FileError(path.string(), kWhatWasTried);
 }
 
+/// Files of camera formats other than rig.toml, whose studies and rigs inspect_text() tells apart.
+bool states_cameras(const fs::path& path) {
+  const CameraFormat* const format = recognised_camera_format(CameraFile::open(path));
+  return format != nullptr && std::string_view(format->name) != "rig";
+}
+
 void inspect_file(const fs::path& path,
                   const CtReadOptions& options,
                   const Communicator& communicator,
@@ -85,6 +93,7 @@ void inspect_file(const fs::path& path,
   if (first_bytes(path, kHdf5Mark.size()) == kHdf5Mark)
     return inspect_field(path, communicator, inspection);
   if (sniff_image_format(path)) return inspect_image(path, options, inspection);
+  if (states_cameras(path)) return inspect_camera_file(path, inspection);
   inspect_text(path, inspection);
 }
 
@@ -273,7 +282,7 @@ std::string input_lines(const fs::path& study_path) {
       lines += study_case.name + '\t' + path.string() + '\n';
     };
     add(study_case.ct);
-    if (fs::exists(study.rig_name_or_path)) add(study.rig_name_or_path);
+    for (const fs::path& file : rig_files(study.rig_name_or_path)) add(file);
     for (const StudyView& view : study_case.views) {
       add(view.xray);
       if (view.mask.has_value()) add(*view.mask);

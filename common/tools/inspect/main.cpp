@@ -1,13 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <filesystem>
 #include <iostream>
 #include <string>
 #include <vector>
 
 #include <CLI/CLI.hpp>
 
+#include "base/named_rows.h"
+#include "camera_files/camera_formats.h"
 #include "cli/app_main.h"
 #include "cli/bind_options.h"
+#include "files/output_file.h"
+#include "run/terminal.h"
+#include "study/rig_file.h"
 #include "study/study_template.h"
 #include "tools/inspect/inspection.h"
 
@@ -21,6 +27,10 @@ struct Options {
   bool as_json = false;
   bool lists_views = false;
   bool lists_inputs = false;
+  std::vector<std::filesystem::path> rig_from;
+  std::string rig_to = "rig";
+  std::filesystem::path output;
+  af::CameraFileOptions cameras;
   af::CtReadOptions ct;
 
   void describe(af::Fields& field);
@@ -45,6 +55,19 @@ void Options::describe(af::Fields& field) {
         "Of studies, for scripts: one line per case and file that it reads, with a tab between "
         "them")
       .excludes({"--json", "--list-views"});
+  field("rig_from",
+        rig_from,
+        "Camera files to make one rig of, each of any of the formats; -o names the rig.toml")
+      .one_of_group("What");
+  field("rig_to",
+        rig_to,
+        "With --rig-from: format to write the cameras in. " + af::help_of(af::camera_formats()))
+      .choice(af::writable_camera_formats())
+      .needs({"--rig-from"});
+  field("output", output, "With --rig-from: file to write instead of printing it")
+      .as("-o,--output")
+      .needs({"--rig-from"});
+  field.part(cameras);
   field.part(ct);
   field.last().help = "SeriesInstanceUID to read from a DICOM folder that holds several series";
 }
@@ -61,7 +84,29 @@ void print(const Options& options, const std::vector<af::Inspection>& inspection
   std::cout << array.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) << '\n';
 }
 
+/// Cameras of other programs as a rig, or the other way round.
+void convert_cameras(const Options& options, const Communicator& world) {
+  std::vector<std::string> warnings;
+  const std::vector<std::string> shipped = af::builtin_rig_names();
+  const bool is_shipped = options.rig_from.size() == 1 &&
+                          std::ranges::find(shipped, options.rig_from[0].string()) != shipped.end();
+  const af::CameraRig rig =
+      is_shipped ? af::parse_rig(af::builtin_rig_text(options.rig_from[0]), options.rig_from[0])
+                 : af::read_camera_files(options.rig_from, options.cameras, &warnings);
+  for (const std::string& warning : warnings) af::warn(world, warning);
+  for (const auto& file : af::camera_files_of(rig, options.rig_to, options.output))
+    if (options.output.empty())
+      std::cout << file.bytes;
+    else
+      af::write_text_file(file.path, file.bytes);
+}
+
 void run(const Options& options, const Communicator& world) {
+  af::throw_if_any(af::field_problems(options.cameras));
+  if (!options.rig_from.empty()) {
+    if (world.is_root()) convert_cameras(options, world);
+    return;
+  }
   if (!options.template_name.empty()) {
     if (world.is_root()) std::cout << af::template_text(options.template_name);
     return;

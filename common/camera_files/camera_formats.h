@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+// Formats of camera geometry: one table, told apart by content. docs/cameras.md describes each
+// convention; CONTRIBUTING.md says how to add one.
+#pragma once
+
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "camera_files/camera_file.h"
+#include "camera_files/camera_file_options.h"
+#include "camera_files/stated_rig.h"
+#include "geometry/camera_geometry.h"
+
+namespace af {
+
+/// One format. `write` is given all cameras of a rig, or one of them when a file holds only one.
+struct CameraFormat {
+  const char* name;
+  const char* help;
+  const char* extension;
+  bool holds_one_camera;
+  bool (*is_this)(const CameraFile& file);
+  StatedRig (*read)(const CameraFile& file);
+  std::string (*write)(const CameraRig& rig);  ///< nullptr: is not written
+};
+
+/// Every format, in the order in which their marks are looked for.
+std::span<const CameraFormat> camera_formats();
+
+std::vector<std::string> readable_camera_formats();
+std::vector<std::string> writable_camera_formats();
+
+/// The format that a file's content tells, or nullptr.
+const CameraFormat* recognised_camera_format(const CameraFile& file);
+
+/// One rig of the cameras of several files, each of any format. FileError when a file is of none or
+/// broken; InputError for unacceptable values and for what is missing. `warnings` receives what was
+/// taken by default.
+CameraRig read_camera_files(const std::vector<std::filesystem::path>& files,
+                            const CameraFileOptions& options,
+                            std::vector<std::string>* warnings);
+
+/// A file's name and bytes.
+struct WrittenCameraFile {
+  std::filesystem::path path;
+  std::string bytes;
+};
+
+/// The rig in the format of that name: one file `path`, or, when the format holds one camera per
+/// file and the rig has several, one per camera whose name goes before the extension.
+std::vector<WrittenCameraFile> camera_files_of(const CameraRig& rig,
+                                               const std::string& format,
+                                               const std::filesystem::path& path);
+
+}  // namespace af

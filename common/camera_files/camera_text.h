@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+// Numbers of matrices as the writers of text formats put them down: read back to the same bits.
+#pragma once
+
+#include <string>
+
+#include <Eigen/Core>
+
+namespace af {
+
+/// Rows on lines of their own, numbers with `between` between them.
+std::string rows_text(const Eigen::MatrixXd& matrix, const std::string& between);
+
+/// All numbers, row by row, on one line.
+std::string numbers_text(const Eigen::MatrixXd& matrix, const std::string& between);
+
+}  // namespace af

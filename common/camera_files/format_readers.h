@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// What kCameraFormats (camera_formats.cpp) is made of. Each format's convention is described in
+// docs/cameras.md and above its reader. Readers throw FileError for files that cannot be parsed and
+// InputError for values that cannot be a camera's; what a file leaves open they mark in the
+// StatedCamera. Writers return the bytes of a file that the reader reads back.
+#pragma once
+
+#include <string>
+
+#include "camera_files/camera_file.h"
+#include "camera_files/rig_toml.h"
+#include "camera_files/stated_rig.h"
+
+namespace af {
+
+bool is_rig_toml(const CameraFile& file);
+StatedRig read_rig_toml(const CameraFile& file);
+
+bool is_mayacam1(const CameraFile& file);
+StatedRig read_mayacam1(const CameraFile& file);
+std::string write_mayacam1(const CameraRig& rig);
+
+bool is_mayacam2(const CameraFile& file);
+StatedRig read_mayacam2(const CameraFile& file);
+std::string write_mayacam2(const CameraRig& rig);
+
+bool is_opencv_yaml(const CameraFile& file);
+StatedRig read_opencv_yaml(const CameraFile& file);
+std::string write_opencv_yaml(const CameraRig& rig);
+
+bool is_matrix_text(const CameraFile& file);
+StatedRig read_matrix_text(const CameraFile& file);
+std::string write_matrix_text(const CameraRig& rig);
+
+}  // namespace af

@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: Apache-2.0
+// Cameras in OpenCV's FileStorage YAML, as cv.FileStorage writes them, and in the plain YAML of
+// ROS: camera matrix, R (3x3, or a rotation vector) and t, with (column, row, 1) ~ K (R x + t). The
+// names of the keys are everybody's own; the usual ones are known. A number behind a name (K1, R2)
+// tells several cameras of one file apart.
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <set>
+
+#include <Eigen/Geometry>
+
+#include "base/error.h"
+#include "camera_files/camera_text.h"
+#include "camera_files/format_readers.h"
+#include "camera_files/opencv_yaml.h"
+#include "geometry/pinhole_camera.h"
+
+namespace af {
+
+namespace {
+
+/// Names of a value, lower case, without '_' and '-'. The first is the one in messages.
+using KeyNames = std::vector<std::string>;
+
+const KeyNames& camera_matrix_names() {
+  static const KeyNames names = {
+      "cameramatrix", "k", "m", "mtx", "intrinsic", "intrinsics", "intrinsicmatrix"};
+  return names;
+}
+const KeyNames& rotation_names() {
+  static const KeyNames names = {
+      "r", "rotation", "rotationmatrix", "rmat", "rvec", "rotationvector"};
+  return names;
+}
+const KeyNames& translation_names() {
+  static const KeyNames names = {"t", "tvec", "translation", "translationvector"};
+  return names;
+}
+const KeyNames& distortion_names() {
+  static const KeyNames names = {
+      "distortioncoefficients", "d", "dist", "distcoeffs", "distortion", "distortioncoeffs"};
+  return names;
+}
+
+/// A key without case, '_' and '-', its trailing number apart.
+struct PlainKey {
+  std::string name;
+  std::string number;
+};
+
+PlainKey plain_key(const std::string& key) {
+  PlainKey plain;
+  for (const char c : key)
+    if (c != '_' && c != '-')
+      plain.name += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  while (!plain.name.empty() && std::isdigit(static_cast<unsigned char>(plain.name.back())) != 0) {
+    plain.number.insert(plain.number.begin(), plain.name.back());
+    plain.name.pop_back();
+  }
+  return plain;
+}
+
+bool is_one_of(const KeyNames& names, const std::string& name) {
+  return std::ranges::find(names, name) != names.end();
+}
+
+/// The values of one file, looked up by any of their names.
+class OpenCvValues {
+ public:
+  explicit OpenCvValues(const CameraFile& file) : file_(file) {
+    for (auto& [key, value] : parse_opencv_yaml(file.text, file.name())) {
+      const PlainKey plain = plain_key(key);
+      values_.push_back({plain, key, value});
+      if (is_one_of(camera_matrix_names(), plain.name)) numbers_.insert(plain.number);
+    }
+  }
+
+  /// The numbers that tell the cameras apart; "" when there is one.
+  [[nodiscard]] const std::set<std::string>& camera_numbers() const { return numbers_; }
+
+  /// The value of that camera, or the one that all cameras share.
+  [[nodiscard]] const YamlValue* find(const KeyNames& names, const std::string& number) const {
+    for (const std::string& wanted : {number, std::string()})
+      for (const Entry& entry : values_)
+        if (entry.plain.number == wanted && is_one_of(names, entry.plain.name)) return &entry.value;
+    return nullptr;
+  }
+
+  [[nodiscard]] const YamlValue& required(const KeyNames& names,
+                                          const std::string& number,
+                                          const char* what) const {
+    if (const YamlValue* const value = find(names, number); value != nullptr) return *value;
+    throw InputError(file_.name() + ": " + names.front() + number + " is missing: " + what);
+  }
+
+  /// A vector of that many numbers, stored as row, column or list.
+  [[nodiscard]] Eigen::VectorXd vector(const YamlValue& value,
+                                       Eigen::Index count,
+                                       const std::string& name) const {
+    if (value.numbers.size() != count)
+      throw FileError(place(value),
+                      name,
+                      std::to_string(count) + " numbers",
+                      std::to_string(value.numbers.size()));
+    return value.numbers.transpose().reshaped();
+  }
+
+  [[nodiscard]] std::string place(const YamlValue& value) const {
+    return file_.name() + ":" + std::to_string(value.line);
+  }
+
+ private:
+  struct Entry {
+    PlainKey plain;
+    std::string key;
+    YamlValue value;
+  };
+  const CameraFile& file_;
+  std::vector<Entry> values_;
+  std::set<std::string> numbers_;
+};
+
+Eigen::Matrix3d matrix3(const OpenCvValues& values, const YamlValue& value, const char* name) {
+  if (value.numbers.rows() == 3 && value.numbers.cols() == 3) return value.numbers;
+  const Eigen::VectorXd numbers = values.vector(value, 9, name);
+  return numbers.reshaped<Eigen::RowMajor>(3, 3);
+}
+
+/// A rotation matrix, or OpenCV's rotation vector: axis times angle in radians.
+Eigen::Matrix3d rotation(const OpenCvValues& values, const YamlValue& value) {
+  if (value.numbers.size() != 3) return matrix3(values, value, "R");
+  const Eigen::Vector3d vector = values.vector(value, 3, "rvec");
+  const double angle_rad = vector.norm();
+  if (angle_rad == 0.0) return Eigen::Matrix3d::Identity();
+  return Eigen::AngleAxisd(angle_rad, vector / angle_rad).toRotationMatrix();
+}
+
+void read_size(const OpenCvValues& values, const std::string& number, StatedCamera& camera) {
+  const YamlValue* const width = values.find({"imagewidth", "width"}, number);
+  const YamlValue* const height = values.find({"imageheight", "height"}, number);
+  const YamlValue* const both = values.find({"imagesize", "size", "resolution"}, number);
+  camera.has_size = both != nullptr || (width != nullptr && height != nullptr);
+  camera.geometry.size_px = {1, 1};
+  if (both != nullptr)
+    camera.geometry.size_px = size_of(values.vector(*both, 2, "image_size"), values.place(*both));
+  else if (camera.has_size)
+    camera.geometry.size_px = size_of(
+        {values.vector(*width, 1, "image_width")[0], values.vector(*height, 1, "image_height")[0]},
+        values.place(*width));
+}
+
+void refuse_distortion(const OpenCvValues& values, const std::string& number) {
+  const YamlValue* const distortion = values.find(distortion_names(), number);
+  if (distortion == nullptr || distortion->numbers.size() == 0 || distortion->numbers.isZero(0.0))
+    return;
+  throw InputError(values.place(*distortion) +
+                   ": distortion that is not 0 is not supported: undistort the images first");
+}
+
+StatedCamera read_camera(const OpenCvValues& values, const std::string& number) {
+  PinholeCamera pinhole;
+  pinhole.pixels_from_camera =
+      matrix3(values, values.required(camera_matrix_names(), number, "K, 3x3"), "camera_matrix");
+  constexpr const char* kNeedsPose =
+      "K alone does not say where the camera stands; add R (3x3, or rvec) and t (or tvec), with "
+      "x_camera = R x_room + t, mm";
+  pinhole.camera_from_room =
+      rotation(values, values.required(rotation_names(), number, kNeedsPose));
+  pinhole.translation_mm =
+      values.vector(values.required(translation_names(), number, kNeedsPose), 3, "t");
+  refuse_distortion(values, number);
+  StatedCamera camera;
+  read_size(values, number, camera);
+  double column_spacing_mm = 1.0;
+  const YamlValue* const spacing = values.find({"pixelspacingmm"}, number);
+  camera.has_spacing = spacing != nullptr;
+  if (spacing != nullptr) {
+    column_spacing_mm = values.vector(*spacing, 2, "pixel_spacing_mm")[0];
+    if (!(column_spacing_mm > 0.0))
+      throw InputError(values.place(*spacing) + ": pixel_spacing_mm must be positive");
+  }
+  const YamlValue* const name = values.find({"cameraname", "name"}, number);
+  camera.has_name = name != nullptr && !name->text.empty();
+  const std::string name_text = camera.has_name ? name->text : "camera" + number;
+  camera.geometry =
+      camera_from_pinhole(name_text, pinhole, column_spacing_mm, camera.geometry.size_px);
+  return camera;
+}
+
+std::string yaml_matrix(const char* key, const Eigen::MatrixXd& matrix) {
+  return std::string(key) + ": !!opencv-matrix\n   rows: " + std::to_string(matrix.rows()) +
+         "\n   cols: " + std::to_string(matrix.cols()) + "\n   dt: d\n   data: [ " +
+         numbers_text(matrix, ", ") + " ]\n";
+}
+
+}  // namespace
+
+bool is_opencv_yaml(const CameraFile& file) {
+  const auto lines = word_lines(file.text);
+  return std::ranges::any_of(lines, [](const WordLine& line) {
+    const std::size_t colon = line.text.find(':');
+    return colon != std::string_view::npos &&
+           is_one_of(
+               camera_matrix_names(),
+               plain_key(std::string(line.text.substr(0, std::min<std::size_t>(colon, 64)))).name);
+  });
+}
+
+StatedRig read_opencv_yaml(const CameraFile& file) {
+  const OpenCvValues values(file);
+  StatedRig stated;
+  if (values.camera_numbers().empty())
+    throw InputError(file.name() + ": camera_matrix is missing: K, 3x3");
+  for (const std::string& number : values.camera_numbers())
+    stated.cameras.push_back(read_camera(values, number));
+  if (const YamlValue* const point = values.find({"isocenterpoint"}, ""); point != nullptr)
+    stated.isocenter_point = Eigen::Vector3d(values.vector(*point, 3, "isocenter_point"));
+  return stated;
+}
+
+std::string write_opencv_yaml(const CameraRig& rig) {
+  const CameraGeometry& camera = rig.cameras.front();
+  const PinholeCamera pinhole = pinhole_of(camera);
+  return "%YAML:1.0\n---\ncamera_name: \"" + camera.name +
+         "\"\nimage_width: " + std::to_string(camera.size_px.x()) +
+         "\nimage_height: " + std::to_string(camera.size_px.y()) + "\n" +
+         yaml_matrix("camera_matrix", pinhole.pixels_from_camera) +
+         yaml_matrix("distortion_coefficients", Eigen::MatrixXd::Zero(5, 1)) +
+         yaml_matrix("R", pinhole.camera_from_room) + yaml_matrix("t", pinhole.translation_mm) +
+         yaml_matrix("pixel_spacing_mm", camera.pixel_spacing_mm) +
+         yaml_matrix("isocenter_point", rig.isocenter_point);
+}
+
+}  // namespace af

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "geometry/camera_geometry.h"
+
+namespace af {
+
+/// Rigs shipped by name: "c-arm-12in" (cameras AP, LAT) and "treatment-room" (cameras A, B).
+std::vector<std::string> builtin_rig_names();
+
+/// TOML text of a shipped rig.
+std::string builtin_rig_text(const std::string& name);
+
+/// A rig from its TOML text; messages name `file`. InputError (exit 3) for a bad rig: names file,
+/// line, camera, key, value, constraint; FileError (exit 4) when it is not TOML. `warnings`
+/// receives e.g. "camera 'A': mirrored ...".
+CameraRig parse_rig(const std::string& text,
+                    const std::string& file,
+                    std::vector<std::string>* warnings = nullptr);
+
+/// The rig as TOML text that parse_rig() reads back to the last bit.
+std::string rig_to_toml(const CameraRig& rig);
+
+/// What a camera name must be so that it can be part of options (--field NAME=PATH) and of file
+/// names; empty when it is.
+std::string camera_name_problem(const std::string& name);
+
+}  // namespace af

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "image/image2d.h"
+#include "scan/scan_geometry.h"
+
+namespace af {
+
+/// What every pixel of a scan counts without the object, above its dark level, and where it counts
+/// anything.
+struct AirLevel {
+  Image2d air;
+  std::vector<unsigned char> is_lit;  ///< 0: behind the aperture, per pixel
+  std::vector<unsigned char> is_air;  ///< 1: no view of the object shadows it, per pixel
+};
+
+/// How the views' pixels were sampled over time: mean and standard deviation per pixel, above the
+/// dark level.
+struct PixelStatistics {
+  Image2d mean;
+  Image2d deviation;
+};
+
+/// Statistics of images (counts above dark) of one size.
+PixelStatistics pixel_statistics(const std::vector<const Image2d*>& images);
+
+/// The air level of a scan without a flat image: a cubic polynomial of column and row times one
+/// factor per line across the rotation axis (stripes of the detector), fitted to the logarithm of
+/// the pixels that no view shadows. The fit begins with the ends of the lines, which see past any
+/// object that a scan can reconstruct, and takes in what agrees with it. Dark areas that touch
+/// those ends are the aperture. InputError when too few pixels show air.
+/// \test AirLevel.IsFoundAroundAnObject
+AirLevel estimated_air_level(const PixelStatistics& statistics, AxisAlong axis_along);
+
+/// The air level of a flat image (counts above dark); which pixels see air is found from the
+/// scan's statistics: those within 5 % of it.
+AirLevel air_level_of_flat(const Image2d& flat, const PixelStatistics& statistics);
+
+/// -log(counts / (air * beam)), where `beam` is this view's mean ratio of counts to air over the
+/// pixels that see air: the tube's output changes from view to view. Pixels behind the aperture get
+/// the value of the nearest lit pixel of their line across the axis. Counts below `least_count`
+/// are taken as that. \test LineIntegrals.AreThoseOfTheObjectUnderStripesAndDrift
+Image2d line_integrals_of(const Image2d& counts,
+                          const AirLevel& level,
+                          AxisAlong axis_along,
+                          double least_count);
+
+}  // namespace af

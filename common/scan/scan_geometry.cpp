@@ -1,0 +1,243 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "scan/scan_geometry.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+#include <Eigen/Dense>
+
+#include "base/plausible.h"
+#include "geometry/rigid_transform.h"
+
+namespace af {
+
+namespace {
+
+constexpr double kTurn = 2.0 * std::numbers::pi;
+
+Eigen::Matrix3d turned_about(const Eigen::Vector3d& axis, double angle_rad) {
+  return Eigen::AngleAxisd(angle_rad, axis).toRotationMatrix();
+}
+
+/// Angles within one turn, ascending, as indices.
+std::vector<std::size_t> order_around(const std::vector<double>& within_turn) {
+  std::vector<std::size_t> order(within_turn.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return within_turn[a] < within_turn[b];
+  });
+  return order;
+}
+
+/// From each angle to the next one around, in the order of order_around().
+std::vector<double> gaps_around(const std::vector<double>& within_turn,
+                                const std::vector<std::size_t>& order) {
+  std::vector<double> gaps(order.size());
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const bool is_last = i + 1 == order.size();
+    const double next = within_turn[order[is_last ? 0 : i + 1]] + (is_last ? kTurn : 0.0);
+    gaps[i] = next - within_turn[order[i]];
+  }
+  return gaps;
+}
+
+std::vector<double> within_one_turn(std::vector<double> angles_rad) {
+  for (double& angle : angles_rad) angle -= kTurn * std::floor(angle / kTurn);
+  return angles_rad;
+}
+
+std::string out_of_range(const std::string& name, double value, const std::string& constraint) {
+  return name + " = " + std::to_string(value) + ": " + constraint;
+}
+
+void note_angle_problems(const std::vector<double>& angles_rad, std::vector<std::string>& found) {
+  constexpr std::size_t kFewestViews = 16;
+  constexpr double kMostUneven = 3.0;
+  if (angles_rad.size() < kFewestViews) {
+    found.push_back("views = " + std::to_string(angles_rad.size()) + ": must be at least " +
+                    std::to_string(kFewestViews));
+    return;
+  }
+  const std::vector<double> within_turn = within_one_turn(angles_rad);
+  std::vector<double> gaps = gaps_around(within_turn, order_around(within_turn));
+  std::sort(gaps.begin(), gaps.end());
+  const double even_gap = kTurn / static_cast<double>(gaps.size());
+  // Repeated angles leave wider gaps between the others.
+  const double typical = std::max(gaps[gaps.size() / 2], even_gap);
+  if (gaps.back() > kMostUneven * typical)
+    found.push_back("the views leave " + std::to_string(gaps.back() * kDegPerRad) +
+                    " degrees of the circle empty, where neighbours are " +
+                    std::to_string(typical * kDegPerRad) +
+                    " degrees apart: the scan must go all the way round");
+}
+
+}  // namespace
+
+std::vector<int> CircularScan::every(int first, int stride, int end) {
+  std::vector<int> views;
+  for (int view = first; view < end; view += stride) views.push_back(view);
+  return views;
+}
+
+CircularScan CircularScan::binned(int factor) const {
+  CircularScan result = *this;
+  result.pixel_spacing_mm *= factor;
+  result.size_px /= factor;
+  return result;
+}
+
+std::vector<std::string> problems(const CircularScan& scan) {
+  std::vector<std::string> found;
+  const auto is_length = [](double mm) { return mm > 0.0 && mm <= kMaxRoomMm; };
+  if (!is_length(scan.source_to_axis_mm))
+    found.push_back(out_of_range(
+        "source_to_axis_mm", scan.source_to_axis_mm, "must be above 0, at most 1e6 mm"));
+  if (!(scan.source_to_detector_mm > scan.source_to_axis_mm) ||
+      !is_length(scan.source_to_detector_mm))
+    found.push_back(out_of_range("source to detector",
+                                 scan.source_to_detector_mm,
+                                 "must be above source_to_axis_mm, at most 1e6 mm"));
+  for (const double spacing : scan.pixel_spacing_mm)
+    if (!is_plausible_spacing_mm(spacing))
+      found.push_back(out_of_range("pixel_spacing_mm", spacing, kPlausibleSpacing));
+  constexpr int kFewestPixels = 16;
+  constexpr int kMostPixels = 16384;
+  for (const int size : scan.size_px)
+    if (size < kFewestPixels || size > kMostPixels)
+      found.push_back("size_px = " + std::to_string(size) + ": must be within 16 and 16384");
+  for (const double angle : scan.angles_rad)
+    if (!std::isfinite(angle)) return {"angles must be finite"};
+  note_angle_problems(scan.angles_rad, found);
+  return found;
+}
+
+std::vector<double> angle_shares_rad(const std::vector<double>& angles_rad) {
+  const std::vector<double> within_turn = within_one_turn(angles_rad);
+  const std::vector<std::size_t> order = order_around(within_turn);
+  const std::vector<double> gaps = gaps_around(within_turn, order);
+  std::vector<double> shares(angles_rad.size());
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const double before = gaps[i == 0 ? order.size() - 1 : i - 1];
+    shares[order[i]] = 0.5 * (before + gaps[i]);
+  }
+  return shares;
+}
+
+Eigen::VectorXd AngleSeries::basis(int harmonics, double angle_rad) {
+  Eigen::VectorXd values(1 + 2 * harmonics);
+  values[0] = 1.0;
+  for (int k = 1; k <= harmonics; ++k) {
+    values[2 * k - 1] = std::cos(k * angle_rad);
+    values[2 * k] = std::sin(k * angle_rad);
+  }
+  return values;
+}
+
+double AngleSeries::at(double angle_rad) const {
+  return basis(harmonics(), angle_rad).dot(coefficients);
+}
+
+ScanCalibration ScanCalibration::nominal(const CircularScan& scan, int harmonics) {
+  ScanCalibration calibration;
+  calibration.source_to_detector_mm = scan.source_to_detector_mm;
+  calibration.column_px = AngleSeries(harmonics);
+  calibration.row_px = AngleSeries(harmonics);
+  calibration.rotation_rad = AngleSeries(harmonics);
+  calibration.column_px.coefficients[0] = 0.5 * (scan.size_px.x() - 1);
+  calibration.row_px.coefficients[0] = 0.5 * (scan.size_px.y() - 1);
+  return calibration;
+}
+
+ScanCalibration ScanCalibration::binned(double factor) const {
+  ScanCalibration result = *this;
+  for (AngleSeries* const series : {&result.column_px, &result.row_px}) {
+    series->coefficients /= factor;
+    // Pixel centres are integers: the outer edge, at -1/2, stays.
+    series->coefficients[0] += 0.5 / factor - 0.5;
+  }
+  return result;
+}
+
+CameraGeometry scan_camera(const CircularScan& scan,
+                           const ScanCalibration& calibration,
+                           double angle_rad,
+                           const std::string& name) {
+  const double rotation = calibration.rotation_rad.at(angle_rad);
+  const double cosine = std::cos(rotation);
+  const double sine = std::sin(rotation);
+  const bool along_columns = scan.axis_along == AxisAlong::Columns;
+  const Eigen::Vector3d column =
+      along_columns ? Eigen::Vector3d(sine, 0.0, cosine) : Eigen::Vector3d(cosine, 0.0, -sine);
+  const Eigen::Vector3d row =
+      along_columns ? Eigen::Vector3d(cosine, 0.0, -sine) : Eigen::Vector3d(-sine, 0.0, -cosine);
+  const Eigen::Matrix3d turn = turned_about(Eigen::Vector3d::UnitZ(), angle_rad);
+  const Eigen::Matrix3d turn_and_tilt =
+      turn * turned_about(Eigen::Vector3d::UnitX(), calibration.tilt_rad);
+  CameraGeometry camera;
+  camera.name = name;
+  camera.size_px = scan.size_px;
+  camera.pixel_spacing_mm = scan.pixel_spacing_mm;
+  camera.source_point = turn * Eigen::Vector3d(0.0, -scan.source_to_axis_mm, 0.0);
+  camera.column_direction = turn_and_tilt * column;
+  camera.row_direction = turn_and_tilt * row;
+  camera.detector_origin_point =
+      camera.source_point +
+      calibration.source_to_detector_mm * (turn_and_tilt * Eigen::Vector3d::UnitY()) -
+      calibration.column_px.at(angle_rad) * scan.pixel_spacing_mm.x() * camera.column_direction -
+      calibration.row_px.at(angle_rad) * scan.pixel_spacing_mm.y() * camera.row_direction;
+  return camera;
+}
+
+double calibration_distance_px(const CircularScan& scan,
+                               const ScanCalibration& a,
+                               const ScanCalibration& b,
+                               double radius_mm,
+                               double half_height_mm) {
+  std::vector<Eigen::Vector3d> points;
+  for (int corner = 0; corner < 8; ++corner)
+    for (const double height : {-1.0, -0.5, 0.5, 1.0})
+      points.emplace_back(radius_mm * std::cos(0.25 * std::numbers::pi * corner),
+                          radius_mm * std::sin(0.25 * std::numbers::pi * corner),
+                          height * half_height_mm);
+  using Change = Eigen::Matrix<double, 7, 1>;  // three angles, three shifts, logarithm of the size
+  const PoseFrame frame;
+  const auto projections = [&](const ScanCalibration& calibration, const Change& change) {
+    const RigidTransform motion =
+        pose_from_parameters(frame, {change.head<3>(), change.segment<3>(3)});
+    const double size = std::exp(change[6]);
+    Eigen::VectorXd pixels(static_cast<Eigen::Index>(2 * points.size() * scan.angles_rad.size()));
+    Eigen::Index next = 0;
+    for (const double angle : scan.angles_rad) {
+      const CameraGeometry camera = scan_camera(scan, calibration, angle);
+      for (const Eigen::Vector3d& point : points) {
+        pixels.segment<2>(next) = camera.project(motion * (size * point));
+        next += 2;
+      }
+    }
+    return pixels;
+  };
+  const Eigen::VectorXd wanted = projections(a, Change::Zero());
+  Change change = Change::Zero();
+  const auto residual = [&](const Change& tried) -> Eigen::VectorXd {
+    return projections(b, tried) - wanted;
+  };
+  constexpr int kSteps = 4;  // of a nearly linear problem
+  for (int step = 0; step < kSteps; ++step) {
+    const Eigen::VectorXd now = residual(change);
+    Eigen::MatrixXd slopes(now.size(), change.size());
+    for (Eigen::Index i = 0; i < change.size(); ++i) {
+      const double width = i < 3 || i == 6 ? 1e-5 : 1e-3;
+      Change moved = change;
+      moved[i] += width;
+      slopes.col(i) = (residual(moved) - now) / width;
+    }
+    const Eigen::Matrix<double, 7, 7> normal = slopes.transpose() * slopes;
+    change -= normal.ldlt().solve(slopes.transpose() * now);
+  }
+  const Eigen::VectorXd rest = residual(change);
+  return std::sqrt(2.0 * rest.squaredNorm() / static_cast<double>(rest.size()));
+}
+
+}  // namespace af

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "geometry/camera_geometry.h"
+
+namespace af {
+
+/// Along which direction of the images a scan's rotation axis runs; +z of the object is the
+/// direction of increasing column, or that of decreasing row.
+enum class AxisAlong { Columns, Rows };
+
+/// A circular cone-beam scan as its maker states it. Frame: the turning object, mm; +z is the
+/// rotation axis, which passes through the origin. The camera of angle 0 has its source at (0, -R,
+/// 0); the camera of angle a is that one turned by a about +z. Images are never mirrored: column x
+/// row points along the beam.
+struct CircularScan {
+  double source_to_axis_mm = 0.0;
+  double source_to_detector_mm = 0.0;
+  Eigen::Vector2d pixel_spacing_mm = Eigen::Vector2d::Ones();  ///< column, row
+  Eigen::Vector2i size_px = Eigen::Vector2i::Zero();           ///< columns, rows
+  AxisAlong axis_along = AxisAlong::Rows;
+  std::vector<double> angles_rad;  ///< of the views
+
+  /// The scan as seen by pixels `factor` times as wide and high; columns and rows that fill no
+  /// coarse pixel are left out.
+  [[nodiscard]] CircularScan binned(int factor) const;
+  /// The views `first`, `first` + `stride`, ... below `end`.
+  [[nodiscard]] static std::vector<int> every(int first, int stride, int end);
+};
+
+/// "source_to_axis_mm = -3: must be above 0" and so on, among them that the views go all the way
+/// round: the largest gap between neighbouring angles is at most three times the median one.
+std::vector<std::string> problems(const CircularScan& scan);
+
+/// How much of the circle each of these angles stands for, rad: half the gaps to its neighbours.
+/// The shares sum to 2 pi; angles may repeat and exceed a turn.
+std::vector<double> angle_shares_rad(const std::vector<double>& angles_rad);
+
+/// A value that changes with the view angle a: c0 + sum over k of c(2k-1) cos(ka) + c(2k) sin(ka).
+struct AngleSeries {
+  Eigen::VectorXd coefficients = Eigen::VectorXd::Zero(1);
+
+  explicit AngleSeries(int harmonics = 0)
+      : coefficients(Eigen::VectorXd::Zero(1 + 2 * harmonics)) {}
+  [[nodiscard]] double at(double angle_rad) const;
+  [[nodiscard]] int harmonics() const { return static_cast<int>(coefficients.size() - 1) / 2; }
+  /// (1, cos a, sin a, cos 2a, ...): at() is its product with the coefficients.
+  static Eigen::VectorXd basis(int harmonics, double angle_rad);
+};
+
+/// What a scan's geometry really is. The distance from source to axis stays the stated one: it is
+/// the unit of length of a self-calibration.
+struct ScanCalibration {
+  double source_to_detector_mm = 0.0;
+  double tilt_rad = 0.0;     ///< of the detector about the tangent of the circle
+  AngleSeries column_px;     ///< where the beam's perpendicular meets the detector
+  AngleSeries row_px;        ///< likewise
+  AngleSeries rotation_rad;  ///< of the detector in its plane, from its column towards its row axis
+
+  /// The stated geometry: an ideal circle, the beam on the detector's middle.
+  static ScanCalibration nominal(const CircularScan& scan, int harmonics);
+  /// The same geometry for the scan's binned() pixels, and back by a factor of 1 / factor.
+  [[nodiscard]] ScanCalibration binned(double factor) const;
+};
+
+/// The camera at an angle (frame of the object, mm), named `name`.
+CameraGeometry scan_camera(const CircularScan& scan,
+                           const ScanCalibration& calibration,
+                           double angle_rad,
+                           const std::string& name = "view");
+
+/// Distance from camera to camera on the detector when one object is seen by both, px (root mean
+/// square over points of a cylinder about the axis and the scan's angles), after the rigid motion
+/// and the change of size of the object that make it smallest: projections do not tell where an
+/// object lies and how large it is. Two calibrations are one when this is 0.
+double calibration_distance_px(const CircularScan& scan,
+                               const ScanCalibration& a,
+                               const ScanCalibration& b,
+                               double radius_mm,
+                               double half_height_mm);
+
+}  // namespace af

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "base/described_fields.h"
+#include "base/thread_pool.h"
+#include "scan/fdk.h"
+#include "scan/scan_geometry.h"
+#include "scan/view_alignment.h"
+
+namespace af {
+
+struct SelfCalibrationOptions {
+  int harmonics = 3;     ///< of the view angle, in column, row and rotation
+  int rounds = 6;        ///< at the finer of two resolutions
+  double fine_px = 1.0;  ///< of the band pass, pixels of the working resolution
+  double coarse_px = 6.0;
+  int working_px = 200;       ///< the larger side of the images that rounds work on, at most
+  int search_px = 120;        ///< likewise for the search of what projections hardly tell
+  double focal_share = 0.10;  ///< source to detector is sought within this share of the stated one
+  double tilt_deg = 1.0;      ///< and the tilt within this
+
+  void describe(Fields& field);
+};
+
+/// The images of a scan (line integrals), all of one size, and where they are lit.
+struct ScanImages {
+  CircularScan scan;
+  std::vector<Image2d> line_integrals;  ///< one per angle
+  std::vector<unsigned char> is_lit;
+
+  /// Means of factor x factor pixels; a pixel is lit when all of it is.
+  [[nodiscard]] ScanImages binned(int factor) const;
+};
+
+/// One view against its prediction from views that do not include it.
+struct JudgedView {
+  int view = 0;
+  ViewAlignment alignment;
+  Eigen::Vector2d shift_px = Eigen::Vector2d::Zero();  ///< over the response
+};
+
+/// What held-out views say of a calibration.
+struct HeldOutResidual {
+  std::vector<JudgedView> views;
+  double rms_px = 0.0;          ///< length of the shift, root mean square over the views
+  double rms_mm_at_axis = 0.0;  ///< the same where the axis is
+  double cost = 0.0;            ///< mean over the views, see ViewAlignment
+};
+
+/// Predicts the `judged` views from a reconstruction of the `used` ones and compares. Pixels whose
+/// rays leave the part that a full circle reconstructs do not count.
+/// \test SelfCalibration.FindsAKnownWobble
+HeldOutResidual held_out_residual(const ScanImages& images,
+                                  const ScanCalibration& calibration,
+                                  const std::vector<int>& used,
+                                  const std::vector<int>& judged,
+                                  const SelfCalibrationOptions& options,
+                                  ThreadPool& pool);
+
+/// The reconstruction of some views.
+MuVolume reconstruct_views(const ScanImages& images,
+                           const ScanCalibration& calibration,
+                           const std::vector<int>& used,
+                           const FdkOptions& options,
+                           ThreadPool& pool);
+
+/// Which pixels' rays stay, within `radius_mm` of the axis, where every view of the circle sees.
+std::vector<unsigned char> fully_seen_pixels(const CircularScan& scan,
+                                             const ScanCalibration& calibration,
+                                             const std::vector<unsigned char>& is_lit,
+                                             double radius_mm);
+
+/// Finds the geometry by which the views agree with each other: of the `used` views each half is
+/// predicted from the other's reconstruction, and cameras move to where the images are. Distance
+/// of the detector and its tilt, which projections hardly tell, are sought by the same residual.
+/// Throws InputError when a scan turning the other way would agree better: then step or handedness
+/// of the images is wrong. `report` receives a line per step.
+ScanCalibration self_calibrate(const ScanImages& images,
+                               const std::vector<int>& used,
+                               const SelfCalibrationOptions& options,
+                               ThreadPool& pool,
+                               const std::function<void(const std::string&)>& report);
+
+}  // namespace af

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "image/image2d.h"
+#include "scan/scan_geometry.h"
+
+namespace af {
+
+/// What of a view's camera a prediction can be wrong in: column and row of the beam's foot (px) and
+/// the detector's rotation in its plane (rad).
+inline constexpr int kViewParameters = 3;
+using ViewVector = Eigen::Matrix<double, kViewParameters, 1>;
+using ViewMatrix = Eigen::Matrix<double, kViewParameters, kViewParameters>;
+
+/// How a measured image differs from a predicted one: a step of robust least squares of
+/// measured = gain * predicted(moved), where the gain is eliminated.
+struct ViewAlignment {
+  ViewMatrix normal = ViewMatrix::Zero();  ///< of the parameters, weights and 1 / variance included
+  ViewVector right = ViewVector::Zero();   ///< normal * step = right
+  Eigen::Vector2d shift_px = Eigen::Vector2d::Zero();  ///< column, row alone, without rotation
+  /// The share of a shift that noise of the prediction lets through, for column and row: the slope
+  /// of measured on predicted gradients. Shifts are divided by it.
+  Eigen::Vector2d response = Eigen::Vector2d::Ones();
+  double cost = 0.0;  ///< mean of the robust residual, in units of the measured image's variance
+  double gain = 1.0;
+  std::vector<float> residual;  ///< measured - gain * predicted, in its robust standard deviations
+};
+
+/// Both images are band passed; `weight` says which pixels count (not 0). `beam_foot_px` is what
+/// the rotation is about. \test ViewAlignment.FindsAKnownMotion
+ViewAlignment align_view(const Image2d& measured,
+                         const Image2d& predicted,
+                         const std::vector<unsigned char>& is_counted,
+                         const Eigen::Vector2d& beam_foot_px,
+                         const Eigen::Vector2d& pixel_spacing_mm);
+
+}  // namespace af

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "scan/line_integrals.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+#include "base/hash_random.h"
+#include "unit/scan/simulated_scan.h"
+
+namespace af {
+namespace {
+
+using test::simulated_scan;
+using test::small_scan;
+
+/// A tube whose output drifts, a beam that is brighter in its middle, stripes, a dark corner.
+struct Detector {
+  bool stripes_are_columns;
+  double noise = 0.0;
+
+  [[nodiscard]] static bool is_dark(int column, int row) { return column + row < 12; }
+  [[nodiscard]] double air(const Image2d& image, int column, int row) const {
+    const double x = 2.0 * column / image.width - 1.0;
+    const double y = 2.0 * row / image.height - 1.0;
+    const double stripe = 1.0 + 0.02 * std::sin(12.3 * (stripes_are_columns ? column : row));
+    return 4e4 * (1.0 - 0.1 * x * x - 0.05 * y + 0.02 * x * y * y) * stripe;
+  }
+  [[nodiscard]] Image2d counts(const Image2d& line_integrals, int view) const {
+    Image2d result(line_integrals.width, line_integrals.height);
+    const double beam = 1.0 + 0.03 * std::sin(0.5 * view);
+    for (int row = 0; row < result.height; ++row)
+      for (int column = 0; column < result.width; ++column) {
+        const auto pixel = static_cast<std::uint64_t>(row * result.width + column);
+        const double grain =
+            noise * (HashRandom(7, static_cast<std::uint64_t>(view), pixel).uniform() - 0.5);
+        result.at(column, row) = static_cast<float>(
+            is_dark(column, row)
+                ? 900.0
+                : beam * air(result, column, row) *
+                      std::exp(-static_cast<double>(line_integrals.at(column, row))) *
+                      (1.0 + grain));
+      }
+    return result;
+  }
+};
+
+class AirLevelAlong : public testing::TestWithParam<AxisAlong> {};
+INSTANTIATE_TEST_SUITE_P(Axes, AirLevelAlong, testing::Values(AxisAlong::Columns, AxisAlong::Rows));
+
+TEST_P(AirLevelAlong, IsFoundAroundAnObjectUnderStripesAndDrift) {
+  const CircularScan scan = small_scan(GetParam());
+  // A ball that covers three quarters of the width in all views, with others in it.
+  const ScanImages images =
+      simulated_scan(scan, ScanCalibration::nominal(scan, 0), test::lopsided_balls());
+  const Detector detector{GetParam() == AxisAlong::Columns, 0.05};
+  std::vector<Image2d> counts;
+  for (int view = 0; view < 120; ++view)
+    counts.push_back(detector.counts(images.line_integrals[static_cast<std::size_t>(view)], view));
+  std::vector<const Image2d*> all;
+  for (const Image2d& image : counts) all.push_back(&image);
+  const AirLevel level = estimated_air_level(pixel_statistics(all), GetParam());
+  double error = 0.0;
+  double lit = 0.0;
+  for (int view = 0; view < 120; view += 7) {
+    const auto i = static_cast<std::size_t>(view);
+    const Image2d found = line_integrals_of(counts[i], level, GetParam(), 0.5);
+    for (std::size_t pixel = 0; pixel < found.pixels.size(); ++pixel) {
+      if (level.is_lit[pixel] == 0) continue;
+      error += static_cast<double>(found.pixels[pixel] - images.line_integrals[i].pixels[pixel]);
+      lit += 1.0;
+    }
+  }
+  // The mean over the object, most of which no air level was seen on: the fit is extrapolated.
+  EXPECT_NEAR(error / lit, 0.0, 0.003);
+  EXPECT_EQ(level.is_lit[0], 0) << "the dark corner";
+  EXPECT_EQ(level.is_air[static_cast<std::size_t>(30 * scan.size_px.x() + 30)], 0) << "the object";
+}
+
+TEST(LineIntegrals, FromAFlatImageAreExact) {
+  const CircularScan scan = small_scan();
+  const ScanImages images =
+      simulated_scan(scan, ScanCalibration::nominal(scan, 0), test::lopsided_balls());
+  const Detector detector{true, 0.0};
+  const Image2d flat = detector.counts(Image2d(scan.size_px.x(), scan.size_px.y()), 0);
+  std::vector<Image2d> counts;
+  for (int view = 0; view < 12; ++view)
+    counts.push_back(
+        detector.counts(images.line_integrals[static_cast<std::size_t>(10 * view)], view));
+  std::vector<const Image2d*> all;
+  for (const Image2d& image : counts) all.push_back(&image);
+  const AirLevel level = air_level_of_flat(flat, pixel_statistics(all));
+  const Image2d found = line_integrals_of(counts[5], level, scan.axis_along, 0.5);
+  for (int row = 0; row < scan.size_px.y(); ++row)
+    for (int column = 0; column < scan.size_px.x(); ++column)
+      // Pixels at the ball's rim, a little shadowed, pass as air and lower the beam by a permille.
+      EXPECT_NEAR(Detector::is_dark(column, row) ? 0.0F : found.at(column, row),
+                  Detector::is_dark(column, row) ? 0.0F : images.line_integrals[50].at(column, row),
+                  0.003);
+}
+
+TEST(AirLevel, IsRefusedWhereNoAirIsSeen) {
+  Image2d mean(40, 40);
+  Image2d deviation(40, 40);
+  for (std::size_t i = 0; i < mean.pixels.size(); ++i) {
+    mean.pixels[i] = 1000.0F;
+    deviation.pixels[i] = i % 3 == 0 ? 1.0F : 500.0F;
+  }
+  mean.pixels[0] = 1e9F;  // one bright pixel: all others are behind an aperture
+  for (std::size_t i = 1; i < 20; ++i) mean.pixels[i] = 1e9F;
+  EXPECT_THROW(estimated_air_level({mean, deviation}, AxisAlong::Rows), InputError);
+}
+
+}  // namespace
+}  // namespace af

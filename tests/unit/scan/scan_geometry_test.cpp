@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "scan/scan_geometry.h"
+
+#include <numbers>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "geometry/rigid_transform.h"
+#include "unit/scan/simulated_scan.h"
+
+namespace af {
+namespace {
+
+using test::small_scan;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+constexpr double kRounding = 1e-9;  // of doubles of some hundred mm
+
+class ScanCameraOf : public testing::TestWithParam<AxisAlong> {};
+INSTANTIATE_TEST_SUITE_P(Axes, ScanCameraOf, testing::Values(AxisAlong::Columns, AxisAlong::Rows));
+
+TEST_P(ScanCameraOf, SeesTheAxisAndIsNotMirrored) {
+  const CircularScan scan = small_scan(GetParam());
+  const ScanCalibration calibration = ScanCalibration::nominal(scan, 1);
+  for (const double angle : scan.angles_rad) {
+    const CameraGeometry camera = scan_camera(scan, calibration, angle);
+    EXPECT_THAT(problems(camera), IsEmpty());
+    EXPECT_FALSE(camera.is_mirrored());
+    const Eigen::Vector2d origin = camera.project(Eigen::Vector3d::Zero());
+    EXPECT_NEAR(origin.x(), 0.5 * (scan.size_px.x() - 1), kRounding);
+    EXPECT_NEAR(origin.y(), 0.5 * (scan.size_px.y() - 1), kRounding);
+    // 10 mm up the axis: 15 mm on the detector, towards larger columns or smaller rows.
+    const Eigen::Vector2d up =
+        camera.project({0.0, 0.0, 10.0}) - camera.project(Eigen::Vector3d::Zero());
+    const double pixels = 10.0 * 300.0 / 200.0 / 0.9;
+    EXPECT_NEAR(up.x(), GetParam() == AxisAlong::Columns ? pixels : 0.0, kRounding);
+    EXPECT_NEAR(up.y(), GetParam() == AxisAlong::Columns ? 0.0 : -pixels, kRounding);
+  }
+}
+
+TEST_P(ScanCameraOf, MovesImagesAsItsParametersSay) {
+  const CircularScan scan = small_scan(GetParam());
+  ScanCalibration calibration = ScanCalibration::nominal(scan, 0);
+  const Eigen::Vector3d point(3.0, 2.0, 8.0);
+  const Eigen::Vector2d before = scan_camera(scan, calibration, 0.4).project(point);
+  calibration.column_px.coefficients[0] += 2.0;
+  calibration.row_px.coefficients[0] -= 1.0;
+  const Eigen::Vector2d foot(calibration.column_px.at(0.4), calibration.row_px.at(0.4));
+  const Eigen::Vector2d shifted = scan_camera(scan, calibration, 0.4).project(point);
+  EXPECT_LT((shifted - before - Eigen::Vector2d(2.0, -1.0)).norm(), kRounding);
+  constexpr double kTurn = 0.01;
+  calibration.rotation_rad.coefficients[0] = kTurn;
+  const Eigen::Vector2d turned = scan_camera(scan, calibration, 0.4).project(point) - foot;
+  const Eigen::Vector2d from_foot = shifted - foot;
+  EXPECT_NEAR(turned.x(), std::cos(kTurn) * from_foot.x() + std::sin(kTurn) * from_foot.y(), 1e-8);
+  EXPECT_NEAR(turned.y(), std::cos(kTurn) * from_foot.y() - std::sin(kTurn) * from_foot.x(), 1e-8);
+}
+
+TEST(ScanCamera, TurnsAboutTheAxisAgainstTheObject) {
+  // A camera turned by a sees the object as the first camera sees it turned by -a.
+  const CircularScan scan = small_scan();
+  const ScanCalibration calibration = ScanCalibration::nominal(scan, 0);
+  const Eigen::Vector3d point(5.0, -3.0, 4.0);
+  const Eigen::Matrix3d back = rotation_from_angles({0.0, 0.0, -0.7});
+  EXPECT_LT((scan_camera(scan, calibration, 0.7).project(point) -
+             scan_camera(scan, calibration, 0.0).project(back * point))
+                .norm(),
+            kRounding);
+}
+
+TEST(ScanCalibration, BinsAndUnbins) {
+  const CircularScan scan = small_scan();
+  ScanCalibration calibration = ScanCalibration::nominal(scan, 2);
+  calibration.column_px.coefficients << 30.0, 1.0, -2.0, 0.5, 0.25;
+  const Eigen::Vector3d point(3.0, 2.0, 8.0);
+  const Eigen::Vector2d fine = scan_camera(scan, calibration, 0.4).project(point);
+  const Eigen::Vector2d coarse =
+      scan_camera(scan.binned(3), calibration.binned(3.0), 0.4).project(point);
+  // The centre of a coarse pixel is that of its middle fine one.
+  EXPECT_LT((3.0 * coarse + Eigen::Vector2d::Ones() - fine).norm(), kRounding);
+  EXPECT_LT((calibration.binned(3.0).binned(1.0 / 3.0).column_px.coefficients -
+             calibration.column_px.coefficients)
+                .norm(),
+            kRounding);
+}
+
+TEST(AngleShares, AreHalfTheGapsAndFillTheCircle) {
+  constexpr double kDeg = std::numbers::pi / 180.0;
+  const std::vector<double> shares =
+      angle_shares_rad({0.0, 90.0 * kDeg, 120.0 * kDeg, 240.0 * kDeg, 360.0 * kDeg});
+  // 0 and 360 are one place that two views share.
+  EXPECT_NEAR(shares[0] + shares[4], (120.0 + 90.0) / 2.0 * kDeg, kRounding);
+  EXPECT_NEAR(shares[1], (90.0 + 30.0) / 2.0 * kDeg, kRounding);
+  EXPECT_NEAR(shares[2], (30.0 + 120.0) / 2.0 * kDeg, kRounding);
+  EXPECT_NEAR(shares[3], 120.0 * kDeg, kRounding);
+}
+
+TEST(CircularScan, NamesWhatIsImpossible) {
+  EXPECT_THAT(problems(small_scan()), IsEmpty());
+  EXPECT_THAT(problems(small_scan(AxisAlong::Rows, -6.0)), IsEmpty()) << "two turns";
+  EXPECT_THAT(problems(small_scan(AxisAlong::Rows, 1.5)),
+              ElementsAre(HasSubstr("must go all the way round")));
+  CircularScan scan = small_scan();
+  scan.source_to_axis_mm = 0.0;
+  EXPECT_THAT(problems(scan), ElementsAre(HasSubstr("source_to_axis_mm = 0")));
+  scan = small_scan();
+  scan.source_to_detector_mm = 150.0;
+  EXPECT_THAT(problems(scan), ElementsAre(HasSubstr("must be above source_to_axis_mm")));
+  scan = small_scan();
+  scan.angles_rad.resize(10);
+  EXPECT_THAT(problems(scan), ElementsAre(HasSubstr("views = 10")));
+}
+
+TEST(CalibrationDistance, KnowsNoMotionOfTheObject) {
+  const CircularScan scan = small_scan();
+  const ScanCalibration stated = ScanCalibration::nominal(scan, 3);
+  EXPECT_NEAR(calibration_distance_px(scan, stated, stated, 10.0, 10.0), 0.0, kRounding);
+  ScanCalibration other = stated;
+  other.column_px.coefficients[3] = 0.5;  // cos 2a: root mean square 0.5 / sqrt(2)
+  EXPECT_NEAR(calibration_distance_px(scan, stated, other, 10.0, 10.0), 0.354, 0.01);
+  // A first harmonic is nearly a shift of the object: 0.5 px are 0.3 mm, at 200 mm from the source.
+  other = stated;
+  other.column_px.coefficients[1] = 0.5;
+  EXPECT_LT(calibration_distance_px(scan, stated, other, 10.0, 10.0), 0.03);
+}
+
+}  // namespace
+}  // namespace af

@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "scan/self_calibration.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+#include "scan/image_sampling.h"
+#include "unit/scan/simulated_scan.h"
+
+namespace af {
+namespace {
+
+using test::ball_image;
+using test::lopsided_balls;
+using test::simulated_scan;
+using test::small_scan;
+
+SelfCalibrationOptions quick_options() {
+  SelfCalibrationOptions options;
+  options.harmonics = 2;
+  options.rounds = 5;
+  options.working_px = 72;
+  options.search_px = 36;
+  options.coarse_px = 4.0;
+  options.focal_share = 0.05;
+  options.tilt_deg = 0.0;
+  return options;
+}
+
+/// A detector off its place whose foot and rotation wobble, and farther than stated.
+ScanCalibration wobbling(const CircularScan& scan) {
+  ScanCalibration truth = ScanCalibration::nominal(scan, 2);
+  truth.source_to_detector_mm *= 1.02;
+  truth.column_px.coefficients << 38.0, 0.3, -0.2, 0.4, 0.3;
+  truth.row_px.coefficients << 29.0, -0.3, 0.4, 0.3, -0.4;
+  truth.rotation_rad.coefficients << 0.015, 0.002, -0.001, 0.003, 0.002;
+  return truth;
+}
+
+TEST(SelfCalibration, FindsAKnownWobbleFromEvenViewsForOddOnes) {
+  const CircularScan scan = small_scan();
+  const ScanCalibration truth = wobbling(scan);
+  const ScanImages images = simulated_scan(scan, truth, lopsided_balls());
+  ThreadPool pool(2);
+  const std::vector<int> even = CircularScan::every(0, 2, 120);
+  const std::vector<int> odd = CircularScan::every(1, 2, 120);
+  const SelfCalibrationOptions options = quick_options();
+  const ScanCalibration stated = ScanCalibration::nominal(scan, 2);
+  const ScanCalibration found = self_calibrate(images, even, options, pool, [](const auto&) {});
+  // A pixel is 0.6 mm at the axis, and 60 views 6 degrees apart leave streaks: a tenth of a pixel.
+  const double before = calibration_distance_px(scan, truth, stated, 10.0, 10.0);
+  const double after = calibration_distance_px(scan, truth, found, 10.0, 10.0);
+  EXPECT_GT(before, 0.5);
+  EXPECT_LT(after, 0.1);
+  const double held_out = held_out_residual(images, found, even, odd, options, pool).rms_px;
+  EXPECT_LT(held_out, 0.05);
+  // A wrong geometry shows. The reconstruction shares it and yields: half of its 0.35 px remain.
+  ScanCalibration wrong = found;
+  wrong.column_px.coefficients[3] += 0.5;
+  EXPECT_GT(held_out_residual(images, wrong, even, odd, options, pool).rms_px, 0.15);
+}
+
+TEST(SelfCalibration, RefusesAScanThatTurnsTheOtherWay) {
+  const CircularScan scan = small_scan();
+  ScanImages images = simulated_scan(scan, ScanCalibration::nominal(scan, 0), lopsided_balls());
+  images.scan = small_scan(AxisAlong::Rows, -3.0);
+  ThreadPool pool(2);
+  SelfCalibrationOptions options = quick_options();
+  options.harmonics = 0;
+  try {
+    self_calibrate(images, CircularScan::every(0, 2, 120), options, pool, [](const auto&) {});
+    FAIL() << "accepted";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("change the sign of step_deg"));
+  }
+}
+
+TEST(SelfCalibration, RefusesAScanOfNothing) {
+  const CircularScan scan = small_scan();
+  const ScanImages images = simulated_scan(scan, ScanCalibration::nominal(scan, 0), {});
+  ThreadPool pool(1);
+  EXPECT_THROW(
+      self_calibrate(
+          images, CircularScan::every(0, 2, 120), quick_options(), pool, [](const auto&) {}),
+      InputError);
+}
+
+TEST(ViewAlignment, FindsAKnownMotion) {
+  const CircularScan scan = small_scan();
+  const ScanCalibration here = ScanCalibration::nominal(scan, 0);
+  ScanCalibration there = here;
+  there.column_px.coefficients[0] += 0.2;
+  there.row_px.coefficients[0] -= 0.1;
+  there.rotation_rad.coefficients[0] += 0.01;
+  const std::vector<unsigned char> all(static_cast<std::size_t>(scan.size_px.prod()), 1);
+  const BandPass band_pass(scan.size_px.x(), scan.size_px.y(), all, 1.0, 4.0);
+  const auto image = [&](const ScanCalibration& calibration) {
+    return band_pass(ball_image(scan_camera(scan, calibration, 0.3), lopsided_balls()));
+  };
+  Image2d measured = image(there);
+  for (float& value : measured.pixels) value *= 1.3F;  // the gain is eliminated
+  measured.at(20, 20) = 10.0F;                         // a stray object hardly counts
+  const ViewAlignment alignment = align_view(measured,
+                                             image(here),
+                                             all,
+                                             {here.column_px.at(0.3), here.row_px.at(0.3)},
+                                             scan.pixel_spacing_mm);
+  const ViewVector step = alignment.normal.ldlt().solve(alignment.right);
+  // One step of Gauss-Newton over a shift of a fifth of a pixel.
+  EXPECT_NEAR(step[0], 0.2, 0.02);
+  EXPECT_NEAR(step[1], -0.1, 0.02);
+  EXPECT_NEAR(step[2], 0.01, 0.001);
+  EXPECT_NEAR(alignment.gain, 1.3, 0.05);
+}
+
+TEST(ViewAlignment, SaysHowMuchOfAShiftNoiseOfThePredictionLetsThrough) {
+  const CircularScan scan = small_scan();
+  const ScanCalibration here = ScanCalibration::nominal(scan, 0);
+  ScanCalibration there = here;
+  there.column_px.coefficients[0] += 0.2;
+  const std::vector<unsigned char> all(static_cast<std::size_t>(scan.size_px.prod()), 1);
+  const BandPass band_pass(scan.size_px.x(), scan.size_px.y(), all, 1.0, 4.0);
+  Image2d predicted = ball_image(scan_camera(scan, here, 0.3), lopsided_balls());
+  // Noise like that of a reconstruction from few views; any fixed pattern does.
+  for (std::size_t i = 0; i < predicted.pixels.size(); ++i)
+    predicted.pixels[i] += 0.06F * static_cast<float>(std::sin(1e4 * static_cast<double>(i * i)));
+  const ViewAlignment alignment =
+      align_view(band_pass(ball_image(scan_camera(scan, there, 0.3), lopsided_balls())),
+                 band_pass(predicted),
+                 all,
+                 {here.column_px.at(0.3), here.row_px.at(0.3)},
+                 scan.pixel_spacing_mm);
+  EXPECT_LT(alignment.response.x(), 0.95);
+  EXPECT_NEAR(alignment.shift_px.x() / alignment.response.x(), 0.2, 0.04);
+}
+
+TEST(BandPass, LeavesOutInvalidPixels) {
+  Image2d image(20, 20);
+  std::vector<unsigned char> is_valid(400, 1);
+  for (std::size_t i = 0; i < 400; ++i) image.pixels[i] = 3.0F;
+  image.at(7, 9) = 1e6F;
+  is_valid[9 * 20 + 7] = 0;
+  for (const float value : BandPass(20, 20, is_valid, 1.0, 4.0)(image).pixels)
+    EXPECT_NEAR(value, 0.0F, 1e-5F);
+}
+
+TEST(SampledCubic, GivesBackParabolasAndPixels) {
+  Image2d image(8, 8);
+  const auto f = [](double c, double r) { return 1.0 + 0.5 * c - r + 0.25 * c * c - 0.5 * c * r; };
+  for (int row = 0; row < 8; ++row)
+    for (int column = 0; column < 8; ++column)
+      image.at(column, row) = static_cast<float>(f(column, row));
+  EXPECT_EQ(sampled_cubic(image, 3.0, 4.0), static_cast<double>(image.at(3, 4)));
+  EXPECT_NEAR(sampled_cubic(image, 3.3, 4.6), f(3.3, 4.6), 1e-5);
+}
+
+}  // namespace
+}  // namespace af
