@@ -7,6 +7,8 @@
 
 #include <CLI/CLI.hpp>
 
+#include "cli/option_values.h"
+
 namespace af::cli {
 
 namespace {
@@ -73,7 +75,17 @@ void bind_field(CLI::App& app, const Field& field) {
   if (field.number_count > 0) option->expected(field.number_count);
   if (field.is_comma_separated) option->delimiter(',');
   if (field.takes_one_at_a_time) option->allow_extra_args(false);
-  if (field.is_size) option->transform(CLI::AsSizeValue(true));
+  if (field.is_size) {
+    option->transform(CLI::AsSizeValue(true));
+    // The transform added last comes first.
+    option->transform(CLI::Validator(
+        [](std::string& text) {
+          text = whole_bytes(text);
+          return std::string();
+        },
+        "",
+        "decimal size"));
+  }
   option->required(field.is_required);
 }
 

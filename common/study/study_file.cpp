@@ -136,6 +136,15 @@ void check_fiducials(TomlTableReader& reader,
     }
 }
 
+/// mask = "auto" or a file; a file of that name is "./auto".
+void read_mask_key(TomlTableReader& reader, const fs::path& folder, StudyView& view) {
+  const auto text = reader.get_string("mask", Presence::Optional);
+  if (!text) return;
+  view.reading.masks_borders = *text == "auto";
+  if (!view.reading.masks_borders)
+    view.mask = get_path(reader, "mask", Presence::Optional, folder, view.places);
+}
+
 StudyView read_view(const toml::table& table,
                     const std::string& prefix,
                     std::size_t fiducial_count,
@@ -152,7 +161,9 @@ StudyView read_view(const toml::table& table,
   view.roi = get_roi(reader, camera);
   view.fiducials_px = get_points<2>(reader, "fiducials_px");
   view.field = path("field", Presence::Optional);
-  view.mask = path("mask", Presence::Optional);
+  view.reading = read_xray_keys(
+      reader, view.xray_domain, [&](const char* key) { return path(key, Presence::Optional); });
+  read_mask_key(reader, context.folder, view);
   check_fiducials(reader, view, fiducial_count, camera);
   reader.refuse_unknown_keys();
   return view;
@@ -266,6 +277,9 @@ std::string view_text(const StudyView& view, const fs::path& folder) {
   if (!view.fiducials_px.empty()) text += "fiducials_px = " + points_text(view.fiducials_px) + "\n";
   if (view.field) add_path("field", *view.field);
   if (view.mask) add_path("mask", *view.mask);
+  if (view.reading.masks_borders) text += "mask = \"auto\"\n";
+  text += xray_keys_text(view.reading,
+                         [&](const fs::path& path) { return relative_if_below(path, folder); });
   return text;
 }
 

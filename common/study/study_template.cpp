@@ -37,12 +37,18 @@ target_box_ct_mm = [[-30, -30, -30], [30, 30, 30]]  # low and high corner: TRE i
 
 [[case.view]]                                    # one per X-ray; two or more cameras see depth
 camera = "A"                                     # a camera of the rig
-xray = "patient-01/A.mha"                        # MetaImage, NIfTI, NRRD, TIFF or PNG, the camera's size
+xray = "patient-01/A.mha"                        # DICOM, MetaImage, NIfTI, NRRD, TIFF or PNG, the camera's size
 xray_domain = "intensity"                        # bright = unattenuated, -log is taken; or "attenuation"
 roi_px = [156, 156, 200, 200]                    # column, row, width, height: the pixels that are compared
 # fiducials_px = [[201.3, 255.0], [280.1, 231.7], [240.6, 301.2], [232.9, 207.4]]   # as many as fiducials_ct_mm
 # field = "fields/patient-01-A.af.h5"            # made by af-precompute --study study.toml --case patient-01 --camera A
-# mask = "patient-01/A-mask.png"                 # not zero = used; for steel, labels or collimators
+# mask = "patient-01/A-mask.png"                 # not zero = used; for steel, labels or collimators; or "auto"
+# How the X-ray's values are read (docs/xrays.md); af-inspect says what was done.
+# xray_frame = 1                                 # of a DICOM file of several frames
+# xray_polarity = "inverted"                     # or "as-stored"; without it as a DICOM file says
+# air_level = "open-beam"                        # or "collimated-borders", "percentile", or a number
+# dark_level = 100.0                             # subtracted first; or dark = "dark.mha"
+# xray_spacing = "ignore"                        # when the file's pixel spacing is wrong, and the rig's right
 
 [[case.view]]
 camera = "B"

@@ -174,6 +174,10 @@ bool TomlTableReader::has(const char* key) {
   return table_.contains(key);
 }
 
+bool TomlTableReader::has_number(const char* key) {
+  return has(key) && node(key).is_number();
+}
+
 std::string TomlTableReader::place(const char* key) const {
   return problems_.where(node(key)) + ": " + prefix_ + key;
 }
@@ -201,6 +205,23 @@ std::optional<std::string> TomlTableReader::get_string(const char* key, Presence
     return std::nullopt;
   }
   add_problem(key, "must be a text in quotes that is not empty");
+  return std::nullopt;
+}
+
+std::optional<double> TomlTableReader::get_number(const char* key, Presence presence) {
+  const toml::node* found = find(key, presence);
+  if (found == nullptr) return std::nullopt;
+  const auto number = number_within(*found, std::numeric_limits<double>::max());
+  if (!number) add_problem(key, "must be a finite number");
+  return number;
+}
+
+std::optional<int> TomlTableReader::get_integer(const char* key, Presence presence) {
+  const toml::node* found = find(key, presence);
+  if (found == nullptr) return std::nullopt;
+  const auto number = number_within(*found, std::numeric_limits<int>::max());
+  if (number && *number == std::round(*number)) return static_cast<int>(*number);
+  add_problem(key, "must be a whole number");
   return std::nullopt;
 }
 

@@ -59,6 +59,10 @@ class TomlTableReader {
       : table_(table), prefix_(std::move(prefix)), problems_(problems) {}
 
   std::optional<std::string> get_string(const char* key, Presence presence);
+  /// A finite number.
+  std::optional<double> get_number(const char* key, Presence presence);
+  /// A whole number that fits an int.
+  std::optional<int> get_integer(const char* key, Presence presence);
   /// A list of exactly `Size` numbers within kMaxRoomMm: points, directions, spacings.
   template <int Size>
   std::optional<Eigen::Matrix<double, Size, 1>> get_vector(const char* key, Presence presence) {
@@ -81,6 +85,8 @@ class TomlTableReader {
   [[nodiscard]] const toml::node& node(const char* key) const;
   /// Whether the key is there; makes it a known one.
   bool has(const char* key);
+  /// Whether the key is there and holds a number.
+  bool has_number(const char* key);
   /// "FILE:LINE: PREFIXkey".
   [[nodiscard]] std::string place(const char* key) const;
   /// "FILE:LINE: PREFIXkey = value: constraint".

@@ -28,10 +28,11 @@
 #include "files/output_file.h"
 #include "files/resource_check.h"
 #include "files/sha256.h"
+#include "pose_files/pose_file.h"
 #include "run/run_folder.h"
 #include "run/terminal.h"
 #include "study/node_ct.h"
-#include "study/pose_file.h"
+#include "study/pose_context.h"
 #include "study/study_file.h"
 #include "text/options_toml.h"
 
@@ -107,9 +108,10 @@ Setup load(const ImageQualityOptions& options, const Target& target, const Commu
                            ": give --look-up linear",
                        target.field.string());
     if (options.poses.empty()) return;
-    setup.poses = read_poses_csv(options.poses, identity.frame);
-    if (setup.poses.empty())
-      throw InputError("poses", "no row", "must hold at least one pose", options.poses.string());
+    setup.poses = read_poses(
+        options.poses,
+        pose_context(
+            target.ct, {}, CameraRig{Eigen::Vector3d::Zero(), {identity.camera}}, identity.frame));
   });
   setup.view = View::whole_detector(identity.camera);
   return setup;

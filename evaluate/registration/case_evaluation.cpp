@@ -31,6 +31,7 @@
 #include "run/resumable_items.h"
 #include "run/stop_request.h"
 #include "run/terminal.h"
+#include "study/pose_context.h"
 #include "text/options_toml.h"
 
 namespace af::evaluation {
@@ -411,7 +412,8 @@ PoseTableFrames pose_table_frames(const Study& study,
   return {study_case.name,
           study.cases.size() == 1,
           PoseFrame::about(gold_room_from_ct, study_case.center_ct_mm),
-          PoseFrame::about(study_case.nominal_room_from_ct, study_case.center_ct_mm)};
+          PoseFrame::about(study_case.nominal_room_from_ct, study_case.center_ct_mm),
+          pose_context(study, study_case)};
 }
 
 StratifiedStarts given_starts(const RegistrationStudyOptions& options,

@@ -45,6 +45,10 @@ CLI::App* bind_compare(CLI::App& app, CompareOptions& options) {
 void run_compare(const CompareOptions& options, const Communicator& world) {
   all_or_none(world, [&] {
     if (!world.is_root()) return;
+    if (options.output.extension() == ".csv")
+      throw InputError("--output",
+                       options.output.string(),
+                       "must name the table in Markdown; the CSV stands beside it under that name");
     std::filesystem::path csv = options.output;
     csv.replace_extension(".csv");
     announce_output(csv);

@@ -13,7 +13,7 @@
 #include "geometry/rigid_transform.h"
 #include "gold_standard/target_box.h"
 #include "gold_standard/tre.h"
-#include "study/pose_file.h"
+#include "pose_files/pose_file.h"
 
 namespace af::evaluation {
 namespace {

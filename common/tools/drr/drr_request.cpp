@@ -14,7 +14,8 @@
 #include "image/psnr.h"
 #include "image_files/ct_reader.h"
 #include "image_files/image_file.h"
-#include "study/pose_file.h"
+#include "pose_files/pose_file.h"
+#include "study/pose_context.h"
 #include "study/rig_file.h"
 #include "study/study_file.h"
 #include "text/csv_table.h"
@@ -57,10 +58,12 @@ void describe_pose(Fields& field, DrrOptions& options) {
         options.translation_mm,
         "tx,ty,tz along the room's axes, mm (default 0,0,0)")
       .comma_separated();
-  field("pose", options.pose, "File with room_from_ct (TOML, result.json, ITK .tfm or 16 numbers)");
+  field("pose", options.pose, "File with one pose of any format that docs/poses.md lists");
   field("poses",
         options.poses,
-        "CSV of poses (rx_deg ... tz_mm, or m00 ... m23): one 3-D stack comes out");
+        "CSV of poses (rx_deg ... tz_mm, or m00 ... m23) or another file of poses (docs/poses.md): "
+        "one "
+        "3-D stack comes out");
 }
 
 void describe_output(Fields& field, DrrOptions& options) {
@@ -243,15 +246,19 @@ DrrScene load_scene(const DrrOptions& options, const Communicator& communicator)
   return scene;
 }
 
-std::vector<RigidTransform> requested_poses(const DrrOptions& options, const PoseFrame& frame) {
-  if (!options.poses.empty()) return read_poses_csv(options.poses, frame);
-  if (!options.pose.empty()) return {read_pose(options.pose)};
+std::vector<RigidTransform> requested_poses(const DrrOptions& options, const DrrScene& scene) {
+  const PoseContext context = pose_context(source_of(options).ct,
+                                           options.ct_reading,
+                                           CameraRig{Eigen::Vector3d::Zero(), {scene.view.camera}},
+                                           scene.frame);
+  if (!options.poses.empty()) return read_poses(options.poses, context);
+  if (!options.pose.empty()) return {read_pose(options.pose, context)};
   std::array<double, 6> values{};
   for (std::size_t i = 0; i < 3; ++i) {
     if (options.rotation_deg.has_value()) values[i] = (*options.rotation_deg)[i];
     if (options.translation_mm.has_value()) values[i + 3] = (*options.translation_mm)[i];
   }
-  return {pose_of_deg_and_mm(frame, values, "--rotation-deg, --translation-mm")};
+  return {pose_of_deg_and_mm(scene.frame, values, "--rotation-deg, --translation-mm")};
 }
 
 void require_room(std::size_t poses, const View& view, const std::filesystem::path& output) {

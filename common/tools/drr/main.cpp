@@ -17,7 +17,7 @@ void run(const DrrOptions& options, const af::Communicator& world) {
   af::throw_if_any(problems(options));
   if (world.is_root()) af::announce_output(options.output);
   const af::tools::DrrScene scene = af::tools::load_scene(options, world);
-  const std::vector<af::RigidTransform> poses = af::tools::requested_poses(options, scene.frame);
+  const std::vector<af::RigidTransform> poses = af::tools::requested_poses(options, scene);
   if (!world.is_root()) return;
   if (options.compare) {
     const std::string words = af::tools::write_comparison(scene, poses.front(), options.output);
