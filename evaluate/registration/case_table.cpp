@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "evaluate/registration/case_table.h"
 
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -48,6 +49,31 @@ CsvTable case_table(const json& renderers) {
       add(name, entry.at("case").get<std::string>(), entry);
     add(name, "all", renderer);
   }
+  return table;
+}
+
+CsvTable drawn_starts_table(const json& cases, const json& renderers) {
+  CsvTable table(
+      {"case", "low_mm", "high_mm", "draws", "refused_draws", "rotation_share_of_starts"});
+  const json& intervals = renderers.at(0).at("intervals");
+  for (const json& of_case : cases)
+    for (std::size_t k = 0; k < intervals.size(); ++k) {
+      const auto number = [&](const char* key) {
+        const json& values = of_case.at(key);
+        return k < values.size() && values.at(k).is_number()
+                   ? number_text(values.at(k).get<double>())
+                   : std::string("nan");
+      };
+      table.add_row({of_case.at("case").get<std::string>(),
+                     number_text(number_of(intervals.at(k).at("low_mm"))),
+                     number_text(number_of(intervals.at(k).at("high_mm"))),
+                     number("draws_per_interval"),
+                     // Zeros of starts that were not drawn say nothing.
+                     of_case.at("draws_per_interval").empty()
+                         ? "nan"
+                         : number("inadmissible_draws_per_interval"),
+                     number("rotation_share_per_interval")});
+    }
   return table;
 }
 

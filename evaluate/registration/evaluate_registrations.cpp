@@ -482,7 +482,12 @@ void run_registration(const RegistrationStudyOptions& options,
     if (world.is_root()) require_gnuplot();
   });
   RunFolder run({folder,
-                 {"starts.csv", "registrations.csv", "cases.csv", "reproduce.sh", "summary.json"},
+                 {"starts.csv",
+                  "registrations.csv",
+                  "cases.csv",
+                  "starts-per-interval.csv",
+                  "reproduce.sh",
+                  "summary.json"},
                  options.resume.restarts},
                 world);
   const Study study = shared_study(options.study, world, &study_warnings);
@@ -534,6 +539,8 @@ void run_registration(const RegistrationStudyOptions& options,
     draw_figures(options, rows.view());
     const json summary = summary_json(options, study, evaluations, rows.view());
     write_text_file(folder / "cases.csv", case_table(summary["renderers"]).to_text());
+    write_text_file(folder / "starts-per-interval.csv",
+                    drawn_starts_table(summary["cases"], summary["renderers"]).to_text());
     run.finish(summary, provenance);
     print_outcome(summary, folder, world);
   });

@@ -215,6 +215,30 @@ TEST_F(HandBuiltResults, OfOneStartOfAllFailuresAndOfAllSuccessesAreTheEndsOfThe
   EXPECT_TRUE(single["tre_of_successes_mm"]["sd"].is_null());
 }
 
+TEST_F(HandBuiltResults, SayHowTheStartsWereDrawnAsFarAsTheyKnow) {
+  ASSERT_EQ(evaluate().exit_code, 0);
+  const CsvTable starts = CsvTable::read(path("out/starts-per-interval.csv"));
+  ASSERT_EQ(starts.row_count(), 4u * 8u);
+  // The starts are given ones: nobody knows which draws were refused. They are pure shifts.
+  EXPECT_EQ(starts.text(0, "draws"), "nan");
+  EXPECT_EQ(starts.text(0, "refused_draws"), "nan");
+  EXPECT_NEAR(starts.number(0, "rotation_share_of_starts"), 0.0, 1e-9);
+  EXPECT_EQ(starts.number(1, "high_mm"), 4.0);
+  const CsvTable cases = CsvTable::read(path("out/cases.csv"));
+  EXPECT_EQ(cases.text(0, "case"), "hopeless");
+  EXPECT_EQ(cases.number(0, "gross_failures"), 20.0);
+  EXPECT_EQ(cases.number(0, "capture_range_mm"), 0.0);
+  EXPECT_EQ(cases.text(0, "capture_range_ended_by"), "failures");
+}
+
+TEST_F(HandBuiltResults, AreCountedBelowTheStatedThreshold) {
+  ASSERT_EQ(evaluate("--success-tre-mm 1").exit_code, 0);
+  EXPECT_EQ(summary()["success_tre_mm"], 1.0);
+  EXPECT_EQ(of_case(statistics(), "mixed")["successes"], 6);
+  EXPECT_EQ(evaluate("--success-tre-mm 0").exit_code, 3);
+  EXPECT_EQ(evaluate("--success-tre-mm nan").exit_code, 3);
+}
+
 TEST_F(HandBuiltResults, OfFewCasesComeWithAWarning) {
   const test::ProgramRun run = evaluate();
   EXPECT_THAT(run.output, HasSubstr("4 cases: the bootstrap interval over cases is too narrow"));
