@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "register/results/target_errors.h"
 
+#include <vector>
+
 #include "gold_standard/target_box.h"
 #include "gold_standard/tre.h"
 
