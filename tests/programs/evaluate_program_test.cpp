@@ -15,10 +15,10 @@
 #include <gtest/gtest.h>
 
 #include "files/output_file.h"
+#include "pose_files/pose_file.h"
 #include "programs/small_study.h"
 #include "run/output_lock.h"
 #include "run/stop_request.h"
-#include "study/pose_file.h"
 #include "study/study_file.h"
 #include "support/browser.h"
 #include "support/kept_records.h"
