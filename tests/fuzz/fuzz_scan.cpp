@@ -10,7 +10,7 @@
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace af;
   std::optional<tools::ScanFile> file;
-  const std::string text = fuzz::as_text({data, size});
+  const std::string text(fuzz::as_text({data, size}));
   if (!fuzz::is_accepted([&] { file = tools::parse_scan_file(text, "scan.toml"); })) return 0;
   fuzz::require(is_plain_file_name(file->name), "a scan's name can be a part of file names");
   fuzz::require(problems(file->scan).empty(), "an accepted scan is a possible one");
