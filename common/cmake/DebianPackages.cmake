@@ -55,7 +55,8 @@ find_package(AttenuationFields)." DEPENDS "${af_library_package} (${af_same_vers
 endif()
 if(TARGET attenuation_fields_python)
   af_add_package(
-    python python3-attenuation-fields python "The Python module attenuation_fields: DRRs and their derivatives as NumPy arrays,
-registration, results." DEPENDS python3 python3-numpy "${af_library_package} (${af_same_version})")
+    python python3-attenuation-fields python "The Python module attenuation_fields: DRRs and their derivatives as NumPy
+arrays, registration, results."
+    DEPENDS "python3 (>= ${Python_VERSION_MAJOR}.${Python_VERSION_MINOR})" "python3 (<< ${Python_VERSION_MAJOR}.${Python_VERSION_MINOR}.99)" python3-numpy "${af_library_package} (${af_same_version})")
 endif()
 include(CPack)

@@ -83,7 +83,8 @@ if [[ -e /usr/lib/python3/dist-packages/attenuation_fields ]]; then
   python3 -c "import attenuation_fields as af; print('Python: a DRR of shape', af.Field.open('AP.af.h5').drr(rotation_deg=(1, 0, 0)).shape)"
 fi
 af-inspect AP.af.h5 result/pose.toml | grep -E 'field|checksums|pose'
-/usr/libexec/attenuation-fields/slicer/af-register --xml | head -n 1
+/usr/libexec/attenuation-fields/slicer/af-register --xml >module.xml
+head -n 1 module.xml
 TEXT
 cat >"$root/packages/remove.sh" <<'TEXT'
 mapfile -t installed < <(dpkg-query --show --showformat '${Package}\n' '*attenuation-fields*')
