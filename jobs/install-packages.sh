@@ -11,7 +11,7 @@ base_packages=(
   libinsighttoolkit5-dev libgdcm-dev zlib1g-dev
   libeigen3-dev libcli11-dev libtomlplusplus-dev nlohmann-json3-dev libnlopt-dev libspdlog-dev libssl-dev libboost-math-dev
   libgtest-dev libgmock-dev
-  libcairo2-dev fonts-dejavu-core gnuplot-nox
+  libcairo2-dev libexpat1-dev fonts-dejavu-core gnuplot-nox
   invesalius-examples
 )
 benchmark_packages=(plastimatch libfaiss-dev libopenblas-dev)
