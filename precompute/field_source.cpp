@@ -5,8 +5,9 @@
 
 #include "base/error.h"
 #include "base/joined.h"
+#include "pose_files/pose_file.h"
 #include "study/node_ct.h"
-#include "study/pose_file.h"
+#include "study/pose_context.h"
 #include "study/rig_file.h"
 #include "study/shared_inputs.h"
 
@@ -59,9 +60,12 @@ NamedSource source_of_options(const PrecomputeOptions& options,
         all_or_none(communicator, [&] { return only_camera(cameras, "rig " + options.rig); });
   }
   if (!options.nominal_pose.empty())
-    source.nominal_room_from_ct = shared_poses(communicator, [&] {
-                                    return std::vector{read_pose(options.nominal_pose)};
-                                  }).front();
+    source.nominal_room_from_ct =
+        shared_poses(communicator, [&] {
+          return std::vector{
+              read_pose(options.nominal_pose,
+                        pose_context(options.ct, {options.series_uid}, source.rig, std::nullopt))};
+        }).front();
   return source;
 }
 

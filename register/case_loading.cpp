@@ -65,31 +65,34 @@ void require_known_field_cameras(const StudyCase& study_case, const CaseLoadOpti
   }
 }
 
-/// X-ray and mask of a view from their files; their hashes go to `input_sha256`.
-void read_images(const StudyView& study_view,
-                 RegistrationView& view,
-                 std::map<std::string, std::string>& input_sha256) {
-  const CameraGeometry& camera = view.view.camera;
-  view.xray = used_from(
-      study_view.places, "xray", [&] { return read_xray_attenuation(study_view, camera); });
-  view.mask = used_from(study_view.places, "mask", [&] { return read_mask(study_view, camera); });
-  input_sha256["xray " + study_view.camera] = sha256_of_file(study_view.xray.string());
-  if (study_view.mask.has_value())
-    input_sha256["mask " + study_view.camera] = sha256_of_file(study_view.mask->string());
+/// X-ray and mask of a view from their files; hashes, notes and warnings go to `loaded`.
+void read_images(const StudyView& study_view, RegistrationView& view, LoadedCase& loaded) {
+  ViewXray xray = read_view_xray(study_view, view.view.camera);
+  view.xray = std::move(xray.attenuation);
+  view.mask = std::move(xray.mask);
+  loaded.input_notes["xray " + study_view.camera] = xray.note;
+  for (std::string& warning : xray.warnings) loaded.warnings.push_back(std::move(warning));
+  const auto note_hash = [&](const char* kind, const std::filesystem::path& path) {
+    loaded.input_sha256[kind + (" " + study_view.camera)] = sha256_of_file(path.string());
+  };
+  note_hash("xray", study_view.xray);
+  if (study_view.mask) note_hash("mask", *study_view.mask);
+  if (study_view.reading.flat) note_hash("flat", *study_view.reading.flat);
+  if (study_view.reading.dark) note_hash("dark", *study_view.reading.dark);
 }
 
-/// Collective. The views without renderers; rank 0 reads the images and keeps the hashes.
+/// Collective. The views without renderers; rank 0 reads the images and keeps hashes and notes.
 std::vector<RegistrationView> read_views(const Study& study,
                                          const StudyCase& study_case,
                                          double fiducial_mask_mm,
                                          const Communicator& communicator,
-                                         std::map<std::string, std::string>& input_sha256) {
+                                         LoadedCase& loaded) {
   std::vector<RegistrationView> views;
   for (const StudyView& study_view : study_case.views) {
     RegistrationView view;
     all_or_none(communicator, [&] {
       view.view = {study.rig.camera(study_view.camera), study_view.roi};
-      if (communicator.is_root()) read_images(study_view, view, input_sha256);
+      if (communicator.is_root()) read_images(study_view, view, loaded);
     });
     broadcast(view.xray, communicator);
     broadcast(view.mask, communicator);
@@ -116,6 +119,8 @@ std::string case_sha256(const Study& study, const StudyCase& study_case) {
     view.xray.clear();
     view.field.reset();
     if (view.mask.has_value()) view.mask->clear();
+    if (view.reading.flat.has_value()) view.reading.flat->clear();
+    if (view.reading.dark.has_value()) view.reading.dark->clear();
   }
   const std::string text = study_to_toml(one, {}) + rig_to_toml(one.rig);
   return sha256_hex(std::as_bytes(std::span(text)));
@@ -379,8 +384,7 @@ LoadedCase load_case(const Study& study,
     require_known_field_cameras(study_case, options);
     loaded.input_sha256["case"] = case_sha256(study, study_case);
   });
-  problem->views =
-      read_views(study, study_case, options.fiducial_mask_mm, communicator, loaded.input_sha256);
+  problem->views = read_views(study, study_case, options.fiducial_mask_mm, communicator, loaded);
 
   problem->target_points_ct = ct_lattice_points(study_case.target_box_ct, kTargetPointsPerAxis);
   const bool looks_up = options.renderer == RendererKind::Field;

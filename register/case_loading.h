@@ -46,6 +46,7 @@ struct CaseLoadOptions {
 struct LoadedCase {
   std::shared_ptr<const RegistrationProblem> problem;
   std::map<std::string, std::string> input_sha256;  ///< "ct", "field A", "xray A", ...
+  std::map<std::string, std::string> input_notes;   ///< how each was read: "xray A", ...; rank 0
   std::vector<std::string> warnings;
 };
 

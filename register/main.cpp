@@ -9,6 +9,7 @@
 #include "cli/app_main.h"
 #include "cli/bind_lists.h"
 #include "cli/bind_options.h"
+#include "cli/slicer_module.h"
 #include "files/output_file.h"
 #include "parallel/work_watch.h"
 #include "register/multi_start.h"
@@ -17,6 +18,7 @@
 #include "register/results/target_errors.h"
 #include "run/run_folder.h"
 #include "run/terminal.h"
+#include "study/pose_context.h"
 #include "study/shared_inputs.h"
 #include "text/csv_table.h"
 #include "text/options_toml.h"
@@ -43,8 +45,8 @@ void run(const RegisterOptions& options,
   for (const std::string& text : study_warnings) af::warn(world, text);
   const af::StudyCase study_case =
       af::all_or_none(world, [&] { return study.find_case(options.case_name); });
-  const std::vector<af::RigidTransform> starts =
-      af::shared_poses(world, [&] { return start_poses(options, study_case.frame()); });
+  const std::vector<af::RigidTransform> starts = af::shared_poses(
+      world, [&] { return start_poses(options, af::pose_context(study, study_case)); });
   const auto gold = af::all_or_none(world, [&] { return known_gold(study, study_case); });
   const auto pool = std::make_shared<af::ThreadPool>(af::thread_count(options.method.threads));
   CaseLoadOptions load_options =
@@ -56,6 +58,7 @@ void run(const RegisterOptions& options,
     return load_case(study, study_case, load_options, world);
   }();
   for (const std::string& text : loaded.warnings) af::warn(world, text);
+  for (const auto& [input, note] : loaded.input_notes) af::inform(world, input + ": " + note);
   RegistrationRunner runner =
       af::all_or_none(world, [&] { return RegistrationRunner(loaded.problem, method, pool); });
   PoseExaminer examiner = af::all_or_none(world, [&] { return PoseExaminer(loaded.problem); });
@@ -75,7 +78,8 @@ void run(const RegisterOptions& options,
                             af::to_toml(in_force),
                             options.method.seed,
                             world.size(),
-                            loaded.input_sha256};
+                            loaded.input_sha256,
+                            loaded.input_notes};
   auto& input_sha256 = description.provenance.input_sha256;
   af::all_or_none(world, [&] {
     if (world.is_root()) input_sha256.merge(hashes_of_files(options));
@@ -128,6 +132,7 @@ int main(int argc, char** argv) {
   af::cli::bind_lists(app,
                       {{"measures", af::registration::similarity_list()},
                        {"optimizers", af::registration::optimizer_list()}});
+  af::cli::bind_slicer_module(app, "2D-3D registration");
   const std::string command_line = af::cli::command_line(argc, argv);
   return af::cli::app_main(
       app, argc, argv, [&](const Communicator& world) { run(options, command_line, world); });

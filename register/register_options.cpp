@@ -6,7 +6,7 @@
 #include "base/error.h"
 #include "base/toml_text.h"
 #include "files/sha256.h"
-#include "study/pose_file.h"
+#include "pose_files/pose_file.h"
 
 namespace af::registration {
 namespace {
@@ -23,18 +23,24 @@ void describe_start(Fields& field, RegisterOptions& options) {
       .comma_separated();
   field("start_pose",
         options.start_pose,
-        "Start: file with room_from_ct (TOML, JSON, ITK .tfm or 16 numbers)");
+        "Start: file with one pose of any format that docs/poses.md lists")
+      .stands_for(PathRole::InputTransform, ".tfm");
   field("starts",
         options.starts,
-        "CSV of many starts: rx_deg,ry_deg,rz_deg,tx_mm,ty_mm,tz_mm relative to nominal, or m00 "
-        "... m23 of room_from_ct; under mpirun the ranks share them")
+        "Many starts: CSV with rx_deg,ry_deg,rz_deg,tx_mm,ty_mm,tz_mm relative to nominal or m00 "
+        "... m23 of room_from_ct, or another file of poses (docs/poses.md); under mpirun the ranks "
+        "share them")
+      .stands_for(PathRole::InputFile, ".csv")
       .input();
 }
 
 }  // namespace
 
 void RegisterOptions::describe(Fields& field) {
-  field("study", study, "study.toml: rig, cases, X-rays").required().input();
+  field("study", study, "study.toml: rig, cases, X-rays")
+      .stands_for(PathRole::InputFile, ".toml")
+      .required()
+      .input();
   field("case", case_name, "Case of the study (may be left out when it has one)");
   field.part(fields);
   field("renderer",
@@ -56,6 +62,7 @@ void RegisterOptions::describe(Fields& field) {
   field.part(resume);
   field("output", output_folder, "Folder for the results")
       .as("-o,--output")
+      .stands_for(PathRole::OutputFolder)
       .required()
       .not_deciding("results are the same");
 }
@@ -108,16 +115,19 @@ CaseLoadOptions case_load_options(const RegisterOptions& options,
   return result;
 }
 
-std::vector<RigidTransform> start_poses(const RegisterOptions& options, const PoseFrame& frame) {
-  if (!options.starts.empty()) return read_poses_csv(options.starts, frame);
-  if (!options.start_pose.empty()) return {read_pose(options.start_pose)};
+std::vector<RigidTransform> start_poses(const RegisterOptions& options,
+                                        const PoseContext& context) {
+  check(context.frame.has_value(), "a start is relative to the case's nominal pose");
+  if (!options.starts.empty()) return read_poses(options.starts, context);
+  if (!options.start_pose.empty()) return {read_pose(options.start_pose, context)};
   std::array<double, 6> values{};
   for (std::size_t i = 0; i < 3; ++i) {
     if (options.start_rotation_deg.has_value()) values[i] = (*options.start_rotation_deg)[i];
     if (options.start_translation_mm.has_value())
       values[i + 3] = (*options.start_translation_mm)[i];
   }
-  return {pose_of_deg_and_mm(frame, values, "--start-rotation-deg, --start-translation-mm")};
+  return {
+      pose_of_deg_and_mm(*context.frame, values, "--start-rotation-deg, --start-translation-mm")};
 }
 
 std::map<std::string, std::string> hashes_of_files(const RegisterOptions& options) {

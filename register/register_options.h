@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "cli/run_limits.h"
+#include "pose_files/pose_format.h"
 #include "register/case_loading.h"
 #include "register/field_paths.h"
 #include "register/method/method_options.h"
@@ -50,8 +51,8 @@ CaseLoadOptions case_load_options(const RegisterOptions& options,
                                   const std::vector<int>& last_levels = {});
 
 /// The starts of a run: of --starts, or the one of --start-pose, or nominal with
-/// --start-rotation-deg and --start-translation-mm.
-std::vector<RigidTransform> start_poses(const RegisterOptions& options, const PoseFrame& frame);
+/// --start-rotation-deg and --start-translation-mm. `context` is the case's, with its frame.
+std::vector<RigidTransform> start_poses(const RegisterOptions& options, const PoseContext& context);
 
 /// SHA-256 of the study and, if given, the file of starts, by name.
 std::map<std::string, std::string> hashes_of_files(const RegisterOptions& options);

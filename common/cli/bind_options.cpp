@@ -2,10 +2,13 @@
 #include "cli/bind_options.h"
 
 #include <cstdlib>
+#include <map>
 #include <sstream>
 #include <type_traits>
 
 #include <CLI/CLI.hpp>
+
+#include "cli/option_values.h"
 
 namespace af::cli {
 
@@ -20,6 +23,12 @@ bool is_given(const T& value) {
     return !value.empty();
   else
     return true;
+}
+
+/// CLI11 keeps nothing of ours beside an option.
+std::map<const CLI::Option*, Field>& bound_fields() {
+  static std::map<const CLI::Option*, Field> fields;
+  return fields;
 }
 
 template <typename T>
@@ -73,8 +82,19 @@ void bind_field(CLI::App& app, const Field& field) {
   if (field.number_count > 0) option->expected(field.number_count);
   if (field.is_comma_separated) option->delimiter(',');
   if (field.takes_one_at_a_time) option->allow_extra_args(false);
-  if (field.is_size) option->transform(CLI::AsSizeValue(true));
+  if (field.is_size) {
+    option->transform(CLI::AsSizeValue(true));
+    // The transform added last comes first.
+    option->transform(CLI::Validator(
+        [](std::string& text) {
+          text = whole_bytes(text);
+          return std::string();
+        },
+        "",
+        "decimal size"));
+  }
   option->required(field.is_required);
+  bound_fields().insert_or_assign(option, field);
 }
 
 }  // namespace
@@ -90,6 +110,11 @@ void bind_fields(CLI::App& app, const Fields& fields) {
     for (const std::string& other : field.excluded) option->excludes(app.get_option(other));
     for (const std::string& other : field.needed) option->needs(app.get_option(other));
   }
+}
+
+const Field* bound_field(const CLI::Option& option) {
+  const auto found = bound_fields().find(&option);
+  return found == bound_fields().end() ? nullptr : &found->second;
 }
 
 }  // namespace af::cli

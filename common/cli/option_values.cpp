@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/option_values.h"
 
+#include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <cstdint>
@@ -52,6 +54,19 @@ std::string problem_of(const std::string& type, const std::string& value) {
   return {};
 }
 
+/// Bytes of a unit such as "MB" or "kib"; 0 when it is not one.
+double bytes_of_unit(std::string unit) {
+  std::transform(unit.begin(), unit.end(), unit.begin(), [](unsigned char letter) {
+    return static_cast<char>(std::tolower(letter));
+  });
+  if (unit.empty() || unit == "b") return 1.0;
+  const std::size_t power = std::string_view("kmgtpe").find(unit.front());
+  if (power == std::string_view::npos) return 0.0;
+  const std::string rest = unit.substr(1);
+  if (rest == "i" || rest == "ib") return std::pow(1024.0, static_cast<double>(power) + 1.0);
+  return rest.empty() || rest == "b" ? std::pow(1000.0, static_cast<double>(power) + 1.0) : 0.0;
+}
+
 void check_values(const CLI::Option& option) {
   if (option.get_expected_max() == 0) return;  // a flag
   for (const std::string& value : option.results())
@@ -61,6 +76,20 @@ void check_values(const CLI::Option& option) {
 }
 
 }  // namespace
+
+std::string whole_bytes(const std::string& size) {
+  if (size.find('.') == std::string::npos) return size;
+  double number = 0.0;
+  const auto [end, error] = std::from_chars(size.data(), size.data() + size.size(), number);
+  if (error != std::errc()) return size;
+  const char* const last = size.data() + size.size();
+  const double bytes =
+      number * bytes_of_unit({std::find_if(end, last, [](char c) { return c != ' '; }), last});
+  constexpr double kExact = 9007199254740992.0;  // 2^53: doubles hold every whole number below
+  if (!(bytes >= 1.0 && bytes <= kExact)) return size;
+  // 1.1 MB is 1100000.0000000002 in binary: the rounding allows for the last bits.
+  return std::to_string(static_cast<std::uint64_t>(std::floor(bytes * (1.0 + 1e-15))));
+}
 
 void check_option_values(const CLI::App& app) {
   for (const CLI::Option* option : app.get_options())

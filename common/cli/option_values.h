@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <string>
+
 #include "cli/app_forward.h"
 
 namespace af::cli {
@@ -10,5 +12,10 @@ namespace af::cli {
 /// 8, 99999999999999999999 for the largest number, and nan and inf for numbers. Texts must not be
 /// empty. CLI::ValidationError, which names the option, for the first that is not sound.
 void check_option_values(const CLI::App& app);
+
+/// "3.5MB" -> "3500000", rounded down to whole bytes; a size without a decimal point stays as it
+/// is, and so does one whose unit is not known, so that CLI::AsSizeValue(true) names it. kB, MB,
+/// ... are powers of 1000, KiB, ... of 1024.
+std::string whole_bytes(const std::string& size);
 
 }  // namespace af::cli

@@ -479,6 +479,20 @@ void check_plausible_size(const DatasetRule& rule,
                     "a file of " + std::to_string(file_bytes));
 }
 
+/// A file's version and its indices say the same of how they are packed.
+void check_packing(hid_t dataset,
+                   const DatasetRule& rule,
+                   IndexPacking packing,
+                   const std::filesystem::path& path) {
+  hdf5::ChunkShape chunk{};
+  const auto text = [](IndexPacking of) {
+    return "indices packed as in version " + std::to_string(field_layout::format_version_of(of));
+  };
+  const IndexPacking found =
+      hdf5::is_coded(dataset, chunk) ? IndexPacking::CodebookTree : IndexPacking::Deflate;
+  if (found != packing) throw FileError(path.string(), rule.name, text(packing), text(found));
+}
+
 /// Rank 0 alone.
 FileHeader read_header(const std::filesystem::path& path) {
   check_is_hdf5(path);
@@ -499,6 +513,7 @@ FileHeader read_header(const std::filesystem::path& path) {
     check_plausible_size(rule, header.file_bytes, path);
     std::vector<std::uint64_t> extents;
     const Handle dataset = hdf5::open_dataset(file, rule, path.string(), extents);
+    check_packing(dataset, rule, header.packing, path);
     header.index_sha256.push_back(hdf5::read_text_attribute(dataset, "sha256"));
   }
   header.payload_sha256 = hdf5::read_text_attribute(file, "payload_sha256");
@@ -606,7 +621,8 @@ FieldFileInfo write_field(const CompressedAttenuationField& field,
                           const MpiIoHints& hints,
                           IndexPacking packing) {
   const hdf5::QuietErrors quiet;
-  const hdf5::IndexFilter filter(field.codebook);
+  std::optional<hdf5::IndexFilter> filter;
+  all_or_none(communicator, [&] { filter.emplace(field.codebook); });
   const std::filesystem::path partial = field_layout::unfinished_path(path);
   const auto rules = index_rules(field.lattice());
   FieldFileInfo info;
@@ -683,7 +699,9 @@ std::shared_ptr<const CompressedAttenuationField> read_field(const std::filesyst
       field_layout::field_of(header.payload, path.string()));
   const auto rules = index_rules(field->lattice());
   std::optional<hdf5::IndexFilter> filter;
-  if (communicator.is_root()) filter.emplace(field->codebook);
+  all_or_none(communicator, [&] {
+    if (communicator.is_root()) filter.emplace(field->codebook);
+  });
   for (std::size_t k = 0; k < rules.size(); ++k)
     field->slabs.push_back(all_or_none(communicator, [&] {
       return read_slab(

@@ -29,6 +29,7 @@ constexpr DicomTag kItemEnd = {0xfffe, 0xe00d};
 constexpr DicomTag kSequenceEnd = {0xfffe, 0xe0dd};
 constexpr DicomTag kTransferSyntax = {0x0002, 0x0010};
 constexpr DicomTag kPixelData = {0x7fe0, 0x0010};
+constexpr DicomTag kIntensitySign = {0x0028, 0x1041};  ///< signed short, in implicit files as well
 
 /// Value representations with a 4-byte length, and those with a 2-byte one (PS3.5, 7.1.2).
 constexpr std::string_view kLongForms = "OB OD OF OL OV OW SQ SV UC UN UR UT UV ";
@@ -175,6 +176,7 @@ class DicomWalker {
   void read_element(const Encoding& encoding, std::uint64_t end, int depth) {
     const Header header = read_header(encoding, end);
     if (header.tag.first == 0xfffe) fail("an item outside of a sequence");
+    if (depth == 0) elements_.tags_.insert(header.tag);
     const bool is_pixels = depth == 0 && header.tag == kPixelData;
     if (header.length == kUndefinedLength) {
       if (is_pixels)
@@ -239,14 +241,20 @@ class DicomWalker {
   }
 
   void keep(const Header& header, const std::string& bytes, bool is_big_endian) {
-    if (header.form != "US" && !(header.form.empty() && is_unsigned_short(header.tag))) {
+    const bool is_signed =
+        header.form == "SS" || (header.form.empty() && header.tag == kIntensitySign);
+    if (header.form != "US" && !is_signed &&
+        !(header.form.empty() && is_unsigned_short(header.tag))) {
       elements_.texts_[header.tag] = trimmed(bytes);
       return;
     }
     std::string text;
-    for (std::size_t i = 0; i + 2 <= bytes.size(); i += 2)
-      text += (i > 0 ? "\\" : "") +
-              std::to_string(number(std::string_view(bytes).substr(i, 2), is_big_endian));
+    for (std::size_t i = 0; i + 2 <= bytes.size(); i += 2) {
+      const auto value =
+          static_cast<std::uint16_t>(number(std::string_view(bytes).substr(i, 2), is_big_endian));
+      text += (i > 0 ? "\\" : "") + (is_signed ? std::to_string(static_cast<std::int16_t>(value))
+                                               : std::to_string(value));
+    }
     elements_.texts_[header.tag] = text;
   }
 

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -30,6 +31,8 @@ class DicomElements {
   static DicomElements read(const std::filesystem::path& path);
 
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+  /// Whether the element is there, whatever it holds; sequences, too.
+  [[nodiscard]] bool has(DicomTag tag) const { return tags_.contains(tag); }
   [[nodiscard]] bool has_pixels() const { return !pixel_parts_.empty(); }
   [[nodiscard]] bool has_compressed_pixels() const { return has_compressed_pixels_; }
   [[nodiscard]] bool is_big_endian() const { return is_big_endian_; }
@@ -48,6 +51,7 @@ class DicomElements {
  private:
   friend class DicomWalker;
   std::filesystem::path path_;
+  std::set<DicomTag> tags_;
   std::map<DicomTag, std::string> texts_;
   bool has_compressed_pixels_ = false;
   bool is_big_endian_ = false;

@@ -15,6 +15,7 @@ namespace af {
 namespace {
 
 constexpr double kMaxSidePx = 65535.0;
+constexpr double kMaxFrames = 100000.0;
 
 void silence_gdcm() {
   static const bool done = [] {
@@ -38,15 +39,17 @@ int required_integer(
   return static_cast<int>(*value);
 }
 
-void check_is_one_grey_frame(const DicomElements& header) {
-  const std::string file = header.path().string();
-  const auto frames = header.number_or_none({0x0028, 0x0008}, "NumberOfFrames");
-  if (frames.value_or(1.0) != 1.0)
+void check_is_one_frame(const DicomElements& header) {
+  if (header.number_or_none({0x0028, 0x0008}, "NumberOfFrames").value_or(1.0) != 1.0)
     throw InputError("NumberOfFrames",
                      header.text({0x0028, 0x0008}),
                      "multi-frame files (enhanced CT) are not supported; convert to NIfTI, for "
                      "example with dcm2niix",
-                     file);
+                     header.path().string());
+}
+
+void check_is_grey(const DicomElements& header) {
+  const std::string file = header.path().string();
   if (header.number_or_none({0x0028, 0x0002}, "SamplesPerPixel").value_or(1.0) != 1.0)
     throw InputError(
         "SamplesPerPixel", header.text({0x0028, 0x0002}), "must be 1, one value per pixel", file);
@@ -79,7 +82,8 @@ std::size_t decoded_bytes(const DicomPixelLayout& layout) {
 
 void check_bytes(const DicomElements& header, const DicomPixelLayout& layout) {
   const std::string file = layout.path().string();
-  const std::uint64_t expected = decoded_bytes(layout);
+  const std::uint64_t expected =
+      std::uint64_t{decoded_bytes(layout)} * static_cast<std::uint64_t>(layout.frames);
   if (!header.has_compressed_pixels() && header.pixel_bytes() < expected)
     throw FileError(file,
                     "pixel data",
@@ -103,6 +107,44 @@ std::vector<char> part_of_file(const std::filesystem::path& path, const DicomPar
   return bytes;
 }
 
+/// The fragments of a frame. The first part of the pixels is the table of the frames' offsets,
+/// which may be empty: then every frame is one fragment, or there is one frame.
+std::vector<DicomPart> fragments_of_frame(const DicomPixelLayout& layout) {
+  constexpr std::uint64_t kItemHeadBytes = 8;
+  const std::vector<DicomPart>& parts = layout.header.pixel_parts();
+  const std::string file = layout.path().string();
+  if (parts.empty()) throw FileError(file, "has no compressed pixels");
+  const std::vector<DicomPart> fragments(parts.begin() + 1, parts.end());
+  if (layout.frames == 1) return fragments;
+  const auto frames = static_cast<std::size_t>(layout.frames);
+  const auto at = static_cast<std::size_t>(layout.frame - 1);
+  if (fragments.size() == frames) return {fragments[at]};
+  if (parts.front().bytes != 4 * frames)
+    throw FileError(file,
+                    "table of frame offsets",
+                    std::to_string(4 * frames) + " bytes for " + std::to_string(frames) + " frames",
+                    std::to_string(parts.front().bytes) + " bytes and " +
+                        std::to_string(fragments.size()) + " fragments");
+  const std::vector<char> table = part_of_file(layout.path(), parts.front());
+  const std::uint64_t first_item = parts.front().offset + parts.front().bytes;
+  const auto offset = [&](std::size_t frame) {
+    std::uint64_t value = 0;
+    for (std::size_t byte = 4; byte-- > 0;)
+      value = value << 8 | static_cast<unsigned char>(table[4 * frame + byte]);
+    return first_item + value;
+  };
+  std::vector<DicomPart> found;
+  for (const DicomPart& fragment : fragments) {
+    const std::uint64_t item = fragment.offset - kItemHeadBytes;
+    if (item >= offset(at) && (at + 1 == frames || item < offset(at + 1)))
+      found.push_back(fragment);
+  }
+  if (found.empty())
+    throw FileError(file,
+                    "its table of offsets has nothing for frame " + std::to_string(layout.frame));
+  return found;
+}
+
 /// GDCM's image of what the file says, made without its parser.
 gdcm::Image compressed_image(const DicomPixelLayout& layout) {
   const std::string syntax = layout.header.text({0x0002, 0x0010});
@@ -111,11 +153,10 @@ gdcm::Image compressed_image(const DicomPixelLayout& layout) {
     throw InputError(
         "transfer syntax", syntax, "is not known to the decoder", layout.path().string());
   const gdcm::SmartPointer<gdcm::SequenceOfFragments> fragments = new gdcm::SequenceOfFragments;
-  const std::vector<DicomPart>& parts = layout.header.pixel_parts();
-  for (std::size_t i = 1; i < parts.size(); ++i) {
-    const std::vector<char> bytes = part_of_file(layout.path(), parts[i]);
+  for (const DicomPart& part : fragments_of_frame(layout)) {
+    const std::vector<char> bytes = part_of_file(layout.path(), part);
     gdcm::Fragment fragment;
-    fragment.SetByteValue(bytes.data(), parts[i].bytes);
+    fragment.SetByteValue(bytes.data(), part.bytes);
     fragments->AddFragment(fragment);
   }
   gdcm::DataElement pixels(gdcm::Tag(0x7fe0, 0x0010));
@@ -181,10 +222,36 @@ std::vector<double> rescaled(const std::vector<char>& raw,
 
 }  // namespace
 
+std::pair<double, double> DicomPixelLayout::value_range() const {
+  const std::int64_t range = std::int64_t{1} << stored_bits;
+  const std::int64_t low = is_signed ? -range / 2 : 0;
+  return {static_cast<double>(low) * slope + intercept,
+          static_cast<double>(low + range - 1) * slope + intercept};
+}
+
 DicomPixelLayout dicom_pixel_layout(const DicomElements& header) {
-  check_is_one_grey_frame(header);
+  check_is_one_frame(header);
+  return dicom_frame_layout(header, std::nullopt);
+}
+
+DicomPixelLayout dicom_frame_layout(const DicomElements& header, std::optional<int> frame) {
+  check_is_grey(header);
   DicomPixelLayout layout;
   layout.header = header;
+  if (!header.text({0x0028, 0x0008}).empty())
+    layout.frames = required_integer(header, {0x0028, 0x0008}, "NumberOfFrames", 1, kMaxFrames);
+  if (!frame && layout.frames > 1)
+    throw InputError("NumberOfFrames",
+                     std::to_string(layout.frames),
+                     "say which frame to read, from 1 (xray_frame in the study)",
+                     header.path().string());
+  layout.frame = frame.value_or(1);
+  if (layout.frame < 1 || layout.frame > layout.frames)
+    throw InputError(
+        "frame",
+        std::to_string(layout.frame),
+        "must be 1 to " + std::to_string(layout.frames) + ", the file's NumberOfFrames",
+        header.path().string());
   layout.rows = required_integer(header, {0x0028, 0x0010}, "Rows", 1, kMaxSidePx);
   layout.columns = required_integer(header, {0x0028, 0x0011}, "Columns", 1, kMaxSidePx);
   const auto slope = header.number_or_none({0x0028, 0x1053}, "RescaleSlope");
@@ -204,9 +271,10 @@ DicomPixelLayout dicom_pixel_layout(const DicomElements& header) {
 
 std::vector<double> read_dicom_pixels(const DicomPixelLayout& layout) {
   if (layout.header.has_compressed_pixels()) return rescaled(decompressed(layout), false, layout);
-  return rescaled(part_of_file(layout.path(), layout.header.pixel_parts().front()),
-                  layout.header.is_big_endian(),
-                  layout);
+  DicomPart part = layout.header.pixel_parts().front();
+  part.bytes = static_cast<std::uint32_t>(decoded_bytes(layout));  // fits: the part holds it
+  part.offset += std::uint64_t{part.bytes} * static_cast<std::uint64_t>(layout.frame - 1);
+  return rescaled(part_of_file(layout.path(), part), layout.header.is_big_endian(), layout);
 }
 
 }  // namespace af

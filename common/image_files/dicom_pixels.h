@@ -2,15 +2,19 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "image_files/dicom_elements.h"
 
 namespace af {
 
-/// How one DICOM file holds its single grey frame; checked against the bytes that are there.
+/// How one DICOM file holds a grey frame; checked against the bytes that are there.
 struct DicomPixelLayout {
   DicomElements header;
+  int frame = 1;  ///< the one that is read, from 1
+  int frames = 1;
   int columns = 0;
   int rows = 0;
   int allocated_bits = 16;
@@ -21,11 +25,18 @@ struct DicomPixelLayout {
   double intercept = 0.0;
 
   [[nodiscard]] const std::filesystem::path& path() const { return header.path(); }
+  /// Lowest and highest value that a pixel can hold, rescaled (the first is the higher one when the
+  /// slope is negative).
+  [[nodiscard]] std::pair<double, double> value_range() const;
 };
 
 /// InputError for more than one frame or channel, for colour and a half-given rescale; FileError
 /// for impossible bit depths or too few pixel bytes.
 DicomPixelLayout dicom_pixel_layout(const DicomElements& header);
+
+/// The same of one of several frames, from 1. Without `frame` there must be one only (InputError,
+/// which names their count).
+DicomPixelLayout dicom_frame_layout(const DicomElements& header, std::optional<int> frame);
 
 /// Decoded pixels with the rescale applied, row 0 on top. Compressed ones go through GDCM.
 std::vector<double> read_dicom_pixels(const DicomPixelLayout& layout);

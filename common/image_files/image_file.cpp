@@ -112,12 +112,16 @@ std::size_t extent(int value) {
 }  // namespace
 
 Image2d read_image(const fs::path& path) {
+  return read_image_with_spacing(path).image;
+}
+
+ImageWithSpacing read_image_with_spacing(const fs::path& path) {
   const std::optional<ImageFormat> format = sniff_image_format(path);
   if (!format)
     throw FileError(path.string(),
                     "not an image: its content is none of MetaImage, NIfTI, NRRD, TIFF, PNG, "
                     "DICOM");
-  if (*format == ImageFormat::Dicom) return read_dicom_image(path);
+  if (*format == ImageFormat::Dicom) return {read_dicom_image(path), std::nullopt};
   const ImageHeader header = read_image_header(path, *format);
   const RawImage raw = read_stored_image(
       path, header, nullptr, [&](const RawImage& seen) { check_is_2d(seen, path); });
@@ -128,7 +132,10 @@ Image2d read_image(const fs::path& path) {
     });
   });
   check_is_finite(image, path);
-  return image;
+  std::optional<Eigen::Vector2d> spacing_mm;
+  if (*format != ImageFormat::Png && *format != ImageFormat::Tiff && header.has_spacing)
+    spacing_mm = Eigen::Vector2d(raw.spacing_mm[0], raw.spacing_mm[1]);
+  return {std::move(image), spacing_mm};
 }
 
 void write_image(const Image2d& image,

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -17,6 +18,16 @@ namespace af {
 /// it cannot be parsed or is truncated; InputError when it is not 2-D, has several channels or
 /// pixels that are not finite.
 Image2d read_image(const std::filesystem::path& path);
+
+/// An image with what its file says of its pixels.
+struct ImageWithSpacing {
+  Image2d image;
+  /// Column, row; none for PNG, TIFF and DICOM, and for files that do not state it.
+  std::optional<Eigen::Vector2d> spacing_mm;
+};
+
+/// read_image() with the pixel spacing.
+ImageWithSpacing read_image_with_spacing(const std::filesystem::path& path);
 
 /// Writes float pixels unscaled: .mha .nii.gz .nrrd .tif, atomically. Pixel spacing (mm) is written
 /// where the format has it.

@@ -80,6 +80,7 @@ nlohmann::json to_json(const Provenance& provenance) {
       {"seed", provenance.seed},
       {"rank_count", provenance.rank_count},
       {"input_sha256", provenance.input_sha256},
+      {"input_notes", provenance.input_notes},
       {"host", {{"cpu", cpu_model()}, {"vector_bits", static_cast<int>(active_vector_width())}}},
       {"started_utc", utc_text(process_start_time)}};
 }

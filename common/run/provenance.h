@@ -16,7 +16,8 @@ struct Provenance {
   std::string options_toml;  ///< the options in force
   std::uint64_t seed = 0;
   int rank_count = 1;
-  std::map<std::string, std::string> input_sha256;  ///< name or path -> hash
+  std::map<std::string, std::string> input_sha256;      ///< name or path -> hash
+  std::map<std::string, std::string> input_notes = {};  ///< name -> how it was read; may be empty
 };
 
 /// JSON object with program, version, compiler, command line, options, seed, ranks, inputs, host

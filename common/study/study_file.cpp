@@ -11,6 +11,7 @@
 #include "base/named_rows.h"
 #include "base/toml_text.h"
 #include "files/output_file.h"
+#include "gold_standard/fiducial_registration.h"
 #include "study/rig_file.h"
 #include "text/toml_reader.h"
 
@@ -51,9 +52,11 @@ std::optional<fs::path> get_path(TomlTableReader& reader,
 }
 
 template <int Size>
-std::vector<Eigen::Matrix<double, Size, 1>> get_points(TomlTableReader& reader, const char* key) {
+std::vector<Eigen::Matrix<double, Size, 1>> get_points(TomlTableReader& reader,
+                                                       const char* key,
+                                                       RowGaps gaps = RowGaps::Refused) {
   std::vector<Eigen::Matrix<double, Size, 1>> points;
-  if (const auto matrix = reader.get_matrix(key, -1, Size, Presence::Optional))
+  if (const auto matrix = reader.get_matrix(key, -1, Size, Presence::Optional, kMaxRoomMm, gaps))
     for (Eigen::Index i = 0; i < matrix->rows(); ++i)
       points.emplace_back(matrix->row(i).transpose());
   return points;
@@ -128,12 +131,21 @@ void check_fiducials(TomlTableReader& reader,
   if (camera == nullptr) return;
   const Eigen::Array2d edge = camera->size_px.cast<double>().array() - 0.5;
   for (const Eigen::Vector2d& point : view.fiducials_px)
-    if (!((point.array() >= -0.5).all() && (point.array() <= edge).all())) {
+    if (is_seen(point) && !((point.array() >= -0.5).all() && (point.array() <= edge).all())) {
       reader.add_problem("fiducials_px",
                          "point " + toml_numbers(point) + " must lie on the detector of camera '" +
                              camera->name + "'");
       return;
     }
+}
+
+/// mask = "auto" or a file; a file of that name is "./auto".
+void read_mask_key(TomlTableReader& reader, const fs::path& folder, StudyView& view) {
+  const auto text = reader.get_string("mask", Presence::Optional);
+  if (!text) return;
+  view.reading.masks_borders = *text == "auto";
+  if (!view.reading.masks_borders)
+    view.mask = get_path(reader, "mask", Presence::Optional, folder, view.places);
 }
 
 StudyView read_view(const toml::table& table,
@@ -150,9 +162,11 @@ StudyView read_view(const toml::table& table,
   view.xray = path("xray", Presence::Required).value_or(fs::path());
   view.xray_domain = get_xray_domain(reader);
   view.roi = get_roi(reader, camera);
-  view.fiducials_px = get_points<2>(reader, "fiducials_px");
+  view.fiducials_px = get_points<2>(reader, "fiducials_px", RowGaps::Allowed);
   view.field = path("field", Presence::Optional);
-  view.mask = path("mask", Presence::Optional);
+  view.reading = read_xray_keys(
+      reader, view.xray_domain, [&](const char* key) { return path(key, Presence::Optional); });
+  read_mask_key(reader, context.folder, view);
   check_fiducials(reader, view, fiducial_count, camera);
   reader.refuse_unknown_keys();
   return view;
@@ -249,7 +263,8 @@ template <int Size>
 std::string points_text(const std::vector<Eigen::Matrix<double, Size, 1>>& points) {
   std::string text = "[";
   for (std::size_t i = 0; i < points.size(); ++i)
-    text += (i > 0 ? ", " : "") + toml_numbers(points[i]);
+    text +=
+        (i > 0 ? ", " : "") + (points[i].allFinite() ? toml_numbers(points[i]) : std::string("[]"));
   return text + "]";
 }
 
@@ -266,6 +281,9 @@ std::string view_text(const StudyView& view, const fs::path& folder) {
   if (!view.fiducials_px.empty()) text += "fiducials_px = " + points_text(view.fiducials_px) + "\n";
   if (view.field) add_path("field", *view.field);
   if (view.mask) add_path("mask", *view.mask);
+  if (view.reading.masks_borders) text += "mask = \"auto\"\n";
+  text += xray_keys_text(view.reading,
+                         [&](const fs::path& path) { return relative_if_below(path, folder); });
   return text;
 }
 

@@ -14,16 +14,9 @@
 #include "geometry/rigid_transform.h"
 #include "geometry/slab_sizing.h"
 #include "image/image2d.h"
+#include "study/xray_reading.h"
 
 namespace af {
-
-/// What an X-ray's pixel values mean: detector intensity (bright = unattenuated; -log is taken on
-/// reading) or attenuation.
-enum class XrayDomain { Intensity, Attenuation };
-
-/// Where a study names each of its files: key -> "study.toml:12: case[0].view[1].xray". Empty for
-/// studies that were not read.
-using StudyPlaces = std::map<std::string, std::string>;
 
 /// One X-ray of a case. Paths are absolute after reading.
 struct StudyView {
@@ -32,9 +25,11 @@ struct StudyView {
   XrayDomain xray_domain = XrayDomain::Intensity;
   RegionOfInterest roi;
   std::vector<Eigen::Vector2d>
-      fiducials_px;  ///< (column, row), in the order of StudyCase::fiducials_ct_mm
+      fiducials_px;  ///< (column, row), in the order of StudyCase::fiducials_ct_mm; NaN: not seen;
+                     ///< NaN: not seen
   std::optional<std::filesystem::path> field;
   std::optional<std::filesystem::path> mask;
+  XrayReading reading;
   StudyPlaces places;
 };
 

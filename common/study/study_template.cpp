@@ -30,19 +30,25 @@ center_ct_mm = [0.0, 0.0, 0.0]                   # middle of the region to regis
 target_box_ct_mm = [[-30, -30, -30], [30, 30, 30]]  # low and high corner: TRE is the mean over this box
 
 # To measure errors, one of these is needed, and with both the fiducials' pose is compared with the stated one:
-# at least three fiducials not on one line, here and in every view in the same order ...
+# at least three fiducials not on one line, here and in every view in the same order ([] for one that a view hides) ...
 # fiducials_ct_mm = [[-20.0, 5.0, 0.0], [18.0, -7.0, 9.0], [3.0, 22.0, -14.0], [-6.0, -12.0, 21.0]]
 # ... or the true pose itself.
 # gold_room_from_ct = [[1, 0, 0, 1.5], [0, 1, 0, -2.0], [0, 0, 1, 0.5], [0, 0, 0, 1]]
 
 [[case.view]]                                    # one per X-ray; two or more cameras see depth
 camera = "A"                                     # a camera of the rig
-xray = "patient-01/A.mha"                        # MetaImage, NIfTI, NRRD, TIFF or PNG, the camera's size
+xray = "patient-01/A.mha"                        # DICOM, MetaImage, NIfTI, NRRD, TIFF or PNG, the camera's size
 xray_domain = "intensity"                        # bright = unattenuated, -log is taken; or "attenuation"
 roi_px = [156, 156, 200, 200]                    # column, row, width, height: the pixels that are compared
 # fiducials_px = [[201.3, 255.0], [280.1, 231.7], [240.6, 301.2], [232.9, 207.4]]   # as many as fiducials_ct_mm
 # field = "fields/patient-01-A.af.h5"            # made by af-precompute --study study.toml --case patient-01 --camera A
-# mask = "patient-01/A-mask.png"                 # not zero = used; for steel, labels or collimators
+# mask = "patient-01/A-mask.png"                 # not zero = used; for steel, labels or collimators; or "auto"
+# How the X-ray's values are read (docs/xrays.md); af-inspect says what was done.
+# xray_frame = 1                                 # of a DICOM file of several frames
+# xray_polarity = "inverted"                     # or "as-stored"; without it as a DICOM file says
+# air_level = "open-beam"                        # or "collimated-borders", "percentile", or a number
+# dark_level = 100.0                             # subtracted first; or dark = "dark.mha"
+# xray_spacing = "ignore"                        # when the file's pixel spacing is wrong, and the rig's right
 
 [[case.view]]
 camera = "B"

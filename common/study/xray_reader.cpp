@@ -2,10 +2,18 @@
 #include "study/xray_reader.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <optional>
 
 #include "base/error.h"
+#include "base/number_text.h"
+#include "image/air_level.h"
+#include "image/quantile.h"
+#include "image/xray_borders.h"
+#include "image_files/dicom_xray.h"
 #include "image_files/image_file.h"
+#include "image_files/image_header.h"
 
 namespace af {
 
@@ -13,6 +21,35 @@ namespace {
 
 /// Share of pixels that are no brighter than what counts as the open beam.
 constexpr double kOpenBeamShare = 0.999;
+/// Of the camera's pixel spacing; decimal strings are rounded, and detectors are measured to this.
+constexpr double kMaxSpacingShare = 0.01;
+/// Of the region of interest, hidden by an automatic mask: more is a mistake of the mask.
+constexpr double kMostHidden = 0.5;
+/// Of the pixels of a flat field that are not brighter than the dark image.
+constexpr double kMostDeadPixels = 0.25;
+
+struct LoadedImage {
+  Image2d image;
+  std::optional<Eigen::Vector2d> spacing_mm;
+  std::optional<DicomXray> dicom;  ///< without its image
+};
+
+LoadedImage load(const std::filesystem::path& path, std::optional<int> frame) {
+  LoadedImage loaded;
+  if (sniff_image_format(path) == ImageFormat::Dicom) {
+    loaded.dicom = read_dicom_xray(path, frame);
+    loaded.image = std::move(loaded.dicom->image);
+    loaded.spacing_mm = loaded.dicom->imager_spacing_mm;
+    return loaded;
+  }
+  ImageWithSpacing read = read_image_with_spacing(path);
+  if (frame)
+    throw InputError("xray_frame",
+                     std::to_string(*frame),
+                     "is for DICOM files of several frames",
+                     path.string());
+  return {std::move(read.image), read.spacing_mm, std::nullopt};
+}
 
 void check_size(const Image2d& image, const std::string& file, const CameraGeometry& camera) {
   if (image.width != camera.size_px.x() || image.height != camera.size_px.y())
@@ -24,38 +61,137 @@ void check_size(const Image2d& image, const std::string& file, const CameraGeome
                      file);
 }
 
-/// The smallest value that the given share of the pixels does not exceed.
-float nearest_rank(std::vector<float> values, double share) {
-  const auto rank = static_cast<std::size_t>(
-      std::max(1.0, std::ceil(share * static_cast<double>(values.size()))));
-  const auto at = values.begin() + static_cast<std::ptrdiff_t>(rank - 1);
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
+std::string spacing_text(const Eigen::Vector2d& spacing_mm) {
+  return number_text(spacing_mm.x()) + " x " + number_text(spacing_mm.y()) + " mm";
 }
 
-/// Half of the smallest step that an image's values can have: half a grey level of integers, half
-/// of the smallest positive value otherwise.
-double half_level(const std::vector<float>& values) {
-  float smallest_positive = 0.0f;
-  bool integers = true;
-  for (const float value : values) {
-    integers = integers && value == std::nearbyint(value);
-    if (value > 0.0f && (smallest_positive == 0.0f || value < smallest_positive))
-      smallest_positive = value;
+bool is_spacing_of(const CameraGeometry& camera, const Eigen::Vector2d& spacing_mm) {
+  return ((spacing_mm - camera.pixel_spacing_mm).cwiseAbs().array() <=
+          kMaxSpacingShare * camera.pixel_spacing_mm.array())
+      .all();
+}
+
+/// 1 x 1 mm is what formats write for a spacing that nobody has set.
+void check_spacing(const LoadedImage& loaded,
+                   const StudyView& view,
+                   const CameraGeometry& camera,
+                   std::vector<std::string>& warnings) {
+  if (view.reading.ignores_spacing) return;
+  if (loaded.spacing_mm) {
+    if ((!loaded.dicom && *loaded.spacing_mm == Eigen::Vector2d::Ones()) ||
+        is_spacing_of(camera, *loaded.spacing_mm))
+      return;
+    throw InputError(loaded.dicom ? "ImagerPixelSpacing" : "pixel spacing",
+                     spacing_text(*loaded.spacing_mm),
+                     "must be pixel_spacing_mm of camera '" + camera.name +
+                         "': " + spacing_text(camera.pixel_spacing_mm) +
+                         " (column, row); mend the rig or the file, or set xray_spacing = "
+                         "\"ignore\"",
+                     view.xray.string());
   }
-  return integers ? 0.5 : 0.5 * static_cast<double>(smallest_positive);
+  if (loaded.dicom && loaded.dicom->pixel_spacing_mm &&
+      !is_spacing_of(camera, *loaded.dicom->pixel_spacing_mm))
+    warnings.push_back(
+        view.xray.string() + ": PixelSpacing = " + spacing_text(*loaded.dicom->pixel_spacing_mm) +
+        ", but camera '" + camera.name + "' has " + spacing_text(camera.pixel_spacing_mm) +
+        " (no ImagerPixelSpacing: it may be that of a plane in the patient)");
+}
+
+/// What is known of a file's values besides them, in the order in which it is done.
+class Note {
+ public:
+  void add(const std::string& what) { text_ += (text_.empty() ? "" : ", ") + what; }
+  [[nodiscard]] const std::string& text() const { return text_; }
+
+ private:
+  std::string text_;
+};
+
+void note_header(const DicomXray& dicom, Note& note) {
+  std::string what = "DICOM " + (dicom.modality.empty() ? "image" : dicom.modality);
+  if (dicom.frames > 1)
+    what += " frame " + std::to_string(dicom.frame) + " of " + std::to_string(dicom.frames);
+  note.add(what + ", " + std::to_string(dicom.stored_bits) + " bits");
+  note.add(dicom.is_monochrome1 ? "MONOCHROME1" : "MONOCHROME2");
+  if (!dicom.relationship_text.empty())
+    note.add("PixelIntensityRelationship " + dicom.relationship_text +
+             (dicom.sign ? (*dicom.sign > 0 ? " +1" : " -1") : ""));
+  if (dicom.is_rescaled) note.add("rescaled");
+  if (!dicom.window.empty()) note.add("window " + dicom.window + " ignored");
+}
+
+void check_relationship(const DicomXray& dicom,
+                        const StudyView& view,
+                        std::vector<std::string>& warnings) {
+  const std::string file = view.xray.string();
+  const bool is_intensity = view.xray_domain == XrayDomain::Intensity;
+  if (dicom.relationship == PixelIntensity::Logarithmic && is_intensity)
+    throw InputError("PixelIntensityRelationship",
+                     "LOG",
+                     "the values are logarithms: set xray_domain = \"attenuation\" (their scale "
+                     "is not known; the file's Modality LUT is not read)",
+                     file);
+  if (dicom.relationship == PixelIntensity::Logarithmic)
+    warnings.push_back(file +
+                       ": PixelIntensityRelationship = LOG: line integrals up to an unknown scale "
+                       "and offset");
+  if (dicom.relationship == PixelIntensity::Linear && !is_intensity)
+    warnings.push_back(file +
+                       ": PixelIntensityRelationship = LIN, but xray_domain = \"attenuation\" "
+                       "takes no logarithm");
+  if (dicom.relationship == PixelIntensity::Display || dicom.relationship == PixelIntensity::Other)
+    warnings.push_back(file + ": PixelIntensityRelationship = " + dicom.relationship_text +
+                       ": the values were made for display and are not proportional to "
+                       "intensity; edges remain, line integrals do not");
+  if (dicom.has_modality_lut)
+    warnings.push_back(file + ": its Modality LUT is not applied; stored values are used");
+  if (dicom.modality == "CT" || dicom.modality == "MR")
+    warnings.push_back(file + ": Modality = " + dicom.modality + " is no X-ray");
+}
+
+/// Whether stored values have to be turned round so that they rise with what `xray_domain` says.
+bool is_turned(const LoadedImage& loaded, const StudyView& view) {
+  if (view.reading.polarity != XrayPolarity::ByHeader)
+    return view.reading.polarity == XrayPolarity::Inverted;
+  if (!loaded.dicom) return false;
+  const bool wants_intensity = view.xray_domain == XrayDomain::Intensity;
+  if (loaded.dicom->sign) return (*loaded.dicom->sign > 0) != wants_intensity;
+  return loaded.dicom->is_monochrome1;
+}
+
+/// What values are subtracted from to turn them round: of DICOM by its stored bits; otherwise the
+/// least full scale of a detector that holds them all.
+double inversion_sum(const LoadedImage& loaded) {
+  if (loaded.dicom) return loaded.dicom->inversion_sum;
+  const auto most = static_cast<double>(
+      *std::max_element(loaded.image.pixels.begin(), loaded.image.pixels.end()));
+  constexpr std::array<double, 5> kFullScales = {255.0, 1023.0, 4095.0, 16383.0, 65535.0};
+  const bool integers = std::all_of(loaded.image.pixels.begin(),
+                                    loaded.image.pixels.end(),
+                                    [](float value) { return value == std::nearbyint(value); });
+  const auto scale = std::find_if(
+      kFullScales.begin(), kFullScales.end(), [&](double full) { return full >= most; });
+  return integers && scale != kFullScales.end() ? *scale : most;
+}
+
+void turn_round(Image2d& image, double sum) {
+  for (float& value : image.pixels) value = static_cast<float>(sum - static_cast<double>(value));
 }
 
 void check_values(const Image2d& image, const StudyView& view) {
   const std::string file = view.xray.string();
-  for (std::size_t i = 0; i < image.pixels.size(); ++i) {
-    const float value = image.pixels[i];
-    if (view.xray_domain != XrayDomain::Intensity || value >= 0.0f) continue;
+  const bool may_be_negative = view.xray_domain != XrayDomain::Intensity || view.reading.dark ||
+                               view.reading.dark_level != 0.0;
+  const auto negative =
+      std::find_if(image.pixels.begin(), image.pixels.end(), [](float v) { return v < 0.0f; });
+  if (!may_be_negative && negative != image.pixels.end()) {
+    const auto at = static_cast<std::size_t>(negative - image.pixels.begin());
     const auto width = static_cast<std::size_t>(image.width);
-    throw InputError("pixel (" + std::to_string(i % width) + ", " + std::to_string(i / width) + ")",
-                     std::to_string(value),
-                     "intensities must not be negative (xray_domain = \"attenuation\"?)",
-                     file);
+    throw InputError(
+        "pixel (" + std::to_string(at % width) + ", " + std::to_string(at / width) + ")",
+        std::to_string(*negative),
+        "intensities must not be negative (xray_domain = \"attenuation\"?)",
+        file);
   }
   const auto [low, high] = std::minmax_element(image.pixels.begin(), image.pixels.end());
   if (*low == *high)
@@ -63,37 +199,256 @@ void check_values(const Image2d& image, const StudyView& view) {
         "pixels", "all " + std::to_string(*low), "a constant image shows nothing", file);
 }
 
-void take_negative_log(Image2d& image, const std::string& file) {
-  const double open_beam = static_cast<double>(nearest_rank(image.pixels, kOpenBeamShare));
-  if (!(open_beam > 0.0))
-    throw InputError("open-beam intensity (99.9th percentile)",
-                     std::to_string(open_beam),
-                     "must be positive",
-                     file);
-  const double zero = half_level(image.pixels);
-  for (float& pixel : image.pixels) {
-    const double intensity = pixel > 0.0f ? static_cast<double>(pixel) : zero;
-    pixel = static_cast<float>(-std::log(intensity / open_beam));
+/// The flat or dark image of a view, turned as its X-ray.
+Image2d load_companion(const std::filesystem::path& path,
+                       const StudyView& view,
+                       const CameraGeometry& camera) {
+  LoadedImage loaded = load(path, std::nullopt);
+  check_size(loaded.image, path.string(), camera);
+  if (is_turned(loaded, view)) turn_round(loaded.image, inversion_sum(loaded));
+  return std::move(loaded.image);
+}
+
+/// Dark and flat fields of a view, where it has them; `mask` loses pixels without a beam.
+void correct_by_flat(const StudyView& view,
+                     const CameraGeometry& camera,
+                     Image2d& image,
+                     Image2d& mask,
+                     Note& note) {
+  const XrayReading& reading = view.reading;
+  Image2d dark;
+  if (reading.dark) {
+    dark =
+        used_from(view.places, "dark", [&] { return load_companion(*reading.dark, view, camera); });
+    note.add("dark image subtracted");
+  } else if (reading.dark_level != 0.0) {
+    dark = Image2d(image.width, image.height);
+    std::fill(dark.pixels.begin(), dark.pixels.end(), static_cast<float>(reading.dark_level));
+    note.add("dark level " + number_text(reading.dark_level) + " subtracted");
   }
+  if (!reading.flat) {
+    for (std::size_t i = 0; i < dark.pixels.size(); ++i) image.pixels[i] -= dark.pixels[i];
+    return;
+  }
+  const Image2d flat =
+      used_from(view.places, "flat", [&] { return load_companion(*reading.flat, view, camera); });
+  if (mask.pixels.empty()) {
+    mask = Image2d(image.width, image.height);
+    std::fill(mask.pixels.begin(), mask.pixels.end(), 1.0f);
+  }
+  std::size_t dead = 0;
+  for (std::size_t i = 0; i < flat.pixels.size(); ++i)
+    if (!(flat.pixels[i] > (dark.pixels.empty() ? 0.0f : dark.pixels[i]))) {
+      mask.pixels[i] = 0.0f;
+      ++dead;
+    }
+  if (static_cast<double>(dead) > kMostDeadPixels * static_cast<double>(flat.pixels.size()))
+    throw InputError("flat",
+                     std::to_string(dead) + " of " + std::to_string(flat.pixels.size()) +
+                         " pixels not above the dark image",
+                     "must be an X-ray of the open beam",
+                     reading.flat->string());
+  image = flat_corrected(image, flat, dark);
+  if (dead == 0) mask = Image2d();
+  note.add("air level 1 by the flat field" +
+           (dead > 0 ? " (" + std::to_string(dead) + " dead pixels masked)" : std::string()));
 }
 
-}  // namespace
-
-Image2d read_xray_attenuation(const StudyView& view, const CameraGeometry& camera) {
-  Image2d image = read_image(view.xray);
-  check_size(image, view.xray.string(), camera);
-  check_values(image, view);
-  if (view.xray_domain == XrayDomain::Intensity) take_negative_log(image, view.xray.string());
-  return image;
+std::string percent(double share) {
+  return number_text(std::round(1000.0 * share) / 10.0) + " %";
 }
 
-Image2d read_mask(const StudyView& view, const CameraGeometry& camera) {
-  if (!view.mask) return {};
+std::vector<float> values_in(const Image2d& image, const Image2d& mask) {
+  if (mask.pixels.empty()) return image.pixels;
+  std::vector<float> values;
+  for (std::size_t i = 0; i < image.pixels.size(); ++i)
+    if (mask.pixels[i] != 0.0f) values.push_back(image.pixels[i]);
+  return values;
+}
+
+double percentile_level(const Image2d& image, const Image2d& mask, const StudyView& view) {
+  const std::vector<float> values = values_in(image, mask);
+  const double level =
+      values.empty() ? 0.0 : static_cast<double>(nearest_rank(values, kOpenBeamShare));
+  if (!(level > 0.0))
+    throw InputError("open-beam intensity (99.9th percentile)",
+                     std::to_string(level),
+                     "must be positive",
+                     view.xray.string());
+  return level;
+}
+
+double air_level(const Image2d& image,
+                 const XrayBorders& borders,
+                 const StudyView& view,
+                 Note& note) {
+  const auto told = [&](double level, const std::string& how) {
+    note.add("air level " + number_text(level) + " (" + how + ")");
+    return level;
+  };
+  if (view.reading.flat) return 1.0;
+  const Image2d field = view.reading.masks_borders ? borders.mask : Image2d();
+  switch (view.reading.air) {
+    case AirSource::Value:
+      return told(view.reading.air_level, "stated");
+    case AirSource::OpenBeam: {
+      const auto air = open_beam_peak(values_in(image, field));
+      if (!air)
+        throw InputError("air_level",
+                         "\"open-beam\"",
+                         "no level is shared by 3 % of the pixels: is air in view? State a "
+                         "number or a flat field",
+                         view.xray.string());
+      return told(air->level, "open beam: " + percent(air->share) + " of the field within 10 %");
+    }
+    case AirSource::CollimatedBorders: {
+      if (!borders.is_any())
+        throw InputError("air_level",
+                         "\"collimated-borders\"",
+                         "no collimator or aperture was found; state \"open-beam\", a number or a "
+                         "flat field",
+                         view.xray.string());
+      const AirLevel air = air_beside_edge(image, borders.mask);
+      if (!(air.level > 0.0))
+        throw InputError("air_level",
+                         number_text(air.level) + " beside the edge of the field",
+                         "must be positive",
+                         view.xray.string());
+      return told(air.level, "90th percentile beside the collimated edge");
+    }
+    case AirSource::Percentile:
+      return told(percentile_level(image, field, view), "99.9th percentile");
+    case AirSource::NotAsked:
+      break;
+  }
+  return told(percentile_level(image, field, view),
+              "99.9th percentile, the default: too low where no air is in view; see air_level");
+}
+
+/// Intensities of an attenuation image, up to scale: exp(-value), values beyond a few units of
+/// which (logarithms of an unknown scale) are taken on a scale of four units from air to the
+/// densest.
+Image2d intensities_of(const Image2d& attenuation) {
+  constexpr double kUnits = 4.0;
+  const auto low = static_cast<double>(nearest_rank(attenuation.pixels, 0.01));
+  const auto high = static_cast<double>(nearest_rank(attenuation.pixels, 0.99));
+  const double unit = std::max(1.0, (high - low) / kUnits);
+  Image2d intensity = attenuation;
+  for (float& value : intensity.pixels)
+    value = static_cast<float>(std::exp(-(static_cast<double>(value) - low) / unit));
+  return intensity;
+}
+
+XrayBorders borders_of(const Image2d& image, XrayDomain domain) {
+  return find_xray_borders(domain == XrayDomain::Intensity ? image : intensities_of(image));
+}
+
+/// Looking for borders takes a while on large pictures.
+bool needs_borders(const StudyView& view, const Image2d& image) {
+  const Background unexpected =
+      view.xray_domain == XrayDomain::Intensity ? Background::Dark : Background::Bright;
+  return view.reading.masks_borders || view.reading.air == AirSource::CollimatedBorders ||
+         background_of(image, Image2d()) == unexpected;
+}
+
+void note_background(const Image2d& image,
+                     const StudyView& view,
+                     const XrayBorders& borders,
+                     Note& note,
+                     std::vector<std::string>& warnings) {
+  const Background found =
+      background_of(image, view.reading.masks_borders ? borders.mask : Image2d());
+  if (found == Background::Undecided) return;
+  const bool is_bright = found == Background::Bright;
+  note.add(std::string("background looks ") + (is_bright ? "bright" : "dark"));
+  if (is_bright == (view.xray_domain == XrayDomain::Intensity)) return;
+  const std::string domain =
+      view.xray_domain == XrayDomain::Intensity ? "intensity" : "attenuation";
+  const bool may_be_border = borders.is_any() && !view.reading.masks_borders;
+  warnings.push_back(view.xray.string() + ": its background looks " +
+                     (is_bright ? "bright" : "dark") + ", but xray_domain = \"" + domain +
+                     "\" means " + (is_bright ? "dark" : "bright") + " air; " +
+                     (may_be_border ? "a collimator or aperture (mask = \"auto\")? " : "") +
+                     "if its greys are turned round, set xray_polarity = \"inverted\"; anatomy "
+                     "that fills the picture looks so, too");
+}
+
+double hidden_share(const Image2d& mask, const RegionOfInterest& roi) {
+  const Image2d part = crop(mask, roi);
+  return static_cast<double>(std::count(part.pixels.begin(), part.pixels.end(), 0.0f)) /
+         static_cast<double>(part.pixels.size());
+}
+
+/// What an automatic mask hides, checked against the region of interest.
+void use_borders(const XrayBorders& borders, const StudyView& view, Image2d& mask, Note& note) {
+  note.add(borders.text());
+  if (borders.is_any()) {
+    if (mask.pixels.empty()) mask = Image2d(borders.mask);
+    for (std::size_t i = 0; i < mask.pixels.size(); ++i)
+      if (borders.mask.pixels[i] == 0.0f) mask.pixels[i] = 0.0f;
+  }
+  if (mask.pixels.empty() || view.roi.pixel_count() == 0) return;
+  const double hidden = hidden_share(mask, view.roi);
+  if (hidden > kMostHidden)
+    throw InputError("mask",
+                     "\"auto\": " + borders.text(),
+                     "hides " + percent(hidden) +
+                         " of roi_px, which cannot be border: draw a mask, or leave it out",
+                     view.xray.string());
+}
+
+Image2d read_mask_file(const StudyView& view, const CameraGeometry& camera) {
   Image2d mask = read_image(*view.mask);
   check_size(mask, view.mask->string(), camera);
   if (std::none_of(mask.pixels.begin(), mask.pixels.end(), [](float v) { return v != 0.0f; }))
     throw InputError("mask", "all 0", "must let at least one pixel through", view.mask->string());
   return mask;
+}
+
+/// The X-ray's values, rising with what `xray_domain` says, and what was done for that.
+Image2d load_oriented(const StudyView& view,
+                      const CameraGeometry& camera,
+                      Note& note,
+                      std::vector<std::string>& warnings) {
+  LoadedImage loaded = load(view.xray, view.reading.frame);
+  check_size(loaded.image, view.xray.string(), camera);
+  check_spacing(loaded, view, camera, warnings);
+  if (loaded.dicom) {
+    note_header(*loaded.dicom, note);
+    check_relationship(*loaded.dicom, view, warnings);
+  }
+  if (is_turned(loaded, view)) {
+    const double sum = inversion_sum(loaded);
+    turn_round(loaded.image, sum);
+    note.add("values turned round: " + number_text(sum) + " - stored");
+  }
+  return std::move(loaded.image);
+}
+
+}  // namespace
+
+ViewXray read_view_xray(const StudyView& view, const CameraGeometry& camera) {
+  ViewXray xray;
+  Note note;
+  if (view.mask)
+    xray.mask = used_from(view.places, "mask", [&] { return read_mask_file(view, camera); });
+  Image2d& image = xray.attenuation;
+  XrayBorders borders;
+  used_from(view.places, "xray", [&] {
+    image = load_oriented(view, camera, note, xray.warnings);
+    check_values(image, view);
+    if (needs_borders(view, image)) borders = borders_of(image, view.xray_domain);
+    note_background(image, view, borders, note, xray.warnings);
+  });
+  if (view.xray_domain == XrayDomain::Intensity)
+    correct_by_flat(view, camera, image, xray.mask, note);
+  used_from(view.places, "xray", [&] {
+    if (view.xray_domain == XrayDomain::Intensity)
+      take_negative_log(image, air_level(image, borders, view, note));
+    if (view.reading.masks_borders) use_borders(borders, view, xray.mask, note);
+  });
+  xray.note = note.text();
+  return xray;
 }
 
 }  // namespace af

@@ -48,6 +48,8 @@ class TomlProblems {
 };
 
 enum class Presence { Required, Optional };
+/// Whether rows of a matrix may be absent.
+enum class RowGaps { Refused, Allowed };
 
 /// Reads one table's keys with type and range checks. Every get_*() notes its key as known; a value
 /// that is missing or unacceptable is noted as a problem and comes back as nullopt.
@@ -59,6 +61,10 @@ class TomlTableReader {
       : table_(table), prefix_(std::move(prefix)), problems_(problems) {}
 
   std::optional<std::string> get_string(const char* key, Presence presence);
+  /// A finite number.
+  std::optional<double> get_number(const char* key, Presence presence);
+  /// A whole number that fits an int.
+  std::optional<int> get_integer(const char* key, Presence presence);
   /// A list of exactly `Size` numbers within kMaxRoomMm: points, directions, spacings.
   template <int Size>
   std::optional<Eigen::Matrix<double, Size, 1>> get_vector(const char* key, Presence presence) {
@@ -69,9 +75,14 @@ class TomlTableReader {
   /// A list of exactly `count` whole numbers that fit an int.
   std::optional<std::vector<int>> get_integers(const char* key, int count, Presence presence);
   /// A list of rows of `columns` numbers each, finite and not beyond `most`; `rows` = -1: any
-  /// number of rows.
-  std::optional<Eigen::MatrixXd> get_matrix(
-      const char* key, int rows, int columns, Presence presence, double most = kMaxRoomMm);
+  /// number of rows. With `RowGaps::Allowed` a row may be absent: `[]`, or `nan` in every column;
+  /// it is then NaN.
+  std::optional<Eigen::MatrixXd> get_matrix(const char* key,
+                                            int rows,
+                                            int columns,
+                                            Presence presence,
+                                            double most = kMaxRoomMm,
+                                            RowGaps gaps = RowGaps::Refused);
   /// A rigid 4x4 transform.
   std::optional<RigidTransform> get_pose(const char* key, Presence presence);
   /// The tables of [[key]]; none is a problem when the key is required.
@@ -81,6 +92,8 @@ class TomlTableReader {
   [[nodiscard]] const toml::node& node(const char* key) const;
   /// Whether the key is there; makes it a known one.
   bool has(const char* key);
+  /// Whether the key is there and holds a number.
+  bool has_number(const char* key);
   /// "FILE:LINE: PREFIXkey".
   [[nodiscard]] std::string place(const char* key) const;
   /// "FILE:LINE: PREFIXkey = value: constraint".

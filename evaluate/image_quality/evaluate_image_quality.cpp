@@ -18,6 +18,7 @@
 #include "evaluate/image_quality/image_quality_tables.h"
 #include "evaluate/image_quality/loss_split.h"
 #include "evaluate/image_quality/loss_split_tables.h"
+#include "evaluate/outputs/paper_setting.h"
 #include "evaluate/outputs/result_figures.h"
 #include "evaluate/outputs/row_gathering.h"
 #include "evaluate/outputs/sample_summary_json.h"
@@ -27,10 +28,11 @@
 #include "files/output_file.h"
 #include "files/resource_check.h"
 #include "files/sha256.h"
+#include "pose_files/pose_file.h"
 #include "run/run_folder.h"
 #include "run/terminal.h"
 #include "study/node_ct.h"
-#include "study/pose_file.h"
+#include "study/pose_context.h"
 #include "study/study_file.h"
 #include "text/options_toml.h"
 
@@ -53,6 +55,7 @@ struct TargetResult {
   std::string camera;
   std::vector<DrrComparison> comparisons;
   std::vector<PicturePanel> worst_pair;
+  bool is_papers_setting = false;  ///< rank 0
 
   [[nodiscard]] std::string label() const {
     return (case_name.empty() ? "camera" : case_name) + " " + camera;
@@ -105,9 +108,10 @@ Setup load(const ImageQualityOptions& options, const Target& target, const Commu
                            ": give --look-up linear",
                        target.field.string());
     if (options.poses.empty()) return;
-    setup.poses = read_poses_csv(options.poses, identity.frame);
-    if (setup.poses.empty())
-      throw InputError("poses", "no row", "must hold at least one pose", options.poses.string());
+    setup.poses = read_poses(
+        options.poses,
+        pose_context(
+            target.ct, {}, CameraRig{Eigen::Vector3d::Zero(), {identity.camera}}, identity.frame));
   });
   setup.view = View::whole_detector(identity.camera);
   return setup;
@@ -163,6 +167,10 @@ void write_pair(const std::vector<PicturePanel>& panels,
                 zoom_of(panels.front().image));
 }
 
+PaperLevels levels_for(bool is_papers_setting) {
+  return is_papers_setting ? PaperLevels::Shown : PaperLevels::Hidden;
+}
+
 PsnrGroup group_of(const TargetResult& result) {
   PsnrGroup group{result.label(), {}};
   for (const DrrComparison& comparison : result.comparisons)
@@ -183,7 +191,9 @@ void write_results(const ImageQualityOptions& options,
   remove_output(folder / "summary.json");
   write_text_file(folder / "image-quality.csv", image_quality_table(comparisons).to_text());
   const PsnrGroup group = group_of(result);
-  draw_psnr_boxes({group}, folder / "psnr");
+  const json field = field_description(*setup.field);
+  result.is_papers_setting = is_papers_setting(field);
+  draw_psnr_boxes({group}, levels_for(result.is_papers_setting), folder / "psnr");
   json summary = {{"format", "attenuation-fields evaluation"},
                   {"format_version", 1},
                   {"kind", "image-quality"}};
@@ -207,7 +217,7 @@ void write_results(const ImageQualityOptions& options,
     summary["loss_split"] = write_loss_split(splits, folder);
     summary["figures"].push_back("loss-split");
   }
-  summary["field"] = field_description(*setup.field);
+  summary["field"] = field;
   summary["field"]["file_bytes"] = setup.field_info.file_bytes;
   summary["field"]["payload_bytes"] = setup.field_info.payload_bytes;
   summary["look_up"] = setup.look_up(options);
@@ -342,7 +352,11 @@ void write_together(const std::vector<TargetResult>& results, const std::filesys
     panels.insert(panels.end(), result.worst_pair.begin(), result.worst_pair.end());
   }
   write_text_file(folder / "image-quality.csv", table.to_text());
-  draw_psnr_boxes(groups, folder / "psnr");
+  const bool are_papers =
+      std::all_of(results.begin(), results.end(), [](const TargetResult& result) {
+        return result.is_papers_setting;
+      });
+  draw_psnr_boxes(groups, levels_for(are_papers), folder / "psnr");
   write_picture(panels,
                 3,
                 "The worst pair of every field",

@@ -9,7 +9,8 @@
 #include <utility>
 
 #include "base/error.h"
-#include "study/pose_file.h"
+#include "pose_files/pose_file.h"
+#include "pose_files/project_poses.h"
 #include "text/csv_table.h"
 
 namespace af::evaluation {
@@ -120,10 +121,35 @@ std::optional<std::pair<std::string, std::int64_t>> split_stem(const std::string
   return std::pair(stem.substr(0, digits > 0 ? digits - 1 : 0), std::stoll(stem.substr(digits)));
 }
 
+/// Whether a file of a folder may be one of poses, by its name.
+bool is_named_like_a_pose(const std::filesystem::path& path) {
+  static const std::set<std::string> extensions = {
+      ".tfm", ".h5", ".dcm", ".json", ".toml", ".tra", ".txt"};
+  return extensions.contains(path.extension().string());
+}
+
+/// Whether a file is a table with named columns.
+bool is_table(const std::filesystem::path& path) {
+  if (path.extension() == ".csv") return true;
+  const PoseFileBytes file = read_pose_bytes(path);
+  const std::string first_line = file.bytes.substr(0, file.bytes.find('\n'));
+  return is_csv_of_poses(file) || first_line.find("start_index") != std::string::npos;
+}
+
+/// A file of poses that is no table of ours; nullopt when it is a table.
+std::optional<std::vector<RigidTransform>> poses_of_other_file(const std::filesystem::path& path,
+                                                               const PoseTableFrames& frames) {
+  if (is_table(path)) return std::nullopt;
+  if (!frames.is_only_case)
+    throw InputError(path.string() +
+                     ": does not say of which case its poses are; choose one with --case");
+  return read_poses(path, frames.context);
+}
+
 std::vector<std::filesystem::path> transforms_in(const std::filesystem::path& folder) {
   std::vector<std::filesystem::path> paths;
   for (const auto& entry : std::filesystem::directory_iterator(folder))
-    if (entry.path().extension() == ".tfm") paths.push_back(entry.path());
+    if (is_named_like_a_pose(entry.path())) paths.push_back(entry.path());
   std::sort(paths.begin(), paths.end());
   return paths;
 }
@@ -133,13 +159,14 @@ FoundPoses read_folder(const std::filesystem::path& folder, const PoseTableFrame
   for (const std::filesystem::path& path : transforms_in(folder)) {
     const auto name = split_stem(path.stem().string());
     if (!name.has_value()) {
-      found.problems.push_back(path.string() + ": is not named [CASE-]INDEX.tfm; left out");
+      found.problems.push_back(path.string() + ": is not named [CASE-]INDEX" +
+                               path.extension().string() + "; left out");
       continue;
     }
     const bool is_mine =
         name->first.empty() ? frames.is_only_case : name->first == frames.case_name;
     if (!is_mine) continue;
-    if (!found.room_from_ct.emplace(name->second, read_pose(path)).second)
+    if (!found.room_from_ct.emplace(name->second, read_pose(path, frames.context)).second)
       found.problems.push_back(path.string() + ": start " + std::to_string(name->second) +
                                " occurs again; the first pose counts");
   }
@@ -150,6 +177,7 @@ FoundPoses read_folder(const std::filesystem::path& folder, const PoseTableFrame
 
 std::vector<RigidTransform> read_starts(const std::filesystem::path& path,
                                         const PoseTableFrames& frames) {
+  if (const auto poses = poses_of_other_file(path, frames)) return *poses;
   const CsvTable table = CsvTable::read(path);
   const bool has_matrix = table.find_column("m00").has_value();
   const bool has_index = table.find_column("start_index").has_value();
@@ -181,7 +209,7 @@ std::vector<std::string> unknown_case_problems(const std::filesystem::path& path
       if (const auto name = split_stem(file.stem().string()); name.has_value())
         ++poses_of[name->first];
     poses_of.erase("");
-  } else {
+  } else if (is_table(path)) {
     const CsvTable table = CsvTable::read(path);
     for (std::size_t row = 0; table.find_column("case").has_value() && row < table.row_count();
          ++row)
@@ -196,7 +224,13 @@ std::vector<std::string> unknown_case_problems(const std::filesystem::path& path
 }
 
 FoundPoses read_found_poses(const std::filesystem::path& path, const PoseTableFrames& frames) {
-  return std::filesystem::is_directory(path) ? read_folder(path, frames) : read_table(path, frames);
+  if (std::filesystem::is_directory(path)) return read_folder(path, frames);
+  const auto poses = poses_of_other_file(path, frames);
+  if (!poses) return read_table(path, frames);
+  FoundPoses found;
+  for (std::size_t i = 0; i < poses->size(); ++i)
+    found.room_from_ct.emplace(static_cast<std::int64_t>(i), (*poses)[i]);
+  return found;
 }
 
 }  // namespace af::evaluation

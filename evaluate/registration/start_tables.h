@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "geometry/rigid_transform.h"
+#include "pose_files/pose_format.h"
 
 namespace af::evaluation {
 
@@ -19,6 +20,7 @@ struct PoseTableFrames {
   bool is_only_case = true;  ///< a table or file name need not name the case
   PoseFrame gold;            ///< of start_rx_deg ... and final_rx_deg ...
   PoseFrame nominal;         ///< of rx_deg ... tz_mm
+  PoseContext context = {};  ///< of files of poses that are no tables
 };
 
 /// The starts of one case from a CSV file, in its order: rows whose `case` is the case's; the pose
@@ -26,6 +28,7 @@ struct PoseTableFrames {
 /// unreadable, or a value that is not a number; InputError: no row of the case, a pose that is not
 /// rigid, or a start_index (where there is that column) that is not the row's place among the
 /// case's: a start that is missing, repeated or out of order would give all others another number.
+/// A file of another format of poses (docs/poses.md) holds the starts of the only case.
 std::vector<RigidTransform> read_starts(const std::filesystem::path& path,
                                         const PoseTableFrames& frames);
 
@@ -38,10 +41,12 @@ struct FoundPoses {
 
 /// The poses of one case: a CSV file with start_index, optionally case and seconds, and m00 ... m23
 /// of room_from_ct, or final_rx_deg ... final_tz_mm relative to gold (as in registrations.csv), or
-/// rx_deg ... tz_mm relative to the nominal pose, about the ROI centre. Or a folder of ITK
-/// transforms (.tfm, ct_from_room) named [CASE-]INDEX.tfm. A pose with a value that is not finite
-/// is no pose; of a start that occurs twice the first counts, also when it is no pose; a
-/// start_index that is not a whole number is no start: all are reported as problems.
+/// rx_deg ... tz_mm relative to the nominal pose, about the ROI centre. Or a folder of files of one
+/// pose each (docs/poses.md), named [CASE-]INDEX.tfm, .h5, .dcm, .json, .toml, .tra or .txt. Or one
+/// file of several poses that is no table: the poses of the only case from start 0 on. A pose with
+/// a value that is not finite is no pose; of a start that occurs twice the first counts, also when
+/// it is no pose; a start_index that is not a whole number is no start: all are reported as
+/// problems.
 FoundPoses read_found_poses(const std::filesystem::path& path, const PoseTableFrames& frames);
 
 /// The cases in a table or folder of poses that are not among `known`, in words: otherwise nobody

@@ -168,6 +168,9 @@ std::vector<std::string> problems(const LatticeErrorsOptions& options) {
   if (options.renderer == "raycast")
     found.emplace_back(
         "--renderer = raycast: must be field or both, because the cells are a field's");
+  if (options.output.extension() == ".csv")
+    found.push_back("--output = " + options.output.string() +
+                    ": must name the table in Markdown; the CSV stands beside it under that name");
   return found;
 }
 

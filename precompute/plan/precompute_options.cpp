@@ -105,7 +105,13 @@ void describe_codebook(Fields& field, PrecomputeOptions& options) {
       .decides(kCodebookStage);
   field("max_iterations",
         options.max_iterations,
-        "Most iterations of the training; it ends when one gains less than 0.5 %")
+        "Most iterations of the training, see --min-improvement")
+      .decides(kCodebookStage);
+  field("min_improvement",
+        options.min_improvement,
+        "The training ends when an iteration lowers the squared error of its tiles by less than "
+        "this share of it [0.005 for one slab, as in the paper's design, else 0.015]")
+      .within(0.0, 0.5)
       .decides(kCodebookStage);
   field("training_fraction",
         options.training_fraction,
@@ -212,6 +218,10 @@ bool PrecomputeOptions::packs_by_codebook_tree() const {
   return limits().is_stated();
 }
 
+double min_improvement_of(const FieldDesign& design) {
+  return design.slabs == 1 ? CodebookOptions{}.min_relative_improvement : 0.015;
+}
+
 PrecomputeOptions PrecomputeOptions::with_design(const FieldDesign& design) const {
   PrecomputeOptions options = *this;
   options.slabs = design.slabs;
@@ -223,6 +233,7 @@ PrecomputeOptions PrecomputeOptions::with_design(const FieldDesign& design) cons
     options.look_up.reset();
   else
     options.look_up = design.look_up;
+  options.min_improvement = min_improvement.value_or(min_improvement_of(design));
   return options;
 }
 
@@ -230,6 +241,7 @@ CodebookOptions PrecomputeOptions::codebook_options() const {
   CodebookOptions options;
   options.codewords = design().codewords;
   options.max_iterations = max_iterations;
+  options.min_relative_improvement = min_improvement.value_or(min_improvement_of(design()));
   options.seed = seed;
   return options;
 }

@@ -53,6 +53,7 @@ struct PrecomputeOptions {
 
   std::optional<int> codewords;
   int max_iterations = CodebookOptions{}.max_iterations;
+  std::optional<double> min_improvement;    ///< none: min_improvement_of() the design
   std::optional<double> training_fraction;  ///< none: kTrainingTilesPerCodeword decide
   std::uint64_t max_training_tiles = TrainingSelection{}.max_training_tiles;
   std::uint64_t seed = 1;
@@ -102,6 +103,10 @@ inline constexpr const char* kCodebookStage = "codebook";  ///< what is made of 
 /// Training tiles where no share is stated: enough that unseen tiles come out nearly as training
 /// tiles do (precompute/README.md has what more and fewer give).
 inline constexpr std::uint64_t kTrainingTilesPerCodeword = 64;
+/// Where a training ends unless told otherwise. The paper's single slab goes on longer, to give the
+/// same bytes as ever; with several slabs what the last iterations gain is below what interpolation
+/// loses (precompute/README.md).
+double min_improvement_of(const FieldDesign& design);
 /// A limit for every codebook, so that 65536 codewords do not take more than twice the time of
 /// 16384.
 inline constexpr std::uint64_t kTrainingTilesUnlessStated = std::uint64_t{1} << 20u;

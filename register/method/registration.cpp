@@ -369,10 +369,9 @@ void RegistrationRunner::Impl::correct(std::int64_t start_index,
   const SearchBudget budget{
       std::min(options.correction.max_casts, options.max_evaluations - result.evaluations),
       random_key(start_index, stages.size())};
+  if (budget.max_evaluations <= 0) return;
   const RigidTransform found = search_by_casting(*scaling, budget, end, result);
   report.casts = search.evaluations;
-  report.moved_mm = 0.0;
-  report.last_mm = 0.0;
   // The value is look-up's, as that of ends that are not corrected; and the fields hold the pose.
   const ObjectiveValue value = stages[end.stage].objective.evaluate(found);
   result.drr_count += value.drr_count;

@@ -10,8 +10,8 @@
 #include "base/joined.h"
 #include "figures/picture.h"
 #include "files/output_file.h"
+#include "pose_files/pose_file.h"
 #include "register/results/registration_columns.h"
-#include "study/pose_file.h"
 
 namespace af::registration {
 namespace {
@@ -80,10 +80,13 @@ std::string parameters_line(const PoseParameters& parameters) {
 
 /// "by 2 ray-cast DRRs per view, which moved the end 0.041 mm; it stands still"
 std::string correction_text(const CorrectionReport& correction) {
-  if (correction.casts == 0) return "no: there is no converged end to correct";
-  return "by " + std::to_string(correction.casts) + " ray-cast DRR" +
-         (correction.casts == 1 ? "" : "s") + " per view, which moved the end " +
-         fixed_text(correction.moved_mm, 3) + " mm; " +
+  if (correction.casts == 0)
+    return "no: the search before had not converged, or no evaluation was left";
+  const std::string casts = std::to_string(correction.casts) + " ray-cast DRR" +
+                            (correction.casts == 1 ? "" : "s") + " per view";
+  if (std::isnan(correction.moved_mm))
+    return "no: " + casts + " led to a pose that is not admissible or has no value";
+  return "by " + casts + ", which moved the end " + fixed_text(correction.moved_mm, 3) + " mm; " +
          (correction.stood_still ? "it stands still"
                                  : "it does not stand still, the last moved it " +
                                        fixed_text(correction.last_mm, 3) + " mm");

@@ -7,7 +7,7 @@
 #include "drr/drr_renderer.h"
 #include "files/output_file.h"
 #include "image_files/image_file.h"
-#include "study/pose_file.h"
+#include "pose_files/pose_file.h"
 
 namespace af::registration {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "evaluate/registration/start_tables.h"
 #include "fuzz/fuzz_input.h"
-#include "study/pose_file.h"
+#include "pose_files/pose_file.h"
 #include "text/csv_table.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -24,7 +24,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   fuzz::require(again.columns() == table->columns() && again.row_count() == table->row_count() &&
                     again.to_text() == table->to_text(),
                 "a table reads back as it was written");
-  fuzz::is_accepted([&] { read_poses_csv(path, PoseFrame()); });
+  fuzz::is_accepted([&] { (void)read_pose_file(path, {PoseFrame(), {}, {}, {}}); });
   evaluation::PoseTableFrames frames;
   frames.case_name = "skull-01";
   fuzz::is_accepted([&] { evaluation::read_starts(path, frames); });

@@ -1,25 +1,49 @@
 // SPDX-License-Identifier: Apache-2.0
-// A pose as JSON, TOML, ITK transform or plain numbers; the first byte picks the file's name.
+// Poses in every format; the first byte picks the file's name.
 #include <array>
 #include <optional>
 
 #include "fuzz/fuzz_input.h"
-#include "study/pose_file.h"
+#include "pose_files/pose_file.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace af;
-  constexpr std::array kNames = {"pose.txt", "pose.toml", "pose.tfm", "result.json"};
+  constexpr std::array kNames = {"pose.txt", "pose.toml", "pose.tfm", "result.json", "pose.tra"};
   fuzz::InputBytes input(data, size);
   const char* const name = kNames[input.take<std::uint8_t>() % kNames.size()];
   const auto path = fuzz::written(name, fuzz::as_text(input.rest()));
-  std::optional<RigidTransform> pose;
-  if (!fuzz::is_accepted([&] { pose = read_pose(path); })) return 0;
-  fuzz::require(rigidity_problems(pose->matrix()).empty(), "a pose is rigid");
-  for (const char* text_name : {"again.toml", "again.tfm"}) {
-    const bool is_toml = std::string_view(text_name).ends_with("toml");
-    const auto again =
-        fuzz::written(text_name, is_toml ? pose_to_toml(*pose) : pose_to_itk_transform(*pose));
-    fuzz::require(fuzz::is_accepted([&] { read_pose(again); }), "a pose can be written and read");
+  PoseContext context;
+  context.frame = PoseFrame();
+  context.ct_grid = [] {
+    CtGrid grid;
+    grid.size = {20, 30, 40};
+    return grid;
+  };
+  context.rig = [] {
+    CameraGeometry camera;
+    camera.name = "A";
+    camera.source_point = {0.0, -650.0, 0.0};
+    camera.row_direction = {0.0, 0.0, -1.0};
+    camera.size_px = {200, 180};
+    return CameraRig{Eigen::Vector3d::Zero(), {camera}};
+  };
+  context.ct_frame_of_reference = [] { return std::string("1.2.3.4"); };
+  PosesInFile found;
+  if (!fuzz::is_accepted([&] { found = read_pose_file(path, context); })) return 0;
+  for (const PosesInFile::Named& pose : found.poses)
+    fuzz::require(rigidity_problems(pose.room_from_ct.matrix()).empty(), "a pose is rigid");
+  if (found.poses.empty()) return 0;
+  const RigidTransform pose = found.poses.front().room_from_ct;
+  for (const std::string& format : written_pose_formats()) {
+    const auto again = fuzz::written(format == "autoscoper" ? "again.tra" : "again",
+                                     pose_file_bytes(format, {&pose, 1}, context));
+    std::optional<RigidTransform> read_again;
+    fuzz::require(fuzz::is_accepted([&] { read_again = read_pose(again, context); }),
+                  "a pose can be written and read");
+    // Written with 16 characters a number, of poses within 1 km.
+    constexpr double kDecimalsMm = 1e-3;
+    fuzz::require((read_again->matrix() - pose.matrix()).cwiseAbs().maxCoeff() < kDecimalsMm,
+                  "a pose reads back as it was written");
   }
   return 0;
 }

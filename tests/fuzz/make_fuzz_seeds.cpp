@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iostream>
+#include <iterator>
 #include <stdexcept>
 #include <string>
 
@@ -16,7 +17,7 @@
 #include "files/output_file.h"
 #include "image_files/ct_reader.h"
 #include "image_files/image_file.h"
-#include "study/pose_file.h"
+#include "pose_files/pose_file.h"
 #include "study/rig_file.h"
 #include "study/study_template.h"
 #include "unit/image_files/ct_test_data.h"
@@ -124,6 +125,21 @@ void write_pose_seeds(const fs::path& folder) {
   write_seed(folder / "pose" / "versor",
              "\2#Insight Transform File V1.0\nTransform: VersorRigid3DTransform_double_3_3\n"
              "Parameters: 0.1 0 0.2 1 2 3\nFixedParameters: 0 0 1\n"s);
+  PoseContext context;
+  context.ct_grid = [] {
+    CtGrid grid;
+    grid.size = {20, 30, 40};
+    return grid;
+  };
+  context.rig = [] { return parse_rig(builtin_rig_text("c-arm-12in"), "c-arm-12in"); };
+  const RigidTransform pose = some_pose();
+  for (const char* format : {"dicom", "itk-hdf5", "diffdrr", "csv"})
+    write_seed(folder / "pose" / format, "\0"s + pose_file_bytes(format, {&pose, 1}, context));
+  write_seed(folder / "pose" / "autoscoper",
+             "\4"s + pose_file_bytes("autoscoper", {&pose, 1}, context));
+  write_seed(folder / "pose" / "euler",
+             "\2#Insight\nTransform: Euler3DTransform_double_3_3\nParameters: 0.1 0.2 0.3 4 5 6\n"
+             "FixedParameters: 10 20 30 1\n"s);
   write_seed(folder / "pose" / "json",
              "\3{\"room_from_ct\": [[1,0,0,1],[0,1,0,2],[0,0,1,3],[0,0,0,1]], \"a\": [null]}"s);
 }
@@ -159,6 +175,31 @@ void write_dicom_seeds(const fs::path& folder) {
              "\x08\0\x50\x11\2\0\0\0"
              "12\xfe\xff\x0d\xe0\0\0\0\0\xfe\xff\xdd\xe0\0\0\0\0"
              "\x28\0\x10\0\2\0\0\0\1\0\x28\0\x11\0\2\0\0\0\1\0\xe0\x7f\x10\0\2\0\0\0\1\1"s);
+}
+
+/// The first byte is how the study reads the file.
+void write_dicom_xray_seeds(const fs::path& folder) {
+  const fs::path scratch = folder / "dicom_xray.tmp";
+  std::vector<int> levels(12 * 12, 3000);
+  for (std::size_t i = 0; i < levels.size(); ++i)
+    if (i % 12 < 2 || i / 12 > 9) levels[i] = 10;
+  const auto write = [&](const std::string& name, char choice, test::DicomTestFile file) {
+    file.write(scratch);
+    std::ifstream written(scratch, std::ios::binary);
+    write_seed(folder / "dicom_xray" / name,
+               choice + std::string(std::istreambuf_iterator<char>(written), {}));
+    fs::remove(scratch);
+  };
+  write("plain", '\x22', test::xa_file(12, 12, 1, levels));
+  write("frames", '\x61', test::xa_file(12, 12, 3, levels));
+  test::DicomTestFile inverted = test::xa_file(12, 12, 1, levels);
+  inverted.set_text({0x0028, 0x0004}, "CS", "MONOCHROME1");
+  inverted.set_text({0x0028, 0x1041}, "SS", "\xff\xff");
+  inverted.set_text({0x0028, 0x1040}, "CS", "LOG");
+  inverted.set_text({0x0028, 0x1052}, "DS", "-5");
+  inverted.set_text({0x0028, 0x1053}, "DS", "0.5");
+  write("inverted", '\x3a', inverted);
+  write("attenuation", '\x24', inverted);
 }
 
 /// As fuzz_index_coding takes it apart: two codewords, extents, a chunk.
@@ -270,6 +311,7 @@ int main(int argc, char** argv) {
     write_pose_seeds(folder);
     write_image_seeds(folder);
     write_dicom_seeds(folder);
+    write_dicom_xray_seeds(folder);
     write_index_coding_seeds(folder);
     write_other_seeds(folder);
     write_report_seeds(folder);

@@ -497,6 +497,22 @@ TEST(FieldFile, RefusesAnUnknownVersion) {
   EXPECT_NE(message.find("format_version: expected 1 to 2, found 3"), std::string::npos) << message;
 }
 
+TEST(FieldFile, RefusesIndicesPackedOtherwiseThanItsVersionSays) {
+  const test::SharedFolder folder;
+  for (const auto& [packing, other] :
+       {std::pair(IndexPacking::Deflate, 2), std::pair(IndexPacking::CodebookTree, 1)}) {
+    write(small_field(), folder / "a.af.h5", packing);
+    edit_file(folder / "a.af.h5", [other = other](hid_t file) {
+      H5Adelete(file, "format_version");
+      hdf5::write_int_attribute(file, "format_version", other);
+    });
+    const std::string message = refusal(folder / "a.af.h5");
+    EXPECT_NE(message.find("expected indices packed as in version " + std::to_string(other)),
+              std::string::npos)
+        << message;
+  }
+}
+
 TEST(FieldFile, RefusesAMissingDataset) {
   const test::SharedFolder folder;
   for (const char* name :

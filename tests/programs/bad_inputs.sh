@@ -194,6 +194,17 @@ of_study 3 'roi_px' 'ROI of huge numbers' "$(edited study.toml '0,/^roi_px = .*/
 of_study 3 'collinear' 'collinear fiducials' "$(edited study.toml 's/^name = .*/&\nfiducials_ct_mm = [[0,0,0],[1,1,1],[2,2,2],[3,3,3]]/; s/^roi_px = .*/&\nfiducials_px = [[10,10],[20,20],[30,30],[40,41]]/')"
 of_study 4 'gone.mha' 'X-ray missing' "$(edited study.toml '0,/^xray = .*/s//xray = "gone.mha"/')"
 of_study 4 'edited-study.toml' 'not TOML' "$(edited study.toml '1s/^.*$/rig = /')"
+# of_xray CODE PART WHAT FILE KEYS: the valid study with another first X-ray, and keys beside it.
+of_xray() { of_study "$1" "$2" "$3" "$(edited study.toml "0,/^xray = .*/s//xray = \"..\/$4\"\n$5/; 0,/^xray_domain = .*/s//xray_domain = \"intensity\"/")"; }
+of_xray 3 'say which frame' 'X-ray of several frames' frames.dcm ''
+of_xray 3 'must be 1 to 2' 'frame that is not there' frames.dcm 'xray_frame = 3'
+of_xray 3 'pixel_spacing_mm of camera' "X-ray of another detector's pixels" other-spacing.dcm ''
+of_xray 3 'PixelIntensityRelationship' 'logarithms as intensities' logarithms.dcm ''
+of_xray 3 'must be grey' 'X-ray in colour' colour.dcm ''
+of_xray 4 'pixel data' 'frames that are not there' promises-frames.dcm 'xray_frame = 1'
+of_study 3 'must be a positive number or one of percentile' 'unknown air level' "$(edited study.toml '0,/^xray_domain = .*/s//xray_domain = "intensity"\nair_level = "sky"/')"
+of_study 3 'which gives it for every pixel' 'air level beside a flat field' "$(edited study.toml '0,/^xray_domain = .*/s//xray_domain = "intensity"\nair_level = 5.0\nflat = "f.mha"/')"
+of_study 3 'xray_frame' 'frame of a MetaImage' "$(edited study.toml '0,/^xray_domain = .*/s//&\nxray_frame = 2/')"
 row 3 'nobody' 'unknown case' "$bin/af-register" --study valid/study.toml --case nobody --renderer raycast -o out/result
 
 printf -- '--- options ---\n'
@@ -275,6 +286,31 @@ row 4 'standard output: cannot be written' 'a version onto a full disk' full "$b
 awk 'BEGIN { print "rx_deg,ry_deg,rz_deg,tx_mm,ty_mm,tz_mm"; for (i = 0; i < 400000; ++i) print "1,1,1,0,0,0" }' >poses.csv
 row 3 'must fit' 'more DRRs than the machine can hold' "$bin/af-drr" --field AP.af.h5 --rig c-arm-12in --camera AP --poses poses.csv -o out/drrs.mha
 row 3 'must fit' 'more poses than the machine can hold' "$bin/af-evaluate" image-quality --field AP.af.h5 --ct valid/ct.nii.gz --pose-count 2000000000 -o out
+
+printf -- '--- poses of other programs ---\n'
+printf '%s\n' '1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1' >one.txt
+for format in dicom itk-hdf5; do
+  "$bin/af-inspect" one.txt --pose-to "$format" -o "one.$format"
+  for bytes in 100 400 800; do
+    head -c "$bytes" "one.$format" >"cut-$bytes.$format"
+    row 4 "cut-$bytes.$format" "$format pose of $bytes bytes" "${drr_of_ct[@]}" --pose "cut-$bytes.$format"
+  done
+done
+sed 's/RIGID /AFFINE/' one.dicom >affine.dicom
+row 3 'must be RIGID' 'affine registration' "${drr_of_ct[@]}" --pose affine.dicom
+nans=NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN
+printf '%s\n' "$nans" "$nans" >nan.tra
+row 3 'holds no pose' 'Autoscoper frames that were not tracked' "${drr_of_ct[@]}" --pose nan.tra
+printf '%s\n' "$nans" '2 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1' >scaled.tra
+row 3 'frame 2' 'Autoscoper frame not rigid' "${drr_of_ct[@]}" --pose scaled.tra
+printf '%s\n' '1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1' '1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1' >two.tra
+row 3 'one is expected' 'two frames as one pose' "${drr_of_ct[@]}" --pose two.tra
+printf '%s\n' '#Insight' 'Transform: Euler3DTransform_double_3_3' 'Parameters: 1 2 3 4 5' 'FixedParameters: 0 0 0' >five.tfm
+row 4 'number of Parameters' 'Euler transform of five numbers' "${drr_of_ct[@]}" --pose five.tfm
+printf '%s\n' 'diffdrr_parameterization = "se3"' 'rotation_rad = [[0, 0, nan]]' 'translation_mm = [[0, 0]]' >bad-diffdrr.toml
+row 3 'diffdrr_parameterization' 'DiffDRR pose with mistakes' "${drr_of_ct[@]}" --pose bad-diffdrr.toml
+row 2 'requires' 'a case without a study' "$bin/af-inspect" one.txt --pose-to toml --case a -o out/one.toml
+row 3 'Autoscoper' 'Autoscoper pose of no CT' "$bin/af-inspect" one.txt --pose-to autoscoper -o out/one.tra
 
 printf -- '--- outputs that are inputs ---\n'
 ln valid/ct.nii.gz hard.nii.gz

@@ -15,10 +15,10 @@
 #include <gtest/gtest.h>
 
 #include "files/output_file.h"
+#include "pose_files/pose_file.h"
 #include "programs/small_study.h"
 #include "run/output_lock.h"
 #include "run/stop_request.h"
-#include "study/pose_file.h"
 #include "study/study_file.h"
 #include "support/browser.h"
 #include "support/kept_records.h"
@@ -481,6 +481,8 @@ TEST_F(EvaluateProgram, MeasuresErrorsAgainstFractionsOfACell) {
   expect_refused(evaluate("lattice-errors --study " + path("study.toml") + " --renderer raycast"),
                  3,
                  "must be field or both");
+  expect_refused(
+      evaluate(arguments + " -o " + path("cells.csv")), 3, "must name the table in Markdown");
 }
 
 TEST_F(EvaluateProgram, BuildsTheFieldsOfASweepOnceAndReusesThem) {
@@ -590,6 +592,9 @@ TEST_F(EvaluateProgram, ComparesRunsInOneTable) {
   EXPECT_EQ(table.text(1, "method"), "paper ncc best-neighbor");
   EXPECT_EQ(table.text(1, "starts_0_8_mm"), "4");
   expect_refused(evaluate("compare " + path("nowhere")), 4, "nowhere");
+  expect_refused(evaluate("compare " + path("methods") + " -o " + path("methods/table.csv")),
+                 3,
+                 "must name the table in Markdown");
 }
 
 TEST_F(EvaluateProgram, CorrectsLookedUpEndsAndMeasuresHowFarMethodsEndApart) {

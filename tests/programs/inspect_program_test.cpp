@@ -11,8 +11,8 @@
 #include <gtest/gtest.h>
 
 #include "base/build_info.h"
+#include "pose_files/pose_file.h"
 #include "programs/small_study.h"
-#include "study/pose_file.h"
 #include "support/run_program.h"
 #include "support/test_paths.h"
 #include "text/csv_table.h"

@@ -43,6 +43,29 @@ void write_dicom_folders(const fs::path& folder) {
   });
 }
 
+/// DICOM X-rays of the valid study's detector (48 x 48), wrong in one way each.
+void write_dicom_xrays(const fs::path& folder) {
+  std::vector<int> levels(48 * 48, 3000);
+  levels[48 * 24 + 24] = 100;
+  const auto write = [&](const char* name, int frames, const auto& edit) {
+    DicomTestFile file = test::xa_file(48, 48, frames, levels);
+    file.erase({0x0018, 0x1164});
+    edit(file);
+    file.write(folder / name);
+  };
+  write("frames.dcm", 2, [](DicomTestFile&) {});
+  write("other-spacing.dcm", 1, [](DicomTestFile& file) {
+    file.set_text({0x0018, 0x1164}, "DS", "0.1\\0.1");
+  });
+  write("logarithms.dcm", 1, [](DicomTestFile& file) {
+    file.set_text({0x0028, 0x1040}, "CS", "LOG");
+  });
+  write("colour.dcm", 1, [](DicomTestFile& file) { file.set_text({0x0028, 0x0004}, "CS", "RGB"); });
+  write("promises-frames.dcm", 1, [](DicomTestFile& file) {
+    file.set_text({0x0028, 0x0008}, "IS", "99999");
+  });
+}
+
 /// A MetaImage of 4 x 4 x 4 voxels (x 2 when there are four dimensions).
 template <typename T>
 void write_meta(const fs::path& path, const std::string& type, int dimensions, T first, T other) {
@@ -99,6 +122,7 @@ void write_inputs(const fs::path& folder) {
   fs::create_directories(folder / "valid");
   test::write_small_study(folder / "valid");
   write_dicom_folders(folder);
+  write_dicom_xrays(folder);
   write_meta<float>(folder / "nan.mha", "MET_FLOAT", 3, std::numeric_limits<float>::quiet_NaN(), 0);
   write_meta<short>(folder / "all-air.mha", "MET_SHORT", 3, -1000, -1000);
   write_meta<short>(folder / "four-d.mha", "MET_SHORT", 4, 40, 40);

@@ -14,7 +14,8 @@
 #include "image/psnr.h"
 #include "image_files/ct_reader.h"
 #include "image_files/image_file.h"
-#include "study/pose_file.h"
+#include "pose_files/pose_file.h"
+#include "study/pose_context.h"
 #include "study/rig_file.h"
 #include "study/study_file.h"
 #include "text/csv_table.h"
@@ -26,13 +27,16 @@ void describe_source(Fields& field, DrrOptions& options) {
   field("field",
         options.field,
         "Look DRRs up in this field; its own camera is used unless --rig and --camera name "
-        "another");
-  field("ct", options.ct, "Cast rays through this CT (DICOM folder, NIfTI, MetaImage, NRRD)");
+        "another")
+      .stands_for(PathRole::InputFile, ".h5");
+  field("ct", options.ct, "Cast rays through this CT (DICOM folder, NIfTI, MetaImage, NRRD)")
+      .stands_for(PathRole::InputVolume, ".nrrd");
   field.part(options.ct_reading);
   field("study",
         options.study,
         "study.toml in place of --ct and --rig: rays are cast through the case's CT, and poses are "
-        "relative to its nominal pose");
+        "relative to its nominal pose")
+      .stands_for(PathRole::InputFile, ".toml");
   field("study_case", options.study_case, "Case of the study [the only one]").as("--case");
   field("rig", options.rig, "Rig file, or c-arm-12in, or treatment-room");
   field("camera", options.camera, "Camera of the rig or study");
@@ -57,10 +61,13 @@ void describe_pose(Fields& field, DrrOptions& options) {
         options.translation_mm,
         "tx,ty,tz along the room's axes, mm (default 0,0,0)")
       .comma_separated();
-  field("pose", options.pose, "File with room_from_ct (TOML, result.json, ITK .tfm or 16 numbers)");
+  field("pose", options.pose, "File with one pose of any format that docs/poses.md lists")
+      .stands_for(PathRole::InputTransform, ".tfm");
   field("poses",
         options.poses,
-        "CSV of poses (rx_deg ... tz_mm, or m00 ... m23): one 3-D stack comes out");
+        "CSV of poses (rx_deg ... tz_mm, or m00 ... m23) or another file of poses (docs/poses.md): "
+        "one 3-D stack comes out")
+      .stands_for(PathRole::InputFile, ".csv");
 }
 
 void describe_output(Fields& field, DrrOptions& options) {
@@ -80,6 +87,7 @@ void describe_output(Fields& field, DrrOptions& options) {
         "OUT.mha, .nii.gz, .nrrd, .tif: total attenuation, float32, not scaled; OUT.png: 8 bits, "
         "row 0 on top, bright is attenuated")
       .as("-o,--output")
+      .stands_for(PathRole::OutputVolume, ".nrrd")
       .required();
 }
 
@@ -243,15 +251,19 @@ DrrScene load_scene(const DrrOptions& options, const Communicator& communicator)
   return scene;
 }
 
-std::vector<RigidTransform> requested_poses(const DrrOptions& options, const PoseFrame& frame) {
-  if (!options.poses.empty()) return read_poses_csv(options.poses, frame);
-  if (!options.pose.empty()) return {read_pose(options.pose)};
+std::vector<RigidTransform> requested_poses(const DrrOptions& options, const DrrScene& scene) {
+  const PoseContext context = pose_context(source_of(options).ct,
+                                           options.ct_reading,
+                                           CameraRig{Eigen::Vector3d::Zero(), {scene.view.camera}},
+                                           scene.frame);
+  if (!options.poses.empty()) return read_poses(options.poses, context);
+  if (!options.pose.empty()) return {read_pose(options.pose, context)};
   std::array<double, 6> values{};
   for (std::size_t i = 0; i < 3; ++i) {
     if (options.rotation_deg.has_value()) values[i] = (*options.rotation_deg)[i];
     if (options.translation_mm.has_value()) values[i + 3] = (*options.translation_mm)[i];
   }
-  return {pose_of_deg_and_mm(frame, values, "--rotation-deg, --translation-mm")};
+  return {pose_of_deg_and_mm(scene.frame, values, "--rotation-deg, --translation-mm")};
 }
 
 void require_room(std::size_t poses, const View& view, const std::filesystem::path& output) {

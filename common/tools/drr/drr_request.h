@@ -64,8 +64,8 @@ struct DrrScene {
 /// Collective. Reads field, CT and rig. FileError when --compare's CT is not the field's.
 DrrScene load_scene(const DrrOptions& options, const Communicator& communicator);
 
-/// Poses in the order of the options or the CSV file.
-std::vector<RigidTransform> requested_poses(const DrrOptions& options, const PoseFrame& frame);
+/// Poses in the order of the options or their file.
+std::vector<RigidTransform> requested_poses(const DrrOptions& options, const DrrScene& scene);
 
 /// InputError when so many DRRs fit neither into memory nor on the disk of the output.
 void require_room(std::size_t poses, const View& view, const std::filesystem::path& output);

@@ -8,7 +8,7 @@
 #include "files/output_file.h"
 #include "files/sha256.h"
 #include "image_files/image_file.h"
-#include "study/pose_file.h"
+#include "pose_files/pose_file.h"
 #include "study/rig_file.h"
 #include "study/study_file.h"
 #include "study/xray_reader.h"
@@ -82,10 +82,14 @@ ordered_json view_json(const StudyView& view,
   json["xray"] = view.xray.string();
   json["xray_domain"] = view.xray_domain == XrayDomain::Intensity ? "intensity" : "attenuation";
   json["roi_px"] = {view.roi.column, view.roi.row, view.roi.width, view.roi.height};
-  json["fiducials"] = view.fiducials_px.size();
+  // Those that the view shows.
+  json["fiducials"] = std::count_if(view.fiducials_px.begin(),
+                                    view.fiducials_px.end(),
+                                    [](const Eigen::Vector2d& point) { return point.allFinite(); });
   const CameraGeometry& camera = rig.camera(view.camera);
-  used_from(view.places, "xray", [&] { (void)read_xray_attenuation(view, camera); });
-  used_from(view.places, "mask", [&] { (void)read_mask(view, camera); });
+  ViewXray xray = read_view_xray(view, camera);
+  json["xray_reading"] = xray.note;
+  for (std::string& warning : xray.warnings) warnings.push_back(std::move(warning));
   if (!view.field) return json;
   json["field"] = view.field->string();
   // A study is written before its fields are made.
@@ -111,6 +115,12 @@ ordered_json case_json(const StudyCase& study_case,
   for (const StudyView& view : study_case.views)
     json["views"].push_back(view_json(view, rig, warnings));
   return json;
+}
+
+/// Formats that state a pose relative to the CT's voxels or to a camera.
+bool needs_context(const PoseFormat& format) {
+  return std::string_view(format.name) == "autoscoper" ||
+         std::string_view(format.name) == "diffdrr";
 }
 
 double median_of(std::vector<double> values) {
@@ -212,7 +222,21 @@ void inspect_study(const fs::path& path, Inspection& inspection) {
 
 void inspect_pose(const fs::path& path, Inspection& inspection) {
   inspection.kind = "pose";
-  const RigidTransform room_from_ct = read_pose(path);
+  const PoseFileBytes file = read_pose_bytes(path);
+  const PoseFormat& format = format_of_pose_file(file);
+  inspection.facts["format"] = format.name;
+  if (needs_context(format)) {
+    inspection.facts["next_step"] = std::string("is relative to a CT or camera: af-inspect ") +
+                                    "--pose-to toml --study STUDY, or --ct and --rig, resolves it";
+    return;
+  }
+  const PosesInFile found = format.read(file, {PoseFrame{}, {}, {}, {}});
+  inspection.warnings.insert(inspection.warnings.end(), found.notes.begin(), found.notes.end());
+  if (found.poses.size() != 1) {
+    inspection.facts["poses"] = found.poses.size();
+    return;
+  }
+  const RigidTransform& room_from_ct = found.poses.front().room_from_ct;
   const Eigen::Matrix4d& matrix = room_from_ct.matrix();
   for (Eigen::Index row = 0; row < 4; ++row)
     inspection.facts["room_from_ct"].push_back(vector_json(matrix.row(row).transpose()));
@@ -233,7 +257,7 @@ void inspect_csv(const fs::path& path, Inspection& inspection) {
       has_columns(table, {"m00", "m23"})) {
     inspection.kind = "poses";
     // The frame only gives the parameters a place; any frame is good enough to check them.
-    inspection.facts["poses"] = read_poses_csv(path, PoseFrame{}).size();
+    inspection.facts["poses"] = read_pose_file(path, {PoseFrame{}, {}, {}, {}}).poses.size();
     return;
   }
   throw InputError(path.string() +

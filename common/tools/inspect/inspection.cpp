@@ -12,6 +12,10 @@
 #include "files/input_file.h"
 #include "image_files/dicom_series.h"
 #include "image_files/image_header.h"
+#include "pose_files/autoscoper_pose.h"
+#include "pose_files/dicom_registration.h"
+#include "pose_files/itk_transform.h"
+#include "pose_files/pose_file.h"
 #include "run/progress_journal.h"
 #include "study/rig_file.h"
 #include "study/study_file.h"
@@ -29,8 +33,8 @@ constexpr std::string_view kHdf5Mark = "\x89HDF\r\n\x1a\n";
 constexpr const char* kWhatWasTried =
     "not recognised; tried: DICOM folder, result folder, unfinished work (NAME.progress), HDF5 "
     "field, NIfTI, MetaImage, NRRD, TIFF, PNG, DICOM file, TOML rig, study or pose, JSON result, "
-    "CSV table, ITK transform, pose of 16 numbers, name of a shipped rig, and cameras as MayaCam, "
-    "OpenCV YAML or 3x4 matrices";
+    "CSV table, pose (ITK, DICOM registration, DiffDRR, Autoscoper, 16 numbers), name of a shipped "
+    "rig, and cameras as MayaCam, OpenCV YAML or 3x4 matrices";
 
 std::string first_bytes(const fs::path& path, std::size_t count) {
   std::ifstream file = open_input_file(path);
@@ -58,6 +62,14 @@ bool has_line(std::string_view text, std::string_view start) {
   return false;
 }
 
+/// Poses are small; other HDF5 and DICOM files need not be.
+bool is_small_file(const fs::path& path) {
+  constexpr std::uintmax_t kMostBytes = 1u << 20;
+  std::error_code error;
+  const std::uintmax_t bytes = fs::file_size(path, error);
+  return !error && bytes > 0 && bytes <= kMostBytes;
+}
+
 bool is_sixteen_numbers(const std::string& text) {
   std::istringstream words(text);
   std::size_t count = 0;
@@ -74,7 +86,8 @@ void inspect_text(const fs::path& path, Inspection& inspection) {
   const std::size_t first = text.find_first_not_of(" \t\r\n");
   if (first != std::string::npos && text[first] == '{') return inspect_json(path, inspection);
   if (text.starts_with("#Insight Transform") || has_line(text, "room_from_ct") ||
-      is_sixteen_numbers(text))
+      has_line(text, "diffdrr_parameterization") || is_sixteen_numbers(text) ||
+      is_autoscoper({path, text}))
     return inspect_pose(path, inspection);
   if (path.extension() == ".csv") return inspect_csv(path, inspection);
   throw FileError(path.string(), kWhatWasTried);
@@ -90,8 +103,13 @@ void inspect_file(const fs::path& path,
                   const CtReadOptions& options,
                   const Communicator& communicator,
                   Inspection& inspection) {
-  if (first_bytes(path, kHdf5Mark.size()) == kHdf5Mark)
+  if (first_bytes(path, kHdf5Mark.size()) == kHdf5Mark) {
+    if (is_small_file(path) && holds_itk_hdf5_transform(read_pose_bytes(path)))
+      return inspect_pose(path, inspection);
     return inspect_field(path, communicator, inspection);
+  }
+  if (is_small_file(path) && holds_dicom_registration(read_pose_bytes(path)))
+    return inspect_pose(path, inspection);
   if (sniff_image_format(path)) return inspect_image(path, options, inspection);
   if (states_cameras(path)) return inspect_camera_file(path, inspection);
   inspect_text(path, inspection);
@@ -285,7 +303,8 @@ std::string input_lines(const fs::path& study_path) {
     for (const fs::path& file : rig_files(study.rig_name_or_path)) add(file);
     for (const StudyView& view : study_case.views) {
       add(view.xray);
-      if (view.mask.has_value()) add(*view.mask);
+      for (const auto& path : {view.mask, view.reading.flat, view.reading.dark})
+        if (path.has_value()) add(*path);
     }
   }
   return lines;

@@ -16,6 +16,7 @@
 #include "study/rig_file.h"
 #include "study/study_template.h"
 #include "tools/inspect/inspection.h"
+#include "tools/inspect/pose_conversion.h"
 
 namespace {
 
@@ -29,8 +30,9 @@ struct Options {
   bool lists_inputs = false;
   std::vector<std::filesystem::path> rig_from;
   std::string rig_to = "rig";
-  std::filesystem::path output;
   af::CameraFileOptions cameras;
+  af::PoseConversion poses;
+  std::filesystem::path output;
   af::CtReadOptions ct;
 
   void describe(af::Fields& field);
@@ -64,10 +66,12 @@ void Options::describe(af::Fields& field) {
         "With --rig-from: format to write the cameras in. " + af::help_of(af::camera_formats()))
       .choice(af::writable_camera_formats())
       .needs({"--rig-from"});
-  field("output", output, "With --rig-from: file to write instead of printing it")
-      .as("-o,--output")
-      .needs({"--rig-from"});
   field.part(cameras);
+  field.part(poses);
+  field("output",
+        output,
+        "With --rig-from: file to write instead of printing it; with --pose-to: the file to write")
+      .as("-o,--output");
   field.part(ct);
   field.last().help = "SeriesInstanceUID to read from a DICOM folder that holds several series";
 }
@@ -82,6 +86,17 @@ void print(const Options& options, const std::vector<af::Inspection>& inspection
   for (const af::Inspection& inspection : inspections) array.push_back(af::to_json(inspection));
   // File headers may hold text of any encoding.
   std::cout << array.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) << '\n';
+}
+
+/// The poses of a file in another format.
+void convert_poses(const Options& options, const Communicator& world) {
+  if (options.paths.size() != 1 || options.output.empty())
+    throw af::UsageError("--pose-to takes one PATH, and -o names the file to write");
+  std::vector<std::string> notes;
+  const std::string bytes =
+      af::converted_poses(options.paths.front(), options.poses, options.ct, notes);
+  for (const std::string& note : notes) af::warn(world, note);
+  af::write_text_file(options.output, bytes);
 }
 
 /// Cameras of other programs as a rig, or the other way round.
@@ -103,6 +118,12 @@ void convert_cameras(const Options& options, const Communicator& world) {
 
 void run(const Options& options, const Communicator& world) {
   af::throw_if_any(af::field_problems(options.cameras));
+  if (!options.output.empty() && options.rig_from.empty() && options.poses.format.empty())
+    throw af::UsageError("-o names what --rig-from or --pose-to writes: give one of them");
+  if (!options.poses.format.empty()) {
+    if (world.is_root()) convert_poses(options, world);
+    return;
+  }
   if (!options.rig_from.empty()) {
     if (world.is_root()) convert_cameras(options, world);
     return;

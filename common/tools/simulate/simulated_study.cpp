@@ -9,9 +9,9 @@
 #include "figures/picture.h"
 #include "files/output_file.h"
 #include "image_files/image_file.h"
+#include "pose_files/pose_file.h"
 #include "simulation/automatic_target.h"
 #include "simulation/phantom.h"
-#include "study/pose_file.h"
 #include "study/rig_file.h"
 #include "text/csv_table.h"
 

@@ -54,6 +54,20 @@ Parsed parsed(const std::string& line) {
   return result;
 }
 
+TEST(BindOptions, SizesTakeDecimals) {
+  const auto bytes = [](const std::string& size) {
+    return parsed("--ct a.mha -m '" + size + "'").options.memory_bytes;
+  };
+  EXPECT_EQ(bytes("3.5MB"), 3'500'000u);
+  EXPECT_EQ(bytes("1.1mb"), 1'100'000u);
+  EXPECT_EQ(bytes("0.5KiB"), 512u);
+  EXPECT_EQ(bytes("2.25 Gi"), 2'415'919'104u);
+  EXPECT_EQ(bytes("1.0004kB"), 1000u);
+  EXPECT_EQ(bytes("8MB"), 8'000'000u);
+  for (const char* size : {"0.4", "3.5XB", "3.5.1MB", "nan.MB", "-3.5MB", "99999.5EB"})
+    EXPECT_THROW(parsed(std::string("--ct a.mha -m=") + size), CLI::ParseError) << size;
+}
+
 TEST(BindOptions, ReadsEveryKindOfField) {
   const Options options =
       parsed(

@@ -97,4 +97,28 @@ void write_dicom_series(const CtVolume& ct,
   }
 }
 
+DicomTestFile xa_file(int columns, int rows, int frames, const std::vector<int>& levels) {
+  DicomTestFile file;
+  file.set_text({0x0008, 0x0016}, "UI", "1.2.840.10008.5.1.4.1.1.12.1");
+  file.set_text({0x0008, 0x0060}, "CS", "XA");
+  file.set_text({0x0018, 0x1164}, "DS", "0.4\\0.4");
+  file.set_u16({0x0028, 0x0002}, 1);
+  file.set_text({0x0028, 0x0004}, "CS", "MONOCHROME2");
+  if (frames > 1) file.set_text({0x0028, 0x0008}, "IS", std::to_string(frames));
+  file.set_u16({0x0028, 0x0010}, static_cast<std::uint16_t>(rows));
+  file.set_u16({0x0028, 0x0011}, static_cast<std::uint16_t>(columns));
+  file.set_u16({0x0028, 0x0100}, 16);
+  file.set_u16({0x0028, 0x0101}, 12);
+  file.set_u16({0x0028, 0x0102}, 11);
+  file.set_u16({0x0028, 0x0103}, 0);
+  file.set_text({0x0028, 0x1040}, "CS", "LIN");
+  file.set_text({0x0028, 0x1050}, "DS", "40");
+  file.set_text({0x0028, 0x1051}, "DS", "80");
+  std::vector<std::int16_t> pixels;
+  for (int frame = 0; frame < frames; ++frame)
+    for (const int level : levels) pixels.push_back(static_cast<std::int16_t>(level + frame));
+  file.set_pixels(pixels);
+  return file;
+}
+
 }  // namespace af::test

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "unit/image_files/dicom_test_file.h"
 #include "volume/ct_volume.h"
@@ -27,5 +28,9 @@ void write_dicom_series(const CtVolume& ct,
                         const SliceEdit& edit = {},
                         const std::string& series_uid = "1.2.826.0.1.3680043.2.1",
                         const std::string& name_prefix = "IM");
+
+/// An X-ray of 12 bits in 16, 0.4 mm pixels, LIN, with a window; frame f (from 0) holds `levels` +
+/// f.
+DicomTestFile xa_file(int columns, int rows, int frames, const std::vector<int>& levels);
 
 }  // namespace af::test

@@ -13,8 +13,8 @@
 #include "gold_standard/fiducial_registration.h"
 #include "image_files/ct_reader.h"
 #include "image_files/image_file.h"
+#include "pose_files/pose_file.h"
 #include "simulation/siddon_projector.h"
-#include "study/pose_file.h"
 #include "study/rig_file.h"
 #include "study/study_file.h"
 #include "study/xray_reader.h"
@@ -51,7 +51,7 @@ TEST_F(AfSimulate, MakesAStudyThatReadsBack) {
   ASSERT_EQ(patient.fiducials_ct_mm.size(), 4u);
   for (const StudyView& view : patient.views) {
     const CameraGeometry& camera = study.rig.camera(view.camera);
-    const Image2d attenuation = read_xray_attenuation(view, camera);
+    const Image2d attenuation = read_view_xray(view, camera).attenuation;
     EXPECT_EQ(attenuation.width, camera.size_px.x());
     EXPECT_GE(view.roi.column, 2);
     EXPECT_LE(view.roi.row + view.roi.height, camera.size_px.y() - 2);

@@ -265,6 +265,29 @@ TEST_F(StudyFile, FiducialsMustBeEnoughNotCollinearAndEquallyMany) {
               HasSubstr(":14: case[0].view[0].fiducials_px[3]"));
 }
 
+TEST_F(StudyFile, FiducialsMayBeHiddenInAView) {
+  const auto view_with = [&](const std::string& row) {
+    return read(replaced(kGoodStudy, "[5,6], [7.5,8.25]]", row + ", [7.5,8.25]]"));
+  };
+  for (const char* hidden : {"[]", "[nan,nan]", "[nan, +nan]"}) {
+    const Study study = view_with(hidden);
+    const StudyView& view = study.find_case("").views[0];
+    ASSERT_EQ(view.fiducials_px.size(), 4U) << hidden;
+    EXPECT_FALSE(view.fiducials_px[2].allFinite()) << hidden;
+    EXPECT_EQ(view.fiducials_px[3], Vector2d(7.5, 8.25));
+    // Written and read again.
+    const StudyView again = read(study_to_toml(study, folder().path())).find_case("").views[0];
+    EXPECT_FALSE(again.fiducials_px[2].allFinite()) << hidden;
+    EXPECT_EQ(again.fiducials_px[3], view.fiducials_px[3]);
+  }
+  // Half a point is none, and the CT's fiducials have all to be there.
+  for (const char* bad : {"[nan,5]", "[5]", "[nan]", "[inf,inf]", "\"\"", "[[]]"})
+    EXPECT_THAT(refusal("[5,6], [7.5,8.25]]", std::string(bad) + ", [7.5,8.25]]"),
+                HasSubstr("or [] for one that is absent"))
+        << bad;
+  EXPECT_THAT(refusal("[0,50,0], [0,0,50]]", "[], [0,0,50]]"), HasSubstr("fiducials_ct_mm"));
+}
+
 TEST_F(StudyFile, CaseWithNeitherFiducialsNorGoldPoseIsAccepted) {
   std::string text =
       replaced(kGoodStudy, "fiducials_ct_mm = [[0,0,0], [50,0,0], [0,50,0], [0,0,50]]\n", "");
@@ -362,6 +385,50 @@ TEST_F(StudyFile, DamagedFilesAreReadOrRefused) {
   const std::size_t refused = test::refused_damaged_copies(
       kGoodStudy, 7, 1000, [&](const std::string& text) { read(text); });
   EXPECT_GT(refused, 300U);
+}
+
+TEST_F(StudyFile, KeepsHowAnXrayIsRead) {
+  const char* const keys =
+      "xray_domain = \"intensity\"\nxray_frame = 3\nxray_polarity = \"inverted\"\nmask = "
+      "\"auto\"\ndark_level = 8500.0\nair_level = 51000\nxray_spacing = \"ignore\"";
+  Study study = read(replaced(kGoodStudy, "xray_domain = \"intensity\"", keys));
+  for (const bool again : {false, true}) {
+    if (again) study = read(study_to_toml(study, folder().path()));
+    const StudyView& view = study.cases[0].views[0];
+    EXPECT_EQ(view.reading.frame, 3);
+    EXPECT_EQ(view.reading.polarity, XrayPolarity::Inverted);
+    EXPECT_TRUE(view.reading.masks_borders);
+    EXPECT_FALSE(view.mask);
+    EXPECT_EQ(view.reading.dark_level, 8500.0);
+    EXPECT_EQ(view.reading.air, AirSource::Value);
+    EXPECT_EQ(view.reading.air_level, 51000.0);
+    EXPECT_TRUE(view.reading.ignores_spacing);
+    EXPECT_FALSE(study.cases[0].views[1].reading.masks_borders);
+  }
+  study = read(replaced(kGoodStudy,
+                        "xray_domain = \"intensity\"",
+                        "xray_domain = \"intensity\"\nflat = \"f.mha\"\ndark = \"d.mha\""));
+  study = read(study_to_toml(study, folder().path()));
+  EXPECT_EQ(study.cases[0].views[0].reading.flat, folder() / "f.mha");
+  EXPECT_EQ(study.cases[0].views[0].reading.dark, folder() / "d.mha");
+}
+
+TEST_F(StudyFile, RefusesContradictionsInHowAnXrayIsRead) {
+  const auto refused = [&](const std::string& keys) {
+    return refusal("xray_domain = \"intensity\"", "xray_domain = \"intensity\"\n" + keys);
+  };
+  EXPECT_THAT(refused("xray_frame = 0"), HasSubstr("xray_frame = 0: must be at least 1"));
+  EXPECT_THAT(refused("xray_frame = 1.5"), HasSubstr("must be a whole number"));
+  EXPECT_THAT(refused("air_level = -1.0"), HasSubstr("must be positive"));
+  EXPECT_THAT(refused("air_level = \"sky\""), HasSubstr("percentile, open-beam"));
+  EXPECT_THAT(refused("air_level = 3.0\nflat = \"f.mha\""), HasSubstr("beside `flat`"));
+  EXPECT_THAT(refused("dark_level = 3.0\ndark = \"d.mha\""), HasSubstr("beside `dark`"));
+  EXPECT_THAT(refused("dark_level = nan"), HasSubstr("must be a finite number"));
+  EXPECT_THAT(refused("xray_polarity = \"upside down\""), HasSubstr("\"as-stored\""));
+  EXPECT_THAT(refused("xray_spacing = \"no\""), HasSubstr("\"check\" or \"ignore\""));
+  EXPECT_THAT(
+      refusal("xray_domain = \"attenuation\"", "xray_domain = \"attenuation\"\nair_level = 3.0"),
+      HasSubstr("is for xray_domain = \"intensity\" only"));
 }
 
 }  // namespace

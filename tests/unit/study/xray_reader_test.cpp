@@ -2,6 +2,7 @@
 #include "study/xray_reader.h"
 
 #include <cmath>
+#include <functional>
 #include <limits>
 
 #include <gmock/gmock.h>
@@ -9,12 +10,15 @@
 
 #include "base/error.h"
 #include "image_files/image_file.h"
+#include "support/io_checks.h"
 #include "support/test_paths.h"
+#include "unit/image_files/ct_test_data.h"
 
 namespace af {
 namespace {
 
 using test::ScratchFolder;
+using testing::AllOf;
 using testing::HasSubstr;
 
 /// Single-precision rounding of a logarithm of at most 10.
@@ -24,6 +28,7 @@ CameraGeometry camera(int columns, int rows) {
   CameraGeometry geometry;
   geometry.name = "A";
   geometry.size_px = {columns, rows};
+  geometry.pixel_spacing_mm = {0.4, 0.4};
   return geometry;
 }
 
@@ -50,7 +55,7 @@ StudyView view_of(const ScratchFolder& folder,
 
 TEST(XrayReader, TakesTheNegativeLogarithmRelativeToTheOpenBeam) {
   const ScratchFolder folder;
-  const Image2d found = read_xray_attenuation(view_of(folder, intensities()), camera(40, 50));
+  const Image2d found = read_view_xray(view_of(folder, intensities()), camera(40, 50)).attenuation;
   EXPECT_NEAR(found.at(0, 0), std::log(4.0f), kLogRounding);
   EXPECT_NEAR(found.at(1, 0), std::log(4000.0f), kLogRounding);
   EXPECT_NEAR(found.at(2, 0), std::log(8000.0f), kLogRounding) << "zero is half a level";
@@ -61,7 +66,7 @@ TEST(XrayReader, TakesThe999thPermilleAsOpenBeamSoThatSinglePixelsDoNotDecide) {
   const ScratchFolder folder;
   Image2d image = intensities();
   image.at(5, 5) = 65535.0f;  // one of 2000 pixels
-  const Image2d found = read_xray_attenuation(view_of(folder, image), camera(40, 50));
+  const Image2d found = read_view_xray(view_of(folder, image), camera(40, 50)).attenuation;
   EXPECT_EQ(found.at(3, 0), 0.0f);
   EXPECT_LT(found.at(5, 5), 0.0f);
 }
@@ -71,17 +76,24 @@ TEST(XrayReader, LeavesAttenuationAsItIs) {
   Image2d image(2, 2);
   image.pixels = {0.0f, 1.5f, -0.25f, 7.0f};
   const auto view = view_of(folder, image, XrayDomain::Attenuation);
-  EXPECT_EQ(read_xray_attenuation(view, camera(2, 2)).pixels, image.pixels);
+  EXPECT_EQ(read_view_xray(view, camera(2, 2)).attenuation.pixels, image.pixels);
 }
 
 void expect_refused(const StudyView& view, const CameraGeometry& geometry, const char* message) {
   try {
-    (void)read_xray_attenuation(view, geometry);
+    (void)read_view_xray(view, geometry);
     FAIL() << "accepted; expected: " << message;
   } catch (const InputError& error) {
     EXPECT_THAT(error.what(), HasSubstr(message));
     EXPECT_THAT(error.what(), HasSubstr("xray.mha"));
   }
+}
+
+void expect_refused_with(const StudyView& view,
+                         const char* message,
+                         const CameraGeometry& geometry = camera(40, 50)) {
+  EXPECT_THAT(test::message_of<InputError>([&] { (void)read_view_xray(view, geometry); }),
+              HasSubstr(message));
 }
 
 TEST(XrayReader, RefusesAnotherSizeAConstantImageAndImpossibleValues) {
@@ -102,21 +114,250 @@ TEST(XrayReader, RefusesAnotherSizeAConstantImageAndImpossibleValues) {
 TEST(XrayReader, RefusesAMissingFileAsAFileError) {
   StudyView view;
   view.xray = "/nonexistent/xray.mha";
-  EXPECT_THROW((void)read_xray_attenuation(view, camera(2, 2)), FileError);
+  EXPECT_THROW((void)read_view_xray(view, camera(2, 2)), FileError);
 }
 
 TEST(MaskReader, IsEmptyWithoutAMaskAndRefusesOneThatHidesEverything) {
   const ScratchFolder folder;
   StudyView view = view_of(folder, intensities());
-  EXPECT_TRUE(read_mask(view, camera(40, 50)).pixels.empty());
+  EXPECT_TRUE(read_view_xray(view, camera(40, 50)).mask.pixels.empty());
   Image2d mask(40, 50);
   write_png_image(mask, folder / "mask.png", 0, 1);
   view.mask = folder / "mask.png";
-  EXPECT_THROW((void)read_mask(view, camera(40, 50)), InputError);
+  EXPECT_THROW((void)read_view_xray(view, camera(40, 50)), InputError);
   mask.at(3, 4) = 1.0f;
   write_png_image(mask, folder / "mask.png", 0, 1);
-  EXPECT_NE(read_mask(view, camera(40, 50)).at(3, 4), 0.0f);
-  EXPECT_THROW((void)read_mask(view, camera(40, 51)), InputError);
+  EXPECT_NE(read_view_xray(view, camera(40, 50)).mask.at(3, 4), 0.0f);
+  EXPECT_THROW((void)read_view_xray(view, camera(40, 51)), InputError);
+}
+
+const std::vector<int> kLevels = {4000, 2000, 1000, 500, 4000, 4000};
+
+class DicomXrayView : public testing::Test {
+ protected:
+  /// The view's X-ray from `file`, which `edit` has changed.
+  ViewXray read(const std::function<void(test::DicomTestFile&)>& edit = {},
+                const std::function<void(StudyView&)>& edit_view = {},
+                int frames = 1) {
+    test::DicomTestFile file = test::xa_file(3, 2, frames, kLevels);
+    if (edit) edit(file);
+    file.write(folder_ / "xray.dcm");
+    StudyView view;
+    view.camera = "A";
+    view.xray = folder_ / "xray.dcm";
+    view.reading.air = AirSource::Value;
+    view.reading.air_level = 4000.0;
+    if (edit_view) edit_view(view);
+    return read_view_xray(view, camera(3, 2));
+  }
+  std::string refusal(const std::function<void(test::DicomTestFile&)>& edit,
+                      const std::function<void(StudyView&)>& edit_view = {},
+                      int frames = 1) {
+    return test::message_of<InputError>([&] { (void)read(edit, edit_view, frames); });
+  }
+  static void expect_lines_of_levels(const ViewXray& xray, int added = 0) {
+    for (std::size_t i = 0; i < kLevels.size(); ++i)
+      EXPECT_NEAR(xray.attenuation.pixels[i],
+                  -std::log((kLevels[i] + added) / 4000.0),
+                  static_cast<double>(kLogRounding))
+          << i << " " << xray.note;
+  }
+
+ private:
+  ScratchFolder folder_;
+};
+
+constexpr test::DicomTestFile::Tag kPhotometricTag = {0x0028, 0x0004};
+constexpr test::DicomTestFile::Tag kSignTag = {0x0028, 0x1041};
+
+TEST_F(DicomXrayView, GivesTheLineIntegralsOfItsStoredBitsAndIgnoresItsWindow) {
+  const ViewXray xray = read();
+  expect_lines_of_levels(xray);
+  EXPECT_THAT(xray.note, HasSubstr("DICOM XA, 12 bits, MONOCHROME2"));
+  EXPECT_THAT(xray.note, HasSubstr("PixelIntensityRelationship LIN"));
+  EXPECT_THAT(xray.note, HasSubstr("window 40/80 ignored"));
+  EXPECT_THAT(xray.note, HasSubstr("air level 4000 (stated)"));
+}
+
+TEST_F(DicomXrayView, ReadsTheFrameThatIsAskedForAndNoOther) {
+  const auto frame = [](int number) {
+    return [number](StudyView& view) { view.reading.frame = number; };
+  };
+  expect_lines_of_levels(read({}, frame(3), 3), 2);
+  expect_lines_of_levels(read({}, frame(1), 3), 0);
+  EXPECT_THAT(read({}, frame(2), 3).note, HasSubstr("frame 2 of 3"));
+  EXPECT_THAT(refusal({}, {}, 3), HasSubstr("NumberOfFrames = 3: say which frame"));
+  EXPECT_THAT(refusal({}, frame(4), 3), HasSubstr("frame = 4: must be 1 to 3"));
+}
+
+TEST_F(DicomXrayView, Monochrome1IsTurnedRoundByItsStoredBits) {
+  const ViewXray xray = read([](test::DicomTestFile& file) {
+    file.set_text(kPhotometricTag, "CS", "MONOCHROME1");
+    std::vector<std::int16_t> pixels;
+    for (const int level : kLevels) pixels.push_back(static_cast<std::int16_t>(4095 - level));
+    file.set_pixels(pixels);
+  });
+  expect_lines_of_levels(xray);
+  EXPECT_THAT(xray.note, HasSubstr("values turned round: 4095 - stored"));
+}
+
+TEST_F(DicomXrayView, TheSignOfTheRelationshipDecidesOverThePhotometricInterpretation) {
+  // Shown with bone white, stored in proportion to intensity.
+  expect_lines_of_levels(read([](test::DicomTestFile& file) {
+    file.set_text(kPhotometricTag, "CS", "MONOCHROME1");
+    file.set_text(kSignTag, "SS", std::string("\1\0", 2));
+  }));
+  // Values that fall with intensity, though MONOCHROME2.
+  expect_lines_of_levels(read([](test::DicomTestFile& file) {
+    file.set_text(kSignTag, "SS", std::string("\xff\xff", 2));
+    std::vector<std::int16_t> pixels;
+    for (const int level : kLevels) pixels.push_back(static_cast<std::int16_t>(4095 - level));
+    file.set_pixels(pixels);
+  }));
+  EXPECT_THAT(refusal([](test::DicomTestFile& file) {
+                file.set_text(kSignTag, "SS", std::string("\2\0", 2));
+              }),
+              HasSubstr("PixelIntensityRelationshipSign = '2': must be 1 or -1"));
+}
+
+TEST_F(DicomXrayView, TheStudyMayOverruleTheHeader) {
+  const ViewXray xray =
+      read([](test::DicomTestFile& file) { file.set_text(kPhotometricTag, "CS", "MONOCHROME1"); },
+           [](StudyView& view) { view.reading.polarity = XrayPolarity::AsStored; });
+  expect_lines_of_levels(xray);
+}
+
+TEST_F(DicomXrayView, RescalesBeforeItTakesTheLogarithm) {
+  const ViewXray xray = read([](test::DicomTestFile& file) {
+    file.set_text({0x0028, 0x1052}, "DS", "-100");
+    file.set_text({0x0028, 0x1053}, "DS", "2");
+  });
+  for (std::size_t i = 0; i < kLevels.size(); ++i)
+    EXPECT_NEAR(xray.attenuation.pixels[i],
+                -std::log((2.0 * kLevels[i] - 100.0) / 4000.0),
+                static_cast<double>(kLogRounding));
+  EXPECT_THAT(xray.note, HasSubstr("rescaled"));
+}
+
+TEST_F(DicomXrayView, LogarithmsAreNoIntensitiesAndDisplayValuesAreWarnedOf) {
+  const auto relationship = [](const char* text) {
+    return [text](test::DicomTestFile& file) { file.set_text({0x0028, 0x1040}, "CS", text); };
+  };
+  const auto attenuation = [](StudyView& view) {
+    view.xray_domain = XrayDomain::Attenuation;
+    view.reading.air = AirSource::NotAsked;
+  };
+  EXPECT_THAT(refusal(relationship("LOG")), HasSubstr("xray_domain = \"attenuation\""));
+  const ViewXray xray = read(relationship("LOG"), attenuation);
+  EXPECT_EQ(xray.attenuation.pixels[3], 500.0f);
+  EXPECT_THAT(xray.warnings, testing::Contains(HasSubstr("unknown scale")));
+  EXPECT_THAT(read(relationship("DISP")).warnings, testing::Contains(HasSubstr("for display")));
+  EXPECT_THAT(read({}, attenuation).warnings, testing::Contains(HasSubstr("takes no logarithm")));
+}
+
+TEST_F(DicomXrayView, ItsPixelSpacingIsTheCamerasOrTheErrorNamesBoth) {
+  const auto spacing = [](test::DicomTestFile& file) {
+    file.set_text({0x0018, 0x1164}, "DS", "0.3\\0.4");  // rows, then columns
+  };
+  EXPECT_THAT(refusal(spacing),
+              AllOf(HasSubstr("ImagerPixelSpacing = 0.4 x 0.3 mm"),
+                    HasSubstr("camera 'A': 0.4 x 0.4 mm"),
+                    HasSubstr("xray.dcm")));
+  expect_lines_of_levels(
+      read(spacing, [](StudyView& view) { view.reading.ignores_spacing = true; }));
+  const ViewXray calibrated = read([](test::DicomTestFile& file) {
+    file.erase({0x0018, 0x1164});
+    file.set_text({0x0028, 0x0030}, "DS", "0.3\\0.3");
+  });
+  EXPECT_THAT(calibrated.warnings, testing::Contains(HasSubstr("PixelSpacing = 0.3 x 0.3 mm")));
+}
+
+TEST(XrayReader, ComparesTheSpacingOfOtherFormatsUnlessNobodyHasSetIt) {
+  const ScratchFolder folder;
+  StudyView view = view_of(folder, intensities());
+  CameraGeometry geometry = camera(40, 50);
+  geometry.pixel_spacing_mm = {0.41, 0.4};
+  expect_refused(view, geometry, "pixel spacing = 0.4 x 0.4 mm");
+  geometry.pixel_spacing_mm = {0.4035, 0.4};  // within 1 %
+  EXPECT_NO_THROW((void)read_view_xray(view, geometry));
+  write_image(intensities(), view.xray, 1.0, 1.0);
+  EXPECT_NO_THROW((void)read_view_xray(view, geometry));
+  view.reading.frame = 1;
+  expect_refused(view, geometry, "xray_frame = 1");
+}
+
+TEST(XrayReader, FlatAndDarkImagesGiveTheLineIntegralsOfAnUnevenBeam) {
+  const ScratchFolder folder;
+  Image2d beam(40, 50);
+  Image2d xray(40, 50);
+  Image2d dark(40, 50);
+  for (int row = 0; row < 50; ++row)
+    for (int column = 0; column < 40; ++column) {
+      dark.at(column, row) = static_cast<float>(100 + row % 3);
+      beam.at(column, row) = dark.at(column, row) + 1024.0f + 32.0f * static_cast<float>(column);
+      const float share = column < 20 ? 0.25f : 1.0f;
+      xray.at(column, row) =
+          dark.at(column, row) + share * (beam.at(column, row) - dark.at(column, row));
+    }
+  beam.at(7, 7) = dark.at(7, 7);
+  StudyView view = view_of(folder, xray);
+  write_image(beam, folder / "flat.mha", 0.4, 0.4);
+  write_image(dark, folder / "dark.mha", 0.4, 0.4);
+  view.reading.flat = folder / "flat.mha";
+  view.reading.dark = folder / "dark.mha";
+  const ViewXray found = read_view_xray(view, camera(40, 50));
+  EXPECT_NEAR(found.attenuation.at(3, 3), std::log(4.0f), kLogRounding);
+  EXPECT_NEAR(found.attenuation.at(30, 40), 0.0f, kLogRounding);
+  EXPECT_EQ(found.mask.at(7, 7), 0.0f) << "a pixel without a beam";
+  EXPECT_NE(found.mask.at(8, 7), 0.0f);
+  EXPECT_THAT(found.note, HasSubstr("flat field (1 dead pixels masked)"));
+  write_image(dark, folder / "flat.mha", 0.4, 0.4);
+  expect_refused_with(view, "flat.mha: flat");
+  write_image(Image2d(3, 3), folder / "flat.mha", 0.4, 0.4);
+  expect_refused_with(view, "flat.mha: size = 3 x 3 px");
+}
+
+TEST(XrayReader, FindsTheOpenBeamAndMasksTheApertureWhenAskedTo) {
+  const ScratchFolder folder;
+  Image2d image(120, 100);
+  for (int row = 0; row < 100; ++row)
+    for (int column = 0; column < 120; ++column)
+      image.at(column, row) = std::hypot(column - 60, row - 50) > 45   ? 3.0f
+                              : std::hypot(column - 60, row - 50) < 20 ? 500.0f
+                                                                       : 3000.0f;
+  StudyView view = view_of(folder, image);
+  view.roi = {40, 30, 40, 40};
+  ViewXray found = read_view_xray(view, camera(120, 100));
+  EXPECT_TRUE(found.mask.pixels.empty());
+  EXPECT_THAT(found.note, HasSubstr("99.9th percentile, the default"));
+  EXPECT_THAT(found.warnings, testing::Contains(HasSubstr("mask = \"auto\"")));
+  view.reading.masks_borders = true;
+  view.reading.air = AirSource::OpenBeam;
+  found = read_view_xray(view, camera(120, 100));
+  EXPECT_TRUE(found.warnings.empty());
+  EXPECT_EQ(found.mask.at(60, 1), 0.0f);
+  EXPECT_NE(found.mask.at(60, 50), 0.0f);
+  EXPECT_NEAR(found.attenuation.at(60, 50), std::log(6.0f), kLogRounding);
+  EXPECT_THAT(found.note, HasSubstr("air level 3000 (open beam"));
+  EXPECT_THAT(found.note, HasSubstr("a round edge about pixel (60, 50)"));
+  view.roi = {0, 0, 20, 20};
+  expect_refused_with(view, "of roi_px, which cannot be border", camera(120, 100));
+}
+
+TEST(XrayReader, InvertedGreysAreToldAndTurnedRoundOnRequest) {
+  const ScratchFolder folder;
+  Image2d image(60, 60);
+  for (int row = 0; row < 60; ++row)
+    for (int column = 0; column < 60; ++column)
+      image.at(column, row) = std::hypot(column - 30, row - 30) < 20 ? 155.0f : 5.0f;
+  StudyView view = view_of(folder, image);
+  EXPECT_THAT(read_view_xray(view, camera(60, 60)).warnings,
+              testing::ElementsAre(HasSubstr("xray_polarity = \"inverted\"")));
+  view.reading.polarity = XrayPolarity::Inverted;
+  const ViewXray found = read_view_xray(view, camera(60, 60));
+  EXPECT_TRUE(found.warnings.empty());
+  EXPECT_THAT(found.note, HasSubstr("values turned round: 255 - stored"));
+  EXPECT_NEAR(found.attenuation.at(30, 30), std::log(2.5f), kLogRounding);
 }
 
 }  // namespace

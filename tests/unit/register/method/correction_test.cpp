@@ -231,8 +231,23 @@ TEST(Correction, LeavesAnEndWhoseCorrectedPoseNoFieldHolds) {
   const RegistrationResult result = RegistrationRunner(small.problem, options).run(start);
   EXPECT_LT((result.room_from_ct.translation() - start.translation()).norm(), 1e-3);
   EXPECT_GE(result.correction->casts, 1);
-  EXPECT_EQ(result.correction->moved_mm, 0.0);
+  // Not 0 mm, which would read as an end that ray casting confirmed.
+  EXPECT_TRUE(std::isnan(result.correction->moved_mm));
+  EXPECT_TRUE(std::isnan(result.correction->last_mm));
   EXPECT_FALSE(result.correction->stood_still);
+}
+
+TEST(Correction, HasNoDistanceWhenNoEvaluationIsLeft) {
+  const test::SmallCase small = spoilt_case();
+  RegistrationOptions options = one_stage("ncc", "gauss-newton");
+  options.max_evaluations =
+      RegistrationRunner(small.problem, options).run(start_near_gold(small)).evaluations;
+  const RegistrationResult spent =
+      RegistrationRunner(small.problem, corrected(options)).run(start_near_gold(small));
+  EXPECT_NE(spent.stop_reason, StopReason::EvaluationBudgetSpent);
+  EXPECT_EQ(spent.correction->casts, 0);
+  EXPECT_TRUE(std::isnan(spent.correction->moved_mm));
+  EXPECT_FALSE(spent.correction->stood_still);
 }
 
 TEST(Correction, StaysInsideTheMotionRange) {

@@ -11,7 +11,7 @@
 #include "image_files/image_file.h"
 #include "image_files/image_header.h"
 #include "image_files/itk_image_io.h"
-#include "study/pose_file.h"
+#include "pose_files/pose_file.h"
 #include "support/test_paths.h"
 #include "unit/register/method/registration_cases.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "study/pose_file.h"
+#include "pose_files/pose_file.h"
 
 #include <sstream>
 
@@ -42,7 +42,7 @@ class PoseFile : public testing::Test {
   }
   std::vector<RigidTransform> read_csv(const std::string& text, const PoseFrame& frame = {}) {
     test::write_input(folder_ / "p.csv", text);
-    return read_poses_csv(folder_ / "p.csv", frame);
+    return read_poses(folder_ / "p.csv", {frame, {}, {}, {}});
   }
   [[nodiscard]] std::string path(const std::string& name) const { return folder_ / name; }
 

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include <Eigen/Core>
+
+#include "image/image2d.h"
+
+namespace af {
+
+/// DICOM's PixelIntensityRelationship: values proportional to intensity, to its logarithm, or made
+/// for display.
+enum class PixelIntensity { NotStated, Linear, Logarithmic, Display, Other };
+
+/// One frame of a DICOM X-ray (XA, RF, CR, DX, ...) and what the file says of its values.
+struct DicomXray {
+  Image2d image;         ///< rescaled; neither inverted nor windowed; row 0 on top
+  std::string modality;  ///< empty when the file does not state it
+  int frame = 1;
+  int frames = 1;
+  int stored_bits = 16;
+  bool is_monochrome1 = false;  ///< shown with low values white
+  bool is_rescaled = false;     ///< by a slope and intercept other than 1 and 0
+  PixelIntensity relationship = PixelIntensity::NotStated;
+  std::string relationship_text;  ///< as the file has it
+  /// PixelIntensityRelationshipSign: 1 = higher values mean more intensity, -1 = less.
+  std::optional<int> sign;
+  std::string window;  ///< "centre/width" as the file has it; empty: none
+  bool has_modality_lut = false;
+  /// Sum of the lowest and highest value that a pixel can hold: what a value is subtracted from to
+  /// turn white into black.
+  double inversion_sum = 0.0;
+  /// Column, row; of the detector's plane (ImagerPixelSpacing).
+  std::optional<Eigen::Vector2d> imager_spacing_mm;
+  /// Column, row; PixelSpacing, which may be that of a plane in the patient.
+  std::optional<Eigen::Vector2d> pixel_spacing_mm;
+};
+
+/// Reads frame `frame` (from 1) of a DICOM image file; without it there must be one frame only.
+/// Errors as read_image(); InputError also for a PixelIntensityRelationshipSign that is not 1 or -1
+/// and a pixel spacing that is not positive.
+DicomXray read_dicom_xray(const std::filesystem::path& path, std::optional<int> frame);
+
+}  // namespace af

@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pose_files/pose_file.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <sstream>
+
+#include "base/error.h"
+#include "base/named_rows.h"
+#include "files/output_file.h"
+#include "pose_files/autoscoper_pose.h"
+#include "pose_files/dicom_registration.h"
+#include "pose_files/diffdrr_pose.h"
+#include "pose_files/itk_transform.h"
+#include "pose_files/project_poses.h"
+
+namespace af {
+namespace {
+
+constexpr std::array kPoseFormats = {
+    PoseFormat{"itk-hdf5",
+               "ITK transform in HDF5 (xReg): ct_from_room, LPS, mm",
+               is_hdf5,
+               read_itk_hdf5,
+               write_itk_hdf5},
+    PoseFormat{"dicom",
+               "DICOM spatial registration: room_from_ct, LPS, mm",
+               is_dicom_registration,
+               read_dicom_registration,
+               write_dicom_registration},
+    PoseFormat{"itk",
+               "ITK transform as text (.tfm, Slicer, elastix): ct_from_room, LPS, mm",
+               is_itk_text,
+               read_itk_text,
+               write_itk_text},
+    PoseFormat{"json", "result.json: room_from_ct", is_json_pose, read_json_pose, nullptr},
+    PoseFormat{"diffdrr",
+               "DiffDRR's rotation and translation of one camera, RAS about the CT's middle",
+               is_diffdrr,
+               read_diffdrr,
+               write_diffdrr},
+    PoseFormat{"toml", "TOML: room_from_ct, 4x4", is_toml_pose, read_toml_pose, write_toml_pose},
+    PoseFormat{"csv",
+               "table of poses: m00 ... m23 of room_from_ct, or rx_deg ... tz_mm from nominal",
+               is_csv_of_poses,
+               read_csv_of_poses,
+               write_csv_of_poses},
+    PoseFormat{"autoscoper",
+               "Autoscoper .tra: a line of 16 numbers per frame, room from the CT's voxel frame",
+               is_autoscoper,
+               read_autoscoper,
+               write_autoscoper},
+    PoseFormat{"matrix",
+               "plain text: the 16 numbers of room_from_ct, row by row",
+               is_plain_pose,
+               read_plain_pose,
+               write_plain_pose},
+};
+
+}  // namespace
+
+RigidTransform rigid_or_throw(const Eigen::Matrix4d& matrix, const std::string& where) {
+  throw_if_any(rigidity_problems(matrix), where);
+  return rigid_from_matrix(matrix);
+}
+
+std::vector<double> numbers_of(std::string_view text, const std::string& where) {
+  constexpr std::string_view kSeparators = " \t\r\n,;[]()";
+  std::vector<double> numbers;
+  for (std::size_t start = 0;;) {
+    start = text.find_first_not_of(kSeparators, start);
+    if (start == std::string_view::npos) return numbers;
+    const std::size_t stop = std::min(text.find_first_of(kSeparators, start), text.size());
+    std::string_view word = text.substr(start, stop - start);
+    start = stop;
+    if (word.starts_with('+') && !word.starts_with("+-")) word.remove_prefix(1);
+    double value = 0.0;
+    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+    if (error != std::errc() || end != word.data() + word.size() || !std::isfinite(value))
+      throw FileError(where, "pose", "finite numbers", "'" + std::string(word.substr(0, 40)) + "'");
+    numbers.push_back(value);
+  }
+}
+
+std::vector<std::string> lines_of(const std::string& text) {
+  std::vector<std::string> lines;
+  std::istringstream stream(text);
+  for (std::string line; std::getline(stream, line);) {
+    if (!line.empty() && line.back() == '\r') line.pop_back();
+    if (line.find_first_not_of(" \t") != std::string::npos) lines.push_back(line);
+  }
+  return lines;
+}
+
+const RigidTransform& only_pose(std::span<const RigidTransform> poses, const char* format) {
+  if (poses.size() != 1)
+    throw InputError("number of poses",
+                     std::to_string(poses.size()),
+                     std::string("must be 1 for the format ") + format);
+  return poses.front();
+}
+
+std::span<const PoseFormat> pose_formats() {
+  return kPoseFormats;
+}
+
+std::vector<std::string> written_pose_formats() {
+  std::vector<std::string> names;
+  for (const PoseFormat& format : kPoseFormats)
+    if (format.write != nullptr) names.emplace_back(format.name);
+  return names;
+}
+
+const PoseFormat& format_of_pose_file(const PoseFileBytes& file) {
+  for (const PoseFormat& format : kPoseFormats)
+    if (format.is_it(file)) return format;
+  throw FileError(file.path.string(),
+                  "holds no pose of a known format (" + joined(names_of(kPoseFormats)) + ")");
+}
+
+PoseFileBytes read_pose_bytes(const std::filesystem::path& path) {
+  constexpr std::size_t kMaxPoseFileBytes = std::size_t{64} << 20;
+  PoseFileBytes file{path, read_text_file(path, kMaxPoseFileBytes)};
+  if (file.bytes.find_first_not_of(" \t\r\n") == std::string::npos)
+    throw FileError(path.string(), "is empty; a pose was expected");
+  return file;
+}
+
+PosesInFile read_pose_file(const std::filesystem::path& path, const PoseContext& context) {
+  const PoseFileBytes file = read_pose_bytes(path);
+  return format_of_pose_file(file).read(file, context);
+}
+
+std::vector<RigidTransform> read_poses(const std::filesystem::path& path,
+                                       const PoseContext& context) {
+  std::vector<RigidTransform> poses;
+  for (const PosesInFile::Named& pose : read_pose_file(path, context).poses)
+    poses.push_back(pose.room_from_ct);
+  if (poses.empty()) throw InputError(path.string() + ": holds no pose");
+  return poses;
+}
+
+RigidTransform read_pose(const std::filesystem::path& path, const PoseContext& context) {
+  const std::vector<RigidTransform> poses = read_poses(path, context);
+  if (poses.size() > 1)
+    throw InputError(path.string() + ": holds " + std::to_string(poses.size()) +
+                     " poses; one is expected");
+  return poses.front();
+}
+
+std::string pose_file_bytes(const std::string& format,
+                            std::span<const RigidTransform> room_from_ct,
+                            const PoseContext& context) {
+  const PoseFormat& row = required_row(kPoseFormats, "format of poses", format);
+  if (row.write == nullptr)
+    throw InputError(
+        "format of poses", format, "is only read; written are " + joined(written_pose_formats()));
+  return row.write(room_from_ct, context);
+}
+
+std::string pose_to_itk_transform(const RigidTransform& room_from_ct) {
+  return write_itk_text({&room_from_ct, 1}, {});
+}
+
+}  // namespace af

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+// Poses of a CT in the room, in and out, in the formats of this and other programs. docs/poses.md
+// states every format's frames.
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <nlohmann/json_fwd.hpp>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "geometry/rigid_transform.h"
+#include "pose_files/pose_format.h"
+
+namespace af {
+
+/// Every format, in the order in which a file is tried: they are told apart by content.
+std::span<const PoseFormat> pose_formats();
+/// Names of those that are written, too.
+std::vector<std::string> written_pose_formats();
+
+/// The format of a file that holds poses, by its content.
+const PoseFormat& format_of_pose_file(const PoseFileBytes& file);
+
+/// A pose file in memory; FileError when it is unreadable, empty or larger than 64 MiB.
+PoseFileBytes read_pose_bytes(const std::filesystem::path& path);
+
+/// All poses of a file, of any format. InputError when one is not rigid or `context` lacks what
+/// the format needs, FileError when it is damaged.
+PosesInFile read_pose_file(const std::filesystem::path& path, const PoseContext& context = {});
+
+/// The poses of a file, at least one.
+std::vector<RigidTransform> read_poses(const std::filesystem::path& path,
+                                       const PoseContext& context);
+
+/// The one pose of a file; InputError when it holds several.
+RigidTransform read_pose(const std::filesystem::path& path, const PoseContext& context = {});
+
+/// The bytes of a file of the named format. InputError when the format is read only, holds one pose
+/// only, or lacks something of `context`.
+std::string pose_file_bytes(const std::string& format,
+                            std::span<const RigidTransform> room_from_ct,
+                            const PoseContext& context);
+
+/// A pose as the rows of its matrix, as result.json and summaries hold it, and back: InputError
+/// that begins with `where` when these are not four rows of four numbers, or not rigid.
+nlohmann::json pose_rows(const RigidTransform& pose);
+RigidTransform pose_of_rows(const nlohmann::json& rows, const std::string& where);
+
+/// The pose of six numbers (rx_deg ... tz_mm) relative to `frame`. InputError, beginning with
+/// `where`, when it is not finite or leads out of the world (rigidity_problems()).
+RigidTransform pose_of_deg_and_mm(const PoseFrame& frame,
+                                  const std::array<double, 6>& values,
+                                  const std::string& where);
+
+/// TOML text with room_from_ct as 4x4, 17 significant digits.
+std::string pose_to_toml(const RigidTransform& room_from_ct);
+
+/// ITK text transform (AffineTransform_double_3_3) holding ct_from_room in LPS mm: the resampling
+/// direction, so that Slicer, applied to the CT, shows it in the room.
+std::string pose_to_itk_transform(const RigidTransform& room_from_ct);
+
+}  // namespace af

@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pose_files/project_poses.h"
+
+#include <algorithm>
+#include <array>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "base/error.h"
+#include "base/number_text.h"
+#include "pose_files/pose_file.h"
+#include "text/csv_table.h"
+#include "text/json_text.h"
+#include "text/toml_reader.h"
+
+namespace af {
+
+namespace {
+
+constexpr const char* kPoseKey = "room_from_ct";
+
+/// Row by row; what follows a # on its line is a comment.
+RigidTransform pose_of_plain_numbers(const std::string& text, const std::string& file) {
+  std::string without_comments;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);)
+    without_comments += line.substr(0, line.find('#')) + "\n";
+  const std::vector<double> numbers = numbers_of(without_comments, file);
+  constexpr std::size_t kCount = 16;
+  if (numbers.size() != kCount)
+    throw FileError(
+        file, "pose", "16 numbers of room_from_ct, row by row", std::to_string(numbers.size()));
+  return rigid_or_throw(
+      Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(numbers.data()), file);
+}
+
+RigidTransform pose_of_json(const std::string& text, const std::string& file) {
+  const nlohmann::json json = json_of_text(text, file);
+  if (!json.contains(kPoseKey)) throw InputError(file + ": has no \"" + kPoseKey + "\"");
+  return pose_of_rows(json[kPoseKey], file + ": " + kPoseKey);
+}
+
+RigidTransform pose_of_toml(const std::string& text, const std::string& file) {
+  const toml::table table = parse_toml(text, file);
+  TomlProblems problems(file);
+  TomlTableReader reader(table, "", problems);
+  const auto pose = reader.get_pose(kPoseKey, Presence::Required);
+  problems.throw_if_any();
+  check(pose.has_value(), "a pose without problems must be there");
+  return *pose;
+}
+
+std::string matrix_column(int row, int column) {
+  return "m" + std::to_string(row) + std::to_string(column);
+}
+
+bool has_matrix_columns(const CsvTable& table, int rows) {
+  for (int row = 0; row < rows; ++row)
+    for (int column = 0; column < 4; ++column)
+      if (!table.find_column(matrix_column(row, column))) return false;
+  return true;
+}
+
+RigidTransform matrix_of_row(const CsvTable& table, std::size_t row, int matrix_rows) {
+  Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
+  for (int i = 0; i < matrix_rows; ++i)
+    for (int j = 0; j < 4; ++j) matrix(i, j) = table.number(row, matrix_column(i, j));
+  return rigid_or_throw(matrix, table.where(row));
+}
+
+RigidTransform parameters_of_row(const CsvTable& table, std::size_t row, const PoseFrame& frame) {
+  std::array<double, 6> values{};
+  for (std::size_t i = 0; i < values.size(); ++i) values[i] = table.number(row, kParameterNames[i]);
+  return pose_of_deg_and_mm(frame, values, table.where(row));
+}
+
+void check_parameter_columns(const CsvTable& table, const std::string& file) {
+  std::string missing;
+  for (const char* column : kParameterNames)
+    if (!table.find_column(column)) missing += (missing.empty() ? "" : ", ") + std::string(column);
+  if (!missing.empty())
+    throw InputError(file + ":1: has no column " + missing +
+                     " (wanted: rx_deg, ry_deg, rz_deg, tx_mm, ty_mm, tz_mm, or m00 ... m23)");
+}
+
+}  // namespace
+
+RigidTransform pose_of_deg_and_mm(const PoseFrame& frame,
+                                  const std::array<double, 6>& values,
+                                  const std::string& where) {
+  const RigidTransform pose = pose_from_parameters(frame, PoseParameters::from_deg_and_mm(values));
+  return rigid_or_throw(pose.matrix(), where);
+}
+
+nlohmann::json pose_rows(const RigidTransform& pose) {
+  nlohmann::json rows = nlohmann::json::array();
+  for (int row = 0; row < 4; ++row) {
+    nlohmann::json values = nlohmann::json::array();
+    for (int column = 0; column < 4; ++column) values.push_back(pose.matrix()(row, column));
+    rows.push_back(values);
+  }
+  return rows;
+}
+
+RigidTransform pose_of_rows(const nlohmann::json& rows, const std::string& where) {
+  const auto bad_shape = [&where] {
+    return InputError(where + " must be a list of 4 lists of 4 numbers");
+  };
+  if (!rows.is_array() || rows.size() != 4) throw bad_shape();
+  Eigen::Matrix4d matrix;
+  for (std::size_t i = 0; i < 4; ++i) {
+    if (!rows[i].is_array() || rows[i].size() != 4) throw bad_shape();
+    for (std::size_t j = 0; j < 4; ++j) {
+      if (!rows[i][j].is_number()) throw bad_shape();
+      matrix(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = rows[i][j].get<double>();
+    }
+  }
+  return rigid_or_throw(matrix, where);
+}
+
+std::string pose_to_toml(const RigidTransform& room_from_ct) {
+  std::string text = std::string(kPoseKey) + " = [\n";
+  for (int row = 0; row < 4; ++row)
+    text += "  " + toml_numbers(room_from_ct.matrix().row(row).transpose()) + ",\n";
+  return text + "]\n";
+}
+
+bool is_json_pose(const PoseFileBytes& file) {
+  const std::size_t start = file.bytes.find_first_not_of(" \t\r\n");
+  return start != std::string::npos && file.bytes[start] == '{';
+}
+
+PosesInFile read_json_pose(const PoseFileBytes& file, const PoseContext& /*context*/) {
+  return {{{"1", pose_of_json(file.bytes, file.path.string())}}, {}};
+}
+
+bool is_toml_pose(const PoseFileBytes& file) {
+  const std::vector<std::string> lines = lines_of(file.bytes);
+  return file.path.extension() == ".toml" ||
+         std::ranges::any_of(lines, [](const std::string& line) {
+           return line.substr(line.find_first_not_of(" \t")).starts_with(kPoseKey);
+         });
+}
+
+PosesInFile read_toml_pose(const PoseFileBytes& file, const PoseContext& /*context*/) {
+  return {{{"1", pose_of_toml(file.bytes, file.path.string())}}, {}};
+}
+
+std::string write_toml_pose(std::span<const RigidTransform> room_from_ct,
+                            const PoseContext& /*context*/) {
+  return pose_to_toml(only_pose(room_from_ct, "toml"));
+}
+
+bool is_plain_pose(const PoseFileBytes& file) {
+  return file.bytes.find('\0') == std::string::npos;
+}
+
+PosesInFile read_plain_pose(const PoseFileBytes& file, const PoseContext& /*context*/) {
+  return {{{"1", pose_of_plain_numbers(file.bytes, file.path.string())}}, {}};
+}
+
+std::string write_plain_pose(std::span<const RigidTransform> room_from_ct,
+                             const PoseContext& /*context*/) {
+  const RigidTransform& pose = only_pose(room_from_ct, "matrix");
+  std::string text;
+  for (int row = 0; row < 4; ++row)
+    for (int column = 0; column < 4; ++column)
+      text += number_text(pose.matrix()(row, column)) + (column == 3 ? "\n" : " ");
+  return text;
+}
+
+bool is_csv_of_poses(const PoseFileBytes& file) {
+  const std::string first_line = file.bytes.substr(0, file.bytes.find('\n'));
+  return first_line.find("rx_deg") != std::string::npos ||
+         first_line.find("m00") != std::string::npos;
+}
+
+PosesInFile read_csv_of_poses(const PoseFileBytes& file, const PoseContext& context) {
+  const std::string name = file.path.string();
+  const CsvTable table = CsvTable::read(file.path);
+  if (table.row_count() == 0) throw InputError(name + ": has no poses below its header");
+  // A matrix needs no frame, so it is preferred where a file has both.
+  const bool has_matrix = has_matrix_columns(table, 3);
+  const int matrix_rows = has_matrix_columns(table, 4) ? 4 : 3;
+  if (!has_matrix) {
+    check_parameter_columns(table, name);
+    if (!context.frame)
+      throw InputError(name +
+                       ": rx_deg ... tz_mm are relative to a nominal pose, which is not known "
+                       "here; m00 ... m23 are not");
+  }
+  PosesInFile found;
+  found.poses.reserve(table.row_count());
+  for (std::size_t row = 0; row < table.row_count(); ++row)
+    found.poses.push_back({std::to_string(row + 1),
+                           has_matrix ? matrix_of_row(table, row, matrix_rows)
+                                      : parameters_of_row(table, row, *context.frame)});
+  return found;
+}
+
+std::string write_csv_of_poses(std::span<const RigidTransform> room_from_ct,
+                               const PoseContext& /*context*/) {
+  std::vector<std::string> columns;
+  for (int row = 0; row < 3; ++row)
+    for (int column = 0; column < 4; ++column) columns.push_back(matrix_column(row, column));
+  CsvTable table(columns);
+  for (const RigidTransform& pose : room_from_ct) {
+    std::vector<std::string> cells;
+    for (int row = 0; row < 3; ++row)
+      for (int column = 0; column < 4; ++column)
+        cells.push_back(number_text(pose.matrix()(row, column)));
+    table.add_row(cells);
+  }
+  return table.to_text();
+}
+
+}  // namespace af

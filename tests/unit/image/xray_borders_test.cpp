@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "image/xray_borders.h"
+
+#include <cmath>
+#include <functional>
+#include <random>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "image/air_level.h"
+#include "image/quantile.h"
+
+namespace af {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr double kAirLevel = 4000.0;
+constexpr auto kAir = static_cast<float>(kAirLevel);
+constexpr float kShutter = 40.0f;
+constexpr float kBody = 300.0f;
+
+/// Air with 1 % of noise, and what `value` puts into it where it is not negative.
+Image2d picture(int width, int height, const std::function<float(int, int)>& value) {
+  std::mt19937 random(7);
+  std::normal_distribution<float> noise(0.0f, 1.0f);
+  Image2d image(width, height);
+  for (int row = 0; row < height; ++row)
+    for (int column = 0; column < width; ++column) {
+      const float put = value(column, row);
+      const float level = put < 0.0f ? kAir : put;
+      image.at(column, row) = std::round(level * (1.0f + 0.01f * noise(random)));
+    }
+  return image;
+}
+
+/// A body with soft sides that crosses the picture from top to bottom.
+float body(int column, int width) {
+  const double depth = 1.0 - std::pow((column - 0.5 * width) / (0.25 * width), 2);
+  return depth <= 0.0 ? -1.0f : kAir * static_cast<float>(std::exp(-2.6 * std::sqrt(depth)));
+}
+
+TEST(XrayBorders, LeaveAPictureWithoutBordersWhole) {
+  EXPECT_FALSE(find_xray_borders(picture(160, 120, [](int, int) { return -1.0f; })).is_any());
+  const XrayBorders found =
+      find_xray_borders(picture(160, 120, [](int c, int) { return body(c, 160); }));
+  EXPECT_EQ(found.masked_share(), 0.0) << found.text();
+}
+
+TEST(XrayBorders, MaskFourBladesAndKeepTheBodyThatPassesBehindThem) {
+  const auto is_shut = [](int c, int r) { return c < 20 || c >= 150 || r < 12 || r >= 100; };
+  const XrayBorders found = find_xray_borders(
+      picture(160, 120, [&](int c, int r) { return is_shut(c, r) ? kShutter : body(c, 160); }));
+  EXPECT_EQ(found.straight_sides, 4) << found.text();
+  for (int row = 0; row < 120; ++row)
+    for (int column = 0; column < 160; ++column) {
+      const bool is_used = found.mask.at(column, row) != 0.0f;
+      if (is_shut(column, row)) {
+        ASSERT_FALSE(is_used) << column << " " << row;
+      }
+      const int m = found.margin_px + 2;  // the edge is found to one or two pixels
+      if (!is_shut(column - m, row - m) && !is_shut(column + m, row + m)) {
+        ASSERT_TRUE(is_used) << column << " " << row;
+      }
+    }
+}
+
+TEST(XrayBorders, FindTheCircleOfAnAperture) {
+  // A penumbra of 6 px about a radius of 90.
+  const auto share = [](int c, int r) {
+    return std::clamp((93.0 - std::hypot(c - 105.0, r - 98.0)) / 6.0, 0.0, 1.0);
+  };
+  const XrayBorders found = find_xray_borders(picture(210, 200, [&](int c, int r) {
+    const float inside = body(c, 210) < 0.0f ? kAir : body(c, 210);
+    return kShutter + static_cast<float>(share(c, r)) * (inside - kShutter);
+  }));
+  ASSERT_TRUE(found.circle) << found.text();
+  EXPECT_NEAR(found.circle->column_px, 105.0, 2.0);
+  EXPECT_NEAR(found.circle->row_px, 98.0, 2.0);
+  EXPECT_NEAR(found.circle->radius_px, 92.0, 4.0);  // where it is 15 % bright
+  EXPECT_LE(found.margin_px, 14) << "6 px of penumbra, and the body in every ring";
+  for (int row = 0; row < 200; ++row)
+    for (int column = 0; column < 210; ++column) {
+      if (share(column, row) < 0.5) {
+        ASSERT_EQ(found.mask.at(column, row), 0.0f) << column << " " << row;
+      }
+      if (std::hypot(column - 105.0, row - 98.0) < 90.0 - found.margin_px) {
+        ASSERT_NE(found.mask.at(column, row), 0.0f) << column << " " << row;
+      }
+    }
+}
+
+TEST(XrayBorders, MaskDeadRowsAndColumnsOfAnyValue) {
+  const XrayBorders found = find_xray_borders(picture(100, 80, [](int, int) { return -1.0f; }));
+  ASSERT_FALSE(found.is_any());
+  Image2d image = picture(100, 80, [](int, int) { return -1.0f; });
+  for (int row = 0; row < 80; ++row)
+    for (int column = 0; column < 100; ++column)
+      if (column < 3 || row >= 75) image.at(column, row) = column < 3 ? 65535.0f : 0.0f;
+  // Rows are looked at first; they must be constant over their whole length.
+  for (int row = 75; row < 80; ++row)
+    for (int column = 0; column < 3; ++column) image.at(column, row) = 0.0f;
+  const XrayBorders dead = find_xray_borders(image);
+  EXPECT_EQ(dead.dead_px, (std::array<int, 4>{3, 0, 0, 5})) << dead.text();
+  EXPECT_EQ(dead.mask.at(2, 10), 0.0f);
+  EXPECT_NE(dead.mask.at(3, 10), 0.0f);
+  EXPECT_EQ(dead.mask.at(50, 75), 0.0f);
+  EXPECT_NE(dead.mask.at(50, 74), 0.0f);
+}
+
+TEST(XrayBorders, MaskMetalAtTheEdgeButNotDarkAnatomyThatLeavesThePicture) {
+  const auto is_metal = [](int c, int r) { return c >= 150 && r >= 50 && r < 62; };
+  const auto is_limb = [](int c, int r) { return r >= 70 && c >= 40 && c < 90; };
+  const XrayBorders found = find_xray_borders(picture(160, 120, [&](int c, int r) {
+    return is_metal(c, r) ? kShutter : is_limb(c, r) ? kBody + 350.0f : -1.0f;
+  }));
+  EXPECT_GT(found.opaque_share, 0.0);
+  for (int row = 0; row < 120; ++row)
+    for (int column = 0; column < 160; ++column) {
+      if (is_metal(column, row)) {
+        ASSERT_EQ(found.mask.at(column, row), 0.0f);
+      }
+      if (is_limb(column, row)) {
+        ASSERT_NE(found.mask.at(column, row), 0.0f);
+      }
+    }
+}
+
+TEST(XrayBorders, SayTheyAreInDoubtRatherThanMaskMostOfAPicture) {
+  const XrayBorders found =
+      find_xray_borders(picture(160, 120, [](int c, int) { return c < 20 ? -1.0f : kBody; }));
+  EXPECT_FALSE(found.is_any());
+  EXPECT_THAT(found.text(), HasSubstr("may be anatomy"));
+}
+
+TEST(AirLevel, OfTheOpenBeamIsTheBrightestPeakAndNotTheBrightestPixels) {
+  Image2d image = picture(160, 120, [](int c, int) { return body(c, 160); });
+  for (int i = 0; i < 100; ++i) image.pixels[static_cast<std::size_t>(i)] = 60000.0f;  // 0.5 %
+  const auto found = open_beam_peak(image.pixels);
+  ASSERT_TRUE(found);
+  EXPECT_NEAR(found->level, kAirLevel, 0.005 * kAirLevel);  // the median of noise of 1 %
+  EXPECT_GT(static_cast<double>(nearest_rank(image.pixels, 0.999)), 2.0 * kAirLevel)
+      << "the percentile is misled";
+}
+
+TEST(AirLevel, IsNotFoundWhereValuesAreSpreadEvenly) {
+  std::vector<float> values;
+  for (int i = 0; i < 40000; ++i) values.push_back(std::exp(1e-4f * static_cast<float>(i)) * 50.0f);
+  // exp(4) in 40000 steps: 20 % about a value hold 5 %.
+  ASSERT_TRUE(open_beam_peak(values));
+  values.clear();
+  for (int i = 0; i < 40000; ++i) values.push_back(std::exp(2e-4f * static_cast<float>(i)));
+  EXPECT_FALSE(open_beam_peak(values));
+  EXPECT_FALSE(open_beam_peak({}));
+  EXPECT_FALSE(open_beam_peak({0.0f, 0.0f}));
+}
+
+TEST(AirLevel, BesideTheCollimatedEdgeIsAirThoughTheMiddleIsNot) {
+  const Image2d image = picture(160, 120, [](int c, int r) {
+    if (c < 20 || c >= 140 || r < 15 || r >= 105) return kShutter;
+    return std::hypot(c - 80, r - 60) < 34 ? kBody : -1.0f;
+  });
+  const XrayBorders borders = find_xray_borders(image);
+  ASSERT_TRUE(borders.is_any());
+  EXPECT_NEAR(air_beside_edge(image, borders.mask).level, kAirLevel, 0.02 * kAirLevel);
+}
+
+TEST(Background, IsBrightDarkOrUndecidedByThePictureItself) {
+  Image2d image = picture(
+      100, 100, [](int c, int r) { return std::hypot(c - 50, r - 50) < 30 ? kBody : -1.0f; });
+  EXPECT_EQ(background_of(image, {}), Background::Bright);
+  for (float& value : image.pixels) value = 4095.0f - value;
+  EXPECT_EQ(background_of(image, {}), Background::Dark);
+  for (std::size_t i = 0; i < image.pixels.size(); ++i)
+    image.pixels[i] = static_cast<float>(i % 100);
+  EXPECT_EQ(background_of(image, {}), Background::Undecided);
+}
+
+TEST(FlatCorrected, IsTheShareOfTheBeamAndZeroWhereThereIsNone) {
+  Image2d image(3, 1);
+  Image2d flat(3, 1);
+  Image2d dark(3, 1);
+  image.pixels = {60.0f, 110.0f, 10.0f};
+  flat.pixels = {110.0f, 210.0f, 10.0f};
+  dark.pixels = {10.0f, 10.0f, 10.0f};
+  EXPECT_EQ(flat_corrected(image, flat, dark).pixels, (std::vector<float>{0.5f, 0.5f, 0.0f}));
+  EXPECT_FLOAT_EQ(flat_corrected(image, flat, {}).pixels[0], 60.0f / 110.0f);
+}
+
+}  // namespace
+}  // namespace af
