@@ -193,7 +193,10 @@ std::string capture_table(const json& renderers) {
     if (range.is_object() && range.contains("end_interval")) {
       const json& interval = range.at("end_interval");
       end = decimals(interval.at("low_mm"), 0) + "–" + decimals(interval.at("high_mm"), 0) +
-            " mm: " + plain(interval.at("successes")) + " of " + plain(interval.at("starts"));
+            " mm: " +
+            (interval.at("starts") == 0
+                 ? std::string("no starts")
+                 : plain(interval.at("successes")) + " of " + plain(interval.at("starts")));
     }
     table.add_row(
         {method_title(renderer),
