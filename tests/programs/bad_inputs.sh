@@ -82,6 +82,13 @@ of_ct 3 "Modality = 'MR'" 'another modality' mr
 of_ct 3 'GantryDetectorTilt = 12.5' 'gantry tilt' tilted
 of_ct 3 'a slice is missing' 'missing slice' missing-slice
 of_ct 3 'not evenly spaced' 'uneven slices' uneven
+of_ct 3 '--resample' 'missing slice, advice' missing-slice
+row 3 'raw_slope_per_mm' 'raw values without a slope' "${precompute[@]}" --ct valid/ct.nii.gz --rig valid/rig.toml --camera AP --values raw
+row 3 'label_hu = 3' 'label without HU' "${precompute[@]}" --ct valid/ct.nii.gz --rig valid/rig.toml --camera AP \
+  --values labels --label-hu 3
+row 3 'HU must be within 1e6' 'HU taken for attenuation' "${precompute[@]}" --ct valid/ct.nii.gz --rig valid/rig.toml --camera AP --values mu
+of_study 3 'ct_values' 'CT of unknown values' "$(edited study.toml 's/^ct = .*/&\nct_values = "grey"/')"
+of_study 3 'must be true or false' 'switch that is a text' "$(edited study.toml 's/^ct = .*/&\nct_resample = "yes"/')"
 of_ct 3 'nan.mha' 'NaN voxel' nan.mha
 of_ct 3 'all-air.mha' 'all air' all-air.mha
 of_ct 3 'four-d.mha' '4-D' four-d.mha
