@@ -26,7 +26,8 @@ struct StudyView {
   XrayDomain xray_domain = XrayDomain::Intensity;
   RegionOfInterest roi;
   std::vector<Eigen::Vector2d>
-      fiducials_px;  ///< (column, row), in the order of StudyCase::fiducials_ct_mm
+      fiducials_px;  ///< (column, row), in the order of StudyCase::fiducials_ct_mm; NaN: not seen;
+                     ///< NaN: not seen
   std::optional<std::filesystem::path> field;
   std::optional<std::filesystem::path> mask;
   XrayReading reading;
