@@ -41,3 +41,11 @@ find_package(
              ITKIOPNG
              ITKIOTIFF
              ITKIOTransformInsightLegacy)
+
+# For AF_BUILD_PYTHON. pybind11's package file fails where Python is not found, so that is looked for first.
+set(Python_EXECUTABLE ${AF_PYTHON_EXECUTABLE})
+find_package(Python 3.9 QUIET COMPONENTS Interpreter Development.Module NumPy OPTIONAL_COMPONENTS Development.Embed)
+if(Python_FOUND)
+  set(PYBIND11_FINDPYTHON ON)
+  find_package(pybind11 2.10 QUIET)
+endif()
