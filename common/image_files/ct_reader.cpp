@@ -31,6 +31,9 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr int kAirBelowHu = -900;
+/// Share of bone that --body-only may remove: more means that the body itself was taken for a
+/// table.
+constexpr double kMostDenseRemoved = 0.1;
 /// From orthonormal; single-precision quaternions and rows of NIfTI stay well below.
 constexpr double kMaxDirectionError = 1e-4;
 /// Between the affine of a NIfTI header and what ITK makes of it, at any corner of the volume.
@@ -242,6 +245,14 @@ void keep_body(const CtGrid& grid,
                std::vector<std::int16_t>& hu,
                std::vector<std::string>& warnings) {
   const BodyRemoval removal = remove_all_but_body(grid, hu);
+  if (removal.dense_share_removed > kMostDenseRemoved)
+    throw InputError("body_only",
+                     "true",
+                     "would remove " +
+                         std::to_string(std::lround(100.0 * removal.dense_share_removed)) +
+                         " % of what is 300 HU or more: walls of a hollow body (a dry skull?) are "
+                         "too thin to be told from a table",
+                     file);
   warnings.push_back(file + ": " + std::to_string(std::lround(removal.removed_ml)) +
                      " ml outside the body were made air (--body-only); " +
                      std::to_string(removal.parts_kept) +

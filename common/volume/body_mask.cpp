@@ -16,6 +16,7 @@ namespace {
 constexpr std::int16_t kNoBodyHu = -1000;
 constexpr std::int16_t kTissueHu = -300;
 constexpr std::int16_t kNotAirHu = -900;
+constexpr std::int16_t kDenseHu = 300;
 constexpr double kEdgeMm = 3.5;
 constexpr double kLeastBodyShare = 0.1;  ///< of the largest part
 
@@ -237,6 +238,9 @@ BodyRemoval remove_all_but_body(const CtGrid& grid, std::span<std::int16_t> hu) 
     throw InputError("body_only",
                      "true",
                      "nothing is thicker than 7 mm and above -300 HU: there is no body to keep");
+  const auto dense =
+      std::count_if(hu.begin(), hu.end(), [](std::int16_t v) { return v >= kDenseHu; });
+  std::size_t dense_removed = 0;
   SliceBody body(order);
   for (std::size_t slice = 0; slice < order.slices; ++slice) {
     const std::vector<std::uint8_t>& outside = body.outside(slice, marks);
@@ -245,9 +249,12 @@ BodyRemoval remove_all_but_body(const CtGrid& grid, std::span<std::int16_t> hu) 
       std::int16_t& value = hu[slice * order.slice_stride + pixel / order.width * order.y_stride +
                                pixel % order.width * order.x_stride];
       removal.voxels_removed += value >= kNotAirHu ? 1 : 0;
+      dense_removed += value >= kDenseHu ? 1 : 0;
       value = kNoBodyHu;
     }
   }
+  if (dense > 0)
+    removal.dense_share_removed = static_cast<double>(dense_removed) / static_cast<double>(dense);
   removal.removed_ml =
       static_cast<double>(removal.voxels_removed) * grid.spacing_mm.prod() / 1000.0;
   return removal;

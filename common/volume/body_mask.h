@@ -14,6 +14,9 @@ struct BodyRemoval {
   std::size_t parts_kept = 0;      ///< bodies: the largest, and others of a tenth of it or more
   std::size_t voxels_removed = 0;  ///< of at least -900 HU outside the body
   double removed_ml = 0.0;
+  /// Share of the voxels of 300 HU or more that were removed: large where the body is hollow, such
+  /// as a dry skull, whose walls are too thin to be kept.
+  double dense_share_removed = 0.0;
 };
 
 /// Makes air (-1000 HU) of what is not the body. The body is tissue (above -300 HU) that is still

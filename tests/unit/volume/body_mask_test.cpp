@@ -110,6 +110,18 @@ TEST(BodyMask, TakesSlicesAcrossThePatientsAxisWhereverThatIs) {
         ASSERT_EQ(hu[at(i, j, k)], expected[static_cast<std::size_t>(i + 100 * (j + 90 * k))]);
 }
 
+TEST(BodyMask, SaysHowMuchBoneItTookOfAHollowBody) {
+  const CtGrid grid = grid_of({100, 90, 12});
+  std::vector<std::int16_t> hu = filled(grid, [](const Eigen::Vector3d& p) {
+    const double radius = std::hypot(p.x() - 50.0, p.y() - 45.0);
+    if (radius < 30.0) return radius > 26.0 ? 900 : -1000;  // a dry skull of 4 mm
+    return std::hypot(p.x() - 10.0, p.y() - 10.0) < 8.0 ? 100 : -1000;
+  });
+  EXPECT_EQ(remove_all_but_body(grid, hu).dense_share_removed, 1.0);
+  hu = filled(grid, chest_on_table_hu);
+  EXPECT_EQ(remove_all_but_body(grid, hu).dense_share_removed, 0.0);
+}
+
 TEST(BodyMask, RefusesACtWithoutABody) {
   const CtGrid grid = grid_of({20, 20, 4});
   std::vector<std::int16_t> hu(grid.voxel_count(), -1000);
