@@ -82,6 +82,13 @@ of_ct 3 "Modality = 'MR'" 'another modality' mr
 of_ct 3 'GantryDetectorTilt = 12.5' 'gantry tilt' tilted
 of_ct 3 'a slice is missing' 'missing slice' missing-slice
 of_ct 3 'not evenly spaced' 'uneven slices' uneven
+of_ct 3 '--resample' 'missing slice, advice' missing-slice
+row 3 'raw_slope_per_mm' 'raw values without a slope' "${precompute[@]}" --ct valid/ct.nii.gz --rig valid/rig.toml --camera AP --values raw
+row 3 'label_hu = 3' 'label without HU' "${precompute[@]}" --ct valid/ct.nii.gz --rig valid/rig.toml --camera AP \
+  --values labels --label-hu 3
+row 3 'HU must be within 1e6' 'HU taken for attenuation' "${precompute[@]}" --ct valid/ct.nii.gz --rig valid/rig.toml --camera AP --values mu
+of_study 3 'ct_values' 'CT of unknown values' "$(edited study.toml 's/^ct = .*/&\nct_values = "grey"/')"
+of_study 3 'must be true or false' 'switch that is a text' "$(edited study.toml 's/^ct = .*/&\nct_resample = "yes"/')"
 of_ct 3 'nan.mha' 'NaN voxel' nan.mha
 of_ct 3 'all-air.mha' 'all air' all-air.mha
 of_ct 3 'four-d.mha' '4-D' four-d.mha
@@ -145,6 +152,26 @@ of_rig 3 'pixel_spacing' 'unknown key (typo)' "$(edited rig.toml '0,/^pixel_spac
 of_rig 3 'source_point' 'source at 1e300 mm' "$(edited rig.toml '0,/^source_point = .*/s//source_point = [0, 1e300, 0]/')"
 of_rig 3 'pixel_spacing_mm' 'pixels of 1e300 mm' "$(edited rig.toml '0,/^pixel_spacing_mm = .*/s//pixel_spacing_mm = [1e300, 3]/')"
 of_rig 4 'c-arm-9in' 'unknown shipped rig' c-arm-9in
+# Cameras of other programs, in files that af-inspect writes here.
+for format in mayacam2 opencv matrix elastix plastimatch; do
+  "$bin/af-inspect" --rig-from valid/rig.toml --rig-to "$format" -o "valid/camera-$format.txt" >message.txt 2>&1 ||
+    { echo "af-inspect could not write valid/camera-$format.txt" >&2; exit 1; }
+done
+of_rig 4 'truncated' 'MayaCam cut short' "$(edited camera-mayacam2-AP.txt '/^translation/q')"
+of_rig 3 'finite' 'MayaCam with nan' "$(edited camera-mayacam2-AP.txt '/^translation/,/^end/s/^-?[0-9].*/nan/')"
+of_rig 4 "'rotation' is missing" 'MayaCam without rotation' "$(edited camera-mayacam2-AP.txt 's/^rotation/turn/')"
+of_rig 3 '32768' 'MayaCam of 1e18 columns' "$(edited camera-mayacam2-AP.txt '2s/.*/1e18,64/')"
+of_rig 4 'rows' 'OpenCV matrix of 1e12 rows' "$(edited camera-opencv-AP.txt '0,/rows: 3/s//rows: 1000000000000/')"
+of_rig 3 'x_camera = R x_room + t' 'OpenCV without R' "$(edited camera-opencv-AP.txt 's/^R:/Q:/')"
+of_rig 3 'must be a rotation' 'OpenCV with a mirrored R' "$(edited camera-opencv-AP.txt '/^R:/,/data/s/data: .*/data: [ 1, 0, 0, 0, 1, 0, 0, 0, -1 ]/')"
+of_rig 3 'finite' 'matrix with inf' "$(edited camera-matrix.txt 's/^-?[0-9][^ ]*/inf/')"
+of_rig 3 '--rig-size-px' 'plastimatch without the size of the images' valid/camera-plastimatch-AP.txt
+of_rig 3 'Origin' 'elastix without the origin' "$(edited camera-elastix-AP.txt 's/^[(]Origin/(Orient/')"
+of_rig 4 'not closed' 'elastix cut short' "$(edited camera-elastix-AP.txt 's/^[(]FocalPoint.*/(FocalPoint 1 2/')"
+printf '<RTKThreeDCircularGeometry><Projection>' >cut.xml
+of_rig 4 'broken XML' 'RTK geometry cut short' cut.xml
+printf '<!DOCTYPE a [<!ENTITY b "bbbb">]><RTKThreeDCircularGeometry/>' >entities.xml
+of_rig 4 'entities' 'RTK geometry with entities' entities.xml
 of_rig 4 'edited-rig.toml' 'not TOML' "$(edited rig.toml '1s/^.*$/= 3/')"
 of_design() { row "$1" "$2" "$3" "${precompute[@]}" --study valid/study.toml --camera AP "${@:4}"; }
 of_design 3 'max_field_bytes = 0: must be at least 1' 'no size' --max-field-size 0
@@ -217,6 +244,8 @@ row 2 '--camera' 'empty text' "${precompute[@]}" --study valid/study.toml --came
 printf -- '--- field ---\n'
 register=("$bin/af-register" --study valid/study.toml -o out/result)
 row 4 'other.af.h5' 'field of another CT' "${register[@]}" --field AP=other.af.h5 --field LAT=other-LAT.af.h5
+row 4 'read with mu = 2e-05 * value + 0.02 per mm' 'field of a CT that is read otherwise' "${register[@]}" \
+  --field AP=AP.af.h5 --field LAT=LAT.af.h5 --values raw --raw-slope-per-mm 0.00002 --raw-offset-per-mm 0.02
 row 4 'LAT.af.h5' 'field of another camera' "${register[@]}" --field AP=LAT.af.h5 --field LAT=AP.af.h5
 head -c 20000 AP.af.h5 >cut.af.h5
 row 4 'cut.af.h5' 'truncated field' "$bin/af-drr" --field cut.af.h5 -o out/drr.mha

@@ -8,9 +8,11 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "study/ct_keys.h"
 #include "study/rig_file.h"
 #include "study/study_template.h"
 #include "support/io_checks.h"
+#include "text/options_toml.h"
 
 namespace af {
 namespace {
@@ -429,6 +431,42 @@ TEST_F(StudyFile, RefusesContradictionsInHowAnXrayIsRead) {
   EXPECT_THAT(
       refusal("xray_domain = \"attenuation\"", "xray_domain = \"attenuation\"\nair_level = 3.0"),
       HasSubstr("is for xray_domain = \"intensity\" only"));
+}
+
+TEST_F(StudyFile, KeepsHowACtIsRead) {
+  const char* const keys =
+      "ct = \"ct.nii.gz\"\nct_resample = true\nct_values = \"labels\"\nct_label_hu = [\"3=700\", "
+      "\"1=40\"]\nct_body_only = true\nct_series = \"1.2\"";
+  Study study = read(replaced(kGoodStudy, "ct = \"ct.nii.gz\"", keys));
+  for (const bool again : {false, true}) {
+    if (again) study = read(study_to_toml(study, folder().path()));
+    const CtReadOptions& reading = study.cases[0].ct_reading;
+    EXPECT_TRUE(reading.resamples);
+    EXPECT_EQ(reading.values, "labels");
+    EXPECT_EQ(reading.label_hu, (std::vector<std::string>{"3=700", "1=40"}));
+    EXPECT_TRUE(reading.keeps_body_only);
+    EXPECT_EQ(reading.series_uid, "1.2");
+  }
+  EXPECT_EQ(ct_keys_text(CtReadOptions()), "");
+  CtReadOptions typed;
+  typed.series_uid = "3.4";
+  EXPECT_EQ(ct_reading_in_force(typed, study.cases[0].ct_reading).values, "labels");
+  EXPECT_EQ(ct_reading_in_force(typed, study.cases[0].ct_reading).series_uid, "3.4");
+  typed.values = "mu";
+  EXPECT_FALSE(ct_reading_in_force(typed, study.cases[0].ct_reading).resamples);
+  EXPECT_EQ(ct_reading_of(to_toml(typed)).values, "mu");
+  EXPECT_EQ(ct_reading_of("st_nodes = 3").text(), "");
+}
+
+TEST_F(StudyFile, RefusesContradictionsInHowACtIsRead) {
+  const auto refused = [&](const std::string& keys) {
+    return refusal("ct = \"ct.nii.gz\"", "ct = \"ct.nii.gz\"\n" + keys);
+  };
+  EXPECT_THAT(refused("ct_values = \"raw\""), HasSubstr("ct_raw_slope_per_mm = 0"));
+  EXPECT_THAT(refused("ct_values = \"grey\""), HasSubstr("must be one of hu, mu, raw, labels"));
+  EXPECT_THAT(refused("ct_resample = 1"), HasSubstr("must be true or false"));
+  EXPECT_THAT(refused("ct_label_hu = [3]"), HasSubstr("must be a list of texts"));
+  EXPECT_THAT(refused("ct_resamples = true"), HasSubstr("did you mean \"ct_resample\""));
 }
 
 }  // namespace
