@@ -108,7 +108,7 @@ TEST_F(AfScan, MakesAStudyWhoseGoldPoseIsTheIdentity) {
     EXPECT_TRUE(study_case.gold_room_from_ct->isApprox(RigidTransform::Identity()));
     EXPECT_FALSE(study_case.nominal_room_from_ct.isApprox(RigidTransform::Identity(), 1e-3));
     for (const StudyView& view : study_case.views)
-      EXPECT_NO_THROW(read_mask(view, study.rig.camera(view.camera)));
+      EXPECT_NO_THROW(read_view_xray(view, study.rig.camera(view.camera)));
   }
   const StudyCase& pair = study.find_case("pair-01");
   ASSERT_EQ(pair.views.size(), 2U);
@@ -120,7 +120,7 @@ TEST_F(AfScan, MakesAStudyWhoseGoldPoseIsTheIdentity) {
   // The CT shows the heaviest ball where the X-rays do: along the rays through it, in both views.
   const Eigen::Vector3d ball = test::lopsided_balls()[2].center_mm;
   for (const StudyView& view : pair.views) {
-    const Image2d xray = read_xray_attenuation(view, study.rig.camera(view.camera));
+    const Image2d xray = read_view_xray(view, study.rig.camera(view.camera)).attenuation;
     const Eigen::Vector2d pixel = study.rig.camera(view.camera).project(ball);
     // 14 mm of 0.01 twice less the ball's, and 5 mm of 0.04 at least, next to 0.3 beside it.
     EXPECT_GT(
