@@ -4,7 +4,8 @@
 # asks dpkg only and ends at once. Needs root or sudo only when something is missing.
 set -euo pipefail
 
-# Compilers and build tools, libraries, figures, and the default CT (invesalius-examples).
+# Compilers and build tools, libraries, figures, what checks pages and makes packages, and the default CT
+# (invesalius-examples).
 base_packages=(
   g++-12 cmake ninja-build pkg-config
   libopenmpi-dev openmpi-bin libhdf5-openmpi-dev
@@ -12,11 +13,12 @@ base_packages=(
   libeigen3-dev libcli11-dev libtomlplusplus-dev nlohmann-json3-dev libnlopt-dev libspdlog-dev libssl-dev libboost-math-dev
   libgtest-dev libgmock-dev
   libcairo2-dev fonts-dejavu-core gnuplot-nox
+  python3 dpkg-dev
   invesalius-examples
 )
 benchmark_packages=(plastimatch libfaiss-dev libopenblas-dev)
-# Formatter, linters, and the browser that opens the report in a test.
-lint_packages=(clang-format-14 clang-tidy-14 shellcheck chromium)
+# Formatter, linters, the browser that opens the report in a test, and what reads manual pages and completions in tests.
+lint_packages=(clang-format-14 clang-tidy-14 shellcheck chromium groff-base bsdextrautils zsh)
 slurm_packages=(slurm-wlm munge)
 
 usage() {
@@ -26,8 +28,8 @@ Usage: jobs/install-packages.sh [--with-lint] [--with-benchmarks] [--with-slurm]
 Installs the Debian 12 packages that the project needs to build, run and pass its tests. Says what it does; does
 nothing when all are there. Needs root or sudo only to install.
 
-  --with-lint         also the formatter, the linters and the browser that checks reports (clang-format-14, clang-tidy-14,
-                      shellcheck, chromium)
+  --with-lint         also the formatter, the linters, the browser that checks reports, and what checks manual pages and
+                      completions (clang-format-14, clang-tidy-14, shellcheck, chromium, groff-base, bsdextrautils, zsh)
   --with-benchmarks   also what tests/benchmark/run.sh compares with (plastimatch, Faiss, OpenBLAS)
   --with-slurm        also a Slurm of one node, for tests/slurm
   --check             only say what is missing; exit 1 when something is

@@ -4,7 +4,7 @@
 # `set -euo pipefail`.
 
 # The repository (or, installed, the folder that holds jobs/).
-af_root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
+af_root="$(cd -P "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
 
 # shellcheck disable=SC2034  # for the scripts that source this file
 af_programs=(af-precompute af-drr af-simulate af-register af-evaluate af-inspect)

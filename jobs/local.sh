@@ -13,7 +13,7 @@ Usage: jobs/local.sh [OPTIONS]
        jobs/local.sh STUDY.toml [OPTIONS]    a study of yours: see jobs/run-study.sh --help
 
 Installs what is missing, builds, and takes a CT through the whole pipeline: simulated X-ray pair, one attenuation
-field per camera, image quality of the fields, registrations, report.html. Finished stages with unchanged inputs are
+field per camera, image quality of the fields, registrations by the presets paper and robust, report.html. Finished stages with unchanged inputs are
 skipped, so an interrupted run goes on where it stopped when the same command is run again.
 
   --output DIR              where everything goes                                        [./af-study]
@@ -24,6 +24,7 @@ skipped, so an interrupted run goes on where it stopped when the same command is
                             10 ray-cast starts per interval
   --starts-per-interval N   field registrations in each of the eight intervals of start error            [30]
   --raycast-starts N        how many of them, in each of the first two intervals, are repeated by ray casting
+                            (with --paper by both presets, else by robust alone: by paper each takes a minute)
                                                                                             [2, --paper: 10]
   --pose-count N            random poses whose DRRs are compared with ray casting, per field
                                                                                           [30, --paper: 100]
@@ -157,8 +158,18 @@ plan_stage field-B "$(parallel_seconds $field_seconds)" "Precompute the field of
 compare_seconds=$(parallel_seconds $((pose_count / 3 + 4)))
 plan_stage image-quality-A "$compare_seconds" "Compare $pose_count DRRs of field A with ray casting"
 plan_stage image-quality-B "$compare_seconds" "Compare $pose_count DRRs of field B with ray casting"
-plan_stage registration "$(parallel_seconds $((8 * starts_per_interval / 8 + 2 * raycast_starts * 35)))" \
-  "Register $((8 * starts_per_interval)) starts with fields, $((2 * raycast_starts)) of them also by ray casting"
+# On one core a registration takes, in s, with fields 0.1 (paper) or 0.03, by ray casting 40 (paper) or 5.
+field_starts=$((8 * starts_per_interval)) cast_starts=$((2 * raycast_starts))
+paper_casts="" paper_cast_seconds=0 paper_renderer=(--renderer field)
+if [[ "$preset" == paper ]]; then
+  paper_casts=", $cast_starts of them also by ray casting"
+  paper_cast_seconds=$((cast_starts * 40))
+  paper_renderer=(--renderer both --raycast-starts-per-interval "$raycast_starts" --raycast-intervals 2)
+fi
+plan_stage registration-paper "$(parallel_seconds $((field_starts / 8 + paper_cast_seconds + 2)))" \
+  "Register $field_starts starts by preset paper$paper_casts"
+plan_stage registration-robust "$(parallel_seconds $((field_starts / 30 + cast_starts * 5 + 2)))" \
+  "Register the same starts by preset robust, $cast_starts of them also by ray casting"
 plan_stage overlay 5 "Register one start and draw its overlays"
 plan_stage report 5 "Write the report"
 print_plan
@@ -205,12 +216,14 @@ for camera in A B; do
     --field "$output/$camera.af.h5" --ct "$ct" "${series_option[@]}" --pose-count "$pose_count" --seed "$seed" \
     -o "$output/image-quality-$camera"
 done
-next_stage "$output/registration/summary.json" run_ranks "$ranks" "$bin/af-evaluate" registration --study "$study" \
-  "${series_option[@]}" "${fields[@]}" --preset paper --renderer both --starts-per-interval "$starts_per_interval" \
-  --raycast-starts-per-interval "$raycast_starts" --raycast-intervals 2 --seed "$seed" -o "$output/registration"
+registration=(run_ranks "$ranks" "$bin/af-evaluate" registration --study "$study" "${series_option[@]}" "${fields[@]}"
+  --starts-per-interval "$starts_per_interval" --seed "$seed")
+next_stage "$output/registration-paper/summary.json" "${registration[@]}" --preset paper "${paper_renderer[@]}" \
+  -o "$output/registration-paper"
+next_stage "$output/registration-robust/summary.json" "${registration[@]}" --preset robust --renderer both \
+  --raycast-starts-per-interval "$raycast_starts" --raycast-intervals 2 -o "$output/registration-robust"
 next_stage "$output/overlay/result.json" "$bin/af-register" --study "$study" --case "$case_name" "${series_option[@]}" \
-  "${fields[@]}" --preset paper \
-  --start-rotation-deg 2,-2,2 --start-translation-mm 3,3,-3 -o "$output/overlay"
+  "${fields[@]}" --preset robust --start-rotation-deg 2,-2,2 --start-translation-mm 3,3,-3 -o "$output/overlay"
 next_stage "$output/report.html" "$bin/af-evaluate" report -o "$output/report.html" "$output"
 
 say ""

@@ -209,7 +209,11 @@ for experiment in "${experiments[@]}"; do
     fig-14) make_curves ;;
     fig-15) make_registrations; publish fig-15 registration tre-histogram.svg tre-histogram.png registrations.csv ;;
     table-2) make_registrations; publish table-2 registration cases.csv ;;
-    fig-16) make_registrations; publish fig-16 registration success-rate.svg success-rate.png registrations.csv ;;
+    fig-16)
+      make_registrations
+      publish fig-16 registration success-rate.svg success-rate.png registrations.csv
+      cp "$output/runs/registration/starts-per-interval.csv" "$output/paper/fig-16-starts.csv"
+      ;;
   esac
 done
 "$bin/af-evaluate" report "$output/runs" -o "$output/report.html"

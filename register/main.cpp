@@ -10,6 +10,7 @@
 #include "cli/app_main.h"
 #include "cli/bind_lists.h"
 #include "cli/bind_options.h"
+#include "cli/slicer_module.h"
 #include "files/output_file.h"
 #include "parallel/work_watch.h"
 #include "register/multi_start.h"
@@ -140,6 +141,7 @@ int main(int argc, char** argv) {
   af::cli::bind_lists(app,
                       {{"measures", af::registration::similarity_list()},
                        {"optimizers", af::registration::optimizer_list()}});
+  af::cli::bind_slicer_module(app, "2D-3D registration");
   const std::string command_line = af::cli::command_line(argc, argv);
   return af::cli::app_main(
       app, argc, argv, [&](const Communicator& world) { run(options, command_line, world); });

@@ -30,19 +30,24 @@ void describe_start(Fields& field, RegisterOptions& options) {
       .choice({"auto", "nominal", "landmarks"});
   field("start_pose",
         options.start_pose,
-        "Start: file with one pose of any format that docs/poses.md lists");
+        "Start: file with one pose of any format that docs/poses.md lists")
+      .stands_for(PathRole::InputTransform, ".tfm");
   field("starts",
         options.starts,
         "Many starts: CSV with rx_deg,ry_deg,rz_deg,tx_mm,ty_mm,tz_mm relative to nominal or m00 "
         "... m23 of room_from_ct, or another file of poses (docs/poses.md); under mpirun the ranks "
         "share them")
+      .stands_for(PathRole::InputFile, ".csv")
       .input();
 }
 
 }  // namespace
 
 void RegisterOptions::describe(Fields& field) {
-  field("study", study, "study.toml: rig, cases, X-rays").required().input();
+  field("study", study, "study.toml: rig, cases, X-rays")
+      .stands_for(PathRole::InputFile, ".toml")
+      .required()
+      .input();
   field("case", case_name, "Case of the study (may be left out when it has one)");
   field.part(fields);
   field("renderer",
@@ -64,6 +69,7 @@ void RegisterOptions::describe(Fields& field) {
   field.part(resume);
   field("output", output_folder, "Folder for the results")
       .as("-o,--output")
+      .stands_for(PathRole::OutputFolder)
       .required()
       .not_deciding("results are the same");
 }

@@ -55,7 +55,9 @@ struct ElementVisitor {
 }  // namespace
 
 Field& Field::at_least(double low) {
-  return such_that("at least " + number_text(low), [low](double v) { return v >= low; });
+  such_that("at least " + number_text(low), [low](double v) { return v >= low; });
+  constraints.back().low = low;
+  return *this;
 }
 
 Field& Field::above(double low) {
@@ -63,12 +65,17 @@ Field& Field::above(double low) {
 }
 
 Field& Field::at_most(double high) {
-  return such_that("at most " + number_text(high), [high](double v) { return v <= high; });
+  such_that("at most " + number_text(high), [high](double v) { return v <= high; });
+  constraints.back().high = high;
+  return *this;
 }
 
 Field& Field::within(double low, double high) {
-  return such_that("within " + number_text(low) + " and " + number_text(high),
-                   [low, high](double v) { return v >= low && v <= high; });
+  such_that("within " + number_text(low) + " and " + number_text(high),
+            [low, high](double v) { return v >= low && v <= high; });
+  constraints.back().low = low;
+  constraints.back().high = high;
+  return *this;
 }
 
 Field& Field::finite() {
@@ -83,10 +90,11 @@ Field& Field::such_that(std::string words, std::function<bool(double)> accepts) 
 }
 
 Field& Field::one_of(std::vector<std::string> names) {
-  const std::string words = words_of_list(names);
-  return of_form(words, [names = std::move(names)](const std::string& text) {
+  of_form(words_of_list(names), [names](const std::string& text) {
     return std::find(names.begin(), names.end(), text) != names.end();
   });
+  constraints.back().names = std::move(names);
+  return *this;
 }
 
 Field& Field::of_form(std::string words, std::function<bool(const std::string&)> accepts) {
@@ -168,6 +176,12 @@ Field& Field::off_switch() {
 
 Field& Field::default_in_help() {
   shows_default = false;
+  return *this;
+}
+
+Field& Field::stands_for(PathRole role, std::string endings) {
+  path_role = role;
+  file_endings = std::move(endings);
   return *this;
 }
 

@@ -52,9 +52,25 @@ using FieldValue = std::variant<bool*,
 
 /// What every number, or every text, of a field must be.
 struct Constraint {
-  std::string words;  ///< "within 2 and 4096"
+  std::string words;               ///< "within 2 and 4096"
+  std::optional<double> low;       ///< smallest number that is accepted, when words say one
+  std::optional<double> high;      ///< largest
+  std::vector<std::string> names;  ///< all texts that are accepted, when they can be listed
   std::function<bool(double)> accepts_number = [](double) { return true; };
   std::function<bool(const std::string&)> accepts_text = [](const std::string&) { return true; };
+};
+
+/// What the path or paths of a field stand for. Graphical front ends and completion by a shell ask
+/// for it.
+enum class PathRole {
+  Unsaid,
+  InputFile,
+  InputFolder,
+  InputVolume,     ///< a CT
+  InputTransform,  ///< a rigid transform that ITK reads
+  OutputFile,
+  OutputFolder,
+  OutputVolume,  ///< an image or a stack of images
 };
 
 /// One field of a struct: what it is called, how it is typed, checked and recorded.
@@ -78,6 +94,8 @@ struct Field {
   bool is_size = false;              ///< "8GB"
   bool is_off_switch = false;        ///< the option makes it false
   bool shows_default = true;
+  PathRole path_role = PathRole::Unsaid;
+  std::string file_endings;  ///< ".toml", ".mha,.nii.gz"; the first is the usual one
 
   bool is_recorded = true;
   bool is_deciding = true;      ///< of results: unfinished work made with another value is refused
@@ -112,6 +130,7 @@ struct Field {
   Field& size();
   Field& off_switch();
   Field& default_in_help();
+  Field& stands_for(PathRole role, std::string endings = "");
 
   // Records. Reasons are for who reads the code.
   /// Neither recorded nor deciding.

@@ -12,12 +12,17 @@
 #include <system_error>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
 #include "base/build_info.h"
 #include "base/error.h"
+#include "cli/command_help.h"
+#include "cli/help_pages.h"
 #include "cli/option_values.h"
+#include "cli/shell_completion.h"
+#include "cli/slicer_module.h"
 #include "parallel/mpi_environment.h"
 #include "parallel/work_watch.h"
 #include "run/stop_request.h"
@@ -29,6 +34,35 @@ namespace {
 
 std::string program_name(const std::string& path) {
   return path.substr(path.find_last_of('/') + 1);
+}
+
+std::string help_as(const CLI::App& app, const std::string& format) {
+  const CommandHelp help = command_help(app);
+  if (format == "markdown") return markdown_page(help);
+  if (format == "man") return man_page(help, std::string(program_version()));
+  return format == "bash" ? bash_completion(help) : zsh_completion(help);
+}
+
+/// --help for other readers than people at a terminal.
+void add_help_formats(CLI::App& app) {
+  app.add_option_function<std::string>(
+         "--help-as",
+         // CLI11 prints the text of this "error" and ends the line, on one rank, with exit code 0.
+         [&app](const std::string& format) {
+           const std::string text = help_as(app, format);
+           throw CLI::CallForVersion(text.substr(0, text.find_last_not_of('\n') + 1), 0);
+         },
+         "Print this help as a page of Markdown, a manual page, or a completion for a shell, and "
+         "exit")
+      ->check(CLI::IsMember({"markdown", "man", "bash", "zsh"}))
+      ->trigger_on_parse();
+}
+
+/// CLI11 takes them from the back.
+std::vector<std::string> arguments_for(const CLI::App& app, int argc, char** argv) {
+  std::vector<std::string> arguments;
+  for (int i = argc - 1; i > 0; --i) arguments.push_back(with_dashes(app, argv[i]));
+  return arguments;
 }
 
 /// Help and version end with 0, every other parse problem with 2; rank 0 prints.
@@ -110,8 +144,9 @@ int app_main(CLI::App& app,
   const Communicator world = Communicator::world();
   app.name(program_name(argv[0]));
   app.set_version_flag("--version", app.get_name() + " " + std::string(program_version()));
+  add_help_formats(app);
   try {
-    app.parse(argc, argv);
+    app.parse(arguments_for(app, argc, argv));
     check_option_values(app);
   } catch (const CLI::ParseError& error) {
     return with_output_written(app, report_parse_result(app, error, world.is_root()));

@@ -2,6 +2,7 @@
 #include "cli/bind_options.h"
 
 #include <cstdlib>
+#include <map>
 #include <sstream>
 #include <type_traits>
 
@@ -22,6 +23,12 @@ bool is_given(const T& value) {
     return !value.empty();
   else
     return true;
+}
+
+/// CLI11 keeps nothing of ours beside an option.
+std::map<const CLI::Option*, Field>& bound_fields() {
+  static std::map<const CLI::Option*, Field> fields;
+  return fields;
 }
 
 template <typename T>
@@ -87,6 +94,7 @@ void bind_field(CLI::App& app, const Field& field) {
         "decimal size"));
   }
   option->required(field.is_required);
+  bound_fields().insert_or_assign(option, field);
 }
 
 }  // namespace
@@ -102,6 +110,11 @@ void bind_fields(CLI::App& app, const Fields& fields) {
     for (const std::string& other : field.excluded) option->excludes(app.get_option(other));
     for (const std::string& other : field.needed) option->needs(app.get_option(other));
   }
+}
+
+const Field* bound_field(const CLI::Option& option) {
+  const auto found = bound_fields().find(&option);
+  return found == bound_fields().end() ? nullptr : &found->second;
 }
 
 }  // namespace af::cli

@@ -9,6 +9,9 @@ namespace af::cli {
 /// Adds an option for every field that has one.
 void bind_fields(CLI::App& app, const Fields& fields);
 
+/// The description that an option was made of; null for one that was not made of a description.
+const Field* bound_field(const CLI::Option& option);
+
 /// The options of a struct that describes itself; `options` must outlive the parsing.
 template <Described T>
 void bind_options(CLI::App& app, T& options) {

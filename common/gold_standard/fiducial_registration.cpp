@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gold_standard/fiducial_registration.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <string>
@@ -136,26 +137,45 @@ std::vector<double> leave_one_out_errors_mm(std::span<const Vector3d> target_poi
   return errors_mm;
 }
 
-FiducialGold gold_from_fiducials(std::span<const FiducialView> views,
-                                 std::span<const Vector3d> fiducials_ct_mm) {
+std::vector<std::size_t> fiducials_in_two_views(std::span<const FiducialView> views,
+                                                std::size_t fiducial_count) {
   for (const FiducialView& view : views)
-    if (view.fiducials_px.size() != fiducials_ct_mm.size())
+    if (view.fiducials_px.size() != fiducial_count)
       throw InputError(
           "fiducials_px of camera '" + view.camera.name + "'",
           std::to_string(view.fiducials_px.size()) + " entries",
-          "must be as many as fiducials_ct_mm (" + std::to_string(fiducials_ct_mm.size()) + ")");
+          "must be as many as fiducials_ct_mm (" + std::to_string(fiducial_count) + ")");
+  std::vector<std::size_t> found;
+  for (std::size_t i = 0; i < fiducial_count; ++i) {
+    const auto seen = std::count_if(views.begin(), views.end(), [&](const FiducialView& view) {
+      return is_seen(view.fiducials_px[i]);
+    });
+    if (seen >= 2) found.push_back(i);
+  }
+  return found;
+}
+
+FiducialGold gold_from_fiducials(std::span<const FiducialView> views,
+                                 std::span<const Vector3d> fiducials_ct_mm) {
   FiducialGold gold;
+  gold.used = fiducials_in_two_views(views, fiducials_ct_mm.size());
+  if (gold.used.size() < kFewestFiducials)
+    throw InputError("fiducials: a pose needs at least three that two views show, found " +
+                     std::to_string(gold.used.size()));
   std::vector<Vector3d> room_points;
-  for (std::size_t i = 0; i < fiducials_ct_mm.size(); ++i) {
+  std::vector<Vector3d> ct_points;
+  for (const std::size_t i : gold.used) {
     std::vector<Ray> rays;
     for (const FiducialView& view : views)
-      rays.push_back(view.camera.ray(view.fiducials_px[i].x(), view.fiducials_px[i].y()));
+      if (is_seen(view.fiducials_px[i]))
+        rays.push_back(view.camera.ray(view.fiducials_px[i].x(), view.fiducials_px[i].y()));
     gold.back_projections.push_back(back_project(rays));
     room_points.push_back(gold.back_projections.back().room_point);
+    ct_points.push_back(fiducials_ct_mm[i]);
   }
-  gold.fit = fit_rigid(room_points, fiducials_ct_mm);
+  gold.fit = fit_rigid(room_points, ct_points);
   gold.room_from_ct = gold.fit.target_from_source;
-  gold.leave_one_out_mm = leave_one_out_errors_mm(room_points, fiducials_ct_mm);
+  gold.leave_one_out_mm = leave_one_out_errors_mm(room_points, ct_points);
   return gold;
 }
 

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <span>
 #include <vector>
 
+#include "base/sample_summary.h"
 #include "geometry/camera_geometry.h"
 #include "geometry/rigid_transform.h"
 
@@ -36,18 +38,40 @@ struct RigidFit {
 RigidFit fit_rigid(std::span<const Eigen::Vector3d> target_points,
                    std::span<const Eigen::Vector3d> source_points);
 
-/// Where one camera saw the fiducials: (column, row), in the order of the CT's fiducials.
+/// What stands for a fiducial that a view does not show.
+inline Eigen::Vector2d hidden_fiducial_px() {
+  return Eigen::Vector2d::Constant(kNan);
+}
+
+/// Whether a view shows a fiducial.
+inline bool is_seen(const Eigen::Vector2d& fiducial_px) {
+  return fiducial_px.allFinite();
+}
+
+/// Where one camera saw the fiducials: (column, row), in the order of the CT's fiducials;
+/// hidden_fiducial_px() for those that it does not show.
 struct FiducialView {
   CameraGeometry camera;
   std::vector<Eigen::Vector2d> fiducials_px;
 };
 
+/// Fewer fix no pose.
+inline constexpr std::size_t kFewestFiducials = 3;
+
+/// The fiducials, from 0, that two or more views show: those that have a place in the room. Throws
+/// InputError when a view has another number of entries.
+std::vector<std::size_t> fiducials_in_two_views(std::span<const FiducialView> views,
+                                                std::size_t fiducial_count);
+
 /// The gold standard of one case.
 struct FiducialGold {
   RigidTransform room_from_ct = RigidTransform::Identity();
-  std::vector<BackProjection> back_projections;  ///< per fiducial
+  /// The fiducials that two or more views show; the others take no part. What follows is per one of
+  /// these.
+  std::vector<std::size_t> used;
+  std::vector<BackProjection> back_projections;
   RigidFit fit;
-  /// Per fiducial: its distance (mm) from where the pose fitted to all others puts it. Empty when
+  /// Its distance (mm) from where the pose fitted to all others puts it. Empty when
   /// the others are fewer than three or, for any of the fiducials, lie on one line.
   std::vector<double> leave_one_out_mm;
 };
@@ -56,8 +80,10 @@ struct FiducialGold {
 std::vector<double> leave_one_out_errors_mm(std::span<const Eigen::Vector3d> target_points,
                                             std::span<const Eigen::Vector3d> source_points);
 
-/// Back-projects every fiducial from all views and fits the CT's fiducials to the result. Throws
-/// InputError as the two steps do, and when a view lacks a fiducial.
+/// Back-projects every fiducial from the views that show it, where two or more do, and fits the
+/// CT's fiducials to the result. Throws InputError as the two steps do (so when fewer than three
+/// have a place), and when a view has another number of entries. \test
+/// FiducialGold.IsMadeFromThoseThatTwoViewsShow
 FiducialGold gold_from_fiducials(std::span<const FiducialView> views,
                                  std::span<const Eigen::Vector3d> fiducials_ct_mm);
 

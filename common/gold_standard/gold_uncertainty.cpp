@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "base/error.h"
@@ -19,26 +20,40 @@ using Eigen::Vector3d;
 constexpr std::uint64_t kGoldStream = 0x676F6C64;  // "gold"
 constexpr std::size_t kPoseParameters = 6;
 
-/// The views in which the gold pose itself would show the fiducials.
+/// The views in which the gold pose itself would show the fiducials; hidden where the views hide
+/// them, and where one view alone shows them.
 std::vector<FiducialView> projected_views(const FiducialGold& gold,
                                           std::span<const FiducialView> views,
                                           std::span<const Vector3d> fiducials_ct_mm) {
   std::vector<FiducialView> projected(views.begin(), views.end());
   for (FiducialView& view : projected) {
     const PointProjector projector(view.camera);
-    for (std::size_t i = 0; i < fiducials_ct_mm.size(); ++i)
-      view.fiducials_px[i] = projector.project(gold.room_from_ct * fiducials_ct_mm[i]);
+    std::vector<Eigen::Vector2d> shown(fiducials_ct_mm.size(), hidden_fiducial_px());
+    for (const std::size_t i : gold.used)
+      if (is_seen(view.fiducials_px[i]))
+        shown[i] = projector.project(gold.room_from_ct * fiducials_ct_mm[i]);
+    view.fiducials_px = std::move(shown);
   }
   return projected;
 }
 
-double squared_residuals_px2(std::span<const FiducialView> seen,
-                             std::span<const FiducialView> projected) {
-  double sum_px2 = 0.0;
+/// Distances of what was seen from the projections.
+struct PixelResiduals {
+  double squares_px2 = 0.0;
+  std::size_t detections = 0;
+};
+
+PixelResiduals pixel_residuals(std::span<const FiducialView> seen,
+                               std::span<const FiducialView> projected) {
+  PixelResiduals residuals;
   for (std::size_t view = 0; view < seen.size(); ++view)
-    for (std::size_t i = 0; i < seen[view].fiducials_px.size(); ++i)
-      sum_px2 += (seen[view].fiducials_px[i] - projected[view].fiducials_px[i]).squaredNorm();
-  return sum_px2;
+    for (std::size_t i = 0; i < seen[view].fiducials_px.size(); ++i) {
+      if (!is_seen(projected[view].fiducials_px[i])) continue;
+      residuals.squares_px2 +=
+          (seen[view].fiducials_px[i] - projected[view].fiducials_px[i]).squaredNorm();
+      ++residuals.detections;
+    }
+  return residuals;
 }
 
 /// TRE between the gold pose and that of one set of noisy detections.
@@ -75,9 +90,11 @@ GoldUncertainty gold_uncertainty(const FiducialGold& gold,
   if (target_points_ct_mm.empty()) throw InputError("target points: there must be at least one");
   const std::vector<FiducialView> projected = projected_views(gold, views, fiducials_ct_mm);
   GoldUncertainty result;
-  result.degrees_of_freedom = 2 * views.size() * fiducials_ct_mm.size() - kPoseParameters;
-  result.detection_sigma_px = std::sqrt(squared_residuals_px2(views, projected) /
-                                        static_cast<double>(result.degrees_of_freedom));
+  const PixelResiduals residuals = pixel_residuals(views, projected);
+  // Three fiducials in two views each, the fewest that give a pose, leave six.
+  result.degrees_of_freedom = 2 * residuals.detections - kPoseParameters;
+  result.detection_sigma_px =
+      std::sqrt(residuals.squares_px2 / static_cast<double>(result.degrees_of_freedom));
   result.replicates = replicates;
   std::vector<double> tre_mm(replicates);
   double squares = 0.0;

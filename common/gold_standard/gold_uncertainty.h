@@ -12,9 +12,9 @@ namespace af {
 /// How far the fiducials' gold pose may itself lie from the true pose, as a TRE over the target.
 struct GoldUncertainty {
   /// Degrees of freedom of the residuals, from which the detections' noise is estimated: two per
-  /// fiducial and view, less the six parameters of the pose. The relative standard error of
-  /// `detection_sigma_px` is 1 / sqrt(2 * degrees_of_freedom): 0.22 for four fiducials in two
-  /// views.
+  /// fiducial and view that shows it, less the six parameters of the pose. The relative standard
+  /// error of `detection_sigma_px` is 1 / sqrt(2 * degrees_of_freedom): 0.22 for four fiducials in
+  /// two views.
   std::size_t degrees_of_freedom = 0;
   double detection_sigma_px = 0.0;  ///< per coordinate of a detection, from the residuals
   std::size_t replicates = 0;

@@ -22,12 +22,17 @@ constexpr std::uint64_t kUncertaintySeed = 1;
 // rigid motion over a cell is that at its centre up to second order in angle times cell.
 constexpr double kUncertaintySpacingMm = 6.0;
 
-void add_fiducial_gold(const Study& study, const StudyCase& study_case, GoldStandard& gold) {
+std::vector<FiducialView> fiducial_views(const Study& study, const StudyCase& study_case) {
   std::vector<FiducialView> views;
   for (const StudyView& view : study_case.views)
     if (!view.fiducials_px.empty())
       views.push_back({study.rig.camera(view.camera), view.fiducials_px});
-  if (study_case.fiducials_ct_mm.empty() || views.size() < 2) return;
+  return views;
+}
+
+void add_fiducial_gold(const Study& study, const StudyCase& study_case, GoldStandard& gold) {
+  if (!has_fiducial_gold(study, study_case)) return;
+  const std::vector<FiducialView> views = fiducial_views(study, study_case);
   gold.fiducials = gold_from_fiducials(views, study_case.fiducials_ct_mm);
   gold.uncertainty =
       gold_uncertainty(*gold.fiducials,
@@ -54,6 +59,12 @@ json to_json(const GoldUncertainty& uncertainty) {
 
 }  // namespace
 
+bool has_fiducial_gold(const Study& study, const StudyCase& study_case) {
+  const std::vector<FiducialView> views = fiducial_views(study, study_case);
+  return fiducials_in_two_views(views, study_case.fiducials_ct_mm.size()).size() >=
+         kFewestFiducials;
+}
+
 GoldStandard gold_standard(const Study& study,
                            const StudyCase& study_case,
                            const std::string& choice) {
@@ -69,9 +80,9 @@ GoldStandard gold_standard(const Study& study,
     throw InputError("gold",
                      choice,
                      "case '" + study_case.name + "' has " +
-                         (choice == "fiducials" ? "no fiducials seen in two views"
+                         (choice == "fiducials" ? "no three fiducials that two views show"
                           : choice == "study"   ? "no gold_room_from_ct"
-                                                : "neither fiducials seen in two views nor "
+                                                : "neither three fiducials that two views show nor "
                                                   "gold_room_from_ct"),
                      study.path.string());
   gold.room_from_ct = uses_fiducials ? gold.fiducials->room_from_ct : *gold.stated_pose;
@@ -91,6 +102,7 @@ json to_json(const GoldStandard& gold) {
     json gaps = json::array();
     for (const BackProjection& point : gold.fiducials->back_projections)
       gaps.push_back(point.ray_gap_mm);
+    result["fiducials_used"] = gold.fiducials->used;
     result["fre_mm"] = gold.fiducials->fit.fre_mm;
     result["residuals_mm"] = gold.fiducials->fit.residuals_mm;
     result["ray_gaps_mm"] = gaps;

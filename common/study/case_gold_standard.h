@@ -15,11 +15,14 @@ namespace af {
 struct GoldStandard {
   RigidTransform room_from_ct = RigidTransform::Identity();
   std::string source;                            ///< "fiducials" or "study"
-  std::optional<FiducialGold> fiducials;         ///< when at least two views show them
+  std::optional<FiducialGold> fiducials;         ///< when two views show at least three
   std::optional<GoldUncertainty> uncertainty;    ///< of the fiducials' pose at the target
   std::optional<RigidTransform> stated_pose;     ///< the study's gold_room_from_ct
   std::optional<double> stated_to_fiducials_mm;  ///< mean TRE between the two, when both exist
 };
+
+/// Whether two views show at least three of the case's fiducials.
+bool has_fiducial_gold(const Study& study, const StudyCase& study_case);
 
 /// The gold standard of a case. `choice`: "fiducials", "study" (gold_room_from_ct) or "auto":
 /// fiducials when the case has them, else the stated pose. Throws InputError when the chosen one

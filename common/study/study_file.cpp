@@ -12,6 +12,7 @@
 #include "base/named_rows.h"
 #include "base/toml_text.h"
 #include "files/output_file.h"
+#include "gold_standard/fiducial_registration.h"
 #include "study/rig_file.h"
 #include "text/toml_reader.h"
 
@@ -52,9 +53,11 @@ std::optional<fs::path> get_path(TomlTableReader& reader,
 }
 
 template <int Size>
-std::vector<Eigen::Matrix<double, Size, 1>> get_points(TomlTableReader& reader, const char* key) {
+std::vector<Eigen::Matrix<double, Size, 1>> get_points(TomlTableReader& reader,
+                                                       const char* key,
+                                                       RowGaps gaps = RowGaps::Refused) {
   std::vector<Eigen::Matrix<double, Size, 1>> points;
-  if (const auto matrix = reader.get_matrix(key, -1, Size, Presence::Optional))
+  if (const auto matrix = reader.get_matrix(key, -1, Size, Presence::Optional, kMaxRoomMm, gaps))
     for (Eigen::Index i = 0; i < matrix->rows(); ++i)
       points.emplace_back(matrix->row(i).transpose());
   return points;
@@ -129,7 +132,7 @@ void check_fiducials(TomlTableReader& reader,
   if (camera == nullptr) return;
   const Eigen::Array2d edge = camera->size_px.cast<double>().array() - 0.5;
   for (const Eigen::Vector2d& point : view.fiducials_px)
-    if (!((point.array() >= -0.5).all() && (point.array() <= edge).all())) {
+    if (is_seen(point) && !((point.array() >= -0.5).all() && (point.array() <= edge).all())) {
       reader.add_problem("fiducials_px",
                          "point " + toml_numbers(point) + " must lie on the detector of camera '" +
                              camera->name + "'");
@@ -208,7 +211,7 @@ StudyView read_view(const toml::table& table,
   view.xray = path("xray", Presence::Required).value_or(fs::path());
   view.xray_domain = get_xray_domain(reader);
   view.roi = get_roi(reader, camera);
-  view.fiducials_px = get_points<2>(reader, "fiducials_px");
+  view.fiducials_px = get_points<2>(reader, "fiducials_px", RowGaps::Allowed);
   view.field = path("field", Presence::Optional);
   view.reading = read_xray_keys(
       reader, view.xray_domain, [&](const char* key) { return path(key, Presence::Optional); });
@@ -310,7 +313,8 @@ template <int Size>
 std::string points_text(const std::vector<Eigen::Matrix<double, Size, 1>>& points) {
   std::string text = "[";
   for (std::size_t i = 0; i < points.size(); ++i)
-    text += (i > 0 ? ", " : "") + toml_numbers(points[i]);
+    text +=
+        (i > 0 ? ", " : "") + (points[i].allFinite() ? toml_numbers(points[i]) : std::string("[]"));
   return text + "]";
 }
 

@@ -30,7 +30,7 @@ center_ct_mm = [0.0, 0.0, 0.0]                   # middle of the region to regis
 target_box_ct_mm = [[-30, -30, -30], [30, 30, 30]]  # low and high corner: TRE is the mean over this box
 
 # To measure errors, one of these is needed, and with both the fiducials' pose is compared with the stated one:
-# at least three fiducials not on one line, here and in every view in the same order ...
+# at least three fiducials not on one line, here and in every view in the same order ([] for one that a view hides) ...
 # fiducials_ct_mm = [[-20.0, 5.0, 0.0], [18.0, -7.0, 9.0], [3.0, 22.0, -14.0], [-6.0, -12.0, 21.0]]
 # ... or the true pose itself.
 # gold_room_from_ct = [[1, 0, 0, 1.5], [0, 1, 0, -2.0], [0, 0, 1, 0.5], [0, 0, 0, 1]]

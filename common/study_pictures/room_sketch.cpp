@@ -17,6 +17,7 @@ struct RoomLine {
   std::vector<Vector3d> points;
   PictureColor color;
   double width_px;
+  bool is_far = false;  ///< may lead off the paper: a ray from a source
 };
 struct RoomMark {
   Vector3d place;
@@ -27,6 +28,7 @@ struct RoomMark {
 struct RoomScene {
   std::vector<RoomLine> lines;
   std::vector<RoomMark> marks;
+  std::vector<RoomMark> sources;
 };
 
 /// How a drawing's axes lie in the room: to the right, and up.
@@ -52,13 +54,13 @@ void add_camera(const CameraGeometry& camera, RoomScene& scene) {
                                         camera.detector_point(columns, rows),
                                         camera.detector_point(-0.5, rows)};
   for (const Vector3d& corner : corners)
-    scene.lines.push_back({{camera.source_point, corner}, PictureColor::Yellow, 0.8});
+    scene.lines.push_back({{camera.source_point, corner}, PictureColor::Yellow, 0.8, true});
   scene.lines.push_back({closed(around), PictureColor::Ink, 2.0});
   // The first row in red: it is the picture's top edge, and (0, 0) its left corner.
   scene.lines.push_back({{around[0], around[1]}, PictureColor::Red, 3.5});
   scene.marks.push_back({around[0], PictureMark::Shape::Dot, "(0,0)", PictureColor::Red});
-  scene.marks.push_back(
-      {camera.source_point, PictureMark::Shape::Dot, camera.name + " source", PictureColor::Ink});
+  scene.sources.push_back(
+      {camera.source_point, PictureMark::Shape::Dot, camera.name, PictureColor::Ink});
 }
 
 void add_ct(const CtGrid& ct, const RigidTransform& room_from_ct, RoomScene& scene) {
@@ -93,6 +95,7 @@ PicturePanel panel_of(const RoomScene& scene, const Projection& projection) {
   Vector2d high = -low;
   for (const RoomLine& line : scene.lines)
     for (const Vector3d& point : line.points) {
+      if (line.is_far) continue;
       low = low.cwiseMin(flat(point));
       high = high.cwiseMax(flat(point));
     }
@@ -113,6 +116,18 @@ PicturePanel panel_of(const RoomScene& scene, const Projection& projection) {
   }
   for (const RoomMark& mark : scene.marks)
     panel.marks.push_back({placed(mark.place), mark.shape, mark.text, mark.color});
+  // A source off the paper is named at its edge, on the way to it from the middle.
+  for (const RoomMark& source : scene.sources) {
+    const auto [x, y] = placed(source.place);
+    const Vector2d away = Vector2d(x, y) - Vector2d::Constant(kSide / 2.0);
+    const double share =
+        std::min(1.0, (kSide / 2.0 - 20.0) / std::max(away.cwiseAbs().maxCoeff(), 1e-6));
+    const Vector2d place = Vector2d::Constant(kSide / 2.0) + share * away;
+    panel.marks.push_back({{place.x(), std::clamp(place.y(), 20.0, kSide - 20.0)},
+                           source.shape,
+                           source.text,
+                           source.color});
+  }
   return panel;
 }
 
@@ -128,12 +143,20 @@ std::vector<PicturePanel> room_sketch(std::span<const CameraGeometry> cameras,
   const Vector3d right = sight.cross(Vector3d::UnitZ()).normalized();
   const std::vector<Projection> projections = {
       {"Obliquely",
-       "Seen from the room's +x, -y, +z. Green: the CT's box with the patient's directions; red: "
-       "the first row of each picture, and its pixel (0,0)",
+       "Seen from the room's +x, -y, +z. Green: the CT's box with the patient's directions. Black "
+       "and red: detectors, red their first row and pixel (0,0). Black dots: where the sources "
+       "are, "
+       "or the way to them",
        right,
        right.cross(sight)},
-      {"Against the room's z", "x to the right, y up", Vector3d::UnitX(), Vector3d::UnitY()},
-      {"Along the room's y", "x to the right, z up", Vector3d::UnitX(), Vector3d::UnitZ()},
+      {"From above, against the room's z",
+       "x to the right, y up",
+       Vector3d::UnitX(),
+       Vector3d::UnitY()},
+      {"From the front, along the room's y",
+       "x to the right, z up",
+       Vector3d::UnitX(),
+       Vector3d::UnitZ()},
   };
   std::vector<PicturePanel> panels;
   panels.reserve(projections.size());

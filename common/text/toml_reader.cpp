@@ -122,6 +122,17 @@ std::optional<std::vector<double>> numbers_within(const toml::node& node, int co
   return numbers;
 }
 
+/// [] or as many NaNs as there are columns.
+bool is_absent_row(const toml::node& node, int columns) {
+  const toml::array* list = node.as_array();
+  if (list == nullptr) return false;
+  if (!list->empty() && list->size() != static_cast<std::size_t>(columns)) return false;
+  return std::all_of(list->begin(), list->end(), [](const toml::node& element) {
+    const auto number = element.value_exact<double>();
+    return number.has_value() && std::isnan(*number);
+  });
+}
+
 std::string wanted_numbers(double most) {
   return " finite numbers, none beyond " + number_text(most);
 }
@@ -254,7 +265,7 @@ std::optional<std::vector<int>> TomlTableReader::get_integers(const char* key,
 }
 
 std::optional<Eigen::MatrixXd> TomlTableReader::get_matrix(
-    const char* key, int rows, int columns, Presence presence, double most) {
+    const char* key, int rows, int columns, Presence presence, double most, RowGaps gaps) {
   const toml::node* found = find(key, presence);
   if (found == nullptr) return std::nullopt;
   const toml::array* list = found->as_array();
@@ -262,13 +273,18 @@ std::optional<Eigen::MatrixXd> TomlTableReader::get_matrix(
       list != nullptr && (rows < 0 || list->size() == static_cast<std::size_t>(rows));
   const std::string wanted = "must be a list of " +
                              (rows < 0 ? std::string() : std::to_string(rows) + " ") + "lists of " +
-                             std::to_string(columns) + wanted_numbers(most);
+                             std::to_string(columns) + wanted_numbers(most) +
+                             (gaps == RowGaps::Allowed ? ", or [] for one that is absent" : "");
   if (!size_fits) {
     add_problem(key, wanted);
     return std::nullopt;
   }
   Eigen::MatrixXd matrix(static_cast<Eigen::Index>(list->size()), columns);
   for (std::size_t i = 0; i < list->size(); ++i) {
+    if (gaps == RowGaps::Allowed && is_absent_row(*list->get(i), columns)) {
+      matrix.row(static_cast<Eigen::Index>(i)).setConstant(std::nan(""));
+      continue;
+    }
     const auto row = numbers_within(*list->get(i), columns, most);
     if (!row) {
       problems_.add(*list->get(i),

@@ -48,6 +48,8 @@ class TomlProblems {
 };
 
 enum class Presence { Required, Optional };
+/// Whether rows of a matrix may be absent.
+enum class RowGaps { Refused, Allowed };
 
 /// Reads one table's keys with type and range checks. Every get_*() notes its key as known; a value
 /// that is missing or unacceptable is noted as a problem and comes back as nullopt.
@@ -73,9 +75,14 @@ class TomlTableReader {
   /// A list of exactly `count` whole numbers that fit an int.
   std::optional<std::vector<int>> get_integers(const char* key, int count, Presence presence);
   /// A list of rows of `columns` numbers each, finite and not beyond `most`; `rows` = -1: any
-  /// number of rows.
-  std::optional<Eigen::MatrixXd> get_matrix(
-      const char* key, int rows, int columns, Presence presence, double most = kMaxRoomMm);
+  /// number of rows. With `RowGaps::Allowed` a row may be absent: `[]`, or `nan` in every column;
+  /// it is then NaN.
+  std::optional<Eigen::MatrixXd> get_matrix(const char* key,
+                                            int rows,
+                                            int columns,
+                                            Presence presence,
+                                            double most = kMaxRoomMm,
+                                            RowGaps gaps = RowGaps::Refused);
   /// A rigid 4x4 transform.
   std::optional<RigidTransform> get_pose(const char* key, Presence presence);
   /// The tables of [[key]]; none is a problem when the key is required.

@@ -18,6 +18,7 @@
 #include "evaluate/image_quality/image_quality_tables.h"
 #include "evaluate/image_quality/loss_split.h"
 #include "evaluate/image_quality/loss_split_tables.h"
+#include "evaluate/outputs/paper_setting.h"
 #include "evaluate/outputs/result_figures.h"
 #include "evaluate/outputs/row_gathering.h"
 #include "evaluate/outputs/sample_summary_json.h"
@@ -54,6 +55,7 @@ struct TargetResult {
   std::string camera;
   std::vector<DrrComparison> comparisons;
   std::vector<PicturePanel> worst_pair;
+  bool is_papers_setting = false;  ///< rank 0
 
   [[nodiscard]] std::string label() const {
     return (case_name.empty() ? "camera" : case_name) + " " + camera;
@@ -165,6 +167,10 @@ void write_pair(const std::vector<PicturePanel>& panels,
                 zoom_of(panels.front().image));
 }
 
+PaperLevels levels_for(bool is_papers_setting) {
+  return is_papers_setting ? PaperLevels::Shown : PaperLevels::Hidden;
+}
+
 PsnrGroup group_of(const TargetResult& result) {
   PsnrGroup group{result.label(), {}};
   for (const DrrComparison& comparison : result.comparisons)
@@ -185,7 +191,9 @@ void write_results(const ImageQualityOptions& options,
   remove_output(folder / "summary.json");
   write_text_file(folder / "image-quality.csv", image_quality_table(comparisons).to_text());
   const PsnrGroup group = group_of(result);
-  draw_psnr_boxes({group}, folder / "psnr");
+  const json field = field_description(*setup.field);
+  result.is_papers_setting = is_papers_setting(field);
+  draw_psnr_boxes({group}, levels_for(result.is_papers_setting), folder / "psnr");
   json summary = {{"format", "attenuation-fields evaluation"},
                   {"format_version", 1},
                   {"kind", "image-quality"}};
@@ -209,7 +217,7 @@ void write_results(const ImageQualityOptions& options,
     summary["loss_split"] = write_loss_split(splits, folder);
     summary["figures"].push_back("loss-split");
   }
-  summary["field"] = field_description(*setup.field);
+  summary["field"] = field;
   summary["field"]["file_bytes"] = setup.field_info.file_bytes;
   summary["field"]["payload_bytes"] = setup.field_info.payload_bytes;
   summary["look_up"] = setup.look_up(options);
@@ -344,7 +352,11 @@ void write_together(const std::vector<TargetResult>& results, const std::filesys
     panels.insert(panels.end(), result.worst_pair.begin(), result.worst_pair.end());
   }
   write_text_file(folder / "image-quality.csv", table.to_text());
-  draw_psnr_boxes(groups, folder / "psnr");
+  const bool are_papers =
+      std::all_of(results.begin(), results.end(), [](const TargetResult& result) {
+        return result.is_papers_setting;
+      });
+  draw_psnr_boxes(groups, levels_for(are_papers), folder / "psnr");
   write_picture(panels,
                 3,
                 "The worst pair of every field",

@@ -120,6 +120,9 @@ json field_description(const CompressedAttenuationField& field) {
   const SlabLattice lattice = field.lattice(0);
   return {{"camera", identity.camera.name},
           {"detector_px", {identity.camera.size_px.x(), identity.camera.size_px.y()}},
+          {"pixel_spacing_mm",
+           {identity.camera.pixel_spacing_mm.x(), identity.camera.pixel_spacing_mm.y()}},
+          {"source_detector_mm", identity.camera.source_detector_distance_mm()},
           {"uv_nodes", {lattice.u.nodes, lattice.v.nodes}},
           {"st_nodes", {lattice.s.nodes, lattice.t.nodes}},
           {"slabs", field.slabs.size()},

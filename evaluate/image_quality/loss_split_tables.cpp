@@ -61,7 +61,7 @@ json write_loss_split(const std::vector<LossSplit>& splits, const std::filesyste
          {"share_of_total",
           number_json(mean_of_part(splits, part) / mean_of_part(splits, LossSplit::kParts - 1))}});
   }
-  draw_psnr_boxes(groups, folder / "loss-split");
+  draw_psnr_boxes(groups, PaperLevels::Hidden, folder / "loss-split");
   return {{"poses", splits.size()}, {"parts", parts}};
 }
 

@@ -88,6 +88,7 @@ std::string multiplot(const std::string& title, int rows, int columns) {
 }  // namespace
 
 void draw_psnr_boxes(const std::vector<PsnrGroup>& groups,
+                     PaperLevels levels,
                      const std::filesystem::path& path_without_extension) {
   GnuplotFigure figure("DRR quality: field against ray casting",
                        std::max(460, 240 + 170 * static_cast<int>(groups.size())),
@@ -117,9 +118,13 @@ void draw_psnr_boxes(const std::vector<PsnrGroup>& groups,
   figure.add("unset key\nset ylabel 'PSNR (dB)'\nset xtics (" + tics + ")\nset xrange [0.4:" +
              right_edge + "]\nset yrange [" + number_text(std::floor(lowest)) + ":" +
              number_text(std::ceil(highest)) + "]\nset rmargin 15\nset boxwidth 0.42");
-  const std::array<std::pair<int, const char*>, 3> levels = {
-      {{43, "43: paper's medians"}, {40, "40: almost all above"}, {36, "36: very few below"}}};
-  for (const auto& [level, text] : levels) {
+  const std::vector<std::pair<int, const char*>> lines =
+      levels == PaperLevels::Shown
+          ? std::vector<std::pair<int, const char*>>{{43, "43: paper's medians"},
+                                                     {40, "40: almost all above"},
+                                                     {36, "36: very few below"}}
+          : std::vector<std::pair<int, const char*>>{{40, "40"}, {36, "36"}};
+  for (const auto& [level, text] : lines) {
     const std::string y = std::to_string(level);
     std::string line = "set arrow from graph 0, first " + y;
     line.append(" to graph 1, first ").append(y).append(" nohead dt 2 lw 1 lc ").append(quiet());
@@ -141,7 +146,8 @@ void draw_psnr_boxes(const std::vector<PsnrGroup>& groups,
 void draw_success_rates(const std::vector<OutcomeGroup>& groups,
                         int intervals,
                         double width_mm,
-                        const std::filesystem::path& path_without_extension) {
+                        const std::filesystem::path& path_without_extension,
+                        double success_tre_mm) {
   GnuplotFigure figure("Success against initial error", kWidthPx, kHeightPx);
   std::vector<std::string> parts;
   CsvTable table(
@@ -151,7 +157,7 @@ void draw_success_rates(const std::vector<OutcomeGroup>& groups,
     const double shift_mm =
         width_mm * 0.12 * (static_cast<double>(g) - (static_cast<double>(groups.size()) - 1) / 2);
     for (const IntervalSuccess& interval :
-         success_per_interval(groups[g].outcomes, intervals, width_mm)) {
+         success_per_interval(groups[g].outcomes, intervals, width_mm, success_tre_mm)) {
       if (interval.trials == 0) continue;
       table.add_row({groups[g].label,
                      number_text(interval.low_mm),
@@ -177,14 +183,17 @@ void draw_success_rates(const std::vector<OutcomeGroup>& groups,
   figure.add("set xlabel 'initial TRE (mm)'\nset ylabel 'success (% of starts)'\nset xrange [0:" +
              number_text(intervals * width_mm) + "]\nset xtics " + number_text(width_mm) +
              "\nset yrange [0:102]\nset ytics 20\nset key bottom left reverse Left samplen 1.5\n"
-             "plot " +
-             plots(parts));
+             "set arrow from graph 0, first 95 to graph 1, first 95 nohead dt 2 lw 1 lc " +
+             quiet());
+  figure.add(label_at("95", "graph 0.995, first 95", "right offset 0,-0.6"));
+  figure.add("plot " + plots(parts));
   figure.draw(path_without_extension);
   write_figure_table(path_without_extension, table);
 }
 
 void draw_tre_histogram(const std::vector<OutcomeGroup>& groups,
-                        const std::filesystem::path& path_without_extension) {
+                        const std::filesystem::path& path_without_extension,
+                        double success_tre_mm) {
   GnuplotFigure figure("Error after registration", kWidthPx, kHeightPx);
   std::vector<std::string> parts;
   const auto group_count = static_cast<double>(groups.size());
@@ -221,10 +230,10 @@ void draw_tre_histogram(const std::vector<OutcomeGroup>& groups,
              number_text(end_mm) + "\nset xtics add ('> " + number_text(end_mm) + "' " +
              number_text(end_mm + 0.375) + ", '' " + number_text(end_mm) +
              ")\nset key top right samplen 1.5\nset arrow from first " +
-             number_text(kSuccessTreMm) + ", graph 0 to first " + number_text(kSuccessTreMm) +
+             number_text(success_tre_mm) + ", graph 0 to first " + number_text(success_tre_mm) +
              ", graph 1 nohead dt 2 lw 1.5 lc " + quiet());
-  figure.add(label_at("success: below " + number_text(kSuccessTreMm) + " mm",
-                      "first " + number_text(kSuccessTreMm) + ", graph 0.97",
+  figure.add(label_at("success: below " + number_text(success_tre_mm) + " mm",
+                      "first " + number_text(success_tre_mm) + ", graph 0.97",
                       "right offset -0.7,0"));
   figure.add("plot " + plots(parts));
   figure.draw(path_without_extension);
@@ -233,7 +242,8 @@ void draw_tre_histogram(const std::vector<OutcomeGroup>& groups,
 
 void draw_tre_scatter(const std::vector<OutcomeGroup>& groups,
                       double largest_initial_mm,
-                      const std::filesystem::path& path_without_extension) {
+                      const std::filesystem::path& path_without_extension,
+                      double success_tre_mm) {
   std::size_t most = 0;
   for (const OutcomeGroup& group : groups) most = std::max(most, group.outcomes.size());
   // More dots would tell nothing more, and make a page of many megabytes.
@@ -271,10 +281,10 @@ void draw_tre_scatter(const std::vector<OutcomeGroup>& groups,
       number_text(largest_initial_mm) + "]\nset yrange [" + number_text(kLowestMm) +
       ":*]\nset ytics (0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100)\nset key top left "
       "reverse Left samplen 1\nset samples 400\nset arrow from graph 0, first " +
-      number_text(kSuccessTreMm) + " to graph 1, first " + number_text(kSuccessTreMm) +
+      number_text(success_tre_mm) + " to graph 1, first " + number_text(success_tre_mm) +
       " nohead dt 2 lw 1.5 lc " + quiet());
   figure.add(label_at(
-      "success below", "graph 0.99, first " + number_text(kSuccessTreMm), "right offset 0,-0.6"));
+      "success below", "graph 0.99, first " + number_text(success_tre_mm), "right offset 0,-0.6"));
   figure.add(label_at(
       "no change", "graph 0.985, first " + number_text(largest_initial_mm * 1.25), "right"));
   figure.add("plot " + plots(parts));

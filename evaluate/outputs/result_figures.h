@@ -17,9 +17,15 @@ struct PsnrGroup {
   std::vector<double> psnr_db;
 };
 
+/// Whether the paper's PSNR may stand beside a figure: its levels hold for its motion range and its
+/// camera alone (see paper_setting.h).
+enum class PaperLevels { Hidden, Shown };
+
 /// Box plots (Fig. 8): box from quartile to quartile with the median, whiskers from the 5th to the
-/// 95th percentile, every pose as a dot, and the paper's levels 36, 40 and 43 dB.
+/// 95th percentile, every pose as a dot, and lines at 36 and 40 dB, or at all of the paper's
+/// levels.
 void draw_psnr_boxes(const std::vector<PsnrGroup>& groups,
+                     PaperLevels levels,
                      const std::filesystem::path& path_without_extension);
 
 /// The outcomes of one method, e.g. "field".
@@ -32,19 +38,22 @@ struct OutcomeGroup {
 void draw_success_rates(const std::vector<OutcomeGroup>& groups,
                         int intervals,
                         double width_mm,
-                        const std::filesystem::path& path_without_extension);
+                        const std::filesystem::path& path_without_extension,
+                        double success_tre_mm = kSuccessTreMm);
 
 /// Histogram of TRE (Fig. 15) as shares of each group's registrations; the last bar holds
 /// everything beyond, failures without a pose included.
 void draw_tre_histogram(const std::vector<OutcomeGroup>& groups,
-                        const std::filesystem::path& path_without_extension);
+                        const std::filesystem::path& path_without_extension,
+                        double success_tre_mm = kSuccessTreMm);
 
 /// Initial against final TRE, one dot per registration, logarithmic final TRE. Of more than 4000
 /// every second, third, ... is drawn, which the title says.
 /// \test Figures.DrawAPartOfVeryManyStartsAndSaySo
 void draw_tre_scatter(const std::vector<OutcomeGroup>& groups,
                       double largest_initial_mm,
-                      const std::filesystem::path& path_without_extension);
+                      const std::filesystem::path& path_without_extension,
+                      double success_tre_mm = kSuccessTreMm);
 
 /// One curve of a panel; NaN values are holes.
 struct PanelCurve {

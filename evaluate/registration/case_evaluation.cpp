@@ -47,6 +47,7 @@ struct Method {
   std::string renderer;
   RegistrationRunner runner;
   std::vector<std::int64_t> start_indices;  ///< ascending
+  double success_tre_mm = kSuccessTreMm;    ///< failures keep their traces
 };
 
 /// Inside the motion range of every field in use.
@@ -57,6 +58,14 @@ bool is_admissible(const std::vector<Method>& methods, const RigidTransform& roo
           !view.limit->range.contains(parameters_from_pose(view.limit->frame, room_from_ct)))
         return false;
   return true;
+}
+
+/// The motion range of the first field in use; the others may have another.
+std::optional<StartLimit> motion_limit(const std::vector<Method>& methods) {
+  for (const Method& method : methods)
+    for (const registration::RegistrationView& view : method.runner.problem().views)
+      if (view.limit.has_value()) return StartLimit{view.limit->frame, view.limit->range};
+  return std::nullopt;
 }
 
 /// Collective. Draws or reads a case's starts: on rank 0, the others share the work.
@@ -71,10 +80,12 @@ StratifiedStarts make_starts(const RegistrationStudyOptions& options,
       start_frame(study_case, yardstick),
       options.start_options(),
       yardstick.points_ct_mm,
-      [&](const RigidTransform& pose) { return is_admissible(methods, pose); });
+      [&](const RigidTransform& pose) { return is_admissible(methods, pose); },
+      motion_limit(methods));
   return starts_measured_together(world, measures, [&](StartMeasures& shared) {
     if (!options.starts_from.empty())
       return given_starts(options, study, study_case, yardstick, shared);
+    if (options.start_rule == "within-range") return starts_within_range(shared);
     return options.start_rule == "uniform" ? uniform_starts(shared) : stratified_starts(shared);
   });
 }
@@ -161,7 +172,7 @@ TracedRow traced_row(Method& method,
       yardstick);
   row.renderer = method.renderer;
   row.start_index = index;
-  if (!row.is_success())
+  if (!row.is_success(method.success_tre_mm))
     traced.trace = trace_points(trace, method.runner.problem().frame(), yardstick);
   return traced;
 }
@@ -451,7 +462,7 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
   std::vector<Method> methods;
   for (LoadedMethod& method :
        load_methods(options, options.correction, study, study_case, world, evaluation.input_sha256))
-    methods.push_back({method.renderer, std::move(method.runner), {}});
+    methods.push_back({method.renderer, std::move(method.runner), {}, options.success_tre_mm});
   const Yardstick yardstick = all_or_none(world, [&] {
     evaluation.gold = gold_standard(study, study_case, options.gold);
     return yardstick_of(study, study_case, evaluation.gold);

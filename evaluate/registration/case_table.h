@@ -11,4 +11,8 @@ namespace af::evaluation {
 /// the "renderers" of summary.json. TREs in mm; failures stay in rates and in the last columns.
 CsvTable case_table(const nlohmann::json& renderers);
 
+/// starts-per-interval.csv: how the starts of every case and interval were drawn, of the "cases"
+/// and "renderers" of summary.json; nan where that is not known (starts that another run drew).
+CsvTable drawn_starts_table(const nlohmann::json& cases, const nlohmann::json& renderers);
+
 }  // namespace af::evaluation

@@ -22,8 +22,15 @@ void CompareOptions::describe(Fields& field) {
   field("pose_distances",
         with_pose_distances,
         "Also the distance between the end poses of every two methods from the same starts (mean "
-        "over the target box: median, 95th percentile, maximum), as a table below and in a CSV "
-        "beside, ...-pose-distances.csv");
+        "over the target box: median, 95th percentile, maximum) for every patient, and their mean "
+        "over patients with intervals, as tables below and in CSVs beside, ...-pose-distances.csv "
+        "and ...-pose-distances-over-patients.csv");
+  field("equivalence_margin_mm",
+        equivalence_margin_mm,
+        "With --pose-distances: two methods count as equivalent when their ends lie closer "
+        "together than this on average over patients, mm")
+      .above(0.0)
+      .finite();
 }
 
 CLI::App* bind_compare(CLI::App& app, CompareOptions& options) {
@@ -48,7 +55,12 @@ void run_compare(const CompareOptions& options, const Communicator& world) {
     announce_output(options.output);
     std::filesystem::path distances_csv = csv;
     distances_csv.replace_filename(csv.stem().string() + "-pose-distances.csv");
-    if (options.with_pose_distances) announce_output(distances_csv);
+    std::filesystem::path patients_csv = csv;
+    patients_csv.replace_filename(csv.stem().string() + "-pose-distances-over-patients.csv");
+    if (options.with_pose_distances) {
+      announce_output(distances_csv);
+      announce_output(patients_csv);
+    }
     const std::vector<EvaluationRun> runs = find_runs(options.runs);
     const std::vector<MethodRow> rows = method_rows(runs);
     if (rows.empty())
@@ -61,10 +73,15 @@ void run_compare(const CompareOptions& options, const Communicator& world) {
     const std::vector<PoseDistanceRow> distances =
         options.with_pose_distances ? pose_distances(runs) : std::vector<PoseDistanceRow>();
     parts.push_back(pose_distances_markdown(distances));
+    const std::vector<PatientDistances> over_patients =
+        distances_over_patients(distances, options.equivalence_margin_mm);
+    parts.push_back(patient_distances_markdown(over_patients));
     for (const std::string& part : parts)
       if (!part.empty()) text += (text.empty() ? "" : "\n") + part;
-    if (options.with_pose_distances)
+    if (options.with_pose_distances) {
       write_text_file(distances_csv, pose_distances_table(distances).to_text());
+      write_text_file(patients_csv, patient_distances_table(over_patients).to_text());
+    }
     write_text_file(csv, methods_table(rows).to_text());
     write_text_file(options.output, text);
     std::cout << text;

@@ -17,6 +17,7 @@ struct CompareOptions {
   bool is_screen = false;  ///< Markdown of measures against optimisers
 
   bool with_pose_distances = false;
+  double equivalence_margin_mm = 0.1;
 
   void describe(Fields& field);
 };

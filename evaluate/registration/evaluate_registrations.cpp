@@ -23,11 +23,14 @@
 #include "evaluate/registration/case_table.h"
 #include "evaluate/registration/failure_traces.h"
 #include "evaluate/registration/found_poses.h"
+#include "evaluate/registration/paired_statistics.h"
 #include "evaluate/registration/registration_statistics.h"
 #include "evaluate/report/number_html.h"
 #include "figures/gnuplot_figure.h"
 #include "files/output_file.h"
 #include "files/sha256.h"
+#include "gold_standard/target_box.h"
+#include "gold_standard/tre.h"
 #include "parallel/work_watch.h"
 #include "pose_files/pose_file.h"
 #include "run/run_folder.h"
@@ -114,14 +117,68 @@ void add_target(const CaseEvaluation& evaluation, const StudyCase& study_case, j
                                  point_json(study_case.target_box_ct.high_mm)};
 }
 
+json numbers_json(const std::vector<double>& values) {
+  json result = json::array();
+  for (const double value : values) result.push_back(number_json(value));
+  return result;
+}
+
 json case_json(const CaseEvaluation& evaluation) {
-  return {{"case", evaluation.case_name},
-          {"gold", to_json(evaluation.gold)},
-          {"starts", evaluation.start_count},
-          {"draws", evaluation.starts.draws},
-          {"inadmissible_draws", evaluation.starts.inadmissible_draws},
-          {"inadmissible_draws_per_interval", evaluation.starts.inadmissible_per_interval},
-          {"draws_beyond_last_interval", evaluation.starts.draws_beyond}};
+  return {
+      {"case", evaluation.case_name},
+      {"gold", to_json(evaluation.gold)},
+      {"starts", evaluation.start_count},
+      {"draws", evaluation.starts.draws},
+      {"inadmissible_draws", evaluation.starts.inadmissible_draws},
+      {"inadmissible_draws_per_interval", evaluation.starts.inadmissible_per_interval},
+      {"draws_beyond_last_interval", evaluation.starts.draws_beyond},
+      {"draws_per_interval", evaluation.starts.draws_per_interval},
+      {"rotation_share_per_interval", numbers_json(evaluation.starts.rotation_share_per_interval)}};
+}
+
+/// Warnings about starts that are not of every kind: where the fields' range refused most draws.
+std::vector<std::string> warnings_about_starts(const RegistrationStudyOptions& options,
+                                               const CaseEvaluation& evaluation) {
+  const StratifiedStarts& starts = evaluation.starts;
+  std::string intervals;
+  for (std::size_t k = 0; k < starts.draws_per_interval.size(); ++k) {
+    const std::uint64_t draws = starts.draws_per_interval[k];
+    const std::uint64_t refused = starts.inadmissible_per_interval[k];
+    if (2 * refused <= draws) continue;
+    const auto low_mm = static_cast<double>(k) * options.interval_width_mm;
+    intervals += (intervals.empty() ? "" : ", ") + number_text(low_mm) + "-" +
+                 number_text(low_mm + options.interval_width_mm) +
+                 " mm: " + std::to_string(refused) + " of " + std::to_string(draws) +
+                 " (share of rotation " + fixed_text(starts.rotation_share_per_interval[k], 2) +
+                 ")";
+  }
+  if (intervals.empty()) return {};
+  return {evaluation.case_name +
+          ": the fields' range refused most draws of some starts, which are therefore not of every "
+          "kind (where nothing is refused the share of rotation is 0.5): " +
+          intervals};
+}
+
+/// How far the end poses of two rows lie apart, over the target points of their case.
+EndDistance end_distance_of(const Study& study, const std::vector<CaseEvaluation>& evaluations) {
+  struct Target {
+    PoseFrame frame;
+    std::vector<Eigen::Vector3d> points_ct_mm;
+  };
+  std::map<std::string, Target> targets;
+  for (const CaseEvaluation& evaluation : evaluations) {
+    const StudyCase& study_case = study.find_case(evaluation.case_name);
+    targets[evaluation.case_name] = {
+        PoseFrame::about(evaluation.gold.room_from_ct, study_case.center_ct_mm),
+        target_points(study_case.target_box_ct)};
+  }
+  return [targets = std::move(targets)](const RegistrationRow& a, const RegistrationRow& b) {
+    const Target& target = targets.at(a.case_name);
+    const auto end_of = [&](const RegistrationRow& row) {
+      return pose_from_parameters(target.frame, PoseParameters::from_deg_and_mm(row.final_deg_mm));
+    };
+    return mean_tre_mm(end_of(a), end_of(b), target.points_ct_mm);
+  };
 }
 
 /// The gold standard's own error, to stand beside every TRE: that of a case, and the mean over a
@@ -149,9 +206,12 @@ void draw_figures(const RegistrationStudyOptions& options, std::span<const Regis
     groups.push_back(
         {renderer == "raycast" ? "ray casting" : renderer, outcomes_of(rows, renderer)});
   const std::filesystem::path& folder = options.output_folder;
-  draw_success_rates(groups, options.intervals, options.interval_width_mm, folder / "success-rate");
-  draw_tre_histogram(groups, folder / "tre-histogram");
-  draw_tre_scatter(groups, options.intervals * options.interval_width_mm, folder / "tre-scatter");
+  const double success_mm = options.success_tre_mm;
+  draw_success_rates(
+      groups, options.intervals, options.interval_width_mm, folder / "success-rate", success_mm);
+  draw_tre_histogram(groups, folder / "tre-histogram", success_mm);
+  draw_tre_scatter(
+      groups, options.intervals * options.interval_width_mm, folder / "tre-scatter", success_mm);
 }
 
 json summary_json(const RegistrationStudyOptions& options,
@@ -162,7 +222,8 @@ json summary_json(const RegistrationStudyOptions& options,
                   {"format_version", 1},
                   {"kind", "registration"},
                   {"study", study.path.string()},
-                  {"success_tre_mm", kSuccessTreMm}};
+                  {"success_tre_mm", options.success_tre_mm},
+                  {"start_rule", options.starts_from.empty() ? options.start_rule : "given"}};
   const registration::RegistrationOptions method = registration::resolve(options.method);
   summary["method"] = {
       {"preset", options.method.chains.empty() ? options.method.preset_name() : "chain"},
@@ -174,13 +235,19 @@ json summary_json(const RegistrationStudyOptions& options,
   summary["pictures"] = json::array();
   for (const CaseEvaluation& evaluation : evaluations) {
     summary["cases"].push_back(case_json(evaluation));
-    add_target(evaluation, study.find_case(evaluation.case_name), summary["cases"].back());
+    const StudyCase& study_case = study.find_case(evaluation.case_name);
+    add_target(evaluation, study_case, summary["cases"].back());
+    summary["cases"].back()["views"] = study_case.views.size();
     for (const json& picture : evaluation.pictures) summary["pictures"].push_back(picture);
   }
   summary["renderers"] = json::array();
   for (const std::string& renderer : options.renderers())
-    summary["renderers"].push_back(renderer_statistics(
-        rows, renderer, {options.intervals, options.interval_width_mm, options.method.seed}));
+    summary["renderers"].push_back(renderer_statistics(rows,
+                                                       renderer,
+                                                       {options.intervals,
+                                                        options.interval_width_mm,
+                                                        options.method.seed,
+                                                        options.success_tre_mm}));
   add_gold_uncertainty(evaluations, summary["renderers"]);
   std::vector<std::string> found = row_problems(rows);
   for (const CaseEvaluation& evaluation : evaluations)
@@ -193,8 +260,14 @@ json summary_json(const RegistrationStudyOptions& options,
   }
   summary["row_problems"] = found;
   summary["warnings"] = warnings_about_cases(evaluations.size());
-  summary["field_against_raycast"] =
-      paired_statistics(rows, options.equivalence_margin_mm, options.method.seed);
+  for (const CaseEvaluation& evaluation : evaluations)
+    for (const std::string& text : warnings_about_starts(options, evaluation))
+      summary["warnings"].push_back(text);
+  summary["field_against_raycast"] = paired_statistics(rows,
+                                                       {options.equivalence_margin_mm,
+                                                        options.method.seed,
+                                                        options.success_tre_mm,
+                                                        end_distance_of(study, evaluations)});
   summary["figures"] = {"success-rate", "tre-histogram", "tre-scatter"};
   summary["repeat"] = repeat_json(options);
   if (options.only_start.has_value()) summary["only_start"] = *options.only_start;
@@ -231,7 +304,7 @@ void print_outcome(const json& summary,
     std::cout << renderer["renderer"].get<std::string>() << ": "
               << renderer["successes"].get<std::int64_t>() << " of "
               << renderer["starts"].get<std::int64_t>() << " starts succeeded (TRE < "
-              << number_text(kSuccessTreMm) << " mm)";
+              << number_text(number_of(summary["success_tre_mm"])) << " mm)";
     std::cout << mean_text(renderer);
     const double seconds = number_of(renderer["seconds"]["median"]);
     if (std::isfinite(seconds)) std::cout << ", median " << seconds_text(seconds) << " each";
@@ -303,9 +376,11 @@ void describe_starts(Fields& field, RegistrationStudyOptions& options) {
   field("interval_width_mm", options.interval_width_mm, "Width of an interval, mm");
   field("start_rule",
         options.start_rule,
-        "stratified: as many starts in each interval (the paper); uniform: as many in all, their "
-        "initial TREs uniform over all intervals")
-      .choice({"stratified", "uniform"});
+        "stratified: as many starts in each interval, draws outside the fields' motion range drawn "
+        "again (the paper); uniform: as many in all, their initial TREs uniform over all "
+        "intervals; within-range: as many in each interval, inside the motion range by design, in "
+        "directions that are uniform in its box")
+      .choice({"stratified", "uniform", "within-range"});
   field("starts_from",
         options.starts_from,
         "starts.csv of another run instead of drawn starts: [case,] and m00 ... m23 of "
@@ -344,11 +419,16 @@ void describe_methods(Fields& field, RegistrationStudyOptions& options) {
         "With --renderer both: ray casting only in the first so many intervals (default: all)");
   field("equivalence_margin_mm",
         options.equivalence_margin_mm,
-        "Field and ray casting count as equal when their mean TREs differ by less, mm: two "
-        "one-sided tests")
+        "Field and ray casting count as equivalent when their end poses lie closer together than "
+        "this on average over patients, mm")
       .above(0.0)
       .finite()
       .not_deciding("rows do not depend on it");
+  field("success_tre_mm",
+        options.success_tre_mm,
+        "A registration that ends below this TRE succeeded, mm")
+      .above(0.0)
+      .finite();
 }
 
 }  // namespace
@@ -402,7 +482,12 @@ void run_registration(const RegistrationStudyOptions& options,
     if (world.is_root()) require_gnuplot();
   });
   RunFolder run({folder,
-                 {"starts.csv", "registrations.csv", "cases.csv", "reproduce.sh", "summary.json"},
+                 {"starts.csv",
+                  "registrations.csv",
+                  "cases.csv",
+                  "starts-per-interval.csv",
+                  "reproduce.sh",
+                  "summary.json"},
                  options.resume.restarts},
                 world);
   const Study study = shared_study(options.study, world, &study_warnings);
@@ -449,11 +534,13 @@ void run_registration(const RegistrationStudyOptions& options,
     for (const CaseEvaluation& evaluation : evaluations)
       provenance.input_sha256.insert(evaluation.input_sha256.begin(),
                                      evaluation.input_sha256.end());
-    write_registrations(folder / "registrations.csv", rows.view());
+    write_registrations(folder / "registrations.csv", rows.view(), options.success_tre_mm);
     write_traces(folder, evaluations);
     draw_figures(options, rows.view());
     const json summary = summary_json(options, study, evaluations, rows.view());
     write_text_file(folder / "cases.csv", case_table(summary["renderers"]).to_text());
+    write_text_file(folder / "starts-per-interval.csv",
+                    drawn_starts_table(summary["cases"], summary["renderers"]).to_text());
     run.finish(summary, provenance);
     print_outcome(summary, folder, world);
   });

@@ -11,6 +11,7 @@
 #include "cli/run_limits.h"
 #include "evaluate/methods/evaluated_methods.h"
 #include "evaluate/starts/perturbed_starts.h"
+#include "evaluate/statistics/success_rate.h"
 #include "parallel/communicator.h"
 
 namespace af::evaluation {
@@ -24,13 +25,14 @@ struct RegistrationStudyOptions : MethodOptions {
   double interval_width_mm = 2.0;
   std::optional<int> raycast_starts_per_interval;  ///< with "both"; default: as many
   std::optional<int> raycast_intervals;            ///< with "both"; default: as many
-  std::string start_rule = "stratified";           ///< or "uniform" in initial TRE
+  std::string start_rule = "stratified";           ///< or "uniform", "within-range"
   std::filesystem::path starts_from;               ///< starts.csv instead of drawn ones
   bool is_starts_only = false;                     ///< write starts.csv and register nothing
   std::optional<std::int64_t> only_start;          ///< of the table of starts, by every renderer
   std::filesystem::path poses_from;                ///< poses that another program found
   std::string method_name = "poses";               ///< what these are called
   double equivalence_margin_mm = 0.1;
+  double success_tre_mm = kSuccessTreMm;
   cli::ResumeOptions resume;
   std::filesystem::path output_folder;
   std::string program = "af-evaluate";  ///< as typed, quoted for a shell

@@ -10,8 +10,12 @@
 
 #include <Eigen/Core>
 
+#include "base/error.h"
 #include "evaluate/outputs/sample_summary_json.h"
+#include "evaluate/registration/registration_statistics.h"
+#include "evaluate/starts/perturbed_starts.h"
 #include "evaluate/statistics/statistics.h"
+#include "gold_standard/target_box.h"
 
 namespace af::evaluation {
 
@@ -25,27 +29,74 @@ constexpr std::size_t kBands = std::size(kBandEndsMm) - 1;
 struct Sums {
   std::array<IntervalSuccess, kBands> bands{};
   Eigen::Matrix<double, 6, 1> parameters = Eigen::Matrix<double, 6, 1>::Zero();
-  std::vector<double> tre_mm;  ///< of successes
+  std::vector<double> tre_mm;              ///< of successes
+  std::vector<double> rotation_error_deg;  ///< of successes
+  std::array<double, kBands> rotation_share{};
+  std::int64_t gross_failures = 0;
   std::int64_t starts = 0;
   std::vector<double> drr_counts;
   std::vector<double> seconds;
 };
 
-void add_row(const CsvTable& table, std::size_t row, Sums& sums) {
+/// What of a run's summary its rows are read with.
+struct RunFacts {
+  double success_tre_mm = kSuccessTreMm;
+  std::map<std::string, double> radius_mm;  ///< of the cases' target boxes, about their centres
+};
+
+Eigen::Vector3d point_in(const json& values) {
+  return {values.at(0).get<double>(), values.at(1).get<double>(), values.at(2).get<double>()};
+}
+
+/// Runs of earlier versions do not state all of it.
+RunFacts facts_of(const EvaluationRun& run) {
+  RunFacts facts;
+  const json threshold = run.summary.value("success_tre_mm", json());
+  if (threshold.is_number()) facts.success_tre_mm = threshold.get<double>();
+  try {
+    for (const json& of_case : run.summary.value("cases", json::array())) {
+      if (!of_case.contains("target_box_ct_mm") || !of_case.contains("center_ct_mm")) continue;
+      const json& box = of_case.at("target_box_ct_mm");
+      facts.radius_mm[of_case.at("case").get<std::string>()] = rms_radius_mm(
+          {point_in(box.at(0)), point_in(box.at(1))}, point_in(of_case.at("center_ct_mm")));
+    }
+  } catch (const json::exception&) {
+    throw FileError((run.folder / "summary.json").string(),
+                    "cases",
+                    "a name, a box of two points and a centre",
+                    "something else");
+  }
+  return facts;
+}
+
+double rotation_share_of(const CsvTable& table, std::size_t row, const RunFacts& facts) {
+  const auto radius_mm = facts.radius_mm.find(table.text(row, "case"));
+  if (radius_mm == facts.radius_mm.end()) return kNan;
+  std::array<double, 6> start{};
+  for (std::size_t i = 0; i < start.size(); ++i)
+    start[i] = table.number(row, std::string("start_") + kParameterNames[i]);
+  return rotation_share(PoseParameters::from_deg_and_mm(start), radius_mm->second);
+}
+
+void add_row(const CsvTable& table, std::size_t row, const RunFacts& facts, Sums& sums) {
   const double initial_mm = table.number(row, "initial_tre_mm");
   const double tre_mm = table.number_or_nan(row, "tre_mm");
-  const bool is_success = tre_mm < kSuccessTreMm;
+  const bool is_success = tre_mm < facts.success_tre_mm;
   ++sums.starts;
+  sums.gross_failures += tre_mm < kGrossFailureTreMm ? 0 : 1;
   for (std::size_t band = 0; band < kBands; ++band) {
     if (!(initial_mm >= kBandEndsMm[band] && initial_mm < kBandEndsMm[band + 1])) continue;
     ++sums.bands[band].trials;
     sums.bands[band].successes += is_success ? 1 : 0;
+    sums.rotation_share[band] += rotation_share_of(table, row, facts);
   }
   sums.drr_counts.push_back(table.number(row, "drr_count"));
   const double seconds = table.number_or_nan(row, "seconds");
   if (std::isfinite(seconds)) sums.seconds.push_back(seconds);
   if (!is_success) return;
   sums.tre_mm.push_back(tre_mm);
+  const double rotation_deg = table.number_or_nan(row, "rotation_error_deg");
+  if (std::isfinite(rotation_deg)) sums.rotation_error_deg.push_back(rotation_deg);
   constexpr std::array<const char*, 6> kFinal = {
       "final_rx_deg", "final_ry_deg", "final_rz_deg", "final_tx_mm", "final_ty_mm", "final_tz_mm"};
   for (std::size_t i = 0; i < kFinal.size(); ++i)
@@ -63,6 +114,25 @@ void name_method(const EvaluationRun& run, MethodRow& row) {
   if (row.renderer == "field" && method.value("corrected", false)) row.method += " corrected";
 }
 
+/// The case's own capture range of a run's summary.
+std::string capture_range_of(const EvaluationRun& run,
+                             const std::string& case_name,
+                             const std::string& renderer) {
+  for (const json& of_renderer : run.summary.value("renderers", json::array())) {
+    if (of_renderer.value("renderer", "") != renderer) continue;
+    for (const json& of_case : of_renderer.value("cases", json::array())) {
+      const json range = of_case.value("capture_range", json());
+      // Without what ended it, it is the cumulative range of an earlier version.
+      if (of_case.value("case", "") != case_name || !range.is_object() ||
+          !range.contains("ended_by"))
+        continue;
+      return (range.at("is_whole_study").get<bool>() ? "at least " : "") +
+             fixed_text(range.at("initial_tre_mm").get<double>(), 0);
+    }
+  }
+  return "-";
+}
+
 MethodRow row_of(const EvaluationRun& run,
                  const std::string& case_name,
                  const std::string& renderer,
@@ -78,6 +148,8 @@ MethodRow row_of(const EvaluationRun& run,
     row.bands[band].low_mm = kBandEndsMm[band];
     row.bands[band].high_mm = kBandEndsMm[band + 1];
     row.bands[band].wilson = wilson_interval(sums.bands[band].successes, sums.bands[band].trials);
+    row.rotation_shares.push_back(sums.rotation_share[band] /
+                                  static_cast<double>(sums.bands[band].trials));
   }
   // NaN without a success: 0 / 0.
   const auto successes = static_cast<double>(sums.tre_mm.size());
@@ -86,6 +158,9 @@ MethodRow row_of(const EvaluationRun& run,
   row.median_tre_mm = tre.median;
   row.rotation_bias_deg = sums.parameters.head<3>().norm() / successes;
   row.translation_bias_mm = sums.parameters.tail<3>().norm() / successes;
+  row.median_rotation_error_deg = summarize(sums.rotation_error_deg).median;
+  row.gross_failures = sums.gross_failures;
+  row.capture_range_mm = capture_range_of(run, case_name, renderer);
   row.median_drr_count = summarize(sums.drr_counts).median;
   row.median_seconds = summarize(sums.seconds).median;
   return row;
@@ -148,10 +223,11 @@ std::vector<MethodRow> method_rows(const std::vector<EvaluationRun>& runs) {
   std::vector<MethodRow> rows;
   for (const EvaluationRun& run : runs) {
     if (run.kind != "registration") continue;
+    const RunFacts facts = facts_of(run);
     std::map<std::pair<std::string, std::string>, Sums> sums;
     run.read_in_parts("registrations.csv", [&](const CsvTable& table) {
       for (std::size_t i = 0; i < table.row_count(); ++i)
-        add_row(table, i, sums[{table.text(i, "case"), table.text(i, "renderer")}]);
+        add_row(table, i, facts, sums[{table.text(i, "case"), table.text(i, "renderer")}]);
     });
     for (const auto& [key, value] : sums) rows.push_back(row_of(run, key.first, key.second, value));
   }
@@ -163,13 +239,17 @@ CsvTable methods_table(const std::vector<MethodRow>& rows) {
   for (std::size_t band = 0; band < kBands; ++band) {
     const std::string name =
         fixed_text(kBandEndsMm[band], 0) + "_" + fixed_text(kBandEndsMm[band + 1], 0) + "_mm";
-    for (const char* what : {"starts_", "successes_", "wilson_low_", "wilson_high_"})
+    for (const char* what :
+         {"starts_", "successes_", "wilson_low_", "wilson_high_", "rotation_share_"})
       columns.push_back(what + name);
   }
   for (const char* name : {"mean_tre_mm",
                            "median_tre_mm",
                            "rotation_bias_deg",
                            "translation_bias_mm",
+                           "median_rotation_error_deg",
+                           "gross_failures",
+                           "capture_range_mm",
                            "median_drr_count",
                            "median_seconds"})
     columns.emplace_back(name);
@@ -177,19 +257,24 @@ CsvTable methods_table(const std::vector<MethodRow>& rows) {
   for (const MethodRow& row : rows) {
     std::vector<std::string> fields = {
         row.run, row.case_name, row.method, row.renderer, std::to_string(row.starts)};
-    for (const IntervalSuccess& band : row.bands) {
+    for (std::size_t i = 0; i < row.bands.size(); ++i) {
+      const IntervalSuccess& band = row.bands[i];
       fields.push_back(std::to_string(band.trials));
       fields.push_back(std::to_string(band.successes));
       fields.push_back(number_text(band.wilson.low));
       fields.push_back(number_text(band.wilson.high));
+      fields.push_back(number_text(row.rotation_shares.at(i)));
     }
     for (const double value : {row.mean_tre_mm,
                                row.median_tre_mm,
                                row.rotation_bias_deg,
                                row.translation_bias_mm,
-                               row.median_drr_count,
-                               row.median_seconds})
+                               row.median_rotation_error_deg})
       fields.push_back(number_text(value));
+    fields.push_back(std::to_string(row.gross_failures));
+    fields.push_back(row.capture_range_mm);
+    fields.push_back(number_text(row.median_drr_count));
+    fields.push_back(number_text(row.median_seconds));
     table.add_row(std::move(fields));
   }
   return table;
@@ -201,19 +286,24 @@ std::string methods_markdown(const std::vector<MethodRow>& rows) {
     text += (band == 0 ? "" : " / ") + fixed_text(kBandEndsMm[band], 0) + "-" +
             fixed_text(kBandEndsMm[band + 1], 0);
   text +=
-      " mm | of starts | TRE of successes, mm: mean, median | Bias, deg and mm | DRRs | Seconds |\n"
-      "|---|---|---|---|---|---|---|---|---|---|\n";
+      " mm | of starts | of whose size is rotation | Capture range, mm | Gross failures | TRE of "
+      "successes, mm: mean, median | Bias, deg and mm | DRRs | Seconds |\n"
+      "|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
   for (const MethodRow& row : rows) {
     std::string percents;
     std::string counts;
+    std::string shares;
     for (const IntervalSuccess& band : row.bands) {
       percents += (percents.empty() ? "" : " / ") + percent_text(band) + wilson_text(band);
       counts += (counts.empty() ? "" : " / ") + std::to_string(band.trials);
     }
+    for (const double share : row.rotation_shares)
+      shares += (shares.empty() ? "" : " / ") + number_or_dash(share, 2);
     text += "| " + row.run + " | " + row.case_name + " | " + row.method + " | " + row.renderer +
-            " | " + percents + " | " + counts + " | " + number_or_dash(row.mean_tre_mm, 3) + ", " +
-            number_or_dash(row.median_tre_mm, 3) + " | " +
-            number_or_dash(row.rotation_bias_deg, 3) + ", " +
+            " | " + percents + " | " + counts + " | " + shares + " | " + row.capture_range_mm +
+            " | " + std::to_string(row.gross_failures) + " | " +
+            number_or_dash(row.mean_tre_mm, 3) + ", " + number_or_dash(row.median_tre_mm, 3) +
+            " | " + number_or_dash(row.rotation_bias_deg, 3) + ", " +
             number_or_dash(row.translation_bias_mm, 3) + " | " +
             number_or_dash(row.median_drr_count, 0) + " | " +
             number_or_dash(row.median_seconds, 4) + " |\n";
@@ -247,6 +337,25 @@ std::string studies_markdown(const std::vector<MethodRow>& rows) {
   return table.columns.size() < 2 ? std::string() : table.markdown();
 }
 
+namespace {
+
+/// "0.021 [0.018, 0.024]" by bootstrap, and Student's interval behind it.
+std::string over_patients_text(const json& over) {
+  const auto number = [&](const char* name) { return number_or_dash(number_of(over[name]), 3); };
+  return number("mean") + " [" + number("low") + ", " + number("high") + "], Student [" +
+         number("student_low") + ", " + number("student_high") + "]";
+}
+
+std::string claim_text(const json& ends) {
+  const json& is_equivalent = ends["is_equivalent"];
+  if (is_equivalent.is_null())
+    return "not claimed: fewer than " + ends["cases_needed"].dump() + " patients";
+  return std::string(is_equivalent.get<bool>() ? "yes" : "not shown") + ", p " +
+         p_text(number_of(ends["p"]));
+}
+
+}  // namespace
+
 std::string pairs_markdown(const std::vector<EvaluationRun>& runs) {
   std::string text;
   for (const EvaluationRun& run : runs) {
@@ -256,20 +365,30 @@ std::string pairs_markdown(const std::vector<EvaluationRun>& runs) {
     const auto number = [&](const char* name, int decimals) {
       return number_or_dash(number_of(test[name]), decimals);
     };
+    // Runs of earlier versions have no distances.
+    const json ends = pairs.value("end_distance_mm", json());
     text += "| " + run.folder.filename().string() + " | " + pairs["common_starts"].dump() + " | " +
             pairs["successes"][0].dump() + ", " + pairs["successes"][1].dump() + " | " +
             number_or_dash(number_of(pairs["mcnemar_p"]), 2) + " | " + pairs["pairs"].dump() +
-            " | " + number("mean_difference_mm", 3) + " [" + number("low_90_mm", 3) + ", " +
-            number("high_90_mm", 3) + "] | " + p_text(number_of(test["equivalence_p"])) + " at " +
-            number("margin_mm", 2) + " mm | " + number("equivalence_power", 2) + " | " +
+            " | ";
+    if (ends.is_object())
+      text += ends["over_cases"]["cases"].dump() + " | " + over_patients_text(ends["over_cases"]) +
+              " | " + number_or_dash(number_of(ends["pairs"]["p95"]), 3) + ", " +
+              number_or_dash(number_of(ends["pairs"]["max"]), 3) + " | " +
+              number_or_dash(number_of(ends["margin_mm"]), 2) + " mm: " + claim_text(ends) + " | ";
+    else
+      text += "- | - | - | - | ";
+    text += number("mean_difference_mm", 3) + " [" + number("low_90_mm", 3) + ", " +
+            number("high_90_mm", 3) + "] | " +
             number_or_dash(number_of(pairs["median_seconds"][0]), 4) + ", " +
             number_or_dash(number_of(pairs["median_seconds"][1]), 2) + " |\n";
   }
   if (text.empty()) return text;
-  return "| Run | Common starts | Successes: field, ray casting | McNemar p | Pairs | TRE, field "
-         "less "
-         "ray casting, mm [90 % interval] | Equivalence p | Power | Seconds |\n"
-         "|---|---|---|---|---|---|---|---|---|\n" +
+  return "| Run | Common starts | Successes: field, ray casting | McNemar p | Pairs | Patients | "
+         "End poses apart, mm: mean over patients [95 % intervals] | of pairs: 95th percentile, "
+         "largest | Equivalent within | TRE, field less ray casting, mm [90 % interval, starts as "
+         "if independent] | Seconds |\n"
+         "|---|---|---|---|---|---|---|---|---|---|---|\n" +
          text;
 }
 

@@ -20,12 +20,19 @@ struct MethodRow {
   std::string preset, similarity, optimizer;  ///< the parts of it; empty for other programs' poses
   std::string renderer;
   std::vector<IntervalSuccess> bands;  ///< of initial TRE, see kBandEndsMm
+  /// Per band the mean rotation_share() of the starts; NaN where a run does not state its target.
+  std::vector<double> rotation_shares;
   std::int64_t starts = 0;
   double mean_tre_mm = 0.0;  ///< of successes, as the rest
   double median_tre_mm = 0.0;
   double rotation_bias_deg = 0.0;    ///< length of the mean signed rotation
   double translation_bias_mm = 0.0;  ///< length of the mean signed translation
-  double median_drr_count = 0.0;     ///< of all starts, as the seconds
+  double median_rotation_error_deg = 0.0;
+  std::int64_t gross_failures = 0;  ///< of all starts: 10 mm or more, or no pose
+  /// The case's own capture range as text, "at least 16" where the study ends first; "-" where the
+  /// run's summary does not have it.
+  std::string capture_range_mm = "-";
+  double median_drr_count = 0.0;  ///< of all starts, as the seconds
   double median_seconds = 0.0;
 };
 
@@ -51,9 +58,9 @@ std::string screen_markdown(const std::vector<MethodRow>& rows);
 /// others are left out. Empty with fewer than two methods.
 std::string studies_markdown(const std::vector<MethodRow>& rows);
 
-/// Field against ray casting from the same starts, of the runs that have both: success, the paired
-/// TRE difference with its 90 % interval, two one-sided tests and their power, as a table in
-/// Markdown; empty without such a run.
+/// Field against ray casting from the same starts, of the runs that have both: success, the
+/// distance between the two end poses with intervals over patients and what is claimed of it, and
+/// the paired TRE difference, as a table in Markdown; empty without such a run.
 std::string pairs_markdown(const std::vector<EvaluationRun>& runs);
 
 }  // namespace af::evaluation

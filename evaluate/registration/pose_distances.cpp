@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "evaluate/registration/pose_distances.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -122,6 +123,11 @@ std::vector<double> distances_mm(const MethodEnds& a, const MethodEnds& b) {
   return distances;
 }
 
+std::string claim_of(const CaseEquivalence& found) {
+  if (!found.has_enough_cases()) return "too few patients";
+  return found.is_shown() ? "yes" : "not shown";
+}
+
 }  // namespace
 
 std::vector<PoseDistanceRow> pose_distances(const std::vector<EvaluationRun>& runs) {
@@ -149,6 +155,7 @@ CsvTable pose_distances_table(const std::vector<PoseDistanceRow>& rows) {
                   "run_b",
                   "renderer_b",
                   "starts",
+                  "mean_distance_mm",
                   "median_distance_mm",
                   "p95_distance_mm",
                   "max_distance_mm"});
@@ -159,6 +166,7 @@ CsvTable pose_distances_table(const std::vector<PoseDistanceRow>& rows) {
                    row.run_b,
                    row.renderer_b,
                    std::to_string(row.distance_mm.count),
+                   number_text(row.distance_mm.mean),
                    number_text(row.distance_mm.median),
                    number_text(row.distance_mm.percentile_95),
                    number_text(row.distance_mm.maximum)});
@@ -176,6 +184,86 @@ std::string pose_distances_markdown(const std::vector<PoseDistanceRow>& rows) {
             fixed_text(row.distance_mm.median, 4) + ", " +
             fixed_text(row.distance_mm.percentile_95, 4) + ", " +
             fixed_text(row.distance_mm.maximum, 4) + " |\n";
+  return text;
+}
+
+std::vector<PatientDistances> distances_over_patients(const std::vector<PoseDistanceRow>& rows,
+                                                      double margin_mm) {
+  std::vector<PatientDistances> methods;
+  std::vector<std::vector<double>> means_mm;
+  for (const PoseDistanceRow& row : rows) {
+    const auto is_same = [&](const PatientDistances& other) {
+      return other.run_a == row.run_a && other.renderer_a == row.renderer_a &&
+             other.run_b == row.run_b && other.renderer_b == row.renderer_b;
+    };
+    auto method = std::find_if(methods.begin(), methods.end(), is_same);
+    if (method == methods.end()) {
+      methods.push_back({row.run_a, row.renderer_a, row.run_b, row.renderer_b, 0, {}});
+      means_mm.emplace_back();
+      method = methods.end() - 1;
+    }
+    method->starts += row.distance_mm.count;
+    means_mm[static_cast<std::size_t>(method - methods.begin())].push_back(row.distance_mm.mean);
+  }
+  constexpr std::uint64_t kSeed = 1;
+  for (std::size_t i = 0; i < methods.size(); ++i)
+    methods[i].equivalence = equivalence_over_cases(means_mm[i], margin_mm, kSeed);
+  return methods;
+}
+
+CsvTable patient_distances_table(const std::vector<PatientDistances>& methods) {
+  CsvTable table({"run_a",
+                  "renderer_a",
+                  "run_b",
+                  "renderer_b",
+                  "patients",
+                  "starts",
+                  "mean_distance_mm",
+                  "bootstrap_low_mm",
+                  "bootstrap_high_mm",
+                  "student_low_mm",
+                  "student_high_mm",
+                  "margin_mm",
+                  "p",
+                  "claim"});
+  for (const PatientDistances& method : methods) {
+    const CaseEquivalence& found = method.equivalence;
+    table.add_row({method.run_a,
+                   method.renderer_a,
+                   method.run_b,
+                   method.renderer_b,
+                   std::to_string(found.cases),
+                   std::to_string(method.starts),
+                   number_text(found.mean),
+                   number_text(found.bootstrap.low),
+                   number_text(found.bootstrap.high),
+                   number_text(found.student.low),
+                   number_text(found.student.high),
+                   number_text(found.margin),
+                   number_text(found.p),
+                   claim_of(found)});
+  }
+  return table;
+}
+
+std::string patient_distances_markdown(const std::vector<PatientDistances>& methods) {
+  if (methods.empty()) return "";
+  std::string text =
+      "| End poses of | and of | Patients | Starts | Distance, mm: mean over patients [95 % by "
+      "bootstrap], Student's | Equivalent |\n|---|---|---|---|---|---|\n";
+  for (const PatientDistances& method : methods) {
+    const CaseEquivalence& found = method.equivalence;
+    const auto interval = [](double low, double high) {
+      return std::isnan(low) ? std::string("-")
+                             : "[" + fixed_text(low, 4) + ", " + fixed_text(high, 4) + "]";
+    };
+    text += "| " + method.run_a + " " + method.renderer_a + " | " + method.run_b + " " +
+            method.renderer_b + " | " + std::to_string(found.cases) + " | " +
+            std::to_string(method.starts) + " | " + fixed_text(found.mean, 4) + " " +
+            interval(found.bootstrap.low, found.bootstrap.high) + ", " +
+            interval(found.student.low, found.student.high) + " | within " +
+            number_text(found.margin) + " mm: " + claim_of(found) + " |\n";
+  }
   return text;
 }
 

@@ -3,11 +3,13 @@
 // lets errors in opposite directions cancel; a distance does not.
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <vector>
 
 #include "base/sample_summary.h"
 #include "evaluate/report/evaluation_run.h"
+#include "evaluate/statistics/case_equivalence.h"
 #include "text/csv_table.h"
 
 namespace af::evaluation {
@@ -29,5 +31,22 @@ CsvTable pose_distances_table(const std::vector<PoseDistanceRow>& rows);
 
 /// The same for people, as a table in Markdown.
 std::string pose_distances_markdown(const std::vector<PoseDistanceRow>& rows);
+
+/// Two methods over all patients that both registered.
+struct PatientDistances {
+  std::string run_a, renderer_a;
+  std::string run_b, renderer_b;
+  std::size_t starts = 0;
+  CaseEquivalence equivalence;  ///< of the patients' mean distances
+};
+
+/// In the order of the rows. Every patient counts alike.
+std::vector<PatientDistances> distances_over_patients(const std::vector<PoseDistanceRow>& rows,
+                                                      double margin_mm);
+
+CsvTable patient_distances_table(const std::vector<PatientDistances>& methods);
+
+/// The same for people, as a table in Markdown; empty without methods.
+std::string patient_distances_markdown(const std::vector<PatientDistances>& methods);
 
 }  // namespace af::evaluation

@@ -50,7 +50,9 @@ std::vector<std::string> start_fields(const std::string& case_name,
   return fields;
 }
 
-registration::NamedCells cells_of(const RegistrationRow& row, bool with_correction) {
+registration::NamedCells cells_of(const RegistrationRow& row,
+                                  bool with_correction,
+                                  double success_tre_mm) {
   const registration::RegistrationCells cells = {.case_name = row.case_name,
                                                  .start_index = row.start_index,
                                                  .renderer = row.renderer,
@@ -78,30 +80,35 @@ registration::NamedCells cells_of(const RegistrationRow& row, bool with_correcti
                          before_seconds);
   return registration::registration_row(
       cells,
-      {{"success", row.is_success() ? "1" : "0"},
+      {{"success", row.is_success(success_tre_mm) ? "1" : "0"},
        {"interval", std::to_string(row.interval)},
        {"draw_index", std::to_string(row.draw_index)},
        {"stated_pose_tre_mm", number_text(row.stated_pose_tre_mm)}},
       before_seconds);
 }
 
-CsvTable table_of(std::span<const RegistrationRow> rows, bool with_correction) {
-  CsvTable table(registration::names_of(cells_of(RegistrationRow(), with_correction)));
+CsvTable table_of(std::span<const RegistrationRow> rows,
+                  bool with_correction,
+                  double success_tre_mm) {
+  CsvTable table(
+      registration::names_of(cells_of(RegistrationRow(), with_correction, success_tre_mm)));
   for (const RegistrationRow& row : rows)
-    table.add_row(registration::texts_of(cells_of(row, with_correction)));
+    table.add_row(registration::texts_of(cells_of(row, with_correction, success_tre_mm)));
   return table;
 }
 
 }  // namespace
 
-CsvTable registrations_table(std::span<const RegistrationRow> rows) {
-  return table_of(rows, is_any_corrected(rows));
+CsvTable registrations_table(std::span<const RegistrationRow> rows, double success_tre_mm) {
+  return table_of(rows, is_any_corrected(rows), success_tre_mm);
 }
 
-void write_registrations(const std::filesystem::path& path, std::span<const RegistrationRow> rows) {
+void write_registrations(const std::filesystem::path& path,
+                         std::span<const RegistrationRow> rows,
+                         double success_tre_mm) {
   const bool with_correction = is_any_corrected(rows);
   write_csv_in_parts(path, rows.size(), [&](std::size_t first, std::size_t end) {
-    return table_of(rows.subspan(first, end - first), with_correction);
+    return table_of(rows.subspan(first, end - first), with_correction, success_tre_mm);
   });
 }
 

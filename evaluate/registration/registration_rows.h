@@ -60,7 +60,7 @@ struct RegistrationRow {
   InternedText error;    ///< message of a registration that threw
   double seconds = 0.0;  ///< wall time
 
-  [[nodiscard]] bool is_success() const { return tre_mm < kSuccessTreMm; }
+  [[nodiscard]] bool is_success(double success_tre_mm) const { return tre_mm < success_tre_mm; }
   auto members() {
     return std::tie(case_name,
                     renderer,
@@ -85,6 +85,9 @@ struct RegistrationRow {
   }
 };
 
+/// Some of many rows: a copy of millions would need too much memory.
+using RowPointers = std::vector<const RegistrationRow*>;
+
 /// A row, and for some failures how the search went (see failure_traces.h; empty for other rows).
 struct TracedRow {
   RegistrationRow row;
@@ -94,11 +97,14 @@ struct TracedRow {
 };
 
 /// registrations.csv with the contract's columns, in the given order; timings last. Where a
-/// correction was wanted, every row has its columns.
-CsvTable registrations_table(std::span<const RegistrationRow> rows);
+/// correction was wanted, every row has its columns. `success` is a TRE below `success_tre_mm`.
+CsvTable registrations_table(std::span<const RegistrationRow> rows,
+                             double success_tre_mm = kSuccessTreMm);
 
 /// registrations.csv of any length, a part at a time.
-void write_registrations(const std::filesystem::path& path, std::span<const RegistrationRow> rows);
+void write_registrations(const std::filesystem::path& path,
+                         std::span<const RegistrationRow> rows,
+                         double success_tre_mm = kSuccessTreMm);
 
 /// starts.csv: the starts of all cases, in order, of any number. It has its name once finished.
 class StartsFile {

@@ -15,11 +15,12 @@ namespace af::evaluation {
 /// TRE at or above this, or no pose at all, is a gross failure.
 inline constexpr double kGrossFailureTreMm = 10.0;
 
-/// How initial TRE is divided, and the seed of the bootstrap.
+/// How initial TRE is divided, the seed of the bootstrap, and what a success is.
 struct StatisticsOptions {
   int intervals = 8;
   double interval_width_mm = 2.0;
   std::uint64_t seed = 1;
+  double success_tre_mm = kSuccessTreMm;
 };
 
 /// Why a registration that did not succeed failed: "left range" (start outside, or pinned at the
@@ -28,21 +29,13 @@ struct StatisticsOptions {
 /// that converged elsewhere.
 std::string failure_reason(const RegistrationRow& row);
 
-/// Counts, success (overall, per interval, per threshold), gross failures, failures by reason,
-/// capture range, TRE over all runs (no pose counts as infinitely far) and over successes, bias,
-/// the other errors, stop reasons and times of one renderer; per case, too; bootstrap intervals
-/// over cases. docs/errors.md defines each.
+/// Counts, success (overall, per interval, per threshold; by TRE and by mRPD), gross failures,
+/// failures by reason, capture ranges, TRE over all runs (no pose counts as infinitely far) and
+/// over successes, bias, the other errors, stop reasons and times of one renderer; per case, too;
+/// intervals over cases. docs/errors.md defines each.
 nlohmann::json renderer_statistics(std::span<const RegistrationRow> rows,
                                    const std::string& renderer,
                                    const StatisticsOptions& options);
-
-/// Field against ray casting on the starts that both were given: successes and median seconds of
-/// each, McNemar's test of success; on those from which both succeeded ("pairs"), if there are two
-/// or more, paired t-test, signed-rank test, and equivalence of TRE with its power, and intervals
-/// of the mean difference over cases. null when no start was given to both.
-nlohmann::json paired_statistics(std::span<const RegistrationRow> rows,
-                                 double margin_mm,
-                                 std::uint64_t seed = 1);
 
 /// What is wrong with a set of rows, in words: registrations that occur twice, values that are NaN
 /// beside a pose, initial TREs that are not finite. Empty when nothing is.

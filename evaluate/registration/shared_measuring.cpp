@@ -73,8 +73,13 @@ SharedStartMeasures::SharedStartMeasures(const Communicator& world,
                                          StartFrame frame,
                                          const StartOptions& options,
                                          std::span<const Eigen::Vector3d> target_points_ct_mm,
-                                         IsAdmissible is_admissible)
-    : StartMeasures(std::move(frame), options, target_points_ct_mm, std::move(is_admissible)),
+                                         IsAdmissible is_admissible,
+                                         std::optional<StartLimit> limit)
+    : StartMeasures(std::move(frame),
+                    options,
+                    target_points_ct_mm,
+                    std::move(is_admissible),
+                    std::move(limit)),
       world_(world) {}
 
 std::vector<DrawVerdict> SharedStartMeasures::judge_draws(IndexRange draws) {
@@ -94,7 +99,15 @@ std::vector<double> SharedStartMeasures::tres_mm(std::span<const RigidTransform>
 }
 
 std::vector<UniformStart> SharedStartMeasures::draw_uniform(IndexRange starts) {
-  const Words words = ask(Task::DrawUniform, starts);
+  return ask_for_starts(Task::DrawUniform, starts);
+}
+
+std::vector<UniformStart> SharedStartMeasures::draw_within_range(IndexRange starts) {
+  return ask_for_starts(Task::DrawWithinRange, starts);
+}
+
+std::vector<UniformStart> SharedStartMeasures::ask_for_starts(Task task, IndexRange starts) {
+  const Words words = ask(task, starts);
   std::vector<UniformStart> drawn;
   drawn.reserve(starts.count);
   for (std::uint64_t i = 0; i < starts.count; ++i)
@@ -152,7 +165,8 @@ SharedStartMeasures::Words SharedStartMeasures::part_of_answer(const Question& q
   // The interval at which progress is noted: a TRE takes some 0.1 ms, a uniform start up to
   // thousands of them.
   constexpr std::uint64_t kFewItems = 256;
-  const bool is_uniform = question.task == Task::DrawUniform;
+  const bool is_uniform =
+      question.task == Task::DrawUniform || question.task == Task::DrawWithinRange;
   const std::uint64_t count = question.items.count;
   const auto rank = static_cast<std::uint64_t>(world_.rank());
   const auto ranks = static_cast<std::uint64_t>(world_.size());
@@ -188,6 +202,10 @@ SharedStartMeasures::Words SharedStartMeasures::answer_alone(const Question& que
       break;
     case Task::DrawUniform:
       for (const UniformStart& start : StartMeasures::draw_uniform(items))
+        for (const std::uint64_t word : words_of(start)) words.push_back(word);
+      break;
+    case Task::DrawWithinRange:
+      for (const UniformStart& start : StartMeasures::draw_within_range(items))
         for (const std::uint64_t word : words_of(start)) words.push_back(word);
       break;
   }

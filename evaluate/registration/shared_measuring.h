@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -19,13 +20,15 @@ class SharedStartMeasures final : public StartMeasures {
                       StartFrame frame,
                       const StartOptions& options,
                       std::span<const Eigen::Vector3d> target_points_ct_mm,
-                      IsAdmissible is_admissible);
+                      IsAdmissible is_admissible,
+                      std::optional<StartLimit> limit = std::nullopt);
 
   // Called by rank 0, while the others serve(). An error on any rank is thrown on all ranks and
   // ends the sharing.
   std::vector<DrawVerdict> judge_draws(IndexRange draws) override;
   std::vector<double> tres_mm(std::span<const RigidTransform> room_from_ct) override;
   std::vector<UniformStart> draw_uniform(IndexRange starts) override;
+  std::vector<UniformStart> draw_within_range(IndexRange starts) override;
 
   /// Called by the other ranks: computes parts until rank 0 calls end().
   void serve();
@@ -34,12 +37,13 @@ class SharedStartMeasures final : public StartMeasures {
 
  private:
   using Words = std::vector<std::uint64_t>;
-  enum class Task : std::uint64_t { End, JudgeDraws, Tres, DrawUniform };
+  enum class Task : std::uint64_t { End, JudgeDraws, Tres, DrawUniform, DrawWithinRange };
   struct Question {
     Task task = Task::End;
     IndexRange items;
   };
   Words ask(Task task, IndexRange items, std::span<const RigidTransform> poses = {});
+  std::vector<UniformStart> ask_for_starts(Task task, IndexRange starts);
   Words answer(std::vector<std::byte> bytes);
   Words part_of_answer(const Question& question, std::span<const std::byte> poses);
   Words answer_alone(const Question& question, IndexRange part, std::span<const std::byte> poses);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <cstdint>
 
 #include "base/error.h"
 #include "base/joined.h"
@@ -40,10 +41,14 @@ std::string search_text(const json& summary, const json& renderer) {
   return text.empty() ? "–" : text;
 }
 
-std::string capture_cell(const json& range) {
-  if (!range.is_object()) return "none";
-  return std::string(range.at("is_whole_study").get<bool>() ? "≥ " : "") +
-         decimals(range.at("initial_tre_mm"), 1);
+/// Of the patients' own capture ranges the mean, and the smallest; the range of all starts together
+/// where there is one patient, or where an earlier version made the run.
+std::string capture_cell(const json& renderer) {
+  const json own = renderer.at("over_cases").value("capture_range_mm", json());
+  if (!own.is_object() || own.at("cases").get<std::int64_t>() < 2)
+    return capture_text(renderer.at("capture_range"));
+  return std::string(own.at("at_least") == 0 ? "" : "≥ ") + decimals(own.at("mean_mm"), 1) + " (" +
+         decimals(own.at("min_mm"), 0) + ")";
 }
 
 std::string comparison_table(const std::vector<const EvaluationRun*>& runs) {
@@ -57,7 +62,7 @@ std::string comparison_table(const std::vector<const EvaluationRun*>& runs) {
                    {"95th percentile (mm)", true},
                    {"Mean TRE of successes (mm)", true},
                    {"Gross failures", true},
-                   {"Capture range (mm)", true},
+                   {"Capture range, mean over patients (smallest) (mm)", true},
                    {"Median time", true}},
                   "Every run and method; a click on a title sorts");
   for (const EvaluationRun* run : runs)
@@ -72,7 +77,7 @@ std::string comparison_table(const std::vector<const EvaluationRun*>& runs) {
                      decimals(renderer.at("tre_of_all_mm").at("p95"), 2),
                      decimals(renderer.at("tre_of_successes_mm").at("mean"), 2),
                      plain(renderer.at("gross_failures").at("successes")),
-                     capture_cell(renderer.at("capture_range")),
+                     capture_cell(renderer),
                      seconds_text(number_of(renderer.at("seconds").at("median")))});
   return table.html();
 }

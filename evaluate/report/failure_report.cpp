@@ -47,10 +47,15 @@ std::vector<SparkPoint> spark_points(const CsvTable& trace, double initial_tre_m
   return points;
 }
 
+/// Below which TRE a start of the run succeeds.
+double success_tre_mm_of(const EvaluationRun& run) {
+  return run.summary.at("success_tre_mm").get<double>();
+}
+
 /// TRE against the poses tried as a small line; a dashed line shows below which TRE a start
 /// succeeds.
-std::string spark(const std::vector<SparkPoint>& points) {
-  double highest_mm = 2 * kSuccessTreMm;
+std::string spark(const std::vector<SparkPoint>& points, double success_tre_mm) {
+  double highest_mm = 2 * success_tre_mm;
   for (const SparkPoint& point : points) highest_mm = std::max(highest_mm, point.tre_mm);
   const double poses = std::max(1.0, points.back().poses_tried);
   const auto height = [&](double tre_mm) {
@@ -60,7 +65,7 @@ std::string spark(const std::vector<SparkPoint>& points) {
   for (const SparkPoint& point : points)
     line += (line.empty() ? "" : " ") + decimals(kSparkWidth * point.poses_tried / poses, 1) + "," +
             height(point.tre_mm);
-  const std::string limit = height(kSuccessTreMm);
+  const std::string limit = height(success_tre_mm);
   const std::string text = "TRE from " + decimals(points.front().tre_mm, 1) + " to " +
                            decimals(points.back().tre_mm, 1) + " mm over " + decimals(poses, 0) +
                            " poses";
@@ -77,8 +82,8 @@ std::string trace_cell(const EvaluationRun& run, const CsvTable& rows, std::size
   if (!run.has_file(file)) return "–";
   const std::vector<SparkPoint> points =
       spark_points(run.table(file), rows.number(row, "initial_tre_mm"));
-  return "<span class=\"nowrap\">" + spark(points) + " <a href=\"" + run.link(file) +
-         "\">trace</a></span>";
+  return "<span class=\"nowrap\">" + spark(points, success_tre_mm_of(run)) + " <a href=\"" +
+         run.link(file) + "\">trace</a></span>";
 }
 
 std::string repeat_cell(const EvaluationRun& run, const CsvTable& rows, std::size_t row) {
@@ -116,7 +121,7 @@ std::string failures_text(const EvaluationRun& run) {
                    {"TRE along the search", false},
                    {"Repeat it alone", false, false}},
                   "Failed starts: TRE against the poses tried, the dashed line at " +
-                      decimals(kSuccessTreMm, 1) +
+                      decimals(success_tre_mm_of(run), 1) +
                       " mm; each can be repeated alone by its command");
   std::int64_t failures = 0;
   run.read_in_parts("registrations.csv", [&](const CsvTable& rows) {

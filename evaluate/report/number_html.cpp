@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "base/error.h"
+#include "text/number_json.h"
 
 namespace af::evaluation {
 
@@ -55,6 +56,12 @@ std::string interval_text(const json& proportion) {
 std::string rate_with_interval(const json& proportion) {
   if (!proportion.at("rate").is_number()) return "–";
   return percent(proportion.at("rate").get<double>()) + " (" + interval_text(proportion) + ")";
+}
+
+std::string capture_text(const nlohmann::json& range) {
+  if (!range.is_object() || number_of(range.at("initial_tre_mm")) == 0.0) return "none";
+  return std::string(range.at("is_whole_study").get<bool>() ? "at least " : "") +
+         decimals(range.at("initial_tre_mm"), 1) + " mm";
 }
 
 std::string seconds_text(double seconds) {

@@ -25,6 +25,9 @@ std::string interval_text(const nlohmann::json& proportion);
 /// A proportion of a summary: "91 % (76–97 %)", the brackets holding the 95 % interval.
 std::string rate_with_interval(const nlohmann::json& proportion);
 
+/// A capture range of a summary: "12 mm", "at least 16 mm" where the study ends it, "none".
+std::string capture_text(const nlohmann::json& range);
+
 /// Seconds as "42.6 s", "0.20 s", "8.4 ms".
 std::string seconds_text(double seconds);
 

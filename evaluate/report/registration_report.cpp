@@ -22,14 +22,53 @@ std::string bar(double share) {
   return "<span class=\"bar\" style=\"--share:" + decimals(100 * share, 1) + "\"></span>";
 }
 
-std::string success_table(const json& renderers) {
+/// How the starts of one interval were drawn, over all cases.
+struct IntervalDraws {
+  double draws = 0.0;
+  double refused = 0.0;
+  double share_sum = 0.0;    ///< of rotation
+  double share_count = 0.0;  ///< cases
+};
+
+/// Of runs of earlier versions, and of starts that another run drew, not all is known.
+IntervalDraws draws_of(const json& cases, std::size_t interval) {
+  IntervalDraws all;
+  const auto at = [&](const json& of_case, const char* key) {
+    const json values = of_case.value(key, json::array());
+    return interval < values.size() ? number_of(values.at(interval))
+                                    : std::numeric_limits<double>::quiet_NaN();
+  };
+  for (const json& of_case : cases) {
+    all.draws += at(of_case, "draws_per_interval");
+    all.refused += at(of_case, "inadmissible_draws_per_interval");
+    const double share = at(of_case, "rotation_share_per_interval");
+    if (!std::isfinite(share)) continue;
+    all.share_sum += share;
+    all.share_count += 1.0;
+  }
+  return all;
+}
+
+std::string refused_text(const IntervalDraws& draws) {
+  if (!(draws.draws > 0.0)) return "–";
+  return decimals(draws.refused, 0) + " of " + decimals(draws.draws, 0) + " (" +
+         percent(draws.refused / draws.draws) + ")";
+}
+
+std::string success_table(const json& summary) {
+  const json& renderers = summary.at("renderers");
   std::vector<HtmlTable::Column> columns = {{"Initial TRE (mm)", false}};
   for (const json& renderer : renderers) {
     columns.push_back({method_name(renderer) + ": starts", true});
     columns.push_back({"succeeded", true});
     columns.push_back({"rate (95 % interval)", false});
   }
-  HtmlTable table(columns, "Success per interval of initial error, with Wilson intervals");
+  columns.push_back({"Draws refused", true});
+  columns.push_back({"Share of rotation", true});
+  HtmlTable table(columns,
+                  "Success per interval of initial error, with Wilson intervals. Draws outside the "
+                  "fields' motion range were refused and drawn again; where many were, the starts "
+                  "are less rotation than the half that directions of every kind have");
   const std::size_t intervals = renderers.at(0).at("intervals").size();
   for (std::size_t i = 0; i < intervals; ++i) {
     const json& first = renderers.at(0).at("intervals").at(i);
@@ -45,6 +84,10 @@ std::string success_table(const json& renderers) {
                                                                rate_with_interval(interval),
                                                            "nowrap"));
     }
+    const IntervalDraws draws = draws_of(summary.at("cases"), i);
+    cells.push_back(element("span", refused_text(draws), "nowrap"));
+    cells.push_back(draws.share_count > 0.0 ? decimals(draws.share_sum / draws.share_count, 2)
+                                            : "–");
     table.add_row(cells);
   }
   return table.html();
@@ -81,35 +124,106 @@ std::string error_table(const json& renderers) {
   return table.html();
 }
 
-std::string capture_text(const json& range) {
-  if (!range.is_object()) return "none";
-  return std::string(range.at("is_whole_study").get<bool>() ? "at least " : "") +
-         decimals(range.at("initial_tre_mm"), 1) + " mm";
+/// Of the patients' own capture ranges the mean with its intervals, the smallest and the largest.
+std::string own_captures_text(const json& renderer) {
+  const json own = renderer.at("over_cases").value("capture_range_mm", json());
+  if (!own.is_object()) return "–";
+  std::string text = decimals(own.at("mean_mm"), 1) + " mm (" + decimals(own.at("min_mm"), 0) +
+                     " to " + decimals(own.at("max_mm"), 0);
+  if (own.at("low").is_number())
+    text += "; over patients " + decimals(own.at("low"), 1) + "–" + decimals(own.at("high"), 1);
+  if (own.at("student_low").is_number())
+    text += ", Student " + decimals(own.at("student_low"), 1) + "–" +
+            decimals(own.at("student_high"), 1);
+  text += ")";
+  if (own.at("at_least").get<std::int64_t>() > 0)
+    text += "; of " + plain(own.at("at_least")) + " of " + plain(own.at("cases")) +
+            " the study ends first";
+  return text;
 }
 
 std::string threshold_table(const json& renderers) {
-  std::vector<HtmlTable::Column> columns = {{"TRE below", false}};
-  for (const json& renderer : renderers)
-    columns.push_back({method_name(renderer) + " (95 % interval)", true});
-  HtmlTable table(columns, "Share of all starts below other thresholds");
+  std::vector<HtmlTable::Column> columns = {{"Error below", false}};
+  for (const json& renderer : renderers) {
+    columns.push_back({method_name(renderer) + ": TRE (95 % interval)", true});
+    columns.push_back({method_name(renderer) + ": mRPD (95 % interval)", true});
+  }
+  HtmlTable table(columns,
+                  "Share of all starts below other thresholds, by TRE and by the mean "
+                  "reprojection distance (mRPD), which does not count what one view cannot see");
   const std::size_t count = renderers.at(0).at("thresholds").size();
   for (std::size_t i = 0; i < count; ++i) {
     const json& threshold = renderers.at(0).at("thresholds").at(i).at("threshold_mm");
     std::vector<std::string> cells = {decimals(threshold, threshold == 2.5 ? 1 : 0) + " mm"};
-    for (const json& renderer : renderers)
+    for (const json& renderer : renderers) {
       cells.push_back(rate_with_interval(renderer.at("thresholds").at(i)));
+      const json mrpd = renderer.value("mrpd_thresholds", json::array());
+      cells.push_back(i < mrpd.size() ? rate_with_interval(mrpd.at(i)) : "–");
+    }
     table.add_row(cells);
   }
   std::vector<std::string> gross = {"gross failures: 10 mm or more, or no pose"};
-  std::vector<std::string> capture = {
-      "capture range: largest initial TRE with 95 % success up to it"};
   for (const json& renderer : renderers) {
     gross.push_back(rate_with_interval(renderer.at("gross_failures")));
-    capture.push_back(capture_text(renderer.at("capture_range")));
+    gross.emplace_back("–");
   }
   table.add_row(gross);
-  table.add_row(capture);
   return table.html();
+}
+
+std::string capture_table(const json& renderers) {
+  HtmlTable table({{"Method", false},
+                   {"Patients' own ranges: mean (smallest to largest; 95 %)", false},
+                   {"All starts together (95 % over patients)", false},
+                   {"Ended by", false},
+                   {"By mRPD, all starts", true},
+                   {"Cumulative", true}},
+                  "Capture range: the first interval of initial error with a success below 95 % "
+                  "ends it (van de Kraats et al. 2005). Cumulative: the largest initial error with "
+                  "95 % success up to it, where close starts make up for far ones");
+  for (const json& renderer : renderers) {
+    const json& range = renderer.at("capture_range");
+    const json pooled = renderer.at("over_cases").value("pooled_capture_range_mm", json());
+    // Earlier versions called the cumulative range so.
+    const bool is_cumulative = range.is_object() && !range.contains("ended_by");
+    std::string together = is_cumulative ? "–" : capture_text(range);
+    if (pooled.is_object() && pooled.at("low").is_number())
+      together += " (" + decimals(pooled.at("low"), 0) + "–" + decimals(pooled.at("high"), 0) + ")";
+    std::string end = "–";
+    if (range.is_object() && range.contains("end_interval")) {
+      const json& interval = range.at("end_interval");
+      end = decimals(interval.at("low_mm"), 0) + "–" + decimals(interval.at("high_mm"), 0) +
+            " mm: " + plain(interval.at("successes")) + " of " + plain(interval.at("starts"));
+    }
+    table.add_row(
+        {method_title(renderer),
+         own_captures_text(renderer),
+         together,
+         end,
+         capture_text(renderer.value("mrpd_capture_range", json())),
+         capture_text(is_cumulative ? range : renderer.value("cumulative_capture_range", json()))});
+  }
+  return table.html();
+}
+
+/// Success by mRPD, where a case has one view only.
+std::string one_view_text(const json& summary) {
+  bool has_one_view = false;
+  for (const json& of_case : summary.at("cases"))
+    has_one_view = has_one_view || of_case.value("views", json()) == 1;
+  if (!has_one_view) return "";
+  std::string text;
+  for (const json& renderer : summary.at("renderers"))
+    text += " With " + method_title(renderer) + " " +
+            rate_with_interval(renderer.at("mrpd_success")) +
+            " of the starts end with an mRPD below " +
+            decimals(renderer.at("mrpd_success").at("threshold_mm"), 1) + " mm.";
+  return element(
+      "p",
+      "<strong>One view.</strong> A single view hardly shows the depth along its rays, "
+      "so a TRE says little; the reprojection distance (mRPD) measures what the view can "
+      "show." +
+          text);
 }
 
 /// Failures of every kind, for each method.
@@ -138,7 +252,7 @@ std::string other_errors_table(const json& renderers) {
                    {"mRPD (mm)", true},
                    {"On the detector (mm)", true},
                    {"In the isocentre plane (mm)", true},
-                   {"Rotation (deg)", true},
+                   {"Rotation, geodesic (deg)", true},
                    {"Translation (mm)", true},
                    {"Bias rx, ry, rz (deg)", true},
                    {"Bias tx, ty, tz (mm)", true}},
@@ -266,20 +380,41 @@ std::string p_text(double p) {
   return p < 0.001 ? "p &lt; 0.001" : "p = " + decimals(p, 3);
 }
 
-std::string test_text(const json& test) {
-  const double equivalence_p = test.at("equivalence_p").get<double>();
-  return " On the starts that both solved TRE differs by " +
-         decimals(test.at("mean_difference_mm"), 3) + " mm on average (90 % interval " +
-         decimals(test.at("low_90_mm"), 3) + " to " + decimals(test.at("high_90_mm"), 3) +
-         " mm; paired t-test " + p_text(test.at("t_test_p").get<double>()) +
-         ", Wilcoxon's signed-rank test " + p_text(test.at("signed_rank_p").get<double>()) +
-         "). Equivalence within ±" + decimals(test.at("margin_mm"), 2) +
-         " mm, two one-sided tests: " + p_text(equivalence_p) +
-         (equivalence_p < 0.05 ? ", equivalent at the 5 % level."
-                               : ", not shown: too few pairs or too different ones.") +
-         " If there were no difference, the power of this test would be " +
-         percent(test.at("equivalence_power").get<double>()) + " with these " +
-         "pairs and their standard deviation of " + decimals(test.at("sd_mm"), 3) + " mm.";
+/// Tests that take starts for independent: they tell of these X-rays only.
+std::string pooled_test_text(const json& test) {
+  return " Over these starts TRE differs by " + decimals(test.at("mean_difference_mm"), 3) +
+         " mm on average (90 % interval " + decimals(test.at("low_90_mm"), 3) + " to " +
+         decimals(test.at("high_90_mm"), 3) + " mm; paired t-test " +
+         p_text(test.at("t_test_p").get<double>()) + ", Wilcoxon's signed-rank test " +
+         p_text(test.at("signed_rank_p").get<double>()) +
+         "). These tests take starts for independent, which those of one patient are not, and "
+         "errors in opposite directions cancel in them: they show no equivalence.";
+}
+
+/// What is claimed of the distance between end poses, and over which patients.
+std::string equivalence_text(const json& ends) {
+  const json& over = ends.at("over_cases");
+  const std::string margin = decimals(ends.at("margin_mm"), 2);
+  std::string text = " Where both succeeded their end poses lie " + decimals(over.at("mean"), 3) +
+                     " mm apart (mean over the target and over " +
+                     counted(count_of(over.at("cases")), "patient", "patients");
+  if (over.at("low").is_number())
+    text += "; 95 % over patients " + decimals(over.at("low"), 3) + " to " +
+            decimals(over.at("high"), 3) + " mm by bootstrap";
+  if (over.at("student_low").is_number())
+    text += ", " + decimals(over.at("student_low"), 3) + " to " +
+            decimals(over.at("student_high"), 3) + " mm by Student's";
+  text += "; 95th percentile of starts " + decimals(ends.at("pairs").at("p95"), 3) + ", largest " +
+          decimals(ends.at("pairs").at("max"), 3) + " mm).";
+  const json& is_equivalent = ends.at("is_equivalent");
+  if (is_equivalent.is_null())
+    return text + " <strong>Nothing is claimed about equivalence</strong>: that needs " +
+           plain(ends.at("cases_needed")) + " patients.";
+  return text +
+         (is_equivalent.get<bool>()
+              ? " Over patients the two are equivalent within " + margin + " mm: "
+              : " Equivalence within " + margin + " mm is not shown over patients: ") +
+         "one-sided Student's test " + p_text(number_of(ends.at("p"))) + ".";
 }
 
 std::string paired_text(const json& paired) {
@@ -289,8 +424,9 @@ std::string paired_text(const json& paired) {
                      " given to both: " + plain(paired.at("successes").at(0)) + " and " +
                      plain(paired.at("successes").at(1)) + " successes (McNemar " +
                      p_text(paired.at("mcnemar_p").get<double>()) + ").";
-  if (paired.contains("test")) text += test_text(paired.at("test"));
-  return element("p", text + " Starts of one patient are not independent samples of patients.");
+  if (paired.contains("end_distance_mm")) text += equivalence_text(paired.at("end_distance_mm"));
+  if (paired.contains("test")) text += pooled_test_text(paired.at("test"));
+  return element("p", text);
 }
 
 /// The folder of a result that Slicer loads, where there is one.
@@ -342,7 +478,9 @@ std::string registration_figures(const EvaluationRun& run) {
                             "success-rate",
                             "Success rate per interval of initial error",
                             "<b>Success against initial error</b> (the paper's Fig. 16). Dots: "
-                            "share of starts that end below 2.5 mm; bars: 95 % Wilson intervals.") +
+                            "share of starts that end below " +
+                                decimals(run.summary.at("success_tre_mm"), 1) +
+                                " mm; bars: 95 % Wilson intervals; dashed: 95 %.") +
                      run_figure(run,
                                 "tre-scatter",
                                 "Initial against final error",
@@ -377,11 +515,11 @@ std::string registration_section(const EvaluationRun& run, const std::string& ti
   const json& renderers = summary.at("renderers");
   return section_heading(escaped(title), run_id(run)) + element("p", starts_text(summary)) +
          problems_text(summary.at("row_problems")) + registration_figures(run) +
-         success_table(renderers) + error_table(renderers) + threshold_table(renderers) +
-         other_errors_table(renderers) + over_cases_text(renderers) +
-         paired_text(summary.at("field_against_raycast")) + case_table(summary) +
-         gold_table(summary.at("cases")) + element("h3", "Failures") + reason_table(renderers) +
-         failures_text(run) + appearance_text(run);
+         success_table(summary) + capture_table(renderers) + error_table(renderers) +
+         threshold_table(renderers) + one_view_text(summary) + other_errors_table(renderers) +
+         over_cases_text(renderers) + paired_text(summary.at("field_against_raycast")) +
+         case_table(summary) + gold_table(summary.at("cases")) + element("h3", "Failures") +
+         reason_table(renderers) + failures_text(run) + appearance_text(run);
 }
 
 }  // namespace af::evaluation

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 #include "evaluate/outputs/sample_summary_json.h"
 #include "evaluate/report/html_text.h"
@@ -43,6 +44,19 @@ double flawless_up_to_mm(const json& renderer) {
   return end_mm;
 }
 
+/// How far starts may lie; empty for a run of an earlier version, which meant another range.
+std::string capture_sentence(const json& renderer) {
+  const json& range = renderer.at("capture_range");
+  if (!range.is_object() || !range.contains("ended_by")) return "";
+  const json own = renderer.at("over_cases").value("capture_range_mm", json());
+  if (own.is_object() && own.at("cases").get<std::int64_t>() > 1)
+    return " Capture range per patient: " +
+           std::string(own.at("at_least") == 0 ? "" : "at least ") +
+           decimals(own.at("mean_mm"), 1) + " mm on average, " + decimals(own.at("min_mm"), 0) +
+           " mm at worst.";
+  return " Capture range: " + capture_text(range) + ".";
+}
+
 std::string success_sentence(const json& renderer, double threshold_mm) {
   const auto starts = count_of(renderer.at("starts"));
   const auto successes = count_of(renderer.at("successes"));
@@ -55,6 +69,7 @@ std::string success_sentence(const json& renderer, double threshold_mm) {
   text += "; these ended " + decimals(renderer.at("tre_of_successes_mm").at("mean"), 2) +
           " mm from it on average.";
   const double flawless_mm = flawless_up_to_mm(renderer);
+  text += capture_sentence(renderer);
   if (successes == starts)
     text += " None failed.";
   else if (flawless_mm > 0.0)
@@ -120,8 +135,7 @@ std::string quality_sentence(const std::vector<const EvaluationRun*>& runs) {
     list += (list.empty() ? "" : ", ") + decimals(run->summary.at("psnr_db").at("median"), 1) +
             " dB (" + escaped(field_name(*run)) + ")";
   return element("li",
-                 "The fields' images agree with ray casting to a median PSNR of " + list +
-                     "; the paper reports medians above 43 dB.");
+                 "The fields' images agree with ray casting to a median PSNR of " + list + ".");
 }
 
 std::string seconds_tile(const json& renderer) {

@@ -24,6 +24,7 @@ constexpr double kMagnitudeOverTre = 1.5;
 constexpr std::uint64_t kDrawStream = 0x73746172;  // "star"
 constexpr std::uint64_t kPickStream = 0x7069636B;  // "pick"
 constexpr std::uint64_t kTreStream = 0x74726521;   // "tre!"
+constexpr std::uint64_t kBoxStream = 0x626F7821;   // "box!"
 
 std::uint64_t most_draws(const StartOptions& options) {
   const auto wanted = static_cast<std::uint64_t>(options.starts_per_interval) *
@@ -85,6 +86,25 @@ void pick(StartMeasures& measures,
   });
 }
 
+/// Sets what the starts of every interval are made of.
+void add_rotation_shares(const StartMeasures& measures, StratifiedStarts& result) {
+  const StartFrame& frame = measures.frame();
+  const double radius_mm = rms_radius_mm(frame.target_box_ct, frame.center_ct_mm);
+  const auto intervals = static_cast<std::size_t>(measures.options().intervals);
+  std::vector<double> sums(intervals);
+  std::vector<double> counts(intervals);
+  for (const PerturbedStart& start : result.starts) {
+    const double share = rotation_share(start.parameters, radius_mm);
+    const auto interval = static_cast<std::size_t>(start.interval);
+    if (interval >= intervals || std::isnan(share)) continue;
+    sums[interval] += share;
+    counts[interval] += 1.0;
+  }
+  result.rotation_share_per_interval.clear();
+  for (std::size_t k = 0; k < intervals; ++k)
+    result.rotation_share_per_interval.push_back(sums[k] / counts[k]);
+}
+
 [[noreturn]] void throw_too_empty(const std::vector<std::vector<Candidate>>& by_interval,
                                   const StartOptions& options,
                                   const StratifiedStarts& counts) {
@@ -114,6 +134,11 @@ std::vector<std::string> problems(const StartOptions& options) {
   return found;
 }
 
+double rotation_share(const PoseParameters& parameters, double rms_radius_mm) {
+  const double rotation_mm2 = parameters.rotation_rad.squaredNorm() * rms_radius_mm * rms_radius_mm;
+  return rotation_mm2 / (rotation_mm2 + parameters.translation_mm.squaredNorm());
+}
+
 PoseParameters draw_perturbation(const StartFrame& frame,
                                  double largest_magnitude_mm,
                                  std::uint64_t seed,
@@ -133,11 +158,13 @@ PoseParameters draw_perturbation(const StartFrame& frame,
 StartMeasures::StartMeasures(StartFrame frame,
                              const StartOptions& options,
                              std::span<const Eigen::Vector3d> target_points_ct_mm,
-                             IsAdmissible is_admissible)
+                             IsAdmissible is_admissible,
+                             std::optional<StartLimit> limit)
     : frame_(std::move(frame)),
       options_(options),
       points_ct_mm_(target_points_ct_mm),
-      is_admissible_(std::move(is_admissible)) {
+      is_admissible_(std::move(is_admissible)),
+      limit_(std::move(limit)) {
   throw_if_any(problems(options));
 }
 
@@ -228,6 +255,58 @@ std::vector<UniformStart> StartMeasures::draw_uniform(IndexRange starts) {
   return drawn;
 }
 
+double StartMeasures::tre_mm(const RigidTransform& room_from_ct) const {
+  return mean_tre_mm(room_from_ct, frame_.gold_room_from_ct, points_ct_mm_);
+}
+
+UniformStart StartMeasures::draw_within_range(std::uint64_t index) const {
+  HashRandom random(options_.seed, hash64(kBoxStream, hash_name(frame_.case_name)), index);
+  const auto interval = index / static_cast<std::uint64_t>(options_.starts_per_interval);
+  const double wanted_mm =
+      (static_cast<double>(interval) + random.uniform()) * options_.interval_width_mm;
+  const PoseParameters gold = parameters_from_pose(limit_->frame, frame_.gold_room_from_ct);
+  UniformStart start;
+  start.initial_tre_mm = wanted_mm;
+  for (; start.refused < UniformStart::kMostDraws; ++start.refused) {
+    PoseParameters far;
+    for (int i = 0; i < 3; ++i) {
+      far.rotation_rad[i] = random.uniform(-1.0, 1.0) * limit_->range.max_rotation_rad;
+      far.translation_mm[i] = random.uniform(-1.0, 1.0) * limit_->range.max_translation_mm;
+    }
+    const auto pose_at = [&](double share) {
+      PoseParameters between = gold;
+      between.rotation_rad += share * (far.rotation_rad - gold.rotation_rad);
+      between.translation_mm += share * (far.translation_mm - gold.translation_mm);
+      return pose_from_parameters(limit_->frame, between);
+    };
+    if (tre_mm(pose_at(1.0)) < wanted_mm) continue;
+    // TRE is continuous along the line: halving finds a place of the wanted TRE, to 60 bits.
+    double below = 0.0;
+    double above = 1.0;
+    constexpr int kHalvings = 60;
+    for (int step = 0; step < kHalvings; ++step) {
+      const double middle = 0.5 * (below + above);
+      (tre_mm(pose_at(middle)) < wanted_mm ? below : above) = middle;
+    }
+    const RigidTransform pose = pose_at(below);
+    if (!is_admissible_(pose)) continue;
+    start.parameters = parameters_from_pose(frame_.pose_frame(), pose);
+    start.initial_tre_mm = tre_mm(pose);
+    break;
+  }
+  return start;
+}
+
+std::vector<UniformStart> StartMeasures::draw_within_range(IndexRange starts) {
+  check(limit_.has_value(), "starts within a range need one");
+  std::vector<UniformStart> drawn(starts.count);
+  for (std::uint64_t i = 0; i < starts.count; ++i) {
+    drawn[i] = draw_within_range(starts.first + i);
+    if (drawn[i].is_exhausted()) break;
+  }
+  return drawn;
+}
+
 StratifiedStarts stratified_starts(StartMeasures& measures) {
   const StartOptions& options = measures.options();
   const std::uint64_t case_key = hash_name(measures.frame().case_name);
@@ -235,6 +314,7 @@ StratifiedStarts stratified_starts(StartMeasures& measures) {
   std::vector<std::vector<Candidate>> by_interval(static_cast<std::size_t>(options.intervals));
   StratifiedStarts result;
   result.inadmissible_per_interval.resize(by_interval.size());
+  result.draws_per_interval.resize(by_interval.size());
   std::size_t full_intervals = 0;
   std::vector<DrawVerdict> verdicts;
   std::size_t judged = 0;
@@ -251,6 +331,7 @@ StratifiedStarts stratified_starts(StartMeasures& measures) {
     const DrawVerdict& verdict = verdicts[judged++];
     const std::uint64_t draw_index = result.draws++;
     const auto interval = static_cast<std::size_t>(verdict.interval);
+    if (interval < by_interval.size()) ++result.draws_per_interval[interval];
     if (interval >= by_interval.size()) {
       ++result.draws_beyond;
     } else if (!verdict.is_admissible) {
@@ -267,25 +348,30 @@ StratifiedStarts stratified_starts(StartMeasures& measures) {
   for (std::vector<Candidate>& candidates : by_interval)
     pick(measures, std::move(candidates), starts);
   result.starts = SharedArray<PerturbedStart>(std::move(starts));
+  add_rotation_shares(measures, result);
   return result;
 }
 
-StratifiedStarts uniform_starts(StartMeasures& measures) {
+namespace {
+
+/// Starts that are drawn one by one, each until it is admissible.
+StratifiedStarts starts_one_by_one(
+    StartMeasures& measures,
+    const std::string& refusal,
+    const std::function<std::vector<UniformStart>(const IndexRange&)>& draw) {
   const StartOptions& options = measures.options();
   const PoseFrame pose_frame = measures.frame().pose_frame();
   const auto count = static_cast<std::uint64_t>(options.intervals) *
                      static_cast<std::uint64_t>(options.starts_per_interval);
   StratifiedStarts result;
   result.inadmissible_per_interval.resize(static_cast<std::size_t>(options.intervals));
+  result.draws_per_interval = result.inadmissible_per_interval;
   std::vector<int> found(static_cast<std::size_t>(options.intervals));
   std::vector<PerturbedStart> starts;
   starts.reserve(count);
   const auto add = [&](const UniformStart& drawn, std::uint64_t index) {
     if (drawn.is_exhausted())
-      throw InputError("starts",
-                       std::to_string(drawn.initial_tre_mm) + " mm",
-                       "every one of 1000 draws of this initial TRE lies outside the motion "
-                       "range: use fewer intervals or fields of a larger range");
+      throw InputError("starts", std::to_string(drawn.initial_tre_mm) + " mm", refusal);
     PerturbedStart& start = starts.emplace_back();
     start.draw_index = index * UniformStart::kMostDraws + drawn.refused;
     start.parameters = drawn.parameters;
@@ -295,15 +381,44 @@ StratifiedStarts uniform_starts(StartMeasures& measures) {
     const auto interval = static_cast<std::size_t>(start.interval);
     start.rank_in_interval = found[interval]++;
     result.draws += drawn.refused + 1;
+    result.draws_per_interval[interval] += drawn.refused + 1;
     result.inadmissible_draws += drawn.refused;
     result.inadmissible_per_interval[interval] += drawn.refused;
   };
   in_parts(count, [&](const IndexRange& part) {
-    const std::vector<UniformStart> drawn = measures.draw_uniform(part);
+    const std::vector<UniformStart> drawn = draw(part);
     for (std::uint64_t i = 0; i < part.count; ++i) add(drawn[i], part.first + i);
   });
   result.starts = SharedArray<PerturbedStart>(std::move(starts));
+  add_rotation_shares(measures, result);
   return result;
+}
+
+}  // namespace
+
+StratifiedStarts uniform_starts(StartMeasures& measures) {
+  return starts_one_by_one(
+      measures,
+      "every one of 1000 draws of this initial TRE lies outside the motion range: use fewer "
+      "intervals or fields of a larger range",
+      [&](const IndexRange& part) { return measures.draw_uniform(part); });
+}
+
+StratifiedStarts starts_within_range(StartMeasures& measures) {
+  if (!measures.limit().has_value())
+    throw InputError(
+        "--start-rule", "within-range", "needs fields: ray casting alone has no motion range");
+  const StartLimit& limit = *measures.limit();
+  if (!limit.range.contains(parameters_from_pose(limit.frame, measures.frame().gold_room_from_ct)))
+    throw InputError("--start-rule",
+                     "within-range",
+                     "the gold pose itself lies outside the fields' motion range",
+                     measures.frame().case_name);
+  return starts_one_by_one(
+      measures,
+      "none of 1000 points of the fields' motion range is so far from gold: use fewer intervals "
+      "or fields of a larger range",
+      [&](const IndexRange& part) { return measures.draw_within_range(part); });
 }
 
 StratifiedStarts starts_at(StartMeasures& measures, std::span<const RigidTransform> poses) {
@@ -324,6 +439,7 @@ StratifiedStarts starts_at(StartMeasures& measures, std::span<const RigidTransfo
     if (start.interval >= measures.options().intervals) ++result.draws_beyond;
   }
   result.starts = SharedArray<PerturbedStart>(std::move(starts));
+  add_rotation_shares(measures, result);
   return result;
 }
 

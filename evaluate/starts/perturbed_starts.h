@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -57,6 +58,18 @@ struct PerturbedStart {
   int rank_in_interval = 0;
 };
 
+/// Which part of a start is rotation: the square of its size in mm, angles times the target box's
+/// RMS radius, over that of rotation and translation together. 0: a pure translation; 1: a pure
+/// rotation; NaN when nothing moves. Directions uniform in the six parameters have 1/2 on average.
+/// \test RotationShare.IsOneHalfWhereNothingIsRefused
+double rotation_share(const PoseParameters& parameters, double rms_radius_mm);
+
+/// The motion range of a field: what its poses are relative to, and how far they may lie from it.
+struct StartLimit {
+  PoseFrame frame;
+  MotionRange range;
+};
+
 /// Whether a registration may start at a pose.
 using IsAdmissible = std::function<bool(const RigidTransform& room_from_ct)>;
 
@@ -72,7 +85,7 @@ struct DrawVerdict {
   bool is_admissible = true;  ///< beyond the last: not asked
 };
 
-/// A start of uniform_starts().
+/// A start of uniform_starts() or starts_within_range().
 struct UniformStart {
   PoseParameters parameters;
   double initial_tre_mm = 0.0;
@@ -91,13 +104,15 @@ class StartMeasures {
   StartMeasures(StartFrame frame,
                 const StartOptions& options,
                 std::span<const Eigen::Vector3d> target_points_ct_mm,
-                IsAdmissible is_admissible);
+                IsAdmissible is_admissible,
+                std::optional<StartLimit> limit = std::nullopt);
   virtual ~StartMeasures() = default;
   StartMeasures(const StartMeasures&) = delete;
   StartMeasures& operator=(const StartMeasures&) = delete;
 
   [[nodiscard]] const StartFrame& frame() const { return frame_; }
   [[nodiscard]] const StartOptions& options() const { return options_; }
+  [[nodiscard]] const std::optional<StartLimit>& limit() const { return limit_; }
   [[nodiscard]] double largest_tre_mm() const {
     return options_.intervals * options_.interval_width_mm;
   }
@@ -113,16 +128,21 @@ class StartMeasures {
   virtual std::vector<double> tres_mm(std::span<const RigidTransform> room_from_ct);
   /// In order. When a start is exhausted, nothing is drawn after it.
   virtual std::vector<UniformStart> draw_uniform(IndexRange starts);
+  /// The same for starts_within_range(), which needs a limit.
+  virtual std::vector<UniformStart> draw_within_range(IndexRange starts);
 
  private:
   [[nodiscard]] int interval_of_draw(const RigidTransform& room_from_ct) const;
   [[nodiscard]] UniformStart draw_uniform(std::uint64_t index) const;
+  [[nodiscard]] UniformStart draw_within_range(std::uint64_t index) const;
+  [[nodiscard]] double tre_mm(const RigidTransform& room_from_ct) const;
   [[nodiscard]] double scale_to_tre(double tre_mm, PoseParameters& parameters) const;
 
   StartFrame frame_;
   StartOptions options_;
   std::span<const Eigen::Vector3d> points_ct_mm_;
   IsAdmissible is_admissible_;
+  std::optional<StartLimit> limit_;
   std::vector<TreBounder> bounders_;  ///< coarse to fine; made by the first draw
 };
 
@@ -134,6 +154,12 @@ struct StratifiedStarts {
   /// Draws that the predicate refused, by the interval that they would have been in; draws
   /// for intervals that are already full count, too.
   std::vector<std::uint64_t> inadmissible_per_interval;
+  /// All draws by the interval that they would have been in, refused or not; empty when the starts
+  /// were not drawn.
+  std::vector<std::uint64_t> draws_per_interval;
+  /// Mean rotation_share() of the starts; NaN for an interval without any. Draws that a field's
+  /// range refuses are mostly rotations: far starts are then mostly translations.
+  std::vector<double> rotation_share_per_interval;
 };
 
 /// The paper's rule: draws until every interval has enough, then picks at random that many in each.
@@ -147,6 +173,15 @@ StratifiedStarts stratified_starts(StartMeasures& measures);
 /// so the distribution stays uniform. Throws InputError after 1000 refusals of one start.
 /// \test PerturbedStarts.UniformInTreHaveThatDistribution
 StratifiedStarts uniform_starts(StartMeasures& measures);
+
+/// As many starts in each interval as stratified_starts() gives, inside the measures' limit by
+/// design: a point uniform in the limit's box of six parameters, moved towards gold along a
+/// straight line in these until its TRE is one that is uniform in the interval. The box is convex,
+/// so all of the line lies inside. Points that are nearer to gold than that TRE are drawn again and
+/// count as refused; so do those that the predicate refuses (another field's range). InputError
+/// without a limit, for a gold pose outside, and after 1000 refusals of one start.
+/// \test PerturbedStarts.WithinRangeLieInsideByDesign
+StratifiedStarts starts_within_range(StartMeasures& measures);
 
 /// The starts at given poses, in their order; intervals may lie beyond the last one.
 StratifiedStarts starts_at(StartMeasures& measures, std::span<const RigidTransform> poses);

@@ -30,9 +30,9 @@ std::int64_t count_successes(std::span<const TreOutcome> outcomes, double thresh
   });
 }
 
-std::optional<CaptureRange> capture_range(std::span<const TreOutcome> outcomes,
-                                          double share,
-                                          double threshold_mm) {
+std::optional<CumulativeCaptureRange> cumulative_capture_range(std::span<const TreOutcome> outcomes,
+                                                               double share,
+                                                               double threshold_mm) {
   check(share > 0.0 && share <= 1.0, "a share lies between 0 and 1");
   std::vector<TreOutcome> sorted;
   for (const TreOutcome& outcome : outcomes)
@@ -40,7 +40,7 @@ std::optional<CaptureRange> capture_range(std::span<const TreOutcome> outcomes,
   std::sort(sorted.begin(), sorted.end(), [](const TreOutcome& a, const TreOutcome& b) {
     return a.initial_tre_mm < b.initial_tre_mm;
   });
-  std::optional<CaptureRange> range;
+  std::optional<CumulativeCaptureRange> range;
   std::int64_t successes = 0;
   for (std::size_t i = 0; i < sorted.size(); ++i) {
     successes += sorted[i].tre_mm < threshold_mm ? 1 : 0;
@@ -73,6 +73,27 @@ std::vector<IntervalSuccess> success_per_interval(std::span<const TreOutcome> ou
   for (IntervalSuccess& interval : result)
     interval.wilson = wilson_interval(interval.successes, interval.trials);
   return result;
+}
+
+CaptureRange capture_range(std::span<const IntervalSuccess> intervals, double share) {
+  check(share > 0.0 && share <= 1.0, "a share lies between 0 and 1");
+  CaptureRange range;
+  range.end = CaptureEnd::LastInterval;
+  for (const IntervalSuccess& interval : intervals) {
+    if (interval.trials == 0) {
+      range.end = CaptureEnd::NoStarts;
+      break;
+    }
+    if (static_cast<double>(interval.successes) < share * static_cast<double>(interval.trials)) {
+      range.end = CaptureEnd::Failures;
+      break;
+    }
+    range.initial_tre_mm = interval.high_mm;
+    range.starts += interval.trials;
+    range.successes += interval.successes;
+    ++range.end_interval;
+  }
+  return range;
 }
 
 }  // namespace af::evaluation

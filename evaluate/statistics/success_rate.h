@@ -11,6 +11,9 @@ namespace af::evaluation {
 /// The paper's: TRE below this is a success (Sec. IV-B).
 inline constexpr double kSuccessTreMm = 2.5;
 
+/// The share of starts that must succeed inside a capture range.
+inline constexpr double kCaptureShare = 0.95;
+
 struct ProportionInterval {
   double low = 0.0;
   double high = 1.0;
@@ -45,8 +48,8 @@ struct TreOutcome {
 /// Number of outcomes with TRE below `threshold_mm`; NaN never is.
 std::int64_t count_successes(std::span<const TreOutcome> outcomes, double threshold_mm);
 
-/// Capture range: how far registrations may start.
-struct CaptureRange {
+/// Up to which initial TRE enough of all starts together succeed.
+struct CumulativeCaptureRange {
   double initial_tre_mm = 0.0;  ///< the largest initial TRE with enough success up to it
   std::int64_t starts = 0;      ///< that began at or below it
   std::int64_t successes = 0;
@@ -55,10 +58,12 @@ struct CaptureRange {
 
 /// The largest initial TRE d of any outcome such that at least `share` of the outcomes with an
 /// initial TRE of at most d succeeded; nullopt when there is none. Outcomes without an initial TRE
-/// are left out. \test CaptureRange.IsTheLargestErrorWithEnoughSuccessBelowIt
-std::optional<CaptureRange> capture_range(std::span<const TreOutcome> outcomes,
-                                          double share = 0.95,
-                                          double threshold_mm = kSuccessTreMm);
+/// are left out. Many close starts that succeed make up for far ones that fail, so that it reaches
+/// at least to the farthest start inside capture_range(), and often much farther. \test
+/// CumulativeCaptureRange.IsTheLargestErrorWithEnoughSuccessBelowIt
+std::optional<CumulativeCaptureRange> cumulative_capture_range(std::span<const TreOutcome> outcomes,
+                                                               double share = kCaptureShare,
+                                                               double threshold_mm = kSuccessTreMm);
 
 /// Success per interval [k, k + 1) * width; outcomes whose initial TRE lies beyond the last
 /// interval are left out.
@@ -66,5 +71,30 @@ std::vector<IntervalSuccess> success_per_interval(std::span<const TreOutcome> ou
                                                   int intervals,
                                                   double width_mm,
                                                   double threshold_mm = kSuccessTreMm);
+
+/// What ends a capture range.
+enum class CaptureEnd {
+  Failures,      ///< an interval in which too few starts succeeded
+  NoStarts,      ///< an interval without starts: what follows is unknown
+  LastInterval,  ///< the study: every interval had enough success
+};
+
+/// Capture range: how far registrations may start.
+struct CaptureRange {
+  double initial_tre_mm = 0.0;  ///< upper end of the last interval with enough success; 0: none
+  std::int64_t starts = 0;      ///< in the intervals up to there
+  std::int64_t successes = 0;
+  CaptureEnd end = CaptureEnd::NoStarts;
+  std::size_t end_interval = 0;  ///< the interval that ends it, from 0; their number: none does
+
+  /// The true range may be larger.
+  [[nodiscard]] bool is_whole_study() const { return end != CaptureEnd::Failures; }
+};
+
+/// The capture range of van de Kraats et al. (IEEE TMI 24(9), 2005): the first interval of initial
+/// TRE with a success below `share` ends it. `intervals` are as success_per_interval() has them.
+/// \test CaptureRange.EndsAtTheFirstIntervalWithTooManyFailures
+CaptureRange capture_range(std::span<const IntervalSuccess> intervals,
+                           double share = kCaptureShare);
 
 }  // namespace af::evaluation

@@ -35,7 +35,8 @@ Image2d mask_fiducials(Image2d mask,
     mask = Image2d(camera.size_px.x(), camera.size_px.y());
     std::fill(mask.pixels.begin(), mask.pixels.end(), 1.0f);
   }
-  for (const Eigen::Vector2d& center_px : fiducials_px) clear_disc(mask, center_px, radius_px);
+  for (const Eigen::Vector2d& center_px : fiducials_px)
+    if (center_px.allFinite()) clear_disc(mask, center_px, radius_px);
   return mask;
 }
 

@@ -12,8 +12,8 @@
 namespace af::registration {
 
 /// `mask` (whole detector, non-zero = used; empty: every pixel) with 0 where a pixel's centre lies
-/// within `radius_px` of a fiducial's projection (column, row). `mask` itself when there is no
-/// fiducial or the radius is 0.
+/// within `radius_px` of a fiducial's projection (column, row; NaN: the view hides it). `mask`
+/// itself when there is no fiducial or the radius is 0.
 Image2d mask_fiducials(Image2d mask,
                        const CameraGeometry& camera,
                        const std::vector<Eigen::Vector2d>& fiducials_px,

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "register/results/target_errors.h"
 
-#include <algorithm>
+#include <vector>
 
 #include "gold_standard/target_box.h"
 #include "gold_standard/tre.h"
@@ -9,12 +9,7 @@
 namespace af::registration {
 
 std::optional<GoldStandard> known_gold(const Study& study, const StudyCase& study_case) {
-  const auto views_with_fiducials =
-      std::count_if(study_case.views.begin(), study_case.views.end(), [](const StudyView& view) {
-        return !view.fiducials_px.empty();
-      });
-  if (!study_case.gold_room_from_ct.has_value() &&
-      (study_case.fiducials_ct_mm.empty() || views_with_fiducials < 2))
+  if (!study_case.gold_room_from_ct.has_value() && !has_fiducial_gold(study, study_case))
     return std::nullopt;
   return gold_standard(study, study_case, "auto");
 }

@@ -12,6 +12,8 @@ af_add_check(format ${af_checks}/format.sh ${PROJECT_SOURCE_DIR})
 af_add_check(scripts ${af_checks}/scripts.sh ${PROJECT_SOURCE_DIR})
 af_add_check(stages ${af_checks}/stages.sh ${PROJECT_SOURCE_DIR})
 af_add_check(tree ${af_checks}/tree.sh ${PROJECT_SOURCE_DIR})
+af_add_check(links ${af_checks}/links.py ${PROJECT_SOURCE_DIR})
+af_add_check(links_self_test ${af_checks}/links.py --self-test)
 
 set(af_program_files)
 foreach(program af-precompute af-drr af-simulate af-register af-evaluate af-inspect)

@@ -6,6 +6,7 @@ af_add_test(
           unit/evaluate/statistics/statistics_test.cpp
           unit/evaluate/statistics/signed_rank_test_test.cpp
           unit/evaluate/statistics/bootstrap_test.cpp
+          unit/evaluate/statistics/case_equivalence_test.cpp
           support/interval_coverage.cpp
           unit/evaluate/registration/registration_errors_test.cpp
           unit/evaluate/sweeps/error_budget_test.cpp
@@ -17,7 +18,7 @@ af_add_test(
 
 af_add_test(
   evaluate_figures_test
-  SOURCES unit/evaluate/outputs/result_figures_test.cpp
+  SOURCES unit/evaluate/outputs/result_figures_test.cpp unit/evaluate/outputs/paper_setting_test.cpp
   LIBS af_evaluation_outputs af_gnuplot)
 
 af_add_test(

@@ -47,6 +47,21 @@ void print_cases(SimulatedStudies setting) {
     }
 }
 
+void print_equivalence(const SimulatedStudies& setting) {
+  std::printf("| Patients | SD of the logarithm 0.2 | 0.4 | 0.6 | 0.8 |\n|---|---|---|---|---|\n");
+  for (const std::size_t cases : {10u, 20u, 30u, 60u}) {
+    std::printf("| %zu", cases);
+    for (const double log_sd : {0.2, 0.4, 0.6, 0.8})
+      std::printf(" | %.1f %%",
+                  100 * af::test::wrong_equivalence_claims({.cases = cases,
+                                                            .log_sd = log_sd,
+                                                            .studies = setting.studies,
+                                                            .seed = setting.seed,
+                                                            .replicates = setting.replicates}));
+    std::printf(" |\n");
+  }
+}
+
 }  // namespace
 
 // Binding options can throw only by a defect, which may well end the program.
@@ -56,7 +71,7 @@ int main(int argc, char** argv) {
   CLI::App app{
       "Coverage of 95 % intervals in simulated studies with known truth, as tables in Markdown: "
       "Wilson's of independent runs; Wilson's, the bootstrap's and Student's where patients "
-      "differ."};
+      "differ; and how often equivalence is claimed wrongly."};
   app.add_option("--studies", setting.studies, "Simulated studies of each setting")
       ->capture_default_str();
   app.add_option("--replicates", setting.replicates, "Of the bootstrap")->capture_default_str();
@@ -67,5 +82,7 @@ int main(int argc, char** argv) {
   print_independent(setting);
   std::printf("\n");
   print_cases(setting);
+  std::printf("\n");
+  print_equivalence(setting);
   return 0;
 }

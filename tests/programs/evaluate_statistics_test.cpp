@@ -177,9 +177,13 @@ TEST_F(HandBuiltResults, OfAMixedCaseAreKnownToTheLastBit) {
   EXPECT_EQ(mixed["tre_of_all_mm"]["p95"], "inf");
   EXPECT_DOUBLE_EQ(mixed["tre_of_successes_mm"]["mean"].get<double>(), 12.5 / 12.0);
   // The first twelve succeed; with the thirteenth 12 / 13 is below 95 %.
-  EXPECT_EQ(mixed["capture_range"]["initial_tre_mm"], 0.25 + 0.75 * 11);
-  EXPECT_EQ(mixed["capture_range"]["starts"], 12);
-  EXPECT_EQ(mixed["capture_range"]["is_whole_study"], false);
+  EXPECT_EQ(mixed["cumulative_capture_range"]["initial_tre_mm"], 0.25 + 0.75 * 11);
+  EXPECT_EQ(mixed["cumulative_capture_range"]["starts"], 12);
+  EXPECT_EQ(mixed["cumulative_capture_range"]["is_whole_study"], false);
+  // 0.25 + 0.75 i mm: start 12, the first to fail, lies at 9.25 mm, in the interval from 8 mm.
+  EXPECT_EQ(mixed["capture_range"]["initial_tre_mm"], 8.0);
+  EXPECT_EQ(mixed["capture_range"]["starts"], 11);
+  EXPECT_EQ(mixed["capture_range"]["end_interval"]["low_mm"], 8.0);
   // A pure shift: no rotation, the whole of it translation.
   const CsvTable rows = CsvTable::read(path("out/registrations.csv"));
   EXPECT_EQ(rows.text(20, "case"), "mixed");
@@ -201,12 +205,38 @@ TEST_F(HandBuiltResults, OfOneStartOfAllFailuresAndOfAllSuccessesAreTheEndsOfThe
   EXPECT_EQ(hopeless["wilson_low"], 0.0);
   EXPECT_NEAR(hopeless["wilson_high"].get<double>(), 0.16112515805281938, 1e-12);
   EXPECT_TRUE(hopeless["tre_of_successes_mm"]["mean"].is_null());
-  EXPECT_TRUE(hopeless["capture_range"].is_null());
+  EXPECT_TRUE(hopeless["cumulative_capture_range"].is_null());
+  EXPECT_EQ(hopeless["capture_range"]["initial_tre_mm"], 0.0);
+  EXPECT_EQ(hopeless["capture_range"]["is_whole_study"], false);
   EXPECT_EQ(hopeless["tre_of_all_mm"]["median"], "inf");
   const json single = of_case(all, "single");
   EXPECT_NEAR(single["wilson_low"].get<double>(), 0.20654931437723745, 1e-12);
   EXPECT_EQ(single["wilson_high"], 1.0);
   EXPECT_TRUE(single["tre_of_successes_mm"]["sd"].is_null());
+}
+
+TEST_F(HandBuiltResults, SayHowTheStartsWereDrawnAsFarAsTheyKnow) {
+  ASSERT_EQ(evaluate().exit_code, 0);
+  const CsvTable starts = CsvTable::read(path("out/starts-per-interval.csv"));
+  ASSERT_EQ(starts.row_count(), 4u * 8u);
+  // The starts are given ones: nobody knows which draws were refused. They are pure shifts.
+  EXPECT_EQ(starts.text(0, "draws"), "nan");
+  EXPECT_EQ(starts.text(0, "refused_draws"), "nan");
+  EXPECT_NEAR(starts.number(0, "rotation_share_of_starts"), 0.0, 1e-9);
+  EXPECT_EQ(starts.number(1, "high_mm"), 4.0);
+  const CsvTable cases = CsvTable::read(path("out/cases.csv"));
+  EXPECT_EQ(cases.text(0, "case"), "hopeless");
+  EXPECT_EQ(cases.number(0, "gross_failures"), 20.0);
+  EXPECT_EQ(cases.number(0, "capture_range_mm"), 0.0);
+  EXPECT_EQ(cases.text(0, "capture_range_ended_by"), "failures");
+}
+
+TEST_F(HandBuiltResults, AreCountedBelowTheStatedThreshold) {
+  ASSERT_EQ(evaluate("--success-tre-mm 1").exit_code, 0);
+  EXPECT_EQ(summary()["success_tre_mm"], 1.0);
+  EXPECT_EQ(of_case(statistics(), "mixed")["successes"], 6);
+  EXPECT_EQ(evaluate("--success-tre-mm 0").exit_code, 3);
+  EXPECT_EQ(evaluate("--success-tre-mm nan").exit_code, 3);
 }
 
 TEST_F(HandBuiltResults, OfFewCasesComeWithAWarning) {

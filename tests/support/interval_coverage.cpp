@@ -7,6 +7,7 @@
 
 #include "base/hash_random.h"
 #include "evaluate/statistics/bootstrap.h"
+#include "evaluate/statistics/case_equivalence.h"
 #include "evaluate/statistics/statistics.h"
 #include "evaluate/statistics/success_rate.h"
 
@@ -93,6 +94,22 @@ IntervalCoverage interval_coverage(const SimulatedStudies& setting) {
           share(rate.student),
           share(tre.bootstrap),
           share(tre.student)};
+}
+
+double wrong_equivalence_claims(const StudiesAtTheMargin& setting) {
+  constexpr double kMarginMm = 0.1;
+  std::uint64_t claims = 0;
+  for (std::uint64_t study = 0; study < setting.studies; ++study) {
+    HashRandom random(setting.seed, hash64(setting.cases, 0x6D617267), study);  // "marg"
+    std::vector<double> means_mm;
+    for (std::size_t i = 0; i < setting.cases; ++i)
+      means_mm.push_back(kMarginMm * std::exp(setting.log_sd * random.normal() -
+                                              0.5 * setting.log_sd * setting.log_sd));
+    const evaluation::CaseEquivalence found =
+        evaluation::equivalence_over_cases(means_mm, kMarginMm, study, setting.replicates);
+    claims += found.is_shown() ? 1u : 0u;
+  }
+  return static_cast<double>(claims) / static_cast<double>(setting.studies);
 }
 
 }  // namespace af::test

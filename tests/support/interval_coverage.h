@@ -32,4 +32,17 @@ struct IntervalCoverage {
 
 IntervalCoverage interval_coverage(const SimulatedStudies& setting);
 
+/// Simulated studies of the distance between two methods' end poses: the patients' own means are
+/// log-normal about the margin itself, so that whoever claims equivalence is wrong.
+struct StudiesAtTheMargin {
+  std::size_t cases = 10;
+  double log_sd = 0.4;  ///< standard deviation of the logarithm of a patient's mean
+  std::uint64_t studies = 2000;
+  std::uint64_t seed = 1;
+  std::size_t replicates = 2000;  ///< of the bootstrap
+};
+
+/// The share of the studies that claim equivalence.
+double wrong_equivalence_claims(const StudiesAtTheMargin& setting);
+
 }  // namespace af::test

@@ -27,13 +27,16 @@ void describe_source(Fields& field, DrrOptions& options) {
   field("field",
         options.field,
         "Look DRRs up in this field; its own camera is used unless --rig and --camera name "
-        "another");
-  field("ct", options.ct, "Cast rays through this CT (DICOM folder, NIfTI, MetaImage, NRRD)");
+        "another")
+      .stands_for(PathRole::InputFile, ".h5");
+  field("ct", options.ct, "Cast rays through this CT (DICOM folder, NIfTI, MetaImage, NRRD)")
+      .stands_for(PathRole::InputVolume, ".nrrd");
   field.part(options.ct_reading);
   field("study",
         options.study,
         "study.toml in place of --ct and --rig: rays are cast through the case's CT, and poses are "
-        "relative to its nominal pose");
+        "relative to its nominal pose")
+      .stands_for(PathRole::InputFile, ".toml");
   field("study_case", options.study_case, "Case of the study [the only one]").as("--case");
   field("rig", options.rig, "Rig file, or c-arm-12in, or treatment-room");
   field("camera", options.camera, "Camera of the rig or study");
@@ -58,12 +61,13 @@ void describe_pose(Fields& field, DrrOptions& options) {
         options.translation_mm,
         "tx,ty,tz along the room's axes, mm (default 0,0,0)")
       .comma_separated();
-  field("pose", options.pose, "File with one pose of any format that docs/poses.md lists");
+  field("pose", options.pose, "File with one pose of any format that docs/poses.md lists")
+      .stands_for(PathRole::InputTransform, ".tfm");
   field("poses",
         options.poses,
         "CSV of poses (rx_deg ... tz_mm, or m00 ... m23) or another file of poses (docs/poses.md): "
-        "one "
-        "3-D stack comes out");
+        "one 3-D stack comes out")
+      .stands_for(PathRole::InputFile, ".csv");
 }
 
 void describe_output(Fields& field, DrrOptions& options) {
@@ -83,6 +87,7 @@ void describe_output(Fields& field, DrrOptions& options) {
         "OUT.mha, .nii.gz, .nrrd, .tif: total attenuation, float32, not scaled; OUT.png: 8 bits, "
         "row 0 on top, bright is attenuated")
       .as("-o,--output")
+      .stands_for(PathRole::OutputVolume, ".nrrd")
       .required();
 }
 

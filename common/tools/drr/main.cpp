@@ -6,6 +6,7 @@
 #include "base/error.h"
 #include "cli/app_main.h"
 #include "cli/bind_options.h"
+#include "cli/slicer_module.h"
 #include "files/output_file.h"
 #include "tools/drr/drr_request.h"
 
@@ -39,6 +40,7 @@ int main(int argc, char** argv) {
   CLI::App app{
       "Makes digitally reconstructed radiographs, from an attenuation field or by ray casting."};
   af::cli::bind_options(app, options);
+  af::cli::bind_slicer_module(app, "Digitally reconstructed radiograph");
   return af::cli::app_main(
       app, argc, argv, [&](const af::Communicator& world) { run(options, world); });
 }

@@ -82,7 +82,10 @@ ordered_json view_json(const StudyView& view,
   json["xray"] = view.xray.string();
   json["xray_domain"] = view.xray_domain == XrayDomain::Intensity ? "intensity" : "attenuation";
   json["roi_px"] = {view.roi.column, view.roi.row, view.roi.width, view.roi.height};
-  json["fiducials"] = view.fiducials_px.size();
+  // Those that the view shows.
+  json["fiducials"] = std::count_if(view.fiducials_px.begin(),
+                                    view.fiducials_px.end(),
+                                    [](const Eigen::Vector2d& point) { return point.allFinite(); });
   const CameraGeometry& camera = rig.camera(view.camera);
   ViewXray xray = read_view_xray(view, camera);
   json["xray_reading"] = xray.note;

@@ -132,6 +132,71 @@ TEST(RigidFit, RefusesPointsThatFixNoRotation) {
   EXPECT_THROW(fit_rigid(with_nan, plane), InputError);
 }
 
+/// Five fiducials as two or three cameras see them at a pose.
+struct SeenFiducials {
+  RigidTransform truth =
+      pose_from_parameters(PoseFrame{}, PoseParameters::from_deg_and_mm({5, -3, 8, 4, -6, 2}));
+  std::vector<Vector3d> ct_mm = {
+      {20, 5, -8}, {-25, 10, 3}, {4, -22, 18}, {-6, 14, -20}, {15, -18, -4}};
+  std::vector<FiducialView> views = {
+      {camera_at("A", {0, -650, 0}, Vector3d::UnitX()), {}},
+      {camera_at("B", {650, 0, 0}, Vector3d::UnitY()), {}},
+      {camera_at("C", {460, -460, 0}, Vector3d(1, 1, 0).normalized()), {}}};
+
+  SeenFiducials() {
+    for (FiducialView& view : views)
+      for (const Vector3d& point : ct_mm)
+        view.fiducials_px.push_back(view.camera.project(truth * point));
+  }
+};
+
+TEST(FiducialGold, IsMadeFromThoseThatTwoViewsShow) {
+  SeenFiducials seen;
+  // Fiducial 0 in all, 1 in A and C, 2 in B alone, 3 in A and B, 4 in B and C.
+  seen.views[0].fiducials_px[2] = hidden_fiducial_px();
+  seen.views[2].fiducials_px[2] = hidden_fiducial_px();
+  seen.views[1].fiducials_px[1] = hidden_fiducial_px();
+  seen.views[2].fiducials_px[3] = hidden_fiducial_px();
+  seen.views[0].fiducials_px[4] = hidden_fiducial_px();
+  // Where one view alone shows it, a fiducial has no say, however wrong it is.
+  seen.views[1].fiducials_px[2] += Eigen::Vector2d(40, -30);
+  const FiducialGold gold = gold_from_fiducials(seen.views, seen.ct_mm);
+  EXPECT_EQ(gold.used, (std::vector<std::size_t>{0, 1, 3, 4}));
+  EXPECT_TRUE(gold.room_from_ct.isApprox(seen.truth, kRoundingMm));
+  EXPECT_EQ(gold.back_projections.size(), 4u);
+  EXPECT_EQ(gold.fit.residuals_mm.size(), 4u);
+  EXPECT_EQ(gold.leave_one_out_mm.size(), 4u);
+  for (const double error_mm : gold.leave_one_out_mm) EXPECT_LT(error_mm, kRoundingMm);
+}
+
+TEST(FiducialGold, OfAHiddenFiducialEqualsThatOfAStudyWithoutIt) {
+  SeenFiducials seen;
+  // Noise, so that the fit is no exact one.
+  HashRandom random(3, 1);
+  for (FiducialView& view : seen.views)
+    for (Eigen::Vector2d& point : view.fiducials_px)
+      point += Eigen::Vector2d(random.normal(), random.normal());
+  SeenFiducials without = seen;
+  for (FiducialView& view : seen.views) view.fiducials_px[2] = hidden_fiducial_px();
+  for (FiducialView& view : without.views) view.fiducials_px.erase(view.fiducials_px.begin() + 2);
+  without.ct_mm.erase(without.ct_mm.begin() + 2);
+  const FiducialGold gold = gold_from_fiducials(seen.views, seen.ct_mm);
+  const FiducialGold expected = gold_from_fiducials(without.views, without.ct_mm);
+  EXPECT_EQ(gold.room_from_ct.matrix(), expected.room_from_ct.matrix());
+  EXPECT_EQ(gold.fit.fre_mm, expected.fit.fre_mm);
+  EXPECT_GT(gold.fit.fre_mm, 0.01);
+}
+
+TEST(FiducialGold, NeedsThreeThatTwoViewsShow) {
+  SeenFiducials seen;
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t view = 1; view < 3; ++view)
+      seen.views[view].fiducials_px[i] = hidden_fiducial_px();
+  EXPECT_EQ(fiducials_in_two_views(seen.views, 5), (std::vector<std::size_t>{3, 4}));
+  EXPECT_THROW(gold_from_fiducials(seen.views, seen.ct_mm), InputError);
+  EXPECT_TRUE(fiducials_in_two_views({}, 5).empty());
+}
+
 TEST(FiducialGold, RecoversThePoseThatProjectedTheFiducials) {
   const RigidTransform truth =
       pose_from_parameters(PoseFrame{}, PoseParameters::from_deg_and_mm({5, -3, 8, 4, -6, 2}));

@@ -86,6 +86,22 @@ TEST(GoldUncertainty, OfExactFiducialsIsZero) {
   EXPECT_LT(result.p95_tre_mm, 1e-8);
 }
 
+TEST(GoldUncertainty, CountsOnlyWhatViewsShow) {
+  std::vector<FiducialView> views = noisy_views(0.2, 3);
+  views.push_back({camera_at("C", {460, -460, 0}, Vector3d(1, 1, 0).normalized()), {}});
+  for (const Vector3d& point : kFiducials)
+    views[2].fiducials_px.push_back(views[2].camera.project(true_pose() * point));
+  EXPECT_EQ(uncertainty_of(views, 1, 5).degrees_of_freedom, 2u * 3u * 4u - 6u);
+  views[2].fiducials_px[0] = hidden_fiducial_px();
+  EXPECT_EQ(uncertainty_of(views, 1, 5).degrees_of_freedom, 2u * (3u * 4u - 1u) - 6u);
+  // Fiducial 1 is left in one view: its detection there says nothing either.
+  views[0].fiducials_px[1] = views[1].fiducials_px[1] = hidden_fiducial_px();
+  const GoldUncertainty result = uncertainty_of(views, 1, 20);
+  EXPECT_EQ(result.degrees_of_freedom, 2u * (3u * 3u - 1u) - 6u);
+  EXPECT_TRUE(std::isfinite(result.mean_tre_mm));
+  EXPECT_GT(result.detection_sigma_px, 0.0);
+}
+
 TEST(GoldUncertainty, DependsOnItsArgumentsAlone) {
   const std::vector<FiducialView> views = noisy_views(0.2, 3);
   EXPECT_EQ(uncertainty_of(views, 1, 20).mean_tre_mm, uncertainty_of(views, 1, 20).mean_tre_mm);

@@ -265,6 +265,29 @@ TEST_F(StudyFile, FiducialsMustBeEnoughNotCollinearAndEquallyMany) {
               HasSubstr(":14: case[0].view[0].fiducials_px[3]"));
 }
 
+TEST_F(StudyFile, FiducialsMayBeHiddenInAView) {
+  const auto view_with = [&](const std::string& row) {
+    return read(replaced(kGoodStudy, "[5,6], [7.5,8.25]]", row + ", [7.5,8.25]]"));
+  };
+  for (const char* hidden : {"[]", "[nan,nan]", "[nan, +nan]"}) {
+    const Study study = view_with(hidden);
+    const StudyView& view = study.find_case("").views[0];
+    ASSERT_EQ(view.fiducials_px.size(), 4U) << hidden;
+    EXPECT_FALSE(view.fiducials_px[2].allFinite()) << hidden;
+    EXPECT_EQ(view.fiducials_px[3], Vector2d(7.5, 8.25));
+    // Written and read again.
+    const StudyView again = read(study_to_toml(study, folder().path())).find_case("").views[0];
+    EXPECT_FALSE(again.fiducials_px[2].allFinite()) << hidden;
+    EXPECT_EQ(again.fiducials_px[3], view.fiducials_px[3]);
+  }
+  // Half a point is none, and the CT's fiducials have all to be there.
+  for (const char* bad : {"[nan,5]", "[5]", "[nan]", "[inf,inf]", "\"\"", "[[]]"})
+    EXPECT_THAT(refusal("[5,6], [7.5,8.25]]", std::string(bad) + ", [7.5,8.25]]"),
+                HasSubstr("or [] for one that is absent"))
+        << bad;
+  EXPECT_THAT(refusal("[0,50,0], [0,0,50]]", "[], [0,0,50]]"), HasSubstr("fiducials_ct_mm"));
+}
+
 TEST_F(StudyFile, CaseWithNeitherFiducialsNorGoldPoseIsAccepted) {
   std::string text =
       replaced(kGoodStudy, "fiducials_ct_mm = [[0,0,0], [50,0,0], [0,50,0], [0,0,50]]\n", "");

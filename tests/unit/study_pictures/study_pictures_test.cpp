@@ -118,11 +118,10 @@ TEST(RoomSketch, ShowsEveryCameraWithinItsPaper) {
     // Per camera four rays, a detector and its first row; twelve edges of the CT.
     EXPECT_EQ(panel.lines.size(), 2U * 6U + 12U);
     EXPECT_EQ(panel.marks.size(), 2U * 2U + 6U);
-    for (const PictureLine& line : panel.lines)
-      for (const auto& [x, y] : line.points) {
-        EXPECT_GE(std::min(x, y), 0.0);
-        EXPECT_LE(std::max(x, y), panel.image.width);
-      }
+    for (const PictureMark& mark : panel.marks) {
+      EXPECT_GE(std::min(mark.place[0], mark.place[1]), 0.0);
+      EXPECT_LE(std::max(mark.place[0], mark.place[1]), panel.image.width);
+    }
   }
 }
 

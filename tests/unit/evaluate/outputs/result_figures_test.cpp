@@ -88,7 +88,7 @@ TEST(Figures, AreDrawnWithTitlesAndUnits) {
     fields[1].psnr_db.push_back(43.5 + 1.0 * HashRandom(2, i).normal());
   }
   fields[1].psnr_db[3] = std::numeric_limits<double>::infinity();
-  draw_psnr_boxes(fields, folder / "psnr");
+  draw_psnr_boxes(fields, PaperLevels::Shown, folder / "psnr");
   draw_success_rates(groups, 8, 2.0, folder / "success");
   draw_tre_histogram(groups, folder / "histogram");
   draw_tre_scatter(groups, 16.0, folder / "scatter");
@@ -107,7 +107,7 @@ TEST(Figures, HaveTheirNumbersBesideThem) {
   draw_success_rates(groups, 2, 2.0, folder / "success");
   draw_tre_histogram(groups, folder / "histogram");
   draw_tre_scatter(groups, 16.0, folder / "scatter");
-  draw_psnr_boxes({{"camera A", {40.5, 41.0}}}, folder / "psnr");
+  draw_psnr_boxes({{"camera A", {40.5, 41.0}}}, PaperLevels::Hidden, folder / "psnr");
 
   const CsvTable success = CsvTable::read(folder / "success.csv");
   ASSERT_EQ(success.row_count(), 2u);
@@ -140,7 +140,7 @@ TEST(Figures, AreDrawnForEmptyGroups) {
   EXPECT_NO_THROW(draw_success_rates(groups, 8, 2.0, folder / "success"));
   EXPECT_NO_THROW(draw_success_rates({{"field", {{40.0, 1.0}}}}, 8, 2.0, folder / "beyond"));
   EXPECT_NO_THROW(draw_tre_scatter(groups, 16.0, folder / "scatter"));
-  EXPECT_NO_THROW(draw_psnr_boxes({{"camera A", {}}}, folder / "psnr"));
+  EXPECT_NO_THROW(draw_psnr_boxes({{"camera A", {}}}, PaperLevels::Hidden, folder / "psnr"));
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include "evaluate/image_quality/image_quality_tables.h"
 #include "evaluate/registration/case_evaluation.h"
 #include "evaluate/registration/method_comparison.h"
+#include "evaluate/registration/paired_statistics.h"
 #include "evaluate/registration/pose_distances.h"
 #include "evaluate/registration/registration_rows.h"
 #include "evaluate/registration/registration_statistics.h"
@@ -160,11 +161,86 @@ TEST(RegistrationStatistics, KeepEveryFailureInTheDenominatorAndNameItsReason) {
   EXPECT_EQ(result["tre_of_all_mm"]["median"], (0.5 + 4.0) / 2);
   EXPECT_EQ(result["tre_of_all_mm"]["q3"], 10.0 + 0.75 * 2.0);
   EXPECT_EQ(result["tre_of_all_mm"]["p95"], "inf");
-  EXPECT_EQ(result["capture_range"]["initial_tre_mm"], 4.5);
-  EXPECT_EQ(result["capture_range"]["starts"], 5);
-  EXPECT_EQ(result["capture_range"]["is_whole_study"], false);
+  EXPECT_EQ(result["cumulative_capture_range"]["initial_tre_mm"], 4.5);
+  EXPECT_EQ(result["cumulative_capture_range"]["starts"], 5);
+  EXPECT_EQ(result["cumulative_capture_range"]["is_whole_study"], false);
+  // Two starts in each interval: one of two from 4 mm on.
+  const json& range = result["capture_range"];
+  EXPECT_EQ(range["initial_tre_mm"], 4.0);
+  EXPECT_EQ(range["starts"], 4);
+  EXPECT_EQ(range["ended_by"], "failures");
+  EXPECT_EQ(range["end_interval"]["low_mm"], 4.0);
+  EXPECT_EQ(range["end_interval"]["successes"], 1);
   // 8.5 and 9.5 mm.
   EXPECT_EQ(result["starts_beyond_last_interval"], 2);
+}
+
+TEST(RegistrationStatistics, CountSuccessBelowTheStatedThreshold) {
+  const Rows rows = {
+      row("field", 0, 0.5, 0.9), row("field", 1, 1.5, 2.0), row("field", 2, 2.5, 3.0)};
+  const json strict = renderer_statistics(rows, "field", {8, 2.0, 1, 1.0});
+  EXPECT_EQ(strict["successes"], 1);
+  EXPECT_EQ(strict["intervals"][0]["successes"], 1);
+  EXPECT_EQ(strict["tre_of_successes_mm"]["mean"], 0.9);
+  EXPECT_EQ(strict["cases"][0]["successes"], 1);
+  EXPECT_EQ(renderer_statistics(rows, "field", {8, 2.0, 1, 5.0})["successes"], 3);
+  // The ladder is the same for all: 1, 2, 2.5, 5, 10 mm.
+  for (std::size_t i = 0; i < 5; ++i)
+    EXPECT_EQ(strict["thresholds"][i]["successes"], (std::vector<int>{1, 1, 2, 3, 3}[i])) << i;
+  EXPECT_EQ(registrations_table(rows, 1.0).text(1, "success"), "0");
+  EXPECT_EQ(registrations_table(rows, 5.0).text(2, "success"), "1");
+}
+
+TEST(RegistrationStatistics, HaveTheLadderOfMrpdToo) {
+  Rows rows;
+  for (std::int64_t i = 0; i < 5; ++i) rows.push_back(row("field", i, 1, 30.0));
+  const std::vector<double> mrpd_mm = {0.5, 1.0, 2.4, 7.0, std::nan("")};
+  for (std::size_t i = 0; i < 5; ++i) rows[i].errors.mrpd_mm = mrpd_mm[i];
+  const json result = renderer_statistics(rows, "field", {2, 2.0});
+  const std::vector<int> below = {1, 2, 3, 3, 4};
+  for (std::size_t i = 0; i < below.size(); ++i) {
+    EXPECT_EQ(result["mrpd_thresholds"][i]["successes"], below[i]) << i;
+    EXPECT_EQ(result["mrpd_thresholds"][i]["starts"], 5) << i;
+    EXPECT_EQ(result["mrpd_thresholds"][i]["threshold_mm"],
+              result["thresholds"][i]["threshold_mm"]);
+  }
+  EXPECT_EQ(result["successes"], 0);
+  EXPECT_EQ(result["mrpd_success"]["successes"], 3);
+  EXPECT_EQ(result["mrpd_success"]["threshold_mm"], 2.5);
+  EXPECT_EQ(result["mrpd_capture_range"]["initial_tre_mm"], 0.0);
+}
+
+TEST(RegistrationStatistics, HaveCaptureRangesOfPatientsAndOverThem) {
+  // Patient a succeeds to 2 mm, b to 4 mm, c everywhere (three intervals, one start each).
+  Rows rows;
+  const auto add = [&](const char* name, int successes) {
+    for (int k = 0; k < 3; ++k)
+      rows.push_back(row("field", k, 2.0 * k + 1.0, k < successes ? 0.1 : 9.0, name));
+  };
+  add("a", 1);
+  add("b", 2);
+  add("c", 3);
+  const json result = renderer_statistics(rows, "field", {3, 2.0});
+  EXPECT_EQ(result["cases"][0]["capture_range"]["initial_tre_mm"], 2.0);
+  EXPECT_EQ(result["cases"][1]["capture_range"]["initial_tre_mm"], 4.0);
+  EXPECT_EQ(result["cases"][2]["capture_range"]["ended_by"], "last interval");
+  // Together 2 of 3 succeed from 2 mm on.
+  EXPECT_EQ(result["capture_range"]["initial_tre_mm"], 2.0);
+  const json& own = result["over_cases"]["capture_range_mm"];
+  EXPECT_DOUBLE_EQ(own["mean_mm"].get<double>(), 4.0);
+  EXPECT_EQ(own["min_mm"], 2.0);
+  EXPECT_EQ(own["max_mm"], 6.0);
+  EXPECT_EQ(own["at_least"], 1);
+  EXPECT_EQ(own["cases"], 3);
+  // 4 +- 4.302653 * 2 / sqrt(3), Student's quantile of two degrees of freedom.
+  EXPECT_NEAR(
+      own["student_high"].get<double>(), 4.0 + 4.302652729749464 * 2 / std::sqrt(3.0), 1e-9);
+  EXPECT_GE(own["low"].get<double>(), 2.0);
+  EXPECT_LE(own["high"].get<double>(), 6.0);
+  // Drawn three times c: 6 mm, in 1 of 27 resamples; only b and c: at least 4 mm, in 8 of 27.
+  const json& pooled = result["over_cases"]["pooled_capture_range_mm"];
+  EXPECT_EQ(pooled["low"], 2.0);
+  EXPECT_EQ(pooled["high"], 6.0);
 }
 
 TEST(RegistrationStatistics, OfOtherErrorsKeepEveryFailureToo) {
@@ -257,7 +333,7 @@ TEST(PairedStatistics, TakeOnlyStartsThatBothWereGiven) {
                      row("raycast", 0, 0.5, 0.3),
                      row("raycast", 1, 1.5, 0.6),
                      row("raycast", 3, 2.5, 0.1)};
-  const json result = paired_statistics(rows, 0.5);
+  const json result = paired_statistics(rows, {0.5});
   EXPECT_EQ(result["common_starts"], 3);
   EXPECT_EQ(result["successes"], json({2, 3}));
   // Start 3 alone is discordant: both of the two ways are equally probable.
@@ -279,10 +355,72 @@ TEST(PairedStatistics, OverCasesResampleCases) {
                      row("raycast", 0, 1, 0.25, "a"),
                      row("field", 0, 1, 0.5, "b"),
                      row("raycast", 0, 1, 0.75, "b")};
-  const json over = paired_statistics(rows, 0.5)["mean_difference_over_cases_mm"];
+  const json over = paired_statistics(rows, {0.5})["mean_difference_over_cases_mm"];
   EXPECT_EQ(over["low"], -0.25);
   EXPECT_EQ(over["high"], 0.25);
   EXPECT_NEAR(over["student_high"].get<double>(), 12.7062 * 0.25, 1e-4);
+}
+
+/// Distance along x of two end poses.
+double shift_between(const RegistrationRow& a, const RegistrationRow& b) {
+  return std::abs(a.final_deg_mm[3] - b.final_deg_mm[3]);
+}
+
+TEST(PairedStatistics, OppositeErrorsOfEqualLengthDoNotCancelInTheDistance) {
+  // Field ends 0.3 mm to one side, ray casting 0.3 mm to the other: equal TREs, 0.6 mm apart.
+  Rows rows;
+  for (int patient = 0; patient < 12; ++patient)
+    for (std::int64_t start = 0; start < 2; ++start)
+      for (const char* renderer : {"field", "raycast"}) {
+        rows.push_back(row(renderer, start, 1, 0.3, "p" + std::to_string(patient)));
+        const double side = std::string(renderer) == "field" ? 0.3 : -0.3;
+        rows.back().final_deg_mm = {0, 0, 0, side, 0, 0};
+      }
+  // One start that both lost: it counts among all, not among the pairs.
+  rows[0].tre_mm = 9.0;
+  const json result = paired_statistics(rows, {0.5, 1, kSuccessTreMm, shift_between});
+  EXPECT_EQ(result["test"]["equivalence_p"], 0.0) << "lengths of TRE see nothing";
+  const json& ends = result["end_distance_mm"];
+  EXPECT_EQ(ends["pairs"]["count"], 23);
+  EXPECT_EQ(ends["all"]["count"], 24);
+  EXPECT_DOUBLE_EQ(ends["over_cases"]["mean"].get<double>(), 0.6);
+  EXPECT_EQ(ends["over_cases"]["cases"], 12);
+  EXPECT_EQ(ends["is_equivalent"], false);
+  const json wide = paired_statistics(rows, {0.7, 1, kSuccessTreMm, shift_between});
+  EXPECT_EQ(wide["end_distance_mm"]["is_equivalent"], true);
+}
+
+TEST(PairedStatistics, OfFewPatientsClaimNothingHoweverManyStarts) {
+  Rows rows;
+  for (std::int64_t start = 0; start < 500; ++start)
+    for (const char* renderer : {"field", "raycast"}) {
+      rows.push_back(row(renderer, start, 1, 0.2, start % 2 == 0 ? "a" : "b"));
+      rows.back().final_deg_mm = {};
+    }
+  const json ends =
+      paired_statistics(rows, {0.1, 1, kSuccessTreMm, shift_between})["end_distance_mm"];
+  EXPECT_EQ(ends["pairs"]["count"], 500);
+  EXPECT_TRUE(ends["is_equivalent"].is_null());
+  EXPECT_EQ(ends["has_enough_cases"], false);
+  EXPECT_FALSE(paired_statistics(rows, {0.1}).contains("end_distance_mm"));
+}
+
+TEST(PairedStatistics, WeighPatientsAlikeHoweverManyPairsTheyHave) {
+  Rows rows;
+  const auto add = [&](const char* name, std::int64_t start, double apart_mm) {
+    rows.push_back(row("field", start, 1, 0.2, name));
+    rows.back().final_deg_mm = {0, 0, 0, apart_mm, 0, 0};
+    rows.push_back(row("raycast", start, 1, 0.2, name));
+    rows.back().final_deg_mm = {};
+  };
+  for (std::int64_t start = 0; start < 9; ++start) add("a", start, 0.1);
+  add("b", 0, 0.5);
+  const json ends =
+      paired_statistics(rows, {0.1, 1, kSuccessTreMm, shift_between})["end_distance_mm"];
+  EXPECT_NEAR(ends["over_cases"]["mean"].get<double>(), 0.3, 1e-12);
+  EXPECT_EQ(ends["pairs"]["median"], 0.1);
+  EXPECT_NEAR(ends["over_cases"]["low"].get<double>(), 0.1, 1e-12);
+  EXPECT_NEAR(ends["over_cases"]["high"].get<double>(), 0.5, 1e-12);
 }
 
 TEST(PairedStatistics, TieInEveryPairAtOnceIsEquivalenceWithoutSpread) {
@@ -291,7 +429,7 @@ TEST(PairedStatistics, TieInEveryPairAtOnceIsEquivalenceWithoutSpread) {
     rows.push_back(row("field", i, 1, 0.5));
     rows.push_back(row("raycast", i, 1, 0.5));
   }
-  const json test = paired_statistics(rows, 0.1)["test"];
+  const json test = paired_statistics(rows, {0.1})["test"];
   EXPECT_EQ(test["t_test_p"], 1.0);
   EXPECT_EQ(test["signed_rank_p"], 1.0);
   EXPECT_EQ(test["equivalence_p"], 0.0);
@@ -299,11 +437,12 @@ TEST(PairedStatistics, TieInEveryPairAtOnceIsEquivalenceWithoutSpread) {
 
 TEST(PairedStatistics, DoNotExistWithoutCommonStarts) {
   EXPECT_TRUE(
-      paired_statistics(Rows{row("field", 0, 1, 1), row("raycast", 1, 1, 1)}, 0.5).is_null());
+      paired_statistics(Rows{row("field", 0, 1, 1), row("raycast", 1, 1, 1)}, {0.5}).is_null());
   // The same start number of another patient is another start.
-  EXPECT_TRUE(paired_statistics(Rows{row("field", 0, 1, 1, "a"), row("raycast", 0, 1, 1, "b")}, 0.5)
-                  .is_null());
-  const json one = paired_statistics(Rows{row("field", 0, 1, 1), row("raycast", 0, 1, 1)}, 0.5);
+  EXPECT_TRUE(
+      paired_statistics(Rows{row("field", 0, 1, 1, "a"), row("raycast", 0, 1, 1, "b")}, {0.5})
+          .is_null());
+  const json one = paired_statistics(Rows{row("field", 0, 1, 1), row("raycast", 0, 1, 1)}, {0.5});
   EXPECT_EQ(one["pairs"], 1);
   EXPECT_FALSE(one.contains("test"));
 }
@@ -407,9 +546,30 @@ TEST(MethodComparison, OfAHandBuiltRunIsTheKnownOne) {
   const std::string text = methods_markdown(found);
   // Wilson's interval of 2 of 2 begins at 2 / (2 + 1.96^2) = 34 %, that of 0 of 1 ends at 79 %.
   EXPECT_THAT(text,
-              testing::HasSubstr("| 100 [34, 100] / 0 [0, 79] / 0 [0, 79] | 2 / 1 / 1 | 0.300, "
-                                 "0.300 | 0.224, 2.000 | 102 |"));
+              testing::HasSubstr("| 100 [34, 100] / 0 [0, 79] / 0 [0, 79] | 2 / 1 / 1 | - / - / - "
+                                 "| - | 1 | 0.300, 0.300 | 0.224, 2.000 | 102 |"));
+  EXPECT_EQ(methods_table(found).text(0, "gross_failures"), "1");  // the one without a pose
   EXPECT_EQ(methods_table(found).text(0, "successes_0_8_mm"), "2");
+}
+
+TEST(MethodComparison, TakesThresholdTargetAndCaptureRangeFromTheSummary) {
+  const test::ScratchFolder folder;
+  Rows rows = {row("field", 0, 1, 1.5), row("field", 1, 1, 0.5)};
+  rows[0].start_deg_mm = {0, 0, 0, 0, 1, 0};  // a translation
+  rows[1].start_deg_mm = {1, 0, 0, 0, 0, 0};  // a rotation
+  for (RegistrationRow& each : rows) each.final_deg_mm = {};
+  write_text_file(folder / "registrations.csv", registrations_table(rows).to_text());
+  EvaluationRun run{folder.path(), "registration", {}};
+  run.summary["success_tre_mm"] = 1.0;
+  run.summary["cases"] = json::array({{{"case", "skull"},
+                                       {"center_ct_mm", {0, 0, 0}},
+                                       {"target_box_ct_mm", {{-9, -9, -9}, {9, 9, 9}}}}});
+  run.summary["renderers"] = json::array({renderer_statistics(rows, "field", {8, 2.0, 1, 1.0})});
+  const MethodRow method = method_rows({run}).front();
+  EXPECT_EQ(method.bands[0].successes, 1);
+  EXPECT_EQ(method.rotation_shares[0], 0.5);
+  EXPECT_EQ(method.capture_range_mm, "0");
+  EXPECT_EQ(method.gross_failures, 0);
 }
 
 /// A run of one case whose gold pose turns the CT by a right angle about z.
@@ -452,6 +612,33 @@ TEST(PoseDistances, OfTwoRunsAreThoseOfTheirEndsFromTheSameStarts) {
   EXPECT_NEAR(found[0].distance_mm.maximum, 0.5, kRounding);
   EXPECT_EQ(pose_distances_table(found).text(0, "starts"), "2");
   EXPECT_THAT(pose_distances_markdown(found), testing::HasSubstr("| 2 | 0.3000, "));
+}
+
+TEST(PoseDistances, OverPatientsTakeTheirMeansAlike) {
+  std::vector<PoseDistanceRow> rows;
+  for (int patient = 0; patient < 10; ++patient)
+    rows.push_back({"p" + std::to_string(patient),
+                    "a",
+                    "field",
+                    "b",
+                    "field",
+                    // The first patient has more starts than the others, and no more weight.
+                    summarize(std::vector<double>(patient == 0 ? 50 : 1, 0.01 * patient))});
+  rows.push_back({"p0", "a", "field", "b", "raycast", summarize({0.3})});
+  const std::vector<PatientDistances> found = distances_over_patients(rows, 0.1);
+  ASSERT_EQ(found.size(), 2u);
+  EXPECT_EQ(found[0].starts, 59u);
+  EXPECT_EQ(found[0].equivalence.cases, 10u);
+  EXPECT_NEAR(found[0].equivalence.mean, 0.045, 1e-12);
+  EXPECT_TRUE(found[0].equivalence.is_shown());
+  const CsvTable table = patient_distances_table(found);
+  EXPECT_EQ(table.text(0, "claim"), "yes");
+  EXPECT_EQ(table.text(1, "claim"), "too few patients");
+  EXPECT_EQ(table.text(1, "patients"), "1");
+  EXPECT_THAT(patient_distances_markdown(found),
+              testing::HasSubstr("| a field | b raycast | 1 | 1 | 0.3000 -, - | within 0.1 mm: too "
+                                 "few patients |"));
+  EXPECT_EQ(distances_over_patients(rows, 0.05)[0].equivalence.is_shown(), false);
 }
 
 TEST(PoseDistances, OfARotationDependOnWhereTheBoxIs) {
@@ -535,11 +722,19 @@ TEST(MethodComparison, PairsTellTheTestOfTheSummary) {
     rows.push_back(row("raycast", start, 1, raycast_mm));
   }
   EvaluationRun run{"runs/skull-fast", "registration", {}};
-  run.summary["field_against_raycast"] = paired_statistics(rows, 0.5);
+  run.summary["field_against_raycast"] = paired_statistics(rows, {0.5});
   // Equal differences of 0.1 mm have no spread; one success of three differs.
   EXPECT_THAT(pairs_markdown({run}),
-              testing::HasSubstr("| skull-fast | 3 | 3, 2 | 1.00 | 2 | 0.100 [0.100, 0.100] | "
-                                 "< 0.0001 at 0.50 mm | 1.00 |"));
+              testing::HasSubstr("| skull-fast | 3 | 3, 2 | 1.00 | 2 | - | - | - | - | "
+                                 "0.100 [0.100, 0.100] | 0.2000, 40.00 |"));
+  // With end poses 0.25 mm apart, of one patient: nothing is claimed.
+  for (RegistrationRow& each : rows) each.final_deg_mm = {};
+  for (std::size_t i = 0; i < rows.size(); i += 2) rows[i].final_deg_mm[3] = 0.25;
+  run.summary["field_against_raycast"] =
+      paired_statistics(rows, {0.5, 1, kSuccessTreMm, shift_between});
+  EXPECT_THAT(pairs_markdown({run}),
+              testing::HasSubstr("| 2 | 1 | 0.250 [-, -], Student [-, -] | 0.250, 0.250 | 0.50 mm: "
+                                 "not claimed: fewer than 10 patients | 0.100"));
   run.summary["field_against_raycast"] = nullptr;
   EXPECT_EQ(pairs_markdown({run}), "");
 }

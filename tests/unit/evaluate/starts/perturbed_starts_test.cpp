@@ -5,7 +5,10 @@
 #include <cmath>
 #include <map>
 #include <numeric>
+#include <optional>
 #include <set>
+#include <string>
+#include <utility>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -156,6 +159,125 @@ TEST(PerturbedStarts, CountDrawsThatThePredicateRefuses) {
   EXPECT_EQ(result.inadmissible_per_interval[0], 0u);
   EXPECT_GT(result.inadmissible_per_interval[7], 0u);
   for (const PerturbedStart& start : result.starts) EXPECT_TRUE(limited(start.room_from_ct));
+  // All draws but those beyond, each in its interval.
+  ASSERT_EQ(result.draws_per_interval.size(), 8u);
+  EXPECT_EQ(
+      std::accumulate(
+          result.draws_per_interval.begin(), result.draws_per_interval.end(), std::uint64_t{0}),
+      result.draws - beyond);
+  for (std::size_t k = 0; k < 8; ++k)
+    EXPECT_GE(result.draws_per_interval[k], result.inadmissible_per_interval[k] + 5) << k;
+}
+
+TEST(RotationShare, OfHandComputedStarts) {
+  PoseParameters parameters;
+  EXPECT_TRUE(std::isnan(rotation_share(parameters, 50.0)));
+  parameters.translation_mm = {0, 3, 4};
+  EXPECT_EQ(rotation_share(parameters, 50.0), 0.0);
+  parameters.rotation_rad = {0.1, 0, 0};  // 5 mm at a radius of 50 mm
+  EXPECT_DOUBLE_EQ(rotation_share(parameters, 50.0), 0.5);
+  parameters.translation_mm.setZero();
+  EXPECT_EQ(rotation_share(parameters, 50.0), 1.0);
+}
+
+TEST(RotationShare, IsOneHalfWhereNothingIsRefused) {
+  // Three of six components of a uniform direction: Beta(3/2, 3/2), mean 1/2, variance 1/16.
+  StartOptions options;
+  options.starts_per_interval = 400;
+  const StratifiedStarts result = draw(test::example_start_frame(), options);
+  ASSERT_EQ(result.rotation_share_per_interval.size(), 8u);
+  double mean = 0.0;
+  for (const double share : result.rotation_share_per_interval) mean += share / 8.0;
+  // A pure rotation moves the box by 0.7 to 0.8 of its magnitude: farther draws with much rotation
+  // fall into nearer intervals, which leaves the same share in each where none end; the last
+  // intervals still have all, since draws reach 1.5 times the end.
+  EXPECT_NEAR(mean, 0.5, 5 * 0.25 / std::sqrt(3200.0) + 0.01);
+}
+
+TEST(RotationShare, FallsWhereTheRangeRefusesRotations) {
+  const StartFrame frame = test::example_start_frame();
+  StartOptions options;
+  options.starts_per_interval = 40;
+  const auto limited = [&](const RigidTransform& pose) {
+    return parameters_from_pose(frame.pose_frame(), pose).rotation_rad.cwiseAbs().maxCoeff() <
+           3.0 * kRadPerDeg;
+  };
+  const auto points = target_points(frame.target_box_ct, 20.0);
+  StartMeasures measures(frame, options, points, limited);
+  const StratifiedStarts result = stratified_starts(measures);
+  EXPECT_LT(result.rotation_share_per_interval[7], 0.2);
+  EXPECT_GT(result.rotation_share_per_interval[0], 0.4);
+  EXPECT_GT(2 * result.inadmissible_per_interval[7], result.draws_per_interval[7]);
+}
+
+/// A field's box of 10 deg and 30 mm about a nominal pose that lies beside gold.
+StartLimit limit_beside(const StartFrame& frame) {
+  PoseParameters offset;
+  offset.rotation_rad = Eigen::Vector3d(2, -3, 1) * kRadPerDeg;
+  offset.translation_mm = {4, -6, 5};
+  return {PoseFrame::about(pose_from_parameters(frame.pose_frame(), offset),
+                           frame.center_ct_mm + Eigen::Vector3d(10, 0, -5)),
+          {10.0 * kRadPerDeg, 30.0}};
+}
+
+TEST(PerturbedStarts, WithinRangeLieInsideByDesign) {
+  const StartFrame frame = test::example_start_frame();
+  const StartLimit limit = limit_beside(frame);
+  StartOptions options;
+  options.starts_per_interval = 20;
+  const auto points = target_points(frame.target_box_ct, 20.0);
+  std::uint64_t outside = 0;
+  const auto contains = [&](const RigidTransform& pose) {
+    const bool is_inside = limit.range.contains(parameters_from_pose(limit.frame, pose));
+    outside += is_inside ? 0 : 1;
+    return is_inside;
+  };
+  StartMeasures measures(frame, options, points, contains, limit);
+  const StratifiedStarts result = starts_within_range(measures);
+  EXPECT_EQ(outside, 0u) << "a start was drawn outside the range";
+  ASSERT_EQ(result.starts.size(), 160u);
+  std::map<int, int> per_interval;
+  for (const PerturbedStart& start : result.starts) {
+    ++per_interval[start.interval];
+    EXPECT_NEAR(start.initial_tre_mm,
+                mean_tre_mm(start.room_from_ct, frame.gold_room_from_ct, points),
+                1e-9);
+    EXPECT_EQ(start.interval, static_cast<int>(start.initial_tre_mm / 2.0));
+    constexpr double kRoundingMm = 1e-9;
+    EXPECT_LT(
+        mean_tre_mm(
+            start.room_from_ct, pose_from_parameters(frame.pose_frame(), start.parameters), points),
+        kRoundingMm);
+  }
+  for (int interval = 0; interval < 8; ++interval) EXPECT_EQ(per_interval[interval], 20);
+  EXPECT_EQ(result.draws, 160u + result.inadmissible_draws);
+  // The same again, and other starts with another seed.
+  EXPECT_EQ(starts_within_range(measures).starts[77].parameters.deg_and_mm(),
+            result.starts[77].parameters.deg_and_mm());
+  options.seed = 2;
+  StartMeasures others(frame, options, points, contains, limit);
+  EXPECT_NE(starts_within_range(others).starts[77].parameters.deg_and_mm(),
+            result.starts[77].parameters.deg_and_mm());
+}
+
+TEST(PerturbedStarts, WithinRangeSayWhatIsImpossible) {
+  const StartFrame frame = test::example_start_frame();
+  const auto points = target_points(frame.target_box_ct, 30.0);
+  const auto refusal = [&](const StartOptions& options, std::optional<StartLimit> limit) {
+    StartMeasures measures(frame, options, points, anything, std::move(limit));
+    try {
+      starts_within_range(measures);
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_THAT(refusal({}, std::nullopt), testing::HasSubstr("needs fields"));
+  StartLimit far = limit_beside(frame);
+  far.range.max_translation_mm = 1.0;
+  EXPECT_THAT(refusal({}, far), testing::HasSubstr("gold pose itself"));
+  // No pose of the box is 200 mm from gold.
+  EXPECT_THAT(refusal({100, 2.0, 1, 1}, limit_beside(frame)), testing::HasSubstr("none of 1000"));
 }
 
 TEST(PerturbedStarts, UniformInTreHaveThatDistribution) {

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "evaluate/statistics/success_rate.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
+
+#include "base/hash_random.h"
 
 namespace af::evaluation {
 namespace {
@@ -71,25 +74,94 @@ TEST(SuccessRate, NanIsNeverASuccess) {
   EXPECT_EQ(count_successes(kOutcomes, 1e9), 6);
 }
 
-TEST(CaptureRange, IsTheLargestErrorWithEnoughSuccessBelowIt) {
+TEST(CumulativeCaptureRange, IsTheLargestErrorWithEnoughSuccessBelowIt) {
   // Twenty starts 1 ... 20 mm, of which the 15th fails: 14 of 14, 14 of 15, ... 19 of 20.
   std::vector<TreOutcome> outcomes;
   for (int i = 1; i <= 20; ++i) outcomes.push_back({static_cast<double>(i), i == 15 ? 9.0 : 0.1});
-  const std::optional<CaptureRange> range = capture_range(outcomes);
+  const std::optional<CumulativeCaptureRange> range = cumulative_capture_range(outcomes);
   ASSERT_TRUE(range.has_value());
   EXPECT_EQ(range->initial_tre_mm, 20.0);  // 19 of 20 are 95 %
   EXPECT_TRUE(range->is_whole_study);
-  EXPECT_EQ(capture_range(std::span(outcomes).first(19))->initial_tre_mm, 14.0);
-  EXPECT_FALSE(capture_range(std::span(outcomes).first(19))->is_whole_study);
-  EXPECT_EQ(capture_range(outcomes, 1.0)->initial_tre_mm, 14.0);
+  EXPECT_EQ(cumulative_capture_range(std::span(outcomes).first(19))->initial_tre_mm, 14.0);
+  EXPECT_FALSE(cumulative_capture_range(std::span(outcomes).first(19))->is_whole_study);
+  EXPECT_EQ(cumulative_capture_range(outcomes, 1.0)->initial_tre_mm, 14.0);
 }
 
-TEST(CaptureRange, CountsFailuresWithoutAPoseAndTakesEqualErrorsTogether) {
+TEST(CumulativeCaptureRange, CountsFailuresWithoutAPoseAndTakesEqualErrorsTogether) {
   const std::vector<TreOutcome> outcomes = {{1, 0.1}, {2, 0.1}, {2, std::nan("")}};
-  EXPECT_EQ(capture_range(outcomes)->initial_tre_mm, 1.0);
-  EXPECT_EQ(capture_range(outcomes)->starts, 1);
-  EXPECT_FALSE(capture_range(std::vector<TreOutcome>{{1, 9.0}}).has_value());
-  EXPECT_FALSE(capture_range({}).has_value());
+  EXPECT_EQ(cumulative_capture_range(outcomes)->initial_tre_mm, 1.0);
+  EXPECT_EQ(cumulative_capture_range(outcomes)->starts, 1);
+  EXPECT_FALSE(cumulative_capture_range(std::vector<TreOutcome>{{1, 9.0}}).has_value());
+  EXPECT_FALSE(cumulative_capture_range({}).has_value());
+}
+
+/// 20 starts per interval of 2 mm; so many of them succeed.
+std::vector<IntervalSuccess> intervals_with(const std::vector<int>& successes, int starts = 20) {
+  std::vector<IntervalSuccess> intervals;
+  for (std::size_t k = 0; k < successes.size(); ++k) {
+    IntervalSuccess& interval = intervals.emplace_back();
+    interval.low_mm = 2.0 * static_cast<double>(k);
+    interval.high_mm = interval.low_mm + 2.0;
+    interval.trials = starts;
+    interval.successes = successes[k];
+  }
+  return intervals;
+}
+
+TEST(CaptureRange, EndsAtTheFirstIntervalWithTooManyFailures) {
+  // 19 of 20 are 95 %; 18 end the range, whatever follows.
+  const CaptureRange range = capture_range(intervals_with({20, 19, 20, 18, 20, 20}));
+  EXPECT_EQ(range.initial_tre_mm, 6.0);
+  EXPECT_EQ(range.starts, 60);
+  EXPECT_EQ(range.successes, 59);
+  EXPECT_EQ(range.end, CaptureEnd::Failures);
+  EXPECT_EQ(range.end_interval, 3u);
+  EXPECT_FALSE(range.is_whole_study());
+  // The numbers that the paper's experiments had with 120 starts each: 92 % at 10-12 mm end it,
+  // while 95.0 % of all starts up to 15.1 mm succeeded.
+  EXPECT_EQ(
+      capture_range(intervals_with({120, 120, 120, 119, 115, 110, 102, 96}, 120)).initial_tre_mm,
+      10.0);
+}
+
+TEST(CaptureRange, SaysWhetherTheStudyEndsFirst) {
+  const CaptureRange whole = capture_range(intervals_with({20, 20}));
+  EXPECT_EQ(whole.initial_tre_mm, 4.0);
+  EXPECT_EQ(whole.end, CaptureEnd::LastInterval);
+  EXPECT_EQ(whole.end_interval, 2u);
+  EXPECT_TRUE(whole.is_whole_study());
+  auto intervals = intervals_with({20, 20, 20});
+  intervals[1].trials = intervals[1].successes = 0;
+  const CaptureRange hole = capture_range(intervals);
+  EXPECT_EQ(hole.initial_tre_mm, 2.0);
+  EXPECT_EQ(hole.end, CaptureEnd::NoStarts);
+  EXPECT_TRUE(hole.is_whole_study());
+  const CaptureRange none = capture_range(intervals_with({18, 20}));
+  EXPECT_EQ(none.initial_tre_mm, 0.0);
+  EXPECT_EQ(none.starts, 0);
+  EXPECT_FALSE(none.is_whole_study());
+  EXPECT_EQ(capture_range({}).initial_tre_mm, 0.0);
+}
+
+TEST(CaptureRange, IsNeverFartherThanTheCumulativeOne) {
+  // Both from the same random outcomes: what every interval has, all of them together have.
+  for (std::uint64_t study = 0; study < 200; ++study) {
+    HashRandom random(7, study);
+    std::vector<TreOutcome> outcomes;
+    for (int start = 0; start < 160; ++start) {
+      const double initial_mm = random.uniform(0.0, 16.0);
+      const bool fails = random.uniform() < 0.004 * initial_mm;
+      outcomes.push_back({initial_mm, fails ? 9.0 : 0.1});
+    }
+    const CaptureRange range = capture_range(success_per_interval(outcomes, 8, 2.0));
+    const auto cumulative = cumulative_capture_range(outcomes);
+    double farthest_inside_mm = 0.0;
+    for (const TreOutcome& outcome : outcomes)
+      if (outcome.initial_tre_mm < range.initial_tre_mm)
+        farthest_inside_mm = std::max(farthest_inside_mm, outcome.initial_tre_mm);
+    EXPECT_GE(cumulative.has_value() ? cumulative->initial_tre_mm : 0.0, farthest_inside_mm)
+        << study;
+  }
 }
 
 }  // namespace

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+#include "cli/command_help.h"
+
+namespace af::cli {
+
+/// A page of the reference: headings and a table of options per group.
+std::string markdown_page(const CommandHelp& program);
+
+/// A page for man(1), section 1. `version` goes into its foot.
+std::string man_page(const CommandHelp& program, const std::string& version);
+
+}  // namespace af::cli

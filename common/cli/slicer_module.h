@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+// 3D Slicer asks a program for its options with --xml and makes a module of the answer
+// (docs/slicer.md).
+#pragma once
+
+#include <string>
+
+#include "cli/app_forward.h"
+#include "cli/command_help.h"
+
+namespace af::cli {
+
+/// The XML of Slicer's execution model. Slicer's parser takes letters, digits and underscores only
+/// in names of options, so they are written with underscores, which app_main() understands.
+/// \test SlicerModule, and tests/programs/slicer_xml.py, which runs the programs with it
+std::string slicer_xml(const CommandHelp& program,
+                       const std::string& title,
+                       const std::string& version);
+
+/// Adds --xml, which prints it and ends the program. After all other options.
+void bind_slicer_module(CLI::App& app, const std::string& title);
+
+/// A typed option with underscores in its name, such as --start_pose, as --start-pose when the
+/// program, or one of its commands, has that one; else the argument as it is.
+std::string with_dashes(const CLI::App& app, const std::string& argument);
+
+}  // namespace af::cli

@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluate/registration/paired_statistics.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <tuple>
+#include <vector>
+
+#include "base/sample_summary.h"
+#include "evaluate/outputs/sample_summary_json.h"
+#include "evaluate/registration/case_intervals.h"
+#include "evaluate/statistics/case_equivalence.h"
+#include "evaluate/statistics/signed_rank_test.h"
+#include "evaluate/statistics/statistics.h"
+
+namespace af::evaluation {
+
+using nlohmann::json;
+
+namespace {
+
+/// Field and ray casting from one start.
+struct StartPair {
+  const RegistrationRow* field = nullptr;
+  const RegistrationRow* raycast = nullptr;
+};
+
+bool is_earlier_start(const RegistrationRow* a, const RegistrationRow* b) {
+  return std::tie(a->case_name, a->start_index) < std::tie(b->case_name, b->start_index);
+}
+
+/// RowPointers by case and start index; of repeated rows the last. Millions of rows are looked at
+/// through pointers: a map of them would need more memory than they do.
+RowPointers rows_by_start(std::span<const RegistrationRow> rows, const std::string& renderer) {
+  RowPointers found;
+  for (const RegistrationRow& row : rows)
+    if (row.renderer == renderer) found.push_back(&row);
+  std::stable_sort(found.begin(), found.end(), is_earlier_start);
+  const auto kept = std::unique(
+      found.rbegin(), found.rend(), [](const RegistrationRow* later, const RegistrationRow* row) {
+        return !is_earlier_start(row, later);
+      });
+  found.erase(found.begin(), kept.base());
+  return found;
+}
+
+std::vector<StartPair> pairs_of(std::span<const RegistrationRow> rows) {
+  const RowPointers raycast = rows_by_start(rows, "raycast");
+  if (raycast.empty()) return {};
+  std::vector<StartPair> pairs;
+  auto next = raycast.begin();
+  for (const RegistrationRow* field : rows_by_start(rows, "field")) {
+    next = std::lower_bound(next, raycast.end(), field, is_earlier_start);
+    if (next == raycast.end()) break;
+    if (!is_earlier_start(field, *next)) pairs.push_back({field, *next});
+  }
+  return pairs;
+}
+
+json test_json(const std::vector<double>& field_tre_mm,
+               const std::vector<double>& raycast_tre_mm,
+               double margin_mm) {
+  const PairedComparison comparison = compare_paired(field_tre_mm, raycast_tre_mm, margin_mm);
+  std::vector<double> differences;
+  for (std::size_t i = 0; i < field_tre_mm.size(); ++i)
+    differences.push_back(field_tre_mm[i] - raycast_tre_mm[i]);
+  const SignedRankTest ranks = signed_rank_test(differences);
+  const double sd = comparison.standard_error * std::sqrt(static_cast<double>(comparison.pairs));
+  return {{"mean_difference_mm", comparison.mean_difference},
+          {"sd_mm", sd},
+          {"low_90_mm", comparison.low_90},
+          {"high_90_mm", comparison.high_90},
+          {"t_test_p", comparison.t_test_p},
+          {"signed_rank_p", ranks.p},
+          {"signed_rank_is_exact", ranks.is_exact},
+          {"margin_mm", comparison.margin},
+          {"equivalence_p", comparison.equivalence_p},
+          {"equivalence_power", comparison.equivalence_power},
+          {"pairs_for_power_90", pairs_for_equivalence(sd, margin_mm)}};
+}
+
+/// Sums over the pairs of one case.
+struct CasePairs {
+  CaseMean tre_difference_mm;   ///< field less ray casting, where both succeeded
+  CaseMean success_difference;  ///< field less ray casting, every common start
+  CaseMean end_distance_mm;     ///< where both succeeded
+};
+
+/// All pairs of a run.
+struct PairSums {
+  std::array<std::vector<double>, 2> seconds;
+  std::vector<double> field_tre_mm;      ///< where both succeeded
+  std::vector<double> raycast_tre_mm;    ///< the same
+  std::vector<double> distances_mm;      ///< the same
+  std::vector<double> all_distances_mm;  ///< where both have an end pose
+  std::int64_t only_field = 0;
+  std::int64_t only_raycast = 0;
+  std::map<std::string, CasePairs> cases;
+
+  void add(const StartPair& pair, const PairedOptions& options);
+};
+
+void PairSums::add(const StartPair& pair, const PairedOptions& options) {
+  CasePairs& of_case = cases[pair.field->case_name];
+  seconds[0].push_back(pair.field->seconds);
+  seconds[1].push_back(pair.raycast->seconds);
+  const bool field = pair.field->is_success(options.success_tre_mm);
+  const bool raycast = pair.raycast->is_success(options.success_tre_mm);
+  only_field += field && !raycast ? 1 : 0;
+  only_raycast += raycast && !field ? 1 : 0;
+  of_case.success_difference.sum += (field ? 1.0 : 0.0) - (raycast ? 1.0 : 0.0);
+  of_case.success_difference.count += 1.0;
+  const double distance_mm =
+      options.end_distance_mm ? options.end_distance_mm(*pair.field, *pair.raycast) : kNan;
+  if (std::isfinite(distance_mm)) all_distances_mm.push_back(distance_mm);
+  if (!field || !raycast) return;
+  field_tre_mm.push_back(pair.field->tre_mm);
+  raycast_tre_mm.push_back(pair.raycast->tre_mm);
+  of_case.tre_difference_mm.sum += pair.field->tre_mm - pair.raycast->tre_mm;
+  of_case.tre_difference_mm.count += 1.0;
+  if (!std::isfinite(distance_mm)) return;
+  distances_mm.push_back(distance_mm);
+  of_case.end_distance_mm.sum += distance_mm;
+  of_case.end_distance_mm.count += 1.0;
+}
+
+/// One of the means of every case that has it.
+std::vector<CaseMean> means_of(const std::map<std::string, CasePairs>& cases,
+                               CaseMean CasePairs::*member) {
+  std::vector<CaseMean> means;
+  for (const auto& [name, of_case] : cases)
+    if ((of_case.*member).count > 0.0) means.push_back(of_case.*member);
+  return means;
+}
+
+/// Every case counts alike, however many pairs it has.
+json end_distance_json(const PairSums& sums, const PairedOptions& options) {
+  std::vector<double> case_means_mm;
+  for (const CaseMean& mean : means_of(sums.cases, &CasePairs::end_distance_mm))
+    case_means_mm.push_back(mean.sum / mean.count);
+  const CaseEquivalence found =
+      equivalence_over_cases(case_means_mm, options.margin_mm, options.seed);
+  json over_cases = bootstrap_json(found.bootstrap);
+  over_cases["mean"] = number_json(found.mean);
+  over_cases["student_low"] = number_json(found.student.low);
+  over_cases["student_high"] = number_json(found.student.high);
+  json result = {{"pairs", to_json(summarize(sums.distances_mm))},
+                 {"all", to_json(summarize(sums.all_distances_mm))},
+                 {"over_cases", over_cases},
+                 {"margin_mm", options.margin_mm},
+                 {"p", number_json(found.p)},
+                 {"cases_needed", kEnoughCasesForEquivalence},
+                 {"has_enough_cases", found.has_enough_cases()}};
+  // With too few cases nothing is claimed, neither way.
+  result["is_equivalent"] = found.has_enough_cases() ? json(found.is_shown()) : json(nullptr);
+  return result;
+}
+
+}  // namespace
+
+json paired_statistics(std::span<const RegistrationRow> rows, const PairedOptions& options) {
+  PairSums sums;
+  for (const StartPair& pair : pairs_of(rows)) sums.add(pair, options);
+  if (sums.seconds[0].empty()) return nullptr;
+  const auto both = static_cast<std::int64_t>(sums.field_tre_mm.size());
+  json result = {
+      {"common_starts", sums.seconds[0].size()},
+      {"successes", {both + sums.only_field, both + sums.only_raycast}},
+      {"mcnemar_p", mcnemar_exact_p(sums.only_field, sums.only_raycast)},
+      {"median_seconds", {summarize(sums.seconds[0]).median, summarize(sums.seconds[1]).median}},
+      {"pairs", both}};
+  result["success_difference_over_cases"] =
+      interval_over_cases(means_of(sums.cases, &CasePairs::success_difference), options.seed);
+  if (options.end_distance_mm) result["end_distance_mm"] = end_distance_json(sums, options);
+  if (both >= 2)
+    result["test"] = test_json(sums.field_tre_mm, sums.raycast_tre_mm, options.margin_mm);
+  result["mean_difference_over_cases_mm"] =
+      interval_over_cases(means_of(sums.cases, &CasePairs::tre_difference_mm), options.seed);
+  return result;
+}
+
+}  // namespace af::evaluation

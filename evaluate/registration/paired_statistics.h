@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+// Field against ray casting from the same starts: what summary.json says of it.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <span>
+#include <string>
+
+#include "evaluate/registration/registration_rows.h"
+
+namespace af::evaluation {
+
+/// How far the end poses of two rows of one case lie apart, mm: mean over its target points.
+using EndDistance = std::function<double(const RegistrationRow& a, const RegistrationRow& b)>;
+
+struct PairedOptions {
+  double margin_mm = 0.1;
+  std::uint64_t seed = 1;  ///< of the bootstrap
+  double success_tre_mm = kSuccessTreMm;
+  EndDistance end_distance_mm = {};  ///< empty: no `end_distance_mm`
+};
+
+/// Field against ray casting on the starts that both were given: successes and median seconds of
+/// each, McNemar's test of success, and the difference of the cases' success rates with intervals
+/// over cases; on those from which both succeeded ("pairs"), the distance of their end poses with
+/// intervals and a test of equivalence over cases. Also, if there are two pairs or more, tests of
+/// the TREs' difference that take starts for independent. null when no start was given to both.
+nlohmann::json paired_statistics(std::span<const RegistrationRow> rows,
+                                 const PairedOptions& options);
+
+}  // namespace af::evaluation

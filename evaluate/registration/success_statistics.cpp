@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluate/registration/success_statistics.h"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "base/sample_summary.h"
+#include "evaluate/registration/case_intervals.h"
+#include "evaluate/statistics/bootstrap.h"
+#include "evaluate/statistics/success_rate.h"
+#include "text/number_json.h"
+
+namespace af::evaluation {
+
+using nlohmann::json;
+
+namespace {
+
+/// Of TRE and of mRPD alike.
+constexpr std::array<double, 5> kThresholdsMm = {1.0, 2.0, 2.5, 5.0, 10.0};
+
+/// The ends are TREs, or mRPDs: with one view the depth along its rays stays unknown, so that a TRE
+/// says little, while a distance from the rays can be small.
+enum class EndError { Tre, Mrpd };
+
+std::vector<TreOutcome> outcomes_by(EndError error, const RowPointers& rows) {
+  std::vector<TreOutcome> outcomes;
+  outcomes.reserve(rows.size());
+  for (const RegistrationRow* row : rows)
+    outcomes.push_back(
+        {row->initial_tre_mm, error == EndError::Tre ? row->tre_mm : row->errors.mrpd_mm});
+  return outcomes;
+}
+
+json share_below(double threshold_mm, const std::vector<TreOutcome>& outcomes) {
+  json share = proportion_json(count_successes(outcomes, threshold_mm),
+                               static_cast<std::int64_t>(outcomes.size()));
+  share["threshold_mm"] = threshold_mm;
+  return share;
+}
+
+json ladder_json(const std::vector<TreOutcome>& outcomes) {
+  json ladder = json::array();
+  for (const double threshold : kThresholdsMm) ladder.push_back(share_below(threshold, outcomes));
+  return ladder;
+}
+
+std::vector<IntervalSuccess> intervals_of(const std::vector<TreOutcome>& outcomes,
+                                          const StatisticsOptions& options) {
+  return success_per_interval(
+      outcomes, options.intervals, options.interval_width_mm, options.success_tre_mm);
+}
+
+const char* name_of(CaptureEnd end) {
+  switch (end) {
+    case CaptureEnd::Failures:
+      return "failures";
+    case CaptureEnd::NoStarts:
+      return "no starts";
+    case CaptureEnd::LastInterval:
+      return "last interval";
+  }
+  return "";
+}
+
+/// null without starts.
+json capture_json(const std::vector<IntervalSuccess>& intervals) {
+  const bool is_empty =
+      std::all_of(intervals.begin(), intervals.end(), [](const IntervalSuccess& interval) {
+        return interval.trials == 0;
+      });
+  if (is_empty) return nullptr;
+  const CaptureRange range = capture_range(intervals);
+  json result = {{"initial_tre_mm", range.initial_tre_mm},
+                 {"starts", range.starts},
+                 {"successes", range.successes},
+                 {"is_whole_study", range.is_whole_study()},
+                 {"ended_by", name_of(range.end)}};
+  if (range.end_interval < intervals.size())
+    result["end_interval"] = interval_json(intervals[range.end_interval]);
+  return result;
+}
+
+json cumulative_capture_json(const std::vector<TreOutcome>& outcomes, double success_tre_mm) {
+  const std::optional<CumulativeCaptureRange> range =
+      cumulative_capture_range(outcomes, kCaptureShare, success_tre_mm);
+  if (!range.has_value()) return nullptr;
+  return {{"initial_tre_mm", range->initial_tre_mm},
+          {"starts", range->starts},
+          {"successes", range->successes},
+          {"is_whole_study", range->is_whole_study}};
+}
+
+/// The starts of all drawn cases together.
+std::vector<IntervalSuccess> pooled(const std::vector<std::vector<IntervalSuccess>>& cases,
+                                    std::span<const std::size_t> drawn) {
+  std::vector<IntervalSuccess> sums = cases[drawn.front()];
+  for (const std::size_t index : drawn.subspan(1))
+    for (std::size_t k = 0; k < sums.size(); ++k) {
+      sums[k].trials += cases[index][k].trials;
+      sums[k].successes += cases[index][k].successes;
+    }
+  return sums;
+}
+
+}  // namespace
+
+json success_statistics(const RowPointers& rows, const StatisticsOptions& options) {
+  const std::vector<TreOutcome> by_tre = outcomes_by(EndError::Tre, rows);
+  const std::vector<TreOutcome> by_mrpd = outcomes_by(EndError::Mrpd, rows);
+  const std::vector<IntervalSuccess> intervals = intervals_of(by_tre, options);
+  const auto trials = static_cast<std::int64_t>(rows.size());
+  json result = proportion_json(count_successes(by_tre, options.success_tre_mm), trials);
+  result["intervals"] = json::array();
+  for (const IntervalSuccess& interval : intervals)
+    result["intervals"].push_back(interval_json(interval));
+  result["thresholds"] = ladder_json(by_tre);
+  result["gross_failures"] =
+      proportion_json(trials - count_successes(by_tre, kGrossFailureTreMm), trials);
+  result["capture_range"] = capture_json(intervals);
+  result["cumulative_capture_range"] = cumulative_capture_json(by_tre, options.success_tre_mm);
+  result["mrpd_success"] = share_below(options.success_tre_mm, by_mrpd);
+  result["mrpd_thresholds"] = ladder_json(by_mrpd);
+  result["mrpd_capture_range"] = capture_json(intervals_of(by_mrpd, options));
+  return result;
+}
+
+void add_capture_over_cases(const std::map<std::string, RowPointers>& by_case,
+                            const StatisticsOptions& options,
+                            json& over_cases) {
+  std::vector<std::vector<IntervalSuccess>> cases;
+  std::vector<CaseMean> own_ranges;
+  std::vector<double> ranges_mm;
+  std::int64_t at_least = 0;
+  for (const auto& [name, rows] : by_case) {
+    cases.push_back(intervals_of(outcomes_by(EndError::Tre, rows), options));
+    const CaptureRange range = capture_range(cases.back());
+    own_ranges.push_back({range.initial_tre_mm, 1.0});
+    ranges_mm.push_back(range.initial_tre_mm);
+    at_least += range.is_whole_study() ? 1 : 0;
+  }
+  const SampleSummary summary = summarize(ranges_mm);
+  json own = interval_over_cases(own_ranges, options.seed);
+  own["mean_mm"] = number_json(summary.mean);
+  own["min_mm"] = number_json(summary.minimum);
+  own["max_mm"] = number_json(summary.maximum);
+  own["at_least"] = at_least;
+  over_cases["capture_range_mm"] = own;
+  over_cases["pooled_capture_range_mm"] = bootstrap_json(bootstrap_over_cases(
+      cases.size(),
+      [&](std::span<const std::size_t> drawn) {
+        return capture_range(pooled(cases, drawn)).initial_tre_mm;
+      },
+      options.seed));
+}
+
+}  // namespace af::evaluation

@@ -1,0 +1,122 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Runs the commands of a page, so that a reader can.
+
+Usage: page_commands.py --run PAGE PROGRAMS       runs all ```sh blocks of a page in one scratch folder
+       page_commands.py --check ROOT              blocks of every page are of a known kind, those that are not run say
+                                                  why, and name options that our programs have
+       page_commands.py --pages ROOT              prints the pages that have ```sh blocks
+
+A block marked ```sh is run, from the top of the page to its end, with small data of the names that our pages use
+(small_data.py). A block marked ```console shows commands that are not run; the line behind it begins with
+"*Not run by the tests:" and gives the reason.
+"""
+import os
+import re
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+SKIPPED = {".git", "build"}
+KINDS = {"", "sh", "console", "toml", "text", "python", "cpp", "cmake", "json", "csv", "xml", "latex"}
+EXCUSE = "*Not run by the tests:"
+
+
+def blocks_of(page):
+    """(kind, first line's number, text, the first line of words behind it) of each fenced block."""
+    lines = page.read_text(encoding="utf-8").splitlines()
+    blocks, begin, kind = [], None, ""
+    for number, line in enumerate(lines):
+        if begin is None and line.startswith("```"):
+            begin, kind = number + 1, line[3:].strip()
+        elif begin is not None and line.startswith("```"):
+            behind = next((text for text in lines[number + 1 :] if text.strip()), "")
+            blocks.append((kind, begin + 1, "\n".join(lines[begin:number]), behind))
+            begin = None
+    if begin is not None:
+        sys.exit(f"{page}:{begin}: a block without an end")
+    return blocks
+
+
+def pages_below(root):
+    return sorted(p for p in root.rglob("*.md") if not SKIPPED & set(p.relative_to(root).parts))
+
+
+def known_options(root):
+    """The options of each program, by docs/reference, which is compared with the programs."""
+    options = {}
+    for page in (root / "docs" / "reference").glob("af-*.md"):
+        rows = [line for line in page.read_text(encoding="utf-8").splitlines() if line.startswith("| `-")]
+        options[page.stem] = {name for row in rows for name in re.findall(r"`(--?[a-z][a-z-]*)`", row.split("|")[1])}
+    return options
+
+
+def unknown_options(text, options):
+    """Options of our programs' commands that the programs do not have."""
+    for command in re.split(r"[|;&\n]+", re.sub(r"#.*", "", text.replace("\\\n", " "))):
+        program = re.search(r"\baf-[a-z]+\b", command)
+        if program and program.group() in options:
+            for name in re.findall(r"(?<=\s)--[a-z][a-z_-]*", command[program.end() :]):
+                if name.replace("_", "-") not in options[program.group()]:
+                    yield f"{program.group()} {name}"
+
+
+def check(root):
+    problems, options = [], known_options(root)
+    for page in pages_below(root):
+        for kind, number, text, behind in blocks_of(page):
+            where = f"{page.relative_to(root)}:{number}"
+            if kind not in KINDS:
+                problems.append(f"{where}: a block of the unknown kind '{kind}'")
+            if kind == "console" and not behind.startswith(EXCUSE):
+                problems.append(f"{where}: nothing says why this block is not run ('{EXCUSE} ...*' behind it)")
+            if kind in ("console", "sh"):
+                problems += [f"{where}: there is no {name}" for name in unknown_options(text, options)]
+    for problem in problems:
+        print(problem, file=sys.stderr)
+    if problems:
+        sys.exit(f"pages: {len(problems)} problems")
+    print(f"pages: {len(pages_below(root))} pages say which commands are run")
+
+
+def script_of(page):
+    parts = ["set -euo pipefail"]
+    for kind, number, text, _ in blocks_of(page):
+        if kind == "sh":
+            parts.append(f"echo '--- {page.name}:{number}'\n{text}")
+    return "\n".join(parts) + "\n"
+
+
+def run(page, programs):
+    root = HERE.parent.parent
+    with tempfile.TemporaryDirectory(prefix="page ") as folder:
+        for name in ("jobs", "tests", "docs", "common"):
+            (Path(folder) / name).symlink_to(root / name)
+        environment = dict(os.environ)
+        environment["PATH"] = f"{programs}:{environment['PATH']}"
+        environment["OMPI_ALLOW_RUN_AS_ROOT"] = environment["OMPI_ALLOW_RUN_AS_ROOT_CONFIRM"] = "1"
+        environment["OMPI_MCA_rmaps_base_oversubscribe"] = "1"
+        script = script_of(page)
+        wanted = [word for word in ("cam01.txt", "results/") if f" {word}" in script]
+        subprocess.run([HERE / "small_data.py", folder, *wanted], check=True, env=environment, cwd=folder)
+        return subprocess.run(["bash", "-c", script], check=False, env=environment, cwd=folder).returncode
+
+
+def main():
+    arguments = sys.argv[1:]
+    if len(arguments) == 3 and arguments[0] == "--run":
+        return run(Path(arguments[1]), Path(arguments[2]).resolve())
+    if len(arguments) == 2 and arguments[0] == "--check":
+        return check(Path(arguments[1]))
+    if len(arguments) == 2 and arguments[0] == "--pages":
+        for page in pages_below(Path(arguments[1])):
+            if any(kind == "sh" for kind, *_ in blocks_of(page)):
+                print(page.relative_to(arguments[1]))
+        return 0
+    sys.exit(__doc__)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

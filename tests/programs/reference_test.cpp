@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+// docs/reference/ is what the programs print of themselves and what the code knows of its files.
+// After a change: AF_WRITE_REFERENCE=1 build/release/tests/reference_tests
+#include <cstdlib>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "field_file/field_layout.h"
+#include "files/output_file.h"
+#include "register/results/registration_columns.h"
+#include "register/results/registration_results.h"
+#include "study/study_template.h"
+#include "support/run_program.h"
+
+namespace af {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The page in the tree is `text`; or becomes it, when that is asked for.
+void expect_page(const std::string& name, const std::string& text) {
+  const fs::path path = fs::path(AF_SOURCE_FOLDER) / "docs" / "reference" / name;
+  if (std::getenv("AF_WRITE_REFERENCE") != nullptr) write_text_file(path, text);
+  EXPECT_EQ(fs::exists(path) ? read_text_file(path) : "", text)
+      << path << " differs from the code: AF_WRITE_REFERENCE=1 " << AF_REFERENCE_PROGRAM;
+}
+
+std::string dataset_table() {
+  std::ostringstream out;
+  out << "| Dataset | Type | Extents | Unit | Frame |\n|---|---|---|---|---|\n";
+  std::vector<field_layout::DatasetRule> rules = field_layout::payload_rules(1);
+  for (const field_layout::DatasetRule& rule : field_layout::provenance_rules())
+    rules.push_back(rule);
+  for (const field_layout::DatasetRule& rule : rules) {
+    out << "| `" << rule.name << "` | " << to_string(rule.type) << " | ";
+    for (std::size_t i = 0; i < rule.extents.size(); ++i)
+      out << (i == 0 ? "" : " x ") << (i == 0 && rule.is_first_extent_free ? "up to " : "")
+          << rule.extents[i];
+    out << " | " << rule.units << " | " << rule.frame << " |\n";
+  }
+  return out.str();
+}
+
+std::string code_list(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "`" : ", `") + name + "`";
+  return text;
+}
+
+std::string file_page() {
+  using namespace registration;
+  std::ostringstream page;
+  page << "# Files\n\nThis page is made from the code (`tests/programs/reference_test.cpp`).\n\n"
+       << "## study.toml\n\n`af-inspect --template study` prints this:\n\n```toml\n"
+       << template_text("study") << "```\n\n## rig.toml\n\n`af-inspect --template rig` prints "
+       << "this:\n\n```toml\n"
+       << template_text("rig") << "```\n\n## Fields (`.af.h5`)\n\nHDF5, format "
+       << field_layout::kFormat << ", version " << field_layout::kFormatVersion
+       << ". A field of several depth slabs has `/geometry/slab_1/`, `/field/slab_1` and so on. "
+       << "`/field/slab_0` holds the codeword of each tile, uint16, by (u, v, s, t). "
+       << "[Frames](../../common/geometry/README.md), "
+       << "[coding](../coding.md).\n\n"
+       << dataset_table() << "\n## Results of af-register\n\nIn the folder of `--output`: "
+       << code_list(result_file_names())
+       << ", one `CAMERA-overlay.png` per view, and `slicer/`. Which of them are there depends on "
+       << "the verdict ([register/README.md](../../register/README.md)).\n\n"
+       << "## registrations.csv\n\nOne row per registration, with these columns; `af-evaluate` "
+       << "and `--correct` add more between them ([errors.md](../errors.md) defines the "
+       << "errors):\n\n"
+       << code_list(names_of(registration_row({}, {}, {})))
+       << "\n\nWith `--correct`: " << code_list(names_of(correction_cells({}))) << ".\n";
+  return page.str();
+}
+
+TEST(Reference, OfEveryProgramIsWhatItPrints) {
+  for (const char* name :
+       {"af-precompute", "af-drr", "af-simulate", "af-register", "af-evaluate", "af-inspect"}) {
+    const test::ProgramRun run =
+        test::run_command(std::string(AF_PROGRAM_FOLDER "/") + name + " --help-as markdown");
+    ASSERT_EQ(run.exit_code, 0) << run.output;
+    expect_page(std::string(name) + ".md", run.output);
+  }
+}
+
+TEST(Reference, OfFilesIsWhatTheCodeKnows) {
+  expect_page("files.md", file_page());
+}
+
+}  // namespace
+}  // namespace af

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cli/command_help.h"
+
+#include <CLI/CLI.hpp>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "cli/bind_options.h"
+#include "cli/help_pages.h"
+#include "cli/shell_completion.h"
+#include "cli/slicer_module.h"
+
+namespace af::cli {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+struct ShownOptions {
+  std::filesystem::path study;
+  std::filesystem::path output;
+  std::string way = "quick";
+  std::optional<std::string> preset;
+  int nodes = 64;
+  double share = 0.25;
+  double tiny = 1e-9;
+  double lone = 0.5;
+  std::optional<double> unset;
+  std::array<double, 2> window = {0.5, 99.5};
+  bool is_exact = false;
+
+  void describe(Fields& field) {
+    field("study", study, "A study | of <one> case").stands_for(PathRole::InputFile, ".toml");
+    field("output", output, "Results")
+        .as("-o,--output")
+        .stands_for(PathRole::OutputFolder)
+        .required();
+    field("way", way, "How").choice({"quick", "exact"});
+    field("preset", preset, "Preset").choice({"fast", "paper"});
+    field("nodes", nodes, "Nodes").within(2, 128);
+    field("share", share, "Share").at_least(0.0);
+    field("tiny", tiny, "Tiny");
+    field("lone", lone, "Lone").excludes({"--unset"});
+    field("unset", unset, "Unset");
+    field("window", window, "Window").comma_separated();
+    field("exact", is_exact, "A flag");
+  }
+};
+
+CommandHelp shown_help() {
+  static ShownOptions options;
+  static CLI::App app{"Shows options. Quickly."};
+  if (app.get_name().empty()) {
+    app.name("af-show");
+    bind_options(app, options);
+  }
+  return command_help(app);
+}
+
+TEST(MarkdownPage, HasARowForEveryOption) {
+  const std::string page = markdown_page(shown_help());
+  EXPECT_THAT(page, HasSubstr("# af-show\n\nShows options. Quickly.\n"));
+  EXPECT_THAT(page, HasSubstr("| `--study` | `PATH` |  | A study \\| of \\<one> case |\n"));
+  EXPECT_THAT(page, HasSubstr("| `-o`, `--output` | `PATH` |  | Results. Required |\n"));
+  EXPECT_THAT(page, HasSubstr("| `--way` | `TEXT` | `quick` | How. One of: quick, exact |\n"));
+  EXPECT_THAT(page, HasSubstr("| `--nodes` | `INT` | `64` | Nodes. Must be within 2 and 128 |\n"));
+  EXPECT_THAT(page, HasSubstr("| `--exact` |  |  | A flag |\n"));
+}
+
+TEST(ManPage, SaysWhatTheProgramDoesInItsName) {
+  const std::string page = man_page(shown_help(), "1.2");
+  EXPECT_THAT(page, HasSubstr(".SH NAME\naf\\-show \\- Shows options\n"));
+  EXPECT_THAT(page, HasSubstr("\\fB\\-o\\fR, \\fB\\-\\-output\\fR \\fIPATH\\fR\n"));
+}
+
+TEST(SlicerXml, GivesAParameterTheTypeThatCarriesItsMeaning) {
+  const std::string xml = slicer_xml(shown_help(), "Show", "1.2");
+  EXPECT_THAT(xml, HasSubstr("<file fileExtensions=\".toml\">\n      <name>study</name>"));
+  EXPECT_THAT(xml, HasSubstr("A study | of &lt;one&gt; case"));
+  EXPECT_THAT(xml, HasSubstr("<directory>\n      <name>output</name>\n      <flag>o</flag>"));
+  EXPECT_THAT(xml, HasSubstr("<string-enumeration>\n      <name>way</name>"));
+  EXPECT_THAT(xml,
+              HasSubstr("<constraints><minimum>2</minimum><maximum>128</maximum><step>1</step>"));
+  EXPECT_THAT(xml, HasSubstr("<default>0.5,99.5</default>"));
+  EXPECT_THAT(xml, HasSubstr("<double>\n      <name>share</name>"));
+  EXPECT_THAT(xml, HasSubstr("<boolean>\n      <name>exact</name>"));
+  EXPECT_THAT(xml, Not(HasSubstr("help")));
+}
+
+TEST(SlicerXml, MakesATextOfWhatMustNotAlwaysBeGiven) {
+  const std::string xml = slicer_xml(shown_help(), "Show", "1.2");
+  for (const char* name : {"preset", "unset", "tiny", "lone"})
+    EXPECT_THAT(xml, HasSubstr(std::string("<string>\n      <name>") + name + "</name>"));
+}
+
+TEST(Completion, NamesOptionsAndChoices) {
+  const std::string bash = bash_completion(shown_help());
+  EXPECT_THAT(bash, HasSubstr("\" --way\") names=\"quick exact\" ;;"));
+  EXPECT_THAT(bash, HasSubstr("complete -o default -F _af_show af-show\n"));
+  const std::string zsh = zsh_completion(shown_help());
+  EXPECT_THAT(zsh, HasSubstr("'(-o --output)'{-o,--output}'[Results]:PATH:_files'"));
+  EXPECT_THAT(zsh, HasSubstr("'--way[How]:TEXT:(quick exact)'"));
+}
+
+TEST(WithDashes, TurnsUnderscoresOfKnownOptionsOnly) {
+  CLI::App app{"test"};
+  CLI::App* command = app.add_subcommand("work", "");
+  double value = 0.0;
+  app.add_option("--start-pose", value, "");
+  command->add_option("--pose-count", value, "");
+  EXPECT_EQ(with_dashes(app, "--start_pose"), "--start-pose");
+  EXPECT_EQ(with_dashes(app, "--start_pose=a_b"), "--start-pose=a_b");
+  EXPECT_EQ(with_dashes(app, "--pose_count"), "--pose-count");
+  EXPECT_EQ(with_dashes(app, "--no_such"), "--no_such");
+  EXPECT_EQ(with_dashes(app, "a_b"), "a_b");
+}
+
+}  // namespace
+}  // namespace af::cli
