@@ -104,10 +104,22 @@ void add_landmarks(const StudyCase& study_case,
                              PictureColor::Red});
 }
 
+/// The window is that of the region: borders of an X-ray may hold anything.
 PicturePanel panel_with(const Image2d& image,
+                        const StudyView& view,
+                        const ShrunkView& shrunk,
                         const std::string& title,
                         const std::string& caption) {
-  const auto window = percentile_window(image, 0.5, 99.5);
+  const RegionOfInterest region = {
+      std::min(view.roi.column / shrunk.factor, image.width - 1),
+      std::min(view.roi.row / shrunk.factor, image.height - 1),
+      std::max(1, std::min(view.roi.width / shrunk.factor, image.width)),
+      std::max(1, std::min(view.roi.height / shrunk.factor, image.height))};
+  const RegionOfInterest within = {region.column,
+                                   region.row,
+                                   std::min(region.width, image.width - region.column),
+                                   std::min(region.height, image.height - region.row)};
+  const auto window = percentile_window(crop(image, within), 0.5, 99.5);
   return {image, window[0], window[1], title, caption, {}, {}};
 }
 
@@ -127,6 +139,8 @@ void draw_view(const Study& study,
   std::vector<PicturePanel> panels;
   panels.push_back(
       panel_with(xray,
+                 view,
+                 shrunk,
                  "X-ray",
                  "as the file has it, attenuation; letters of the nominal pose, " + beam +
                      (view.landmarks_px.empty() ? "" : "; circles: landmarks as marked")));
@@ -138,6 +152,8 @@ void draw_view(const Study& study,
     last_drr = render_image(caster, pose.room_from_ct, shrunk.view);
     const EdgeLetters at_pose = edge_letters(camera, pose.room_from_ct);
     panels.push_back(panel_with(last_drr,
+                                view,
+                                shrunk,
                                 "DRR, " + pose.name,
                                 "cast through the CT; beam from " + at_pose.beam_from + " to " +
                                     at_pose.beam_to +
