@@ -4,7 +4,7 @@
 # asks dpkg only and ends at once. Needs root or sudo only when something is missing.
 set -euo pipefail
 
-# Compilers and build tools, libraries, figures, what checks pages and makes packages, and the default CT
+# Compilers and build tools, libraries, the Python module, figures, what checks pages and makes packages, and the default CT
 # (invesalius-examples).
 base_packages=(
   g++-12 cmake ninja-build pkg-config
@@ -12,18 +12,21 @@ base_packages=(
   libinsighttoolkit5-dev libgdcm-dev zlib1g-dev
   libeigen3-dev libcli11-dev libtomlplusplus-dev nlohmann-json3-dev libnlopt-dev libspdlog-dev libssl-dev libboost-math-dev
   libgtest-dev libgmock-dev
-  libcairo2-dev fonts-dejavu-core gnuplot-nox
-  python3 dpkg-dev
+  python3-dev python3-numpy pybind11-dev python3-wheel
+  libcairo2-dev libexpat1-dev fonts-dejavu-core gnuplot-nox
+  dpkg-dev
   invesalius-examples
 )
 benchmark_packages=(plastimatch libfaiss-dev libopenblas-dev)
 # Formatter, linters, the browser that opens the report in a test, and what reads manual pages and completions in tests.
 lint_packages=(clang-format-14 clang-tidy-14 shellcheck chromium groff-base bsdextrautils zsh)
+# Large, and only one test and one example of the Python module need it; they are skipped without it.
+torch_packages=(python3-torch)
 slurm_packages=(slurm-wlm munge)
 
 usage() {
   cat <<'TEXT'
-Usage: jobs/install-packages.sh [--with-lint] [--with-benchmarks] [--with-slurm] [--check] [--help]
+Usage: jobs/install-packages.sh [--with-lint] [--with-benchmarks] [--with-slurm] [--with-torch] [--check] [--help]
 
 Installs the Debian 12 packages that the project needs to build, run and pass its tests. Says what it does; does
 nothing when all are there. Needs root or sudo only to install.
@@ -32,6 +35,7 @@ nothing when all are there. Needs root or sudo only to install.
                       completions (clang-format-14, clang-tidy-14, shellcheck, chromium, groff-base, bsdextrautils, zsh)
   --with-benchmarks   also what tests/benchmark/run.sh compares with (plastimatch, Faiss, OpenBLAS)
   --with-slurm        also a Slurm of one node, for tests/slurm
+  --with-torch        also PyTorch, for the test and the example of differentiable DRRs
   --check             only say what is missing; exit 1 when something is
 TEXT
 }
@@ -47,6 +51,7 @@ main() {
       --with-lint) packages+=("${lint_packages[@]}") ;;
       --with-benchmarks) packages+=("${benchmark_packages[@]}") ;;
       --with-slurm) packages+=("${slurm_packages[@]}") ;;
+      --with-torch) packages+=("${torch_packages[@]}") ;;
       --check) check_only=yes ;;
       --help | -h) usage; return 0 ;;
       *)

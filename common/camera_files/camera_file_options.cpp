@@ -32,6 +32,34 @@ void CameraFileOptions::describe(Fields& field) {
       .finite();
   field("rig_unit_mm", unit_mm, "Length of the files' unit, when they may mean another than mm")
       .within(1e-3, 1e4);
+  field("rig_detector_origin_mm",
+        detector_origin_mm,
+        "Where the centre of pixel (0, 0) lies on the detector, for formats that state the "
+        "detector in mm only (default: the image is centred)")
+      .comma_separated()
+      .count(2)
+      .within(-kMaxRoomMm, kMaxRoomMm);
+  field("rig_source_detector_mm",
+        source_detector_mm,
+        "Distance from source to detector, when a DICOM file does not state it")
+      .within(1.0, kMaxRoomMm);
+  field(
+      "rig_source_isocenter_mm",
+      source_isocenter_mm,
+      "Distance from source to isocentre (DICOM: to patient), when a DICOM file does not state it")
+      .within(1.0, kMaxRoomMm);
+  field("rig_positioner_deg",
+        positioner_deg,
+        "Primary (LAO is positive) and secondary (cranial is positive) positioner angle, when a "
+        "DICOM file does not state them")
+      .comma_separated()
+      .count(2)
+      .within(-180.0, 180.0);
+  field("rig_flip",
+        flip,
+        "The X-rays are stored with their rows, or columns, in the other order than the files' "
+        "convention has it")
+      .choice({"rows", "columns"});
 }
 
 }  // namespace af

@@ -18,6 +18,11 @@ struct CameraFileOptions {
   std::vector<double> pixel_spacing_mm;
   std::optional<std::array<double, 3>> isocenter_point;
   std::optional<double> unit_mm;
+  std::vector<double> detector_origin_mm;
+  std::optional<double> source_detector_mm;
+  std::optional<double> source_isocenter_mm;
+  std::vector<double> positioner_deg;
+  std::string flip;
 
   void describe(Fields& field);
 };

@@ -22,7 +22,7 @@ struct CameraFormat {
   const char* extension;
   bool holds_one_camera;
   bool (*is_this)(const CameraFile& file);
-  StatedRig (*read)(const CameraFile& file);
+  StatedRig (*read)(const CameraFile& file, const CameraFileOptions& options);
   std::string (*write)(const CameraRig& rig);  ///< nullptr: is not written
 };
 

@@ -14,22 +14,40 @@
 namespace af {
 
 bool is_rig_toml(const CameraFile& file);
-StatedRig read_rig_toml(const CameraFile& file);
+StatedRig read_rig_toml(const CameraFile& file, const CameraFileOptions& options);
 
 bool is_mayacam1(const CameraFile& file);
-StatedRig read_mayacam1(const CameraFile& file);
+StatedRig read_mayacam1(const CameraFile& file, const CameraFileOptions& options);
 std::string write_mayacam1(const CameraRig& rig);
 
 bool is_mayacam2(const CameraFile& file);
-StatedRig read_mayacam2(const CameraFile& file);
+StatedRig read_mayacam2(const CameraFile& file, const CameraFileOptions& options);
 std::string write_mayacam2(const CameraRig& rig);
 
 bool is_opencv_yaml(const CameraFile& file);
-StatedRig read_opencv_yaml(const CameraFile& file);
+StatedRig read_opencv_yaml(const CameraFile& file, const CameraFileOptions& options);
 std::string write_opencv_yaml(const CameraRig& rig);
 
 bool is_matrix_text(const CameraFile& file);
-StatedRig read_matrix_text(const CameraFile& file);
+StatedRig read_matrix_text(const CameraFile& file, const CameraFileOptions& options);
 std::string write_matrix_text(const CameraRig& rig);
+
+bool is_rtk_geometry(const CameraFile& file);
+StatedRig read_rtk_geometry(const CameraFile& file, const CameraFileOptions& options);
+std::string write_rtk_geometry(const CameraRig& rig);
+
+bool is_plastimatch(const CameraFile& file);
+StatedRig read_plastimatch(const CameraFile& file, const CameraFileOptions& options);
+std::string write_plastimatch(const CameraRig& rig);
+
+bool is_plastimatch_command(const CameraFile& file);
+StatedRig read_plastimatch_command(const CameraFile& file, const CameraFileOptions& options);
+
+bool is_elastix(const CameraFile& file);
+StatedRig read_elastix(const CameraFile& file, const CameraFileOptions& options);
+std::string write_elastix(const CameraRig& rig);
+
+bool is_dicom_xray(const CameraFile& file);
+StatedRig read_dicom_xray(const CameraFile& file, const CameraFileOptions& options);
 
 }  // namespace af

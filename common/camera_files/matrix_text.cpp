@@ -161,7 +161,7 @@ bool is_matrix_text(const CameraFile& file) {
   return rows > 0 && rows % kMatrixRows == 0;
 }
 
-StatedRig read_matrix_text(const CameraFile& file) {
+StatedRig read_matrix_text(const CameraFile& file, const CameraFileOptions& /*options*/) {
   return MatrixReader(file).run();
 }
 

@@ -60,7 +60,7 @@ bool is_mayacam2(const CameraFile& file) {
 }
 
 /// (column, row, 1) ~ K (R x + t), as OpenCV has it: row 0 on top, integers are pixel centres.
-StatedRig read_mayacam2(const CameraFile& file) {
+StatedRig read_mayacam2(const CameraFile& file, const CameraFileOptions& /*options*/) {
   const MayaCam2Sections sections(file);
   const Eigen::MatrixXd size = sections.numbers("image size", 1, 2);
   PinholeCamera pinhole;
@@ -92,7 +92,7 @@ bool is_mayacam1(const CameraFile& file) {
 /// then y, then x; the camera looks along -z, y is up. Line 3: where Maya puts the film, not read.
 /// Line 4: u0 and v0 (pixels from 1, v0 from the lowest row upwards) and the focal length in
 /// pixels, of either sign. Line 5: the film's scale, not read, columns and rows; 0 means 1024.
-StatedRig read_mayacam1(const CameraFile& file) {
+StatedRig read_mayacam1(const CameraFile& file, const CameraFileOptions& /*options*/) {
   const auto lines = word_lines(file.text);
   std::array<Eigen::Vector3d, kMayaCam1Lines> values;
   if (lines.size() != kMayaCam1Lines)

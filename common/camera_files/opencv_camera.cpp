@@ -207,7 +207,7 @@ bool is_opencv_yaml(const CameraFile& file) {
   });
 }
 
-StatedRig read_opencv_yaml(const CameraFile& file) {
+StatedRig read_opencv_yaml(const CameraFile& file, const CameraFileOptions& /*options*/) {
   const OpenCvValues values(file);
   StatedRig stated;
   if (values.camera_numbers().empty())

@@ -280,7 +280,7 @@ bool is_rig_toml(const CameraFile& file) {
   });
 }
 
-StatedRig read_rig_toml(const CameraFile& file) {
+StatedRig read_rig_toml(const CameraFile& file, const CameraFileOptions& /*options*/) {
   const CameraRig rig = parse_rig(file.text, file.name());
   StatedRig stated;
   stated.isocenter_point = rig.isocenter_point;

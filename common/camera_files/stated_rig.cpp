@@ -73,10 +73,12 @@ class RigCompletion {
   CameraRig run(std::vector<std::string>* warnings) {
     set_names();
     set_sizes();
+    set_pixel_grids();
     set_units();
     find_isocenter();
     face_isocenter();
     set_spacings();
+    flip_images();
     CameraRig rig;
     rig.isocenter_point = *isocenter_;
     for (const StatedCamera& camera : cameras_) rig.cameras.push_back(camera.geometry);
@@ -122,17 +124,46 @@ class RigCompletion {
   }
 
   void set_sizes() {
-    bool is_used = false;
     for (std::size_t i = 0; i < cameras_.size(); ++i) {
-      if (cameras_[i].has_size) continue;
+      Eigen::Vector2i& size_px = cameras_[i].geometry.size_px;
+      if (options_.size_px.empty() && cameras_[i].has_size) continue;
       if (options_.size_px.empty())
         throw InputError(place(i) +
                          ": the size of its images is not in the file: af-inspect --rig-from with "
                          "--rig-size-px COLUMNS,ROWS states it");
-      cameras_[i].geometry.size_px = {options_.size_px[0], options_.size_px[1]};
-      is_used = true;
+      const Eigen::Vector2i given(options_.size_px[0], options_.size_px[1]);
+      if (cameras_[i].has_size && size_px != given)
+        refuse_contradiction("--rig-size-px",
+                             std::to_string(given.x()) + "," + std::to_string(given.y()),
+                             std::to_string(size_px.x()) + "," + std::to_string(size_px.y()),
+                             i);
+      size_px = given;
     }
-    refuse_unused(!options_.size_px.empty(), is_used, "--rig-size-px", "size of the images");
+  }
+
+  /// Detectors that the files state in mm get their pixels.
+  void set_pixel_grids() {
+    bool is_used = options_.detector_origin_mm.empty();
+    for (std::size_t i = 0; i < cameras_.size(); ++i) {
+      if (cameras_[i].has_pixel_grid) continue;
+      if (options_.pixel_spacing_mm.empty())
+        throw InputError(place(i) +
+                         ": the pixel spacing is not in the file: af-inspect --rig-from with "
+                         "--rig-pixel-spacing-mm COLUMN,ROW states it");
+      CameraGeometry& camera = cameras_[i].geometry;
+      camera.pixel_spacing_mm = {options_.pixel_spacing_mm[0], options_.pixel_spacing_mm[1]};
+      Eigen::Vector2d first_mm = -0.5 * (camera.size_px.cast<double>() - Eigen::Vector2d::Ones())
+                                            .cwiseProduct(camera.pixel_spacing_mm);
+      if (!options_.detector_origin_mm.empty()) {
+        first_mm = {options_.detector_origin_mm[0], options_.detector_origin_mm[1]};
+        is_used = true;
+      }
+      camera.detector_origin_point +=
+          first_mm.x() * camera.column_direction + first_mm.y() * camera.row_direction;
+    }
+    if (!is_used)
+      throw InputError(
+          "--rig-detector-origin-mm: must not be given: the files state where the pixels are");
   }
 
   void set_units() {
@@ -198,16 +229,15 @@ class RigCompletion {
   }
 
   void set_spacings() {
-    bool is_used = false;
     for (std::size_t i = 0; i < cameras_.size(); ++i) {
-      if (cameras_[i].has_spacing) continue;
       CameraGeometry& camera = cameras_[i].geometry;
       if (!options_.pixel_spacing_mm.empty()) {
-        is_used = true;
-        camera = with_column_spacing(camera, options_.pixel_spacing_mm[0]);
-        check_row_spacing(camera, i);
+        if (!cameras_[i].has_spacing)
+          camera = with_column_spacing(camera, options_.pixel_spacing_mm[0]);
+        check_spacing(camera, i);
         continue;
       }
+      if (cameras_[i].has_spacing) continue;
       camera = with_column_spacing(camera,
                                    kDefaultMagnification * camera.depth_mm(*isocenter_) /
                                        camera.source_detector_distance_mm() *
@@ -218,24 +248,39 @@ class RigCompletion {
                        number_text(camera.pixel_spacing_mm.x()) +
                        " mm apart. Rays do not depend on it; --rig-pixel-spacing-mm states it");
     }
-    refuse_unused(
-        !options_.pixel_spacing_mm.empty(), is_used, "--rig-pixel-spacing-mm", "pixel spacing");
   }
 
-  void check_row_spacing(const CameraGeometry& camera, std::size_t i) const {
+  void check_spacing(const CameraGeometry& camera, std::size_t i) const {
     constexpr double kAspectTolerance = 1e-2;
-    const double stated = options_.pixel_spacing_mm[1];
-    if (std::abs(camera.pixel_spacing_mm.y() - stated) <= kAspectTolerance * stated) return;
-    throw InputError("--rig-pixel-spacing-mm",
-                     number_text(options_.pixel_spacing_mm[0]) + "," + number_text(stated),
-                     "must agree with the ratio of the focal lengths to 1 %: rows would be " +
-                         number_text(camera.pixel_spacing_mm.y()) + " mm apart",
-                     place(i));
+    const Eigen::Vector2d stated(options_.pixel_spacing_mm[0], options_.pixel_spacing_mm[1]);
+    if ((camera.pixel_spacing_mm - stated).cwiseAbs().maxCoeff() <=
+        kAspectTolerance * stated.minCoeff())
+      return;
+    refuse_contradiction(
+        "--rig-pixel-spacing-mm",
+        number_text(stated.x()) + "," + number_text(stated.y()),
+        number_text(camera.pixel_spacing_mm.x()) + "," + number_text(camera.pixel_spacing_mm.y()),
+        i);
   }
 
-  static void refuse_unused(bool is_given, bool is_used, const char* option, const char* what) {
-    if (is_given && !is_used)
-      throw InputError(std::string(option) + ": must not be given: the files state the " + what);
+  [[noreturn]] void refuse_contradiction(const char* option,
+                                         const std::string& given,
+                                         const std::string& stated,
+                                         std::size_t i) const {
+    throw InputError(option, given, "must agree with the file: " + stated, place(i));
+  }
+
+  void flip_images() {
+    if (options_.flip.empty()) return;
+    const bool flips_rows = options_.flip == "rows";
+    for (StatedCamera& stated : cameras_) {
+      CameraGeometry& camera = stated.geometry;
+      const Eigen::Index axis = flips_rows ? 1 : 0;
+      Eigen::Vector3d& direction = flips_rows ? camera.row_direction : camera.column_direction;
+      camera.detector_origin_point +=
+          (camera.size_px[axis] - 1) * camera.pixel_spacing_mm[axis] * direction;
+      direction = -direction;
+    }
   }
 
   void note_mirrored() {

@@ -16,6 +16,10 @@ struct StatedCamera {
   bool has_name = false;    ///< otherwise it is named after its file
   bool has_size = true;     ///< otherwise geometry.size_px is (1, 1)
   bool has_spacing = true;  ///< otherwise the detector stands anywhere behind the source
+  /// Otherwise geometry states the detector in mm: its origin is the point (0, 0) mm of the
+  /// detector and its spacing (1, 1); where the pixels are follows from size, spacing and
+  /// --rig-detector-origin-mm.
+  bool has_pixel_grid = true;
   bool knows_front = true;  ///< otherwise source and rays may point the wrong way: see turned()
 };
 

@@ -14,7 +14,10 @@ target_compile_options(
             # One binary for every x86-64 node: SSE4.2 baseline, wider only in kernels chosen at run time.
             -march=x86-64-v2
             # Same bits on every vector width: the compiler may not fuse a multiply with an add.
-            -ffp-contract=off)
+            -ffp-contract=off
+            # The programs' objects are also those of the shared library, which shows nothing but its own interface.
+            # Hidden symbols cannot be replaced from outside, so calls stay direct and are inlined as in a program.
+            -fPIC -fvisibility=hidden -fvisibility-inlines-hidden)
 target_include_directories(af_compile_options INTERFACE ${PROJECT_SOURCE_DIR} ${PROJECT_SOURCE_DIR}/common)
 
 if(AF_SANITIZE)

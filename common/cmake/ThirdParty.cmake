@@ -16,6 +16,7 @@ set_property(TARGET MPI::MPI_C APPEND PROPERTY INTERFACE_COMPILE_DEFINITIONS OMP
 find_package(OpenSSL REQUIRED COMPONENTS Crypto)
 find_package(PkgConfig REQUIRED)
 find_package(ZLIB REQUIRED)
+find_package(EXPAT REQUIRED)
 pkg_check_modules(tomlplusplus REQUIRED IMPORTED_TARGET tomlplusplus)
 pkg_check_modules(nlopt REQUIRED IMPORTED_TARGET nlopt)
 pkg_check_modules(cairo REQUIRED IMPORTED_TARGET cairo)
@@ -41,3 +42,11 @@ find_package(
              ITKIOPNG
              ITKIOTIFF
              ITKIOTransformInsightLegacy)
+
+# For AF_BUILD_PYTHON. pybind11's package file fails where Python is not found, so that is looked for first.
+set(Python_EXECUTABLE ${AF_PYTHON_EXECUTABLE})
+find_package(Python 3.9 QUIET COMPONENTS Interpreter Development.Module NumPy OPTIONAL_COMPONENTS Development.Embed)
+if(Python_FOUND)
+  set(PYBIND11_FINDPYTHON ON)
+  find_package(pybind11 2.10 QUIET)
+endif()

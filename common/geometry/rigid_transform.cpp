@@ -81,6 +81,20 @@ PoseParameters parameters_from_pose(const PoseFrame& frame, const RigidTransform
   return parameters;
 }
 
+Eigen::Matrix<double, 6, 6> motions_from_parameters(const PoseParameters& parameters) {
+  const auto about = [](int axis, double angle_rad) {
+    Eigen::Vector3d angles = Eigen::Vector3d::Zero();
+    angles[axis] = angle_rad;
+    return rotation_from_angles(angles);
+  };
+  const Eigen::Matrix3d about_z = about(2, parameters.rotation_rad.z());
+  Eigen::Matrix<double, 6, 6> motions = Eigen::Matrix<double, 6, 6>::Identity();
+  motions.block<3, 1>(0, 0) =
+      about_z * about(1, parameters.rotation_rad.y()) * Eigen::Vector3d::UnitX();
+  motions.block<3, 1>(0, 1) = about_z * Eigen::Vector3d::UnitY();
+  return motions;
+}
+
 std::vector<std::string> rigidity_problems(const Eigen::Matrix4d& matrix) {
   constexpr double kTolerance = 1e-5;
   std::vector<std::string> problems;

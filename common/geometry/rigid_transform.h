@@ -58,6 +58,12 @@ Eigen::Vector3d angles_from_rotation(const Eigen::Matrix3d& rotation);
 RigidTransform pose_from_parameters(const PoseFrame& frame, const PoseParameters& parameters);
 PoseParameters parameters_from_pose(const PoseFrame& frame, const RigidTransform& room_from_ct);
 
+/// Small motions (rotations about the room's axes through r + t in rad, then translations along
+/// them in mm) per unit of every pose parameter (rad, mm; columns): x_room = r + t + Rz Ry Rx R0 (x
+/// - c) turns about r + t, by rx about Rz Ry e_x, by ry about Rz e_y, by rz about e_z. \test
+/// PoseParameters.MoveThePoseAsTheirMotionsSay
+Eigen::Matrix<double, 6, 6> motions_from_parameters(const PoseParameters& parameters);
+
 /// Why the 4x4 matrix is not a rigid transform (tolerance 1e-5 on orthonormality) within 1 km;
 /// empty when it is one.
 std::vector<std::string> rigidity_problems(const Eigen::Matrix4d& matrix);

@@ -308,6 +308,10 @@ CtVolume read_ct(const fs::path& path,
   return ct;
 }
 
+void require_sound_grid(const CtGrid& grid, const std::string& file) {
+  check_grid(grid, file);
+}
+
 void write_ct(const CtVolume& ct, const fs::path& path) {
   const std::string name = path.filename().string();
   if (!name.ends_with(".mha") && !name.ends_with(".nii.gz") && !name.ends_with(".nrrd"))

@@ -28,6 +28,10 @@ CtVolume read_ct(const std::filesystem::path& path,
                  const CtReadOptions& options = {},
                  std::vector<std::string>* warnings = nullptr);
 
+/// InputError naming `file` for a grid that read_ct() would refuse: too few voxels, an implausible
+/// spacing or origin, axes that are not orthonormal.
+void require_sound_grid(const CtGrid& grid, const std::string& file);
+
 /// Writes a CT (int16) by extension (.mha .nii.gz .nrrd), atomically.
 void write_ct(const CtVolume& ct, const std::filesystem::path& path);
 

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstring>
 #include <filesystem>
+#include <new>
 #include <stdexcept>
 
 #include "base/error.h"
@@ -17,6 +18,11 @@ namespace {
 
 /// MPI counts are int: longer messages go in pieces.
 constexpr std::size_t kLargestPiece = std::size_t{1} << 30;
+
+/// Communicator::alone(): there is nobody to talk to, and MPI may not be initialised.
+bool is_alone(MPI_Comm communicator) {
+  return communicator == MPI_COMM_NULL;
+}
 
 void require_success(int code, const char* call) {
   if (code == MPI_SUCCESS) return;
@@ -104,6 +110,13 @@ struct NodeWindow {
   }
 };
 
+/// Aligned as node memory is.
+std::shared_ptr<std::byte> memory_of_process(std::size_t bytes) {
+  constexpr std::align_val_t kAlignment{Communicator::kNodeMemoryAlignment};
+  return {static_cast<std::byte*>(::operator new(bytes, kAlignment)),
+          [](std::byte* memory) { ::operator delete(memory, kAlignment); }};
+}
+
 }  // namespace
 
 Communicator::Impl::~Impl() {
@@ -116,40 +129,51 @@ Communicator Communicator::world() {
   return Communicator(std::make_shared<Impl>(MPI_COMM_WORLD, false));
 }
 
+Communicator Communicator::alone() {
+  return Communicator(std::make_shared<Impl>(MPI_COMM_NULL, false));
+}
+
 int Communicator::rank() const {
   int rank = 0;
+  if (is_alone(impl_->handle)) return rank;
   MPI_Comm_rank(impl_->handle, &rank);
   return rank;
 }
 
 int Communicator::size() const {
   int size = 1;
+  if (is_alone(impl_->handle)) return size;
   MPI_Comm_size(impl_->handle, &size);
   return size;
 }
 
 void Communicator::barrier() const {
+  if (is_alone(impl_->handle)) return;
   const WaitNote waits;
   require_success(MPI_Barrier(impl_->handle), "MPI_Barrier");
 }
 
 void Communicator::sum(std::span<std::uint64_t> values) const {
+  if (is_alone(impl_->handle)) return;
   const WaitNote waits;
   reduce_in_place(impl_->handle, values, MPI_SUM);
 }
 
 void Communicator::maximum(std::span<std::uint64_t> values) const {
+  if (is_alone(impl_->handle)) return;
   const WaitNote waits;
   reduce_in_place(impl_->handle, values, MPI_MAX);
 }
 
 void Communicator::broadcast(std::vector<std::byte>& bytes) const {
+  if (is_alone(impl_->handle)) return;
   const WaitNote waits;
   bytes.resize(broadcast_size(impl_->handle, bytes.size()));
   broadcast_bytes(impl_->handle, bytes);
 }
 
 void Communicator::broadcast(std::string& text) const {
+  if (is_alone(impl_->handle)) return;
   const WaitNote waits;
   text.resize(broadcast_size(impl_->handle, text.size()));
   broadcast_bytes(impl_->handle, std::as_writable_bytes(std::span(text)));
@@ -157,6 +181,7 @@ void Communicator::broadcast(std::string& text) const {
 
 std::vector<std::vector<std::byte>> Communicator::all_gather(
     std::span<const std::byte> mine) const {
+  if (is_alone(impl_->handle)) return {{mine.begin(), mine.end()}};
   const WaitNote waits;
   std::vector<std::vector<std::byte>> parts(static_cast<std::size_t>(size()));
   for (int source = 0; source < size(); ++source) {
@@ -177,6 +202,7 @@ std::vector<std::vector<std::byte>> Communicator::all_gather(
 }
 
 Communicator Communicator::node() const {
+  if (is_alone(impl_->handle)) return *this;
   MPI_Comm node_handle = MPI_COMM_NULL;
   require_success(
       MPI_Comm_split_type(impl_->handle, MPI_COMM_TYPE_SHARED, rank(), MPI_INFO_NULL, &node_handle),
@@ -194,6 +220,11 @@ std::shared_ptr<const std::byte> Communicator::allocate_on_node(
 std::shared_ptr<const std::byte> Communicator::allocate_on_node_together(
     std::size_t bytes,
     const std::function<void(std::span<std::byte>, int part, int parts)>& fill) const {
+  if (is_alone(impl_->handle)) {
+    std::shared_ptr<std::byte> memory = memory_of_process(bytes);
+    fill(std::span<std::byte>(memory.get(), bytes), 0, 1);
+    return memory;
+  }
   const Communicator on_node = node();
   auto owner = std::make_shared<NodeWindow>();
   std::byte* base = nullptr;
@@ -222,6 +253,7 @@ std::shared_ptr<const std::byte> Communicator::allocate_on_node_together(
 
 std::shared_ptr<const std::byte> Communicator::allocate_on_nodes_from_root(
     std::size_t bytes, const std::function<void(std::span<std::byte>)>& fill) const {
+  if (is_alone(impl_->handle)) return allocate_on_node(bytes, fill);
   std::span<std::byte> memory;
   bool is_first_of_node = false;
   auto owner =

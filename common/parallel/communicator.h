@@ -21,6 +21,9 @@ class Communicator {
  public:
   /// All ranks of the job. Requires a live MpiEnvironment.
   static Communicator world();
+  /// The calling process alone, without MPI: what libraries read files with. No file can be written
+  /// by it in parallel, and it has no work queue. \test CommunicatorAlone.NeedsNoMpi
+  static Communicator alone();
 
   [[nodiscard]] int rank() const;
   [[nodiscard]] int size() const;

@@ -9,7 +9,7 @@
 namespace af {
 
 struct Communicator::Impl {
-  MPI_Comm handle = MPI_COMM_NULL;
+  MPI_Comm handle = MPI_COMM_NULL;  ///< null: Communicator::alone()
   bool is_owned = false;
 
   Impl(MPI_Comm communicator_handle, bool owned) : handle(communicator_handle), is_owned(owned) {}

@@ -23,10 +23,10 @@ namespace af {
 struct PoseContext {
   /// What six numbers (rx_deg ... tz_mm) of a table are relative to.
   std::optional<PoseFrame> frame;
-  std::function<CtGrid()> ct_grid;
-  std::function<CameraRig()> rig;
+  std::function<CtGrid()> ct_grid = {};
+  std::function<CameraRig()> rig = {};
   /// DICOM's Frame of Reference UID of the CT; empty text: the CT has none.
-  std::function<std::string()> ct_frame_of_reference;
+  std::function<std::string()> ct_frame_of_reference = {};
 };
 
 /// A pose file, read into memory.

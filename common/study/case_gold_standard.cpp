@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "study/case_gold_standard.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -88,6 +89,12 @@ GoldStandard gold_standard(const Study& study,
   gold.room_from_ct = uses_fiducials ? gold.fiducials->room_from_ct : *gold.stated_pose;
   gold.source = uses_fiducials ? "fiducials" : "study";
   return gold;
+}
+
+std::optional<GoldStandard> known_gold(const Study& study, const StudyCase& study_case) {
+  if (!study_case.gold_room_from_ct.has_value() && !has_fiducial_gold(study, study_case))
+    return std::nullopt;
+  return gold_standard(study, study_case, "auto");
 }
 
 double own_tre_mm(const GoldStandard& gold) {

@@ -31,6 +31,10 @@ GoldStandard gold_standard(const Study& study,
                            const StudyCase& study_case,
                            const std::string& choice);
 
+/// The case's gold pose as af-evaluate takes it (from its fiducials if two views show them, else
+/// the one the study states); nullopt when the study knows none.
+std::optional<GoldStandard> known_gold(const Study& study, const StudyCase& study_case);
+
 /// What stands beside every TRE that is measured against this pose: the mean TRE (mm) that the gold
 /// standard has by itself. NaN for a stated pose, whose uncertainty nothing tells.
 double own_tre_mm(const GoldStandard& gold);

@@ -374,12 +374,13 @@ void describe_starts(Fields& field, RegistrationStudyOptions& options) {
       "starts_per_interval", options.starts_per_interval, "Starts in each interval of initial TRE");
   field("intervals", options.intervals, "Number of intervals of initial TRE, from 0 mm");
   field("interval_width_mm", options.interval_width_mm, "Width of an interval, mm");
-  field("start_rule",
-        options.start_rule,
-        "stratified: as many starts in each interval, draws outside the fields' motion range drawn "
-        "again (the paper); uniform: as many in all, their initial TREs uniform over all "
-        "intervals; within-range: as many in each interval, inside the motion range by design, in "
-        "directions that are uniform in its box")
+  field(
+      "start_rule",
+      options.start_rule,
+      "stratified: as many starts in each interval, draws outside the fields' motion range drawn "
+      "again (the paper); uniform: as many in all, their initial TREs uniform over all "
+      "intervals; within-range: as many in each interval, inside the motion range by design: where "
+      "the range holds a parameter back, the others make up for it")
       .choice({"stratified", "uniform", "within-range"});
   field("starts_from",
         options.starts_from,

@@ -259,39 +259,59 @@ double StartMeasures::tre_mm(const RigidTransform& room_from_ct) const {
   return mean_tre_mm(room_from_ct, frame_.gold_room_from_ct, points_ct_mm_);
 }
 
+/// A pose so far from gold along a direction, brought back into the motion range.
+RigidTransform StartMeasures::pose_within_range(const PoseParameters& direction,
+                                                double size_mm) const {
+  // A search that starts at the wall itself could not step beyond it on any side.
+  constexpr double kShareOfRange = 0.98;
+  // Farther turns have other angles about the axes than those that were meant.
+  constexpr double kFarthestTurnRad = 1.4;
+  const double radius_mm = rms_radius_mm(frame_.target_box_ct, frame_.center_ct_mm);
+  PoseParameters wanted;
+  wanted.rotation_rad = direction.rotation_rad * std::min(size_mm / radius_mm, kFarthestTurnRad);
+  wanted.translation_mm = direction.translation_mm * size_mm;
+  PoseParameters inside =
+      parameters_from_pose(limit_->frame, pose_from_parameters(frame_.pose_frame(), wanted));
+  const double most_rad = kShareOfRange * limit_->range.max_rotation_rad;
+  const double most_mm = kShareOfRange * limit_->range.max_translation_mm;
+  for (int i = 0; i < 3; ++i) {
+    inside.rotation_rad[i] = std::clamp(inside.rotation_rad[i], -most_rad, most_rad);
+    inside.translation_mm[i] = std::clamp(inside.translation_mm[i], -most_mm, most_mm);
+  }
+  return pose_from_parameters(limit_->frame, inside);
+}
+
 UniformStart StartMeasures::draw_within_range(std::uint64_t index) const {
   HashRandom random(options_.seed, hash64(kBoxStream, hash_name(frame_.case_name)), index);
   const auto interval = index / static_cast<std::uint64_t>(options_.starts_per_interval);
   const double wanted_mm =
       (static_cast<double>(interval) + random.uniform()) * options_.interval_width_mm;
-  const PoseParameters gold = parameters_from_pose(limit_->frame, frame_.gold_room_from_ct);
+  // Where the range holds even the rotations back, translations of this size reach every TRE.
+  const double largest_mm = 4.0 * wanted_mm;
   UniformStart start;
   start.initial_tre_mm = wanted_mm;
   for (; start.refused < UniformStart::kMostDraws; ++start.refused) {
-    PoseParameters far;
-    for (int i = 0; i < 3; ++i) {
-      far.rotation_rad[i] = random.uniform(-1.0, 1.0) * limit_->range.max_rotation_rad;
-      far.translation_mm[i] = random.uniform(-1.0, 1.0) * limit_->range.max_translation_mm;
-    }
-    const auto pose_at = [&](double share) {
-      PoseParameters between = gold;
-      between.rotation_rad += share * (far.rotation_rad - gold.rotation_rad);
-      between.translation_mm += share * (far.translation_mm - gold.translation_mm);
-      return pose_from_parameters(limit_->frame, between);
-    };
-    if (tre_mm(pose_at(1.0)) < wanted_mm) continue;
-    // TRE is continuous along the line: halving finds a place of the wanted TRE, to 60 bits.
+    Eigen::Matrix<double, 6, 1> normals;
+    for (int i = 0; i < 6; ++i) normals[i] = random.normal();
+    normals.normalize();
+    const PoseParameters direction{normals.head<3>(), normals.tail<3>()};
+    if (tre_mm(pose_within_range(direction, largest_mm)) < wanted_mm) continue;
+    // TRE is continuous along the way, which begins at or near gold: halving finds a place of the
+    // wanted TRE, to 60 bits.
     double below = 0.0;
-    double above = 1.0;
+    double above = largest_mm;
     constexpr int kHalvings = 60;
     for (int step = 0; step < kHalvings; ++step) {
       const double middle = 0.5 * (below + above);
-      (tre_mm(pose_at(middle)) < wanted_mm ? below : above) = middle;
+      (tre_mm(pose_within_range(direction, middle)) < wanted_mm ? below : above) = middle;
     }
-    const RigidTransform pose = pose_at(below);
-    if (!is_admissible_(pose)) continue;
+    const RigidTransform pose = pose_within_range(direction, below);
+    const double found_mm = tre_mm(pose);
+    // A gold pose beside the wall has no such way near it.
+    constexpr double kToleranceMm = 1e-6;
+    if (std::abs(found_mm - wanted_mm) > kToleranceMm || !is_admissible_(pose)) continue;
     start.parameters = parameters_from_pose(frame_.pose_frame(), pose);
-    start.initial_tre_mm = tre_mm(pose);
+    start.initial_tre_mm = found_mm;
     break;
   }
   return start;
@@ -416,8 +436,9 @@ StratifiedStarts starts_within_range(StartMeasures& measures) {
                      measures.frame().case_name);
   return starts_one_by_one(
       measures,
-      "none of 1000 points of the fields' motion range is so far from gold: use fewer intervals "
-      "or fields of a larger range",
+      "in none of 1000 directions does the fields' motion range reach so far: use fewer intervals "
+      "or "
+      "fields of a larger range",
       [&](const IndexRange& part) { return measures.draw_within_range(part); });
 }
 

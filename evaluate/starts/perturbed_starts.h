@@ -135,6 +135,8 @@ class StartMeasures {
   [[nodiscard]] int interval_of_draw(const RigidTransform& room_from_ct) const;
   [[nodiscard]] UniformStart draw_uniform(std::uint64_t index) const;
   [[nodiscard]] UniformStart draw_within_range(std::uint64_t index) const;
+  [[nodiscard]] RigidTransform pose_within_range(const PoseParameters& direction,
+                                                 double size_mm) const;
   [[nodiscard]] double tre_mm(const RigidTransform& room_from_ct) const;
   [[nodiscard]] double scale_to_tre(double tre_mm, PoseParameters& parameters) const;
 
@@ -175,12 +177,13 @@ StratifiedStarts stratified_starts(StartMeasures& measures);
 StratifiedStarts uniform_starts(StartMeasures& measures);
 
 /// As many starts in each interval as stratified_starts() gives, inside the measures' limit by
-/// design: a point uniform in the limit's box of six parameters, moved towards gold along a
-/// straight line in these until its TRE is one that is uniform in the interval. The box is convex,
-/// so all of the line lies inside. Points that are nearer to gold than that TRE are drawn again and
-/// count as refused; so do those that the predicate refuses (another field's range). InputError
-/// without a limit, for a gold pose outside, and after 1000 refusals of one start.
-/// \test PerturbedStarts.WithinRangeLieInsideByDesign
+/// design: a direction uniform in the six parameters as there, and a TRE uniform in the interval.
+/// The start goes along the direction; each of the limit's six parameters stops at 98 % of its
+/// range, and the others go on until the TRE is as wanted. So a start keeps as much rotation as the
+/// range holds, and translation makes up for the rest. A direction in which the range does not
+/// reach the TRE is drawn again and counts as refused, as does one that the predicate refuses
+/// (another field's range). InputError without a limit, for a gold pose outside, and after 1000
+/// refusals of one start. \test PerturbedStarts.WithinRangeLieInsideByDesign
 StratifiedStarts starts_within_range(StartMeasures& measures);
 
 /// The starts at given poses, in their order; intervals may lie beyond the last one.

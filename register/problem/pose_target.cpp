@@ -7,22 +7,6 @@
 namespace af::registration {
 namespace {
 
-/// Small motions (PoseGradients) per unit of every pose parameter at a pose: x_room = r + t + Rz Ry
-/// Rx R0 (x - c) turns about r + t, by rx about Rz Ry e_x, by ry about Rz e_y, by rz about e_z.
-PoseMatrix motions_from_parameters(const PoseParameters& parameters) {
-  const auto about = [](int axis, double angle_rad) {
-    Eigen::Vector3d angles = Eigen::Vector3d::Zero();
-    angles[axis] = angle_rad;
-    return rotation_from_angles(angles);
-  };
-  const Eigen::Matrix3d about_z = about(2, parameters.rotation_rad.z());
-  PoseMatrix motions = PoseMatrix::Identity();
-  motions.block<3, 1>(0, 0) =
-      about_z * about(1, parameters.rotation_rad.y()) * Eigen::Vector3d::UnitX();
-  motions.block<3, 1>(0, 1) = about_z * Eigen::Vector3d::UnitY();
-  return motions;
-}
-
 /// Poses keep this share of a box's size away from its edge, so that rounding does not put them
 /// beyond it.
 constexpr double kInsideShare = 1e-9;

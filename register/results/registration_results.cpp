@@ -106,12 +106,8 @@ std::string counts_text(const std::vector<RegistrationRecord>& records) {
 }  // namespace
 
 Judgement judgement_of(const RegistrationRecord& record) {
-  Judgement judgement = judged_end(record.result.stop_reason, record.view_values);
-  if (record.diagnosis.sayings.empty()) return judgement;
-  const std::string sayings = joined(record.diagnosis.sayings, "; ");
-  if (judgement.verdict == Verdict::NotFound)
-    return {Verdict::NotFound, judgement.reason + "; " + sayings};
-  return {Verdict::Doubtful, sayings};
+  return judgement_with(judged_end(record.result.stop_reason, record.view_values),
+                        record.diagnosis);
 }
 
 bool is_better(const RegistrationRecord& a, const RegistrationRecord& b) {

@@ -8,12 +8,6 @@
 
 namespace af::registration {
 
-std::optional<GoldStandard> known_gold(const Study& study, const StudyCase& study_case) {
-  if (!study_case.gold_room_from_ct.has_value() && !has_fiducial_gold(study, study_case))
-    return std::nullopt;
-  return gold_standard(study, study_case, "auto");
-}
-
 void add_target_errors(const std::optional<GoldStandard>& gold,
                        const CtBox& target_box_ct,
                        std::vector<RegistrationRecord>& records) {

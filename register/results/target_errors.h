@@ -10,10 +10,6 @@
 
 namespace af::registration {
 
-/// The case's gold pose as af-evaluate takes it (from its fiducials if two views show them, else
-/// the one the study states); nullopt when the study knows none.
-std::optional<GoldStandard> known_gold(const Study& study, const StudyCase& study_case);
-
 /// Fills in every record's TRE: the mean over the target box.
 void add_target_errors(const std::optional<GoldStandard>& gold,
                        const CtBox& target_box_ct,

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "base/error.h"
+#include "base/joined.h"
 #include "register/verdict/pose_examiner.h"
 #include "register/verdict/verdict.h"
 
@@ -207,6 +208,14 @@ ViewDiagnosis diagnose_views(const std::shared_ptr<const RegistrationProblem>& p
         remedy->text + " would explain more: " + shares_text(*problem, remedy->view_values) +
         " instead of " + shares_text(*problem, view_values));
   return diagnosis;
+}
+
+Judgement judgement_with(const Judgement& judgement, const ViewDiagnosis& diagnosis) {
+  if (diagnosis.sayings.empty()) return judgement;
+  const std::string sayings = joined(diagnosis.sayings, "; ");
+  if (judgement.verdict == Verdict::NotFound)
+    return {Verdict::NotFound, judgement.reason + "; " + sayings};
+  return {Verdict::Doubtful, sayings};
 }
 
 }  // namespace af::registration

@@ -25,4 +25,8 @@ ViewDiagnosis diagnose_views(const std::shared_ptr<const RegistrationProblem>& p
                              const RigidTransform& room_from_ct,
                              const std::vector<ViewValue>& view_values);
 
+/// The judgement of an end in the light of a diagnosis of its views: at least doubtful where that
+/// found something.
+Judgement judgement_with(const Judgement& judgement, const ViewDiagnosis& diagnosis);
+
 }  // namespace af::registration

@@ -13,6 +13,9 @@ trap 'rm -rf "$scratch"' EXIT
 for section in machine casting encoding fields efficiency memory quality drr-look-up ranks-2 ranks-4; do
   grep -q "^    \"$section\": {" "$scratch/out/benchmark.json" || { echo "benchmark.json lacks section $section" >&2; exit 1; }
 done
+if [[ -x "$programs/benchmark/bench-python" ]]; then
+  grep -q '^    "python": {' "$scratch/out/benchmark.json" || { echo "benchmark.json lacks section python" >&2; exit 1; }
+fi
 for table in 'Casting' 'Encoding' 'One DRR' 'Whole fields' 'Seconds per phase' 'Machine'; do
   grep -q "^## $table" "$scratch/out/benchmark.md" || { echo "benchmark.md lacks the table $table" >&2; exit 1; }
 done

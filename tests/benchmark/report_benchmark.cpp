@@ -121,8 +121,8 @@ std::string encoding_table(const json& encoding) {
          (blas.empty() ? "" : "\nBLAS under Faiss: " + fs::path(blas).filename().string() + "\n");
 }
 
-std::string look_up_table(const json& look_up) {
-  std::string text = "## One DRR, one core\n\n" + header({"renderer", "ms", "least ms"});
+std::string drr_table(const std::string& heading, const json& look_up) {
+  std::string text = "## " + heading + "\n\n" + header({"renderer", "ms", "least ms"});
   for (const auto& [name, result] : look_up.at("results").items()) {
     const double work = result.at("work");
     text += row({name,
@@ -267,7 +267,8 @@ std::string tables(const json& result) {
   };
   add("casting", casting_table);
   add("encoding", encoding_table);
-  add("drr-look-up", look_up_table);
+  add("drr-look-up", [](const json& drrs) { return drr_table("One DRR, one core", drrs); });
+  add("python", [](const json& drrs) { return drr_table("One DRR from Python, one core", drrs); });
   add("fields", [&](const json& fields) {
     return fields_table(sections) + "\n" +
            phases_table(fields.at("jobs"), "Seconds per phase, 2 ranks");

@@ -5,7 +5,7 @@ set -euo pipefail
 # shellcheck source-path=SCRIPTDIR
 source "$(dirname "${BASH_SOURCE[0]}")/../../jobs/lib.sh"
 
-all_sections=(machine casting encoding fields drr-look-up efficiency memory quality ranks)
+all_sections=(machine casting encoding fields drr-look-up efficiency memory quality ranks python)
 
 usage() {
   cat <<TEXT
@@ -63,6 +63,10 @@ if [[ "$skip_build" == no ]]; then
     die 1 "configuring failed; see $programs/benchmark-configure.log"
   build_preset release "$af_root/build/benchmark.log" af-precompute af-evaluate af-inspect \
     bench-machine bench-casting bench-encoding bench-drr-look-up bench-fields bench-ranks bench-report
+  # The module may be left out of a build.
+  if grep -q '^AF_BUILD_PYTHON:BOOL=ON' "$programs/CMakeCache.txt"; then
+    build_preset release "$af_root/build/benchmark.log" bench-python
+  fi
 fi
 mkdir -p "$out/sections" "$out/work"
 if [[ -z "$ct" ]]; then
@@ -93,6 +97,14 @@ run_section() {
     drr-look-up)
       [[ -f "$out/work/paper.af.h5" ]] || die 1 "drr-look-up needs the field that section 'fields' makes: run that first"
       "$bench/bench-drr-look-up" "${of_case[@]}" --field "$out/work/paper.af.h5" --work "$out/work" -o "$json"
+      ;;
+    python)
+      [[ -f "$out/work/paper.af.h5" ]] || die 1 "python needs the field that section 'fields' makes: run that first"
+      if [[ -x "$bench/bench-python" ]]; then
+        PYTHONPATH="$programs/python" "$bench/bench-python" --field "$out/work/paper.af.h5" "${quick[@]}" -o "$json"
+      else
+        say "        left out: no Python module is built"
+      fi
       ;;
     ranks)
       local ranks

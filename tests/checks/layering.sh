@@ -14,13 +14,13 @@ check_tree() {
   {
     cd "$root"
     # A scratch tree has only some of the folders.
-    find common precompute register evaluate -type f \( -name '*.h' -o -name '*.cpp' \) 2>/dev/null || true
+    find common precompute register evaluate python -type f \( -name '*.h' -o -name '*.cpp' \) 2>/dev/null || true
   } | LC_ALL=C sort |
     awk -v root="$root" -v mode="$mode" '
       function report(where, what) { printf "%s: %s\n", where, what; ++violations }
       function trimmed(text) { gsub(/^[ `]+|[ `]+$/, "", text); return text }
       function long_name(folder) {
-        return folder ~ /^(precompute|register|evaluate)(\/|$)/ ? folder : "common/" folder
+        return folder ~ /^(precompute|register|evaluate|python)(\/|$)/ ? folder : "common/" folder
       }
       function library_of(name) {
         if (name ~ /^mpi[.]h$/) return "MPI"
@@ -35,6 +35,7 @@ check_tree() {
         if (name ~ /^toml\+\+\//) return "toml++"
         if (name ~ /^nlohmann\//) return "nlohmann-json"
         if (name ~ /^zlib[.]h$/) return "zlib"
+        if (name ~ /^(pybind11\/|Python[.]h|numpy\/)/) return "pybind11"
         if (name ~ /^(iostream|cstdio|print)$/) return "terminal"
         return ""
       }
@@ -64,7 +65,7 @@ check_tree() {
         if (name !~ /\//) return folder
         sub(/\/[^\/]*$/, "", name)
         if (name ~ /^common\//) return name
-        return name ~ /^(precompute|register|evaluate)(\/|$)/ ? name : "common/" name
+        return name ~ /^(precompute|register|evaluate|python)(\/|$)/ ? name : "common/" name
       }
       BEGIN { read_table(root "/ARCHITECTURE.md") }
       {
@@ -184,6 +185,10 @@ self_test() {
   expect_violation 'numerics use HDF5' common/geometry/slab.h:2
   plant common/geometry/slab.h '#include <itkImage.h>'
   expect_violation 'numerics use ITK' common/geometry/slab.h:2
+  plant common/geometry/slab.h '#include <pybind11/pybind11.h>'
+  expect_violation 'numerics use Python' common/geometry/slab.h:2
+  plant python/bindings/module.cpp '#include "geometry/ray.h"'
+  expect_violation 'a folder of python/ without a row' python/bindings/module.cpp:0
   plant common/geometry/slab.h '#include <iostream>'
   expect_violation 'a library prints' common/geometry/slab.h:2
   plant register/method/judge.h '#include "parallel/mpi_handle.h"'

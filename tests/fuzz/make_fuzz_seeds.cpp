@@ -9,15 +9,19 @@
 #include <stdexcept>
 #include <string>
 
+#include "base/error.h"
 #include "base/stored_bytes.h"
+#include "camera_files/camera_formats.h"
 #include "evaluate/registration/registration_rows.h"
 #include "field/index_coding.h"
+#include "files/output_file.h"
 #include "image_files/ct_reader.h"
 #include "image_files/image_file.h"
 #include "pose_files/pose_file.h"
 #include "study/rig_file.h"
 #include "study/study_template.h"
 #include "unit/image_files/ct_test_data.h"
+#include "unit/image_files/dicom_test_file.h"
 #include "volume/ct_volume.h"
 
 namespace {
@@ -57,6 +61,47 @@ void write_toml_seeds(const fs::path& folder) {
   write_seed(folder / "rig" / "template", template_text("rig"));
   write_seed(folder / "study" / "template", template_text("study"));
   write_seed(folder / "study" / "optional", uncommented(template_text("study")));
+}
+
+/// Both shipped rigs in every format that can state them, also with the images' rows turned around,
+/// each with all options and with none.
+void write_camera_seeds(const fs::path& folder) {
+  for (const std::string& name : builtin_rig_names()) {
+    CameraRig rig = parse_rig(builtin_rig_text(name), name);
+    for (const bool flips : {false, true}) {
+      for (CameraGeometry& camera : rig.cameras)
+        if (flips) camera.row_direction = -camera.row_direction;
+      for (const CameraFormat& format : camera_formats()) {
+        if (format.write == nullptr) continue;
+        const CameraRig one = {rig.isocenter_point, {rig.cameras.front()}};
+        std::string bytes;
+        try {
+          bytes = format.write(format.holds_one_camera ? one : rig);
+        } catch (const InputError&) {
+          continue;  // the format cannot state it
+        }
+        const std::string stem = format.name + ("-" + name) + (flips ? "-flipped" : "");
+        write_seed(folder / "camera" / stem, "\0"s + bytes);
+        write_seed(folder / "camera" / (stem + "-options"), "\7"s + bytes);
+      }
+    }
+  }
+  write_seed(folder / "camera" / "command",
+             "\0plastimatch drr --nrm \"0 -1 0\" --vup '0 0 1' --sad 800 --sid=1200 -r \"64 48\" "
+             "-z \"240 200\" ct.mha\n"s);
+  test::DicomTestFile image;
+  image.set_text({0x0008, 0x0060}, "CS", "XA");
+  image.set_u16({0x0028, 0x0010}, 48);
+  image.set_u16({0x0028, 0x0011}, 64);
+  image.set_text({0x0018, 0x1164}, "DS", "0.4\\0.3");
+  image.set_text({0x0018, 0x1500}, "CS", "DYNAMIC");
+  image.set_text({0x0028, 0x0008}, "IS", "2");
+  image.set_text({0x0018, 0x1520}, "DS", "1.5");
+  image.set_text({0x0020, 0x0020}, "CS", "L\\F");
+  image.write(folder / "camera" / "dicom-header");
+  write_seed(folder / "camera" / "dicom",
+             "\x10"s + read_text_file(folder / "camera" / "dicom-header"));
+  fs::remove(folder / "camera" / "dicom-header");
 }
 
 void write_table_seeds(const fs::path& folder) {
@@ -261,6 +306,7 @@ int main(int argc, char** argv) {
   try {
     const fs::path folder = argv[2];
     write_toml_seeds(folder);
+    write_camera_seeds(folder);
     write_table_seeds(folder);
     write_pose_seeds(folder);
     write_image_seeds(folder);

@@ -71,6 +71,33 @@ TEST(Communicator, NodeMemoryFromRankZeroIsFilledThereAloneAndSeenByAll) {
                Error);
 }
 
+/// Also where MPI runs: every rank by itself. library_test uses it where MPI is not even
+/// initialised.
+TEST(CommunicatorAlone, NeedsNoMpi) {
+  const Communicator alone = Communicator::alone();
+  EXPECT_EQ(alone.rank(), 0);
+  EXPECT_EQ(alone.size(), 1);
+  if (Communicator::world().is_root()) {  // a collective call would wait for the other ranks
+    alone.barrier();
+    std::vector<std::uint64_t> values{3};
+    alone.sum(values);
+    alone.maximum(values);
+    EXPECT_EQ(values, std::vector<std::uint64_t>{3});
+    std::string text = "mine";
+    alone.broadcast(text);
+    EXPECT_EQ(text, "mine");
+    const std::vector<std::byte> bytes(5, std::byte{4});
+    EXPECT_EQ(alone.all_gather(bytes), (std::vector<std::vector<std::byte>>{bytes}));
+    EXPECT_EQ(alone.node().size(), 1);
+    const auto memory = alone.allocate_on_nodes_from_root(
+        100, [](std::span<std::byte> all) { std::memset(all.data(), 7, all.size()); });
+    EXPECT_EQ(memory.get()[99], std::byte{7});
+    EXPECT_EQ(reinterpret_cast<std::uintptr_t>(memory.get()) % Communicator::kNodeMemoryAlignment,
+              0U);
+    EXPECT_THROW(all_or_none(alone, [] { throw InputError("no"); }), Error);
+  }
+}
+
 TEST(AllOrNone, ThrowsTheLoneRanksErrorEverywhere) {
   const Communicator world = Communicator::world();
   const int failing = world.size() - 1;

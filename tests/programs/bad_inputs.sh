@@ -145,6 +145,26 @@ of_rig 3 'pixel_spacing' 'unknown key (typo)' "$(edited rig.toml '0,/^pixel_spac
 of_rig 3 'source_point' 'source at 1e300 mm' "$(edited rig.toml '0,/^source_point = .*/s//source_point = [0, 1e300, 0]/')"
 of_rig 3 'pixel_spacing_mm' 'pixels of 1e300 mm' "$(edited rig.toml '0,/^pixel_spacing_mm = .*/s//pixel_spacing_mm = [1e300, 3]/')"
 of_rig 4 'c-arm-9in' 'unknown shipped rig' c-arm-9in
+# Cameras of other programs, in files that af-inspect writes here.
+for format in mayacam2 opencv matrix elastix plastimatch; do
+  "$bin/af-inspect" --rig-from valid/rig.toml --rig-to "$format" -o "valid/camera-$format.txt" >message.txt 2>&1 ||
+    { echo "af-inspect could not write valid/camera-$format.txt" >&2; exit 1; }
+done
+of_rig 4 'truncated' 'MayaCam cut short' "$(edited camera-mayacam2-AP.txt '/^translation/q')"
+of_rig 3 'finite' 'MayaCam with nan' "$(edited camera-mayacam2-AP.txt '/^translation/,/^end/s/^-?[0-9].*/nan/')"
+of_rig 4 "'rotation' is missing" 'MayaCam without rotation' "$(edited camera-mayacam2-AP.txt 's/^rotation/turn/')"
+of_rig 3 '32768' 'MayaCam of 1e18 columns' "$(edited camera-mayacam2-AP.txt '2s/.*/1e18,64/')"
+of_rig 4 'rows' 'OpenCV matrix of 1e12 rows' "$(edited camera-opencv-AP.txt '0,/rows: 3/s//rows: 1000000000000/')"
+of_rig 3 'x_camera = R x_room + t' 'OpenCV without R' "$(edited camera-opencv-AP.txt 's/^R:/Q:/')"
+of_rig 3 'must be a rotation' 'OpenCV with a mirrored R' "$(edited camera-opencv-AP.txt '/^R:/,/data/s/data: .*/data: [ 1, 0, 0, 0, 1, 0, 0, 0, -1 ]/')"
+of_rig 3 'finite' 'matrix with inf' "$(edited camera-matrix.txt 's/^-?[0-9][^ ]*/inf/')"
+of_rig 3 '--rig-size-px' 'plastimatch without the size of the images' valid/camera-plastimatch-AP.txt
+of_rig 3 'Origin' 'elastix without the origin' "$(edited camera-elastix-AP.txt 's/^[(]Origin/(Orient/')"
+of_rig 4 'not closed' 'elastix cut short' "$(edited camera-elastix-AP.txt 's/^[(]FocalPoint.*/(FocalPoint 1 2/')"
+printf '<RTKThreeDCircularGeometry><Projection>' >cut.xml
+of_rig 4 'broken XML' 'RTK geometry cut short' cut.xml
+printf '<!DOCTYPE a [<!ENTITY b "bbbb">]><RTKThreeDCircularGeometry/>' >entities.xml
+of_rig 4 'entities' 'RTK geometry with entities' entities.xml
 of_rig 4 'edited-rig.toml' 'not TOML' "$(edited rig.toml '1s/^.*$/= 3/')"
 of_design() { row "$1" "$2" "$3" "${precompute[@]}" --study valid/study.toml --camera AP "${@:4}"; }
 of_design 3 'max_field_bytes = 0: must be at least 1' 'no size' --max-field-size 0

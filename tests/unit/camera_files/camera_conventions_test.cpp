@@ -9,6 +9,7 @@
 #include "base/error.h"
 #include "camera_files/camera_formats.h"
 #include "support/io_checks.h"
+#include "unit/image_files/dicom_test_file.h"
 
 namespace af {
 namespace {
@@ -246,6 +247,379 @@ TEST_F(CameraConventions, MatrixTextRefusals) {
   EXPECT_THAT(refusal("0 0 0 1\n0 0 0 1\n0 0 0 1\n"), HasSubstr("singular"));
   EXPECT_THAT(refusal(test::replaced(good, "1000 255.5 0", "1000 255.5 700")), HasSubstr("skew"));
   EXPECT_THAT(refusal("# size_px 1e30 4\n" + good), HasSubstr("32768"));
+}
+
+constexpr const char* kRtk = R"(<?xml version="1.0"?>
+<!DOCTYPE RTKGEOMETRY>
+<RTKThreeDCircularGeometry version="3">
+  <SourceToIsocenterDistance>1000</SourceToIsocenterDistance>
+  <SourceToDetectorDistance>1536</SourceToDetectorDistance>
+  <Projection>
+    <GantryAngle>90</GantryAngle>
+  </Projection>
+  <Projection>
+    <GantryAngle>30</GantryAngle>
+    <OutOfPlaneAngle>5</OutOfPlaneAngle>
+    <InPlaneAngle>-3</InPlaneAngle>
+    <SourceOffsetX>2</SourceOffsetX>
+    <SourceOffsetY>-4</SourceOffsetY>
+    <ProjectionOffsetX>-117</ProjectionOffsetX>
+    <ProjectionOffsetY>6</ProjectionOffsetY>
+  </Projection>
+</RTKThreeDCircularGeometry>
+)";
+
+CameraFileOptions rtk_options() {
+  CameraFileOptions options;
+  options.size_px = {512, 400};
+  options.pixel_spacing_mm = {0.8, 0.8};
+  return options;
+}
+
+Eigen::Matrix3d turn_about(int axis, double deg) {
+  const double angle = deg * std::acos(-1.0) / 180.0;
+  const int a = (axis + 1) % 3;
+  const int b = (axis + 2) % 3;
+  Eigen::Matrix3d matrix = Eigen::Matrix3d::Identity();
+  matrix(a, a) = matrix(b, b) = std::cos(angle);
+  matrix(a, b) = -std::sin(angle);
+  matrix(b, a) = std::sin(angle);
+  return matrix;
+}
+
+TEST_F(CameraConventions, Rtk) {
+  const CameraRig rig = read(kRtk, rtk_options());
+  ASSERT_EQ(rig.cameras.size(), 2U);
+  EXPECT_EQ(rig.isocenter_point, Vector3d(0, 0, 0));
+  // Gantry angle 90: the source has turned from +z to +x, u runs along -z, v along +y.
+  const CameraGeometry& first = rig.cameras[0];
+  EXPECT_LT((first.source_point - Vector3d(1000, 0, 0)).norm(), 1e-9);
+  EXPECT_TRUE(first.is_mirrored());
+  const double scale = 1536.0 / (1000 - 10) / 0.8;
+  expect_seen(first, {10, 20, 30}, {255.5 - 30 * scale, 199.5 + 20 * scale});
+
+  // RTK's own product of matrices, of its documentation: MTransl2D M(SDD, SID) MTransl3D MR.
+  Eigen::Matrix3d shift_uv = Eigen::Matrix3d::Identity();
+  shift_uv.col(2) = Vector3d(2.0 + 117.0, -4.0 - 6.0, 1.0);
+  Eigen::Matrix<double, 3, 4> magnification = Eigen::Matrix<double, 3, 4>::Zero();
+  magnification(0, 0) = magnification(1, 1) = -1536.0;
+  magnification(2, 2) = 1.0;
+  magnification(2, 3) = -1000.0;
+  Eigen::Matrix4d shift_source = Eigen::Matrix4d::Identity();
+  shift_source.topRightCorner<2, 1>() = Vector2d(-2.0, 4.0);
+  Eigen::Matrix4d turn = Eigen::Matrix4d::Identity();
+  turn.topLeftCorner<3, 3>() = turn_about(2, 3) * turn_about(0, -5) * turn_about(1, -30);
+  const Vector3d uv =
+      shift_uv * magnification * shift_source * turn * Vector3d(10, 20, 30).homogeneous();
+  expect_seen(
+      rig.cameras[1], {10, 20, 30}, {255.5 + uv.x() / uv.z() / 0.8, 199.5 + uv.y() / uv.z() / 0.8});
+}
+
+TEST_F(CameraConventions, RtkOriginOfTheProjectionsAndTheirMatrix) {
+  CameraFileOptions options = rtk_options();
+  options.detector_origin_mm = {-100.0, -80.0};
+  const double scale = 1536.0 / (1000 - 10);
+  const CameraGeometry read = camera(kRtk, options);
+  expect_seen(read, {10, 20, 30}, {(100 - 30 * scale) / 0.8, (80 + 20 * scale) / 0.8});
+
+  // At angle 90, R takes x to z, so that w = x - SID, u = SDD z / w and v = -SDD y / w.
+  const std::string with_matrix =
+      test::replaced(kRtk,
+                     "90</GantryAngle>\n",
+                     "90</GantryAngle>\n<Matrix>\n0 0 1536 0\n0 -1536 0 0\n1 0 0 -1000</Matrix>\n");
+  EXPECT_EQ(camera(with_matrix, options).source_point, read.source_point);
+  EXPECT_THAT(test::message_of<InputError>([&] {
+                (void)camera(test::replaced(with_matrix, "0 0 1536 0", "0 0 1536 50"), options);
+              }),
+              HasSubstr("does not agree"));
+}
+
+TEST_F(CameraConventions, RtkRefusals) {
+  const std::string good = kRtk;
+  EXPECT_THAT(input_refusal(good), HasSubstr("--rig-size-px"));
+  CameraFileOptions no_spacing;
+  no_spacing.size_px = {512, 400};
+  EXPECT_THAT(test::message_of<InputError>([&] { (void)read(good, no_spacing); }),
+              HasSubstr("--rig-pixel-spacing-mm"));
+  EXPECT_THAT(file_refusal(good.substr(0, good.size() - 40)), HasSubstr("broken XML"));
+  EXPECT_THAT(file_refusal(test::replaced(good, ">90<", ">ninety<")), HasSubstr("GantryAngle"));
+  EXPECT_THAT(input_refusal(test::replaced(good, ">90<", ">nan<")), HasSubstr("finite"));
+  EXPECT_THAT(input_refusal(test::replaced(good, ">1536<", ">0<")), HasSubstr("parallel"));
+  EXPECT_THAT(file_refusal("<RTKThreeDCircularGeometry></RTKThreeDCircularGeometry>"),
+              HasSubstr("no <Projection>"));
+  std::string nested = "<RTKThreeDCircularGeometry>";
+  for (int i = 0; i < 100; ++i) nested += "<a>";
+  EXPECT_THAT(file_refusal(nested), HasSubstr("nested too deeply"));
+  EXPECT_THAT(
+      file_refusal(test::replaced(good, "RTKGEOMETRY>", "RTKGEOMETRY [<!ENTITY a \"aaaa\">]>")),
+      HasSubstr("entities"));
+}
+
+// Written by plastimatch 1.9.4: plastimatch drr -G --nrm "0.6 -0.7 0.2" --vup "0.1 0.2 1" --sad 800
+// --sid 1200 -r "240 200" -z "480 420" -c "110.5 95.25" -o "5 -7 11" -t pfm -O out_ ct.mha
+constexpr const char* kPlastimatch = R"(    1.10500000e+02     9.52500000e+01
+    3.85730695e-01     3.02329480e-01    -9.90389669e-02     1.27708152e+00
+   -8.94575491e-03    -1.37869908e-01    -4.55707397e-01     4.09242078e+00
+   -5.29998957e-04     6.18332082e-04    -1.76666315e-04     6.75588315e-01
+    8.00000000e+02
+    1.20000000e+03
+   -6.35998749e-01     7.41998498e-01    -2.11999578e-01
+Extrinsic
+    7.71461389e-01     6.04658960e-01    -1.98077934e-01     2.55416304e+00
+   -1.87860853e-02    -2.89526807e-01    -9.56985533e-01     8.59408365e+00
+   -6.35998749e-01     7.41998498e-01    -2.11999578e-01     8.10705979e+02
+    0.00000000e+00     0.00000000e+00     0.00000000e+00     1.00000000e+00
+Intrinsic
+    5.00000000e-01     0.00000000e+00     0.00000000e+00     0.00000000e+00
+    0.00000000e+00     4.76190476e-01     0.00000000e+00     0.00000000e+00
+    0.00000000e+00     0.00000000e+00     8.33333333e-04     0.00000000e+00
+)";
+
+constexpr const char* kPlastimatchCommand =
+    "#!/bin/sh\nplastimatch drr --nrm \"0.6 -0.7 0.2\" --vup='0.1 0.2 1' --sad 800 --sid 1200 \\\n"
+    "  -r \"240 200\" -z \"480 420\" -c \"110.5 95.25\" -o \"5 -7 11\" -t pfm -O out_ ct.mha\n";
+
+// The file's numbers have 9 digits; 1e-9 of 1e3 mm and of 1e2 px, magnified by about 1.
+constexpr double kNineDigitsPx = 1e-5;
+
+TEST_F(CameraConventions, Plastimatch) {
+  CameraFileOptions options;
+  options.size_px = {240, 200};
+  const CameraRig by_file = read(kPlastimatch, options);
+  const CameraRig by_command = read(kPlastimatchCommand);
+  // The matrix of the file: w = 0.61506..., at the image centre plus (P x) / w; plastimatch draws a
+  // ball of 12 mm there, at (103.000, 70.070) by its centre of mass.
+  const Vector2d expected(102.99675021, 70.09949423);
+  for (const CameraRig& rig : {by_file, by_command}) {
+    const CameraGeometry& camera = rig.cameras.front();
+    EXPECT_LT((camera.project({30, -40, 55}) - expected).norm(), kNineDigitsPx);
+    EXPECT_LT((rig.isocenter_point - Vector3d(5, -7, 11)).norm(), 1e-5);
+    EXPECT_NEAR(camera.source_detector_distance_mm(), 1200.0, 1e-5);
+    EXPECT_NEAR(camera.pixel_spacing_mm.x(), 2.0, 1e-8);
+    EXPECT_NEAR(camera.pixel_spacing_mm.y(), 2.1, 1e-8);
+    EXPECT_EQ(camera.size_px, Eigen::Vector2i(240, 200));
+    EXPECT_FALSE(camera.is_mirrored());
+  }
+}
+
+TEST_F(CameraConventions, PlastimatchRefusals) {
+  const std::string good = kPlastimatch;
+  EXPECT_THAT(input_refusal(good), HasSubstr("--rig-size-px"));
+  EXPECT_THAT(file_refusal(good.substr(0, good.size() - 90)), HasSubstr("truncated"));
+  EXPECT_THAT(input_refusal(test::replaced(good, "1.27708152e+00", "1.37708152e+00")),
+              HasSubstr("Intrinsic times Extrinsic"));
+  EXPECT_THAT(input_refusal(test::replaced(good, "8.00000000e+02", "inf")), HasSubstr("finite"));
+  EXPECT_THAT(input_refusal(test::replaced(good, "8.00000000e+02", "-8e+02")), HasSubstr("SAD"));
+  const std::string command = kPlastimatchCommand;
+  EXPECT_THAT(input_refusal(test::replaced(command, "--nrm", "--normal")), HasSubstr("--nrm"));
+  EXPECT_THAT(input_refusal(test::replaced(command, "-o ", "-y ")), HasSubstr("--gantry-angle"));
+  EXPECT_THAT(input_refusal(test::replaced(command, "0.1 0.2 1'", "0.6 -0.7 0.2'")),
+              HasSubstr("parallel"));
+  EXPECT_THAT(file_refusal(test::replaced(command, "--sad 800", "--sad far")),
+              HasSubstr("no number"));
+  EXPECT_THAT(input_refusal(test::replaced(command, "240 200", "1e12 200")), HasSubstr("32768"));
+}
+
+// What elastix 5.0.1 writes as TransformParameters.0.txt, without the lines that say nothing of the
+// camera. Its ray caster draws a ball at (30, -40, 55) there.
+constexpr const char* kElastix = R"((Transform "EulerTransform")
+(TransformParameters 0 0 0 0 0 0)
+// a comment
+(Size 240 200 1)
+(Index 0 0 0)
+(Spacing 2.0000000000 2.1000000000 1.0000000000)
+(Origin -200.0000000000 300.0000000000 180.0000000000)
+(Direction 1.0 0.0 0.0 0.0 0.0 -1.0 0.0 1.0 0.0)
+(ResampleInterpolator "FinalRayCastInterpolator")
+(FocalPoint 5.0 -800.0 11.0)
+(PreParameters 0.0 0.0 0.0 0.0 0.0 0.0)
+)";
+
+TEST_F(CameraConventions, Elastix) {
+  const CameraGeometry read = camera(kElastix);
+  EXPECT_EQ(read.source_point, Vector3d(5, -800, 11));
+  EXPECT_EQ(read.size_px, Eigen::Vector2i(240, 200));
+  // From the focal point the ball is 760 of 1100 mm away along y.
+  const double scale = 1100.0 / 760.0;
+  expect_seen(read, {30, -40, 55}, {(200 + 5 + 25 * scale) / 2.0, (180 - (11 + 44 * scale)) / 2.1});
+}
+
+TEST_F(CameraConventions, ElastixRefusals) {
+  const std::string good = kElastix;
+  EXPECT_THAT(file_refusal(good.substr(0, good.find("11.0)") + 2)), HasSubstr("not closed"));
+  EXPECT_THAT(input_refusal(test::replaced(good, "(Origin", "(Orient")), HasSubstr("(Origin ...)"));
+  EXPECT_THAT(file_refusal(test::replaced(good, "-800.0 11.0", "-800.0")), HasSubstr("3 numbers"));
+  EXPECT_THAT(input_refusal(test::replaced(good, "-800.0 11.0", "nan 11.0")), HasSubstr("finite"));
+  EXPECT_THAT(input_refusal(test::replaced(good, "200 1)", "200 2)")), HasSubstr("single slice"));
+  EXPECT_THAT(input_refusal(test::replaced(good, "240 200", "4e9 200")), HasSubstr("32768"));
+  EXPECT_THAT(input_refusal(test::replaced(good, "(PreParameters 0.0", "(PreParameters 0.1")),
+              HasSubstr("PreParameters"));
+  EXPECT_THAT(input_refusal(test::replaced(good, "(Direction 1.0", "(Direction 2.0")),
+              HasSubstr("column_direction"));
+}
+
+class DicomCameras : public testing::Test {
+ protected:
+  /// An XA image of 400 columns and 512 rows, 0.3 and 0.4 mm apart at the detector.
+  static test::DicomTestFile xa() {
+    test::DicomTestFile file;
+    file.set_text({0x0008, 0x0060}, "CS", "XA");
+    file.set_text({0x0018, 0x1110}, "DS", "1200");
+    file.set_text({0x0018, 0x1111}, "DS", "800");
+    file.set_text({0x0018, 0x1164}, "DS", "0.4\\0.3");
+    file.set_text({0x0018, 0x1500}, "CS", "STATIC");
+    file.set_text({0x0018, 0x1510}, "DS", "0");
+    file.set_text({0x0018, 0x1511}, "DS", "0");
+    file.set_text({0x0020, 0x0020}, "CS", "L\\F");
+    file.set_u16({0x0028, 0x0010}, 512);
+    file.set_u16({0x0028, 0x0011}, 400);
+    return file;
+  }
+  CameraRig read(const test::DicomTestFile& file, const CameraFileOptions& options = {}) {
+    file.write(folder_ / "image.dcm");
+    warnings_.clear();
+    return read_camera_files({folder_ / "image.dcm"}, options, &warnings_);
+  }
+  std::string refusal(const test::DicomTestFile& file, const CameraFileOptions& options = {}) {
+    return test::message_of<InputError>([&] { (void)read(file, options); });
+  }
+  [[nodiscard]] const std::vector<std::string>& warnings() const { return warnings_; }
+  [[nodiscard]] const test::ScratchFolder& folder() const { return folder_; }
+
+ private:
+  test::ScratchFolder folder_;
+  std::vector<std::string> warnings_;
+};
+
+void expect_dicom_pixel(const CameraGeometry& camera, const Vector3d& point, const Vector2d& at) {
+  EXPECT_LT((camera.project(point) - at).norm(), kConventionPx)
+      << camera.project(point).transpose() << " instead of " << at.transpose();
+}
+
+TEST_F(DicomCameras, AtAnglesZeroThePatientFacesTheDetector) {
+  const CameraGeometry camera = read(xa()).cameras.front();
+  EXPECT_LT((camera.source_point - Vector3d(0, 800, 0)).norm(), 1e-9);  // behind the back
+  EXPECT_LT((camera.beam_direction() - Vector3d(0, -1, 0)).norm(), 1e-12);
+  EXPECT_TRUE(camera.is_mirrored());  // seen from the detector, against the beam
+  const double scale = 1200.0 / (800 - 20);
+  expect_dicom_pixel(camera, {10, 20, 30}, {199.5 + 10 * scale / 0.3, 255.5 - 30 * scale / 0.4});
+  EXPECT_THAT(warnings(), testing::ElementsAre(HasSubstr("mirrored")));
+}
+
+TEST_F(DicomCameras, AnglesAreLongitudeAndLatitudeOfTheDetector) {
+  test::DicomTestFile file = xa();
+  file.set_text({0x0018, 0x1510}, "DS", "30");   // LAO
+  file.set_text({0x0018, 0x1511}, "DS", "-20");  // caudal
+  const CameraGeometry camera = read(file).cameras.front();
+  const double a = 30.0 * std::acos(-1.0) / 180.0;
+  const double b = -20.0 * std::acos(-1.0) / 180.0;
+  const Vector3d to_detector(
+      std::sin(a) * std::cos(b), -std::cos(a) * std::cos(b), std::sin(b));  // left, front, foot
+  EXPECT_LT((camera.beam_direction() - to_detector).norm(), 1e-12);
+  EXPECT_LT((camera.source_point + 800.0 * to_detector).norm(), 1e-9);
+  // The isocentre is in the middle; columns stay in the axial plane of the primary angle.
+  expect_dicom_pixel(camera, {0, 0, 0}, {199.5, 255.5});
+  EXPECT_LT((camera.column_direction - Vector3d(std::cos(a), std::sin(a), 0.0)).norm(), 1e-12);
+  EXPECT_LT(camera.row_direction.z(), 0.0);
+}
+
+TEST_F(DicomCameras, PatientOrientationTurnsTheImageAround) {
+  test::DicomTestFile file = xa();
+  file.set_text({0x0020, 0x0020}, "CS", "R\\F");
+  const CameraGeometry camera = read(file).cameras.front();
+  EXPECT_FALSE(camera.is_mirrored());
+  const double scale = 1200.0 / (800 - 20);
+  expect_dicom_pixel(camera, {10, 20, 30}, {199.5 - 10 * scale / 0.3, 255.5 - 30 * scale / 0.4});
+  file.erase({0x0020, 0x0020});
+  EXPECT_TRUE(read(file).cameras.front().is_mirrored());
+  EXPECT_THAT(warnings(), testing::Contains(HasSubstr("PatientOrientation (0020,0020)")));
+  CameraFileOptions flip;
+  flip.flip = "columns";
+  EXPECT_FALSE(read(file, flip).cameras.front().is_mirrored());
+}
+
+TEST_F(DicomCameras, MovingPositionersHaveACameraPerFrame) {
+  test::DicomTestFile file = xa();
+  file.set_text({0x0018, 0x1500}, "CS", "DYNAMIC");
+  file.set_text({0x0028, 0x0008}, "IS", "3");
+  file.set_text({0x0018, 0x1510}, "DS", "10");
+  file.set_text({0x0018, 0x1520}, "DS", "40");         // per frame
+  file.set_text({0x0018, 0x1521}, "DS", "0\\0.5\\2");  // from the first
+  const CameraRig rig = read(file);
+  ASSERT_EQ(rig.cameras.size(), 3U);
+  const double a = 90.0 * std::acos(-1.0) / 180.0;
+  const double b = 2.0 * std::acos(-1.0) / 180.0;
+  EXPECT_LT((rig.cameras[2].beam_direction() -
+             Vector3d(std::sin(a) * std::cos(b), -std::cos(a) * std::cos(b), std::sin(b)))
+                .norm(),
+            1e-12);
+  file.set_text({0x0018, 0x1521}, "DS", "0\\0.5");
+  EXPECT_THAT(refusal(file), HasSubstr("one per frame: 3"));
+  file.set_text({0x0028, 0x0008}, "IS", "999999999999");
+  EXPECT_THAT(refusal(file), HasSubstr("100000"));
+}
+
+TEST_F(DicomCameras, FieldOfViewMovesTheImageOnTheDetector) {
+  test::DicomTestFile file = xa();
+  // A detector of 300 x 400 mm in elements of 0.2 mm; the image begins 200 rows and 900 columns in.
+  file.set_text({0x0018, 0x7022}, "DS", "0.2\\0.2");
+  file.set_text({0x0018, 0x7026}, "DS", "300\\400");
+  file.set_text({0x0018, 0x7028}, "DS", "0\\0");
+  file.set_text({0x0018, 0x7030}, "DS", "200\\900");
+  const CameraGeometry camera = read(file).cameras.front();
+  // The detector's middle, where the isocentre is seen, is (200, 150) mm in; the image begins at
+  // (180, 40) mm, and its first pixel's centre half a pixel later.
+  expect_dicom_pixel(camera, {0, 0, 0}, {20.0 / 0.3 - 0.5, 110.0 / 0.4 - 0.5});
+}
+
+TEST_F(DicomCameras, WhatIsMissingIsAskedForByName) {
+  const auto without = [&](test::DicomTestFile::Tag tag) {
+    test::DicomTestFile file = xa();
+    file.erase(tag);
+    return file;
+  };
+  EXPECT_THAT(refusal(without({0x0018, 0x1110})), HasSubstr("--rig-source-detector-mm"));
+  EXPECT_THAT(refusal(without({0x0018, 0x1111})), HasSubstr("--rig-source-isocenter-mm"));
+  EXPECT_THAT(refusal(without({0x0018, 0x1164})), HasSubstr("--rig-pixel-spacing-mm"));
+  EXPECT_THAT(refusal(without({0x0018, 0x1510})), HasSubstr("--rig-positioner-deg"));
+  EXPECT_THAT(refusal(without({0x0028, 0x0010})), HasSubstr("Rows (0028,0010)"));
+
+  test::DicomTestFile bare = xa();
+  for (const int element : {0x1110, 0x1111, 0x1164, 0x1510, 0x1511})
+    bare.erase({0x0018, static_cast<std::uint16_t>(element)});
+  CameraFileOptions options;
+  options.source_detector_mm = 1200.0;
+  options.source_isocenter_mm = 800.0;
+  options.pixel_spacing_mm = {0.3, 0.4};
+  options.positioner_deg = {0.0, 0.0};
+  EXPECT_LT((read(bare, options).cameras[0].project({10, 20, 30}) -
+             read(xa()).cameras[0].project({10, 20, 30}))
+                .norm(),
+            kConventionPx);
+}
+
+TEST_F(DicomCameras, Refusals) {
+  test::DicomTestFile file = xa();
+  CameraFileOptions options;
+  options.source_detector_mm = 1000.0;
+  EXPECT_THAT(refusal(file, options), HasSubstr("must agree"));
+  file.set_text({0x0018, 0x1164}, "DS", "0.4\\-1");
+  EXPECT_THAT(refusal(file), HasSubstr("spacings above 0"));
+  file.set_text({0x0018, 0x1164}, "DS", "0.4\\nan");
+  EXPECT_THAT(refusal(file), HasSubstr("finite"));
+  file = xa();
+  file.set_text({0x0018, 0x1510}, "DS", "1e9");
+  EXPECT_THAT(refusal(file), HasSubstr("360"));
+  file = xa();
+  file.set_text({0x0018, 0x1111}, "DS", "1e300");
+  EXPECT_THAT(refusal(file), HasSubstr("1e6 mm"));
+  file = xa();
+  file.write(folder() / "cut.dcm");
+  std::filesystem::resize_file(folder() / "cut.dcm",
+                               std::filesystem::file_size(folder() / "cut.dcm") - 3);
+  EXPECT_THAT(test::message_of<FileError>(
+                  [&] { (void)read_camera_files({folder() / "cut.dcm"}, {}, nullptr); }),
+              HasSubstr("truncated"));
 }
 
 }  // namespace

@@ -130,7 +130,7 @@ TEST(StatedRig, RefusesWhatContradictsTheFiles) {
                       [](auto& options) {
                         options.pixel_spacing_mm = {0.5, 0.6};
                       }),
-              HasSubstr("ratio of the focal lengths"));
+              HasSubstr("must agree with the file"));
   EXPECT_THAT(refusal(stated,
                       [](auto& options) {
                         options.isocenter_point = {0, -2000, 0};

@@ -229,5 +229,32 @@ TEST(RotationAngleBetween, IsTheAngleOfTheRelativeRotation) {
   EXPECT_NEAR(rotation_angle_between_rad(b, a), 0.3, kAngleToleranceRad);
 }
 
+TEST(PoseParameters, MoveThePoseAsTheirMotionsSay) {
+  HashRandom random(21);
+  for (int i = 0; i < 20; ++i) {
+    const PoseFrame frame = random_frame(random);
+    const PoseParameters parameters{random_vector(random, 1.0), random_vector(random, 50.0)};
+    const RigidTransform pose = pose_from_parameters(frame, parameters);
+    const Vector3d pivot = frame.center_room_mm + parameters.translation_mm;
+    const Vector3d point_ct = random_vector(random, 100.0);
+    const auto motions = motions_from_parameters(parameters);
+    for (Eigen::Index k = 0; k < 6; ++k) {
+      // Central differences of second order: third derivatives of rotations of 600 mm arms.
+      constexpr double kStep = 1e-4;
+      constexpr double kToleranceMm = 1e-5;
+      const auto moved = [&](double step) {
+        PoseParameters other = parameters;
+        (k < 3 ? other.rotation_rad[k] : other.translation_mm[k - 3]) += step;
+        return Vector3d(pose_from_parameters(frame, other) * point_ct);
+      };
+      const Vector3d expected = (moved(kStep) - moved(-kStep)) / (2.0 * kStep);
+      const Vector3d axis = motions.col(k).head<3>();
+      const Vector3d found =
+          axis.cross(Vector3d(pose * point_ct) - pivot) + Vector3d(motions.col(k).tail<3>());
+      EXPECT_LT((found - expected).norm(), kToleranceMm) << "parameter " << k;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace af

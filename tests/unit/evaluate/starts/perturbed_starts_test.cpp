@@ -251,6 +251,10 @@ TEST(PerturbedStarts, WithinRangeLieInsideByDesign) {
   }
   for (int interval = 0; interval < 8; ++interval) EXPECT_EQ(per_interval[interval], 20);
   EXPECT_EQ(result.draws, 160u + result.inadmissible_draws);
+  // Near gold nothing is held back; far from it rotations are, but no farther than the range.
+  EXPECT_NEAR(result.rotation_share_per_interval[0], 0.5, 5 * 0.25 / std::sqrt(20.0));
+  EXPECT_GT(result.rotation_share_per_interval[7], 0.1);
+  EXPECT_LT(result.rotation_share_per_interval[7], 0.5);
   // The same again, and other starts with another seed.
   EXPECT_EQ(starts_within_range(measures).starts[77].parameters.deg_and_mm(),
             result.starts[77].parameters.deg_and_mm());
@@ -277,7 +281,8 @@ TEST(PerturbedStarts, WithinRangeSayWhatIsImpossible) {
   far.range.max_translation_mm = 1.0;
   EXPECT_THAT(refusal({}, far), testing::HasSubstr("gold pose itself"));
   // No pose of the box is 200 mm from gold.
-  EXPECT_THAT(refusal({100, 2.0, 1, 1}, limit_beside(frame)), testing::HasSubstr("none of 1000"));
+  EXPECT_THAT(refusal({100, 2.0, 1, 1}, limit_beside(frame)),
+              testing::HasSubstr("none of 1000 directions"));
 }
 
 TEST(PerturbedStarts, UniformInTreHaveThatDistribution) {

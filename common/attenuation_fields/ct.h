@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "attenuation_fields/export.h"
+#include "attenuation_fields/geometry.h"
+
+namespace attenuation_fields {
+
+/// Where a CT's voxels lie in the ct frame (DICOM LPS, mm).
+struct ATTENUATION_FIELDS_API CtGrid {
+  std::array<int, 3> size = {0, 0, 0};  ///< voxels along i, j, k
+  Vector3 origin_mm = {0.0, 0.0, 0.0};  ///< centre of voxel (0, 0, 0)
+  Vector3 spacing_mm = {1.0, 1.0, 1.0};
+  /// Columns: directions of i, j, k; row by row.
+  std::array<double, 9> direction = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+
+  [[nodiscard]] Vector3 center_mm() const;
+};
+
+/// A CT in Hounsfield units. Copies share the voxels, which do not change.
+class ATTENUATION_FIELDS_API Ct {
+ public:
+  /// A DICOM folder, NIfTI, MetaImage or NRRD file. `series_uid` chooses one of several DICOM
+  /// series. InputError, FileError, as the programs.
+  static Ct read(const std::filesystem::path& path, const std::string& series_uid = "");
+  /// Voxels that exist already, i fastest; `owner` keeps them. InputError when the grid has not as
+  /// many or is no grid.
+  static Ct from_voxels(const CtGrid& grid,
+                        std::shared_ptr<const void> owner,
+                        std::span<const std::int16_t> hu);
+
+  [[nodiscard]] const CtGrid& grid() const;
+  /// HU, i fastest.
+  [[nodiscard]] std::span<const std::int16_t> hu() const;
+  /// What read() found odd.
+  [[nodiscard]] const std::vector<std::string>& warnings() const;
+  /// Over size and voxels in ascending LPS: one CT has one hash in every format. Fields carry it.
+  [[nodiscard]] std::string content_sha256() const;
+
+ private:
+  friend class RayCaster;
+  struct Impl;
+  explicit Ct(std::shared_ptr<const Impl> impl);
+  std::shared_ptr<const Impl> impl_;
+};
+
+}  // namespace attenuation_fields

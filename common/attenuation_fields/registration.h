@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+// Registration of one case of a study, as af-register does it.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "attenuation_fields/export.h"
+#include "attenuation_fields/geometry.h"
+
+namespace attenuation_fields {
+
+/// The presets by name, and a line that explains them.
+[[nodiscard]] ATTENUATION_FIELDS_API std::vector<std::string> preset_names();
+[[nodiscard]] ATTENUATION_FIELDS_API std::string preset_help();
+
+/// The options of af-register of the same names.
+struct RegistrationOptions {
+  std::string preset = {};                                   ///< empty: robust
+  std::string renderer = "field";                            ///< "field" or "raycast"
+  std::map<std::string, std::filesystem::path> fields = {};  ///< camera -> field, over the study's
+  std::vector<std::string> chains = {};                      ///< replace the preset's chains
+  std::optional<std::string> similarity = {};                ///< of every stage
+  std::optional<std::string> optimizer = {};                 ///< of every stage
+  std::optional<int> max_evaluations = {};
+  bool correct = false;             ///< corrects the end by ray casting
+  bool skip_ct_check = false;       ///< with fields: the CT is not read
+  double water_mu_per_mm = 0.0200;  ///< of ray casting
+  int air_below_hu = -900;
+  double step_mm = 1.0;
+  std::string ct_series_uid = {};
+  std::uint64_t seed = 1;
+  int threads = 1;  ///< that one registration spreads over; 0: every processor
+};
+
+/// Shares of an X-ray's gradients that the DRR at a pose explains, 0 to 1; NaN: not judged.
+struct ViewAgreement {
+  std::string camera;
+  double coarse = 0.0;
+  double fine = 0.0;
+};
+
+/// An X-ray of a case, whole detector, row by row. Spans live as long as the case.
+struct CaseView {
+  Camera camera;
+  std::array<int, 4> roi_px{};  ///< region of interest: column, row, width, height
+  std::span<const float> xray;  ///< in the attenuation domain: bright is attenuated
+  std::span<const float> mask;  ///< non-zero is used; empty: every pixel
+};
+
+struct Registration {
+  std::int64_t start_index = 0;
+  Pose start;
+  Pose pose;                                 ///< the end
+  std::array<double, 6> start_parameters{};  ///< deg, mm; relative to RegistrationCase::frame()
+  std::array<double, 6> parameters{};        ///< likewise, of the end
+  std::string verdict;                       ///< "found", "doubtful" or "not found"
+  std::string reason;                        ///< of the verdict
+  double similarity = 0.0;                   ///< NaN when there is none
+  std::string chain;
+  std::string stop_reason;
+  std::int64_t evaluations = 0;
+  std::int64_t inadmissible = 0;
+  std::int64_t drr_count = 0;
+  std::vector<ViewAgreement> views;
+  std::optional<double> initial_tre_mm;  ///< when the case's gold pose is known
+  std::optional<double> tre_mm;
+  double seconds = 0.0;
+};
+
+/// A case of a study with all that its registrations need: X-rays, fields or CT. One call at a
+/// time; calls from other threads wait.
+class ATTENUATION_FIELDS_API RegistrationCase {
+ public:
+  /// `case_name`: empty picks the only one. InputError, FileError.
+  static RegistrationCase load(const std::filesystem::path& study,
+                               const std::string& case_name = "",
+                               const RegistrationOptions& options = {});
+
+  [[nodiscard]] const std::string& name() const;
+  [[nodiscard]] std::vector<CaseView> views() const;
+  /// Nominal pose, about the centre of the region of interest.
+  [[nodiscard]] const PoseFrame& frame() const;
+  /// What is odd about the study.
+  [[nodiscard]] const std::vector<std::string>& warnings() const;
+  /// The pose that errors are measured against, when the study knows one.
+  [[nodiscard]] std::optional<Pose> gold() const;
+  /// Mean distance (mm) over the target box between where a pose and the gold pose put its points.
+  [[nodiscard]] std::optional<double> tre_mm(const Pose& pose) const;
+
+  /// Registers from a start. `start_index` is a key of random numbers. What af-register writes into
+  /// result.json, to the bit (its seconds excepted).
+  [[nodiscard]] Registration run(const Pose& start, std::int64_t start_index = 0) const;
+  /// From many starts, by their positions; verdicts as in registrations.csv.
+  [[nodiscard]] std::vector<Registration> run_all(std::span<const Pose> starts) const;
+  /// The similarity that results are compared by, at a pose; nullopt where it is inadmissible.
+  [[nodiscard]] std::optional<double> similarity(const Pose& pose) const;
+
+ private:
+  struct Impl;
+  explicit RegistrationCase(std::shared_ptr<Impl> impl);
+  std::shared_ptr<Impl> impl_;
+};
+
+}  // namespace attenuation_fields

@@ -1,0 +1,297 @@
+// SPDX-License-Identifier: Apache-2.0
+// The camera of a C-arm by the header of its DICOM image (PS3.3, C.8.7.5: XA positioner). Room: the
+// patient's axes (LPS, mm) with the origin at the isocentre, the patient lying on the back, head
+// first. The detector is in front of the chest at angles 0 and moves to the patient's left (LAO)
+// with a positive primary, to the head with a positive secondary angle, like longitude and
+// latitude.
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <Eigen/Geometry>
+
+#include "base/error.h"
+#include "base/number_text.h"
+#include "camera_files/format_readers.h"
+#include "geometry/rigid_transform.h"
+#include "image_files/dicom_elements.h"
+
+namespace af {
+
+namespace {
+
+constexpr DicomTag kModality = {0x0008, 0x0060};
+constexpr DicomTag kSourceDetector = {0x0018, 0x1110};
+constexpr DicomTag kSourcePatient = {0x0018, 0x1111};
+constexpr DicomTag kImagerSpacing = {0x0018, 0x1164};
+constexpr DicomTag kPositionerMotion = {0x0018, 0x1500};
+constexpr DicomTag kPrimaryAngle = {0x0018, 0x1510};
+constexpr DicomTag kSecondaryAngle = {0x0018, 0x1511};
+constexpr DicomTag kPrimaryIncrement = {0x0018, 0x1520};
+constexpr DicomTag kSecondaryIncrement = {0x0018, 0x1521};
+constexpr DicomTag kElementSpacing = {0x0018, 0x7022};
+constexpr DicomTag kActiveDimensions = {0x0018, 0x7026};
+constexpr DicomTag kActiveOrigin = {0x0018, 0x7028};
+constexpr DicomTag kFieldOfViewOrigin = {0x0018, 0x7030};
+constexpr DicomTag kPatientOrientation = {0x0020, 0x0020};
+constexpr DicomTag kFrames = {0x0028, 0x0008};
+constexpr DicomTag kRows = {0x0028, 0x0010};
+constexpr DicomTag kColumns = {0x0028, 0x0011};
+
+constexpr std::array kModalities = {"XA", "RF", "CR", "DX"};
+constexpr int kMostFrames = 100000;
+
+struct PositionerAngles {
+  double primary_deg = 0.0;
+  double secondary_deg = 0.0;
+};
+
+/// A DICOM header as a camera's file; whatever it lacks comes from the options or is asked for.
+class DicomCamera {
+ public:
+  DicomCamera(const CameraFile& file, const CameraFileOptions& options)
+      : file_(file.name()), options_(options), elements_(DicomElements::read(file.path)) {}
+
+  StatedRig run() {
+    const std::string modality = elements_.text(kModality);
+    if (std::ranges::find(kModalities, modality) == kModalities.end())
+      throw InputError(
+          "Modality (0008,0060)", "'" + modality + "'", "must be XA, RF, CR or DX", file_);
+    read_detector();
+    for (const PositionerAngles& angles : all_angles()) add_camera(angles);
+    stated_.isocenter_point = Eigen::Vector3d::Zero();
+    return stated_;
+  }
+
+ private:
+  /// A number of the header, or of the option, which must not contradict it.
+  double number(DicomTag tag,
+                const char* name,
+                const std::optional<double>& given,
+                const char* option) const {
+    const std::optional<double> found = elements_.number_or_none(tag, name);
+    if (found && *found > 0.0) {
+      constexpr double kToleranceMm = 1e-3;
+      if (given && std::abs(*given - *found) > kToleranceMm)
+        throw InputError(option,
+                         number_text(*given),
+                         "must agree with " + std::string(name) + " = " + number_text(*found),
+                         file_);
+      return *found;
+    }
+    if (given) return *given;
+    throw InputError(file_ + ": " + name + " is missing: af-inspect --rig-from with " + option +
+                     " states it");
+  }
+
+  void read_detector() {
+    const auto side = [&](DicomTag tag, const char* name) {
+      const std::optional<double> found = elements_.number_or_none(tag, name);
+      if (!found) throw InputError(file_ + ": " + name + " is missing");
+      return *found;
+    };
+    camera_.size_px =
+        size_of({side(kColumns, "Columns (0028,0011)"), side(kRows, "Rows (0028,0010)")},
+                file_ + ": Columns, Rows");
+    source_detector_mm_ = number(kSourceDetector,
+                                 "DistanceSourceToDetector (0018,1110)",
+                                 options_.source_detector_mm,
+                                 "--rig-source-detector-mm");
+    source_isocenter_mm_ = number(kSourcePatient,
+                                  "DistanceSourceToPatient (0018,1111)",
+                                  options_.source_isocenter_mm,
+                                  "--rig-source-isocenter-mm");
+    const std::vector<double> spacing =
+        elements_.numbers(kImagerSpacing, "ImagerPixelSpacing (0018,1164)");
+    if (!spacing.empty() && (spacing.size() != 2 || !(spacing[0] > 0.0) || !(spacing[1] > 0.0)))
+      throw InputError("ImagerPixelSpacing (0018,1164)",
+                       elements_.text(kImagerSpacing),
+                       "must be two spacings above 0: of rows, of columns",
+                       file_);
+    if (spacing.size() == 2)
+      camera_.pixel_spacing_mm = {spacing[1], spacing[0]};
+    else if (!options_.pixel_spacing_mm.empty())
+      camera_.pixel_spacing_mm = {options_.pixel_spacing_mm[0], options_.pixel_spacing_mm[1]};
+    else
+      throw InputError(
+          file_ +
+          ": ImagerPixelSpacing (0018,1164) is missing: af-inspect --rig-from with "
+          "--rig-pixel-spacing-mm COLUMN,ROW states it; PixelSpacing (0028,0030) may be "
+          "that at the patient and is not taken");
+  }
+
+  /// Of each frame: one, unless the positioner moves.
+  std::vector<PositionerAngles> all_angles() const {
+    PositionerAngles first;
+    const auto primary =
+        elements_.number_or_none(kPrimaryAngle, "PositionerPrimaryAngle (0018,1510)");
+    const auto secondary =
+        elements_.number_or_none(kSecondaryAngle, "PositionerSecondaryAngle (0018,1511)");
+    const std::vector<double>& given = options_.positioner_deg;
+    constexpr double kToleranceDeg = 1e-3;
+    if ((!primary || !secondary) && given.empty())
+      throw InputError(file_ +
+                       ": PositionerPrimaryAngle (0018,1510) or PositionerSecondaryAngle "
+                       "(0018,1511) is missing: af-inspect --rig-from with --rig-positioner-deg "
+                       "PRIMARY,SECONDARY states them");
+    if (!given.empty() && ((primary && std::abs(*primary - given[0]) > kToleranceDeg) ||
+                           (secondary && std::abs(*secondary - given[1]) > kToleranceDeg)))
+      throw InputError("--rig-positioner-deg",
+                       number_text(given[0]) + "," + number_text(given[1]),
+                       "must agree with the file's angles",
+                       file_);
+    first.primary_deg = primary ? *primary : given[0];
+    first.secondary_deg = secondary ? *secondary : given[1];
+    if (!(std::abs(first.primary_deg) <= 360.0) || !(std::abs(first.secondary_deg) <= 180.0))
+      throw InputError("positioner angles",
+                       number_text(first.primary_deg) + ", " + number_text(first.secondary_deg),
+                       "must be within 360 and 180 degrees",
+                       file_);
+    if (elements_.text(kPositionerMotion) != "DYNAMIC") return {first};
+    return moving_angles(first);
+  }
+
+  /// PS3.3, C.8.7.5.1.3: one increment per frame, or an offset from the first angles for each.
+  std::vector<PositionerAngles> moving_angles(const PositionerAngles& first) const {
+    const double frames =
+        elements_.number_or_none(kFrames, "NumberOfFrames (0028,0008)").value_or(1.0);
+    if (!(frames >= 1.0 && frames <= kMostFrames) || frames != std::floor(frames))
+      throw InputError("NumberOfFrames (0028,0008)",
+                       number_text(frames),
+                       "must be whole and within 1 and 100000",
+                       file_);
+    const auto count = static_cast<std::size_t>(frames);
+    const auto offsets = [&](DicomTag tag, const char* name) {
+      std::vector<double> values = elements_.numbers(tag, name);
+      if (values.empty()) values = {0.0};
+      if (values.size() != 1 && values.size() != count)
+        throw InputError(name,
+                         std::to_string(values.size()) + " values",
+                         "must be one, or one per frame: " + std::to_string(count),
+                         file_);
+      if (values.size() == count && count > 1) return values;
+      const double step = values.front();
+      values.resize(count);
+      for (std::size_t i = 0; i < count; ++i) values[i] = static_cast<double>(i) * step;
+      return values;
+    };
+    const auto primary = offsets(kPrimaryIncrement, "PositionerPrimaryAngleIncrement (0018,1520)");
+    const auto secondary =
+        offsets(kSecondaryIncrement, "PositionerSecondaryAngleIncrement (0018,1521)");
+    std::vector<PositionerAngles> angles;
+    for (std::size_t i = 0; i < count; ++i)
+      angles.push_back({first.primary_deg + primary[i], first.secondary_deg + secondary[i]});
+    return angles;
+  }
+
+  /// Where the image's middle lies from the middle of the active detector: (column, row) mm. 0
+  /// unless all is stated.
+  Eigen::Vector2d field_of_view_offset_mm() const {
+    const auto pair = [&](DicomTag tag, const char* name) -> std::optional<Eigen::Vector2d> {
+      const std::vector<double> values = elements_.numbers(tag, name);
+      if (values.size() != 2) return std::nullopt;
+      return Eigen::Vector2d(values[1], values[0]);  // rows come first in DICOM
+    };
+    const auto spacing = pair(kElementSpacing, "DetectorElementSpacing (0018,7022)");
+    const auto active = pair(kActiveDimensions, "DetectorActiveDimensions (0018,7026)");
+    const auto active_origin = pair(kActiveOrigin, "DetectorActiveOrigin (0018,7028)");
+    const auto origin = pair(kFieldOfViewOrigin, "FieldOfViewOrigin (0018,7030)");
+    if (!spacing || !active || !active_origin || !origin) return Eigen::Vector2d::Zero();
+    const Eigen::Vector2d image_mm =
+        camera_.size_px.cast<double>().cwiseProduct(camera_.pixel_spacing_mm);
+    return (*origin - *active_origin).cwiseProduct(*spacing) + 0.5 * (image_mm - *active);
+  }
+
+  /// The direction of patient letters such as "L" or "PL", by the first.
+  static std::optional<Eigen::Vector3d> letter_direction(const std::string& letters) {
+    if (letters.empty()) return std::nullopt;
+    switch (letters.front()) {
+      case 'L':
+        return Eigen::Vector3d(1.0, 0.0, 0.0);
+      case 'R':
+        return Eigen::Vector3d(-1.0, 0.0, 0.0);
+      case 'P':
+        return Eigen::Vector3d(0.0, 1.0, 0.0);
+      case 'A':
+        return Eigen::Vector3d(0.0, -1.0, 0.0);
+      case 'H':
+        return Eigen::Vector3d(0.0, 0.0, 1.0);
+      case 'F':
+        return Eigen::Vector3d(0.0, 0.0, -1.0);
+      default:
+        return std::nullopt;
+    }
+  }
+
+  /// Turns the axes around where PatientOrientation says that the image is stored so.
+  void orient(CameraGeometry& camera) {
+    const std::string text = elements_.text(kPatientOrientation);
+    const std::size_t bar = text.find('\\');
+    const auto columns = letter_direction(text.substr(0, bar));
+    const auto rows =
+        bar == std::string::npos ? std::nullopt : letter_direction(text.substr(bar + 1));
+    constexpr double kClear = 0.3;
+    if (!columns || !rows || std::abs(columns->dot(camera.column_direction)) < kClear ||
+        std::abs(rows->dot(camera.row_direction)) < kClear) {
+      if (stated_.cameras.empty())
+        stated_.notes.push_back(
+            file_ +
+            ": PatientOrientation (0020,0020) is missing or does not fit the angles; the images "
+            "are "
+            "taken as seen from the detector, head on top (L\\F at angles 0); --rig-flip columns "
+            "or rows turns them around");
+      return;
+    }
+    if (columns->dot(camera.column_direction) < 0.0) camera.column_direction *= -1.0;
+    if (rows->dot(camera.row_direction) < 0.0) camera.row_direction *= -1.0;
+  }
+
+  void add_camera(const PositionerAngles& angles) {
+    using Eigen::AngleAxisd;
+    using Eigen::Vector3d;
+    const Eigen::Matrix3d turn = (AngleAxisd(angles.primary_deg * kRadPerDeg, Vector3d::UnitZ()) *
+                                  AngleAxisd(-angles.secondary_deg * kRadPerDeg, Vector3d::UnitX()))
+                                     .toRotationMatrix();
+    const Vector3d to_detector = turn * Vector3d(0.0, -1.0, 0.0);
+    StatedCamera stated;
+    stated.geometry = camera_;
+    CameraGeometry& camera = stated.geometry;
+    camera.column_direction = turn * Vector3d(1.0, 0.0, 0.0);
+    camera.row_direction = turn * Vector3d(0.0, 0.0, -1.0);
+    orient(camera);
+    camera.source_point = -source_isocenter_mm_ * to_detector;
+    const Eigen::Vector2d first_mm =
+        field_of_view_offset_mm() - 0.5 * (camera.size_px.cast<double>() - Eigen::Vector2d::Ones())
+                                              .cwiseProduct(camera.pixel_spacing_mm);
+    camera.detector_origin_point = camera.source_point + source_detector_mm_ * to_detector +
+                                   first_mm.x() * camera.column_direction +
+                                   first_mm.y() * camera.row_direction;
+    stated_.cameras.push_back(stated);
+  }
+
+  std::string file_;
+  const CameraFileOptions& options_;
+  DicomElements elements_;
+  StatedRig stated_;
+  CameraGeometry camera_;  ///< what all frames share
+  double source_detector_mm_ = 0.0;
+  double source_isocenter_mm_ = 0.0;
+};
+
+}  // namespace
+
+bool is_dicom_xray(const CameraFile& file) {
+  if (!file.text.empty() || file.head.empty() || !is_marked_dicom(file.path)) return false;
+  try {
+    const std::string modality = DicomElements::read(file.path).text(kModality);
+    return std::ranges::find(kModalities, modality) != kModalities.end();
+  } catch (const Error&) {
+    return true;  // DICOM, but broken: reading it says why
+  }
+}
+
+StatedRig read_dicom_xray(const CameraFile& file, const CameraFileOptions& options) {
+  return DicomCamera(file, options).run();
+}
+
+}  // namespace af

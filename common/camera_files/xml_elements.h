@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace af {
+
+/// An element of an XML text: its own text without that of its children.
+struct XmlElement {
+  std::string name;
+  std::size_t line = 0;
+  std::string text;
+  std::vector<XmlElement> children;
+
+  /// The first child of that name, or nullptr.
+  [[nodiscard]] const XmlElement* child(std::string_view child_name) const;
+};
+
+/// The root element (expat). Attributes are left out. FileError "FILE:LINE: ..." when the text is
+/// no XML, and for elements nested deeper than 32, a million elements or entities of its own.
+XmlElement parse_xml(const std::string& text, const std::string& file);
+
+}  // namespace af

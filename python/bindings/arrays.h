@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+// NumPy arrays and what the library takes and gives. No array is copied that is what is asked for.
+#pragma once
+
+#include <array>
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "attenuation_fields/geometry.h"
+#include "attenuation_fields/renderer.h"
+
+namespace attenuation_fields::python {
+
+namespace py = pybind11;
+
+/// float64, C order; another kind of sequence is converted.
+using Numbers = py::array_t<double, py::array::c_style | py::array::forcecast>;
+
+/// "(3,)", "(n, 6)": how shapes are told in errors.
+std::string shape_text(const py::array& array);
+
+/// InputError naming `name` unless the array has this shape; -1 is any extent.
+void require_shape(const py::array& array, const char* name, const std::vector<py::ssize_t>& shape);
+
+/// A new float32 array, or `out` itself: InputError unless that is float32, C-contiguous, writeable
+/// and of this shape.
+py::array_t<float> output_array(const std::vector<py::ssize_t>& shape,
+                                const py::object& out,
+                                const char* name);
+
+std::span<float> floats_of(py::array_t<float>& array);
+
+Vector3 vector_of(const Numbers& values, const char* name);
+Pose pose_of(const Numbers& matrix, const char* name);
+std::vector<Pose> poses_of(const Numbers& matrices, const char* name);
+py::array_t<double> matrix_of(const Pose& pose);
+template <std::size_t n>
+py::array_t<double> array_of(const std::array<double, n>& values) {
+  return py::array_t<double>(static_cast<py::ssize_t>(n), values.data());
+}
+
+void bind_errors(py::module_& module);
+void bind_geometry(py::module_& module);
+void bind_ct(py::module_& module);
+void bind_renderers(py::module_& module);
+void bind_registration(py::module_& module);
+void bind_evaluation(py::module_& module);
+
+}  // namespace attenuation_fields::python

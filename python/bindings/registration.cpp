@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "attenuation_fields/registration.h"
+
+#include <filesystem>
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+
+#include "python/bindings/arrays.h"
+
+namespace attenuation_fields::python {
+namespace {
+
+using namespace pybind11::literals;
+
+void bind_result(py::module_& module) {
+  py::class_<ViewAgreement> view(
+      module, "ViewAgreement", "Shares of an X-ray's gradients that the DRR at a pose explains.");
+  view.def_readonly("camera", &ViewAgreement::camera);
+  view.def_readonly("coarse", &ViewAgreement::coarse);
+  view.def_readonly("fine", &ViewAgreement::fine);
+  py::class_<Registration> result(module, "Registration", "Where a registration led.");
+  result.def_readonly("start_index", &Registration::start_index);
+  result.def_property_readonly("start",
+                               [](const Registration& self) { return matrix_of(self.start); });
+  result.def_property_readonly(
+      "pose",
+      [](const Registration& self) { return matrix_of(self.pose); },
+      "The end, room_from_ct (4x4).");
+  result.def_property_readonly(
+      "start_parameters", [](const Registration& self) { return array_of(self.start_parameters); });
+  result.def_property_readonly(
+      "parameters",
+      [](const Registration& self) { return array_of(self.parameters); },
+      "rx, ry, rz (degrees), tx, ty, tz (mm) of the end, relative to the case's frame.");
+  result.def_readonly("verdict", &Registration::verdict, "'found', 'doubtful' or 'not found'");
+  result.def_readonly("reason", &Registration::reason);
+  result.def_readonly("similarity", &Registration::similarity);
+  result.def_readonly("chain", &Registration::chain);
+  result.def_readonly("stop_reason", &Registration::stop_reason);
+  result.def_readonly("evaluations", &Registration::evaluations);
+  result.def_readonly("inadmissible", &Registration::inadmissible);
+  result.def_readonly("drr_count", &Registration::drr_count);
+  result.def_readonly("views", &Registration::views);
+  result.def_readonly("initial_tre_mm", &Registration::initial_tre_mm);
+  result.def_readonly("tre_mm", &Registration::tre_mm);
+  result.def_readonly("seconds", &Registration::seconds);
+  result.def("__repr__", [](const Registration& self) {
+    return "Registration(" + self.verdict + ": " + self.reason + ")";
+  });
+}
+
+/// The pixels themselves, read-only; the array keeps the case.
+py::array_t<float> image_of(const RegistrationCase& owner,
+                            const Camera& camera,
+                            std::span<const float> pixels) {
+  const py::capsule keeper(new RegistrationCase(owner),
+                           [](void* pointer) { delete static_cast<RegistrationCase*>(pointer); });
+  py::array_t<float> image({camera.size_px[1], camera.size_px[0]}, pixels.data(), keeper);
+  image.attr("flags").attr("writeable") = false;
+  return image;
+}
+
+/// A CaseView whose images are arrays.
+struct PythonView {
+  Camera camera;
+  std::array<int, 4> roi_px;
+  py::array_t<float> xray;
+  py::object mask;
+};
+
+std::vector<PythonView> views_of(const RegistrationCase& owner) {
+  std::vector<PythonView> views;
+  for (const CaseView& view : owner.views()) {
+    py::object mask = py::none();
+    if (!view.mask.empty()) mask = image_of(owner, view.camera, view.mask);
+    views.push_back(
+        {view.camera, view.roi_px, image_of(owner, view.camera, view.xray), std::move(mask)});
+  }
+  return views;
+}
+
+RegistrationCase load(const std::filesystem::path& study,
+                      const std::string& case_name,
+                      const std::string& preset,
+                      const std::string& renderer,
+                      const std::map<std::string, std::filesystem::path>& fields,
+                      const std::vector<std::string>& chains,
+                      const std::optional<std::string>& similarity,
+                      const std::optional<std::string>& optimizer,
+                      std::optional<int> max_evaluations,
+                      bool correct,
+                      bool skip_ct_check,
+                      double water_mu_per_mm,
+                      const std::string& ct_series_uid,
+                      std::uint64_t seed,
+                      int threads) {
+  RegistrationOptions options;
+  options.preset = preset;
+  options.renderer = renderer;
+  options.fields = fields;
+  options.chains = chains;
+  options.similarity = similarity;
+  options.optimizer = optimizer;
+  options.max_evaluations = max_evaluations;
+  options.correct = correct;
+  options.skip_ct_check = skip_ct_check;
+  options.water_mu_per_mm = water_mu_per_mm;
+  options.ct_series_uid = ct_series_uid;
+  options.seed = seed;
+  options.threads = threads;
+  RegistrationCase loaded = [&] {
+    const py::gil_scoped_release release;
+    return RegistrationCase::load(study, case_name, options);
+  }();
+  for (const std::string& text : loaded.warnings())
+    if (PyErr_WarnEx(PyExc_UserWarning, text.c_str(), 1) != 0) throw py::error_already_set();
+  return loaded;
+}
+
+void bind_case(py::module_& module) {
+  py::class_<PythonView> view(module, "CaseView", "An X-ray of a case.");
+  view.def_readonly("camera", &PythonView::camera);
+  view.def_property_readonly(
+      "roi_px",
+      [](const PythonView& self) { return py::tuple(py::cast(self.roi_px)); },
+      "Region of interest: column, row, width, height.");
+  view.def_readonly("xray",
+                    &PythonView::xray,
+                    "Whole detector (h, w) in the attenuation domain: bright is attenuated.");
+  view.def_readonly("mask", &PythonView::mask, "Non-zero is used (h, w); None: every pixel.");
+  py::class_<RegistrationCase> registration_case(
+      module,
+      "RegistrationCase",
+      "A case of a study with all that its registrations need, as af-register loads it.");
+  registration_case.def_static("load",
+                               &load,
+                               "study"_a,
+                               "case_name"_a = "",
+                               py::kw_only(),
+                               "preset"_a = "",
+                               "renderer"_a = "field",
+                               "fields"_a = std::map<std::string, std::filesystem::path>{},
+                               "chains"_a = std::vector<std::string>{},
+                               "similarity"_a = py::none(),
+                               "optimizer"_a = py::none(),
+                               "max_evaluations"_a = py::none(),
+                               "correct"_a = false,
+                               "skip_ct_check"_a = false,
+                               "water_mu_per_mm"_a = RegistrationOptions{}.water_mu_per_mm,
+                               "ct_series_uid"_a = "",
+                               "seed"_a = 1,
+                               "threads"_a = 1,
+                               "Options are those of af-register.");
+  registration_case.def_property_readonly("name", &RegistrationCase::name);
+  registration_case.def_property_readonly(
+      "views", &views_of, "The case's X-rays, with their cameras and regions of interest.");
+  registration_case.def_property_readonly(
+      "frame", [](const RegistrationCase& self) { return self.frame(); });
+  registration_case.def_property_readonly(
+      "gold",
+      [](const RegistrationCase& self) -> py::object {
+        const std::optional<Pose> gold = self.gold();
+        if (!gold.has_value()) return py::none();
+        return matrix_of(*gold);
+      },
+      "The pose that errors are measured against, or None.");
+  registration_case.def(
+      "tre_mm",
+      [](const RegistrationCase& self, const Numbers& pose) {
+        return self.tre_mm(pose_of(pose, "pose"));
+      },
+      "pose"_a,
+      "Target registration error of a 4x4 pose; None without a gold pose.");
+  registration_case.def(
+      "run",
+      [](const RegistrationCase& self, const std::optional<Numbers>& start, std::int64_t index) {
+        const Pose pose = start.has_value() ? pose_of(*start, "start") : self.frame().pose({}, {});
+        const py::gil_scoped_release release;
+        return self.run(pose, index);
+      },
+      "start"_a = py::none(),
+      "start_index"_a = 0,
+      "Registers from a 4x4 start [the nominal pose].");
+  registration_case.def(
+      "run_all",
+      [](const RegistrationCase& self, const Numbers& starts) {
+        const std::vector<Pose> poses = poses_of(starts, "starts");
+        const py::gil_scoped_release release;
+        return self.run_all(poses);
+      },
+      "starts"_a,
+      "Registers from many starts (n, 4, 4).");
+  registration_case.def(
+      "similarity",
+      [](const RegistrationCase& self, const Numbers& pose) {
+        const Pose room_from_ct = pose_of(pose, "pose");
+        const py::gil_scoped_release release;
+        return self.similarity(room_from_ct);
+      },
+      "pose"_a,
+      "What results are compared by, at a 4x4 pose; None where it is inadmissible.");
+}
+
+}  // namespace
+
+void bind_registration(py::module_& module) {
+  bind_result(module);
+  bind_case(module);
+  module.def("preset_names", &preset_names);
+}
+
+}  // namespace attenuation_fields::python

@@ -1,0 +1,373 @@
+// SPDX-License-Identifier: Apache-2.0
+// The library from outside: its headers alone, against what the programs made (make_library_study).
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <iterator>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "attenuation_fields/attenuation_fields.h"
+#include "library/library_study.h"
+
+namespace attenuation_fields {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::SizeIs;
+
+constexpr Vector3 kRotationDeg = {2.0, -1.5, 3.0};
+constexpr Vector3 kTranslationMm = {4.0, -5.0, 6.0};
+
+fs::path study_file(const std::string& name) {
+  return fs::path(AF_LIBRARY_STUDY) / name;
+}
+
+/// The last `count` floats of a file: all of the pixels of an image.
+std::vector<float> last_floats(const fs::path& path, std::size_t count) {
+  std::ifstream file(path, std::ios::binary);
+  const std::string bytes(std::istreambuf_iterator<char>(file), {});
+  std::vector<float> values(count);
+  if (bytes.size() < count * sizeof(float)) {
+    ADD_FAILURE() << path << " has " << bytes.size() << " bytes";
+    return values;
+  }
+  std::copy_n(bytes.end() - static_cast<std::ptrdiff_t>(count * sizeof(float)),
+              count * sizeof(float),
+              reinterpret_cast<char*>(values.data()));
+  return values;
+}
+
+std::vector<float> drr_of(const Renderer& renderer, const Pose& pose) {
+  std::vector<float> drr(renderer.pixel_count());
+  renderer.drr(pose, drr);
+  return drr;
+}
+
+template <typename Thrown>
+std::string message_of(const std::function<void()>& function) {
+  try {
+    function();
+  } catch (const Thrown& error) {
+    return error.what();
+  }
+  ADD_FAILURE() << "nothing was thrown";
+  return "";
+}
+
+TEST(LibraryField, LooksUpTheDrrOfTheProgram) {
+  const Field field = Field::open(study_file("AP.af.h5"));
+  const Pose pose = field.frame().pose(kRotationDeg, kTranslationMm);
+  EXPECT_EQ(drr_of(field, pose), last_floats(study_file("field.mha"), field.pixel_count()));
+  const Field cubic = Field::open(study_file("AP.af.h5"), {.look_up = "cubic"});
+  EXPECT_EQ(drr_of(cubic, pose), last_floats(study_file("cubic.mha"), field.pixel_count()));
+  EXPECT_EQ(cubic.look_up(), "cubic");
+  EXPECT_EQ(field.camera().name, "AP");
+  EXPECT_NEAR(field.max_rotation_deg(), 8.0, 1e-9);
+  EXPECT_EQ(field.max_translation_mm(), 12.0);
+  EXPECT_EQ(field.ct_content_sha256(), Ct::read(study_file("ct.nii.gz")).content_sha256());
+  EXPECT_THAT(field.payload_sha256(), SizeIs(64));
+}
+
+TEST(LibraryRayCaster, CastsTheDrrOfTheProgram) {
+  const Rig rig = Rig::read(study_file("rig.toml").string());
+  const RayCaster caster(Ct::read(study_file("ct.nii.gz")),
+                         rig.camera("LAT"),
+                         {.isocenter_point = rig.isocenter_point});
+  EXPECT_EQ(drr_of(caster, caster.frame().pose(kRotationDeg, kTranslationMm)),
+            last_floats(study_file("cast.mha"), caster.pixel_count()));
+}
+
+TEST(LibraryRenderer, GivesTheDerivativesThatTheProgramsOptimiseWith) {
+  const Field field = Field::open(study_file("AP.af.h5"));
+  const std::size_t pixels = field.pixel_count();
+  std::vector<float> values(7 * pixels);
+  const std::span<float> all(values);
+  field.drr_and_motion_gradient(field.frame().pose(kRotationDeg, kTranslationMm),
+                                af::test::kPivotRoomMm,
+                                all.first(pixels),
+                                all.subspan(pixels));
+  EXPECT_EQ(values, last_floats(study_file("motion-gradient.f32"), 7 * pixels));
+}
+
+/// Sums over the detector by waves of 14 and 18 pixels, which average the rounding of single pixels
+/// out and feel every motion, against central differences of the sums.
+TEST(LibraryRenderer, GivesDerivativesByItsParameters) {
+  const Rig rig = Rig::read(study_file("rig.toml").string());
+  const RayCaster caster(Ct::read(study_file("ct.nii.gz")), rig.camera("LAT"), {.step_mm = 0.1});
+  const std::size_t pixels = caster.pixel_count();
+  std::vector<float> drr(pixels);
+  std::vector<float> planes(6 * pixels);
+  caster.drr_and_gradient(kRotationDeg, kTranslationMm, drr, planes);
+  EXPECT_EQ(drr, drr_of(caster, caster.frame().pose(kRotationDeg, kTranslationMm)));
+  const auto weight = [&](std::size_t i) {
+    const auto width = static_cast<std::size_t>(caster.width());
+    return std::sin(0.45 * static_cast<double>(i % width) + 0.3) *
+           std::cos(0.35 * static_cast<double>(i / width) - 0.2);
+  };
+  const auto weighted = [&](std::span<const float> values) {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < pixels; ++i) sum += weight(i) * static_cast<double>(values[i]);
+    return sum;
+  };
+  constexpr double kStep = 0.05;  // degrees, mm
+  std::vector<double> found;
+  std::vector<double> expected;
+  for (std::size_t k = 0; k < 6; ++k) {
+    const auto moved = [&](double step) {
+      Vector3 rotation = kRotationDeg;
+      Vector3 translation = kTranslationMm;
+      (k < 3 ? rotation[k] : translation[k - 3]) += step;
+      return weighted(drr_of(caster, caster.frame().pose(rotation, translation)));
+    };
+    expected.push_back((moved(kStep) - moved(-kStep)) / (2.0 * kStep));
+    found.push_back(weighted(std::span(planes).subspan(k * pixels, pixels)));
+  }
+  // Where rays enter and leave the volume their samples slide as it moves, which shifts values, and
+  // differences over a small step by some percent of the largest.
+  constexpr double kTolerance = 0.05;
+  for (const std::size_t first : {0U, 3U}) {
+    double largest = 0.0;
+    for (std::size_t k = first; k < first + 3; ++k)
+      largest = std::max(largest, std::abs(expected[k]));
+    for (std::size_t k = first; k < first + 3; ++k)
+      EXPECT_NEAR(found[k], expected[k], kTolerance * largest) << k;
+  }
+}
+
+TEST(LibraryRenderer, MakesBatchesOfTheSameBitsOnAnyThreads) {
+  const Field one = Field::open(study_file("AP.af.h5"));
+  const Field three = Field::open(study_file("AP.af.h5"), {.threads = 3});
+  EXPECT_EQ(three.threads(), 3);
+  const std::size_t pixels = one.pixel_count();
+  std::vector<Pose> poses;
+  std::vector<std::array<double, 6>> parameters;
+  for (int i = 0; i < 7; ++i) {
+    parameters.push_back({0.5 * i, 1.0, -0.3 * i, 2.0, -1.0 * i, 0.7});
+    const auto& p = parameters.back();
+    poses.push_back(one.frame().pose({p[0], p[1], p[2]}, {p[3], p[4], p[5]}));
+  }
+  std::vector<float> batch(poses.size() * pixels);
+  three.drrs(poses, batch);
+  std::vector<float> batch_again(batch.size());
+  std::vector<float> planes(6 * batch.size());
+  three.drrs_and_gradients(parameters, batch_again, planes);
+  EXPECT_EQ(batch, batch_again);
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    std::vector<float> drr(pixels);
+    std::vector<float> gradient(6 * pixels);
+    one.drr_and_gradient({parameters[i][0], parameters[i][1], parameters[i][2]},
+                         {parameters[i][3], parameters[i][4], parameters[i][5]},
+                         drr,
+                         gradient);
+    EXPECT_TRUE(std::equal(drr.begin(), drr.end(), batch.begin() + static_cast<long>(i * pixels)));
+    EXPECT_TRUE(std::equal(
+        gradient.begin(), gradient.end(), planes.begin() + static_cast<long>(6 * i * pixels)));
+  }
+}
+
+TEST(LibraryRenderer, MayBeCalledFromSeveralThreads) {
+  for (const int threads : {1, 2}) {
+    const Field field = Field::open(study_file("AP.af.h5"), {.threads = threads});
+    const auto expected = last_floats(study_file("field.mha"), field.pixel_count());
+    const Pose pose = field.frame().pose(kRotationDeg, kTranslationMm);
+    std::vector<int> differences(4, 0);
+    {
+      std::vector<std::jthread> callers;
+      for (int& count : differences)
+        callers.emplace_back([&] {
+          for (int i = 0; i < 20; ++i) count += drr_of(field, pose) == expected ? 0 : 1;
+        });
+    }
+    EXPECT_THAT(differences, ElementsAre(0, 0, 0, 0));
+  }
+}
+
+TEST(LibraryRenderer, RefusesOrCountsRaysOutside) {
+  const Pose far = Field::open(study_file("AP.af.h5")).frame().pose({}, {300.0, 0.0, 0.0});
+  const Field throwing = Field::open(study_file("AP.af.h5"));
+  std::vector<float> drr(throwing.pixel_count());
+  EXPECT_THAT(message_of<InputError>([&] { throwing.drr(far, drr); }),
+              HasSubstr("pose 0 = outside the field: "));
+  const Field counting = Field::open(study_file("AP.af.h5"), {.outside = Outside::Zero});
+  EXPECT_GT(counting.drr(far, drr), 0);
+  EXPECT_EQ(counting.drr(counting.frame().pose({}, {}), drr), 0);
+}
+
+TEST(LibraryRenderer, RefusesBuffersAndPosesThatDoNotFit) {
+  const Field field = Field::open(study_file("AP.af.h5"));
+  std::vector<float> small(field.pixel_count() - 1);
+  const Pose pose = field.frame().pose({}, {});
+  EXPECT_THAT(message_of<InputError>([&] { field.drr(pose, small); }),
+              HasSubstr("total_attenuation"));
+  std::vector<float> drr(field.pixel_count());
+  Pose scaled = pose;
+  scaled.room_from_ct[0] = 2.0;
+  EXPECT_THAT(message_of<InputError>([&] { field.drr(scaled, drr); }), HasSubstr("pose: "));
+  EXPECT_THROW((void)field.frame().pose({std::numeric_limits<double>::quiet_NaN(), 0, 0}, {}),
+               InputError);
+  EXPECT_THROW((void)Field::open(study_file("AP.af.h5"), {.threads = -1}), InputError);
+  EXPECT_THROW((void)Field::open(study_file("AP.af.h5"), {.look_up = "psychic"}), InputError);
+}
+
+TEST(LibraryErrors, AreThoseOfThePrograms) {
+  EXPECT_THAT(message_of<FileError>([] { (void)Field::open(study_file("rig.toml")); }),
+              HasSubstr("is not an HDF5 file"));
+  EXPECT_THAT(message_of<FileError>([] { (void)Ct::read(study_file("nothing.nii")); }),
+              HasSubstr("nothing.nii"));
+  try {
+    (void)Rig::read("no-such-rig.toml");
+    ADD_FAILURE();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.exit_code(), 4);
+  }
+}
+
+TEST(LibraryCt, SharesVoxelsAndRefusesGridsThatAreNone) {
+  const Ct ct = Ct::read(study_file("ct.nii.gz"));
+  const Ct same = Ct::from_voxels(ct.grid(), nullptr, ct.hu());
+  EXPECT_EQ(same.hu().data(), ct.hu().data());
+  EXPECT_EQ(same.content_sha256(), ct.content_sha256());
+  CtGrid grid = ct.grid();
+  grid.size[0] += 1;
+  EXPECT_THROW((void)Ct::from_voxels(grid, nullptr, ct.hu()), InputError);
+  grid = ct.grid();
+  grid.spacing_mm[1] = -1.0;
+  EXPECT_THAT(message_of<InputError>([&] { (void)Ct::from_voxels(grid, nullptr, ct.hu()); }),
+              HasSubstr("spacing"));
+}
+
+TEST(LibraryRig, IsReadBackToTheBit) {
+  const Rig rig = Rig::read("c-arm-12in");
+  const fs::path path = fs::path(testing::TempDir()) / "af-library-rig.toml";
+  std::ofstream(path) << rig.to_toml();
+  const Rig again = Rig::read(path.string());
+  fs::remove(path);
+  ASSERT_EQ(again.cameras.size(), rig.cameras.size());
+  EXPECT_EQ(again.camera("AP").detector_origin_point, rig.camera("AP").detector_origin_point);
+  EXPECT_THAT(message_of<InputError>([&] { (void)rig.camera("PA"); }), HasSubstr("AP"));
+  // The isocentre is seen in the middle of the detector.
+  EXPECT_THAT(rig.camera("AP").project(rig.isocenter_point),
+              ElementsAre(testing::DoubleNear(127.5, 1e-9), testing::DoubleNear(127.5, 1e-9)));
+}
+
+nlohmann::json result_of(const std::string& folder) {
+  std::ifstream file(study_file(folder) / "result.json");
+  return nlohmann::json::parse(file);
+}
+
+class LibraryRegistrationOf : public testing::TestWithParam<std::string> {};
+
+TEST_P(LibraryRegistrationOf, EndsWhereTheProgramEnds) {
+  RegistrationOptions options;
+  options.preset = GetParam();
+  options.fields = {{"AP", study_file("AP.af.h5")}, {"LAT", study_file("LAT.af.h5")}};
+  const RegistrationCase registration_case =
+      RegistrationCase::load(study_file("study.toml"), "", options);
+  EXPECT_EQ(registration_case.name(), "ellipsoids");
+  const std::vector<CaseView> views = registration_case.views();
+  ASSERT_THAT(views, SizeIs(2));
+  EXPECT_EQ(views[1].camera.name, "LAT");
+  const std::vector<float> xray = last_floats(study_file("LAT.mha"), views[1].xray.size());
+  EXPECT_TRUE(std::equal(xray.begin(), xray.end(), views[1].xray.begin(), views[1].xray.end()));
+  const Registration found =
+      registration_case.run(registration_case.frame().pose({-1.0, 0.5, 2.5}, {0.5, 1.0, 4.0}));
+  const nlohmann::json expected = result_of(GetParam());
+  for (std::size_t row = 0; row < 4; ++row)
+    for (std::size_t column = 0; column < 4; ++column)
+      EXPECT_EQ(found.pose.room_from_ct[4 * row + column],
+                expected.at("room_from_ct")[row][column].get<double>());
+  EXPECT_EQ(found.verdict, expected.at("verdict").get<std::string>());
+  EXPECT_EQ(found.reason, expected.at("verdict_reason").get<std::string>());
+  EXPECT_EQ(found.similarity, expected.at("similarity").get<double>());
+  EXPECT_EQ(found.stop_reason, expected.at("stop_reason").get<std::string>());
+  EXPECT_EQ(found.tre_mm, expected.at("tre_mm").get<double>());
+  EXPECT_EQ(found.initial_tre_mm, expected.at("initial_tre_mm").get<double>());
+  EXPECT_EQ(registration_case.tre_mm(found.pose), found.tre_mm);
+  EXPECT_THAT(found.views, SizeIs(2));
+}
+
+INSTANTIATE_TEST_SUITE_P(EveryPreset,
+                         LibraryRegistrationOf,
+                         testing::ValuesIn(preset_names()),
+                         [](const auto& preset) { return preset.param; });
+
+TEST(LibraryRegistration, RegistersSeveralStartsAsTheProgram) {
+  RegistrationOptions options;
+  options.preset = "fast";
+  options.fields = {{"AP", study_file("AP.af.h5")}, {"LAT", study_file("LAT.af.h5")}};
+  const RegistrationCase registration_case =
+      RegistrationCase::load(study_file("study.toml"), "ellipsoids", options);
+  const Table starts = Table::read(study_file("starts.csv"));
+  std::vector<Pose> poses;
+  for (std::size_t i = 0; i < starts.row_count(); ++i) {
+    const auto at = [&](const char* column) { return starts.numbers(column)[i]; };
+    poses.push_back(registration_case.frame().pose({at("rx_deg"), at("ry_deg"), at("rz_deg")},
+                                                   {at("tx_mm"), at("ty_mm"), at("tz_mm")}));
+  }
+  const std::vector<Registration> found = registration_case.run_all(poses);
+  const Table expected = Table::read(study_file("several/registrations.csv"));
+  ASSERT_EQ(expected.row_count(), found.size());
+  std::vector<double> tre_mm;
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    EXPECT_NEAR(found[i].parameters[0], expected.numbers("final_rx_deg")[i], 1e-6);
+    EXPECT_NEAR(*found[i].tre_mm, expected.numbers("tre_mm")[i], 1e-6);
+    tre_mm.push_back(*found[i].tre_mm);
+  }
+  const SuccessRate rate = success_rate(tre_mm);
+  EXPECT_EQ(rate.trials, 2);
+  EXPECT_EQ(rate.successes, 2);
+  EXPECT_EQ(rate.rate, 1.0);
+}
+
+TEST(LibraryRegistration, RefusesWhatTheProgramRefuses) {
+  RegistrationOptions options;
+  options.preset = "hasty";
+  EXPECT_THAT(message_of<InputError>(
+                  [&] { (void)RegistrationCase::load(study_file("study.toml"), "", options); }),
+              HasSubstr("robust"));
+  options.preset = "fast";
+  EXPECT_THAT(message_of<InputError>(
+                  [&] { (void)RegistrationCase::load(study_file("study.toml"), "", options); }),
+              HasSubstr("field = none"));
+  EXPECT_THAT(message_of<InputError>(
+                  [&] { (void)RegistrationCase::load(study_file("study.toml"), "knee", options); }),
+              HasSubstr("ellipsoids"));
+}
+
+TEST(LibraryTable, NamesItsColumnsAndRefusesOthers) {
+  const Table table = Table::read(study_file("several/registrations.csv"));
+  EXPECT_THAT(table.columns(), testing::Contains("stop_reason"));
+  EXPECT_THAT(message_of<InputError>([&] { (void)table.numbers("tre_cm"); }), HasSubstr("tre_mm"));
+  EXPECT_THAT(message_of<FileError>([&] { (void)table.numbers("stop_reason"); }),
+              HasSubstr("registrations.csv:2"));
+}
+
+TEST(LibraryEvaluation, MeasuresPosesAndImages) {
+  Pose moved;
+  moved.room_from_ct[3] = 3.0;
+  moved.room_from_ct[7] = 4.0;
+  const CtBox box{{-1.0, -1.0, -1.0}, {1.0, 1.0, 1.0}};
+  EXPECT_NEAR(mean_tre_mm(moved, Pose{}, box), 5.0, 1e-12);
+  EXPECT_THROW((void)mean_tre_mm(moved, Pose{}, CtBox{}), InputError);
+  // Differences of 0.1 against a maximum of 1: 20 dB.
+  const std::vector<float> reference = {1.0F, 0.5F, 0.0F};
+  const std::vector<float> drr = {0.9F, 0.6F, 7.0F};
+  EXPECT_NEAR(psnr_db(drr, reference).value_or(0.0), 20.0, 1e-4);
+  EXPECT_EQ(psnr_db(std::vector<float>{1.0F}, std::vector<float>{0.0F}), std::nullopt);
+  EXPECT_THROW((void)psnr_db(drr, std::vector<float>{1.0F}), InputError);
+}
+
+}  // namespace
+}  // namespace attenuation_fields

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+// make_library_study FOLDER PROGRAMS: a small study with its fields, and what the programs make of
+// them: the DRRs and registrations that the library and the Python module must give to the bit.
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <stdexcept>
+#include <string>
+
+#include "drr/field_renderer.h"
+#include "field_file/field_file.h"
+#include "library/library_study.h"
+#include "programs/small_study.h"
+#include "support/run_program.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+
+void run(const std::string& command) {
+  const af::test::ProgramRun result = af::test::run_command(command);
+  if (result.exit_code != 0) throw std::runtime_error(command + "\n" + result.output);
+}
+
+/// The DRR and its six planes, as the optimisers get them.
+void write_motion_gradient(const fs::path& field_path, const fs::path& output) {
+  const auto field = af::read_field(field_path, af::Communicator::alone());
+  const auto renderer = af::make_field_renderer(field, "linear");
+  const af::View view = af::View::whole_detector(field->identity.camera);
+  std::vector<float> values(7 * view.pixel_count());
+  const std::span<float> all(values);
+  const Eigen::Vector3d pivot(af::test::kPivotRoomMm.data());
+  const auto workspace = renderer->make_workspace();
+  renderer->render(
+      af::pose_from_parameters(field->identity.frame,
+                               af::PoseParameters::from_deg_and_mm(af::test::kLibraryPose)),
+      view,
+      *workspace,
+      all.first(view.pixel_count()),
+      af::PoseGradients{pivot, all.subspan(view.pixel_count())});
+  std::ofstream(output, std::ios::binary)
+      .write(reinterpret_cast<const char*>(values.data()),
+             static_cast<std::streamsize>(values.size() * sizeof(float)));
+}
+
+void make(const fs::path& folder, const std::string& programs) {
+  fs::remove_all(folder);
+  fs::create_directories(folder);
+  af::test::write_small_study(folder);
+  const std::string study = " --study " + (folder / "study.toml").string();
+  std::string fields;
+  for (const std::string camera : {"AP", "LAT"}) {
+    const std::string field = (folder / (camera + ".af.h5")).string();
+    run(programs + "/af-precompute" + study + " --camera " + camera +
+        " --max-rotation-deg 8 --max-translation-mm 12 --uv-nodes 24 --st-nodes 96"
+        " --codewords 1024 -o " +
+        field);
+    fields += " --field " + camera + "=" + field;
+  }
+  const std::string pose = " --rotation-deg 2,-1.5,3 --translation-mm 4,-5,6 -o ";
+  const std::string field = " --field " + (folder / "AP.af.h5").string();
+  run(programs + "/af-drr" + field + pose + (folder / "field.mha").string());
+  run(programs + "/af-drr" + field + " --look-up cubic" + pose + (folder / "cubic.mha").string());
+  run(programs + "/af-drr --ct " + (folder / "ct.nii.gz").string() + " --rig " +
+      (folder / "rig.toml").string() + " --camera LAT" + pose + (folder / "cast.mha").string());
+  write_motion_gradient(folder / "AP.af.h5", folder / "motion-gradient.f32");
+  const std::string start =
+      " --start-rotation-deg -1,0.5,2.5 --start-translation-mm 0.5,1,4 --preset ";
+  for (const std::string preset : {"paper", "fast", "robust"})
+    run(programs + "/af-register" + study + fields + start + preset + " -o " +
+        (folder / preset).string());
+  std::ofstream(folder / "starts.csv") << "rx_deg,ry_deg,rz_deg,tx_mm,ty_mm,tz_mm\n"
+                                          "-1,0.5,2.5,0.5,1,4\n"
+                                          "1,1,-1,-2,3,-1\n";
+  run(programs + "/af-register" + study + fields + " --preset fast --starts " +
+      (folder / "starts.csv").string() + " -o " + (folder / "several").string());
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 3) {
+    std::cerr << "usage: make_library_study FOLDER PROGRAMS\n";
+    return 2;
+  }
+  try {
+    make(argv[1], argv[2]);
+    return 0;
+  } catch (const std::exception& error) {
+    std::cerr << "make_library_study: " << error.what() << '\n';
+    return 1;
+  }
+}

@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The examples run and say what they should. Usage: test_examples.py FOLDER NAME
+
+Exit code 77: the example needs PyTorch, which is not installed.
+"""
+
+import importlib.util
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+STUDY = Path(os.environ["AF_LIBRARY_STUDY"])
+
+
+def output_of(example, *arguments):
+    run = subprocess.run(
+        [sys.executable, "-B", "-W", "error", str(example), *map(str, arguments)],
+        capture_output=True,
+        text=True,
+    )
+    if run.returncode != 0:
+        sys.exit(f"{example}: exit code {run.returncode}\n{run.stdout}{run.stderr}")
+    return run.stdout
+
+
+def number_in(output, pattern):
+    found = re.search(pattern, output)
+    if found is None:
+        sys.exit(f"no '{pattern}' in\n{output}")
+    return float(found.group(1))
+
+
+def expect(is_right, output):
+    if not is_right:
+        sys.exit(f"the example says something else:\n{output}")
+
+
+def look_up_and_compare(example):
+    output = output_of(example, STUDY / "AP.af.h5", STUDY / "ct.nii.gz")
+    # A small field of a small CT.
+    expect(number_in(output, r"PSNR ([\d.]+) dB") > 30.0, output)
+
+
+def register_with_torch(example):
+    if importlib.util.find_spec("torch") is None:
+        print("skipped: python3-torch is not installed (jobs/install-packages.sh --with-torch)")
+        sys.exit(77)
+    fields = [f"{camera}={STUDY / camera}.af.h5" for camera in ("AP", "LAT")]
+    output = output_of(example, STUDY / "study.toml", *fields)
+    expect(number_in(output, r"TRE ([\d.]+) mm at the start") > 3.0, output)
+    # Of register_program_test: what a small field shows of 2 mm pixels.
+    expect(number_in(output, r"([\d.]+) mm at the end") < 1.0, output)
+    expect(number_in(output, r"TRE ([\d.]+) mm in") < 1.0, output)
+
+
+def evaluate_results(example):
+    output = output_of(example, STUDY / "several" / "registrations.csv")
+    expect("2 registrations of 1 cases" in output and "field: 2 of 2 succeed" in output, output)
+
+
+if __name__ == "__main__":
+    check = {
+        function.__name__: function
+        for function in (look_up_and_compare, register_with_torch, evaluate_results)
+    }[sys.argv[2]]
+    check(Path(sys.argv[1], sys.argv[2] + ".py"))
+    print(f"{sys.argv[2]}: runs and says what it should")

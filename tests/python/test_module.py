@@ -1,0 +1,444 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The Python module against what the programs make of a small study (make_library_study).
+
+AF_LIBRARY_STUDY names the study's folder. Bits are compared, not values.
+"""
+
+import ast
+import gc
+import inspect
+import os
+import re
+import tempfile
+import threading
+import unittest
+import warnings
+from pathlib import Path
+
+import numpy as np
+
+import attenuation_fields as af
+
+STUDY = Path(os.environ["AF_LIBRARY_STUDY"])
+ROTATION_DEG = (2.0, -1.5, 3.0)
+TRANSLATION_MM = (4.0, -5.0, 6.0)
+PARAMETERS = np.array([*ROTATION_DEG, *TRANSLATION_MM])
+PIVOT_ROOM_MM = (3.0, -2.0, 1.0)
+
+
+def last_floats(name, shape):
+    """The pixels of an image file: its last bytes."""
+    values = np.frombuffer((STUDY / name).read_bytes()[-4 * int(np.prod(shape)) :], dtype="<f4")
+    return values.reshape(shape)
+
+
+def open_field(camera="AP", **options):
+    return af.Field.open(STUDY / f"{camera}.af.h5", **options)
+
+
+class FieldTest(unittest.TestCase):
+    def assert_same_bits(self, first, second):
+        self.assertEqual(first.dtype, second.dtype)
+        self.assertEqual(first.shape, second.shape)
+        self.assertEqual(first.tobytes(), second.tobytes())
+
+    def test_drr_is_that_of_the_program(self):
+        field = open_field()
+        expected = last_floats("field.mha", field.shape)
+        self.assertGreater(expected.max(), 0.5)
+        drr = field.drr(rotation_deg=ROTATION_DEG, translation_mm=TRANSLATION_MM)
+        self.assert_same_bits(drr, expected)
+        self.assert_same_bits(
+            field.drr(pose=field.frame.pose(ROTATION_DEG, TRANSLATION_MM)), expected
+        )
+        self.assert_same_bits(
+            open_field(look_up="cubic").drr(ROTATION_DEG, TRANSLATION_MM),
+            last_floats("cubic.mha", field.shape),
+        )
+
+    def test_gradient_is_that_of_the_optimisers(self):
+        field = open_field()
+        pose = field.frame.pose(ROTATION_DEG, TRANSLATION_MM)
+        drr, gradient = field.drr_and_motion_gradient(pose, PIVOT_ROOM_MM)
+        expected = last_floats("motion-gradient.f32", (7, *field.shape))
+        self.assert_same_bits(drr, expected[0].copy())
+        self.assert_same_bits(gradient, expected[1:].copy())
+
+    def test_gradient_by_parameters_is_the_motions_gradient_turned(self):
+        field = open_field()
+        drr, gradient = field.drr_and_gradient(ROTATION_DEG, TRANSLATION_MM)
+        self.assert_same_bits(drr, field.drr(ROTATION_DEG, TRANSLATION_MM))
+        pivot = field.frame.center_room_mm + TRANSLATION_MM
+        pose = field.frame.pose(ROTATION_DEG, TRANSLATION_MM)
+        _, motion = field.drr_and_motion_gradient(pose, pivot)
+        self.assert_same_bits(gradient[3:], motion[3:])
+        rx, ry, rz = np.radians(ROTATION_DEG)
+        about_z = np.array([[np.cos(rz), -np.sin(rz), 0], [np.sin(rz), np.cos(rz), 0], [0, 0, 1]])
+        about_y = np.array([[np.cos(ry), 0, np.sin(ry)], [0, 1, 0], [-np.sin(ry), 0, np.cos(ry)]])
+        axes = np.stack([about_z @ about_y @ [1, 0, 0], about_z @ [0, 1, 0], [0, 0, 1]])
+        expected = np.radians(np.einsum("ka,ahw->khw", axes, motion[:3].astype(np.float64)))
+        np.testing.assert_allclose(gradient[:3], expected, atol=1e-6)
+
+    def test_batches_have_the_bits_of_single_calls_on_any_threads(self):
+        parameters = PARAMETERS * np.linspace(-1.0, 1.0, 7)[:, None]
+        single = open_field()
+        expected = np.stack([single.drr(p[:3], p[3:]) for p in parameters])
+        for threads in (1, 3):
+            field = open_field(threads=threads)
+            self.assertEqual(field.threads, threads)
+            self.assert_same_bits(field.drrs(parameters), expected)
+            poses = np.stack([field.frame.pose(p[:3], p[3:]) for p in parameters])
+            self.assert_same_bits(field.drrs(poses=poses), expected)
+            drrs, gradients = field.drrs_and_gradients(parameters)
+            self.assert_same_bits(drrs, expected)
+            self.assert_same_bits(
+                gradients[2], single.drr_and_gradient(parameters[2, :3], parameters[2, 3:])[1]
+            )
+
+    def test_outputs_are_written_into_where_they_are_given(self):
+        field = open_field()
+        out = np.full(field.shape, np.nan, dtype=np.float32)
+        self.assertIs(field.drr(ROTATION_DEG, TRANSLATION_MM, out=out), out)
+        self.assert_same_bits(out, field.drr(ROTATION_DEG, TRANSLATION_MM))
+        stack = np.empty((3, *field.shape), dtype=np.float32)
+        self.assertEqual(field.drr(out=stack[1]).ctypes.data, stack[1].ctypes.data)
+        gradient = np.empty((6, *field.shape), dtype=np.float32)
+        self.assertIs(field.drr_and_gradient(out=out, gradient_out=gradient)[1], gradient)
+        read_only = np.empty(field.shape, dtype=np.float32)
+        read_only.flags.writeable = False
+        for wrong in (
+            np.empty(field.shape),
+            np.empty(field.shape[::-1] + (1,), dtype=np.float32),
+            np.empty((field.shape[0], 2 * field.shape[1]), dtype=np.float32)[:, ::2],
+            read_only,
+            [[0.0]],
+        ):
+            with self.assertRaises(af.InputError):
+                field.drr(out=wrong)
+
+    def test_outputs_outlive_their_field(self):
+        drr = open_field().drr(ROTATION_DEG, TRANSLATION_MM)
+        copy = drr.copy()
+        gc.collect()
+        self.assertTrue(drr.flags.owndata)
+        self.assert_same_bits(drr, copy)
+
+    def test_threads_of_python_run_beside_each_other(self):
+        field = open_field()
+        expected = field.drr(ROTATION_DEG, TRANSLATION_MM)
+        found = [None] * 4
+
+        def work(index):
+            for _ in range(20):
+                found[index] = field.drr(ROTATION_DEG, TRANSLATION_MM)
+
+        callers = [threading.Thread(target=work, args=(i,)) for i in range(len(found))]
+        for caller in callers:
+            caller.start()
+        for caller in callers:
+            caller.join()
+        for drr in found:
+            self.assert_same_bits(drr, expected)
+
+    def test_poses_outside_are_refused_or_zero(self):
+        with self.assertRaisesRegex(af.InputError, "pose 0 = outside the field: ") as caught:
+            open_field().drr(translation_mm=(300.0, 0.0, 0.0))
+        self.assertEqual(caught.exception.exit_code, 3)
+        self.assertIsInstance(caught.exception, ValueError)
+        drr = open_field(outside="zero").drr(translation_mm=(300.0, 0.0, 0.0))
+        self.assertEqual(drr.shape, open_field().shape)
+        with self.assertRaisesRegex(af.InputError, "raise or zero"):
+            open_field(outside="guess")
+
+    def test_a_field_tells_what_it_is(self):
+        field = open_field()
+        self.assertEqual((field.look_up, field.max_translation_mm), ("linear", 12.0))
+        self.assertEqual(field.camera.name, "AP")
+        self.assertEqual(field.ct_content_sha256, af.Ct.read(STUDY / "ct.nii.gz").content_sha256)
+
+    def test_pose_parameters_come_back(self):
+        frame = open_field().frame
+        np.testing.assert_allclose(
+            frame.parameters(frame.pose(ROTATION_DEG, TRANSLATION_MM)), PARAMETERS, atol=1e-12
+        )
+        about = af.PoseFrame.about(frame.pose(ROTATION_DEG, TRANSLATION_MM), (1.0, 2.0, 3.0))
+        np.testing.assert_allclose(about.center_ct_mm, (1.0, 2.0, 3.0))
+
+
+class ErrorsTest(unittest.TestCase):
+    def test_files_that_are_none_are_file_errors_with_the_programs_text(self):
+        with self.assertRaisesRegex(af.FileError, "rig.toml: is not an HDF5 file") as caught:
+            af.Field.open(STUDY / "rig.toml")
+        self.assertEqual(caught.exception.exit_code, 4)
+        self.assertIsInstance(caught.exception, OSError)
+        with self.assertRaisesRegex(af.FileError, "none.nii"):
+            af.Ct.read("none.nii")
+
+    def test_shapes_and_values_are_named(self):
+        field = open_field()
+        for call, text in (
+            (lambda: field.drr(pose=np.eye(3)), r"pose: shape = \(3, 3\): must be \(4, 4\)"),
+            (lambda: field.drr(pose=2.0 * np.eye(4)), "pose: "),
+            (lambda: field.drr((1, 0, 0), pose=np.eye(4)), "several ways"),
+            (lambda: field.drrs(np.zeros((2, 5))), r"must be \(n, 6\)"),
+            (lambda: field.drrs(), "use one of parameters and poses"),
+            (lambda: field.drr(rotation_deg=(float("nan"), 0, 0)), "rotation_deg"),
+            (lambda: open_field(threads=-1), "threads = -1"),
+            (lambda: open_field(look_up="psychic"), "linear"),
+        ):
+            with self.assertRaisesRegex(af.InputError, text):
+                call()
+        with self.assertRaises(TypeError):
+            field.drr(rotation_deg=(1, 2))
+
+
+class CtTest(unittest.TestCase):
+    def test_ray_casting_is_that_of_the_program(self):
+        ct = af.Ct.read(STUDY / "ct.nii.gz")
+        rig = af.Rig.read(STUDY / "rig.toml")
+        camera = rig.camera("LAT")
+        drr = af.ray_cast(
+            ct, camera, ROTATION_DEG, TRANSLATION_MM, isocenter_point=rig.isocenter_point
+        )
+        self.assertEqual(drr.tobytes(), last_floats("cast.mha", drr.shape).tobytes())
+
+    def test_voxels_are_shared_both_ways(self):
+        ct = af.Ct.read(STUDY / "ct.nii.gz")
+        self.assertEqual(ct.hu.shape, tuple(ct.size)[::-1])
+        self.assertEqual(ct.hu.ctypes.data, ct.hu.ctypes.data)
+        self.assertFalse(ct.hu.flags.writeable)
+        voxels = ct.hu.copy()
+        again = af.Ct(voxels, ct.spacing_mm, ct.origin_mm, ct.direction)
+        self.assertEqual(again.hu.ctypes.data, voxels.ctypes.data)
+        self.assertEqual(again.content_sha256, ct.content_sha256)
+        rig = af.Rig.read(STUDY / "rig.toml")
+        drr = af.ray_cast(
+            again, rig.camera("LAT"), ROTATION_DEG, TRANSLATION_MM,
+            isocenter_point=rig.isocenter_point,
+        )
+        self.assertEqual(drr.tobytes(), last_floats("cast.mha", drr.shape).tobytes())
+
+    def test_voxels_outlive_the_names_of_their_owners(self):
+        hu = af.Ct.read(STUDY / "ct.nii.gz").hu
+        copy = hu.copy()
+        gc.collect()
+        self.assertTrue((hu == copy).all())
+        ct = af.Ct(copy, (3.0, 3.0, 3.0))
+        expected = int(copy.sum(dtype=np.int64))
+        del copy
+        gc.collect()
+        self.assertEqual(int(ct.hu.sum(dtype=np.int64)), expected)
+
+    def test_arrays_that_are_no_ct_are_refused(self):
+        voxels = np.zeros((4, 5, 6), dtype=np.int16)
+        with self.assertRaisesRegex(af.InputError, "spacing"):
+            af.Ct(voxels, (1.0, -1.0, 1.0))
+        with self.assertRaisesRegex(af.InputError, "hu: shape"):
+            af.Ct(voxels[0], (1.0, 1.0, 1.0))
+        with self.assertRaisesRegex(af.InputError, "orthonormal"):
+            af.Ct(voxels, (1.0, 1.0, 1.0), direction=2.0 * np.eye(3))
+        with self.assertRaises(TypeError):
+            af.Ct(voxels.astype(np.float32), (1.0, 1.0, 1.0))
+
+    def test_cameras_go_through_their_matrix(self):
+        camera = af.Rig.read("c-arm-12in").camera("LAT")
+        points = np.array([[0, 0, 0], [30, 0, 0], [0, 40, 0], [0, 0, 50], [11, -7, 5], [-9, 3, 21.0]])
+        rows = []
+        for point in points:
+            column, row = camera.project(point)
+            x = np.append(point, 1.0)
+            rows.append(np.concatenate([x, np.zeros(4), -column * x]))
+            rows.append(np.concatenate([np.zeros(4), x, -row * x]))
+        matrix = np.linalg.svd(np.array(rows))[2][-1].reshape(3, 4)
+        # The linear estimate has skew of rounding; its scale is free.
+        again = af.Camera.from_projection_matrix(
+            "again", matrix / np.linalg.norm(matrix), camera.pixel_spacing_mm, camera.size_px
+        )
+        np.testing.assert_allclose(again.source_point, camera.source_point, atol=1e-4)
+        rig = af.Rig([camera, again])
+        with tempfile.NamedTemporaryFile("w", suffix=".toml") as file:
+            file.write(rig.to_toml())
+            file.flush()
+            read = af.Rig.read(file.name)
+        self.assertEqual(read.camera("again").source_point.tobytes(), again.source_point.tobytes())
+
+
+class RegistrationTest(unittest.TestCase):
+    fields = {"AP": STUDY / "AP.af.h5", "LAT": STUDY / "LAT.af.h5"}
+    start = {"rotation_deg": (-1.0, 0.5, 2.5), "translation_mm": (0.5, 1.0, 4.0)}
+
+    def test_every_preset_ends_where_the_program_ends(self):
+        self.assertEqual(sorted(af.preset_names()), ["fast", "paper", "robust"])
+        for preset in af.preset_names():
+            with self.subTest(preset):
+                found = af.register(
+                    STUDY / "study.toml", preset=preset, fields=self.fields, **self.start
+                )
+                expected = af.read_result(STUDY / preset)
+                self.assertEqual(found.pose.tobytes(), expected.room_from_ct.tobytes())
+                self.assertEqual(found.verdict, expected.verdict)
+                self.assertEqual(found.reason, expected.reason)
+                self.assertEqual(found.tre_mm, expected.tre_mm)
+                self.assertEqual(found.similarity, expected.similarity)
+
+    def test_several_starts_and_their_errors(self):
+        table = af.Table.read(STUDY / "starts.csv")
+        self.assertEqual(len(table), 2)
+        case = af.RegistrationCase.load(
+            STUDY / "study.toml", preset="fast", fields=self.fields, threads=2
+        )
+        names = ("rx_deg", "ry_deg", "rz_deg", "tx_mm", "ty_mm", "tz_mm")
+        starts = np.stack([table.numbers(name) for name in names], axis=1)
+        found = case.run_all([case.frame.pose(start[:3], start[3:]) for start in starts])
+        written = af.read_registrations(STUDY / "several" / "registrations.csv")
+        for i, registration in enumerate(found):
+            self.assertEqual(registration.start_index, i)
+            for k, name in enumerate(names):
+                self.assertAlmostEqual(registration.parameters[k], written["final_" + name][i], 6)
+            self.assertAlmostEqual(registration.tre_mm, written["tre_mm"][i], 6)
+            self.assertEqual(registration.stop_reason, written["stop_reason"][i])
+        view = case.views[1]
+        self.assertEqual(view.camera.name, "LAT")
+        self.assertEqual(view.xray.tobytes(), last_floats("LAT.mha", view.xray.shape).tobytes())
+        self.assertFalse(view.xray.flags.writeable)
+        self.assertEqual(len(view.roi_px), 4)
+        self.assertIsNone(view.mask)
+        self.assertAlmostEqual(case.tre_mm(case.gold), 0.0)
+        self.assertGreater(case.similarity(case.gold), case.similarity(case.frame.pose()))
+
+    def test_wrong_options_are_refused_as_by_the_program(self):
+        with self.assertRaisesRegex(af.InputError, "robust"):
+            af.RegistrationCase.load(STUDY / "study.toml", preset="hasty")
+        with self.assertRaisesRegex(af.InputError, "field = none"):
+            af.RegistrationCase.load(STUDY / "study.toml", preset="fast")
+        with self.assertRaisesRegex(af.InputError, "ellipsoids"):
+            af.RegistrationCase.load(STUDY / "study.toml", "knee")
+
+
+class ResultsTest(unittest.TestCase):
+    def test_columns_are_arrays(self):
+        columns = af.read_registrations(STUDY / "several" / "registrations.csv")
+        self.assertEqual(columns["tre_mm"].dtype, np.float64)
+        self.assertEqual(list(columns["case"]), ["ellipsoids"] * 2)
+        self.assertEqual(list(columns["start_index"]), [0.0, 1.0])
+
+    def test_rows_of_af_evaluate_are_read(self):
+        folder = Path(__file__).resolve().parents[1] / "fuzz" / "runs" / "registration"
+        columns = af.read_registrations(folder / "registrations.csv")
+        count = len(columns["case"])
+        self.assertGreater(count, 1)
+        for name, column in columns.items():
+            self.assertEqual(column.shape, (count,), name)
+        self.assertTrue(np.issubdtype(columns["stop_reason"].dtype, np.str_))
+
+    def test_image_quality_is_read(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder, "image-quality.csv")
+            path.write_text("pose_index,rx_deg,psnr_db\n0,1.5,43.25\n1,-2,nan\n")
+            columns = af.read_image_quality(path)
+            np.testing.assert_array_equal(columns["psnr_db"], [43.25, np.nan])
+            path.write_text("pose_index,psnr_db\n0,loud\n")
+            with self.assertRaisesRegex(af.FileError, r"image-quality\.csv:2"):
+                af.read_image_quality(path)
+
+    def test_results_that_are_none_are_refused(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder, "result.json")
+            for text, expected in (
+                ("{", "is not JSON"),
+                ("[1]", "is not a result.json"),
+                ("[" * 100000, "is not JSON"),
+                ('{"verdict": "found", "room_from_ct": [[1]]}', "room_from_ct: expected a 4x4"),
+                ('{"verdict": "found", "room_from_ct": "x"}', "room_from_ct: expected a 4x4"),
+                ('{"verdict": "found", "tre_mm": "far"}', "tre_mm: expected a number"),
+            ):
+                path.write_text(text)
+                with self.assertRaisesRegex(af.FileError, expected):
+                    af.read_result(folder)
+            path.write_text('{"verdict": "not found", "tre_mm": null}')
+            result = af.read_result(path)
+            self.assertIsNone(result.room_from_ct)
+            self.assertTrue(np.isnan(result.tre_mm))
+        with self.assertRaisesRegex(af.FileError, "nowhere.json"):
+            af.read_result("nowhere.json")
+
+    def test_measures(self):
+        moved = np.eye(4)
+        moved[:3, 3] = (3.0, 4.0, 0.0)
+        box = ((-1.0, -1.0, -1.0), (1.0, 1.0, 1.0))
+        self.assertAlmostEqual(af.mean_tre_mm(moved, np.eye(4), box), 5.0)
+        drr = np.array([0.9, 0.6, 7.0], dtype=np.float32)
+        reference = np.array([1.0, 0.5, 0.0], dtype=np.float32)
+        self.assertAlmostEqual(af.psnr_db(drr, reference), 20.0, 4)
+        rate = af.success_rate([0.5, 2.4, 2.6, np.nan])
+        self.assertEqual((rate.trials, rate.successes, rate.rate), (4, 2, 0.5))
+        self.assertTrue(0.1 < rate.low < 0.5 < rate.high < 0.9)
+
+
+class StubTest(unittest.TestCase):
+    """_core.pyi names what is there, with its parameters, and nothing else."""
+
+    def setUp(self):
+        self.core = af._core
+        folder = Path(inspect.getfile(af)).parent
+        self.assertTrue((folder / "py.typed").exists())
+        self.tree = ast.parse((folder / "_core.pyi").read_text())
+
+    def parameters_at_run_time(self, function):
+        """Names in the signature that pybind11 writes into the documentation."""
+        signature = function.__doc__.splitlines()[0]
+        inside = signature[signature.index("(") + 1 : signature.rindex(") ->")]
+        depth = 0
+        names = [""]
+        for character in inside:
+            depth += character in "[(<{"
+            depth -= character in "])>}"
+            if character == "," and depth == 0:
+                names.append("")
+            else:
+                names[-1] += character
+        return [re.split("[:=]", name)[0].strip() for name in names if name.strip()]
+
+    def check_function(self, stub, function):
+        arguments = stub.args
+        expected = [a.arg for a in arguments.posonlyargs + arguments.args]
+        if arguments.kwonlyargs:
+            expected += ["*"] + [a.arg for a in arguments.kwonlyargs]
+        found = ["self" if name == "arg0" else name for name in self.parameters_at_run_time(function)]
+        self.assertEqual(found, expected, stub.name)
+
+    def test_names_and_parameters_agree(self):
+        stubs = {
+            node.name: node
+            for node in self.tree.body
+            if isinstance(node, (ast.ClassDef, ast.FunctionDef))
+        }
+        there = {name for name in vars(self.core) if not name.startswith("_")}
+        self.assertEqual(set(stubs), there)
+        for name, stub in stubs.items():
+            if isinstance(stub, ast.FunctionDef):
+                self.check_function(stub, getattr(self.core, name))
+                continue
+            members = {}
+            for node in stub.body:
+                if isinstance(node, ast.FunctionDef):
+                    members[node.name] = node
+                elif isinstance(node, ast.AnnAssign):
+                    members[node.target.id] = node
+            owner = getattr(self.core, name)
+            public = {key for key in vars(owner) if not key.startswith("_")}
+            self.assertEqual({key for key in members if not key.startswith("_")}, public, name)
+            for key, node in members.items():
+                member = vars(owner)[key]
+                if isinstance(member, property) or not isinstance(node, ast.FunctionDef):
+                    continue
+                self.check_function(node, getattr(owner, key))
+
+    def test_everything_public_is_documented_or_named(self):
+        for name in af.__all__:
+            self.assertTrue(hasattr(af, name), name)
+
+
+if __name__ == "__main__":
+    warnings.simplefilter("error")
+    unittest.main()
