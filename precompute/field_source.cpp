@@ -6,6 +6,7 @@
 #include "base/error.h"
 #include "base/joined.h"
 #include "pose_files/pose_file.h"
+#include "study/ct_keys.h"
 #include "study/node_ct.h"
 #include "study/pose_context.h"
 #include "study/rig_file.h"
@@ -18,6 +19,7 @@ namespace {
 /// The facts that are known before the CT is read; the default centre is the CT's.
 struct NamedSource {
   std::string ct_path;
+  CtReadOptions ct_reading;
   StudyPlaces places;  ///< where the study names its files
   CameraRig rig;
   std::string camera;
@@ -35,6 +37,7 @@ NamedSource source_of_study(const PrecomputeOptions& options, const Study& study
   const StudyCase& study_case = study.find_case(options.case_name);
   NamedSource source;
   source.ct_path = study_case.ct.string();
+  source.ct_reading = ct_reading_in_force(options.ct_reading, study_case.ct_reading);
   source.places = study_case.places;
   source.rig = study.rig;
   source.frame = study_case.frame();
@@ -51,6 +54,7 @@ NamedSource source_of_options(const PrecomputeOptions& options,
                               std::vector<std::string>& warnings) {
   NamedSource source;
   source.ct_path = options.ct;
+  source.ct_reading = options.ct_reading;
   source.rig = shared_rig(options.rig, communicator, &warnings);
   source.camera = options.camera;
   if (options.camera.empty()) {
@@ -64,7 +68,7 @@ NamedSource source_of_options(const PrecomputeOptions& options,
         shared_poses(communicator, [&] {
           return std::vector{
               read_pose(options.nominal_pose,
-                        pose_context(options.ct, {options.series_uid}, source.rig, std::nullopt))};
+                        pose_context(options.ct, options.ct_reading, source.rig, std::nullopt))};
         }).front();
   return source;
 }
@@ -104,14 +108,13 @@ FieldSource load_source(const PrecomputeOptions& options, const Communicator& co
   FieldSource source;
   const NamedSource named = named_source(options, communicator, source.warnings);
   source.camera = all_or_none(communicator, [&] { return named.rig.camera(named.camera); });
-  CtReadOptions ct_options;
-  ct_options.series_uid = options.series_uid;
   const NodeCt ct = used_from(named.places, "ct", [&] {
     return read_ct_per_node(
-        named.ct_path, ct_options, options.attenuation, communicator, source.warnings);
+        named.ct_path, named.ct_reading, options.attenuation, communicator, source.warnings);
   });
   source.volume = ct.volume;
   source.ct_path = named.ct_path;
+  source.ct_reading = named.ct_reading;
   source.ct_content_sha256 = ct.facts.content_sha256;
   source.frame = frame_of(named, options, ct.facts.grid);
   return source;

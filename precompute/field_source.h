@@ -11,6 +11,7 @@
 #include "parallel/communicator.h"
 #include "precompute/plan/precompute_options.h"
 #include "volume/attenuation_volume.h"
+#include "volume/ct_read_options.h"
 
 namespace af {
 
@@ -19,6 +20,7 @@ namespace af {
 struct FieldSource {
   std::shared_ptr<const AttenuationVolume> volume;
   std::string ct_path;
+  CtReadOptions ct_reading;  ///< in force: typed, or the study's
   std::string ct_content_sha256;
   CameraGeometry camera;
   PoseFrame frame;

@@ -537,9 +537,11 @@ class PrecomputeRun {
   [[nodiscard]] FieldProvenance provenance_of(const TrainedCodebook& trained,
                                               const CastPhase& cast,
                                               const BuildStatistics& statistics) const {
+    PrecomputeOptions recorded = options_;
+    recorded.ct_reading = source_.ct_reading;  // in force, where a study states it
     const Provenance provenance = {"af-precompute",
                                    command_line_,
-                                   to_toml(options_),
+                                   to_toml(recorded),
                                    options_.seed,
                                    world_.size(),
                                    {{source_.ct_path, source_.ct_content_sha256}}};

@@ -19,6 +19,7 @@
 #include "register/problem/fiducial_mask.h"
 #include "register/problem/parameter_scaling.h"
 #include "register/problem/stage_view.h"
+#include "study/ct_keys.h"
 #include "study/node_ct.h"
 #include "study/rig_file.h"
 #include "study/shared_inputs.h"
@@ -257,6 +258,12 @@ void require_same_attenuation(const FieldIdentity& field,
       path);
 }
 
+/// "as HU" or what differs from that.
+std::string how(const CtReadOptions& reading) {
+  const std::string text = reading.text();
+  return text.empty() ? "as HU" : "with " + text;
+}
+
 /// Collective. A field, checked against the view's camera and the CT.
 std::shared_ptr<const CompressedAttenuationField> field_of_view(const std::string& path,
                                                                 const StudyCase& study_case,
@@ -272,8 +279,10 @@ std::shared_ptr<const CompressedAttenuationField> field_of_view(const std::strin
     if (ct.has_value() && ct->content_sha256 != field->identity.ct_content_sha256)
       throw FileError(path,
                       "CT of the field (ct_content_sha256)",
-                      ct->content_sha256 + " (" + study_case.ct.string() + ")",
-                      field->identity.ct_content_sha256);
+                      ct->content_sha256 + " (" + study_case.ct.string() + ", read " +
+                          how(ct_reading_in_force(options.ct, study_case.ct_reading)) + ")",
+                      field->identity.ct_content_sha256 + " (read " +
+                          how(ct_reading_of(info.provenance.options_toml)) + ")");
   });
   return field;
 }
@@ -333,7 +342,11 @@ NodeCt read_node_ct(const StudyCase& study_case,
                     const Communicator& communicator,
                     std::vector<std::string>& warnings) {
   return used_from(study_case.places, "ct", [&] {
-    return read_ct_per_node(study_case.ct, options.ct, options.attenuation, communicator, warnings);
+    return read_ct_per_node(study_case.ct,
+                            ct_reading_in_force(options.ct, study_case.ct_reading),
+                            options.attenuation,
+                            communicator,
+                            warnings);
   });
 }
 
@@ -398,7 +411,10 @@ LoadedCase load_case(const Study& study,
     ray_cast = std::make_shared<const RayCastDrr>(volume, options.ray_caster, options.pool);
   } else if (!options.skip_ct_check) {
     ct = used_from(study_case.places, "ct", [&] {
-      return read_ct_facts(study_case.ct, options.ct, communicator, loaded.warnings);
+      return read_ct_facts(study_case.ct,
+                           ct_reading_in_force(options.ct, study_case.ct_reading),
+                           communicator,
+                           loaded.warnings);
     });
   }
   if (looks_up) {
@@ -414,6 +430,8 @@ LoadedCase load_case(const Study& study,
 
   if (ct.has_value()) {
     loaded.input_sha256["ct"] = ct->content_sha256;
+    loaded.input_notes["ct"] =
+        "read " + how(ct_reading_in_force(options.ct, study_case.ct_reading));
     problem->scaling_points_ct = ct_lattice_points(ct->grid);
   } else {
     const Eigen::Vector3d half = Eigen::Vector3d::Constant(kAssumedCtHalfSideMm);

@@ -22,6 +22,7 @@
 #include "image_files/itk_image_io.h"
 #include "image_files/stored_image.h"
 #include "text/csv_table.h"
+#include "volume/body_mask.h"
 
 namespace af {
 
@@ -30,6 +31,9 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr int kAirBelowHu = -900;
+/// Share of bone that --body-only may remove: more means that the body itself was taken for a
+/// table.
+constexpr double kMostDenseRemoved = 0.1;
 /// From orthonormal; single-precision quaternions and rows of NIfTI stay well below.
 constexpr double kMaxDirectionError = 1e-4;
 /// Between the affine of a NIfTI header and what ITK makes of it, at any corner of the volume.
@@ -201,6 +205,7 @@ std::array<std::size_t, 3> voxel_index(const CtGrid& grid, std::size_t number) {
 
 void check_values(const CtGrid& grid,
                   const HuValues& values,
+                  const CtReadOptions& options,
                   const std::string& file,
                   std::vector<std::string>& warnings) {
   if (values.non_finite_count() > 0)
@@ -225,12 +230,33 @@ void check_values(const CtGrid& grid,
   if (values.clamped_count() > 0)
     warnings.push_back(file + ": " + std::to_string(values.clamped_count()) +
                        " voxels beyond int16 were clamped");
+  if (options.values != "hu") return;
   const std::string range = std::to_string(*low) + " to " + std::to_string(*high);
   if (*low >= -200)
     warnings.push_back(file + ": values " + range +
-                       " do not look like HU: no voxel is near air (-1000)");
+                       " do not look like HU: no voxel is near air (-1000); --values says what "
+                       "else they are (ct_values in a study)");
   else if (*high < 100)
     warnings.push_back(file + ": values " + range + " do not look like a CT of a body: no bone");
+}
+
+void keep_body(const CtGrid& grid,
+               const std::string& file,
+               std::vector<std::int16_t>& hu,
+               std::vector<std::string>& warnings) {
+  const BodyRemoval removal = remove_all_but_body(grid, hu);
+  if (removal.dense_share_removed > kMostDenseRemoved)
+    throw InputError("body_only",
+                     "true",
+                     "would remove " +
+                         std::to_string(std::lround(100.0 * removal.dense_share_removed)) +
+                         " % of what is 300 HU or more: walls of a hollow body (a dry skull?) are "
+                         "too thin to be told from a table",
+                     file);
+  warnings.push_back(file + ": " + std::to_string(std::lround(removal.removed_ml)) +
+                     " ml outside the body were made air (--body-only); " +
+                     std::to_string(removal.parts_kept) +
+                     (removal.parts_kept == 1 ? " part" : " parts") + " kept");
 }
 
 /// Permutation and signs that bring a grid's axes to ascending L, P, S.
@@ -282,28 +308,26 @@ RawImage raw_image_of(const CtVolume& ct) {
 
 }  // namespace
 
-void CtReadOptions::describe(Fields& field) {
-  field("series", series_uid, "DICOM series UID, when the CT's folder has several").input();
-}
-
 CtVolume read_ct(const fs::path& path,
                  const CtReadOptions& options,
                  std::vector<std::string>* warnings) {
   std::vector<std::string> found;
   std::error_code error;
   CtVolume ct;
-  HuValues values;
+  HuValues values{HuConversion(options)};
   note_input(path);
   if (fs::is_directory(path, error)) {
-    DicomCt series = read_dicom_series(path, options.series_uid, &found);
+    DicomCt series = read_dicom_series(path, options, &found);
     ct.grid = series.grid;
     values = std::move(series.values);
     check_grid(ct.grid, path.string());
   } else {
     ct = read_ct_image(path, values, found);
   }
-  check_values(ct.grid, values, path.string(), found);
-  ct.hu = SharedArray<std::int16_t>(values.take());
+  check_values(ct.grid, values, options, path.string(), found);
+  std::vector<std::int16_t> hu = values.take();
+  if (options.keeps_body_only) keep_body(ct.grid, path.string(), hu, found);
+  ct.hu = SharedArray<std::int16_t>(std::move(hu));
   if (warnings != nullptr) warnings->insert(warnings->end(), found.begin(), found.end());
   return ct;
 }

@@ -4,21 +4,15 @@
 #include <filesystem>
 #include <string>
 
-#include "base/described_fields.h"
+#include "volume/ct_read_options.h"
 #include "volume/ct_volume.h"
 
 namespace af {
 
-struct CtReadOptions {
-  std::string series_uid;  ///< chooses one of several DICOM series in a folder; empty: there must
-                           ///< be only one
-
-  void describe(Fields& field);
-};
-
 /// Reads a CT (DICOM folder, NIfTI, MetaImage, NRRD) as HU in int16, in DICOM LPS; rescale applied,
-/// values rounded and clamped to int16. InputError (exit 3): several series (lists UID,
-/// description, slice count of each), missing or uneven slices (names the position), gantry tilt,
+/// values rounded and clamped to int16; what else `options` ask for. InputError (exit 3): several
+/// series (lists UID, description, slice count of each), missing or uneven slices (names the
+/// position) and gantry tilt unless they are to be resampled,
 /// modality other than CT, not 3-D, NaN or infinite values, HU beyond 1e6, all air (no voxel
 /// >= -900 HU), no spacing or one that is not 0.01 to 100 mm, an origin beyond 10 m, direction not
 /// orthonormal, fewer than 2 voxels

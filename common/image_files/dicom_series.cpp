@@ -13,6 +13,7 @@
 #include "base/error.h"
 #include "image_files/dicom_elements.h"
 #include "image_files/dicom_pixels.h"
+#include "volume/slice_stack.h"
 
 namespace af {
 
@@ -151,12 +152,6 @@ void check_is_plain_ct(const DicomElements& header, std::vector<std::string>* wa
     throw InputError("Modality", "'" + modality + "'", "must be CT", file);
   if (const std::string meaning = header.text({0x0028, 0x0004}); meaning != "MONOCHROME2")
     throw InputError("PhotometricInterpretation", "'" + meaning + "'", "must be MONOCHROME2", file);
-  if (const auto tilt = header.number_or_none({0x0018, 0x1120}, "GantryDetectorTilt");
-      std::abs(tilt.value_or(0.0)) > kMaxGantryTiltDeg)
-    throw InputError("GantryDetectorTilt",
-                     number(*tilt) + " deg",
-                     "tilted gantries are not supported; resample the CT to upright slices",
-                     file);
   if (const std::string units = header.text({0x0028, 0x1054}); !units.empty() && units != "HU")
     warn(warnings, file + ": RescaleType = '" + units + "', read as HU");
 }
@@ -241,33 +236,33 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-/// Distance between slices; InputError when it is not the same everywhere. `heights` ascend.
-double even_distance(const fs::path& folder,
-                     const std::vector<Slice>& slices,
-                     const std::vector<double>& heights) {
+/// Why slices are not evenly spaced; empty when they are. InputError for two at one position.
+/// `heights` ascend.
+std::string unevenness(const fs::path& folder,
+                       const std::vector<Slice>& slices,
+                       const std::vector<double>& heights) {
   std::vector<double> gaps;
   for (std::size_t i = 1; i < heights.size(); ++i) gaps.push_back(heights[i] - heights[i - 1]);
   const double usual = median(gaps);
+  std::string found;
   for (std::size_t i = 0; i < gaps.size(); ++i) {
     if (gaps[i] < kUnevenMm)
       throw InputError(folder.string() + ": two slices at one position, " +
                        place(i + 1, heights[i + 1]) +
                        " along the slice normal: " + slices[i].pixels.path().filename().string() +
                        " and " + slices[i + 1].pixels.path().filename().string());
-    if (std::abs(gaps[i] - usual) > std::max(kUnevenShare * usual, kUnevenMm))
-      throw InputError(
-          folder.string() + ": between " + place(i, heights[i]) + " and " +
-          place(i + 1, heights[i + 1]) + " the distance is " + number(gaps[i]) + " mm, elsewhere " +
-          number(usual) + " mm: " +
-          (gaps[i] > 1.5 * usual ? "a slice is missing" : "slices are not evenly spaced") +
-          " (positions along the slice normal)");
+    if (!found.empty() || std::abs(gaps[i] - usual) <= std::max(kUnevenShare * usual, kUnevenMm))
+      continue;
+    found = "between " + place(i, heights[i]) + " and " + place(i + 1, heights[i + 1]) +
+            " the distance is " + number(gaps[i]) + " mm, elsewhere " + number(usual) + " mm: " +
+            (gaps[i] > 1.5 * usual ? "a slice is missing" : "slices are not evenly spaced") +
+            " (positions along the slice normal)";
   }
-  return (heights.back() - heights.front()) / static_cast<double>(gaps.size());
+  return found;
 }
 
-void check_not_sheared(const fs::path& folder,
-                       const std::vector<Slice>& slices,
-                       const Eigen::Vector3d& normal) {
+/// Why slices do not stand straight above each other; empty when they do.
+std::string leaning(const std::vector<Slice>& slices, const Eigen::Vector3d& normal) {
   const Eigen::Vector3d way = slices.back().position_mm - slices.front().position_mm;
   const double limit =
       std::max(kMaxDriftMm, kMaxDriftPixels * slices.front().spacing_mm.minCoeff());
@@ -277,31 +272,90 @@ void check_not_sheared(const fs::path& folder,
     if (drift.norm() <= limit) continue;
     const double angle_deg =
         std::acos(std::clamp(std::abs(way.normalized().dot(normal)), 0.0, 1.0)) * 180.0 / M_PI;
-    throw InputError(folder.string() + ": gantry tilt or shifted slices: " +
-                     slice.pixels.path().filename().string() + " lies " + number(drift.norm()) +
-                     " mm beside the line along the slice normal (limit " + number(limit) +
-                     " mm; the stack leans by " + number(angle_deg) +
-                     " deg); resample the CT to upright slices");
+    return "gantry tilt or shifted slices: " + slice.pixels.path().filename().string() + " lies " +
+           number(drift.norm()) + " mm beside the line along the slice normal (limit " +
+           number(limit) + " mm; the stack leans by " + number(angle_deg) + " deg)";
   }
+  return {};
 }
 
-CtGrid sorted_grid(const fs::path& folder, std::vector<Slice>& slices) {
-  const Eigen::Matrix3d axes = orthonormal_axes(slices.front());
-  const Eigen::Vector3d normal = axes.col(2);
+/// A tag that says tilt, though the slices' positions do not lean: one of the two is wrong.
+std::string tilt_of_tags(const std::vector<Slice>& slices) {
+  for (const Slice& slice : slices) {
+    const auto tilt = slice.pixels.header.number_or_none({0x0018, 0x1120}, "GantryDetectorTilt");
+    if (std::abs(tilt.value_or(0.0)) > kMaxGantryTiltDeg)
+      return slice.pixels.path().string() + ": GantryDetectorTilt = " + number(*tilt) + " deg";
+  }
+  return {};
+}
+
+/// Slices in their order, and where they lie.
+struct PlacedSlices {
+  SliceStack stack;
+  std::string trouble;  ///< why they are no upright, even grid; empty when they are
+  double largest_gap_mm = 0.0;
+  double usual_gap_mm = 0.0;
+};
+
+PlacedSlices placed(const fs::path& folder, std::vector<Slice>& slices) {
+  PlacedSlices found;
+  SliceStack& stack = found.stack;
+  stack.axes = orthonormal_axes(slices.front());
+  const Eigen::Vector3d normal = stack.axes.col(2);
   std::stable_sort(slices.begin(), slices.end(), [&](const Slice& a, const Slice& b) {
     return normal.dot(a.position_mm) < normal.dot(b.position_mm);
   });
   std::vector<double> heights;
-  heights.reserve(slices.size());
-  for (const Slice& slice : slices) heights.push_back(normal.dot(slice.position_mm));
+  for (const Slice& slice : slices) {
+    heights.push_back(normal.dot(slice.position_mm));
+    stack.origins_mm.push_back(slice.position_mm);
+  }
+  std::vector<double> gaps;
+  for (std::size_t i = 1; i < heights.size(); ++i) gaps.push_back(heights[i] - heights[i - 1]);
+  found.usual_gap_mm = median(gaps);
+  found.largest_gap_mm = *std::max_element(gaps.begin(), gaps.end());
+  stack.spacing_mm = slices.front().spacing_mm;
+  stack.columns = slices.front().pixels.columns;
+  stack.rows = slices.front().pixels.rows;
+  found.trouble = unevenness(folder, slices, heights);
+  if (found.trouble.empty()) found.trouble = leaning(slices, normal);
+  return found;
+}
+
+/// The grid of slices as they are stored; even and upright ones only.
+CtGrid stored_grid(const SliceStack& stack) {
+  const Eigen::Vector3d normal = stack.axes.col(2);
+  const double length = normal.dot(stack.origins_mm.back() - stack.origins_mm.front());
   CtGrid grid;
-  grid.size = {
-      slices.front().pixels.columns, slices.front().pixels.rows, static_cast<int>(slices.size())};
-  grid.spacing_mm.head<2>() = slices.front().spacing_mm;
-  grid.spacing_mm.z() = even_distance(folder, slices, heights);
-  check_not_sheared(folder, slices, normal);
-  grid.origin_mm = slices.front().position_mm;
-  grid.direction = axes;
+  grid.size = {stack.columns, stack.rows, static_cast<int>(stack.origins_mm.size())};
+  grid.spacing_mm.head<2>() = stack.spacing_mm;
+  grid.spacing_mm.z() = length / static_cast<double>(stack.origins_mm.size() - 1);
+  grid.origin_mm = stack.origins_mm.front();
+  grid.direction = stack.axes;
+  return grid;
+}
+
+constexpr double kMostGrowth = 8.0;  ///< of the voxels, by resampling
+constexpr double kWidestGap = 3.5;   ///< of the usual one: three slices in a row are not made up
+
+/// The grid to resample a stack to; InputError when that is no small repair.
+CtGrid repaired_grid(const fs::path& folder, const PlacedSlices& slices) {
+  const SliceStack& stack = slices.stack;
+  if (stack.columns < 2 || stack.rows < 2)
+    throw InputError(folder.string() + ": slices of " + std::to_string(stack.columns) + " x " +
+                     std::to_string(stack.rows) + " pixels cannot be resampled");
+  if (!(slices.largest_gap_mm <= kWidestGap * slices.usual_gap_mm))
+    throw InputError(folder.string() + ": " + slices.trouble + "; a gap of " +
+                     number(slices.largest_gap_mm) + " mm is too wide to be resampled");
+  const CtGrid grid = upright_grid(stack);
+  const double stored = static_cast<double>(stack.columns) * static_cast<double>(stack.rows) *
+                        static_cast<double>(stack.origins_mm.size());
+  const double wanted = static_cast<double>(grid.size[0]) * static_cast<double>(grid.size[1]) *
+                        static_cast<double>(grid.size[2]);
+  if (!(wanted <= kMostGrowth * stored))
+    throw InputError(folder.string() + ": " + slices.trouble + "; its upright grid of " +
+                     std::to_string(grid.size[0]) + " x " + std::to_string(grid.size[1]) + " x " +
+                     std::to_string(grid.size[2]) + " voxels is too large");
   return grid;
 }
 
@@ -313,10 +367,10 @@ bool holds_dicom(const fs::path& folder) {
 }
 
 DicomCt read_dicom_series(const fs::path& folder,
-                          const std::string& series_uid,
+                          const CtReadOptions& options,
                           std::vector<std::string>* warnings) {
   const std::vector<DicomElements> headers =
-      chosen_series(folder, image_headers(folder, warnings), series_uid);
+      chosen_series(folder, image_headers(folder, warnings), options.series_uid);
   std::vector<Slice> slices;
   bool rescale_missing = false;
   for (const DicomElements& header : headers) {
@@ -325,19 +379,41 @@ DicomCt read_dicom_series(const fs::path& folder,
     slices.push_back(slice_of(header));
     check_alike(slices.front(), slices.back());
   }
-  if (rescale_missing)
+  if (rescale_missing && options.values == "hu")
     warn(warnings, folder.string() + ": no RescaleSlope: stored values are taken as HU");
   if (slices.size() < 2)
     throw InputError(folder.string() + ": the series has one slice; a CT needs at least 2");
+  const PlacedSlices places = placed(folder, slices);
+  const std::string tag = tilt_of_tags(slices);
+  if (!options.resamples && !(places.trouble.empty() && tag.empty()))
+    throw InputError((places.trouble.empty() ? tag : folder.string() + ": " + places.trouble) +
+                     "; resample it to an upright, even grid with --resample (ct_resample = true "
+                     "in a study)");
+  if (places.trouble.empty() && !tag.empty())
+    warn(warnings, tag + ", but the slices' positions do not lean; these are believed");
+  const bool is_repaired = !places.trouble.empty();
   DicomCt ct;
-  ct.grid = sorted_grid(folder, slices);
+  ct.values = HuValues{HuConversion(options)};
+  ct.grid = is_repaired ? repaired_grid(folder, places) : stored_grid(places.stack);
   if (ct.grid.voxel_count() > kMaxVoxels)
     throw InputError(folder.string() + ": more than " + std::to_string(kMaxVoxels) + " voxels");
+  const std::size_t stored_voxels = stored_grid(places.stack).voxel_count();
   for (const Slice& slice : slices) {
-    for (const double hu : read_dicom_pixels(slice.pixels)) ct.values.add(hu);
+    for (const double value : read_dicom_pixels(slice.pixels)) ct.values.add(value);
     // Only now is it known that the pixels are there which the headers promise.
-    if (&slice == &slices.front()) ct.values.reserve(ct.grid.voxel_count());
+    if (&slice == &slices.front()) ct.values.reserve(stored_voxels);
   }
+  if (!is_repaired) return ct;
+  if (ct.values.non_finite_count() + ct.values.implausible_count() > 0) {
+    ct.grid = stored_grid(places.stack);  // the caller names the voxel of the file
+    return ct;
+  }
+  ct.values.replace(resampled(places.stack, ct.values.hu(), ct.grid));
+  warn(warnings,
+       folder.string() + ": " + places.trouble + "; resampled to " +
+           std::to_string(ct.grid.size[0]) + " x " + std::to_string(ct.grid.size[1]) + " x " +
+           std::to_string(ct.grid.size[2]) + " voxels, slices " + number(ct.grid.spacing_mm.z()) +
+           " mm apart");
   return ct;
 }
 

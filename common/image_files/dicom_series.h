@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "image_files/hu_values.h"
+#include "volume/ct_read_options.h"
 #include "volume/ct_volume.h"
 
 namespace af {
@@ -20,10 +21,11 @@ struct DicomCt {
 bool holds_dicom(const std::filesystem::path& folder);
 
 /// Reads the CT series of a DICOM folder (GDCM). Slices are ordered by position along the slice
-/// normal, never by name or number. Errors as read_ct() says; files that are no images of a series
+/// normal, never by name or number; what leans or is uneven is resampled if `options` say so, with
+/// a warning that tells by how much. Errors as read_ct() says; files that are no images of a series
 /// are skipped with a warning.
 DicomCt read_dicom_series(const std::filesystem::path& folder,
-                          const std::string& series_uid,
+                          const CtReadOptions& options,
                           std::vector<std::string>* warnings);
 
 /// What a single DICOM image says of itself, for messages.

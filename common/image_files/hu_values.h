@@ -11,15 +11,22 @@
 #include <vector>
 
 #include "base/plausible.h"
+#include "volume/ct_read_options.h"
 
 namespace af {
 
 /// Collects voxels as int16 HU and counts what does not fit.
 class HuValues {
  public:
+  HuValues() = default;
+  /// Numbers are turned into HU first.
+  explicit HuValues(HuConversion conversion) : conversion_(std::move(conversion)) {}
+
   void reserve(std::size_t voxels) { hu_.reserve(voxels); }
 
-  void add(double hu) {
+  void add(double number) { add_hu(conversion_.hu(number)); }
+
+  void add_hu(double hu) {
     constexpr double kLow = std::numeric_limits<std::int16_t>::min();
     constexpr double kHigh = std::numeric_limits<std::int16_t>::max();
     const double rounded = std::nearbyint(hu);
@@ -44,9 +51,11 @@ class HuValues {
   template <typename Value>
   void add_all(std::span<const Value> values) {
     if constexpr (std::is_same_v<Value, std::int16_t>)
-      hu_.insert(hu_.end(), values.begin(), values.end());
-    else
-      for (const Value value : values) add(static_cast<double>(value));
+      if (conversion_.is_identity()) {
+        hu_.insert(hu_.end(), values.begin(), values.end());
+        return;
+      }
+    for (const Value value : values) add(static_cast<double>(value));
   }
 
   [[nodiscard]] std::size_t clamped_count() const { return clamped_count_; }
@@ -59,8 +68,11 @@ class HuValues {
   [[nodiscard]] double first_implausible_hu() const { return first_implausible_hu_; }
   [[nodiscard]] const std::vector<std::int16_t>& hu() const { return hu_; }
   [[nodiscard]] std::vector<std::int16_t> take() { return std::move(hu_); }
+  /// Puts the voxels of another grid in place of these; counts stay.
+  void replace(std::vector<std::int16_t> hu) { hu_ = std::move(hu); }
 
  private:
+  HuConversion conversion_;
   std::vector<std::int16_t> hu_;
   std::size_t clamped_count_ = 0;
   std::size_t non_finite_count_ = 0;

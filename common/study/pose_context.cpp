@@ -59,7 +59,7 @@ PoseContext pose_context(const Study& study, const StudyCase& study_case) {
   CameraRig rig{study.rig.isocenter_point, {}};
   for (const StudyView& view : study_case.views)
     rig.cameras.push_back(study.rig.camera(view.camera));
-  return pose_context(study_case.ct, {}, rig, study_case.frame());
+  return pose_context(study_case.ct, study_case.ct_reading, rig, study_case.frame());
 }
 
 }  // namespace af

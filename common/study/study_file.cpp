@@ -13,6 +13,7 @@
 #include "base/toml_text.h"
 #include "files/output_file.h"
 #include "gold_standard/fiducial_registration.h"
+#include "study/ct_keys.h"
 #include "study/rig_file.h"
 #include "text/toml_reader.h"
 
@@ -261,6 +262,7 @@ StudyCase read_case(const toml::table& table,
   study_case.note = reader.get_string("note", Presence::Optional).value_or("");
   study_case.ct =
       get_path(reader, "ct", Presence::Required, context.folder, study_case.places).value_or("");
+  study_case.ct_reading = read_ct_keys(reader);
   study_case.nominal_room_from_ct = reader.get_pose("nominal_room_from_ct", Presence::Required)
                                         .value_or(RigidTransform::Identity());
   study_case.center_ct_mm =
@@ -348,6 +350,7 @@ std::string case_text(const StudyCase& study_case, const fs::path& folder) {
   std::string text = "\n[[case]]\nname = " + toml_text(study_case.name) + "\n";
   if (!study_case.note.empty()) text += "note = " + toml_text(study_case.note) + "\n";
   text += "ct = " + toml_text(relative_if_below(study_case.ct, folder)) + "\n";
+  text += ct_keys_text(study_case.ct_reading);
   text += "nominal_room_from_ct = " + toml_matrix(study_case.nominal_room_from_ct.matrix()) + "\n";
   text += "center_ct_mm = " + toml_numbers(study_case.center_ct_mm) + "\n";
   text += "target_box_ct_mm = [" + toml_numbers(study_case.target_box_ct.low_mm) + ", " +

@@ -15,6 +15,7 @@
 #include "geometry/slab_sizing.h"
 #include "image/image2d.h"
 #include "study/xray_reading.h"
+#include "volume/ct_read_options.h"
 
 namespace af {
 
@@ -41,6 +42,7 @@ struct StudyCase {
   std::string name;
   std::string note;          ///< free text for people, for example how X-rays were simulated
   std::filesystem::path ct;  ///< image file or DICOM folder
+  CtReadOptions ct_reading;  ///< keys ct_values, ct_resample, ...
   RigidTransform nominal_room_from_ct = RigidTransform::Identity();
   Eigen::Vector3d center_ct_mm =
       Eigen::Vector3d::Zero();  ///< ROI centre: rotation origin of the registration

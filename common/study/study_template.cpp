@@ -23,6 +23,10 @@ rig = "treatment-room"
 name = "patient-01"                              # in result tables; letters, digits, - and _
 # note = "who took the X-rays, when, anything"   # free text for people
 ct = "patient-01/ct.nii.gz"                      # in HU: NIfTI, MetaImage, NRRD or a DICOM folder
+# What else the voxels are and what is to be done to them (docs/cts.md), as the options of the programs without --.
+# ct_resample = true                             # a tilted gantry or uneven slices
+# ct_values = "mu"                               # attenuation per mm; or "raw" with ct_raw_slope_per_mm, or "labels"
+# ct_body_only = true                            # table and head holder become air
 # Where the patient lies according to the set-up: x_room = nominal_room_from_ct * x_ct, rigid. The true pose is looked
 # for about it, within the fields' range. The identity puts the CT's origin at the room's, head to +z.
 nominal_room_from_ct = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]

@@ -75,10 +75,11 @@ void AttenuationModel::describe(Fields& field) {
         "Attenuation of water, 1/mm: mu = this * max(0, 1 + HU/1000)")
       .above(0.0)
       .at_most(1.0);
-  field("air_below_hu", air_below_hu, "Lower HU attenuate nothing")
-      .within(-1000, 0)
-      .no_option("all programs have one")
-      .not_recorded("it never changes");
+  field("air_below_hu",
+        air_below_hu,
+        "Lower HU attenuate nothing. Noise below the cut is lost and noise above it counts: a "
+        "higher cut lowers the bias of a noisy CT's air, and costs what it has of lung")
+      .within(-1000, 0);
 }
 
 std::vector<std::string> problems(const AttenuationModel& model) {

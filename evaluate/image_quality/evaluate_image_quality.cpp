@@ -31,6 +31,7 @@
 #include "pose_files/pose_file.h"
 #include "run/run_folder.h"
 #include "run/terminal.h"
+#include "study/ct_keys.h"
 #include "study/node_ct.h"
 #include "study/pose_context.h"
 #include "study/study_file.h"
@@ -46,6 +47,7 @@ struct Target {
   std::string case_name;  ///< empty when the field stands alone
   std::filesystem::path field;
   std::filesystem::path ct;
+  CtReadOptions ct_reading;
   std::filesystem::path folder;  ///< of its results
 };
 
@@ -84,7 +86,7 @@ Setup load(const ImageQualityOptions& options, const Target& target, const Commu
   const FieldIdentity& identity = setup.field->identity;
   std::vector<std::string> warnings;
   setup.ct = read_ct_per_node(target.ct,
-                              options.ct_reading,
+                              target.ct_reading,
                               {identity.mu_water_per_mm, identity.air_below_hu},
                               world,
                               warnings);
@@ -108,10 +110,11 @@ Setup load(const ImageQualityOptions& options, const Target& target, const Commu
                            ": give --look-up linear",
                        target.field.string());
     if (options.poses.empty()) return;
-    setup.poses = read_poses(
-        options.poses,
-        pose_context(
-            target.ct, {}, CameraRig{Eigen::Vector3d::Zero(), {identity.camera}}, identity.frame));
+    setup.poses = read_poses(options.poses,
+                             pose_context(target.ct,
+                                          target.ct_reading,
+                                          CameraRig{Eigen::Vector3d::Zero(), {identity.camera}},
+                                          identity.frame));
   });
   setup.view = View::whole_detector(identity.camera);
   return setup;
@@ -315,7 +318,8 @@ std::vector<Target> targets_of(const ImageQualityOptions& options) {
   const bool has_any = !options.field.empty() || !options.ct.empty();
   if (options.study.empty() ? !has_field : has_any)
     throw UsageError("name a field and its CT, --field FIELD --ct CT, or --study STUDY alone");
-  if (options.study.empty()) return {{"", options.field, options.ct, options.output_folder}};
+  if (options.study.empty())
+    return {{"", options.field, options.ct, options.ct_reading, options.output_folder}};
   const Study study = read_study(options.study);
   std::vector<Target> targets;
   for (const StudyCase* study_case : study.chosen_cases(options.cases))
@@ -328,6 +332,7 @@ std::vector<Target> targets_of(const ImageQualityOptions& options) {
       targets.push_back({study_case->name,
                          *view.field,
                          study_case->ct,
+                         ct_reading_in_force(options.ct_reading, study_case->ct_reading),
                          options.output_folder / (study_case->name + "-" + view.camera)});
     }
   return targets;

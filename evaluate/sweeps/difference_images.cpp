@@ -155,10 +155,11 @@ json write_difference_images(const std::vector<SettingResult>& results,
   if (drrs.empty()) return nullptr;
   std::vector<std::string> warnings;
   const PrecomputeOptions& setting = results[drrs.front().result].setting;
+  // The setting's reading of the CT is the one in force.
   const NodeCt ct = read_ct_per_node(
       setting.ct.empty() ? read_study(setting.study).find_case(setting.case_name).ct.string()
                          : setting.ct,
-      {setting.series_uid},
+      setting.ct_reading,
       setting.attenuation,
       world,
       warnings);

@@ -29,6 +29,7 @@
 #include "run/progress_printer.h"
 #include "run/run_folder.h"
 #include "run/terminal.h"
+#include "study/ct_keys.h"
 #include "study/node_ct.h"
 #include "study/study_file.h"
 #include "text/csv_table.h"
@@ -143,13 +144,18 @@ std::vector<Target> targets_of(const FieldParametersOptions& options) {
   const PrecomputeOptions& base = options.base;
   if (!base.ct.empty()) return {{base, base.ct}};
   const Study study = read_study(base.study);
-  if (!base.camera.empty()) return {{base, study.find_case(base.case_name).ct.string()}};
+  const auto target_of = [&](const StudyCase& study_case) {
+    Target target{base, study_case.ct.string()};
+    target.base.ct_reading = ct_reading_in_force(base.ct_reading, study_case.ct_reading);
+    return target;
+  };
+  if (!base.camera.empty()) return {target_of(study.find_case(base.case_name))};
   std::vector<std::string> names;
   if (!base.case_name.empty()) names.push_back(base.case_name);
   std::vector<Target> targets;
   for (const StudyCase* study_case : study.chosen_cases(names))
     for (const StudyView& view : study_case->views) {
-      Target& target = targets.emplace_back(Target{base, study_case->ct.string()});
+      Target& target = targets.emplace_back(target_of(*study_case));
       target.base.case_name = study_case->name;
       target.base.camera = view.camera;
     }
@@ -190,7 +196,7 @@ void sweep_target(const FieldParametersOptions& options,
                   Provenance& provenance) {
   std::vector<std::string> warnings;
   const NodeCt ct = read_ct_per_node(
-      target.ct_path, {target.base.series_uid}, target.base.attenuation, world, warnings);
+      target.ct_path, target.base.ct_reading, target.base.attenuation, world, warnings);
   for (const std::string& text : warnings) warn(world, text);
   const RayCastDrr reference(ct.volume, options.reference);
   std::vector<PrecomputeOptions> settings = settings_of(options, target.base);
@@ -257,7 +263,8 @@ void describe_base(Fields& field, PrecomputeOptions& base) {
   field.without_options(why);
   for (const char* name : {"output", "restart", "dry_run"}) field.at(name).not_recorded(why);
   field.at("ct").as("--ct");
-  field.at("series").as("--series");
+  CtReadOptions reading;
+  for (const Field& part : fields_of(reading)) field.at(part.name).as(part.option);
   field.at("rig").as("--rig");
   field.at("study")
       .as("--study", "study.toml that names CT, rig and pose instead")

@@ -18,7 +18,7 @@ void append(const std::vector<std::string>& more, std::vector<std::string>& foun
 
 void describe_source(Fields& field, PrecomputeOptions& options) {
   field("ct", options.ct, "CT: image file or DICOM folder").input();
-  field("series", options.series_uid, "DICOM series UID, when the CT's folder has several").input();
+  field.part(options.ct_reading);
   field("rig", options.rig, "Cameras: a rig.toml, or a shipped rig: c-arm-12in, treatment-room")
       .input();
   field("camera",

@@ -14,6 +14,7 @@
 #include "precompute/design/design_presets.h"
 #include "precompute/units/unit_planner.h"
 #include "volume/attenuation_volume.h"
+#include "volume/ct_read_options.h"
 #include "volume/ray_caster.h"
 
 namespace af {
@@ -27,7 +28,7 @@ inline constexpr std::uint64_t kDefaultMemoryLimitBytes = std::uint64_t{300} << 
 struct PrecomputeOptions {
   // The CT, the camera and the pose about which the CT moves: named one by one ...
   std::string ct;
-  std::string series_uid;
+  CtReadOptions ct_reading;
   std::string rig;
   std::string camera;
   std::vector<double> center_ct_mm;  ///< empty: the CT's centre

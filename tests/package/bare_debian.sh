@@ -79,11 +79,16 @@ af-precompute "${field[@]}" --camera AP -o AP.af.h5
 mpirun -n 2 --oversubscribe af-precompute "${field[@]}" --camera LAT -o LAT.af.h5
 af-drr --field AP.af.h5 -o drr.png
 af-register --study study/study.toml --field AP=AP.af.h5 --field LAT=LAT.af.h5 --start-rotation-deg 1,-1,1 -o result
+if [[ -e /usr/lib/python3/dist-packages/attenuation_fields ]]; then
+  python3 -c "import attenuation_fields as af; print('Python: a DRR of shape', af.Field.open('AP.af.h5').drr(rotation_deg=(1, 0, 0)).shape)"
+fi
 af-inspect AP.af.h5 result/pose.toml | grep -E 'field|checksums|pose'
-/usr/libexec/attenuation-fields/slicer/af-register --xml | head -n 1
+/usr/libexec/attenuation-fields/slicer/af-register --xml >module.xml
+head -n 1 module.xml
 TEXT
 cat >"$root/packages/remove.sh" <<'TEXT'
-apt-get remove -y -q attenuation-fields
+mapfile -t installed < <(dpkg-query --show --showformat '${Package}\n' '*attenuation-fields*')
+apt-get remove -y -q "${installed[@]}"
 if command -v af-drr; then exit 1; fi
 TEXT
 

@@ -82,6 +82,13 @@ of_ct 3 "Modality = 'MR'" 'another modality' mr
 of_ct 3 'GantryDetectorTilt = 12.5' 'gantry tilt' tilted
 of_ct 3 'a slice is missing' 'missing slice' missing-slice
 of_ct 3 'not evenly spaced' 'uneven slices' uneven
+of_ct 3 '--resample' 'missing slice, advice' missing-slice
+row 3 'raw_slope_per_mm' 'raw values without a slope' "${precompute[@]}" --ct valid/ct.nii.gz --rig valid/rig.toml --camera AP --values raw
+row 3 'label_hu = 3' 'label without HU' "${precompute[@]}" --ct valid/ct.nii.gz --rig valid/rig.toml --camera AP \
+  --values labels --label-hu 3
+row 3 'HU must be within 1e6' 'HU taken for attenuation' "${precompute[@]}" --ct valid/ct.nii.gz --rig valid/rig.toml --camera AP --values mu
+of_study 3 'ct_values' 'CT of unknown values' "$(edited study.toml 's/^ct = .*/&\nct_values = "grey"/')"
+of_study 3 'must be true or false' 'switch that is a text' "$(edited study.toml 's/^ct = .*/&\nct_resample = "yes"/')"
 of_ct 3 'nan.mha' 'NaN voxel' nan.mha
 of_ct 3 'all-air.mha' 'all air' all-air.mha
 of_ct 3 'four-d.mha' '4-D' four-d.mha
@@ -237,6 +244,8 @@ row 2 '--camera' 'empty text' "${precompute[@]}" --study valid/study.toml --came
 printf -- '--- field ---\n'
 register=("$bin/af-register" --study valid/study.toml -o out/result)
 row 4 'other.af.h5' 'field of another CT' "${register[@]}" --field AP=other.af.h5 --field LAT=other-LAT.af.h5
+row 4 'read with mu = 2e-05 * value + 0.02 per mm' 'field of a CT that is read otherwise' "${register[@]}" \
+  --field AP=AP.af.h5 --field LAT=LAT.af.h5 --values raw --raw-slope-per-mm 0.00002 --raw-offset-per-mm 0.02
 row 4 'LAT.af.h5' 'field of another camera' "${register[@]}" --field AP=LAT.af.h5 --field LAT=AP.af.h5
 head -c 20000 AP.af.h5 >cut.af.h5
 row 4 'cut.af.h5' 'truncated field' "$bin/af-drr" --field cut.af.h5 -o out/drr.mha

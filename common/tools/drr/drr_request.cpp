@@ -15,6 +15,7 @@
 #include "image_files/ct_reader.h"
 #include "image_files/image_file.h"
 #include "pose_files/pose_file.h"
+#include "study/ct_keys.h"
 #include "study/pose_context.h"
 #include "study/rig_file.h"
 #include "study/study_file.h"
@@ -172,27 +173,28 @@ DrrSource source_of(const DrrOptions& options) {
     const Study study = read_study(options.study);
     const StudyCase& study_case = study.find_case(options.study_case);
     return {study_case.ct,
+            ct_reading_in_force(options.ct_reading, study_case.ct_reading),
             study.rig.camera(options.camera),
             study_case.frame(),
             study.rig.isocenter_point};
   }
-  if (options.rig.empty()) return {options.ct, {}, {}, {}};
+  if (options.rig.empty()) return {options.ct, options.ct_reading, {}, {}, {}};
   const CameraRig rig = read_rig(options.rig);
-  return {options.ct, rig.camera(options.camera), {}, rig.isocenter_point};
+  return {options.ct, options.ct_reading, rig.camera(options.camera), {}, rig.isocenter_point};
 }
 
 CastCt ray_caster(const DrrOptions& options,
-                  const std::filesystem::path& path,
+                  const DrrSource& source,
                   const CompressedAttenuationField* field,
                   const std::shared_ptr<ThreadPool>& pool) {
-  const CtVolume ct = read_ct(path, options.ct_reading);
+  const CtVolume ct = read_ct(source.ct, source.ct_reading);
   AttenuationModel model = options.attenuation;
   if (field != nullptr) {
     const std::string hash = ct_content_sha256(ct);
     if (hash != field->identity.ct_content_sha256)
       throw FileError(options.field.string(),
                       "CT of the field (ct_content_sha256)",
-                      hash + " (" + path.string() + ")",
+                      hash + " (" + source.ct.string() + ")",
                       field->identity.ct_content_sha256);
     // --compare compares ways to render, so the reference takes the field's HU model.
     model = {field->identity.mu_water_per_mm, field->identity.air_below_hu};
@@ -244,7 +246,7 @@ DrrScene load_scene(const DrrOptions& options, const Communicator& communicator)
   else if (!field)
     scene.frame.center_room_mm = source.isocenter_point;
   if (!source.ct.empty()) {
-    const CastCt cast = ray_caster(options, source.ct, field.get(), scene.pool);
+    const CastCt cast = ray_caster(options, source, field.get(), scene.pool);
     (field ? scene.reference : scene.renderer) = cast.renderer;
     if (!field && !source.frame.has_value()) scene.frame.center_ct_mm = cast.center_ct_mm;
   }
@@ -252,8 +254,9 @@ DrrScene load_scene(const DrrOptions& options, const Communicator& communicator)
 }
 
 std::vector<RigidTransform> requested_poses(const DrrOptions& options, const DrrScene& scene) {
-  const PoseContext context = pose_context(source_of(options).ct,
-                                           options.ct_reading,
+  const DrrSource source = source_of(options);
+  const PoseContext context = pose_context(source.ct,
+                                           source.ct_reading,
                                            CameraRig{Eigen::Vector3d::Zero(), {scene.view.camera}},
                                            scene.frame);
   if (!options.poses.empty()) return read_poses(options.poses, context);

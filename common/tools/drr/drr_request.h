@@ -46,7 +46,8 @@ std::vector<std::string> problems(const DrrOptions& options);
 
 /// What DRRs are made of and for which camera.
 struct DrrSource {
-  std::filesystem::path ct;              ///< empty: none
+  std::filesystem::path ct;  ///< empty: none
+  CtReadOptions ct_reading;
   std::optional<CameraGeometry> camera;  ///< none: the field's
   std::optional<PoseFrame> frame;        ///< none: the field's, or of the CT's centre
   Eigen::Vector3d isocenter_point = Eigen::Vector3d::Zero();

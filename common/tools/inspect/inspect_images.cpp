@@ -136,7 +136,7 @@ void warn_of_cut_body(const CtVolume& ct, Inspection& inspection) {
           "truncated field of view: " + std::to_string(percent) + " % of the " +
           patient_letters(at_end ? direction : Eigen::Vector3d(-direction)) +
           " face is tissue (or table) that continues outside the CT; rays through it miss "
-          "attenuation");
+          "attenuation (--body-only makes air of a table)");
     }
   }
 }

@@ -114,6 +114,9 @@ void run(const SimulateOptions& options,
   SimulatedCase simulated = imaged_case(options, imaged, rig, folder.path());
   inform(world, "Writing the study");
   simulated.study_case.ct = ct_of_study(options, imaged.ct, simulated, folder.path());
+  // A copy is in HU.
+  if (!options.ct.empty() && simulated.study_case.ct == std::filesystem::absolute(options.ct))
+    simulated.study_case.ct_reading = options.ct_reading;
 
   const Provenance provenance = {"af-simulate",
                                  command_line,

@@ -38,6 +38,11 @@ void describe_output(Fields& field, SimulateOptions& o) {
         o.copies_ct,
         "Write the CT into the study as ct.nii.gz; otherwise a --ct is referred to by its absolute "
         "path (a phantom is always written)");
+  field("xray_format",
+        o.xray_format,
+        "Format of the X-rays: mha; dicom: XA, MONOCHROME1, 8 to 16 bits, with the positioner's "
+        "angles of the nominal pose")
+      .choice({"mha", "dicom"});
   field("case", o.case_name, "Name of the case (default: from the CT's name)");
   field("seed",
         o.seed,
@@ -120,6 +125,10 @@ std::vector<std::string> problems(const SimulateOptions& options) {
     if (!(box[axis] < box[axis + 3]) || !std::isfinite(box[axis + 3] - box[axis]))
       found.push_back("target_box_ct_mm: low " + std::to_string(box[axis]) +
                       " must be below high " + std::to_string(box[axis + 3]));
+  const int bits = options.xray_in_force().detector.bits;
+  if (options.xray_format == "dicom" && (bits < 8 || bits > 16))
+    found.push_back("xray_format = dicom: needs 8 to 16 bits, not " + std::to_string(bits) +
+                    (bits == 0 ? " (none: floats)" : ""));
   if (options.case_name.find_first_of("/\\\"\n") != std::string::npos)
     found.push_back("case = " + options.case_name + ": must not hold / \\ \" or line ends");
   return found;

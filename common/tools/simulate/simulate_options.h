@@ -24,6 +24,7 @@ struct SimulateOptions {
   std::string output;
   std::uint64_t seed = 1;
   bool copies_ct = false;
+  std::string xray_format = "mha";
   bool replaces_output = false;
 
   std::vector<double> center_ct_mm;      ///< x, y, z

@@ -8,6 +8,7 @@
 #include "base/hash_random.h"
 #include "figures/picture.h"
 #include "files/output_file.h"
+#include "image_files/dicom_xray_writer.h"
 #include "image_files/image_file.h"
 #include "pose_files/pose_file.h"
 #include "simulation/automatic_target.h"
@@ -279,6 +280,40 @@ std::optional<CtVolume> degraded_study_ct(const SimulateOptions& options,
                      view_key(simulated.study_case.name, "", "ct noise"));
 }
 
+namespace {
+
+/// The X-ray's file into `folder`; its path goes to `view`.
+void write_xray(const SimulateOptions& options,
+                const Image2d& xray,
+                const CameraGeometry& camera,
+                const Eigen::Vector3d& isocenter_point,
+                const std::filesystem::path& folder,
+                const StudyCase& study_case,
+                StudyView& view) {
+  const int bits = options.xray_in_force().detector.bits;
+  if (options.xray_format == "dicom") {
+    DicomXrayDescription description;
+    description.stored_bits = bits;
+    description.patient_id = study_case.name;
+    description.description = "camera " + camera.name;
+    description.imager_spacing_mm = camera.pixel_spacing_mm;
+    description.source_detector_mm = camera.source_detector_distance_mm();
+    description.source_patient_mm = (isocenter_point - camera.source_point).norm();
+    const Eigen::Vector2d angles = positioner_angles_deg(
+        study_case.nominal_room_from_ct.linear().transpose() * camera.beam_direction());
+    description.primary_angle_deg = angles.x();
+    description.secondary_angle_deg = angles.y();
+    view.xray = folder / (camera.name + ".dcm");
+    write_dicom_xray(xray, view.xray, description);
+    return;
+  }
+  view.xray = folder / (camera.name + ".mha");
+  const auto write = bits == 0 ? write_image : write_image_u16;
+  write(xray, view.xray, camera.pixel_spacing_mm.x(), camera.pixel_spacing_mm.y());
+}
+
+}  // namespace
+
 void take_xrays(const SimulateOptions& options,
                 const AttenuationVolume& volume,
                 const std::filesystem::path& folder,
@@ -304,9 +339,7 @@ void take_xrays(const SimulateOptions& options,
                          if (progress)
                            progress(static_cast<double>(i) + done / total, camera_count);
                        });
-    view.xray = folder / (camera.name + ".mha");
-    const auto write = imaging.detector.bits == 0 ? write_image : write_image_u16;
-    write(xray, view.xray, camera.pixel_spacing_mm.x(), camera.pixel_spacing_mm.y());
+    write_xray(options, xray, camera, rig.isocenter_point, folder, study_case, view);
     write_preview(xray, imaging.detector.open_beam_level, folder / (camera.name + "-preview.png"));
   }
 }

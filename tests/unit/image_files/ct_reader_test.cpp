@@ -2,11 +2,15 @@
 #include "image_files/ct_reader.h"
 
 #include <array>
+#include <cmath>
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
+#include <functional>
+#include <iomanip>
 #include <limits>
 #include <span>
+#include <sstream>
 #include <sys/stat.h>
 #include <zlib.h>
 
@@ -16,6 +20,7 @@
 
 #include "base/error.h"
 #include "image_files/itk_image_io.h"
+#include "support/io_checks.h"
 #include "support/test_paths.h"
 #include "unit/image_files/ct_test_data.h"
 
@@ -941,6 +946,105 @@ TEST(CtWriter, RefusesAFormatThatCannotHoldACt) {
   const ScratchFolder folder;
   EXPECT_THROW(write_ct(asymmetric_ct(small_grid()), folder / "ct.png"), UsageError);
   EXPECT_TRUE(fs::is_empty(folder.path()));
+}
+
+/// A body that is a ramp along all axes, in HU.
+double body_hu(const Eigen::Vector3d& point) {
+  return 100.0 + Eigen::Vector3d(20.0, -15.0, 30.0).dot(point - Eigen::Vector3d(-29, 15, -104));
+}
+
+/// The small series with its slices moved by `shift_mm(slice)`; voxels hold body_hu().
+void write_moved_series(const std::filesystem::path& folder,
+                        const std::function<Eigen::Vector3d(int)>& shift_mm) {
+  const CtGrid grid = test::small_grid();
+  std::vector<std::int16_t> hu;
+  for (int k = 0; k < grid.size[2]; ++k)
+    for (int j = 0; j < grid.size[1]; ++j)
+      for (int i = 0; i < grid.size[0]; ++i)
+        hu.push_back(static_cast<std::int16_t>(
+            std::lround(body_hu(grid.point_mm(Eigen::Vector3d(i, j, k)) + shift_mm(k)))));
+  CtVolume ct;
+  ct.grid = grid;
+  ct.hu = SharedArray<std::int16_t>(std::move(hu));
+  test::write_dicom_series(ct, folder, [&](int slice, test::DicomTestFile& file) {
+    const Eigen::Vector3d at = grid.point_mm({0, 0, static_cast<double>(slice)}) + shift_mm(slice);
+    std::ostringstream text;
+    text << std::setprecision(10) << at.x() << '\\' << at.y() << '\\' << at.z();
+    file.set_text({0x0020, 0x0032}, "DS", text.str());
+  });
+}
+
+void expect_body(const CtVolume& ct, std::size_t least_compared) {
+  std::size_t compared = 0;
+  std::size_t at = 0;
+  for (int k = 0; k < ct.grid.size[2]; ++k)
+    for (int j = 0; j < ct.grid.size[1]; ++j)
+      for (int i = 0; i < ct.grid.size[0]; ++i, ++at) {
+        if (ct.hu[at] == -1000) continue;
+        ++compared;
+        EXPECT_NEAR(ct.hu[at], body_hu(ct.grid.point_mm(Eigen::Vector3d(i, j, k))), 1.01);
+      }
+  EXPECT_GE(compared, least_compared);
+}
+
+TEST(CtReaderResamples, ATiltedGantryWhenAskedTo) {
+  const test::ScratchFolder folder;
+  write_moved_series(folder / "ct",
+                     [](int slice) { return Eigen::Vector3d(0.0, 0.5 * slice, 0.0); });
+  const std::string refusal = test::message_of<InputError>([&] { (void)read_ct(folder / "ct"); });
+  EXPECT_THAT(refusal, testing::HasSubstr("gantry tilt"));
+  EXPECT_THAT(refusal, testing::HasSubstr("--resample"));
+  CtReadOptions options;
+  options.resamples = true;
+  std::vector<std::string> warnings;
+  const CtVolume ct = read_ct(folder / "ct", options, &warnings);
+  EXPECT_EQ(ct.grid.size, (std::array<int, 3>{7, 9, 5}));
+  EXPECT_THAT(warnings, testing::Contains(testing::HasSubstr("resampled to 7 x 9 x 5 voxels")));
+  expect_body(ct, 7 * 5 * 5);
+}
+
+TEST(CtReaderResamples, UnevenSlicesAndLeavesEvenOnesAlone) {
+  const test::ScratchFolder folder;
+  write_moved_series(folder / "ct",
+                     [](int slice) { return Eigen::Vector3d(0.0, 0.0, slice == 2 ? 0.6 : 0.0); });
+  CtReadOptions options;
+  options.resamples = true;
+  const CtVolume ct = read_ct(folder / "ct", options);
+  EXPECT_EQ(ct.grid.size, test::small_grid().size);
+  expect_body(ct, ct.grid.voxel_count());
+  const CtVolume even = test::asymmetric_ct(test::small_grid());
+  test::write_dicom_series(even, folder / "even");
+  EXPECT_EQ(ct_content_sha256(read_ct(folder / "even", options)), ct_content_sha256(even));
+}
+
+TEST(CtReaderResamples, NoGapThatWouldBeMadeUp) {
+  const test::ScratchFolder folder;
+  write_moved_series(folder / "ct",
+                     [](int slice) { return Eigen::Vector3d(0.0, 0.0, slice > 2 ? 6.0 : 0.0); });
+  CtReadOptions options;
+  options.resamples = true;
+  EXPECT_THAT(test::message_of<InputError>([&] { (void)read_ct(folder / "ct", options); }),
+              testing::HasSubstr("too wide to be resampled"));
+}
+
+TEST(CtReaderValues, OfAttenuationAndLabelsBecomeHuAndAnotherContent) {
+  const test::ScratchFolder folder;
+  const CtVolume ct = test::asymmetric_ct(test::small_grid());
+  write_ct(ct, folder / "ct.mha");
+  CtReadOptions options;
+  options.values = "raw";
+  options.raw_slope_per_mm = 1e-5;
+  options.raw_offset_per_mm = 0.01;
+  const CtVolume raw = read_ct(folder / "ct.mha", options);
+  for (std::size_t i = 0; i < ct.hu.size(); ++i)
+    ASSERT_NEAR(raw.hu[i], (1e-5 * ct.hu[i] + 0.01) / 2e-5 - 1000.0, 0.5 + 1e-9) << i;
+  EXPECT_NE(ct_content_sha256(raw), ct_content_sha256(ct));
+  CtReadOptions labels;
+  labels.values = "labels";
+  labels.label_hu = {std::to_string(ct.hu[100]) + "=55"};
+  const CtVolume labelled = read_ct(folder / "ct.mha", labels);
+  for (std::size_t i = 0; i < ct.hu.size(); ++i)
+    ASSERT_EQ(labelled.hu[i], ct.hu[i] == ct.hu[100] ? 55 : -1000);
 }
 
 }  // namespace

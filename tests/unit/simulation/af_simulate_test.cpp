@@ -12,6 +12,7 @@
 #include "files/output_file.h"
 #include "gold_standard/fiducial_registration.h"
 #include "image_files/ct_reader.h"
+#include "image_files/dicom_elements.h"
 #include "image_files/image_file.h"
 #include "pose_files/pose_file.h"
 #include "simulation/siddon_projector.h"
@@ -257,6 +258,62 @@ TEST_F(AfSimulate, KeepsAnExistingFolderUnlessForced) {
   EXPECT_EQ(run(coarse + "--force " + folder("s")), 0) << log();
   EXPECT_FALSE(fs::exists(scratch_ / "s" / "mine"));
   EXPECT_TRUE(fs::exists(scratch_ / "s" / "study.toml"));
+}
+
+/// A camera that looks at the isocentre from where an XA positioner at these angles does, for a
+/// patient whose axes are the room's.
+CameraGeometry oblique_camera(const std::string& name, double primary_deg, double secondary_deg) {
+  const double primary = primary_deg * kRadPerDeg;
+  const double secondary = secondary_deg * kRadPerDeg;
+  const Eigen::Vector3d beam(std::sin(primary) * std::cos(secondary),
+                             -std::cos(primary) * std::cos(secondary),
+                             std::sin(secondary));
+  CameraGeometry camera;
+  camera.name = name;
+  camera.size_px = {96, 80};
+  camera.pixel_spacing_mm = {2.5, 2.0};
+  camera.source_point = -800.0 * beam;
+  camera.row_direction =
+      (-Eigen::Vector3d::UnitZ() + beam.z() * beam).normalized();  // head side first
+  camera.column_direction = camera.row_direction.cross(beam);
+  camera.detector_origin_point =
+      400.0 * beam - 47.5 * 2.5 * camera.column_direction - 39.5 * 2.0 * camera.row_direction;
+  return camera;
+}
+
+TEST_F(AfSimulate, DicomXaOfObliqueViewsGivesTheLineIntegralsOfMetaImageToTheBit) {
+  CameraRig rig;
+  rig.cameras = {oblique_camera("LAO", 30.0, 20.0), oblique_camera("RAO", -55.0, -10.0)};
+  write_text_file(scratch_ / "rig.toml", rig_to_toml(rig));
+  const std::string arguments = coarse + "--rig '" + (scratch_ / "rig.toml").string() + "' ";
+  for (const int bits : {12, 16}) {
+    const std::string name = "dicom" + std::to_string(bits);
+    const std::string with_bits = arguments + "--bits " + std::to_string(bits) + " ";
+    const std::string other = "mha" + std::to_string(bits);
+    ASSERT_EQ(run(with_bits + folder(other)), 0) << log();
+    ASSERT_EQ(run(with_bits + "--xray-format dicom " + folder(name)), 0) << log();
+    const Study meta = read_study(scratch_ / other / "study.toml");
+    const Study dicom = read_study(scratch_ / name / "study.toml");
+    for (std::size_t i = 0; i < 2; ++i) {
+      const StudyView& view = dicom.cases[0].views[i];
+      EXPECT_EQ(view.xray.extension(), ".dcm");
+      const ViewXray found = read_view_xray(view, dicom.rig.cameras[i]);
+      const ViewXray expected = read_view_xray(meta.cases[0].views[i], meta.rig.cameras[i]);
+      EXPECT_EQ(found.attenuation.pixels, expected.attenuation.pixels);
+      EXPECT_NE(found.note.find("MONOCHROME1"), std::string::npos) << found.note;
+      EXPECT_NE(found.note.find(std::to_string((1 << bits) - 1) + " - stored"), std::string::npos);
+    }
+    EXPECT_TRUE(meta.cases[0].gold_room_from_ct->isApprox(*dicom.cases[0].gold_room_from_ct));
+    const DicomElements lao = DicomElements::read(dicom.cases[0].views[0].xray);
+    EXPECT_NEAR(*lao.number_or_none({0x0018, 0x1510}, "primary"), 30.0, 1e-6);
+    EXPECT_NEAR(*lao.number_or_none({0x0018, 0x1511}, "secondary"), 20.0, 1e-6);
+    EXPECT_NEAR(*lao.number_or_none({0x0018, 0x1110}, "to detector"), 1200.0, 1e-6);
+    EXPECT_NEAR(*lao.number_or_none({0x0018, 0x1111}, "to patient"), 800.0, 1e-6);
+    const DicomElements rao = DicomElements::read(dicom.cases[0].views[1].xray);
+    EXPECT_NEAR(*rao.number_or_none({0x0018, 0x1510}, "primary"), -55.0, 1e-6);
+    EXPECT_NEAR(*rao.number_or_none({0x0018, 0x1511}, "secondary"), -10.0, 1e-6);
+  }
+  EXPECT_EQ(run(coarse + "--ideal --xray-format dicom " + folder("floats")), 3);
 }
 
 }  // namespace

@@ -8,9 +8,11 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "study/ct_keys.h"
 #include "study/rig_file.h"
 #include "study/study_template.h"
 #include "support/io_checks.h"
+#include "text/options_toml.h"
 
 namespace af {
 namespace {
@@ -431,46 +433,81 @@ TEST_F(StudyFile, RefusesContradictionsInHowAnXrayIsRead) {
       HasSubstr("is for xray_domain = \"intensity\" only"));
 }
 
-/// The good study with landmarks, and [] and nan for what is not visible.
-std::string study_with_landmarks() {
-  std::string text =
-      replaced(kGoodStudy,
-               "fiducials_ct_mm = ",
-               "landmarks_ct_mm = [[1,2,3], [40,5,6], [7,80,9]]\nfiducials_ct_mm = ");
-  text = replaced(
-      text, "field = \"fields", "landmarks_px = [[10,20.5], [], [30,40]]\nfield = \"fields");
-  return replaced(text, "mask = ", "landmarks_px = [[nan,nan], [1,2], [3,4]]\nmask = ");
+TEST_F(StudyFile, KeepsHowACtIsRead) {
+  const char* const keys =
+      "ct = \"ct.nii.gz\"\nct_resample = true\nct_values = \"labels\"\nct_label_hu = [\"3=700\", "
+      "\"1=40\"]\nct_body_only = true\nct_series = \"1.2\"";
+  Study study = read(replaced(kGoodStudy, "ct = \"ct.nii.gz\"", keys));
+  for (const bool again : {false, true}) {
+    if (again) study = read(study_to_toml(study, folder().path()));
+    const CtReadOptions& reading = study.cases[0].ct_reading;
+    EXPECT_TRUE(reading.resamples);
+    EXPECT_EQ(reading.values, "labels");
+    EXPECT_EQ(reading.label_hu, (std::vector<std::string>{"3=700", "1=40"}));
+    EXPECT_TRUE(reading.keeps_body_only);
+    EXPECT_EQ(reading.series_uid, "1.2");
+  }
+  EXPECT_EQ(ct_keys_text(CtReadOptions()), "");
+  CtReadOptions typed;
+  typed.series_uid = "3.4";
+  EXPECT_EQ(ct_reading_in_force(typed, study.cases[0].ct_reading).values, "labels");
+  EXPECT_EQ(ct_reading_in_force(typed, study.cases[0].ct_reading).series_uid, "3.4");
+  typed.values = "mu";
+  EXPECT_FALSE(ct_reading_in_force(typed, study.cases[0].ct_reading).resamples);
+  EXPECT_EQ(ct_reading_of(to_toml(typed)).values, "mu");
+  EXPECT_EQ(ct_reading_of("st_nodes = 3").text(), "");
 }
 
-TEST_F(StudyFile, LandmarksMayBeInvisibleInAView) {
-  const Study study = read(study_with_landmarks());
-  const StudyCase& study_case = study.cases.at(0);
-  ASSERT_EQ(study_case.landmarks_ct_mm.size(), 3U);
-  EXPECT_EQ(study_case.landmarks_ct_mm[2], Vector3d(7, 80, 9));
-  const auto& a = study_case.views.at(0).landmarks_px;
-  ASSERT_EQ(a.size(), 3U);
-  EXPECT_EQ(a[0], Vector2d(10, 20.5));
-  EXPECT_FALSE(a[1].has_value());
-  EXPECT_FALSE(study_case.views.at(1).landmarks_px.at(0).has_value());
-  const Study again = read(study_to_toml(study, study.path.parent_path()));
-  EXPECT_EQ(again.cases.at(0).views.at(0).landmarks_px, a);
-  EXPECT_EQ(again.cases.at(0).landmarks_ct_mm, study_case.landmarks_ct_mm);
-}
-
-TEST_F(StudyFile, LandmarksWithMistakesAreRefusedWithTheirLine) {
-  const auto refused = [&](const std::string& from, const std::string& to) {
-    return message_of<InputError>([&] { read(replaced(study_with_landmarks(), from, to)); });
+TEST_F(StudyFile, RefusesContradictionsInHowACtIsRead) {
+  const auto refused = [&](const std::string& keys) {
+    return refusal("ct = \"ct.nii.gz\"", "ct = \"ct.nii.gz\"\n" + keys);
   };
-  EXPECT_THAT(refused("[[10,20.5], [], ", "[[10,20.5], "),
-              AllOf(HasSubstr("landmarks_px"), HasSubstr("2 entries")));
-  EXPECT_THAT(refused("[10,20.5]", "[10]"), HasSubstr("[column, row]"));
-  EXPECT_THAT(refused("[10,20.5]", "[10,nan]"), HasSubstr("[column, row]"));
-  EXPECT_THAT(refused("[10,20.5]", "[10,20.5,3]"), HasSubstr("[column, row]"));
-  EXPECT_THAT(refused("[10,20.5]", "\"none\""), HasSubstr("[column, row]"));
-  EXPECT_THAT(refused("[10,20.5]", "[10,2000]"), HasSubstr("on the detector"));
-  EXPECT_THAT(refused("landmarks_px = [[10,20.5], [], [30,40]]", "landmarks_px = 3"),
-              HasSubstr("0 entries"));
-}
+  EXPECT_THAT(refused("ct_values = \"raw\""), HasSubstr("ct_raw_slope_per_mm = 0"));
+  EXPECT_THAT(refused("ct_values = \"grey\""), HasSubstr("must be one of hu, mu, raw, labels"));
+  EXPECT_THAT(refused("ct_resample = 1"), HasSubstr("must be true or false"));
+  EXPECT_THAT(refused("ct_label_hu = [3]"), HasSubstr("must be a list of texts"));
+  EXPECT_THAT(refused("ct_resamples = true"), HasSubstr("did you mean \"ct_resample\""));
+
+  /// The good study with landmarks, and [] and nan for what is not visible.
+  std::string study_with_landmarks() {
+    std::string text =
+        replaced(kGoodStudy,
+                 "fiducials_ct_mm = ",
+                 "landmarks_ct_mm = [[1,2,3], [40,5,6], [7,80,9]]\nfiducials_ct_mm = ");
+    text = replaced(
+        text, "field = \"fields", "landmarks_px = [[10,20.5], [], [30,40]]\nfield = \"fields");
+    return replaced(text, "mask = ", "landmarks_px = [[nan,nan], [1,2], [3,4]]\nmask = ");
+  }
+
+  TEST_F(StudyFile, LandmarksMayBeInvisibleInAView) {
+    const Study study = read(study_with_landmarks());
+    const StudyCase& study_case = study.cases.at(0);
+    ASSERT_EQ(study_case.landmarks_ct_mm.size(), 3U);
+    EXPECT_EQ(study_case.landmarks_ct_mm[2], Vector3d(7, 80, 9));
+    const auto& a = study_case.views.at(0).landmarks_px;
+    ASSERT_EQ(a.size(), 3U);
+    EXPECT_EQ(a[0], Vector2d(10, 20.5));
+    EXPECT_FALSE(a[1].has_value());
+    EXPECT_FALSE(study_case.views.at(1).landmarks_px.at(0).has_value());
+    const Study again = read(study_to_toml(study, study.path.parent_path()));
+    EXPECT_EQ(again.cases.at(0).views.at(0).landmarks_px, a);
+    EXPECT_EQ(again.cases.at(0).landmarks_ct_mm, study_case.landmarks_ct_mm);
+  }
+
+  TEST_F(StudyFile, LandmarksWithMistakesAreRefusedWithTheirLine) {
+    const auto refused = [&](const std::string& from, const std::string& to) {
+      return message_of<InputError>([&] { read(replaced(study_with_landmarks(), from, to)); });
+    };
+    EXPECT_THAT(refused("[[10,20.5], [], ", "[[10,20.5], "),
+                AllOf(HasSubstr("landmarks_px"), HasSubstr("2 entries")));
+    EXPECT_THAT(refused("[10,20.5]", "[10]"), HasSubstr("[column, row]"));
+    EXPECT_THAT(refused("[10,20.5]", "[10,nan]"), HasSubstr("[column, row]"));
+    EXPECT_THAT(refused("[10,20.5]", "[10,20.5,3]"), HasSubstr("[column, row]"));
+    EXPECT_THAT(refused("[10,20.5]", "\"none\""), HasSubstr("[column, row]"));
+    EXPECT_THAT(refused("[10,20.5]", "[10,2000]"), HasSubstr("on the detector"));
+    EXPECT_THAT(refused("landmarks_px = [[10,20.5], [], [30,40]]", "landmarks_px = 3"),
+                HasSubstr("0 entries"));
+  }
 
 }  // namespace
 }  // namespace af

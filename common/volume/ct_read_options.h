@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "base/described_fields.h"
+
+namespace af {
+
+/// How a CT's file becomes HU. What is read differently has other voxels, so another content hash:
+/// fields and unfinished work of the one are refused with the other.
+struct CtReadOptions {
+  std::string series_uid;  ///< chooses one of several DICOM series in a folder; empty: there must
+                           ///< be only one
+  /// Tilted gantries and uneven slices are resampled to an upright grid; otherwise refused.
+  bool resamples = false;
+  /// What a voxel's number is: "hu"; "mu", attenuation per mm; "raw", mu = slope * number +
+  /// offset; "labels", a tissue's number.
+  std::string values = "hu";
+  double raw_slope_per_mm = 0.0;           ///< of "raw"; 0: not given
+  double raw_offset_per_mm = 0.0;          ///< of "raw"
+  double values_water_mu_per_mm = 0.0200;  ///< mu that becomes 0 HU, of "mu" and "raw"
+  std::vector<std::string> label_hu;       ///< of "labels": "3=700"; others are air
+  bool keeps_body_only = false;            ///< table and head holder become air
+
+  void describe(Fields& field);
+
+  /// Short text of what differs from the default, the series aside: "values mu (water 0.02 per
+  /// mm), body only"; empty when nothing does.
+  [[nodiscard]] std::string text() const;
+};
+
+std::vector<std::string> problems(const CtReadOptions& options);
+
+/// Numbers of a CT's file as HU.
+class HuConversion {
+ public:
+  /// The numbers are HU.
+  HuConversion() = default;
+  /// InputError for options with problems.
+  explicit HuConversion(const CtReadOptions& options);
+  [[nodiscard]] bool is_identity() const { return kind_ == Kind::Hu; }
+  [[nodiscard]] double hu(double number) const;
+
+ private:
+  enum class Kind { Hu, Scaled, Labels };
+  Kind kind_ = Kind::Hu;
+  double scale_ = 1.0;
+  double offset_ = 0.0;
+  std::vector<std::pair<double, double>> labels_;  ///< number, HU; by number
+};
+
+}  // namespace af
