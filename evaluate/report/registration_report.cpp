@@ -193,7 +193,10 @@ std::string capture_table(const json& renderers) {
     if (range.is_object() && range.contains("end_interval")) {
       const json& interval = range.at("end_interval");
       end = decimals(interval.at("low_mm"), 0) + "–" + decimals(interval.at("high_mm"), 0) +
-            " mm: " + plain(interval.at("successes")) + " of " + plain(interval.at("starts"));
+            " mm: " +
+            (interval.at("starts") == 0
+                 ? std::string("no starts")
+                 : plain(interval.at("successes")) + " of " + plain(interval.at("starts")));
     }
     table.add_row(
         {method_title(renderer),
@@ -323,6 +326,7 @@ std::string case_table(const json& summary) {
                    {"Method", false},
                    {"Starts", true},
                    {"Success (95 % interval)", true},
+                   {"Capture range", true},
                    {"Mean TRE of successes (mm)", true},
                    {"Gold standard by itself (mm)", true},
                    {"Median seconds", true},
@@ -330,14 +334,19 @@ std::string case_table(const json& summary) {
                   "Per patient (the paper's Table II)");
   for (const json& renderer : summary.at("renderers"))
     for (const json& entry : renderer.at("cases"))
-      table.add_row({escaped(entry.at("case").get<std::string>()),
-                     method_title(renderer),
-                     plain(entry.at("starts")),
-                     rate_with_interval(entry),
-                     decimals(entry.at("tre_of_successes_mm").at("mean"), 2),
-                     decimals(entry.value("gold_uncertainty_mm", json()), 2),
-                     decimals(entry.at("seconds").at("median"), 2),
-                     decimals(entry.at("evaluations").at("median"), 0)});
+      table.add_row(
+          {escaped(entry.at("case").get<std::string>()),
+           method_title(renderer),
+           plain(entry.at("starts")),
+           rate_with_interval(entry),
+           // Earlier versions called the cumulative range so.
+           entry.at("capture_range").is_object() && !entry.at("capture_range").contains("ended_by")
+               ? "–"
+               : capture_text(entry.at("capture_range")),
+           decimals(entry.at("tre_of_successes_mm").at("mean"), 2),
+           decimals(entry.value("gold_uncertainty_mm", json()), 2),
+           decimals(entry.at("seconds").at("median"), 2),
+           decimals(entry.at("evaluations").at("median"), 0)});
   return table.html();
 }
 
