@@ -253,8 +253,10 @@ row 4 'cut.af.h5' 'truncated field' "$bin/af-drr" --field cut.af.h5 -o out/drr.m
 for percent in 20 30 40 60 80; do
   cp AP.af.h5 spoilt.af.h5
   from=$(($(stat --format %s AP.af.h5) * percent / 100))
-  skip=$(tail --bytes=+$((from + 1)) AP.af.h5 | LC_ALL=C grep --null-data --only-matching --byte-offset --text --max-count=1 \
-    '.\{20\}' | tr '\0' '\n' | head -n 1 | cut -d : -f 1)
+  tail --bytes=+$((from + 1)) AP.af.h5 >rest
+  LC_ALL=C grep --null-data --only-matching --byte-offset --text --max-count=1 '.\{20\}' rest >found
+  skip=$(head --bytes=20 found)  # "OFFSET:MATCH"
+  skip=${skip%%:*}
   printf 'spoilt spoilt spoilt' | dd of=spoilt.af.h5 bs=1 seek=$((from + skip)) conv=notrunc status=none
   row 4 'spoilt.af.h5' "20 bytes spoilt at $percent % of a field" "$bin/af-drr" --field spoilt.af.h5 -o out/drr.mha
 done
