@@ -8,6 +8,7 @@
 #include "drr/ray_cast_drr.h"
 #include "figures/picture.h"
 #include "files/output_file.h"
+#include "study/ct_keys.h"
 #include "study/landmark_start.h"
 #include "study/xray_reader.h"
 #include "study_pictures/patient_directions.h"
@@ -190,8 +191,9 @@ StudyPictures draw_study_pictures(const Study& study,
                                   const CtReadOptions& ct_reading,
                                   const std::filesystem::path& folder) {
   StudyPictures pictures;
-  const CtVolume ct =
-      used_from(study_case.places, "ct", [&] { return read_ct(study_case.ct, ct_reading); });
+  const CtVolume ct = used_from(study_case.places, "ct", [&] {
+    return read_ct(study_case.ct, ct_reading_in_force(ct_reading, study_case.ct_reading));
+  });
   const RayCastDrr caster(std::make_shared<const AttenuationVolume>(ct, AttenuationModel()));
   std::vector<ShownPose> poses = {{"nominal pose", study_case.nominal_room_from_ct}};
   if (has_landmarks(study_case)) {
