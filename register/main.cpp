@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <filesystem>
 #include <iostream>
+#include <optional>
 #include <string>
 
 #include <CLI/CLI.hpp>
@@ -18,6 +19,7 @@
 #include "register/results/target_errors.h"
 #include "run/run_folder.h"
 #include "run/terminal.h"
+#include "study/landmark_start.h"
 #include "study/pose_context.h"
 #include "study/shared_inputs.h"
 #include "text/csv_table.h"
@@ -45,8 +47,13 @@ void run(const RegisterOptions& options,
   for (const std::string& text : study_warnings) af::warn(world, text);
   const af::StudyCase study_case =
       af::all_or_none(world, [&] { return study.find_case(options.case_name); });
-  const std::vector<af::RigidTransform> starts = af::shared_poses(
-      world, [&] { return start_poses(options, af::pose_context(study, study_case)); });
+  std::optional<af::LandmarkPose> landmarks;
+  if (starts_from_landmarks(options, study_case))
+    landmarks = af::all_or_none(world, [&] { return af::landmark_pose(study, study_case); });
+  const std::vector<af::RigidTransform> starts = af::shared_poses(world, [&] {
+    if (landmarks.has_value()) return std::vector{landmarks->room_from_ct};
+    return start_poses(options, af::pose_context(study, study_case));
+  });
   const auto gold = af::all_or_none(world, [&] { return known_gold(study, study_case); });
   const auto pool = std::make_shared<af::ThreadPool>(af::thread_count(options.method.threads));
   CaseLoadOptions load_options =
@@ -72,7 +79,8 @@ void run(const RegisterOptions& options,
 
   RegisterOptions in_force = options.in_force();
   in_force.case_name = study_case.name;
-  RunDescription description{study_case.name, options.renderer, {}};
+  RunDescription description{study_case.name, options.renderer, {}, {}};
+  if (landmarks.has_value()) description.landmarks = af::to_json(*landmarks, study_case);
   description.provenance = {"af-register",
                             command_line,
                             af::to_toml(in_force),
@@ -107,6 +115,7 @@ void run(const RegisterOptions& options,
       remove_slicer_files(*loaded.problem, slicer);  // an earlier run's
     else
       write_slicer_folder(*loaded.problem, best.result.room_from_ct, study_case, slicer);
+    if (landmarks.has_value()) std::cout << af::residuals_text(*landmarks, study_case);
     std::cout << write_run(records, *loaded.problem, description, options.output_folder);
     folder.finish();
     if (judgement.verdict == Verdict::NotFound)

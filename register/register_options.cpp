@@ -7,6 +7,7 @@
 #include "base/toml_text.h"
 #include "files/sha256.h"
 #include "pose_files/pose_file.h"
+#include "study/landmark_start.h"
 
 namespace af::registration {
 namespace {
@@ -21,6 +22,12 @@ void describe_start(Fields& field, RegisterOptions& options) {
         options.start_translation_mm,
         "Start: tx,ty,tz along the room's axes, mm, relative to nominal (default 0,0,0)")
       .comma_separated();
+  field("start",
+        options.start,
+        "Start when no other is given: nominal, landmarks (the pose that the study's "
+        "landmarks_ct_mm and landmarks_px give), or auto: landmarks where the case has them, else "
+        "nominal")
+      .choice({"auto", "nominal", "landmarks"});
   field("start_pose",
         options.start_pose,
         "Start: file with one pose of any format that docs/poses.md lists")
@@ -83,6 +90,9 @@ std::vector<std::string> problems(const RegisterOptions& options) {
     found.emplace_back(
         "start = given in several ways: use one of --start-rotation-deg/--start-translation-mm, "
         "--start-pose, --starts");
+  if (ways > 0 && options.start != "auto")
+    found.push_back("--start = " + options.start +
+                    ": must be left out when another start is given");
   for (const auto& values : {options.start_rotation_deg, options.start_translation_mm})
     if (values.has_value())
       for (const double value : *values)
@@ -113,6 +123,14 @@ CaseLoadOptions case_load_options(const RegisterOptions& options,
   result.fiducial_mask_mm = options.method.fiducial_mask_mm;
   if (options.correction.is_wanted) result.correction_levels = last_levels;
   return result;
+}
+
+bool starts_from_landmarks(const RegisterOptions& options, const StudyCase& study_case) {
+  const bool has_start = options.start_rotation_deg.has_value() ||
+                         options.start_translation_mm.has_value() || !options.start_pose.empty() ||
+                         !options.starts.empty();
+  if (options.start == "landmarks") return true;
+  return options.start == "auto" && !has_start && has_landmarks(study_case);
 }
 
 std::vector<RigidTransform> start_poses(const RegisterOptions& options,

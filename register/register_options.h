@@ -28,6 +28,7 @@ struct RegisterOptions {
   CorrectionOptions correction;
   std::optional<std::array<double, 3>> start_rotation_deg;
   std::optional<std::array<double, 3>> start_translation_mm;
+  std::string start = "auto";  ///< or "nominal" or "landmarks", when no other start is given
   std::filesystem::path start_pose;
   std::filesystem::path starts;
   AttenuationModel attenuation;  ///< of ray casting
@@ -49,6 +50,10 @@ std::vector<std::string> problems(const RegisterOptions& options);
 CaseLoadOptions case_load_options(const RegisterOptions& options,
                                   int coarsest_level = 0,
                                   const std::vector<int>& last_levels = {});
+
+/// Whether the case's landmarks give the start: when they are asked for, or when the case has
+/// landmarks and no start is given.
+bool starts_from_landmarks(const RegisterOptions& options, const StudyCase& study_case);
 
 /// The starts of a run: of --starts, or the one of --start-pose, or nominal with
 /// --start-rotation-deg and --start-translation-mm. `context` is the case's, with its frame.

@@ -8,6 +8,7 @@
 #include <cstring>
 #include <functional>
 #include <memory>
+#include <numbers>
 #include <stdexcept>
 #include <string_view>
 
@@ -105,6 +106,28 @@ class Canvas {
     cairo_set_line_width(context_.get(), line);
     cairo_rectangle(context_.get(), x, y, width, height);
     cairo_stroke(context_.get());
+  }
+  /// Strokes lines between points of the picture, within an area.
+  void lines(const std::vector<std::array<double, 2>>& points,
+             const Area& area,
+             const Color& color,
+             double width) {
+    cairo_save(context_.get());
+    cairo_rectangle(context_.get(), area.x, area.y, area.width, area.height);
+    cairo_clip(context_.get());
+    set_color(color);
+    cairo_set_line_width(context_.get(), width);
+    cairo_new_path(context_.get());
+    for (const auto& [x, y] : points) cairo_line_to(context_.get(), x, y);
+    cairo_stroke(context_.get());
+    cairo_restore(context_.get());
+  }
+  void circle(double x, double y, double radius, const Color& color, double line) {
+    set_color(color);
+    cairo_set_line_width(context_.get(), line);
+    cairo_new_path(context_.get());
+    cairo_arc(context_.get(), x, y, radius, 0.0, 2.0 * std::numbers::pi);
+    line > 0.0 ? cairo_stroke(context_.get()) : cairo_fill(context_.get());
   }
   [[nodiscard]] double text_width(const std::string& text, const Font& font) {
     set_font(font);
@@ -323,6 +346,91 @@ std::vector<PanelRow> rows_of(const std::vector<PicturePanel>& panels,
 // ---- Drawing
 // -------------------------------------------------------------------------------------
 
+Color color_of(PictureColor color) {
+  switch (color) {
+    case PictureColor::Ink:
+      return kInk;
+    case PictureColor::Cyan:
+      return {0.2, 0.85, 1.0};
+    case PictureColor::Red:
+      return {0.86, 0.15, 0.15};
+    case PictureColor::Green:
+      return {0.1, 0.6, 0.25};
+    case PictureColor::Yellow:
+      break;
+  }
+  return kBox;
+}
+
+/// Letters with a dark rim, so that they stand out on black and on white.
+void draw_rimmed_text(Canvas& canvas,
+                      double x,
+                      double baseline_y,
+                      const std::string& text,
+                      const Font& font,
+                      PictureColor color) {
+  if (color != PictureColor::Ink)
+    for (const auto& [dx, dy] : {std::pair{-1.2, 0.0}, {1.2, 0.0}, {0.0, -1.2}, {0.0, 1.2}})
+      canvas.text(x + dx, baseline_y + dy, text, font, kBoxShadow);
+  canvas.text(x, baseline_y, text, font, color_of(color));
+}
+
+void draw_mark(Canvas& canvas, const PictureMark& mark, double x, double y, double size) {
+  const Color color = color_of(mark.color);
+  const Area around = {static_cast<int>(x - 2.0 * size),
+                       static_cast<int>(y - 2.0 * size),
+                       static_cast<int>(4.0 * size),
+                       static_cast<int>(4.0 * size)};
+  switch (mark.shape) {
+    case PictureMark::Shape::Cross:
+      canvas.lines({{x - size, y - size}, {x + size, y + size}}, around, color, 1.8);
+      canvas.lines({{x - size, y + size}, {x + size, y - size}}, around, color, 1.8);
+      break;
+    case PictureMark::Shape::Circle:
+      canvas.circle(x, y, 1.2 * size, color, 1.8);
+      break;
+    case PictureMark::Shape::Dot:
+      canvas.circle(x, y, 0.8 * size, color, 0.0);
+      break;
+    case PictureMark::Shape::None: {
+      const Font font{std::round(4.0 * size), true};
+      draw_rimmed_text(canvas,
+                       x - canvas.text_width(mark.text, font) / 2.0,
+                       y + 0.36 * font.size_px,
+                       mark.text,
+                       font,
+                       mark.color);
+      return;
+    }
+  }
+  if (!mark.text.empty())
+    draw_rimmed_text(canvas,
+                     x + 1.6 * size,
+                     y - 0.8 * size,
+                     mark.text,
+                     {std::round(2.6 * size), true},
+                     mark.color);
+}
+
+/// Lines and marks over a panel's image, which fills the area.
+void draw_marks(Canvas& canvas, const PicturePanel& panel, const Area& area, int zoom) {
+  const auto placed = [&](const std::array<double, 2>& place) {
+    return std::array<double, 2>{area.x + (place[0] + 0.5) * zoom,
+                                 area.y + (place[1] + 0.5) * zoom};
+  };
+  for (const PictureLine& line : panel.lines) {
+    std::vector<std::array<double, 2>> points;
+    points.reserve(line.points.size());
+    for (const auto& point : line.points) points.push_back(placed(point));
+    canvas.lines(points, area, color_of(line.color), line.width_px);
+  }
+  const double size = std::clamp(area.width / 90.0, 3.0, 9.0);
+  for (const PictureMark& mark : panel.marks) {
+    const auto [x, y] = placed(mark.place);
+    draw_mark(canvas, mark, x, y, size);
+  }
+}
+
 void draw_image(Canvas& canvas, const PicturePanel& panel, int x0, int y0, int zoom) {
   canvas.set_pixels({x0, y0, panel.image.width * zoom, panel.image.height * zoom},
                     [&](int x, int y) {
@@ -336,6 +444,7 @@ void draw_image(Canvas& canvas, const PicturePanel& panel, int x0, int y0, int z
     canvas.outline(x, y, width, height, kBoxShadow, 3.5);
     canvas.outline(x, y, width, height, kBox, 1.8);
   }
+  draw_marks(canvas, panel, {x0, y0, panel.image.width * zoom, panel.image.height * zoom}, zoom);
   canvas.outline(x0 - 0.5,
                  y0 - 0.5,
                  panel.image.width * zoom + 1,
@@ -385,7 +494,7 @@ void draw_row(Canvas& canvas,
     draw_image(canvas, panel, x, image_y, zoom);
     const int bar_y = image_y + panel.image.height * zoom + kSmallGap;
     const int bar_width = std::max(panel.image.width * zoom, kMinCellWidth / 2);
-    draw_scale(canvas, panel, x, bar_y, bar_width, layout.scale);
+    if (panel.has_scale) draw_scale(canvas, panel, x, bar_y, bar_width, layout.scale);
     const double caption_y = bar_y + kBarHeight + layout.scale.line_height_px() + kSmallGap;
     draw_lines(canvas, text.caption, x, caption_y, layout.caption, kInk);
   }

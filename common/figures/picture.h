@@ -10,6 +10,25 @@
 
 namespace af {
 
+/// What is drawn over a panel's image. Places are in its pixels, integers being pixel centres.
+enum class PictureColor { Ink, Yellow, Cyan, Red, Green };
+
+/// A line through points.
+struct PictureLine {
+  std::vector<std::array<double, 2>> points;
+  PictureColor color = PictureColor::Yellow;
+  double width_px = 1.5;  ///< of the picture
+};
+
+/// A small mark with a text beside it.
+struct PictureMark {
+  enum class Shape { None, Cross, Circle, Dot };
+  std::array<double, 2> place = {0.0, 0.0};
+  Shape shape = Shape::None;
+  std::string text;  ///< None: centred on the place, in large letters
+  PictureColor color = PictureColor::Yellow;
+};
+
 /// One panel of a picture: an image with its grey (or diverging blue-white-red) window and a
 /// caption.
 struct PicturePanel {
@@ -21,6 +40,9 @@ struct PicturePanel {
   std::string caption;
   Colors colors = Colors::Grey;
   std::vector<RegionOfInterest> boxes;  ///< outlined on the panel
+  std::vector<PictureLine> lines = {};
+  std::vector<PictureMark> marks = {};
+  bool has_scale = true;  ///< the bar of the window below it
 };
 
 /// Draws panels in a row-major grid of `columns` columns with titles, captions and the range of

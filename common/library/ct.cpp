@@ -21,7 +21,9 @@ Ct::Ct(std::shared_ptr<const Impl> impl) : impl_(std::move(impl)) {}
 Ct Ct::read(const std::filesystem::path& path, const std::string& series_uid) {
   return library::translated_reading([&] {
     auto impl = std::make_shared<Impl>();
-    impl->ct = af::read_ct(path, af::CtReadOptions{series_uid}, &impl->warnings);
+    af::CtReadOptions options;
+    options.series_uid = series_uid;
+    impl->ct = af::read_ct(path, options, &impl->warnings);
     impl->grid = library::grid_of(impl->ct.grid);
     return Ct(std::move(impl));
   });

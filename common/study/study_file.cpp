@@ -2,6 +2,7 @@
 #include "study/study_file.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 
 #include <Eigen/Dense>
@@ -149,9 +150,57 @@ void read_mask_key(TomlTableReader& reader, const fs::path& folder, StudyView& v
     view.mask = get_path(reader, "mask", Presence::Optional, folder, view.places);
 }
 
+/// One entry of landmarks_px: a point, or [] or [nan, nan] for what is not visible. False when it
+/// is neither.
+bool get_landmark(const toml::node& node, std::optional<Eigen::Vector2d>& point) {
+  const toml::array* const numbers = node.as_array();
+  if (numbers == nullptr || (!numbers->empty() && numbers->size() != 2)) return false;
+  if (numbers->empty()) return true;
+  const auto column = (*numbers)[0].value<double>();
+  const auto row = (*numbers)[1].value<double>();
+  if (!column || !row) return false;
+  if (std::isnan(*column) && std::isnan(*row)) return true;
+  point = Eigen::Vector2d(*column, *row);
+  return point->allFinite();
+}
+
+std::vector<std::optional<Eigen::Vector2d>> get_landmarks(TomlTableReader& reader,
+                                                          std::size_t expected,
+                                                          const CameraGeometry* camera) {
+  constexpr const char* kKey = "landmarks_px";
+  std::vector<std::optional<Eigen::Vector2d>> points;
+  if (!reader.has(kKey)) return points;
+  const toml::array* const entries = reader.node(kKey).as_array();
+  const std::size_t count = entries == nullptr ? 0 : entries->size();
+  if (count != expected) {
+    reader.add_problem(kKey,
+                       "has " + std::to_string(count) + " entries, but the case has " +
+                           std::to_string(expected) +
+                           " landmarks_ct_mm; they must be as many, in the same order, [] where "
+                           "one is not visible");
+    return points;
+  }
+  for (const toml::node& entry : *entries) {
+    std::optional<Eigen::Vector2d> point;
+    if (!get_landmark(entry, point)) {
+      reader.add_problem(kKey, "must be a list of [column, row], or [] where one is not visible");
+      return {};
+    }
+    const bool is_off = point && camera != nullptr &&
+                        !((point->array() >= -0.5).all() &&
+                          (point->array() <= camera->size_px.cast<double>().array() - 0.5).all());
+    if (is_off)
+      reader.add_problem(kKey,
+                         "point " + toml_numbers(*point) + " must lie on the detector of camera '" +
+                             camera->name + "'");
+    points.push_back(point);
+  }
+  return points;
+}
+
 StudyView read_view(const toml::table& table,
                     const std::string& prefix,
-                    std::size_t fiducial_count,
+                    const StudyCase& study_case,
                     const StudyContext& context) {
   TomlTableReader reader(table, prefix, context.problems);
   StudyView view;
@@ -168,7 +217,8 @@ StudyView read_view(const toml::table& table,
   view.reading = read_xray_keys(
       reader, view.xray_domain, [&](const char* key) { return path(key, Presence::Optional); });
   read_mask_key(reader, context.folder, view);
-  check_fiducials(reader, view, fiducial_count, camera);
+  check_fiducials(reader, view, study_case.fiducials_ct_mm.size(), camera);
+  view.landmarks_px = get_landmarks(reader, study_case.landmarks_ct_mm.size(), camera);
   reader.refuse_unknown_keys();
   return view;
 }
@@ -188,8 +238,7 @@ void read_views(TomlTableReader& reader,
   for (const toml::table* view_table : reader.get_tables("view", Presence::Required)) {
     const std::string view_prefix =
         prefix + "view[" + std::to_string(study_case.views.size()) + "].";
-    study_case.views.push_back(
-        read_view(*view_table, view_prefix, study_case.fiducials_ct_mm.size(), context));
+    study_case.views.push_back(read_view(*view_table, view_prefix, study_case, context));
     const std::string& camera = study_case.views.back().camera;
     const auto [earlier, is_new] =
         place_of_camera.emplace(camera, context.problems.where(*view_table));
@@ -222,6 +271,7 @@ StudyCase read_case(const toml::table& table,
   study_case.fiducials_ct_mm = get_points<3>(reader, "fiducials_ct_mm");
   if (!study_case.fiducials_ct_mm.empty() && are_collinear(study_case.fiducials_ct_mm))
     reader.add_problem("fiducials_ct_mm", "must be at least 3 points that are not collinear");
+  study_case.landmarks_ct_mm = get_points<3>(reader, "landmarks_ct_mm");
   study_case.gold_room_from_ct = reader.get_pose("gold_room_from_ct", Presence::Optional);
   read_views(reader, prefix, study_case, context);
   reader.refuse_unknown_keys();
@@ -281,6 +331,13 @@ std::string view_text(const StudyView& view, const fs::path& folder) {
   text += "roi_px = [" + std::to_string(view.roi.column) + ", " + std::to_string(view.roi.row) +
           ", " + std::to_string(view.roi.width) + ", " + std::to_string(view.roi.height) + "]\n";
   if (!view.fiducials_px.empty()) text += "fiducials_px = " + points_text(view.fiducials_px) + "\n";
+  if (!view.landmarks_px.empty())
+    text +=
+        "landmarks_px = [" +
+        joined(view.landmarks_px,
+               ", ",
+               [](const auto& point) { return point ? toml_numbers(*point) : std::string("[]"); }) +
+        "]\n";
   if (view.field) add_path("field", *view.field);
   if (view.mask) add_path("mask", *view.mask);
   if (view.reading.masks_borders) text += "mask = \"auto\"\n";
@@ -300,6 +357,8 @@ std::string case_text(const StudyCase& study_case, const fs::path& folder) {
           toml_numbers(study_case.target_box_ct.high_mm) + "]\n";
   if (!study_case.fiducials_ct_mm.empty())
     text += "fiducials_ct_mm = " + points_text(study_case.fiducials_ct_mm) + "\n";
+  if (!study_case.landmarks_ct_mm.empty())
+    text += "landmarks_ct_mm = " + points_text(study_case.landmarks_ct_mm) + "\n";
   if (study_case.gold_room_from_ct)
     text += "gold_room_from_ct = " + toml_matrix(study_case.gold_room_from_ct->matrix()) + "\n";
   for (const StudyView& view : study_case.views) text += view_text(view, folder);

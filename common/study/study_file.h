@@ -28,6 +28,9 @@ struct StudyView {
   std::vector<Eigen::Vector2d>
       fiducials_px;  ///< (column, row), in the order of StudyCase::fiducials_ct_mm; NaN: not seen;
                      ///< NaN: not seen
+  /// (column, row), in the order of StudyCase::landmarks_ct_mm; nullopt: not visible here. Empty:
+  /// none is.
+  std::vector<std::optional<Eigen::Vector2d>> landmarks_px;
   std::optional<std::filesystem::path> field;
   std::optional<std::filesystem::path> mask;
   XrayReading reading;
@@ -45,6 +48,7 @@ struct StudyCase {
       Eigen::Vector3d::Zero();  ///< ROI centre: rotation origin of the registration
   CtBox target_box_ct;
   std::vector<Eigen::Vector3d> fiducials_ct_mm;
+  std::vector<Eigen::Vector3d> landmarks_ct_mm;  ///< to start from, however roughly marked
   std::optional<RigidTransform>
       gold_room_from_ct;  ///< instead of, or to compare with, the fiducials
   std::vector<StudyView> views;

@@ -39,12 +39,17 @@ target_box_ct_mm = [[-30, -30, -30], [30, 30, 30]]  # low and high corner: TRE i
 # ... or the true pose itself.
 # gold_room_from_ct = [[1, 0, 0, 1.5], [0, 1, 0, -2.0], [0, 0, 1, 0.5], [0, 0, 0, 1]]
 
+# A start without a guess: at least three points that are marked here and, roughly, in the X-rays
+# (docs/start-without-a-guess.md).
+# landmarks_ct_mm = [[-60.0, 10.0, 5.0], [55.0, -20.0, 12.0], [8.0, 70.0, -40.0]]
+
 [[case.view]]                                    # one per X-ray; two or more cameras see depth
 camera = "A"                                     # a camera of the rig
 xray = "patient-01/A.mha"                        # DICOM, MetaImage, NIfTI, NRRD, TIFF or PNG, the camera's size
 xray_domain = "intensity"                        # bright = unattenuated, -log is taken; or "attenuation"
 roi_px = [156, 156, 200, 200]                    # column, row, width, height: the pixels that are compared
 # fiducials_px = [[201.3, 255.0], [280.1, 231.7], [240.6, 301.2], [232.9, 207.4]]   # as many as fiducials_ct_mm
+# landmarks_px = [[210.0, 240.5], [], [251.0, 330.0]]   # as many as landmarks_ct_mm; [] is one that is not visible
 # field = "fields/patient-01-A.af.h5"            # made by af-precompute --study study.toml --case patient-01 --camera A
 # mask = "patient-01/A-mask.png"                 # not zero = used; for steel, labels or collimators; or "auto"
 # How the X-ray's values are read (docs/xrays.md); af-inspect says what was done.

@@ -187,6 +187,7 @@ json result_json(const RegistrationRecord& record,
       parameters_json(parameters_from_pose(frame, result.room_from_ct));
   output["start_parameters_relative_to_nominal"] =
       parameters_json(parameters_from_pose(frame, result.start_room_from_ct));
+  if (!run.landmarks.is_null()) output["start_landmarks"] = run.landmarks;
   output["similarity"] = number_or_null(result.similarity);
   output["evaluations"] = result.evaluations;
   output["inadmissible_evaluations"] = result.inadmissible;

@@ -49,6 +49,7 @@ struct RunDescription {
   std::string case_name;
   std::string renderer;  ///< "field" or "raycast"
   Provenance provenance;
+  nlohmann::json landmarks;  ///< what gave the start, with residuals; null: another start
 };
 
 /// result.json: verdict, poses as 4x4 (`room_from_ct`, which read_pose() reads) and as six

@@ -244,15 +244,20 @@ row 2 '--camera' 'empty text' "${precompute[@]}" --study valid/study.toml --came
 printf -- '--- field ---\n'
 register=("$bin/af-register" --study valid/study.toml -o out/result)
 row 4 'other.af.h5' 'field of another CT' "${register[@]}" --field AP=other.af.h5 --field LAT=other-LAT.af.h5
-row 4 'read with mu = 2e-05 * value + 0.02 per mm' 'field of a CT that is read otherwise' "${register[@]}" \
-  --field AP=AP.af.h5 --field LAT=LAT.af.h5 --values raw --raw-slope-per-mm 0.00002 --raw-offset-per-mm 0.02
+row 4 'read with mu = 3e-05 * value + 0.02 per mm' 'field of a CT that is read otherwise' "${register[@]}" \
+  --field AP=AP.af.h5 --field LAT=LAT.af.h5 --values raw --raw-slope-per-mm 0.00003 --raw-offset-per-mm 0.02
 row 4 'LAT.af.h5' 'field of another camera' "${register[@]}" --field AP=LAT.af.h5 --field LAT=AP.af.h5
 head -c 20000 AP.af.h5 >cut.af.h5
 row 4 'cut.af.h5' 'truncated field' "$bin/af-drr" --field cut.af.h5 -o out/drr.mha
+# The first 20 bytes from there on without a zero: HDF5 leaves room that holds nothing.
 for percent in 20 30 40 60 80; do
   cp AP.af.h5 spoilt.af.h5
-  printf 'spoilt spoilt spoilt' |
-    dd of=spoilt.af.h5 bs=1 seek=$(($(stat --format %s AP.af.h5) * percent / 100)) conv=notrunc status=none
+  from=$(($(stat --format %s AP.af.h5) * percent / 100))
+  tail --bytes=+$((from + 1)) AP.af.h5 >rest
+  LC_ALL=C grep --null-data --only-matching --byte-offset --text --max-count=1 '.\{20\}' rest >found
+  skip=$(head --bytes=20 found)  # "OFFSET:MATCH"
+  skip=${skip%%:*}
+  printf 'spoilt spoilt spoilt' | dd of=spoilt.af.h5 bs=1 seek=$((from + skip)) conv=notrunc status=none
   row 4 'spoilt.af.h5' "20 bytes spoilt at $percent % of a field" "$bin/af-drr" --field spoilt.af.h5 -o out/drr.mha
 done
 : >empty.af.h5

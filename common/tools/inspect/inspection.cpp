@@ -10,6 +10,7 @@
 #include "base/joined.h"
 #include "camera_files/camera_formats.h"
 #include "files/input_file.h"
+#include "files/output_file.h"
 #include "image_files/dicom_series.h"
 #include "image_files/image_header.h"
 #include "pose_files/autoscoper_pose.h"
@@ -19,6 +20,7 @@
 #include "run/progress_journal.h"
 #include "study/rig_file.h"
 #include "study/study_file.h"
+#include "study_pictures/study_pictures.h"
 #include "tools/inspect/inspect_kinds.h"
 
 namespace af {
@@ -282,6 +284,22 @@ ordered_json to_json(const Inspection& inspection) {
 
 std::string to_text(const Inspection& inspection) {
   return text_at(inspection, "");
+}
+
+std::string draw_pictures(const fs::path& study_path,
+                          const CtReadOptions& ct_reading,
+                          const fs::path& folder) {
+  const Study study = read_study(study_path);
+  make_output_folder(folder);
+  std::string text;
+  for (const StudyCase& study_case : study.cases) {
+    const StudyPictures pictures = draw_study_pictures(study, study_case, ct_reading, folder);
+    text += "case " + study_case.name + "\n";
+    for (const std::string& fact : pictures.facts) text += "  " + indented(fact, "  ") + "\n";
+    for (const std::string& telltale : pictures.telltales) text += "  LOOK: " + telltale + "\n";
+    for (const fs::path& file : pictures.files) text += "  " + file.string() + "\n";
+  }
+  return text;
 }
 
 std::string view_lines(const fs::path& study_path) {

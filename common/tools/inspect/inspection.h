@@ -38,6 +38,13 @@ nlohmann::ordered_json to_json(const Inspection& inspection);
 /// For people: one fact per line.
 std::string to_text(const Inspection& inspection);
 
+/// Draws the pictures of every case of a study (draw_study_pictures()) into a folder, which is
+/// made; returns what they show and the tell-tales, for people. Throws as read_study() and reading
+/// what the study names.
+std::string draw_pictures(const std::filesystem::path& study_path,
+                          const CtReadOptions& ct_reading,
+                          const std::filesystem::path& folder);
+
 /// For scripts: one line per view of a study, "case<tab>camera". Throws as read_study().
 std::string view_lines(const std::filesystem::path& study_path);
 

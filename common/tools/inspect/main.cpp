@@ -32,6 +32,7 @@ struct Options {
   std::string rig_to = "rig";
   af::CameraFileOptions cameras;
   af::PoseConversion poses;
+  std::filesystem::path pictures;
   std::filesystem::path output;
   af::CtReadOptions ct;
 
@@ -67,6 +68,11 @@ void Options::describe(af::Fields& field) {
       .choice(af::writable_camera_formats())
       .needs({"--rig-from"});
   field.part(cameras);
+  field("pictures",
+        pictures,
+        "Of studies: folder for pictures of each view (X-ray, DRRs at the nominal pose and at that "
+        "of the landmarks, with the patient's directions) and of the room")
+      .excludes({"--json", "--list-views", "--list-inputs", "--rig-from", "--pose-to"});
   field.part(poses);
   field("output",
         output,
@@ -138,6 +144,16 @@ void run(const Options& options, const Communicator& world) {
         return options.lists_views ? af::view_lines(path) : af::input_lines(path);
       });
       if (world.is_root()) std::cout << lines;
+    }
+    return;
+  }
+  if (!options.pictures.empty()) {
+    for (const std::string& path : options.paths) {
+      const std::string text = af::all_or_none(world, [&] {
+        return world.is_root() ? af::draw_pictures(path, options.ct, options.pictures)
+                               : std::string();
+      });
+      if (world.is_root()) std::cout << text;
     }
     return;
   }

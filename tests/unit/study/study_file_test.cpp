@@ -469,5 +469,46 @@ TEST_F(StudyFile, RefusesContradictionsInHowACtIsRead) {
   EXPECT_THAT(refused("ct_resamples = true"), HasSubstr("did you mean \"ct_resample\""));
 }
 
+/// The good study with landmarks, and [] and nan for what is not visible.
+std::string study_with_landmarks() {
+  std::string text =
+      replaced(kGoodStudy,
+               "fiducials_ct_mm = ",
+               "landmarks_ct_mm = [[1,2,3], [40,5,6], [7,80,9]]\nfiducials_ct_mm = ");
+  text = replaced(
+      text, "field = \"fields", "landmarks_px = [[10,20.5], [], [30,40]]\nfield = \"fields");
+  return replaced(text, "mask = ", "landmarks_px = [[nan,nan], [1,2], [3,4]]\nmask = ");
+}
+
+TEST_F(StudyFile, LandmarksMayBeInvisibleInAView) {
+  const Study study = read(study_with_landmarks());
+  const StudyCase& study_case = study.cases.at(0);
+  ASSERT_EQ(study_case.landmarks_ct_mm.size(), 3U);
+  EXPECT_EQ(study_case.landmarks_ct_mm[2], Vector3d(7, 80, 9));
+  const auto& a = study_case.views.at(0).landmarks_px;
+  ASSERT_EQ(a.size(), 3U);
+  EXPECT_EQ(a[0], Vector2d(10, 20.5));
+  EXPECT_FALSE(a[1].has_value());
+  EXPECT_FALSE(study_case.views.at(1).landmarks_px.at(0).has_value());
+  const Study again = read(study_to_toml(study, study.path.parent_path()));
+  EXPECT_EQ(again.cases.at(0).views.at(0).landmarks_px, a);
+  EXPECT_EQ(again.cases.at(0).landmarks_ct_mm, study_case.landmarks_ct_mm);
+}
+
+TEST_F(StudyFile, LandmarksWithMistakesAreRefusedWithTheirLine) {
+  const auto refused = [&](const std::string& from, const std::string& to) {
+    return message_of<InputError>([&] { read(replaced(study_with_landmarks(), from, to)); });
+  };
+  EXPECT_THAT(refused("[[10,20.5], [], ", "[[10,20.5], "),
+              AllOf(HasSubstr("landmarks_px"), HasSubstr("2 entries")));
+  EXPECT_THAT(refused("[10,20.5]", "[10]"), HasSubstr("[column, row]"));
+  EXPECT_THAT(refused("[10,20.5]", "[10,nan]"), HasSubstr("[column, row]"));
+  EXPECT_THAT(refused("[10,20.5]", "[10,20.5,3]"), HasSubstr("[column, row]"));
+  EXPECT_THAT(refused("[10,20.5]", "\"none\""), HasSubstr("[column, row]"));
+  EXPECT_THAT(refused("[10,20.5]", "[10,2000]"), HasSubstr("on the detector"));
+  EXPECT_THAT(refused("landmarks_px = [[10,20.5], [], [30,40]]", "landmarks_px = 3"),
+              HasSubstr("0 entries"));
+}
+
 }  // namespace
 }  // namespace af

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "study/landmark_start.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "base/error.h"
+#include "text/csv_table.h"
+
+namespace af {
+namespace {
+
+bool shows_one(const StudyView& view) {
+  return std::ranges::any_of(view.landmarks_px,
+                             [](const auto& point) { return point.has_value(); });
+}
+
+}  // namespace
+
+bool has_landmarks(const StudyCase& study_case) {
+  return std::ranges::any_of(study_case.views, shows_one);
+}
+
+LandmarkPose landmark_pose(const Study& study, const StudyCase& study_case) {
+  const std::string where = "case '" + study_case.name + "'";
+  if (!has_landmarks(study_case))
+    throw InputError(where + ": has no landmarks_ct_mm with landmarks_px to start from");
+  std::vector<LandmarkView> views;
+  for (const StudyView& view : study_case.views) {
+    std::vector<std::optional<Eigen::Vector2d>> seen = view.landmarks_px;
+    seen.resize(study_case.landmarks_ct_mm.size());
+    views.push_back({study.rig.camera(view.camera), seen});
+  }
+  try {
+    return pose_from_landmarks(views, study_case.landmarks_ct_mm, study_case.nominal_room_from_ct);
+  } catch (const InputError& error) {
+    throw InputError(study.path.string() + ": " + where + ": " + error.what());
+  }
+}
+
+std::string residuals_text(const LandmarkPose& pose, const StudyCase& study_case) {
+  std::string text = "landmarks   " + fixed_text(pose.rms_px, 1) + " px, " +
+                     fixed_text(pose.rms_mm, 2) + " mm from where they were seen (RMS);";
+  for (const LandmarkResidual& residual : pose.residuals)
+    text += " " + study_case.views[residual.view].camera + std::to_string(residual.landmark + 1) +
+            ": " + fixed_text(residual.px, 1) + " px, " + fixed_text(residual.mm, 2) + " mm";
+  text += "\n";
+  for (const std::string& note : pose.notes) text += "            " + note + "\n";
+  return text;
+}
+
+nlohmann::json to_json(const LandmarkPose& pose, const StudyCase& study_case) {
+  nlohmann::json output = {{"rms_px", pose.rms_px},
+                           {"rms_mm", pose.rms_mm},
+                           {"notes", pose.notes},
+                           {"residuals", nlohmann::json::array()}};
+  for (const LandmarkResidual& residual : pose.residuals)
+    output["residuals"].push_back({{"camera", study_case.views[residual.view].camera},
+                                   {"landmark", residual.landmark + 1},
+                                   {"px", residual.px},
+                                   {"mm", residual.mm}});
+  return output;
+}
+
+}  // namespace af

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <string>
+
+#include "geometry/camera_geometry.h"
+#include "geometry/rigid_transform.h"
+
+namespace af {
+
+/// Letters of a direction in the patient: L left, R right, A front (anterior), P back (posterior),
+/// H head, F feet; the nearest axis first, then those within 67.5 degrees of it: "A", "AR", "LPH".
+std::string patient_letters(const Eigen::Vector3d& ct_direction);
+
+/// What stands at a picture's edges, and where the beam goes.
+struct EdgeLetters {
+  std::string left, right, top, bottom;
+  std::string beam_from, beam_to;
+};
+
+/// The patient's directions as a camera's picture shows them at a pose: at the left edge stand the
+/// letters of the direction against the columns, at the top of that against the rows.
+EdgeLetters edge_letters(const CameraGeometry& camera, const RigidTransform& room_from_ct);
+
+}  // namespace af

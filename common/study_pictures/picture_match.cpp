@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "study_pictures/picture_match.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "base/error.h"
+#include "text/csv_table.h"
+
+namespace af {
+namespace {
+
+constexpr std::array kLayings = {
+    PictureLaying{"as it is", false, false, false},
+    PictureLaying{"flipped left to right", false, true, false},
+    PictureLaying{"flipped upside down", false, false, true},
+    PictureLaying{"turned by 180 degrees", false, true, true},
+    PictureLaying{"with columns and rows swapped", true, false, false},
+    PictureLaying{"turned by 90 degrees clockwise", true, true, false},
+    PictureLaying{"turned by 90 degrees anticlockwise", true, false, true},
+    PictureLaying{"with columns and rows swapped and turned by 180 degrees", true, true, true},
+};
+
+/// Means of squares of pixels, so that no side is longer than `most`.
+Image2d shrunk(const Image2d& image, int most) {
+  const int factor = std::max(1, (std::max(image.width, image.height) + most - 1) / most);
+  Image2d small(image.width / factor, image.height / factor);
+  for (int row = 0; row < small.height; ++row)
+    for (int column = 0; column < small.width; ++column) {
+      double sum = 0.0;
+      for (int y = 0; y < factor; ++y)
+        for (int x = 0; x < factor; ++x)
+          sum += static_cast<double>(image.at(column * factor + x, row * factor + y));
+      small.at(column, row) = static_cast<float>(sum / (factor * factor));
+    }
+  return small;
+}
+
+Image2d laid(const Image2d& image, const PictureLaying& laying) {
+  Image2d result(laying.swaps_axes ? image.height : image.width,
+                 laying.swaps_axes ? image.width : image.height);
+  for (int row = 0; row < result.height; ++row)
+    for (int column = 0; column < result.width; ++column) {
+      const int x = laying.flips_columns ? result.width - 1 - column : column;
+      const int y = laying.flips_rows ? result.height - 1 - row : row;
+      result.at(column, row) = laying.swaps_axes ? image.at(y, x) : image.at(x, y);
+    }
+  return result;
+}
+
+/// Normalised correlation of `a` at (column, row) with `b` at (column + dx, row + dy), over the
+/// pixels that both have.
+double correlation_at(const Image2d& a, const Image2d& b, int dx, int dy) {
+  double n = 0.0;
+  double sum_a = 0.0;
+  double sum_b = 0.0;
+  double sum_aa = 0.0;
+  double sum_bb = 0.0;
+  double sum_ab = 0.0;
+  for (int row = std::max(0, -dy); row < std::min(a.height, b.height - dy); ++row)
+    for (int column = std::max(0, -dx); column < std::min(a.width, b.width - dx); ++column) {
+      const auto va = static_cast<double>(a.at(column, row));
+      const auto vb = static_cast<double>(b.at(column + dx, row + dy));
+      n += 1.0;
+      sum_a += va;
+      sum_b += vb;
+      sum_aa += va * va;
+      sum_bb += vb * vb;
+      sum_ab += va * vb;
+    }
+  const double variance = (sum_aa - sum_a * sum_a / n) * (sum_bb - sum_b * sum_b / n);
+  return n > 0.0 && variance > 0.0 ? (sum_ab - sum_a * sum_b / n) / std::sqrt(variance) : 0.0;
+}
+
+double best_correlation(const Image2d& a, const Image2d& b) {
+  double best = -1.0;
+  const int reach_x = b.width / 4;
+  const int reach_y = b.height / 4;
+  for (int dy = -reach_y; dy <= reach_y; dy += 2)
+    for (int dx = -reach_x; dx <= reach_x; dx += 2)
+      best = std::max(best, correlation_at(a, b, dx, dy));
+  return best;
+}
+
+}  // namespace
+
+std::vector<LayingMatch> laying_matches(const Image2d& xray, const Image2d& drr) {
+  check(xray.width == drr.width && xray.height == drr.height, "pictures of one camera");
+  constexpr int kMostPixels = 48;
+  const Image2d small_xray = shrunk(xray, kMostPixels);
+  const Image2d small_drr = shrunk(drr, kMostPixels);
+  std::vector<LayingMatch> matches;
+  for (const PictureLaying& laying : kLayings)
+    if (!laying.swaps_axes || xray.width == xray.height)
+      matches.push_back({laying, best_correlation(laid(small_xray, laying), small_drr)});
+  return matches;
+}
+
+std::string laying_telltale(const std::vector<LayingMatch>& matches) {
+  constexpr double kClearlyBetter = 0.1;
+  constexpr double kWell = 0.6;
+  const LayingMatch& best = *std::ranges::max_element(matches, {}, &LayingMatch::correlation);
+  if (best.correlation < matches.front().correlation + kClearlyBetter || best.correlation < kWell)
+    return {};
+  return std::string("the X-ray looks more like the DRR when ") + best.laying.name +
+         " (correlation " + fixed_text(best.correlation, 2) + ") than as it is (" +
+         fixed_text(matches.front().correlation, 2) +
+         "): check its orientation and the camera's directions; nothing is flipped here";
+}
+
+}  // namespace af

@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "study_pictures/study_pictures.h"
+
+#include <algorithm>
+#include <memory>
+
+#include "base/error.h"
+#include "drr/ray_cast_drr.h"
+#include "figures/picture.h"
+#include "files/output_file.h"
+#include "study/ct_keys.h"
+#include "study/landmark_start.h"
+#include "study/xray_reader.h"
+#include "study_pictures/patient_directions.h"
+#include "study_pictures/picture_match.h"
+#include "study_pictures/room_sketch.h"
+#include "text/csv_table.h"
+
+namespace af {
+namespace {
+
+/// A pose to show, and what it is called.
+struct ShownPose {
+  std::string name;
+  RigidTransform room_from_ct;
+};
+
+/// A view's pictures, shrunk by `factor`.
+struct ShrunkView {
+  View view;  ///< of coarse pixels, the whole detector
+  int factor = 1;
+
+  /// Place of a detector point in the shrunk picture.
+  [[nodiscard]] std::array<double, 2> place(const Eigen::Vector2d& px) const {
+    return {(px.x() + 0.5) / factor - 0.5, (px.y() + 0.5) / factor - 0.5};
+  }
+};
+
+ShrunkView shrunk_view(const CameraGeometry& camera) {
+  constexpr int kMostPixels = 320;
+  const int longest = camera.size_px.maxCoeff();
+  const int factor = std::max(1, (longest + kMostPixels - 1) / kMostPixels);
+  const View whole = View::whole_detector(camera);
+  return {factor == 1 ? whole : whole.coarser(factor), factor};
+}
+
+Image2d shrunk_image(const Image2d& image, const ShrunkView& shrunk) {
+  Image2d small(shrunk.view.roi.width, shrunk.view.roi.height);
+  const int factor = shrunk.factor;
+  for (int row = 0; row < small.height; ++row)
+    for (int column = 0; column < small.width; ++column) {
+      double sum = 0.0;
+      for (int y = 0; y < factor; ++y)
+        for (int x = 0; x < factor; ++x)
+          sum += static_cast<double>(image.at(column * factor + x, row * factor + y));
+      small.at(column, row) = static_cast<float>(sum / (factor * factor));
+    }
+  return small;
+}
+
+void add_letters(const EdgeLetters& letters, PicturePanel& panel) {
+  const double width = panel.image.width;
+  const double height = panel.image.height;
+  const double inset = 0.05 * std::max(width, height);
+  const auto add = [&](double x, double y, const std::string& text) {
+    panel.marks.push_back({{x, y}, PictureMark::Shape::None, text, PictureColor::Yellow});
+  };
+  add(inset, height / 2.0, letters.left);
+  add(width - inset, height / 2.0, letters.right);
+  add(width / 2.0, inset, letters.top);
+  add(width / 2.0, height - inset, letters.bottom);
+}
+
+void add_region(const StudyView& view, const ShrunkView& shrunk, PicturePanel& panel) {
+  const RegionOfInterest& roi = view.roi;
+  const auto corner = [&](int column, int row) { return shrunk.place({column - 0.5, row - 0.5}); };
+  panel.lines.push_back({{corner(roi.column, roi.row),
+                          corner(roi.column + roi.width, roi.row),
+                          corner(roi.column + roi.width, roi.row + roi.height),
+                          corner(roi.column, roi.row + roi.height),
+                          corner(roi.column, roi.row)},
+                         PictureColor::Yellow,
+                         1.8});
+}
+
+/// Circles where landmarks were seen, crosses where a pose puts them.
+void add_landmarks(const StudyCase& study_case,
+                   const StudyView& view,
+                   const ShrunkView& shrunk,
+                   const CameraGeometry& camera,
+                   const RigidTransform* pose,
+                   PicturePanel& panel) {
+  for (std::size_t i = 0; i < view.landmarks_px.size(); ++i)
+    if (const auto& seen = view.landmarks_px[i]; seen.has_value())
+      panel.marks.push_back({shrunk.place(*seen),
+                             PictureMark::Shape::Circle,
+                             std::to_string(i + 1),
+                             PictureColor::Cyan});
+  if (pose == nullptr) return;
+  for (const Eigen::Vector3d& point : study_case.landmarks_ct_mm)
+    if (const Eigen::Vector3d room_point = *pose * point; camera.depth_mm(room_point) > 1.0)
+      panel.marks.push_back({shrunk.place(camera.project(room_point)),
+                             PictureMark::Shape::Cross,
+                             "",
+                             PictureColor::Red});
+}
+
+/// The window is that of the region: borders of an X-ray may hold anything.
+PicturePanel panel_with(const Image2d& image,
+                        const StudyView& view,
+                        const ShrunkView& shrunk,
+                        const std::string& title,
+                        const std::string& caption) {
+  const RegionOfInterest region = {
+      std::min(view.roi.column / shrunk.factor, image.width - 1),
+      std::min(view.roi.row / shrunk.factor, image.height - 1),
+      std::max(1, std::min(view.roi.width / shrunk.factor, image.width)),
+      std::max(1, std::min(view.roi.height / shrunk.factor, image.height))};
+  const RegionOfInterest within = {region.column,
+                                   region.row,
+                                   std::min(region.width, image.width - region.column),
+                                   std::min(region.height, image.height - region.row)};
+  const auto window = percentile_window(crop(image, within), 0.5, 99.5);
+  return {image, window[0], window[1], title, caption, {}, {}};
+}
+
+/// The pictures of one view.
+void draw_view(const Study& study,
+               const StudyCase& study_case,
+               const StudyView& view,
+               const DrrRenderer& caster,
+               const std::vector<ShownPose>& poses,
+               const std::filesystem::path& folder,
+               StudyPictures& pictures) {
+  const CameraGeometry& camera = study.rig.camera(view.camera);
+  const ShrunkView shrunk = shrunk_view(camera);
+  const Image2d xray = shrunk_image(read_view_xray(view, camera).attenuation, shrunk);
+  const EdgeLetters letters = edge_letters(camera, poses.front().room_from_ct);
+  const std::string beam = "beam from " + letters.beam_from + " to " + letters.beam_to;
+  std::vector<PicturePanel> panels;
+  panels.push_back(
+      panel_with(xray,
+                 view,
+                 shrunk,
+                 "X-ray",
+                 "as the file has it, attenuation; letters of the nominal pose, " + beam +
+                     (view.landmarks_px.empty() ? "" : "; circles: landmarks as marked")));
+  add_letters(letters, panels.back());
+  add_region(view, shrunk, panels.back());
+  add_landmarks(study_case, view, shrunk, camera, nullptr, panels.back());
+  Image2d last_drr;
+  for (const ShownPose& pose : poses) {
+    last_drr = render_image(caster, pose.room_from_ct, shrunk.view);
+    const EdgeLetters at_pose = edge_letters(camera, pose.room_from_ct);
+    panels.push_back(panel_with(last_drr,
+                                view,
+                                shrunk,
+                                "DRR, " + pose.name,
+                                "cast through the CT; beam from " + at_pose.beam_from + " to " +
+                                    at_pose.beam_to +
+                                    (study_case.landmarks_ct_mm.empty()
+                                         ? ""
+                                         : "; crosses: landmarks where this pose puts them")));
+    add_letters(at_pose, panels.back());
+    add_region(view, shrunk, panels.back());
+    add_landmarks(study_case, view, shrunk, camera, &pose.room_from_ct, panels.back());
+  }
+  pictures.facts.push_back("camera " + camera.name + ": left edge " + letters.left + ", right " +
+                           letters.right + ", top " + letters.top + ", bottom " + letters.bottom +
+                           "; " + beam);
+  if (camera.is_mirrored())
+    pictures.telltales.push_back("camera " + camera.name +
+                                 ": column x row points against the beam: its pictures are "
+                                 "mirrored, as if seen from behind the detector");
+  if (const std::string telltale = laying_telltale(laying_matches(xray, last_drr));
+      !telltale.empty())
+    pictures.telltales.push_back("camera " + camera.name + ": " + telltale);
+  std::string heading = study_case.name + ", camera " + camera.name;
+  for (const std::string& telltale : pictures.telltales)
+    if (telltale.starts_with("camera " + camera.name + ":")) heading += "\n" + telltale;
+  const std::filesystem::path path =
+      folder / (file_name_part(study_case.name) + "-" + file_name_part(camera.name) + ".png");
+  write_picture(panels, static_cast<int>(panels.size()), heading, path);
+  pictures.files.push_back(path);
+}
+
+}  // namespace
+
+StudyPictures draw_study_pictures(const Study& study,
+                                  const StudyCase& study_case,
+                                  const CtReadOptions& ct_reading,
+                                  const std::filesystem::path& folder) {
+  StudyPictures pictures;
+  const CtVolume ct = used_from(study_case.places, "ct", [&] {
+    return read_ct(study_case.ct, ct_reading_in_force(ct_reading, study_case.ct_reading));
+  });
+  const RayCastDrr caster(std::make_shared<const AttenuationVolume>(ct, AttenuationModel()));
+  std::vector<ShownPose> poses = {{"nominal pose", study_case.nominal_room_from_ct}};
+  if (has_landmarks(study_case)) {
+    const LandmarkPose pose = landmark_pose(study, study_case);
+    poses.push_back({"pose of the landmarks", pose.room_from_ct});
+    pictures.facts.push_back(residuals_text(pose, study_case));
+  }
+  std::vector<CameraGeometry> cameras;
+  for (const StudyView& view : study_case.views) {
+    draw_view(study, study_case, view, caster, poses, folder, pictures);
+    cameras.push_back(study.rig.camera(view.camera));
+  }
+  const std::filesystem::path path = folder / (file_name_part(study_case.name) + "-room.png");
+  write_picture(room_sketch(cameras, ct.grid, poses.back().room_from_ct),
+                3,
+                study_case.name + ": the room at the " + poses.back().name,
+                path);
+  pictures.files.push_back(path);
+  return pictures;
+}
+
+}  // namespace af

@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/hash_random.h"
+#include "study/rig_file.h"
+#include "study_pictures/patient_directions.h"
+#include "study_pictures/picture_match.h"
+#include "study_pictures/room_sketch.h"
+
+namespace af {
+namespace {
+
+using Eigen::Vector3d;
+using testing::HasSubstr;
+
+TEST(PatientLetters, NameTheNearestDirectionsFirst) {
+  EXPECT_EQ(patient_letters({1, 0, 0}), "L");
+  EXPECT_EQ(patient_letters({-1, 0, 0}), "R");
+  EXPECT_EQ(patient_letters({0, 1, 0}), "P");
+  EXPECT_EQ(patient_letters({0, -5, 0}), "A");
+  EXPECT_EQ(patient_letters({0, 0, 1}), "H");
+  EXPECT_EQ(patient_letters({0, 0, -1}), "F");
+  EXPECT_EQ(patient_letters({0.9, -0.5, 0.1}), "LA");
+  EXPECT_EQ(patient_letters({0.5, 0.6, -0.7}), "FPL");
+}
+
+// The contract's c-arm-12in with a supine patient: in AP the patient's right is on the picture's
+// left and the head on top; LAT looks from the patient's left (+x), so the front (-y) is left.
+TEST(EdgeLetters, OfTheShippedCArmAreThoseOfARadiograph) {
+  const CameraRig rig = parse_rig(builtin_rig_text("c-arm-12in"), "c-arm-12in");
+  const EdgeLetters ap = edge_letters(rig.camera("AP"), RigidTransform::Identity());
+  EXPECT_EQ(ap.left + ap.right + ap.top + ap.bottom, "RLHF");
+  EXPECT_EQ(ap.beam_from + ap.beam_to, "AP");
+  const EdgeLetters lat = edge_letters(rig.camera("LAT"), RigidTransform::Identity());
+  EXPECT_EQ(lat.left + lat.right + lat.top + lat.bottom, "APHF");
+  EXPECT_EQ(lat.beam_from + lat.beam_to, "LR");
+}
+
+TEST(EdgeLetters, FollowThePatientWhenItIsTurned) {
+  const CameraRig rig = parse_rig(builtin_rig_text("c-arm-12in"), "c-arm-12in");
+  RigidTransform prone = RigidTransform::Identity();  // half a turn about the long axis
+  prone.linear() = rotation_from_angles({0, 0, 180.0 * kRadPerDeg});
+  const EdgeLetters ap = edge_letters(rig.camera("AP"), prone);
+  EXPECT_EQ(ap.left + ap.right + ap.top + ap.bottom, "LRHF");
+  EXPECT_EQ(ap.beam_from + ap.beam_to, "PA");
+}
+
+/// A picture without symmetry: an L of discs on a smooth ground.
+Image2d uneven_picture(int side) {
+  Image2d image(side, side);
+  const std::vector<std::array<double, 3>> discs = {
+      {0.3, 0.25, 0.12}, {0.32, 0.5, 0.1}, {0.35, 0.75, 0.13}, {0.65, 0.75, 0.08}};
+  for (int row = 0; row < side; ++row)
+    for (int column = 0; column < side; ++column) {
+      double value = 0.3 * row / side;
+      for (const auto& [x, y, radius] : discs)
+        if (std::hypot((column + 0.5) / side - x, (row + 0.5) / side - y) < radius) value += 2.0;
+      image.at(column, row) = static_cast<float>(value);
+    }
+  return image;
+}
+
+Image2d mirrored(const Image2d& image) {
+  Image2d result(image.width, image.height);
+  for (int row = 0; row < image.height; ++row)
+    for (int column = 0; column < image.width; ++column)
+      result.at(column, row) = image.at(image.width - 1 - column, row);
+  return result;
+}
+
+Image2d shifted(const Image2d& image, int columns, int rows) {
+  Image2d result(image.width, image.height);
+  for (int row = 0; row < image.height; ++row)
+    for (int column = 0; column < image.width; ++column)
+      result.at(column, row) = image.at(std::clamp(column - columns, 0, image.width - 1),
+                                        std::clamp(row - rows, 0, image.height - 1));
+  return result;
+}
+
+Image2d turned_clockwise(const Image2d& image) {
+  Image2d result(image.height, image.width);
+  for (int row = 0; row < result.height; ++row)
+    for (int column = 0; column < result.width; ++column)
+      result.at(column, row) = image.at(row, image.height - 1 - column);
+  return result;
+}
+
+TEST(LayingTelltale, IsSilentForPicturesThatAreMerelyShifted) {
+  const Image2d drr = uneven_picture(96);
+  EXPECT_EQ(laying_telltale(laying_matches(shifted(drr, 9, -7), drr)), "");
+}
+
+TEST(LayingTelltale, NamesHowThePictureWouldFit) {
+  const Image2d drr = uneven_picture(96);
+  EXPECT_THAT(laying_telltale(laying_matches(shifted(mirrored(drr), 6, 4), drr)),
+              HasSubstr("when flipped left to right"));
+  // Turned clockwise, it fits after a turn the other way.
+  EXPECT_THAT(laying_telltale(laying_matches(turned_clockwise(drr), drr)),
+              HasSubstr("when turned by 90 degrees anticlockwise"));
+  EXPECT_THAT(laying_telltale(laying_matches(turned_clockwise(turned_clockwise(drr)), drr)),
+              HasSubstr("when turned by 180 degrees"));
+}
+
+TEST(LayingTelltale, IsSilentForNoiseAndForConstantPictures) {
+  HashRandom random(3);
+  Image2d noise(64, 64);
+  for (float& pixel : noise.pixels) pixel = static_cast<float>(random.normal());
+  EXPECT_EQ(laying_telltale(laying_matches(noise, uneven_picture(64))), "");
+  EXPECT_EQ(laying_telltale(laying_matches(Image2d(64, 64), uneven_picture(64))), "");
+}
+
+TEST(RoomSketch, ShowsEveryCameraWithinItsPaper) {
+  const CameraRig rig = parse_rig(builtin_rig_text("c-arm-12in"), "c-arm-12in");
+  CtGrid ct;
+  ct.size = {100, 100, 50};
+  for (const PicturePanel& panel : room_sketch(rig.cameras, ct, RigidTransform::Identity())) {
+    // Per camera four rays, a detector and its first row; twelve edges of the CT.
+    EXPECT_EQ(panel.lines.size(), 2U * 6U + 12U);
+    EXPECT_EQ(panel.marks.size(), 2U * 2U + 6U);
+    for (const PictureMark& mark : panel.marks) {
+      EXPECT_GE(std::min(mark.place[0], mark.place[1]), 0.0);
+      EXPECT_LE(std::max(mark.place[0], mark.place[1]), panel.image.width);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace af
