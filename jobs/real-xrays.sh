@@ -131,9 +131,9 @@ for case_name in "${case_names[@]}"; do
     register "runs/$case_name-$preset" summary.json "$case_name" "${of_case[@]}" "${from[@]}" --preset "$preset" "${both[@]}"
     run_folders+=("$output/runs/$case_name-$preset")
     if ((raycast_starts > 0)) && [[ "$preset" != paper ]]; then
-      register "finishes/$case_name-$preset" summary.json "$case_name" "${of_case[@]}" "${from[@]}" \
+      register "finishes/$case_name-$preset-corrected" summary.json "$case_name" "${of_case[@]}" "${from[@]}" \
         --preset "$preset" --correct --renderer field
-      finish_folders+=("$output/finishes/$case_name-$preset")
+      finish_folders+=("$output/finishes/$case_name-$preset-corrected")
     fi
   done
 done
