@@ -95,13 +95,17 @@ TEST(CaseTable, HasARowPerCaseAndOneOverAll) {
                 {"successes", successes},
                 {"rate", static_cast<double>(successes) / starts},
                 {"tre_of_successes_mm", {{"mean", mean}, {"sd", 0.25}}},
-                {"tre_of_all_mm", {{"median", 0.5}, {"p95", "inf"}}}};
+                {"tre_of_all_mm", {{"median", 0.5}, {"p95", "inf"}}},
+                {"gross_failures", {{"successes", starts - successes}}},
+                {"mrpd_success", {{"successes", successes}}},
+                {"capture_range", nullptr}};
   };
   json renderer = part(6, 2, 0.5);
   renderer["renderer"] = "field";
   renderer["cases"] = {part(2, 2, 0.5), part(4, 0, nullptr)};
   renderer["cases"][0]["case"] = "head";
   renderer["cases"][1]["case"] = "spine";
+  renderer["cases"][1]["capture_range"] = {{"initial_tre_mm", 8.0}, {"ended_by", "failures"}};
   const CsvTable table = case_table(json::array({renderer}));
   ASSERT_EQ(table.row_count(), 3u);
   EXPECT_EQ(table.text(0, "case"), "head");
@@ -110,6 +114,11 @@ TEST(CaseTable, HasARowPerCaseAndOneOverAll) {
   EXPECT_EQ(table.text(1, "p95_tre_of_all_mm"), "inf");
   EXPECT_EQ(table.text(2, "case"), "all");
   EXPECT_EQ(table.text(2, "successes"), "2");
+  EXPECT_EQ(table.text(2, "gross_failures"), "4");
+  EXPECT_EQ(table.text(0, "capture_range_mm"), "nan");
+  EXPECT_EQ(table.text(0, "capture_range_ended_by"), "");
+  EXPECT_EQ(table.text(1, "capture_range_mm"), "8");
+  EXPECT_EQ(table.text(1, "capture_range_ended_by"), "failures");
 }
 
 TEST(StartsFile, HasEveryStartOfEveryCaseWhateverTheirNumber) {
