@@ -4,7 +4,7 @@ set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME programs)
 # Debian looks for copyright and changelog in a folder of the package's name.
 set(CMAKE_INSTALL_DOCDIR ${CMAKE_INSTALL_DATAROOTDIR}/doc/attenuation-fields)
 set(AF_PACKAGE_CONTACT "The authors of attenuation_fields <nobody@localhost>" CACHE STRING "Maintainer of the package")
-set(af_programs af-precompute af-drr af-simulate af-register af-evaluate af-inspect)
+set(af_programs af-precompute af-drr af-simulate af-scan af-register af-evaluate af-inspect)
 
 # Manual pages and completions are asked of the programs when they are installed, so that they cannot differ from them.
 # The file's destination is relative to the prefix, and DESTDIR stands before it, as with everything that is installed.

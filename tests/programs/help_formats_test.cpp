@@ -93,8 +93,13 @@ TEST(Option, IsFoundWithUnderscoresForDashes) {
 
 TEST(ManPage, OfEveryProgramIsCleanRoff) {
   if (!is_installed("groff")) GTEST_SKIP() << "groff is not installed";
-  for (const char* name :
-       {"af-precompute", "af-drr", "af-simulate", "af-register", "af-evaluate", "af-inspect"}) {
+  for (const char* name : {"af-precompute",
+                           "af-drr",
+                           "af-simulate",
+                           "af-scan",
+                           "af-register",
+                           "af-evaluate",
+                           "af-inspect"}) {
     const test::ProgramRun run =
         run_command(program(name) + " --help-as man | groff -man -Tutf8 -ww -z");
     EXPECT_EQ(run.exit_code, 0) << run.output;
@@ -127,8 +132,13 @@ TEST(BashCompletion, OffersOptionsAndTheNamesTheyChooseFrom) {
 
 TEST(ZshCompletion, IsAFunctionThatZshReads) {
   if (!is_installed("zsh")) GTEST_SKIP() << "zsh is not installed";
-  for (const char* name :
-       {"af-precompute", "af-drr", "af-simulate", "af-register", "af-evaluate", "af-inspect"}) {
+  for (const char* name : {"af-precompute",
+                           "af-drr",
+                           "af-simulate",
+                           "af-scan",
+                           "af-register",
+                           "af-evaluate",
+                           "af-inspect"}) {
     const test::ProgramRun run = run_command(program(name) + " --help-as zsh | zsh -n /dev/stdin");
     EXPECT_EQ(run.exit_code, 0) << name << ": " << run.output;
     EXPECT_EQ(run.output, "") << name;

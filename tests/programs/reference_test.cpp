@@ -76,8 +76,13 @@ std::string file_page() {
 }
 
 TEST(Reference, OfEveryProgramIsWhatItPrints) {
-  for (const char* name :
-       {"af-precompute", "af-drr", "af-simulate", "af-register", "af-evaluate", "af-inspect"}) {
+  for (const char* name : {"af-precompute",
+                           "af-drr",
+                           "af-simulate",
+                           "af-scan",
+                           "af-register",
+                           "af-evaluate",
+                           "af-inspect"}) {
     const test::ProgramRun run =
         test::run_command(std::string(AF_PROGRAM_FOLDER "/") + name + " --help-as markdown");
     ASSERT_EQ(run.exit_code, 0) << run.output;
