@@ -22,19 +22,9 @@ constexpr std::array kLayings = {
     PictureLaying{"with columns and rows swapped and turned by 180 degrees", true, true, true},
 };
 
-/// Means of squares of pixels, so that no side is longer than `most`.
+/// So that no side is longer than `most`.
 Image2d shrunk(const Image2d& image, int most) {
-  const int factor = std::max(1, (std::max(image.width, image.height) + most - 1) / most);
-  Image2d small(image.width / factor, image.height / factor);
-  for (int row = 0; row < small.height; ++row)
-    for (int column = 0; column < small.width; ++column) {
-      double sum = 0.0;
-      for (int y = 0; y < factor; ++y)
-        for (int x = 0; x < factor; ++x)
-          sum += static_cast<double>(image.at(column * factor + x, row * factor + y));
-      small.at(column, row) = static_cast<float>(sum / (factor * factor));
-    }
-  return small;
+  return block_means(image, std::max(1, (std::max(image.width, image.height) + most - 1) / most));
 }
 
 Image2d laid(const Image2d& image, const PictureLaying& laying) {
@@ -84,6 +74,19 @@ double best_correlation(const Image2d& a, const Image2d& b) {
 }
 
 }  // namespace
+
+Image2d block_means(const Image2d& image, int factor) {
+  Image2d small(image.width / factor, image.height / factor);
+  for (int row = 0; row < small.height; ++row)
+    for (int column = 0; column < small.width; ++column) {
+      double sum = 0.0;
+      for (int y = 0; y < factor; ++y)
+        for (int x = 0; x < factor; ++x)
+          sum += static_cast<double>(image.at(column * factor + x, row * factor + y));
+      small.at(column, row) = static_cast<float>(sum / (factor * factor));
+    }
+  return small;
+}
 
 std::vector<LayingMatch> laying_matches(const Image2d& xray, const Image2d& drr) {
   check(xray.width == drr.width && xray.height == drr.height, "pictures of one camera");

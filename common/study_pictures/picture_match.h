@@ -8,6 +8,10 @@
 
 namespace af {
 
+/// The means of squares of `factor` x `factor` pixels; what does not fill a square is left out.
+/// `factor` is at least 1.
+Image2d block_means(const Image2d& image, int factor);
+
 /// One of the eight ways to lay a picture: rows turned to columns first, then flips.
 struct PictureLaying {
   const char* name;  ///< "flipped left to right"

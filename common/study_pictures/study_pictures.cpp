@@ -44,20 +44,6 @@ ShrunkView shrunk_view(const CameraGeometry& camera) {
   return {factor == 1 ? whole : whole.coarser(factor), factor};
 }
 
-Image2d shrunk_image(const Image2d& image, const ShrunkView& shrunk) {
-  Image2d small(shrunk.view.roi.width, shrunk.view.roi.height);
-  const int factor = shrunk.factor;
-  for (int row = 0; row < small.height; ++row)
-    for (int column = 0; column < small.width; ++column) {
-      double sum = 0.0;
-      for (int y = 0; y < factor; ++y)
-        for (int x = 0; x < factor; ++x)
-          sum += static_cast<double>(image.at(column * factor + x, row * factor + y));
-      small.at(column, row) = static_cast<float>(sum / (factor * factor));
-    }
-  return small;
-}
-
 void add_letters(const EdgeLetters& letters, PicturePanel& panel) {
   const double width = panel.image.width;
   const double height = panel.image.height;
@@ -134,7 +120,7 @@ void draw_view(const Study& study,
                StudyPictures& pictures) {
   const CameraGeometry& camera = study.rig.camera(view.camera);
   const ShrunkView shrunk = shrunk_view(camera);
-  const Image2d xray = shrunk_image(read_view_xray(view, camera).attenuation, shrunk);
+  const Image2d xray = block_means(read_view_xray(view, camera).attenuation, shrunk.factor);
   const EdgeLetters letters = edge_letters(camera, poses.front().room_from_ct);
   const std::string beam = "beam from " + letters.beam_from + " to " + letters.beam_to;
   std::vector<PicturePanel> panels;
