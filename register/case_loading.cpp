@@ -413,6 +413,7 @@ LoadedCase load_case(const Study& study,
     ct = used_from(study_case.places, "ct", [&] {
       return read_ct_facts(study_case.ct,
                            ct_reading_in_force(options.ct, study_case.ct_reading),
+                           options.attenuation,
                            communicator,
                            loaded.warnings);
     });
@@ -433,6 +434,7 @@ LoadedCase load_case(const Study& study,
     loaded.input_notes["ct"] =
         "read " + how(ct_reading_in_force(options.ct, study_case.ct_reading));
     problem->scaling_points_ct = ct_lattice_points(ct->grid);
+    problem->cut_points_ct = ct->cut_points_ct;
   } else {
     const Eigen::Vector3d half = Eigen::Vector3d::Constant(kAssumedCtHalfSideMm);
     problem->scaling_points_ct =

@@ -7,6 +7,8 @@
 #include <span>
 #include <type_traits>
 
+#include "volume/cut_faces.h"
+
 namespace af {
 
 namespace {
@@ -35,6 +37,23 @@ CtGrid grid_of(const PlainGrid& plain) {
   return grid;
 }
 
+CtFacts facts_of(const CtVolume& ct, const AttenuationModel& model) {
+  return {ct.grid, ct_content_sha256(ct), cut_points(ct, model)};
+}
+
+/// Collective. Rank 0's points on every rank of `group`.
+void share(std::vector<Eigen::Vector3d>& points, const Communicator& group) {
+  std::vector<std::array<double, 3>> plain;
+  for (const Eigen::Vector3d& point : points) plain.push_back({point.x(), point.y(), point.z()});
+  std::vector<std::byte> bytes(plain.size() * sizeof(plain[0]));
+  if (!plain.empty()) std::memcpy(bytes.data(), plain.data(), bytes.size());
+  group.broadcast(bytes);
+  plain.resize(bytes.size() / sizeof(plain[0]));
+  if (!plain.empty()) std::memcpy(plain.data(), bytes.data(), bytes.size());
+  points.clear();
+  for (const auto& point : plain) points.emplace_back(point[0], point[1], point[2]);
+}
+
 /// Collective. Rank 0's facts on every rank of `group`.
 void share(CtFacts& facts, const Communicator& group) {
   PlainGrid plain = plain_grid(facts.grid);
@@ -44,6 +63,7 @@ void share(CtFacts& facts, const Communicator& group) {
   std::memcpy(&plain, bytes.data(), sizeof(plain));
   facts.grid = grid_of(plain);
   group.broadcast(facts.content_sha256);
+  share(facts.cut_points_ct, group);
 }
 
 }  // namespace
@@ -59,7 +79,7 @@ NodeCt read_ct_per_node(const std::filesystem::path& path,
   all_or_none(communicator, [&] {
     if (!communicator.is_root()) return;
     ct = read_ct(path, options, &warnings);
-    facts = {ct.grid, ct_content_sha256(ct)};
+    facts = facts_of(ct, model);
     bordered.grid = AttenuationVolume::bordered_grid_of(ct, model);
   });
   share(facts, communicator);
@@ -78,13 +98,14 @@ NodeCt read_ct_per_node(const std::filesystem::path& path,
 
 CtFacts read_ct_facts(const std::filesystem::path& path,
                       const CtReadOptions& options,
+                      const AttenuationModel& model,
                       const Communicator& communicator,
                       std::vector<std::string>& warnings) {
   CtFacts facts;
   all_or_none(communicator, [&] {
     if (!communicator.is_root()) return;
     const CtVolume ct = read_ct(path, options, &warnings);
-    facts = {ct.grid, ct_content_sha256(ct)};
+    facts = facts_of(ct, model);
   });
   share(facts, communicator);
   return facts;

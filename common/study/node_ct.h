@@ -16,6 +16,7 @@ namespace af {
 struct CtFacts {
   CtGrid grid;
   std::string content_sha256;
+  std::vector<Eigen::Vector3d> cut_points_ct;  ///< see cut_points()
 };
 
 /// The attenuation of a CT, held once per node.
@@ -33,9 +34,10 @@ NodeCt read_ct_per_node(const std::filesystem::path& path,
                         const Communicator& communicator,
                         std::vector<std::string>& warnings);
 
-/// Collective. Rank 0 reads the CT for its grid and hash.
+/// Collective. Rank 0 reads the CT for its grid, hash and cuts.
 CtFacts read_ct_facts(const std::filesystem::path& path,
                       const CtReadOptions& options,
+                      const AttenuationModel& model,
                       const Communicator& communicator,
                       std::vector<std::string>& warnings);
 

@@ -50,6 +50,13 @@ RegistrationOptions robust_preset() {
   return options;
 }
 
+RegistrationOptions bone_preset() {
+  return one_chain(chain_from_text("bone",
+                                   "gc gauss-newton level=2 pixels=4 silhouette=6 step=10 final=0.2;"
+                                   "gc gauss-newton level=1 pixels=4 silhouette=3 final=0.1;"
+                                   "gc quasi-newton pixels=2 silhouette=3 step=2 final=0.02"));
+}
+
 struct Preset {
   const char* name;
   const char* help;
@@ -63,6 +70,10 @@ constexpr std::array kPresets = {
            "a portfolio: Gauss-Newton on correlations or tiles, or CMA-ES, then on robust gradient "
            "residuals",
            robust_preset},
+    Preset{"bone",
+           "for a CT of one bone in X-rays that show more: Gauss-Newton on correlations of gradients "
+           "within its silhouette, which follows the pose",
+           bone_preset},
 };
 
 }  // namespace

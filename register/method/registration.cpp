@@ -13,6 +13,7 @@
 #include "register/optimizer/newton_search.h"
 #include "register/problem/parameter_scaling.h"
 #include "register/problem/pose_target.h"
+#include "register/problem/silhouette_objective.h"
 #include "register/problem/stage_view.h"
 
 namespace af::registration {
@@ -75,10 +76,10 @@ SimilarityReference visible_reference(const RegistrationView& view, const StageG
   return pixels >= kLeastPixelsToHideIn && 4 * used >= 3 * pixels ? hidden : plain;
 }
 
-ObjectiveView prepare_view(const RegistrationProblem& problem,
-                           const RegistrationView& view,
-                           const ValueRange& drr_range,
-                           const StageOptions& stage) {
+SilhouetteView prepare_view(const RegistrationProblem& problem,
+                            const RegistrationView& view,
+                            const ValueRange& drr_range,
+                            const StageOptions& stage) {
   const StageGrid grid = stage_grid(problem, view, stage);
   SimilarityReference reference = visible_reference(view, grid);
   reference.drr_range = drr_range;
@@ -88,10 +89,14 @@ ObjectiveView prepare_view(const RegistrationProblem& problem,
   SimilarityOptions similarity = stage.similarity;
   similarity.has_smooth_histogram |=
       make_optimizer(stage.optimizer)->needs() == Derivatives::Gradient;
-  return {stage_view(view.view, grid),
-          stage_renderer(view, stage.level),
-          make_similarity(similarity, reference),
-          view.limit};
+  ObjectiveView whole{stage_view(view.view, grid),
+                      stage_renderer(view, stage.level),
+                      make_similarity(similarity, reference),
+                      view.limit};
+  const double margin_px = stage.silhouette_mm *
+                           pixels_per_mm(view.view.camera, problem.isocenter_point) /
+                           stage.pixel_step;
+  return {std::move(whole), std::move(reference), similarity, view.renderer, margin_px};
 }
 
 /// Points enough for the lengths of steps that derivatives choose.
@@ -119,10 +124,24 @@ bool is_converged(StopReason reason) {
 struct PreparedStage {
   StageOptions options;
   std::shared_ptr<const Optimizer> optimizer;
-  MultiViewObjective objective;
+  MultiViewObjective objective;  ///< of a silhouette: that of the pose it was last narrowed to
+  /// What silhouettes are taken from; none where the whole region counts.
+  std::shared_ptr<const std::vector<SilhouetteView>> silhouettes;
 
   [[nodiscard]] PreparedStage copy() const {
-    return {options, optimizer, MultiViewObjective(objective.views())};
+    return {options, optimizer, MultiViewObjective(objective.views()), silhouettes};
+  }
+
+  /// Narrows the objective to the silhouettes at a pose, if it is one of silhouettes; false when
+  /// too little is seen of them.
+  [[nodiscard]] bool narrow_to(const RegistrationProblem& problem,
+                               const RigidTransform& room_from_ct) {
+    if (!silhouettes) return true;
+    auto narrowed =
+        silhouette_objective(*silhouettes, problem.cut_points_ct, room_from_ct, objective.pool());
+    if (!narrowed.has_value()) return false;
+    objective = std::move(*narrowed);
+    return true;
   }
 };
 
@@ -144,6 +163,13 @@ MultiViewObjective ray_cast_objective(const RegistrationProblem& problem,
   for (std::size_t i = 0; i < views.size(); ++i)
     views[i].renderer = ray_cast_of(problem.views[i], stage.options.level);
   return MultiViewObjective(std::move(views), stage.objective.pool());
+}
+
+/// Of a pose at which there is nothing to compare.
+ObjectiveValue inadmissible_value() {
+  ObjectiveValue value;
+  value.similarity = std::numeric_limits<double>::quiet_NaN();
+  return value;
 }
 
 /// Differences over this many mm to both sides average over a field's nodes, yet are small beside
@@ -201,6 +227,12 @@ struct RegistrationRunner::Impl {
                  std::int64_t start_index,
                  ChainEnd& end,
                  RegistrationResult& result);
+  /// Narrows a stage to the silhouettes at its start; false, and why in `end`, when it cannot.
+  [[nodiscard]] bool narrow_at_start(PreparedStage& stage,
+                                     ChainEnd& end,
+                                     RegistrationResult& result) const;
+  /// The similarity of an end within its own silhouettes, so that ends of several starts compare.
+  void take_own_similarity(ChainEnd& end, RegistrationResult& result);
   void run_portfolio(std::int64_t start_index, RegistrationResult& result);
   /// The finish, from `end`.
   void run_finish(std::int64_t start_index, ChainEnd& end, RegistrationResult& result) {
@@ -222,10 +254,18 @@ struct RegistrationRunner::Impl {
 
 PreparedStage RegistrationRunner::Impl::prepare(const StageOptions& stage,
                                                 const std::vector<ValueRange>& drr_ranges) const {
-  std::vector<ObjectiveView> stage_views;
-  for (std::size_t i = 0; i < problem->views.size(); ++i)
-    stage_views.push_back(prepare_view(*problem, problem->views[i], drr_ranges[i], stage));
-  return {stage, make_optimizer(stage.optimizer), MultiViewObjective(std::move(stage_views), pool)};
+  std::vector<SilhouetteView> prepared;
+  std::vector<ObjectiveView> whole;
+  for (std::size_t i = 0; i < problem->views.size(); ++i) {
+    prepared.push_back(prepare_view(*problem, problem->views[i], drr_ranges[i], stage));
+    whole.push_back(prepared.back().whole);
+  }
+  const bool has_silhouettes = stage.silhouette_mm > 0.0;
+  return {stage,
+          make_optimizer(stage.optimizer),
+          MultiViewObjective(std::move(whole), pool),
+          has_silhouettes ? std::make_shared<const std::vector<SilhouetteView>>(std::move(prepared))
+                          : nullptr};
 }
 
 void RegistrationRunner::Impl::prepare() {
@@ -288,6 +328,7 @@ bool RegistrationRunner::Impl::run_stage(PreparedStage& stage,
     end.stop_reason = StopReason::CtOutsideRoi;
     return false;
   }
+  if (!narrow_at_start(stage, end, result)) return false;
   PoseTarget target(
       stage.objective, PoseFrame::about(end.room_from_ct, problem->center_ct_mm), *scaling);
   const SearchBudget budget{options.max_evaluations - result.evaluations,
@@ -321,6 +362,25 @@ bool RegistrationRunner::Impl::run_chain(const ChainOptions& chain,
     return false;
   }
   return true;
+}
+
+bool RegistrationRunner::Impl::narrow_at_start(PreparedStage& stage,
+                                               ChainEnd& end,
+                                               RegistrationResult& result) const {
+  if (!stage.silhouettes) return true;
+  result.drr_count += static_cast<std::int64_t>(views.size());
+  if (stage.narrow_to(*problem, end.room_from_ct)) return true;
+  end.stop_reason = StopReason::CtOutsideRoi;
+  return false;
+}
+
+void RegistrationRunner::Impl::take_own_similarity(ChainEnd& end, RegistrationResult& result) {
+  PreparedStage& stage = stages[end.stage];
+  if (!stage.silhouettes || !std::isfinite(end.similarity)) return;
+  result.drr_count += 2 * static_cast<std::int64_t>(views.size());
+  if (!stage.narrow_to(*problem, end.room_from_ct)) return;
+  const ObjectiveValue value = stage.objective.evaluate(end.room_from_ct);
+  if (value.is_admissible) end.similarity = value.similarity;
 }
 
 RigidTransform RegistrationRunner::Impl::search_by_casting(const ParameterScaling& scaling,
@@ -389,6 +449,7 @@ void RegistrationRunner::Impl::correct(std::int64_t start_index,
 }
 
 ObjectiveValue RegistrationRunner::Impl::judged(const RigidTransform& room_from_ct) {
+  if (!judge->narrow_to(*problem, room_from_ct)) return inadmissible_value();
   ObjectiveValue value = judge->objective.evaluate(room_from_ct);
   value.similarity /= static_cast<double>(views.size());
   return value;
@@ -477,6 +538,7 @@ RegistrationResult RegistrationRunner::run(const RigidTransform& start_room_from
     if (impl.run_chain(chain, 0, start_index, end, result))
       impl.run_finish(start_index, end, result);
     impl.correct(start_index, end, result);
+    impl.take_own_similarity(end, result);
     result.room_from_ct = end.room_from_ct;
     result.similarity = end.similarity;
     result.stop_reason = end.stop_reason;
@@ -494,6 +556,7 @@ ObjectiveValue RegistrationRunner::similarity_at(const RigidTransform& room_from
 ObjectiveValue RegistrationRunner::similarity_at(const RigidTransform& room_from_ct,
                                                  std::size_t stage) {
   check(stage < impl_->stages.size(), "no such stage");
+  if (!impl_->stages[stage].narrow_to(*impl_->problem, room_from_ct)) return inadmissible_value();
   return impl_->stages[stage].objective.evaluate(room_from_ct);
 }
 

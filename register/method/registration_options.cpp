@@ -62,6 +62,12 @@ void StageOptions::describe(Fields& field) {
       .as("sigma")
       .at_least(0.0)
       .finite();
+  field("silhouette_mm",
+        silhouette_mm,
+        "mm on the isocentre plane: of the region only what lies within so many mm of the CT's "
+        "silhouette, as it is where the stage starts, counts; 0: all of the region")
+      .as("silhouette")
+      .within(0.0, 100.0);
   field.part(similarity);
   field.leave_out(optimizer, "stands before the keys");
   field.part(search);

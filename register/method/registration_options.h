@@ -20,6 +20,7 @@ struct StageOptions {
   int pixel_step = 1;
   double roi_scale = 1.0;
   double smoothing_sigma_mm = 0.0;
+  double silhouette_mm = 0.0;  ///< 0: the whole region counts
   SimilarityOptions similarity;
   std::string optimizer = "best-neighbor";
   OptimizerOptions search;  ///< steps in mm of mean projected motion

@@ -46,6 +46,7 @@ struct RegistrationProblem {
   std::vector<Eigen::Vector3d> scaling_points_ct;             ///< see ct_lattice_points()
   std::vector<RegistrationView> views;
   std::vector<Eigen::Vector3d> target_points_ct;  ///< of the target box; a correction needs them
+  std::vector<Eigen::Vector3d> cut_points_ct;     ///< see cut_points(); silhouettes leave them out
 
   /// What the parameters in results are relative to.
   [[nodiscard]] PoseFrame frame() const {
