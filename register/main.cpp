@@ -68,7 +68,8 @@ void run(const RegisterOptions& options,
   for (const auto& [input, note] : loaded.input_notes) af::inform(world, input + ": " + note);
   RegistrationRunner runner =
       af::all_or_none(world, [&] { return RegistrationRunner(loaded.problem, method, pool); });
-  PoseExaminer examiner = af::all_or_none(world, [&] { return PoseExaminer(loaded.problem); });
+  PoseExaminer examiner =
+      af::all_or_none(world, [&] { return PoseExaminer(loaded.problem, method.silhouette_mm()); });
   const std::filesystem::path slicer = options.output_folder / "slicer";
   af::all_or_none(world, [&] {
     if (!world.is_root()) return;

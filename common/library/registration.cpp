@@ -162,7 +162,8 @@ RegistrationCase RegistrationCase::load(const std::filesystem::path& study_path,
     impl->warnings.insert(impl->warnings.end(), loaded.warnings.begin(), loaded.warnings.end());
     impl->problem = loaded.problem;
     impl->runner = std::make_unique<registration::RegistrationRunner>(loaded.problem, method, pool);
-    impl->examiner = std::make_unique<registration::PoseExaminer>(loaded.problem);
+    impl->examiner =
+        std::make_unique<registration::PoseExaminer>(loaded.problem, method.silhouette_mm());
     return RegistrationCase(std::move(impl));
   });
 }

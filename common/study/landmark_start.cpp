@@ -21,20 +21,23 @@ bool has_landmarks(const StudyCase& study_case) {
   return std::ranges::any_of(study_case.views, shows_one);
 }
 
-LandmarkPose landmark_pose(const Study& study, const StudyCase& study_case) {
-  const std::string where = "case '" + study_case.name + "'";
+LandmarkPose landmark_pose(const CameraRig& rig, const StudyCase& study_case) {
   if (!has_landmarks(study_case))
-    throw InputError(where + ": has no landmarks_ct_mm with landmarks_px to start from");
+    throw InputError("has no landmarks_ct_mm with landmarks_px to start from");
   std::vector<LandmarkView> views;
   for (const StudyView& view : study_case.views) {
     std::vector<std::optional<Eigen::Vector2d>> seen = view.landmarks_px;
     seen.resize(study_case.landmarks_ct_mm.size());
-    views.push_back({study.rig.camera(view.camera), seen});
+    views.push_back({rig.camera(view.camera), seen});
   }
+  return pose_from_landmarks(views, study_case.landmarks_ct_mm, study_case.nominal_room_from_ct);
+}
+
+LandmarkPose landmark_pose(const Study& study, const StudyCase& study_case) {
   try {
-    return pose_from_landmarks(views, study_case.landmarks_ct_mm, study_case.nominal_room_from_ct);
+    return landmark_pose(study.rig, study_case);
   } catch (const InputError& error) {
-    throw InputError(study.path.string() + ": " + where + ": " + error.what());
+    throw InputError(study.path.string() + ": case '" + study_case.name + "': " + error.what());
   }
 }
 

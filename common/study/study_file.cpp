@@ -14,6 +14,7 @@
 #include "files/output_file.h"
 #include "gold_standard/fiducial_registration.h"
 #include "study/ct_keys.h"
+#include "study/landmark_start.h"
 #include "study/rig_file.h"
 #include "text/toml_reader.h"
 
@@ -100,7 +101,8 @@ XrayDomain get_xray_domain(TomlTableReader& reader) {
 
 RegionOfInterest get_roi(TomlTableReader& reader, const CameraGeometry* camera) {
   RegionOfInterest roi;
-  const auto numbers = reader.get_integers("roi_px", 4, Presence::Required);
+  if (camera != nullptr) roi = {0, 0, camera->size_px.x(), camera->size_px.y()};
+  const auto numbers = reader.get_integers("roi_px", 4, Presence::Optional);
   if (!numbers) return roi;
   roi = {(*numbers)[0], (*numbers)[1], (*numbers)[2], (*numbers)[3]};
   if (camera != nullptr && !problems(roi, camera->size_px.x(), camera->size_px.y()).empty())
@@ -252,6 +254,20 @@ void read_views(TomlTableReader& reader,
   }
 }
 
+/// A case that states landmarks and no nominal pose has the landmarks' pose as nominal one.
+void take_nominal_from_landmarks(TomlTableReader& reader,
+                                 const StudyContext& context,
+                                 StudyCase& study_case) {
+  if (!context.problems.empty()) return;
+  try {
+    study_case.nominal_room_from_ct = landmark_pose(context.rig, study_case).room_from_ct;
+  } catch (const InputError& error) {
+    reader.add_problem(
+        "landmarks_ct_mm",
+        std::string("must give the nominal pose, which is not stated: ") + error.what());
+  }
+}
+
 StudyCase read_case(const toml::table& table,
                     const std::string& prefix,
                     const StudyContext& context) {
@@ -263,17 +279,21 @@ StudyCase read_case(const toml::table& table,
   study_case.ct =
       get_path(reader, "ct", Presence::Required, context.folder, study_case.places).value_or("");
   study_case.ct_reading = read_ct_keys(reader);
-  study_case.nominal_room_from_ct = reader.get_pose("nominal_room_from_ct", Presence::Required)
-                                        .value_or(RigidTransform::Identity());
+  study_case.landmarks_ct_mm = get_points<3>(reader, "landmarks_ct_mm");
+  const auto nominal =
+      reader.get_pose("nominal_room_from_ct",
+                      study_case.landmarks_ct_mm.empty() ? Presence::Required : Presence::Optional);
+  study_case.nominal_room_from_ct = nominal.value_or(RigidTransform::Identity());
   study_case.center_ct_mm =
       reader.get_vector<3>("center_ct_mm", Presence::Required).value_or(Eigen::Vector3d::Zero());
   study_case.target_box_ct = get_target_box(reader);
   study_case.fiducials_ct_mm = get_points<3>(reader, "fiducials_ct_mm");
   if (!study_case.fiducials_ct_mm.empty() && are_collinear(study_case.fiducials_ct_mm))
     reader.add_problem("fiducials_ct_mm", "must be at least 3 points that are not collinear");
-  study_case.landmarks_ct_mm = get_points<3>(reader, "landmarks_ct_mm");
   study_case.gold_room_from_ct = reader.get_pose("gold_room_from_ct", Presence::Optional);
   read_views(reader, prefix, study_case, context);
+  if (!reader.has("nominal_room_from_ct") && !study_case.landmarks_ct_mm.empty())
+    take_nominal_from_landmarks(reader, context, study_case);
   reader.refuse_unknown_keys();
   return study_case;
 }

@@ -127,6 +127,10 @@ std::string RegistrationOptions::final_similarity() const {
   return chains.size() > 1 ? judge.stage.similarity.name : stages().back()->similarity.name;
 }
 
+double RegistrationOptions::silhouette_mm() const {
+  return stages().empty() ? 0.0 : stages().back()->silhouette_mm;
+}
+
 int RegistrationOptions::coarsest_level() const {
   int coarsest = chains.size() > 1 ? judge.stage.level : 0;
   for (const StageOptions* const stage : stages()) coarsest = std::max(coarsest, stage->level);

@@ -66,6 +66,8 @@ struct RegistrationOptions {
   [[nodiscard]] std::string optimizer_list() const;
   /// The measure that results' similarities are values of.
   [[nodiscard]] std::string final_similarity() const;
+  /// Margin of the last stage's silhouettes; 0: it compares the whole region.
+  [[nodiscard]] double silhouette_mm() const;
   /// Highest level of any stage.
   [[nodiscard]] int coarsest_level() const;
   /// Levels of the stages that a registration can end with, ascending: a correction casts there.

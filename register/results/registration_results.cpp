@@ -11,6 +11,7 @@
 #include "figures/picture.h"
 #include "files/output_file.h"
 #include "pose_files/pose_file.h"
+#include "register/problem/silhouette.h"
 #include "register/results/registration_columns.h"
 
 namespace af::registration {
@@ -255,13 +256,53 @@ CsvTable registrations_table(std::vector<RegistrationRecord> records,
   return table;
 }
 
+namespace {
+
+/// What pictures show of a view's region: all of it, or where the CT is a small body in it, the
+/// silhouette's box and a third of its size around it. In pixels of the region.
+RegionOfInterest shown_region(const Image2d& drr) {
+  const std::vector<std::uint8_t> body = silhouette(drr, 0.0, {});
+  const RegionOfInterest tight = region_of(body, drr.width, drr.height, 0);
+  const int border = std::max(tight.width, tight.height) / 3;
+  const RegionOfInterest wide = region_of(body, drr.width, drr.height, border);
+  const RegionOfInterest whole = {0, 0, drr.width, drr.height};
+  return wide.pixel_count() == 0 || 2 * wide.pixel_count() > whole.pixel_count() ? whole : wide;
+}
+
+/// The border of a silhouette: a line between each of its pixels and a neighbour that is not.
+std::vector<PictureLine> outline(const Image2d& drr) {
+  const std::vector<std::uint8_t> body = silhouette(drr, 0.0, {});
+  const auto is_body = [&](int column, int row) {
+    return column >= 0 && row >= 0 && column < drr.width && row < drr.height &&
+           body[static_cast<std::size_t>(row) * static_cast<std::size_t>(drr.width) +
+                static_cast<std::size_t>(column)] != 0;
+  };
+  std::vector<PictureLine> lines;
+  const auto add = [&](double x0, double y0, double x1, double y1) {
+    lines.push_back({{{x0, y0}, {x1, y1}}, PictureColor::Red, 1.0});
+  };
+  for (int row = 0; row <= drr.height; ++row)
+    for (int column = 0; column <= drr.width; ++column) {
+      const double left = column - 0.5;
+      const double top = row - 0.5;
+      if (is_body(column, row) != is_body(column - 1, row)) add(left, top, left, top + 1.0);
+      if (is_body(column, row) != is_body(column, row - 1)) add(left, top, left + 1.0, top);
+    }
+  return lines;
+}
+
+}  // namespace
+
 void write_overlay(const RegistrationView& view,
                    const RigidTransform& room_from_ct,
                    const std::string& heading,
                    const std::filesystem::path& path) {
-  const Image2d xray = crop(view.xray, view.view.roi);
   std::int64_t rays_outside = 0;
   Image2d drr = render_image(*view.renderer, room_from_ct, view.view, &rays_outside);
+  const RegionOfInterest shown = shown_region(drr);
+  const bool is_body_alone = shown.pixel_count() < drr.pixels.size();
+  drr = crop(drr, shown);
+  const Image2d xray = crop(crop(view.xray, view.view.roi), shown);
   const auto drr_window = percentile_window(drr);
   PicturePanel drr_panel{drr, drr_window[0], drr_window[1], "DRR", "", {}, {}};
   drr_panel.caption = "attenuation";
@@ -293,7 +334,18 @@ void write_overlay(const RegistrationView& view,
                                       PicturePanel::Colors::Diverging,
                                       {}};
   const int zoom = std::max(1, 300 / std::max(1, std::max(xray.width, xray.height)));
-  write_picture({xray_panel, drr_panel, checker_panel, difference_panel}, 2, heading, path, zoom);
+  if (!is_body_alone) {
+    write_picture({xray_panel, drr_panel, checker_panel, difference_panel}, 2, heading, path, zoom);
+    return;
+  }
+  PicturePanel outline_panel = xray_panel;
+  outline_panel.title = "X-ray and outline of the DRR";
+  outline_panel.lines = outline(drr);
+  write_picture({xray_panel, outline_panel, drr_panel, checker_panel, difference_panel},
+                5,
+                heading,
+                path,
+                zoom);
 }
 
 namespace {

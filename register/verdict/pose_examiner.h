@@ -11,19 +11,23 @@ namespace af::registration {
 
 /// Judges poses view by view, whatever the method that found them: by the judge of portfolios
 /// (RobustGradient), at its own level, or the coarsest that the problem's views have, and at level
-/// 0. For one thread at a time. \test PoseExaminer.TellsARightPoseFromAWrongOneInEveryView
+/// 0. Within silhouettes, see ViewValue. For one thread at a time. \test
+/// PoseExaminer.TellsARightPoseFromAWrongOneInEveryView
 class PoseExaminer {
  public:
   /// The level of the image pyramids that it looks at where views have it.
   static int coarsest_level();
 
-  /// `problem`: as for a RegistrationRunner.
-  explicit PoseExaminer(std::shared_ptr<const RegistrationProblem> problem);
+  /// `problem`: as for a RegistrationRunner. `silhouette_mm`: the margin about the CT's silhouette
+  /// within which poses are judged, by gradient correlation; 0: over twice the region.
+  explicit PoseExaminer(std::shared_ptr<const RegistrationProblem> problem,
+                        double silhouette_mm = 0.0);
 
   /// One per view; NaN where the pose is outside a field, or the X-ray has no gradients to explain.
   [[nodiscard]] std::vector<ViewValue> view_values(const RigidTransform& room_from_ct);
 
  private:
+  bool in_silhouette_ = false;
   std::vector<std::unique_ptr<RegistrationRunner>> views_;  ///< none where nothing can be judged
 };
 

@@ -47,20 +47,22 @@ std::optional<std::string> failure_of(StopReason stop_reason) {
   }
 }
 
-Judgement judged_values(const ViewSummary& coarse, const ViewSummary& fine) {
+Judgement judged_values(const ViewSummary& coarse,
+                        const ViewSummary& fine,
+                        const VerdictLimits& limits) {
   const std::string too_little =
       "on average the pose explains too little of the X-rays' gradients: ";
-  if (coarse.mean < kLeastCoarseMean)
-    return {Verdict::NotFound, too_little + share_text(coarse.mean, kLeastCoarseMean)};
-  if (fine.mean < kLeastFineMean)
-    return {Verdict::NotFound, too_little + share_text(fine.mean, kLeastFineMean) + " in detail"};
+  if (coarse.mean < limits.coarse_mean)
+    return {Verdict::NotFound, too_little + share_text(coarse.mean, limits.coarse_mean)};
+  if (fine.mean < limits.fine_mean)
+    return {Verdict::NotFound, too_little + share_text(fine.mean, limits.fine_mean) + " in detail"};
   const std::string little = "the pose explains little of an X-ray's gradients: ";
-  if (coarse.lowest < kLeastCoarseOfFound)
-    return {Verdict::Doubtful, little + share_text(coarse.lowest, kLeastCoarseOfFound)};
-  if (fine.lowest < kLeastFineOfFound)
+  if (coarse.lowest < limits.coarse_of_found)
+    return {Verdict::Doubtful, little + share_text(coarse.lowest, limits.coarse_of_found)};
+  if (fine.lowest < limits.fine_of_found)
     return {Verdict::Doubtful,
-            little + value_text(fine.lowest) + " of 1 in detail (" + value_text(kLeastFineOfFound) +
-                " or more leaves no doubt)"};
+            little + value_text(fine.lowest) + " of 1 in detail (" +
+                value_text(limits.fine_of_found) + " or more leaves no doubt)"};
   return {Verdict::Found,
           "of every X-ray's gradients the pose explains " + value_text(coarse.lowest) +
               " of 1 or more, " + value_text(fine.lowest) + " in detail"};
@@ -109,15 +111,21 @@ Judgement judged_end(StopReason stop_reason, std::span<const ViewValue> values) 
   if (!std::isfinite(coarse.mean) || !std::isfinite(fine.mean))
     return {Verdict::Doubtful, doubt.value_or("no X-ray has gradients to judge the pose by")};
   if (!doubt.has_value()) doubt = unjudged_view(values);
-  const Judgement judgement = judged_values(coarse, fine);
+  const Judgement judgement = judged_values(coarse, fine, limits_of(values));
   if (!doubt.has_value()) return judgement;
   if (judgement.verdict == Verdict::Found) return {Verdict::Doubtful, *doubt};
   return {judgement.verdict, judgement.reason + "; " + *doubt};
 }
 
+const VerdictLimits& limits_of(std::span<const ViewValue> values) {
+  const bool in_silhouette = !values.empty() && values.front().in_silhouette;
+  return in_silhouette ? kSilhouetteLimits : kRegionLimits;
+}
+
 bool disagrees(std::size_t view, std::span<const ViewValue> values) {
-  return is_far_below_others(view, values, &ViewValue::coarse, kLeastCoarseOfFound) ||
-         is_far_below_others(view, values, &ViewValue::fine, kLeastFineOfFound);
+  const VerdictLimits& limits = limits_of(values);
+  return is_far_below_others(view, values, &ViewValue::coarse, limits.coarse_of_found) ||
+         is_far_below_others(view, values, &ViewValue::fine, limits.fine_of_found);
 }
 
 ViewSummary summary_of(std::span<const ViewValue> values, double ViewValue::*value) {

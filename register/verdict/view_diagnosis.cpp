@@ -202,6 +202,9 @@ ViewDiagnosis diagnose_views(const std::shared_ptr<const RegistrationProblem>& p
                         lowest_of(view_values, &ViewValue::fine) >= kLeastFineOfFound;
   // No change mends a copy: what seems to is a body's symmetry.
   if (is_sound || has_copy) return diagnosis;
+  // Mirrored, a shaft is still a shaft, so silhouettes of bones would fit changed X-rays too.
+  const bool in_silhouettes = std::ranges::any_of(view_values, &ViewValue::in_silhouette);
+  if (in_silhouettes) return diagnosis;
   const auto remedy = remedy_of(*problem, {start_room_from_ct, room_from_ct}, view_values);
   if (remedy.has_value())
     diagnosis.sayings.push_back(

@@ -4,3 +4,12 @@ af_add_program_tests(
   SOURCES programs/register_program_test.cpp
   LIBS af_registration_case
   PROGRAMS af-register af-drr af-precompute)
+
+# docs/howto/bones.md: a simulated bone among others, and real X-rays where AF_WRIST_BIPLANE names their folder.
+foreach(af_bones simulated wrist)
+  add_test(NAME bones.${af_bones} COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/programs/bones.py ${af_bones}
+                                          $<TARGET_FILE_DIR:af-register>)
+  set_tests_properties(
+    bones.${af_bones} PROPERTIES LABELS programs SKIP_RETURN_CODE 77 TIMEOUT 600 ENVIRONMENT
+                                 "OMPI_ALLOW_RUN_AS_ROOT=1;OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1")
+endforeach()

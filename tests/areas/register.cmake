@@ -8,6 +8,7 @@ af_add_test(
           unit/register/optimizer/optimizers_test.cpp
           unit/register/problem/stage_view_test.cpp
           unit/register/problem/fiducial_mask_test.cpp
+          unit/register/problem/silhouette_test.cpp
           unit/register/method/method_options_test.cpp
           unit/register/problem/parameter_scaling_test.cpp
           unit/register/problem/multi_view_objective_test.cpp

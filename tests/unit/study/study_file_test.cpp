@@ -327,6 +327,54 @@ TEST_F(StudyFile, MissingPartsAreAllNamed) {
   EXPECT_THAT(message_of<InputError>([&] { read("[[case]]\n"); }), HasSubstr("rig is missing"));
 }
 
+TEST_F(StudyFile, WithoutARegionTheWholeDetectorCounts) {
+  const std::regex roi("roi_px = [^\n]*\n");
+  const Study study = read(std::regex_replace(kGoodStudy, roi, ""));
+  const StudyView& view = study.find_case("").views.front();
+  const Eigen::Vector2i size_px = study.rig.camera(view.camera).size_px;
+  EXPECT_EQ(view.roi.column, 0);
+  EXPECT_EQ(view.roi.row, 0);
+  EXPECT_EQ(view.roi.width, size_px.x());
+  EXPECT_EQ(view.roi.height, size_px.y());
+}
+
+/// The good study with landmarks and no nominal pose: points of the CT as cameras A and B see them
+/// at `room_from_ct`.
+std::string study_of_landmarks(const RigidTransform& room_from_ct) {
+  const CameraRig rig = read_rig("treatment-room");
+  const std::vector<Eigen::Vector3d> points = {{20, -10, 5}, {-15, 12, 25}, {3, 30, -20}};
+  std::string text =
+      "rig = \"treatment-room\"\n[[case]]\nname = \"x\"\nct = \"ct.nii\"\n"
+      "center_ct_mm = [0, 0, 0]\ntarget_box_ct_mm = [[-9, -9, -9], [9, 9, 9]]\n"
+      "landmarks_ct_mm = [[20, -10, 5], [-15, 12, 25], [3, 30, -20]]\n";
+  for (const CameraGeometry& camera : rig.cameras) {
+    text += "[[case.view]]\ncamera = \"" + camera.name + "\"\nxray = \"x.png\"\n" +
+            "xray_domain = \"intensity\"\nlandmarks_px = [";
+    for (const Eigen::Vector3d& point : points) {
+      const Eigen::Vector2d px = camera.project(room_from_ct * point);
+      text += "[" + std::to_string(px.x()) + ", " + std::to_string(px.y()) + "], ";
+    }
+    text += "]\n";
+  }
+  return text;
+}
+
+TEST_F(StudyFile, LandmarksGiveTheNominalPoseThatIsNotStated) {
+  RigidTransform pose = RigidTransform::Identity();
+  pose.linear() = Eigen::AngleAxisd(2.0, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix();
+  pose.translation() = Eigen::Vector3d(4, -5, 6);
+  const std::string text = study_of_landmarks(pose);
+  const RigidTransform nominal = read(text).find_case("").nominal_room_from_ct;
+  // Pixels are written to 1e-6.
+  EXPECT_LT((nominal.matrix() - pose.matrix()).cwiseAbs().maxCoeff(), 1e-3);
+  const std::string too_few =
+      std::regex_replace(std::regex_replace(text, std::regex(", \\[3, 30, -20\\]"), ""),
+                         std::regex(", \\[[^\\]]*\\], \\]\n"),
+                         "]\n");
+  EXPECT_THAT(message_of<InputError>([&] { read(too_few); }),
+              HasSubstr("must give the nominal pose, which is not stated"));
+}
+
 TEST_F(StudyFile, RepeatedCaseNameIsRefused) {
   const std::string body = kGoodStudy;
   const std::string twice = body + body.substr(body.find("[[case]]"));

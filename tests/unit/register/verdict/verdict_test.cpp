@@ -59,6 +59,18 @@ TEST(Judgement, AViewThatCannotBeJudgedLeavesADoubt) {
   EXPECT_EQ(verdict_of({}), Verdict::Doubtful);
 }
 
+TEST(Judgement, WithinSilhouettesHasLimitsOfItsOwn) {
+  const auto verdict_within = [](double coarse, double fine) {
+    return verdict_of({{0.4, 0.4, true}, {coarse, fine, true}});
+  };
+  EXPECT_EQ(verdict_within(0.36, 0.26), Verdict::Found);
+  EXPECT_EQ(verdict_within(0.36, 0.18), Verdict::Doubtful);
+  EXPECT_EQ(verdict_within(0.29, 0.26), Verdict::Doubtful);
+  EXPECT_EQ(verdict_of({{0.3, 0.11, true}, {0.3, 0.11, true}}), Verdict::NotFound);
+  EXPECT_EQ(verdict_of({{0.19, 0.3, true}, {0.19, 0.3, true}}), Verdict::NotFound);
+  EXPECT_EQ(verdict_of({{0.4, 0.4}, {0.36, 0.26}}), Verdict::Doubtful);
+}
+
 TEST(Disagreement, IsOneViewFarBelowAnotherThatIsGood) {
   const std::vector<ViewValue> one_bad = {{0.7, 0.6}, {0.1, 0.0}, {0.6, 0.5}};
   EXPECT_FALSE(disagrees(0, one_bad));

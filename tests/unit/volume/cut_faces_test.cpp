@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "volume/cut_faces.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+namespace af {
+namespace {
+
+constexpr int kCtSide = 24;
+
+/// 24^3 voxels of 1 mm, -1000 HU but 500 HU where `is_bone`.
+template <typename IsBone>
+CtVolume ct_of(const IsBone& is_bone) {
+  CtVolume ct;
+  ct.grid.size = {kCtSide, kCtSide, kCtSide};
+  ct.grid.origin_mm = {10.0, 20.0, 30.0};
+  std::vector<std::int16_t> hu;
+  for (int k = 0; k < kCtSide; ++k)
+    for (int j = 0; j < kCtSide; ++j)
+      for (int i = 0; i < kCtSide; ++i)
+        hu.push_back(static_cast<std::int16_t>(is_bone(i, j, k) ? 500 : -1000));
+  ct.hu = SharedArray<std::int16_t>(std::move(hu));
+  return ct;
+}
+
+double norm_of(double i, double j, double k) {
+  return std::sqrt(i * i + j * j + k * k);
+}
+
+TEST(CutFaces, AreWhereAShaftIsCutAndNotWhereABodyEnds) {
+  // A ball of radius 7, out of which a shaft of radius 4 leaves the CT upwards.
+  const CtVolume ct = ct_of([](int i, int j, int k) {
+    return norm_of(i - 12, j - 12, k - 9) <= 7.0 ||
+           (k > 9 && norm_of(i - 12, j - 12, 0) <= 4.0);
+  });
+  const auto points = cut_points(ct, AttenuationModel{});
+  // Gauss's circle problem: 49 lattice points lie within 4 of the origin.
+  EXPECT_EQ(points.size(), 49u);
+  for (const Eigen::Vector3d& point : points) {
+    EXPECT_EQ(point.z(), 30.0 + 23.0);
+    EXPECT_LE(norm_of(point.x() - 22.0, point.y() - 32.0, 0.0), 4.0);
+  }
+}
+
+TEST(CutFaces, OfABodyWithinTheCtAreNone) {
+  const CtVolume ct =
+      ct_of([](int i, int j, int k) { return norm_of(i - 12, j - 12, k - 12) <= 8.0; });
+  EXPECT_TRUE(cut_points(ct, AttenuationModel{}).empty());
+}
+
+TEST(CutFaces, AreFewPointsHoweverLargeTheCut) {
+  const CtVolume ct = ct_of([](int /*i*/, int /*j*/, int /*k*/) { return true; });
+  const auto points = cut_points(ct, AttenuationModel{});
+  EXPECT_EQ(points.size(), 6u * kCtSide * kCtSide);  // 576 a face, which is few
+}
+
+}  // namespace
+}  // namespace af
