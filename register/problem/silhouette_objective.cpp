@@ -59,10 +59,8 @@ std::optional<ObjectiveView> narrowed_view(const SilhouetteView& view,
       static_cast<std::size_t>(std::count(reference.used.begin(), reference.used.end(), 1));
   if (count < kLeastSilhouettePixels || !problems(reference).empty()) return std::nullopt;
   ObjectiveView narrow = view.whole;
-  narrow.view.roi = {whole.roi.column + region.column,
-                     whole.roi.row + region.row,
-                     region.width,
-                     region.height};
+  narrow.view.roi = {
+      whole.roi.column + region.column, whole.roi.row + region.row, region.width, region.height};
   try {
     narrow.measure = make_similarity(view.similarity, reference);
   } catch (const InputError&) {  // no contrast that this measure could compare

@@ -14,7 +14,7 @@ namespace af::registration {
 
 /// A view of a stage, whose region is not yet narrowed to a silhouette.
 struct SilhouetteView {
-  ObjectiveView whole;  ///< over the stage's region
+  ObjectiveView whole;            ///< over the stage's region
   SimilarityReference reference;  ///< over the same
   SimilarityOptions similarity;
   std::shared_ptr<const DrrRenderer> sharpest;  ///< of the problem's view: draws the silhouette
@@ -23,9 +23,9 @@ struct SilhouetteView {
 
 /// The objective that compares only what lies within the silhouettes of the CT at a pose, grown by
 /// the views' margins: a measure over the whole region would mostly compare what surrounds a bone
-/// and is not in its CT. Renderers look at no more than the silhouettes' boxes. The silhouettes stay
-/// where they are when poses change. None when a view sees fewer than kLeastSilhouettePixels of
-/// them, or no contrast there. \test SilhouetteObjective.ComparesOnlyWhatIsNearTheBody
+/// and is not in its CT. Renderers look at no more than the silhouettes' boxes. The silhouettes
+/// stay where they are when poses change. None when a view sees fewer than kLeastSilhouettePixels
+/// of them, or no contrast there. \test SilhouetteObjective.ComparesOnlyWhatIsNearTheBody
 std::optional<MultiViewObjective> silhouette_objective(
     std::span<const SilhouetteView> views,
     std::span<const Eigen::Vector3d> cut_points_ct,

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <sstream>
 
 #include "base/error.h"
@@ -269,6 +270,16 @@ RegionOfInterest shown_region(const Image2d& drr) {
   return wide.pixel_count() == 0 || 2 * wide.pixel_count() > whole.pixel_count() ? whole : wide;
 }
 
+/// Masked pixels, such as those beyond an aperture, become no brighter than the brightest others,
+/// so that these have all greys.
+void tame_masked(const Image2d& mask, Image2d& xray) {
+  float highest = -std::numeric_limits<float>::infinity();
+  for (std::size_t i = 0; i < xray.pixels.size(); ++i)
+    if (mask.pixels[i] != 0.0f) highest = std::max(highest, xray.pixels[i]);
+  for (std::size_t i = 0; i < xray.pixels.size(); ++i)
+    if (mask.pixels[i] == 0.0f) xray.pixels[i] = std::min(xray.pixels[i], highest);
+}
+
 /// The border of a silhouette: a line between each of its pixels and a neighbour that is not.
 std::vector<PictureLine> outline(const Image2d& drr) {
   const std::vector<std::uint8_t> body = silhouette(drr, 0.0, {});
@@ -302,7 +313,9 @@ void write_overlay(const RegistrationView& view,
   const RegionOfInterest shown = shown_region(drr);
   const bool is_body_alone = shown.pixel_count() < drr.pixels.size();
   drr = crop(drr, shown);
-  const Image2d xray = crop(crop(view.xray, view.view.roi), shown);
+  Image2d xray = crop(crop(view.xray, view.view.roi), shown);
+  if (is_body_alone && !view.mask.pixels.empty())
+    tame_masked(crop(crop(view.mask, view.view.roi), shown), xray);
   const auto drr_window = percentile_window(drr);
   PicturePanel drr_panel{drr, drr_window[0], drr_window[1], "DRR", "", {}, {}};
   drr_panel.caption = "attenuation";

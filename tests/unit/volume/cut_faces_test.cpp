@@ -32,8 +32,7 @@ double norm_of(double i, double j, double k) {
 TEST(CutFaces, AreWhereAShaftIsCutAndNotWhereABodyEnds) {
   // A ball of radius 7, out of which a shaft of radius 4 leaves the CT upwards.
   const CtVolume ct = ct_of([](int i, int j, int k) {
-    return norm_of(i - 12, j - 12, k - 9) <= 7.0 ||
-           (k > 9 && norm_of(i - 12, j - 12, 0) <= 4.0);
+    return norm_of(i - 12, j - 12, k - 9) <= 7.0 || (k > 9 && norm_of(i - 12, j - 12, 0) <= 4.0);
   });
   const auto points = cut_points(ct, AttenuationModel{});
   // Gauss's circle problem: 49 lattice points lie within 4 of the origin.
