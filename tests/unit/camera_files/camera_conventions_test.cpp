@@ -547,7 +547,8 @@ TEST_F(CameraConventions, XRegRefusals) {
               HasSubstr("/proj-params/pixel-row-spacing = 0.3: must agree with the intrinsic"));
   EXPECT_THAT(input_refusal(XRegExample({.frame = "sideways"}).camera()),
               HasSubstr("/cam-coord-frame-type = 'sideways': must be one of"));
-  EXPECT_THAT(input_refusal(XRegExample({.focal_px = 0.0}).deep_fluoro()), HasSubstr("focal lengths"));
+  EXPECT_THAT(input_refusal(XRegExample({.focal_px = 0.0}).deep_fluoro()),
+              HasSubstr("focal lengths"));
   Hdf5Output empty;
   empty.add_group("/proj-params");
   EXPECT_THAT(file_refusal(empty.bytes()), HasSubstr("has no /proj-params/intrinsic"));
