@@ -121,7 +121,7 @@ class DicomCamera {
   }
 
   /// Of each frame: one, unless the positioner moves.
-  std::vector<PositionerAngles> all_angles() const {
+  [[nodiscard]] std::vector<PositionerAngles> all_angles() const {
     PositionerAngles first;
     const auto primary =
         elements_.number_or_none(kPrimaryAngle, "PositionerPrimaryAngle (0018,1510)");
@@ -152,7 +152,7 @@ class DicomCamera {
   }
 
   /// PS3.3, C.8.7.5.1.3: one increment per frame, or an offset from the first angles for each.
-  std::vector<PositionerAngles> moving_angles(const PositionerAngles& first) const {
+  [[nodiscard]] std::vector<PositionerAngles> moving_angles(const PositionerAngles& first) const {
     const double frames =
         elements_.number_or_none(kFrames, "NumberOfFrames (0028,0008)").value_or(1.0);
     if (!(frames >= 1.0 && frames <= kMostFrames) || frames != std::floor(frames))
@@ -186,7 +186,7 @@ class DicomCamera {
 
   /// Where the image's middle lies from the middle of the active detector: (column, row) mm. 0
   /// unless all is stated.
-  Eigen::Vector2d field_of_view_offset_mm() const {
+  [[nodiscard]] Eigen::Vector2d field_of_view_offset_mm() const {
     const auto pair = [&](DicomTag tag, const char* name) -> std::optional<Eigen::Vector2d> {
       const std::vector<double> values = elements_.numbers(tag, name);
       if (values.size() != 2) return std::nullopt;
