@@ -467,10 +467,10 @@ TEST_F(StudyFile, KeepsHowACtIsRead) {
   water.values_water_mu_per_mm = 0.019;
   EXPECT_EQ(ct_reading_in_force(water, of_study).values_water_mu_per_mm, 0.019);
   EXPECT_EQ(ct_reading_in_force(water, of_study).values, "mu");
+  EXPECT_EQ(ct_reading_of(to_toml(typed)).values, "mu");
   typed.values = "hu";
   typed.label_hu = {"1=40"};
   EXPECT_THROW(ct_reading_in_force(typed, of_study), InputError);
-  EXPECT_EQ(ct_reading_of(to_toml(typed)).values, "mu");
   EXPECT_EQ(ct_reading_of("st_nodes = 3").text(), "");
 }
 
