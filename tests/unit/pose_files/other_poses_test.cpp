@@ -247,7 +247,33 @@ TEST_F(OtherPoses, DiffDrrAnglesOfEveryOrderComeBack) {
     pose.rotation = {angles[0], angles[1], angles[2]};
     const Matrix3d rotation = world_from_diffdrr_camera(pose).linear();
     EXPECT_LT((angles_of_convention(rotation, convention) - angles).norm(), 1e-13) << convention;
+    // At and beside gimbal lock the angles are not unique, or poorly known; the rotation is both.
+    for (const double beside_rad : {0.0, 1e-15, 1e-13, 1e-9, 1e-5})
+      for (const double quarter : {-std::numbers::pi / 2.0, std::numbers::pi / 2.0}) {
+        pose.rotation = {0.3, quarter - beside_rad, 0.5};
+        const Matrix3d locked = world_from_diffdrr_camera(pose).linear();
+        const Vector3d found = angles_of_convention(locked, convention);
+        pose.rotation = {found[0], found[1], found[2]};
+        EXPECT_LT((world_from_diffdrr_camera(pose).linear() - locked).norm(), 1e-14)
+            << convention << " " << quarter << " " << beside_rad;
+      }
   }
+}
+
+// A camera that looks from the feet to the head stands at gimbal lock of ZXY and AP.
+TEST_F(OtherPoses, DiffDrrPosesOfACameraAlongTheBodyKeepTheTurnAboutTheBeam) {
+  PoseContext context = whole_context();
+  context.rig = [] {
+    CameraGeometry camera = frontal_camera();
+    camera.source_point = {0.0, 0.0, -650.0};
+    camera.detector_origin_point = {-100.0, -90.0, 370.0};
+    camera.row_direction = {0.0, 1.0, 0.0};
+    return CameraRig{Vector3d::Zero(), {camera}};
+  };
+  RigidTransform turned = RigidTransform::Identity();
+  turned.linear() = rotation_from_angles({0.0, 0.0, 30.0 * kRadPerDeg});
+  const std::string bytes = pose_file_bytes("diffdrr", {&turned, 1}, context);
+  EXPECT_LT(distance(read("p", bytes, context), turned), kRoundingMm);
 }
 
 TEST_F(OtherPoses, DiffDrrFilesWithMistakesAreRefused) {
