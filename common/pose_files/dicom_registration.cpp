@@ -159,9 +159,9 @@ PosesInFile read_dicom_registration(const PoseFileBytes& file, const PoseContext
   RigidTransform registered_from_room = RigidTransform::Identity();
   for (const RegisteredFrame& frame : frames)
     if (&frame != &ct && frame.uid == room_uid) registered_from_room = frame.registered_from_frame;
-  PosesInFile found{{{"1", registered_from_room.inverse() * ct.registered_from_frame}}, {}};
+  PosesInFile found{{{1, registered_from_room.inverse() * ct.registered_from_frame}}, {}};
   if (!ct_uid.empty() && ct.uid != ct_uid)
-    found.notes.push_back("the frame of reference " + ct.uid + " is taken as the CT's, which is " +
+    found.notes.push_back(name + ": the frame of reference " + ct.uid + " is taken as the CT's, which is " +
                           ct_uid);
   return found;
 }

@@ -160,7 +160,7 @@ PosesInFile read_diffdrr(const PoseFileBytes& file, const PoseContext& context) 
     pose.translation_mm = translations->row(i).transpose();
     const RigidTransform room_from_ct =
         room_from_camera * world_from_diffdrr_camera(pose).inverse() * from_ct;
-    found.poses.push_back({std::to_string(i + 1), rigid_or_throw(room_from_ct.matrix(), where)});
+    found.poses.push_back({i + 1, rigid_or_throw(room_from_ct.matrix(), where)});
   }
   return found;
 }

@@ -246,7 +246,7 @@ PosesInFile read_itk_hdf5(const PoseFileBytes& file, const PoseContext& /*contex
   const H5Quiet quiet;
   try {
     const ItkTransform transform = transform_in(file);
-    return {{{"1", map_of_itk_transform(transform, file.path.string()).inverse()}}, {}};
+    return {{{1, map_of_itk_transform(transform, file.path.string()).inverse()}}, {}};
   } catch (const H5CallFailed& failure) {
     throw FileError(file.path.string(), std::string("damaged HDF5: ") + failure.what() + " fails");
   }

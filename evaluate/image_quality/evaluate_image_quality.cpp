@@ -91,6 +91,7 @@ Setup load(const ImageQualityOptions& options, const Target& target, const Commu
                               world,
                               warnings);
   for (const std::string& text : warnings) warn(world, text);
+  std::vector<std::string> notes;
   all_or_none(world, [&] {
     if (setup.ct.facts.content_sha256 != identity.ct_content_sha256)
       throw FileError(target.field.string(),
@@ -114,8 +115,10 @@ Setup load(const ImageQualityOptions& options, const Target& target, const Commu
                              pose_context(target.ct,
                                           target.ct_reading,
                                           CameraRig{Eigen::Vector3d::Zero(), {identity.camera}},
-                                          identity.frame));
+                                          identity.frame),
+                             &notes);
   });
+  for (const std::string& text : notes) warn(world, text);
   setup.view = View::whole_detector(identity.camera);
   return setup;
 }

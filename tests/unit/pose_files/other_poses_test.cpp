@@ -20,6 +20,7 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using test::message_of;
+using testing::AllOf;
 using testing::HasSubstr;
 
 /// Products and inverses of rotations, of translations up to 1000 mm.
@@ -76,8 +77,11 @@ class OtherPoses : public testing::Test {
     return read_pose(folder_ / name, context);
   }
   PosesInFile read_all(const std::string& name, const std::string& bytes) {
+    return read_pose_file(write(name, bytes), whole_context());
+  }
+  std::filesystem::path write(const std::string& name, const std::string& bytes) {
     test::write_input(folder_ / name, bytes);
-    return read_pose_file(folder_ / name, whole_context());
+    return folder_ / name;
   }
 
   const RigidTransform pose_ = uneven_pose();
@@ -196,13 +200,31 @@ TEST_F(OtherPoses, AutoscoperFramesThatWereNotTrackedAreLeftOutAndSaid) {
   const PosesInFile found =
       read_all("a.tra", nans + pose_file_bytes("autoscoper", {&pose_, 1}, whole_context()) + nans);
   ASSERT_EQ(found.poses.size(), 1U);
-  EXPECT_EQ(found.poses[0].name, "2");
-  EXPECT_THAT(found.notes, testing::ElementsAre(HasSubstr("2 of 3 frames")));
+  EXPECT_EQ(found.poses[0].number, 2);
+  EXPECT_THAT(found.notes,
+              testing::ElementsAre(
+                  AllOf(HasSubstr("a.tra: 2 of 3 frames"), testing::EndsWith("left out: 1, 3"))));
   EXPECT_THROW(read("a.tra", nans), InputError);
   EXPECT_THROW(read("a.tra", "NaN 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1\n"), FileError);
   EXPECT_THAT(
       message_of<InputError>([&] { read("a.tra", "2 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1\n" + nans); }),
       HasSubstr("frame 1"));
+}
+
+TEST_F(OtherPoses, StartsAreRefusedWhereAFrameBeforeTheLastPoseHasNone) {
+  const std::string nans = "NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN\n";
+  const std::string one = pose_file_bytes("autoscoper", {&pose_, 1}, whole_context());
+  const std::filesystem::path path = write("a.tra", one + nans + one);
+  std::vector<std::string> notes;
+  EXPECT_EQ(read_poses(path, whole_context(), &notes).size(), 2U);
+  EXPECT_THAT(notes, testing::ElementsAre(testing::EndsWith("left out: 2")));
+  EXPECT_THAT(message_of<InputError>([&] { read_unbroken_poses(path, whole_context()); }),
+              AllOf(HasSubstr("a.tra"), HasSubstr("frame 2")));
+  // What is missing at the end moves no other frame.
+  notes.clear();
+  const std::filesystem::path cut = write("b.tra", one + one + nans);
+  EXPECT_EQ(read_unbroken_poses(cut, whole_context(), &notes).size(), 2U);
+  EXPECT_THAT(notes, testing::ElementsAre(testing::EndsWith("left out: 3")));
 }
 
 // DiffDRR's first example: no rotation, 850 mm along y, AP: the source stands 850 mm in front of
