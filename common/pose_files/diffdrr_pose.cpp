@@ -64,11 +64,11 @@ Vector3d middle_of(const PoseContext& context, const std::string& file) {
   return context.ct_grid().center_mm();
 }
 
-/// Only the first camera's, where the file names none.
+/// The only one, where none is named.
 CameraGeometry camera_of(const CameraRig& rig, const std::string& name, const std::string& file) {
   if (!name.empty()) return rig.camera(name);
   if (rig.cameras.size() != 1)
-    throw InputError(file + ": camera is missing, and the rig has several");
+    throw InputError(file + ": which camera is not said, and the rig has several (--camera)");
   return rig.cameras.front();
 }
 
@@ -167,8 +167,7 @@ PosesInFile read_diffdrr(const PoseFileBytes& file, const PoseContext& context) 
 
 std::string write_diffdrr(std::span<const RigidTransform> room_from_ct,
                           const PoseContext& context) {
-  const CameraRig rig = rig_of(context, "diffdrr");
-  const CameraGeometry& camera = rig.cameras.front();
+  const CameraGeometry camera = camera_of(rig_of(context, "diffdrr"), "", "diffdrr");
   const Vector3d middle = middle_of(context, "diffdrr");
   const DiffDrrPose frame;
   std::string rotations;

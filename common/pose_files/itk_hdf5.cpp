@@ -154,8 +154,10 @@ std::string text_in(hid_t dataset, const std::string& where) {
     H5free_memory(text);
     return copy.substr(0, kMostBytes);
   }
-  std::string text(H5Tget_size(type), '\0');
-  if (text.size() > kMostBytes) throw FileError(where, "is too long");
+  // The file's word, up to 4 GB: asked before memory is.
+  const std::size_t bytes = H5Tget_size(type);
+  if (bytes > kMostBytes) throw FileError(where, "is too long");
+  std::string text(bytes, '\0');
   h5_checked(H5Dread(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, text.data()), "H5Dread");
   return text.substr(0, text.find('\0'));
 }

@@ -227,6 +227,19 @@ TEST_F(OtherPoses, StartsAreRefusedWhereAFrameBeforeTheLastPoseHasNone) {
   EXPECT_THAT(notes, testing::ElementsAre(testing::EndsWith("left out: 3")));
 }
 
+TEST_F(OtherPoses, DiffDrrsPoseOfSeveralCamerasIsRefusedUntilOneIsNamed) {
+  PoseContext context = whole_context();
+  context.rig = [] {
+    CameraGeometry other = frontal_camera();
+    other.name = "B";
+    return CameraRig{Vector3d::Zero(), {frontal_camera(), other}};
+  };
+  EXPECT_THAT(message_of<InputError>([&] {
+                pose_file_bytes("diffdrr", {&pose_, 1}, context);
+              }),
+              HasSubstr("--camera"));
+}
+
 // DiffDRR's first example: no rotation, 850 mm along y, AP: the source stands 850 mm in front of
 // the patient, whose head is up and whose right side is on the picture's left.
 TEST_F(OtherPoses, DiffDrrsApViewLooksAtThePatientFromTheFront) {
@@ -374,6 +387,12 @@ TEST_F(OtherPoses, RegistrationsThatAreNotOneRigidPoseAreRefused) {
   EXPECT_THROW(read("r", registration("1.1", {{"1.2.3.4", "RIGID", "2" + identity.substr(1)}})),
                InputError);
   EXPECT_THROW(read("r", registration("1.1", {})), FileError);
+  // The CT is what the object registers to: the matrix is another frame's.
+  EXPECT_THAT(message_of<InputError>([&] {
+                read("r", registration("1.2.3.4", {{"9.9", "RIGID", identity}}));
+              }),
+              AllOf(HasSubstr("1.2.3.4"), HasSubstr("9.9")));
+  EXPECT_NO_THROW(read("r", registration("1.2.3.4", {{"1.2.3.4", "RIGID", identity}})));
   // Of another CT: taken, and said.
   const PosesInFile found =
       read_all("r", registration("1.1", {{"9.9", "RIGID", identity}, {"1.1", "RIGID", identity}}));
