@@ -315,8 +315,24 @@ TEST(AfInspect, VerifiesAFieldAndAStudyAndSeesDamage) {
   EXPECT_EQ(facts["provenance"]["source_version"], std::string(program_version()));
   EXPECT_GE(facts["provenance"]["details"]["training"]["iterations"].get<int>(), 1);
 
+  // Named by the study, it is said what it covers: its own range, for its own camera and region.
+  std::ifstream lines(study);
+  std::string text((std::istreambuf_iterator<char>(lines)), {});
+  const std::size_t at = text.find("xray = ");
+  ASSERT_NE(at, std::string::npos);
+  text.insert(at, "field = \"AP.af.h5\"\n");
+  std::ofstream(study) << text;
+  const test::ProgramRun covered = inspect(study);
+  EXPECT_EQ(covered.exit_code, 0) << covered.output;
+  EXPECT_THAT(covered.output, HasSubstr("field camera: the nominal camera"));
+  EXPECT_THAT(covered.output, HasSubstr("field covers 100 % of camera AP's rays within"));
+
   fs::resize_file(field, fs::file_size(field) / 2);
   EXPECT_EQ(inspect(field.string()).exit_code, 4);
+  // A study is sound though a field of it is not; it is said.
+  const test::ProgramRun halved = inspect(study);
+  EXPECT_EQ(halved.exit_code, 0) << halved.output;
+  EXPECT_THAT(halved.output, HasSubstr("cannot be used"));
   fs::remove(folder / "LAT.mha");
   const test::ProgramRun broken = inspect(study);
   EXPECT_EQ(broken.exit_code, 4);
