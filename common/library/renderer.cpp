@@ -152,7 +152,7 @@ struct Renderer::Impl {
   }
 
  private:
-  std::unique_ptr<af::RenderWorkspace> take_workspace() const {
+  [[nodiscard]] std::unique_ptr<af::RenderWorkspace> take_workspace() const {
     {
       const std::lock_guard lock(workspace_mutex_);
       if (!workspaces_.empty()) {
