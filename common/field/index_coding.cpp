@@ -224,7 +224,7 @@ class BlockCoder {
 
   /// For a neighbour that is missing, the first one that is there stands in, best one that is not
   /// empty.
-  PredictionInputs inputs_of(const Neighbours& around) const {
+  [[nodiscard]] PredictionInputs inputs_of(const Neighbours& around) const {
     static constexpr TileCoefficients kZeros{};
     const float* substitute = kZeros.data();
     for (const auto wanted : {Neighbour::State::Occupied, Neighbour::State::Empty}) {

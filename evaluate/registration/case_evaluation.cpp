@@ -50,12 +50,14 @@ struct Method {
   double success_tre_mm = kSuccessTreMm;    ///< failures keep their traces
 };
 
-/// Inside the motion range of every field in use.
+/// Inside the motion range of every field in use; where a field has none for this camera, all rays
+/// must be inside.
 bool is_admissible(const std::vector<Method>& methods, const RigidTransform& room_from_ct) {
   for (const Method& method : methods)
     for (const registration::RegistrationView& view : method.runner.problem().views)
-      if (view.limit.has_value() &&
-          !view.limit->range.contains(parameters_from_pose(view.limit->frame, room_from_ct)))
+      if (view.limit.has_value()
+              ? !view.limit->range.contains(parameters_from_pose(view.limit->frame, room_from_ct))
+              : view.renderer->rays_outside(room_from_ct, view.view) > 0)
         return false;
   return true;
 }
@@ -64,7 +66,7 @@ bool is_admissible(const std::vector<Method>& methods, const RigidTransform& roo
 std::optional<StartLimit> motion_limit(const std::vector<Method>& methods) {
   for (const Method& method : methods)
     for (const registration::RegistrationView& view : method.runner.problem().views)
-      if (view.limit.has_value()) return StartLimit{view.limit->frame, view.limit->range};
+      if (view.reach.has_value()) return StartLimit{view.reach->frame, view.reach->range};
   return std::nullopt;
 }
 
