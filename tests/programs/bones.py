@@ -260,6 +260,8 @@ def simulated():
     write_starts(FOLDER / "two.csv", [wrong, start])
     best = np.array(registered("bone", "two", "--starts", FOLDER / "two.csv")["room_from_ct"])
     ends, _ = poses_of(FOLDER / "two")
+    turned = next(csv.DictReader(open(FOLDER / "two/registrations.csv")))
+    print(f"a start turned by 130 deg: verdict '{turned['verdict']}', lowest view in detail {turned['judge_fine_lowest_view']}")
     require(f"a start turned by 130 deg ends elsewhere ({2 * np.abs(ends).max():.0f} deg or mm)", np.abs(ends).max() > 5)
     require(f"the better of both ends is {distance_mm(best):.3f} mm from gold", distance_mm(best) <= 0.1)
 
