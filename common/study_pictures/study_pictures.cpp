@@ -2,6 +2,7 @@
 #include "study_pictures/study_pictures.h"
 
 #include <algorithm>
+#include <limits>
 #include <memory>
 
 #include "base/error.h"
@@ -110,6 +111,17 @@ PicturePanel panel_with(const Image2d& image,
   return {image, window[0], window[1], title, caption, {}, {}};
 }
 
+/// The shrunk X-ray with no value, which pictures show orange, where the mask hides half of a block
+/// or more.
+Image2d with_mask(Image2d xray, Image2d mask, int factor) {
+  if (mask.pixels.empty()) return xray;
+  for (float& value : mask.pixels) value = value != 0.0f ? 1.0f : 0.0f;
+  const Image2d used = block_means(mask, factor);
+  for (std::size_t i = 0; i < xray.pixels.size(); ++i)
+    if (used.pixels[i] <= 0.5f) xray.pixels[i] = std::numeric_limits<float>::quiet_NaN();
+  return xray;
+}
+
 /// The pictures of one view.
 void draw_view(const Study& study,
                const StudyCase& study_case,
@@ -120,16 +132,18 @@ void draw_view(const Study& study,
                StudyPictures& pictures) {
   const CameraGeometry& camera = study.rig.camera(view.camera);
   const ShrunkView shrunk = shrunk_view(camera);
-  const Image2d xray = block_means(read_view_xray(view, camera).attenuation, shrunk.factor);
+  const ViewXray read = read_view_xray(view, camera);
+  const Image2d xray = block_means(read.attenuation, shrunk.factor);
   const EdgeLetters letters = edge_letters(camera, poses.front().room_from_ct);
   const std::string beam = "beam from " + letters.beam_from + " to " + letters.beam_to;
   std::vector<PicturePanel> panels;
   panels.push_back(
-      panel_with(xray,
+      panel_with(with_mask(xray, read.mask, shrunk.factor),
                  view,
                  shrunk,
                  "X-ray",
                  "as the file has it, attenuation; letters of the nominal pose, " + beam +
+                     (read.mask.pixels.empty() ? "" : "; orange: masked") +
                      (view.landmarks_px.empty() ? "" : "; circles: landmarks as marked")));
   add_letters(letters, panels.back());
   add_region(view, shrunk, panels.back());
