@@ -293,12 +293,12 @@ def found_pose(bone):
     run(BIN / "af-register", *wrist_case(bone), "-o", FOLDER / bone)
     result = json.loads((FOLDER / bone / "result.json").read_text())
     require(f"{bone}: verdict '{result['verdict']}' is found: {result['verdict_reason']}", result["verdict"] == "found")
-    return np.array(result["room_from_ct"])
+    return np.array(result["room_from_ct"]), result["similarity"]
 
 
 def wrist():
     for bone, center in CENTERS.items():
-        write_starts(FOLDER / f"{bone}.csv", starts_about(found_pose(bone), center, 20))
+        write_starts(FOLDER / f"{bone}.csv", starts_about(found_pose(bone)[0], center, 20))
         run(BIN / "af-register", *wrist_case(bone), "--starts", FOLDER / f"{bone}.csv", "-o", FOLDER / f"{bone}-20")
         ends, _ = poses_of(FOLDER / f"{bone}-20")
         spread = np.abs(ends).max(axis=0)
@@ -310,10 +310,10 @@ def wrist():
 
 def far():
     for bone, center in CENTERS.items():
-        write_starts(FOLDER / f"{bone}.csv", starts_about(found_pose(bone), center, 30, most_mm=30.0, most_deg=120.0))
+        pose, best = found_pose(bone)
+        write_starts(FOLDER / f"{bone}.csv", starts_about(pose, center, 30, most_mm=30.0, most_deg=120.0))
         run(BIN / "af-register", *wrist_case(bone), "--starts", FOLDER / f"{bone}.csv", "-o", FOLDER / f"{bone}-far")
         rows = list(csv.DictReader(open(FOLDER / f"{bone}-far/registrations.csv")))
-        best = max(float(row["similarity"]) for row in rows if row["similarity"])
         for is_right in (True, False):
             # Other ends have a fifth less.
             ends = [row for row in rows if (float(row["similarity"] or "-1") > 0.98 * best) == is_right]
