@@ -68,7 +68,8 @@ NamedSource source_of_options(const PrecomputeOptions& options,
         shared_poses(communicator, [&] {
           return std::vector{
               read_pose(options.nominal_pose,
-                        pose_context(options.ct, options.ct_reading, source.rig, std::nullopt))};
+                        pose_context(options.ct, options.ct_reading, source.rig, std::nullopt),
+                        &warnings)};
         }).front();
   return source;
 }

@@ -117,6 +117,7 @@ Setup load(const ImageQualityOptions& options, const Target& target, const Commu
                               world,
                               warnings);
   for (const std::string& text : warnings) warn(world, text);
+  std::vector<std::string> notes;
   all_or_none(world, [&] {
     if (setup.ct.facts.content_sha256 != identity.ct_content_sha256)
       throw FileError(target.field.string(),
@@ -141,8 +142,10 @@ Setup load(const ImageQualityOptions& options, const Target& target, const Commu
                              pose_context(target.ct,
                                           target.ct_reading,
                                           CameraRig{Eigen::Vector3d::Zero(), {setup.view.camera}},
-                                          identity.frame));
+                                          identity.frame),
+                             &notes);
   });
+  for (const std::string& text : notes) warn(world, text);
   if (!setup.camera_distance.is_none())
     inform(world,
            "camera " + setup.view.camera.name + ": " + setup.camera_distance.text() +

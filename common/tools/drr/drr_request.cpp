@@ -259,14 +259,16 @@ DrrScene load_scene(const DrrOptions& options, const Communicator& communicator)
   return scene;
 }
 
-std::vector<RigidTransform> requested_poses(const DrrOptions& options, const DrrScene& scene) {
+std::vector<RigidTransform> requested_poses(const DrrOptions& options,
+                                            const DrrScene& scene,
+                                            std::vector<std::string>& notes) {
   const DrrSource source = source_of(options);
   const PoseContext context = pose_context(source.ct,
                                            source.ct_reading,
                                            CameraRig{Eigen::Vector3d::Zero(), {scene.view.camera}},
                                            scene.frame);
-  if (!options.poses.empty()) return read_poses(options.poses, context);
-  if (!options.pose.empty()) return {read_pose(options.pose, context)};
+  if (!options.poses.empty()) return read_poses(options.poses, context, &notes);
+  if (!options.pose.empty()) return {read_pose(options.pose, context, &notes)};
   std::array<double, 6> values{};
   for (std::size_t i = 0; i < 3; ++i) {
     if (options.rotation_deg.has_value()) values[i] = (*options.rotation_deg)[i];

@@ -66,8 +66,11 @@ struct DrrScene {
 /// Collective. Reads field, CT and rig. FileError when --compare's CT is not the field's.
 DrrScene load_scene(const DrrOptions& options, const Communicator& communicator);
 
-/// Poses in the order of the options or their file.
-std::vector<RigidTransform> requested_poses(const DrrOptions& options, const DrrScene& scene);
+/// Poses in the order of the options or their file; `notes` get what was left out of it and
+/// assumed.
+std::vector<RigidTransform> requested_poses(const DrrOptions& options,
+                                            const DrrScene& scene,
+                                            std::vector<std::string>& notes);
 
 /// InputError when so many DRRs fit neither into memory nor on the disk of the output.
 void require_room(std::size_t poses, const View& view, const std::filesystem::path& output);
