@@ -26,11 +26,8 @@ class Anatomy {
   [[nodiscard]] double shift(std::string_view trait, double spread, int index = 0) const;
   [[nodiscard]] Eigen::Vector3d shift3(std::string_view trait, double spread, int index = 0) const;
   /// Uniform in [low, high); `typical` without a seed.
-  [[nodiscard]] double between(std::string_view trait,
-                               double low,
-                               double high,
-                               double typical,
-                               int index = 0) const;
+  [[nodiscard]] double between(
+      std::string_view trait, double low, double high, double typical, int index = 0) const;
   /// True with that probability; false without a seed.
   [[nodiscard]] bool has(std::string_view trait, double probability, int index = 0) const;
 
@@ -46,8 +43,8 @@ class Anatomy {
 };
 
 /// A smooth map of the ct frame that makes a patient's size and proportions of the typical adult's:
-/// stretches, long waves (no side mirrors the other), and, where `bends`, scoliosis with the turn of
-/// the vertebrae that goes with it, and more or less kyphosis.
+/// stretches, long waves (no side mirrors the other), and, where `bends`, scoliosis with the turn
+/// of the vertebrae that goes with it, and more or less kyphosis.
 class Habitus {
  public:
   /// `wave_mm`: amplitude of the waves.

@@ -23,15 +23,14 @@ const Vector3d vault_half_mm(73.0, 91.0, 74.0);
 void add_soft_tissue(const Anatomy& anatomy, std::vector<Solid>& solids) {
   const auto add = [&](const Solid& solid) { solids.push_back(solid); };
   const Vector3d fat = 0.4 * anatomy.fat_mm() * Vector3d(1.0, 1.0, 0.0);
-  add(elliptic_cylinder(
-      {0.0, 18.0, -125.0}, Vector3d(57.0, 58.0, 60.0) + fat, kMuscleHu));  // neck
-  add(ellipsoid({0.0, 40.0, -62.0}, {56.0, 44.0, 48.0}, kMuscleHu));           // nape
-  add(ellipsoid({0.0, -34.0, -46.0}, {66.0, 62.0, 70.0}, 30, 15));             // face
-  add(ellipsoid({0.0, -70.0, -92.0}, {30.0, 32.0, 24.0}, 20, 15));             // chin
-  add(ellipsoid({0.0, -98.0, -34.0}, {12.0, 16.0, 17.0}, 20));                 // nose
-  add(ellipsoid({0.0, -88.0, -10.0}, {9.0, 17.0, 24.0}, 20));                  // its bridge
-  add(ellipsoid({0.0, -60.0, -6.0}, {66.0, 43.0, 30.0}, 20, 15));              // brow and eyelids
-  add(ellipsoid(vault_mm, vault_half_mm + Vector3d::Constant(6.0), 20, 30));   // scalp
+  add(elliptic_cylinder({0.0, 18.0, -125.0}, Vector3d(57.0, 58.0, 60.0) + fat, kMuscleHu));  // neck
+  add(ellipsoid({0.0, 40.0, -62.0}, {56.0, 44.0, 48.0}, kMuscleHu));                         // nape
+  add(ellipsoid({0.0, -34.0, -46.0}, {66.0, 62.0, 70.0}, 30, 15));                           // face
+  add(ellipsoid({0.0, -70.0, -92.0}, {30.0, 32.0, 24.0}, 20, 15));                           // chin
+  add(ellipsoid({0.0, -98.0, -34.0}, {12.0, 16.0, 17.0}, 20));                               // nose
+  add(ellipsoid({0.0, -88.0, -10.0}, {9.0, 17.0, 24.0}, 20));                 // its bridge
+  add(ellipsoid({0.0, -60.0, -6.0}, {66.0, 43.0, 30.0}, 20, 15));             // brow and eyelids
+  add(ellipsoid(vault_mm, vault_half_mm + Vector3d::Constant(6.0), 20, 30));  // scalp
   for (const double side : {-1.0, 1.0})
     add(ellipsoid({side * 56.0, -22.0, -42.0}, {11.0, 22.0, 30.0}, 60));  // masticatory muscles
 }
@@ -50,7 +49,7 @@ void add_vault(const Anatomy& anatomy, std::vector<Solid>& solids) {
   for (const double side : {-1.0, 1.0}) {
     solids.push_back(ellipsoid({side * 12.0, 4.0, 42.0},
                                anatomy.factor("ventricles", 0.25) * Vector3d(6.0, 30.0, 9.0),
-                               kWaterHu));  // ventricles
+                               kWaterHu));                                          // ventricles
     solids.push_back(ellipsoid({side * 2.5, -80.0, 18.0}, {3.0, 5.0, 14.0}, 900));  // frontal crest
     if (anatomy.has("calcified choroid plexus", 0.5))
       solids.push_back(ellipsoid(Vector3d(side * 20.0, 34.0, 30.0) + anatomy.shift3("plexus", 3.0),
@@ -59,14 +58,14 @@ void add_vault(const Anatomy& anatomy, std::vector<Solid>& solids) {
                                  200));
   }
   if (anatomy.has("calcified pineal gland", 0.6))
-    solids.push_back(ellipsoid(Vector3d(0.0, 20.0, 12.0) + anatomy.shift3("pineal gland", 1.5),
-                               {2.5, 3.0, 2.5},
-                               500));
+    solids.push_back(ellipsoid(
+        Vector3d(0.0, 20.0, 12.0) + anatomy.shift3("pineal gland", 1.5), {2.5, 3.0, 2.5}, 500));
   const int plates = static_cast<int>(anatomy.between("calcified falx", -4.0, 3.0, 0.0));
   for (int i = 0; i < plates; ++i)
-    solids.push_back(ellipsoid(Vector3d(0.0, -40.0 + 25.0 * i, 86.0) + anatomy.shift3("falx", 5.0, i),
-                               {1.2, 9.0, 4.0},
-                               700));
+    solids.push_back(
+        ellipsoid(Vector3d(0.0, -40.0 + 25.0 * i, 86.0) + anatomy.shift3("falx", 5.0, i),
+                  {1.2, 9.0, 4.0},
+                  700));
 }
 
 void add_skull_base(const Anatomy& anatomy, std::vector<Solid>& solids) {
@@ -100,11 +99,11 @@ void add_skull_base(const Anatomy& anatomy, std::vector<Solid>& solids) {
     const double cells = anatomy.between("air cells", 0.3, 1.1, 1.0, index);
     solids.push_back(ellipsoid(
         at(59.0, 25.0, -32.0), cells * Vector3d(8.0, 10.0, 17.0), -150, 800));  // air cells
-    solids.push_back(ellipsoid(at(28.0, 6.0, -16.0), {3.0, 3.0, 3.0}, 0));             // cochlea
+    solids.push_back(ellipsoid(at(28.0, 6.0, -16.0), {3.0, 3.0, 3.0}, 0));      // cochlea
     solids.push_back(capsule_between(at(7.0, -22.0, 1.0), at(6.0, -18.0, 5.0), 2.2, kCorticalHu));
   }
   solids.push_back(capsule_between({-7.0, -10.0, 2.0}, {7.0, -10.0, 2.0}, 2.5, kCorticalHu));
-  solids.push_back(ellipsoid({0.0, -17.0, 0.0}, {7.0, 5.5, 5.0}, kBrainHu));   // sella
+  solids.push_back(ellipsoid({0.0, -17.0, 0.0}, {7.0, 5.5, 5.0}, kBrainHu));  // sella
   const auto sinus = [&](int index) { return anatomy.between("sinus", 0.4, 1.2, 1.0, index); };
   solids.push_back(
       ellipsoid({6.0, -34.0, -11.0}, sinus(0) * Vector3d(8.0, 14.0, 9.0), kGasHu));  // sphenoid
@@ -116,9 +115,8 @@ void add_orbits(const Anatomy& anatomy, std::vector<Solid>& solids) {
   {
     BonePainter bone(solids, 1.6 * anatomy.shell());
     for (const double side : {-1.0, 1.0}) {
-      bone.add(ellipsoid(mirrored({33.0, -62.0, -8.0}, side),
-                         orbit * Vector3d(25.0, 27.0, 23.0),
-                         kCorticalHu));
+      bone.add(ellipsoid(
+          mirrored({33.0, -62.0, -8.0}, side), orbit * Vector3d(25.0, 27.0, 23.0), kCorticalHu));
       bone.add_chain({mirrored({12.0, -84.0, 12.0}, side),
                       mirrored({34.0, -83.0, 14.0}, side),
                       mirrored({54.0, -70.0, 4.0}, side),
@@ -128,15 +126,15 @@ void add_orbits(const Anatomy& anatomy, std::vector<Solid>& solids) {
     bone.add_chain({Vector3d(0.0, -86.0, 6.0), Vector3d(0.0, -94.0, -12.0)}, 5.0);  // nasal bones
   }
   for (const double side : {-1.0, 1.0}) {
-    solids.push_back(ellipsoid(
-        mirrored({34.0, -68.0, -8.0}, side), orbit * Vector3d(20.5, 27.0, 18.5), -70));
+    solids.push_back(
+        ellipsoid(mirrored({34.0, -68.0, -8.0}, side), orbit * Vector3d(20.5, 27.0, 18.5), -70));
     solids.push_back(ellipsoid(mirrored({34.0, -76.0, -8.0}, side), Vector3d::Constant(12.0), 15));
   }
   solids.push_back(ellipsoid({0.0, -76.0, 15.0}, {30.0, 9.0, 16.0}, kCorticalHu));
   if (anatomy.has("no frontal sinuses", 0.08)) return;
   const auto sinus = [&](int index) { return anatomy.between("sinus", 0.35, 1.25, 1.0, index); };
-  solids.push_back(ellipsoid(
-      {13.0, -77.0, 18.0}, sinus(2) * Vector3d(13.0, 5.0, 11.0), kGasHu));  // frontal
+  solids.push_back(
+      ellipsoid({13.0, -77.0, 18.0}, sinus(2) * Vector3d(13.0, 5.0, 11.0), kGasHu));  // frontal
   solids.push_back(ellipsoid({-9.0, -77.0, 16.0}, sinus(3) * Vector3d(9.0, 4.5, 9.0), kGasHu));
 }
 
@@ -161,9 +159,8 @@ void add_nose_and_cheeks(const Anatomy& anatomy, std::vector<Solid>& solids) {
     bone.add(ellipsoid({0.0, -66.0, -58.0}, {27.0, 25.0, 8.0}, kCorticalHu));  // palate
   }
   for (const double side : {-1.0, 1.0})
-    solids.push_back(ellipsoid(mirrored({30.0, -62.0, -40.0}, side),
-                               antrum(side) * Vector3d(16.3, 18.3, 17.3),
-                               kGasHu));
+    solids.push_back(ellipsoid(
+        mirrored({30.0, -62.0, -40.0}, side), antrum(side) * Vector3d(16.3, 18.3, 17.3), kGasHu));
   solids.push_back(ellipsoid({0.0, -66.0, -34.0}, {14.0, 32.0, 24.0}, kGasHu));
   for (const double side : {-1.0, 1.0}) {
     solids.push_back(ellipsoid(mirrored({9.0, -64.0, -42.0}, side), {3.5, 22.0, 6.0}, 40));
@@ -194,7 +191,9 @@ void add_mandible(const Anatomy& anatomy, std::vector<Solid>& solids) {
   for (int i = -8; i <= 8; ++i)
     body.push_back(arch_point(11.0 * i, 40.0, 42.0, -96.0 + 0.35 * std::abs(i)));
   bone.add_chain(body, 8.0 * height);
-  bone.add(ellipsoid(Vector3d(0.0, -88.0, -99.0) + anatomy.shift3("chin", 2.5), height * Vector3d(15.0, 8.0, 9.0), kCorticalHu));  // chin
+  bone.add(ellipsoid(Vector3d(0.0, -88.0, -99.0) + anatomy.shift3("chin", 2.5),
+                     height * Vector3d(15.0, 8.0, 9.0),
+                     kCorticalHu));  // chin
   for (const double side : {-1.0, 1.0}) {
     const auto at = [&](double x, double y, double z) { return mirrored({x, y, z}, side); };
     bone.add_chain({at(40.0, -46.0, -92.0), at(46.0, -18.0, -80.0)}, 8.0);
@@ -238,7 +237,10 @@ void add_teeth(const Anatomy& anatomy, std::vector<Solid>& solids, bool has_fill
 }
 
 /// Beaks at the front of a cervical body.
-void add_cervical_wear(const Anatomy& anatomy, int level, const Vector3d& center, BonePainter& bone) {
+void add_cervical_wear(const Anatomy& anatomy,
+                       int level,
+                       const Vector3d& center,
+                       BonePainter& bone) {
   for (int i = 0; i < 6; ++i) {
     const double length_mm =
         anatomy.arthrosis() * anatomy.between("neck beak", 0.0, 7.0, 0.0, 10 * level + i);
@@ -332,7 +334,8 @@ void add_drawn_implants(const Anatomy& anatomy, bool has_metal, Phantom& phantom
 Phantom head_phantom(bool has_metal, const Anatomy& anatomy) {
   constexpr double kBoxHalfMm = 30.0;
   constexpr double kWaveMm = 1.8;
-  Phantom phantom{{}, {96.0, 122.0, 130.0}, target_box_at({0.0, -14.0, -14.0}, 2.0 * kBoxHalfMm), {}};
+  Phantom phantom{
+      {}, {96.0, 122.0, 130.0}, target_box_at({0.0, -14.0, -14.0}, 2.0 * kBoxHalfMm), {}};
   std::vector<Solid>& solids = phantom.solids;
   add_soft_tissue(anatomy, solids);
   add_vault(anatomy, solids);

@@ -50,10 +50,10 @@ void add_soft_tissue(const Anatomy& anatomy, std::vector<Solid>& solids) {
     solid.texture_hu = texture_hu;
     solids.push_back(solid);
   };
-  add_organ(organ(0, {0.0, -22.0, 2.0}, {38.0, 30.0, 30.0}), 8, 0);       // bladder
-  add_organ(organ(1, {4.0, 46.0, 12.0}, {17.0, 18.0, 40.0}), 30, 30);     // rectum
+  add_organ(organ(0, {0.0, -22.0, 2.0}, {38.0, 30.0, 30.0}), 8, 0);    // bladder
+  add_organ(organ(1, {4.0, 46.0, 12.0}, {17.0, 18.0, 40.0}), 30, 30);  // rectum
   add_organ(organ(1, {5.0, 40.0, 22.0}, {9.0, 8.0, 16.0}), kGasHu, 0);
-  add_organ(organ(2, {52.0, -32.0, 72.0}, {20.0, 20.0, 42.0}), 25, 40);   // sigmoid, left
+  add_organ(organ(2, {52.0, -32.0, 72.0}, {20.0, 20.0, 42.0}), 25, 40);  // sigmoid, left
   add_organ(organ(2, {54.0, -42.0, 84.0}, {11.0, 8.0, 22.0}), kGasHu, 0);
   add_organ(organ(2, {34.0, -46.0, 52.0}, {13.0, 7.0, 9.0}), kGasHu, 0);
   add_organ(organ(3, {-68.0, -30.0, 78.0}, {26.0, 24.0, 40.0}), 20, 70);  // caecum, right
@@ -69,15 +69,14 @@ double hip_wear(const Anatomy& anatomy, double side) {
 void add_ilium(const Anatomy& anatomy, double side, BonePainter& bone) {
   constexpr int kRibs = 30;
   std::array<Vector3d, 4> crest{Vector3d(124.0, -46.0, 76.0),
-                                      Vector3d(138.0, -6.0, 118.0),
-                                      Vector3d(108.0, 46.0, 122.0),
-                                      Vector3d(50.0, 80.0, 84.0)};
+                                Vector3d(138.0, -6.0, 118.0),
+                                Vector3d(108.0, 46.0, 122.0),
+                                Vector3d(50.0, 80.0, 84.0)};
   const std::array<Vector3d, 4> root{Vector3d(100.0, -26.0, 26.0),
                                      Vector3d(94.0, -4.0, 30.0),
                                      Vector3d(78.0, 26.0, 32.0),
                                      Vector3d(54.0, 56.0, 30.0)};
-  for (int i = 0; i < 4; ++i)
-    crest[static_cast<std::size_t>(i)] += anatomy.shift3("crest", 4.0, i);
+  for (int i = 0; i < 4; ++i) crest[static_cast<std::size_t>(i)] += anatomy.shift3("crest", 4.0, i);
   const double thickness = anatomy.factor("ilium", 0.12);
   // Cubic Bezier curves through the first and last points.
   const auto curve = [](const std::array<Vector3d, 4>& p, double t) {
@@ -110,7 +109,8 @@ void add_pubis_and_ischium(const Anatomy& anatomy, double side, BonePainter& bon
   };
   bone.add_chain({at(74.0, -18.0, 4.0), at(44.0, -42.0, 8.0), at(16.0, -50.0, -8.0)}, 8.5 * stout);
   bone.add_chain({at(13.0, -50.0, -10.0), at(13.0, -48.0, -36.0)}, 9.5 * stout);
-  bone.add_chain({at(14.0, -46.0, -38.0), at(32.0, -22.0, -60.0), at(52.0, 10.0, -76.0)}, 7.0 * stout);
+  bone.add_chain({at(14.0, -46.0, -38.0), at(32.0, -22.0, -60.0), at(52.0, 10.0, -76.0)},
+                 7.0 * stout);
   bone.add_chain({at(80.0, 16.0, -14.0), at(72.0, 28.0, -46.0), at(60.0, 24.0, -74.0)}, 14.0);
   bone.add(ellipsoid(at(58.0, 22.0, -74.0), {15.0, 17.0, 19.0}, kCorticalHu));
   bone.add_capsule(at(70.0, 34.0, -22.0), at(58.0, 48.0, -26.0), 5.0);  // ischial spine
@@ -121,8 +121,9 @@ void add_femur(const Anatomy& anatomy, double side, BonePainter& bone) {
   const double head = anatomy.factor("femoral head", 0.04) * (1.0 + 0.06 * hip_wear(anatomy, side));
   bone.add(ellipsoid(at(hip_mm), Vector3d::Constant(24.0 * head), kCorticalHu));
   const Vector3d neck(0.0, anatomy.shift("anteversion", 4.0), anatomy.shift("neck", 4.0));
-  bone.add_capsule(
-      at(hip_mm), at(Vector3d(130.0, 8.0, -26.0) + neck), 16.0 * anatomy.factor("neck width", 0.05));
+  bone.add_capsule(at(hip_mm),
+                   at(Vector3d(130.0, 8.0, -26.0) + neck),
+                   16.0 * anatomy.factor("neck width", 0.05));
   bone.add(ellipsoid(at(trochanter_mm + neck),
                      anatomy.factor("trochanter", 0.06) * Vector3d(15.0, 20.0, 24.0),
                      kCorticalHu));
@@ -161,12 +162,12 @@ void add_hip_wear(const Anatomy& anatomy,
   BonePainter bone(solids, 1.2);
   for (int i = 0; i < kBeaks; ++i) {
     const double angle = 2.0 * std::numbers::pi * i / kBeaks;
-    const Vector3d rim = hip + 8.0 * opening +
-                         kRimMm * (std::cos(angle) * across + std::sin(angle) * up);
+    const Vector3d rim =
+        hip + 8.0 * opening + kRimMm * (std::cos(angle) * across + std::sin(angle) * up);
     const double length_mm = wear * anatomy.between("rim beak", 0.0, 9.0, 0.0, key + i);
     if (length_mm > 1.5)
-      bone.add_capsule(rim, rim + length_mm * opening,
-                       anatomy.between("beak radius", 2.0, 3.6, 2.0, key + i));
+      bone.add_capsule(
+          rim, rim + length_mm * opening, anatomy.between("beak radius", 2.0, 3.6, 2.0, key + i));
   }
   constexpr int kSclerosisHu = 1150;
   solids.push_back(ellipsoid(hip + Vector3d(-side * 6.0, 0.0, 31.0),
@@ -207,9 +208,10 @@ void add_sacrum(const Anatomy& anatomy, std::vector<Solid>& solids) {
                          {28.0 - 17.0 * share, 17.0 - 9.0 * share, 14.5 - 3.0 * share},
                          kCorticalHu));
       for (const double side : {-1.0, 1.0})
-        bone.add(ellipsoid(sacral_point(share) + Vector3d(side * width * (32.0 - 22.0 * share), 8.0, -3.0),
-                           {25.0 - 14.0 * share, 13.0 - 5.0 * share, 18.0 - 5.0 * share},
-                           kCorticalHu));
+        bone.add(ellipsoid(
+            sacral_point(share) + Vector3d(side * width * (32.0 - 22.0 * share), 8.0, -3.0),
+            {25.0 - 14.0 * share, 13.0 - 5.0 * share, 18.0 - 5.0 * share},
+            kCorticalHu));
       bone.add(ellipsoid(sacral_point(share) + Vector3d(0.0, 24.0 - 8.0 * share, -6.0),
                          {4.0, 8.0, 11.0},
                          kCorticalHu));
@@ -220,12 +222,12 @@ void add_sacrum(const Anatomy& anatomy, std::vector<Solid>& solids) {
   for (int i = 0; i + 1 < kSegments; ++i)
     for (const double side : {-1.0, 1.0}) {
       const double share = i / 5.0 + 0.14;
-      const Vector3d hole = sacral_point(share) + Vector3d(side * width * (23.0 - 12.0 * share), 0.0, 0.0);
-      solids.push_back(capsule_between(
-          hole - Vector3d(0.0, 12.0, 2.0),
-          hole + Vector3d(0.0, 20.0, -2.0),
-          4.3 * anatomy.factor("foramina", 0.12, i),
-          0));
+      const Vector3d hole =
+          sacral_point(share) + Vector3d(side * width * (23.0 - 12.0 * share), 0.0, 0.0);
+      solids.push_back(capsule_between(hole - Vector3d(0.0, 12.0, 2.0),
+                                       hole + Vector3d(0.0, 20.0, -2.0),
+                                       4.3 * anatomy.factor("foramina", 0.12, i),
+                                       0));
     }
 }
 
@@ -292,10 +294,10 @@ void add_drawn_implants(const Anatomy& anatomy, bool has_metal, Phantom& phantom
   constexpr int kStoneHu = 700;
   const int stones = static_cast<int>(anatomy.between("phleboliths", -4.0, 9.0, 0.0));
   for (int i = 0; i < stones; ++i)
-    solids.push_back(ellipsoid(Vector3d(i % 2 == 0 ? 50.0 : -50.0, 20.0, -25.0) +
-                                   anatomy.shift3("phlebolith", 9.0, i),
-                               Vector3d::Constant(anatomy.between("stone", 1.2, 2.6, 2.0, i)),
-                               kStoneHu));
+    solids.push_back(ellipsoid(
+        Vector3d(i % 2 == 0 ? 50.0 : -50.0, 20.0, -25.0) + anatomy.shift3("phlebolith", 9.0, i),
+        Vector3d::Constant(anatomy.between("stone", 1.2, 2.6, 2.0, i)),
+        kStoneHu));
 }
 
 }  // namespace
@@ -303,8 +305,7 @@ void add_drawn_implants(const Anatomy& anatomy, bool has_metal, Phantom& phantom
 Phantom pelvis_phantom(bool has_metal, const Anatomy& anatomy) {
   constexpr double kBoxHalfMm = 30.0;
   constexpr double kWaveMm = 3.0;
-  Phantom phantom{
-      {}, {190.0, 130.0, 150.0}, target_box_at({76.0, 0.0, 6.0}, 2.0 * kBoxHalfMm), {}};
+  Phantom phantom{{}, {190.0, 130.0, 150.0}, target_box_at({76.0, 0.0, 6.0}, 2.0 * kBoxHalfMm), {}};
   std::vector<Solid>& solids = phantom.solids;
   add_soft_tissue(anatomy, solids);
   add_sacrum(anatomy, solids);

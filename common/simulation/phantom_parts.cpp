@@ -25,8 +25,8 @@ void add_arch(const Vertebra& v, BonePainter& bone) {
     const auto at = [&](double x, double y, double z) {
       return Vector3d(v.center + Vector3d(side * x, y, z));
     };
-    bone.add_capsule(at(12.0, back - 4.0, 4.0), at(13.5, back + 9.0, 3.0), 4.5);      // pedicle
-    bone.add_capsule(at(13.5, back + 11.0, 1.0), at(3.0, back + 19.0, -5.0), 3.8);    // lamina
+    bone.add_capsule(at(12.0, back - 4.0, 4.0), at(13.5, back + 9.0, 3.0), 4.5);    // pedicle
+    bone.add_capsule(at(13.5, back + 11.0, 1.0), at(3.0, back + 19.0, -5.0), 3.8);  // lamina
     bone.add_capsule(at(14.0, back + 9.0, 16.0),
                      at(14.5, back + 12.0, -15.0),
                      4.2 * v.facets);  // articular
@@ -40,8 +40,7 @@ void add_spinous_process(const Vertebra& v, BonePainter& bone) {
   // Long and steep on thoracic, broad and level on lumbar vertebrae.
   const double drop_mm = v.has_ribs() ? 16.0 : 7.0;
   const Vector3d root = v.center + Vector3d(0.0, v.half_depth_mm + 17.0, -5.0);
-  const Vector3d tip =
-      root + Vector3d(1.0 + v.tilt_mm, 25.0 * v.processes, -drop_mm * v.processes);
+  const Vector3d tip = root + Vector3d(1.0 + v.tilt_mm, 25.0 * v.processes, -drop_mm * v.processes);
   Solid blade = ellipsoid(0.5 * (root + tip),
                           {3.4, 0.5 * (tip - root).norm() + 3.0, v.has_ribs() ? 6.0 : 9.0},
                           kCorticalHu);
@@ -64,10 +63,11 @@ void add_osteophytes(const Vertebra& v, BonePainter& bone, std::vector<Solid>& s
       const Vector3d rim =
           v.center + Vector3d(v.half_width_mm * outwards.x(), v.half_depth_mm * outwards.y(), 0.0) -
           radius_mm * outwards + Vector3d(0.0, 0.0, end * (v.half_height_mm - radius_mm));
-      bone.add_chain({rim,
-                      rim + length_mm * outwards,
-                      rim + (length_mm + 1.0) * outwards + Vector3d(0.0, 0.0, end * length_mm * 0.5)},
-                     radius_mm);
+      bone.add_chain(
+          {rim,
+           rim + length_mm * outwards,
+           rim + (length_mm + 1.0) * outwards + Vector3d(0.0, 0.0, end * length_mm * 0.5)},
+          radius_mm);
     }
     solids.push_back(elliptic_cylinder(v.center + Vector3d(0.0, 0.0, end * v.half_height_mm),
                                        {0.93 * v.half_width_mm, 0.93 * v.half_depth_mm, 1.2},
@@ -89,9 +89,8 @@ Solid shaped(Solid solid, const Habitus& habitus) {
   if (solid.shape == Solid::Shape::Capsule && solid.half_sizes_mm.z() > 0.0) {
     const Vector3d half = solid.half_sizes_mm.z() * solid.rotation.col(2);
     const Eigen::Matrix3d jacobian = habitus.jacobian(solid.center_mm);
-    const double across = std::sqrt((jacobian * solid.rotation.col(0))
-                                        .cross(jacobian * solid.rotation.col(1))
-                                        .norm());
+    const double across = std::sqrt(
+        (jacobian * solid.rotation.col(0)).cross(jacobian * solid.rotation.col(1)).norm());
     const Solid moved = capsule_between(habitus(solid.center_mm - half),
                                         habitus(solid.center_mm + half),
                                         across * solid.half_sizes_mm.x(),
@@ -112,8 +111,9 @@ Solid shaped(Solid solid, const Habitus& habitus) {
 }  // namespace
 
 bool Phantom::has_metal() const {
-  return std::any_of(
-      solids.begin(), solids.end(), [](const Solid& solid) { return solid.hu > kScannersHighestHu; });
+  return std::any_of(solids.begin(), solids.end(), [](const Solid& solid) {
+    return solid.hu > kScannersHighestHu;
+  });
 }
 
 Phantom shaped(Phantom phantom, const Anatomy& anatomy, const Habitus& habitus) {
@@ -139,8 +139,8 @@ Phantom shaped(Phantom phantom, const Anatomy& anatomy, const Habitus& habitus) 
   if (cancellous < 0.65) phantom.findings.emplace_back("thin bone");
   if (anatomy.arthrosis() > 0.3) phantom.findings.emplace_back("arthrosis");
   if (habitus.cobb_deg() >= 10.0)
-    phantom.findings.push_back(
-        "scoliosis of " + std::to_string(std::lround(habitus.cobb_deg())) + " deg");
+    phantom.findings.push_back("scoliosis of " + std::to_string(std::lround(habitus.cobb_deg())) +
+                               " deg");
   return phantom;
 }
 
@@ -234,9 +234,10 @@ void add_gas(const Anatomy& anatomy, const CtBox& box, std::vector<Solid>& solid
     for (int axis = 0; axis < 3; ++axis)
       share[axis] = anatomy.between("bubble", 0.0, 1.0, 0.5, 3 * i + axis);
     const double size_mm = anatomy.between("bubble size", 4.0, 14.0, 4.0, i);
-    solids.push_back(ellipsoid(
-        box.low_mm + share.cwiseProduct(box.high_mm - box.low_mm),
-        size_mm * (Vector3d::Ones() + anatomy.shift3("bubble shape", 0.2, i)), kGasHu));
+    solids.push_back(
+        ellipsoid(box.low_mm + share.cwiseProduct(box.high_mm - box.low_mm),
+                  size_mm * (Vector3d::Ones() + anatomy.shift3("bubble shape", 0.2, i)),
+                  kGasHu));
   }
 }
 
@@ -256,8 +257,8 @@ Vertebra varied(Vertebra v, const Anatomy& anatomy, int index) {
   const double size = anatomy.factor("vertebrae", 0.05);
   v.half_width_mm *= size * anatomy.factor("vertebra width", 0.04, index);
   v.half_depth_mm *= size * anatomy.factor("vertebra depth", 0.04, index);
-  v.half_height_mm *= anatomy.factor("vertebrae's height", 0.04) *
-                      anatomy.factor("vertebra height", 0.03, index);
+  v.half_height_mm *=
+      anatomy.factor("vertebrae's height", 0.04) * anatomy.factor("vertebra height", 0.03, index);
   v.center += anatomy.shift3("vertebra place", 0.7, index);
   v.shell_mm *= anatomy.shell();
   v.processes = anatomy.factor("processes", 0.08) * anatomy.factor("process", 0.06, index);

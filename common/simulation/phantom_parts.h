@@ -20,7 +20,7 @@ struct PhantomOptions {
   int samples_per_axis = 2;  ///< points per voxel and axis
   int threads = 0;           ///< 0: as many as the hardware has; voxels do not depend on it
   bool has_metal = false;    ///< implants: screws and rods, a hip prosthesis, fillings
-  std::optional<std::int64_t> anatomy_seed;  ///< which patient; none: the typical adult
+  std::optional<std::int64_t> anatomy_seed = {};  ///< which patient; none: the typical adult
 
   void describe(Fields& field);
 };

@@ -68,13 +68,10 @@ std::optional<Chord> capsule_chord(const Solid& solid, const Vector3d& a, const 
   return all;
 }
 
-/// Adds the parts of `outer` that the waist leaves, to 1e-6 mm; a gap of less than 1/24 of the chord
-/// may stay unseen.
-void add_waist_chords(const Solid& solid,
-                      const Vector3d& a,
-                      const Vector3d& b,
-                      const Chord& outer,
-                      Chords& found) {
+/// Adds the parts of `outer` that the waist leaves, to 1e-6 mm; a gap of less than 1/24 of the
+/// chord may stay unseen.
+void add_waist_chords(
+    const Solid& solid, const Vector3d& a, const Vector3d& b, const Chord& outer, Chords& found) {
   constexpr int kSamples = 24;
   constexpr int kBisections = 30;
   const auto is_inside = [&](double t) {
@@ -109,7 +106,8 @@ void add_waist_chords(const Solid& solid,
 }  // namespace
 
 void Chords::add(double first_mm, double last_mm) {
-  if (count < 2 && first_mm < last_mm) items[static_cast<std::size_t>(count++)] = {first_mm, last_mm};
+  if (count < 2 && first_mm < last_mm)
+    items[static_cast<std::size_t>(count++)] = {first_mm, last_mm};
 }
 
 Chords chords(const Solid& solid, const Vector3d& origin, const Vector3d& direction) {

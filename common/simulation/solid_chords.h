@@ -24,8 +24,6 @@ struct Chords {
 };
 
 /// Where the line origin + t direction (unit) is inside a body; a tangent has none.
-Chords chords(const Solid& solid,
-              const Eigen::Vector3d& origin,
-              const Eigen::Vector3d& direction);
+Chords chords(const Solid& solid, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction);
 
 }  // namespace af

@@ -54,8 +54,7 @@ SolidProjector::SolidProjector(const Phantom& phantom,
     if (solid.shape == Solid::Shape::Capsule)
       radius_mm = solid.half_sizes_mm.x() + solid.half_sizes_mm.z();
     if (solid.shape == Solid::Shape::EllipticCylinder)
-      radius_mm =
-          std::hypot(solid.half_sizes_mm.head<2>().maxCoeff(), solid.half_sizes_mm.z());
+      radius_mm = std::hypot(solid.half_sizes_mm.head<2>().maxCoeff(), solid.half_sizes_mm.z());
     balls_.push_back({solid.center_mm, radius_mm});
   }
 }
@@ -76,8 +75,7 @@ std::vector<SolidProjector::Piece> SolidProjector::pieces(const Vector3d& source
     last_mm = std::min(last_mm, std::max(a, b));
   }
   if (!(first_mm < last_mm)) return {};
-  if (!motion_)
-    return {{source_point + first_mm * direction, direction, last_mm - first_mm, 1.0}};
+  if (!motion_) return {{source_point + first_mm * direction, direction, last_mm - first_mm, 1.0}};
   std::vector<Piece> found;
   const int count = static_cast<int>(std::ceil((last_mm - first_mm) / kPieceMm));
   const double step_mm = (last_mm - first_mm) / count;
@@ -98,8 +96,8 @@ std::vector<SolidProjector::Piece> SolidProjector::pieces(const Vector3d& source
 void SolidProjector::add_length(int hu, double length_mm, PathIntegrals& sum) const {
   const AttenuationModel& model = tissue_.attenuation_model();
   if (hu < model.air_below_hu) return;
-  const auto relative =
-      static_cast<std::uint16_t>(std::clamp(hu + 1000, 0, int{std::numeric_limits<std::uint16_t>::max()}));
+  const auto relative = static_cast<std::uint16_t>(
+      std::clamp(hu + 1000, 0, int{std::numeric_limits<std::uint16_t>::max()}));
   const double bone = tissue_.bone_part(relative);
   sum.water_mm += (relative - bone) * length_mm / 1000.0;
   sum.bone_mm += bone * length_mm / 1000.0;

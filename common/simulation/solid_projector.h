@@ -13,8 +13,8 @@ namespace af {
 
 /// Line integrals through bodies themselves, without voxels: the surfaces that a ray crosses in
 /// closed form (those of a waist by bisection to 1e-6 mm), between them the body that was painted
-/// last, textures by the midpoints of steps of at most 1.5 mm. So X-rays share no voxel grid with the
-/// CT that registers them. With a motion the ray is followed through the anatomy as a polyline,
+/// last, textures by the midpoints of steps of at most 1.5 mm. So X-rays share no voxel grid with
+/// the CT that registers them. With a motion the ray is followed through the anatomy as a polyline,
 /// one piece every 8 mm. Ends at the faces of the phantom's volume.
 /// \test SolidProjector.EqualsClosedFormsOfSingleBodies
 class SolidProjector : public RayIntegrator {
@@ -42,9 +42,7 @@ class SolidProjector : public RayIntegrator {
 
   [[nodiscard]] std::vector<Piece> pieces(const Eigen::Vector3d& source_point,
                                           const Eigen::Vector3d& direction) const;
-  void add_piece(const Piece& piece,
-                 const std::vector<int>& candidates,
-                 PathIntegrals& sum) const;
+  void add_piece(const Piece& piece, const std::vector<int>& candidates, PathIntegrals& sum) const;
   void add_span(const Piece& piece,
                 const Solid& solid,
                 double first_mm,

@@ -108,8 +108,7 @@ void add_ribs(const Anatomy& anatomy, std::vector<Solid>& solids) {
   for (int level = lacks_last ? 1 : 0; level <= kVertebraeEachSide + 2; ++level)
     for (const double side : {-1.0, 1.0}) {
       BonePainter bone(solids, 1.6 * anatomy.shell());
-      const std::vector<Vector3d> points =
-          rib_points(vertebra_at(level, anatomy), anatomy, side);
+      const std::vector<Vector3d> points = rib_points(vertebra_at(level, anatomy), anatomy, side);
       const double radius = anatomy.factor("ribs", 0.12) * anatomy.factor("rib", 0.06, level);
       for (std::size_t i = 1; i < points.size(); ++i)
         bone.add_capsule(points[i - 1], points[i], (i < 2 ? 4.0 : 5.0) * radius);
@@ -145,10 +144,10 @@ void add_soft_tissue(const Anatomy& anatomy, std::vector<Solid>& solids) {
   const Vector3d left_lung(65.0, -12.0, 150.0);
   add(ellipsoid(right_lung + breath, {49.0, 60.0, 120.0}, kLungHu, 60));
   add(ellipsoid(left_lung + breath, {46.0, 58.0, 128.0}, kLungHu, 60));
-  add(organ(anatomy, 0, {22.0, -52.0, 120.0}, {48.0, 38.0, 62.0}, kMuscleHu));     // heart
-  add(organ(anatomy, 1, {-56.0, -38.0, 8.0}, {66.0, 58.0, 52.0}, kOrganHu, 8));    // liver
-  add(organ(anatomy, 2, {84.0, 6.0, 22.0}, {27.0, 34.0, 34.0}, kOrganHu, 8));      // spleen
-  add(organ(anatomy, 3, {52.0, -58.0, 2.0}, {42.0, 34.0, 36.0}, 35));              // stomach
+  add(organ(anatomy, 0, {22.0, -52.0, 120.0}, {48.0, 38.0, 62.0}, kMuscleHu));   // heart
+  add(organ(anatomy, 1, {-56.0, -38.0, 8.0}, {66.0, 58.0, 52.0}, kOrganHu, 8));  // liver
+  add(organ(anatomy, 2, {84.0, 6.0, 22.0}, {27.0, 34.0, 34.0}, kOrganHu, 8));    // spleen
+  add(organ(anatomy, 3, {52.0, -58.0, 2.0}, {42.0, 34.0, 36.0}, 35));            // stomach
   const double gas = anatomy.between("stomach gas", 0.4, 1.25, 1.0);
   add(organ(anatomy, 3, {58.0, -72.0, 10.0}, gas * Vector3d(26.0, 15.0, 20.0), kGasHu));
   add(organ(anatomy, 4, {76.0, -50.0, -78.0}, {16.0, 18.0, 34.0}, 30));  // colon
@@ -209,16 +208,20 @@ void add_drawn_implants(const Anatomy& anatomy,
     const int level = static_cast<int>(anatomy.between("cement level", -3.0, 2.99, 0.0));
     const Vertebra v = vertebra_at(level, anatomy);
     for (int i = 0; i < 5; ++i)
-      solids.push_back(ellipsoid(v.center + anatomy.shift3("cement place", 3.5, i),
-                                 Vector3d::Constant(anatomy.between("cement size", 2.5, 6.0, 4.0, i)),
-                                 kCementHu));
+      solids.push_back(
+          ellipsoid(v.center + anatomy.shift3("cement place", 3.5, i),
+                    Vector3d::Constant(anatomy.between("cement size", 2.5, 6.0, 4.0, i)),
+                    kCementHu));
     findings.emplace_back("bone cement");
   }
   if (anatomy.has("clips", 0.15)) {
     for (int i = 0; i < 5; ++i) {
       const Vector3d clip = Vector3d(-38.0, -52.0, -18.0) + anatomy.shift3("clip", 8.0, i);
-      solids.push_back(capsule_between(
-          clip, clip + anatomy.shift3("clip axis", 3.0, i) + Vector3d(0.0, 0.0, 4.0), 0.7, kTitaniumHu));
+      solids.push_back(
+          capsule_between(clip,
+                          clip + anatomy.shift3("clip axis", 3.0, i) + Vector3d(0.0, 0.0, 4.0),
+                          0.7,
+                          kTitaniumHu));
     }
     findings.emplace_back("surgical clips");
   }

@@ -35,8 +35,9 @@ struct XraySimulationOptions {
 
 std::vector<std::string> problems(const XraySimulationOptions& options);
 
-/// Makes X-rays of a CT, or of a phantom, with steel bodies. Steel adds to the tissue along a ray; the tissue that it
-/// would displace (at most 0.04 of the steel's own attenuation) is not taken away.
+/// Makes X-rays of a CT, or of a phantom, with steel bodies. Steel adds to the tissue along a ray;
+/// the tissue that it would displace (at most 0.04 of the steel's own attenuation) is not taken
+/// away.
 class XraySimulator {
  public:
   /// `volume` must outlive the simulator.

@@ -46,9 +46,8 @@ RegistrationTarget chosen_target(const SimulateOptions& options, const CtVolume&
   } else if (center.size() == 3) {
     target = target_box_at({center[0], center[1], center[2]}, options.target_side_mm);
   } else {
-    target = options.phantom.empty()
-                 ? find_target(ct, options.target_side_mm)
-                 : phantom_of(options).target;
+    target = options.phantom.empty() ? find_target(ct, options.target_side_mm)
+                                     : phantom_of(options).target;
   }
   if (center.size() == 3) target.center_ct_mm = {center[0], center[1], center[2]};
   return target;
