@@ -8,7 +8,7 @@
 #include <limits>
 #include <map>
 #include <optional>
-#include <set>
+#include <utility>
 
 #include <CLI/CLI.hpp>
 
@@ -295,27 +295,69 @@ std::string millimetre_text(double value) {
 }
 
 std::string success_cells(const PopulationSuccess& success) {
-  return percent(success.rate.value) + " | " + percent(success.rate.bootstrap.low) + "-" +
-         percent(success.rate.bootstrap.high) + " | " + percent(success.rate.student.low) + "-" +
+  return percent(success.rate.value) + " | " + percent(success.rate.bootstrap.low) + " to " +
+         percent(success.rate.bootstrap.high) + " | " + percent(success.rate.student.low) + " to " +
          percent(success.rate.student.high) + " | " +
          millimetre_text(success.pooled.initial_tre_mm) + " | " +
          millimetre_text(success.capture_mm.value) + " (" +
-         millimetre_text(success.capture_mm.bootstrap.low) + "-" +
+         millimetre_text(success.capture_mm.bootstrap.low) + " to " +
          millimetre_text(success.capture_mm.bootstrap.high) + ")";
 }
 
+bool is_kind(const PopulationGroup& group) {
+  return group.group != "all" && group.group != "odd" && group.group != "even" &&
+         group.group != "real";
+}
+
+/// All patients, and the halves.
 std::string population_markdown(const std::vector<PopulationGroup>& groups, bool by_mrpd) {
   std::string text =
-      "| Condition | Patients | Group | Starts | Success, % | Bootstrap over patients | Student's "
-      "| "
+      "| Condition | Group | Patients | Starts | Success, % | Bootstrap | Student's | "
       "Capture range of all, mm | Patients' own, mean, mm | Median TRE, mm | Seconds |\n"
       "|---|---|---|---|---|---|---|---|---|---|---|\n";
   for (const PopulationGroup& group : groups)
-    text += "| " + group.condition + " | " + std::to_string(group.by_tre.patients.size()) + " | " +
-            group.group + " | " + std::to_string(group.by_tre.starts) + " | " +
-            success_cells(by_mrpd ? group.by_mrpd : group.by_tre) + " | " +
-            (std::isfinite(group.median_tre_mm) ? fixed_text(group.median_tre_mm, 2) : "-") +
-            " | " + fixed_text(group.median_seconds, 3) + " |\n";
+    if (!is_kind(group))
+      text += "| " + group.condition + " | " + group.group + " | " +
+              std::to_string(group.by_tre.patients.size()) + " | " +
+              std::to_string(group.by_tre.starts) + " | " +
+              success_cells(by_mrpd ? group.by_mrpd : group.by_tre) + " | " +
+              (std::isfinite(group.median_tre_mm) ? fixed_text(group.median_tre_mm, 2) : "-") +
+              " | " + fixed_text(group.median_seconds, 3) + " |\n";
+  return text;
+}
+
+/// A column per kind of patient: success and capture range of all its starts, by TRE and by mRPD.
+std::string kinds_markdown(const std::vector<PopulationGroup>& groups) {
+  std::vector<std::string> kinds;
+  std::vector<std::string> conditions;
+  std::map<std::pair<std::string, std::string>, std::string> cells;
+  const auto add_new = [](std::vector<std::string>& names, const std::string& name) {
+    if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+  };
+  for (const PopulationGroup& group : groups) {
+    add_new(conditions, group.condition);
+    if (!is_kind(group) && group.group != "real") continue;
+    add_new(kinds, group.group);
+    cells[{group.condition, group.group}] =
+        percent(group.by_tre.rate.value) + " / " + percent(group.by_mrpd.rate.value) + ", " +
+        millimetre_text(group.by_tre.pooled.initial_tre_mm) + " / " +
+        millimetre_text(group.by_mrpd.pooled.initial_tre_mm);
+  }
+  std::string text = "| Condition |";
+  std::string line = "|---|";
+  for (const std::string& kind : kinds) {
+    text += " " + kind + " |";
+    line += "---|";
+  }
+  text += "\n" + line + "\n";
+  for (const std::string& condition : conditions) {
+    text += "| " + condition + " |";
+    for (const std::string& kind : kinds) {
+      const auto cell = cells.find({condition, kind});
+      text += " " + (cell == cells.end() ? std::string("-") : cell->second) + " |";
+    }
+    text += "\n";
+  }
   return text;
 }
 
@@ -449,7 +491,10 @@ void write_population(const PopulationOptions& options, const PopulationReader& 
   const std::string text = "By TRE below " + number_text(reader.counting().success_mm) +
                            " mm:\n\n" + population_markdown(groups, false) +
                            "\nBy mRPD below the same, which is the one to read with one view:\n\n" +
-                           population_markdown(groups, true);
+                           population_markdown(groups, true) +
+                           "\nKinds of patients: success, % (TRE / mRPD), capture range of all "
+                           "starts, mm (TRE / mRPD):\n\n" +
+                           kinds_markdown(groups);
   std::filesystem::create_directories(options.output);
   write_text_file(options.output / "population.csv", population_table(groups).to_text());
   write_text_file(options.output / "patients.csv", patients_table(groups).to_text());

@@ -54,12 +54,12 @@ class Leaks : public ::testing::Test {
   }
   /// Registers a study from a start a little off the nominal pose; result.json.
   static nlohmann::json registered(const std::string& name, const std::string& options = {}) {
-    const std::string output = path(name + "-result");
+    static int run_count = 0;
+    const std::string output = path(name + "-result-" + std::to_string(++run_count));
     const test::ProgramRun run = test::run_command(
         AF_PROGRAM_FOLDER "/af-register --renderer raycast --preset robust --study " +
-        path(name + "/study.toml") +
-        " --start-rotation-deg 1,-1,2 --start-translation-mm 2,-2,3 --force " + options + " -o " +
-        output);
+        path(name + "/study.toml") + " --start-rotation-deg 1,-1,2 --start-translation-mm 2,-2,3 " +
+        options + " -o " + output);
     EXPECT_TRUE(run.exit_code == 0 || run.exit_code == 7) << run.output;
     std::ifstream file(output + "/result.json");
     return nlohmann::json::parse(file);
