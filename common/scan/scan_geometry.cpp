@@ -5,9 +5,11 @@
 #include <cmath>
 #include <numbers>
 #include <numeric>
+#include <tuple>
 
 #include <Eigen/Dense>
 
+#include "base/error.h"
 #include "base/plausible.h"
 #include "geometry/rigid_transform.h"
 
@@ -15,6 +17,7 @@ namespace af {
 
 namespace {
 
+constexpr int kFewestPixels = 16;  ///< on a side of the detector
 constexpr double kTurn = 2.0 * std::numbers::pi;
 
 Eigen::Matrix3d turned_about(const Eigen::Vector3d& axis, double angle_rad) {
@@ -52,14 +55,11 @@ std::string out_of_range(const std::string& name, double value, const std::strin
   return name + " = " + std::to_string(value) + ": " + constraint;
 }
 
-void note_angle_problems(const std::vector<double>& angles_rad, std::vector<std::string>& found) {
-  constexpr std::size_t kFewestViews = 16;
+/// "the views leave 40 degrees of the circle empty, ..." when they do not go all the way round.
+void note_gaps(const std::vector<double>& angles_rad,
+               const std::string& which,
+               std::vector<std::string>& found) {
   constexpr double kMostUneven = 3.0;
-  if (angles_rad.size() < kFewestViews) {
-    found.push_back("views = " + std::to_string(angles_rad.size()) + ": must be at least " +
-                    std::to_string(kFewestViews));
-    return;
-  }
   const std::vector<double> within_turn = within_one_turn(angles_rad);
   std::vector<double> gaps = gaps_around(within_turn, order_around(within_turn));
   std::sort(gaps.begin(), gaps.end());
@@ -67,10 +67,37 @@ void note_angle_problems(const std::vector<double>& angles_rad, std::vector<std:
   // Repeated angles leave wider gaps between the others.
   const double typical = std::max(gaps[gaps.size() / 2], even_gap);
   if (gaps.back() > kMostUneven * typical)
-    found.push_back("the views leave " + std::to_string(gaps.back() * kDegPerRad) +
+    found.push_back(which + " leave " + std::to_string(gaps.back() * kDegPerRad) +
                     " degrees of the circle empty, where neighbours are " +
-                    std::to_string(typical * kDegPerRad) +
-                    " degrees apart: the scan must go all the way round");
+                    std::to_string(typical * kDegPerRad) + " degrees apart: ");
+}
+
+void note_angle_problems(const std::vector<double>& angles_rad, std::vector<std::string>& found) {
+  constexpr std::size_t kFewestViews = 16;
+  if (angles_rad.size() < kFewestViews) {
+    found.push_back("views = " + std::to_string(angles_rad.size()) + ": must be at least " +
+                    std::to_string(kFewestViews));
+    return;
+  }
+  std::vector<std::string> gaps;
+  note_gaps(angles_rad, "the views", gaps);
+  if (!gaps.empty()) {
+    found.push_back(gaps.front() + "the scan must go all the way round");
+    return;
+  }
+  // The even views are reconstructed, and so is each half of them.
+  for (const auto& [first, stride, which] :
+       {std::tuple{0, 2, "the even views"},
+        std::tuple{0, 4, "every fourth view from the first"},
+        std::tuple{2, 4, "every fourth view from the third"}}) {
+    std::vector<double> part;
+    for (const int view : CircularScan::every(first, stride, static_cast<int>(angles_rad.size())))
+      part.push_back(angles_rad[static_cast<std::size_t>(view)]);
+    note_gaps(part, which, gaps);
+    if (gaps.empty()) continue;
+    found.push_back(gaps.front() + "list the views in the order of their angles");
+    return;
+  }
 }
 
 }  // namespace
@@ -85,7 +112,36 @@ CircularScan CircularScan::binned(int factor) const {
   CircularScan result = *this;
   result.pixel_spacing_mm *= factor;
   result.size_px /= factor;
+  if (result.size_px.minCoeff() < kFewestPixels)
+    throw InputError("size_px",
+                     std::to_string(size_px.x()) + " x " + std::to_string(size_px.y()),
+                     "must keep at least " + std::to_string(kFewestPixels) +
+                         " pixels on both sides when binned by " + std::to_string(factor));
+  // Pixel centres are integers: the outer edge, at -1/2, stays.
+  if (result.beam_foot_px)
+    result.beam_foot_px = (result.beam_foot_px->array() + 0.5) / factor - 0.5;
   return result;
+}
+
+Eigen::Vector2d CircularScan::stated_foot_px() const {
+  return beam_foot_px.value_or(0.5 * (size_px.cast<double>().array() - 1.0).matrix());
+}
+
+AxisView view_at_axis(const CircularScan& scan) {
+  const double scale = scan.source_to_axis_mm / scan.source_to_detector_mm;
+  const Eigen::Vector2d pixel_mm = scale * scan.pixel_spacing_mm;
+  // From the foot to the outer edges: of the first, and of the last column and row.
+  const Eigen::Vector2d before =
+      pixel_mm.cwiseProduct((scan.stated_foot_px().array() + 0.5).matrix());
+  const Eigen::Vector2d behind = pixel_mm.cwiseProduct(scan.size_px.cast<double>()) - before;
+  const bool along_columns = scan.axis_along == AxisAlong::Columns;
+  const int across = along_columns ? 1 : 0;
+  AxisView view;
+  view.lowest_mm = along_columns ? -before.x() : -behind.y();
+  view.highest_mm = along_columns ? behind.x() : before.y();
+  view.narrow_mm = std::min(before[across], behind[across]);
+  view.wide_mm = std::max(before[across], behind[across]);
+  return view;
 }
 
 std::vector<std::string> problems(const CircularScan& scan) {
@@ -102,11 +158,16 @@ std::vector<std::string> problems(const CircularScan& scan) {
   for (const double spacing : scan.pixel_spacing_mm)
     if (!is_plausible_spacing_mm(spacing))
       found.push_back(out_of_range("pixel_spacing_mm", spacing, kPlausibleSpacing));
-  constexpr int kFewestPixels = 16;
   constexpr int kMostPixels = 16384;
   for (const int size : scan.size_px)
     if (size < kFewestPixels || size > kMostPixels)
       found.push_back("size_px = " + std::to_string(size) + ": must be within 16 and 16384");
+  for (int axis = 0; axis < 2; ++axis) {
+    const double foot = scan.stated_foot_px()[axis];
+    // The whole object must be seen on both sides of the axis.
+    if (!(foot > 0.0) || !(foot < scan.size_px[axis] - 1))
+      found.push_back(out_of_range("beam_foot_px", foot, "must be on the detector"));
+  }
   for (const double angle : scan.angles_rad)
     if (!std::isfinite(angle)) return {"angles must be finite"};
   note_angle_problems(scan.angles_rad, found);
@@ -145,8 +206,8 @@ ScanCalibration ScanCalibration::nominal(const CircularScan& scan, int harmonics
   calibration.column_px = AngleSeries(harmonics);
   calibration.row_px = AngleSeries(harmonics);
   calibration.rotation_rad = AngleSeries(harmonics);
-  calibration.column_px.coefficients[0] = 0.5 * (scan.size_px.x() - 1);
-  calibration.row_px.coefficients[0] = 0.5 * (scan.size_px.y() - 1);
+  calibration.column_px.coefficients[0] = scan.stated_foot_px().x();
+  calibration.row_px.coefficients[0] = scan.stated_foot_px().y();
   return calibration;
 }
 

@@ -333,8 +333,10 @@ void write_xray(const SimulateOptions& options,
     description.imager_spacing_mm = camera.pixel_spacing_mm;
     description.source_detector_mm = camera.source_detector_distance_mm();
     description.source_patient_mm = (isocenter_point - camera.source_point).norm();
-    const Eigen::Vector2d angles = positioner_angles_deg(
-        study_case.nominal_room_from_ct.linear().transpose() * camera.beam_direction());
+    const Eigen::Matrix3d ct_from_room = study_case.nominal_room_from_ct.linear().transpose();
+    description.column_direction_ct = ct_from_room * camera.column_direction;
+    description.row_direction_ct = ct_from_room * camera.row_direction;
+    const Eigen::Vector2d angles = positioner_angles_deg(ct_from_room * camera.beam_direction());
     description.primary_angle_deg = angles.x();
     description.secondary_angle_deg = angles.y();
     view.xray = folder / (camera.name + ".dcm");
