@@ -13,3 +13,9 @@ foreach(af_bones simulated wrist)
     bones.${af_bones} PROPERTIES LABELS programs SKIP_RETURN_CODE 77 TIMEOUT 600 ENVIRONMENT
                                  "OMPI_ALLOW_RUN_AS_ROOT=1;OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1")
 endforeach()
+
+af_add_program_tests(
+  leak_tests
+  SOURCES programs/leaks_test.cpp
+  LIBS af_study_contents
+  PROGRAMS af-register af-simulate af-evaluate)
