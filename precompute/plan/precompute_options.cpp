@@ -7,6 +7,7 @@
 #include "base/plausible.h"
 #include "base/toml_text.h"
 #include "precompute/casting/casters.h"
+#include "precompute/plan/axis_ranges.h"
 
 namespace af {
 
@@ -51,6 +52,26 @@ void describe_casting(Fields& field, PrecomputeOptions& options) {
         options.max_translation_mm,
         "Range: largest shift along each room axis, mm")
       .decides(kCastingStage);
+  field("rotation_range_deg",
+        options.rotation_range_deg,
+        "Range per axis, degrees, such as rx=-15:15,ry=-5:5,rz=-30:30; one number stands for both "
+        "sides; axes not named keep --max-rotation-deg")
+      .decides(kCastingStage);
+  field("translation_range_mm",
+        options.translation_range_mm,
+        "Range per axis, mm, such as tx=-20:20,ty=-80:40,tz=30; axes not named keep "
+        "--max-translation-mm")
+      .decides(kCastingStage);
+  field("cover",
+        options.cover,
+        "File of poses (docs/poses.md): the range is taken about each of them instead of the "
+        "nominal pose, and the field covers the smallest box of the six parameters that holds all "
+        "of these")
+      .input();
+  field("cover_rig",
+        options.cover_rig,
+        "Rig of further cameras: the field holds their rays, too, over the same range")
+      .input();
   field("preset",
         options.preset,
         "Design of the field, by name. " + design_preset_help() + " [" + kDefaultPreset +
@@ -252,7 +273,7 @@ StPlane PrecomputeOptions::st_plane_rule() const {
 }
 
 std::vector<std::string> problems(const PrecomputeOptions& options) {
-  std::vector<std::string> found = problems(options.range());
+  std::vector<std::string> found = problems(options.range());  // UsageError where it is no range
   append(field_problems(options), found);
   append(problems(options.codebook_options()), found);
   append(problems(options.training_selection()), found);
@@ -267,6 +288,27 @@ std::vector<std::string> problems(const PrecomputeOptions& options) {
     if (!is_plausible_room_mm(coordinate))
       found.push_back("center_ct_mm = " + number_text(coordinate) + ": " + kPlausibleRoom);
   return found;
+}
+
+MotionRange PrecomputeOptions::range() const {
+  MotionRange range(max_rotation_deg * kRadPerDeg, max_translation_mm);
+  if (!rotation_range_deg.empty()) {
+    const AxisRanges stated =
+        axis_ranges("--rotation-range-deg", rotation_range_deg, 'r', max_rotation_deg);
+    for (std::size_t i = 0; i < 3; ++i) {
+      range.low.rotation_rad[static_cast<int>(i)] = stated.low[i] * kRadPerDeg;
+      range.high.rotation_rad[static_cast<int>(i)] = stated.high[i] * kRadPerDeg;
+    }
+  }
+  if (!translation_range_mm.empty()) {
+    const AxisRanges stated =
+        axis_ranges("--translation-range-mm", translation_range_mm, 't', max_translation_mm);
+    for (std::size_t i = 0; i < 3; ++i) {
+      range.low.translation_mm[static_cast<int>(i)] = stated.low[i];
+      range.high.translation_mm[static_cast<int>(i)] = stated.high[i];
+    }
+  }
+  return range;
 }
 
 TrainingSelection PrecomputeOptions::training_selection(int for_codewords) const {

@@ -27,6 +27,8 @@ af_add_test(
           unit/evaluate/registration/failure_traces_test.cpp unit/evaluate/report/study_runs_test.cpp
   LIBS af_evaluation_program af_evaluation_report af_study af_run)
 
+af_add_test(start_tables_test SOURCES unit/evaluate/registration/start_tables_test.cpp LIBS af_evaluation_tables)
+
 af_add_program_tests(
   evaluate_statistics_program_tests EACH_TEST
   SOURCES programs/evaluate_statistics_test.cpp

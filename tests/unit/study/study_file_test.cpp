@@ -255,6 +255,8 @@ TEST_F(StudyFile, BadValuesAreRefusedWithLineKeyValueAndConstraint) {
       refusal("[1.0, 2.0, 3.0]", "[1.0, inf, 3.0]"),
       HasSubstr(":6: case[0].center_ct_mm = [1, inf, 3]: must be a list of 3 finite numbers"));
   EXPECT_THAT(refusal("[30,31,32]", "[30,-31,32]"), HasSubstr(":7: case[0].target_box_ct_mm"));
+  EXPECT_THAT(refusal("[30,31,32]", "[30000,31,32]"), HasSubstr("2e4 mm"));
+  EXPECT_THAT(refusal("[30,31,32]", "[3000,3000,3000]"), HasSubstr("1e7 cells"));
   EXPECT_THAT(refusal("\"ct.nii.gz\"", "\"\""), HasSubstr(":4: case[0].ct = \"\""));
   EXPECT_THAT(refusal("\"skull-01\"", "\"a/b\""), HasSubstr(":3: case[0].name = \"a/b\""));
   EXPECT_THAT(refusal("[150, 160, 200, 201]", "[313, 160, 200, 201]"),
