@@ -171,10 +171,9 @@ void describe_run(Fields& field, PrecomputeOptions& options) {
       .not_deciding(why);
   field("index_packing",
         options.index_packing,
-        "How the file holds the indices: deflate (quick, and any reader of HDF5 can), or "
-        "codebook-tree "
-        "(about half the bytes, a second or two more to write and read); the payload is the same "
-        "[codebook-tree where limits, or a preset with limits, are given; else deflate]")
+        "How the file holds the indices: codebook-tree (about half the bytes, up to a second more "
+        "to write and read), or deflate (any reader of HDF5 can); the payload is the same "
+        "[deflate for the preset 'paper' and for designs that are typed; else codebook-tree]")
       .one_of({"codebook-tree", "deflate"})
       .not_deciding(why);
   field("mpi_io_hints",
@@ -222,7 +221,7 @@ DesignParts PrecomputeOptions::stated_parts() const {
 
 const DesignPreset& PrecomputeOptions::design_preset() const {
   const bool has_parts = slabs || uv_nodes || st_nodes || codewords || look_up;
-  return design_preset_named(preset.value_or(has_parts ? "paper" : kDefaultPreset));
+  return design_preset_named(preset.value_or(has_parts ? kPaperPreset : kDefaultPreset));
 }
 
 bool PrecomputeOptions::needs_probe() const {
@@ -236,7 +235,8 @@ const DesignBudget& PrecomputeOptions::limits() const {
 
 bool PrecomputeOptions::packs_by_codebook_tree() const {
   if (index_packing) return *index_packing == "codebook-tree";
-  return limits().is_stated();
+  // Whoever types a design compares with the paper.
+  return limits().is_stated() || design_preset().name != std::string_view(kPaperPreset);
 }
 
 double min_improvement_of(const FieldDesign& design) {

@@ -248,6 +248,9 @@ of_option 3 'uv' 'nodes < 2' --uv-nodes 1
 of_option 3 'codewords' 'codewords > 65536' --codewords 70000
 of_option 3 'codewords' 'codewords > training tiles' --codewords 60000
 of_option 3 'max_rotation_deg' 'rotation range too large' --max-rotation-deg 85
+of_option 2 'rx=5:-5' 'bounds of a range that descend' --rotation-range-deg rx=5:-5
+of_option 2 'the axes are tx' 'range of an axis that there is not' --translation-range-mm rx=5
+of_option 4 'does not exist' 'poses to cover that are missing' --cover none.csv
 of_option 3 'max_translation_mm' 'source inside the CT within the range' --max-translation-mm 640
 row 2 'must be a finite number' 'centre that is no number' "${precompute[@]}" --ct valid/ct.nii.gz --rig valid/rig.toml \
   --camera AP --center-ct-mm nan,0,0
