@@ -274,7 +274,7 @@ void announce_times(std::vector<Method>& methods,
 /// Every option, input and start that decides a case's rows.
 DecidingValues deciding_values(const RegistrationStudyOptions& options,
                                const CaseEvaluation& evaluation) {
-  DecidingValues values = af::deciding_values(deciding_options(options), evaluation.input_sha256);
+  DecidingValues values = af::deciding_values(deciding_options(options), evaluation.inputs.sha256);
   values["case name"] = evaluation.case_name;
   Sha256 starts;
   for (const PerturbedStart& start : evaluation.starts.starts) {
@@ -467,7 +467,7 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
       std::in_place, "loading case " + study_case.name, WorkNote::Kind::Phase);
   std::vector<Method> methods;
   for (LoadedMethod& method :
-       load_methods(options, options.correction, study, study_case, world, evaluation.input_sha256))
+       load_methods(options, options.correction, study, study_case, world, evaluation.inputs))
     methods.push_back({method.renderer, std::move(method.runner), {}, options.success_tre_mm});
   const Yardstick yardstick = all_or_none(world, [&] {
     evaluation.gold = gold_standard(study, study_case, options.gold);

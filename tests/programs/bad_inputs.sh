@@ -169,6 +169,11 @@ of_rig 3 '--rig-size-px' 'plastimatch without the size of the images' valid/came
 of_rig 3 'Origin' 'elastix without the origin' "$(edited camera-elastix-AP.txt 's/^[(]Origin/(Orient/')"
 of_rig 4 'not closed' 'elastix cut short' "$(edited camera-elastix-AP.txt 's/^[(]FocalPoint.*/(FocalPoint 1 2/')"
 printf '<RTKThreeDCircularGeometry><Projection>' >cut.xml
+for numbers in '1, 2, 3' '[0.1]' '-500, 0, 0, 0' 'nan, 0, 0, 0' '0, 0, 0, 0, 0, -500, 0, 0' '1e300, 0, 0, 0'; do
+  of_rig 3 'distortion' "distortion $numbers" "$(edited rig.toml "0,/^size_px = .*/s//&\ndistortion = [$numbers]/")"
+done
+of_rig 4 '4, 5, 8, 12 or 14 numbers' 'OpenCV distortion of two numbers' \
+  "$(edited camera-opencv-AP.txt '/^distortion/,/data/s/data: .*/data: [ 0.1, 0.2 ]/; /^distortion/,/data/s/rows: .*/rows: 2/')"
 of_rig 4 'broken XML' 'RTK geometry cut short' cut.xml
 printf '<!DOCTYPE a [<!ENTITY b "bbbb">]><RTKThreeDCircularGeometry/>' >entities.xml
 of_rig 4 'entities' 'RTK geometry with entities' entities.xml
