@@ -47,6 +47,18 @@ bool is_elastix(const CameraFile& file);
 StatedRig read_elastix(const CameraFile& file, const CameraFileOptions& options);
 std::string write_elastix(const CameraRig& rig);
 
+bool is_xreg_hdf5(const CameraFile& file);
+StatedRig read_xreg_hdf5(const CameraFile& file, const CameraFileOptions& options);
+std::string write_xreg_hdf5(const CameraRig& rig);
+
+bool is_rad_header(const CameraFile& file);
+StatedRig read_rad_header(const CameraFile& file, const CameraFileOptions& options);
+std::string write_rad_header(const CameraRig& rig);
+
+bool is_diffdrr_camera(const CameraFile& file);
+StatedRig read_diffdrr_camera(const CameraFile& file, const CameraFileOptions& options);
+std::string write_diffdrr_camera(const CameraRig& rig);
+
 bool is_dicom_xray(const CameraFile& file);
 StatedRig read_dicom_xray(const CameraFile& file, const CameraFileOptions& options);
 

@@ -48,6 +48,24 @@ void check_is_2d(const RawImage& image, const fs::path& path) {
                         std::to_string(rows) + " pixels");
 }
 
+void check_is_stack(const RawImage& image, const fs::path& path) {
+  if (image.size.size() != 3)
+    throw InputError(
+        "dimensions", std::to_string(image.size.size()), "must be a 3-D stack", path.string());
+  if (image.channels != 1)
+    throw InputError(
+        "channels", std::to_string(image.channels), "must be grey (one channel)", path.string());
+  const std::size_t columns = image.size[0];
+  const std::size_t rows = image.size[1];
+  constexpr std::size_t kMostImages = 100000;
+  if (columns == 0 || rows == 0 || columns > kMaxPixels / rows || image.size[2] > kMostImages)
+    throw InputError("size",
+                     std::to_string(columns) + " x " + std::to_string(rows) + " x " +
+                         std::to_string(image.size[2]),
+                     "must be images of 1 to 2^28 pixels, at most 100000",
+                     path.string());
+}
+
 RawImage raw_image_of(std::vector<std::size_t> size, ValueType type, double dx_mm, double dy_mm) {
   RawImage image;
   const std::size_t dimensions = size.size();
@@ -136,6 +154,41 @@ ImageWithSpacing read_image_with_spacing(const fs::path& path) {
   if (*format != ImageFormat::Png && *format != ImageFormat::Tiff && header.has_spacing)
     spacing_mm = Eigen::Vector2d(raw.spacing_mm[0], raw.spacing_mm[1]);
   return {std::move(image), spacing_mm};
+}
+
+void for_each_image_of_stack(const fs::path& path,
+                             const std::function<void(int number, Image2d&& image)>& visit) {
+  const std::optional<ImageFormat> format = sniff_image_format(path);
+  if (!format) throw FileError(path.string(), "not a stack of images: its content is of no format");
+  const bool has_values = *format == ImageFormat::MetaImage || *format == ImageFormat::Nrrd ||
+                          *format == ImageFormat::Nifti;
+  if (!has_values)
+    throw InputError("stack",
+                     std::string(format_name(*format)),
+                     "must be MetaImage, NRRD or NIfTI; convert it, or give one file per image",
+                     path.string());
+  const ImageHeader header = read_image_header(path, *format);
+  const RawImage description = read_image_description(
+      path, header, [&](const RawImage& seen) { check_is_stack(seen, path); });
+  const auto empty = [&] {
+    return Image2d(static_cast<int>(description.size[0]), static_cast<int>(description.size[1]));
+  };
+  Image2d image = empty();
+  std::size_t filled = 0;
+  int number = 0;
+  const auto add = [&](float value) {
+    image.pixels[filled++] = value;
+    if (filled < image.pixels.size()) return;
+    check_is_finite(image, path);
+    visit(number++, std::move(image));
+    image = empty();
+    filled = 0;
+  };
+  read_described_values(path, header, description, nullptr, [&](std::span<const std::byte> piece) {
+    visit_values(description.type, piece, [&](const auto values) {
+      for (const auto value : values) add(static_cast<float>(value));
+    });
+  });
 }
 
 void write_image(const Image2d& image,

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <span>
 #include <vector>
@@ -28,6 +29,11 @@ struct ImageWithSpacing {
 
 /// read_image() with the pixel spacing.
 ImageWithSpacing read_image_with_spacing(const std::filesystem::path& path);
+
+/// Reads a 3-D MetaImage, NRRD or NIfTI file as images of its first two axes, one after the other
+/// along the third, values as stored; holds one image at a time. Errors as read_image().
+void for_each_image_of_stack(const std::filesystem::path& path,
+                             const std::function<void(int number, Image2d&& image)>& visit);
 
 /// Writes float pixels unscaled: .mha .nii.gz .nrrd .tif, atomically. Pixel spacing (mm) is written
 /// where the format has it.

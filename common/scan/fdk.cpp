@@ -26,18 +26,10 @@ struct AxisPlane {
   [[nodiscard]] double height_mm(int i) const { return (i - 0.5 * (heights - 1)) * pitch_mm; }
 };
 
-/// Half extents at the axis of what the detector sees, mm: across and along the axis.
-Eigen::Vector2d half_view_mm(const CircularScan& scan) {
-  const double scale = scan.source_to_axis_mm / scan.source_to_detector_mm;
-  const Eigen::Vector2d half =
-      0.5 * scale * scan.pixel_spacing_mm.cwiseProduct(scan.size_px.cast<double>());
-  return scan.axis_along == AxisAlong::Columns ? Eigen::Vector2d(half.y(), half.x()) : half;
-}
-
 /// Of the cylinder that all views see: a ray that just misses the detector passes the axis there.
 double seen_radius_mm(const CircularScan& scan) {
   return scan.source_to_axis_mm *
-         std::sin(std::atan(half_view_mm(scan).x() / scan.source_to_axis_mm));
+         std::sin(std::atan(view_at_axis(scan).narrow_mm / scan.source_to_axis_mm));
 }
 
 double axis_pixel_mm(const CircularScan& scan) {
@@ -47,11 +39,12 @@ double axis_pixel_mm(const CircularScan& scan) {
 AxisPlane axis_plane(const CircularScan& scan) {
   AxisPlane plane;
   plane.pitch_mm = axis_pixel_mm(scan);
-  // The beam need not meet the detector's middle.
+  // The beam need not meet the detector where it is stated to.
   constexpr double kMargin = 1.1;
-  const Eigen::Vector2d half = kMargin * half_view_mm(scan);
-  plane.tangents = 2 * static_cast<int>(std::ceil(half.x() / plane.pitch_mm)) + 1;
-  plane.heights = 2 * static_cast<int>(std::ceil(half.y() / plane.pitch_mm)) + 1;
+  const AxisView view = view_at_axis(scan);
+  const double half_height = std::max(-view.lowest_mm, view.highest_mm);
+  plane.tangents = 2 * static_cast<int>(std::ceil(kMargin * view.wide_mm / plane.pitch_mm)) + 1;
+  plane.heights = 2 * static_cast<int>(std::ceil(kMargin * half_height / plane.pitch_mm)) + 1;
   return plane;
 }
 
@@ -184,16 +177,18 @@ void FdkOptions::describe(Fields& field) {
 
 CtGrid scan_grid(const CircularScan& scan, double voxel_mm) {
   const double voxel = voxel_mm > 0.0 ? voxel_mm : axis_pixel_mm(scan);
-  const Eigen::Vector2d half = half_view_mm(scan);
+  const AxisView view = view_at_axis(scan);
   const double radius = seen_radius_mm(scan);
   CtGrid grid;
-  const auto voxels = [&](double half_mm) {
-    return std::max(2, static_cast<int>(std::floor(2.0 * half_mm / voxel)));
+  const auto voxels = [&](double width_mm) {
+    return std::max(2, static_cast<int>(std::floor(width_mm / voxel)));
   };
-  grid.size = {voxels(radius), voxels(radius), voxels(half.y())};
+  grid.size = {
+      voxels(2.0 * radius), voxels(2.0 * radius), voxels(view.highest_mm - view.lowest_mm)};
   grid.spacing_mm.setConstant(voxel);
   for (Eigen::Index axis = 0; axis < 3; ++axis)
     grid.origin_mm[axis] = -0.5 * (grid.size[static_cast<std::size_t>(axis)] - 1) * voxel;
+  grid.origin_mm.z() += 0.5 * (view.highest_mm + view.lowest_mm);
   return grid;
 }
 

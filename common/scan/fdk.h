@@ -33,7 +33,7 @@ struct FdkOptions {
 };
 
 /// The grid of the cylinder about the axis that all views see, and what lies around it in the box:
-/// identity direction, centred on the axis at the height of the beam.
+/// identity direction, centred on the axis and on the heights that the detector sees.
 CtGrid scan_grid(const CircularScan& scan, double voxel_mm);
 
 /// Filtered back projection of a full circle (Feldkamp, Davis, Kress, JOSA A 1:612, 1984). Each

@@ -85,7 +85,31 @@ CircularScan CircularScan::binned(int factor) const {
   CircularScan result = *this;
   result.pixel_spacing_mm *= factor;
   result.size_px /= factor;
+  // Pixel centres are integers: the outer edge, at -1/2, stays.
+  if (result.beam_foot_px)
+    result.beam_foot_px = (result.beam_foot_px->array() + 0.5) / factor - 0.5;
   return result;
+}
+
+Eigen::Vector2d CircularScan::stated_foot_px() const {
+  return beam_foot_px.value_or(0.5 * (size_px.cast<double>().array() - 1.0).matrix());
+}
+
+AxisView view_at_axis(const CircularScan& scan) {
+  const double scale = scan.source_to_axis_mm / scan.source_to_detector_mm;
+  const Eigen::Vector2d pixel_mm = scale * scan.pixel_spacing_mm;
+  // From the foot to the outer edges: of the first, and of the last column and row.
+  const Eigen::Vector2d before =
+      pixel_mm.cwiseProduct((scan.stated_foot_px().array() + 0.5).matrix());
+  const Eigen::Vector2d behind = pixel_mm.cwiseProduct(scan.size_px.cast<double>()) - before;
+  const bool along_columns = scan.axis_along == AxisAlong::Columns;
+  const int across = along_columns ? 1 : 0;
+  AxisView view;
+  view.lowest_mm = along_columns ? -before.x() : -behind.y();
+  view.highest_mm = along_columns ? behind.x() : before.y();
+  view.narrow_mm = std::min(before[across], behind[across]);
+  view.wide_mm = std::max(before[across], behind[across]);
+  return view;
 }
 
 std::vector<std::string> problems(const CircularScan& scan) {
@@ -107,6 +131,12 @@ std::vector<std::string> problems(const CircularScan& scan) {
   for (const int size : scan.size_px)
     if (size < kFewestPixels || size > kMostPixels)
       found.push_back("size_px = " + std::to_string(size) + ": must be within 16 and 16384");
+  for (int axis = 0; axis < 2; ++axis) {
+    const double foot = scan.stated_foot_px()[axis];
+    // The whole object must be seen on both sides of the axis.
+    if (!(foot > 0.0) || !(foot < scan.size_px[axis] - 1))
+      found.push_back(out_of_range("beam_foot_px", foot, "must be on the detector"));
+  }
   for (const double angle : scan.angles_rad)
     if (!std::isfinite(angle)) return {"angles must be finite"};
   note_angle_problems(scan.angles_rad, found);
@@ -145,8 +175,8 @@ ScanCalibration ScanCalibration::nominal(const CircularScan& scan, int harmonics
   calibration.column_px = AngleSeries(harmonics);
   calibration.row_px = AngleSeries(harmonics);
   calibration.rotation_rad = AngleSeries(harmonics);
-  calibration.column_px.coefficients[0] = 0.5 * (scan.size_px.x() - 1);
-  calibration.row_px.coefficients[0] = 0.5 * (scan.size_px.y() - 1);
+  calibration.column_px.coefficients[0] = scan.stated_foot_px().x();
+  calibration.row_px.coefficients[0] = scan.stated_foot_px().y();
   return calibration;
 }
 

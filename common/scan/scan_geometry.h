@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,9 @@ struct CircularScan {
   Eigen::Vector2d pixel_spacing_mm = Eigen::Vector2d::Ones();  ///< column, row
   Eigen::Vector2i size_px = Eigen::Vector2i::Zero();           ///< columns, rows
   AxisAlong axis_along = AxisAlong::Rows;
+  /// Where the perpendicular from the source meets the detector (column, row), as stated; none: its
+  /// middle.
+  std::optional<Eigen::Vector2d> beam_foot_px;
   std::vector<double> angles_rad;  ///< of the views
 
   /// The scan as seen by pixels `factor` times as wide and high; columns and rows that fill no
@@ -29,7 +33,18 @@ struct CircularScan {
   [[nodiscard]] CircularScan binned(int factor) const;
   /// The views `first`, `first` + `stride`, ... below `end`.
   [[nodiscard]] static std::vector<int> every(int first, int stride, int end);
+  /// The stated foot of the beam, or the detector's middle.
+  [[nodiscard]] Eigen::Vector2d stated_foot_px() const;
 };
+
+/// What the stated detector sees where the axis is, mm: heights are of +z, widths of the tangent.
+struct AxisView {
+  double lowest_mm = 0.0;   ///< along the axis; negative
+  double highest_mm = 0.0;  ///< along the axis
+  double narrow_mm = 0.0;   ///< across, to the side that sees less
+  double wide_mm = 0.0;     ///< across, to the other side
+};
+AxisView view_at_axis(const CircularScan& scan);
 
 /// "source_to_axis_mm = -3: must be above 0" and so on, among them that the views go all the way
 /// round: the largest gap between neighbouring angles is at most three times the median one.
@@ -60,7 +75,7 @@ struct ScanCalibration {
   AngleSeries row_px;        ///< likewise
   AngleSeries rotation_rad;  ///< of the detector in its plane, from its column towards its row axis
 
-  /// The stated geometry: an ideal circle, the beam on the detector's middle.
+  /// The stated geometry: an ideal circle.
   static ScanCalibration nominal(const CircularScan& scan, int harmonics);
   /// The same geometry for the scan's binned() pixels, and back by a factor of 1 / factor.
   [[nodiscard]] ScanCalibration binned(double factor) const;

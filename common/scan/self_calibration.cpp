@@ -43,14 +43,6 @@ Image2d cast_view(const AttenuationVolume& volume, const CameraGeometry& camera)
   return image;
 }
 
-/// Half the height that every view sees at the axis, mm.
-double half_height_mm(const CircularScan& scan) {
-  const bool along_columns = scan.axis_along == AxisAlong::Columns;
-  const int size = along_columns ? scan.size_px.x() : scan.size_px.y();
-  const double spacing = along_columns ? scan.pixel_spacing_mm.x() : scan.pixel_spacing_mm.y();
-  return 0.5 * size * spacing * scan.source_to_axis_mm / scan.source_to_detector_mm;
-}
-
 /// The column (or row) across the axis where the views' common centre of attenuation lies: that of
 /// a full circle is on the axis.
 double axis_position_px(const ScanImages& images, const std::vector<int>& used) {
@@ -302,10 +294,10 @@ std::vector<unsigned char> fully_seen_pixels(const CircularScan& scan,
                                              const std::vector<unsigned char>& is_lit,
                                              double radius_mm) {
   std::vector<unsigned char> is_seen = is_lit;
-  const double half_height = half_height_mm(scan);
   const double radius = scan.source_to_axis_mm;
   // Where a reconstructed point must be to be seen from everywhere, and how high a ray gets.
-  const double lowest_roof = half_height * (radius - radius_mm) / radius;
+  const double nearest = (radius - radius_mm) / radius;
+  const AxisView view = view_at_axis(scan);
   const double farthest = (radius + radius_mm) / calibration.source_to_detector_mm;
   const bool along_columns = scan.axis_along == AxisAlong::Columns;
   const double foot = (along_columns ? calibration.column_px : calibration.row_px).coefficients[0];
@@ -315,11 +307,12 @@ std::vector<unsigned char> fully_seen_pixels(const CircularScan& scan,
   std::size_t pixel = 0;
   for (int row = 0; row < scan.size_px.y(); ++row)
     for (int column = 0; column < scan.size_px.x(); ++column, ++pixel) {
-      const double along_mm = std::abs((along_columns ? column : row) - foot) * spacing;
+      const double height_mm = farthest * spacing * (along_columns ? column - foot : foot - row);
       const bool at_edge = column < kEdgePx || row < kEdgePx ||
                            column >= scan.size_px.x() - kEdgePx ||
                            row >= scan.size_px.y() - kEdgePx;
-      if (at_edge || along_mm * farthest > lowest_roof) is_seen[pixel] = 0;
+      if (at_edge || height_mm < view.lowest_mm * nearest || height_mm > view.highest_mm * nearest)
+        is_seen[pixel] = 0;
     }
   return is_seen;
 }

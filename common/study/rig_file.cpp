@@ -49,6 +49,10 @@ CameraRig read_rig(const std::string& name_or_paths, std::vector<std::string>* w
   const CameraFormat* const format = recognised_camera_format(file);
   if (format != nullptr && format->read != read_rig_toml)
     return read_camera_files(files, {}, warnings);
+  // The rest are bytes: a format that cannot be told, or a damaged one.
+  if (format == nullptr && file.text.empty() && !file.head.empty() &&
+      std::filesystem::file_size(files.front()) <= CameraFile::kMostTextBytes)
+    return read_camera_files(files, {}, warnings);
   return parse_rig(
       read_text_file(files.front(), CameraFile::kMostTextBytes), files.front().string(), warnings);
 }

@@ -247,6 +247,17 @@ std::optional<std::vector<double>> TomlTableReader::get_numbers(const char* key,
   return numbers;
 }
 
+std::optional<std::vector<double>> TomlTableReader::get_number_list(const char* key,
+                                                                    Presence presence) {
+  const toml::node* found = find(key, presence);
+  if (found == nullptr) return std::nullopt;
+  const toml::array* list = found->as_array();
+  const int count = list == nullptr ? 0 : static_cast<int>(list->size());
+  auto numbers = count > 0 ? numbers_within(*found, count, kMaxRoomMm) : std::nullopt;
+  if (!numbers) add_problem(key, "must be a list of" + wanted_numbers(kMaxRoomMm));
+  return numbers;
+}
+
 std::optional<std::vector<int>> TomlTableReader::get_integers(const char* key,
                                                               int count,
                                                               Presence presence) {

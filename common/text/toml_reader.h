@@ -72,6 +72,8 @@ class TomlTableReader {
     if (!numbers) return std::nullopt;
     return Eigen::Map<const Eigen::Matrix<double, Size, 1>>(numbers->data());
   }
+  /// A list of as many numbers as there are, within kMaxRoomMm; an empty one is a problem.
+  std::optional<std::vector<double>> get_number_list(const char* key, Presence presence);
   /// A list of exactly `count` whole numbers that fit an int.
   std::optional<std::vector<int>> get_integers(const char* key, int count, Presence presence);
   /// A list of rows of `columns` numbers each, finite and not beyond `most`; `rows` = -1: any

@@ -20,7 +20,7 @@ check_tree() {
       function report(where, what) { printf "%s: %s\n", where, what; ++violations }
       function trimmed(text) { gsub(/^[ `]+|[ `]+$/, "", text); return text }
       function long_name(folder) {
-        return folder ~ /^(precompute|register|evaluate|python)(\/|$)/ ? folder : "common/" folder
+        return folder ~ /^(common|precompute|register|evaluate|python)(\/|$)/ ? folder : "common/" folder
       }
       function library_of(name) {
         if (name ~ /^mpi[.]h$/) return "MPI"
@@ -60,10 +60,12 @@ check_tree() {
         for (folder in row) ++rows
         if (!rows) report("ARCHITECTURE.md", "holds no table of folders")
       }
-      # The folder of an included file: beside the including one, below common/, or below the root.
+      # The folder of an included file: beside the including one, below common/, or below the root; the public headers are
+      # included as they are installed.
       function folder_of_include(name, folder,    place) {
         if (name !~ /\//) return folder
         sub(/\/[^\/]*$/, "", name)
+        if (name == "attenuation_fields") return "common/library/" name
         if (name ~ /^common\//) return name
         return name ~ /^(precompute|register|evaluate|python)(\/|$)/ ? name : "common/" name
       }

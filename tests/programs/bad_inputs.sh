@@ -153,7 +153,7 @@ of_rig 3 'source_point' 'source at 1e300 mm' "$(edited rig.toml '0,/^source_poin
 of_rig 3 'pixel_spacing_mm' 'pixels of 1e300 mm' "$(edited rig.toml '0,/^pixel_spacing_mm = .*/s//pixel_spacing_mm = [1e300, 3]/')"
 of_rig 4 'c-arm-9in' 'unknown shipped rig' c-arm-9in
 # Cameras of other programs, in files that af-inspect writes here.
-for format in mayacam2 opencv matrix elastix plastimatch; do
+for format in mayacam2 opencv matrix elastix plastimatch xreg diffdrr; do
   "$bin/af-inspect" --rig-from valid/rig.toml --rig-to "$format" -o "valid/camera-$format.txt" >message.txt 2>&1 ||
     { echo "af-inspect could not write valid/camera-$format.txt" >&2; exit 1; }
 done
@@ -172,6 +172,19 @@ printf '<RTKThreeDCircularGeometry><Projection>' >cut.xml
 of_rig 4 'broken XML' 'RTK geometry cut short' cut.xml
 printf '<!DOCTYPE a [<!ENTITY b "bbbb">]><RTKThreeDCircularGeometry/>' >entities.xml
 of_rig 4 'entities' 'RTK geometry with entities' entities.xml
+for bytes in 400 2000; do
+  head -c "$bytes" valid/camera-xreg.txt >"cut-$bytes.h5"
+  of_rig 4 'states no camera in a known format' "xReg's HDF5 of $bytes bytes" "cut-$bytes.h5"
+done
+of_rig 4 'known format' "a field as a rig" AP.af.h5
+rad=$'Size[pixels]: 64 48\nStep[mm]: 3 3\nDataType: float\nSourcePosition[mm]: 0 -650 0\nTPosition:\n1 0 0 -96\n0 0 -1 350\n'
+printf '%s' "$rad" >cut.rad
+of_rig 4 'TPosition has four lines' '.rad cut short' cut.rad
+printf '%s0 1 0 -72\n0 0 0 1\n' "${rad/-650/-1e300}" >far.rad
+of_rig 3 'source_point' '.rad with the source at 1e300 mm' far.rad
+of_rig 3 'must be above 0' 'DiffDRR with pixels of -3 mm' "$(edited camera-diffdrr.txt '0,/^delx = .*/s//delx = -3/')"
+of_rig 3 'within 1 and 32768' 'DiffDRR of 2e9 rows' "$(edited camera-diffdrr.txt '0,/^height = .*/s//height = 2000000000/')"
+of_rig 3 'neighbours different' 'DiffDRR with an unknown convention' "$(edited camera-diffdrr.txt '0,/^convention = .*/s//convention = "XXL"/')"
 of_rig 4 'edited-rig.toml' 'not TOML' "$(edited rig.toml '1s/^.*$/= 3/')"
 of_design() { row "$1" "$2" "$3" "${precompute[@]}" --study valid/study.toml --camera AP "${@:4}"; }
 of_design 3 'max_field_bytes = 0: must be at least 1' 'no size' --max-field-size 0
@@ -199,6 +212,15 @@ of_study 3 'none beyond 1e+06' 'pose 1e300 mm away' "$(edited study.toml 's/^nom
 of_study 3 'must vary' 'ROI of one pixel at the corner' "$(edited study.toml 's/^roi_px = .*/roi_px = [47, 47, 1, 1]/')"
 of_study 3 'roi_px' 'ROI of huge numbers' "$(edited study.toml '0,/^roi_px = .*/s//roi_px = [2147483647, 0, 2147483647, 1]/')"
 of_study 3 'collinear' 'collinear fiducials' "$(edited study.toml 's/^name = .*/&\nfiducials_ct_mm = [[0,0,0],[1,1,1],[2,2,2],[3,3,3]]/; s/^roi_px = .*/&\nfiducials_px = [[10,10],[20,20],[30,30],[40,41]]/')"
+# marked KEY-OF-THE-CASE KEYS-OF-ITS-VIEWS: the valid study with points that somebody marked.
+marked() { edited study.toml "s/^name = .*/&\n$1/; s/^roi_px = .*/&\n$2/"; }
+of_study 3 'fiducials_px' 'fiducial of three numbers' "$(marked 'fiducials_ct_mm = [[0,0,0],[9,1,1],[2,8,2]]' 'fiducials_px = [[1,2],[],[3,4,5]]')"
+of_study 3 'must lie on the detector' 'landmark off the detector' "$(marked 'landmarks_ct_mm = [[0,0,0],[9,1,1],[2,8,2]]' 'landmarks_px = [[1,2],[],[1e300,4]]')"
+of_study 3 'has 2 entries' 'fewer landmarks than are marked in the CT' "$(marked 'landmarks_ct_mm = [[0,0,0],[9,1,1],[2,8,2]]' 'landmarks_px = [[1,2],[3,4]]')"
+of_study 3 'must be a list of' 'landmarks that are no points' "$(marked 'landmarks_ct_mm = [[0,0,0],[9,1,1],[2,8,2]]' 'landmarks_px = [[1,2],["a",4],[inf,3]]')"
+of_study 3 'landmarks_ct_mm' 'landmark in the CT at 1e300 mm' "$(marked 'landmarks_ct_mm = [[0,0,0],[9,1,1],[2,8,1e300]]' 'landmarks_px = [[1,2],[3,4],[5,6]]')"
+row 3 'landmarks' 'start from landmarks that no view shows' "$bin/af-register" --renderer raycast -o out/result --start landmarks \
+  --study "$(marked 'landmarks_ct_mm = [[0,0,0],[9,1,1],[2,8,2]]' 'landmarks_px = [[],[],[]]')"
 of_study 4 'gone.mha' 'X-ray missing' "$(edited study.toml '0,/^xray = .*/s//xray = "gone.mha"/')"
 of_study 4 'edited-study.toml' 'not TOML' "$(edited study.toml '1s/^.*$/rig = /')"
 # of_xray CODE PART WHAT FILE KEYS: the valid study with another first X-ray, and keys beside it.

@@ -132,6 +132,38 @@ TEST_F(AfScan, MakesAStudyWhoseGoldPoseIsTheIdentity) {
   EXPECT_GT(ct.hu[(voxel(2) * size(1) + voxel(1)) * size(0) + voxel(0)], 400);
 }
 
+/// The study does not depend on how the views and their angles are written down.
+TEST_F(AfScan, TakesAStackAndListedAngles) {
+  ASSERT_EQ(run().exit_code, 0);
+  const std::string from_files = read_text_file(scratch_ / "study" / "calibration.toml");
+  std::vector<Image2d> views;
+  std::string angles;
+  for (std::size_t view = 0; view < 120; ++view) {
+    views.push_back(read_image(image(view)));
+    angles += std::to_string(10.0 + 3.0 * static_cast<double>(view)) + "\n";
+  }
+  write_image_stack(views, scratch_ / "views.mha", 0.9, 0.9);
+  write_text_file(scratch_ / "angles.txt", angles);
+  std::string text = kScan;
+  const auto replace = [&](const std::string& from, const std::string& to) {
+    text.replace(text.find(from), from.size(), to);
+  };
+  replace("view_count = 120\nfirst_angle_deg = 10.0\nstep_deg = 3.0\n",
+          "angles_file = \"angles.txt\"\n");
+  replace("p{:03}.png", "views.mha");
+  write_text_file(scratch_ / "scan.toml", text);
+  ASSERT_EQ(run("--force").exit_code, 0);
+  EXPECT_EQ(read_text_file(scratch_ / "study" / "calibration.toml"), from_files);
+}
+
+TEST_F(AfScan, RefusesAStackOfAnotherNumberOfViews) {
+  write_image_stack(std::vector<Image2d>(119, Image2d(72, 60)), scratch_ / "views.mha", 0.9, 0.9);
+  std::string text = kScan;
+  text.replace(text.find("p{:03}.png"), 10, "views.mha");
+  write_text_file(scratch_ / "scan.toml", text);
+  expect_refused(3, "must be as many as the stack's 119 images");
+}
+
 TEST_F(AfScan, GivesTheSameBytesOnAnyNumberOfThreads) {
   ASSERT_EQ(run("--threads 1").exit_code, 0);
   const std::string one = read_text_file(scratch_ / "study" / "calibration.toml");

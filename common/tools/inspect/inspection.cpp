@@ -36,7 +36,7 @@ constexpr const char* kWhatWasTried =
     "not recognised; tried: DICOM folder, result folder, unfinished work (NAME.progress), HDF5 "
     "field, NIfTI, MetaImage, NRRD, TIFF, PNG, DICOM file, TOML rig, study or pose, JSON result, "
     "CSV table, pose (ITK, DICOM registration, DiffDRR, Autoscoper, 16 numbers), name of a shipped "
-    "rig, and cameras as MayaCam, OpenCV YAML or 3x4 matrices";
+    "rig, and cameras as MayaCam, OpenCV YAML, xReg's HDF5 or 3x4 matrices";
 
 std::string first_bytes(const fs::path& path, std::size_t count) {
   std::ifstream file = open_input_file(path);
@@ -108,6 +108,7 @@ void inspect_file(const fs::path& path,
   if (first_bytes(path, kHdf5Mark.size()) == kHdf5Mark) {
     if (is_small_file(path) && holds_itk_hdf5_transform(read_pose_bytes(path)))
       return inspect_pose(path, inspection);
+    if (states_cameras(path)) return inspect_camera_file(path, inspection);
     return inspect_field(path, communicator, inspection);
   }
   if (is_small_file(path) && holds_dicom_registration(read_pose_bytes(path)))

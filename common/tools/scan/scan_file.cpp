@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/scan/scan_file.h"
 
+#include <charconv>
 #include <cmath>
+#include <sstream>
 
 #include "base/file_name.h"
 #include "files/output_file.h"
@@ -79,9 +81,46 @@ void read_geometry(TomlTableReader& reader, CircularScan& scan) {
   scan.pixel_spacing_mm = spacing.value_or(Eigen::Vector2d::Ones());
   scan.size_px = size ? Eigen::Vector2i((*size)[0], (*size)[1]) : Eigen::Vector2i(16, 16);
   scan.axis_along = axis == "columns" ? AxisAlong::Columns : AxisAlong::Rows;
+  scan.beam_foot_px = reader.get_vector<2>("beam_foot_px", Presence::Optional);
 }
 
-void read_angles(TomlTableReader& reader, CircularScan& scan) {
+/// Numbers between blanks or line ends, as many as there are; # begins a comment.
+std::vector<double> read_angles_file(const std::filesystem::path& path) {
+  std::istringstream lines(read_text_file(path, kMostTomlBytes));
+  std::vector<double> angles_deg;
+  std::string line;
+  for (int number = 1; std::getline(lines, line); ++number) {
+    std::istringstream words(line.substr(0, line.find('#')));
+    for (std::string word; words >> word;) {
+      double angle_deg = 0.0;
+      const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), angle_deg);
+      if (error != std::errc() || end != word.data() + word.size() || !std::isfinite(angle_deg))
+        throw FileError(path.string() + ":" + std::to_string(number),
+                        "'" + word + "' is not an angle: angles_file holds a number per view");
+      angles_deg.push_back(angle_deg);
+    }
+  }
+  return angles_deg;
+}
+
+/// The angles one by one: angles_deg, or the numbers of angles_file.
+std::vector<double> read_listed_angles(TomlTableReader& reader,
+                                       const std::filesystem::path& folder) {
+  for (const char* const key : {"view_count", "step_deg", "first_angle_deg"})
+    if (reader.has(key)) reader.add_problem(key, "must not stand beside a list of angles");
+  if (reader.has("angles_deg") && reader.has("angles_file"))
+    reader.add_problem("angles_file", "must not stand beside angles_deg, which says the same");
+  if (const auto listed = reader.get_number_list("angles_deg", Presence::Optional)) return *listed;
+  const auto file = reader.get_string("angles_file", Presence::Optional);
+  return file ? read_angles_file(folder / *file) : std::vector<double>{};
+}
+
+void read_angles(TomlTableReader& reader, const std::filesystem::path& folder, CircularScan& scan) {
+  if (reader.has("angles_deg") || reader.has("angles_file")) {
+    for (const double angle_deg : read_listed_angles(reader, folder))
+      scan.angles_rad.push_back(angle_deg * kRadPerDeg);
+    return;
+  }
   const auto count = get_index(reader, "view_count", 1, Presence::Required);
   const auto step_deg = get_number(reader, "step_deg", Presence::Required);
   const auto first_deg = get_number(reader, "first_angle_deg", Presence::Optional);
@@ -94,9 +133,15 @@ void read_angles(TomlTableReader& reader, CircularScan& scan) {
 
 void read_image_keys(TomlTableReader& reader, ScanFile& file) {
   file.files = reader.get_string("files", Presence::Required).value_or("{}");
-  if (!index_place(file.files))
+  const bool has_braces = file.files.find_first_of("{}") != std::string::npos;
+  if (has_braces && !index_place(file.files))
     reader.add_problem("files",
-                       "must hold {} once, where the view's index stands; {:04} for four digits");
+                       "must hold {} once, where the view's index stands; {:04} for four digits; a "
+                       "stack of all views has none");
+  if (file.is_stack() && reader.has("first_index"))
+    reader.add_problem("first_index",
+                       "is for files with an index; a stack's first image is the "
+                       "first view");
   file.first_index = get_index(reader, "first_index", 0, Presence::Optional).value_or(0);
   const auto domain = reader.get_string("xray_domain", Presence::Required);
   if (domain && *domain != "intensity" && *domain != "attenuation")
@@ -115,7 +160,12 @@ void read_image_keys(TomlTableReader& reader, ScanFile& file) {
 
 }  // namespace
 
+bool ScanFile::is_stack() const {
+  return !index_place(files);
+}
+
 std::string ScanFile::file_of(int view) const {
+  if (is_stack()) return files;
   const IndexPlace place = index_place(files).value();
   std::string index = std::to_string(first_index + view);
   if (index.size() < place.digits) index.insert(0, place.digits - index.size(), '0');
@@ -131,7 +181,7 @@ ScanFile parse_scan_file(const std::string& text, const std::string& file) {
   result.name = reader.get_string("name", Presence::Optional).value_or("scan");
   if (!is_plain_file_name(result.name)) reader.add_problem("name", "must be usable in a file name");
   read_geometry(reader, result.scan);
-  read_angles(reader, result.scan);
+  read_angles(reader, std::filesystem::path(file).parent_path(), result.scan);
   read_image_keys(reader, result);
   reader.refuse_unknown_keys();
   problems.throw_if_any();

@@ -14,14 +14,17 @@ namespace af::tools {
 struct ScanFile {
   std::string name;
   CircularScan scan;
-  std::string files;  ///< "Projection{}.png"; {:04} writes the index with four digits
+  /// "Projection{}.png"; {:04} writes the index with four digits; without braces a stack of views.
+  std::string files;
   int first_index = 0;
   XrayDomain xray_domain = XrayDomain::Intensity;
   double dark_level = 0.0;  ///< counts of every pixel without beam, if there is no dark image
   std::optional<std::string> dark;
   std::optional<std::string> flat;
 
-  /// File name of a view, relative to the scan's folder.
+  /// Whether one file holds all views, one behind the other.
+  [[nodiscard]] bool is_stack() const;
+  /// File name of a view (or of the stack), relative to the scan's folder.
   [[nodiscard]] std::string file_of(int view) const;
 };
 
@@ -29,7 +32,7 @@ struct ScanFile {
 /// is unacceptable, FileError (4) when it cannot be parsed.
 ScanFile read_scan_file(const std::filesystem::path& path);
 
-/// The same from its text; messages name `file`.
+/// The same from its text; messages name `file`, beside which angles_file stands.
 ScanFile parse_scan_file(const std::string& text, const std::string& file);
 
 }  // namespace af::tools

@@ -17,8 +17,7 @@ namespace fs = std::filesystem;
 /// Half a count: what a pixel without any stands for under the logarithm.
 constexpr double kLeastCount = 0.5;
 
-Image2d read_sized(const fs::path& path, const CircularScan& scan, int bin) {
-  const Image2d image = read_image(path);
+Image2d sized(const Image2d& image, const fs::path& path, const CircularScan& scan, int bin) {
   if (image.width != scan.size_px.x() || image.height != scan.size_px.y())
     throw InputError("size",
                      std::to_string(image.width) + " x " + std::to_string(image.height) + " px",
@@ -26,6 +25,23 @@ Image2d read_sized(const fs::path& path, const CircularScan& scan, int bin) {
                          std::to_string(scan.size_px.y()),
                      path.string());
   return binned_image(image, bin);
+}
+
+Image2d read_sized(const fs::path& path, const CircularScan& scan, int bin) {
+  return sized(read_image(path), path, scan, bin);
+}
+
+std::vector<Image2d> read_stack(const ScanFile& file, const fs::path& path, int bin) {
+  std::vector<Image2d> views;
+  for_each_image_of_stack(path, [&](int /*number*/, Image2d&& image) {
+    views.push_back(sized(image, path, file.scan, bin));
+  });
+  if (views.size() != file.scan.angles_rad.size())
+    throw InputError("views",
+                     std::to_string(file.scan.angles_rad.size()),
+                     "must be as many as the stack's " + std::to_string(views.size()) + " images",
+                     path.string());
+  return views;
 }
 
 void refuse_other_count(const ScanFile& file, const fs::path& folder) {
@@ -40,6 +56,15 @@ void refuse_other_count(const ScanFile& file, const fs::path& folder) {
     throw InputError("view_count",
                      std::to_string(count),
                      "must count all views, but " + next.string() + " exists, too");
+}
+
+std::vector<Image2d> read_views(const ScanFile& file, const fs::path& folder, int bin) {
+  if (file.is_stack()) return read_stack(file, folder / file.files, bin);
+  refuse_other_count(file, folder);
+  std::vector<Image2d> views;
+  for (std::size_t view = 0; view < file.scan.angles_rad.size(); ++view)
+    views.push_back(read_sized(folder / file.file_of(static_cast<int>(view)), file.scan, bin));
+  return views;
 }
 
 /// Counts above the dark level.
@@ -83,15 +108,11 @@ ScanImages read_scan_images(const ScanFile& file,
                             const fs::path& folder,
                             int most_px,
                             ThreadPool& pool) {
-  refuse_other_count(file, folder);
   const int bin = std::max(1, (file.scan.size_px.maxCoeff() + most_px - 1) / most_px);
   ScanImages images;
   images.scan = file.scan.binned(bin);
-  const auto count = static_cast<int>(file.scan.angles_rad.size());
-  images.line_integrals.resize(static_cast<std::size_t>(count));
-  for (int view = 0; view < count; ++view)
-    images.line_integrals[static_cast<std::size_t>(view)] =
-        read_sized(folder / file.file_of(view), file.scan, bin);
+  images.line_integrals = read_views(file, folder, bin);
+  const auto count = static_cast<int>(images.line_integrals.size());
   if (file.xray_domain == XrayDomain::Attenuation) {
     images.is_lit.assign(images.line_integrals.front().pixels.size(), 1);
     return images;

@@ -76,12 +76,14 @@ RegionOfInterest seen_region(const CalibratedScan& scan) {
 CtBox target_box(const CalibratedScan& scan) {
   constexpr double kShare = 0.6;
   const CircularScan& geometry = scan.images.scan;
-  const double half_height = 0.5 * scan.ct.grid.size[2] * scan.ct.grid.spacing_mm.z();
-  const double seen = half_height * (geometry.source_to_axis_mm - scan.object_radius_mm) /
-                      (geometry.source_to_axis_mm + scan.object_radius_mm);
-  const Eigen::Vector3d half(
-      kShare * scan.object_radius_mm, kShare * scan.object_radius_mm, kShare * seen);
-  return {-half, half};
+  const AxisView view = view_at_axis(geometry);
+  const double nearest = 1.0 - scan.object_radius_mm / geometry.source_to_axis_mm;
+  const Eigen::Vector3d middle(0.0, 0.0, 0.5 * nearest * (view.highest_mm + view.lowest_mm));
+  const Eigen::Vector3d half =
+      kShare * Eigen::Vector3d(scan.object_radius_mm,
+                               scan.object_radius_mm,
+                               0.5 * nearest * (view.highest_mm - view.lowest_mm));
+  return {middle - half, middle + half};
 }
 
 RigidTransform nominal_pose(const ScanOptions& options, const std::string& scan_name, int pair) {

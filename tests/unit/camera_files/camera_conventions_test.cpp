@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "camera_files/camera_formats.h"
+#include "hdf5_files/hdf5_output.h"
 #include "support/io_checks.h"
 #include "unit/image_files/dicom_test_file.h"
 
@@ -456,6 +457,207 @@ TEST_F(CameraConventions, ElastixRefusals) {
               HasSubstr("PreParameters"));
   EXPECT_THAT(input_refusal(test::replaced(good, "(Direction 1.0", "(Direction 2.0")),
               HasSubstr("column_direction"));
+}
+
+/// A camera as xReg states it: 1536 x 1200 pixels of 0.2 mm, 1000 mm from the source.
+struct XRegExample {
+  double focal_px = -5000.0;
+  Vector3d translation = {5.0, -8.0, -700.0};
+  const char* frame = nullptr;
+  double row_spacing_mm = 0.2;
+
+  void write(Hdf5Output& file, const std::string& group, const std::string& prefix) const {
+    Eigen::Matrix3d intrinsic;
+    intrinsic << focal_px, 0, 767.5, 0, focal_px, 599.5, 0, 0, 1;
+    Eigen::Matrix4d extrinsic = Eigen::Matrix4d::Identity();
+    extrinsic.topLeftCorner<3, 3>() << 0, 1, 0, 0, 0, 1, 1, 0, 0;
+    extrinsic.topRightCorner<3, 1>() = translation;
+    file.add_matrix(group + "/intrinsic", intrinsic);
+    file.add_matrix(group + "/extrinsic", extrinsic);
+    file.add_count(group + "/num-cols", 1536);
+    file.add_count(group + "/num-rows", 1200);
+    file.add_scalar(group + "/" + prefix + "col-spacing", 0.2);
+    file.add_scalar(group + "/" + prefix + "row-spacing", row_spacing_mm);
+    if (frame != nullptr) file.add_fixed_text(group + "/cam-coord-frame-type", frame);
+  }
+
+  /// As the data set DeepFluoro has it.
+  [[nodiscard]] std::string deep_fluoro() const {
+    Hdf5Output file;
+    file.add_group("/proj-params");
+    write(file, "/proj-params", "pixel-");
+    return file.bytes();
+  }
+
+  /// As xReg writes one camera.
+  [[nodiscard]] std::string camera() const {
+    Hdf5Output file;
+    write(file, "", "");
+    return file.bytes();
+  }
+};
+
+TEST_F(CameraConventions, XRegDeepFluoro) {
+  const CameraGeometry read = camera(XRegExample().deep_fluoro());
+  // -R' t.
+  EXPECT_LT((read.source_point - Vector3d(700, -5, 8)).norm(), 1e-9);
+  EXPECT_NEAR(read.source_detector_distance_mm(), 1000.0, 1e-9);
+  EXPECT_EQ(read.size_px, Eigen::Vector2i(1536, 1200));
+  EXPECT_TRUE(read.is_mirrored()) << "columns x rows points to the source";
+  // The extrinsic matrix takes (10, 20, 30) to (25, 22, -690).
+  expect_seen(read, {10, 20, 30}, {767.5 + 5000.0 * 25 / 690, 599.5 + 5000.0 * 22 / 690});
+}
+
+TEST_F(CameraConventions, XRegFrames) {
+  const Vector2d at_710(767.5 + 5000.0 * 25 / 710, 599.5 + 5000.0 * 22 / 710);
+  const Vector2d at_690(767.5 + 5000.0 * 25 / 690, 599.5 + 5000.0 * 22 / 690);
+  const XRegExample plus = {5000.0, {5, -8, 700}, "origin-at-focal-pt-det-pos-z"};
+  EXPECT_FALSE(camera(plus.camera()).is_mirrored());
+  expect_seen(camera(plus.camera()), {10, 20, 30}, at_710);
+  const XRegExample minus = {-5000.0, {5, -8, -700}, "origin-at-focal-pt-det-neg-z"};
+  expect_seen(camera(minus.camera()), {10, 20, 30}, at_690);
+  // 310 mm of 1000 mm in front of the detector.
+  const XRegExample on_detector = {5000.0, {5, -8, 300}, "origin-on-det"};
+  const CameraGeometry read = camera(on_detector.camera());
+  expect_seen(read, {10, 20, 30}, at_690);
+  // 700 mm further along x, the third row of the extrinsic matrix.
+  EXPECT_LT((read.source_point - Vector3d(700, -5, 8)).norm(), 1e-9);
+}
+
+TEST_F(CameraConventions, XRegSeveralProjections) {
+  Hdf5Output file;
+  file.add_count("/num-projs", 2);
+  for (const char* group : {"/proj-000", "/proj-001"}) {
+    file.add_group(group);
+    file.add_group(std::string(group) + "/cam");
+    XRegExample example = {5000.0, {5, -8, 700}, "origin-at-focal-pt-det-pos-z"};
+    if (std::string(group) == "/proj-001") example.translation.z() = 800;
+    example.write(file, std::string(group) + "/cam", "");
+  }
+  CameraFileOptions options;
+  options.isocenter_point = {0.0, 0.0, 0.0};
+  const CameraRig rig = read(file.bytes(), options);
+  ASSERT_EQ(rig.cameras.size(), 2U);
+  EXPECT_EQ(rig.cameras[1].name, "camera-2");
+  expect_seen(rig.cameras[1], {10, 20, 30}, {767.5 + 5000.0 * 25 / 810, 599.5 + 5000.0 * 22 / 810});
+}
+
+TEST_F(CameraConventions, XRegRefusals) {
+  EXPECT_THAT(input_refusal(XRegExample({.row_spacing_mm = 0.3}).deep_fluoro()),
+              HasSubstr("/proj-params/pixel-row-spacing = 0.3: must agree with the intrinsic"));
+  EXPECT_THAT(input_refusal(XRegExample({.frame = "sideways"}).camera()),
+              HasSubstr("/cam-coord-frame-type = 'sideways': must be one of"));
+  EXPECT_THAT(input_refusal(XRegExample({.focal_px = 0.0}).deep_fluoro()),
+              HasSubstr("focal lengths"));
+  Hdf5Output empty;
+  empty.add_group("/proj-params");
+  EXPECT_THAT(file_refusal(empty.bytes()), HasSubstr("has no /proj-params/intrinsic"));
+  Hdf5Output flat;
+  flat.add_group("/proj-params");
+  flat.add_numbers("/proj-params/intrinsic", std::vector<double>(9, 1.0));
+  EXPECT_THAT(file_refusal(flat.bytes()), HasSubstr("is no matrix of 3 x 3"));
+  Hdf5Output many;
+  many.add_scalar("/num-projs", 1e300);
+  EXPECT_THAT(input_refusal(many.bytes()), HasSubstr("within 1 and 10000"));
+}
+
+constexpr const char* kRad =
+    "Size[pixels]: 512 400\nStep[mm]: 0.4 0.5\nDataType: float\nSourcePosition[mm]: -700 5 -8\n"
+    "TPosition:\n0 0 -1 300\n1 0 0 -100\n0 -1 0 80\n0 0 0 1\n";
+
+TEST_F(CameraConventions, Rad) {
+  const CameraGeometry read = camera(kRad);
+  EXPECT_EQ(read.size_px, Eigen::Vector2i(512, 400));
+  EXPECT_TRUE(read.is_mirrored()) << "columns x rows points to the source";
+  // 710 of the 1000 mm from the source to the detector.
+  expect_seen(read,
+              {10, 20, 30},
+              {(100 + 5 + 15 * 1000.0 / 710) / 0.4, (80 + 8 - 38 * 1000.0 / 710) / 0.5});
+}
+
+TEST_F(CameraConventions, RadRefusals) {
+  const std::string good = kRad;
+  EXPECT_THAT(file_refusal(test::replaced(good, "Step[mm]: ", "Steps: ")),
+              HasSubstr("'Step[mm]:' is missing"));
+  EXPECT_THAT(file_refusal(good.substr(0, good.find("0 -1 0 80"))),
+              HasSubstr("truncated: TPosition"));
+  EXPECT_THAT(file_refusal(test::replaced(good, "-700 5 -8", "-700 5")),
+              HasSubstr("camera.txt:4: expected 3 numbers"));
+  EXPECT_THAT(input_refusal(test::replaced(good, "-700 5 -8", "700 5 -8")),
+              HasSubstr("from the detector to the source"));
+  EXPECT_THAT(input_refusal(test::replaced(good, "0 0 -1 300", "0 0 -2 300")),
+              HasSubstr("TPosition"));
+}
+
+constexpr const char* kDiffDrr =
+    "[[diffdrr_camera]]\nsdd = 1020.0\nheight = 200\nwidth = 240\ndelx = 2.0\ndely = 1.5\n"
+    "x0 = 12.0\ny0 = -9.0\nrotation = [0.0, 0.0, 0.0]\ntranslation = [0.0, 850.0, 0.0]\n";
+
+TEST_F(CameraConventions, DiffDrr) {
+  const CameraGeometry read = camera(kDiffDrr);
+  // In front of the patient, the left of whom is on the right.
+  EXPECT_LT((read.source_point - Vector3d(0, -850, 0)).norm(), 1e-9);
+  EXPECT_LT((read.column_direction - Vector3d(1, 0, 0)).norm(), 1e-12);
+  EXPECT_LT((read.row_direction - Vector3d(0, 0, -1)).norm(), 1e-12);
+  EXPECT_FALSE(read.is_mirrored());
+  const double magnification = 1020.0 / 870;
+  expect_seen(read,
+              {10, 20, 30},
+              {119.5 + (12 + 10 * magnification) / 2, 99.5 + (-9 - 30 * magnification) / 1.5});
+}
+
+TEST_F(CameraConventions, DiffDrrCtFrameAndUnreversedColumns) {
+  std::string text = "volume_middle_ct_mm = [5.0, -7.0, 11.0]\n" + std::string(kDiffDrr);
+  const double magnification = 1020.0 / 870;
+  expect_seen(camera(text),
+              {15, 13, 41},
+              {119.5 + (12 + 10 * magnification) / 2, 99.5 + (-9 - 30 * magnification) / 1.5});
+  EXPECT_EQ(read(text).isocenter_point, Vector3d(5, -7, 11));
+  text += "reverse_x_axis = false\n";
+  EXPECT_TRUE(camera(text).is_mirrored());
+  expect_seen(camera(text),
+              {15, 13, 41},
+              {119.5 - (12 + 10 * magnification) / 2, 99.5 + (-9 - 30 * magnification) / 1.5});
+}
+
+// DRR() and Detector() of DiffDRR 0.4, written out: a pixel's point is (x, y, sdd) in the camera's
+// frame, turned to the orientation PA, moved by t and turned by Rx Ry Rz.
+TEST_F(CameraConventions, DiffDrrTurnedPixels) {
+  const std::string text =
+      test::replaced(test::replaced(kDiffDrr, "[0.0, 0.0, 0.0]", "[0.3, -0.2, 0.1]"),
+                     "[0.0, 850.0, 0.0]",
+                     "[10.0, -800.0, 30.0]") +
+      "convention = \"XYZ\"\norientation = \"PA\"\n";
+  const CameraGeometry read = camera(text);
+  const auto about = [](double angle, const Vector3d& axis) {
+    return Eigen::AngleAxisd(angle, axis).toRotationMatrix();
+  };
+  const Eigen::Matrix3d turn = about(0.3, Vector3d::UnitX()) * about(-0.2, Vector3d::UnitY()) *
+                               about(0.1, Vector3d::UnitZ());
+  Eigen::Matrix3d pa;
+  pa << -1, 0, 0, 0, 0, 1, 0, 1, 0;
+  const auto lps = [&](const Vector3d& of_camera) -> Vector3d {
+    return Vector3d(-1, -1, 1).cwiseProduct(turn * (pa * of_camera + Vector3d(10, -800, 30)));
+  };
+  EXPECT_LT((read.source_point - lps(Vector3d::Zero())).norm(), 1e-9)
+      << read.source_point.transpose() << " instead of " << lps(Vector3d::Zero()).transpose();
+  for (const Vector2d& pixel : {Vector2d(0, 0), Vector2d(239, 0), Vector2d(17, 199)})
+    EXPECT_LT((read.detector_point(pixel.x(), pixel.y()) -
+               lps({12 - 2.0 * (pixel.x() - 119.5), -9 - 1.5 * (pixel.y() - 99.5), 1020}))
+                  .norm(),
+              1e-9);
+}
+
+TEST_F(CameraConventions, DiffDrrRefusals) {
+  const std::string good = kDiffDrr;
+  EXPECT_THAT(input_refusal(test::replaced(good, "sdd = 1020.0\n", "")), HasSubstr("sdd"));
+  EXPECT_THAT(input_refusal(test::replaced(good, "delx = 2.0", "delx = -2.0")),
+              HasSubstr("must be above 0"));
+  EXPECT_THAT(input_refusal(test::replaced(good, "height = 200", "height = 0")),
+              HasSubstr("within 1 and 32768"));
+  EXPECT_THAT(input_refusal(good + "convention = \"ZZX\"\n"), HasSubstr("neighbours different"));
+  EXPECT_THAT(input_refusal(good + "parameterization = \"quaternion\"\n"), HasSubstr("rotation"));
+  EXPECT_THAT(input_refusal(good + "sid = 3\n"), HasSubstr("sid"));
 }
 
 class DicomCameras : public testing::Test {

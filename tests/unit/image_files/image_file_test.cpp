@@ -141,6 +141,32 @@ TEST(ImageFile, StackIsAVolumeWithTheImagesAsSlices) {
   EXPECT_EQ(volume.hu[2 * 4 + 3], 23 - 1000);
 }
 
+TEST(ImageFile, ReadsAStackImageByImage) {
+  const ScratchFolder folder;
+  std::vector<Image2d> images(2, uneven_image());
+  images[1].pixels[7] = 41.0f;
+  write_image_stack(images, folder / "stack.nrrd", 0.5, 0.75);
+  std::vector<Image2d> read;
+  for_each_image_of_stack(folder / "stack.nrrd", [&](int number, Image2d&& image) {
+    EXPECT_EQ(number, static_cast<int>(read.size()));
+    read.push_back(std::move(image));
+  });
+  ASSERT_EQ(read.size(), images.size());
+  for (std::size_t k = 0; k < images.size(); ++k) EXPECT_EQ(read[k].pixels, images[k].pixels);
+}
+
+TEST(ImageFile, RefusesAStackThatIsNone) {
+  const ScratchFolder folder;
+  const auto read = [](const auto& path) { for_each_image_of_stack(path, [](int, Image2d&&) {}); };
+  write_image(uneven_image(), folder / "one.mha", 0.5, 0.5);
+  EXPECT_THROW(read(folder / "one.mha"), InputError);
+  write_png_image(uneven_image(), folder / "one.png", 0.0, 1.0);
+  EXPECT_THROW(read(folder / "one.png"), InputError);
+  write_image_stack({uneven_image(), uneven_image()}, folder / "cut.mha", 0.5, 0.5);
+  fs::resize_file(folder / "cut.mha", fs::file_size(folder / "cut.mha") - 4);
+  EXPECT_THROW(read(folder / "cut.mha"), FileError);
+}
+
 TEST(ImageFile, KeepsSixteenBitLevels) {
   const ScratchFolder folder;
   Image2d image(2, 2);

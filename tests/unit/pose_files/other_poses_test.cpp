@@ -6,10 +6,10 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "geometry/diffdrr_convention.h"
 #include "pose_files/autoscoper_pose.h"
 #include "pose_files/dicom_items.h"
 #include "pose_files/dicom_registration.h"
-#include "pose_files/diffdrr_pose.h"
 #include "pose_files/itk_transform.h"
 #include "pose_files/pose_file.h"
 #include "support/io_checks.h"

@@ -48,6 +48,22 @@ TEST_P(FdkAlong, OfABallGivesItsAttenuationWhereItIs) {
   }
 }
 
+TEST_P(FdkAlong, ReachesAsFarAsTheDetectorSeesFromAFootAwayFromItsMiddle) {
+  CircularScan scan = small_scan(GetParam());
+  const bool along_columns = GetParam() == AxisAlong::Columns;
+  // 30 px towards low heights, 10 across: 18 and 6 mm at the axis.
+  scan.beam_foot_px = along_columns ? Eigen::Vector2d(scan.stated_foot_px().x() + 20.0, 25.5)
+                                    : Eigen::Vector2d(25.5, scan.stated_foot_px().y() - 20.0);
+  const ScanCalibration truth = ScanCalibration::nominal(scan, 0);
+  const Eigen::Vector3d center(3.0, -2.0, -20.0);
+  const ScanImages images = simulated_scan(scan, truth, {Ball{center, 5.0, 0.02}});
+  ThreadPool pool(2);
+  const MuVolume volume =
+      reconstruct_views(images, truth, CircularScan::every(0, 1, 120), {}, pool);
+  EXPECT_NEAR(value_at(volume, center), 0.02, 0.0004);
+  EXPECT_NEAR(value_at(volume, center + Eigen::Vector3d(8.0, 0.0, 0.0)), 0.0, 0.001);
+}
+
 TEST(Fdk, TakesUnevenAnglesByTheirShares) {
   const CircularScan scan = small_scan();
   const ScanCalibration truth = ScanCalibration::nominal(scan, 0);

@@ -5,6 +5,8 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "files/output_file.h"
+#include "support/test_paths.h"
 
 namespace af::tools {
 namespace {
@@ -67,6 +69,60 @@ TEST(ScanFile, WritesIndicesWithoutZerosWhenNotAsked) {
   EXPECT_EQ(file.file_of(113), "a/Projection120.png");
 }
 
+/// The valid text with its evenly spaced angles replaced by a line.
+std::string with_angles(const std::string& line) {
+  std::string text = kValid;
+  for (const char* const key : {"view_count", "first_angle_deg", "step_deg"}) {
+    const std::size_t begin = text.find(key);
+    text.erase(begin, text.find('\n', begin) + 1 - begin);
+  }
+  return text + line + "\n";
+}
+
+std::string angles_of_a_turn(const std::string& separator, int count) {
+  std::string text;
+  for (int view = 0; view < count; ++view)
+    text += (view > 0 ? separator : "") + std::to_string(view * 360.0 / count);
+  return text;
+}
+
+TEST(ScanFile, TakesAnglesOneByOne) {
+  const ScanFile file = parse_scan_file(
+      with_angles("angles_deg = [" + angles_of_a_turn(", ", 24) + "]"), "scan.toml");
+  ASSERT_EQ(file.scan.angles_rad.size(), 24U);
+  EXPECT_NEAR(file.scan.angles_rad[23] * kDegPerRad, 345.0, 1e-9);
+}
+
+TEST(ScanFile, TakesAnglesFromAFileBesideIt) {
+  const test::ScratchFolder scratch;
+  write_text_file(scratch / "angles.txt", "# degrees\n" + angles_of_a_turn("\n", 30) + "\n");
+  const ScanFile file = parse_scan_file(with_angles("angles_file = \"angles.txt\""),
+                                        (scratch / "scan.toml").string());
+  ASSERT_EQ(file.scan.angles_rad.size(), 30U);
+  EXPECT_NEAR(file.scan.angles_rad[1] * kDegPerRad, 12.0, 1e-9);
+}
+
+TEST(ScanFile, RefusesAnAnglesFileThatHoldsOtherThings) {
+  const test::ScratchFolder scratch;
+  write_text_file(scratch / "angles.txt", "0.0\n3.0 six\n");
+  try {
+    parse_scan_file(with_angles("angles_file = \"angles.txt\""), (scratch / "scan.toml").string());
+    FAIL() << "accepted";
+  } catch (const FileError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("angles.txt:2"));
+    EXPECT_THAT(error.what(), HasSubstr("'six' is not an angle"));
+  }
+}
+
+TEST(ScanFile, WithoutBracesIsAStack) {
+  std::string text = with("p{:04}.png", "views.mha");
+  text.erase(text.find("first_index"), std::string("first_index = 7\n").size());
+  const ScanFile file = parse_scan_file(text, "scan.toml");
+  EXPECT_TRUE(file.is_stack());
+  EXPECT_EQ(file.file_of(5), "views.mha");
+  EXPECT_FALSE(parse_scan_file(kValid, "scan.toml").is_stack());
+}
+
 class MissingKey : public testing::TestWithParam<const char*> {};
 INSTANTIATE_TEST_SUITE_P(Keys,
                          MissingKey,
@@ -114,11 +170,14 @@ INSTANTIATE_TEST_SUITE_P(
         BadValue{"= 120", "= 60", "must go all the way round"},
         BadValue{"= -3.0", "= 0", "step_deg"},
         BadValue{"= -3.0", "= inf", "step_deg"},
-        BadValue{"p{:04}.png", "p.png", "must hold {} once"},
+        BadValue{"p{:04}.png", "p.mha", "first_index = 7: is for files with an index"},
         BadValue{"p{:04}.png", "p{}{}.png", "must hold {} once"},
         BadValue{"p{:04}.png", "p{:4}.png", "must hold {} once"},
         BadValue{"p{:04}.png", "p}{.png", "must hold {} once"},
         BadValue{"= 7", "= -1", "first_index"},
+        BadValue{"[72, 60]", "[72, 60]\nbeam_foot_px = [72, 30]", "beam_foot_px"},
+        BadValue{"[72, 60]", "[72, 60]\nbeam_foot_px = 36", "beam_foot_px"},
+        BadValue{"[72, 60]", "[72, 60]\nangles_deg = [0, 3]", "must not stand beside a list"},
         BadValue{"\"intensity\"", "\"counts\"", "xray_domain"},
         BadValue{"\"intensity\"", "\"attenuation\"", "is for xray_domain = \"intensity\" alone"},
         BadValue{"flat = ", "dark = \"d.png\"\nflat = ", "must not stand beside dark_level"},

@@ -41,6 +41,32 @@ TEST_P(ScanCameraOf, SeesTheAxisAndIsNotMirrored) {
   }
 }
 
+TEST_P(ScanCameraOf, StandsWhereTheStatedFootIs) {
+  CircularScan scan = small_scan(GetParam());
+  scan.beam_foot_px = Eigen::Vector2d(20.0, 25.0);
+  const CameraGeometry camera =
+      scan_camera(scan, ScanCalibration::nominal(scan, 1), scan.angles_rad[7]);
+  EXPECT_LT((camera.project(Eigen::Vector3d::Zero()) - *scan.beam_foot_px).norm(), kRounding);
+  // The same camera in pixels of twice the size: outer edges stay, so centres are halved about
+  // -1/2.
+  EXPECT_LT((scan.binned(2).stated_foot_px() - Eigen::Vector2d(9.75, 12.25)).norm(), kRounding);
+}
+
+TEST(ViewAtAxis, ReachesFromTheFootToTheEdges) {
+  CircularScan scan = small_scan(AxisAlong::Rows);  // 72 x 60 px of 0.9 mm, 0.6 mm at the axis
+  scan.beam_foot_px = Eigen::Vector2d(31.5, 19.5);
+  AxisView view = view_at_axis(scan);
+  EXPECT_NEAR(view.narrow_mm, 32 * 0.6, kRounding);
+  EXPECT_NEAR(view.wide_mm, 40 * 0.6, kRounding);
+  EXPECT_NEAR(view.highest_mm, 20 * 0.6, kRounding);  // up is towards smaller rows
+  EXPECT_NEAR(view.lowest_mm, -40 * 0.6, kRounding);
+  scan.axis_along = AxisAlong::Columns;  // up is towards larger columns
+  view = view_at_axis(scan);
+  EXPECT_NEAR(view.highest_mm, 40 * 0.6, kRounding);
+  EXPECT_NEAR(view.lowest_mm, -32 * 0.6, kRounding);
+  EXPECT_NEAR(view.narrow_mm, 20 * 0.6, kRounding);
+}
+
 TEST_P(ScanCameraOf, MovesImagesAsItsParametersSay) {
   const CircularScan scan = small_scan(GetParam());
   ScanCalibration calibration = ScanCalibration::nominal(scan, 0);

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "geometry/diffdrr_convention.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Geometry>
+
+#include "base/error.h"
+
+namespace af {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+Matrix3d rotation_about_letter(char letter, double angle_rad) {
+  return Eigen::AngleAxisd(angle_rad, Vector3d::Unit(letter - 'X')).toRotationMatrix();
+}
+
+/// World from camera before any turn.
+Matrix3d orientation_rotation(const std::string& orientation) {
+  Matrix3d rotation = Matrix3d::Identity();
+  if (orientation == "AP") rotation << 1, 0, 0, 0, 0, -1, 0, 1, 0;
+  if (orientation == "PA") rotation << -1, 0, 0, 0, 0, 1, 0, 1, 0;
+  return rotation;
+}
+
+Matrix3d rotation_of(const DiffDrrPose& pose) {
+  const std::vector<double>& r = pose.rotation;
+  if (pose.parameterization == "quaternion")
+    return Eigen::Quaterniond(r[0], r[1], r[2], r[3]).normalized().toRotationMatrix();
+  Matrix3d rotation = Matrix3d::Identity();
+  for (std::size_t i = 0; i < 3; ++i)
+    rotation = rotation * rotation_about_letter(pose.convention[i], r[i]);
+  return rotation;
+}
+
+}  // namespace
+
+bool is_diffdrr_convention(const std::string& letters) {
+  return letters.size() == 3 && letters.find_first_not_of("XYZ") == std::string::npos &&
+         letters[0] != letters[1] && letters[1] != letters[2];
+}
+
+RigidTransform world_from_diffdrr_camera(const DiffDrrPose& pose) {
+  const Matrix3d rotation = rotation_of(pose);
+  RigidTransform world_from_camera = RigidTransform::Identity();
+  world_from_camera.linear() = rotation * orientation_rotation(pose.orientation);
+  world_from_camera.translation() = rotation * pose.translation_mm;
+  return world_from_camera;
+}
+
+RigidTransform room_from_diffdrr_camera(const CameraGeometry& camera) {
+  if (camera.is_mirrored())
+    throw InputError("camera", camera.name, "must not be mirrored: DiffDRR's cameras are not");
+  RigidTransform room_from_camera = RigidTransform::Identity();
+  room_from_camera.linear().col(0) = -camera.column_direction;
+  room_from_camera.linear().col(1) = -camera.row_direction;
+  room_from_camera.linear().col(2) = camera.beam_direction();
+  room_from_camera.translation() = camera.source_point;
+  return room_from_camera;
+}
+
+Vector3d angles_of_convention(const Matrix3d& rotation, const std::string& convention) {
+  check(is_diffdrr_convention(convention) && convention[0] != convention[2],
+        "three different axes");
+  const int a = convention[0] - 'X';
+  const int b = convention[1] - 'X';
+  const int c = convention[2] - 'X';
+  // R = Ra Rb Rc: its element (a, c) is the sine of the middle angle, with the sign of the order.
+  const double sign = (b - a + 3) % 3 == 1 ? 1.0 : -1.0;
+  const double middle = std::asin(std::clamp(sign * rotation(a, c), -1.0, 1.0));
+  const double first = std::atan2(-sign * rotation(b, c), rotation(c, c));
+  const double last = std::atan2(-sign * rotation(a, b), rotation(a, a));
+  return {first, middle, last};
+}
+
+DiffDrrPose diffdrr_pose_of(const RigidTransform& world_from_camera) {
+  DiffDrrPose pose;
+  const Matrix3d rotation =
+      world_from_camera.linear() * orientation_rotation(pose.orientation).transpose();
+  const Vector3d angles = angles_of_convention(rotation, pose.convention);
+  pose.rotation.assign(angles.begin(), angles.end());
+  pose.translation_mm = rotation.transpose() * world_from_camera.translation();
+  return pose;
+}
+
+}  // namespace af

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+// Internal to common/hdf5_files.
+#pragma once
+
+#include <stdexcept>
+
+#include <hdf5.h>
+
+namespace af {
+
+/// An HDF5 call failed; callers know the file.
+struct H5CallFailed : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+template <typename Result>
+Result h5_checked(Result result, const char* call) {
+  if (result < 0) throw H5CallFailed(call);
+  return result;
+}
+
+/// Closes what it holds.
+class H5Id {
+ public:
+  H5Id(hid_t id, herr_t (*close)(hid_t), const char* call)
+      : id_(h5_checked(id, call)), close_(close) {}
+  ~H5Id() {
+    if (id_ >= 0) close_(id_);
+  }
+  H5Id(H5Id&& other) noexcept : id_(other.id_), close_(other.close_) { other.id_ = -1; }
+  H5Id& operator=(H5Id&&) = delete;
+  H5Id(const H5Id&) = delete;
+  H5Id& operator=(const H5Id&) = delete;
+  operator hid_t() const { return id_; }  // NOLINT(google-explicit-constructor): used as the id
+
+ private:
+  hid_t id_;
+  herr_t (*close_)(hid_t);
+};
+
+/// HDF5 prints no error stack while alive.
+class H5Quiet {
+ public:
+  H5Quiet() {
+    H5Eget_auto2(H5E_DEFAULT, &function_, &data_);
+    H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+  }
+  ~H5Quiet() { H5Eset_auto2(H5E_DEFAULT, function_, data_); }
+  H5Quiet(const H5Quiet&) = delete;
+  H5Quiet& operator=(const H5Quiet&) = delete;
+
+ private:
+  H5E_auto2_t function_ = nullptr;
+  void* data_ = nullptr;
+};
+
+/// HDF5 takes two files in memory of one name for the same file.
+inline std::string h5_memory_name() {
+  static std::atomic<std::size_t> count{0};
+  return "in-memory-" + std::to_string(++count);
+}
+
+/// By how much a file in memory grows.
+constexpr std::size_t kH5MemoryStep = 1U << 16;
+
+}  // namespace af

@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "hdf5_files/hdf5_input.h"
+
+#include <array>
+#include <cmath>
+
+#include "base/error.h"
+#include "hdf5_files/hdf5_handles.h"
+
+namespace af {
+namespace {
+
+H5Id file_access() {
+  return {H5Pcreate(H5P_FILE_ACCESS), H5Pclose, "H5Pcreate"};
+}
+
+H5Id opened_file(const std::string& name) {
+  const H5Id access = file_access();
+  return {H5Fopen(name.c_str(), H5F_ACC_RDONLY, access), H5Fclose, "H5Fopen"};
+}
+
+/// Opens these bytes as if they were a file. HDF5 copies them.
+H5Id opened_bytes(std::string bytes) {
+  const H5Id access = file_access();
+  h5_checked(H5Pset_fapl_core(access, kH5MemoryStep, 0), "H5Pset_fapl_core");
+  h5_checked(H5Pset_file_image(access, bytes.data(), bytes.size()), "H5Pset_file_image");
+  return {H5Fopen(h5_memory_name().c_str(), H5F_ACC_RDONLY, access), H5Fclose, "H5Fopen"};
+}
+
+/// Of this file itself, uncompressed or deflated in small pieces.
+void check_storage(hid_t dataset, const std::string& where) {
+  const H5Id creation(H5Dget_create_plist(dataset), H5Pclose, "H5Dget_create_plist");
+  const H5D_layout_t layout = H5Pget_layout(creation);
+  if (layout == H5D_VIRTUAL || (layout == H5D_CONTIGUOUS && H5Pget_external_count(creation) != 0))
+    throw FileError(where, "holds the contents of another file");
+  if (layout != H5D_CHUNKED) return;
+  constexpr hsize_t kMostOfAChunk = 4096;
+  std::array<hsize_t, H5S_MAX_RANK> chunk{};
+  const int rank = h5_checked(H5Pget_chunk(creation, H5S_MAX_RANK, chunk.data()), "H5Pget_chunk");
+  hsize_t elements = 1;
+  for (int i = 0; i < rank; ++i) {
+    elements = chunk[static_cast<std::size_t>(i)] > kMostOfAChunk
+                   ? kMostOfAChunk + 1
+                   : elements * chunk[static_cast<std::size_t>(i)];
+    if (elements > kMostOfAChunk) throw FileError(where, "is stored in large pieces");
+  }
+  const int filters = h5_checked(H5Pget_nfilters(creation), "H5Pget_nfilters");
+  for (int i = 0; i < filters; ++i) {
+    unsigned flags = 0;
+    std::size_t values = 0;
+    if (H5Pget_filter2(
+            creation, static_cast<unsigned>(i), &flags, &values, nullptr, 0, nullptr, nullptr) !=
+        H5Z_FILTER_DEFLATE)
+      throw FileError(where, "is compressed in another way than by deflate");
+  }
+}
+
+std::vector<std::size_t> extents_of(hid_t dataset, const std::string& where) {
+  const H5Id space(H5Dget_space(dataset), H5Sclose, "H5Dget_space");
+  constexpr int kMostExtents = 2;
+  if (H5Sget_simple_extent_type(space) == H5S_NULL) throw FileError(where, "holds no values");
+  const int rank = h5_checked(H5Sget_simple_extent_ndims(space), "H5Sget_simple_extent_ndims");
+  if (rank > kMostExtents) throw FileError(where, "has more than two extents");
+  std::array<hsize_t, kMostExtents> sizes{};
+  h5_checked(H5Sget_simple_extent_dims(space, sizes.data(), nullptr), "H5Sget_simple_extent_dims");
+  return {sizes.begin(), sizes.begin() + rank};
+}
+
+std::vector<double> values_of(hid_t dataset, std::size_t count, const std::string& where) {
+  std::vector<double> values(count);
+  if (count > 0)
+    h5_checked(H5Dread(dataset, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()),
+               "H5Dread");
+  for (const double value : values)
+    if (!std::isfinite(value)) throw FileError(where, "holds a number that is not finite");
+  return values;
+}
+
+constexpr std::size_t kMostTextBytes = 256;
+
+std::string variable_text(hid_t dataset, hid_t type) {
+  char* text = nullptr;
+  const H5Id memory(H5Tcopy(type), H5Tclose, "H5Tcopy");
+  h5_checked(H5Dread(dataset, memory, H5S_ALL, H5S_ALL, H5P_DEFAULT, &text), "H5Dread");
+  const std::string copy = text == nullptr ? "" : text;
+  H5free_memory(text);
+  return copy.substr(0, kMostTextBytes);
+}
+
+}  // namespace
+
+struct Hdf5Input::State {
+  explicit State(H5Id opened) : file(std::move(opened)) {}
+  H5Id file;
+
+  /// Every link on the way is checked before it is followed.
+  [[nodiscard]] H5Id dataset(const std::string& path, const std::string& name) const {
+    for (std::size_t at = path.find('/', 1);; at = path.find('/', at + 1)) {
+      const std::string part = path.substr(0, at);
+      if (H5Lexists(file, part.c_str(), H5P_DEFAULT) <= 0) throw FileError(name, "has no " + part);
+      H5L_info_t link;
+      h5_checked(H5Lget_info(file, part.c_str(), &link, H5P_DEFAULT), "H5Lget_info");
+      if (link.type != H5L_TYPE_HARD) throw FileError(name, part, "a part of this file", "a link");
+      if (at == std::string::npos) break;
+    }
+    return {H5Dopen2(file, path.c_str(), H5P_DEFAULT), H5Dclose, "H5Dopen2"};
+  }
+};
+
+namespace {
+
+/// Runs `use` without HDF5's own messages; failed calls become an error of the file.
+template <typename Use>
+auto quietly(const std::string& name, Use&& use) {
+  const H5Quiet quiet;
+  try {
+    return use();
+  } catch (const H5CallFailed& failure) {
+    throw FileError(name, std::string("damaged HDF5: ") + failure.what() + " fails");
+  }
+}
+
+}  // namespace
+
+bool is_hdf5_head(std::string_view bytes) {
+  return bytes.starts_with("\x89HDF\r\n\x1a\n");
+}
+
+Hdf5Input::Hdf5Input(std::unique_ptr<State> state, std::string name)
+    : state_(std::move(state)), name_(std::move(name)) {}
+Hdf5Input::Hdf5Input(Hdf5Input&&) noexcept = default;
+Hdf5Input& Hdf5Input::operator=(Hdf5Input&&) noexcept = default;
+Hdf5Input::~Hdf5Input() = default;
+
+Hdf5Input Hdf5Input::of_file(const std::filesystem::path& path) {
+  return quietly(path.string(), [&] {
+    return Hdf5Input(std::make_unique<State>(opened_file(path.string())), path.string());
+  });
+}
+
+Hdf5Input Hdf5Input::of_bytes(std::string bytes, std::string name) {
+  return quietly(name, [&] {
+    return Hdf5Input(std::make_unique<State>(opened_bytes(std::move(bytes))), name);
+  });
+}
+
+bool Hdf5Input::holds(const std::string& path) const {
+  const H5Quiet quiet;
+  for (std::size_t at = path.find('/', 1);; at = path.find('/', at + 1)) {
+    const std::string part = path.substr(0, at);
+    H5L_info_t link;
+    if (H5Lexists(state_->file, part.c_str(), H5P_DEFAULT) <= 0) return false;
+    if (at == std::string::npos) return true;
+    if (H5Lget_info(state_->file, part.c_str(), &link, H5P_DEFAULT) < 0 ||
+        link.type != H5L_TYPE_HARD)
+      return false;
+  }
+}
+
+Hdf5Numbers Hdf5Input::numbers(const std::string& path, std::size_t most) const {
+  return quietly(name_, [&] {
+    const std::string where = name_ + ": " + path;
+    const H5Id dataset = state_->dataset(path, name_);
+    check_storage(dataset, where);
+    const H5Id type(H5Dget_type(dataset), H5Tclose, "H5Dget_type");
+    const H5T_class_t kind = H5Tget_class(type);
+    Hdf5Numbers numbers;
+    numbers.extents = extents_of(dataset, where);
+    std::size_t count = 1;
+    for (const std::size_t extent : numbers.extents)
+      count = extent > most ? most + 1 : count * extent;
+    if ((kind != H5T_FLOAT && kind != H5T_INTEGER) || count > most)
+      throw FileError(where, "is no list of at most " + std::to_string(most) + " numbers");
+    numbers.values = values_of(dataset, count, where);
+    return numbers;
+  });
+}
+
+std::string Hdf5Input::text(const std::string& path) const {
+  return quietly(name_, [&] {
+    const std::string where = name_ + ": " + path;
+    const H5Id dataset = state_->dataset(path, name_);
+    check_storage(dataset, where);
+    const H5Id type(H5Dget_type(dataset), H5Tclose, "H5Dget_type");
+    std::size_t count = 1;
+    for (const std::size_t extent : extents_of(dataset, where)) count *= extent;
+    if (H5Tget_class(type) != H5T_STRING || count != 1) throw FileError(where, "is no text");
+    if (h5_checked(H5Tis_variable_str(type), "H5Tis_variable_str") > 0)
+      return variable_text(dataset, type);
+    std::string text(H5Tget_size(type), '\0');
+    if (text.size() > kMostTextBytes) throw FileError(where, "is too long");
+    h5_checked(H5Dread(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, text.data()), "H5Dread");
+    return text.substr(0, text.find('\0'));
+  });
+}
+
+}  // namespace af
