@@ -20,8 +20,8 @@ struct LoadedMethod {
 };
 
 /// Collective. The methods of a case, in the order of chosen_renderers(); hashes of the inputs go
-/// to `input_sha256`, as "CASE: what". Look-up is corrected where `correction` says so. `judging_level`:
-/// as CaseLoadOptions has it. Throws as load_case() does.
+/// to `input_sha256`, as "CASE: what". Look-up is corrected where `correction` says so.
+/// `judging_level`: as CaseLoadOptions has it. Throws as load_case() does.
 std::vector<LoadedMethod> load_methods(const MethodOptions& options,
                                        const registration::CorrectionOptions& correction,
                                        const Study& study,

@@ -503,7 +503,8 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
                     world,
                     evaluation.input_sha256,
                     options.uncertainty.is_left_out ? 0 : PoseExaminer::coarsest_level())) {
-    methods.push_back({method.renderer, std::move(method.runner), {}, options.success_tre_mm, {}, {}});
+    methods.push_back(
+        {method.renderer, std::move(method.runner), {}, options.success_tre_mm, {}, {}});
     all_or_none(world, [&] { examine_ends(method.problem, options.uncertainty, methods.back()); });
   }
   const Yardstick yardstick = all_or_none(world, [&] {

@@ -21,7 +21,7 @@ namespace af::evaluation {
 struct RegistrationStudyOptions : MethodOptions {
   registration::CorrectionOptions correction;  ///< of the field's ends
   registration::UncertaintyOptions uncertainty;
-  std::vector<std::string> cases;              ///< empty: all
+  std::vector<std::string> cases;  ///< empty: all
   int starts_per_interval = 30;
   int intervals = 8;
   double interval_width_mm = 2.0;

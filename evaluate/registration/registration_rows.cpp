@@ -107,8 +107,7 @@ registration::NamedCells cells_of(const RegistrationRow& row,
 CsvTable table_of(std::span<const RegistrationRow> rows,
                   const RowParts& parts,
                   double success_tre_mm) {
-  CsvTable table(
-      registration::names_of(cells_of(RegistrationRow(), parts, success_tre_mm)));
+  CsvTable table(registration::names_of(cells_of(RegistrationRow(), parts, success_tre_mm)));
   for (const RegistrationRow& row : rows)
     table.add_row(registration::texts_of(cells_of(row, parts, success_tre_mm)));
   return table;

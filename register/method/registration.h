@@ -30,9 +30,9 @@ struct TraceRow {
 struct RegistrationResult {
   RigidTransform start_room_from_ct = RigidTransform::Identity();
   RigidTransform room_from_ct = RigidTransform::Identity();
-  double similarity = 0.0;        ///< at the end: of the chain's last stage, of a portfolio by its
-                                  ///< judge (mean over views); NaN if it has none
-  std::string chain;              ///< the one that the result is from
+  double similarity = 0.0;  ///< at the end: of the chain's last stage, of a portfolio by its
+                            ///< judge (mean over views); NaN if it has none
+  std::string chain;        ///< the one that the result is from
   /// Of a portfolio: from its choice to the nearest end of another chain, mean over the target box;
   /// NaN when only one chain was run, or none of the others has a value.
   double chain_distance_mm = std::numeric_limits<double>::quiet_NaN();

@@ -199,8 +199,7 @@ ObjectiveValue MultiViewObjective::evaluate_scores(const RigidTransform& room_fr
       evaluate_view(0, room_from_ct, view, scratch, gradients, [&](NormalEquations& part) {
         part.value = views_[view].measure->evaluate_with_derivative(
             scratch.drr, scratch.by_pixel, *scratch.similarity);
-        found[view] =
-            tile_scores(views_[view].view.roi, tiles, scratch.planes, scratch.by_pixel);
+        found[view] = tile_scores(views_[view].view.roi, tiles, scratch.planes, scratch.by_pixel);
       });
     });
   NormalEquations sum;

@@ -62,8 +62,9 @@ class MultiViewObjective {
                                NormalEquations& result);
 
   /// The views one by one, the gradient of each split over `tiles` x `tiles` parts of its region:
-  /// sums of (derivative by a DRR pixel) x (derivative of that pixel by the pose). The measures must
-  /// have derivatives. `scores`: one per view; it keeps what it was when the pose is inadmissible.
+  /// sums of (derivative by a DRR pixel) x (derivative of that pixel by the pose). The measures
+  /// must have derivatives. `scores`: one per view; it keeps what it was when the pose is
+  /// inadmissible.
   ObjectiveValue evaluate_scores(const RigidTransform& room_from_ct,
                                  const Eigen::Vector3d& pivot_room_point,
                                  int tiles,

@@ -55,9 +55,9 @@ struct RunDescription {
 };
 
 /// result.json: verdict, poses as 4x4 (`room_from_ct`, which read_pose() reads) and as six
-/// parameters relative to the nominal pose about the ROI centre, uncertainty, similarity, counts, stop reason,
-/// trace, seconds, TRE, provenance. Numbers that do not exist are null. What is not found is no
-/// pose for read_pose(): its key is `rejected_room_from_ct`.
+/// parameters relative to the nominal pose about the ROI centre, uncertainty, similarity, counts,
+/// stop reason, trace, seconds, TRE, provenance. Numbers that do not exist are null. What is not
+/// found is no pose for read_pose(): its key is `rejected_room_from_ct`.
 nlohmann::json result_json(const RegistrationRecord& record,
                            const RegistrationProblem& problem,
                            const RunDescription& run);

@@ -48,7 +48,8 @@ std::array<double, 21> in_deg_mm(const PoseMatrix& covariance);
 /// The matrix (rad and mm) again.
 PoseMatrix from_deg_mm(const std::array<double, 21>& upper_triangle);
 
-/// Squared Mahalanobis distance of an error (rad and mm); below kPoseRegion95 inside the 95 % region.
+/// Squared Mahalanobis distance of an error (rad and mm); below kPoseRegion95 inside the 95 %
+/// region.
 double squared_distance(const PoseMatrix& covariance, const PoseVector& error);
 
 /// 95 % quantile of chi-square with six degrees of freedom.

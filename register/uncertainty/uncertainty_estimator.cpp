@@ -85,11 +85,10 @@ void UncertaintyEstimator::add_covariance(const RegistrationResult& result,
   if (!sandwich.has_value()) return;
   const double inflation = covariance_inflation(similarities_[stage], view_values);
   report.inflation = inflation;
-  const PoseMatrix covariance = inflation * *sandwich +
-                                calibration_covariance(*information,
-                                                       views_,
-                                                       problem_->isocenter_point,
-                                                       options_.calibration_error_px);
+  const PoseMatrix covariance =
+      inflation * *sandwich +
+      calibration_covariance(
+          *information, views_, problem_->isocenter_point, options_.calibration_error_px);
   report.covariance_deg_mm = in_deg_mm(covariance);
   if (problem_->target_points_ct.empty()) return;
   const PredictedTre tre = predicted_tre(covariance, frame, problem_->target_points_ct);

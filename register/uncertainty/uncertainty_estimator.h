@@ -48,7 +48,7 @@ class UncertaintyEstimator {
   UncertaintyOptions options_;
   std::vector<View> views_;
   std::map<std::string, std::size_t> stage_of_chain_;
-  std::vector<std::string> similarities_;  ///< of the stages, as registered with
+  std::vector<std::string> similarities_;     ///< of the stages, as registered with
   std::unique_ptr<RegistrationRunner> ends_;  ///< a stage for every way to end; none when left out
 };
 

@@ -38,8 +38,8 @@ TEST(RegisterStarts, GivesTheRecordsOfASerialRunOnAnyRankCount) {
   PoseExaminer examiner(small.problem);
   UncertaintyEstimator estimator(small.problem, runner.options(), {});
   const test::SharedFolder folder;
-  const std::vector<RegistrationRecord> records =
-      register_starts(runner, examiner, estimator, starts, {folder / "p", "registrations", {}}, world);
+  const std::vector<RegistrationRecord> records = register_starts(
+      runner, examiner, estimator, starts, {folder / "p", "registrations", {}}, world);
   if (!world.is_root()) {
     EXPECT_TRUE(records.empty());
     return;
@@ -72,7 +72,8 @@ TEST(RegisterStarts, CopesWithFewerStartsThanRanks) {
   UncertaintyEstimator estimator(small.problem, runner.options(), {});
   const test::SharedFolder folder;
   const UnfinishedWork work = {folder / "p", "registrations", {}};
-  const auto records = register_starts(runner, examiner, estimator, some_starts(small, 1), work, world);
+  const auto records =
+      register_starts(runner, examiner, estimator, some_starts(small, 1), work, world);
   EXPECT_EQ(records.size(), world.is_root() ? 1U : 0U);
   // One start leaves nothing to be kept.
   EXPECT_FALSE(std::filesystem::exists(work.folder));
@@ -88,8 +89,12 @@ TEST(RegisterStarts, KeepsTheTraceOfTheFirstWhenNoStartHasASimilarity) {
   PoseExaminer examiner(small.problem);
   UncertaintyEstimator estimator(small.problem, runner.options(), {});
   const test::SharedFolder folder;
-  const auto records = register_starts(
-      runner, examiner, estimator, some_starts(small, 5), {folder / "p", "registrations", {}}, world);
+  const auto records = register_starts(runner,
+                                       examiner,
+                                       estimator,
+                                       some_starts(small, 5),
+                                       {folder / "p", "registrations", {}},
+                                       world);
   if (!world.is_root()) return;
   ASSERT_EQ(records.size(), 5U);
   EXPECT_EQ(best_record(records), 0U);

@@ -49,6 +49,7 @@ class LinearRenderer final : public DrrRenderer {
   [[nodiscard]] std::unique_ptr<RenderWorkspace> make_workspace() const override {
     return std::make_unique<RenderWorkspace>();
   }
+  [[nodiscard]] const char* name() const override { return "linear"; }
 
  private:
   PoseFrame frame_;
