@@ -277,7 +277,7 @@ TEST_F(RigFile, WhatIsNotTomlIsAFileErrorWithItsPlace) {
   EXPECT_THAT(file_refusal(""), HasSubstr("is empty"));
   EXPECT_THAT(file_refusal(" \n\n"), HasSubstr("is empty"));
   EXPECT_THAT(file_refusal(std::string("\x89PNG\r\n\x1a\n\0\0\0\rIHDR", 16)),
-              HasSubstr("is not valid TOML"));
+              HasSubstr("states no camera in a known format"));
   EXPECT_THROW(read_rig(folder().path().string()), FileError);
   EXPECT_THROW(read_rig(folder() / "missing.toml"), FileError);
 }
