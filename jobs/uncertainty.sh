@@ -59,8 +59,10 @@ for kind in "${kind_list[@]}"; do
     for variant in clean stressed moving; do
       name="$kind-$variant-$seed" stress=${stress_of[$variant]}
       stage "simulate-$name" "$output/studies/$name/study.toml" "$bin/af-simulate" --phantom "$kind" \
-        --phantom-voxel-mm 2 --rig c-arm-12in --case "$name" --seed "$seed" --no-fiducials \
-        ${stress:+--stress "$stress"} --force -o "$output/studies/$name"
+        --phantom-voxel-mm 2 --rig c-arm-12in --seed "$seed" --no-fiducials ${stress:+--stress "$stress"} --force \
+        -o "$output/studies/$name"
+      # The name is a key of the draws: with one name, the variants of a seed have one true pose.
+      sed -i "s/^name = .*/name = \"$name\"/" "$output/studies/$name/study.toml"
       studies+=("$output/studies/$name/study.toml")
     done
   done

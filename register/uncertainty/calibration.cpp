@@ -27,10 +27,10 @@ constexpr std::array kInflation = {
 };
 
 /// Of success_confidence(), likewise fitted.
-constexpr double kConfidenceAtOnce = 2.0;
-constexpr double kConfidenceByFine = 8.0;
-constexpr double kConfidenceByTre = -2.5;
-constexpr double kConfidenceByChains = -0.2;
+constexpr double kConfidenceAtOnce = 6.45;
+constexpr double kConfidenceByFine = 0.37;
+constexpr double kConfidenceByTre = -2.74;
+constexpr double kConfidenceByChains = -0.32;
 
 /// Shares below are as good as none.
 constexpr double kLeastShare = 0.05;
