@@ -22,15 +22,15 @@ struct InflationRow {
 constexpr std::array kInflation = {
     InflationRow{"rg", 0.0, 5.80, 0.65},
     InflationRow{"gc", 0.0, 2.65, 0.65},
-    InflationRow{"mi", 1.0, 3.0, 0.65},
-    InflationRow{"", 1.0, 6.15, 0.65},
+    InflationRow{"mi", 2.50, 8.00, 0.65},
+    InflationRow{"", 2.50, 8.00, 0.65},
 };
 
 /// Of success_confidence(), likewise fitted.
-constexpr double kConfidenceAtOnce = 6.45;
-constexpr double kConfidenceByFine = 0.37;
-constexpr double kConfidenceByTre = -2.74;
-constexpr double kConfidenceByChains = -0.32;
+constexpr double kConfidenceAtOnce = 6.47;
+constexpr double kConfidenceByFine = 1.49;
+constexpr double kConfidenceByTre = -3.02;
+constexpr double kConfidenceByChains = -0.22;
 
 /// Shares below are as good as none.
 constexpr double kLeastShare = 0.05;
