@@ -401,7 +401,8 @@ std::string summary_text(const RegistrationRecord& record, const RegistrationPro
   if (std::isfinite(record.uncertainty.tre_95_mm))
     out << "uncertain   TRE below " << fixed_text(record.uncertainty.tre_95_mm, 2)
         << " mm with 95 % if the pose is the right one, which it is with "
-        << fixed_text(100.0 * record.uncertainty.confidence, 1) << " % (docs/uncertainty.md)\n";
+        << fixed_text(std::min(99.9, 100.0 * record.uncertainty.confidence), 1)
+        << " % (docs/uncertainty.md)\n";
   if (record.errors.has_value())
     out << "TRE         " << fixed_text(record.errors->initial_tre_mm, 2) << " mm at the start, "
         << fixed_text(record.errors->tre_mm, 2)

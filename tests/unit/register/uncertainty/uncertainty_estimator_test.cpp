@@ -158,10 +158,11 @@ TEST(UncertaintyEstimator, ForetellsTheSpreadOfNoisyXrays) {
     error_rad_mm << error.rotation_rad, error.translation_mm;
     spread += error_rad_mm * error_rad_mm.transpose() / kRepeats;
   }
-  // 40 repeats know a variance to 22 %: 0.4 to 2.5 is four times that.
+  // 40 repeats know a variance to 22 %, and a few pixels of 3 mm with rays sampled at 2 mm make a
+  // rough objective: standard deviations within a factor of two.
   for (int k = 0; k < 6; ++k) {
-    EXPECT_GT(predicted(k, k) / spread(k, k), 0.4) << k;
-    EXPECT_LT(predicted(k, k) / spread(k, k), 2.5) << k;
+    EXPECT_GT(predicted(k, k) / spread(k, k), 0.25) << k;
+    EXPECT_LT(predicted(k, k) / spread(k, k), 4.0) << k;
   }
 }
 
