@@ -7,6 +7,7 @@
 #include "evaluate/registration/compare_methods.h"
 #include "evaluate/registration/evaluate_registrations.h"
 #include "evaluate/registration/join_studies.h"
+#include "evaluate/registration/measure_population.h"
 #include "evaluate/report/make_report.h"
 #include "evaluate/sweeps/draw_similarity_curves.h"
 #include "evaluate/sweeps/make_error_budget.h"
@@ -35,6 +36,8 @@ int main(int argc, char** argv) {
   const CLI::App* lattice_errors_command = bind_lattice_errors(app, lattice_errors);
   af::evaluation::JoinStudiesOptions join;
   const CLI::App* join_command = bind_join_studies(app, join);
+  af::evaluation::PopulationOptions population;
+  const CLI::App* population_command = bind_population(app, population);
   af::evaluation::ReportOptions report;
   const CLI::App* report_command = bind_report(app, report);
   af::registration::MethodOptions method;
@@ -51,6 +54,7 @@ int main(int argc, char** argv) {
     if (error_budget_command->parsed()) run_error_budget(error_budget, command_line, world);
     if (lattice_errors_command->parsed()) run_lattice_errors(lattice_errors, world);
     if (join_command->parsed()) run_join_studies(join, world);
+    if (population_command->parsed()) run_population(population, world);
     if (method_command->parsed()) af::evaluation::show_method(method, world);
     if (report_command->parsed()) run_report(report, world);
   });

@@ -8,6 +8,7 @@
 stress_of() {
   case "$1" in
     clean) ;;
+    all) echo all ;;
     stressed) echo rods,fiducials,heel,noise,degraded-ct ;;
     moving) echo rods,fiducials,heel,noise,degraded-ct,motion ;;
     *) echo "${1//+/,}" ;;

@@ -14,8 +14,8 @@ Usage: jobs/real-xrays.sh FOLDER [OPTIONS]
 
 FOLDER holds the images of a circular cone-beam scan. Finds the scan's true geometry from its even views, reconstructs a
 CT from them, takes odd views as X-rays, in pairs about 90 degrees apart and alone, builds a field for each X-ray,
-registers from starts up to 30 mm from the true pose with every preset, by fields, by fields with a finish by ray casting,
-and by ray casting, and writes methods.md and report.html. After a stop, run the same command again to continue. Needs the
+registers from starts up to 30 mm from the true pose with every preset, by fields, by fields with a finish by ray casting
+(but paper, which has none), and by ray casting, and writes methods.md and report.html. After a stop, run the same command again to continue. Needs the
 programs in build/release/bin (or installed).
 
   --scan FILE               geometry of the scan (af-scan --help)        [FOLDER/scan.toml, else docs/data/cbct-cylinder.toml]
@@ -28,7 +28,7 @@ programs in build/release/bin (or installed).
   --field OPTIONS           options of af-precompute, in one word                                 [--preset standard]
   --max-rotation-deg X      range of the fields, degrees                                                         [16]
   --max-translation-mm X    range of the fields, mm                                                              [40]
-  --quick                   2 pairs, 1 start in each of 15 intervals, ray casting from 4 starts in all
+  --quick                   2 pairs, 1 start in each of 15 intervals, ray casting from 4 starts per case and preset
   --ranks N                 MPI ranks of fields and registrations                                         [all cores]
   --seed N                  of nominal poses and starts                                                           [1]
   --help

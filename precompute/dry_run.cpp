@@ -150,9 +150,7 @@ std::string dry_run_text(const DryRun& run) {
   };
   std::string text =
       "Field of camera " + run.source.camera.name + " for " + run.source.ct_path + "\n";
-  text += formatted("  range              +-%g degrees, +-%g mm\n",
-                    run.options.max_rotation_deg,
-                    run.options.max_translation_mm);
+  text += "  range              " + run.source.range.text() + "\n";
   text += run.planes;
   text += formatted("  rays               %.1f million stored of %.1f million\n",
                     static_cast<double>(run.lattice.stored_node_count()) / 1e6,

@@ -31,7 +31,8 @@ LightSlab sized_planes(const FieldSource& source,
       source.frame,
       range,
       source.volume->corner_points(),
-      {design.uv_nodes, design.st_nodes, depth_slabs.boundaries_y_mm, depth_slabs.st_plane_y_mm});
+      {design.uv_nodes, design.st_nodes, depth_slabs.boundaries_y_mm, depth_slabs.st_plane_y_mm},
+      source.more_cameras);
 }
 
 std::string planes_text(const LightSlab& planes) {
@@ -59,16 +60,16 @@ std::string advice_text(const FieldSource& source,
       "and costs nothing.\n",
       100.0 * static_cast<double>(lattice.stored_node_count()) /
           static_cast<double>(lattice.node_count()));
-  MotionRange narrower = options.range();
-  narrower.max_translation_mm /= 2.0;
-  if (narrower.max_translation_mm >= 5.0) {
+  const MotionRange narrower(source.range.max_rotation_rad(),
+                             0.5 * source.range.max_translation_mm());
+  if (source.range.is_symmetric() && narrower.max_translation_mm() >= 5.0) {
     // The spacing that half the range would give with the same nodes.
     const LightSlab alternative =
         sized_planes(source, options, narrower, {{}, {slab.st_plane_y_mm}});
     text += formatted(
         "  With --max-translation-mm %.0f the same nodes would stand %.2f instead of %.2f mm apart "
         "on the (s,t) plane: sharper DRRs for the same size.\n",
-        narrower.max_translation_mm,
+        narrower.max_translation_mm(),
         alternative.slabs.front().s.spacing_mm(),
         slab.s.spacing_mm());
   }

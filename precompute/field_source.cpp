@@ -68,7 +68,8 @@ NamedSource source_of_options(const PrecomputeOptions& options,
         shared_poses(communicator, [&] {
           return std::vector{
               read_pose(options.nominal_pose,
-                        pose_context(options.ct, options.ct_reading, source.rig, std::nullopt))};
+                        pose_context(options.ct, options.ct_reading, source.rig, std::nullopt),
+                        &warnings)};
         }).front();
   return source;
 }
@@ -102,6 +103,25 @@ PoseFrame frame_of(const NamedSource& source,
   return {Eigen::Matrix3d::Identity(), center, source.rig.isocenter_point};
 }
 
+/// The smallest box of the six parameters that holds `about_one` about every pose.
+MotionRange range_about(const std::vector<RigidTransform>& poses,
+                        const PoseFrame& frame,
+                        const MotionRange& about_one) {
+  PoseParameters low = parameters_from_pose(frame, poses.front());
+  PoseParameters high = low;
+  for (const RigidTransform& pose : poses) {
+    const PoseParameters parameters = parameters_from_pose(frame, pose);
+    low = {low.rotation_rad.cwiseMin(parameters.rotation_rad),
+           low.translation_mm.cwiseMin(parameters.translation_mm)};
+    high = {high.rotation_rad.cwiseMax(parameters.rotation_rad),
+            high.translation_mm.cwiseMax(parameters.translation_mm)};
+  }
+  return {PoseParameters{low.rotation_rad + about_one.low.rotation_rad,
+                         low.translation_mm + about_one.low.translation_mm},
+          PoseParameters{high.rotation_rad + about_one.high.rotation_rad,
+                         high.translation_mm + about_one.high.translation_mm}};
+}
+
 }  // namespace
 
 FieldSource load_source(const PrecomputeOptions& options, const Communicator& communicator) {
@@ -117,6 +137,17 @@ FieldSource load_source(const PrecomputeOptions& options, const Communicator& co
   source.ct_reading = named.ct_reading;
   source.ct_content_sha256 = ct.facts.content_sha256;
   source.frame = frame_of(named, options, ct.facts.grid);
+  source.range = all_or_none(communicator, [&] { return options.range(); });
+  if (!options.cover.empty()) {
+    const std::vector<RigidTransform> poses = shared_poses(communicator, [&] {
+      return read_poses(options.cover,
+                        pose_context(named.ct_path, named.ct_reading, named.rig, source.frame));
+    });
+    source.range = range_about(poses, source.frame, source.range);
+    all_or_none(communicator, [&] { throw_if_any(problems(source.range)); });
+  }
+  if (!options.cover_rig.empty())
+    source.more_cameras = shared_rig(options.cover_rig, communicator, &source.warnings).cameras;
   return source;
 }
 

@@ -24,6 +24,8 @@ struct FieldSource {
   std::string ct_content_sha256;
   CameraGeometry camera;
   PoseFrame frame;
+  MotionRange range;                         ///< about the nominal pose: of the options
+  std::vector<CameraGeometry> more_cameras;  ///< whose rays the field holds, too
   std::vector<std::string> warnings;
 };
 

@@ -77,19 +77,27 @@ std::string numbers_text(const Eigen::PlainObjectBase<Derived>& matrix) {
 /// its resume, for example after "more codewords than training tiles".
 DecidingValues casting_decides(const PrecomputeOptions& options, const FieldSource& source) {
   DecidingValues decides = deciding_values(deciding_options(options, kCastingStage), {});
-  const CameraGeometry& camera = source.camera;
+  const auto add_camera = [&](const CameraGeometry& camera, const std::string& what) {
+    decides[what] = camera.name;
+    decides[what + " source_point"] = numbers_text(camera.source_point);
+    decides[what + " detector_origin_point"] = numbers_text(camera.detector_origin_point);
+    decides[what + " column_direction"] = numbers_text(camera.column_direction);
+    decides[what + " row_direction"] = numbers_text(camera.row_direction);
+    decides[what + " pixel_spacing_mm"] = numbers_text(camera.pixel_spacing_mm);
+    decides[what + " size_px"] =
+        std::to_string(camera.size_px.x()) + " x " + std::to_string(camera.size_px.y());
+  };
   decides["ct_content_sha256"] = source.ct_content_sha256;
-  decides["camera"] = camera.name;
-  decides["camera source_point"] = numbers_text(camera.source_point);
-  decides["camera detector_origin_point"] = numbers_text(camera.detector_origin_point);
-  decides["camera column_direction"] = numbers_text(camera.column_direction);
-  decides["camera row_direction"] = numbers_text(camera.row_direction);
-  decides["camera pixel_spacing_mm"] = numbers_text(camera.pixel_spacing_mm);
-  decides["camera size_px"] =
-      std::to_string(camera.size_px.x()) + " x " + std::to_string(camera.size_px.y());
+  add_camera(source.camera, "camera");
+  for (std::size_t i = 0; i < source.more_cameras.size(); ++i)
+    add_camera(source.more_cameras[i], "covered camera " + std::to_string(i + 1));
   decides["nominal rotation"] = numbers_text(source.frame.rotation);
   decides["center_ct_mm"] = numbers_text(source.frame.center_ct_mm);
   decides["nominal center_room_mm"] = numbers_text(source.frame.center_room_mm);
+  if (!options.cover.empty()) {
+    decides["covered from"] = numbers_text(source.range.low.deg_and_mm().data(), 6);
+    decides["covered to"] = numbers_text(source.range.high.deg_and_mm().data(), 6);
+  }
   return decides;
 }
 
@@ -261,7 +269,7 @@ class PrecomputeRun {
   /// Collective.
   void size_planes(const DepthSlabs& depth_slabs) {
     field_.light_slab = all_or_none(
-        world_, [&] { return sized_planes(source_, options_, options_.range(), depth_slabs); });
+        world_, [&] { return sized_planes(source_, options_, source_.range, depth_slabs); });
     share_geometry(field_, world_);
     lattice_ = field_.lattice();
   }
@@ -512,7 +520,7 @@ class PrecomputeRun {
     const AttenuationModel& model = options_.attenuation;
     field_.identity = {source_.camera,
                        source_.frame,
-                       options_.range(),
+                       source_.range,
                        source_.ct_content_sha256,
                        model.mu_water_per_mm,
                        model.air_below_hu};

@@ -11,11 +11,14 @@
 #include "base/error.h"
 #include "base/joined.h"
 #include "base/number_text.h"
+#include "base/stored_bytes.h"
 #include "drr/field_level.h"
 #include "drr/ray_cast_drr.h"
 #include "drr/two_pass_af_drr.h"
 #include "field_file/field_file.h"
 #include "files/sha256.h"
+#include "geometry/camera_distance.h"
+#include "geometry/ray_coverage.h"
 #include "register/problem/fiducial_mask.h"
 #include "register/problem/parameter_scaling.h"
 #include "register/problem/stage_view.h"
@@ -28,8 +31,6 @@
 
 namespace af::registration {
 namespace {
-
-constexpr double kCameraToleranceMm = 1e-3;
 
 /// Half the side of the cube about the ROI centre that stands for the CT when it is not read.
 constexpr double kAssumedCtHalfSideMm = 100.0;
@@ -264,17 +265,15 @@ std::string how(const CtReadOptions& reading) {
   return text.empty() ? "as HU" : "with " + text;
 }
 
-/// Collective. A field, checked against the view's camera and the CT.
+/// Collective. A field, checked against the CT.
 std::shared_ptr<const CompressedAttenuationField> field_of_view(const std::string& path,
                                                                 const StudyCase& study_case,
-                                                                const RegistrationView& view,
                                                                 const CaseLoadOptions& options,
                                                                 const std::optional<CtFacts>& ct,
                                                                 const Communicator& communicator,
                                                                 FieldFileInfo& info) {
   auto field = read_field(path, communicator, &info);
   all_or_none(communicator, [&] {
-    require_same_camera(field->identity.camera, view.view.camera, path);
     require_same_attenuation(field->identity, options, path);
     if (ct.has_value() && ct->content_sha256 != field->identity.ct_content_sha256)
       throw FileError(path,
@@ -287,13 +286,52 @@ std::shared_ptr<const CompressedAttenuationField> field_of_view(const std::strin
   return field;
 }
 
-/// Collective. The fields of all views; their hashes go to `input_sha256`.
+/// Collective. Rank 0's box on every rank: processors may differ in its last bits.
+MotionRange shared_box(MotionRange range, const Communicator& communicator) {
+  std::vector<std::byte> bytes = bytes_of(range.high);
+  communicator.broadcast(bytes);
+  const auto high = value_of<PoseParameters>(bytes, "the covered box of rank 0");
+  return {high.rotation_rad.x(), high.translation_mm.x()};
+}
+
+/// Collective. Which poses a field answers for, for the view's camera; says so in a note. The
+/// field's motion range speaks of its own camera; of another one its rays decide.
+std::string limit_to_rays(const FieldIdentity& identity,
+                          const LightSlab& light_slab,
+                          const std::string& path,
+                          const PoseFrame& nominal,
+                          const Communicator& communicator,
+                          RegistrationView& view) {
+  const CameraGeometry& camera = view.view.camera;
+  const CameraDistance distance = camera_distance(camera, identity.camera);
+  if (distance.is_none()) {
+    view.limit = MotionLimit{identity.frame, identity.range};
+    view.reach = view.limit;
+    return distance.text() + ", " + identity.range.text();
+  }
+  const auto rays = static_cast<std::int64_t>(view.view.pixel_count());
+  const std::int64_t outside =
+      view.renderer->rays_outside(nominal.nominal_room_from_ct(), view.view);
+  const MotionRange own_box = all_or_none(communicator, [&] {
+    if (outside == rays)
+      throw FileError(path,
+                      "camera '" + camera.name + "' of the field",
+                      "one that holds rays of the study's at the nominal pose",
+                      "none of them; the study's has " + distance.text());
+    return covered_box(light_slab, view.view.coarser(1).camera, nominal, identity.range);
+  });
+  view.reach = MotionLimit{nominal, shared_box(own_box, communicator)};
+  return distance.text() + "; " +
+         coverage_text(camera.name, rays - outside, rays, view.reach->range);
+}
+
+/// Collective. The fields of all views; hashes and notes go to `loaded`.
 void use_fields(const StudyCase& study_case,
                 const CaseLoadOptions& options,
                 const Communicator& communicator,
                 const std::optional<CtFacts>& ct,
                 RegistrationProblem& problem,
-                std::map<std::string, std::string>& input_sha256) {
+                LoadedCase& loaded) {
   for (std::size_t i = 0; i < problem.views.size(); ++i) {
     RegistrationView& view = problem.views[i];
     const std::string path = all_or_none(communicator, [&] {
@@ -303,11 +341,13 @@ void use_fields(const StudyCase& study_case,
     FieldFileInfo info;
     const auto field =
         used_from(is_of_study ? study_case.views[i].places : StudyPlaces(), "field", [&] {
-          return field_of_view(path, study_case, view, options, ct, communicator, info);
+          return field_of_view(path, study_case, options, ct, communicator, info);
         });
     use_field(field, options, communicator, view);
-    view.limit = MotionLimit{field->identity.frame, field->identity.range};
-    input_sha256["field " + view.view.camera.name] = info.payload_sha256;
+    const std::string name = "field " + view.view.camera.name;
+    loaded.input_notes[name] = limit_to_rays(
+        field->identity, field->light_slab, path, problem.frame(), communicator, view);
+    loaded.input_sha256[name] = info.payload_sha256;
   }
 }
 
@@ -356,33 +396,6 @@ const char* to_string(RendererKind kind) {
   return kind == RendererKind::Field ? "field" : "raycast";
 }
 
-void require_same_camera(const CameraGeometry& field_camera,
-                         const CameraGeometry& rig_camera,
-                         const std::string& field_path) {
-  const std::string object = "camera '" + rig_camera.name + "' of the field";
-  const auto size_text = [](const CameraGeometry& camera) {
-    return std::to_string(camera.size_px.x()) + " x " + std::to_string(camera.size_px.y()) +
-           " pixels";
-  };
-  if (field_camera.size_px != rig_camera.size_px)
-    throw FileError(field_path, object, size_text(rig_camera), size_text(field_camera));
-  const auto require_same_point =
-      [&](const char* name, const Eigen::Vector3d& expected, const Eigen::Vector3d& found) {
-        if ((expected - found).norm() <= kCameraToleranceMm) return;
-        const auto text = [](const Eigen::Vector3d& point) {
-          std::ostringstream out;
-          out << '[' << point.x() << ", " << point.y() << ", " << point.z() << "] mm";
-          return out.str();
-        };
-        throw FileError(field_path, object + ": " + name, text(expected), text(found));
-      };
-  require_same_point("source_point", rig_camera.source_point, field_camera.source_point);
-  const auto expected = rig_camera.detector_corner_points();
-  const auto found = field_camera.detector_corner_points();
-  for (std::size_t i = 0; i < expected.size(); ++i)
-    require_same_point("a detector corner", expected[i], found[i]);
-}
-
 LoadedCase load_case(const Study& study,
                      const StudyCase& study_case,
                      const CaseLoadOptions& options,
@@ -418,7 +431,7 @@ LoadedCase load_case(const Study& study,
     });
   }
   if (looks_up) {
-    use_fields(study_case, options, communicator, ct, *problem, loaded.input_sha256);
+    use_fields(study_case, options, communicator, ct, *problem, loaded);
     if (volume) add_ray_casts(*volume, ray_cast, options, communicator, *problem);
   } else {
     const auto levels = coarse_ray_casts(*volume, options, communicator);

@@ -56,17 +56,13 @@ struct LoadedCase {
 /// With fields the CT is read by rank 0 alone, for its hash and grid (skip_ct_check: not at all;
 /// steps are then scaled as if it filled 200 mm about the ROI centre), unless a correction casts
 /// rays through it: its attenuation must then be the fields' (InputError). FileError (exit 4) when
-/// a field was made from another CT (both hashes are named) or for another camera (geometry to 1e-3
-/// mm); InputError when a view has no field or the field's range does not hold the nominal pose.
+/// a field was made from another CT (both hashes are named) or holds none of the rays of a view at
+/// the nominal pose; InputError when a view has no field. A field for another camera is taken: its
+/// rays decide on every pose, and a note says how far the camera is from the field's and what is
+/// covered.
 LoadedCase load_case(const Study& study,
                      const StudyCase& study_case,
                      const CaseLoadOptions& options,
                      const Communicator& communicator);
-
-/// FileError when the cameras differ by more than 1e-3 mm in any point of their geometry (1e-6 in
-/// directions and per pixel), or in size.
-void require_same_camera(const CameraGeometry& field_camera,
-                         const CameraGeometry& rig_camera,
-                         const std::string& field_path);
 
 }  // namespace af::registration

@@ -50,10 +50,12 @@ void run(const RegisterOptions& options,
   std::optional<af::LandmarkPose> landmarks;
   if (starts_from_landmarks(options, study_case))
     landmarks = af::all_or_none(world, [&] { return af::landmark_pose(study, study_case); });
+  std::vector<std::string> notes;
   const std::vector<af::RigidTransform> starts = af::shared_poses(world, [&] {
     if (landmarks.has_value()) return std::vector{landmarks->room_from_ct};
-    return start_poses(options, af::pose_context(study, study_case));
+    return start_poses(options, af::pose_context(study, study_case), notes);
   });
+  for (const std::string& text : notes) af::warn(world, text);
   const auto gold = af::all_or_none(world, [&] { return known_gold(study, study_case); });
   const auto pool = std::make_shared<af::ThreadPool>(af::thread_count(options.method.threads));
   CaseLoadOptions load_options =

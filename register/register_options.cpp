@@ -135,10 +135,11 @@ bool starts_from_landmarks(const RegisterOptions& options, const StudyCase& stud
 }
 
 std::vector<RigidTransform> start_poses(const RegisterOptions& options,
-                                        const PoseContext& context) {
+                                        const PoseContext& context,
+                                        std::vector<std::string>& notes) {
   check(context.frame.has_value(), "a start is relative to the case's nominal pose");
-  if (!options.starts.empty()) return read_poses(options.starts, context);
-  if (!options.start_pose.empty()) return {read_pose(options.start_pose, context)};
+  if (!options.starts.empty()) return read_unbroken_poses(options.starts, context, &notes);
+  if (!options.start_pose.empty()) return {read_pose(options.start_pose, context, &notes)};
   std::array<double, 6> values{};
   for (std::size_t i = 0; i < 3; ++i) {
     if (options.start_rotation_deg.has_value()) values[i] = (*options.start_rotation_deg)[i];

@@ -58,8 +58,13 @@ CaseLoadOptions case_load_options(const RegisterOptions& options,
 bool starts_from_landmarks(const RegisterOptions& options, const StudyCase& study_case);
 
 /// The starts of a run: of --starts, or the one of --start-pose, or nominal with
-/// --start-rotation-deg and --start-translation-mm. `context` is the case's, with its frame.
-std::vector<RigidTransform> start_poses(const RegisterOptions& options, const PoseContext& context);
+/// --start-rotation-deg and --start-translation-mm. `context` is the case's, with its frame;
+/// `notes` get what was left out of a file and assumed. InputError when a frame before the last
+/// pose of
+/// --starts has none: rows are numbered by frames.
+std::vector<RigidTransform> start_poses(const RegisterOptions& options,
+                                        const PoseContext& context,
+                                        std::vector<std::string>& notes);
 
 /// SHA-256 of the study and, if given, the file of starts, by name.
 std::map<std::string, std::string> hashes_of_files(const RegisterOptions& options);

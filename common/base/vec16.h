@@ -9,6 +9,8 @@
 #include <string.h>
 
 #define AF_KERNEL_INLINE static inline __attribute__((always_inline))
+/// For members of classes of kernels.
+#define AF_KERNEL_MEMBER inline __attribute__((always_inline))
 
 namespace af::AF_KERNEL_NAMESPACE {
 
@@ -82,6 +84,7 @@ AF_DEFINE_OPERATION(minimum, min_ps, FloatRegister, F16, F16)
 AF_DEFINE_OPERATION(minimum, min_epi32, IntegerRegister, I16, I16)
 /// a > b ? a : b per lane.
 AF_DEFINE_OPERATION(maximum, max_ps, FloatRegister, F16, F16)
+AF_DEFINE_OPERATION(maximum, max_epi32, IntegerRegister, I16, I16)
 /// round(a * b / 2^15) per 16-bit lane; not for a == b == -32768.
 AF_DEFINE_OPERATION(multiply_fraction, mulhrs_epi16, IntegerRegister, S32, S32)
 /// Within each group of 8 lanes: a[0] b[0] a[1] b[1] a[2] b[2] a[3] b[3].

@@ -33,6 +33,8 @@ constexpr DicomTag kElementSpacing = {0x0018, 0x7022};
 constexpr DicomTag kActiveDimensions = {0x0018, 0x7026};
 constexpr DicomTag kActiveOrigin = {0x0018, 0x7028};
 constexpr DicomTag kFieldOfViewOrigin = {0x0018, 0x7030};
+constexpr DicomTag kFieldOfViewRotation = {0x0018, 0x7032};
+constexpr DicomTag kFieldOfViewFlip = {0x0018, 0x7034};
 constexpr DicomTag kPatientOrientation = {0x0020, 0x0020};
 constexpr DicomTag kFrames = {0x0028, 0x0008};
 constexpr DicomTag kRows = {0x0028, 0x0010};
@@ -121,7 +123,7 @@ class DicomCamera {
   }
 
   /// Of each frame: one, unless the positioner moves.
-  std::vector<PositionerAngles> all_angles() const {
+  [[nodiscard]] std::vector<PositionerAngles> all_angles() const {
     PositionerAngles first;
     const auto primary =
         elements_.number_or_none(kPrimaryAngle, "PositionerPrimaryAngle (0018,1510)");
@@ -152,7 +154,7 @@ class DicomCamera {
   }
 
   /// PS3.3, C.8.7.5.1.3: one increment per frame, or an offset from the first angles for each.
-  std::vector<PositionerAngles> moving_angles(const PositionerAngles& first) const {
+  [[nodiscard]] std::vector<PositionerAngles> moving_angles(const PositionerAngles& first) const {
     const double frames =
         elements_.number_or_none(kFrames, "NumberOfFrames (0028,0008)").value_or(1.0);
     if (!(frames >= 1.0 && frames <= kMostFrames) || frames != std::floor(frames))
@@ -186,7 +188,7 @@ class DicomCamera {
 
   /// Where the image's middle lies from the middle of the active detector: (column, row) mm. 0
   /// unless all is stated.
-  Eigen::Vector2d field_of_view_offset_mm() const {
+  [[nodiscard]] Eigen::Vector2d field_of_view_offset_mm() const {
     const auto pair = [&](DicomTag tag, const char* name) -> std::optional<Eigen::Vector2d> {
       const std::vector<double> values = elements_.numbers(tag, name);
       if (values.size() != 2) return std::nullopt;
@@ -199,7 +201,24 @@ class DicomCamera {
     if (!spacing || !active || !active_origin || !origin) return Eigen::Vector2d::Zero();
     const Eigen::Vector2d image_mm =
         camera_.size_px.cast<double>().cwiseProduct(camera_.pixel_spacing_mm);
-    return (*origin - *active_origin).cwiseProduct(*spacing) + 0.5 * (image_mm - *active);
+    const Eigen::Vector2d offset_mm =
+        (*origin - *active_origin).cwiseProduct(*spacing) + 0.5 * (image_mm - *active);
+    return offset_mm.isZero(0.0) ? offset_mm : along_stored_axes(offset_mm);
+  }
+
+  /// FieldOfViewOrigin is of the detector's own rows and columns, before the image was turned and
+  /// flipped as these tags say.
+  [[nodiscard]] Eigen::Vector2d along_stored_axes(Eigen::Vector2d offset_mm) const {
+    const std::vector<double> turn =
+        elements_.numbers(kFieldOfViewRotation, "FieldOfViewRotation (0018,7032)");
+    const double turn_deg = turn.empty() ? 0.0 : turn.front();
+    if (turn_deg != 0.0 && turn_deg != 180.0)
+      throw InputError(file_ + ": FieldOfViewRotation (0018,7032)",
+                       number_text(turn_deg),
+                       "must be 0 or 180 where FieldOfViewOrigin is not the detector's middle");
+    if (turn_deg == 180.0) offset_mm = -offset_mm;
+    if (elements_.text(kFieldOfViewFlip) == "YES") offset_mm.x() = -offset_mm.x();
+    return offset_mm;
   }
 
   /// The direction of patient letters such as "L" or "PL", by the first.

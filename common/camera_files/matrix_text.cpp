@@ -102,8 +102,8 @@ class MatrixReader {
   }
 
   /// The side on which the object is becomes known with the isocentre only.
-  CameraGeometry from_matrix(const Eigen::Matrix<double, 3, 4>& matrix,
-                             const CameraGeometry& stated) const {
+  [[nodiscard]] CameraGeometry from_matrix(const Eigen::Matrix<double, 3, 4>& matrix,
+                                           const CameraGeometry& stated) const {
     const std::string name = stated.name.empty() ? file_.name() + ", matrix " +
                                                        std::to_string(stated_.cameras.size() + 1)
                                                  : stated.name;

@@ -38,8 +38,18 @@ const KeyNames& translation_names() {
   return names;
 }
 const KeyNames& distortion_names() {
-  static const KeyNames names = {
-      "distortioncoefficients", "d", "dist", "distcoeffs", "distortion", "distortioncoeffs"};
+  static const KeyNames names = {"distortioncoefficients",
+                                 "d",
+                                 "dist",
+                                 "distcoeffs",
+                                 "distortion",
+                                 "distortioncoeffs",
+                                 "distortioncoefficient",
+                                 "distcoeff",
+                                 "distcoef",
+                                 "distcoefs",
+                                 "distortionparameters",
+                                 "distortionparams"};
   return names;
 }
 
@@ -78,6 +88,20 @@ class OpenCvValues {
 
   /// The numbers that tell the cameras apart; "" when there is one.
   [[nodiscard]] const std::set<std::string>& camera_numbers() const { return numbers_; }
+
+  /// The value of that camera alone. An unnumbered R or t beside several cameras is that of a
+  /// stereo calibration: the second camera's relative to the first.
+  [[nodiscard]] const YamlValue& of_camera(const KeyNames& names,
+                                           const std::string& number,
+                                           const char* what) const {
+    for (const Entry& entry : values_)
+      if (entry.plain.number == number && is_one_of(names, entry.plain.name)) return entry.value;
+    const bool is_stereo = numbers_.size() > 1 && find(names, "") != nullptr;
+    throw InputError(file_.name() + ": " + names.front() + number + " is missing: " + what +
+                     (is_stereo ? "; that without a number, of a stereo calibration, is relative "
+                                  "to the first camera"
+                                : ""));
+  }
 
   /// The value of that camera, or the one that all cameras share.
   [[nodiscard]] const YamlValue* find(const KeyNames& names, const std::string& number) const {
@@ -166,9 +190,9 @@ StatedCamera read_camera(const OpenCvValues& values, const std::string& number) 
       "K alone does not say where the camera stands; add R (3x3, or rvec) and t (or tvec), with "
       "x_camera = R x_room + t, mm";
   pinhole.camera_from_room =
-      rotation(values, values.required(rotation_names(), number, kNeedsPose));
+      rotation(values, values.of_camera(rotation_names(), number, kNeedsPose));
   pinhole.translation_mm =
-      values.vector(values.required(translation_names(), number, kNeedsPose), 3, "t");
+      values.vector(values.of_camera(translation_names(), number, kNeedsPose), 3, "t");
   refuse_distortion(values, number);
   StatedCamera camera;
   read_size(values, number, camera);

@@ -68,10 +68,8 @@ void check_agreement(const Eigen::MatrixXd& matrix,
 class DrrCommand {
  public:
   explicit DrrCommand(const CameraFile& file) : file_(file.name()) {
-    const std::vector<std::string> words = shell_like_words(file.text);
-    const auto start = std::ranges::find(words, "drr");
-    if (start == words.end()) throw FileError(file_, "no plastimatch drr command");
-    for (auto word = start; word != words.end(); ++word) {
+    const std::vector<std::string> words = words_of_drr(file.text);
+    for (auto word = words.begin(); word != words.end(); ++word) {
       if (!word->starts_with('-') || is_number(*word)) continue;
       std::string name = *word;
       std::string value;
@@ -102,6 +100,42 @@ class DrrCommand {
   }
 
  private:
+  /// The words from "drr" on of the only command that has it.
+  [[nodiscard]] std::vector<std::string> words_of_drr(const std::string& text) const {
+    std::vector<std::vector<std::string>> found;
+    for (const std::string& command : commands_of(text)) {
+      const std::vector<std::string> words = shell_like_words(command);
+      const auto start = std::ranges::find(words, "drr");
+      if (start != words.end()) found.emplace_back(start, words.end());
+    }
+    if (found.empty()) throw FileError(file_, "no plastimatch drr command");
+    if (found.size() > 1)
+      throw InputError(file_ + ": holds " + std::to_string(found.size()) +
+                       " plastimatch drr commands; give a file with one");
+    return found.front();
+  }
+
+  /// Parts that a shell runs one after the other: between line ends without a backslash, ';' and
+  /// '&', outside quotes.
+  static std::vector<std::string> commands_of(const std::string& text) {
+    std::vector<std::string> commands(1);
+    char quote = '\0';
+    char before = '\0';
+    for (const char c : text) {
+      if (quote == '\0' && (c == '"' || c == '\''))
+        quote = c;
+      else if (c == quote)
+        quote = '\0';
+      const bool ends = c == ';' || c == '&' || (c == '\n' && before != '\\');
+      if (quote == '\0' && ends)
+        commands.emplace_back();
+      else
+        commands.back() += c;
+      if (c != '\r') before = c;
+    }
+    return commands;
+  }
+
   /// Words as a shell takes them: quotes, and a backslash before the end of a line.
   static std::vector<std::string> shell_like_words(const std::string& text) {
     std::vector<std::string> words;

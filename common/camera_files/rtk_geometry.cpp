@@ -131,6 +131,27 @@ StatedCamera read_projection(const XmlElement& projection,
   return stated;
 }
 
+/// The angles whose Rz(-in plane) Rx(-out of plane) Ry(-gantry) has the rows `axes`, degrees.
+struct RtkAngles {
+  double gantry_deg = 0.0;
+  double out_of_plane_deg = 0.0;
+  double in_plane_deg = 0.0;
+};
+
+RtkAngles rtk_angles(const Eigen::Matrix3d& axes) {
+  RtkAngles angles;
+  angles.out_of_plane_deg = -kDegPerRad * std::asin(std::clamp(axes(2, 1), -1.0, 1.0));
+  // A beam along y: gantry and in-plane angle turn about the same axis, so one of them is free.
+  constexpr double kAlongY = 1e-9;
+  if (std::hypot(axes(2, 0), axes(2, 2)) < kAlongY) {
+    angles.in_plane_deg = -kDegPerRad * std::atan2(axes(1, 0), axes(0, 0));
+    return angles;
+  }
+  angles.gantry_deg = -kDegPerRad * std::atan2(-axes(2, 0), axes(2, 2));
+  angles.in_plane_deg = -kDegPerRad * std::atan2(-axes(0, 1), axes(1, 1));
+  return angles;
+}
+
 std::string xml_number(const char* name, double value) {
   return std::string("    <") + name + ">" + number_text(value + 0.0) + "</" + name + ">\n";
 }
@@ -177,12 +198,12 @@ std::string write_rtk_geometry(const CameraRig& rig) {
     const Eigen::Vector3d source = axes * camera.source_point;
     const Eigen::Vector2d middle = 0.5 * (camera.size_px.cast<double>() - Eigen::Vector2d::Ones());
     const Eigen::Vector3d center = axes * camera.detector_point(middle.x(), middle.y());
-    const double degrees = kDegPerRad;
+    const RtkAngles angles = rtk_angles(axes);
     text += "  <Projection>\n" + xml_number("SourceToIsocenterDistance", source.z()) +
             xml_number("SourceToDetectorDistance", camera.source_detector_distance_mm()) +
-            xml_number("GantryAngle", -degrees * std::atan2(-axes(2, 0), axes(2, 2))) +
-            xml_number("OutOfPlaneAngle", -degrees * std::asin(std::clamp(axes(2, 1), -1.0, 1.0))) +
-            xml_number("InPlaneAngle", -degrees * std::atan2(-axes(0, 1), axes(1, 1))) +
+            xml_number("GantryAngle", angles.gantry_deg) +
+            xml_number("OutOfPlaneAngle", angles.out_of_plane_deg) +
+            xml_number("InPlaneAngle", angles.in_plane_deg) +
             xml_number("SourceOffsetX", source.x()) + xml_number("SourceOffsetY", source.y()) +
             xml_number("ProjectionOffsetX", center.x()) +
             xml_number("ProjectionOffsetY", center.y()) + "  </Projection>\n";

@@ -20,11 +20,11 @@ set(CPACK_DEBIAN_PROGRAMS_PACKAGE_NAME attenuation-fields)
 set(CPACK_DEBIAN_PROGRAMS_PACKAGE_DEPENDS openmpi-bin)
 set(CPACK_DEBIAN_PROGRAMS_PACKAGE_RECOMMENDS gnuplot-nox)
 set(CPACK_DEBIAN_PROGRAMS_PACKAGE_SUGGESTS invesalius-examples)
-set(CPACK_COMPONENT_PROGRAMS_DESCRIPTION "The programs af-precompute, af-drr, af-simulate, af-register, af-evaluate
-and af-inspect make compressed attenuation fields from CTs, look digitally
-reconstructed radiographs up in them, find the pose of a CT from calibrated
-X-rays, and measure how well that works. Research software: not a medical
-device.")
+set(CPACK_COMPONENT_PROGRAMS_DESCRIPTION "The programs af-precompute, af-drr, af-simulate, af-register, af-evaluate,
+af-inspect and af-scan make compressed attenuation fields from CTs, look
+digitally reconstructed radiographs up in them, find the pose of a CT from
+calibrated X-rays, make studies of scans and of simulated X-rays, and measure
+how well that works. Research software: not a medical device.")
 
 # af_add_package(<component> <package> <section> <what it is> [DEPENDS ...]): a package of the library or of what is built on
 # it, with a copyright and a changelog of its own.

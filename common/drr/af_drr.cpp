@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "drr/slab_rays.h"
 
 namespace af {
 
@@ -99,6 +100,10 @@ AfDrr::AfDrr(std::shared_ptr<const CompressedAttenuationField> field,
 
 std::unique_ptr<RenderWorkspace> AfDrr::make_workspace() const {
   return std::make_unique<RenderWorkspace>();
+}
+
+std::int64_t AfDrr::rays_outside(const RigidTransform& room_from_ct, const View& view) const {
+  return SlabRays(field_->light_slab, room_from_ct, view).count_outside();
 }
 
 RenderStatus AfDrr::render(const RigidTransform& room_from_ct,

@@ -23,6 +23,8 @@ class AfDrr final : public DrrRenderer {
                       RenderWorkspace& workspace,
                       std::span<float> total_attenuation,
                       const std::optional<PoseGradients>& gradients = std::nullopt) const override;
+  [[nodiscard]] std::int64_t rays_outside(const RigidTransform& room_from_ct,
+                                          const View& view) const override;
   [[nodiscard]] std::unique_ptr<RenderWorkspace> make_workspace() const override;
   [[nodiscard]] const char* name() const override { return "field"; }
   [[nodiscard]] const CompressedAttenuationField& field() const { return *field_; }

@@ -64,6 +64,13 @@ class DrrRenderer {
       std::span<float> total_attenuation,
       const std::optional<PoseGradients>& gradients = std::nullopt) const = 0;
 
+  /// RenderStatus::rays_outside of render(), without a DRR. None where nothing limits the rays.
+  /// \test TwoPassAfDrr.CountsTheRaysThatRenderingCounts
+  [[nodiscard]] virtual std::int64_t rays_outside(const RigidTransform& /*room_from_ct*/,
+                                                  const View& /*view*/) const {
+    return 0;
+  }
+
   [[nodiscard]] virtual std::unique_ptr<RenderWorkspace> make_workspace() const = 0;
 
   /// "field" or "raycast", as in result tables.

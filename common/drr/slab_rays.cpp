@@ -44,6 +44,11 @@ bool SlabRays::all_inside() const {
       corners.begin(), corners.end(), [&](const Eigen::Vector3d& d) { return is_inside(d); });
 }
 
+std::int64_t SlabRays::count_outside() const {
+  if (all_descend() && all_inside()) return 0;
+  return blank_outside({});
+}
+
 std::int64_t SlabRays::blank_outside(std::span<float> planes, std::span<float> more_planes) const {
   std::int64_t outside = 0;
   std::size_t pixel = 0;

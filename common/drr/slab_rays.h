@@ -27,6 +27,8 @@ struct SlabRays {
   /// The hit points of a view's rays form a convex quadrilateral on each plane, so its corner rays
   /// decide.
   [[nodiscard]] bool all_inside() const;
+  /// Rays that miss a plane.
+  [[nodiscard]] std::int64_t count_outside() const;
   /// Counts the rays that miss a plane and zeroes their pixels in both outputs. Each output has any
   /// number of planes of the region's pixels.
   [[nodiscard]] std::int64_t blank_outside(std::span<float> planes,

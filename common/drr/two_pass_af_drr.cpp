@@ -314,6 +314,11 @@ RenderStatus TwoPassAfDrr::render(const RigidTransform& room_from_ct,
   return {blank_outside()};
 }
 
+std::int64_t TwoPassAfDrr::rays_outside(const RigidTransform& room_from_ct,
+                                        const View& view) const {
+  return SlabRays(blender_->coverage(), room_from_ct, view).count_outside();
+}
+
 RenderStatus TwoPassAfDrr::render_gradient_images(const RigidTransform& room_from_ct,
                                                   const View& view,
                                                   RenderWorkspace& workspace,

@@ -52,6 +52,8 @@ class TwoPassAfDrr final : public DrrRenderer {
                                       std::span<float> column_gradient,
                                       std::span<float> row_gradient) const;
 
+  [[nodiscard]] std::int64_t rays_outside(const RigidTransform& room_from_ct,
+                                          const View& view) const override;
   [[nodiscard]] std::unique_ptr<RenderWorkspace> make_workspace() const override;
   [[nodiscard]] const char* name() const override { return "field"; }
 

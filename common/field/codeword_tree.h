@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
+#include "field/block_coding_kernel.h"
 #include "field/codebook.h"
 
 namespace af {
@@ -35,22 +35,33 @@ class CodewordTree {
     std::int8_t quarter_octaves = 0;  ///< of the standard deviation of that coefficient
   };
 
-  [[nodiscard]] const Node& node(std::uint32_t number) const { return nodes_[number]; }
-  /// Fetches the node's great-grandchildren, which a way down will need next but two.
-  void prefetch_below(std::uint32_t number) const {
-    __builtin_prefetch(&nodes_[std::min<std::size_t>(8 * std::size_t{number}, nodes_.size() - 1)]);
-  }
+  [[nodiscard]] Node node(std::uint32_t number) const;
   [[nodiscard]] std::uint32_t leaf_of(std::uint16_t codeword) const { return leaves_[codeword]; }
   [[nodiscard]] const TileCoefficients& coefficients(std::uint16_t codeword) const {
-    return coefficients_[codeword];
+    return coefficients_[codeword].values;
   }
   [[nodiscard]] std::size_t codeword_count() const { return coefficients_.size(); }
+  /// For the kernels, while this lives.
+  [[nodiscard]] CodewordTables tables() const;
 
  private:
-  void split(std::uint32_t number, std::uint32_t* begin, std::uint32_t* end);
+  /// In one line of the cache.
+  struct alignas(64) Coefficients {
+    TileCoefficients values;
+  };
+  /// Where a node stands that splits.
+  struct Place {
+    std::size_t cluster;
+    std::size_t within;
+  };
 
-  std::vector<TileCoefficients> coefficients_;
-  std::vector<Node> nodes_;
+  void split(std::uint32_t number, std::uint32_t* begin, std::uint32_t* end);
+  [[nodiscard]] Place place_of(std::uint32_t number) const;
+
+  std::vector<Coefficients> coefficients_;  ///< never empty: codeword 0
+  int depth_ = 0;
+  std::vector<NodeCluster> clusters_;
+  std::vector<std::uint16_t> codewords_at_;
   std::vector<std::uint32_t> leaves_;
 };
 

@@ -11,6 +11,12 @@
 
 namespace af {
 
+/// Coded bytes of a block, and where its indices go.
+struct CodedBlock {
+  std::span<const std::uint8_t> bytes;
+  std::span<std::uint16_t> indices;
+};
+
 /// Coding of a block of indices [u][v][s][t] without loss, in some 40 to 55 % of the bytes that
 /// deflate needs. A tile resembles its neighbours along u, s and t. So it is predicted from those
 /// that come before it, and its codeword is told by the turns of the way to it through the
@@ -20,6 +26,9 @@ namespace af {
 /// \test IndexCoding
 class IndexCoding {
  public:
+  /// So many blocks are best decoded together.
+  static constexpr int kBlocksTogether = kBlocksAtOnce;
+
   explicit IndexCoding(const Codebook& codebook) : tree_(codebook) {}
 
   /// Throws std::logic_error unless there are as many indices as `tiles` says and all are below the
@@ -27,11 +36,17 @@ class IndexCoding {
   [[nodiscard]] std::vector<std::uint8_t> encode(std::span<const std::uint16_t> indices,
                                                  const std::array<std::size_t, 4>& tiles) const;
 
-  /// False when the bytes cannot be an encoder's for so many tiles; `indices` are then of no use,
-  /// but below the number of codewords.
+  /// Some blocks of equal extents, a few of them in turns: a turn waits for the one before it, but
+  /// not for another block's. False when the bytes of any cannot be an encoder's for so many tiles;
+  /// `indices` are then of no use, but below the number of codewords.
+  [[nodiscard]] bool decode(std::span<const CodedBlock> blocks,
+                            const std::array<std::size_t, 4>& tiles) const;
   [[nodiscard]] bool decode(std::span<const std::uint8_t> bytes,
                             const std::array<std::size_t, 4>& tiles,
                             std::span<std::uint16_t> indices) const;
+
+  /// No encoder makes more of so many tiles.
+  static std::size_t most_bytes(std::size_t tiles);
 
  private:
   CodewordTree tree_;

@@ -155,6 +155,8 @@ void create_file_without_indices(const CompressedAttenuationField& field,
   hdf5::write_text_attribute(file, "payload_sha256", std::string(kSha256Digits, '0'));
   for (const Dataset& dataset : field_layout::datasets_of(field))
     hdf5::write_dataset(file, dataset, sha256_hex(dataset.bytes));
+  for (const Dataset& dataset : field_layout::range_datasets(field.identity.range))
+    hdf5::write_dataset(file, dataset, sha256_hex(dataset.bytes));
   const std::vector<DatasetRule> rules = index_rules(field.lattice());
   const std::vector<hdf5::ChunkShape> chunks = hdf5::index_chunks(rules);
   for (std::size_t k = 0; k < rules.size(); ++k)
@@ -433,8 +435,17 @@ void share(FieldFileInfo& info, const Communicator& communicator) {
 /// What rank 0 knows of a file before the indices are read.
 struct FileHeader {
   std::vector<Dataset> payload;
+  std::vector<Dataset> range;  ///< empty: two numbers of the payload state it
   std::vector<Dataset> provenance;
   std::vector<std::string> index_sha256;
+
+  /// Without indices. FileError.
+  [[nodiscard]] CompressedAttenuationField field(const std::string& path) const {
+    CompressedAttenuationField field = field_layout::field_of(payload, path);
+    if (!range.empty())
+      field.identity.range = field_layout::range_of(range, field.identity.range, path);
+    return field;
+  }
   std::string payload_sha256;
   std::uint64_t file_bytes = 0;
   IndexPacking packing = IndexPacking::CodebookTree;
@@ -507,7 +518,10 @@ FileHeader read_header(const std::filesystem::path& path) {
     header.payload.push_back(hdf5::read_dataset(file, rule, path.string()));
   for (const DatasetRule& rule : field_layout::provenance_rules())
     header.provenance.push_back(hdf5::read_dataset(file, rule, path.string()));
-  const CompressedAttenuationField field = field_layout::field_of(header.payload, path.string());
+  if (checked(H5Lexists(file, "/range", H5P_DEFAULT), "H5Lexists") > 0)
+    for (const DatasetRule& rule : field_layout::range_rules())
+      header.range.push_back(hdf5::read_dataset(file, rule, path.string()));
+  const CompressedAttenuationField field = header.field(path.string());
   const std::vector<DatasetRule> rules = index_rules(field.lattice());
   for (const DatasetRule& rule : rules) {
     check_plausible_size(rule, header.file_bytes, path);
@@ -530,15 +544,18 @@ FileHeader read_header(const std::filesystem::path& path) {
 /// Collective. Rank 0's header on every rank.
 void share(FileHeader& header, const Communicator& communicator) {
   std::vector<std::byte> payload = bytes_of(header.payload);
+  std::vector<std::byte> range = bytes_of(header.range);
   std::vector<std::byte> provenance = bytes_of(header.provenance);
   std::string lines = header.payload_sha256 + "\n" + std::to_string(header.file_bytes) + "\n" +
                       std::to_string(static_cast<int>(header.packing)) + "\n";
   for (const std::string& sha256 : header.index_sha256) lines += sha256 + "\n";
   communicator.broadcast(payload);
+  communicator.broadcast(range);
   communicator.broadcast(provenance);
   communicator.broadcast(lines);
   if (communicator.is_root()) return;
   header.payload = value_of<std::vector<Dataset>>(payload, "the header from rank 0");
+  header.range = value_of<std::vector<Dataset>>(range, "the header from rank 0");
   header.provenance = value_of<std::vector<Dataset>>(provenance, "the header from rank 0");
   std::istringstream stream(lines);
   std::getline(stream, header.payload_sha256);
@@ -686,6 +703,11 @@ void share_geometry(CompressedAttenuationField& field, const Communicator& commu
                              field);
 }
 
+CompressedAttenuationField read_field_header(const std::filesystem::path& path) {
+  const hdf5::QuietErrors quiet;
+  return naming_file(path, [&] { return read_header(path).field(path.string()); });
+}
+
 std::shared_ptr<const CompressedAttenuationField> read_field(const std::filesystem::path& path,
                                                              const Communicator& communicator,
                                                              FieldFileInfo* info) {
@@ -695,8 +717,7 @@ std::shared_ptr<const CompressedAttenuationField> read_field(const std::filesyst
     if (communicator.is_root()) header = naming_file(path, [&] { return read_header(path); });
   });
   share(header, communicator);
-  auto field = std::make_shared<CompressedAttenuationField>(
-      field_layout::field_of(header.payload, path.string()));
+  auto field = std::make_shared<CompressedAttenuationField>(header.field(path.string()));
   const auto rules = index_rules(field->lattice());
   std::optional<hdf5::IndexFilter> filter;
   all_or_none(communicator, [&] {

@@ -112,6 +112,10 @@ void check_writing_many_chunks(const FieldLattice& lattice,
 /// processors.
 void share_geometry(CompressedAttenuationField& field, const Communicator& communicator);
 
+/// One rank alone, and quick: a field without its indices (identity, geometry, codebook), verified
+/// as read_field() does. FileError.
+CompressedAttenuationField read_field_header(const std::filesystem::path& path);
+
 /// Collective. Rank 0 reads and verifies (extents against dataspaces before allocating, checksums,
 /// index range), the rest receive it; indices are held once per node. FileError (exit 4) on
 /// anything that does not fit: names path, dataset, expected, found.

@@ -146,7 +146,24 @@ StoredValues stored_values(LightSlab& planes) {
   return values;
 }
 
-StoredValues stored_values(FieldIdentity& identity) {
+/// An identity as files hold it. Two numbers are the motion range of files that older programs
+/// read, too; of a range that needs more (range_rules()) they are the largest part that two numbers
+/// can state.
+struct StoredIdentity {
+  FieldIdentity identity;
+  double max_rotation_rad = 0.0;
+  double max_translation_mm = 0.0;
+
+  StoredIdentity() = default;
+  explicit StoredIdentity(const FieldIdentity& whole) : identity(whole) {
+    const MotionRange part = whole.range.symmetric_part();
+    max_rotation_rad = part.max_rotation_rad();
+    max_translation_mm = part.max_translation_mm();
+  }
+};
+
+StoredValues stored_values(StoredIdentity& stored) {
+  FieldIdentity& identity = stored.identity;
   CameraGeometry& camera = identity.camera;
   StoredValues values("/identity/");
   values.text("camera_name", camera.name, kMaxNameBytes);
@@ -159,11 +176,21 @@ StoredValues stored_values(FieldIdentity& identity) {
   values.matrix("nominal_rotation", identity.frame.rotation, "1", "room from ct");
   values.matrix("center_ct_mm", identity.frame.center_ct_mm, "mm", "ct");
   values.matrix("center_room_mm", identity.frame.center_room_mm, "mm", "room");
-  values.numbers("max_rotation_rad", {&identity.range.max_rotation_rad}, "rad", "room");
-  values.numbers("max_translation_mm", {&identity.range.max_translation_mm}, "mm", "room");
+  values.numbers("max_rotation_rad", {&stored.max_rotation_rad}, "rad", "room");
+  values.numbers("max_translation_mm", {&stored.max_translation_mm}, "mm", "room");
   values.text("ct_content_sha256", identity.ct_content_sha256, kSha256Digits);
   values.numbers("mu_water_per_mm", {&identity.mu_water_per_mm}, "1/mm", "none");
   values.numbers("air_below_hu", {&identity.air_below_hu}, "HU", "none");
+  return values;
+}
+
+/// Bounds of a range that two numbers do not state.
+StoredValues stored_values(MotionRange& range) {
+  StoredValues values("/range/");
+  values.matrix("low_rad", range.low.rotation_rad, "rad", "room");
+  values.matrix("high_rad", range.high.rotation_rad, "rad", "room");
+  values.matrix("low_mm", range.low.translation_mm, "mm", "room");
+  values.matrix("high_mm", range.high.translation_mm, "mm", "room");
   return values;
 }
 
@@ -281,7 +308,7 @@ DatasetRule slab_count_rule() {
 std::vector<DatasetRule> payload_rules(int slab_count) {
   LightSlab light_slab;
   light_slab.slabs.resize(static_cast<std::size_t>(slab_count));
-  FieldIdentity identity;
+  StoredIdentity identity;
   std::vector<DatasetRule> rules = {slab_count_rule()};
   append_rules(stored_values(light_slab), rules);
   append_rules(stored_values(identity), rules);
@@ -328,12 +355,39 @@ std::vector<Dataset> geometry_datasets(const CompressedAttenuationField& field) 
 
 std::vector<Dataset> datasets_of(const CompressedAttenuationField& field) {
   std::vector<Dataset> datasets = geometry_datasets(field);
-  append_datasets(field.identity, datasets);
+  append_datasets(StoredIdentity(field.identity), datasets);
   datasets.push_back(dataset_of<float>(step_rule(), std::span(&field.quantizer_step, 1)));
   const Tile* first = field.codebook.codewords.data();
   datasets.push_back(dataset_of<std::uint16_t>(
       codewords_rule(), std::span(first->data(), field.codebook.size() * kTileElements)));
   return datasets;
+}
+
+std::vector<DatasetRule> range_rules() {
+  MotionRange range;
+  std::vector<DatasetRule> rules;
+  append_rules(stored_values(range), rules);
+  return rules;
+}
+
+std::vector<Dataset> range_datasets(const MotionRange& range) {
+  std::vector<Dataset> datasets;
+  if (!range.is_symmetric()) append_datasets(range, datasets);
+  return datasets;
+}
+
+MotionRange range_of(std::span<const Dataset> datasets,
+                     const MotionRange& stated,
+                     const std::string& path) {
+  MotionRange range;
+  set_values(stored_values(range), datasets, path);
+  const std::vector<std::string> found = problems(range);
+  if (!found.empty()) throw FileError(path, "/range: " + found.front());
+  const MotionRange part = range.symmetric_part();
+  if (part.max_rotation_rad() != stated.max_rotation_rad() ||
+      part.max_translation_mm() != stated.max_translation_mm())
+    throw FileError(path, "/range", "a range around " + stated.text(), range.text());
+  return range;
 }
 
 std::vector<Dataset> datasets_of(const FieldProvenance& provenance) {
@@ -358,7 +412,10 @@ std::span<const Dataset> set_geometry(std::span<const Dataset> datasets,
 CompressedAttenuationField field_of(std::span<const Dataset> datasets, const std::string& path) {
   CompressedAttenuationField field;
   datasets = set_geometry(datasets, path, field);
-  datasets = set_values(stored_values(field.identity), datasets, path);
+  StoredIdentity stored;
+  datasets = set_values(stored_values(stored), datasets, path);
+  field.identity = stored.identity;
+  field.identity.range = {stored.max_rotation_rad, stored.max_translation_mm};
   check(datasets.size() == 2, "a dataset per rule");
   field.quantizer_step = values_of<float>(datasets[0], path)[0];
   const auto levels = values_of<std::uint16_t>(datasets[1], path);

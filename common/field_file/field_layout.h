@@ -73,6 +73,17 @@ std::vector<Dataset> datasets_of(const FieldProvenance& provenance);
 /// Of its geometry alone, the number of slabs first.
 std::vector<Dataset> geometry_datasets(const CompressedAttenuationField& field);
 
+/// A motion range that two numbers do not state, as datasets beside the payload; none for others.
+/// Older programs do not see them: to these the file states symmetric_part() of the range, all of
+/// which it covers.
+std::vector<Dataset> range_datasets(const MotionRange& range);
+std::vector<DatasetRule> range_rules();
+/// The range of such datasets. FileError when it is no range or contradicts the two numbers that
+/// the payload states.
+MotionRange range_of(std::span<const Dataset> datasets,
+                     const MotionRange& stated,
+                     const std::string& path);
+
 /// Takes the geometry from the first datasets; returns the others. FileError on NaN and infinity.
 std::span<const Dataset> set_geometry(std::span<const Dataset> datasets,
                                       const std::string& path,

@@ -20,12 +20,6 @@ namespace {
 constexpr std::size_t kParameters = 5;
 constexpr unsigned kVersion = 1;
 
-/// No encoder makes more of a chunk: a turn costs 11 bits at most, and a tile has 17 or fewer.
-hsize_t most_chunk_bytes(const ChunkShape& chunk) {
-  constexpr hsize_t kOfItsEnd = 64;
-  return chunk[0] * chunk[1] * chunk[2] * chunk[3] * 24 + kOfItsEnd;
-}
-
 const IndexCoding* coding_in_use = nullptr;
 
 /// Replaces HDF5's buffer; 0, which is HDF5's sign of failure, when there is no memory.
@@ -82,7 +76,8 @@ struct StoredChunk {
 StoredChunk stored_chunk(hid_t dataset, const ChunkShape& chunk_shape, const ChunkShape& first) {
   hsize_t size = 0;
   checked(H5Dget_chunk_storage_size(dataset, first.data(), &size), "H5Dget_chunk_storage_size");
-  if (size > most_chunk_bytes(chunk_shape))
+  const ChunkShape& c = chunk_shape;
+  if (size > IndexCoding::most_bytes(c[0] * c[1] * c[2] * c[3]))
     throw std::runtime_error("a chunk of indices is too large");
   StoredChunk chunk{first, std::vector<std::uint8_t>(size)};
   if (size == 0) return chunk;
@@ -93,22 +88,18 @@ StoredChunk stored_chunk(hid_t dataset, const ChunkShape& chunk_shape, const Chu
   return chunk;
 }
 
-/// The part of a chunk within the dataset, of `count` planes from the chunk's first.
-void decode_into(const StoredChunk& stored,
-                 const DatasetRule& rule,
-                 const ChunkShape& chunk,
-                 std::uint64_t count,
-                 std::span<std::uint16_t> planes) {
-  const std::array<std::size_t, 4> tiles = {chunk[0], chunk[1], chunk[2], chunk[3]};
-  std::vector<std::uint16_t> indices(tiles[0] * tiles[1] * tiles[2] * tiles[3]);
-  if (!stored.bytes.empty() && !coding_in_use->decode(stored.bytes, tiles, indices))
-    throw std::runtime_error("a chunk of indices cannot be decoded");
-  const ChunkShape& first = stored.first;
+/// Copies what of a chunk lies within the dataset, of `count` planes from the chunk's first.
+void copy_into(std::span<const std::uint16_t> indices,
+               const ChunkShape& first,
+               const DatasetRule& rule,
+               const ChunkShape& chunk,
+               std::uint64_t count,
+               std::span<std::uint16_t> planes) {
   const auto run = static_cast<std::ptrdiff_t>(std::min(chunk[3], rule.extents[3] - first[3]));
   for (std::size_t u = 0; u < count; ++u)
     for (std::size_t v = 0; v < std::min(chunk[1], rule.extents[1] - first[1]); ++v)
       for (std::size_t s = 0; s < std::min(chunk[2], rule.extents[2] - first[2]); ++s) {
-        const std::size_t from = ((u * tiles[1] + v) * tiles[2] + s) * tiles[3];
+        const std::size_t from = ((u * chunk[1] + v) * chunk[2] + s) * chunk[3];
         const std::size_t to =
             ((u * rule.extents[1] + first[1] + v) * rule.extents[2] + first[2] + s) *
                 rule.extents[3] +
@@ -117,6 +108,26 @@ void decode_into(const StoredChunk& stored,
                     run,
                     planes.begin() + static_cast<std::ptrdiff_t>(to));
       }
+}
+
+/// Chunks that one thread decodes together.
+void decode_into(std::span<const StoredChunk> stored,
+                 const DatasetRule& rule,
+                 const ChunkShape& chunk,
+                 std::uint64_t count,
+                 std::span<std::uint16_t> planes) {
+  const std::array<std::size_t, 4> tiles = {chunk[0], chunk[1], chunk[2], chunk[3]};
+  const std::size_t size = tiles[0] * tiles[1] * tiles[2] * tiles[3];
+  std::vector<std::uint16_t> indices(stored.size() * size);
+  std::vector<CodedBlock> coded;
+  for (std::size_t i = 0; i < stored.size(); ++i)
+    if (!stored[i].bytes.empty())
+      coded.push_back({stored[i].bytes, std::span(indices).subspan(i * size, size)});
+  if (!coding_in_use->decode(coded, tiles))
+    throw std::runtime_error("a chunk of indices cannot be decoded");
+  for (std::size_t i = 0; i < stored.size(); ++i)
+    copy_into(
+        std::span(indices).subspan(i * size, size), stored[i].first, rule, chunk, count, planes);
 }
 
 void register_filter() {
@@ -164,9 +175,15 @@ void read_coded_planes(hid_t dataset,
     for (hsize_t s = 0; s < rule.extents[2]; s += chunk[2])
       for (hsize_t t = 0; t < rule.extents[3]; t += chunk[3])
         stored.push_back(stored_chunk(dataset, chunk, {u, v, s, t}));
-  pool.for_each(static_cast<int>(stored.size()), [&](int task, int /*slot*/) {
-    decode_into(stored[static_cast<std::size_t>(task)], rule, chunk, count, planes);
-  });
+  pool.for_each_block(
+      static_cast<int>(stored.size()), IndexCoding::kBlocksTogether, [&](int begin, int end) {
+        decode_into(std::span(stored).subspan(static_cast<std::size_t>(begin),
+                                              static_cast<std::size_t>(end - begin)),
+                    rule,
+                    chunk,
+                    count,
+                    planes);
+      });
 }
 
 void add_index_filter(hid_t creation, const ChunkShape& chunk) {

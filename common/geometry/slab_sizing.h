@@ -3,19 +3,41 @@
 
 #include <array>
 #include <span>
+#include <string>
+#include <vector>
 
 #include "geometry/light_slab.h"
 
 namespace af {
 
-/// The motion box of a field: |each angle| and |each translation| relative to its PoseFrame.
+/// The motion box of a field: bounds of each angle and of each translation relative to its
+/// PoseFrame. The box need not hold zero, the nominal pose.
 struct MotionRange {
-  double max_rotation_rad = 10.0 * kRadPerDeg;
-  double max_translation_mm = 100.0;
+  PoseParameters low;
+  PoseParameters high;
+
+  MotionRange() : MotionRange(10.0 * kRadPerDeg, 100.0) {}
+  /// The same to both sides of zero about and along every axis.
+  MotionRange(double max_rotation_rad, double max_translation_mm);
+  MotionRange(const PoseParameters& lowest, const PoseParameters& highest)
+      : low(lowest), high(highest) {}
 
   [[nodiscard]] bool contains(const PoseParameters& parameters) const;
+  /// Whether two numbers say all: max_rotation_rad() and max_translation_mm().
+  [[nodiscard]] bool is_symmetric() const;
+  /// Farthest from zero of any bound.
+  [[nodiscard]] double max_rotation_rad() const;
+  [[nodiscard]] double max_translation_mm() const;
+  /// The largest box of two numbers within this one; of the size 0 where this one misses zero.
+  [[nodiscard]] MotionRange symmetric_part() const;
+  [[nodiscard]] MotionRange scaled(double factor) const;
+  /// The parameters, each brought into the middle `share` of its bounds.
+  [[nodiscard]] PoseParameters clamped(const PoseParameters& parameters, double share = 1.0) const;
+  /// "+-10 deg, +-30 mm" or the bounds of each axis.
+  [[nodiscard]] std::string text() const;
 };
 
+/// Why a field cannot be sized for it; empty when it can.
 std::vector<std::string> problems(const MotionRange& range);
 
 /// Extent of ray hits on one plane y = const (mm).
@@ -24,17 +46,28 @@ struct PlaneExtent {
   double z_low_mm = 0.0, z_high_mm = 0.0;  ///< along v or t
 };
 
+/// Share of a plane's larger side (of 1 mm, where it is smaller) that extents_on_planes() adds to
+/// all four.
+inline constexpr double kExtentMargin = 1e-6;
+
 /// Where all rays of a camera can meet the planes y = `plane_y_mm` of the slab frame while the CT
 /// moves within `range` (generalises eq. (3), Sec. II-C: true detector corners, any nominal pose,
 /// rotations about room axes). For a fixed rotation the hit point is linear in the translation and
 /// projective in the detector point, so corners decide both; over rotations the maximum is searched
-/// on a grid and refined. Extents include a safety margin of 1e-6 of their size. Throws InputError
+/// on a grid and refined. Extents include a safety margin, kExtentMargin. Throws InputError
 /// when a ray can become parallel to the planes (range too large). \test
 /// SlabSizing.NoInRangeRayMissesAPlane
 std::vector<PlaneExtent> extents_on_planes(const CameraGeometry& camera,
                                            const PoseFrame& frame,
                                            const MotionRange& range,
                                            std::span<const double> plane_y_mm);
+
+/// The same in any slab frame: that of a field made for another camera or about another pose.
+std::vector<PlaneExtent> extents_on_planes(const CameraGeometry& camera,
+                                           const PoseFrame& frame,
+                                           const MotionRange& range,
+                                           std::span<const double> plane_y_mm,
+                                           const RigidTransform& slab_from_ct);
 
 /// Lowest slab-frame y that the X-ray source can take while the CT moves within `range`.
 double lowest_source_y_mm(const CameraGeometry& camera,
@@ -58,12 +91,14 @@ struct LightSlabSpec {
 
 /// The complete geometry of a field, every slab cropped to the shadow that `attenuating_corners_ct`
 /// (corners of convex bodies that hold all attenuation, ct frame) can throw from the (u,v)
-/// rectangle, plus one node, even-aligned. Throws InputError when the source can come to lie inside
-/// the CT's depth range or the range is too large.
+/// rectangle, plus one node, even-aligned. The planes hold the rays of `more_cameras` over the same
+/// range, too. Throws InputError when a source can come to lie inside the CT's depth range or the
+/// range is too large.
 LightSlab make_light_slab(const CameraGeometry& camera,
                           const PoseFrame& frame,
                           const MotionRange& range,
                           const std::array<Eigen::Vector3d, 8>& attenuating_corners_ct,
-                          const LightSlabSpec& spec);
+                          const LightSlabSpec& spec,
+                          std::span<const CameraGeometry> more_cameras = {});
 
 }  // namespace af

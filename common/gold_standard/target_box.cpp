@@ -6,14 +6,28 @@
 #include <cstddef>
 
 #include "base/error.h"
+#include "base/number_text.h"
+#include "base/plausible.h"
 
 namespace af {
 
-std::vector<Eigen::Vector3d> target_points(const CtBox& box, double max_spacing_mm) {
+std::string target_box_problem(const CtBox& box, double max_spacing_mm) {
   check(max_spacing_mm > 0.0, "the spacing of target points is positive");
+  constexpr double kMostPoints = 1e7;  // 240 MB; at 2 mm a box with sides of 430 mm
   const Eigen::Vector3d extent = box.high_mm - box.low_mm;
   if (!(extent.allFinite() && extent.minCoeff() > 0.0))
-    throw InputError("target_box_ct_mm: every low corner value must be below the high one");
+    return "must be [[low x, y, z], [high x, y, z]] with low < high on every axis";
+  const bool is_beyond_a_ct = !(extent.maxCoeff() <= 2.0 * kMaxCtOriginMm);
+  if (is_beyond_a_ct || !((extent / max_spacing_mm).array().ceil().prod() <= kMostPoints))
+    return "must be smaller: sides of at most 2e4 mm (20 m), at most 1e7 cells of " +
+           number_text(max_spacing_mm) + " mm in all";
+  return {};
+}
+
+std::vector<Eigen::Vector3d> target_points(const CtBox& box, double max_spacing_mm) {
+  if (const std::string problem = target_box_problem(box, max_spacing_mm); !problem.empty())
+    throw InputError("target_box_ct_mm: " + problem);
+  const Eigen::Vector3d extent = box.high_mm - box.low_mm;
   std::array<int, 3> cells{};
   for (int axis = 0; axis < 3; ++axis)
     cells[static_cast<std::size_t>(axis)] =

@@ -10,10 +10,14 @@ namespace af {
 
 inline constexpr double kTargetPointSpacingMm = 2.0;
 
+/// What a target box must be and this one is not, in words: low below high, no side longer than a
+/// CT can be, no more points than memory has room for. Empty: nothing.
+std::string target_box_problem(const CtBox& box, double max_spacing_mm = kTargetPointSpacingMm);
+
 /// The points that stand for a target box (ct frame, mm): the centres of equal cells whose sides
 /// are at most `max_spacing_mm`. Differs from the paper, which averages over the CT's voxels in the
-/// box: a mean over cells does not depend on the CT's resolution. Throws InputError for a box
-/// without volume. \test TargetBox.PointsAreTheCentresOfEqualCells
+/// box: a mean over cells does not depend on the CT's resolution. Throws InputError for a box that
+/// target_box_problem() complains of. \test TargetBox.PointsAreTheCentresOfEqualCells
 std::vector<Eigen::Vector3d> target_points(const CtBox& box,
                                            double max_spacing_mm = kTargetPointSpacingMm);
 

@@ -187,8 +187,10 @@ std::string Hdf5Input::text(const std::string& path) const {
     if (H5Tget_class(type) != H5T_STRING || count != 1) throw FileError(where, "is no text");
     if (h5_checked(H5Tis_variable_str(type), "H5Tis_variable_str") > 0)
       return variable_text(dataset, type);
-    std::string text(H5Tget_size(type), '\0');
-    if (text.size() > kMostTextBytes) throw FileError(where, "is too long");
+    // The file's word, up to 4 GB: asked before memory is.
+    const std::size_t bytes = H5Tget_size(type);
+    if (bytes > kMostTextBytes) throw FileError(where, "is too long");
+    std::string text(bytes, '\0');
     h5_checked(H5Dread(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, text.data()), "H5Dread");
     return text.substr(0, text.find('\0'));
   });

@@ -19,7 +19,8 @@ constexpr double kLeastPeakShare = 0.03;
 constexpr double kEdgeBandShare = 0.05;  ///< of the shorter side
 constexpr double kEdgeAirShare = 0.9;    ///< percentile of the band
 
-double half_step(const std::vector<float>& values) {
+/// What stands for a pixel that counted nothing: half a step of the values.
+double half_step(const std::vector<float>& values, double air_level) {
   float smallest_positive = 0.0f;
   bool integers = true;
   for (const float value : values) {
@@ -27,7 +28,11 @@ double half_step(const std::vector<float>& values) {
     if (value > 0.0f && (smallest_positive == 0.0f || value < smallest_positive))
       smallest_positive = value;
   }
-  return integers ? 0.5 : 0.5 * static_cast<double>(smallest_positive);
+  // Of corrected values the smallest positive one may be next to nothing; half a count of 16 bits
+  // is the least that a detector tells apart.
+  constexpr double kHalfCount = 1.0 / 131072.0;
+  return integers ? 0.5
+                  : std::max(0.5 * static_cast<double>(smallest_positive), kHalfCount * air_level);
 }
 
 std::vector<float> used_values(const Image2d& image, const Image2d& mask) {
@@ -127,7 +132,7 @@ Image2d flat_corrected(const Image2d& image, const Image2d& flat, const Image2d&
 }
 
 void take_negative_log(Image2d& image, double air_level) {
-  const double zero = half_step(image.pixels);
+  const double zero = half_step(image.pixels, air_level);
   for (float& pixel : image.pixels) {
     const double intensity = pixel > 0.0f ? static_cast<double>(pixel) : zero;
     pixel = static_cast<float>(-std::log(intensity / air_level));

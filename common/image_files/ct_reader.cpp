@@ -16,6 +16,7 @@
 #include "base/plausible.h"
 #include "files/input_guard.h"
 #include "files/sha256.h"
+#include "image_files/dicom_elements.h"
 #include "image_files/dicom_series.h"
 #include "image_files/hu_values.h"
 #include "image_files/image_header.h"
@@ -330,6 +331,13 @@ CtVolume read_ct(const fs::path& path,
   ct.hu = SharedArray<std::int16_t>(std::move(hu));
   if (warnings != nullptr) warnings->insert(warnings->end(), found.begin(), found.end());
   return ct;
+}
+
+std::string ct_frame_of_reference(const fs::path& path, const CtReadOptions& options) {
+  std::error_code error;
+  if (fs::is_directory(path, error)) return dicom_frame_of_reference(path, options.series_uid);
+  return is_marked_dicom(path) ? DicomElements::read(path).text(kDicomFrameOfReference)
+                               : std::string();
 }
 
 void require_sound_grid(const CtGrid& grid, const std::string& file) {

@@ -22,6 +22,12 @@ CtVolume read_ct(const std::filesystem::path& path,
                  const CtReadOptions& options = {},
                  std::vector<std::string>* warnings = nullptr);
 
+/// DICOM's Frame of Reference UID of the series that read_ct() reads, from headers alone; empty for
+/// other formats and where the series states none. A single DICOM file may be named, too.
+/// InputError when the folder holds several series and `options` choose none, FileError when a file
+/// is damaged.
+std::string ct_frame_of_reference(const std::filesystem::path& path, const CtReadOptions& options);
+
 /// InputError naming `file` for a grid that read_ct() would refuse: too few voxels, an implausible
 /// spacing or origin, axes that are not orthonormal.
 void require_sound_grid(const CtGrid& grid, const std::string& file);

@@ -15,6 +15,8 @@ namespace af {
 /// (group, element).
 using DicomTag = std::pair<std::uint16_t, std::uint16_t>;
 
+inline constexpr DicomTag kDicomFrameOfReference = {0x0020, 0x0052};
+
 /// A stretch of a file.
 struct DicomPart {
   std::uint64_t offset = 0;

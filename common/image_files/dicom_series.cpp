@@ -417,6 +417,13 @@ DicomCt read_dicom_series(const fs::path& folder,
   return ct;
 }
 
+std::string dicom_frame_of_reference(const fs::path& folder, const std::string& series_uid) {
+  for (const DicomElements& header :
+       chosen_series(folder, image_headers(folder, nullptr), series_uid))
+    if (std::string uid = header.text(kDicomFrameOfReference); !uid.empty()) return uid;
+  return {};
+}
+
 std::string describe_dicom_file(const fs::path& path) {
   const DicomElements header = DicomElements::read(path);
   const std::string frames = header.text({0x0028, 0x0008});

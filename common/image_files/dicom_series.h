@@ -28,6 +28,11 @@ DicomCt read_dicom_series(const std::filesystem::path& folder,
                           const CtReadOptions& options,
                           std::vector<std::string>* warnings);
 
+/// Frame of Reference UID of the series that read_dicom_series() reads, from headers alone; empty
+/// when it states none. Errors as that one's of the choice of a series.
+std::string dicom_frame_of_reference(const std::filesystem::path& folder,
+                                     const std::string& series_uid);
+
 /// What a single DICOM image says of itself, for messages.
 std::string describe_dicom_file(const std::filesystem::path& path);
 

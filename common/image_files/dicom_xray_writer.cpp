@@ -103,6 +103,22 @@ Eigen::Vector2d positioner_angles_deg(const Eigen::Vector3d& beam_direction_ct) 
                                              std::asin(std::clamp(beam.z(), -1.0, 1.0)));
 }
 
+std::string patient_letters(const Eigen::Vector3d& direction_ct) {
+  constexpr std::array<std::array<char, 2>, 3> kLetters = {{{'L', 'R'}, {'P', 'A'}, {'H', 'F'}}};
+  constexpr double kLeast = 0.1;
+  std::array<std::size_t, 3> axes = {0, 1, 2};
+  const auto size = [&](std::size_t axis) {
+    return std::abs(direction_ct[static_cast<Eigen::Index>(axis)]);
+  };
+  std::stable_sort(
+      axes.begin(), axes.end(), [&](std::size_t a, std::size_t b) { return size(a) > size(b); });
+  std::string letters;
+  for (const std::size_t axis : axes)
+    if (size(axis) >= kLeast)
+      letters += kLetters[axis][direction_ct[static_cast<Eigen::Index>(axis)] > 0.0 ? 0 : 1];
+  return letters;
+}
+
 void write_dicom_xray(const Image2d& levels,
                       const std::filesystem::path& path,
                       const DicomXrayDescription& description) {
@@ -141,6 +157,12 @@ void write_dicom_xray(const Image2d& levels,
   data.text(0x0020, 0x000d, "UI", study_uid);
   data.text(0x0020, 0x000e, "UI", series_uid);
   data.text(0x0020, 0x0013, "IS", "1");
+  if (!description.column_direction_ct.isZero(0.0))
+    data.text(0x0020,
+              0x0020,
+              "CS",
+              patient_letters(description.column_direction_ct) + "\\" +
+                  patient_letters(description.row_direction_ct));
   data.u16(0x0028, 0x0002, 1);
   data.text(0x0028, 0x0004, "CS", "MONOCHROME1");
   data.u16(0x0028, 0x0010, levels.height);

@@ -22,11 +22,18 @@ struct DicomXrayDescription {
   /// behind it.
   double primary_angle_deg = 0.0;
   double secondary_angle_deg = 0.0;  ///< positive towards the head (CRA)
+  /// Of increasing column and row, unit, DICOM's patient coordinates.
+  Eigen::Vector3d column_direction_ct = Eigen::Vector3d::Zero();  ///< 0: not stated
+  Eigen::Vector3d row_direction_ct = Eigen::Vector3d::Zero();
 };
 
 /// The positioner's angles of a beam (unit vector from source to detector, DICOM's patient
 /// coordinates): primary, secondary.
 Eigen::Vector2d positioner_angles_deg(const Eigen::Vector3d& beam_direction_ct);
+
+/// DICOM's letters of a direction (unit, patient coordinates), the largest part first: "L", "PL";
+/// parts below a tenth are left out.
+std::string patient_letters(const Eigen::Vector3d& direction_ct);
 
 /// Writes intensities (whole grey levels) as one frame of DICOM XA: MONOCHROME1, so low values are
 /// white: 2^bits - 1 - level is stored; LIN; explicit little endian. UIDs follow from the content.

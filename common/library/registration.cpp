@@ -19,6 +19,7 @@
 #include "register/verdict/verdict.h"
 #include "register/verdict/view_diagnosis.h"
 #include "study/case_gold_standard.h"
+#include "study/landmark_start.h"
 #include "study/study_file.h"
 
 namespace attenuation_fields {
@@ -110,6 +111,7 @@ struct RegistrationCase::Impl {
   std::string name;
   PoseFrame frame;
   std::vector<std::string> warnings;
+  af::Study study;
   std::optional<af::GoldStandard> gold;
   std::vector<Eigen::Vector3d> target_points;
   std::shared_ptr<const registration::RegistrationProblem> problem;
@@ -174,7 +176,8 @@ RegistrationCase RegistrationCase::load(const std::filesystem::path& study_path,
     const auto pool = std::make_shared<af::ThreadPool>(af::thread_count(options.threads));
     const registration::CaseLoadOptions loading = load_options(options, method, pool);
     auto impl = std::make_shared<Impl>();
-    const af::Study study = af::read_study(study_path, &impl->warnings);
+    impl->study = af::read_study(study_path, &impl->warnings);
+    const af::Study& study = impl->study;
     const af::StudyCase& study_case = study.find_case(case_name);
     impl->name = study_case.name;
     impl->frame = library::frame_of(study_case.frame());
@@ -223,6 +226,14 @@ std::optional<Pose> RegistrationCase::gold() const {
 
 std::optional<double> RegistrationCase::tre_mm(const Pose& pose) const {
   return library::translated([&] { return impl_->tre_mm(library::transform_of(pose, "pose")); });
+}
+
+std::optional<Pose> RegistrationCase::landmark_start() const {
+  return library::translated([&]() -> std::optional<Pose> {
+    const af::StudyCase& study_case = impl_->study.find_case(impl_->name);
+    if (!af::has_landmarks(study_case)) return std::nullopt;
+    return library::pose_of(af::landmark_pose(impl_->study, study_case).room_from_ct);
+  });
 }
 
 Registration RegistrationCase::run(const Pose& start, std::int64_t start_index) const {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "base/plausible.h"
 #include "base/thread_pool.h"
 #include "drr/field_renderer.h"
 #include "drr/ray_cast_drr.h"
@@ -152,7 +153,7 @@ struct Renderer::Impl {
   }
 
  private:
-  std::unique_ptr<af::RenderWorkspace> take_workspace() const {
+  [[nodiscard]] std::unique_ptr<af::RenderWorkspace> take_workspace() const {
     {
       const std::lock_guard lock(workspace_mutex_);
       if (!workspaces_.empty()) {
@@ -209,7 +210,10 @@ std::int64_t Renderer::drr_and_motion_gradient(const Pose& pose,
     require_size("total_attenuation", total_attenuation.size(), pixel_count());
     require_size("planes", planes.size(), kPlanes * pixel_count());
     const af::RigidTransform room_from_ct = library::transform_of(pose, "pose");
-    const af::PoseGradients gradients{library::vector_of(pivot_room_mm), planes};
+    const Eigen::Vector3d pivot = library::vector_of(pivot_room_mm);
+    if (!std::all_of(pivot.begin(), pivot.end(), af::is_plausible_room_mm))
+      throw af::InputError(std::string("pivot_room_mm: ") + af::kPlausibleRoom);
+    const af::PoseGradients gradients{pivot, planes};
     return impl_->in_turn(
         [&] { return impl_->render(room_from_ct, 0, total_attenuation, gradients); });
   });
@@ -279,8 +283,8 @@ Field Field::open(const std::filesystem::path& path, const FieldOptions& options
     const af::FieldIdentity& identity = field->identity;
     auto facts = std::make_shared<Facts>();
     facts->look_up = options.look_up.empty() ? info.look_up : options.look_up;
-    facts->max_rotation_deg = identity.range.max_rotation_rad * af::kDegPerRad;
-    facts->max_translation_mm = identity.range.max_translation_mm;
+    facts->max_rotation_deg = identity.range.max_rotation_rad() * af::kDegPerRad;
+    facts->max_translation_mm = identity.range.max_translation_mm();
     facts->ct_content_sha256 = identity.ct_content_sha256;
     facts->payload_sha256 = info.payload_sha256;
     facts->water_mu_per_mm = identity.mu_water_per_mm;

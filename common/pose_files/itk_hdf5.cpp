@@ -51,7 +51,7 @@ bool holds_itk_hdf5_transform(const PoseFileBytes& file) {
 
 PosesInFile read_itk_hdf5(const PoseFileBytes& file, const PoseContext& /*context*/) {
   const ItkTransform transform = transform_in(Hdf5Input::of_bytes(file.bytes, file.path.string()));
-  return {{{"1", map_of_itk_transform(transform, file.path.string()).inverse()}}, {}};
+  return {{{1, map_of_itk_transform(transform, file.path.string()).inverse()}}, {}};
 }
 
 std::string write_itk_hdf5(std::span<const RigidTransform> room_from_ct,

@@ -164,7 +164,7 @@ PosesInFile read_itk_text(const PoseFileBytes& file, const PoseContext& /*contex
   std::istringstream(fields.at("Transform")) >> transform.type;
   transform.parameters = numbers_of(fields.at("Parameters"), name + ": Parameters");
   transform.fixed_parameters = numbers_of(fields.at("FixedParameters"), name + ": FixedParameters");
-  return {{{"1", map_of_itk_transform(transform, name).inverse()}}, {}};
+  return {{{1, map_of_itk_transform(transform, name).inverse()}}, {}};
 }
 
 std::string write_itk_text(std::span<const RigidTransform> room_from_ct,

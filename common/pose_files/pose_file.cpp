@@ -58,6 +58,31 @@ constexpr std::array kPoseFormats = {
                write_plain_pose},
 };
 
+/// What fits into a message, no character of UTF-8 cut in two.
+std::string beginning_of(std::string_view word) {
+  constexpr std::size_t kMostBytes = 40;
+  std::size_t end = std::min(kMostBytes, word.size());
+  while (end > 0 && end < word.size() && (static_cast<unsigned char>(word[end]) & 0xC0) == 0x80)
+    --end;
+  return std::string(word.substr(0, end));
+}
+
+/// With at least one pose; its notes are passed on.
+PosesInFile filled_pose_file(const std::filesystem::path& path,
+                             const PoseContext& context,
+                             std::vector<std::string>* notes) {
+  PosesInFile found = read_pose_file(path, context);
+  if (found.poses.empty()) throw InputError(path.string() + ": holds no pose");
+  if (notes != nullptr) notes->insert(notes->end(), found.notes.begin(), found.notes.end());
+  return found;
+}
+
+std::vector<RigidTransform> poses_of(const PosesInFile& file) {
+  std::vector<RigidTransform> poses;
+  for (const PosesInFile::Numbered& pose : file.poses) poses.push_back(pose.room_from_ct);
+  return poses;
+}
+
 }  // namespace
 
 RigidTransform rigid_or_throw(const Eigen::Matrix4d& matrix, const std::string& where) {
@@ -78,7 +103,7 @@ std::vector<double> numbers_of(std::string_view text, const std::string& where) 
     double value = 0.0;
     const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
     if (error != std::errc() || end != word.data() + word.size() || !std::isfinite(value))
-      throw FileError(where, "pose", "finite numbers", "'" + std::string(word.substr(0, 40)) + "'");
+      throw FileError(where, "pose", "finite numbers", "'" + beginning_of(word) + "'");
     numbers.push_back(value);
   }
 }
@@ -133,16 +158,30 @@ PosesInFile read_pose_file(const std::filesystem::path& path, const PoseContext&
 }
 
 std::vector<RigidTransform> read_poses(const std::filesystem::path& path,
-                                       const PoseContext& context) {
-  std::vector<RigidTransform> poses;
-  for (const PosesInFile::Named& pose : read_pose_file(path, context).poses)
-    poses.push_back(pose.room_from_ct);
-  if (poses.empty()) throw InputError(path.string() + ": holds no pose");
-  return poses;
+                                       const PoseContext& context,
+                                       std::vector<std::string>* notes) {
+  return poses_of(filled_pose_file(path, context, notes));
 }
 
-RigidTransform read_pose(const std::filesystem::path& path, const PoseContext& context) {
-  const std::vector<RigidTransform> poses = read_poses(path, context);
+std::vector<RigidTransform> read_unbroken_poses(const std::filesystem::path& path,
+                                                const PoseContext& context,
+                                                std::vector<std::string>* notes) {
+  const PosesInFile found = filled_pose_file(path, context, notes);
+  for (std::size_t i = 0; i < found.poses.size(); ++i)
+    if (found.poses[i].number != static_cast<std::int64_t>(i) + 1)
+      throw InputError(
+          "frame " + std::to_string(i + 1),
+          "no pose",
+          "starts are numbered by their frames, so each needs one: leave the frame out "
+          "of the file, or complete it",
+          path.string());
+  return poses_of(found);
+}
+
+RigidTransform read_pose(const std::filesystem::path& path,
+                         const PoseContext& context,
+                         std::vector<std::string>* notes) {
+  const std::vector<RigidTransform> poses = read_poses(path, context, notes);
   if (poses.size() > 1)
     throw InputError(path.string() + ": holds " + std::to_string(poses.size()) +
                      " poses; one is expected");

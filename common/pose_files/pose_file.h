@@ -30,12 +30,21 @@ PoseFileBytes read_pose_bytes(const std::filesystem::path& path);
 /// the format needs, FileError when it is damaged.
 PosesInFile read_pose_file(const std::filesystem::path& path, const PoseContext& context = {});
 
-/// The poses of a file, at least one.
+/// The poses of a file, at least one. `notes`, if given, get what was left out and assumed.
 std::vector<RigidTransform> read_poses(const std::filesystem::path& path,
-                                       const PoseContext& context);
+                                       const PoseContext& context,
+                                       std::vector<std::string>* notes = nullptr);
+
+/// As read_poses(), where the place in the list is the number of the row or frame: InputError that
+/// names the first one which has no pose, though a later one has. Starts are numbered so.
+std::vector<RigidTransform> read_unbroken_poses(const std::filesystem::path& path,
+                                                const PoseContext& context,
+                                                std::vector<std::string>* notes = nullptr);
 
 /// The one pose of a file; InputError when it holds several.
-RigidTransform read_pose(const std::filesystem::path& path, const PoseContext& context = {});
+RigidTransform read_pose(const std::filesystem::path& path,
+                         const PoseContext& context = {},
+                         std::vector<std::string>* notes = nullptr);
 
 /// The bytes of a file of the named format. InputError when the format is read only, holds one pose
 /// only, or lacks something of `context`.

@@ -2,6 +2,7 @@
 // What the formats of pose files have in common. Every format is a row of pose_formats().
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <optional>
@@ -37,11 +38,11 @@ struct PoseFileBytes {
 
 /// What a pose file holds.
 struct PosesInFile {
-  struct Named {
-    std::string name;  ///< of its row or frame in the file, counted from 1
+  struct Numbered {
+    std::int64_t number = 1;  ///< of its row or frame in the file, counted from 1
     RigidTransform room_from_ct = RigidTransform::Identity();
   };
-  std::vector<Named> poses;
+  std::vector<Numbered> poses;
   std::vector<std::string> notes;  ///< what was left out, and what was assumed
 };
 

@@ -131,7 +131,7 @@ bool is_json_pose(const PoseFileBytes& file) {
 }
 
 PosesInFile read_json_pose(const PoseFileBytes& file, const PoseContext& /*context*/) {
-  return {{{"1", pose_of_json(file.bytes, file.path.string())}}, {}};
+  return {{{1, pose_of_json(file.bytes, file.path.string())}}, {}};
 }
 
 bool is_toml_pose(const PoseFileBytes& file) {
@@ -143,7 +143,7 @@ bool is_toml_pose(const PoseFileBytes& file) {
 }
 
 PosesInFile read_toml_pose(const PoseFileBytes& file, const PoseContext& /*context*/) {
-  return {{{"1", pose_of_toml(file.bytes, file.path.string())}}, {}};
+  return {{{1, pose_of_toml(file.bytes, file.path.string())}}, {}};
 }
 
 std::string write_toml_pose(std::span<const RigidTransform> room_from_ct,
@@ -156,7 +156,7 @@ bool is_plain_pose(const PoseFileBytes& file) {
 }
 
 PosesInFile read_plain_pose(const PoseFileBytes& file, const PoseContext& /*context*/) {
-  return {{{"1", pose_of_plain_numbers(file.bytes, file.path.string())}}, {}};
+  return {{{1, pose_of_plain_numbers(file.bytes, file.path.string())}}, {}};
 }
 
 std::string write_plain_pose(std::span<const RigidTransform> room_from_ct,
@@ -192,7 +192,7 @@ PosesInFile read_csv_of_poses(const PoseFileBytes& file, const PoseContext& cont
   PosesInFile found;
   found.poses.reserve(table.row_count());
   for (std::size_t row = 0; row < table.row_count(); ++row)
-    found.poses.push_back({std::to_string(row + 1),
+    found.poses.push_back({static_cast<std::int64_t>(row + 1),
                            has_matrix ? matrix_of_row(table, row, matrix_rows)
                                       : parameters_of_row(table, row, *context.frame)});
   return found;

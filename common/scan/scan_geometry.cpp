@@ -5,9 +5,11 @@
 #include <cmath>
 #include <numbers>
 #include <numeric>
+#include <tuple>
 
 #include <Eigen/Dense>
 
+#include "base/error.h"
 #include "base/plausible.h"
 #include "geometry/rigid_transform.h"
 
@@ -15,6 +17,7 @@ namespace af {
 
 namespace {
 
+constexpr int kFewestPixels = 16;  ///< on a side of the detector
 constexpr double kTurn = 2.0 * std::numbers::pi;
 
 Eigen::Matrix3d turned_about(const Eigen::Vector3d& axis, double angle_rad) {
@@ -52,14 +55,11 @@ std::string out_of_range(const std::string& name, double value, const std::strin
   return name + " = " + std::to_string(value) + ": " + constraint;
 }
 
-void note_angle_problems(const std::vector<double>& angles_rad, std::vector<std::string>& found) {
-  constexpr std::size_t kFewestViews = 16;
+/// "the views leave 40 degrees of the circle empty, ..." when they do not go all the way round.
+void note_gaps(const std::vector<double>& angles_rad,
+               const std::string& which,
+               std::vector<std::string>& found) {
   constexpr double kMostUneven = 3.0;
-  if (angles_rad.size() < kFewestViews) {
-    found.push_back("views = " + std::to_string(angles_rad.size()) + ": must be at least " +
-                    std::to_string(kFewestViews));
-    return;
-  }
   const std::vector<double> within_turn = within_one_turn(angles_rad);
   std::vector<double> gaps = gaps_around(within_turn, order_around(within_turn));
   std::sort(gaps.begin(), gaps.end());
@@ -67,10 +67,37 @@ void note_angle_problems(const std::vector<double>& angles_rad, std::vector<std:
   // Repeated angles leave wider gaps between the others.
   const double typical = std::max(gaps[gaps.size() / 2], even_gap);
   if (gaps.back() > kMostUneven * typical)
-    found.push_back("the views leave " + std::to_string(gaps.back() * kDegPerRad) +
+    found.push_back(which + " leave " + std::to_string(gaps.back() * kDegPerRad) +
                     " degrees of the circle empty, where neighbours are " +
-                    std::to_string(typical * kDegPerRad) +
-                    " degrees apart: the scan must go all the way round");
+                    std::to_string(typical * kDegPerRad) + " degrees apart: ");
+}
+
+void note_angle_problems(const std::vector<double>& angles_rad, std::vector<std::string>& found) {
+  constexpr std::size_t kFewestViews = 16;
+  if (angles_rad.size() < kFewestViews) {
+    found.push_back("views = " + std::to_string(angles_rad.size()) + ": must be at least " +
+                    std::to_string(kFewestViews));
+    return;
+  }
+  std::vector<std::string> gaps;
+  note_gaps(angles_rad, "the views", gaps);
+  if (!gaps.empty()) {
+    found.push_back(gaps.front() + "the scan must go all the way round");
+    return;
+  }
+  // The even views are reconstructed, and so is each half of them.
+  for (const auto& [first, stride, which] :
+       {std::tuple{0, 2, "the even views"},
+        std::tuple{0, 4, "every fourth view from the first"},
+        std::tuple{2, 4, "every fourth view from the third"}}) {
+    std::vector<double> part;
+    for (const int view : CircularScan::every(first, stride, static_cast<int>(angles_rad.size())))
+      part.push_back(angles_rad[static_cast<std::size_t>(view)]);
+    note_gaps(part, which, gaps);
+    if (gaps.empty()) continue;
+    found.push_back(gaps.front() + "list the views in the order of their angles");
+    return;
+  }
 }
 
 }  // namespace
@@ -85,6 +112,11 @@ CircularScan CircularScan::binned(int factor) const {
   CircularScan result = *this;
   result.pixel_spacing_mm *= factor;
   result.size_px /= factor;
+  if (result.size_px.minCoeff() < kFewestPixels)
+    throw InputError("size_px",
+                     std::to_string(size_px.x()) + " x " + std::to_string(size_px.y()),
+                     "must keep at least " + std::to_string(kFewestPixels) +
+                         " pixels on both sides when binned by " + std::to_string(factor));
   // Pixel centres are integers: the outer edge, at -1/2, stays.
   if (result.beam_foot_px)
     result.beam_foot_px = (result.beam_foot_px->array() + 0.5) / factor - 0.5;
@@ -126,7 +158,6 @@ std::vector<std::string> problems(const CircularScan& scan) {
   for (const double spacing : scan.pixel_spacing_mm)
     if (!is_plausible_spacing_mm(spacing))
       found.push_back(out_of_range("pixel_spacing_mm", spacing, kPlausibleSpacing));
-  constexpr int kFewestPixels = 16;
   constexpr int kMostPixels = 16384;
   for (const int size : scan.size_px)
     if (size < kFewestPixels || size > kMostPixels)

@@ -29,7 +29,7 @@ struct CircularScan {
   std::vector<double> angles_rad;  ///< of the views
 
   /// The scan as seen by pixels `factor` times as wide and high; columns and rows that fill no
-  /// coarse pixel are left out.
+  /// coarse pixel are left out. InputError when fewer than 16 pixels remain on a side.
   [[nodiscard]] CircularScan binned(int factor) const;
   /// The views `first`, `first` + `stride`, ... below `end`.
   [[nodiscard]] static std::vector<int> every(int first, int stride, int end);
@@ -47,7 +47,8 @@ struct AxisView {
 AxisView view_at_axis(const CircularScan& scan);
 
 /// "source_to_axis_mm = -3: must be above 0" and so on, among them that the views go all the way
-/// round: the largest gap between neighbouring angles is at most three times the median one.
+/// round (the largest gap between neighbouring angles is at most three times the median one), and
+/// so do the even ones and each half of them.
 std::vector<std::string> problems(const CircularScan& scan);
 
 /// How much of the circle each of these angles stands for, rad: half the gaps to its neighbours.

@@ -15,7 +15,7 @@ namespace {
 struct KnownPhantom {
   const char* name;
   const char* help;
-  Phantom (*make)(bool has_metal);
+  Phantom (*make)(bool has_metal, const Anatomy& anatomy);
 };
 
 /// Every phantom there is; a new one joins here.
@@ -35,8 +35,12 @@ std::string phantom_help() {
   return help_of(kPhantoms);
 }
 
-Phantom make_phantom(const std::string& name, bool has_metal) {
-  return required_row(kPhantoms, "phantom", name).make(has_metal);
+Phantom make_phantom(const std::string& name,
+                     bool has_metal,
+                     std::optional<std::int64_t> anatomy_seed) {
+  return required_row(kPhantoms, "phantom", name)
+      .make(has_metal,
+            anatomy_seed ? Anatomy(name, static_cast<std::uint64_t>(*anatomy_seed)) : Anatomy());
 }
 
 }  // namespace af

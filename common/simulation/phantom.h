@@ -9,7 +9,10 @@ namespace af {
 std::vector<std::string> phantom_names();
 std::string phantom_help();
 
-/// A phantom by its name; InputError for any other.
-Phantom make_phantom(const std::string& name, bool has_metal);
+/// A phantom by its name; InputError for any other. With a seed, the patient of that number instead
+/// of the typical adult.
+Phantom make_phantom(const std::string& name,
+                     bool has_metal,
+                     std::optional<std::int64_t> anatomy_seed = {});
 
 }  // namespace af

@@ -2,10 +2,13 @@
 // What phantoms are built from, beyond single bodies.
 #pragma once
 
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "base/described_fields.h"
+#include "simulation/anatomy.h"
 #include "simulation/automatic_target.h"
 #include "simulation/solid.h"
 
@@ -17,6 +20,7 @@ struct PhantomOptions {
   int samples_per_axis = 2;  ///< points per voxel and axis
   int threads = 0;           ///< 0: as many as the hardware has; voxels do not depend on it
   bool has_metal = false;    ///< implants: screws and rods, a hip prosthesis, fillings
+  std::optional<std::int64_t> anatomy_seed = {};  ///< which patient; none: the typical adult
 
   void describe(Fields& field);
 };
@@ -28,7 +32,14 @@ struct Phantom {
   std::vector<Solid> solids;      ///< in painting order
   Eigen::Vector3d half_sizes_mm;  ///< of the volume around the origin
   RegistrationTarget target;
+  std::vector<std::string> findings;  ///< what differs from the typical adult, in words
+
+  [[nodiscard]] bool has_metal() const;  ///< denser than a scanner's range
 };
+
+/// The patient that a phantom of the typical adult becomes: bodies, volume and target by `habitus`,
+/// densities and textures by `anatomy`. 	est ShapedPhantom.KeepsCapsulesJoined
+Phantom shaped(Phantom phantom, const Anatomy& anatomy, const Habitus& habitus);
 
 /// Voxels of a phantom; metal at its full HU.
 CtVolume sample_phantom(const Phantom& phantom, const PhantomOptions& options);
@@ -77,6 +88,9 @@ class BonePainter {
   std::vector<Solid> cores_;
 };
 
+/// Bubbles of bowel gas within a box; none in the typical adult, who has its own.
+void add_gas(const Anatomy& anatomy, const CtBox& box, std::vector<Solid>& solids);
+
 /// A vertebra: body with waist, pedicles, laminae, articular, transverse and spinous processes.
 struct Vertebra {
   int level;  ///< 0 is T12, positive towards the head
@@ -84,10 +98,19 @@ struct Vertebra {
   double half_width_mm;  ///< of the body
   double half_depth_mm;
   double half_height_mm;
+  double shell_mm = 1.6;
+  double processes = 1.0;   ///< length of transverse and spinous processes, times the typical
+  double facets = 1.0;      ///< radius of articular processes, times the typical
+  double tilt_mm = 0.0;     ///< sideways, of the spinous process's tip
+  double arthrosis = 0.0;   ///< 0 to 1: beaks at the rims, dense end plates
+  std::uint64_t beaks = 0;  ///< key of their places
 
   [[nodiscard]] bool has_ribs() const { return level >= 0; }
 };
 
 void add_vertebra(const Vertebra& v, std::vector<Solid>& solids);
+
+/// The vertebra as `anatomy` has it: width, depth, height, processes, wear. `index` keys its draws.
+Vertebra varied(Vertebra v, const Anatomy& anatomy, int index);
 
 }  // namespace af

@@ -104,6 +104,10 @@ Eigen::Vector3d SmoothMotion::displacement_mm(const Eigen::Vector3d& ct_point_mm
   return options_.amplitude_mm * share * displacement;
 }
 
+double SmoothMotion::largest_mm() const {
+  return std::sqrt(3.0) * options_.amplitude_mm;
+}
+
 CtVolume SmoothMotion::moved(const CtVolume& ct) const {
   const CtGrid& grid = ct.grid;
   std::vector<std::int16_t> voxels(grid.voxel_count());

@@ -40,6 +40,9 @@ class SmoothMotion {
   /// Displacement (ct, mm) at a point. \test SmoothMotion.VanishesInTheTargetBoxAndItsMargin
   [[nodiscard]] Eigen::Vector3d displacement_mm(const Eigen::Vector3d& ct_point_mm) const;
 
+  /// No displacement is longer.
+  [[nodiscard]] double largest_mm() const;
+
   /// The anatomy that shows at x what `ct` has at x + displacement(x), trilinear, edges
   /// replicated. Voxels without displacement keep their value.
   [[nodiscard]] CtVolume moved(const CtVolume& ct) const;

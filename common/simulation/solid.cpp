@@ -14,7 +14,6 @@ namespace af {
 
 namespace {
 
-constexpr double kTextureScaleMm = 3.0;
 constexpr int kAirHu = -1000;
 
 /// The sample points whose mean is one slice of voxels.
@@ -61,11 +60,7 @@ struct SliceSamples {
           const Eigen::Vector3d point =
               first_point + step_mm.cwiseProduct(Eigen::Vector3d(i, j, k));
           if (!solid.contains(point)) continue;
-          int value = solid.hu;
-          if (solid.texture_hu != 0)
-            value +=
-                static_cast<int>(std::lround(solid.texture_hu * texture(point, kTextureScaleMm)));
-          hu[offset(i, j, k)] = value;
+          hu[offset(i, j, k)] = solid.hu_at(point);
         }
   }
 
@@ -113,6 +108,12 @@ bool Solid::contains(const Eigen::Vector3d& ct_point_mm) const {
   return local.cwiseQuotient(half_sizes_mm).squaredNorm() <= 1.0;
 }
 
+int Solid::hu_at(const Eigen::Vector3d& ct_point_mm) const {
+  if (texture_hu == 0) return hu;
+  return hu + static_cast<int>(std::lround(
+                  texture_hu * texture(ct_point_mm + texture_shift_mm, texture_scale_mm)));
+}
+
 CtBox Solid::bounds() const {
   Eigen::Vector3d half = half_sizes_mm;
   if (shape == Shape::Capsule) half = Eigen::Vector3d(half.x(), half.x(), half.z() + half.x());
@@ -133,20 +134,32 @@ Solid capsule_between(const Eigen::Vector3d& a,
   return solid;
 }
 
-double texture(const Eigen::Vector3d& ct_point_mm, double scale_mm) {
+double TextureReader::at(const Eigen::Vector3d& ct_point_mm, double scale_mm) {
   const Eigen::Vector3d position = ct_point_mm / scale_mm;
   const Eigen::Vector3d low = position.array().floor();
   const Eigen::Vector3d part = position - low;
-  const auto i = static_cast<std::int64_t>(low.x());
-  const auto j = static_cast<std::int64_t>(low.y());
-  const auto k = static_cast<std::int64_t>(low.z());
-  const auto along_i = [&](std::int64_t at_j, std::int64_t at_k) {
-    return std::lerp(lattice_value(i, at_j, at_k), lattice_value(i + 1, at_j, at_k), part.x());
+  const std::array<std::int64_t, 3> cell{static_cast<std::int64_t>(low.x()),
+                                         static_cast<std::int64_t>(low.y()),
+                                         static_cast<std::int64_t>(low.z())};
+  if (is_empty_ || cell != cell_) {
+    for (std::size_t corner = 0; corner < corners_.size(); ++corner)
+      corners_[corner] = lattice_value(cell[0] + static_cast<std::int64_t>(corner & 1U),
+                                       cell[1] + static_cast<std::int64_t>(corner >> 1U & 1U),
+                                       cell[2] + static_cast<std::int64_t>(corner >> 2U));
+    cell_ = cell;
+    is_empty_ = false;
+  }
+  const auto along_i = [&](std::size_t corner) {
+    return std::lerp(corners_[corner], corners_[corner + 1], part.x());
   };
-  const auto along_j = [&](std::int64_t at_k) {
-    return std::lerp(along_i(j, at_k), along_i(j + 1, at_k), part.y());
+  const auto along_j = [&](std::size_t corner) {
+    return std::lerp(along_i(corner), along_i(corner + 2), part.y());
   };
-  return std::lerp(along_j(k), along_j(k + 1), part.z());
+  return std::lerp(along_j(0), along_j(4), part.z());
+}
+
+double texture(const Eigen::Vector3d& ct_point_mm, double scale_mm) {
+  return TextureReader().at(ct_point_mm, scale_mm);
 }
 
 CtVolume sample_solids(const CtGrid& grid,

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <vector>
 
 #include "geometry/slab_sizing.h"
@@ -25,8 +27,12 @@ struct Solid {
   double waist = 0.0;  ///< share of the radius lost at half height, in [0, 1)
   int hu = 0;
   int texture_hu = 0;  ///< amplitude of the texture added to hu
+  double texture_scale_mm = 3.0;
+  Eigen::Vector3d texture_shift_mm = Eigen::Vector3d::Zero();  ///< other values at one point
 
   [[nodiscard]] bool contains(const Eigen::Vector3d& ct_point_mm) const;
+  /// HU at a point of the body, with its texture.
+  [[nodiscard]] int hu_at(const Eigen::Vector3d& ct_point_mm) const;
   /// A box along the ct axes that holds the body.
   [[nodiscard]] CtBox bounds() const;
 };
@@ -37,6 +43,18 @@ Solid capsule_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double
 /// Smooth deterministic noise in [-1, 1], correlated over `scale_mm`: trilinear blends of hashed
 /// lattice values.
 double texture(const Eigen::Vector3d& ct_point_mm, double scale_mm);
+
+/// The same for points one after the other: the cell of the lattice that the last one was in is
+/// kept.
+class TextureReader {
+ public:
+  double at(const Eigen::Vector3d& ct_point_mm, double scale_mm);
+
+ private:
+  std::array<std::int64_t, 3> cell_{};
+  std::array<double, 8> corners_{};
+  bool is_empty_ = true;
+};
 
 /// Bodies sampled on a grid with identity direction: every voxel is the mean HU of
 /// samples_per_axis^3 points, air (-1000 HU) elsewhere. The result does not depend on `threads`

@@ -13,10 +13,11 @@ namespace af {
 /// processes), discs, five pairs of ribs that start at the vertebrae, fat, muscle, lung bases,
 /// heart, liver, stomach with gas, spleen, kidneys and aorta. Left and right differ: liver right,
 /// gas, spleen and aorta left, and the spine bends. Sizes are typical of adults, not of one person;
-/// nothing is taken from patient data. Metal: pedicle screws from T11 to L1 and two rods.
-Phantom spine_phantom(bool has_metal);
+/// nothing is taken from patient data. Metal: pedicle screws from T11 to L1 and two rods. `anatomy`
+/// makes another patient of it.
+Phantom spine_phantom(bool has_metal, const Anatomy& anatomy = {});
 
-/// The bodies of the phantom in painting order.
+/// The bodies of the typical adult's phantom in painting order.
 std::vector<Solid> spine_phantom_solids(bool has_metal);
 
 /// The body of T12, the middle vertebra, with its pedicles.

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "simulation/parallel_rows.h"
+#include "simulation/solid_projector.h"
 
 namespace af {
 
@@ -36,14 +37,25 @@ XraySimulator::XraySimulator(const AttenuationVolume& volume,
                              SteelBodies steel,
                              const XraySimulationOptions& options)
     : tissue_(volume.model()),
-      projector_(volume, tissue_),
+      projector_(std::make_unique<SiddonProjector>(volume, tissue_)),
+      beam_(options.spectrum, tissue_),
+      steel_(std::move(steel)),
+      options_(options) {}
+
+XraySimulator::XraySimulator(const Phantom& phantom,
+                             std::optional<SmoothMotion> motion,
+                             const AttenuationModel& model,
+                             SteelBodies steel,
+                             const XraySimulationOptions& options)
+    : tissue_(model),
+      projector_(std::make_unique<SolidProjector>(phantom, tissue_, std::move(motion))),
       beam_(options.spectrum, tissue_),
       steel_(std::move(steel)),
       options_(options) {}
 
 double XraySimulator::transmission(const Eigen::Vector3d& source_ct_mm,
                                    const Eigen::Vector3d& detector_ct_mm) const {
-  const PathIntegrals path = projector_.integrate(source_ct_mm, detector_ct_mm);
+  const PathIntegrals path = projector_->integrate(source_ct_mm, detector_ct_mm);
   return beam_.transmission(
       {path.water_mm, path.bone_mm, steel_.chord_length_mm(source_ct_mm, detector_ct_mm)});
 }

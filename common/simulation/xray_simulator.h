@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -10,7 +12,9 @@
 #include "drr/drr_renderer.h"
 #include "simulation/detector_model.h"
 #include "simulation/occluders.h"
+#include "simulation/phantom_parts.h"
 #include "simulation/siddon_projector.h"
+#include "simulation/smooth_motion.h"
 #include "simulation/xray_spectrum.h"
 
 namespace af {
@@ -31,12 +35,20 @@ struct XraySimulationOptions {
 
 std::vector<std::string> problems(const XraySimulationOptions& options);
 
-/// Makes X-rays of a CT with steel bodies. Steel adds to the tissue along a ray; the tissue that it
-/// would displace (at most 0.04 of the steel's own attenuation) is not taken away.
+/// Makes X-rays of a CT, or of a phantom, with steel bodies. Steel adds to the tissue along a ray;
+/// the tissue that it would displace (at most 0.04 of the steel's own attenuation) is not taken
+/// away.
 class XraySimulator {
  public:
   /// `volume` must outlive the simulator.
   XraySimulator(const AttenuationVolume& volume,
+                SteelBodies steel,
+                const XraySimulationOptions& options);
+
+  /// X-rays of a phantom's bodies themselves, at rest or moved: no voxels. Tissue follows `model`.
+  XraySimulator(const Phantom& phantom,
+                std::optional<SmoothMotion> motion,
+                const AttenuationModel& model,
                 SteelBodies steel,
                 const XraySimulationOptions& options);
 
@@ -61,7 +73,7 @@ class XraySimulator {
                                     const Eigen::Vector3d& detector_ct_mm) const;
 
   TissueModel tissue_;
-  SiddonProjector projector_;
+  std::unique_ptr<const RayIntegrator> projector_;
   BeamTransmission beam_;
   SteelBodies steel_;
   XraySimulationOptions options_;

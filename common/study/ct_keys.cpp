@@ -79,34 +79,64 @@ CtReadOptions read_ct_keys(TomlTableReader& reader) {
   return reading;
 }
 
-std::string ct_keys_text(const CtReadOptions& reading) {
-  const OptionTexts defaults = option_texts(to_toml(CtReadOptions()));
-  std::string text;
+namespace {
+
+/// The options that differ from what is usual.
+OptionTexts stated_texts(const CtReadOptions& reading) {
+  const OptionTexts usual = option_texts(to_toml(CtReadOptions()));
+  OptionTexts stated;
   for (const auto& [name, value] : option_texts(to_toml(reading))) {
-    const auto usual = defaults.find(name);
-    if (usual == defaults.end() || usual->second != value)
-      text += std::string(kPrefix).append(name).append(" = ").append(value).append("\n");
+    const auto found = usual.find(name);
+    if (found == usual.end() || found->second != value) stated[name] = value;
   }
+  return stated;
+}
+
+bool says_what_voxels_hold(const std::string& name) {
+  return name.starts_with("values") || name.starts_with("raw_") || name == "label_hu";
+}
+
+/// The options under their names as keys of a study, so that one reader reads both.
+std::string keys_of(const OptionTexts& texts) {
+  std::string text;
+  CtReadOptions names;
+  for (const Field& field : fields_of(names))
+    if (const auto found = texts.find(field.name); found != texts.end())
+      text += std::string(kPrefix).append(field.name + " = " + found->second + "\n");
+  return text;
+}
+
+}  // namespace
+
+std::string ct_keys_text(const CtReadOptions& reading) {
+  std::string text;
+  for (const auto& [name, value] : stated_texts(reading))
+    text += std::string(kPrefix).append(name).append(" = ").append(value).append("\n");
   return text;
 }
 
 CtReadOptions ct_reading_in_force(const CtReadOptions& typed, const CtReadOptions& of_study) {
-  CtReadOptions reading = typed.text().empty() ? of_study : typed;
+  OptionTexts stated = stated_texts(of_study);
+  const OptionTexts of_command = stated_texts(typed);
+  // What voxels hold is one statement: "labels" of a study does not go with a typed "mu".
+  if (of_command.contains("values"))
+    std::erase_if(stated, [](const auto& option) { return says_what_voxels_hold(option.first); });
+  for (const auto& [name, value] : of_command) stated[name] = value;
+  const std::string place = "how the CT is read, as typed and by the study";
+  const toml::table table = parse_toml("# CT\n" + keys_of(stated), place);
+  TomlProblems problems(place);
+  TomlTableReader reader(table, "", problems);
+  CtReadOptions reading = read_ct_keys(reader);
+  problems.throw_if_any();
   reading.series_uid = typed.series_uid.empty() ? of_study.series_uid : typed.series_uid;
   return reading;
 }
 
 CtReadOptions ct_reading_of(const std::string& options_toml) {
-  // The lines under their names as keys of a study, so that one reader reads both.
-  const OptionTexts recorded = option_texts(options_toml);
-  std::string text = "# CT\n";
-  CtReadOptions names;
-  for (const Field& field : fields_of(names))
-    if (const auto found = recorded.find(field.name); found != recorded.end())
-      text += std::string(kPrefix).append(field.name + " = " + found->second + "\n");
   try {
-    const toml::table table = parse_toml(text, "options of the field");
-    TomlProblems problems("options of the field");
+    const std::string place = "options of the field";
+    const toml::table table = parse_toml("# CT\n" + keys_of(option_texts(options_toml)), place);
+    TomlProblems problems(place);
     TomlTableReader reader(table, "", problems);
     return read_ct_keys(reader);
   } catch (const Error&) {

@@ -17,7 +17,8 @@ CtReadOptions read_ct_keys(TomlTableReader& reader);
 std::string ct_keys_text(const CtReadOptions& reading);
 
 /// How a case's CT is read when the command line says `typed`: what is typed replaces what the
-/// study says, the series by itself and all else together.
+/// study says, option by option; --values other than hu replaces all that says what voxels hold.
+/// InputError when the two do not go together.
 CtReadOptions ct_reading_in_force(const CtReadOptions& typed, const CtReadOptions& of_study);
 
 /// How a CT was read, by the options that a field records. Texts of older programs give the

@@ -13,6 +13,7 @@
 #include "base/toml_text.h"
 #include "files/output_file.h"
 #include "gold_standard/fiducial_registration.h"
+#include "gold_standard/target_box.h"
 #include "study/ct_keys.h"
 #include "study/rig_file.h"
 #include "text/toml_reader.h"
@@ -85,9 +86,8 @@ CtBox get_target_box(TomlTableReader& reader) {
   const auto corners = reader.get_matrix("target_box_ct_mm", 2, 3, Presence::Required);
   if (!corners) return box;
   box = {corners->row(0).transpose(), corners->row(1).transpose()};
-  if (!(box.low_mm.array() < box.high_mm.array()).all())
-    reader.add_problem("target_box_ct_mm",
-                       "must be [[low x, y, z], [high x, y, z]] with low < high on every axis");
+  if (const std::string problem = target_box_problem(box); !problem.empty())
+    reader.add_problem("target_box_ct_mm", problem);
   return box;
 }
 

@@ -199,27 +199,41 @@ void check_values(const Image2d& image, const StudyView& view) {
         "pixels", "all " + std::to_string(*low), "a constant image shows nothing", file);
 }
 
-/// The flat or dark image of a view, turned as its X-ray.
+/// The flat or dark image of a view, turned as its X-ray: by the same full scale, which a flat
+/// field of inverted values, all small, does not show.
 Image2d load_companion(const std::filesystem::path& path,
                        const StudyView& view,
-                       const CameraGeometry& camera) {
+                       const CameraGeometry& camera,
+                       std::optional<double> sum_of_xray) {
   LoadedImage loaded = load(path, std::nullopt);
   check_size(loaded.image, path.string(), camera);
-  if (is_turned(loaded, view)) turn_round(loaded.image, inversion_sum(loaded));
+  if (!is_turned(loaded, view)) return std::move(loaded.image);
+  const double sum =
+      loaded.dicom ? loaded.dicom->inversion_sum : sum_of_xray.value_or(inversion_sum(loaded));
+  const float most = *std::max_element(loaded.image.pixels.begin(), loaded.image.pixels.end());
+  if (static_cast<double>(most) > sum)
+    throw InputError("largest value",
+                     number_text(static_cast<double>(most)),
+                     "must not exceed " + number_text(sum) +
+                         ", the full scale by which the X-ray's values were turned round",
+                     path.string());
+  turn_round(loaded.image, sum);
   return std::move(loaded.image);
 }
 
 /// Dark and flat fields of a view, where it has them; `mask` loses pixels without a beam.
 void correct_by_flat(const StudyView& view,
                      const CameraGeometry& camera,
+                     std::optional<double> sum_of_xray,
                      Image2d& image,
                      Image2d& mask,
                      Note& note) {
   const XrayReading& reading = view.reading;
   Image2d dark;
   if (reading.dark) {
-    dark =
-        used_from(view.places, "dark", [&] { return load_companion(*reading.dark, view, camera); });
+    dark = used_from(view.places, "dark", [&] {
+      return load_companion(*reading.dark, view, camera, sum_of_xray);
+    });
     note.add("dark image subtracted");
   } else if (reading.dark_level != 0.0) {
     dark = Image2d(image.width, image.height);
@@ -230,15 +244,16 @@ void correct_by_flat(const StudyView& view,
     for (std::size_t i = 0; i < dark.pixels.size(); ++i) image.pixels[i] -= dark.pixels[i];
     return;
   }
-  const Image2d flat =
-      used_from(view.places, "flat", [&] { return load_companion(*reading.flat, view, camera); });
-  if (mask.pixels.empty()) {
-    mask = Image2d(image.width, image.height);
-    std::fill(mask.pixels.begin(), mask.pixels.end(), 1.0f);
-  }
+  const Image2d flat = used_from(view.places, "flat", [&] {
+    return load_companion(*reading.flat, view, camera, sum_of_xray);
+  });
   std::size_t dead = 0;
   for (std::size_t i = 0; i < flat.pixels.size(); ++i)
     if (!(flat.pixels[i] > (dark.pixels.empty() ? 0.0f : dark.pixels[i]))) {
+      if (mask.pixels.empty()) {
+        mask = Image2d(image.width, image.height);
+        std::fill(mask.pixels.begin(), mask.pixels.end(), 1.0f);
+      }
       mask.pixels[i] = 0.0f;
       ++dead;
     }
@@ -249,7 +264,6 @@ void correct_by_flat(const StudyView& view,
                      "must be an X-ray of the open beam",
                      reading.flat->string());
   image = flat_corrected(image, flat, dark);
-  if (dead == 0) mask = Image2d();
   note.add("air level 1 by the flat field" +
            (dead > 0 ? " (" + std::to_string(dead) + " dead pixels masked)" : std::string()));
 }
@@ -302,7 +316,7 @@ double air_level(const Image2d& image,
       return told(air->level, "open beam: " + percent(air->share) + " of the field within 10 %");
     }
     case AirSource::CollimatedBorders: {
-      if (!borders.is_any())
+      if (!(borders.aperture_share > 0.0))
         throw InputError("air_level",
                          "\"collimated-borders\"",
                          "no collimator or aperture was found; state \"open-beam\", a number or a "
@@ -405,9 +419,11 @@ Image2d read_mask_file(const StudyView& view, const CameraGeometry& camera) {
   return mask;
 }
 
-/// The X-ray's values, rising with what `xray_domain` says, and what was done for that.
+/// The X-ray's values, rising with what `xray_domain` says, and what was done for that;
+/// `inversion` is what they were subtracted from.
 Image2d load_oriented(const StudyView& view,
                       const CameraGeometry& camera,
+                      std::optional<double>& inversion,
                       Note& note,
                       std::vector<std::string>& warnings) {
   LoadedImage loaded = load(view.xray, view.reading.frame);
@@ -418,9 +434,9 @@ Image2d load_oriented(const StudyView& view,
     check_relationship(*loaded.dicom, view, warnings);
   }
   if (is_turned(loaded, view)) {
-    const double sum = inversion_sum(loaded);
-    turn_round(loaded.image, sum);
-    note.add("values turned round: " + number_text(sum) + " - stored");
+    inversion = inversion_sum(loaded);
+    turn_round(loaded.image, *inversion);
+    note.add("values turned round: " + number_text(*inversion) + " - stored");
   }
   return std::move(loaded.image);
 }
@@ -434,14 +450,15 @@ ViewXray read_view_xray(const StudyView& view, const CameraGeometry& camera) {
     xray.mask = used_from(view.places, "mask", [&] { return read_mask_file(view, camera); });
   Image2d& image = xray.attenuation;
   XrayBorders borders;
+  std::optional<double> inversion;
   used_from(view.places, "xray", [&] {
-    image = load_oriented(view, camera, note, xray.warnings);
+    image = load_oriented(view, camera, inversion, note, xray.warnings);
     check_values(image, view);
     if (needs_borders(view, image)) borders = borders_of(image, view.xray_domain);
     note_background(image, view, borders, note, xray.warnings);
   });
   if (view.xray_domain == XrayDomain::Intensity)
-    correct_by_flat(view, camera, image, xray.mask, note);
+    correct_by_flat(view, camera, inversion, image, xray.mask, note);
   used_from(view.places, "xray", [&] {
     if (view.xray_domain == XrayDomain::Intensity)
       take_negative_log(image, air_level(image, borders, view, note));

@@ -5,6 +5,7 @@
 #include <charconv>
 #include <cmath>
 #include <optional>
+#include <set>
 
 #include "base/joined.h"
 #include "base/number_text.h"
@@ -80,6 +81,10 @@ std::vector<std::string> problems(const CtReadOptions& options) {
   for (const std::string& text : options.label_hu)
     if (!label_of(text))
       found.push_back("label_hu = " + text + ": must be LABEL=HU, such as 3=700");
+  std::set<double> labels;
+  for (const std::string& text : options.label_hu)
+    if (const auto label = label_of(text); label && !labels.insert(label->first).second)
+      found.push_back("label_hu = " + text + ": its label has a value already");
   return found;
 }
 

@@ -43,10 +43,11 @@ PoseParameters random_pose_in_range(const MotionRange& range,
   HashRandom random(seed, hash64(kPoseStream, index), attempt);
   PoseParameters parameters;
   for (int i = 0; i < 3; ++i)
-    parameters.rotation_rad[i] = random.uniform(-range.max_rotation_rad, range.max_rotation_rad);
+    parameters.rotation_rad[i] =
+        random.uniform(range.low.rotation_rad[i], range.high.rotation_rad[i]);
   for (int i = 0; i < 3; ++i)
     parameters.translation_mm[i] =
-        random.uniform(-range.max_translation_mm, range.max_translation_mm);
+        random.uniform(range.low.translation_mm[i], range.high.translation_mm[i]);
   return parameters;
 }
 

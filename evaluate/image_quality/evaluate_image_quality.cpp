@@ -28,12 +28,15 @@
 #include "files/output_file.h"
 #include "files/resource_check.h"
 #include "files/sha256.h"
+#include "geometry/camera_distance.h"
+#include "geometry/ray_coverage.h"
 #include "pose_files/pose_file.h"
 #include "run/run_folder.h"
 #include "run/terminal.h"
 #include "study/ct_keys.h"
 #include "study/node_ct.h"
 #include "study/pose_context.h"
+#include "study/rig_file.h"
 #include "study/study_file.h"
 #include "text/options_toml.h"
 
@@ -48,7 +51,8 @@ struct Target {
   std::filesystem::path field;
   std::filesystem::path ct;
   CtReadOptions ct_reading;
-  std::filesystem::path folder;  ///< of its results
+  std::filesystem::path folder;          ///< of its results
+  std::optional<CameraGeometry> camera;  ///< none: the field's
 };
 
 /// The output that all fields of a study share.
@@ -71,6 +75,8 @@ struct Setup {
   NodeCt ct;
   std::vector<RigidTransform> poses;  ///< empty: random ones
   View view;
+  CameraDistance camera_distance;  ///< of the view's from the field's
+  MotionRange range;               ///< of random poses: the field's, or what it covers
 
   [[nodiscard]] std::string look_up(const ImageQualityOptions& options) const {
     return options.look_up.empty() ? field_info.look_up : options.look_up;
@@ -79,6 +85,26 @@ struct Setup {
     return poses.empty() ? options.pose_count : static_cast<std::int64_t>(poses.size());
   }
 };
+
+/// The camera that is looked through, and from where random poses are drawn.
+void choose_camera(const Target& target, Setup& setup) {
+  const FieldIdentity& identity = setup.field->identity;
+  setup.view = View::whole_detector(identity.camera);
+  setup.range = identity.range;
+  if (!target.camera.has_value()) return;
+  setup.camera_distance = camera_distance(*target.camera, identity.camera);
+  if (setup.camera_distance.is_none()) return;
+  setup.view = View::whole_detector(*target.camera);
+  setup.range =
+      covered_box(setup.field->light_slab, *target.camera, identity.frame, identity.range);
+  if (!covers_range(setup.field->light_slab, *target.camera, identity.frame, setup.range))
+    throw InputError(
+        "camera",
+        target.camera->name,
+        "the field does not hold all of its rays at the field's nominal pose; it has " +
+            setup.camera_distance.text(),
+        target.field.string());
+}
 
 Setup load(const ImageQualityOptions& options, const Target& target, const Communicator& world) {
   Setup setup;
@@ -91,6 +117,7 @@ Setup load(const ImageQualityOptions& options, const Target& target, const Commu
                               world,
                               warnings);
   for (const std::string& text : warnings) warn(world, text);
+  std::vector<std::string> notes;
   all_or_none(world, [&] {
     if (setup.ct.facts.content_sha256 != identity.ct_content_sha256)
       throw FileError(target.field.string(),
@@ -109,14 +136,20 @@ Setup load(const ImageQualityOptions& options, const Target& target, const Commu
                        "is for linear look-up; the field's own is " + setup.look_up(options) +
                            ": give --look-up linear",
                        target.field.string());
+    choose_camera(target, setup);
     if (options.poses.empty()) return;
     setup.poses = read_poses(options.poses,
                              pose_context(target.ct,
                                           target.ct_reading,
-                                          CameraRig{Eigen::Vector3d::Zero(), {identity.camera}},
-                                          identity.frame));
+                                          CameraRig{Eigen::Vector3d::Zero(), {setup.view.camera}},
+                                          identity.frame),
+                             &notes);
   });
-  setup.view = View::whole_detector(identity.camera);
+  for (const std::string& text : notes) warn(world, text);
+  if (!setup.camera_distance.is_none())
+    inform(world,
+           "camera " + setup.view.camera.name + ": " + setup.camera_distance.text() +
+               "; the field covers its rays within " + setup.range.text() + " of nominal");
   return setup;
 }
 
@@ -127,7 +160,7 @@ DrrComparison compare(const ImageQualityOptions& options,
   const FieldIdentity& identity = setup.field->identity;
   if (setup.poses.empty())
     return comparer.at_random_pose(
-        identity.frame, identity.range, options.seed, static_cast<std::uint64_t>(index));
+        identity.frame, setup.range, options.seed, static_cast<std::uint64_t>(index));
   const RigidTransform& pose = setup.poses[static_cast<std::size_t>(index)];
   return comparer.at_pose(identity.frame, parameters_from_pose(identity.frame, pose));
 }
@@ -224,6 +257,7 @@ void write_results(const ImageQualityOptions& options,
   summary["field"]["file_bytes"] = setup.field_info.file_bytes;
   summary["field"]["payload_bytes"] = setup.field_info.payload_bytes;
   summary["look_up"] = setup.look_up(options);
+  summary["camera_distance"] = camera_distance_json(setup.camera_distance, setup.range);
   summary.update(image_quality_statistics(comparisons));
   write_results_last(folder / "summary.json", std::move(summary), provenance);
 
@@ -285,11 +319,16 @@ TargetResult evaluate_target(const ImageQualityOptions& options,
   all_or_none(world, [&] {
     if (world.is_root() && !options.poses.empty())
       provenance.input_sha256["poses"] = sha256_of_file(options.poses.string());
+    if (world.is_root() && !options.rig.empty())
+      for (const std::filesystem::path& file : rig_files(options.rig))
+        provenance.input_sha256["rig"] = sha256_of_file(file.string());
   });
   const std::string name = target.folder.filename().string();
   const auto unfinished = [&](const std::string& what) {
-    return run.unfinished(name + what,
-                          deciding_values(deciding_options(options), provenance.input_sha256));
+    DecidingValues values = deciding_values(deciding_options(options), provenance.input_sha256);
+    if (!setup.camera_distance.is_none())
+      values["camera"] = camera_distance_json(setup.camera_distance, setup.range).dump();
+    return run.unfinished(name + what, values);
   };
   const std::int64_t count = setup.pose_count(options);
   all_or_none(world, [&] {
@@ -319,7 +358,13 @@ std::vector<Target> targets_of(const ImageQualityOptions& options) {
   if (options.study.empty() ? !has_field : has_any)
     throw UsageError("name a field and its CT, --field FIELD --ct CT, or --study STUDY alone");
   if (options.study.empty())
-    return {{"", options.field, options.ct, options.ct_reading, options.output_folder}};
+    return {{"",
+             options.field,
+             options.ct,
+             options.ct_reading,
+             options.output_folder,
+             options.rig.empty() ? std::nullopt
+                                 : std::optional(read_rig(options.rig).camera(options.camera))}};
   const Study study = read_study(options.study);
   std::vector<Target> targets;
   for (const StudyCase* study_case : study.chosen_cases(options.cases))
@@ -333,7 +378,8 @@ std::vector<Target> targets_of(const ImageQualityOptions& options) {
                          *view.field,
                          study_case->ct,
                          ct_reading_in_force(options.ct_reading, study_case->ct_reading),
-                         options.output_folder / (study_case->name + "-" + view.camera)});
+                         options.output_folder / (study_case->name + "-" + view.camera),
+                         study.rig.camera(view.camera)});
     }
   return targets;
 }
@@ -382,6 +428,14 @@ void ImageQualityOptions::describe(Fields& field_list) {
              "plot of all, the worst pairs side by side")
       .input();
   field_list("case", cases, "Case of the study, may be repeated (default: all)");
+  field_list("rig",
+             rig,
+             "With --camera: look through another camera than the field's, whose rays it has to "
+             "hold; random poses are then drawn where it does [the field's own camera]")
+      .excludes({"--study"})
+      .needs({"--camera"})
+      .input();
+  field_list("camera", camera, "Camera of the rig").needs({"--rig"}).input();
   field_list("pose_count", pose_count, "Random poses, uniform in the six parameters").at_least(1);
   field_list("poses",
              poses,

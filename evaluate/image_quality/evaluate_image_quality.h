@@ -21,6 +21,8 @@ struct ImageQualityOptions {
   std::filesystem::path study;     ///< instead of both: all its cases and views
   std::vector<std::string> cases;  ///< of the study; empty: all
   int pose_count = 100;
+  std::string rig;     ///< of another camera than the field's; empty: the field's
+  std::string camera;  ///< of that rig
   std::filesystem::path poses;
   std::string look_up;       ///< empty: the field's own
   int split_loss_poses = 0;  ///< so many poses' losses are split
@@ -38,7 +40,8 @@ std::vector<std::string> problems(const ImageQualityOptions& options);
 /// Adds the subcommand; returns it.
 CLI::App* bind_image_quality(CLI::App& app, ImageQualityOptions& options);
 
-/// Collective. Compares a field's DRRs with ray casting (Fig. 8) and writes image-quality.csv,
+/// Collective. Compares a field's DRRs with ray casting (Fig. 8), for its own camera, the one of
+/// --rig and --camera, or those of the study, and writes image-quality.csv,
 /// figures, the pictures of the worst and the median pair, summary.json and reproduce.sh. Of a
 /// study every view's field gets a folder of its own, CASE-CAMERA, and the run's folder one table,
 /// one box plot and the worst pairs side by side.

@@ -115,6 +115,15 @@ json image_quality_statistics(const std::vector<DrrComparison>& comparisons) {
   return result;
 }
 
+json camera_distance_json(const CameraDistance& distance, const MotionRange& covered) {
+  return {{"text", distance.text()},
+          {"source_mm", distance.source_mm},
+          {"rotation_deg", distance.rotation_deg},
+          {"source_detector_mm", distance.source_detector_mm},
+          {"detector_mm", distance.detector_mm},
+          {"range", covered.text()}};
+}
+
 json field_description(const CompressedAttenuationField& field) {
   const FieldIdentity& identity = field.identity;
   const SlabLattice lattice = field.lattice(0);
@@ -127,8 +136,8 @@ json field_description(const CompressedAttenuationField& field) {
           {"st_nodes", {lattice.s.nodes, lattice.t.nodes}},
           {"slabs", field.slabs.size()},
           {"codewords", field.codebook.size()},
-          {"max_rotation_deg", identity.range.max_rotation_rad * kDegPerRad},
-          {"max_translation_mm", identity.range.max_translation_mm},
+          {"max_rotation_deg", identity.range.max_rotation_rad() * kDegPerRad},
+          {"max_translation_mm", identity.range.max_translation_mm()},
           {"mu_water_per_mm", identity.mu_water_per_mm}};
 }
 

@@ -7,6 +7,7 @@
 
 #include "evaluate/image_quality/drr_comparison.h"
 #include "field/compressed_attenuation_field.h"
+#include "geometry/camera_distance.h"
 #include "text/csv_table.h"
 
 namespace af::evaluation {
@@ -21,6 +22,9 @@ std::optional<std::size_t> comparison_at(const std::vector<DrrComparison>& compa
 
 /// Counts and statistics of summary.json.
 nlohmann::json image_quality_statistics(const std::vector<DrrComparison>& comparisons);
+
+/// How far the camera in use is from the field's, and the poses that the field covers for it.
+nlohmann::json camera_distance_json(const CameraDistance& distance, const MotionRange& covered);
 
 /// Resolution, range and size of a field, as tables show them.
 nlohmann::json field_description(const CompressedAttenuationField& field);

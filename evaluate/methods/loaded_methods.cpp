@@ -64,6 +64,8 @@ std::vector<LoadedMethod> load_methods(const MethodOptions& options,
         registration::load_case(study, study_case, loading, world);
     blurs_mm = level_blurs_mm(*loaded.problem);
     for (const std::string& text : loaded.warnings) warn(world, text);
+    for (const auto& [name, note] : loaded.input_notes)
+      if (name.starts_with("field ")) inform(world, study_case.name + ": " + name + ": " + note);
     for (const auto& [name, hash] : loaded.input_sha256)
       input_sha256[study_case.name + ": " + name] = hash;
     registration::RegistrationRunner runner = all_or_none(

@@ -68,12 +68,14 @@ void examine_ends(const std::shared_ptr<const registration::RegistrationProblem>
       std::make_unique<UncertaintyEstimator>(problem, method.runner.options(), options);
 }
 
-/// Inside the motion range of every field in use.
+/// Inside the motion range of every field in use; where a field has none for this camera, all rays
+/// must be inside.
 bool is_admissible(const std::vector<Method>& methods, const RigidTransform& room_from_ct) {
   for (const Method& method : methods)
     for (const registration::RegistrationView& view : method.runner.problem().views)
-      if (view.limit.has_value() &&
-          !view.limit->range.contains(parameters_from_pose(view.limit->frame, room_from_ct)))
+      if (view.limit.has_value()
+              ? !view.limit->range.contains(parameters_from_pose(view.limit->frame, room_from_ct))
+              : view.renderer->rays_outside(room_from_ct, view.view) > 0)
         return false;
   return true;
 }
@@ -82,17 +84,19 @@ bool is_admissible(const std::vector<Method>& methods, const RigidTransform& roo
 std::optional<StartLimit> motion_limit(const std::vector<Method>& methods) {
   for (const Method& method : methods)
     for (const registration::RegistrationView& view : method.runner.problem().views)
-      if (view.limit.has_value()) return StartLimit{view.limit->frame, view.limit->range};
+      if (view.reach.has_value()) return StartLimit{view.reach->frame, view.reach->range};
   return std::nullopt;
 }
 
-/// Collective. Draws or reads a case's starts: on rank 0, the others share the work.
+/// Collective. Draws or reads a case's starts: on rank 0, which gets `notes` on what it read; the
+/// others share the work.
 StratifiedStarts make_starts(const RegistrationStudyOptions& options,
                              const Study& study,
                              const StudyCase& study_case,
                              const Yardstick& yardstick,
                              const std::vector<Method>& methods,
-                             const Communicator& world) {
+                             const Communicator& world,
+                             std::vector<std::string>& notes) {
   SharedStartMeasures measures(
       world,
       start_frame(study_case, yardstick),
@@ -102,7 +106,7 @@ StratifiedStarts make_starts(const RegistrationStudyOptions& options,
       motion_limit(methods));
   return starts_measured_together(world, measures, [&](StartMeasures& shared) {
     if (!options.starts_from.empty())
-      return given_starts(options, study, study_case, yardstick, shared);
+      return given_starts(options, study, study_case, yardstick, shared, notes);
     if (options.start_rule == "within-range") return starts_within_range(shared);
     return options.start_rule == "uniform" ? uniform_starts(shared) : stratified_starts(shared);
   });
@@ -455,10 +459,12 @@ StratifiedStarts given_starts(const RegistrationStudyOptions& options,
                               const Study& study,
                               const StudyCase& study_case,
                               const Yardstick& yardstick,
-                              StartMeasures& measures) {
+                              StartMeasures& measures,
+                              std::vector<std::string>& notes) {
   return starts_at(measures,
                    read_starts(options.starts_from,
-                               pose_table_frames(study, study_case, yardstick.gold_room_from_ct)));
+                               pose_table_frames(study, study_case, yardstick.gold_room_from_ct),
+                               notes));
 }
 
 void set_start(const PerturbedStart& start, RegistrationRow& row) {
@@ -511,7 +517,8 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
     evaluation.gold = gold_standard(study, study_case, options.gold);
     return yardstick_of(study, study_case, evaluation.gold);
   });
-  evaluation.starts = make_starts(options, study, study_case, yardstick, methods, world);
+  evaluation.starts =
+      make_starts(options, study, study_case, yardstick, methods, world, evaluation.pose_problems);
   evaluation.starts.starts = held_per_node(evaluation.starts.starts, world);
   evaluation.start_count = evaluation.starts.starts.size();
   all_or_none(world, [&] {

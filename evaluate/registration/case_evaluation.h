@@ -44,12 +44,13 @@ PoseTableFrames pose_table_frames(const Study& study,
 /// What the starts of a case are relative to.
 StartFrame start_frame(const StudyCase& study_case, const Yardstick& yardstick);
 
-/// The starts of --starts-from for one case.
+/// The starts of --starts-from for one case. `notes` get what the reader of its file says.
 StratifiedStarts given_starts(const RegistrationStudyOptions& options,
                               const Study& study,
                               const StudyCase& study_case,
                               const Yardstick& yardstick,
-                              StartMeasures& measures);
+                              StartMeasures& measures,
+                              std::vector<std::string>& notes);
 
 /// The start of a row.
 void set_start(const PerturbedStart& start, RegistrationRow& row);

@@ -54,11 +54,13 @@ CaseEvaluation evaluate_found_poses(const RegistrationStudyOptions& options,
                          options.start_options(),
                          yardstick.points_ct_mm,
                          [](const RigidTransform&) { return true; });
-  evaluation.starts = given_starts(options, study, study_case, yardstick, measures);
+  evaluation.starts =
+      given_starts(options, study, study_case, yardstick, measures, evaluation.pose_problems);
   on_starts(evaluation);
   const FoundPoses found = read_found_poses(
       options.poses_from, pose_table_frames(study, study_case, yardstick.gold_room_from_ct));
-  evaluation.pose_problems = found.problems;
+  evaluation.pose_problems.insert(
+      evaluation.pose_problems.end(), found.problems.begin(), found.problems.end());
   evaluation.start_count = evaluation.starts.starts.size();
   const auto count = static_cast<std::int64_t>(evaluation.start_count);
   const std::span<RegistrationRow> mine = rows.append(evaluation.start_count);

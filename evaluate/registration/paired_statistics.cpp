@@ -135,6 +135,20 @@ std::vector<CaseMean> means_of(const std::map<std::string, CasePairs>& cases,
   return means;
 }
 
+/// Methods that succeed from different starts are not equivalent, however close their ends are
+/// where both do: the difference of success rates must be shown to be small, too.
+constexpr double kSuccessMargin = 0.05;
+constexpr std::array<const char*, 4> kIntervalEnds = {"low", "high", "student_low", "student_high"};
+
+/// Whether both 95 % intervals over cases of the success difference lie within the margin.
+bool succeeds_alike(const PairSums& sums, std::uint64_t seed) {
+  const json interval =
+      interval_over_cases(means_of(sums.cases, &CasePairs::success_difference), seed);
+  return std::all_of(kIntervalEnds.begin(), kIntervalEnds.end(), [&](const char* end) {
+    return interval[end].is_number() && std::abs(interval[end].get<double>()) <= kSuccessMargin;
+  });
+}
+
 /// Every case counts alike, however many pairs it has.
 json end_distance_json(const PairSums& sums, const PairedOptions& options) {
   std::vector<double> case_means_mm;
@@ -142,6 +156,8 @@ json end_distance_json(const PairSums& sums, const PairedOptions& options) {
     case_means_mm.push_back(mean.sum / mean.count);
   const CaseEquivalence found =
       equivalence_over_cases(case_means_mm, options.margin_mm, options.seed);
+  const auto cases_without_pairs =
+      static_cast<std::int64_t>(sums.cases.size() - case_means_mm.size());
   json over_cases = bootstrap_json(found.bootstrap);
   over_cases["mean"] = number_json(found.mean);
   over_cases["student_low"] = number_json(found.student.low);
@@ -152,9 +168,13 @@ json end_distance_json(const PairSums& sums, const PairedOptions& options) {
                  {"margin_mm", options.margin_mm},
                  {"p", number_json(found.p)},
                  {"cases_needed", kEnoughCasesForEquivalence},
+                 {"cases_without_pairs", cases_without_pairs},
+                 {"success_margin", kSuccessMargin},
                  {"has_enough_cases", found.has_enough_cases()}};
   // With too few cases nothing is claimed, neither way.
-  result["is_equivalent"] = found.has_enough_cases() ? json(found.is_shown()) : json(nullptr);
+  const bool is_shown =
+      found.is_shown() && cases_without_pairs == 0 && succeeds_alike(sums, options.seed);
+  result["is_equivalent"] = found.has_enough_cases() ? json(is_shown) : json(nullptr);
   return result;
 }
 

@@ -190,7 +190,8 @@ std::string pose_distances_markdown(const std::vector<PoseDistanceRow>& rows) {
 std::vector<PatientDistances> distances_over_patients(const std::vector<PoseDistanceRow>& rows,
                                                       double margin_mm) {
   std::vector<PatientDistances> methods;
-  std::vector<std::vector<double>> means_mm;
+  // By case: runs of one name, and both orders of two methods, may have it several times.
+  std::vector<std::map<std::string, std::vector<double>>> means_mm;
   for (const PoseDistanceRow& row : rows) {
     const auto is_same = [&](const PatientDistances& other) {
       return other.run_a == row.run_a && other.renderer_a == row.renderer_a &&
@@ -203,11 +204,15 @@ std::vector<PatientDistances> distances_over_patients(const std::vector<PoseDist
       method = methods.end() - 1;
     }
     method->starts += row.distance_mm.count;
-    means_mm[static_cast<std::size_t>(method - methods.begin())].push_back(row.distance_mm.mean);
+    means_mm[static_cast<std::size_t>(method - methods.begin())][row.case_name].push_back(
+        row.distance_mm.mean);
   }
   constexpr std::uint64_t kSeed = 1;
-  for (std::size_t i = 0; i < methods.size(); ++i)
-    methods[i].equivalence = equivalence_over_cases(means_mm[i], margin_mm, kSeed);
+  for (std::size_t i = 0; i < methods.size(); ++i) {
+    std::vector<double> of_cases_mm;
+    for (const auto& [name, means] : means_mm[i]) of_cases_mm.push_back(summarize(means).mean);
+    methods[i].equivalence = equivalence_over_cases(of_cases_mm, margin_mm, kSeed);
+  }
   return methods;
 }
 

@@ -136,14 +136,23 @@ bool is_table(const std::filesystem::path& path) {
   return is_csv_of_poses(file) || first_line.find("start_index") != std::string::npos;
 }
 
-/// A file of poses that is no table of ours; nullopt when it is a table.
-std::optional<std::vector<RigidTransform>> poses_of_other_file(const std::filesystem::path& path,
-                                                               const PoseTableFrames& frames) {
-  if (is_table(path)) return std::nullopt;
+/// A file of poses that is no table of ours names no case.
+void require_only_case(const std::filesystem::path& path, const PoseTableFrames& frames) {
   if (!frames.is_only_case)
     throw InputError(path.string() +
                      ": does not say of which case its poses are; choose one with --case");
-  return read_poses(path, frames.context);
+}
+
+/// Of such a file: frame 1 is start 0.
+FoundPoses read_frames(const std::filesystem::path& path, const PoseTableFrames& frames) {
+  require_only_case(path, frames);
+  const PosesInFile file = read_pose_file(path, frames.context);
+  if (file.poses.empty()) throw InputError(path.string() + ": holds no pose");
+  FoundPoses found;
+  found.problems = file.notes;
+  for (const PosesInFile::Numbered& pose : file.poses)
+    found.room_from_ct.emplace(pose.number - 1, pose.room_from_ct);
+  return found;
 }
 
 std::vector<std::filesystem::path> transforms_in(const std::filesystem::path& folder) {
@@ -166,7 +175,8 @@ FoundPoses read_folder(const std::filesystem::path& folder, const PoseTableFrame
     const bool is_mine =
         name->first.empty() ? frames.is_only_case : name->first == frames.case_name;
     if (!is_mine) continue;
-    if (!found.room_from_ct.emplace(name->second, read_pose(path, frames.context)).second)
+    const RigidTransform pose = read_pose(path, frames.context, &found.problems);
+    if (!found.room_from_ct.emplace(name->second, pose).second)
       found.problems.push_back(path.string() + ": start " + std::to_string(name->second) +
                                " occurs again; the first pose counts");
   }
@@ -176,8 +186,12 @@ FoundPoses read_folder(const std::filesystem::path& folder, const PoseTableFrame
 }  // namespace
 
 std::vector<RigidTransform> read_starts(const std::filesystem::path& path,
-                                        const PoseTableFrames& frames) {
-  if (const auto poses = poses_of_other_file(path, frames)) return *poses;
+                                        const PoseTableFrames& frames,
+                                        std::vector<std::string>& notes) {
+  if (!is_table(path)) {
+    require_only_case(path, frames);
+    return read_unbroken_poses(path, frames.context, &notes);
+  }
   const CsvTable table = CsvTable::read(path);
   const bool has_matrix = table.find_column("m00").has_value();
   const bool has_index = table.find_column("start_index").has_value();
@@ -225,12 +239,7 @@ std::vector<std::string> unknown_case_problems(const std::filesystem::path& path
 
 FoundPoses read_found_poses(const std::filesystem::path& path, const PoseTableFrames& frames) {
   if (std::filesystem::is_directory(path)) return read_folder(path, frames);
-  const auto poses = poses_of_other_file(path, frames);
-  if (!poses) return read_table(path, frames);
-  FoundPoses found;
-  for (std::size_t i = 0; i < poses->size(); ++i)
-    found.room_from_ct.emplace(static_cast<std::int64_t>(i), (*poses)[i]);
-  return found;
+  return is_table(path) ? read_table(path, frames) : read_frames(path, frames);
 }
 
 }  // namespace af::evaluation

@@ -28,9 +28,11 @@ struct PoseTableFrames {
 /// unreadable, or a value that is not a number; InputError: no row of the case, a pose that is not
 /// rigid, or a start_index (where there is that column) that is not the row's place among the
 /// case's: a start that is missing, repeated or out of order would give all others another number.
-/// A file of another format of poses (docs/poses.md) holds the starts of the only case.
+/// A file of another format of poses (docs/poses.md) holds the starts of the only case; InputError
+/// when a frame before its last pose has none. `notes` get what its reader left out and assumed.
 std::vector<RigidTransform> read_starts(const std::filesystem::path& path,
-                                        const PoseTableFrames& frames);
+                                        const PoseTableFrames& frames,
+                                        std::vector<std::string>& notes);
 
 /// Poses that were found, by start index.
 struct FoundPoses {
@@ -43,7 +45,8 @@ struct FoundPoses {
 /// of room_from_ct, or final_rx_deg ... final_tz_mm relative to gold (as in registrations.csv), or
 /// rx_deg ... tz_mm relative to the nominal pose, about the ROI centre. Or a folder of files of one
 /// pose each (docs/poses.md), named [CASE-]INDEX.tfm, .h5, .dcm, .json, .toml, .tra or .txt. Or one
-/// file of several poses that is no table: the poses of the only case from start 0 on. A pose with
+/// file of several poses that is no table: its first frame or row is start 0 of the only case, and
+/// frames without a pose leave their start without one. A pose with
 /// a value that is not finite is no pose; of a start that occurs twice the first counts, also when
 /// it is no pose; a start_index that is not a whole number is no start: all are reported as
 /// problems.

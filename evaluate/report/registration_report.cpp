@@ -421,7 +421,8 @@ std::string equivalence_text(const json& ends) {
            plain(ends.at("cases_needed")) + " patients.";
   return text +
          (is_equivalent.get<bool>()
-              ? " Over patients the two are equivalent within " + margin + " mm: "
+              ? " Over patients the two are equivalent within " + margin +
+                    " mm, and succeed alike: "
               : " Equivalence within " + margin + " mm is not shown over patients: ") +
          "one-sided Student's test " + p_text(number_of(ends.at("p"))) + ".";
 }

@@ -270,15 +270,9 @@ RigidTransform StartMeasures::pose_within_range(const PoseParameters& direction,
   PoseParameters wanted;
   wanted.rotation_rad = direction.rotation_rad * std::min(size_mm / radius_mm, kFarthestTurnRad);
   wanted.translation_mm = direction.translation_mm * size_mm;
-  PoseParameters inside =
+  const PoseParameters parameters =
       parameters_from_pose(limit_->frame, pose_from_parameters(frame_.pose_frame(), wanted));
-  const double most_rad = kShareOfRange * limit_->range.max_rotation_rad;
-  const double most_mm = kShareOfRange * limit_->range.max_translation_mm;
-  for (int i = 0; i < 3; ++i) {
-    inside.rotation_rad[i] = std::clamp(inside.rotation_rad[i], -most_rad, most_rad);
-    inside.translation_mm[i] = std::clamp(inside.translation_mm[i], -most_mm, most_mm);
-  }
-  return pose_from_parameters(limit_->frame, inside);
+  return pose_from_parameters(limit_->frame, limit_->range.clamped(parameters, kShareOfRange));
 }
 
 UniformStart StartMeasures::draw_within_range(std::uint64_t index) const {

@@ -12,7 +12,7 @@ constexpr std::int64_t kMegabyte = 1000000;
 
 /// Every preset there is; a new one joins here.
 const std::array kPresets = {
-    DesignPreset{"paper",
+    DesignPreset{kPaperPreset,
                  "one slab of 64 x 64 x 256 x 256 nodes, 16384 codewords, linear look-up",
                  {1, 64, 256, 16384, "linear"},
                  {}},

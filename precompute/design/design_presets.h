@@ -18,6 +18,8 @@ struct DesignPreset {
 
 /// What a field gets when nothing is said about its design.
 inline constexpr const char* kDefaultPreset = "standard";
+/// The paper's own design, for comparisons.
+inline constexpr const char* kPaperPreset = "paper";
 
 /// InputError when there is none of that name.
 const DesignPreset& design_preset_named(const std::string& name);

@@ -24,10 +24,12 @@ constexpr double kEvenShare = 0.3;
 
 PoseParameters pose_in(const MotionRange& range, HashRandom& random) {
   PoseParameters parameters;
-  for (double& angle : parameters.rotation_rad)
-    angle = random.uniform(-range.max_rotation_rad, range.max_rotation_rad);
-  for (double& shift : parameters.translation_mm)
-    shift = random.uniform(-range.max_translation_mm, range.max_translation_mm);
+  for (int i = 0; i < 3; ++i)
+    parameters.rotation_rad[i] =
+        random.uniform(range.low.rotation_rad[i], range.high.rotation_rad[i]);
+  for (int i = 0; i < 3; ++i)
+    parameters.translation_mm[i] =
+        random.uniform(range.low.translation_mm[i], range.high.translation_mm[i]);
   return parameters;
 }
 

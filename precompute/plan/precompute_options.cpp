@@ -7,6 +7,7 @@
 #include "base/plausible.h"
 #include "base/toml_text.h"
 #include "precompute/casting/casters.h"
+#include "precompute/plan/axis_ranges.h"
 
 namespace af {
 
@@ -51,6 +52,26 @@ void describe_casting(Fields& field, PrecomputeOptions& options) {
         options.max_translation_mm,
         "Range: largest shift along each room axis, mm")
       .decides(kCastingStage);
+  field("rotation_range_deg",
+        options.rotation_range_deg,
+        "Range per axis, degrees, such as rx=-15:15,ry=-5:5,rz=-30:30; one number stands for both "
+        "sides; axes not named keep --max-rotation-deg")
+      .decides(kCastingStage);
+  field("translation_range_mm",
+        options.translation_range_mm,
+        "Range per axis, mm, such as tx=-20:20,ty=-80:40,tz=30; axes not named keep "
+        "--max-translation-mm")
+      .decides(kCastingStage);
+  field("cover",
+        options.cover,
+        "File of poses (docs/poses.md): the range is taken about each of them instead of the "
+        "nominal pose, and the field covers the smallest box of the six parameters that holds all "
+        "of these")
+      .input();
+  field("cover_rig",
+        options.cover_rig,
+        "Rig of further cameras: the field holds their rays, too, over the same range")
+      .input();
   field("preset",
         options.preset,
         "Design of the field, by name. " + design_preset_help() + " [" + kDefaultPreset +
@@ -150,10 +171,9 @@ void describe_run(Fields& field, PrecomputeOptions& options) {
       .not_deciding(why);
   field("index_packing",
         options.index_packing,
-        "How the file holds the indices: deflate (quick, and any reader of HDF5 can), or "
-        "codebook-tree "
-        "(about half the bytes, a second or two more to write and read); the payload is the same "
-        "[codebook-tree where limits, or a preset with limits, are given; else deflate]")
+        "How the file holds the indices: codebook-tree (about half the bytes, up to a second more "
+        "to write and read), or deflate (any reader of HDF5 can); the payload is the same "
+        "[deflate for the preset 'paper' and for designs that are typed; else codebook-tree]")
       .one_of({"codebook-tree", "deflate"})
       .not_deciding(why);
   field("mpi_io_hints",
@@ -201,7 +221,7 @@ DesignParts PrecomputeOptions::stated_parts() const {
 
 const DesignPreset& PrecomputeOptions::design_preset() const {
   const bool has_parts = slabs || uv_nodes || st_nodes || codewords || look_up;
-  return design_preset_named(preset.value_or(has_parts ? "paper" : kDefaultPreset));
+  return design_preset_named(preset.value_or(has_parts ? kPaperPreset : kDefaultPreset));
 }
 
 bool PrecomputeOptions::needs_probe() const {
@@ -215,7 +235,8 @@ const DesignBudget& PrecomputeOptions::limits() const {
 
 bool PrecomputeOptions::packs_by_codebook_tree() const {
   if (index_packing) return *index_packing == "codebook-tree";
-  return limits().is_stated();
+  // Whoever types a design compares with the paper.
+  return limits().is_stated() || design_preset().name != std::string_view(kPaperPreset);
 }
 
 double min_improvement_of(const FieldDesign& design) {
@@ -252,7 +273,7 @@ StPlane PrecomputeOptions::st_plane_rule() const {
 }
 
 std::vector<std::string> problems(const PrecomputeOptions& options) {
-  std::vector<std::string> found = problems(options.range());
+  std::vector<std::string> found = problems(options.range());  // UsageError where it is no range
   append(field_problems(options), found);
   append(problems(options.codebook_options()), found);
   append(problems(options.training_selection()), found);
@@ -267,6 +288,27 @@ std::vector<std::string> problems(const PrecomputeOptions& options) {
     if (!is_plausible_room_mm(coordinate))
       found.push_back("center_ct_mm = " + number_text(coordinate) + ": " + kPlausibleRoom);
   return found;
+}
+
+MotionRange PrecomputeOptions::range() const {
+  MotionRange range(max_rotation_deg * kRadPerDeg, max_translation_mm);
+  if (!rotation_range_deg.empty()) {
+    const AxisRanges stated =
+        axis_ranges("--rotation-range-deg", rotation_range_deg, 'r', max_rotation_deg);
+    for (std::size_t i = 0; i < 3; ++i) {
+      range.low.rotation_rad[static_cast<int>(i)] = stated.low[i] * kRadPerDeg;
+      range.high.rotation_rad[static_cast<int>(i)] = stated.high[i] * kRadPerDeg;
+    }
+  }
+  if (!translation_range_mm.empty()) {
+    const AxisRanges stated =
+        axis_ranges("--translation-range-mm", translation_range_mm, 't', max_translation_mm);
+    for (std::size_t i = 0; i < 3; ++i) {
+      range.low.translation_mm[static_cast<int>(i)] = stated.low[i];
+      range.high.translation_mm[static_cast<int>(i)] = stated.high[i];
+    }
+  }
+  return range;
 }
 
 TrainingSelection PrecomputeOptions::training_selection(int for_codewords) const {

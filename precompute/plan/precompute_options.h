@@ -39,6 +39,10 @@ struct PrecomputeOptions {
 
   double max_rotation_deg = 10.0;
   double max_translation_mm = 100.0;
+  std::string rotation_range_deg;    ///< "rx=-15:15,ry=..."; axes not named: max_rotation_deg
+  std::string translation_range_mm;  ///< "tx=..."; axes not named: max_translation_mm
+  std::string cover;                 ///< file of poses about each of which the range is taken
+  std::string cover_rig;             ///< further cameras whose rays the field is to hold
   /// The design: a preset or a budget, and parts that are stated.
   std::optional<std::string> preset;
   DesignBudget budget;
@@ -68,9 +72,8 @@ struct PrecomputeOptions {
   bool is_restart = false;
   bool has_checkpoint = true;
 
-  [[nodiscard]] MotionRange range() const {
-    return {max_rotation_deg * kRadPerDeg, max_translation_mm};
-  }
+  /// The range about one pose. UsageError when a text of it does not parse.
+  [[nodiscard]] MotionRange range() const;
   /// The parts of the design that are stated.
   [[nodiscard]] DesignParts stated_parts() const;
   /// The preset that is asked for: where parts alone are stated, the paper's.

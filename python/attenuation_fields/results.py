@@ -144,13 +144,18 @@ def register(
     study: Path,
     case_name: str = "",
     *,
-    rotation_deg: Sequence[float] = (0.0, 0.0, 0.0),
-    translation_mm: Sequence[float] = (0.0, 0.0, 0.0),
+    rotation_deg: Optional[Sequence[float]] = None,
+    translation_mm: Optional[Sequence[float]] = None,
     **options: Any,
 ) -> Registration:
-    """Registers a case of a study from one start, relative to its nominal pose.
+    """Registers a case of a study from one start, as af-register does.
 
-    Options are those of RegistrationCase.load(), which is for several starts.
+    The start is relative to the nominal pose; without one it is the pose of the study's landmarks,
+    or the nominal pose where the study has none. Options are those of RegistrationCase.load(),
+    which is for several starts.
     """
     case = RegistrationCase.load(study, case_name, **options)
-    return case.run(case.frame.pose(rotation_deg, translation_mm))
+    if rotation_deg is None and translation_mm is None:
+        return case.run()
+    zero = (0.0, 0.0, 0.0)
+    return case.run(case.frame.pose(rotation_deg or zero, translation_mm or zero))

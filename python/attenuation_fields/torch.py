@@ -12,6 +12,7 @@ from typing import Any, Tuple
 import numpy as np
 import torch
 from torch import Tensor
+from torch.autograd.function import once_differentiable
 
 from attenuation_fields._core import Renderer
 from attenuation_fields.errors import InputError
@@ -30,7 +31,9 @@ class DrrFunction(torch.autograd.Function):
         ctx.place = (parameters.device, parameters.dtype)
         return torch.from_numpy(drrs).to(parameters.device)
 
+    # The DRRs' second derivatives are not known: asking for them is an error.
     @staticmethod
+    @once_differentiable  # type: ignore[misc]
     def backward(ctx: Any, grad_output: Tensor) -> Tuple[Tensor, None]:  # type: ignore[override]
         (gradients,) = ctx.saved_tensors
         device, dtype = ctx.place

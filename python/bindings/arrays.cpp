@@ -2,6 +2,7 @@
 #include "python/bindings/arrays.h"
 
 #include <algorithm>
+#include <functional>
 
 #include "attenuation_fields/errors.h"
 
@@ -32,6 +33,13 @@ void require_shape(const py::array& array,
                      extents_text(shape));
 }
 
+void require_aligned(const py::array& array, const char* name) {
+  if ((array.flags() & py::detail::npy_api::NPY_ARRAY_ALIGNED_) == 0)
+    throw InputError(std::string(name) +
+                     " = an array whose numbers do not stand at multiples of their size in memory: "
+                     "must be aligned (numpy.require(array, requirements=\"A\"))");
+}
+
 py::array_t<float> output_array(const std::vector<py::ssize_t>& shape,
                                 const py::object& out,
                                 const char* name) {
@@ -43,11 +51,21 @@ py::array_t<float> output_array(const std::vector<py::ssize_t>& shape,
   require_shape(array, name, shape);
   if (!array.writeable())
     throw InputError(std::string(name) + " = a read-only array: must be writeable");
+  require_aligned(array, name);
   return array;
 }
 
 std::span<float> floats_of(py::array_t<float>& array) {
   return {array.mutable_data(), static_cast<std::size_t>(array.size())};
+}
+
+void require_apart(std::span<const float> first, std::span<const float> second, const char* names) {
+  const std::less<const float*> is_before;
+  const auto ends_before = [&](std::span<const float> a, std::span<const float> b) {
+    return !is_before(b.data(), a.data() + a.size());
+  };
+  if (!ends_before(first, second) && !ends_before(second, first))
+    throw InputError(std::string(names) + " = the same memory: must not overlap");
 }
 
 Vector3 vector_of(const Numbers& values, const char* name) {

@@ -25,13 +25,19 @@ std::string shape_text(const py::array& array);
 /// InputError naming `name` unless the array has this shape; -1 is any extent.
 void require_shape(const py::array& array, const char* name, const std::vector<py::ssize_t>& shape);
 
-/// A new float32 array, or `out` itself: InputError unless that is float32, C-contiguous, writeable
-/// and of this shape.
+/// InputError naming `name` unless numbers stand in memory where the processor wants them.
+void require_aligned(const py::array& array, const char* name);
+
+/// A new float32 array, or `out` itself: InputError unless that is float32, C-contiguous, aligned,
+/// writeable and of this shape.
 py::array_t<float> output_array(const std::vector<py::ssize_t>& shape,
                                 const py::object& out,
                                 const char* name);
 
 std::span<float> floats_of(py::array_t<float>& array);
+
+/// InputError naming both when two outputs share memory.
+void require_apart(std::span<const float> first, std::span<const float> second, const char* names);
 
 Vector3 vector_of(const Numbers& values, const char* name);
 Pose pose_of(const Numbers& matrix, const char* name);

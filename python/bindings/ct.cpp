@@ -9,6 +9,7 @@
 
 #include "attenuation_fields/errors.h"
 #include "python/bindings/arrays.h"
+#include "python/bindings/texts.h"
 
 namespace attenuation_fields::python {
 namespace {
@@ -32,6 +33,7 @@ Ct ct_of_array(const Voxels& hu,
                const Numbers& origin_mm,
                const Numbers& direction) {
   require_shape(hu, "hu", {-1, -1, -1});
+  require_aligned(hu, "hu");
   require_shape(direction, "direction", {3, 3});
   CtGrid grid;
   for (int axis = 0; axis < 3; ++axis) {
@@ -51,8 +53,7 @@ Ct ct_read(const std::filesystem::path& path, const std::string& series_uid) {
     const py::gil_scoped_release release;
     return Ct::read(path, series_uid);
   }();
-  for (const std::string& text : ct.warnings())
-    if (PyErr_WarnEx(PyExc_UserWarning, text.c_str(), 1) != 0) throw py::error_already_set();
+  warn_of(ct.warnings());
   return ct;
 }
 
@@ -79,8 +80,9 @@ void bind_ct(py::module_& module) {
       "origin_mm"_a = std::array<double, 3>{},
       "direction"_a =
           std::array<std::array<double, 3>, 3>{{{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}}},
-      "A CT of an int16 array (k, j, i), which is not copied when it is in C order. spacing_mm "
-      "and origin_mm are (x, y, z), the columns of direction those of i, j, k.");
+      "A CT of an int16 array (k, j, i), which is not copied when it is in C order: it must "
+      "not change afterwards, because attenuation and hash are kept. spacing_mm and origin_mm are "
+      "(x, y, z), the columns of direction those of i, j, k.");
   ct.def_static("read",
                 &ct_read,
                 "path"_a,

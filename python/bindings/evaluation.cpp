@@ -7,6 +7,7 @@
 
 #include "attenuation_fields/errors.h"
 #include "python/bindings/arrays.h"
+#include "python/bindings/texts.h"
 
 namespace attenuation_fields::python {
 namespace {
@@ -16,6 +17,12 @@ using Floats = py::array_t<float, py::array::c_style | py::array::forcecast>;
 
 std::span<const float> values_of(const Floats& array) {
   return {array.data(), static_cast<std::size_t>(array.size())};
+}
+
+py::list cells_of(const std::vector<std::string>& cells) {
+  py::list texts;
+  for (const std::string& cell : cells) texts.append(cell_of(cell));
+  return texts;
 }
 
 void bind_table(py::module_& module) {
@@ -28,9 +35,14 @@ void bind_table(py::module_& module) {
         return Table::read(path);
       },
       "path"_a);
-  table.def_property_readonly("columns", &Table::columns);
+  table.def_property_readonly("columns",
+                              [](const Table& self) { return cells_of(self.columns()); });
   table.def("__len__", &Table::row_count);
-  table.def("texts", &Table::texts, "column"_a, "A column as a list of texts.");
+  table.def(
+      "texts",
+      [](const Table& self, const std::string& column) { return cells_of(self.texts(column)); },
+      "column"_a,
+      "A column as a list of texts; bytes that are not UTF-8 as os.fsdecode() has them.");
   table.def(
       "numbers",
       [](const Table& self, const std::string& column) {
@@ -61,6 +73,7 @@ void bind_evaluation(py::module_& module) {
   module.def(
       "psnr_db",
       [](const Floats& drr, const Floats& reference) {
+        require_shape(drr, "drr", {reference.shape(), reference.shape() + reference.ndim()});
         return psnr_db(values_of(drr), values_of(reference));
       },
       "drr"_a,

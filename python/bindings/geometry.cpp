@@ -5,6 +5,7 @@
 #include <pybind11/stl/filesystem.h>
 
 #include "python/bindings/arrays.h"
+#include "python/bindings/texts.h"
 
 namespace attenuation_fields::python {
 namespace {
@@ -101,8 +102,7 @@ void bind_rig(py::module_& module) {
       [](const std::filesystem::path& name_or_path) {
         std::vector<std::string> warnings;
         Rig rig_read = Rig::read(name_or_path.string(), &warnings);
-        for (const std::string& text : warnings)
-          if (PyErr_WarnEx(PyExc_UserWarning, text.c_str(), 1) != 0) throw py::error_already_set();
+        warn_of(warnings);
         return rig_read;
       },
       "name_or_path"_a,

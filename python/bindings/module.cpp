@@ -4,6 +4,7 @@
 #include "attenuation_fields/errors.h"
 #include "attenuation_fields/version.h"
 #include "python/bindings/arrays.h"
+#include "python/bindings/texts.h"
 
 namespace attenuation_fields::python {
 namespace {
@@ -11,7 +12,7 @@ namespace {
 /// Raises attenuation_fields.errors.NAME with the text and the exit code of the programs.
 void raise(const char* name, const Error& error) {
   const py::object type = py::module_::import("attenuation_fields.errors").attr(name);
-  py::object exception = type(error.what());
+  py::object exception = type(message_of(error.what()));
   exception.attr("exit_code") = error.exit_code();
   PyErr_SetObject(type.ptr(), exception.ptr());
 }

@@ -6,6 +6,7 @@
 #include <pybind11/stl/filesystem.h>
 
 #include "python/bindings/arrays.h"
+#include "python/bindings/texts.h"
 
 namespace attenuation_fields::python {
 namespace {
@@ -111,6 +112,8 @@ RegistrationCase load(const std::filesystem::path& study,
                       bool correct,
                       bool skip_ct_check,
                       double water_mu_per_mm,
+                      int air_below_hu,
+                      double step_mm,
                       const std::string& ct_series_uid,
                       std::uint64_t seed,
                       int threads,
@@ -126,6 +129,8 @@ RegistrationCase load(const std::filesystem::path& study,
   options.correct = correct;
   options.skip_ct_check = skip_ct_check;
   options.water_mu_per_mm = water_mu_per_mm;
+  options.air_below_hu = air_below_hu;
+  options.step_mm = step_mm;
   options.ct_series_uid = ct_series_uid;
   options.seed = seed;
   options.threads = threads;
@@ -134,9 +139,13 @@ RegistrationCase load(const std::filesystem::path& study,
     const py::gil_scoped_release release;
     return RegistrationCase::load(study, case_name, options);
   }();
-  for (const std::string& text : loaded.warnings())
-    if (PyErr_WarnEx(PyExc_UserWarning, text.c_str(), 1) != 0) throw py::error_already_set();
+  warn_of(loaded.warnings());
   return loaded;
+}
+
+Pose usual_start(const RegistrationCase& owner) {
+  const std::optional<Pose> by_landmarks = owner.landmark_start();
+  return by_landmarks.has_value() ? *by_landmarks : owner.frame().pose({}, {});
 }
 
 void bind_case(py::module_& module) {
@@ -169,6 +178,8 @@ void bind_case(py::module_& module) {
                                "correct"_a = false,
                                "skip_ct_check"_a = false,
                                "water_mu_per_mm"_a = RegistrationOptions{}.water_mu_per_mm,
+                               "air_below_hu"_a = RegistrationOptions{}.air_below_hu,
+                               "step_mm"_a = RegistrationOptions{}.step_mm,
                                "ct_series_uid"_a = "",
                                "seed"_a = 1,
                                "threads"_a = 1,
@@ -188,6 +199,14 @@ void bind_case(py::module_& module) {
       },
       "The pose that errors are measured against, or None.");
   registration_case.def(
+      "landmark_start",
+      [](const RegistrationCase& self) -> py::object {
+        const std::optional<Pose> start = self.landmark_start();
+        if (!start.has_value()) return py::none();
+        return matrix_of(*start);
+      },
+      "The pose that the study's landmarks give, or None without them.");
+  registration_case.def(
       "tre_mm",
       [](const RegistrationCase& self, const Numbers& pose) {
         return self.tre_mm(pose_of(pose, "pose"));
@@ -197,13 +216,13 @@ void bind_case(py::module_& module) {
   registration_case.def(
       "run",
       [](const RegistrationCase& self, const std::optional<Numbers>& start, std::int64_t index) {
-        const Pose pose = start.has_value() ? pose_of(*start, "start") : self.frame().pose({}, {});
+        const Pose pose = start.has_value() ? pose_of(*start, "start") : usual_start(self);
         const py::gil_scoped_release release;
         return self.run(pose, index);
       },
       "start"_a = py::none(),
       "start_index"_a = 0,
-      "Registers from a 4x4 start [the nominal pose].");
+      "Registers from a 4x4 start [as af-register: landmark_start(), else the nominal pose].");
   registration_case.def(
       "run_all",
       [](const RegistrationCase& self, const Numbers& starts) {
@@ -212,7 +231,8 @@ void bind_case(py::module_& module) {
         return self.run_all(poses);
       },
       "starts"_a,
-      "Registers from many starts (n, 4, 4).");
+      "Registers from many starts (n, 4, 4); the X-rays of the best end are not looked into, as "
+      "run() does.");
   registration_case.def(
       "similarity",
       [](const RegistrationCase& self, const Numbers& pose) {

@@ -55,6 +55,7 @@ py::tuple drr_and_gradient(const Renderer& self,
   py::array_t<float> gradient = output_array(shape_of(self, {6}), gradient_out, "gradient_out");
   const std::span<float> pixels = floats_of(image);
   const std::span<float> planes = floats_of(gradient);
+  require_apart(pixels, planes, "out, gradient_out");
   {
     const py::gil_scoped_release release;
     self.drr_and_gradient(rotation_deg, translation_mm, pixels, planes);

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "register/problem/pose_target.h"
 
-#include <algorithm>
 #include <utility>
 
 namespace af::registration {
@@ -11,20 +10,10 @@ namespace {
 /// beyond it.
 constexpr double kInsideShare = 1e-9;
 
-double clamped(double value, double limit) {
-  return std::clamp(value, -limit * (1.0 - kInsideShare), limit * (1.0 - kInsideShare));
-}
-
 /// The pose of a motion limit's box nearest to `room_from_ct`, parameter by parameter.
 RigidTransform clamped_pose(const MotionLimit& limit, const RigidTransform& room_from_ct) {
-  PoseParameters parameters = parameters_from_pose(limit.frame, room_from_ct);
-  for (int axis = 0; axis < 3; ++axis) {
-    parameters.rotation_rad[axis] =
-        clamped(parameters.rotation_rad[axis], limit.range.max_rotation_rad);
-    parameters.translation_mm[axis] =
-        clamped(parameters.translation_mm[axis], limit.range.max_translation_mm);
-  }
-  return pose_from_parameters(limit.frame, parameters);
+  const PoseParameters parameters = parameters_from_pose(limit.frame, room_from_ct);
+  return pose_from_parameters(limit.frame, limit.range.clamped(parameters, 1.0 - kInsideShare));
 }
 
 }  // namespace

@@ -29,7 +29,12 @@ struct RegistrationView {
   Image2d mask_without_markers;
   std::shared_ptr<const DrrRenderer> renderer;
   std::vector<RendererLevel> coarse_levels;  ///< levels 1, 2, ... as far as stages need them
-  std::optional<MotionLimit> limit;  ///< motion box of the renderer's field; none for ray casting
+  /// Motion box of the renderer's field; none for ray casting, and none where the field was made
+  /// for another camera: then rays alone decide.
+  std::optional<MotionLimit> limit;
+  /// A box of poses whose rays the field holds: `limit`, or, for another camera, the largest about
+  /// the nominal pose. Starts are drawn from it; it limits nothing.
+  std::optional<MotionLimit> reach;
   /// [level] Ray casting, where a correction needs it; else none.
   std::vector<std::shared_ptr<const DrrRenderer>> ray_casts;
 };

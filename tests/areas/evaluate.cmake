@@ -9,6 +9,7 @@ af_add_test(
           unit/evaluate/statistics/case_equivalence_test.cpp
           unit/evaluate/statistics/roc_test.cpp
           support/interval_coverage.cpp
+          unit/evaluate/registration/population_statistics_test.cpp
           unit/evaluate/registration/registration_errors_test.cpp
           unit/evaluate/sweeps/error_budget_test.cpp
           unit/evaluate/sweeps/lattice_errors_test.cpp
@@ -27,6 +28,8 @@ af_add_test(
   SOURCES unit/evaluate/report/report_text_test.cpp unit/evaluate/registration/evaluation_rows_test.cpp
           unit/evaluate/registration/failure_traces_test.cpp unit/evaluate/report/study_runs_test.cpp
   LIBS af_evaluation_program af_evaluation_report af_study af_run)
+
+af_add_test(start_tables_test SOURCES unit/evaluate/registration/start_tables_test.cpp LIBS af_evaluation_tables)
 
 af_add_program_tests(
   evaluate_statistics_program_tests EACH_TEST

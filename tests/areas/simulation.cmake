@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 af_add_test(
   simulation_test
-  SOURCES unit/simulation/automatic_target_test.cpp
+  SOURCES unit/simulation/anatomy_test.cpp
+          unit/simulation/automatic_target_test.cpp
           unit/simulation/detector_model_test.cpp
           unit/simulation/fiducials_test.cpp
           unit/simulation/phantom_test.cpp
           unit/simulation/siddon_projector_test.cpp
+          unit/simulation/solid_projector_test.cpp
           unit/simulation/solid_test.cpp
           unit/simulation/spine_phantom_test.cpp
           unit/simulation/stress_test.cpp

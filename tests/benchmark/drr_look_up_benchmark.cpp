@@ -27,8 +27,8 @@ std::vector<RigidTransform> random_poses(const CompressedAttenuationField& field
     HashRandom random(1, static_cast<std::uint64_t>(i));
     PoseParameters parameters;
     for (Eigen::Index axis = 0; axis < 3; ++axis) {
-      parameters.rotation_rad[axis] = range.max_rotation_rad * (2.0 * random.uniform() - 1.0);
-      parameters.translation_mm[axis] = range.max_translation_mm * (2.0 * random.uniform() - 1.0);
+      parameters.rotation_rad[axis] = range.max_rotation_rad() * (2.0 * random.uniform() - 1.0);
+      parameters.translation_mm[axis] = range.max_translation_mm() * (2.0 * random.uniform() - 1.0);
     }
     poses.push_back(pose_from_parameters(field.identity.frame, parameters));
   }

@@ -188,8 +188,8 @@ void run(const CaseOptions& options, const std::string& field_path, const Commun
     std::array<double, 6> p{};
     for (double& value : p) value = random.uniform(-1.0, 1.0);
     PoseParameters parameters;
-    parameters.rotation_rad = range.max_rotation_rad * Eigen::Vector3d(p[0], p[1], p[2]);
-    parameters.translation_mm = range.max_translation_mm * Eigen::Vector3d(p[3], p[4], p[5]);
+    parameters.rotation_rad = range.max_rotation_rad() * Eigen::Vector3d(p[0], p[1], p[2]);
+    parameters.translation_mm = range.max_translation_mm() * Eigen::Vector3d(p[3], p[4], p[5]);
     poses.push_back(pose_from_parameters(field->identity.frame, parameters));
     references.push_back(render_image(ray_cast, poses.back(), view));
   }

@@ -2,6 +2,7 @@
 // Tables: CSV as such, poses for DRRs, starts of registrations, and poses that were found.
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "evaluate/registration/start_tables.h"
 #include "fuzz/fuzz_input.h"
@@ -27,7 +28,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   fuzz::is_accepted([&] { (void)read_pose_file(path, {PoseFrame(), {}, {}, {}}); });
   evaluation::PoseTableFrames frames;
   frames.case_name = "skull-01";
-  fuzz::is_accepted([&] { evaluation::read_starts(path, frames); });
+  std::vector<std::string> notes;
+  fuzz::is_accepted([&] { evaluation::read_starts(path, frames, notes); });
   fuzz::is_accepted([&] { evaluation::read_found_poses(path, frames); });
   fuzz::is_accepted([&] { evaluation::unknown_case_problems(path, {"skull-01"}); });
   return 0;

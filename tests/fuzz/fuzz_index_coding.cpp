@@ -25,6 +25,15 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const bool is_accepted = coding.decode(input.rest(), tiles, indices);
   for (const std::uint16_t index : indices)
     fuzz::require(index < codebook.size(), "an index of the codebook");
+  const auto rest = input.rest();
+  std::vector<std::uint16_t> again(indices.size());
+  std::vector<std::uint16_t> of_half(indices.size());
+  std::vector<std::uint16_t> once_more(indices.size());
+  const std::array<CodedBlock, 3> together = {
+      {{rest, again}, {rest.first(rest.size() / 2), of_half}, {rest, once_more}}};
+  const bool are_accepted = coding.decode(together, tiles);
+  fuzz::require(again == indices && once_more == indices && !(are_accepted && !is_accepted),
+                "blocks decode together as one by one");
   if (!is_accepted) return 0;
   const auto bytes = coding.encode(indices, tiles);
   std::vector<std::uint16_t> back(indices.size());

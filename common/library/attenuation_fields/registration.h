@@ -107,10 +107,17 @@ class ATTENUATION_FIELDS_API RegistrationCase {
   /// Mean distance (mm) over the target box between where a pose and the gold pose put its points.
   [[nodiscard]] std::optional<double> tre_mm(const Pose& pose) const;
 
+  /// The pose that the landmarks give which the study states in CT and X-rays: where af-register
+  /// starts when it is given no start. nullopt when it states none; InputError when no pose fits
+  /// them.
+  [[nodiscard]] std::optional<Pose> landmark_start() const;
+
   /// Registers from a start. `start_index` is a key of random numbers. What af-register writes into
   /// result.json, to the bit (its seconds excepted).
   [[nodiscard]] Registration run(const Pose& start, std::int64_t start_index = 0) const;
-  /// From many starts, by their positions; verdicts as in registrations.csv.
+  /// From many starts, by their positions; verdicts as in registrations.csv, without what
+  /// af-register finds out about the X-rays of the best one: that may turn its verdict from found
+  /// to doubtful. run() finds it out.
   [[nodiscard]] std::vector<Registration> run_all(std::span<const Pose> starts) const;
   /// The similarity that results are compared by, at a pose; nullopt where it is inadmissible.
   [[nodiscard]] std::optional<double> similarity(const Pose& pose) const;

@@ -46,6 +46,7 @@ class ATTENUATION_FIELDS_API Renderer {
   /// The same with six planes of pixel_count() values: its derivatives by small motions after
   /// `pose`, x_room -> p + t + Rz Ry Rx (x_room - p), at zero: by rx, ry, rz per rad, then by tx,
   /// ty, tz per mm. These are what the programs optimise with.
+  /// InputError for a pivot beyond 1 km.
   std::int64_t drr_and_motion_gradient(const Pose& pose,
                                        const Vector3& pivot_room_mm,
                                        std::span<float> total_attenuation,

@@ -11,6 +11,7 @@
 #include "field_file/field_file.h"
 #include "figures/picture.h"
 #include "files/resource_check.h"
+#include "geometry/camera_distance.h"
 #include "image/psnr.h"
 #include "image_files/ct_reader.h"
 #include "image_files/image_file.h"
@@ -28,7 +29,7 @@ void describe_source(Fields& field, DrrOptions& options) {
   field("field",
         options.field,
         "Look DRRs up in this field; its own camera is used unless --rig and --camera name "
-        "another")
+        "another, whose rays it has to hold")
       .stands_for(PathRole::InputFile, ".h5");
   field("ct", options.ct, "Cast rays through this CT (DICOM folder, NIfTI, MetaImage, NRRD)")
       .stands_for(PathRole::InputVolume, ".nrrd");
@@ -240,7 +241,12 @@ DrrScene load_scene(const DrrOptions& options, const Communicator& communicator)
         field, options.look_up.empty() ? info.look_up : options.look_up, scene.pool);
   }
   const DrrSource source = source_of(options);
-  if (source.camera.has_value()) scene.view = View::whole_detector(*source.camera);
+  if (source.camera.has_value()) {
+    scene.view = View::whole_detector(*source.camera);
+    if (field)
+      scene.note = "camera " + source.camera->name + ": " +
+                   camera_distance(*source.camera, field->identity.camera).text();
+  }
   if (source.frame.has_value())
     scene.frame = *source.frame;
   else if (!field)
@@ -253,14 +259,16 @@ DrrScene load_scene(const DrrOptions& options, const Communicator& communicator)
   return scene;
 }
 
-std::vector<RigidTransform> requested_poses(const DrrOptions& options, const DrrScene& scene) {
+std::vector<RigidTransform> requested_poses(const DrrOptions& options,
+                                            const DrrScene& scene,
+                                            std::vector<std::string>& notes) {
   const DrrSource source = source_of(options);
   const PoseContext context = pose_context(source.ct,
                                            source.ct_reading,
                                            CameraRig{Eigen::Vector3d::Zero(), {scene.view.camera}},
                                            scene.frame);
-  if (!options.poses.empty()) return read_poses(options.poses, context);
-  if (!options.pose.empty()) return {read_pose(options.pose, context)};
+  if (!options.poses.empty()) return read_poses(options.poses, context, &notes);
+  if (!options.pose.empty()) return {read_pose(options.pose, context, &notes)};
   std::array<double, 6> values{};
   for (std::size_t i = 0; i < 3; ++i) {
     if (options.rotation_deg.has_value()) values[i] = (*options.rotation_deg)[i];
@@ -282,7 +290,8 @@ void require_room(std::size_t poses, const View& view, const std::filesystem::pa
 std::vector<Image2d> render_poses(const DrrRenderer& renderer,
                                   const View& view,
                                   const std::vector<RigidTransform>& poses,
-                                  ThreadPool& pool) {
+                                  ThreadPool& pool,
+                                  const std::string& note) {
   std::vector<Image2d> drrs(poses.size());
   pool.for_each(static_cast<int>(poses.size()), [&](int task, int /*slot*/) {
     const auto i = static_cast<std::size_t>(task);
@@ -291,7 +300,8 @@ std::vector<Image2d> render_poses(const DrrRenderer& renderer,
     if (rays_outside > 0)
       throw InputError("pose " + std::to_string(i) + " = outside the field: " +
                        std::to_string(rays_outside) + " of " + std::to_string(view.pixel_count()) +
-                       " rays miss its planes; must be within the motion range it was made for");
+                       " rays miss its planes; must be within the motion range it was made for" +
+                       (note.empty() ? "" : " (" + note + ")"));
   });
   return drrs;
 }
@@ -332,9 +342,9 @@ std::string write_comparison(const DrrScene& scene,
                              const RigidTransform& room_from_ct,
                              const std::filesystem::path& path) {
   const Image2d field =
-      render_poses(*scene.renderer, scene.view, {room_from_ct}, *scene.pool).front();
+      render_poses(*scene.renderer, scene.view, {room_from_ct}, *scene.pool, scene.note).front();
   const Image2d cast =
-      render_poses(*scene.reference, scene.view, {room_from_ct}, *scene.pool).front();
+      render_poses(*scene.reference, scene.view, {room_from_ct}, *scene.pool, "").front();
   const std::optional<Psnr> quality = psnr(field.pixels, cast.pixels);
   Image2d difference = field;
   for (std::size_t i = 0; i < difference.pixels.size(); ++i) difference.pixels[i] -= cast.pixels[i];

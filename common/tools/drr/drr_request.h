@@ -60,23 +60,28 @@ struct DrrScene {
   View view;
   PoseFrame frame;
   std::shared_ptr<ThreadPool> pool;
+  std::string note;  ///< of a field: how far the camera is from its own; empty for its own
 };
 
 /// Collective. Reads field, CT and rig. FileError when --compare's CT is not the field's.
 DrrScene load_scene(const DrrOptions& options, const Communicator& communicator);
 
-/// Poses in the order of the options or their file.
-std::vector<RigidTransform> requested_poses(const DrrOptions& options, const DrrScene& scene);
+/// Poses in the order of the options or their file; `notes` get what was left out of it and
+/// assumed.
+std::vector<RigidTransform> requested_poses(const DrrOptions& options,
+                                            const DrrScene& scene,
+                                            std::vector<std::string>& notes);
 
 /// InputError when so many DRRs fit neither into memory nor on the disk of the output.
 void require_room(std::size_t poses, const View& view, const std::filesystem::path& output);
 
-/// DRRs of all poses, shared by the threads of the pool; InputError when any ray of any pose is
-/// outside the field.
+/// DRRs of all poses, shared by the threads of the pool; InputError, with `note`, when any ray of
+/// any pose is outside the field.
 std::vector<Image2d> render_poses(const DrrRenderer& renderer,
                                   const View& view,
                                   const std::vector<RigidTransform>& poses,
-                                  ThreadPool& pool);
+                                  ThreadPool& pool,
+                                  const std::string& note);
 
 /// One DRR, a stack of several, or a PNG, by the name's extension. Returns a line about it.
 std::string write_drrs(const std::vector<Image2d>& drrs,

@@ -8,6 +8,7 @@
 #include "cli/bind_options.h"
 #include "cli/slicer_module.h"
 #include "files/output_file.h"
+#include "run/terminal.h"
 #include "tools/drr/drr_request.h"
 
 namespace {
@@ -18,8 +19,11 @@ void run(const DrrOptions& options, const af::Communicator& world) {
   af::throw_if_any(problems(options));
   if (world.is_root()) af::announce_output(options.output);
   const af::tools::DrrScene scene = af::tools::load_scene(options, world);
-  const std::vector<af::RigidTransform> poses = af::tools::requested_poses(options, scene);
+  std::vector<std::string> notes;
+  const std::vector<af::RigidTransform> poses = af::tools::requested_poses(options, scene, notes);
+  for (const std::string& text : notes) af::warn(world, text);
   if (!world.is_root()) return;
+  if (!scene.note.empty()) std::cout << scene.note << '\n';
   if (options.compare) {
     const std::string words = af::tools::write_comparison(scene, poses.front(), options.output);
     std::cout << options.output.string() << ": " << words << '\n';
@@ -27,7 +31,7 @@ void run(const DrrOptions& options, const af::Communicator& world) {
   }
   af::tools::require_room(poses.size(), scene.view, options.output);
   const std::vector<af::Image2d> drrs =
-      af::tools::render_poses(*scene.renderer, scene.view, poses, *scene.pool);
+      af::tools::render_poses(*scene.renderer, scene.view, poses, *scene.pool, scene.note);
   std::cout << af::tools::write_drrs(drrs, scene.view, options) << '\n';
 }
 

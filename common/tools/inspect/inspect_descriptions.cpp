@@ -5,8 +5,12 @@
 #include <set>
 
 #include "camera_files/camera_formats.h"
+#include "drr/slab_rays.h"
+#include "field_file/field_file.h"
 #include "files/output_file.h"
 #include "files/sha256.h"
+#include "geometry/camera_distance.h"
+#include "geometry/ray_coverage.h"
 #include "image_files/image_file.h"
 #include "pose_files/pose_file.h"
 #include "study/rig_file.h"
@@ -74,7 +78,37 @@ void require_existing(const fs::path& path) {
   if (!fs::exists(path)) throw FileError(path.string(), "does not exist");
 }
 
-ordered_json view_json(const StudyView& view,
+/// What the field of a view covers of the rays of its region, about the case's nominal pose.
+void describe_coverage(const StudyCase& study_case,
+                       const StudyView& view,
+                       const CameraGeometry& camera,
+                       ordered_json& json,
+                       std::vector<std::string>& warnings) {
+  try {
+    const CompressedAttenuationField field = read_field_header(*view.field);
+    const View region = View{camera, view.roi};
+    const PoseFrame nominal = study_case.frame();
+    const CameraDistance distance = camera_distance(camera, field.identity.camera);
+    json["field_camera"] = distance.text();
+    const auto rays = static_cast<std::int64_t>(region.pixel_count());
+    const std::int64_t outside =
+        SlabRays(field.light_slab, nominal.nominal_room_from_ct(), region).count_outside();
+    json["field_coverage"] = coverage_text(
+        camera.name,
+        rays - outside,
+        rays,
+        covered_box(field.light_slab, region.coarser(1).camera, nominal, field.identity.range));
+    if (outside > 0)
+      warnings.push_back("field " + view.field->string() + " misses " + std::to_string(outside) +
+                         " of " + std::to_string(rays) + " rays of camera " + camera.name +
+                         " at the nominal pose");
+  } catch (const Error& error) {
+    warnings.push_back("field " + view.field->string() + " cannot be used: " + error.what());
+  }
+}
+
+ordered_json view_json(const StudyCase& study_case,
+                       const StudyView& view,
                        const CameraRig& rig,
                        std::vector<std::string>& warnings) {
   ordered_json json;
@@ -93,7 +127,9 @@ ordered_json view_json(const StudyView& view,
   if (!view.field) return json;
   json["field"] = view.field->string();
   // A study is written before its fields are made.
-  if (!fs::exists(*view.field))
+  if (fs::exists(*view.field))
+    describe_coverage(study_case, view, camera, json, warnings);
+  else
     warnings.push_back("field " + view.field->string() +
                        " does not exist yet; af-precompute --study ... --camera " + view.camera +
                        " -o makes it");
@@ -115,7 +151,7 @@ ordered_json case_json(const StudyCase& study_case,
   json["fiducials"] = study_case.fiducials_ct_mm.size();
   json["has_gold_pose"] = study_case.gold_room_from_ct.has_value();
   for (const StudyView& view : study_case.views)
-    json["views"].push_back(view_json(view, rig, warnings));
+    json["views"].push_back(view_json(study_case, view, rig, warnings));
   return json;
 }
 

@@ -79,7 +79,8 @@ void Options::describe(af::Fields& field) {
         "With --rig-from: file to write instead of printing it; with --pose-to: the file to write")
       .as("-o,--output");
   field.part(ct);
-  field.last().help = "SeriesInstanceUID to read from a DICOM folder that holds several series";
+  field.at("series").help =
+      "SeriesInstanceUID to read from a DICOM folder that holds several series";
 }
 
 /// The report of each path as soon as it is known; JSON is one array.

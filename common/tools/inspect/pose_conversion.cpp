@@ -60,7 +60,7 @@ std::string converted_poses(const std::filesystem::path& path,
   const PosesInFile found = read_pose_file(path, context);
   notes.insert(notes.end(), found.notes.begin(), found.notes.end());
   std::vector<RigidTransform> poses;
-  for (const PosesInFile::Named& pose : found.poses) poses.push_back(pose.room_from_ct);
+  for (const PosesInFile::Numbered& pose : found.poses) poses.push_back(pose.room_from_ct);
   if (poses.empty()) throw InputError(path.string() + ": holds no pose");
   return pose_file_bytes(options.format, poses, context);
 }

@@ -2,6 +2,7 @@
 // af-simulate: a whole registration study, with a known answer, from a CT or a phantom.
 #include <optional>
 #include <string>
+#include <utility>
 
 #include <CLI/CLI.hpp>
 
@@ -25,24 +26,28 @@ using namespace af;
 using tools::SimulatedCase;
 using tools::SimulateOptions;
 
-/// A patient as X-rays and as the CT show them. The two differ only where the CT clips metal.
+/// A patient as X-rays and as the CT show them. The two differ where the CT clips metal; and X-rays
+/// of drawn anatomies are of the bodies, not of voxels.
 struct Patient {
   CtVolume anatomy;
   CtVolume ct;
+  std::optional<Phantom> bodies;
 };
 
 Patient patient(const SimulateOptions& options, const Communicator& world) {
   if (!options.phantom.empty()) {
-    PhantomOptions phantom = options.phantom_options;
-    phantom.threads = options.xray.threads;
-    const CtVolume anatomy =
-        sample_phantom(make_phantom(options.phantom, phantom.has_metal), phantom);
-    return {anatomy, phantom.has_metal ? with_scanner_range(anatomy) : anatomy};
+    PhantomOptions sampling = options.phantom_options;
+    sampling.threads = options.xray.threads;
+    Phantom phantom = phantom_of(options);
+    const CtVolume anatomy = sample_phantom(phantom, sampling);
+    const CtVolume ct = phantom.has_metal() ? with_scanner_range(anatomy) : anatomy;
+    if (!sampling.anatomy_seed) return {anatomy, ct, std::nullopt};
+    return {anatomy, ct, std::move(phantom)};
   }
   std::vector<std::string> warnings;
   const CtVolume ct = read_ct(options.ct, options.ct_reading, &warnings);
   for (const std::string& warning : warnings) warn(world, warning);
-  return {ct, ct};
+  return {ct, ct, std::nullopt};
 }
 
 CameraRig cameras(const SimulateOptions& options, const Communicator& world) {
@@ -72,10 +77,17 @@ SimulatedCase imaged_case(const SimulateOptions& options,
                           const std::filesystem::path& folder) {
   SimulatedCase simulated =
       plan_case(options, patient.ct, rig, AttenuationVolume(patient.ct, options.attenuation));
-  const AttenuationVolume volume(imaged_anatomy(options, patient.anatomy, simulated),
-                                 options.attenuation);
   ProgressPrinter printer("Taking X-rays", true);
-  take_xrays(options, volume, folder, simulated, printer.callback());
+  const auto take = [&](const XraySimulator& simulator) {
+    take_xrays(options, simulator, folder, simulated, printer.callback());
+  };
+  if (patient.bodies) {
+    take(body_simulator(options, *patient.bodies, simulated));
+  } else {
+    const AttenuationVolume volume(imaged_anatomy(options, patient.anatomy, simulated),
+                                   options.attenuation);
+    take(voxel_simulator(options, volume, simulated));
+  }
   return simulated;
 }
 

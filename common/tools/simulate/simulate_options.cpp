@@ -105,6 +105,8 @@ XraySimulationOptions SimulateOptions::xray_in_force() const {
 
 std::string SimulateOptions::case_name_in_force() const {
   if (!case_name.empty()) return case_name;
+  if (!phantom.empty() && phantom_options.anatomy_seed)
+    return phantom + "-" + std::to_string(*phantom_options.anatomy_seed);
   if (!phantom.empty()) return phantom + "-phantom";
   std::filesystem::path path = std::filesystem::absolute(ct).lexically_normal();
   if (!path.has_filename()) path = path.parent_path();
@@ -118,6 +120,8 @@ std::vector<std::string> problems(const SimulateOptions& options) {
   if (found.empty()) found = problems(options.stress);
   if (options.phantom_options.has_metal && options.phantom.empty())
     found.push_back("metal: needs a phantom; a CT has its own");
+  if (options.phantom_options.anatomy_seed && options.phantom.empty())
+    found.push_back("anatomy-seed: needs a phantom; a CT is one patient");
   for (const double value : options.center_ct_mm)
     if (!std::isfinite(value)) found.push_back("center_ct_mm must be finite");
   const std::vector<double>& box = options.target_box_ct_mm;
@@ -132,6 +136,11 @@ std::vector<std::string> problems(const SimulateOptions& options) {
   if (options.case_name.find_first_of("/\\\"\n") != std::string::npos)
     found.push_back("case = " + options.case_name + ": must not hold / \\ \" or line ends");
   return found;
+}
+
+Phantom phantom_of(const SimulateOptions& options) {
+  return make_phantom(
+      options.phantom, options.phantom_options.has_metal, options.phantom_options.anatomy_seed);
 }
 
 void SimulateOptions::describe(Fields& field) {

@@ -52,4 +52,7 @@ struct SimulateOptions {
 
 std::vector<std::string> problems(const SimulateOptions& options);
 
+/// The phantom that is asked for.
+Phantom phantom_of(const SimulateOptions& options);
+
 }  // namespace af::tools

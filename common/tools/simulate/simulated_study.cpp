@@ -46,9 +46,8 @@ RegistrationTarget chosen_target(const SimulateOptions& options, const CtVolume&
   } else if (center.size() == 3) {
     target = target_box_at({center[0], center[1], center[2]}, options.target_side_mm);
   } else {
-    target = options.phantom.empty()
-                 ? find_target(ct, options.target_side_mm)
-                 : make_phantom(options.phantom, options.phantom_options.has_metal).target;
+    target = options.phantom.empty() ? find_target(ct, options.target_side_mm)
+                                     : phantom_of(options).target;
   }
   if (center.size() == 3) target.center_ct_mm = {center[0], center[1], center[2]};
   return target;
@@ -182,6 +181,11 @@ std::string note_text(const SimulateOptions& options) {
   std::string text = "X-rays simulated by af-simulate from ";
   text += options.phantom.empty() ? "a CT" : "the " + options.phantom + " phantom";
   if (options.phantom_options.has_metal) text += " with metal";
+  if (options.phantom_options.anatomy_seed) {
+    text += ", patient " + std::to_string(*options.phantom_options.anatomy_seed);
+    for (const std::string& finding : phantom_of(options).findings) text += ", " + finding;
+    text += "; X-rays of the bodies themselves, voxels in the CT only";
+  }
   const std::vector<StressDescription> stress = descriptions(options.stress);
   if (stress.empty()) return text;
   text += ", made harder by";
@@ -253,18 +257,48 @@ SimulatedCase plan_case(const SimulateOptions& options,
   return simulated;
 }
 
-CtVolume imaged_anatomy(const SimulateOptions& options,
-                        const CtVolume& anatomy,
-                        const SimulatedCase& simulated) {
-  if (!options.stress.has(Stress::Motion)) return anatomy;
+namespace {
+
+std::optional<SmoothMotion> wanted_motion(const SimulateOptions& options,
+                                          const SimulatedCase& simulated) {
+  if (!options.stress.has(Stress::Motion)) return std::nullopt;
   SmoothMotionOptions motion = options.stress.motion;
   motion.threads = options.xray.threads;
   const StudyCase& study_case = simulated.study_case;
-  return SmoothMotion(study_case.target_box_ct,
-                      motion,
-                      options.seed,
-                      view_key(study_case.name, "", "motion"))
-      .moved(anatomy);
+  return SmoothMotion(
+      study_case.target_box_ct, motion, options.seed, view_key(study_case.name, "", "motion"));
+}
+
+SteelBodies all_steel(const SimulatedCase& simulated) {
+  SteelBodies steel = simulated.occluders;
+  steel.cylinders.insert(
+      steel.cylinders.end(), simulated.fiducials.begin(), simulated.fiducials.end());
+  return steel;
+}
+
+}  // namespace
+
+XraySimulator voxel_simulator(const SimulateOptions& options,
+                              const AttenuationVolume& volume,
+                              const SimulatedCase& simulated) {
+  return {volume, all_steel(simulated), options.xray_in_force()};
+}
+
+XraySimulator body_simulator(const SimulateOptions& options,
+                             const Phantom& phantom,
+                             const SimulatedCase& simulated) {
+  return {phantom,
+          wanted_motion(options, simulated),
+          options.attenuation,
+          all_steel(simulated),
+          options.xray_in_force()};
+}
+
+CtVolume imaged_anatomy(const SimulateOptions& options,
+                        const CtVolume& anatomy,
+                        const SimulatedCase& simulated) {
+  const std::optional<SmoothMotion> motion = wanted_motion(options, simulated);
+  return motion ? motion->moved(anatomy) : anatomy;
 }
 
 std::optional<CtVolume> degraded_study_ct(const SimulateOptions& options,
@@ -299,8 +333,10 @@ void write_xray(const SimulateOptions& options,
     description.imager_spacing_mm = camera.pixel_spacing_mm;
     description.source_detector_mm = camera.source_detector_distance_mm();
     description.source_patient_mm = (isocenter_point - camera.source_point).norm();
-    const Eigen::Vector2d angles = positioner_angles_deg(
-        study_case.nominal_room_from_ct.linear().transpose() * camera.beam_direction());
+    const Eigen::Matrix3d ct_from_room = study_case.nominal_room_from_ct.linear().transpose();
+    description.column_direction_ct = ct_from_room * camera.column_direction;
+    description.row_direction_ct = ct_from_room * camera.row_direction;
+    const Eigen::Vector2d angles = positioner_angles_deg(ct_from_room * camera.beam_direction());
     description.primary_angle_deg = angles.x();
     description.secondary_angle_deg = angles.y();
     view.xray = folder / (camera.name + ".dcm");
@@ -315,16 +351,12 @@ void write_xray(const SimulateOptions& options,
 }  // namespace
 
 void take_xrays(const SimulateOptions& options,
-                const AttenuationVolume& volume,
+                const XraySimulator& simulator,
                 const std::filesystem::path& folder,
                 SimulatedCase& simulated,
                 const ProgressCallback& progress) {
   StudyCase& study_case = simulated.study_case;
   const XraySimulationOptions imaging = options.xray_in_force();
-  SteelBodies steel = simulated.occluders;
-  steel.cylinders.insert(
-      steel.cylinders.end(), simulated.fiducials.begin(), simulated.fiducials.end());
-  const XraySimulator simulator(volume, steel, imaging);
   const CameraRig& rig = simulated.true_rig;
   const auto camera_count = static_cast<double>(rig.cameras.size());
   for (std::size_t i = 0; i < rig.cameras.size(); ++i) {

@@ -33,7 +33,16 @@ SimulatedCase plan_case(const SimulateOptions& options,
                         const CameraRig& rig,
                         const AttenuationVolume& volume);
 
-/// What the X-rays show: the anatomy itself, or with the wanted non-rigid motion.
+/// The simulator of this case's X-rays from voxels (`volume` must outlive it) and from a phantom's
+/// bodies themselves; each with the wanted non-rigid motion.
+XraySimulator voxel_simulator(const SimulateOptions& options,
+                              const AttenuationVolume& volume,
+                              const SimulatedCase& simulated);
+XraySimulator body_simulator(const SimulateOptions& options,
+                             const Phantom& phantom,
+                             const SimulatedCase& simulated);
+
+/// What voxels show: the anatomy itself, or with the wanted non-rigid motion.
 CtVolume imaged_anatomy(const SimulateOptions& options,
                         const CtVolume& anatomy,
                         const SimulatedCase& simulated);
@@ -46,7 +55,7 @@ std::optional<CtVolume> degraded_study_ct(const SimulateOptions& options,
 /// Takes the X-ray of every view and writes it with its preview into `folder`; fills in the file
 /// names.
 void take_xrays(const SimulateOptions& options,
-                const AttenuationVolume& volume,
+                const XraySimulator& simulator,
                 const std::filesystem::path& folder,
                 SimulatedCase& simulated,
                 const ProgressCallback& progress);

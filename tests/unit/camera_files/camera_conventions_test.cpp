@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "camera_files/camera_formats.h"
+#include "camera_files/format_readers.h"
 #include "hdf5_files/hdf5_output.h"
 #include "support/io_checks.h"
 #include "unit/image_files/dicom_test_file.h"
@@ -209,6 +210,11 @@ TEST_F(CameraConventions, OpenCvRefusals) {
   EXPECT_THAT(input_refusal(test::replaced(good, "900.", "nan")), HasSubstr("finite"));
   EXPECT_THAT(input_refusal(test::replaced(good, "image_width: 512", "image_width: 5e9")),
               HasSubstr("32768"));
+  // A stereo calibration's R and t are of the second camera relative to the first.
+  const std::string stereo =
+      "K1: [1000, 0, 320, 0, 1000, 240, 0, 0, 1]\nK2: [1000, 0, 320, 0, 1000, 240, 0, 0, 1]\n"
+      "R: [1, 0, 0, 0, 1, 0, 0, 0, 1]\nt: [0, 0, 500]\n";
+  EXPECT_THAT(input_refusal(stereo), HasSubstr("relative to the first camera"));
   EXPECT_THAT(input_refusal(test::replaced(good, "[ 0., 0., 0.", "[ 0.1, 0., 0.")),
               HasSubstr("distortion"));
 }
@@ -316,6 +322,34 @@ TEST_F(CameraConventions, Rtk) {
       rig.cameras[1], {10, 20, 30}, {255.5 + uv.x() / uv.z() / 0.8, 199.5 + uv.y() / uv.z() / 0.8});
 }
 
+/// A beam along y: gantry and in-plane angle turn about one axis.
+TEST_F(CameraConventions, RtkWritesCamerasThatLookAlongTheGantrysAxis) {
+  for (const double side : {1.0, -1.0})
+    for (const double turn_rad : {0.0, 0.3, 3.1, -2.0}) {
+      const Eigen::AngleAxisd turn(turn_rad, Vector3d::UnitY());
+      CameraGeometry written;
+      written.name = "AP";
+      written.size_px = {64, 48};
+      written.pixel_spacing_mm = {0.8, 0.8};
+      written.source_point = Vector3d(0.0, -650.0 * side, 0.0);
+      written.column_direction = turn * Vector3d(1.0, 0.0, 0.0);
+      written.row_direction = turn * Vector3d(0.0, 0.0, side);
+      written.detector_origin_point = Vector3d(0.0, 370.0 * side, 0.0) -
+                                      25.2 * written.column_direction -
+                                      18.8 * written.row_direction;
+      CameraRig rig;
+      rig.isocenter_point = Vector3d::Zero();
+      rig.cameras = {written};
+      CameraFileOptions options;
+      options.size_px = {64, 48};
+      options.pixel_spacing_mm = {0.8, 0.8};
+      const CameraGeometry read = camera(write_rtk_geometry(rig), options);
+      for (const Vector3d& point : {Vector3d(10, 20, 30), Vector3d(-40, 5, 12)})
+        EXPECT_LT((read.project(point) - written.project(point)).norm(), 1e-6)
+            << "side " << side << ", turned by " << turn_rad;
+    }
+}
+
 TEST_F(CameraConventions, RtkOriginOfTheProjectionsAndTheirMatrix) {
   CameraFileOptions options = rtk_options();
   options.detector_origin_mm = {-100.0, -80.0};
@@ -419,6 +453,9 @@ TEST_F(CameraConventions, PlastimatchRefusals) {
   EXPECT_THAT(file_refusal(test::replaced(command, "--sad 800", "--sad far")),
               HasSubstr("no number"));
   EXPECT_THAT(input_refusal(test::replaced(command, "240 200", "1e12 200")), HasSubstr("32768"));
+  EXPECT_THAT(input_refusal(command + "\n" + command), HasSubstr("2 plastimatch drr commands"));
+  EXPECT_EQ(camera(command + "\nplastimatch convert --input a -o b.mha\n").source_point,
+            camera(command).source_point);
 }
 
 // What elastix 5.0.1 writes as TransformParameters.0.txt, without the lines that say nothing of the
@@ -772,6 +809,26 @@ TEST_F(DicomCameras, FieldOfViewMovesTheImageOnTheDetector) {
   // The detector's middle, where the isocentre is seen, is (200, 150) mm in; the image begins at
   // (180, 40) mm, and its first pixel's centre half a pixel later.
   expect_dicom_pixel(camera, {0, 0, 0}, {20.0 / 0.3 - 0.5, 110.0 / 0.4 - 0.5});
+}
+
+TEST_F(DicomCameras, FieldOfViewOriginIsOfTheDetectorBeforeTurnAndFlip) {
+  test::DicomTestFile file = xa();
+  file.set_text({0x0018, 0x7022}, "DS", "0.2\\0.2");
+  file.set_text({0x0018, 0x7026}, "DS", "300\\400");
+  file.set_text({0x0018, 0x7028}, "DS", "0\\0");
+  file.set_text({0x0018, 0x7030}, "DS", "200\\900");
+  // The image's middle lies at column 240, row 142.4 mm: 40 to the right of and 7.6 above the
+  // detector's, which is seen the other way round in a flipped or turned image.
+  const Vector2d middle(199.5, 255.5);
+  const Vector2d offset(40.0 / 0.3, -7.6 / 0.4);
+  file.set_text({0x0018, 0x7034}, "CS", "YES");
+  expect_dicom_pixel(
+      read(file).cameras.front(), {0, 0, 0}, middle + Vector2d(offset.x(), -offset.y()));
+  file.set_text({0x0018, 0x7032}, "DS", "180");
+  expect_dicom_pixel(
+      read(file).cameras.front(), {0, 0, 0}, middle + Vector2d(-offset.x(), offset.y()));
+  file.set_text({0x0018, 0x7032}, "DS", "90");
+  EXPECT_THAT(refusal(file), HasSubstr("FieldOfViewRotation (0018,7032)"));
 }
 
 TEST_F(DicomCameras, WhatIsMissingIsAskedForByName) {

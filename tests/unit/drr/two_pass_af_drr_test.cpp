@@ -288,6 +288,23 @@ TEST(TwoPassAfDrr, OutsideRaysHaveNoGradient) {
   EXPECT_LT(outside, static_cast<int>(outputs.values.size()));
 }
 
+TEST(TwoPassAfDrr, CountsTheRaysThatRenderingCounts) {
+  const auto field = small_field(waves, 2, 7, 21);
+  const View view = View::whole_detector(small_camera());
+  const TwoPassAfDrr renderer(field);
+  const AfDrr literal(field);
+  PoseParameters turned;
+  turned.rotation_rad = {2.0, 0.0, 0.0};
+  for (const RigidTransform& pose : {pose_from_parameters({}, small_pose(3)),
+                                     pose_partly_outside(),
+                                     pose_from_parameters({}, turned)}) {
+    std::int64_t outside = 0;
+    render_image(renderer, pose, view, &outside);
+    EXPECT_EQ(renderer.rays_outside(pose, view), outside);
+    EXPECT_EQ(literal.rays_outside(pose, view), outside);
+  }
+}
+
 TEST(TwoPassAfDrr, CubicInterpolationIsMoreAccurateOnASmoothField) {
   // A wave of 9 nodes along s and t: between nodes, linear interpolation errs by up to
   // (2 pi / 9)^2 / 8 = 6 % of it, the cubic ones by some tenths of that.

@@ -65,6 +65,35 @@ TEST(IndexCoding, GivesIndicesBackAndTheSameBytesOnEveryWidth) {
   }
 }
 
+TEST(IndexCoding, DecodesBlocksTogetherAsOneByOne) {
+  const Extents tiles = {3, 2, 9, 11};
+  const IndexCoding coding(some_codebook(3000));
+  // More than are decoded in turns, of which some end early: all tiles but a few are empty.
+  std::vector<std::vector<std::uint16_t>> given(11, some_indices(tiles, 3000));
+  for (std::size_t k = 0; k < given.size(); ++k)
+    for (std::size_t i = 0; i < given[k].size(); ++i)
+      if (hash64(kSeed, i) % given.size() < k) given[k][i] = 0;
+  std::vector<std::vector<std::uint8_t>> bytes;
+  for (const auto& indices : given) bytes.push_back(coding.encode(indices, tiles));
+  for (const VectorWidth width : supported_vector_widths()) {
+    force_vector_width(width);
+    auto back = given;
+    std::vector<CodedBlock> blocks;
+    for (std::size_t k = 0; k < given.size(); ++k) {
+      std::ranges::fill(back[k], std::uint16_t{1});
+      blocks.push_back({bytes[k], back[k]});
+    }
+    EXPECT_TRUE(coding.decode(blocks, tiles)) << to_string(width);
+    EXPECT_EQ(back, given) << to_string(width);
+    EXPECT_TRUE(coding.decode(std::span<const CodedBlock>(), tiles));
+    blocks[6].bytes = blocks[6].bytes.first(bytes[6].size() - 1);
+    EXPECT_FALSE(coding.decode(blocks, tiles)) << to_string(width);
+    back[6] = given[6];
+    EXPECT_EQ(back, given) << "a damaged block spoils no other one";
+  }
+  force_vector_width({});
+}
+
 /// Files are read by later versions: when this fails, the filter needs a new version number, and
 /// the old coding has to stay.
 TEST(IndexCoding, KeepsItsFormat) {
@@ -99,6 +128,7 @@ TEST(IndexCoding, RefusesIndicesBeyondTheCodebook) {
   const std::vector<std::uint16_t> indices = {3, 50};
   EXPECT_THROW((void)coding.encode(indices, {1, 1, 1, 2}), std::logic_error);
   EXPECT_THROW((void)coding.encode(std::span(indices).first(1), {1, 1, 1, 2}), std::logic_error);
+  EXPECT_THROW((void)coding.encode(std::span(indices).first(0), {1, 1, 0, 2}), std::logic_error);
 }
 
 /// Readers refuse extents that a file is too small for before they ask for memory.

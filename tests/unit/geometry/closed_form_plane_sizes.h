@@ -29,13 +29,13 @@ struct ClosedFormTerms {
 };
 
 inline ClosedFormTerms closed_form_terms(const SymmetricCamera& camera, const MotionRange& range) {
-  const double c = std::cos(range.max_rotation_rad);
-  const double s = std::sin(range.max_rotation_rad);
+  const double c = std::cos(range.max_rotation_rad());
+  const double s = std::sin(range.max_rotation_rad());
   const double k = std::tan(camera.half_field_of_view_rad);
   const double denominator = c * c - s * s * s - k * c * s * (2.0 + s);
   if (!(denominator > 0.0))
     throw InputError("max_rotation_deg",
-                     std::to_string(range.max_rotation_rad * kDegPerRad),
+                     std::to_string(range.max_rotation_rad() * kDegPerRad),
                      "too large: the extreme ray runs parallel to the field's planes");
   return {
       c, s, k, denominator, (k * (c * c - s * s + c * c * s) + c * s * (1.0 + s)) / denominator};
@@ -49,7 +49,7 @@ inline SymmetricPlaneSizes closed_form_plane_sizes(const SymmetricCamera& camera
   const double c = terms.cosine;
   const double s = terms.sine;
   const double f = camera.plane_separation_mm;
-  const double moved = range.max_translation_mm * (1.0 + terms.k_term);
+  const double moved = range.max_translation_mm() * (1.0 + terms.k_term);
   return {2.0 * (moved + f * s * (1.0 + s) * (c + s * terms.k_term)),
           2.0 * (moved + f * terms.tangent * (c * c + s) / terms.denominator)};
 }
@@ -58,9 +58,9 @@ inline SymmetricPlaneSizes closed_form_plane_sizes(const SymmetricCamera& camera
 inline SymmetricPlaneSizes small_angle_plane_sizes(const SymmetricCamera& camera,
                                                    const MotionRange& range) {
   const double phi = camera.half_field_of_view_rad;
-  const double angle = range.max_rotation_rad;
+  const double angle = range.max_rotation_rad();
   const double f = camera.plane_separation_mm;
-  const double moved = range.max_translation_mm * (1.0 + phi + angle);
+  const double moved = range.max_translation_mm() * (1.0 + phi + angle);
   return {2.0 * (moved + f * angle * (1.0 + angle)), 2.0 * (moved + f * phi * (1.0 + angle))};
 }
 

@@ -210,8 +210,9 @@ double worst_excess(const MovingCase& moving,
 PoseParameters within(const MotionRange& range, const std::array<double, 6>& unit) {
   PoseParameters parameters;
   for (int i = 0; i < 3; ++i) {
-    parameters.rotation_rad[i] = range.max_rotation_rad * unit[static_cast<std::size_t>(i)];
-    parameters.translation_mm[i] = range.max_translation_mm * unit[static_cast<std::size_t>(i) + 3];
+    parameters.rotation_rad[i] = range.max_rotation_rad() * unit[static_cast<std::size_t>(i)];
+    parameters.translation_mm[i] =
+        range.max_translation_mm() * unit[static_cast<std::size_t>(i) + 3];
   }
   return parameters;
 }

@@ -35,6 +35,13 @@ TEST(TargetBox, RefusesABoxWithoutVolume) {
   EXPECT_THROW(target_points({{0, 0, 0}, {1, std::nan(""), 1}}), InputError);
 }
 
+TEST(TargetBox, RefusesABoxLargerThanAnyCtOrThanMemoryHasRoomFor) {
+  for (const double high_mm : {1e308, 1e12, 3e4, 500.0})
+    EXPECT_THROW(target_points({{0, 0, 0}, {high_mm, high_mm, high_mm}}), InputError) << high_mm;
+  EXPECT_THROW(target_points({{0, 0, 0}, {3e4, 1, 1}}), InputError);
+  EXPECT_EQ(target_points({{0, 0, 0}, {1e4, 1, 1}}).size(), 5000U);
+}
+
 TEST(TargetBox, RmsRadiusEqualsThatOfManyPoints) {
   const CtBox box{{-10, 0, 5}, {20, 8, 30}};
   const Vector3d center(3, -2, 11);

@@ -20,6 +20,7 @@
 
 #include "base/error.h"
 #include "image_files/itk_image_io.h"
+#include "study/pose_context.h"
 #include "support/io_checks.h"
 #include "support/test_paths.h"
 #include "unit/image_files/ct_test_data.h"
@@ -818,6 +819,38 @@ TEST(CtReader, DecodesCompressedDicomPixels) {
     file.set_fragment("1.2.840.10008.1.2.5", rle_encoded(stored));
   });
   expect_same_ct(ct, read_ct(folder / "dicom"));
+}
+
+// What a pose in DICOM is told apart by: of the series that is read, whatever lies beside it.
+TEST(CtReader, GivesTheFrameOfReferenceOfTheSeriesThatIsRead) {
+  const ScratchFolder folder;
+  const CtVolume ct = asymmetric_ct(small_grid());
+  const auto in_frame = [](const std::string& uid) {
+    return [uid](int /*slice*/, test::DicomTestFile& file) {
+      file.set_text({0x0020, 0x0052}, "UI", uid);
+      file.set_fragment("1.2.840.10008.1.2.5", rle_encoded(std::vector<std::int16_t>(42)));
+    };
+  };
+  // Names that come first are of the other series, of no image and of no content.
+  write_dicom_series(ct, folder / "ct", in_frame("5.1"), "1.2.1", "A");
+  write_dicom_series(ct, folder / "ct", in_frame("5.2"), "1.2.2", "B");
+  test::DicomTestFile report;
+  report.set_text({0x0008, 0x0016}, "UI", "1.2.840.10008.5.1.4.1.1.88.11");
+  report.set_text({0x0020, 0x0052}, "UI", "5.3");
+  report.write(folder / "ct/0.dcm");
+  test::write_input(folder / "ct/1.dcm", "");
+  CtReadOptions options;
+  const auto frame_of = [&](const fs::path& path) {
+    return pose_context(path, options, std::nullopt, std::nullopt).ct_frame_of_reference();
+  };
+  EXPECT_THAT(test::message_of<InputError>([&] { frame_of(folder / "ct"); }), HasSubstr("1.2.2"));
+  options.series_uid = "1.2.2";
+  EXPECT_EQ(frame_of(folder / "ct"), "5.2");
+  options.series_uid = "1.2.1";
+  EXPECT_EQ(frame_of(folder / "ct"), "5.1");
+  EXPECT_EQ(frame_of(folder / "ct/A3.dcm"), "5.1");
+  write_ct(ct, folder / "ct.mha");
+  EXPECT_EQ(frame_of(folder / "ct.mha"), "");
 }
 
 TEST(CtReader, CutsTwelveStoredBitsOutOfSixteenAndExtendsTheirSign) {

@@ -20,6 +20,7 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using test::message_of;
+using testing::AllOf;
 using testing::HasSubstr;
 
 /// Products and inverses of rotations, of translations up to 1000 mm.
@@ -76,8 +77,11 @@ class OtherPoses : public testing::Test {
     return read_pose(folder_ / name, context);
   }
   PosesInFile read_all(const std::string& name, const std::string& bytes) {
+    return read_pose_file(write(name, bytes), whole_context());
+  }
+  std::filesystem::path write(const std::string& name, const std::string& bytes) {
     test::write_input(folder_ / name, bytes);
-    return read_pose_file(folder_ / name, whole_context());
+    return folder_ / name;
   }
 
   const RigidTransform pose_ = uneven_pose();
@@ -196,13 +200,44 @@ TEST_F(OtherPoses, AutoscoperFramesThatWereNotTrackedAreLeftOutAndSaid) {
   const PosesInFile found =
       read_all("a.tra", nans + pose_file_bytes("autoscoper", {&pose_, 1}, whole_context()) + nans);
   ASSERT_EQ(found.poses.size(), 1U);
-  EXPECT_EQ(found.poses[0].name, "2");
-  EXPECT_THAT(found.notes, testing::ElementsAre(HasSubstr("2 of 3 frames")));
+  EXPECT_EQ(found.poses[0].number, 2);
+  EXPECT_THAT(found.notes,
+              testing::ElementsAre(
+                  AllOf(HasSubstr("a.tra: 2 of 3 frames"), testing::EndsWith("left out: 1, 3"))));
   EXPECT_THROW(read("a.tra", nans), InputError);
   EXPECT_THROW(read("a.tra", "NaN 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1\n"), FileError);
   EXPECT_THAT(
       message_of<InputError>([&] { read("a.tra", "2 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1\n" + nans); }),
       HasSubstr("frame 1"));
+}
+
+TEST_F(OtherPoses, StartsAreRefusedWhereAFrameBeforeTheLastPoseHasNone) {
+  const std::string nans = "NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN\n";
+  const std::string one = pose_file_bytes("autoscoper", {&pose_, 1}, whole_context());
+  const std::filesystem::path path = write("a.tra", one + nans + one);
+  std::vector<std::string> notes;
+  EXPECT_EQ(read_poses(path, whole_context(), &notes).size(), 2U);
+  EXPECT_THAT(notes, testing::ElementsAre(testing::EndsWith("left out: 2")));
+  EXPECT_THAT(message_of<InputError>([&] { read_unbroken_poses(path, whole_context()); }),
+              AllOf(HasSubstr("a.tra"), HasSubstr("frame 2")));
+  // What is missing at the end moves no other frame.
+  notes.clear();
+  const std::filesystem::path cut = write("b.tra", one + one + nans);
+  EXPECT_EQ(read_unbroken_poses(cut, whole_context(), &notes).size(), 2U);
+  EXPECT_THAT(notes, testing::ElementsAre(testing::EndsWith("left out: 3")));
+}
+
+TEST_F(OtherPoses, DiffDrrsPoseOfSeveralCamerasIsRefusedUntilOneIsNamed) {
+  PoseContext context = whole_context();
+  context.rig = [] {
+    CameraGeometry other = frontal_camera();
+    other.name = "B";
+    return CameraRig{Vector3d::Zero(), {frontal_camera(), other}};
+  };
+  EXPECT_THAT(message_of<InputError>([&] {
+                pose_file_bytes("diffdrr", {&pose_, 1}, context);
+              }),
+              HasSubstr("--camera"));
 }
 
 // DiffDRR's first example: no rotation, 850 mm along y, AP: the source stands 850 mm in front of
@@ -247,7 +282,33 @@ TEST_F(OtherPoses, DiffDrrAnglesOfEveryOrderComeBack) {
     pose.rotation = {angles[0], angles[1], angles[2]};
     const Matrix3d rotation = world_from_diffdrr_camera(pose).linear();
     EXPECT_LT((angles_of_convention(rotation, convention) - angles).norm(), 1e-13) << convention;
+    // At and beside gimbal lock the angles are not unique, or poorly known; the rotation is both.
+    for (const double beside_rad : {0.0, 1e-15, 1e-13, 1e-9, 1e-5})
+      for (const double quarter : {-std::numbers::pi / 2.0, std::numbers::pi / 2.0}) {
+        pose.rotation = {0.3, quarter - beside_rad, 0.5};
+        const Matrix3d locked = world_from_diffdrr_camera(pose).linear();
+        const Vector3d found = angles_of_convention(locked, convention);
+        pose.rotation = {found[0], found[1], found[2]};
+        EXPECT_LT((world_from_diffdrr_camera(pose).linear() - locked).norm(), 1e-14)
+            << convention << " " << quarter << " " << beside_rad;
+      }
   }
+}
+
+// A camera that looks from the feet to the head stands at gimbal lock of ZXY and AP.
+TEST_F(OtherPoses, DiffDrrPosesOfACameraAlongTheBodyKeepTheTurnAboutTheBeam) {
+  PoseContext context = whole_context();
+  context.rig = [] {
+    CameraGeometry camera = frontal_camera();
+    camera.source_point = {0.0, 0.0, -650.0};
+    camera.detector_origin_point = {-100.0, -90.0, 370.0};
+    camera.row_direction = {0.0, 1.0, 0.0};
+    return CameraRig{Vector3d::Zero(), {camera}};
+  };
+  RigidTransform turned = RigidTransform::Identity();
+  turned.linear() = rotation_from_angles({0.0, 0.0, 30.0 * kRadPerDeg});
+  const std::string bytes = pose_file_bytes("diffdrr", {&turned, 1}, context);
+  EXPECT_LT(distance(read("p", bytes, context), turned), kRoundingMm);
 }
 
 TEST_F(OtherPoses, DiffDrrFilesWithMistakesAreRefused) {
@@ -326,6 +387,12 @@ TEST_F(OtherPoses, RegistrationsThatAreNotOneRigidPoseAreRefused) {
   EXPECT_THROW(read("r", registration("1.1", {{"1.2.3.4", "RIGID", "2" + identity.substr(1)}})),
                InputError);
   EXPECT_THROW(read("r", registration("1.1", {})), FileError);
+  // The CT is what the object registers to: the matrix is another frame's.
+  EXPECT_THAT(message_of<InputError>([&] {
+                read("r", registration("1.2.3.4", {{"9.9", "RIGID", identity}}));
+              }),
+              AllOf(HasSubstr("1.2.3.4"), HasSubstr("9.9")));
+  EXPECT_NO_THROW(read("r", registration("1.2.3.4", {{"1.2.3.4", "RIGID", identity}})));
   // Of another CT: taken, and said.
   const PosesInFile found =
       read_all("r", registration("1.1", {{"9.9", "RIGID", identity}, {"1.1", "RIGID", identity}}));

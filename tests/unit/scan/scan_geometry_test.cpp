@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "base/error.h"
 #include "geometry/rigid_transform.h"
 #include "unit/scan/simulated_scan.h"
 
@@ -50,6 +51,22 @@ TEST_P(ScanCameraOf, StandsWhereTheStatedFootIs) {
   // The same camera in pixels of twice the size: outer edges stay, so centres are halved about
   // -1/2.
   EXPECT_LT((scan.binned(2).stated_foot_px() - Eigen::Vector2d(9.75, 12.25)).norm(), kRounding);
+}
+
+TEST(CircularScan, MustGoAllTheWayRoundByItsEvenViewsAlone) {
+  CircularScan scan = small_scan();
+  EXPECT_THAT(problems(scan), IsEmpty());
+  scan.angles_rad.clear();
+  for (int i = 0; i < 180; ++i)  // even views of one half of the circle, odd ones of the other
+    for (const int half : {0, 180}) scan.angles_rad.push_back((half + i) * kRadPerDeg);
+  EXPECT_THAT(problems(scan), ElementsAre(HasSubstr("the even views leave")));
+}
+
+TEST(CircularScan, KeepsPixelsEnoughWhenBinned) {
+  CircularScan scan = small_scan();
+  scan.size_px = {64, 1024};
+  EXPECT_EQ(scan.binned(4).size_px, Eigen::Vector2i(16, 256));
+  EXPECT_THROW((void)scan.binned(5), InputError);
 }
 
 TEST(ViewAtAxis, ReachesFromTheFootToTheEdges) {

@@ -9,6 +9,7 @@
 
 #include <gtest/gtest.h>
 
+#include "camera_files/camera_formats.h"
 #include "files/output_file.h"
 #include "gold_standard/fiducial_registration.h"
 #include "image_files/ct_reader.h"
@@ -314,6 +315,26 @@ TEST_F(AfSimulate, DicomXaOfObliqueViewsGivesTheLineIntegralsOfMetaImageToTheBit
     EXPECT_NEAR(*rao.number_or_none({0x0018, 0x1511}, "secondary"), -10.0, 1e-6);
   }
   EXPECT_EQ(run(coarse + "--ideal --xray-format dicom " + folder("floats")), 3);
+}
+
+TEST_F(AfSimulate, DicomXaStatesTheCameraThatTookIt) {
+  // AP as it is stored, left of the image is the patient's right, and the lateral view.
+  ASSERT_EQ(run(coarse + "--rig c-arm-12in --xray-format dicom " + folder("dicom")), 0) << log();
+  const Study study = read_study(scratch_ / "dicom" / "study.toml");
+  const StudyCase& study_case = study.cases[0];
+  for (std::size_t i = 0; i < 2; ++i) {
+    const CameraGeometry of_header =
+        read_camera_files({study_case.views[i].xray}, {}, nullptr).cameras.front();
+    for (const Eigen::Vector3d& from_center :
+         {Eigen::Vector3d(20.0, -10.0, 30.0), Eigen::Vector3d(-5.0, 40.0, -25.0)}) {
+      const Eigen::Vector3d in_room =
+          study_case.nominal_room_from_ct * (study_case.center_ct_mm + from_center);
+      constexpr double kDecimalsPx = 1e-6;  // of the header's lengths and angles
+      EXPECT_LT((of_header.project(from_center) - study.rig.cameras[i].project(in_room)).norm(),
+                kDecimalsPx)
+          << study_case.views[i].camera;
+    }
+  }
 }
 
 }  // namespace

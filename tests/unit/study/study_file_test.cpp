@@ -230,6 +230,8 @@ TEST_F(StudyFile, BadValuesAreRefusedWithLineKeyValueAndConstraint) {
       refusal("[1.0, 2.0, 3.0]", "[1.0, inf, 3.0]"),
       HasSubstr(":6: case[0].center_ct_mm = [1, inf, 3]: must be a list of 3 finite numbers"));
   EXPECT_THAT(refusal("[30,31,32]", "[30,-31,32]"), HasSubstr(":7: case[0].target_box_ct_mm"));
+  EXPECT_THAT(refusal("[30,31,32]", "[30000,31,32]"), HasSubstr("2e4 mm"));
+  EXPECT_THAT(refusal("[30,31,32]", "[3000,3000,3000]"), HasSubstr("1e7 cells"));
   EXPECT_THAT(refusal("\"ct.nii.gz\"", "\"\""), HasSubstr(":4: case[0].ct = \"\""));
   EXPECT_THAT(refusal("\"skull-01\"", "\"a/b\""), HasSubstr(":3: case[0].name = \"a/b\""));
   EXPECT_THAT(refusal("[150, 160, 200, 201]", "[313, 160, 200, 201]"),
@@ -453,8 +455,24 @@ TEST_F(StudyFile, KeepsHowACtIsRead) {
   EXPECT_EQ(ct_reading_in_force(typed, study.cases[0].ct_reading).values, "labels");
   EXPECT_EQ(ct_reading_in_force(typed, study.cases[0].ct_reading).series_uid, "3.4");
   typed.values = "mu";
-  EXPECT_FALSE(ct_reading_in_force(typed, study.cases[0].ct_reading).resamples);
+  const CtReadOptions both = ct_reading_in_force(typed, study.cases[0].ct_reading);
+  EXPECT_EQ(both.values, "mu");
+  EXPECT_THAT(both.label_hu, testing::IsEmpty());
+  EXPECT_TRUE(both.resamples);
+  CtReadOptions body;
+  body.keeps_body_only = true;
+  CtReadOptions of_study;
+  of_study.values = "mu";
+  EXPECT_EQ(ct_reading_in_force(body, of_study).values, "mu");
+  EXPECT_TRUE(ct_reading_in_force(body, of_study).keeps_body_only);
+  CtReadOptions water;
+  water.values_water_mu_per_mm = 0.019;
+  EXPECT_EQ(ct_reading_in_force(water, of_study).values_water_mu_per_mm, 0.019);
+  EXPECT_EQ(ct_reading_in_force(water, of_study).values, "mu");
   EXPECT_EQ(ct_reading_of(to_toml(typed)).values, "mu");
+  typed.values = "hu";
+  typed.label_hu = {"1=40"};
+  EXPECT_THROW(ct_reading_in_force(typed, of_study), InputError);
   EXPECT_EQ(ct_reading_of("st_nodes = 3").text(), "");
 }
 

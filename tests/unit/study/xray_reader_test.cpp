@@ -317,6 +317,48 @@ TEST(XrayReader, FlatAndDarkImagesGiveTheLineIntegralsOfAnUnevenBeam) {
   expect_refused_with(view, "flat.mha: size = 3 x 3 px");
 }
 
+TEST(XrayReader, KeepsTheStudysMaskBesideAFlatFieldWithoutDeadPixels) {
+  const ScratchFolder folder;
+  Image2d xray(40, 50);
+  Image2d beam(40, 50);
+  Image2d mask(40, 50);
+  for (std::size_t i = 0; i < xray.pixels.size(); ++i) {
+    beam.pixels[i] = 1000.0f;
+    xray.pixels[i] = i % 40 < 20 ? 250.0f : 1000.0f;
+    mask.pixels[i] = i < 80 ? 0.0f : 255.0f;
+  }
+  StudyView view = view_of(folder, xray);
+  write_image(beam, folder / "flat.mha", 0.4, 0.4);
+  write_image_u16(mask, folder / "mask.png", 0.4, 0.4);
+  view.reading.flat = folder / "flat.mha";
+  view.mask = folder / "mask.png";
+  const ViewXray found = read_view_xray(view, camera(40, 50));
+  ASSERT_FALSE(found.mask.pixels.empty());
+  EXPECT_EQ(found.mask.at(3, 1), 0.0f);
+  EXPECT_NE(found.mask.at(3, 2), 0.0f);
+}
+
+TEST(XrayReader, TurnsAFlatFieldRoundByTheXraysFullScale) {
+  const ScratchFolder folder;
+  // Stored inverted, 16 bits: 65535 - counts. The open beam of 65000 counts is stored as 535.
+  Image2d xray(40, 50);
+  Image2d flat(40, 50);
+  for (std::size_t i = 0; i < xray.pixels.size(); ++i) {
+    flat.pixels[i] = 535.0f;
+    xray.pixels[i] = 65535.0f - (i % 40 < 20 ? 6500.0f : 65000.0f);
+  }
+  StudyView view = view_of(folder, xray);
+  view.reading.polarity = XrayPolarity::Inverted;
+  write_image(flat, folder / "flat.mha", 0.4, 0.4);
+  view.reading.flat = folder / "flat.mha";
+  const ViewXray found = read_view_xray(view, camera(40, 50));
+  EXPECT_NEAR(found.attenuation.at(3, 3), std::log(10.0f), kLogRounding);
+  EXPECT_NEAR(found.attenuation.at(30, 3), 0.0f, kLogRounding);
+  for (float& value : flat.pixels) value = 70000.0f;
+  write_image(flat, folder / "flat.mha", 0.4, 0.4);
+  expect_refused_with(view, "must not exceed 65535");
+}
+
 TEST(XrayReader, FindsTheOpenBeamAndMasksTheApertureWhenAskedTo) {
   const ScratchFolder folder;
   Image2d image(120, 100);

@@ -404,7 +404,7 @@ TEST(PairedStatistics, OppositeErrorsOfEqualLengthDoNotCancelInTheDistance) {
         rows.back().final_deg_mm = {0, 0, 0, side, 0, 0};
       }
   // One start that both lost: it counts among all, not among the pairs.
-  rows[0].tre_mm = 9.0;
+  rows[0].tre_mm = rows[1].tre_mm = 9.0;
   const json result = paired_statistics(rows, {0.5, 1, kSuccessTreMm, shift_between});
   EXPECT_EQ(result["test"]["equivalence_p"], 0.0) << "lengths of TRE see nothing";
   const json& ends = result["end_distance_mm"];
@@ -415,6 +415,29 @@ TEST(PairedStatistics, OppositeErrorsOfEqualLengthDoNotCancelInTheDistance) {
   EXPECT_EQ(ends["is_equivalent"], false);
   const json wide = paired_statistics(rows, {0.7, 1, kSuccessTreMm, shift_between});
   EXPECT_EQ(wide["end_distance_mm"]["is_equivalent"], true);
+}
+
+/// Twelve patients whose ends agree where both succeed; of each, field loses some of 20 starts.
+json ends_when_field_loses(std::int64_t lost_of_first, std::int64_t lost_of_others) {
+  Rows rows;
+  for (int patient = 0; patient < 12; ++patient)
+    for (std::int64_t start = 0; start < 20; ++start)
+      for (const char* renderer : {"field", "raycast"}) {
+        const bool is_field = std::string(renderer) == "field";
+        const bool is_lost = is_field && start < (patient == 0 ? lost_of_first : lost_of_others);
+        rows.push_back(row(renderer, start, 1, is_lost ? 9.0 : 0.3, "p" + std::to_string(patient)));
+        rows.back().final_deg_mm = {0, 0, 0, is_field ? 0.01 : 0.0, 0, 0};
+      }
+  return paired_statistics(rows, {0.1, 1, kSuccessTreMm, shift_between})["end_distance_mm"];
+}
+
+TEST(PairedStatistics, MethodsOfOtherSuccessAreNotEquivalentWhereverBothEnd) {
+  EXPECT_EQ(ends_when_field_loses(0, 0)["is_equivalent"], true);
+  EXPECT_EQ(ends_when_field_loses(1, 0)["is_equivalent"], true) << "1 of 240: within 5 %";
+  EXPECT_EQ(ends_when_field_loses(19, 19)["is_equivalent"], false);
+  const json without = ends_when_field_loses(20, 0);
+  EXPECT_EQ(without["cases_without_pairs"], 1);
+  EXPECT_EQ(without["is_equivalent"], false);
 }
 
 TEST(PairedStatistics, OfFewPatientsClaimNothingHoweverManyStarts) {
@@ -666,6 +689,23 @@ TEST(PoseDistances, OverPatientsTakeTheirMeansAlike) {
               testing::HasSubstr("| a field | b raycast | 1 | 1 | 0.3000 -, - | within 0.1 mm: too "
                                  "few patients |"));
   EXPECT_EQ(distances_over_patients(rows, 0.05)[0].equivalence.is_shown(), false);
+}
+
+TEST(PoseDistances, CountAPatientOnceHoweverManyRunsHaveIt) {
+  std::vector<PoseDistanceRow> rows;
+  // Two repeats, whose folders have the same names, give four rows for the pair of methods.
+  for (int patient = 0; patient < 6; ++patient)
+    for (const double distance_mm : {0.01, 0.02, 0.03, 0.04})
+      rows.push_back({"p" + std::to_string(patient),
+                      "robust",
+                      "field",
+                      "fast",
+                      "field",
+                      summarize({distance_mm})});
+  const std::vector<PatientDistances> found = distances_over_patients(rows, 0.1);
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].equivalence.cases, 6u);
+  EXPECT_NEAR(found[0].equivalence.mean, 0.025, 1e-12);
 }
 
 TEST(PoseDistances, OfARotationDependOnWhereTheBoxIs) {

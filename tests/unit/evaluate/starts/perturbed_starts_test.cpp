@@ -278,7 +278,7 @@ TEST(PerturbedStarts, WithinRangeSayWhatIsImpossible) {
   };
   EXPECT_THAT(refusal({}, std::nullopt), testing::HasSubstr("needs fields"));
   StartLimit far = limit_beside(frame);
-  far.range.max_translation_mm = 1.0;
+  far.range = {far.range.max_rotation_rad(), 1.0};
   EXPECT_THAT(refusal({}, far), testing::HasSubstr("gold pose itself"));
   // No pose of the box is 200 mm from gold.
   EXPECT_THAT(refusal({100, 2.0, 1, 1}, limit_beside(frame)),

@@ -104,9 +104,10 @@ class DesignProbeTest : public testing::Test {
     for (int i = 0; i < kPoses; ++i) {
       PoseParameters parameters;
       for (double& angle : parameters.rotation_rad)
-        angle = random.uniform(-scene_.range.max_rotation_rad, scene_.range.max_rotation_rad);
+        angle = random.uniform(-scene_.range.max_rotation_rad(), scene_.range.max_rotation_rad());
       for (double& shift : parameters.translation_mm)
-        shift = random.uniform(-scene_.range.max_translation_mm, scene_.range.max_translation_mm);
+        shift =
+            random.uniform(-scene_.range.max_translation_mm(), scene_.range.max_translation_mm());
       const RigidTransform pose = pose_from_parameters(scene_.frame, parameters);
       decibels.push_back(
           psnr(render_image(tested, pose, view).pixels, render_image(reference, pose, view).pixels)

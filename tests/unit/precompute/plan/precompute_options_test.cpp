@@ -68,6 +68,24 @@ TEST(PrecomputeOptions, TrainLongerForOneSlabUnlessTold) {
   EXPECT_FALSE(problems(options).empty());
 }
 
+TEST(PrecomputeOptions, PackByTheCodebooksTreeUnlessTheyCompareWithThePaper) {
+  PrecomputeOptions options;
+  EXPECT_TRUE(options.packs_by_codebook_tree());
+  EXPECT_EQ(options.in_force().index_packing, "codebook-tree");
+  EXPECT_TRUE(options.in_force().packs_by_codebook_tree()) << "although its parts are stated";
+  options.index_packing = "deflate";
+  EXPECT_FALSE(options.packs_by_codebook_tree());
+  options.index_packing.reset();
+  options.preset = "paper";
+  EXPECT_FALSE(options.packs_by_codebook_tree());
+  options.preset.reset();
+  options.uv_nodes = 8;
+  EXPECT_FALSE(options.packs_by_codebook_tree());
+  EXPECT_EQ(options.in_force().index_packing, "deflate");
+  options.preset = "standard";
+  EXPECT_TRUE(options.packs_by_codebook_tree());
+}
+
 TEST(FieldDesignOfOptions, IsThePapersByName) {
   PrecomputeOptions options;
   options.preset = "paper";
@@ -118,6 +136,48 @@ TEST(FieldDesignOfOptions, EveryPresetIsSound) {
     options.preset = name;
     EXPECT_TRUE(problems(options).empty()) << name;
   }
+}
+
+TEST(PrecomputeOptions, RangesOfAxesAreStatedOneByOne) {
+  PrecomputeOptions options;
+  options.max_rotation_deg = 7.0;
+  options.max_translation_mm = 20.0;
+  EXPECT_TRUE(options.range().is_symmetric());
+  options.rotation_range_deg = "rx=-15:15,rz=-30:+12.5";
+  options.translation_range_mm = "ty=40";
+  const MotionRange range = options.range();
+  const std::array<double, 6> low = {-15, -7, -30, -20, -40, -20};
+  const std::array<double, 6> high = {15, 7, 12.5, 20, 40, 20};
+  for (std::size_t i = 0; i < low.size(); ++i) {
+    EXPECT_DOUBLE_EQ(range.low.deg_and_mm()[i], low[i]);
+    EXPECT_DOUBLE_EQ(range.high.deg_and_mm()[i], high[i]);
+  }
+  EXPECT_TRUE(problems(options).empty());
+}
+
+TEST(PrecomputeOptions, RangesThatAreNoneAreRefused) {
+  for (const char* text : {"rx",
+                           "rx=",
+                           "rx=1:",
+                           "rx=2:1",
+                           "tx=1",
+                           "rx=1,rx=2",
+                           "rw=1",
+                           "rx=-3",
+                           "rx=1,",
+                           ",",
+                           "rx=1:2:3",
+                           "rx=nan",
+                           "rx=1 ",
+                           "x=1",
+                           "rx=inf"}) {
+    PrecomputeOptions options;
+    options.rotation_range_deg = text;
+    EXPECT_THROW((void)options.range(), UsageError) << text;
+  }
+  PrecomputeOptions far;
+  far.rotation_range_deg = "rx=170:190";
+  EXPECT_FALSE(problems(far).empty());
 }
 
 }  // namespace

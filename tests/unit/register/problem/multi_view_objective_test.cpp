@@ -91,7 +91,7 @@ TEST(MultiViewObjective, APoseWithARayOutsideIsInadmissible) {
 TEST(MultiViewObjective, APoseBeyondTheMotionRangeCostsNoDrr) {
   const Fixture fixture;
   MotionLimit limit;
-  limit.range.max_translation_mm = 2.0;
+  limit.range = {limit.range.max_rotation_rad(), 2.0};
   const ObjectiveValue value = fixture.objective(limit).evaluate(shifted(2.5));
   EXPECT_FALSE(value.is_admissible);
   EXPECT_EQ(value.drr_count, 0);
@@ -102,7 +102,7 @@ TEST(MultiViewObjective, APoseBeyondTheMotionRangeCostsNoDrr) {
 TEST(MultiViewObjective, PosesTogetherHaveTheValuesThatTheyHaveAlone) {
   const Fixture fixture;
   MotionLimit limit;
-  limit.range.max_translation_mm = 5.0;
+  limit.range = {limit.range.max_rotation_rad(), 5.0};
   std::vector<RigidTransform> poses;
   for (int i = 0; i < 40; ++i) poses.push_back(shifted(0.25 * i));  // inside, outside, beyond
   MultiViewObjective alone = fixture.objective(limit);

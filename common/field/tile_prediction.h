@@ -1,12 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-// Prediction of a tile from its neighbours (see index_coding.cpp). Compiled once per vector width.
-#include "field/tile_prediction_kernel.h"
+// For kernels only: prediction of a tile from its neighbours.
+#pragma once
 
 #include "base/vec16.h"
 
 namespace af::AF_KERNEL_NAMESPACE {
 
-namespace {
+/// Neighbours from which a tile is predicted, all before it in the order of tiles: u - 1; s - 1;
+/// t - 1; s - 1, t - 1; u - 1, s + 1; u - 1, t + 1; u - 1, s - 1; u - 1, t - 1.
+inline constexpr int kPredictors = 8;
+
+/// Hadamard coefficients of the neighbours. `plain` serves the terms that keep a coefficient's
+/// place, `turned` those that take it from another place: zeros, where another tile stands in for a
+/// neighbour that is missing.
+struct PredictionInputs {
+  const float* plain[kPredictors];
+  const float* turned[kPredictors];
+};
 
 /// What coefficient j of the tile takes from coefficient j ^ turn of a neighbour, in 64ths. An axis
 /// along which the neighbour lies may be turned: the slope there says how the mean goes on.
@@ -19,7 +29,7 @@ struct Term {
 /// Least squares over the tiles of one field of the paper's design, two of four slabs and one of
 /// eight (a skull and a thorax); part of the format. The tree of a codebook decides what a poor
 /// prediction costs, so the weights need not suit a field.
-constexpr Term kTerms[] = {
+inline constexpr Term kTerms[] = {
     // clang-format off
     // u - 1
     {0, 0, {9, 21, 14, 17, 15, 17, 8, 15, 7, 8, 3, 10, 7, 11, 8, 4}},
@@ -57,7 +67,7 @@ constexpr Term kTerms[] = {
     {7, 9, {17, -7, 119, 0, 70, -2, 10, -1, 0, 0, 0, 0, 0, 0, -1, 0}},
     // clang-format on
 };
-constexpr int kTermCount = sizeof(kTerms) / sizeof(kTerms[0]);
+inline constexpr int kTermCount = sizeof(kTerms) / sizeof(kTerms[0]);
 
 template <int kTurn>
 AF_KERNEL_INLINE F16 turned_by(F16 values) {
@@ -96,10 +106,8 @@ AF_KERNEL_INLINE F16 add_terms_from(const PredictionInputs& inputs, F16 sum) {
   }
 }
 
-}  // namespace
-
-void predict_tile(const PredictionInputs& inputs, float* predicted) {
-  store(predicted, add_terms_from<0>(inputs, F16{}));
+AF_KERNEL_INLINE F16 predicted_tile(const PredictionInputs& inputs) {
+  return add_terms_from<0>(inputs, F16{});
 }
 
 }  // namespace af::AF_KERNEL_NAMESPACE

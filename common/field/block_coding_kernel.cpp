@@ -1,0 +1,384 @@
+// SPDX-License-Identifier: Apache-2.0
+// Coding of blocks of indices (see index_coding.h). Compiled once per vector width.
+#include "field/block_coding_kernel.h"
+
+#include "base/vec16.h"
+#include "field/range_coder.h"
+#include "field/tile_prediction.h"
+
+namespace af::AF_KERNEL_NAMESPACE {
+
+namespace {
+
+/// Part of the format of files, as the numbers in the header.
+constexpr float kFirstSurprise = 64.0f;
+constexpr float kForgetting = 1.0f / 32.0f;
+/// Least probabilities, of 65536. That of empty tiles bounds how far a block can shrink: to a
+/// 704th.
+constexpr uint32_t kLeastTurn = 32;
+constexpr uint32_t kLeastEmpty = 1024;
+
+/// Where the models of a coefficient begin: those of its order, that is, how many axes it is a
+/// difference along: 0, 1, more.
+constexpr int32_t kModelsOfOrder = kDistances * kWidths;
+constexpr I16 kFirstModels = I16{0, 1, 1, 2, 1, 2, 2, 2, 1, 2, 2, 2, 2, 2, 2, 2} * kModelsOfOrder;
+
+constexpr int kOctaveShift = 21;        // of a float's bits: two of the mantissa are kept
+constexpr int32_t kOctavesOfOne = 508;  // 127 << 2
+
+AF_KERNEL_INLINE int32_t quarter_octaves(float magnitude) {
+  const float above_one = magnitude + 1.0f;
+  int32_t bits;
+  memcpy(&bits, &above_one, sizeof(bits));
+  return (bits >> kOctaveShift) - kOctavesOfOne;
+}
+
+AF_KERNEL_INLINE I16 quarter_octaves(F16 magnitudes) {
+  const F16 above_one = magnitudes + splat(1.0f);
+  I16 bits;
+  memcpy(&bits, &above_one, sizeof(bits));
+  return (bits >> kOctaveShift) - kOctavesOfOne;
+}
+
+AF_KERNEL_INLINE F16 magnitude(F16 values) {
+  I16 bits;
+  memcpy(&bits, &values, sizeof(bits));
+  bits &= splat(int32_t{0x7FFFFFFF});
+  F16 result;
+  memcpy(&result, &bits, sizeof(result));
+  return result;
+}
+
+/// Within 0 ... 15.
+AF_KERNEL_INLINE I16 class_of(I16 quarters) {
+  return minimum(maximum(quarters >> 1, I16{}), splat(int32_t{15}));
+}
+
+/// values[index] per lane, of 16.
+template <typename Vector>
+AF_KERNEL_INLINE Vector picked(Vector values, I16 index) {
+  Vector result;
+#if AF_VECTOR_BITS == 512
+  __m512i from;
+  __m512i at;
+  memcpy(&from, &values, sizeof(from));
+  memcpy(&at, &index, sizeof(at));
+  from = _mm512_permutexvar_epi32(at, from);
+  memcpy(&result, &from, sizeof(result));
+#elif AF_VECTOR_BITS == 256
+  __m256i from[2];
+  __m256i at[2];
+  memcpy(from, &values, sizeof(from));
+  memcpy(at, &index, sizeof(at));
+  __m256 found[2];
+  for (int half = 0; half < 2; ++half)
+    found[half] =
+        _mm256_blendv_ps(_mm256_castsi256_ps(_mm256_permutevar8x32_epi32(from[0], at[half])),
+                         _mm256_castsi256_ps(_mm256_permutevar8x32_epi32(from[1], at[half])),
+                         _mm256_castsi256_ps(_mm256_slli_epi32(at[half], 28)));  // bit 3 decides
+  memcpy(&result, found, sizeof(result));
+#else
+  for (int lane = 0; lane < kLanes; ++lane) result[lane] = values[index[lane]];
+#endif
+  return result;
+}
+
+/// Sums of every fourth, then of these by pairs.
+AF_KERNEL_INLINE float sum_of(F16 values) {
+  float v[16];
+  memcpy(v, &values, sizeof(v));
+  float sums[4];
+  for (int j = 0; j < 4; ++j) sums[j] = ((v[j] + v[j + 4]) + v[j + 8]) + v[j + 12];
+  return (sums[0] + sums[1]) + (sums[2] + sums[3]);
+}
+
+/// A block under way, and the tile that it has come to.
+template <typename Coder, typename Index>
+struct Lane {
+  Coder coder;
+  BlockMemory memory;
+  Index* index;        ///< of the tile
+  bool* is_exhausted;  ///< of a decoder
+  int32_t u, v, s, t;
+  TileNote* here;          ///< the tile's note
+  const TileNote* before;  ///< that of the tile before it along u
+  int32_t surprise_class;
+  const int32_t* usual;     ///< errors there, in quarters of an octave
+  uint32_t cluster;         ///< that the way has come to
+  uint32_t within_cluster;  ///< the node there
+  uint32_t number;          ///< and in the whole tree
+  alignas(64) float predicted[16];
+  alignas(64) int32_t models[kNodesOfCluster];  ///< of the turns at the cluster's nodes
+};
+
+AF_KERNEL_INLINE int64_t row_of(const BlockShape& shape) {
+  return shape.t + 2;
+}
+AF_KERNEL_INLINE int64_t plane_of(const BlockShape& shape) {
+  return (shape.s + 2) * row_of(shape);
+}
+
+/// Indices that are given stay.
+AF_KERNEL_INLINE void set(const uint16_t* /*index*/, uint16_t /*codeword*/) {}
+AF_KERNEL_INLINE void set(uint16_t* index, uint16_t codeword) {
+  *index = codeword;
+}
+
+/// Points to the notes of the tile and of the one before it along u.
+template <typename Coder, typename Index>
+AF_KERNEL_INLINE void find_notes(Lane<Coder, Index>& lane, const BlockShape& shape) {
+  const int64_t at = lane.v * plane_of(shape) + (lane.s + 1) * row_of(shape) + lane.t + 1;
+  const int64_t all = shape.v * plane_of(shape);
+  lane.here = lane.memory.notes + (lane.u % 2) * all + at;
+  lane.before = lane.memory.notes + ((lane.u + 1) % 2) * all + at;
+}
+
+template <typename Coder, typename Index>
+AF_KERNEL_INLINE void begin(Lane<Coder, Index>& lane,
+                            const BlockShape& shape,
+                            const BlockMemory& memory,
+                            Index* indices) {
+  lane.memory = memory;
+  lane.index = indices;
+  lane.u = lane.v = lane.s = lane.t = 0;
+  find_notes(lane, shape);
+}
+
+template <typename Coder, typename Index>
+AF_KERNEL_INLINE void go_on(Lane<Coder, Index>& lane, const BlockShape& shape) {
+  ++lane.index;
+  ++lane.here;
+  ++lane.before;
+  if (++lane.t < shape.t) return;
+  lane.t = 0;
+  if (++lane.s == shape.s) {
+    lane.s = 0;
+    if (++lane.v == shape.v) {
+      lane.v = 0;
+      ++lane.u;
+    }
+  }
+  find_notes(lane, shape);
+}
+
+/// Neighbours in the order of kPredictors.
+AF_KERNEL_INLINE void find_neighbours(const TileNote* here,
+                                      const TileNote* before,
+                                      int64_t row,
+                                      const TileNote* around[kPredictors]) {
+  around[0] = before;
+  around[1] = here - row;
+  around[2] = here - 1;
+  around[3] = here - row - 1;
+  around[4] = before + row;
+  around[5] = before + 1;
+  around[6] = before - row;
+  around[7] = before - 1;
+}
+
+/// For a neighbour that is missing, the first one that is there stands in, best one that is not
+/// empty.
+AF_KERNEL_INLINE uint32_t substitute_of(const TileNote* const around[kPredictors]) {
+  for (int i = 0; i < kPredictors; ++i)
+    if (around[i]->state == kOccupied) return around[i]->codeword;
+  return 0;
+}
+
+AF_KERNEL_INLINE PredictionInputs inputs_of(const CodewordTables& tables,
+                                            const TileNote* const around[kPredictors]) {
+  PredictionInputs inputs;
+  bool is_whole = true;
+  for (int i = 0; i < kPredictors; ++i) {
+    inputs.plain[i] = tables.coefficients + 16u * uint32_t{around[i]->codeword};
+    inputs.turned[i] = inputs.plain[i];
+    is_whole = is_whole && around[i]->state != kMissing;
+  }
+  if (is_whole) [[likely]]
+    return inputs;
+  const float* const substitute = tables.coefficients + 16u * substitute_of(around);
+  for (int i = 0; i < kPredictors; ++i)
+    if (around[i]->state == kMissing) inputs.plain[i] = substitute;
+  return inputs;
+}
+
+/// Of the first four neighbours.
+AF_KERNEL_INLINE int32_t surprise_class_of(const TileNote* const around[kPredictors]) {
+  float sum = 0.0f;
+  int32_t count = 0;
+  for (int i = 0; i < 4; ++i) {
+    sum += around[i]->surprise;
+    count += around[i]->state == kOccupied ? 1 : 0;
+  }
+  const float mean = count > 0 ? sum / static_cast<float>(count) : kFirstSurprise;
+  const int32_t octaves = quarter_octaves(mean + 1.0f) / 4;
+  return octaves < kSurpriseClasses - 1 ? octaves : kSurpriseClasses - 1;
+}
+
+AF_KERNEL_INLINE uint32_t empty_context_of(const TileNote* const around[kPredictors]) {
+  uint32_t context = around[0]->state;
+  context = 3 * context + around[1]->state;
+  context = 3 * context + around[2]->state;
+  context = 3 * context + around[4]->state;
+  return 3 * context + around[5]->state;
+}
+
+AF_KERNEL_INLINE void prefetch_coefficients(const CodewordTables& tables, uint16_t codeword) {
+  __builtin_prefetch(tables.coefficients + 16u * uint32_t{codeword});
+}
+
+/// Codes empty tiles up to one that is not, and predicts it; false at the end of the block.
+template <typename Coder, typename Index>
+AF_KERNEL_INLINE bool go_to_occupied(Lane<Coder, Index>& lane,
+                                     const CodewordTables& tables,
+                                     const BlockShape& shape) {
+  const int64_t row = row_of(shape);
+  const TileNote* around[kPredictors];
+  for (; lane.u < shape.u; go_on(lane, shape)) {
+    find_neighbours(lane.here, lane.before, row, around);
+    AdaptiveBit& model = lane.memory.empties[empty_context_of(around)];
+    const bool is_empty = lane.coder.template code<kLeastEmpty>(model, *lane.index == 0);
+    if (!is_empty && tables.codeword_count > 1) break;
+    set(lane.index, 0);
+    *lane.here = {0.0f, 0, kEmpty};
+  }
+  if (lane.u == shape.u) return false;
+  // For the tiles that come next but two: the plane before is known.
+  prefetch_coefficients(tables, lane.before[row + 3].codeword);
+  lane.surprise_class = surprise_class_of(around);
+  lane.usual = lane.memory.octaves + 16 * lane.surprise_class;
+  store(lane.predicted, predicted_tile(inputs_of(tables, around)));
+  lane.cluster = 0;
+  lane.within_cluster = tables.first_node;
+  lane.number = 1;
+  return true;
+}
+
+/// Models of the turns at all nodes of a cluster: a way that is told turn by turn must not wait for
+/// more than the last turn.
+AF_KERNEL_INLINE I16 turn_models(const NodeCluster& cluster, F16 predicted, I16 usual) {
+  const I16 splits = load<I16>(cluster.splits);
+  const I16 coefficients = splits & splat(int32_t{15});
+  const F16 differences = picked(predicted, coefficients) - load<F16>(cluster.thresholds);
+  const I16 usual_there = picked(usual, coefficients);
+  const I16 distances = class_of(quarter_octaves(magnitude(differences)) - usual_there + 24);
+  const I16 widths = class_of((splits >> 4) - usual_there + 20);
+  I16 bits;
+  memcpy(&bits, &differences, sizeof(bits));
+  const I16 is_above = ~(bits >> 31);
+  const I16 sides = (distances ^ is_above) + kDistances / 2;
+  return picked(kFirstModels, coefficients) + sides * kWidths + widths;
+}
+
+/// A way enters a cluster.
+template <typename Coder, typename Index>
+AF_KERNEL_INLINE void enter_cluster(Lane<Coder, Index>& lane, const CodewordTables& tables) {
+  store(
+      lane.models,
+      turn_models(tables.clusters[lane.cluster], load<F16>(lane.predicted), load<I16>(lane.usual)));
+}
+
+/// One turn of the way from the root to a codeword; `is_upper` is an encoder's.
+template <typename Coder, typename Index>
+AF_KERNEL_INLINE void take_turn(Lane<Coder, Index>& lane, bool is_upper) {
+  const bool bit = lane.coder.template code<kLeastTurn>(
+      lane.memory.turns[lane.models[lane.within_cluster]], is_upper);
+  lane.within_cluster = 2 * lane.within_cluster + static_cast<uint32_t>(bit);
+  lane.number = 2 * lane.number + static_cast<uint32_t>(bit);
+}
+
+/// A way leaves a cluster for the next one.
+template <typename Coder, typename Index>
+AF_KERNEL_INLINE void leave_cluster(Lane<Coder, Index>& lane) {
+  lane.cluster = kNodesOfCluster * lane.cluster + 1 + (lane.within_cluster - kNodesOfCluster);
+  lane.within_cluster = 1;
+}
+
+/// Learns from the tile, and notes it.
+template <typename Coder, typename Index>
+AF_KERNEL_INLINE void finish_tile(Lane<Coder, Index>& lane,
+                                  const CodewordTables& tables,
+                                  const BlockShape& shape,
+                                  uint16_t codeword) {
+  const F16 found = load<F16>(tables.coefficients + 16u * uint32_t{codeword});
+  const F16 wrong_by = magnitude(found - load<F16>(lane.predicted));
+  float* const errors = lane.memory.errors + 16 * lane.surprise_class;
+  const F16 usual = load<F16>(errors);
+  const F16 learned = usual + (wrong_by - usual) * splat(kForgetting);
+  store(errors, learned);
+  store(lane.memory.octaves + 16 * lane.surprise_class, quarter_octaves(learned));
+  *lane.here = {sum_of(wrong_by) / 4.0f, codeword, kOccupied};
+  set(lane.index, codeword);
+  go_on(lane, shape);
+}
+
+/// All lanes' ways to their codewords, turn by turn: one computes while another waits.
+AF_KERNEL_INLINE void find_ways(Lane<RangeDecoder, uint16_t>* lanes,
+                                int count,
+                                const CodewordTables& tables) {
+  // All lanes come to the end of a cluster at the same level.
+  int in_cluster = (tables.depth + kLevelsOfCluster - 1) % kLevelsOfCluster + 1;
+  for (int level = 0; level < tables.depth; level += in_cluster, in_cluster = kLevelsOfCluster) {
+    for (int i = 0; i < count; ++i) enter_cluster(lanes[i], tables);
+    const bool is_last = level + in_cluster == tables.depth;
+    for (int turn = is_last ? 1 : 0; turn < in_cluster; ++turn)
+      for (int i = 0; i < count; ++i) take_turn(lanes[i], false);
+    if (is_last)
+      for (int i = 0; i < count; ++i)
+        if (tables.codewords_at[lanes[i].number] == 0) take_turn(lanes[i], false);
+    for (int i = 0; i < count; ++i) leave_cluster(lanes[i]);
+  }
+}
+
+}  // namespace
+
+int64_t encode_block(const CodewordTables& tables,
+                     const BlockShape& shape,
+                     const BlockMemory& memory,
+                     const uint16_t* indices,
+                     uint8_t* bytes) {
+  Lane<RangeEncoder, const uint16_t> lane;
+  lane.coder = RangeEncoder(bytes);
+  begin(lane, shape, memory, indices);
+  while (go_to_occupied(lane, tables, shape)) {
+    const uint16_t codeword = *lane.index;
+    const uint32_t leaf = tables.leaves[codeword];
+    for (int left = 30 - __builtin_clz(leaf); left >= 0;) {
+      enter_cluster(lane, tables);
+      for (; left >= 0 && lane.within_cluster < kNodesOfCluster; --left)
+        take_turn(lane, (leaf >> static_cast<uint32_t>(left) & 1u) != 0);
+      leave_cluster(lane);
+    }
+    finish_tile(lane, tables, shape, codeword);
+  }
+  return lane.coder.finish();
+}
+
+void decode_blocks(const CodewordTables& tables,
+                   const BlockShape& shape,
+                   const BlockMemory* memories,
+                   BlockToDecode* blocks,
+                   int count) {
+  Lane<RangeDecoder, uint16_t> lanes[kBlocksAtOnce];
+  for (int i = 0; i < count; ++i) {
+    lanes[i].coder = RangeDecoder(blocks[i].bytes, blocks[i].byte_count);
+    lanes[i].is_exhausted = &blocks[i].is_exhausted;
+    begin(lanes[i], shape, memories[i], blocks[i].indices);
+  }
+  for (int under_way = count; under_way > 0;) {
+    for (int i = 0; i < under_way;) {
+      if (go_to_occupied(lanes[i], tables, shape)) {
+        ++i;
+        continue;
+      }
+      *lanes[i].is_exhausted = lanes[i].coder.is_exhausted();
+      lanes[i] = lanes[--under_way];
+    }
+    find_ways(lanes, under_way, tables);
+    for (int i = 0; i < under_way; ++i)
+      prefetch_coefficients(tables, tables.codewords_at[lanes[i].number]);
+    for (int i = 0; i < under_way; ++i)
+      finish_tile(lanes[i], tables, shape, tables.codewords_at[lanes[i].number]);
+  }
+}
+
+}  // namespace af::AF_KERNEL_NAMESPACE

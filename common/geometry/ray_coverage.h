@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which rays a field holds decides what it can be used for, not the camera it was made for.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "geometry/slab_sizing.h"
+
+namespace af {
+
+/// Whether all rays of the whole detector meet every plane of the light slab within its rectangle,
+/// wherever the CT is within `range` about the nominal pose of `frame`. Found as planes are sized
+/// (extents_on_planes), so the answer is no sample of poses. \test
+/// RayCoverage.SaysWhatSampledRaysSay
+bool covers_range(const LightSlab& light_slab,
+                  const CameraGeometry& camera,
+                  const PoseFrame& frame,
+                  const MotionRange& range);
+
+/// The largest box about the nominal pose of `frame` (angles and translations to both sides in the
+/// proportion of `proportion`, at most 60 degrees) whose poses are all covered. Its bounds are at
+/// most `kCoveredBoxTolerance` of themselves too small, never too large. Of the size 0 when the
+/// nominal pose itself is covered no farther, or not at all: covers_range() tells which.
+MotionRange covered_box(const LightSlab& light_slab,
+                        const CameraGeometry& camera,
+                        const PoseFrame& frame,
+                        const MotionRange& proportion);
+inline constexpr double kCoveredBoxTolerance = 2e-3;
+
+/// "field covers 100 % of camera A's rays within 6.2 deg / 18 mm of nominal" of a box, or what
+/// share of them where the nominal pose itself is not all covered. Numbers are rounded down.
+std::string coverage_text(const std::string& camera,
+                          std::int64_t rays_inside,
+                          std::int64_t rays,
+                          const MotionRange& box);
+
+}  // namespace af

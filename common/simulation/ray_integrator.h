@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+
+namespace af {
+
+/// Line integrals of relative attenuation (1 for water) along a ray: mm of water that attenuate
+/// alike at the effective energy.
+struct PathIntegrals {
+  double water_mm = 0.0;
+  double bone_mm = 0.0;
+};
+
+/// What X-rays are made of: anatomy as voxels or as bodies. Re-entrant.
+class RayIntegrator {
+ public:
+  RayIntegrator() = default;
+  RayIntegrator(const RayIntegrator&) = delete;
+  RayIntegrator& operator=(const RayIntegrator&) = delete;
+  virtual ~RayIntegrator() = default;
+
+  /// Integrals over the half-line from `source_point` through `through_point` (ct, mm) and on; a
+  /// source inside the volume starts there.
+  [[nodiscard]] virtual PathIntegrals integrate(const Eigen::Vector3d& source_point,
+                                                const Eigen::Vector3d& through_point) const = 0;
+};
+
+}  // namespace af

@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "simulation/solid_projector.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "simulation/solid_chords.h"
+
+namespace af {
+
+namespace {
+
+using Eigen::Vector3d;
+
+/// A surface of a body on a ray.
+struct Crossing {
+  double at_mm;
+  int solid;
+  bool is_entry;
+};
+
+/// The bodies around the present point of a ray; the one that was painted last is what is there.
+class OpenBodies {
+ public:
+  void apply(const Crossing& crossing) {
+    if (crossing.is_entry) {
+      open_.insert(std::upper_bound(open_.begin(), open_.end(), crossing.solid), crossing.solid);
+    } else {
+      open_.erase(std::lower_bound(open_.begin(), open_.end(), crossing.solid));
+    }
+  }
+  [[nodiscard]] bool is_empty() const { return open_.empty(); }
+  [[nodiscard]] int top() const { return open_.back(); }
+
+ private:
+  std::vector<int> open_;  ///< ascending
+};
+
+}  // namespace
+
+SolidProjector::SolidProjector(const Phantom& phantom,
+                               const TissueModel& tissue,
+                               std::optional<SmoothMotion> motion)
+    : solids_(phantom.solids),
+      half_sizes_mm_(phantom.half_sizes_mm),
+      tissue_(tissue),
+      motion_(std::move(motion)) {
+  balls_.reserve(solids_.size());
+  for (const Solid& solid : solids_) {
+    double radius_mm = solid.half_sizes_mm.maxCoeff();
+    if (solid.shape == Solid::Shape::Capsule)
+      radius_mm = solid.half_sizes_mm.x() + solid.half_sizes_mm.z();
+    if (solid.shape == Solid::Shape::EllipticCylinder)
+      radius_mm = std::hypot(solid.half_sizes_mm.head<2>().maxCoeff(), solid.half_sizes_mm.z());
+    balls_.push_back({solid.center_mm, radius_mm});
+  }
+}
+
+std::vector<SolidProjector::Piece> SolidProjector::pieces(const Vector3d& source_point,
+                                                          const Vector3d& direction) const {
+  constexpr double kPieceMm = 8.0;
+  double first_mm = 0.0;
+  double last_mm = std::numeric_limits<double>::infinity();
+  for (int axis = 0; axis < 3; ++axis) {
+    if (direction[axis] == 0.0) {
+      if (std::abs(source_point[axis]) > half_sizes_mm_[axis]) return {};
+      continue;
+    }
+    const double a = (-half_sizes_mm_[axis] - source_point[axis]) / direction[axis];
+    const double b = (half_sizes_mm_[axis] - source_point[axis]) / direction[axis];
+    first_mm = std::max(first_mm, std::min(a, b));
+    last_mm = std::min(last_mm, std::max(a, b));
+  }
+  if (!(first_mm < last_mm)) return {};
+  if (!motion_) return {{source_point + first_mm * direction, direction, last_mm - first_mm, 1.0}};
+  std::vector<Piece> found;
+  const int count = static_cast<int>(std::ceil((last_mm - first_mm) / kPieceMm));
+  const double step_mm = (last_mm - first_mm) / count;
+  const auto in_anatomy = [&](int i) {
+    const Vector3d point = source_point + (first_mm + i * step_mm) * direction;
+    return Vector3d(point + motion_->displacement_mm(point));
+  };
+  Vector3d from = in_anatomy(0);
+  for (int i = 0; i < count; ++i) {
+    const Vector3d to = in_anatomy(i + 1);
+    const double length_mm = (to - from).norm();
+    found.push_back({from, (to - from) / length_mm, length_mm, step_mm / length_mm});
+    from = to;
+  }
+  return found;
+}
+
+void SolidProjector::add_length(int hu, double length_mm, PathIntegrals& sum) const {
+  const AttenuationModel& model = tissue_.attenuation_model();
+  if (hu < model.air_below_hu) return;
+  const auto relative = static_cast<std::uint16_t>(
+      std::clamp(hu + 1000, 0, int{std::numeric_limits<std::uint16_t>::max()}));
+  const double bone = tissue_.bone_part(relative);
+  sum.water_mm += (relative - bone) * length_mm / 1000.0;
+  sum.bone_mm += bone * length_mm / 1000.0;
+}
+
+void SolidProjector::add_span(const Piece& piece,
+                              const Solid& solid,
+                              double first_mm,
+                              double last_mm,
+                              PathIntegrals& sum) const {
+  constexpr double kTextureStepMm = 1.5;
+  const double length_mm = last_mm - first_mm;
+  if (!(length_mm > 0.0)) return;
+  const int steps =
+      solid.texture_hu == 0 ? 1 : static_cast<int>(std::ceil(length_mm / kTextureStepMm));
+  const double step_mm = length_mm / steps;
+  TextureReader reader;
+  for (int i = 0; i < steps; ++i) {
+    double hu = solid.hu;
+    if (solid.texture_hu != 0)
+      hu += solid.texture_hu * reader.at(piece.origin + solid.texture_shift_mm +
+                                             (first_mm + (i + 0.5) * step_mm) * piece.direction,
+                                         solid.texture_scale_mm);
+    add_length(static_cast<int>(std::lround(hu)), step_mm * piece.stretch, sum);
+  }
+}
+
+void SolidProjector::add_piece(const Piece& piece,
+                               const std::vector<int>& candidates,
+                               PathIntegrals& sum) const {
+  std::vector<Crossing> crossings;
+  for (const int candidate : candidates) {
+    const auto index = static_cast<std::size_t>(candidate);
+    const Vector3d to_center = balls_[index].center_mm - piece.origin;
+    const double nearest_mm = std::clamp(to_center.dot(piece.direction), 0.0, piece.length_mm);
+    if ((to_center - nearest_mm * piece.direction).norm() > balls_[index].radius_mm) continue;
+    for (const Chord& chord : chords(solids_[index], piece.origin, piece.direction)) {
+      const double first_mm = std::max(chord.first_mm, 0.0);
+      const double last_mm = std::min(chord.last_mm, piece.length_mm);
+      if (!(first_mm < last_mm)) continue;
+      crossings.push_back({first_mm, candidate, true});
+      crossings.push_back({last_mm, candidate, false});
+    }
+  }
+  std::sort(crossings.begin(), crossings.end(), [](const Crossing& a, const Crossing& b) {
+    return std::pair(a.at_mm, a.is_entry) < std::pair(b.at_mm, b.is_entry);
+  });
+  OpenBodies open;
+  double at_mm = 0.0;
+  for (const Crossing& crossing : crossings) {
+    if (!open.is_empty())
+      add_span(piece, solids_[static_cast<std::size_t>(open.top())], at_mm, crossing.at_mm, sum);
+    at_mm = crossing.at_mm;
+    open.apply(crossing);
+  }
+}
+
+PathIntegrals SolidProjector::integrate(const Vector3d& source_point,
+                                        const Vector3d& through_point) const {
+  const Vector3d direction = (through_point - source_point).normalized();
+  const std::vector<Piece> way = pieces(source_point, direction);
+  // Motion takes no point of the ray farther from it than this.
+  const double slack_mm = motion_ ? motion_->largest_mm() : 0.0;
+  std::vector<int> candidates;
+  for (std::size_t i = 0; i < balls_.size(); ++i) {
+    const Vector3d to_center = balls_[i].center_mm - source_point;
+    const double reach_mm = balls_[i].radius_mm + slack_mm;
+    if ((to_center - to_center.dot(direction) * direction).squaredNorm() <= reach_mm * reach_mm)
+      candidates.push_back(static_cast<int>(i));
+  }
+  PathIntegrals sum;
+  for (const Piece& piece : way) add_piece(piece, candidates, sum);
+  return sum;
+}
+
+}  // namespace af

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "base/described_fields.h"
+#include "cli/app_forward.h"
+#include "parallel/communicator.h"
+
+namespace af::evaluation {
+
+/// `af-evaluate population` as typed.
+struct PopulationOptions {
+  std::vector<std::string> conditions;  ///< NAME=FOLDER each
+  std::uint64_t seed = 1;
+  std::filesystem::path output = "population";
+
+  void describe(Fields& field);
+};
+
+/// Adds the subcommand; returns it.
+CLI::App* bind_population(CLI::App& app, PopulationOptions& options);
+
+/// Rank 0. Success of finished registration runs of many patients, with intervals over patients:
+/// population.md, population.csv (conditions and groups of patients), patients.csv, intervals.csv
+/// and the figures success.svg and capture-range.svg. InputError when runs of one study differ in
+/// their intervals or threshold, or a condition holds no run.
+void run_population(const PopulationOptions& options, const Communicator& world);
+
+}  // namespace af::evaluation

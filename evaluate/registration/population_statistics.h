@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+// Success of many patients, each the unit that is sampled.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "evaluate/statistics/bootstrap.h"
+#include "evaluate/statistics/statistics.h"
+#include "evaluate/statistics/success_rate.h"
+
+namespace af::evaluation {
+
+/// How starts and ends are counted.
+struct PopulationCounting {
+  int intervals = 15;
+  double interval_width_mm = 2.0;
+  double success_mm = kSuccessTreMm;
+  std::uint64_t seed = 1;
+};
+
+/// The registrations of one patient in one condition: all true poses together.
+struct PatientOutcomes {
+  std::string patient;
+  std::vector<TreOutcome> by_tre;
+  std::vector<TreOutcome> by_mrpd;  ///< the same starts, ends by mRPD: to be read with one view
+  std::vector<double> seconds;
+
+  /// The number at the end of the patient's name; 0: none, such as that of a real CT.
+  [[nodiscard]] int number() const;
+  /// What stands before the number: the kind of patient, or the whole name.
+  [[nodiscard]] std::string kind() const;
+};
+
+/// The patient of a case: its name without a trailing "-pN", which says which true pose.
+std::string patient_of_case(const std::string& case_name);
+
+/// "odd" (the half to tune on), "even" (the half to judge on) or "real".
+std::string half_of(const PatientOutcomes& patient);
+
+/// A mean over patients with both kinds of 95 % intervals.
+struct OverPatients {
+  double value = 0.0;
+  MeanInterval student;     ///< over the patients' own values; NaN where these are equal
+  CaseBootstrap bootstrap;  ///< by resampling of patients
+};
+
+/// One patient's success.
+struct PatientSuccess {
+  std::string patient;
+  std::int64_t starts = 0;
+  std::int64_t successes = 0;
+  ProportionInterval wilson;
+  CaptureRange capture;
+  /// 95 % of the capture range, by resampling of the patient's starts within each interval.
+  MeanInterval capture_interval_mm;
+};
+
+/// Success of a group of patients by one error. \test PopulationStatistics.OfHandMadePatients
+struct PopulationSuccess {
+  std::vector<PatientSuccess> patients;
+  std::int64_t starts = 0;
+  std::int64_t successes = 0;
+  OverPatients rate;                 ///< of all starts; every patient has its own number of them
+  OverPatients capture_mm;           ///< mean of the patients' own capture ranges
+  CaptureRange pooled;               ///< of all starts together
+  CaseBootstrap pooled_interval_mm;  ///< of the pooled range, by resampling of patients
+  std::vector<IntervalSuccess> intervals;  ///< of all starts together
+  std::vector<CaseBootstrap> interval_bootstraps;
+};
+
+enum class CountedEnd { Tre, Mrpd };
+
+PopulationSuccess population_success(const std::vector<const PatientOutcomes*>& patients,
+                                     CountedEnd end,
+                                     const PopulationCounting& counting);
+
+}  // namespace af::evaluation

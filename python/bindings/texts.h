@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+// Texts of the library as Python's. They may hold bytes that are not UTF-8: names of files, cells.
+#pragma once
+
+#include <pybind11/pybind11.h>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace attenuation_fields::python {
+
+namespace py = pybind11;
+
+/// For people to read: other bytes become \xNN.
+py::str message_of(std::string_view text);
+
+/// As os.fsdecode() has it: text.encode("utf-8", "surrogateescape") gives all bytes back.
+py::str cell_of(std::string_view bytes);
+
+/// Each as a UserWarning; py::error_already_set where warnings are errors.
+void warn_of(const std::vector<std::string>& texts);
+
+}  // namespace attenuation_fields::python
