@@ -17,7 +17,7 @@ Simulates a phantom's X-rays, clean and stressed, and registers them from the sa
 (presets), by automatic differentiation in PyTorch (evaluate/peers/autodiff_registration.py) and by plastimatch's DRRs
 with Nelder and Mead's search (evaluate/peers/plastimatch_registration.py). Says what Debian's elastix answers to its
 ray-casting interpolator. Writes peers.csv. After a stop, run the same command again to continue. Needs the programs in
-build/release/bin (or installed); peers that are not installed are left out, and it says so.
+build/release/bin; peers that are not installed are left out, and it says so.
 
   --output DIR             where everything goes                                                             [./peers]
   --kind KIND              phantom: spine, pelvis or head                                                      [spine]
@@ -50,6 +50,7 @@ done
 
 bin=$(program_folder)
 need_programs "$bin" af-simulate af-precompute af-evaluate
+[[ -d "$af_root/evaluate/peers" ]] || die 1 "the peers are in the sources only: run the script there"
 open_output "$target"
 mkdir -p "$output/fields" "$output/starts" "$output/runs" "$output/poses"
 
