@@ -13,8 +13,14 @@ namespace af {
 namespace {
 
 constexpr std::array kCameraFormats = {
-    CameraFormat{
-        "rig", "this project's rig.toml", ".toml", false, is_rig_toml, read_rig_toml, rig_to_toml},
+    CameraFormat{"rig",
+                 "this project's rig.toml",
+                 ".toml",
+                 false,
+                 is_rig_toml,
+                 read_rig_toml,
+                 rig_to_toml,
+                 true},
     CameraFormat{"mayacam2",
                  "MayaCam 2 of XMALab and Autoscoper: image size, K, R, t",
                  ".txt",
@@ -35,7 +41,8 @@ constexpr std::array kCameraFormats = {
                  true,
                  is_opencv_yaml,
                  read_opencv_yaml,
-                 write_opencv_yaml},
+                 write_opencv_yaml,
+                 true},
     CameraFormat{"rtk",
                  "geometry XML of RTK (IEC 61217), one camera per projection",
                  ".xml",
@@ -151,6 +158,12 @@ std::vector<WrittenCameraFile> camera_files_of(const CameraRig& rig,
   if (format.write == nullptr)
     throw InputError(
         "--rig-to", format_name, "is only read; written are " + joined(writable_camera_formats()));
+  for (const CameraGeometry& camera : rig.cameras)
+    if (!camera.distortion.is_none() && !format.states_distortion)
+      throw InputError(
+          "--rig-to",
+          format_name,
+          "cannot state the distortion of camera '" + camera.name + "'; rig and opencv can");
   if (!format.holds_one_camera || rig.cameras.size() == 1) return {{path, format.write(rig)}};
   std::vector<WrittenCameraFile> files;
   for (const CameraGeometry& camera : rig.cameras) {

@@ -24,6 +24,7 @@ struct CameraFormat {
   bool (*is_this)(const CameraFile& file);
   StatedRig (*read)(const CameraFile& file, const CameraFileOptions& options);
   std::string (*write)(const CameraRig& rig);  ///< nullptr: is not written
+  bool states_distortion = false;
 };
 
 /// Every format, in the order in which their marks are looked for.

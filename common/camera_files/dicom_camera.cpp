@@ -39,6 +39,15 @@ constexpr DicomTag kPatientOrientation = {0x0020, 0x0020};
 constexpr DicomTag kFrames = {0x0028, 0x0008};
 constexpr DicomTag kRows = {0x0028, 0x0010};
 constexpr DicomTag kColumns = {0x0028, 0x0011};
+// Of enhanced files: functional groups, and what they hold.
+constexpr DicomTag kSharedGroups = {0x5200, 0x9229};
+constexpr DicomTag kFrameGroups = {0x5200, 0x9230};
+constexpr DicomTag kGeometryMacro = {0x0018, 0x9476};
+constexpr DicomTag kPositionerMacro = {0x0018, 0x9405};
+constexpr DicomTag kIsocenterMacro = {0x0018, 0x9462};
+constexpr DicomTag kPixelMacro = {0x0028, 0x9443};
+constexpr DicomTag kSourceIsocenter = {0x0018, 0x9402};
+constexpr DicomTag kDetectorRotation = {0x0018, 0x9465};
 
 constexpr std::array kModalities = {"XA", "RF", "CR", "DX"};
 constexpr int kMostFrames = 100000;
@@ -59,19 +68,35 @@ class DicomCamera {
     if (std::ranges::find(kModalities, modality) == kModalities.end())
       throw InputError(
           "Modality (0008,0060)", "'" + modality + "'", "must be XA, RF, CR or DX", file_);
-    read_detector();
-    for (const PositionerAngles& angles : all_angles()) add_camera(angles);
+    read_size();
+    if (elements_.has(kSharedGroups) || elements_.has(kFrameGroups)) {
+      add_enhanced_cameras();
+    } else {
+      read_detector(1);
+      for (const PositionerAngles& angles : all_angles()) add_camera(angles);
+    }
     stated_.isocenter_point = Eigen::Vector3d::Zero();
     return stated_;
   }
 
  private:
+  /// The number of a frame's functional groups, or of the top level.
+  [[nodiscard]] std::optional<double> found_number(int frame,
+                                                   DicomTag macro,
+                                                   DicomTag tag,
+                                                   const char* name) const {
+    if (const DicomValues* const group = functional_group(elements_, frame, macro);
+        group != nullptr)
+      if (const auto numbers = group->numbers(tag, name, file_); !numbers.empty())
+        return numbers.front();
+    return elements_.number_or_none(tag, name);
+  }
+
   /// A number of the header, or of the option, which must not contradict it.
-  double number(DicomTag tag,
+  double number(const std::optional<double>& found,
                 const char* name,
                 const std::optional<double>& given,
                 const char* option) const {
-    const std::optional<double> found = elements_.number_or_none(tag, name);
     if (found && *found > 0.0) {
       constexpr double kToleranceMm = 1e-3;
       if (given && std::abs(*given - *found) > kToleranceMm)
@@ -86,7 +111,7 @@ class DicomCamera {
                      " states it");
   }
 
-  void read_detector() {
+  void read_size() {
     const auto side = [&](DicomTag tag, const char* name) {
       const std::optional<double> found = elements_.number_or_none(tag, name);
       if (!found) throw InputError(file_ + ": " + name + " is missing");
@@ -95,19 +120,31 @@ class DicomCamera {
     camera_.size_px =
         size_of({side(kColumns, "Columns (0028,0011)"), side(kRows, "Rows (0028,0010)")},
                 file_ + ": Columns, Rows");
-    source_detector_mm_ = number(kSourceDetector,
-                                 "DistanceSourceToDetector (0018,1110)",
-                                 options_.source_detector_mm,
-                                 "--rig-source-detector-mm");
-    source_isocenter_mm_ = number(kSourcePatient,
+  }
+
+  void read_detector(int frame) {
+    constexpr const char* kDetectorName = "DistanceSourceToDetector (0018,1110)";
+    source_detector_mm_ =
+        number(found_number(frame, kGeometryMacro, kSourceDetector, kDetectorName),
+               kDetectorName,
+               options_.source_detector_mm,
+               "--rig-source-detector-mm");
+    auto to_isocenter =
+        found_number(frame, kGeometryMacro, kSourceIsocenter, "DistanceSourceToIsocenter");
+    if (!to_isocenter)
+      to_isocenter = elements_.number_or_none(kSourcePatient, "DistanceSourceToPatient");
+    source_isocenter_mm_ = number(to_isocenter,
                                   "DistanceSourceToPatient (0018,1111)",
                                   options_.source_isocenter_mm,
                                   "--rig-source-isocenter-mm");
-    const std::vector<double> spacing =
-        elements_.numbers(kImagerSpacing, "ImagerPixelSpacing (0018,1164)");
+    constexpr const char* kSpacingName = "ImagerPixelSpacing (0018,1164)";
+    std::vector<double> spacing = elements_.numbers(kImagerSpacing, kSpacingName);
+    if (const DicomValues* const pixels = functional_group(elements_, frame, kPixelMacro);
+        pixels != nullptr && spacing.empty())
+      spacing = pixels->numbers(kImagerSpacing, kSpacingName, file_);
     if (!spacing.empty() && (spacing.size() != 2 || !(spacing[0] > 0.0) || !(spacing[1] > 0.0)))
       throw InputError("ImagerPixelSpacing (0018,1164)",
-                       elements_.text(kImagerSpacing),
+                       std::to_string(spacing.size()) + " numbers",
                        "must be two spacings above 0: of rows, of columns",
                        file_);
     if (spacing.size() == 2)
@@ -122,20 +159,59 @@ class DicomCamera {
           "that at the patient and is not taken");
   }
 
-  /// Of each frame: one, unless the positioner moves.
-  [[nodiscard]] std::vector<PositionerAngles> all_angles() const {
+  /// Of an enhanced file: one camera per frame, or one when no frame moves.
+  void add_enhanced_cameras() {
+    const std::size_t frames = frame_count();
+    for (std::size_t i = 0; i < frames; ++i) {
+      const int frame = static_cast<int>(i) + 1;
+      read_detector(frame);
+      add_camera(angles_of(frame));
+    }
+    const auto is_as_first = [&](const StatedCamera& other) {
+      const CameraGeometry& first = stated_.cameras.front().geometry;
+      return other.geometry.source_point == first.source_point &&
+             other.geometry.detector_origin_point == first.detector_origin_point &&
+             other.geometry.column_direction == first.column_direction &&
+             other.geometry.row_direction == first.row_direction &&
+             other.geometry.pixel_spacing_mm == first.pixel_spacing_mm;
+    };
+    if (std::ranges::all_of(stated_.cameras, is_as_first)) stated_.cameras.resize(1);
+    const auto rotation =
+        found_number(1, kIsocenterMacro, kDetectorRotation, "detector rotation (0018,9465)");
+    if (rotation && *rotation != 0.0)
+      stated_.notes.push_back(file_ + ": PositionerIsocenterDetectorRotationAngle (0018,9465) = " +
+                              number_text(*rotation) +
+                              " degrees is not applied: the images may be turned in their plane");
+  }
+
+  [[nodiscard]] std::size_t frame_count() const {
+    const double frames =
+        elements_.number_or_none(kFrames, "NumberOfFrames (0028,0008)").value_or(1.0);
+    if (!(frames >= 1.0 && frames <= kMostFrames) || frames != std::floor(frames))
+      throw InputError("NumberOfFrames (0028,0008)",
+                       number_text(frames),
+                       "must be whole and within 1 and 100000",
+                       file_);
+    return static_cast<std::size_t>(frames);
+  }
+
+  [[nodiscard]] PositionerAngles angles_of(int frame) const {
     PositionerAngles first;
     const auto primary =
-        elements_.number_or_none(kPrimaryAngle, "PositionerPrimaryAngle (0018,1510)");
-    const auto secondary =
-        elements_.number_or_none(kSecondaryAngle, "PositionerSecondaryAngle (0018,1511)");
+        found_number(frame, kPositionerMacro, kPrimaryAngle, "PositionerPrimaryAngle (0018,1510)");
+    const auto secondary = found_number(
+        frame, kPositionerMacro, kSecondaryAngle, "PositionerSecondaryAngle (0018,1511)");
     const std::vector<double>& given = options_.positioner_deg;
     constexpr double kToleranceDeg = 1e-3;
     if ((!primary || !secondary) && given.empty())
       throw InputError(file_ +
                        ": PositionerPrimaryAngle (0018,1510) or PositionerSecondaryAngle "
                        "(0018,1511) is missing: af-inspect --rig-from with --rig-positioner-deg "
-                       "PRIMARY,SECONDARY states them");
+                       "PRIMARY,SECONDARY states them" +
+                       (functional_group(elements_, frame, kIsocenterMacro) == nullptr
+                            ? ""
+                            : "; the file's PositionerIsocenter angles are of the equipment, not "
+                              "of the patient"));
     if (!given.empty() && ((primary && std::abs(*primary - given[0]) > kToleranceDeg) ||
                            (secondary && std::abs(*secondary - given[1]) > kToleranceDeg)))
       throw InputError("--rig-positioner-deg",
@@ -149,20 +225,19 @@ class DicomCamera {
                        number_text(first.primary_deg) + ", " + number_text(first.secondary_deg),
                        "must be within 360 and 180 degrees",
                        file_);
+    return first;
+  }
+
+  /// Of each frame: one, unless the positioner moves.
+  [[nodiscard]] std::vector<PositionerAngles> all_angles() const {
+    const PositionerAngles first = angles_of(1);
     if (elements_.text(kPositionerMotion) != "DYNAMIC") return {first};
     return moving_angles(first);
   }
 
   /// PS3.3, C.8.7.5.1.3: one increment per frame, or an offset from the first angles for each.
   [[nodiscard]] std::vector<PositionerAngles> moving_angles(const PositionerAngles& first) const {
-    const double frames =
-        elements_.number_or_none(kFrames, "NumberOfFrames (0028,0008)").value_or(1.0);
-    if (!(frames >= 1.0 && frames <= kMostFrames) || frames != std::floor(frames))
-      throw InputError("NumberOfFrames (0028,0008)",
-                       number_text(frames),
-                       "must be whole and within 1 and 100000",
-                       file_);
-    const auto count = static_cast<std::size_t>(frames);
+    const std::size_t count = frame_count();
     const auto offsets = [&](DicomTag tag, const char* name) {
       std::vector<double> values = elements_.numbers(tag, name);
       if (values.empty()) values = {0.0};

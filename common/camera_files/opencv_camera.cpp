@@ -174,12 +174,28 @@ void read_size(const OpenCvValues& values, const std::string& number, StatedCame
         values.place(*width));
 }
 
-void refuse_distortion(const OpenCvValues& values, const std::string& number) {
-  const YamlValue* const distortion = values.find(distortion_names(), number);
-  if (distortion == nullptr || distortion->numbers.size() == 0 || distortion->numbers.isZero(0.0))
-    return;
-  throw InputError(values.place(*distortion) +
-                   ": distortion that is not 0 is not supported: undistort the images first");
+/// OpenCV's first eight coefficients; more, of thin prisms and tilted sensors, must be 0. A
+/// negative focal length along rows turns x and y of PixelDistortion's K round.
+LensDistortion read_distortion_of(const OpenCvValues& values,
+                                  const std::string& number,
+                                  const Eigen::Matrix3d& k) {
+  LensDistortion distortion;
+  const YamlValue* const stated = values.find(distortion_names(), number);
+  if (stated == nullptr || stated->numbers.size() == 0) return distortion;
+  const Eigen::VectorXd numbers = stated->numbers.transpose().reshaped();
+  constexpr std::array<Eigen::Index, 5> kCounts = {4, 5, 8, 12, 14};
+  if (std::ranges::find(kCounts, numbers.size()) == kCounts.end())
+    throw FileError(values.place(*stated),
+                    "distortion_coefficients",
+                    "4, 5, 8, 12 or 14 numbers",
+                    std::to_string(numbers.size()));
+  const Eigen::Index known = std::min<Eigen::Index>(numbers.size(), 8);
+  if (!numbers.tail(numbers.size() - known).isZero(0.0))
+    throw InputError(values.place(*stated) +
+                     ": distortion of thin prisms or tilted sensors (s1 ... s4, tx, ty) that is "
+                     "not 0 is not supported: undistort the images first");
+  std::copy_n(numbers.begin(), known, distortion.coefficients.begin());
+  return k(1, 1) < 0.0 ? distortion.with_rows_flipped() : distortion;
 }
 
 StatedCamera read_camera(const OpenCvValues& values, const std::string& number) {
@@ -193,7 +209,6 @@ StatedCamera read_camera(const OpenCvValues& values, const std::string& number) 
       rotation(values, values.of_camera(rotation_names(), number, kNeedsPose));
   pinhole.translation_mm =
       values.vector(values.of_camera(translation_names(), number, kNeedsPose), 3, "t");
-  refuse_distortion(values, number);
   StatedCamera camera;
   read_size(values, number, camera);
   double column_spacing_mm = 1.0;
@@ -209,6 +224,7 @@ StatedCamera read_camera(const OpenCvValues& values, const std::string& number) 
   const std::string name_text = camera.has_name ? name->text : "camera" + number;
   camera.geometry =
       camera_from_pinhole(name_text, pinhole, column_spacing_mm, camera.geometry.size_px);
+  camera.geometry.distortion = read_distortion_of(values, number, pinhole.pixels_from_camera);
   return camera;
 }
 
@@ -250,7 +266,11 @@ std::string write_opencv_yaml(const CameraRig& rig) {
          "\"\nimage_width: " + std::to_string(camera.size_px.x()) +
          "\nimage_height: " + std::to_string(camera.size_px.y()) + "\n" +
          yaml_matrix("camera_matrix", pinhole.pixels_from_camera) +
-         yaml_matrix("distortion_coefficients", Eigen::MatrixXd::Zero(5, 1)) +
+         yaml_matrix(
+             "distortion_coefficients",
+             Eigen::Map<const Eigen::VectorXd>(
+                 camera.distortion.coefficients.data(),
+                 static_cast<Eigen::Index>(std::max<std::size_t>(5, camera.distortion.count())))) +
          yaml_matrix("R", pinhole.camera_from_room) + yaml_matrix("t", pinhole.translation_mm) +
          yaml_matrix("pixel_spacing_mm", camera.pixel_spacing_mm) +
          yaml_matrix("isocenter_point", rig.isocenter_point);

@@ -144,6 +144,29 @@ std::optional<CameraGeometry> camera_from_keys(TomlTableReader& reader,
   return camera;
 }
 
+/// distortion = [k1, k2, p1, p2], or five or eight, as OpenCV orders them.
+LensDistortion read_distortion(TomlTableReader& reader) {
+  constexpr const char* kKey = "distortion";
+  LensDistortion distortion;
+  if (!reader.has(kKey)) return distortion;
+  const toml::array* const numbers = reader.node(kKey).as_array();
+  const std::size_t count = numbers == nullptr ? 0 : numbers->size();
+  if (count != 4 && count != 5 && count != 8) {
+    reader.add_problem(kKey,
+                       "must be OpenCV's k1, k2, p1, p2, or these with k3, or with k3, k4, k5, k6");
+    return distortion;
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto number = (*numbers)[i].value<double>();
+    if (!number || !std::isfinite(*number)) {
+      reader.add_problem(kKey, "must be finite numbers");
+      return {};
+    }
+    distortion.coefficients[i] = *number;
+  }
+  return distortion;
+}
+
 using CameraMaker = std::optional<CameraGeometry> (*)(TomlTableReader& reader,
                                                       const CameraGeometry& stated,
                                                       const Eigen::Vector3d& isocenter_point,
@@ -182,11 +205,13 @@ std::optional<CameraGeometry> read_camera(const toml::table& table,
       reader.add_problem("name", problem);
   CameraGeometry stated;
   stated.name = name.value_or("");
+  stated.distortion = read_distortion(reader);
   stated.pixel_spacing_mm = spacing.value_or(Eigen::Vector2d::Ones());
   stated.size_px = size ? Eigen::Vector2i((*size)[0], (*size)[1]) : Eigen::Vector2i(1, 1);
   auto camera = form_of(reader).make(reader, stated, isocenter_point, problems);
   reader.refuse_unknown_keys();
   if (!camera || !name) return std::nullopt;
+  camera->distortion = stated.distortion;
   // Missing sizes stand in as ones, so that the rest is checked too.
   if (!note_geometry_problems(*camera, table, problems) || !spacing || !size) return std::nullopt;
   clean_axes(*camera);
@@ -269,6 +294,12 @@ std::string rig_to_toml(const CameraRig& rig) {
     text += "pixel_spacing_mm = " + toml_numbers(camera.pixel_spacing_mm) + "\n";
     text += "size_px = [" + std::to_string(camera.size_px.x()) + ", " +
             std::to_string(camera.size_px.y()) + "]\n";
+    if (!camera.distortion.is_none())
+      text += "distortion = " +
+              toml_numbers(Eigen::Map<const Eigen::VectorXd>(
+                  camera.distortion.coefficients.data(),
+                  static_cast<Eigen::Index>(camera.distortion.count()))) +
+              "\n";
   }
   return text;
 }

@@ -280,6 +280,7 @@ class RigCompletion {
       camera.detector_origin_point +=
           (camera.size_px[axis] - 1) * camera.pixel_spacing_mm[axis] * direction;
       direction = -direction;
+      if (flips_rows) camera.distortion = camera.distortion.with_rows_flipped();
     }
   }
 

@@ -44,6 +44,27 @@ bool SlabRays::all_inside() const {
       corners.begin(), corners.end(), [&](const Eigen::Vector3d& d) { return is_inside(d); });
 }
 
+double SlabRays::share_to_edges() const {
+  if (!all_descend()) return -1.0;
+  double least = 0.5;
+  const auto keep = [&](const GridAxis& axis, double position_mm) {
+    const double distance_mm = std::min(position_mm - axis.first_mm, axis.last_mm - position_mm);
+    least = std::min(least, distance_mm / (axis.last_mm - axis.first_mm));
+  };
+  const auto keep_hit =
+      [&](const GridAxis& x, const GridAxis& z, double plane_y_mm, const Eigen::Vector3d& ray) {
+        const Eigen::Vector3d hit = source + (plane_y_mm - source.y()) / ray.y() * ray;
+        keep(x, hit.x());
+        keep(z, hit.z());
+      };
+  for (const Eigen::Vector3d& direction : corner_directions()) {
+    keep_hit(light_slab_.u, light_slab_.v, light_slab_.uv_plane_y_mm, direction);
+    for (const SlabGeometry& slab : light_slab_.slabs)
+      keep_hit(slab.s, slab.t, slab.st_plane_y_mm, direction);
+  }
+  return least;
+}
+
 std::int64_t SlabRays::count_outside() const {
   if (all_descend() && all_inside()) return 0;
   return blank_outside({});

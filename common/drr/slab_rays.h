@@ -27,6 +27,9 @@ struct SlabRays {
   /// The hit points of a view's rays form a convex quadrilateral on each plane, so its corner rays
   /// decide.
   [[nodiscard]] bool all_inside() const;
+  /// How far the rays keep from the edges of the planes: the least distance of a hit from an edge,
+  /// as a share of the plane's side, at most 0.5. Below 0 when a ray is outside.
+  [[nodiscard]] double share_to_edges() const;
   /// Rays that miss a plane.
   [[nodiscard]] std::int64_t count_outside() const;
   /// Counts the rays that miss a plane and zeroes their pixels in both outputs. Each output has any

@@ -184,6 +184,12 @@ std::vector<std::string> problems(const CameraGeometry& camera) {
   if (camera.size_px.minCoeff() < 1 || camera.size_px.maxCoeff() > kMaxSide ||
       camera.size_px.cast<double>().prod() > kMaxPixels)
     add("size_px", text_of(camera.size_px), "must be within 1 and 32768, at most 2^28 pixels");
+  if (!camera.distortion.is_none() && found.empty())
+    if (const std::string problem = distortion_problem(camera); !problem.empty())
+      add("distortion",
+          text_of(
+              Eigen::Map<const Eigen::Matrix<double, 8, 1>>(camera.distortion.coefficients.data())),
+          problem);
   return found;
 }
 

@@ -7,6 +7,8 @@
 
 #include <Eigen/Core>
 
+#include "geometry/lens_distortion.h"
+
 namespace af {
 
 /// Half-line from the X-ray source.
@@ -25,6 +27,9 @@ struct CameraGeometry {
   Eigen::Vector3d row_direction = Eigen::Vector3d::UnitY();         ///< of increasing row
   Eigen::Vector2d pixel_spacing_mm = Eigen::Vector2d::Ones();       ///< column, row
   Eigen::Vector2i size_px = Eigen::Vector2i::Zero();                ///< columns, rows
+  /// Of the stored X-rays: they are undistorted on reading, and everything here is of the
+  /// undistorted ones.
+  LensDistortion distortion;
 
   [[nodiscard]] Eigen::Vector3d detector_point(double column, double row) const;
   [[nodiscard]] Ray ray(double column, double row) const;

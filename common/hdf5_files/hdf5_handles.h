@@ -2,7 +2,10 @@
 // Internal to common/hdf5_files.
 #pragma once
 
+#include <atomic>
+#include <cstddef>
 #include <stdexcept>
+#include <string>
 
 #include <hdf5.h>
 

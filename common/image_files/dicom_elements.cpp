@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <charconv>
 #include <cmath>
 #include <cstring>
@@ -11,6 +12,7 @@
 #include <string_view>
 
 #include "base/error.h"
+#include "base/number_text.h"
 #include "files/input_file.h"
 #include "files/input_guard.h"
 
@@ -30,6 +32,31 @@ constexpr DicomTag kSequenceEnd = {0xfffe, 0xe0dd};
 constexpr DicomTag kTransferSyntax = {0x0002, 0x0010};
 constexpr DicomTag kPixelData = {0x7fe0, 0x0010};
 constexpr DicomTag kIntensitySign = {0x0028, 0x1041};  ///< signed short, in implicit files as well
+constexpr DicomTag kLutDescriptor = {0x0028, 0x3002};
+constexpr DicomTag kLutData = {0x0028, 0x3006};
+constexpr std::uint64_t kLongestLut = 1U << 18;
+/// Values within sequences that one file may have: a moving C-arm has tens per frame.
+constexpr std::size_t kMostNestedValues = std::size_t{1} << 20;
+
+/// Sequences whose items are kept: Modality LUT; shared and per-frame functional groups, and of
+/// these geometry, positioner, isocentre, pixel properties and intensity relationship.
+bool is_kept_sequence(DicomTag tag) {
+  constexpr std::array<DicomTag, 8> kKept = {{{0x0028, 0x3000},
+                                              {0x5200, 0x9229},
+                                              {0x5200, 0x9230},
+                                              {0x0018, 0x9405},
+                                              {0x0018, 0x9462},
+                                              {0x0018, 0x9476},
+                                              {0x0028, 0x9443},
+                                              {0x0028, 0x9422}}};
+  return std::find(kKept.begin(), kKept.end(), tag) != kKept.end();
+}
+
+/// Of the elements that are read, floats in implicit files.
+bool is_single_float(DicomTag tag) {
+  return tag.first == 0x0018 &&
+         (tag.second == 0x9402 || (tag.second >= 0x9463 && tag.second <= 0x9471));
+}
 
 /// Value representations with a 4-byte length, and those with a 2-byte one (PS3.5, 7.1.2).
 constexpr std::string_view kLongForms = "OB OD OF OL OV OW SQ SV UC UN UR UT UV ";
@@ -82,10 +109,11 @@ class DicomWalker {
 
   DicomElements walk() {
     at_ = is_marked_dicom(elements_.path_) ? kPreambleBytes : 0;
-    while (at_ < size_ && peek_group() == 0x0002) read_element({}, size_, 0);
+    DicomValues* const top = &elements_.values_;
+    while (at_ < size_ && peek_group() == 0x0002) read_element({}, size_, 0, top);
     const Encoding encoding = data_encoding();
     elements_.is_big_endian_ = encoding.is_big_endian;
-    while (at_ < size_ && !elements_.has_pixels()) read_element(encoding, size_, 0);
+    while (at_ < size_ && !elements_.has_pixels()) read_element(encoding, size_, 0, top);
     return std::move(elements_);
   }
 
@@ -173,7 +201,8 @@ class DicomWalker {
     return header;
   }
 
-  void read_element(const Encoding& encoding, std::uint64_t end, int depth) {
+  /// Its value goes to `into`, unless that is nullptr.
+  void read_element(const Encoding& encoding, std::uint64_t end, int depth, DicomValues* into) {
     const Header header = read_header(encoding, end);
     if (header.tag.first == 0xfffe) fail("an item outside of a sequence");
     if (depth == 0) elements_.tags_.insert(header.tag);
@@ -182,31 +211,59 @@ class DicomWalker {
       if (is_pixels)
         read_fragments(encoding, end);
       else  // an unknown form of undefined length holds implicit elements (PS3.5, 6.2.2)
-        read_items(header.form == "UN" ? Encoding{false, false} : encoding, end, true, depth + 1);
+        read_items(header.form == "UN" ? Encoding{false, false} : encoding,
+                   end,
+                   true,
+                   depth + 1,
+                   kept_sequence(header.tag, into));
     } else {
       need(header.length, end);
       if (header.length % unit_bytes(header.form) != 0) fail("a length that does not fit its form");
       if (header.form == "SQ")
-        read_items(encoding, at_ + header.length, false, depth + 1);
-      else if (depth == 0 && header.length <= kLongestKeptValue && !is_pixels)
-        keep(header, take(header.length, end), encoding.is_big_endian);
+        read_items(
+            encoding, at_ + header.length, false, depth + 1, kept_sequence(header.tag, into));
+      else if (is_implicit_sequence(header, into))
+        read_items(
+            encoding, at_ + header.length, false, depth + 1, kept_sequence(header.tag, into));
+      else if (into != nullptr && header.length <= longest_kept(header.tag) && !is_pixels)
+        keep(header, take(header.length, end), encoding.is_big_endian, depth, *into);
       else
         skip(header.length, is_pixels);
     }
   }
 
-  void read_items(const Encoding& encoding, std::uint64_t end, bool until_mark, int depth) {
+  static std::uint64_t longest_kept(DicomTag tag) {
+    return tag == kLutData ? kLongestLut : kLongestKeptValue;
+  }
+
+  /// Implicit files do not say that an element of stated length is a sequence.
+  static bool is_implicit_sequence(const Header& header, const DicomValues* into) {
+    return header.form.empty() && into != nullptr && is_kept_sequence(header.tag);
+  }
+
+  /// Where the items of a sequence go; nullptr: they are passed over.
+  static std::vector<DicomValues>* kept_sequence(DicomTag tag, DicomValues* into) {
+    return into != nullptr && is_kept_sequence(tag) ? &into->sequences_[tag] : nullptr;
+  }
+
+  void read_items(const Encoding& encoding,
+                  std::uint64_t end,
+                  bool until_mark,
+                  int depth,
+                  std::vector<DicomValues>* items) {
     if (depth > kMaxDepth) fail("sequences are nested too deeply");
     while (until_mark || at_ < end) {
       const Header item = read_header(encoding, end);
       if (until_mark && item.tag == kSequenceEnd) return;
       if (item.tag != kItem) fail("a sequence holds something that is no item");
+      DicomValues* const into = items == nullptr ? nullptr : &items->emplace_back();
+      if (into != nullptr) count_nested();
       if (item.length == kUndefinedLength) {
-        while (!at_item_end(encoding, end)) read_element(encoding, end, depth);
+        while (!at_item_end(encoding, end)) read_element(encoding, end, depth, into);
       } else {
         need(item.length, end);
         const std::uint64_t item_end = at_ + item.length;
-        while (at_ < item_end) read_element(encoding, item_end, depth);
+        while (at_ < item_end) read_element(encoding, item_end, depth, into);
       }
     }
   }
@@ -240,12 +297,45 @@ class DicomWalker {
     }
   }
 
-  void keep(const Header& header, const std::string& bytes, bool is_big_endian) {
-    const bool is_signed =
-        header.form == "SS" || (header.form.empty() && header.tag == kIntensitySign);
-    if (header.form != "US" && !is_signed &&
-        !(header.form.empty() && is_unsigned_short(header.tag))) {
-      elements_.texts_[header.tag] = trimmed(bytes);
+  void count_nested() {
+    if (++nested_values_ > kMostNestedValues) fail("its sequences hold too many values");
+  }
+
+  /// IEEE numbers of 4 or 8 bytes.
+  template <typename Float, typename Bits>
+  static std::string float_text(std::string_view bytes, bool is_big_endian) {
+    std::string text;
+    for (std::size_t at = 0; at + sizeof(Bits) <= bytes.size(); at += sizeof(Bits)) {
+      Bits bits = 0;
+      for (std::size_t i = 0; i < sizeof(Bits); ++i) {
+        const std::size_t byte = is_big_endian ? i : sizeof(Bits) - 1 - i;
+        bits = bits << 8 | static_cast<unsigned char>(bytes[at + byte]);
+      }
+      text += (at > 0 ? "\\" : "") + number_text(static_cast<double>(std::bit_cast<Float>(bits)));
+    }
+    return text;
+  }
+
+  void keep(const Header& header,
+            const std::string& bytes,
+            bool is_big_endian,
+            int depth,
+            DicomValues& into) {
+    if (depth > 0) count_nested();
+    const bool is_implicit = header.form.empty();
+    if (header.form == "FL" || (is_implicit && is_single_float(header.tag))) {
+      into.texts_[header.tag] = float_text<float, std::uint32_t>(bytes, is_big_endian);
+      return;
+    }
+    if (header.form == "FD") {
+      into.texts_[header.tag] = float_text<double, std::uint64_t>(bytes, is_big_endian);
+      return;
+    }
+    const bool is_lut = header.tag == kLutData || header.tag == kLutDescriptor;
+    const bool is_signed = header.form == "SS" || (is_implicit && header.tag == kIntensitySign);
+    if (header.form != "US" && !is_signed && !(is_implicit && is_unsigned_short(header.tag)) &&
+        !is_lut) {
+      into.texts_[header.tag] = trimmed(bytes);
       return;
     }
     std::string text;
@@ -255,13 +345,14 @@ class DicomWalker {
       text += (i > 0 ? "\\" : "") + (is_signed ? std::to_string(static_cast<std::int16_t>(value))
                                                : std::to_string(value));
     }
-    elements_.texts_[header.tag] = text;
+    into.texts_[header.tag] = text;
   }
 
   std::string path_;
   std::ifstream file_;
   std::uint64_t size_ = 0;
   std::uint64_t at_ = 0;
+  std::size_t nested_values_ = 0;
   DicomElements elements_;
 };
 
@@ -270,18 +361,41 @@ DicomElements DicomElements::read(const fs::path& path) {
   return DicomWalker(path).walk();
 }
 
+const DicomValues* functional_group(const DicomElements& header, int frame, DicomTag macro) {
+  const std::vector<DicomValues>& frames = header.values().items({0x5200, 0x9230});
+  const auto at = static_cast<std::size_t>(frame - 1);
+  if (frame >= 1 && at < frames.size() && !frames[at].items(macro).empty())
+    return &frames[at].item(macro);
+  const DicomValues& shared = header.values().item({0x5200, 0x9229});
+  return shared.items(macro).empty() ? nullptr : &shared.item(macro);
+}
+
 std::uint64_t DicomElements::pixel_bytes() const {
   std::uint64_t bytes = 0;
   for (const DicomPart& part : pixel_parts_) bytes += part.bytes;
   return bytes;
 }
 
-std::string DicomElements::text(DicomTag tag) const {
+std::string DicomValues::text(DicomTag tag) const {
   const auto found = texts_.find(tag);
   return found == texts_.end() ? std::string() : found->second;
 }
 
-std::vector<double> DicomElements::numbers(DicomTag tag, const char* name) const {
+const std::vector<DicomValues>& DicomValues::items(DicomTag sequence) const {
+  static const std::vector<DicomValues> none;
+  const auto found = sequences_.find(sequence);
+  return found == sequences_.end() ? none : found->second;
+}
+
+const DicomValues& DicomValues::item(DicomTag sequence) const {
+  static const DicomValues none;
+  const std::vector<DicomValues>& all = items(sequence);
+  return all.empty() ? none : all.front();
+}
+
+std::vector<double> DicomValues::numbers(DicomTag tag,
+                                         const char* name,
+                                         const std::string& file) const {
   const std::string all = text(tag);
   std::vector<double> values;
   for (std::size_t at = 0; at < all.size();) {
@@ -291,7 +405,7 @@ std::vector<double> DicomElements::numbers(DicomTag tag, const char* name) const
     double value = 0.0;
     const auto [rest, error] = std::from_chars(word.data(), word.data() + word.size(), value);
     if (error != std::errc() || rest != word.data() + word.size() || !std::isfinite(value))
-      throw InputError(name, "'" + all + "'", "must be finite numbers", path_.string());
+      throw InputError(name, "'" + all.substr(0, 200) + "'", "must be finite numbers", file);
     values.push_back(value);
     at = end + 1;
   }

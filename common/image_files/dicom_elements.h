@@ -23,6 +23,28 @@ struct DicomPart {
   std::uint32_t bytes = 0;
 };
 
+/// Elements of a data set, or of an item of one of its sequences.
+class DicomValues {
+ public:
+  /// An element as text without padding; numbers in binary are written out. Empty when absent.
+  [[nodiscard]] std::string text(DicomTag tag) const;
+  /// Backslash-separated numbers; empty when the element is absent, InputError naming `name` and
+  /// `file` when it holds anything but finite numbers.
+  [[nodiscard]] std::vector<double> numbers(DicomTag tag,
+                                            const char* name,
+                                            const std::string& file) const;
+  /// Of the sequences that readers ask for: Modality LUT, functional groups and what they hold.
+  /// Empty when absent.
+  [[nodiscard]] const std::vector<DicomValues>& items(DicomTag sequence) const;
+  /// The only or first item of a sequence; an empty one when it is absent.
+  [[nodiscard]] const DicomValues& item(DicomTag sequence) const;
+
+ private:
+  friend class DicomWalker;
+  std::map<DicomTag, std::string> texts_;
+  std::map<DicomTag, std::vector<DicomValues>> sequences_;
+};
+
 /// The top-level elements of a DICOM file, read by walking its structure to the end of the pixel
 /// data. GDCM's own parser is not used: Debian's build of it aborts the process on headers that are
 /// cut short or of an unexpected form, and accepts cut pixel data in silence.
@@ -43,22 +65,28 @@ class DicomElements {
   [[nodiscard]] const std::vector<DicomPart>& pixel_parts() const { return pixel_parts_; }
   /// Bytes of all parts.
   [[nodiscard]] std::uint64_t pixel_bytes() const;
-  /// An element as text without padding; numbers in binary are written out. Empty when absent.
-  [[nodiscard]] std::string text(DicomTag tag) const;
-  /// Backslash-separated numbers; empty when the element is absent, InputError naming `name` when
-  /// it holds anything but finite numbers.
-  [[nodiscard]] std::vector<double> numbers(DicomTag tag, const char* name) const;
+  /// As DicomValues, of the top level.
+  [[nodiscard]] std::string text(DicomTag tag) const { return values_.text(tag); }
+  [[nodiscard]] std::vector<double> numbers(DicomTag tag, const char* name) const {
+    return values_.numbers(tag, name, path_.string());
+  }
+  [[nodiscard]] const DicomValues& values() const { return values_; }
   [[nodiscard]] std::optional<double> number_or_none(DicomTag tag, const char* name) const;
 
  private:
   friend class DicomWalker;
   std::filesystem::path path_;
   std::set<DicomTag> tags_;
-  std::map<DicomTag, std::string> texts_;
+  DicomValues values_;
   bool has_compressed_pixels_ = false;
   bool is_big_endian_ = false;
   std::vector<DicomPart> pixel_parts_;
 };
+
+/// An element of one frame (from 1) of an enhanced file: of the macro's sequence in the frame's
+/// functional groups, else in the shared ones, else nullptr. Files without functional groups have
+/// none.
+const DicomValues* functional_group(const DicomElements& header, int frame, DicomTag macro);
 
 /// True for a file with the mark of DICOM, or without its preamble as old files are. Reads a few
 /// bytes only.

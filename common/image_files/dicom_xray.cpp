@@ -21,18 +21,19 @@ constexpr DicomTag kSign = {0x0028, 0x1041};
 constexpr DicomTag kWindowCenter = {0x0028, 0x1050};
 constexpr DicomTag kWindowWidth = {0x0028, 0x1051};
 constexpr DicomTag kModalityLut = {0x0028, 0x3000};
+constexpr DicomTag kFramePixelProperties = {0x0028, 0x9443};
+constexpr DicomTag kIntensityLuts = {0x0028, 0x9422};
+constexpr DicomTag kLutFunction = {0x0028, 0x9474};
 
 /// Column, row, from DICOM's "row\column".
-std::optional<Eigen::Vector2d> spacing_of(const DicomElements& header,
+std::optional<Eigen::Vector2d> spacing_of(const DicomValues& header,
                                           DicomTag tag,
-                                          const char* name) {
-  const std::vector<double> values = header.numbers(tag, name);
+                                          const char* name,
+                                          const std::string& file) {
+  const std::vector<double> values = header.numbers(tag, name, file);
   if (values.empty()) return std::nullopt;
   if (values.size() != 2 || !(values[0] > 0.0 && values[1] > 0.0))
-    throw InputError(name,
-                     "'" + header.text(tag) + "'",
-                     "must be two positive numbers (mm)",
-                     header.path().string());
+    throw InputError(name, "'" + header.text(tag) + "'", "must be two positive numbers (mm)", file);
   return Eigen::Vector2d(values[1], values[0]);
 }
 
@@ -52,6 +53,77 @@ std::optional<int> sign_of(const DicomElements& header) {
                      "must be 1 or -1",
                      header.path().string());
   return static_cast<int>(*sign);
+}
+
+/// Of stored values to others (PS3.3, C.11.1); outside of its range its ends hold.
+struct ModalityLut {
+  double first = 0.0;  ///< the stored value of the first entry
+  std::vector<double> entries;
+  double highest = 0.0;  ///< that its bits can hold
+  std::string kind;
+
+  [[nodiscard]] double operator()(double stored) const {
+    const double last = static_cast<double>(entries.size()) - 1.0;
+    return entries[static_cast<std::size_t>(std::clamp(stored - first, 0.0, last))];
+  }
+};
+
+ModalityLut modality_lut_of(const DicomPixelLayout& layout) {
+  const std::string file = layout.path().string();
+  const DicomValues& item = layout.header.values().item(kModalityLut);
+  const std::vector<double> descriptor =
+      item.numbers({0x0028, 0x3002}, "LUTDescriptor (0028,3002)", file);
+  constexpr double kMostEntries = 65536.0;
+  constexpr double kMostBits = 16.0;
+  if (descriptor.size() != 3 || !(descriptor[2] >= 1.0 && descriptor[2] <= kMostBits))
+    throw FileError(file, "LUTDescriptor (0028,3002) is no count, first value and 1 to 16 bits");
+  ModalityLut lut;
+  lut.kind = item.text({0x0028, 0x3004});
+  lut.highest = std::exp2(descriptor[2]) - 1.0;
+  // Counts have no sign, whatever form the file gives them; first values have that of the pixels.
+  const auto wrapped = [&](double value) { return value < 0.0 ? value + kMostEntries : value; };
+  const double count = descriptor[0] == 0.0 ? kMostEntries : wrapped(descriptor[0]);
+  lut.first = layout.is_signed && descriptor[1] >= kMostEntries / 2.0 ? descriptor[1] - kMostEntries
+                                                                      : descriptor[1];
+  lut.entries = item.numbers({0x0028, 0x3006}, "LUTData (0028,3006)", file);
+  std::transform(lut.entries.begin(), lut.entries.end(), lut.entries.begin(), wrapped);
+  if (static_cast<double>(lut.entries.size()) != count)
+    throw FileError(file,
+                    "LUTData (0028,3006)",
+                    std::to_string(static_cast<int>(count)) + " entries",
+                    std::to_string(lut.entries.size()));
+  if (layout.slope != 1.0 || layout.intercept != 0.0)
+    throw InputError(file + ": a Modality LUT and RescaleSlope contradict each other");
+  return lut;
+}
+
+/// The LUT's part in what the file says of its values.
+void apply_modality_lut(const DicomPixelLayout& layout, DicomXray& xray) {
+  const ModalityLut lut = modality_lut_of(layout);
+  for (float& value : xray.image.pixels)
+    value = static_cast<float>(lut(static_cast<double>(value)));
+  xray.modality_lut = (lut.kind.empty() ? std::string() : lut.kind + ", ") +
+                      std::to_string(lut.entries.size()) + " entries";
+  xray.inversion_sum = lut.highest;
+  const bool is_angiography = xray.modality == "XA" || xray.modality == "RF";
+  if (is_angiography && xray.relationship == PixelIntensity::Logarithmic) {
+    xray.was_linearised = true;
+    xray.relationship = PixelIntensity::Linear;
+    xray.sign = 1;
+  }
+}
+
+/// What an enhanced file says of one frame alone.
+void read_functional_groups(const DicomElements& header, DicomXray& xray) {
+  const std::string file = header.path().string();
+  if (const DicomValues* const pixels = functional_group(header, xray.frame, kFramePixelProperties);
+      pixels != nullptr) {
+    const auto spacing = spacing_of(*pixels, kImagerPixelSpacing, "ImagerPixelSpacing", file);
+    if (spacing) xray.imager_spacing_mm = spacing;
+  }
+  if (const DicomValues* const luts = functional_group(header, xray.frame, kIntensityLuts);
+      luts != nullptr)
+    xray.intensity_function = luts->text(kLutFunction);
 }
 
 Image2d image_of(const DicomPixelLayout& layout) {
@@ -88,12 +160,15 @@ DicomXray read_dicom_xray(const std::filesystem::path& path, std::optional<int> 
   xray.sign = sign_of(header);
   if (const std::string center = header.text(kWindowCenter); !center.empty())
     xray.window = center + "/" + header.text(kWindowWidth);
-  xray.has_modality_lut = header.has(kModalityLut);
   const auto [low, high] = layout.value_range();
   xray.inversion_sum = low + high;
-  xray.imager_spacing_mm = spacing_of(header, kImagerPixelSpacing, "ImagerPixelSpacing");
-  xray.pixel_spacing_mm = spacing_of(header, kPixelSpacing, "PixelSpacing");
+  const DicomValues& values = header.values();
+  const std::string file = path.string();
+  xray.imager_spacing_mm = spacing_of(values, kImagerPixelSpacing, "ImagerPixelSpacing", file);
+  xray.pixel_spacing_mm = spacing_of(values, kPixelSpacing, "PixelSpacing", file);
+  read_functional_groups(header, xray);
   xray.image = image_of(layout);
+  if (header.has(kModalityLut)) apply_modality_lut(layout, xray);
   return xray;
 }
 

@@ -29,7 +29,13 @@ struct DicomXray {
   /// PixelIntensityRelationshipSign: 1 = higher values mean more intensity, -1 = less.
   std::optional<int> sign;
   std::string window;  ///< "centre/width" as the file has it; empty: none
-  bool has_modality_lut = false;
+  /// "kind, N entries" of the Modality LUT that was applied, in place of slope and intercept.
+  std::string modality_lut;
+  /// The LUT of an XA or RF image turned logarithms into values linear to intensity (PS3.3,
+  /// C.8.7.1.1.2); `relationship` is then Linear.
+  bool was_linearised = false;
+  /// The frame's own words on it (Pixel Intensity Relationship LUT), when it has functional groups.
+  std::string intensity_function;
   /// Sum of the lowest and highest value that a pixel can hold: what a value is subtracted from to
   /// turn white into black.
   double inversion_sum = 0.0;
@@ -40,8 +46,9 @@ struct DicomXray {
 };
 
 /// Reads frame `frame` (from 1) of a DICOM image file; without it there must be one frame only.
-/// Errors as read_image(); InputError also for a PixelIntensityRelationshipSign that is not 1 or -1
-/// and a pixel spacing that is not positive.
+/// Errors as read_image(); InputError also for a PixelIntensityRelationshipSign that is not 1 or
+/// -1, a pixel spacing that is not positive and a Modality LUT that is broken or stands beside a
+/// rescale.
 DicomXray read_dicom_xray(const std::filesystem::path& path, std::optional<int> frame);
 
 }  // namespace af

@@ -103,7 +103,7 @@ Eigen::Vector2d positioner_angles_deg(const Eigen::Vector3d& beam_direction_ct) 
                                              std::asin(std::clamp(beam.z(), -1.0, 1.0)));
 }
 
-std::string patient_letters(const Eigen::Vector3d& direction_ct) {
+std::string patient_orientation_letters(const Eigen::Vector3d& direction_ct) {
   constexpr std::array<std::array<char, 2>, 3> kLetters = {{{'L', 'R'}, {'P', 'A'}, {'H', 'F'}}};
   constexpr double kLeast = 0.1;
   std::array<std::size_t, 3> axes = {0, 1, 2};
@@ -161,8 +161,8 @@ void write_dicom_xray(const Image2d& levels,
     data.text(0x0020,
               0x0020,
               "CS",
-              patient_letters(description.column_direction_ct) + "\\" +
-                  patient_letters(description.row_direction_ct));
+              patient_orientation_letters(description.column_direction_ct) + "\\" +
+                  patient_orientation_letters(description.row_direction_ct));
   data.u16(0x0028, 0x0002, 1);
   data.text(0x0028, 0x0004, "CS", "MONOCHROME1");
   data.u16(0x0028, 0x0010, levels.height);

@@ -33,7 +33,7 @@ Eigen::Vector2d positioner_angles_deg(const Eigen::Vector3d& beam_direction_ct);
 
 /// DICOM's letters of a direction (unit, patient coordinates), the largest part first: "L", "PL";
 /// parts below a tenth are left out.
-std::string patient_letters(const Eigen::Vector3d& direction_ct);
+std::string patient_orientation_letters(const Eigen::Vector3d& direction_ct);
 
 /// Writes intensities (whole grey levels) as one frame of DICOM XA: MONOCHROME1, so low values are
 /// white: 2^bits - 1 - level is stored; LIN; explicit little endian. UIDs follow from the content.

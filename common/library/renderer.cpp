@@ -283,8 +283,9 @@ Field Field::open(const std::filesystem::path& path, const FieldOptions& options
     const af::FieldIdentity& identity = field->identity;
     auto facts = std::make_shared<Facts>();
     facts->look_up = options.look_up.empty() ? info.look_up : options.look_up;
-    facts->max_rotation_deg = identity.range.max_rotation_rad() * af::kDegPerRad;
-    facts->max_translation_mm = identity.range.max_translation_mm();
+    const af::MotionRange within = identity.range.symmetric_part();
+    facts->max_rotation_deg = within.max_rotation_rad() * af::kDegPerRad;
+    facts->max_translation_mm = within.max_translation_mm();
     facts->ct_content_sha256 = identity.ct_content_sha256;
     facts->payload_sha256 = info.payload_sha256;
     facts->water_mu_per_mm = identity.mu_water_per_mm;

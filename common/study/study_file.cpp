@@ -141,13 +141,34 @@ void check_fiducials(TomlTableReader& reader,
     }
 }
 
-/// mask = "auto" or a file; a file of that name is "./auto".
+/// mask = "auto", a file, or both in a list; a file of that name is "./auto".
 void read_mask_key(TomlTableReader& reader, const fs::path& folder, StudyView& view) {
-  const auto text = reader.get_string("mask", Presence::Optional);
-  if (!text) return;
-  view.reading.masks_borders = *text == "auto";
-  if (!view.reading.masks_borders)
-    view.mask = get_path(reader, "mask", Presence::Optional, folder, view.places);
+  constexpr const char* kKey = "mask";
+  if (!reader.has(kKey)) return;
+  const toml::node& node = reader.node(kKey);
+  toml::array one;
+  if (!node.is_array()) one.push_back(node);
+  const toml::array& entries = node.is_array() ? *node.as_array() : one;
+  for (const toml::node& entry : entries) {
+    const auto text = entry.value<std::string>();
+    const bool is_auto = text == "auto";
+    const bool is_again = is_auto ? view.reading.masks_borders : view.mask.has_value();
+    if (!text || text->empty() || is_again)
+      return reader.add_problem(kKey, "must be \"auto\", a file, or [\"auto\", a file]");
+    if (is_auto)
+      view.reading.masks_borders = true;
+    else
+      view.mask = resolved(folder, *text);
+  }
+  if (view.mask) view.places[kKey] = reader.place(kKey);
+}
+
+/// The reverse of read_mask_key().
+std::string mask_text(const StudyView& view,
+                      const std::function<std::string(const fs::path&)>& path_text) {
+  const std::string file = view.mask ? toml_text(path_text(*view.mask)) : std::string();
+  if (!view.reading.masks_borders) return file.empty() ? "" : "mask = " + file + "\n";
+  return file.empty() ? "mask = \"auto\"\n" : "mask = [\"auto\", " + file + "]\n";
 }
 
 /// One entry of landmarks_px: a point, or [] or [nan, nan] for what is not visible. False when it
@@ -198,6 +219,24 @@ std::vector<std::optional<Eigen::Vector2d>> get_landmarks(TomlTableReader& reade
   return points;
 }
 
+/// Points are stated in the stored X-ray; from here on they are those of the undistorted one.
+void undistort_points(TomlTableReader& reader, const CameraGeometry& camera, StudyView& view) {
+  if (camera.distortion.is_none()) return;
+  const PixelDistortion distortion(camera);
+  const auto undistort = [&](const char* key, Eigen::Vector2d& point) {
+    if (const auto ideal = distortion.ideal_from_stored(point); ideal.has_value())
+      point = *ideal;
+    else
+      reader.add_problem(key,
+                         "point " + toml_numbers(point) + " is where the lens of camera '" +
+                             camera.name + "' shows nothing");
+  };
+  for (Eigen::Vector2d& point : view.fiducials_px)
+    if (is_seen(point)) undistort("fiducials_px", point);
+  for (std::optional<Eigen::Vector2d>& point : view.landmarks_px)
+    if (point) undistort("landmarks_px", *point);
+}
+
 StudyView read_view(const toml::table& table,
                     const std::string& prefix,
                     const StudyCase& study_case,
@@ -219,6 +258,7 @@ StudyView read_view(const toml::table& table,
   read_mask_key(reader, context.folder, view);
   check_fiducials(reader, view, study_case.fiducials_ct_mm.size(), camera);
   view.landmarks_px = get_landmarks(reader, study_case.landmarks_ct_mm.size(), camera);
+  if (camera != nullptr) undistort_points(reader, *camera, view);
   reader.refuse_unknown_keys();
   return view;
 }
@@ -320,6 +360,18 @@ std::string points_text(const std::vector<Eigen::Matrix<double, Size, 1>>& point
   return text + "]";
 }
 
+/// The reverse of undistort_points().
+StudyView with_stored_points(StudyView view, const CameraRig& rig) {
+  const CameraGeometry* const camera = find_row(rig.cameras, view.camera);
+  if (camera == nullptr || camera->distortion.is_none()) return view;
+  const PixelDistortion distortion(*camera);
+  for (Eigen::Vector2d& point : view.fiducials_px)
+    if (is_seen(point)) point = distortion.stored_from_ideal(point);
+  for (std::optional<Eigen::Vector2d>& point : view.landmarks_px)
+    if (point) point = distortion.stored_from_ideal(*point);
+  return view;
+}
+
 std::string view_text(const StudyView& view, const fs::path& folder) {
   std::string text = "\n[[case.view]]\ncamera = " + toml_text(view.camera) + "\n";
   const auto add_path = [&](const char* key, const fs::path& path) {
@@ -339,14 +391,12 @@ std::string view_text(const StudyView& view, const fs::path& folder) {
                [](const auto& point) { return point ? toml_numbers(*point) : std::string("[]"); }) +
         "]\n";
   if (view.field) add_path("field", *view.field);
-  if (view.mask) add_path("mask", *view.mask);
-  if (view.reading.masks_borders) text += "mask = \"auto\"\n";
-  text += xray_keys_text(view.reading,
-                         [&](const fs::path& path) { return relative_if_below(path, folder); });
+  const auto path_text = [&](const fs::path& path) { return relative_if_below(path, folder); };
+  text += mask_text(view, path_text) + xray_keys_text(view.reading, path_text);
   return text;
 }
 
-std::string case_text(const StudyCase& study_case, const fs::path& folder) {
+std::string case_text(const StudyCase& study_case, const CameraRig& rig, const fs::path& folder) {
   std::string text = "\n[[case]]\nname = " + toml_text(study_case.name) + "\n";
   if (!study_case.note.empty()) text += "note = " + toml_text(study_case.note) + "\n";
   text += "ct = " + toml_text(relative_if_below(study_case.ct, folder)) + "\n";
@@ -361,7 +411,8 @@ std::string case_text(const StudyCase& study_case, const fs::path& folder) {
     text += "landmarks_ct_mm = " + points_text(study_case.landmarks_ct_mm) + "\n";
   if (study_case.gold_room_from_ct)
     text += "gold_room_from_ct = " + toml_matrix(study_case.gold_room_from_ct->matrix()) + "\n";
-  for (const StudyView& view : study_case.views) text += view_text(view, folder);
+  for (const StudyView& view : study_case.views)
+    text += view_text(with_stored_points(view, rig), folder);
   return text;
 }
 
@@ -426,7 +477,8 @@ std::string study_to_toml(const Study& study, const std::filesystem::path& folde
                                        return relative_if_below(file, absolute_folder);
                                      })) +
       "\n";
-  for (const StudyCase& study_case : study.cases) text += case_text(study_case, absolute_folder);
+  for (const StudyCase& study_case : study.cases)
+    text += case_text(study_case, study.rig, absolute_folder);
   return text;
 }
 

@@ -25,11 +25,11 @@ struct StudyView {
   std::filesystem::path xray;
   XrayDomain xray_domain = XrayDomain::Intensity;
   RegionOfInterest roi;
-  std::vector<Eigen::Vector2d>
-      fiducials_px;  ///< (column, row), in the order of StudyCase::fiducials_ct_mm; NaN: not seen;
-                     ///< NaN: not seen
-  /// (column, row), in the order of StudyCase::landmarks_ct_mm; nullopt: not visible here. Empty:
-  /// none is.
+  /// (column, row) of the undistorted X-ray, in the order of StudyCase::fiducials_ct_mm; NaN: not
+  /// seen.
+  std::vector<Eigen::Vector2d> fiducials_px;
+  /// (column, row) of the undistorted X-ray, in the order of StudyCase::landmarks_ct_mm; nullopt:
+  /// not visible here. Empty: none is.
   std::vector<std::optional<Eigen::Vector2d>> landmarks_px;
   std::optional<std::filesystem::path> field;
   std::optional<std::filesystem::path> mask;

@@ -51,7 +51,7 @@ roi_px = [156, 156, 200, 200]                    # column, row, width, height: t
 # fiducials_px = [[201.3, 255.0], [280.1, 231.7], [240.6, 301.2], [232.9, 207.4]]   # as many as fiducials_ct_mm
 # landmarks_px = [[210.0, 240.5], [], [251.0, 330.0]]   # as many as landmarks_ct_mm; [] is one that is not visible
 # field = "fields/patient-01-A.af.h5"            # made by af-precompute --study study.toml --case patient-01 --camera A
-# mask = "patient-01/A-mask.png"                 # not zero = used; for steel, labels or collimators; or "auto"
+# mask = "patient-01/A-mask.png"                 # not zero = used; for steel, labels or collimators; or "auto", or both in a list
 # How the X-ray's values are read (docs/xrays.md); af-inspect says what was done.
 # xray_frame = 1                                 # of a DICOM file of several frames
 # xray_polarity = "inverted"                     # or "as-stored"; without it as a DICOM file says
@@ -91,6 +91,7 @@ constexpr const char* kRigHead =
     R"(# X-ray cameras, in room coordinates (mm). column x row must point along the beam, from source to detector; `af-inspect
 # rig.toml` says so, and what else is wrong, with the line. Instead of the four geometry keys a camera may have
 # projection_matrix = [[...], [...], [...]] (3 x 4: pixels from room mm), with size_px and pixel_spacing_mm.
+# A lens or an image intensifier that distorts: distortion = [k1, k2, p1, p2, k3], OpenCV's; its X-rays are undistorted.
 )";
 
 }  // namespace

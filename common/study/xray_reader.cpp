@@ -14,6 +14,7 @@
 #include "image_files/dicom_xray.h"
 #include "image_files/image_file.h"
 #include "image_files/image_header.h"
+#include "study/xray_undistortion.h"
 
 namespace af {
 
@@ -117,6 +118,11 @@ void note_header(const DicomXray& dicom, Note& note) {
     note.add("PixelIntensityRelationship " + dicom.relationship_text +
              (dicom.sign ? (*dicom.sign > 0 ? " +1" : " -1") : ""));
   if (dicom.is_rescaled) note.add("rescaled");
+  if (!dicom.modality_lut.empty())
+    note.add("Modality LUT applied (" + dicom.modality_lut + ")" +
+             (dicom.was_linearised ? ", which makes logarithms intensities" : ""));
+  if (!dicom.intensity_function.empty())
+    note.add("frame's intensity LUT " + dicom.intensity_function + " not applied");
   if (!dicom.window.empty()) note.add("window " + dicom.window + " ignored");
 }
 
@@ -129,7 +135,7 @@ void check_relationship(const DicomXray& dicom,
     throw InputError("PixelIntensityRelationship",
                      "LOG",
                      "the values are logarithms: set xray_domain = \"attenuation\" (their scale "
-                     "is not known; the file's Modality LUT is not read)",
+                     "is not known)",
                      file);
   if (dicom.relationship == PixelIntensity::Logarithmic)
     warnings.push_back(file +
@@ -143,8 +149,6 @@ void check_relationship(const DicomXray& dicom,
     warnings.push_back(file + ": PixelIntensityRelationship = " + dicom.relationship_text +
                        ": the values were made for display and are not proportional to "
                        "intensity; edges remain, line integrals do not");
-  if (dicom.has_modality_lut)
-    warnings.push_back(file + ": its Modality LUT is not applied; stored values are used");
   if (dicom.modality == "CT" || dicom.modality == "MR")
     warnings.push_back(file + ": Modality = " + dicom.modality + " is no X-ray");
 }
@@ -411,6 +415,25 @@ void use_borders(const XrayBorders& borders, const StudyView& view, Image2d& mas
                      view.xray.string());
 }
 
+/// The X-ray and its mask as the camera without distortion sees them.
+void undistort(const XrayUndistortion& undistortion,
+               const StudyView& view,
+               Image2d& image,
+               Image2d& mask,
+               Note& note) {
+  image = undistortion.image(image);
+  const bool has_mask = !mask.pixels.empty();
+  mask = undistortion.mask(mask);
+  note.add(undistortion.text());
+  if (!has_mask && view.roi.pixel_count() > 0 && hidden_share(mask, view.roi) > kMostHidden)
+    throw InputError("distortion",
+                     undistortion.text(),
+                     "leaves more than half of roi_px without data",
+                     view.xray.string());
+  if (std::none_of(mask.pixels.begin(), mask.pixels.end(), [](float v) { return v != 0.0f; }))
+    throw InputError("distortion", undistortion.text(), "leaves no pixel", view.xray.string());
+}
+
 Image2d read_mask_file(const StudyView& view, const CameraGeometry& camera) {
   Image2d mask = read_image(*view.mask);
   check_size(mask, view.mask->string(), camera);
@@ -450,15 +473,22 @@ ViewXray read_view_xray(const StudyView& view, const CameraGeometry& camera) {
     xray.mask = used_from(view.places, "mask", [&] { return read_mask_file(view, camera); });
   Image2d& image = xray.attenuation;
   XrayBorders borders;
+  std::optional<XrayUndistortion> undistortion;
+  if (!camera.distortion.is_none()) undistortion.emplace(camera);
   std::optional<double> inversion;
   used_from(view.places, "xray", [&] {
     image = load_oriented(view, camera, inversion, note, xray.warnings);
     check_values(image, view);
-    if (needs_borders(view, image)) borders = borders_of(image, view.xray_domain);
-    note_background(image, view, borders, note, xray.warnings);
+    const Image2d undistorted = undistortion ? undistortion->image(image) : Image2d();
+    const Image2d& shown = undistortion ? undistorted : image;
+    if (needs_borders(view, shown)) borders = borders_of(shown, view.xray_domain);
+    note_background(shown, view, borders, note, xray.warnings);
   });
+  // Flat and dark fields are of the detector's own pixels.
   if (view.xray_domain == XrayDomain::Intensity)
     correct_by_flat(view, camera, inversion, image, xray.mask, note);
+  if (undistortion)
+    used_from(view.places, "xray", [&] { undistort(*undistortion, view, image, xray.mask, note); });
   used_from(view.places, "xray", [&] {
     if (view.xray_domain == XrayDomain::Intensity)
       take_negative_log(image, air_level(image, borders, view, note));

@@ -126,6 +126,7 @@ json camera_distance_json(const CameraDistance& distance, const MotionRange& cov
 
 json field_description(const CompressedAttenuationField& field) {
   const FieldIdentity& identity = field.identity;
+  const MotionRange within = identity.range.symmetric_part();
   const SlabLattice lattice = field.lattice(0);
   return {{"camera", identity.camera.name},
           {"detector_px", {identity.camera.size_px.x(), identity.camera.size_px.y()}},
@@ -136,8 +137,9 @@ json field_description(const CompressedAttenuationField& field) {
           {"st_nodes", {lattice.s.nodes, lattice.t.nodes}},
           {"slabs", field.slabs.size()},
           {"codewords", field.codebook.size()},
-          {"max_rotation_deg", identity.range.max_rotation_rad() * kDegPerRad},
-          {"max_translation_mm", identity.range.max_translation_mm()},
+          {"max_rotation_deg", within.max_rotation_rad() * kDegPerRad},
+          {"max_translation_mm", within.max_translation_mm()},
+          {"range", identity.range.text()},
           {"mu_water_per_mm", identity.mu_water_per_mm}};
 }
 

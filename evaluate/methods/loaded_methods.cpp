@@ -43,7 +43,7 @@ std::vector<LoadedMethod> load_methods(const MethodOptions& options,
                                        const Study& study,
                                        const StudyCase& study_case,
                                        const Communicator& world,
-                                       std::map<std::string, std::string>& input_sha256,
+                                       LoadedInputs& inputs,
                                        int judging_level) {
   std::vector<LoadedMethod> methods;
   const registration::RegistrationOptions method =
@@ -67,7 +67,9 @@ std::vector<LoadedMethod> load_methods(const MethodOptions& options,
     for (const auto& [name, note] : loaded.input_notes)
       if (name.starts_with("field ")) inform(world, study_case.name + ": " + name + ": " + note);
     for (const auto& [name, hash] : loaded.input_sha256)
-      input_sha256[study_case.name + ": " + name] = hash;
+      inputs.sha256[study_case.name + ": " + name] = hash;
+    for (const auto& [name, note] : loaded.input_notes)
+      inputs.notes[study_case.name + ": " + name] = note;
     registration::RegistrationRunner runner = all_or_none(
         world, [&] { return registration::RegistrationRunner(loaded.problem, its_method, pool); });
     methods.push_back({renderer, std::move(runner), loaded.problem});

@@ -19,15 +19,21 @@ struct LoadedMethod {
   std::shared_ptr<const registration::RegistrationProblem> problem;  ///< the runner's
 };
 
-/// Collective. The methods of a case, in the order of chosen_renderers(); hashes of the inputs go
-/// to `input_sha256`, as "CASE: what". Look-up is corrected where `correction` says so.
-/// `judging_level`: as CaseLoadOptions has it. Throws as load_case() does.
+/// What a case was loaded from, as "CASE: what"; rank 0.
+struct LoadedInputs {
+  std::map<std::string, std::string> sha256;
+  std::map<std::string, std::string> notes;  ///< how it was read, as af-register says it
+};
+
+/// Collective. The methods of a case, in the order of chosen_renderers(); hashes and notes of the
+/// inputs go to `inputs`. Look-up is corrected where `correction` says so. `judging_level`: as
+/// CaseLoadOptions has it. Throws as load_case() does.
 std::vector<LoadedMethod> load_methods(const MethodOptions& options,
                                        const registration::CorrectionOptions& correction,
                                        const Study& study,
                                        const StudyCase& study_case,
                                        const Communicator& world,
-                                       std::map<std::string, std::string>& input_sha256,
+                                       LoadedInputs& inputs,
                                        int judging_level = 0);
 
 }  // namespace af::evaluation

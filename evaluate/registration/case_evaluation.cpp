@@ -309,7 +309,7 @@ void announce_times(std::vector<Method>& methods,
 /// Every option, input and start that decides a case's rows.
 DecidingValues deciding_values(const RegistrationStudyOptions& options,
                                const CaseEvaluation& evaluation) {
-  DecidingValues values = af::deciding_values(deciding_options(options), evaluation.input_sha256);
+  DecidingValues values = af::deciding_values(deciding_options(options), evaluation.inputs.sha256);
   values["case name"] = evaluation.case_name;
   Sha256 starts;
   for (const PerturbedStart& start : evaluation.starts.starts) {
@@ -507,7 +507,7 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
                     study,
                     study_case,
                     world,
-                    evaluation.input_sha256,
+                    evaluation.inputs,
                     options.uncertainty.is_left_out ? 0 : PoseExaminer::coarsest_level())) {
     methods.push_back(
         {method.renderer, std::move(method.runner), {}, options.success_tre_mm, {}, {}});

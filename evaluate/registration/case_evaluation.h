@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "evaluate/methods/loaded_methods.h"
 #include "evaluate/registration/evaluate_registrations.h"
 #include "evaluate/registration/failure_traces.h"
 #include "evaluate/registration/registration_rows.h"
@@ -31,7 +32,7 @@ struct CaseEvaluation {
   StratifiedStarts starts;
   std::size_t start_count = 0;
   std::map<std::string, FirstTraces> traces;  ///< rank 0: of each renderer
-  std::map<std::string, std::string> input_sha256;
+  LoadedInputs inputs;
   std::vector<std::string> pose_problems;             ///< of poses that were read, in words
   nlohmann::json pictures = nlohmann::json::array();  ///< rank 0: files and what they show
 };

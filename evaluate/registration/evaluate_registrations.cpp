@@ -533,9 +533,11 @@ void run_registration(const RegistrationStudyOptions& options,
                              options.method.seed,
                              world.size(),
                              {{"study", sha256_of_file(study.path.string())}}};
-    for (const CaseEvaluation& evaluation : evaluations)
-      provenance.input_sha256.insert(evaluation.input_sha256.begin(),
-                                     evaluation.input_sha256.end());
+    for (const CaseEvaluation& evaluation : evaluations) {
+      provenance.input_sha256.insert(evaluation.inputs.sha256.begin(),
+                                     evaluation.inputs.sha256.end());
+      provenance.input_notes.insert(evaluation.inputs.notes.begin(), evaluation.inputs.notes.end());
+    }
     write_registrations(folder / "registrations.csv", rows.view(), options.success_tre_mm);
     write_traces(folder, evaluations);
     draw_figures(options, rows.view());

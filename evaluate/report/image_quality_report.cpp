@@ -61,6 +61,15 @@ std::string joint_box_plot(const std::vector<const EvaluationRun*>& runs,
                        runs.size() > 3 ? "wide" : "narrow");
 }
 
+/// The range of a field: two numbers, or the bounds of a box that these do not state. Runs of
+/// earlier versions have numbers alone.
+std::string range_text(const json& field) {
+  const std::string text = field.value("range", "+-");
+  if (!text.starts_with("+-")) return escaped(text);
+  return "±" + decimals(field.at("max_rotation_deg"), 0) + "°, ±" +
+         decimals(field.at("max_translation_mm"), 0) + " mm";
+}
+
 std::string nodes_text(const json& field) {
   const auto pair = [&](const char* key) {
     return plain(field.at(key).at(0)) + "×" + plain(field.at(key).at(1));
@@ -94,8 +103,7 @@ std::string quality_table(const std::vector<const EvaluationRun*>& runs) {
                    nodes_text(field),
                    plain(field.at("codewords")),
                    decimals(field.at("file_bytes").get<double>() / kBytesPerMb, 1),
-                   "±" + decimals(field.at("max_rotation_deg"), 0) + "°, ±" +
-                       decimals(field.at("max_translation_mm"), 0) + " mm",
+                   range_text(field),
                    plain(summary.at("compared")),
                    decimals(psnr.at("median"), 1),
                    decimals(psnr.at("p5"), 1),

@@ -299,8 +299,10 @@ void run_similarity_curves(const SimilarityCurvesOptions& options,
   in_force.case_name = study_case.name;
   Provenance provenance = {
       "af-evaluate similarity-curves", command_line, to_toml(in_force), 0, world.size(), {}};
-  std::vector<LoadedMethod> methods =
-      load_methods(options, {}, study, study_case, world, provenance.input_sha256);
+  LoadedInputs inputs;
+  std::vector<LoadedMethod> methods = load_methods(options, {}, study, study_case, world, inputs);
+  provenance.input_sha256 = inputs.sha256;
+  provenance.input_notes = inputs.notes;
   all_or_none(world, [&] {
     if (world.is_root()) provenance.input_sha256["study"] = sha256_of_file(study.path.string());
   });

@@ -213,9 +213,9 @@ void run_lattice_errors(const LatticeErrorsOptions& options, const Communicator&
   // Ray casting is loaded in any case: it makes the X-rays.
   MethodOptions loading = options;
   loading.renderer = "both";
-  std::map<std::string, std::string> ignored_hashes;
+  LoadedInputs ignored;
   const std::vector<LoadedMethod> methods =
-      load_methods(loading, {}, study, study_case, world, ignored_hashes);
+      load_methods(loading, {}, study, study_case, world, ignored);
   const std::vector<CellView> views = cells_of(study, study_case, options, world);
   all_or_none(world, [&] {
     if (!world.is_root()) return;

@@ -38,6 +38,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (xray->image.width * xray->image.height > kMostPixels) return 0;
   CameraGeometry camera;
   camera.size_px = {xray->image.width, xray->image.height};
+  if ((choice & 129) == 128) camera.distortion = {{-0.1, 0.0, 0.001}};
+  camera.row_direction = {0.0, 1.0, 0.0};
+  camera.source_point = {0.0, 0.0, -1000.0};
   view.roi = {0, 0, 1, 1};
   ViewXray found;
   if (!fuzz::is_accepted([&] { found = read_view_xray(view, camera); })) return 0;

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <iostream>
 #include <iterator>
+#include <regex>
 #include <stdexcept>
 #include <string>
 
@@ -15,6 +16,7 @@
 #include "evaluate/registration/registration_rows.h"
 #include "field/index_coding.h"
 #include "files/output_file.h"
+#include "hdf5_files/hdf5_output.h"
 #include "image_files/ct_reader.h"
 #include "image_files/image_file.h"
 #include "pose_files/pose_file.h"
@@ -59,6 +61,10 @@ void write_toml_seeds(const fs::path& folder) {
              "pixel_spacing_mm = [1, 1]\n"
              "projection_matrix = [[4, 1000, 0, 4000], [4, 0, 1000, 4000], [1, 0, 0, 600]]\n");
   write_seed(folder / "rig" / "template", template_text("rig"));
+  CameraRig lens = parse_rig(builtin_rig_text("c-arm-12in"), "rig");
+  lens.cameras[0].distortion = {{-0.35, 0.12, 0.004, -0.003, 0.05}};
+  lens.cameras[1].distortion = {{0.3, -0.1, 0.002, 0.001, 0.02, 0.5, 0.1, -0.05}};
+  write_seed(folder / "rig" / "distortion", rig_to_toml(lens));
   write_seed(folder / "study" / "template", template_text("study"));
   const std::string scan =
       "name = \"s\"\nsource_to_axis_mm = 300.0\naxis_to_detector_mm = 150\n"
@@ -69,7 +75,49 @@ void write_toml_seeds(const fs::path& folder) {
              scan + "xray_domain = \"intensity\"\ndark = \"d.png\"\nflat = \"f.png\"\n");
   write_seed(folder / "scan" / "level", scan + "xray_domain = \"intensity\"\ndark_level = 8500\n");
   write_seed(folder / "scan" / "attenuation", scan + "xray_domain = \"attenuation\"\n");
-  write_seed(folder / "study" / "optional", uncommented(template_text("study")));
+  const std::string optional = uncommented(template_text("study"));
+  write_seed(folder / "study" / "optional", optional);
+  write_seed(
+      folder / "study" / "hidden-points",
+      std::regex_replace(
+          optional, std::regex("(fiducials|landmarks)_px = \\[\\[[^\\]]*\\]"), "$1_px = [[]"));
+}
+
+/// What DeepFluoro's files have beside their volumes.
+std::string deep_fluoro_seed() {
+  Hdf5Output file;
+  const std::string group = "/proj-params";
+  file.add_group(group);
+  file.add_matrix(group + "/intrinsic",
+                  (Eigen::Matrix3d() << -500, 0, 31.5, 0, -500, 23.5, 0, 0, 1).finished());
+  Eigen::Matrix4d extrinsic = Eigen::Matrix4d::Identity();
+  extrinsic(2, 3) = -700.0;
+  file.add_matrix(group + "/extrinsic", extrinsic);
+  file.add_count(group + "/num-cols", 64);
+  file.add_count(group + "/num-rows", 48);
+  file.add_scalar(group + "/pixel-col-spacing", 0.5);
+  file.add_scalar(group + "/pixel-row-spacing", 0.5);
+  return file.bytes();
+}
+
+/// An enhanced XA file of two frames.
+test::DicomTestFile enhanced_seed(test::DicomTestFile file) {
+  test::DicomTestFile geometry;
+  geometry.set_text({0x0018, 0x1110}, "DS", "1200");
+  geometry.set_float({0x0018, 0x9402}, 800.0f);
+  test::DicomTestFile angles;
+  angles.set_text({0x0018, 0x1510}, "DS", "30");
+  angles.set_text({0x0018, 0x1511}, "DS", "-20");
+  test::DicomTestFile pixels;
+  pixels.set_text({0x0018, 0x1164}, "DS", "0.4\\0.4");
+  test::DicomTestFile shared;
+  shared.set_items({0x0018, 0x9476}, {geometry}, true);
+  test::DicomTestFile frame;
+  frame.set_items({0x0018, 0x9405}, {angles});
+  frame.set_items({0x0028, 0x9443}, {pixels});
+  file.set_items({0x5200, 0x9229}, {shared});
+  file.set_items({0x5200, 0x9230}, {frame, frame}, true);
+  return file;
 }
 
 /// Both shipped rigs in every format that can state them, also with the images' rows turned around,
@@ -98,6 +146,13 @@ void write_camera_seeds(const fs::path& folder) {
   write_seed(folder / "camera" / "command",
              "\0plastimatch drr --nrm \"0 -1 0\" --vup '0 0 1' --sad 800 --sid=1200 -r \"64 48\" "
              "-z \"240 200\" ct.mha\n"s);
+  write_seed(folder / "camera" / "deep-fluoro", "\4"s + deep_fluoro_seed());
+  CameraRig lens = parse_rig(builtin_rig_text("c-arm-12in"), "rig");
+  lens.cameras.resize(1);
+  lens.cameras[0].distortion = {{-0.35, 0.12, 0.004, -0.003, 0.05}};
+  for (const char* format : {"rig", "opencv"})
+    write_seed(folder / "camera" / (format + "-distortion"s),
+               "\x08"s + camera_files_of(lens, format, "camera").front().bytes);
   test::DicomTestFile image;
   image.set_text({0x0008, 0x0060}, "CS", "XA");
   image.set_u16({0x0028, 0x0010}, 48);
@@ -110,6 +165,9 @@ void write_camera_seeds(const fs::path& folder) {
   image.write(folder / "camera" / "dicom-header");
   write_seed(folder / "camera" / "dicom",
              "\x10"s + read_text_file(folder / "camera" / "dicom-header"));
+  enhanced_seed(image).write(folder / "camera" / "dicom-header");
+  write_seed(folder / "camera" / "dicom-enhanced",
+             "\0"s + read_text_file(folder / "camera" / "dicom-header"));
   fs::remove(folder / "camera" / "dicom-header");
 }
 
@@ -209,6 +267,16 @@ void write_dicom_xray_seeds(const fs::path& folder) {
   inverted.set_text({0x0028, 0x1053}, "DS", "0.5");
   write("inverted", '\x3a', inverted);
   write("attenuation", '\x24', inverted);
+  write("enhanced", '\x21', enhanced_seed(test::xa_file(12, 12, 2, levels)));
+  std::vector<std::uint16_t> entries;
+  for (std::uint16_t i = 0; i < 64; ++i) entries.push_back(static_cast<std::uint16_t>(4000 - i));
+  test::DicomTestFile lut;
+  lut.set_u16s({0x0028, 0x3002}, {64, 2950, 16});
+  lut.set_u16s({0x0028, 0x3006}, entries, "OW");
+  test::DicomTestFile with_lut = test::xa_file(12, 12, 1, levels);
+  with_lut.set_text({0x0028, 0x1040}, "CS", "LOG");
+  with_lut.set_items({0x0028, 0x3000}, {lut}, true);
+  write("lut", '\x20', with_lut);
 }
 
 /// As fuzz_index_coding takes it apart: two codewords, extents, a chunk.

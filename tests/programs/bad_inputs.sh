@@ -169,6 +169,11 @@ of_rig 3 '--rig-size-px' 'plastimatch without the size of the images' valid/came
 of_rig 3 'Origin' 'elastix without the origin' "$(edited camera-elastix-AP.txt 's/^[(]Origin/(Orient/')"
 of_rig 4 'not closed' 'elastix cut short' "$(edited camera-elastix-AP.txt 's/^[(]FocalPoint.*/(FocalPoint 1 2/')"
 printf '<RTKThreeDCircularGeometry><Projection>' >cut.xml
+for numbers in '1, 2, 3' '[0.1]' '-500, 0, 0, 0' 'nan, 0, 0, 0' '0, 0, 0, 0, 0, -500, 0, 0' '1e300, 0, 0, 0'; do
+  of_rig 3 'distortion' "distortion $numbers" "$(edited rig.toml "0,/^size_px = .*/s//&\ndistortion = [$numbers]/")"
+done
+of_rig 4 '4, 5, 8, 12 or 14 numbers' 'OpenCV distortion of two numbers' \
+  "$(edited camera-opencv-AP.txt '/^distortion/,/data/s/data: .*/data: [ 0.1, 0.2 ]/; /^distortion/,/data/s/rows: .*/rows: 2/')"
 of_rig 4 'broken XML' 'RTK geometry cut short' cut.xml
 printf '<!DOCTYPE a [<!ENTITY b "bbbb">]><RTKThreeDCircularGeometry/>' >entities.xml
 of_rig 4 'entities' 'RTK geometry with entities' entities.xml
@@ -243,6 +248,9 @@ of_option 3 'uv' 'nodes < 2' --uv-nodes 1
 of_option 3 'codewords' 'codewords > 65536' --codewords 70000
 of_option 3 'codewords' 'codewords > training tiles' --codewords 60000
 of_option 3 'max_rotation_deg' 'rotation range too large' --max-rotation-deg 85
+of_option 2 'rx=5:-5' 'bounds of a range that descend' --rotation-range-deg rx=5:-5
+of_option 2 'the axes are tx' 'range of an axis that there is not' --translation-range-mm rx=5
+of_option 4 'does not exist' 'poses to cover that are missing' --cover none.csv
 of_option 3 'max_translation_mm' 'source inside the CT within the range' --max-translation-mm 640
 row 2 'must be a finite number' 'centre that is no number' "${precompute[@]}" --ct valid/ct.nii.gz --rig valid/rig.toml \
   --camera AP --center-ct-mm nan,0,0

@@ -192,6 +192,9 @@ TEST_F(EvaluateProgram, RegistersAlikeOnAnyRankCount) {
   EXPECT_EQ(summary["cases"][0]["gold"]["source"], "fiducials");
   EXPECT_LT(summary["cases"][0]["gold"]["fre_mm"].get<double>(), 1e-6);
   EXPECT_EQ(summary["field_against_raycast"]["common_starts"], 4);
+  const json& notes = summary["provenance"]["input_notes"];
+  const std::string first_case = summary["cases"][0]["case"];
+  EXPECT_EQ(notes.count(first_case + ": xray AP"), 1U) << "as af-register: " << notes.dump();
 }
 
 /// How a run is cut short.

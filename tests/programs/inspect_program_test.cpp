@@ -11,8 +11,11 @@
 #include <gtest/gtest.h>
 
 #include "base/build_info.h"
+#include "field_file/field_file.h"
+#include "geometry/ray_coverage.h"
 #include "pose_files/pose_file.h"
 #include "programs/small_study.h"
+#include "study/rig_file.h"
 #include "support/run_program.h"
 #include "support/test_paths.h"
 #include "text/csv_table.h"
@@ -315,6 +318,12 @@ TEST(AfInspect, VerifiesAFieldAndAStudyAndSeesDamage) {
   EXPECT_EQ(facts["provenance"]["source_version"], std::string(program_version()));
   EXPECT_GE(facts["provenance"]["details"]["training"]["iterations"].get<int>(), 1);
 
+  const auto run_precompute = [&](const std::string& more) {
+    return test::run_command(program("af-precompute") + " --study " + study +
+                             " --camera AP --max-rotation-deg 4 --max-translation-mm 8"
+                             " --uv-nodes 6 --st-nodes 24 --codewords 16 " +
+                             more + " -o " + (folder / "both.af.h5").string());
+  };
   // Ranges per axis, and about poses: the bounds stand in the file.
   const fs::path bounded = folder / "bounded.af.h5";
   std::ofstream(folder / "poses.csv") << "rx_deg,ry_deg,rz_deg,tx_mm,ty_mm,tz_mm\n"
@@ -329,6 +338,25 @@ TEST(AfInspect, VerifiesAFieldAndAStudyAndSeesDamage) {
   EXPECT_EQ(inspect_json(bounded.string())["facts"]["range"],
             "rx -2 to 3 ry -2 to 2 rz -8 to 1 degrees, tx -4 to 4 ty -4 to 9 tz -4 to 4 mm");
   EXPECT_FALSE(facts.contains("range"));
+
+  // The rays of a further camera, which the field alone would not hold over the same range.
+  CameraRig rig = read_rig((folder / "rig.toml").string());
+  for (CameraGeometry& camera : rig.cameras) camera.source_point.x() += 20.0;
+  std::ofstream(folder / "moved.toml") << rig_to_toml(rig);
+  EXPECT_EQ(run_precompute("--cover-rig " + (folder / "moved.toml").string()).exit_code, 3)
+      << "LAT looks from across";
+  rig.cameras.resize(1);
+  std::ofstream(folder / "moved.toml") << rig_to_toml(rig);
+  const test::ProgramRun covers_both =
+      run_precompute("--cover-rig " + (folder / "moved.toml").string());
+  ASSERT_EQ(covers_both.exit_code, 0) << covers_both.output;
+  const CompressedAttenuationField both = read_field_header(folder / "both.af.h5");
+  EXPECT_TRUE(
+      covers_range(both.light_slab, rig.cameras[0], both.identity.frame, both.identity.range));
+  EXPECT_FALSE(covers_range(read_field_header(field).light_slab,
+                            rig.cameras[0],
+                            both.identity.frame,
+                            both.identity.range));
 
   // Named by the study, it is said what it covers: its own range, for its own camera and region.
   std::ifstream lines(study);

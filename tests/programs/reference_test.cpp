@@ -74,7 +74,30 @@ std::string file_page() {
        << "\n\nWith `--correct`: " << code_list(names_of(correction_cells({})))
        << ".\n\nWithout `--no-uncertainty` ([uncertainty.md](../uncertainty.md)): "
        << code_list(names_of(judge_cells({}, {}))) << ", "
-       << code_list(names_of(uncertainty_cells({}, 0.0))) << ".\n";
+       << code_list(names_of(uncertainty_cells({}, 0.0))) << ".\n\n"
+       << "## summary.json\n\nIn the folder of a finished run of `af-evaluate`; `af-evaluate "
+       << "report` reads it. Numbers that are not known are null.\n\n"
+       << "| Key | Of which kinds | What |\n|---|---|---|\n"
+       << "| `format`, `format_version` | all | \"attenuation-fields evaluation\", 1 |\n"
+       << "| `kind` | all | \"registration\", \"image-quality\", \"field-parameters\", "
+          "\"similarity-curves\" or \"error-budget\" |\n"
+       << "| `provenance` | all | program and version, command line, options in force, seed, "
+          "SHA-256 of the inputs (`input_sha256`), how X-rays and CTs were read (`input_notes`), "
+          "host, start |\n"
+       << "| `figures`, `pictures` | all that draw | names of figures without ending; files of "
+          "pictures and what they show |\n"
+       << "| `study`, `method`, `success_tre_mm`, `start_rule`, `simulation` | registration | the "
+          "study's path; preset, similarity and optimisers; what a success and a start are; how "
+          "the study was simulated, or null |\n"
+       << "| `cases` | registration | per case its gold pose, region and starts |\n"
+       << "| `renderers` | registration, similarity-curves | per renderer successes, TRE, times "
+          "and their intervals; or the curves' maxima |\n"
+       << "| `field_against_raycast` | registration | the same starts by both renderers |\n"
+       << "| `row_problems`, `warnings` | registration | rows that failed, and what to mind |\n"
+       << "| `field`, `loss_split` | image-quality | the field; shares of the mean squared "
+          "difference |\n"
+       << "| `steps`, `common_starts`, `gold` | error-budget | what each part of the error moves "
+          "|\n";
   return page.str();
 }
 

@@ -41,6 +41,11 @@ ordered_json camera_json(const CameraGeometry& camera, const Eigen::Vector3d& is
   json["beam_direction"] = vector_json(camera.beam_direction());
   json["isocenter_at_px"] = vector_json(camera.project(isocenter_point));
   json["mirrored"] = camera.is_mirrored();
+  if (!camera.distortion.is_none())
+    json["distortion"] = std::vector<double>(
+        camera.distortion.coefficients.begin(),
+        camera.distortion.coefficients.begin() +
+            static_cast<std::ptrdiff_t>(camera.distortion.count()));
   return json;
 }
 

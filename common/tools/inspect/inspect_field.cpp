@@ -102,8 +102,9 @@ void inspect_field(const std::filesystem::path& path,
   facts["camera"] = camera_json(identity.camera);
   facts["center_ct_mm"] = vector_json(identity.frame.center_ct_mm);
   facts["center_room_mm"] = vector_json(identity.frame.center_room_mm);
-  facts["max_rotation_deg"] = identity.range.max_rotation_rad() * kDegPerRad;
-  facts["max_translation_mm"] = identity.range.max_translation_mm();
+  const MotionRange within = identity.range.symmetric_part();
+  facts["max_rotation_deg"] = within.max_rotation_rad() * kDegPerRad;
+  facts["max_translation_mm"] = within.max_translation_mm();
   if (!identity.range.is_symmetric()) facts["range"] = identity.range.text();
   facts["ct_content_sha256"] = identity.ct_content_sha256;
   facts["mu_water_per_mm"] = identity.mu_water_per_mm;

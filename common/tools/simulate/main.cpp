@@ -53,6 +53,13 @@ Patient patient(const SimulateOptions& options, const Communicator& world) {
 CameraRig cameras(const SimulateOptions& options, const Communicator& world) {
   std::vector<std::string> warnings;
   CameraRig rig = read_rig(options.rig, &warnings);
+  for (CameraGeometry& camera : rig.cameras)
+    if (!camera.distortion.is_none()) {
+      warnings.push_back(
+          "camera '" + camera.name +
+          "': simulated X-rays are not distorted; the study's rig has no distortion");
+      camera.distortion = {};
+    }
   for (const std::string& warning : warnings) warn(world, warning);
   return rig;
 }

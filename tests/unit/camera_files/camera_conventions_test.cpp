@@ -210,13 +210,50 @@ TEST_F(CameraConventions, OpenCvRefusals) {
   EXPECT_THAT(input_refusal(test::replaced(good, "900.", "nan")), HasSubstr("finite"));
   EXPECT_THAT(input_refusal(test::replaced(good, "image_width: 512", "image_width: 5e9")),
               HasSubstr("32768"));
+  EXPECT_THAT(input_refusal(test::replaced(good, "[ 0., 0., 0.", "[ -9.1, 0., 0.")),
+              HasSubstr("must not fold the image"));
+  EXPECT_THAT(
+      file_refusal(test::replaced(
+          test::replaced(good, "rows: 5", "rows: 3"), "[ 0., 0., 0., 0., 0. ]", "[ 0.1, 0., 0. ]")),
+      HasSubstr("4, 5, 8, 12 or 14 numbers"));
+  EXPECT_THAT(input_refusal(test::replaced(test::replaced(good, "rows: 5", "rows: 12"),
+                                           "[ 0., 0., 0., 0., 0. ]",
+                                           "[ 0, 0, 0, 0, 0, 0, 0, 0, 0.1, 0, 0, 0 ]")),
+              HasSubstr("thin prisms"));
   // A stereo calibration's R and t are of the second camera relative to the first.
   const std::string stereo =
       "K1: [1000, 0, 320, 0, 1000, 240, 0, 0, 1]\nK2: [1000, 0, 320, 0, 1000, 240, 0, 0, 1]\n"
       "R: [1, 0, 0, 0, 1, 0, 0, 0, 1]\nt: [0, 0, 500]\n";
   EXPECT_THAT(input_refusal(stereo), HasSubstr("relative to the first camera"));
-  EXPECT_THAT(input_refusal(test::replaced(good, "[ 0., 0., 0.", "[ 0.1, 0., 0.")),
-              HasSubstr("distortion"));
+}
+
+// cv2.projectPoints of OpenCV 4.6 with these coefficients puts (30, -40, 55) at (317.66513,
+// 132.91818), at (317.87961, 132.68263) without.
+TEST_F(CameraConventions, OpenCvDistortion) {
+  const CameraGeometry read = camera(
+      test::replaced(kOpenCv, "[ 0., 0., 0., 0., 0. ]", "[ -0.35, 0.12, 0.004, -0.003, 0.05 ]"));
+  expect_opencv_pixels(read);
+  const Vector2d stored =
+      PixelDistortion(read).stored_from_ideal(read.project(Vector3d(30, -40, 55)));
+  EXPECT_LT((stored - Vector2d(317.6651288, 132.91818315)).norm(), 1e-5) << stored.transpose();
+}
+
+TEST_F(CameraConventions, FlippedRowsTurnTheLensRound) {
+  const std::string text =
+      test::replaced(kOpenCv, "[ 0., 0., 0., 0., 0. ]", "[ -0.35, 0.12, 0.004, -0.003, 0.05 ]");
+  const CameraGeometry as_is = camera(text);
+  CameraFileOptions options;
+  for (const char* flip : {"rows", "columns"}) {
+    options.flip = flip;
+    const CameraGeometry flipped = camera(text, options);
+    const bool flips_rows = std::string(flip) == "rows";
+    const auto mirror = [&](const Vector2d& px) {
+      return flips_rows ? Vector2d(px.x(), 399 - px.y()) : Vector2d(511 - px.x(), px.y());
+    };
+    const Vector2d stored = PixelDistortion(as_is).stored_from_ideal({100, 50});
+    const Vector2d stored_flipped = PixelDistortion(flipped).stored_from_ideal(mirror({100, 50}));
+    EXPECT_LT((stored_flipped - mirror(stored)).norm(), kConventionPx) << flip;
+  }
 }
 
 CameraFileOptions matrix_options() {
@@ -796,6 +833,64 @@ TEST_F(DicomCameras, MovingPositionersHaveACameraPerFrame) {
   EXPECT_THAT(refusal(file), HasSubstr("one per frame: 3"));
   file.set_text({0x0028, 0x0008}, "IS", "999999999999");
   EXPECT_THAT(refusal(file), HasSubstr("100000"));
+}
+
+/// An enhanced XA image of two frames: what both share stands once, the angles per frame.
+test::DicomTestFile enhanced(const test::DicomTestFile& plain, const char* second_primary) {
+  test::DicomTestFile file = plain;
+  for (const auto& tag : {test::DicomTestFile::Tag{0x0018, 0x1110},
+                          {0x0018, 0x1111},
+                          {0x0018, 0x1164},
+                          {0x0018, 0x1500},
+                          {0x0018, 0x1510},
+                          {0x0018, 0x1511}})
+    file.erase(tag);
+  file.set_text({0x0028, 0x0008}, "IS", "2");
+  test::DicomTestFile geometry;
+  geometry.set_text({0x0018, 0x1110}, "DS", "1200");
+  geometry.set_float({0x0018, 0x9402}, 800.0f);
+  test::DicomTestFile pixels;
+  pixels.set_text({0x0018, 0x1164}, "DS", "0.4\\0.3");
+  test::DicomTestFile shared;
+  shared.set_items({0x0018, 0x9476}, {geometry}, true);
+  shared.set_items({0x0028, 0x9443}, {pixels});
+  file.set_items({0x5200, 0x9229}, {shared});
+  std::vector<test::DicomTestFile> frames;
+  for (const char* const primary : {"0", second_primary}) {
+    test::DicomTestFile angles;
+    angles.set_text({0x0018, 0x1510}, "DS", primary);
+    angles.set_text({0x0018, 0x1511}, "DS", "0");
+    frames.emplace_back();
+    frames.back().set_items({0x0018, 0x9405}, {angles});
+  }
+  file.set_items({0x5200, 0x9230}, frames, true);
+  return file;
+}
+
+TEST_F(DicomCameras, EnhancedFilesHaveACameraPerFrame) {
+  const CameraRig rig = read(enhanced(xa(), "90"));
+  ASSERT_EQ(rig.cameras.size(), 2U);
+  const double scale = 1200.0 / (800 - 20);
+  expect_dicom_pixel(
+      rig.cameras[0], {10, 20, 30}, {199.5 + 10 * scale / 0.3, 255.5 - 30 * scale / 0.4});
+  EXPECT_LT((rig.cameras[1].source_point - Vector3d(-800, 0, 0)).norm(), 1e-9) << "LAO 90";
+  EXPECT_EQ(read(enhanced(xa(), "0")).cameras.size(), 1U) << "nothing moves";
+}
+
+TEST_F(DicomCameras, AnglesOfTheEquipmentAreNotThoseOfThePatient) {
+  test::DicomTestFile file = enhanced(xa(), "90");
+  test::DicomTestFile isocenter;
+  isocenter.set_float({0x0018, 0x9463}, 30.0f);
+  isocenter.set_float({0x0018, 0x9465}, 5.0f);
+  test::DicomTestFile frame;
+  frame.set_items({0x0018, 0x9462}, {isocenter});
+  test::DicomTestFile only_isocenter = file;
+  only_isocenter.set_items({0x5200, 0x9230}, {frame, frame});
+  EXPECT_THAT(refusal(only_isocenter), HasSubstr("are of the equipment, not of the patient"));
+  CameraFileOptions options;
+  options.positioner_deg = {0.0, 0.0};
+  EXPECT_EQ(read(only_isocenter, options).cameras.size(), 1U);
+  EXPECT_THAT(warnings(), testing::Contains(HasSubstr("= 5 degrees is not applied")));
 }
 
 TEST_F(DicomCameras, FieldOfViewMovesTheImageOnTheDetector) {

@@ -177,6 +177,20 @@ TEST_P(EveryCameraFormat, MirroredCamerasAreKeptOrRefused) {
               kRoundTripPx);
 }
 
+TEST_P(EveryCameraFormat, DistortionIsKeptOrRefused) {
+  if (GetParam()->write == nullptr) GTEST_SKIP() << "is not written";
+  CameraRig rig = writable_rig();
+  rig.cameras[0].distortion = {{-0.35, 0.12, 0.004, -0.003, 0.05}};
+  rig.cameras[1].distortion = {{0.3, -0.1, 0.002, 0.001, 0.02, 0.5, 0.1, -0.05}};
+  if (!GetParam()->states_distortion) {
+    EXPECT_FALSE(can_state(rig));
+    return;
+  }
+  const CameraRig back = read_camera_files(written(rig), options_for(rig), nullptr);
+  EXPECT_EQ(back.cameras[0].distortion, rig.cameras[0].distortion);
+  EXPECT_EQ(back.cameras[1].distortion, rig.cameras[1].distortion);
+}
+
 TEST(CameraFormats, RigsAreTakenFromSeveralFilesWithCommas) {
   const test::ScratchFolder folder;
   const CameraRig rig = parse_rig(builtin_rig_text("treatment-room"), "treatment-room");

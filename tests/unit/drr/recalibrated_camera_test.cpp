@@ -7,6 +7,7 @@
 
 #include "base/hash_random.h"
 #include "drr/field_level.h"
+#include "drr/field_set_drr.h"
 #include "drr/ray_cast_drr.h"
 #include "drr/two_pass_af_drr.h"
 #include "geometry/camera_distance.h"
@@ -128,6 +129,129 @@ TEST(RecalibratedCamera, IsLookedUpInTheOldFieldAsWellAsInItsOwn) {
   EXPECT_LT(std::abs(by_spacing_db), 0.5 * kLargestLossDb);
   EXPECT_LT(chance_db, 0.5 * kLargestLossDb);
   EXPECT_LT(mean, kLargestLossDb) << "+- " << chance_db << " dB by chance";
+}
+
+/// The camera turned about the long axis through the isocentre, as an orbit turns it.
+CameraGeometry at_angle(double angle_deg) {
+  const Eigen::Matrix3d turn =
+      Eigen::AngleAxisd(angle_deg * kRadPerDeg, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  CameraGeometry camera = small_camera();
+  camera.source_point = turn * camera.source_point;
+  camera.detector_origin_point = turn * camera.detector_origin_point;
+  camera.column_direction = turn * camera.column_direction;
+  camera.row_direction = turn * camera.row_direction;
+  return camera;
+}
+
+/// Fields of two angles of an orbit, 12 degrees apart, each good for 8 degrees and more.
+class FieldSetDrrTest : public testing::Test {
+ protected:
+  static constexpr double kHalfDeg = 6.0;
+
+  static void SetUpTestSuite() {
+    volume = bones_volume();
+    const MotionRange range{10.0 * kRadPerDeg, 10.0};
+    levels = {level_for(at_angle(-kHalfDeg), range, *volume),
+              level_for(at_angle(kHalfDeg), range, *volume)};
+  }
+  static void TearDownTestSuite() {
+    levels.clear();
+    volume.reset();
+  }
+
+  static FieldSetDrr set() {
+    std::vector<FieldSetMember> members;
+    for (const auto& level : levels)
+      members.push_back({std::shared_ptr<const LightSlab>(level, &level->coverage),
+                         std::make_shared<const TwoPassAfDrr>(level)});
+    return FieldSetDrr(std::move(members));
+  }
+
+  static inline std::shared_ptr<const AttenuationVolume> volume;
+  static inline std::vector<std::shared_ptr<const FieldLevel>> levels;
+};
+
+TEST_F(FieldSetDrrTest, LooksUpInTheFieldThatHoldsThePoseBest) {
+  const FieldSetDrr fields = set();
+  const RigidTransform pose = pose_from_parameters({}, {});
+  for (const std::size_t own : {0U, 1U}) {
+    const View view = View::whole_detector(at_angle(own == 0 ? -kHalfDeg : kHalfDeg));
+    EXPECT_EQ(fields.weights(pose, view)[own], 1.0);
+    EXPECT_EQ(render_image(fields, pose, view).pixels,
+              render_image(TwoPassAfDrr(levels[own]), pose, view).pixels);
+  }
+  // Half way, both are as good.
+  const std::vector<double> middle = fields.weights(pose, View::whole_detector(at_angle(0.0)));
+  EXPECT_NEAR(middle[0], 0.5, 1e-6);
+  EXPECT_NEAR(middle[1], 0.5, 1e-6);
+}
+
+TEST_F(FieldSetDrrTest, HasNoJumpAtASeam) {
+  const FieldSetDrr fields = set();
+  const RayCastDrr reference(volume);
+  const RigidTransform pose = pose_from_parameters({}, {});
+  // Steps as an optimiser's last ones. A weight falls from 1 to 0 over kSeamShare = 0.04 of a
+  // plane's side, of which the seam crosses about 0.03 per degree: it changes by far less than 0.2
+  // per step, and so does the DRR, by that part of the difference of two fields.
+  constexpr double kStepDeg = 0.05;
+  constexpr double kLargestWeightStep = 0.2;
+  constexpr double kLargestJumpDb = 0.5;
+  std::vector<double> last;
+  double last_db = 0.0;
+  bool is_any_blended = false;
+  for (double angle = -2.0; angle <= 2.0; angle += kStepDeg) {
+    const View view = View::whole_detector(at_angle(angle));
+    ASSERT_EQ(fields.rays_outside(pose, view), 0);
+    const std::vector<double> weights = fields.weights(pose, view);
+    ASSERT_NEAR(weights[0] + weights[1], 1.0, 1e-12);
+    is_any_blended = is_any_blended || (weights[0] > 0.1 && weights[1] > 0.1);
+    const double db =
+        psnr(render_image(fields, pose, view).pixels, render_image(reference, pose, view).pixels)
+            ->psnr_db;
+    if (!last.empty()) {
+      EXPECT_LT(std::abs(weights[0] - last[0]), kLargestWeightStep) << angle << " deg";
+      EXPECT_LT(std::abs(db - last_db), kLargestJumpDb) << angle << " deg";
+    }
+    last = weights;
+    last_db = db;
+  }
+  EXPECT_TRUE(is_any_blended);
+}
+
+TEST_F(FieldSetDrrTest, CountsRaysThatNoFieldHolds) {
+  const FieldSetDrr fields = set();
+  const View view = View::whole_detector(at_angle(40.0));
+  const RigidTransform pose = pose_from_parameters({}, {});
+  std::int64_t outside = 0;
+  render_image(fields, pose, view, &outside);
+  EXPECT_GT(outside, 0);
+  EXPECT_EQ(fields.rays_outside(pose, view), outside);
+}
+
+TEST_F(FieldSetDrrTest, GradientsAreTheAverageOfTheFields) {
+  const FieldSetDrr fields = set();
+  const View view = View::whole_detector(at_angle(0.3));
+  const RigidTransform pose = pose_from_parameters({}, {});
+  const std::vector<double> weights = fields.weights(pose, view);
+  ASSERT_GT(weights[0], 0.05);
+  ASSERT_GT(weights[1], 0.05);
+  const auto planes_of = [&](const DrrRenderer& renderer) {
+    std::vector<float> values(view.pixel_count());
+    std::vector<float> planes(6 * view.pixel_count());
+    const auto workspace = renderer.make_workspace();
+    renderer.render(pose, view, *workspace, values, PoseGradients{Eigen::Vector3d::Zero(), planes});
+    return planes;
+  };
+  const std::vector<float> together = planes_of(fields);
+  const std::vector<float> first = planes_of(TwoPassAfDrr(levels[0]));
+  const std::vector<float> second = planes_of(TwoPassAfDrr(levels[1]));
+  // Three roundings of float.
+  constexpr double kRounding = 4e-7;
+  for (std::size_t i = 0; i < together.size(); ++i) {
+    const double a = weights[0] * static_cast<double>(first[i]);
+    const double b = weights[1] * static_cast<double>(second[i]);
+    EXPECT_NEAR(together[i], a + b, kRounding * (std::abs(a) + std::abs(b)) + 1e-12);
+  }
 }
 
 }  // namespace

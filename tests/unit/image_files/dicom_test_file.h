@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <bit>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
@@ -46,6 +47,31 @@ class DicomTestFile {
     transfer_syntax_ = transfer_syntax;
     if (transfer_syntax_.size() % 2 != 0) transfer_syntax_ += '\0';
   }
+  /// A sequence of items, each with the elements of another file; of stated or undefined length.
+  void set_items(Tag tag, const std::vector<DicomTestFile>& items, bool is_undefined = false) {
+    std::string bytes;
+    for (const DicomTestFile& item : items) {
+      std::string inner;
+      for (const auto& [inner_tag, element] : item.elements_)
+        append_element(inner, inner_tag, element);
+      append(bytes, 0xe000fffe, 4);
+      append(bytes, is_undefined ? 0xffffffff : inner.size(), 4);
+      bytes += inner;
+      if (is_undefined) bytes += std::string("\xfe\xff\x0d\xe0\0\0\0\0", 8);
+    }
+    if (is_undefined) bytes += std::string("\xfe\xff\xdd\xe0\0\0\0\0", 8);
+    elements_[tag] = {is_undefined ? "SQ*" : "SQ", bytes};
+  }
+  void set_u16s(Tag tag, const std::vector<std::uint16_t>& values, const std::string& vr = "US") {
+    std::string bytes;
+    for (const std::uint16_t value : values) append(bytes, value, 2);
+    elements_[tag] = {vr, bytes};
+  }
+  void set_float(Tag tag, float value) {
+    std::string bytes;
+    append(bytes, std::bit_cast<std::uint32_t>(value), 4);
+    elements_[tag] = {"FL", bytes};
+  }
   void erase(Tag tag) { elements_.erase(tag); }
 
   void write(const std::filesystem::path& path) const {
@@ -75,11 +101,12 @@ class DicomTestFile {
   static void append_element(std::string& bytes, Tag tag, const Element& element) {
     append(bytes, tag.first, 2);
     append(bytes, tag.second, 2);
-    bytes += element.vr;
-    if (element.vr == "OW" || element.vr == "OB") {
+    bytes += element.vr.substr(0, 2);
+    if (element.vr == "OW" || element.vr == "OB" || element.vr.starts_with("SQ")) {
       append(bytes, 0, 2);
-      // Fragments have their own end mark: undefined length.
-      append(bytes, element.vr == "OB" ? 0xffffffff : element.bytes.size(), 4);
+      // Fragments and some sequences have their own end mark: undefined length.
+      const bool is_undefined = element.vr == "OB" || element.vr == "SQ*";
+      append(bytes, is_undefined ? 0xffffffff : element.bytes.size(), 4);
     } else {
       append(bytes, element.bytes.size(), 2);
     }

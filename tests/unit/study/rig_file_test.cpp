@@ -242,6 +242,24 @@ TEST_F(RigFile, BadValuesAreRefusedWithLineKeyValueAndConstraint) {
   EXPECT_THAT(input_refusal(replaced(good_, "\"AP\"", "7")), HasSubstr("name = 7: must be a text"));
 }
 
+TEST_F(RigFile, DistortionIsOpenCvsFourFiveOrEightNumbers) {
+  const auto with = [&](const std::string& numbers) {
+    return replaced(
+        good_, "size_px = [256, 256]", "size_px = [256, 256]\ndistortion = [" + numbers + "]");
+  };
+  const CameraRig rig = parse_rig(with("-0.2, 0.1, 0.001, 0.002"), "rig.toml");
+  EXPECT_EQ(rig.cameras[0].distortion, (LensDistortion{{-0.2, 0.1, 0.001, 0.002}}));
+  EXPECT_TRUE(rig.cameras[1].distortion.is_none());
+  EXPECT_EQ(parse_rig(rig_to_toml(rig), "rig.toml").cameras[0].distortion,
+            rig.cameras[0].distortion);
+  const CameraRig rational = parse_rig(with("0.1, 0, 0, 0, 0, 0.2, 0.1, 0.01"), "rig.toml");
+  EXPECT_EQ(parse_rig(rig_to_toml(rational), "rig.toml").cameras[0].distortion,
+            rational.cameras[0].distortion);
+  EXPECT_THAT(input_refusal(with("1, 2, 3")), HasSubstr("must be OpenCV's k1, k2, p1, p2"));
+  EXPECT_THAT(input_refusal(with("1, 2, 3, \"x\"")), HasSubstr("must be finite numbers"));
+  EXPECT_THAT(input_refusal(with("-50, 0, 0, 0")), HasSubstr("must not fold the image"));
+}
+
 TEST_F(RigFile, UnknownKeyIsRefusedWithTheNearestName) {
   EXPECT_THAT(
       input_refusal(replaced(good_, "row_direction =", "row_directoin =")),

@@ -170,6 +170,31 @@ TEST_F(StudyFile, RigPathIsRelativeToTheFile) {
   EXPECT_THAT(message_of<FileError>([&] { read(missing); }), HasSubstr(folder() / "gone.toml"));
 }
 
+TEST_F(StudyFile, PointsAreStatedInTheStoredXray) {
+  CameraRig rig = parse_rig(builtin_rig_text("treatment-room"), "treatment-room");
+  rig.cameras[0].distortion = {{-3.0, 12.0, 0.04, -0.03}};
+  test::write_input(folder() / "lens.toml", rig_to_toml(rig));
+  const std::string text =
+      replaced(replaced(replaced(kGoodStudy, "treatment-room", "lens.toml"),
+                        "fiducials_ct_mm",
+                        "landmarks_ct_mm = [[0,0,0], [9,9,9]]\nfiducials_ct_mm"),
+               "field = ",
+               "landmarks_px = [[20.5, 30.0], []]\nfield = ");
+  const Study study = read(text);
+  const PixelDistortion distortion(study.rig.cameras[0]);
+  const StudyView& view = study.cases[0].views[0];
+  constexpr double kInversePx = 1e-8;
+  EXPECT_LT((distortion.stored_from_ideal(view.fiducials_px[3]) - Vector2d(7.5, 8.25)).norm(),
+            kInversePx);
+  EXPECT_GT((view.fiducials_px[3] - Vector2d(7.5, 8.25)).norm(), 0.5);
+  EXPECT_LT((distortion.stored_from_ideal(*view.landmarks_px[0]) - Vector2d(20.5, 30.0)).norm(),
+            kInversePx);
+  EXPECT_FALSE(view.landmarks_px[1].has_value());
+  EXPECT_EQ(study.cases[0].views[1].fiducials_px[0], Vector2d(10, 20)) << "a lens of its own";
+  const Study back = read(study_to_toml(study, folder().path()));
+  EXPECT_LT((back.cases[0].views[0].fiducials_px[3] - view.fiducials_px[3]).norm(), kInversePx);
+}
+
 TEST_F(StudyFile, RoundTripKeepsEveryBit) {
   Study study = read(kGoodStudy);
   StudyCase second = study.cases.front();
@@ -415,6 +440,22 @@ TEST_F(StudyFile, KeepsHowAnXrayIsRead) {
   study = read(study_to_toml(study, folder().path()));
   EXPECT_EQ(study.cases[0].views[0].reading.flat, folder() / "f.mha");
   EXPECT_EQ(study.cases[0].views[0].reading.dark, folder() / "d.mha");
+}
+
+TEST_F(StudyFile, AMaskMayBeAFileAndAutomatic) {
+  const auto with = [](const std::string& mask) {
+    return replaced(kGoodStudy, "mask = \"B-mask.png\"", "mask = " + mask);
+  };
+  Study study = read(with("[\"auto\", \"B-mask.png\"]"));
+  for (const bool again : {false, true}) {
+    if (again) study = read(study_to_toml(study, folder().path()));
+    EXPECT_TRUE(study.cases[0].views[1].reading.masks_borders);
+    EXPECT_EQ(study.cases[0].views[1].mask, folder() / "B-mask.png");
+  }
+  for (const char* bad : {"3", "[\"a.png\", \"b.png\"]", "[\"auto\", \"auto\"]", "[[]]", "\"\""})
+    EXPECT_THAT(message_of<InputError>([&] { (void)read(with(bad)); }),
+                HasSubstr("must be \"auto\", a file, or"))
+        << bad;
 }
 
 TEST_F(StudyFile, RefusesContradictionsInHowAnXrayIsRead) {

@@ -9,10 +9,13 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "geometry/pinhole_camera.h"
+#include "image_files/dicom_xray.h"
 #include "image_files/image_file.h"
 #include "support/io_checks.h"
 #include "support/test_paths.h"
 #include "unit/image_files/ct_test_data.h"
+#include "unit/image_files/encoded_frames.h"
 
 namespace af {
 namespace {
@@ -400,6 +403,255 @@ TEST(XrayReader, InvertedGreysAreToldAndTurnedRoundOnRequest) {
   EXPECT_TRUE(found.warnings.empty());
   EXPECT_THAT(found.note, HasSubstr("values turned round: 255 - stored"));
   EXPECT_NEAR(found.attenuation.at(30, 30), std::log(2.5f), kLogRounding);
+}
+
+/// A LUT from 12 stored bits to intensities: 4095 - stored, but for the first and last entries.
+test::DicomTestFile falling_lut(std::uint16_t first, std::size_t entries) {
+  std::vector<std::uint16_t> data;
+  for (std::size_t i = 0; i < entries; ++i) data.push_back(static_cast<std::uint16_t>(5000 - i));
+  test::DicomTestFile item;
+  item.set_u16s({0x0028, 0x3002}, {static_cast<std::uint16_t>(entries), first, 16});
+  item.set_text({0x0028, 0x3004}, "LO", "US");
+  item.set_u16s({0x0028, 0x3006}, data, "OW");
+  return item;
+}
+
+TEST_F(DicomXrayView, ModalityLutIsApplied) {
+  // Stored 500 becomes 5000, 1000 4500, 2000 3500; beyond the last entry 1001 stays.
+  const ViewXray read_back = read([](test::DicomTestFile& file) {
+    file.set_items({0x0028, 0x3000}, {falling_lut(500, 4000)});
+  });
+  EXPECT_NEAR(read_back.attenuation.pixels[3], -std::log(5000.0f / 4000.0f), kLogRounding);
+  EXPECT_NEAR(read_back.attenuation.pixels[2], -std::log(4500.0f / 4000.0f), kLogRounding);
+  EXPECT_NEAR(read_back.attenuation.pixels[1], -std::log(3500.0f / 4000.0f), kLogRounding);
+  EXPECT_THAT(read_back.note, HasSubstr("Modality LUT applied (US, 4000 entries)"));
+  const ViewXray clamped = read([](test::DicomTestFile& file) {
+    file.set_items({0x0028, 0x3000}, {falling_lut(800, 1000)}, true);
+  });
+  EXPECT_NEAR(clamped.attenuation.pixels[3], -std::log(5000.0f / 4000.0f), kLogRounding);
+  EXPECT_NEAR(clamped.attenuation.pixels[0], -std::log(4001.0f / 4000.0f), kLogRounding);
+}
+
+TEST_F(DicomXrayView, ModalityLutMakesTheLogarithmsOfAngiographyIntensities) {
+  const auto logarithms = [](test::DicomTestFile& file) {
+    file.set_text({0x0028, 0x1040}, "CS", "LOG");
+    file.set_text({0x0028, 0x0004}, "CS", "MONOCHROME1");
+    file.set_items({0x0028, 0x3000}, {falling_lut(500, 4000)});
+  };
+  const ViewXray xray = read(logarithms);
+  EXPECT_NEAR(xray.attenuation.pixels[3], -std::log(5000.0f / 4000.0f), kLogRounding);
+  EXPECT_THAT(xray.note, HasSubstr("which makes logarithms intensities"));
+  const auto of_radiography = [&](test::DicomTestFile& file) {
+    logarithms(file);
+    file.set_text({0x0008, 0x0060}, "CS", "DX");
+  };
+  EXPECT_THAT(refusal(of_radiography), HasSubstr("the values are logarithms"));
+}
+
+TEST_F(DicomXrayView, BrokenModalityLutsAreRefused) {
+  const auto refused = [&](const std::function<void(test::DicomTestFile&)>& edit_lut) {
+    try {
+      (void)read([&](test::DicomTestFile& file) {
+        test::DicomTestFile lut = falling_lut(500, 40);
+        edit_lut(lut);
+        file.set_items({0x0028, 0x3000}, {lut});
+      });
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_THAT(refused([](auto& lut) {
+                lut.set_u16s({0x0028, 0x3002}, {41, 0, 16});
+              }),
+              HasSubstr("41 entries"));
+  EXPECT_THAT(refused([](auto& lut) {
+                lut.set_u16s({0x0028, 0x3002}, {40, 0});
+              }),
+              HasSubstr("LUTDescriptor"));
+  EXPECT_THAT(refused([](auto& lut) {
+                lut.set_u16s({0x0028, 0x3002}, {40, 0, 60});
+              }),
+              HasSubstr("1 to 16 bits"));
+  EXPECT_THAT(refused([](auto& lut) { lut.erase({0x0028, 0x3006}); }), HasSubstr("40 entries"));
+  EXPECT_THAT(refusal([](test::DicomTestFile& file) {
+                file.set_items({0x0028, 0x3000}, {falling_lut(500, 40)});
+                file.set_text({0x0028, 0x1052}, "DS", "0");
+                file.set_text({0x0028, 0x1053}, "DS", "2");
+              }),
+              HasSubstr("contradict"));
+}
+
+TEST_F(DicomXrayView, FunctionalGroupsGiveTheSpacingOfAFrame) {
+  const auto spaced = [](const char* spacing) {
+    return [spacing](test::DicomTestFile& file) {
+      file.erase({0x0018, 0x1164});
+      test::DicomTestFile pixels;
+      pixels.set_text({0x0018, 0x1164}, "DS", spacing);
+      test::DicomTestFile other;
+      other.set_text({0x0018, 0x1164}, "DS", "9\\9");
+      test::DicomTestFile first;
+      first.set_items({0x0028, 0x9443}, {other});
+      test::DicomTestFile second;
+      second.set_items({0x0028, 0x9443}, {pixels});
+      file.set_items({0x5200, 0x9230}, {first, second});
+    };
+  };
+  const auto frame_two = [](StudyView& view) { view.reading.frame = 2; };
+  expect_lines_of_levels(read(spaced("0.4\\0.4"), frame_two, 2), 1);
+  EXPECT_THAT(refusal(spaced("0.5\\0.5"), frame_two, 2), HasSubstr("ImagerPixelSpacing = 0.5"));
+}
+
+TEST(XrayReader, FramesThatOtherProgramsEncodedAreReadExactly) {
+  const ScratchFolder folder;
+  for (const test::EncodedFrame& frame : test::kEncodedFrames) {
+    test::DicomTestFile file = test::xa_file(16, 12, 1, std::vector<int>(16 * 12, 0));
+    file.set_fragment(frame.transfer_syntax, test::bytes_of_hex(frame.hex));
+    file.write(folder / "frame.dcm");
+    const DicomXray xray = read_dicom_xray(folder / "frame.dcm", std::nullopt);
+    for (int row = 0; row < 12; ++row)
+      for (int column = 0; column < 16; ++column)
+        ASSERT_EQ(xray.image.at(column, row),
+                  static_cast<float>(2000 + 40 * column - 30 * row + (column * row) % 5))
+            << frame.encoder << ", column " << column << ", row " << row;
+  }
+}
+
+TEST(XrayReader, AMaskFileAndAnAutomaticMaskHideWhatEitherHides) {
+  const ScratchFolder folder;
+  Image2d image(60, 50);
+  for (int row = 0; row < 50; ++row)
+    for (int column = 0; column < 60; ++column)
+      image.at(column, row) =
+          column < 10 ? 5.0f : 3000.0f + 10.0f * static_cast<float>((column * 7 + row * 13) % 50);
+  Image2d mask(60, 50);
+  std::fill(mask.pixels.begin(), mask.pixels.end(), 1.0f);
+  mask.at(40, 25) = 0.0f;
+  StudyView view = view_of(folder, image);
+  write_image(mask, folder / "mask.mha", 0.4, 0.4);
+  view.mask = folder / "mask.mha";
+  view.reading.masks_borders = true;
+  const Image2d found = read_view_xray(view, camera(60, 50)).mask;
+  EXPECT_EQ(found.at(40, 25), 0.0f) << "the file's";
+  EXPECT_EQ(found.at(3, 25), 0.0f) << "the border's";
+  EXPECT_EQ(found.at(45, 25), 1.0f);
+}
+
+/// 256 x 200 pixels of 1 mm, seen through OpenCV's distortion.
+CameraGeometry distorting_camera(const LensDistortion& lens) {
+  PinholeCamera pinhole;
+  pinhole.pixels_from_camera << 400, 0, 130.5, 0, 380, 100.25, 0, 0, 1;
+  CameraGeometry camera = camera_from_pinhole("A", pinhole, 0.4, {256, 200});
+  camera.distortion = lens;
+  return camera;
+}
+
+StudyView distorted_view(const ScratchFolder& folder, const Image2d& image) {
+  StudyView view = view_of(folder, image, XrayDomain::Attenuation);
+  view.reading.ignores_spacing = true;
+  view.roi = {60, 50, 100, 100};
+  return view;
+}
+
+constexpr LensDistortion kBarrel = {{-0.35, 0.12, 0.004, -0.003, 0.05}};
+
+// cv2.undistort of OpenCV 4.6 rounds places to 1/32 px; the picture's steepest slope is 20 per px.
+TEST(XrayReader, UndistortsAsOpenCvDoes) {
+  const ScratchFolder folder;
+  Image2d image(256, 200);
+  for (int row = 0; row < 200; ++row)
+    for (int column = 0; column < 256; ++column)
+      image.at(column, row) =
+          static_cast<float>(1000.0 + 300.0 * std::sin(column / 17.0) +
+                             200.0 * std::cos(row / 23.0) + 0.01 * column * row);
+  constexpr float kOpenCvRounding = 20.0f * 2.0f / 64.0f;
+  const auto at = [&](const LensDistortion& lens) {
+    return read_view_xray(distorted_view(folder, image), distorting_camera(lens)).attenuation;
+  };
+  const Image2d five = at(kBarrel);
+  EXPECT_NEAR(five.at(10, 12), 1391.8446f, kOpenCvRounding);
+  EXPECT_NEAR(five.at(128, 100), 1341.0282f, kOpenCvRounding);
+  EXPECT_NEAR(five.at(240, 180), 1736.2079f, kOpenCvRounding);
+  EXPECT_NEAR(five.at(60, 150), 1157.5388f, kOpenCvRounding);
+  EXPECT_NEAR(five.at(200, 20), 917.6590f, kOpenCvRounding);
+  const Image2d eight = at({{0.3, -0.1, 0.002, 0.001, 0.02, 0.5, 0.1, -0.05}});
+  EXPECT_NEAR(eight.at(10, 12), 1380.6473f, kOpenCvRounding);
+  EXPECT_NEAR(eight.at(240, 180), 1739.8680f, kOpenCvRounding);
+  EXPECT_NEAR(eight.at(200, 20), 933.8280f, kOpenCvRounding);
+}
+
+// A grid of waves 25 px long, as the lens shows it, becomes the grid again. Bilinear interpolation
+// of such a wave of amplitude 1 is wrong by at most (2 pi / 25)^2 / 8 per axis.
+TEST(XrayReader, AGridSeenThroughTheLensBecomesTheGrid) {
+  const ScratchFolder folder;
+  const auto grid = [](const Eigen::Vector2d& pixel) {
+    constexpr double kWave = 2.0 * 3.14159265358979323846 / 25.0;
+    return static_cast<float>(std::cos(kWave * pixel.x()) + std::cos(kWave * pixel.y()));
+  };
+  const CameraGeometry camera = distorting_camera(kBarrel);
+  const PixelDistortion distortion(camera);
+  Image2d stored(256, 200);
+  for (int row = 0; row < 200; ++row)
+    for (int column = 0; column < 256; ++column) {
+      const auto ideal =
+          distortion.ideal_from_stored({static_cast<double>(column), static_cast<double>(row)});
+      ASSERT_TRUE(ideal.has_value());
+      stored.at(column, row) = grid(*ideal);
+    }
+  const ViewXray read = read_view_xray(distorted_view(folder, stored), camera);
+  constexpr float kBilinear = 2.0f * 0.0079f * 1.3f;  // 1.3: the lens shrinks the wave
+  float worst = 0.0f;
+  for (int row = 0; row < 200; ++row)
+    for (int column = 0; column < 256; ++column)
+      worst = std::max(worst,
+                       std::abs(read.attenuation.at(column, row) -
+                                grid({static_cast<double>(column), static_cast<double>(row)})));
+  EXPECT_LT(worst, kBilinear);
+  EXPECT_THAT(read.note,
+              HasSubstr("undistorted (-0.35 0.12 0.004 -0.003 0.05, bilinear; 0 pixels"));
+  float undone = 0.0f;
+  for (int row = 0; row < 200; ++row)
+    undone = std::max(undone, std::abs(stored.at(0, row) - grid({0.0, static_cast<double>(row)})));
+  EXPECT_GT(undone, 0.5f) << "the lens does something";
+}
+
+TEST(XrayReader, PixelsThatTheLensDoesNotShowAreMasked) {
+  const ScratchFolder folder;
+  Image2d image(256, 200);
+  image.at(3, 3) = 1.0f;
+  const CameraGeometry camera = distorting_camera({{0.3}});  // stored places lie further out
+  const StudyView view = distorted_view(folder, image);
+  const ViewXray read = read_view_xray(view, camera);
+  ASSERT_EQ(read.mask.pixels.size(), image.pixels.size());
+  EXPECT_EQ(read.mask.at(0, 0), 0.0f);
+  EXPECT_EQ(read.mask.at(130, 100), 1.0f);
+  const PixelDistortion distortion(camera);
+  for (int column = 0; column < 256; ++column) {
+    const Eigen::Vector2d stored = distortion.stored_from_ideal({static_cast<double>(column), 7.0});
+    const bool is_inside = stored.minCoeff() >= 0.0 && stored.x() <= 255.0 && stored.y() <= 199.0;
+    EXPECT_EQ(read.mask.at(column, 7) != 0.0f, is_inside) << column;
+  }
+  StudyView corner = view;
+  corner.roi = {0, 0, 6, 6};
+  EXPECT_THAT(test::message_of<InputError>([&] { (void)read_view_xray(corner, camera); }),
+              HasSubstr("more than half of roi_px without data"));
+}
+
+TEST(XrayReader, MasksAreThoseOfTheStoredXray) {
+  const ScratchFolder folder;
+  Image2d image(256, 200);
+  image.at(3, 3) = 1.0f;
+  Image2d mask(256, 200);
+  std::fill(mask.pixels.begin(), mask.pixels.end(), 1.0f);
+  const CameraGeometry camera = distorting_camera(kBarrel);
+  const Eigen::Vector2d stored = PixelDistortion(camera).stored_from_ideal({30, 180});
+  mask.at(static_cast<int>(stored.x()), static_cast<int>(stored.y())) = 0.0f;
+  write_image(mask, folder / "mask.mha", 0.4, 0.4);
+  StudyView view = distorted_view(folder, image);
+  view.mask = folder / "mask.mha";
+  const Image2d found = read_view_xray(view, camera).mask;
+  EXPECT_EQ(found.at(30, 180), 0.0f);
+  EXPECT_EQ(found.at(33, 177), 1.0f) << "not where it stands in the file";
 }
 
 }  // namespace

@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "drr/field_set_drr.h"
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+#include "base/error.h"
+#include "drr/slab_rays.h"
+
+namespace af {
+
+namespace {
+
+/// Members whose rays keep from the edges by this share of the planes less than the best's are not
+/// looked up: narrow enough that few poses need two look-ups, wide enough that an optimiser's steps
+/// see a smooth change.
+constexpr double kSeamShare = 0.04;
+
+class SetWorkspace final : public RenderWorkspace {
+ public:
+  std::vector<std::unique_ptr<RenderWorkspace>> members;
+  std::vector<float> values;
+  std::vector<float> planes;
+};
+
+}  // namespace
+
+FieldSetDrr::FieldSetDrr(std::vector<FieldSetMember> members) : members_(std::move(members)) {
+  check(!members_.empty(), "a set of fields has at least one");
+}
+
+std::vector<double> FieldSetDrr::weights(const RigidTransform& room_from_ct,
+                                         const View& view) const {
+  std::vector<double> shares;
+  for (const FieldSetMember& member : members_)
+    shares.push_back(SlabRays(*member.coverage, room_from_ct, view).share_to_edges());
+  const double best = *std::max_element(shares.begin(), shares.end());
+  std::vector<double> weights(members_.size(), 0.0);
+  if (best < 0.0) return weights;
+  double sum = 0.0;
+  for (std::size_t i = 0; i < shares.size(); ++i) {
+    if (shares[i] < 0.0) continue;
+    // Falls to 0 where a member is no longer nearly the best, and where it no longer holds all
+    // rays.
+    const double behind = std::clamp(1.0 - (best - shares[i]) / kSeamShare, 0.0, 1.0);
+    weights[i] = behind * behind * std::min(1.0, shares[i] / kSeamShare);
+    sum += weights[i];
+  }
+  if (sum == 0.0) {  // at the very edge of the set
+    weights[static_cast<std::size_t>(std::max_element(shares.begin(), shares.end()) -
+                                     shares.begin())] = 1.0;
+    return weights;
+  }
+  for (double& weight : weights) weight /= sum;
+  return weights;
+}
+
+RenderStatus FieldSetDrr::render(const RigidTransform& room_from_ct,
+                                 const View& view,
+                                 RenderWorkspace& workspace,
+                                 std::span<float> total_attenuation,
+                                 const std::optional<PoseGradients>& gradients) const {
+  auto& scratch = dynamic_cast<SetWorkspace&>(workspace);
+  const auto render_member = [&](std::size_t i,
+                                 std::span<float> values,
+                                 const std::optional<PoseGradients>& wanted) {
+    if (!scratch.members[i]) scratch.members[i] = members_[i].renderer->make_workspace();
+    return members_[i].renderer->render(room_from_ct, view, *scratch.members[i], values, wanted);
+  };
+  std::vector<double> weight = weights(room_from_ct, view);
+  if (std::all_of(weight.begin(), weight.end(), [](double w) { return w == 0.0; })) {
+    std::int64_t fewest = std::numeric_limits<std::int64_t>::max();
+    std::size_t best = 0;
+    for (std::size_t i = 0; i < members_.size(); ++i) {
+      const std::int64_t outside = members_[i].renderer->rays_outside(room_from_ct, view);
+      if (outside >= fewest) continue;
+      fewest = outside;
+      best = i;
+    }
+    return render_member(best, total_attenuation, gradients);
+  }
+  const auto first = static_cast<std::size_t>(
+      std::find_if(weight.begin(), weight.end(), [](double w) { return w > 0.0; }) -
+      weight.begin());
+  const RenderStatus status = render_member(first, total_attenuation, gradients);
+  if (weight[first] == 1.0) return status;
+  const auto scale = [](std::span<float> values, double factor) {
+    for (float& value : values) value = static_cast<float>(factor * static_cast<double>(value));
+  };
+  const auto add = [](std::span<float> sum, std::span<const float> values, double factor) {
+    for (std::size_t i = 0; i < sum.size(); ++i)
+      sum[i] += static_cast<float>(factor * static_cast<double>(values[i]));
+  };
+  scale(total_attenuation, weight[first]);
+  if (gradients) scale(gradients->planes, weight[first]);
+  scratch.values.resize(total_attenuation.size());
+  if (gradients) scratch.planes.resize(gradients->planes.size());
+  for (std::size_t i = first + 1; i < members_.size(); ++i) {
+    if (weight[i] == 0.0) continue;
+    std::optional<PoseGradients> its_gradients = gradients;
+    if (its_gradients) its_gradients->planes = scratch.planes;
+    render_member(i, scratch.values, its_gradients);
+    add(total_attenuation, scratch.values, weight[i]);
+    if (gradients) add(gradients->planes, scratch.planes, weight[i]);
+  }
+  return status;
+}
+
+std::int64_t FieldSetDrr::rays_outside(const RigidTransform& room_from_ct, const View& view) const {
+  std::int64_t fewest = std::numeric_limits<std::int64_t>::max();
+  for (const FieldSetMember& member : members_)
+    fewest = std::min(fewest, member.renderer->rays_outside(room_from_ct, view));
+  return fewest;
+}
+
+std::unique_ptr<RenderWorkspace> FieldSetDrr::make_workspace() const {
+  auto workspace = std::make_unique<SetWorkspace>();
+  workspace->members.resize(members_.size());
+  return workspace;
+}
+
+}  // namespace af
