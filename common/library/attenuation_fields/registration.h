@@ -38,7 +38,7 @@ struct RegistrationOptions {
   std::string ct_series_uid = {};
   std::uint64_t seed = 1;
   double calibration_error_px = 0.0;  ///< of every view's shift, that covariances are to contain
-  int threads = 1;  ///< that one registration spreads over; 0: every processor
+  int threads = 1;                    ///< that one registration spreads over; 0: every processor
 };
 
 /// Shares of an X-ray's gradients that the DRR at a pose explains, 0 to 1; NaN: not judged.
