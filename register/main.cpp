@@ -71,6 +71,9 @@ void run(const RegisterOptions& options,
   RegistrationRunner runner =
       af::all_or_none(world, [&] { return RegistrationRunner(loaded.problem, method, pool); });
   PoseExaminer examiner = af::all_or_none(world, [&] { return PoseExaminer(loaded.problem); });
+  UncertaintyEstimator estimator = af::all_or_none(world, [&] {
+    return UncertaintyEstimator(loaded.problem, method, options.uncertainty, pool);
+  });
   const std::filesystem::path slicer = options.output_folder / "slicer";
   af::all_or_none(world, [&] {
     if (!world.is_root()) return;
@@ -97,6 +100,7 @@ void run(const RegisterOptions& options,
   std::vector<RegistrationRecord> records = register_starts(
       runner,
       examiner,
+      estimator,
       starts,
       folder.unfinished("registrations",
                         af::deciding_values(af::deciding_options(in_force), input_sha256)),

@@ -29,6 +29,7 @@ std::vector<RegistrationRecord> records_of(const ResumableItems& items, std::siz
 
 std::vector<RegistrationRecord> register_starts(RegistrationRunner& runner,
                                                 PoseExaminer& examiner,
+                                                UncertaintyEstimator& estimator,
                                                 std::span<const RigidTransform> starts,
                                                 const UnfinishedWork& unfinished,
                                                 const Communicator& communicator) {
@@ -37,6 +38,7 @@ std::vector<RegistrationRecord> register_starts(RegistrationRunner& runner,
     record.start_index = index;
     record.result = runner.run(starts[static_cast<std::size_t>(index)], index);
     record.view_values = examiner.view_values(record.result.room_from_ct);
+    record.uncertainty = estimator.report(record.result, record.view_values);
     return record;
   };
   std::vector<RegistrationRecord> records;

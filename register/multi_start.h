@@ -7,6 +7,7 @@
 #include "parallel/communicator.h"
 #include "register/method/registration.h"
 #include "register/results/registration_results.h"
+#include "register/uncertainty/uncertainty_estimator.h"
 #include "register/verdict/pose_examiner.h"
 #include "run/resumable_items.h"
 
@@ -19,6 +20,7 @@ namespace af::registration {
 /// trace, so that memory does not grow with the number of starts.
 std::vector<RegistrationRecord> register_starts(RegistrationRunner& runner,
                                                 PoseExaminer& examiner,
+                                                UncertaintyEstimator& estimator,
                                                 std::span<const RigidTransform> starts,
                                                 const UnfinishedWork& unfinished,
                                                 const Communicator& communicator);

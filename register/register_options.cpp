@@ -57,6 +57,7 @@ void RegisterOptions::describe(Fields& field) {
   field.part(method);
   field.at("seed").as("--seed");
   field.part(correction);
+  field.part(uncertainty);
   describe_start(field, *this);
   field.part(attenuation);
   field.at("water_mu_per_mm").help =

@@ -15,6 +15,7 @@
 #include "register/field_paths.h"
 #include "register/method/method_options.h"
 #include "register/method/registration.h"
+#include "register/uncertainty/uncertainty_estimator.h"
 
 namespace af::registration {
 
@@ -26,6 +27,7 @@ struct RegisterOptions {
   std::string renderer = "field";
   MethodOptions method;
   CorrectionOptions correction;
+  UncertaintyOptions uncertainty;
   std::optional<std::array<double, 3>> start_rotation_deg;
   std::optional<std::array<double, 3>> start_translation_mm;
   std::string start = "auto";  ///< or "nominal" or "landmarks", when no other start is given

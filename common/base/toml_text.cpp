@@ -42,6 +42,15 @@ std::string escaped(char character) {
 
 }  // namespace
 
+bool is_utf8(std::string_view text) {
+  while (!text.empty()) {
+    const std::size_t bytes = character_bytes(text);
+    if (bytes == 0) return false;
+    text.remove_prefix(bytes);
+  }
+  return true;
+}
+
 std::string toml_text(std::string_view text) {
   std::string result = "\"";
   while (!text.empty()) {

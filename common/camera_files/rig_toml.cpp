@@ -271,6 +271,7 @@ std::string builtin_rig_text(const std::string& name) {
 }
 
 std::string camera_name_problem(const std::string& name) {
+  if (!is_utf8(name)) return "must be UTF-8: a rig.toml could not state it";
   if (is_plain_file_name(name) && name.find('=') == std::string::npos && name.front() != '-')
     return "";
   return "must be usable in a file name: at most 100 bytes, no '/', '=' or control characters, no "

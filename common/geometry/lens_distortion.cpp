@@ -26,6 +26,11 @@ RadialFactor radial_factor(const std::array<double, 8>& k, double r2) {
   return {above / below, (above_slope * below - above * below_slope) / (below * below), below};
 }
 
+/// Neither turned over in one direction nor, behind a second fold, in both.
+bool keeps_its_sides(const Eigen::Matrix2d& jacobian) {
+  return jacobian.determinant() > 0.0 && jacobian.trace() > 0.0;
+}
+
 }  // namespace
 
 bool LensDistortion::is_none() const {
@@ -93,7 +98,7 @@ std::optional<Eigen::Vector2d> PixelDistortion::ideal_from_stored(
   for (int step = 0; step < kMostSteps; ++step) {
     const Eigen::Vector2d missing = wanted - lens_.distorted(at);
     const Eigen::Matrix2d jacobian = lens_.jacobian(at);
-    if (!missing.allFinite() || !(jacobian.determinant() > 0.0)) return std::nullopt;
+    if (!missing.allFinite() || !keeps_its_sides(jacobian)) return std::nullopt;
     if (missing.cwiseProduct(focal_px_).norm() <= kExactPx)
       return at.cwiseProduct(focal_px_) + center_px_;
     at += jacobian.inverse() * missing;
@@ -104,7 +109,7 @@ std::optional<Eigen::Vector2d> PixelDistortion::ideal_from_stored(
 bool PixelDistortion::is_one_to_one_at(const Eigen::Vector2d& pixel) const {
   const Eigen::Vector2d at = normalised(pixel);
   return radial_factor(lens_.coefficients, at.squaredNorm()).denominator > 0.0 &&
-         lens_.jacobian(at).determinant() > 0.0;
+         keeps_its_sides(lens_.jacobian(at));
 }
 
 std::string distortion_problem(const CameraGeometry& camera) {

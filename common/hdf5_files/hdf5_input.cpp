@@ -3,6 +3,8 @@
 
 #include <array>
 #include <cmath>
+#include <fstream>
+#include <limits>
 
 #include "base/error.h"
 #include "hdf5_files/hdf5_handles.h"
@@ -78,20 +80,93 @@ std::vector<double> values_of(hid_t dataset, std::size_t count, const std::strin
 
 constexpr std::size_t kMostTextBytes = 256;
 
-std::string variable_text(hid_t dataset, hid_t type) {
-  char* text = nullptr;
-  const H5Id memory(H5Tcopy(type), H5Tclose, "H5Tcopy");
-  h5_checked(H5Dread(dataset, memory, H5S_ALL, H5S_ALL, H5P_DEFAULT, &text), "H5Dread");
-  const std::string copy = text == nullptr ? "" : text;
-  H5free_memory(text);
-  return copy.substr(0, kMostTextBytes);
+std::uint64_t little_endian(std::string_view bytes) {
+  std::uint64_t value = 0;
+  for (std::size_t i = bytes.size(); i-- > 0;)
+    value = value << 8 | static_cast<unsigned char>(bytes[i]);
+  return value;
+}
+
+/// The bytes of a file, in memory or on the disk.
+class FileBytes {
+ public:
+  FileBytes(std::string bytes, std::filesystem::path path)
+      : bytes_(std::move(bytes)), path_(std::move(path)) {}
+
+  /// FileError that begins with `where` when the file ends before.
+  [[nodiscard]] std::string part(std::uint64_t offset,
+                                 std::size_t count,
+                                 const std::string& where) const {
+    std::string found(count, '\0');
+    if (path_.empty()) {
+      if (offset <= bytes_.size() && count <= bytes_.size() - offset)
+        return bytes_.substr(static_cast<std::size_t>(offset), count);
+    } else if (offset <= std::uint64_t{std::numeric_limits<std::int64_t>::max()}) {
+      std::ifstream file(path_, std::ios::binary);
+      file.seekg(static_cast<std::streamoff>(offset));
+      if (file.read(found.data(), static_cast<std::streamsize>(count))) return found;
+    }
+    throw FileError(where, "damaged HDF5: a text lies behind the end of the file");
+  }
+
+ private:
+  std::string bytes_;
+  std::filesystem::path path_;  ///< empty: in memory
+};
+
+void check_plain_addresses(hid_t file, const std::string& where) {
+  const H5Id creation(H5Fget_create_plist(file), H5Pclose, "H5Fget_create_plist");
+  std::size_t address_bytes = 0;
+  std::size_t length_bytes = 0;
+  hsize_t user_block = 0;
+  h5_checked(H5Pget_sizes(creation, &address_bytes, &length_bytes), "H5Pget_sizes");
+  h5_checked(H5Pget_userblock(creation, &user_block), "H5Pget_userblock");
+  if (address_bytes != 8 || length_bytes != 8 || user_block != 0)
+    throw FileError(where, "is a text of a file with unusual addresses");
+}
+
+/// A text of variable length stands in a heap of the file. HDF5 1.10 copies as many bytes as the
+/// heap says to where there is room for as many as the dataset says, so the bytes are taken without
+/// it (HDF5's file format, III.E, global heap).
+std::string variable_text(hid_t file,
+                          hid_t dataset,
+                          const FileBytes& bytes,
+                          const std::string& where) {
+  constexpr std::uint64_t kMostHeapBytes = std::uint64_t{1} << 24;
+  check_plain_addresses(file, where);
+  const haddr_t offset = H5Dget_offset(dataset);
+  if (offset == HADDR_UNDEF) throw FileError(where, "is a text that is stored in pieces");
+  const std::string cell = bytes.part(offset, 16, where);
+  const std::uint64_t length = little_endian(std::string_view(cell).substr(0, 4));
+  const std::uint64_t heap = little_endian(std::string_view(cell).substr(4, 8));
+  const std::uint64_t index = little_endian(std::string_view(cell).substr(12, 4));
+  if (length == 0) return "";
+  if (length > kMostTextBytes) throw FileError(where, "is too long");
+  const std::string head = bytes.part(heap, 16, where);
+  const std::uint64_t heap_bytes = little_endian(std::string_view(head).substr(8, 8));
+  if (!head.starts_with(std::string_view("GCOL\1", 5)) || heap_bytes > kMostHeapBytes)
+    throw FileError(where, "damaged HDF5: its text is in no heap");
+  for (std::uint64_t at = 16; at + 16 <= heap_bytes;) {
+    const std::string object = bytes.part(heap + at, 16, where);
+    const std::uint64_t number = little_endian(std::string_view(object).substr(0, 2));
+    const std::uint64_t size = little_endian(std::string_view(object).substr(8, 8));
+    if (number == 0 || size > heap_bytes - at - 16) break;  // 0: what is left is free
+    if (number == index && size >= length) {
+      const std::string text = bytes.part(heap + at + 16, static_cast<std::size_t>(length), where);
+      return text.substr(0, text.find('\0'));
+    }
+    at += 16 + (size + 7) / 8 * 8;
+  }
+  throw FileError(where, "damaged HDF5: its text is not in its heap");
 }
 
 }  // namespace
 
 struct Hdf5Input::State {
-  explicit State(H5Id opened) : file(std::move(opened)) {}
+  State(H5Id opened, FileBytes read_bytes)
+      : file(std::move(opened)), bytes(std::move(read_bytes)) {}
   H5Id file;
+  FileBytes bytes;
 
   /// Every link on the way is checked before it is followed.
   [[nodiscard]] H5Id dataset(const std::string& path, const std::string& name) const {
@@ -134,13 +209,14 @@ Hdf5Input::~Hdf5Input() = default;
 
 Hdf5Input Hdf5Input::of_file(const std::filesystem::path& path) {
   return quietly(path.string(), [&] {
-    return Hdf5Input(std::make_unique<State>(opened_file(path.string())), path.string());
+    return Hdf5Input(std::make_unique<State>(opened_file(path.string()), FileBytes("", path)),
+                     path.string());
   });
 }
 
 Hdf5Input Hdf5Input::of_bytes(std::string bytes, std::string name) {
   return quietly(name, [&] {
-    return Hdf5Input(std::make_unique<State>(opened_bytes(std::move(bytes))), name);
+    return Hdf5Input(std::make_unique<State>(opened_bytes(bytes), FileBytes(bytes, {})), name);
   });
 }
 
@@ -186,7 +262,7 @@ std::string Hdf5Input::text(const std::string& path) const {
     for (const std::size_t extent : extents_of(dataset, where)) count *= extent;
     if (H5Tget_class(type) != H5T_STRING || count != 1) throw FileError(where, "is no text");
     if (h5_checked(H5Tis_variable_str(type), "H5Tis_variable_str") > 0)
-      return variable_text(dataset, type);
+      return variable_text(state_->file, dataset, state_->bytes, where);
     // The file's word, up to 4 GB: asked before memory is.
     const std::size_t bytes = H5Tget_size(type);
     if (bytes > kMostTextBytes) throw FileError(where, "is too long");

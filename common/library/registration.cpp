@@ -14,6 +14,7 @@
 #include "register/case_loading.h"
 #include "register/method/method_options.h"
 #include "register/method/registration.h"
+#include "register/uncertainty/uncertainty_estimator.h"
 #include "register/verdict/pose_examiner.h"
 #include "register/verdict/verdict.h"
 #include "register/verdict/view_diagnosis.h"
@@ -38,6 +39,26 @@ registration::MethodOptions method_options(const RegistrationOptions& options) {
   method.seed = options.seed;
   method.threads = options.threads;
   return method;
+}
+
+registration::UncertaintyOptions uncertainty_options(const RegistrationOptions& options) {
+  registration::UncertaintyOptions result;
+  result.calibration_error_px = options.calibration_error_px;
+  af::throw_if_any(af::field_problems(result));
+  return result;
+}
+
+Uncertainty uncertainty_of(const registration::UncertaintyReport& report) {
+  Uncertainty result;
+  std::size_t next = 0;
+  for (std::size_t row = 0; row < 6; ++row)
+    for (std::size_t column = row; column < 6; ++column, ++next)
+      result.covariance[row][column] = result.covariance[column][row] =
+          report.covariance_deg_mm[next];
+  result.tre_rms_mm = report.tre_rms_mm;
+  result.tre_95_mm = report.tre_95_mm;
+  result.confidence = report.confidence;
+  return result;
 }
 
 registration::RegistrationOptions resolved_method(const RegistrationOptions& options) {
@@ -96,7 +117,8 @@ struct RegistrationCase::Impl {
   std::shared_ptr<const registration::RegistrationProblem> problem;
   std::unique_ptr<registration::RegistrationRunner> runner;
   std::unique_ptr<registration::PoseExaminer> examiner;
-  std::mutex mutex;  ///< of runner and examiner
+  std::unique_ptr<registration::UncertaintyEstimator> estimator;
+  std::mutex mutex;  ///< of runner, examiner and estimator
 
   [[nodiscard]] std::optional<double> tre_mm(const af::RigidTransform& pose) const {
     if (!gold.has_value()) return std::nullopt;
@@ -130,6 +152,7 @@ struct RegistrationCase::Impl {
     for (std::size_t i = 0; i < view_values.size(); ++i)
       found.views.push_back(
           {problem->views[i].view.camera.name, view_values[i].coarse, view_values[i].fine});
+    found.uncertainty = uncertainty_of(estimator->report(result, view_values));
     found.initial_tre_mm = tre_mm(result.start_room_from_ct);
     found.tre_mm = tre_mm(result.room_from_ct);
     found.seconds = result.seconds;
@@ -166,6 +189,8 @@ RegistrationCase RegistrationCase::load(const std::filesystem::path& study_path,
     impl->problem = loaded.problem;
     impl->runner = std::make_unique<registration::RegistrationRunner>(loaded.problem, method, pool);
     impl->examiner = std::make_unique<registration::PoseExaminer>(loaded.problem);
+    impl->estimator = std::make_unique<registration::UncertaintyEstimator>(
+        loaded.problem, method, uncertainty_options(options), pool);
     return RegistrationCase(std::move(impl));
   });
 }

@@ -43,7 +43,8 @@ std::vector<LoadedMethod> load_methods(const MethodOptions& options,
                                        const Study& study,
                                        const StudyCase& study_case,
                                        const Communicator& world,
-                                       LoadedInputs& inputs) {
+                                       LoadedInputs& inputs,
+                                       int judging_level) {
   std::vector<LoadedMethod> methods;
   const registration::RegistrationOptions method =
       all_or_none(world, [&] { return registration::resolve(options.method); });
@@ -57,6 +58,7 @@ std::vector<LoadedMethod> load_methods(const MethodOptions& options,
     registration::CaseLoadOptions loading =
         load_options(options, renderer, method.coarsest_level(), blurs_mm);
     if (its_method.correction.is_wanted) loading.correction_levels = method.last_levels();
+    loading.judging_level = judging_level;
     loading.pool = pool;
     const registration::LoadedCase loaded =
         registration::load_case(study, study_case, loading, world);
@@ -70,7 +72,7 @@ std::vector<LoadedMethod> load_methods(const MethodOptions& options,
       inputs.notes[study_case.name + ": " + name] = note;
     registration::RegistrationRunner runner = all_or_none(
         world, [&] { return registration::RegistrationRunner(loaded.problem, its_method, pool); });
-    methods.push_back({renderer, std::move(runner)});
+    methods.push_back({renderer, std::move(runner), loaded.problem});
   }
   return methods;
 }

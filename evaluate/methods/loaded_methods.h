@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,7 @@ namespace af::evaluation {
 struct LoadedMethod {
   std::string renderer;  ///< "field" or "raycast"
   registration::RegistrationRunner runner;
+  std::shared_ptr<const registration::RegistrationProblem> problem;  ///< the runner's
 };
 
 /// What a case was loaded from, as "CASE: what"; rank 0.
@@ -24,13 +26,14 @@ struct LoadedInputs {
 };
 
 /// Collective. The methods of a case, in the order of chosen_renderers(); hashes and notes of the
-/// inputs go to `inputs`. Look-up is corrected where `correction` says so. Throws as
-/// load_case() does.
+/// inputs go to `inputs`. Look-up is corrected where `correction` says so. `judging_level`: as
+/// CaseLoadOptions has it. Throws as load_case() does.
 std::vector<LoadedMethod> load_methods(const MethodOptions& options,
                                        const registration::CorrectionOptions& correction,
                                        const Study& study,
                                        const StudyCase& study_case,
                                        const Communicator& world,
-                                       LoadedInputs& inputs);
+                                       LoadedInputs& inputs,
+                                       int judging_level = 0);
 
 }  // namespace af::evaluation

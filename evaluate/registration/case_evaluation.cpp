@@ -27,6 +27,9 @@
 #include "parallel/work_watch.h"
 #include "register/results/registration_results.h"
 #include "register/results/slicer_folder.h"
+#include "register/uncertainty/pose_covariance.h"
+#include "register/uncertainty/uncertainty_estimator.h"
+#include "register/verdict/pose_examiner.h"
 #include "run/progress_printer.h"
 #include "run/resumable_items.h"
 #include "run/stop_request.h"
@@ -38,9 +41,11 @@ namespace af::evaluation {
 namespace {
 
 using nlohmann::json;
+using registration::PoseExaminer;
 using registration::RegistrationResult;
 using registration::RegistrationRunner;
 using registration::StopReason;
+using registration::UncertaintyEstimator;
 
 /// One renderer's share of a case.
 struct Method {
@@ -48,7 +53,20 @@ struct Method {
   RegistrationRunner runner;
   std::vector<std::int64_t> start_indices;  ///< ascending
   double success_tre_mm = kSuccessTreMm;    ///< failures keep their traces
+  /// None when uncertainty is left out.
+  std::unique_ptr<registration::PoseExaminer> examiner;
+  std::unique_ptr<registration::UncertaintyEstimator> estimator;
 };
+
+/// Prepares what says how far ends are from the truth, unless that is left out.
+void examine_ends(const std::shared_ptr<const registration::RegistrationProblem>& problem,
+                  const registration::UncertaintyOptions& options,
+                  Method& method) {
+  if (options.is_left_out) return;
+  method.examiner = std::make_unique<PoseExaminer>(problem);
+  method.estimator =
+      std::make_unique<UncertaintyEstimator>(problem, method.runner.options(), options);
+}
 
 /// Inside the motion range of every field in use; where a field has none for this camera, all rays
 /// must be inside.
@@ -158,26 +176,43 @@ void add_result(const RegistrationResult& result,
   measure_pose(result.room_from_ct, yardstick, row);
 }
 
+/// What a registration says of itself, and how its error lies in its covariance.
+void add_uncertainty(Method& method, const RegistrationResult& result, RegistrationRow& row) {
+  if (method.estimator == nullptr) return;
+  row.chain_distance_mm = result.chain_distance_mm;
+  std::vector<registration::ViewValue> values;
+  if (has_pose(result)) values = method.examiner->view_values(result.room_from_ct);
+  row.judge = summary_of(values, &registration::ViewValue::coarse);
+  row.judge_fine = summary_of(values, &registration::ViewValue::fine);
+  row.uncertainty = method.estimator->report(result, values);
+  if (!std::isfinite(row.uncertainty.covariance_deg_mm[0])) return;
+  const PoseParameters error = PoseParameters::from_deg_and_mm(row.final_deg_mm);
+  registration::PoseVector error_rad_mm;
+  error_rad_mm << error.rotation_rad, error.translation_mm;
+  row.squared_distance = registration::squared_distance(
+      registration::from_deg_mm(row.uncertainty.covariance_deg_mm), error_rad_mm);
+}
+
 /// The row of one start, without its case; for a failure with its trace.
 TracedRow traced_row(Method& method,
                      const PerturbedStart& start,
                      std::int64_t index,
                      const Yardstick& yardstick) {
-  std::vector<registration::TraceRow> trace;
+  RegistrationResult result;
   TracedRow traced;
   RegistrationRow& row = traced.row;
   row = registered_row(
       [&](const RigidTransform& room_from_ct) {
-        RegistrationResult result = method.runner.run(room_from_ct, index);
-        trace = result.trace;
+        result = method.runner.run(room_from_ct, index);
         return result;
       },
       start,
       yardstick);
   row.renderer = method.renderer;
   row.start_index = index;
+  if (row.error == InternedText()) add_uncertainty(method, result, row);
   if (!row.is_success(method.success_tre_mm))
-    traced.trace = trace_points(trace, method.runner.problem().frame(), yardstick);
+    traced.trace = trace_points(result.trace, method.runner.problem().frame(), yardstick);
   return traced;
 }
 
@@ -467,8 +502,17 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
       std::in_place, "loading case " + study_case.name, WorkNote::Kind::Phase);
   std::vector<Method> methods;
   for (LoadedMethod& method :
-       load_methods(options, options.correction, study, study_case, world, evaluation.inputs))
-    methods.push_back({method.renderer, std::move(method.runner), {}, options.success_tre_mm});
+       load_methods(options,
+                    options.correction,
+                    study,
+                    study_case,
+                    world,
+                    evaluation.inputs,
+                    options.uncertainty.is_left_out ? 0 : PoseExaminer::coarsest_level())) {
+    methods.push_back(
+        {method.renderer, std::move(method.runner), {}, options.success_tre_mm, {}, {}});
+    all_or_none(world, [&] { examine_ends(method.problem, options.uncertainty, methods.back()); });
+  }
   const Yardstick yardstick = all_or_none(world, [&] {
     evaluation.gold = gold_standard(study, study_case, options.gold);
     return yardstick_of(study, study_case, evaluation.gold);

@@ -437,6 +437,7 @@ void describe_methods(Fields& field, RegistrationStudyOptions& options) {
 void RegistrationStudyOptions::describe(Fields& field) {
   field.part<MethodOptions>(*this);
   field.part(correction);
+  field.part(uncertainty);
   describe_starts(field, *this);
   describe_methods(field, *this);
   field.at("seed").as("--seed", "Of the starts, and of what cma-es draws");

@@ -13,13 +13,15 @@
 #include "evaluate/starts/perturbed_starts.h"
 #include "evaluate/statistics/success_rate.h"
 #include "parallel/communicator.h"
+#include "register/uncertainty/uncertainty_estimator.h"
 
 namespace af::evaluation {
 
 /// `af-evaluate registration` as typed; method.seed is the seed of the starts, too.
 struct RegistrationStudyOptions : MethodOptions {
   registration::CorrectionOptions correction;  ///< of the field's ends
-  std::vector<std::string> cases;              ///< empty: all
+  registration::UncertaintyOptions uncertainty;
+  std::vector<std::string> cases;  ///< empty: all
   int starts_per_interval = 30;
   int intervals = 8;
   double interval_width_mm = 2.0;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cmath>
 #include <cstddef>
 #include <cstring>
 #include <utility>
@@ -20,9 +21,19 @@ void append_numbers(std::vector<std::string>& fields, const std::array<double, 6
   for (const double value : values) fields.push_back(number_text(value));
 }
 
-bool is_any_corrected(std::span<const RegistrationRow> rows) {
-  return std::any_of(
-      rows.begin(), rows.end(), [](const RegistrationRow& row) { return row.is_corrected; });
+/// What parts of the columns rows have.
+struct RowParts {
+  bool correction = false;
+  bool uncertainty = false;
+};
+
+RowParts parts_of(std::span<const RegistrationRow> rows) {
+  RowParts parts;
+  for (const RegistrationRow& row : rows) {
+    parts.correction = parts.correction || row.is_corrected;
+    parts.uncertainty = parts.uncertainty || std::isfinite(row.uncertainty.confidence);
+  }
+  return parts;
 }
 
 std::vector<std::string> start_columns() {
@@ -51,7 +62,7 @@ std::vector<std::string> start_fields(const std::string& case_name,
 }
 
 registration::NamedCells cells_of(const RegistrationRow& row,
-                                  bool with_correction,
+                                  const RowParts& parts,
                                   double success_tre_mm) {
   const registration::RegistrationCells cells = {.case_name = row.case_name,
                                                  .start_index = row.start_index,
@@ -74,7 +85,13 @@ registration::NamedCells cells_of(const RegistrationRow& row,
       {"rotation_error_deg", number_text(errors.rotation_deg)},
       {"translation_error_mm", number_text(errors.translation_mm)},
       {"error", row.error}};
-  if (with_correction)
+  if (parts.uncertainty) {
+    registration::append(registration::judge_cells(row.judge, row.judge_fine), before_seconds);
+    registration::append(registration::uncertainty_cells(row.uncertainty, row.chain_distance_mm),
+                         before_seconds);
+    before_seconds.emplace_back("squared_distance", number_text(row.squared_distance));
+  }
+  if (parts.correction)
     registration::append(registration::correction_cells(
                              row.is_corrected ? std::optional(row.correction) : std::nullopt),
                          before_seconds);
@@ -88,27 +105,26 @@ registration::NamedCells cells_of(const RegistrationRow& row,
 }
 
 CsvTable table_of(std::span<const RegistrationRow> rows,
-                  bool with_correction,
+                  const RowParts& parts,
                   double success_tre_mm) {
-  CsvTable table(
-      registration::names_of(cells_of(RegistrationRow(), with_correction, success_tre_mm)));
+  CsvTable table(registration::names_of(cells_of(RegistrationRow(), parts, success_tre_mm)));
   for (const RegistrationRow& row : rows)
-    table.add_row(registration::texts_of(cells_of(row, with_correction, success_tre_mm)));
+    table.add_row(registration::texts_of(cells_of(row, parts, success_tre_mm)));
   return table;
 }
 
 }  // namespace
 
 CsvTable registrations_table(std::span<const RegistrationRow> rows, double success_tre_mm) {
-  return table_of(rows, is_any_corrected(rows), success_tre_mm);
+  return table_of(rows, parts_of(rows), success_tre_mm);
 }
 
 void write_registrations(const std::filesystem::path& path,
                          std::span<const RegistrationRow> rows,
                          double success_tre_mm) {
-  const bool with_correction = is_any_corrected(rows);
+  const RowParts parts = parts_of(rows);
   write_csv_in_parts(path, rows.size(), [&](std::size_t first, std::size_t end) {
-    return table_of(rows.subspan(first, end - first), with_correction, success_tre_mm);
+    return table_of(rows.subspan(first, end - first), parts, success_tre_mm);
   });
 }
 

@@ -17,6 +17,8 @@
 #include "evaluate/starts/perturbed_starts.h"
 #include "evaluate/statistics/success_rate.h"
 #include "register/method/correction_report.h"
+#include "register/uncertainty/uncertainty_report.h"
+#include "register/verdict/verdict.h"
 #include "text/csv_table.h"
 
 namespace af::evaluation {
@@ -56,6 +58,12 @@ struct RegistrationRow {
   std::int64_t drr_count = 0;
   bool is_corrected = false;  ///< a correction was wanted
   registration::CorrectionReport correction;
+  // What the registration says of itself, without the gold pose; NaN where it was not asked.
+  registration::ViewSummary judge = {kMissing, kMissing};
+  registration::ViewSummary judge_fine = {kMissing, kMissing};
+  registration::UncertaintyReport uncertainty;
+  double chain_distance_mm = kMissing;
+  double squared_distance = kMissing;  ///< Mahalanobis, of the error by the covariance
   InternedText stop_reason;
   InternedText error;    ///< message of a registration that threw
   double seconds = 0.0;  ///< wall time
@@ -81,6 +89,11 @@ struct RegistrationRow {
                     error,
                     is_corrected,
                     correction,
+                    judge,
+                    judge_fine,
+                    uncertainty,
+                    chain_distance_mm,
+                    squared_distance,
                     seconds);
   }
 };

@@ -14,6 +14,7 @@
 #include "evaluate/outputs/sample_summary_json.h"
 #include "evaluate/registration/case_intervals.h"
 #include "evaluate/registration/success_statistics.h"
+#include "evaluate/registration/uncertainty_statistics.h"
 #include "evaluate/statistics/bootstrap.h"
 
 namespace af::evaluation {
@@ -203,6 +204,8 @@ json renderer_statistics(std::span<const RegistrationRow> rows,
   for (const json& interval : result["intervals"]) inside += interval["starts"].get<std::int64_t>();
   result["starts_beyond_last_interval"] = static_cast<std::int64_t>(mine.size()) - inside;
   result["over_cases"] = over_cases_json(by_case, options);
+  if (json uncertainty = uncertainty_statistics(by_case, options); !uncertainty.is_null())
+    result["uncertainty"] = std::move(uncertainty);
   result["cases"] = json::array();
   for (const auto& [name, case_rows] : by_case) {
     json entry = statistics_of(case_rows, options);

@@ -19,6 +19,25 @@ void bind_result(py::module_& module) {
   view.def_readonly("camera", &ViewAgreement::camera);
   view.def_readonly("coarse", &ViewAgreement::coarse);
   view.def_readonly("fine", &ViewAgreement::fine);
+  py::class_<Uncertainty> uncertainty(
+      module, "Uncertainty", "What a registration says of its own error.");
+  uncertainty.def_property_readonly(
+      "covariance",
+      [](const Uncertainty& self) {
+        py::array_t<double> matrix({6, 6});
+        for (py::ssize_t row = 0; row < 6; ++row)
+          for (py::ssize_t column = 0; column < 6; ++column)
+            matrix.mutable_at(row, column) =
+                self.covariance[static_cast<std::size_t>(row)][static_cast<std::size_t>(column)];
+        return matrix;
+      },
+      "Of (rx, ry, rz, tx, ty, tz) (6x6), degrees and mm: motions after the end, about the centre "
+      "of the region of interest, along the room's axes.");
+  uncertainty.def_readonly("tre_rms_mm", &Uncertainty::tre_rms_mm, "Expected over the target box.");
+  uncertainty.def_readonly(
+      "tre_95_mm", &Uncertainty::tre_95_mm, "The TRE stays below with a probability of 0.95.");
+  uncertainty.def_readonly(
+      "confidence", &Uncertainty::confidence, "Probability of a TRE below 2.5 mm.");
   py::class_<Registration> result(module, "Registration", "Where a registration led.");
   result.def_readonly("start_index", &Registration::start_index);
   result.def_property_readonly("start",
@@ -42,6 +61,7 @@ void bind_result(py::module_& module) {
   result.def_readonly("inadmissible", &Registration::inadmissible);
   result.def_readonly("drr_count", &Registration::drr_count);
   result.def_readonly("views", &Registration::views);
+  result.def_readonly("uncertainty", &Registration::uncertainty);
   result.def_readonly("initial_tre_mm", &Registration::initial_tre_mm);
   result.def_readonly("tre_mm", &Registration::tre_mm);
   result.def_readonly("seconds", &Registration::seconds);
@@ -96,7 +116,8 @@ RegistrationCase load(const std::filesystem::path& study,
                       double step_mm,
                       const std::string& ct_series_uid,
                       std::uint64_t seed,
-                      int threads) {
+                      int threads,
+                      double calibration_error_px) {
   RegistrationOptions options;
   options.preset = preset;
   options.renderer = renderer;
@@ -113,6 +134,7 @@ RegistrationCase load(const std::filesystem::path& study,
   options.ct_series_uid = ct_series_uid;
   options.seed = seed;
   options.threads = threads;
+  options.calibration_error_px = calibration_error_px;
   RegistrationCase loaded = [&] {
     const py::gil_scoped_release release;
     return RegistrationCase::load(study, case_name, options);
@@ -161,6 +183,7 @@ void bind_case(py::module_& module) {
                                "ct_series_uid"_a = "",
                                "seed"_a = 1,
                                "threads"_a = 1,
+                               "calibration_error_px"_a = 0.0,
                                "Options are those of af-register.");
   registration_case.def_property_readonly("name", &RegistrationCase::name);
   registration_case.def_property_readonly(

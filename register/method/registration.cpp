@@ -404,6 +404,7 @@ double RegistrationRunner::Impl::judged(const RigidTransform& room_from_ct,
 void RegistrationRunner::Impl::run_portfolio(std::int64_t start_index, RegistrationResult& result) {
   std::size_t first = 0;
   std::optional<ChainEnd> best;
+  std::vector<RigidTransform> others;
   for (const ChainOptions& chain : options.chains) {
     ChainEnd end{result.start_room_from_ct};
     run_chain(chain, first, start_index, end, result);
@@ -414,12 +415,20 @@ void RegistrationRunner::Impl::run_portfolio(std::int64_t start_index, Registrat
       continue;
     }
     if (!best.has_value() || end.similarity > best->similarity) {
+      if (best.has_value()) others.push_back(best->room_from_ct);
       best = end;
       result.chain = chain.name;
+    } else {
+      others.push_back(end.room_from_ct);
     }
     if (best->similarity >= options.judge.enough_value) break;
   }
   if (!best.has_value()) return;
+  if (!problem->target_points_ct.empty())
+    for (const RigidTransform& other : others)
+      result.chain_distance_mm =
+          std::fmin(result.chain_distance_mm,
+                    mean_tre_mm(best->room_from_ct, other, problem->target_points_ct));
   if (!options.finish.stages.empty()) run_finish(start_index, *best, result);
   correct(start_index, *best, result);
   if (!options.finish.stages.empty() || options.correction.is_wanted)
@@ -495,6 +504,11 @@ ObjectiveValue RegistrationRunner::similarity_at(const RigidTransform& room_from
                                                  std::size_t stage) {
   check(stage < impl_->stages.size(), "no such stage");
   return impl_->stages[stage].objective.evaluate(room_from_ct);
+}
+
+MultiViewObjective& RegistrationRunner::objective(std::size_t stage) {
+  check(stage < impl_->stages.size(), "no such stage");
+  return impl_->stages[stage].objective;
 }
 
 const RegistrationProblem& RegistrationRunner::problem() const {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -29,9 +30,12 @@ struct TraceRow {
 struct RegistrationResult {
   RigidTransform start_room_from_ct = RigidTransform::Identity();
   RigidTransform room_from_ct = RigidTransform::Identity();
-  double similarity = 0.0;        ///< at the end: of the chain's last stage, of a portfolio by its
-                                  ///< judge (mean over views); NaN if it has none
-  std::string chain;              ///< the one that the result is from
+  double similarity = 0.0;  ///< at the end: of the chain's last stage, of a portfolio by its
+                            ///< judge (mean over views); NaN if it has none
+  std::string chain;        ///< the one that the result is from
+  /// Of a portfolio: from its choice to the nearest end of another chain, mean over the target box;
+  /// NaN when only one chain was run, or none of the others has a value.
+  double chain_distance_mm = std::numeric_limits<double>::quiet_NaN();
   int evaluations = 0;            ///< poses tried
   int inadmissible = 0;           ///< of these, outside the field or its motion range
   std::int64_t drr_count = 0;     ///< DRRs rendered, those of a correction included
@@ -46,6 +50,7 @@ struct RegistrationResult {
                     room_from_ct,
                     similarity,
                     chain,
+                    chain_distance_mm,
                     evaluations,
                     inadmissible,
                     drr_count,
@@ -86,6 +91,10 @@ class RegistrationRunner {
   [[nodiscard]] ObjectiveValue similarity_at(const RigidTransform& room_from_ct);
   /// The objective of one stage, counted over the chains, at a pose.
   [[nodiscard]] ObjectiveValue similarity_at(const RigidTransform& room_from_ct, std::size_t stage);
+
+  /// What a stage, counted over the chains, maximises; lives as long as the runner, and is used by
+  /// no run meanwhile.
+  [[nodiscard]] MultiViewObjective& objective(std::size_t stage);
 
   [[nodiscard]] const RegistrationProblem& problem() const;
   [[nodiscard]] const RegistrationOptions& options() const;

@@ -33,6 +33,25 @@ NormalEquations gradient_equations(const SimilarityMeasure& measure,
   return result;
 }
 
+/// The gradient by tiles of the view's region.
+TileScores tile_scores(const RegionOfInterest& roi,
+                       int tiles,
+                       std::span<const float> planes,
+                       std::span<const float> by_pixel) {
+  TileScores scores(static_cast<std::size_t>(tiles * tiles), PoseVector::Zero());
+  std::size_t pixel = 0;
+  for (int row = 0; row < roi.height; ++row)
+    for (int column = 0; column < roi.width; ++column, ++pixel) {
+      const int tile = row * tiles / roi.height * tiles + column * tiles / roi.width;
+      PoseVector& score = scores[static_cast<std::size_t>(tile)];
+      const auto weight = static_cast<double>(by_pixel[pixel]);
+      for (std::size_t k = 0; k < 6; ++k)
+        score[static_cast<Eigen::Index>(k)] +=
+            weight * static_cast<double>(planes[k * by_pixel.size() + pixel]);
+    }
+  return scores;
+}
+
 }  // namespace
 
 MultiViewObjective::MultiViewObjective(std::vector<ObjectiveView> views,
@@ -161,6 +180,32 @@ ObjectiveValue MultiViewObjective::evaluate_with(const RigidTransform& room_from
       });
     });
   return sum_of(0, result);
+}
+
+ObjectiveValue MultiViewObjective::evaluate_scores(const RigidTransform& room_from_ct,
+                                                   const Eigen::Vector3d& pivot_room_point,
+                                                   int tiles,
+                                                   std::vector<TileScores>& scores) {
+  check(tiles > 0, "at least one tile");
+  prepare({&room_from_ct, 1});
+  std::vector<TileScores> found(views_.size());
+  if (poses_[0].is_in_range)
+    pool_->for_each(static_cast<int>(views_.size()), [&](int task, int /*slot*/) {
+      const auto view = static_cast<std::size_t>(task);
+      Scratch& scratch = scratch_of(0, view);
+      scratch.planes.resize(6 * scratch.drr.size());
+      scratch.by_pixel.resize(scratch.drr.size());
+      const PoseGradients gradients{pivot_room_point, scratch.planes};
+      evaluate_view(0, room_from_ct, view, scratch, gradients, [&](NormalEquations& part) {
+        part.value = views_[view].measure->evaluate_with_derivative(
+            scratch.drr, scratch.by_pixel, *scratch.similarity);
+        found[view] = tile_scores(views_[view].view.roi, tiles, scratch.planes, scratch.by_pixel);
+      });
+    });
+  NormalEquations sum;
+  const ObjectiveValue value = sum_of(0, sum);
+  if (value.is_admissible) scores = std::move(found);
+  return value;
 }
 
 }  // namespace af::registration

@@ -36,6 +36,10 @@ struct ObjectiveValue {
   int drr_count = 0;              ///< DRRs rendered for this value
 };
 
+/// The gradient of one view's similarity, tile by tile of its region, row by row; they sum to the
+/// view's. By small motions of the CT in the room, as PoseGradients (per rad, per mm).
+using TileScores = std::vector<PoseVector>;
+
 /// Eq. (13): sum of the views' similarities at a pose. Owns the scratch memory: one objective at a
 /// time on a pool of threads, over which views and poses are spread. Values do not depend on the
 /// number of threads. Evaluations do not allocate, but for the first ones of a kind.
@@ -56,6 +60,15 @@ class MultiViewObjective {
                                const Eigen::Vector3d& pivot_room_point,
                                Derivatives derivatives,
                                NormalEquations& result);
+
+  /// The views one by one, the gradient of each split over `tiles` x `tiles` parts of its region:
+  /// sums of (derivative by a DRR pixel) x (derivative of that pixel by the pose). The measures
+  /// must have derivatives. `scores`: one per view; it keeps what it was when the pose is
+  /// inadmissible.
+  ObjectiveValue evaluate_scores(const RigidTransform& room_from_ct,
+                                 const Eigen::Vector3d& pivot_room_point,
+                                 int tiles,
+                                 std::vector<TileScores>& scores);
 
   [[nodiscard]] const std::vector<ObjectiveView>& views() const { return views_; }
   [[nodiscard]] const std::shared_ptr<ThreadPool>& pool() const { return pool_; }

@@ -57,6 +57,33 @@ NamedCells correction_cells(const std::optional<CorrectionReport>& correction) {
   return cells;
 }
 
+NamedCells judge_cells(const ViewSummary& coarse, const ViewSummary& fine) {
+  return {{"judge_mean", number_text(coarse.mean)},
+          {"judge_lowest_view", number_text(coarse.lowest)},
+          {"judge_fine_mean", number_text(fine.mean)},
+          {"judge_fine_lowest_view", number_text(fine.lowest)}};
+}
+
+NamedCells uncertainty_cells(const UncertaintyReport& report, double chain_distance_mm) {
+  static const std::array<std::string, UncertaintyReport::kCovarianceSize> names = [] {
+    constexpr std::array short_names{"rx", "ry", "rz", "tx", "ty", "tz"};
+    std::array<std::string, UncertaintyReport::kCovarianceSize> result;
+    std::size_t next = 0;
+    for (std::size_t row = 0; row < short_names.size(); ++row)
+      for (std::size_t column = row; column < short_names.size(); ++column)
+        result[next++] = std::string("cov_") + short_names[row] + "_" + short_names[column];
+    return result;
+  }();
+  NamedCells cells = {{"predicted_tre_rms_mm", number_text(report.tre_rms_mm)},
+                      {"predicted_tre_95_mm", number_text(report.tre_95_mm)},
+                      {"confidence", number_text(report.confidence)},
+                      {"covariance_inflation", number_text(report.inflation)},
+                      {"chain_distance_mm", number_text(chain_distance_mm)}};
+  for (std::size_t i = 0; i < names.size(); ++i)
+    cells.emplace_back(names[i], number_text(report.covariance_deg_mm[i]));
+  return cells;
+}
+
 void append(const NamedCells& more, NamedCells& cells) {
   cells.insert(cells.end(), more.begin(), more.end());
 }

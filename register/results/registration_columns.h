@@ -12,6 +12,8 @@
 #include <vector>
 
 #include "register/method/correction_report.h"
+#include "register/uncertainty/uncertainty_report.h"
+#include "register/verdict/verdict.h"
 
 namespace af::registration {
 
@@ -43,6 +45,13 @@ NamedCells registration_row(const RegistrationCells& row,
 
 /// What a correction adds before the time; empty cells where there was none.
 NamedCells correction_cells(const std::optional<CorrectionReport>& correction);
+
+/// What the judge says of an end: means and lowest values over the views.
+NamedCells judge_cells(const ViewSummary& coarse, const ViewSummary& fine);
+
+/// Uncertainty: TREs foretold, confidence, inflation, distance of the chains, and the covariance's
+/// upper triangle as `cov_rx_rx` (deg^2), `cov_rx_tx` (deg mm) ... `cov_tz_tz` (mm^2).
+NamedCells uncertainty_cells(const UncertaintyReport& report, double chain_distance_mm);
 
 void append(const NamedCells& more, NamedCells& cells);
 

@@ -152,6 +152,27 @@ json views_json(const RegistrationRecord& record, const RegistrationProblem& pro
           {"cameras", views}};
 }
 
+/// Covariance as six rows; null what is not known.
+json uncertainty_json(const RegistrationRecord& record) {
+  const UncertaintyReport& report = record.uncertainty;
+  json covariance = nullptr;
+  if (std::isfinite(report.covariance_deg_mm[0])) {
+    covariance = json(std::vector(6, std::vector(6, 0.0)));
+    std::size_t next = 0;
+    for (std::size_t row = 0; row < 6; ++row)
+      for (std::size_t column = row; column < 6; ++column, ++next)
+        covariance[row][column] = covariance[column][row] = report.covariance_deg_mm[next];
+  }
+  return {{"covariance_deg_mm", covariance},
+          {"parameters", kParameterNames},
+          {"frame", "motions after the pose found, about the ROI centre, along the room's axes"},
+          {"inflation", number_or_null(report.inflation)},
+          {"tre_rms_mm", number_or_null(report.tre_rms_mm)},
+          {"tre_95_mm", number_or_null(report.tre_95_mm)},
+          {"chain_distance_mm", number_or_null(record.result.chain_distance_mm)},
+          {"confidence", number_or_null(report.confidence)}};
+}
+
 json correction_json(const CorrectionReport& correction) {
   return {{"casts_per_view", correction.casts},
           {"moved_mm", number_or_null(correction.moved_mm)},
@@ -199,6 +220,7 @@ json result_json(const RegistrationRecord& record,
       record.errors.has_value() ? number_or_null(record.errors->initial_tre_mm) : json(nullptr);
   output["tre_mm"] =
       record.errors.has_value() ? number_or_null(record.errors->tre_mm) : json(nullptr);
+  output["uncertainty"] = uncertainty_json(record);
   if (result.correction.has_value()) output["correction"] = correction_json(*result.correction);
   output["gold_source"] =
       record.errors.has_value() ? json(record.errors->gold_source) : json(nullptr);
@@ -228,14 +250,12 @@ NamedCells cells_of(const RegistrationRecord& record,
   row.inadmissible = result.inadmissible;
   row.drr_count = result.drr_count;
   row.seconds = result.seconds;
-  const ViewSummary coarse = summary_of(record.view_values, &ViewValue::coarse);
-  const ViewSummary fine = summary_of(record.view_values, &ViewValue::fine);
   NamedCells before_seconds = {{"relative_to", "nominal"},
-                               {"verdict", to_string(judgement_of(record).verdict)},
-                               {"judge_mean", number_text(coarse.mean)},
-                               {"judge_lowest_view", number_text(coarse.lowest)},
-                               {"judge_fine_mean", number_text(fine.mean)},
-                               {"judge_fine_lowest_view", number_text(fine.lowest)}};
+                               {"verdict", to_string(judgement_of(record).verdict)}};
+  append(judge_cells(summary_of(record.view_values, &ViewValue::coarse),
+                     summary_of(record.view_values, &ViewValue::fine)),
+         before_seconds);
+  append(uncertainty_cells(record.uncertainty, result.chain_distance_mm), before_seconds);
   if (result.correction.has_value()) append(correction_cells(result.correction), before_seconds);
   return registration_row(row, {}, before_seconds);
 }
@@ -378,6 +398,11 @@ std::string summary_text(const RegistrationRecord& record, const RegistrationPro
       << "   (rx, ry, rz, tx, ty, tz from nominal)\n"
       << "result      " << parameters_line(parameters_from_pose(frame, result.room_from_ct)) << '\n'
       << "similarity  " << fixed_text(result.similarity, 4) << '\n';
+  if (std::isfinite(record.uncertainty.tre_95_mm))
+    out << "uncertain   TRE below " << fixed_text(record.uncertainty.tre_95_mm, 2)
+        << " mm with 95 % if the pose is the right one, which it is with "
+        << fixed_text(std::min(99.9, 100.0 * record.uncertainty.confidence), 1)
+        << " % (docs/uncertainty.md)\n";
   if (record.errors.has_value())
     out << "TRE         " << fixed_text(record.errors->initial_tre_mm, 2) << " mm at the start, "
         << fixed_text(record.errors->tre_mm, 2)

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "register/method/registration.h"
+#include "register/uncertainty/uncertainty_report.h"
 #include "register/verdict/verdict.h"
 #include "register/verdict/view_diagnosis.h"
 #include "run/provenance.h"
@@ -27,11 +28,12 @@ struct RegistrationRecord {
   std::int64_t start_index = 0;
   RegistrationResult result;
   std::vector<ViewValue> view_values;  ///< of PoseExaminer, at the end
+  UncertaintyReport uncertainty;       ///< of UncertaintyEstimator, likewise
   ViewDiagnosis diagnosis;             ///< of a run's best record
   std::optional<TargetErrors> errors;  ///< when the gold pose is known
 
   /// What the registration itself found; the rest follows from it once all are there.
-  auto members() { return std::tie(start_index, result, view_values); }
+  auto members() { return std::tie(start_index, result, view_values, uncertainty); }
 };
 
 /// The verdict on a record: at least doubtful where the diagnosis found something.
@@ -53,9 +55,9 @@ struct RunDescription {
 };
 
 /// result.json: verdict, poses as 4x4 (`room_from_ct`, which read_pose() reads) and as six
-/// parameters relative to the nominal pose about the ROI centre, similarity, counts, stop reason,
-/// trace, seconds, TRE, provenance. Numbers that do not exist are null. What is not found is no
-/// pose for read_pose(): its key is `rejected_room_from_ct`.
+/// parameters relative to the nominal pose about the ROI centre, uncertainty, similarity, counts,
+/// stop reason, trace, seconds, TRE, provenance. Numbers that do not exist are null. What is not
+/// found is no pose for read_pose(): its key is `rejected_room_from_ct`.
 nlohmann::json result_json(const RegistrationRecord& record,
                            const RegistrationProblem& problem,
                            const RunDescription& run);

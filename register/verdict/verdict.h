@@ -3,6 +3,7 @@
 
 #include <span>
 #include <string>
+#include <tuple>
 
 #include "register/optimizer/optimizer.h"
 
@@ -53,6 +54,8 @@ bool disagrees(std::size_t view, std::span<const ViewValue> values);
 struct ViewSummary {
   double mean = 0.0;
   double lowest = 0.0;
+
+  auto members() { return std::tie(mean, lowest); }
 };
 ViewSummary summary_of(std::span<const ViewValue> values, double ViewValue::*value);
 

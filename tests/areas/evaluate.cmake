@@ -7,6 +7,7 @@ af_add_test(
           unit/evaluate/statistics/signed_rank_test_test.cpp
           unit/evaluate/statistics/bootstrap_test.cpp
           unit/evaluate/statistics/case_equivalence_test.cpp
+          unit/evaluate/statistics/roc_test.cpp
           support/interval_coverage.cpp
           unit/evaluate/registration/population_statistics_test.cpp
           unit/evaluate/registration/registration_errors_test.cpp

@@ -14,6 +14,8 @@ af_add_test(
           unit/register/method/correction_test.cpp
           unit/register/method/registration_test.cpp
           unit/register/verdict/verdict_test.cpp
+          unit/register/uncertainty/pose_covariance_test.cpp
+          unit/register/uncertainty/uncertainty_estimator_test.cpp
   LIBS af_registration af_gold_standard af_text)
 af_add_test(
   register_program_unit_tests

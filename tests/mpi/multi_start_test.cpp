@@ -36,9 +36,10 @@ TEST(RegisterStarts, GivesTheRecordsOfASerialRunOnAnyRankCount) {
   const std::vector<RigidTransform> starts = some_starts(small, 7);
   RegistrationRunner runner(small.problem, quick_options());
   PoseExaminer examiner(small.problem);
+  UncertaintyEstimator estimator(small.problem, runner.options(), {});
   const test::SharedFolder folder;
-  const std::vector<RegistrationRecord> records =
-      register_starts(runner, examiner, starts, {folder / "p", "registrations", {}}, world);
+  const std::vector<RegistrationRecord> records = register_starts(
+      runner, examiner, estimator, starts, {folder / "p", "registrations", {}}, world);
   if (!world.is_root()) {
     EXPECT_TRUE(records.empty());
     return;
@@ -68,13 +69,15 @@ TEST(RegisterStarts, CopesWithFewerStartsThanRanks) {
   const test::SmallCase small = test::small_case();
   RegistrationRunner runner(small.problem, quick_options());
   PoseExaminer examiner(small.problem);
+  UncertaintyEstimator estimator(small.problem, runner.options(), {});
   const test::SharedFolder folder;
   const UnfinishedWork work = {folder / "p", "registrations", {}};
-  const auto records = register_starts(runner, examiner, some_starts(small, 1), work, world);
+  const auto records =
+      register_starts(runner, examiner, estimator, some_starts(small, 1), work, world);
   EXPECT_EQ(records.size(), world.is_root() ? 1U : 0U);
   // One start leaves nothing to be kept.
   EXPECT_FALSE(std::filesystem::exists(work.folder));
-  EXPECT_TRUE(register_starts(runner, examiner, {}, work, world).empty());
+  EXPECT_TRUE(register_starts(runner, examiner, estimator, {}, work, world).empty());
 }
 
 TEST(RegisterStarts, KeepsTheTraceOfTheFirstWhenNoStartHasASimilarity) {
@@ -84,9 +87,14 @@ TEST(RegisterStarts, KeepsTheTraceOfTheFirstWhenNoStartHasASimilarity) {
     view.limit = MotionLimit{small.problem->frame(), {1e-6, 1e-6}};
   RegistrationRunner runner(small.problem, quick_options());
   PoseExaminer examiner(small.problem);
+  UncertaintyEstimator estimator(small.problem, runner.options(), {});
   const test::SharedFolder folder;
-  const auto records = register_starts(
-      runner, examiner, some_starts(small, 5), {folder / "p", "registrations", {}}, world);
+  const auto records = register_starts(runner,
+                                       examiner,
+                                       estimator,
+                                       some_starts(small, 5),
+                                       {folder / "p", "registrations", {}},
+                                       world);
   if (!world.is_root()) return;
   ASSERT_EQ(records.size(), 5U);
   EXPECT_EQ(best_record(records), 0U);

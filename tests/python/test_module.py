@@ -372,6 +372,12 @@ class RegistrationTest(unittest.TestCase):
             self.assertAlmostEqual(registration.tre_mm, written["tre_mm"][i], 6)
             self.assertEqual(registration.stop_reason, written["stop_reason"][i])
             self.assertEqual(registration.verdict, written["verdict"][i])
+            uncertainty = registration.uncertainty
+            self.assertEqual(uncertainty.covariance.shape, (6, 6))
+            self.assertTrue((np.linalg.eigvalsh(uncertainty.covariance) > 0.0).all())
+            self.assertAlmostEqual(uncertainty.covariance[3, 5], written["cov_tx_tz"][i], 9)
+            self.assertAlmostEqual(uncertainty.tre_95_mm, written["predicted_tre_95_mm"][i], 6)
+            self.assertAlmostEqual(uncertainty.confidence, written["confidence"][i], 6)
         view = case.views[1]
         self.assertEqual(view.camera.name, "LAT")
         self.assertEqual(view.xray.tobytes(), last_floats("LAT.mha", view.xray.shape).tobytes())

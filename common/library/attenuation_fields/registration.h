@@ -37,7 +37,8 @@ struct RegistrationOptions {
   double step_mm = 1.0;
   std::string ct_series_uid = {};
   std::uint64_t seed = 1;
-  int threads = 1;  ///< that one registration spreads over; 0: every processor
+  double calibration_error_px = 0.0;  ///< of every view's shift, that covariances are to contain
+  int threads = 1;                    ///< that one registration spreads over; 0: every processor
 };
 
 /// Shares of an X-ray's gradients that the DRR at a pose explains, 0 to 1; NaN: not judged.
@@ -55,6 +56,16 @@ struct CaseView {
   std::span<const float> mask;  ///< non-zero is used; empty: every pixel
 };
 
+/// What a registration says of its own error; NaN where it cannot be said.
+struct Uncertainty {
+  /// Of (rx, ry, rz, tx, ty, tz), deg and mm: the true pose is a motion after the pose that was
+  /// found, about the centre of the region of interest, along the room's axes.
+  std::array<std::array<double, 6>, 6> covariance{};
+  double tre_rms_mm = 0.0;  ///< expected over the target box
+  double tre_95_mm = 0.0;   ///< stays below with a probability of 0.95
+  double confidence = 0.0;  ///< probability of a TRE below 2.5 mm
+};
+
 struct Registration {
   std::int64_t start_index = 0;
   Pose start;
@@ -70,6 +81,7 @@ struct Registration {
   std::int64_t inadmissible = 0;
   std::int64_t drr_count = 0;
   std::vector<ViewAgreement> views;
+  Uncertainty uncertainty;
   std::optional<double> initial_tre_mm;  ///< when the case's gold pose is known
   std::optional<double> tre_mm;
   double seconds = 0.0;

@@ -42,10 +42,10 @@ ordered_json camera_json(const CameraGeometry& camera, const Eigen::Vector3d& is
   json["isocenter_at_px"] = vector_json(camera.project(isocenter_point));
   json["mirrored"] = camera.is_mirrored();
   if (!camera.distortion.is_none())
-    json["distortion"] = std::vector<double>(
-        camera.distortion.coefficients.begin(),
-        camera.distortion.coefficients.begin() +
-            static_cast<std::ptrdiff_t>(camera.distortion.count()));
+    json["distortion"] =
+        std::vector<double>(camera.distortion.coefficients.begin(),
+                            camera.distortion.coefficients.begin() +
+                                static_cast<std::ptrdiff_t>(camera.distortion.count()));
   return json;
 }
 

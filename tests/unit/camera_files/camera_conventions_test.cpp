@@ -227,6 +227,12 @@ TEST_F(CameraConventions, OpenCvRefusals) {
   EXPECT_THAT(input_refusal(stereo), HasSubstr("relative to the first camera"));
 }
 
+TEST_F(CameraConventions, NamesAreUtf8) {
+  const std::string good = kOpenCv;
+  EXPECT_EQ(camera("camera_name: \"\xc3\xa4\"\n" + good).name, "\xc3\xa4");
+  EXPECT_THAT(input_refusal("camera_name: \"\xc3\"\n" + good), HasSubstr("must be UTF-8"));
+}
+
 // cv2.projectPoints of OpenCV 4.6 with these coefficients puts (30, -40, 55) at (317.66513,
 // 132.91818), at (317.87961, 132.68263) without.
 TEST_F(CameraConventions, OpenCvDistortion) {

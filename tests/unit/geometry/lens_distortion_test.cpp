@@ -89,6 +89,8 @@ TEST(LensDistortion, FoldedImagesAreRefused) {
   EXPECT_EQ(distortion_problem(camera_with({})), "");
   EXPECT_EQ(distortion_problem(camera_with(kFive)), "");
   EXPECT_THAT(distortion_problem(camera_with({{-5.0}})), testing::HasSubstr("must not fold"));
+  EXPECT_THAT(distortion_problem(camera_with({{-1e5}})), testing::HasSubstr("must not fold"))
+      << "both directions are turned over beyond a fold that is narrower than a step";
   LensDistortion pole;
   pole.coefficients[5] = -20.0;  // the denominator is 0 within the image
   EXPECT_THAT(distortion_problem(camera_with(pole)), testing::HasSubstr("must not fold"));

@@ -116,6 +116,23 @@ TEST_F(Hdf5Links, ValuesOfOtherFilesAndLargePiecesAreRefused) {
   EXPECT_THAT(refusal("/chunked"), HasSubstr("is stored in large pieces"));
 }
 
+// HDF5 1.10 itself would write beyond its memory for such a file.
+TEST(Hdf5Input, TextsThatDoNotFitTheirHeapAreRefused) {
+  const std::string good = some_file();
+  const std::size_t text = good.find("of any length");
+  ASSERT_NE(text, std::string::npos);
+  const auto refusal = [&](std::size_t at, char value) {
+    std::string forged = good;
+    forged[at] = value;
+    return message_of<FileError>(
+        [&] { (void)Hdf5Input::of_bytes(forged, "forged.h5").text("/text"); });
+  };
+  EXPECT_THAT(refusal(text - 8, '\5'), HasSubstr("its text is not in its heap")) << "too short";
+  EXPECT_THAT(refusal(text - 2, '\x60'), HasSubstr("its text is not in its heap")) << "too long";
+  EXPECT_THAT(refusal(text - 16, '\x7f'), HasSubstr("its text is not in its heap")) << "another";
+  EXPECT_THAT(refusal(good.find("GCOL"), 'X'), HasSubstr("in no heap"));
+}
+
 TEST(Hdf5Input, DamagedFilesAreRefusedOrReadWithoutHarm) {
   const std::string good = some_file();
   const std::size_t refused =

@@ -268,6 +268,33 @@ TEST(RegistrationStatistics, BiasIsTheMeanSignedErrorOfSuccesses) {
   EXPECT_EQ(bias["tz_mm"]["mean"], 0.0);
 }
 
+RegistrationRow sure_row(double tre_mm, double squared_distance, double confidence) {
+  RegistrationRow result = row("field", 0, 4.0, tre_mm);
+  result.squared_distance = squared_distance;
+  result.uncertainty.tre_95_mm = 1.0;
+  result.uncertainty.confidence = confidence;
+  return result;
+}
+
+TEST(RegistrationStatistics, SayWhetherRegistrationsKnowTheirErrors) {
+  const Rows rows = {sure_row(0.5, 3.0, 0.99),
+                     sure_row(0.9, 12.0, 0.95),
+                     sure_row(1.5, 13.0, 0.6),
+                     sure_row(8.0, 900.0, 0.7)};
+  const json found = renderer_statistics(rows, "field", {1})["uncertainty"];
+  EXPECT_EQ(found["pose_region_95"]["successes"], 2);
+  EXPECT_EQ(found["pose_region_95"]["starts"], 3);  // the failure is for the confidence to tell
+  EXPECT_EQ(found["tre_region_95"]["successes"], 2);
+  EXPECT_EQ(found["median_squared_distance"], 12.0);
+  const json& confidence = found["confidence"];
+  EXPECT_EQ(confidence["failures"], 1);
+  EXPECT_DOUBLE_EQ(confidence["roc_area"], 2.0 / 3.0);
+  EXPECT_DOUBLE_EQ(confidence["at_least"][1]["share_of_successes"], 2.0 / 3.0);
+  EXPECT_EQ(confidence["at_least"][0]["share_of_failures"], 1.0);
+  EXPECT_FALSE(
+      renderer_statistics(Rows{row("field", 0, 4.0, 0.5)}, "field", {1}).contains("uncertainty"));
+}
+
 TEST(RegistrationStatistics, IntervalsOverCasesNeedSeveral) {
   Rows rows = {row("field", 0, 1, 0.2, "a"), row("field", 1, 1, 9.0, "a")};
   EXPECT_TRUE(renderer_statistics(rows, "field", {})["over_cases"]["rate"]["low"].is_null());

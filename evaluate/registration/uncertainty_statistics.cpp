@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluate/registration/uncertainty_statistics.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "base/sample_summary.h"
+#include "evaluate/registration/case_intervals.h"
+#include "evaluate/statistics/roc.h"
+#include "register/uncertainty/pose_covariance.h"
+#include "text/number_json.h"
+
+namespace af::evaluation {
+
+using nlohmann::json;
+
+namespace {
+
+constexpr std::array<double, 3> kConfidences = {0.5, 0.9, 0.99};
+
+/// Whether a row's error lies in its region; rows without one do not count.
+struct Region {
+  std::function<bool(const RegistrationRow&)> is_known;
+  std::function<bool(const RegistrationRow&)> holds;
+};
+
+json coverage_json(const std::map<std::string, RowPointers>& by_case,
+                   const StatisticsOptions& options,
+                   const Region& region) {
+  std::vector<CaseMean> cases;
+  std::int64_t known = 0;
+  std::int64_t held = 0;
+  for (const auto& [name, rows] : by_case) {
+    CaseMean mean;
+    for (const RegistrationRow* row : rows) {
+      if (!row->is_success(options.success_tre_mm) || !region.is_known(*row)) continue;
+      mean.count += 1.0;
+      mean.sum += region.holds(*row) ? 1.0 : 0.0;
+    }
+    if (!(mean.count > 0.0)) continue;
+    known += std::llround(mean.count);
+    held += std::llround(mean.sum);
+    cases.push_back(mean);
+  }
+  json result = proportion_json(held, known);
+  result["over_cases"] = interval_over_cases(cases, options.seed);
+  return result;
+}
+
+double share_at_least(double confidence, const std::vector<double>& values) {
+  const auto count = std::count_if(
+      values.begin(), values.end(), [&](double value) { return value >= confidence; });
+  return static_cast<double>(count) / static_cast<double>(values.size());
+}
+
+json confidence_json(const std::vector<double>& successes, const std::vector<double>& failures) {
+  json result = {{"successes", successes.size()},
+                 {"failures", failures.size()},
+                 {"roc_area", number_json(roc_area(successes, failures))},
+                 {"at_least", json::array()}};
+  for (const double confidence : kConfidences)
+    result["at_least"].push_back(
+        {{"confidence", confidence},
+         {"share_of_successes", number_json(share_at_least(confidence, successes))},
+         {"share_of_failures", number_json(share_at_least(confidence, failures))}});
+  return result;
+}
+
+}  // namespace
+
+json uncertainty_statistics(const std::map<std::string, RowPointers>& by_case,
+                            const StatisticsOptions& options) {
+  std::vector<double> successes;
+  std::vector<double> failures;
+  std::vector<double> squared_distances;
+  for (const auto& [name, rows] : by_case)
+    for (const RegistrationRow* row : rows) {
+      if (!std::isfinite(row->uncertainty.confidence)) continue;
+      const bool is_success = row->is_success(options.success_tre_mm);
+      (is_success ? successes : failures).push_back(row->uncertainty.confidence);
+      if (is_success && std::isfinite(row->squared_distance))
+        squared_distances.push_back(row->squared_distance);
+    }
+  if (successes.empty() && failures.empty()) return nullptr;
+  const Region pose = {
+      [](const RegistrationRow& row) { return std::isfinite(row.squared_distance); },
+      [](const RegistrationRow& row) {
+        return row.squared_distance <= registration::kPoseRegion95;
+      }};
+  const Region tre = {
+      [](const RegistrationRow& row) { return std::isfinite(row.uncertainty.tre_95_mm); },
+      [](const RegistrationRow& row) { return row.tre_mm <= row.uncertainty.tre_95_mm; }};
+  return {{"pose_region_95", coverage_json(by_case, options, pose)},
+          {"tre_region_95", coverage_json(by_case, options, tre)},
+          {"median_squared_distance", number_json(summarize(squared_distances).median)},
+          {"confidence", confidence_json(successes, failures)}};
+}
+
+}  // namespace af::evaluation

@@ -1,0 +1,224 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Fits the constants of register/uncertainty/calibration.cpp to registrations of known truth, on the cases of odd seeds,
+and prints how well they do on the others.
+
+    jobs/fit-uncertainty.py MEASURE=registrations.csv ... [--csv OUT.csv] [--commit HASH]
+
+MEASURE is that of the last stage: rg, gc, mi. Cases are named KIND-VARIANT-SEED. Needs nothing but Python.
+"""
+import csv
+import math
+import sys
+
+REGION_95 = 12.591587243743977  # chi-square, six degrees of freedom
+SUCCESS_TRE_MM = 2.5
+FAR_MM = 20.0
+LEAST_SHARE = 0.05
+
+
+class Row:
+    """What is needed of one registration."""
+
+    def __init__(self, measure, cells):
+        def number(name):
+            return float(cells[name]) if cells[name] not in ("", "nan") else math.nan
+
+        self.measure = measure
+        self.case = cells["case"]
+        self.variant = self.case.split("-")[1]
+        self.is_for_fit = int(self.case.split("-")[-1]) % 2 == 1
+        self.tre = number("tre_mm")
+        self.is_success = self.tre < SUCCESS_TRE_MM
+        self.fine_lowest = number("judge_fine_lowest_view")
+        self.fine_mean = number("judge_fine_mean")
+        inflation = number("covariance_inflation")
+        self.distance = number("squared_distance") * inflation  # by the sandwich alone
+        self.tre_rms = number("predicted_tre_rms_mm") / math.sqrt(inflation) if inflation > 0 else math.nan
+        self.tre_95 = number("predicted_tre_95_mm") / math.sqrt(inflation) if inflation > 0 else math.nan
+        chains = number("chain_distance_mm")
+        self.chains = 0.0 if math.isnan(chains) else min(chains, FAR_MM)
+        self.has_pose = not math.isnan(self.fine_lowest)
+        self.inflation = 1.0
+        self.confidence = 0.0
+
+    def misfit(self):
+        return -math.log(min(max(self.fine_mean, LEAST_SHARE), 1.0))
+
+    def features(self):
+        tre = self.tre_rms * math.sqrt(self.inflation)
+        tre = FAR_MM if math.isnan(tre) else min(tre, FAR_MM)
+        return [1.0, self.fine_lowest, math.log1p(tre), math.log1p(self.chains)]
+
+
+def weighted_quantile(values, weights, share):
+    pairs = sorted(zip(values, weights))
+    total, seen = sum(weights), 0.0
+    for value, weight in pairs:
+        seen += weight
+        if seen >= share * total:
+            return value
+    return pairs[-1][0]
+
+
+def case_weights(rows):
+    """Every case counts the same: starts of one case mostly end at one pose."""
+    counts = {}
+    for row in rows:
+        counts[row.case] = counts.get(row.case, 0) + 1
+    return [1.0 / counts[row.case] for row in rows]
+
+
+def fit_inflation(rows):
+    """Quantile regression (Koenker and Bassett 1978) of log squared distance on the misfit beyond what all X-rays have,
+    so that 95 % lie inside."""
+    y = [math.log(max(row.distance, 1e-6) / REGION_95) for row in rows]
+    weights = case_weights(rows)
+    best = None
+    for share in (0.4, 0.45, 0.5, 0.55, 0.6, 0.65):
+        x = [max(0.0, row.misfit() + math.log(share)) for row in rows]
+        for step in range(0, 161):
+            growth = 0.05 * step
+            rest = [b - growth * a for a, b in zip(x, y)]
+            # Never less than the sandwich itself, which holds where the pose explains the X-rays.
+            at_once = max(0.0, weighted_quantile(rest, weights, 0.95))
+            loss = sum(w * ((0.95 if r > at_once else -0.05) * (r - at_once)) for r, w in zip(rest, weights))
+            if best is None or loss < best[0]:
+                best = (loss, at_once, growth, share)
+    return best[1:]
+
+
+def solve(matrix, right):
+    n = len(right)
+    a = [row[:] + [value] for row, value in zip(matrix, right)]
+    for i in range(n):
+        pivot = max(range(i, n), key=lambda r: abs(a[r][i]))
+        a[i], a[pivot] = a[pivot], a[i]
+        for r in range(i + 1, n):
+            factor = a[r][i] / a[i][i]
+            for c in range(i, n + 1):
+                a[r][c] -= factor * a[i][c]
+    x = [0.0] * n
+    for i in reversed(range(n)):
+        x[i] = (a[i][n] - sum(a[i][c] * x[c] for c in range(i + 1, n))) / a[i][i]
+    return x
+
+
+def probability(coefficients, features):
+    logit = sum(c * f for c, f in zip(coefficients, features))
+    return 1.0 / (1.0 + math.exp(-max(-60.0, min(60.0, logit))))
+
+
+def fit_confidence(rows, ridge=0.05):
+    """Logistic regression by Newton's steps; a small ridge keeps it finite where a line separates."""
+    n = len(rows[0].features())
+    coefficients = [0.0] * n
+    for _ in range(60):
+        gradient = [-ridge * c if i else 0.0 for i, c in enumerate(coefficients)]
+        hessian = [[ridge if i == j and i else 1e-9 * (i == j) for j in range(n)] for i in range(n)]
+        for row in rows:
+            f = row.features()
+            p = probability(coefficients, f)
+            for i in range(n):
+                gradient[i] += (float(row.is_success) - p) * f[i]
+                for j in range(n):
+                    hessian[i][j] += p * (1.0 - p) * f[i] * f[j]
+        step = solve(hessian, gradient)
+        scale = min(1.0, 5.0 / max(1e-12, max(abs(s) for s in step)))
+        coefficients = [c + scale * s for c, s in zip(coefficients, step)]
+    return coefficients
+
+
+def roc_area(positives, negatives):
+    if not positives or not negatives:
+        return math.nan
+    wins = sum((p > q) + 0.5 * (p == q) for p in positives for q in negatives)
+    return wins / (len(positives) * len(negatives))
+
+
+def share(values):
+    values = list(values)
+    return sum(values) / len(values) if values else math.nan
+
+
+def coverage(rows, holds):
+    weights = case_weights(rows)
+    return sum(w for row, w in zip(rows, weights) if holds(row)) / sum(weights) if rows else math.nan
+
+
+def summary(label, half, rows):
+    known = [row for row in rows if row.is_success and not math.isnan(row.distance)]
+    posed = [row for row in rows if row.has_pose]
+    successes = [row.confidence for row in posed if row.is_success]
+    failures = [row.confidence for row in posed if not row.is_success]
+    return {
+        "measure": label,
+        "half": half,
+        "cases": len({row.case for row in known}),
+        "successes": len(successes),
+        "failures": len(failures),
+        "pose_region": coverage(known, lambda r: r.distance <= REGION_95 * r.inflation),
+        "tre_region": coverage(known, lambda r: r.tre <= r.tre_95 * math.sqrt(r.inflation)),
+        "sandwich_alone": coverage(known, lambda r: r.distance <= REGION_95),
+        "roc_area": roc_area(successes, failures),
+        "sure_failures": share(v >= 0.9 for v in failures),
+        "sure_successes": share(v >= 0.9 for v in successes),
+    }
+
+
+def main():
+    words = sys.argv[1:]
+    out = commit = None
+    if "--csv" in words:
+        at = words.index("--csv")
+        out = words[at + 1]
+        del words[at : at + 2]
+    if "--commit" in words:
+        at = words.index("--commit")
+        commit = words[at + 1]
+        del words[at : at + 2]
+    if not words or any("=" not in word for word in words):
+        sys.exit(__doc__)
+    rows = []
+    for word in words:
+        measure, path = word.split("=", 1)
+        with open(path, newline="", encoding="utf-8") as file:
+            rows += [Row(measure, cells) for cells in csv.DictReader(file)]
+    measures = list(dict.fromkeys(row.measure for row in rows))
+    for measure in measures:
+        mine = [r for r in rows if r.measure == measure]
+        fit = [r for r in mine if r.is_for_fit and r.is_success and not math.isnan(r.distance)]
+        at_once, growth, share_from = fit_inflation(fit)
+        print(f'    InflationRow{{"{measure}", {at_once:.2f}, {growth:.2f}, {share_from:.2f}}},')
+        for row in mine:
+            if row.has_pose:
+                row.inflation = math.exp(at_once + growth * max(0.0, row.misfit() + math.log(share_from)))
+    coefficients = fit_confidence([row for row in rows if row.is_for_fit and row.has_pose])
+    names = ["AtOnce", "ByFine", "ByTre", "ByChains"]
+    for name, value in zip(names, coefficients):
+        print(f"constexpr double kConfidence{name} = {value:.2f};")
+    for row in rows:
+        if row.has_pose:
+            row.confidence = probability(coefficients, row.features())
+    table = []
+    for half, is_for_fit in (("odd, fitted", True), ("even, unseen", False)):
+        for label in measures + ["all"]:
+            mine = [r for r in rows if r.is_for_fit == is_for_fit and label in ("all", r.measure)]
+            table.append(summary(label, half, mine))
+    for variant in dict.fromkeys(row.variant for row in rows):
+        mine = [r for r in rows if not r.is_for_fit and r.variant == variant]
+        table.append(summary("all, " + variant, "even, unseen", mine))
+    print()
+    for entry in table:
+        print("  ".join(f"{k} {v:.3f}" if isinstance(v, float) else f"{k} {v}" for k, v in entry.items()))
+    if out:
+        with open(out, "w", newline="", encoding="utf-8") as file:
+            writer = csv.DictWriter(file, list(table[0]) + (["commit"] if commit else []), lineterminator="\n")
+            writer.writeheader()
+            for entry in table:
+                cells = {k: f"{v:.4f}" if isinstance(v, float) else v for k, v in entry.items()}
+                writer.writerow({**cells, "commit": commit} if commit else cells)
+
+
+if __name__ == "__main__":
+    main()

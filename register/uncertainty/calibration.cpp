@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "register/uncertainty/calibration.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace af::registration {
+namespace {
+
+/// exp(at_once + growth x): x is by how much the logarithm of the share of the X-rays' gradients
+/// that the pose explains in detail (mean over the views) falls short of that of `share_from`.
+struct InflationRow {
+  const char* similarity;
+  double at_once;
+  double growth;
+  double share_from;
+};
+
+/// By `jobs/uncertainty.sh`, on its odd cases. The last row is for measures that were not fitted:
+/// the most cautious of them.
+constexpr std::array kInflation = {
+    InflationRow{"rg", 0.0, 5.80, 0.65},
+    InflationRow{"gc", 0.0, 2.65, 0.65},
+    InflationRow{"mi", 2.50, 8.00, 0.65},
+    InflationRow{"", 2.50, 8.00, 0.65},
+};
+
+/// Of success_confidence(), likewise fitted.
+constexpr double kConfidenceAtOnce = 6.47;
+constexpr double kConfidenceByFine = 1.49;
+constexpr double kConfidenceByTre = -3.02;
+constexpr double kConfidenceByChains = -0.22;
+
+/// Shares below are as good as none.
+constexpr double kLeastShare = 0.05;
+/// A TRE that is not foretold, and the farthest that tells more than the one before.
+constexpr double kFarMm = 20.0;
+
+}  // namespace
+
+double covariance_inflation(const std::string& similarity, std::span<const ViewValue> view_values) {
+  const double share = summary_of(view_values, &ViewValue::fine).mean;
+  if (!std::isfinite(share)) return share;
+  const auto* const row =
+      std::find_if(kInflation.begin(), kInflation.end() - 1, [&](const InflationRow& candidate) {
+        return similarity == candidate.similarity;
+      });
+  const double shortfall = std::log(row->share_from / std::clamp(share, kLeastShare, 1.0));
+  return std::exp(row->at_once + row->growth * std::max(0.0, shortfall));
+}
+
+double success_confidence(const ConfidenceFeatures& features) {
+  const double share = summary_of(features.view_values, &ViewValue::fine).lowest;
+  const double tre_mm =
+      std::isfinite(features.tre_rms_mm) ? std::min(features.tre_rms_mm, kFarMm) : kFarMm;
+  const double chains_mm = std::isfinite(features.chain_distance_mm)
+                               ? std::min(features.chain_distance_mm, kFarMm)
+                               : 0.0;
+  const double logit = kConfidenceAtOnce + kConfidenceByFine * share +
+                       kConfidenceByTre * std::log1p(tre_mm) +
+                       kConfidenceByChains * std::log1p(chains_mm);
+  return 1.0 / (1.0 + std::exp(-logit));
+}
+
+}  // namespace af::registration

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the measured registrations of jobs/uncertainty.sh say of predictions: constants that are
+// fitted on one half of the cases and judged on the other (docs/uncertainty.md).
+#pragma once
+
+#include <span>
+#include <string>
+
+#include "register/verdict/verdict.h"
+
+namespace af::registration {
+
+/// What a covariance is multiplied by, for ends of a measure whose judge says that the pose
+/// explains these shares of the X-rays' gradients: what no rigid pose explains, as moved anatomy,
+/// pulls the optimum aside more than its scatter tells. NaN where nothing can be judged.
+/// \test Calibration.WidensWhatThePoseDoesNotExplain
+double covariance_inflation(const std::string& similarity, std::span<const ViewValue> view_values);
+
+/// What tells a success from a failure.
+struct ConfidenceFeatures {
+  std::span<const ViewValue> view_values;
+  double tre_rms_mm = 0.0;         ///< as predicted, calibrated; NaN counts as no prediction
+  double chain_distance_mm = 0.0;  ///< RegistrationResult::chain_distance_mm
+};
+
+/// Probability that the TRE is below 2.5 mm, by logistic regression; NaN where no view can be
+/// judged. \test Calibration.ConfidenceFallsWithEveryDoubt
+double success_confidence(const ConfidenceFeatures& features);
+
+}  // namespace af::registration

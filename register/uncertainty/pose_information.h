@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+
+#include "geometry/rigid_transform.h"
+#include "register/problem/multi_view_objective.h"
+#include "register/problem/parameter_scaling.h"
+
+namespace af::registration {
+
+/// What the objective of a registration says about a pose that maximises it. Matrices are of small
+/// motions (rx, ry, rz, tx, ty, tz) of the CT in the room about the frame's centre, per rad and mm.
+struct PoseInformation {
+  PoseMatrix curvature = PoseMatrix::Zero();  ///< negative Hessian, made positive definite
+  /// Sum over tiles of score score', score being the tile's share of the gradient: the gradient's
+  /// variance when what the DRRs do not explain is independent from tile to tile.
+  PoseMatrix scatter = PoseMatrix::Zero();
+  std::vector<PoseMatrix> view_curvatures;  ///< their sum is `curvature` before it was bent
+};
+
+/// The information at the origin of `frame`. Curvature by central differences of the gradient over
+/// kInformationStepMm of mean projected motion (`scaling`) to both sides, or to one where the other
+/// is inadmissible; 13 evaluations. nullopt where neither is admissible. The measures must have
+/// derivatives. \test PoseInformation.OfAQuadraticObjectiveIsItsHessian
+std::optional<PoseInformation> information_at(MultiViewObjective& objective,
+                                              const PoseFrame& frame,
+                                              const ParameterScaling& scaling,
+                                              int tiles);
+
+/// Long enough to average over a field's nodes, short beside the way over which curvatures change.
+inline constexpr double kInformationStepMm = 0.2;
+
+/// Where the objective bends less than this share of its strongest bend, in scaled parameters, it
+/// is taken to bend so: differences cannot tell it from a straight line, or one that bends upwards.
+inline constexpr double kLeastRelativeCurvature = 1e-2;
+
+/// The matrix, in scaled parameters, with its eigenvalues no less than kLeastRelativeCurvature of
+/// the largest; zero where that is not positive. \test BentCurvature.KeepsDirectionsThatAreKnown
+PoseMatrix bent_curvature(const PoseMatrix& curvature, const ParameterScaling& scaling);
+
+}  // namespace af::registration

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "register/uncertainty/uncertainty_estimator.h"
+
+#include <cmath>
+#include <utility>
+
+#include "register/problem/parameter_scaling.h"
+#include "register/uncertainty/calibration.h"
+#include "register/uncertainty/pose_covariance.h"
+#include "register/uncertainty/pose_information.h"
+
+namespace af::registration {
+namespace {
+
+/// Along each axis of a region: wide enough that what a DRR does not explain hardly reaches across,
+/// and enough of them to estimate six variances.
+constexpr int kTiles = 8;
+
+/// The stage as the curvature needs it: with derivatives, and with an optimiser that they suit.
+StageOptions differentiable(StageOptions stage) {
+  if (!similarity_has_derivative(stage.similarity.name)) stage.similarity.name = "rg";
+  stage.similarity.has_smooth_histogram = true;
+  stage.optimizer = "gradient";
+  return stage;
+}
+
+bool has_end(const RegistrationResult& result) {
+  return std::isfinite(result.similarity) && result.room_from_ct.matrix().allFinite();
+}
+
+}  // namespace
+
+void UncertaintyOptions::describe(Fields& field) {
+  field.start_group("Uncertainty");
+  field("no_uncertainty",
+        is_left_out,
+        "Do not say how far the pose may be from the truth: no covariance, no confidence. Saves "
+        "some 13 DRRs with derivatives per registration");
+  field("calibration_error_px",
+        calibration_error_px,
+        "Error of the cameras' calibration that covariances are to contain: the standard deviation "
+        "of every view's shift along its columns and rows, px of the detector. X-rays do not tell "
+        "it")
+      .at_least(0.0)
+      .finite();
+  field.start_group("");
+}
+
+UncertaintyEstimator::UncertaintyEstimator(std::shared_ptr<const RegistrationProblem> problem,
+                                           const RegistrationOptions& method,
+                                           const UncertaintyOptions& options,
+                                           std::shared_ptr<ThreadPool> pool)
+    : problem_(std::move(problem)), options_(options) {
+  if (options_.is_left_out) return;
+  for (const RegistrationView& view : problem_->views) views_.push_back(view.view);
+  ChainOptions ends{"ends", {}};
+  for (const ChainOptions& chain : method.chains) {
+    const bool ends_with_finish = !method.finish.stages.empty();
+    if (!ends_with_finish || ends.stages.empty()) {
+      const StageOptions& last = (ends_with_finish ? method.finish : chain).stages.back();
+      ends.stages.push_back(differentiable(last));
+      similarities_.push_back(last.similarity.name);
+    }
+    stage_of_chain_[chain.name] = ends.stages.size() - 1;
+  }
+  RegistrationOptions stages;
+  stages.chains = {ends};
+  ends_ = std::make_unique<RegistrationRunner>(problem_, stages, std::move(pool));
+}
+
+void UncertaintyEstimator::add_covariance(const RegistrationResult& result,
+                                          std::span<const ViewValue> view_values,
+                                          UncertaintyReport& report) {
+  const PoseFrame frame = PoseFrame::about(result.room_from_ct, problem_->center_ct_mm);
+  const auto scaling = projected_motion_scaling(result.room_from_ct,
+                                                problem_->center_ct_mm,
+                                                problem_->scaling_points_ct,
+                                                views_,
+                                                problem_->isocenter_point);
+  if (!scaling.has_value()) return;
+  const std::size_t stage = stage_of_chain_.at(result.chain);
+  const auto information = information_at(ends_->objective(stage), frame, *scaling, kTiles);
+  if (!information.has_value()) return;
+  const auto sandwich = sandwich_covariance(*information);
+  if (!sandwich.has_value()) return;
+  const double inflation = covariance_inflation(similarities_[stage], view_values);
+  report.inflation = inflation;
+  const PoseMatrix covariance =
+      inflation * *sandwich +
+      calibration_covariance(
+          *information, views_, problem_->isocenter_point, options_.calibration_error_px);
+  report.covariance_deg_mm = in_deg_mm(covariance);
+  if (problem_->target_points_ct.empty()) return;
+  const PredictedTre tre = predicted_tre(covariance, frame, problem_->target_points_ct);
+  report.tre_rms_mm = tre.rms_mm;
+  report.tre_95_mm = tre.upper_95_mm;
+}
+
+UncertaintyReport UncertaintyEstimator::report(const RegistrationResult& result,
+                                               std::span<const ViewValue> view_values) {
+  UncertaintyReport report;
+  if (options_.is_left_out) return report;
+  if (!has_end(result)) {
+    report.confidence = 0.0;
+    return report;
+  }
+  add_covariance(result, view_values, report);
+  report.confidence =
+      success_confidence({view_values, report.tre_rms_mm, result.chain_distance_mm});
+  if (judged_end(result.stop_reason, view_values).verdict == Verdict::NotFound)
+    report.confidence = 0.0;
+  return report;
+}
+
+}  // namespace af::registration

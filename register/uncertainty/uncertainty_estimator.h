@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <map>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "base/described_fields.h"
+#include "base/thread_pool.h"
+#include "register/method/registration.h"
+#include "register/uncertainty/uncertainty_report.h"
+#include "register/verdict/verdict.h"
+
+namespace af::registration {
+
+struct UncertaintyOptions {
+  bool is_left_out = false;
+  double calibration_error_px = 0.0;  ///< per axis and view
+
+  void describe(Fields& field);
+};
+
+/// Says how far the end of a registration may be from the truth (docs/uncertainty.md): the
+/// sandwich covariance of the stage that it ended with, what the cameras' calibration adds, widened
+/// as measured registrations ask for, the TRE that follows, and the confidence that it succeeded.
+/// Where the stage's measure has no derivative (tncc, gd, pi, entropy, go), rg stands for it. For
+/// one thread at a time. \test UncertaintyEstimator.ForetellsTheSpreadOfNoisyXrays
+class UncertaintyEstimator {
+ public:
+  /// `problem` and `method`: as for the RegistrationRunner of the results.
+  UncertaintyEstimator(std::shared_ptr<const RegistrationProblem> problem,
+                       const RegistrationOptions& method,
+                       const UncertaintyOptions& options,
+                       std::shared_ptr<ThreadPool> pool = nullptr);
+
+  /// `view_values`: of PoseExaminer, at the result's end. Only NaN where there is no end, or no
+  /// motion to both sides of it is admissible; the confidence is 0 where nothing was found.
+  [[nodiscard]] UncertaintyReport report(const RegistrationResult& result,
+                                         std::span<const ViewValue> view_values);
+
+ private:
+  void add_covariance(const RegistrationResult& result,
+                      std::span<const ViewValue> view_values,
+                      UncertaintyReport& report);
+
+  std::shared_ptr<const RegistrationProblem> problem_;
+  UncertaintyOptions options_;
+  std::vector<View> views_;
+  std::map<std::string, std::size_t> stage_of_chain_;
+  std::vector<std::string> similarities_;     ///< of the stages, as registered with
+  std::unique_ptr<RegistrationRunner> ends_;  ///< a stage for every way to end; none when left out
+};
+
+}  // namespace af::registration

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <limits>
+#include <tuple>
+
+namespace af::registration {
+
+/// What a registration says of its own error. Numbers alone: millions are held in memory. NaN where
+/// it cannot be said.
+struct UncertaintyReport {
+  static constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  static constexpr std::size_t kCovarianceSize = 21;
+
+  /// Upper triangle, row by row, of the covariance of (rx, ry, rz, tx, ty, tz) in deg and mm: the
+  /// true pose is x_room -> p + t + Rz Ry Rx (x_room - p) after the pose that was found, p being
+  /// where that puts the ROI centre, axes the room's.
+  std::array<double, kCovarianceSize> covariance_deg_mm = filled_with_nan();
+  double tre_rms_mm = kNone;  ///< the root of the expected mean squared TRE over the target box
+  double tre_95_mm = kNone;   ///< the TRE stays below with a probability of 0.95
+  double inflation = kNone;   ///< what calibration multiplied the covariance by
+  double confidence = kNone;  ///< probability that the registration succeeded (TRE below 2.5 mm)
+
+  auto members() {
+    return std::tie(covariance_deg_mm, tre_rms_mm, tre_95_mm, inflation, confidence);
+  }
+
+ private:
+  static constexpr std::array<double, kCovarianceSize> filled_with_nan() {
+    std::array<double, kCovarianceSize> values{};
+    for (double& value : values) value = kNone;
+    return values;
+  }
+};
+
+}  // namespace af::registration
