@@ -24,7 +24,8 @@ CameraGeometry geometry_of(const api::Camera& camera) {
           vector_of(camera.column_direction),
           vector_of(camera.row_direction),
           Eigen::Vector2d(camera.pixel_spacing_mm.data()),
-          Eigen::Vector2i(camera.size_px.data())};
+          Eigen::Vector2i(camera.size_px.data()),
+          {}};
 }
 
 CameraRig rig_of(const api::Rig& rig) {
@@ -143,8 +144,12 @@ Rig Rig::read(const std::string& name_or_path, std::vector<std::string>* warning
   return library::translated_reading([&] {
     const af::CameraRig rig = af::read_rig(name_or_path, warnings);
     Rig result{library::vector_of(rig.isocenter_point), {}};
-    for (const af::CameraGeometry& camera : rig.cameras)
+    for (const af::CameraGeometry& camera : rig.cameras) {
+      if (!camera.distortion.is_none() && warnings != nullptr)
+        warnings->push_back(name_or_path + ": the distortion of camera '" + camera.name +
+                            "' is left out: it is of stored X-rays, and studies see to it");
       result.cameras.push_back(library::camera_of(camera));
+    }
     return result;
   });
 }

@@ -75,8 +75,13 @@ PoseFrame some_frame() {
   return PoseFrame::about(nominal, {1, 2, 3});
 }
 
+std::vector<RigidTransform> poses_of(const RegisterOptions& options) {
+  std::vector<std::string> notes;
+  return start_poses(options, {some_frame()}, notes);
+}
+
 TEST(StartPoses, AreNominalUnlessToldOtherwise) {
-  const std::vector<RigidTransform> starts = start_poses(RegisterOptions(), {some_frame()});
+  const std::vector<RigidTransform> starts = poses_of(RegisterOptions());
   ASSERT_EQ(starts.size(), 1U);
   EXPECT_TRUE(starts[0].isApprox(some_frame().nominal_room_from_ct(), 1e-12));
 }
@@ -85,7 +90,7 @@ TEST(StartPoses, OfParametersAreRelativeToNominal) {
   RegisterOptions options;
   options.start_rotation_deg = {{1.0, -2.0, 3.0}};
   options.start_translation_mm = {{4.0, 5.0, -6.0}};
-  const RigidTransform start = start_poses(options, {some_frame()}).at(0);
+  const RigidTransform start = poses_of(options).at(0);
   const std::array<double, 6> expected = {1, -2, 3, 4, 5, -6};
   const std::array<double, 6> found = parameters_from_pose(some_frame(), start).deg_and_mm();
   for (std::size_t i = 0; i < 6; ++i) EXPECT_NEAR(found[i], expected[i], 1e-9) << i;
@@ -97,15 +102,15 @@ TEST(StartPoses, OfAFileAreItsRowsInOrder) {
   options.starts = folder / "starts.csv";
   std::ofstream(options.starts) << "rx_deg,ry_deg,rz_deg,tx_mm,ty_mm,tz_mm\n0,0,0,0,0,0\n"
                                    "0,0,0,7,0,0\n";
-  const std::vector<RigidTransform> starts = start_poses(options, {some_frame()});
+  const std::vector<RigidTransform> starts = poses_of(options);
   ASSERT_EQ(starts.size(), 2U);
   EXPECT_NEAR((starts[1].translation() - starts[0].translation()).x(), 7.0, 1e-12);
   std::ofstream(options.starts) << "rx_deg,ry_deg\n0,0\n";
-  EXPECT_THROW(start_poses(options, {some_frame()}), InputError);
+  EXPECT_THROW(poses_of(options), InputError);
   std::ofstream(options.starts) << "";
-  EXPECT_THROW(start_poses(options, {some_frame()}), FileError);
+  EXPECT_THROW(poses_of(options), FileError);
   options.starts = folder / "absent.csv";
-  EXPECT_THROW(start_poses(options, {some_frame()}), FileError);
+  EXPECT_THROW(poses_of(options), FileError);
 }
 
 }  // namespace

@@ -28,7 +28,8 @@ std::vector<View> two_views() {
                              {1.0, 0.0, 0.0},
                              {0.0, 0.0, -1.0},
                              {1.0, 1.0},
-                             {256, 256}};
+                             {256, 256},
+                             {}};
   CameraGeometry side = front;
   side.name = "side";
   side.source_point = {600.0, 0.0, 0.0};
