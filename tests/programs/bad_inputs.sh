@@ -348,7 +348,8 @@ of_scan 4 'p35.png' 'a scan without images' valid/scan.toml
 of_scan 3 'size_px is missing' 'a scan without its size' "$(edited scan.toml '/^size_px/d')"
 of_scan 3 'must go all the way round' 'a scan of half a circle' "$(edited scan.toml 's/^step_deg.*/step_deg = 5.0/')"
 of_scan 3 'source_to_axis_mm' 'a source at 1e300 mm' "$(edited scan.toml 's/^source_to_axis_mm.*/source_to_axis_mm = 1e300/')"
-of_scan 3 'must hold {} once' 'a file pattern without an index' "$(edited scan.toml 's/p[{][}]/p/')"
+of_scan 3 'must hold {} once' 'a file pattern with half an index' "$(edited scan.toml 's/p[{][}]/p{/')"
+of_scan 4 'valid/p.png' 'a stack of views that is not there' "$(edited scan.toml 's/p[{][}]/p/')"
 of_scan 4 'edited-scan.toml' 'a scan that is not TOML' "$(edited scan.toml '1s/^.*$/= 3/')"
 
 printf -- '--- poses of other programs ---\n'

@@ -192,7 +192,10 @@ TEST(UncertaintyEstimator, TakesRobustGradientsWhereAMeasureHasNoDerivative) {
   UncertaintyEstimator estimator(small.problem, options, {});
   const UncertaintyReport report = estimator.report(result, std::vector<ViewValue>{{0.9, 0.9}});
   EXPECT_TRUE(std::isfinite(report.covariance_deg_mm[0]));
-  EXPECT_GT(report.confidence, 0.5);
+  // What the X-rays explain moves the confidence, whatever the calibration makes of this small
+  // case.
+  const UncertaintyReport worse = estimator.report(result, std::vector<ViewValue>{{0.1, 0.1}});
+  EXPECT_GT(report.confidence, 2.0 * worse.confidence);
 }
 
 }  // namespace
