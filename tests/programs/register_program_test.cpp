@@ -464,6 +464,27 @@ TEST_F(DrrProgram, RefusesAPoseOutsideTheFieldWithTheRayCount) {
   EXPECT_FALSE(fs::exists(path("outside.mha")));
 }
 
+/// 14 degrees about the long axis leave a field of +-8 degrees; a second one, about that angle,
+/// holds them.
+TEST_F(ProgramTest, DrrTakesTheFieldThatHoldsAPose) {
+  const std::string turned = path("AP-turned.af.h5");
+  const test::ProgramRun made = test::run_command(
+      program("af-precompute") + " --study " + path("study.toml") +
+      " --camera AP --max-rotation-deg 8 --max-translation-mm 12 --uv-nodes 24" +
+      " --st-nodes 96 --codewords 1024 --rotation-range-deg rz=6:22 -o " + turned);
+  ASSERT_EQ(made.exit_code, 0) << made.output;
+  const std::string field = "--field " + path("AP.af.h5") + " ";
+  const std::string pose = "--rotation-deg 0,0,14 -o ";
+  expect_refused(run_drr(field + pose + path("alone.mha")), 3, "outside the field");
+  ASSERT_EQ(run_drr(field + "--also-field " + turned + " " + pose + path("both.mha")).exit_code, 0);
+  ASSERT_EQ(run_drr("--field " + turned + " " + pose + path("turned.mha")).exit_code, 0);
+  EXPECT_EQ(read_image(path("both.mha")).pixels, read_image(path("turned.mha")).pixels);
+  expect_refused(run_drr("--ct " + path("ct.nii.gz") + " --rig " + path("rig.toml") +
+                         " --camera AP --also-field " + turned + " -o " + path("a.mha")),
+                 3,
+                 "--also-field");
+}
+
 TEST_F(DrrProgram, RefusesWhatDoesNotFit) {
   const std::string field = "--field " + path("AP.af.h5");
   const std::string ct = "--ct " + path("ct.nii.gz");

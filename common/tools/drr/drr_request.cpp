@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "drr/field_renderer.h"
+#include "drr/field_set_drr.h"
 #include "drr/ray_cast_drr.h"
 #include "field_file/field_file.h"
 #include "figures/picture.h"
@@ -31,6 +32,12 @@ void describe_source(Fields& field, DrrOptions& options) {
         "Look DRRs up in this field; its own camera is used unless --rig and --camera name "
         "another, whose rays it has to hold")
       .stands_for(PathRole::InputFile, ".h5");
+  field("also_field",
+        options.more_fields,
+        "A further field of the same CT, made for other angles or cameras; repeated. A pose is "
+        "looked up in the field whose planes hold its rays best; where two are nearly as good "
+        "their DRRs are averaged")
+      .one_at_a_time();
   field("ct", options.ct, "Cast rays through this CT (DICOM folder, NIfTI, MetaImage, NRRD)")
       .stands_for(PathRole::InputVolume, ".nrrd");
   field.part(options.ct_reading);
@@ -127,6 +134,9 @@ void append_source_problems(const DrrOptions& options, std::vector<std::string>&
     found.emplace_back("--ct = set: needs --rig and --camera");
   if (!has_study && options.rig.empty() != options.camera.empty())
     found.emplace_back("--rig, --camera = only one of them: give both");
+  if (!has_field && !options.more_fields.empty())
+    found.push_back("--also-field = " + options.more_fields.front() +
+                    ": goes with --field, whose camera and poses are used");
   if (!has_field && !options.look_up.empty())
     found.push_back("--look-up = " + options.look_up + ": applies to fields only; give --field");
 }
@@ -228,17 +238,73 @@ std::vector<std::string> problems(const DrrOptions& options) {
   return found;
 }
 
+namespace {
+
+/// A field as a member of a set, and what it is a field of.
+struct LoadedField {
+  std::shared_ptr<const CompressedAttenuationField> field;
+  std::shared_ptr<const DrrRenderer> renderer;
+};
+
+LoadedField load_field(const std::filesystem::path& path,
+                       const DrrOptions& options,
+                       const std::shared_ptr<ThreadPool>& pool,
+                       const Communicator& communicator) {
+  FieldFileInfo info;
+  const std::shared_ptr<const CompressedAttenuationField> field =
+      read_field(path, communicator, &info);
+  return {
+      field,
+      make_field_renderer(field, options.look_up.empty() ? info.look_up : options.look_up, pool)};
+}
+
+void require_same_subject(const LoadedField& first,
+                          const LoadedField& other,
+                          const std::string& path) {
+  const FieldIdentity& wanted = first.field->identity;
+  const FieldIdentity& found = other.field->identity;
+  if (found.ct_content_sha256 != wanted.ct_content_sha256)
+    throw FileError(path,
+                    "CT of the field (ct_content_sha256)",
+                    wanted.ct_content_sha256 + " (that of --field)",
+                    found.ct_content_sha256);
+  if (found.mu_water_per_mm != wanted.mu_water_per_mm || found.air_below_hu != wanted.air_below_hu)
+    throw InputError("--also-field",
+                     path,
+                     "must have the attenuation of --field: mu_water and the HU that count as air");
+}
+
+/// The field's renderer; with further fields that of the set.
+std::shared_ptr<const DrrRenderer> renderer_of(const LoadedField& first,
+                                               const DrrOptions& options,
+                                               const std::shared_ptr<ThreadPool>& pool,
+                                               const Communicator& communicator) {
+  if (options.more_fields.empty()) return first.renderer;
+  const auto member = [](const LoadedField& loaded) {
+    return FieldSetMember{std::shared_ptr<const LightSlab>(loaded.field, &loaded.field->light_slab),
+                          loaded.renderer};
+  };
+  std::vector<FieldSetMember> members = {member(first)};
+  for (const std::string& path : options.more_fields) {
+    const LoadedField other = load_field(path, options, pool, communicator);
+    require_same_subject(first, other, path);
+    members.push_back(member(other));
+  }
+  return std::make_shared<const FieldSetDrr>(std::move(members));
+}
+
+}  // namespace
+
 DrrScene load_scene(const DrrOptions& options, const Communicator& communicator) {
   DrrScene scene;
   scene.pool = std::make_shared<ThreadPool>(thread_count(options.threads));
   std::shared_ptr<const CompressedAttenuationField> field;
   if (!options.field.empty()) {
-    FieldFileInfo info;
-    field = read_field(options.field, communicator, &info);
+    const LoadedField loaded = load_field(options.field, options, scene.pool, communicator);
+    field = loaded.field;
     scene.view = View::whole_detector(field->identity.camera);
     scene.frame = field->identity.frame;
-    scene.renderer = make_field_renderer(
-        field, options.look_up.empty() ? info.look_up : options.look_up, scene.pool);
+    scene.renderer = renderer_of(loaded, options, scene.pool, communicator);
   }
   const DrrSource source = source_of(options);
   if (source.camera.has_value()) {

@@ -19,6 +19,7 @@ namespace af::tools {
 /// The options of af-drr as typed.
 struct DrrOptions {
   std::filesystem::path field;
+  std::vector<std::string> more_fields;  ///< of the same CT, for other angles
   std::filesystem::path ct;
   CtReadOptions ct_reading;
   std::filesystem::path study;  ///< instead of ct and rig
