@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "register/uncertainty/uncertainty_estimator.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -100,6 +101,11 @@ UncertaintyReport UncertaintyEstimator::report(const RegistrationResult& result,
                                                std::span<const ViewValue> view_values) {
   UncertaintyReport report;
   if (options_.is_left_out) return report;
+  // Values within silhouettes are on another scale than those that the calibration has seen.
+  if (std::any_of(view_values.begin(), view_values.end(), [](const ViewValue& value) {
+        return value.in_silhouette;
+      }))
+    return report;
   if (!has_end(result)) {
     report.confidence = 0.0;
     return report;

@@ -196,6 +196,10 @@ TEST(UncertaintyEstimator, TakesRobustGradientsWhereAMeasureHasNoDerivative) {
   // case.
   const UncertaintyReport worse = estimator.report(result, std::vector<ViewValue>{{0.1, 0.1}});
   EXPECT_GT(report.confidence, 2.0 * worse.confidence);
+  // Nothing was calibrated within silhouettes.
+  const UncertaintyReport bone = estimator.report(result, std::vector<ViewValue>{{0.9, 0.9, true}});
+  EXPECT_TRUE(std::isnan(bone.confidence));
+  EXPECT_TRUE(std::isnan(bone.tre_95_mm));
 }
 
 }  // namespace
