@@ -60,13 +60,7 @@ while (($# > 0)); do
     --patients) need_value "$1" $#; need_seed "$1" "$2"; patients=$2; shift ;;
     --first) need_value "$1" $#; need_count "$1" "$2"; first=$2; shift ;;
     --kinds) need_value "$1" $#; kinds=$2; shift ;;
-    --ct)
-      need_value "$1" $#
-      [[ "$2" =~ ^[A-Za-z0-9_]+=.+$ ]] || die 2 "--ct = '$2' must be NAME=PATH"
-      [[ -e "${2#*=}" ]] || die 4 "--ct ${2#*=}: no such file or folder"
-      cts+=("${2%%=*}=$(realpath "${2#*=}")")
-      shift
-      ;;
+    --ct) need_value "$1" $#; need_ct "$1" "$2"; cts+=("$named_ct"); shift ;;
     --poses) need_value "$1" $#; need_count "$1" "$2"; poses=$2; shift ;;
     --variants) need_value "$1" $#; variants=$2; shift ;;
     --presets) need_value "$1" $#; presets=$2; shift ;;
