@@ -9,7 +9,7 @@ af_add_test(
           unit/evaluate/statistics/case_equivalence_test.cpp
           unit/evaluate/statistics/roc_test.cpp
           support/interval_coverage.cpp
-          unit/evaluate/registration/population_statistics_test.cpp
+          unit/evaluate/population/population_statistics_test.cpp
           unit/evaluate/registration/registration_errors_test.cpp
           unit/evaluate/sweeps/error_budget_test.cpp
           unit/evaluate/sweeps/lattice_errors_test.cpp
