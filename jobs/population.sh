@@ -141,13 +141,13 @@ register() {
   shift 2
   stage "$folder" "$output/runs/$folder/summary.json" run_ranks "$ranks" "$bin/af-evaluate" registration \
     --study "$study" --gold study --intervals "$intervals" --starts-per-interval "$starts" --seed "$seed" \
-    --start-rule within-range "$@" -o "$output/runs/$folder"
+    --start-rule within-range --no-uncertainty "$@" -o "$output/runs/$folder"
 }
 
 # study_patient NAME SOURCE: every condition of one patient.
 study_patient() {
   local patient=$1 variant camera count preset study
-  stage_inputs="$2, $field_words, $max_rotation_deg deg, $max_translation_mm mm: "
+  stage_inputs="$2, seed $seed, $poses poses, $field_words, $max_rotation_deg deg, $max_translation_mm mm: "
   for variant in "${variant_list[@]}"; do
     sessions "$patient" "$2" "$variant"
     for camera in A B; do

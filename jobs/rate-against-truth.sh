@@ -139,7 +139,8 @@ register() {
   local folder=$1 study=$2
   shift 2
   stage "$folder" "$output/$folder/summary.json" run_ranks "$ranks" "$bin/af-evaluate" registration --study "$study" \
-    --gold study --preset "$preset" --intervals "$starts_count" --starts-per-interval 1 --seed "$seed" "$@" -o "$output/$folder"
+    --gold study --preset "$preset" --no-uncertainty --intervals "$starts_count" --starts-per-interval 1 \
+    --seed "$seed" "$@" -o "$output/$folder"
 }
 
 # ct_of STUDY: the CT that it names.

@@ -146,7 +146,7 @@ register() {
   stage_inputs="$inputs$method_text"
   stage "$folder" "$output/$folder/summary.json" run_ranks "$ranks" \
     "$bin/af-evaluate" registration --study "$study" "${field_options[@]}" --gold study \
-    "${method_options[@]}" --seed "$seed" -o "$output/$folder" "$@"
+    "${method_options[@]}" --no-uncertainty --seed "$seed" -o "$output/$folder" "$@"
   stage_inputs=$inputs
 }
 
