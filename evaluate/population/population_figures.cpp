@@ -27,9 +27,14 @@ bool is_drawn(const PopulationGroup& group) {
   return group.group == "all" && group.condition.find(", ") == std::string::npos;
 }
 
-/// VARIANT-VIEWS of VARIANT-VIEWS-PRESET.
+/// VARIANT-VIEWS of VARIANT-VIEWS-PRESET; a name of one word has a panel of its own.
 std::string panel_of(const std::string& condition) {
   return condition.substr(0, condition.rfind('-'));
+}
+
+/// PRESET, or the one word.
+std::string preset_of(const std::string& condition) {
+  return condition.substr(condition.rfind('-') + 1);
 }
 
 bool has_one_view(const std::string& panel) {
@@ -70,9 +75,11 @@ std::string panel_script(const std::string& panel,
         " lc rgb '" + std::string(kPresetColors[k % kPresetColors.size()]) + "'";
     plot += (plot.empty() ? "plot $" : ", $") + name + " using 1:2 with lines lw 1.5" + style +
             " notitle, $" + name + " using 1:2:3:4 with yerrorbars lw 1.5 pt 7 ps 0.6" + style +
-            " title " + gnuplot_quoted(members[k]->condition.substr(panel.size() + 1));
+            " title " + gnuplot_quoted(preset_of(members[k]->condition));
   }
-  const std::string title = panel + (has_one_view(panel) ? " view, by mRPD" : " views");
+  const std::string title = panel + (has_one_view(panel)     ? " view, by mRPD"
+                                     : panel.ends_with("-2") ? " views"
+                                                             : "");
   return "set title " + gnuplot_quoted(title) + "\n" + plot + "\n";
 }
 

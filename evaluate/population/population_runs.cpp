@@ -2,9 +2,8 @@
 #include "evaluate/population/population_runs.h"
 
 #include <map>
-#include <utility>
-
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "base/error.h"
 #include "text/csv_table.h"
