@@ -523,7 +523,8 @@ class PrecomputeRun {
                        source_.range,
                        source_.ct_content_sha256,
                        model.mu_water_per_mm,
-                       model.air_below_hu};
+                       model.air_below_hu,
+                       options_.is_of_bone() ? FieldMaterial::Bone : FieldMaterial::All};
     field_.quantizer_step = quantizer().step();
     field_.codebook = codebook;
   }

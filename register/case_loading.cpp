@@ -13,6 +13,7 @@
 #include "base/number_text.h"
 #include "base/stored_bytes.h"
 #include "drr/field_level.h"
+#include "drr/polychromatic_drr.h"
 #include "drr/ray_cast_drr.h"
 #include "drr/two_pass_af_drr.h"
 #include "field_file/field_file.h"
@@ -22,6 +23,7 @@
 #include "register/problem/fiducial_mask.h"
 #include "register/problem/parameter_scaling.h"
 #include "register/problem/stage_view.h"
+#include "study/bone_per_node.h"
 #include "study/ct_keys.h"
 #include "study/node_ct.h"
 #include "study/rig_file.h"
@@ -170,32 +172,70 @@ bool pays_to_decode(const CompressedAttenuationField& field) {
   return field.slabs.size() > 1 && decoded_bytes(field) <= kMostDecodedBytes;
 }
 
-/// Collective. A field's renderers for a view: its own, and levels 1, 2, ... of its pyramid, held
+/// Renderers of one field, or of two fields together: the finest, and levels 1, 2, ... of a
+/// pyramid.
+struct FieldRenderers {
+  std::shared_ptr<const DrrRenderer> finest;
+  std::vector<RendererLevel> coarse;
+};
+
+/// Collective. A field's renderers: its own, and levels 1 ... coarsest_level of its pyramid, held
 /// once per node. A method's levels are those of a field of about 256 nodes: a finer field begins
 /// with more halvings, so that a level has about the same blur. Look-up is linear, whatever a field
 /// is meant for: cubic gives better DRRs, but not better poses (register/README.md).
-void use_field(const std::shared_ptr<const CompressedAttenuationField>& field,
-               const CaseLoadOptions& options,
-               const Communicator& communicator,
-               RegistrationView& view) {
+FieldRenderers field_renderers(const std::shared_ptr<const CompressedAttenuationField>& field,
+                               int coarsest_level,
+                               const CaseLoadOptions& options,
+                               const Communicator& communicator) {
   const auto pool = options.pool ? options.pool : std::make_shared<ThreadPool>();
   const auto memory = node_memory(communicator, *pool);
   const int more_halvings = halvings_to_usual_nodes(field->light_slab);
-  const int coarsest_level = level_count(*field, options);
   const int halvings = coarsest_level > 0 ? coarsest_level + more_halvings : 0;
+  FieldRenderers renderers;
   FieldLevels pyramid;
   if (pays_to_decode(*field)) {
     const auto samples = std::make_shared<const FieldLevel>(decode_field(*field, memory));
-    view.renderer = std::make_shared<const TwoPassAfDrr>(samples, TwoPassOptions{}, options.pool);
+    renderers.finest =
+        std::make_shared<const TwoPassAfDrr>(samples, TwoPassOptions{}, options.pool);
     if (halvings > 0) pyramid = make_field_pyramid(*samples, halvings, memory);
   } else {
-    view.renderer = std::make_shared<const TwoPassAfDrr>(field, TwoPassOptions{}, options.pool);
+    renderers.finest = std::make_shared<const TwoPassAfDrr>(field, TwoPassOptions{}, options.pool);
     if (halvings > 0) pyramid = make_field_pyramid(*field, halvings, memory);
   }
   for (auto i = static_cast<std::size_t>(more_halvings); i < pyramid.size(); ++i)
-    view.coarse_levels.push_back(
+    renderers.coarse.push_back(
         {std::make_shared<const TwoPassAfDrr>(pyramid[i], TwoPassOptions{}, pool),
          pyramid[i]->blur_sigma_mm(true)});
+  return renderers;
+}
+
+std::shared_ptr<const PolychromaticAttenuation> attenuation_of(const CaseLoadOptions& options,
+                                                               const AttenuationModel& model) {
+  return std::make_shared<const PolychromaticAttenuation>(options.spectrum, TissueModel(model));
+}
+
+/// Collective. A field's renderers for a view; with `bone` those of the tube's spectrum, whose
+/// levels are as many as both fields have, and blurred as those of the field of all.
+void use_field(const std::shared_ptr<const CompressedAttenuationField>& field,
+               const std::shared_ptr<const CompressedAttenuationField>& bone,
+               const CaseLoadOptions& options,
+               const Communicator& communicator,
+               RegistrationView& view) {
+  const int levels = bone ? std::min(level_count(*field, options), level_count(*bone, options))
+                          : level_count(*field, options);
+  FieldRenderers all = field_renderers(field, levels, options, communicator);
+  if (bone) {
+    const FieldRenderers of_bone = field_renderers(bone, levels, options, communicator);
+    const auto attenuation =
+        attenuation_of(options, {field->identity.mu_water_per_mm, field->identity.air_below_hu});
+    all.finest = std::make_shared<const PolychromaticDrr>(all.finest, of_bone.finest, attenuation);
+    all.coarse.resize(std::min(all.coarse.size(), of_bone.coarse.size()));
+    for (std::size_t i = 0; i < all.coarse.size(); ++i)
+      all.coarse[i].renderer = std::make_shared<const PolychromaticDrr>(
+          all.coarse[i].renderer, of_bone.coarse[i].renderer, attenuation);
+  }
+  view.renderer = all.finest;
+  view.coarse_levels = std::move(all.coarse);
 }
 
 /// Collective. The same CT, its attenuation blurred by sigma_mm, held once per node.
@@ -213,20 +253,51 @@ std::shared_ptr<const AttenuationVolume> blurred_per_node(const AttenuationVolum
       blur.grid(), volume.model(), SharedArray<std::uint16_t>(owner, {voxels, count}));
 }
 
+/// What rays are cast through.
+struct CastVolumes {
+  std::shared_ptr<const AttenuationVolume> all;
+  std::shared_ptr<const AttenuationVolume> bone;  ///< none for DRRs of one energy
+  std::shared_ptr<const PolychromaticAttenuation> attenuation;
+};
+
+/// Collective.
+CastVolumes cast_volumes(std::shared_ptr<const AttenuationVolume> all,
+                         const CaseLoadOptions& options,
+                         const Communicator& communicator) {
+  if (options.spectrum.is_one_energy()) return {std::move(all), nullptr, nullptr};
+  auto bone = bone_per_node(*all, communicator);
+  const auto attenuation =
+      all_or_none(communicator, [&] { return attenuation_of(options, all->model()); });
+  return {std::move(all), std::move(bone), attenuation};
+}
+
+std::shared_ptr<const DrrRenderer> ray_cast_through(const CastVolumes& volumes,
+                                                    const RayCasterOptions& caster,
+                                                    const CaseLoadOptions& options) {
+  auto all = std::make_shared<const RayCastDrr>(volumes.all, caster, options.pool);
+  if (!volumes.bone) return all;
+  return std::make_shared<const PolychromaticDrr>(
+      std::move(all),
+      std::make_shared<const RayCastDrr>(volumes.bone, caster, options.pool),
+      volumes.attenuation);
+}
+
 /// Collective. A level of ray casting: the CT blurred as the fields' level blurs DRRs, sampled
 /// twice per sigma.
-std::shared_ptr<const DrrRenderer> coarse_ray_cast(const AttenuationVolume& volume,
+std::shared_ptr<const DrrRenderer> coarse_ray_cast(const CastVolumes& volumes,
                                                    double sigma_mm,
                                                    const CaseLoadOptions& options,
                                                    const Communicator& communicator) {
   RayCasterOptions caster = options.ray_caster;
   caster.step_mm = std::max(caster.step_mm, 0.5 * sigma_mm);
-  return std::make_shared<const RayCastDrr>(
-      blurred_per_node(volume, sigma_mm, communicator), caster, options.pool);
+  CastVolumes blurred = volumes;
+  blurred.all = blurred_per_node(*volumes.all, sigma_mm, communicator);
+  if (volumes.bone) blurred.bone = blurred_per_node(*volumes.bone, sigma_mm, communicator);
+  return ray_cast_through(blurred, caster, options);
 }
 
 /// Collective. Levels 1 ... coarsest_level of ray casting.
-std::vector<RendererLevel> coarse_ray_casts(const AttenuationVolume& volume,
+std::vector<RendererLevel> coarse_ray_casts(const CastVolumes& volumes,
                                             const CaseLoadOptions& options,
                                             const Communicator& communicator) {
   std::vector<RendererLevel> levels;
@@ -236,7 +307,7 @@ std::vector<RendererLevel> coarse_ray_casts(const AttenuationVolume& volume,
     const double sigma_mm = at < options.level_blur_sigma_mm.size()
                                 ? options.level_blur_sigma_mm[at]
                                 : kAssumedNodeMm * level_blur_sigma_in_nodes(level, true);
-    levels.push_back({coarse_ray_cast(volume, sigma_mm, options, communicator), sigma_mm});
+    levels.push_back({coarse_ray_cast(volumes, sigma_mm, options, communicator), sigma_mm});
   }
   return levels;
 }
@@ -344,8 +415,14 @@ void use_fields(const StudyCase& study_case,
         used_from(is_of_study ? study_case.views[i].places : StudyPlaces(), "field", [&] {
           return field_of_view(path, study_case, options, ct, communicator, info);
         });
-    use_field(field, options, communicator, view);
     const std::string name = "field " + view.view.camera.name;
+    std::shared_ptr<const CompressedAttenuationField> bone;
+    if (!options.spectrum.is_one_energy()) {
+      FieldFileInfo bone_info;
+      bone = read_bone_field(bone_field_path(path), *field, communicator, &bone_info);
+      loaded.input_sha256["bone " + name] = bone_info.payload_sha256;
+    }
+    use_field(field, bone, options, communicator, view);
     loaded.input_notes[name] = limit_to_rays(
         field->identity, field->light_slab, path, problem.frame(), communicator, view);
     loaded.input_sha256[name] = info.payload_sha256;
@@ -361,7 +438,7 @@ double mean_blur_mm(const RegistrationProblem& problem, int level) {
 }
 
 /// Collective. Ray casting beside the fields, at the levels that a correction needs.
-void add_ray_casts(const AttenuationVolume& volume,
+void add_ray_casts(const CastVolumes& volumes,
                    const std::shared_ptr<const DrrRenderer>& renderer,
                    const CaseLoadOptions& options,
                    const Communicator& communicator,
@@ -369,7 +446,7 @@ void add_ray_casts(const AttenuationVolume& volume,
   for (const int level : options.correction_levels) {
     const auto ray_cast =
         level == 0 ? renderer
-                   : coarse_ray_cast(volume, mean_blur_mm(problem, level), options, communicator);
+                   : coarse_ray_cast(volumes, mean_blur_mm(problem, level), options, communicator);
     for (RegistrationView& view : problem.views) {
       view.ray_casts.resize(static_cast<std::size_t>(level) + 1);
       view.ray_casts.back() = ray_cast;
@@ -416,13 +493,13 @@ LoadedCase load_case(const Study& study,
   problem->target_points_ct = ct_lattice_points(study_case.target_box_ct, kTargetPointsPerAxis);
   const bool looks_up = options.renderer == RendererKind::Field;
   std::optional<CtFacts> ct;
-  std::shared_ptr<const AttenuationVolume> volume;
+  CastVolumes volumes;
   std::shared_ptr<const DrrRenderer> ray_cast;
   if (!looks_up || !options.correction_levels.empty()) {
     const NodeCt node_ct = read_node_ct(study_case, options, communicator, loaded.warnings);
     ct = node_ct.facts;
-    volume = node_ct.volume;
-    ray_cast = std::make_shared<const RayCastDrr>(volume, options.ray_caster, options.pool);
+    volumes = cast_volumes(node_ct.volume, options, communicator);
+    ray_cast = ray_cast_through(volumes, options.ray_caster, options);
   } else if (!options.skip_ct_check) {
     ct = used_from(study_case.places, "ct", [&] {
       return read_ct_facts(study_case.ct,
@@ -434,9 +511,9 @@ LoadedCase load_case(const Study& study,
   }
   if (looks_up) {
     use_fields(study_case, options, communicator, ct, *problem, loaded);
-    if (volume) add_ray_casts(*volume, ray_cast, options, communicator, *problem);
+    if (volumes.all) add_ray_casts(volumes, ray_cast, options, communicator, *problem);
   } else {
-    const auto levels = coarse_ray_casts(*volume, options, communicator);
+    const auto levels = coarse_ray_casts(volumes, options, communicator);
     for (RegistrationView& view : problem->views) {
       view.renderer = ray_cast;
       view.coarse_levels = levels;

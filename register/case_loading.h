@@ -12,6 +12,7 @@
 #include "image_files/ct_reader.h"
 #include "parallel/communicator.h"
 #include "register/method/registration.h"
+#include "spectrum/xray_spectrum.h"
 #include "study/study_file.h"
 #include "volume/ray_caster.h"
 
@@ -28,6 +29,9 @@ struct CaseLoadOptions {
   CtReadOptions ct;
   AttenuationModel attenuation;  ///< of ray casting
   RayCasterOptions ray_caster;
+  /// Of the X-rays that DRRs are of; with fields beside one energy, bone_field_path() of each is
+  /// read, too.
+  SpectrumOptions spectrum = SpectrumOptions::one_energy();
   bool skip_ct_check = false;  ///< with fields: do not read the CT (it may be absent)
   /// Radius, mm on the isocentre plane, of the discs about the study's fiducials that registration
   /// does not see; 0: it sees them.

@@ -157,6 +157,8 @@ void create_file_without_indices(const CompressedAttenuationField& field,
     hdf5::write_dataset(file, dataset, sha256_hex(dataset.bytes));
   for (const Dataset& dataset : field_layout::range_datasets(field.identity.range))
     hdf5::write_dataset(file, dataset, sha256_hex(dataset.bytes));
+  for (const Dataset& dataset : field_layout::material_datasets(field.identity.material))
+    hdf5::write_dataset(file, dataset, sha256_hex(dataset.bytes));
   const std::vector<DatasetRule> rules = index_rules(field.lattice());
   const std::vector<hdf5::ChunkShape> chunks = hdf5::index_chunks(rules);
   for (std::size_t k = 0; k < rules.size(); ++k)
@@ -435,7 +437,8 @@ void share(FieldFileInfo& info, const Communicator& communicator) {
 /// What rank 0 knows of a file before the indices are read.
 struct FileHeader {
   std::vector<Dataset> payload;
-  std::vector<Dataset> range;  ///< empty: two numbers of the payload state it
+  std::vector<Dataset> range;     ///< empty: two numbers of the payload state it
+  std::vector<Dataset> material;  ///< empty: all of the CT
   std::vector<Dataset> provenance;
   std::vector<std::string> index_sha256;
 
@@ -444,6 +447,8 @@ struct FileHeader {
     CompressedAttenuationField field = field_layout::field_of(payload, path);
     if (!range.empty())
       field.identity.range = field_layout::range_of(range, field.identity.range, path);
+    if (!material.empty())
+      field.identity.material = field_layout::material_of(material.front(), path);
     return field;
   }
   std::string payload_sha256;
@@ -521,6 +526,9 @@ FileHeader read_header(const std::filesystem::path& path) {
   if (checked(H5Lexists(file, "/range", H5P_DEFAULT), "H5Lexists") > 0)
     for (const DatasetRule& rule : field_layout::range_rules())
       header.range.push_back(hdf5::read_dataset(file, rule, path.string()));
+  const DatasetRule material_rule = field_layout::material_rule();
+  if (checked(H5Lexists(file, material_rule.name.c_str(), H5P_DEFAULT), "H5Lexists") > 0)
+    header.material.push_back(hdf5::read_dataset(file, material_rule, path.string()));
   const CompressedAttenuationField field = header.field(path.string());
   const std::vector<DatasetRule> rules = index_rules(field.lattice());
   for (const DatasetRule& rule : rules) {
@@ -545,17 +553,20 @@ FileHeader read_header(const std::filesystem::path& path) {
 void share(FileHeader& header, const Communicator& communicator) {
   std::vector<std::byte> payload = bytes_of(header.payload);
   std::vector<std::byte> range = bytes_of(header.range);
+  std::vector<std::byte> material = bytes_of(header.material);
   std::vector<std::byte> provenance = bytes_of(header.provenance);
   std::string lines = header.payload_sha256 + "\n" + std::to_string(header.file_bytes) + "\n" +
                       std::to_string(static_cast<int>(header.packing)) + "\n";
   for (const std::string& sha256 : header.index_sha256) lines += sha256 + "\n";
   communicator.broadcast(payload);
   communicator.broadcast(range);
+  communicator.broadcast(material);
   communicator.broadcast(provenance);
   communicator.broadcast(lines);
   if (communicator.is_root()) return;
   header.payload = value_of<std::vector<Dataset>>(payload, "the header from rank 0");
   header.range = value_of<std::vector<Dataset>>(range, "the header from rank 0");
+  header.material = value_of<std::vector<Dataset>>(material, "the header from rank 0");
   header.provenance = value_of<std::vector<Dataset>>(provenance, "the header from rank 0");
   std::istringstream stream(lines);
   std::getline(stream, header.payload_sha256);
@@ -708,9 +719,60 @@ CompressedAttenuationField read_field_header(const std::filesystem::path& path) 
   return naming_file(path, [&] { return read_header(path).field(path.string()); });
 }
 
+std::filesystem::path bone_field_path(const std::filesystem::path& path) {
+  std::string name = path.filename().string();
+  std::size_t ending = name.find(".af.h5");
+  if (ending == std::string::npos) ending = name.rfind('.');
+  name.insert(std::min(ending, name.size()), ".bone");
+  return path.parent_path() / name;
+}
+
 std::shared_ptr<const CompressedAttenuationField> read_field(const std::filesystem::path& path,
                                                              const Communicator& communicator,
                                                              FieldFileInfo* info) {
+  auto field = read_field_of_any_material(path, communicator, info);
+  all_or_none(communicator, [&] {
+    if (field->identity.material != FieldMaterial::All)
+      throw FileError(path.string(), "/material", "a field of all of the CT", "of its bone alone");
+  });
+  return field;
+}
+
+std::shared_ptr<const CompressedAttenuationField> read_bone_field(
+    const std::filesystem::path& path,
+    const CompressedAttenuationField& of_all,
+    const Communicator& communicator,
+    FieldFileInfo* info) {
+  all_or_none(communicator, [&] {
+    if (!std::filesystem::exists(path))
+      throw FileError(path.string(),
+                      "does not exist: a tube voltage needs the field of the CT's bone, which "
+                      "af-precompute --material bone makes with the other options of the field "
+                      "beside it");
+  });
+  auto field = read_field_of_any_material(path, communicator, info);
+  const FieldIdentity& wanted = of_all.identity;
+  const FieldIdentity& found = field->identity;
+  all_or_none(communicator, [&] {
+    if (found.material != FieldMaterial::Bone)
+      throw FileError(path.string(), "/material", "a field of the CT's bone alone", "of all of it");
+    if (found.ct_content_sha256 != wanted.ct_content_sha256)
+      throw FileError(path.string(),
+                      "CT of the field (ct_content_sha256)",
+                      wanted.ct_content_sha256 + " (that of the field of all)",
+                      found.ct_content_sha256);
+    if (found.mu_water_per_mm != wanted.mu_water_per_mm ||
+        found.air_below_hu != wanted.air_below_hu)
+      throw FileError(path.string(),
+                      "attenuation",
+                      "mu_water and the HU that count as air as in the field of all",
+                      "others");
+  });
+  return field;
+}
+
+std::shared_ptr<const CompressedAttenuationField> read_field_of_any_material(
+    const std::filesystem::path& path, const Communicator& communicator, FieldFileInfo* info) {
   const hdf5::QuietErrors quiet;
   FileHeader header;
   all_or_none(communicator, [&] {

@@ -119,6 +119,12 @@ void describe_casting(Fields& field, PrecomputeOptions& options) {
   step.help = "Trilinear caster: largest distance of samples along a ray, mm";
   field.part(options.attenuation);
   field.at("water_mu_per_mm").decides(kCastingStage);
+  field("material",
+        options.material,
+        "What of the CT the field holds: all, or bone alone, for DRRs of a tube's spectrum, which "
+        "programs look for in FIELD.bone.af.h5 beside FIELD.af.h5 (docs/spectra.md)")
+      .one_of({"all", "bone"})
+      .decides(kCastingStage);
 }
 
 void describe_codebook(Fields& field, PrecomputeOptions& options) {

@@ -8,6 +8,7 @@
 #include "base/error.h"
 #include "drr/field_renderer.h"
 #include "drr/field_set_drr.h"
+#include "drr/polychromatic_drr.h"
 #include "drr/ray_cast_drr.h"
 #include "field_file/field_file.h"
 #include "figures/picture.h"
@@ -17,6 +18,7 @@
 #include "image_files/ct_reader.h"
 #include "image_files/image_file.h"
 #include "pose_files/pose_file.h"
+#include "spectrum/bone_volume.h"
 #include "study/ct_keys.h"
 #include "study/pose_context.h"
 #include "study/rig_file.h"
@@ -58,6 +60,8 @@ void describe_source(Fields& field, DrrOptions& options) {
   field.at("water_mu_per_mm").help =
       "Attenuation of water, 1/mm, for ray casting (with --compare the field's own)";
   field.part(options.ray_caster);
+  field.part(options.spectrum);
+  field.at("tube_kvp").help = drr_tube_help();
 }
 
 void describe_pose(Fields& field, DrrOptions& options) {
@@ -194,6 +198,23 @@ DrrSource source_of(const DrrOptions& options) {
   return {options.ct, options.ct_reading, rig.camera(options.camera), {}, rig.isocenter_point};
 }
 
+std::shared_ptr<const PolychromaticAttenuation> attenuation_of(const DrrOptions& options,
+                                                               const AttenuationModel& model) {
+  return std::make_shared<const PolychromaticAttenuation>(options.spectrum, TissueModel(model));
+}
+
+std::shared_ptr<const DrrRenderer> cast_through(
+    const std::shared_ptr<const AttenuationVolume>& volume,
+    const DrrOptions& options,
+    const std::shared_ptr<ThreadPool>& pool) {
+  const auto caster = [&](std::shared_ptr<const AttenuationVolume> through) {
+    return std::make_shared<const RayCastDrr>(std::move(through), options.ray_caster, pool);
+  };
+  if (options.spectrum.is_one_energy()) return caster(volume);
+  return std::make_shared<const PolychromaticDrr>(
+      caster(volume), caster(bone_volume(*volume)), attenuation_of(options, volume->model()));
+}
+
 CastCt ray_caster(const DrrOptions& options,
                   const DrrSource& source,
                   const CompressedAttenuationField* field,
@@ -210,8 +231,7 @@ CastCt ray_caster(const DrrOptions& options,
     // --compare compares ways to render, so the reference takes the field's HU model.
     model = {field->identity.mu_water_per_mm, field->identity.air_below_hu};
   }
-  return {std::make_shared<const RayCastDrr>(
-              std::make_shared<const AttenuationVolume>(ct, model), options.ray_caster, pool),
+  return {cast_through(std::make_shared<const AttenuationVolume>(ct, model), options, pool),
           ct.grid.center_mm()};
 }
 
@@ -253,9 +273,17 @@ LoadedField load_field(const std::filesystem::path& path,
   FieldFileInfo info;
   const std::shared_ptr<const CompressedAttenuationField> field =
       read_field(path, communicator, &info);
-  return {
-      field,
-      make_field_renderer(field, options.look_up.empty() ? info.look_up : options.look_up, pool)};
+  const auto looked_up = [&](std::shared_ptr<const CompressedAttenuationField> of) {
+    return make_field_renderer(
+        std::move(of), options.look_up.empty() ? info.look_up : options.look_up, pool);
+  };
+  const std::shared_ptr<const DrrRenderer> all = looked_up(field);
+  if (options.spectrum.is_one_energy()) return {field, all};
+  const auto bone = read_bone_field(bone_field_path(path), *field, communicator, &info);
+  const AttenuationModel model = {field->identity.mu_water_per_mm, field->identity.air_below_hu};
+  return {field,
+          std::make_shared<const PolychromaticDrr>(
+              all, looked_up(bone), attenuation_of(options, model))};
 }
 
 void require_same_subject(const LoadedField& first,

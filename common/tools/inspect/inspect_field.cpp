@@ -94,11 +94,12 @@ void inspect_field(const std::filesystem::path& path,
                    Inspection& inspection) {
   inspection.kind = "field";
   FieldFileInfo info;
-  const auto field = read_field(path, communicator, &info);
+  const auto field = read_field_of_any_material(path, communicator, &info);
   const FieldIdentity& identity = field->identity;
   ordered_json& facts = inspection.facts;
   facts["checksums"] = "verified";
   facts["payload_sha256"] = info.payload_sha256;
+  facts["material"] = identity.material == FieldMaterial::Bone ? "bone" : "all";
   facts["camera"] = camera_json(identity.camera);
   facts["center_ct_mm"] = vector_json(identity.frame.center_ct_mm);
   facts["center_room_mm"] = vector_json(identity.frame.center_room_mm);
