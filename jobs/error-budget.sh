@@ -112,8 +112,8 @@ register() {
   local name=$1 study=$2
   shift 2
   stage "runs/$name" "$output/runs/$name/summary.json" run_ranks "$ranks" "$bin/af-evaluate" registration \
-    --study "$output/studies/$study/study.toml" --gold study "${method[@]}" --intervals "$intervals" \
-    --starts-per-interval "$starts_per_interval" --seed "$seed" "${starts[@]}" "$@" -o "$output/runs/$name"
+    --study "$output/studies/$study/study.toml" --gold study "${method[@]}" --no-uncertainty \
+    --intervals "$intervals" --starts-per-interval "$starts_per_interval" --seed "$seed" "${starts[@]}" "$@" -o "$output/runs/$name"
 }
 
 field shipped --codewords "$codewords"

@@ -142,7 +142,8 @@ FieldSource load_source(const PrecomputeOptions& options, const Communicator& co
   if (!options.cover.empty()) {
     const std::vector<RigidTransform> poses = shared_poses(communicator, [&] {
       return read_poses(options.cover,
-                        pose_context(named.ct_path, named.ct_reading, named.rig, source.frame));
+                        pose_context(named.ct_path, named.ct_reading, named.rig, source.frame),
+                        &source.warnings);
     });
     source.range = range_about(poses, source.frame, source.range);
     all_or_none(communicator, [&] { throw_if_any(problems(source.range)); });

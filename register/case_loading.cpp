@@ -380,16 +380,17 @@ std::string limit_to_rays(const FieldIdentity& identity,
     view.reach = view.limit;
     return distance.text() + ", " + identity.range.text();
   }
-  const auto rays = static_cast<std::int64_t>(view.view.pixel_count());
-  const std::int64_t outside =
-      view.renderer->rays_outside(nominal.nominal_room_from_ct(), view.view);
+  const View widest = view.widest_view();
+  const auto rays = static_cast<std::int64_t>(widest.pixel_count());
+  const std::int64_t outside = view.renderer->rays_outside(nominal.nominal_room_from_ct(), widest);
   const MotionRange own_box = all_or_none(communicator, [&] {
-    if (outside == rays)
+    if (outside > 0)
       throw FileError(path,
                       "camera '" + camera.name + "' of the field",
-                      "one that holds rays of the study's at the nominal pose",
-                      "none of them; the study's has " + distance.text());
-    return covered_box(light_slab, view.view.coarser(1).camera, nominal, identity.range);
+                      "one that holds all rays of twice the study's region at the nominal pose",
+                      std::to_string(rays - outside) + " of " + std::to_string(rays) +
+                          " rays; the study's has " + distance.text());
+    return covered_box(light_slab, widest.coarser(1).camera, nominal, identity.range);
   });
   view.reach = MotionLimit{nominal, shared_box(own_box, communicator)};
   return distance.text() + "; " +

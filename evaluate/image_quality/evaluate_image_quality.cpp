@@ -361,7 +361,8 @@ TargetResult evaluate_target(const ImageQualityOptions& options,
       provenance.input_sha256["poses"] = sha256_of_file(options.poses.string());
     if (world.is_root() && !options.rig.empty())
       for (const std::filesystem::path& file : rig_files(options.rig))
-        provenance.input_sha256["rig"] = sha256_of_file(file.string());
+        provenance.input_sha256["rig " + file.filename().string()] =
+            sha256_of_file(file.string());
   });
   const std::string name = target.folder.filename().string();
   const auto unfinished = [&](const std::string& what) {

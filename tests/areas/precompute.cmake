@@ -24,4 +24,4 @@ af_add_mpi_test(
 
 add_test(NAME precompute_program COMMAND ${PROJECT_SOURCE_DIR}/tests/checks/precompute_program.sh
                                          $<TARGET_FILE:af-precompute> ${MPIEXEC_EXECUTABLE} ${af_sanitized})
-set_tests_properties(precompute_program PROPERTIES LABELS mpi TIMEOUT 1800 PROCESSORS 2)
+set_tests_properties(precompute_program PROPERTIES LABELS mpi TIMEOUT 1800)

@@ -8,32 +8,15 @@
 
 #include "base/hash_random.h"
 #include "geometry/camera_distance.h"
+#include "support/c_arm_camera.h"
 
 namespace af {
 namespace {
 
-CameraGeometry c_arm_camera() {
-  CameraGeometry camera;
-  camera.name = "AP";
-  camera.source_point = {0.0, -650.0, 0.0};
-  camera.column_direction = {1.0, 0.0, 0.0};
-  camera.row_direction = {0.0, 0.0, -1.0};
-  camera.pixel_spacing_mm = {1.190625, 1.190625};
-  camera.size_px = {256, 256};
-  camera.detector_origin_point = {-151.8046875, 370.0, 151.8046875};
-  return camera;
-}
-
 CameraGeometry moved(const CameraGeometry& camera,
                      const Eigen::Vector3d& angles_rad,
                      const Eigen::Vector3d& shift_mm) {
-  const Eigen::Matrix3d turn = rotation_from_angles(angles_rad);
-  CameraGeometry other = camera;
-  other.source_point = turn * camera.source_point + shift_mm;
-  other.detector_origin_point = turn * camera.detector_origin_point + shift_mm;
-  other.column_direction = turn * camera.column_direction;
-  other.row_direction = turn * camera.row_direction;
-  return other;
+  return test::moved_camera(camera, rotation_from_angles(angles_rad), shift_mm);
 }
 
 LightSlab planes_of(const CameraGeometry& camera,
@@ -93,9 +76,9 @@ PoseParameters sampled(const MotionRange& range, int index, HashRandom& random) 
 
 TEST(RayCoverage, OfAFieldsOwnCameraIsItsRange) {
   const MotionRange range{8.0 * kRadPerDeg, 25.0};
-  const LightSlab planes = planes_of(c_arm_camera(), {}, range);
-  EXPECT_TRUE(covers_range(planes, c_arm_camera(), {}, range));
-  const MotionRange box = covered_box(planes, c_arm_camera(), {}, range);
+  const LightSlab planes = planes_of(test::paper_camera(), {}, range);
+  EXPECT_TRUE(covers_range(planes, test::paper_camera(), {}, range));
+  const MotionRange box = covered_box(planes, test::paper_camera(), {}, range);
   // The planes are larger by kExtentMargin only, and the search stops at its tolerance.
   EXPECT_GE(box.max_rotation_rad(), range.max_rotation_rad());
   EXPECT_LE(box.max_rotation_rad(), range.max_rotation_rad() * (1.0 + kCoveredBoxTolerance));
@@ -105,7 +88,7 @@ TEST(RayCoverage, OfAFieldsOwnCameraIsItsRange) {
 
 TEST(RayCoverage, SaysWhatSampledRaysSay) {
   const MotionRange range{8.0 * kRadPerDeg, 25.0};
-  const CameraGeometry nominal = c_arm_camera();
+  const CameraGeometry nominal = test::paper_camera();
   const LightSlab planes = planes_of(nominal, {}, range);
   CameraGeometry cropped = nominal;
   cropped.size_px = {100, 120};
@@ -133,9 +116,9 @@ TEST(RayCoverage, SaysWhatSampledRaysSay) {
 
 TEST(RayCoverage, IsNoneForACameraAcross) {
   const MotionRange range{8.0 * kRadPerDeg, 25.0};
-  const LightSlab planes = planes_of(c_arm_camera(), {}, range);
+  const LightSlab planes = planes_of(test::paper_camera(), {}, range);
   const CameraGeometry across =
-      moved(c_arm_camera(), {0.0, 0.0, std::numbers::pi / 2.0}, Eigen::Vector3d::Zero());
+      moved(test::paper_camera(), {0.0, 0.0, std::numbers::pi / 2.0}, Eigen::Vector3d::Zero());
   const MotionRange box = covered_box(planes, across, {}, range);
   EXPECT_EQ(box.max_rotation_rad(), 0.0);
   EXPECT_FALSE(covers_range(planes, across, {}, box));
@@ -190,7 +173,7 @@ TEST(MotionRange, EveryPoseOfRandomRangesIsCoveredForRandomCameras) {
     frame.rotation = rotation_from_angles(anywhere(0.6));
     frame.center_ct_mm = anywhere(40.0);
     frame.center_room_mm = anywhere(10.0);
-    const CameraGeometry camera = moved(c_arm_camera(), anywhere(3.0), anywhere(10.0));
+    const CameraGeometry camera = moved(test::paper_camera(), anywhere(3.0), anywhere(10.0));
     // Bounds on either side of zero, or both on the same.
     MotionRange range;
     for (int axis = 0; axis < 3; ++axis) {
@@ -214,7 +197,7 @@ TEST(MotionRange, EveryPoseOfRandomRangesIsCoveredForRandomCameras) {
 }
 
 TEST(CameraDistance, IsWhatACalibrationChanged) {
-  const CameraGeometry nominal = c_arm_camera();
+  const CameraGeometry nominal = test::paper_camera();
   EXPECT_TRUE(camera_distance(nominal, nominal).is_none());
   const CameraDistance distance =
       camera_distance(moved(nominal, {0, 0, 0.0174533}, {0, 0, 5}), nominal);
