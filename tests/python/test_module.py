@@ -418,6 +418,14 @@ class RegistrationTest(unittest.TestCase):
             self.assertEqual(found.start.tobytes(), start.tobytes())
             given = af.register(study, rotation_deg=(1, 0, 0), preset="fast", fields=self.fields)
             np.testing.assert_allclose(given.start_parameters, (1, 0, 0, 0, 0, 0), atol=1e-9)
+            from_arrays = af.register(
+                study,
+                rotation_deg=np.array([1, 0, 0]),
+                translation_mm=np.array([0, 0, 0]),
+                preset="fast",
+                fields=self.fields,
+            )
+            self.assertEqual(from_arrays.start.tobytes(), given.start.tobytes())
             run_program(
                 "af-register", "--study", study, "--preset", "fast", "-o", Path(folder, "out"),
                 *(f"--field={name}={path}" for name, path in self.fields.items()),
