@@ -370,6 +370,28 @@ const DicomValues* functional_group(const DicomElements& header, int frame, Dico
   return shared.items(macro).empty() ? nullptr : &shared.item(macro);
 }
 
+std::optional<Eigen::Vector2d> dicom_spacing_mm(const DicomValues& values,
+                                                DicomTag tag,
+                                                const char* name,
+                                                const std::string& file) {
+  const std::vector<double> found = values.numbers(tag, name, file);
+  if (found.empty()) return std::nullopt;
+  if (found.size() != 2 || !(found[0] > 0.0 && found[1] > 0.0))
+    throw InputError(name, "'" + values.text(tag) + "'", "must be two positive numbers (mm)", file);
+  return Eigen::Vector2d(found[1], found[0]);
+}
+
+std::optional<Eigen::Vector2d> imager_spacing_mm(const DicomElements& header, int frame) {
+  constexpr DicomTag kPixelProperties = {0x0028, 0x9443};
+  constexpr DicomTag kImagerSpacing = {0x0018, 0x1164};
+  constexpr const char* kName = "ImagerPixelSpacing (0018,1164)";
+  const std::string file = header.path().string();
+  if (const DicomValues* const pixels = functional_group(header, frame, kPixelProperties);
+      pixels != nullptr)
+    if (const auto spacing = dicom_spacing_mm(*pixels, kImagerSpacing, kName, file)) return spacing;
+  return dicom_spacing_mm(header.values(), kImagerSpacing, kName, file);
+}
+
 std::uint64_t DicomElements::pixel_bytes() const {
   std::uint64_t bytes = 0;
   for (const DicomPart& part : pixel_parts_) bytes += part.bytes;
