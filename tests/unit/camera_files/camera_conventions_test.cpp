@@ -227,6 +227,14 @@ TEST_F(CameraConventions, OpenCvRefusals) {
   EXPECT_THAT(input_refusal(stereo), HasSubstr("relative to the first camera"));
 }
 
+TEST_F(CameraConventions, TheOnlyCameraMayHaveANumber) {
+  const std::string one =
+      "K1: [1000, 0, 320, 0, 1000, 240, 0, 0, 1]\nimage_width: 640\nimage_height: 480\n"
+      "pixel_spacing_mm: [0.5, 0.5]\nisocenter_point: [0, 0, 0]\n"
+      "R: [1, 0, 0, 0, 1, 0, 0, 0, 1]\nt: [0, 0, 500]\n";
+  expect_seen(camera(one), {10, 20, 0}, {320 + 1000 * 10 / 500.0, 240 + 1000 * 20 / 500.0});
+}
+
 TEST_F(CameraConventions, NamesAreUtf8) {
   const std::string good = kOpenCv;
   EXPECT_EQ(camera("camera_name: \"\xc3\xa4\"\n" + good).name, "\xc3\xa4");
