@@ -414,6 +414,7 @@ class RegistrationTest(unittest.TestCase):
             case = af.RegistrationCase.load(study, preset="fast", fields=self.fields)
             start = case.landmark_start()
             self.assertLess(case.tre_mm(start), 1e-3)
+            self.assertEqual(case.usual_start().tobytes(), start.tobytes())
             found = af.register(study, preset="fast", fields=self.fields)
             self.assertEqual(found.start.tobytes(), start.tobytes())
             given = af.register(study, rotation_deg=(1, 0, 0), preset="fast", fields=self.fields)
@@ -432,6 +433,14 @@ class RegistrationTest(unittest.TestCase):
             )
             expected = af.read_result(Path(folder, "out"))
             self.assertEqual(found.pose.tobytes(), expected.room_from_ct.tobytes())
+
+    def test_uncertainty_may_be_left_out(self):
+        case = af.RegistrationCase.load(
+            STUDY / "study.toml", preset="fast", fields=self.fields, no_uncertainty=True
+        )
+        found = case.run(case.frame.pose((-1, 0.5, 2.5), (0.5, 1, 4)))
+        self.assertTrue(np.isnan(found.uncertainty.covariance).all())
+        self.assertTrue(np.isnan(found.uncertainty.confidence))
 
     def test_wrong_options_are_refused_as_by_the_program(self):
         with self.assertRaisesRegex(af.InputError, "robust"):
