@@ -5,6 +5,7 @@
 #include <cmath>
 #include <fstream>
 #include <limits>
+#include <utility>
 
 #include "base/error.h"
 #include "hdf5_files/hdf5_handles.h"
@@ -168,16 +169,24 @@ struct Hdf5Input::State {
   H5Id file;
   FileBytes bytes;
 
-  /// Every link on the way is checked before it is followed.
-  [[nodiscard]] H5Id dataset(const std::string& path, const std::string& name) const {
+  enum class Link { Absent, Elsewhere, Hard };
+  /// The last link of a path, or the first one that is not hard, and the path up to it: only hard
+  /// links are followed.
+  [[nodiscard]] std::pair<Link, std::string> link_at(const std::string& path) const {
     for (std::size_t at = path.find('/', 1);; at = path.find('/', at + 1)) {
       const std::string part = path.substr(0, at);
-      if (H5Lexists(file, part.c_str(), H5P_DEFAULT) <= 0) throw FileError(name, "has no " + part);
+      if (H5Lexists(file, part.c_str(), H5P_DEFAULT) <= 0) return {Link::Absent, part};
       H5L_info_t link;
       h5_checked(H5Lget_info(file, part.c_str(), &link, H5P_DEFAULT), "H5Lget_info");
-      if (link.type != H5L_TYPE_HARD) throw FileError(name, part, "a part of this file", "a link");
-      if (at == std::string::npos) break;
+      if (link.type != H5L_TYPE_HARD) return {Link::Elsewhere, part};
+      if (at == std::string::npos) return {Link::Hard, part};
     }
+  }
+
+  [[nodiscard]] H5Id dataset(const std::string& path, const std::string& name) const {
+    const auto [link, part] = link_at(path);
+    if (link == Link::Absent) throw FileError(name, "has no " + part);
+    if (link == Link::Elsewhere) throw FileError(name, part, "a part of this file", "a link");
     return {H5Dopen2(file, path.c_str(), H5P_DEFAULT), H5Dclose, "H5Dopen2"};
   }
 };
@@ -191,7 +200,7 @@ auto quietly(const std::string& name, Use&& use) {
   try {
     return use();
   } catch (const H5CallFailed& failure) {
-    throw FileError(name, std::string("damaged HDF5: ") + failure.what() + " fails");
+    throw FileError(name, std::string("damaged HDF5: ") + failure.what());
   }
 }
 
@@ -222,14 +231,11 @@ Hdf5Input Hdf5Input::of_bytes(std::string bytes, std::string name) {
 
 bool Hdf5Input::holds(const std::string& path) const {
   const H5Quiet quiet;
-  for (std::size_t at = path.find('/', 1);; at = path.find('/', at + 1)) {
-    const std::string part = path.substr(0, at);
-    H5L_info_t link;
-    if (H5Lexists(state_->file, part.c_str(), H5P_DEFAULT) <= 0) return false;
-    if (at == std::string::npos) return true;
-    if (H5Lget_info(state_->file, part.c_str(), &link, H5P_DEFAULT) < 0 ||
-        link.type != H5L_TYPE_HARD)
-      return false;
+  try {
+    const auto [link, part] = state_->link_at(path);
+    return link != State::Link::Absent && part.size() == path.size();
+  } catch (const H5CallFailed&) {
+    return false;
   }
 }
 
