@@ -49,8 +49,20 @@ TEST(Hdf5Input, ReadsWhatWasWritten) {
 TEST(Hdf5Input, AFileOnTheDiskIsTheSame) {
   const test::ScratchFolder folder;
   test::write_input(folder / "some.h5", some_file());
-  EXPECT_EQ(Hdf5Input::of_file(folder / "some.h5").numbers("/count", 1).values,
-            std::vector<double>{7.0});
+  const Hdf5Input file = Hdf5Input::of_file(folder / "some.h5");
+  EXPECT_EQ(file.numbers("/count", 1).values, std::vector<double>{7.0});
+  EXPECT_EQ(file.text("/text"), "of any length");
+}
+
+TEST(Hdf5Input, TextsOfOneHeapAreToldApart) {
+  Hdf5Output written;
+  for (const char* const text : {"one", "two", "three"})
+    written.add_text(std::string("/") + text, text);
+  const test::ScratchFolder folder;
+  test::write_input(folder / "texts.h5", written.bytes());
+  const Hdf5Input file = Hdf5Input::of_file(folder / "texts.h5");
+  for (const char* const text : {"three", "one", "two", "one"})
+    EXPECT_EQ(file.text(std::string("/") + text), text);
 }
 
 TEST(Hdf5Input, RefusesWhatIsNotAskedFor) {
