@@ -13,6 +13,7 @@
 #include "base/error.h"
 #include "base/number_text.h"
 #include "camera_files/format_readers.h"
+#include "geometry/camera_distance.h"
 #include "geometry/rigid_transform.h"
 #include "image_files/dicom_elements.h"
 
@@ -156,12 +157,7 @@ class DicomCamera {
       add_camera(angles_of(frame));
     }
     const auto is_as_first = [&](const StatedCamera& other) {
-      const CameraGeometry& first = stated_.cameras.front().geometry;
-      return other.geometry.source_point == first.source_point &&
-             other.geometry.detector_origin_point == first.detector_origin_point &&
-             other.geometry.column_direction == first.column_direction &&
-             other.geometry.row_direction == first.row_direction &&
-             other.geometry.pixel_spacing_mm == first.pixel_spacing_mm;
+      return camera_distance(other.geometry, stated_.cameras.front().geometry).is_none();
     };
     if (std::ranges::all_of(stated_.cameras, is_as_first)) stated_.cameras.resize(1);
     const auto rotation =

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <sstream>
+#include <string_view>
 
 #include "base/error.h"
 
@@ -308,12 +309,11 @@ std::string MotionRange::text() const {
   }
   const std::array<double, 6> from = low.deg_and_mm();
   const std::array<double, 6> to = high.deg_and_mm();
-  constexpr std::array kAxes = {"rx", "ry", "rz", "tx", "ty", "tz"};
   for (std::size_t i = 0; i < from.size(); ++i) {
     out << (i == 0   ? ""
             : i == 3 ? " degrees, "
                      : " ")
-        << kAxes[i] << ' ' << from[i] << " to " << to[i];
+        << std::string_view(kParameterNames[i]).substr(0, 2) << ' ' << from[i] << " to " << to[i];
     if (i + 1 == from.size()) out << " mm";
   }
   return out.str();

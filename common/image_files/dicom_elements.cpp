@@ -219,10 +219,7 @@ class DicomWalker {
     } else {
       need(header.length, end);
       if (header.length % unit_bytes(header.form) != 0) fail("a length that does not fit its form");
-      if (header.form == "SQ")
-        read_items(
-            encoding, at_ + header.length, false, depth + 1, kept_sequence(header.tag, into));
-      else if (is_implicit_sequence(header, into))
+      if (header.form == "SQ" || is_implicit_sequence(header, into))
         read_items(
             encoding, at_ + header.length, false, depth + 1, kept_sequence(header.tag, into));
       else if (into != nullptr && header.length <= longest_kept(header.tag) && !is_pixels)
