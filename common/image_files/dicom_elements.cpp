@@ -4,15 +4,16 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <charconv>
-#include <cmath>
 #include <cstring>
 #include <fstream>
 #include <limits>
+#include <optional>
 #include <string_view>
 
 #include "base/error.h"
 #include "base/number_text.h"
+#include "base/parsed_number.h"
+#include "base/toml_text.h"
 #include "files/input_file.h"
 #include "files/input_guard.h"
 
@@ -415,17 +416,16 @@ const DicomValues& DicomValues::item(DicomTag sequence) const {
 std::vector<double> DicomValues::numbers(DicomTag tag,
                                          const char* name,
                                          const std::string& file) const {
+  constexpr std::size_t kMostBytes = 200;  // of the text in the message
   const std::string all = text(tag);
   std::vector<double> values;
   for (std::size_t at = 0; at < all.size();) {
     const std::size_t end = std::min(all.find('\\', at), all.size());
-    std::string word = trimmed(all.substr(at, end - at));
-    if (word.starts_with('+')) word.erase(0, 1);
-    double value = 0.0;
-    const auto [rest, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-    if (error != std::errc() || rest != word.data() + word.size() || !std::isfinite(value))
-      throw InputError(name, "'" + all.substr(0, 200) + "'", "must be finite numbers", file);
-    values.push_back(value);
+    const std::optional<double> value = finite_number(trimmed(all.substr(at, end - at)));
+    if (!value)
+      throw InputError(
+          name, "'" + beginning_of(all, kMostBytes) + "'", "must be finite numbers", file);
+    values.push_back(*value);
     at = end + 1;
   }
   return values;
