@@ -23,6 +23,8 @@ spectrum (docs/spectra.md) and prints a second one. What is finished is kept.
   --fine-step-mm X          step of ray casting where casting must add nothing                        [0.25]
   --ranks N                 MPI ranks                                                           [all cores]
   --seed N                  of everything random                                                         [1]
+  --tube-kvp KV             of the X-rays                                                              [100]
+  --aluminium-mm X          their filter                                                                 [3]
   --spectra-only            without the first budget: what DRRs of the tube's spectrum do
   --quick                   small fields, 2 starts, coarse steps: to see whether it works
   --help
@@ -32,7 +34,7 @@ METHOD OPTIONS name another, such as `-- --preset paper`.
 TEXT
 }
 
-spectra_only=no
+tube_kvp=100 aluminium_mm=3 spectra_only=no
 output="$PWD/error-budget" ct="" starts_per_interval=6 intervals=4 fine_step_mm=0.25 seed=1
 ranks=$(core_count)
 field_size=(--uv-nodes 64 --st-nodes 256) codewords=16384 most_codewords=65536
@@ -47,6 +49,8 @@ while (($# > 0)); do
     --fine-step-mm) need_value "$1" $#; fine_step_mm=$2; shift ;;
     --ranks | -n) need_value "$1" $#; ranks=$2; shift ;;
     --seed) need_value "$1" $#; seed=$2; shift ;;
+    --tube-kvp) need_value "$1" $#; tube_kvp=$2; shift ;;
+    --aluminium-mm) need_value "$1" $#; aluminium_mm=$2; shift ;;
     --spectra-only) spectra_only=yes ;;
     --quick)
       starts_per_interval=1 intervals=2 fine_step_mm=2 codewords=512 most_codewords=1024
@@ -80,11 +84,9 @@ simulate() {
 }
 nothing=(--no-fiducials --scatter-to-primary 0 --photons-per-pixel 0 --blur-sigma-px 0 --bits 0)
 simulate ideal "${nothing[@]}" --tube-kvp 0
-simulate spectrum "${nothing[@]}"
-simulate xrays
-
-# What af-simulate takes unless it is told otherwise.
-tube=(--tube-kvp 100 --aluminium-mm 3)
+tube=(--tube-kvp "$tube_kvp" --aluminium-mm "$aluminium_mm")
+simulate spectrum "${nothing[@]}" "${tube[@]}"
+simulate xrays "${tube[@]}"
 
 # --- three fields per camera: by the reference caster, by shear-warp, and as they are shipped -----------------------
 
@@ -149,14 +151,15 @@ fi
 
 material=.bone field shipped --material bone --codewords "$codewords"
 register tube-spectrum spectrum --renderer raycast --step-mm "$fine_step_mm" "${tube[@]}"
-register tube-wrong spectrum --renderer raycast --step-mm "$fine_step_mm" --tube-kvp 80 --aluminium-mm 3
+register tube-wrong spectrum --renderer raycast --step-mm "$fine_step_mm" --tube-kvp $((tube_kvp - 20)) \
+  --aluminium-mm "$aluminium_mm"
 register tube-fine xrays --renderer raycast --step-mm "$fine_step_mm" "${tube[@]}"
 register tube-shipped xrays "${shipped[@]}" "${tube[@]}"
 
 "$bin/af-evaluate" error-budget \
   --step "method alone: ray casting every $fine_step_mm mm, ideal X-rays=$output/runs/raycast-ideal" \
   --step "X-rays of the tube's spectrum, DRRs of one energy=$output/runs/raycast-spectrum" \
-  --step "DRRs of a tube of 80 instead of 100 kV=$output/runs/tube-wrong" \
+  --step "DRRs of a tube of $((tube_kvp - 20)) instead of $tube_kvp kV=$output/runs/tube-wrong" \
   --step "DRRs of the tube's spectrum=$output/runs/tube-spectrum" \
   --step "X-rays: scatter, noise, blur, grey levels, pins=$output/runs/tube-fine" \
   --step "DRRs of one energy again=$output/runs/raycast-fine" \

@@ -117,6 +117,34 @@ TEST(PolychromaticDrr, GradientsAgreeWithCentralDifferences) {
   }
 }
 
+TEST(PolychromaticDrr, OfTwoFieldsHasTheGradientsOfItsValues) {
+  // Integers at the nodes, as small_field() wants them: body and bone that lean differently.
+  const auto all = small_field(
+      [](const RayNodes& at) { return 12.0 + 2.0 * at.u + at.v + 2.0 * at.s + 3.0 * at.t; }, 1);
+  const auto bone = small_field([](const RayNodes& at) { return 2.0 + at.v + at.s + at.t; }, 1);
+  const PolychromaticDrr renderer(make_field_renderer(all, "linear"),
+                                  make_field_renderer(bone, "linear"),
+                                  attenuation_of({70.0, 2.5, 40}));
+  const View view{small_camera(), {3, 2, 20, 15}};
+  const RigidTransform pose = pose_from_parameters({}, small_pose(4));
+  const std::size_t pixels = view.pixel_count();
+  std::vector<float> values(pixels);
+  std::vector<float> found(6 * pixels);
+  std::vector<float> expected(6 * pixels);
+  const auto workspace = renderer.make_workspace();
+  renderer.render(
+      pose, view, *workspace, values, PoseGradients{Eigen::Vector3d(5.0, 3.0, -8.0), found});
+  test::central_difference_gradients(
+      renderer, pose, view, *workspace, {Eigen::Vector3d(5.0, 3.0, -8.0), expected});
+  for (std::size_t k = 0; k < 6; ++k) {
+    test::PlaneProducts products;
+    products.add(std::span(found).subspan(k * pixels, pixels),
+                 std::span(expected).subspan(k * pixels, pixels));
+    // Multilinear fields leave the differences' rounding alone.
+    EXPECT_LT(products.relative_distance(), 0.01) << "parameter " << k;
+  }
+}
+
 TEST(PolychromaticDrr, CountsTheRaysThatMissEitherField) {
   const auto field = small_field([](const RayNodes&) { return 1.0; }, 1);
   const auto all = make_field_renderer(field, "linear");
