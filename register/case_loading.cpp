@@ -13,7 +13,6 @@
 #include "base/number_text.h"
 #include "base/stored_bytes.h"
 #include "drr/field_level.h"
-#include "drr/polychromatic_drr.h"
 #include "drr/ray_cast_drr.h"
 #include "drr/two_pass_af_drr.h"
 #include "field_file/field_file.h"
@@ -209,11 +208,6 @@ FieldRenderers field_renderers(const std::shared_ptr<const CompressedAttenuation
   return renderers;
 }
 
-std::shared_ptr<const PolychromaticAttenuation> attenuation_of(const CaseLoadOptions& options,
-                                                               const AttenuationModel& model) {
-  return std::make_shared<const PolychromaticAttenuation>(options.spectrum, TissueModel(model));
-}
-
 /// Collective. A field's renderers for a view; with `bone` those of the tube's spectrum, whose
 /// levels are as many as both fields have, and blurred as those of the field of all.
 void use_field(const std::shared_ptr<const CompressedAttenuationField>& field,
@@ -224,16 +218,18 @@ void use_field(const std::shared_ptr<const CompressedAttenuationField>& field,
   const int levels = bone ? std::min(level_count(*field, options), level_count(*bone, options))
                           : level_count(*field, options);
   FieldRenderers all = field_renderers(field, levels, options, communicator);
+  FieldRenderers of_bone;
   if (bone) {
-    const FieldRenderers of_bone = field_renderers(bone, levels, options, communicator);
-    const auto attenuation =
-        attenuation_of(options, {field->identity.mu_water_per_mm, field->identity.air_below_hu});
-    all.finest = std::make_shared<const PolychromaticDrr>(all.finest, of_bone.finest, attenuation);
+    of_bone = field_renderers(bone, levels, options, communicator);
     all.coarse.resize(std::min(all.coarse.size(), of_bone.coarse.size()));
-    for (std::size_t i = 0; i < all.coarse.size(); ++i)
-      all.coarse[i].renderer = std::make_shared<const PolychromaticDrr>(
-          all.coarse[i].renderer, of_bone.coarse[i].renderer, attenuation);
   }
+  of_bone.coarse.resize(all.coarse.size());
+  const auto beam = all_or_none(communicator, [&] {
+    return XrayBeam(options.beam, {field->identity.mu_water_per_mm, field->identity.air_below_hu});
+  });
+  all.finest = beam.renderer(all.finest, of_bone.finest);
+  for (std::size_t i = 0; i < all.coarse.size(); ++i)
+    all.coarse[i].renderer = beam.renderer(all.coarse[i].renderer, of_bone.coarse[i].renderer);
   view.renderer = all.finest;
   view.coarse_levels = std::move(all.coarse);
 }
@@ -257,29 +253,26 @@ std::shared_ptr<const AttenuationVolume> blurred_per_node(const AttenuationVolum
 struct CastVolumes {
   std::shared_ptr<const AttenuationVolume> all;
   std::shared_ptr<const AttenuationVolume> bone;  ///< none for DRRs of one energy
-  std::shared_ptr<const PolychromaticAttenuation> attenuation;
+  std::shared_ptr<const XrayBeam> beam;
 };
 
 /// Collective.
 CastVolumes cast_volumes(std::shared_ptr<const AttenuationVolume> all,
                          const CaseLoadOptions& options,
                          const Communicator& communicator) {
-  if (options.spectrum.is_one_energy()) return {std::move(all), nullptr, nullptr};
-  auto bone = bone_per_node(*all, communicator);
-  const auto attenuation =
-      all_or_none(communicator, [&] { return attenuation_of(options, all->model()); });
-  return {std::move(all), std::move(bone), attenuation};
+  auto bone = options.beam.needs_bone() ? bone_per_node(*all, communicator) : nullptr;
+  const auto beam = all_or_none(
+      communicator, [&] { return std::make_shared<const XrayBeam>(options.beam, all->model()); });
+  return {std::move(all), std::move(bone), beam};
 }
 
 std::shared_ptr<const DrrRenderer> ray_cast_through(const CastVolumes& volumes,
                                                     const RayCasterOptions& caster,
                                                     const CaseLoadOptions& options) {
-  auto all = std::make_shared<const RayCastDrr>(volumes.all, caster, options.pool);
-  if (!volumes.bone) return all;
-  return std::make_shared<const PolychromaticDrr>(
-      std::move(all),
-      std::make_shared<const RayCastDrr>(volumes.bone, caster, options.pool),
-      volumes.attenuation);
+  const auto cast = [&](const std::shared_ptr<const AttenuationVolume>& volume) {
+    return volume ? std::make_shared<const RayCastDrr>(volume, caster, options.pool) : nullptr;
+  };
+  return volumes.beam->renderer(cast(volumes.all), cast(volumes.bone));
 }
 
 /// Collective. A level of ray casting: the CT blurred as the fields' level blurs DRRs, sampled
@@ -417,7 +410,7 @@ void use_fields(const StudyCase& study_case,
         });
     const std::string name = "field " + view.view.camera.name;
     std::shared_ptr<const CompressedAttenuationField> bone;
-    if (!options.spectrum.is_one_energy()) {
+    if (options.beam.needs_bone()) {
       FieldFileInfo bone_info;
       bone = read_bone_field(bone_field_path(path), *field, communicator, &bone_info);
       loaded.input_sha256["bone " + name] = bone_info.payload_sha256;

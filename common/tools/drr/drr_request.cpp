@@ -8,7 +8,6 @@
 #include "base/error.h"
 #include "drr/field_renderer.h"
 #include "drr/field_set_drr.h"
-#include "drr/polychromatic_drr.h"
 #include "drr/ray_cast_drr.h"
 #include "field_file/field_file.h"
 #include "figures/picture.h"
@@ -60,8 +59,7 @@ void describe_source(Fields& field, DrrOptions& options) {
   field.at("water_mu_per_mm").help =
       "Attenuation of water, 1/mm, for ray casting (with --compare the field's own)";
   field.part(options.ray_caster);
-  field.part(options.spectrum);
-  field.at("tube_kvp").help = drr_tube_help();
+  field.part(options.beam);
 }
 
 void describe_pose(Fields& field, DrrOptions& options) {
@@ -198,11 +196,6 @@ DrrSource source_of(const DrrOptions& options) {
   return {options.ct, options.ct_reading, rig.camera(options.camera), {}, rig.isocenter_point};
 }
 
-std::shared_ptr<const PolychromaticAttenuation> attenuation_of(const DrrOptions& options,
-                                                               const AttenuationModel& model) {
-  return std::make_shared<const PolychromaticAttenuation>(options.spectrum, TissueModel(model));
-}
-
 std::shared_ptr<const DrrRenderer> cast_through(
     const std::shared_ptr<const AttenuationVolume>& volume,
     const DrrOptions& options,
@@ -210,9 +203,9 @@ std::shared_ptr<const DrrRenderer> cast_through(
   const auto caster = [&](std::shared_ptr<const AttenuationVolume> through) {
     return std::make_shared<const RayCastDrr>(std::move(through), options.ray_caster, pool);
   };
-  if (options.spectrum.is_one_energy()) return caster(volume);
-  return std::make_shared<const PolychromaticDrr>(
-      caster(volume), caster(bone_volume(*volume)), attenuation_of(options, volume->model()));
+  const XrayBeam beam(options.beam, volume->model());
+  return beam.renderer(caster(volume),
+                       options.beam.needs_bone() ? caster(bone_volume(*volume)) : nullptr);
 }
 
 CastCt ray_caster(const DrrOptions& options,
@@ -277,13 +270,11 @@ LoadedField load_field(const std::filesystem::path& path,
     return make_field_renderer(
         std::move(of), options.look_up.empty() ? info.look_up : options.look_up, pool);
   };
-  const std::shared_ptr<const DrrRenderer> all = looked_up(field);
-  if (options.spectrum.is_one_energy()) return {field, all};
-  const auto bone = read_bone_field(bone_field_path(path), *field, communicator, &info);
+  std::shared_ptr<const DrrRenderer> bone;
+  if (options.beam.needs_bone())
+    bone = looked_up(read_bone_field(bone_field_path(path), *field, communicator));
   const AttenuationModel model = {field->identity.mu_water_per_mm, field->identity.air_below_hu};
-  return {field,
-          std::make_shared<const PolychromaticDrr>(
-              all, looked_up(bone), attenuation_of(options, model))};
+  return {field, XrayBeam(options.beam, model).renderer(looked_up(field), bone)};
 }
 
 void require_same_subject(const LoadedField& first,
