@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <sstream>
 #include <utility>
 
@@ -13,9 +14,10 @@
 #include "base/number_text.h"
 #include "base/stored_bytes.h"
 #include "drr/field_level.h"
+#include "drr/field_set_drr.h"
 #include "drr/ray_cast_drr.h"
 #include "drr/two_pass_af_drr.h"
-#include "field_file/field_file.h"
+#include "field_use/opened_field.h"
 #include "files/sha256.h"
 #include "geometry/camera_distance.h"
 #include "geometry/ray_coverage.h"
@@ -151,11 +153,11 @@ FieldLevelMemory node_memory(const Communicator& communicator, ThreadPool& pool)
 
 /// The levels of a method to make of a field: those of its stages, and for judging as many as there
 /// are nodes.
-int level_count(const CompressedAttenuationField& field, const CaseLoadOptions& options) {
+int level_count(const LightSlab& light_slab, const CaseLoadOptions& options) {
   int nodes = std::numeric_limits<int>::max();
-  for (const SlabLattice& slab : field.lattice().slabs)
+  for (const SlabLattice& slab : light_slab.lattice().slabs)
     nodes = std::min({nodes, slab.s.nodes, slab.t.nodes});
-  nodes >>= halvings_to_usual_nodes(field.light_slab);
+  nodes >>= halvings_to_usual_nodes(light_slab);
   int possible = 0;
   for (; possible < options.judging_level && nodes > 2; ++possible) nodes = (nodes + 1) / 2;
   return std::max(options.coarsest_level, possible);
@@ -170,32 +172,135 @@ bool pays_to_decode(const CompressedAttenuationField& field) {
   return field.slabs.size() > 1 && decoded_bytes(field) <= kMostDecodedBytes;
 }
 
-/// Collective. A field's renderers for a view: its own, and levels 1, 2, ... of its pyramid, held
-/// once per node. A method's levels are those of a field of about 256 nodes: a finer field begins
-/// with more halvings, so that a level has about the same blur. Look-up is linear, whatever a field
-/// is meant for: cubic gives better DRRs, but not better poses (register/README.md).
-void use_field(const std::shared_ptr<const CompressedAttenuationField>& field,
+/// Renderers of one field, and the blurs of its levels 1, 2, ...
+struct FieldLevelRenderers {
+  MemberLevels renderers;  ///< its own first
+  std::vector<double> blur_sigma_mm;
+};
+
+/// Collective where the memory is. A field's renderers for a view: its own, and those of so many
+/// levels of its pyramid. A method's levels are those of a field of about 256 nodes: a finer field
+/// begins with more halvings, so that a level has about the same blur. Look-up is linear, whatever
+/// a field is meant for: cubic gives better DRRs, but not better poses (register/README.md).
+FieldLevelRenderers renderers_of(const std::shared_ptr<const CompressedAttenuationField>& field,
+                                 int levels,
+                                 const std::shared_ptr<ThreadPool>& pool,
+                                 const std::shared_ptr<ThreadPool>& coarse_pool,
+                                 const FieldLevelMemory& memory) {
+  const int more_halvings = halvings_to_usual_nodes(field->light_slab);
+  const int halvings = levels > 0 ? levels + more_halvings : 0;
+  FieldLevelRenderers made;
+  FieldLevels pyramid;
+  if (pays_to_decode(*field)) {
+    const auto samples = std::make_shared<const FieldLevel>(decode_field(*field, memory));
+    made.renderers.push_back(std::make_shared<const TwoPassAfDrr>(samples, TwoPassOptions{}, pool));
+    if (halvings > 0) pyramid = make_field_pyramid(*samples, halvings, memory);
+  } else {
+    made.renderers.push_back(std::make_shared<const TwoPassAfDrr>(field, TwoPassOptions{}, pool));
+    if (halvings > 0) pyramid = make_field_pyramid(*field, halvings, memory);
+  }
+  for (auto i = static_cast<std::size_t>(more_halvings); i < pyramid.size(); ++i) {
+    made.renderers.push_back(
+        std::make_shared<const TwoPassAfDrr>(pyramid[i], TwoPassOptions{}, coarse_pool));
+    made.blur_sigma_mm.push_back(pyramid[i]->blur_sigma_mm(true));
+  }
+  return made;
+}
+
+/// Members of an atlas that poses in the middle of its range about the nominal one are looked up
+/// in, the nominal one's first: most registrations need no others.
+std::vector<std::uint64_t> members_in_reach(const OpenedField& opened,
+                                            const PoseFrame& nominal,
+                                            const View& view) {
+  std::vector<FieldSetMember> planes;
+  for (const auto& of_member : opened.coverage().planes) planes.push_back({of_member, nullptr});
+  const FieldSetDrr set(std::move(planes));
+  constexpr double kMiddle = 0.5;
+  const MotionRange range = opened.identity().range.scaled(kMiddle);
+  std::vector<std::uint64_t> members;
+  const auto add_at = [&](const PoseParameters& parameters) {
+    const std::vector<double> weights =
+        set.weights(pose_from_parameters(nominal, parameters), view);
+    std::vector<std::uint64_t> order(weights.size());
+    std::iota(order.begin(), order.end(), std::uint64_t{0});
+    std::stable_sort(
+        order.begin(), order.end(), [&](auto a, auto b) { return weights[a] > weights[b]; });
+    for (const std::uint64_t i : order)
+      if (weights[i] > 0.0 && std::find(members.begin(), members.end(), i) == members.end())
+        members.push_back(i);
+  };
+  add_at({});
+  for (unsigned corner = 0; corner < 64; ++corner) {
+    PoseParameters parameters;
+    for (unsigned axis = 0; axis < 3; ++axis) {
+      parameters.rotation_rad[axis] =
+          ((corner >> axis & 1u) != 0 ? range.high : range.low).rotation_rad[axis];
+      parameters.translation_mm[axis] =
+          ((corner >> (axis + 3) & 1u) != 0 ? range.high : range.low).translation_mm[axis];
+    }
+    add_at(parameters);
+  }
+  return members;
+}
+
+/// Collective. An atlas's renderers for a view. Members that poses near the nominal one need are
+/// held once per node; a search that goes farther opens others, each rank for itself. Their levels
+/// carry about the same blur; that of the nominal pose's member is taken.
+void use_atlas(const OpenedField& opened,
+               const PoseFrame& nominal,
                const CaseLoadOptions& options,
                const Communicator& communicator,
                RegistrationView& view) {
   const auto pool = options.pool ? options.pool : std::make_shared<ThreadPool>();
-  const auto memory = node_memory(communicator, *pool);
-  const int more_halvings = halvings_to_usual_nodes(field->light_slab);
-  const int coarsest_level = level_count(*field, options);
-  const int halvings = coarsest_level > 0 ? coarsest_level + more_halvings : 0;
-  FieldLevels pyramid;
-  if (pays_to_decode(*field)) {
-    const auto samples = std::make_shared<const FieldLevel>(decode_field(*field, memory));
-    view.renderer = std::make_shared<const TwoPassAfDrr>(samples, TwoPassOptions{}, options.pool);
-    if (halvings > 0) pyramid = make_field_pyramid(*samples, halvings, memory);
-  } else {
-    view.renderer = std::make_shared<const TwoPassAfDrr>(field, TwoPassOptions{}, options.pool);
-    if (halvings > 0) pyramid = make_field_pyramid(*field, halvings, memory);
+  int levels = std::numeric_limits<int>::max();
+  for (const auto& planes : opened.coverage().planes)
+    levels = std::min(levels, level_count(*planes, options));
+  std::vector<std::uint64_t> near = members_in_reach(opened, nominal, view.view);
+  std::vector<std::byte> bytes = bytes_of(near);
+  communicator.broadcast(bytes);
+  near = value_of<std::vector<std::uint64_t>>(bytes, "the members of rank 0");
+  const auto open = [opened, levels, pool, own_pool = options.pool](std::size_t member) {
+    return std::make_shared<const MemberLevels>(
+        renderers_of(
+            opened.member(member, Communicator::alone()), levels, own_pool, pool, process_memory())
+            .renderers);
+  };
+  const auto members =
+      std::make_shared<MembersInUse>(open, near.size() + OpenedField::kMembersKept);
+  std::vector<double> blur_sigma_mm;
+  for (const std::uint64_t i : near) {
+    const FieldLevelRenderers made = renderers_of(opened.member(i, communicator),
+                                                  levels,
+                                                  options.pool,
+                                                  pool,
+                                                  node_memory(communicator, *pool));
+    members->keep(i, std::make_shared<const MemberLevels>(made.renderers));
+    if (blur_sigma_mm.empty()) blur_sigma_mm = made.blur_sigma_mm;
   }
-  for (auto i = static_cast<std::size_t>(more_halvings); i < pyramid.size(); ++i)
-    view.coarse_levels.push_back(
-        {std::make_shared<const TwoPassAfDrr>(pyramid[i], TwoPassOptions{}, pool),
-         pyramid[i]->blur_sigma_mm(true)});
+  const auto level = [&](std::size_t of) {
+    return std::make_shared<const FieldSetDrr>(atlas_level(opened.coverage().planes, members, of));
+  };
+  view.renderer = level(0);
+  for (std::size_t i = 0; i < blur_sigma_mm.size(); ++i)
+    view.coarse_levels.push_back({level(i + 1), blur_sigma_mm[i]});
+}
+
+/// Collective. Renderers for a view, held once per node.
+void use_field(const OpenedField& opened,
+               const PoseFrame& nominal,
+               const CaseLoadOptions& options,
+               const Communicator& communicator,
+               RegistrationView& view) {
+  if (opened.atlas()) return use_atlas(opened, nominal, options, communicator, view);
+  const auto pool = options.pool ? options.pool : std::make_shared<ThreadPool>();
+  const FieldLevelRenderers made = renderers_of(opened.field(),
+                                                level_count(opened.field()->light_slab, options),
+                                                options.pool,
+                                                pool,
+                                                node_memory(communicator, *pool));
+  view.renderer = made.renderers.front();
+  for (std::size_t i = 0; i < made.blur_sigma_mm.size(); ++i)
+    view.coarse_levels.push_back({made.renderers[i + 1], made.blur_sigma_mm[i]});
 }
 
 /// Collective. The same CT, its attenuation blurred by sigma_mm, held once per node.
@@ -265,25 +370,25 @@ std::string how(const CtReadOptions& reading) {
   return text.empty() ? "as HU" : "with " + text;
 }
 
-/// Collective. A field, checked against the CT.
-std::shared_ptr<const CompressedAttenuationField> field_of_view(const std::string& path,
-                                                                const StudyCase& study_case,
-                                                                const CaseLoadOptions& options,
-                                                                const std::optional<CtFacts>& ct,
-                                                                const Communicator& communicator,
-                                                                FieldFileInfo& info) {
-  auto field = read_field(path, communicator, &info);
+/// Collective. A field or an atlas, checked against the CT.
+OpenedField field_of_view(const std::string& path,
+                          const StudyCase& study_case,
+                          const CaseLoadOptions& options,
+                          const std::optional<CtFacts>& ct,
+                          const Communicator& communicator) {
+  OpenedField opened(path, communicator);
   all_or_none(communicator, [&] {
-    require_same_attenuation(field->identity, options, path);
-    if (ct.has_value() && ct->content_sha256 != field->identity.ct_content_sha256)
+    const FieldIdentity& identity = opened.identity();
+    require_same_attenuation(identity, options, path);
+    if (ct.has_value() && ct->content_sha256 != identity.ct_content_sha256)
       throw FileError(path,
                       "CT of the field (ct_content_sha256)",
                       ct->content_sha256 + " (" + study_case.ct.string() + ", read " +
                           how(ct_reading_in_force(options.ct, study_case.ct_reading)) + ")",
-                      field->identity.ct_content_sha256 + " (read " +
-                          how(ct_reading_of(info.provenance.options_toml)) + ")");
+                      identity.ct_content_sha256 + " (read " +
+                          how(ct_reading_of(opened.info().provenance.options_toml)) + ")");
   });
-  return field;
+  return opened;
 }
 
 /// Collective. Rank 0's box on every rank: processors may differ in its last bits.
@@ -295,34 +400,33 @@ MotionRange shared_box(MotionRange range, const Communicator& communicator) {
 }
 
 /// Collective. Which poses a field answers for, for the view's camera; says so in a note. The
-/// field's motion range speaks of its own camera; of another one its rays decide.
-std::string limit_to_rays(const FieldIdentity& identity,
-                          const LightSlab& light_slab,
-                          const std::string& path,
+/// field's motion range speaks of its own camera; of another one, and of an atlas's, its rays
+/// decide.
+std::string limit_to_rays(const OpenedField& opened,
                           const PoseFrame& nominal,
                           const Communicator& communicator,
                           RegistrationView& view) {
   const CameraGeometry& camera = view.view.camera;
-  const CameraDistance distance = camera_distance(camera, identity.camera);
-  if (distance.is_none()) {
+  const FieldIdentity& identity = opened.identity();
+  const std::string distance = opened.coverage().distance_text(camera);
+  if (opened.field() && camera_distance(camera, identity.camera).is_none()) {
     view.limit = MotionLimit{identity.frame, identity.range};
     view.reach = view.limit;
-    return distance.text() + ", " + identity.range.text();
+    return distance + ", " + identity.range.text();
   }
   const auto rays = static_cast<std::int64_t>(view.view.pixel_count());
   const std::int64_t outside =
       view.renderer->rays_outside(nominal.nominal_room_from_ct(), view.view);
   const MotionRange own_box = all_or_none(communicator, [&] {
     if (outside == rays)
-      throw FileError(path,
+      throw FileError(opened.path().string(),
                       "camera '" + camera.name + "' of the field",
                       "one that holds rays of the study's at the nominal pose",
-                      "none of them; the study's has " + distance.text());
-    return covered_box(light_slab, view.view.coarser(1).camera, nominal, identity.range);
+                      "none of them; the study's has " + distance);
+    return opened.coverage().box(view.view, nominal, identity.range);
   });
   view.reach = MotionLimit{nominal, shared_box(own_box, communicator)};
-  return distance.text() + "; " +
-         coverage_text(camera.name, rays - outside, rays, view.reach->range);
+  return distance + "; " + coverage_text(camera.name, rays - outside, rays, view.reach->range);
 }
 
 /// Collective. The fields of all views; hashes and notes go to `loaded`.
@@ -338,16 +442,14 @@ void use_fields(const StudyCase& study_case,
       return field_path_of(study_case, study_case.views[i], options).string();
     });
     const bool is_of_study = options.field_paths.count(view.view.camera.name) == 0;
-    FieldFileInfo info;
-    const auto field =
+    const OpenedField opened =
         used_from(is_of_study ? study_case.views[i].places : StudyPlaces(), "field", [&] {
-          return field_of_view(path, study_case, options, ct, communicator, info);
+          return field_of_view(path, study_case, options, ct, communicator);
         });
-    use_field(field, options, communicator, view);
+    use_field(opened, problem.frame(), options, communicator, view);
     const std::string name = "field " + view.view.camera.name;
-    loaded.input_notes[name] = limit_to_rays(
-        field->identity, field->light_slab, path, problem.frame(), communicator, view);
-    loaded.input_sha256[name] = info.payload_sha256;
+    loaded.input_notes[name] = limit_to_rays(opened, problem.frame(), communicator, view);
+    loaded.input_sha256[name] = opened.info().payload_sha256;
   }
 }
 
