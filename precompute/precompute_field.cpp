@@ -532,7 +532,8 @@ class PrecomputeRun {
             source.range,
             source.ct_content_sha256,
             model.mu_water_per_mm,
-            model.air_below_hu};
+            model.air_below_hu,
+            options_.is_of_bone() ? FieldMaterial::Bone : FieldMaterial::All};
   }
 
   /// Collective. A field, or an atlas.

@@ -15,6 +15,7 @@
 #include "base/stored_bytes.h"
 #include "drr/field_level.h"
 #include "drr/field_set_drr.h"
+#include "drr/polychromatic_drr.h"
 #include "drr/ray_cast_drr.h"
 #include "drr/two_pass_af_drr.h"
 #include "field_use/opened_field.h"
@@ -24,6 +25,7 @@
 #include "register/problem/fiducial_mask.h"
 #include "register/problem/parameter_scaling.h"
 #include "register/problem/stage_view.h"
+#include "study/bone_per_node.h"
 #include "study/ct_keys.h"
 #include "study/node_ct.h"
 #include "study/rig_file.h"
@@ -285,22 +287,41 @@ void use_atlas(const OpenedField& opened,
     view.coarse_levels.push_back({level(i + 1), blur_sigma_mm[i]});
 }
 
-/// Collective. Renderers for a view, held once per node.
+std::shared_ptr<const PolychromaticAttenuation> attenuation_of(const CaseLoadOptions& options,
+                                                               const AttenuationModel& model) {
+  return std::make_shared<const PolychromaticAttenuation>(options.spectrum, TissueModel(model));
+}
+
+/// Collective. Renderers for a view, held once per node; with `bone` those of the tube's spectrum,
+/// whose levels are as many as both fields have, and blurred as those of the field of all.
 void use_field(const OpenedField& opened,
+               const std::shared_ptr<const CompressedAttenuationField>& bone,
                const PoseFrame& nominal,
                const CaseLoadOptions& options,
                const Communicator& communicator,
                RegistrationView& view) {
   if (opened.atlas()) return use_atlas(opened, nominal, options, communicator, view);
   const auto pool = options.pool ? options.pool : std::make_shared<ThreadPool>();
-  const FieldLevelRenderers made = renderers_of(opened.field(),
-                                                level_count(opened.field()->light_slab, options),
-                                                options.pool,
-                                                pool,
-                                                node_memory(communicator, *pool));
-  view.renderer = made.renderers.front();
-  for (std::size_t i = 0; i < made.blur_sigma_mm.size(); ++i)
-    view.coarse_levels.push_back({made.renderers[i + 1], made.blur_sigma_mm[i]});
+  int levels = level_count(opened.field()->light_slab, options);
+  if (bone) levels = std::min(levels, level_count(bone->light_slab, options));
+  const auto renderers = [&](const std::shared_ptr<const CompressedAttenuationField>& field) {
+    return renderers_of(field, levels, options.pool, pool, node_memory(communicator, *pool));
+  };
+  FieldLevelRenderers all = renderers(opened.field());
+  if (bone) {
+    const FieldLevelRenderers of_bone = renderers(bone);
+    const FieldIdentity& identity = opened.identity();
+    const auto attenuation =
+        attenuation_of(options, {identity.mu_water_per_mm, identity.air_below_hu});
+    all.renderers.resize(std::min(all.renderers.size(), of_bone.renderers.size()));
+    all.blur_sigma_mm.resize(all.renderers.size() - 1);
+    for (std::size_t i = 0; i < all.renderers.size(); ++i)
+      all.renderers[i] = std::make_shared<const PolychromaticDrr>(
+          all.renderers[i], of_bone.renderers[i], attenuation);
+  }
+  view.renderer = all.renderers.front();
+  for (std::size_t i = 0; i < all.blur_sigma_mm.size(); ++i)
+    view.coarse_levels.push_back({all.renderers[i + 1], all.blur_sigma_mm[i]});
 }
 
 /// Collective. The same CT, its attenuation blurred by sigma_mm, held once per node.
@@ -318,20 +339,51 @@ std::shared_ptr<const AttenuationVolume> blurred_per_node(const AttenuationVolum
       blur.grid(), volume.model(), SharedArray<std::uint16_t>(owner, {voxels, count}));
 }
 
+/// What rays are cast through.
+struct CastVolumes {
+  std::shared_ptr<const AttenuationVolume> all;
+  std::shared_ptr<const AttenuationVolume> bone;  ///< none for DRRs of one energy
+  std::shared_ptr<const PolychromaticAttenuation> attenuation;
+};
+
+/// Collective.
+CastVolumes cast_volumes(std::shared_ptr<const AttenuationVolume> all,
+                         const CaseLoadOptions& options,
+                         const Communicator& communicator) {
+  if (options.spectrum.is_one_energy()) return {std::move(all), nullptr, nullptr};
+  auto bone = bone_per_node(*all, communicator);
+  const auto attenuation =
+      all_or_none(communicator, [&] { return attenuation_of(options, all->model()); });
+  return {std::move(all), std::move(bone), attenuation};
+}
+
+std::shared_ptr<const DrrRenderer> ray_cast_through(const CastVolumes& volumes,
+                                                    const RayCasterOptions& caster,
+                                                    const CaseLoadOptions& options) {
+  auto all = std::make_shared<const RayCastDrr>(volumes.all, caster, options.pool);
+  if (!volumes.bone) return all;
+  return std::make_shared<const PolychromaticDrr>(
+      std::move(all),
+      std::make_shared<const RayCastDrr>(volumes.bone, caster, options.pool),
+      volumes.attenuation);
+}
+
 /// Collective. A level of ray casting: the CT blurred as the fields' level blurs DRRs, sampled
 /// twice per sigma.
-std::shared_ptr<const DrrRenderer> coarse_ray_cast(const AttenuationVolume& volume,
+std::shared_ptr<const DrrRenderer> coarse_ray_cast(const CastVolumes& volumes,
                                                    double sigma_mm,
                                                    const CaseLoadOptions& options,
                                                    const Communicator& communicator) {
   RayCasterOptions caster = options.ray_caster;
   caster.step_mm = std::max(caster.step_mm, 0.5 * sigma_mm);
-  return std::make_shared<const RayCastDrr>(
-      blurred_per_node(volume, sigma_mm, communicator), caster, options.pool);
+  CastVolumes blurred = volumes;
+  blurred.all = blurred_per_node(*volumes.all, sigma_mm, communicator);
+  if (volumes.bone) blurred.bone = blurred_per_node(*volumes.bone, sigma_mm, communicator);
+  return ray_cast_through(blurred, caster, options);
 }
 
 /// Collective. Levels 1 ... coarsest_level of ray casting.
-std::vector<RendererLevel> coarse_ray_casts(const AttenuationVolume& volume,
+std::vector<RendererLevel> coarse_ray_casts(const CastVolumes& volumes,
                                             const CaseLoadOptions& options,
                                             const Communicator& communicator) {
   std::vector<RendererLevel> levels;
@@ -341,7 +393,7 @@ std::vector<RendererLevel> coarse_ray_casts(const AttenuationVolume& volume,
     const double sigma_mm = at < options.level_blur_sigma_mm.size()
                                 ? options.level_blur_sigma_mm[at]
                                 : kAssumedNodeMm * level_blur_sigma_in_nodes(level, true);
-    levels.push_back({coarse_ray_cast(volume, sigma_mm, options, communicator), sigma_mm});
+    levels.push_back({coarse_ray_cast(volumes, sigma_mm, options, communicator), sigma_mm});
   }
   return levels;
 }
@@ -414,16 +466,17 @@ std::string limit_to_rays(const OpenedField& opened,
     view.reach = view.limit;
     return distance + ", " + identity.range.text();
   }
-  const auto rays = static_cast<std::int64_t>(view.view.pixel_count());
-  const std::int64_t outside =
-      view.renderer->rays_outside(nominal.nominal_room_from_ct(), view.view);
+  const View widest = view.widest_view();
+  const auto rays = static_cast<std::int64_t>(widest.pixel_count());
+  const std::int64_t outside = view.renderer->rays_outside(nominal.nominal_room_from_ct(), widest);
   const MotionRange own_box = all_or_none(communicator, [&] {
-    if (outside == rays)
+    if (outside > 0)
       throw FileError(opened.path().string(),
                       "camera '" + camera.name + "' of the field",
-                      "one that holds rays of the study's at the nominal pose",
-                      "none of them; the study's has " + distance);
-    return opened.coverage().box(view.view, nominal, identity.range);
+                      "one that holds all rays of twice the study's region at the nominal pose",
+                      std::to_string(rays - outside) + " of " + std::to_string(rays) +
+                          " rays; the study's has " + distance);
+    return opened.coverage().box(widest, nominal, identity.range);
   });
   view.reach = MotionLimit{nominal, shared_box(own_box, communicator)};
   return distance + "; " + coverage_text(camera.name, rays - outside, rays, view.reach->range);
@@ -446,8 +499,14 @@ void use_fields(const StudyCase& study_case,
         used_from(is_of_study ? study_case.views[i].places : StudyPlaces(), "field", [&] {
           return field_of_view(path, study_case, options, ct, communicator);
         });
-    use_field(opened, problem.frame(), options, communicator, view);
     const std::string name = "field " + view.view.camera.name;
+    std::shared_ptr<const CompressedAttenuationField> bone;
+    if (!options.spectrum.is_one_energy()) {
+      FieldFileInfo bone_info;
+      bone = opened.bone_field(communicator, &bone_info);
+      loaded.input_sha256["bone " + name] = bone_info.payload_sha256;
+    }
+    use_field(opened, bone, problem.frame(), options, communicator, view);
     loaded.input_notes[name] = limit_to_rays(opened, problem.frame(), communicator, view);
     loaded.input_sha256[name] = opened.info().payload_sha256;
   }
@@ -462,7 +521,7 @@ double mean_blur_mm(const RegistrationProblem& problem, int level) {
 }
 
 /// Collective. Ray casting beside the fields, at the levels that a correction needs.
-void add_ray_casts(const AttenuationVolume& volume,
+void add_ray_casts(const CastVolumes& volumes,
                    const std::shared_ptr<const DrrRenderer>& renderer,
                    const CaseLoadOptions& options,
                    const Communicator& communicator,
@@ -470,7 +529,7 @@ void add_ray_casts(const AttenuationVolume& volume,
   for (const int level : options.correction_levels) {
     const auto ray_cast =
         level == 0 ? renderer
-                   : coarse_ray_cast(volume, mean_blur_mm(problem, level), options, communicator);
+                   : coarse_ray_cast(volumes, mean_blur_mm(problem, level), options, communicator);
     for (RegistrationView& view : problem.views) {
       view.ray_casts.resize(static_cast<std::size_t>(level) + 1);
       view.ray_casts.back() = ray_cast;
@@ -517,13 +576,13 @@ LoadedCase load_case(const Study& study,
   problem->target_points_ct = ct_lattice_points(study_case.target_box_ct, kTargetPointsPerAxis);
   const bool looks_up = options.renderer == RendererKind::Field;
   std::optional<CtFacts> ct;
-  std::shared_ptr<const AttenuationVolume> volume;
+  CastVolumes volumes;
   std::shared_ptr<const DrrRenderer> ray_cast;
   if (!looks_up || !options.correction_levels.empty()) {
     const NodeCt node_ct = read_node_ct(study_case, options, communicator, loaded.warnings);
     ct = node_ct.facts;
-    volume = node_ct.volume;
-    ray_cast = std::make_shared<const RayCastDrr>(volume, options.ray_caster, options.pool);
+    volumes = cast_volumes(node_ct.volume, options, communicator);
+    ray_cast = ray_cast_through(volumes, options.ray_caster, options);
   } else if (!options.skip_ct_check) {
     ct = used_from(study_case.places, "ct", [&] {
       return read_ct_facts(study_case.ct,
@@ -535,9 +594,9 @@ LoadedCase load_case(const Study& study,
   }
   if (looks_up) {
     use_fields(study_case, options, communicator, ct, *problem, loaded);
-    if (volume) add_ray_casts(*volume, ray_cast, options, communicator, *problem);
+    if (volumes.all) add_ray_casts(volumes, ray_cast, options, communicator, *problem);
   } else {
-    const auto levels = coarse_ray_casts(*volume, options, communicator);
+    const auto levels = coarse_ray_casts(volumes, options, communicator);
     for (RegistrationView& view : problem->views) {
       view.renderer = ray_cast;
       view.coarse_levels = levels;

@@ -38,6 +38,8 @@ void run(const RegisterOptions& options,
     af::throw_if_any(problems(options));
     RegistrationOptions resolved = resolve(options.method);
     resolved.correction = options.correction;
+    if (options.skip_ct_check && resolved.silhouette_mm() > 0.0)
+      throw af::InputError(kSilhouettesNeedTheCt);
     return resolved;
   });
   af::RunFolder folder({options.output_folder, result_file_names(), options.resume.restarts},

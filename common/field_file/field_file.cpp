@@ -151,19 +151,22 @@ struct FileContents {
   IndexPacking packing = IndexPacking::CodebookTree;
   std::string ct_sha256;
   std::vector<Dataset> payload;
-  std::vector<Dataset> beside;  ///< not of the payload: ranges that two numbers do not state
+  std::vector<Dataset> beside;  ///< not of the payload: ranges that two numbers do not state, bone
   std::vector<DatasetRule> indices;
   std::uint64_t payload_bytes = 0;
 };
 
 FileContents contents_of(const CompressedAttenuationField& field, IndexPacking packing) {
-  return {field_layout::kFormat,
-          packing,
-          field.identity.ct_content_sha256,
-          field_layout::datasets_of(field),
-          field_layout::range_datasets(field.identity.range),
-          index_rules(field.lattice()),
-          field_layout::payload_bytes(field.codebook, field.lattice())};
+  FileContents contents = {field_layout::kFormat,
+                           packing,
+                           field.identity.ct_content_sha256,
+                           field_layout::datasets_of(field),
+                           field_layout::range_datasets(field.identity.range),
+                           index_rules(field.lattice()),
+                           field_layout::payload_bytes(field.codebook, field.lattice())};
+  for (Dataset& dataset : field_layout::material_datasets(field.identity.material))
+    contents.beside.push_back(std::move(dataset));
+  return contents;
 }
 
 FileContents contents_of(const AttenuationAtlas& atlas, IndexPacking packing) {
@@ -474,17 +477,20 @@ void share(FieldFileInfo& info, const Communicator& communicator) {
 
 /// A field of a file, before its indices are read.
 struct FieldHeader {
-  std::vector<Dataset> payload;  ///< with the codebook, which an atlas's members share
-  std::vector<Dataset> range;    ///< empty: two numbers of the payload state it
+  std::vector<Dataset> payload;   ///< with the codebook, which an atlas's members share
+  std::vector<Dataset> range;     ///< empty: two numbers of the payload state it
+  std::vector<Dataset> material;  ///< empty: all of the CT
   std::vector<DatasetRule> index_rules;
   std::vector<std::string> index_sha256;
 
-  auto members() { return std::tie(payload, range, index_sha256); }
+  auto members() { return std::tie(payload, range, material, index_sha256); }
   /// Without indices. FileError.
   [[nodiscard]] CompressedAttenuationField field(const std::string& path) const {
     CompressedAttenuationField field = field_layout::field_of(payload, path);
     if (!range.empty())
       field.identity.range = field_layout::range_of(range, field.identity.range, path);
+    if (!material.empty())
+      field.identity.material = field_layout::material_of(material.front(), path);
     return field;
   }
 };
@@ -611,6 +617,9 @@ FieldHeader read_field_of(hid_t file,
                                  path.string());
   header.payload.insert(header.payload.end(), shared.begin(), shared.end());
   header.range = read_range(file, group, path.string());
+  const DatasetRule material = of_group({field_layout::material_rule()}).front();
+  if (checked(H5Lexists(file, material.name.c_str(), H5P_DEFAULT), "H5Lexists") > 0)
+    header.material.push_back(hdf5::read_dataset(file, material, path.string()));
   header.index_rules = of_group(index_rules(header.field(path.string()).lattice()));
   for (const DatasetRule& rule : header.index_rules) {
     check_plausible_size(rule, of_file.file_bytes, path);
@@ -937,9 +946,60 @@ CompressedAttenuationField read_field_header(const std::filesystem::path& path) 
       path, [&] { return read_header_of(false, path).fields.front().field(path.string()); });
 }
 
+std::filesystem::path bone_field_path(const std::filesystem::path& path) {
+  std::string name = path.filename().string();
+  std::size_t ending = name.find(".af.h5");
+  if (ending == std::string::npos) ending = name.rfind('.');
+  name.insert(std::min(ending, name.size()), ".bone");
+  return path.parent_path() / name;
+}
+
 std::shared_ptr<const CompressedAttenuationField> read_field(const std::filesystem::path& path,
                                                              const Communicator& communicator,
                                                              FieldFileInfo* info) {
+  auto field = read_field_of_any_material(path, communicator, info);
+  all_or_none(communicator, [&] {
+    if (field->identity.material != FieldMaterial::All)
+      throw FileError(path.string(), "/material", "a field of all of the CT", "of its bone alone");
+  });
+  return field;
+}
+
+std::shared_ptr<const CompressedAttenuationField> read_bone_field(
+    const std::filesystem::path& path,
+    const CompressedAttenuationField& of_all,
+    const Communicator& communicator,
+    FieldFileInfo* info) {
+  all_or_none(communicator, [&] {
+    if (!std::filesystem::exists(path))
+      throw FileError(path.string(),
+                      "does not exist: a tube voltage needs the field of the CT's bone, which "
+                      "af-precompute --material bone makes with the other options of the field "
+                      "beside it");
+  });
+  auto field = read_field_of_any_material(path, communicator, info);
+  const FieldIdentity& wanted = of_all.identity;
+  const FieldIdentity& found = field->identity;
+  all_or_none(communicator, [&] {
+    if (found.material != FieldMaterial::Bone)
+      throw FileError(path.string(), "/material", "a field of the CT's bone alone", "of all of it");
+    if (found.ct_content_sha256 != wanted.ct_content_sha256)
+      throw FileError(path.string(),
+                      "CT of the field (ct_content_sha256)",
+                      wanted.ct_content_sha256 + " (that of the field of all)",
+                      found.ct_content_sha256);
+    if (found.mu_water_per_mm != wanted.mu_water_per_mm ||
+        found.air_below_hu != wanted.air_below_hu)
+      throw FileError(path.string(),
+                      "attenuation",
+                      "mu_water and the HU that count as air as in the field of all",
+                      "others");
+  });
+  return field;
+}
+
+std::shared_ptr<const CompressedAttenuationField> read_field_of_any_material(
+    const std::filesystem::path& path, const Communicator& communicator, FieldFileInfo* info) {
   const hdf5::QuietErrors quiet;
   const FileHeader header = shared_header(false, path, communicator);
   auto field = field_with_indices(header.fields.front(), path, communicator);

@@ -129,10 +129,29 @@ CompressedAttenuationField read_field_header(const std::filesystem::path& path);
 
 /// Collective. Rank 0 reads and verifies (extents against dataspaces before allocating, checksums,
 /// index range), the rest receive it; indices are held once per node. FileError (exit 4) on
-/// anything that does not fit: names path, dataset, expected, found.
+/// anything that does not fit: names path, dataset, expected, found. A field of bone's part alone
+/// is refused, too.
 std::shared_ptr<const CompressedAttenuationField> read_field(const std::filesystem::path& path,
                                                              const Communicator& communicator,
                                                              FieldFileInfo* info = nullptr);
+
+/// Collective. The field of bone's part that belongs to a field of all: FileError, beside those of
+/// read_field(), when it is missing, or of all of a CT, of another CT or another attenuation. Its
+/// camera, range and design may be others.
+std::shared_ptr<const CompressedAttenuationField> read_bone_field(
+    const std::filesystem::path& path,
+    const CompressedAttenuationField& of_all,
+    const Communicator& communicator,
+    FieldFileInfo* info = nullptr);
+
+/// Collective. Either.
+std::shared_ptr<const CompressedAttenuationField> read_field_of_any_material(
+    const std::filesystem::path& path,
+    const Communicator& communicator,
+    FieldFileInfo* info = nullptr);
+
+/// Where programs look for the field of bone's part beside a field: A.bone.af.h5 beside A.af.h5.
+std::filesystem::path bone_field_path(const std::filesystem::path& path);
 
 /// One rank alone, and quick: whether a file says that it is an atlas. FileError when it is neither
 /// atlas nor field.

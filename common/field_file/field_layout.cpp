@@ -15,6 +15,7 @@ namespace af::field_layout {
 namespace {
 
 constexpr std::uint64_t kMaxNameBytes = 4096;
+constexpr const char* kBoneText = "bone";
 
 DatasetRule step_rule() {
   return {"/codebook/quantizer_step", ElementType::Float32, {1}, false, "1 per level", "none"};
@@ -378,6 +379,22 @@ std::vector<DatasetRule> index_rules(const FieldLattice& lattice) {
   std::vector<DatasetRule> rules;
   for (std::size_t k = 0; k < lattice.slabs.size(); ++k) rules.push_back(index_rule(lattice, k));
   return rules;
+}
+
+DatasetRule material_rule() {
+  constexpr std::uint64_t kMostBytes = 64;
+  return {"/material", ElementType::Text, {kMostBytes}, true, "1", "none"};
+}
+
+std::vector<Dataset> material_datasets(FieldMaterial material) {
+  if (material == FieldMaterial::All) return {};
+  return {dataset_of<char>(material_rule(), stored_text(kBoneText))};
+}
+
+FieldMaterial material_of(const Dataset& dataset, const std::string& path) {
+  const std::string text = text_of(dataset);
+  if (text != kBoneText) throw FileError(path, dataset.rule.name, kBoneText, text);
+  return FieldMaterial::Bone;
 }
 
 std::vector<DatasetRule> provenance_rules() {

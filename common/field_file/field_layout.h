@@ -108,6 +108,13 @@ MotionRange range_of(std::span<const Dataset> datasets,
                      const MotionRange& stated,
                      const std::string& path);
 
+/// Says in a field of bone's part alone that it is one, beside the payload; none for others. Older
+/// programs do not see it.
+std::vector<Dataset> material_datasets(FieldMaterial material);
+DatasetRule material_rule();
+/// FileError when it names no material that a field has.
+FieldMaterial material_of(const Dataset& dataset, const std::string& path);
+
 /// Takes the geometry from the first datasets; returns the others. FileError on NaN and infinity.
 std::span<const Dataset> set_geometry(std::span<const Dataset> datasets,
                                       const std::string& path,

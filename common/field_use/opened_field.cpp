@@ -8,7 +8,9 @@
 
 namespace af {
 
-OpenedField::OpenedField(const std::filesystem::path& path, const Communicator& communicator)
+OpenedField::OpenedField(const std::filesystem::path& path,
+                         const Communicator& communicator,
+                         Materials materials)
     : path_(path) {
   std::string kind;
   all_or_none(communicator, [&] {
@@ -19,13 +21,26 @@ OpenedField::OpenedField(const std::filesystem::path& path, const Communicator& 
     atlas_ = read_atlas(path, communicator, &info_);
     coverage_ = FieldCoverage(atlas_);
   } else {
-    field_ = read_field(path, communicator, &info_);
+    field_ = materials == Materials::Any ? read_field_of_any_material(path, communicator, &info_)
+                                         : read_field(path, communicator, &info_);
     coverage_ = FieldCoverage(field_);
   }
 }
 
 std::size_t OpenedField::codewords() const {
   return atlas_ ? atlas_->codebook.size() : field_->codebook.size();
+}
+
+std::shared_ptr<const CompressedAttenuationField> OpenedField::bone_field(
+    const Communicator& communicator, FieldFileInfo* info) const {
+  all_or_none(communicator, [&] {
+    if (atlas_)
+      throw InputError("tube voltage",
+                       "given",
+                       "needs a field of the CT's bone, which an atlas does not have: use fields",
+                       path_.string());
+  });
+  return read_bone_field(bone_field_path(path_), *field_, communicator, info);
 }
 
 std::shared_ptr<const CompressedAttenuationField> OpenedField::member(

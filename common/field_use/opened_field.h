@@ -20,8 +20,13 @@ namespace af {
 /// A field with its indices, or an atlas whose members are read when they are needed.
 class OpenedField {
  public:
-  /// Collective. Errors of read_field() and read_atlas().
-  OpenedField(const std::filesystem::path& path, const Communicator& communicator);
+  enum class Materials { All, Any };
+
+  /// Collective. Errors of read_field() and read_atlas(); a field of bone alone is refused, too,
+  /// unless any will do.
+  OpenedField(const std::filesystem::path& path,
+              const Communicator& communicator,
+              Materials materials = Materials::All);
 
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
   [[nodiscard]] const FieldFileInfo& info() const { return info_; }
@@ -38,6 +43,11 @@ class OpenedField {
   /// The planes of the field, or of every member.
   [[nodiscard]] const FieldCoverage& coverage() const { return coverage_; }
   [[nodiscard]] std::size_t codewords() const;
+
+  /// Collective. The field of the CT's bone beside it, for DRRs of a tube's spectrum. Errors of
+  /// read_bone_field(); InputError for an atlas, which has none.
+  [[nodiscard]] std::shared_ptr<const CompressedAttenuationField> bone_field(
+      const Communicator& communicator, FieldFileInfo* info = nullptr) const;
 
   /// Collective for a communicator of ranks. A member of an atlas.
   [[nodiscard]] std::shared_ptr<const CompressedAttenuationField> member(

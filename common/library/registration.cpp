@@ -79,6 +79,8 @@ registration::CaseLoadOptions load_options(const RegistrationOptions& options,
     throw af::InputError(
         "correct = set: must not be given with skip_ct_check, because it casts rays through the "
         "CT");
+  if (options.skip_ct_check && method.silhouette_mm() > 0.0)
+    throw af::InputError(registration::kSilhouettesNeedTheCt);
   if (options.correct && casts) throw af::InputError(registration::kCorrectsRayCasting);
   registration::CaseLoadOptions result;
   result.renderer = casts ? registration::RendererKind::RayCast : registration::RendererKind::Field;

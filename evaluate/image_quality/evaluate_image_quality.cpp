@@ -14,6 +14,7 @@
 #include "base/toml_text.h"
 #include "cli/bind_options.h"
 #include "drr/field_renderer.h"
+#include "drr/polychromatic_drr.h"
 #include "drr/ray_cast_drr.h"
 #include "evaluate/image_quality/image_quality_tables.h"
 #include "evaluate/image_quality/loss_split.h"
@@ -32,6 +33,7 @@
 #include "pose_files/pose_file.h"
 #include "run/run_folder.h"
 #include "run/terminal.h"
+#include "study/bone_per_node.h"
 #include "study/ct_keys.h"
 #include "study/node_ct.h"
 #include "study/pose_context.h"
@@ -70,6 +72,8 @@ struct TargetResult {
 /// Everything a comparison needs, the same on every rank.
 struct Setup {
   std::shared_ptr<const OpenedField> field;
+  std::shared_ptr<const CompressedAttenuationField> bone_field;  ///< none for one energy
+  FieldFileInfo bone_info;
   NodeCt ct;
   std::vector<RigidTransform> poses;  ///< empty: random ones
   View view;
@@ -115,6 +119,8 @@ void choose_camera(const Target& target, Setup& setup) {
 Setup load(const ImageQualityOptions& options, const Target& target, const Communicator& world) {
   Setup setup;
   setup.field = std::make_shared<const OpenedField>(target.field, world);
+  if (!options.spectrum.is_one_energy())
+    setup.bone_field = setup.field->bone_field(world, &setup.bone_info);
   const FieldIdentity& identity = setup.field->identity();
   std::vector<std::string> warnings;
   setup.ct = read_ct_per_node(target.ct,
@@ -308,6 +314,35 @@ std::vector<LossSplit> split_losses(const ImageQualityOptions& options,
       });
 }
 
+using RendererPointer = std::shared_ptr<const DrrRenderer>;
+
+/// The renderers that are compared.
+struct Renderers {
+  RendererPointer field;
+  RendererPointer ray_cast;
+};
+
+/// Collective.
+Renderers renderers_of(const ImageQualityOptions& options,
+                       const Setup& setup,
+                       const Communicator& world) {
+  const auto cast = [&](const std::shared_ptr<const AttenuationVolume>& volume) {
+    return std::make_shared<const RayCastDrr>(volume, options.ray_caster);
+  };
+  const RendererPointer field = setup.field->renderer(options.look_up);
+  if (!setup.bone_field) return {field, cast(setup.ct.volume)};
+  const auto bone = bone_per_node(*setup.ct.volume, world);
+  const auto attenuation = all_or_none(world, [&] {
+    return std::make_shared<const PolychromaticAttenuation>(options.spectrum,
+                                                            TissueModel(setup.ct.volume->model()));
+  });
+  const auto joined = [&](const RendererPointer& all, const RendererPointer& of_bone) {
+    return std::make_shared<const PolychromaticDrr>(all, of_bone, attenuation);
+  };
+  return {joined(field, make_field_renderer(setup.bone_field, setup.look_up(options))),
+          joined(cast(setup.ct.volume), cast(bone))};
+}
+
 /// Collective. Compares one field and writes its folder; the result is rank 0's.
 TargetResult evaluate_target(const ImageQualityOptions& options,
                              const Target& target,
@@ -318,9 +353,8 @@ TargetResult evaluate_target(const ImageQualityOptions& options,
     if (world.is_root()) make_output_folder(target.folder);
   });
   const Setup setup = load(options, target, world);
-  const auto field = setup.field->renderer(options.look_up);
-  const RayCastDrr ray_cast(setup.ct.volume, options.ray_caster);
-  DrrComparer comparer(*field, ray_cast, setup.view);
+  const auto [field, ray_cast] = renderers_of(options, setup, world);
+  DrrComparer comparer(*field, *ray_cast, setup.view);
   Provenance provenance = {"af-evaluate image-quality",
                            command_line,
                            to_toml(options),
@@ -328,12 +362,15 @@ TargetResult evaluate_target(const ImageQualityOptions& options,
                            world.size(),
                            {{"field " + setup.view.camera.name, setup.field->info().payload_sha256},
                             {"ct", setup.ct.facts.content_sha256}}};
+  if (setup.bone_field)
+    provenance.input_sha256["bone field " + setup.view.camera.name] =
+        setup.bone_info.payload_sha256;
   all_or_none(world, [&] {
     if (world.is_root() && !options.poses.empty())
       provenance.input_sha256["poses"] = sha256_of_file(options.poses.string());
     if (world.is_root() && !options.rig.empty())
       for (const std::filesystem::path& file : rig_files(options.rig))
-        provenance.input_sha256["rig"] = sha256_of_file(file.string());
+        provenance.input_sha256["rig " + file.filename().string()] = sha256_of_file(file.string());
   });
   const std::string name = target.folder.filename().string();
   const auto unfinished = [&](const std::string& what) {
@@ -355,7 +392,7 @@ TargetResult evaluate_target(const ImageQualityOptions& options,
         return compare(options, setup, comparer, index);
       });
   const std::vector<LossSplit> splits =
-      split_losses(options, setup, *field, ray_cast, comparer, unfinished("-losses"), world);
+      split_losses(options, setup, *field, *ray_cast, comparer, unfinished("-losses"), world);
   all_or_none(world, [&] {
     if (world.is_root())
       write_results(options, target, setup, comparer, splits, result, provenance);
@@ -464,6 +501,8 @@ void ImageQualityOptions::describe(Fields& field_list) {
              "and quantisation; some ten ray-cast DRRs each")
       .at_least(0);
   field_list.part(ray_caster);
+  field_list.part(spectrum);
+  field_list.at("tube_kvp").help = drr_tube_help();
   field_list.part(ct_reading);
   field_list("seed", seed, "Of the random poses");
   field_list.part(resume);
@@ -480,6 +519,9 @@ std::vector<std::string> problems(const ImageQualityOptions& options) {
   if (options.split_loss_poses > 0 && !options.look_up.empty() && options.look_up != "linear")
     found.push_back("--split-loss-poses = " + std::to_string(options.split_loss_poses) +
                     ": must be 0 for a look-up other than linear");
+  if (options.split_loss_poses > 0 && !options.spectrum.is_one_energy())
+    found.push_back("--split-loss-poses = " + std::to_string(options.split_loss_poses) +
+                    ": must be 0 with --tube-kvp, whose DRRs are of two fields");
   return found;
 }
 

@@ -10,6 +10,7 @@
 #include "parallel/communicator.h"
 #include "register/field_paths.h"
 #include "register/method/method_options.h"
+#include "spectrum/xray_spectrum.h"
 #include "study/study_file.h"
 #include "volume/ray_caster.h"
 
@@ -25,6 +26,7 @@ struct MethodOptions {
   registration::MethodOptions method;
   AttenuationModel attenuation;  ///< of ray casting
   RayCasterOptions ray_caster;
+  SpectrumOptions spectrum = SpectrumOptions::one_energy();
   CtReadOptions ct;
 
   /// Renderers in the order of rows: "field" before "raycast".

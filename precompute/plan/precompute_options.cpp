@@ -133,6 +133,12 @@ void describe_casting(Fields& field, PrecomputeOptions& options) {
   step.help = "Trilinear caster: largest distance of samples along a ray, mm";
   field.part(options.attenuation);
   field.at("water_mu_per_mm").decides(kCastingStage);
+  field("material",
+        options.material,
+        "What of the CT the field holds: all, or bone alone, for DRRs of a tube's spectrum, which "
+        "programs look for in FIELD.bone.af.h5 beside FIELD.af.h5 (docs/spectra.md)")
+      .one_of({"all", "bone"})
+      .decides(kCastingStage);
 }
 
 void describe_codebook(Fields& field, PrecomputeOptions& options) {
@@ -290,6 +296,8 @@ std::vector<std::string> problems(const PrecomputeOptions& options) {
   std::vector<std::string> found = problems(options.range());  // UsageError where it is no range
   if (!options.orbit.empty()) (void)orbit_of_text("--orbit", options.orbit);  // likewise
   append(field_problems(options), found);
+  if (options.is_atlas() && options.is_of_bone())
+    found.emplace_back("material = bone: an atlas is of all of a CT; leave --orbit out");
   append(problems(options.codebook_options()), found);
   append(problems(options.training_selection()), found);
   if (options.limits().max_field_bytes && !options.packs_by_codebook_tree())

@@ -57,6 +57,7 @@ struct PrecomputeOptions {
   std::string caster = "shear-warp";
   RayCasterOptions ray_caster;  ///< of the trilinear caster
   AttenuationModel attenuation;
+  std::string material = "all";  ///< or "bone"
 
   std::optional<int> codewords;
   int max_iterations = CodebookOptions{}.max_iterations;
@@ -98,6 +99,7 @@ struct PrecomputeOptions {
   [[nodiscard]] TrainingSelection training_selection(int for_codewords) const;
   [[nodiscard]] CodebookOptions codebook_options() const;
   [[nodiscard]] StPlane st_plane_rule() const;
+  [[nodiscard]] bool is_of_bone() const { return material == "bone"; }
 
   void describe(Fields& field);
   /// With the design, unless a probe has to choose it, and the rule that places the (s,t) planes.

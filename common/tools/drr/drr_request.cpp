@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "drr/field_renderer.h"
+#include "drr/polychromatic_drr.h"
 #include "drr/ray_cast_drr.h"
 #include "field_use/opened_field.h"
 #include "figures/picture.h"
@@ -16,6 +17,7 @@
 #include "image_files/ct_reader.h"
 #include "image_files/image_file.h"
 #include "pose_files/pose_file.h"
+#include "spectrum/bone_volume.h"
 #include "study/ct_keys.h"
 #include "study/pose_context.h"
 #include "study/rig_file.h"
@@ -58,6 +60,8 @@ void describe_source(Fields& field, DrrOptions& options) {
   field.at("water_mu_per_mm").help =
       "Attenuation of water, 1/mm, for ray casting (with --compare the field's own)";
   field.part(options.ray_caster);
+  field.part(options.spectrum);
+  field.at("tube_kvp").help = drr_tube_help();
 }
 
 void describe_pose(Fields& field, DrrOptions& options) {
@@ -194,6 +198,23 @@ DrrSource source_of(const DrrOptions& options) {
   return {options.ct, options.ct_reading, rig.camera(options.camera), {}, rig.isocenter_point};
 }
 
+std::shared_ptr<const PolychromaticAttenuation> attenuation_of(const DrrOptions& options,
+                                                               const AttenuationModel& model) {
+  return std::make_shared<const PolychromaticAttenuation>(options.spectrum, TissueModel(model));
+}
+
+std::shared_ptr<const DrrRenderer> cast_through(
+    const std::shared_ptr<const AttenuationVolume>& volume,
+    const DrrOptions& options,
+    const std::shared_ptr<ThreadPool>& pool) {
+  const auto caster = [&](std::shared_ptr<const AttenuationVolume> through) {
+    return std::make_shared<const RayCastDrr>(std::move(through), options.ray_caster, pool);
+  };
+  if (options.spectrum.is_one_energy()) return caster(volume);
+  return std::make_shared<const PolychromaticDrr>(
+      caster(volume), caster(bone_volume(*volume)), attenuation_of(options, volume->model()));
+}
+
 CastCt ray_caster(const DrrOptions& options,
                   const DrrSource& source,
                   const std::optional<FieldIdentity>& field,
@@ -210,8 +231,7 @@ CastCt ray_caster(const DrrOptions& options,
     // --compare compares ways to render, so the reference takes the field's HU model.
     model = {field->mu_water_per_mm, field->air_below_hu};
   }
-  return {std::make_shared<const RayCastDrr>(
-              std::make_shared<const AttenuationVolume>(ct, model), options.ray_caster, pool),
+  return {cast_through(std::make_shared<const AttenuationVolume>(ct, model), options, pool),
           ct.grid.center_mm()};
 }
 
@@ -254,19 +274,38 @@ void require_same_subject(const FieldIdentity& wanted,
                      "must have the attenuation of --field: mu_water and the HU that count as air");
 }
 
+/// The field, or every member of an atlas, to be looked up; with a tube's spectrum a field together
+/// with that of the bone beside it.
+std::vector<FieldSetMember> renderers_of(const OpenedField& opened,
+                                         const DrrOptions& options,
+                                         const std::shared_ptr<ThreadPool>& pool,
+                                         const Communicator& communicator) {
+  std::vector<FieldSetMember> members = opened.renderers(options.look_up, pool);
+  if (options.spectrum.is_one_energy()) return members;
+  FieldFileInfo info;
+  auto bone = opened.bone_field(communicator, &info);
+  const FieldIdentity& identity = opened.identity();
+  members.front().renderer = std::make_shared<const PolychromaticDrr>(
+      members.front().renderer,
+      make_field_renderer(
+          std::move(bone), options.look_up.empty() ? info.look_up : options.look_up, pool),
+      attenuation_of(options, {identity.mu_water_per_mm, identity.air_below_hu}));
+  return members;
+}
+
 /// The field's renderer; with further fields, or of an atlas, that of the set.
 std::shared_ptr<const DrrRenderer> renderer_of(const OpenedField& first,
                                                const DrrOptions& options,
                                                const std::shared_ptr<ThreadPool>& pool,
                                                const Communicator& communicator) {
-  if (options.more_fields.empty()) return first.renderer(options.look_up, pool);
-  std::vector<FieldSetMember> members = first.renderers(options.look_up, pool);
+  std::vector<FieldSetMember> members = renderers_of(first, options, pool, communicator);
   for (const std::string& path : options.more_fields) {
     const OpenedField other(path, communicator);
     require_same_subject(first.identity(), other.identity(), path);
-    for (FieldSetMember& member : other.renderers(options.look_up, pool))
+    for (FieldSetMember& member : renderers_of(other, options, pool, communicator))
       members.push_back(std::move(member));
   }
+  if (members.size() == 1) return members.front().renderer;
   return std::make_shared<const FieldSetDrr>(std::move(members));
 }
 

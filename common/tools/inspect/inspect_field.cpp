@@ -148,7 +148,7 @@ void verify_members(const OpenedField& opened, const Communicator& communicator)
 void inspect_field(const std::filesystem::path& path,
                    const Communicator& communicator,
                    Inspection& inspection) {
-  const OpenedField opened(path, communicator);
+  const OpenedField opened(path, communicator, OpenedField::Materials::Any);
   const FieldFileInfo& info = opened.info();
   const AttenuationAtlas* const atlas = opened.atlas().get();
   if (atlas != nullptr) verify_members(opened, communicator);
@@ -156,6 +156,7 @@ void inspect_field(const std::filesystem::path& path,
   ordered_json& facts = inspection.facts;
   facts["checksums"] = "verified";
   facts["payload_sha256"] = info.payload_sha256;
+  facts["material"] = opened.identity().material == FieldMaterial::Bone ? "bone" : "all";
   describe_identity(opened.identity(), facts);
   if (atlas != nullptr) {
     facts["field_coverage"] = coverage_of(opened, opened.identity().camera);

@@ -11,32 +11,15 @@
 #include "base/hash_random.h"
 #include "geometry/camera_distance.h"
 #include "geometry/orbit.h"
+#include "support/c_arm_camera.h"
 
 namespace af {
 namespace {
 
-CameraGeometry c_arm_camera() {
-  CameraGeometry camera;
-  camera.name = "AP";
-  camera.source_point = {0.0, -650.0, 0.0};
-  camera.column_direction = {1.0, 0.0, 0.0};
-  camera.row_direction = {0.0, 0.0, -1.0};
-  camera.pixel_spacing_mm = {1.190625, 1.190625};
-  camera.size_px = {256, 256};
-  camera.detector_origin_point = {-151.8046875, 370.0, 151.8046875};
-  return camera;
-}
-
 CameraGeometry moved(const CameraGeometry& camera,
                      const Eigen::Vector3d& angles_rad,
                      const Eigen::Vector3d& shift_mm) {
-  const Eigen::Matrix3d turn = rotation_from_angles(angles_rad);
-  CameraGeometry other = camera;
-  other.source_point = turn * camera.source_point + shift_mm;
-  other.detector_origin_point = turn * camera.detector_origin_point + shift_mm;
-  other.column_direction = turn * camera.column_direction;
-  other.row_direction = turn * camera.row_direction;
-  return other;
+  return test::moved_camera(camera, rotation_from_angles(angles_rad), shift_mm);
 }
 
 LightSlab planes_of(const CameraGeometry& camera,
@@ -96,9 +79,9 @@ PoseParameters sampled(const MotionRange& range, int index, HashRandom& random) 
 
 TEST(RayCoverage, OfAFieldsOwnCameraIsItsRange) {
   const MotionRange range{8.0 * kRadPerDeg, 25.0};
-  const LightSlab planes = planes_of(c_arm_camera(), {}, range);
-  EXPECT_TRUE(covers_range(planes, c_arm_camera(), {}, range));
-  const MotionRange box = covered_box(planes, c_arm_camera(), {}, range);
+  const LightSlab planes = planes_of(test::paper_camera(), {}, range);
+  EXPECT_TRUE(covers_range(planes, test::paper_camera(), {}, range));
+  const MotionRange box = covered_box(planes, test::paper_camera(), {}, range);
   // The planes are larger by kExtentMargin only, and the search stops at its tolerance.
   EXPECT_GE(box.max_rotation_rad(), range.max_rotation_rad());
   EXPECT_LE(box.max_rotation_rad(), range.max_rotation_rad() * (1.0 + kCoveredBoxTolerance));
@@ -108,7 +91,7 @@ TEST(RayCoverage, OfAFieldsOwnCameraIsItsRange) {
 
 TEST(RayCoverage, SaysWhatSampledRaysSay) {
   const MotionRange range{8.0 * kRadPerDeg, 25.0};
-  const CameraGeometry nominal = c_arm_camera();
+  const CameraGeometry nominal = test::paper_camera();
   const LightSlab planes = planes_of(nominal, {}, range);
   CameraGeometry cropped = nominal;
   cropped.size_px = {100, 120};
@@ -136,9 +119,9 @@ TEST(RayCoverage, SaysWhatSampledRaysSay) {
 
 TEST(RayCoverage, IsNoneForACameraAcross) {
   const MotionRange range{8.0 * kRadPerDeg, 25.0};
-  const LightSlab planes = planes_of(c_arm_camera(), {}, range);
+  const LightSlab planes = planes_of(test::paper_camera(), {}, range);
   const CameraGeometry across =
-      moved(c_arm_camera(), {0.0, 0.0, std::numbers::pi / 2.0}, Eigen::Vector3d::Zero());
+      moved(test::paper_camera(), {0.0, 0.0, std::numbers::pi / 2.0}, Eigen::Vector3d::Zero());
   const MotionRange box = covered_box(planes, across, {}, range);
   EXPECT_EQ(box.max_rotation_rad(), 0.0);
   EXPECT_FALSE(covers_range(planes, across, {}, box));
@@ -193,7 +176,7 @@ TEST(MotionRange, EveryPoseOfRandomRangesIsCoveredForRandomCameras) {
     frame.rotation = rotation_from_angles(anywhere(0.6));
     frame.center_ct_mm = anywhere(40.0);
     frame.center_room_mm = anywhere(10.0);
-    const CameraGeometry camera = moved(c_arm_camera(), anywhere(3.0), anywhere(10.0));
+    const CameraGeometry camera = moved(test::paper_camera(), anywhere(3.0), anywhere(10.0));
     // Bounds on either side of zero, or both on the same.
     MotionRange range;
     for (int axis = 0; axis < 3; ++axis) {
@@ -233,7 +216,7 @@ struct RandomOrbit {
     frame.center_ct_mm = anywhere(40.0);
     frame.center_room_mm = anywhere(20.0);
     isocenter_point = anywhere(20.0);
-    camera = moved(c_arm_camera(), anywhere(0.3), anywhere(10.0));
+    camera = moved(test::paper_camera(), anywhere(0.3), anywhere(10.0));
     for (int axis = 0; axis < 3; ++axis) {
       range.low.rotation_rad[axis] = -random.uniform(0.0, 0.2);
       range.high.rotation_rad[axis] = random.uniform(0.0, 0.2);
@@ -316,7 +299,7 @@ TEST(Orbit, AboutZMembersTileAnglesOfCamerasAndPoses) {
   orbit.to_rad = 90.0 * kRadPerDeg;
   const MotionRange range{10.0 * kRadPerDeg, 30.0};
   const std::vector<OrbitMember> members =
-      orbit_members(c_arm_camera(), {0, 0, 0}, {}, range, orbit);
+      orbit_members(test::paper_camera(), {0, 0, 0}, {}, range, orbit);
   // -100 to 100 degrees in steps of at most 20, with a member about 0.
   ASSERT_EQ(members.size(), 11U);
   const double half = 100.0 / 11.0;
@@ -324,7 +307,7 @@ TEST(Orbit, AboutZMembersTileAnglesOfCamerasAndPoses) {
   EXPECT_EQ(members[5].angle_rad, 0.0);
   EXPECT_EQ(members[5].camera.name, "AP_z0");
   EXPECT_EQ(members[6].camera.name, "AP_z18.18");
-  EXPECT_EQ(members[5].camera.source_point, c_arm_camera().source_point);
+  EXPECT_EQ(members[5].camera.source_point, test::paper_camera().source_point);
   const MotionRange& of_member = members.front().range;
   EXPECT_NEAR(of_member.high.rotation_rad.z() * kDegPerRad, half, 1e-6);
   EXPECT_EQ(of_member.high.rotation_rad.x(), range.high.rotation_rad.x());
@@ -336,7 +319,7 @@ TEST(Orbit, AboutZMembersTileAnglesOfCamerasAndPoses) {
   // An orbit beside 0 is cut into equal parts.
   orbit.from_rad = 30.0 * kRadPerDeg;
   const std::vector<OrbitMember> beside =
-      orbit_members(c_arm_camera(), {0, 0, 0}, {}, range, orbit);
+      orbit_members(test::paper_camera(), {0, 0, 0}, {}, range, orbit);
   ASSERT_EQ(beside.size(), 4U);
   EXPECT_NEAR(beside[0].angle_rad * kDegPerRad, 30.0, 1e-9);
   EXPECT_NEAR(beside[3].angle_rad * kDegPerRad, 90.0, 1e-9);
@@ -347,7 +330,7 @@ TEST(Orbit, AboutZMembersTileAnglesOfCamerasAndPoses) {
 TEST(Orbit, IsRefusedWhenItTakesTooManyFieldsOrIsNone) {
   const MotionRange range{10.0 * kRadPerDeg, 30.0};
   const auto members_of = [&](const Orbit& orbit) {
-    return orbit_members(c_arm_camera(), {0, 0, 0}, {}, range, orbit);
+    return orbit_members(test::paper_camera(), {0, 0, 0}, {}, range, orbit);
   };
   EXPECT_THROW(members_of({2, 1.0, -1.0, {}}), InputError);
   EXPECT_THROW(members_of({2, -1.0, 1.0, 0.0}), InputError);
@@ -357,7 +340,7 @@ TEST(Orbit, IsRefusedWhenItTakesTooManyFieldsOrIsNone) {
 }
 
 TEST(CameraDistance, IsWhatACalibrationChanged) {
-  const CameraGeometry nominal = c_arm_camera();
+  const CameraGeometry nominal = test::paper_camera();
   EXPECT_TRUE(camera_distance(nominal, nominal).is_none());
   const CameraDistance distance =
       camera_distance(moved(nominal, {0, 0, 0.0174533}, {0, 0, 5}), nominal);

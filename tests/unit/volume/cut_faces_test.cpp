@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "volume/cut_faces.h"
 
+#include <array>
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -10,16 +11,17 @@ namespace {
 
 constexpr int kCtSide = 24;
 
-/// 24^3 voxels of 1 mm, -1000 HU but 500 HU where `is_bone`.
+/// Voxels of 1 mm, -1000 HU but 500 HU where `is_bone`.
 template <typename IsBone>
-CtVolume ct_of(const IsBone& is_bone) {
+CtVolume ct_of(const IsBone& is_bone,
+               const std::array<int, 3>& size = {kCtSide, kCtSide, kCtSide}) {
   CtVolume ct;
-  ct.grid.size = {kCtSide, kCtSide, kCtSide};
+  ct.grid.size = size;
   ct.grid.origin_mm = {10.0, 20.0, 30.0};
   std::vector<std::int16_t> hu;
-  for (int k = 0; k < kCtSide; ++k)
-    for (int j = 0; j < kCtSide; ++j)
-      for (int i = 0; i < kCtSide; ++i)
+  for (int k = 0; k < size[2]; ++k)
+    for (int j = 0; j < size[1]; ++j)
+      for (int i = 0; i < size[0]; ++i)
         hu.push_back(static_cast<std::int16_t>(is_bone(i, j, k) ? 500 : -1000));
   ct.hu = SharedArray<std::int16_t>(std::move(hu));
   return ct;
@@ -49,10 +51,15 @@ TEST(CutFaces, OfABodyWithinTheCtAreNone) {
   EXPECT_TRUE(cut_points(ct, AttenuationModel{}).empty());
 }
 
-TEST(CutFaces, AreFewPointsHoweverLargeTheCut) {
+TEST(CutFaces, OfFewVoxelsKeepThemAll) {
   const CtVolume ct = ct_of([](int /*i*/, int /*j*/, int /*k*/) { return true; });
-  const auto points = cut_points(ct, AttenuationModel{});
-  EXPECT_EQ(points.size(), 6u * kCtSide * kCtSide);  // 576 a face, which is few
+  EXPECT_EQ(cut_points(ct, AttenuationModel{}).size(), 6u * kCtSide * kCtSide);
+}
+
+TEST(CutFaces, OfManyVoxelsKeepOneInAFew) {
+  const CtVolume ct = ct_of([](int /*i*/, int /*j*/, int /*k*/) { return true; }, {60, 60, 8});
+  // Two faces of 3600 voxels, of which every other is kept, and four of 480.
+  EXPECT_EQ(cut_points(ct, AttenuationModel{}).size(), 2u * 1800 + 4u * 480);
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "evaluate/registration/population_statistics.h"
+#include "evaluate/population/population_statistics.h"
 
 #include <cmath>
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "base/described_fields.h"
-#include "simulation/tissue_model.h"
+#include "spectrum/tissue_model.h"
 
 namespace af {
 
@@ -15,10 +15,17 @@ struct SpectrumOptions {
   double aluminium_mm = 3.0;  ///< total filtration
   int energy_bins = 40;       ///< of equal width between 10 keV and the tube voltage
 
+  /// The effective energy alone: Beer and Lambert's law.
+  static SpectrumOptions one_energy();
+  [[nodiscard]] bool is_one_energy() const { return tube_kvp == 0.0; }
+
   void describe(Fields& field);
 };
 
 std::vector<std::string> problems(const SpectrumOptions& options);
+
+/// Help of `tube_kvp` where DRRs are made.
+const char* drr_tube_help();
 
 /// One energy bin.
 struct SpectrumBin {
@@ -32,7 +39,8 @@ struct SpectrumBin {
 /// and the detector's own absorption are left out.
 std::vector<SpectrumBin> tube_spectrum(const SpectrumOptions& options, double effective_energy_kev);
 
-/// Lengths of material along one ray; water and bone as in PathIntegrals.
+/// Lengths of material along one ray: of water and bone, mm of water that attenuate alike at the
+/// effective energy.
 struct RayMaterials {
   double water_mm = 0.0;
   double bone_mm = 0.0;

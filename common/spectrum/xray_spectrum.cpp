@@ -1,11 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "simulation/xray_spectrum.h"
+#include "spectrum/xray_spectrum.h"
 
 #include <cmath>
 
-#include "simulation/material_tables.h"
+#include "spectrum/material_tables.h"
 
 namespace af {
+
+SpectrumOptions SpectrumOptions::one_energy() {
+  SpectrumOptions options;
+  options.tube_kvp = 0.0;
+  return options;
+}
 
 void SpectrumOptions::describe(Fields& field) {
   field("tube_kvp", tube_kvp, "Tube voltage, kV; 0: only the HU scale's effective energy")
@@ -16,13 +22,19 @@ void SpectrumOptions::describe(Fields& field) {
   field("energy_bins", energy_bins, "Energy bins of the spectrum, at least 20").within(20, 1000);
 }
 
+const char* drr_tube_help() {
+  return "DRRs of the X-rays of a tube of this voltage, kV, through water and bone "
+         "(docs/spectra.md); fields need their bone's part, FIELD.bone.af.h5. 0: of one energy, "
+         "the HU scale's effective one";
+}
+
 std::vector<std::string> problems(const SpectrumOptions& options) {
   return field_problems(options);
 }
 
 std::vector<SpectrumBin> tube_spectrum(const SpectrumOptions& options,
                                        double effective_energy_kev) {
-  if (options.tube_kvp == 0.0) return {{effective_energy_kev, 1.0}};
+  if (options.is_one_energy()) return {{effective_energy_kev, 1.0}};
   std::vector<SpectrumBin> bins;
   const double width_kev = (options.tube_kvp - kLowestTableEnergyKev) / options.energy_bins;
   double sum = 0.0;
