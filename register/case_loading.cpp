@@ -15,7 +15,6 @@
 #include "base/stored_bytes.h"
 #include "drr/field_level.h"
 #include "drr/field_set_drr.h"
-#include "drr/polychromatic_drr.h"
 #include "drr/ray_cast_drr.h"
 #include "drr/two_pass_af_drr.h"
 #include "field_use/opened_field.h"
@@ -245,6 +244,15 @@ std::vector<std::uint64_t> members_in_reach(const OpenedField& opened,
   return members;
 }
 
+/// Collective.
+XrayBeam beam_of(const FieldIdentity& identity,
+                 const CaseLoadOptions& options,
+                 const Communicator& communicator) {
+  return all_or_none(communicator, [&] {
+    return XrayBeam(options.beam, {identity.mu_water_per_mm, identity.air_below_hu});
+  });
+}
+
 /// Collective. An atlas's renderers for a view. Members that poses near the nominal one need are
 /// held once per node; a search that goes farther opens others, each rank for itself. Their levels
 /// carry about the same blur; that of the nominal pose's member is taken.
@@ -279,17 +287,15 @@ void use_atlas(const OpenedField& opened,
     members->keep(i, std::make_shared<const MemberLevels>(made.renderers));
     if (blur_sigma_mm.empty()) blur_sigma_mm = made.blur_sigma_mm;
   }
+  const XrayBeam beam = beam_of(opened.identity(), options, communicator);
   const auto level = [&](std::size_t of) {
-    return std::make_shared<const FieldSetDrr>(atlas_level(opened.coverage().planes, members, of));
+    return beam.renderer(
+        std::make_shared<const FieldSetDrr>(atlas_level(opened.coverage().planes, members, of)),
+        nullptr);
   };
   view.renderer = level(0);
   for (std::size_t i = 0; i < blur_sigma_mm.size(); ++i)
     view.coarse_levels.push_back({level(i + 1), blur_sigma_mm[i]});
-}
-
-std::shared_ptr<const PolychromaticAttenuation> attenuation_of(const CaseLoadOptions& options,
-                                                               const AttenuationModel& model) {
-  return std::make_shared<const PolychromaticAttenuation>(options.spectrum, TissueModel(model));
 }
 
 /// Collective. Renderers for a view, held once per node; with `bone` those of the tube's spectrum,
@@ -308,17 +314,16 @@ void use_field(const OpenedField& opened,
     return renderers_of(field, levels, options.pool, pool, node_memory(communicator, *pool));
   };
   FieldLevelRenderers all = renderers(opened.field());
+  FieldLevelRenderers of_bone;
   if (bone) {
-    const FieldLevelRenderers of_bone = renderers(bone);
-    const FieldIdentity& identity = opened.identity();
-    const auto attenuation =
-        attenuation_of(options, {identity.mu_water_per_mm, identity.air_below_hu});
+    of_bone = renderers(bone);
     all.renderers.resize(std::min(all.renderers.size(), of_bone.renderers.size()));
     all.blur_sigma_mm.resize(all.renderers.size() - 1);
-    for (std::size_t i = 0; i < all.renderers.size(); ++i)
-      all.renderers[i] = std::make_shared<const PolychromaticDrr>(
-          all.renderers[i], of_bone.renderers[i], attenuation);
   }
+  of_bone.renderers.resize(all.renderers.size());
+  const XrayBeam beam = beam_of(opened.identity(), options, communicator);
+  for (std::size_t i = 0; i < all.renderers.size(); ++i)
+    all.renderers[i] = beam.renderer(all.renderers[i], of_bone.renderers[i]);
   view.renderer = all.renderers.front();
   for (std::size_t i = 0; i < all.blur_sigma_mm.size(); ++i)
     view.coarse_levels.push_back({all.renderers[i + 1], all.blur_sigma_mm[i]});
@@ -343,29 +348,26 @@ std::shared_ptr<const AttenuationVolume> blurred_per_node(const AttenuationVolum
 struct CastVolumes {
   std::shared_ptr<const AttenuationVolume> all;
   std::shared_ptr<const AttenuationVolume> bone;  ///< none for DRRs of one energy
-  std::shared_ptr<const PolychromaticAttenuation> attenuation;
+  std::shared_ptr<const XrayBeam> beam;
 };
 
 /// Collective.
 CastVolumes cast_volumes(std::shared_ptr<const AttenuationVolume> all,
                          const CaseLoadOptions& options,
                          const Communicator& communicator) {
-  if (options.spectrum.is_one_energy()) return {std::move(all), nullptr, nullptr};
-  auto bone = bone_per_node(*all, communicator);
-  const auto attenuation =
-      all_or_none(communicator, [&] { return attenuation_of(options, all->model()); });
-  return {std::move(all), std::move(bone), attenuation};
+  auto bone = options.beam.needs_bone() ? bone_per_node(*all, communicator) : nullptr;
+  const auto beam = all_or_none(
+      communicator, [&] { return std::make_shared<const XrayBeam>(options.beam, all->model()); });
+  return {std::move(all), std::move(bone), beam};
 }
 
 std::shared_ptr<const DrrRenderer> ray_cast_through(const CastVolumes& volumes,
                                                     const RayCasterOptions& caster,
                                                     const CaseLoadOptions& options) {
-  auto all = std::make_shared<const RayCastDrr>(volumes.all, caster, options.pool);
-  if (!volumes.bone) return all;
-  return std::make_shared<const PolychromaticDrr>(
-      std::move(all),
-      std::make_shared<const RayCastDrr>(volumes.bone, caster, options.pool),
-      volumes.attenuation);
+  const auto cast = [&](const std::shared_ptr<const AttenuationVolume>& volume) {
+    return volume ? std::make_shared<const RayCastDrr>(volume, caster, options.pool) : nullptr;
+  };
+  return volumes.beam->renderer(cast(volumes.all), cast(volumes.bone));
 }
 
 /// Collective. A level of ray casting: the CT blurred as the fields' level blurs DRRs, sampled
@@ -501,7 +503,7 @@ void use_fields(const StudyCase& study_case,
         });
     const std::string name = "field " + view.view.camera.name;
     std::shared_ptr<const CompressedAttenuationField> bone;
-    if (!options.spectrum.is_one_energy()) {
+    if (options.beam.needs_bone()) {
       FieldFileInfo bone_info;
       bone = opened.bone_field(communicator, &bone_info);
       loaded.input_sha256["bone " + name] = bone_info.payload_sha256;

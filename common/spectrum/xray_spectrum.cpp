@@ -22,12 +22,6 @@ void SpectrumOptions::describe(Fields& field) {
   field("energy_bins", energy_bins, "Energy bins of the spectrum, at least 20").within(20, 1000);
 }
 
-const char* drr_tube_help() {
-  return "DRRs of the X-rays of a tube of this voltage, kV, through water and bone "
-         "(docs/spectra.md); fields need their bone's part, FIELD.bone.af.h5. 0: of one energy, "
-         "the HU scale's effective one";
-}
-
 std::vector<std::string> problems(const SpectrumOptions& options) {
   return field_problems(options);
 }

@@ -24,9 +24,6 @@ struct SpectrumOptions {
 
 std::vector<std::string> problems(const SpectrumOptions& options);
 
-/// Help of `tube_kvp` where DRRs are made.
-const char* drr_tube_help();
-
 /// One energy bin.
 struct SpectrumBin {
   double energy_kev;  ///< centre

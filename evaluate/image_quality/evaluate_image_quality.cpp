@@ -14,7 +14,6 @@
 #include "base/toml_text.h"
 #include "cli/bind_options.h"
 #include "drr/field_renderer.h"
-#include "drr/polychromatic_drr.h"
 #include "drr/ray_cast_drr.h"
 #include "evaluate/image_quality/image_quality_tables.h"
 #include "evaluate/image_quality/loss_split.h"
@@ -119,7 +118,7 @@ void choose_camera(const Target& target, Setup& setup) {
 Setup load(const ImageQualityOptions& options, const Target& target, const Communicator& world) {
   Setup setup;
   setup.field = std::make_shared<const OpenedField>(target.field, world);
-  if (!options.spectrum.is_one_energy())
+  if (options.beam.needs_bone())
     setup.bone_field = setup.field->bone_field(world, &setup.bone_info);
   const FieldIdentity& identity = setup.field->identity();
   std::vector<std::string> warnings;
@@ -329,18 +328,14 @@ Renderers renderers_of(const ImageQualityOptions& options,
   const auto cast = [&](const std::shared_ptr<const AttenuationVolume>& volume) {
     return std::make_shared<const RayCastDrr>(volume, options.ray_caster);
   };
+  const auto beam =
+      all_or_none(world, [&] { return XrayBeam(options.beam, setup.ct.volume->model()); });
   const RendererPointer field = setup.field->renderer(options.look_up);
-  if (!setup.bone_field) return {field, cast(setup.ct.volume)};
+  if (!setup.bone_field)
+    return {beam.renderer(field, nullptr), beam.renderer(cast(setup.ct.volume), nullptr)};
   const auto bone = bone_per_node(*setup.ct.volume, world);
-  const auto attenuation = all_or_none(world, [&] {
-    return std::make_shared<const PolychromaticAttenuation>(options.spectrum,
-                                                            TissueModel(setup.ct.volume->model()));
-  });
-  const auto joined = [&](const RendererPointer& all, const RendererPointer& of_bone) {
-    return std::make_shared<const PolychromaticDrr>(all, of_bone, attenuation);
-  };
-  return {joined(field, make_field_renderer(setup.bone_field, setup.look_up(options))),
-          joined(cast(setup.ct.volume), cast(bone))};
+  const RendererPointer bone_field = make_field_renderer(setup.bone_field, setup.look_up(options));
+  return {beam.renderer(field, bone_field), beam.renderer(cast(setup.ct.volume), cast(bone))};
 }
 
 /// Collective. Compares one field and writes its folder; the result is rank 0's.
@@ -501,8 +496,7 @@ void ImageQualityOptions::describe(Fields& field_list) {
              "and quantisation; some ten ray-cast DRRs each")
       .at_least(0);
   field_list.part(ray_caster);
-  field_list.part(spectrum);
-  field_list.at("tube_kvp").help = drr_tube_help();
+  field_list.part(beam);
   field_list.part(ct_reading);
   field_list("seed", seed, "Of the random poses");
   field_list.part(resume);
@@ -519,9 +513,9 @@ std::vector<std::string> problems(const ImageQualityOptions& options) {
   if (options.split_loss_poses > 0 && !options.look_up.empty() && options.look_up != "linear")
     found.push_back("--split-loss-poses = " + std::to_string(options.split_loss_poses) +
                     ": must be 0 for a look-up other than linear");
-  if (options.split_loss_poses > 0 && !options.spectrum.is_one_energy())
+  if (options.split_loss_poses > 0 && !options.beam.is_ordinary())
     found.push_back("--split-loss-poses = " + std::to_string(options.split_loss_poses) +
-                    ": must be 0 with --tube-kvp, whose DRRs are of two fields");
+                    ": must be 0 with --tube-kvp and --scatter-to-primary");
   return found;
 }
 

@@ -8,9 +8,9 @@
 
 #include "cli/app_forward.h"
 #include "cli/run_limits.h"
+#include "drr/xray_beam.h"
 #include "image_files/ct_reader.h"
 #include "parallel/communicator.h"
-#include "spectrum/xray_spectrum.h"
 #include "volume/ray_caster.h"
 
 namespace af::evaluation {
@@ -28,7 +28,7 @@ struct ImageQualityOptions {
   std::string look_up;       ///< empty: the field's own
   int split_loss_poses = 0;  ///< so many poses' losses are split
   RayCasterOptions ray_caster;
-  SpectrumOptions spectrum = SpectrumOptions::one_energy();
+  XrayBeamOptions beam;
   CtReadOptions ct_reading;
   std::uint64_t seed = 1;
   cli::ResumeOptions resume;

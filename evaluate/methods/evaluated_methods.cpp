@@ -32,8 +32,7 @@ void MethodOptions::describe(Fields& field) {
   field.part(attenuation);
   field.at("water_mu_per_mm").help = "Attenuation of water for ray casting, 1/mm";
   field.part(ray_caster);
-  field.part(spectrum);
-  field.at("tube_kvp").help = drr_tube_help();
+  field.part(beam);
   field.part(ct);
 }
 

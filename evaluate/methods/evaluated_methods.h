@@ -6,11 +6,11 @@
 #include <vector>
 
 #include "cli/app_forward.h"
+#include "drr/xray_beam.h"
 #include "image_files/ct_reader.h"
 #include "parallel/communicator.h"
 #include "register/field_paths.h"
 #include "register/method/method_options.h"
-#include "spectrum/xray_spectrum.h"
 #include "study/study_file.h"
 #include "volume/ray_caster.h"
 
@@ -26,7 +26,7 @@ struct MethodOptions {
   registration::MethodOptions method;
   AttenuationModel attenuation;  ///< of ray casting
   RayCasterOptions ray_caster;
-  SpectrumOptions spectrum = SpectrumOptions::one_energy();
+  XrayBeamOptions beam;
   CtReadOptions ct;
 
   /// Renderers in the order of rows: "field" before "raycast".

@@ -3,7 +3,8 @@
 
 #include <algorithm>
 #include <cctype>
-#include <cmath>
+#include <map>
+#include <numeric>
 #include <span>
 #include <utility>
 
@@ -32,9 +33,30 @@ std::vector<IntervalSuccess> intervals_of(const std::vector<TreOutcome>& outcome
       outcomes, counting.intervals, counting.interval_width_mm, counting.success_mm);
 }
 
-/// The numbers of starts of one interval stay; which of them succeed is drawn with replacement,
-/// that is binomial.
-MeanInterval capture_interval(const std::vector<IntervalSuccess>& intervals, std::uint64_t seed) {
+/// Rates that an interval may truly have had. Looked up, because many intervals have the same few
+/// starts.
+class PlausibleRates {
+ public:
+  /// `share` in [0, 1) says which of them.
+  double at(const IntervalSuccess& interval, double share) {
+    std::vector<double>& rates = rates_[{interval.successes, interval.trials}];
+    if (rates.empty())
+      for (int i = 0; i < kRates; ++i)
+        rates.push_back(plausible_rate(interval.successes, interval.trials, (i + 0.5) / kRates));
+    return rates[static_cast<std::size_t>(share * kRates)];
+  }
+
+ private:
+  static constexpr int kRates = 256;
+  std::map<std::pair<std::int64_t, std::int64_t>, std::vector<double>> rates_;
+};
+
+/// What else the patient's capture range might have come out as: the number of starts of an
+/// interval stays, its true rate is one that its successes leave plausible, and the starts that
+/// succeed are drawn by it. Two successes of two starts say little about an interval.
+MeanInterval capture_interval(const std::vector<IntervalSuccess>& intervals,
+                              std::uint64_t seed,
+                              PlausibleRates& rates) {
   constexpr int kReplicates = 1000;
   std::vector<double> ranges_mm;
   for (int replicate = 0; replicate < kReplicates; ++replicate) {
@@ -42,7 +64,7 @@ MeanInterval capture_interval(const std::vector<IntervalSuccess>& intervals, std
     std::vector<IntervalSuccess> drawn = intervals;
     for (IntervalSuccess& interval : drawn) {
       if (interval.trials == 0) continue;
-      const double rate = interval.rate();
+      const double rate = rates.at(interval, random.uniform());
       interval.successes = 0;
       for (std::int64_t i = 0; i < interval.trials; ++i)
         interval.successes += random.uniform() < rate ? 1 : 0;
@@ -53,14 +75,87 @@ MeanInterval capture_interval(const std::vector<IntervalSuccess>& intervals, std
   return {quantile(ranges_mm, 0.025), quantile(ranges_mm, 0.975)};
 }
 
-/// Interval k, or all together, of some patients.
-struct Counts {
-  std::int64_t trials = 0;
-  std::int64_t successes = 0;
-  [[nodiscard]] double rate() const {
-    return trials > 0 ? static_cast<double>(successes) / static_cast<double>(trials) : kNan;
+double mean_of(const std::vector<double>& values) {
+  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+}
+
+/// What a statistic of patients becomes when patients are drawn again.
+template <typename Statistic>
+CaseBootstrap resampled(std::size_t patients,
+                        const PopulationCounting& counting,
+                        const Statistic& statistic) {
+  return bootstrap_over_cases(patients, statistic, counting.seed);
+}
+
+/// The starts of some patients together.
+IntervalSuccess sum_of(const std::vector<PatientSuccess>& patients,
+                       std::span<const std::size_t> drawn) {
+  IntervalSuccess sum;
+  for (const std::size_t i : drawn) {
+    sum.trials += patients[i].starts;
+    sum.successes += patients[i].successes;
   }
-};
+  return sum;
+}
+
+/// Over patients: of all starts; Student's interval is of the mean of the patients' own rates.
+OverPatients rate_over(const std::vector<PatientSuccess>& patients,
+                       const PopulationCounting& counting) {
+  OverPatients rate;
+  IntervalSuccess all;
+  std::vector<double> rates;
+  for (const PatientSuccess& patient : patients) {
+    const IntervalSuccess own{0.0, 0.0, patient.starts, patient.successes, {}};
+    all.trials += own.trials;
+    all.successes += own.successes;
+    rates.push_back(own.rate());
+  }
+  rate.value = all.rate();
+  rate.student = student_interval(rates);
+  rate.bootstrap = resampled(patients.size(), counting, [&](std::span<const std::size_t> drawn) {
+    return sum_of(patients, drawn).rate();
+  });
+  return rate;
+}
+
+/// Mean over patients of their own capture ranges.
+OverPatients capture_over(const std::vector<PatientSuccess>& patients,
+                          const PopulationCounting& counting) {
+  std::vector<double> ranges_mm;
+  for (const PatientSuccess& patient : patients)
+    ranges_mm.push_back(patient.capture.initial_tre_mm);
+  OverPatients capture_mm;
+  capture_mm.value = mean_of(ranges_mm);
+  capture_mm.student = student_interval(ranges_mm);
+  capture_mm.bootstrap =
+      resampled(patients.size(), counting, [&](std::span<const std::size_t> drawn) {
+        std::vector<double> of_drawn_mm;
+        for (const std::size_t i : drawn) of_drawn_mm.push_back(ranges_mm[i]);
+        return mean_of(of_drawn_mm);
+      });
+  return capture_mm;
+}
+
+/// All starts together, interval by interval, and what that becomes when patients are drawn again.
+void pool_intervals(const std::vector<std::vector<IntervalSuccess>>& own,
+                    const PopulationCounting& counting,
+                    PopulationSuccess& result) {
+  result.pooled = capture_range(result.intervals);
+  result.pooled_interval_mm =
+      resampled(own.size(), counting, [&](std::span<const std::size_t> drawn) {
+        return capture_range(pooled_intervals(own, drawn)).initial_tre_mm;
+      });
+  for (std::size_t k = 0; k < result.intervals.size(); ++k)
+    result.interval_bootstraps.push_back(
+        resampled(own.size(), counting, [&](std::span<const std::size_t> drawn) {
+          IntervalSuccess sum;
+          for (const std::size_t i : drawn) {
+            sum.trials += own[i][k].trials;
+            sum.successes += own[i][k].successes;
+          }
+          return sum.rate();
+        }));
+}
 
 }  // namespace
 
@@ -95,9 +190,8 @@ PopulationSuccess population_success(const std::vector<const PatientOutcomes*>& 
                                      const PopulationCounting& counting) {
   PopulationSuccess result;
   std::vector<std::vector<IntervalSuccess>> own;  // per patient
-  std::vector<double> rates;
-  std::vector<double> ranges_mm;
   std::vector<TreOutcome> all;
+  PlausibleRates rates;
   for (const PatientOutcomes* patient : patients) {
     const std::vector<TreOutcome>& outcomes = ends_of(*patient, end);
     own.push_back(intervals_of(outcomes, counting));
@@ -109,56 +203,15 @@ PopulationSuccess population_success(const std::vector<const PatientOutcomes*>& 
     success.wilson = wilson_interval(success.successes, success.starts);
     success.capture = capture_range(own.back());
     success.capture_interval_mm =
-        capture_interval(own.back(), hash64(counting.seed, hash_name(patient->patient)));
+        capture_interval(own.back(), hash64(counting.seed, hash_name(patient->patient)), rates);
     result.starts += success.starts;
     result.successes += success.successes;
-    rates.push_back(Counts{success.starts, success.successes}.rate());
-    ranges_mm.push_back(success.capture.initial_tre_mm);
     result.patients.push_back(std::move(success));
   }
-  const auto resampled = [&](const auto& statistic) {
-    return bootstrap_over_cases(patients.size(), statistic, counting.seed);
-  };
-  result.rate.value = Counts{result.starts, result.successes}.rate();
-  result.rate.student = student_interval(rates);
-  result.rate.bootstrap = resampled([&](std::span<const std::size_t> drawn) {
-    Counts sum;
-    for (const std::size_t i : drawn) {
-      sum.trials += result.patients[i].starts;
-      sum.successes += result.patients[i].successes;
-    }
-    return sum.rate();
-  });
-  const auto mean_range = [&](std::span<const std::size_t> drawn) {
-    double sum_mm = 0.0;
-    for (const std::size_t i : drawn) sum_mm += ranges_mm[i];
-    return sum_mm / static_cast<double>(drawn.size());
-  };
-  double sum_mm = 0.0;
-  for (const double range_mm : ranges_mm) sum_mm += range_mm;
-  result.capture_mm.value = sum_mm / static_cast<double>(ranges_mm.size());
-  result.capture_mm.student = student_interval(ranges_mm);
-  result.capture_mm.bootstrap = resampled(mean_range);
+  result.rate = rate_over(result.patients, counting);
+  result.capture_mm = capture_over(result.patients, counting);
   result.intervals = intervals_of(all, counting);
-  result.pooled = capture_range(result.intervals);
-  result.pooled_interval_mm = resampled([&](std::span<const std::size_t> drawn) {
-    std::vector<IntervalSuccess> sums = own[drawn.front()];
-    for (const std::size_t i : drawn.subspan(1))
-      for (std::size_t k = 0; k < sums.size(); ++k) {
-        sums[k].trials += own[i][k].trials;
-        sums[k].successes += own[i][k].successes;
-      }
-    return capture_range(sums).initial_tre_mm;
-  });
-  for (std::size_t k = 0; k < result.intervals.size(); ++k)
-    result.interval_bootstraps.push_back(resampled([&](std::span<const std::size_t> drawn) {
-      Counts sum;
-      for (const std::size_t i : drawn) {
-        sum.trials += own[i][k].trials;
-        sum.successes += own[i][k].successes;
-      }
-      return sum.rate();
-    }));
+  pool_intervals(own, counting, result);
   return result;
 }
 

@@ -96,6 +96,7 @@ std::string success_cells(const PopulationSuccess& success) {
   return percent(success.rate.value) + " | " + percent(success.rate.bootstrap.low) + " to " +
          percent(success.rate.bootstrap.high) + " | " + percent(success.rate.student.low) + " to " +
          percent(success.rate.student.high) + " | " +
+         (success.pooled.is_whole_study() ? ">= " : "") +
          millimetre_text(success.pooled.initial_tre_mm) + " | " +
          millimetre_text(success.capture_mm.value) + " (" +
          millimetre_text(success.capture_mm.bootstrap.low) + " to " +
@@ -211,6 +212,7 @@ CsvTable patients_table(const std::vector<PopulationGroup>& groups) {
                   "capture_mm",
                   "capture_low_mm",
                   "capture_high_mm",
+                  "capture_ended_by",
                   "mrpd_successes",
                   "mrpd_capture_mm"});
   for (const PopulationGroup& group : groups) {
@@ -227,6 +229,7 @@ CsvTable patients_table(const std::vector<PopulationGroup>& groups) {
                      number_text(tre.capture.initial_tre_mm),
                      number_text(tre.capture_interval_mm.low),
                      number_text(tre.capture_interval_mm.high),
+                     to_string(tre.capture.end),
                      std::to_string(mrpd.successes),
                      number_text(mrpd.capture.initial_tre_mm)});
     }

@@ -19,7 +19,8 @@ struct ViewDiagnosis {
 /// low, the X-rays are tried inverted, mirrored left-right and up-down, turned by 180 degrees and
 /// exchanged, one change at a time, each with a coarse registration from the start and from the
 /// end. What would explain far more is said; values within silhouettes are not compared. Views with
-/// the same X-ray are always told. Nothing of `problem` changes. \test ViewDiagnosis.NamesTheViewAndWhatWouldMendIt
+/// the same X-ray are always told. Nothing of `problem` changes. \test
+/// ViewDiagnosis.NamesTheViewAndWhatWouldMendIt
 ViewDiagnosis diagnose_views(const std::shared_ptr<const RegistrationProblem>& problem,
                              const RigidTransform& start_room_from_ct,
                              const RigidTransform& room_from_ct,

@@ -27,6 +27,8 @@ struct Options {
   std::string case_name;
   FieldPaths fields;
   SpectrumOptions spectrum;
+  double scatter_to_primary = 0.0;
+  AttenuationModel attenuation;
   double step_mm = 0.5;
   int timing_drrs = 0;
 };
@@ -107,16 +109,27 @@ void print_rows(const Options& options, const Communicator& world) {
   const double kvp = options.spectrum.tube_kvp;
   struct Tube {
     std::string name;
-    SpectrumOptions spectrum;
+    XrayBeamOptions beam;
   };
-  std::vector<Tube> tubes = {{"one energy", SpectrumOptions::one_energy()}};
-  for (const double change : {0.0, -20.0, 20.0}) {
-    SpectrumOptions other = options.spectrum;
-    other.tube_kvp = kvp + change;
-    if (!problems(other).empty()) continue;
-    char name[64];
-    std::snprintf(name, sizeof name, "%g kV, %g mm Al", other.tube_kvp, other.aluminium_mm);
-    tubes.push_back({name, other});
+  std::vector<Tube> tubes = {{"one energy", {}}};
+  const auto add_tube = [&](double change, double scatter) {
+    XrayBeamOptions beam{options.spectrum, scatter};
+    beam.spectrum.tube_kvp = kvp + change;
+    if (!problems(beam.spectrum).empty()) return;
+    char name[96];
+    std::snprintf(name,
+                  sizeof name,
+                  "%g kV, %g mm Al%s",
+                  beam.spectrum.tube_kvp,
+                  beam.spectrum.aluminium_mm,
+                  scatter > 0.0 ? ", scatter" : "");
+    tubes.push_back({name, beam});
+  };
+  for (const double change : {0.0, -20.0, 20.0}) add_tube(change, 0.0);
+  if (options.scatter_to_primary > 0.0) {
+    tubes.push_back(
+        {"one energy, scatter", {SpectrumOptions::one_energy(), options.scatter_to_primary}});
+    for (const double change : {0.0, -20.0, 20.0}) add_tube(change, options.scatter_to_primary);
   }
   std::printf(
       "| DRRs | X-rays of | Bias of U | RMS | Slope | RMS about the line "
@@ -131,7 +144,8 @@ void print_rows(const Options& options, const Communicator& world) {
       loading.ct = study_case.ct_reading;
       if (kind == RendererKind::Field) loading.field_paths = options.fields.by_camera();
       loading.ray_caster.step_mm = options.step_mm;
-      loading.spectrum = tube.spectrum;
+      loading.beam = tube.beam;
+      loading.attenuation = options.attenuation;
       const LoadedCase loaded = load_case(study, study_case, loading, world);
       const RigidTransform& gold = *study_case.gold_room_from_ct;
       const ValueFit fit = fit_of(*loaded.problem, gold);
@@ -163,6 +177,12 @@ int main(int argc, char** argv) {
   app.add_option("--field", options.fields.texts, "CAMERA=FIELD.af.h5; FIELD.bone.af.h5 beside it");
   app.add_option("--tube-kvp", options.spectrum.tube_kvp, "Of the X-rays")->capture_default_str();
   app.add_option("--aluminium-mm", options.spectrum.aluminium_mm, "Their filter")
+      ->capture_default_str();
+  app.add_option("--scatter-to-primary",
+                 options.scatter_to_primary,
+                 "Also DRRs with so much scatter; 0: none")
+      ->capture_default_str();
+  app.add_option("--water-mu-per-mm", options.attenuation.mu_water_per_mm, "Of the CT's HU scale")
       ->capture_default_str();
   app.add_option("--step-mm", options.step_mm, "Of ray casting")->capture_default_str();
   app.add_option("--timing-drrs", options.timing_drrs, "DRRs that are timed; 0: none");

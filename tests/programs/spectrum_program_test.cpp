@@ -100,6 +100,13 @@ TEST_F(SpectrumPrograms, ATubeOfZeroKilovoltsIsTheOrdinaryDrr) {
   EXPECT_EQ(drr(by_field + "--tube-kvp 0").pixels, drr(by_field).pixels);
 }
 
+TEST_F(SpectrumPrograms, ScatterNeedsNoFieldOfBone) {
+  fs::copy_file(path("AP.af.h5"), path("alone.af.h5"));
+  const Image2d without = drr("--field " + path("alone.af.h5"));
+  const Image2d with = drr("--field " + path("alone.af.h5") + " --scatter-to-primary 0.5");
+  for (std::size_t i = 0; i < with.pixels.size(); ++i) EXPECT_LT(with.pixels[i], without.pixels[i]);
+}
+
 TEST_F(SpectrumPrograms, RegisterByFieldsAndByRayCasting) {
   const std::string start = "af-register --study " + path("study.toml") + kTube +
                             " --start-rotation-deg -1,0.5,2.5 --start-translation-mm 0.5,1,4 ";
@@ -117,6 +124,7 @@ TEST_F(SpectrumPrograms, RefuseWhatDoesNotFit) {
   const std::string out = " -o " + path("refused.mha");
   const std::string field = "af-drr --field " + path("AP.af.h5");
   expect_refused(field + " --tube-kvp 10" + out, 3, "tube_kvp = 10");
+  expect_refused(field + " --scatter-to-primary -1" + out, 3, "scatter_to_primary = -1");
   expect_refused("af-drr --field " + path("AP.bone.af.h5") + out, 4, "of its bone alone");
   expect_refused("af-register --study " + path("study.toml") +
                      " --field AP=" + path("AP.bone.af.h5") + " --field LAT=" + path("LAT.af.h5") +

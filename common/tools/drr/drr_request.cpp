@@ -7,7 +7,6 @@
 
 #include "base/error.h"
 #include "drr/field_renderer.h"
-#include "drr/polychromatic_drr.h"
 #include "drr/ray_cast_drr.h"
 #include "field_use/opened_field.h"
 #include "figures/picture.h"
@@ -60,8 +59,7 @@ void describe_source(Fields& field, DrrOptions& options) {
   field.at("water_mu_per_mm").help =
       "Attenuation of water, 1/mm, for ray casting (with --compare the field's own)";
   field.part(options.ray_caster);
-  field.part(options.spectrum);
-  field.at("tube_kvp").help = drr_tube_help();
+  field.part(options.beam);
 }
 
 void describe_pose(Fields& field, DrrOptions& options) {
@@ -198,11 +196,6 @@ DrrSource source_of(const DrrOptions& options) {
   return {options.ct, options.ct_reading, rig.camera(options.camera), {}, rig.isocenter_point};
 }
 
-std::shared_ptr<const PolychromaticAttenuation> attenuation_of(const DrrOptions& options,
-                                                               const AttenuationModel& model) {
-  return std::make_shared<const PolychromaticAttenuation>(options.spectrum, TissueModel(model));
-}
-
 std::shared_ptr<const DrrRenderer> cast_through(
     const std::shared_ptr<const AttenuationVolume>& volume,
     const DrrOptions& options,
@@ -210,9 +203,9 @@ std::shared_ptr<const DrrRenderer> cast_through(
   const auto caster = [&](std::shared_ptr<const AttenuationVolume> through) {
     return std::make_shared<const RayCastDrr>(std::move(through), options.ray_caster, pool);
   };
-  if (options.spectrum.is_one_energy()) return caster(volume);
-  return std::make_shared<const PolychromaticDrr>(
-      caster(volume), caster(bone_volume(*volume)), attenuation_of(options, volume->model()));
+  const XrayBeam beam(options.beam, volume->model());
+  return beam.renderer(caster(volume),
+                       options.beam.needs_bone() ? caster(bone_volume(*volume)) : nullptr);
 }
 
 CastCt ray_caster(const DrrOptions& options,
@@ -274,22 +267,21 @@ void require_same_subject(const FieldIdentity& wanted,
                      "must have the attenuation of --field: mu_water and the HU that count as air");
 }
 
-/// The field, or every member of an atlas, to be looked up; with a tube's spectrum a field together
-/// with that of the bone beside it.
+/// The field, or every member of an atlas, to be looked up in the beam's way; with a tube's
+/// spectrum a field together with that of the bone beside it.
 std::vector<FieldSetMember> renderers_of(const OpenedField& opened,
                                          const DrrOptions& options,
                                          const std::shared_ptr<ThreadPool>& pool,
                                          const Communicator& communicator) {
   std::vector<FieldSetMember> members = opened.renderers(options.look_up, pool);
-  if (options.spectrum.is_one_energy()) return members;
-  FieldFileInfo info;
-  auto bone = opened.bone_field(communicator, &info);
+  std::shared_ptr<const DrrRenderer> bone;
+  if (options.beam.needs_bone())
+    bone = make_field_renderer(opened.bone_field(communicator),
+                               options.look_up.empty() ? opened.info().look_up : options.look_up,
+                               pool);
   const FieldIdentity& identity = opened.identity();
-  members.front().renderer = std::make_shared<const PolychromaticDrr>(
-      members.front().renderer,
-      make_field_renderer(
-          std::move(bone), options.look_up.empty() ? info.look_up : options.look_up, pool),
-      attenuation_of(options, {identity.mu_water_per_mm, identity.air_below_hu}));
+  const XrayBeam beam(options.beam, {identity.mu_water_per_mm, identity.air_below_hu});
+  for (FieldSetMember& member : members) member.renderer = beam.renderer(member.renderer, bone);
   return members;
 }
 

@@ -10,9 +10,9 @@
 
 #include "base/thread_pool.h"
 #include "drr/drr_renderer.h"
+#include "drr/xray_beam.h"
 #include "image_files/ct_reader.h"
 #include "parallel/communicator.h"
-#include "spectrum/xray_spectrum.h"
 #include "volume/ray_caster.h"
 
 namespace af::tools {
@@ -34,7 +34,7 @@ struct DrrOptions {
   std::string look_up;  ///< empty: the field's own
   AttenuationModel attenuation;
   RayCasterOptions ray_caster;
-  SpectrumOptions spectrum = SpectrumOptions::one_energy();
+  XrayBeamOptions beam;
   bool compare = false;
   bool invert = false;
   std::array<double, 2> window_percent = {0.5, 99.5};  ///< of PNG files
