@@ -3,7 +3,6 @@
 
 #include <optional>
 #include <sstream>
-#include <string_view>
 
 #include "base/error.h"
 #include "base/parsed_number.h"
