@@ -7,7 +7,6 @@
 
 #include "base/error.h"
 #include "base/parsed_number.h"
-#include "precompute/plan/axis_ranges.h"
 
 namespace af {
 
