@@ -138,6 +138,7 @@ FieldSource load_source(const PrecomputeOptions& options, const Communicator& co
   source.ct_reading = named.ct_reading;
   source.ct_content_sha256 = ct.facts.content_sha256;
   source.frame = frame_of(named, options, ct.facts.grid);
+  source.isocenter_point = named.rig.isocenter_point;
   source.range = all_or_none(communicator, [&] { return options.range(); });
   if (!options.cover.empty()) {
     const std::vector<RigidTransform> poses = shared_poses(communicator, [&] {

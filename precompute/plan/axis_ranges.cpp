@@ -3,15 +3,11 @@
 
 #include <charconv>
 #include <cmath>
-#include <optional>
 #include <sstream>
-#include <string_view>
 
 #include "base/error.h"
 
 namespace af {
-
-namespace {
 
 std::optional<double> finite_number(std::string_view text) {
   if (text.starts_with('+')) text.remove_prefix(1);
@@ -21,6 +17,8 @@ std::optional<double> finite_number(std::string_view text) {
     return std::nullopt;
   return value;
 }
+
+namespace {
 
 struct Bounds {
   double low = 0.0;

@@ -43,6 +43,8 @@ struct PrecomputeOptions {
   std::string translation_range_mm;  ///< "tx=..."; axes not named: max_translation_mm
   std::string cover;                 ///< file of poses about each of which the range is taken
   std::string cover_rig;             ///< further cameras whose rays the field is to hold
+  std::string orbit;                 ///< "axis=z,from=-90,to=90": an atlas instead of one field
+  std::string orbit_cameras;         ///< rig: an atlas with a field for each of its cameras
   /// The design: a preset or a budget, and parts that are stated.
   std::optional<std::string> preset;
   DesignBudget budget;
@@ -75,6 +77,8 @@ struct PrecomputeOptions {
 
   /// The range about one pose. UsageError when a text of it does not parse.
   [[nodiscard]] MotionRange range() const;
+  /// Whether an atlas is made, not a field.
+  [[nodiscard]] bool is_atlas() const { return !orbit.empty() || !orbit_cameras.empty(); }
   /// The parts of the design that are stated.
   [[nodiscard]] DesignParts stated_parts() const;
   /// The preset that is asked for: where parts alone are stated, the paper's.

@@ -5,3 +5,5 @@ af_add_test(
           unit/drr/ray_cast_level_test.cpp unit/drr/polychromatic_drr_test.cpp unit/drr/scattered_drr_test.cpp unit/drr/recalibrated_camera_test.cpp unit/drr/slab_merging_test.cpp unit/drr/slab_sum_test.cpp unit/drr/small_fields.cpp
           unit/drr/two_pass_af_drr_test.cpp
   LIBS af_drr_core)
+
+af_add_test(field_use_test SOURCES unit/field_use/atlas_renderers_test.cpp LIBS af_field_use)
