@@ -36,15 +36,15 @@ RegistrationOptions robust_preset() {
   options.chains = {chain_from_text("edges",
                                     "ncc gauss-newton level=2 pixels=8 roi=2 step=10;"
                                     "gc gauss-newton level=2 pixels=8 roi=2 final=0.2;"
-                                    "rg gauss-newton level=2 pixels=4 final=0.1"),
+                                    "rg gauss-newton level=1 pixels=4 final=0.1"),
                     chain_from_text("tiles",
                                     "ncc gauss-newton level=2 pixels=8 roi=2 step=10;"
                                     "tncc gauss-newton level=2 pixels=8 roi=2 final=0.2;"
-                                    "rg gauss-newton level=2 pixels=4 final=0.1"),
+                                    "rg gauss-newton level=1 pixels=4 final=0.1"),
                     chain_from_text("wide",
                                     "rg cma-es level=2 pixels=8 roi=2 step=8 final=1;"
                                     "rg gauss-newton level=2 pixels=8 roi=2 final=0.2;"
-                                    "rg gauss-newton level=2 pixels=4 final=0.1")};
+                                    "rg gauss-newton level=1 pixels=4 final=0.1")};
   options.finish = chain_from_text("finish", "rg quasi-newton pixels=2 step=2 final=0.02");
   options.judge.enough_value = kConvincingValue;
   return options;
