@@ -31,9 +31,9 @@ RegistrationOptions fast_preset() {
 /// were clean, wrong vertebrae came to 0.51 and right poses to 0.69 or more.
 constexpr double kConvincingValue = 0.6;
 
-/// The wide chain searches at level 3, where there are fewer wrong optima to end in, and every chain
-/// ends over the region alone at level 1: at level 2 steel and scatter have optima of their own
-/// there, which the judge cannot undo (docs/population.md).
+/// The wide chain searches at level 3, where there are fewer wrong optima to end in, and every
+/// chain ends over the region alone at level 1: at level 2 steel and scatter have optima of their
+/// own there, which the judge cannot undo (docs/population.md).
 RegistrationOptions robust_preset() {
   RegistrationOptions options;
   options.chains = {chain_from_text("edges",

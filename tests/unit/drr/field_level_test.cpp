@@ -144,7 +144,8 @@ TEST(FieldLevel, BlurSigmaIsThatOfAnImpulse) {
   EXPECT_GT(level.blur_sigma_mm(true), level.blur_sigma_mm());
 }
 
-/// A field's geometry of two slabs of `nodes` x `nodes` over `side_mm` at the plane through the centre.
+/// A field's geometry of two slabs of `nodes` x `nodes` over `side_mm` at the plane through the
+/// centre.
 LightSlab square_slabs(int nodes, double side_mm) {
   LightSlab light_slab;
   light_slab.uv_plane_y_mm = 2600.0;
