@@ -7,7 +7,7 @@
 #include "evaluate/registration/compare_methods.h"
 #include "evaluate/registration/evaluate_registrations.h"
 #include "evaluate/registration/join_studies.h"
-#include "evaluate/registration/measure_population.h"
+#include "evaluate/population/measure_population.h"
 #include "evaluate/report/make_report.h"
 #include "evaluate/sweeps/draw_similarity_curves.h"
 #include "evaluate/sweeps/make_error_budget.h"

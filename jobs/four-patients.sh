@@ -28,13 +28,7 @@ metal_option=() cts=()
 while (($# > 0)); do
   case "$1" in
     --output | -o) need_value "$1" $#; target=$2; shift ;;
-    --ct)
-      need_value "$1" $#
-      [[ "$2" =~ ^[A-Za-z0-9_-]+=.+$ ]] || die 2 "--ct = '$2' must be NAME=PATH"
-      [[ -e "${2#*=}" ]] || die 4 "--ct ${2#*=}: no such file or folder"
-      cts+=("${2%%=*}=$(realpath "${2#*=}")")
-      shift
-      ;;
+    --ct) need_value "$1" $#; need_ct "$1" "$2"; cts+=("$named_ct"); shift ;;
     --patients) need_value "$1" $#; patients=$2; shift ;;
     --metal) metal_option=(--metal) ;;
     --seed) need_value "$1" $#; need_seed "$1" "$2"; seed=$2; shift ;;

@@ -101,3 +101,12 @@ run_ranks() {
 need_value() { (($2 >= 2)) || die 2 "option $1 needs a value (try --help)"; }
 need_count() { [[ "$2" =~ ^[1-9][0-9]{0,6}$ ]] || die 2 "$1 = '$2' must be a whole number from 1 to 9999999"; }
 need_seed() { [[ "$2" =~ ^[0-9]{1,18}$ ]] || die 2 "$1 = '$2' must be a whole number"; }
+
+# need_ct OPTION NAME=PATH: sets named_ct to the same with the full path. Names become parts of files' names, whose other
+# parts stand between hyphens.
+need_ct() {
+  [[ "$2" =~ ^[A-Za-z0-9_]+=.+$ ]] || die 2 "$1 = '$2' must be NAME=PATH, with letters, digits and _ in NAME"
+  [[ -e "${2#*=}" ]] || die 4 "$1 ${2#*=}: no such file or folder"
+  # shellcheck disable=SC2034  # for the scripts that source this file
+  named_ct="${2%%=*}=$(realpath "${2#*=}")"
+}

@@ -182,7 +182,7 @@ make_curves() {
 make_registrations() {
   make_fields
   stage registration "$output/runs/registration/summary.json" run_ranks "$ranks" "$bin/af-evaluate" registration \
-    --study "$output/study.toml" --preset paper --renderer both --starts-per-interval "$starts_per_interval" --intervals 8 "${raycast[@]}" \
+    --study "$output/study.toml" --preset paper --renderer both --no-uncertainty --starts-per-interval "$starts_per_interval" --intervals 8 "${raycast[@]}" \
     --seed "$seed" -o "$output/runs/registration"
 }
 

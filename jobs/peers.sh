@@ -93,6 +93,9 @@ peer() {
   evaluate "$case_name-$name" "$case_name" --poses-from "$poses" --method-name "$name"
 }
 
+# What the peers' poses depend on beside the words of their commands.
+# shellcheck disable=SC2034  # for stage()
+stage_inputs="seed $seed, $starts in each of $intervals, $(cat "$af_root"/evaluate/peers/*.py | sha256sum)"
 for variant in clean stressed; do
   case_name="$kind-$variant" stress=$(stress_of "$variant")
   stage "simulate-$case_name" "$output/studies/$case_name/study.toml" "$bin/af-simulate" --phantom "$kind" \

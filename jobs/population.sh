@@ -60,13 +60,7 @@ while (($# > 0)); do
     --patients) need_value "$1" $#; need_seed "$1" "$2"; patients=$2; shift ;;
     --first) need_value "$1" $#; need_count "$1" "$2"; first=$2; shift ;;
     --kinds) need_value "$1" $#; kinds=$2; shift ;;
-    --ct)
-      need_value "$1" $#
-      [[ "$2" =~ ^[A-Za-z0-9_]+=.+$ ]] || die 2 "--ct = '$2' must be NAME=PATH"
-      [[ -e "${2#*=}" ]] || die 4 "--ct ${2#*=}: no such file or folder"
-      cts+=("${2%%=*}=$(realpath "${2#*=}")")
-      shift
-      ;;
+    --ct) need_value "$1" $#; need_ct "$1" "$2"; cts+=("$named_ct"); shift ;;
     --poses) need_value "$1" $#; need_count "$1" "$2"; poses=$2; shift ;;
     --variants) need_value "$1" $#; variants=$2; shift ;;
     --presets) need_value "$1" $#; presets=$2; shift ;;
@@ -147,13 +141,13 @@ register() {
   shift 2
   stage "$folder" "$output/runs/$folder/summary.json" run_ranks "$ranks" "$bin/af-evaluate" registration \
     --study "$study" --gold study --intervals "$intervals" --starts-per-interval "$starts" --seed "$seed" \
-    --start-rule within-range "$@" -o "$output/runs/$folder"
+    --start-rule within-range --no-uncertainty "$@" -o "$output/runs/$folder"
 }
 
 # study_patient NAME SOURCE: every condition of one patient.
 study_patient() {
   local patient=$1 variant camera count preset study
-  stage_inputs="$2, $field_words, $max_rotation_deg deg, $max_translation_mm mm: "
+  stage_inputs="$2, seed $seed, $poses poses, $field_words, $max_rotation_deg deg, $max_translation_mm mm: "
   for variant in "${variant_list[@]}"; do
     sessions "$patient" "$2" "$variant"
     for camera in A B; do

@@ -54,13 +54,7 @@ while (($# > 0)); do
   case "$1" in
     --output | -o) need_value "$1" $#; output=$2; shift ;;
     --anatomies) need_value "$1" $#; anatomies=$2; shift ;;
-    --ct)
-      need_value "$1" $#
-      [[ "$2" =~ ^[A-Za-z0-9_]+=.+$ ]] || die 2 "--ct = '$2' must be NAME=PATH"
-      [[ -e "${2#*=}" ]] || die 4 "--ct ${2#*=}: no such file or folder"
-      cts+=("${2%%=*}=$(realpath "${2#*=}")")
-      shift
-      ;;
+    --ct) need_value "$1" $#; need_ct "$1" "$2"; cts+=("$named_ct"); shift ;;
     --variants) need_value "$1" $#; variants=$2; shift ;;
     --views) need_value "$1" $#; views=$2; shift ;;
     --design)
@@ -145,7 +139,8 @@ register() {
   local folder=$1 study=$2
   shift 2
   stage "$folder" "$output/$folder/summary.json" run_ranks "$ranks" "$bin/af-evaluate" registration --study "$study" \
-    --gold study --preset "$preset" --intervals "$starts_count" --starts-per-interval 1 --seed "$seed" "$@" -o "$output/$folder"
+    --gold study --preset "$preset" --no-uncertainty --intervals "$starts_count" --starts-per-interval 1 \
+    --seed "$seed" "$@" -o "$output/$folder"
 }
 
 # ct_of STUDY: the CT that it names.

@@ -60,13 +60,7 @@ need_number() { [[ "$2" =~ ^[0-9]+([.][0-9]+)?$ ]] || die 2 "$1 = '$2' must be a
 while (($# > 0)); do
   case "$1" in
     --output | -o) need_value "$1" $#; output=$2; shift ;;
-    --ct)
-      need_value "$1" $#
-      [[ "$2" =~ ^[A-Za-z0-9._-]+=.+$ ]] || die 2 "--ct = '$2' must be NAME=PATH"
-      [[ -e "${2#*=}" ]] || die 4 "--ct ${2#*=}: no such file or folder"
-      anatomies+=("${2%%=*}=ct=$(realpath "${2#*=}")")
-      shift
-      ;;
+    --ct) need_value "$1" $#; need_ct "$1" "$2"; anatomies+=("${named_ct/=/=ct=}"); shift ;;
     --phantom) need_value "$1" $#; anatomies+=("$2=phantom=$2"); shift ;;
     --variants) need_value "$1" $#; variants=$2; shift ;;
     --methods) need_value "$1" $#; methods=$2; shift ;;
@@ -152,7 +146,7 @@ register() {
   stage_inputs="$inputs$method_text"
   stage "$folder" "$output/$folder/summary.json" run_ranks "$ranks" \
     "$bin/af-evaluate" registration --study "$study" "${field_options[@]}" --gold study \
-    "${method_options[@]}" --seed "$seed" -o "$output/$folder" "$@"
+    "${method_options[@]}" --no-uncertainty --seed "$seed" -o "$output/$folder" "$@"
   stage_inputs=$inputs
 }
 

@@ -54,7 +54,7 @@ declare -A stress_of=([clean]="" [stressed]="rods,fiducials,heel,noise" [moving]
 read -r -a field_options <<<"--uv-nodes 12 --st-nodes 256 --slabs 4 --codewords 8192 --max-rotation-deg 18 --max-translation-mm 45"
 
 for kind in "${kind_list[@]}"; do
-  studies=()
+  studies=() stage_inputs=""
   for ((seed = 1; seed <= seeds; ++seed)); do
     for variant in clean stressed moving; do
       name="$kind-$variant-$seed" stress=${stress_of[$variant]}
@@ -70,10 +70,12 @@ for kind in "${kind_list[@]}"; do
     stage "field-$kind-$camera" "$output/fields/$kind-$camera.af.h5" "$bin/af-precompute" --study "${studies[0]}" \
       --camera "$camera" "${field_options[@]}" -o "$output/fields/$kind-$camera.af.h5"
   done
+  stage_inputs="$seeds seeds"
   stage "join-$kind" "$output/$kind.toml" "$bin/af-evaluate" join-studies "${studies[@]}" \
     --fields "fields/$kind-{camera}.af.h5" -o "$output/$kind.toml"
 done
 
+stage_inputs="$seeds seeds"
 declare -A measure_of=([robust]=rg [fast]=gc [paper]=mi)
 tables=()
 for preset in "${preset_list[@]}"; do

@@ -6,6 +6,7 @@
 #include "base/error.h"
 #include "base/joined.h"
 #include "pose_files/pose_file.h"
+#include "study/bone_per_node.h"
 #include "study/ct_keys.h"
 #include "study/node_ct.h"
 #include "study/pose_context.h"
@@ -132,16 +133,18 @@ FieldSource load_source(const PrecomputeOptions& options, const Communicator& co
     return read_ct_per_node(
         named.ct_path, named.ct_reading, options.attenuation, communicator, source.warnings);
   });
-  source.volume = ct.volume;
+  source.volume = options.is_of_bone() ? bone_per_node(*ct.volume, communicator) : ct.volume;
   source.ct_path = named.ct_path;
   source.ct_reading = named.ct_reading;
   source.ct_content_sha256 = ct.facts.content_sha256;
   source.frame = frame_of(named, options, ct.facts.grid);
+  source.isocenter_point = named.rig.isocenter_point;
   source.range = all_or_none(communicator, [&] { return options.range(); });
   if (!options.cover.empty()) {
     const std::vector<RigidTransform> poses = shared_poses(communicator, [&] {
       return read_poses(options.cover,
-                        pose_context(named.ct_path, named.ct_reading, named.rig, source.frame));
+                        pose_context(named.ct_path, named.ct_reading, named.rig, source.frame),
+                        &source.warnings);
     });
     source.range = range_about(poses, source.frame, source.range);
     all_or_none(communicator, [&] { throw_if_any(problems(source.range)); });

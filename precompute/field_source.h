@@ -24,6 +24,7 @@ struct FieldSource {
   std::string ct_content_sha256;
   CameraGeometry camera;
   PoseFrame frame;
+  Eigen::Vector3d isocenter_point = Eigen::Vector3d::Zero();  ///< of the rig
   MotionRange range;                         ///< about the nominal pose: of the options
   std::vector<CameraGeometry> more_cameras;  ///< whose rays the field holds, too
   std::vector<std::string> warnings;

@@ -18,9 +18,9 @@
 #include "files/output_file.h"
 #include "parallel/work_watch.h"
 #include "precompute/casting/casters.h"
-#include "precompute/casting/unit_costs.h"
 #include "precompute/design_choice.h"
 #include "precompute/dry_run.h"
+#include "precompute/field_parts.h"
 #include "precompute/field_planes.h"
 #include "precompute/pipeline/field_build.h"
 #include "precompute/pipeline/field_encoder.h"
@@ -75,7 +75,9 @@ std::string numbers_text(const Eigen::PlainObjectBase<Derived>& matrix) {
 
 /// Everything that decides the cast samples. Options of the codebook may change between a stop and
 /// its resume, for example after "more codewords than training tiles".
-DecidingValues casting_decides(const PrecomputeOptions& options, const FieldSource& source) {
+DecidingValues casting_decides(const PrecomputeOptions& options,
+                               const FieldSource& source,
+                               const std::vector<FieldPart>& parts) {
   DecidingValues decides = deciding_values(deciding_options(options, kCastingStage), {});
   const auto add_camera = [&](const CameraGeometry& camera, const std::string& what) {
     decides[what] = camera.name;
@@ -91,6 +93,8 @@ DecidingValues casting_decides(const PrecomputeOptions& options, const FieldSour
   add_camera(source.camera, "camera");
   for (std::size_t i = 0; i < source.more_cameras.size(); ++i)
     add_camera(source.more_cameras[i], "covered camera " + std::to_string(i + 1));
+  for (std::size_t i = 0; options.is_atlas() && i < parts.size(); ++i)
+    add_camera(parts[i].source.camera, "camera of member " + std::to_string(i));
   decides["nominal rotation"] = numbers_text(source.frame.rotation);
   decides["center_ct_mm"] = numbers_text(source.frame.center_ct_mm);
   decides["nominal center_room_mm"] = numbers_text(source.frame.center_room_mm);
@@ -192,7 +196,7 @@ class PrecomputeRun {
     if (!options_.is_dry_run) open_output();
     load();
     run_.stop_if_requested("before the first unit");
-    const std::unique_ptr<const FieldCaster> caster = make_caster();
+    const std::unique_ptr<const FieldCaster> caster = make_caster(parts_, options_, quantizer());
     if (options_.is_dry_run) {
       print_dry_run(*caster);
       return;
@@ -237,50 +241,52 @@ class PrecomputeRun {
     WorkNote note("reading the CT", WorkNote::Kind::Phase);
     source_ = load_source(options_, world_);
     for (const std::string& warning : source_.warnings) warn(world_, warning);
-    size_planes(DepthSlabs{{}, {0.0}});
+    parts_ = field_parts(source_, options_, world_);
+    for (FieldPart& part : parts_) size_planes(part, DepthSlabs{{}, {0.0}});
+    lattice_ = lattice_of(parts_);
     clock_.end("read");
     const bool is_for_casting = caster_named(options_.caster).needs_resampled;
     if (!is_for_casting && !options_.needs_probe() && has_one_central_slab()) return;
-    note.change("resampling the CT");
-    resampled_ = std::make_shared<const SlabAlignedVolume>(resample_on_node(
-        *source_.volume, field_.light_slab.slab_from_ct, SlabAlignedOptions{}, world_));
+    for (std::size_t i = 0; i < parts_.size(); ++i) {
+      note.change(parts_.size() == 1 ? "resampling the CT"
+                                     : "resampling the CT for " + std::to_string(i + 1) + " of " +
+                                           std::to_string(parts_.size()) + " fields");
+      parts_[i].resampled = std::make_shared<const SlabAlignedVolume>(resample_on_node(
+          *source_.volume, parts_[i].light_slab.slab_from_ct, SlabAlignedOptions{}, world_));
+    }
     clock_.end("resample");
-    if (options_.needs_probe()) choose();
-    size_planes(has_one_central_slab() ? DepthSlabs{{}, {0.0}} : all_or_none(world_, [&] {
-      return choose_depth_slabs(*resampled_, options_.design().slabs, options_.st_plane_rule());
-    }));
-    if (!is_for_casting) resampled_ = nullptr;
+    if (options_.needs_probe()) choose(parts_[parts_.size() / 2]);
+    for (FieldPart& part : parts_) {
+      size_planes(part, has_one_central_slab() ? DepthSlabs{{}, {0.0}} : all_or_none(world_, [&] {
+                    return choose_depth_slabs(
+                        *part.resampled, options_.design().slabs, options_.st_plane_rule());
+                  }));
+      if (!is_for_casting) part.resampled = nullptr;
+    }
+    lattice_ = lattice_of(parts_);
   }
 
   [[nodiscard]] bool has_one_central_slab() const {
     return options_.design().slabs == 1 && options_.st_plane_rule() == StPlane::Centre;
   }
 
-  /// Collective. The design within the budget.
-  void choose() {
+  /// Collective. The design within the budget; of an atlas, one for all, by what a member needs.
+  void choose(const FieldPart& part) {
     WorkNote note("probing designs", WorkNote::Kind::Phase);
-    choice_ = all_or_none(
-        world_, [&] { return choose_design(source_, *resampled_, options_, quantizer(), world_); });
+    choice_ = all_or_none(world_, [&] {
+      return choose_design(part.source, *part.resampled, options_, quantizer(), world_);
+    });
     options_ = options_.with_design(choice_->chosen.forecast.design).in_force();
     inform(world_, choice_text(*choice_));
     clock_.end("probe");
   }
 
   /// Collective.
-  void size_planes(const DepthSlabs& depth_slabs) {
-    field_.light_slab = all_or_none(
-        world_, [&] { return sized_planes(source_, options_, source_.range, depth_slabs); });
-    share_geometry(field_, world_);
-    lattice_ = field_.lattice();
-  }
-
-  [[nodiscard]] std::unique_ptr<const FieldCaster> make_caster() const {
-    return caster_named(options_.caster)
-        .make({*source_.volume,
-               resampled_.get(),
-               field_.light_slab,
-               quantizer(),
-               options_.ray_caster});
+  void size_planes(FieldPart& part, const DepthSlabs& depth_slabs) {
+    part.light_slab = all_or_none(world_, [&] {
+      return sized_planes(part.source, options_, part.source.range, depth_slabs);
+    });
+    share_geometry(part.light_slab, world_);
   }
 
   [[nodiscard]] PlanOptions plan() const {
@@ -294,8 +300,10 @@ class PrecomputeRun {
   }
 
   [[nodiscard]] std::uint64_t volume_bytes() const {
-    return source_.volume->voxels().size_bytes() +
-           (resampled_ == nullptr ? 0 : resampled_->bytes());
+    std::uint64_t bytes = source_.volume->voxels().size_bytes();
+    for (const FieldPart& part : parts_)
+      if (part.resampled != nullptr) bytes += part.resampled->bytes();
+    return bytes;
   }
 
   /// Collective. Memory of the rank that has most of its own.
@@ -332,6 +340,7 @@ class PrecomputeRun {
       if (!world_.is_root()) return;
       const SpeedSample speed =
           sample_speed(caster, lattice_, sample_plan(), options_, kSampleSeconds);
+      const FieldPart& first = parts_.front();
       std::cout << dry_run_text({source_,
                                  lattice_,
                                  options_,
@@ -342,16 +351,21 @@ class PrecomputeRun {
                                  memory,
                                  clock_.phases(),
                                  world_.size(),
-                                 planes_text(field_.light_slab),
-                                 advice_text(source_, field_.light_slab, options_)});
+                                 what_text(),
+                                 advice_text(first.source, first.light_slab, options_)});
     });
+  }
+
+  /// Of a dry run: the planes, of an atlas those of its first field.
+  [[nodiscard]] std::string what_text() const {
+    return (options_.is_atlas() ? parts_text(parts_) : "") + planes_text(parts_.front().light_slab);
   }
 
   void build(const FieldCaster& caster) {
     // A limit that is too low is refused before anything is made.
     const MemoryPlan memory = memory_plan(plan_units(lattice_, plan()));
     all_or_none(world_, [&] { (void)memory_limit(options_, memory); });
-    const DecidingValues decides = casting_decides(options_, source_);
+    const DecidingValues decides = casting_decides(options_, source_, parts_);
     UnfinishedWork work = run_.unfinished("units", decides);
     work.plan = plan().rays_per_unit;
     std::optional<UnitStore> progress;
@@ -365,13 +379,12 @@ class PrecomputeRun {
     const FieldBuild build{caster,
                            lattice_,
                            units,
-                           unit_costs(units, field_.light_slab, source_.volume->corner_points()),
+                           unit_costs(units, parts_),
                            progress.has_value() ? &*progress : nullptr,
                            world_};
     CastPhase cast = cast_phase(build);
     const OverflowChoice choice = overflow_choice(build, cast);
     const TrainedCodebook trained = train_or_give_way(build, decides, cast);
-    complete_field(trained.codebook);
     write_phase(build, cast, trained, choice);
   }
 
@@ -485,18 +498,14 @@ class PrecomputeRun {
     BuildStatistics statistics;
     std::optional<ProgressPrinter> printer;
     printer.emplace("encoding and writing", world_.is_root());
-    const FieldFileInfo info = write_field(
-        field_,
+    const FieldFileInfo info = write_output(
+        trained.codebook,
         [&] { return encoder.next_blocks(printer->callback(), stop_requested()); },
         [&] {
           statistics = statistics_of(cast, encoder);
           clock_.split("encode", largest_of(statistics.encode_seconds));
           return provenance_of(trained, cast, statistics);
-        },
-        options_.output,
-        world_,
-        hints(),
-        options_.packs_by_codebook_tree() ? IndexPacking::CodebookTree : IndexPacking::Deflate);
+        });
     printer.reset();
     if (build.progress != nullptr) remove_progress(*build.progress);
     clock_.end("write");
@@ -516,16 +525,31 @@ class PrecomputeRun {
     return [this] { return run_.is_stop_requested(); };
   }
 
-  void complete_field(const Codebook& codebook) {
+  [[nodiscard]] FieldIdentity identity_of(const FieldSource& source) const {
     const AttenuationModel& model = options_.attenuation;
-    field_.identity = {source_.camera,
-                       source_.frame,
-                       source_.range,
-                       source_.ct_content_sha256,
-                       model.mu_water_per_mm,
-                       model.air_below_hu};
-    field_.quantizer_step = quantizer().step();
-    field_.codebook = codebook;
+    return {source.camera,
+            source.frame,
+            source.range,
+            source.ct_content_sha256,
+            model.mu_water_per_mm,
+            model.air_below_hu,
+            options_.is_of_bone() ? FieldMaterial::Bone : FieldMaterial::All};
+  }
+
+  /// Collective. A field, or an atlas.
+  FieldFileInfo write_output(const Codebook& codebook,
+                             const NextBlocks& next_blocks,
+                             const MakeProvenance& make_provenance) const {
+    const IndexPacking packing =
+        options_.packs_by_codebook_tree() ? IndexPacking::CodebookTree : IndexPacking::Deflate;
+    AttenuationAtlas atlas{identity_of(source_), {}, quantizer().step(), codebook};
+    for (const FieldPart& part : parts_)
+      atlas.members.push_back({identity_of(part.source), part.light_slab});
+    if (options_.is_atlas())
+      return write_atlas(
+          atlas, next_blocks, make_provenance, options_.output, world_, hints(), packing);
+    return write_field(
+        atlas.field(0), next_blocks, make_provenance, options_.output, world_, hints(), packing);
   }
 
   /// Collective.
@@ -603,10 +627,9 @@ class PrecomputeRun {
   RunFolder run_;
   int ranks_on_node_ = world_.node().size();
   FieldSource source_;
-  CompressedAttenuationField field_;                    ///< without indices
-  FieldLattice lattice_;                                ///< of the field
-  std::shared_ptr<const SlabAlignedVolume> resampled_;  ///< for casters that need it
-  std::size_t iterations_resumed_ = 0;                  ///< of the training, by earlier runs
+  std::vector<FieldPart> parts_;        ///< one, or the members of an atlas
+  FieldLattice lattice_;                ///< of all of them
+  std::size_t iterations_resumed_ = 0;  ///< of the training, by earlier runs
   PhaseClock clock_;
 };
 

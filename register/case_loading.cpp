@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <sstream>
 #include <utility>
 
@@ -13,15 +14,17 @@
 #include "base/number_text.h"
 #include "base/stored_bytes.h"
 #include "drr/field_level.h"
+#include "drr/field_set_drr.h"
 #include "drr/ray_cast_drr.h"
 #include "drr/two_pass_af_drr.h"
-#include "field_file/field_file.h"
+#include "field_use/opened_field.h"
 #include "files/sha256.h"
 #include "geometry/camera_distance.h"
 #include "geometry/ray_coverage.h"
 #include "register/problem/fiducial_mask.h"
 #include "register/problem/parameter_scaling.h"
 #include "register/problem/stage_view.h"
+#include "study/bone_per_node.h"
 #include "study/ct_keys.h"
 #include "study/node_ct.h"
 #include "study/rig_file.h"
@@ -151,11 +154,11 @@ FieldLevelMemory node_memory(const Communicator& communicator, ThreadPool& pool)
 
 /// The levels of a method to make of a field: those of its stages, and for judging as many as there
 /// are nodes.
-int level_count(const CompressedAttenuationField& field, const CaseLoadOptions& options) {
+int level_count(const LightSlab& light_slab, const CaseLoadOptions& options) {
   int nodes = std::numeric_limits<int>::max();
-  for (const SlabLattice& slab : field.lattice().slabs)
+  for (const SlabLattice& slab : light_slab.lattice().slabs)
     nodes = std::min({nodes, slab.s.nodes, slab.t.nodes});
-  nodes >>= halvings_to_usual_nodes(field.light_slab);
+  nodes >>= halvings_to_usual_nodes(light_slab);
   int possible = 0;
   for (; possible < options.judging_level && nodes > 2; ++possible) nodes = (nodes + 1) / 2;
   return std::max(options.coarsest_level, possible);
@@ -170,32 +173,160 @@ bool pays_to_decode(const CompressedAttenuationField& field) {
   return field.slabs.size() > 1 && decoded_bytes(field) <= kMostDecodedBytes;
 }
 
-/// Collective. A field's renderers for a view: its own, and levels 1, 2, ... of its pyramid, held
-/// once per node. A method's levels are those of a field of about 256 nodes: a finer field begins
-/// with more halvings, so that a level has about the same blur. Look-up is linear, whatever a field
-/// is meant for: cubic gives better DRRs, but not better poses (register/README.md).
-void use_field(const std::shared_ptr<const CompressedAttenuationField>& field,
+/// Renderers of one field, and the blurs of its levels 1, 2, ...
+struct FieldLevelRenderers {
+  MemberLevels renderers;  ///< its own first
+  std::vector<double> blur_sigma_mm;
+};
+
+/// Collective where the memory is. A field's renderers for a view: its own, and those of so many
+/// levels of its pyramid. A method's levels are those of a field of about 256 nodes: a finer field
+/// begins with more halvings, so that a level has about the same blur. Look-up is linear, whatever
+/// a field is meant for: cubic gives better DRRs, but not better poses (register/README.md).
+FieldLevelRenderers renderers_of(const std::shared_ptr<const CompressedAttenuationField>& field,
+                                 int levels,
+                                 const std::shared_ptr<ThreadPool>& pool,
+                                 const std::shared_ptr<ThreadPool>& coarse_pool,
+                                 const FieldLevelMemory& memory) {
+  const int more_halvings = halvings_to_usual_nodes(field->light_slab);
+  const int halvings = levels > 0 ? levels + more_halvings : 0;
+  FieldLevelRenderers made;
+  FieldLevels pyramid;
+  if (pays_to_decode(*field)) {
+    const auto samples = std::make_shared<const FieldLevel>(decode_field(*field, memory));
+    made.renderers.push_back(std::make_shared<const TwoPassAfDrr>(samples, TwoPassOptions{}, pool));
+    if (halvings > 0) pyramid = make_field_pyramid(*samples, halvings, memory);
+  } else {
+    made.renderers.push_back(std::make_shared<const TwoPassAfDrr>(field, TwoPassOptions{}, pool));
+    if (halvings > 0) pyramid = make_field_pyramid(*field, halvings, memory);
+  }
+  for (auto i = static_cast<std::size_t>(more_halvings); i < pyramid.size(); ++i) {
+    made.renderers.push_back(
+        std::make_shared<const TwoPassAfDrr>(pyramid[i], TwoPassOptions{}, coarse_pool));
+    made.blur_sigma_mm.push_back(pyramid[i]->blur_sigma_mm(true));
+  }
+  return made;
+}
+
+/// Members of an atlas that poses in the middle of its range about the nominal one are looked up
+/// in, the nominal one's first: most registrations need no others.
+std::vector<std::uint64_t> members_in_reach(const OpenedField& opened,
+                                            const PoseFrame& nominal,
+                                            const View& view) {
+  std::vector<FieldSetMember> planes;
+  for (const auto& of_member : opened.coverage().planes) planes.push_back({of_member, nullptr});
+  const FieldSetDrr set(std::move(planes));
+  constexpr double kMiddle = 0.5;
+  const MotionRange range = opened.identity().range.scaled(kMiddle);
+  std::vector<std::uint64_t> members;
+  const auto add_at = [&](const PoseParameters& parameters) {
+    const std::vector<double> weights =
+        set.weights(pose_from_parameters(nominal, parameters), view);
+    std::vector<std::uint64_t> order(weights.size());
+    std::iota(order.begin(), order.end(), std::uint64_t{0});
+    std::stable_sort(
+        order.begin(), order.end(), [&](auto a, auto b) { return weights[a] > weights[b]; });
+    for (const std::uint64_t i : order)
+      if (weights[i] > 0.0 && std::find(members.begin(), members.end(), i) == members.end())
+        members.push_back(i);
+  };
+  add_at({});
+  for (unsigned corner = 0; corner < 64; ++corner) {
+    PoseParameters parameters;
+    for (unsigned axis = 0; axis < 3; ++axis) {
+      parameters.rotation_rad[axis] =
+          ((corner >> axis & 1u) != 0 ? range.high : range.low).rotation_rad[axis];
+      parameters.translation_mm[axis] =
+          ((corner >> (axis + 3) & 1u) != 0 ? range.high : range.low).translation_mm[axis];
+    }
+    add_at(parameters);
+  }
+  return members;
+}
+
+/// Collective.
+XrayBeam beam_of(const FieldIdentity& identity,
+                 const CaseLoadOptions& options,
+                 const Communicator& communicator) {
+  return all_or_none(communicator, [&] {
+    return XrayBeam(options.beam, {identity.mu_water_per_mm, identity.air_below_hu});
+  });
+}
+
+/// Collective. An atlas's renderers for a view. Members that poses near the nominal one need are
+/// held once per node; a search that goes farther opens others, each rank for itself. Their levels
+/// carry about the same blur; that of the nominal pose's member is taken.
+void use_atlas(const OpenedField& opened,
+               const PoseFrame& nominal,
                const CaseLoadOptions& options,
                const Communicator& communicator,
                RegistrationView& view) {
   const auto pool = options.pool ? options.pool : std::make_shared<ThreadPool>();
-  const auto memory = node_memory(communicator, *pool);
-  const int more_halvings = halvings_to_usual_nodes(field->light_slab);
-  const int coarsest_level = level_count(*field, options);
-  const int halvings = coarsest_level > 0 ? coarsest_level + more_halvings : 0;
-  FieldLevels pyramid;
-  if (pays_to_decode(*field)) {
-    const auto samples = std::make_shared<const FieldLevel>(decode_field(*field, memory));
-    view.renderer = std::make_shared<const TwoPassAfDrr>(samples, TwoPassOptions{}, options.pool);
-    if (halvings > 0) pyramid = make_field_pyramid(*samples, halvings, memory);
-  } else {
-    view.renderer = std::make_shared<const TwoPassAfDrr>(field, TwoPassOptions{}, options.pool);
-    if (halvings > 0) pyramid = make_field_pyramid(*field, halvings, memory);
+  int levels = std::numeric_limits<int>::max();
+  for (const auto& planes : opened.coverage().planes)
+    levels = std::min(levels, level_count(*planes, options));
+  std::vector<std::uint64_t> near = members_in_reach(opened, nominal, view.view);
+  std::vector<std::byte> bytes = bytes_of(near);
+  communicator.broadcast(bytes);
+  near = value_of<std::vector<std::uint64_t>>(bytes, "the members of rank 0");
+  const auto open = [opened, levels, pool, own_pool = options.pool](std::size_t member) {
+    return std::make_shared<const MemberLevels>(
+        renderers_of(
+            opened.member(member, Communicator::alone()), levels, own_pool, pool, process_memory())
+            .renderers);
+  };
+  const auto members =
+      std::make_shared<MembersInUse>(open, near.size() + OpenedField::kMembersKept);
+  std::vector<double> blur_sigma_mm;
+  for (const std::uint64_t i : near) {
+    const FieldLevelRenderers made = renderers_of(opened.member(i, communicator),
+                                                  levels,
+                                                  options.pool,
+                                                  pool,
+                                                  node_memory(communicator, *pool));
+    members->keep(i, std::make_shared<const MemberLevels>(made.renderers));
+    if (blur_sigma_mm.empty()) blur_sigma_mm = made.blur_sigma_mm;
   }
-  for (auto i = static_cast<std::size_t>(more_halvings); i < pyramid.size(); ++i)
-    view.coarse_levels.push_back(
-        {std::make_shared<const TwoPassAfDrr>(pyramid[i], TwoPassOptions{}, pool),
-         pyramid[i]->blur_sigma_mm(true)});
+  const XrayBeam beam = beam_of(opened.identity(), options, communicator);
+  const auto level = [&](std::size_t of) {
+    return beam.renderer(
+        std::make_shared<const FieldSetDrr>(atlas_level(opened.coverage().planes, members, of)),
+        nullptr);
+  };
+  view.renderer = level(0);
+  for (std::size_t i = 0; i < blur_sigma_mm.size(); ++i)
+    view.coarse_levels.push_back({level(i + 1), blur_sigma_mm[i]});
+}
+
+/// Collective. Renderers for a view, held once per node; with `bone` those of the tube's spectrum,
+/// whose levels are as many as both fields have, and blurred as those of the field of all.
+void use_field(const OpenedField& opened,
+               const std::shared_ptr<const CompressedAttenuationField>& bone,
+               const PoseFrame& nominal,
+               const CaseLoadOptions& options,
+               const Communicator& communicator,
+               RegistrationView& view) {
+  if (opened.atlas()) return use_atlas(opened, nominal, options, communicator, view);
+  const auto pool = options.pool ? options.pool : std::make_shared<ThreadPool>();
+  int levels = level_count(opened.field()->light_slab, options);
+  if (bone) levels = std::min(levels, level_count(bone->light_slab, options));
+  const auto renderers = [&](const std::shared_ptr<const CompressedAttenuationField>& field) {
+    return renderers_of(field, levels, options.pool, pool, node_memory(communicator, *pool));
+  };
+  FieldLevelRenderers all = renderers(opened.field());
+  FieldLevelRenderers of_bone;
+  if (bone) {
+    of_bone = renderers(bone);
+    all.renderers.resize(std::min(all.renderers.size(), of_bone.renderers.size()));
+    all.blur_sigma_mm.resize(all.renderers.size() - 1);
+  }
+  of_bone.renderers.resize(all.renderers.size());
+  const XrayBeam beam = beam_of(opened.identity(), options, communicator);
+  for (std::size_t i = 0; i < all.renderers.size(); ++i)
+    all.renderers[i] = beam.renderer(all.renderers[i], of_bone.renderers[i]);
+  view.renderer = all.renderers.front();
+  for (std::size_t i = 0; i < all.blur_sigma_mm.size(); ++i)
+    view.coarse_levels.push_back({all.renderers[i + 1], all.blur_sigma_mm[i]});
 }
 
 /// Collective. The same CT, its attenuation blurred by sigma_mm, held once per node.
@@ -213,20 +344,48 @@ std::shared_ptr<const AttenuationVolume> blurred_per_node(const AttenuationVolum
       blur.grid(), volume.model(), SharedArray<std::uint16_t>(owner, {voxels, count}));
 }
 
+/// What rays are cast through.
+struct CastVolumes {
+  std::shared_ptr<const AttenuationVolume> all;
+  std::shared_ptr<const AttenuationVolume> bone;  ///< none for DRRs of one energy
+  std::shared_ptr<const XrayBeam> beam;
+};
+
+/// Collective.
+CastVolumes cast_volumes(std::shared_ptr<const AttenuationVolume> all,
+                         const CaseLoadOptions& options,
+                         const Communicator& communicator) {
+  auto bone = options.beam.needs_bone() ? bone_per_node(*all, communicator) : nullptr;
+  const auto beam = all_or_none(
+      communicator, [&] { return std::make_shared<const XrayBeam>(options.beam, all->model()); });
+  return {std::move(all), std::move(bone), beam};
+}
+
+std::shared_ptr<const DrrRenderer> ray_cast_through(const CastVolumes& volumes,
+                                                    const RayCasterOptions& caster,
+                                                    const CaseLoadOptions& options) {
+  const auto cast = [&](const std::shared_ptr<const AttenuationVolume>& volume) {
+    return volume ? std::make_shared<const RayCastDrr>(volume, caster, options.pool) : nullptr;
+  };
+  return volumes.beam->renderer(cast(volumes.all), cast(volumes.bone));
+}
+
 /// Collective. A level of ray casting: the CT blurred as the fields' level blurs DRRs, sampled
 /// twice per sigma.
-std::shared_ptr<const DrrRenderer> coarse_ray_cast(const AttenuationVolume& volume,
+std::shared_ptr<const DrrRenderer> coarse_ray_cast(const CastVolumes& volumes,
                                                    double sigma_mm,
                                                    const CaseLoadOptions& options,
                                                    const Communicator& communicator) {
   RayCasterOptions caster = options.ray_caster;
   caster.step_mm = std::max(caster.step_mm, 0.5 * sigma_mm);
-  return std::make_shared<const RayCastDrr>(
-      blurred_per_node(volume, sigma_mm, communicator), caster, options.pool);
+  CastVolumes blurred = volumes;
+  blurred.all = blurred_per_node(*volumes.all, sigma_mm, communicator);
+  if (volumes.bone) blurred.bone = blurred_per_node(*volumes.bone, sigma_mm, communicator);
+  return ray_cast_through(blurred, caster, options);
 }
 
 /// Collective. Levels 1 ... coarsest_level of ray casting.
-std::vector<RendererLevel> coarse_ray_casts(const AttenuationVolume& volume,
+std::vector<RendererLevel> coarse_ray_casts(const CastVolumes& volumes,
                                             const CaseLoadOptions& options,
                                             const Communicator& communicator) {
   std::vector<RendererLevel> levels;
@@ -236,7 +395,7 @@ std::vector<RendererLevel> coarse_ray_casts(const AttenuationVolume& volume,
     const double sigma_mm = at < options.level_blur_sigma_mm.size()
                                 ? options.level_blur_sigma_mm[at]
                                 : kAssumedNodeMm * level_blur_sigma_in_nodes(level, true);
-    levels.push_back({coarse_ray_cast(volume, sigma_mm, options, communicator), sigma_mm});
+    levels.push_back({coarse_ray_cast(volumes, sigma_mm, options, communicator), sigma_mm});
   }
   return levels;
 }
@@ -265,25 +424,25 @@ std::string how(const CtReadOptions& reading) {
   return text.empty() ? "as HU" : "with " + text;
 }
 
-/// Collective. A field, checked against the CT.
-std::shared_ptr<const CompressedAttenuationField> field_of_view(const std::string& path,
-                                                                const StudyCase& study_case,
-                                                                const CaseLoadOptions& options,
-                                                                const std::optional<CtFacts>& ct,
-                                                                const Communicator& communicator,
-                                                                FieldFileInfo& info) {
-  auto field = read_field(path, communicator, &info);
+/// Collective. A field or an atlas, checked against the CT.
+OpenedField field_of_view(const std::string& path,
+                          const StudyCase& study_case,
+                          const CaseLoadOptions& options,
+                          const std::optional<CtFacts>& ct,
+                          const Communicator& communicator) {
+  OpenedField opened(path, communicator);
   all_or_none(communicator, [&] {
-    require_same_attenuation(field->identity, options, path);
-    if (ct.has_value() && ct->content_sha256 != field->identity.ct_content_sha256)
+    const FieldIdentity& identity = opened.identity();
+    require_same_attenuation(identity, options, path);
+    if (ct.has_value() && ct->content_sha256 != identity.ct_content_sha256)
       throw FileError(path,
                       "CT of the field (ct_content_sha256)",
                       ct->content_sha256 + " (" + study_case.ct.string() + ", read " +
                           how(ct_reading_in_force(options.ct, study_case.ct_reading)) + ")",
-                      field->identity.ct_content_sha256 + " (read " +
-                          how(ct_reading_of(info.provenance.options_toml)) + ")");
+                      identity.ct_content_sha256 + " (read " +
+                          how(ct_reading_of(opened.info().provenance.options_toml)) + ")");
   });
-  return field;
+  return opened;
 }
 
 /// Collective. Rank 0's box on every rank: processors may differ in its last bits.
@@ -295,34 +454,34 @@ MotionRange shared_box(MotionRange range, const Communicator& communicator) {
 }
 
 /// Collective. Which poses a field answers for, for the view's camera; says so in a note. The
-/// field's motion range speaks of its own camera; of another one its rays decide.
-std::string limit_to_rays(const FieldIdentity& identity,
-                          const LightSlab& light_slab,
-                          const std::string& path,
+/// field's motion range speaks of its own camera; of another one, and of an atlas's, its rays
+/// decide.
+std::string limit_to_rays(const OpenedField& opened,
                           const PoseFrame& nominal,
                           const Communicator& communicator,
                           RegistrationView& view) {
   const CameraGeometry& camera = view.view.camera;
-  const CameraDistance distance = camera_distance(camera, identity.camera);
-  if (distance.is_none()) {
+  const FieldIdentity& identity = opened.identity();
+  const std::string distance = opened.coverage().distance_text(camera);
+  if (opened.field() && camera_distance(camera, identity.camera).is_none()) {
     view.limit = MotionLimit{identity.frame, identity.range};
     view.reach = view.limit;
-    return distance.text() + ", " + identity.range.text();
+    return distance + ", " + identity.range.text();
   }
-  const auto rays = static_cast<std::int64_t>(view.view.pixel_count());
-  const std::int64_t outside =
-      view.renderer->rays_outside(nominal.nominal_room_from_ct(), view.view);
+  const View widest = view.widest_view();
+  const auto rays = static_cast<std::int64_t>(widest.pixel_count());
+  const std::int64_t outside = view.renderer->rays_outside(nominal.nominal_room_from_ct(), widest);
   const MotionRange own_box = all_or_none(communicator, [&] {
-    if (outside == rays)
-      throw FileError(path,
+    if (outside > 0)
+      throw FileError(opened.path().string(),
                       "camera '" + camera.name + "' of the field",
-                      "one that holds rays of the study's at the nominal pose",
-                      "none of them; the study's has " + distance.text());
-    return covered_box(light_slab, view.view.coarser(1).camera, nominal, identity.range);
+                      "one that holds all rays of twice the study's region at the nominal pose",
+                      std::to_string(rays - outside) + " of " + std::to_string(rays) +
+                          " rays; the study's has " + distance);
+    return opened.coverage().box(widest, nominal, identity.range);
   });
   view.reach = MotionLimit{nominal, shared_box(own_box, communicator)};
-  return distance.text() + "; " +
-         coverage_text(camera.name, rays - outside, rays, view.reach->range);
+  return distance + "; " + coverage_text(camera.name, rays - outside, rays, view.reach->range);
 }
 
 /// Collective. The fields of all views; hashes and notes go to `loaded`.
@@ -338,16 +497,20 @@ void use_fields(const StudyCase& study_case,
       return field_path_of(study_case, study_case.views[i], options).string();
     });
     const bool is_of_study = options.field_paths.count(view.view.camera.name) == 0;
-    FieldFileInfo info;
-    const auto field =
+    const OpenedField opened =
         used_from(is_of_study ? study_case.views[i].places : StudyPlaces(), "field", [&] {
-          return field_of_view(path, study_case, options, ct, communicator, info);
+          return field_of_view(path, study_case, options, ct, communicator);
         });
-    use_field(field, options, communicator, view);
     const std::string name = "field " + view.view.camera.name;
-    loaded.input_notes[name] = limit_to_rays(
-        field->identity, field->light_slab, path, problem.frame(), communicator, view);
-    loaded.input_sha256[name] = info.payload_sha256;
+    std::shared_ptr<const CompressedAttenuationField> bone;
+    if (options.beam.needs_bone()) {
+      FieldFileInfo bone_info;
+      bone = opened.bone_field(communicator, &bone_info);
+      loaded.input_sha256["bone " + name] = bone_info.payload_sha256;
+    }
+    use_field(opened, bone, problem.frame(), options, communicator, view);
+    loaded.input_notes[name] = limit_to_rays(opened, problem.frame(), communicator, view);
+    loaded.input_sha256[name] = opened.info().payload_sha256;
   }
 }
 
@@ -360,7 +523,7 @@ double mean_blur_mm(const RegistrationProblem& problem, int level) {
 }
 
 /// Collective. Ray casting beside the fields, at the levels that a correction needs.
-void add_ray_casts(const AttenuationVolume& volume,
+void add_ray_casts(const CastVolumes& volumes,
                    const std::shared_ptr<const DrrRenderer>& renderer,
                    const CaseLoadOptions& options,
                    const Communicator& communicator,
@@ -368,7 +531,7 @@ void add_ray_casts(const AttenuationVolume& volume,
   for (const int level : options.correction_levels) {
     const auto ray_cast =
         level == 0 ? renderer
-                   : coarse_ray_cast(volume, mean_blur_mm(problem, level), options, communicator);
+                   : coarse_ray_cast(volumes, mean_blur_mm(problem, level), options, communicator);
     for (RegistrationView& view : problem.views) {
       view.ray_casts.resize(static_cast<std::size_t>(level) + 1);
       view.ray_casts.back() = ray_cast;
@@ -415,13 +578,13 @@ LoadedCase load_case(const Study& study,
   problem->target_points_ct = ct_lattice_points(study_case.target_box_ct, kTargetPointsPerAxis);
   const bool looks_up = options.renderer == RendererKind::Field;
   std::optional<CtFacts> ct;
-  std::shared_ptr<const AttenuationVolume> volume;
+  CastVolumes volumes;
   std::shared_ptr<const DrrRenderer> ray_cast;
   if (!looks_up || !options.correction_levels.empty()) {
     const NodeCt node_ct = read_node_ct(study_case, options, communicator, loaded.warnings);
     ct = node_ct.facts;
-    volume = node_ct.volume;
-    ray_cast = std::make_shared<const RayCastDrr>(volume, options.ray_caster, options.pool);
+    volumes = cast_volumes(node_ct.volume, options, communicator);
+    ray_cast = ray_cast_through(volumes, options.ray_caster, options);
   } else if (!options.skip_ct_check) {
     ct = used_from(study_case.places, "ct", [&] {
       return read_ct_facts(study_case.ct,
@@ -433,9 +596,9 @@ LoadedCase load_case(const Study& study,
   }
   if (looks_up) {
     use_fields(study_case, options, communicator, ct, *problem, loaded);
-    if (volume) add_ray_casts(*volume, ray_cast, options, communicator, *problem);
+    if (volumes.all) add_ray_casts(volumes, ray_cast, options, communicator, *problem);
   } else {
-    const auto levels = coarse_ray_casts(*volume, options, communicator);
+    const auto levels = coarse_ray_casts(volumes, options, communicator);
     for (RegistrationView& view : problem->views) {
       view.renderer = ray_cast;
       view.coarse_levels = levels;

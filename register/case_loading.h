@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "base/thread_pool.h"
+#include "drr/xray_beam.h"
 #include "image_files/ct_reader.h"
 #include "parallel/communicator.h"
 #include "register/method/registration.h"
@@ -28,6 +29,9 @@ struct CaseLoadOptions {
   CtReadOptions ct;
   AttenuationModel attenuation;  ///< of ray casting
   RayCasterOptions ray_caster;
+  /// Of the X-rays that DRRs are of; with fields of a spectrum, bone_field_path() of each is
+  /// read, too.
+  XrayBeamOptions beam;
   bool skip_ct_check = false;  ///< with fields: do not read the CT (it may be absent)
   /// Radius, mm on the isocentre plane, of the discs about the study's fiducials that registration
   /// does not see; 0: it sees them.
@@ -56,10 +60,10 @@ struct LoadedCase {
 /// With fields the CT is read by rank 0 alone, for its hash and grid (skip_ct_check: not at all;
 /// steps are then scaled as if it filled 200 mm about the ROI centre), unless a correction casts
 /// rays through it: its attenuation must then be the fields' (InputError). FileError (exit 4) when
-/// a field was made from another CT (both hashes are named) or holds none of the rays of a view at
-/// the nominal pose; InputError when a view has no field. A field for another camera is taken: its
-/// rays decide on every pose, and a note says how far the camera is from the field's and what is
-/// covered.
+/// a field was made from another CT (both hashes are named) or misses rays of a view's widest
+/// region at the nominal pose; InputError when a view has no field. A field for another camera is
+/// taken: its rays decide on every pose, and a note says how far the camera is from the field's and
+/// what is covered.
 LoadedCase load_case(const Study& study,
                      const StudyCase& study_case,
                      const CaseLoadOptions& options,

@@ -38,6 +38,8 @@ void run(const RegisterOptions& options,
     af::throw_if_any(problems(options));
     RegistrationOptions resolved = resolve(options.method);
     resolved.correction = options.correction;
+    if (options.skip_ct_check && resolved.silhouette_mm() > 0.0)
+      throw af::InputError(kSilhouettesNeedTheCt);
     return resolved;
   });
   af::RunFolder folder({options.output_folder, result_file_names(), options.resume.restarts},
@@ -53,7 +55,7 @@ void run(const RegisterOptions& options,
   std::vector<std::string> notes;
   const std::vector<af::RigidTransform> starts = af::shared_poses(world, [&] {
     if (landmarks.has_value()) return std::vector{landmarks->room_from_ct};
-    return start_poses(options, af::pose_context(study, study_case), notes);
+    return start_poses(options, af::pose_context(study, study_case, options.ct), notes);
   });
   for (const std::string& text : notes) af::warn(world, text);
   const auto gold = af::all_or_none(world, [&] { return known_gold(study, study_case); });

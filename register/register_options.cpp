@@ -63,6 +63,7 @@ void RegisterOptions::describe(Fields& field) {
   field.at("water_mu_per_mm").help =
       "Attenuation of water, 1/mm, for ray casting (a field has its own)";
   field.part(ray_caster);
+  field.part(beam);
   field.part(ct);
   field("skip_ct_check",
         skip_ct_check,
@@ -120,6 +121,7 @@ CaseLoadOptions case_load_options(const RegisterOptions& options,
   result.ct = options.ct;
   result.attenuation = options.attenuation;
   result.ray_caster = options.ray_caster;
+  result.beam = options.beam;
   result.skip_ct_check = options.skip_ct_check;
   result.fiducial_mask_mm = options.method.fiducial_mask_mm;
   if (options.correction.is_wanted) result.correction_levels = last_levels;

@@ -35,6 +35,7 @@ struct RegisterOptions {
   std::filesystem::path starts;
   AttenuationModel attenuation;  ///< of ray casting
   RayCasterOptions ray_caster;
+  XrayBeamOptions beam;
   CtReadOptions ct;
   bool skip_ct_check = false;
   cli::ResumeOptions resume;

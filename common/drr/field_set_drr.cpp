@@ -73,7 +73,8 @@ RenderStatus FieldSetDrr::render(const RigidTransform& room_from_ct,
     std::int64_t fewest = std::numeric_limits<std::int64_t>::max();
     std::size_t best = 0;
     for (std::size_t i = 0; i < members_.size(); ++i) {
-      const std::int64_t outside = members_[i].renderer->rays_outside(room_from_ct, view);
+      const std::int64_t outside =
+          SlabRays(*members_[i].coverage, room_from_ct, view).count_outside();
       if (outside >= fewest) continue;
       fewest = outside;
       best = i;
@@ -109,8 +110,10 @@ RenderStatus FieldSetDrr::render(const RigidTransform& room_from_ct,
 
 std::int64_t FieldSetDrr::rays_outside(const RigidTransform& room_from_ct, const View& view) const {
   std::int64_t fewest = std::numeric_limits<std::int64_t>::max();
-  for (const FieldSetMember& member : members_)
-    fewest = std::min(fewest, member.renderer->rays_outside(room_from_ct, view));
+  for (const FieldSetMember& member : members_) {
+    fewest = std::min(fewest, SlabRays(*member.coverage, room_from_ct, view).count_outside());
+    if (fewest == 0) break;
+  }
   return fewest;
 }
 

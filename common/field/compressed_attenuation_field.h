@@ -14,6 +14,10 @@
 
 namespace af {
 
+/// Which part of a CT's attenuation a field holds: all of it, or bone's alone (TissueModel), which
+/// goes with a field of all for DRRs of polychromatic X-rays.
+enum class FieldMaterial { All, Bone };
+
 /// What a field was made from and for; travels with it.
 struct FieldIdentity {
   CameraGeometry camera;  ///< the camera it was sized for
@@ -22,6 +26,7 @@ struct FieldIdentity {
   std::string ct_content_sha256;  ///< over size and int16 HU voxels
   double mu_water_per_mm = 0.0200;
   int air_below_hu = -900;
+  FieldMaterial material = FieldMaterial::All;
 };
 
 /// Codeword indices of one slab, [Tu][Tv][Ts][Tt] with Tt fastest; tile (a, b, c, d) holds nodes

@@ -4,9 +4,10 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <iterator>
+#include <mutex>
 #include <numeric>
 #include <optional>
-#include <sstream>
 #include <utility>
 
 #include "base/error.h"
@@ -144,23 +145,65 @@ void create_index_dataset(hid_t file,
   hdf5::write_text_attribute(dataset, "sha256", std::string(kSha256Digits, '0'));
 }
 
+/// What a file is to hold but for the provenance: of a field, or of an atlas.
+struct FileContents {
+  const char* format = field_layout::kFormat;
+  IndexPacking packing = IndexPacking::CodebookTree;
+  std::string ct_sha256;
+  std::vector<Dataset> payload;
+  std::vector<Dataset> beside;  ///< not of the payload: ranges that two numbers do not state, bone
+  std::vector<DatasetRule> indices;
+  std::uint64_t payload_bytes = 0;
+};
+
+FileContents contents_of(const CompressedAttenuationField& field, IndexPacking packing) {
+  FileContents contents = {field_layout::kFormat,
+                           packing,
+                           field.identity.ct_content_sha256,
+                           field_layout::datasets_of(field),
+                           field_layout::range_datasets(field.identity.range),
+                           index_rules(field.lattice()),
+                           field_layout::payload_bytes(field.codebook, field.lattice())};
+  for (Dataset& dataset : field_layout::material_datasets(field.identity.material))
+    contents.beside.push_back(std::move(dataset));
+  return contents;
+}
+
+FileContents contents_of(const AttenuationAtlas& atlas, IndexPacking packing) {
+  FileContents contents = {field_layout::kAtlasFormat,
+                           packing,
+                           atlas.identity.ct_content_sha256,
+                           field_layout::datasets_of(atlas),
+                           field_layout::range_datasets(atlas.identity.range),
+                           index_rules(atlas),
+                           field_layout::payload_bytes(atlas.codebook, atlas.lattice())};
+  const auto append = [](std::vector<Dataset> more, std::vector<Dataset>& datasets) {
+    std::move(more.begin(), more.end(), std::back_inserter(datasets));
+  };
+  for (std::size_t i = 0; i < atlas.members.size(); ++i) {
+    const std::string group = field_layout::member_group(i);
+    const AtlasMember& member = atlas.members[i];
+    append(field_layout::within(group, field_layout::datasets_of(member)), contents.payload);
+    append(field_layout::within(group, field_layout::range_datasets(member.identity.range)),
+           contents.beside);
+  }
+  return contents;
+}
+
 /// Rank 0 alone: everything but the indices and the provenance.
-void create_file_without_indices(const CompressedAttenuationField& field,
-                                 IndexPacking packing,
-                                 const std::filesystem::path& path) {
+void create_file_without_indices(const FileContents& contents, const std::filesystem::path& path) {
   Handle file = hdf5::create_file(path);
-  hdf5::write_text_attribute(file, "format", field_layout::kFormat);
-  hdf5::write_int_attribute(file, "format_version", field_layout::format_version_of(packing));
-  hdf5::write_text_attribute(file, "ct_sha256", field.identity.ct_content_sha256);
+  hdf5::write_text_attribute(file, "format", contents.format);
+  hdf5::write_int_attribute(
+      file, "format_version", field_layout::format_version_of(contents.packing));
+  hdf5::write_text_attribute(file, "ct_sha256", contents.ct_sha256);
   hdf5::write_text_attribute(file, "payload_sha256", std::string(kSha256Digits, '0'));
-  for (const Dataset& dataset : field_layout::datasets_of(field))
-    hdf5::write_dataset(file, dataset, sha256_hex(dataset.bytes));
-  for (const Dataset& dataset : field_layout::range_datasets(field.identity.range))
-    hdf5::write_dataset(file, dataset, sha256_hex(dataset.bytes));
-  const std::vector<DatasetRule> rules = index_rules(field.lattice());
-  const std::vector<hdf5::ChunkShape> chunks = hdf5::index_chunks(rules);
-  for (std::size_t k = 0; k < rules.size(); ++k)
-    create_index_dataset(file, rules[k], chunks[k], packing);
+  for (const std::vector<Dataset>* datasets : {&contents.payload, &contents.beside})
+    for (const Dataset& dataset : *datasets)
+      hdf5::write_dataset(file, dataset, sha256_hex(dataset.bytes));
+  const std::vector<hdf5::ChunkShape> chunks = hdf5::index_chunks(contents.indices);
+  for (std::size_t k = 0; k < contents.indices.size(); ++k)
+    create_index_dataset(file, contents.indices[k], chunks[k], contents.packing);
   file.close("H5Fclose");
 }
 
@@ -383,12 +426,12 @@ std::string payload_hash(std::span<const Dataset> datasets,
 
 /// Rank 0 alone: reads every index back, compares with what the ranks wrote, and stores the hashes
 /// and the provenance.
-std::string verify_and_seal(const CompressedAttenuationField& field,
+std::string verify_and_seal(const FileContents& contents,
                             const FieldProvenance& provenance,
                             const std::vector<std::uint64_t>& written_sums,
                             const std::filesystem::path& path) {
   Handle file = hdf5::open_file(path, H5F_ACC_RDWR);
-  const auto rules = index_rules(field.lattice());
+  const std::vector<DatasetRule>& rules = contents.indices;
   std::vector<std::string> index_sha256;
   for (std::size_t k = 0; k < rules.size(); ++k) {
     const Handle dataset(H5Dopen2(file, rules[k].name.c_str(), H5P_DEFAULT), H5Dclose, "H5Dopen2");
@@ -413,7 +456,7 @@ std::string verify_and_seal(const CompressedAttenuationField& field,
     index_sha256.push_back(sha256.hex_digest());
     hdf5::replace_text_attribute(dataset, "sha256", index_sha256.back());
   }
-  std::string payload = payload_hash(field_layout::datasets_of(field), rules, index_sha256);
+  std::string payload = payload_hash(contents.payload, rules, index_sha256);
   hdf5::replace_text_attribute(file, "payload_sha256", payload);
   hdf5::write_text_attribute(file, "options_toml", provenance.options_toml);
   hdf5::write_text_attribute(file, "source_version", provenance.source_version);
@@ -432,23 +475,52 @@ void share(FieldFileInfo& info, const Communicator& communicator) {
 
 // --- reading -------------------------------------------------------------------------------------
 
-/// What rank 0 knows of a file before the indices are read.
-struct FileHeader {
-  std::vector<Dataset> payload;
-  std::vector<Dataset> range;  ///< empty: two numbers of the payload state it
-  std::vector<Dataset> provenance;
+/// A field of a file, before its indices are read.
+struct FieldHeader {
+  std::vector<Dataset> payload;   ///< with the codebook, which an atlas's members share
+  std::vector<Dataset> range;     ///< empty: two numbers of the payload state it
+  std::vector<Dataset> material;  ///< empty: all of the CT
+  std::vector<DatasetRule> index_rules;
   std::vector<std::string> index_sha256;
 
+  auto members() { return std::tie(payload, range, material, index_sha256); }
   /// Without indices. FileError.
   [[nodiscard]] CompressedAttenuationField field(const std::string& path) const {
     CompressedAttenuationField field = field_layout::field_of(payload, path);
     if (!range.empty())
       field.identity.range = field_layout::range_of(range, field.identity.range, path);
+    if (!material.empty())
+      field.identity.material = field_layout::material_of(material.front(), path);
     return field;
   }
+};
+
+/// What rank 0 knows of a file before the indices are read.
+struct FileHeader {
+  bool is_atlas = false;
+  std::vector<FieldHeader> fields;  ///< one, or an atlas's members
+  std::vector<Dataset> root;        ///< of an atlas: atlas_rules()
+  std::vector<Dataset> root_range;  ///< of an atlas
+  std::vector<Dataset> provenance;
   std::string payload_sha256;
   std::uint64_t file_bytes = 0;
   IndexPacking packing = IndexPacking::CodebookTree;
+
+  auto members() {
+    return std::tie(
+        is_atlas, fields, root, root_range, provenance, payload_sha256, file_bytes, packing);
+  }
+  /// Of an atlas. FileError.
+  [[nodiscard]] AttenuationAtlas atlas(const std::string& path) const {
+    AttenuationAtlas atlas = field_layout::atlas_of(root, path);
+    if (!root_range.empty())
+      atlas.identity.range = field_layout::range_of(root_range, atlas.identity.range, path);
+    for (const FieldHeader& header : fields) {
+      CompressedAttenuationField field = header.field(path);
+      atlas.members.push_back({std::move(field.identity), std::move(field.light_slab)});
+    }
+    return atlas;
+  }
 };
 
 void check_is_hdf5(const std::filesystem::path& path) {
@@ -461,12 +533,19 @@ void check_is_hdf5(const std::filesystem::path& path) {
     throw FileError(path.string(), "is not an HDF5 file (or its first bytes are damaged)");
 }
 
-IndexPacking check_format(hid_t file, const std::filesystem::path& path) {
+bool is_atlas_format(hid_t file, const std::filesystem::path& path) {
+  const std::string expected =
+      std::string(field_layout::kFormat) + " or " + field_layout::kAtlasFormat;
   if (H5Aexists(file, "format") <= 0)
-    throw FileError(path.string(), "attribute format", field_layout::kFormat, "none");
+    throw FileError(path.string(), "attribute format", expected, "none");
   const std::string format = hdf5::read_text_attribute(file, "format");
+  if (format == field_layout::kAtlasFormat) return true;
   if (format != field_layout::kFormat)
-    throw FileError(path.string(), "attribute format", field_layout::kFormat, format);
+    throw FileError(path.string(), "attribute format", expected, format);
+  return false;
+}
+
+IndexPacking checked_packing(hid_t file, const std::filesystem::path& path) {
   const int version = hdf5::read_int_attribute(file, "format_version");
   if (version < 1 || version > field_layout::kFormatVersion)
     throw FileError(path.string(),
@@ -504,67 +583,167 @@ void check_packing(hid_t dataset,
   if (found != packing) throw FileError(path.string(), rule.name, text(packing), text(found));
 }
 
+std::vector<Dataset> read_datasets(hid_t file,
+                                   const std::vector<DatasetRule>& rules,
+                                   const std::string& path) {
+  std::vector<Dataset> datasets;
+  for (const DatasetRule& rule : rules) datasets.push_back(hdf5::read_dataset(file, rule, path));
+  return datasets;
+}
+
+/// Of a group, "" for the root; none where the file has none.
+std::vector<Dataset> read_range(hid_t file, const std::string& group, const std::string& path) {
+  if (checked(H5Lexists(file, (group + "/range").c_str(), H5P_DEFAULT), "H5Lexists") <= 0)
+    return {};
+  return read_datasets(file, field_layout::within(group, field_layout::range_rules()), path);
+}
+
+/// The field of a group, "" for the root. `shared`: what stands in the root for all of an atlas.
+FieldHeader read_field_of(hid_t file,
+                          const std::string& group,
+                          std::span<const Dataset> shared,
+                          const FileHeader& of_file,
+                          const std::filesystem::path& path) {
+  const auto of_group = [&](std::vector<DatasetRule> rules) {
+    return field_layout::within(group, std::move(rules));
+  };
+  FieldHeader header;
+  const DatasetRule slab_count = of_group({field_layout::slab_count_rule()}).front();
+  const int slabs = field_layout::slab_count_of(hdf5::read_dataset(file, slab_count, path.string()),
+                                                path.string());
+  header.payload = read_datasets(file,
+                                 of_group(shared.empty() ? field_layout::payload_rules(slabs)
+                                                         : field_layout::member_rules(slabs)),
+                                 path.string());
+  header.payload.insert(header.payload.end(), shared.begin(), shared.end());
+  header.range = read_range(file, group, path.string());
+  const DatasetRule material = of_group({field_layout::material_rule()}).front();
+  if (checked(H5Lexists(file, material.name.c_str(), H5P_DEFAULT), "H5Lexists") > 0)
+    header.material.push_back(hdf5::read_dataset(file, material, path.string()));
+  header.index_rules = of_group(index_rules(header.field(path.string()).lattice()));
+  for (const DatasetRule& rule : header.index_rules) {
+    check_plausible_size(rule, of_file.file_bytes, path);
+    std::vector<std::uint64_t> extents;
+    const Handle dataset = hdf5::open_dataset(file, rule, path.string(), extents);
+    check_packing(dataset, rule, of_file.packing, path);
+    header.index_sha256.push_back(hdf5::read_text_attribute(dataset, "sha256"));
+  }
+  return header;
+}
+
+/// The root of an atlas, and its members.
+void read_members(hid_t file, const std::filesystem::path& path, FileHeader& header) {
+  header.root = read_datasets(file, field_layout::atlas_rules(), path.string());
+  header.root_range = read_range(file, "", path.string());
+  const auto shared = std::span<const Dataset>(header.root).last(field_layout::kSharedRules);
+  const int members = field_layout::member_count_of(header.root.front(), path.string());
+  for (int i = 0; i < members; ++i)
+    header.fields.push_back(read_field_of(
+        file, field_layout::member_group(static_cast<std::size_t>(i)), shared, header, path));
+}
+
+/// Of everything that a file says of its content.
+std::string payload_hash(const FileHeader& header) {
+  std::vector<Dataset> datasets = header.root;
+  std::vector<DatasetRule> rules;
+  std::vector<std::string> index_sha256;
+  const std::size_t shared = header.is_atlas ? field_layout::kSharedRules : 0;
+  for (const FieldHeader& field : header.fields) {
+    datasets.insert(datasets.end(),
+                    field.payload.begin(),
+                    field.payload.end() - static_cast<std::ptrdiff_t>(shared));
+    rules.insert(rules.end(), field.index_rules.begin(), field.index_rules.end());
+    index_sha256.insert(index_sha256.end(), field.index_sha256.begin(), field.index_sha256.end());
+  }
+  return payload_hash(datasets, rules, index_sha256);
+}
+
+/// An atlas is of one CT, and so are its members.
+void require_same_origin(const AttenuationAtlas& atlas, const std::filesystem::path& path) {
+  const FieldIdentity& all = atlas.identity;
+  for (std::size_t i = 0; i < atlas.members.size(); ++i) {
+    const FieldIdentity& one = atlas.members[i].identity;
+    if (one.ct_content_sha256 != all.ct_content_sha256)
+      throw FileError(path.string(),
+                      field_layout::member_group(i) + "/identity/ct_content_sha256",
+                      all.ct_content_sha256,
+                      one.ct_content_sha256);
+    if (one.mu_water_per_mm != all.mu_water_per_mm || one.air_below_hu != all.air_below_hu)
+      throw FileError(path.string(),
+                      field_layout::member_group(i) + "/identity",
+                      "the attenuation of water and of air of the atlas",
+                      "others");
+  }
+}
+
 /// Rank 0 alone.
 FileHeader read_header(const std::filesystem::path& path) {
   check_is_hdf5(path);
   note_input(path);
   const Handle file = hdf5::open_file(path, H5F_ACC_RDONLY);
   FileHeader header;
-  header.packing = check_format(file, path);
+  header.is_atlas = is_atlas_format(file, path);
+  header.packing = checked_packing(file, path);
   header.file_bytes = std::filesystem::file_size(path);
-  const int slab_count = field_layout::slab_count_of(
-      hdf5::read_dataset(file, field_layout::slab_count_rule(), path.string()), path.string());
-  for (const DatasetRule& rule : field_layout::payload_rules(slab_count))
-    header.payload.push_back(hdf5::read_dataset(file, rule, path.string()));
-  for (const DatasetRule& rule : field_layout::provenance_rules())
-    header.provenance.push_back(hdf5::read_dataset(file, rule, path.string()));
-  if (checked(H5Lexists(file, "/range", H5P_DEFAULT), "H5Lexists") > 0)
-    for (const DatasetRule& rule : field_layout::range_rules())
-      header.range.push_back(hdf5::read_dataset(file, rule, path.string()));
-  const CompressedAttenuationField field = header.field(path.string());
-  const std::vector<DatasetRule> rules = index_rules(field.lattice());
-  for (const DatasetRule& rule : rules) {
-    check_plausible_size(rule, header.file_bytes, path);
-    std::vector<std::uint64_t> extents;
-    const Handle dataset = hdf5::open_dataset(file, rule, path.string(), extents);
-    check_packing(dataset, rule, header.packing, path);
-    header.index_sha256.push_back(hdf5::read_text_attribute(dataset, "sha256"));
-  }
+  if (header.is_atlas)
+    read_members(file, path, header);
+  else
+    header.fields.push_back(read_field_of(file, "", {}, header, path));
+  header.provenance = read_datasets(file, field_layout::provenance_rules(), path.string());
   header.payload_sha256 = hdf5::read_text_attribute(file, "payload_sha256");
-  const std::string computed = payload_hash(header.payload, rules, header.index_sha256);
+  const std::string computed = payload_hash(header);
   if (header.payload_sha256 != computed)
     throw FileError(path.string(), "payload_sha256", header.payload_sha256, computed);
   const std::string ct_sha256 = hdf5::read_text_attribute(file, "ct_sha256");
-  if (ct_sha256 != field.identity.ct_content_sha256)
-    throw FileError(
-        path.string(), "attribute ct_sha256", field.identity.ct_content_sha256, ct_sha256);
+  const FieldIdentity identity = header.is_atlas ? header.atlas(path.string()).identity
+                                                 : header.fields[0].field(path.string()).identity;
+  if (ct_sha256 != identity.ct_content_sha256)
+    throw FileError(path.string(), "attribute ct_sha256", identity.ct_content_sha256, ct_sha256);
+  if (header.is_atlas) require_same_origin(header.atlas(path.string()), path);
   return header;
 }
 
+/// Rank 0 alone. Of one kind: FileError when the file is of the other.
+FileHeader read_header_of(bool atlas, const std::filesystem::path& path) {
+  FileHeader header = read_header(path);
+  if (header.is_atlas == atlas) return header;
+  const auto text = [](bool is_atlas) {
+    return is_atlas ? field_layout::kAtlasFormat : field_layout::kFormat;
+  };
+  throw FileError(path.string(), "attribute format", text(atlas), text(header.is_atlas));
+}
+
 /// Collective. Rank 0's header on every rank.
-void share(FileHeader& header, const Communicator& communicator) {
-  std::vector<std::byte> payload = bytes_of(header.payload);
-  std::vector<std::byte> range = bytes_of(header.range);
-  std::vector<std::byte> provenance = bytes_of(header.provenance);
-  std::string lines = header.payload_sha256 + "\n" + std::to_string(header.file_bytes) + "\n" +
-                      std::to_string(static_cast<int>(header.packing)) + "\n";
-  for (const std::string& sha256 : header.index_sha256) lines += sha256 + "\n";
-  communicator.broadcast(payload);
-  communicator.broadcast(range);
-  communicator.broadcast(provenance);
-  communicator.broadcast(lines);
-  if (communicator.is_root()) return;
-  header.payload = value_of<std::vector<Dataset>>(payload, "the header from rank 0");
-  header.range = value_of<std::vector<Dataset>>(range, "the header from rank 0");
-  header.provenance = value_of<std::vector<Dataset>>(provenance, "the header from rank 0");
-  std::istringstream stream(lines);
-  std::getline(stream, header.payload_sha256);
-  std::string line;
-  std::getline(stream, line);
-  header.file_bytes = std::stoull(line);
-  std::getline(stream, line);
-  header.packing = static_cast<IndexPacking>(std::stoi(line));
-  while (std::getline(stream, line)) header.index_sha256.push_back(line);
+FileHeader shared_header(bool atlas,
+                         const std::filesystem::path& path,
+                         const Communicator& communicator) {
+  FileHeader header;
+  all_or_none(communicator, [&] {
+    if (communicator.is_root())
+      header = naming_file(path, [&] { return read_header_of(atlas, path); });
+  });
+  std::vector<std::byte> bytes = bytes_of(header);
+  communicator.broadcast(bytes);
+  if (communicator.is_root()) return header;
+  header = value_of<FileHeader>(bytes, "the header from rank 0");
+  for (std::size_t i = 0; i < header.fields.size(); ++i)
+    header.fields[i].index_rules =
+        field_layout::within(atlas ? field_layout::member_group(i) : "",
+                             index_rules(header.fields[i].field(path.string()).lattice()));
+  return header;
+}
+
+/// What a file's header says of it.
+FieldFileInfo info_of(const FileHeader& header,
+                      std::uint64_t payload_bytes,
+                      const std::filesystem::path& path) {
+  const FieldProvenance provenance = field_layout::provenance_of(header.provenance);
+  return {provenance,
+          header.payload_sha256,
+          header.file_bytes,
+          payload_bytes,
+          field_layout::look_up_of(provenance, path.string()),
+          header.packing};
 }
 
 /// Reads and verifies the indices of one slab into memory for all of them.
@@ -620,6 +799,79 @@ CompressedSlab read_slab(const std::filesystem::path& path,
   return {SharedArray<std::uint16_t>(memory, {first, tiles})};
 }
 
+/// Collective. What write_field() and write_atlas() promise.
+FieldFileInfo write_file(const FileContents& contents,
+                         const Codebook& codebook,
+                         const NextBlocks& next_blocks,
+                         const MakeProvenance& make_provenance,
+                         const std::filesystem::path& path,
+                         const Communicator& communicator,
+                         const MpiIoHints& hints) {
+  const hdf5::QuietErrors quiet;
+  std::optional<hdf5::IndexFilter> filter;
+  all_or_none(communicator, [&] { filter.emplace(codebook); });
+  const std::filesystem::path partial = field_layout::unfinished_path(path);
+  FieldFileInfo info;
+  info.payload_bytes = contents.payload_bytes;
+  info.packing = contents.packing;
+  // Before the part that removes the partial file when it fails: it may be none of ours.
+  all_or_none(communicator, [&] {
+    if (communicator.is_root()) check_output_file(path, partial);
+  });
+  try {
+    all_or_none(communicator, [&] {
+      if (!communicator.is_root()) return;
+      const WorkNote note("making " + partial.string());
+      lay_out(partial, hints);
+      naming_file(partial, [&] { create_file_without_indices(contents, partial); });
+    });
+    const auto sums = write_indices(partial, contents.indices, next_blocks, communicator, hints);
+    info.provenance = make_provenance();
+    all_or_none(communicator, [&] {
+      if (!communicator.is_root()) return;
+      const WorkNote note("reading " + partial.string() + " back to verify it");
+      info.payload_sha256 = naming_file(
+          partial, [&] { return verify_and_seal(contents, info.provenance, sums, partial); });
+      move_into_place(partial, path);
+      info.file_bytes = std::filesystem::file_size(path);
+    });
+  } catch (const Error& error) {
+    // HDF5 would try again to write what could not be written, when MPI is finalised.
+    if (error.exit_code() != ExitCode::Stopped) MpiEnvironment::require_abort();
+    std::error_code ignored;
+    if (communicator.is_root()) std::filesystem::remove(partial, ignored);
+    throw;
+  }
+  share(info, communicator);
+  return info;
+}
+
+/// Collective. A field of a file with its indices.
+std::shared_ptr<const CompressedAttenuationField> field_with_indices(
+    const FieldHeader& header,
+    const std::filesystem::path& path,
+    const Communicator& communicator) {
+  auto field = std::make_shared<CompressedAttenuationField>(header.field(path.string()));
+  std::optional<hdf5::IndexFilter> filter;
+  all_or_none(communicator, [&] {
+    if (communicator.is_root()) filter.emplace(field->codebook);
+  });
+  for (std::size_t k = 0; k < header.index_rules.size(); ++k)
+    field->slabs.push_back(all_or_none(communicator, [&] {
+      return read_slab(path,
+                       header.index_rules[k],
+                       header.index_sha256[k],
+                       field->codebook.size(),
+                       communicator);
+    }));
+  all_or_none(communicator, [&] {
+    if (!communicator.is_root()) return;
+    const auto found = problems(*field);
+    if (!found.empty()) throw FileError(path.string(), found.front());
+  });
+  return field;
+}
+
 }  // namespace
 
 void announce_field(const std::filesystem::path& path) {
@@ -637,44 +889,29 @@ FieldFileInfo write_field(const CompressedAttenuationField& field,
                           const Communicator& communicator,
                           const MpiIoHints& hints,
                           IndexPacking packing) {
-  const hdf5::QuietErrors quiet;
-  std::optional<hdf5::IndexFilter> filter;
-  all_or_none(communicator, [&] { filter.emplace(field.codebook); });
-  const std::filesystem::path partial = field_layout::unfinished_path(path);
-  const auto rules = index_rules(field.lattice());
-  FieldFileInfo info;
-  info.payload_bytes = field_layout::payload_bytes(field);
-  info.packing = packing;
-  // Before the part that removes the partial file when it fails: it may be none of ours.
-  all_or_none(communicator, [&] {
-    if (communicator.is_root()) check_output_file(path, partial);
-  });
-  try {
-    all_or_none(communicator, [&] {
-      if (!communicator.is_root()) return;
-      const WorkNote note("making " + partial.string());
-      lay_out(partial, hints);
-      naming_file(partial, [&] { create_file_without_indices(field, packing, partial); });
-    });
-    const auto sums = write_indices(partial, rules, next_blocks, communicator, hints);
-    info.provenance = make_provenance();
-    all_or_none(communicator, [&] {
-      if (!communicator.is_root()) return;
-      const WorkNote note("reading " + partial.string() + " back to verify it");
-      info.payload_sha256 = naming_file(
-          partial, [&] { return verify_and_seal(field, info.provenance, sums, partial); });
-      move_into_place(partial, path);
-      info.file_bytes = std::filesystem::file_size(path);
-    });
-  } catch (const Error& error) {
-    // HDF5 would try again to write what could not be written, when MPI is finalised.
-    if (error.exit_code() != ExitCode::Stopped) MpiEnvironment::require_abort();
-    std::error_code ignored;
-    if (communicator.is_root()) std::filesystem::remove(partial, ignored);
-    throw;
-  }
-  share(info, communicator);
-  return info;
+  return write_file(contents_of(field, packing),
+                    field.codebook,
+                    next_blocks,
+                    make_provenance,
+                    path,
+                    communicator,
+                    hints);
+}
+
+FieldFileInfo write_atlas(const AttenuationAtlas& atlas,
+                          const NextBlocks& next_blocks,
+                          const MakeProvenance& make_provenance,
+                          const std::filesystem::path& path,
+                          const Communicator& communicator,
+                          const MpiIoHints& hints,
+                          IndexPacking packing) {
+  return write_file(contents_of(atlas, packing),
+                    atlas.codebook,
+                    next_blocks,
+                    make_provenance,
+                    path,
+                    communicator,
+                    hints);
 }
 
 FieldFileInfo write_field(const CompressedAttenuationField& field,
@@ -695,55 +932,126 @@ FieldFileInfo write_field(const CompressedAttenuationField& field,
       packing);
 }
 
-void share_geometry(CompressedAttenuationField& field, const Communicator& communicator) {
-  std::vector<std::byte> bytes = bytes_of(field_layout::geometry_datasets(field));
+void share_geometry(LightSlab& light_slab, const Communicator& communicator) {
+  std::vector<std::byte> bytes = bytes_of(field_layout::geometry_datasets(light_slab));
   communicator.broadcast(bytes);
   field_layout::set_geometry(value_of<std::vector<Dataset>>(bytes, "the geometry of rank 0"),
                              "the geometry of rank 0",
-                             field);
+                             light_slab);
 }
 
 CompressedAttenuationField read_field_header(const std::filesystem::path& path) {
   const hdf5::QuietErrors quiet;
-  return naming_file(path, [&] { return read_header(path).field(path.string()); });
+  return naming_file(
+      path, [&] { return read_header_of(false, path).fields.front().field(path.string()); });
+}
+
+std::filesystem::path bone_field_path(const std::filesystem::path& path) {
+  std::string name = path.filename().string();
+  std::size_t ending = name.find(".af.h5");
+  if (ending == std::string::npos) ending = name.rfind('.');
+  name.insert(std::min(ending, name.size()), ".bone");
+  return path.parent_path() / name;
 }
 
 std::shared_ptr<const CompressedAttenuationField> read_field(const std::filesystem::path& path,
                                                              const Communicator& communicator,
                                                              FieldFileInfo* info) {
-  const hdf5::QuietErrors quiet;
-  FileHeader header;
+  auto field = read_field_of_any_material(path, communicator, info);
   all_or_none(communicator, [&] {
-    if (communicator.is_root()) header = naming_file(path, [&] { return read_header(path); });
+    if (field->identity.material != FieldMaterial::All)
+      throw FileError(path.string(), "/material", "a field of all of the CT", "of its bone alone");
   });
-  share(header, communicator);
-  auto field = std::make_shared<CompressedAttenuationField>(header.field(path.string()));
-  const auto rules = index_rules(field->lattice());
-  std::optional<hdf5::IndexFilter> filter;
-  all_or_none(communicator, [&] {
-    if (communicator.is_root()) filter.emplace(field->codebook);
-  });
-  for (std::size_t k = 0; k < rules.size(); ++k)
-    field->slabs.push_back(all_or_none(communicator, [&] {
-      return read_slab(
-          path, rules[k], header.index_sha256[k], field->codebook.size(), communicator);
-    }));
-  all_or_none(communicator, [&] {
-    if (!communicator.is_root()) return;
-    const auto found = problems(*field);
-    if (!found.empty()) throw FileError(path.string(), found.front());
-  });
-  const FieldProvenance provenance = field_layout::provenance_of(header.provenance);
-  const std::string look_up = all_or_none(
-      communicator, [&] { return field_layout::look_up_of(provenance, path.string()); });
-  if (info != nullptr)
-    *info = {provenance,
-             header.payload_sha256,
-             header.file_bytes,
-             field_layout::payload_bytes(*field),
-             look_up,
-             header.packing};
   return field;
+}
+
+std::shared_ptr<const CompressedAttenuationField> read_bone_field(
+    const std::filesystem::path& path,
+    const CompressedAttenuationField& of_all,
+    const Communicator& communicator,
+    FieldFileInfo* info) {
+  all_or_none(communicator, [&] {
+    if (!std::filesystem::exists(path))
+      throw FileError(path.string(),
+                      "does not exist: a tube voltage needs the field of the CT's bone, which "
+                      "af-precompute --material bone makes with the other options of the field "
+                      "beside it");
+  });
+  auto field = read_field_of_any_material(path, communicator, info);
+  const FieldIdentity& wanted = of_all.identity;
+  const FieldIdentity& found = field->identity;
+  all_or_none(communicator, [&] {
+    if (found.material != FieldMaterial::Bone)
+      throw FileError(path.string(), "/material", "a field of the CT's bone alone", "of all of it");
+    if (found.ct_content_sha256 != wanted.ct_content_sha256)
+      throw FileError(path.string(),
+                      "CT of the field (ct_content_sha256)",
+                      wanted.ct_content_sha256 + " (that of the field of all)",
+                      found.ct_content_sha256);
+    if (found.mu_water_per_mm != wanted.mu_water_per_mm ||
+        found.air_below_hu != wanted.air_below_hu)
+      throw FileError(path.string(),
+                      "attenuation",
+                      "mu_water and the HU that count as air as in the field of all",
+                      "others");
+  });
+  return field;
+}
+
+std::shared_ptr<const CompressedAttenuationField> read_field_of_any_material(
+    const std::filesystem::path& path, const Communicator& communicator, FieldFileInfo* info) {
+  const hdf5::QuietErrors quiet;
+  const FileHeader header = shared_header(false, path, communicator);
+  auto field = field_with_indices(header.fields.front(), path, communicator);
+  const FieldFileInfo said = all_or_none(communicator, [&] {
+    return info_of(header, field_layout::payload_bytes(field->codebook, field->lattice()), path);
+  });
+  if (info != nullptr) *info = said;
+  return field;
+}
+
+bool is_atlas_file(const std::filesystem::path& path) {
+  const hdf5::QuietErrors quiet;
+  return naming_file(path, [&] {
+    check_is_hdf5(path);
+    const Handle file = hdf5::open_file(path, H5F_ACC_RDONLY);
+    return is_atlas_format(file, path);
+  });
+}
+
+AttenuationAtlas read_atlas_header(const std::filesystem::path& path) {
+  const hdf5::QuietErrors quiet;
+  return naming_file(path, [&] { return read_header_of(true, path).atlas(path.string()); });
+}
+
+std::shared_ptr<const AttenuationAtlas> read_atlas(const std::filesystem::path& path,
+                                                   const Communicator& communicator,
+                                                   FieldFileInfo* info) {
+  const hdf5::QuietErrors quiet;
+  const FileHeader header = shared_header(true, path, communicator);
+  auto atlas = std::make_shared<AttenuationAtlas>(header.atlas(path.string()));
+  const FieldFileInfo said = all_or_none(communicator, [&] {
+    return info_of(header, field_layout::payload_bytes(atlas->codebook, atlas->lattice()), path);
+  });
+  if (info != nullptr) *info = said;
+  return atlas;
+}
+
+std::shared_ptr<const CompressedAttenuationField> read_atlas_member(
+    const std::filesystem::path& path,
+    std::size_t member,
+    const std::string& payload_sha256,
+    const Communicator& communicator) {
+  static std::mutex one_at_a_time;  // HDF5 and its filter are for one thread
+  const std::scoped_lock lock(one_at_a_time);
+  const hdf5::QuietErrors quiet;
+  const FileHeader header = shared_header(true, path, communicator);
+  all_or_none(communicator, [&] {
+    if (header.payload_sha256 != payload_sha256)
+      throw FileError(path.string(), "payload_sha256", payload_sha256, header.payload_sha256);
+  });
+  check(member < header.fields.size(), "a member of the atlas");
+  return field_with_indices(header.fields[member], path, communicator);
 }
 
 }  // namespace af

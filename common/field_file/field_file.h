@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "field/attenuation_atlas.h"
 #include "field/compressed_attenuation_field.h"
 #include "parallel/communicator.h"
 
@@ -89,6 +90,16 @@ FieldFileInfo write_field(const CompressedAttenuationField& field,
                           const MpiIoHints& hints = {},
                           IndexPacking packing = IndexPacking::CodebookTree);
 
+/// Collective. As write_field(), of an atlas: a block's slab counts over the slabs of all members.
+/// The identity of every member names the atlas's CT and attenuation.
+FieldFileInfo write_atlas(const AttenuationAtlas& atlas,
+                          const NextBlocks& next_blocks,
+                          const MakeProvenance& make_provenance,
+                          const std::filesystem::path& path,
+                          const Communicator& communicator,
+                          const MpiIoHints& hints = {},
+                          IndexPacking packing = IndexPacking::CodebookTree);
+
 /// Rank 0 alone, before the work: announce_output() of a field and of what write_field() and
 /// check_parallel_writing() put beside it.
 void announce_field(const std::filesystem::path& path);
@@ -110,7 +121,7 @@ void check_writing_many_chunks(const FieldLattice& lattice,
 
 /// Collective. Rank 0's geometry on every rank: sizing uses libm, whose last bit may differ between
 /// processors.
-void share_geometry(CompressedAttenuationField& field, const Communicator& communicator);
+void share_geometry(LightSlab& light_slab, const Communicator& communicator);
 
 /// One rank alone, and quick: a field without its indices (identity, geometry, codebook), verified
 /// as read_field() does. FileError.
@@ -118,9 +129,50 @@ CompressedAttenuationField read_field_header(const std::filesystem::path& path);
 
 /// Collective. Rank 0 reads and verifies (extents against dataspaces before allocating, checksums,
 /// index range), the rest receive it; indices are held once per node. FileError (exit 4) on
-/// anything that does not fit: names path, dataset, expected, found.
+/// anything that does not fit: names path, dataset, expected, found. A field of bone's part alone
+/// is refused, too.
 std::shared_ptr<const CompressedAttenuationField> read_field(const std::filesystem::path& path,
                                                              const Communicator& communicator,
                                                              FieldFileInfo* info = nullptr);
+
+/// Collective. The field of bone's part that belongs to a field of all: FileError, beside those of
+/// read_field(), when it is missing, or of all of a CT, of another CT or another attenuation. Its
+/// camera, range and design may be others.
+std::shared_ptr<const CompressedAttenuationField> read_bone_field(
+    const std::filesystem::path& path,
+    const CompressedAttenuationField& of_all,
+    const Communicator& communicator,
+    FieldFileInfo* info = nullptr);
+
+/// Collective. Either.
+std::shared_ptr<const CompressedAttenuationField> read_field_of_any_material(
+    const std::filesystem::path& path,
+    const Communicator& communicator,
+    FieldFileInfo* info = nullptr);
+
+/// Where programs look for the field of bone's part beside a field: A.bone.af.h5 beside A.af.h5.
+std::filesystem::path bone_field_path(const std::filesystem::path& path);
+
+/// One rank alone, and quick: whether a file says that it is an atlas. FileError when it is neither
+/// atlas nor field.
+bool is_atlas_file(const std::filesystem::path& path);
+
+/// One rank alone, and quick: an atlas, verified as read_field() verifies but for the indices.
+/// FileError.
+AttenuationAtlas read_atlas_header(const std::filesystem::path& path);
+
+/// Collective. The same on every rank; no indices are read.
+std::shared_ptr<const AttenuationAtlas> read_atlas(const std::filesystem::path& path,
+                                                   const Communicator& communicator,
+                                                   FieldFileInfo* info = nullptr);
+
+/// Collective. One member of an atlas, read and verified as a field; indices are held once per
+/// node. `payload_sha256`: of the atlas as it was read before; FileError when the file has become
+/// another. With Communicator::alone() threads may call it.
+std::shared_ptr<const CompressedAttenuationField> read_atlas_member(
+    const std::filesystem::path& path,
+    std::size_t member,
+    const std::string& payload_sha256,
+    const Communicator& communicator);
 
 }  // namespace af

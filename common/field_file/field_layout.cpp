@@ -15,6 +15,7 @@ namespace af::field_layout {
 namespace {
 
 constexpr std::uint64_t kMaxNameBytes = 4096;
+constexpr const char* kBoneText = "bone";
 
 DatasetRule step_rule() {
   return {"/codebook/quantizer_step", ElementType::Float32, {1}, false, "1 per level", "none"};
@@ -249,23 +250,65 @@ std::span<const Dataset> set_values(const StoredValues& values,
   return datasets.subspan(list.size());
 }
 
-/// What must hold before the indices can even be looked for.
-std::vector<std::string> header_problems(const CompressedAttenuationField& field) {
-  std::vector<std::string> found = problems(field.codebook);
+/// What must hold before the indices can even be looked for; without planes, when there are none.
+std::vector<std::string> header_problems(const FieldIdentity& identity,
+                                         const Codebook& codebook,
+                                         float quantizer_step,
+                                         const LightSlab* light_slab) {
+  std::vector<std::string> found = problems(codebook);
   const auto append = [&](const std::vector<std::string>& more) {
     found.insert(found.end(), more.begin(), more.end());
   };
-  append(problems(field.identity.camera));
-  append(problems(field.identity.range));
-  if (!is_plain_file_name(field.identity.camera.name))
+  append(problems(identity.camera));
+  append(problems(identity.range));
+  if (!is_plain_file_name(identity.camera.name))
     found.emplace_back("camera_name: must be usable in a file name");
-  append(rigidity_problems(field.identity.frame.nominal_room_from_ct().matrix()));
-  append(problems(field.light_slab));
-  if (!(field.quantizer_step > 0.0f && std::isfinite(field.quantizer_step)))
+  append(rigidity_problems(identity.frame.nominal_room_from_ct().matrix()));
+  if (light_slab != nullptr) append(problems(*light_slab));
+  if (!(quantizer_step > 0.0f && std::isfinite(quantizer_step)))
     found.emplace_back("quantizer_step: must be positive and finite");
-  if (!(field.identity.mu_water_per_mm > 0.0))
-    found.emplace_back("mu_water_per_mm: must be positive");
+  if (!(identity.mu_water_per_mm > 0.0)) found.emplace_back("mu_water_per_mm: must be positive");
   return found;
+}
+
+/// From the first datasets; returns the others.
+std::span<const Dataset> set_identity(std::span<const Dataset> datasets,
+                                      const std::string& path,
+                                      FieldIdentity& identity) {
+  StoredIdentity stored;
+  datasets = set_values(stored_values(stored), datasets, path);
+  identity = stored.identity;
+  identity.range = {stored.max_rotation_rad, stored.max_translation_mm};
+  return datasets;
+}
+
+/// From the datasets of step_rule() and codewords_rule().
+void set_codebook(std::span<const Dataset> datasets,
+                  const std::string& path,
+                  float& quantizer_step,
+                  Codebook& codebook) {
+  check(datasets.size() == kSharedRules, "a dataset per rule");
+  quantizer_step = values_of<float>(datasets[0], path)[0];
+  const auto levels = values_of<std::uint16_t>(datasets[1], path);
+  codebook.codewords.resize(levels.size() / kTileElements);
+  if (!levels.empty()) std::memcpy(codebook.codewords.data(), levels.data(), levels.size() * 2);
+}
+
+void append_codebook(float quantizer_step,
+                     const Codebook& codebook,
+                     std::vector<Dataset>& datasets) {
+  datasets.push_back(dataset_of<float>(step_rule(), std::span(&quantizer_step, 1)));
+  const Tile* first = codebook.codewords.data();
+  datasets.push_back(dataset_of<std::uint16_t>(
+      codewords_rule(), std::span(first->data(), codebook.size() * kTileElements)));
+}
+
+int count_within(const Dataset& dataset, int most, const std::string& path) {
+  const int count = values_of<std::int32_t>(dataset, path).at(0);
+  if (count < 1 || count > most)
+    throw FileError(
+        path, dataset.rule.name, "1 ... " + std::to_string(most), std::to_string(count));
+  return count;
 }
 
 }  // namespace
@@ -305,13 +348,18 @@ DatasetRule slab_count_rule() {
   return {"/geometry/slab_count", ElementType::Int32, {1}, false, "1", "none"};
 }
 
-std::vector<DatasetRule> payload_rules(int slab_count) {
+std::vector<DatasetRule> member_rules(int slab_count) {
   LightSlab light_slab;
   light_slab.slabs.resize(static_cast<std::size_t>(slab_count));
   StoredIdentity identity;
   std::vector<DatasetRule> rules = {slab_count_rule()};
   append_rules(stored_values(light_slab), rules);
   append_rules(stored_values(identity), rules);
+  return rules;
+}
+
+std::vector<DatasetRule> payload_rules(int slab_count) {
+  std::vector<DatasetRule> rules = member_rules(slab_count);
   rules.push_back(step_rule());
   rules.push_back(codewords_rule());
   return rules;
@@ -333,6 +381,22 @@ std::vector<DatasetRule> index_rules(const FieldLattice& lattice) {
   return rules;
 }
 
+DatasetRule material_rule() {
+  constexpr std::uint64_t kMostBytes = 64;
+  return {"/material", ElementType::Text, {kMostBytes}, true, "1", "none"};
+}
+
+std::vector<Dataset> material_datasets(FieldMaterial material) {
+  if (material == FieldMaterial::All) return {};
+  return {dataset_of<char>(material_rule(), stored_text(kBoneText))};
+}
+
+FieldMaterial material_of(const Dataset& dataset, const std::string& path) {
+  const std::string text = text_of(dataset);
+  if (text != kBoneText) throw FileError(path, dataset.rule.name, kBoneText, text);
+  return FieldMaterial::Bone;
+}
+
 std::vector<DatasetRule> provenance_rules() {
   std::vector<DatasetRule> rules;
   for (const char* name : {"source_version", "command_line", "options_toml", "provenance_json"})
@@ -345,21 +409,81 @@ std::vector<DatasetRule> provenance_rules() {
   return rules;
 }
 
-std::vector<Dataset> geometry_datasets(const CompressedAttenuationField& field) {
-  const auto slab_count = static_cast<std::int32_t>(field.light_slab.slabs.size());
+std::string member_group(std::size_t member) {
+  return "/member_" + std::to_string(member);
+}
+
+std::vector<DatasetRule> within(const std::string& group, std::vector<DatasetRule> rules) {
+  for (DatasetRule& rule : rules) rule.name.insert(0, group);
+  return rules;
+}
+
+std::vector<Dataset> within(const std::string& group, std::vector<Dataset> datasets) {
+  for (Dataset& dataset : datasets) dataset.rule.name.insert(0, group);
+  return datasets;
+}
+
+DatasetRule member_count_rule() {
+  return {"/member_count", ElementType::Int32, {1}, false, "1", "none"};
+}
+
+std::vector<DatasetRule> atlas_rules() {
+  StoredIdentity identity;
+  std::vector<DatasetRule> rules = {member_count_rule()};
+  append_rules(stored_values(identity), rules);
+  rules.push_back(step_rule());
+  rules.push_back(codewords_rule());
+  return rules;
+}
+
+std::vector<DatasetRule> index_rules(const AttenuationAtlas& atlas) {
+  std::vector<DatasetRule> rules;
+  for (std::size_t i = 0; i < atlas.members.size(); ++i)
+    for (DatasetRule& rule :
+         within(member_group(i), index_rules(atlas.members[i].light_slab.lattice())))
+      rules.push_back(std::move(rule));
+  return rules;
+}
+
+std::vector<Dataset> datasets_of(const AttenuationAtlas& atlas) {
+  const auto count = static_cast<std::int32_t>(atlas.members.size());
+  std::vector<Dataset> datasets = {
+      dataset_of<std::int32_t>(member_count_rule(), std::span(&count, 1))};
+  append_datasets(StoredIdentity(atlas.identity), datasets);
+  append_codebook(atlas.quantizer_step, atlas.codebook, datasets);
+  return datasets;
+}
+
+std::vector<Dataset> datasets_of(const AtlasMember& member) {
+  std::vector<Dataset> datasets = geometry_datasets(member.light_slab);
+  append_datasets(StoredIdentity(member.identity), datasets);
+  return datasets;
+}
+
+int member_count_of(const Dataset& dataset, const std::string& path) {
+  return count_within(dataset, kMaxMembers, path);
+}
+
+AttenuationAtlas atlas_of(std::span<const Dataset> datasets, const std::string& path) {
+  AttenuationAtlas atlas;
+  datasets = set_identity(datasets.subspan(1), path, atlas.identity);
+  set_codebook(datasets, path, atlas.quantizer_step, atlas.codebook);
+  const auto found = header_problems(atlas.identity, atlas.codebook, atlas.quantizer_step, nullptr);
+  if (!found.empty()) throw FileError(path, found.front());
+  return atlas;
+}
+
+std::vector<Dataset> geometry_datasets(const LightSlab& light_slab) {
+  const auto slab_count = static_cast<std::int32_t>(light_slab.slabs.size());
   std::vector<Dataset> datasets = {
       dataset_of<std::int32_t>(slab_count_rule(), std::span(&slab_count, 1))};
-  append_datasets(field.light_slab, datasets);
+  append_datasets(light_slab, datasets);
   return datasets;
 }
 
 std::vector<Dataset> datasets_of(const CompressedAttenuationField& field) {
-  std::vector<Dataset> datasets = geometry_datasets(field);
-  append_datasets(StoredIdentity(field.identity), datasets);
-  datasets.push_back(dataset_of<float>(step_rule(), std::span(&field.quantizer_step, 1)));
-  const Tile* first = field.codebook.codewords.data();
-  datasets.push_back(dataset_of<std::uint16_t>(
-      codewords_rule(), std::span(first->data(), field.codebook.size() * kTileElements)));
+  std::vector<Dataset> datasets = datasets_of(AtlasMember{field.identity, field.light_slab});
+  append_codebook(field.quantizer_step, field.codebook, datasets);
   return datasets;
 }
 
@@ -403,26 +527,19 @@ std::vector<Dataset> datasets_of(const FieldProvenance& provenance) {
 
 std::span<const Dataset> set_geometry(std::span<const Dataset> datasets,
                                       const std::string& path,
-                                      CompressedAttenuationField& field) {
+                                      LightSlab& light_slab) {
   const int slab_count = slab_count_of(datasets.front(), path);
-  field.light_slab.slabs.assign(static_cast<std::size_t>(slab_count), {});
-  return set_values(stored_values(field.light_slab), datasets.subspan(1), path);
+  light_slab.slabs.assign(static_cast<std::size_t>(slab_count), {});
+  return set_values(stored_values(light_slab), datasets.subspan(1), path);
 }
 
 CompressedAttenuationField field_of(std::span<const Dataset> datasets, const std::string& path) {
   CompressedAttenuationField field;
-  datasets = set_geometry(datasets, path, field);
-  StoredIdentity stored;
-  datasets = set_values(stored_values(stored), datasets, path);
-  field.identity = stored.identity;
-  field.identity.range = {stored.max_rotation_rad, stored.max_translation_mm};
-  check(datasets.size() == 2, "a dataset per rule");
-  field.quantizer_step = values_of<float>(datasets[0], path)[0];
-  const auto levels = values_of<std::uint16_t>(datasets[1], path);
-  field.codebook.codewords.resize(levels.size() / kTileElements);
-  if (!levels.empty())
-    std::memcpy(field.codebook.codewords.data(), levels.data(), levels.size() * 2);
-  const auto found = header_problems(field);
+  datasets = set_geometry(datasets, path, field.light_slab);
+  datasets = set_identity(datasets, path, field.identity);
+  set_codebook(datasets, path, field.quantizer_step, field.codebook);
+  const auto found =
+      header_problems(field.identity, field.codebook, field.quantizer_step, &field.light_slab);
   if (!found.empty()) throw FileError(path, found.front());
   return field;
 }
@@ -446,10 +563,7 @@ std::string look_up_of(const FieldProvenance& provenance, const std::string& pat
 }
 
 int slab_count_of(const Dataset& dataset, const std::string& path) {
-  const int count = values_of<std::int32_t>(dataset, path).at(0);
-  if (count < 1 || count > kMaxSlabs)
-    throw FileError(path, dataset.rule.name, "1 ... 64", std::to_string(count));
-  return count;
+  return count_within(dataset, kMaxSlabs, path);
 }
 
 std::string payload_line(const DatasetRule& rule, const std::string& sha256) {
@@ -458,9 +572,9 @@ std::string payload_line(const DatasetRule& rule, const std::string& sha256) {
   return line + " " + sha256 + "\n";
 }
 
-std::uint64_t payload_bytes(const CompressedAttenuationField& field) {
-  return field.codebook.size() * sizeof(Tile) +
-         static_cast<std::uint64_t>(field.lattice().tile_count()) * sizeof(std::uint16_t);
+std::uint64_t payload_bytes(const Codebook& codebook, const FieldLattice& lattice) {
+  return codebook.size() * sizeof(Tile) +
+         static_cast<std::uint64_t>(lattice.tile_count()) * sizeof(std::uint16_t);
 }
 
 }  // namespace af::field_layout

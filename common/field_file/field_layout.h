@@ -10,6 +10,7 @@
 #include <tuple>
 #include <vector>
 
+#include "field/attenuation_atlas.h"
 #include "field/compressed_attenuation_field.h"
 #include "field_file/field_file.h"
 
@@ -21,7 +22,9 @@ inline constexpr int kFormatVersion = 2;
 inline constexpr int format_version_of(IndexPacking packing) {
   return packing == IndexPacking::CodebookTree ? 2 : 1;
 }
+inline constexpr const char* kAtlasFormat = "attenuation-atlas";
 inline constexpr int kMaxSlabs = 64;
+inline constexpr int kMaxMembers = 64;
 inline constexpr std::size_t kSha256Digits = 64;
 inline constexpr std::uint64_t kMaxTextBytes = 16u << 20;
 
@@ -67,11 +70,32 @@ DatasetRule index_rule(const FieldLattice& lattice, std::size_t slab);
 std::vector<DatasetRule> index_rules(const FieldLattice& lattice);
 std::vector<DatasetRule> provenance_rules();
 
+/// Where the datasets of an atlas's member stand, as a field's own root has them: "/member_3".
+std::string member_group(std::size_t member);
+/// The same with names that begin with the group.
+std::vector<DatasetRule> within(const std::string& group, std::vector<DatasetRule> rules);
+std::vector<Dataset> within(const std::string& group, std::vector<Dataset> datasets);
+DatasetRule member_count_rule();
+/// Payload that stands in an atlas's root: the identity, and the last kSharedRules are codebook and
+/// quantiser. Its rules in payload_rules() are the last, too: the datasets of a member, and these,
+/// are those of a field.
+std::vector<DatasetRule> atlas_rules();
+inline constexpr std::size_t kSharedRules = 2;
+std::vector<Dataset> datasets_of(const AttenuationAtlas& atlas);
+/// One per slab of every member, in the order of the atlas's lattice.
+std::vector<DatasetRule> index_rules(const AttenuationAtlas& atlas);
+/// payload_rules() without the shared ones, and the datasets of a member that they stand for.
+std::vector<DatasetRule> member_rules(int slab_count);
+std::vector<Dataset> datasets_of(const AtlasMember& member);
+int member_count_of(const Dataset& dataset, const std::string& path);
+/// The atlas of datasets that satisfy atlas_rules(), without members. FileError.
+AttenuationAtlas atlas_of(std::span<const Dataset> datasets, const std::string& path);
+
 /// The small payload datasets of a field, in the order of payload_rules().
 std::vector<Dataset> datasets_of(const CompressedAttenuationField& field);
 std::vector<Dataset> datasets_of(const FieldProvenance& provenance);
 /// Of its geometry alone, the number of slabs first.
-std::vector<Dataset> geometry_datasets(const CompressedAttenuationField& field);
+std::vector<Dataset> geometry_datasets(const LightSlab& light_slab);
 
 /// A motion range that two numbers do not state, as datasets beside the payload; none for others.
 /// Older programs do not see them: to these the file states symmetric_part() of the range, all of
@@ -84,10 +108,17 @@ MotionRange range_of(std::span<const Dataset> datasets,
                      const MotionRange& stated,
                      const std::string& path);
 
+/// Says in a field of bone's part alone that it is one, beside the payload; none for others. Older
+/// programs do not see it.
+std::vector<Dataset> material_datasets(FieldMaterial material);
+DatasetRule material_rule();
+/// FileError when it names no material that a field has.
+FieldMaterial material_of(const Dataset& dataset, const std::string& path);
+
 /// Takes the geometry from the first datasets; returns the others. FileError on NaN and infinity.
 std::span<const Dataset> set_geometry(std::span<const Dataset> datasets,
                                       const std::string& path,
-                                      CompressedAttenuationField& field);
+                                      LightSlab& light_slab);
 /// The field of datasets that satisfy payload_rules(), without indices. FileError when values make
 /// no sense: NaN, bad geometry, a codebook out of order, ranges outside the lattice.
 CompressedAttenuationField field_of(std::span<const Dataset> datasets, const std::string& path);
@@ -100,7 +131,7 @@ int slab_count_of(const Dataset& dataset, const std::string& path);
 /// One line per dataset that takes part in the payload hash.
 std::string payload_line(const DatasetRule& rule, const std::string& sha256);
 
-/// Bytes of indices and codebook, as stored.
-std::uint64_t payload_bytes(const CompressedAttenuationField& field);
+/// Bytes of codebook and indices, as stored.
+std::uint64_t payload_bytes(const Codebook& codebook, const FieldLattice& lattice);
 
 }  // namespace af::field_layout

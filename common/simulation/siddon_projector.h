@@ -2,7 +2,7 @@
 #pragma once
 
 #include "simulation/ray_integrator.h"
-#include "simulation/tissue_model.h"
+#include "spectrum/tissue_model.h"
 #include "volume/attenuation_volume.h"
 
 namespace af {

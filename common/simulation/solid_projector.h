@@ -7,7 +7,7 @@
 #include "simulation/phantom_parts.h"
 #include "simulation/ray_integrator.h"
 #include "simulation/smooth_motion.h"
-#include "simulation/tissue_model.h"
+#include "spectrum/tissue_model.h"
 
 namespace af {
 

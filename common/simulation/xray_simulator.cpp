@@ -10,7 +10,7 @@ namespace af {
 
 XraySimulationOptions XraySimulationOptions::ideal() {
   XraySimulationOptions options;
-  options.spectrum.tube_kvp = 0.0;
+  options.spectrum = SpectrumOptions::one_energy();
   options.detector.scatter_to_primary_ratio = 0.0;
   options.detector.photons_per_pixel = 0.0;
   options.detector.blur_sigma_px = 0.0;

@@ -15,7 +15,7 @@
 #include "simulation/phantom_parts.h"
 #include "simulation/siddon_projector.h"
 #include "simulation/smooth_motion.h"
-#include "simulation/xray_spectrum.h"
+#include "spectrum/xray_spectrum.h"
 
 namespace af {
 

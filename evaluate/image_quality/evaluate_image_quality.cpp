@@ -22,17 +22,17 @@
 #include "evaluate/outputs/result_figures.h"
 #include "evaluate/outputs/row_gathering.h"
 #include "evaluate/outputs/sample_summary_json.h"
-#include "field_file/field_file.h"
+#include "field_use/opened_field.h"
 #include "figures/gnuplot_figure.h"
 #include "figures/picture.h"
 #include "files/output_file.h"
 #include "files/resource_check.h"
 #include "files/sha256.h"
 #include "geometry/camera_distance.h"
-#include "geometry/ray_coverage.h"
 #include "pose_files/pose_file.h"
 #include "run/run_folder.h"
 #include "run/terminal.h"
+#include "study/bone_per_node.h"
 #include "study/ct_keys.h"
 #include "study/node_ct.h"
 #include "study/pose_context.h"
@@ -70,8 +70,9 @@ struct TargetResult {
 
 /// Everything a comparison needs, the same on every rank.
 struct Setup {
-  std::shared_ptr<const CompressedAttenuationField> field;
-  FieldFileInfo field_info;
+  std::shared_ptr<const OpenedField> field;
+  std::shared_ptr<const CompressedAttenuationField> bone_field;  ///< none for one energy
+  FieldFileInfo bone_info;
   NodeCt ct;
   std::vector<RigidTransform> poses;  ///< empty: random ones
   View view;
@@ -79,37 +80,47 @@ struct Setup {
   MotionRange range;               ///< of random poses: the field's, or what it covers
 
   [[nodiscard]] std::string look_up(const ImageQualityOptions& options) const {
-    return options.look_up.empty() ? field_info.look_up : options.look_up;
+    return options.look_up.empty() ? field->info().look_up : options.look_up;
   }
   [[nodiscard]] std::int64_t pose_count(const ImageQualityOptions& options) const {
     return poses.empty() ? options.pose_count : static_cast<std::int64_t>(poses.size());
   }
 };
 
-/// The camera that is looked through, and from where random poses are drawn.
+/// The camera that is looked through, and from where random poses are drawn. An atlas's range is
+/// held at each of its angles; a field's is that of its own camera.
 void choose_camera(const Target& target, Setup& setup) {
-  const FieldIdentity& identity = setup.field->identity;
+  const FieldIdentity& identity = setup.field->identity();
   setup.view = View::whole_detector(identity.camera);
   setup.range = identity.range;
-  if (!target.camera.has_value()) return;
-  setup.camera_distance = camera_distance(*target.camera, identity.camera);
-  if (setup.camera_distance.is_none()) return;
-  setup.view = View::whole_detector(*target.camera);
-  setup.range =
-      covered_box(setup.field->light_slab, *target.camera, identity.frame, identity.range);
-  if (!covers_range(setup.field->light_slab, *target.camera, identity.frame, setup.range))
+  if (!target.camera.has_value() && setup.field->field()) return;
+  if (target.camera.has_value()) {
+    setup.camera_distance = camera_distance(*target.camera, identity.camera);
+    if (setup.camera_distance.is_none() && setup.field->field()) return;
+    setup.view = View::whole_detector(*target.camera);
+  }
+  const FieldCoverage& coverage = setup.field->coverage();
+  const std::int64_t outside =
+      coverage.rays_outside(identity.frame.nominal_room_from_ct(), setup.view);
+  if (outside > 0)
     throw InputError(
         "camera",
-        target.camera->name,
+        setup.view.camera.name,
         "the field does not hold all of its rays at the field's nominal pose; it has " +
-            setup.camera_distance.text(),
+            coverage.distance_text(setup.view.camera),
         target.field.string());
+  setup.range = coverage.box(setup.view, identity.frame, identity.range);
+  if (setup.field->atlas() &&
+      setup.range.max_rotation_rad() >= identity.range.symmetric_part().max_rotation_rad())
+    setup.range = identity.range;
 }
 
 Setup load(const ImageQualityOptions& options, const Target& target, const Communicator& world) {
   Setup setup;
-  setup.field = read_field(target.field, world, &setup.field_info);
-  const FieldIdentity& identity = setup.field->identity;
+  setup.field = std::make_shared<const OpenedField>(target.field, world);
+  if (options.beam.needs_bone())
+    setup.bone_field = setup.field->bone_field(world, &setup.bone_info);
+  const FieldIdentity& identity = setup.field->identity();
   std::vector<std::string> warnings;
   setup.ct = read_ct_per_node(target.ct,
                               target.ct_reading,
@@ -124,11 +135,13 @@ Setup load(const ImageQualityOptions& options, const Target& target, const Commu
                       "CT of the field (ct_content_sha256)",
                       setup.ct.facts.content_sha256 + " (" + target.ct.string() + ")",
                       identity.ct_content_sha256);
-    if (options.split_loss_poses > 0 && setup.field->slabs.size() != 1)
+    const FieldLattice lattice =
+        setup.field->field() ? setup.field->field()->lattice() : setup.field->atlas()->lattice();
+    if (options.split_loss_poses > 0 && lattice.slabs.size() != 1)
       throw InputError(
           "--split-loss-poses",
           std::to_string(options.split_loss_poses),
-          "needs a field of one slab; this has " + std::to_string(setup.field->slabs.size()),
+          "needs a field of one slab; this has " + std::to_string(lattice.slabs.size()),
           target.field.string());
     if (options.split_loss_poses > 0 && setup.look_up(options) != "linear")
       throw InputError("--split-loss-poses",
@@ -157,7 +170,7 @@ DrrComparison compare(const ImageQualityOptions& options,
                       const Setup& setup,
                       DrrComparer& comparer,
                       std::int64_t index) {
-  const FieldIdentity& identity = setup.field->identity;
+  const FieldIdentity& identity = setup.field->identity();
   if (setup.poses.empty())
     return comparer.at_random_pose(
         identity.frame, setup.range, options.seed, static_cast<std::uint64_t>(index));
@@ -227,7 +240,9 @@ void write_results(const ImageQualityOptions& options,
   remove_output(folder / "summary.json");
   write_text_file(folder / "image-quality.csv", image_quality_table(comparisons).to_text());
   const PsnrGroup group = group_of(result);
-  const json field = field_description(*setup.field);
+  json field = field_description(
+      setup.field->identity(), *setup.field->coverage().planes.front(), setup.field->codewords());
+  if (setup.field->atlas()) field["members"] = setup.field->coverage().planes.size();
   result.is_papers_setting = is_papers_setting(field);
   draw_psnr_boxes({group}, levels_for(result.is_papers_setting), folder / "psnr");
   json summary = {{"format", "attenuation-fields evaluation"},
@@ -254,8 +269,8 @@ void write_results(const ImageQualityOptions& options,
     summary["figures"].push_back("loss-split");
   }
   summary["field"] = field;
-  summary["field"]["file_bytes"] = setup.field_info.file_bytes;
-  summary["field"]["payload_bytes"] = setup.field_info.payload_bytes;
+  summary["field"]["file_bytes"] = setup.field->info().file_bytes;
+  summary["field"]["payload_bytes"] = setup.field->info().payload_bytes;
   summary["look_up"] = setup.look_up(options);
   summary["camera_distance"] = camera_distance_json(setup.camera_distance, setup.range);
   summary.update(image_quality_statistics(comparisons));
@@ -284,16 +299,43 @@ std::vector<LossSplit> split_losses(const ImageQualityOptions& options,
   const std::int64_t count =
       std::min<std::int64_t>(options.split_loss_poses, setup.pose_count(options));
   if (count == 0) return {};
-  const LossSplitter splitter(
-      field,
-      reference,
-      {setup.ct.volume, options.ray_caster, setup.field->light_slab, InterpolatedPlanes::Both},
-      setup.view);
+  const LossSplitter splitter(field,
+                              reference,
+                              {setup.ct.volume,
+                               options.ray_caster,
+                               *setup.field->coverage().planes.front(),
+                               InterpolatedPlanes::Both},
+                              setup.view);
   return collected_rows<LossSplit>(
       world, unfinished, count, "losses split", [&](std::int64_t index) {
         const PoseParameters parameters = compare(options, setup, comparer, index).parameters;
-        return splitter.at_pose(pose_from_parameters(setup.field->identity.frame, parameters));
+        return splitter.at_pose(pose_from_parameters(setup.field->identity().frame, parameters));
       });
+}
+
+using RendererPointer = std::shared_ptr<const DrrRenderer>;
+
+/// The renderers that are compared.
+struct Renderers {
+  RendererPointer field;
+  RendererPointer ray_cast;
+};
+
+/// Collective.
+Renderers renderers_of(const ImageQualityOptions& options,
+                       const Setup& setup,
+                       const Communicator& world) {
+  const auto cast = [&](const std::shared_ptr<const AttenuationVolume>& volume) {
+    return std::make_shared<const RayCastDrr>(volume, options.ray_caster);
+  };
+  const auto beam =
+      all_or_none(world, [&] { return XrayBeam(options.beam, setup.ct.volume->model()); });
+  const RendererPointer field = setup.field->renderer(options.look_up);
+  if (!setup.bone_field)
+    return {beam.renderer(field, nullptr), beam.renderer(cast(setup.ct.volume), nullptr)};
+  const auto bone = bone_per_node(*setup.ct.volume, world);
+  const RendererPointer bone_field = make_field_renderer(setup.bone_field, setup.look_up(options));
+  return {beam.renderer(field, bone_field), beam.renderer(cast(setup.ct.volume), cast(bone))};
 }
 
 /// Collective. Compares one field and writes its folder; the result is rank 0's.
@@ -306,22 +348,24 @@ TargetResult evaluate_target(const ImageQualityOptions& options,
     if (world.is_root()) make_output_folder(target.folder);
   });
   const Setup setup = load(options, target, world);
-  const auto field = make_field_renderer(setup.field, setup.look_up(options));
-  const RayCastDrr ray_cast(setup.ct.volume, options.ray_caster);
-  DrrComparer comparer(*field, ray_cast, setup.view);
+  const auto [field, ray_cast] = renderers_of(options, setup, world);
+  DrrComparer comparer(*field, *ray_cast, setup.view);
   Provenance provenance = {"af-evaluate image-quality",
                            command_line,
                            to_toml(options),
                            options.seed,
                            world.size(),
-                           {{"field " + setup.view.camera.name, setup.field_info.payload_sha256},
+                           {{"field " + setup.view.camera.name, setup.field->info().payload_sha256},
                             {"ct", setup.ct.facts.content_sha256}}};
+  if (setup.bone_field)
+    provenance.input_sha256["bone field " + setup.view.camera.name] =
+        setup.bone_info.payload_sha256;
   all_or_none(world, [&] {
     if (world.is_root() && !options.poses.empty())
       provenance.input_sha256["poses"] = sha256_of_file(options.poses.string());
     if (world.is_root() && !options.rig.empty())
       for (const std::filesystem::path& file : rig_files(options.rig))
-        provenance.input_sha256["rig"] = sha256_of_file(file.string());
+        provenance.input_sha256["rig " + file.filename().string()] = sha256_of_file(file.string());
   });
   const std::string name = target.folder.filename().string();
   const auto unfinished = [&](const std::string& what) {
@@ -343,7 +387,7 @@ TargetResult evaluate_target(const ImageQualityOptions& options,
         return compare(options, setup, comparer, index);
       });
   const std::vector<LossSplit> splits =
-      split_losses(options, setup, *field, ray_cast, comparer, unfinished("-losses"), world);
+      split_losses(options, setup, *field, *ray_cast, comparer, unfinished("-losses"), world);
   all_or_none(world, [&] {
     if (world.is_root())
       write_results(options, target, setup, comparer, splits, result, provenance);
@@ -452,6 +496,7 @@ void ImageQualityOptions::describe(Fields& field_list) {
              "and quantisation; some ten ray-cast DRRs each")
       .at_least(0);
   field_list.part(ray_caster);
+  field_list.part(beam);
   field_list.part(ct_reading);
   field_list("seed", seed, "Of the random poses");
   field_list.part(resume);
@@ -468,6 +513,9 @@ std::vector<std::string> problems(const ImageQualityOptions& options) {
   if (options.split_loss_poses > 0 && !options.look_up.empty() && options.look_up != "linear")
     found.push_back("--split-loss-poses = " + std::to_string(options.split_loss_poses) +
                     ": must be 0 for a look-up other than linear");
+  if (options.split_loss_poses > 0 && !options.beam.is_ordinary())
+    found.push_back("--split-loss-poses = " + std::to_string(options.split_loss_poses) +
+                    ": must be 0 with --tube-kvp and --scatter-to-primary");
   return found;
 }
 

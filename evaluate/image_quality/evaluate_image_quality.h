@@ -8,6 +8,7 @@
 
 #include "cli/app_forward.h"
 #include "cli/run_limits.h"
+#include "drr/xray_beam.h"
 #include "image_files/ct_reader.h"
 #include "parallel/communicator.h"
 #include "volume/ray_caster.h"
@@ -27,6 +28,7 @@ struct ImageQualityOptions {
   std::string look_up;       ///< empty: the field's own
   int split_loss_poses = 0;  ///< so many poses' losses are split
   RayCasterOptions ray_caster;
+  XrayBeamOptions beam;
   CtReadOptions ct_reading;
   std::uint64_t seed = 1;
   cli::ResumeOptions resume;

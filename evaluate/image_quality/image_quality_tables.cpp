@@ -124,10 +124,11 @@ json camera_distance_json(const CameraDistance& distance, const MotionRange& cov
           {"range", covered.text()}};
 }
 
-json field_description(const CompressedAttenuationField& field) {
-  const FieldIdentity& identity = field.identity;
+json field_description(const FieldIdentity& identity,
+                       const LightSlab& planes,
+                       std::size_t codewords) {
   const MotionRange within = identity.range.symmetric_part();
-  const SlabLattice lattice = field.lattice(0);
+  const SlabLattice lattice = planes.lattice(0);
   return {{"camera", identity.camera.name},
           {"detector_px", {identity.camera.size_px.x(), identity.camera.size_px.y()}},
           {"pixel_spacing_mm",
@@ -135,8 +136,8 @@ json field_description(const CompressedAttenuationField& field) {
           {"source_detector_mm", identity.camera.source_detector_distance_mm()},
           {"uv_nodes", {lattice.u.nodes, lattice.v.nodes}},
           {"st_nodes", {lattice.s.nodes, lattice.t.nodes}},
-          {"slabs", field.slabs.size()},
-          {"codewords", field.codebook.size()},
+          {"slabs", planes.slabs.size()},
+          {"codewords", codewords},
           {"max_rotation_deg", within.max_rotation_rad() * kDegPerRad},
           {"max_translation_mm", within.max_translation_mm()},
           {"range", identity.range.text()},

@@ -26,7 +26,10 @@ nlohmann::json image_quality_statistics(const std::vector<DrrComparison>& compar
 /// How far the camera in use is from the field's, and the poses that the field covers for it.
 nlohmann::json camera_distance_json(const CameraDistance& distance, const MotionRange& covered);
 
-/// Resolution, range and size of a field, as tables show them.
-nlohmann::json field_description(const CompressedAttenuationField& field);
+/// Resolution, range and size of a field, as tables show them; of an atlas, `planes` are those of a
+/// member.
+nlohmann::json field_description(const FieldIdentity& identity,
+                                 const LightSlab& planes,
+                                 std::size_t codewords);
 
 }  // namespace af::evaluation

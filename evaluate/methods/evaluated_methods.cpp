@@ -32,6 +32,7 @@ void MethodOptions::describe(Fields& field) {
   field.part(attenuation);
   field.at("water_mu_per_mm").help = "Attenuation of water for ray casting, 1/mm";
   field.part(ray_caster);
+  field.part(beam);
   field.part(ct);
 }
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "cli/app_forward.h"
+#include "drr/xray_beam.h"
 #include "image_files/ct_reader.h"
 #include "parallel/communicator.h"
 #include "register/field_paths.h"
@@ -25,6 +26,7 @@ struct MethodOptions {
   registration::MethodOptions method;
   AttenuationModel attenuation;  ///< of ray casting
   RayCasterOptions ray_caster;
+  XrayBeamOptions beam;
   CtReadOptions ct;
 
   /// Renderers in the order of rows: "field" before "raycast".

@@ -24,6 +24,7 @@ registration::CaseLoadOptions load_options(const MethodOptions& options,
   result.fiducial_mask_mm = options.method.fiducial_mask_mm;
   result.attenuation = options.attenuation;
   result.ray_caster = options.ray_caster;
+  result.beam = options.beam;
   return result;
 }
 

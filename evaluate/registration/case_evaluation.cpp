@@ -63,9 +63,9 @@ void examine_ends(const std::shared_ptr<const registration::RegistrationProblem>
                   const registration::UncertaintyOptions& options,
                   Method& method) {
   if (options.is_left_out) return;
-  method.examiner = std::make_unique<PoseExaminer>(problem);
-  method.estimator =
-      std::make_unique<UncertaintyEstimator>(problem, method.runner.options(), options);
+  const registration::RegistrationOptions& registered = method.runner.options();
+  method.examiner = std::make_unique<PoseExaminer>(problem, registered.silhouette_mm());
+  method.estimator = std::make_unique<UncertaintyEstimator>(problem, registered, options);
 }
 
 /// Inside the motion range of every field in use; where a field has none for this camera, all rays
@@ -75,7 +75,7 @@ bool is_admissible(const std::vector<Method>& methods, const RigidTransform& roo
     for (const registration::RegistrationView& view : method.runner.problem().views)
       if (view.limit.has_value()
               ? !view.limit->range.contains(parameters_from_pose(view.limit->frame, room_from_ct))
-              : view.renderer->rays_outside(room_from_ct, view.view) > 0)
+              : view.renderer->rays_outside(room_from_ct, view.widest_view()) > 0)
         return false;
   return true;
 }
@@ -156,11 +156,6 @@ void assign_starts(const RegistrationStudyOptions& options,
       method.start_indices.push_back(static_cast<std::int64_t>(i));
 }
 
-/// Whether a registration ended with a pose that means anything.
-bool has_pose(const RegistrationResult& result) {
-  return std::isfinite(result.similarity) && result.room_from_ct.matrix().allFinite();
-}
-
 void add_result(const RegistrationResult& result,
                 const Yardstick& yardstick,
                 RegistrationRow& row) {
@@ -171,7 +166,7 @@ void add_result(const RegistrationResult& result,
   row.seconds = result.seconds;
   row.is_corrected = result.correction.has_value();
   row.correction = result.correction.value_or(registration::CorrectionReport());
-  if (!has_pose(result)) return;
+  if (!result.has_pose()) return;
   row.similarity = result.similarity;
   measure_pose(result.room_from_ct, yardstick, row);
 }
@@ -181,7 +176,7 @@ void add_uncertainty(Method& method, const RegistrationResult& result, Registrat
   if (method.estimator == nullptr) return;
   row.chain_distance_mm = result.chain_distance_mm;
   std::vector<registration::ViewValue> values;
-  if (has_pose(result)) values = method.examiner->view_values(result.room_from_ct);
+  if (result.has_pose()) values = method.examiner->view_values(result.room_from_ct);
   row.judge = summary_of(values, &registration::ViewValue::coarse);
   row.judge_fine = summary_of(values, &registration::ViewValue::fine);
   row.uncertainty = method.estimator->report(result, values);
@@ -207,10 +202,12 @@ TracedRow traced_row(Method& method,
         return result;
       },
       start,
-      yardstick);
+      yardstick,
+      [&](const RegistrationResult& ended, RegistrationRow& of_it) {
+        add_uncertainty(method, ended, of_it);
+      });
   row.renderer = method.renderer;
   row.start_index = index;
-  if (row.error == InternedText()) add_uncertainty(method, result, row);
   if (!row.is_success(method.success_tre_mm))
     traced.trace = trace_points(result.trace, method.runner.problem().frame(), yardstick);
   return traced;
@@ -477,11 +474,14 @@ void set_start(const PerturbedStart& start, RegistrationRow& row) {
 RegistrationRow registered_row(
     const std::function<RegistrationResult(const RigidTransform& start)>& run,
     const PerturbedStart& start,
-    const Yardstick& yardstick) {
+    const Yardstick& yardstick,
+    const std::function<void(const RegistrationResult& result, RegistrationRow& row)>& add_more) {
   RegistrationRow row;
   set_start(start, row);
   try {
-    add_result(run(start.room_from_ct), yardstick, row);
+    const RegistrationResult result = run(start.room_from_ct);
+    add_result(result, yardstick, row);
+    add_more(result, row);
   } catch (const std::exception& error) {
     row.stop_reason = "error";
     row.error = error.what();
@@ -501,6 +501,8 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
   std::optional<WorkNote> phase(
       std::in_place, "loading case " + study_case.name, WorkNote::Kind::Phase);
   std::vector<Method> methods;
+  registration::UncertaintyOptions uncertainty = options.uncertainty;
+  uncertainty.is_left_out = uncertainty.is_left_out || options.is_starts_only;
   for (LoadedMethod& method :
        load_methods(options,
                     options.correction,
@@ -508,10 +510,10 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
                     study_case,
                     world,
                     evaluation.inputs,
-                    options.uncertainty.is_left_out ? 0 : PoseExaminer::coarsest_level())) {
+                    uncertainty.is_left_out ? 0 : PoseExaminer::coarsest_level())) {
     methods.push_back(
         {method.renderer, std::move(method.runner), {}, options.success_tre_mm, {}, {}});
-    all_or_none(world, [&] { examine_ends(method.problem, options.uncertainty, methods.back()); });
+    all_or_none(world, [&] { examine_ends(method.problem, uncertainty, methods.back()); });
   }
   const Yardstick yardstick = all_or_none(world, [&] {
     evaluation.gold = gold_standard(study, study_case, options.gold);

@@ -56,18 +56,6 @@ std::vector<IntervalSuccess> intervals_of(const std::vector<TreOutcome>& outcome
       outcomes, options.intervals, options.interval_width_mm, options.success_tre_mm);
 }
 
-const char* name_of(CaptureEnd end) {
-  switch (end) {
-    case CaptureEnd::Failures:
-      return "failures";
-    case CaptureEnd::NoStarts:
-      return "no starts";
-    case CaptureEnd::LastInterval:
-      return "last interval";
-  }
-  return "";
-}
-
 /// null without starts.
 json capture_json(const std::vector<IntervalSuccess>& intervals) {
   const bool is_empty =
@@ -80,7 +68,7 @@ json capture_json(const std::vector<IntervalSuccess>& intervals) {
                  {"starts", range.starts},
                  {"successes", range.successes},
                  {"is_whole_study", range.is_whole_study()},
-                 {"ended_by", name_of(range.end)}};
+                 {"ended_by", to_string(range.end)}};
   if (range.end_interval < intervals.size())
     result["end_interval"] = interval_json(intervals[range.end_interval]);
   return result;
@@ -94,18 +82,6 @@ json cumulative_capture_json(const std::vector<TreOutcome>& outcomes, double suc
           {"starts", range->starts},
           {"successes", range->successes},
           {"is_whole_study", range->is_whole_study}};
-}
-
-/// The starts of all drawn cases together.
-std::vector<IntervalSuccess> pooled(const std::vector<std::vector<IntervalSuccess>>& cases,
-                                    std::span<const std::size_t> drawn) {
-  std::vector<IntervalSuccess> sums = cases[drawn.front()];
-  for (const std::size_t index : drawn.subspan(1))
-    for (std::size_t k = 0; k < sums.size(); ++k) {
-      sums[k].trials += cases[index][k].trials;
-      sums[k].successes += cases[index][k].successes;
-    }
-  return sums;
 }
 
 }  // namespace
@@ -154,7 +130,7 @@ void add_capture_over_cases(const std::map<std::string, RowPointers>& by_case,
   over_cases["pooled_capture_range_mm"] = bootstrap_json(bootstrap_over_cases(
       cases.size(),
       [&](std::span<const std::size_t> drawn) {
-        return capture_range(pooled(cases, drawn)).initial_tre_mm;
+        return capture_range(pooled_intervals(cases, drawn)).initial_tre_mm;
       },
       options.seed));
 }

@@ -2,6 +2,7 @@
 #include "evaluate/statistics/success_rate.h"
 
 #include <algorithm>
+#include <boost/math/distributions/beta.hpp>
 #include <boost/math/distributions/normal.hpp>
 #include <cmath>
 #include <cstddef>
@@ -22,6 +23,12 @@ ProportionInterval wilson_interval(std::int64_t successes, std::int64_t trials, 
   const double half = z * std::sqrt(p * (1.0 - p) / n + z * z / (4.0 * n * n)) / denominator;
   // Exactly 0 and 1 at the ends, where rounding would leave 1e-17.
   return {successes == 0 ? 0.0 : center - half, successes == trials ? 1.0 : center + half};
+}
+
+double plausible_rate(std::int64_t successes, std::int64_t trials, double p) {
+  const boost::math::beta_distribution<double> posterior(
+      static_cast<double>(successes) + 0.5, static_cast<double>(trials - successes) + 0.5);
+  return boost::math::quantile(posterior, p);
 }
 
 std::int64_t count_successes(std::span<const TreOutcome> outcomes, double threshold_mm) {
@@ -73,6 +80,29 @@ std::vector<IntervalSuccess> success_per_interval(std::span<const TreOutcome> ou
   for (IntervalSuccess& interval : result)
     interval.wilson = wilson_interval(interval.successes, interval.trials);
   return result;
+}
+
+std::vector<IntervalSuccess> pooled_intervals(std::span<const std::vector<IntervalSuccess>> cases,
+                                              std::span<const std::size_t> drawn) {
+  std::vector<IntervalSuccess> sums = cases[drawn.front()];
+  for (const std::size_t index : drawn.subspan(1))
+    for (std::size_t k = 0; k < sums.size(); ++k) {
+      sums[k].trials += cases[index][k].trials;
+      sums[k].successes += cases[index][k].successes;
+    }
+  return sums;
+}
+
+const char* to_string(CaptureEnd end) {
+  switch (end) {
+    case CaptureEnd::Failures:
+      return "failures";
+    case CaptureEnd::NoStarts:
+      return "no starts";
+    case CaptureEnd::LastInterval:
+      return "last interval";
+  }
+  return "";
 }
 
 CaptureRange capture_range(std::span<const IntervalSuccess> intervals, double share) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -25,6 +26,10 @@ struct ProportionInterval {
 ProportionInterval wilson_interval(std::int64_t successes,
                                    std::int64_t trials,
                                    double confidence = 0.95);
+
+/// Quantile `p` in (0, 1) of what successes leave plausible of a rate: of Jeffreys' posterior,
+/// Beta( successes + 1/2, failures + 1/2).
+double plausible_rate(std::int64_t successes, std::int64_t trials, double p);
 
 /// Success among the starts of one interval of initial TRE.
 struct IntervalSuccess {
@@ -72,12 +77,20 @@ std::vector<IntervalSuccess> success_per_interval(std::span<const TreOutcome> ou
                                                   double width_mm,
                                                   double threshold_mm = kSuccessTreMm);
 
+/// Interval by interval, the starts of the cases that `drawn` names together, as often as it names
+/// them. All cases have the same intervals; Wilson's interval is left as it was.
+std::vector<IntervalSuccess> pooled_intervals(std::span<const std::vector<IntervalSuccess>> cases,
+                                              std::span<const std::size_t> drawn);
+
 /// What ends a capture range.
 enum class CaptureEnd {
   Failures,      ///< an interval in which too few starts succeeded
   NoStarts,      ///< an interval without starts: what follows is unknown
   LastInterval,  ///< the study: every interval had enough success
 };
+
+/// "failures", "no starts" or "last interval".
+const char* to_string(CaptureEnd end);
 
 /// Capture range: how far registrations may start.
 struct CaptureRange {

@@ -218,7 +218,7 @@ void sweep_target(const FieldParametersOptions& options,
                         ct.facts.content_sha256,
                         field->identity.ct_content_sha256);
     });
-    result.field = field_description(*field);
+    result.field = field_description(field->identity, field->light_slab, field->codebook.size());
     result.uncompressed_bytes = uncompressed_bytes_of(setting);
     read_creation(result);
     const Clock::time_point compared = Clock::now();

@@ -8,6 +8,7 @@
 #include "base/toml_text.h"
 #include "precompute/casting/casters.h"
 #include "precompute/plan/axis_ranges.h"
+#include "precompute/plan/orbit_text.h"
 
 namespace af {
 
@@ -72,6 +73,19 @@ void describe_casting(Fields& field, PrecomputeOptions& options) {
         options.cover_rig,
         "Rig of further cameras: the field holds their rays, too, over the same range")
       .input();
+  field("orbit",
+        options.orbit,
+        "Make an atlas, one file of many fields, for the camera on an orbit: axis=z,from=-90,to=90 "
+        "turns it about the room's z through the isocentre, degrees, right-handed. Every pose of "
+        "the range at every angle is in one of its fields; they stand as far apart as the range "
+        "about the axis is wide, or step=10 degrees. A budget of the design is that of each field")
+      .decides(kCastingStage);
+  field("orbit_cameras",
+        options.orbit_cameras,
+        "Make an atlas with a field for --camera and for every camera of this rig, each over the "
+        "same range")
+      .excludes({"--orbit"})
+      .input();
   field("preset",
         options.preset,
         "Design of the field, by name. " + design_preset_help() + " [" + kDefaultPreset +
@@ -119,6 +133,12 @@ void describe_casting(Fields& field, PrecomputeOptions& options) {
   step.help = "Trilinear caster: largest distance of samples along a ray, mm";
   field.part(options.attenuation);
   field.at("water_mu_per_mm").decides(kCastingStage);
+  field("material",
+        options.material,
+        "What of the CT the field holds: all, or bone alone, for DRRs of a tube's spectrum, which "
+        "programs look for in FIELD.bone.af.h5 beside FIELD.af.h5 (docs/spectra.md)")
+      .one_of({"all", "bone"})
+      .decides(kCastingStage);
 }
 
 void describe_codebook(Fields& field, PrecomputeOptions& options) {
@@ -274,7 +294,10 @@ StPlane PrecomputeOptions::st_plane_rule() const {
 
 std::vector<std::string> problems(const PrecomputeOptions& options) {
   std::vector<std::string> found = problems(options.range());  // UsageError where it is no range
+  if (!options.orbit.empty()) (void)orbit_of_text("--orbit", options.orbit);  // likewise
   append(field_problems(options), found);
+  if (options.is_atlas() && options.is_of_bone())
+    found.emplace_back("material = bone: an atlas is of all of a CT; leave --orbit out");
   append(problems(options.codebook_options()), found);
   append(problems(options.training_selection()), found);
   if (options.limits().max_field_bytes && !options.packs_by_codebook_tree())

@@ -43,6 +43,8 @@ struct PrecomputeOptions {
   std::string translation_range_mm;  ///< "tx=..."; axes not named: max_translation_mm
   std::string cover;                 ///< file of poses about each of which the range is taken
   std::string cover_rig;             ///< further cameras whose rays the field is to hold
+  std::string orbit;                 ///< "axis=z,from=-90,to=90": an atlas instead of one field
+  std::string orbit_cameras;         ///< rig: an atlas with a field for each of its cameras
   /// The design: a preset or a budget, and parts that are stated.
   std::optional<std::string> preset;
   DesignBudget budget;
@@ -55,6 +57,7 @@ struct PrecomputeOptions {
   std::string caster = "shear-warp";
   RayCasterOptions ray_caster;  ///< of the trilinear caster
   AttenuationModel attenuation;
+  std::string material = "all";  ///< or "bone"
 
   std::optional<int> codewords;
   int max_iterations = CodebookOptions{}.max_iterations;
@@ -74,6 +77,8 @@ struct PrecomputeOptions {
 
   /// The range about one pose. UsageError when a text of it does not parse.
   [[nodiscard]] MotionRange range() const;
+  /// Whether an atlas is made, not a field.
+  [[nodiscard]] bool is_atlas() const { return !orbit.empty() || !orbit_cameras.empty(); }
   /// The parts of the design that are stated.
   [[nodiscard]] DesignParts stated_parts() const;
   /// The preset that is asked for: where parts alone are stated, the paper's.
@@ -94,6 +99,7 @@ struct PrecomputeOptions {
   [[nodiscard]] TrainingSelection training_selection(int for_codewords) const;
   [[nodiscard]] CodebookOptions codebook_options() const;
   [[nodiscard]] StPlane st_plane_rule() const;
+  [[nodiscard]] bool is_of_bone() const { return material == "bone"; }
 
   void describe(Fields& field);
   /// With the design, unless a probe has to choose it, and the rule that places the (s,t) planes.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <memory>
@@ -44,6 +45,11 @@ struct RegistrationResult {
   std::vector<TraceRow> trace;
   std::optional<CorrectionReport> correction;  ///< when one was wanted
   double seconds = 0.0;                        ///< wall time
+
+  /// Whether it ended with a pose that means anything.
+  [[nodiscard]] bool has_pose() const {
+    return std::isfinite(similarity) && room_from_ct.matrix().allFinite();
+  }
 
   auto members() {
     return std::tie(start_room_from_ct,

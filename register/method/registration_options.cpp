@@ -7,6 +7,7 @@
 
 #include "base/named_rows.h"
 #include "register/method/presets.h"
+#include "register/problem/stage_view.h"
 
 namespace af::registration {
 namespace {
@@ -84,7 +85,7 @@ RegistrationOptions::RegistrationOptions() : chains{paper_chain()} {
   judge.stage.similarity.name = "rg";
   judge.stage.level = 2;
   judge.stage.pixel_step = 4;
-  judge.stage.roi_scale = 2.0;
+  judge.stage.roi_scale = kWidestRoiScale;
 }
 
 std::vector<StageOptions*> RegistrationOptions::stages() {

@@ -45,6 +45,11 @@ struct JudgeOptions {
   double enough_value = 1.0;  ///< mean over views; an end at or above ends the portfolio
 };
 
+/// Silhouettes leave out the edges that a CT has where it is cut.
+inline constexpr const char* kSilhouettesNeedTheCt =
+    "skip_ct_check = set: must be left out where a stage looks within the CT's silhouette, because "
+    "the CT says where it is cut";
+
 /// How to register: one chain, or a portfolio of several from the same start.
 struct RegistrationOptions {
   std::vector<ChainOptions> chains;

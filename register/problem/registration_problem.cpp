@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "register/problem/registration_problem.h"
 
+#include "register/problem/stage_view.h"
+
 namespace af::registration {
 namespace {
 
@@ -31,6 +33,10 @@ void append_view_problems(const RegistrationView& view, std::vector<std::string>
 
 std::string view_name(const RegistrationView& view) {
   return "view '" + view.view.camera.name + "': ";
+}
+
+View RegistrationView::widest_view() const {
+  return stage_view(view, {1, kWidestRoiScale});
 }
 
 std::vector<std::string> problems(const RegistrationProblem& problem) {

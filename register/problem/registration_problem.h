@@ -37,6 +37,10 @@ struct RegistrationView {
   std::optional<MotionLimit> reach;
   /// [level] Ray casting, where a correction needs it; else none.
   std::vector<std::shared_ptr<const DrrRenderer>> ray_casts;
+
+  /// The widest region that presets' stages and the judge look at: a ray that a field misses there
+  /// makes a pose inadmissible.
+  [[nodiscard]] View widest_view() const;
 };
 
 /// "view 'AP': ", before what is wrong with it.

@@ -463,7 +463,7 @@ std::string summary_text(const RegistrationRecord& record, const RegistrationPro
       << "   (rx, ry, rz, tx, ty, tz from nominal)\n"
       << "result      " << parameters_line(parameters_from_pose(frame, result.room_from_ct)) << '\n'
       << "similarity  " << fixed_text(result.similarity, 4) << '\n';
-  if (std::isfinite(record.uncertainty.tre_95_mm))
+  if (std::isfinite(record.uncertainty.tre_95_mm) && std::isfinite(record.uncertainty.confidence))
     out << "uncertain   TRE below " << fixed_text(record.uncertainty.tre_95_mm, 2)
         << " mm with 95 % if the pose is the right one, which it is with "
         << fixed_text(std::min(99.9, 100.0 * record.uncertainty.confidence), 1)

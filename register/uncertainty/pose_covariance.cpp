@@ -67,6 +67,7 @@ PoseMatrix calibration_covariance(const PoseInformation& information,
 PredictedTre predicted_tre(const PoseMatrix& covariance,
                            const PoseFrame& frame,
                            std::span<const Eigen::Vector3d> target_points_ct) {
+  if (!covariance.allFinite()) return {};
   const RigidTransform room_from_ct = pose_from_parameters(frame, {});
   PoseMatrix mean_square = PoseMatrix::Zero();
   for (const Eigen::Vector3d& point : target_points_ct) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 #include <optional>
 #include <span>
 #include <vector>
@@ -31,11 +32,13 @@ PoseMatrix calibration_covariance(const PoseInformation& information,
 
 /// TRE that a covariance foretells.
 struct PredictedTre {
-  double rms_mm = 0.0;  ///< root of the expected squared distance, mean over the points
+  /// Root of the expected squared distance, mean over the points. NaN for a covariance that is not
+  /// finite.
+  double rms_mm = std::numeric_limits<double>::quiet_NaN();
   /// 95 % quantile of the root mean squared distance, which the mean distance does not exceed: of
   /// the quadratic form as a scaled chi-square with its mean and variance (Satterthwaite 1946), by
   /// Wilson and Hilferty's cube root (1931).
-  double upper_95_mm = 0.0;
+  double upper_95_mm = std::numeric_limits<double>::quiet_NaN();
 };
 
 /// \test PredictedTre.IsThatOfDrawnPoses

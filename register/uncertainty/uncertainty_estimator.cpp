@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "register/uncertainty/uncertainty_estimator.h"
 
-#include <algorithm>
 #include <cmath>
 #include <utility>
 
+#include "base/error.h"
 #include "register/problem/parameter_scaling.h"
 #include "register/uncertainty/calibration.h"
 #include "register/uncertainty/pose_covariance.h"
@@ -23,10 +23,6 @@ StageOptions differentiable(StageOptions stage) {
   stage.similarity.has_smooth_histogram = true;
   stage.optimizer = "gradient";
   return stage;
-}
-
-bool has_end(const RegistrationResult& result) {
-  return std::isfinite(result.similarity) && result.room_from_ct.matrix().allFinite();
 }
 
 }  // namespace
@@ -52,7 +48,8 @@ UncertaintyEstimator::UncertaintyEstimator(std::shared_ptr<const RegistrationPro
                                            const UncertaintyOptions& options,
                                            std::shared_ptr<ThreadPool> pool)
     : problem_(std::move(problem)), options_(options) {
-  if (options_.is_left_out) return;
+  // Values within silhouettes are on another scale than those that the calibration has seen.
+  if (options_.is_left_out || method.silhouette_mm() > 0.0) return;
   for (const RegistrationView& view : problem_->views) views_.push_back(view.view);
   ChainOptions ends{"ends", {}};
   for (const ChainOptions& chain : method.chains) {
@@ -66,7 +63,12 @@ UncertaintyEstimator::UncertaintyEstimator(std::shared_ptr<const RegistrationPro
   }
   RegistrationOptions stages;
   stages.chains = {ends};
-  ends_ = std::make_unique<RegistrationRunner>(problem_, stages, std::move(pool));
+  try {
+    ends_ = std::make_unique<RegistrationRunner>(problem_, stages, std::move(pool));
+  } catch (const InputError&) {
+    // The measure that stands for one without derivative refuses X-rays without gradients over most
+    // of the region, which the registration's own measure may take.
+  }
 }
 
 void UncertaintyEstimator::add_covariance(const RegistrationResult& result,
@@ -85,6 +87,7 @@ void UncertaintyEstimator::add_covariance(const RegistrationResult& result,
   const auto sandwich = sandwich_covariance(*information);
   if (!sandwich.has_value()) return;
   const double inflation = covariance_inflation(similarities_[stage], view_values);
+  if (!std::isfinite(inflation)) return;
   report.inflation = inflation;
   const PoseMatrix covariance =
       inflation * *sandwich +
@@ -100,13 +103,8 @@ void UncertaintyEstimator::add_covariance(const RegistrationResult& result,
 UncertaintyReport UncertaintyEstimator::report(const RegistrationResult& result,
                                                std::span<const ViewValue> view_values) {
   UncertaintyReport report;
-  if (options_.is_left_out) return report;
-  // Values within silhouettes are on another scale than those that the calibration has seen.
-  if (std::any_of(view_values.begin(), view_values.end(), [](const ViewValue& value) {
-        return value.in_silhouette;
-      }))
-    return report;
-  if (!has_end(result)) {
+  if (ends_ == nullptr) return report;
+  if (!result.has_pose()) {
     report.confidence = 0.0;
     return report;
   }

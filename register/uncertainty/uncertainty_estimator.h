@@ -28,7 +28,9 @@ struct UncertaintyOptions {
 /// one thread at a time. \test UncertaintyEstimator.ForetellsTheSpreadOfNoisyXrays
 class UncertaintyEstimator {
  public:
-  /// `problem` and `method`: as for the RegistrationRunner of the results.
+  /// `problem` and `method`: as for the RegistrationRunner of the results. Reports stay empty when
+  /// uncertainty is left out, when the method looks within silhouettes, and when X-rays have no
+  /// gradients that the curvature could be of.
   UncertaintyEstimator(std::shared_ptr<const RegistrationProblem> problem,
                        const RegistrationOptions& method,
                        const UncertaintyOptions& options,
@@ -48,8 +50,9 @@ class UncertaintyEstimator {
   UncertaintyOptions options_;
   std::vector<View> views_;
   std::map<std::string, std::size_t> stage_of_chain_;
-  std::vector<std::string> similarities_;     ///< of the stages, as registered with
-  std::unique_ptr<RegistrationRunner> ends_;  ///< a stage for every way to end; none when left out
+  std::vector<std::string> similarities_;  ///< of the stages, as registered with
+  std::unique_ptr<RegistrationRunner>
+      ends_;  ///< a stage for every way to end; none: nothing is said
 };
 
 }  // namespace af::registration

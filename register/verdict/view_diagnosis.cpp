@@ -137,7 +137,7 @@ std::optional<std::vector<ViewValue>> values_with(const Change& change,
   std::optional<std::vector<ViewValue>> best;
   try {
     RegistrationRunner runner(changed, options);
-    PoseExaminer examiner(changed);
+    PoseExaminer examiner(changed, 0.0);
     for (const RigidTransform& start : starts) {
       std::vector<ViewValue> values = examiner.view_values(runner.run(start).room_from_ct);
       if (!best.has_value() || mean_of(values) > mean_of(*best)) best = std::move(values);
@@ -151,6 +151,9 @@ std::optional<std::vector<ViewValue>> values_with(const Change& change,
 std::optional<Remedy> remedy_of(const RegistrationProblem& problem,
                                 const std::vector<RigidTransform>& starts,
                                 const std::vector<ViewValue>& view_values) {
+  // Changes are tried over the whole region, whose values do not compare with those in silhouettes.
+  for (const ViewValue& value : view_values)
+    if (value.in_silhouette) return std::nullopt;
   const auto options = coarse_options(problem);
   if (!options.has_value()) return std::nullopt;
   std::optional<Remedy> best;

@@ -2,6 +2,8 @@
 af_add_test(
   drr_test
   SOURCES unit/drr/af_drr_test.cpp unit/drr/field_level_test.cpp unit/drr/ray_cast_drr_test.cpp
-          unit/drr/ray_cast_level_test.cpp unit/drr/recalibrated_camera_test.cpp unit/drr/slab_merging_test.cpp unit/drr/slab_sum_test.cpp unit/drr/small_fields.cpp
+          unit/drr/ray_cast_level_test.cpp unit/drr/polychromatic_drr_test.cpp unit/drr/scattered_drr_test.cpp unit/drr/recalibrated_camera_test.cpp unit/drr/slab_merging_test.cpp unit/drr/slab_sum_test.cpp unit/drr/small_fields.cpp
           unit/drr/two_pass_af_drr_test.cpp
   LIBS af_drr_core)
+
+af_add_test(field_use_test SOURCES unit/field_use/atlas_renderers_test.cpp LIBS af_field_use)

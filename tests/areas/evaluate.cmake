@@ -9,7 +9,7 @@ af_add_test(
           unit/evaluate/statistics/case_equivalence_test.cpp
           unit/evaluate/statistics/roc_test.cpp
           support/interval_coverage.cpp
-          unit/evaluate/registration/population_statistics_test.cpp
+          unit/evaluate/population/population_statistics_test.cpp
           unit/evaluate/registration/registration_errors_test.cpp
           unit/evaluate/sweeps/error_budget_test.cpp
           unit/evaluate/sweeps/lattice_errors_test.cpp
@@ -27,6 +27,7 @@ af_add_test(
   evaluate_report_test
   SOURCES unit/evaluate/report/report_text_test.cpp unit/evaluate/registration/evaluation_rows_test.cpp
           unit/evaluate/registration/failure_traces_test.cpp unit/evaluate/report/study_runs_test.cpp
+          unit/evaluate/population/population_tables_test.cpp
   LIBS af_evaluation_program af_evaluation_report af_study af_run)
 
 af_add_test(start_tables_test SOURCES unit/evaluate/registration/start_tables_test.cpp LIBS af_evaluation_tables)
@@ -44,8 +45,7 @@ af_add_program_tests(
   LIBS af_registration_case af_run
   PROGRAMS af-evaluate af-precompute
   LABELS programs mpi
-  TIMEOUT 1800
-  PROCESSORS 2)
+  TIMEOUT 1800)
 
 af_add_mpi_test(shared_measuring_test SOURCES mpi/shared_measuring_test.cpp LIBS af_evaluation_program RANKS 1 2 3 4)
 

@@ -17,6 +17,12 @@ af_add_mpi_test(
   RANKS 1 2 3 4)
 
 af_add_mpi_test(
+  atlas_file_test
+  SOURCES mpi/atlas_file_test.cpp
+  LIBS af_field_use MPI::MPI_C PkgConfig::hdf5_openmpi
+  RANKS 1 2 3 4)
+
+af_add_mpi_test(
   field_build_test
   SOURCES mpi/field_build_test.cpp
   LIBS af_precompute_build
@@ -24,4 +30,8 @@ af_add_mpi_test(
 
 add_test(NAME precompute_program COMMAND ${PROJECT_SOURCE_DIR}/tests/checks/precompute_program.sh
                                          $<TARGET_FILE:af-precompute> ${MPIEXEC_EXECUTABLE} ${af_sanitized})
-set_tests_properties(precompute_program PROPERTIES LABELS mpi TIMEOUT 1800 PROCESSORS 2)
+set_tests_properties(precompute_program PROPERTIES LABELS mpi TIMEOUT 1800)
+
+add_test(NAME atlas_program COMMAND ${PROJECT_SOURCE_DIR}/tests/checks/atlas_program.sh
+                                    ${PROJECT_BINARY_DIR}/bin ${MPIEXEC_EXECUTABLE})
+set_tests_properties(atlas_program PROPERTIES LABELS mpi TIMEOUT 900)

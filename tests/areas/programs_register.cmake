@@ -19,3 +19,9 @@ af_add_program_tests(
   SOURCES programs/leaks_test.cpp
   LIBS af_study_contents
   PROGRAMS af-register af-simulate af-evaluate)
+
+af_add_program_tests(
+  spectrum_program_tests
+  SOURCES programs/spectrum_program_test.cpp
+  LIBS af_registration_case
+  PROGRAMS af-register af-drr af-precompute af-evaluate)

@@ -11,7 +11,7 @@ af_add_test(
           unit/simulation/solid_test.cpp
           unit/simulation/spine_phantom_test.cpp
           unit/simulation/stress_test.cpp
-          unit/simulation/xray_physics_test.cpp
+          unit/simulation/poisson_test.cpp
           unit/simulation/xray_simulator_test.cpp
   LIBS af_simulation)
 af_add_test(

@@ -414,7 +414,7 @@ TEST_F(FieldBuildTest, GeometryOfRankZeroIsTakenOver) {
   field.light_slab = small_light_slab();
   field.light_slab.u.first_mm += 1e-13 * world_.rank();
   field.light_slab.slabs[0].y_high_mm = 12.5;
-  share_geometry(field, world_);
+  share_geometry(field.light_slab, world_);
   const LightSlab& shared = field.light_slab;
   EXPECT_EQ(shared.u.first_mm, -90.0);
   EXPECT_EQ(shared.v.nodes, 6);

@@ -760,6 +760,36 @@ TEST(FieldFile, HoldsARangeOfBoundsBesideWhatOlderProgramsRead) {
   EXPECT_EQ(read_field_header(folder / "b.af.h5").identity.range.max_rotation_rad(), 0.1);
 }
 
+TEST(FieldFile, SaysThatItIsOfBoneAloneBesideThePayload) {
+  const test::SharedFolder folder;
+  CompressedAttenuationField field = small_field();
+  const std::string of_all = write(field, folder / "a.af.h5").payload_sha256;
+  field.identity.material = FieldMaterial::Bone;
+  EXPECT_EQ(write(field, folder / "a.bone.af.h5").payload_sha256, of_all);
+  const auto& world = Communicator::world();
+  const auto all = read_field(folder / "a.af.h5", world);
+  EXPECT_EQ(all->identity.material, FieldMaterial::All);
+  EXPECT_EQ(read_field_header(folder / "a.bone.af.h5").identity.material, FieldMaterial::Bone);
+  const auto bone = read_bone_field(bone_field_path(folder / "a.af.h5"), *all, world);
+  EXPECT_EQ(bone->identity.material, FieldMaterial::Bone);
+  // FileError where it is thrown, RemoteError on the other ranks.
+  EXPECT_THROW(read_field(folder / "a.bone.af.h5", world), Error);
+  EXPECT_THROW(read_bone_field(folder / "a.af.h5", *all, world), Error);
+  EXPECT_THROW(read_bone_field(folder / "absent.bone.af.h5", *all, world), Error);
+  CompressedAttenuationField other = *all;
+  other.identity.mu_water_per_mm = 0.019;
+  EXPECT_THROW(read_bone_field(folder / "a.bone.af.h5", other, world), Error);
+  other = *all;
+  other.identity.ct_content_sha256 = std::string(64, 'b');
+  EXPECT_THROW(read_bone_field(folder / "a.bone.af.h5", other, world), Error);
+}
+
+TEST(FieldFile, OfBoneStandsBesideTheFieldOfAll) {
+  EXPECT_EQ(bone_field_path("a/A.af.h5"), "a/A.bone.af.h5");
+  EXPECT_EQ(bone_field_path("A.h5"), "A.bone.h5");
+  EXPECT_EQ(bone_field_path("field"), "field.bone");
+}
+
 TEST(FieldFile, RefusesBoundsThatContradictThePayload) {
   const test::SharedFolder folder;
   CompressedAttenuationField field = small_field();

@@ -63,7 +63,15 @@ std::string file_page() {
        << "`/field/slab_0` holds the codeword of each tile, uint16, by (u, v, s, t). "
        << "[Frames](../../common/geometry/README.md), "
        << "[coding](../coding.md).\n\n"
-       << dataset_table() << "\n## Results of af-register\n\nIn the folder of `--output`: "
+       << dataset_table()
+       << "\nAn atlas (`af-precompute --orbit`, [page](../other-cameras.md)) has "
+       << "the format " << field_layout::kAtlasFormat
+       << " and the same version. In its root stand `" << field_layout::member_count_rule().name
+       << "`, `/identity` of the camera that the orbit "
+       << "begins from, `/codebook` and `/provenance`; each field is a group, `"
+       << field_layout::member_group(0) << "`, `" << field_layout::member_group(1)
+       << "`, ..., with `geometry`, `identity` and `field` as above.\n"
+       << "\n## Results of af-register\n\nIn the folder of `--output`: "
        << code_list(result_file_names())
        << ", one `CAMERA-overlay.png` per view, and `slicer/`. Which of them are there depends on "
        << "the verdict ([register/README.md](../../register/README.md)).\n\n"

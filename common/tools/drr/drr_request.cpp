@@ -7,9 +7,8 @@
 
 #include "base/error.h"
 #include "drr/field_renderer.h"
-#include "drr/field_set_drr.h"
 #include "drr/ray_cast_drr.h"
-#include "field_file/field_file.h"
+#include "field_use/opened_field.h"
 #include "figures/picture.h"
 #include "files/resource_check.h"
 #include "geometry/camera_distance.h"
@@ -17,6 +16,7 @@
 #include "image_files/ct_reader.h"
 #include "image_files/image_file.h"
 #include "pose_files/pose_file.h"
+#include "spectrum/bone_volume.h"
 #include "study/ct_keys.h"
 #include "study/pose_context.h"
 #include "study/rig_file.h"
@@ -27,10 +27,11 @@ namespace af::tools {
 namespace {
 
 void describe_source(Fields& field, DrrOptions& options) {
-  field("field",
-        options.field,
-        "Look DRRs up in this field; its own camera is used unless --rig and --camera name "
-        "another, whose rays it has to hold")
+  field(
+      "field",
+      options.field,
+      "Look DRRs up in this field or atlas; its own camera is used unless --rig and --camera name "
+      "another, whose rays it has to hold")
       .stands_for(PathRole::InputFile, ".h5");
   field("also_field",
         options.more_fields,
@@ -58,6 +59,7 @@ void describe_source(Fields& field, DrrOptions& options) {
   field.at("water_mu_per_mm").help =
       "Attenuation of water, 1/mm, for ray casting (with --compare the field's own)";
   field.part(options.ray_caster);
+  field.part(options.beam);
 }
 
 void describe_pose(Fields& field, DrrOptions& options) {
@@ -194,24 +196,35 @@ DrrSource source_of(const DrrOptions& options) {
   return {options.ct, options.ct_reading, rig.camera(options.camera), {}, rig.isocenter_point};
 }
 
+std::shared_ptr<const DrrRenderer> cast_through(
+    const std::shared_ptr<const AttenuationVolume>& volume,
+    const DrrOptions& options,
+    const std::shared_ptr<ThreadPool>& pool) {
+  const auto caster = [&](std::shared_ptr<const AttenuationVolume> through) {
+    return std::make_shared<const RayCastDrr>(std::move(through), options.ray_caster, pool);
+  };
+  const XrayBeam beam(options.beam, volume->model());
+  return beam.renderer(caster(volume),
+                       options.beam.needs_bone() ? caster(bone_volume(*volume)) : nullptr);
+}
+
 CastCt ray_caster(const DrrOptions& options,
                   const DrrSource& source,
-                  const CompressedAttenuationField* field,
+                  const std::optional<FieldIdentity>& field,
                   const std::shared_ptr<ThreadPool>& pool) {
   const CtVolume ct = read_ct(source.ct, source.ct_reading);
   AttenuationModel model = options.attenuation;
-  if (field != nullptr) {
+  if (field.has_value()) {
     const std::string hash = ct_content_sha256(ct);
-    if (hash != field->identity.ct_content_sha256)
+    if (hash != field->ct_content_sha256)
       throw FileError(options.field.string(),
                       "CT of the field (ct_content_sha256)",
                       hash + " (" + source.ct.string() + ")",
-                      field->identity.ct_content_sha256);
+                      field->ct_content_sha256);
     // --compare compares ways to render, so the reference takes the field's HU model.
-    model = {field->identity.mu_water_per_mm, field->identity.air_below_hu};
+    model = {field->mu_water_per_mm, field->air_below_hu};
   }
-  return {std::make_shared<const RayCastDrr>(
-              std::make_shared<const AttenuationVolume>(ct, model), options.ray_caster, pool),
+  return {cast_through(std::make_shared<const AttenuationVolume>(ct, model), options, pool),
           ct.grid.center_mm()};
 }
 
@@ -240,29 +253,9 @@ std::vector<std::string> problems(const DrrOptions& options) {
 
 namespace {
 
-/// A field as a member of a set, and what it is a field of.
-struct LoadedField {
-  std::shared_ptr<const CompressedAttenuationField> field;
-  std::shared_ptr<const DrrRenderer> renderer;
-};
-
-LoadedField load_field(const std::filesystem::path& path,
-                       const DrrOptions& options,
-                       const std::shared_ptr<ThreadPool>& pool,
-                       const Communicator& communicator) {
-  FieldFileInfo info;
-  const std::shared_ptr<const CompressedAttenuationField> field =
-      read_field(path, communicator, &info);
-  return {
-      field,
-      make_field_renderer(field, options.look_up.empty() ? info.look_up : options.look_up, pool)};
-}
-
-void require_same_subject(const LoadedField& first,
-                          const LoadedField& other,
+void require_same_subject(const FieldIdentity& wanted,
+                          const FieldIdentity& found,
                           const std::string& path) {
-  const FieldIdentity& wanted = first.field->identity;
-  const FieldIdentity& found = other.field->identity;
   if (found.ct_content_sha256 != wanted.ct_content_sha256)
     throw FileError(path,
                     "CT of the field (ct_content_sha256)",
@@ -274,23 +267,48 @@ void require_same_subject(const LoadedField& first,
                      "must have the attenuation of --field: mu_water and the HU that count as air");
 }
 
-/// The field's renderer; with further fields that of the set.
-std::shared_ptr<const DrrRenderer> renderer_of(const LoadedField& first,
+/// The field, or every member of an atlas, to be looked up in the beam's way; with a tube's
+/// spectrum a field together with that of the bone beside it.
+std::vector<FieldSetMember> renderers_of(const OpenedField& opened,
+                                         const DrrOptions& options,
+                                         const std::shared_ptr<ThreadPool>& pool,
+                                         const Communicator& communicator) {
+  std::vector<FieldSetMember> members = opened.renderers(options.look_up, pool);
+  std::shared_ptr<const DrrRenderer> bone;
+  if (options.beam.needs_bone())
+    bone = make_field_renderer(opened.bone_field(communicator),
+                               options.look_up.empty() ? opened.info().look_up : options.look_up,
+                               pool);
+  const FieldIdentity& identity = opened.identity();
+  const XrayBeam beam(options.beam, {identity.mu_water_per_mm, identity.air_below_hu});
+  for (FieldSetMember& member : members) member.renderer = beam.renderer(member.renderer, bone);
+  return members;
+}
+
+/// The field's renderer; with further fields, or of an atlas, that of the set.
+std::shared_ptr<const DrrRenderer> renderer_of(const OpenedField& first,
                                                const DrrOptions& options,
                                                const std::shared_ptr<ThreadPool>& pool,
                                                const Communicator& communicator) {
-  if (options.more_fields.empty()) return first.renderer;
-  const auto member = [](const LoadedField& loaded) {
-    return FieldSetMember{std::shared_ptr<const LightSlab>(loaded.field, &loaded.field->light_slab),
-                          loaded.renderer};
-  };
-  std::vector<FieldSetMember> members = {member(first)};
+  std::vector<FieldSetMember> members = renderers_of(first, options, pool, communicator);
   for (const std::string& path : options.more_fields) {
-    const LoadedField other = load_field(path, options, pool, communicator);
-    require_same_subject(first, other, path);
-    members.push_back(member(other));
+    const OpenedField other(path, communicator);
+    require_same_subject(first.identity(), other.identity(), path);
+    for (FieldSetMember& member : renderers_of(other, options, pool, communicator))
+      members.push_back(std::move(member));
   }
+  if (members.size() == 1) return members.front().renderer;
   return std::make_shared<const FieldSetDrr>(std::move(members));
+}
+
+/// Of the camera that DRRs are looked up for.
+std::string note_of(const CameraGeometry& camera,
+                    const CameraGeometry& of_field,
+                    const DrrOptions& options) {
+  const CameraDistance distance = camera_distance(camera, of_field);
+  if (distance.is_none()) return "";
+  return "camera " + camera.name + ": " + distance.text() +
+         (options.more_fields.empty() ? "" : ", that of --field");
 }
 
 }  // namespace
@@ -298,27 +316,26 @@ std::shared_ptr<const DrrRenderer> renderer_of(const LoadedField& first,
 DrrScene load_scene(const DrrOptions& options, const Communicator& communicator) {
   DrrScene scene;
   scene.pool = std::make_shared<ThreadPool>(thread_count(options.threads));
-  std::shared_ptr<const CompressedAttenuationField> field;
+  std::optional<FieldIdentity> field;
   if (!options.field.empty()) {
-    const LoadedField loaded = load_field(options.field, options, scene.pool, communicator);
-    field = loaded.field;
-    scene.view = View::whole_detector(field->identity.camera);
-    scene.frame = field->identity.frame;
-    scene.renderer = renderer_of(loaded, options, scene.pool, communicator);
+    const OpenedField opened(options.field, communicator);
+    field = opened.identity();
+    scene.view = View::whole_detector(field->camera);
+    scene.frame = field->frame;
+    scene.renderer = renderer_of(opened, options, scene.pool, communicator);
   }
-  const DrrSource source = source_of(options);
+  scene.source = source_of(options);
+  const DrrSource& source = scene.source;
   if (source.camera.has_value()) {
     scene.view = View::whole_detector(*source.camera);
-    if (field)
-      scene.note = "camera " + source.camera->name + ": " +
-                   camera_distance(*source.camera, field->identity.camera).text();
+    if (field) scene.note = note_of(*source.camera, field->camera, options);
   }
   if (source.frame.has_value())
     scene.frame = *source.frame;
   else if (!field)
     scene.frame.center_room_mm = source.isocenter_point;
   if (!source.ct.empty()) {
-    const CastCt cast = ray_caster(options, source, field.get(), scene.pool);
+    const CastCt cast = ray_caster(options, source, field, scene.pool);
     (field ? scene.reference : scene.renderer) = cast.renderer;
     if (!field && !source.frame.has_value()) scene.frame.center_ct_mm = cast.center_ct_mm;
   }
@@ -328,9 +345,8 @@ DrrScene load_scene(const DrrOptions& options, const Communicator& communicator)
 std::vector<RigidTransform> requested_poses(const DrrOptions& options,
                                             const DrrScene& scene,
                                             std::vector<std::string>& notes) {
-  const DrrSource source = source_of(options);
-  const PoseContext context = pose_context(source.ct,
-                                           source.ct_reading,
+  const PoseContext context = pose_context(scene.source.ct,
+                                           scene.source.ct_reading,
                                            CameraRig{Eigen::Vector3d::Zero(), {scene.view.camera}},
                                            scene.frame);
   if (!options.poses.empty()) return read_poses(options.poses, context, &notes);

@@ -5,11 +5,9 @@
 #include <set>
 
 #include "camera_files/camera_formats.h"
-#include "drr/slab_rays.h"
-#include "field_file/field_file.h"
+#include "field_use/field_coverage.h"
 #include "files/output_file.h"
 #include "files/sha256.h"
-#include "geometry/camera_distance.h"
 #include "geometry/ray_coverage.h"
 #include "image_files/image_file.h"
 #include "pose_files/pose_file.h"
@@ -90,19 +88,18 @@ void describe_coverage(const StudyCase& study_case,
                        ordered_json& json,
                        std::vector<std::string>& warnings) {
   try {
-    const CompressedAttenuationField field = read_field_header(*view.field);
+    const HeldRays field = read_held_rays(*view.field);
     const View region = View{camera, view.roi};
     const PoseFrame nominal = study_case.frame();
-    const CameraDistance distance = camera_distance(camera, field.identity.camera);
-    json["field_camera"] = distance.text();
+    json["field_camera"] = field.coverage.distance_text(camera);
     const auto rays = static_cast<std::int64_t>(region.pixel_count());
     const std::int64_t outside =
-        SlabRays(field.light_slab, nominal.nominal_room_from_ct(), region).count_outside();
-    json["field_coverage"] = coverage_text(
-        camera.name,
-        rays - outside,
-        rays,
-        covered_box(field.light_slab, region.coarser(1).camera, nominal, field.identity.range));
+        field.coverage.rays_outside(nominal.nominal_room_from_ct(), region);
+    json["field_coverage"] =
+        coverage_text(camera.name,
+                      rays - outside,
+                      rays,
+                      field.coverage.box(region, nominal, field.identity.range));
     if (outside > 0)
       warnings.push_back("field " + view.field->string() + " misses " + std::to_string(outside) +
                          " of " + std::to_string(rays) + " rays of camera " + camera.name +

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "base/error.h"
-#include "field_file/field_file.h"
+#include "field_use/opened_field.h"
+#include "geometry/ray_coverage.h"
 #include "text/json_text.h"
 #include "tools/inspect/inspect_kinds.h"
 
@@ -38,8 +39,7 @@ ordered_json slab_json(const SlabGeometry& slab) {
   return json;
 }
 
-ordered_json sizes_json(const CompressedAttenuationField& field, const FieldFileInfo& info) {
-  const FieldLattice lattice = field.lattice();
+ordered_json sizes_json(const FieldLattice& lattice, const FieldFileInfo& info) {
   const auto whole = kBytesPerSample * static_cast<std::uint64_t>(lattice.node_count());
   const auto cropped = kBytesPerSample * static_cast<std::uint64_t>(lattice.stored_node_count());
   const auto ratio = [](std::uint64_t raw, std::uint64_t stored) {
@@ -87,18 +87,8 @@ ordered_json provenance_json(const FieldProvenance& provenance) {
   return json;
 }
 
-}  // namespace
-
-void inspect_field(const std::filesystem::path& path,
-                   const Communicator& communicator,
-                   Inspection& inspection) {
-  inspection.kind = "field";
-  FieldFileInfo info;
-  const auto field = read_field(path, communicator, &info);
-  const FieldIdentity& identity = field->identity;
-  ordered_json& facts = inspection.facts;
-  facts["checksums"] = "verified";
-  facts["payload_sha256"] = info.payload_sha256;
+/// The camera, the poses and the CT.
+void describe_identity(const FieldIdentity& identity, ordered_json& facts) {
   facts["camera"] = camera_json(identity.camera);
   facts["center_ct_mm"] = vector_json(identity.frame.center_ct_mm);
   facts["center_room_mm"] = vector_json(identity.frame.center_room_mm);
@@ -109,15 +99,79 @@ void inspect_field(const std::filesystem::path& path,
   facts["ct_content_sha256"] = identity.ct_content_sha256;
   facts["mu_water_per_mm"] = identity.mu_water_per_mm;
   facts["air_below_hu"] = identity.air_below_hu;
-  facts["uv_plane_y_mm"] = field->light_slab.uv_plane_y_mm;
-  facts["uv_plane"] = plane_json(field->light_slab.u, field->light_slab.v);
-  for (const SlabGeometry& slab : field->light_slab.slabs)
-    facts["slabs"].push_back(slab_json(slab));
-  facts["codewords"] = field->codebook.size();
-  facts["quantizer_step"] = field->quantizer_step;
+}
+
+void describe_planes(const LightSlab& light_slab, ordered_json& facts) {
+  facts["uv_plane_y_mm"] = light_slab.uv_plane_y_mm;
+  facts["uv_plane"] = plane_json(light_slab.u, light_slab.v);
+  for (const SlabGeometry& slab : light_slab.slabs) facts["slabs"].push_back(slab_json(slab));
+}
+
+/// What a file's fields cover of a camera's rays, about the nominal pose.
+std::string coverage_of(const OpenedField& opened, const CameraGeometry& camera) {
+  const FieldIdentity& identity = opened.identity();
+  const View view = View::whole_detector(camera);
+  const auto rays = static_cast<std::int64_t>(view.pixel_count());
+  const std::int64_t outside =
+      opened.coverage().rays_outside(identity.frame.nominal_room_from_ct(), view);
+  return coverage_text(camera.name,
+                       rays - outside,
+                       rays,
+                       opened.coverage().box(view, identity.frame, identity.range));
+}
+
+/// The members have the same counts of nodes, and about the same planes.
+ordered_json members_json(const OpenedField& opened) {
+  ordered_json members;
+  for (const AtlasMember& member : opened.atlas()->members) {
+    const CameraGeometry& camera = member.identity.camera;
+    std::int64_t stored = 0;
+    for (const SlabLattice& slab : member.light_slab.lattice().slabs)
+      stored += slab.stored_node_count();
+    members.push_back({{"camera", camera.name},
+                       {"source_point_mm", vector_json(camera.source_point)},
+                       {"own_range", member.identity.range.text()},
+                       {"stored_nodes", stored},
+                       {"field_coverage", coverage_of(opened, camera)}});
+  }
+  return members;
+}
+
+/// Every index is read, member by member, and thereby verified.
+void verify_members(const OpenedField& opened, const Communicator& communicator) {
+  for (std::size_t i = 0; i < opened.coverage().planes.size(); ++i)
+    (void)opened.member(i, communicator);
+}
+
+}  // namespace
+
+void inspect_field(const std::filesystem::path& path,
+                   const Communicator& communicator,
+                   Inspection& inspection) {
+  const OpenedField opened(path, communicator, OpenedField::Materials::Any);
+  const FieldFileInfo& info = opened.info();
+  const AttenuationAtlas* const atlas = opened.atlas().get();
+  if (atlas != nullptr) verify_members(opened, communicator);
+  inspection.kind = atlas != nullptr ? "atlas" : "field";
+  ordered_json& facts = inspection.facts;
+  facts["checksums"] = "verified";
+  facts["payload_sha256"] = info.payload_sha256;
+  facts["material"] = opened.identity().material == FieldMaterial::Bone ? "bone" : "all";
+  describe_identity(opened.identity(), facts);
+  if (atlas != nullptr) {
+    facts["field_coverage"] = coverage_of(opened, opened.identity().camera);
+    facts["members"] = members_json(opened);
+    describe_planes(atlas->members.front().light_slab, facts["planes_of_first_member"]);
+  } else {
+    describe_planes(opened.field()->light_slab, facts);
+  }
+  facts["codewords"] = opened.codewords();
+  facts["quantizer_step"] =
+      atlas != nullptr ? atlas->quantizer_step : opened.field()->quantizer_step;
   facts["look_up"] = info.look_up;
   facts["index_packing"] = info.packing == IndexPacking::CodebookTree ? "codebook-tree" : "deflate";
-  facts["sizes"] = sizes_json(*field, info);
+  facts["sizes"] =
+      sizes_json(atlas != nullptr ? atlas->lattice() : opened.field()->lattice(), info);
   facts["provenance"] = provenance_json(info.provenance);
 }
 

@@ -13,6 +13,7 @@
 #include "geometry/camera_distance.h"
 #include "geometry/ray_coverage.h"
 #include "image/psnr.h"
+#include "support/c_arm_camera.h"
 #include "support/ct_phantoms.h"
 #include "support/cube_grid.h"
 #include "unit/drr/small_fields.h"
@@ -37,12 +38,7 @@ CameraGeometry recalibrated(const CameraGeometry& camera) {
       Eigen::AngleAxisd(1.0 * kRadPerDeg, Eigen::Vector3d(1, -2, 3).normalized())
           .toRotationMatrix();
   const Eigen::Vector3d shift = 5.0 * Eigen::Vector3d(2, 1, -2).normalized();
-  CameraGeometry moved = camera;
-  moved.source_point = turn * camera.source_point + shift;
-  moved.detector_origin_point = turn * camera.detector_origin_point + shift;
-  moved.column_direction = turn * camera.column_direction;
-  moved.row_direction = turn * camera.row_direction;
-  return moved;
+  return test::moved_camera(camera, turn, shift);
 }
 
 /// A field without codebook for a camera, cast node by node.
@@ -135,12 +131,7 @@ TEST(RecalibratedCamera, IsLookedUpInTheOldFieldAsWellAsInItsOwn) {
 CameraGeometry at_angle(double angle_deg) {
   const Eigen::Matrix3d turn =
       Eigen::AngleAxisd(angle_deg * kRadPerDeg, Eigen::Vector3d::UnitZ()).toRotationMatrix();
-  CameraGeometry camera = small_camera();
-  camera.source_point = turn * camera.source_point;
-  camera.detector_origin_point = turn * camera.detector_origin_point;
-  camera.column_direction = turn * camera.column_direction;
-  camera.row_direction = turn * camera.row_direction;
-  return camera;
+  return test::moved_camera(small_camera(), turn, Eigen::Vector3d::Zero());
 }
 
 /// Fields of two angles of an orbit, 12 degrees apart, each good for 8 degrees and more.

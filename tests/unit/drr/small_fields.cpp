@@ -5,19 +5,12 @@
 #include <cmath>
 
 #include "base/hash_random.h"
+#include "support/c_arm_camera.h"
 
 namespace af {
 
 CameraGeometry small_camera() {
-  CameraGeometry camera;
-  camera.name = "AP";
-  camera.source_point = {0.0, -650.0, 0.0};
-  camera.column_direction = {1.0, 0.0, 0.0};
-  camera.row_direction = {0.0, 0.0, -1.0};
-  camera.pixel_spacing_mm = {6.0, 6.0};
-  camera.size_px = {31, 24};
-  camera.detector_origin_point = {-90.0, 370.0, 69.0};
-  return camera;
+  return test::c_arm_camera(31, 24, 6.0);
 }
 
 std::shared_ptr<CompressedAttenuationField> small_field(const FieldFunction& function,

@@ -1,39 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "geometry/ray_coverage.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include <gtest/gtest.h>
 
+#include "base/error.h"
 #include "base/hash_random.h"
 #include "geometry/camera_distance.h"
+#include "geometry/hit_extents.h"
+#include "geometry/orbit.h"
+#include "support/c_arm_camera.h"
 
 namespace af {
 namespace {
 
-CameraGeometry c_arm_camera() {
-  CameraGeometry camera;
-  camera.name = "AP";
-  camera.source_point = {0.0, -650.0, 0.0};
-  camera.column_direction = {1.0, 0.0, 0.0};
-  camera.row_direction = {0.0, 0.0, -1.0};
-  camera.pixel_spacing_mm = {1.190625, 1.190625};
-  camera.size_px = {256, 256};
-  camera.detector_origin_point = {-151.8046875, 370.0, 151.8046875};
-  return camera;
-}
-
 CameraGeometry moved(const CameraGeometry& camera,
                      const Eigen::Vector3d& angles_rad,
                      const Eigen::Vector3d& shift_mm) {
-  const Eigen::Matrix3d turn = rotation_from_angles(angles_rad);
-  CameraGeometry other = camera;
-  other.source_point = turn * camera.source_point + shift_mm;
-  other.detector_origin_point = turn * camera.detector_origin_point + shift_mm;
-  other.column_direction = turn * camera.column_direction;
-  other.row_direction = turn * camera.row_direction;
-  return other;
+  return test::moved_camera(camera, rotation_from_angles(angles_rad), shift_mm);
 }
 
 LightSlab planes_of(const CameraGeometry& camera,
@@ -93,9 +80,9 @@ PoseParameters sampled(const MotionRange& range, int index, HashRandom& random) 
 
 TEST(RayCoverage, OfAFieldsOwnCameraIsItsRange) {
   const MotionRange range{8.0 * kRadPerDeg, 25.0};
-  const LightSlab planes = planes_of(c_arm_camera(), {}, range);
-  EXPECT_TRUE(covers_range(planes, c_arm_camera(), {}, range));
-  const MotionRange box = covered_box(planes, c_arm_camera(), {}, range);
+  const LightSlab planes = planes_of(test::paper_camera(), {}, range);
+  EXPECT_TRUE(covers_range(planes, test::paper_camera(), {}, range));
+  const MotionRange box = covered_box(planes, test::paper_camera(), {}, range);
   // The planes are larger by kExtentMargin only, and the search stops at its tolerance.
   EXPECT_GE(box.max_rotation_rad(), range.max_rotation_rad());
   EXPECT_LE(box.max_rotation_rad(), range.max_rotation_rad() * (1.0 + kCoveredBoxTolerance));
@@ -103,9 +90,33 @@ TEST(RayCoverage, OfAFieldsOwnCameraIsItsRange) {
             "field covers 100 % of camera A's rays within 8.0 deg / 25.0 mm of nominal");
 }
 
+/// One pixel that moves by a tenth of a millimetre: planes of that size hold its rays, however
+/// small they are.
+TEST(RayCoverage, PlanesNeedNoMarginThatTheRaysDoNot) {
+  const MotionRange range{0.0, 0.1};
+  CameraGeometry camera = test::paper_camera();
+  camera.detector_origin_point = camera.detector_point(127.5, 127.5);
+  camera.size_px = {1, 1};
+  LightSlab planes = planes_of(camera, {}, range);
+  std::vector<double> y_mm = {planes.uv_plane_y_mm};
+  for (const SlabGeometry& slab : planes.slabs) y_mm.push_back(slab.st_plane_y_mm);
+  const auto hits = hit_extents(camera, {}, range, y_mm, planes.slab_from_ct);
+  constexpr double kRoundingMm = 1e-9;
+  const auto set = [](const PlaneExtent& hit, GridAxis& x, GridAxis& z) {
+    x = {hit.x_low_mm - kRoundingMm, hit.x_high_mm + kRoundingMm, x.nodes};
+    z = {hit.z_low_mm - kRoundingMm, hit.z_high_mm + kRoundingMm, z.nodes};
+  };
+  set(hits[0], planes.u, planes.v);
+  for (std::size_t k = 0; k < planes.slabs.size(); ++k)
+    set(hits[k + 1], planes.slabs[k].s, planes.slabs[k].t);
+  EXPECT_LT(hits[1].x_high_mm - hits[1].x_low_mm, 1.0);
+  EXPECT_TRUE(covers_range(planes, camera, {}, range));
+  EXPECT_FALSE(covers_range(planes, camera, {}, range.scaled(1.001)));
+}
+
 TEST(RayCoverage, SaysWhatSampledRaysSay) {
   const MotionRange range{8.0 * kRadPerDeg, 25.0};
-  const CameraGeometry nominal = c_arm_camera();
+  const CameraGeometry nominal = test::paper_camera();
   const LightSlab planes = planes_of(nominal, {}, range);
   CameraGeometry cropped = nominal;
   cropped.size_px = {100, 120};
@@ -133,9 +144,9 @@ TEST(RayCoverage, SaysWhatSampledRaysSay) {
 
 TEST(RayCoverage, IsNoneForACameraAcross) {
   const MotionRange range{8.0 * kRadPerDeg, 25.0};
-  const LightSlab planes = planes_of(c_arm_camera(), {}, range);
+  const LightSlab planes = planes_of(test::paper_camera(), {}, range);
   const CameraGeometry across =
-      moved(c_arm_camera(), {0.0, 0.0, std::numbers::pi / 2.0}, Eigen::Vector3d::Zero());
+      moved(test::paper_camera(), {0.0, 0.0, std::numbers::pi / 2.0}, Eigen::Vector3d::Zero());
   const MotionRange box = covered_box(planes, across, {}, range);
   EXPECT_EQ(box.max_rotation_rad(), 0.0);
   EXPECT_FALSE(covers_range(planes, across, {}, box));
@@ -190,7 +201,7 @@ TEST(MotionRange, EveryPoseOfRandomRangesIsCoveredForRandomCameras) {
     frame.rotation = rotation_from_angles(anywhere(0.6));
     frame.center_ct_mm = anywhere(40.0);
     frame.center_room_mm = anywhere(10.0);
-    const CameraGeometry camera = moved(c_arm_camera(), anywhere(3.0), anywhere(10.0));
+    const CameraGeometry camera = moved(test::paper_camera(), anywhere(3.0), anywhere(10.0));
     // Bounds on either side of zero, or both on the same.
     MotionRange range;
     for (int axis = 0; axis < 3; ++axis) {
@@ -213,8 +224,148 @@ TEST(MotionRange, EveryPoseOfRandomRangesIsCoveredForRandomCameras) {
   }
 }
 
+/// An atlas to test: a camera, a range and an orbit, all random.
+struct RandomOrbit {
+  PoseFrame frame;
+  CameraGeometry camera;
+  MotionRange range;
+  Orbit orbit;
+  Eigen::Vector3d isocenter_point;
+
+  explicit RandomOrbit(HashRandom& random) {
+    const auto anywhere = [&](double size) {
+      return Eigen::Vector3d(
+          random.uniform(-size, size), random.uniform(-size, size), random.uniform(-size, size));
+    };
+    frame.rotation = rotation_from_angles(anywhere(0.6));
+    frame.center_ct_mm = anywhere(40.0);
+    frame.center_room_mm = anywhere(20.0);
+    isocenter_point = anywhere(20.0);
+    camera = moved(test::paper_camera(), anywhere(0.3), anywhere(10.0));
+    for (int axis = 0; axis < 3; ++axis) {
+      range.low.rotation_rad[axis] = -random.uniform(0.0, 0.2);
+      range.high.rotation_rad[axis] = random.uniform(0.0, 0.2);
+      range.low.translation_mm[axis] = -random.uniform(0.0, 30.0);
+      range.high.translation_mm[axis] = random.uniform(0.0, 30.0);
+    }
+    orbit.axis = static_cast<int>(random.uniform() * 3.0);
+    orbit.from_rad = -random.uniform(0.0, 1.6);
+    orbit.to_rad = random.uniform(0.0, 1.6);
+    if (random.uniform() < 0.5) orbit.step_rad = random.uniform(0.15, 0.4);
+  }
+
+  [[nodiscard]] std::vector<OrbitMember> members() const {
+    return orbit_members(camera, isocenter_point, frame, range, orbit);
+  }
+  [[nodiscard]] CameraGeometry at(double angle_rad) const {
+    return turned_camera(camera, isocenter_point, orbit.direction(), angle_rad);
+  }
+  /// Angles at the ends of the orbit, between members, and any.
+  double angle(int index, HashRandom& random) const {
+    if (index % 5 == 0) return orbit.from_rad;
+    if (index % 5 == 1) return orbit.to_rad;
+    return random.uniform(orbit.from_rad, orbit.to_rad);
+  }
+};
+
+TEST(Orbit, EveryPoseAtEveryAngleIsInAMembersRange) {
+  constexpr int kSettings = 100;
+  constexpr int kPosesEach = 300;
+  HashRandom random(43);
+  for (int setting = 0; setting < kSettings; ++setting) {
+    const RandomOrbit of(random);
+    const std::vector<OrbitMember> members = of.members();
+    for (int i = 0; i < kPosesEach; ++i) {
+      const double angle = of.angle(i, random);
+      const RigidTransform pose = pose_from_parameters(of.frame, sampled(of.range, i, random));
+      const bool is_held =
+          std::any_of(members.begin(), members.end(), [&](const OrbitMember& member) {
+            // The pose that the member's camera sees as the turned one sees this.
+            const Eigen::Matrix3d back =
+                Eigen::AngleAxisd(member.angle_rad - angle, of.orbit.direction())
+                    .toRotationMatrix();
+            RigidTransform seen = RigidTransform::Identity();
+            seen.linear() = back * pose.linear();
+            seen.translation() =
+                of.isocenter_point + back * (pose.translation() - of.isocenter_point);
+            return member.range.contains(parameters_from_pose(of.frame, seen));
+          });
+      ASSERT_TRUE(is_held) << setting << ", pose " << i << ", " << text_of(of.orbit) << ", angle "
+                           << angle << ", " << of.range.text();
+    }
+  }
+}
+
+TEST(Orbit, EveryRayAtEveryAngleIsHeldByOneMember) {
+  constexpr int kSettings = 20;
+  constexpr int kPosesEach = 500;
+  HashRandom random(47);
+  for (int setting = 0; setting < kSettings; ++setting) {
+    const RandomOrbit of(random);
+    std::vector<LightSlab> planes;
+    for (const OrbitMember& member : of.members())
+      planes.push_back(planes_of(member.camera, of.frame, member.range));
+    for (int i = 0; i < kPosesEach; ++i) {
+      const CameraGeometry camera = of.at(of.angle(i, random));
+      const PoseParameters pose = sampled(of.range, i, random);
+      ASSERT_TRUE(std::any_of(planes.begin(),
+                              planes.end(),
+                              [&](const LightSlab& of_member) {
+                                return all_rays_inside(of_member, camera, of.frame, pose);
+                              }))
+          << setting << ", " << i;
+    }
+  }
+}
+
+TEST(Orbit, AboutZMembersTileAnglesOfCamerasAndPoses) {
+  Orbit orbit;
+  orbit.from_rad = -90.0 * kRadPerDeg;
+  orbit.to_rad = 90.0 * kRadPerDeg;
+  const MotionRange range{10.0 * kRadPerDeg, 30.0};
+  const std::vector<OrbitMember> members =
+      orbit_members(test::paper_camera(), {0, 0, 0}, {}, range, orbit);
+  // -100 to 100 degrees in steps of at most 20, with a member about 0.
+  ASSERT_EQ(members.size(), 11U);
+  const double half = 100.0 / 11.0;
+  EXPECT_NEAR(members.front().angle_rad * kDegPerRad, -10.0 * half, 1e-9);
+  EXPECT_EQ(members[5].angle_rad, 0.0);
+  EXPECT_EQ(members[5].camera.name, "AP_z0");
+  EXPECT_EQ(members[6].camera.name, "AP_z18.18");
+  EXPECT_EQ(members[5].camera.source_point, test::paper_camera().source_point);
+  const MotionRange& of_member = members.front().range;
+  EXPECT_NEAR(of_member.high.rotation_rad.z() * kDegPerRad, half, 1e-6);
+  EXPECT_EQ(of_member.high.rotation_rad.x(), range.high.rotation_rad.x());
+  // A square of 30 mm turned as far as a camera and a pose of the same member can be apart.
+  const double farthest = (10.0 + half) * kRadPerDeg;
+  EXPECT_NEAR(
+      of_member.high.translation_mm.x(), 30.0 * (std::cos(farthest) + std::sin(farthest)), 1e-3);
+  EXPECT_EQ(of_member.high.translation_mm.z(), 30.0);
+  // An orbit beside 0 is cut into equal parts.
+  orbit.from_rad = 30.0 * kRadPerDeg;
+  const std::vector<OrbitMember> beside =
+      orbit_members(test::paper_camera(), {0, 0, 0}, {}, range, orbit);
+  ASSERT_EQ(beside.size(), 4U);
+  EXPECT_NEAR(beside[0].angle_rad * kDegPerRad, 30.0, 1e-9);
+  EXPECT_NEAR(beside[3].angle_rad * kDegPerRad, 90.0, 1e-9);
+  // Right-handed about z: from (0, -650, 0) at 90 degrees to (650, 0, 0).
+  EXPECT_NEAR((beside[3].camera.source_point - Eigen::Vector3d(650, 0, 0)).norm(), 0.0, 1e-9);
+}
+
+TEST(Orbit, IsRefusedWhenItTakesTooManyFieldsOrIsNone) {
+  const MotionRange range{10.0 * kRadPerDeg, 30.0};
+  const auto members_of = [&](const Orbit& orbit) {
+    return orbit_members(test::paper_camera(), {0, 0, 0}, {}, range, orbit);
+  };
+  EXPECT_THROW(members_of({2, 1.0, -1.0, {}}), InputError);
+  EXPECT_THROW(members_of({2, -1.0, 1.0, 0.0}), InputError);
+  EXPECT_THROW(members_of({2, -1.0, 1.0, 0.02}), InputError);
+  EXPECT_THROW(members_of({2, -4.0, 4.0, {}}), InputError);
+  EXPECT_EQ(members_of({0, 0.5, 0.5, {}}).size(), 1U);
+}
+
 TEST(CameraDistance, IsWhatACalibrationChanged) {
-  const CameraGeometry nominal = c_arm_camera();
+  const CameraGeometry nominal = test::paper_camera();
   EXPECT_TRUE(camera_distance(nominal, nominal).is_none());
   const CameraDistance distance =
       camera_distance(moved(nominal, {0, 0, 0.0174533}, {0, 0, 5}), nominal);

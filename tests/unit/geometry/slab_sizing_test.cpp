@@ -7,24 +7,11 @@
 
 #include "base/error.h"
 #include "base/hash_random.h"
+#include "support/c_arm_camera.h"
 #include "unit/geometry/closed_form_plane_sizes.h"
 
 namespace af {
 namespace {
-
-/// The paper's camera: 12-inch C-arm, f = 650 mm, square detector whose outer edges span 2 * 152.4
-/// mm at 1020 mm.
-CameraGeometry paper_camera() {
-  CameraGeometry camera;
-  camera.name = "AP";
-  camera.source_point = {0.0, -650.0, 0.0};
-  camera.column_direction = {1.0, 0.0, 0.0};
-  camera.row_direction = {0.0, 0.0, -1.0};
-  camera.pixel_spacing_mm = {1.190625, 1.190625};
-  camera.size_px = {256, 256};
-  camera.detector_origin_point = {-151.8046875, 370.0, 151.8046875};
-  return camera;
-}
 
 /// A camera that is neither aimed at the centre nor square nor axis-aligned.
 CameraGeometry skewed_camera() {
@@ -126,8 +113,8 @@ TEST(SlabSizing, GivesTheStatedSizesForAMovedCt) {
                            {10, 0, 244.4, 279.5}};
   for (const Row& row : kRows) {
     const std::array<double, 2> planes{0.0, 650.0};
-    const auto extents =
-        extents_on_planes(paper_camera(), {}, range_of(row.degrees, row.translation_mm), planes);
+    const auto extents = extents_on_planes(
+        test::paper_camera(), {}, range_of(row.degrees, row.translation_mm), planes);
     const auto side = [](const PlaneExtent& extent) {
       return std::max({2 * std::abs(extent.x_low_mm),
                        2 * extent.x_high_mm,
@@ -151,8 +138,8 @@ std::vector<MovingCase> moving_cases() {
   tilted.rotation = rotation_from_angles({0.2, -0.3, 0.5});
   tilted.center_ct_mm = {12.0, -30.0, 44.0};
   tilted.center_room_mm = {5.0, 8.0, -9.0};
-  return {{paper_camera(), {}, range_of(10, 100)},
-          {paper_camera(), {}, range_of(30, 20)},
+  return {{test::paper_camera(), {}, range_of(10, 100)},
+          {test::paper_camera(), {}, range_of(30, 20)},
           {skewed_camera(), tilted, range_of(15, 60)},
           {skewed_camera(), tilted, range_of(30, 0)},
           {skewed_camera(), tilted, range_of(0, 0)}};
@@ -313,12 +300,13 @@ TEST(LightSlab, StoredRangeHoldsTheShadowAndIsEvenAligned) {
 
 TEST(LightSlab, SourceWithinTheCtsDepthIsRefused) {
   const auto corners = CtBox{{-100, -600, -100}, {100, 100, 100}}.corner_points();
-  EXPECT_THROW(make_light_slab(paper_camera(), {}, range_of(10, 100), corners, {}), InputError);
+  EXPECT_THROW(make_light_slab(test::paper_camera(), {}, range_of(10, 100), corners, {}),
+               InputError);
 }
 
 TEST(LightSlab, RangeThatMakesRaysParallelToThePlanesIsRefused) {
   const std::array<double, 1> planes{0.0};
-  EXPECT_THROW(extents_on_planes(paper_camera(), {}, range_of(60, 0), planes), InputError);
+  EXPECT_THROW(extents_on_planes(test::paper_camera(), {}, range_of(60, 0), planes), InputError);
 }
 
 }  // namespace

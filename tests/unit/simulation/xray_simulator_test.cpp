@@ -6,7 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "simulation/material_tables.h"
+#include "spectrum/material_tables.h"
 #include "support/ct_phantoms.h"
 
 namespace af {

@@ -8,6 +8,7 @@
 
 #include "drr/ray_cast_drr.h"
 #include "geometry/slab_sizing.h"
+#include "support/c_arm_camera.h"
 #include "support/ct_phantoms.h"
 #include "support/cube_grid.h"
 
@@ -20,15 +21,7 @@ constexpr RayCasterOptions kCaster{1.0};
 
 /// 24 x 20 pixels of 8 mm on a C-arm, beam along +y.
 CameraGeometry camera() {
-  CameraGeometry camera;
-  camera.name = "A";
-  camera.source_point = {0.0, -650.0, 0.0};
-  camera.detector_origin_point = {-92.0, 370.0, 76.0};
-  camera.column_direction = Vector3d::UnitX();
-  camera.row_direction = -Vector3d::UnitZ();
-  camera.pixel_spacing_mm = {8.0, 8.0};
-  camera.size_px = {24, 20};
-  return camera;
+  return test::c_arm_camera(24, 20, 8.0);
 }
 
 std::shared_ptr<const AttenuationVolume> ellipsoids() {

@@ -14,6 +14,7 @@
 #include "precompute/codebook/unit_encoding.h"
 #include "precompute/design/patch_nodes.h"
 #include "precompute/units/unit_planner.h"
+#include "support/c_arm_camera.h"
 #include "support/ct_phantoms.h"
 #include "support/cube_grid.h"
 
@@ -24,15 +25,7 @@ using Eigen::Vector3d;
 
 /// 64 x 64 pixels of 3 mm on a C-arm, beam along +y.
 CameraGeometry c_arm() {
-  CameraGeometry camera;
-  camera.name = "A";
-  camera.source_point = {0.0, -650.0, 0.0};
-  camera.detector_origin_point = {-94.5, 370.0, 94.5};
-  camera.column_direction = Vector3d::UnitX();
-  camera.row_direction = -Vector3d::UnitZ();
-  camera.pixel_spacing_mm = {3.0, 3.0};
-  camera.size_px = {64, 64};
-  return camera;
+  return test::c_arm_camera(64, 64, 3.0);
 }
 
 CtVolume bones() {

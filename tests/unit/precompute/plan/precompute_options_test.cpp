@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "base/error.h"
+#include "precompute/plan/orbit_text.h"
 #include "text/options_toml.h"
 
 namespace af {
@@ -178,6 +180,31 @@ TEST(PrecomputeOptions, RangesThatAreNoneAreRefused) {
   PrecomputeOptions far;
   far.rotation_range_deg = "rx=170:190";
   EXPECT_FALSE(problems(far).empty());
+}
+
+TEST(PrecomputeOptions, TakeAnOrbitAsText) {
+  const Orbit orbit = orbit_of_text("--orbit", "axis=z,from=-90,to=+45.5,step=15");
+  EXPECT_EQ(orbit.axis, 2);
+  EXPECT_EQ(orbit.from_rad, -90.0 * kRadPerDeg);
+  EXPECT_EQ(orbit.to_rad, 45.5 * kRadPerDeg);
+  EXPECT_EQ(orbit.step_rad, 15.0 * kRadPerDeg);
+  EXPECT_FALSE(orbit_of_text("--orbit", "to=9,axis=x,from=-9").step_rad.has_value());
+  for (const char* text : {"",
+                           "axis=z",
+                           "axis=z,from=-90",
+                           "axis=w,from=-90,to=90",
+                           "axis=,from=-90,to=90",
+                           "axis=z,from=-90,to=90,to=95",
+                           "axis=z,from=90,to=-90",
+                           "axis=z,from=-90,to=nan",
+                           "axis=z,from=-90,to=90,step=0",
+                           "axis=z,from=-90,to=90deg",
+                           "axis=z,from=-90,to=90,by=10"}) {
+    PrecomputeOptions options;
+    options.orbit = *text == '\0' ? "=" : text;
+    EXPECT_THROW(problems(options), UsageError) << text;
+    EXPECT_TRUE(options.is_atlas());
+  }
 }
 
 }  // namespace

@@ -57,6 +57,13 @@ struct BlockProblem {
   }
 };
 
+TEST(PredictedTre, OfACovarianceThatIsNotKnownIsNotKnown) {
+  const std::vector<Eigen::Vector3d> points{{1, 2, 3}};
+  const PredictedTre tre = predicted_tre(PoseMatrix::Constant(std::nan("")), PoseFrame(), points);
+  EXPECT_TRUE(std::isnan(tre.rms_mm));
+  EXPECT_TRUE(std::isnan(tre.upper_95_mm));
+}
+
 TEST(PoseCovariance, PredictsTheSpreadOfRepeatedFits) {
   std::mt19937_64 random(3);
   const BlockProblem problem(random);

@@ -196,10 +196,50 @@ TEST(UncertaintyEstimator, TakesRobustGradientsWhereAMeasureHasNoDerivative) {
   // case.
   const UncertaintyReport worse = estimator.report(result, std::vector<ViewValue>{{0.1, 0.1}});
   EXPECT_GT(report.confidence, 2.0 * worse.confidence);
-  // Nothing was calibrated within silhouettes.
-  const UncertaintyReport bone = estimator.report(result, std::vector<ViewValue>{{0.9, 0.9, true}});
-  EXPECT_TRUE(std::isnan(bone.confidence));
-  EXPECT_TRUE(std::isnan(bone.tre_95_mm));
+}
+
+TEST(UncertaintyEstimator, SaysNothingWhereNoViewCanBeJudged) {
+  const test::SmallCase small = test::small_case();
+  RegistrationResult result;
+  result.room_from_ct = small.gold_room_from_ct;
+  result.similarity = 1.0;
+  result.chain = "squares";
+  const std::vector<ViewValue> unjudged{{std::nan(""), std::nan("")}};
+  const UncertaintyReport report =
+      UncertaintyEstimator(small.problem, squares(), {}).report(result, unjudged);
+  EXPECT_TRUE(std::isnan(report.covariance_deg_mm[0]));
+  EXPECT_TRUE(std::isnan(report.inflation));
+  EXPECT_TRUE(std::isnan(report.tre_rms_mm));
+  EXPECT_TRUE(std::isnan(report.tre_95_mm));
+}
+
+TEST(UncertaintyEstimator, SaysNothingOfStagesWithinSilhouettes) {
+  const test::SmallCase small = test::small_case();
+  RegistrationOptions options = squares();
+  options.chains.front().stages.front().silhouette_mm = 5.0;
+  RegistrationResult result;
+  result.room_from_ct = small.gold_room_from_ct;
+  result.similarity = 1.0;
+  result.chain = "squares";
+  const UncertaintyReport report = UncertaintyEstimator(small.problem, options, {})
+                                       .report(result, std::vector<ViewValue>{{1, 1}});
+  EXPECT_TRUE(std::isnan(report.covariance_deg_mm[0]));
+  EXPECT_TRUE(std::isnan(report.confidence));
+}
+
+TEST(UncertaintyEstimator, IsSilentWhereTheMeasureThatStandsInRefusesTheXray) {
+  const test::SmallCase small = test::small_case();
+  for (RegistrationView& view : small.problem->views)
+    std::fill(view.xray.pixels.begin(), view.xray.pixels.end(), 1.0f);
+  RegistrationOptions options;
+  options.use_similarity("pi");
+  RegistrationResult result;
+  result.room_from_ct = small.gold_room_from_ct;
+  result.similarity = 1.0;
+  result.chain = options.chains.front().name;
+  const UncertaintyReport report = UncertaintyEstimator(small.problem, options, {})
+                                       .report(result, std::vector<ViewValue>{{0.9, 0.9}});
+  EXPECT_TRUE(std::isnan(report.covariance_deg_mm[0]));
 }
 
 }  // namespace

@@ -1,11 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "simulation/xray_spectrum.h"
+#include "spectrum/xray_spectrum.h"
 
 #include <cmath>
 
-#include "simulation/material_tables.h"
+#include "spectrum/material_tables.h"
 
 namespace af {
+
+SpectrumOptions SpectrumOptions::one_energy() {
+  SpectrumOptions options;
+  options.tube_kvp = 0.0;
+  return options;
+}
 
 void SpectrumOptions::describe(Fields& field) {
   field("tube_kvp", tube_kvp, "Tube voltage, kV; 0: only the HU scale's effective energy")
@@ -22,7 +28,7 @@ std::vector<std::string> problems(const SpectrumOptions& options) {
 
 std::vector<SpectrumBin> tube_spectrum(const SpectrumOptions& options,
                                        double effective_energy_kev) {
-  if (options.tube_kvp == 0.0) return {{effective_energy_kev, 1.0}};
+  if (options.is_one_energy()) return {{effective_energy_kev, 1.0}};
   std::vector<SpectrumBin> bins;
   const double width_kev = (options.tube_kvp - kLowestTableEnergyKev) / options.energy_bins;
   double sum = 0.0;

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "base/described_fields.h"
-#include "simulation/tissue_model.h"
+#include "spectrum/tissue_model.h"
 
 namespace af {
 
@@ -14,6 +14,10 @@ struct SpectrumOptions {
   double tube_kvp = 100.0;    ///< 0: one energy, the effective energy of the CT's HU scale
   double aluminium_mm = 3.0;  ///< total filtration
   int energy_bins = 40;       ///< of equal width between 10 keV and the tube voltage
+
+  /// The effective energy alone: Beer and Lambert's law.
+  static SpectrumOptions one_energy();
+  [[nodiscard]] bool is_one_energy() const { return tube_kvp == 0.0; }
 
   void describe(Fields& field);
 };
@@ -32,7 +36,8 @@ struct SpectrumBin {
 /// and the detector's own absorption are left out.
 std::vector<SpectrumBin> tube_spectrum(const SpectrumOptions& options, double effective_energy_kev);
 
-/// Lengths of material along one ray; water and bone as in PathIntegrals.
+/// Lengths of material along one ray: of water and bone, mm of water that attenuate alike at the
+/// effective energy.
 struct RayMaterials {
   double water_mm = 0.0;
   double bone_mm = 0.0;

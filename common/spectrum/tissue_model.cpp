@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "simulation/tissue_model.h"
+#include "spectrum/tissue_model.h"
 
 #include <algorithm>
 #include <limits>
 
 #include "base/error.h"
-#include "simulation/material_tables.h"
+#include "spectrum/material_tables.h"
 
 namespace af {
 

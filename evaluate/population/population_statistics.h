@@ -42,7 +42,8 @@ std::string half_of(const PatientOutcomes& patient);
 /// A mean over patients with both kinds of 95 % intervals.
 struct OverPatients {
   double value = 0.0;
-  MeanInterval student;     ///< over the patients' own values; NaN where these are equal
+  /// Of the mean of the patients' own values, each of the same weight; NaN where these are equal.
+  MeanInterval student;
   CaseBootstrap bootstrap;  ///< by resampling of patients
 };
 
@@ -53,7 +54,8 @@ struct PatientSuccess {
   std::int64_t successes = 0;
   ProportionInterval wilson;
   CaptureRange capture;
-  /// 95 % of the capture range, by resampling of the patient's starts within each interval.
+  /// 95 % of what the capture range might have come out as, by what the patient's starts leave
+  /// plausible: each interval's rate is drawn from Jeffreys' posterior, its successes by that rate.
   MeanInterval capture_interval_mm;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "simulation/material_tables.h"
+#include "spectrum/material_tables.h"
 
 #include <algorithm>
 #include <array>

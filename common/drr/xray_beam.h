@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "base/described_fields.h"
+#include "drr/drr_renderer.h"
+#include "spectrum/polychromatic_attenuation.h"
+
+namespace af {
+
+/// The X-rays that DRRs are of. Unless told otherwise, they are of one energy and without scatter.
+struct XrayBeamOptions {
+  SpectrumOptions spectrum = SpectrumOptions::one_energy();
+  double scatter_to_primary = 0.0;
+
+  /// Whether a renderer of the bone's part is needed beside the ordinary one.
+  [[nodiscard]] bool needs_bone() const { return !spectrum.is_one_energy(); }
+  /// Whether DRRs are the renderer's own.
+  [[nodiscard]] bool is_ordinary() const { return !needs_bone() && scatter_to_primary == 0.0; }
+  void describe(Fields& field);
+};
+
+/// Turns renderers of ordinary DRRs into those of a beam.
+class XrayBeam {
+ public:
+  /// `model`: of the ordinary DRRs. InputError when its mu_water fits no energy of a spectrum.
+  XrayBeam(const XrayBeamOptions& options, const AttenuationModel& model);
+
+  /// `bone`: where needs_bone(). The ordinary renderer itself, when the beam is of one energy and
+  /// without scatter.
+  [[nodiscard]] std::shared_ptr<const DrrRenderer> renderer(
+      std::shared_ptr<const DrrRenderer> all, std::shared_ptr<const DrrRenderer> bone) const;
+
+ private:
+  XrayBeamOptions options_;
+  std::shared_ptr<const PolychromaticAttenuation> attenuation_;  ///< none for one energy
+};
+
+}  // namespace af

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+// Renderers of an atlas that open its members when a pose first needs them.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "drr/drr_renderer.h"
+#include "drr/field_set_drr.h"
+#include "geometry/light_slab.h"
+
+namespace af {
+
+/// The renderers of one member: its own, then those of the levels of its image pyramid.
+using MemberLevels = std::vector<std::shared_ptr<const DrrRenderer>>;
+
+/// The members of an atlas that are in memory: at most so many, those that were used last. For any
+/// number of threads. \test MembersInUse.KeepsThoseThatWereUsedLast
+class MembersInUse {
+ public:
+  using Open = std::function<std::shared_ptr<const MemberLevels>(std::size_t member)>;
+
+  /// `open` is called by one thread at a time; what it throws, get() throws. At least two members
+  /// are kept: a seam needs as many.
+  MembersInUse(Open open, std::size_t most);
+
+  /// Opened, if need be. What the caller holds stays usable when the member is let go.
+  std::shared_ptr<const MemberLevels> get(std::size_t member);
+  /// Keeps a member that was opened elsewhere, for good.
+  void keep(std::size_t member, std::shared_ptr<const MemberLevels> levels);
+  [[nodiscard]] std::size_t count() const;
+
+ private:
+  struct Kept {
+    std::shared_ptr<const MemberLevels> levels;
+    std::uint64_t used = 0;  ///< a count that grows with every use
+    bool is_for_good = false;
+  };
+
+  void let_go();
+
+  Open open_;
+  std::size_t most_;
+  std::uint64_t uses_ = 0;
+  std::map<std::size_t, Kept> kept_;
+  mutable std::mutex mutex_;
+};
+
+/// One level of every member, opened when it is rendered; level 0 are the DRRs themselves.
+/// `coverage`: the planes of every member. What is rendered does not depend on which members are in
+/// memory.
+std::vector<FieldSetMember> atlas_level(
+    const std::vector<std::shared_ptr<const LightSlab>>& coverage,
+    const std::shared_ptr<MembersInUse>& members,
+    std::size_t level);
+
+}  // namespace af

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which rays a file's fields hold: one field, or the members of an atlas together.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "drr/drr_renderer.h"
+#include "field/attenuation_atlas.h"
+
+namespace af {
+
+/// The fields of a file, without what they hold.
+struct FieldCoverage {
+  std::vector<CameraGeometry> cameras;  ///< that each was made for
+  std::vector<std::shared_ptr<const LightSlab>> planes;
+
+  FieldCoverage() = default;
+  explicit FieldCoverage(const std::shared_ptr<const CompressedAttenuationField>& field);
+  explicit FieldCoverage(const std::shared_ptr<const AttenuationAtlas>& atlas);
+
+  /// Rays of a view that the best field misses: the one that misses fewest.
+  [[nodiscard]] std::int64_t rays_outside(const RigidTransform& room_from_ct,
+                                          const View& view) const;
+  /// The largest box about the nominal pose of `frame`, in the proportion of `proportion`, each of
+  /// whose poses one of the fields holds: covered_box() of a field. Of several it is judged by
+  /// kBoxPoses poses, the box's corners first: between them a ray may be missed.
+  [[nodiscard]] MotionRange box(const View& view,
+                                const PoseFrame& frame,
+                                const MotionRange& proportion) const;
+  static constexpr int kBoxPoses = 512;
+  /// How far a camera is from the field's, or from that of the nearest member, which is named.
+  [[nodiscard]] std::string distance_text(const CameraGeometry& camera) const;
+};
+
+/// One rank alone, and quick: of a field's or an atlas's file, and what it was made from.
+/// FileError.
+struct HeldRays {
+  FieldIdentity identity;
+  FieldCoverage coverage;
+};
+HeldRays read_held_rays(const std::filesystem::path& path);
+
+}  // namespace af

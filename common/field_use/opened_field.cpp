@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "field_use/opened_field.h"
+
+#include <utility>
+
+#include "base/error.h"
+#include "drr/field_renderer.h"
+
+namespace af {
+
+OpenedField::OpenedField(const std::filesystem::path& path,
+                         const Communicator& communicator,
+                         Materials materials)
+    : path_(path) {
+  std::string kind;
+  all_or_none(communicator, [&] {
+    if (communicator.is_root()) kind = is_atlas_file(path) ? "atlas" : "field";
+  });
+  communicator.broadcast(kind);
+  if (kind == "atlas") {
+    atlas_ = read_atlas(path, communicator, &info_);
+    coverage_ = FieldCoverage(atlas_);
+  } else {
+    field_ = materials == Materials::Any ? read_field_of_any_material(path, communicator, &info_)
+                                         : read_field(path, communicator, &info_);
+    coverage_ = FieldCoverage(field_);
+  }
+}
+
+std::size_t OpenedField::codewords() const {
+  return atlas_ ? atlas_->codebook.size() : field_->codebook.size();
+}
+
+std::shared_ptr<const CompressedAttenuationField> OpenedField::bone_field(
+    const Communicator& communicator, FieldFileInfo* info) const {
+  all_or_none(communicator, [&] {
+    if (atlas_)
+      throw InputError("tube voltage",
+                       "given",
+                       "needs a field of the CT's bone, which an atlas does not have: use fields",
+                       path_.string());
+  });
+  return read_bone_field(bone_field_path(path_), *field_, communicator, info);
+}
+
+std::shared_ptr<const CompressedAttenuationField> OpenedField::member(
+    std::size_t member, const Communicator& communicator) const {
+  check(atlas_ != nullptr, "a member of an atlas");
+  return read_atlas_member(path_, member, info_.payload_sha256, communicator);
+}
+
+std::vector<FieldSetMember> OpenedField::renderers(const std::string& look_up,
+                                                   const std::shared_ptr<ThreadPool>& pool) const {
+  const std::string way = look_up.empty() ? info_.look_up : look_up;
+  if (field_) return {{coverage_.planes.front(), make_field_renderer(field_, way, pool)}};
+  const auto open = [of = *this, way, pool](std::size_t member) {
+    return std::make_shared<const MemberLevels>(
+        MemberLevels{make_field_renderer(of.member(member, Communicator::alone()), way, pool)});
+  };
+  return atlas_level(coverage_.planes, std::make_shared<MembersInUse>(open, kMembersKept), 0);
+}
+
+std::shared_ptr<const DrrRenderer> OpenedField::renderer(
+    const std::string& look_up, const std::shared_ptr<ThreadPool>& pool) const {
+  std::vector<FieldSetMember> all = renderers(look_up, pool);
+  if (field_) return all.front().renderer;
+  return std::make_shared<const FieldSetDrr>(std::move(all));
+}
+
+}  // namespace af

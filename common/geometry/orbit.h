@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+// Cameras on a C-arm's orbit, and the motion that a field of each of them has to hold so that
+// together they hold every pose at every angle.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "geometry/slab_sizing.h"
+
+namespace af {
+
+/// Angles about a room axis through the isocentre, right-handed: the camera turns, not the CT.
+struct Orbit {
+  int axis = 2;  ///< 0, 1, 2: the room's x, y, z
+  double from_rad = 0.0;
+  double to_rad = 0.0;
+  std::optional<double> step_rad;  ///< most between two members; none: default_step_rad()
+
+  [[nodiscard]] Eigen::Vector3d direction() const { return Eigen::Vector3d::Unit(axis); }
+};
+
+/// A camera that turned about a room axis through a point.
+CameraGeometry turned_camera(const CameraGeometry& camera,
+                             const Eigen::Vector3d& room_point,
+                             const Eigen::Vector3d& direction,
+                             double angle_rad);
+
+/// One field of an atlas: its camera and the range that its planes are sized for.
+struct OrbitMember {
+  CameraGeometry camera;  ///< the nominal one, turned by angle_rad; its name says so
+  double angle_rad = 0.0;
+  MotionRange range;  ///< about the nominal pose
+};
+
+/// How far members stand apart unless an orbit says it: as wide as the range is about its axis, at
+/// least 5 degrees.
+double default_step_rad(const Orbit& orbit, const MotionRange& range);
+
+/// Most members of an orbit.
+inline constexpr int kMaxOrbitMembers = 64;
+
+/// Fields at equal distances, one about the nominal camera where the orbit holds it, such that
+/// every pose of `range` about the nominal pose of `frame`, seen by the camera at any angle of the
+/// orbit, is held by one of them. A turn about z, the outer- most rotation of a pose, adds to its
+/// rz and changes no other angle: members then tile the sum of both, and a member is no wider about
+/// z than its step. About x and y a member holds the whole range at every angle that is nearest to
+/// it. Shifts are those of the room: a member holds the box turned. InputError when there would be
+/// more than kMaxOrbitMembers, or angles are not finite and ascending. \test
+/// Orbit.EveryPoseAtEveryAngleIsInAMembersRange
+std::vector<OrbitMember> orbit_members(const CameraGeometry& nominal,
+                                       const Eigen::Vector3d& isocenter_point,
+                                       const PoseFrame& frame,
+                                       const MotionRange& range,
+                                       const Orbit& orbit);
+
+/// "axis z, -90 to 90 deg".
+std::string text_of(const Orbit& orbit);
+
+}  // namespace af

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluate/population/measure_population.h"
+
+#include <iostream>
+#include <utility>
+
+#include <CLI/CLI.hpp>
+
+#include "cli/bind_options.h"
+#include "evaluate/population/population_figures.h"
+#include "evaluate/population/population_runs.h"
+#include "evaluate/population/population_tables.h"
+#include "figures/gnuplot_figure.h"
+#include "files/output_file.h"
+
+namespace af::evaluation {
+
+namespace {
+
+void write_population(const PopulationOptions& options, const PopulationReader& reader) {
+  std::vector<PopulationGroup> groups;
+  for (const PopulationCondition& condition : reader.conditions())
+    for (PopulationGroup& group : groups_of(condition, reader.counting()))
+      groups.push_back(std::move(group));
+  const std::string text = population_text(groups, reader.counting());
+  std::filesystem::create_directories(options.output);
+  write_text_file(options.output / "population.csv", population_table(groups).to_text());
+  write_text_file(options.output / "patients.csv", patients_table(groups).to_text());
+  write_text_file(options.output / "intervals.csv", intervals_table(groups).to_text());
+  draw_population_success(groups, reader.counting(), options.output / "success");
+  draw_capture_ranges(groups, reader.counting(), options.output / "capture-range");
+  write_text_file(options.output / "population.md", text);
+  std::cout << text << "results: " << options.output.string() << '\n';
+}
+
+}  // namespace
+
+void PopulationOptions::describe(Fields& field) {
+  field("condition",
+        conditions,
+        "NAME=FOLDER: finished registration runs of one condition, of any number of patients, "
+        "searched with all below the folder. NAME is VARIANT-VIEWS-PRESET for the figures. May be "
+        "repeated")
+      .required()
+      .one_at_a_time();
+  field("seed", seed, "Seed of the bootstrap");
+  field("output", output, "Folder for tables and figures").as("-o,--output");
+}
+
+CLI::App* bind_population(CLI::App& app, PopulationOptions& options) {
+  CLI::App* command = app.add_subcommand(
+      "population",
+      "Success and capture range of many patients, with intervals over patients (bootstrap and "
+      "Student's), for all, for those of odd and of even numbers, and for every kind. A case "
+      "named PATIENT-pN is a true pose of that patient");
+  cli::bind_options(*command, options);
+  return command;
+}
+
+void run_population(const PopulationOptions& options, const Communicator& world) {
+  all_or_none(world, [&] {
+    if (!world.is_root()) return;
+    require_gnuplot();
+    PopulationReader reader(options.seed);
+    for (const std::string& condition : options.conditions) reader.read(condition);
+    write_population(options, reader);
+  });
+}
+
+}  // namespace af::evaluation

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+// The patients of finished registration runs.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "evaluate/population/population_statistics.h"
+#include "evaluate/report/evaluation_run.h"
+
+namespace af::evaluation {
+
+/// The patients of one condition (clean or stressed, views, preset) by one renderer.
+struct PopulationCondition {
+  std::string name;
+  std::vector<PatientOutcomes> patients;
+};
+
+/// Collects the conditions of a study of many patients.
+class PopulationReader {
+ public:
+  /// \param seed of the bootstrap, which counting() hands on
+  explicit PopulationReader(std::uint64_t seed) : seed_(seed) {}
+
+  /// Adds NAME=FOLDER: all registration runs below the folder, one condition per renderer.
+  /// InputError when the text has another form, when nothing is found, or when a run counts in
+  /// other intervals or by another threshold than those before it; FileError for a broken run.
+  void read(const std::string& condition);
+
+  [[nodiscard]] const std::vector<PopulationCondition>& conditions() const { return conditions_; }
+  /// How all runs count. Only after read().
+  [[nodiscard]] const PopulationCounting& counting() const { return *counting_; }
+
+ private:
+  void check_counting(const EvaluationRun& run);
+
+  std::uint64_t seed_;
+  std::optional<PopulationCounting> counting_;
+  std::vector<PopulationCondition> conditions_;
+};
+
+}  // namespace af::evaluation

@@ -1,0 +1,278 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluate/population/population_tables.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <utility>
+
+#include "base/number_text.h"
+#include "base/sample_summary.h"
+
+namespace af::evaluation {
+
+namespace {
+
+PopulationGroup group_of(const PopulationCondition& condition,
+                         const std::string& name,
+                         const std::vector<const PatientOutcomes*>& patients,
+                         const PopulationCounting& counting) {
+  PopulationGroup group{condition.name,
+                        name,
+                        population_success(patients, CountedEnd::Tre, counting),
+                        population_success(patients, CountedEnd::Mrpd, counting)};
+  std::vector<double> tre_mm;
+  std::vector<double> seconds;
+  for (const PatientOutcomes* patient : patients) {
+    for (const TreOutcome& outcome : patient->by_tre)
+      if (outcome.tre_mm < counting.success_mm) tre_mm.push_back(outcome.tre_mm);
+    for (const double value : patient->seconds)
+      if (std::isfinite(value)) seconds.push_back(value);
+  }
+  group.median_tre_mm = summarize(tre_mm).median;
+  group.median_seconds = summarize(seconds).median;
+  return group;
+}
+
+std::vector<std::string> success_columns(const std::string& error) {
+  std::vector<std::string> names;
+  for (const char* const what : {"_successes",
+                                 "_rate",
+                                 "_student_low",
+                                 "_student_high",
+                                 "_bootstrap_low",
+                                 "_bootstrap_high",
+                                 "_worst_patient_rate",
+                                 "_capture_mm",
+                                 "_capture_bootstrap_low_mm",
+                                 "_capture_bootstrap_high_mm",
+                                 "_patients_capture_mean_mm",
+                                 "_patients_capture_student_low_mm",
+                                 "_patients_capture_student_high_mm",
+                                 "_patients_capture_bootstrap_low_mm",
+                                 "_patients_capture_bootstrap_high_mm",
+                                 "_patients_capture_smallest_mm"})
+    names.push_back(error + what);
+  return names;
+}
+
+void add_success_fields(const PopulationSuccess& success, std::vector<std::string>& fields) {
+  double worst = 1.0;
+  double smallest_mm = std::numeric_limits<double>::infinity();
+  for (const PatientSuccess& patient : success.patients) {
+    worst = std::min(worst,
+                     static_cast<double>(patient.successes) / static_cast<double>(patient.starts));
+    smallest_mm = std::min(smallest_mm, patient.capture.initial_tre_mm);
+  }
+  fields.push_back(std::to_string(success.successes));
+  for (const double value : {success.rate.value,
+                             success.rate.student.low,
+                             success.rate.student.high,
+                             success.rate.bootstrap.low,
+                             success.rate.bootstrap.high,
+                             worst,
+                             success.pooled.initial_tre_mm,
+                             success.pooled_interval_mm.low,
+                             success.pooled_interval_mm.high,
+                             success.capture_mm.value,
+                             success.capture_mm.student.low,
+                             success.capture_mm.student.high,
+                             success.capture_mm.bootstrap.low,
+                             success.capture_mm.bootstrap.high,
+                             smallest_mm})
+    fields.push_back(number_text(value));
+}
+
+std::string percent(double share) {
+  return std::isfinite(share) ? fixed_text(100.0 * share, 1) : "-";
+}
+
+std::string millimetre_text(double value) {
+  return std::isfinite(value) ? fixed_text(value, 1) : "-";
+}
+
+std::string success_cells(const PopulationSuccess& success) {
+  return percent(success.rate.value) + " | " + percent(success.rate.bootstrap.low) + " to " +
+         percent(success.rate.bootstrap.high) + " | " + percent(success.rate.student.low) + " to " +
+         percent(success.rate.student.high) + " | " +
+         (success.pooled.is_whole_study() ? ">= " : "") +
+         millimetre_text(success.pooled.initial_tre_mm) + " | " +
+         millimetre_text(success.capture_mm.value) + " (" +
+         millimetre_text(success.capture_mm.bootstrap.low) + " to " +
+         millimetre_text(success.capture_mm.bootstrap.high) + ")";
+}
+
+bool is_kind(const PopulationGroup& group) {
+  return group.group != "all" && group.group != "odd" && group.group != "even" &&
+         group.group != "real";
+}
+
+/// All patients, and the halves.
+std::string population_markdown(const std::vector<PopulationGroup>& groups, bool by_mrpd) {
+  std::string text =
+      "| Condition | Group | Patients | Starts | Success, % | Bootstrap | Student's | "
+      "Capture range of all, mm | Patients' own, mean, mm | Median TRE, mm | Seconds |\n"
+      "|---|---|---|---|---|---|---|---|---|---|---|\n";
+  for (const PopulationGroup& group : groups)
+    if (!is_kind(group))
+      text += "| " + group.condition + " | " + group.group + " | " +
+              std::to_string(group.by_tre.patients.size()) + " | " +
+              std::to_string(group.by_tre.starts) + " | " +
+              success_cells(by_mrpd ? group.by_mrpd : group.by_tre) + " | " +
+              (std::isfinite(group.median_tre_mm) ? fixed_text(group.median_tre_mm, 2) : "-") +
+              " | " + fixed_text(group.median_seconds, 3) + " |\n";
+  return text;
+}
+
+/// A column per kind of patient: success and capture range of all its starts, by TRE and by mRPD.
+std::string kinds_markdown(const std::vector<PopulationGroup>& groups) {
+  std::vector<std::string> kinds;
+  std::vector<std::string> conditions;
+  std::map<std::pair<std::string, std::string>, std::string> cells;
+  const auto add_new = [](std::vector<std::string>& names, const std::string& name) {
+    if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+  };
+  for (const PopulationGroup& group : groups) {
+    add_new(conditions, group.condition);
+    if (!is_kind(group) && group.group != "real") continue;
+    add_new(kinds, group.group);
+    cells[{group.condition, group.group}] =
+        percent(group.by_tre.rate.value) + " / " + percent(group.by_mrpd.rate.value) + ", " +
+        millimetre_text(group.by_tre.pooled.initial_tre_mm) + " / " +
+        millimetre_text(group.by_mrpd.pooled.initial_tre_mm);
+  }
+  std::string text = "| Condition |";
+  std::string line = "|---|";
+  for (const std::string& kind : kinds) {
+    text += " " + kind + " |";
+    line += "---|";
+  }
+  text += "\n" + line + "\n";
+  for (const std::string& condition : conditions) {
+    text += "| " + condition + " |";
+    for (const std::string& kind : kinds) {
+      const auto cell = cells.find({condition, kind});
+      text += " " + (cell == cells.end() ? std::string("-") : cell->second) + " |";
+    }
+    text += "\n";
+  }
+  return text;
+}
+
+}  // namespace
+
+/// All patients, the two halves, and the kinds.
+std::vector<PopulationGroup> groups_of(const PopulationCondition& condition,
+                                       const PopulationCounting& counting) {
+  std::vector<std::string> names{"all"};
+  std::map<std::string, std::vector<const PatientOutcomes*>> members;
+  const auto add = [&](const std::string& name, const PatientOutcomes& patient) {
+    std::vector<const PatientOutcomes*>& list = members[name];
+    if (list.empty() && name != "all") names.push_back(name);
+    list.push_back(&patient);
+  };
+  for (const PatientOutcomes& patient : condition.patients) add("all", patient);
+  for (const PatientOutcomes& patient : condition.patients) add(half_of(patient), patient);
+  for (const PatientOutcomes& patient : condition.patients)
+    if (patient.number() > 0) add(patient.kind(), patient);
+  std::vector<PopulationGroup> groups;
+  for (const std::string& name : names)
+    groups.push_back(group_of(condition, name, members[name], counting));
+  return groups;
+}
+
+CsvTable population_table(const std::vector<PopulationGroup>& groups) {
+  std::vector<std::string> columns{
+      "condition", "group", "patients", "starts", "median_tre_mm", "median_seconds"};
+  for (const char* const error : {"tre", "mrpd"})
+    for (const std::string& name : success_columns(error)) columns.push_back(name);
+  CsvTable table(columns);
+  for (const PopulationGroup& group : groups) {
+    std::vector<std::string> fields{group.condition,
+                                    group.group,
+                                    std::to_string(group.by_tre.patients.size()),
+                                    std::to_string(group.by_tre.starts),
+                                    number_text(group.median_tre_mm),
+                                    number_text(group.median_seconds)};
+    add_success_fields(group.by_tre, fields);
+    add_success_fields(group.by_mrpd, fields);
+    table.add_row(std::move(fields));
+  }
+  return table;
+}
+
+CsvTable patients_table(const std::vector<PopulationGroup>& groups) {
+  CsvTable table({"condition",
+                  "patient",
+                  "starts",
+                  "tre_successes",
+                  "wilson_low",
+                  "wilson_high",
+                  "capture_mm",
+                  "capture_low_mm",
+                  "capture_high_mm",
+                  "capture_ended_by",
+                  "mrpd_successes",
+                  "mrpd_capture_mm"});
+  for (const PopulationGroup& group : groups) {
+    if (group.group != "all") continue;
+    for (std::size_t i = 0; i < group.by_tre.patients.size(); ++i) {
+      const PatientSuccess& tre = group.by_tre.patients[i];
+      const PatientSuccess& mrpd = group.by_mrpd.patients[i];
+      table.add_row({group.condition,
+                     tre.patient,
+                     std::to_string(tre.starts),
+                     std::to_string(tre.successes),
+                     number_text(tre.wilson.low),
+                     number_text(tre.wilson.high),
+                     number_text(tre.capture.initial_tre_mm),
+                     number_text(tre.capture_interval_mm.low),
+                     number_text(tre.capture_interval_mm.high),
+                     to_string(tre.capture.end),
+                     std::to_string(mrpd.successes),
+                     number_text(mrpd.capture.initial_tre_mm)});
+    }
+  }
+  return table;
+}
+
+CsvTable intervals_table(const std::vector<PopulationGroup>& groups) {
+  CsvTable table({"condition",
+                  "error",
+                  "low_mm",
+                  "high_mm",
+                  "starts",
+                  "successes",
+                  "bootstrap_low",
+                  "bootstrap_high"});
+  for (const PopulationGroup& group : groups) {
+    if (group.group != "all") continue;
+    for (const bool is_tre : {true, false}) {
+      const PopulationSuccess& success = is_tre ? group.by_tre : group.by_mrpd;
+      for (std::size_t k = 0; k < success.intervals.size(); ++k)
+        table.add_row({group.condition,
+                       is_tre ? "tre" : "mrpd",
+                       number_text(success.intervals[k].low_mm),
+                       number_text(success.intervals[k].high_mm),
+                       std::to_string(success.intervals[k].trials),
+                       std::to_string(success.intervals[k].successes),
+                       number_text(success.interval_bootstraps[k].low),
+                       number_text(success.interval_bootstraps[k].high)});
+    }
+  }
+  return table;
+}
+
+std::string population_text(const std::vector<PopulationGroup>& groups,
+                            const PopulationCounting& counting) {
+  return "By TRE below " + number_text(counting.success_mm) + " mm:\n\n" +
+         population_markdown(groups, false) +
+         "\nBy mRPD below the same, which is the one to read with one view:\n\n" +
+         population_markdown(groups, true) +
+         "\nKinds of patients: success, % (TRE / mRPD), capture range of all starts, mm (TRE / "
+         "mRPD):\n\n" +
+         kinds_markdown(groups);
+}
+
+}  // namespace af::evaluation

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+#include "precompute/casting/field_caster.h"
+
+namespace af {
+
+/// Which of several fields, whose slabs are counted through, a slab belongs to.
+struct SlabPlace {
+  std::size_t field = 0;
+  std::size_t slab = 0;  ///< of that field
+};
+
+/// Of every slab, in order. `slab_counts`: of each field.
+std::vector<SlabPlace> slab_places(const std::vector<std::size_t>& slab_counts);
+
+/// Casts units of several fields as of one that has the slabs of all, those of the first first.
+class JoinedCaster final : public FieldCaster {
+ public:
+  /// One caster per field.
+  JoinedCaster(std::vector<std::unique_ptr<const FieldCaster>> casters,
+               const std::vector<std::size_t>& slab_counts);
+
+  void cast(const WorkUnit& unit, std::span<std::uint16_t> samples) const override;
+
+ private:
+  std::vector<std::unique_ptr<const FieldCaster>> casters_;
+  std::vector<SlabPlace> places_;
+};
+
+}  // namespace af

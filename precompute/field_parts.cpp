@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "precompute/field_parts.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "base/error.h"
+#include "base/stored_bytes.h"
+#include "geometry/orbit.h"
+#include "precompute/casting/casters.h"
+#include "precompute/casting/joined_caster.h"
+#include "precompute/casting/unit_costs.h"
+#include "precompute/plan/orbit_text.h"
+#include "study/rig_file.h"
+#include "study/shared_inputs.h"
+
+namespace af {
+
+namespace {
+
+/// What tells a part from the others, as rank 0 derived it: trigonometry may differ in its last bit
+/// between processors.
+struct PartKey {
+  CameraGeometry camera;
+  MotionRange range;
+  auto members() {
+    return std::tie(camera.name,
+                    camera.source_point,
+                    camera.detector_origin_point,
+                    camera.column_direction,
+                    camera.row_direction,
+                    range.low,
+                    range.high);
+  }
+};
+
+std::vector<PartKey> keys_of_orbit(const FieldSource& source, const PrecomputeOptions& options) {
+  std::vector<PartKey> keys;
+  for (OrbitMember& member : orbit_members(source.camera,
+                                           source.isocenter_point,
+                                           source.frame,
+                                           source.range,
+                                           orbit_of_text("--orbit", options.orbit)))
+    keys.push_back({std::move(member.camera), member.range});
+  return keys;
+}
+
+/// The camera, and those of the rig that bear other names.
+std::vector<CameraGeometry> listed_cameras(const FieldSource& source,
+                                           const std::string& path,
+                                           const CameraRig& rig) {
+  std::vector<CameraGeometry> cameras = {source.camera};
+  for (const CameraGeometry& camera : rig.cameras)
+    if (camera.name != source.camera.name) cameras.push_back(camera);
+  if (cameras.size() > static_cast<std::size_t>(kMaxOrbitMembers))
+    throw InputError("--orbit-cameras",
+                     std::to_string(cameras.size()) + " cameras",
+                     "at most " + std::to_string(kMaxOrbitMembers) + " fields stand in a file",
+                     path);
+  return cameras;
+}
+
+std::vector<FieldPart> parts_of_orbit(const FieldSource& source,
+                                      const PrecomputeOptions& options,
+                                      const Communicator& communicator) {
+  std::vector<PartKey> keys =
+      all_or_none(communicator, [&] { return keys_of_orbit(source, options); });
+  std::vector<std::byte> bytes = bytes_of(keys);
+  communicator.broadcast(bytes);
+  keys = value_of<std::vector<PartKey>>(bytes, "the orbit of rank 0");
+  std::vector<FieldPart> parts;
+  for (PartKey& key : keys) {
+    FieldPart part{source, {}, {}};
+    key.camera.pixel_spacing_mm = source.camera.pixel_spacing_mm;
+    key.camera.size_px = source.camera.size_px;
+    part.source.camera = key.camera;
+    part.source.range = key.range;
+    parts.push_back(std::move(part));
+  }
+  return parts;
+}
+
+std::vector<std::size_t> slab_counts(const std::vector<FieldPart>& parts) {
+  std::vector<std::size_t> counts;
+  for (const FieldPart& part : parts) counts.push_back(part.light_slab.slabs.size());
+  return counts;
+}
+
+}  // namespace
+
+std::vector<FieldPart> field_parts(const FieldSource& source,
+                                   const PrecomputeOptions& options,
+                                   const Communicator& communicator) {
+  if (!options.orbit.empty()) return parts_of_orbit(source, options, communicator);
+  if (options.orbit_cameras.empty()) return {FieldPart{source, {}, {}}};
+  const CameraRig rig = shared_rig(options.orbit_cameras, communicator);
+  std::vector<FieldPart> parts;
+  for (const CameraGeometry& camera : all_or_none(
+           communicator, [&] { return listed_cameras(source, options.orbit_cameras, rig); })) {
+    parts.push_back({source, {}, {}});
+    parts.back().source.camera = camera;
+  }
+  return parts;
+}
+
+FieldLattice lattice_of(const std::vector<FieldPart>& parts) {
+  FieldLattice all;
+  for (const FieldPart& part : parts)
+    for (const SlabLattice& slab : part.light_slab.lattice().slabs) all.slabs.push_back(slab);
+  return all;
+}
+
+std::unique_ptr<const FieldCaster> make_caster(const std::vector<FieldPart>& parts,
+                                               const PrecomputeOptions& options,
+                                               const AttenuationQuantizer& quantizer) {
+  std::vector<std::unique_ptr<const FieldCaster>> casters;
+  for (const FieldPart& part : parts)
+    casters.push_back(caster_named(options.caster)
+                          .make({*part.source.volume,
+                                 part.resampled.get(),
+                                 part.light_slab,
+                                 quantizer,
+                                 options.ray_caster}));
+  if (casters.size() == 1) return std::move(casters.front());
+  return std::make_unique<const JoinedCaster>(std::move(casters), slab_counts(parts));
+}
+
+std::vector<double> unit_costs(const std::vector<WorkUnit>& units,
+                               const std::vector<FieldPart>& parts) {
+  const std::vector<SlabPlace> places = slab_places(slab_counts(parts));
+  std::vector<double> costs;
+  costs.reserve(units.size());
+  // The units of a part stand together, as its slabs do.
+  for (std::size_t first = 0; first < units.size();) {
+    const std::size_t of = places.at(units[first].slab).field;
+    std::vector<WorkUnit> of_part;
+    for (; first < units.size() && places.at(units[first].slab).field == of; ++first) {
+      of_part.push_back(units[first]);
+      of_part.back().slab = places[units[first].slab].slab;
+    }
+    const FieldPart& part = parts[of];
+    const std::vector<double> its_costs =
+        unit_costs(of_part, part.light_slab, part.source.volume->corner_points());
+    costs.insert(costs.end(), its_costs.begin(), its_costs.end());
+  }
+  return costs;
+}
+
+std::string parts_text(const std::vector<FieldPart>& parts) {
+  std::string names;
+  for (const FieldPart& part : parts)
+    names += (names.empty() ? "" : ", ") + part.source.camera.name;
+  return "  atlas              " + std::to_string(parts.size()) + " fields: " + names +
+         "; each for " + parts.front().source.range.text() + "\n";
+}
+
+}  // namespace af

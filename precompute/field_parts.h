@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+// What af-precompute makes, as a list: one field, or the members of an atlas.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "geometry/field_lattice.h"
+#include "geometry/light_slab.h"
+#include "parallel/communicator.h"
+#include "precompute/casting/field_caster.h"
+#include "precompute/casting/slab_aligned_volume.h"
+#include "precompute/field_source.h"
+#include "precompute/units/work_unit.h"
+
+namespace af {
+
+/// One field to make.
+struct FieldPart {
+  FieldSource source;  ///< with its own camera and range
+  LightSlab light_slab;
+  std::shared_ptr<const SlabAlignedVolume> resampled;  ///< for casters that need it
+};
+
+/// Collective. The field of the options, or the members of their atlas; without planes. The same on
+/// every rank. InputError when the orbit or the list of cameras makes no atlas.
+std::vector<FieldPart> field_parts(const FieldSource& source,
+                                   const PrecomputeOptions& options,
+                                   const Communicator& communicator);
+
+/// The slabs of all parts, those of the first part first.
+FieldLattice lattice_of(const std::vector<FieldPart>& parts);
+
+/// A caster of all slabs. The parts must outlive it.
+std::unique_ptr<const FieldCaster> make_caster(const std::vector<FieldPart>& parts,
+                                               const PrecomputeOptions& options,
+                                               const AttenuationQuantizer& quantizer);
+
+/// The relative costs of casting units of all slabs.
+std::vector<double> unit_costs(const std::vector<WorkUnit>& units,
+                               const std::vector<FieldPart>& parts);
+
+/// What a dry run says of the members of an atlas.
+std::string parts_text(const std::vector<FieldPart>& parts);
+
+}  // namespace af

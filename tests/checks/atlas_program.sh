@@ -1,0 +1,112 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# Makes and uses atlases as a person would: exit codes, dry run, the same payload on 1 to 4 ranks and after kills, and what
+# af-inspect and af-drr make of one.
+#
+#   atlas_program.sh FOLDER_OF_PROGRAMS MPIEXEC
+set -euo pipefail
+# shellcheck source=tests/checks/body_ct.sh
+. "$(dirname "$0")/body_ct.sh"
+
+programs=$1
+mpiexec=$2
+program=$programs/af-precompute
+export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMPI_MCA_hwloc_base_binding_policy=none
+scratch=$(mktemp -d)
+trap 'rm -rf "$scratch"' EXIT
+cd "$scratch"
+make_ct >ct.mha
+
+fail() {
+  echo "FAILED: $*" >&2
+  exit 1
+}
+hash_of() { sed -n 's/.*sha256 //p' "$1"; }
+
+common=(--ct ct.mha --rig c-arm-12in --camera AP --max-rotation-deg 10 --max-translation-mm 10 --slabs 2 --uv-nodes 7)
+common+=(--st-nodes 61 --codewords 200 --index-packing codebook-tree)
+orbit=("${common[@]}" --orbit 'axis=z,from=-40,to=20')
+
+# refuse CODE PATTERN OPTION...: with the common options.
+refuse() {
+  local code=$1 pattern=$2 found=0
+  shift 2
+  "$program" "${common[@]}" "$@" -o refused.h5 >out 2>err || found=$?
+  [[ $found == "$code" ]] || fail "$* gave $found instead of $code: $(cat err)"
+  grep -q -- "$pattern" err || fail "$* did not say '$pattern': $(cat err)"
+  [[ -z $(find . -name 'refused.h5*') ]] || fail "$* left $(find . -name 'refused.h5*')"
+}
+refuse 2 'the axis is x, y or z' --orbit axis=q,from=0,to=10
+refuse 2 "'to' is missing" --orbit axis=z,from=0
+refuse 2 "'to' is below 'from'" --orbit axis=z,from=10,to=0
+refuse 2 'excludes' --orbit axis=z,from=0,to=10 --orbit-cameras c-arm-12in
+refuse 3 'at most 64' --orbit axis=z,from=-90,to=90,step=1
+refuse 4 'missing.toml' --orbit-cameras missing.toml
+
+"$program" "${orbit[@]}" --dry-run >dry.txt
+grep -q '4 fields: AP_z-40, AP_z-20, AP_z0, AP_z20; each' dry.txt || fail "the dry run does not name the fields: $(cat dry.txt)"
+
+# The same payload on any number of ranks, for either caster.
+for caster in shear-warp trilinear; do
+  "$program" "${orbit[@]}" --caster "$caster" -o one.h5 >one.txt 2>one.err || fail "one rank: $(cat one.err)"
+  expected=$(hash_of one.txt)
+  [[ ${#expected} == 64 ]] || fail "no payload hash: $(cat one.txt)"
+  for ranks in 2 3 4; do
+    "$mpiexec" -n "$ranks" --oversubscribe "$program" "${orbit[@]}" --caster "$caster" -o ranks.h5 >ranks.txt 2>ranks.err ||
+      fail "$ranks ranks: $(cat ranks.err)"
+    [[ $(hash_of ranks.txt) == "$expected" ]] || fail "another payload on $ranks ranks with $caster"
+  done
+done
+
+# Killed while it casts, and run again on another number of ranks; another orbit in between is refused.
+slow=("${orbit[@]}" --caster trilinear --step-mm 0.02)
+"$mpiexec" -n 2 --oversubscribe "$program" "${slow[@]}" -o slow.h5 >slow.txt 2>slow.err &
+job=$!
+for ((i = 0; i < 600; ++i)); do
+  [[ -n $(find . -path './slow.h5.progress/*.records' -size +0) ]] && break
+  sleep 0.05
+done
+kill -KILL "$job" 2>/dev/null || fail "it ended before it could be killed: $(cat slow.err)"
+wait "$job" 2>/dev/null || true
+[[ ! -e slow.h5 ]] || fail 'an unfinished atlas has its name'
+for ((i = 0; i < 100; ++i)); do
+  code=0
+  "$program" "${common[@]}" --caster trilinear --step-mm 0.02 --orbit axis=z,from=-40,to=21 -o slow.h5 >out 2>err || code=$?
+  # The ranks of a killed launcher hold the folder until they notice.
+  [[ $code == 3 ]] && grep -q 'orbit' err && break
+  sleep 0.2
+done
+[[ $code == 3 ]] || fail "another orbit: $code $(cat err)"
+grep -q 'orbit = .*the unfinished work was begun with' err || fail "another orbit: $(cat err)"
+"$program" "${slow[@]}" -o slow.h5 >slow.txt 2>slow.err || fail "resumed: $(cat slow.err)"
+grep -q 'resumed' slow.err || fail "nothing was resumed: $(cat slow.err)"
+"$program" "${slow[@]}" -o whole.h5 --no-checkpoint >whole.txt 2>/dev/null
+[[ $(hash_of slow.txt) == "$(hash_of whole.txt)" ]] || fail 'the resumed atlas differs'
+
+# What it is, and what it covers.
+"$programs/af-inspect" one.h5 >inspect.txt || fail 'af-inspect refuses an atlas'
+for word in 'one.h5: atlas' 'AP_z-40' "covers 100 % of camera AP's rays within 10"; do
+  grep -q -- "$word" inspect.txt || fail "af-inspect says nothing of '$word': $(cat inspect.txt)"
+done
+
+# DRRs at poses that no single field of this range holds: a camera at -40 degrees sees what a CT turned by 40 shows.
+drr=("$programs/af-drr" --field one.h5)
+for angle in 40 12 0 -20; do
+  "${drr[@]}" --rotation-deg "0,0,$angle" -o "at$angle.mha" >/dev/null || fail "af-drr at $angle degrees"
+done
+code=0
+"${drr[@]}" --rotation-deg 0,0,65 -o outside.mha >out 2>err || code=$?
+[[ $code == 3 ]] || fail "a pose beyond the orbit: $code $(cat err)"
+grep -q 'outside the field' err || fail "a pose beyond the orbit: $(cat err)"
+
+# An atlas of one camera is the field of that camera, and a list of cameras holds each.
+"$program" "${common[@]}" -o field.h5 >field.txt 2>/dev/null
+"$program" "${common[@]}" --orbit-cameras c-arm-12in -o both.h5 >both.txt 2>both.err || fail "a list: $(cat both.err)"
+"$programs/af-drr" --field both.h5 --rig c-arm-12in --camera LAT -o lateral.mha >/dev/null || fail 'the second camera of a list'
+"$programs/af-inspect" --template rig | sed '/^\[\[camera/,$ { /"LAT"/,$ d }' | sed '$ d' >one.toml
+"$program" "${common[@]}" --orbit-cameras one.toml -o single.h5 >single.txt 2>single.err || fail "one camera: $(cat single.err)"
+for file in field single; do
+  "$programs/af-drr" --field "$file.h5" --rotation-deg 3,-4,5 --translation-mm 1,2,3 -o "$file.mha" >/dev/null
+done
+cmp field.mha single.mha || fail 'an atlas of one camera gives other DRRs than its field'
+echo 'atlases: exit codes, dry run, resume, payload, coverage and DRRs are as promised'
