@@ -272,22 +272,28 @@ double level_blur_sigma_in_nodes(int level, bool with_resampling) {
   return std::sqrt((std::pow(4.0, level) - 1.0) * variance_per_step);
 }
 
+double node_spacing_mm(const LightSlab& light_slab) {
+  double sum_mm = 0.0;
+  for (const SlabGeometry& slab : light_slab.slabs) {
+    const double scale = light_slab.uv_plane_y_mm / (light_slab.uv_plane_y_mm - slab.st_plane_y_mm);
+    sum_mm += scale * 0.5 * (slab.s.spacing_mm() + slab.t.spacing_mm());
+  }
+  return sum_mm / static_cast<double>(light_slab.slabs.size());
+}
+
 int halvings_to_usual_nodes(const LightSlab& light_slab) {
   int nodes = 0;
   for (const SlabGeometry& slab : light_slab.slabs)
     nodes = std::max({nodes, slab.s.nodes, slab.t.nodes});
   constexpr double kUsualNodes = 256.0;
-  return std::max(0, static_cast<int>(std::lround(std::log2(nodes / kUsualNodes))));
+  constexpr double kUsualSpacingMm = 1.1;
+  const double halvings = std::min(std::log2(nodes / kUsualNodes),
+                                   std::log2(kUsualSpacingMm / node_spacing_mm(light_slab)));
+  return std::max(0, static_cast<int>(std::lround(halvings)));
 }
 
 double FieldLevel::blur_sigma_mm(bool with_resampling) const {
-  const double sigma_in_nodes = level_blur_sigma_in_nodes(level, with_resampling);
-  double node_mm = 0.0;
-  for (const SlabGeometry& slab : coverage.slabs) {
-    const double scale = coverage.uv_plane_y_mm / (coverage.uv_plane_y_mm - slab.st_plane_y_mm);
-    node_mm += scale * 0.5 * (slab.s.spacing_mm() + slab.t.spacing_mm());
-  }
-  return sigma_in_nodes * node_mm / static_cast<double>(coverage.slabs.size());
+  return level_blur_sigma_in_nodes(level, with_resampling) * node_spacing_mm(coverage);
 }
 
 FieldLevelMemory process_memory(int threads) {

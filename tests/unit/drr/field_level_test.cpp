@@ -167,6 +167,33 @@ TEST(FieldLevel, BlurSigmaIsThatOfAnImpulse) {
   EXPECT_GT(level.blur_sigma_mm(true), level.blur_sigma_mm());
 }
 
+/// A field's geometry of two slabs of `nodes` x `nodes` over `side_mm` at the plane through the
+/// centre.
+LightSlab square_slabs(int nodes, double side_mm) {
+  LightSlab light_slab;
+  light_slab.uv_plane_y_mm = 2600.0;
+  for (const double y_mm : {-50.0, 50.0}) {
+    SlabGeometry slab;
+    slab.st_plane_y_mm = y_mm;
+    const double half_mm =
+        0.5 * side_mm * (light_slab.uv_plane_y_mm - y_mm) / light_slab.uv_plane_y_mm;
+    slab.s = slab.t = {-half_mm, half_mm, nodes};
+    light_slab.slabs.push_back(slab);
+  }
+  return light_slab;
+}
+
+TEST(FieldLevel, BeginsWithMoreHalvingsOfFinerNodesNotOfAWiderRange) {
+  // 10 degrees and 30 mm: 281 mm; 20 degrees and 40 mm: 410 mm.
+  EXPECT_NEAR(node_spacing_mm(square_slabs(256, 281.0)), 281.0 / 255.0, 1e-9);
+  EXPECT_EQ(halvings_to_usual_nodes(square_slabs(256, 281.0)), 0);
+  EXPECT_EQ(halvings_to_usual_nodes(square_slabs(384, 281.0)), 1);
+  EXPECT_EQ(halvings_to_usual_nodes(square_slabs(384, 410.0)), 0);
+  EXPECT_EQ(halvings_to_usual_nodes(square_slabs(768, 410.0)), 1);
+  // Nor do small objects, whose nodes stand close, begin with more halvings.
+  EXPECT_EQ(halvings_to_usual_nodes(square_slabs(256, 60.0)), 0);
+}
+
 TEST(FieldLevel, SamplesDoNotDependOnPartsOrVectorWidth) {
   const auto field = cropped_noise(16, {4, 8}, {2, 12});
   const auto expected = make_field_pyramid(*field, 2);
