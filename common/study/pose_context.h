@@ -22,6 +22,6 @@ PoseContext pose_context(const std::filesystem::path& ct,
 /// the cameras of its views, its nominal pose. InputError as of ct_reading_in_force().
 PoseContext pose_context(const Study& study,
                          const StudyCase& study_case,
-                         const CtReadOptions& typed = {});
+                         const CtReadOptions& typed);
 
 }  // namespace af

@@ -444,12 +444,13 @@ StartFrame start_frame(const StudyCase& study_case, const Yardstick& yardstick) 
 
 PoseTableFrames pose_table_frames(const Study& study,
                                   const StudyCase& study_case,
-                                  const RigidTransform& gold_room_from_ct) {
+                                  const RigidTransform& gold_room_from_ct,
+                                  const CtReadOptions& ct_reading) {
   return {study_case.name,
           study.cases.size() == 1,
           PoseFrame::about(gold_room_from_ct, study_case.center_ct_mm),
           PoseFrame::about(study_case.nominal_room_from_ct, study_case.center_ct_mm),
-          pose_context(study, study_case)};
+          pose_context(study, study_case, ct_reading)};
 }
 
 StratifiedStarts given_starts(const RegistrationStudyOptions& options,
@@ -458,10 +459,11 @@ StratifiedStarts given_starts(const RegistrationStudyOptions& options,
                               const Yardstick& yardstick,
                               StartMeasures& measures,
                               std::vector<std::string>& notes) {
-  return starts_at(measures,
-                   read_starts(options.starts_from,
-                               pose_table_frames(study, study_case, yardstick.gold_room_from_ct),
-                               notes));
+  return starts_at(
+      measures,
+      read_starts(options.starts_from,
+                  pose_table_frames(study, study_case, yardstick.gold_room_from_ct, options.ct),
+                  notes));
 }
 
 void set_start(const PerturbedStart& start, RegistrationRow& row) {

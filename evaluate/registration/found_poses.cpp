@@ -58,7 +58,8 @@ CaseEvaluation evaluate_found_poses(const RegistrationStudyOptions& options,
       given_starts(options, study, study_case, yardstick, measures, evaluation.pose_problems);
   on_starts(evaluation);
   const FoundPoses found = read_found_poses(
-      options.poses_from, pose_table_frames(study, study_case, yardstick.gold_room_from_ct));
+      options.poses_from,
+      pose_table_frames(study, study_case, yardstick.gold_room_from_ct, options.ct));
   evaluation.pose_problems.insert(
       evaluation.pose_problems.end(), found.problems.begin(), found.problems.end());
   evaluation.start_count = evaluation.starts.starts.size();
