@@ -17,7 +17,7 @@ namespace {
 /// Members that hold a pose by so much less than the best are not looked up: narrow enough that few
 /// poses need two look-ups, wide enough that an optimiser's steps see a smooth change. In units of
 /// how_well_held().
-constexpr double kSeam = 0.2;
+constexpr double kSeam = 0.4;
 
 /// How well a field holds a view's rays: the sum over its axes of the logarithm of how far they
 /// keep from the edges. It falls without bound where rays leave a plane, and an axis along which

@@ -188,7 +188,7 @@ TEST_F(FieldSetDrrTest, HasNoJumpAtASeam) {
   const RayCastDrr reference(volume);
   const RigidTransform pose = pose_from_parameters({}, {});
   // Steps as an optimiser's last ones. A weight falls from 1 to 0 while the logarithms of how far
-  // rays keep from the edges come to differ by kSeam = 0.2; they differ by some 0.3 per degree. It
+  // rays keep from the edges come to differ by kSeam = 0.4; they differ by some 0.3 per degree. It
   // changes by far less than 0.2 per step, and so does the DRR, by that part of the difference of
   // two fields.
   constexpr double kStepDeg = 0.05;
