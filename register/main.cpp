@@ -55,7 +55,7 @@ void run(const RegisterOptions& options,
   std::vector<std::string> notes;
   const std::vector<af::RigidTransform> starts = af::shared_poses(world, [&] {
     if (landmarks.has_value()) return std::vector{landmarks->room_from_ct};
-    return start_poses(options, af::pose_context(study, study_case), notes);
+    return start_poses(options, af::pose_context(study, study_case, options.ct), notes);
   });
   for (const std::string& text : notes) af::warn(world, text);
   const auto gold = af::all_or_none(world, [&] { return known_gold(study, study_case); });

@@ -51,6 +51,16 @@ bool is_utf8(std::string_view text) {
   return true;
 }
 
+std::string beginning_of(std::string_view text, std::size_t most_bytes) {
+  if (text.size() <= most_bytes) return std::string(text);
+  constexpr std::size_t kMostBytesOfACharacter = 4;
+  for (std::size_t i = 1; i < kMostBytesOfACharacter && i <= most_bytes; ++i) {
+    const std::size_t start = most_bytes - i;
+    if (character_bytes(text.substr(start)) > i) return std::string(text.substr(0, start));
+  }
+  return std::string(text.substr(0, most_bytes));
+}
+
 std::string toml_text(std::string_view text) {
   std::string result = "\"";
   while (!text.empty()) {

@@ -2,12 +2,14 @@
 #include "camera_files/camera_file.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <fstream>
+#include <optional>
 
 #include "base/error.h"
 #include "base/number_text.h"
+#include "base/parsed_number.h"
+#include "base/toml_text.h"
 #include "files/input_file.h"
 #include "files/input_guard.h"
 #include "files/output_file.h"
@@ -38,13 +40,6 @@ std::vector<std::string_view> words_of(std::string_view line) {
     words.push_back(line.substr(begin, at - begin));
   }
   return words;
-}
-
-bool parse_number(std::string_view word, double& value) {
-  if (word.starts_with('+')) word.remove_prefix(1);
-  const char* const end = word.data() + word.size();
-  const auto [rest, error] = std::from_chars(word.data(), end, value);
-  return error == std::errc() && rest == end;
 }
 
 }  // namespace
@@ -86,16 +81,14 @@ std::vector<WordLine> word_lines(std::string_view text, char comment) {
 }
 
 bool is_number(std::string_view word) {
-  double value = 0.0;
-  return parse_number(word, value);
+  return parsed_number(word).has_value();
 }
 
 double number_of(std::string_view word, const std::string& place) {
-  double value = 0.0;
-  if (!parse_number(word, value))
-    throw FileError(place, "'" + std::string(word) + "' is no number");
-  if (!std::isfinite(value)) throw InputError(place, std::string(word), "must be finite");
-  return value;
+  const std::optional<double> value = parsed_number(word);
+  if (!value) throw FileError(place, "'" + std::string(word) + "' is no number");
+  if (!std::isfinite(*value)) throw InputError(place, std::string(word), "must be finite");
+  return *value;
 }
 
 Eigen::Vector2i size_of(const Eigen::Vector2d& numbers, const std::string& place) {
@@ -116,7 +109,7 @@ Eigen::VectorXd numbers_of(const WordLine& line, Eigen::Index count, const std::
   if (line.words.size() != static_cast<std::size_t>(count))
     throw FileError(place,
                     "expected " + std::to_string(count) + " numbers, found '" +
-                        std::string(line.text.substr(0, 100)) + "'");
+                        beginning_of(line.text, 100) + "'");
   Eigen::VectorXd numbers(count);
   for (Eigen::Index i = 0; i < count; ++i)
     numbers[i] = number_of(line.words[static_cast<std::size_t>(i)], place);

@@ -109,6 +109,14 @@ constexpr std::array kCameraFormats = {
                  write_matrix_text},
 };
 
+template <typename IsOne>
+std::vector<std::string> names_of_those(const IsOne& is_one) {
+  std::vector<std::string> names;
+  for (const CameraFormat& format : kCameraFormats)
+    if (is_one(format)) names.emplace_back(format.name);
+  return names;
+}
+
 }  // namespace
 
 std::span<const CameraFormat> camera_formats() {
@@ -120,10 +128,7 @@ std::vector<std::string> readable_camera_formats() {
 }
 
 std::vector<std::string> writable_camera_formats() {
-  std::vector<std::string> names;
-  for (const CameraFormat& format : kCameraFormats)
-    if (format.write != nullptr) names.emplace_back(format.name);
-  return names;
+  return names_of_those([](const CameraFormat& format) { return format.write != nullptr; });
 }
 
 const CameraFormat* recognised_camera_format(const CameraFile& file) {
@@ -163,7 +168,10 @@ std::vector<WrittenCameraFile> camera_files_of(const CameraRig& rig,
       throw InputError(
           "--rig-to",
           format_name,
-          "cannot state the distortion of camera '" + camera.name + "'; rig and opencv can");
+          "cannot state the distortion of camera '" + camera.name +
+              "'; those that can: " + joined(names_of_those([](const CameraFormat& other) {
+                return other.states_distortion && other.write != nullptr;
+              })));
   if (!format.holds_one_camera || rig.cameras.size() == 1) return {{path, format.write(rig)}};
   std::vector<WrittenCameraFile> files;
   for (const CameraGeometry& camera : rig.cameras) {

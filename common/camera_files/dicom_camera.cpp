@@ -13,6 +13,7 @@
 #include "base/error.h"
 #include "base/number_text.h"
 #include "camera_files/format_readers.h"
+#include "geometry/camera_distance.h"
 #include "geometry/rigid_transform.h"
 #include "image_files/dicom_elements.h"
 
@@ -23,7 +24,6 @@ namespace {
 constexpr DicomTag kModality = {0x0008, 0x0060};
 constexpr DicomTag kSourceDetector = {0x0018, 0x1110};
 constexpr DicomTag kSourcePatient = {0x0018, 0x1111};
-constexpr DicomTag kImagerSpacing = {0x0018, 0x1164};
 constexpr DicomTag kPositionerMotion = {0x0018, 0x1500};
 constexpr DicomTag kPrimaryAngle = {0x0018, 0x1510};
 constexpr DicomTag kSecondaryAngle = {0x0018, 0x1511};
@@ -45,7 +45,6 @@ constexpr DicomTag kFrameGroups = {0x5200, 0x9230};
 constexpr DicomTag kGeometryMacro = {0x0018, 0x9476};
 constexpr DicomTag kPositionerMacro = {0x0018, 0x9405};
 constexpr DicomTag kIsocenterMacro = {0x0018, 0x9462};
-constexpr DicomTag kPixelMacro = {0x0028, 0x9443};
 constexpr DicomTag kSourceIsocenter = {0x0018, 0x9402};
 constexpr DicomTag kDetectorRotation = {0x0018, 0x9465};
 
@@ -137,18 +136,8 @@ class DicomCamera {
                                   "DistanceSourceToPatient (0018,1111)",
                                   options_.source_isocenter_mm,
                                   "--rig-source-isocenter-mm");
-    constexpr const char* kSpacingName = "ImagerPixelSpacing (0018,1164)";
-    std::vector<double> spacing = elements_.numbers(kImagerSpacing, kSpacingName);
-    if (const DicomValues* const pixels = functional_group(elements_, frame, kPixelMacro);
-        pixels != nullptr && spacing.empty())
-      spacing = pixels->numbers(kImagerSpacing, kSpacingName, file_);
-    if (!spacing.empty() && (spacing.size() != 2 || !(spacing[0] > 0.0) || !(spacing[1] > 0.0)))
-      throw InputError("ImagerPixelSpacing (0018,1164)",
-                       std::to_string(spacing.size()) + " numbers",
-                       "must be two spacings above 0: of rows, of columns",
-                       file_);
-    if (spacing.size() == 2)
-      camera_.pixel_spacing_mm = {spacing[1], spacing[0]};
+    if (const auto spacing = imager_spacing_mm(elements_, frame))
+      camera_.pixel_spacing_mm = *spacing;
     else if (!options_.pixel_spacing_mm.empty())
       camera_.pixel_spacing_mm = {options_.pixel_spacing_mm[0], options_.pixel_spacing_mm[1]};
     else
@@ -168,12 +157,7 @@ class DicomCamera {
       add_camera(angles_of(frame));
     }
     const auto is_as_first = [&](const StatedCamera& other) {
-      const CameraGeometry& first = stated_.cameras.front().geometry;
-      return other.geometry.source_point == first.source_point &&
-             other.geometry.detector_origin_point == first.detector_origin_point &&
-             other.geometry.column_direction == first.column_direction &&
-             other.geometry.row_direction == first.row_direction &&
-             other.geometry.pixel_spacing_mm == first.pixel_spacing_mm;
+      return camera_distance(other.geometry, stated_.cameras.front().geometry).is_none();
     };
     if (std::ranges::all_of(stated_.cameras, is_as_first)) stated_.cameras.resize(1);
     const auto rotation =

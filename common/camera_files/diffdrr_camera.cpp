@@ -4,7 +4,6 @@
 // has RAS axes about the middle of the volume; the room here has LPS axes, with its origin at
 // the CT's when volume_middle_ct_mm says where the middle is, at the middle otherwise.
 #include <algorithm>
-#include <cmath>
 
 #include <Eigen/Geometry>
 
@@ -21,14 +20,6 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr const char* kDiffDrrTable = "diffdrr_camera";
-
-/// Room from DiffDRR's world.
-RigidTransform room_from_diffdrr_world(const Vector3d& middle_ct_mm) {
-  RigidTransform room_from_world = RigidTransform::Identity();
-  room_from_world.linear() = Vector3d(-1.0, -1.0, 1.0).asDiagonal();
-  room_from_world.translation() = middle_ct_mm;
-  return room_from_world;
-}
 
 /// The arguments of DRR().
 struct DiffDrrDetector {
@@ -80,21 +71,15 @@ DiffDrrPose read_camera_pose(TomlTableReader& reader) {
   pose.parameterization = text("parameterization", pose.parameterization);
   pose.convention = text("convention", pose.convention);
   pose.orientation = text("orientation", pose.orientation);
-  if (pose.orientation != "AP" && pose.orientation != "PA" && pose.orientation != "none")
-    reader.add_problem("orientation", "must be \"AP\", \"PA\" or \"none\"");
-  if (pose.parameterization == "quaternion") {
-    const auto numbers = reader.get_vector<4>("rotation", Presence::Required);
-    if (numbers && !(std::abs(numbers->norm() - 1.0) <= 1e-5))
-      reader.add_problem("rotation", "must be a quaternion of norm 1, real part first");
+  const auto take = [&](const auto& numbers) {
     if (numbers) pose.rotation.assign(numbers->begin(), numbers->end());
-  } else {
-    if (pose.parameterization != "euler_angles")
-      reader.add_problem("parameterization", "must be \"euler_angles\" or \"quaternion\"");
-    if (!is_diffdrr_convention(pose.convention))
-      reader.add_problem("convention", "must be three of X, Y and Z, neighbours different");
-    const auto numbers = reader.get_vector<3>("rotation", Presence::Required);
-    if (numbers) pose.rotation.assign(numbers->begin(), numbers->end());
-  }
+  };
+  if (pose.parameterization == "quaternion")
+    take(reader.get_vector<4>("rotation", Presence::Required));
+  else
+    take(reader.get_vector<3>("rotation", Presence::Required));
+  for (const DiffDrrProblem& problem : problems(pose))
+    reader.add_problem(problem.member.c_str(), problem.constraint);
   pose.translation_mm =
       reader.get_vector<3>("translation", Presence::Required).value_or(Vector3d::Zero());
   return pose;
@@ -118,12 +103,7 @@ CameraGeometry camera_of_diffdrr(const DiffDrrDetector& detector,
 }
 
 std::string diffdrr_table(const CameraGeometry& camera, const RigidTransform& world_from_room) {
-  const bool reverses_x = !camera.is_mirrored();
-  RigidTransform room_from_camera = RigidTransform::Identity();
-  room_from_camera.linear().col(0) = (reverses_x ? -1.0 : 1.0) * camera.column_direction;
-  room_from_camera.linear().col(1) = -camera.row_direction;
-  room_from_camera.linear().col(2) = camera.beam_direction();
-  room_from_camera.translation() = camera.source_point;
+  const RigidTransform room_from_camera = room_from_diffdrr_camera(camera);
   const DiffDrrPose pose = diffdrr_pose_of(world_from_room * room_from_camera);
   const Vector3d middle_mm =
       room_from_camera.inverse() *
@@ -135,7 +115,7 @@ std::string diffdrr_table(const CameraGeometry& camera, const RigidTransform& wo
          "\ndelx = " + toml_number(camera.pixel_spacing_mm.x()) +
          "\ndely = " + toml_number(camera.pixel_spacing_mm.y()) +
          "\nx0 = " + toml_number(middle_mm.x()) + "\ny0 = " + toml_number(middle_mm.y()) +
-         "\nreverse_x_axis = " + (reverses_x ? "true" : "false") +
+         "\nreverse_x_axis = " + (camera.is_mirrored() ? "false" : "true") +
          "\norientation = " + toml_text(pose.orientation) +
          "\nparameterization = \"euler_angles\"\nconvention = " + toml_text(pose.convention) +
          "\nrotation = " + toml_numbers(Eigen::Map<const Vector3d>(pose.rotation.data())) +
@@ -156,7 +136,8 @@ StatedRig read_diffdrr_camera(const CameraFile& file, const CameraFileOptions& /
   TomlProblems problems(file.name());
   TomlTableReader reader(table, "", problems);
   const auto middle = reader.get_vector<3>("volume_middle_ct_mm", Presence::Optional);
-  const RigidTransform room_from_world = room_from_diffdrr_world(middle.value_or(Vector3d::Zero()));
+  const RigidTransform room_from_world =
+      diffdrr_world_from_lps(middle.value_or(Vector3d::Zero())).inverse();
   StatedRig stated;
   stated.isocenter_point = room_from_world.translation();
   for (const toml::table* camera_table : reader.get_tables(kDiffDrrTable, Presence::Required)) {
@@ -187,7 +168,7 @@ StatedRig read_diffdrr_camera(const CameraFile& file, const CameraFileOptions& /
 }
 
 std::string write_diffdrr_camera(const CameraRig& rig) {
-  const RigidTransform world_from_room = room_from_diffdrr_world(rig.isocenter_point).inverse();
+  const RigidTransform world_from_room = diffdrr_world_from_lps(rig.isocenter_point);
   std::string text =
       "# DRR(subject, sdd, height, delx, width, dely, x0, y0, reverse_x_axis=...) and\n"
       "# drr(rotation, translation, parameterization=..., convention=...); DiffDRR 0.4 or later.\n"

@@ -86,17 +86,18 @@ class OpenCvValues {
     }
   }
 
-  /// The numbers that tell the cameras apart; "" when there is one.
+  /// The numbers that tell the cameras apart; "" is one without a number.
   [[nodiscard]] const std::set<std::string>& camera_numbers() const { return numbers_; }
 
-  /// The value of that camera alone. An unnumbered R or t beside several cameras is that of a
-  /// stereo calibration: the second camera's relative to the first.
+  /// The value of that camera. An unnumbered R or t is that of the only camera; beside several it
+  /// is of a stereo calibration, the second camera's relative to the first, and not taken.
   [[nodiscard]] const YamlValue& of_camera(const KeyNames& names,
                                            const std::string& number,
                                            const char* what) const {
+    if (numbers_.size() == 1) return required(names, number, what);
     for (const Entry& entry : values_)
       if (entry.plain.number == number && is_one_of(names, entry.plain.name)) return entry.value;
-    const bool is_stereo = numbers_.size() > 1 && find(names, "") != nullptr;
+    const bool is_stereo = find(names, "") != nullptr;
     throw InputError(file_.name() + ": " + names.front() + number + " is missing: " + what +
                      (is_stereo ? "; that without a number, of a stereo calibration, is relative "
                                   "to the first camera"

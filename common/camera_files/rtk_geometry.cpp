@@ -15,6 +15,7 @@
 
 #include "base/error.h"
 #include "base/number_text.h"
+#include "base/toml_text.h"
 #include "camera_files/format_readers.h"
 #include "camera_files/xml_elements.h"
 #include "geometry/rigid_transform.h"
@@ -165,7 +166,7 @@ bool is_rtk_geometry(const CameraFile& file) {
 StatedRig read_rtk_geometry(const CameraFile& file, const CameraFileOptions& /*options*/) {
   const XmlElement root = parse_xml(file.text, file.name());
   if (root.name != kRoot)
-    throw FileError(file.name(), "root element", kRoot, root.name.substr(0, 100));
+    throw FileError(file.name(), "root element", kRoot, beginning_of(root.name, 100));
   StatedRig stated;
   stated.isocenter_point = Eigen::Vector3d::Zero();
   RtkValues common;  // what stands outside holds for the projections behind it

@@ -11,6 +11,8 @@
 
 #include <CLI/CLI.hpp>
 
+#include "base/parsed_number.h"
+
 namespace af::cli {
 
 namespace {
@@ -26,13 +28,6 @@ bool is_whole_number(std::string_view text) {
   return error == std::errc() && end == text.data() + text.size();
 }
 
-bool is_finite_number(std::string_view text) {
-  if (text.starts_with('+')) text.remove_prefix(1);
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  return error == std::errc() && end == text.data() + text.size() && std::isfinite(value);
-}
-
 /// "8 GB" -> "8".
 std::string_view without_unit(std::string_view text) {
   const std::size_t unit = text.find_first_not_of("+-0123456789");
@@ -43,7 +38,7 @@ std::string_view without_unit(std::string_view text) {
 std::string problem_of(const std::string& type, const std::string& value) {
   const auto is_of = [&](const char* name) { return type.find(name) != std::string::npos; };
   if (value.empty()) return "must not be empty";
-  if (is_of("FLOAT") && !is_finite_number(value)) return "must be a finite number";
+  if (is_of("FLOAT") && !finite_number(value)) return "must be a finite number";
   const std::string_view number = is_of("SIZE") ? without_unit(value) : std::string_view(value);
   if (is_of("UINT")) {
     if (!is_whole_number<std::uint64_t>(number))

@@ -20,18 +20,6 @@ namespace {
 
 constexpr std::size_t kMaxAttributeBytes = 1u << 20;
 
-/// The innermost message of HDF5's error stack: the true reason.
-herr_t keep_first(unsigned position, const H5E_error2_t* error, void* text) {
-  if (position == 0 && error->desc != nullptr) *static_cast<std::string*>(text) = error->desc;
-  return 0;
-}
-
-std::string reason_of_last_error() {
-  std::string reason;
-  H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, keep_first, &reason);
-  return reason.empty() ? "no reason given" : reason;
-}
-
 Handle text_type(std::size_t bytes) {
   Handle type(H5Tcopy(H5T_C_S1), H5Tclose, "H5Tcopy");
   checked(H5Tset_size(type, bytes), "H5Tset_size");
@@ -160,18 +148,6 @@ bool fits(const std::vector<std::uint64_t>& found, const DatasetRule& rule) {
 }
 
 }  // namespace
-
-CallFailed::CallFailed(const char* call)
-    : std::runtime_error(std::string(call) + " failed: " + reason_of_last_error()) {}
-
-QuietErrors::QuietErrors() {
-  H5Eget_auto2(H5E_DEFAULT, &function_, &client_data_);
-  H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
-}
-
-QuietErrors::~QuietErrors() {
-  H5Eset_auto2(H5E_DEFAULT, function_, client_data_);
-}
 
 Handle file_access() {
   Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose, "H5Pcreate");

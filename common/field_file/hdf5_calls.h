@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// Internal to field_file: HDF5 handles that close themselves, checked calls, and small datasets.
+// Internal to field_file: checked calls of HDF5 and small datasets.
 #pragma once
 
 #include <filesystem>
-#include <stdexcept>
 #include <string>
 
 #include <hdf5.h>
 
 #include "field_file/field_layout.h"
+#include "hdf5_files/hdf5_handles.h"
 
 #ifndef H5_HAVE_PARALLEL
 #error "the field file needs parallel HDF5: link hdf5-openmpi (see common/cmake/ThirdParty.cmake)"
@@ -16,58 +16,14 @@
 
 namespace af::hdf5 {
 
-/// An HDF5 call failed; the text names the call and HDF5's own reason. Callers know the path.
-class CallFailed : public std::runtime_error {
- public:
-  explicit CallFailed(const char* call);
-};
+using CallFailed = H5CallFailed;
+using Handle = H5Id;
+using QuietErrors = H5Quiet;
 
-/// Throws CallFailed when an HDF5 call returned a negative value.
 template <typename Result>
 Result checked(Result result, const char* call) {
-  if (result < 0) throw CallFailed(call);
-  return result;
+  return h5_checked(result, call);
 }
-
-/// Owns an identifier. Not for files opened by several ranks: closing those is collective and must
-/// not happen while one rank unwinds.
-class Handle {
- public:
-  using Closer = herr_t (*)(hid_t);
-  Handle(hid_t id, Closer closer, const char* call) : id_(checked(id, call)), closer_(closer) {}
-  ~Handle() {
-    if (id_ >= 0) closer_(id_);
-  }
-  Handle(Handle&& other) noexcept : id_(other.id_), closer_(other.closer_) { other.id_ = -1; }
-  Handle& operator=(Handle&&) = delete;
-  Handle(const Handle&) = delete;
-  Handle& operator=(const Handle&) = delete;
-
-  operator hid_t() const { return id_; }  // NOLINT(google-explicit-constructor): used as the id
-  /// Closes now and reports failure, which a destructor cannot.
-  void close(const char* call) {
-    const hid_t id = id_;
-    id_ = -1;
-    checked(closer_(id), call);
-  }
-
- private:
-  hid_t id_;
-  Closer closer_;
-};
-
-/// Keeps HDF5 from printing its error stack while alive; errors travel as exceptions.
-class QuietErrors {
- public:
-  QuietErrors();
-  ~QuietErrors();
-  QuietErrors(const QuietErrors&) = delete;
-  QuietErrors& operator=(const QuietErrors&) = delete;
-
- private:
-  H5E_auto2_t function_ = nullptr;
-  void* client_data_ = nullptr;
-};
 
 /// File access of new files: formats whose metadata carry checksums.
 Handle file_access();

@@ -35,12 +35,13 @@ Matrix3d rotation_of(const DiffDrrPose& pose) {
   return rotation;
 }
 
-}  // namespace
-
-bool is_diffdrr_convention(const std::string& letters) {
+/// Three of X, Y and Z, neighbours different.
+bool is_convention(const std::string& letters) {
   return letters.size() == 3 && letters.find_first_not_of("XYZ") == std::string::npos &&
          letters[0] != letters[1] && letters[1] != letters[2];
 }
+
+}  // namespace
 
 RigidTransform world_from_diffdrr_camera(const DiffDrrPose& pose) {
   const Matrix3d rotation = rotation_of(pose);
@@ -50,11 +51,34 @@ RigidTransform world_from_diffdrr_camera(const DiffDrrPose& pose) {
   return world_from_camera;
 }
 
+std::vector<DiffDrrProblem> problems(const DiffDrrPose& pose) {
+  constexpr double kNormTolerance = 1e-5;
+  std::vector<DiffDrrProblem> found;
+  const bool is_quaternion = pose.parameterization == "quaternion";
+  if (!is_quaternion && pose.parameterization != "euler_angles")
+    found.push_back({"parameterization", "must be \"euler_angles\" or \"quaternion\""});
+  if (!is_quaternion && !is_convention(pose.convention))
+    found.push_back({"convention", "must be three of X, Y and Z, neighbours different"});
+  if (pose.orientation != "AP" && pose.orientation != "PA" && pose.orientation != "none")
+    found.push_back({"orientation", "must be \"AP\", \"PA\" or \"none\""});
+  double square = 0.0;
+  for (const double value : pose.rotation) square += value * value;
+  if (is_quaternion && !pose.rotation.empty() &&
+      !(std::abs(std::sqrt(square) - 1.0) <= kNormTolerance))
+    found.push_back({"rotation", "must be a quaternion of norm 1, real part first"});
+  return found;
+}
+
+RigidTransform diffdrr_world_from_lps(const Vector3d& middle_mm) {
+  RigidTransform world_from_lps = RigidTransform::Identity();
+  world_from_lps.linear() = Vector3d(-1.0, -1.0, 1.0).asDiagonal();
+  world_from_lps.translation() = -(world_from_lps.linear() * middle_mm);
+  return world_from_lps;
+}
+
 RigidTransform room_from_diffdrr_camera(const CameraGeometry& camera) {
-  if (camera.is_mirrored())
-    throw InputError("camera", camera.name, "must not be mirrored: DiffDRR's cameras are not");
   RigidTransform room_from_camera = RigidTransform::Identity();
-  room_from_camera.linear().col(0) = -camera.column_direction;
+  room_from_camera.linear().col(0) = (camera.is_mirrored() ? 1.0 : -1.0) * camera.column_direction;
   room_from_camera.linear().col(1) = -camera.row_direction;
   room_from_camera.linear().col(2) = camera.beam_direction();
   room_from_camera.translation() = camera.source_point;
@@ -62,8 +86,7 @@ RigidTransform room_from_diffdrr_camera(const CameraGeometry& camera) {
 }
 
 Vector3d angles_of_convention(const Matrix3d& rotation, const std::string& convention) {
-  check(is_diffdrr_convention(convention) && convention[0] != convention[2],
-        "three different axes");
+  check(is_convention(convention) && convention[0] != convention[2], "three different axes");
   const int a = convention[0] - 'X';
   const int b = convention[1] - 'X';
   const int c = convention[2] - 'X';

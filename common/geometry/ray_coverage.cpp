@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "geometry/hit_extents.h"
 
 namespace af {
 
@@ -16,18 +17,6 @@ namespace {
 bool holds(const GridAxis& x, const GridAxis& z, const PlaneExtent& extent) {
   return x.contains(extent.x_low_mm) && x.contains(extent.x_high_mm) &&
          z.contains(extent.z_low_mm) && z.contains(extent.z_high_mm);
-}
-
-/// Extents carry a margin, so that planes of their size are larger than what is asked of them.
-PlaneExtent without_margin(PlaneExtent extent) {
-  const double width = extent.x_high_mm - extent.x_low_mm;
-  const double height = extent.z_high_mm - extent.z_low_mm;
-  const double margin = kExtentMargin / (1.0 + 2.0 * kExtentMargin) * std::max(width, height);
-  extent.x_low_mm += margin;
-  extent.x_high_mm -= margin;
-  extent.z_low_mm += margin;
-  extent.z_high_mm -= margin;
-  return extent;
 }
 
 /// The corners of the range alone: far cheaper than the search, and most boxes that are too large
@@ -68,11 +57,10 @@ bool covers_range(const LightSlab& light_slab,
   for (const SlabGeometry& slab : light_slab.slabs) planes.push_back(slab.st_plane_y_mm);
   try {
     const std::vector<PlaneExtent> extents =
-        extents_on_planes(camera, frame, range, planes, light_slab.slab_from_ct);
-    if (!holds(light_slab.u, light_slab.v, without_margin(extents.front()))) return false;
+        hit_extents(camera, frame, range, planes, light_slab.slab_from_ct);
+    if (!holds(light_slab.u, light_slab.v, extents.front())) return false;
     for (std::size_t k = 0; k < light_slab.slabs.size(); ++k)
-      if (!holds(light_slab.slabs[k].s, light_slab.slabs[k].t, without_margin(extents[k + 1])))
-        return false;
+      if (!holds(light_slab.slabs[k].s, light_slab.slabs[k].t, extents[k + 1])) return false;
     return true;
   } catch (const InputError&) {  // rays parallel to the planes
     return false;

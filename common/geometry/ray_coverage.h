@@ -11,7 +11,7 @@ namespace af {
 
 /// Whether all rays of the whole detector meet every plane of the light slab within its rectangle,
 /// wherever the CT is within `range` about the nominal pose of `frame`. Found as planes are sized
-/// (extents_on_planes), so the answer is no sample of poses. \test
+/// (hit_extents), so the answer is no sample of poses. \test
 /// RayCoverage.SaysWhatSampledRaysSay
 bool covers_range(const LightSlab& light_slab,
                   const CameraGeometry& camera,

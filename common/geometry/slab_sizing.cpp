@@ -5,8 +5,10 @@
 #include <cmath>
 #include <limits>
 #include <sstream>
+#include <string_view>
 
 #include "base/error.h"
+#include "geometry/hit_extents.h"
 
 namespace af {
 
@@ -14,51 +16,91 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// Maximises a smooth function over the rotation box: a grid that holds corners, edges and centre,
-/// then a pattern search from the best node. At large angles extremes lie inside the box, so
-/// corners alone would not do.
-template <typename Objective>
-double maximum_over_rotations(const MotionRange& range, const Objective& objective) {
-  constexpr double kWidestStepRad = 15.0 * kRadPerDeg;
-  const Eigen::Vector3d& low = range.low.rotation_rad;
-  const Eigen::Vector3d& high = range.high.rotation_rad;
-  Eigen::Vector3d best_angles = Eigen::Vector3d::Zero().cwiseMax(low).cwiseMin(high);
-  double best = objective(best_angles);
-  const auto consider = [&](const Eigen::Vector3d& angles) {
-    const double value = objective(angles);
-    if (!(value > best)) return false;
-    best = value;
-    best_angles = angles;
+/// The largest value found of a function of the rotation, and where.
+struct RotationMaximum {
+  Eigen::Vector3d angles;
+  double value;
+
+  /// Whether `candidate` at `at` is larger, which it then takes.
+  bool takes(const Eigen::Vector3d& at, double candidate) {
+    if (!(candidate > value)) return false;
+    value = candidate;
+    angles = at;
     return true;
-  };
-  std::array<int, 3> intervals{};
-  Eigen::Vector3d grid_step;
-  for (int axis = 0; axis < 3; ++axis) {
-    const double width = high[axis] - low[axis];
-    const int count = std::max(8, static_cast<int>(std::ceil(width / kWidestStepRad)));
-    // An axis without room needs no nodes beside its first.
-    intervals[static_cast<std::size_t>(axis)] = width > 0.0 ? count : 0;
-    grid_step[axis] = width / count;
   }
-  for (int i = 0; i <= intervals[0]; ++i)
-    for (int j = 0; j <= intervals[1]; ++j)
-      for (int k = 0; k <= intervals[2]; ++k)
-        consider(low + grid_step.cwiseProduct(Eigen::Vector3d(i, j, k)));
+};
+
+/// The grid of rotations that a search begins with: holds the box's corners, edges and centre.
+struct RotationGrid {
+  Eigen::Vector3d low;
+  Eigen::Vector3d high;
+  std::array<int, 3> intervals;
+  Eigen::Vector3d step;
+
+  explicit RotationGrid(const MotionRange& range)
+      : low(range.low.rotation_rad), high(range.high.rotation_rad) {
+    constexpr double kWidestStepRad = 15.0 * kRadPerDeg;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double width = high[axis] - low[axis];
+      const int count = std::max(8, static_cast<int>(std::ceil(width / kWidestStepRad)));
+      // An axis without room needs no nodes beside its first.
+      intervals[static_cast<std::size_t>(axis)] = width > 0.0 ? count : 0;
+      step[axis] = width / count;
+    }
+  }
+
+  [[nodiscard]] Eigen::Vector3d middle() const {
+    return Eigen::Vector3d::Zero().cwiseMax(low).cwiseMin(high);
+  }
+  template <typename Visit>
+  void for_each(const Visit& visit) const {
+    for (int i = 0; i <= intervals[0]; ++i)
+      for (int j = 0; j <= intervals[1]; ++j)
+        for (int k = 0; k <= intervals[2]; ++k)
+          visit(Eigen::Vector3d(low + step.cwiseProduct(Eigen::Vector3d(i, j, k))));
+  }
+};
+
+/// Pattern search from the best node of the grid.
+template <typename Objective>
+double refined(RotationMaximum best, const RotationGrid& grid, const Objective& objective) {
   constexpr double kFinalStepRad = 1e-8;
-  for (Eigen::Vector3d step = grid_step / 2.0; step.maxCoeff() > kFinalStepRad;) {
-    // consider() moves best_angles, so this is a copy.
-    // NOLINTNEXTLINE(performance-unnecessary-copy-initialization)
-    const Eigen::Vector3d center = best_angles;
+  for (Eigen::Vector3d step = grid.step / 2.0; step.maxCoeff() > kFinalStepRad;) {
+    const Eigen::Vector3d center = best.angles;
     bool improved = false;
     for (int axis = 0; axis < 3; ++axis)
       for (const double sign : {-1.0, 1.0}) {
         Eigen::Vector3d angles = center;
-        angles[axis] = std::clamp(angles[axis] + sign * step[axis], low[axis], high[axis]);
-        improved = consider(angles) || improved;
+        angles[axis] =
+            std::clamp(angles[axis] + sign * step[axis], grid.low[axis], grid.high[axis]);
+        improved = best.takes(angles, objective(angles)) || improved;
       }
     if (!improved) step /= 2.0;
   }
-  return best;
+  return best.value;
+}
+
+/// Maximises smooth functions over the rotation box, each from its best node of one grid. At large
+/// angles extremes lie inside the box, so corners alone would not do. `turned(angles)` is what the
+/// functions share of a rotation, `value(that, i)` the function i of `count`.
+template <typename Turned, typename Value>
+std::vector<double> maxima_over_rotations(const MotionRange& range,
+                                          std::size_t count,
+                                          const Turned& turned,
+                                          const Value& value) {
+  const RotationGrid grid(range);
+  std::vector<RotationMaximum> best;
+  const auto at_middle = turned(grid.middle());
+  for (std::size_t i = 0; i < count; ++i) best.push_back({grid.middle(), value(at_middle, i)});
+  grid.for_each([&](const Eigen::Vector3d& angles) {
+    const auto at_node = turned(angles);
+    for (std::size_t i = 0; i < count; ++i) best[i].takes(angles, value(at_node, i));
+  });
+  std::vector<double> maxima;
+  for (std::size_t i = 0; i < count; ++i)
+    maxima.push_back(refined(
+        best[i], grid, [&](const Eigen::Vector3d& angles) { return value(turned(angles), i); }));
+  return maxima;
 }
 
 /// All translations of a range: about its middle, to both sides by at most `half_mm` along each
@@ -118,46 +160,77 @@ class MovingCamera {
     return (slab_from_room_ * (source_from_center_ + translations_.middle_mm)).y();
   }
 
+  /// The camera at one rotation of the CT, the translations at their middle.
+  struct Turned {
+    Eigen::Matrix3d slab_from_room;
+    Eigen::Vector3d source;
+    std::array<Eigen::Vector3d, 4> corner_directions;
+  };
+  [[nodiscard]] Turned turned(const Eigen::Vector3d& angles) const {
+    Turned at{slab_from_room_ * rotation_from_angles(angles).transpose(), {}, {}};
+    at.source = at.slab_from_room * source_from_center_ + center_in_slab_;
+    for (std::size_t corner = 0; corner < corner_directions_.size(); ++corner)
+      at.corner_directions[corner] = at.slab_from_room * corner_directions_[corner];
+    return at;
+  }
+
   /// Largest coordinate sign * x (axis 0) or sign * z (axis 2) at which the ray to detector corner
   /// `corner` can meet the plane y = plane_y, over all translations in range.
-  [[nodiscard]] double extreme_hit(const Eigen::Vector3d& angles,
-                                   std::size_t corner,
-                                   double plane_y_mm,
-                                   int axis,
-                                   double sign) const {
-    const Eigen::Matrix3d slab_from_room =
-        slab_from_room_ * rotation_from_angles(angles).transpose();
-    const Eigen::Vector3d point = slab_from_room * source_from_center_ + center_in_slab_;
-    const Eigen::Vector3d direction = slab_from_room * corner_directions_[corner];
+  [[nodiscard]] double extreme_hit(
+      const Turned& at, std::size_t corner, double plane_y_mm, int axis, double sign) const {
+    const Eigen::Vector3d& direction = at.corner_directions[corner];
     constexpr double kSteepest = -0.05;  // rays within 3 degrees of the planes make them boundless
     if (!(direction.y() < kSteepest * direction.norm()))
       throw InputError("max_rotation_deg",
                        std::to_string(range_.max_rotation_rad() * kDegPerRad),
                        "too large: some rays of the camera run parallel to the field's planes");
     const double slope = direction[axis] / direction.y();
-    const double at_rest = point[axis] + (plane_y_mm - point.y()) * slope;
+    const double at_rest = at.source[axis] + (plane_y_mm - at.source.y()) * slope;
     const Eigen::Vector3d per_translation =
-        slab_from_room.transpose() *
+        at.slab_from_room.transpose() *
         (Eigen::Vector3d::Unit(axis) - slope * Eigen::Vector3d::UnitY());
     return sign * at_rest + translations_.largest_growth(per_translation);
   }
 
-  [[nodiscard]] double lowest_source_y(const Eigen::Vector3d& angles) const {
-    const Eigen::Matrix3d slab_from_room =
-        slab_from_room_ * rotation_from_angles(angles).transpose();
-    return (slab_from_room * source_from_center_ + center_in_slab_).y() -
-           translations_.largest_growth(slab_from_room.row(1).transpose());
+  /// Lowest slab-frame y of the source over the whole motion box.
+  [[nodiscard]] double lowest_source_y() const {
+    return -maxima_over_rotations(
+                range_,
+                1,
+                [this](const Eigen::Vector3d& angles) { return turned(angles); },
+                [this](const Turned& at, std::size_t /*i*/) {
+                  return -(at.source.y() -
+                           translations_.largest_growth(at.slab_from_room.row(1).transpose()));
+                })
+                .front();
   }
 
-  /// Largest of sign * coordinate over the whole motion box and all detector corners.
-  [[nodiscard]] double extreme_hit(double plane_y_mm, int axis, double sign) const {
-    double extreme = -kInfinity;
-    for (std::size_t corner = 0; corner < corner_directions_.size(); ++corner)
-      extreme =
-          std::max(extreme, maximum_over_rotations(range_, [&](const Eigen::Vector3d& angles) {
-                     return extreme_hit(angles, corner, plane_y_mm, axis, sign);
-                   }));
-    return extreme;
+  /// Where rays to any detector corner can meet the planes, over the whole motion box.
+  [[nodiscard]] std::vector<PlaneExtent> hits(std::span<const double> plane_y_mm) const {
+    constexpr std::size_t kCorners = 4;
+    constexpr std::size_t kSides = 4;  // of a plane: low x, high x, low z, high z
+    const std::vector<double> extremes = maxima_over_rotations(
+        range_,
+        plane_y_mm.size() * kSides * kCorners,
+        [this](const Eigen::Vector3d& angles) { return turned(angles); },
+        [&](const Turned& at, std::size_t i) {
+          const std::size_t side = i / kCorners % kSides;
+          return extreme_hit(at,
+                             i % kCorners,
+                             plane_y_mm[i / (kCorners * kSides)],
+                             side < 2 ? 0 : 2,
+                             side % 2 == 0 ? -1.0 : 1.0);
+        });
+    std::vector<PlaneExtent> planes;
+    for (auto of_plane = extremes.begin(); of_plane != extremes.end();
+         of_plane += kSides * kCorners) {
+      const auto largest = [&](std::size_t side) {
+        const auto first = of_plane + static_cast<std::ptrdiff_t>(side * kCorners);
+        return *std::max_element(first, first + kCorners);
+      };
+      planes.push_back({-largest(0), largest(1), -largest(2), largest(3)});
+    }
+    return planes;
   }
 
  private:
@@ -308,12 +381,11 @@ std::string MotionRange::text() const {
   }
   const std::array<double, 6> from = low.deg_and_mm();
   const std::array<double, 6> to = high.deg_and_mm();
-  constexpr std::array kAxes = {"rx", "ry", "rz", "tx", "ty", "tz"};
   for (std::size_t i = 0; i < from.size(); ++i) {
     out << (i == 0   ? ""
             : i == 3 ? " degrees, "
                      : " ")
-        << kAxes[i] << ' ' << from[i] << " to " << to[i];
+        << std::string_view(kParameterNames[i]).substr(0, 2) << ' ' << from[i] << " to " << to[i];
     if (i + 1 == from.size()) out << " mm";
   }
   return out.str();
@@ -348,16 +420,10 @@ std::vector<std::string> problems(const MotionRange& range) {
 
 namespace {
 
-std::vector<PlaneExtent> extents_of(const MovingCamera& moving,
-                                    std::span<const double> plane_y_mm) {
-  std::vector<PlaneExtent> extents;
-  for (const double y : plane_y_mm) {
-    PlaneExtent extent{-moving.extreme_hit(y, 0, -1.0),
-                       moving.extreme_hit(y, 0, 1.0),
-                       -moving.extreme_hit(y, 2, -1.0),
-                       moving.extreme_hit(y, 2, 1.0)};
-    // Rounding and the search's final step stay far below this margin; it also keeps a plane that
-    // is a single point (no motion) from having no size.
+std::vector<PlaneExtent> with_margin(std::vector<PlaneExtent> extents) {
+  // Rounding and the search's final step stay far below this; it also keeps a plane that is a
+  // single point (no motion) from having no size.
+  for (PlaneExtent& extent : extents) {
     const double margin =
         kExtentMargin *
         std::max({extent.x_high_mm - extent.x_low_mm, extent.z_high_mm - extent.z_low_mm, 1.0});
@@ -365,14 +431,8 @@ std::vector<PlaneExtent> extents_of(const MovingCamera& moving,
     extent.x_high_mm += margin;
     extent.z_low_mm -= margin;
     extent.z_high_mm += margin;
-    extents.push_back(extent);
   }
   return extents;
-}
-
-double lowest_source_y(const MovingCamera& moving, const MotionRange& range) {
-  return -maximum_over_rotations(
-      range, [&](const Eigen::Vector3d& angles) { return -moving.lowest_source_y(angles); });
 }
 
 void widen(std::vector<PlaneExtent>& extents, const std::vector<PlaneExtent>& others) {
@@ -391,7 +451,7 @@ std::vector<PlaneExtent> extents_on_planes(const CameraGeometry& camera,
                                            const PoseFrame& frame,
                                            const MotionRange& range,
                                            std::span<const double> plane_y_mm) {
-  return extents_of(MovingCamera(camera, frame, range), plane_y_mm);
+  return with_margin(MovingCamera(camera, frame, range).hits(plane_y_mm));
 }
 
 std::vector<PlaneExtent> extents_on_planes(const CameraGeometry& camera,
@@ -399,13 +459,21 @@ std::vector<PlaneExtent> extents_on_planes(const CameraGeometry& camera,
                                            const MotionRange& range,
                                            std::span<const double> plane_y_mm,
                                            const RigidTransform& slab_from_ct) {
-  return extents_of(MovingCamera(camera, frame, range, slab_from_ct), plane_y_mm);
+  return with_margin(hit_extents(camera, frame, range, plane_y_mm, slab_from_ct));
+}
+
+std::vector<PlaneExtent> hit_extents(const CameraGeometry& camera,
+                                     const PoseFrame& frame,
+                                     const MotionRange& range,
+                                     std::span<const double> plane_y_mm,
+                                     const RigidTransform& slab_from_ct) {
+  return MovingCamera(camera, frame, range, slab_from_ct).hits(plane_y_mm);
 }
 
 double lowest_source_y_mm(const CameraGeometry& camera,
                           const PoseFrame& frame,
                           const MotionRange& range) {
-  return lowest_source_y(MovingCamera(camera, frame, range), range);
+  return MovingCamera(camera, frame, range).lowest_source_y();
 }
 
 std::array<Eigen::Vector3d, 8> CtBox::corner_points() const {
@@ -439,7 +507,7 @@ LightSlab make_light_slab(const CameraGeometry& camera,
   for (const CameraGeometry& other : more_cameras)
     refuse_source_inside_ct(
         highest_ct_y_mm,
-        lowest_source_y(MovingCamera(other, frame, range, light_slab.slab_from_ct), range));
+        MovingCamera(other, frame, range, light_slab.slab_from_ct).lowest_source_y());
 
   std::vector<double> planes = spec.st_plane_y_mm;
   planes.push_back(light_slab.uv_plane_y_mm);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Internal to common/hdf5_files.
+// HDF5 handles that close themselves, and checked calls. For sources of common/hdf5_files and
+// common/field_file alone.
 #pragma once
 
 #include <atomic>
@@ -11,22 +12,25 @@
 
 namespace af {
 
-/// An HDF5 call failed; callers know the file.
-struct H5CallFailed : std::runtime_error {
-  using std::runtime_error::runtime_error;
+/// An HDF5 call failed; the text names the call and HDF5's own reason. Callers know the file.
+class H5CallFailed : public std::runtime_error {
+ public:
+  explicit H5CallFailed(const char* call);
 };
 
+/// Throws H5CallFailed when an HDF5 call returned a negative value.
 template <typename Result>
 Result h5_checked(Result result, const char* call) {
   if (result < 0) throw H5CallFailed(call);
   return result;
 }
 
-/// Closes what it holds.
+/// Owns an identifier. Not for files opened by several ranks: closing those is collective and must
+/// not happen while one rank unwinds.
 class H5Id {
  public:
-  H5Id(hid_t id, herr_t (*close)(hid_t), const char* call)
-      : id_(h5_checked(id, call)), close_(close) {}
+  H5Id(hid_t id, herr_t (*closer)(hid_t), const char* call)
+      : id_(h5_checked(id, call)), close_(closer) {}
   ~H5Id() {
     if (id_ >= 0) close_(id_);
   }
@@ -35,13 +39,19 @@ class H5Id {
   H5Id(const H5Id&) = delete;
   H5Id& operator=(const H5Id&) = delete;
   operator hid_t() const { return id_; }  // NOLINT(google-explicit-constructor): used as the id
+  /// Closes now and reports failure, which a destructor cannot.
+  void close(const char* call) {
+    const hid_t id = id_;
+    id_ = -1;
+    h5_checked(close_(id), call);
+  }
 
  private:
   hid_t id_;
   herr_t (*close_)(hid_t);
 };
 
-/// HDF5 prints no error stack while alive.
+/// HDF5 prints no error stack while alive: errors travel as exceptions.
 class H5Quiet {
  public:
   H5Quiet() {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <fstream>
 #include <limits>
+#include <utility>
 
 #include "base/error.h"
 #include "hdf5_files/hdf5_handles.h"
@@ -90,28 +91,47 @@ std::uint64_t little_endian(std::string_view bytes) {
 /// The bytes of a file, in memory or on the disk.
 class FileBytes {
  public:
-  FileBytes(std::string bytes, std::filesystem::path path)
-      : bytes_(std::move(bytes)), path_(std::move(path)) {}
+  explicit FileBytes(std::string bytes) : bytes_(std::move(bytes)) {}
+  explicit FileBytes(const std::filesystem::path& path) : file_(path, std::ios::binary) {}
 
   /// FileError that begins with `where` when the file ends before.
   [[nodiscard]] std::string part(std::uint64_t offset,
                                  std::size_t count,
-                                 const std::string& where) const {
-    std::string found(count, '\0');
-    if (path_.empty()) {
+                                 const std::string& where) {
+    if (!file_.is_open()) {
       if (offset <= bytes_.size() && count <= bytes_.size() - offset)
         return bytes_.substr(static_cast<std::size_t>(offset), count);
     } else if (offset <= std::uint64_t{std::numeric_limits<std::int64_t>::max()}) {
-      std::ifstream file(path_, std::ios::binary);
-      file.seekg(static_cast<std::streamoff>(offset));
-      if (file.read(found.data(), static_cast<std::streamsize>(count))) return found;
+      std::string found(count, '\0');
+      file_.clear();
+      file_.seekg(static_cast<std::streamoff>(offset));
+      if (file_.read(found.data(), static_cast<std::streamsize>(count))) return found;
     }
     throw FileError(where, "damaged HDF5: a text lies behind the end of the file");
   }
 
+  /// A global heap, from its head on. It is kept: the texts of a file share few.
+  [[nodiscard]] const std::string& heap(std::uint64_t offset, const std::string& where) {
+    if (!heap_.empty() && heap_offset_ == offset) return heap_;
+    constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 24;
+    heap_.clear();
+    const std::string head = part(offset, kHeapHeadBytes, where);
+    const std::uint64_t bytes = little_endian(std::string_view(head).substr(8, 8));
+    if (!head.starts_with(std::string_view("GCOL\1", 5)) || bytes < kHeapHeadBytes ||
+        bytes > kMostBytes)
+      throw FileError(where, "damaged HDF5: its text is in no heap");
+    heap_ = part(offset, static_cast<std::size_t>(bytes), where);
+    heap_offset_ = offset;
+    return heap_;
+  }
+
+  static constexpr std::size_t kHeapHeadBytes = 16;
+
  private:
-  std::string bytes_;
-  std::filesystem::path path_;  ///< empty: in memory
+  std::string bytes_;   ///< of a file in memory
+  std::ifstream file_;  ///< open: the file is on the disk
+  std::string heap_;    ///< the last one
+  std::uint64_t heap_offset_ = 0;
 };
 
 void check_plain_addresses(hid_t file, const std::string& where) {
@@ -128,34 +148,28 @@ void check_plain_addresses(hid_t file, const std::string& where) {
 /// A text of variable length stands in a heap of the file. HDF5 1.10 copies as many bytes as the
 /// heap says to where there is room for as many as the dataset says, so the bytes are taken without
 /// it (HDF5's file format, III.E, global heap).
-std::string variable_text(hid_t file,
-                          hid_t dataset,
-                          const FileBytes& bytes,
-                          const std::string& where) {
-  constexpr std::uint64_t kMostHeapBytes = std::uint64_t{1} << 24;
+std::string variable_text(hid_t file, hid_t dataset, FileBytes& bytes, const std::string& where) {
   check_plain_addresses(file, where);
   const haddr_t offset = H5Dget_offset(dataset);
   if (offset == HADDR_UNDEF) throw FileError(where, "is a text that is stored in pieces");
   const std::string cell = bytes.part(offset, 16, where);
   const std::uint64_t length = little_endian(std::string_view(cell).substr(0, 4));
-  const std::uint64_t heap = little_endian(std::string_view(cell).substr(4, 8));
   const std::uint64_t index = little_endian(std::string_view(cell).substr(12, 4));
   if (length == 0) return "";
   if (length > kMostTextBytes) throw FileError(where, "is too long");
-  const std::string head = bytes.part(heap, 16, where);
-  const std::uint64_t heap_bytes = little_endian(std::string_view(head).substr(8, 8));
-  if (!head.starts_with(std::string_view("GCOL\1", 5)) || heap_bytes > kMostHeapBytes)
-    throw FileError(where, "damaged HDF5: its text is in no heap");
-  for (std::uint64_t at = 16; at + 16 <= heap_bytes;) {
-    const std::string object = bytes.part(heap + at, 16, where);
-    const std::uint64_t number = little_endian(std::string_view(object).substr(0, 2));
-    const std::uint64_t size = little_endian(std::string_view(object).substr(8, 8));
-    if (number == 0 || size > heap_bytes - at - 16) break;  // 0: what is left is free
+  const std::string_view heap =
+      bytes.heap(little_endian(std::string_view(cell).substr(4, 8)), where);
+  constexpr std::size_t kObjectHeadBytes = 16;
+  for (std::size_t at = FileBytes::kHeapHeadBytes; at + kObjectHeadBytes <= heap.size();) {
+    const std::uint64_t number = little_endian(heap.substr(at, 2));
+    const std::uint64_t size = little_endian(heap.substr(at + 8, 8));
+    at += kObjectHeadBytes;
+    if (number == 0 || size > heap.size() - at) break;  // 0: what is left is free
     if (number == index && size >= length) {
-      const std::string text = bytes.part(heap + at + 16, static_cast<std::size_t>(length), where);
-      return text.substr(0, text.find('\0'));
+      const std::string_view text = heap.substr(at, static_cast<std::size_t>(length));
+      return std::string(text.substr(0, text.find('\0')));
     }
-    at += 16 + (size + 7) / 8 * 8;
+    at += static_cast<std::size_t>((size + 7) / 8 * 8);
   }
   throw FileError(where, "damaged HDF5: its text is not in its heap");
 }
@@ -168,16 +182,24 @@ struct Hdf5Input::State {
   H5Id file;
   FileBytes bytes;
 
-  /// Every link on the way is checked before it is followed.
-  [[nodiscard]] H5Id dataset(const std::string& path, const std::string& name) const {
+  enum class Link { Absent, Elsewhere, Hard };
+  /// The last link of a path, or the first one that is not hard, and the path up to it: only hard
+  /// links are followed.
+  [[nodiscard]] std::pair<Link, std::string> link_at(const std::string& path) const {
     for (std::size_t at = path.find('/', 1);; at = path.find('/', at + 1)) {
       const std::string part = path.substr(0, at);
-      if (H5Lexists(file, part.c_str(), H5P_DEFAULT) <= 0) throw FileError(name, "has no " + part);
+      if (H5Lexists(file, part.c_str(), H5P_DEFAULT) <= 0) return {Link::Absent, part};
       H5L_info_t link;
       h5_checked(H5Lget_info(file, part.c_str(), &link, H5P_DEFAULT), "H5Lget_info");
-      if (link.type != H5L_TYPE_HARD) throw FileError(name, part, "a part of this file", "a link");
-      if (at == std::string::npos) break;
+      if (link.type != H5L_TYPE_HARD) return {Link::Elsewhere, part};
+      if (at == std::string::npos) return {Link::Hard, part};
     }
+  }
+
+  [[nodiscard]] H5Id dataset(const std::string& path, const std::string& name) const {
+    const auto [link, part] = link_at(path);
+    if (link == Link::Absent) throw FileError(name, "has no " + part);
+    if (link == Link::Elsewhere) throw FileError(name, part, "a part of this file", "a link");
     return {H5Dopen2(file, path.c_str(), H5P_DEFAULT), H5Dclose, "H5Dopen2"};
   }
 };
@@ -191,7 +213,7 @@ auto quietly(const std::string& name, Use&& use) {
   try {
     return use();
   } catch (const H5CallFailed& failure) {
-    throw FileError(name, std::string("damaged HDF5: ") + failure.what() + " fails");
+    throw FileError(name, std::string("damaged HDF5: ") + failure.what());
   }
 }
 
@@ -209,27 +231,25 @@ Hdf5Input::~Hdf5Input() = default;
 
 Hdf5Input Hdf5Input::of_file(const std::filesystem::path& path) {
   return quietly(path.string(), [&] {
-    return Hdf5Input(std::make_unique<State>(opened_file(path.string()), FileBytes("", path)),
+    return Hdf5Input(std::make_unique<State>(opened_file(path.string()), FileBytes(path)),
                      path.string());
   });
 }
 
 Hdf5Input Hdf5Input::of_bytes(std::string bytes, std::string name) {
   return quietly(name, [&] {
-    return Hdf5Input(std::make_unique<State>(opened_bytes(bytes), FileBytes(bytes, {})), name);
+    H5Id file = opened_bytes(bytes);
+    return Hdf5Input(std::make_unique<State>(std::move(file), FileBytes(std::move(bytes))), name);
   });
 }
 
 bool Hdf5Input::holds(const std::string& path) const {
   const H5Quiet quiet;
-  for (std::size_t at = path.find('/', 1);; at = path.find('/', at + 1)) {
-    const std::string part = path.substr(0, at);
-    H5L_info_t link;
-    if (H5Lexists(state_->file, part.c_str(), H5P_DEFAULT) <= 0) return false;
-    if (at == std::string::npos) return true;
-    if (H5Lget_info(state_->file, part.c_str(), &link, H5P_DEFAULT) < 0 ||
-        link.type != H5L_TYPE_HARD)
-      return false;
+  try {
+    const auto [link, part] = state_->link_at(path);
+    return link != State::Link::Absent && part.size() == path.size();
+  } catch (const H5CallFailed&) {
+    return false;
   }
 }
 

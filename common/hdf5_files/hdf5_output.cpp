@@ -46,7 +46,7 @@ auto or_input_error(Use&& use) {
   try {
     return use();
   } catch (const H5CallFailed& failure) {
-    throw InputError(std::string("cannot be written as HDF5: ") + failure.what() + " fails");
+    throw InputError(std::string("cannot be written as HDF5: ") + failure.what());
   }
 }
 

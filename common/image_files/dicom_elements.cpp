@@ -4,15 +4,16 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <charconv>
-#include <cmath>
 #include <cstring>
 #include <fstream>
 #include <limits>
+#include <optional>
 #include <string_view>
 
 #include "base/error.h"
 #include "base/number_text.h"
+#include "base/parsed_number.h"
+#include "base/toml_text.h"
 #include "files/input_file.h"
 #include "files/input_guard.h"
 
@@ -219,10 +220,7 @@ class DicomWalker {
     } else {
       need(header.length, end);
       if (header.length % unit_bytes(header.form) != 0) fail("a length that does not fit its form");
-      if (header.form == "SQ")
-        read_items(
-            encoding, at_ + header.length, false, depth + 1, kept_sequence(header.tag, into));
-      else if (is_implicit_sequence(header, into))
+      if (header.form == "SQ" || is_implicit_sequence(header, into))
         read_items(
             encoding, at_ + header.length, false, depth + 1, kept_sequence(header.tag, into));
       else if (into != nullptr && header.length <= longest_kept(header.tag) && !is_pixels)
@@ -370,6 +368,28 @@ const DicomValues* functional_group(const DicomElements& header, int frame, Dico
   return shared.items(macro).empty() ? nullptr : &shared.item(macro);
 }
 
+std::optional<Eigen::Vector2d> dicom_spacing_mm(const DicomValues& values,
+                                                DicomTag tag,
+                                                const char* name,
+                                                const std::string& file) {
+  const std::vector<double> found = values.numbers(tag, name, file);
+  if (found.empty()) return std::nullopt;
+  if (found.size() != 2 || !(found[0] > 0.0 && found[1] > 0.0))
+    throw InputError(name, "'" + values.text(tag) + "'", "must be two positive numbers (mm)", file);
+  return Eigen::Vector2d(found[1], found[0]);
+}
+
+std::optional<Eigen::Vector2d> imager_spacing_mm(const DicomElements& header, int frame) {
+  constexpr DicomTag kPixelProperties = {0x0028, 0x9443};
+  constexpr DicomTag kImagerSpacing = {0x0018, 0x1164};
+  constexpr const char* kName = "ImagerPixelSpacing (0018,1164)";
+  const std::string file = header.path().string();
+  if (const DicomValues* const pixels = functional_group(header, frame, kPixelProperties);
+      pixels != nullptr)
+    if (const auto spacing = dicom_spacing_mm(*pixels, kImagerSpacing, kName, file)) return spacing;
+  return dicom_spacing_mm(header.values(), kImagerSpacing, kName, file);
+}
+
 std::uint64_t DicomElements::pixel_bytes() const {
   std::uint64_t bytes = 0;
   for (const DicomPart& part : pixel_parts_) bytes += part.bytes;
@@ -396,17 +416,16 @@ const DicomValues& DicomValues::item(DicomTag sequence) const {
 std::vector<double> DicomValues::numbers(DicomTag tag,
                                          const char* name,
                                          const std::string& file) const {
+  constexpr std::size_t kMostBytes = 200;  // of the text in the message
   const std::string all = text(tag);
   std::vector<double> values;
   for (std::size_t at = 0; at < all.size();) {
     const std::size_t end = std::min(all.find('\\', at), all.size());
-    std::string word = trimmed(all.substr(at, end - at));
-    if (word.starts_with('+')) word.erase(0, 1);
-    double value = 0.0;
-    const auto [rest, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-    if (error != std::errc() || rest != word.data() + word.size() || !std::isfinite(value))
-      throw InputError(name, "'" + all.substr(0, 200) + "'", "must be finite numbers", file);
-    values.push_back(value);
+    const std::optional<double> value = finite_number(trimmed(all.substr(at, end - at)));
+    if (!value)
+      throw InputError(
+          name, "'" + beginning_of(all, kMostBytes) + "'", "must be finite numbers", file);
+    values.push_back(*value);
     at = end + 1;
   }
   return values;

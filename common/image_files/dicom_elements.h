@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include <Eigen/Core>
+
 namespace af {
 
 /// (group, element).
@@ -87,6 +89,18 @@ class DicomElements {
 /// functional groups, else in the shared ones, else nullptr. Files without functional groups have
 /// none.
 const DicomValues* functional_group(const DicomElements& header, int frame, DicomTag macro);
+
+/// Column, row (mm), which DICOM states as "row\column"; none when the element is absent.
+/// InputError naming `name` and `file` when it is not two positive numbers.
+std::optional<Eigen::Vector2d> dicom_spacing_mm(const DicomValues& values,
+                                                DicomTag tag,
+                                                const char* name,
+                                                const std::string& file);
+
+/// ImagerPixelSpacing (column, row; of the detector's plane) of a frame (from 1): that of its
+/// functional groups, else of the top level; none when the file states none. InputError when it is
+/// not two positive numbers.
+std::optional<Eigen::Vector2d> imager_spacing_mm(const DicomElements& header, int frame);
 
 /// True for a file with the mark of DICOM, or without its preamble as old files are. Reads a few
 /// bytes only.

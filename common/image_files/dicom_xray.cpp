@@ -13,7 +13,6 @@ namespace af {
 namespace {
 
 constexpr DicomTag kModality = {0x0008, 0x0060};
-constexpr DicomTag kImagerPixelSpacing = {0x0018, 0x1164};
 constexpr DicomTag kPhotometric = {0x0028, 0x0004};
 constexpr DicomTag kPixelSpacing = {0x0028, 0x0030};
 constexpr DicomTag kRelationship = {0x0028, 0x1040};
@@ -21,21 +20,8 @@ constexpr DicomTag kSign = {0x0028, 0x1041};
 constexpr DicomTag kWindowCenter = {0x0028, 0x1050};
 constexpr DicomTag kWindowWidth = {0x0028, 0x1051};
 constexpr DicomTag kModalityLut = {0x0028, 0x3000};
-constexpr DicomTag kFramePixelProperties = {0x0028, 0x9443};
 constexpr DicomTag kIntensityLuts = {0x0028, 0x9422};
 constexpr DicomTag kLutFunction = {0x0028, 0x9474};
-
-/// Column, row, from DICOM's "row\column".
-std::optional<Eigen::Vector2d> spacing_of(const DicomValues& header,
-                                          DicomTag tag,
-                                          const char* name,
-                                          const std::string& file) {
-  const std::vector<double> values = header.numbers(tag, name, file);
-  if (values.empty()) return std::nullopt;
-  if (values.size() != 2 || !(values[0] > 0.0 && values[1] > 0.0))
-    throw InputError(name, "'" + header.text(tag) + "'", "must be two positive numbers (mm)", file);
-  return Eigen::Vector2d(values[1], values[0]);
-}
 
 PixelIntensity relationship_of(const std::string& text) {
   if (text.empty()) return PixelIntensity::NotStated;
@@ -113,19 +99,6 @@ void apply_modality_lut(const DicomPixelLayout& layout, DicomXray& xray) {
   }
 }
 
-/// What an enhanced file says of one frame alone.
-void read_functional_groups(const DicomElements& header, DicomXray& xray) {
-  const std::string file = header.path().string();
-  if (const DicomValues* const pixels = functional_group(header, xray.frame, kFramePixelProperties);
-      pixels != nullptr) {
-    const auto spacing = spacing_of(*pixels, kImagerPixelSpacing, "ImagerPixelSpacing", file);
-    if (spacing) xray.imager_spacing_mm = spacing;
-  }
-  if (const DicomValues* const luts = functional_group(header, xray.frame, kIntensityLuts);
-      luts != nullptr)
-    xray.intensity_function = luts->text(kLutFunction);
-}
-
 Image2d image_of(const DicomPixelLayout& layout) {
   const std::vector<double> values = read_dicom_pixels(layout);
   Image2d image(layout.columns, layout.rows);
@@ -162,11 +135,12 @@ DicomXray read_dicom_xray(const std::filesystem::path& path, std::optional<int> 
     xray.window = center + "/" + header.text(kWindowWidth);
   const auto [low, high] = layout.value_range();
   xray.inversion_sum = low + high;
-  const DicomValues& values = header.values();
-  const std::string file = path.string();
-  xray.imager_spacing_mm = spacing_of(values, kImagerPixelSpacing, "ImagerPixelSpacing", file);
-  xray.pixel_spacing_mm = spacing_of(values, kPixelSpacing, "PixelSpacing", file);
-  read_functional_groups(header, xray);
+  xray.imager_spacing_mm = imager_spacing_mm(header, xray.frame);
+  xray.pixel_spacing_mm =
+      dicom_spacing_mm(header.values(), kPixelSpacing, "PixelSpacing", path.string());
+  if (const DicomValues* const luts = functional_group(header, xray.frame, kIntensityLuts);
+      luts != nullptr)
+    xray.intensity_function = luts->text(kLutFunction);
   xray.image = image_of(layout);
   if (header.has(kModalityLut)) apply_modality_lut(layout, xray);
   return xray;

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <bit>
-#include <charconv>
 #include <cmath>
 #include <map>
 #include <optional>
 #include <sstream>
 
 #include "base/error.h"
+#include "base/parsed_number.h"
 #include "image_files/image_formats.h"
 #include "image_files/image_text_header.h"
 #include "image_files/itk_image_io.h"
@@ -79,12 +79,9 @@ void check_meta_numbers(const TextHeader& header, const std::string& key, std::i
   std::int64_t count = 0;
   std::istringstream words(*text);
   for (std::string word; words >> word; ++count) {
-    double value = 0.0;
-    const char* first = word.data() + (word[0] == '+' ? 1 : 0);
-    const auto [end, error] = std::from_chars(first, word.data() + word.size(), value);
-    if (error != std::errc() || end != word.data() + word.size())
-      throw FileError(header.path, key, "numbers", "'" + *text + "'");
-    if (!std::isfinite(value))
+    const std::optional<double> value = parsed_number(word);
+    if (!value) throw FileError(header.path, key, "numbers", "'" + *text + "'");
+    if (!std::isfinite(*value))
       throw InputError(key, "'" + *text + "'", "must be finite", header.path);
   }
   if (count != expected)

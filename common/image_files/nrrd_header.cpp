@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <bit>
-#include <charconv>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <sstream>
 
 #include "base/error.h"
+#include "base/parsed_number.h"
 #include "base/plausible.h"
 #include "image_files/image_formats.h"
 #include "image_files/image_text_header.h"
@@ -115,11 +116,9 @@ double nrrd_vector_length(const std::string& text) {
   double length = 0.0;
   std::istringstream numbers(text.substr(1));
   for (std::string number; std::getline(numbers, number, ',');) {
-    const std::string word = trimmed(number);
-    double value = 0.0;
-    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-    if (error != std::errc() || end != word.data() + word.size()) return std::nan("");
-    length = std::hypot(length, value);
+    const std::optional<double> value = parsed_number(trimmed(number));
+    if (!value) return std::nan("");
+    length = std::hypot(length, *value);
   }
   return length;
 }

@@ -43,6 +43,7 @@ registration::MethodOptions method_options(const RegistrationOptions& options) {
 
 registration::UncertaintyOptions uncertainty_options(const RegistrationOptions& options) {
   registration::UncertaintyOptions result;
+  result.is_left_out = options.no_uncertainty;
   result.calibration_error_px = options.calibration_error_px;
   af::throw_if_any(af::field_problems(result));
   return result;
@@ -237,6 +238,11 @@ std::optional<Pose> RegistrationCase::landmark_start() const {
     if (!af::has_landmarks(study_case)) return std::nullopt;
     return library::pose_of(af::landmark_pose(impl_->study, study_case).room_from_ct);
   });
+}
+
+Pose RegistrationCase::usual_start() const {
+  const std::optional<Pose> by_landmarks = landmark_start();
+  return by_landmarks.has_value() ? *by_landmarks : frame().pose({}, {});
 }
 
 Registration RegistrationCase::run(const Pose& start, std::int64_t start_index) const {

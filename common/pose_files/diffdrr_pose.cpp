@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pose_files/diffdrr_pose.h"
 
-#include <cmath>
-
 #include "base/error.h"
 #include "base/toml_text.h"
 #include "geometry/diffdrr_convention.h"
@@ -11,18 +9,9 @@
 namespace af {
 namespace {
 
-using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 constexpr const char* kMarkKey = "diffdrr_parameterization";
-
-/// DiffDRR's world from ct: to RAS axes about the middle of the volume.
-RigidTransform world_from_ct(const Vector3d& middle_ct_mm) {
-  RigidTransform world_from_ct = RigidTransform::Identity();
-  world_from_ct.linear() = Vector3d(-1.0, -1.0, 1.0).asDiagonal();
-  world_from_ct.translation() = -(world_from_ct.linear() * middle_ct_mm);
-  return world_from_ct;
-}
 
 CameraRig rig_of(const PoseContext& context, const std::string& file) {
   if (!context.rig)
@@ -46,13 +35,11 @@ CameraGeometry camera_of(const CameraRig& rig, const std::string& name, const st
   return rig.cameras.front();
 }
 
-void check_pose(TomlTableReader& reader, const DiffDrrPose& pose) {
-  if (pose.parameterization != "euler_angles" && pose.parameterization != "quaternion")
-    reader.add_problem(kMarkKey, "must be \"euler_angles\" or \"quaternion\"");
-  if (pose.parameterization == "euler_angles" && !is_diffdrr_convention(pose.convention))
-    reader.add_problem("convention", "must be three of X, Y and Z, neighbours different");
-  if (pose.orientation != "AP" && pose.orientation != "PA" && pose.orientation != "none")
-    reader.add_problem("orientation", "must be \"AP\", \"PA\" or \"none\"");
+/// DiffDRR's cameras are not mirrored, unless reverse_x_axis=False, which no pose states.
+RigidTransform room_from_camera_of(const CameraGeometry& camera) {
+  if (camera.is_mirrored())
+    throw InputError("camera", camera.name, "must not be mirrored: DiffDRR's cameras are not");
+  return room_from_diffdrr_camera(camera);
 }
 
 }  // namespace
@@ -71,7 +58,9 @@ PosesInFile read_diffdrr(const PoseFileBytes& file, const PoseContext& context) 
   pose.convention = reader.get_string("convention", Presence::Optional).value_or(pose.convention);
   pose.orientation =
       reader.get_string("orientation", Presence::Optional).value_or(pose.orientation);
-  check_pose(reader, pose);
+  for (const DiffDrrProblem& problem : af::problems(pose))
+    reader.add_problem(problem.member == "parameterization" ? kMarkKey : problem.member.c_str(),
+                       problem.constraint);
   const int numbers = pose.parameterization == "quaternion" ? 4 : 3;
   const char* const rotation_key = numbers == 4 ? "rotation" : "rotation_rad";
   const auto rotations = reader.get_matrix(rotation_key, -1, numbers, Presence::Required);
@@ -83,18 +72,19 @@ PosesInFile read_diffdrr(const PoseFileBytes& file, const PoseContext& context) 
   reader.refuse_unknown_keys();
   problems.throw_if_any();
   const RigidTransform room_from_camera =
-      room_from_diffdrr_camera(camera_of(rig_of(context, name), camera, name));
-  const RigidTransform from_ct = world_from_ct(middle ? *middle : middle_of(context, name));
+      room_from_camera_of(camera_of(rig_of(context, name), camera, name));
+  const RigidTransform world_from_ct =
+      diffdrr_world_from_lps(middle ? *middle : middle_of(context, name));
   PosesInFile found;
   for (Eigen::Index i = 0; i < rotations->rows(); ++i) {
     const Eigen::VectorXd rotation = rotations->row(i).transpose();
     const std::string where = name + ": pose " + std::to_string(i + 1);
-    if (numbers == 4 && !(std::abs(rotation.norm() - 1.0) <= 1e-5))
-      throw InputError(where + ": the quaternion's norm is not 1");
     pose.rotation.assign(rotation.begin(), rotation.end());
+    for (const DiffDrrProblem& problem : af::problems(pose))
+      throw InputError(where + ": " + problem.member + " " + problem.constraint);
     pose.translation_mm = translations->row(i).transpose();
     const RigidTransform room_from_ct =
-        room_from_camera * world_from_diffdrr_camera(pose).inverse() * from_ct;
+        room_from_camera * world_from_diffdrr_camera(pose).inverse() * world_from_ct;
     found.poses.push_back({i + 1, rigid_or_throw(room_from_ct.matrix(), where)});
   }
   return found;
@@ -109,7 +99,7 @@ std::string write_diffdrr(std::span<const RigidTransform> room_from_ct,
   std::string translations;
   for (const RigidTransform& pose : room_from_ct) {
     const RigidTransform world_from_camera =
-        world_from_ct(middle) * pose.inverse() * room_from_diffdrr_camera(camera);
+        diffdrr_world_from_lps(middle) * pose.inverse() * room_from_camera_of(camera);
     const DiffDrrPose written = diffdrr_pose_of(world_from_camera);
     rotations += (rotations.empty() ? "" : ", ") +
                  toml_numbers(Eigen::Map<const Vector3d>(written.rotation.data()));

@@ -10,6 +10,7 @@
 #include "base/error.h"
 #include "base/named_rows.h"
 #include "base/number_text.h"
+#include "base/toml_text.h"
 
 namespace af {
 namespace {
@@ -91,7 +92,7 @@ std::map<std::string, std::string> itk_fields(const std::string& text, const std
     if (line.front() == '#') continue;
     const std::size_t colon = line.find(':');
     if (colon == std::string::npos)
-      throw FileError(file, "line '" + line.substr(0, 40) + "' has no colon");
+      throw FileError(file, "line '" + beginning_of(line, 40) + "' has no colon");
     if (!fields.emplace(line.substr(0, colon), line.substr(colon + 1)).second)
       throw FileError(file,
                       "'" + line.substr(0, colon) + "' is repeated; one transform is expected");
@@ -115,7 +116,7 @@ RigidTransform map_of_itk_transform(const ItkTransform& transform, const std::st
   if (type == nullptr || !transform.type.ends_with("_3_3"))
     throw InputError(
         file + ": Transform",
-        transform.type.substr(0, 60),
+        beginning_of(transform.type, 60),
         "must be one of " + joined(names_of(kItkTypes)) + ", in three dimensions (_double_3_3)");
   const auto check_count =
       [&](const char* what, std::size_t least, std::size_t most, std::size_t found) {

@@ -2,12 +2,13 @@
 #include "pose_files/pose_file.h"
 
 #include <algorithm>
-#include <charconv>
-#include <cmath>
+#include <optional>
 #include <sstream>
 
 #include "base/error.h"
 #include "base/named_rows.h"
+#include "base/parsed_number.h"
+#include "base/toml_text.h"
 #include "files/output_file.h"
 #include "pose_files/autoscoper_pose.h"
 #include "pose_files/dicom_registration.h"
@@ -58,15 +59,6 @@ constexpr std::array kPoseFormats = {
                write_plain_pose},
 };
 
-/// What fits into a message, no character of UTF-8 cut in two.
-std::string beginning_of(std::string_view word) {
-  constexpr std::size_t kMostBytes = 40;
-  std::size_t end = std::min(kMostBytes, word.size());
-  while (end > 0 && end < word.size() && (static_cast<unsigned char>(word[end]) & 0xC0) == 0x80)
-    --end;
-  return std::string(word.substr(0, end));
-}
-
 /// With at least one pose; its notes are passed on.
 PosesInFile filled_pose_file(const std::filesystem::path& path,
                              const PoseContext& context,
@@ -92,19 +84,18 @@ RigidTransform rigid_or_throw(const Eigen::Matrix4d& matrix, const std::string& 
 
 std::vector<double> numbers_of(std::string_view text, const std::string& where) {
   constexpr std::string_view kSeparators = " \t\r\n,;[]()";
+  constexpr std::size_t kMostBytes = 40;  // of a word in the message
   std::vector<double> numbers;
   for (std::size_t start = 0;;) {
     start = text.find_first_not_of(kSeparators, start);
     if (start == std::string_view::npos) return numbers;
     const std::size_t stop = std::min(text.find_first_of(kSeparators, start), text.size());
-    std::string_view word = text.substr(start, stop - start);
+    const std::string_view word = text.substr(start, stop - start);
     start = stop;
-    if (word.starts_with('+') && !word.starts_with("+-")) word.remove_prefix(1);
-    double value = 0.0;
-    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-    if (error != std::errc() || end != word.data() + word.size() || !std::isfinite(value))
-      throw FileError(where, "pose", "finite numbers", "'" + beginning_of(word) + "'");
-    numbers.push_back(value);
+    const std::optional<double> value = finite_number(word);
+    if (!value)
+      throw FileError(where, "pose", "finite numbers", "'" + beginning_of(word, kMostBytes) + "'");
+    numbers.push_back(*value);
   }
 }
 

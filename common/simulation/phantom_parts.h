@@ -38,7 +38,7 @@ struct Phantom {
 };
 
 /// The patient that a phantom of the typical adult becomes: bodies, volume and target by `habitus`,
-/// densities and textures by `anatomy`. 	est ShapedPhantom.KeepsCapsulesJoined
+/// densities and textures by `anatomy`. \test ShapedPhantom.KeepsCapsulesJoined
 Phantom shaped(Phantom phantom, const Anatomy& anatomy, const Habitus& habitus);
 
 /// Voxels of a phantom; metal at its full HU.

@@ -108,12 +108,11 @@ PolychromaticAttenuation::Node PolychromaticAttenuation::interpolated(double wat
 }
 
 template <typename Function>
-PolychromaticAttenuation::Value PolychromaticAttenuation::within_limits(double all,
-                                                                        double bone,
-                                                                        const Function& node_at) {
-  if (!(all > 0.0)) {
-    const Node air = node_at(0.0, 0.0);
-    return {air.by_water * all, air.by_water, 0.0};
+PolychromaticAttenuation::Value PolychromaticAttenuation::within_limits(
+    double all, double bone, const Function& node_at) const {
+  if (!(all > 0.0)) {  // much of a DRR is air
+    const double by_all = nodes_.front().by_water;
+    return {by_all * all, by_all, 0.0};
   }
   if (bone < 0.0) {
     const Node water = node_at(all, 0.0);

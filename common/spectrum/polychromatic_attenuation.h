@@ -54,7 +54,7 @@ class PolychromaticAttenuation {
     double bone;
   };
   template <typename Function>
-  [[nodiscard]] static Value within_limits(double all, double bone, const Function& node_at);
+  [[nodiscard]] Value within_limits(double all, double bone, const Function& node_at) const;
   /// To single precision: the last bits of exp() and log() differ between processors, DRRs do not.
   static Node rounded(const Node& node);
   [[nodiscard]] Node summed(double water, double bone) const;

@@ -2,6 +2,7 @@
 #include "study/ct_keys.h"
 
 #include <algorithm>
+#include <set>
 #include <stdexcept>
 #include <variant>
 #include <vector>
@@ -96,40 +97,54 @@ bool says_what_voxels_hold(const std::string& name) {
   return name.starts_with("values") || name.starts_with("raw_") || name == "label_hu";
 }
 
-/// The options under their names as keys of a study, so that one reader reads both.
+/// Those of the texts that are CtReadOptions, as keys of a study.
 std::string keys_of(const OptionTexts& texts) {
+  std::set<std::string> names;
+  CtReadOptions reading;
+  for (const Field& field : fields_of(reading)) names.insert(field.name);
   std::string text;
-  CtReadOptions names;
-  for (const Field& field : fields_of(names))
-    if (const auto found = texts.find(field.name); found != texts.end())
-      text += std::string(kPrefix).append(field.name + " = " + found->second + "\n");
+  for (const auto& [name, value] : texts)
+    if (names.contains(name))
+      text += std::string(kPrefix).append(name).append(" = ").append(value).append("\n");
   return text;
+}
+
+/// Sets a field to another's value, of the same type.
+void set_field(const Field& field, const Field& other) {
+  std::visit([&](auto* value) { *value = *std::get<decltype(value)>(other.value); }, field.value);
+}
+
+bool have_equal_values(const Field& field, const Field& other) {
+  return std::visit([&](auto* value) { return *value == *std::get<decltype(value)>(other.value); },
+                    field.value);
 }
 
 }  // namespace
 
 std::string ct_keys_text(const CtReadOptions& reading) {
-  std::string text;
-  for (const auto& [name, value] : stated_texts(reading))
-    text += std::string(kPrefix).append(name).append(" = ").append(value).append("\n");
-  return text;
+  return keys_of(stated_texts(reading));
 }
 
 CtReadOptions ct_reading_in_force(const CtReadOptions& typed, const CtReadOptions& of_study) {
-  OptionTexts stated = stated_texts(of_study);
-  const OptionTexts of_command = stated_texts(typed);
+  CtReadOptions in_force = of_study;
+  CtReadOptions of_command = typed;
+  CtReadOptions usual;
   // What voxels hold is one statement: "labels" of a study does not go with a typed "mu".
-  if (of_command.contains("values"))
-    std::erase_if(stated, [](const auto& option) { return says_what_voxels_hold(option.first); });
-  for (const auto& [name, value] : of_command) stated[name] = value;
-  const std::string place = "how the CT is read, as typed and by the study";
-  const toml::table table = parse_toml("# CT\n" + keys_of(stated), place);
-  TomlProblems problems(place);
-  TomlTableReader reader(table, "", problems);
-  CtReadOptions reading = read_ct_keys(reader);
-  problems.throw_if_any();
-  reading.series_uid = typed.series_uid.empty() ? of_study.series_uid : typed.series_uid;
-  return reading;
+  const bool replaces_values = typed.values != usual.values;
+  const Fields commanded = fields_of(of_command);
+  const Fields defaults = fields_of(usual);
+  auto command = commanded.begin();
+  auto by_default = defaults.begin();
+  for (const Field& field : fields_of(in_force)) {
+    if (!have_equal_values(*command, *by_default))
+      set_field(field, *command);
+    else if (replaces_values && says_what_voxels_hold(field.name))
+      set_field(field, *by_default);
+    ++command;
+    ++by_default;
+  }
+  throw_if_any(problems(in_force), "how the CT is read, as typed and by the study");
+  return in_force;
 }
 
 CtReadOptions ct_reading_of(const std::string& options_toml) {

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "image_files/ct_reader.h"
@@ -17,6 +18,11 @@ struct CtFacts {
   CtGrid grid;
   std::string content_sha256;
   std::vector<Eigen::Vector3d> cut_points_ct;  ///< see cut_points()
+
+  auto members() {
+    return std::tie(
+        grid.size, grid.origin_mm, grid.spacing_mm, grid.direction, content_sha256, cut_points_ct);
+  }
 };
 
 /// The attenuation of a CT, held once per node.

@@ -3,6 +3,8 @@
 
 #include <memory>
 
+#include "study/ct_keys.h"
+
 namespace af {
 
 namespace fs = std::filesystem;
@@ -26,11 +28,14 @@ PoseContext pose_context(const fs::path& ct,
   return context;
 }
 
-PoseContext pose_context(const Study& study, const StudyCase& study_case) {
+PoseContext pose_context(const Study& study,
+                         const StudyCase& study_case,
+                         const CtReadOptions& typed) {
   CameraRig rig{study.rig.isocenter_point, {}};
   for (const StudyView& view : study_case.views)
     rig.cameras.push_back(study.rig.camera(view.camera));
-  return pose_context(study_case.ct, study_case.ct_reading, rig, study_case.frame());
+  return pose_context(
+      study_case.ct, ct_reading_in_force(typed, study_case.ct_reading), rig, study_case.frame());
 }
 
 }  // namespace af

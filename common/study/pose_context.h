@@ -18,7 +18,10 @@ PoseContext pose_context(const std::filesystem::path& ct,
                          const std::optional<CameraRig>& rig,
                          const std::optional<PoseFrame>& frame);
 
-/// That of a case: its CT, the cameras of its views, its nominal pose.
-PoseContext pose_context(const Study& study, const StudyCase& study_case);
+/// That of a case: its CT, read as the command line says (`typed`) where it differs from the study,
+/// the cameras of its views, its nominal pose. InputError as of ct_reading_in_force().
+PoseContext pose_context(const Study& study,
+                         const StudyCase& study_case,
+                         const CtReadOptions& typed = {});
 
 }  // namespace af

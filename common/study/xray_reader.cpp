@@ -225,6 +225,13 @@ Image2d load_companion(const std::filesystem::path& path,
   return std::move(loaded.image);
 }
 
+/// Whether correct_by_flat() changes a view's X-ray.
+bool has_corrections(const StudyView& view) {
+  const XrayReading& reading = view.reading;
+  return view.xray_domain == XrayDomain::Intensity &&
+         (reading.flat || reading.dark || reading.dark_level != 0.0);
+}
+
 /// Dark and flat fields of a view, where it has them; `mask` loses pixels without a beam.
 void correct_by_flat(const StudyView& view,
                      const CameraGeometry& camera,
@@ -415,13 +422,11 @@ void use_borders(const XrayBorders& borders, const StudyView& view, Image2d& mas
                      view.xray.string());
 }
 
-/// The X-ray and its mask as the camera without distortion sees them.
-void undistort(const XrayUndistortion& undistortion,
-               const StudyView& view,
-               Image2d& image,
-               Image2d& mask,
-               Note& note) {
-  image = undistortion.image(image);
+/// The mask as the camera without distortion sees it; refuses a distortion that leaves too little.
+void undistort_mask(const XrayUndistortion& undistortion,
+                    const StudyView& view,
+                    Image2d& mask,
+                    Note& note) {
   const bool has_mask = !mask.pixels.empty();
   mask = undistortion.mask(mask);
   note.add(undistortion.text());
@@ -475,11 +480,12 @@ ViewXray read_view_xray(const StudyView& view, const CameraGeometry& camera) {
   XrayBorders borders;
   std::optional<XrayUndistortion> undistortion;
   if (!camera.distortion.is_none()) undistortion.emplace(camera);
+  Image2d undistorted;
   std::optional<double> inversion;
   used_from(view.places, "xray", [&] {
     image = load_oriented(view, camera, inversion, note, xray.warnings);
     check_values(image, view);
-    const Image2d undistorted = undistortion ? undistortion->image(image) : Image2d();
+    if (undistortion) undistorted = undistortion->image(image);
     const Image2d& shown = undistortion ? undistorted : image;
     if (needs_borders(view, shown)) borders = borders_of(shown, view.xray_domain);
     note_background(shown, view, borders, note, xray.warnings);
@@ -488,7 +494,10 @@ ViewXray read_view_xray(const StudyView& view, const CameraGeometry& camera) {
   if (view.xray_domain == XrayDomain::Intensity)
     correct_by_flat(view, camera, inversion, image, xray.mask, note);
   if (undistortion)
-    used_from(view.places, "xray", [&] { undistort(*undistortion, view, image, xray.mask, note); });
+    used_from(view.places, "xray", [&] {
+      image = has_corrections(view) ? undistortion->image(image) : std::move(undistorted);
+      undistort_mask(*undistortion, view, xray.mask, note);
+    });
   used_from(view.places, "xray", [&] {
     if (view.xray_domain == XrayDomain::Intensity)
       take_negative_log(image, air_level(image, borders, view, note));

@@ -5,10 +5,13 @@
 #include <charconv>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <set>
 #include <utility>
 
 #include "base/error.h"
+#include "base/number_text.h"
+#include "base/parsed_number.h"
 #include "files/input_guard.h"
 #include "files/output_file.h"
 
@@ -53,15 +56,6 @@ std::string_view trimmed(std::string_view text) {
   const std::size_t first = text.find_first_not_of(kBlanks);
   if (first == std::string_view::npos) return {};
   return text.substr(first, text.find_last_not_of(kBlanks) - first + 1);
-}
-
-std::optional<double> finite_number(std::string_view text) {
-  text = trimmed(text);
-  if (text.starts_with('+') && !text.starts_with("+-")) text.remove_prefix(1);
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) return {};
-  return value;
 }
 
 }  // namespace
@@ -237,7 +231,7 @@ const std::string& CsvTable::text(std::size_t row, std::string_view column) cons
 
 double CsvTable::number(std::size_t row, std::string_view column) const {
   const std::string& value = text(row, column);
-  if (const auto parsed = finite_number(value)) return *parsed;
+  if (const auto parsed = finite_number(trimmed(value))) return *parsed;
   throw FileError(where(row), std::string(column), "a finite number", "'" + value + "'");
 }
 

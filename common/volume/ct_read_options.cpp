@@ -2,13 +2,13 @@
 #include "volume/ct_read_options.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <optional>
 #include <set>
 
 #include "base/joined.h"
 #include "base/number_text.h"
+#include "base/parsed_number.h"
 #include "base/plausible.h"
 
 namespace af {
@@ -17,20 +17,12 @@ namespace {
 
 constexpr double kUnlabelledHu = -1000.0;
 
-std::optional<double> number_of(const std::string& text) {
-  double value = 0.0;
-  const char* const end = text.data() + text.size();
-  const auto [rest, error] = std::from_chars(text.data(), end, value);
-  if (error != std::errc() || rest != end || !std::isfinite(value)) return std::nullopt;
-  return value;
-}
-
 /// "3=700"; nullopt for anything else.
 std::optional<std::pair<double, double>> label_of(const std::string& text) {
   const std::size_t equals = text.find('=');
   if (equals == std::string::npos) return std::nullopt;
-  const auto label = number_of(text.substr(0, equals));
-  const auto hu = number_of(text.substr(equals + 1));
+  const auto label = finite_number(text.substr(0, equals));
+  const auto hu = finite_number(text.substr(equals + 1));
   if (!label || !hu || *label != std::round(*label) || std::abs(*hu) > 32767.0) return std::nullopt;
   return std::pair{*label, *hu};
 }

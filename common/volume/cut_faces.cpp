@@ -19,24 +19,12 @@ constexpr std::size_t kMostPointsOfAFace = 2000;
 struct AttenuatingPart {
   const CtVolume& ct;
   const AttenuationModel& model;
-  std::array<int, 3> low;   ///< voxel indices, inclusive
-  std::array<int, 3> high;  ///< inclusive
-
-  AttenuatingPart(const CtVolume& of_ct, const AttenuationModel& of_model)
-      : ct(of_ct), model(of_model) {
-    const CtGrid bordered = AttenuationVolume::bordered_grid_of(ct, model);
-    const Eigen::Vector3d first =
-        ct.grid.index_of(bordered.point_mm(Eigen::Vector3d::Ones())).array().round();
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      low[axis] = static_cast<int>(first[static_cast<Eigen::Index>(axis)]);
-      high[axis] = low[axis] + bordered.size[axis] - 3;
-    }
-  }
+  AttenuatingBox box;
 
   /// The attenuating voxels of the layer `index` across `axis`.
   [[nodiscard]] std::vector<Eigen::Vector3i> layer(std::size_t axis, int index) const {
-    std::array<int, 3> first = low;
-    std::array<int, 3> last = high;
+    std::array<int, 3> first = box.low;
+    std::array<int, 3> last = box.high;
     first[axis] = last[axis] = index;
     std::vector<Eigen::Vector3i> voxels;
     const auto& size = ct.grid.size;
@@ -60,9 +48,9 @@ void append_if_cut(const AttenuatingPart& part,
                    std::vector<Eigen::Vector3d>& points) {
   const double spacing_mm = part.ct.grid.spacing_mm[static_cast<Eigen::Index>(axis)];
   const int depth = std::max(1, static_cast<int>(std::lround(kInsideMm / spacing_mm)));
-  const int outermost = is_low ? part.low[axis] : part.high[axis];
+  const int outermost = is_low ? part.box.low[axis] : part.box.high[axis];
   const int inside = is_low ? outermost + depth : outermost - depth;
-  if (inside < part.low[axis] || inside > part.high[axis]) return;
+  if (inside < part.box.low[axis] || inside > part.box.high[axis]) return;
   const std::vector<Eigen::Vector3i> face = part.layer(axis, outermost);
   if (2 * face.size() <= part.layer(axis, inside).size()) return;
   const std::size_t stride = face.size() / kMostPointsOfAFace + 1;
@@ -72,8 +60,10 @@ void append_if_cut(const AttenuatingPart& part,
 
 }  // namespace
 
-std::vector<Eigen::Vector3d> cut_points(const CtVolume& ct, const AttenuationModel& model) {
-  const AttenuatingPart part(ct, model);
+std::vector<Eigen::Vector3d> cut_points(const CtVolume& ct,
+                                        const AttenuationModel& model,
+                                        const AttenuatingBox& box) {
+  const AttenuatingPart part{ct, model, box};
   std::vector<Eigen::Vector3d> points;
   for (std::size_t axis = 0; axis < 3; ++axis)
     for (const bool is_low : {true, false}) append_if_cut(part, axis, is_low, points);

@@ -1,22 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "precompute/plan/axis_ranges.h"
 
-#include <charconv>
-#include <cmath>
+#include <optional>
 #include <sstream>
 
 #include "base/error.h"
+#include "base/parsed_number.h"
 
 namespace af {
-
-std::optional<double> finite_number(std::string_view text) {
-  if (text.starts_with('+')) text.remove_prefix(1);
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value))
-    return std::nullopt;
-  return value;
-}
 
 namespace {
 

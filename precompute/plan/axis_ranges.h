@@ -2,7 +2,6 @@
 #pragma once
 
 #include <array>
-#include <optional>
 #include <string>
 #include <string_view>
 
@@ -22,8 +21,5 @@ AxisRanges axis_ranges(const std::string& option,
                        const std::string& text,
                        char letter,
                        double otherwise);
-
-/// The number that a whole text is, with or without a sign; none for anything else.
-std::optional<double> finite_number(std::string_view text);
 
 }  // namespace af

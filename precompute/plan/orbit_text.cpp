@@ -2,10 +2,11 @@
 #include "precompute/plan/orbit_text.h"
 
 #include <map>
+#include <optional>
 #include <sstream>
 
 #include "base/error.h"
-#include "precompute/plan/axis_ranges.h"
+#include "base/parsed_number.h"
 
 namespace af {
 

@@ -158,4 +158,6 @@ def register(
     if rotation_deg is None and translation_mm is None:
         return case.run()
     zero = (0.0, 0.0, 0.0)
-    return case.run(case.frame.pose(rotation_deg or zero, translation_mm or zero))
+    rotation = zero if rotation_deg is None else rotation_deg
+    translation = zero if translation_mm is None else translation_mm
+    return case.run(case.frame.pose(rotation, translation))

@@ -117,7 +117,8 @@ RegistrationCase load(const std::filesystem::path& study,
                       const std::string& ct_series_uid,
                       std::uint64_t seed,
                       int threads,
-                      double calibration_error_px) {
+                      double calibration_error_px,
+                      bool no_uncertainty) {
   RegistrationOptions options;
   options.preset = preset;
   options.renderer = renderer;
@@ -135,6 +136,7 @@ RegistrationCase load(const std::filesystem::path& study,
   options.seed = seed;
   options.threads = threads;
   options.calibration_error_px = calibration_error_px;
+  options.no_uncertainty = no_uncertainty;
   RegistrationCase loaded = [&] {
     const py::gil_scoped_release release;
     return RegistrationCase::load(study, case_name, options);
@@ -143,9 +145,10 @@ RegistrationCase load(const std::filesystem::path& study,
   return loaded;
 }
 
-Pose usual_start(const RegistrationCase& owner) {
-  const std::optional<Pose> by_landmarks = owner.landmark_start();
-  return by_landmarks.has_value() ? *by_landmarks : owner.frame().pose({}, {});
+template <typename Compute>
+auto without_lock(const Compute& compute) {
+  const py::gil_scoped_release release;
+  return compute();
 }
 
 void bind_case(py::module_& module) {
@@ -184,6 +187,7 @@ void bind_case(py::module_& module) {
                                "seed"_a = 1,
                                "threads"_a = 1,
                                "calibration_error_px"_a = 0.0,
+                               "no_uncertainty"_a = false,
                                "Options are those of af-register.");
   registration_case.def_property_readonly("name", &RegistrationCase::name);
   registration_case.def_property_readonly(
@@ -201,11 +205,17 @@ void bind_case(py::module_& module) {
   registration_case.def(
       "landmark_start",
       [](const RegistrationCase& self) -> py::object {
-        const std::optional<Pose> start = self.landmark_start();
+        const std::optional<Pose> start = without_lock([&] { return self.landmark_start(); });
         if (!start.has_value()) return py::none();
         return matrix_of(*start);
       },
       "The pose that the study's landmarks give, or None without them.");
+  registration_case.def(
+      "usual_start",
+      [](const RegistrationCase& self) {
+        return matrix_of(without_lock([&] { return self.usual_start(); }));
+      },
+      "Where af-register starts unless told: at landmark_start(), else at the nominal pose.");
   registration_case.def(
       "tre_mm",
       [](const RegistrationCase& self, const Numbers& pose) {
@@ -216,13 +226,14 @@ void bind_case(py::module_& module) {
   registration_case.def(
       "run",
       [](const RegistrationCase& self, const std::optional<Numbers>& start, std::int64_t index) {
-        const Pose pose = start.has_value() ? pose_of(*start, "start") : usual_start(self);
+        std::optional<Pose> pose;
+        if (start.has_value()) pose = pose_of(*start, "start");
         const py::gil_scoped_release release;
-        return self.run(pose, index);
+        return self.run(pose.has_value() ? *pose : self.usual_start(), index);
       },
       "start"_a = py::none(),
       "start_index"_a = 0,
-      "Registers from a 4x4 start [as af-register: landmark_start(), else the nominal pose].");
+      "Registers from a 4x4 start [usual_start()].");
   registration_case.def(
       "run_all",
       [](const RegistrationCase& self, const Numbers& starts) {

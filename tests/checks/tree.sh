@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# The tree holds no path of anybody's machine and no mark of an unfinished merge, every source names its licence, and every text file ends with a line
+# The tree holds no path of anybody's machine, no tab and no mark of an unfinished merge, every source names its licence, and every text file ends with a line
 # end. Usage: tree.sh ROOT
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR
@@ -17,6 +17,11 @@ if grep -nE '(^|[^[:alnum:]._$}/-])/(home/[a-z]|root/|work/|mnt/|Users/|tmp/[a-z
 fi
 if grep -nE '^(<{7}|>{7}) ' -- "${files[@]}"; then
   echo "tree: the lines above are marks of an unfinished merge" >&2
+  failed=yes
+fi
+# A tab that was meant to be "\t...", or indentation that looks different everywhere.
+if grep -nP '\t' -- "${files[@]}"; then
+  echo "tree: the lines above hold a tab" >&2
   failed=yes
 fi
 for file in "${files[@]}"; do

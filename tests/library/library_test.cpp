@@ -336,6 +336,32 @@ TEST(LibraryRegistration, RegistersSeveralStartsAsTheProgram) {
   EXPECT_EQ(rate.rate, 1.0);
 }
 
+TEST(LibraryRegistration, LeavesOutTheUncertaintyAndNothingElse) {
+  RegistrationOptions options;
+  options.preset = "fast";
+  options.fields = {{"AP", study_file("AP.af.h5")}, {"LAT", study_file("LAT.af.h5")}};
+  const RegistrationCase full = RegistrationCase::load(study_file("study.toml"), "", options);
+  options.no_uncertainty = true;
+  const RegistrationCase bare = RegistrationCase::load(study_file("study.toml"), "", options);
+  const Pose start = full.frame().pose({-1.0, 0.5, 2.5}, {0.5, 1.0, 4.0});
+  const Registration with = full.run(start);
+  const Registration without = bare.run(start);
+  EXPECT_TRUE(std::isfinite(with.uncertainty.confidence));
+  EXPECT_TRUE(std::isnan(without.uncertainty.confidence));
+  EXPECT_TRUE(std::isnan(without.uncertainty.tre_95_mm));
+  EXPECT_TRUE(std::isnan(without.uncertainty.covariance[2][4]));
+  EXPECT_EQ(without.pose.room_from_ct, with.pose.room_from_ct);
+  EXPECT_EQ(without.verdict, with.verdict);
+}
+
+TEST(LibraryRegistration, StartsAtTheNominalPoseWithoutLandmarks) {
+  RegistrationOptions options;
+  options.renderer = "raycast";
+  const RegistrationCase loaded = RegistrationCase::load(study_file("study.toml"), "", options);
+  EXPECT_FALSE(loaded.landmark_start().has_value());
+  EXPECT_EQ(loaded.usual_start().room_from_ct, loaded.frame().pose({}, {}).room_from_ct);
+}
+
 TEST(LibraryRegistration, RefusesWhatTheProgramRefuses) {
   RegistrationOptions options;
   options.preset = "hasty";

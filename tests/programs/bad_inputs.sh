@@ -374,6 +374,10 @@ printf '%s\n' '#Insight' 'Transform: Euler3DTransform_double_3_3' 'Parameters: 1
 row 4 'number of Parameters' 'Euler transform of five numbers' "${drr_of_ct[@]}" --pose five.tfm
 printf '%s\n' 'diffdrr_parameterization = "se3"' 'rotation_rad = [[0, 0, nan]]' 'translation_mm = [[0, 0]]' >bad-diffdrr.toml
 row 3 'diffdrr_parameterization' 'DiffDRR pose with mistakes' "${drr_of_ct[@]}" --pose bad-diffdrr.toml
+sed -E 's/^ct = .*/ct = "..\/two-series"/' valid/study.toml >valid/two-series.toml
+printf '%s\n' '1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1' >one.tra
+row 3 '--series = 9.9: no such series' 'Autoscoper start of a series not there' in_time \
+  "$bin/af-register" --study valid/two-series.toml --renderer raycast -o out/result --series 9.9 --start-pose one.tra
 row 2 'requires' 'a case without a study' "$bin/af-inspect" one.txt --pose-to toml --case a -o out/one.toml
 row 3 'Autoscoper' 'Autoscoper pose of no CT' "$bin/af-inspect" one.txt --pose-to autoscoper -o out/one.tra
 

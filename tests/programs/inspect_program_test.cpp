@@ -16,6 +16,7 @@
 #include "pose_files/pose_file.h"
 #include "programs/small_study.h"
 #include "study/rig_file.h"
+#include "support/io_checks.h"
 #include "support/run_program.h"
 #include "support/test_paths.h"
 #include "text/csv_table.h"
@@ -102,6 +103,23 @@ TEST(AfInspect, RefusesADicomFolderWithTwoSeriesUntilOneIsChosen) {
   EXPECT_THAT(run.output, HasSubstr("1.2.3.5  5 slices"));
   const json entry = inspect_json("--series 1.2.3.5 " + (folder / "dicom").string());
   EXPECT_EQ(entry["facts"]["ct_content_sha256"], ct_content_sha256(ct));
+}
+
+TEST(AfInspect, ReadsAStudysCtAsTypedWhenItWritesPoses) {
+  const ScratchFolder folder;
+  test::write_small_study(folder.path());
+  const CtVolume ct = test::asymmetric_ct(test::small_grid());
+  test::write_dicom_series(ct, folder / "dicom", {}, "1.2.3.4", "A");
+  test::write_dicom_series(ct, folder / "dicom", {}, "1.2.3.5", "B");
+  write_text_file(folder / "series.toml",
+                  test::replaced(read_text_file(folder / "study.toml"), "ct.nii.gz", "dicom"));
+  write_text_file(folder / "one.txt", "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1\n");
+  const std::string command = (folder / "one.txt").string() + " --pose-to autoscoper -o " +
+                              (folder / "one.tra").string() + " --study " +
+                              (folder / "series.toml").string();
+  EXPECT_THAT(inspect(command).output, HasSubstr("2 DICOM series"));
+  const test::ProgramRun run = inspect(command + " --series 1.2.3.5");
+  EXPECT_EQ(run.exit_code, 0) << run.output;
 }
 
 TEST(AfInspect, KnowsUnfinishedWork) {

@@ -479,6 +479,13 @@ TEST_F(ProgramTest, DrrTakesTheFieldThatHoldsAPose) {
   ASSERT_EQ(run_drr(field + "--also-field " + turned + " " + pose + path("both.mha")).exit_code, 0);
   ASSERT_EQ(run_drr("--field " + turned + " " + pose + path("turned.mha")).exit_code, 0);
   EXPECT_EQ(read_image(path("both.mha")).pixels, read_image(path("turned.mha")).pixels);
+  const std::string rig = " --rig " + path("rig.toml") + " --camera ";
+  const test::ProgramRun own = run_drr(field + rig + "AP -o " + path("own.mha"));
+  EXPECT_EQ(own.exit_code, 0) << own.output;
+  EXPECT_EQ(own.output.find("camera"), std::string::npos) << own.output;
+  expect_refused(run_drr(field + "--also-field " + turned + rig + "LAT " + pose + path("a.mha")),
+                 3,
+                 "from the nominal camera, that of --field");
   expect_refused(run_drr("--ct " + path("ct.nii.gz") + " --rig " + path("rig.toml") +
                          " --camera AP --also-field " + turned + " -o " + path("a.mha")),
                  3,

@@ -414,16 +414,33 @@ class RegistrationTest(unittest.TestCase):
             case = af.RegistrationCase.load(study, preset="fast", fields=self.fields)
             start = case.landmark_start()
             self.assertLess(case.tre_mm(start), 1e-3)
+            self.assertEqual(case.usual_start().tobytes(), start.tobytes())
             found = af.register(study, preset="fast", fields=self.fields)
             self.assertEqual(found.start.tobytes(), start.tobytes())
             given = af.register(study, rotation_deg=(1, 0, 0), preset="fast", fields=self.fields)
             np.testing.assert_allclose(given.start_parameters, (1, 0, 0, 0, 0, 0), atol=1e-9)
+            from_arrays = af.register(
+                study,
+                rotation_deg=np.array([1, 0, 0]),
+                translation_mm=np.array([0, 0, 0]),
+                preset="fast",
+                fields=self.fields,
+            )
+            self.assertEqual(from_arrays.start.tobytes(), given.start.tobytes())
             run_program(
                 "af-register", "--study", study, "--preset", "fast", "-o", Path(folder, "out"),
                 *(f"--field={name}={path}" for name, path in self.fields.items()),
             )
             expected = af.read_result(Path(folder, "out"))
             self.assertEqual(found.pose.tobytes(), expected.room_from_ct.tobytes())
+
+    def test_uncertainty_may_be_left_out(self):
+        case = af.RegistrationCase.load(
+            STUDY / "study.toml", preset="fast", fields=self.fields, no_uncertainty=True
+        )
+        found = case.run(case.frame.pose((-1, 0.5, 2.5), (0.5, 1, 4)))
+        self.assertTrue(np.isnan(found.uncertainty.covariance).all())
+        self.assertTrue(np.isnan(found.uncertainty.confidence))
 
     def test_wrong_options_are_refused_as_by_the_program(self):
         with self.assertRaisesRegex(af.InputError, "robust"):

@@ -37,6 +37,7 @@ struct RegistrationOptions {
   double step_mm = 1.0;
   std::string ct_series_uid = {};
   std::uint64_t seed = 1;
+  bool no_uncertainty = false;  ///< no covariance and no confidence: all of Uncertainty is NaN
   double calibration_error_px = 0.0;  ///< of every view's shift, that covariances are to contain
   int threads = 1;                    ///< that one registration spreads over; 0: every processor
 };
@@ -107,10 +108,12 @@ class ATTENUATION_FIELDS_API RegistrationCase {
   /// Mean distance (mm) over the target box between where a pose and the gold pose put its points.
   [[nodiscard]] std::optional<double> tre_mm(const Pose& pose) const;
 
-  /// The pose that the landmarks give which the study states in CT and X-rays: where af-register
-  /// starts when it is given no start. nullopt when it states none; InputError when no pose fits
-  /// them.
+  /// The pose that the landmarks give which the study states in CT and X-rays. nullopt when it
+  /// states none; InputError when no pose fits them.
   [[nodiscard]] std::optional<Pose> landmark_start() const;
+  /// Where af-register starts when it is given no start: at landmark_start(), else at the nominal
+  /// pose. InputError as landmark_start().
+  [[nodiscard]] Pose usual_start() const;
 
   /// Registers from a start. `start_index` is a key of random numbers. What af-register writes into
   /// result.json, to the bit (its seconds excepted).

@@ -301,6 +301,16 @@ std::shared_ptr<const DrrRenderer> renderer_of(const OpenedField& first,
   return std::make_shared<const FieldSetDrr>(std::move(members));
 }
 
+/// Of the camera that DRRs are looked up for.
+std::string note_of(const CameraGeometry& camera,
+                    const CameraGeometry& of_field,
+                    const DrrOptions& options) {
+  const CameraDistance distance = camera_distance(camera, of_field);
+  if (distance.is_none()) return "";
+  return "camera " + camera.name + ": " + distance.text() +
+         (options.more_fields.empty() ? "" : ", that of --field");
+}
+
 }  // namespace
 
 DrrScene load_scene(const DrrOptions& options, const Communicator& communicator) {
@@ -314,12 +324,11 @@ DrrScene load_scene(const DrrOptions& options, const Communicator& communicator)
     scene.frame = field->frame;
     scene.renderer = renderer_of(opened, options, scene.pool, communicator);
   }
-  const DrrSource source = source_of(options);
+  scene.source = source_of(options);
+  const DrrSource& source = scene.source;
   if (source.camera.has_value()) {
     scene.view = View::whole_detector(*source.camera);
-    if (field)
-      scene.note = "camera " + source.camera->name + ": " +
-                   camera_distance(*source.camera, field->camera).text();
+    if (field) scene.note = note_of(*source.camera, field->camera, options);
   }
   if (source.frame.has_value())
     scene.frame = *source.frame;
@@ -336,9 +345,8 @@ DrrScene load_scene(const DrrOptions& options, const Communicator& communicator)
 std::vector<RigidTransform> requested_poses(const DrrOptions& options,
                                             const DrrScene& scene,
                                             std::vector<std::string>& notes) {
-  const DrrSource source = source_of(options);
-  const PoseContext context = pose_context(source.ct,
-                                           source.ct_reading,
+  const PoseContext context = pose_context(scene.source.ct,
+                                           scene.source.ct_reading,
                                            CameraRig{Eigen::Vector3d::Zero(), {scene.view.camera}},
                                            scene.frame);
   if (!options.poses.empty()) return read_poses(options.poses, context, &notes);

@@ -58,12 +58,15 @@ struct DrrSource {
 
 /// What renders, for which camera, and what pose parameters are relative to.
 struct DrrScene {
+  DrrSource source;
   std::shared_ptr<const DrrRenderer> renderer;   ///< the field's, else the ray caster
   std::shared_ptr<const DrrRenderer> reference;  ///< the ray caster, for --compare
   View view;
   PoseFrame frame;
   std::shared_ptr<ThreadPool> pool;
-  std::string note;  ///< of a field: how far the camera is from its own; empty for its own
+  /// How far the camera is from the field's own, with several fields from the first one's; empty
+  /// for that one.
+  std::string note;
 };
 
 /// Collective. Reads field, CT and rig. FileError when --compare's CT is not the field's.

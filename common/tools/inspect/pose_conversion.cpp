@@ -19,7 +19,7 @@ CameraRig cameras_of(CameraRig rig, const std::string& camera) {
 PoseContext context_of(const PoseConversion& options, const CtReadOptions& ct_reading) {
   if (!options.study.empty()) {
     const Study study = read_study(options.study);
-    PoseContext context = pose_context(study, study.find_case(options.study_case));
+    PoseContext context = pose_context(study, study.find_case(options.study_case), ct_reading);
     if (!options.camera.empty())
       context.rig = [rig = cameras_of(study.rig, options.camera)] { return rig; };
     return context;

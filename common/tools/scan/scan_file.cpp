@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/scan/scan_file.h"
 
-#include <charconv>
 #include <cmath>
+#include <optional>
 #include <sstream>
 
 #include "base/file_name.h"
+#include "base/parsed_number.h"
 #include "files/output_file.h"
 #include "geometry/rigid_transform.h"
 #include "text/toml_reader.h"
@@ -92,12 +93,11 @@ std::vector<double> read_angles_file(const std::filesystem::path& path) {
   for (int number = 1; std::getline(lines, line); ++number) {
     std::istringstream words(line.substr(0, line.find('#')));
     for (std::string word; words >> word;) {
-      double angle_deg = 0.0;
-      const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), angle_deg);
-      if (error != std::errc() || end != word.data() + word.size() || !std::isfinite(angle_deg))
+      const std::optional<double> angle_deg = finite_number(word);
+      if (!angle_deg)
         throw FileError(path.string() + ":" + std::to_string(number),
                         "'" + word + "' is not an angle: angles_file holds a number per view");
-      angles_deg.push_back(angle_deg);
+      angles_deg.push_back(*angle_deg);
     }
   }
   return angles_deg;

@@ -4,6 +4,9 @@
 #include <cmath>
 #include <filesystem>
 
+#include "base/number_text.h"
+#include "gold_standard/target_box.h"
+#include "simulation/automatic_target.h"
 #include "simulation/phantom.h"
 
 namespace af::tools {
@@ -93,6 +96,21 @@ void describe_truth(Fields& field, SimulateOptions& o) {
       .within(0.0, 100.0);
 }
 
+/// Studies are refused whose target box breaks the rule of target_box_problem().
+void append_target_problems(const SimulateOptions& options, std::vector<std::string>& found) {
+  for (const double value : options.center_ct_mm)
+    if (!std::isfinite(value)) found.push_back("center_ct_mm must be finite");
+  const std::vector<double>& box = options.target_box_ct_mm;
+  if (box.size() == 6)
+    if (const std::string problem =
+            target_box_problem({{box[0], box[1], box[2]}, {box[3], box[4], box[5]}});
+        !problem.empty())
+      found.push_back("target_box_ct_mm: " + problem);
+  const CtBox automatic = target_box_at(Eigen::Vector3d::Zero(), options.target_side_mm).box_ct;
+  if (const std::string problem = target_box_problem(automatic); !problem.empty())
+    found.push_back("target_side_mm = " + number_text(options.target_side_mm) + ": " + problem);
+}
+
 }  // namespace
 
 XraySimulationOptions SimulateOptions::xray_in_force() const {
@@ -122,13 +140,7 @@ std::vector<std::string> problems(const SimulateOptions& options) {
     found.push_back("metal: needs a phantom; a CT has its own");
   if (options.phantom_options.anatomy_seed && options.phantom.empty())
     found.push_back("anatomy-seed: needs a phantom; a CT is one patient");
-  for (const double value : options.center_ct_mm)
-    if (!std::isfinite(value)) found.push_back("center_ct_mm must be finite");
-  const std::vector<double>& box = options.target_box_ct_mm;
-  for (std::size_t axis = 0; box.size() == 6 && axis < 3; ++axis)
-    if (!(box[axis] < box[axis + 3]) || !std::isfinite(box[axis + 3] - box[axis]))
-      found.push_back("target_box_ct_mm: low " + std::to_string(box[axis]) +
-                      " must be below high " + std::to_string(box[axis + 3]));
+  append_target_problems(options, found);
   const int bits = options.xray_in_force().detector.bits;
   if (options.xray_format == "dicom" && (bits < 8 || bits > 16))
     found.push_back("xray_format = dicom: needs 8 to 16 bits, not " + std::to_string(bits) +

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <array>
 #include <cmath>
+#include <limits>
 #include <set>
 #include <string>
 #include <vector>
@@ -9,6 +10,8 @@
 
 #include "base/error.h"
 #include "base/hash_random.h"
+#include "base/number_text.h"
+#include "base/parsed_number.h"
 #include "base/vector_width.h"
 #include "run/progress_printer.h"
 
@@ -120,6 +123,19 @@ TEST(Errors, KeepMessagesOfManyLinesAndWholeCharacters) {
     EXPECT_EQ((gap - shift) % 3, 0u);
     EXPECT_EQ(text.substr(text.find(") ... ") + 6).size() % 3, 0u);
   }
+}
+
+TEST(ParsedNumber, IsOneWholeNumberWithOneSignAtMost) {
+  EXPECT_EQ(finite_number("5"), 5.0);
+  EXPECT_EQ(finite_number("+5"), 5.0);
+  EXPECT_EQ(finite_number("-0.5e-3"), -0.0005);
+  EXPECT_EQ(finite_number(number_text(0.1)), 0.1);
+  for (const char* const text :
+       {"", "+", "-", "+-5", "-+5", "++5", " 5", "5 ", "5mm", "1,5", "0x5", "1e999"})
+    EXPECT_FALSE(parsed_number(text).has_value()) << "'" << text << "'";
+  EXPECT_EQ(parsed_number("-inf"), -std::numeric_limits<double>::infinity());
+  EXPECT_FALSE(finite_number("-inf").has_value());
+  EXPECT_FALSE(finite_number("nan").has_value());
 }
 
 }  // namespace

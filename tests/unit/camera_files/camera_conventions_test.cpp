@@ -227,6 +227,14 @@ TEST_F(CameraConventions, OpenCvRefusals) {
   EXPECT_THAT(input_refusal(stereo), HasSubstr("relative to the first camera"));
 }
 
+TEST_F(CameraConventions, TheOnlyCameraMayHaveANumber) {
+  const std::string one =
+      "K1: [1000, 0, 320, 0, 1000, 240, 0, 0, 1]\nimage_width: 640\nimage_height: 480\n"
+      "pixel_spacing_mm: [0.5, 0.5]\nisocenter_point: [0, 0, 0]\n"
+      "R: [1, 0, 0, 0, 1, 0, 0, 0, 1]\nt: [0, 0, 500]\n";
+  expect_seen(camera(one), {10, 20, 0}, {320 + 1000 * 10 / 500.0, 240 + 1000 * 20 / 500.0});
+}
+
 TEST_F(CameraConventions, NamesAreUtf8) {
   const std::string good = kOpenCv;
   EXPECT_EQ(camera("camera_name: \"\xc3\xa4\"\n" + good).name, "\xc3\xa4");
@@ -881,6 +889,9 @@ TEST_F(DicomCameras, EnhancedFilesHaveACameraPerFrame) {
       rig.cameras[0], {10, 20, 30}, {199.5 + 10 * scale / 0.3, 255.5 - 30 * scale / 0.4});
   EXPECT_LT((rig.cameras[1].source_point - Vector3d(-800, 0, 0)).norm(), 1e-9) << "LAO 90";
   EXPECT_EQ(read(enhanced(xa(), "0")).cameras.size(), 1U) << "nothing moves";
+  test::DicomTestFile both = enhanced(xa(), "90");
+  both.set_text({0x0018, 0x1164}, "DS", "0.8\\0.6");
+  EXPECT_EQ(read(both).cameras[0].pixel_spacing_mm, Vector2d(0.3, 0.4)) << "the frame's own";
 }
 
 TEST_F(DicomCameras, AnglesOfTheEquipmentAreNotThoseOfThePatient) {
@@ -964,7 +975,8 @@ TEST_F(DicomCameras, Refusals) {
   options.source_detector_mm = 1000.0;
   EXPECT_THAT(refusal(file, options), HasSubstr("must agree"));
   file.set_text({0x0018, 0x1164}, "DS", "0.4\\-1");
-  EXPECT_THAT(refusal(file), HasSubstr("spacings above 0"));
+  EXPECT_THAT(refusal(file),
+              HasSubstr("ImagerPixelSpacing (0018,1164) = '0.4\\-1': must be two positive"));
   file.set_text({0x0018, 0x1164}, "DS", "0.4\\nan");
   EXPECT_THAT(refusal(file), HasSubstr("finite"));
   file = xa();

@@ -10,6 +10,7 @@
 #include "base/error.h"
 #include "base/hash_random.h"
 #include "geometry/camera_distance.h"
+#include "geometry/hit_extents.h"
 #include "geometry/orbit.h"
 #include "support/c_arm_camera.h"
 
@@ -87,6 +88,30 @@ TEST(RayCoverage, OfAFieldsOwnCameraIsItsRange) {
   EXPECT_LE(box.max_rotation_rad(), range.max_rotation_rad() * (1.0 + kCoveredBoxTolerance));
   EXPECT_EQ(coverage_text("A", 100, 100, box),
             "field covers 100 % of camera A's rays within 8.0 deg / 25.0 mm of nominal");
+}
+
+/// One pixel that moves by a tenth of a millimetre: planes of that size hold its rays, however
+/// small they are.
+TEST(RayCoverage, PlanesNeedNoMarginThatTheRaysDoNot) {
+  const MotionRange range{0.0, 0.1};
+  CameraGeometry camera = test::paper_camera();
+  camera.detector_origin_point = camera.detector_point(127.5, 127.5);
+  camera.size_px = {1, 1};
+  LightSlab planes = planes_of(camera, {}, range);
+  std::vector<double> y_mm = {planes.uv_plane_y_mm};
+  for (const SlabGeometry& slab : planes.slabs) y_mm.push_back(slab.st_plane_y_mm);
+  const auto hits = hit_extents(camera, {}, range, y_mm, planes.slab_from_ct);
+  constexpr double kRoundingMm = 1e-9;
+  const auto set = [](const PlaneExtent& hit, GridAxis& x, GridAxis& z) {
+    x = {hit.x_low_mm - kRoundingMm, hit.x_high_mm + kRoundingMm, x.nodes};
+    z = {hit.z_low_mm - kRoundingMm, hit.z_high_mm + kRoundingMm, z.nodes};
+  };
+  set(hits[0], planes.u, planes.v);
+  for (std::size_t k = 0; k < planes.slabs.size(); ++k)
+    set(hits[k + 1], planes.slabs[k].s, planes.slabs[k].t);
+  EXPECT_LT(hits[1].x_high_mm - hits[1].x_low_mm, 1.0);
+  EXPECT_TRUE(covers_range(planes, camera, {}, range));
+  EXPECT_FALSE(covers_range(planes, camera, {}, range.scaled(1.001)));
 }
 
 TEST(RayCoverage, SaysWhatSampledRaysSay) {

@@ -49,8 +49,20 @@ TEST(Hdf5Input, ReadsWhatWasWritten) {
 TEST(Hdf5Input, AFileOnTheDiskIsTheSame) {
   const test::ScratchFolder folder;
   test::write_input(folder / "some.h5", some_file());
-  EXPECT_EQ(Hdf5Input::of_file(folder / "some.h5").numbers("/count", 1).values,
-            std::vector<double>{7.0});
+  const Hdf5Input file = Hdf5Input::of_file(folder / "some.h5");
+  EXPECT_EQ(file.numbers("/count", 1).values, std::vector<double>{7.0});
+  EXPECT_EQ(file.text("/text"), "of any length");
+}
+
+TEST(Hdf5Input, TextsOfOneHeapAreToldApart) {
+  Hdf5Output written;
+  for (const char* const text : {"one", "two", "three"})
+    written.add_text(std::string("/") + text, text);
+  const test::ScratchFolder folder;
+  test::write_input(folder / "texts.h5", written.bytes());
+  const Hdf5Input file = Hdf5Input::of_file(folder / "texts.h5");
+  for (const char* const text : {"three", "one", "two", "one"})
+    EXPECT_EQ(file.text(std::string("/") + text), text);
 }
 
 TEST(Hdf5Input, RefusesWhatIsNotAskedFor) {
@@ -62,7 +74,7 @@ TEST(Hdf5Input, RefusesWhatIsNotAskedFor) {
   EXPECT_THAT(refusal("/many", 99), HasSubstr("/many: is no list of at most 99 numbers"));
   EXPECT_THAT(refusal("/text", 99), HasSubstr("is no list"));
   EXPECT_THAT(refusal("/nan", 1), HasSubstr("not finite"));
-  EXPECT_THAT(refusal("/group", 1), HasSubstr("damaged HDF5: H5Dopen2 fails"));
+  EXPECT_THAT(refusal("/group", 1), HasSubstr("damaged HDF5: H5Dopen2 failed: not a dataset"));
   EXPECT_THAT(message_of<FileError>([&] { (void)file.text("/count"); }), HasSubstr("is no text"));
 }
 

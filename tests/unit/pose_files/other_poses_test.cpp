@@ -327,6 +327,14 @@ TEST_F(OtherPoses, DiffDrrFilesWithMistakesAreRefused) {
                     "diffdrr_parameterization = \"quaternion\"\nrotation = [[1.0, 1.0, 0, 0]]\n"
                     "translation_mm = [[1.0, 2.0, 3.0]]\n"),
                InputError);
+  PoseContext mirrored = whole_context();
+  mirrored.rig = [] {
+    CameraGeometry camera = frontal_camera();
+    camera.column_direction = -camera.column_direction;
+    return CameraRig{Vector3d::Zero(), {camera}};
+  };
+  EXPECT_THAT(test::message_of<InputError>([&] { read("p", good, mirrored); }),
+              testing::HasSubstr("must not be mirrored"));
 }
 
 TEST_F(OtherPoses, ARegistrationsMatrixTakesTheCtToTheRoom) {

@@ -235,7 +235,10 @@ TEST_F(AfSimulate, RefusesBadInputByTheContractsCodesAndLeavesNothing) {
       {coarse + "--tube-kvp 10 --energy-bins 3", 3, "energy-bins = 3"},
       {coarse + "--water-mu-per-mm 0.6", 3, "water_mu_per_mm"},
       {coarse + "--center-ct-mm 900,0,0", 3, "center_ct_mm"},
-      {coarse + "--target-box-ct-mm 0,0,0,-1,5,5", 3, "target_box_ct_mm"},
+      {coarse + "--target-box-ct-mm 0,0,0,-1,5,5", 3, "target_box_ct_mm: must be [[low"},
+      // What a study would be refused for: more than 1e7 cells of 2 mm.
+      {coarse + "--target-box-ct-mm=-300,-300,-300,300,300,300", 3, "target_box_ct_mm: must be sm"},
+      {coarse + "--center-ct-mm 0,0,0 --target-side-mm 600", 3, "target_side_mm = 600: must be sm"},
       {coarse + "--rig " + bad_rig, 3, "camera"},
       {coarse + "--rig nowhere.toml", 4, "nowhere.toml"},
       {"--ct /nowhere/ct.nii.gz", 4, "/nowhere/ct.nii.gz"},

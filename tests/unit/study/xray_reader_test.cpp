@@ -499,6 +499,11 @@ TEST_F(DicomXrayView, FunctionalGroupsGiveTheSpacingOfAFrame) {
   };
   const auto frame_two = [](StudyView& view) { view.reading.frame = 2; };
   expect_lines_of_levels(read(spaced("0.4\\0.4"), frame_two, 2), 1);
+  const auto spaced_twice = [&](test::DicomTestFile& file) {
+    spaced("0.4\\0.4")(file);
+    file.set_text({0x0018, 0x1164}, "DS", "0.5\\0.5");
+  };
+  expect_lines_of_levels(read(spaced_twice, frame_two, 2), 1);
   EXPECT_THAT(refusal(spaced("0.5\\0.5"), frame_two, 2), HasSubstr("ImagerPixelSpacing = 0.5"));
 }
 

@@ -27,6 +27,11 @@ CtVolume ct_of(const IsBone& is_bone,
   return ct;
 }
 
+std::vector<Eigen::Vector3d> cuts_of(const CtVolume& ct) {
+  const AttenuationModel model;
+  return cut_points(ct, model, attenuating_box(ct, model));
+}
+
 double norm_of(double i, double j, double k) {
   return std::sqrt(i * i + j * j + k * k);
 }
@@ -36,7 +41,7 @@ TEST(CutFaces, AreWhereAShaftIsCutAndNotWhereABodyEnds) {
   const CtVolume ct = ct_of([](int i, int j, int k) {
     return norm_of(i - 12, j - 12, k - 9) <= 7.0 || (k > 9 && norm_of(i - 12, j - 12, 0) <= 4.0);
   });
-  const auto points = cut_points(ct, AttenuationModel{});
+  const auto points = cuts_of(ct);
   // Gauss's circle problem: 49 lattice points lie within 4 of the origin.
   EXPECT_EQ(points.size(), 49u);
   for (const Eigen::Vector3d& point : points) {
@@ -48,18 +53,18 @@ TEST(CutFaces, AreWhereAShaftIsCutAndNotWhereABodyEnds) {
 TEST(CutFaces, OfABodyWithinTheCtAreNone) {
   const CtVolume ct =
       ct_of([](int i, int j, int k) { return norm_of(i - 12, j - 12, k - 12) <= 8.0; });
-  EXPECT_TRUE(cut_points(ct, AttenuationModel{}).empty());
+  EXPECT_TRUE(cuts_of(ct).empty());
 }
 
 TEST(CutFaces, OfFewVoxelsKeepThemAll) {
   const CtVolume ct = ct_of([](int /*i*/, int /*j*/, int /*k*/) { return true; });
-  EXPECT_EQ(cut_points(ct, AttenuationModel{}).size(), 6u * kCtSide * kCtSide);
+  EXPECT_EQ(cuts_of(ct).size(), 6u * kCtSide * kCtSide);
 }
 
 TEST(CutFaces, OfManyVoxelsKeepOneInAFew) {
   const CtVolume ct = ct_of([](int /*i*/, int /*j*/, int /*k*/) { return true; }, {60, 60, 8});
   // Two faces of 3600 voxels, of which every other is kept, and four of 480.
-  EXPECT_EQ(cut_points(ct, AttenuationModel{}).size(), 2u * 1800 + 4u * 480);
+  EXPECT_EQ(cuts_of(ct).size(), 2u * 1800 + 4u * 480);
 }
 
 }  // namespace
