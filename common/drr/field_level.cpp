@@ -140,8 +140,9 @@ void decode_slab(const CompressedAttenuationField& field,
   Halving halve(coarse);
   const SlabLattice lattice = field.lattice(k);
   const int v_tiles = lattice.v.stored.tiles();
-  const auto st_tiles = static_cast<std::size_t>(lattice.s.stored.tiles()) *
-                        static_cast<std::size_t>(lattice.t.stored.tiles());
+  const bool has_means = field.codebook.has_means();
+  const auto st_values = static_cast<std::size_t>(lattice.s.stored.tiles()) *
+                         static_cast<std::size_t>(lattice.t.stored.tiles()) * (has_means ? 2 : 1);
   for (int a = u_tiles.begin; a < u_tiles.end; ++a)
     for (int b = 0; b < v_tiles; ++b) {
       std::array<std::uint16_t*, 4> targets{};
@@ -154,10 +155,11 @@ void decode_slab(const CompressedAttenuationField& field,
       }
       const std::size_t uv_tile = static_cast<std::size_t>(a) * static_cast<std::size_t>(v_tiles) +
                                   static_cast<std::size_t>(b);
-      decode_tiles({field.slabs[k].indices.data() + uv_tile * st_tiles,
+      decode_tiles({field.slabs[k].indices.data() + uv_tile * st_values,
                     field.codebook.codewords.data()->data(),
                     fine.stored_s.tiles(),
-                    fine.stored_t.tiles()},
+                    fine.stored_t.tiles(),
+                    has_means},
                    planes[0].width(),
                    decoded.data());
       for (std::size_t i = 0; i < 4; ++i) {
@@ -307,9 +309,7 @@ FieldLevelMemory process_memory(int threads) {
 }
 
 std::size_t decoded_bytes(const CompressedAttenuationField& field) {
-  std::size_t tiles = 0;
-  for (const CompressedSlab& slab : field.slabs) tiles += slab.indices.size();
-  return tiles * sizeof(Tile);
+  return static_cast<std::size_t>(field.lattice().tile_count()) * sizeof(Tile);
 }
 
 FieldLevel decode_field(const CompressedAttenuationField& field, const FieldLevelMemory& memory) {

@@ -101,6 +101,29 @@ TEST(FieldLevel, LevelZeroHasTheFieldsSamples) {
                     field->node_value(0, {u, v, s, t}));
 }
 
+TEST(FieldLevel, IsTheSameOfMeanRemovedTiles) {
+  const auto waves = [](const RayNodes& n) {
+    return std::round(30000 + 9000 * std::sin(0.7 * n.s + 0.3 * n.u) * std::cos(0.9 * n.t + n.v));
+  };
+  auto plain = small_field(waves, 1, 5, 16);
+  crop_stored(*plain, {4, 8}, {6, 6});
+  const auto with_means = mean_removed(*plain, 32);
+  ASSERT_TRUE(problems(*with_means).empty());
+  EXPECT_EQ(decoded_bytes(*with_means), decoded_bytes(*plain));
+  for (const VectorWidth width : supported_vector_widths()) {
+    force_vector_width(width);
+    const auto expected = decode_field(*plain).slabs[0].samples;
+    const auto found = decode_field(*with_means).slabs[0].samples;
+    EXPECT_TRUE(std::ranges::equal(found.view(), expected.view())) << to_string(width);
+  }
+  force_vector_width({});
+  for (int u = 0; u < 5; ++u)
+    for (int s = 0; s < 16; ++s)
+      for (int t = 0; t < 16; ++t)
+        ASSERT_EQ(with_means->node_value(0, {u, 4 - u, s, t}),
+                  plain->node_value(0, {u, 4 - u, s, t}));
+}
+
 TEST(FieldLevel, CoarseNodesLieMidwayBetweenFineNodes) {
   const auto field = small_field(noise, 1, 5, 12);
   const auto pyramid = make_field_pyramid(*field, 2);
