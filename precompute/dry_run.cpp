@@ -46,6 +46,11 @@ struct TileCounts {
   }
 };
 
+/// Of indices and means, where there are any.
+double bytes_per_tile(const PrecomputeOptions& options) {
+  return options.design().mean_step > 0 ? 4.0 : 2.0;
+}
+
 double seconds_at(double amount, double per_second) {
   return per_second > 0.0 ? amount / per_second : 0.0;
 }
@@ -82,10 +87,10 @@ void forecast_seconds(const DryRun& run, const TileCounts& tiles, FieldForecast&
       need.overflow == TileOverflow::ReadBack
           ? seconds_at(overflow_fraction * tile_bytes, run.disk.read_bytes_per_second)
           : overflow_fraction * cast_seconds;
-  const double index_bytes = 2.0 * tiles.occupied;
+  const double index_bytes = bytes_per_tile(run.options) * tiles.occupied;
   const double compress_seconds = index_bytes * speed.compress_seconds_per_byte;
   // Rank 0 reads the file back: decoding takes as long as coding, SHA-256 some 2 ns a byte.
-  const double verify_seconds = compress_seconds + 2e-9 * 2.0 * tiles.all;
+  const double verify_seconds = compress_seconds + 2e-9 * bytes_per_tile(run.options) * tiles.all;
   need.seconds = run.past;
   need.seconds.emplace_back("cast", cast_seconds + checkpoint_seconds);
   need.seconds.emplace_back("train",
@@ -134,10 +139,11 @@ FieldForecast forecast(const DryRun& run) {
   FieldForecast need;
   need.uncropped_bytes = 2 * static_cast<std::uint64_t>(run.lattice.node_count());
   need.cropped_bytes = 2 * static_cast<std::uint64_t>(run.lattice.stored_node_count());
-  need.payload_bytes = static_cast<std::uint64_t>(2.0 * tiles.all + codebook_bytes);
-  need.file_bytes =
-      static_cast<std::uint64_t>(2.0 * run.speed.compressed_fraction * tiles.occupied +
-                                 kFileBytesPerCodeword * run.options.design().codewords);
+  need.payload_bytes =
+      static_cast<std::uint64_t>(bytes_per_tile(run.options) * tiles.all + codebook_bytes);
+  need.file_bytes = static_cast<std::uint64_t>(
+      bytes_per_tile(run.options) * run.speed.compressed_fraction * tiles.occupied +
+      kFileBytesPerCodeword * run.options.design().codewords);
   forecast_memory(run, tiles, need);
   forecast_seconds(run, tiles, need);
   return need;

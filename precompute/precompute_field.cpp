@@ -18,6 +18,7 @@
 #include "files/output_file.h"
 #include "parallel/work_watch.h"
 #include "precompute/casting/casters.h"
+#include "precompute/codebook/mean_removal.h"
 #include "precompute/design_choice.h"
 #include "precompute/dry_run.h"
 #include "precompute/field_parts.h"
@@ -494,7 +495,8 @@ class PrecomputeRun {
                    CastPhase& cast,
                    const TrainedCodebook& trained,
                    const OverflowChoice& choice) {
-    FieldEncoder encoder(build, cast, trained.codebook, choice.overflow);
+    FieldEncoder encoder(
+        build, cast, trained.codebook, options_.design().mean_step, choice.overflow);
     BuildStatistics statistics;
     std::optional<ProgressPrinter> printer;
     printer.emplace("encoding and writing", world_.is_root());
@@ -537,12 +539,15 @@ class PrecomputeRun {
   }
 
   /// Collective. A field, or an atlas.
-  FieldFileInfo write_output(const Codebook& codebook,
+  FieldFileInfo write_output(const Codebook& trained,
                              const NextBlocks& next_blocks,
                              const MakeProvenance& make_provenance) const {
     const IndexPacking packing =
         options_.packs_by_codebook_tree() ? IndexPacking::CodebookTree : IndexPacking::Deflate;
-    AttenuationAtlas atlas{identity_of(source_), {}, quantizer().step(), codebook};
+    AttenuationAtlas atlas{identity_of(source_),
+                           {},
+                           quantizer().step(),
+                           field_codebook(trained, options_.design().mean_step)};
     for (const FieldPart& part : parts_)
       atlas.members.push_back({identity_of(part.source), part.light_slab});
     if (options_.is_atlas())

@@ -46,6 +46,32 @@ AF_NATIVE_INLINE Floats load(const uint16_t* from) {
   return __builtin_convertvector(reinterpret_cast<Ints>(samples), Floats);
 }
 
+/// Unsigned 16-bit levels as floats: signed differences from a mean, and the mean, limited to
+/// 0 ... 65535.
+AF_NATIVE_INLINE Floats load_with_mean(const int16_t* differences, uint16_t mean) {
+  // Signed sums saturate at both limits at once when levels count from the middle.
+#if AF_VECTOR_BITS == 512
+  const __m256i middle = _mm256_set1_epi16(INT16_MIN);
+  const __m256i from_middle = _mm256_xor_si256(_mm256_set1_epi16(static_cast<short>(mean)), middle);
+  const __m256i sum = _mm256_adds_epi16(
+      _mm256_loadu_si256(reinterpret_cast<const __m256i*>(differences)), from_middle);
+  const __m512i levels = _mm512_cvtepu16_epi32(_mm256_xor_si256(sum, middle));
+#else
+  const __m128i middle = _mm_set1_epi16(INT16_MIN);
+  const __m128i from_middle = _mm_xor_si128(_mm_set1_epi16(static_cast<short>(mean)), middle);
+#if AF_VECTOR_BITS == 256
+  const __m128i sum =
+      _mm_adds_epi16(_mm_loadu_si128(reinterpret_cast<const __m128i*>(differences)), from_middle);
+  const __m256i levels = _mm256_cvtepu16_epi32(_mm_xor_si128(sum, middle));
+#else
+  const __m128i sum =
+      _mm_adds_epi16(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(differences)), from_middle);
+  const __m128i levels = _mm_cvtepu16_epi32(_mm_xor_si128(sum, middle));
+#endif
+#endif
+  return __builtin_convertvector(reinterpret_cast<Ints>(levels), Floats);
+}
+
 AF_NATIVE_INLINE void store(float* to, Floats vector) {
   memcpy(to, &vector, sizeof(vector));
 }

@@ -18,8 +18,18 @@ struct Blend {
   Floats value, u_slope, v_slope;
 };
 
+/// Elements first ... first + kLanes - 1 of the tile with this index.
+template <bool kHasMeans>
+AF_NATIVE_INLINE Floats elements_of(const TileStrip& strip, const uint16_t* index, int first) {
+  const int64_t at = int64_t{16} * *index + first;
+  if constexpr (kHasMeans)
+    return native::load_with_mean(strip.shapes + at, index[strip.mean_offset]);
+  else
+    return load(strip.codewords + at);
+}
+
 /// Elements first ... first + kLanes - 1 of the tiles at d.
-template <bool kWithSlopes>
+template <bool kWithSlopes, bool kHasMeans>
 AF_NATIVE_INLINE Blend blend_elements(const TileStrip& strip, int32_t d, int first) {
   Blend sum{splat(0.0f), splat(0.0f), splat(0.0f)};
   const TileTap* const v_begin = strip.v_taps + strip.v_begin[d];
@@ -29,8 +39,8 @@ AF_NATIVE_INLINE Blend blend_elements(const TileStrip& strip, int32_t d, int fir
     Floats over_v = splat(0.0f);
     Floats slope_over_v = splat(0.0f);
     for (const TileTap* v = v_begin; v != v_end; ++v) {
-      const int64_t codeword = strip.indices[u.offset + v->offset + d];
-      const Floats elements = load(strip.codewords + 16 * codeword + first);
+      const Floats elements =
+          elements_of<kHasMeans>(strip, strip.indices + u.offset + v->offset + d, first);
       over_v += elements * load(v->weights + first);
       if (kWithSlopes) slope_over_v += elements * load(v->slopes + first);
     }
@@ -69,24 +79,24 @@ AF_NATIVE_INLINE F4 sum_over_viewpoints(F8 pairs) {
 }
 #endif
 
-template <bool kWithSlopes>
+template <bool kWithSlopes, bool kHasMeans>
 AF_NATIVE_INLINE void blend_tile(const TileStrip& strip, int32_t d) {
 #if AF_VECTOR_BITS == 512
-  const Blend blend = blend_elements<kWithSlopes>(strip, d, 0);
+  const Blend blend = blend_elements<kWithSlopes, kHasMeans>(strip, d, 0);
   const F4 value = sum_over_viewpoints(blend.value);
   const F4 u_slope = sum_over_viewpoints(blend.u_slope);
   const F4 v_slope = sum_over_viewpoints(blend.v_slope);
 #elif AF_VECTOR_BITS == 256
-  const Blend low = blend_elements<kWithSlopes>(strip, d, 0);
-  const Blend high = blend_elements<kWithSlopes>(strip, d, 8);
+  const Blend low = blend_elements<kWithSlopes, kHasMeans>(strip, d, 0);
+  const Blend high = blend_elements<kWithSlopes, kHasMeans>(strip, d, 8);
   const F4 value = sum_over_viewpoints(low.value + high.value);
   const F4 u_slope = sum_over_viewpoints(low.u_slope + high.u_slope);
   const F4 v_slope = sum_over_viewpoints(low.v_slope + high.v_slope);
 #else
-  const Blend q0 = blend_elements<kWithSlopes>(strip, d, 0);
-  const Blend q1 = blend_elements<kWithSlopes>(strip, d, 4);
-  const Blend q2 = blend_elements<kWithSlopes>(strip, d, 8);
-  const Blend q3 = blend_elements<kWithSlopes>(strip, d, 12);
+  const Blend q0 = blend_elements<kWithSlopes, kHasMeans>(strip, d, 0);
+  const Blend q1 = blend_elements<kWithSlopes, kHasMeans>(strip, d, 4);
+  const Blend q2 = blend_elements<kWithSlopes, kHasMeans>(strip, d, 8);
+  const Blend q3 = blend_elements<kWithSlopes, kHasMeans>(strip, d, 12);
   const F4 value = (q0.value + q2.value) + (q1.value + q3.value);
   const F4 u_slope = (q0.u_slope + q2.u_slope) + (q1.u_slope + q3.u_slope);
   const F4 v_slope = (q0.v_slope + q2.v_slope) + (q1.v_slope + q3.v_slope);
@@ -96,6 +106,14 @@ AF_NATIVE_INLINE void blend_tile(const TileStrip& strip, int32_t d) {
   if (!kWithSlopes) return;
   store_nodes(u_slope, strip.images[1] + at, strip.stride);
   store_nodes(v_slope, strip.images[2] + at, strip.stride);
+}
+
+template <bool kWithSlopes, bool kHasMeans>
+AF_NATIVE_INLINE void blend_strip(const TileStrip& given) {
+  // A copy that no store can change.
+  const TileStrip strip = given;
+  for (int32_t d = strip.tile_begin; d < strip.tile_end; ++d)
+    blend_tile<kWithSlopes, kHasMeans>(strip, d);
 }
 
 /// kLanes columns of a block from column c on.
@@ -143,13 +161,12 @@ AF_NATIVE_INLINE void blend_block(const SampleBlock& given) {
 
 }  // namespace
 
-void blend_tiles(const TileStrip& given) {
-  // A copy that no store can change.
-  const TileStrip strip = given;
-  if (strip.images[1] == nullptr)
-    for (int32_t d = strip.tile_begin; d < strip.tile_end; ++d) blend_tile<false>(strip, d);
+void blend_tiles(const TileStrip& strip) {
+  const bool has_slopes = strip.images[1] != nullptr;
+  if (strip.shapes == nullptr)
+    has_slopes ? blend_strip<true, false>(strip) : blend_strip<false, false>(strip);
   else
-    for (int32_t d = strip.tile_begin; d < strip.tile_end; ++d) blend_tile<true>(strip, d);
+    has_slopes ? blend_strip<true, true>(strip) : blend_strip<false, true>(strip);
 }
 
 void blend_samples(const SampleBlock& block) {

@@ -16,7 +16,9 @@ struct alignas(64) TileTap {
 /// The tiles of one column of an image of (s,t) nodes: two nodes wide, every tile two high.
 struct TileStrip {
   const uint16_t* indices;    ///< of the column's first tile of viewpoints (0, 0)
-  const uint16_t* codewords;  ///< 16 elements each
+  const uint16_t* codewords;  ///< 16 levels each; null where tiles have means
+  const int16_t* shapes;      ///< else: 16 differences from the mean each
+  int64_t mean_offset;        ///< from a tile's index to its mean, where it has one
   const TileTap* u_taps;
   int32_t u_count;
   const TileTap* v_taps;  ///< taps v_begin[d] ... v_begin[d + 1] - 1 belong to tile d

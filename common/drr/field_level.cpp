@@ -140,8 +140,9 @@ void decode_slab(const CompressedAttenuationField& field,
   Halving halve(coarse);
   const SlabLattice lattice = field.lattice(k);
   const int v_tiles = lattice.v.stored.tiles();
-  const auto st_tiles = static_cast<std::size_t>(lattice.s.stored.tiles()) *
-                        static_cast<std::size_t>(lattice.t.stored.tiles());
+  const bool has_means = field.codebook.has_means();
+  const auto st_values = static_cast<std::size_t>(lattice.s.stored.tiles()) *
+                         static_cast<std::size_t>(lattice.t.stored.tiles()) * (has_means ? 2 : 1);
   for (int a = u_tiles.begin; a < u_tiles.end; ++a)
     for (int b = 0; b < v_tiles; ++b) {
       std::array<std::uint16_t*, 4> targets{};
@@ -154,10 +155,11 @@ void decode_slab(const CompressedAttenuationField& field,
       }
       const std::size_t uv_tile = static_cast<std::size_t>(a) * static_cast<std::size_t>(v_tiles) +
                                   static_cast<std::size_t>(b);
-      decode_tiles({field.slabs[k].indices.data() + uv_tile * st_tiles,
+      decode_tiles({field.slabs[k].indices.data() + uv_tile * st_values,
                     field.codebook.codewords.data()->data(),
                     fine.stored_s.tiles(),
-                    fine.stored_t.tiles()},
+                    fine.stored_t.tiles(),
+                    has_means},
                    planes[0].width(),
                    decoded.data());
       for (std::size_t i = 0; i < 4; ++i) {
@@ -270,22 +272,28 @@ double level_blur_sigma_in_nodes(int level, bool with_resampling) {
   return std::sqrt((std::pow(4.0, level) - 1.0) * variance_per_step);
 }
 
+double node_spacing_mm(const LightSlab& light_slab) {
+  double sum_mm = 0.0;
+  for (const SlabGeometry& slab : light_slab.slabs) {
+    const double scale = light_slab.uv_plane_y_mm / (light_slab.uv_plane_y_mm - slab.st_plane_y_mm);
+    sum_mm += scale * 0.5 * (slab.s.spacing_mm() + slab.t.spacing_mm());
+  }
+  return sum_mm / static_cast<double>(light_slab.slabs.size());
+}
+
 int halvings_to_usual_nodes(const LightSlab& light_slab) {
   int nodes = 0;
   for (const SlabGeometry& slab : light_slab.slabs)
     nodes = std::max({nodes, slab.s.nodes, slab.t.nodes});
   constexpr double kUsualNodes = 256.0;
-  return std::max(0, static_cast<int>(std::lround(std::log2(nodes / kUsualNodes))));
+  constexpr double kUsualSpacingMm = 1.1;
+  const double halvings = std::min(std::log2(nodes / kUsualNodes),
+                                   std::log2(kUsualSpacingMm / node_spacing_mm(light_slab)));
+  return std::max(0, static_cast<int>(std::lround(halvings)));
 }
 
 double FieldLevel::blur_sigma_mm(bool with_resampling) const {
-  const double sigma_in_nodes = level_blur_sigma_in_nodes(level, with_resampling);
-  double node_mm = 0.0;
-  for (const SlabGeometry& slab : coverage.slabs) {
-    const double scale = coverage.uv_plane_y_mm / (coverage.uv_plane_y_mm - slab.st_plane_y_mm);
-    node_mm += scale * 0.5 * (slab.s.spacing_mm() + slab.t.spacing_mm());
-  }
-  return sigma_in_nodes * node_mm / static_cast<double>(coverage.slabs.size());
+  return level_blur_sigma_in_nodes(level, with_resampling) * node_spacing_mm(coverage);
 }
 
 FieldLevelMemory process_memory(int threads) {
@@ -301,9 +309,7 @@ FieldLevelMemory process_memory(int threads) {
 }
 
 std::size_t decoded_bytes(const CompressedAttenuationField& field) {
-  std::size_t tiles = 0;
-  for (const CompressedSlab& slab : field.slabs) tiles += slab.indices.size();
-  return tiles * sizeof(Tile);
+  return static_cast<std::size_t>(field.lattice().tile_count()) * sizeof(Tile);
 }
 
 FieldLevel decode_field(const CompressedAttenuationField& field, const FieldLevelMemory& memory) {

@@ -3,13 +3,37 @@
 
 #include <string.h>
 
+#include "base/vec_native.h"
+
 namespace af::AF_KERNEL_NAMESPACE {
 
-void decode_tiles(const TilePlane& tiles, int32_t stride, uint16_t* const planes[4]) {
+namespace {
+
+/// The levels of a mean-removed tile: differences stand 32768 higher, and sums are limited.
+AF_NATIVE_INLINE void add_mean(const uint16_t* shape, uint16_t mean, uint16_t* levels) {
+  const __m128i middle = _mm_set1_epi16(INT16_MIN);
+  const __m128i from_middle = _mm_xor_si128(_mm_set1_epi16(static_cast<short>(mean)), middle);
+  for (int i = 0; i < 2; ++i) {
+    const __m128i elements = _mm_loadu_si128(reinterpret_cast<const __m128i*>(shape) + i);
+    const __m128i sums = _mm_adds_epi16(_mm_xor_si128(elements, middle), from_middle);
+    _mm_storeu_si128(reinterpret_cast<__m128i*>(levels) + i, _mm_xor_si128(sums, middle));
+  }
+}
+
+template <bool kHasMeans>
+AF_NATIVE_INLINE void decode_plane(const TilePlane& tiles,
+                                   int32_t stride,
+                                   uint16_t* const planes[4]) {
+  const int64_t row_values = kHasMeans ? int64_t{2} * tiles.t_tiles : tiles.t_tiles;
   for (int32_t d = 0; d < tiles.t_tiles; ++d)
     for (int32_t c = 0; c < tiles.s_tiles; ++c) {
-      const uint16_t* codeword =
-          tiles.codewords + 16 * static_cast<int64_t>(tiles.indices[c * tiles.t_tiles + d]);
+      const uint16_t* const index = tiles.indices + c * row_values + d;
+      const uint16_t* codeword = tiles.codewords + 16 * static_cast<int64_t>(*index);
+      uint16_t levels[16];
+      if constexpr (kHasMeans) {
+        add_mean(codeword, index[tiles.t_tiles], levels);
+        codeword = levels;
+      }
       for (int viewpoint = 0; viewpoint < 4; ++viewpoint) {
         uint16_t* plane = planes[viewpoint];
         if (plane == nullptr) continue;
@@ -21,6 +45,13 @@ void decode_tiles(const TilePlane& tiles, int32_t stride, uint16_t* const planes
         row[stride + 1] = element[3];
       }
     }
+}
+
+}  // namespace
+
+void decode_tiles(const TilePlane& tiles, int32_t stride, uint16_t* const planes[4]) {
+  tiles.has_means ? decode_plane<true>(tiles, stride, planes)
+                  : decode_plane<false>(tiles, stride, planes);
 }
 
 void halve_plane(const uint16_t* in,

@@ -6,11 +6,13 @@
 namespace af {
 
 /// The tiles of one pair of viewpoint pairs: indices [s_tiles][t_tiles], codewords of 16 elements.
+/// With means, [s_tiles][2][t_tiles], and codewords are shapes as in a Codebook.
 struct TilePlane {
   const uint16_t* indices;
   const uint16_t* codewords;
   int32_t s_tiles;
   int32_t t_tiles;
+  bool has_means;
 };
 
 /// Decodes the four viewpoints (du, dv) = 00, 01, 10, 11 of a tile plane into `planes` (null: not

@@ -2,6 +2,7 @@
 #include "drr/viewpoint_blender.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "base/error.h"
@@ -173,13 +174,30 @@ BlendedImages at_node(const BlendedImages& images, const Footprint& footprint, i
 struct alignas(32) AlignedTile {
   Tile elements;
 };
+/// The same of a shape: differences from the mean.
+struct alignas(32) AlignedShape {
+  std::array<std::int16_t, kTileElements> differences;
+};
+
+AlignedShape aligned_shape(const Tile& codeword) {
+  AlignedShape shape{};
+  for (std::size_t i = 0; i < kTileElements; ++i)
+    shape.differences[i] = static_cast<std::int16_t>(int{codeword[i]} - kShapeZero);
+  return shape;
+}
 
 class CompressedBlender final : public AnyBlender {
  public:
   CompressedBlender(std::shared_ptr<const CompressedAttenuationField> field, AxisInterpolation uv)
       : AnyBlender(uv), field_(std::move(field)) {
-    codewords_.reserve(field_->codebook.size());
-    for (const Tile& tile : field_->codebook.codewords) codewords_.push_back({tile});
+    const Codebook& codebook = field_->codebook;
+    if (codebook.has_means()) {
+      shapes_.reserve(codebook.size());
+      for (const Tile& tile : codebook.codewords) shapes_.push_back(aligned_shape(tile));
+    } else {
+      codewords_.reserve(codebook.size());
+      for (const Tile& tile : codebook.codewords) codewords_.push_back({tile});
+    }
   }
 
   [[nodiscard]] const LightSlab& coverage() const override { return field_->light_slab; }
@@ -266,7 +284,9 @@ class CompressedBlender final : public AnyBlender {
                     const BlendedImages& images) const override {
     const SlabGeometry& slab = this->slab(k);
     const std::int64_t t_tiles = slab.stored_t.tiles();
-    const std::int64_t v_stride = slab.stored_s.tiles() * t_tiles;
+    const bool has_means = field_->codebook.has_means();
+    const std::int64_t row = has_means ? 2 * t_tiles : t_tiles;
+    const std::int64_t v_stride = slab.stored_s.tiles() * row;
     const std::int64_t u_stride = v_stride * field_->lattice(k).v.stored.tiles();
     const auto blend_tiles = select_kernel<BlendTiles>(
         kernels_128::blend_tiles, kernels_256::blend_tiles, kernels_512::blend_tiles);
@@ -280,22 +300,24 @@ class CompressedBlender final : public AnyBlender {
       if (needed.count == 0) continue;
       const BlendedImages strip = at_node(images, footprint, s, stored.t.begin);
       const auto at = static_cast<std::size_t>(c);
-      blend_tiles(
-          {field_->slabs[k].indices.data() + ((s - slab.stored_s.begin) / 2) * t_tiles + t_tile,
-           codewords_.data()->elements.data(),
-           scratch.u_tiles.data() + scratch.u_begin[at],
-           scratch.u_begin[at + 1] - scratch.u_begin[at],
-           scratch.v_tiles.data(),
-           scratch.v_begin.data(),
-           (needed.begin - stored.t.begin) / 2,
-           (needed.end() - stored.t.begin + 1) / 2,
-           {strip.value, strip.source_x, strip.source_z},
-           images.stride});
+      blend_tiles({field_->slabs[k].indices.data() + ((s - slab.stored_s.begin) / 2) * row + t_tile,
+                   has_means ? nullptr : codewords_.front().elements.data(),
+                   has_means ? shapes_.front().differences.data() : nullptr,
+                   t_tiles,
+                   scratch.u_tiles.data() + scratch.u_begin[at],
+                   scratch.u_begin[at + 1] - scratch.u_begin[at],
+                   scratch.v_tiles.data(),
+                   scratch.v_begin.data(),
+                   (needed.begin - stored.t.begin) / 2,
+                   (needed.end() - stored.t.begin + 1) / 2,
+                   {strip.value, strip.source_x, strip.source_z},
+                   images.stride});
     }
   }
 
   std::shared_ptr<const CompressedAttenuationField> field_;
   std::vector<AlignedTile> codewords_;
+  std::vector<AlignedShape> shapes_;  ///< instead, where tiles have means
 };
 
 class LevelBlender final : public AnyBlender {

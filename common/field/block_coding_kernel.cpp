@@ -17,6 +17,7 @@ constexpr float kForgetting = 1.0f / 32.0f;
 /// 704th.
 constexpr uint32_t kLeastTurn = 32;
 constexpr uint32_t kLeastEmpty = 1024;
+constexpr uint32_t kLeastMean = 32;
 
 /// Where the models of a coefficient begin: those of its order, that is, how many axes it is a
 /// difference along: 0, 1, more.
@@ -118,10 +119,21 @@ AF_KERNEL_INLINE int64_t plane_of(const BlockShape& shape) {
   return (shape.s + 2) * row_of(shape);
 }
 
+/// Values of one row in the array: with means, a row of these follows that of the indices.
+template <bool kHasMeans>
+AF_KERNEL_INLINE int64_t values_of_row(const BlockShape& shape) {
+  return kHasMeans ? int64_t{2} * shape.t : shape.t;
+}
+
 /// Indices that are given stay.
 AF_KERNEL_INLINE void set(const uint16_t* /*index*/, uint16_t /*codeword*/) {}
 AF_KERNEL_INLINE void set(uint16_t* index, uint16_t codeword) {
   *index = codeword;
+}
+/// The same for the mean of the tile with this index.
+AF_KERNEL_INLINE void set_mean(const uint16_t*, const BlockShape&, uint16_t) {}
+AF_KERNEL_INLINE void set_mean(uint16_t* index, const BlockShape& shape, uint16_t mean) {
+  index[shape.t] = mean;
 }
 
 /// Points to the notes of the tile and of the one before it along u.
@@ -144,13 +156,14 @@ AF_KERNEL_INLINE void begin(Lane<Coder, Index>& lane,
   find_notes(lane, shape);
 }
 
-template <typename Coder, typename Index>
+template <bool kHasMeans, typename Coder, typename Index>
 AF_KERNEL_INLINE void go_on(Lane<Coder, Index>& lane, const BlockShape& shape) {
   ++lane.index;
   ++lane.here;
   ++lane.before;
   if (++lane.t < shape.t) return;
   lane.t = 0;
+  lane.index += values_of_row<kHasMeans>(shape) - shape.t;
   if (++lane.s == shape.s) {
     lane.s = 0;
     if (++lane.v == shape.v) {
@@ -201,6 +214,35 @@ AF_KERNEL_INLINE PredictionInputs inputs_of(const CodewordTables& tables,
   return inputs;
 }
 
+/// What a neighbour's sum of levels weighs in the prediction of a tile's.
+constexpr float weight_of_sum(int neighbour) {
+  int weight = 0;
+  for (const Term& term : kTerms)
+    if (term.neighbour == neighbour && term.turn == 0) weight += term.weights[0];
+  return static_cast<float>(weight) / 64.0f;
+}
+constexpr float kSumWeights[kPredictors] = {weight_of_sum(0),
+                                            weight_of_sum(1),
+                                            weight_of_sum(2),
+                                            weight_of_sum(3),
+                                            weight_of_sum(4),
+                                            weight_of_sum(5),
+                                            weight_of_sum(6),
+                                            weight_of_sum(7)};
+
+/// Of what the neighbours' means add to the sums of their shapes.
+AF_KERNEL_INLINE float expected_of_means(const BlockMemory& memory,
+                                         const TileNote* const around[kPredictors]) {
+  const auto sum_of = [&](const TileNote* note) { return memory.sums[note - memory.notes]; };
+  float substitute = 0.0f;
+  for (int i = kPredictors - 1; i >= 0; --i)
+    if (around[i]->state == kOccupied) substitute = sum_of(around[i]);
+  float sum = 0.0f;
+  for (int i = 0; i < kPredictors; ++i)
+    sum += kSumWeights[i] * (around[i]->state == kMissing ? substitute : sum_of(around[i]));
+  return sum;
+}
+
 /// Of the first four neighbours.
 AF_KERNEL_INLINE int32_t surprise_class_of(const TileNote* const around[kPredictors]) {
   float sum = 0.0f;
@@ -226,27 +268,97 @@ AF_KERNEL_INLINE void prefetch_coefficients(const CodewordTables& tables, uint16
   __builtin_prefetch(tables.coefficients + 16u * uint32_t{codeword});
 }
 
-/// Codes empty tiles up to one that is not, and predicts it; false at the end of the block.
+/// Codes by how many steps a mean differs from its prediction; `difference` is an encoder's.
+/// `offset`: of the prediction from its nearest step, in quarters of half a step, 0 ... 3; the
+/// difference counts upwards on the side where the prediction lies.
+template <typename Coder>
+AF_KERNEL_INLINE int32_t
+code_difference(Coder& coder, AdaptiveBit* models, int32_t offset, int32_t difference) {
+  AdaptiveBit* const has_more_bits = models + 2 * kMeanOffsets;
+  AdaptiveBit* const of_bits = has_more_bits + kMeanBits;
+  if (!coder.template code<kLeastMean>(models[2 * offset], difference != 0)) return 0;
+  const bool is_below = coder.template code<kLeastMean>(models[2 * offset + 1], difference < 0);
+  const uint32_t given = static_cast<uint32_t>(is_below ? -difference : difference);
+  const int32_t given_bits = 32 - __builtin_clz(given | 1u);
+  int32_t bits = 1;
+  while (bits < kMeanBits &&
+         coder.template code<kLeastMean>(has_more_bits[bits - 1], given_bits > bits))
+    ++bits;
+  uint32_t magnitude = 1;
+  for (int32_t left = bits - 2; left >= 0; --left) {
+    // The two highest bits after the first have models for their number of bits, the rest one.
+    const int32_t lower = static_cast<int32_t>(magnitude & 1u);
+    AdaptiveBit& model = left == bits - 2   ? of_bits[3 * (bits - 1)]
+                         : left == bits - 3 ? of_bits[3 * (bits - 1) + 1 + lower]
+                                            : of_bits[0];
+    const bool bit =
+        coder.template code<kLeastMean>(model, (given >> static_cast<uint32_t>(left) & 1u) != 0);
+    magnitude = 2 * magnitude + static_cast<uint32_t>(bit);
+  }
+  return is_below ? -static_cast<int32_t>(magnitude) : static_cast<int32_t>(magnitude);
+}
+
+/// Codes the mean of a tile whose levels are foretold to have this sum; returns 16 times the mean.
 template <typename Coder, typename Index>
+AF_KERNEL_INLINE float code_mean(Lane<Coder, Index>& lane,
+                                 const CodewordTables& tables,
+                                 const BlockShape& shape,
+                                 float expected_sum) {
+  const float sum_of_step = 16.0f * static_cast<float>(tables.mean_step);
+  const float usual = lane.memory.errors[16 * lane.surprise_class];
+  const int32_t spread = quarter_octaves(16.0f * (usual / sum_of_step)) >> 1;
+  AdaptiveBit* const models = lane.memory.mean_models +
+                              kModelsOfSpread * (spread < kMeanSpreads ? spread : kMeanSpreads - 1);
+  const int32_t most = 65535 / tables.mean_step;
+  const auto limited = [&](int32_t steps) { return steps < 0 ? 0 : steps > most ? most : steps; };
+  // Beyond either end by some tiles' sums at most.
+  const float steps = expected_sum / sum_of_step;
+  const int32_t expected = limited(static_cast<int32_t>(steps + 0.5f));
+  const float beyond = steps - static_cast<float>(expected);
+  const int32_t side = beyond < 0.0f ? -1 : 1;
+  const int32_t offset = static_cast<int32_t>(8.0f * (beyond < 0.0f ? -beyond : beyond));
+  const int32_t given = lane.index[shape.t] / tables.mean_step - expected;
+  const int32_t coded = code_difference(
+      lane.coder, models, offset < kMeanOffsets ? offset : kMeanOffsets - 1, side * given);
+  // Bytes that no encoder wrote may lead anywhere.
+  const int32_t level = limited(expected + side * coded) * tables.mean_step;
+  set_mean(lane.index, shape, static_cast<uint16_t>(level));
+  return 16.0f * static_cast<float>(level);
+}
+
+/// Codes empty tiles up to one that is not, predicts it, and codes its mean; false at the end of
+/// the block.
+template <bool kHasMeans, typename Coder, typename Index>
 AF_KERNEL_INLINE bool go_to_occupied(Lane<Coder, Index>& lane,
                                      const CodewordTables& tables,
                                      const BlockShape& shape) {
   const int64_t row = row_of(shape);
   const TileNote* around[kPredictors];
-  for (; lane.u < shape.u; go_on(lane, shape)) {
+  for (; lane.u < shape.u; go_on<kHasMeans>(lane, shape)) {
     find_neighbours(lane.here, lane.before, row, around);
     AdaptiveBit& model = lane.memory.empties[empty_context_of(around)];
     const bool is_empty = lane.coder.template code<kLeastEmpty>(model, *lane.index == 0);
     if (!is_empty && tables.codeword_count > 1) break;
     set(lane.index, 0);
     *lane.here = {0.0f, 0, kEmpty};
+    if constexpr (kHasMeans) {
+      set_mean(lane.index, shape, 0);
+      lane.memory.sums[lane.here - lane.memory.notes] = 0.0f;
+    }
   }
   if (lane.u == shape.u) return false;
   // For the tiles that come next but two: the plane before is known.
   prefetch_coefficients(tables, lane.before[row + 3].codeword);
   lane.surprise_class = surprise_class_of(around);
   lane.usual = lane.memory.octaves + 16 * lane.surprise_class;
-  store(lane.predicted, predicted_tile(inputs_of(tables, around)));
+  F16 predicted = predicted_tile(inputs_of(tables, around));
+  if constexpr (kHasMeans) {
+    const float expected_sum = predicted[0] + expected_of_means(lane.memory, around);
+    const float sum = code_mean(lane, tables, shape, expected_sum);
+    lane.memory.sums[lane.here - lane.memory.notes] = sum;
+    predicted[0] = expected_sum - sum;
+  }
+  store(lane.predicted, predicted);
   lane.cluster = 0;
   lane.within_cluster = tables.first_node;
   lane.number = 1;
@@ -294,7 +406,7 @@ AF_KERNEL_INLINE void leave_cluster(Lane<Coder, Index>& lane) {
 }
 
 /// Learns from the tile, and notes it.
-template <typename Coder, typename Index>
+template <bool kHasMeans, typename Coder, typename Index>
 AF_KERNEL_INLINE void finish_tile(Lane<Coder, Index>& lane,
                                   const CodewordTables& tables,
                                   const BlockShape& shape,
@@ -308,7 +420,7 @@ AF_KERNEL_INLINE void finish_tile(Lane<Coder, Index>& lane,
   store(lane.memory.octaves + 16 * lane.surprise_class, quarter_octaves(learned));
   *lane.here = {sum_of(wrong_by) / 4.0f, codeword, kOccupied};
   set(lane.index, codeword);
-  go_on(lane, shape);
+  go_on<kHasMeans>(lane, shape);
 }
 
 /// All lanes' ways to their codewords, turn by turn: one computes while another waits.
@@ -329,17 +441,16 @@ AF_KERNEL_INLINE void find_ways(Lane<RangeDecoder, uint16_t>* lanes,
   }
 }
 
-}  // namespace
-
-int64_t encode_block(const CodewordTables& tables,
-                     const BlockShape& shape,
-                     const BlockMemory& memory,
-                     const uint16_t* indices,
-                     uint8_t* bytes) {
+template <bool kHasMeans>
+AF_KERNEL_INLINE int64_t encode(const CodewordTables& tables,
+                                const BlockShape& shape,
+                                const BlockMemory& memory,
+                                const uint16_t* indices,
+                                uint8_t* bytes) {
   Lane<RangeEncoder, const uint16_t> lane;
   lane.coder = RangeEncoder(bytes);
   begin(lane, shape, memory, indices);
-  while (go_to_occupied(lane, tables, shape)) {
+  while (go_to_occupied<kHasMeans>(lane, tables, shape)) {
     const uint16_t codeword = *lane.index;
     const uint32_t leaf = tables.leaves[codeword];
     for (int left = 30 - __builtin_clz(leaf); left >= 0;) {
@@ -348,16 +459,17 @@ int64_t encode_block(const CodewordTables& tables,
         take_turn(lane, (leaf >> static_cast<uint32_t>(left) & 1u) != 0);
       leave_cluster(lane);
     }
-    finish_tile(lane, tables, shape, codeword);
+    finish_tile<kHasMeans>(lane, tables, shape, codeword);
   }
   return lane.coder.finish();
 }
 
-void decode_blocks(const CodewordTables& tables,
-                   const BlockShape& shape,
-                   const BlockMemory* memories,
-                   BlockToDecode* blocks,
-                   int count) {
+template <bool kHasMeans>
+AF_KERNEL_INLINE void decode(const CodewordTables& tables,
+                             const BlockShape& shape,
+                             const BlockMemory* memories,
+                             BlockToDecode* blocks,
+                             int count) {
   Lane<RangeDecoder, uint16_t> lanes[kBlocksAtOnce];
   for (int i = 0; i < count; ++i) {
     lanes[i].coder = RangeDecoder(blocks[i].bytes, blocks[i].byte_count);
@@ -366,7 +478,7 @@ void decode_blocks(const CodewordTables& tables,
   }
   for (int under_way = count; under_way > 0;) {
     for (int i = 0; i < under_way;) {
-      if (go_to_occupied(lanes[i], tables, shape)) {
+      if (go_to_occupied<kHasMeans>(lanes[i], tables, shape)) {
         ++i;
         continue;
       }
@@ -377,8 +489,28 @@ void decode_blocks(const CodewordTables& tables,
     for (int i = 0; i < under_way; ++i)
       prefetch_coefficients(tables, tables.codewords_at[lanes[i].number]);
     for (int i = 0; i < under_way; ++i)
-      finish_tile(lanes[i], tables, shape, tables.codewords_at[lanes[i].number]);
+      finish_tile<kHasMeans>(lanes[i], tables, shape, tables.codewords_at[lanes[i].number]);
   }
+}
+
+}  // namespace
+
+int64_t encode_block(const CodewordTables& tables,
+                     const BlockShape& shape,
+                     const BlockMemory& memory,
+                     const uint16_t* indices,
+                     uint8_t* bytes) {
+  return tables.mean_step > 0 ? encode<true>(tables, shape, memory, indices, bytes)
+                              : encode<false>(tables, shape, memory, indices, bytes);
+}
+
+void decode_blocks(const CodewordTables& tables,
+                   const BlockShape& shape,
+                   const BlockMemory* memories,
+                   BlockToDecode* blocks,
+                   int count) {
+  tables.mean_step > 0 ? decode<true>(tables, shape, memories, blocks, count)
+                       : decode<false>(tables, shape, memories, blocks, count);
 }
 
 }  // namespace af::AF_KERNEL_NAMESPACE

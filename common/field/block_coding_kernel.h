@@ -38,6 +38,7 @@ struct CodewordTables {
   const float* coefficients;     ///< 16 per codeword; of codeword 0 zeros
   const uint32_t* leaves;        ///< node of each codeword
   uint32_t codeword_count;
+  int32_t mean_step;  ///< 0: tiles have no means
 };
 
 /// What is kept of a tile until those that it helps to predict are done.
@@ -57,6 +58,15 @@ inline constexpr int kWidths = 16;     ///< of a node against the usual error
 inline constexpr int kOrders = 3;      ///< mean, slopes, the rest
 inline constexpr int kEmptyContexts = 3 * 3 * 3 * 3 * 3;
 
+/// Models of the difference of a mean to its prediction, by the usual difference: whether there is
+/// any, and its sign, by how far the prediction is from its nearest step; how many bits it has, and
+/// these bits from the highest on.
+inline constexpr int kMeanSpreads = 32;
+inline constexpr int kMeanBits = 16;
+inline constexpr int kMeanOffsets = 4;
+inline constexpr int kModelsOfSpread = 2 * kMeanOffsets + kMeanBits + 3 * kMeanBits;
+inline constexpr int kMeanModels = kMeanSpreads * kModelsOfSpread;
+
 inline constexpr int kNotesBeyond = 4;  ///< that are looked at ahead of time
 
 /// What a coder learns within a block, and its notes. Zeros, and models as they begin, at first.
@@ -68,9 +78,11 @@ struct BlockMemory {
   int32_t* octaves;  ///< of the errors, in quarters
   /// [u % 2][v][1 + s + 1][1 + t + 1]: tiles beyond the borders are missing. kNotesBeyond follow.
   TileNote* notes;
+  AdaptiveBit* mean_models;  ///< kMeanModels; of tiles with means
+  float* sums;               ///< of these, too: 16 times the mean of the tile of each note
 };
 
-/// Indices [u][v][s][t] of one block and their bytes.
+/// Indices [u][v][s][t] of one block and their bytes; with means, [u][v][s][2][t].
 struct BlockToDecode {
   uint16_t* indices;
   const uint8_t* bytes;

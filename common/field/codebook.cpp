@@ -15,14 +15,28 @@ bool codeword_less(const Tile& a, const Tile& b) {
   return sum_a != sum_b ? sum_a < sum_b : a < b;
 }
 
+Tile folded_shape(const Tile& shape) {
+  constexpr std::size_t kUpperS = tile_element(0, 0, 1, 0);
+  Tile folded = shape;
+  for (std::size_t i = 0; i < kTileElements; ++i)
+    if ((i & kUpperS) != 0) folded[i] = static_cast<std::uint16_t>(65535 - folded[i]);
+  return folded;
+}
+
 std::vector<std::string> problems(const Codebook& codebook) {
   std::vector<std::string> found;
   const auto& codewords = codebook.codewords;
   if (codewords.empty() || codewords.size() > kMaxCodewords)
     return {"codewords = " + std::to_string(codewords.size()) + ": must be within 1 and 65536"};
+  if (codebook.mean_step < 0 || codebook.mean_step > kMaxMeanStep)
+    found.push_back("mean_step = " + std::to_string(codebook.mean_step) +
+                    ": must be within 0 and " + std::to_string(kMaxMeanStep));
   if (!is_zero(codewords.front())) found.emplace_back("codeword 0 must be the zero tile");
-  for (std::size_t i = 1; i < codewords.size(); ++i)
-    if (codeword_less(codewords[i], codewords[i - 1])) {
+  const auto ordered = [&](std::size_t i) {
+    return codebook.has_means() ? folded_shape(codewords[i]) : codewords[i];
+  };
+  for (std::size_t i = codebook.has_means() ? 2 : 1; i < codewords.size(); ++i)
+    if (codeword_less(ordered(i), ordered(i - 1))) {
       found.push_back("codeword " + std::to_string(i) + " breaks the codebook's order by sum");
       break;
     }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -10,14 +12,37 @@ namespace af {
 
 inline constexpr std::size_t kMaxCodewords = 65536;  ///< an index is 16 bits
 
-/// Codewords of the vector quantiser, sorted by the sum of their elements (ties:
-/// lexicographically), so that codeword 0 is the zero tile and a search can bound distances by the
-/// sum alone.
+/// Codewords of the vector quantiser. Codeword 0 is the zero tile.
+///
+/// Of plain tiles, a codeword is the tile: codewords are sorted by the sum of their elements (ties:
+/// lexicographically), so that a search can bound distances by the sum alone.
+///
+/// Of mean-removed tiles (mean-removed VQ: Baker and Gray 1983), a codeword is a tile's shape, the
+/// differences from its mean, and the field holds the mean beside the index, as a multiple of
+/// `mean_step` levels. Elements of shapes stand kShapeZero higher. The shapes from codeword 1 on
+/// are sorted as plain tiles are, but folded (folded_shape()), because their own sums hardly
+/// differ. Codeword 0 goes with mean 0 and says that a tile is empty.
 struct Codebook {
   std::vector<Tile> codewords;
+  int mean_step = 0;  ///< 0: of plain tiles
 
   [[nodiscard]] std::size_t size() const { return codewords.size(); }
+  [[nodiscard]] bool has_means() const { return mean_step > 0; }
 };
+
+/// What an element of a shape that equals the mean holds.
+inline constexpr int kShapeZero = 32768;
+/// A larger step leaves nothing to the means.
+inline constexpr int kMaxMeanStep = 4096;
+
+/// The level that an element of a mean-removed tile stands for: within 0 and 65535.
+inline std::uint16_t level_of(std::uint16_t element, std::uint16_t mean) {
+  return static_cast<std::uint16_t>(std::clamp(int{mean} + int{element} - kShapeZero, 0, 65535));
+}
+
+/// A shape whose elements at the upper node along s are complemented, or back: distances between
+/// shapes stay, and the sum becomes the slope along s.
+Tile folded_shape(const Tile& shape);
 
 /// Sum of a tile's elements: its DC coefficient before scaling.
 std::uint32_t tile_sum(const Tile& tile);
@@ -25,8 +50,8 @@ std::uint32_t tile_sum(const Tile& tile);
 /// The order in which a codebook is kept.
 bool codeword_less(const Tile& a, const Tile& b);
 
-/// Why a codebook is not usable: size not in 1 ... 65536, codeword 0 not zero, order broken; empty
-/// when it is.
+/// Why a codebook is not usable: size not in 1 ... 65536, codeword 0 not zero, order broken, a step
+/// that is none; empty when it is.
 std::vector<std::string> problems(const Codebook& codebook);
 
 }  // namespace af

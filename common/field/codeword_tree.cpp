@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <numeric>
+#include <span>
 #include <utility>
 
 namespace af {
@@ -56,6 +57,11 @@ CodewordTree::CodewordTree(const Codebook& codebook) {
   coefficients_.reserve(codebook.size());
   for (const Tile& codeword : codebook.codewords)
     coefficients_.push_back({hadamard_coefficients(codeword)});
+  if (codebook.has_means()) {
+    mean_step_ = codebook.mean_step;
+    for (auto& of_shape : std::span(coefficients_).subspan(1))
+      of_shape.values[0] -= static_cast<float>(kTileElements) * kShapeZero;
+  }
   leaves_.assign(codebook.size(), 0);
   if (codebook.size() < 2) return;
   std::vector<std::uint32_t> codewords(codebook.size() - 1);
@@ -76,7 +82,8 @@ CodewordTables CodewordTree::tables() const {
           depth_,
           coefficients_.front().values.data(),
           leaves_.data(),
-          static_cast<std::uint32_t>(coefficients_.size())};
+          static_cast<std::uint32_t>(coefficients_.size()),
+          mean_step_};
 }
 
 CodewordTree::Node CodewordTree::node(std::uint32_t number) const {

@@ -41,6 +41,7 @@ class CodewordTree {
     return coefficients_[codeword].values;
   }
   [[nodiscard]] std::size_t codeword_count() const { return coefficients_.size(); }
+  [[nodiscard]] int mean_step() const { return mean_step_; }
   /// For the kernels, while this lives.
   [[nodiscard]] CodewordTables tables() const;
 
@@ -58,7 +59,8 @@ class CodewordTree {
   void split(std::uint32_t number, std::uint32_t* begin, std::uint32_t* end);
   [[nodiscard]] Place place_of(std::uint32_t number) const;
 
-  std::vector<Coefficients> coefficients_;  ///< never empty: codeword 0
+  std::vector<Coefficients> coefficients_;  ///< never empty: codeword 0; of shapes the differences
+  int mean_step_ = 0;                       ///< of the codebook
   int depth_ = 0;
   std::vector<NodeCluster> clusters_;
   std::vector<std::uint16_t> codewords_at_;

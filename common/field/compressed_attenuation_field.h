@@ -31,7 +31,8 @@ struct FieldIdentity {
 
 /// Codeword indices of one slab, [Tu][Tv][Ts][Tt] with Tt fastest; tile (a, b, c, d) holds nodes
 /// 2a.., 2b.., 2c.., 2d.. of what is stored along each axis. Odd ends are padded by edge
-/// replication.
+/// replication. Where the codebook has means, [Tu][Tv][Ts][2][Tt]: a row of indices, then the row
+/// of the means of its tiles, in levels.
 struct CompressedSlab {
   SharedArray<std::uint16_t> indices;
 };
@@ -58,6 +59,13 @@ struct CompressedAttenuationField {
   /// stored range).
   [[nodiscard]] float node_value(std::size_t slab, const NodeIndex& node) const;
 };
+
+/// Why rows of indices, each followed by its row of means where the codebook has them, cannot be of
+/// a field with this codebook; empty when they can. `row`: tiles of a row.
+std::vector<std::string> index_problems(std::span<const std::uint16_t> values,
+                                        std::size_t row,
+                                        const Codebook& codebook,
+                                        const std::string& name);
 
 /// Every inconsistency between geometry, codebook and index arrays (sizes, indices out of range);
 /// empty when sound.

@@ -31,7 +31,7 @@ BlockShape shape_of(const std::array<std::size_t, 4>& tiles) {
 /// What a coder begins a block with.
 class BlockStart {
  public:
-  explicit BlockStart(const std::array<std::size_t, 4>& tiles)
+  BlockStart(const std::array<std::size_t, 4>& tiles, int mean_step)
       : turns_(std::size_t{kOrders} * kDistances * kWidths),
         empties_(kEmptyContexts),
         notes_(2 * tiles[1] * (tiles[2] + 2) * (tiles[3] + 2) + kNotesBeyond) {
@@ -39,6 +39,9 @@ class BlockStart {
       errors_[c].fill(std::ldexp(0.6f, static_cast<int>(c)));
       octaves_[c].fill(quarter_octaves(errors_[c][0]));
     }
+    if (mean_step == 0) return;
+    mean_models_.resize(kMeanModels);
+    sums_.resize(notes_.size());
   }
 
   [[nodiscard]] BlockMemory memory() {
@@ -46,7 +49,9 @@ class BlockStart {
             empties_.data(),
             errors_.front().data(),
             octaves_.front().data(),
-            notes_.data()};
+            notes_.data(),
+            mean_models_.data(),
+            sums_.data()};
   }
 
  private:
@@ -55,25 +60,42 @@ class BlockStart {
   std::array<TileCoefficients, kSurpriseClasses> errors_;
   std::array<std::array<std::int32_t, kTileElements>, kSurpriseClasses> octaves_;
   std::vector<TileNote> notes_;
+  std::vector<AdaptiveBit> mean_models_;
+  std::vector<float> sums_;
 };
 
 }  // namespace
 
 std::size_t IndexCoding::most_bytes(std::size_t tiles) {
-  // A turn costs 11 bits at most, and a tile has 17 or fewer.
-  constexpr std::size_t kOfATile = 24;
+  // A turn costs 11 bits at most, and a tile has 17 or fewer; a mean has 34 or fewer.
+  constexpr std::size_t kOfATile = 72;
   constexpr std::size_t kOfTheEnd = 64;
   return tiles * kOfATile + kOfTheEnd;
 }
 
+void IndexCoding::check_values(std::span<const std::uint16_t> values,
+                               const std::array<std::size_t, 4>& tiles) const {
+  check(values.size() == values_per_tile() * tile_count_of(tiles), "one index per tile");
+  const std::size_t row = tiles[3];
+  for (std::size_t at = 0; at < values.size(); at += values_per_tile() * row) {
+    const auto indices = values.subspan(at, row);
+    check(std::ranges::all_of(indices,
+                              [&](std::uint16_t index) { return index < tree_.codeword_count(); }),
+          "indices of the codebook");
+    if (tree_.mean_step() == 0) continue;
+    const auto means = values.subspan(at + row, row);
+    for (std::size_t i = 0; i < row; ++i)
+      check(means[i] % tree_.mean_step() == 0 && (indices[i] != 0 || means[i] == 0),
+            "means are multiples of the step");
+  }
+}
+
 std::vector<std::uint8_t> IndexCoding::encode(std::span<const std::uint16_t> indices,
                                               const std::array<std::size_t, 4>& tiles) const {
-  check(indices.size() == tile_count_of(tiles), "one index per tile");
-  check(std::ranges::all_of(indices,
-                            [&](std::uint16_t index) { return index < tree_.codeword_count(); }),
-        "indices of the codebook");
-  const auto bytes = std::make_unique_for_overwrite<std::uint8_t[]>(most_bytes(indices.size()));
-  BlockStart start(tiles);
+  check_values(indices, tiles);
+  const auto bytes =
+      std::make_unique_for_overwrite<std::uint8_t[]>(most_bytes(tile_count_of(tiles)));
+  BlockStart start(tiles, tree_.mean_step());
   const auto encode_one = select_kernel<EncodeBlock>(
       kernels_128::encode_block, kernels_256::encode_block, kernels_512::encode_block);
   const std::int64_t count =
@@ -90,11 +112,12 @@ bool IndexCoding::decode(std::span<const CodedBlock> blocks,
   for (std::size_t first = 0; first < blocks.size(); first += kBlocksAtOnce) {
     const auto some =
         blocks.subspan(first, std::min<std::size_t>(kBlocksAtOnce, blocks.size() - first));
-    std::vector<BlockStart> starts(some.size(), BlockStart(tiles));
+    std::vector<BlockStart> starts(some.size(), BlockStart(tiles, tree_.mean_step()));
     std::array<BlockMemory, kBlocksAtOnce> memories{};
     std::array<BlockToDecode, kBlocksAtOnce> in_memory{};
     for (std::size_t i = 0; i < some.size(); ++i) {
-      check(some[i].indices.size() == tile_count_of(tiles), "one index per tile");
+      check(some[i].indices.size() == values_per_tile() * tile_count_of(tiles),
+            "one index per tile");
       memories[i] = starts[i].memory();
       in_memory[i] = {some[i].indices.data(),
                       some[i].bytes.data(),

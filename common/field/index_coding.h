@@ -17,13 +17,14 @@ struct CodedBlock {
   std::span<std::uint16_t> indices;
 };
 
-/// Coding of a block of indices [u][v][s][t] without loss, in some 40 to 55 % of the bytes that
+/// Coding of a block of indices [u][v][s][t] without loss (with means: [u][v][s][2][t], a row of
+/// indices, then that of the means), in some 40 to 55 % of the bytes that
 /// deflate needs. A tile resembles its neighbours along u, s and t. So it is predicted from those
 /// that come before it, and its codeword is told by the turns of the way to it through the
 /// codebook's tree. An adaptive range coder learns how likely each turn is, given how far the
 /// prediction lies from the node's threshold, measured by what predictions were wrong by of late.
-/// Blocks do not need each other. The bytes are the same on every vector width. Re-entrant.
-/// \test IndexCoding
+/// A mean is told first, by its difference to the prediction. Blocks do not need each other. The
+/// bytes are the same on every vector width. Re-entrant. \test IndexCoding
 class IndexCoding {
  public:
   /// So many blocks are best decoded together.
@@ -31,8 +32,8 @@ class IndexCoding {
 
   explicit IndexCoding(const Codebook& codebook) : tree_(codebook) {}
 
-  /// Throws std::logic_error unless there are as many indices as `tiles` says and all are below the
-  /// number of codewords.
+  /// Throws std::logic_error unless there are as many indices (and means) as `tiles` says and
+  /// the indices are below the number of codewords, and means are as index_problems() has them.
   [[nodiscard]] std::vector<std::uint8_t> encode(std::span<const std::uint16_t> indices,
                                                  const std::array<std::size_t, 4>& tiles) const;
 
@@ -48,7 +49,13 @@ class IndexCoding {
   /// No encoder makes more of so many tiles.
   static std::size_t most_bytes(std::size_t tiles);
 
+  /// 1, or 2 where they have means.
+  [[nodiscard]] std::size_t values_per_tile() const { return tree_.mean_step() > 0 ? 2 : 1; }
+
  private:
+  void check_values(std::span<const std::uint16_t> values,
+                    const std::array<std::size_t, 4>& tiles) const;
+
   CodewordTree tree_;
 };
 

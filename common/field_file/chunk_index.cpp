@@ -17,7 +17,8 @@ constexpr int kMostDoublings = 16;
 /// Viewpoints along u that a chunk spans: whoever reads a field holds so many planes of equal u.
 hsize_t viewpoints_of_chunk(const DatasetRule& rule) {
   constexpr std::uint64_t kMostTilesAtOnce = std::uint64_t{16} << 20;
-  const std::uint64_t plane = rule.extents[1] * rule.extents[2] * rule.extents[3];
+  const std::uint64_t plane =
+      rule.extents[1] * rule.extents[2] * rule.extents[3] / rule.rows_per_tile;
   hsize_t viewpoints = kIndexChunkViewpoints;
   while (viewpoints > 1 && viewpoints * plane > kMostTilesAtOnce) viewpoints /= 2;
   return std::min<hsize_t>(viewpoints, rule.extents[0]);
@@ -27,7 +28,7 @@ hsize_t viewpoints_of_chunk(const DatasetRule& rule) {
 ChunkShape chunk_shape(const DatasetRule& rule, int doublings) {
   ChunkShape shape = {viewpoints_of_chunk(rule),
                       1,
-                      std::min<hsize_t>(kIndexChunkTiles[0], rule.extents[2]),
+                      std::min<hsize_t>(rule.rows_per_tile * kIndexChunkTiles[0], rule.extents[2]),
                       std::min<hsize_t>(kIndexChunkTiles[1], rule.extents[3])};
   std::uint64_t elements = shape[0] * shape[2] * shape[3];
   for (const std::size_t axis : {1u, 2u, 3u, 0u})

@@ -76,21 +76,34 @@ std::uint64_t hash_sum(std::uint64_t first_tile, std::span<const std::uint16_t> 
   return sum;
 }
 
-/// Calls visit(first tile number within the slab, indices) for every run of tiles along t.
+/// First value and number of values of a block along the axes of its dataset: tiles, but along s
+/// rows.
+struct DatasetBlock {
+  std::array<std::uint64_t, 4> first{};
+  std::array<std::uint64_t, 4> count{};
+};
+
+DatasetBlock in_dataset(const IndexBlock& block, const DatasetRule& rule) {
+  DatasetBlock values;
+  for (std::size_t axis = 0; axis < 4; ++axis) {
+    const std::uint64_t rows = axis == 2 ? rule.rows_per_tile : 1;
+    values.first[axis] = rows * static_cast<std::uint64_t>(block.first_tile[axis]);
+    values.count[axis] = rows * static_cast<std::uint64_t>(block.tile_count[axis]);
+  }
+  return values;
+}
+
+/// Calls visit(number of the first value within the slab, values) for every run of values along t.
 template <typename Visit>
 void for_each_run(const IndexBlock& block, const DatasetRule& rule, Visit&& visit) {
   std::span<const std::uint16_t> rest(block.indices);
-  const auto run = static_cast<std::size_t>(block.tile_count[3]);
-  const auto position = [&](std::size_t axis, int local) {
-    return static_cast<std::uint64_t>(block.first_tile[axis]) + static_cast<std::uint64_t>(local);
-  };
-  for (int a = 0; a < block.tile_count[0]; ++a)
-    for (int b = 0; b < block.tile_count[1]; ++b)
-      for (int c = 0; c < block.tile_count[2]; ++c) {
-        const std::uint64_t row =
-            (position(0, a) * rule.extents[1] + position(1, b)) * rule.extents[2] + position(2, c);
-        visit(row * rule.extents[3] + position(3, 0), rest.first(run));
-        rest = rest.subspan(run);
+  const auto [first, count] = in_dataset(block, rule);
+  for (std::uint64_t a = first[0]; a < first[0] + count[0]; ++a)
+    for (std::uint64_t b = first[1]; b < first[1] + count[1]; ++b)
+      for (std::uint64_t c = first[2]; c < first[2] + count[2]; ++c) {
+        const std::uint64_t row = (a * rule.extents[1] + b) * rule.extents[2] + c;
+        visit(row * rule.extents[3] + first[3], rest.first(count[3]));
+        rest = rest.subspan(count[3]);
       }
 }
 
@@ -99,17 +112,16 @@ void for_each_run(const IndexBlock& block, const DatasetRule& rule, Visit&& visi
 void check_blocks(const std::vector<IndexBlock>& blocks, const std::vector<DatasetRule>& rules) {
   for (const IndexBlock& block : blocks) {
     check(block.slab < rules.size(), "an index block names a slab of the field");
-    std::size_t tiles = 1;
+    const DatasetRule& rule = rules[block.slab];
+    const DatasetBlock values = in_dataset(block, rule);
+    std::size_t needed = 1;
     for (std::size_t axis = 0; axis < 4; ++axis) {
-      const int first = block.first_tile[axis];
-      const int count = block.tile_count[axis];
-      check(first >= 0 && count >= 1 &&
-                static_cast<std::uint64_t>(first) + static_cast<std::uint64_t>(count) <=
-                    rules[block.slab].extents[axis],
+      check(block.first_tile[axis] >= 0 && block.tile_count[axis] >= 1 &&
+                values.first[axis] + values.count[axis] <= rule.extents[axis],
             "an index block lies within its slab");
-      tiles *= static_cast<std::size_t>(count);
+      needed *= values.count[axis];
     }
-    check(block.indices.size() == tiles, "an index block has one index per tile");
+    check(block.indices.size() == needed, "an index block has one index per tile");
   }
 }
 
@@ -149,6 +161,7 @@ void create_index_dataset(hid_t file,
 struct FileContents {
   const char* format = field_layout::kFormat;
   IndexPacking packing = IndexPacking::CodebookTree;
+  bool has_means = false;
   std::string ct_sha256;
   std::vector<Dataset> payload;
   std::vector<Dataset> beside;  ///< not of the payload: ranges that two numbers do not state, bone
@@ -159,10 +172,11 @@ struct FileContents {
 FileContents contents_of(const CompressedAttenuationField& field, IndexPacking packing) {
   FileContents contents = {field_layout::kFormat,
                            packing,
+                           field.codebook.has_means(),
                            field.identity.ct_content_sha256,
                            field_layout::datasets_of(field),
                            field_layout::range_datasets(field.identity.range),
-                           index_rules(field.lattice()),
+                           index_rules(field),
                            field_layout::payload_bytes(field.codebook, field.lattice())};
   for (Dataset& dataset : field_layout::material_datasets(field.identity.material))
     contents.beside.push_back(std::move(dataset));
@@ -172,6 +186,7 @@ FileContents contents_of(const CompressedAttenuationField& field, IndexPacking p
 FileContents contents_of(const AttenuationAtlas& atlas, IndexPacking packing) {
   FileContents contents = {field_layout::kAtlasFormat,
                            packing,
+                           atlas.codebook.has_means(),
                            atlas.identity.ct_content_sha256,
                            field_layout::datasets_of(atlas),
                            field_layout::range_datasets(atlas.identity.range),
@@ -194,8 +209,15 @@ FileContents contents_of(const AttenuationAtlas& atlas, IndexPacking packing) {
 void create_file_without_indices(const FileContents& contents, const std::filesystem::path& path) {
   Handle file = hdf5::create_file(path);
   hdf5::write_text_attribute(file, "format", contents.format);
-  hdf5::write_int_attribute(
-      file, "format_version", field_layout::format_version_of(contents.packing));
+  hdf5::write_int_attribute(file,
+                            "format_version",
+                            field_layout::format_version_of(contents.packing, contents.has_means));
+  if (contents.has_means) {
+    hdf5::write_text_attribute(
+        file, field_layout::kTileCodingAttribute, field_layout::kMeanRemoved);
+    hdf5::write_text_attribute(
+        file, field_layout::kPackingAttribute, field_layout::to_string(contents.packing));
+  }
   hdf5::write_text_attribute(file, "ct_sha256", contents.ct_sha256);
   hdf5::write_text_attribute(file, "payload_sha256", std::string(kSha256Digits, '0'));
   for (const std::vector<Dataset>* datasets : {&contents.payload, &contents.beside})
@@ -210,15 +232,16 @@ void create_file_without_indices(const FileContents& contents, const std::filesy
 /// Collective. Writes one block, or none where `block` is null. One plain hyperslab with a memory
 /// space of the same shape: collective filtered writes of unions of hyperslabs from a 1-D memory
 /// space crash or hang in HDF5 1.10.8 now and then.
-void write_block(hid_t dataset, IndexBlock* block) {
+void write_block(hid_t dataset, const DatasetRule& rule, IndexBlock* block) {
   const Handle in_file(H5Dget_space(dataset), H5Sclose, "H5Dget_space");
   const Handle transfer(H5Pcreate(H5P_DATASET_XFER), H5Pclose, "H5Pcreate");
   checked(H5Pset_dxpl_mpio(transfer, H5FD_MPIO_COLLECTIVE), "H5Pset_dxpl_mpio");
   std::array<hsize_t, 4> start{};
   std::array<hsize_t, 4> count = {1, 1, 1, 1};
-  for (std::size_t axis = 0; block != nullptr && axis < 4; ++axis) {
-    start[axis] = static_cast<hsize_t>(block->first_tile[axis]);
-    count[axis] = static_cast<hsize_t>(block->tile_count[axis]);
+  if (block != nullptr) {
+    const DatasetBlock values = in_dataset(*block, rule);
+    std::ranges::copy(values.first, start.begin());
+    std::ranges::copy(values.count, count.begin());
   }
   const Handle in_memory(H5Screate_simple(4, count.data(), nullptr), H5Sclose, "H5Screate_simple");
   const std::uint16_t nothing = 0;
@@ -308,7 +331,7 @@ class SharedFile {
         const Handle dataset(
             H5Dopen2(file_, rules_[k].name.c_str(), H5P_DEFAULT), H5Dclose, "H5Dopen2");
         for (std::size_t i = 0; i < most_blocks[k]; ++i)
-          write_block(dataset, i < of_slab.size() ? of_slab[i] : nullptr);
+          write_block(dataset, rules_[k], i < of_slab.size() ? of_slab[i] : nullptr);
       });
     }
   }
@@ -505,10 +528,18 @@ struct FileHeader {
   std::string payload_sha256;
   std::uint64_t file_bytes = 0;
   IndexPacking packing = IndexPacking::CodebookTree;
+  bool has_means = false;
 
   auto members() {
-    return std::tie(
-        is_atlas, fields, root, root_range, provenance, payload_sha256, file_bytes, packing);
+    return std::tie(is_atlas,
+                    fields,
+                    root,
+                    root_range,
+                    provenance,
+                    payload_sha256,
+                    file_bytes,
+                    packing,
+                    has_means);
   }
   /// Of an atlas. FileError.
   [[nodiscard]] AttenuationAtlas atlas(const std::string& path) const {
@@ -545,23 +576,55 @@ bool is_atlas_format(hid_t file, const std::filesystem::path& path) {
   return false;
 }
 
-IndexPacking checked_packing(hid_t file, const std::filesystem::path& path) {
+/// What a file's version and attributes say of its indices.
+struct StoredCoding {
+  IndexPacking packing = IndexPacking::CodebookTree;
+  bool has_means = false;
+};
+
+/// A text attribute that a version asks for, one of `known`.
+std::string required_attribute(hid_t file,
+                               const char* name,
+                               const std::vector<std::string>& known,
+                               const std::filesystem::path& path) {
+  const std::string found =
+      H5Aexists(file, name) > 0 ? hdf5::read_text_attribute(file, name) : "none";
+  for (const std::string& text : known)
+    if (found == text) return found;
+  std::string expected = known.front();
+  for (std::size_t i = 1; i < known.size(); ++i) expected += " or " + known[i];
+  throw FileError(path.string(), std::string("attribute ") + name, expected, found);
+}
+
+StoredCoding checked_coding(hid_t file, const std::filesystem::path& path) {
   const int version = hdf5::read_int_attribute(file, "format_version");
   if (version < 1 || version > field_layout::kFormatVersion)
     throw FileError(path.string(),
                     "attribute format_version",
                     "1 to " + std::to_string(field_layout::kFormatVersion),
                     std::to_string(version));
-  return version == field_layout::format_version_of(IndexPacking::Deflate)
-             ? IndexPacking::Deflate
-             : IndexPacking::CodebookTree;
+  if (version != field_layout::kFormatVersionWithMeans)
+    return {version == field_layout::format_version_of(IndexPacking::Deflate, false)
+                ? IndexPacking::Deflate
+                : IndexPacking::CodebookTree,
+            false};
+  required_attribute(file, field_layout::kTileCodingAttribute, {field_layout::kMeanRemoved}, path);
+  const char* const deflate = field_layout::to_string(IndexPacking::Deflate);
+  const std::string packing =
+      required_attribute(file,
+                         field_layout::kPackingAttribute,
+                         {field_layout::to_string(IndexPacking::CodebookTree), deflate},
+                         path);
+  return {packing == deflate ? IndexPacking::Deflate : IndexPacking::CodebookTree, true};
 }
 
 /// Whether a file of this size can hold so many indices at all; refuses before memory is asked for.
 void check_plausible_size(const DatasetRule& rule,
                           std::uint64_t file_bytes,
                           const std::filesystem::path& path) {
-  const std::uint64_t needed = tile_count_of(rule) * sizeof(std::uint16_t) / kMaxPackingRatio;
+  // Empty tiles have no means of their own.
+  const std::uint64_t needed =
+      tile_count_of(rule) / rule.rows_per_tile * sizeof(std::uint16_t) / kMaxPackingRatio;
   if (needed > file_bytes)
     throw FileError(path.string(),
                     rule.name,
@@ -575,8 +638,10 @@ void check_packing(hid_t dataset,
                    IndexPacking packing,
                    const std::filesystem::path& path) {
   hdf5::ChunkShape chunk{};
-  const auto text = [](IndexPacking of) {
-    return "indices packed as in version " + std::to_string(field_layout::format_version_of(of));
+  const auto text = [&](IndexPacking of) {
+    if (rule.rows_per_tile > 1) return std::string(field_layout::to_string(of));
+    return "indices packed as in version " +
+           std::to_string(field_layout::format_version_of(of, false));
   };
   const IndexPacking found =
       hdf5::is_coded(dataset, chunk) ? IndexPacking::CodebookTree : IndexPacking::Deflate;
@@ -611,16 +676,17 @@ FieldHeader read_field_of(hid_t file,
   const DatasetRule slab_count = of_group({field_layout::slab_count_rule()}).front();
   const int slabs = field_layout::slab_count_of(hdf5::read_dataset(file, slab_count, path.string()),
                                                 path.string());
-  header.payload = read_datasets(file,
-                                 of_group(shared.empty() ? field_layout::payload_rules(slabs)
-                                                         : field_layout::member_rules(slabs)),
-                                 path.string());
+  header.payload =
+      read_datasets(file,
+                    of_group(shared.empty() ? field_layout::payload_rules(slabs, of_file.has_means)
+                                            : field_layout::member_rules(slabs)),
+                    path.string());
   header.payload.insert(header.payload.end(), shared.begin(), shared.end());
   header.range = read_range(file, group, path.string());
   const DatasetRule material = of_group({field_layout::material_rule()}).front();
   if (checked(H5Lexists(file, material.name.c_str(), H5P_DEFAULT), "H5Lexists") > 0)
     header.material.push_back(hdf5::read_dataset(file, material, path.string()));
-  header.index_rules = of_group(index_rules(header.field(path.string()).lattice()));
+  header.index_rules = of_group(index_rules(header.field(path.string())));
   for (const DatasetRule& rule : header.index_rules) {
     check_plausible_size(rule, of_file.file_bytes, path);
     std::vector<std::uint64_t> extents;
@@ -633,9 +699,10 @@ FieldHeader read_field_of(hid_t file,
 
 /// The root of an atlas, and its members.
 void read_members(hid_t file, const std::filesystem::path& path, FileHeader& header) {
-  header.root = read_datasets(file, field_layout::atlas_rules(), path.string());
+  header.root = read_datasets(file, field_layout::atlas_rules(header.has_means), path.string());
   header.root_range = read_range(file, "", path.string());
-  const auto shared = std::span<const Dataset>(header.root).last(field_layout::kSharedRules);
+  const auto shared =
+      std::span<const Dataset>(header.root).last(field_layout::shared_rules(header.has_means));
   const int members = field_layout::member_count_of(header.root.front(), path.string());
   for (int i = 0; i < members; ++i)
     header.fields.push_back(read_field_of(
@@ -647,7 +714,7 @@ std::string payload_hash(const FileHeader& header) {
   std::vector<Dataset> datasets = header.root;
   std::vector<DatasetRule> rules;
   std::vector<std::string> index_sha256;
-  const std::size_t shared = header.is_atlas ? field_layout::kSharedRules : 0;
+  const std::size_t shared = header.is_atlas ? field_layout::shared_rules(header.has_means) : 0;
   for (const FieldHeader& field : header.fields) {
     datasets.insert(datasets.end(),
                     field.payload.begin(),
@@ -683,7 +750,9 @@ FileHeader read_header(const std::filesystem::path& path) {
   const Handle file = hdf5::open_file(path, H5F_ACC_RDONLY);
   FileHeader header;
   header.is_atlas = is_atlas_format(file, path);
-  header.packing = checked_packing(file, path);
+  const StoredCoding coding = checked_coding(file, path);
+  header.packing = coding.packing;
+  header.has_means = coding.has_means;
   header.file_bytes = std::filesystem::file_size(path);
   if (header.is_atlas)
     read_members(file, path, header);
@@ -729,7 +798,7 @@ FileHeader shared_header(bool atlas,
   for (std::size_t i = 0; i < header.fields.size(); ++i)
     header.fields[i].index_rules =
         field_layout::within(atlas ? field_layout::member_group(i) : "",
-                             index_rules(header.fields[i].field(path.string()).lattice()));
+                             index_rules(header.fields[i].field(path.string())));
   return header;
 }
 
@@ -750,14 +819,14 @@ FieldFileInfo info_of(const FileHeader& header,
 void read_indices(const std::filesystem::path& path,
                   const DatasetRule& rule,
                   const std::string& expected_sha256,
-                  std::size_t codewords,
+                  const Codebook& codebook,
                   std::span<std::uint16_t> indices) {
   const Handle file = hdf5::open_file(path, H5F_ACC_RDONLY);
   std::vector<std::uint64_t> extents;
   const Handle dataset = hdf5::open_dataset(file, rule, path.string(), extents);
   const std::size_t plane = indices.size() / rule.extents[0];
   Sha256 sha256;
-  std::uint16_t largest = 0;
+  std::vector<std::string> found;
   read_planes(
       dataset,
       rule,
@@ -766,23 +835,19 @@ void read_indices(const std::filesystem::path& path,
       },
       [&](std::uint64_t, std::span<const std::uint16_t> values) {
         sha256.update(std::as_bytes(values));
-        largest = std::max(largest, *std::max_element(values.begin(), values.end()));
+        if (found.empty()) found = index_problems(values, rule.extents[3], codebook, rule.name);
       });
   const std::string computed = sha256.hex_digest();
   if (computed != expected_sha256)
     throw FileError(path.string(), rule.name, "sha256 " + expected_sha256, computed);
-  if (largest >= codewords)
-    throw FileError(path.string(),
-                    rule.name,
-                    "indices below the " + std::to_string(codewords) + " codewords",
-                    std::to_string(largest));
+  if (!found.empty()) throw FileError(path.string(), found.front());
 }
 
 /// Collective. The indices of one slab, held once per node; rank 0 reads them for all.
 CompressedSlab read_slab(const std::filesystem::path& path,
                          const DatasetRule& rule,
                          const std::string& sha256,
-                         std::size_t codewords,
+                         const Codebook& codebook,
                          const Communicator& communicator) {
   const std::size_t tiles = tile_count_of(rule);
   const auto memory = communicator.allocate_on_nodes_from_root(
@@ -791,7 +856,7 @@ CompressedSlab read_slab(const std::filesystem::path& path,
           read_indices(path,
                        rule,
                        sha256,
-                       codewords,
+                       codebook,
                        {reinterpret_cast<std::uint16_t*>(bytes.data()), tiles});
         });
       });
@@ -858,11 +923,8 @@ std::shared_ptr<const CompressedAttenuationField> field_with_indices(
   });
   for (std::size_t k = 0; k < header.index_rules.size(); ++k)
     field->slabs.push_back(all_or_none(communicator, [&] {
-      return read_slab(path,
-                       header.index_rules[k],
-                       header.index_sha256[k],
-                       field->codebook.size(),
-                       communicator);
+      return read_slab(
+          path, header.index_rules[k], header.index_sha256[k], field->codebook, communicator);
     }));
   all_or_none(communicator, [&] {
     if (!communicator.is_root()) return;

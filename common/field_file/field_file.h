@@ -34,7 +34,7 @@ struct FieldFileInfo {
   FieldProvenance provenance;
   std::string payload_sha256;  ///< over the named datasets in fixed order
   std::uint64_t file_bytes = 0;
-  std::uint64_t payload_bytes = 0;  ///< indices + codebook, by the bits stored
+  std::uint64_t payload_bytes = 0;  ///< indices, means and codebook, by the bits stored
   /// How DRRs are meant to be looked up, by its options: "linear", also where they do not say, or
   /// "cubic".
   std::string look_up = "linear";
@@ -42,7 +42,7 @@ struct FieldFileInfo {
 };
 
 /// A block of tile indices of one slab that one rank has: half-open tile ranges and the indices,
-/// [u][v][s][t].
+/// [u][v][s][t]; of tiles with means, [u][v][s][2][t] as in CompressedSlab.
 struct IndexBlock {
   std::size_t slab = 0;
   std::array<int, 4> first_tile = {0, 0, 0, 0};

@@ -30,6 +30,10 @@ DatasetRule codewords_rule() {
           "tile (u, v, s, t)"};
 }
 
+DatasetRule mean_step_rule() {
+  return {"/codebook/mean_step", ElementType::Int32, {1}, false, "level", "none"};
+}
+
 /// A text is never stored empty: HDF5 has no string type of length 0.
 std::string stored_text(const std::string& text) {
   return text.empty() ? std::string(1, '\0') : text;
@@ -287,7 +291,14 @@ void set_codebook(std::span<const Dataset> datasets,
                   const std::string& path,
                   float& quantizer_step,
                   Codebook& codebook) {
-  check(datasets.size() == kSharedRules, "a dataset per rule");
+  const bool has_means = datasets.size() == shared_rules(true);
+  check(has_means || datasets.size() == shared_rules(false), "a dataset per rule");
+  if (has_means) {
+    codebook.mean_step = values_of<std::int32_t>(datasets[2], path).at(0);
+    if (!codebook.has_means())
+      throw FileError(
+          path, datasets[2].rule.name, "at least 1", std::to_string(codebook.mean_step));
+  }
   quantizer_step = values_of<float>(datasets[0], path)[0];
   const auto levels = values_of<std::uint16_t>(datasets[1], path);
   codebook.codewords.resize(levels.size() / kTileElements);
@@ -301,6 +312,9 @@ void append_codebook(float quantizer_step,
   const Tile* first = codebook.codewords.data();
   datasets.push_back(dataset_of<std::uint16_t>(
       codewords_rule(), std::span(first->data(), codebook.size() * kTileElements)));
+  const std::int32_t mean_step = codebook.mean_step;
+  if (codebook.has_means())
+    datasets.push_back(dataset_of<std::int32_t>(mean_step_rule(), std::span(&mean_step, 1)));
 }
 
 int count_within(const Dataset& dataset, int most, const std::string& path) {
@@ -358,27 +372,43 @@ std::vector<DatasetRule> member_rules(int slab_count) {
   return rules;
 }
 
-std::vector<DatasetRule> payload_rules(int slab_count) {
+std::vector<DatasetRule> payload_rules(int slab_count, bool has_means) {
   std::vector<DatasetRule> rules = member_rules(slab_count);
   rules.push_back(step_rule());
   rules.push_back(codewords_rule());
+  if (has_means) rules.push_back(mean_step_rule());
   return rules;
 }
 
-DatasetRule index_rule(const FieldLattice& lattice, std::size_t slab) {
+DatasetRule index_rule(const FieldLattice& lattice, std::size_t slab, bool has_means) {
   const std::array<int, 4> tiles = lattice.slabs[slab].tile_counts();
-  return {"/field/slab_" + std::to_string(slab),
-          ElementType::UInt16,
-          {tiles.begin(), tiles.end()},
-          false,
-          "codeword",
-          "tiles (u, v, s, t)"};
+  DatasetRule rule{"/field/slab_" + std::to_string(slab),
+                   ElementType::UInt16,
+                   {tiles.begin(), tiles.end()},
+                   false,
+                   "codeword",
+                   "tiles (u, v, s, t)"};
+  if (!has_means) return rule;
+  rule.extents[2] *= 2;
+  rule.units = "codeword, mean level";
+  rule.frame = "tiles (u, v, s, t); along s a row of codewords, then that of the means";
+  rule.rows_per_tile = 2;
+  return rule;
 }
 
-std::vector<DatasetRule> index_rules(const FieldLattice& lattice) {
+std::vector<DatasetRule> index_rules(const FieldLattice& lattice, bool has_means) {
   std::vector<DatasetRule> rules;
-  for (std::size_t k = 0; k < lattice.slabs.size(); ++k) rules.push_back(index_rule(lattice, k));
+  for (std::size_t k = 0; k < lattice.slabs.size(); ++k)
+    rules.push_back(index_rule(lattice, k, has_means));
   return rules;
+}
+
+std::vector<DatasetRule> index_rules(const CompressedAttenuationField& field) {
+  return index_rules(field.lattice(), field.codebook.has_means());
+}
+
+const char* to_string(IndexPacking packing) {
+  return packing == IndexPacking::CodebookTree ? "codebook-tree" : "deflate";
 }
 
 DatasetRule material_rule() {
@@ -427,12 +457,13 @@ DatasetRule member_count_rule() {
   return {"/member_count", ElementType::Int32, {1}, false, "1", "none"};
 }
 
-std::vector<DatasetRule> atlas_rules() {
+std::vector<DatasetRule> atlas_rules(bool has_means) {
   StoredIdentity identity;
   std::vector<DatasetRule> rules = {member_count_rule()};
   append_rules(stored_values(identity), rules);
   rules.push_back(step_rule());
   rules.push_back(codewords_rule());
+  if (has_means) rules.push_back(mean_step_rule());
   return rules;
 }
 
@@ -440,7 +471,8 @@ std::vector<DatasetRule> index_rules(const AttenuationAtlas& atlas) {
   std::vector<DatasetRule> rules;
   for (std::size_t i = 0; i < atlas.members.size(); ++i)
     for (DatasetRule& rule :
-         within(member_group(i), index_rules(atlas.members[i].light_slab.lattice())))
+         within(member_group(i),
+                index_rules(atlas.members[i].light_slab.lattice(), atlas.codebook.has_means())))
       rules.push_back(std::move(rule));
   return rules;
 }
@@ -573,8 +605,9 @@ std::string payload_line(const DatasetRule& rule, const std::string& sha256) {
 }
 
 std::uint64_t payload_bytes(const Codebook& codebook, const FieldLattice& lattice) {
-  return codebook.size() * sizeof(Tile) +
-         static_cast<std::uint64_t>(lattice.tile_count()) * sizeof(std::uint16_t);
+  return codebook.size() * sizeof(Tile) + static_cast<std::uint64_t>(lattice.tile_count()) *
+                                              (codebook.has_means() ? 2 : 1) *
+                                              sizeof(std::uint16_t);
 }
 
 }  // namespace af::field_layout

@@ -17,11 +17,19 @@
 namespace af::field_layout {
 
 inline constexpr const char* kFormat = "attenuation-field";
-/// Version 2 has indices that IndexPacking::CodebookTree coded; else it is as version 1.
-inline constexpr int kFormatVersion = 2;
-inline constexpr int format_version_of(IndexPacking packing) {
+/// Version 2 has indices that IndexPacking::CodebookTree coded; else it is as version 1. Version 3
+/// has mean-removed tiles, packed either way, and says so in its attribute tile_coding.
+inline constexpr int kFormatVersion = 3;
+inline constexpr int kFormatVersionWithMeans = 3;
+inline constexpr int format_version_of(IndexPacking packing, bool has_means) {
+  if (has_means) return kFormatVersionWithMeans;
   return packing == IndexPacking::CodebookTree ? 2 : 1;
 }
+/// Attributes of files of version 3: "mean-removed", and "codebook-tree" or "deflate".
+inline constexpr const char* kTileCodingAttribute = "tile_coding";
+inline constexpr const char* kMeanRemoved = "mean-removed";
+inline constexpr const char* kPackingAttribute = "index_packing";
+const char* to_string(IndexPacking packing);
 inline constexpr const char* kAtlasFormat = "attenuation-atlas";
 inline constexpr int kMaxSlabs = 64;
 inline constexpr int kMaxMembers = 64;
@@ -50,6 +58,7 @@ struct DatasetRule {
   bool is_first_extent_free = false;   ///< the first extent may be 1 ... extents[0]
   std::string units;
   std::string frame;
+  std::uint64_t rows_per_tile = 1;  ///< of indices: 2 where rows of means follow theirs along s
 };
 
 /// A small dataset, held whole.
@@ -63,11 +72,12 @@ struct Dataset {
 
 /// The rules of all small datasets that count as payload, in the fixed order of the payload hash;
 /// the indices of the slabs follow them.
-std::vector<DatasetRule> payload_rules(int slab_count);
+std::vector<DatasetRule> payload_rules(int slab_count, bool has_means);
 DatasetRule slab_count_rule();
-DatasetRule index_rule(const FieldLattice& lattice, std::size_t slab);
+DatasetRule index_rule(const FieldLattice& lattice, std::size_t slab, bool has_means);
 /// One per slab.
-std::vector<DatasetRule> index_rules(const FieldLattice& lattice);
+std::vector<DatasetRule> index_rules(const FieldLattice& lattice, bool has_means);
+std::vector<DatasetRule> index_rules(const CompressedAttenuationField& field);
 std::vector<DatasetRule> provenance_rules();
 
 /// Where the datasets of an atlas's member stand, as a field's own root has them: "/member_3".
@@ -76,11 +86,13 @@ std::string member_group(std::size_t member);
 std::vector<DatasetRule> within(const std::string& group, std::vector<DatasetRule> rules);
 std::vector<Dataset> within(const std::string& group, std::vector<Dataset> datasets);
 DatasetRule member_count_rule();
-/// Payload that stands in an atlas's root: the identity, and the last kSharedRules are codebook and
-/// quantiser. Its rules in payload_rules() are the last, too: the datasets of a member, and these,
-/// are those of a field.
-std::vector<DatasetRule> atlas_rules();
-inline constexpr std::size_t kSharedRules = 2;
+/// Payload that stands in an atlas's root: the identity, and the last shared_rules() are codebook
+/// and quantiser. Its rules in payload_rules() are the last, too: the datasets of a member, and
+/// these, are those of a field.
+std::vector<DatasetRule> atlas_rules(bool has_means);
+inline constexpr std::size_t shared_rules(bool has_means) {
+  return has_means ? 3 : 2;
+}
 std::vector<Dataset> datasets_of(const AttenuationAtlas& atlas);
 /// One per slab of every member, in the order of the atlas's lattice.
 std::vector<DatasetRule> index_rules(const AttenuationAtlas& atlas);
@@ -131,7 +143,7 @@ int slab_count_of(const Dataset& dataset, const std::string& path);
 /// One line per dataset that takes part in the payload hash.
 std::string payload_line(const DatasetRule& rule, const std::string& sha256);
 
-/// Bytes of codebook and indices, as stored.
+/// Bytes of codebook, indices and means, as stored.
 std::uint64_t payload_bytes(const Codebook& codebook, const FieldLattice& lattice);
 
 }  // namespace af::field_layout

@@ -22,6 +22,13 @@ constexpr unsigned kVersion = 1;
 
 const IndexCoding* coding_in_use = nullptr;
 
+/// The tiles of a chunk of values along its axes, by the coding in use; false when there are none.
+bool tiles_of_chunk(const std::array<std::size_t, 4>& values, std::array<std::size_t, 4>& tiles) {
+  const std::size_t rows = coding_in_use->values_per_tile();
+  tiles = {values[0], values[1], values[2] / rows, values[3]};
+  return values[2] % rows == 0;
+}
+
 /// Replaces HDF5's buffer; 0, which is HDF5's sign of failure, when there is no memory.
 std::size_t give(std::span<const std::byte> bytes, std::size_t* buffer_size, void** buffer) {
   void* const replacement = H5allocate_memory(bytes.size(), false);
@@ -34,11 +41,13 @@ std::size_t give(std::span<const std::byte> bytes, std::size_t* buffer_size, voi
 }
 
 std::size_t code_chunk(bool reads,
-                       const std::array<std::size_t, 4>& tiles,
+                       const std::array<std::size_t, 4>& values,
                        std::size_t bytes,
                        std::size_t* buffer_size,
                        void** buffer) {
-  std::vector<std::uint16_t> indices(tiles[0] * tiles[1] * tiles[2] * tiles[3]);
+  std::array<std::size_t, 4> tiles{};
+  if (!tiles_of_chunk(values, tiles)) return 0;
+  std::vector<std::uint16_t> indices(values[0] * values[1] * values[2] * values[3]);
   if (reads) {
     if (!coding_in_use->decode({static_cast<const std::uint8_t*>(*buffer), bytes}, tiles, indices))
       return 0;
@@ -58,10 +67,10 @@ std::size_t filter_chunk(unsigned flags,
                          std::size_t* buffer_size,
                          void** buffer) {
   if (coding_in_use == nullptr || parameter_count != kParameters) return 0;
-  std::array<std::size_t, 4> tiles{};
-  std::copy(parameters + 1, parameters + kParameters, tiles.begin());
+  std::array<std::size_t, 4> values{};
+  std::copy(parameters + 1, parameters + kParameters, values.begin());
   try {
-    return code_chunk((flags & H5Z_FLAG_REVERSE) != 0, tiles, bytes, buffer_size, buffer);
+    return code_chunk((flags & H5Z_FLAG_REVERSE) != 0, values, bytes, buffer_size, buffer);
   } catch (...) {
     return 0;  // nothing may be thrown through HDF5
   }
@@ -116,8 +125,10 @@ void decode_into(std::span<const StoredChunk> stored,
                  const ChunkShape& chunk,
                  std::uint64_t count,
                  std::span<std::uint16_t> planes) {
-  const std::array<std::size_t, 4> tiles = {chunk[0], chunk[1], chunk[2], chunk[3]};
-  const std::size_t size = tiles[0] * tiles[1] * tiles[2] * tiles[3];
+  std::array<std::size_t, 4> tiles{};
+  if (!tiles_of_chunk({chunk[0], chunk[1], chunk[2], chunk[3]}, tiles))
+    throw std::runtime_error("a chunk of indices ends without their means");
+  const std::size_t size = chunk[0] * chunk[1] * chunk[2] * chunk[3];
   std::vector<std::uint16_t> indices(stored.size() * size);
   std::vector<CodedBlock> coded;
   for (std::size_t i = 0; i < stored.size(); ++i)

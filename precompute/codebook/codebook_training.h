@@ -18,6 +18,7 @@ struct CodebookOptions {
   int max_iterations = 12;
   double min_relative_improvement = 0.005;  ///< of the training tiles' squared error
   std::uint64_t seed = 1;
+  int mean_step = 0;  ///< of a field whose tiles have means (mean_removal.h); 0: plain tiles
 };
 
 std::vector<std::string> problems(const CodebookOptions& options);

@@ -1,17 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
 
 #include "field/codebook.h"
+#include "precompute/codebook/nearest_codeword_kernel.h"
 
 namespace af {
 
 /// Where the search for a tile takes its first guess from. It affects only speed.
 enum class SearchHint {
-  None,     ///< the codewords next to the tile's DC serve: nearer than a neighbour's answer
+  None,     ///< the codewords that are compared first serve: nearer than a neighbour's answer
   PerTile,  ///< the caller's guess, for example the answer of the last training iteration
 };
 
@@ -22,9 +24,18 @@ enum class SearchHint {
 /// 16 are. Floats decide where they are exact (sums below 2^24); above, they discard with a margin
 /// above their rounding and integers decide. So the answer equals brute force on every vector
 /// width. \test NearestCodeword.EqualsBruteForceOnEveryWidth
+///
+/// Or the nearest codeword of a few blocks: for codewords that are much alike in all coefficients,
+/// where an exact search has to compare a tile with most of them. A balanced tree halves the
+/// codewords at the median of the coefficient that varies most, down to blocks of 16; the ranges of
+/// eight coefficients within each part bound how near its codewords can be, and parts are visited
+/// nearest first. With as many blocks as there are, it is exact, too; with fewer, the answer is the
+/// same on every vector width.
 class NearestCodeword {
  public:
   explicit NearestCodeword(const Codebook& codebook);
+  /// Of at most `most_blocks` blocks.
+  NearestCodeword(const Codebook& codebook, int most_blocks);
 
   /// Index of the nearest codeword and squared error of every tile. With SearchHint::PerTile
   /// `nearest` holds valid indices on entry. Re-entrant.
@@ -36,11 +47,26 @@ class NearestCodeword {
   [[nodiscard]] std::size_t codeword_count() const { return codewords_.size(); }
 
  private:
+  struct Part;
+
+  void sort_by_dc();
+  void make_boxes();
+  void split(const Part& part);
+  void set_block(const Part& part);
+  void set_box(const Part& child);
+
+  // As in CodewordBlocks.
   std::vector<Tile> codewords_;
-  std::vector<float> coefficients_;  ///< as in CodewordBlocks
-  std::vector<float> low_dc_;        ///< one guard at each end
+  std::vector<float> coefficients_;
+  std::vector<std::uint32_t> indices_;
+  std::vector<float> low_dc_;  ///< one guard at each end
   std::vector<float> high_dc_;
   std::vector<std::uint32_t> start_block_;
+  std::array<std::vector<CodewordBox>, kMostBoxLevels> boxes_;
+  int box_levels_ = 0;
+  int most_blocks_ = 0;
+
+  std::vector<std::array<float, kTileElements>> transformed_;  ///< while boxes are made
 };
 
 }  // namespace af

@@ -158,7 +158,7 @@ AF_KERNEL_INLINE void offer_lanes(
     const float nearest = smallest(sums);
     const uint32_t lane =
         static_cast<uint32_t>(__builtin_ctz(lane_bits(sums == splat(nearest)) & near_bits));
-    const uint32_t candidate = block * 16 + lane;
+    const uint32_t candidate = blocks.indices[block * 16 + lane];
     const uint64_t error =
         nearest < kExactBelow
             ? static_cast<uint64_t>(nearest) / 16
@@ -191,7 +191,9 @@ AF_KERNEL_INLINE float squared_gap(float gap) {
 
 /// Walks outwards from the tile's DC, a block above and a block below in turn (a branch on which
 /// is nearer would be a coin toss), until the DC alone is too far.
-AF_KERNEL_INLINE Best search_tile(const CodewordBlocks& blocks, const uint16_t* tile, Best best) {
+AF_KERNEL_INLINE Best search_outwards(const CodewordBlocks& blocks,
+                                      const uint16_t* tile,
+                                      Best best) {
   float coefficients[16];
   hadamard(tile, coefficients);
   const float dc = coefficients[0];
@@ -210,13 +212,62 @@ AF_KERNEL_INLINE Best search_tile(const CodewordBlocks& blocks, const uint16_t* 
   return best;
 }
 
+/// Squared distances of a tile's coefficients from those of a box's children, as far as their
+/// ranges tell.
+AF_KERNEL_INLINE F16 distances(const CodewordBox& box, const float* coefficients) {
+  F16 sum = {};
+  for (int i = 0; i < kBoxCoefficients; ++i) {
+    const F16 coefficient = splat(coefficients[i]);
+    const F16 gap = maximum(
+        maximum(load<F16>(box.low[i]) - coefficient, coefficient - load<F16>(box.high[i])), F16{});
+    sum += gap * gap;
+  }
+  return sum;
+}
+
+/// Beyond any limit.
+constexpr float kVisited = 3e38f;
+
+/// Visits the nearest child of a box first, down to the blocks, and the others while they may hold
+/// a codeword that is as near as the best, or until enough blocks are visited.
+AF_KERNEL_INLINE Best search_boxes(const CodewordBlocks& blocks, const uint16_t* tile, Best best) {
+  float coefficients[16];
+  hadamard(tile, coefficients);
+  const I16 lanes = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+  uint32_t numbers[kMostBoxLevels] = {};
+  F16 to_children[kMostBoxLevels];
+  to_children[0] = distances(blocks.boxes[0][0], coefficients);
+  const int32_t last = blocks.box_levels - 1;
+  int32_t left = blocks.most_blocks;
+  for (int32_t level = 0; level >= 0;) {
+    const float nearest = smallest(to_children[level]);
+    if (!(nearest <= best.limit)) {
+      --level;
+      continue;
+    }
+    const int32_t lane = __builtin_ctz(lane_bits(to_children[level] == splat(nearest)));
+    to_children[level] = lanes == splat(lane) ? splat(kVisited) : to_children[level];
+    const uint32_t child = 16 * numbers[level] + static_cast<uint32_t>(lane);
+    if (level == last) {
+      search_block(blocks, child, tile, coefficients, best);
+      if (--left == 0) return best;
+      continue;
+    }
+    ++level;
+    numbers[level] = child;
+    to_children[level] = distances(blocks.boxes[level][child], coefficients);
+  }
+  return best;
+}
+
 }  // namespace
 
 void find_nearest(const CodewordBlocks& blocks, const NearestRequest& request) {
   for (size_t i = 0; i < request.tile_count; ++i) {
     const uint16_t* tile = request.tiles + 16 * i;
     const Best guess = request.has_hints ? guessed(blocks, tile, request.nearest[i]) : kNothing;
-    const Best best = search_tile(blocks, tile, guess);
+    const Best best = blocks.box_levels > 0 ? search_boxes(blocks, tile, guess)
+                                            : search_outwards(blocks, tile, guess);
     request.nearest[i] = best.index;
     request.squared_errors[i] = best.squared_error;
   }

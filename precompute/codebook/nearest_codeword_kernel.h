@@ -8,16 +8,35 @@
 
 namespace af {
 
-/// A sorted codebook in the layout of the search: blocks of 16 codewords, padded with codewords
-/// that are farther than any tile.
+/// Coefficients whose ranges a CodewordBox states: DC, the linear ones, and three more.
+inline constexpr int kBoxCoefficients = 8;
+
+/// Ranges of coefficients of the codewords of up to 16 boxes or blocks; beyond all tiles where
+/// there are fewer.
+struct CodewordBox {
+  float low[kBoxCoefficients][16];
+  float high[kBoxCoefficients][16];
+};
+
+/// A codebook in the layout of the search: blocks of 16 codewords, padded with codewords that are
+/// farther than any tile. Either sorted by DC, or under a tree of boxes.
 struct CodewordBlocks {
-  const float* coefficients;    ///< [block][16 coefficients, DC first, then the 4 linear][16 lanes]
+  const float* coefficients;  ///< [block][16 coefficients, DC first, then the 4 linear][16 lanes]
+  const uint32_t* indices;    ///< [block][16 lanes] in the codebook, ascending within a block
+  const uint16_t* codewords;  ///< [index][16]
+  // Sorted by DC:
   const float* low_dc;          ///< [-1 ... block_count]: DC of a block's first codeword
   const float* high_dc;         ///< [-1 ... block_count]: DC of a block's last codeword
-  const uint16_t* codewords;    ///< [codeword][16]
   const uint32_t* start_block;  ///< [DC >> kStartShift]: first block whose high_dc is not below it
-  uint32_t block_count;
+  // Under boxes:
+  /// Level by level, the root first; child c of box b is box 16 b + c of the level below, and of
+  /// the last level it is block 16 b + c.
+  const CodewordBox* const* boxes;
+  int32_t box_levels;   ///< 0: sorted by DC
+  int32_t most_blocks;  ///< to compare a tile with
 };
+/// Enough for 65536 codewords: 4096 blocks.
+inline constexpr int kMostBoxLevels = 3;
 
 inline constexpr uint32_t kStartShift = 7;
 inline constexpr uint32_t kStartEntries = (16u * 65535u >> kStartShift) + 1;

@@ -47,6 +47,7 @@ FieldDesign DesignParts::over(FieldDesign design) const {
   design.st_nodes = st_nodes.value_or(design.st_nodes);
   design.codewords = codewords.value_or(design.codewords);
   design.look_up = look_up.value_or(design.look_up);
+  design.mean_step = mean_step.value_or(design.mean_step);
   return design;
 }
 

@@ -33,6 +33,7 @@ struct DesignParts {
   std::optional<int> st_nodes;
   std::optional<int> codewords;
   std::optional<std::string> look_up;
+  std::optional<int> mean_step;  ///< 0: plain tiles
 
   /// `design` with these parts replaced.
   [[nodiscard]] FieldDesign over(FieldDesign design) const;

@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "base/hash_random.h"
+#include "precompute/codebook/mean_removal.h"
 #include "precompute/design/drr_time.h"
 #include "precompute/design/patch_nodes.h"
 
@@ -184,8 +185,10 @@ std::vector<Codebook> DesignProbe::small_codebooks(std::span<const NumberedTile>
 
 std::vector<PoseLoss> DesignProbe::losses(const FieldCaster& caster,
                                           const LightSlab& planes,
-                                          const Codebook& codebook) const {
-  const NearestCodeword search(codebook);
+                                          const Codebook& trained,
+                                          int mean_step) const {
+  const NearestCodeword search = encoding_search(trained, mean_step);
+  const Codebook codebook = field_codebook(trained, mean_step);
   std::vector<PoseLoss> losses(rays_.poses);
   for (const RayPatch& patch : rays_.patches) {
     const PatchNodes nodes(caster, planes, scene_.quantizer.step(), patch);
@@ -209,13 +212,14 @@ DesignMeasurement DesignProbe::measure(const FieldDesign& design,
   share_out<double>(reduction_, sample.occupied_share);
   for (std::size_t i = 0; i < sample.occupied_share.size(); ++i)
     measured.occupied_tiles += sample.occupied_share[i] * sample.tiles_meant[i];
-  const std::vector<NumberedTile> tiles =
+  std::vector<NumberedTile> tiles =
       shuffled_tiles(sample, lattice, probe_tiles(*std::ranges::max_element(codewords)));
+  remove_means(tiles, design.mean_step);
   const std::vector<Codebook> codebooks = small_codebooks(tiles);
   const auto unseen = std::span(tiles).last(std::min(tiles.size(), kProbeUnseenTiles));
   for (std::size_t i = 0; i < codebooks.size(); ++i)
     measured.tile_errors[i] = squared_error(unseen, codebooks[i]);
-  measured.poses = losses(*caster, planes, codebooks.back());
+  measured.poses = losses(*caster, planes, codebooks.back(), design.mean_step);
   for (const int count : codewords) {
     const TrainingSelection selection = options_.selection_for(count);
     measured.training_tiles[count] = std::min(static_cast<double>(selection.max_training_tiles),
@@ -226,15 +230,15 @@ DesignMeasurement DesignProbe::measure(const FieldDesign& design,
     constexpr double kTrainedCodebook = 0.83;
     // Some of the chunks tell.
     constexpr std::size_t kChunks = 8;
-    const NearestCodeword search(codebook);
-    const IndexCoding coding(codebook);
+    const NearestCodeword search = encoding_search(codebook, design.mean_step);
+    const IndexCoding coding(field_codebook(codebook, design.mean_step));
     const std::size_t stride = 1 + sample.occupied_share.size() / kChunks;
     std::size_t at = 0;
     for (std::size_t number = 0; number < sample.occupied_share.size(); ++number) {
       if (!share_.has(number)) continue;
       const FieldSample::Chunk& chunk = sample.chunks[at++];
       if (number % stride != 0) continue;
-      const IndexBytes bytes = index_bytes(chunk, search, coding);
+      const IndexBytes bytes = index_bytes(chunk, search, design.mean_step, coding);
       sums[0] += static_cast<std::uint64_t>(bytes.bytes);
       sums[1] += static_cast<std::uint64_t>(bytes.tiles);
     }

@@ -74,7 +74,8 @@ class DesignProbe {
   [[nodiscard]] std::vector<Codebook> small_codebooks(std::span<const NumberedTile> tiles) const;
   [[nodiscard]] std::vector<PoseLoss> losses(const FieldCaster& caster,
                                              const LightSlab& planes,
-                                             const Codebook& codebook) const;
+                                             const Codebook& trained,
+                                             int mean_step) const;
 
   const ProbeScene& scene_;
   ProbeOptions options_;

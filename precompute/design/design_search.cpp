@@ -54,6 +54,7 @@ class Family {
     look_ups_ = one_or(fixed.look_up,
                        may_be_linear ? std::vector<std::string>{"cubic", "linear"}
                                      : std::vector<std::string>{"cubic"});
+    mean_step_ = fixed.mean_step.value_or(0);
     is_uv_free_ = !fixed.uv_nodes.has_value();
   }
 
@@ -68,7 +69,7 @@ class Family {
           if (is_uv_free_ && (slabs * uv < kFewest || slabs * uv > kMost)) continue;
           for (const int st : st_nodes_)
             for (const int codewords : codewords_)
-              visit(FieldDesign{slabs, uv, st, codewords, look_up});
+              visit(FieldDesign{slabs, uv, st, codewords, look_up, mean_step_});
         }
   }
 
@@ -78,6 +79,7 @@ class Family {
   std::vector<int> st_nodes_;
   std::vector<int> codewords_;
   std::vector<std::string> look_ups_;
+  int mean_step_ = 0;
   bool is_uv_free_ = true;
 };
 

@@ -9,7 +9,11 @@ std::string to_text(const FieldDesign& design) {
   };
   return std::to_string(design.slabs) + (design.slabs == 1 ? " slab, " : " slabs, ") +
          square(design.uv_nodes) + " (u,v) nodes, " + square(design.st_nodes) + " (s,t) nodes, " +
-         std::to_string(design.codewords) + " codewords, " + design.look_up + " look-up";
+         std::to_string(design.codewords) + " codewords" +
+         (design.mean_step > 0
+              ? " of mean-removed tiles (step " + std::to_string(design.mean_step) + "), "
+              : ", ") +
+         design.look_up + " look-up";
 }
 
 }  // namespace af

@@ -12,6 +12,7 @@ struct FieldDesign {
   int st_nodes = 256;
   int codewords = 16384;
   std::string look_up = "linear";  ///< "linear" or "cubic": how DRRs are meant to be looked up
+  int mean_step = 0;               ///< levels, of mean-removed tiles; 0: plain ones
 
   bool operator==(const FieldDesign&) const = default;
 };

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "precompute/codebook/unit_encoding.h"
+
 namespace af {
 
 namespace {
@@ -169,14 +171,14 @@ PatchValues PatchNodes::values(const NearestCodeword& search, const Codebook& co
   for (std::size_t k = 0; k < units_.size(); ++k) {
     const WorkUnit& unit = units_[k];
     const UnitTiles tiles = make_unit_tiles(unit, samples_[k]);
-    std::vector<std::uint32_t> nearest(tiles.tiles.size());
-    std::vector<std::uint64_t> errors(tiles.tiles.size());
-    search.search(tiles.tiles, SearchHint::None, nearest, errors);
+    const std::vector<std::uint16_t> indices =
+        encode_unit(search, codebook.mean_step, unit, tiles).indices;
+    const auto row = static_cast<std::size_t>(unit.tile_counts()[3]);
     const std::array<int, 4> counts = unit.tile_counts();
     const std::array<int, 4> nodes = {unit.u.count, unit.v.count, unit.s.count, unit.t.count};
-    std::size_t next = 0;
     tiles.for_each([&](std::size_t local, const Tile& /*tile*/) {
-      const Tile& codeword = codebook.codewords[nearest[next++]];
+      const std::size_t code = codebook.has_means() ? local / row * 2 * row + local % row : local;
+      const Tile& codeword = codebook.codewords[indices[code]];
       std::array<int, 4> first{};
       for (std::size_t axis = 4; axis-- > 0;) {
         first[axis] = 2 * static_cast<int>(local % static_cast<std::size_t>(counts[axis]));
@@ -190,7 +192,9 @@ PatchValues PatchNodes::values(const NearestCodeword& search, const Codebook& co
           is_padding = is_padding || node >= nodes[axis];
           at = at * static_cast<std::size_t>(nodes[axis]) + static_cast<std::size_t>(node);
         }
-        if (!is_padding) coded[k][at] = codeword[element];
+        if (!is_padding)
+          coded[k][at] = codebook.has_means() ? level_of(codeword[element], indices[code + row])
+                                              : codeword[element];
       }
     });
   }

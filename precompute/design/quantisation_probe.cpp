@@ -82,8 +82,9 @@ double error_ratio(const std::array<double, kProbeCodewords.size()>& errors_of_s
 
 IndexBytes index_bytes(const FieldSample::Chunk& chunk,
                        const NearestCodeword& search,
+                       int mean_step,
                        const IndexCoding& coding) {
-  const EncodedUnit encoded = encode_unit(search, chunk.unit, chunk.tiles);
+  const EncodedUnit encoded = encode_unit(search, mean_step, chunk.unit, chunk.tiles);
   std::array<std::size_t, 4> tiles{};
   std::ranges::transform(chunk.unit.tile_counts(), tiles.begin(), [](int count) {
     return static_cast<std::size_t>(count);

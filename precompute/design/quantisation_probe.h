@@ -54,13 +54,15 @@ double error_ratio(const std::array<double, kProbeCodewords.size()>& errors_of_s
                    int codewords,
                    const TrainingTiles& tiles);
 
-/// Bytes of the indices of chunks, coded as in a field's file, and their tiles that are not empty.
+/// Bytes of the indices (and means) of chunks, coded as in a field's file, and their tiles that are
+/// not empty. `search` and `mean_step` as for encode_unit().
 struct IndexBytes {
   double bytes = 0.0;
   double tiles = 0.0;
 };
 IndexBytes index_bytes(const FieldSample::Chunk& chunk,
                        const NearestCodeword& search,
+                       int mean_step,
                        const IndexCoding& coding);
 
 /// Bytes of a codebook in a file, deflated, per codeword.

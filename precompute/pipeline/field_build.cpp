@@ -14,6 +14,7 @@
 #include "base/error.h"
 #include "parallel/work_queue.h"
 #include "parallel/work_watch.h"
+#include "precompute/codebook/mean_removal.h"
 #include "precompute/codebook/unit_encoding.h"
 
 namespace af {
@@ -183,6 +184,7 @@ TrainedCodebook train_field(const FieldBuild& build,
   return all_or_none(build.communicator, [&] {
     TrainingShare share = cast.picker.take(reduction);
     level_out(share, reduction);
+    remove_means(share, options.mean_step);
     return train_codebook(share, options, reduction, on_progress, checkpoints);
   });
 }

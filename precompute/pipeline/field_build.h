@@ -77,7 +77,8 @@ struct OverflowChoice {
 /// again.
 OverflowChoice choose_overflow(const FieldBuild& build, const CastPhase& cast);
 
-/// Collective. The codebook trained on the share that the picker took of all tiles.
+/// Collective. The codebook trained on the share that the picker took of all tiles, or on their
+/// shapes, where the options have a step of means: see field_codebook().
 TrainedCodebook train_field(const FieldBuild& build,
                             CastPhase& cast,
                             const CodebookOptions& options,

@@ -12,6 +12,7 @@
 #include "base/crc32c.h"
 #include "base/error.h"
 #include "parallel/work_watch.h"
+#include "precompute/codebook/mean_removal.h"
 
 namespace af {
 
@@ -44,22 +45,23 @@ std::vector<std::size_t> balanced_owners(const std::vector<std::uint64_t>& unit_
   return owners;
 }
 
-/// A record's checksum says that it is whole, not that it is ours.
-bool are_below(const std::vector<std::uint16_t>& indices, std::size_t count) {
-  return std::all_of(
-      indices.begin(), indices.end(), [&](std::uint16_t index) { return index < count; });
+std::uint32_t crc_of(const Codebook& trained, int mean_step) {
+  const std::uint32_t crc = crc32c(std::as_bytes(std::span(trained.codewords)));
+  return crc ^ static_cast<std::uint32_t>(mean_step);
 }
 
 }  // namespace
 
 FieldEncoder::FieldEncoder(const FieldBuild& build,
                            CastPhase& cast,
-                           const Codebook& codebook,
+                           const Codebook& trained,
+                           int mean_step,
                            TileOverflow overflow)
     : build_(build),
       cast_(cast),
-      search_(codebook),
-      codebook_crc_(crc32c(std::as_bytes(std::span(codebook.codewords)))),
+      codebook_(field_codebook(trained, mean_step)),
+      search_(encoding_search(trained, mean_step)),
+      codebook_crc_(crc_of(trained, mean_step)),
       overflow_(overflow) {
   if (build_.progress != nullptr && overflow_ == TileOverflow::ReadBack)
     build_.progress->share_places();
@@ -122,15 +124,22 @@ IndexBlock FieldEncoder::next_block() {
 
 EncodedUnit FieldEncoder::encoded(const WorkUnit& unit, bool is_kept) {
   if (build_.progress != nullptr)
-    if (auto before = build_.progress->read_encoded(unit, codebook_crc_);
-        before && are_below(before->indices, search_.codeword_count())) {
+    if (auto before =
+            build_.progress->read_encoded(unit, codebook_.has_means() ? 2 : 1, codebook_crc_);
+        before && is_ours(*before, unit)) {
       ++units_resumed_;
       return std::move(*before);
     }
-  EncodedUnit of_unit = is_kept ? encode_unit(search_, unit, cast_.kept.back())
-                                : encode_unit(search_, unit, tiles_again(unit));
+  const int mean_step = codebook_.mean_step;
+  EncodedUnit of_unit = is_kept ? encode_unit(search_, mean_step, unit, cast_.kept.back())
+                                : encode_unit(search_, mean_step, unit, tiles_again(unit));
   if (build_.progress != nullptr) build_.progress->append(unit, of_unit, codebook_crc_);
   return of_unit;
+}
+
+bool FieldEncoder::is_ours(const EncodedUnit& before, const WorkUnit& unit) const {
+  const auto row = static_cast<std::size_t>(unit.tile_counts()[3]);
+  return index_problems(before.indices, row, codebook_, "a unit").empty();
 }
 
 UnitTiles FieldEncoder::tiles_again(const WorkUnit& unit) {

@@ -15,10 +15,12 @@ namespace af {
 /// are dealt out such that all ranks have equally many.
 class FieldEncoder {
  public:
-  /// Collective. `cast` is emptied while encoding and must outlive the encoder.
+  /// Collective. `cast` is emptied while encoding and must outlive the encoder. `trained`: of
+  /// train_field(), on shapes where `mean_step` is above 0.
   FieldEncoder(const FieldBuild& build,
                CastPhase& cast,
-               const Codebook& codebook,
+               const Codebook& trained,
+               int mean_step,
                TileOverflow overflow);
 
   /// This rank's next units, about kRoundBytes of indices; none when it has no more. Units that an
@@ -43,10 +45,13 @@ class FieldEncoder {
   [[nodiscard]] UnitTiles tiles_again(const WorkUnit& unit);
   IndexBlock next_block();
   EncodedUnit encoded(const WorkUnit& unit, bool is_kept);
+  /// A record's checksum says that it is whole, not that it is ours.
+  [[nodiscard]] bool is_ours(const EncodedUnit& before, const WorkUnit& unit) const;
 
   const FieldBuild& build_;
   CastPhase& cast_;
-  NearestCodeword search_;
+  Codebook codebook_;       ///< of the field
+  NearestCodeword search_;  ///< of what was trained
   std::uint32_t codebook_crc_;
   TileOverflow overflow_;
   std::vector<std::uint32_t> others_;  ///< this rank's units that are not in memory

@@ -84,12 +84,13 @@ void UnitStore::append(const WorkUnit& unit,
 }
 
 std::optional<EncodedUnit> UnitStore::read_encoded(const WorkUnit& unit,
+                                                   std::size_t values_per_tile,
                                                    std::uint32_t codebook_crc) const {
   const auto found = indices_.find(unit.id);
   if (found == indices_.end()) return std::nullopt;
   IndicesHead head;
   EncodedUnit encoded;
-  encoded.indices.resize(unit.tile_count());
+  encoded.indices.resize(values_per_tile * unit.tile_count());
   const bool is_sound = store_.read(found->second,
                                     {std::as_writable_bytes(std::span(&head, 1)),
                                      std::as_writable_bytes(std::span(encoded.indices))});

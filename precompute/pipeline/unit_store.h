@@ -41,8 +41,9 @@ class UnitStore {
   void append(const WorkUnit& unit, const EncodedUnit& encoded, std::uint32_t codebook_crc);
 
   /// The indices of a unit that an earlier run encoded with the codebook of this CRC-32C; nothing
-  /// when there are none, or damaged ones.
+  /// when there are none, or damaged ones. `values_per_tile`: 2 with means.
   [[nodiscard]] std::optional<EncodedUnit> read_encoded(const WorkUnit& unit,
+                                                        std::size_t values_per_tile,
                                                         std::uint32_t codebook_crc) const;
 
   /// Collective. Tells every rank where each unit lies, so that any can read it.

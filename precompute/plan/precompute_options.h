@@ -54,6 +54,8 @@ struct PrecomputeOptions {
   std::optional<int> uv_nodes;
   std::optional<int> st_nodes;
   std::optional<std::string> look_up;
+  std::optional<std::string> tile_coding;  ///< "plain" or "mean-removed"
+  std::optional<int> mean_step;            ///< of mean-removed tiles, levels
   std::string caster = "shear-warp";
   RayCasterOptions ray_caster;  ///< of the trilinear caster
   AttenuationModel attenuation;
@@ -105,6 +107,9 @@ struct PrecomputeOptions {
   /// With the design, unless a probe has to choose it, and the rule that places the (s,t) planes.
   [[nodiscard]] PrecomputeOptions in_force() const;
 };
+
+/// Of the means of mean-removed tiles, unless a design says otherwise: levels of 65535.
+inline constexpr int kDefaultMeanStep = 64;
 
 /// Stages that options decide.
 inline constexpr const char* kCastingStage = "casting";  ///< the samples, with CT, camera and pose

@@ -14,6 +14,7 @@
 #include "base/error.h"
 #include "base/hash_random.h"
 #include "field/index_coding.h"
+#include "precompute/codebook/mean_removal.h"
 #include "precompute/codebook/nearest_codeword.h"
 #include "precompute/design/quantisation_probe.h"
 #include "precompute/units/unit_tiles.h"
@@ -101,24 +102,35 @@ PackedSample deflated(const std::vector<std::uint16_t>& indices) {
 /// As a field's file has them, but a row of tiles alone: there are no neighbours along u and s.
 /// What those save was measured on fields of four slabs and of the paper's design.
 PackedSample coded_by_tree(const std::vector<std::uint16_t>& indices,
+                           std::size_t tiles,
                            const Codebook& codebook,
                            int viewpoint_tiles) {
   constexpr double kShareOfNeighbours = 0.78;
   const IndexCoding coding(codebook);
   const Stopwatch watch;
-  const std::vector<std::uint8_t> coded = coding.encode(indices, {1, 1, 1, indices.size()});
+  const std::vector<std::uint8_t> coded = coding.encode(indices, {1, 1, 1, tiles});
   return {kShareOfNeighbours * sharing_along_u(viewpoint_tiles) * static_cast<double>(coded.size()),
           watch.seconds()};
 }
 
-void sample_search(const SampledTiles& tiles,
+void sample_search(SampledTiles tiles,
                    const PrecomputeOptions& options,
                    int viewpoint_tiles,
                    SpeedSample& sample) {
   if (tiles.run.empty() || tiles.spread.empty()) return;
+  const int mean_step = options.design().mean_step;
+  std::vector<std::uint16_t> means;
+  if (mean_step > 0) {
+    for (Tile& tile : tiles.spread) tile = remove_mean(tile, mean_step).shape;
+    for (Tile& tile : tiles.run) {
+      const MeanRemovedTile removed = remove_mean(tile, mean_step);
+      means.push_back(removed.mean);
+      tile = removed.shape;
+    }
+  }
   const Codebook codebook = drawn_codebook(tiles.spread, options.design().codewords);
   const Stopwatch preparing;
-  const NearestCodeword search(codebook);
+  const NearestCodeword search = encoding_search(codebook, mean_step);
   sample.codebook_seconds = preparing.seconds();
   std::vector<std::uint32_t> nearest(tiles.run.size());
   std::vector<std::uint64_t> errors(tiles.run.size());
@@ -129,10 +141,13 @@ void sample_search(const SampledTiles& tiles,
   };
   sample.encode_seconds_per_tile = seconds_per_tile(SearchHint::None);
   sample.train_seconds_per_tile = seconds_per_tile(SearchHint::PerTile);
-  const std::vector<std::uint16_t> indices(nearest.begin(), nearest.end());
-  const PackedSample packed = options.packs_by_codebook_tree()
-                                  ? coded_by_tree(indices, codebook, viewpoint_tiles)
-                                  : deflated(indices);
+  std::vector<std::uint16_t> indices(nearest.begin(), nearest.end());
+  indices.insert(indices.end(), means.begin(), means.end());
+  const PackedSample packed =
+      options.packs_by_codebook_tree()
+          ? coded_by_tree(
+                indices, nearest.size(), field_codebook(codebook, mean_step), viewpoint_tiles)
+          : deflated(indices);
   const auto bytes = 2.0 * static_cast<double>(indices.size());
   sample.compress_seconds_per_byte = packed.seconds / bytes;
   sample.compressed_fraction = packed.bytes / bytes;

@@ -16,7 +16,7 @@ struct SpeedSample {
   double encode_seconds_per_tile = 0.0;    ///< not empty; a neighbour's codeword as hint
   double train_seconds_per_tile = 0.0;     ///< and iteration; the tile's own last codeword as hint
   double codebook_seconds = 0.0;           ///< to prepare a search
-  double compress_seconds_per_byte = 0.0;  ///< of indices of tiles that are not empty
+  double compress_seconds_per_byte = 0.0;  ///< of indices (and means) of tiles that are not empty
   double compressed_fraction = 1.0;        ///< of those indices
 };
 

@@ -28,14 +28,13 @@ std::string bytes_of_file(const std::filesystem::path& path) {
   return std::string(std::istreambuf_iterator<char>(file), {});
 }
 
-std::string sound_file() {
+std::string sound_file(const CompressedAttenuationField& field) {
   static int argc = 1;
   static std::array<char, 5> name = {'f', 'u', 'z', 'z', '\0'};
   static char* pointer = name.data();
   static char** argv = &pointer;
   static const MpiEnvironment mpi(argc, argv);
   const auto path = fuzz::scratch_folder() / kElsewhere;
-  const CompressedAttenuationField field = fuzz::sample_field();
   write_field(field,
               fuzz::sample_blocks(field),
               {"0.1.0", "af-precompute", "seed = 1\n", "{}"},
@@ -46,7 +45,7 @@ std::string sound_file() {
 
 std::vector<std::string> all_names() {
   std::vector<std::string> names = {"/", "/geometry", "/field", "/field/slab_0", "/field/slab_1"};
-  for (const DatasetRule& rule : field_layout::payload_rules(2)) names.push_back(rule.name);
+  for (const DatasetRule& rule : field_layout::payload_rules(2, true)) names.push_back(rule.name);
   for (const DatasetRule& rule : field_layout::provenance_rules()) names.push_back(rule.name);
   return names;
 }
@@ -217,16 +216,16 @@ void change(hid_t file, fuzz::InputBytes& input) {
 }
 
 /// The hash over all datasets, as far as their hashes can be found.
-void mend_payload_hash(hid_t file) {
+void mend_payload_hash(hid_t file, bool has_means) {
   std::vector<Dataset> datasets;
-  for (const DatasetRule& rule : field_layout::payload_rules(2))
+  for (const DatasetRule& rule : field_layout::payload_rules(2, has_means))
     datasets.push_back(hdf5::read_dataset(file, rule, "field"));
   const CompressedAttenuationField field = field_layout::field_of(datasets, "field");
   std::string lines;
   for (const Dataset& dataset : datasets)
     lines += field_layout::payload_line(dataset.rule, sha256_hex(dataset.bytes));
   for (std::size_t k = 0; k < 2; ++k) {
-    const DatasetRule rule = field_layout::index_rule(field.lattice(), k);
+    const DatasetRule rule = field_layout::index_rule(field.lattice(), k, has_means);
     const Handle dataset(H5Dopen2(file, rule.name.c_str(), H5P_DEFAULT), H5Dclose, "H5Dopen2");
     lines += field_layout::payload_line(rule, hdf5::read_text_attribute(dataset, "sha256"));
   }
@@ -247,21 +246,25 @@ void try_edit(Edit&& edit) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  static const std::string sound = sound_file();
+  static const CompressedAttenuationField plain = fuzz::sample_field();
+  static const CompressedAttenuationField mean_removed = fuzz::sample_field_with_means();
+  static const std::array<std::string, 2> sound = {sound_file(plain), sound_file(mean_removed)};
+  // An odd number of bytes changes a field with means.
+  const bool has_means = size % 2 == 1;
   // HDF5 keeps a megabyte for each file it opens: kept for the next one, it need not be mapped
   // anew.
   static const herr_t keeps_memory = H5set_free_list_limits(-1, -1, -1, -1, -1, -1);
   fuzz::require(keeps_memory >= 0, "HDF5 takes the limits");
   const hdf5::QuietErrors quiet;
-  static const hdf5::IndexFilter filter(fuzz::sample_field().codebook);
-  const auto path = fuzz::written("field.af.h5", sound);
+  const hdf5::IndexFilter filter((has_means ? mean_removed : plain).codebook);
+  const auto path = fuzz::written("field.af.h5", sound[has_means ? 1 : 0]);
   {
     const Handle file = hdf5::open_file(path, H5F_ACC_RDWR);
     fuzz::InputBytes input(data, size);
     constexpr int kMostEdits = 6;
     for (int edits = 0; edits < kMostEdits && !input.empty(); ++edits)
       try_edit([&] { change(file, input); });
-    try_edit([&] { mend_payload_hash(file); });
+    try_edit([&] { mend_payload_hash(file, has_means); });
   }
   std::shared_ptr<const CompressedAttenuationField> field;
   if (fuzz::is_accepted([&] { field = read_field(path, Communicator::world()); }))

@@ -29,7 +29,7 @@ void replace_values(std::vector<field_layout::Dataset>& datasets, fuzz::InputByt
 bool add_indices(CompressedAttenuationField& field) {
   for (std::size_t k = 0; k < field.light_slab.slabs.size(); ++k) {
     std::uint64_t tiles = 1;
-    for (const std::uint64_t extent : field_layout::index_rule(field.lattice(), k).extents) {
+    for (const std::uint64_t extent : field_layout::index_rule(field.lattice(), k, false).extents) {
       fuzz::require(extent >= 1 && extent <= 65536, "extents of indices are sane");
       tiles *= extent;
     }

@@ -4,6 +4,7 @@
 #include <array>
 #include <vector>
 
+#include "field/compressed_attenuation_field.h"
 #include "field/index_coding.h"
 #include "fuzz/fuzz_input.h"
 
@@ -18,13 +19,17 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     codebook.codewords.push_back(tile);
   }
   std::sort(codebook.codewords.begin(), codebook.codewords.end(), codeword_less);
+  // The order matters to no coding; a step makes shapes of the codewords.
+  if (input.take_below(2) == 1)
+    codebook.mean_step = 1 + static_cast<int>(input.take_below(kMaxMeanStep));
   std::array<std::size_t, 4> tiles{};
   for (std::size_t& extent : tiles) extent = 1 + input.take_below(9);
   const IndexCoding coding(codebook);
-  std::vector<std::uint16_t> indices(tiles[0] * tiles[1] * tiles[2] * tiles[3]);
+  const std::size_t rows = coding.values_per_tile();
+  std::vector<std::uint16_t> indices(rows * tiles[0] * tiles[1] * tiles[2] * tiles[3]);
   const bool is_accepted = coding.decode(input.rest(), tiles, indices);
-  for (const std::uint16_t index : indices)
-    fuzz::require(index < codebook.size(), "an index of the codebook");
+  fuzz::require(index_problems(indices, tiles[3], codebook, "a block").empty(),
+                "indices and means of the codebook");
   const auto rest = input.rest();
   std::vector<std::uint16_t> again(indices.size());
   std::vector<std::uint16_t> of_half(indices.size());

@@ -82,7 +82,7 @@ void read_and_go_on() {
     UnitStore progress = opened();
     found = found_in(progress);
     for (const WorkUnit& unit : units())
-      if (const auto encoded = progress.read_encoded(unit, kCodebookCrc))
+      if (const auto encoded = progress.read_encoded(unit, 1, kCodebookCrc))
         fuzz::require(encoded->indices.size() == unit.tile_count(), "one index for each tile");
     if (!found.contains(0)) progress.append(more);
   }

@@ -291,8 +291,14 @@ void write_index_coding_seeds(const fs::path& folder) {
   const std::vector<std::uint8_t> chunk =
       IndexCoding(codebook).encode(std::vector<std::uint16_t>{0, 1, 1, 2, 0, 2}, {1, 1, 2, 3});
   write_seed(folder / "index_coding" / "chunk",
-             "\2\0"s + std::string(32, '\1') + std::string(32, '\2') + "\0\0\0\0\1\0\2\0"s +
+             "\2\0"s + std::string(32, '\1') + std::string(32, '\2') + "\0\0\0\0\0\0\1\0\2\0"s +
                  std::string(chunk.begin(), chunk.end()));
+  codebook.mean_step = 1 + 48;
+  const std::vector<std::uint8_t> with_means = IndexCoding(codebook).encode(
+      std::vector<std::uint16_t>{0, 1, 1, 0, 490, 539, 2, 0, 2, 0, 0, 980}, {1, 1, 2, 3});
+  write_seed(folder / "index_coding" / "means",
+             "\2\0"s + std::string(32, '\1') + std::string(32, '\2') +
+                 "\1\0\x30\0\0\0\0\0\1\0\2\0"s + std::string(with_means.begin(), with_means.end()));
 }
 
 void write_other_seeds(const fs::path& folder) {
@@ -315,6 +321,7 @@ void write_other_seeds(const fs::path& folder) {
   write_seed(folder / "field_values" / "shifted",
              "\2\0\3\0\1\0\0\0\0\0\0\0\x59\x40\5\0\2\0\0\0\x06\0\0\0"s);
   write_seed(folder / "field_file" / "sound", "");
+  write_seed(folder / "field_file" / "means", "\xff"s);
   write_seed(folder / "field_file" / "content", "\x0a\0\0\0\0\0\6\0\0\0"s);
   write_seed(folder / "field_file" / "replaced",
              "\x05\0\2\0\2\0\1\0\2\0\0\0\0\0\1\0\0\0\0\0\0\0\0\0\0\0"s);

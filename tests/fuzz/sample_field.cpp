@@ -44,13 +44,30 @@ CompressedAttenuationField sample_field() {
   return field;
 }
 
+CompressedAttenuationField sample_field_with_means() {
+  CompressedAttenuationField field = sample_field();
+  field.codebook.mean_step = 64;
+  for (std::uint16_t i = 1; i < kCodewords; ++i)
+    for (std::size_t k = 0; k < kTileElements; ++k)
+      field.codebook.codewords[i][k] =
+          static_cast<std::uint16_t>((k & 2u) == 0 ? kShapeZero + i : kShapeZero - i);
+  return field;
+}
+
 std::vector<IndexBlock> sample_blocks(const CompressedAttenuationField& field) {
   std::vector<IndexBlock> blocks;
   for (std::size_t k = 0; k < field.light_slab.slabs.size(); ++k) {
     const SlabLattice slab = field.lattice(k);
     blocks.push_back({k, {0, 0, 0, 0}, slab.tile_counts(), {}});
-    for (std::int64_t tile = 0; tile < slab.tile_count(); ++tile)
-      blocks.back().indices.push_back(static_cast<std::uint16_t>(tile % kCodewords));
+    std::vector<std::uint16_t>& values = blocks.back().indices;
+    const int row = slab.t.stored.tiles();
+    for (int first = 0; first < slab.tile_count(); first += row) {
+      for (int tile = first; tile < first + row; ++tile)
+        values.push_back(static_cast<std::uint16_t>(tile % kCodewords));
+      if (!field.codebook.has_means()) continue;
+      for (int tile = first; tile < first + row; ++tile)
+        values.push_back(static_cast<std::uint16_t>(64 * (tile % kCodewords)));
+    }
   }
   return blocks;
 }

@@ -10,6 +10,8 @@ namespace af::fuzz {
 
 /// A sound field of two slabs, small enough to be written thousands of times; without its indices.
 CompressedAttenuationField sample_field();
+/// The same of mean-removed tiles.
+CompressedAttenuationField sample_field_with_means();
 
 /// All its tiles, one block per slab.
 std::vector<IndexBlock> sample_blocks(const CompressedAttenuationField& field);

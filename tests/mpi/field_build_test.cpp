@@ -13,6 +13,7 @@
 #include "base/vector_width.h"
 #include "precompute/casting/trilinear_caster.h"
 #include "precompute/casting/unit_costs.h"
+#include "precompute/codebook/mean_removal.h"
 #include "precompute/pipeline/field_encoder.h"
 #include "precompute/pipeline/training_checkpoints.h"
 #include "precompute/units/unit_planner.h"
@@ -26,6 +27,9 @@ namespace {
 // must give the same. From correctly rounded operations only.
 constexpr const char* kFrozenPayload =
     "f2f5b60b4f8945b3b23f57da9610fa7a21bf08e0b89d793507ac2bb447bec2b6";
+
+constexpr const char* kFrozenMeanRemovedPayload =
+    "6d34569f947342602203d92238859f5b1106a4d0ba86158cc02e79f33343df5e";
 
 CtVolume small_ct() {
   CtGrid grid;
@@ -70,8 +74,11 @@ class FieldBuildTest : public testing::Test {
     field.identity.ct_content_sha256 = std::string(64, 'b');
     field.light_slab = light_slab_;
     field.quantizer_step = quantizer_.step();
-    field.codebook = train_field(build, cast, {.codewords = 64, .seed = 3}, {}).codebook;
-    FieldEncoder encoder(build, cast, field.codebook, overflow_);
+    const Codebook trained =
+        train_field(build, cast, {.codewords = 64, .seed = 3, .mean_step = mean_step_}, {})
+            .codebook;
+    field.codebook = field_codebook(trained, mean_step_);
+    FieldEncoder encoder(build, cast, trained, mean_step_, overflow_);
     const FieldFileInfo info = write_field(
         field,
         [&] { return encoder.next_blocks(); },
@@ -123,6 +130,7 @@ class FieldBuildTest : public testing::Test {
   static constexpr TrainingSelection kSelection{0.5, 100000, 3};
   std::uint64_t kept_tile_bytes_ = ~std::uint64_t{0};
   TileOverflow overflow_ = TileOverflow::CastAgain;
+  int mean_step_ = 0;
   std::uint64_t units_resumed_ = 0;
   std::uint64_t units_kept_ = 0;
   std::uint64_t units_damaged_ = 0;
@@ -135,6 +143,37 @@ TEST_F(FieldBuildTest, PayloadIsTheSameOnAnyRankCountPlanAndVectorWidth) {
     EXPECT_EQ(build(folder_ / "cut.h5", kUnitRays).payload_sha256, kFrozenPayload);
   }
   force_vector_width(std::nullopt);
+}
+
+TEST_F(FieldBuildTest, MeanRemovedPayloadIsTheSameOnAnyRankCountPlanAndVectorWidth) {
+  mean_step_ = 48;
+  EXPECT_EQ(build(folder_ / "whole.h5", 1000000).payload_sha256, kFrozenMeanRemovedPayload);
+  for (const VectorWidth width : supported_vector_widths()) {
+    force_vector_width(width);
+    EXPECT_EQ(build(folder_ / "cut.h5", kUnitRays).payload_sha256, kFrozenMeanRemovedPayload);
+  }
+  force_vector_width(std::nullopt);
+  kept_tile_bytes_ = 2000;
+  overflow_ = TileOverflow::ReadBack;
+  UnitStore progress(work_in(folder_ / "a.progress"), world_);
+  EXPECT_EQ(build(folder_ / "a.h5", kUnitRays, &progress).payload_sha256,
+            kFrozenMeanRemovedPayload);
+}
+
+/// Sixty-three shapes beside means serve better than sixty-three tiles.
+TEST_F(FieldBuildTest, MeanRemovedTilesComeNearerToTheSamples) {
+  const auto units = plan_units(light_slab_.lattice(), {kUnitRays});
+  const FieldBuild build = build_of(units, nullptr);
+  const auto error_of = [&](int mean_step) {
+    CastPhase cast = cast_field(build, {kSelection}, [] { return false; }, {});
+    const Codebook trained =
+        train_field(build, cast, {.codewords = 64, .seed = 3, .mean_step = mean_step}, {}).codebook;
+    FieldEncoder encoder(build, cast, trained, mean_step, TileOverflow::CastAgain);
+    while (sum_over(world_, encoder.next_blocks().size()) > 0) {
+    }
+    return static_cast<double>(encoder.squared_error());
+  };
+  EXPECT_LT(error_of(48), 0.75 * error_of(0));
 }
 
 TEST_F(FieldBuildTest, PayloadIsTheSameWhereverTheTilesAreKept) {
@@ -162,7 +201,7 @@ TEST_F(FieldBuildTest, TilesThatCannotBeReadBackAreCastAgain) {
   const OverflowChoice choice = choose_overflow(build, cast);
   EXPECT_GT(choice.read_bytes_per_second, 0.0);
   const Codebook codebook = train_field(build, cast, {.codewords = 64, .seed = 3}, {}).codebook;
-  FieldEncoder encoder(build, cast, codebook, TileOverflow::ReadBack);
+  FieldEncoder encoder(build, cast, codebook, 0, TileOverflow::ReadBack);
   world_.barrier();
   if (world_.is_root())
     for (const auto& entry : std::filesystem::directory_iterator(progress.path()))
@@ -364,12 +403,12 @@ TEST_F(FieldBuildTest, EncodedUnitsAreReadForTheirCodebookOnly) {
   }
   UnitStore progress(work_in(folder_ / "a.h5.progress"), world_);
   progress.visit_finished(units, [](const UnitTiles&) { ADD_FAILURE() << "no tiles were kept"; });
-  const auto read = progress.read_encoded(units[1], kCodebookCrc);
+  const auto read = progress.read_encoded(units[1], 1, kCodebookCrc);
   ASSERT_TRUE(read.has_value());
   EXPECT_EQ(read->indices, encoded.indices);
   EXPECT_EQ(read->squared_error, 99u);
-  EXPECT_FALSE(progress.read_encoded(units[1], kCodebookCrc + 1).has_value());
-  EXPECT_FALSE(progress.read_encoded(units[0], kCodebookCrc).has_value());
+  EXPECT_FALSE(progress.read_encoded(units[1], 1, kCodebookCrc + 1).has_value());
+  EXPECT_FALSE(progress.read_encoded(units[0], 1, kCodebookCrc).has_value());
   world_.barrier();
   if (world_.is_root()) {
     std::fstream shard(progress.path() / "units.0000-000000.records",
@@ -378,7 +417,7 @@ TEST_F(FieldBuildTest, EncodedUnitsAreReadForTheirCodebookOnly) {
     shard.put('\x5A');
   }
   world_.barrier();
-  EXPECT_FALSE(progress.read_encoded(units[1], kCodebookCrc).has_value());
+  EXPECT_FALSE(progress.read_encoded(units[1], 1, kCodebookCrc).has_value());
 }
 
 TEST_F(FieldBuildTest, AUnitCastAgainForItsDamagedRecordIsFoundByTheNextRun) {

@@ -293,7 +293,7 @@ TEST(FieldFile, HoldsMoreChunksThanFitIntoTheCacheOfHdf5) {
   const test::SharedFolder folder;
   const Communicator world = Communicator::world();
   const CompressedAttenuationField field = field_of_chunks(kTilesU, kTilesV);
-  EXPECT_GT(hdf5::chunk_count(field_layout::index_rules(field.lattice())), 65536u);
+  EXPECT_GT(hdf5::chunk_count(field_layout::index_rules(field)), 65536u);
   std::vector<IndexBlock> blocks;
   for (int first = 0; first < kTilesU; first += kAlongU) {
     blocks.push_back({0, {first, 0, 0, 0}, {kAlongU, kTilesV, 1, 1}, {}});
@@ -491,10 +491,10 @@ TEST(FieldFile, RefusesAnUnknownVersion) {
   write(small_field(), folder / "a.af.h5");
   edit_file(folder / "a.af.h5", [](hid_t file) {
     H5Adelete(file, "format_version");
-    hdf5::write_int_attribute(file, "format_version", 3);
+    hdf5::write_int_attribute(file, "format_version", 4);
   });
   const std::string message = refusal(folder / "a.af.h5");
-  EXPECT_NE(message.find("format_version: expected 1 to 2, found 3"), std::string::npos) << message;
+  EXPECT_NE(message.find("format_version: expected 1 to 3, found 4"), std::string::npos) << message;
 }
 
 TEST(FieldFile, RefusesIndicesPackedOtherwiseThanItsVersionSays) {
@@ -728,7 +728,113 @@ TEST(FieldFile, RefusesContentsThatMakeNoSenseThoughAllHashesAgree) {
       [&](auto& field) { std::swap(field.codebook.codewords[1], field.codebook.codewords[9]); });
   refusal_of([&](auto& field) { field.codebook.codewords[0][3] = 1; });
   const std::string message = refusal_of([&](auto& field) { field.codebook.codewords.resize(20); });
-  EXPECT_NE(message.find("indices below the 20 codewords"), std::string::npos) << message;
+  EXPECT_NE(message.find("an index beyond the 20 codewords"), std::string::npos) << message;
+}
+
+/// small_field() with means: of codewords 1 to 49, 96 times the index.
+CompressedAttenuationField field_with_means() {
+  CompressedAttenuationField field = small_field();
+  field.codebook.mean_step = 48;
+  for (std::size_t i = 1; i < field.codebook.size(); ++i)
+    for (std::size_t k = 0; k < kTileElements; ++k)
+      field.codebook.codewords[i][k] =
+          static_cast<std::uint16_t>(kShapeZero + ((k & 2u) == 0 ? -1 : 1) * 3 * (25 - int(i)));
+  return field;
+}
+
+std::vector<IndexBlock> blocks_with_means(const CompressedAttenuationField& field) {
+  std::vector<IndexBlock> blocks = all_blocks(field);
+  for (IndexBlock& block : blocks) {
+    const auto row = static_cast<std::size_t>(block.tile_count[3]);
+    std::vector<std::uint16_t> values;
+    for (std::size_t at = 0; at < block.indices.size(); at += row) {
+      const auto indices = std::span(block.indices).subspan(at, row);
+      values.insert(values.end(), indices.begin(), indices.end());
+      for (const std::uint16_t index : indices)
+        values.push_back(static_cast<std::uint16_t>(96 * index));
+    }
+    block.indices = std::move(values);
+  }
+  return blocks;
+}
+
+TEST(FieldFile, HoldsMeansBesideTheIndices) {
+  const test::SharedFolder folder;
+  const Communicator world = Communicator::world();
+  const CompressedAttenuationField field = field_with_means();
+  std::array<std::string, 2> payload;
+  for (const IndexPacking packing : {IndexPacking::CodebookTree, IndexPacking::Deflate}) {
+    const auto path = folder / (std::string(field_layout::to_string(packing)) + ".af.h5");
+    write_field(
+        field, dealt(blocks_with_means(field), world), some_provenance(), path, world, {}, packing);
+    FieldFileInfo info;
+    const auto read = read_field(path, world, &info);
+    payload[packing == IndexPacking::Deflate ? 1 : 0] = info.payload_sha256;
+    EXPECT_EQ(info.packing, packing);
+    EXPECT_EQ(read->codebook.mean_step, 48);
+    EXPECT_EQ(read->codebook.codewords, field.codebook.codewords);
+    EXPECT_EQ(read_field_header(path).codebook.mean_step, 48);
+    for (std::size_t k = 0; k < 2; ++k) {
+      const std::array<int, 4> tiles = read->lattice(k).tile_counts();
+      std::size_t next = 0;
+      for (int a = 0; a < tiles[0]; ++a)
+        for (int b = 0; b < tiles[1]; ++b)
+          for (int c = 0; c < tiles[2]; ++c) {
+            for (int d = 0; d < tiles[3]; ++d)
+              ASSERT_EQ(read->slabs[k].indices[next++], index_at({a, b, c, d}, k));
+            for (int d = 0; d < tiles[3]; ++d)
+              ASSERT_EQ(read->slabs[k].indices[next++], 96 * index_at({a, b, c, d}, k));
+          }
+    }
+  }
+  EXPECT_EQ(payload[0], payload[1]);
+  edit_file(folder / "deflate.af.h5", [&](hid_t file) {
+    H5Adelete(file, "tile_coding");
+    hdf5::write_text_attribute(file, "tile_coding", "two stages");
+  });
+  const std::string message = refusal(folder / "deflate.af.h5");
+  EXPECT_NE(message.find("attribute tile_coding: expected mean-removed, found two stages"),
+            std::string::npos)
+      << message;
+}
+
+TEST(FieldFile, RefusesMeansThatMakeNoSense) {
+  const test::SharedFolder folder;
+  const Communicator world = Communicator::world();
+  const auto refusal_of =
+      [&](const std::function<void(CompressedAttenuationField&, std::vector<IndexBlock>&)>& spoil) {
+        CompressedAttenuationField field = field_with_means();
+        std::vector<IndexBlock> blocks = blocks_with_means(field);
+        spoil(field, blocks);
+        std::error_code ignored;
+        if (world.is_root()) std::filesystem::remove(folder / "a.af.h5", ignored);
+        world.barrier();
+        write_field(field,
+                    dealt(blocks, world),
+                    some_provenance(),
+                    folder / "a.af.h5",
+                    world,
+                    {},
+                    IndexPacking::Deflate);
+        return refusal(folder / "a.af.h5");
+      };
+  const auto expect_named = [](const std::string& message, const std::string& text) {
+    EXPECT_NE(message.find(text), std::string::npos) << message;
+  };
+  // Within the second row of the first block.
+  expect_named(refusal_of([](auto&, auto& blocks) {
+                 auto& block = blocks.front();
+                 block.indices[static_cast<std::size_t>(block.tile_count[3])] = 97;
+               }),
+               "means are multiples of 48");
+  expect_named(refusal_of([](auto&, auto& blocks) { blocks.front().indices[0] = 50; }),
+               "an index beyond the 50 codewords");
+  expect_named(refusal_of([](auto& field, auto&) { field.codebook.mean_step = 100000; }),
+               "mean_step = 100000");
+  expect_named(refusal_of([](auto& field, auto&) {
+                 std::swap(field.codebook.codewords[3], field.codebook.codewords[9]);
+               }),
+               "breaks the codebook's order");
 }
 
 /// Asymmetric, with a symmetric part of 0.1 rad and 5 mm.

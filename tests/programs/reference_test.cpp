@@ -31,7 +31,7 @@ void expect_page(const std::string& name, const std::string& text) {
 std::string dataset_table() {
   std::ostringstream out;
   out << "| Dataset | Type | Extents | Unit | Frame |\n|---|---|---|---|---|\n";
-  std::vector<field_layout::DatasetRule> rules = field_layout::payload_rules(1);
+  std::vector<field_layout::DatasetRule> rules = field_layout::payload_rules(1, true);
   for (const field_layout::DatasetRule& rule : field_layout::provenance_rules())
     rules.push_back(rule);
   for (const field_layout::DatasetRule& rule : rules) {
@@ -53,59 +53,63 @@ std::string code_list(const std::vector<std::string>& names) {
 std::string file_page() {
   using namespace registration;
   std::ostringstream page;
-  page << "# Files\n\nThis page is made from the code (`tests/programs/reference_test.cpp`).\n\n"
-       << "## study.toml\n\n`af-inspect --template study` prints this:\n\n```toml\n"
-       << template_text("study") << "```\n\n## rig.toml\n\n`af-inspect --template rig` prints "
-       << "this:\n\n```toml\n"
-       << template_text("rig") << "```\n\n## Fields (`.af.h5`)\n\nHDF5, format "
-       << field_layout::kFormat << ", version " << field_layout::kFormatVersion
-       << ". A field of several depth slabs has `/geometry/slab_1/`, `/field/slab_1` and so on. "
-       << "`/field/slab_0` holds the codeword of each tile, uint16, by (u, v, s, t). "
-       << "[Frames](../../common/geometry/README.md), "
-       << "[coding](../coding.md).\n\n"
-       << dataset_table()
-       << "\nAn atlas (`af-precompute --orbit`, [page](../other-cameras.md)) has "
-       << "the format " << field_layout::kAtlasFormat
-       << " and the same version. In its root stand `" << field_layout::member_count_rule().name
-       << "`, `/identity` of the camera that the orbit "
-       << "begins from, `/codebook` and `/provenance`; each field is a group, `"
-       << field_layout::member_group(0) << "`, `" << field_layout::member_group(1)
-       << "`, ..., with `geometry`, `identity` and `field` as above.\n"
-       << "\n## Results of af-register\n\nIn the folder of `--output`: "
-       << code_list(result_file_names())
-       << ", one `CAMERA-overlay.png` per view, and `slicer/`. Which of them are there depends on "
-       << "the verdict ([register/README.md](../../register/README.md)).\n\n"
-       << "## registrations.csv\n\nOne row per registration, with these columns; `af-evaluate` "
-       << "and `--correct` add more between them ([errors.md](../errors.md) defines the "
-       << "errors):\n\n"
-       << code_list(names_of(registration_row({}, {}, {})))
-       << "\n\nWith `--correct`: " << code_list(names_of(correction_cells({})))
-       << ".\n\nWithout `--no-uncertainty` ([uncertainty.md](../uncertainty.md)): "
-       << code_list(names_of(judge_cells({}, {}))) << ", "
-       << code_list(names_of(uncertainty_cells({}, 0.0))) << ".\n\n"
-       << "## summary.json\n\nIn the folder of a finished run of `af-evaluate`; `af-evaluate "
-       << "report` reads it. Numbers that are not known are null.\n\n"
-       << "| Key | Of which kinds | What |\n|---|---|---|\n"
-       << "| `format`, `format_version` | all | \"attenuation-fields evaluation\", 1 |\n"
-       << "| `kind` | all | \"registration\", \"image-quality\", \"field-parameters\", "
-          "\"similarity-curves\" or \"error-budget\" |\n"
-       << "| `provenance` | all | program and version, command line, options in force, seed, "
-          "SHA-256 of the inputs (`input_sha256`), how X-rays and CTs were read (`input_notes`), "
-          "host, start |\n"
-       << "| `figures`, `pictures` | all that draw | names of figures without ending; files of "
-          "pictures and what they show |\n"
-       << "| `study`, `method`, `success_tre_mm`, `start_rule`, `simulation` | registration | the "
-          "study's path; preset, similarity and optimisers; what a success and a start are; how "
-          "the study was simulated, or null |\n"
-       << "| `cases` | registration | per case its gold pose, region and starts |\n"
-       << "| `renderers` | registration, similarity-curves | per renderer successes, TRE, times "
-          "and their intervals; or the curves' maxima |\n"
-       << "| `field_against_raycast` | registration | the same starts by both renderers |\n"
-       << "| `row_problems`, `warnings` | registration | rows that failed, and what to mind |\n"
-       << "| `field`, `loss_split` | image-quality | the field; shares of the mean squared "
-          "difference |\n"
-       << "| `steps`, `common_starts`, `gold` | error-budget | what each part of the error moves "
-          "|\n";
+  page
+      << "# Files\n\nThis page is made from the code (`tests/programs/reference_test.cpp`).\n\n"
+      << "## study.toml\n\n`af-inspect --template study` prints this:\n\n```toml\n"
+      << template_text("study") << "```\n\n## rig.toml\n\n`af-inspect --template rig` prints "
+      << "this:\n\n```toml\n"
+      << template_text("rig") << "```\n\n## Fields (`.af.h5`)\n\nHDF5, format "
+      << field_layout::kFormat << ", version " << field_layout::kFormatVersion
+      << ". A field of several depth slabs has `/geometry/slab_1/`, `/field/slab_1` and so on. "
+      << "`/field/slab_0` holds the codeword of each tile, uint16, by (u, v, s, t). Fields of "
+      << "mean-removed tiles (version 3, attribute `tile_coding`) have `/codebook/mean_step`; in "
+      << "`/field/slab_0` a row of codewords along t and the row of their tiles' means, in levels, "
+      << "take turns along s. Codeword 0 is an empty tile; the level of any other tile's element "
+      << "is its mean + the codeword's element - 32768, within 0 and 65535. Versions 1 and 2 are "
+      << "fields of plain tiles, deflated and packed by the codebook's tree. "
+      << "[Frames](../../common/geometry/README.md), "
+      << "[coding](../coding.md).\n\n"
+      << dataset_table() << "\nAn atlas (`af-precompute --orbit`, [page](../other-cameras.md)) has "
+      << "the format " << field_layout::kAtlasFormat << " and the same version. In its root stand `"
+      << field_layout::member_count_rule().name << "`, `/identity` of the camera that the orbit "
+      << "begins from, `/codebook` and `/provenance`; each field is a group, `"
+      << field_layout::member_group(0) << "`, `" << field_layout::member_group(1)
+      << "`, ..., with `geometry`, `identity` and `field` as above.\n"
+      << "\n## Results of af-register\n\nIn the folder of `--output`: "
+      << code_list(result_file_names())
+      << ", one `CAMERA-overlay.png` per view, and `slicer/`. Which of them are there depends on "
+      << "the verdict ([register/README.md](../../register/README.md)).\n\n"
+      << "## registrations.csv\n\nOne row per registration, with these columns; `af-evaluate` "
+      << "and `--correct` add more between them ([errors.md](../errors.md) defines the "
+      << "errors):\n\n"
+      << code_list(names_of(registration_row({}, {}, {})))
+      << "\n\nWith `--correct`: " << code_list(names_of(correction_cells({})))
+      << ".\n\nWithout `--no-uncertainty` ([uncertainty.md](../uncertainty.md)): "
+      << code_list(names_of(judge_cells({}, {}))) << ", "
+      << code_list(names_of(uncertainty_cells({}, 0.0))) << ".\n\n"
+      << "## summary.json\n\nIn the folder of a finished run of `af-evaluate`; `af-evaluate "
+      << "report` reads it. Numbers that are not known are null.\n\n"
+      << "| Key | Of which kinds | What |\n|---|---|---|\n"
+      << "| `format`, `format_version` | all | \"attenuation-fields evaluation\", 1 |\n"
+      << "| `kind` | all | \"registration\", \"image-quality\", \"field-parameters\", "
+         "\"similarity-curves\" or \"error-budget\" |\n"
+      << "| `provenance` | all | program and version, command line, options in force, seed, "
+         "SHA-256 of the inputs (`input_sha256`), how X-rays and CTs were read (`input_notes`), "
+         "host, start |\n"
+      << "| `figures`, `pictures` | all that draw | names of figures without ending; files of "
+         "pictures and what they show |\n"
+      << "| `study`, `method`, `success_tre_mm`, `start_rule`, `simulation` | registration | the "
+         "study's path; preset, similarity and optimisers; what a success and a start are; how "
+         "the study was simulated, or null |\n"
+      << "| `cases` | registration | per case its gold pose, region and starts |\n"
+      << "| `renderers` | registration, similarity-curves | per renderer successes, TRE, times "
+         "and their intervals; or the curves' maxima |\n"
+      << "| `field_against_raycast` | registration | the same starts by both renderers |\n"
+      << "| `row_problems`, `warnings` | registration | rows that failed, and what to mind |\n"
+      << "| `field`, `loss_split` | image-quality | the field; shares of the mean squared "
+         "difference |\n"
+      << "| `steps`, `common_starts`, `gold` | error-budget | what each part of the error moves "
+         "|\n";
   return page.str();
 }
 

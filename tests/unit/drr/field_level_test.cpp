@@ -101,6 +101,29 @@ TEST(FieldLevel, LevelZeroHasTheFieldsSamples) {
                     field->node_value(0, {u, v, s, t}));
 }
 
+TEST(FieldLevel, IsTheSameOfMeanRemovedTiles) {
+  const auto waves = [](const RayNodes& n) {
+    return std::round(30000 + 9000 * std::sin(0.7 * n.s + 0.3 * n.u) * std::cos(0.9 * n.t + n.v));
+  };
+  auto plain = small_field(waves, 1, 5, 16);
+  crop_stored(*plain, {4, 8}, {6, 6});
+  const auto with_means = mean_removed(*plain, 32);
+  ASSERT_TRUE(problems(*with_means).empty());
+  EXPECT_EQ(decoded_bytes(*with_means), decoded_bytes(*plain));
+  for (const VectorWidth width : supported_vector_widths()) {
+    force_vector_width(width);
+    const auto expected = decode_field(*plain).slabs[0].samples;
+    const auto found = decode_field(*with_means).slabs[0].samples;
+    EXPECT_TRUE(std::ranges::equal(found.view(), expected.view())) << to_string(width);
+  }
+  force_vector_width({});
+  for (int u = 0; u < 5; ++u)
+    for (int s = 0; s < 16; ++s)
+      for (int t = 0; t < 16; ++t)
+        ASSERT_EQ(with_means->node_value(0, {u, 4 - u, s, t}),
+                  plain->node_value(0, {u, 4 - u, s, t}));
+}
+
 TEST(FieldLevel, CoarseNodesLieMidwayBetweenFineNodes) {
   const auto field = small_field(noise, 1, 5, 12);
   const auto pyramid = make_field_pyramid(*field, 2);
@@ -142,6 +165,33 @@ TEST(FieldLevel, BlurSigmaIsThatOfAnImpulse) {
               std::sqrt(variance) * 0.5 * (s.spacing_mm() + t.spacing_mm()),
               1e-3 * level.blur_sigma_mm());
   EXPECT_GT(level.blur_sigma_mm(true), level.blur_sigma_mm());
+}
+
+/// A field's geometry of two slabs of `nodes` x `nodes` over `side_mm` at the plane through the
+/// centre.
+LightSlab square_slabs(int nodes, double side_mm) {
+  LightSlab light_slab;
+  light_slab.uv_plane_y_mm = 2600.0;
+  for (const double y_mm : {-50.0, 50.0}) {
+    SlabGeometry slab;
+    slab.st_plane_y_mm = y_mm;
+    const double half_mm =
+        0.5 * side_mm * (light_slab.uv_plane_y_mm - y_mm) / light_slab.uv_plane_y_mm;
+    slab.s = slab.t = {-half_mm, half_mm, nodes};
+    light_slab.slabs.push_back(slab);
+  }
+  return light_slab;
+}
+
+TEST(FieldLevel, BeginsWithMoreHalvingsOfFinerNodesNotOfAWiderRange) {
+  // 10 degrees and 30 mm: 281 mm; 20 degrees and 40 mm: 410 mm.
+  EXPECT_NEAR(node_spacing_mm(square_slabs(256, 281.0)), 281.0 / 255.0, 1e-9);
+  EXPECT_EQ(halvings_to_usual_nodes(square_slabs(256, 281.0)), 0);
+  EXPECT_EQ(halvings_to_usual_nodes(square_slabs(384, 281.0)), 1);
+  EXPECT_EQ(halvings_to_usual_nodes(square_slabs(384, 410.0)), 0);
+  EXPECT_EQ(halvings_to_usual_nodes(square_slabs(768, 410.0)), 1);
+  // Nor do small objects, whose nodes stand close, begin with more halvings.
+  EXPECT_EQ(halvings_to_usual_nodes(square_slabs(256, 60.0)), 0);
 }
 
 TEST(FieldLevel, SamplesDoNotDependOnPartsOrVectorWidth) {

@@ -61,6 +61,44 @@ std::shared_ptr<CompressedAttenuationField> small_field(const FieldFunction& fun
   return field;
 }
 
+std::shared_ptr<CompressedAttenuationField> mean_removed(const CompressedAttenuationField& field,
+                                                         int mean_step) {
+  auto result = std::make_shared<CompressedAttenuationField>(field);
+  const auto mean_of = [&](const Tile& tile) {
+    return static_cast<int>(tile_sum(tile)) / 16 / mean_step * mean_step;
+  };
+  const auto shape_of = [&](const Tile& tile) {
+    Tile shape = tile;
+    for (std::uint16_t& element : shape)
+      element = static_cast<std::uint16_t>(element - mean_of(tile) + kShapeZero);
+    return shape;
+  };
+  const auto folded_less = [](const Tile& a, const Tile& b) {
+    return codeword_less(folded_shape(a), folded_shape(b));
+  };
+  std::vector<Tile>& shapes = result->codebook.codewords;
+  for (std::size_t i = 1; i < shapes.size(); ++i) shapes[i] = shape_of(shapes[i]);
+  std::sort(shapes.begin() + 1, shapes.end(), folded_less);
+  shapes.erase(std::unique(shapes.begin() + 1, shapes.end()), shapes.end());
+  result->codebook.mean_step = mean_step;
+  for (std::size_t k = 0; k < field.slabs.size(); ++k) {
+    const auto row = static_cast<std::size_t>(field.lattice(k).t.stored.tiles());
+    const auto indices = field.slabs[k].indices.view();
+    std::vector<std::uint16_t> values(2 * indices.size());
+    for (std::size_t i = 0; i < indices.size(); ++i) {
+      if (indices[i] == 0) continue;
+      const Tile& tile = field.codebook.codewords[indices[i]];
+      const std::size_t at = i / row * 2 * row + i % row;
+      const auto found =
+          std::lower_bound(shapes.begin() + 1, shapes.end(), shape_of(tile), folded_less);
+      values[at] = static_cast<std::uint16_t>(found - shapes.begin());
+      values[at + row] = static_cast<std::uint16_t>(mean_of(tile));
+    }
+    result->slabs[k].indices = SharedArray<std::uint16_t>(std::move(values));
+  }
+  return result;
+}
+
 void crop_stored(CompressedAttenuationField& field, const NodeRange& s, const NodeRange& t) {
   SlabGeometry& slab = field.light_slab.slabs[0];
   const int s_tiles = slab.stored_s.tiles();

@@ -21,6 +21,11 @@ std::shared_ptr<CompressedAttenuationField> small_field(const FieldFunction& fun
                                                         int uv_nodes = 5,
                                                         int st_nodes = 9);
 
+/// The same field of mean-removed tiles. Nothing is lost where no level differs from its tile's
+/// mean by 32767 or more.
+std::shared_ptr<CompressedAttenuationField> mean_removed(const CompressedAttenuationField& field,
+                                                         int mean_step);
+
 /// Leaves of a one-slab field that stores its whole lattice the even-aligned nodes s x t.
 void crop_stored(CompressedAttenuationField& field, const NodeRange& s, const NodeRange& t);
 

@@ -93,6 +93,65 @@ TEST(TwoPassAfDrr, EveryVectorWidthGivesTheSameBits) {
     }
 }
 
+TEST(TwoPassAfDrr, MeanRemovedTilesGiveTheBitsOfPlainOnes) {
+  for (const TwoPassOptions& options : {kLinear, kCubic})
+    for (const int slabs : {1, 2}) {
+      const auto plain = small_field(waves, slabs, 7, 51);
+      const auto with_means = mean_removed(*plain, 48);
+      ASSERT_TRUE(problems(*with_means).empty()) << problems(*with_means).front();
+      const TwoPassAfDrr expected(plain, options);
+      const TwoPassAfDrr found(with_means, options);
+      const View view = View::whole_detector(small_camera());
+      const RigidTransform pose = pose_from_parameters({}, small_pose(8));
+      for (const VectorWidth width : supported_vector_widths()) {
+        force_vector_width(width);
+        EXPECT_EQ(all_outputs(found, pose, view, *found.make_workspace()),
+                  all_outputs(expected, pose, view, *expected.make_workspace()))
+            << to_string(width);
+      }
+      force_vector_width(std::nullopt);
+    }
+}
+
+/// One tile everywhere, whose levels go beyond both ends.
+TEST(TwoPassAfDrr, LevelsOfMeanRemovedTilesAreLimited) {
+  for (const int mean : {96, 65520}) {
+    const auto field = small_field(waves, 1, 6, 24);
+    Tile shape{};
+    for (std::size_t i = 0; i < shape.size(); ++i)
+      shape[i] = static_cast<std::uint16_t>(kShapeZero + (i % 2 == 0 ? 700 : -700));
+    field->codebook = {{Tile{}, shape}, 48};
+    std::vector<std::uint16_t> values(2 * field->slabs[0].indices.size(), 1);
+    for (std::size_t i = 0; i < values.size(); ++i)
+      if (i / 12 % 2 == 1) values[i] = static_cast<std::uint16_t>(mean);
+    field->slabs[0].indices = SharedArray<std::uint16_t>(values);
+    ASSERT_TRUE(problems(*field).empty()) << problems(*field).front();
+    const float low = field->quantizer_step * (mean == 96 ? 0.0f : 64820.0f);
+    const float high = field->quantizer_step * (mean == 96 ? 796.0f : 65535.0f);
+    EXPECT_EQ(field->node_value(0, {0, 0, 0, 0}), high);
+    EXPECT_EQ(field->node_value(0, {1, 2, 4, 7}), low);
+    const View view = View::whole_detector(small_camera());
+    const auto of_field = [&](const DrrRenderer& renderer) {
+      std::vector<float> drr(view.pixel_count());
+      renderer.render({}, view, *renderer.make_workspace(), drr);
+      return drr;
+    };
+    const auto expected = of_field(AfDrr(field, FieldInterpolation::Quadrilinear));
+    for (const VectorWidth width : supported_vector_widths()) {
+      force_vector_width(width);
+      const FieldLevel decoded = decode_field(*field);
+      for (const std::uint16_t sample : decoded.slabs[0].samples.view().first(24 * 24))
+        ASSERT_TRUE(static_cast<float>(sample) * field->quantizer_step == low ||
+                    static_cast<float>(sample) * field->quantizer_step == high);
+      const auto found = of_field(TwoPassAfDrr(field, kLinear));
+      constexpr float kRounding = 0.02f;  // of floats around 16384
+      for (std::size_t i = 0; i < found.size(); ++i)
+        ASSERT_NEAR(found[i], expected[i], kRounding) << to_string(width);
+    }
+    force_vector_width(std::nullopt);
+  }
+}
+
 TEST(TwoPassAfDrr, AnyNumberOfThreadsGivesTheSameBits) {
   // Pixels enough for several bands.
   View view = View::whole_detector(small_camera());

@@ -58,8 +58,9 @@ Answer brute_force(const Codebook& codebook, const Tile& tile) {
   return best;
 }
 
-void expect_equals_brute_force(const Codebook& codebook, const std::vector<Tile>& tiles) {
-  const NearestCodeword search(codebook);
+void expect_equals_brute_force(const NearestCodeword& search,
+                               const Codebook& codebook,
+                               const std::vector<Tile>& tiles) {
   for (const VectorWidth width : supported_vector_widths()) {
     force_vector_width(width);
     std::vector<std::uint32_t> nearest(tiles.size());
@@ -79,6 +80,12 @@ void expect_equals_brute_force(const Codebook& codebook, const std::vector<Tile>
     }
   }
   force_vector_width(std::nullopt);
+}
+
+void expect_equals_brute_force(const Codebook& codebook, const std::vector<Tile>& tiles) {
+  expect_equals_brute_force(NearestCodeword(codebook), codebook, tiles);
+  constexpr int kAllBlocks = 4096;
+  expect_equals_brute_force(NearestCodeword(codebook, kAllBlocks), codebook, tiles);
 }
 
 TEST(NearestCodeword, EqualsBruteForceOnEveryWidth) {
@@ -137,6 +144,32 @@ TEST(NearestCodeword, TiesFartherThanFloatsAreExactTakeTheLowestIndex) {
     tiles[i][i % 16] = static_cast<std::uint16_t>(30000 + i / 8);
   }
   expect_equals_brute_force(codebook_of(codewords), tiles);
+}
+
+TEST(NearestCodeword, OfSomeBlocksIsTheSameOnEveryWidthAndHardlyFarther) {
+  const Codebook codebook = codebook_of(field_like_tiles(2000, 1, 20000.0));
+  const std::vector<Tile> tiles = field_like_tiles(1500, 2, 20000.0);
+  const auto answers = [&](int most_blocks) {
+    std::vector<std::uint32_t> nearest(tiles.size());
+    std::vector<std::uint64_t> errors(tiles.size());
+    NearestCodeword(codebook, most_blocks).search(tiles, SearchHint::None, nearest, errors);
+    return std::pair(nearest, errors);
+  };
+  const auto exact = answers(1000);
+  const auto first = answers(8);
+  for (const VectorWidth width : supported_vector_widths()) {
+    force_vector_width(width);
+    EXPECT_EQ(answers(8), first) << to_string(width);
+  }
+  force_vector_width(std::nullopt);
+  double sum = 0.0;
+  double least = 0.0;
+  for (std::size_t i = 0; i < tiles.size(); ++i) {
+    EXPECT_GE(first.second[i], exact.second[i]);
+    sum += static_cast<double>(first.second[i]);
+    least += static_cast<double>(exact.second[i]);
+  }
+  EXPECT_LT(sum, 1.2 * least);
 }
 
 TEST(NearestCodeword, RefusesAnUnsortedCodebook) {

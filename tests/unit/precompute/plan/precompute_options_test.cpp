@@ -40,7 +40,8 @@ TEST(PrecomputeOptions, DecideTheSamplesOrWhatTheCodebookMakesOfThem) {
   PrecomputeOptions options;
   options.preset = "paper";
   EXPECT_EQ(deciding_options(options, kCastingStage),
-            (OptionTexts{{"max_rotation_deg", "10.0"},
+            (OptionTexts{{"material", "\"all\""},
+                         {"max_rotation_deg", "10.0"},
                          {"max_translation_mm", "100.0"},
                          {"slabs", "1"},
                          {"st_plane", "\"centre\""},

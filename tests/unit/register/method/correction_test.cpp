@@ -307,7 +307,7 @@ TEST(RegistrationOptions, KnowsTheLevelsThatItCanEndWith) {
   RegistrationOptions robust = preset_options("robust");
   EXPECT_EQ(robust.last_levels(), std::vector<int>{0});
   robust.finish.stages.clear();
-  robust.chains.front().stages.back().level = 1;
+  robust.chains.front().stages.back().level = 2;
   EXPECT_EQ(robust.last_levels(), (std::vector<int>{1, 2}));
 }
 

@@ -190,6 +190,14 @@ TEST(RegistrationOptions, NamesEverythingThatIsWrong) {
   EXPECT_THROW(preset_options("unheard-of"), InputError);
 }
 
+// At level 2 steel and scatter have optima of their own within the region alone: under all stresses
+// chains then left the right pose for ends 4 to 11 mm off (docs/population.md).
+TEST(RegistrationOptions, RobustSeesTheRegionAloneNoCoarserThanLevelOne) {
+  for (const ChainOptions& chain : preset_options("robust").chains)
+    for (const StageOptions& stage : chain.stages)
+      EXPECT_TRUE(stage.roi_scale > 1.0 || stage.level <= 1) << chain.name;
+}
+
 TEST(RegistrationOptions, RefuseAnOptimizerThatItsMeasureCannotServe) {
   RegistrationOptions options;
   options.use_optimizer("gauss-newton");
