@@ -2,7 +2,9 @@
 #include "drr/field_set_drr.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
+#include <optional>
 #include <utility>
 
 #include "base/error.h"
@@ -12,10 +14,22 @@ namespace af {
 
 namespace {
 
-/// Members whose rays keep from the edges by this share of the planes less than the best's are not
-/// looked up: narrow enough that few poses need two look-ups, wide enough that an optimiser's steps
-/// see a smooth change.
-constexpr double kSeamShare = 0.04;
+/// Members that hold a pose by so much less than the best are not looked up: narrow enough that few
+/// poses need two look-ups, wide enough that an optimiser's steps see a smooth change. In units of
+/// how_well_held().
+constexpr double kSeam = 0.4;
+
+/// How well a field holds a view's rays: the sum over its axes of the logarithm of how far they
+/// keep from the edges. It falls without bound where rays leave a plane, and an axis along which
+/// two fields hold the rays alike says nothing between them. None where a ray is outside.
+std::optional<double> how_well_held(const SlabRays& rays) {
+  double sum = 0.0;
+  for (const double share : rays.shares_to_edges()) {
+    if (!(share > 0.0)) return std::nullopt;
+    sum += std::log(share);
+  }
+  return sum;
+}
 
 class SetWorkspace final : public RenderWorkspace {
  public:
@@ -32,25 +46,21 @@ FieldSetDrr::FieldSetDrr(std::vector<FieldSetMember> members) : members_(std::mo
 
 std::vector<double> FieldSetDrr::weights(const RigidTransform& room_from_ct,
                                          const View& view) const {
-  std::vector<double> shares;
+  std::vector<std::optional<double>> held;
   for (const FieldSetMember& member : members_)
-    shares.push_back(SlabRays(*member.coverage, room_from_ct, view).share_to_edges());
-  const double best = *std::max_element(shares.begin(), shares.end());
+    held.push_back(how_well_held(SlabRays(*member.coverage, room_from_ct, view)));
+  // None is below any number.
+  const std::optional<double> best = *std::max_element(held.begin(), held.end());
   std::vector<double> weights(members_.size(), 0.0);
-  if (best < 0.0) return weights;
+  if (!best) return weights;
   double sum = 0.0;
-  for (std::size_t i = 0; i < shares.size(); ++i) {
-    if (shares[i] < 0.0) continue;
-    // Falls to 0 where a member is no longer nearly the best, and where it no longer holds all
-    // rays.
-    const double behind = std::clamp(1.0 - (best - shares[i]) / kSeamShare, 0.0, 1.0);
-    weights[i] = behind * behind * std::min(1.0, shares[i] / kSeamShare);
+  for (std::size_t i = 0; i < held.size(); ++i) {
+    if (!held[i]) continue;
+    // Falls to 0 where a member is no longer nearly the best, as it is not where it loses a ray
+    // that another holds.
+    const double behind = std::max(0.0, 1.0 - (*best - *held[i]) / kSeam);
+    weights[i] = behind * behind;
     sum += weights[i];
-  }
-  if (sum == 0.0) {  // at the very edge of the set
-    weights[static_cast<std::size_t>(std::max_element(shares.begin(), shares.end()) -
-                                     shares.begin())] = 1.0;
-    return weights;
   }
   for (double& weight : weights) weight /= sum;
   return weights;

@@ -16,13 +16,13 @@ struct FieldSetMember {
 };
 
 /// DRRs of several fields of one CT, such as those of a C-arm's angles. A pose is looked up in the
-/// field that holds its rays best: whose planes' edges they keep farthest from, as a share of the
-/// planes' sizes. Where two are nearly as good, both are looked up, and their DRRs are averaged
-/// with weights that are continuous in the pose, so that a registration can cross a seam. What is
-/// rendered depends on the pose alone, not on the poses before it: results are the same on any
-/// number of threads. A pose that no field holds whole is rendered by the one that misses fewest
-/// rays. Gradients leave out how the weights change, which multiplies the difference of two fields'
-/// errors. \test FieldSetDrrTest.HasNoJumpAtASeam
+/// field that holds its rays best: whose planes' edges they keep farthest from, as shares of the
+/// planes' sizes, along all axes together (their product). Where two are nearly as good, both are
+/// looked up, and their DRRs are averaged with weights that are continuous in the pose, so that a
+/// registration can cross a seam. What is rendered depends on the pose alone, not on the poses
+/// before it: results are the same on any number of threads. A pose that no field holds whole is
+/// rendered by the one that misses fewest rays. Gradients leave out how the weights change, which
+/// multiplies the difference of two fields' errors. \test FieldSetDrrTest.HasNoJumpAtASeam
 class FieldSetDrr final : public DrrRenderer {
  public:
   /// At least one member.

@@ -44,25 +44,32 @@ bool SlabRays::all_inside() const {
       corners.begin(), corners.end(), [&](const Eigen::Vector3d& d) { return is_inside(d); });
 }
 
-double SlabRays::share_to_edges() const {
-  if (!all_descend()) return -1.0;
-  double least = 0.5;
-  const auto keep = [&](const GridAxis& axis, double position_mm) {
+std::array<double, 4> SlabRays::shares_to_edges() const {
+  if (!all_descend()) return {-1.0, -1.0, -1.0, -1.0};
+  std::array<double, 4> least = {0.5, 0.5, 0.5, 0.5};
+  const auto keep = [&](std::size_t of, const GridAxis& axis, double position_mm) {
     const double distance_mm = std::min(position_mm - axis.first_mm, axis.last_mm - position_mm);
-    least = std::min(least, distance_mm / (axis.last_mm - axis.first_mm));
+    least[of] = std::min(least[of], distance_mm / (axis.last_mm - axis.first_mm));
   };
-  const auto keep_hit =
-      [&](const GridAxis& x, const GridAxis& z, double plane_y_mm, const Eigen::Vector3d& ray) {
-        const Eigen::Vector3d hit = source + (plane_y_mm - source.y()) / ray.y() * ray;
-        keep(x, hit.x());
-        keep(z, hit.z());
-      };
+  const auto hit = [&](double plane_y_mm, const Eigen::Vector3d& ray) -> Eigen::Vector3d {
+    return source + (plane_y_mm - source.y()) / ray.y() * ray;
+  };
   for (const Eigen::Vector3d& direction : corner_directions()) {
-    keep_hit(light_slab_.u, light_slab_.v, light_slab_.uv_plane_y_mm, direction);
-    for (const SlabGeometry& slab : light_slab_.slabs)
-      keep_hit(slab.s, slab.t, slab.st_plane_y_mm, direction);
+    const Eigen::Vector3d on_uv = hit(light_slab_.uv_plane_y_mm, direction);
+    keep(0, light_slab_.u, on_uv.x());
+    keep(1, light_slab_.v, on_uv.z());
+    for (const SlabGeometry& slab : light_slab_.slabs) {
+      const Eigen::Vector3d on_st = hit(slab.st_plane_y_mm, direction);
+      keep(2, slab.s, on_st.x());
+      keep(3, slab.t, on_st.z());
+    }
   }
   return least;
+}
+
+double SlabRays::share_to_edges() const {
+  const std::array<double, 4> shares = shares_to_edges();
+  return *std::min_element(shares.begin(), shares.end());
 }
 
 std::int64_t SlabRays::count_outside() const {

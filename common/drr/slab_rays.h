@@ -30,6 +30,9 @@ struct SlabRays {
   /// How far the rays keep from the edges of the planes: the least distance of a hit from an edge,
   /// as a share of the plane's side, at most 0.5. Below 0 when a ray is outside.
   [[nodiscard]] double share_to_edges() const;
+  /// The same for each of the axes u, v, s and t, the least over the slabs; all -1 when a ray does
+  /// not descend.
+  [[nodiscard]] std::array<double, 4> shares_to_edges() const;
   /// Rays that miss a plane.
   [[nodiscard]] std::int64_t count_outside() const;
   /// Counts the rays that miss a plane and zeroes their pixels in both outputs. Each output has any

@@ -254,7 +254,7 @@ TEST(AtlasFile, RefusesACodebookThatIsNotItsOwn) {
   const std::string sha256 = write(few, folder / "b.h5", IndexPacking::Deflate).payload_sha256;
   const std::string message =
       refusal_of([&] { read_atlas_member(folder / "b.h5", 0, sha256, Communicator::world()); });
-  EXPECT_NE(message.find("/member_0/field/slab_0: expected indices below the 3 codewords"),
+  EXPECT_NE(message.find("/member_0/field/slab_0 has an index beyond the 3 codewords"),
             std::string::npos)
       << message;
 }

@@ -171,6 +171,12 @@ TEST_F(FieldSetDrrTest, LooksUpInTheFieldThatHoldsThePoseBest) {
     EXPECT_EQ(render_image(fields, pose, view).pixels,
               render_image(TwoPassAfDrr(levels[own]), pose, view).pixels);
   }
+  // Nor are both looked up where another axis comes nearer to the planes' edges than the angle.
+  PoseParameters tilted;
+  tilted.rotation_rad.x() = 8.0 * kRadPerDeg;
+  EXPECT_EQ(fields.weights(pose_from_parameters({}, tilted),
+                           View::whole_detector(at_angle(-kHalfDeg)))[0],
+            1.0);
   // Half way, both are as good.
   const std::vector<double> middle = fields.weights(pose, View::whole_detector(at_angle(0.0)));
   EXPECT_NEAR(middle[0], 0.5, 1e-6);
@@ -181,9 +187,10 @@ TEST_F(FieldSetDrrTest, HasNoJumpAtASeam) {
   const FieldSetDrr fields = set();
   const RayCastDrr reference(volume);
   const RigidTransform pose = pose_from_parameters({}, {});
-  // Steps as an optimiser's last ones. A weight falls from 1 to 0 over kSeamShare = 0.04 of a
-  // plane's side, of which the seam crosses about 0.03 per degree: it changes by far less than 0.2
-  // per step, and so does the DRR, by that part of the difference of two fields.
+  // Steps as an optimiser's last ones. A weight falls from 1 to 0 while the logarithms of how far
+  // rays keep from the edges come to differ by kSeam = 0.4; they differ by some 0.3 per degree. It
+  // changes by far less than 0.2 per step, and so does the DRR, by that part of the difference of
+  // two fields.
   constexpr double kStepDeg = 0.05;
   constexpr double kLargestWeightStep = 0.2;
   constexpr double kLargestJumpDb = 0.5;
