@@ -67,5 +67,4 @@ if [[ "$preset" == sanitize-threads ]]; then
   ctest_options+=(--label-exclude 'checks|physics')
 fi
 cd "$af_root/build/$preset"
-# The longest tests start and stop programs, and wait for a quarter of their time: one more than there are processors.
-exec ctest --output-on-failure --no-tests=error --parallel "$(($(core_count) + 1))" "${ctest_options[@]}"
+exec ctest --output-on-failure --no-tests=error --parallel "$(core_count)" "${ctest_options[@]}"

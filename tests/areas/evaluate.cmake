@@ -45,7 +45,8 @@ af_add_program_tests(
   LIBS af_registration_case af_run
   PROGRAMS af-evaluate af-precompute
   LABELS programs mpi
-  TIMEOUT 1800)
+  TIMEOUT 1800
+  PROCESSORS 2)
 
 af_add_mpi_test(shared_measuring_test SOURCES mpi/shared_measuring_test.cpp LIBS af_evaluation_program RANKS 1 2 3 4)
 
