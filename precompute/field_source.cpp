@@ -129,7 +129,7 @@ FieldSource load_source(const PrecomputeOptions& options, const Communicator& co
   FieldSource source;
   const NamedSource named = named_source(options, communicator, source.warnings);
   source.camera = all_or_none(communicator, [&] { return named.rig.camera(named.camera); });
-  const NodeCt ct = used_from(named.places, "ct", [&] {
+  const NodeCt ct = naming_study_line(named.places, "ct", [&] {
     return read_ct_per_node(
         named.ct_path, named.ct_reading, options.attenuation, communicator, source.warnings);
   });

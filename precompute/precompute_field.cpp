@@ -374,7 +374,7 @@ class PrecomputeRun {
     if (progress.has_value() && progress->has_replaced_refused())
       inform(world_,
              "unfinished work in " + progress->path().string() +
-                 " is thrown away: its options were refused, and these are others");
+                 " is discarded: its options were refused, and they have changed");
     const auto units =
         plan_units(lattice_, {progress.has_value() ? progress->rays_per_unit() : work.plan});
     const FieldBuild build{caster,

@@ -216,7 +216,7 @@ void use_fields(const StudyCase& study_case,
     });
     const bool is_of_study = options.field_paths.count(view.view.camera.name) == 0;
     const OpenedField opened =
-        used_from(is_of_study ? study_case.views[i].places : StudyPlaces(), "field", [&] {
+        naming_study_line(is_of_study ? study_case.views[i].places : StudyPlaces(), "field", [&] {
           return field_of_view(path, study_case, options, ct, communicator);
         });
     const std::string name = "field " + view.view.camera.name;
@@ -262,7 +262,7 @@ NodeCt read_node_ct(const StudyCase& study_case,
                     const CaseLoadOptions& options,
                     const Communicator& communicator,
                     std::vector<std::string>& warnings) {
-  return used_from(study_case.places, "ct", [&] {
+  return naming_study_line(study_case.places, "ct", [&] {
     return read_ct_per_node(study_case.ct,
                             ct_reading_in_force(options.ct, study_case.ct_reading),
                             options.attenuation,
@@ -304,7 +304,7 @@ LoadedCase load_case(const Study& study,
     volumes = cast_volumes(node_ct.volume, options, communicator);
     ray_cast = ray_cast_through(volumes, options.ray_caster, options);
   } else if (!options.skip_ct_check) {
-    ct = used_from(study_case.places, "ct", [&] {
+    ct = naming_study_line(study_case.places, "ct", [&] {
       return read_ct_facts(study_case.ct,
                            ct_reading_in_force(options.ct, study_case.ct_reading),
                            options.attenuation,

@@ -10,13 +10,17 @@
 #include "cli/app_main.h"
 #include "cli/bind_lists.h"
 #include "cli/bind_options.h"
+#include "cli/run_limits.h"
 #include "cli/slicer_module.h"
 #include "files/output_file.h"
 #include "parallel/work_watch.h"
 #include "register/multi_start.h"
 #include "register/register_options.h"
+#include "register/results/registration_results.h"
 #include "register/results/slicer_folder.h"
 #include "register/results/target_errors.h"
+#include "register/verdict/pose_examiner.h"
+#include "register/verdict/view_diagnosis.h"
 #include "run/run_folder.h"
 #include "run/terminal.h"
 #include "study/landmark_start.h"
@@ -73,7 +77,7 @@ void run(const RegisterOptions& options,
   RegistrationRunner runner =
       af::all_or_none(world, [&] { return RegistrationRunner(loaded.problem, method, pool); });
   PoseExaminer examiner =
-      af::all_or_none(world, [&] { return PoseExaminer(loaded.problem, method.silhouette_mm()); });
+      af::all_or_none(world, [&] { return PoseExaminer(*loaded.problem, method.silhouette_mm()); });
   UncertaintyEstimator estimator = af::all_or_none(world, [&] {
     return UncertaintyEstimator(loaded.problem, method, options.uncertainty, pool);
   });
@@ -117,7 +121,7 @@ void run(const RegisterOptions& options,
                                       best.result.start_room_from_ct,
                                       best.result.room_from_ct,
                                       best.view_values);
-    for (const std::string& text : best.diagnosis.sayings) af::warn(world, text);
+    for (const std::string& text : best.diagnosis.messages) af::warn(world, text);
     const Judgement judgement = judgement_of(best);
     // Before result.json: when that is there, everything is.
     if (judgement.verdict == Verdict::NotFound)

@@ -100,7 +100,8 @@ std::vector<std::string> problems(const RegisterOptions& options) {
       for (const double value : *values)
         if (!std::isfinite(value)) found.emplace_back("start = not finite: must be finite numbers");
   if (options.skip_ct_check && options.renderer == "raycast")
-    found.emplace_back("--skip-ct-check = set: ray casting needs the CT; leave it out");
+    found.emplace_back(
+        "--skip-ct-check = set: must not be given with --renderer raycast, which needs the CT");
   if (options.correction.is_wanted && options.skip_ct_check)
     found.emplace_back(
         "--correct = set: must not be given with --skip-ct-check, because it casts rays through "

@@ -16,17 +16,17 @@ namespace af::AF_KERNEL_NAMESPACE {
 
 inline constexpr int kLanes = 16;
 
-using F16 = float __attribute__((vector_size(64)));
-using I16 = int32_t __attribute__((vector_size(64)));
-using U16 = uint32_t __attribute__((vector_size(64)));
+using Floats16 = float __attribute__((vector_size(64)));
+using Ints16 = int32_t __attribute__((vector_size(64)));
+using UnsignedInts16 = uint32_t __attribute__((vector_size(64)));
 /// Thirty-two 16-bit lanes, for integer arithmetic on samples.
-using S32 = int16_t __attribute__((vector_size(64)));
+using Shorts32 = int16_t __attribute__((vector_size(64)));
 
-AF_KERNEL_INLINE F16 splat(float value) {
-  return value - F16{};
+AF_KERNEL_INLINE Floats16 splat(float value) {
+  return value - Floats16{};
 }
-AF_KERNEL_INLINE I16 splat(int32_t value) {
-  return value - I16{};
+AF_KERNEL_INLINE Ints16 splat(int32_t value) {
+  return value - Ints16{};
 }
 
 template <typename Vector, typename Element>
@@ -44,11 +44,11 @@ AF_KERNEL_INLINE void store(Element* to, Vector vector) {
 }
 
 /// Truncation towards zero.
-AF_KERNEL_INLINE I16 to_int(F16 value) {
-  return __builtin_convertvector(value, I16);
+AF_KERNEL_INLINE Ints16 to_int(Floats16 value) {
+  return __builtin_convertvector(value, Ints16);
 }
-AF_KERNEL_INLINE F16 to_float(I16 value) {
-  return __builtin_convertvector(value, F16);
+AF_KERNEL_INLINE Floats16 to_float(Ints16 value) {
+  return __builtin_convertvector(value, Floats16);
 }
 
 // The registers that make up one 64-byte vector, and the intrinsics of that width.
@@ -80,30 +80,30 @@ inline constexpr int kRegisters = 512 / AF_VECTOR_BITS;
   }
 
 /// a < b ? a : b per lane.
-AF_DEFINE_OPERATION(minimum, min_ps, FloatRegister, F16, F16)
-AF_DEFINE_OPERATION(minimum, min_epi32, IntegerRegister, I16, I16)
+AF_DEFINE_OPERATION(minimum, min_ps, FloatRegister, Floats16, Floats16)
+AF_DEFINE_OPERATION(minimum, min_epi32, IntegerRegister, Ints16, Ints16)
 /// a > b ? a : b per lane.
-AF_DEFINE_OPERATION(maximum, max_ps, FloatRegister, F16, F16)
-AF_DEFINE_OPERATION(maximum, max_epi32, IntegerRegister, I16, I16)
+AF_DEFINE_OPERATION(maximum, max_ps, FloatRegister, Floats16, Floats16)
+AF_DEFINE_OPERATION(maximum, max_epi32, IntegerRegister, Ints16, Ints16)
 /// round(a * b / 2^15) per 16-bit lane; not for a == b == -32768.
-AF_DEFINE_OPERATION(multiply_fraction, mulhrs_epi16, IntegerRegister, S32, S32)
+AF_DEFINE_OPERATION(multiply_fraction, mulhrs_epi16, IntegerRegister, Shorts32, Shorts32)
 /// Within each group of 8 lanes: a[0] b[0] a[1] b[1] a[2] b[2] a[3] b[3].
-AF_DEFINE_OPERATION(interleave_low, unpacklo_epi16, IntegerRegister, S32, S32)
+AF_DEFINE_OPERATION(interleave_low, unpacklo_epi16, IntegerRegister, Shorts32, Shorts32)
 /// Within each group of 8 lanes: a[4] b[4] a[5] b[5] a[6] b[6] a[7] b[7].
-AF_DEFINE_OPERATION(interleave_high, unpackhi_epi16, IntegerRegister, S32, S32)
+AF_DEFINE_OPERATION(interleave_high, unpackhi_epi16, IntegerRegister, Shorts32, Shorts32)
 /// The same for pairs and for fours of 16-bit lanes.
-AF_DEFINE_OPERATION(interleave_pairs_low, unpacklo_epi32, IntegerRegister, S32, S32)
-AF_DEFINE_OPERATION(interleave_pairs_high, unpackhi_epi32, IntegerRegister, S32, S32)
-AF_DEFINE_OPERATION(interleave_fours_low, unpacklo_epi64, IntegerRegister, S32, S32)
-AF_DEFINE_OPERATION(interleave_fours_high, unpackhi_epi64, IntegerRegister, S32, S32)
+AF_DEFINE_OPERATION(interleave_pairs_low, unpacklo_epi32, IntegerRegister, Shorts32, Shorts32)
+AF_DEFINE_OPERATION(interleave_pairs_high, unpackhi_epi32, IntegerRegister, Shorts32, Shorts32)
+AF_DEFINE_OPERATION(interleave_fours_low, unpacklo_epi64, IntegerRegister, Shorts32, Shorts32)
+AF_DEFINE_OPERATION(interleave_fours_high, unpackhi_epi64, IntegerRegister, Shorts32, Shorts32)
 /// Saturated to 0 ... 65535 (as bits); within each group of 8 lanes: a's four, then b's four. The
 /// inverse of the two interleaves.
-AF_DEFINE_OPERATION(pack_unsigned, packus_epi32, IntegerRegister, S32, I16)
+AF_DEFINE_OPERATION(pack_unsigned, packus_epi32, IntegerRegister, Shorts32, Ints16)
 
 #undef AF_DEFINE_OPERATION
 
 /// True when any lane of a comparison's result is set.
-AF_KERNEL_INLINE bool any(I16 mask) {
+AF_KERNEL_INLINE bool any(Ints16 mask) {
 #if AF_VECTOR_BITS == 512
   __m512i bits;
   memcpy(&bits, &mask, sizeof(bits));
@@ -117,8 +117,8 @@ AF_KERNEL_INLINE bool any(I16 mask) {
 }
 
 /// base[offset] per lane.
-AF_KERNEL_INLINE F16 gather(const float* base, I16 offset) {
-  F16 values;
+AF_KERNEL_INLINE Floats16 gather(const float* base, Ints16 offset) {
+  Floats16 values;
 #if AF_VECTOR_BITS == 512
   __m512i index;
   memcpy(&index, &offset, sizeof(index));
@@ -138,8 +138,8 @@ AF_KERNEL_INLINE F16 gather(const float* base, I16 offset) {
 
 /// Two neighbouring 16-bit elements, base[offset] in the low and base[offset + 1] in the high half
 /// of each lane.
-AF_KERNEL_INLINE I16 gather_pairs(const uint16_t* base, I16 offset) {
-  I16 pairs;
+AF_KERNEL_INLINE Ints16 gather_pairs(const uint16_t* base, Ints16 offset) {
+  Ints16 pairs;
 #if AF_VECTOR_BITS == 512
   __m512i index;
   memcpy(&index, &offset, sizeof(index));
@@ -163,7 +163,7 @@ AF_KERNEL_INLINE I16 gather_pairs(const uint16_t* base, I16 offset) {
 }
 
 /// Stores the four groups of 8 lanes at to, to + stride, to + 2 stride and to + 3 stride.
-AF_KERNEL_INLINE void store_groups(int16_t* to, int stride, S32 value) {
+AF_KERNEL_INLINE void store_groups(int16_t* to, int stride, Shorts32 value) {
   using Group = int16_t __attribute__((vector_size(16)));
   const Group groups[4] = {__builtin_shufflevector(value, value, 0, 1, 2, 3, 4, 5, 6, 7),
                            __builtin_shufflevector(value, value, 8, 9, 10, 11, 12, 13, 14, 15),
@@ -172,7 +172,7 @@ AF_KERNEL_INLINE void store_groups(int16_t* to, int stride, S32 value) {
   for (int i = 0; i < 4; ++i) memcpy(to + i * stride, &groups[i], sizeof(groups[i]));
 }
 
-AF_KERNEL_INLINE F16 square_root(F16 value) {
+AF_KERNEL_INLINE Floats16 square_root(Floats16 value) {
   FloatRegister parts[kRegisters];
   memcpy(parts, &value, sizeof(parts));
   for (int i = 0; i < kRegisters; ++i) parts[i] = AF_INTRINSIC(sqrt_ps)(parts[i]);

@@ -236,11 +236,11 @@ FieldLevelSlab halved_slab(const FieldLevelSlab& from,
   return slab;
 }
 
-FieldLevelSlab merged_slab(const LightSlab& coverage,
+FieldLevelSlab merged_slab(const LightSlab& field_geometry,
                            std::span<const FieldLevelSlab> from,
                            const FieldLevel& level,
                            const FieldLevelMemory& memory) {
-  const SlabMerging merging(coverage, from);
+  const SlabMerging merging(field_geometry, from);
   FieldLevelSlab slab{merging.geometry(), {}};
   slab.samples = padded_samples(level, slab, memory, [&](auto samples, int part, int parts) {
     const Share share = share_of(static_cast<int>(level.viewpoint_count()), part, parts);
@@ -293,7 +293,7 @@ int halvings_to_usual_nodes(const LightSlab& light_slab) {
 }
 
 double FieldLevel::blur_sigma_mm(bool with_resampling) const {
-  return level_blur_sigma_in_nodes(level, with_resampling) * node_spacing_mm(coverage);
+  return level_blur_sigma_in_nodes(level, with_resampling) * node_spacing_mm(field_geometry);
 }
 
 FieldLevelMemory process_memory(int threads) {
@@ -323,7 +323,7 @@ FieldLevel decode_halved_field(const CompressedAttenuationField& field,
 }
 
 FieldLevel next_field_level(const FieldLevel& level, const FieldLevelMemory& memory) {
-  FieldLevel result{level.level + 1, level.coverage, level.quantizer_step, {}};
+  FieldLevel result{level.level + 1, level.field_geometry, level.quantizer_step, {}};
   const std::span slabs(level.slabs);
   // Level 1 keeps the slabs: with half the nodes they bear half the parallax, in nodes, and so do
   // the merged slabs of all further levels.
@@ -333,9 +333,10 @@ FieldLevel next_field_level(const FieldLevel& level, const FieldLevelMemory& mem
     return result;
   }
   for (std::size_t k = 0; k < slabs.size(); k += 2)
-    result.slabs.push_back(k + 1 < slabs.size()
-                               ? merged_slab(level.coverage, slabs.subspan(k, 2), result, memory)
-                               : halved_slab(slabs[k], result, memory));
+    result.slabs.push_back(
+        k + 1 < slabs.size()
+            ? merged_slab(level.field_geometry, slabs.subspan(k, 2), result, memory)
+            : halved_slab(slabs[k], result, memory));
   return result;
 }
 

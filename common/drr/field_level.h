@@ -58,12 +58,14 @@ double level_blur_sigma_in_nodes(int level, bool with_resampling = false);
 /// (SlabMerging); an odd one out is halved.
 struct FieldLevel {
   int level = 0;
-  LightSlab coverage;  ///< the field's geometry: it decides which rays are outside, at every level
+  LightSlab
+      field_geometry;  ///< the field's geometry: it decides which rays are outside, at every level
   float quantizer_step = 0.0f;
-  std::vector<FieldLevelSlab> slabs;  ///< ascending in depth, as coverage.slabs
+  std::vector<FieldLevelSlab> slabs;  ///< ascending in depth, as field_geometry.slabs
 
   [[nodiscard]] std::size_t viewpoint_count() const {
-    return static_cast<std::size_t>(coverage.u.nodes) * static_cast<std::size_t>(coverage.v.nodes);
+    return static_cast<std::size_t>(field_geometry.u.nodes) *
+           static_cast<std::size_t>(field_geometry.v.nodes);
   }
 
   /// level_blur_sigma_in_nodes() in mm at the plane through the field's centre (y = 0 of the slab

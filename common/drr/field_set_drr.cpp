@@ -48,7 +48,7 @@ std::vector<double> FieldSetDrr::weights(const RigidTransform& room_from_ct,
                                          const View& view) const {
   std::vector<std::optional<double>> held;
   for (const FieldSetMember& member : members_)
-    held.push_back(how_well_held(SlabRays(*member.coverage, room_from_ct, view)));
+    held.push_back(how_well_held(SlabRays(*member.field_geometry, room_from_ct, view)));
   // None is below any number.
   const std::optional<double> best = *std::max_element(held.begin(), held.end());
   std::vector<double> weights(members_.size(), 0.0);
@@ -84,7 +84,7 @@ RenderStatus FieldSetDrr::render(const RigidTransform& room_from_ct,
     std::size_t best = 0;
     for (std::size_t i = 0; i < members_.size(); ++i) {
       const std::int64_t outside =
-          SlabRays(*members_[i].coverage, room_from_ct, view).count_outside();
+          SlabRays(*members_[i].field_geometry, room_from_ct, view).count_outside();
       if (outside >= fewest) continue;
       fewest = outside;
       best = i;
@@ -121,7 +121,7 @@ RenderStatus FieldSetDrr::render(const RigidTransform& room_from_ct,
 std::int64_t FieldSetDrr::rays_outside(const RigidTransform& room_from_ct, const View& view) const {
   std::int64_t fewest = std::numeric_limits<std::int64_t>::max();
   for (const FieldSetMember& member : members_) {
-    fewest = std::min(fewest, SlabRays(*member.coverage, room_from_ct, view).count_outside());
+    fewest = std::min(fewest, SlabRays(*member.field_geometry, room_from_ct, view).count_outside());
     if (fewest == 0) break;
   }
   return fewest;

@@ -11,7 +11,7 @@ namespace af {
 
 /// One field of a set, and what renders it (or one level of it).
 struct FieldSetMember {
-  std::shared_ptr<const LightSlab> coverage;
+  std::shared_ptr<const LightSlab> field_geometry;
   std::shared_ptr<const DrrRenderer> renderer;
 };
 

@@ -52,11 +52,11 @@ class NodeMap {
 };
 
 /// Distance of the slab's plane from the viewpoints over that of the merged plane.
-double reach_ratio(const LightSlab& coverage,
+double reach_ratio(const LightSlab& field_geometry,
                    const SlabGeometry& slab,
                    const SlabGeometry& merged) {
-  return (coverage.uv_plane_y_mm - slab.st_plane_y_mm) /
-         (coverage.uv_plane_y_mm - merged.st_plane_y_mm);
+  return (field_geometry.uv_plane_y_mm - slab.st_plane_y_mm) /
+         (field_geometry.uv_plane_y_mm - merged.st_plane_y_mm);
 }
 
 double total_level(const FieldLevelSlab& slab) {
@@ -197,8 +197,8 @@ std::uint16_t rounded_sample(float sum) {
 
 }  // namespace
 
-SlabMerging::SlabMerging(const LightSlab& coverage, std::span<const FieldLevelSlab> slabs)
-    : v_nodes_(coverage.v.nodes) {
+SlabMerging::SlabMerging(const LightSlab& field_geometry, std::span<const FieldLevelSlab> slabs)
+    : v_nodes_(field_geometry.v.nodes) {
   check(!slabs.empty(), "slabs to merge");
   std::vector<double> weights;
   for (const FieldLevelSlab& slab : slabs) weights.push_back(total_level(slab) + 1.0);
@@ -216,18 +216,18 @@ SlabMerging::SlabMerging(const LightSlab& coverage, std::span<const FieldLevelSl
   std::vector<NodeMap> s_maps, t_maps;
   SeenNodes seen_s(merged_.s.nodes), seen_t(merged_.t.nodes);
   for (const FieldLevelSlab& slab : slabs) {
-    const double ratio = reach_ratio(coverage, slab.geometry, merged_);
+    const double ratio = reach_ratio(field_geometry, slab.geometry, merged_);
     s_maps.emplace_back(merged_.s, slab.geometry.s, ratio);
     t_maps.emplace_back(merged_.t, slab.geometry.t, ratio);
-    seen_s.add(s_maps.back(), coverage.u, slab.geometry.stored_s, merged_.s.nodes);
-    seen_t.add(t_maps.back(), coverage.v, slab.geometry.stored_t, merged_.t.nodes);
+    seen_s.add(s_maps.back(), field_geometry.u, slab.geometry.stored_s, merged_.s.nodes);
+    seen_t.add(t_maps.back(), field_geometry.v, slab.geometry.stored_t, merged_.t.nodes);
   }
   merged_.stored_s = seen_s.range();
   merged_.stored_t = seen_t.range();
   for (std::size_t k = 0; k < slabs.size(); ++k)
     sources_.push_back({&slabs[k],
-                        taps_of(s_maps[k], coverage.u, merged_.stored_s),
-                        taps_of(t_maps[k], coverage.v, merged_.stored_t)});
+                        taps_of(s_maps[k], field_geometry.u, merged_.stored_s),
+                        taps_of(t_maps[k], field_geometry.v, merged_.stored_t)});
 }
 
 void SlabMerging::merge(int begin, int end, std::span<std::uint16_t> samples) const {

@@ -29,7 +29,7 @@ struct MergingTaps {
 class SlabMerging {
  public:
   /// `slabs`: neighbours in depth, of the same level; must outlive this.
-  SlabMerging(const LightSlab& coverage, std::span<const FieldLevelSlab> slabs);
+  SlabMerging(const LightSlab& field_geometry, std::span<const FieldLevelSlab> slabs);
 
   [[nodiscard]] const SlabGeometry& geometry() const { return merged_; }
   /// Fills the viewpoints begin ... end - 1 of the merged slab's samples.

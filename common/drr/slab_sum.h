@@ -49,7 +49,7 @@ class SlabSum {
           SlabSumScratch& scratch)
       : grid_(grid), source_(source), images_(images), scratch_(scratch) {}
 
-  /// Beyond the slab's image its edge goes on linearly for a node.
+  /// Extrapolates linearly by one node beyond the slab's image.
   void add(const NodeImages& slab);
   [[nodiscard]] NodeImages images() const { return {grid_, {images_[0], images_[1], images_[2]}}; }
 

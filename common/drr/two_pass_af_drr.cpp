@@ -274,7 +274,7 @@ RenderStatus TwoPassAfDrr::render(const RigidTransform& room_from_ct,
   check(!gradients || gradients->planes.size() == 6 * pixels,
         "six gradient planes of the view's size");
   auto& scratch = dynamic_cast<Workspace&>(workspace);
-  const SlabRays rays(blender_->coverage(), room_from_ct, view);
+  const SlabRays rays(blender_->field_geometry(), room_from_ct, view);
   const auto blank_outside = [&] {
     return rays.blank_outside(total_attenuation,
                               gradients ? gradients->planes : std::span<float>{});
@@ -316,7 +316,7 @@ RenderStatus TwoPassAfDrr::render(const RigidTransform& room_from_ct,
 
 std::int64_t TwoPassAfDrr::rays_outside(const RigidTransform& room_from_ct,
                                         const View& view) const {
-  return SlabRays(blender_->coverage(), room_from_ct, view).count_outside();
+  return SlabRays(blender_->field_geometry(), room_from_ct, view).count_outside();
 }
 
 RenderStatus TwoPassAfDrr::render_gradient_images(const RigidTransform& room_from_ct,
@@ -327,7 +327,7 @@ RenderStatus TwoPassAfDrr::render_gradient_images(const RigidTransform& room_fro
   check(column_gradient.size() == view.pixel_count() && row_gradient.size() == view.pixel_count(),
         "one value per pixel of the view");
   auto& scratch = dynamic_cast<Workspace&>(workspace);
-  const SlabRays rays(blender_->coverage(), room_from_ct, view);
+  const SlabRays rays(blender_->field_geometry(), room_from_ct, view);
   if (!rays.all_descend()) return {rays.blank_outside(column_gradient, row_gradient)};
   const auto warp_slopes = select_kernel<WarpSlopes>(
       kernels_128::warp_slopes, kernels_256::warp_slopes, kernels_512::warp_slopes);

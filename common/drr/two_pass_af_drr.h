@@ -31,7 +31,7 @@ class TwoPassAfDrr final : public DrrRenderer {
   explicit TwoPassAfDrr(std::shared_ptr<const CompressedAttenuationField> field,
                         const TwoPassOptions& options = {},
                         std::shared_ptr<ThreadPool> pool = nullptr);
-  /// A level of an image pyramid; it inherits the field's coverage.
+  /// A level of an image pyramid; it holds the rays that the field holds.
   explicit TwoPassAfDrr(std::shared_ptr<const FieldLevel> level,
                         const TwoPassOptions& options = {},
                         std::shared_ptr<ThreadPool> pool = nullptr);

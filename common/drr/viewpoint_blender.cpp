@@ -127,11 +127,11 @@ class AnyBlender : public ViewpointBlender {
     const SlabGeometry& slab = this->slab(k);
     const NodeRectangle stored = stored_nodes(slab, footprint);
     if (stored.s.count > 0 && stored.t.count > 0) {
-      const double ratio =
-          (coverage().uv_plane_y_mm - rays.source.y()) / (slab.st_plane_y_mm - rays.source.y());
-      ViewpointLine(slab.s, rays.source.x(), ratio, coverage().u, interpolation())
+      const double ratio = (field_geometry().uv_plane_y_mm - rays.source.y()) /
+                           (slab.st_plane_y_mm - rays.source.y());
+      ViewpointLine(slab.s, rays.source.x(), ratio, field_geometry().u, interpolation())
           .make_taps(stored.s, scratch.u_taps);
-      ViewpointLine(slab.t, rays.source.z(), ratio, coverage().v, interpolation())
+      ViewpointLine(slab.t, rays.source.z(), ratio, field_geometry().v, interpolation())
           .make_taps(stored.t, scratch.v_taps);
       blend_stored(k, footprint, stored, scratch, images);
     }
@@ -151,7 +151,7 @@ class AnyBlender : public ViewpointBlender {
                             const BlendedImages& images) const = 0;
 
   [[nodiscard]] AxisInterpolation interpolation() const {
-    const bool has_four = coverage().u.nodes >= 4 && coverage().v.nodes >= 4;
+    const bool has_four = field_geometry().u.nodes >= 4 && field_geometry().v.nodes >= 4;
     return has_four ? uv_ : AxisInterpolation::Linear;
   }
   [[nodiscard]] int tap_count() const {
@@ -200,7 +200,7 @@ class CompressedBlender final : public AnyBlender {
     }
   }
 
-  [[nodiscard]] const LightSlab& coverage() const override { return field_->light_slab; }
+  [[nodiscard]] const LightSlab& field_geometry() const override { return field_->light_slab; }
   [[nodiscard]] std::size_t slab_count() const override { return field_->slabs.size(); }
   [[nodiscard]] const SlabGeometry& slab(std::size_t k) const override {
     return field_->light_slab.slabs[k];
@@ -330,7 +330,7 @@ class LevelBlender final : public AnyBlender {
             "a field level's samples do not have its geometry's size");
   }
 
-  [[nodiscard]] const LightSlab& coverage() const override { return level_->coverage; }
+  [[nodiscard]] const LightSlab& field_geometry() const override { return level_->field_geometry; }
   [[nodiscard]] std::size_t slab_count() const override { return level_->slabs.size(); }
   [[nodiscard]] const SlabGeometry& slab(std::size_t k) const override {
     return level_->slabs[k].geometry;
@@ -408,7 +408,7 @@ class LevelBlender final : public AnyBlender {
     SampleBlock block{};
     block.t_stride = geometry.stored_s.count;
     block.v_stride = static_cast<std::int64_t>(slab.samples_per_viewpoint());
-    block.u_stride = block.v_stride * level_->coverage.v.nodes;
+    block.u_stride = block.v_stride * level_->field_geometry.v.nodes;
     block.samples = slab.samples.data() + scratch.u_taps[first_s].first * block.u_stride +
                     scratch.v_taps[first_t].first * block.v_stride +
                     (nodes.t.begin - geometry.stored_t.begin) * block.t_stride +

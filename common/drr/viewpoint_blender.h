@@ -42,8 +42,8 @@ class ViewpointBlender {
   virtual ~ViewpointBlender() = default;
 
   /// This geometry decides which rays are outside.
-  [[nodiscard]] virtual const LightSlab& coverage() const = 0;
-  /// Slabs to sum over; fewer than the coverage's where a level has merged them.
+  [[nodiscard]] virtual const LightSlab& field_geometry() const = 0;
+  /// Slabs to sum over; fewer than the field's where a level has merged them.
   [[nodiscard]] virtual std::size_t slab_count() const = 0;
   /// The (s,t) nodes of slab k.
   [[nodiscard]] virtual const SlabGeometry& slab(std::size_t k) const = 0;

@@ -50,8 +50,8 @@ std::uint32_t tile_sum(const Tile& tile);
 /// The order in which a codebook is kept.
 bool codeword_less(const Tile& a, const Tile& b);
 
-/// Why a codebook is not usable: size not in 1 ... 65536, codeword 0 not zero, order broken, a step
-/// that is none; empty when it is.
+/// Why a codebook is not usable: size not in 1 ... 65536, codeword 0 not zero, order broken, an
+/// invalid mean step; empty when it is.
 std::vector<std::string> problems(const Codebook& codebook);
 
 }  // namespace af

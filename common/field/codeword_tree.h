@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "field/block_coding_kernel.h"
 #include "field/codebook.h"
+#include "field/index_coding_kernel.h"
 
 namespace af {
 

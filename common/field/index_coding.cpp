@@ -8,7 +8,7 @@
 
 #include "base/error.h"
 #include "base/vector_width.h"
-#include "field/block_coding_kernel.h"
+#include "field/index_coding_kernel.h"
 
 namespace af {
 

@@ -8,7 +8,7 @@
 #include <string.h>
 
 #include "base/vec16.h"
-#include "field/block_coding_kernel.h"
+#include "field/index_coding_kernel.h"
 
 namespace af::AF_KERNEL_NAMESPACE {
 

@@ -70,7 +70,7 @@ inline constexpr Term kTerms[] = {
 inline constexpr int kTermCount = sizeof(kTerms) / sizeof(kTerms[0]);
 
 template <int kTurn>
-AF_KERNEL_INLINE F16 turned_by(F16 values) {
+AF_KERNEL_INLINE Floats16 turned_by(Floats16 values) {
   return __builtin_shufflevector(values,
                                  values,
                                  0 ^ kTurn,
@@ -92,22 +92,22 @@ AF_KERNEL_INLINE F16 turned_by(F16 values) {
 }
 
 template <int kTerm>
-AF_KERNEL_INLINE F16 add_terms_from(const PredictionInputs& inputs, F16 sum) {
+AF_KERNEL_INLINE Floats16 add_terms_from(const PredictionInputs& inputs, Floats16 sum) {
   if constexpr (kTerm == kTermCount) {
     return sum;
   } else {
     constexpr Term kThis = kTerms[kTerm];
     const float* from =
         kThis.turn == 0 ? inputs.plain[kThis.neighbour] : inputs.turned[kThis.neighbour];
-    F16 weights;
+    Floats16 weights;
     for (int i = 0; i < kLanes; ++i) weights[i] = static_cast<float>(kThis.weights[i]) / 64.0f;
     return add_terms_from<kTerm + 1>(inputs,
-                                     sum + weights * turned_by<kThis.turn>(load<F16>(from)));
+                                     sum + weights * turned_by<kThis.turn>(load<Floats16>(from)));
   }
 }
 
-AF_KERNEL_INLINE F16 predicted_tile(const PredictionInputs& inputs) {
-  return add_terms_from<0>(inputs, F16{});
+AF_KERNEL_INLINE Floats16 predicted_tile(const PredictionInputs& inputs) {
+  return add_terms_from<0>(inputs, Floats16{});
 }
 
 }  // namespace af::AF_KERNEL_NAMESPACE

@@ -144,7 +144,7 @@ std::shared_ptr<const CompressedAttenuationField> read_bone_field(
     const Communicator& communicator,
     FieldFileInfo* info = nullptr);
 
-/// Collective. Either.
+/// Collective. As read_field(), of either material.
 std::shared_ptr<const CompressedAttenuationField> read_field_of_any_material(
     const std::filesystem::path& path,
     const Communicator& communicator,

@@ -36,8 +36,7 @@ std::string required_attribute(hid_t file,
                                const char* name,
                                const std::vector<std::string>& known,
                                const std::filesystem::path& path) {
-  const std::string found =
-      H5Aexists(file, name) > 0 ? hdf5::read_text_attribute(file, name) : "none";
+  std::string found = H5Aexists(file, name) > 0 ? hdf5::read_text_attribute(file, name) : "none";
   for (const std::string& text : known)
     if (found == text) return found;
   std::string expected = known.front();
@@ -69,7 +68,7 @@ void check_plausible_size(const DatasetRule& rule,
                           const std::filesystem::path& path) {
   // Empty tiles have no means of their own.
   const std::uint64_t needed =
-      tile_count_of(rule) / rule.rows_per_tile * sizeof(std::uint16_t) / kMaxPackingRatio;
+      value_count_of(rule) / rule.rows_per_tile * sizeof(std::uint16_t) / kMaxPackingRatio;
   if (needed > file_bytes)
     throw FileError(path.string(),
                     rule.name,
@@ -96,6 +95,7 @@ std::vector<Dataset> read_datasets(hid_t file,
                                    const std::vector<DatasetRule>& rules,
                                    const std::string& path) {
   std::vector<Dataset> datasets;
+  datasets.reserve(rules.size());
   for (const DatasetRule& rule : rules) datasets.push_back(hdf5::read_dataset(file, rule, path));
   return datasets;
 }

@@ -28,7 +28,7 @@ using field_layout::naming_file;
 using field_layout::read_header_of;
 using field_layout::read_planes;
 using field_layout::shared_header;
-using field_layout::tile_count_of;
+using field_layout::value_count_of;
 using hdf5::Handle;
 
 /// Reads and verifies the indices of one slab into memory for all of them.
@@ -65,7 +65,7 @@ CompressedSlab read_slab(const std::filesystem::path& path,
                          const std::string& sha256,
                          const Codebook& codebook,
                          const Communicator& communicator) {
-  const std::size_t tiles = tile_count_of(rule);
+  const std::size_t tiles = value_count_of(rule);
   const auto memory = communicator.allocate_on_nodes_from_root(
       tiles * sizeof(std::uint16_t), [&](std::span<std::byte> bytes) {
         naming_file(path, [&] {

@@ -14,6 +14,7 @@
 #include "field_file/hdf5_calls.h"
 #include "field_file/index_dataset.h"
 #include "field_file/index_filter.h"
+#include "files/input_guard.h"
 #include "files/output_file.h"
 #include "files/sha256.h"
 #include "parallel/mpi_environment.h"
@@ -33,7 +34,7 @@ using field_layout::kSha256Digits;
 using field_layout::naming_file;
 using field_layout::payload_hash;
 using field_layout::read_planes;
-using field_layout::tile_count_of;
+using field_layout::value_count_of;
 using hdf5::checked;
 using hdf5::Handle;
 
@@ -334,7 +335,7 @@ std::string verify_and_seal(const FileContents& contents,
   std::vector<std::string> index_sha256;
   for (std::size_t k = 0; k < rules.size(); ++k) {
     const Handle dataset(H5Dopen2(file, rules[k].name.c_str(), H5P_DEFAULT), H5Dclose, "H5Dopen2");
-    const std::uint64_t plane_tiles = tile_count_of(rules[k]) / rules[k].extents[0];
+    const std::uint64_t plane_values = value_count_of(rules[k]) / rules[k].extents[0];
     std::vector<std::uint16_t> planes;
     Sha256 sha256;
     std::uint64_t sum = 0;
@@ -342,16 +343,16 @@ std::string verify_and_seal(const FileContents& contents,
         dataset,
         rules[k],
         [&](std::uint64_t, std::uint64_t count) {
-          planes.resize(count * plane_tiles);
+          planes.resize(count * plane_values);
           return std::span(planes);
         },
         [&](std::uint64_t u, std::span<const std::uint16_t> indices) {
           sha256.update(std::as_bytes(indices));
-          sum += hash_sum(u * plane_tiles, indices);
+          sum += hash_sum(u * plane_values, indices);
         });
     if (sum != written_sums[k])
       throw FileError(
-          path.string(), rules[k].name, "the indices written", "others on reading back");
+          path.string(), rules[k].name, "the indices written", "different indices on reading back");
     index_sha256.push_back(sha256.hex_digest());
     hdf5::replace_text_attribute(dataset, "sha256", index_sha256.back());
   }

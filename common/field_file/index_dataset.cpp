@@ -49,7 +49,7 @@ std::uint64_t planes_of_chunk(hid_t dataset) {
 
 }  // namespace
 
-std::uint64_t tile_count_of(const DatasetRule& rule) {
+std::uint64_t value_count_of(const DatasetRule& rule) {
   return std::accumulate(
       rule.extents.begin(), rule.extents.end(), std::uint64_t{1}, std::multiplies<>());
 }

@@ -37,7 +37,7 @@ auto naming_file(const std::filesystem::path& path, Function&& function) {
 }
 
 /// Values of a dataset of indices, the means among them.
-std::uint64_t tile_count_of(const DatasetRule& rule);
+std::uint64_t value_count_of(const DatasetRule& rule);
 
 /// A sum over the indices from `first_tile` on. Over all blocks of a slab, whoever holds them, it
 /// adds up to one that a lost, doubled, moved or changed index changes.

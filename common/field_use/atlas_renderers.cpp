@@ -77,14 +77,14 @@ std::shared_ptr<const MemberLevels> MembersInUse::get(std::size_t member) {
   }
   std::shared_ptr<const MemberLevels> levels = open_(member);
   kept_[member] = {levels, ++uses_, false};
-  let_go();
+  dropped();
   return levels;
 }
 
 void MembersInUse::keep(std::size_t member, std::shared_ptr<const MemberLevels> levels) {
   const std::scoped_lock lock(mutex_);
   kept_[member] = {std::move(levels), ++uses_, true};
-  let_go();
+  dropped();
 }
 
 std::size_t MembersInUse::count() const {
@@ -92,7 +92,7 @@ std::size_t MembersInUse::count() const {
   return kept_.size();
 }
 
-void MembersInUse::let_go() {
+void MembersInUse::dropped() {
   const auto later = [](const auto& a, const auto& b) {
     if (a.second.is_for_good != b.second.is_for_good) return b.second.is_for_good;
     return a.second.used < b.second.used;

@@ -42,7 +42,7 @@ class MembersInUse {
     bool is_for_good = false;
   };
 
-  void let_go();
+  void dropped();
 
   Open open_;
   std::size_t most_;

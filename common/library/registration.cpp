@@ -192,7 +192,7 @@ RegistrationCase RegistrationCase::load(const std::filesystem::path& study_path,
     impl->problem = loaded.problem;
     impl->runner = std::make_unique<registration::RegistrationRunner>(loaded.problem, method, pool);
     impl->examiner =
-        std::make_unique<registration::PoseExaminer>(loaded.problem, method.silhouette_mm());
+        std::make_unique<registration::PoseExaminer>(*loaded.problem, method.silhouette_mm());
     impl->estimator = std::make_unique<registration::UncertaintyEstimator>(
         loaded.problem, method, uncertainty_options(options), pool);
     return RegistrationCase(std::move(impl));

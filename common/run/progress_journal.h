@@ -25,8 +25,8 @@ struct UnfinishedWork {
   std::string name;              ///< of its files; several may share a folder
   DecidingValues decides;        ///< what every result depends on
   std::int64_t plan = 0;         ///< how it is cut up; later runs take over the first one's
-  bool gives_way = false;        ///< is thrown away, not refused, when it cannot be gone on with
-  bool restarts = false;         ///< what is there of it is thrown away
+  bool gives_way = false;        ///< discarded, not refused, when it cannot be continued
+  bool restarts = false;         ///< discard any earlier progress
 };
 
 /// What one process has written in one run.

@@ -5,6 +5,7 @@
 #include <array>
 
 #include "base/error.h"
+#include "parallel/values_of_ranks.h"
 
 namespace af {
 

@@ -2,11 +2,9 @@
 #pragma once
 
 #include <cstddef>
-#include <cstring>
 #include <filesystem>
 #include <optional>
 #include <span>
-#include <type_traits>
 #include <vector>
 
 #include "parallel/communicator.h"
@@ -52,18 +50,5 @@ class ProgressStore {
   std::optional<ProgressShard> shard_;
   std::int64_t plan_ = 0;
 };
-
-/// Collective. The values of all ranks on every rank, in rank order.
-template <typename T>
-std::vector<T> from_all(const std::vector<T>& mine, const Communicator& communicator) {
-  static_assert(std::is_trivially_copyable_v<T>);
-  std::vector<T> all;
-  for (const auto& bytes : communicator.all_gather(std::as_bytes(std::span(mine)))) {
-    const std::size_t before = all.size();
-    all.resize(before + bytes.size() / sizeof(T));
-    if (!bytes.empty()) std::memcpy(all.data() + before, bytes.data(), bytes.size());
-  }
-  return all;
-}
 
 }  // namespace af

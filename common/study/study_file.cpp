@@ -475,7 +475,7 @@ Study parse_study(const std::string& text,
   const auto rig = reader.get_string("rig", Presence::Required);
   if (!rig) problems.throw_if_any();  // without cameras nothing else can be judged
   study.rig_name_or_path = resolved_rig(*rig, folder);
-  study.rig = used_from(
+  study.rig = naming_study_line(
       {{"rig", reader.place("rig")}}, "rig", [&] { return read_rig_of(study.rig_name_or_path); });
   read_cases(reader, study, {folder, study.rig, problems});
   reader.refuse_unknown_keys();

@@ -88,7 +88,9 @@ Study parse_study(const std::string& text,
 /// Runs `use`, which reads the file that `key` names; what it throws then begins with the study's
 /// line. \test StudyFile.ErrorsOfItsFilesNameTheLine
 template <typename Use>
-std::invoke_result_t<Use> used_from(const StudyPlaces& places, const std::string& key, Use&& use) {
+std::invoke_result_t<Use> naming_study_line(const StudyPlaces& places,
+                                            const std::string& key,
+                                            Use&& use) {
   const auto place = places.find(key);
   if (place == places.end()) return use();
   try {

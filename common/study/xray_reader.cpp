@@ -242,7 +242,7 @@ void correct_by_flat(const StudyView& view,
   const XrayReading& reading = view.reading;
   Image2d dark;
   if (reading.dark) {
-    dark = used_from(view.places, "dark", [&] {
+    dark = naming_study_line(view.places, "dark", [&] {
       return load_companion(*reading.dark, view, camera, sum_of_xray);
     });
     note.add("dark image subtracted");
@@ -255,7 +255,7 @@ void correct_by_flat(const StudyView& view,
     for (std::size_t i = 0; i < dark.pixels.size(); ++i) image.pixels[i] -= dark.pixels[i];
     return;
   }
-  const Image2d flat = used_from(view.places, "flat", [&] {
+  const Image2d flat = naming_study_line(view.places, "flat", [&] {
     return load_companion(*reading.flat, view, camera, sum_of_xray);
   });
   std::size_t dead = 0;
@@ -475,14 +475,15 @@ ViewXray read_view_xray(const StudyView& view, const CameraGeometry& camera) {
   ViewXray xray;
   Note note;
   if (view.mask)
-    xray.mask = used_from(view.places, "mask", [&] { return read_mask_file(view, camera); });
+    xray.mask =
+        naming_study_line(view.places, "mask", [&] { return read_mask_file(view, camera); });
   Image2d& image = xray.attenuation;
   XrayBorders borders;
   std::optional<XrayUndistortion> undistortion;
   if (!camera.distortion.is_none()) undistortion.emplace(camera);
   Image2d undistorted;
   std::optional<double> inversion;
-  used_from(view.places, "xray", [&] {
+  naming_study_line(view.places, "xray", [&] {
     image = load_oriented(view, camera, inversion, note, xray.warnings);
     check_values(image, view);
     if (undistortion) undistorted = undistortion->image(image);
@@ -494,11 +495,11 @@ ViewXray read_view_xray(const StudyView& view, const CameraGeometry& camera) {
   if (view.xray_domain == XrayDomain::Intensity)
     correct_by_flat(view, camera, inversion, image, xray.mask, note);
   if (undistortion)
-    used_from(view.places, "xray", [&] {
+    naming_study_line(view.places, "xray", [&] {
       image = has_corrections(view) ? undistortion->image(image) : std::move(undistorted);
       undistort_mask(*undistortion, view, xray.mask, note);
     });
-  used_from(view.places, "xray", [&] {
+  naming_study_line(view.places, "xray", [&] {
     if (view.xray_domain == XrayDomain::Intensity)
       take_negative_log(image, air_level(image, borders, view, note));
     if (view.reading.masks_borders) use_borders(borders, view, xray.mask, note);

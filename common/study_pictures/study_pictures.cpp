@@ -191,7 +191,7 @@ StudyPictures draw_study_pictures(const Study& study,
                                   const CtReadOptions& ct_reading,
                                   const std::filesystem::path& folder) {
   StudyPictures pictures;
-  const CtVolume ct = used_from(study_case.places, "ct", [&] {
+  const CtVolume ct = naming_study_line(study_case.places, "ct", [&] {
     return read_ct(study_case.ct, ct_reading_in_force(ct_reading, study_case.ct_reading));
   });
   const RayCastDrr caster(std::make_shared<const AttenuationVolume>(ct, AttenuationModel()));

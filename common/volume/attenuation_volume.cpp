@@ -39,7 +39,7 @@ void AttenuationModel::describe(Fields& field) {
   field("air_below_hu",
         air_below_hu,
         "Lower HU attenuate nothing. Noise below the cut is lost and noise above it counts: a "
-        "higher cut lowers the bias of a noisy CT's air, and costs what it has of lung")
+        "higher cut lowers the bias of a noisy CT's air, but also removes lung tissue")
       .within(-1000, 0);
 }
 

@@ -16,7 +16,7 @@ struct AttenuationModel {
   double mu_water_per_mm = 0.0200;
   int air_below_hu = -900;
 
-  /// mu in units of mu_water / 1000: an exact integer in 0 or 1000 + air_below_hu ... 33767.
+  /// mu in units of mu_water / 1000: an exact integer: 0, or 1000 + air_below_hu to 33767.
   [[nodiscard]] std::uint16_t relative_attenuation(std::int16_t hu) const {
     return hu < air_below_hu || hu < -1000 ? std::uint16_t{0}
                                            : static_cast<std::uint16_t>(1000 + hu);

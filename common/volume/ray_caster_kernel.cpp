@@ -8,49 +8,53 @@ namespace af::AF_KERNEL_NAMESPACE {
 namespace {
 
 struct Row {
-  F16 low;
-  F16 high;
+  Floats16 low;
+  Floats16 high;
 };
 
-AF_KERNEL_INLINE Row unpack(I16 pairs) {
+AF_KERNEL_INLINE Row unpack(Ints16 pairs) {
   return {to_float(pairs & 0xFFFF),
-          to_float(reinterpret_cast<I16>(reinterpret_cast<U16>(pairs) >> 16))};
+          to_float(reinterpret_cast<Ints16>(reinterpret_cast<UnsignedInts16>(pairs) >> 16))};
 }
 
-AF_KERNEL_INLINE F16 mix(F16 a, F16 b, F16 weight) {
+AF_KERNEL_INLINE Floats16 mix(Floats16 a, Floats16 b, Floats16 weight) {
   return a + weight * (b - a);
 }
 
 /// The interpolant on a face of a cell, i fixed.
 struct Face {
-  F16 value;
-  F16 slope_y;
-  F16 slope_z;
+  Floats16 value;
+  Floats16 slope_y;
+  Floats16 slope_z;
 };
 
-AF_KERNEL_INLINE Face
-face_of(F16 at_00, F16 at_10, F16 at_01, F16 at_11, F16 weight_y, F16 weight_z) {
-  const F16 edge_0 = at_10 - at_00;
-  const F16 edge_1 = at_11 - at_01;
-  const F16 value_0 = at_00 + weight_y * edge_0;
-  const F16 slope_z = at_01 + weight_y * edge_1 - value_0;
+AF_KERNEL_INLINE Face face_of(Floats16 at_00,
+                              Floats16 at_10,
+                              Floats16 at_01,
+                              Floats16 at_11,
+                              Floats16 weight_y,
+                              Floats16 weight_z) {
+  const Floats16 edge_0 = at_10 - at_00;
+  const Floats16 edge_1 = at_11 - at_01;
+  const Floats16 value_0 = at_00 + weight_y * edge_0;
+  const Floats16 slope_z = at_01 + weight_y * edge_1 - value_0;
   return {value_0 + weight_z * slope_z, mix(edge_0, edge_1, weight_z), slope_z};
 }
 
 /// The interpolant at one point of each ray, its slopes per voxel.
 struct Sample {
-  F16 value;
-  F16 slope[3];
+  Floats16 value;
+  Floats16 slope[3];
 };
 
-AF_KERNEL_INLINE Sample sample(const VoxelView& volume, F16 x, F16 y, F16 z) {
-  const I16 i = to_int(x);
-  const I16 j = to_int(y);
-  const I16 k = to_int(z);
-  const F16 weight_x = x - to_float(i);
-  const F16 weight_y = y - to_float(j);
-  const F16 weight_z = z - to_float(k);
-  const I16 offset = i + j * volume.row_stride + k * volume.slice_stride;
+AF_KERNEL_INLINE Sample sample(const VoxelView& volume, Floats16 x, Floats16 y, Floats16 z) {
+  const Ints16 i = to_int(x);
+  const Ints16 j = to_int(y);
+  const Ints16 k = to_int(z);
+  const Floats16 weight_x = x - to_float(i);
+  const Floats16 weight_y = y - to_float(j);
+  const Floats16 weight_z = z - to_float(k);
+  const Ints16 offset = i + j * volume.row_stride + k * volume.slice_stride;
   const uint16_t* next_slice = volume.voxels + volume.slice_stride;
   const Row row_00 = unpack(gather_pairs(volume.voxels, offset));
   const Row row_10 = unpack(gather_pairs(volume.voxels + volume.row_stride, offset));
@@ -66,18 +70,22 @@ AF_KERNEL_INLINE Sample sample(const VoxelView& volume, F16 x, F16 y, F16 z) {
 
 /// A bundle in registers.
 struct Rays {
-  F16 start[3];
-  F16 step[3];
-  I16 samples;
+  Floats16 start[3];
+  Floats16 step[3];
+  Ints16 samples;
 };
 
 AF_KERNEL_INLINE Rays rays_of(const RayBundle& bundle) {
-  return {{load<F16>(bundle.start[0]), load<F16>(bundle.start[1]), load<F16>(bundle.start[2])},
-          {load<F16>(bundle.step[0]), load<F16>(bundle.step[1]), load<F16>(bundle.step[2])},
-          load<I16>(bundle.samples)};
+  return {{load<Floats16>(bundle.start[0]),
+           load<Floats16>(bundle.start[1]),
+           load<Floats16>(bundle.start[2])},
+          {load<Floats16>(bundle.step[0]),
+           load<Floats16>(bundle.step[1]),
+           load<Floats16>(bundle.step[2])},
+          load<Ints16>(bundle.samples)};
 }
 
-AF_KERNEL_INLINE Sample sample(const VoxelView& volume, const Rays& rays, F16 number) {
+AF_KERNEL_INLINE Sample sample(const VoxelView& volume, const Rays& rays, Floats16 number) {
   return sample(volume,
                 rays.start[0] + number * rays.step[0],
                 rays.start[1] + number * rays.step[1],
@@ -89,27 +97,27 @@ AF_KERNEL_INLINE Sample sample(const VoxelView& volume, const Rays& rays, F16 nu
 template <typename Add>
 AF_KERNEL_INLINE void for_each_sample(const VoxelView& volume, const Rays& rays, Add add) {
   for (int32_t k = 0;; ++k) {
-    const I16 is_inside = rays.samples > k;
+    const Ints16 is_inside = rays.samples > k;
     if (!any(is_inside)) break;
-    const F16 number = to_float(is_inside ? splat(k) : splat(0));
+    const Floats16 number = to_float(is_inside ? splat(k) : splat(0));
     add(sample(volume, rays, number), number, is_inside);
   }
 }
 
 /// SlopeSums::stretched_begin or, by a growth of 1 and numbers backwards from the last, the end.
 template <typename NumberOf>
-AF_KERNEL_INLINE F16
+AF_KERNEL_INLINE Floats16
 stretched(const VoxelView& volume, const Rays& rays, float growth, NumberOf number_of) {
-  const I16 count = minimum(rays.samples, splat(int32_t{SlopeSums::kStretched}));
-  const F16 share = splat(1.0f) / to_float(count);
-  F16 sum = splat(0.0f);
+  const Ints16 count = minimum(rays.samples, splat(int32_t{SlopeSums::kStretched}));
+  const Floats16 share = splat(1.0f) / to_float(count);
+  Floats16 sum = splat(0.0f);
   for (int32_t k = 0; k < SlopeSums::kStretched; ++k) {
-    const I16 is_inside = count > k;
+    const Ints16 is_inside = count > k;
     if (!any(is_inside)) break;
     const Sample at = sample(volume, rays, to_float(is_inside ? number_of(k) : splat(0)));
-    const F16 along =
+    const Floats16 along =
         at.slope[0] * rays.step[0] + at.slope[1] * rays.step[1] + at.slope[2] * rays.step[2];
-    const F16 moved = splat(1.0f) - (static_cast<float>(k) + 0.5f) * share;
+    const Floats16 moved = splat(1.0f) - (static_cast<float>(k) + 0.5f) * share;
     sum += is_inside ? moved * along + growth * share * at.value : splat(0.0f);
   }
   return sum;
@@ -118,19 +126,20 @@ stretched(const VoxelView& volume, const Rays& rays, float growth, NumberOf numb
 }  // namespace
 
 void sum_bundle(const VoxelView& volume, const RayBundle& bundle, float* sums) {
-  F16 sum = splat(0.0f);
-  for_each_sample(volume, rays_of(bundle), [&](const Sample& at, F16 /*number*/, I16 is_inside) {
-    sum += is_inside ? at.value : splat(0.0f);
-  });
+  Floats16 sum = splat(0.0f);
+  for_each_sample(
+      volume, rays_of(bundle), [&](const Sample& at, Floats16 /*number*/, Ints16 is_inside) {
+        sum += is_inside ? at.value : splat(0.0f);
+      });
   store(sums, sum);
 }
 
 void sum_bundle_with_slopes(const VoxelView& volume, const RayBundle& bundle, SlopeSums& sums) {
   const Rays rays = rays_of(bundle);
-  F16 value = splat(0.0f);
-  F16 slope[3] = {splat(0.0f), splat(0.0f), splat(0.0f)};
-  F16 numbered[3] = {splat(0.0f), splat(0.0f), splat(0.0f)};
-  for_each_sample(volume, rays, [&](const Sample& at, F16 number, I16 is_inside) {
+  Floats16 value = splat(0.0f);
+  Floats16 slope[3] = {splat(0.0f), splat(0.0f), splat(0.0f)};
+  Floats16 numbered[3] = {splat(0.0f), splat(0.0f), splat(0.0f)};
+  for_each_sample(volume, rays, [&](const Sample& at, Floats16 number, Ints16 is_inside) {
     value += is_inside ? at.value : splat(0.0f);
     for (int axis = 0; axis < 3; ++axis) {
       slope[axis] += is_inside ? at.slope[axis] : splat(0.0f);

@@ -64,7 +64,7 @@ void examine_ends(const std::shared_ptr<const registration::RegistrationProblem>
                   Method& method) {
   if (options.is_left_out) return;
   const registration::RegistrationOptions& registered = method.runner.options();
-  method.examiner = std::make_unique<PoseExaminer>(problem, registered.silhouette_mm());
+  method.examiner = std::make_unique<PoseExaminer>(*problem, registered.silhouette_mm());
   method.estimator = std::make_unique<UncertaintyEstimator>(problem, registered, options);
 }
 

@@ -14,9 +14,9 @@ class FieldCaster {
   virtual ~FieldCaster() = default;
 
   /// Quantised total attenuation of the unit's slab along the ray through each viewpoint and
-  /// (s,t) node, past the (s,t) plane through the whole CT. `samples` is [u][v][s][t], t fastest,
-  /// unit.sample_count() values. A sample depends on its node alone, never on the unit it is cast
-  /// in. Re-entrant.
+  /// (s,t) node. The ray does not stop at the (s,t) plane: all of the slab counts. `samples` is
+  /// [u][v][s][t], t fastest, unit.sample_count() values. A sample depends on its node alone, never
+  /// on the unit it is cast in. Re-entrant.
   virtual void cast(const WorkUnit& unit, std::span<std::uint16_t> samples) const = 0;
 };
 

@@ -7,48 +7,51 @@ namespace af::AF_KERNEL_NAMESPACE {
 
 namespace {
 
-AF_KERNEL_INLINE F16 mix(F16 a, F16 b, F16 weight) {
+AF_KERNEL_INLINE Floats16 mix(Floats16 a, Floats16 b, Floats16 weight) {
   return a + weight * (b - a);
 }
 
 /// The cell that holds a position along one axis of `size` voxels, and the weight of its upper end.
 /// Positions beyond the border are moved onto it, where voxels are 0 and so is every interpolant.
 struct Cell {
-  I16 index;
-  F16 weight;
+  Ints16 index;
+  Floats16 weight;
 };
 
-AF_KERNEL_INLINE Cell cell_of(F16 position, int32_t size) {
-  const F16 inside = minimum(maximum(position, splat(0.0f)), to_float(splat(size - 1)));
-  const I16 index = minimum(to_int(inside), splat(size - 2));
+AF_KERNEL_INLINE Cell cell_of(Floats16 position, int32_t size) {
+  const Floats16 inside = minimum(maximum(position, splat(0.0f)), to_float(splat(size - 1)));
+  const Ints16 index = minimum(to_int(inside), splat(size - 2));
   return {index, inside - to_float(index)};
 }
 
 struct Pair {
-  F16 low;
-  F16 high;
+  Floats16 low;
+  Floats16 high;
 };
 
-AF_KERNEL_INLINE Pair unpack(I16 pairs) {
+AF_KERNEL_INLINE Pair unpack(Ints16 pairs) {
   return {to_float(pairs & 0xFFFF),
-          to_float(reinterpret_cast<I16>(reinterpret_cast<U16>(pairs) >> 16))};
+          to_float(reinterpret_cast<Ints16>(reinterpret_cast<UnsignedInts16>(pairs) >> 16))};
 }
 
-AF_KERNEL_INLINE F16 sample(const VoxelsToResample& volume, F16 x, F16 y, F16 z) {
+AF_KERNEL_INLINE Floats16 sample(const VoxelsToResample& volume,
+                                 Floats16 x,
+                                 Floats16 y,
+                                 Floats16 z) {
   const Cell i = cell_of(x, volume.size[0]);
   const Cell j = cell_of(y, volume.size[1]);
   const Cell k = cell_of(z, volume.size[2]);
   const int32_t row_stride = volume.size[0];
   const int32_t slice_stride = volume.size[0] * volume.size[1];
-  const I16 offset = i.index + j.index * row_stride + k.index * slice_stride;
+  const Ints16 offset = i.index + j.index * row_stride + k.index * slice_stride;
   const uint16_t* next_slice = volume.voxels + slice_stride;
   const Pair row_00 = unpack(gather_pairs(volume.voxels, offset));
   const Pair row_10 = unpack(gather_pairs(volume.voxels + row_stride, offset));
   const Pair row_01 = unpack(gather_pairs(next_slice, offset));
   const Pair row_11 = unpack(gather_pairs(next_slice + row_stride, offset));
-  const F16 low =
+  const Floats16 low =
       mix(mix(row_00.low, row_10.low, j.weight), mix(row_01.low, row_11.low, j.weight), k.weight);
-  const F16 high = mix(
+  const Floats16 high = mix(
       mix(row_00.high, row_10.high, j.weight), mix(row_01.high, row_11.high, j.weight), k.weight);
   return mix(low, high, i.weight);
 }
@@ -68,23 +71,23 @@ template <bool kIsStored>
 AF_KERNEL_INLINE void interpolate_block(const ShearColumns& columns,
                                         int group,
                                         int32_t x,
-                                        S32 (&block)[8]) {
+                                        Shorts32 (&block)[8]) {
   for (int i = 0; i < 8; ++i) {
     const int j = group + i;
-    const S32 lower = load<S32>(block_of<kIsStored>(columns.values, columns.lower[j], x));
-    const S32 upper = load<S32>(block_of<kIsStored>(columns.values, columns.upper[j], x));
-    block[i] = lower + multiply_fraction(upper - lower, columns.weight[j] - S32{});
+    const Shorts32 lower = load<Shorts32>(block_of<kIsStored>(columns.values, columns.lower[j], x));
+    const Shorts32 upper = load<Shorts32>(block_of<kIsStored>(columns.values, columns.upper[j], x));
+    block[i] = lower + multiply_fraction(upper - lower, columns.weight[j] - Shorts32{});
   }
 }
 
 /// Transposes 8 x 8 lanes within each of the four groups: rows of x become rows of t.
-AF_KERNEL_INLINE void transpose_groups(S32 (&rows)[8]) {
-  S32 pairs[8];
+AF_KERNEL_INLINE void transpose_groups(Shorts32 (&rows)[8]) {
+  Shorts32 pairs[8];
   for (int i = 0; i < 4; ++i) {
     pairs[2 * i] = interleave_low(rows[2 * i], rows[2 * i + 1]);
     pairs[2 * i + 1] = interleave_high(rows[2 * i], rows[2 * i + 1]);
   }
-  S32 fours[8];
+  Shorts32 fours[8];
   for (int half = 0; half < 8; half += 4)
     for (int i = 0; i < 2; ++i) {
       fours[half + 2 * i] = interleave_pairs_low(pairs[half + i], pairs[half + i + 2]);
@@ -128,15 +131,15 @@ AF_KERNEL_INLINE void add_slices(const int16_t* columns,
 }  // namespace
 
 void resample_row(const VoxelsToResample& volume, const RowToResample& row, int16_t* out) {
-  F16 index = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+  Floats16 index = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
   index += static_cast<float>(row.first);
-  const F16 scale = splat(row.scale);
+  const Floats16 scale = splat(row.scale);
   for (int32_t i = 0; i < row.count; i += kLanes, index += static_cast<float>(kLanes)) {
-    const F16 value = sample(volume,
-                             row.start[0] + index * row.step[0],
-                             row.start[1] + index * row.step[1],
-                             row.start[2] + index * row.step[2]);
-    const I16 level = to_int(value * scale + 0.5f);
+    const Floats16 value = sample(volume,
+                                  row.start[0] + index * row.step[0],
+                                  row.start[1] + index * row.step[1],
+                                  row.start[2] + index * row.step[2]);
+    const Ints16 level = to_int(value * scale + 0.5f);
     for (int lane = 0; lane < kLanes; ++lane) out[i + lane] = static_cast<int16_t>(level[lane]);
   }
 }
@@ -150,7 +153,7 @@ void interpolate_columns(const ShearColumns& columns,
   for (int group = 0; group < kShearColumns; group += 8)
     for (int32_t row = 0; row < row_count; row += kShearColumns) {
       const int32_t x = first_x + row;
-      S32 block[8];
+      Shorts32 block[8];
       if (x >= columns.whole_begin && x < columns.whole_end)
         interpolate_block<true>(columns, group, x, block);
       else
@@ -166,17 +169,17 @@ void accumulate_nodes(const int16_t* rows,
                       int32_t first_node,
                       int32_t end_node,
                       int32_t* sums) {
-  const F16 start = load<F16>(block.start);
-  const F16 step = load<F16>(block.step);
-  const F16 low = load<F16>(block.low);
-  const F16 high = load<F16>(block.high);
-  const I16 origin = load<I16>(block.origin);
+  const Floats16 start = load<Floats16>(block.start);
+  const Floats16 step = load<Floats16>(block.step);
+  const Floats16 low = load<Floats16>(block.low);
+  const Floats16 high = load<Floats16>(block.high);
+  const Ints16 origin = load<Ints16>(block.origin);
   int32_t offsets[kShearSlices];
   int32_t weights[kShearSlices];
   for (int32_t node = first_node; node < end_node; ++node, sums += kShearColumns) {
-    const I16 x = to_int(minimum(maximum(start + step * static_cast<float>(node), low), high));
+    const Ints16 x = to_int(minimum(maximum(start + step * static_cast<float>(node), low), high));
     store(offsets, (x >> 8) * kShearColumns + origin);
-    const I16 weight = x & 255;
+    const Ints16 weight = x & 255;
     store(weights, (256 - weight) | (weight << 16));
     // Through memory on purpose: loads that broadcast are cheaper than taking registers apart.
     asm volatile("" : : : "memory");
@@ -196,12 +199,14 @@ void quantize_node(const int32_t* sums,
                    const ShearScale& scale,
                    float slope_squared_s,
                    uint16_t* samples) {
-  I16 levels[2];
+  Ints16 levels[2];
   for (int half = 0; half < 2; ++half) {
-    const F16 slope_squared = load<F16>(scale.slope_squared_t + half * kLanes) + slope_squared_s;
-    const F16 total_attenuation = to_float(load<I16>(sums + half * kLanes)) *
-                                  scale.attenuation_per_unit * square_root(slope_squared + 1.0f);
-    const F16 level = total_attenuation / scale.quantizer_step + 0.5f;
+    const Floats16 slope_squared =
+        load<Floats16>(scale.slope_squared_t + half * kLanes) + slope_squared_s;
+    const Floats16 total_attenuation = to_float(load<Ints16>(sums + half * kLanes)) *
+                                       scale.attenuation_per_unit *
+                                       square_root(slope_squared + 1.0f);
+    const Floats16 level = total_attenuation / scale.quantizer_step + 0.5f;
     levels[half] = to_int(minimum(level, splat(65535.0f)));
   }
   store(reinterpret_cast<int16_t*>(samples), pack_unsigned(levels[0], levels[1]));

@@ -43,7 +43,8 @@ struct ShearBlock {
 struct ShearScale {
   float attenuation_per_unit;  ///< of a ray perpendicular to the planes
   float quantizer_step;
-  float slope_squared_t[kShearColumns];  ///< ((t - v) / (f - Y0))^2, in the order of accumulators
+  float slope_squared_t[kShearColumns];  ///< ((t - v) / (uv_plane_y - st_plane_y))^2, as
+                                         ///< accumulators are ordered
 };
 
 /// A row of trilinear samples of the CT: sample i at start + i * step, in voxel indices.

@@ -41,7 +41,7 @@ Eigen::Vector3d resampled_spacing(const CtGrid& grid,
   if (is_resampled[0]) spacing_mm.x() *= relative_spacing;
   if (is_resampled[2]) spacing_mm.z() *= relative_spacing;
   // Voxels that are tilted about every axis leave less room between the frequencies that a slice
-  // must keep and those that it must suppress (SliceSampler).
+  // must keep and those that it must suppress (RowSampler in slab_aligned_volume.cpp).
   constexpr double kTiltedSpacing = 0.8;
   if (is_resampled[0] && is_resampled[1] && is_resampled[2]) spacing_mm.y() *= kTiltedSpacing;
   // From slice to slice a ray moves sideways by up to its slope times their distance; between
@@ -51,8 +51,8 @@ Eigen::Vector3d resampled_spacing(const CtGrid& grid,
   return spacing_mm;
 }
 
-/// What the filters' taps add up to in magnitude: of slices (SliceSampler), of nodes along x and z
-/// (SliceSharpener).
+/// What the filters' taps add up to in magnitude: of slices (RowSampler), of nodes along x and z
+/// (RowSharpener).
 double filter_gain(const SlabAlignedGrid& grid) {
   constexpr double kSliceGain = 36.0 / 32.0;
   constexpr double kNodeGain = 272.0 / 180.0;

@@ -11,7 +11,7 @@ namespace af::AF_KERNEL_NAMESPACE {
 namespace {
 
 /// Bits of the lanes whose comparison result is set.
-AF_KERNEL_INLINE uint32_t lane_bits(I16 mask) {
+AF_KERNEL_INLINE uint32_t lane_bits(Ints16 mask) {
 #if AF_VECTOR_BITS == 512
   __m512i lanes;
   memcpy(&lanes, &mask, sizeof(lanes));
@@ -55,12 +55,12 @@ AF_KERNEL_INLINE Vector exchanged(Vector values) {
 }
 
 template <int kStride>
-AF_KERNEL_INLINE F16 smaller_of_pairs(F16 lanes) {
-  const F16 other = exchanged<kStride>(lanes);
+AF_KERNEL_INLINE Floats16 smaller_of_pairs(Floats16 lanes) {
+  const Floats16 other = exchanged<kStride>(lanes);
   return lanes < other ? lanes : other;
 }
 
-AF_KERNEL_INLINE float smallest(F16 lanes) {
+AF_KERNEL_INLINE float smallest(Floats16 lanes) {
   return smaller_of_pairs<1>(
       smaller_of_pairs<2>(smaller_of_pairs<4>(smaller_of_pairs<8>(lanes))))[0];
 }
@@ -77,10 +77,10 @@ AF_KERNEL_INLINE uint64_t squared_error(const uint16_t* a, const uint16_t* b) {
 }
 
 template <int kStride>
-AF_KERNEL_INLINE I16 butterfly(I16 values) {
-  const I16 lanes = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
-  const I16 is_upper = lanes & splat(int32_t{kStride});
-  const I16 other = exchanged<kStride>(values);
+AF_KERNEL_INLINE Ints16 butterfly(Ints16 values) {
+  const Ints16 lanes = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+  const Ints16 is_upper = lanes & splat(int32_t{kStride});
+  const Ints16 other = exchanged<kStride>(values);
   return is_upper != 0 ? other - values : values + other;
 }
 
@@ -89,26 +89,26 @@ AF_KERNEL_INLINE void hadamard(const uint16_t* tile, float* coefficients) {
   using Levels = uint16_t __attribute__((vector_size(32)));
   Levels levels;
   memcpy(&levels, tile, sizeof(levels));
-  const I16 values =
-      butterfly<8>(butterfly<4>(butterfly<2>(butterfly<1>(__builtin_convertvector(levels, I16)))));
-  const I16 ordered = __builtin_shufflevector(values,
-                                              values,
-                                              kCoefficientOrder[0],
-                                              kCoefficientOrder[1],
-                                              kCoefficientOrder[2],
-                                              kCoefficientOrder[3],
-                                              kCoefficientOrder[4],
-                                              kCoefficientOrder[5],
-                                              kCoefficientOrder[6],
-                                              kCoefficientOrder[7],
-                                              kCoefficientOrder[8],
-                                              kCoefficientOrder[9],
-                                              kCoefficientOrder[10],
-                                              kCoefficientOrder[11],
-                                              kCoefficientOrder[12],
-                                              kCoefficientOrder[13],
-                                              kCoefficientOrder[14],
-                                              kCoefficientOrder[15]);
+  const Ints16 values = butterfly<8>(
+      butterfly<4>(butterfly<2>(butterfly<1>(__builtin_convertvector(levels, Ints16)))));
+  const Ints16 ordered = __builtin_shufflevector(values,
+                                                 values,
+                                                 kCoefficientOrder[0],
+                                                 kCoefficientOrder[1],
+                                                 kCoefficientOrder[2],
+                                                 kCoefficientOrder[3],
+                                                 kCoefficientOrder[4],
+                                                 kCoefficientOrder[5],
+                                                 kCoefficientOrder[6],
+                                                 kCoefficientOrder[7],
+                                                 kCoefficientOrder[8],
+                                                 kCoefficientOrder[9],
+                                                 kCoefficientOrder[10],
+                                                 kCoefficientOrder[11],
+                                                 kCoefficientOrder[12],
+                                                 kCoefficientOrder[13],
+                                                 kCoefficientOrder[14],
+                                                 kCoefficientOrder[15]);
   store(coefficients, to_float(ordered));
 }
 
@@ -144,15 +144,17 @@ AF_KERNEL_INLINE void offer(Best& best, uint64_t error, uint32_t candidate) {
   best = {error, candidate, limit_of(error)};
 }
 
-AF_KERNEL_INLINE F16 add_squared_difference(F16 sum, float coefficient, const float* lanes) {
-  const F16 difference = splat(coefficient) - load<F16>(lanes);
+AF_KERNEL_INLINE Floats16 add_squared_difference(Floats16 sum,
+                                                 float coefficient,
+                                                 const float* lanes) {
+  const Floats16 difference = splat(coefficient) - load<Floats16>(lanes);
   return sum + difference * difference;
 }
 
 /// Offers the codewords of a block whose sums are within the limit, the nearest first: exact sums
 /// need no other, the rest are decided by integers.
 AF_KERNEL_INLINE void offer_lanes(
-    const CodewordBlocks& blocks, uint32_t block, const uint16_t* tile, F16 sums, Best& best) {
+    const CodewordBlocks& blocks, uint32_t block, const uint16_t* tile, Floats16 sums, Best& best) {
   uint32_t near_bits = lane_bits(sums <= splat(best.limit));
   while (near_bits != 0) {
     const float nearest = smallest(sums);
@@ -178,7 +180,7 @@ AF_KERNEL_INLINE void search_block(const CodewordBlocks& blocks,
                                    const float* coefficients,
                                    Best& best) {
   const float* lanes = blocks.coefficients + static_cast<size_t>(block) * 256;
-  F16 sum = {};
+  Floats16 sum = {};
   for (int i = 0; i < 5; ++i) sum = add_squared_difference(sum, coefficients[i], lanes + 16 * i);
   if (lane_bits(sum <= splat(best.limit)) == 0) return;
   for (int i = 5; i < 16; ++i) sum = add_squared_difference(sum, coefficients[i], lanes + 16 * i);
@@ -214,12 +216,13 @@ AF_KERNEL_INLINE Best search_outwards(const CodewordBlocks& blocks,
 
 /// Squared distances of a tile's coefficients from those of a box's children, as far as their
 /// ranges tell.
-AF_KERNEL_INLINE F16 distances(const CodewordBox& box, const float* coefficients) {
-  F16 sum = {};
+AF_KERNEL_INLINE Floats16 distances(const CodewordBox& box, const float* coefficients) {
+  Floats16 sum = {};
   for (int i = 0; i < kBoxCoefficients; ++i) {
-    const F16 coefficient = splat(coefficients[i]);
-    const F16 gap = maximum(
-        maximum(load<F16>(box.low[i]) - coefficient, coefficient - load<F16>(box.high[i])), F16{});
+    const Floats16 coefficient = splat(coefficients[i]);
+    const Floats16 gap = maximum(maximum(load<Floats16>(box.low[i]) - coefficient,
+                                         coefficient - load<Floats16>(box.high[i])),
+                                 Floats16{});
     sum += gap * gap;
   }
   return sum;
@@ -233,9 +236,9 @@ constexpr float kVisited = 3e38f;
 AF_KERNEL_INLINE Best search_boxes(const CodewordBlocks& blocks, const uint16_t* tile, Best best) {
   float coefficients[16];
   hadamard(tile, coefficients);
-  const I16 lanes = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+  const Ints16 lanes = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
   uint32_t numbers[kMostBoxLevels] = {};
-  F16 to_children[kMostBoxLevels];
+  Floats16 to_children[kMostBoxLevels];
   to_children[0] = distances(blocks.boxes[0][0], coefficients);
   const int32_t last = blocks.box_levels - 1;
   int32_t left = blocks.most_blocks;

@@ -4,18 +4,15 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <cstring>
-#include <functional>
 #include <numeric>
-#include <queue>
 #include <utility>
 
-#include "base/crc32c.h"
 #include "base/error.h"
+#include "parallel/values_of_ranks.h"
 #include "parallel/work_queue.h"
 #include "parallel/work_watch.h"
 #include "precompute/codebook/mean_removal.h"
-#include "precompute/codebook/unit_encoding.h"
+#include "precompute/units/unit_tiles.h"
 
 namespace af {
 
@@ -56,7 +53,7 @@ class TileKeeper {
       bytes_left_ -= bytes;
       cast_.kept.push_back(std::move(tiles));
     } else {
-      cast_.let_go.push_back(tiles.unit_id);
+      cast_.dropped.push_back(tiles.unit_id);
     }
   }
 
@@ -161,8 +158,8 @@ OverflowChoice choose_overflow(const FieldBuild& build, const CastPhase& cast) {
   build.communicator.barrier();
   const auto start = Clock::now();
   std::uint64_t bytes = 0;
-  for (std::size_t i = 0; i < std::min(kUnitsRead, cast.let_go.size()); ++i)
-    if (const auto tiles = build.progress->read(build.units[cast.let_go[i]]))
+  for (std::size_t i = 0; i < std::min(kUnitsRead, cast.dropped.size()); ++i)
+    if (const auto tiles = build.progress->read(build.units[cast.dropped[i]]))
       bytes += tiles->memory_bytes();
   const auto seconds =
       from_all<double>({bytes > 0 ? seconds_since(start) : 0.0}, build.communicator);
@@ -187,12 +184,6 @@ TrainedCodebook train_field(const FieldBuild& build,
     remove_means(share, options.mean_step);
     return train_codebook(share, options, reduction, on_progress, checkpoints);
   });
-}
-
-std::uint64_t sum_over(const Communicator& communicator, std::uint64_t value) {
-  std::array<std::uint64_t, 1> total{value};
-  communicator.sum(total);
-  return total[0];
 }
 
 std::string name_of(const WorkUnit& unit, std::size_t units) {

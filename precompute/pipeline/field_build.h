@@ -46,7 +46,7 @@ struct CastPhase {
   explicit CastPhase(TrainingTilePicker tile_picker) : picker(std::move(tile_picker)) {}
 
   std::vector<UnitTiles> kept;                ///< this rank's units whose tiles fit into memory
-  std::vector<std::uint32_t> let_go;          ///< this rank's others
+  std::vector<std::uint32_t> dropped;         ///< this rank's units whose tiles did not fit
   TrainingTilePicker picker;                  ///< has seen all of this rank's units
   std::vector<std::uint64_t> tiles_per_unit;  ///< tiles that are not empty, of every unit
   std::uint64_t rays_cast = 0;                ///< over all ranks, without units of earlier runs
@@ -84,9 +84,6 @@ TrainedCodebook train_field(const FieldBuild& build,
                             const CodebookOptions& options,
                             const ProgressCallback& on_progress,
                             const TrainingCheckpoints& checkpoints = {});
-
-/// Collective. The sum of a value over the ranks.
-std::uint64_t sum_over(const Communicator& communicator, std::uint64_t value);
 
 /// "unit 3 of 32 (slab 0, viewpoints u 0 to 7, v 2 to 3)".
 std::string name_of(const WorkUnit& unit, std::size_t units);

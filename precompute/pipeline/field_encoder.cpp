@@ -11,6 +11,7 @@
 
 #include "base/crc32c.h"
 #include "base/error.h"
+#include "parallel/values_of_ranks.h"
 #include "parallel/work_watch.h"
 #include "precompute/codebook/mean_removal.h"
 

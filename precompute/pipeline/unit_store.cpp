@@ -3,6 +3,8 @@
 
 #include <utility>
 
+#include "parallel/values_of_ranks.h"
+
 namespace af {
 
 namespace {

@@ -139,7 +139,7 @@ bool is_not_found(const RegistrationRecord& record) {
 json views_json(const RegistrationRecord& record, const RegistrationProblem& problem) {
   const std::vector<ViewValue>& values = record.view_values;
   json views = json::array();
-  bool agree = record.diagnosis.sayings.empty();
+  bool agree = record.diagnosis.messages.empty();
   for (std::size_t i = 0; i < values.size(); ++i) {
     const bool is_judged = std::isfinite(values[i].coarse) && std::isfinite(values[i].fine);
     const bool agrees = !disagrees(i, values);
@@ -150,7 +150,7 @@ json views_json(const RegistrationRecord& record, const RegistrationProblem& pro
                      {"agrees", is_judged ? json(agrees) : json()}});
   }
   return {{"verdict", agree ? "nothing found" : "suspicious"},
-          {"findings", record.diagnosis.sayings},
+          {"findings", record.diagnosis.messages},
           {"cameras", views}};
 }
 

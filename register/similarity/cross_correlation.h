@@ -11,12 +11,11 @@ namespace af::registration {
 
 /// Normalised cross correlation of X-ray and DRR (Penney et al., IEEE TMI 17(4), 1998, eq. (4)):
 ///
-///     NCC = sum (x - mean x)(d - mean d) / sqrt(sum (x - mean x)^2 sum (d - mean d)^2)   in [-1,
-///     1]
+///     NCC = sum (x - mean x)(d - mean d) / sqrt(sum (x - mean x)^2 sum (d - mean d)^2)
 ///
-/// over the used pixels; 0 when the DRR is constant there. With x^ and d^ the centred images of
-/// norm 1, NCC = 1 - |x^ - d^|^2 / 2: a sum of squares, whose normal equations gain and offset do
-/// not enter. \test CrossCorrelation.IsOneForAnyRisingLinearMap
+/// over the used pixels, from -1 to 1; 0 when the DRR is constant there. With x^ and d^ the centred
+/// images of norm 1, NCC = 1 - |x^ - d^|^2 / 2: a sum of squares, whose normal equations gain and
+/// offset do not enter. \test CrossCorrelation.IsOneForAnyRisingLinearMap
 class CrossCorrelation final : public SimilarityMeasure {
  public:
   /// InputError when the reference has problems.

@@ -59,10 +59,10 @@ int PoseExaminer::coarsest_level() {
   return RegistrationOptions().judge.stage.level;
 }
 
-PoseExaminer::PoseExaminer(std::shared_ptr<const RegistrationProblem> problem, double silhouette_mm)
+PoseExaminer::PoseExaminer(const RegistrationProblem& problem, double silhouette_mm)
     : in_silhouette_(silhouette_mm > 0.0) {
-  for (std::size_t i = 0; i < problem->views.size(); ++i)
-    views_.push_back(judge_of(*problem, i, silhouette_mm));
+  for (std::size_t i = 0; i < problem.views.size(); ++i)
+    views_.push_back(judge_of(problem, i, silhouette_mm));
 }
 
 std::vector<ViewValue> PoseExaminer::view_values(const RigidTransform& room_from_ct) {

@@ -21,7 +21,7 @@ class PoseExaminer {
   /// `problem`: as for a RegistrationRunner. `silhouette_mm`: the margin about the CT's silhouette
   /// within which poses are judged, by gradient correlation
   /// (RegistrationOptions::silhouette_mm()); 0: over twice the region.
-  PoseExaminer(std::shared_ptr<const RegistrationProblem> problem, double silhouette_mm);
+  PoseExaminer(const RegistrationProblem& problem, double silhouette_mm);
 
   /// One per view; NaN where the pose is outside a field, or the X-ray has no gradients to explain.
   [[nodiscard]] std::vector<ViewValue> view_values(const RigidTransform& room_from_ct);

@@ -111,7 +111,7 @@ Judgement judged_end(StopReason stop_reason, std::span<const ViewValue> values) 
   if (!std::isfinite(coarse.mean) || !std::isfinite(fine.mean))
     return {Verdict::Doubtful, doubt.value_or("no X-ray has gradients to judge the pose by")};
   if (!doubt.has_value()) doubt = unjudged_view(values);
-  const Judgement judgement = judged_values(coarse, fine, limits_of(values));
+  Judgement judgement = judged_values(coarse, fine, limits_of(values));
   if (!doubt.has_value()) return judgement;
   if (judgement.verdict == Verdict::Found) return {Verdict::Doubtful, *doubt};
   return {judgement.verdict, judgement.reason + "; " + *doubt};

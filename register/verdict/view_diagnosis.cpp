@@ -137,7 +137,7 @@ std::optional<std::vector<ViewValue>> values_with(const Change& change,
   std::optional<std::vector<ViewValue>> best;
   try {
     RegistrationRunner runner(changed, options);
-    PoseExaminer examiner(changed, 0.0);
+    PoseExaminer examiner(*changed, 0.0);
     for (const RigidTransform& start : starts) {
       std::vector<ViewValue> values = examiner.view_values(runner.run(start).room_from_ct);
       if (!best.has_value() || mean_of(values) > mean_of(*best)) best = std::move(values);
@@ -176,13 +176,13 @@ std::string shares_text(const RegistrationProblem& problem, const std::vector<Vi
   return text;
 }
 
-void append_same_xrays(const RegistrationProblem& problem, std::vector<std::string>& sayings) {
+void append_same_xrays(const RegistrationProblem& problem, std::vector<std::string>& messages) {
   for (std::size_t i = 0; i < problem.views.size(); ++i)
     for (std::size_t j = 0; j < i; ++j)
       if (problem.views[i].xray.pixels == problem.views[j].xray.pixels)
-        sayings.push_back("views '" + problem.views[j].view.camera.name + "' and '" +
-                          problem.views[i].view.camera.name +
-                          "' have the same X-ray, pixel for pixel");
+        messages.push_back("views '" + problem.views[j].view.camera.name + "' and '" +
+                           problem.views[i].view.camera.name +
+                           "' have the same X-ray, pixel for pixel");
 }
 
 }  // namespace
@@ -192,14 +192,14 @@ ViewDiagnosis diagnose_views(const std::shared_ptr<const RegistrationProblem>& p
                              const RigidTransform& room_from_ct,
                              const std::vector<ViewValue>& view_values) {
   ViewDiagnosis diagnosis;
-  append_same_xrays(*problem, diagnosis.sayings);
-  const bool has_copy = !diagnosis.sayings.empty();
+  append_same_xrays(*problem, diagnosis.messages);
+  const bool has_copy = !diagnosis.messages.empty();
   for (std::size_t i = 0; i < view_values.size(); ++i) {
     if (disagrees(i, view_values))
-      diagnosis.sayings.push_back("view '" + problem->views[i].view.camera.name +
-                                  "' does not agree with the others: shares of the X-rays' "
-                                  "gradients that the pose explains: " +
-                                  shares_text(*problem, view_values));
+      diagnosis.messages.push_back("view '" + problem->views[i].view.camera.name +
+                                   "' does not agree with the others: shares of the X-rays' "
+                                   "gradients that the pose explains: " +
+                                   shares_text(*problem, view_values));
   }
   const bool is_sound = lowest_of(view_values, &ViewValue::coarse) >= kLeastCoarseOfFound &&
                         lowest_of(view_values, &ViewValue::fine) >= kLeastFineOfFound;
@@ -210,18 +210,18 @@ ViewDiagnosis diagnose_views(const std::shared_ptr<const RegistrationProblem>& p
   if (in_silhouettes) return diagnosis;
   const auto remedy = remedy_of(*problem, {start_room_from_ct, room_from_ct}, view_values);
   if (remedy.has_value())
-    diagnosis.sayings.push_back(
+    diagnosis.messages.push_back(
         remedy->text + " would explain more: " + shares_text(*problem, remedy->view_values) +
         " instead of " + shares_text(*problem, view_values));
   return diagnosis;
 }
 
 Judgement judgement_with(const Judgement& judgement, const ViewDiagnosis& diagnosis) {
-  if (diagnosis.sayings.empty()) return judgement;
-  const std::string sayings = joined(diagnosis.sayings, "; ");
+  if (diagnosis.messages.empty()) return judgement;
+  const std::string messages = joined(diagnosis.messages, "; ");
   if (judgement.verdict == Verdict::NotFound)
-    return {Verdict::NotFound, judgement.reason + "; " + sayings};
-  return {Verdict::Doubtful, sayings};
+    return {Verdict::NotFound, judgement.reason + "; " + messages};
+  return {Verdict::Doubtful, messages};
 }
 
 }  // namespace af::registration

@@ -12,7 +12,7 @@ namespace af::registration {
 
 /// What looks wrong with the X-rays of a result.
 struct ViewDiagnosis {
-  std::vector<std::string> sayings;  ///< one for each thing found, for people; empty: nothing
+  std::vector<std::string> messages;  ///< one for each thing found, for people; empty: nothing
 };
 
 /// Looks at the values that PoseExaminer gave the views at `room_from_ct`. Where one of them is

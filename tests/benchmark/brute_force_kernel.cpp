@@ -13,7 +13,7 @@ namespace {
 constexpr int kTilesAtOnce = 4;
 constexpr int kElements = 16;
 
-AF_KERNEL_INLINE F16 add_square(F16 sum, F16 value) {
+AF_KERNEL_INLINE Floats16 add_square(Floats16 sum, Floats16 value) {
 #if AF_VECTOR_BITS == 512
   __m512 total;
   __m512 factor;
@@ -46,7 +46,7 @@ struct Nearest {
 AF_KERNEL_INLINE void offer_block(const benchmark::BruteForceCodebook& codebook,
                                   uint32_t block,
                                   const uint16_t* tile,
-                                  F16 sums,
+                                  Floats16 sums,
                                   Nearest& nearest) {
   for (int lane = 0; lane < kLanes; ++lane) {
     if (sums[lane] > nearest.limit) continue;
@@ -71,12 +71,12 @@ AF_KERNEL_INLINE void search_together(const benchmark::BruteForceCodebook& codeb
   }
   for (uint32_t block = 0; block < codebook.block_count; ++block) {
     const float* lanes = codebook.elements + static_cast<size_t>(block) * kElements * kLanes;
-    F16 sum_0 = {};
-    F16 sum_1 = {};
-    F16 sum_2 = {};
-    F16 sum_3 = {};
+    Floats16 sum_0 = {};
+    Floats16 sum_1 = {};
+    Floats16 sum_2 = {};
+    Floats16 sum_3 = {};
     for (int i = 0; i < kElements; ++i) {
-      const F16 codewords = load<F16>(lanes + i * kLanes);
+      const Floats16 codewords = load<Floats16>(lanes + i * kLanes);
       sum_0 = add_square(sum_0, codewords - elements[i][0]);
       sum_1 = add_square(sum_1, codewords - elements[i][1]);
       sum_2 = add_square(sum_2, codewords - elements[i][2]);

@@ -32,7 +32,7 @@ std::shared_ptr<const FieldLevel> cast_level(const BenchmarkCase& benchmark_case
   const SlabAlignedVolume resampled(*benchmark_case.volume(), light_slab.slab_from_ct);
   const ShearWarpFieldCaster caster(resampled, light_slab, benchmark_case.quantizer());
   auto level = std::make_shared<FieldLevel>();
-  level->coverage = light_slab;
+  level->field_geometry = light_slab;
   level->quantizer_step = benchmark_case.quantizer().step();
   level->slabs.push_back({light_slab.slabs[0], {}});
   const SlabGeometry& slab = light_slab.slabs[0];

@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "base/stored_bytes.h"
 #include "base/vector_width.h"
+#include "parallel/values_of_ranks.h"
 #include "precompute/casting/trilinear_caster.h"
 #include "precompute/casting/unit_costs.h"
 #include "precompute/codebook/mean_removal.h"

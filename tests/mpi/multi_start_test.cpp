@@ -35,7 +35,7 @@ TEST(RegisterStarts, GivesTheRecordsOfASerialRunOnAnyRankCount) {
   const test::SmallCase small = test::small_case();
   const std::vector<RigidTransform> starts = some_starts(small, 7);
   RegistrationRunner runner(small.problem, quick_options());
-  PoseExaminer examiner(small.problem, 0.0);
+  PoseExaminer examiner(*small.problem, 0.0);
   UncertaintyEstimator estimator(small.problem, runner.options(), {});
   const test::SharedFolder folder;
   const std::vector<RegistrationRecord> records = register_starts(
@@ -68,7 +68,7 @@ TEST(RegisterStarts, CopesWithFewerStartsThanRanks) {
   const Communicator world = Communicator::world();
   const test::SmallCase small = test::small_case();
   RegistrationRunner runner(small.problem, quick_options());
-  PoseExaminer examiner(small.problem, 0.0);
+  PoseExaminer examiner(*small.problem, 0.0);
   UncertaintyEstimator estimator(small.problem, runner.options(), {});
   const test::SharedFolder folder;
   const UnfinishedWork work = {folder / "p", "registrations", {}};
@@ -86,7 +86,7 @@ TEST(RegisterStarts, KeepsTheTraceOfTheFirstWhenNoStartHasASimilarity) {
   for (RegistrationView& view : small.problem->views)
     view.limit = MotionLimit{small.problem->frame(), {1e-6, 1e-6}};
   RegistrationRunner runner(small.problem, quick_options());
-  PoseExaminer examiner(small.problem, 0.0);
+  PoseExaminer examiner(*small.problem, 0.0);
   UncertaintyEstimator estimator(small.problem, runner.options(), {});
   const test::SharedFolder folder;
   const auto records = register_starts(runner,

@@ -146,7 +146,7 @@ ordered_json case_json(const StudyCase& study_case,
   json["ct"] = study_case.ct.string();
   if (const std::string reading = study_case.ct_reading.text(); !reading.empty())
     json["ct_reading"] = reading;
-  used_from(study_case.places, "ct", [&] { require_existing(study_case.ct); });
+  naming_study_line(study_case.places, "ct", [&] { require_existing(study_case.ct); });
   json["center_ct_mm"] = vector_json(study_case.center_ct_mm);
   json["target_box_ct_mm"] = {vector_json(study_case.target_box_ct.low_mm),
                               vector_json(study_case.target_box_ct.high_mm)};

@@ -37,7 +37,7 @@ int sample(const FieldLevel& level, const NodeIndex& node) {
   const NodeRange& s = slab.geometry.stored_s;
   const NodeRange& t = slab.geometry.stored_t;
   if (node.s < s.begin || node.s >= s.end() || node.t < t.begin || node.t >= t.end()) return 0;
-  const int viewpoint = node.u * level.coverage.v.nodes + node.v;
+  const int viewpoint = node.u * level.field_geometry.v.nodes + node.v;
   const int index = (viewpoint * t.count + node.t - t.begin) * s.count + node.s - s.begin;
   return slab.samples[static_cast<std::size_t>(index)];
 }
@@ -63,8 +63,8 @@ void expect_halved(const FieldLevel& fine, const FieldLevel& coarse) {
   const SlabGeometry& geometry = coarse.slabs[0].geometry;
   EXPECT_EQ(coarse.level, fine.level + 1);
   ASSERT_EQ(geometry.s.nodes, (fine.slabs[0].geometry.s.nodes + 1) / 2);
-  for (int u = 0; u < coarse.coverage.u.nodes; ++u)
-    for (int v = 0; v < coarse.coverage.v.nodes; ++v)
+  for (int u = 0; u < coarse.field_geometry.u.nodes; ++u)
+    for (int v = 0; v < coarse.field_geometry.v.nodes; ++v)
       for (int s = 0; s < geometry.s.nodes; ++s)
         for (int t = 0; t < geometry.t.nodes; ++t)
           ASSERT_EQ(sample(coarse, {u, v, s, t}), halved_sample(fine, {u, v, s, t}))
@@ -159,8 +159,8 @@ TEST(FieldLevel, BlurSigmaIsThatOfAnImpulse) {
   const FieldLevel level = *make_field_pyramid(*small_field(noise, 1, 3, 32), 2)[1];
   // Samples are rounded twice to integers of 65535.
   EXPECT_NEAR(std::sqrt(variance), level_blur_sigma_in_nodes(2), 1e-3);
-  const GridAxis& s = level.coverage.slabs[0].s;
-  const GridAxis& t = level.coverage.slabs[0].t;
+  const GridAxis& s = level.field_geometry.slabs[0].s;
+  const GridAxis& t = level.field_geometry.slabs[0].t;
   EXPECT_NEAR(level.blur_sigma_mm(),
               std::sqrt(variance) * 0.5 * (s.spacing_mm() + t.spacing_mm()),
               1e-3 * level.blur_sigma_mm());

@@ -40,25 +40,25 @@ FieldLevel cast_level(const AttenuationVolume& volume) {
   LightSlabSpec spec;
   spec.uv_nodes = 24;
   spec.st_nodes = 128;
-  level.coverage = make_light_slab(small_camera(), {}, range, volume.corner_points(), spec);
-  const SlabGeometry& slab = level.coverage.slabs[0];
+  level.field_geometry = make_light_slab(small_camera(), {}, range, volume.corner_points(), spec);
+  const SlabGeometry& slab = level.field_geometry.slabs[0];
   level.quantizer_step = static_cast<float>(volume.max_total_attenuation() / 65535.0);
-  const RigidTransform ct_from_slab = level.coverage.slab_from_ct.inverse();
+  const RigidTransform ct_from_slab = level.field_geometry.slab_from_ct.inverse();
   const RayCaster caster(volume, {});
   std::vector<float> image(FieldLevelSlab{slab, {}}.samples_per_viewpoint());
   std::vector<std::uint16_t> samples;
-  for (int u = 0; u < level.coverage.u.nodes; ++u)
-    for (int v = 0; v < level.coverage.v.nodes; ++v) {
+  for (int u = 0; u < level.field_geometry.u.nodes; ++u)
+    for (int v = 0; v < level.field_geometry.v.nodes; ++v) {
       const Eigen::Vector3d s_step = slab.s.spacing_mm() * Eigen::Vector3d::UnitX();
       const Eigen::Vector3d t_step = slab.t.spacing_mm() * Eigen::Vector3d::UnitZ();
-      caster.cast(
-          {ct_from_slab * level.coverage.viewpoint(u, v),
-           ct_from_slab * level.coverage.st_point(slab, slab.stored_s.begin, slab.stored_t.begin),
-           ct_from_slab.linear() * s_step,
-           ct_from_slab.linear() * t_step,
-           slab.stored_s.count,
-           slab.stored_t.count},
-          image);
+      caster.cast({ct_from_slab * level.field_geometry.viewpoint(u, v),
+                   ct_from_slab * level.field_geometry.st_point(
+                                      slab, slab.stored_s.begin, slab.stored_t.begin),
+                   ct_from_slab.linear() * s_step,
+                   ct_from_slab.linear() * t_step,
+                   slab.stored_s.count,
+                   slab.stored_t.count},
+                  image);
       for (const float value : image)
         samples.push_back(static_cast<std::uint16_t>(std::lround(value / level.quantizer_step)));
     }

@@ -49,25 +49,25 @@ std::shared_ptr<const FieldLevel> level_for(const CameraGeometry& camera,
   LightSlabSpec spec;
   spec.uv_nodes = 20;
   spec.st_nodes = 96;
-  level->coverage = make_light_slab(camera, {}, range, volume.corner_points(), spec);
-  const SlabGeometry& slab = level->coverage.slabs[0];
+  level->field_geometry = make_light_slab(camera, {}, range, volume.corner_points(), spec);
+  const SlabGeometry& slab = level->field_geometry.slabs[0];
   level->quantizer_step = static_cast<float>(volume.max_total_attenuation() / 65535.0);
-  const RigidTransform ct_from_slab = level->coverage.slab_from_ct.inverse();
+  const RigidTransform ct_from_slab = level->field_geometry.slab_from_ct.inverse();
   const RayCaster caster(volume, {});
   std::vector<float> image(FieldLevelSlab{slab, {}}.samples_per_viewpoint());
   std::vector<std::uint16_t> samples;
-  for (int u = 0; u < level->coverage.u.nodes; ++u)
-    for (int v = 0; v < level->coverage.v.nodes; ++v) {
+  for (int u = 0; u < level->field_geometry.u.nodes; ++u)
+    for (int v = 0; v < level->field_geometry.v.nodes; ++v) {
       const Eigen::Vector3d s_step = slab.s.spacing_mm() * Eigen::Vector3d::UnitX();
       const Eigen::Vector3d t_step = slab.t.spacing_mm() * Eigen::Vector3d::UnitZ();
-      caster.cast(
-          {ct_from_slab * level->coverage.viewpoint(u, v),
-           ct_from_slab * level->coverage.st_point(slab, slab.stored_s.begin, slab.stored_t.begin),
-           ct_from_slab.linear() * s_step,
-           ct_from_slab.linear() * t_step,
-           slab.stored_s.count,
-           slab.stored_t.count},
-          image);
+      caster.cast({ct_from_slab * level->field_geometry.viewpoint(u, v),
+                   ct_from_slab * level->field_geometry.st_point(
+                                      slab, slab.stored_s.begin, slab.stored_t.begin),
+                   ct_from_slab.linear() * s_step,
+                   ct_from_slab.linear() * t_step,
+                   slab.stored_s.count,
+                   slab.stored_t.count},
+                  image);
       for (const float value : image)
         samples.push_back(static_cast<std::uint16_t>(std::lround(value / level->quantizer_step)));
     }
@@ -85,7 +85,7 @@ TEST(RecalibratedCamera, IsLookedUpInTheOldFieldAsWellAsInItsOwn) {
   const MotionRange range{8.0 * kRadPerDeg, 20.0};
   const auto old_level = level_for(nominal, range, *volume);
   const auto own_level = level_for(camera, range, *volume);
-  const MotionRange box = covered_box(old_level->coverage, camera, {}, range);
+  const MotionRange box = covered_box(old_level->field_geometry, camera, {}, range);
   ASSERT_GT(box.max_rotation_rad(), 4.0 * kRadPerDeg);
   const TwoPassAfDrr old_field(old_level);
   const TwoPassAfDrr own_field(own_level);
@@ -117,7 +117,8 @@ TEST(RecalibratedCamera, IsLookedUpInTheOldFieldAsWellAsInItsOwn) {
   // interpolation go with the square of the spacing, whose ratio is that of the planes' sides. What
   // a pose gains beyond that is chance, where its rays fall between the nodes: two standard errors.
   const auto spacing = [](const FieldLevel& level) {
-    return level.coverage.slabs[0].s.spacing_mm() * level.coverage.slabs[0].t.spacing_mm();
+    return level.field_geometry.slabs[0].s.spacing_mm() *
+           level.field_geometry.slabs[0].t.spacing_mm();
   };
   const double by_spacing_db = 20.0 * std::log10(spacing(*old_level) / spacing(*own_level));
   const double chance_db = 2.0 * std::sqrt(variance / kRecalibratedPoses);
@@ -153,7 +154,7 @@ class FieldSetDrrTest : public testing::Test {
   static FieldSetDrr set() {
     std::vector<FieldSetMember> members;
     for (const auto& level : levels)
-      members.push_back({std::shared_ptr<const LightSlab>(level, &level->coverage),
+      members.push_back({std::shared_ptr<const LightSlab>(level, &level->field_geometry),
                          std::make_shared<const TwoPassAfDrr>(level)});
     return FieldSetDrr(std::move(members));
   }

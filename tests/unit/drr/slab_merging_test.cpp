@@ -21,7 +21,7 @@ struct MergedSlab {
   std::vector<std::uint16_t> samples;
 
   explicit MergedSlab(const FieldLevel& level) {
-    const SlabMerging merging(level.coverage, level.slabs);
+    const SlabMerging merging(level.field_geometry, level.slabs);
     geometry = merging.geometry();
     samples.resize(level.viewpoint_count() * static_cast<std::size_t>(geometry.stored_s.count) *
                    static_cast<std::size_t>(geometry.stored_t.count));
@@ -71,14 +71,14 @@ TEST(SlabMerging, SeesEachSlabWhereItIsFromEveryViewpoint) {
   const FieldLevel level = decode_field(
       *small_field([&](const RayNodes& n) { return std::round(bump(n.s, n.t)); }, 2, 4, kNodes));
   const MergedSlab merged(level);
-  const double uv_y = level.coverage.uv_plane_y_mm;
+  const double uv_y = level.field_geometry.uv_plane_y_mm;
   int compared = 0;
   for (int u = 0; u < 4; ++u)
     for (int v = 0; v < 4; ++v)
       for (int s = 0; s < merged.geometry.s.nodes; ++s)
         for (int t = 0; t < merged.geometry.t.nodes; ++t) {
-          const Eigen::Vector3d from = level.coverage.viewpoint(u, v);
-          const Eigen::Vector3d to = level.coverage.st_point(merged.geometry, s, t);
+          const Eigen::Vector3d from = level.field_geometry.viewpoint(u, v);
+          const Eigen::Vector3d to = level.field_geometry.st_point(merged.geometry, s, t);
           double expected = 0.0;
           bool is_inside = true;
           for (const FieldLevelSlab& slab : level.slabs) {

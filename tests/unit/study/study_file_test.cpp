@@ -413,14 +413,15 @@ TEST_F(StudyFile, ErrorsOfItsFilesNameTheLine) {
   const Study study = read(kGoodStudy);
   const StudyView& view = study.cases.front().views.front();
   const auto fails = [] { throw FileError("A.mha", "is gone"); };
-  EXPECT_EQ(message_of<FileError>([&] { used_from(view.places, "xray", fails); }),
+  EXPECT_EQ(message_of<FileError>([&] { naming_study_line(view.places, "xray", fails); }),
             path() + ":11: case[0].view[0].xray: A.mha: is gone");
   EXPECT_EQ(message_of<InputError>([&] {
-              used_from(study.cases.front().places, "ct", [] { throw InputError("no HU"); });
+              naming_study_line(
+                  study.cases.front().places, "ct", [] { throw InputError("no HU"); });
             }),
             path() + ":4: case[0].ct: no HU");
   // Of what the study does not name, and of other defects, nothing is said.
-  EXPECT_EQ(message_of<FileError>([&] { used_from(view.places, "mask", fails); }),
+  EXPECT_EQ(message_of<FileError>([&] { naming_study_line(view.places, "mask", fails); }),
             "A.mha: is gone");
   EXPECT_THAT(
       message_of<FileError>([&] { read(replaced(kGoodStudy, "treatment-room", "gone.toml")); }),

@@ -71,7 +71,7 @@ TEST(ResultFiles, WhatIsNotFoundHasNoPoseThatAScriptCouldTake) {
 TEST(ResultFiles, AFindingAboutTheXraysMakesAResultDoubtful) {
   const test::SmallCase small = test::small_case();
   RegistrationRecord record = judged_record(0, 1.5, 0.8);
-  record.diagnosis.sayings = {"views 'AP' and 'LAT' have the same X-ray, pixel for pixel"};
+  record.diagnosis.messages = {"views 'AP' and 'LAT' have the same X-ray, pixel for pixel"};
   const nlohmann::json json = result_json(record, *small.problem, some_run());
   EXPECT_EQ(json.at("verdict"), "doubtful");
   EXPECT_EQ(json.at("views").at("verdict"), "suspicious");

@@ -98,7 +98,7 @@ RigidTransform beside_gold(const test::SmallCase& small, double mm) {
 
 TEST(PoseExaminer, TellsARightPoseFromAWrongOneInEveryView) {
   const test::SmallCase small = case_with_levels();
-  PoseExaminer examiner(small.problem, 0.0);
+  PoseExaminer examiner(*small.problem, 0.0);
   const auto right = examiner.view_values(small.gold_room_from_ct);
   const auto wrong = examiner.view_values(beside_gold(small, 8.0));
   ASSERT_EQ(right.size(), 2U);
@@ -112,7 +112,7 @@ TEST(PoseExaminer, TellsARightPoseFromAWrongOneInEveryView) {
 TEST(PoseExaminer, DoesNotJudgeAnXrayWithoutGradients) {
   const test::SmallCase small = case_with_levels();
   for (float& value : small.problem->views[1].xray.pixels) value = 1.0f;
-  const auto values = PoseExaminer(small.problem, 0.0).view_values(small.gold_room_from_ct);
+  const auto values = PoseExaminer(*small.problem, 0.0).view_values(small.gold_room_from_ct);
   EXPECT_TRUE(std::isfinite(values[0].coarse));
   EXPECT_TRUE(std::isnan(values[1].coarse));
 }
@@ -122,10 +122,10 @@ std::string sayings_of(const std::function<void(RegistrationProblem&)>& harm) {
   const test::SmallCase small = case_with_levels();
   harm(*small.problem);
   std::string text;
-  const auto values = PoseExaminer(small.problem, 0.0).view_values(small.gold_room_from_ct);
+  const auto values = PoseExaminer(*small.problem, 0.0).view_values(small.gold_room_from_ct);
   const ViewDiagnosis diagnosis =
       diagnose_views(small.problem, beside_gold(small, 1.0), small.gold_room_from_ct, values);
-  for (const std::string& saying : diagnosis.sayings) text += saying + '\n';
+  for (const std::string& saying : diagnosis.messages) text += saying + '\n';
   return text;
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Coding of blocks of indices (see index_coding.h). Compiled once per vector width.
-#include "field/block_coding_kernel.h"
+#include "field/index_coding_kernel.h"
 
 #include "base/vec16.h"
 #include "field/range_coder.h"
@@ -22,7 +22,8 @@ constexpr uint32_t kLeastMean = 32;
 /// Where the models of a coefficient begin: those of its order, that is, how many axes it is a
 /// difference along: 0, 1, more.
 constexpr int32_t kModelsOfOrder = kDistances * kWidths;
-constexpr I16 kFirstModels = I16{0, 1, 1, 2, 1, 2, 2, 2, 1, 2, 2, 2, 2, 2, 2, 2} * kModelsOfOrder;
+constexpr Ints16 kFirstModels =
+    Ints16{0, 1, 1, 2, 1, 2, 2, 2, 1, 2, 2, 2, 2, 2, 2, 2} * kModelsOfOrder;
 
 constexpr int kOctaveShift = 21;        // of a float's bits: two of the mantissa are kept
 constexpr int32_t kOctavesOfOne = 508;  // 127 << 2
@@ -34,30 +35,30 @@ AF_KERNEL_INLINE int32_t quarter_octaves(float magnitude) {
   return (bits >> kOctaveShift) - kOctavesOfOne;
 }
 
-AF_KERNEL_INLINE I16 quarter_octaves(F16 magnitudes) {
-  const F16 above_one = magnitudes + splat(1.0f);
-  I16 bits;
+AF_KERNEL_INLINE Ints16 quarter_octaves(Floats16 magnitudes) {
+  const Floats16 above_one = magnitudes + splat(1.0f);
+  Ints16 bits;
   memcpy(&bits, &above_one, sizeof(bits));
   return (bits >> kOctaveShift) - kOctavesOfOne;
 }
 
-AF_KERNEL_INLINE F16 magnitude(F16 values) {
-  I16 bits;
+AF_KERNEL_INLINE Floats16 magnitude(Floats16 values) {
+  Ints16 bits;
   memcpy(&bits, &values, sizeof(bits));
   bits &= splat(int32_t{0x7FFFFFFF});
-  F16 result;
+  Floats16 result;
   memcpy(&result, &bits, sizeof(result));
   return result;
 }
 
 /// Within 0 ... 15.
-AF_KERNEL_INLINE I16 class_of(I16 quarters) {
-  return minimum(maximum(quarters >> 1, I16{}), splat(int32_t{15}));
+AF_KERNEL_INLINE Ints16 class_of(Ints16 quarters) {
+  return minimum(maximum(quarters >> 1, Ints16{}), splat(int32_t{15}));
 }
 
 /// values[index] per lane, of 16.
 template <typename Vector>
-AF_KERNEL_INLINE Vector picked(Vector values, I16 index) {
+AF_KERNEL_INLINE Vector picked(Vector values, Ints16 index) {
   Vector result;
 #if AF_VECTOR_BITS == 512
   __m512i from;
@@ -85,7 +86,7 @@ AF_KERNEL_INLINE Vector picked(Vector values, I16 index) {
 }
 
 /// Sums of every fourth, then of these by pairs.
-AF_KERNEL_INLINE float sum_of(F16 values) {
+AF_KERNEL_INLINE float sum_of(Floats16 values) {
   float v[16];
   memcpy(v, &values, sizeof(v));
   float sums[4];
@@ -351,7 +352,7 @@ AF_KERNEL_INLINE bool go_to_occupied(Lane<Coder, Index>& lane,
   prefetch_coefficients(tables, lane.before[row + 3].codeword);
   lane.surprise_class = surprise_class_of(around);
   lane.usual = lane.memory.octaves + 16 * lane.surprise_class;
-  F16 predicted = predicted_tile(inputs_of(tables, around));
+  Floats16 predicted = predicted_tile(inputs_of(tables, around));
   if constexpr (kHasMeans) {
     const float expected_sum = predicted[0] + expected_of_means(lane.memory, around);
     const float sum = code_mean(lane, tables, shape, expected_sum);
@@ -367,17 +368,17 @@ AF_KERNEL_INLINE bool go_to_occupied(Lane<Coder, Index>& lane,
 
 /// Models of the turns at all nodes of a cluster: a way that is told turn by turn must not wait for
 /// more than the last turn.
-AF_KERNEL_INLINE I16 turn_models(const NodeCluster& cluster, F16 predicted, I16 usual) {
-  const I16 splits = load<I16>(cluster.splits);
-  const I16 coefficients = splits & splat(int32_t{15});
-  const F16 differences = picked(predicted, coefficients) - load<F16>(cluster.thresholds);
-  const I16 usual_there = picked(usual, coefficients);
-  const I16 distances = class_of(quarter_octaves(magnitude(differences)) - usual_there + 24);
-  const I16 widths = class_of((splits >> 4) - usual_there + 20);
-  I16 bits;
+AF_KERNEL_INLINE Ints16 turn_models(const NodeCluster& cluster, Floats16 predicted, Ints16 usual) {
+  const Ints16 splits = load<Ints16>(cluster.splits);
+  const Ints16 coefficients = splits & splat(int32_t{15});
+  const Floats16 differences = picked(predicted, coefficients) - load<Floats16>(cluster.thresholds);
+  const Ints16 usual_there = picked(usual, coefficients);
+  const Ints16 distances = class_of(quarter_octaves(magnitude(differences)) - usual_there + 24);
+  const Ints16 widths = class_of((splits >> 4) - usual_there + 20);
+  Ints16 bits;
   memcpy(&bits, &differences, sizeof(bits));
-  const I16 is_above = ~(bits >> 31);
-  const I16 sides = (distances ^ is_above) + kDistances / 2;
+  const Ints16 is_above = ~(bits >> 31);
+  const Ints16 sides = (distances ^ is_above) + kDistances / 2;
   return picked(kFirstModels, coefficients) + sides * kWidths + widths;
 }
 
@@ -386,7 +387,8 @@ template <typename Coder, typename Index>
 AF_KERNEL_INLINE void enter_cluster(Lane<Coder, Index>& lane, const CodewordTables& tables) {
   store(
       lane.models,
-      turn_models(tables.clusters[lane.cluster], load<F16>(lane.predicted), load<I16>(lane.usual)));
+      turn_models(
+          tables.clusters[lane.cluster], load<Floats16>(lane.predicted), load<Ints16>(lane.usual)));
 }
 
 /// One turn of the way from the root to a codeword; `is_upper` is an encoder's.
@@ -411,11 +413,11 @@ AF_KERNEL_INLINE void finish_tile(Lane<Coder, Index>& lane,
                                   const CodewordTables& tables,
                                   const BlockShape& shape,
                                   uint16_t codeword) {
-  const F16 found = load<F16>(tables.coefficients + 16u * uint32_t{codeword});
-  const F16 wrong_by = magnitude(found - load<F16>(lane.predicted));
+  const Floats16 found = load<Floats16>(tables.coefficients + 16u * uint32_t{codeword});
+  const Floats16 wrong_by = magnitude(found - load<Floats16>(lane.predicted));
   float* const errors = lane.memory.errors + 16 * lane.surprise_class;
-  const F16 usual = load<F16>(errors);
-  const F16 learned = usual + (wrong_by - usual) * splat(kForgetting);
+  const Floats16 usual = load<Floats16>(errors);
+  const Floats16 learned = usual + (wrong_by - usual) * splat(kForgetting);
   store(errors, learned);
   store(lane.memory.octaves + 16 * lane.surprise_class, quarter_octaves(learned));
   *lane.here = {sum_of(wrong_by) / 4.0f, codeword, kOccupied};
