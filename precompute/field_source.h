@@ -26,6 +26,7 @@ struct FieldSource {
   PoseFrame frame;
   Eigen::Vector3d isocenter_point = Eigen::Vector3d::Zero();  ///< of the rig
   MotionRange range;                         ///< about the nominal pose: of the options
+  std::vector<HalfSpace> sources;            ///< of it, poses to hold: LightSlabSpec::sources
   std::vector<CameraGeometry> more_cameras;  ///< whose rays the field holds, too
   std::vector<std::string> warnings;
 };
