@@ -9,6 +9,7 @@
 #include "geometry/camera_geometry.h"
 #include "geometry/rigid_transform.h"
 #include "parallel/communicator.h"
+#include "precompute/measured_views.h"
 #include "precompute/plan/precompute_options.h"
 #include "volume/attenuation_volume.h"
 #include "volume/ct_read_options.h"
@@ -28,6 +29,7 @@ struct FieldSource {
   MotionRange range;                         ///< about the nominal pose: of the options
   std::vector<HalfSpace> sources;            ///< of it, poses to hold: LightSlabSpec::sources
   std::vector<CameraGeometry> more_cameras;  ///< whose rays the field holds, too
+  std::shared_ptr<const MeasuredViews> projections;  ///< that correct the field; null: none
   std::vector<std::string> warnings;
 };
 

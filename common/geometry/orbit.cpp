@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "base/error.h"
+#include "geometry/pose_in_range.h"
 #include "geometry/rotation_search.h"
 
 namespace af {
@@ -57,9 +58,8 @@ PointBox translations_seen(const Orbit& orbit,
   PointBox box;
   double farthest_mm = 0.0;
   for (unsigned corner = 0; corner < 8; ++corner) {
-    Eigen::Vector3d point = from_isocenter_mm;
-    for (int axis = 0; axis < 3; ++axis)
-      point[axis] += ((corner >> axis & 1u) != 0 ? range.high : range.low).translation_mm[axis];
+    const Eigen::Vector3d point =
+        from_isocenter_mm + corner_pose(range, corner << 3u).translation_mm;
     farthest_mm = std::max(farthest_mm, point.norm());
     for (const double angle : angles_within(off, kStepRad))
       box.add(turn(orbit, -angle) * point - from_isocenter_mm);
@@ -152,7 +152,10 @@ class SourceAngle {
                  const Eigen::Matrix3d back = rotation_from_angles(angles).transpose();
                  double most = -std::numeric_limits<double>::infinity();
                  for (unsigned corner = 0; corner < 8; ++corner)
-                   most = std::max(most, sign * of_source(back * (source_ - shift(box, corner))));
+                   most = std::max(
+                       most,
+                       sign * of_source(back *
+                                        (source_ - corner_pose(box, corner << 3u).translation_mm)));
                  return most + sign * turn_share * angles[kOutermostAxis];
                },
                [](double most, std::size_t /*i*/) { return most; })
@@ -172,12 +175,6 @@ class SourceAngle {
   }
 
  private:
-  static Eigen::Vector3d shift(const MotionRange& box, unsigned corner) {
-    Eigen::Vector3d shift;
-    for (unsigned axis = 0; axis < 3; ++axis)
-      shift[axis] = ((corner >> axis & 1u) != 0 ? box.high : box.low).translation_mm[axis];
-    return shift;
-  }
   /// Of a source seen from the frame's centre.
   [[nodiscard]] double of_source(const Eigen::Vector3d& from_center) const {
     const Eigen::Vector3d from_axis = from_center + axis_;

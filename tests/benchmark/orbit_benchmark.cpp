@@ -14,6 +14,7 @@
 #include "benchmark/benchmark_case.h"
 #include "benchmark/viewpoint_cylinder.h"
 #include "cli/app_main.h"
+#include "geometry/pose_in_range.h"
 #include "image/psnr.h"
 #include "image_files/ct_reader.h"
 #include "study/rig_file.h"
@@ -31,8 +32,9 @@ struct StudyOptions {
   int slabs = 4;
   double uv_step_mm = 22.0;  ///< of the atlas whose samples all get
   double st_step_mm = 0.9;
-  int poses = 20;   ///< at each angle
-  int pixels = 24;  ///< of a DRR, along each side
+  int poses = 20;     ///< at each angle
+  int pairs = 40000;  ///< of neighbouring samples
+  int pixels = 24;    ///< of a DRR, along each side
   std::string output;
 };
 
@@ -66,30 +68,56 @@ DepthSlabs depth_slabs_of(const AttenuationVolume& volume,
   return choose_depth_slabs(slices, sums, slabs, StPlane::Centroid);
 }
 
+/// What a viewpoint (slab frame) sees of one slab through a point of its (s,t) plane.
+double seen_of_slab(const Eigen::Vector3d& viewpoint,
+                    const LightSlab& planes,
+                    const SlabGeometry& slab,
+                    const Eigen::Vector3d& at_st,
+                    const RayCaster& caster) {
+  const RigidTransform ct_from_slab = planes.slab_from_ct.inverse();
+  const double away = planes.uv_plane_y_mm - slab.st_plane_y_mm;
+  RayFan fan;
+  fan.source_point = ct_from_slab * viewpoint;
+  fan.first_point = ct_from_slab * at_st;
+  fan.column_step = fan.row_step = Eigen::Vector3d::Zero();
+  fan.columns = fan.rows = 1;
+  fan.begin = (planes.uv_plane_y_mm - slab.y_high_mm) / away;
+  fan.end = (planes.uv_plane_y_mm - slab.y_low_mm) / away;
+  std::array<float, 1> value{};
+  caster.cast(fan, value);
+  return static_cast<double>(value[0]);
+}
+
 /// The value of a ray (slab frame) as the viewpoint sees it: of each slab, the ray through the same
 /// (s,t) point.
 double seen_from(const Eigen::Vector3d& viewpoint,
                  const LightSlab& planes,
                  const Ray& ray,
                  const RayCaster& caster) {
-  const RigidTransform ct_from_slab = planes.slab_from_ct.inverse();
   double sum = 0.0;
   for (const SlabGeometry& slab : planes.slabs) {
     const Eigen::Vector3d at_st = ray.origin_point + (slab.st_plane_y_mm - ray.origin_point.y()) /
                                                          ray.direction.y() * ray.direction;
-    const double away = planes.uv_plane_y_mm - slab.st_plane_y_mm;
-    RayFan fan;
-    fan.source_point = ct_from_slab * viewpoint;
-    fan.first_point = ct_from_slab * at_st;
-    fan.column_step = fan.row_step = Eigen::Vector3d::Zero();
-    fan.columns = fan.rows = 1;
-    fan.begin = (planes.uv_plane_y_mm - slab.y_high_mm) / away;
-    fan.end = (planes.uv_plane_y_mm - slab.y_low_mm) / away;
-    std::array<float, 1> value{};
-    caster.cast(fan, value);
-    sum += static_cast<double>(value[0]);
+    sum += seen_of_slab(viewpoint, planes, slab, at_st, caster);
   }
   return sum;
+}
+
+/// The index of a random element.
+template <typename Value>
+std::size_t any_index(const std::vector<Value>& values, HashRandom& random) {
+  return std::min(values.size() - 1,
+                  static_cast<std::size_t>(random.uniform() * static_cast<double>(values.size())));
+}
+
+double any_between(const GridAxis& axis, const NodeRange& stored, HashRandom& random) {
+  return axis.position_mm(stored.begin) + random.uniform() * (stored.count - 1) * axis.spacing_mm();
+}
+
+/// A random point of a slab's stored (s,t) nodes.
+Eigen::Vector3d any_st_point(const SlabGeometry& slab, HashRandom& random) {
+  const double s = any_between(slab.s, slab.stored_s, random);
+  return {s, slab.st_plane_y_mm, any_between(slab.t, slab.stored_t, random)};
 }
 
 /// Where a ray meets the (u,v) plane.
@@ -144,6 +172,10 @@ class Contender {
   virtual void set_viewpoints(double step_mm) = 0;
   [[nodiscard]] virtual double samples(double st_step_mm) const = 0;
   [[nodiscard]] virtual int viewpoints() const = 0;
+  /// By how much a sample differs from that of the next viewpoint along the orbit, at a random
+  /// (s,t) node of a random slab: what tiles of two of them have to code.
+  [[nodiscard]] virtual double difference_along_orbit(HashRandom& random,
+                                                      const RayCaster& caster) const = 0;
   /// Of a DRR's rays (ct frame).
   [[nodiscard]] virtual std::vector<float> drr(std::span<const Ray> rays,
                                                const RayCaster& caster) const = 0;
@@ -201,6 +233,19 @@ class Atlas final : public Contender {
       values.push_back(static_cast<float>(value));
     }
     return values;
+  }
+
+  [[nodiscard]] double difference_along_orbit(HashRandom& random,
+                                              const RayCaster& caster) const override {
+    const LightSlab& planes = members_[any_index(members_, random)];
+    const SlabGeometry& slab = planes.slabs[any_index(planes.slabs, random)];
+    const Eigen::Vector3d at_st = any_st_point(slab, random);
+    const double u = random.uniform(planes.u.first_mm, planes.u.last_mm - planes.u.spacing_mm());
+    const double v = random.uniform(planes.v.first_mm, planes.v.last_mm);
+    const auto seen = [&](double x) {
+      return seen_of_slab({x, planes.uv_plane_y_mm, v}, planes, slab, at_st, caster);
+    };
+    return seen(u + planes.u.spacing_mm()) - seen(u);
   }
 
  private:
@@ -271,6 +316,28 @@ class Cylinder final : public Contender {
     return values;
   }
 
+  /// The next column's nodes are counted so that what stands in the middle of a slab's (s,t) plane
+  /// has the same s in both.
+  [[nodiscard]] double difference_along_orbit(HashRandom& random,
+                                              const RayCaster& caster) const override {
+    const std::vector<LightSlab>& columns = columns_->columns();
+    const std::size_t i = std::min(any_index(columns, random), columns.size() - 2);
+    const std::size_t k = any_index(columns[i].slabs, random);
+    const Eigen::Vector3d at_st = any_st_point(columns[i].slabs[k], random);
+    const double v = random.uniform(v_[i].first_mm, v_[i].last_mm);
+    const auto seen = [&](std::size_t column, const Eigen::Vector3d& at) {
+      const LightSlab& planes = columns[column];
+      const double x = columns_->viewpoint_x_mm(static_cast<int>(column));
+      return seen_of_slab({x, planes.uv_plane_y_mm, v}, planes, planes.slabs[k], at, caster);
+    };
+    const Eigen::Vector3d middle(0.0, at_st.y(), 0.0);
+    const Eigen::Vector3d moved =
+        columns[i + 1].slab_from_ct * (columns[i].slab_from_ct.inverse() * middle);
+    const Eigen::Vector3d at_next(
+        at_st.x() + moved.x(), columns[i + 1].slabs[k].st_plane_y_mm, at_st.z());
+    return seen(i + 1, at_next) - seen(i, at_st);
+  }
+
  private:
   [[nodiscard]] double seen_by(int column, const Ray& ray_ct, const RayCaster& caster) const {
     const auto i = static_cast<std::size_t>(column);
@@ -309,14 +376,8 @@ std::vector<Ray> random_rays(const OrbitScene& scene,
                              std::uint64_t index,
                              int pixels) {
   HashRandom random(71, index);
-  PoseParameters pose;
-  for (int axis = 0; axis < 3; ++axis) {
-    pose.rotation_rad[axis] =
-        random.uniform(scene.range.low.rotation_rad[axis], scene.range.high.rotation_rad[axis]);
-    pose.translation_mm[axis] =
-        random.uniform(scene.range.low.translation_mm[axis], scene.range.high.translation_mm[axis]);
-  }
-  const RigidTransform ct_from_room = pose_from_parameters(scene.frame, pose).inverse();
+  const RigidTransform ct_from_room =
+      pose_from_parameters(scene.frame, random_pose(scene.range, random)).inverse();
   const CameraGeometry camera =
       turned_camera(scene.camera, scene.isocenter_point, scene.orbit.direction(), angle_rad);
   const Eigen::Vector3d source = ct_from_room * camera.source_point;
@@ -329,6 +390,16 @@ std::vector<Ray> random_rays(const OrbitScene& scene,
       rays.push_back({source, ct_from_room * through - source});
     }
   return rays;
+}
+
+double rms_along_orbit(const Contender& contender, const RayCaster& caster, int pairs) {
+  double squares = 0.0;
+  for (int i = 0; i < pairs; ++i) {
+    HashRandom random(73, static_cast<std::uint64_t>(i));
+    const double difference = contender.difference_along_orbit(random, caster);
+    squares += difference * difference;
+  }
+  return std::sqrt(squares / pairs);
 }
 
 double median(std::vector<double> values) {
@@ -399,15 +470,17 @@ void run(const StudyOptions& options) {
     contender->set_viewpoints(options.uv_step_mm);
     const double at_equal_steps = contender->samples(options.st_step_mm);
     if (budget == 0.0) budget = at_equal_steps;
+    const double rms = rms_along_orbit(*contender, caster, options.pairs);
     const double step_mm = spend(*contender, budget, options.st_step_mm);
     const std::vector<double> medians = psnr_db(*contender, scene, caster, options);
     std::printf(
-        "%-34s at %.0f mm %7.1f M samples (%.2f); at equal samples: %5d viewpoints, %.1f mm "
-        "apart, %.2f %.2f %.2f dB\n",
+        "%-34s at %.0f mm %7.1f M samples (%.2f), neighbours differ by %.4f; at equal samples: "
+        "%5d viewpoints, %.1f mm apart, %.2f %.2f %.2f dB\n",
         contender->name().c_str(),
         options.uv_step_mm,
         at_equal_steps / 1e6,
         at_equal_steps / budget,
+        rms,
         contender->viewpoints(),
         step_mm,
         medians[0],
@@ -416,6 +489,7 @@ void run(const StudyOptions& options) {
     std::fflush(stdout);
     rows.push_back({{"name", contender->name()},
                     {"samples_at_equal_steps", at_equal_steps},
+                    {"rms_of_neighbours_at_equal_steps", rms},
                     {"step_mm_at_equal_samples", step_mm},
                     {"viewpoints_at_equal_samples", contender->viewpoints()},
                     {"median_psnr_db", medians}});
@@ -449,6 +523,7 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--st-step-mm", options.st_step_mm, "Between (s,t) nodes")->capture_default_str();
   app.add_option("--poses", options.poses, "Random poses at each angle")->capture_default_str();
+  app.add_option("--pairs", options.pairs, "Pairs of neighbouring samples")->capture_default_str();
   app.add_option("--pixels", options.pixels, "Of a DRR, along each side")->capture_default_str();
   app.add_option("-o,--output", options.output, "The section's JSON file");
   return cli::app_main(app, argc, argv, [&](const Communicator& /*world*/) { run(options); });

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "geometry/pose_in_range.h"
 #include "geometry/rotation_search.h"
 
 namespace af::benchmark {
@@ -35,10 +36,7 @@ AcrossAxis across_axis(const OrbitScene& scene, const OrbitMember& member) {
     AcrossAxis at{0.0, std::numeric_limits<double>::infinity(), 0.0};
     double nearest_ahead = std::numeric_limits<double>::infinity();
     for (unsigned corner = 0; corner < 8; ++corner) {
-      Eigen::Vector3d shift;
-      for (unsigned axis = 0; axis < 3; ++axis)
-        shift[axis] = ((corner >> axis & 1u) != 0 ? member.sized_for.high : member.sized_for.low)
-                          .translation_mm[axis];
+      const Eigen::Vector3d shift = corner_pose(member.sized_for, corner << 3u).translation_mm;
       const Eigen::Vector2d source =
           flat(back * (member.camera.source_point - center - shift)) - to_axis;
       at.farthest_source_mm = std::max(at.farthest_source_mm, source.norm());
