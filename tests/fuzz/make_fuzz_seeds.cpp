@@ -153,6 +153,10 @@ void write_camera_seeds(const fs::path& folder) {
   for (const char* format : {"rig", "opencv"})
     write_seed(folder / "camera" / (format + "-distortion"s),
                "\x08"s + camera_files_of(lens, format, "camera").front().bytes);
+  write_seed(folder / "camera" / "opencv-lists",
+             "\3K:\n- - 1200\n  - 0\n  - 255.5\n- [0, 1100, 200]\n- [0, 0,\n1]  # end\n"
+             "dist:\n  - -0.35\n  - 0.12\n  - 4e-3\n  - -0.003\nrvec: [0.3, -0.2, 0.5]\n"
+             "tvec:\n- [10]\n- [-20]\n- [900]\n"s);
   test::DicomTestFile image;
   image.set_text({0x0008, 0x0060}, "CS", "XA");
   image.set_u16({0x0028, 0x0010}, 48);

@@ -174,6 +174,11 @@ for numbers in '1, 2, 3' '[0.1]' '-500, 0, 0, 0' 'nan, 0, 0, 0' '0, 0, 0, 0, 0, 
 done
 of_rig 4 '4, 5, 8, 12 or 14 numbers' 'OpenCV distortion of two numbers' \
   "$(edited camera-opencv-AP.txt '/^distortion/,/data/s/data: .*/data: [ 0.1, 0.2 ]/; /^distortion/,/data/s/rows: .*/rows: 2/')"
+lists="$(sed '/^distortion/,/data/d' valid/camera-opencv-AP.txt)"
+printf '%s\nD:\n- 0.1\n- 0.2\n' "$lists" >dashes.yml
+of_rig 4 '4, 5, 8, 12 or 14 numbers' 'OpenCV distortion of two numbers with dashes' dashes.yml
+printf '%s\nD:\n- [0.1, 0.2\n- 0\n' "$lists" >open.yml
+of_rig 4 'truncated: a list is not closed' 'OpenCV list with dashes that is not closed' open.yml
 of_rig 4 'broken XML' 'RTK geometry cut short' cut.xml
 printf '<!DOCTYPE a [<!ENTITY b "bbbb">]><RTKThreeDCircularGeometry/>' >entities.xml
 of_rig 4 'entities' 'RTK geometry with entities' entities.xml
