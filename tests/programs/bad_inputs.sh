@@ -241,6 +241,9 @@ of_xray 3 'pixel_spacing_mm of camera' "X-ray of another detector's pixels" othe
 of_xray 3 'PixelIntensityRelationship' 'logarithms as intensities' logarithms.dcm ''
 of_xray 3 'must be grey' 'X-ray in colour' colour.dcm ''
 of_xray 4 'pixel data' 'frames that are not there' promises-frames.dcm 'xray_frame = 1'
+for kind in jpeg rle jpeg2000; do
+  of_xray 4 'compressed pixels are corrupt' "$kind frame that its decoder does not survive" "damaged-$kind.dcm" ''
+done
 of_study 3 'must be a positive number or one of percentile' 'unknown air level' "$(edited study.toml '0,/^xray_domain = .*/s//xray_domain = "intensity"\nair_level = "sky"/')"
 of_study 3 'which gives it for every pixel' 'air level beside a flat field' "$(edited study.toml '0,/^xray_domain = .*/s//xray_domain = "intensity"\nair_level = 5.0\nflat = "f.mha"/')"
 of_study 3 'xray_frame' 'frame of a MetaImage' "$(edited study.toml '0,/^xray_domain = .*/s//&\nxray_frame = 2/')"
