@@ -407,6 +407,29 @@ TEST(XrayReader, InvertedGreysAreToldAndTurnedRoundOnRequest) {
   EXPECT_NEAR(found.attenuation.at(30, 30), std::log(2.5f), kLogRounding);
 }
 
+// Photon noise: a body of 3 units of attenuation in the middle and 4.5 at the edge, no air at all.
+TEST(XrayReader, AnatomyThatFillsThePictureIsNoNegative) {
+  const ScratchFolder folder;
+  HashRandom random(3);
+  Image2d image(90, 90);
+  for (int row = 0; row < 90; ++row)
+    for (int column = 0; column < 90; ++column) {
+      const double radius = std::hypot(column - 45, row - 45) / 45.0;
+      const double mean = 60000.0 * std::exp(-1.0 - 2.5 * std::min(1.0, radius));
+      image.at(column, row) =
+          static_cast<float>(std::round(mean + std::sqrt(mean) * random.normal()));
+    }
+  StudyView view = view_of(folder, image);
+  ViewXray found = read_view_xray(view, camera(90, 90));
+  EXPECT_TRUE(found.warnings.empty());
+  EXPECT_THAT(found.note, HasSubstr("background looks dark"));
+  EXPECT_THAT(found.note, HasSubstr("detail grows with brightness: no negative"));
+  view.reading.polarity = XrayPolarity::Inverted;
+  found = read_view_xray(view, camera(90, 90));
+  EXPECT_TRUE(found.warnings.empty()) << "air is at the edge of the negative, as it should be";
+  EXPECT_THAT(found.note, HasSubstr("background looks bright"));
+}
+
 /// A LUT from 12 stored bits to intensities: 4095 - stored, but for the first and last entries.
 test::DicomTestFile falling_lut(std::uint16_t first, std::size_t entries) {
   std::vector<std::uint16_t> data;
