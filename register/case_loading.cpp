@@ -2,35 +2,26 @@
 #include "register/case_loading.h"
 
 #include <algorithm>
-#include <array>
-#include <cmath>
-#include <limits>
-#include <numeric>
-#include <sstream>
 #include <utility>
 
 #include "base/error.h"
 #include "base/joined.h"
 #include "base/number_text.h"
 #include "base/stored_bytes.h"
-#include "drr/field_level.h"
-#include "drr/field_set_drr.h"
-#include "drr/ray_cast_drr.h"
-#include "drr/two_pass_af_drr.h"
 #include "field_use/opened_field.h"
 #include "files/sha256.h"
 #include "geometry/camera_distance.h"
 #include "geometry/ray_coverage.h"
+#include "register/field_renderers.h"
 #include "register/problem/fiducial_mask.h"
 #include "register/problem/parameter_scaling.h"
 #include "register/problem/stage_view.h"
-#include "study/bone_per_node.h"
+#include "register/ray_cast_renderers.h"
 #include "study/ct_keys.h"
 #include "study/node_ct.h"
 #include "study/rig_file.h"
 #include "study/shared_inputs.h"
 #include "study/xray_reader.h"
-#include "volume/blurred_volume.h"
 
 namespace af::registration {
 namespace {
@@ -41,10 +32,6 @@ constexpr double kAssumedCtHalfSideMm = 100.0;
 /// Points of the target box whose mean motion tells whether a corrected pose stands still: 64 cells
 /// give the mean over the box to a few percent.
 constexpr int kTargetPointsPerAxis = 4;
-
-/// Spacing of nodes of the field whose levels ray casting imitates when there is none: about that
-/// of the paper's field of a head or a spine.
-constexpr double kAssumedNodeMm = 1.0;
 
 std::filesystem::path field_path_of(const StudyCase& study_case,
                                     const StudyView& view,
@@ -129,275 +116,6 @@ std::string case_sha256(const Study& study, const StudyCase& study_case) {
   }
   const std::string text = study_to_toml(one, {}) + rig_to_toml(one.rig);
   return sha256_hex(std::as_bytes(std::span(text)));
-}
-
-/// Parts of a rank's share of a level, one thread's work each. The same on every rank, however many
-/// threads these have.
-constexpr int kPartsPerRank = 8;
-
-/// Collective: memory that the ranks of a node share and fill together, each on its threads.
-FieldLevelMemory node_memory(const Communicator& communicator, ThreadPool& pool) {
-  return [communicator, &pool](std::size_t count, const FieldLevelFill& fill) {
-    const auto samples_of = [count](const std::byte* bytes) {
-      return reinterpret_cast<const std::uint16_t*>(bytes);
-    };
-    const auto owner = communicator.allocate_on_node_together(
-        count * sizeof(std::uint16_t), [&](std::span<std::byte> memory, int rank, int ranks) {
-          const std::span samples(reinterpret_cast<std::uint16_t*>(memory.data()), count);
-          pool.for_each(kPartsPerRank, [&](int part, int /*slot*/) {
-            fill(samples, rank * kPartsPerRank + part, ranks * kPartsPerRank);
-          });
-        });
-    return SharedArray<std::uint16_t>(owner, {samples_of(owner.get()), count});
-  };
-}
-
-/// The levels of a method to make of a field: those of its stages, and for judging as many as there
-/// are nodes.
-int level_count(const LightSlab& light_slab, const CaseLoadOptions& options) {
-  int nodes = std::numeric_limits<int>::max();
-  for (const SlabLattice& slab : light_slab.lattice().slabs)
-    nodes = std::min({nodes, slab.s.nodes, slab.t.nodes});
-  nodes >>= halvings_to_usual_nodes(light_slab);
-  int possible = 0;
-  for (; possible < options.judging_level && nodes > 2; ++possible) nodes = (nodes + 1) / 2;
-  return std::max(options.coarsest_level, possible);
-}
-
-/// The samples of several slabs are decoded when they take no more than this: they have few
-/// viewpoints, so they are small, and many nodes, which are blended faster from samples than from
-/// codewords.
-constexpr std::size_t kMostDecodedBytes = std::size_t{512} << 20;
-
-bool pays_to_decode(const CompressedAttenuationField& field) {
-  return field.slabs.size() > 1 && decoded_bytes(field) <= kMostDecodedBytes;
-}
-
-/// Renderers of one field, and the blurs of its levels 1, 2, ...
-struct FieldLevelRenderers {
-  MemberLevels renderers;  ///< its own first
-  std::vector<double> blur_sigma_mm;
-};
-
-/// Collective where the memory is. A field's renderers for a view: its own, and those of so many
-/// levels of its pyramid. A method's levels are those of a field of about 256 nodes: a finer field
-/// begins with more halvings, so that a level has about the same blur. Look-up is linear, whatever
-/// a field is meant for: cubic gives better DRRs, but not better poses (register/README.md).
-FieldLevelRenderers renderers_of(const std::shared_ptr<const CompressedAttenuationField>& field,
-                                 int levels,
-                                 const std::shared_ptr<ThreadPool>& pool,
-                                 const std::shared_ptr<ThreadPool>& coarse_pool,
-                                 const FieldLevelMemory& memory) {
-  const int more_halvings = halvings_to_usual_nodes(field->light_slab);
-  const int halvings = levels > 0 ? levels + more_halvings : 0;
-  FieldLevelRenderers made;
-  FieldLevels pyramid;
-  if (pays_to_decode(*field)) {
-    const auto samples = std::make_shared<const FieldLevel>(decode_field(*field, memory));
-    made.renderers.push_back(std::make_shared<const TwoPassAfDrr>(samples, TwoPassOptions{}, pool));
-    if (halvings > 0) pyramid = make_field_pyramid(*samples, halvings, memory);
-  } else {
-    made.renderers.push_back(std::make_shared<const TwoPassAfDrr>(field, TwoPassOptions{}, pool));
-    if (halvings > 0) pyramid = make_field_pyramid(*field, halvings, memory);
-  }
-  for (auto i = static_cast<std::size_t>(more_halvings); i < pyramid.size(); ++i) {
-    made.renderers.push_back(
-        std::make_shared<const TwoPassAfDrr>(pyramid[i], TwoPassOptions{}, coarse_pool));
-    made.blur_sigma_mm.push_back(pyramid[i]->blur_sigma_mm(true));
-  }
-  return made;
-}
-
-/// Members of an atlas that poses in the middle of its range about the nominal one are looked up
-/// in, the nominal one's first: most registrations need no others.
-std::vector<std::uint64_t> members_in_reach(const OpenedField& opened,
-                                            const PoseFrame& nominal,
-                                            const View& view) {
-  std::vector<FieldSetMember> planes;
-  for (const auto& of_member : opened.coverage().planes) planes.push_back({of_member, nullptr});
-  const FieldSetDrr set(std::move(planes));
-  constexpr double kMiddle = 0.5;
-  const MotionRange range = opened.identity().range.scaled(kMiddle);
-  std::vector<std::uint64_t> members;
-  const auto add_at = [&](const PoseParameters& parameters) {
-    const std::vector<double> weights =
-        set.weights(pose_from_parameters(nominal, parameters), view);
-    std::vector<std::uint64_t> order(weights.size());
-    std::iota(order.begin(), order.end(), std::uint64_t{0});
-    std::stable_sort(
-        order.begin(), order.end(), [&](auto a, auto b) { return weights[a] > weights[b]; });
-    for (const std::uint64_t i : order)
-      if (weights[i] > 0.0 && std::find(members.begin(), members.end(), i) == members.end())
-        members.push_back(i);
-  };
-  add_at({});
-  for (unsigned corner = 0; corner < 64; ++corner) {
-    PoseParameters parameters;
-    for (unsigned axis = 0; axis < 3; ++axis) {
-      parameters.rotation_rad[axis] =
-          ((corner >> axis & 1u) != 0 ? range.high : range.low).rotation_rad[axis];
-      parameters.translation_mm[axis] =
-          ((corner >> (axis + 3) & 1u) != 0 ? range.high : range.low).translation_mm[axis];
-    }
-    add_at(parameters);
-  }
-  return members;
-}
-
-/// Collective.
-XrayBeam beam_of(const FieldIdentity& identity,
-                 const CaseLoadOptions& options,
-                 const Communicator& communicator) {
-  return all_or_none(communicator, [&] {
-    return XrayBeam(options.beam, {identity.mu_water_per_mm, identity.air_below_hu});
-  });
-}
-
-/// Collective. An atlas's renderers for a view. Members that poses near the nominal one need are
-/// held once per node; a search that goes farther opens others, each rank for itself. Their levels
-/// carry about the same blur; that of the nominal pose's member is taken.
-void use_atlas(const OpenedField& opened,
-               const PoseFrame& nominal,
-               const CaseLoadOptions& options,
-               const Communicator& communicator,
-               RegistrationView& view) {
-  const auto pool = options.pool ? options.pool : std::make_shared<ThreadPool>();
-  int levels = std::numeric_limits<int>::max();
-  for (const auto& planes : opened.coverage().planes)
-    levels = std::min(levels, level_count(*planes, options));
-  std::vector<std::uint64_t> near = members_in_reach(opened, nominal, view.view);
-  std::vector<std::byte> bytes = bytes_of(near);
-  communicator.broadcast(bytes);
-  near = value_of<std::vector<std::uint64_t>>(bytes, "the members of rank 0");
-  const auto open = [opened, levels, pool, own_pool = options.pool](std::size_t member) {
-    return std::make_shared<const MemberLevels>(
-        renderers_of(
-            opened.member(member, Communicator::alone()), levels, own_pool, pool, process_memory())
-            .renderers);
-  };
-  const auto members =
-      std::make_shared<MembersInUse>(open, near.size() + OpenedField::kMembersKept);
-  std::vector<double> blur_sigma_mm;
-  for (const std::uint64_t i : near) {
-    const FieldLevelRenderers made = renderers_of(opened.member(i, communicator),
-                                                  levels,
-                                                  options.pool,
-                                                  pool,
-                                                  node_memory(communicator, *pool));
-    members->keep(i, std::make_shared<const MemberLevels>(made.renderers));
-    if (blur_sigma_mm.empty()) blur_sigma_mm = made.blur_sigma_mm;
-  }
-  const XrayBeam beam = beam_of(opened.identity(), options, communicator);
-  const auto level = [&](std::size_t of) {
-    return beam.renderer(
-        std::make_shared<const FieldSetDrr>(atlas_level(opened.coverage().planes, members, of)),
-        nullptr);
-  };
-  view.renderer = level(0);
-  for (std::size_t i = 0; i < blur_sigma_mm.size(); ++i)
-    view.coarse_levels.push_back({level(i + 1), blur_sigma_mm[i]});
-}
-
-/// Collective. Renderers for a view, held once per node; with `bone` those of the tube's spectrum,
-/// whose levels are as many as both fields have, and blurred as those of the field of all.
-void use_field(const OpenedField& opened,
-               const std::shared_ptr<const CompressedAttenuationField>& bone,
-               const PoseFrame& nominal,
-               const CaseLoadOptions& options,
-               const Communicator& communicator,
-               RegistrationView& view) {
-  if (opened.atlas()) return use_atlas(opened, nominal, options, communicator, view);
-  const auto pool = options.pool ? options.pool : std::make_shared<ThreadPool>();
-  int levels = level_count(opened.field()->light_slab, options);
-  if (bone) levels = std::min(levels, level_count(bone->light_slab, options));
-  const auto renderers = [&](const std::shared_ptr<const CompressedAttenuationField>& field) {
-    return renderers_of(field, levels, options.pool, pool, node_memory(communicator, *pool));
-  };
-  FieldLevelRenderers all = renderers(opened.field());
-  FieldLevelRenderers of_bone;
-  if (bone) {
-    of_bone = renderers(bone);
-    all.renderers.resize(std::min(all.renderers.size(), of_bone.renderers.size()));
-    all.blur_sigma_mm.resize(all.renderers.size() - 1);
-  }
-  of_bone.renderers.resize(all.renderers.size());
-  const XrayBeam beam = beam_of(opened.identity(), options, communicator);
-  for (std::size_t i = 0; i < all.renderers.size(); ++i)
-    all.renderers[i] = beam.renderer(all.renderers[i], of_bone.renderers[i]);
-  view.renderer = all.renderers.front();
-  for (std::size_t i = 0; i < all.blur_sigma_mm.size(); ++i)
-    view.coarse_levels.push_back({all.renderers[i + 1], all.blur_sigma_mm[i]});
-}
-
-/// Collective. The same CT, its attenuation blurred by sigma_mm, held once per node.
-std::shared_ptr<const AttenuationVolume> blurred_per_node(const AttenuationVolume& volume,
-                                                          double sigma_mm,
-                                                          const Communicator& communicator) {
-  const VolumeBlur blur(volume.grid(), sigma_mm);
-  const std::size_t count = blur.grid().voxel_count();
-  const auto owner = communicator.allocate_on_node(
-      count * sizeof(std::uint16_t), [&](std::span<std::byte> memory) {
-        blur.fill(volume, {reinterpret_cast<std::uint16_t*>(memory.data()), count});
-      });
-  const auto* const voxels = reinterpret_cast<const std::uint16_t*>(owner.get());
-  return std::make_shared<const AttenuationVolume>(
-      blur.grid(), volume.model(), SharedArray<std::uint16_t>(owner, {voxels, count}));
-}
-
-/// What rays are cast through.
-struct CastVolumes {
-  std::shared_ptr<const AttenuationVolume> all;
-  std::shared_ptr<const AttenuationVolume> bone;  ///< none for DRRs of one energy
-  std::shared_ptr<const XrayBeam> beam;
-};
-
-/// Collective.
-CastVolumes cast_volumes(std::shared_ptr<const AttenuationVolume> all,
-                         const CaseLoadOptions& options,
-                         const Communicator& communicator) {
-  auto bone = options.beam.needs_bone() ? bone_per_node(*all, communicator) : nullptr;
-  const auto beam = all_or_none(
-      communicator, [&] { return std::make_shared<const XrayBeam>(options.beam, all->model()); });
-  return {std::move(all), std::move(bone), beam};
-}
-
-std::shared_ptr<const DrrRenderer> ray_cast_through(const CastVolumes& volumes,
-                                                    const RayCasterOptions& caster,
-                                                    const CaseLoadOptions& options) {
-  const auto cast = [&](const std::shared_ptr<const AttenuationVolume>& volume) {
-    return volume ? std::make_shared<const RayCastDrr>(volume, caster, options.pool) : nullptr;
-  };
-  return volumes.beam->renderer(cast(volumes.all), cast(volumes.bone));
-}
-
-/// Collective. A level of ray casting: the CT blurred as the fields' level blurs DRRs, sampled
-/// twice per sigma.
-std::shared_ptr<const DrrRenderer> coarse_ray_cast(const CastVolumes& volumes,
-                                                   double sigma_mm,
-                                                   const CaseLoadOptions& options,
-                                                   const Communicator& communicator) {
-  RayCasterOptions caster = options.ray_caster;
-  caster.step_mm = std::max(caster.step_mm, 0.5 * sigma_mm);
-  CastVolumes blurred = volumes;
-  blurred.all = blurred_per_node(*volumes.all, sigma_mm, communicator);
-  if (volumes.bone) blurred.bone = blurred_per_node(*volumes.bone, sigma_mm, communicator);
-  return ray_cast_through(blurred, caster, options);
-}
-
-/// Collective. Levels 1 ... coarsest_level of ray casting.
-std::vector<RendererLevel> coarse_ray_casts(const CastVolumes& volumes,
-                                            const CaseLoadOptions& options,
-                                            const Communicator& communicator) {
-  std::vector<RendererLevel> levels;
-  const int coarsest_level = std::max(options.coarsest_level, options.judging_level);
-  for (int level = 1; level <= coarsest_level; ++level) {
-    const auto at = static_cast<std::size_t>(level - 1);
-    const double sigma_mm = at < options.level_blur_sigma_mm.size()
-                                ? options.level_blur_sigma_mm[at]
-                                : kAssumedNodeMm * level_blur_sigma_in_nodes(level, true);
-    levels.push_back({coarse_ray_cast(volumes, sigma_mm, options, communicator), sigma_mm});
-  }
-  return levels;
 }
 
 /// Rays are cast through the attenuation that the field was made with.

@@ -9,6 +9,7 @@
 #include "drr/slab_rays.h"
 #include "field_file/field_file.h"
 #include "geometry/camera_distance.h"
+#include "geometry/pose_in_range.h"
 #include "geometry/ray_coverage.h"
 
 namespace af {
@@ -20,22 +21,16 @@ namespace {
 PoseParameters pose_in_box(const MotionRange& box, int index) {
   constexpr int kCorners = 64;
   HashRandom random(29, static_cast<std::uint64_t>(index));
-  PoseParameters pose;
-  for (int p = 0; p < 6; ++p) {
-    double share = (index >> p & 1) != 0 ? 1.0 : 0.0;
+  std::array<double, 6> shares{};
+  for (std::size_t p = 0; p < shares.size(); ++p) {
+    double& share = shares[p];
+    share = (index >> p & 1) != 0 ? 1.0 : 0.0;
     if (index >= kCorners) {
       share = random.uniform();
       if (random.uniform() < 0.5) share = share < 0.5 ? 0.0 : 1.0;
     }
-    const int axis = p % 3;
-    const auto between = [&](double low, double high) { return low + share * (high - low); };
-    if (p < 3)
-      pose.rotation_rad[axis] = between(box.low.rotation_rad[axis], box.high.rotation_rad[axis]);
-    else
-      pose.translation_mm[axis] =
-          between(box.low.translation_mm[axis], box.high.translation_mm[axis]);
   }
-  return pose;
+  return pose_at(box, shares);
 }
 
 bool holds_box(const FieldCoverage& coverage,

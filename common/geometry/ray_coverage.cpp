@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "geometry/hit_extents.h"
+#include "geometry/pose_in_range.h"
 
 namespace af {
 
@@ -26,16 +27,8 @@ bool covers_corners(const LightSlab& light_slab,
                     const PoseFrame& frame,
                     const MotionRange& range) {
   for (unsigned corner = 0; corner < 64; ++corner) {
-    PoseParameters parameters;
-    for (unsigned axis = 0; axis < 3; ++axis) {
-      const auto bound = [&](unsigned bit) -> const PoseParameters& {
-        return (corner >> bit & 1u) != 0 ? range.high : range.low;
-      };
-      parameters.rotation_rad[axis] = bound(axis).rotation_rad[axis];
-      parameters.translation_mm[axis] = bound(axis + 3).translation_mm[axis];
-    }
     const RigidTransform slab_from_room =
-        light_slab.slab_from_ct * pose_from_parameters(frame, parameters).inverse();
+        light_slab.slab_from_ct * pose_from_parameters(frame, corner_pose(range, corner)).inverse();
     const Eigen::Vector3d source = slab_from_room * camera.source_point;
     for (const Eigen::Vector3d& detector_corner : camera.detector_corner_points()) {
       const Ray ray{source, slab_from_room * detector_corner - source};

@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "base/hash_random.h"
+#include "geometry/pose_in_range.h"
 
 namespace af::evaluation {
 namespace {
@@ -41,14 +42,7 @@ PoseParameters random_pose_in_range(const MotionRange& range,
                                     std::uint64_t index,
                                     std::uint64_t attempt) {
   HashRandom random(seed, hash64(kPoseStream, index), attempt);
-  PoseParameters parameters;
-  for (int i = 0; i < 3; ++i)
-    parameters.rotation_rad[i] =
-        random.uniform(range.low.rotation_rad[i], range.high.rotation_rad[i]);
-  for (int i = 0; i < 3; ++i)
-    parameters.translation_mm[i] =
-        random.uniform(range.low.translation_mm[i], range.high.translation_mm[i]);
-  return parameters;
+  return random_pose(range, random);
 }
 
 DrrComparer::DrrComparer(const DrrRenderer& tested, const DrrRenderer& reference, const View& view)

@@ -35,29 +35,13 @@ PopulationGroup group_of(const PopulationCondition& condition,
   return group;
 }
 
-std::vector<std::string> success_columns(const std::string& error) {
-  std::vector<std::string> names;
-  for (const char* const what : {"_successes",
-                                 "_rate",
-                                 "_student_low",
-                                 "_student_high",
-                                 "_bootstrap_low",
-                                 "_bootstrap_high",
-                                 "_worst_patient_rate",
-                                 "_capture_mm",
-                                 "_capture_bootstrap_low_mm",
-                                 "_capture_bootstrap_high_mm",
-                                 "_patients_capture_mean_mm",
-                                 "_patients_capture_student_low_mm",
-                                 "_patients_capture_student_high_mm",
-                                 "_patients_capture_bootstrap_low_mm",
-                                 "_patients_capture_bootstrap_high_mm",
-                                 "_patients_capture_smallest_mm"})
-    names.push_back(error + what);
-  return names;
-}
+struct NamedCell {
+  const char* name;
+  std::string text;
+};
 
-void add_success_fields(const PopulationSuccess& success, std::vector<std::string>& fields) {
+/// What a row says of a group's success, in the order of its columns.
+std::vector<NamedCell> success_of(const PopulationSuccess& success) {
   double worst = 1.0;
   double smallest_mm = std::numeric_limits<double>::infinity();
   for (const PatientSuccess& patient : success.patients) {
@@ -65,23 +49,25 @@ void add_success_fields(const PopulationSuccess& success, std::vector<std::strin
                      static_cast<double>(patient.successes) / static_cast<double>(patient.starts));
     smallest_mm = std::min(smallest_mm, patient.capture.initial_tre_mm);
   }
-  fields.push_back(std::to_string(success.successes));
-  for (const double value : {success.rate.value,
-                             success.rate.student.low,
-                             success.rate.student.high,
-                             success.rate.bootstrap.low,
-                             success.rate.bootstrap.high,
-                             worst,
-                             success.pooled.initial_tre_mm,
-                             success.pooled_interval_mm.low,
-                             success.pooled_interval_mm.high,
-                             success.capture_mm.value,
-                             success.capture_mm.student.low,
-                             success.capture_mm.student.high,
-                             success.capture_mm.bootstrap.low,
-                             success.capture_mm.bootstrap.high,
-                             smallest_mm})
-    fields.push_back(number_text(value));
+  const auto number = [](double value) { return number_text(value); };
+  const auto& rate = success.rate;
+  const auto& own = success.capture_mm;
+  return {{"successes", std::to_string(success.successes)},
+          {"rate", number(rate.value)},
+          {"student_low", number(rate.student.low)},
+          {"student_high", number(rate.student.high)},
+          {"bootstrap_low", number(rate.bootstrap.low)},
+          {"bootstrap_high", number(rate.bootstrap.high)},
+          {"worst_patient_rate", number(worst)},
+          {"capture_mm", number(success.pooled.initial_tre_mm)},
+          {"capture_bootstrap_low_mm", number(success.pooled_interval_mm.low)},
+          {"capture_bootstrap_high_mm", number(success.pooled_interval_mm.high)},
+          {"patients_capture_mean_mm", number(own.value)},
+          {"patients_capture_student_low_mm", number(own.student.low)},
+          {"patients_capture_student_high_mm", number(own.student.high)},
+          {"patients_capture_bootstrap_low_mm", number(own.bootstrap.low)},
+          {"patients_capture_bootstrap_high_mm", number(own.bootstrap.high)},
+          {"patients_capture_smallest_mm", number(smallest_mm)}};
 }
 
 std::string percent(double share) {
@@ -185,8 +171,8 @@ std::vector<PopulationGroup> groups_of(const PopulationCondition& condition,
 CsvTable population_table(const std::vector<PopulationGroup>& groups) {
   std::vector<std::string> columns{
       "condition", "group", "patients", "starts", "median_tre_mm", "median_seconds"};
-  for (const char* const error : {"tre", "mrpd"})
-    for (const std::string& name : success_columns(error)) columns.push_back(name);
+  for (const char* const error : {"tre_", "mrpd_"})
+    for (const NamedCell& cell : success_of({})) columns.push_back(error + std::string(cell.name));
   CsvTable table(columns);
   for (const PopulationGroup& group : groups) {
     std::vector<std::string> fields{group.condition,
@@ -195,8 +181,8 @@ CsvTable population_table(const std::vector<PopulationGroup>& groups) {
                                     std::to_string(group.by_tre.starts),
                                     number_text(group.median_tre_mm),
                                     number_text(group.median_seconds)};
-    add_success_fields(group.by_tre, fields);
-    add_success_fields(group.by_mrpd, fields);
+    for (const PopulationSuccess* success : {&group.by_tre, &group.by_mrpd})
+      for (NamedCell& cell : success_of(*success)) fields.push_back(std::move(cell.text));
     table.add_row(std::move(fields));
   }
   return table;

@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "base/hash_random.h"
+#include "geometry/pose_in_range.h"
 #include "volume/ray_caster.h"
 
 namespace af {
@@ -21,17 +22,6 @@ constexpr double kLeastForeground = 0.01;
 constexpr double kPatchMm = 12.0;
 /// Share of the patches drawn evenly over the foreground, whatever the roughness.
 constexpr double kEvenShare = 0.3;
-
-PoseParameters pose_in(const MotionRange& range, HashRandom& random) {
-  PoseParameters parameters;
-  for (int i = 0; i < 3; ++i)
-    parameters.rotation_rad[i] =
-        random.uniform(range.low.rotation_rad[i], range.high.rotation_rad[i]);
-  for (int i = 0; i < 3; ++i)
-    parameters.translation_mm[i] =
-        random.uniform(range.low.translation_mm[i], range.high.translation_mm[i]);
-  return parameters;
-}
 
 /// The detector cut into squares, each a possible patch.
 struct PatchGrid {
@@ -130,7 +120,7 @@ class PoseSampler {
     HashRandom random(seed, kPoseStream, pose);
     for (int draw = 0; draw < kMostDraws; ++draw) {
       const RigidTransform room_from_ct =
-          pose_from_parameters(scene_.frame, pose_in(scene_.range, random));
+          pose_from_parameters(scene_.frame, random_pose(scene_.range, random));
       const PixelRays pixels(scene_, room_from_ct);
       const double quarter = 0.25 * grid_.side_px();
       const std::vector<float> coarse =

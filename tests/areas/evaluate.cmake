@@ -56,3 +56,7 @@ af_add_test(
   SOURCES unit/described_options_test.cpp
   LIBS af_evaluation_program af_registration_program af_precompute_program af_drr_request af_simulated_study
        PkgConfig::tomlplusplus)
+
+add_test(NAME population_program COMMAND ${PROJECT_SOURCE_DIR}/tests/checks/population_program.sh
+                                         ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR}/bin)
+set_tests_properties(population_program PROPERTIES LABELS mpi TIMEOUT 900 PROCESSORS 2)

@@ -149,8 +149,8 @@ TABLE
   plant common/geometry/ray.h '#include "base/error.h"'
   plant common/parallel/communicator.cpp '#include <mpi.h>'
   printf '%s\n' '#include "base/error.h"' >>"$scratch/tree/common/parallel/communicator.cpp"
-  plant common/field_file/field_file.cpp '#include <hdf5.h>'
-  printf '%s\n' '#include "parallel/mpi_handle.h"' '#include <mpi.h>' >>"$scratch/tree/common/field_file/field_file.cpp"
+  plant common/field_file/field_reading.cpp '#include <hdf5.h>'
+  printf '%s\n' '#include "parallel/mpi_handle.h"' '#include <mpi.h>' >>"$scratch/tree/common/field_file/field_reading.cpp"
   plant register/method/registration.cpp '#include "geometry/ray.h"'
 }
 

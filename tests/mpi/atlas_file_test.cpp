@@ -15,6 +15,7 @@
 #include "field_use/field_coverage.h"
 #include "field_use/opened_field.h"
 #include "files/sha256.h"
+#include "support/c_arm_camera.h"
 #include "support/shared_folder.h"
 
 namespace af {
@@ -26,13 +27,7 @@ constexpr std::size_t kCodewords = 40;
 /// Two members of one and of two slabs, for cameras that look along y and along x.
 AttenuationAtlas small_atlas() {
   AttenuationAtlas atlas;
-  CameraGeometry& camera = atlas.identity.camera;
-  camera.name = "AP";
-  camera.source_point = {0.0, -650.0, 0.0};
-  camera.detector_origin_point = {-150.0, 370.0, 150.0};
-  camera.row_direction = {0.0, 0.0, -1.0};
-  camera.pixel_spacing_mm = {10.0, 10.0};
-  camera.size_px = {31, 31};
+  atlas.identity.camera = test::c_arm_camera(31, 31, 10.0);
   atlas.identity.range = {0.1, 10.0};
   atlas.identity.ct_content_sha256 = std::string(64, 'a');
   atlas.quantizer_step = 0.00390625f;

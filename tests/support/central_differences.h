@@ -2,10 +2,14 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <vector>
+
+#include <gtest/gtest.h>
 
 #include "base/error.h"
 #include "drr/drr_renderer.h"
+#include "support/plane_products.h"
 
 namespace af::test {
 
@@ -52,6 +56,31 @@ inline void central_difference_gradients(const DrrRenderer& renderer,
     for (std::size_t i = 0; i < plus.size(); ++i)
       plane[i] = (plus[i] - minus[i]) / static_cast<float>(2.0 * step);
   }
+}
+
+/// How far a renderer's own derivatives are from central differences, relative to these, per
+/// parameter. The image that comes with derivatives must be that of render() alone.
+inline std::vector<double> gradient_distances(const DrrRenderer& renderer,
+                                              const RigidTransform& room_from_ct,
+                                              const View& view,
+                                              const Eigen::Vector3d& pivot_room_point) {
+  const std::size_t pixels = view.pixel_count();
+  std::vector<float> values(pixels);
+  std::vector<float> found(6 * pixels);
+  std::vector<float> expected(6 * pixels);
+  const auto workspace = renderer.make_workspace();
+  renderer.render(room_from_ct, view, *workspace, values, PoseGradients{pivot_room_point, found});
+  EXPECT_EQ(values, render_image(renderer, room_from_ct, view).pixels);
+  central_difference_gradients(
+      renderer, room_from_ct, view, *workspace, {pivot_room_point, expected});
+  std::vector<double> distances;
+  for (std::size_t k = 0; k < 6; ++k) {
+    PlaneProducts products;
+    products.add(std::span(found).subspan(k * pixels, pixels),
+                 std::span(expected).subspan(k * pixels, pixels));
+    distances.push_back(products.relative_distance());
+  }
+  return distances;
 }
 
 }  // namespace af::test

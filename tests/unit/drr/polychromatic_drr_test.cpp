@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "drr/field_renderer.h"
@@ -12,7 +13,6 @@
 #include "support/central_differences.h"
 #include "support/ct_phantoms.h"
 #include "support/cube_grid.h"
-#include "support/plane_products.h"
 #include "unit/drr/small_fields.h"
 #include "volume/blurred_volume.h"
 
@@ -97,24 +97,9 @@ TEST(PolychromaticDrr, GradientsAgreeWithCentralDifferences) {
   const PolychromaticDrr renderer = cast_through(body(), SpectrumOptions{70.0, 2.5, 40});
   const View view{small_camera(), {3, 2, 20, 15}};
   const RigidTransform pose = pose_from_parameters({}, small_pose(6));
-  const Eigen::Vector3d pivot(10.0, -20.0, 30.0);
-  const std::size_t pixels = view.pixel_count();
-  std::vector<float> values(pixels);
-  std::vector<float> found(6 * pixels);
-  std::vector<float> expected(6 * pixels);
-  const auto workspace = renderer.make_workspace();
-  renderer.render(pose, view, *workspace, values, PoseGradients{pivot, found});
-  EXPECT_EQ(values, render_image(renderer, pose, view).pixels);
-  test::central_difference_gradients(renderer, pose, view, *workspace, {pivot, expected});
-  for (std::size_t k = 0; k < 6; ++k) {
-    const auto plane = [&](const std::vector<float>& planes) {
-      return std::span(planes).subspan(k * pixels, pixels);
-    };
-    test::PlaneProducts products;
-    products.add(plane(found), plane(expected));
-    // As those of ray casting: differences cross kinks of the interpolant.
-    EXPECT_LT(products.relative_distance(), 0.01) << "parameter " << k;
-  }
+  // As those of ray casting: differences cross kinks of the interpolant.
+  EXPECT_THAT(test::gradient_distances(renderer, pose, view, {10.0, -20.0, 30.0}),
+              testing::Each(testing::Lt(0.01)));
 }
 
 TEST(PolychromaticDrr, OfTwoFieldsHasTheGradientsOfItsValues) {
@@ -127,22 +112,9 @@ TEST(PolychromaticDrr, OfTwoFieldsHasTheGradientsOfItsValues) {
                                   attenuation_of({70.0, 2.5, 40}));
   const View view{small_camera(), {3, 2, 20, 15}};
   const RigidTransform pose = pose_from_parameters({}, small_pose(4));
-  const std::size_t pixels = view.pixel_count();
-  std::vector<float> values(pixels);
-  std::vector<float> found(6 * pixels);
-  std::vector<float> expected(6 * pixels);
-  const auto workspace = renderer.make_workspace();
-  renderer.render(
-      pose, view, *workspace, values, PoseGradients{Eigen::Vector3d(5.0, 3.0, -8.0), found});
-  test::central_difference_gradients(
-      renderer, pose, view, *workspace, {Eigen::Vector3d(5.0, 3.0, -8.0), expected});
-  for (std::size_t k = 0; k < 6; ++k) {
-    test::PlaneProducts products;
-    products.add(std::span(found).subspan(k * pixels, pixels),
-                 std::span(expected).subspan(k * pixels, pixels));
-    // Multilinear fields leave the differences' rounding alone.
-    EXPECT_LT(products.relative_distance(), 0.01) << "parameter " << k;
-  }
+  // Multilinear fields leave the differences' rounding alone.
+  EXPECT_THAT(test::gradient_distances(renderer, pose, view, {5.0, 3.0, -8.0}),
+              testing::Each(testing::Lt(0.01)));
 }
 
 TEST(PolychromaticDrr, CountsTheRaysThatMissEitherField) {

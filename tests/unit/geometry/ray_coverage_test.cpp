@@ -12,6 +12,7 @@
 #include "geometry/camera_distance.h"
 #include "geometry/hit_extents.h"
 #include "geometry/orbit.h"
+#include "geometry/pose_in_range.h"
 #include "support/c_arm_camera.h"
 
 namespace af {
@@ -40,19 +41,6 @@ LightSlab planes_of(const CameraGeometry& camera,
       more);
 }
 
-PoseParameters at(const MotionRange& range, const std::array<double, 6>& share) {
-  PoseParameters parameters;
-  for (int i = 0; i < 3; ++i) {
-    const auto between = [](double low, double high, double x) { return low + x * (high - low); };
-    const auto p = static_cast<std::size_t>(i);
-    parameters.rotation_rad[i] =
-        between(range.low.rotation_rad[i], range.high.rotation_rad[i], share[p]);
-    parameters.translation_mm[i] =
-        between(range.low.translation_mm[i], range.high.translation_mm[i], share[p + 3]);
-  }
-  return parameters;
-}
-
 /// Whether the rays of the detector's corners and edges meet all planes at a pose.
 bool all_rays_inside(const LightSlab& planes,
                      const CameraGeometry& camera,
@@ -75,7 +63,7 @@ PoseParameters sampled(const MotionRange& range, int index, HashRandom& random) 
     if (index % 2 == 1 && random.uniform() < 0.5) share[p] = share[p] < 0.5 ? 0.0 : 1.0;
     if (index < 64) share[p] = (index >> p & 1) != 0 ? 1.0 : 0.0;
   }
-  return at(range, share);
+  return pose_at(range, share);
 }
 
 TEST(RayCoverage, OfAFieldsOwnCameraIsItsRange) {

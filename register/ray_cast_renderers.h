@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "drr/xray_beam.h"
+#include "parallel/communicator.h"
+#include "register/case_loading.h"
+#include "register/problem/registration_problem.h"
+#include "volume/attenuation_volume.h"
+
+namespace af::registration {
+
+/// What rays are cast through.
+struct CastVolumes {
+  std::shared_ptr<const AttenuationVolume> all;
+  std::shared_ptr<const AttenuationVolume> bone;  ///< none for DRRs of one energy
+  std::shared_ptr<const XrayBeam> beam;
+};
+
+/// Collective. The volumes that the beam needs, each held once per node.
+CastVolumes cast_volumes(std::shared_ptr<const AttenuationVolume> all,
+                         const CaseLoadOptions& options,
+                         const Communicator& communicator);
+
+/// DRRs by ray casting through the volumes.
+std::shared_ptr<const DrrRenderer> ray_cast_through(const CastVolumes& volumes,
+                                                    const RayCasterOptions& caster,
+                                                    const CaseLoadOptions& options);
+
+/// Collective. A level of ray casting: the CT blurred as the fields' level blurs DRRs, sampled
+/// twice per sigma.
+std::shared_ptr<const DrrRenderer> coarse_ray_cast(const CastVolumes& volumes,
+                                                   double sigma_mm,
+                                                   const CaseLoadOptions& options,
+                                                   const Communicator& communicator);
+
+/// Collective. Levels 1 ... of ray casting, as many as the method and its judge look at.
+std::vector<RendererLevel> coarse_ray_casts(const CastVolumes& volumes,
+                                            const CaseLoadOptions& options,
+                                            const Communicator& communicator);
+
+}  // namespace af::registration

@@ -1,0 +1,67 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# jobs/population.sh and af-evaluate population as a person would use them: one small patient, the same command again, its
+# tables alone, chains for Slurm, and what they refuse. Fields are too coarse for the success rates to mean anything.
+#
+#   population_program.sh ROOT FOLDER_OF_PROGRAMS
+set -euo pipefail
+root=$1
+programs=$2
+export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMPI_MCA_hwloc_base_binding_policy=none
+scratch=$(mktemp -d)
+trap 'rm -rf "$scratch"' EXIT
+cd "$scratch"
+# As installed, so that the jobs find these programs, whatever they were built as.
+mkdir -p prefix/libexec/attenuation-fields
+cp -r "$root/jobs" prefix/libexec/attenuation-fields/
+ln -s "$programs" prefix/bin
+
+fail() {
+  echo "FAILED: $*" >&2
+  exit 1
+}
+
+small=(--patients 1 --kinds spine --poses 1 --starts 1 --intervals 2 --presets fast --variants clean --raycast-patients 0 --ranks 2)
+small+=(--field '--slabs 1 --uv-nodes 7 --st-nodes 61 --codewords 64')
+population() { prefix/libexec/attenuation-fields/jobs/population.sh --output pop "${small[@]}" "$@" >out 2>err; }
+# refuse CODE PATTERN COMMAND...
+refuse() {
+  local code=$1 pattern=$2 found=0
+  shift 2
+  "$@" >out 2>err || found=$?
+  [[ $found == "$code" ]] || fail "$* gave $found instead of $code: $(cat err)"
+  grep -q -- "$pattern" err || fail "$* did not say '$pattern': $(cat err)"
+}
+
+refuse 2 "'3' must name 2, 1 or both" population --views 3
+refuse 2 'must name some of spine, pelvis, head' population --kinds leg
+refuse 4 'no registrations are finished yet' population --tables
+
+population || fail "population.sh: $(cat out err)"
+tables=pop/tables
+# Two starts of one patient, with two views and with one.
+for condition in clean-1-fast clean-2-fast; do
+  grep -q "^$condition,all,1,2," "$tables/population.csv" || fail "no row of $condition: $(cat $tables/population.csv)"
+  grep -q "^| $condition | all | 1 | 2 |" "$tables/population.md" || fail "no line of $condition: $(cat $tables/population.md)"
+  grep -q "^$condition,spine-001,2," "$tables/patients.csv" || fail "no row of the patient: $(cat $tables/patients.csv)"
+done
+
+cp "$tables/population.csv" first.csv
+population || fail "the same command again: $(cat out err)"
+! grep -q ' min \| s$' out || fail "a finished stage ran again: $(cat out)"
+population --tables || fail "--tables: $(cat out err)"
+cmp first.csv "$tables/population.csv"
+
+population --slurm --dry-run || fail "--slurm --dry-run: $(cat out err)"
+for condition in clean-1-fast clean-2-fast; do
+  grep -q "slurm/$condition" out || fail "no chain of $condition: $(cat out)"
+done
+grep -q sbatch out || fail "no command of Slurm: $(cat out)"
+
+evaluate=("$programs/af-evaluate" population -o refused)
+refuse 2 'condition' "${evaluate[@]}"
+refuse 3 'NAME=FOLDER' "${evaluate[@]}" --condition pop
+mkdir empty
+refuse 3 'holds no finished run' "${evaluate[@]}" --condition clean-2-fast=empty
+refuse 4 'is not a folder of results' "${evaluate[@]}" --condition clean-2-fast=missing
+[[ ! -e refused ]] || fail "a refused table left $(find refused)"
