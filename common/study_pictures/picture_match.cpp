@@ -166,7 +166,7 @@ std::string scale_telltale(const std::vector<ScaleMatch>& matches) {
   if (is_near(best) || best.correlation < kWell) return {};
   for (const ScaleMatch& match : matches)
     if (is_near(match) && best.correlation < match.correlation + kClearlyBetter) return {};
-  return "the X-ray looks more like the DRR when enlarged by " + fixed_text(best.factor, 2) +
+  return "the X-ray looks more like the DRR when scaled by " + fixed_text(best.factor, 2) +
          " (correlation " + fixed_text(best.correlation, 2) + ") than as it is (" +
          fixed_text(matches.front().correlation, 2) +
          "): check the pixel spacing, the distances of source and detector, and the CT's spacing; "
