@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "register/problem/registration_problem.h"
 
-
 namespace af::registration {
 namespace {
 
