@@ -8,6 +8,7 @@
 #include "base/stored_bytes.h"
 #include "geometry/orbit.h"
 #include "precompute/casting/casters.h"
+#include "precompute/casting/corrected_caster.h"
 #include "precompute/casting/joined_caster.h"
 #include "precompute/casting/unit_costs.h"
 #include "precompute/plan/orbit_text.h"
@@ -80,6 +81,25 @@ std::vector<FieldPart> parts_of_orbit(const FieldSource& source,
   return parts;
 }
 
+std::unique_ptr<const FieldCaster> make_caster(const FieldPart& part,
+                                               const PrecomputeOptions& options,
+                                               const AttenuationQuantizer& quantizer) {
+  std::unique_ptr<const FieldCaster> of_ct = caster_named(options.caster)
+                                                 .make({*part.source.volume,
+                                                        part.resampled.get(),
+                                                        part.light_slab,
+                                                        quantizer,
+                                                        options.ray_caster});
+  if (part.source.projections == nullptr) return of_ct;
+  const Eigen::Vector3d toward_source =
+      part.light_slab.slab_from_ct.linear().transpose() * Eigen::Vector3d::UnitY();
+  return std::make_unique<const CorrectedFieldCaster>(
+      std::move(of_ct),
+      MeasuredResidual(part.source.projections->views, *part.source.volume, toward_source),
+      part.light_slab,
+      quantizer);
+}
+
 std::vector<std::size_t> slab_counts(const std::vector<FieldPart>& parts) {
   std::vector<std::size_t> counts;
   for (const FieldPart& part : parts) counts.push_back(part.light_slab.slabs.size());
@@ -114,13 +134,7 @@ std::unique_ptr<const FieldCaster> make_caster(const std::vector<FieldPart>& par
                                                const PrecomputeOptions& options,
                                                const AttenuationQuantizer& quantizer) {
   std::vector<std::unique_ptr<const FieldCaster>> casters;
-  for (const FieldPart& part : parts)
-    casters.push_back(caster_named(options.caster)
-                          .make({*part.source.volume,
-                                 part.resampled.get(),
-                                 part.light_slab,
-                                 quantizer,
-                                 options.ray_caster}));
+  for (const FieldPart& part : parts) casters.push_back(make_caster(part, options, quantizer));
   if (casters.size() == 1) return std::move(casters.front());
   return std::make_unique<const JoinedCaster>(std::move(casters), slab_counts(parts));
 }

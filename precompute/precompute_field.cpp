@@ -91,6 +91,8 @@ DecidingValues casting_decides(const PrecomputeOptions& options,
         std::to_string(camera.size_px.x()) + " x " + std::to_string(camera.size_px.y());
   };
   decides["ct_content_sha256"] = source.ct_content_sha256;
+  if (source.projections != nullptr)
+    decides["projections sha256"] = source.projections->content_sha256;
   add_camera(source.camera, "camera");
   for (std::size_t i = 0; i < source.more_cameras.size(); ++i)
     add_camera(source.more_cameras[i], "covered camera " + std::to_string(i + 1));
@@ -242,6 +244,7 @@ class PrecomputeRun {
     WorkNote note("reading the CT", WorkNote::Kind::Phase);
     source_ = load_source(options_, world_);
     for (const std::string& warning : source_.warnings) warn(world_, warning);
+    if (source_.projections != nullptr) inform(world_, source_.projections->text());
     parts_ = field_parts(source_, options_, world_);
     for (FieldPart& part : parts_) size_planes(part, DepthSlabs{{}, {0.0}});
     lattice_ = lattice_of(parts_);
@@ -302,6 +305,7 @@ class PrecomputeRun {
 
   [[nodiscard]] std::uint64_t volume_bytes() const {
     std::uint64_t bytes = source_.volume->voxels().size_bytes();
+    if (source_.projections != nullptr) bytes += source_.projections->bytes;
     for (const FieldPart& part : parts_)
       if (part.resampled != nullptr) bytes += part.resampled->bytes();
     return bytes;
@@ -576,13 +580,19 @@ class PrecomputeRun {
                                               const BuildStatistics& statistics) const {
     PrecomputeOptions recorded = options_;
     recorded.ct_reading = source_.ct_reading;  // in force, where a study states it
-    const Provenance provenance = {"af-precompute",
-                                   command_line_,
-                                   to_toml(recorded),
-                                   options_.seed,
-                                   world_.size(),
-                                   {{source_.ct_path, source_.ct_content_sha256}}};
+    Provenance provenance = {"af-precompute",
+                             command_line_,
+                             to_toml(recorded),
+                             options_.seed,
+                             world_.size(),
+                             {{source_.ct_path, source_.ct_content_sha256}}};
+    if (source_.projections != nullptr)
+      provenance.input_sha256[source_.projections->path] = source_.projections->content_sha256;
     nlohmann::json json = to_json(provenance);
+    if (source_.projections != nullptr)
+      json["projections"] = {{"views", source_.projections->views.size()},
+                             {"measured_rms", source_.projections->measured_rms},
+                             {"residual_rms", source_.projections->residual_rms}};
     json["training"] = training_json(trained);
     if (choice_) json["design"] = design_json(*choice_);
     json["occupied_tiles"] = cast.occupied_tiles;

@@ -139,6 +139,21 @@ void describe_casting(Fields& field, PrecomputeOptions& options) {
         "programs look for in FIELD.bone.af.h5 beside FIELD.af.h5 (docs/spectra.md)")
       .one_of({"all", "bone"})
       .decides(kCastingStage);
+  field("projections",
+        options.projections,
+        "study.toml of X-rays that were measured around this CT, with their true pose: what they "
+        "hold beyond the CT is added to the field (docs/measured-fields.md); af-scan "
+        "--write-projections makes one")
+      .input();
+  field("projections_case", options.projections_case, "Case of --projections [the only one]")
+      .needs({"--projections"})
+      .input();
+  field("projections_smoothing_px",
+        options.projections_smoothing_px,
+        "Gaussian by which what the projections hold beyond the CT is smoothed, standard "
+        "deviation in pixels: for noisy ones; 0: not at all")
+      .within(0.0, 100.0)
+      .not_deciding("the hash of the projections says it");
 }
 
 void describe_codebook(Fields& field, PrecomputeOptions& options) {
@@ -331,6 +346,9 @@ std::vector<std::string> problems(const PrecomputeOptions& options) {
   if (options.is_atlas() && options.is_of_bone())
     found.emplace_back("material = bone: an atlas is of all of a CT; leave --orbit out");
   append(problems(options.codebook_options()), found);
+  if (!options.projections.empty() && options.is_of_bone())
+    found.push_back(
+        "projections: show all that attenuates, and correct no field of material = bone");
   append(problems(options.training_selection()), found);
   if (options.mean_step && options.tile_coding == "plain")
     found.emplace_back("mean_step: plain tiles have no means; leave it out");

@@ -212,6 +212,11 @@ of_design 3 '; the fastest DRR: ' 'time that no DRR keeps' --max-drr-ms 0.000001
 of_design 3 "preset = 'nonsense': must be one of paper" 'unknown preset' --preset nonsense
 of_design 2 '--preset excludes' 'preset and budget' --preset paper --max-field-size 8MB
 of_design 3 'look_up = nearest: must be linear or cubic' 'look-up that no field is for' --look-up nearest
+of_projections() { row "$1" "$2" "$3" "${precompute[@]}" --study valid/study.toml --camera AP --projections "${@:4}"; }
+of_projections 4 'nowhere.toml' 'projections that are not there' nowhere.toml
+of_projections 3 'must be at least 3' 'projections of two views' valid/study.toml
+of_projections 3 'projections: show all' 'projections for a field of bone' valid/study.toml --material bone
+row 2 '--projections' 'case of no projections' "${precompute[@]}" --study valid/study.toml --camera AP --projections-case x
 row 3 "XY" 'unknown camera' "${precompute[@]}" --study valid/study.toml --camera XY
 
 printf -- '--- study ---\n'
