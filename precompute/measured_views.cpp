@@ -18,7 +18,7 @@ namespace af {
 namespace {
 
 /// Of what was measured: more left by the CT is a mistake.
-constexpr double kMostLeft = 0.5;
+constexpr double kMostLeft = 0.7;
 
 /// The camera as the CT sees it.
 CameraGeometry in_ct_frame(CameraGeometry camera, const RigidTransform& ct_from_room) {

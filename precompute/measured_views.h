@@ -31,8 +31,9 @@ struct MeasuredViews {
 /// true pose, and subtracts what `volume` casts. For a field, only views are read that look along
 /// `beam_ct` (from source to CT, ct frame), not against it; for an atlas all. Errors as of
 /// read_study() and read_view_xray(). InputError when the case states no gold pose, when a value is
-/// not finite, when the sources are on no circle, or when the CT leaves more than half of what was
-/// measured: then the X-rays are of another object or geometry, or of another scale of attenuation.
+/// not finite, when the sources are on no circle, or when the CT leaves more than 0.7 of what was
+/// measured (of an unrelated object it would leave 1.4 times as much): then the X-rays are of
+/// another object or geometry, or of another scale of attenuation.
 std::shared_ptr<const MeasuredViews> load_measured_views(const PrecomputeOptions& options,
                                                          const AttenuationVolume& volume,
                                                          const Eigen::Vector3d& beam_ct,

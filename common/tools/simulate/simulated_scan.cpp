@@ -31,7 +31,8 @@ std::string view_file(int view) {
   return "view-" + digits + ".mha";
 }
 
-/// The middle half of the detector, where the scatter-to-primary ratio holds.
+/// The middle half of the detector: the scatter-to-primary ratio holds there, and predictions are
+/// judged there, which every view of the circle sees.
 RegionOfInterest middle_of(const CircularScan& scan) {
   const Eigen::Vector2i size = scan.size_px;
   return {size.x() / 4, size.y() / 4, size.x() / 2, size.y() / 2};
@@ -170,7 +171,7 @@ void write_elevated(const SimulateOptions& options,
       view.camera = name;
       view.xray = folder / "elevated" / (name + ".mha");
       view.xray_domain = XrayDomain::Attenuation;
-      view.roi = {0, 0, scan.size_px.x(), scan.size_px.y()};
+      view.roi = middle_of(scan);
       write_image(image, view.xray, scan.pixel_spacing_mm.x(), scan.pixel_spacing_mm.y());
       of_elevation.views.push_back(std::move(view));
       study.rig.cameras.push_back(camera);
