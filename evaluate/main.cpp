@@ -3,6 +3,7 @@
 
 #include "cli/app_main.h"
 #include "evaluate/image_quality/evaluate_image_quality.h"
+#include "evaluate/image_quality/measure_held_out.h"
 #include "evaluate/methods/evaluated_methods.h"
 #include "evaluate/population/measure_population.h"
 #include "evaluate/registration/compare_methods.h"
@@ -22,6 +23,8 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   af::evaluation::ImageQualityOptions image_quality;
   const CLI::App* image_quality_command = bind_image_quality(app, image_quality);
+  af::evaluation::HeldOutOptions held_out;
+  const CLI::App* held_out_command = bind_held_out(app, held_out);
   af::evaluation::RegistrationStudyOptions registration;
   const CLI::App* registration_command = bind_registration(app, registration);
   af::evaluation::SimilarityCurvesOptions curves;
@@ -46,6 +49,7 @@ int main(int argc, char** argv) {
   registration.program = af::shell_quoted(argv[0]);
   return af::cli::app_main(app, argc, argv, [&](const af::Communicator& world) {
     if (image_quality_command->parsed()) run_image_quality(image_quality, command_line, world);
+    if (held_out_command->parsed()) run_held_out(held_out, world);
     if (registration_command->parsed()) run_registration(registration, command_line, world);
     if (curves_command->parsed()) run_similarity_curves(curves, command_line, world);
     if (field_parameters_command->parsed())

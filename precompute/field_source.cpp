@@ -151,6 +151,13 @@ FieldSource load_source(const PrecomputeOptions& options, const Communicator& co
   }
   if (!options.cover_rig.empty())
     source.more_cameras = shared_rig(options.cover_rig, communicator, &source.warnings).cameras;
+  if (!options.projections.empty())
+    source.projections = load_measured_views(
+        options,
+        *source.volume,
+        source.frame.nominal_room_from_ct().linear().transpose() * source.camera.beam_direction(),
+        communicator,
+        source.warnings);
   return source;
 }
 

@@ -9,6 +9,7 @@
 #include "geometry/camera_geometry.h"
 #include "geometry/rigid_transform.h"
 #include "parallel/communicator.h"
+#include "precompute/measured_views.h"
 #include "precompute/plan/precompute_options.h"
 #include "volume/attenuation_volume.h"
 #include "volume/ct_read_options.h"
@@ -26,7 +27,9 @@ struct FieldSource {
   PoseFrame frame;
   Eigen::Vector3d isocenter_point = Eigen::Vector3d::Zero();  ///< of the rig
   MotionRange range;                         ///< about the nominal pose: of the options
+  std::vector<HalfSpace> sources;            ///< of it, poses to hold: LightSlabSpec::sources
   std::vector<CameraGeometry> more_cameras;  ///< whose rays the field holds, too
+  std::shared_ptr<const MeasuredViews> projections;  ///< that correct the field; null: none
   std::vector<std::string> warnings;
 };
 

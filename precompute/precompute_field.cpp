@@ -91,11 +91,21 @@ DecidingValues casting_decides(const PrecomputeOptions& options,
         std::to_string(camera.size_px.x()) + " x " + std::to_string(camera.size_px.y());
   };
   decides["ct_content_sha256"] = source.ct_content_sha256;
+  if (source.projections != nullptr)
+    decides["projections sha256"] = source.projections->content_sha256;
   add_camera(source.camera, "camera");
   for (std::size_t i = 0; i < source.more_cameras.size(); ++i)
     add_camera(source.more_cameras[i], "covered camera " + std::to_string(i + 1));
-  for (std::size_t i = 0; options.is_atlas() && i < parts.size(); ++i)
-    add_camera(parts[i].source.camera, "camera of member " + std::to_string(i));
+  for (std::size_t i = 0; options.is_atlas() && i < parts.size(); ++i) {
+    const FieldSource& part = parts[i].source;
+    const std::string of_member = " of member " + std::to_string(i);
+    add_camera(part.camera, "camera" + of_member);
+    decides["range" + of_member] = numbers_text(part.range.low.deg_and_mm().data(), 6) + " " +
+                                   numbers_text(part.range.high.deg_and_mm().data(), 6);
+    for (const HalfSpace& half_space : part.sources)
+      decides["sources" + of_member] +=
+          numbers_text(half_space.normal) + " " + numbers_text(&half_space.offset_mm, 1) + " ";
+  }
   decides["nominal rotation"] = numbers_text(source.frame.rotation);
   decides["center_ct_mm"] = numbers_text(source.frame.center_ct_mm);
   decides["nominal center_room_mm"] = numbers_text(source.frame.center_room_mm);
@@ -242,6 +252,7 @@ class PrecomputeRun {
     WorkNote note("reading the CT", WorkNote::Kind::Phase);
     source_ = load_source(options_, world_);
     for (const std::string& warning : source_.warnings) warn(world_, warning);
+    if (source_.projections != nullptr) inform(world_, source_.projections->text());
     parts_ = field_parts(source_, options_, world_);
     for (FieldPart& part : parts_) size_planes(part, DepthSlabs{{}, {0.0}});
     lattice_ = lattice_of(parts_);
@@ -302,6 +313,7 @@ class PrecomputeRun {
 
   [[nodiscard]] std::uint64_t volume_bytes() const {
     std::uint64_t bytes = source_.volume->voxels().size_bytes();
+    if (source_.projections != nullptr) bytes += source_.projections->bytes;
     for (const FieldPart& part : parts_)
       if (part.resampled != nullptr) bytes += part.resampled->bytes();
     return bytes;
@@ -527,11 +539,12 @@ class PrecomputeRun {
     return [this] { return run_.is_stop_requested(); };
   }
 
-  [[nodiscard]] FieldIdentity identity_of(const FieldSource& source) const {
+  [[nodiscard]] FieldIdentity identity_of(const FieldSource& source,
+                                          const MotionRange& range) const {
     const AttenuationModel& model = options_.attenuation;
     return {source.camera,
             source.frame,
-            source.range,
+            range,
             source.ct_content_sha256,
             model.mu_water_per_mm,
             model.air_below_hu,
@@ -544,12 +557,12 @@ class PrecomputeRun {
                              const MakeProvenance& make_provenance) const {
     const IndexPacking packing =
         options_.packs_by_codebook_tree() ? IndexPacking::CodebookTree : IndexPacking::Deflate;
-    AttenuationAtlas atlas{identity_of(source_),
+    AttenuationAtlas atlas{identity_of(source_, source_.range),
                            {},
                            quantizer().step(),
                            field_codebook(trained, options_.design().mean_step)};
     for (const FieldPart& part : parts_)
-      atlas.members.push_back({identity_of(part.source), part.light_slab});
+      atlas.members.push_back({identity_of(part.source, part.range), part.light_slab});
     if (options_.is_atlas())
       return write_atlas(
           atlas, next_blocks, make_provenance, options_.output, world_, hints(), packing);
@@ -576,13 +589,19 @@ class PrecomputeRun {
                                               const BuildStatistics& statistics) const {
     PrecomputeOptions recorded = options_;
     recorded.ct_reading = source_.ct_reading;  // in force, where a study states it
-    const Provenance provenance = {"af-precompute",
-                                   command_line_,
-                                   to_toml(recorded),
-                                   options_.seed,
-                                   world_.size(),
-                                   {{source_.ct_path, source_.ct_content_sha256}}};
+    Provenance provenance = {"af-precompute",
+                             command_line_,
+                             to_toml(recorded),
+                             options_.seed,
+                             world_.size(),
+                             {{source_.ct_path, source_.ct_content_sha256}}};
+    if (source_.projections != nullptr)
+      provenance.input_sha256[source_.projections->path] = source_.projections->content_sha256;
     nlohmann::json json = to_json(provenance);
+    if (source_.projections != nullptr)
+      json["projections"] = {{"views", source_.projections->views.size()},
+                             {"measured_rms", source_.projections->measured_rms},
+                             {"residual_rms", source_.projections->residual_rms}};
     json["training"] = training_json(trained);
     if (choice_) json["design"] = design_json(*choice_);
     json["occupied_tiles"] = cast.occupied_tiles;

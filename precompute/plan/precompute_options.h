@@ -61,6 +61,11 @@ struct PrecomputeOptions {
   AttenuationModel attenuation;
   std::string material = "all";  ///< or "bone"
 
+  /// Study of measured X-rays that correct the field; empty: none.
+  std::string projections;
+  std::string projections_case;
+  double projections_smoothing_px = 0.0;
+
   std::optional<int> codewords;
   int max_iterations = CodebookOptions{}.max_iterations;
   std::optional<double> min_improvement;    ///< none: min_improvement_of() the design

@@ -3,7 +3,7 @@ af_add_test(
   precompute_test
   SOURCES unit/precompute/units/unit_planner_test.cpp unit/precompute/units/unit_tiles_test.cpp unit/precompute/codebook/nearest_codeword_test.cpp
           unit/precompute/codebook/mean_removal_test.cpp
-          unit/precompute/plan/precompute_options_test.cpp unit/precompute/casting/field_caster_test.cpp unit/precompute/codebook/codebook_training_test.cpp
+          unit/precompute/plan/precompute_options_test.cpp unit/precompute/casting/field_caster_test.cpp unit/precompute/casting/measured_residual_test.cpp unit/precompute/codebook/codebook_training_test.cpp
   LIBS af_precompute af_text)
 
 af_add_test(
@@ -36,3 +36,11 @@ set_tests_properties(precompute_program PROPERTIES LABELS mpi TIMEOUT 1800 PROCE
 add_test(NAME atlas_program COMMAND ${PROJECT_SOURCE_DIR}/tests/checks/atlas_program.sh
                                     ${PROJECT_BINARY_DIR}/bin ${MPIEXEC_EXECUTABLE})
 set_tests_properties(atlas_program PROPERTIES LABELS mpi TIMEOUT 900 PROCESSORS 2)
+
+af_add_program_tests(
+  measured_fields_tests
+  SOURCES programs/measured_fields_test.cpp
+  LIBS af_image_files af_text
+  PROGRAMS af-simulate af-scan af-precompute af-evaluate
+  TIMEOUT 600
+  PROCESSORS 2)

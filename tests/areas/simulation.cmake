@@ -21,3 +21,7 @@ af_add_test(
   TIMEOUT 300)
 target_compile_definitions(af_simulate_test PRIVATE AF_SIMULATE_PROGRAM="$<TARGET_FILE:af-simulate>")
 add_dependencies(af_simulate_test af-simulate)
+af_add_test(
+  simulated_scan_test
+  SOURCES unit/simulation/simulated_scan_test.cpp
+  LIBS af_simulated_study)

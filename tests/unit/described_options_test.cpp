@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "evaluate/image_quality/evaluate_image_quality.h"
+#include "evaluate/image_quality/measure_held_out.h"
 #include "evaluate/registration/compare_methods.h"
 #include "evaluate/registration/evaluate_registrations.h"
 #include "evaluate/registration/join_studies.h"
@@ -120,6 +121,7 @@ using AllOptions = testing::Types<PrecomputeOptions,
                                   registration::MethodOptions,
                                   registration::RegisterOptions,
                                   evaluation::ImageQualityOptions,
+                                  evaluation::HeldOutOptions,
                                   evaluation::RegistrationStudyOptions,
                                   evaluation::SimilarityCurvesOptions,
                                   evaluation::FieldParametersOptions,

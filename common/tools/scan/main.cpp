@@ -35,11 +35,14 @@ CalibratedScan calibrated_scan(const ScanOptions& options,
   CalibratedScan scan;
   scan.name = file.name;
   const auto report = [&](const std::string& line) { inform(world, line); };
-  scan.calibration = self_calibrate(images, even, how, pool, report);
+  scan.calibration = options.is_as_stated ? ScanCalibration::nominal(images.scan, 0)
+                                          : self_calibrate(images, even, how, pool, report);
   inform(world, "Judging by the odd views");
-  scan.as_stated =
-      held_out_residual(images, stated_calibration(images, even, how), even, odd, how, pool);
   scan.calibrated = held_out_residual(images, scan.calibration, even, odd, how, pool);
+  scan.as_stated =
+      options.is_as_stated
+          ? scan.calibrated
+          : held_out_residual(images, stated_calibration(images, even, how), even, odd, how, pool);
   inform(world, "Reconstructing the even views");
   FdkOptions fdk = options.fdk;
   constexpr double kVoxelPx = 1.5;

@@ -38,11 +38,19 @@ void ScanOptions::describe(Fields& field) {
         "Places where an X-ray differs from its prediction by more than so many robust standard "
         "deviations are masked: something moved during the scan; 0: no masks")
       .within(0.0, 1000.0);
+  field("write_projections",
+        writes_projections,
+        "Write every view, too: projections.toml is a study whose case 'measured' has the even "
+        "views, for af-precompute --projections, and 'held-out' the odd ones, for af-evaluate "
+        "held-out");
   field("seed", seed, "Seed of the nominal poses");
   field("threads", threads, "Threads; 0: every processor")
       .within(0, 1024)
       .not_recorded("results do not depend on it");
   field.start_group("Self-calibration");
+  field("as_stated",
+        is_as_stated,
+        "None: the stated geometry is exact, of a calibrated or simulated scanner");
   field.part(calibration);
   field.start_group("Reconstruction");
   field.part(fdk);

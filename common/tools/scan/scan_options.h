@@ -24,6 +24,8 @@ struct ScanOptions {
   double max_offset_rotation_deg = 3.0;
   double max_offset_translation_mm = 5.0;
   double mask_deviations = 6.0;
+  bool is_as_stated = false;        ///< the stated geometry is the true one
+  bool writes_projections = false;  ///< all views, for fields that they correct
   std::uint64_t seed = 1;
   int threads = 0;
 

@@ -220,6 +220,54 @@ void write_held_out(const CalibratedScan& scan, const fs::path& path) {
   write_text_file(path, text);
 }
 
+/// Every second view of the scan as a case of known pose, with X-rays in `folder`.
+StudyCase projections_case(const CalibratedScan& scan,
+                           const std::string& name,
+                           int first_view,
+                           const RegionOfInterest& region,
+                           const fs::path& folder) {
+  const int count = static_cast<int>(scan.images.scan.angles_rad.size());
+  StudyCase result = case_of(scan,
+                             name,
+                             RigidTransform::Identity(),
+                             CircularScan::every(first_view, 2, count),
+                             region,
+                             folder / "projections");
+  result.ct = folder / "ct.nii.gz";
+  const std::vector<unsigned char>& is_lit = scan.images.is_lit;
+  const bool has_dark = std::find(is_lit.begin(), is_lit.end(), 0) != is_lit.end();
+  for (StudyView& view : result.views) {
+    view.mask.reset();
+    if (has_dark) view.mask = folder / "projections" / "lit.png";
+  }
+  return result;
+}
+
+/// projections.toml, its rig, and the folder of its X-rays.
+void write_projections(const CalibratedScan& scan,
+                       const RegionOfInterest& region,
+                       const fs::path& folder) {
+  const CircularScan& geometry = scan.images.scan;
+  fs::create_directory(folder / "projections");
+  Study study;
+  study.path = folder / "projections.toml";
+  study.rig_name_or_path = (folder / "projections" / "rig.toml").string();
+  study.cases = {projections_case(scan, "measured", 0, region, folder),
+                 projections_case(scan, "held-out", 1, region, folder)};
+  for (std::size_t view = 0; view < geometry.angles_rad.size(); ++view) {
+    study.rig.cameras.push_back(camera_of(scan, static_cast<int>(view)));
+    write_image(scan.images.line_integrals[view],
+                folder / "projections" / (view_name(static_cast<int>(view)) + ".mha"),
+                geometry.pixel_spacing_mm.x(),
+                geometry.pixel_spacing_mm.y());
+  }
+  Image2d lit(geometry.size_px.x(), geometry.size_px.y());
+  std::copy(scan.images.is_lit.begin(), scan.images.is_lit.end(), lit.pixels.begin());
+  write_png_image(lit, folder / "projections" / "lit.png", 0.0, 1.0);
+  write_text_file(study.rig_name_or_path, rig_to_toml(study.rig));
+  write_text_file(study.path, study_to_toml(study, folder));
+}
+
 }  // namespace
 
 std::vector<ViewPair> odd_view_pairs(const CircularScan& scan, int pairs) {
@@ -297,6 +345,7 @@ std::string write_scan_study(const ScanOptions& options,
       write_view(options, scan, view, region, folder);
     }
   }
+  if (options.writes_projections) write_projections(scan, region, folder);
   write_ct(scan.ct, folder / "ct.nii.gz");
   write_text_file(folder / "rig.toml", rig_to_toml(study.rig));
   write_text_file(folder / "study.toml", study_to_toml(study, folder));

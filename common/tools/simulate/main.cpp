@@ -18,6 +18,7 @@
 #include "text/csv_table.h"
 #include "text/options_toml.h"
 #include "tools/simulate/simulate_options.h"
+#include "tools/simulate/simulated_scan.h"
 #include "tools/simulate/simulated_study.h"
 
 namespace {
@@ -98,6 +99,21 @@ SimulatedCase imaged_case(const SimulateOptions& options,
   return simulated;
 }
 
+/// Writes a cone-beam scan into `folder`.
+void take_scan(const SimulateOptions& options,
+               const Patient& imaged,
+               const CameraRig& rig,
+               const Provenance& provenance,
+               const std::filesystem::path& folder) {
+  const CameraGeometry& camera =
+      options.cone_beam.camera.empty() ? rig.cameras.front() : rig.camera(options.cone_beam.camera);
+  const CircularScan scan = orbit_of(camera, rig.isocenter_point, options.cone_beam);
+  std::optional<Phantom> bodies;
+  if (!options.phantom.empty()) bodies = phantom_of(options);
+  ProgressPrinter printer("Taking X-rays", true);
+  write_simulated_scan(options, imaged.ct, bodies, scan, provenance, folder, printer.callback());
+}
+
 std::string summary(const SimulatedCase& simulated, const std::filesystem::path& folder) {
   const auto offset = simulated.true_offset.deg_and_mm();
   std::string text = "True pose, relative to nominal:";
@@ -130,19 +146,24 @@ void run(const SimulateOptions& options,
 
   inform(world, options.phantom.empty() ? "Reading " + options.ct : "Making the phantom");
   const Patient imaged = patient(options, world);
-  SimulatedCase simulated = imaged_case(options, imaged, rig, folder.path());
-  inform(world, "Writing the study");
-  simulated.study_case.ct = ct_of_study(options, imaged.ct, simulated, folder.path());
-  // A copy is in HU.
-  if (!options.ct.empty() && simulated.study_case.ct == std::filesystem::absolute(options.ct))
-    simulated.study_case.ct_reading = options.ct_reading;
-
   const Provenance provenance = {"af-simulate",
                                  command_line,
                                  to_toml(options),
                                  options.seed,
                                  world.size(),
                                  {{"ct_content", ct_content_sha256(imaged.ct)}}};
+  if (options.cone_beam.views > 0) {
+    take_scan(options, imaged, rig, provenance, folder.path());
+    folder.commit();
+    inform(world, "Scan: " + (folder.final_path() / "scan.toml").string());
+    return;
+  }
+  SimulatedCase simulated = imaged_case(options, imaged, rig, folder.path());
+  inform(world, "Writing the study");
+  simulated.study_case.ct = ct_of_study(options, imaged.ct, simulated, folder.path());
+  // A copy is in HU.
+  if (!options.ct.empty() && simulated.study_case.ct == std::filesystem::absolute(options.ct))
+    simulated.study_case.ct_reading = options.ct_reading;
   write_study_files(options, rig, simulated, provenance, folder.path());
   folder.commit();
   inform(world, summary(simulated, folder.final_path()));
@@ -157,7 +178,8 @@ int main(int argc, char** argv) {
   CLI::App app{
       "Makes a registration study with a known answer: X-rays of a CT or phantom by an exact "
       "polyenergetic projector with scatter, noise, blur and grey levels, steel fiducials and "
-      "their detections, regions of interest, and the true pose."};
+      "their detections, regions of interest, and the true pose. With --cone-beam a circular scan "
+      "for af-scan instead."};
   cli::bind_options(app, options);
   const std::string command_line = cli::command_line(argc, argv);
   return cli::app_main(

@@ -96,6 +96,25 @@ void describe_truth(Fields& field, SimulateOptions& o) {
       .within(0.0, 100.0);
 }
 
+void append_scan_problems(const SimulateOptions& options, std::vector<std::string>& found) {
+  const ConeBeamOptions& scan = options.cone_beam;
+  if (scan.views == 0) {
+    if (!scan.elevations_deg.empty())
+      found.push_back("elevations_deg: are of a scan: they need --cone-beam");
+    return;
+  }
+  if (scan.orbit_deg == 0.0)
+    found.push_back("orbit_deg = 0: must not be 0, because the source goes round");
+  if (!options.stress.names.empty())
+    found.push_back("stress: is of studies; a scan's X-rays have the effects of Imaging alone");
+  if (options.xray_format != "mha")
+    found.push_back("xray_format = " + options.xray_format + ": a scan's X-rays are mha");
+  for (const double elevation : scan.elevations_deg)
+    if (!(std::abs(elevation) <= 80.0))
+      found.push_back("elevations_deg = " + number_text(elevation) +
+                      ": must be within -80 and 80 degrees");
+}
+
 /// Studies are refused whose target box breaks the rule of target_box_problem().
 void append_target_problems(const SimulateOptions& options, std::vector<std::string>& found) {
   for (const double value : options.center_ct_mm)
@@ -141,6 +160,7 @@ std::vector<std::string> problems(const SimulateOptions& options) {
   if (options.phantom_options.anatomy_seed && options.phantom.empty())
     found.push_back("anatomy-seed: needs a phantom; a CT is one patient");
   append_target_problems(options, found);
+  append_scan_problems(options, found);
   const int bits = options.xray_in_force().detector.bits;
   if (options.xray_format == "dicom" && (bits < 8 || bits > 16))
     found.push_back("xray_format = dicom: needs 8 to 16 bits, not " + std::to_string(bits) +
@@ -153,6 +173,33 @@ std::vector<std::string> problems(const SimulateOptions& options) {
 Phantom phantom_of(const SimulateOptions& options) {
   return make_phantom(
       options.phantom, options.phantom_options.has_metal, options.phantom_options.anatomy_seed);
+}
+
+void ConeBeamOptions::describe(Fields& field) {
+  field("cone_beam",
+        views,
+        "Take so many X-rays on a circle about the CT's centre and write a scan for af-scan: "
+        "scan.toml, an X-ray per view, and ct.nii.gz; those of a phantom are of its bodies, not of "
+        "voxels. 0: a study")
+      .within(0, 100000);
+  field("scan_camera",
+        camera,
+        "Camera of the rig whose distances and detector the scan has [the first]");
+  field("orbit_deg",
+        orbit_deg,
+        "Angle that the views share; below 0 the source goes round the other way; af-scan needs "
+        "360")
+      .within(-360.0, 360.0);
+  field("first_angle_deg", first_angle_deg, "Angle of the first view").within(-360.0, 360.0);
+  field("elevations_deg",
+        elevations_deg,
+        "Also write elevated.toml: X-rays without noise from so many degrees above the circle, "
+        "e.g. 0,2,8, to judge predictions by")
+      .comma_separated();
+  field("elevated_views",
+        elevated_views,
+        "Of each elevation, at the angles of odd views around the first")
+      .within(1, 1000);
 }
 
 void SimulateOptions::describe(Fields& field) {
@@ -169,6 +216,8 @@ void SimulateOptions::describe(Fields& field) {
   field.part(xray);
   field.start_group("Stress (what real X-rays have; strengths count only where named by --stress)");
   field.part(stress);
+  field.start_group("Cone-beam scan (instead of a study)");
+  field.part(cone_beam);
   // Files of studies have them so.
   field.name_like_options();
 }

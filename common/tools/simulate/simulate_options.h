@@ -13,6 +13,19 @@
 
 namespace af::tools {
 
+/// A cone-beam scan instead of a study.
+struct ConeBeamOptions {
+  int views = 0;  ///< 0: a study
+  std::string camera;
+  double orbit_deg = 360.0;
+  double first_angle_deg = 0.0;
+  std::vector<double> elevations_deg;
+  int elevated_views = 4;
+
+  [[nodiscard]] double step_deg() const { return orbit_deg / views; }
+  void describe(Fields& field);
+};
+
 /// What af-simulate is asked for. Empty strings and vectors mean: not given.
 struct SimulateOptions {
   std::string ct;
@@ -41,6 +54,7 @@ struct SimulateOptions {
   XraySimulationOptions xray;
   bool is_ideal = false;
   StressOptions stress;
+  ConeBeamOptions cone_beam;
 
   /// The imaging chain that is used: `xray`, or all its effects off when is_ideal, with the wanted
   /// stress.

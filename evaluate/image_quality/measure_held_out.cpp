@@ -1,0 +1,288 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluate/image_quality/measure_held_out.h"
+
+#include <cmath>
+#include <iostream>
+#include <memory>
+#include <optional>
+
+#include <CLI/CLI.hpp>
+
+#include "base/error.h"
+#include "base/sample_summary.h"
+#include "base/thread_pool.h"
+#include "cli/bind_options.h"
+#include "drr/field_renderer.h"
+#include "drr/ray_cast_drr.h"
+#include "field_use/opened_field.h"
+#include "files/output_file.h"
+#include "image/gaussian_blur.h"
+#include "image/psnr.h"
+#include "run/terminal.h"
+#include "study/node_ct.h"
+#include "study/shared_inputs.h"
+#include "study/xray_reader.h"
+#include "text/csv_table.h"
+
+namespace af::evaluation {
+namespace {
+
+/// Ray casting, or a field.
+struct Predictor {
+  std::string name;
+  std::shared_ptr<const DrrRenderer> renderer;
+};
+
+/// One X-ray and one prediction of it.
+struct HeldOutRow {
+  std::string case_name;
+  std::string camera;
+  std::string predictor;
+  double psnr_db;
+  double smoothed_psnr_db;
+};
+
+struct HeldOutRows {
+  std::vector<HeldOutRow> rows;
+  int views_outside = 0;  ///< of which a field lacks rays
+};
+
+/// PSNR over chosen pixels; NaN when the X-ray shows nothing there.
+double psnr_over(const Image2d& predicted,
+                 const Image2d& measured,
+                 const std::vector<std::size_t>& pixels) {
+  std::vector<float> drr;
+  std::vector<float> reference;
+  for (const std::size_t pixel : pixels) {
+    drr.push_back(predicted.pixels[pixel]);
+    reference.push_back(measured.pixels[pixel]);
+  }
+  const std::optional<Psnr> result = psnr(drr, reference);
+  return result ? result->psnr_db : std::nan("");
+}
+
+/// Pixels of the region that no mask hides and where the CT casts something.
+std::vector<std::size_t> judged_pixels(const ViewXray& xray,
+                                       const RegionOfInterest& region,
+                                       const Image2d& cast) {
+  std::vector<std::size_t> pixels;
+  for (int row = region.row; row < region.row + region.height; ++row)
+    for (int column = region.column; column < region.column + region.width; ++column) {
+      const std::size_t pixel =
+          static_cast<std::size_t>(row) * static_cast<std::size_t>(cast.width) +
+          static_cast<std::size_t>(column);
+      const bool is_used = xray.mask.pixels.empty() || xray.mask.pixels[pixel] != 0.0F;
+      if (is_used && cast.pixels[pixel] > 0.0F) pixels.push_back(pixel);
+    }
+  return pixels;
+}
+
+/// The whole detector, with the region's pixels rendered and the others 0.
+Image2d rendered_region(const DrrRenderer& renderer,
+                        const RigidTransform& room_from_ct,
+                        const View& view) {
+  const Image2d part = render_image(renderer, room_from_ct, view);
+  Image2d whole(view.camera.size_px.x(), view.camera.size_px.y());
+  for (int row = 0; row < part.height; ++row)
+    for (int column = 0; column < part.width; ++column)
+      whole.at(view.roi.column + column, view.roi.row + row) = part.at(column, row);
+  return whole;
+}
+
+void judge_view(const HeldOutOptions& options,
+                const Study& study,
+                const StudyCase& study_case,
+                const StudyView& study_view,
+                const std::vector<Predictor>& predictors,
+                HeldOutRows& found) {
+  const View view = {study.rig.camera(study_view.camera), study_view.roi};
+  const RigidTransform& pose = *study_case.gold_room_from_ct;
+  for (const Predictor& predictor : predictors)
+    if (predictor.renderer->rays_outside(pose, view) > 0) {
+      ++found.views_outside;
+      return;
+    }
+  ViewXray xray = read_view_xray(study_view, view.camera);
+  const Image2d cast = rendered_region(*predictors.front().renderer, pose, view);
+  const std::vector<std::size_t> pixels = judged_pixels(xray, view.roi, cast);
+  // Beyond the region no DRR is rendered: smoothing must not fetch the X-ray from there, either.
+  Image2d measured(cast.width, cast.height);
+  for (const std::size_t pixel : pixels) measured.pixels[pixel] = xray.attenuation.pixels[pixel];
+  const Image2d smooth_measured = gaussian_blur(measured, options.smoothing_px);
+  for (const Predictor& predictor : predictors) {
+    const Image2d drr = rendered_region(*predictor.renderer, pose, view);
+    Image2d predicted(drr.width, drr.height);
+    for (const std::size_t pixel : pixels) predicted.pixels[pixel] = drr.pixels[pixel];
+    found.rows.push_back(
+        {study_case.name,
+         study_view.camera,
+         predictor.name,
+         psnr_over(predicted, measured, pixels),
+         psnr_over(gaussian_blur(predicted, options.smoothing_px), smooth_measured, pixels)});
+  }
+}
+
+CsvTable rows_table(const std::vector<HeldOutRow>& rows) {
+  CsvTable table({"case", "camera", "prediction", "psnr_db", "smoothed_psnr_db"});
+  for (const HeldOutRow& row : rows)
+    table.add_row({row.case_name,
+                   row.camera,
+                   row.predictor,
+                   number_text(row.psnr_db),
+                   number_text(row.smoothed_psnr_db)});
+  return table;
+}
+
+std::string mean_and_least(std::vector<double> values) {
+  const SampleSummary summary = summarize(std::move(values));
+  return fixed_text(summary.mean, 2) + " (" + fixed_text(summary.minimum, 2) + ")";
+}
+
+std::string markdown(const HeldOutOptions& options,
+                     const HeldOutRows& found,
+                     const std::vector<std::string>& case_names,
+                     const std::vector<Predictor>& predictors) {
+  std::string text = "| Case | Prediction | Views | PSNR, mean (least) dB | smoothed by " +
+                     number_text(options.smoothing_px) + " px |\n|---|---|---:|---:|---:|\n";
+  for (const std::string& case_name : case_names)
+    for (const Predictor& predictor : predictors) {
+      std::vector<double> raw;
+      std::vector<double> smoothed;
+      for (const HeldOutRow& row : found.rows) {
+        if (row.case_name != case_name || row.predictor != predictor.name) continue;
+        raw.push_back(row.psnr_db);
+        smoothed.push_back(row.smoothed_psnr_db);
+      }
+      if (raw.empty()) continue;
+      text += "| " + case_name + " | " + predictor.name + " | " + std::to_string(raw.size()) +
+              " | " + mean_and_least(raw) + " | " + mean_and_least(smoothed) + " |\n";
+    }
+  if (found.views_outside > 0)
+    text += "\n" + std::to_string(found.views_outside) +
+            " views are left out: a field does not hold all rays of their regions.\n";
+  return text;
+}
+
+/// Collective. Ray casting first, then the fields under their files' names.
+std::vector<Predictor> load_predictors(const HeldOutOptions& options, const Communicator& world) {
+  const auto pool = std::make_shared<ThreadPool>(thread_count(options.threads));
+  std::vector<Predictor> fields;
+  std::vector<std::string> warnings;
+  std::optional<FieldIdentity> identity;
+  for (const std::filesystem::path& path : options.fields) {
+    const OpenedField field(path, world);
+    if (!identity) identity = field.identity();
+    all_or_none(world, [&] {
+      if (field.identity().ct_content_sha256 != identity->ct_content_sha256)
+        throw FileError(path.string(),
+                        "CT of the field (ct_content_sha256)",
+                        field.identity().ct_content_sha256,
+                        identity->ct_content_sha256 + ", that of the first field");
+    });
+    fields.push_back({path.filename().string(), field.renderer(options.look_up, pool)});
+  }
+  const NodeCt ct = read_ct_per_node(options.ct,
+                                     options.ct_reading,
+                                     {identity->mu_water_per_mm, identity->air_below_hu},
+                                     world,
+                                     warnings);
+  for (const std::string& text : warnings) warn(world, text);
+  all_or_none(world, [&] {
+    if (ct.facts.content_sha256 != identity->ct_content_sha256)
+      throw FileError(options.fields.front().string(),
+                      "CT of the field (ct_content_sha256)",
+                      ct.facts.content_sha256 + " (" + options.ct.string() + ")",
+                      identity->ct_content_sha256);
+  });
+  std::vector<Predictor> predictors = {
+      {"ray casting", std::make_shared<const RayCastDrr>(ct.volume, options.ray_caster, pool)}};
+  predictors.insert(predictors.end(), fields.begin(), fields.end());
+  return predictors;
+}
+
+}  // namespace
+
+void HeldOutOptions::describe(Fields& field_list) {
+  field_list("study", study, "study.toml of X-rays whose cases state gold_room_from_ct")
+      .input()
+      .required();
+  field_list("case", cases, "Case of the study, may be repeated (default: all)");
+  field_list("field", fields, "Field file, once per field to compare; all of one CT")
+      .one_at_a_time()
+      .input()
+      .required();
+  field_list("ct", ct, "The CT that the fields were made from").input().required();
+  field_list.part(ct_reading);
+  field_list.part(ray_caster);
+  field_list(
+      "look_up", look_up, "How DRRs are looked up [each field's own way]. " + field_look_up_help())
+      .choice(field_look_up_names());
+  field_list("smoothing_px",
+             smoothing_px,
+             "Gaussian by which X-rays and predictions are smoothed for the second PSNR, standard "
+             "deviation in pixels")
+      .within(0.0, 100.0);
+  field_list("threads", threads, "Threads; 0: every processor").within(0, 1024);
+  field_list("output", output, "The Markdown file; the CSV takes its name, .csv").as("-o,--output");
+}
+
+std::vector<std::string> problems(const HeldOutOptions& options) {
+  std::vector<std::string> found = field_problems(options);
+  if (options.output.extension() == ".csv")
+    found.push_back("--output = " + options.output.string() +
+                    ": must name the table in Markdown; the CSV stands beside it under that name");
+  return found;
+}
+
+CLI::App* bind_held_out(CLI::App& app, HeldOutOptions& options) {
+  CLI::App* command = app.add_subcommand(
+      "held-out",
+      "How well fields, and ray casting through their CT, predict X-rays whose true pose is known: "
+      "PSNR with the X-ray as the reference, per view and as a table");
+  cli::bind_options(*command, options);
+  return command;
+}
+
+void run_held_out(const HeldOutOptions& options, const Communicator& world) {
+  std::filesystem::path csv = options.output;
+  csv.replace_extension(".csv");
+  std::vector<std::string> warnings;
+  all_or_none(world, [&] {
+    throw_if_any(problems(options));
+    if (!world.is_root()) return;
+    announce_output(csv);
+    announce_output(options.output);
+  });
+  const Study study = shared_study(options.study, world, &warnings);
+  for (const std::string& text : warnings) warn(world, text);
+  const std::vector<const StudyCase*> chosen = all_or_none(world, [&] {
+    const std::vector<const StudyCase*> cases = study.chosen_cases(options.cases);
+    for (const StudyCase* study_case : cases)
+      if (!study_case->gold_room_from_ct)
+        throw InputError("case '" + study_case->name + "': gold_room_from_ct",
+                         "none",
+                         "must be in the study",
+                         study.path.string());
+    return cases;
+  });
+  const std::vector<Predictor> predictors = load_predictors(options, world);
+  all_or_none(world, [&] {
+    if (!world.is_root()) return;
+    HeldOutRows found;
+    std::vector<std::string> names;
+    for (const StudyCase* study_case : chosen) {
+      names.push_back(study_case->name);
+      for (const StudyView& view : study_case->views)
+        judge_view(options, study, *study_case, view, predictors, found);
+    }
+    if (found.rows.empty())
+      throw InputError(
+          "study", options.study.string(), "no view has all rays of its region in the fields");
+    const std::string text = markdown(options, found, names, predictors);
+    write_text_file(csv, rows_table(found.rows).to_text());
+    write_text_file(options.output, text);
+    std::cout << text;
+  });
+}
+
+}  // namespace af::evaluation

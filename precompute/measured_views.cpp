@@ -1,0 +1,224 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "precompute/measured_views.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <sstream>
+
+#include "base/error.h"
+#include "drr/ray_cast_drr.h"
+#include "files/sha256.h"
+#include "image/gaussian_blur.h"
+#include "study/shared_inputs.h"
+#include "study/xray_reader.h"
+
+namespace af {
+
+namespace {
+
+/// Of what was measured: more left by the CT is a mistake.
+constexpr double kMostLeft = 0.7;
+
+/// The camera as the CT sees it.
+CameraGeometry in_ct_frame(CameraGeometry camera, const RigidTransform& ct_from_room) {
+  camera.source_point = ct_from_room * camera.source_point;
+  camera.detector_origin_point = ct_from_room * camera.detector_origin_point;
+  camera.column_direction = ct_from_room.linear() * camera.column_direction;
+  camera.row_direction = ct_from_room.linear() * camera.row_direction;
+  return camera;
+}
+
+const StudyCase& case_with_gold_pose(const Study& study, const PrecomputeOptions& options) {
+  const StudyCase& study_case = study.find_case(options.projections_case);
+  if (!study_case.gold_room_from_ct)
+    throw InputError("gold_room_from_ct",
+                     "none",
+                     "case '" + study_case.name +
+                         "' must state it: measured projections correct a field only where the "
+                         "pose of the CT is known",
+                     options.projections);
+  return study_case;
+}
+
+std::vector<CameraGeometry> cameras_of(const Study& study,
+                                       const std::vector<StudyView>& views,
+                                       const RigidTransform& ct_from_room) {
+  std::vector<CameraGeometry> cameras;
+  for (const StudyView& view : views)
+    cameras.push_back(in_ct_frame(study.rig.camera(view.camera), ct_from_room));
+  return cameras;
+}
+
+/// Where each view's pixels begin, and how many there are in all.
+std::vector<std::size_t> pixel_places(const std::vector<CameraGeometry>& cameras) {
+  std::vector<std::size_t> places = {0};
+  for (const CameraGeometry& camera : cameras)
+    places.push_back(places.back() + static_cast<std::size_t>(camera.size_px.x()) *
+                                         static_cast<std::size_t>(camera.size_px.y()));
+  return places;
+}
+
+/// Line integrals of one view; NaN where a mask hides them.
+void read_measured(const StudyView& view,
+                   const CameraGeometry& camera,
+                   std::span<float> values,
+                   std::vector<std::string>& warnings) {
+  const ViewXray xray = read_view_xray(view, camera);
+  warnings.insert(warnings.end(), xray.warnings.begin(), xray.warnings.end());
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const bool is_hidden = !xray.mask.pixels.empty() && xray.mask.pixels[i] == 0.0F;
+    if (!is_hidden && !std::isfinite(xray.attenuation.pixels[i]))
+      throw InputError(
+          "pixel " + std::to_string(i), "NaN or infinite", "must be finite", view.xray.string());
+    values[i] = is_hidden ? std::nanf("") : xray.attenuation.pixels[i];
+  }
+}
+
+std::string content_hash(const std::vector<CameraGeometry>& cameras,
+                         std::span<const float> measured,
+                         double smoothing_px) {
+  std::ostringstream text;
+  text.precision(17);
+  text << sha256_hex(std::as_bytes(measured)) << ' ' << smoothing_px;
+  for (const CameraGeometry& camera : cameras)
+    text << '\n'
+         << camera.source_point.transpose() << ' ' << camera.detector_origin_point.transpose()
+         << ' ' << camera.column_direction.transpose() << ' ' << camera.row_direction.transpose()
+         << ' ' << camera.pixel_spacing_mm.transpose() << ' ' << camera.size_px.transpose();
+  const std::string all = text.str();
+  return sha256_hex(std::as_bytes(std::span(all)));
+}
+
+/// Turns one view's line integrals into what they hold beyond the CT's.
+void subtract_cast(const RayCaster& caster,
+                   const CameraGeometry& camera,
+                   double smoothing_px,
+                   std::span<const float> measured,
+                   std::span<float> residual) {
+  const RegionOfInterest all = {0, 0, camera.size_px.x(), camera.size_px.y()};
+  Image2d image(all.width, all.height);
+  caster.cast(ray_fan(RigidTransform::Identity(), {camera, all}), image.pixels);
+  for (std::size_t i = 0; i < residual.size(); ++i)
+    image.pixels[i] = std::isnan(measured[i]) ? 0.0F : measured[i] - image.pixels[i];
+  image = gaussian_blur(image, smoothing_px);
+  std::copy(image.pixels.begin(), image.pixels.end(), residual.begin());
+}
+
+/// Root mean squares of measured and residual where the CT attenuates: elsewhere the CT says
+/// nothing, and nothing is corrected.
+void note_rms(std::span<const float> measured,
+              std::span<const float> residual,
+              MeasuredViews& found) {
+  double measured_sum = 0.0;
+  double residual_sum = 0.0;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < measured.size(); ++i) {
+    const auto value = static_cast<double>(measured[i]);
+    const auto left = static_cast<double>(residual[i]);
+    if (std::isnan(value) || left == value) continue;
+    measured_sum += value * value;
+    residual_sum += left * left;
+    ++count;
+  }
+  if (count == 0) return;
+  found.measured_rms = std::sqrt(measured_sum / static_cast<double>(count));
+  found.residual_rms = std::sqrt(residual_sum / static_cast<double>(count));
+}
+
+void require_same_object(const MeasuredViews& found) {
+  if (found.residual_rms <= kMostLeft * found.measured_rms) return;
+  throw InputError(
+      "projections",
+      "the CT leaves " + std::to_string(found.residual_rms) + " of their " +
+          std::to_string(found.measured_rms) + " (root mean square of line integrals)",
+      "must be X-rays of this CT, by their own cameras: is the CT reconstructed from them, is "
+      "--water-mu-per-mm that of its HU, is the pose right?",
+      found.path);
+}
+
+/// The views that look at the CT from the camera's side; all for an atlas, whose cameras go round.
+std::vector<StudyView> views_from_side(const Study& study,
+                                       const StudyCase& study_case,
+                                       const PrecomputeOptions& options,
+                                       const Eigen::Vector3d& beam_ct) {
+  std::vector<StudyView> chosen;
+  for (const StudyView& view : study_case.views) {
+    const Eigen::Vector3d beam = study_case.gold_room_from_ct->linear().transpose() *
+                                 study.rig.camera(view.camera).beam_direction();
+    if (options.is_atlas() || beam.dot(beam_ct) > 0.0) chosen.push_back(view);
+  }
+  return chosen;
+}
+
+/// Collective. The line integrals of the views, one behind the other, once per node.
+std::shared_ptr<const std::byte> read_on_root(const std::vector<StudyView>& views,
+                                              const std::vector<CameraGeometry>& cameras,
+                                              const std::vector<std::size_t>& places,
+                                              const Communicator& communicator,
+                                              std::vector<std::string>& warnings) {
+  return communicator.allocate_on_nodes_from_root(
+      places.back() * sizeof(float), [&](std::span<std::byte> memory) {
+        auto* const values = reinterpret_cast<float*>(memory.data());
+        for (std::size_t i = 0; i < views.size(); ++i)
+          read_measured(
+              views[i], cameras[i], {values + places[i], places[i + 1] - places[i]}, warnings);
+      });
+}
+
+}  // namespace
+
+std::string MeasuredViews::text() const {
+  std::ostringstream text;
+  text.precision(3);
+  text << "measured projections: " << views.size() << " views of " << path << "; the CT leaves "
+       << residual_rms << " of their " << measured_rms << " (root mean square of line integrals), "
+       << 100.0 * residual_rms / measured_rms << " %";
+  return text.str();
+}
+
+std::shared_ptr<const MeasuredViews> load_measured_views(const PrecomputeOptions& options,
+                                                         const AttenuationVolume& volume,
+                                                         const Eigen::Vector3d& beam_ct,
+                                                         const Communicator& communicator,
+                                                         std::vector<std::string>& warnings) {
+  const Study study = shared_study(options.projections, communicator, &warnings);
+  auto found = std::make_shared<MeasuredViews>();
+  found->path = options.projections;
+  std::vector<StudyView> views;
+  std::vector<CameraGeometry> cameras;
+  all_or_none(communicator, [&] {
+    const StudyCase& study_case = case_with_gold_pose(study, options);
+    views = views_from_side(study, study_case, options, beam_ct);
+    cameras = cameras_of(study, views, study_case.gold_room_from_ct->inverse());
+    for (const CameraGeometry& camera : cameras) found->views.push_back({camera, {}});
+    throw_if_any(orbit_problems(found->views), options.projections);
+  });
+  const std::vector<std::size_t> places = pixel_places(cameras);
+  const auto measured_memory = read_on_root(views, cameras, places, communicator, warnings);
+  const std::span measured(reinterpret_cast<const float*>(measured_memory.get()), places.back());
+  const auto of_view = [&](auto values, std::size_t view) {
+    return values.subspan(places[view], places[view + 1] - places[view]);
+  };
+  found->bytes = places.back() * sizeof(float);
+  const RayCaster caster(volume, options.ray_caster);
+  found->memory = communicator.allocate_on_node_together(
+      found->bytes, [&](std::span<std::byte> memory, int part, int parts) {
+        const std::span residual(reinterpret_cast<float*>(memory.data()), places.back());
+        for (auto i = static_cast<std::size_t>(part); i < cameras.size();
+             i += static_cast<std::size_t>(parts))
+          subtract_cast(caster,
+                        cameras[i],
+                        options.projections_smoothing_px,
+                        of_view(measured, i),
+                        of_view(residual, i));
+      });
+  const std::span residual(reinterpret_cast<const float*>(found->memory.get()), places.back());
+  for (std::size_t i = 0; i < cameras.size(); ++i) found->views[i].residual = of_view(residual, i);
+  found->content_sha256 = content_hash(cameras, measured, options.projections_smoothing_px);
+  note_rms(measured, residual, *found);
+  all_or_none(communicator, [&] { require_same_object(*found); });
+  return found;
+}
+
+}  // namespace af

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "parallel/communicator.h"
+#include "precompute/casting/measured_residual.h"
+#include "precompute/plan/precompute_options.h"
+#include "volume/attenuation_volume.h"
+
+namespace af {
+
+/// Measured X-rays of the CT's object at a known pose, less what the CT casts, held once per node.
+struct MeasuredViews {
+  std::string path;
+  std::string content_sha256;  ///< of cameras and line integrals
+  std::vector<ResidualView> views;
+  std::shared_ptr<const std::byte> memory;  ///< of the residuals
+  std::uint64_t bytes = 0;                  ///< of it
+  double measured_rms = 0.0;  ///< line integrals, over pixels whose rays the CT attenuates
+  double residual_rms = 0.0;  ///< over the same pixels
+
+  /// What was read, in a line for people.
+  [[nodiscard]] std::string text() const;
+};
+
+/// Collective. Reads the X-rays of the case that `options.projections` names, which must state its
+/// true pose, and subtracts what `volume` casts. For a field, only views are read that look along
+/// `beam_ct` (from source to CT, ct frame), not against it; for an atlas all. Errors as of
+/// read_study() and read_view_xray(). InputError when the case states no gold pose, when a value is
+/// not finite, when the sources are on no circle, or when the CT leaves more than 0.7 of what was
+/// measured (of an unrelated object it would leave 1.4 times as much): then the X-rays are of
+/// another object or geometry, or of another scale of attenuation.
+std::shared_ptr<const MeasuredViews> load_measured_views(const PrecomputeOptions& options,
+                                                         const AttenuationVolume& volume,
+                                                         const Eigen::Vector3d& beam_ct,
+                                                         const Communicator& communicator,
+                                                         std::vector<std::string>& warnings);
+
+}  // namespace af
