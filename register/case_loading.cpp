@@ -11,7 +11,6 @@
 #include "field_use/opened_field.h"
 #include "files/sha256.h"
 #include "geometry/camera_distance.h"
-#include "geometry/ray_coverage.h"
 #include "register/field_renderers.h"
 #include "register/problem/fiducial_mask.h"
 #include "register/problem/parameter_scaling.h"
@@ -180,26 +179,24 @@ std::string limit_to_rays(const OpenedField& opened,
                           RegistrationView& view) {
   const CameraGeometry& camera = view.view.camera;
   const FieldIdentity& identity = opened.identity();
-  const std::string distance = opened.coverage().distance_text(camera);
   if (opened.field() && camera_distance(camera, identity.camera).is_none()) {
     view.limit = MotionLimit{identity.frame, identity.range};
     view.reach = view.limit;
-    return distance + ", " + identity.range.text();
+    return opened.coverage().distance_text(camera) + ", " + identity.range.text();
   }
-  const View widest = view.widest_view();
-  const auto rays = static_cast<std::int64_t>(widest.pixel_count());
-  const std::int64_t outside = view.renderer->rays_outside(nominal.nominal_room_from_ct(), widest);
-  const MotionRange own_box = all_or_none(communicator, [&] {
-    if (outside > 0)
+  ViewReach reach = all_or_none(communicator, [&] {
+    ViewReach found = opened.coverage().reach(view.widest_view(), nominal, identity.range);
+    if (found.held < found.rays)
       throw FileError(opened.path().string(),
                       "camera '" + camera.name + "' of the field",
                       "one that holds all rays of twice the study's region at the nominal pose",
-                      std::to_string(rays - outside) + " of " + std::to_string(rays) +
-                          " rays; the study's has " + distance);
-    return opened.coverage().box(widest, nominal, identity.range);
+                      std::to_string(found.held) + " of " + std::to_string(found.rays) +
+                          " rays; the study's has " + found.distance);
+    return found;
   });
-  view.reach = MotionLimit{nominal, shared_box(own_box, communicator)};
-  return distance + "; " + coverage_text(camera.name, rays - outside, rays, view.reach->range);
+  reach.box = shared_box(reach.box, communicator);
+  view.reach = MotionLimit{nominal, reach.box};
+  return reach.distance + "; " + reach.text(camera.name);
 }
 
 /// Collective. The fields of all views; hashes and notes go to `loaded`.

@@ -34,6 +34,22 @@ std::optional<std::pair<std::string_view, std::string_view>> key_and_value(std::
   return std::pair(key, trimmed_view(line.substr(colon + 1)));
 }
 
+/// Whether a line is an item of a block list, "- 0.5" or "-", and no negative number.
+bool is_block_item(std::string_view line) {
+  return line.starts_with('-') && (line.size() == 1 || line[1] == ' ' || line[1] == '\t');
+}
+
+std::string_view without_comment(std::string_view line) {
+  if (line.starts_with('#')) return {};
+  return trimmed_view(line.substr(0, line.find(" #")));
+}
+
+/// An item without its dashes, of which items of nested lists have several.
+std::string_view item_text(std::string_view line) {
+  while (is_block_item(line)) line = trimmed_view(line.substr(1));
+  return without_comment(line);
+}
+
 class YamlParser {
  public:
   explicit YamlParser(std::string file) : file_(std::move(file)) {}
@@ -62,6 +78,7 @@ class YamlParser {
     if (line.empty() || line.front() == '#' || line.front() == '%' || line == "---" ||
         line == "...")
       return;
+    if (is_block_item(line)) return take_item(item_text(line));
     const auto pair = key_and_value(line);
     if (!pair) return;
     if (!is_indented) {
@@ -74,18 +91,32 @@ class YamlParser {
   }
 
   void take_value(std::string& into, std::string_view value) {
-    if (!value.starts_with('[')) {
-      into = std::string(value);
-      return;
-    }
+    block_ = nullptr;
+    if (value.starts_with('[')) return start_list(into, value);
+    into = std::string(value);
+    if (without_comment(value).empty()) block_ = &into;
+  }
+
+  /// Items of a block list, one per line or a flow list per line, make one list.
+  void take_item(std::string_view item) {
+    if (block_ == nullptr) return;
+    if (!block_->starts_with('[')) *block_ = "[ ";
+    if (item.starts_with('[')) return start_list(*block_, item);
+    block_->append(item).push_back(' ');
+  }
+
+  void start_list(std::string& into, std::string_view line) {
     list_ = &into;
-    take_list(value);
+    open_brackets_ = 0;
+    take_list(line);
   }
 
   /// Lists go on until their bracket is closed, over any number of lines.
   void take_list(std::string_view line) {
+    line = without_comment(line);
     list_->append(line).push_back(' ');
-    if (line.find(']') != std::string_view::npos) list_ = nullptr;
+    open_brackets_ += std::ranges::count(line, '[') - std::ranges::count(line, ']');
+    if (open_brackets_ <= 0) list_ = nullptr;
   }
 
   [[nodiscard]] Eigen::VectorXd list_numbers(const std::string& text) const {
@@ -143,6 +174,7 @@ class YamlParser {
     if (!values_.emplace(entry_.key, value).second)
       throw FileError(place(entry_.line), "the key " + entry_.key + " is there twice");
     entry_ = {};
+    block_ = nullptr;
   }
 
   static std::string first_word(const std::string& text) {
@@ -160,7 +192,9 @@ class YamlParser {
   std::string file_;
   std::map<std::string, YamlValue> values_;
   OpenEntry entry_;
-  std::string* list_ = nullptr;  ///< that goes on in the next line
+  std::string* list_ = nullptr;   ///< that goes on in the next line
+  std::string* block_ = nullptr;  ///< that items in the next lines belong to
+  std::ptrdiff_t open_brackets_ = 0;
 };
 
 }  // namespace

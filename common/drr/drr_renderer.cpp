@@ -1,12 +1,29 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "drr/drr_renderer.h"
 
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
 #include "base/error.h"
 
 namespace af {
 
 View View::whole_detector(const CameraGeometry& camera) {
   return {camera, {0, 0, camera.size_px.x(), camera.size_px.y()}};
+}
+
+View View::scaled(double scale) const {
+  const auto extent = [&](int first, int count, int limit) {
+    const double middle = first + count / 2.0;
+    const double half = count * scale / 2.0;
+    const int begin = std::max(0, static_cast<int>(std::lround(middle - half)));
+    const int end = std::min(limit, static_cast<int>(std::lround(middle + half)));
+    return std::pair(std::min(begin, limit - 1), std::max(1, end - begin));
+  };
+  const auto [column, width] = extent(roi.column, roi.width, camera.size_px.x());
+  const auto [row, height] = extent(roi.row, roi.height, camera.size_px.y());
+  return {camera, {column, row, width, height}};
 }
 
 View View::coarser(int factor) const {

@@ -12,6 +12,10 @@
 
 namespace af {
 
+/// Sides of the widest region that registrations look at, over those of a study's: what a field
+/// must hold the rays of.
+inline constexpr double kWidestRegionScale = 2.0;
+
 /// What is rendered: a region of one camera's detector.
 struct View {
   CameraGeometry camera;
@@ -20,6 +24,9 @@ struct View {
   /// The whole detector of a camera.
   static View whole_detector(const CameraGeometry& camera);
   [[nodiscard]] std::size_t pixel_count() const { return roi.pixel_count(); }
+  /// The region with its sides multiplied by `scale` about its centre and cut at the detector's
+  /// edges; at least one pixel.
+  [[nodiscard]] View scaled(double scale) const;
   /// The same region seen by pixels `factor` times as wide and high: each lies on the centre of
   /// gravity of factor x factor pixels, counted from the region's corner. The coarse detector is
   /// the region alone (roi.column = roi.row = 0); columns and rows that fill no coarse pixel are

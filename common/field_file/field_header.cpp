@@ -167,7 +167,7 @@ std::string payload_hash(const FileHeader& header) {
   return payload_hash(datasets, rules, index_sha256);
 }
 
-/// An atlas is of one CT, and so are its members.
+/// An atlas is of one CT, all of it, and so are its members.
 void require_same_origin(const AttenuationAtlas& atlas, const std::filesystem::path& path) {
   const FieldIdentity& all = atlas.identity;
   for (std::size_t i = 0; i < atlas.members.size(); ++i) {
@@ -182,6 +182,11 @@ void require_same_origin(const AttenuationAtlas& atlas, const std::filesystem::p
                       member_group(i) + "/identity",
                       "the attenuation of water and of air of the atlas",
                       "others");
+    if (one.material != FieldMaterial::All)
+      throw FileError(path.string(),
+                      field_layout::member_group(i) + "/material",
+                      "none: members of an atlas hold all of the CT",
+                      "bone alone");
   }
 }
 

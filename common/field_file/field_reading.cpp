@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Reads fields and atlases: what field_file.h promises of its readers.
 #include <algorithm>
-#include <mutex>
 #include <optional>
 #include <span>
 
@@ -13,6 +12,7 @@
 #include "field_file/hdf5_calls.h"
 #include "field_file/index_dataset.h"
 #include "field_file/index_filter.h"
+#include "files/reading_turn.h"
 #include "files/sha256.h"
 
 namespace af {
@@ -215,8 +215,7 @@ std::shared_ptr<const CompressedAttenuationField> read_atlas_member(
     std::size_t member,
     const std::string& payload_sha256,
     const Communicator& communicator) {
-  static std::mutex one_at_a_time;  // HDF5 and its filter are for one thread
-  const std::scoped_lock lock(one_at_a_time);
+  const ReadingTurn turn;  // HDF5 and its filter are for one thread
   const hdf5::QuietErrors quiet;
   const FileHeader header = shared_header(true, path, communicator);
   all_or_none(communicator, [&] {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 #include "base/hash_random.h"
 #include "drr/slab_rays.h"
@@ -48,6 +49,10 @@ bool holds_box(const FieldCoverage& coverage,
 
 }  // namespace
 
+std::string ViewReach::text(const std::string& camera) const {
+  return coverage_text(camera, held, rays, box);
+}
+
 FieldCoverage::FieldCoverage(const std::shared_ptr<const CompressedAttenuationField>& field)
     : cameras({field->identity.camera}), planes({{field, &field->light_slab}}) {}
 
@@ -66,6 +71,30 @@ std::int64_t FieldCoverage::rays_outside(const RigidTransform& room_from_ct,
     if (fewest == 0) break;
   }
   return fewest;
+}
+
+std::vector<float> FieldCoverage::held_rays(const RigidTransform& room_from_ct,
+                                            const View& view) const {
+  std::vector<float> best;
+  std::int64_t fewest = std::numeric_limits<std::int64_t>::max();
+  for (const auto& of_field : planes) {
+    std::vector<float> held(view.pixel_count(), 1.0f);
+    const std::int64_t outside = SlabRays(*of_field, room_from_ct, view).blank_outside(held);
+    if (outside >= fewest) continue;
+    fewest = outside;
+    best = std::move(held);
+  }
+  return best;
+}
+
+ViewReach FieldCoverage::reach(const View& view,
+                               const PoseFrame& nominal,
+                               const MotionRange& proportion) const {
+  const auto rays = static_cast<std::int64_t>(view.pixel_count());
+  return {distance_text(view.camera),
+          rays,
+          rays - rays_outside(nominal.nominal_room_from_ct(), view),
+          box(view, nominal, proportion)};
 }
 
 MotionRange FieldCoverage::box(const View& view,

@@ -13,6 +13,16 @@
 
 namespace af {
 
+/// What fields hold of the rays of a view.
+struct ViewReach {
+  std::string distance;   ///< FieldCoverage::distance_text()
+  std::int64_t rays = 0;  ///< of the view
+  std::int64_t held = 0;  ///< at the nominal pose
+  MotionRange box;        ///< FieldCoverage::box()
+  /// "field covers 100 % of camera A's rays within 6.2 deg / 18 mm of nominal".
+  [[nodiscard]] std::string text(const std::string& camera) const;
+};
+
 /// The fields of a file, without what they hold.
 struct FieldCoverage {
   std::vector<CameraGeometry> cameras;  ///< that each was made for
@@ -25,6 +35,12 @@ struct FieldCoverage {
   /// Rays of a view that the best field misses: the one that misses fewest.
   [[nodiscard]] std::int64_t rays_outside(const RigidTransform& room_from_ct,
                                           const View& view) const;
+  /// 1 for each ray of a view that the best field holds, 0 for the others.
+  [[nodiscard]] std::vector<float> held_rays(const RigidTransform& room_from_ct,
+                                             const View& view) const;
+  [[nodiscard]] ViewReach reach(const View& view,
+                                const PoseFrame& nominal,
+                                const MotionRange& proportion) const;
   /// The largest box about the nominal pose of `frame`, in the proportion of `proportion`, each of
   /// whose poses one of the fields holds: covered_box() of a field. Of several it is judged by
   /// kBoxPoses poses, the box's corners first: between them a ray may be missed.

@@ -121,6 +121,43 @@ Background background_of(const Image2d& image, const Image2d& mask) {
   return Background::Undecided;
 }
 
+double bright_detail(const Image2d& image, const Image2d& mask) {
+  struct Pixel {
+    float level;  // of the surroundings: the pixel's own noise must not choose its quarter
+    float detail;
+  };
+  if (image.width < 3 || image.height < 3) return 0.0;
+  const auto [least, most] = std::ranges::minmax(image.pixels);
+  std::vector<Pixel> pixels;
+  for (int row = 1; row + 1 < image.height; ++row)
+    for (int column = 1; column + 1 < image.width; ++column) {
+      const float own = image.at(column, row);
+      if (own == least || own == most) continue;
+      if (!mask.pixels.empty() && mask.at(column, row) == 0.0f) continue;
+      const float across = image.at(column - 1, row) + image.at(column + 1, row);
+      const float along = image.at(column, row - 1) + image.at(column, row + 1);
+      pixels.push_back({(across + along + own) / 5.0f,
+                        std::min(std::abs(across - 2.0f * own), std::abs(along - 2.0f * own))});
+    }
+  const auto quarter = static_cast<std::ptrdiff_t>(pixels.size() / 4);
+  if (quarter == 0) return 0.0;
+  const auto mean_detail = [&](const auto& darker) {
+    std::nth_element(pixels.begin(), pixels.begin() + quarter, pixels.end(), darker);
+    double sum = 0.0;
+    for (auto pixel = pixels.begin(); pixel != pixels.begin() + quarter; ++pixel)
+      sum += static_cast<double>(pixel->detail);
+    return sum / static_cast<double>(quarter);
+  };
+  // Ties by detail: which of equal pixels come first must not depend on the library.
+  const double dark = mean_detail([](const Pixel& a, const Pixel& b) {
+    return a.level < b.level || (a.level == b.level && a.detail < b.detail);
+  });
+  const double bright = mean_detail([](const Pixel& a, const Pixel& b) {
+    return a.level > b.level || (a.level == b.level && a.detail < b.detail);
+  });
+  return dark > 0.0 && bright > 0.0 ? std::log2(bright / dark) : 0.0;
+}
+
 Image2d flat_corrected(const Image2d& image, const Image2d& flat, const Image2d& dark) {
   Image2d corrected(image.width, image.height);
   for (std::size_t i = 0; i < image.pixels.size(); ++i) {

@@ -4,9 +4,11 @@
 #include <cstring>
 #include <gdcmImageReader.h>
 #include <gdcmTrace.h>
-#include <new>
+#include <span>
 #include <string>
+#include <utility>
 
+#include "base/contained_work.h"
 #include "base/error.h"
 #include "files/input_file.h"
 
@@ -145,28 +147,33 @@ std::vector<DicomPart> fragments_of_frame(const DicomPixelLayout& layout) {
   return found;
 }
 
-/// GDCM's image of what the file says, made without its parser.
-gdcm::Image compressed_image(const DicomPixelLayout& layout) {
+gdcm::TransferSyntax::TSType compression_of(const DicomPixelLayout& layout) {
   const std::string syntax = layout.header.text({0x0002, 0x0010});
   const gdcm::TransferSyntax::TSType type = gdcm::TransferSyntax::GetTSType(syntax.c_str());
   if (type == gdcm::TransferSyntax::TS_END)
     throw InputError(
         "transfer syntax", syntax, "is not known to the decoder", layout.path().string());
-  const gdcm::SmartPointer<gdcm::SequenceOfFragments> fragments = new gdcm::SequenceOfFragments;
-  for (const DicomPart& part : fragments_of_frame(layout)) {
-    const std::vector<char> bytes = part_of_file(layout.path(), part);
+  return type;
+}
+
+/// GDCM's image of what the file says, made without its parser.
+gdcm::Image compressed_image(const DicomPixelLayout& layout,
+                             gdcm::TransferSyntax::TSType compression,
+                             const std::vector<std::vector<char>>& fragments) {
+  const gdcm::SmartPointer<gdcm::SequenceOfFragments> sequence = new gdcm::SequenceOfFragments;
+  for (const std::vector<char>& bytes : fragments) {
     gdcm::Fragment fragment;
-    fragment.SetByteValue(bytes.data(), part.bytes);
-    fragments->AddFragment(fragment);
+    fragment.SetByteValue(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
+    sequence->AddFragment(fragment);
   }
   gdcm::DataElement pixels(gdcm::Tag(0x7fe0, 0x0010));
   pixels.SetVR(gdcm::VR::OB);
-  pixels.SetValue(*fragments);
+  pixels.SetValue(*sequence);
   gdcm::Image image;
   image.SetNumberOfDimensions(2);
   image.SetColumns(static_cast<unsigned>(layout.columns));
   image.SetRows(static_cast<unsigned>(layout.rows));
-  image.SetTransferSyntax(type);
+  image.SetTransferSyntax(compression);
   image.SetPixelFormat(gdcm::PixelFormat(1,
                                          static_cast<std::uint16_t>(layout.allocated_bits),
                                          static_cast<std::uint16_t>(layout.stored_bits),
@@ -177,26 +184,22 @@ gdcm::Image compressed_image(const DicomPixelLayout& layout) {
   return image;
 }
 
+/// By GDCM, whose JPEG decoders end the process on damaged frames, version 3.0.21 by an assertion
+/// (gdcmJPEGBITSCodec.hxx:782). So it decodes in a copy of the process.
 std::vector<char> decompressed(const DicomPixelLayout& layout) {
-  const std::string file = layout.path().string();
-  silence_gdcm();
-  try {
-    const gdcm::Image image = compressed_image(layout);
-    std::vector<char> bytes(decoded_bytes(layout));
-    if (image.GetBufferLength() != bytes.size())
-      throw FileError(file,
-                      "decoded pixels",
-                      std::to_string(bytes.size()) + " bytes",
-                      std::to_string(image.GetBufferLength()));
-    if (!image.GetBuffer(bytes.data())) throw FileError(file, "its compressed pixels are corrupt");
-    return bytes;
-  } catch (const Error&) {
-    throw;
-  } catch (const std::bad_alloc&) {
-    throw;
-  } catch (...) {  // GDCM also throws what is no exception class
-    throw FileError(file, "its compressed pixels cannot be decoded");
-  }
+  const gdcm::TransferSyntax::TSType compression = compression_of(layout);
+  std::vector<std::vector<char>> fragments;
+  for (const DicomPart& part : fragments_of_frame(layout))
+    fragments.push_back(part_of_file(layout.path(), part));
+  ContainedWork decoding = contained_work(decoded_bytes(layout), [&](std::span<char> pixels) {
+    silence_gdcm();
+    const gdcm::Image image = compressed_image(layout, compression, fragments);
+    return image.GetBufferLength() == pixels.size() && image.GetBuffer(pixels.data());
+  });
+  if (!decoding.is_done)
+    throw FileError(layout.path().string(),
+                    "its compressed pixels are corrupt: their decoder " + decoding.trouble);
+  return std::move(decoding.bytes);
 }
 
 /// Cuts the stored bits out of the allocated ones, extends the sign, and rescales.

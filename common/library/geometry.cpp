@@ -74,6 +74,15 @@ api::Camera camera_of(const CameraGeometry& camera) {
           {camera.size_px.x(), camera.size_px.y()}};
 }
 
+XrayBeamOptions checked_beam(const api::Beam& beam) {
+  XrayBeamOptions options;
+  options.spectrum.tube_kvp = beam.tube_kvp;
+  options.spectrum.aluminium_mm = beam.aluminium_mm;
+  options.scatter_to_primary = beam.scatter_to_primary;
+  throw_if_any(field_problems(options));
+  return options;
+}
+
 PoseFrame checked_frame(const api::PoseFrame& frame) {
   PoseFrame result;
   result.rotation = Eigen::Map<const RowMajor3>(frame.rotation.data());

@@ -173,11 +173,19 @@ RegistrationCase::RegistrationCase(std::shared_ptr<Impl> impl) : impl_(std::move
 RegistrationCase RegistrationCase::load(const std::filesystem::path& study_path,
                                         const std::string& case_name,
                                         const RegistrationOptions& options) {
+  return load(study_path, case_name, options, Beam{});
+}
+
+RegistrationCase RegistrationCase::load(const std::filesystem::path& study_path,
+                                        const std::string& case_name,
+                                        const RegistrationOptions& options,
+                                        const Beam& beam) {
   return library::translated_reading([&] {
     const registration::RegistrationOptions method = resolved_method(options);
     af::throw_if_any(af::thread_problems(options.threads));
     const auto pool = std::make_shared<af::ThreadPool>(af::thread_count(options.threads));
-    const registration::CaseLoadOptions loading = load_options(options, method, pool);
+    registration::CaseLoadOptions loading = load_options(options, method, pool);
+    loading.beam = library::checked_beam(beam);
     auto impl = std::make_shared<Impl>();
     impl->study = af::read_study(study_path, &impl->warnings);
     const af::Study& study = impl->study;

@@ -10,11 +10,14 @@
 #include "base/plausible.h"
 #include "base/thread_pool.h"
 #include "drr/field_renderer.h"
+#include "drr/field_set_drr.h"
 #include "drr/ray_cast_drr.h"
-#include "field_file/field_file.h"
+#include "drr/xray_beam.h"
+#include "field_use/opened_field.h"
 #include "library/ct_impl.h"
 #include "library/translation.h"
 #include "pose_files/pose_file.h"
+#include "spectrum/bone_volume.h"
 
 namespace attenuation_fields {
 
@@ -263,8 +266,29 @@ std::int64_t Renderer::drrs_and_gradients(std::span<const std::array<double, 6>>
   });
 }
 
+namespace {
+
+/// A field's renderer, or that of an atlas's fields, of a beam; as af-drr makes it.
+std::shared_ptr<const af::DrrRenderer> renderer_of(const af::OpenedField& opened,
+                                                   const std::string& look_up,
+                                                   const af::XrayBeamOptions& options,
+                                                   const std::shared_ptr<af::ThreadPool>& pool) {
+  const af::FieldIdentity& identity = opened.identity();
+  const af::XrayBeam beam(options, {identity.mu_water_per_mm, identity.air_below_hu});
+  std::shared_ptr<const af::DrrRenderer> bone;
+  if (options.needs_bone())
+    bone = af::make_field_renderer(opened.bone_field(af::Communicator::alone()), look_up, pool);
+  std::vector<af::FieldSetMember> members = opened.renderers(look_up, pool);
+  for (af::FieldSetMember& member : members) member.renderer = beam.renderer(member.renderer, bone);
+  if (members.size() == 1) return members.front().renderer;
+  return std::make_shared<const af::FieldSetDrr>(std::move(members));
+}
+
+}  // namespace
+
 struct Field::Facts {
   std::string look_up;
+  int members = 1;
   double max_rotation_deg = 0.0;
   double max_translation_mm = 0.0;
   std::string ct_content_sha256;
@@ -276,28 +300,40 @@ Field::Field(std::shared_ptr<const Impl> impl, std::shared_ptr<const Facts> fact
     : Renderer(std::move(impl)), facts_(std::move(facts)) {}
 
 Field Field::open(const std::filesystem::path& path, const FieldOptions& options) {
+  return open(path, options, Beam{});
+}
+
+Field Field::open(const std::filesystem::path& path,
+                  const FieldOptions& options,
+                  const Beam& beam) {
   return library::translated_reading([&] {
     const auto pool = pool_of(options.threads);
-    af::FieldFileInfo info;
-    const auto field = af::read_field(path, af::Communicator::alone(), &info);
-    const af::FieldIdentity& identity = field->identity;
+    const af::XrayBeamOptions beam_options = library::checked_beam(beam);
+    const af::OpenedField opened(path, af::Communicator::alone());
+    const af::FieldIdentity& identity = opened.identity();
     auto facts = std::make_shared<Facts>();
-    facts->look_up = options.look_up.empty() ? info.look_up : options.look_up;
+    facts->look_up = options.look_up.empty() ? opened.info().look_up : options.look_up;
+    facts->members = static_cast<int>(opened.coverage().planes.size());
     const af::MotionRange within = identity.range.symmetric_part();
     facts->max_rotation_deg = within.max_rotation_rad() * af::kDegPerRad;
     facts->max_translation_mm = within.max_translation_mm();
     facts->ct_content_sha256 = identity.ct_content_sha256;
-    facts->payload_sha256 = info.payload_sha256;
+    facts->payload_sha256 = opened.info().payload_sha256;
     facts->water_mu_per_mm = identity.mu_water_per_mm;
     const af::CameraGeometry camera =
         options.camera.has_value() ? library::checked_camera(*options.camera) : identity.camera;
-    auto impl = std::make_shared<const Impl>(af::make_field_renderer(field, facts->look_up, pool),
-                                             camera,
-                                             identity.frame,
-                                             pool,
-                                             options.outside);
+    auto impl =
+        std::make_shared<const Impl>(renderer_of(opened, facts->look_up, beam_options, pool),
+                                     camera,
+                                     identity.frame,
+                                     pool,
+                                     options.outside);
     return Field(std::move(impl), std::move(facts));
   });
+}
+
+int Field::members() const {
+  return facts_->members;
 }
 
 const std::string& Field::look_up() const {
@@ -325,6 +361,12 @@ double Field::water_mu_per_mm() const {
 }
 
 RayCaster::RayCaster(const Ct& ct, const Camera& camera, const RayCasterOptions& options)
+    : RayCaster(ct, camera, options, Beam{}) {}
+
+RayCaster::RayCaster(const Ct& ct,
+                     const Camera& camera,
+                     const RayCasterOptions& options,
+                     const Beam& beam)
     : Renderer(library::translated([&] {
         const af::AttenuationModel model{options.water_mu_per_mm, options.air_below_hu};
         const af::RayCasterOptions caster{options.step_mm};
@@ -335,8 +377,15 @@ RayCaster::RayCaster(const Ct& ct, const Camera& camera, const RayCasterOptions&
         frame.center_ct_mm = ct.impl_->ct.grid.center_mm();
         frame.center_room_mm = library::vector_of(options.isocenter_point);
         if (options.frame.has_value()) frame = library::checked_frame(*options.frame);
+        const af::XrayBeamOptions beam_options = library::checked_beam(beam);
+        const auto volume = ct.impl_->attenuation(model);
+        const auto through = [&](std::shared_ptr<const af::AttenuationVolume> of) {
+          return std::make_shared<const af::RayCastDrr>(std::move(of), caster, pool);
+        };
         return std::make_shared<const Impl>(
-            std::make_shared<const af::RayCastDrr>(ct.impl_->attenuation(model), caster, pool),
+            af::XrayBeam(beam_options, model)
+                .renderer(through(volume),
+                          beam_options.needs_bone() ? through(af::bone_volume(*volume)) : nullptr),
             library::checked_camera(camera),
             frame,
             pool,

@@ -5,11 +5,13 @@
 #include <string>
 #include <type_traits>
 
+#include "attenuation_fields/beam.h"
 #include "attenuation_fields/ct.h"
 #include "attenuation_fields/geometry.h"
+#include "drr/xray_beam.h"
+#include "files/reading_turn.h"
 #include "geometry/camera_geometry.h"
 #include "geometry/rigid_transform.h"
-#include "library/files_lock.h"
 #include "volume/ct_volume.h"
 
 namespace af::library {
@@ -27,6 +29,8 @@ api::Camera camera_of(const CameraGeometry& camera);
 /// InputError when the rotation is none.
 PoseFrame checked_frame(const api::PoseFrame& frame);
 api::PoseFrame frame_of(const PoseFrame& frame);
+/// InputError when it has problems.
+XrayBeamOptions checked_beam(const api::Beam& beam);
 CtGrid grid_of(const api::CtGrid& grid);
 api::CtGrid grid_of(const CtGrid& grid);
 
@@ -47,7 +51,7 @@ std::invoke_result_t<Function> translated(Function&& function) {
 template <typename Function>
 std::invoke_result_t<Function> translated_reading(Function&& function) {
   return translated([&] {
-    const FilesLock lock;
+    const ReadingTurn turn;
     return function();
   });
 }

@@ -381,15 +381,23 @@ void note_background(const Image2d& image,
                      const XrayBorders& borders,
                      Note& note,
                      std::vector<std::string>& warnings) {
-  const Background found =
-      background_of(image, view.reading.masks_borders ? borders.mask : Image2d());
+  const Image2d mask = view.reading.masks_borders ? borders.mask : Image2d();
+  const Background found = background_of(image, mask);
   if (found == Background::Undecided) return;
   const bool is_bright = found == Background::Bright;
-  note.add(std::string("background looks ") + (is_bright ? "bright" : "dark"));
-  if (is_bright == (view.xray_domain == XrayDomain::Intensity)) return;
-  const std::string domain =
-      view.xray_domain == XrayDomain::Intensity ? "intensity" : "attenuation";
+  const bool is_intensity = view.xray_domain == XrayDomain::Intensity;
+  const bool is_expected = is_bright == is_intensity;
+  const bool is_plainly_shut = borders.circle.has_value() || borders.straight_sides > 2;
+  const bool is_intensity_by_detail =
+      is_intensity && !is_expected && bright_detail(image, mask) > 0.0;
+  note.add(std::string("background looks ") + (is_bright ? "bright" : "dark") +
+           (is_intensity_by_detail ? ", detail grows with brightness: no negative" : "") +
+           (is_intensity_by_detail && is_plainly_shut && !view.reading.masks_borders
+                ? "; borders? (mask = \"auto\")"
+                : ""));
+  if (is_expected || is_intensity_by_detail) return;
   const bool may_be_border = borders.is_any() && !view.reading.masks_borders;
+  const std::string domain = is_intensity ? "intensity" : "attenuation";
   warnings.push_back(view.xray.string() + ": its background looks " +
                      (is_bright ? "bright" : "dark") + ", but xray_domain = \"" + domain +
                      "\" means " + (is_bright ? "dark" : "bright") + " air; " +

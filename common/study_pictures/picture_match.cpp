@@ -73,6 +73,31 @@ double best_correlation(const Image2d& a, const Image2d& b) {
   return best;
 }
 
+/// The middle of an image, enlarged to all of it: bilinear.
+Image2d enlarged(const Image2d& image, double factor) {
+  Image2d result(image.width, image.height);
+  const auto place = [&](int at, int count) {
+    const double middle = 0.5 * (count - 1);
+    return std::clamp(middle + (at - middle) / factor, 0.0, static_cast<double>(count - 1));
+  };
+  for (int row = 0; row < image.height; ++row)
+    for (int column = 0; column < image.width; ++column) {
+      const double x = place(column, image.width);
+      const double y = place(row, image.height);
+      const int left = std::min(static_cast<int>(x), image.width - 2);
+      const int top = std::min(static_cast<int>(y), image.height - 2);
+      const double across = x - left;
+      const double down = y - top;
+      const auto value = [&](int dx, int dy) {
+        return static_cast<double>(image.at(left + dx, top + dy));
+      };
+      result.at(column, row) =
+          static_cast<float>((1 - down) * ((1 - across) * value(0, 0) + across * value(1, 0)) +
+                             down * ((1 - across) * value(0, 1) + across * value(1, 1)));
+    }
+  return result;
+}
+
 }  // namespace
 
 Image2d block_means(const Image2d& image, int factor) {
@@ -110,6 +135,42 @@ std::string laying_telltale(const std::vector<LayingMatch>& matches) {
          " (correlation " + fixed_text(best.correlation, 2) + ") than as it is (" +
          fixed_text(matches.front().correlation, 2) +
          "): check its orientation and the camera's directions; nothing is flipped here";
+}
+
+std::vector<ScaleMatch> scale_matches(const Image2d& xray, const Image2d& drr) {
+  check(xray.width == drr.width && xray.height == drr.height, "pictures of one camera");
+  constexpr int kMostPixels = 64;
+  const Image2d small_xray = shrunk(xray, kMostPixels);
+  const Image2d small_drr = shrunk(drr, kMostPixels);
+  std::vector<ScaleMatch> matches = {{1.0, best_correlation(small_xray, small_drr)}};
+  if (small_xray.width < 2 || small_xray.height < 2) return matches;
+  constexpr double kStep = 1.1224620483;  // sixth root of 2
+  constexpr int kStepsToTwice = 6;
+  double factor = 1.0;
+  for (int step = 1; step <= kStepsToTwice; ++step) {
+    factor *= kStep;
+    matches.push_back({factor, best_correlation(enlarged(small_xray, factor), small_drr)});
+    matches.push_back({1.0 / factor, best_correlation(small_xray, enlarged(small_drr, factor))});
+  }
+  return matches;
+}
+
+std::string scale_telltale(const std::vector<ScaleMatch>& matches) {
+  constexpr double kClearlyBetter = 0.1;
+  constexpr double kWell = 0.6;
+  constexpr double kExplainedByPoses = 1.25;
+  const auto is_near = [&](const ScaleMatch& match) {
+    return std::max(match.factor, 1.0 / match.factor) <= kExplainedByPoses;
+  };
+  const ScaleMatch& best = *std::ranges::max_element(matches, {}, &ScaleMatch::correlation);
+  if (is_near(best) || best.correlation < kWell) return {};
+  for (const ScaleMatch& match : matches)
+    if (is_near(match) && best.correlation < match.correlation + kClearlyBetter) return {};
+  return "the X-ray looks more like the DRR when scaled by " + fixed_text(best.factor, 2) +
+         " (correlation " + fixed_text(best.correlation, 2) + ") than as it is (" +
+         fixed_text(matches.front().correlation, 2) +
+         "): check the pixel spacing, the distances of source and detector, and the CT's spacing; "
+         "nothing is scaled here";
 }
 
 }  // namespace af

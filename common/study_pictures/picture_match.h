@@ -35,4 +35,19 @@ std::vector<LayingMatch> laying_matches(const Image2d& xray, const Image2d& drr)
 /// correlation) better than the X-ray as it is, and by itself well. Empty when there is none.
 std::string laying_telltale(const std::vector<LayingMatch>& matches);
 
+/// How well an X-ray looks like the DRR when it is enlarged about its middle by a factor; below 1
+/// the DRR is enlarged instead, so that always two whole pictures are compared.
+struct ScaleMatch {
+  double factor = 1.0;
+  double correlation = 0.0;  ///< as of LayingMatch
+};
+
+/// The match for factors from a half to twice. The first is the X-ray as it is.
+std::vector<ScaleMatch> scale_matches(const Image2d& xray, const Image2d& drr);
+
+/// The tell-tale of a pixel spacing that does not fit, in words: a factor that poses hardly explain
+/// (beyond 1.25) matches clearly better than the X-ray as it is and than all factors near 1, and by
+/// itself well. Empty when there is none.
+std::string scale_telltale(const std::vector<ScaleMatch>& matches);
+
 }  // namespace af

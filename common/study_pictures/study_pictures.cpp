@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "drr/ray_cast_drr.h"
+#include "field_use/field_coverage.h"
 #include "figures/picture.h"
 #include "files/output_file.h"
 #include "study/ct_keys.h"
@@ -92,6 +93,79 @@ void add_landmarks(const StudyCase& study_case,
                              PictureColor::Red});
 }
 
+/// The sides of pixels that are neither 0 on both sides nor on none, joined to lines.
+std::vector<PictureLine> outline_of(const std::vector<float>& held, int width, int height) {
+  std::vector<PictureLine> lines;
+  const auto at = [&](int column, int row) {
+    return held[static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
+                static_cast<std::size_t>(column)] != 0.0f;
+  };
+  // Along one axis lines of `length` pixels, across it between neighbours.
+  const auto add_lines = [&](int across, int length, const auto& differ, const auto& place) {
+    for (int i = 0; i + 1 < across; ++i)
+      for (int from = 0; from < length;) {
+        int to = from;
+        while (to < length && differ(i, to)) ++to;
+        if (to > from)
+          lines.push_back(
+              {{place(i + 0.5, from - 0.5), place(i + 0.5, to - 0.5)}, PictureColor::Green, 1.8});
+        from = std::max(to, from + 1);
+      }
+  };
+  using Place = std::array<double, 2>;
+  add_lines(
+      width,
+      height,
+      [&](int column, int row) { return at(column, row) != at(column + 1, row); },
+      [](double across, double along) {
+        return Place{across, along};
+      });
+  add_lines(
+      height,
+      width,
+      [&](int row, int column) { return at(column, row) != at(column, row + 1); },
+      [](double across, double along) {
+        return Place{along, across};
+      });
+  return lines;
+}
+
+/// Where the field of a view ends at a pose; what the caption says of it.
+std::string add_coverage(const std::optional<HeldRays>& field,
+                         const ShrunkView& shrunk,
+                         const RigidTransform& room_from_ct,
+                         PicturePanel& panel) {
+  if (!field) return "";
+  const std::vector<float> held = field->coverage.held_rays(room_from_ct, shrunk.view);
+  const auto count = std::ranges::count(held, 1.0f);
+  if (count == 0) return "; the field holds no ray at this pose";
+  if (static_cast<std::size_t>(count) == held.size())
+    return "; the field holds all rays at this pose";
+  const auto lines = outline_of(held, panel.image.width, panel.image.height);
+  panel.lines.insert(panel.lines.end(), lines.begin(), lines.end());
+  return "; green: limit of the rays that the field holds at this pose";
+}
+
+/// The field of a view, where it is made already; what it holds is told of.
+std::optional<HeldRays> field_of(const StudyCase& study_case,
+                                 const StudyView& view,
+                                 const CameraGeometry& camera,
+                                 StudyPictures& pictures) {
+  std::error_code ignored;
+  if (!view.field || !std::filesystem::exists(*view.field, ignored)) return std::nullopt;
+  HeldRays field = read_held_rays(*view.field);
+  const View needed = View{camera, view.roi}.scaled(kWidestRegionScale);
+  const ViewReach reach = field.coverage.reach(needed, study_case.frame(), field.identity.range);
+  pictures.facts.push_back("camera " + camera.name + ": of twice the region, " +
+                           reach.text(camera.name));
+  if (reach.held < reach.rays)
+    pictures.telltales.push_back(
+        "camera " + camera.name + ": the field misses " + std::to_string(reach.rays - reach.held) +
+        " of " + std::to_string(reach.rays) +
+        " rays of twice the region at the nominal pose, which registrations need");
+  return field;
+}
+
 /// The window is that of the region: borders of an X-ray may hold anything.
 PicturePanel panel_with(const Image2d& image,
                         const StudyView& view,
@@ -122,18 +196,19 @@ Image2d with_mask(Image2d xray, Image2d mask, int factor) {
   return xray;
 }
 
-/// The pictures of one view.
+/// The pictures of one view; their names begin with `stem`.
 void draw_view(const Study& study,
                const StudyCase& study_case,
                const StudyView& view,
                const DrrRenderer& caster,
                const std::vector<ShownPose>& poses,
-               const std::filesystem::path& folder,
+               const std::string& stem,
                StudyPictures& pictures) {
   const CameraGeometry& camera = study.rig.camera(view.camera);
   const ShrunkView shrunk = shrunk_view(camera);
   const ViewXray read = read_view_xray(view, camera);
   const Image2d xray = block_means(read.attenuation, shrunk.factor);
+  const std::optional<HeldRays> field = field_of(study_case, view, camera, pictures);
   const EdgeLetters letters = edge_letters(camera, poses.front().room_from_ct);
   const std::string beam = "beam from " + letters.beam_from + " to " + letters.beam_to;
   std::vector<PicturePanel> panels;
@@ -147,6 +222,7 @@ void draw_view(const Study& study,
                      (view.landmarks_px.empty() ? "" : "; circles: landmarks as marked")));
   add_letters(letters, panels.back());
   add_region(view, shrunk, panels.back());
+  panels.back().caption += add_coverage(field, shrunk, poses.front().room_from_ct, panels.back());
   add_landmarks(study_case, view, shrunk, camera, nullptr, panels.back());
   Image2d last_drr;
   for (const ShownPose& pose : poses) {
@@ -163,6 +239,7 @@ void draw_view(const Study& study,
                                          : "; crosses: landmarks where this pose puts them")));
     add_letters(at_pose, panels.back());
     add_region(view, shrunk, panels.back());
+    panels.back().caption += add_coverage(field, shrunk, pose.room_from_ct, panels.back());
     add_landmarks(study_case, view, shrunk, camera, &pose.room_from_ct, panels.back());
   }
   pictures.facts.push_back("camera " + camera.name + ": left edge " + letters.left + ", right " +
@@ -172,14 +249,13 @@ void draw_view(const Study& study,
     pictures.telltales.push_back("camera " + camera.name +
                                  ": column x row points against the beam: its pictures are "
                                  "mirrored, as if seen from behind the detector");
-  if (const std::string telltale = laying_telltale(laying_matches(xray, last_drr));
-      !telltale.empty())
-    pictures.telltales.push_back("camera " + camera.name + ": " + telltale);
+  for (const std::string& telltale : {laying_telltale(laying_matches(xray, last_drr)),
+                                      scale_telltale(scale_matches(xray, last_drr))})
+    if (!telltale.empty()) pictures.telltales.push_back("camera " + camera.name + ": " + telltale);
   std::string heading = study_case.name + ", camera " + camera.name;
   for (const std::string& telltale : pictures.telltales)
     if (telltale.starts_with("camera " + camera.name + ":")) heading += "\n" + telltale;
-  const std::filesystem::path path =
-      folder / (file_name_part(study_case.name) + "-" + file_name_part(camera.name) + ".png");
+  const std::filesystem::path path = stem + "-" + file_name_part(camera.name) + ".png";
   write_picture(panels, static_cast<int>(panels.size()), heading, path);
   pictures.files.push_back(path);
 }
@@ -189,7 +265,8 @@ void draw_view(const Study& study,
 StudyPictures draw_study_pictures(const Study& study,
                                   const StudyCase& study_case,
                                   const CtReadOptions& ct_reading,
-                                  const std::filesystem::path& folder) {
+                                  const std::filesystem::path& folder,
+                                  const std::string& stem) {
   StudyPictures pictures;
   const CtVolume ct = used_from(study_case.places, "ct", [&] {
     return read_ct(study_case.ct, ct_reading_in_force(ct_reading, study_case.ct_reading));
@@ -203,10 +280,10 @@ StudyPictures draw_study_pictures(const Study& study,
   }
   std::vector<CameraGeometry> cameras;
   for (const StudyView& view : study_case.views) {
-    draw_view(study, study_case, view, caster, poses, folder, pictures);
+    draw_view(study, study_case, view, caster, poses, (folder / stem).string(), pictures);
     cameras.push_back(study.rig.camera(view.camera));
   }
-  const std::filesystem::path path = folder / (file_name_part(study_case.name) + "-room.png");
+  const std::filesystem::path path = folder / (stem + "-room.png");
   write_picture(room_sketch(cameras, ct.grid, poses.back().room_from_ct),
                 3,
                 study_case.name + ": the room at the " + poses.back().name,

@@ -17,18 +17,20 @@ namespace af {
 /// What was drawn of a case, and what looks wrong.
 struct StudyPictures {
   std::vector<std::filesystem::path> files;
-  std::vector<std::string> facts;      ///< "camera A: left edge R, ...", one per view
-  std::vector<std::string> telltales;  ///< mirrored cameras, X-rays that look flipped
+  std::vector<std::string> facts;  ///< "camera A: left edge R, ...", and what its field holds
+  /// Mirrored cameras, X-rays that look flipped or scaled, fields that miss rays.
+  std::vector<std::string> telltales;
 };
 
-/// Draws CASE-CAMERA.png for each view of a case (X-ray and DRRs at the nominal pose and, where the
+/// Draws STEM-CAMERA.png for each view of a case (X-ray and DRRs at the nominal pose and, where the
 /// case has landmarks, at the pose that they give; patient letters at the edges, region, landmarks,
-/// the limit of the field's cover where the field exists) and CASE-room.png (sources, detectors and
+/// the limit of the field's cover where the field exists) and STEM-room.png (sources, detectors and
 /// CT box). DRRs are cast through the CT at a few hundred pixels. Nothing is ever
 /// flipped. Errors as of reading the CT, the X-rays and the fields.
 StudyPictures draw_study_pictures(const Study& study,
                                   const StudyCase& study_case,
                                   const CtReadOptions& ct_reading,
-                                  const std::filesystem::path& folder);
+                                  const std::filesystem::path& folder,
+                                  const std::string& stem);
 
 }  // namespace af

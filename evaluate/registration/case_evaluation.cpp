@@ -35,6 +35,7 @@
 #include "run/stop_request.h"
 #include "run/terminal.h"
 #include "study/pose_context.h"
+#include "study_pictures/study_pictures.h"
 #include "text/options_toml.h"
 
 namespace af::evaluation {
@@ -433,6 +434,29 @@ void draw_pictures(const RegistrationStudyOptions& options,
       method, chosen_rows(rows), study_case, yardstick, options.output_folder, evaluation);
 }
 
+/// Rank 0: how cameras, X-rays and poses of a case fit together, which was the same before anything
+/// was registered.
+void draw_setting(const RegistrationStudyOptions& options,
+                  const Study& study,
+                  const StudyCase& study_case,
+                  CaseEvaluation& evaluation) {
+  const WorkNote note("drawing the setting of case " + study_case.name, WorkNote::Kind::Phase);
+  const StudyPictures pictures = draw_study_pictures(study,
+                                                     study_case,
+                                                     options.ct,
+                                                     options.output_folder,
+                                                     file_name_part(study_case.name) + "-setting");
+  // One of each view, then the room.
+  for (std::size_t i = 0; i < pictures.files.size(); ++i)
+    evaluation.pictures.push_back(
+        {{"file", pictures.files[i].filename().string()},
+         {"case", evaluation.case_name},
+         {"which", "setting"},
+         {"shows", i < study_case.views.size() ? "camera " + study_case.views[i].camera : "room"},
+         {"facts", pictures.facts},
+         {"telltales", pictures.telltales}});
+}
+
 }  // namespace
 
 StartFrame start_frame(const StudyCase& study_case, const Yardstick& yardstick) {
@@ -550,6 +574,7 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
   methods.clear();
   all_or_none(world, [&] {
     if (!world.is_root()) return;
+    draw_setting(options, study, study_case, evaluation);
     const WorkNote note("reading the rows of case " + study_case.name, WorkNote::Kind::Phase);
     for (const MethodRows& method : rows)
       evaluation.traces[method.renderer] = add_rows(method, all_rows);

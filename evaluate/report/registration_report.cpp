@@ -452,6 +452,7 @@ std::string overlay_figures(const EvaluationRun& run) {
     const std::string which = picture.at("which").get<std::string>();
     const std::string name = picture.at("file").get<std::string>();
     const std::string case_name = escaped(picture.at("case").get<std::string>());
+    if (which == "setting") continue;
     if (which == "xrays") {
       figures += figure(
           run.file(name),
@@ -505,6 +506,41 @@ std::string registration_figures(const EvaluationRun& run) {
                  "figures");
 }
 
+/// Sentences of a list of texts, as items; each once over the pictures of a case.
+std::string items_of(const json& texts, const char* before) {
+  std::string items;
+  for (const json& text : texts) items += element("li", before + escaped(text.get<std::string>()));
+  return items;
+}
+
+/// What af-inspect --pictures draws of a study, of every case: whether its parts fit together.
+std::string setting_text(const EvaluationRun& run) {
+  std::string html;
+  std::string last_case;
+  for (const json& picture : run.summary.at("pictures")) {
+    if (picture.at("which") != "setting") continue;
+    const std::string case_name = picture.at("case").get<std::string>();
+    if (case_name != last_case)
+      html += element("p", "<b>Case " + escaped(case_name) + "</b>") +
+              element("ul",
+                      items_of(picture.value("telltales", json::array()), "<b>Look:</b> ") +
+                          items_of(picture.value("facts", json::array()), ""));
+    last_case = case_name;
+    html += figure(run.file(picture.at("file").get<std::string>()),
+                   "image/png",
+                   "X-ray and DRRs before the registration, or the room",
+                   escaped(picture.value("shows", "")),
+                   "picture wide");
+  }
+  if (html.empty()) return "";
+  return element("h3", "Whether the study fits together") +
+         element("p",
+                 "X-rays as they are, DRRs cast at the nominal pose and, where there are "
+                 "landmarks, at theirs, with the patient's directions at the edges; the room with "
+                 "sources, detectors and the CT's box. Nothing is flipped or scaled.") +
+         html;
+}
+
 std::string appearance_text(const EvaluationRun& run) {
   const json& summary = run.summary;
   if (summary.at("pictures").empty()) return "";
@@ -529,7 +565,7 @@ std::string registration_section(const EvaluationRun& run, const std::string& ti
          threshold_table(renderers) + one_view_text(summary) + other_errors_table(renderers) +
          over_cases_text(renderers) + paired_text(summary.at("field_against_raycast")) +
          case_table(summary) + gold_table(summary.at("cases")) + element("h3", "Failures") +
-         reason_table(renderers) + failures_text(run) + appearance_text(run);
+         reason_table(renderers) + failures_text(run) + appearance_text(run) + setting_text(run);
 }
 
 }  // namespace af::evaluation

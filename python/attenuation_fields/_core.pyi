@@ -134,7 +134,12 @@ class Field(Renderer):
         camera: Optional[Camera] = ...,
         threads: int = ...,
         outside: str = ...,
+        tube_kvp: float = ...,
+        aluminium_mm: float = ...,
+        scatter_to_primary: float = ...,
     ) -> Field: ...
+    @property
+    def members(self) -> int: ...
     @property
     def look_up(self) -> str: ...
     @property
@@ -160,6 +165,9 @@ class RayCaster(Renderer):
         air_below_hu: int = ...,
         step_mm: float = ...,
         threads: int = ...,
+        tube_kvp: float = ...,
+        aluminium_mm: float = ...,
+        scatter_to_primary: float = ...,
     ) -> None: ...
 
 class CaseView:
@@ -251,6 +259,9 @@ class RegistrationCase:
         threads: int = ...,
         calibration_error_px: float = ...,
         no_uncertainty: bool = ...,
+        tube_kvp: float = ...,
+        aluminium_mm: float = ...,
+        scatter_to_primary: float = ...,
     ) -> RegistrationCase: ...
     @property
     def name(self) -> str: ...

@@ -126,6 +126,9 @@ def ray_cast(
     water_mu_per_mm: float = 0.0200,
     step_mm: float = 1.0,
     threads: int = 1,
+    tube_kvp: float = 0.0,
+    aluminium_mm: float = 3.0,
+    scatter_to_primary: float = 0.0,
 ) -> NDArray[np.float32]:
     """One DRR cast through a CT. For several, a RayCaster keeps what they share."""
     caster = RayCaster(
@@ -136,6 +139,9 @@ def ray_cast(
         water_mu_per_mm=water_mu_per_mm,
         step_mm=step_mm,
         threads=threads,
+        tube_kvp=tube_kvp,
+        aluminium_mm=aluminium_mm,
+        scatter_to_primary=scatter_to_primary,
     )
     return caster.drr(rotation_deg, translation_mm)
 

@@ -118,7 +118,10 @@ RegistrationCase load(const std::filesystem::path& study,
                       std::uint64_t seed,
                       int threads,
                       double calibration_error_px,
-                      bool no_uncertainty) {
+                      bool no_uncertainty,
+                      double tube_kvp,
+                      double aluminium_mm,
+                      double scatter_to_primary) {
   RegistrationOptions options;
   options.preset = preset;
   options.renderer = renderer;
@@ -139,7 +142,8 @@ RegistrationCase load(const std::filesystem::path& study,
   options.no_uncertainty = no_uncertainty;
   RegistrationCase loaded = [&] {
     const py::gil_scoped_release release;
-    return RegistrationCase::load(study, case_name, options);
+    return RegistrationCase::load(
+        study, case_name, options, {tube_kvp, aluminium_mm, scatter_to_primary});
   }();
   warn_of(loaded.warnings());
   return loaded;
@@ -188,6 +192,9 @@ void bind_case(py::module_& module) {
                                "threads"_a = 1,
                                "calibration_error_px"_a = 0.0,
                                "no_uncertainty"_a = false,
+                               "tube_kvp"_a = Beam{}.tube_kvp,
+                               "aluminium_mm"_a = Beam{}.aluminium_mm,
+                               "scatter_to_primary"_a = Beam{}.scatter_to_primary,
                                "Options are those of af-register.");
   registration_case.def_property_readonly("name", &RegistrationCase::name);
   registration_case.def_property_readonly(

@@ -190,10 +190,13 @@ void bind_field(py::module_& module) {
          const std::string& look_up,
          const std::optional<Camera>& camera,
          int threads,
-         const std::string& outside) {
+         const std::string& outside,
+         double tube_kvp,
+         double aluminium_mm,
+         double scatter_to_primary) {
         const FieldOptions options{look_up, camera, threads, outside_of(outside)};
         const py::gil_scoped_release release;
-        return Field::open(path, options);
+        return Field::open(path, options, {tube_kvp, aluminium_mm, scatter_to_primary});
       },
       "path"_a,
       py::kw_only(),
@@ -201,9 +204,14 @@ void bind_field(py::module_& module) {
       "camera"_a = py::none(),
       "threads"_a = 1,
       "outside"_a = "raise",
-      "Reads and verifies a field file. look_up: 'nearest', 'linear', 'cubic' (default: the "
+      "tube_kvp"_a = Beam{}.tube_kvp,
+      "aluminium_mm"_a = Beam{}.aluminium_mm,
+      "scatter_to_primary"_a = Beam{}.scatter_to_primary,
+      "Reads and verifies a file of a field or of an atlas. look_up: 'nearest', 'linear', 'cubic' "
+      "(default: the "
       "field's own); threads: 0 is every processor; outside: 'raise' or 'zero' where rays miss the "
-      "field.");
+      "field; tube_kvp: DRRs of a tube's spectrum, with the field of the CT's bone beside it.");
+  field.def_property_readonly("members", &Field::members, "Fields of an atlas; 1 for a field.");
   field.def_property_readonly("look_up", &Field::look_up);
   field.def_property_readonly("max_rotation_deg", &Field::max_rotation_deg);
   field.def_property_readonly("max_translation_mm", &Field::max_translation_mm);
@@ -222,7 +230,10 @@ void bind_ray_caster(py::module_& module) {
                          double water_mu_per_mm,
                          int air_below_hu,
                          double step_mm,
-                         int threads) {
+                         int threads,
+                         double tube_kvp,
+                         double aluminium_mm,
+                         double scatter_to_primary) {
                const RayCasterOptions options{water_mu_per_mm,
                                               air_below_hu,
                                               step_mm,
@@ -230,7 +241,7 @@ void bind_ray_caster(py::module_& module) {
                                               vector_of(isocenter_point, "isocenter_point"),
                                               threads};
                const py::gil_scoped_release release;
-               return RayCaster(ct, camera, options);
+               return RayCaster(ct, camera, options, {tube_kvp, aluminium_mm, scatter_to_primary});
              }),
              "ct"_a,
              "camera"_a,
@@ -241,6 +252,9 @@ void bind_ray_caster(py::module_& module) {
              "air_below_hu"_a = RayCasterOptions{}.air_below_hu,
              "step_mm"_a = RayCasterOptions{}.step_mm,
              "threads"_a = 1,
+             "tube_kvp"_a = Beam{}.tube_kvp,
+             "aluminium_mm"_a = Beam{}.aluminium_mm,
+             "scatter_to_primary"_a = Beam{}.scatter_to_primary,
              "frame: what poses are relative to; without one the CT's centre at isocenter_point.");
 }
 

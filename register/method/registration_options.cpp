@@ -6,8 +6,8 @@
 #include <set>
 
 #include "base/named_rows.h"
+#include "drr/drr_renderer.h"
 #include "register/method/presets.h"
-#include "register/problem/stage_view.h"
 
 namespace af::registration {
 namespace {
@@ -85,7 +85,7 @@ RegistrationOptions::RegistrationOptions() : chains{paper_chain()} {
   judge.stage.similarity.name = "rg";
   judge.stage.level = 2;
   judge.stage.pixel_step = 4;
-  judge.stage.roi_scale = kWidestRoiScale;
+  judge.stage.roi_scale = kWidestRegionScale;
 }
 
 std::vector<StageOptions*> RegistrationOptions::stages() {

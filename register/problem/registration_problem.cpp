@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "register/problem/registration_problem.h"
 
-#include "register/problem/stage_view.h"
-
 namespace af::registration {
 namespace {
 
@@ -36,7 +34,7 @@ std::string view_name(const RegistrationView& view) {
 }
 
 View RegistrationView::widest_view() const {
-  return stage_view(view, {1, kWidestRoiScale});
+  return view.scaled(kWidestRegionScale);
 }
 
 std::vector<std::string> problems(const RegistrationProblem& problem) {

@@ -37,33 +37,30 @@ Image2d block_image(const Image2d& image, const BlockGrid& grid, bool take_minim
   return blocks;
 }
 
-/// First and count of detector pixels along one axis: a whole number of stage pixels, on the
-/// detector.
+/// First and count of detector pixels along one axis.
 struct Extent {
   int first;
   int count;
 };
 
-Extent scaled_extent(int first, int count, const StageGrid& grid, int limit) {
-  const double middle = first + count / 2.0;
-  const double half = count * grid.roi_scale / 2.0;
-  const int begin = std::max(0, static_cast<int>(std::lround(middle - half)));
-  const int end = std::min(limit, static_cast<int>(std::lround(middle + half)));
-  const int whole = std::max(1, (end - begin) / grid.pixel_step) * grid.pixel_step;
+/// The middle of an extent that a whole number of stage pixels fills.
+Extent whole_pixels(const Extent& extent, int step, int limit) {
+  const int whole = std::max(1, extent.count / step) * step;
   if (whole > limit)
     throw InputError("size_px",
                      std::to_string(limit),
                      "the detector must hold a pixel of this stage, " + std::to_string(whole) +
                          " detector pixels wide (pixel_step)");
   // A region narrower than a stage pixel, at the detector's edge, moves inwards.
-  const int spare = end - begin - whole;
-  return {std::min(begin + std::max(0, spare) / 2, limit - whole), whole};
+  const int spare = extent.count - whole;
+  return {std::min(extent.first + std::max(0, spare) / 2, limit - whole), whole};
 }
 
 RegionOfInterest scaled_region(const View& view, const StageGrid& grid) {
-  const Extent columns =
-      scaled_extent(view.roi.column, view.roi.width, grid, view.camera.size_px.x());
-  const Extent rows = scaled_extent(view.roi.row, view.roi.height, grid, view.camera.size_px.y());
+  const RegionOfInterest roi = view.scaled(grid.roi_scale).roi;
+  const Eigen::Vector2i& size_px = view.camera.size_px;
+  const Extent columns = whole_pixels({roi.column, roi.width}, grid.pixel_step, size_px.x());
+  const Extent rows = whole_pixels({roi.row, roi.height}, grid.pixel_step, size_px.y());
   return {columns.first, rows.first, columns.count, rows.count};
 }
 

@@ -13,10 +13,6 @@ struct StageGrid {
   double blur_sigma_px = 0.0;  ///< of the X-ray, in detector pixels, the mean's own blur included
 };
 
-/// Sides of the widest region that presets' stages and the judge look at, over those of the
-/// study's.
-inline constexpr double kWidestRoiScale = 2.0;
-
 /// Detector pixels per millimetre on the plane through `room_point` parallel to the detector (mean
 /// spacing of columns and rows).
 double pixels_per_mm(const CameraGeometry& camera, const Eigen::Vector3d& room_point);

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <iterator>
 #include <memory>
+#include <utility>
 
 #include "field_file/hdf5_calls.h"
 #include "field_file/index_filter.h"
@@ -28,26 +29,101 @@ std::string bytes_of_file(const std::filesystem::path& path) {
   return std::string(std::istreambuf_iterator<char>(file), {});
 }
 
-std::string sound_file(const CompressedAttenuationField& field) {
+void start_mpi() {
   static int argc = 1;
   static std::array<char, 5> name = {'f', 'u', 'z', 'z', '\0'};
   static char* pointer = name.data();
   static char** argv = &pointer;
   static const MpiEnvironment mpi(argc, argv);
-  const auto path = fuzz::scratch_folder() / kElsewhere;
-  write_field(field,
-              fuzz::sample_blocks(field),
-              {"0.1.0", "af-precompute", "seed = 1\n", "{}"},
-              path,
-              Communicator::world());
-  return bytes_of_file(path);
 }
 
-std::vector<std::string> all_names() {
-  std::vector<std::string> names = {"/", "/geometry", "/field", "/field/slab_0", "/field/slab_1"};
-  for (const DatasetRule& rule : field_layout::payload_rules(2, true)) names.push_back(rule.name);
-  for (const DatasetRule& rule : field_layout::provenance_rules()) names.push_back(rule.name);
-  return names;
+/// A sound file, and what it holds.
+struct SoundFile {
+  std::string bytes;
+  Codebook codebook;
+  std::vector<DatasetRule> payload;  ///< but for the indices
+  std::vector<DatasetRule> indices;
+  std::vector<std::string> names;  ///< of groups and datasets
+  bool is_atlas = false;
+};
+
+/// The parts of a file that every kind of it has.
+SoundFile written_file(SoundFile sound, const std::vector<Dataset>& beside) {
+  sound.bytes = bytes_of_file(fuzz::scratch_folder() / kElsewhere);
+  sound.names = {"/", "/geometry", "/field", "/field/slab_0", "/field/slab_1"};
+  const auto add = [&](const std::vector<DatasetRule>& rules) {
+    for (const DatasetRule& rule : rules) sound.names.push_back(rule.name);
+  };
+  add(sound.payload);
+  add(sound.indices);
+  add(field_layout::provenance_rules());
+  for (const Dataset& dataset : beside) sound.names.push_back(dataset.rule.name);
+  return sound;
+}
+
+constexpr const char* kOptions = "seed = 1\n";
+
+SoundFile sound_field(const CompressedAttenuationField& field, IndexPacking packing) {
+  const bool has_means = field.codebook.has_means();
+  write_field(field,
+              fuzz::sample_blocks(field.lattice(), has_means),
+              {"0.1.0", "af-precompute", kOptions, "{}"},
+              fuzz::scratch_folder() / kElsewhere,
+              Communicator::world(),
+              {},
+              packing);
+  std::vector<Dataset> beside = field_layout::range_datasets(field.identity.range);
+  for (Dataset& dataset : field_layout::material_datasets(field.identity.material))
+    beside.push_back(std::move(dataset));
+  return written_file({{},
+                       field.codebook,
+                       field_layout::payload_rules(2, has_means),
+                       field_layout::index_rules(field),
+                       {},
+                       false},
+                      beside);
+}
+
+SoundFile sound_atlas(const AttenuationAtlas& atlas) {
+  const bool has_means = atlas.codebook.has_means();
+  std::vector<IndexBlock> left = fuzz::sample_blocks(atlas.lattice(), has_means);
+  write_atlas(
+      atlas,
+      [&] { return std::exchange(left, {}); },
+      [] {
+        return FieldProvenance{"0.1.0", "af-precompute", kOptions, "{}"};
+      },
+      fuzz::scratch_folder() / kElsewhere,
+      Communicator::world());
+  SoundFile sound;
+  sound.is_atlas = true;
+  sound.codebook = atlas.codebook;
+  sound.payload = field_layout::atlas_rules(has_means);
+  for (std::size_t i = 0; i < atlas.members.size(); ++i)
+    for (DatasetRule& rule :
+         field_layout::within(field_layout::member_group(i), field_layout::member_rules(2)))
+      sound.payload.push_back(std::move(rule));
+  sound.indices = field_layout::index_rules(atlas);
+  return written_file(sound, {});
+}
+
+/// Every version of the format and everything that a file may or may not have, each once.
+std::vector<SoundFile> sound_files() {
+  start_mpi();
+  const CompressedAttenuationField plain = fuzz::sample_field();
+  const CompressedAttenuationField mean_removed = fuzz::sample_field_with_means();
+  CompressedAttenuationField one_sided = plain;
+  one_sided.identity.range.high.rotation_rad.y() *= 2.0;
+  CompressedAttenuationField bone = plain;
+  bone.identity.material = FieldMaterial::Bone;
+  return {sound_field(plain, IndexPacking::CodebookTree),
+          sound_field(mean_removed, IndexPacking::CodebookTree),
+          sound_field(plain, IndexPacking::Deflate),
+          sound_field(mean_removed, IndexPacking::Deflate),
+          sound_field(one_sided, IndexPacking::CodebookTree),
+          sound_field(bone, IndexPacking::CodebookTree),
+          sound_atlas(fuzz::sample_atlas(plain)),
+          sound_atlas(fuzz::sample_atlas(mean_removed))};
 }
 
 /// Any of the types that a file may hold.
@@ -197,8 +273,7 @@ void change_attribute(hid_t file, const std::string& name, fuzz::InputBytes& inp
       H5Acreate2(object, attribute, type, space, H5P_DEFAULT, H5P_DEFAULT), H5Aclose, "H5Acreate2");
 }
 
-void change(hid_t file, fuzz::InputBytes& input) {
-  static const std::vector<std::string> names = all_names();
+void change(hid_t file, const std::vector<std::string>& names, fuzz::InputBytes& input) {
   const std::string& name = names[input.take_below(names.size())];
   switch (input.take_below(6)) {
     case 0:
@@ -216,16 +291,13 @@ void change(hid_t file, fuzz::InputBytes& input) {
 }
 
 /// The hash over all datasets, as far as their hashes can be found.
-void mend_payload_hash(hid_t file, bool has_means) {
-  std::vector<Dataset> datasets;
-  for (const DatasetRule& rule : field_layout::payload_rules(2, has_means))
-    datasets.push_back(hdf5::read_dataset(file, rule, "field"));
-  const CompressedAttenuationField field = field_layout::field_of(datasets, "field");
+void mend_payload_hash(hid_t file, const SoundFile& sound) {
   std::string lines;
-  for (const Dataset& dataset : datasets)
+  for (const DatasetRule& rule : sound.payload) {
+    const Dataset dataset = hdf5::read_dataset(file, rule, "field");
     lines += field_layout::payload_line(dataset.rule, sha256_hex(dataset.bytes));
-  for (std::size_t k = 0; k < 2; ++k) {
-    const DatasetRule rule = field_layout::index_rule(field.lattice(), k, has_means);
+  }
+  for (const DatasetRule& rule : sound.indices) {
     const Handle dataset(H5Dopen2(file, rule.name.c_str(), H5P_DEFAULT), H5Dclose, "H5Dopen2");
     lines += field_layout::payload_line(rule, hdf5::read_text_attribute(dataset, "sha256"));
   }
@@ -243,31 +315,44 @@ void try_edit(Edit&& edit) {
   }
 }
 
+/// What a program would do with the file.
+void read_all(const std::filesystem::path& path) {
+  const Communicator world = Communicator::world();
+  if (!is_atlas_file(path)) {
+    const auto field = read_field_of_any_material(path, world);
+    fuzz::require(problems(*field).empty(), "an accepted field is sound");
+    return;
+  }
+  FieldFileInfo info;
+  const auto atlas = read_atlas(path, world, &info);
+  for (std::size_t i = 0; i < atlas->members.size(); ++i) {
+    fuzz::require(atlas->members[i].identity.material == FieldMaterial::All,
+                  "members of an atlas hold all of the CT");
+    const auto member = read_atlas_member(path, i, info.payload_sha256, world);
+    fuzz::require(problems(*member).empty(), "an accepted member of an atlas is sound");
+  }
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  static const CompressedAttenuationField plain = fuzz::sample_field();
-  static const CompressedAttenuationField mean_removed = fuzz::sample_field_with_means();
-  static const std::array<std::string, 2> sound = {sound_file(plain), sound_file(mean_removed)};
-  // An odd number of bytes changes a field with means.
-  const bool has_means = size % 2 == 1;
+  static const std::vector<SoundFile> files = sound_files();
   // HDF5 keeps a megabyte for each file it opens: kept for the next one, it need not be mapped
   // anew.
   static const herr_t keeps_memory = H5set_free_list_limits(-1, -1, -1, -1, -1, -1);
   fuzz::require(keeps_memory >= 0, "HDF5 takes the limits");
   const hdf5::QuietErrors quiet;
-  const hdf5::IndexFilter filter((has_means ? mean_removed : plain).codebook);
-  const auto path = fuzz::written("field.af.h5", sound[has_means ? 1 : 0]);
+  fuzz::InputBytes input(data, size);
+  const SoundFile& sound = files[input.take<std::uint8_t>() % files.size()];
+  const auto path = fuzz::written("field.af.h5", sound.bytes);
   {
+    const hdf5::IndexFilter filter(sound.codebook);
     const Handle file = hdf5::open_file(path, H5F_ACC_RDWR);
-    fuzz::InputBytes input(data, size);
     constexpr int kMostEdits = 6;
     for (int edits = 0; edits < kMostEdits && !input.empty(); ++edits)
-      try_edit([&] { change(file, input); });
-    try_edit([&] { mend_payload_hash(file, has_means); });
+      try_edit([&] { change(file, sound.names, input); });
+    try_edit([&] { mend_payload_hash(file, sound); });
   }
-  std::shared_ptr<const CompressedAttenuationField> field;
-  if (fuzz::is_accepted([&] { field = read_field(path, Communicator::world()); }))
-    fuzz::require(problems(*field).empty(), "an accepted field is sound");
+  (void)fuzz::is_accepted([&] { read_all(path); });
   return 0;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The values of a field file, as if every checksum agreed: numbers of a sound field are replaced by
 // any others. What is accepted must be a field that DRRs can be looked up in.
+#include <array>
 #include <memory>
 #include <optional>
 
@@ -25,11 +26,12 @@ void replace_values(std::vector<field_layout::Dataset>& datasets, fuzz::InputByt
   }
 }
 
-/// Codeword 0 everywhere; false when that would be more than a test wants to hold.
+/// Codeword 0, and mean 0, everywhere; false when that would be more than a test wants to hold.
 bool add_indices(CompressedAttenuationField& field) {
   for (std::size_t k = 0; k < field.light_slab.slabs.size(); ++k) {
     std::uint64_t tiles = 1;
-    for (const std::uint64_t extent : field_layout::index_rule(field.lattice(), k, false).extents) {
+    for (const std::uint64_t extent :
+         field_layout::index_rule(field.lattice(), k, field.codebook.has_means()).extents) {
       fuzz::require(extent >= 1 && extent <= 65536, "extents of indices are sane");
       tiles *= extent;
     }
@@ -50,9 +52,10 @@ void look_up(std::shared_ptr<const CompressedAttenuationField> field) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  static const auto sound = field_layout::datasets_of(fuzz::sample_field());
-  auto datasets = sound;
+  static const std::array sound = {field_layout::datasets_of(fuzz::sample_field()),
+                                   field_layout::datasets_of(fuzz::sample_field_with_means())};
   fuzz::InputBytes input(data, size);
+  auto datasets = sound[input.take<std::uint8_t>() % sound.size()];
   replace_values(datasets, input);
   auto field = std::make_shared<CompressedAttenuationField>();
   const bool is_accepted = fuzz::is_accepted([&] {

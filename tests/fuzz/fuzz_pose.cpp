@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "fuzz/fuzz_input.h"
+#include "fuzz/sample_pose_context.h"
 #include "pose_files/pose_file.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -12,22 +13,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   fuzz::InputBytes input(data, size);
   const char* const name = kNames[input.take<std::uint8_t>() % kNames.size()];
   const auto path = fuzz::written(name, fuzz::as_text(input.rest()));
-  PoseContext context;
-  context.frame = PoseFrame();
-  context.ct_grid = [] {
-    CtGrid grid;
-    grid.size = {20, 30, 40};
-    return grid;
-  };
-  context.rig = [] {
-    CameraGeometry camera;
-    camera.name = "A";
-    camera.source_point = {0.0, -650.0, 0.0};
-    camera.row_direction = {0.0, 0.0, -1.0};
-    camera.size_px = {200, 180};
-    return CameraRig{Eigen::Vector3d::Zero(), {camera}};
-  };
-  context.ct_frame_of_reference = [] { return std::string("1.2.3.4"); };
+  const PoseContext context = fuzz::sample_pose_context();
   PosesInFile found;
   if (!fuzz::is_accepted([&] { found = read_pose_file(path, context); })) return 0;
   for (const PosesInFile::Numbered& pose : found.poses)

@@ -153,6 +153,10 @@ void write_camera_seeds(const fs::path& folder) {
   for (const char* format : {"rig", "opencv"})
     write_seed(folder / "camera" / (format + "-distortion"s),
                "\x08"s + camera_files_of(lens, format, "camera").front().bytes);
+  write_seed(folder / "camera" / "opencv-lists",
+             "\3K:\n- - 1200\n  - 0\n  - 255.5\n- [0, 1100, 200]\n- [0, 0,\n1]  # end\n"
+             "dist:\n  - -0.35\n  - 0.12\n  - 4e-3\n  - -0.003\nrvec: [0.3, -0.2, 0.5]\n"
+             "tvec:\n- [10]\n- [-20]\n- [900]\n"s);
   test::DicomTestFile image;
   image.set_text({0x0008, 0x0060}, "CS", "XA");
   image.set_u16({0x0028, 0x0010}, 48);
@@ -213,6 +217,98 @@ void write_pose_seeds(const fs::path& folder) {
              "FixedParameters: 10 20 30 1\n"s);
   write_seed(folder / "pose" / "json",
              "\3{\"room_from_ct\": [[1,0,0,1],[0,1,0,2],[0,0,1,3],[0,0,0,1]], \"a\": [null]}"s);
+}
+
+/// "Files of one pose each": kind of their names, length, bytes.
+std::string found_poses_input(const std::vector<std::pair<char, std::string>>& files) {
+  std::string input(1, '\0');
+  for (const auto& [name, bytes] : files) {
+    const std::size_t length = bytes.size();
+    input += std::string{name, '\0'} + static_cast<char>(length & 0xffu) +
+             static_cast<char>(length >> 8u & 0xffu) + bytes;
+  }
+  return input;
+}
+
+void write_found_poses_seeds(const fs::path& folder) {
+  const RigidTransform pose = some_pose();
+  const std::string plain = "1 0 0 5\n0 1 0 6, 0 0 1 7\n0 0 0 1\n";
+  const std::string json =
+      "{\"room_from_ct\": [[1,0,0,1],[0,1,0,2],[0,0,1,3],[0,0,0,1]], \"views\": [null]}";
+  const std::string film = "1,0,0,-1,0,1,0,15,0,0,1,-10,0,0,0,1\n";
+  const auto seed = [&](const char* name, const std::string& input) {
+    write_seed(folder / "found_poses" / name, input);
+  };
+  seed("transforms", found_poses_input({{0, pose_to_itk_transform(pose)}, {3, plain}}));
+  seed("of-a-case", found_poses_input({{1, json}, {2, pose_to_toml(pose)}, {4, film}}));
+  seed("hdf5", found_poses_input({{6, pose_file_bytes("itk-hdf5", {&pose, 1}, {})}}));
+  seed("dicom", found_poses_input({{5, pose_file_bytes("dicom", {&pose, 1}, {})}}));
+  seed("names", found_poses_input({{7, plain}, {8, plain}, {9, pose_to_toml(pose)}}));
+}
+
+/// "Options, number of changes, and for each: slice, element, length, value", 70 bytes a change.
+void write_dicom_ct_seeds(const fs::path& folder) {
+  const auto seed = [&](const char* name, char options, const std::vector<std::string>& changes) {
+    std::string input = std::string{options, static_cast<char>(changes.size()), '\0'};
+    for (std::string change : changes) {
+      constexpr std::size_t kSliceBytes = 2;
+      change.resize(kSliceBytes + 70, '\0');
+      input += change;
+    }
+    write_seed(folder / "dicom_ct" / name, input);
+  };
+  const auto position = [](char slice, const std::string& text) {
+    return std::string{slice, '\0', '\0', '\0', static_cast<char>(text.size())} + text;
+  };
+  seed("sound", '\0', {});
+  seed("body", '\2', {});
+  seed("labels", '\x10', {});
+  seed("raw", '\x08', {});
+  seed("uneven", '\1', {position(2, "-3\\2\\-6.5")});
+  seed("tilted",
+       '\1',
+       {position(1, "-3\\2.2\\-8.5"), position(2, "-3\\2.4\\-7"), position(3, "-3\\2.6\\-5.5")});
+  seed("another-series",
+       '\x20',
+       {std::string("\1\0\x0a\0\5"
+                    "1.2.3",
+                    10)});
+}
+
+/// As af-inspect takes them: kind of the name, content.
+void write_inspect_seeds(const fs::path& folder) {
+  const auto seed = [&](const char* name, char kind, const std::string& bytes) {
+    write_seed(folder / "inspect" / name, kind + bytes);
+  };
+  seed("rig", '\0', builtin_rig_text("c-arm-12in"));
+  seed("study", '\2', template_text("study"));
+  seed("pose", '\0', pose_to_toml(some_pose()));
+  seed("transform", '\0', pose_to_itk_transform(some_pose()));
+  seed("matrix", '\0', "1 0 0 5\n0 1 0 6\n0 0 1 7\n0 0 0 1\n");
+  seed("film", '\4', "1,0,0,-1,0,1,0,15,0,0,1,-10,0,0,0,1\n");
+  seed("result",
+       '\3',
+       "{\"format\": \"attenuation-fields result\", \"format_version\": 1, \"room_from_ct\": "
+       "[[1,0,0,1],[0,1,0,2],[0,0,1,3],[0,0,0,1]], \"list\": [1, \"\\u00e9\", {}], \"x\": 1e3}");
+  seed("poses", '\1', "rx_deg,ry_deg,rz_deg,tx_mm,ty_mm,tz_mm\n1,-2,3,0.5,4,5\n");
+  seed("registrations",
+       '\1',
+       "case,start_index,renderer,tre_mm,stop_reason\na,0,field,nan,step-below-final\n");
+  seed("image-quality", '\1', "pose_index,psnr_db\n0,inf\n1,41.5\n");
+  const fs::path scratch = folder / "inspect.mha";
+  write_ct(test::asymmetric_ct(test::small_grid()), scratch);
+  seed("ct", '\0', read_text_file(scratch));
+  fs::remove(scratch);
+  const fs::path image = folder / "inspect.nrrd";
+  Image2d xray(5, 4);
+  xray.at(2, 1) = 7.0f;
+  write_image(xray, image, 1.0, 1.0);
+  seed("xray", '\0', read_text_file(image));
+  fs::remove(image);
+  CameraRig rig = parse_rig(builtin_rig_text("c-arm-12in"), "rig");
+  rig.cameras.resize(1);
+  for (const char* format : {"mayacam2", "opencv", "matrix", "plastimatch", "elastix"})
+    seed(format, '\0', camera_files_of(rig, format, "camera").front().bytes);
 }
 
 void write_image_seeds(const fs::path& folder) {
@@ -317,15 +413,29 @@ void write_other_seeds(const fs::path& folder) {
   const auto bytes = bytes_of(traced);
   write_seed(folder / "rows" / "row",
              std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
-  write_seed(folder / "field_values" / "sound", "");
-  write_seed(folder / "field_values" / "shifted",
-             "\2\0\3\0\1\0\0\0\0\0\0\0\x59\x40\5\0\2\0\0\0\x06\0\0\0"s);
-  write_seed(folder / "field_file" / "sound", "");
-  write_seed(folder / "field_file" / "means", "\xff"s);
-  write_seed(folder / "field_file" / "content", "\x0a\0\0\0\0\0\6\0\0\0"s);
-  write_seed(folder / "field_file" / "replaced",
-             "\x05\0\2\0\2\0\1\0\2\0\0\0\0\0\1\0\0\0\0\0\0\0\0\0\0\0"s);
-  write_seed(folder / "field_file" / "linked", "\x08\0\3\0\x09\0\0\0\x0a\0\3\0\x0b\0\2\0"s);
+}
+
+/// The first byte chooses the field, or the file: of each version of the format, with a range of
+/// bounds, of bone alone, an atlas (sound_files() of fuzz_field_file.cpp).
+void write_field_seeds(const fs::path& folder) {
+  constexpr char kValueKinds = 2;
+  for (char kind = 0; kind < kValueKinds; ++kind) {
+    const auto seed = [&](const char* name, const std::string& edits) {
+      write_seed(folder / "field_values" / (name + std::to_string(kind)), kind + edits);
+    };
+    seed("sound-", "");
+    seed("shifted-", "\2\0\3\0\1\0\0\0\0\0\0\0\x59\x40\5\0\2\0\0\0\x06\0\0\0"s);
+  }
+  constexpr char kFileKinds = 8;
+  for (char kind = 0; kind < kFileKinds; ++kind) {
+    const auto seed = [&](const char* name, const std::string& edits) {
+      write_seed(folder / "field_file" / (name + std::to_string(kind)), kind + edits);
+    };
+    seed("sound-", "");
+    seed("content-", "\x0a\0\0\0\0\0\6\0\0\0"s);
+    seed("replaced-", "\x05\0\2\0\2\0\1\0\2\0\0\0\0\0\1\0\0\0\0\0\0\0\0\0\0\0"s);
+    seed("linked-", "\x08\0\3\0\x09\0\0\0\x0a\0\3\0\x0b\0\2\0"s);
+  }
 }
 
 /// "Run KIND, and run OTHER, changed by EDITS"; each number has two bytes.
@@ -401,7 +511,11 @@ int main(int argc, char** argv) {
     write_dicom_seeds(folder);
     write_dicom_xray_seeds(folder);
     write_index_coding_seeds(folder);
+    write_found_poses_seeds(folder);
+    write_dicom_ct_seeds(folder);
+    write_inspect_seeds(folder);
     write_other_seeds(folder);
+    write_field_seeds(folder);
     write_report_seeds(folder);
     write_shard_seeds(folder);
     write_findings(argv[1], folder);

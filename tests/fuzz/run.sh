@@ -9,8 +9,8 @@ usage() {
   cat <<'TEXT'
 Usage: tests/fuzz/run.sh [--seconds N] [--output FOLDER] [--no-build] [--help] [NAME...]
 
-Runs libFuzzer on our readers: rig, camera, study, scan, csv, pose, image, dicom, dicom_xray, journal, rows, index_coding, field_values,
-field_file, shards, report, or those named. Needs clang-14. Corpora grow in FOLDER/NAME/corpus, the log is FOLDER/NAME/log, inputs that are findings are
+Runs libFuzzer on our readers: rig, camera, study, scan, csv, pose, found_poses, image, dicom, dicom_xray, dicom_ct, inspect, journal, rows,
+index_coding, field_values, field_file, shards, report, or those named. Needs clang-14. Corpora grow in FOLDER/NAME/corpus, the log is FOLDER/NAME/log, inputs that are findings are
 FOLDER/NAME/crash-*, oom-* or timeout-*. Exit code 1 when there was a finding.
 
   --seconds N      for each reader (default: 1200)
@@ -32,7 +32,7 @@ while (($# > 0)); do
   esac
   shift
 done
-((${#names[@]} > 0)) || names=(rig camera study scan csv pose image dicom dicom_xray journal rows index_coding field_values field_file shards report)
+((${#names[@]} > 0)) || names=(rig camera study scan csv pose found_poses image dicom dicom_xray dicom_ct inspect journal rows index_coding field_values field_file shards report)
 
 binaries=$af_root/build/fuzz/tests/fuzz
 if [[ "$build" == yes ]]; then
@@ -51,7 +51,8 @@ for name in "${names[@]}"; do
   mkdir -p "$output/$name/corpus"
   cd "$output/$name"
   leaks=1
-  [[ "$name" == field_file || "$name" == shards ]] && leaks=0 # OpenMPI and HDF5 keep memory until the end
+  # OpenMPI and HDF5 keep memory until the end, and HDF5 loses some on damaged files.
+  case $name in field_file | shards | camera | pose | found_poses) leaks=0 ;; esac
   ASAN_OPTIONS=quarantine_size_mb=16:malloc_context_size=4:detect_leaks=$leaks "$binaries/fuzz_$name" -max_total_time="$seconds" -timeout="${AF_FUZZ_TIMEOUT:-30}" -rss_limit_mb=1024 -malloc_limit_mb=256 -detect_leaks=$leaks \
     -print_final_stats=1 corpus "$output/seeds/$name" >log 2>&1 || status=1
   printf '%-13s %12s runs, coverage %s -> %s edges, %s inputs kept, %s findings\n' "$name" \

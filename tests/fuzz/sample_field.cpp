@@ -54,17 +54,30 @@ CompressedAttenuationField sample_field_with_means() {
   return field;
 }
 
-std::vector<IndexBlock> sample_blocks(const CompressedAttenuationField& field) {
+AttenuationAtlas sample_atlas(const CompressedAttenuationField& field) {
+  AttenuationAtlas atlas;
+  atlas.identity = field.identity;
+  atlas.quantizer_step = field.quantizer_step;
+  atlas.codebook = field.codebook;
+  atlas.members = {{field.identity, field.light_slab}, {field.identity, field.light_slab}};
+  constexpr double kBetweenMm = 20.0;
+  CameraGeometry& camera = atlas.members[1].identity.camera;
+  camera.source_point.x() += kBetweenMm;
+  camera.detector_origin_point.x() += kBetweenMm;
+  return atlas;
+}
+
+std::vector<IndexBlock> sample_blocks(const FieldLattice& lattice, bool has_means) {
   std::vector<IndexBlock> blocks;
-  for (std::size_t k = 0; k < field.light_slab.slabs.size(); ++k) {
-    const SlabLattice slab = field.lattice(k);
+  for (std::size_t k = 0; k < lattice.slabs.size(); ++k) {
+    const SlabLattice& slab = lattice.slabs[k];
     blocks.push_back({k, {0, 0, 0, 0}, slab.tile_counts(), {}});
     std::vector<std::uint16_t>& values = blocks.back().indices;
     const int row = slab.t.stored.tiles();
     for (int first = 0; first < slab.tile_count(); first += row) {
       for (int tile = first; tile < first + row; ++tile)
         values.push_back(static_cast<std::uint16_t>(tile % kCodewords));
-      if (!field.codebook.has_means()) continue;
+      if (!has_means) continue;
       for (int tile = first; tile < first + row; ++tile)
         values.push_back(static_cast<std::uint16_t>(64 * (tile % kCodewords)));
     }

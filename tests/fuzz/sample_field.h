@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "field/attenuation_atlas.h"
 #include "field/compressed_attenuation_field.h"
 #include "field_file/field_file.h"
 
@@ -13,7 +14,10 @@ CompressedAttenuationField sample_field();
 /// The same of mean-removed tiles.
 CompressedAttenuationField sample_field_with_means();
 
-/// All its tiles, one block per slab.
-std::vector<IndexBlock> sample_blocks(const CompressedAttenuationField& field);
+/// Two members beside each other, with the codebook of either.
+AttenuationAtlas sample_atlas(const CompressedAttenuationField& field);
+
+/// All tiles of all slabs, one block per slab.
+std::vector<IndexBlock> sample_blocks(const FieldLattice& lattice, bool has_means);
 
 }  // namespace af::fuzz

@@ -80,6 +80,54 @@ TEST(LibraryField, LooksUpTheDrrOfTheProgram) {
   EXPECT_THAT(field.payload_sha256(), SizeIs(64));
 }
 
+TEST(LibraryField, LooksUpTheDrrOfTheProgramInAnAtlas) {
+  const Field atlas = Field::open(study_file("AP.atlas.af.h5"));
+  EXPECT_GT(atlas.members(), 1);
+  EXPECT_EQ(Field::open(study_file("AP.af.h5")).members(), 1);
+  const Pose between = atlas.frame().pose({2.0, -1.5, 7.0}, kTranslationMm);
+  const auto expected = last_floats(study_file("atlas.mha"), atlas.pixel_count());
+  EXPECT_EQ(drr_of(atlas, between), expected);
+  // Members are read by whichever thread needs them first, while others read files, too.
+  const Field shared = Field::open(study_file("AP.atlas.af.h5"), {.threads = 3});
+  std::vector<Pose> poses(6, between);
+  std::vector<float> stack(poses.size() * shared.pixel_count());
+  std::thread reading([] {
+    for (int i = 0; i < 5; ++i) (void)Field::open(study_file("AP.af.h5"));
+  });
+  EXPECT_EQ(shared.drrs(poses, stack), 0);
+  reading.join();
+  EXPECT_TRUE(std::equal(expected.begin(),
+                         expected.end(),
+                         stack.end() - static_cast<std::ptrdiff_t>(shared.pixel_count())));
+}
+
+constexpr Beam kBeam = {.tube_kvp = 80.0, .aluminium_mm = 2.0, .scatter_to_primary = 0.2};
+
+TEST(LibraryField, LooksUpTheDrrOfTheProgramOfABeam) {
+  const Field field = Field::open(study_file("AP.af.h5"), {}, kBeam);
+  const Pose pose = field.frame().pose(kRotationDeg, kTranslationMm);
+  EXPECT_EQ(drr_of(field, pose), last_floats(study_file("field-beam.mha"), field.pixel_count()));
+  EXPECT_NE(drr_of(field, pose), last_floats(study_file("field.mha"), field.pixel_count()));
+  EXPECT_THAT(message_of<FileError>([] { (void)Field::open(study_file("LAT.af.h5"), {}, kBeam); }),
+              HasSubstr("LAT.bone.af.h5"));
+  EXPECT_THAT(
+      message_of<InputError>([] { (void)Field::open(study_file("AP.atlas.af.h5"), {}, kBeam); }),
+      HasSubstr("an atlas"));
+  EXPECT_THAT(message_of<InputError>(
+                  [] { (void)Field::open(study_file("AP.af.h5"), {}, {.tube_kvp = -1.0}); }),
+              HasSubstr("tube_kvp"));
+}
+
+TEST(LibraryRayCaster, CastsTheDrrOfTheProgramOfABeam) {
+  const Rig rig = Rig::read(study_file("rig.toml").string());
+  const RayCaster caster(Ct::read(study_file("ct.nii.gz")),
+                         rig.camera("LAT"),
+                         {.isocenter_point = rig.isocenter_point},
+                         kBeam);
+  EXPECT_EQ(drr_of(caster, caster.frame().pose(kRotationDeg, kTranslationMm)),
+            last_floats(study_file("cast-beam.mha"), caster.pixel_count()));
+}
+
 TEST(LibraryRayCaster, CastsTheDrrOfTheProgram) {
   const Rig rig = Rig::read(study_file("rig.toml").string());
   const RayCaster caster(Ct::read(study_file("ct.nii.gz")),

@@ -49,20 +49,33 @@ void make(const fs::path& folder, const std::string& programs) {
   af::test::write_small_study(folder);
   const std::string study = " --study " + (folder / "study.toml").string();
   std::string fields;
+  const std::string design =
+      " --max-rotation-deg 8 --max-translation-mm 12 --uv-nodes 24 --st-nodes 96"
+      " --codewords 1024 -o ";
   for (const std::string camera : {"AP", "LAT"}) {
     const std::string field = (folder / (camera + ".af.h5")).string();
-    run(programs + "/af-precompute" + study + " --camera " + camera +
-        " --max-rotation-deg 8 --max-translation-mm 12 --uv-nodes 24 --st-nodes 96"
-        " --codewords 1024 -o " +
-        field);
+    run(programs + "/af-precompute" + study + " --camera " + camera + design + field);
     fields += " --field " + camera + "=" + field;
   }
+  run(programs + "/af-precompute" + study + " --camera AP --material bone" + design +
+      (folder / "AP.bone.af.h5").string());
+  const std::string atlas = (folder / "AP.atlas.af.h5").string();
+  run(programs + "/af-precompute" + study + " --camera AP --orbit axis=z,from=-8,to=8,step=8" +
+      design + atlas);
   const std::string pose = " --rotation-deg 2,-1.5,3 --translation-mm 4,-5,6 -o ";
   const std::string field = " --field " + (folder / "AP.af.h5").string();
   run(programs + "/af-drr" + field + pose + (folder / "field.mha").string());
   run(programs + "/af-drr" + field + " --look-up cubic" + pose + (folder / "cubic.mha").string());
   run(programs + "/af-drr --ct " + (folder / "ct.nii.gz").string() + " --rig " +
       (folder / "rig.toml").string() + " --camera LAT" + pose + (folder / "cast.mha").string());
+  const std::string beam = " --tube-kvp 80 --aluminium-mm 2 --scatter-to-primary 0.2";
+  run(programs + "/af-drr" + field + beam + pose + (folder / "field-beam.mha").string());
+  run(programs + "/af-drr --ct " + (folder / "ct.nii.gz").string() + " --rig " +
+      (folder / "rig.toml").string() + " --camera LAT" + beam + pose +
+      (folder / "cast-beam.mha").string());
+  // Between the angles of two members, so that both are looked up.
+  run(programs + "/af-drr --field " + atlas +
+      " --rotation-deg 2,-1.5,7 --translation-mm 4,-5,6 -o " + (folder / "atlas.mha").string());
   write_motion_gradient(folder / "AP.af.h5", folder / "motion-gradient.f32");
   const std::string start =
       " --start-rotation-deg -1,0.5,2.5 --start-translation-mm 0.5,1,4 --preset ";

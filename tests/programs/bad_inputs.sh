@@ -174,6 +174,11 @@ for numbers in '1, 2, 3' '[0.1]' '-500, 0, 0, 0' 'nan, 0, 0, 0' '0, 0, 0, 0, 0, 
 done
 of_rig 4 '4, 5, 8, 12 or 14 numbers' 'OpenCV distortion of two numbers' \
   "$(edited camera-opencv-AP.txt '/^distortion/,/data/s/data: .*/data: [ 0.1, 0.2 ]/; /^distortion/,/data/s/rows: .*/rows: 2/')"
+lists="$(sed '/^distortion/,/data/d' valid/camera-opencv-AP.txt)"
+printf '%s\nD:\n- 0.1\n- 0.2\n' "$lists" >dashes.yml
+of_rig 4 '4, 5, 8, 12 or 14 numbers' 'OpenCV distortion of two numbers with dashes' dashes.yml
+printf '%s\nD:\n- [0.1, 0.2\n- 0\n' "$lists" >open.yml
+of_rig 4 'truncated: a list is not closed' 'OpenCV list with dashes that is not closed' open.yml
 of_rig 4 'broken XML' 'RTK geometry cut short' cut.xml
 printf '<!DOCTYPE a [<!ENTITY b "bbbb">]><RTKThreeDCircularGeometry/>' >entities.xml
 of_rig 4 'entities' 'RTK geometry with entities' entities.xml
@@ -241,6 +246,9 @@ of_xray 3 'pixel_spacing_mm of camera' "X-ray of another detector's pixels" othe
 of_xray 3 'PixelIntensityRelationship' 'logarithms as intensities' logarithms.dcm ''
 of_xray 3 'must be grey' 'X-ray in colour' colour.dcm ''
 of_xray 4 'pixel data' 'frames that are not there' promises-frames.dcm 'xray_frame = 1'
+for kind in jpeg rle; do
+  of_xray 4 'compressed pixels are corrupt' "$kind frame that its decoder does not survive" "damaged-$kind.dcm" ''
+done
 of_study 3 'must be a positive number or one of percentile' 'unknown air level' "$(edited study.toml '0,/^xray_domain = .*/s//xray_domain = "intensity"\nair_level = "sky"/')"
 of_study 3 'which gives it for every pixel' 'air level beside a flat field' "$(edited study.toml '0,/^xray_domain = .*/s//xray_domain = "intensity"\nair_level = 5.0\nflat = "f.mha"/')"
 of_study 3 'xray_frame' 'frame of a MetaImage' "$(edited study.toml '0,/^xray_domain = .*/s//&\nxray_frame = 2/')"

@@ -655,9 +655,12 @@ TEST_F(EvaluateProgram, WritesOneSelfContainedReport) {
   EXPECT_FALSE(has("https://"));
   const std::size_t images = test::count_of(page, " src=\"");
   EXPECT_EQ(test::count_of(page, " src=\"data:"), images);
-  // Of each registration three figures, X-rays, three overlays in two views; one figure of both;
-  // box plot, worst and median pair; curves; sweep with its difference images.
-  EXPECT_EQ(images, 2u * (3u + 1u + 6u) + 1u + 1u + 2u + 1u + 2u);
+  // Of each registration three figures, X-rays, three overlays in two views, and the setting of the
+  // two views and of the room; one figure of both; box plot, worst and median pair; curves; sweep
+  // with its difference images.
+  EXPECT_EQ(images, 2u * (3u + 1u + 6u + 3u) + 1u + 1u + 2u + 1u + 2u);
+  EXPECT_TRUE(has("Whether the study fits together"));
+  EXPECT_TRUE(has("camera AP: left edge R, right L, top H, bottom F"));
 }
 
 TEST_F(EvaluateProgram, LeavesWhatTheReportLinksToBesideIt) {

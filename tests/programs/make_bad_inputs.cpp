@@ -10,8 +10,10 @@
 #include <vector>
 #include <zlib.h>
 
+#include "base/hash_random.h"
 #include "programs/small_study.h"
 #include "unit/image_files/ct_test_data.h"
+#include "unit/image_files/encoded_frames.h"
 
 namespace {
 
@@ -64,6 +66,23 @@ void write_dicom_xrays(const fs::path& folder) {
   write("promises-frames.dcm", 1, [](DicomTestFile& file) {
     file.set_text({0x0028, 0x0008}, "IS", "99999");
   });
+}
+
+/// Frames on which GDCM 3.0.21 ends its process, by signals 6 and 11 (where memory is as it was
+/// here).
+void write_damaged_frames(const fs::path& folder) {
+  const auto write =
+      [&](const std::string& name, const test::EncodedFrame& frame, std::uint64_t key) {
+        std::string bytes = test::bytes_of_hex(frame.hex);
+        HashRandom random(1, key);
+        for (int change = 0; change < 3; ++change)
+          bytes[random.below(bytes.size())] = static_cast<char>(random.below(256));
+        DicomTestFile file = test::xa_file(16, 12, 1, std::vector<int>(16 * 12, 0));
+        file.set_fragment(frame.transfer_syntax, bytes);
+        file.write(folder / name);
+      };
+  write("damaged-jpeg.dcm", test::kEncodedFrames[0], 7);
+  write("damaged-rle.dcm", test::kEncodedFrames[2], 17);
 }
 
 /// A MetaImage of 4 x 4 x 4 voxels (x 2 when there are four dimensions).
@@ -123,6 +142,7 @@ void write_inputs(const fs::path& folder) {
   test::write_small_study(folder / "valid");
   write_dicom_folders(folder);
   write_dicom_xrays(folder);
+  write_damaged_frames(folder);
   write_meta<float>(folder / "nan.mha", "MET_FLOAT", 3, std::numeric_limits<float>::quiet_NaN(), 0);
   write_meta<short>(folder / "all-air.mha", "MET_SHORT", 3, -1000, -1000);
   write_meta<short>(folder / "four-d.mha", "MET_SHORT", 4, 40, 40);

@@ -48,6 +48,28 @@ class FieldTest(unittest.TestCase):
         self.assertEqual(first.shape, second.shape)
         self.assertEqual(first.tobytes(), second.tobytes())
 
+    def test_drr_of_an_atlas_and_of_a_beam_are_those_of_the_program(self):
+        atlas = af.Field.open(STUDY / "AP.atlas.af.h5")
+        self.assertGreater(atlas.members, 1)
+        self.assert_same_bits(
+            atlas.drr((2.0, -1.5, 7.0), TRANSLATION_MM), last_floats("atlas.mha", atlas.shape)
+        )
+        beam = {"tube_kvp": 80.0, "aluminium_mm": 2.0, "scatter_to_primary": 0.2}
+        field = open_field(**beam)
+        self.assert_same_bits(
+            field.drr(ROTATION_DEG, TRANSLATION_MM), last_floats("field-beam.mha", field.shape)
+        )
+        rig = af.Rig.read(str(STUDY / "rig.toml"))
+        caster = af.RayCaster(
+            af.Ct.read(STUDY / "ct.nii.gz"),
+            rig.camera("LAT"),
+            isocenter_point=rig.isocenter_point,
+            **beam,
+        )
+        self.assert_same_bits(
+            caster.drr(ROTATION_DEG, TRANSLATION_MM), last_floats("cast-beam.mha", caster.shape)
+        )
+
     def test_drr_is_that_of_the_program(self):
         field = open_field()
         expected = last_floats("field.mha", field.shape)

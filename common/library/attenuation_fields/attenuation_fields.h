@@ -2,6 +2,7 @@
 // All of the library. docs/library.md is its guide.
 #pragma once
 
+#include "attenuation_fields/beam.h"
 #include "attenuation_fields/ct.h"
 #include "attenuation_fields/errors.h"
 #include "attenuation_fields/evaluation.h"

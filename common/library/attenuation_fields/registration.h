@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "attenuation_fields/beam.h"
 #include "attenuation_fields/export.h"
 #include "attenuation_fields/geometry.h"
 
@@ -96,6 +97,11 @@ class ATTENUATION_FIELDS_API RegistrationCase {
   static RegistrationCase load(const std::filesystem::path& study,
                                const std::string& case_name = "",
                                const RegistrationOptions& options = {});
+  /// The same with DRRs of a beam: Field::open() and RayCaster say what it needs.
+  static RegistrationCase load(const std::filesystem::path& study,
+                               const std::string& case_name,
+                               const RegistrationOptions& options,
+                               const Beam& beam);
 
   [[nodiscard]] const std::string& name() const;
   [[nodiscard]] std::vector<CaseView> views() const;

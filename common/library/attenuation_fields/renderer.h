@@ -11,6 +11,7 @@
 #include <span>
 #include <string>
 
+#include "attenuation_fields/beam.h"
 #include "attenuation_fields/ct.h"
 #include "attenuation_fields/export.h"
 #include "attenuation_fields/geometry.h"
@@ -84,15 +85,26 @@ struct FieldOptions {
   Outside outside = Outside::Throw;
 };
 
-/// A precomputed attenuation field of one CT for one camera.
+/// A precomputed attenuation field of one CT for one camera, or an atlas of several, such as those
+/// of a C-arm's orbit. Of an atlas the fields that poses need are read when they are needed, so
+/// DRRs may throw FileError; camera() is the one that its members were derived from.
 class ATTENUATION_FIELDS_API Field : public Renderer {
  public:
-  /// Reads and verifies a field file (.af.h5). FileError, InputError.
+  /// Reads and verifies a file of a field or of an atlas (.af.h5). FileError, InputError.
   static Field open(const std::filesystem::path& path, const FieldOptions& options = {});
+  /// The same for DRRs of a beam. With a tube voltage the field of the CT's bone, A.bone.af.h5
+  /// beside A.af.h5, is read, too: FileError without it, InputError for an atlas.
+  static Field open(const std::filesystem::path& path,
+                    const FieldOptions& options,
+                    const Beam& beam);
+
+  /// Fields of an atlas; 1 for a field.
+  [[nodiscard]] int members() const;
 
   /// How DRRs are looked up.
   [[nodiscard]] const std::string& look_up() const;
-  /// The motion box: every angle and every translation may be this large.
+  /// The motion box, of an atlas at each of its angles: every angle and every translation may be
+  /// this large.
   [[nodiscard]] double max_rotation_deg() const;
   [[nodiscard]] double max_translation_mm() const;
   [[nodiscard]] const std::string& ct_content_sha256() const;
@@ -120,6 +132,8 @@ class ATTENUATION_FIELDS_API RayCaster : public Renderer {
  public:
   /// InputError.
   RayCaster(const Ct& ct, const Camera& camera, const RayCasterOptions& options = {});
+  /// The same for DRRs of a beam. InputError.
+  RayCaster(const Ct& ct, const Camera& camera, const RayCasterOptions& options, const Beam& beam);
 };
 
 }  // namespace attenuation_fields

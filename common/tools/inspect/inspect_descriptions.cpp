@@ -8,7 +8,6 @@
 #include "field_use/field_coverage.h"
 #include "files/output_file.h"
 #include "files/sha256.h"
-#include "geometry/ray_coverage.h"
 #include "image_files/image_file.h"
 #include "pose_files/pose_file.h"
 #include "study/rig_file.h"
@@ -81,7 +80,8 @@ void require_existing(const fs::path& path) {
   if (!fs::exists(path)) throw FileError(path.string(), "does not exist");
 }
 
-/// What the field of a view covers of the rays of its region, about the case's nominal pose.
+/// What the field of a view covers of the rays that registrations look at, about the case's nominal
+/// pose: those of twice its region.
 void describe_coverage(const StudyCase& study_case,
                        const StudyView& view,
                        const CameraGeometry& camera,
@@ -89,21 +89,15 @@ void describe_coverage(const StudyCase& study_case,
                        std::vector<std::string>& warnings) {
   try {
     const HeldRays field = read_held_rays(*view.field);
-    const View region = View{camera, view.roi};
-    const PoseFrame nominal = study_case.frame();
-    json["field_camera"] = field.coverage.distance_text(camera);
-    const auto rays = static_cast<std::int64_t>(region.pixel_count());
-    const std::int64_t outside =
-        field.coverage.rays_outside(nominal.nominal_room_from_ct(), region);
-    json["field_coverage"] =
-        coverage_text(camera.name,
-                      rays - outside,
-                      rays,
-                      field.coverage.box(region, nominal, field.identity.range));
-    if (outside > 0)
-      warnings.push_back("field " + view.field->string() + " misses " + std::to_string(outside) +
-                         " of " + std::to_string(rays) + " rays of camera " + camera.name +
-                         " at the nominal pose");
+    const View needed = View{camera, view.roi}.scaled(kWidestRegionScale);
+    const ViewReach reach = field.coverage.reach(needed, study_case.frame(), field.identity.range);
+    json["field_camera"] = reach.distance;
+    json["field_coverage"] = reach.text(camera.name);
+    if (reach.held < reach.rays)
+      warnings.push_back("field " + view.field->string() + " misses " +
+                         std::to_string(reach.rays - reach.held) + " of " +
+                         std::to_string(reach.rays) + " rays of camera " + camera.name +
+                         " at the nominal pose that registrations need, those of twice the region");
   } catch (const Error& error) {
     warnings.push_back("field " + view.field->string() + " cannot be used: " + error.what());
   }

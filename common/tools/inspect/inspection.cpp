@@ -294,7 +294,8 @@ std::string draw_pictures(const fs::path& study_path,
   make_output_folder(folder);
   std::string text;
   for (const StudyCase& study_case : study.cases) {
-    const StudyPictures pictures = draw_study_pictures(study, study_case, ct_reading, folder);
+    const StudyPictures pictures =
+        draw_study_pictures(study, study_case, ct_reading, folder, file_name_part(study_case.name));
     text += "case " + study_case.name + "\n";
     for (const std::string& fact : pictures.facts) text += "  " + indented(fact, "  ") + "\n";
     for (const std::string& telltale : pictures.telltales) text += "  LOOK: " + telltale + "\n";

@@ -198,6 +198,37 @@ T2: [0, 0, 600]
   expect_seen(rig.cameras[1], {0, 20, 30}, {319.5 - 1000.0 * 30 / 600, 239.5 + 1000.0 * 20 / 600});
 }
 
+// The same numbers as lists with dashes, as YAML libraries of other languages write them: of
+// numbers, of rows in brackets, of lists of lists, indented or not, as `data` of a matrix.
+TEST_F(CameraConventions, OpenCvBlockLists) {
+  const std::string size = "image_size:\n- 512\n- 400\n";
+  const std::string pose = "rvec:\n  - 0.3\n  - -0.2\n  - 0.5\ntvec:\n- [10]\n- [-20]\n- [900]\n";
+  const std::string lens =
+      "dist:  # k1, k2, p1, p2, k3\n  - -0.35\n  - 0.12   # k2\n  - 4e-3\n"
+      "  -  -0.003\n  # nothing\n  - 0.05\n";
+  const std::vector<std::string> matrices = {
+      "K:\n- - 1200\n  - 0\n  - 255.5\n- - 0\n  - 1100\n  - 200.25\n-\n  - 0\n  - 0\n  - 1\n",
+      "K:\n  - [1200, 0, 255.5]\n  - [0, 1100,\n     200.25]\n  - [0, 0, 1]\n",
+      "K: [[1200, 0, 255.5],  # columns\n    [0, 1100, 200.25],\n    [0, 0, 1]]\n",
+      "K:\n   rows: 3\n   cols: 3\n   data:\n   - 1200\n   - 0\n   - 255.5\n   - 0\n   - 1100\n"
+      "   - 200.25\n   - 0\n   - 0\n   - 1\n"};
+  for (const std::string& matrix : matrices) {
+    const CameraGeometry read = camera(size + matrix + lens + pose);
+    expect_opencv_pixels(read);
+    EXPECT_EQ(read.size_px, Eigen::Vector2i(512, 400));
+    const Vector2d stored =
+        PixelDistortion(read).stored_from_ideal(read.project(Vector3d(30, -40, 55)));
+    EXPECT_LT((stored - Vector2d(317.6651288, 132.91818315)).norm(), 1e-5) << matrix;
+  }
+  const std::string good = size + matrices[0] + lens + pose;
+  EXPECT_THAT(file_refusal(test::replaced(good, "  - 0.05\n", "  - 0.05\n  - 1\n")),
+              HasSubstr("4, 5, 8, 12 or 14 numbers"));
+  EXPECT_THAT(file_refusal(test::replaced(good, "  - 4e-3\n", "  - four\n")),
+              HasSubstr("is no number"));
+  EXPECT_THAT(file_refusal(test::replaced(good, "- [900]\n", "- [900\n")),
+              HasSubstr("truncated: a list"));
+}
+
 TEST_F(CameraConventions, OpenCvRefusals) {
   const std::string good = kOpenCv;
   const std::size_t pose = good.find("rvec:");

@@ -177,6 +177,57 @@ TEST(Background, IsBrightDarkOrUndecidedByThePictureItself) {
   EXPECT_EQ(background_of(image, {}), Background::Undecided);
 }
 
+/// A body that fills the picture, with photon noise: 8 units of attenuation at the edge, 3 in the
+/// middle, and bones; or air about a body.
+Image2d photons(bool is_full) {
+  std::mt19937 random(5);
+  std::normal_distribution<float> noise(0.0f, 1.0f);
+  Image2d image(160, 160);
+  for (int row = 0; row < 160; ++row)
+    for (int column = 0; column < 160; ++column) {
+      const double radius = std::hypot(column - 80, row - 80) / 80.0;
+      double depth = is_full ? 1.0 + 2.5 * std::min(radius, 1.4)
+                             : 3.0 * std::sqrt(std::max(0.0, 1.0 - 2.0 * radius * radius));
+      if (column / 12 % 4 == 0 && depth > 0.0) depth += 0.4;
+      const auto mean = static_cast<float>(4000.0 * std::exp(-depth));
+      image.at(column, row) = std::round(mean + 0.5f * std::sqrt(mean) * noise(random));
+    }
+  return image;
+}
+
+TEST(BrightDetail, TellsAnatomyThatFillsThePictureFromANegative) {
+  const Image2d full = photons(true);
+  EXPECT_EQ(background_of(full, {}), Background::Dark);
+  EXPECT_GT(bright_detail(full, {}), 0.5);
+  Image2d negative = photons(false);
+  EXPECT_GT(bright_detail(negative, {}), 0.5);
+  for (float& value : negative.pixels) value = 4095.0f - value;
+  EXPECT_EQ(background_of(negative, {}), Background::Dark);
+  EXPECT_LT(bright_detail(negative, {}), -0.5);
+}
+
+TEST(BrightDetail, LeavesOutWhatIsClippedOrMasked) {
+  Image2d image = photons(false);
+  const double whole = bright_detail(image, {});
+  // Half of the air saturates: what is left of it is as noisy as before.
+  for (float& value : image.pixels) value = std::min(value, 4000.0f);
+  EXPECT_GT(bright_detail(image, {}), 0.5);
+  EXPECT_GT(whole, 0.5);
+  // A border with noise of its own, of any size.
+  Image2d mask(160, 160);
+  for (int row = 20; row < 140; ++row)
+    for (int column = 0; column < 160; ++column) mask.at(column, row) = 1.0f;
+  const double within = bright_detail(image, mask);
+  for (int row = 0; row < 20; ++row)
+    for (int column = 0; column < 160; ++column)
+      image.at(column, row) = (column + row) % 2 == 0 ? 900.0f : 10.0f;
+  EXPECT_LT(bright_detail(image, {}), within - 0.5);
+  for (int column = 0; column < 160; ++column) image.at(column, 19) = 10.0f;
+  EXPECT_GT(bright_detail(image, mask), 0.5);
+  EXPECT_EQ(bright_detail(Image2d(2, 2), {}), 0.0);
+  EXPECT_EQ(bright_detail(Image2d(9, 9), {}), 0.0) << "nothing but one value";
+}
+
 TEST(FlatCorrected, IsTheShareOfTheBeamAndZeroWhereThereIsNone) {
   Image2d image(3, 1);
   Image2d flat(3, 1);

@@ -4,11 +4,13 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <set>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "base/hash_random.h"
 #include "geometry/pinhole_camera.h"
 #include "image_files/dicom_xray.h"
 #include "image_files/image_file.h"
@@ -405,6 +407,29 @@ TEST(XrayReader, InvertedGreysAreToldAndTurnedRoundOnRequest) {
   EXPECT_NEAR(found.attenuation.at(30, 30), std::log(2.5f), kLogRounding);
 }
 
+// Photon noise: a body of 3 units of attenuation in the middle and 4.5 at the edge, no air at all.
+TEST(XrayReader, AnatomyThatFillsThePictureIsNoNegative) {
+  const ScratchFolder folder;
+  HashRandom random(3);
+  Image2d image(90, 90);
+  for (int row = 0; row < 90; ++row)
+    for (int column = 0; column < 90; ++column) {
+      const double radius = std::hypot(column - 45, row - 45) / 45.0;
+      const double mean = 60000.0 * std::exp(-1.0 - 2.5 * std::min(1.0, radius));
+      image.at(column, row) =
+          static_cast<float>(std::round(mean + std::sqrt(mean) * random.normal()));
+    }
+  StudyView view = view_of(folder, image);
+  ViewXray found = read_view_xray(view, camera(90, 90));
+  EXPECT_TRUE(found.warnings.empty());
+  EXPECT_THAT(found.note, HasSubstr("background looks dark"));
+  EXPECT_THAT(found.note, HasSubstr("detail grows with brightness: no negative"));
+  view.reading.polarity = XrayPolarity::Inverted;
+  found = read_view_xray(view, camera(90, 90));
+  EXPECT_TRUE(found.warnings.empty()) << "air is at the edge of the negative, as it should be";
+  EXPECT_THAT(found.note, HasSubstr("background looks bright"));
+}
+
 /// A LUT from 12 stored bits to intensities: 4095 - stored, but for the first and last entries.
 test::DicomTestFile falling_lut(std::uint16_t first, std::size_t entries) {
   std::vector<std::uint16_t> data;
@@ -520,6 +545,35 @@ TEST(XrayReader, FramesThatOtherProgramsEncodedAreReadExactly) {
                   static_cast<float>(2000 + 40 * column - 30 * row + (column * row) % 5))
             << frame.encoder << ", column " << column << ", row " << row;
   }
+}
+
+// GDCM 3.0.21 ends its process on some (an assertion), which must not end ours.
+TEST(XrayReader, DamagedEncodedFramesAreReadOrRefused) {
+  const ScratchFolder folder;
+  constexpr int kCopies = 25;
+  constexpr int kChangedBytes = 3;
+  std::set<bool> was_refused;
+  for (const test::EncodedFrame& frame : test::kEncodedFrames) {
+    const std::string sound = test::bytes_of_hex(frame.hex);
+    for (std::uint64_t copy = 0; copy < kCopies; ++copy) {
+      std::string bytes = sound;
+      HashRandom random(1, copy);
+      for (int change = 0; change < kChangedBytes; ++change)
+        bytes[random.below(bytes.size())] = static_cast<char>(random.below(256));
+      test::DicomTestFile file = test::xa_file(16, 12, 1, std::vector<int>(16 * 12, 0));
+      file.set_fragment(frame.transfer_syntax, bytes);
+      file.write(folder / "frame.dcm");
+      try {
+        const DicomXray xray = read_dicom_xray(folder / "frame.dcm", std::nullopt);
+        EXPECT_EQ(xray.image.pixels.size(), 16U * 12U);
+        was_refused.insert(false);
+      } catch (const FileError& error) {
+        EXPECT_THAT(error.what(), HasSubstr("its compressed pixels are corrupt"));
+        was_refused.insert(true);
+      }
+    }
+  }
+  EXPECT_EQ(was_refused.size(), 2U) << "some are refused, and pixels alone were changed in some";
 }
 
 TEST(XrayReader, AMaskFileAndAnAutomaticMaskHideWhatEitherHides) {

@@ -110,6 +110,42 @@ TEST(LayingTelltale, IsSilentForNoiseAndForConstantPictures) {
   EXPECT_EQ(laying_telltale(laying_matches(Image2d(64, 64), uneven_picture(64))), "");
 }
 
+/// The picture about its middle, as a detector of other pixels sees it: nearest neighbours.
+Image2d scaled(const Image2d& image, double factor) {
+  Image2d result(image.width, image.height);
+  const auto source = [&](int at, int count) {
+    const double middle = 0.5 * (count - 1);
+    return std::clamp(static_cast<int>(std::lround(middle + (at - middle) / factor)), 0, count - 1);
+  };
+  for (int row = 0; row < image.height; ++row)
+    for (int column = 0; column < image.width; ++column)
+      result.at(column, row) = image.at(source(column, image.width), source(row, image.height));
+  return result;
+}
+
+// Factors between the steps of 2^(1/6): the nearest is named.
+TEST(ScaleTelltale, NamesTheScaleThatWouldFit) {
+  const Image2d drr = uneven_picture(128);
+  EXPECT_THAT(scale_telltale(scale_matches(shifted(scaled(drr, 0.5), 5, -3), drr)),
+              HasSubstr("when scaled by 2.00"));
+  EXPECT_THAT(scale_telltale(scale_matches(scaled(drr, 1.0 / 1.6), drr)),
+              HasSubstr("when scaled by 1.59"));
+  EXPECT_THAT(scale_telltale(scale_matches(scaled(drr, 1.6), drr)),
+              HasSubstr("when scaled by 0.63"));
+}
+
+TEST(ScaleTelltale, IsSilentForWhatPosesExplainAndForNoise) {
+  const Image2d drr = uneven_picture(128);
+  for (const double factor : {0.85, 1.0, 1.15})
+    EXPECT_EQ(scale_telltale(scale_matches(shifted(scaled(drr, factor), 8, 6), drr)), "") << factor;
+  HashRandom random(3);
+  Image2d noise(64, 64);
+  for (float& pixel : noise.pixels) pixel = static_cast<float>(random.normal());
+  EXPECT_EQ(scale_telltale(scale_matches(noise, uneven_picture(64))), "");
+  EXPECT_EQ(scale_telltale(scale_matches(Image2d(64, 64), uneven_picture(64))), "");
+  EXPECT_EQ(scale_telltale(scale_matches(Image2d(1, 1), Image2d(1, 1))), "");
+}
+
 TEST(RoomSketch, ShowsEveryCameraWithinItsPaper) {
   const CameraRig rig = parse_rig(builtin_rig_text("c-arm-12in"), "c-arm-12in");
   CtGrid ct;

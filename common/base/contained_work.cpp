@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "base/contained_work.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <csignal>
+#include <cstring>
+#include <fcntl.h>
+#include <fstream>
+#include <new>
+#include <sys/mman.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+namespace af {
+
+namespace {
+
+/// Memory that a copy of this process shares with it.
+class SharedBytes {
+ public:
+  explicit SharedBytes(std::size_t count)
+      : count_(count),
+        start_(::mmap(nullptr, count, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0)) {
+    if (start_ == MAP_FAILED) throw std::bad_alloc();
+  }
+  ~SharedBytes() { ::munmap(start_, count_); }
+  SharedBytes(const SharedBytes&) = delete;
+  SharedBytes& operator=(const SharedBytes&) = delete;
+
+  [[nodiscard]] std::span<char> bytes() const { return {static_cast<char*>(start_), count_}; }
+
+ private:
+  std::size_t count_;
+  void* start_;
+};
+
+/// How the work ended, as the copy leaves it behind; the status of a process may be taken by others
+/// of a program that we are a library of.
+enum class Verdict : char { None = 0, Done, Refused };
+
+void set_limit(decltype(RLIMIT_CPU) resource, rlim_t most) {
+  rlimit limit{};
+  if (::getrlimit(resource, &limit) != 0) return;
+  limit.rlim_cur = std::min(limit.rlim_max, most);
+  ::setrlimit(resource, &limit);
+}
+
+void limit_resources(std::size_t bytes) {
+  constexpr std::size_t kBytesPerSecond = 1u << 20;
+  constexpr std::size_t kFewSeconds = 60;
+  constexpr std::size_t kBytesPerByte = 64;
+  constexpr std::size_t kFewBytes = std::size_t{1} << 30;
+  set_limit(RLIMIT_CORE, 0);
+  set_limit(RLIMIT_CPU, kFewSeconds + bytes / kBytesPerSecond);
+  std::size_t pages = 0;  // that the process has already
+  if (std::ifstream("/proc/self/statm") >> pages)
+    set_limit(RLIMIT_AS,
+              pages * static_cast<std::size_t>(::sysconf(_SC_PAGESIZE)) + kFewBytes +
+                  kBytesPerByte * bytes);
+}
+
+void be_quiet() {
+  const int nothing = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
+  if (nothing < 0) return;
+  ::dup2(nothing, STDOUT_FILENO);
+  ::dup2(nothing, STDERR_FILENO);
+}
+
+/// Signals end the copy as they would end a plain program, whatever handlers this one has.
+void reset_signals() {
+  for (const int signal : {SIGABRT, SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGXCPU, SIGTERM, SIGINT})
+    ::signal(signal, SIG_DFL);
+}
+
+[[noreturn]] void run_copy(std::span<char> bytes,
+                           char& verdict,
+                           const std::function<bool(std::span<char>)>& work) {
+  reset_signals();
+  be_quiet();
+  limit_resources(bytes.size());
+  Verdict found = Verdict::Refused;
+  try {
+    if (work(bytes)) found = Verdict::Done;
+  } catch (...) {
+    found = Verdict::Refused;
+  }
+  verdict = static_cast<char>(found);
+  ::_exit(0);  // nothing of this process is to be tidied up or written twice
+}
+
+std::string end_of(int status, Verdict verdict) {
+  if (verdict == Verdict::Refused) return "refused it";
+  if (!WIFSIGNALED(status)) return "ended without a result";
+  const int signal = WTERMSIG(status);
+  return "ended by signal " + std::to_string(signal) + " (" + ::strsignal(signal) + ")";
+}
+
+}  // namespace
+
+ContainedWork contained_work(std::size_t bytes, const std::function<bool(std::span<char>)>& work) {
+  const SharedBytes shared(bytes + 1);
+  const std::span<char> made = shared.bytes().first(bytes);
+  char& verdict = shared.bytes().back();
+  const pid_t copy = ::fork();
+  if (copy < 0) return {false, {}, std::string("cannot be started: ") + std::strerror(errno)};
+  if (copy == 0) run_copy(made, verdict, work);
+  int status = 0;
+  while (::waitpid(copy, &status, 0) < 0 && errno == EINTR) {
+  }
+  const auto found = static_cast<Verdict>(verdict);
+  if (found == Verdict::Done) return {true, {made.begin(), made.end()}, {}};
+  return {false, {}, end_of(status, found)};
+}
+
+}  // namespace af

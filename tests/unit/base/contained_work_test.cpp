@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "base/contained_work.h"
+
+#include <algorithm>
+#include <csignal>
+#include <cstdlib>
+#include <new>
+#include <stdexcept>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace af {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+TEST(ContainedWork, GivesTheBytesThatWereMade) {
+  const ContainedWork work = contained_work(3, [](std::span<char> bytes) {
+    std::ranges::copy(std::string("abc"), bytes.begin());
+    return true;
+  });
+  EXPECT_TRUE(work.is_done);
+  EXPECT_THAT(work.bytes, ElementsAre('a', 'b', 'c'));
+  EXPECT_EQ(work.trouble, "");
+}
+
+TEST(ContainedWork, ChangesNothingElse) {
+  int mine = 1;
+  EXPECT_TRUE(contained_work(1, [&](std::span<char>) {
+                mine = 2;
+                return true;
+              }).is_done);
+  EXPECT_EQ(mine, 1);
+}
+
+TEST(ContainedWork, SurvivesWhatEndsAProcess) {
+  const ContainedWork aborted = contained_work(1, [](std::span<char>) -> bool { std::abort(); });
+  EXPECT_FALSE(aborted.is_done);
+  EXPECT_THAT(aborted.trouble, HasSubstr("signal " + std::to_string(SIGABRT)));
+  const ContainedWork killed = contained_work(1, [](std::span<char>) {
+    std::raise(SIGSEGV);
+    return true;
+  });
+  EXPECT_FALSE(killed.is_done);
+  EXPECT_THAT(killed.trouble, HasSubstr("signal " + std::to_string(SIGSEGV)));
+  const ContainedWork left =
+      contained_work(1, [](std::span<char>) -> bool { std::_Exit(EXIT_SUCCESS); });
+  EXPECT_FALSE(left.is_done);
+  EXPECT_THAT(left.trouble, HasSubstr("without a result"));
+}
+
+TEST(ContainedWork, WhatIsThrownOrRefusedIsNotDone) {
+  EXPECT_EQ(contained_work(1, [](std::span<char>) { return false; }).trouble, "refused it");
+  EXPECT_EQ(
+      contained_work(1, [](std::span<char>) -> bool { throw std::runtime_error("x"); }).trouble,
+      "refused it");
+}
+
+// 4 GiB for one byte: more than the limit, less than what an allocator refuses by itself.
+TEST(ContainedWork, IsEndedWhenItAsksForFarMoreMemoryThanItsBytesAreWorth) {
+  EXPECT_FALSE(contained_work(1, [](std::span<char> bytes) {
+                 std::vector<char> much(std::size_t{1} << 32, 'a');
+                 bytes[0] = much[much.size() / 2];
+                 return true;
+               }).is_done);
+}
+
+TEST(ContainedWork, HandlersOfTheProgramAreNotCalledInTheCopy) {
+  static volatile std::sig_atomic_t calls = 0;
+  const auto before = std::signal(SIGABRT, [](int) { calls = calls + 1; });
+  const ContainedWork work = contained_work(1, [](std::span<char>) -> bool { std::abort(); });
+  std::signal(SIGABRT, before);
+  EXPECT_EQ(calls, 0);
+  EXPECT_THAT(work.trouble, HasSubstr("signal"));
+}
+
+}  // namespace
+}  // namespace af
