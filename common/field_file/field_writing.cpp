@@ -14,6 +14,7 @@
 #include "field_file/hdf5_calls.h"
 #include "field_file/index_dataset.h"
 #include "field_file/index_filter.h"
+#include "files/input_guard.h"
 #include "files/output_file.h"
 #include "files/sha256.h"
 #include "parallel/mpi_environment.h"
