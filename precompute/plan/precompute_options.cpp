@@ -157,6 +157,13 @@ void describe_casting(Fields& field, PrecomputeOptions& options) {
         "deviation in pixels: for noisy ones; 0: not at all")
       .within(0.0, 100.0)
       .not_deciding("the hash of the projections says it");
+  field("projections_common",
+        options.projections_common,
+        "What becomes of that part of what the projections hold beyond the CT that is the same at "
+        "a pixel in the mean of all views: keep, or remove, because the detector's errors are such "
+        "and the object's seldom")
+      .one_of({"keep", "remove"})
+      .not_deciding("the hash of the projections says it");
 }
 
 void describe_codebook(Fields& field, PrecomputeOptions& options) {
