@@ -49,7 +49,8 @@ DesignChoice choose_design(const FieldSource& source,
                    quantizer,
                    std::nullopt,
                    options.caster,
-                   options.ray_caster};
+                   options.ray_caster,
+                   source.sources};
   if (options.st_plane) scene.st_plane = options.st_plane_rule();
   ProbeOptions probe_options;
   probe_options.seed = options.seed;

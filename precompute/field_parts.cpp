@@ -24,6 +24,8 @@ namespace {
 struct PartKey {
   CameraGeometry camera;
   MotionRange range;
+  MotionRange sized_for;
+  std::vector<HalfSpace> sources;
   auto members() {
     return std::tie(camera.name,
                     camera.source_point,
@@ -31,18 +33,22 @@ struct PartKey {
                     camera.column_direction,
                     camera.row_direction,
                     range.low,
-                    range.high);
+                    range.high,
+                    sized_for.low,
+                    sized_for.high,
+                    sources);
   }
 };
 
 std::vector<PartKey> keys_of_orbit(const FieldSource& source, const PrecomputeOptions& options) {
+  Orbit orbit = orbit_of_text("--orbit", options.orbit);
+  // Where the rays of cameras that stay where they are count, too, sources are all over the place.
+  if (!source.more_cameras.empty()) orbit.members_by = Orbit::MembersBy::Pose;
   std::vector<PartKey> keys;
-  for (OrbitMember& member : orbit_members(source.camera,
-                                           source.isocenter_point,
-                                           source.frame,
-                                           source.range,
-                                           orbit_of_text("--orbit", options.orbit)))
-    keys.push_back({std::move(member.camera), member.range});
+  for (OrbitMember& member :
+       orbit_members(source.camera, source.isocenter_point, source.frame, source.range, orbit))
+    keys.push_back(
+        {std::move(member.camera), member.range, member.sized_for, std::move(member.sources)});
   return keys;
 }
 
@@ -71,11 +77,12 @@ std::vector<FieldPart> parts_of_orbit(const FieldSource& source,
   keys = value_of<std::vector<PartKey>>(bytes, "the orbit of rank 0");
   std::vector<FieldPart> parts;
   for (PartKey& key : keys) {
-    FieldPart part{source, {}, {}};
+    FieldPart part{source, key.range, {}, {}};
     key.camera.pixel_spacing_mm = source.camera.pixel_spacing_mm;
     key.camera.size_px = source.camera.size_px;
     part.source.camera = key.camera;
-    part.source.range = key.range;
+    part.source.range = key.sized_for;
+    part.source.sources = std::move(key.sources);
     parts.push_back(std::move(part));
   }
   return parts;
@@ -112,12 +119,12 @@ std::vector<FieldPart> field_parts(const FieldSource& source,
                                    const PrecomputeOptions& options,
                                    const Communicator& communicator) {
   if (!options.orbit.empty()) return parts_of_orbit(source, options, communicator);
-  if (options.orbit_cameras.empty()) return {FieldPart{source, {}, {}}};
+  if (options.orbit_cameras.empty()) return {FieldPart{source, source.range, {}, {}}};
   const CameraRig rig = shared_rig(options.orbit_cameras, communicator);
   std::vector<FieldPart> parts;
   for (const CameraGeometry& camera : all_or_none(
            communicator, [&] { return listed_cameras(source, options.orbit_cameras, rig); })) {
-    parts.push_back({source, {}, {}});
+    parts.push_back({source, source.range, {}, {}});
     parts.back().source.camera = camera;
   }
   return parts;
@@ -165,7 +172,7 @@ std::string parts_text(const std::vector<FieldPart>& parts) {
   for (const FieldPart& part : parts)
     names += (names.empty() ? "" : ", ") + part.source.camera.name;
   return "  atlas              " + std::to_string(parts.size()) + " fields: " + names +
-         "; each for " + parts.front().source.range.text() + "\n";
+         "; each for at least " + parts.front().range.text() + "\n";
 }
 
 }  // namespace af

@@ -18,7 +18,8 @@ namespace af {
 
 /// One field to make.
 struct FieldPart {
-  FieldSource source;  ///< with its own camera and range
+  FieldSource source;  ///< with its own camera, and the range and sources that it is sized for
+  MotionRange range;   ///< about the nominal pose: all of it is held
   LightSlab light_slab;
   std::shared_ptr<const SlabAlignedVolume> resampled;  ///< for casters that need it
 };

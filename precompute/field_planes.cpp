@@ -26,13 +26,16 @@ LightSlab sized_planes(const FieldSource& source,
                        const MotionRange& range,
                        const DepthSlabs& depth_slabs) {
   const FieldDesign design = options.design();
-  return make_light_slab(
-      source.camera,
-      source.frame,
-      range,
-      source.volume->corner_points(),
-      {design.uv_nodes, design.st_nodes, depth_slabs.boundaries_y_mm, depth_slabs.st_plane_y_mm},
-      source.more_cameras);
+  return make_light_slab(source.camera,
+                         source.frame,
+                         range,
+                         source.volume->corner_points(),
+                         {design.uv_nodes,
+                          design.st_nodes,
+                          depth_slabs.boundaries_y_mm,
+                          depth_slabs.st_plane_y_mm,
+                          source.sources},
+                         source.more_cameras);
 }
 
 std::string planes_text(const LightSlab& planes) {

@@ -77,10 +77,11 @@ void read_measured(const StudyView& view,
 
 std::string content_hash(const std::vector<CameraGeometry>& cameras,
                          std::span<const float> measured,
-                         double smoothing_px) {
+                         const PrecomputeOptions& options) {
   std::ostringstream text;
   text.precision(17);
-  text << sha256_hex(std::as_bytes(measured)) << ' ' << smoothing_px;
+  text << sha256_hex(std::as_bytes(measured)) << ' ' << options.projections_smoothing_px << ' '
+       << options.projections_common;
   for (const CameraGeometry& camera : cameras)
     text << '\n'
          << camera.source_point.transpose() << ' ' << camera.detector_origin_point.transpose()
@@ -103,6 +104,47 @@ void subtract_cast(const RayCaster& caster,
     image.pixels[i] = std::isnan(measured[i]) ? 0.0F : measured[i] - image.pixels[i];
   image = gaussian_blur(image, smoothing_px);
   std::copy(image.pixels.begin(), image.pixels.end(), residual.begin());
+}
+
+/// The mean over the views of what each pixel holds beyond the CT; 0 where no view was measured.
+/// InputError when the views are not of one size.
+std::vector<float> common_part(const std::vector<CameraGeometry>& cameras,
+                               std::span<const float> measured,
+                               std::span<const float> residual,
+                               const std::string& path) {
+  for (const CameraGeometry& camera : cameras)
+    if (camera.size_px != cameras.front().size_px)
+      throw InputError("projections_common",
+                       "remove",
+                       "needs views of one size; that of camera '" + camera.name + "' is another",
+                       path);
+  const std::size_t pixels = residual.size() / cameras.size();
+  std::vector<float> common(pixels);
+  for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
+    double sum = 0.0;
+    int count = 0;
+    for (std::size_t i = pixel; i < residual.size(); i += pixels) {
+      if (std::isnan(measured[i])) continue;
+      sum += static_cast<double>(residual[i]);
+      ++count;
+    }
+    common[pixel] = count > 0 ? static_cast<float>(sum / count) : 0.0F;
+  }
+  return common;
+}
+
+/// Collective. The residuals without common_part(), once per node.
+std::shared_ptr<const std::byte> without_common_part(const std::vector<CameraGeometry>& cameras,
+                                                     std::span<const float> measured,
+                                                     std::span<const float> residual,
+                                                     const std::string& path,
+                                                     const Communicator& communicator) {
+  return communicator.allocate_on_node(residual.size_bytes(), [&](std::span<std::byte> memory) {
+    const std::vector<float> common = common_part(cameras, measured, residual, path);
+    auto* const values = reinterpret_cast<float*>(memory.data());
+    for (std::size_t i = 0; i < residual.size(); ++i)
+      values[i] = std::isnan(measured[i]) ? 0.0F : residual[i] - common[i % common.size()];
+  });
 }
 
 /// Root mean squares of measured and residual where the CT attenuates: elsewhere the CT says
@@ -213,11 +255,16 @@ std::shared_ptr<const MeasuredViews> load_measured_views(const PrecomputeOptions
                         of_view(measured, i),
                         of_view(residual, i));
       });
-  const std::span residual(reinterpret_cast<const float*>(found->memory.get()), places.back());
-  for (std::size_t i = 0; i < cameras.size(); ++i) found->views[i].residual = of_view(residual, i);
-  found->content_sha256 = content_hash(cameras, measured, options.projections_smoothing_px);
-  note_rms(measured, residual, *found);
+  const auto held = [&] {
+    return std::span(reinterpret_cast<const float*>(found->memory.get()), places.back());
+  };
+  note_rms(measured, held(), *found);
   all_or_none(communicator, [&] { require_same_object(*found); });
+  if (options.projections_common == "remove")
+    found->memory =
+        without_common_part(cameras, measured, held(), options.projections, communicator);
+  for (std::size_t i = 0; i < cameras.size(); ++i) found->views[i].residual = of_view(held(), i);
+  found->content_sha256 = content_hash(cameras, measured, options);
   return found;
 }
 

@@ -33,7 +33,8 @@ struct MeasuredViews {
 /// read_study() and read_view_xray(). InputError when the case states no gold pose, when a value is
 /// not finite, when the sources are on no circle, or when the CT leaves more than 0.7 of what was
 /// measured (of an unrelated object it would leave 1.4 times as much): then the X-rays are of
-/// another object or geometry, or of another scale of attenuation.
+/// another object or geometry, or of another scale of attenuation. Views of several sizes have no
+/// common part to remove: InputError.
 std::shared_ptr<const MeasuredViews> load_measured_views(const PrecomputeOptions& options,
                                                          const AttenuationVolume& volume,
                                                          const Eigen::Vector3d& beam_ct,

@@ -96,8 +96,16 @@ DecidingValues casting_decides(const PrecomputeOptions& options,
   add_camera(source.camera, "camera");
   for (std::size_t i = 0; i < source.more_cameras.size(); ++i)
     add_camera(source.more_cameras[i], "covered camera " + std::to_string(i + 1));
-  for (std::size_t i = 0; options.is_atlas() && i < parts.size(); ++i)
-    add_camera(parts[i].source.camera, "camera of member " + std::to_string(i));
+  for (std::size_t i = 0; options.is_atlas() && i < parts.size(); ++i) {
+    const FieldSource& part = parts[i].source;
+    const std::string of_member = " of member " + std::to_string(i);
+    add_camera(part.camera, "camera" + of_member);
+    decides["range" + of_member] = numbers_text(part.range.low.deg_and_mm().data(), 6) + " " +
+                                   numbers_text(part.range.high.deg_and_mm().data(), 6);
+    for (const HalfSpace& half_space : part.sources)
+      decides["sources" + of_member] +=
+          numbers_text(half_space.normal) + " " + numbers_text(&half_space.offset_mm, 1) + " ";
+  }
   decides["nominal rotation"] = numbers_text(source.frame.rotation);
   decides["center_ct_mm"] = numbers_text(source.frame.center_ct_mm);
   decides["nominal center_room_mm"] = numbers_text(source.frame.center_room_mm);
@@ -531,11 +539,12 @@ class PrecomputeRun {
     return [this] { return run_.is_stop_requested(); };
   }
 
-  [[nodiscard]] FieldIdentity identity_of(const FieldSource& source) const {
+  [[nodiscard]] FieldIdentity identity_of(const FieldSource& source,
+                                          const MotionRange& range) const {
     const AttenuationModel& model = options_.attenuation;
     return {source.camera,
             source.frame,
-            source.range,
+            range,
             source.ct_content_sha256,
             model.mu_water_per_mm,
             model.air_below_hu,
@@ -548,12 +557,12 @@ class PrecomputeRun {
                              const MakeProvenance& make_provenance) const {
     const IndexPacking packing =
         options_.packs_by_codebook_tree() ? IndexPacking::CodebookTree : IndexPacking::Deflate;
-    AttenuationAtlas atlas{identity_of(source_),
+    AttenuationAtlas atlas{identity_of(source_, source_.range),
                            {},
                            quantizer().step(),
                            field_codebook(trained, options_.design().mean_step)};
     for (const FieldPart& part : parts_)
-      atlas.members.push_back({identity_of(part.source), part.light_slab});
+      atlas.members.push_back({identity_of(part.source, part.range), part.light_slab});
     if (options_.is_atlas())
       return write_atlas(
           atlas, next_blocks, make_provenance, options_.output, world_, hints(), packing);

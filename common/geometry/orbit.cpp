@@ -8,6 +8,8 @@
 #include <sstream>
 
 #include "base/error.h"
+#include "geometry/pose_in_range.h"
+#include "geometry/rotation_search.h"
 
 namespace af {
 
@@ -56,9 +58,8 @@ PointBox translations_seen(const Orbit& orbit,
   PointBox box;
   double farthest_mm = 0.0;
   for (unsigned corner = 0; corner < 8; ++corner) {
-    Eigen::Vector3d point = from_isocenter_mm;
-    for (int axis = 0; axis < 3; ++axis)
-      point[axis] += ((corner >> axis & 1u) != 0 ? range.high : range.low).translation_mm[axis];
+    const Eigen::Vector3d point =
+        from_isocenter_mm + corner_pose(range, corner << 3u).translation_mm;
     farthest_mm = std::max(farthest_mm, point.norm());
     for (const double angle : angles_within(off, kStepRad))
       box.add(turn(orbit, -angle) * point - from_isocenter_mm);
@@ -124,6 +125,160 @@ Tiling tiling_of(const Angles& angles, double most_step_rad) {
   return {-below * step, step, below + 1.0 + above};
 }
 
+/// Where the source of a camera stands about an orbit's axis, as the CT at the nominal pose sees
+/// it.
+class SourceAngle {
+ public:
+  SourceAngle(const CameraGeometry& camera,
+              const Eigen::Vector3d& isocenter_point,
+              const PoseFrame& frame,
+              const Orbit& orbit)
+      : source_(camera.source_point - frame.center_room_mm),
+        axis_(frame.center_room_mm - isocenter_point) {
+    const Eigen::Vector3d from_axis = camera.source_point - isocenter_point;
+    const Eigen::Vector3d along = orbit.direction();
+    ahead_ = (from_axis - along.dot(from_axis) * along).normalized();
+    aside_ = along.cross(ahead_);
+  }
+
+  /// Largest sign * (angle from where the camera's own source stands + turn_share * rz) over a box
+  /// of poses. Over the shifts it is largest in a corner: sources on one side of a half-plane
+  /// through the axis are a convex set.
+  [[nodiscard]] double largest(const MotionRange& box, double sign, double turn_share) const {
+    return maxima_over_rotations(
+               box,
+               1,
+               [&](const Eigen::Vector3d& angles) {
+                 const Eigen::Matrix3d back = rotation_from_angles(angles).transpose();
+                 double most = -std::numeric_limits<double>::infinity();
+                 for (unsigned corner = 0; corner < 8; ++corner)
+                   most = std::max(
+                       most,
+                       sign * of_source(back *
+                                        (source_ - corner_pose(box, corner << 3u).translation_mm)));
+                 return most + sign * turn_share * angles[kOutermostAxis];
+               },
+               [](double most, std::size_t /*i*/) { return most; })
+        .front();
+  }
+
+  /// Sources less than `angle_rad` on, of a half turn; `sign` -1: more than that. Ct frame.
+  [[nodiscard]] HalfSpace half_space(double angle_rad, double sign, const PoseFrame& frame) const {
+    const Eigen::Vector3d normal =
+        sign * (std::cos(angle_rad) * aside_ - std::sin(angle_rad) * ahead_);
+    // Through the axis, which is `axis_` before the frame's centre.
+    const HalfSpace about_center{normal, -normal.dot(axis_)};
+    RigidTransform ct_from_center = RigidTransform::Identity();
+    ct_from_center.linear() = frame.rotation.transpose();
+    ct_from_center.translation() = frame.center_ct_mm;
+    return about_center.in(ct_from_center);
+  }
+
+ private:
+  /// Of a source seen from the frame's centre.
+  [[nodiscard]] double of_source(const Eigen::Vector3d& from_center) const {
+    const Eigen::Vector3d from_axis = from_center + axis_;
+    return std::atan2(aside_.dot(from_axis), ahead_.dot(from_axis));
+  }
+
+  Eigen::Vector3d source_;  ///< from the frame's centre
+  Eigen::Vector3d axis_;    ///< to the frame's centre from the isocentre
+  Eigen::Vector3d ahead_;
+  Eigen::Vector3d aside_;
+};
+
+/// A box shrunk about its middle.
+MotionRange shrunk(const MotionRange& box, double factor) {
+  MotionRange part = box;
+  const auto shrink = [&](auto& low, auto& high) {
+    const Eigen::Vector3d middle = 0.5 * (low + high);
+    low = middle + factor * (low - middle);
+    high = middle + factor * (high - middle);
+  };
+  shrink(part.low.rotation_rad, part.high.rotation_rad);
+  shrink(part.low.translation_mm, part.high.translation_mm);
+  return part;
+}
+
+/// What the members of an orbit about the outermost axis are made from.
+struct TiledOrbit {
+  const Eigen::Vector3d& isocenter_point;
+  const PoseFrame& frame;
+  const MotionRange& range;
+  const Orbit& orbit;
+  double half_rad;  ///< of a tile
+};
+
+/// Poses that a member is sized for, when a pose's camera and CT are turned towards each other by
+/// up to `below` and `above` beyond the member's angle.
+MotionRange box_within(const TiledOrbit& of, double below_rad, double above_rad) {
+  const int axis = of.orbit.axis;
+  const PointBox shifts = translations_seen(
+      of.orbit,
+      of.frame.center_room_mm - of.isocenter_point,
+      of.range,
+      {of.range.low.rotation_rad[axis] - below_rad, of.range.high.rotation_rad[axis] + above_rad});
+  MotionRange box = of.range;
+  // Wider by what rounding may take, so that neighbours touch.
+  box.low.rotation_rad[axis] = -above_rad - kRounding;
+  box.high.rotation_rad[axis] = below_rad + kRounding;
+  box.low.translation_mm = shifts.low;
+  box.high.translation_mm = shifts.high;
+  return box;
+}
+
+/// Poses that cameras see which stand `off` from a member about an axis whose turns change all
+/// angles.
+MotionRange box_seen(const TiledOrbit& of, const Angles& off) {
+  const PointBox shifts =
+      translations_seen(of.orbit, of.frame.center_room_mm - of.isocenter_point, of.range, off);
+  const PointBox angles = rotations_seen(of.orbit, of.range, off);
+  return {{angles.low, shifts.low}, {angles.high, shifts.high}};
+}
+
+/// Where the sources of a member end, on either side of its angle.
+struct SourceBounds {
+  double reach_rad = 0.0;
+  bool has_below = true;
+  bool has_above = true;
+};
+
+/// Bounds a member by sources. Leaves it as it is where shifts and turns move these too far.
+void bound_by_sources(const TiledOrbit& of, const SourceBounds& bounds, OrbitMember& member) {
+  constexpr double kMostAsideRad = 20.0 * kRadPerDeg;
+  constexpr double kMostReachRad = 60.0 * kRadPerDeg;
+  constexpr double kLeastHeld = 0.05;  // of what the tile's poses are
+  if (bounds.reach_rad > kMostReachRad) return;
+  const SourceAngle angle(member.camera, of.isocenter_point, of.frame, of.orbit);
+  const auto box_beyond = [&](double aside_rad) {
+    return box_within(of,
+                      bounds.has_below ? bounds.reach_rad + aside_rad : of.half_rad,
+                      bounds.has_above ? bounds.reach_rad + aside_rad : of.half_rad);
+  };
+  // How far poses put the source from where their turn about the axis alone would.
+  const MotionRange widest = box_beyond(kMostAsideRad);
+  const double aside = std::max(angle.largest(widest, 1.0, 1.0), angle.largest(widest, -1.0, 1.0));
+  if (!(aside <= kMostAsideRad)) return;
+  const auto is_held = [&](double factor) {
+    const MotionRange part = shrunk(member.range, factor);
+    return (!bounds.has_above || angle.largest(part, 1.0, 0.0) <= bounds.reach_rad) &&
+           (!bounds.has_below || angle.largest(part, -1.0, 0.0) <= bounds.reach_rad);
+  };
+  if (!is_held(kLeastHeld)) return;
+  double held = kLeastHeld;
+  double missed = 1.0;
+  constexpr int kHalvings = 8;
+  for (int i = 0; i < kHalvings; ++i) {
+    const double next = 0.5 * (held + missed);
+    (is_held(next) ? held : missed) = next;
+  }
+  member.range = shrunk(member.range, held);
+  member.sized_for = box_beyond(aside);
+  if (bounds.has_above) member.sources.push_back(angle.half_space(bounds.reach_rad, 1.0, of.frame));
+  if (bounds.has_below)
+    member.sources.push_back(angle.half_space(-bounds.reach_rad, -1.0, of.frame));
+}
+
 /// "A_z-80", "A_z7.5".
 std::string member_name(const std::string& camera, const Orbit& orbit, double angle_rad) {
   std::ostringstream text;
@@ -186,31 +341,43 @@ std::vector<OrbitMember> orbit_members(const CameraGeometry& nominal,
                      "would take " + std::to_string(static_cast<std::int64_t>(tiling.count)) +
                          " fields; at most " + std::to_string(kMaxOrbitMembers) +
                          " stand in a file: take a larger step");
-  const double half = 0.5 * tiling.step_rad;
-  const Angles off = adds_up ? Angles{lowest - half, highest + half} : Angles{-half, half};
-  const PointBox shifts =
-      translations_seen(orbit, frame.center_room_mm - isocenter_point, range, off);
-  MotionRange of_member = range;
-  of_member.low.translation_mm = shifts.low;
-  of_member.high.translation_mm = shifts.high;
-  if (adds_up) {
-    // Wider by what rounding may take, so that neighbours touch.
-    of_member.low.rotation_rad[orbit.axis] = -half - kRounding;
-    of_member.high.rotation_rad[orbit.axis] = half + kRounding;
-  } else {
-    const PointBox angles = rotations_seen(orbit, range, off);
-    of_member.low.rotation_rad = angles.low;
-    of_member.high.rotation_rad = angles.high;
-  }
+  const TiledOrbit of{isocenter_point, frame, range, orbit, 0.5 * tiling.step_rad};
+  const MotionRange of_member = adds_up ? box_within(of, of.half_rad, of.half_rad)
+                                        : box_seen(of, {-of.half_rad, of.half_rad});
   std::vector<OrbitMember> members;
-  for (int i = 0; i < static_cast<int>(tiling.count); ++i) {
+  const int count = static_cast<int>(tiling.count);
+  for (int i = 0; i < count; ++i) {
     const double angle = tiling.first_rad + i * tiling.step_rad;
-    OrbitMember member{
-        turned_camera(nominal, isocenter_point, orbit.direction(), angle), angle, of_member};
+    OrbitMember member{turned_camera(nominal, isocenter_point, orbit.direction(), angle),
+                       angle,
+                       of_member,
+                       of_member,
+                       {}};
     member.camera.name = member_name(nominal.name, orbit, angle);
+    if (adds_up && orbit.members_by == Orbit::MembersBy::Source)
+      bound_by_sources(of, {of.half_rad + kSeamOverlapRad, i > 0, i + 1 < count}, member);
     members.push_back(std::move(member));
   }
   return members;
+}
+
+OrbitMember member_of_sources(const CameraGeometry& nominal,
+                              const Eigen::Vector3d& isocenter_point,
+                              const PoseFrame& frame,
+                              const MotionRange& range,
+                              double angle_rad,
+                              double reach_rad) {
+  const Orbit orbit{kOutermostAxis, angle_rad, angle_rad, {}};
+  const TiledOrbit of{isocenter_point, frame, range, orbit, reach_rad};
+  const MotionRange box = box_within(of, reach_rad, reach_rad);
+  OrbitMember member{turned_camera(nominal, isocenter_point, orbit.direction(), angle_rad),
+                     angle_rad,
+                     box,
+                     box,
+                     {}};
+  member.camera.name = member_name(nominal.name, orbit, angle_rad);
+  bound_by_sources(of, {reach_rad, true, true}, member);
+  return member;
 }
 
 std::string text_of(const Orbit& orbit) {

@@ -17,6 +17,9 @@ struct Orbit {
   double from_rad = 0.0;
   double to_rad = 0.0;
   std::optional<double> step_rad;  ///< most between two members; none: default_step_rad()
+  /// What tells members apart: where the source stands as the CT sees it, or the pose's angle, with
+  /// all shifts in every member. About x and y it is the pose.
+  enum class MembersBy { Source, Pose } members_by = MembersBy::Source;
 
   [[nodiscard]] Eigen::Vector3d direction() const { return Eigen::Vector3d::Unit(axis); }
 };
@@ -27,12 +30,19 @@ CameraGeometry turned_camera(const CameraGeometry& camera,
                              const Eigen::Vector3d& direction,
                              double angle_rad);
 
-/// One field of an atlas: its camera and the range that its planes are sized for.
+/// One field of an atlas: its camera and what its planes are sized for.
 struct OrbitMember {
   CameraGeometry camera;  ///< the nominal one, turned by angle_rad; its name says so
   double angle_rad = 0.0;
-  MotionRange range;  ///< about the nominal pose
+  MotionRange range;  ///< about the nominal pose: all of it is held
+  /// Of these poses those are held whose source lies in all of `sources` (ct frame).
+  MotionRange sized_for;
+  std::vector<HalfSpace> sources;
 };
+
+/// Angle about the axis between the seam of two members and where either still holds what it sees,
+/// so that DRRs pass from one to the other gradually.
+inline constexpr double kSeamOverlapRad = 0.75 * kRadPerDeg;
 
 /// How far members stand apart unless an orbit says it: as wide as the range is about its axis, at
 /// least 5 degrees.
@@ -43,17 +53,30 @@ inline constexpr int kMaxOrbitMembers = 64;
 
 /// Fields at equal distances, one about the nominal camera where the orbit holds it, such that
 /// every pose of `range` about the nominal pose of `frame`, seen by the camera at any angle of the
-/// orbit, is held by one of them. A turn about z, the outer- most rotation of a pose, adds to its
-/// rz and changes no other angle: members then tile the sum of both, and a member is no wider about
-/// z than its step. About x and y a member holds the whole range at every angle that is nearest to
-/// it. Shifts are those of the room: a member holds the box turned. InputError when there would be
-/// more than kMaxOrbitMembers, or angles are not finite and ascending. \test
-/// Orbit.EveryPoseAtEveryAngleIsInAMembersRange
+/// orbit, is held by one of them. A turn about z, the outermost rotation of a pose, adds to its
+/// rz and changes no other angle: members then tile the sum of both. By source, a member has those
+/// poses whose source is between two half-planes through the axis, or kSeamOverlapRad beyond,
+/// wherever turns and shifts have put it: what shifts need is not held by two. About x and y a
+/// member holds the whole range at every angle that is nearest to it. Shifts are those of
+/// the room: a member holds the box turned. InputError when there would be more than
+/// kMaxOrbitMembers, or angles are not finite and ascending. \test
+/// Orbit.EveryPoseAtEveryAngleIsAMembers
 std::vector<OrbitMember> orbit_members(const CameraGeometry& nominal,
                                        const Eigen::Vector3d& isocenter_point,
                                        const PoseFrame& frame,
                                        const MotionRange& range,
                                        const Orbit& orbit);
+
+/// The member that holds every pose of `range` at any angle of an orbit about z whose source stands
+/// within `reach_rad` of the camera turned by `angle_rad`, as the CT sees it. With all poses of its
+/// range, without regard to sources, where these move too far for that.
+/// \test Orbit.AMemberHoldsItsRangeOnPlanesAsNarrowAsItsSources
+OrbitMember member_of_sources(const CameraGeometry& nominal,
+                              const Eigen::Vector3d& isocenter_point,
+                              const PoseFrame& frame,
+                              const MotionRange& range,
+                              double angle_rad,
+                              double reach_rad);
 
 /// "axis z, -90 to 90 deg".
 std::string text_of(const Orbit& orbit);

@@ -9,99 +9,13 @@
 
 #include "base/error.h"
 #include "geometry/hit_extents.h"
+#include "geometry/rotation_search.h"
 
 namespace af {
 
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-/// The largest value found of a function of the rotation, and where.
-struct RotationMaximum {
-  Eigen::Vector3d angles;
-  double value;
-
-  /// Whether `candidate` at `at` is larger, which it then takes.
-  bool takes(const Eigen::Vector3d& at, double candidate) {
-    if (!(candidate > value)) return false;
-    value = candidate;
-    angles = at;
-    return true;
-  }
-};
-
-/// The grid of rotations that a search begins with: holds the box's corners, edges and centre.
-struct RotationGrid {
-  Eigen::Vector3d low;
-  Eigen::Vector3d high;
-  std::array<int, 3> intervals;
-  Eigen::Vector3d step;
-
-  explicit RotationGrid(const MotionRange& range)
-      : low(range.low.rotation_rad), high(range.high.rotation_rad) {
-    constexpr double kWidestStepRad = 15.0 * kRadPerDeg;
-    for (int axis = 0; axis < 3; ++axis) {
-      const double width = high[axis] - low[axis];
-      const int count = std::max(8, static_cast<int>(std::ceil(width / kWidestStepRad)));
-      // An axis without room needs no nodes beside its first.
-      intervals[static_cast<std::size_t>(axis)] = width > 0.0 ? count : 0;
-      step[axis] = width / count;
-    }
-  }
-
-  [[nodiscard]] Eigen::Vector3d middle() const {
-    return Eigen::Vector3d::Zero().cwiseMax(low).cwiseMin(high);
-  }
-  template <typename Visit>
-  void for_each(const Visit& visit) const {
-    for (int i = 0; i <= intervals[0]; ++i)
-      for (int j = 0; j <= intervals[1]; ++j)
-        for (int k = 0; k <= intervals[2]; ++k)
-          visit(Eigen::Vector3d(low + step.cwiseProduct(Eigen::Vector3d(i, j, k))));
-  }
-};
-
-/// Pattern search from the best node of the grid.
-template <typename Objective>
-double refined(RotationMaximum best, const RotationGrid& grid, const Objective& objective) {
-  constexpr double kFinalStepRad = 1e-8;
-  for (Eigen::Vector3d step = grid.step / 2.0; step.maxCoeff() > kFinalStepRad;) {
-    const Eigen::Vector3d center = best.angles;
-    bool improved = false;
-    for (int axis = 0; axis < 3; ++axis)
-      for (const double sign : {-1.0, 1.0}) {
-        Eigen::Vector3d angles = center;
-        angles[axis] =
-            std::clamp(angles[axis] + sign * step[axis], grid.low[axis], grid.high[axis]);
-        improved = best.takes(angles, objective(angles)) || improved;
-      }
-    if (!improved) step /= 2.0;
-  }
-  return best.value;
-}
-
-/// Maximises smooth functions over the rotation box, each from its best node of one grid. At large
-/// angles extremes lie inside the box, so corners alone would not do. `turned(angles)` is what the
-/// functions share of a rotation, `value(that, i)` the function i of `count`.
-template <typename Turned, typename Value>
-std::vector<double> maxima_over_rotations(const MotionRange& range,
-                                          std::size_t count,
-                                          const Turned& turned,
-                                          const Value& value) {
-  const RotationGrid grid(range);
-  std::vector<RotationMaximum> best;
-  const auto at_middle = turned(grid.middle());
-  for (std::size_t i = 0; i < count; ++i) best.push_back({grid.middle(), value(at_middle, i)});
-  grid.for_each([&](const Eigen::Vector3d& angles) {
-    const auto at_node = turned(angles);
-    for (std::size_t i = 0; i < count; ++i) best[i].takes(angles, value(at_node, i));
-  });
-  std::vector<double> maxima;
-  for (std::size_t i = 0; i < count; ++i)
-    maxima.push_back(refined(
-        best[i], grid, [&](const Eigen::Vector3d& angles) { return value(turned(angles), i); }));
-  return maxima;
-}
 
 /// All translations of a range: about its middle, to both sides by at most `half_mm` along each
 /// axis.
@@ -123,6 +37,13 @@ struct TranslationBox {
     return slope.cwiseAbs().cwiseProduct(share).sum() * largest_half_mm;
   }
 };
+
+PlaneExtent common_part(const PlaneExtent& a, const PlaneExtent& b) {
+  return {std::max(a.x_low_mm, b.x_low_mm),
+          std::min(a.x_high_mm, b.x_high_mm),
+          std::max(a.z_low_mm, b.z_low_mm),
+          std::min(a.z_high_mm, b.z_high_mm)};
+}
 
 /// A camera seen from the CT: maps room vectors, for one rotation of the CT, to the slab frame.
 class MovingCamera {
@@ -174,10 +95,21 @@ class MovingCamera {
     return at;
   }
 
-  /// Largest coordinate sign * x (axis 0) or sign * z (axis 2) at which the ray to detector corner
-  /// `corner` can meet the plane y = plane_y, over all translations in range.
-  [[nodiscard]] double extreme_hit(
-      const Turned& at, std::size_t corner, double plane_y_mm, int axis, double sign) const {
+  /// What lies beyond a half-space is paid for: `price` per mm of normal . source - offset, gained
+  /// within it.
+  struct PricedRegion {
+    HalfSpace sources;  ///< slab frame
+    double price = 0.0;
+  };
+
+  /// Largest coordinate sign * x (axis 0) or sign * z (axis 2), less its price, at which the ray to
+  /// detector corner `corner` can meet the plane y = plane_y, over all translations in range.
+  [[nodiscard]] double extreme_hit(const Turned& at,
+                                   std::size_t corner,
+                                   double plane_y_mm,
+                                   int axis,
+                                   double sign,
+                                   const PricedRegion& region) const {
     const Eigen::Vector3d& direction = at.corner_directions[corner];
     constexpr double kSteepest = -0.05;  // rays within 3 degrees of the planes make them boundless
     if (!(direction.y() < kSteepest * direction.norm()))
@@ -186,10 +118,12 @@ class MovingCamera {
                        "too large: some rays of the camera run parallel to the field's planes");
     const double slope = direction[axis] / direction.y();
     const double at_rest = at.source[axis] + (plane_y_mm - at.source.y()) * slope;
-    const Eigen::Vector3d per_translation =
-        at.slab_from_room.transpose() *
-        (Eigen::Vector3d::Unit(axis) - slope * Eigen::Vector3d::UnitY());
-    return sign * at_rest + translations_.largest_growth(per_translation);
+    const double beyond = region.sources.normal.dot(at.source) - region.sources.offset_mm;
+    const Eigen::Vector3d per_source_mm =
+        sign * (Eigen::Vector3d::Unit(axis) - slope * Eigen::Vector3d::UnitY()) -
+        region.price * region.sources.normal;
+    return sign * at_rest - region.price * beyond +
+           translations_.largest_growth(at.slab_from_room.transpose() * per_source_mm);
   }
 
   /// Lowest slab-frame y of the source over the whole motion box.
@@ -207,19 +141,50 @@ class MovingCamera {
 
   /// Where rays to any detector corner can meet the planes, over the whole motion box.
   [[nodiscard]] std::vector<PlaneExtent> hits(std::span<const double> plane_y_mm) const {
+    return priced_hits(plane_y_mm, [](double /*plane_y*/) { return PricedRegion{}; });
+  }
+
+  /// The same of rays whose source is in a half-space (slab frame). For any price not below 0 the
+  /// largest hit less its price, over all sources, is a bound of those within (Lagrange's dual);
+  /// the least bound over prices is taken. It is nearly tight at the price at which a source that
+  /// moves about a point of y = 0 gains nothing.
+  [[nodiscard]] std::vector<PlaneExtent> hits_from(const HalfSpace& sources,
+                                                   std::span<const double> plane_y_mm) const {
+    constexpr std::array kPrices = {0.1, 0.25, 0.45, 0.7, 0.85, 0.95, 1.0, 1.05, 1.15, 1.3};
+    std::vector<PlaneExtent> least = hits(plane_y_mm);
+    const double aside = std::hypot(sources.normal.x(), sources.normal.z());
+    const double away_mm = nominal_source_y_mm();
+    if (!(aside > 0.0) || !(away_mm > 0.0)) return least;
+    for (const double factor : kPrices) {
+      const std::vector<PlaneExtent> bounds = priced_hits(plane_y_mm, [&](double plane_y) {
+        return PricedRegion{sources, factor * std::abs(plane_y) / (away_mm * aside)};
+      });
+      for (std::size_t i = 0; i < least.size(); ++i) least[i] = common_part(least[i], bounds[i]);
+    }
+    return least;
+  }
+
+ private:
+  template <typename RegionOf>
+  [[nodiscard]] std::vector<PlaneExtent> priced_hits(std::span<const double> plane_y_mm,
+                                                     const RegionOf& region_of) const {
     constexpr std::size_t kCorners = 4;
     constexpr std::size_t kSides = 4;  // of a plane: low x, high x, low z, high z
+    std::vector<PricedRegion> regions;
+    for (const double plane_y : plane_y_mm) regions.push_back(region_of(plane_y));
     const std::vector<double> extremes = maxima_over_rotations(
         range_,
         plane_y_mm.size() * kSides * kCorners,
         [this](const Eigen::Vector3d& angles) { return turned(angles); },
         [&](const Turned& at, std::size_t i) {
           const std::size_t side = i / kCorners % kSides;
+          const std::size_t plane = i / (kCorners * kSides);
           return extreme_hit(at,
                              i % kCorners,
-                             plane_y_mm[i / (kCorners * kSides)],
+                             plane_y_mm[plane],
                              side < 2 ? 0 : 2,
-                             side % 2 == 0 ? -1.0 : 1.0);
+                             side % 2 == 0 ? -1.0 : 1.0,
+                             regions[plane]);
         });
     std::vector<PlaneExtent> planes;
     for (auto of_plane = extremes.begin(); of_plane != extremes.end();
@@ -233,7 +198,6 @@ class MovingCamera {
     return planes;
   }
 
- private:
   Eigen::Matrix3d slab_from_room_;
   Eigen::Vector3d center_in_slab_;
   Eigen::Vector3d source_from_center_;  ///< at the middle of the translations
@@ -445,7 +409,45 @@ void widen(std::vector<PlaneExtent>& extents, const std::vector<PlaneExtent>& ot
   }
 }
 
+/// Extents on planes of the rays whose source is in all of `sources` (ct frame), with a margin.
+std::vector<PlaneExtent> extents_from(const CameraGeometry& camera,
+                                      const PoseFrame& frame,
+                                      const MotionRange& range,
+                                      std::span<const double> plane_y_mm,
+                                      std::span<const HalfSpace> sources,
+                                      const RigidTransform& slab_from_ct) {
+  const MovingCamera moving(camera, frame, range);
+  if (sources.empty()) return with_margin(moving.hits(plane_y_mm));
+  std::vector<PlaneExtent> extents;
+  for (const HalfSpace& half_space : sources) {
+    const std::vector<PlaneExtent> reached =
+        moving.hits_from(half_space.in(slab_from_ct), plane_y_mm);
+    if (extents.empty()) extents = reached;
+    for (std::size_t i = 0; i < extents.size(); ++i)
+      extents[i] = common_part(extents[i], reached[i]);
+  }
+  // Where no source of the range is within, bounds may have passed each other: a point is left.
+  for (PlaneExtent& extent : extents) {
+    extent.x_high_mm = std::max(extent.x_low_mm, extent.x_high_mm);
+    extent.z_high_mm = std::max(extent.z_low_mm, extent.z_high_mm);
+  }
+  return with_margin(extents);
+}
+
+/// Fewest nodes of an axis, an even number and no more than it has, that stand no farther apart
+/// than those of `other`.
+int nodes_at_most_apart(const GridAxis& axis, const GridAxis& other) {
+  const double length = axis.last_mm - axis.first_mm;
+  const int intervals = static_cast<int>(std::ceil(length / other.spacing_mm()));
+  return std::min(axis.nodes, std::max(2, (intervals + 2) / 2 * 2));
+}
+
 }  // namespace
+
+HalfSpace HalfSpace::in(const RigidTransform& other_from_own) const {
+  const Eigen::Vector3d turned = other_from_own.linear() * normal;
+  return {turned, offset_mm + turned.dot(other_from_own.translation())};
+}
 
 std::vector<PlaneExtent> extents_on_planes(const CameraGeometry& camera,
                                            const PoseFrame& frame,
@@ -511,11 +513,16 @@ LightSlab make_light_slab(const CameraGeometry& camera,
 
   std::vector<double> planes = spec.st_plane_y_mm;
   planes.push_back(light_slab.uv_plane_y_mm);
-  std::vector<PlaneExtent> extents = extents_on_planes(camera, frame, range, planes);
+  std::vector<PlaneExtent> extents =
+      extents_from(camera, frame, range, planes, spec.sources, light_slab.slab_from_ct);
   for (const CameraGeometry& other : more_cameras)
     widen(extents, extents_on_planes(other, frame, range, planes, light_slab.slab_from_ct));
   light_slab.u = {extents.back().x_low_mm, extents.back().x_high_mm, spec.uv_nodes};
   light_slab.v = {extents.back().z_low_mm, extents.back().z_high_mm, spec.uv_nodes};
+  if (!spec.sources.empty()) {
+    light_slab.u.nodes = nodes_at_most_apart(light_slab.u, light_slab.v);
+    light_slab.v.nodes = nodes_at_most_apart(light_slab.v, light_slab.u);
+  }
   for (std::size_t k = 0; k < spec.st_plane_y_mm.size(); ++k) {
     SlabGeometry slab;
     slab.st_plane_y_mm = spec.st_plane_y_mm[k];

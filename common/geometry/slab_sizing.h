@@ -81,12 +81,29 @@ struct CtBox {
   [[nodiscard]] std::array<Eigen::Vector3d, 8> corner_points() const;
 };
 
+/// Points x with normal . x <= offset_mm.
+struct HalfSpace {
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitX();
+  double offset_mm = 0.0;
+
+  [[nodiscard]] bool contains(const Eigen::Vector3d& point) const {
+    return normal.dot(point) <= offset_mm;
+  }
+  /// The same points in another frame.
+  [[nodiscard]] HalfSpace in(const RigidTransform& other_from_own) const;
+  auto members() { return std::tie(normal, offset_mm); }
+};
+
 /// Sizes of a field's planes and resolutions.
 struct LightSlabSpec {
   int uv_nodes = 64;
   int st_nodes = 256;
   std::vector<double> slab_boundaries_y_mm;  ///< K - 1 inner boundaries, ascending; empty for K = 1
   std::vector<double> st_plane_y_mm = {0.0};  ///< one per slab, in the order of ascending y
+  /// Of the range's poses, the field holds those whose source lies in all of these (ct frame); none
+  /// means all poses. Of further cameras it holds all. Where they leave less than the whole (u,v)
+  /// plane, its shorter side has fewer nodes: they stand no farther apart than along the other.
+  std::vector<HalfSpace> sources;
 };
 
 /// The complete geometry of a field, every slab cropped to the shadow that `attenuating_corners_ct`

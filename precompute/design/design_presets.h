@@ -18,6 +18,8 @@ struct DesignPreset {
 
 /// What a field gets when nothing is said about its design.
 inline constexpr const char* kDefaultPreset = "standard";
+/// What the fields of an atlas get.
+inline constexpr const char* kAtlasPreset = "atlas";
 /// The paper's own design, for comparisons.
 inline constexpr const char* kPaperPreset = "paper";
 

@@ -16,7 +16,7 @@ LightSlab ProbeScene::planes(const FieldDesign& design) const {
       frame,
       range,
       volume.corner_points(),
-      {design.uv_nodes, design.st_nodes, slabs.boundaries_y_mm, slabs.st_plane_y_mm});
+      {design.uv_nodes, design.st_nodes, slabs.boundaries_y_mm, slabs.st_plane_y_mm, sources});
 }
 
 std::unique_ptr<const FieldCaster> ProbeScene::make_caster(const LightSlab& planes) const {

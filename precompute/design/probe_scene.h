@@ -26,7 +26,8 @@ struct ProbeScene {
   AttenuationQuantizer quantizer;
   std::optional<StPlane> st_plane;  ///< none: the default for the number of slabs
   std::string caster = "shear-warp";
-  RayCasterOptions ray_caster;  ///< of the trilinear caster
+  RayCasterOptions ray_caster;     ///< of the trilinear caster
+  std::vector<HalfSpace> sources;  ///< of the range's poses, those to hold: LightSlabSpec::sources
 
   /// The planes of a design, as af-precompute makes them. Errors of choose_depth_slabs() and
   /// make_light_slab().

@@ -13,11 +13,13 @@ namespace af {
 Orbit orbit_of_text(const std::string& option, const std::string& text) {
   const auto refuse = [&](const std::string& why) {
     throw UsageError(option + " " + text + ": " + why +
-                     "; as axis=z,from=-90,to=90 or axis=z,from=-90,to=90,step=20, degrees");
+                     "; as axis=z,from=-90,to=90 or axis=z,from=-90,to=90,step=20, degrees, and "
+                     "members=by-source or by-pose");
   };
   Orbit orbit;
   std::map<std::string, double> angles_deg;
   bool has_axis = false;
+  bool has_members = false;
   std::istringstream parts(text);
   for (std::string part; std::getline(parts, part, ',');) {
     const std::size_t equals = std::min(part.find('='), part.size());
@@ -28,6 +30,12 @@ Orbit orbit_of_text(const std::string& option, const std::string& text) {
       if (axis == std::string::npos) refuse("the axis is x, y or z of the room");
       orbit.axis = static_cast<int>(axis);
       has_axis = true;
+      continue;
+    }
+    if (key == "members" && !has_members) {
+      if (value != "by-source" && value != "by-pose") refuse("members are by-source or by-pose");
+      orbit.members_by = value == "by-pose" ? Orbit::MembersBy::Pose : Orbit::MembersBy::Source;
+      has_members = true;
       continue;
     }
     const bool is_known = key == "from" || key == "to" || key == "step";

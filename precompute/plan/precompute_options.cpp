@@ -73,12 +73,15 @@ void describe_casting(Fields& field, PrecomputeOptions& options) {
         options.cover_rig,
         "Rig of further cameras: the field holds their rays, too, over the same range")
       .input();
-  field("orbit",
-        options.orbit,
-        "Make an atlas, one file of many fields, for the camera on an orbit: axis=z,from=-90,to=90 "
-        "turns it about the room's z through the isocentre, degrees, right-handed. Every pose of "
-        "the range at every angle is in one of its fields; they stand as far apart as the range "
-        "about the axis is wide, or step=10 degrees. A budget of the design is that of each field")
+  field(
+      "orbit",
+      options.orbit,
+      "Make an atlas, one file of many fields, for the camera on an orbit: axis=z,from=-90,to=90 "
+      "turns it about the room's z through the isocentre, degrees, right-handed. Every pose of "
+      "the range at every angle is in one of its fields; they stand as far apart as the range "
+      "about the axis is wide, or step=10 degrees. About z each field has the poses whose source "
+      "is nearest to it; with members=by-pose those whose angle is, with all shifts, in 1.4 times "
+      "the bytes. A budget of the design is that of each field")
       .decides(kCastingStage);
   field("orbit_cameras",
         options.orbit_cameras,
@@ -89,7 +92,7 @@ void describe_casting(Fields& field, PrecomputeOptions& options) {
   field("preset",
         options.preset,
         "Design of the field, by name. " + design_preset_help() + " [" + kDefaultPreset +
-            "; paper where parts of the design are stated]")
+            "; atlas with --orbit and --orbit-cameras; paper where parts of the design are stated]")
       .one_of(design_preset_names())
       .excludes({"--target-psnr-db", "--max-field-size", "--max-drr-ms"})
       .not_recorded("the design that it stands for is");
@@ -153,6 +156,13 @@ void describe_casting(Fields& field, PrecomputeOptions& options) {
         "Gaussian by which what the projections hold beyond the CT is smoothed, standard "
         "deviation in pixels: for noisy ones; 0: not at all")
       .within(0.0, 100.0)
+      .not_deciding("the hash of the projections says it");
+  field("projections_common",
+        options.projections_common,
+        "What becomes of that part of what the projections hold beyond the CT that is the same at "
+        "a pixel in the mean of all views: keep, or remove, because the detector's errors are such "
+        "and the object's seldom")
+      .one_of({"keep", "remove"})
       .not_deciding("the hash of the projections says it");
 }
 
@@ -276,7 +286,8 @@ DesignParts PrecomputeOptions::stated_parts() const {
 
 const DesignPreset& PrecomputeOptions::design_preset() const {
   const bool has_parts = slabs || uv_nodes || st_nodes || codewords || look_up || tile_coding;
-  return design_preset_named(preset.value_or(has_parts ? kPaperPreset : kDefaultPreset));
+  const char* const whole = is_atlas() ? kAtlasPreset : kDefaultPreset;
+  return design_preset_named(preset.value_or(has_parts ? kPaperPreset : whole));
 }
 
 bool PrecomputeOptions::needs_probe() const {

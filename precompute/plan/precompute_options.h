@@ -65,6 +65,7 @@ struct PrecomputeOptions {
   std::string projections;
   std::string projections_case;
   double projections_smoothing_px = 0.0;
+  std::string projections_common = "keep";  ///< or "remove"
 
   std::optional<int> codewords;
   int max_iterations = CodebookOptions{}.max_iterations;

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-af_add_test(slab_sizing_test SOURCES unit/geometry/slab_sizing_test.cpp unit/geometry/ray_coverage_test.cpp LIBS af_geometry)
+af_add_test(slab_sizing_test SOURCES unit/geometry/slab_sizing_test.cpp unit/geometry/ray_coverage_test.cpp unit/geometry/source_region_test.cpp LIBS af_geometry)
 af_add_test(geometry_test SOURCES unit/geometry/rigid_transform_test.cpp unit/geometry/camera_geometry_test.cpp
                     unit/geometry/field_lattice_test.cpp unit/geometry/lens_distortion_test.cpp unit/geometry/pinhole_camera_test.cpp
             LIBS af_geometry)

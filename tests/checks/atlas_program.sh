@@ -40,11 +40,16 @@ refuse 2 'the axis is x, y or z' --orbit axis=q,from=0,to=10
 refuse 2 "'to' is missing" --orbit axis=z,from=0
 refuse 2 "'to' is below 'from'" --orbit axis=z,from=10,to=0
 refuse 2 'excludes' --orbit axis=z,from=0,to=10 --orbit-cameras c-arm-12in
+refuse 2 'members are by-source or by-pose' --orbit axis=z,from=0,to=10,members=10
 refuse 3 'at most 64' --orbit axis=z,from=-90,to=90,step=1
 refuse 4 'missing.toml' --orbit-cameras missing.toml
 
 "$program" "${orbit[@]}" --dry-run >dry.txt
 grep -q '4 fields: AP_z-40, AP_z-20, AP_z0, AP_z20; each' dry.txt || fail "the dry run does not name the fields: $(cat dry.txt)"
+stored_rays() { sed -n 's/^ *rays *\([0-9.]*\) million stored.*/\1/p' "$1"; }
+"$program" "${common[@]}" --orbit axis=z,from=-40,to=20,members=by-pose --dry-run >pose.txt
+awk -v a="$(stored_rays dry.txt)" -v b="$(stored_rays pose.txt)" 'BEGIN { exit !(a > 0 && a < b) }' ||
+  fail "members by source store no fewer rays: $(stored_rays dry.txt) and $(stored_rays pose.txt)"
 
 # The same payload on any number of ranks, for either caster.
 for caster in shear-warp trilinear; do

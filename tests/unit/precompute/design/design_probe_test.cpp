@@ -130,6 +130,7 @@ class DesignProbeTest : public testing::Test {
                     AttenuationQuantizer::for_maximum(volume_->max_total_attenuation()),
                     std::nullopt,
                     "shear-warp",
+                    {},
                     {}};
   CodebookReduction reduction_ = serial_reduction();
 };

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "precompute/design/design_presets.h"
 #include "precompute/plan/orbit_text.h"
 #include "text/options_toml.h"
 
@@ -190,6 +191,10 @@ TEST(PrecomputeOptions, TakeAnOrbitAsText) {
   EXPECT_EQ(orbit.to_rad, 45.5 * kRadPerDeg);
   EXPECT_EQ(orbit.step_rad, 15.0 * kRadPerDeg);
   EXPECT_FALSE(orbit_of_text("--orbit", "to=9,axis=x,from=-9").step_rad.has_value());
+  EXPECT_EQ(orbit.members_by, Orbit::MembersBy::Source);
+  const std::string by = "axis=z,from=-9,to=9,members=by-";
+  EXPECT_EQ(orbit_of_text("--orbit", by + "source").members_by, Orbit::MembersBy::Source);
+  EXPECT_EQ(orbit_of_text("--orbit", by + "pose").members_by, Orbit::MembersBy::Pose);
   for (const char* text : {"",
                            "axis=z",
                            "axis=z,from=-90",
@@ -200,12 +205,30 @@ TEST(PrecomputeOptions, TakeAnOrbitAsText) {
                            "axis=z,from=-90,to=nan",
                            "axis=z,from=-90,to=90,step=0",
                            "axis=z,from=-90,to=90deg",
-                           "axis=z,from=-90,to=90,by=10"}) {
+                           "axis=z,from=-90,to=90,by=10",
+                           "axis=z,from=-90,to=90,members=10",
+                           "axis=z,from=-9,to=9,members=by-pose,members=by-pose"}) {
     PrecomputeOptions options;
     options.orbit = *text == '\0' ? "=" : text;
     EXPECT_THROW(problems(options), UsageError) << text;
     EXPECT_TRUE(options.is_atlas());
   }
+}
+
+TEST(PrecomputeOptions, AnAtlasHasItsOwnPreset) {
+  PrecomputeOptions options;
+  options.orbit = "axis=z,from=-90,to=90";
+  const FieldDesign of_field = design_preset_named(kDefaultPreset).design;
+  const FieldDesign of_atlas = options.in_force().design();
+  EXPECT_GT(of_atlas.mean_step, 0);
+  EXPECT_EQ(of_atlas.uv_nodes, of_field.uv_nodes);
+  EXPECT_EQ(of_atlas.st_nodes, of_field.st_nodes);
+  options.preset = kDefaultPreset;
+  EXPECT_EQ(options.in_force().design(), of_field);
+  // Parts that are typed make it the paper's, as a field's.
+  options.preset.reset();
+  options.uv_nodes = 12;
+  EXPECT_EQ(options.design().slabs, 1);
 }
 
 }  // namespace
