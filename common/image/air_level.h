@@ -20,7 +20,8 @@ struct AirLevel {
 std::optional<AirLevel> open_beam_peak(const std::vector<float>& intensities);
 
 /// The air beside a collimated field's edge: the 90th percentile of the band of 5 % of the shorter
-/// side along it. `mask` (1 = field) hides something.
+/// side along it. `mask` (1 = field) hides something; when it hides all that is along an edge, the
+/// level is 0.
 AirLevel air_beside_edge(const Image2d& intensity, const Image2d& mask);
 
 /// How the pixels along the field's edge lie between the picture's 1st and 99th percentile.

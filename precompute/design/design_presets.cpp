@@ -31,9 +31,9 @@ const std::array kPresets = {
     // One codebook serves every angle: with the standard design's DRRs lost 1.3 dB against those of
     // an angle's own field (docs/other-cameras.md).
     DesignPreset{kAtlasPreset,
-                 "the standard planes, mean-removed tiles and 16384 codewords for all fields of an "
+                 "the standard planes, mean-removed tiles and 4096 codewords for all fields of an "
                  "atlas",
-                 {4, 16, 384, 16384, "cubic", 64},
+                 {4, 16, 384, 4096, "cubic", 64},
                  {}},
     DesignPreset{"fine",
                  "the same within 8 MB: the truest poses, in several times the time",

@@ -30,6 +30,7 @@ struct StudyOptions {
   std::string rig = "c-arm-12in";
   std::string camera = "AP";
   int slabs = 4;
+  double slab_mm = 0.0;      ///< thickness, alike in all frames; 0: where they suit the CT best
   double uv_step_mm = 22.0;  ///< of the atlas whose samples all get
   double st_step_mm = 0.9;
   int poses = 20;     ///< at each angle
@@ -66,6 +67,16 @@ DepthSlabs depth_slabs_of(const AttenuationVolume& volume,
       }
   slices.size = {1, static_cast<int>(sums.size()), 1};
   return choose_depth_slabs(slices, sums, slabs, StPlane::Centroid);
+}
+
+/// Slabs of equal thickness about the centre, alike in all frames; the outer ones are open.
+DepthSlabs equal_slabs(int slabs, double thickness_mm) {
+  DepthSlabs equal;
+  for (int k = 0; k < slabs; ++k) {
+    equal.st_plane_y_mm.push_back((k + 0.5 - 0.5 * slabs) * thickness_mm);
+    if (k > 0) equal.boundaries_y_mm.push_back((k - 0.5 * slabs) * thickness_mm);
+  }
+  return equal;
 }
 
 /// What a viewpoint (slab frame) sees of one slab through a point of its (s,t) plane.
@@ -445,6 +456,11 @@ OrbitScene scene_of(const StudyOptions& options, const AttenuationVolume& volume
   scene.orbit.to_rad = 90.0 * kRadPerDeg;
   scene.attenuating_corners_ct = volume.corner_points();
   const int slabs = options.slabs;
+  if (options.slab_mm > 0.0) {
+    const DepthSlabs equal = equal_slabs(slabs, options.slab_mm);
+    scene.depth_slabs = [equal](const RigidTransform& /*slab_from_ct*/) { return equal; };
+    return scene;
+  }
   scene.depth_slabs = [&volume, slabs](const RigidTransform& slab_from_ct) {
     return depth_slabs_of(volume, slab_from_ct, slabs);
   };
@@ -519,6 +535,11 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--camera", options.camera, "Which camera of the rig")->capture_default_str();
   app.add_option("--slabs", options.slabs, "Depth slabs")->capture_default_str();
+  app.add_option(
+         "--slab-mm",
+         options.slab_mm,
+         "Thickness of slabs that are alike in all frames; 0: cut where they suit the CT best")
+      ->capture_default_str();
   app.add_option("--uv-step-mm", options.uv_step_mm, "Between viewpoints of the first contender")
       ->capture_default_str();
   app.add_option("--st-step-mm", options.st_step_mm, "Between (s,t) nodes")->capture_default_str();

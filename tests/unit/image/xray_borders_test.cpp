@@ -166,6 +166,11 @@ TEST(AirLevel, BesideTheCollimatedEdgeIsAirThoughTheMiddleIsNot) {
   EXPECT_NEAR(air_beside_edge(image, borders.mask).level, kAirLevel, 0.02 * kAirLevel);
 }
 
+TEST(AirBesideEdge, IsNoneWhereEverythingIsHidden) {
+  EXPECT_EQ(air_beside_edge(picture(20, 20, [](int, int) { return -1.0f; }), Image2d(20, 20)).level,
+            0.0);
+}
+
 TEST(Background, IsBrightDarkOrUndecidedByThePictureItself) {
   Image2d image = picture(
       100, 100, [](int c, int r) { return std::hypot(c - 50, r - 50) < 30 ? kBody : -1.0f; });
