@@ -94,16 +94,23 @@ std::string content_hash(const std::vector<CameraGeometry>& cameras,
 /// Turns one view's line integrals into what they hold beyond the CT's.
 void subtract_cast(const RayCaster& caster,
                    const CameraGeometry& camera,
-                   double smoothing_px,
                    std::span<const float> measured,
                    std::span<float> residual) {
   const RegionOfInterest all = {0, 0, camera.size_px.x(), camera.size_px.y()};
   Image2d image(all.width, all.height);
   caster.cast(ray_fan(RigidTransform::Identity(), {camera, all}), image.pixels);
   for (std::size_t i = 0; i < residual.size(); ++i)
-    image.pixels[i] = std::isnan(measured[i]) ? 0.0F : measured[i] - image.pixels[i];
+    residual[i] = std::isnan(measured[i]) ? 0.0F : measured[i] - image.pixels[i];
+}
+
+void smooth(const CameraGeometry& camera,
+            double smoothing_px,
+            std::span<const float> residual,
+            std::span<float> smoothed) {
+  Image2d image(camera.size_px.x(), camera.size_px.y());
+  std::copy(residual.begin(), residual.end(), image.pixels.begin());
   image = gaussian_blur(image, smoothing_px);
-  std::copy(image.pixels.begin(), image.pixels.end(), residual.begin());
+  std::copy(image.pixels.begin(), image.pixels.end(), smoothed.begin());
 }
 
 /// The mean over the views of what each pixel holds beyond the CT; 0 where no view was measured.
@@ -147,8 +154,8 @@ std::shared_ptr<const std::byte> without_common_part(const std::vector<CameraGeo
   });
 }
 
-/// Root mean squares of measured and residual where the CT attenuates: elsewhere the CT says
-/// nothing, and nothing is corrected.
+/// Root mean squares of measured and residual, not smoothed yet, where the CT attenuates: elsewhere
+/// they are the same, and nothing is corrected.
 void note_rms(std::span<const float> measured,
               std::span<const float> residual,
               MeasuredViews& found) {
@@ -244,22 +251,27 @@ std::shared_ptr<const MeasuredViews> load_measured_views(const PrecomputeOptions
   };
   found->bytes = places.back() * sizeof(float);
   const RayCaster caster(volume, options.ray_caster);
-  found->memory = communicator.allocate_on_node_together(
-      found->bytes, [&](std::span<std::byte> memory, int part, int parts) {
-        const std::span residual(reinterpret_cast<float*>(memory.data()), places.back());
-        for (auto i = static_cast<std::size_t>(part); i < cameras.size();
-             i += static_cast<std::size_t>(parts))
-          subtract_cast(caster,
-                        cameras[i],
-                        options.projections_smoothing_px,
-                        of_view(measured, i),
-                        of_view(residual, i));
-      });
+  const auto per_view = [&](const auto& fill_view) {
+    return communicator.allocate_on_node_together(
+        found->bytes, [&](std::span<std::byte> memory, int part, int parts) {
+          const std::span values(reinterpret_cast<float*>(memory.data()), places.back());
+          for (auto i = static_cast<std::size_t>(part); i < cameras.size();
+               i += static_cast<std::size_t>(parts))
+            fill_view(i, of_view(values, i));
+        });
+  };
+  found->memory = per_view([&](std::size_t i, std::span<float> residual) {
+    subtract_cast(caster, cameras[i], of_view(measured, i), residual);
+  });
   const auto held = [&] {
     return std::span(reinterpret_cast<const float*>(found->memory.get()), places.back());
   };
   note_rms(measured, held(), *found);
   all_or_none(communicator, [&] { require_same_object(*found); });
+  if (options.projections_smoothing_px > 0.0)
+    found->memory = per_view([&](std::size_t i, std::span<float> smoothed) {
+      smooth(cameras[i], options.projections_smoothing_px, of_view(held(), i), smoothed);
+    });
   if (options.projections_common == "remove")
     found->memory =
         without_common_part(cameras, measured, held(), options.projections, communicator);

@@ -14,6 +14,7 @@
 #include "cli/bind_options.h"
 #include "drr/field_renderer.h"
 #include "drr/ray_cast_drr.h"
+#include "evaluate/outputs/table_paths.h"
 #include "field_use/opened_field.h"
 #include "files/output_file.h"
 #include "image/gaussian_blur.h"
@@ -102,21 +103,25 @@ void judge_view(const HeldOutOptions& options,
       ++found.views_outside;
       return;
     }
-  ViewXray xray = read_view_xray(study_view, view.camera);
-  const Image2d cast = rendered_region(*predictors.front().renderer, pose, view);
-  const std::vector<std::size_t> pixels = judged_pixels(xray, view.roi, cast);
+  const ViewXray xray = read_view_xray(study_view, view.camera);
+  std::vector<Image2d> drrs;
+  for (const Predictor& predictor : predictors)
+    drrs.push_back(rendered_region(*predictor.renderer, pose, view));
+  const std::vector<std::size_t> pixels = judged_pixels(xray, view.roi, drrs.front());
+  const auto judged_part = [&](const Image2d& whole) {
+    Image2d part(whole.width, whole.height);
+    for (const std::size_t pixel : pixels) part.pixels[pixel] = whole.pixels[pixel];
+    return part;
+  };
   // Beyond the region no DRR is rendered: smoothing must not fetch the X-ray from there, either.
-  Image2d measured(cast.width, cast.height);
-  for (const std::size_t pixel : pixels) measured.pixels[pixel] = xray.attenuation.pixels[pixel];
+  const Image2d measured = judged_part(xray.attenuation);
   const Image2d smooth_measured = gaussian_blur(measured, options.smoothing_px);
-  for (const Predictor& predictor : predictors) {
-    const Image2d drr = rendered_region(*predictor.renderer, pose, view);
-    Image2d predicted(drr.width, drr.height);
-    for (const std::size_t pixel : pixels) predicted.pixels[pixel] = drr.pixels[pixel];
+  for (std::size_t i = 0; i < predictors.size(); ++i) {
+    const Image2d predicted = judged_part(drrs[i]);
     found.rows.push_back(
         {study_case.name,
          study_view.camera,
-         predictor.name,
+         predictors[i].name,
          psnr_over(predicted, measured, pixels),
          psnr_over(gaussian_blur(predicted, options.smoothing_px), smooth_measured, pixels)});
   }
@@ -228,9 +233,7 @@ void HeldOutOptions::describe(Fields& field_list) {
 
 std::vector<std::string> problems(const HeldOutOptions& options) {
   std::vector<std::string> found = field_problems(options);
-  if (options.output.extension() == ".csv")
-    found.push_back("--output = " + options.output.string() +
-                    ": must name the table in Markdown; the CSV stands beside it under that name");
+  for (std::string& problem : table_problems(options.output)) found.push_back(std::move(problem));
   return found;
 }
 
@@ -244,8 +247,7 @@ CLI::App* bind_held_out(CLI::App& app, HeldOutOptions& options) {
 }
 
 void run_held_out(const HeldOutOptions& options, const Communicator& world) {
-  std::filesystem::path csv = options.output;
-  csv.replace_extension(".csv");
+  const std::filesystem::path csv = csv_beside(options.output);
   std::vector<std::string> warnings;
   all_or_none(world, [&] {
     throw_if_any(problems(options));

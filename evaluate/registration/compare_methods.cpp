@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "cli/bind_options.h"
+#include "evaluate/outputs/table_paths.h"
 #include "evaluate/registration/method_comparison.h"
 #include "evaluate/registration/pose_distances.h"
 #include "files/output_file.h"
@@ -45,12 +46,8 @@ CLI::App* bind_compare(CLI::App& app, CompareOptions& options) {
 void run_compare(const CompareOptions& options, const Communicator& world) {
   all_or_none(world, [&] {
     if (!world.is_root()) return;
-    if (options.output.extension() == ".csv")
-      throw InputError("--output",
-                       options.output.string(),
-                       "must name the table in Markdown; the CSV stands beside it under that name");
-    std::filesystem::path csv = options.output;
-    csv.replace_extension(".csv");
+    throw_if_any(table_problems(options.output));
+    const std::filesystem::path csv = csv_beside(options.output);
     announce_output(csv);
     announce_output(options.output);
     std::filesystem::path distances_csv = csv;

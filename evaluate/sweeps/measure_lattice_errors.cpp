@@ -16,6 +16,7 @@
 #include "cli/bind_options.h"
 #include "drr/drr_renderer.h"
 #include "evaluate/methods/loaded_methods.h"
+#include "evaluate/outputs/table_paths.h"
 #include "evaluate/sweeps/lattice_errors.h"
 #include "field_file/field_file.h"
 #include "files/output_file.h"
@@ -168,9 +169,7 @@ std::vector<std::string> problems(const LatticeErrorsOptions& options) {
   if (options.renderer == "raycast")
     found.emplace_back(
         "--renderer = raycast: must be field or both, because the cells are a field's");
-  if (options.output.extension() == ".csv")
-    found.push_back("--output = " + options.output.string() +
-                    ": must name the table in Markdown; the CSV stands beside it under that name");
+  for (std::string& problem : table_problems(options.output)) found.push_back(std::move(problem));
   return found;
 }
 
@@ -195,8 +194,7 @@ CLI::App* bind_lattice_errors(CLI::App& app, LatticeErrorsOptions& options) {
 }
 
 void run_lattice_errors(const LatticeErrorsOptions& options, const Communicator& world) {
-  std::filesystem::path csv = options.output;
-  csv.replace_extension(".csv");
+  const std::filesystem::path csv = csv_beside(options.output);
   std::vector<std::string> warnings;
   all_or_none(world, [&] {
     throw_if_any(problems(options));

@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "base/number_text.h"
+#include "geometry/pinhole_camera.h"
 
 namespace af {
 
@@ -116,18 +117,9 @@ void MeasuredResidual::select_views(std::span<const ResidualView> views,
     if (!(out > kLeastCosine)) continue;
     Projection projection;
     projection.source_point = camera.source_point;
-    const Eigen::Vector3d beam = camera.beam_direction();
-    const double distance_mm = camera.source_detector_distance_mm();
-    const Eigen::Vector3d corner = camera.detector_origin_point - camera.source_point;
-    const std::array directions = {camera.column_direction, camera.row_direction};
-    for (Eigen::Index axis = 0; axis < 2; ++axis) {
-      const Eigen::Vector3d& direction = directions[static_cast<std::size_t>(axis)];
-      projection.pixels_from_ct.row(axis) =
-          ((distance_mm * direction - corner.dot(direction) * beam) / camera.pixel_spacing_mm[axis])
-              .transpose();
-    }
-    projection.pixels_from_ct.row(2) = beam.transpose();
-    projection.pixels_of_origin = -projection.pixels_from_ct * camera.source_point;
+    const Eigen::Matrix<double, 3, 4> pixels_from_ct = projection_matrix_of(camera);
+    projection.pixels_from_ct = pixels_from_ct.leftCols<3>();
+    projection.pixels_of_origin = pixels_from_ct.col(3);
     projection.width = camera.size_px.x();
     projection.height = camera.size_px.y();
     projection.residual = view.residual.data();

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluate/outputs/table_paths.h"
+
+namespace af::evaluation {
+
+std::filesystem::path csv_beside(const std::filesystem::path& markdown) {
+  std::filesystem::path csv = markdown;
+  csv.replace_extension(".csv");
+  return csv;
+}
+
+std::vector<std::string> table_problems(const std::filesystem::path& output) {
+  if (output.extension() != ".csv") return {};
+  return {"--output = " + output.string() +
+          ": must name the table in Markdown; the CSV stands beside it under that name"};
+}
+
+}  // namespace af::evaluation
