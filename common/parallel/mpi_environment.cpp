@@ -18,6 +18,9 @@ MpiEnvironment::MpiEnvironment(int& argc, char**& argv) {
   // Open MPI would make a file per rank beside each file that ranks open together, for shared file
   // pointers, which we never use. A setting by the user stays.
   setenv("OMPI_MCA_sharedfp", "^lockedfile", 0);
+  // Without mpirun, Open MPI would start a daemon beside the program that could launch more
+  // processes. We launch none, and programs start a third faster without it.
+  setenv("OMPI_MCA_ess_singleton_isolated", "1", 0);
   int provided = 0;
   MPI_Init_thread(&argc, &argv, MPI_THREAD_FUNNELED, &provided);
 }
