@@ -6,6 +6,7 @@
 #include <set>
 
 #include "base/error.h"
+#include "precompute/codebook/mean_removal.h"
 #include "precompute/codebook/nearest_codeword.h"
 
 namespace af {
@@ -194,12 +195,15 @@ class CodebookUpdate {
 /// Iterations on one rank's share of the tiles.
 class CodebookIterations {
  public:
-  CodebookIterations(const TrainingShare& mine, const CodebookReduction& reduction)
-      : training_(mine.training), held_out_(mine.held_out), reduction_(reduction) {}
+  CodebookIterations(const TrainingShare& mine, int mean_step, const CodebookReduction& reduction)
+      : training_(mine.training),
+        held_out_(mine.held_out),
+        mean_step_(mean_step),
+        reduction_(reduction) {}
 
   /// Collective. Replaces the codebook by a better one.
   TrainingIteration improve(Codebook& codebook) {
-    const NearestCodeword search(codebook);
+    const NearestCodeword search = codeword_search(codebook, mean_step_);
     training_.encode(search, hint_);
     held_out_.encode(search, hint_);
     hint_ = SearchHint::PerTile;
@@ -223,6 +227,7 @@ class CodebookIterations {
   CodedTiles training_;
   CodedTiles held_out_;
   SearchHint hint_ = SearchHint::None;
+  int mean_step_;
   const CodebookReduction& reduction_;
 };
 
@@ -276,7 +281,7 @@ TrainedCodebook train_codebook(const TrainingShare& mine,
     result.codebook = initial_codebook(mine, totals[0], options, reduction);
   result.training_tiles = totals[0];
   result.held_out_tiles = totals[1];
-  CodebookIterations iterations(mine, reduction);
+  CodebookIterations iterations(mine, options.mean_step, reduction);
   while (!has_ended(result, options)) {
     result.iterations.push_back(iterations.improve(result.codebook));
     if (on_progress)

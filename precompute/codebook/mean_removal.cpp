@@ -32,9 +32,9 @@ void remove_means(TrainingShare& share, int mean_step) {
   remove_means(std::span(share.held_out), mean_step);
 }
 
-NearestCodeword encoding_search(const Codebook& trained, int mean_step) {
-  constexpr int kBlocksOfShapes = 24;
-  return mean_step > 0 ? NearestCodeword(trained, kBlocksOfShapes) : NearestCodeword(trained);
+NearestCodeword codeword_search(const Codebook& trained, int mean_step) {
+  return NearestCodeword(trained,
+                         mean_step > 0 ? SearchedTiles::FoldedShapes : SearchedTiles::Plain);
 }
 
 Codebook field_codebook(const Codebook& trained, int mean_step) {

@@ -25,10 +25,8 @@ MeanRemovedTile remove_mean(const Tile& tile, int mean_step);
 void remove_means(std::span<NumberedTile> tiles, int mean_step);
 void remove_means(TrainingShare& share, int mean_step);
 
-/// For encoding tiles with a codebook that was trained: plain ones exactly, shapes nearly so.
-/// Shapes are so much alike, in all of their coefficients, that an exact search has to compare a
-/// tile with most of them; what a limit of blocks costs is in docs/coding.md.
-NearestCodeword encoding_search(const Codebook& trained, int mean_step);
+/// The search that is fast for plain tiles, or for folded shapes where `mean_step` is above 0.
+NearestCodeword codeword_search(const Codebook& trained, int mean_step);
 
 /// The codebook of a field from one that was trained, on shapes where `mean_step` is above 0.
 Codebook field_codebook(const Codebook& trained, int mean_step);

@@ -47,16 +47,13 @@ struct NearestCodeword::Part {
   std::uint32_t number = 0;  ///< among the parts of as many halvings
 };
 
-NearestCodeword::NearestCodeword(const Codebook& codebook) : codewords_(codebook.codewords) {
+NearestCodeword::NearestCodeword(const Codebook& codebook, SearchedTiles tiles)
+    : codewords_(codebook.codewords) {
   throw_if_any(problems(codebook));
-  sort_by_dc();
-}
-
-NearestCodeword::NearestCodeword(const Codebook& codebook, int most_blocks)
-    : codewords_(codebook.codewords), most_blocks_(most_blocks) {
-  throw_if_any(problems(codebook));
-  check(most_blocks >= 1, "blocks to search");
-  make_boxes();
+  if (tiles == SearchedTiles::FoldedShapes)
+    make_boxes();
+  else
+    sort_by_dc();
 }
 
 void NearestCodeword::sort_by_dc() {
@@ -91,7 +88,7 @@ void NearestCodeword::make_boxes() {
   for (const Tile& codeword : codewords_) {
     auto& transformed = transformed_.emplace_back();
     for (std::size_t k = 0; k < kTileElements; ++k)
-      transformed[k] = hadamard_coefficient(codeword, kCoefficientOrder[k]);
+      transformed[k] = hadamard_coefficient(codeword, kFoldedCoefficientOrder[k]);
   }
   const std::size_t blocks =
       std::bit_ceil((codewords_.size() + kBlockCodewords - 1) / kBlockCodewords);
@@ -193,8 +190,7 @@ void NearestCodeword::search(std::span<const Tile> tiles,
                               has_boxes ? nullptr : high_dc_.data() + 1,
                               start_block_.data(),
                               boxes.data(),
-                              box_levels_,
-                              most_blocks_};
+                              box_levels_};
   const NearestRequest request{tiles.front().data(),
                                tiles.size(),
                                hint == SearchHint::PerTile,

@@ -17,6 +17,12 @@ enum class SearchHint {
   PerTile,  ///< the caller's guess, for example the answer of the last training iteration
 };
 
+/// What is searched. Every search is exact for all tiles; it is fast for those that it is for.
+enum class SearchedTiles {
+  Plain,
+  FoldedShapes,  ///< of mean-removed tiles (mean_removal.h)
+};
+
 /// Exact nearest-codeword search (squared Euclidean distance of 16 levels; ties take the lowest
 /// index). Tiles and codewords are compared in the coordinates of the 4-D Hadamard transform, whose
 /// first coefficient (DC) orders the codebook: blocks of 16 codewords are visited outwards from the
@@ -25,17 +31,13 @@ enum class SearchHint {
 /// above their rounding and integers decide. So the answer equals brute force on every vector
 /// width. \test NearestCodeword.EqualsBruteForceOnEveryWidth
 ///
-/// Or the nearest codeword of a few blocks: for codewords that are much alike in all coefficients,
-/// where an exact search has to compare a tile with most of them. A balanced tree halves the
-/// codewords at the median of the coefficient that varies most, down to blocks of 16; the ranges of
+/// Shapes have no coefficient that tells as much as the DC of plain tiles. A balanced tree halves
+/// them at the median of the coefficient that varies most, down to blocks of 16; the ranges of
 /// eight coefficients within each part bound how near its codewords can be, and parts are visited
-/// nearest first. With as many blocks as there are, it is exact, too; with fewer, the answer is the
-/// same on every vector width.
+/// nearest first, while they may hold a nearer one.
 class NearestCodeword {
  public:
-  explicit NearestCodeword(const Codebook& codebook);
-  /// Of at most `most_blocks` blocks.
-  NearestCodeword(const Codebook& codebook, int most_blocks);
+  explicit NearestCodeword(const Codebook& codebook, SearchedTiles tiles = SearchedTiles::Plain);
 
   /// Index of the nearest codeword and squared error of every tile. With SearchHint::PerTile
   /// `nearest` holds valid indices on entry. Re-entrant.
@@ -64,7 +66,6 @@ class NearestCodeword {
   std::vector<std::uint32_t> start_block_;
   std::array<std::vector<CodewordBox>, kMostBoxLevels> boxes_;
   int box_levels_ = 0;
-  int most_blocks_ = 0;
 
   std::vector<std::array<float, kTileElements>> transformed_;  ///< while boxes are made
 };

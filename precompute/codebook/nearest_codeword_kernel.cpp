@@ -84,7 +84,9 @@ AF_KERNEL_INLINE Ints16 butterfly(Ints16 values) {
   return is_upper != 0 ? other - values : values + other;
 }
 
-/// 4-D Hadamard transform of a tile; integers below 2^21, exact also as floats.
+/// 4-D Hadamard transform of a tile, its coefficients in the order stated; integers below 2^21,
+/// exact also as floats.
+template <const uint32_t (&kOrder)[16]>
 AF_KERNEL_INLINE void hadamard(const uint16_t* tile, float* coefficients) {
   using Levels = uint16_t __attribute__((vector_size(32)));
   Levels levels;
@@ -93,22 +95,22 @@ AF_KERNEL_INLINE void hadamard(const uint16_t* tile, float* coefficients) {
       butterfly<4>(butterfly<2>(butterfly<1>(__builtin_convertvector(levels, Ints16)))));
   const Ints16 ordered = __builtin_shufflevector(values,
                                                  values,
-                                                 kCoefficientOrder[0],
-                                                 kCoefficientOrder[1],
-                                                 kCoefficientOrder[2],
-                                                 kCoefficientOrder[3],
-                                                 kCoefficientOrder[4],
-                                                 kCoefficientOrder[5],
-                                                 kCoefficientOrder[6],
-                                                 kCoefficientOrder[7],
-                                                 kCoefficientOrder[8],
-                                                 kCoefficientOrder[9],
-                                                 kCoefficientOrder[10],
-                                                 kCoefficientOrder[11],
-                                                 kCoefficientOrder[12],
-                                                 kCoefficientOrder[13],
-                                                 kCoefficientOrder[14],
-                                                 kCoefficientOrder[15]);
+                                                 kOrder[0],
+                                                 kOrder[1],
+                                                 kOrder[2],
+                                                 kOrder[3],
+                                                 kOrder[4],
+                                                 kOrder[5],
+                                                 kOrder[6],
+                                                 kOrder[7],
+                                                 kOrder[8],
+                                                 kOrder[9],
+                                                 kOrder[10],
+                                                 kOrder[11],
+                                                 kOrder[12],
+                                                 kOrder[13],
+                                                 kOrder[14],
+                                                 kOrder[15]);
   store(coefficients, to_float(ordered));
 }
 
@@ -197,7 +199,7 @@ AF_KERNEL_INLINE Best search_outwards(const CodewordBlocks& blocks,
                                       const uint16_t* tile,
                                       Best best) {
   float coefficients[16];
-  hadamard(tile, coefficients);
+  hadamard<kCoefficientOrder>(tile, coefficients);
   const float dc = coefficients[0];
 
   int64_t above = blocks.start_block[static_cast<uint32_t>(dc) >> kStartShift];
@@ -232,16 +234,15 @@ AF_KERNEL_INLINE Floats16 distances(const CodewordBox& box, const float* coeffic
 constexpr float kVisited = 3e38f;
 
 /// Visits the nearest child of a box first, down to the blocks, and the others while they may hold
-/// a codeword that is as near as the best, or until enough blocks are visited.
+/// a codeword that is as near as the best.
 AF_KERNEL_INLINE Best search_boxes(const CodewordBlocks& blocks, const uint16_t* tile, Best best) {
   float coefficients[16];
-  hadamard(tile, coefficients);
+  hadamard<kFoldedCoefficientOrder>(tile, coefficients);
   const Ints16 lanes = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
   uint32_t numbers[kMostBoxLevels] = {};
   Floats16 to_children[kMostBoxLevels];
   to_children[0] = distances(blocks.boxes[0][0], coefficients);
   const int32_t last = blocks.box_levels - 1;
-  int32_t left = blocks.most_blocks;
   for (int32_t level = 0; level >= 0;) {
     const float nearest = smallest(to_children[level]);
     if (!(nearest <= best.limit)) {
@@ -253,7 +254,6 @@ AF_KERNEL_INLINE Best search_boxes(const CodewordBlocks& blocks, const uint16_t*
     const uint32_t child = 16 * numbers[level] + static_cast<uint32_t>(lane);
     if (level == last) {
       search_block(blocks, child, tile, coefficients, best);
-      if (--left == 0) return best;
       continue;
     }
     ++level;

@@ -8,7 +8,7 @@
 
 namespace af {
 
-/// Coefficients whose ranges a CodewordBox states: DC, the linear ones, and three more.
+/// Coefficients whose ranges a CodewordBox states, the first in the order of the search.
 inline constexpr int kBoxCoefficients = 8;
 
 /// Ranges of coefficients of the codewords of up to 16 boxes or blocks; beyond all tiles where
@@ -21,7 +21,7 @@ struct CodewordBox {
 /// A codebook in the layout of the search: blocks of 16 codewords, padded with codewords that are
 /// farther than any tile. Either sorted by DC, or under a tree of boxes.
 struct CodewordBlocks {
-  const float* coefficients;  ///< [block][16 coefficients, DC first, then the 4 linear][16 lanes]
+  const float* coefficients;  ///< [block][16 coefficients, in the order of the search][16 lanes]
   const uint32_t* indices;    ///< [block][16 lanes] in the codebook, ascending within a block
   const uint16_t* codewords;  ///< [index][16]
   // Sorted by DC:
@@ -32,8 +32,7 @@ struct CodewordBlocks {
   /// Level by level, the root first; child c of box b is box 16 b + c of the level below, and of
   /// the last level it is block 16 b + c.
   const CodewordBox* const* boxes;
-  int32_t box_levels;   ///< 0: sorted by DC
-  int32_t most_blocks;  ///< to compare a tile with
+  int32_t box_levels;  ///< 0: sorted by DC
 };
 /// Enough for 65536 codewords: 4096 blocks.
 inline constexpr int kMostBoxLevels = 3;
@@ -41,10 +40,14 @@ inline constexpr int kMostBoxLevels = 3;
 inline constexpr uint32_t kStartShift = 7;
 inline constexpr uint32_t kStartEntries = (16u * 65535u >> kStartShift) + 1;
 
-/// The order in which the 16 coefficients of the 4-D Hadamard transform are kept: DC, the four
-/// linear ones, then by falling energy in practice.
+/// The order in which the 16 coefficients of the 4-D Hadamard transform of plain tiles are kept,
+/// those sorted by DC: DC, the four linear ones, then by falling energy in practice.
 inline constexpr uint32_t kCoefficientOrder[16] = {
     0, 1, 2, 4, 8, 3, 5, 6, 9, 10, 12, 7, 11, 13, 14, 15};
+/// That of folded shapes, under boxes: the four linear ones, what rounding left of the mean, then
+/// by falling energy in practice. Folding along s turns coefficient k into k ^ 2.
+inline constexpr uint32_t kFoldedCoefficientOrder[16] = {
+    0, 3, 6, 10, 2, 7, 8, 1, 4, 11, 14, 5, 9, 15, 12, 13};
 
 /// `nearest` receives the answers; with `has_hints` it holds a guess per tile on entry.
 struct NearestRequest {

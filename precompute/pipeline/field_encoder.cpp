@@ -61,7 +61,7 @@ FieldEncoder::FieldEncoder(const FieldBuild& build,
     : build_(build),
       cast_(cast),
       codebook_(field_codebook(trained, mean_step)),
-      search_(encoding_search(trained, mean_step)),
+      search_(codeword_search(trained, mean_step)),
       codebook_crc_(crc_of(trained, mean_step)),
       overflow_(overflow) {
   if (build_.progress != nullptr && overflow_ == TileOverflow::ReadBack)
