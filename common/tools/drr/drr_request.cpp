@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iostream>
 #include <sstream>
 
 #include "base/error.h"
@@ -10,12 +11,14 @@
 #include "drr/ray_cast_drr.h"
 #include "field_use/opened_field.h"
 #include "figures/picture.h"
+#include "files/output_file.h"
 #include "files/resource_check.h"
 #include "geometry/camera_distance.h"
 #include "image/psnr.h"
 #include "image_files/ct_reader.h"
 #include "image_files/image_file.h"
 #include "pose_files/pose_file.h"
+#include "run/terminal.h"
 #include "spectrum/bone_volume.h"
 #include "study/ct_keys.h"
 #include "study/pose_context.h"
@@ -25,6 +28,28 @@
 
 namespace af::tools {
 namespace {
+
+/// What DRRs are made of and for which camera.
+struct DrrSource {
+  std::filesystem::path ct;  ///< empty: none
+  CtReadOptions ct_reading;
+  std::optional<CameraGeometry> camera;  ///< none: the field's
+  std::optional<PoseFrame> frame;        ///< none: the field's, or of the CT's centre
+  Eigen::Vector3d isocenter_point = Eigen::Vector3d::Zero();
+};
+
+/// What renders, for which camera, and what pose parameters are relative to.
+struct DrrScene {
+  DrrSource source;
+  std::shared_ptr<const DrrRenderer> renderer;   ///< the field's, else the ray caster
+  std::shared_ptr<const DrrRenderer> reference;  ///< the ray caster, for --compare
+  View view;
+  PoseFrame frame;
+  std::shared_ptr<ThreadPool> pool;
+  /// How far the camera is from the field's own, with several fields from the first one's; empty
+  /// for that one.
+  std::string note;
+};
 
 void describe_source(Fields& field, DrrOptions& options) {
   field(
@@ -233,26 +258,6 @@ Image2d negated(Image2d image) {
   return image;
 }
 
-}  // namespace
-
-void DrrOptions::describe(Fields& field_list) {
-  describe_source(field_list, *this);
-  describe_pose(field_list, *this);
-  describe_output(field_list, *this);
-}
-
-std::vector<std::string> problems(const DrrOptions& options) {
-  std::vector<std::string> found;
-  append_source_problems(options, found);
-  append_pose_problems(options, found);
-  append_output_problems(options, found);
-  for (const std::string& text : thread_problems(options.threads)) found.push_back(text);
-  for (const std::string& text : field_problems(options)) found.push_back(text);
-  return found;
-}
-
-namespace {
-
 void require_same_subject(const FieldIdentity& wanted,
                           const FieldIdentity& found,
                           const std::string& path) {
@@ -311,8 +316,7 @@ std::string note_of(const CameraGeometry& camera,
          (options.more_fields.empty() ? "" : ", that of --field");
 }
 
-}  // namespace
-
+/// Collective. Reads field, CT and rig. FileError when --compare's CT is not the field's.
 DrrScene load_scene(const DrrOptions& options, const Communicator& communicator) {
   DrrScene scene;
   scene.pool = std::make_shared<ThreadPool>(thread_count(options.threads));
@@ -342,6 +346,8 @@ DrrScene load_scene(const DrrOptions& options, const Communicator& communicator)
   return scene;
 }
 
+/// Poses in the order of the options or their file; `notes` get what was left out of it and
+/// assumed.
 std::vector<RigidTransform> requested_poses(const DrrOptions& options,
                                             const DrrScene& scene,
                                             std::vector<std::string>& notes) {
@@ -359,6 +365,7 @@ std::vector<RigidTransform> requested_poses(const DrrOptions& options,
   return {pose_of_deg_and_mm(scene.frame, values, "--rotation-deg, --translation-mm")};
 }
 
+/// InputError when so many DRRs fit neither into memory nor on the disk of the output.
 void require_room(std::size_t poses, const View& view, const std::filesystem::path& output) {
   const double bytes = static_cast<double>(poses) * static_cast<double>(view.pixel_count()) *
                        static_cast<double>(sizeof(float));
@@ -369,6 +376,8 @@ void require_room(std::size_t poses, const View& view, const std::filesystem::pa
   if (!is_compressed) require_disk_space(output, bytes);
 }
 
+/// DRRs of all poses, shared by the threads of the pool; InputError, with `note`, when any ray of
+/// any pose is outside the field.
 std::vector<Image2d> render_poses(const DrrRenderer& renderer,
                                   const View& view,
                                   const std::vector<RigidTransform>& poses,
@@ -388,6 +397,7 @@ std::vector<Image2d> render_poses(const DrrRenderer& renderer,
   return drrs;
 }
 
+/// One DRR, a stack of several, or a PNG, by the name's extension. Returns a line about it.
 std::string write_drrs(const std::vector<Image2d>& drrs,
                        const View& view,
                        const DrrOptions& options) {
@@ -420,6 +430,7 @@ std::string write_drrs(const std::vector<Image2d>& drrs,
   return line.str();
 }
 
+/// Field, ray cast and difference of one pose in one PNG. Returns the PSNR in words.
 std::string write_comparison(const DrrScene& scene,
                              const RigidTransform& room_from_ct,
                              const std::filesystem::path& path) {
@@ -455,6 +466,44 @@ std::string write_comparison(const DrrScene& scene,
                 path,
                 std::max(1, 384 / std::max(1, cast.width)));
   return words;
+}
+
+}  // namespace
+
+void DrrOptions::describe(Fields& field_list) {
+  describe_source(field_list, *this);
+  describe_pose(field_list, *this);
+  describe_output(field_list, *this);
+}
+
+std::vector<std::string> problems(const DrrOptions& options) {
+  std::vector<std::string> found;
+  append_source_problems(options, found);
+  append_pose_problems(options, found);
+  append_output_problems(options, found);
+  for (const std::string& text : thread_problems(options.threads)) found.push_back(text);
+  for (const std::string& text : field_problems(options)) found.push_back(text);
+  return found;
+}
+
+void run_drr(const DrrOptions& options, const Communicator& world) {
+  throw_if_any(problems(options));
+  if (world.is_root()) announce_output(options.output);
+  const DrrScene scene = load_scene(options, world);
+  std::vector<std::string> notes;
+  const std::vector<RigidTransform> poses = requested_poses(options, scene, notes);
+  for (const std::string& text : notes) warn(world, text);
+  if (!world.is_root()) return;
+  if (!scene.note.empty()) std::cout << scene.note << '\n';
+  if (options.compare) {
+    const std::string words = write_comparison(scene, poses.front(), options.output);
+    std::cout << options.output.string() << ": " << words << '\n';
+    return;
+  }
+  require_room(poses.size(), scene.view, options.output);
+  const std::vector<Image2d> drrs =
+      render_poses(*scene.renderer, scene.view, poses, *scene.pool, scene.note);
+  std::cout << write_drrs(drrs, scene.view, options) << '\n';
 }
 
 }  // namespace af::tools

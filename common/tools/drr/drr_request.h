@@ -47,56 +47,8 @@ struct DrrOptions {
 /// All impossible values and combinations of options; empty when the options are sound.
 std::vector<std::string> problems(const DrrOptions& options);
 
-/// What DRRs are made of and for which camera.
-struct DrrSource {
-  std::filesystem::path ct;  ///< empty: none
-  CtReadOptions ct_reading;
-  std::optional<CameraGeometry> camera;  ///< none: the field's
-  std::optional<PoseFrame> frame;        ///< none: the field's, or of the CT's centre
-  Eigen::Vector3d isocenter_point = Eigen::Vector3d::Zero();
-};
-
-/// What renders, for which camera, and what pose parameters are relative to.
-struct DrrScene {
-  DrrSource source;
-  std::shared_ptr<const DrrRenderer> renderer;   ///< the field's, else the ray caster
-  std::shared_ptr<const DrrRenderer> reference;  ///< the ray caster, for --compare
-  View view;
-  PoseFrame frame;
-  std::shared_ptr<ThreadPool> pool;
-  /// How far the camera is from the field's own, with several fields from the first one's; empty
-  /// for that one.
-  std::string note;
-};
-
-/// Collective. Reads field, CT and rig. FileError when --compare's CT is not the field's.
-DrrScene load_scene(const DrrOptions& options, const Communicator& communicator);
-
-/// Poses in the order of the options or their file; `notes` get what was left out of it and
-/// assumed.
-std::vector<RigidTransform> requested_poses(const DrrOptions& options,
-                                            const DrrScene& scene,
-                                            std::vector<std::string>& notes);
-
-/// InputError when so many DRRs fit neither into memory nor on the disk of the output.
-void require_room(std::size_t poses, const View& view, const std::filesystem::path& output);
-
-/// DRRs of all poses, shared by the threads of the pool; InputError, with `note`, when any ray of
-/// any pose is outside the field.
-std::vector<Image2d> render_poses(const DrrRenderer& renderer,
-                                  const View& view,
-                                  const std::vector<RigidTransform>& poses,
-                                  ThreadPool& pool,
-                                  const std::string& note);
-
-/// One DRR, a stack of several, or a PNG, by the name's extension. Returns a line about it.
-std::string write_drrs(const std::vector<Image2d>& drrs,
-                       const View& view,
-                       const DrrOptions& options);
-
-/// Field, ray cast and difference of one pose in one PNG. Returns the PSNR in words.
-std::string write_comparison(const DrrScene& scene,
-                             const RigidTransform& room_from_ct,
-                             const std::filesystem::path& path);
+/// Collective. Makes the DRRs that are asked for and writes them. InputError when a ray of a pose
+/// is outside the field, FileError when --compare's CT is not the field's.
+void run_drr(const DrrOptions& options, const Communicator& world);
 
 }  // namespace af::tools

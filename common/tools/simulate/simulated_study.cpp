@@ -3,22 +3,51 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "base/error.h"
 #include "base/hash_random.h"
+#include "base/progress.h"
 #include "figures/picture.h"
+#include "files/input_guard.h"
 #include "files/output_file.h"
+#include "files/partial_folder.h"
+#include "gold_standard/fiducial_registration.h"
+#include "image_files/ct_reader.h"
 #include "image_files/dicom_xray_writer.h"
 #include "image_files/image_file.h"
 #include "pose_files/pose_file.h"
+#include "run/progress_printer.h"
+#include "run/provenance.h"
+#include "run/terminal.h"
 #include "simulation/automatic_target.h"
 #include "simulation/phantom.h"
+#include "simulation/xray_simulator.h"
 #include "study/rig_file.h"
+#include "study/study_file.h"
 #include "text/csv_table.h"
+#include "text/options_toml.h"
+#include "tools/simulate/simulate_options.h"
+#include "tools/simulate/simulated_scan.h"
 
 namespace af::tools {
 
 namespace {
+
+/// A case before its X-rays are taken: where the patient lies and what is to be found.
+struct SimulatedCase {
+  StudyCase study_case;        ///< without file names; gold_room_from_ct is the true pose
+  PoseParameters true_offset;  ///< of the true pose from the nominal one
+  CameraRig true_rig;          ///< that takes the X-rays; the study's own may miss it
+  std::vector<SteelCylinder> fiducials;
+  SteelBodies occluders;  ///< in the X-rays only, besides the fiducials
+  std::vector<std::vector<Eigen::Vector2d>> exact_fiducials_px;  ///< per view, without noise
+  std::optional<FiducialGold> fiducial_gold;
+};
 
 template <typename Vector>
 std::string toml_array(const Vector& vector) {
@@ -219,8 +248,8 @@ std::string truth_text(const SimulatedCase& simulated) {
   return text;
 }
 
-}  // namespace
-
+/// Chooses target, regions, true pose, true cameras, fiducials and occluders. Throws InputError
+/// when the target or a fiducial misses a detector, or a source lies inside the CT.
 SimulatedCase plan_case(const SimulateOptions& options,
                         const CtVolume& ct,
                         const CameraRig& rig,
@@ -257,8 +286,6 @@ SimulatedCase plan_case(const SimulateOptions& options,
   return simulated;
 }
 
-namespace {
-
 std::optional<SmoothMotion> wanted_motion(const SimulateOptions& options,
                                           const SimulatedCase& simulated) {
   if (!options.stress.has(Stress::Motion)) return std::nullopt;
@@ -276,14 +303,15 @@ SteelBodies all_steel(const SimulatedCase& simulated) {
   return steel;
 }
 
-}  // namespace
-
+/// The simulator of this case's X-rays from voxels; `volume` must outlive it.
 XraySimulator voxel_simulator(const SimulateOptions& options,
                               const AttenuationVolume& volume,
                               const SimulatedCase& simulated) {
   return {volume, all_steel(simulated), options.xray_in_force()};
 }
 
+/// The simulator of this case's X-rays from a phantom's bodies themselves, with the wanted
+/// non-rigid motion.
 XraySimulator body_simulator(const SimulateOptions& options,
                              const Phantom& phantom,
                              const SimulatedCase& simulated) {
@@ -294,6 +322,7 @@ XraySimulator body_simulator(const SimulateOptions& options,
           options.xray_in_force()};
 }
 
+/// What voxels show: the anatomy itself, or with the wanted non-rigid motion.
 CtVolume imaged_anatomy(const SimulateOptions& options,
                         const CtVolume& anatomy,
                         const SimulatedCase& simulated) {
@@ -301,6 +330,7 @@ CtVolume imaged_anatomy(const SimulateOptions& options,
   return motion ? motion->moved(anatomy) : anatomy;
 }
 
+/// What the study's CT is to be when it is not the input itself: a wanted degraded one.
 std::optional<CtVolume> degraded_study_ct(const SimulateOptions& options,
                                           const CtVolume& ct,
                                           const SimulatedCase& simulated) {
@@ -313,8 +343,6 @@ std::optional<CtVolume> degraded_study_ct(const SimulateOptions& options,
                      options.seed,
                      view_key(simulated.study_case.name, "", "ct noise"));
 }
-
-namespace {
 
 /// The X-ray's file into `folder`; its path goes to `view`.
 void write_xray(const SimulateOptions& options,
@@ -348,8 +376,8 @@ void write_xray(const SimulateOptions& options,
   write(xray, view.xray, camera.pixel_spacing_mm.x(), camera.pixel_spacing_mm.y());
 }
 
-}  // namespace
-
+/// Takes the X-ray of every view and writes it with its preview into `folder`; fills in the file
+/// names.
 void take_xrays(const SimulateOptions& options,
                 const XraySimulator& simulator,
                 const std::filesystem::path& folder,
@@ -376,6 +404,8 @@ void take_xrays(const SimulateOptions& options,
   }
 }
 
+/// study.toml, rig.toml, truth.toml, rig-true.toml where it differs, provenance.json and
+/// reproduce.sh.
 void write_study_files(const SimulateOptions& options,
                        const CameraRig& rig,
                        const SimulatedCase& simulated,
@@ -397,6 +427,150 @@ void write_study_files(const SimulateOptions& options,
     record["stress"].push_back({{"name", stress.name}, {"text", stress.text}});
   write_text_file(folder / "provenance.json", record.dump(2) + "\n");
   write_reproduce_script(folder, provenance);
+}
+
+/// A patient as X-rays and as the CT show them. The two differ where the CT clips metal; and X-rays
+/// of drawn anatomies are of the bodies, not of voxels.
+struct Patient {
+  CtVolume anatomy;
+  CtVolume ct;
+  std::optional<Phantom> bodies;
+};
+
+Patient patient(const SimulateOptions& options, const Communicator& world) {
+  if (!options.phantom.empty()) {
+    PhantomOptions sampling = options.phantom_options;
+    sampling.threads = options.xray.threads;
+    Phantom phantom = phantom_of(options);
+    const CtVolume anatomy = sample_phantom(phantom, sampling);
+    const CtVolume ct = phantom.has_metal() ? with_scanner_range(anatomy) : anatomy;
+    if (!sampling.anatomy_seed) return {anatomy, ct, std::nullopt};
+    return {anatomy, ct, std::move(phantom)};
+  }
+  std::vector<std::string> warnings;
+  const CtVolume ct = read_ct(options.ct, options.ct_reading, &warnings);
+  for (const std::string& warning : warnings) warn(world, warning);
+  return {ct, ct, std::nullopt};
+}
+
+CameraRig cameras(const SimulateOptions& options, const Communicator& world) {
+  std::vector<std::string> warnings;
+  CameraRig rig = read_rig(options.rig, &warnings);
+  for (CameraGeometry& camera : rig.cameras)
+    if (!camera.distortion.is_none()) {
+      warnings.push_back(
+          "camera '" + camera.name +
+          "': simulated X-rays are not distorted; the study's rig has no distortion");
+      camera.distortion = {};
+    }
+  for (const std::string& warning : warnings) warn(world, warning);
+  return rig;
+}
+
+/// Writes the CT into the study, or refers to where it is.
+std::filesystem::path ct_of_study(const SimulateOptions& options,
+                                  const CtVolume& ct,
+                                  const SimulatedCase& simulated,
+                                  const std::filesystem::path& folder) {
+  const std::optional<CtVolume> degraded = degraded_study_ct(options, ct, simulated);
+  if (options.phantom.empty() && !options.copies_ct && !degraded)
+    return std::filesystem::absolute(options.ct);
+  std::filesystem::path path = folder / "ct.nii.gz";
+  write_ct(degraded ? *degraded : ct, path);
+  return path;
+}
+
+/// Plans the case and takes its X-rays into `folder`.
+SimulatedCase imaged_case(const SimulateOptions& options,
+                          const Patient& patient,
+                          const CameraRig& rig,
+                          const std::filesystem::path& folder) {
+  SimulatedCase simulated =
+      plan_case(options, patient.ct, rig, AttenuationVolume(patient.ct, options.attenuation));
+  ProgressPrinter printer("Taking X-rays", true);
+  const auto take = [&](const XraySimulator& simulator) {
+    take_xrays(options, simulator, folder, simulated, printer.callback());
+  };
+  if (patient.bodies) {
+    take(body_simulator(options, *patient.bodies, simulated));
+  } else {
+    const AttenuationVolume volume(imaged_anatomy(options, patient.anatomy, simulated),
+                                   options.attenuation);
+    take(voxel_simulator(options, volume, simulated));
+  }
+  return simulated;
+}
+
+/// Writes a cone-beam scan into `folder`.
+void take_scan(const SimulateOptions& options,
+               const Patient& imaged,
+               const CameraRig& rig,
+               const Provenance& provenance,
+               const std::filesystem::path& folder) {
+  const CameraGeometry& camera =
+      options.cone_beam.camera.empty() ? rig.cameras.front() : rig.camera(options.cone_beam.camera);
+  const CircularScan scan = orbit_of(camera, rig.isocenter_point, options.cone_beam);
+  std::optional<Phantom> bodies;
+  if (!options.phantom.empty()) bodies = phantom_of(options);
+  ProgressPrinter printer("Taking X-rays", true);
+  write_simulated_scan(options, imaged.ct, bodies, scan, provenance, folder, printer.callback());
+}
+
+std::string summary(const SimulatedCase& simulated, const std::filesystem::path& folder) {
+  const auto offset = simulated.true_offset.deg_and_mm();
+  std::string text = "True pose, relative to nominal:";
+  for (std::size_t i = 0; i < 6; ++i)
+    text += ' ' + fixed_text(offset[i], 2) + (i < 3 ? " deg" : " mm");
+  if (simulated.fiducial_gold) {
+    const RigidTransform& gold = *simulated.study_case.gold_room_from_ct;
+    const RigidTransform& fitted = simulated.fiducial_gold->room_from_ct;
+    const Eigen::Vector3d& center = simulated.study_case.center_ct_mm;
+    text += "\nFiducial gold pose: " + fixed_text((fitted * center - gold * center).norm(), 3) +
+            " mm and " + fixed_text(rotation_angle_between_rad(gold, fitted) * kDegPerRad, 3) +
+            " deg from it, FRE " + fixed_text(simulated.fiducial_gold->fit.fre_mm, 3) + " mm";
+  }
+  if (!simulated.occluders.cylinders.empty() || !simulated.occluders.balls.empty())
+    text += "\nIn the X-rays only: " + std::to_string(simulated.occluders.cylinders.size()) +
+            " rods, " + std::to_string(simulated.occluders.balls.size()) + " balls";
+  return text + "\nStudy: " + (folder / "study.toml").string();
+}
+
+}  // namespace
+
+void run_simulate(const SimulateOptions& options,
+                  const std::string& command_line,
+                  const Communicator& world) {
+  if (!world.is_root()) return;  // the work is small; a launcher with several ranks does no harm
+  throw_if_any(problems(options));
+  const CameraRig rig = cameras(options, world);
+  if (!options.ct.empty()) note_input(options.ct);
+  PartialFolder folder(
+      options.output,
+      options.replaces_output ? PartialFolder::Existing::Replace : PartialFolder::Existing::Refuse);
+
+  inform(world, options.phantom.empty() ? "Reading " + options.ct : "Making the phantom");
+  const Patient imaged = patient(options, world);
+  const Provenance provenance = {"af-simulate",
+                                 command_line,
+                                 to_toml(options),
+                                 options.seed,
+                                 world.size(),
+                                 {{"ct_content", ct_content_sha256(imaged.ct)}}};
+  if (options.cone_beam.views > 0) {
+    take_scan(options, imaged, rig, provenance, folder.path());
+    folder.commit();
+    inform(world, "Scan: " + (folder.final_path() / "scan.toml").string());
+    return;
+  }
+  SimulatedCase simulated = imaged_case(options, imaged, rig, folder.path());
+  inform(world, "Writing the study");
+  simulated.study_case.ct = ct_of_study(options, imaged.ct, simulated, folder.path());
+  // A copy is in HU.
+  if (!options.ct.empty() && simulated.study_case.ct == std::filesystem::absolute(options.ct))
+    simulated.study_case.ct_reading = options.ct_reading;
+  write_study_files(options, rig, simulated, provenance, folder.path());
+  folder.commit();
+  inform(world, summary(simulated, folder.final_path()));
 }
 
 }  // namespace af::tools
