@@ -20,6 +20,7 @@ constexpr double kLeastMasked = 0.001;     ///< less is noise at the edge
 constexpr double kMostBorderShare = 0.5;   ///< of the bright level, with the detector's offset
 constexpr double kDarkShare = 0.15;        ///< of the way from the border's level to the bright one
 constexpr double kAsDarkShare = 0.12;      ///< of the same way: as dark as the border
+constexpr double kLeastRiseShare = 0.2;    ///< of the same way: least level inside a field's edge
 constexpr double kLeastFieldPart = 0.005;  ///< of the picture: smaller bright parts are specks
 constexpr double kMostOpaquePart = 0.02;   ///< of the picture, one body
 constexpr double kPenumbraShare = 0.06;    ///< of the shorter side: the widest penumbra
@@ -27,6 +28,7 @@ constexpr double kRisen = 0.9;             ///< of the level inside: where the p
 constexpr double kStraightShare = 0.15;    ///< of the shorter side
 constexpr double kMostStraight = 0.5;      ///< of a circle's edge, where anatomy crosses it
 constexpr double kCircleRmsShare = 0.02;   ///< of the radius
+constexpr double kMostMore = 0.1;          ///< that a circle may mask beyond the hull
 constexpr double kNoiseSigmaPx = 1.5;
 
 struct Rect {
@@ -201,9 +203,11 @@ Interval row_of_field(const std::vector<Side>& sides, int row, int width, double
           static_cast<int>(std::floor(high + kRounding))};
 }
 
-/// Along the field's edge values rise from the border's level to the field's: how many pixels that
-/// takes, by the medians of rings of one pixel. Anatomy that crosses the edge is in every ring.
-int penumbra_px(const Image2d& smooth, const std::vector<Side>& sides, double border_level) {
+/// Medians of rings of one pixel inside the field's edge, outermost first, as far in as a penumbra
+/// may reach. Anatomy that crosses the edge is in every ring.
+std::vector<double> ring_medians(const Image2d& smooth,
+                                 const std::vector<Side>& sides,
+                                 double border_level) {
   const int most = std::max(
       4, static_cast<int>(std::lround(kPenumbraShare * std::min(smooth.width, smooth.height))));
   std::vector<std::vector<float>> rings(static_cast<std::size_t>(most));
@@ -222,11 +226,41 @@ int penumbra_px(const Image2d& smooth, const std::vector<Side>& sides, double bo
   std::vector<double> medians;
   for (const std::vector<float>& ring : rings)
     medians.push_back(ring.empty() ? border_level : static_cast<double>(nearest_rank(ring, 0.5)));
+  return medians;
+}
+
+/// Along the field's edge values rise from the border's level to the field's: how many pixels that
+/// takes.
+int penumbra_px(const std::vector<double>& medians, double border_level) {
   const double inside = *std::max_element(medians.begin(), medians.end());
   const double risen = border_level + kRisen * (inside - border_level);
   const auto end =
       std::find_if(medians.begin(), medians.end(), [&](double m) { return m >= risen; });
   return static_cast<int>(end - medians.begin());
+}
+
+/// Whether the sides part a border from a field: most of the edge is bright on its inner side, and
+/// what lies a third to two thirds of the widest penumbra beyond it is as dark as a border. Of dark
+/// anatomy at the edge of the picture the hull of the rest cuts through what is as dark on both
+/// sides, or fades slowly.
+bool parts_dark_from_bright(const Image2d& smooth,
+                            const std::vector<Side>& sides,
+                            const std::vector<double>& rings,
+                            const Levels& levels) {
+  const double range = levels.bright - levels.border;
+  if (*std::max_element(rings.begin(), rings.end()) < levels.border + kLeastRiseShare * range)
+    return false;
+  const double penumbra = kPenumbraShare / 3.0 * std::min(smooth.width, smooth.height);
+  std::vector<float> beyond;
+  for (int row = 0; row < smooth.height; ++row) {
+    const Interval near = row_of_field(sides, row, smooth.width, -penumbra);
+    const Interval far = row_of_field(sides, row, smooth.width, -2.0 * penumbra);
+    for (int column = std::max(0, far.first); column <= std::min(smooth.width - 1, far.last);
+         ++column)
+      if (column < near.first || column > near.last) beyond.push_back(smooth.at(column, row));
+  }
+  return beyond.empty() ||
+         static_cast<double>(nearest_rank(beyond, 0.5)) <= levels.border + 0.5 * kDarkShare * range;
 }
 
 /// Least squares by Kasa: x^2 + y^2 + D x + E y + F = 0.
@@ -398,7 +432,9 @@ Image2d field_of(const Image2d& live, XrayBorders& borders) {
   std::vector<Side> sides = sides_of(hull, live.width, live.height);
   const auto total = static_cast<double>(live.pixels.size());
   const double beyond = pixels_beyond(sides, live);
-  if (beyond > kMostMasked * total) {
+  const std::vector<double> rings = ring_medians(smooth, sides, levels.border);
+  if (beyond > kMostMasked * total ||
+      (beyond > kLeastMasked * total && !parts_dark_from_bright(smooth, sides, rings, levels))) {
     borders.doubt = "something dark at the edge, " + number_text(std::round(100 * beyond / total)) +
                     " % of the picture, may be anatomy and is left in";
     return field;
@@ -419,8 +455,17 @@ Image2d field_of(const Image2d& live, XrayBorders& borders) {
     }
     // A circle goes through the corners of any rectangle.
     if (straight_px < kMostStraight * length_px) borders.circle = fitted_circle(edge);
-    if (borders.circle) sides = sides_of_circle(*borders.circle);
-    borders.margin_px = 1 + penumbra_px(smooth, sides, levels.border) +
+    if (borders.circle) {
+      const std::vector<Side> tangents = sides_of_circle(*borders.circle);
+      // A short arc says nothing of where the rest of its circle runs.
+      if (pixels_beyond(tangents, live) <= (1.0 + kMostMore) * beyond)
+        sides = tangents;
+      else
+        borders.circle.reset();
+    }
+    const std::vector<double> edge_rings =
+        borders.circle ? ring_medians(smooth, sides, levels.border) : rings;
+    borders.margin_px = 1 + penumbra_px(edge_rings, levels.border) +
                         (borders.circle ? static_cast<int>(std::ceil(borders.circle->rms_px)) : 0);
     borders.aperture_share = clear_beyond(sides, borders.margin_px, field);
   }

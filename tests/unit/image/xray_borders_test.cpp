@@ -127,6 +127,26 @@ TEST(XrayBorders, MaskMetalAtTheEdgeButNotDarkAnatomyThatLeavesThePicture) {
     }
 }
 
+/// A body that fills the picture but for a bright middle: dark towards the corners, without an
+/// edge.
+TEST(XrayBorders, AreNotDarkAnatomyThatFillsTheCorners) {
+  const XrayBorders found = find_xray_borders(picture(160, 120, [](int c, int r) {
+    const double away = std::hypot((c - 80) / 80.0, (r - 60) / 60.0);
+    return kAir * static_cast<float>(std::exp(-0.3 - 3.2 * away * away));
+  }));
+  EXPECT_FALSE(found.is_any()) << found.text();
+  EXPECT_THAT(found.text(), HasSubstr("may be anatomy"));
+}
+
+/// The rest of the circle that fits a rounded corner would hide most of the picture.
+TEST(XrayBorders, TakeNoCircleForTheArcOfACorner) {
+  const XrayBorders found = find_xray_borders(picture(160, 120, [](int c, int r) {
+    return c < 30 && r < 30 && std::hypot(c - 30, r - 30) > 30 ? kShutter : -1.0f;
+  }));
+  EXPECT_FALSE(found.circle.has_value()) << found.text();
+  EXPECT_LT(found.masked_share(), 0.1) << found.text();
+}
+
 TEST(XrayBorders, SayTheyAreInDoubtRatherThanMaskMostOfAPicture) {
   const XrayBorders found =
       find_xray_borders(picture(160, 120, [](int c, int) { return c < 20 ? -1.0f : kBody; }));
