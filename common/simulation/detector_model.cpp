@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "base/error.h"
 #include "base/hash_random.h"
+#include "image/bilinear.h"
 #include "image/gaussian_blur.h"
 #include "simulation/parallel_rows.h"
 #include "simulation/poisson.h"
@@ -31,29 +33,14 @@ Image2d block_means(const Image2d& image, int factor) {
   return means;
 }
 
-/// Bilinear values at the fine pixel centres, edges replicated.
+/// Values at the fine pixel centres.
 Image2d magnify(const Image2d& coarse, int factor, int width, int height) {
-  Image2d fine(width, height);
-  const auto coarse_position = [factor](int index, int size) {
-    return std::clamp((index + 0.5) / factor - 0.5, 0.0, static_cast<double>(size - 1));
+  const auto coarse_positions = [factor](int count) {
+    std::vector<double> positions;
+    for (int i = 0; i < count; ++i) positions.push_back((i + 0.5) / factor - 0.5);
+    return positions;
   };
-  for (int row = 0; row < height; ++row) {
-    const double y = coarse_position(row, coarse.height);
-    const int y0 = static_cast<int>(y);
-    const int y1 = std::min(y0 + 1, coarse.height - 1);
-    for (int column = 0; column < width; ++column) {
-      const double x = coarse_position(column, coarse.width);
-      const int x0 = static_cast<int>(x);
-      const int x1 = std::min(x0 + 1, coarse.width - 1);
-      const auto along_row = [&](int at_row) {
-        return std::lerp(static_cast<double>(coarse.at(x0, at_row)),
-                         static_cast<double>(coarse.at(x1, at_row)),
-                         x - x0);
-      };
-      fine.at(column, row) = static_cast<float>(std::lerp(along_row(y0), along_row(y1), y - y0));
-    }
-  }
-  return fine;
+  return resampled_bilinearly(coarse, coarse_positions(width), coarse_positions(height));
 }
 
 double mean_within(const Image2d& image, const RegionOfInterest& roi) {

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "image/bilinear.h"
 #include "text/csv_table.h"
 
 namespace af {
@@ -73,29 +74,15 @@ double best_correlation(const Image2d& a, const Image2d& b) {
   return best;
 }
 
-/// The middle of an image, enlarged to all of it: bilinear.
+/// The middle of an image, enlarged to all of it.
 Image2d enlarged(const Image2d& image, double factor) {
-  Image2d result(image.width, image.height);
-  const auto place = [&](int at, int count) {
+  const auto positions = [factor](int count) {
     const double middle = 0.5 * (count - 1);
-    return std::clamp(middle + (at - middle) / factor, 0.0, static_cast<double>(count - 1));
+    std::vector<double> places;
+    for (int i = 0; i < count; ++i) places.push_back(middle + (i - middle) / factor);
+    return places;
   };
-  for (int row = 0; row < image.height; ++row)
-    for (int column = 0; column < image.width; ++column) {
-      const double x = place(column, image.width);
-      const double y = place(row, image.height);
-      const int left = std::min(static_cast<int>(x), image.width - 2);
-      const int top = std::min(static_cast<int>(y), image.height - 2);
-      const double across = x - left;
-      const double down = y - top;
-      const auto value = [&](int dx, int dy) {
-        return static_cast<double>(image.at(left + dx, top + dy));
-      };
-      result.at(column, row) =
-          static_cast<float>((1 - down) * ((1 - across) * value(0, 0) + across * value(1, 0)) +
-                             down * ((1 - across) * value(0, 1) + across * value(1, 1)));
-    }
-  return result;
+  return resampled_bilinearly(image, positions(image.width), positions(image.height));
 }
 
 }  // namespace
