@@ -174,8 +174,8 @@ CtVolume read_ct_image(const fs::path& path, HuValues& values, std::vector<std::
   const std::optional<ImageFormat> format = sniff_image_format(path);
   if (!format)
     throw FileError(file,
-                    "not a CT image: its content is none of NIfTI, MetaImage, NRRD; a DICOM series "
-                    "is given as a folder");
+                    "not a CT image: its content is none of NIfTI, MetaImage, NRRD" +
+                        foreign_content(path) + "; a DICOM series is given as a folder");
   if (*format == ImageFormat::Dicom)
     throw InputError(file + ": a single DICOM file (" + describe_dicom_file(path) +
                      "); give the folder that holds the series" +

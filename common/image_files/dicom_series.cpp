@@ -13,6 +13,7 @@
 #include "base/error.h"
 #include "image_files/dicom_elements.h"
 #include "image_files/dicom_pixels.h"
+#include "image_files/image_header.h"
 #include "volume/slice_stack.h"
 
 namespace af {
@@ -78,12 +79,22 @@ std::string some_of(const std::vector<std::string>& names) {
   return text;
 }
 
+/// Of a folder without a DICOM image.
+std::string what_is_there(const std::vector<fs::path>& files,
+                          const std::vector<std::string>& other_files,
+                          const std::vector<std::string>& other_objects) {
+  if (files.empty()) return "it holds no file";
+  if (!other_objects.empty()) return "DICOM but no image: " + some_of(other_objects);
+  return "not DICOM: " + some_of(other_files) + foreign_content(files.front());
+}
+
 std::vector<DicomElements> image_headers(const fs::path& folder,
                                          std::vector<std::string>* warnings) {
   std::vector<DicomElements> headers;
   std::vector<std::string> other_files;
   std::vector<std::string> other_objects;
-  for (const fs::path& path : files_of(folder)) {
+  const std::vector<fs::path> files = files_of(folder);
+  for (const fs::path& path : files) {
     const std::string name = path.filename().string();
     const bool is_marked = is_marked_dicom(path);
     if (!is_marked && !may_be_bare_dicom(path)) {
@@ -103,7 +114,9 @@ std::vector<DicomElements> image_headers(const fs::path& folder,
   if (!other_objects.empty())
     warn(warnings, folder.string() + ": skipped, DICOM but no image: " + some_of(other_objects));
   if (headers.empty())
-    throw FileError(folder.string(), "no DICOM image in this folder (subfolders are not searched)");
+    throw FileError(folder.string(),
+                    "no DICOM image in this folder (subfolders are not searched): " +
+                        what_is_there(files, other_files, other_objects));
   return headers;
 }
 

@@ -136,9 +136,10 @@ Image2d read_image(const fs::path& path) {
 ImageWithSpacing read_image_with_spacing(const fs::path& path) {
   const std::optional<ImageFormat> format = sniff_image_format(path);
   if (!format)
-    throw FileError(path.string(),
-                    "not an image: its content is none of MetaImage, NIfTI, NRRD, TIFF, PNG, "
-                    "DICOM");
+    throw FileError(
+        path.string(),
+        "not an image: its content is none of MetaImage, NIfTI, NRRD, TIFF, PNG, DICOM" +
+            foreign_content(path));
   if (*format == ImageFormat::Dicom) return {read_dicom_image(path), std::nullopt};
   const ImageHeader header = read_image_header(path, *format);
   const RawImage raw = read_stored_image(

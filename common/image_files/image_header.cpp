@@ -2,6 +2,8 @@
 #include "image_files/image_header.h"
 
 #include <algorithm>
+#include <array>
+#include <string_view>
 #include <utility>
 
 #include "base/error.h"
@@ -150,6 +152,28 @@ std::optional<ImageFormat> sniff_image_format(const fs::path& path) {
   if (is_gzip(bytes) && looks_like_nifti(read_inflated_prefix(path, kNifti1HeaderBytes)))
     return ImageFormat::Nifti;
   return std::nullopt;
+}
+
+std::string foreign_content(const fs::path& path) {
+  using namespace std::string_view_literals;
+  struct Content {
+    std::string_view start;
+    std::string_view what;
+  };
+  constexpr std::array<Content, 8> known = {Content{"\xff\xd8\xff"sv, "a JPEG picture"},
+                                            {"\0\0\0\x0cjP  "sv, "a JPEG 2000 picture"},
+                                            {"\xff\x4f\xff\x51"sv, "a JPEG 2000 code stream"},
+                                            {"GIF8"sv, "a GIF picture"},
+                                            {"BM"sv, "a BMP picture"},
+                                            {"PK\x03\x04"sv, "a ZIP archive"},
+                                            {"%PDF"sv, "a PDF document"},
+                                            {"<"sv, "a page of HTML or XML"}};
+  const std::string start = read_prefix(path, 16);
+  if (start.empty()) return " (it is empty)";
+  for (const Content& content : known)
+    if (start.starts_with(content.start))
+      return " (it begins as " + std::string(content.what) + " does)";
+  return is_gzip(start) ? " (it is compressed by gzip)" : "";
 }
 
 ImageHeader read_image_header(const fs::path& path, ImageFormat format) {

@@ -25,6 +25,10 @@ std::string_view format_name(ImageFormat format);
 /// cannot be read.
 std::optional<ImageFormat> sniff_image_format(const std::filesystem::path& path);
 
+/// What a file that the project does not read looks like, for messages: " (it begins as a JPEG
+/// picture does)", whatever its name; empty when that is not known.
+std::string foreign_content(const std::filesystem::path& path);
+
 /// Rows of an affine map from voxel index to RAS+ mm.
 using RasAffine = std::array<std::array<double, 4>, 3>;
 

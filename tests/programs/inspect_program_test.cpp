@@ -216,12 +216,16 @@ TEST(AfInspect, SaysWhatItTriedWhenNothingFits) {
   const ScratchFolder folder;
   write_bytes(folder / "noise.bin", std::string("\x01\x02\x00\xff rubbish", 12));
   write_bytes(folder / "empty", "");
+  write_bytes(folder / "shot.dcm", "\xff\xd8\xff\xe0 a JPEG picture under another name");
+  fs::create_directory(folder / "folder");
   write_bytes(folder / "other.json", R"({"a": 1})");
   write_bytes(folder / "other.csv", "a,b\n1,2\n");
   write_bytes(folder / "cut.json", R"({"format": "attenu)");
   for (const auto& [name, code, message] :
        {std::tuple("noise.bin", 4, "not recognised; tried: DICOM folder"),
-        std::tuple("empty", 4, "not recognised"),
+        std::tuple("empty", 4, "not recognised (it is empty)"),
+        std::tuple("shot.dcm", 4, "not recognised (it begins as a JPEG picture does)"),
+        std::tuple("folder", 4, "not recognised (the folder is empty)"),
         std::tuple("none", 4, "does not exist"),
         std::tuple("other.json", 3, "no result of this project"),
         std::tuple("other.csv", 3, "none of registrations.csv"),

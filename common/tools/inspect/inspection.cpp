@@ -33,10 +33,14 @@ namespace {
 constexpr std::string_view kHdf5Mark = "\x89HDF\r\n\x1a\n";
 
 constexpr const char* kWhatWasTried =
-    "not recognised; tried: DICOM folder, result folder, unfinished work (NAME.progress), HDF5 "
+    "; tried: DICOM folder, result folder, unfinished work (NAME.progress), HDF5 "
     "field, NIfTI, MetaImage, NRRD, TIFF, PNG, DICOM file, TOML rig, study or pose, JSON result, "
     "CSV table, pose (ITK, DICOM registration, DiffDRR, Autoscoper, 16 numbers), name of a shipped "
     "rig, and cameras as MayaCam, OpenCV YAML, xReg's HDF5 or 3x4 matrices";
+
+FileError not_recognised(const fs::path& path) {
+  return {path.string(), "not recognised" + foreign_content(path) + kWhatWasTried};
+}
 
 std::string first_bytes(const fs::path& path, std::size_t count) {
   std::ifstream file = open_input_file(path);
@@ -82,7 +86,7 @@ bool is_sixteen_numbers(const std::string& text) {
 void inspect_text(const fs::path& path, Inspection& inspection) {
   constexpr std::size_t kTextBytes = 1u << 18;
   const std::string text = first_bytes(path, kTextBytes);
-  if (!is_text(text)) throw FileError(path.string(), kWhatWasTried);
+  if (!is_text(text)) throw not_recognised(path);
   if (has_line(text, "[[case]]")) return inspect_study(path, inspection);
   if (has_line(text, "[[camera]]")) return inspect_rig(path.string(), inspection);
   const std::size_t first = text.find_first_not_of(" \t\r\n");
@@ -92,7 +96,7 @@ void inspect_text(const fs::path& path, Inspection& inspection) {
       is_autoscoper({path, text}))
     return inspect_pose(path, inspection);
   if (path.extension() == ".csv") return inspect_csv(path, inspection);
-  throw FileError(path.string(), kWhatWasTried);
+  throw not_recognised(path);
 }
 
 /// Files of camera formats other than rig.toml, whose studies and rigs inspect_text() tells apart.
@@ -145,7 +149,11 @@ void inspect_folder(const fs::path& folder,
     return;
   }
   const std::vector<fs::path> files = known_files(folder);
-  if (files.empty()) throw FileError(folder.string(), kWhatWasTried);
+  if (files.empty()) {
+    const std::string what = fs::is_empty(folder) ? "not recognised (the folder is empty)"
+                                                  : "not recognised: no file of it is known";
+    throw FileError(folder.string(), what + kWhatWasTried);
+  }
   inspection.kind = "folder of results";
   inspection.facts["has_report"] = fs::exists(folder / "report.html");
   inspection.facts["has_reproduce_script"] = fs::exists(folder / "reproduce.sh");

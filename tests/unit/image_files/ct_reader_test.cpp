@@ -437,16 +437,23 @@ std::vector<BadCt> bad_cts() {
   return {
       // Files that are no CT.
       {"Missing", [](const fs::path& f) { return f / "none.nii.gz"; }, kFile, "does not exist"},
-      {"EmptyFile", text_file(""), kFile, "not a CT image"},
+      {"EmptyFile", text_file(""), kFile, "NRRD (it is empty)"},
       {"TextFile", text_file("hello, this is no image\n"), kFile, "not a CT image"},
-      {"EmptyFolder", [](const fs::path& f) { return f; }, kFile, "no DICOM image"},
+      {"EmptyFolder", [](const fs::path& f) { return f; }, kFile, "it holds no file"},
       {"FolderOfText",
        [](const fs::path& f) {
          write_bytes(f / "a.txt", "text");
          return f;
        },
        kFile,
-       "no DICOM image"},
+       "no DICOM image in this folder (subfolders are not searched): not DICOM: a.txt"},
+      {"FolderOfJpeg",
+       [](const fs::path& f) {
+         write_bytes(f / "a.dcm", "\xff\xd8\xff\xe0 a JPEG picture under another name");
+         return f;
+       },
+       kFile,
+       "not DICOM: a.dcm (it begins as a JPEG picture does)"},
       {"Png", text_file("\x89PNG\r\n\x1a\nrest of it"), kInput, "PNG picture has no HU"},
       // MetaImage.
       {"MetaTruncated", truncated("bad.mha", 0.9), kFile, "truncated"},
