@@ -23,6 +23,7 @@
 #include "cli/option_values.h"
 #include "cli/shell_completion.h"
 #include "cli/slicer_module.h"
+#include "cli/usage_message.h"
 #include "parallel/mpi_environment.h"
 #include "parallel/work_watch.h"
 #include "run/stop_request.h"
@@ -72,7 +73,7 @@ int report_parse_result(const CLI::App& app, const CLI::ParseError& error, bool 
     if (is_success)
       app.exit(error, std::cout, std::cerr);
     else
-      std::cerr << app.get_name() << ": " << shortened(error.what())
+      std::cerr << app.get_name() << ": " << usage_message(app, error)
                 << "\nRun with --help for more information.\n";
   }
   return static_cast<int>(is_success ? ExitCode::Done : ExitCode::Usage);

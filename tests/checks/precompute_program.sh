@@ -52,7 +52,7 @@ refuse() {
   done
   expect "$code" "$pattern" "${kept[@]}" "$@"
 }
-expect 2 'not expected' --no-such-option
+expect 2 "unknown option '--no-such-option'" --no-such-option
 expect 2 'excludes' --study s.toml "${common[@]}"
 expect 2 '-o FIELD.h5' "${common[@]}"
 expect 2 'AP, LAT' --ct ct.mha --rig c-arm-12in -o refused.h5

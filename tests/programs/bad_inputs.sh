@@ -257,6 +257,8 @@ row 3 'nobody' 'unknown case' "$bin/af-register" --study valid/study.toml --case
 printf -- '--- options ---\n'
 of_option 2 '--no-such-option' 'unknown option' --no-such-option 1
 row 2 '--output' 'missing option' "$bin/af-register" --study valid/study.toml
+row 2 "did you mean '--study'?" 'mistyped option' "$bin/af-register" --studdy valid/study.toml -o out/r
+row 2 "did you mean 'registration'?" 'mistyped sub-command' "$bin/af-evaluate" regstration --study valid/study.toml -o out/r
 of_option 3 'uv' 'nodes < 2' --uv-nodes 1
 of_option 3 'codewords' 'codewords > 65536' --codewords 70000
 of_option 3 'codewords' 'codewords > training tiles' --codewords 60000
