@@ -45,6 +45,9 @@ constexpr DicomTag kFrameGroups = {0x5200, 0x9230};
 constexpr DicomTag kGeometryMacro = {0x0018, 0x9476};
 constexpr DicomTag kPositionerMacro = {0x0018, 0x9405};
 constexpr DicomTag kIsocenterMacro = {0x0018, 0x9462};
+constexpr DicomTag kFieldOfViewMacro = {0x0018, 0x9432};
+constexpr DicomTag kPixelsMacro = {0x0028, 0x9443};
+constexpr DicomTag kPixelAreaOrigin = {0x0018, 0x9471};
 constexpr DicomTag kSourceIsocenter = {0x0018, 0x9402};
 constexpr DicomTag kDetectorRotation = {0x0018, 0x9465};
 
@@ -122,6 +125,7 @@ class DicomCamera {
   }
 
   void read_detector(int frame) {
+    frame_ = frame;
     constexpr const char* kDetectorName = "DistanceSourceToDetector (0018,1110)";
     source_detector_mm_ =
         number(found_number(frame, kGeometryMacro, kSourceDetector, kDetectorName),
@@ -160,6 +164,15 @@ class DicomCamera {
       return camera_distance(other.geometry, stated_.cameras.front().geometry).is_none();
     };
     if (std::ranges::all_of(stated_.cameras, is_as_first)) stated_.cameras.resize(1);
+    if (const DicomValues* const pixels = functional_group(elements_, 1, kPixelsMacro);
+        pixels != nullptr) {
+      constexpr const char* kName = "PixelDataAreaOriginRelativeToFOV (0018,9471)";
+      const std::vector<double> origin = pixels->numbers(kPixelAreaOrigin, kName, file_);
+      if (std::ranges::any_of(origin, [](double value) { return value != 0.0; }))
+        stated_.notes.push_back(file_ + ": " + kName +
+                                " is not 0 and is not applied: the images are a part of the field "
+                                "of view, of which the middle is taken for theirs");
+    }
     const auto rotation =
         found_number(1, kIsocenterMacro, kDetectorRotation, "detector rotation (0018,9465)");
     if (rotation && *rotation != 0.0)
@@ -245,18 +258,30 @@ class DicomCamera {
     return angles;
   }
 
+  /// Origin, turn and flip of the image on the detector: the frame's own, or the file's.
+  [[nodiscard]] const DicomValues& field_of_view() const {
+    const DicomValues* const own = functional_group(elements_, frame_, kFieldOfViewMacro);
+    return own != nullptr && !own->text(kFieldOfViewOrigin).empty() ? *own : elements_.values();
+  }
+
   /// Where the image's middle lies from the middle of the active detector: (column, row) mm. 0
   /// unless all is stated.
   [[nodiscard]] Eigen::Vector2d field_of_view_offset_mm() const {
-    const auto pair = [&](DicomTag tag, const char* name) -> std::optional<Eigen::Vector2d> {
-      const std::vector<double> values = elements_.numbers(tag, name);
+    const auto pair_of = [&](const DicomValues& stated,
+                             DicomTag tag,
+                             const char* name) -> std::optional<Eigen::Vector2d> {
+      const std::vector<double> values = stated.numbers(tag, name, file_);
       if (values.size() != 2) return std::nullopt;
       return Eigen::Vector2d(values[1], values[0]);  // rows come first in DICOM
+    };
+    const auto pair = [&](DicomTag tag, const char* name) {
+      return pair_of(elements_.values(), tag, name);
     };
     const auto spacing = pair(kElementSpacing, "DetectorElementSpacing (0018,7022)");
     const auto active = pair(kActiveDimensions, "DetectorActiveDimensions (0018,7026)");
     const auto active_origin = pair(kActiveOrigin, "DetectorActiveOrigin (0018,7028)");
-    const auto origin = pair(kFieldOfViewOrigin, "FieldOfViewOrigin (0018,7030)");
+    const auto origin =
+        pair_of(field_of_view(), kFieldOfViewOrigin, "FieldOfViewOrigin (0018,7030)");
     if (!spacing || !active || !active_origin || !origin) return Eigen::Vector2d::Zero();
     const Eigen::Vector2d image_mm =
         camera_.size_px.cast<double>().cwiseProduct(camera_.pixel_spacing_mm);
@@ -269,14 +294,14 @@ class DicomCamera {
   /// flipped as these tags say.
   [[nodiscard]] Eigen::Vector2d along_stored_axes(Eigen::Vector2d offset_mm) const {
     const std::vector<double> turn =
-        elements_.numbers(kFieldOfViewRotation, "FieldOfViewRotation (0018,7032)");
+        field_of_view().numbers(kFieldOfViewRotation, "FieldOfViewRotation (0018,7032)", file_);
     const double turn_deg = turn.empty() ? 0.0 : turn.front();
     if (turn_deg != 0.0 && turn_deg != 180.0)
       throw InputError(file_ + ": FieldOfViewRotation (0018,7032)",
                        number_text(turn_deg),
                        "must be 0 or 180 where FieldOfViewOrigin is not the detector's middle");
     if (turn_deg == 180.0) offset_mm = -offset_mm;
-    if (elements_.text(kFieldOfViewFlip) == "YES") offset_mm.x() = -offset_mm.x();
+    if (field_of_view().text(kFieldOfViewFlip) == "YES") offset_mm.x() = -offset_mm.x();
     return offset_mm;
   }
 
@@ -352,6 +377,7 @@ class DicomCamera {
   DicomElements elements_;
   StatedRig stated_;
   CameraGeometry camera_;  ///< what all frames share
+  int frame_ = 1;          ///< of which the detector was read last
   double source_detector_mm_ = 0.0;
   double source_isocenter_mm_ = 0.0;
 };

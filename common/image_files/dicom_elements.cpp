@@ -40,12 +40,14 @@ constexpr std::uint64_t kLongestLut = 1U << 18;
 constexpr std::size_t kMostNestedValues = std::size_t{1} << 20;
 
 /// Sequences whose items are kept: Modality LUT; shared and per-frame functional groups, and of
-/// these geometry, positioner, isocentre, pixel properties and intensity relationship.
+/// these geometry, positioner, isocentre, field of view, pixel properties and intensity
+/// relationship.
 bool is_kept_sequence(DicomTag tag) {
-  constexpr std::array<DicomTag, 8> kKept = {{{0x0028, 0x3000},
+  constexpr std::array<DicomTag, 9> kKept = {{{0x0028, 0x3000},
                                               {0x5200, 0x9229},
                                               {0x5200, 0x9230},
                                               {0x0018, 0x9405},
+                                              {0x0018, 0x9432},
                                               {0x0018, 0x9462},
                                               {0x0018, 0x9476},
                                               {0x0028, 0x9443},

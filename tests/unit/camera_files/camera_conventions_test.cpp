@@ -954,6 +954,30 @@ TEST_F(DicomCameras, FieldOfViewMovesTheImageOnTheDetector) {
   expect_dicom_pixel(camera, {0, 0, 0}, {20.0 / 0.3 - 0.5, 110.0 / 0.4 - 0.5});
 }
 
+TEST_F(DicomCameras, FieldOfViewOfAFrameIsThatOfItsFunctionalGroups) {
+  test::DicomTestFile field;
+  field.set_text({0x0018, 0x7030}, "DS", "200\\900");
+  test::DicomTestFile file = enhanced(xa(), "90");
+  file.set_text({0x0018, 0x7022}, "DS", "0.2\\0.2");
+  file.set_text({0x0018, 0x7026}, "DS", "300\\400");
+  file.set_text({0x0018, 0x7028}, "DS", "0\\0");
+  std::vector<test::DicomTestFile> frames;
+  for (const char* const primary : {"0", "90"}) {
+    test::DicomTestFile angles;
+    angles.set_text({0x0018, 0x1510}, "DS", primary);
+    angles.set_text({0x0018, 0x1511}, "DS", "0");
+    frames.emplace_back();
+    frames.back().set_items({0x0018, 0x9405}, {angles});
+  }
+  frames[1].set_items({0x0018, 0x9432}, {field});
+  file.set_items({0x5200, 0x9230}, frames, true);
+  const CameraRig rig = read(file);
+  ASSERT_EQ(rig.cameras.size(), 2U);
+  expect_dicom_pixel(rig.cameras[0], {0, 0, 0}, {199.5, 255.5});
+  // As FieldOfViewMovesTheImageOnTheDetector.
+  expect_dicom_pixel(rig.cameras[1], {0, 0, 0}, {20.0 / 0.3 - 0.5, 110.0 / 0.4 - 0.5});
+}
+
 TEST_F(DicomCameras, FieldOfViewOriginIsOfTheDetectorBeforeTurnAndFlip) {
   test::DicomTestFile file = xa();
   file.set_text({0x0018, 0x7022}, "DS", "0.2\\0.2");
