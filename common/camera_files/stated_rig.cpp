@@ -12,6 +12,7 @@
 #include "base/number_text.h"
 #include "camera_files/rig_toml.h"
 #include "geometry/pinhole_camera.h"
+#include "text/csv_table.h"
 
 namespace af {
 
@@ -22,6 +23,12 @@ constexpr double kDefaultMagnification = 1.5;
 
 std::string point_text(const Eigen::Vector3d& point) {
   return number_text(point.x()) + "," + number_text(point.y()) + "," + number_text(point.z());
+}
+
+/// A derived point, for people: to 0.01 mm.
+std::string rounded_text(const Eigen::Vector3d& point) {
+  return fixed_text(point.x(), 2) + ", " + fixed_text(point.y(), 2) + ", " +
+         fixed_text(point.z(), 2);
 }
 
 /// The ray through the middle of the image, or through the foot of the source on the detector when
@@ -194,8 +201,8 @@ class RigCompletion {
     if (const auto nearest = nearest_point_of_central_rays(cameras); nearest) {
       isocenter_ = *nearest;
       notes_.push_back("the isocentre is not in the files; taken as the point nearest to the " +
-                       std::to_string(cameras.size()) + " central rays, (" + point_text(*nearest) +
-                       ") mm; --rig-isocenter-point states another");
+                       std::to_string(cameras.size()) + " central rays, (" +
+                       rounded_text(*nearest) + ") mm; --rig-isocenter-point states another");
       return;
     }
     if (cameras.empty()) throw InputError("the files hold no camera");
@@ -243,9 +250,9 @@ class RigCompletion {
                                        camera.source_detector_distance_mm() *
                                        camera.pixel_spacing_mm.x());
       notes_.push_back(place(i) + ": the pixel spacing is not in the file; the detector is put " +
-                       number_text(camera.source_detector_distance_mm()) +
+                       fixed_text(camera.source_detector_distance_mm(), 2) +
                        " mm from the source, which makes columns " +
-                       number_text(camera.pixel_spacing_mm.x()) +
+                       fixed_text(camera.pixel_spacing_mm.x(), 4) +
                        " mm apart. Rays do not depend on it; --rig-pixel-spacing-mm states it");
     }
   }

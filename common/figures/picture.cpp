@@ -375,7 +375,9 @@ void draw_rimmed_text(Canvas& canvas,
   canvas.text(x, baseline_y, text, font, color_of(color));
 }
 
-void draw_mark(Canvas& canvas, const PictureMark& mark, double x, double y, double size) {
+/// `right` is where the panel ends: a text that would reach beyond it stands left of its mark.
+void draw_mark(
+    Canvas& canvas, const PictureMark& mark, double x, double y, double size, double right) {
   const Color color = color_of(mark.color);
   const Area around = {static_cast<int>(x - 2.0 * size),
                        static_cast<int>(y - 2.0 * size),
@@ -403,13 +405,13 @@ void draw_mark(Canvas& canvas, const PictureMark& mark, double x, double y, doub
       return;
     }
   }
-  if (!mark.text.empty())
-    draw_rimmed_text(canvas,
-                     x + 1.6 * size,
-                     y - 0.8 * size,
-                     mark.text,
-                     {std::round(2.6 * size), true},
-                     mark.color);
+  if (mark.text.empty()) return;
+  const Font font{std::round(2.6 * size), true};
+  const double width = canvas.text_width(mark.text, font);
+  const double beside = 1.6 * size;
+  const bool fits = x + beside + width <= right;
+  draw_rimmed_text(
+      canvas, fits ? x + beside : x - beside - width, y - 0.8 * size, mark.text, font, mark.color);
 }
 
 /// Lines and marks over a panel's image, which fills the area.
@@ -427,7 +429,7 @@ void draw_marks(Canvas& canvas, const PicturePanel& panel, const Area& area, int
   const double size = std::clamp(area.width / 90.0, 3.0, 9.0);
   for (const PictureMark& mark : panel.marks) {
     const auto [x, y] = placed(mark.place);
-    draw_mark(canvas, mark, x, y, size);
+    draw_mark(canvas, mark, x, y, size, area.x + area.width);
   }
 }
 

@@ -45,9 +45,10 @@ std::string residuals_text(const LandmarkPose& pose, const StudyCase& study_case
   std::string text = "landmarks   " + fixed_text(pose.rms_px, 1) + " px, " +
                      fixed_text(pose.rms_mm, 2) + " mm from where they were seen (RMS);";
   for (const LandmarkResidual& residual : pose.residuals)
-    text += " " + study_case.views[residual.view].camera + std::to_string(residual.landmark + 1) +
-            ": " + fixed_text(residual.px, 1) + " px, " + fixed_text(residual.mm, 2) + " mm";
-  text += "\n";
+    text += " " + study_case.views[residual.view].camera + " #" +
+            std::to_string(residual.landmark + 1) + " " + fixed_text(residual.px, 1) + " px, " +
+            fixed_text(residual.mm, 2) + " mm;";
+  text.back() = '\n';
   for (const std::string& note : pose.notes) text += "            " + note + "\n";
   return text;
 }
