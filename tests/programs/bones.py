@@ -5,6 +5,7 @@
 bones.py simulated BIN   a bone in air as CT (numbers 0 to 4095); X-rays that show it, another bone and soft tissue
 bones.py wrist BIN       real biplane X-rays; AF_WRIST_BIPLANE is the folder of the data that the page names
 bones.py far BIN         the same from far starts, for the page's table of verdicts; no test: minutes
+bones.py marks BIN       the same from marks that are 15 px worse; no test: minutes
 
 Exit 77: skipped, and why.
 """
@@ -12,6 +13,8 @@ import csv
 import json
 import os
 import pathlib
+import random
+import re
 import struct
 import subprocess
 import sys
@@ -324,6 +327,35 @@ def far():
                       + (f", lowest view in detail {values[0]:.2f} to {values[-1]:.2f}" if of else ""))
 
 
-{"simulated": simulated, "wrist": wrist, "far": far}[sys.argv[1]]()
+def distance_of(pose, other, center):
+    """Of the bone's centre (mm), and the angle between the two (deg)."""
+    turn = pose[:3, :3].T @ other[:3, :3]
+    mm = np.linalg.norm((pose[:3, :3] - other[:3, :3]) @ center + pose[:3, 3] - other[:3, 3])
+    return mm, np.degrees(np.arccos(np.clip((np.trace(turn) - 1) / 2, -1, 1)))
+
+
+def marks():
+    poses = {bone: found_pose(bone)[0] for bone in CENTERS}
+    page = (FOLDER / "study.toml").read_text()
+    numbers = random.Random(3)
+
+    def worse(mark):
+        return "[" + ", ".join(f"{float(px) + numbers.gauss(0, 15):.0f}" for px in mark.groups()) + "]"
+
+    for trial in range(6):
+        study = re.sub("landmarks_px = .*", lambda line: re.sub(r"\[(\d+), (\d+)\]", worse, line.group()), page)
+        (FOLDER / "worse.toml").write_text(study)
+        for bone, center in CENTERS.items():
+            output = FOLDER / f"{bone}-{trial}"
+            run(BIN / "af-register", "--study", FOLDER / "worse.toml", "--case", bone, "--renderer", "raycast", "--preset",
+                "bone", "-o", output, accepted=(0, 7))
+            result = json.loads((output / "result.json").read_text())
+            start, end = (np.array(result.get(name) or result["rejected_room_from_ct"])
+                          for name in ("start_room_from_ct", "room_from_ct"))
+            print("{}: start {:.1f} mm, {:.1f} deg, end {:.3f} mm, {:.2f} deg from the pose found, {}".format(
+                bone, *distance_of(start, poses[bone], center), *distance_of(end, poses[bone], center), result["verdict"]))
+
+
+{"simulated": simulated, "wrist": wrist, "far": far, "marks": marks}[sys.argv[1]]()
 print(f"{len(FAILURES)} failed")
 sys.exit(1 if FAILURES else 0)
