@@ -267,6 +267,12 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
+/// How many poses a method tries, about: the medians of preset paper, and of robust, whose steps
+/// come from normal equations.
+double usual_poses(const registration::RegistrationOptions& options) {
+  return options.optimizer_list().find("newton") == std::string::npos ? 400.0 : 15.0;
+}
+
 /// Rank 0 says how long each method will take, from a sample: one row by fields; by ray casting,
 /// where that would be long, one similarity for each of the poses that the sample tried. When the
 /// sample fails, nothing is said: the run itself will report why.
@@ -275,8 +281,7 @@ void announce_times(std::vector<Method>& methods,
                     const StratifiedStarts& starts,
                     const Yardstick& yardstick,
                     const Communicator& world) {
-  // The median number of poses that the presets try, for use where no field gives a sample.
-  double poses_tried = 400.0;
+  std::optional<double> poses_tried;  // by the field's sample
   for (Method& method : methods) {
     if (!world.is_root() || method.start_indices.size() < 2) continue;
     const std::int64_t index = method.start_indices[method.start_indices.size() / 2];
@@ -291,7 +296,8 @@ void announce_times(std::vector<Method>& methods,
         poses_tried = static_cast<double>(row.evaluations);
       } else {
         std::ignore = method.runner.similarity_at(start.room_from_ct);
-        seconds = poses_tried * seconds_since(begin);
+        const double poses = poses_tried.value_or(usual_poses(method.runner.options()));
+        seconds = poses * seconds_since(begin);
       }
     } catch (const std::exception&) {
       continue;
