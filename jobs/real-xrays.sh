@@ -25,6 +25,7 @@ programs in build/release/bin (or installed).
   --starts-per-interval N   starts in each interval of 2 mm                                                       [8]
   --intervals N             intervals of 2 mm, from 0                                                            [15]
   --raycast-starts N        of each interval's starts, so many also by ray casting and with a finish by it; 0: none  [1]
+  --calibration OPTIONS     options of af-scan, in one word, e.g. "--focal-share 0" for a distance that was measured
   --field OPTIONS           options of af-precompute, in one word                                 [--preset standard]
   --max-rotation-deg X      range of the fields, degrees                                                         [16]
   --max-translation-mm X    range of the fields, mm                                                              [40]
@@ -36,7 +37,7 @@ TEXT
 }
 
 folder="" scan="" target="$PWD/real-xrays" pairs=5 presets=robust,fast,paper starts=8 intervals=15 raycast_starts=1
-raycast_intervals=15 field_words="--preset standard" max_rotation_deg=16 max_translation_mm=40 ranks=$(core_count) seed=1
+raycast_intervals=15 field_words="--preset standard" scan_words="" max_rotation_deg=16 max_translation_mm=40 ranks=$(core_count) seed=1
 while (($# > 0)); do
   case "$1" in
     --scan) need_value "$1" $#; scan=$2; shift ;;
@@ -46,6 +47,7 @@ while (($# > 0)); do
     --starts-per-interval) need_value "$1" $#; need_count "$1" "$2"; starts=$2; shift ;;
     --intervals) need_value "$1" $#; need_count "$1" "$2"; intervals=$2; shift ;;
     --raycast-starts) need_value "$1" $#; need_seed "$1" "$2"; raycast_starts=$2; shift ;;
+    --calibration) need_value "$1" $#; scan_words=$2; shift ;;
     --field) need_value "$1" $#; field_words=$2; shift ;;
     --max-rotation-deg) need_value "$1" $#; max_rotation_deg=$2; shift ;;
     --max-translation-mm) need_value "$1" $#; max_translation_mm=$2; shift ;;
@@ -69,6 +71,7 @@ folder=$(realpath "$folder") scan=$(realpath "$scan")
 ((raycast_intervals <= intervals)) || raycast_intervals=$intervals
 IFS=, read -r -a preset_list <<<"$presets"
 read -r -a field_options <<<"$field_words"
+read -r -a scan_options <<<"$scan_words"
 
 bin=$(program_folder)
 need_programs "$bin" af-scan af-precompute af-evaluate af-inspect
@@ -79,8 +82,8 @@ mkdir -p "$output/fields" "$output/starts" "$output/runs" "$output/finishes"
 
 stage_inputs="$(sha256sum <"$scan") $(state_of "$folder")"
 study="$output/study/study.toml"
-stage "scan" "$study" "$bin/af-scan" --scan "$scan" --folder "$folder" --pairs "$pairs" --seed "$seed" --force \
-  -o "$output/study"
+stage "scan" "$study" "$bin/af-scan" --scan "$scan" --folder "$folder" --pairs "$pairs" --seed "$seed" --enlarge-small \
+  "${scan_options[@]}" --force -o "$output/study"
 water=$(sed -n 's/^water_mu_per_mm = //p' "$output/study/calibration.toml")
 [[ -n "$water" ]] || die 6 "$output/study/calibration.toml has no water_mu_per_mm"
 stage_inputs="$(sha256sum <"$study") $(sha256sum <"$output/study/calibration.toml")"
@@ -148,5 +151,5 @@ if ((${#finish_folders[@]} > 0)); then
   say "Tables: $output/finishes.md, $output/distances.md"
 fi
 "$bin/af-evaluate" report -o "$output/report.html" "$output/runs"
-grep -E '^(gold|stated)_residual' "$output/study/calibration.toml" | sed 's/^/  /'
+grep -E '^(enlarged|(gold|stated)_residual)' "$output/study/calibration.toml" | sed 's/^/  /'
 say "Report: $output/report.html; pictures of the X-rays: $output/study/view-*.png"

@@ -26,24 +26,80 @@ struct AxisPlane {
   [[nodiscard]] double height_mm(int i) const { return (i - 0.5 * (heights - 1)) * pitch_mm; }
 };
 
-/// Of the cylinder that all views see: a ray that just misses the detector passes the axis there.
-double seen_radius_mm(const CircularScan& scan) {
-  return scan.source_to_axis_mm *
-         std::sin(std::atan(view_at_axis(scan).narrow_mm / scan.source_to_axis_mm));
-}
+/// A displaced detector sees one side of the object only, and half a turn on the other one.
+class DetectorDisplacement {
+ public:
+  explicit DetectorDisplacement(const CircularScan& scan) : radius_mm_(scan.source_to_axis_mm) {
+    constexpr double kMargin = 0.02;  // the beam need not meet the detector where it is stated to
+    const AxisView view = view_at_axis(scan);
+    is_displaced_ = is_displaced(view);
+    narrow_sign_ = view.is_narrow_before ? -1.0 : 1.0;
+    overlap_mm_ = view.narrow_mm - kMargin * (view.narrow_mm + view.wide_mm);
+    reach_mm_ = is_displaced_ ? view.wide_mm : view.narrow_mm;
+  }
+
+  /// Of the cylinder that the full circle sees: a ray that just misses the detector passes the axis
+  /// there.
+  [[nodiscard]] double seen_radius_mm() const {
+    return radius_mm_ * std::sin(std::atan(reach_mm_ / radius_mm_));
+  }
+
+  /// What a ray counts: it and the opposite one together 2 (G. Wang, Med. Phys. 29:1634, 2002), so
+  /// that the sum is smooth although one of them is often not measured.
+  [[nodiscard]] double weight(double across_mm) const {
+    if (!is_displaced_) return 1.0;
+    const double to_narrow = narrow_sign_ * across_mm;
+    if (to_narrow >= overlap_mm_) return 0.0;
+    if (to_narrow <= -overlap_mm_) return 2.0;
+    const double share = std::atan(to_narrow / radius_mm_) / std::atan(overlap_mm_ / radius_mm_);
+    return 1.0 - std::sin(0.5 * std::numbers::pi * share);
+  }
+
+ private:
+  double radius_mm_;
+  bool is_displaced_ = false;
+  double narrow_sign_ = 1.0;
+  double overlap_mm_ = 0.0;
+  double reach_mm_ = 0.0;
+};
 
 double axis_pixel_mm(const CircularScan& scan) {
   return scan.pixel_spacing_mm.minCoeff() * scan.source_to_axis_mm / scan.source_to_detector_mm;
 }
 
-AxisPlane axis_plane(const CircularScan& scan) {
+/// Whether the object reaches beyond the detector: the ends of the lines across the axis attenuate.
+bool is_truncated(const CircularScan& scan, std::span<const ScanView> views) {
+  constexpr double kLeastShare = 0.1;  // of the mean attenuation
+  const bool lines_are_columns = scan.axis_along == AxisAlong::Columns;
+  double ends = 0.0;
+  double all = 0.0;
+  for (const ScanView& view : views) {
+    const Image2d& image = *view.line_integrals;
+    double of_view = 0.0;
+    for (const float value : image.pixels) of_view += static_cast<double>(value);
+    all += of_view / static_cast<double>(image.pixels.size());
+    const int lines = lines_are_columns ? image.width : image.height;
+    const int last = (lines_are_columns ? image.height : image.width) - 1;
+    double of_ends = 0.0;
+    for (int line = 0; line < lines; ++line)
+      for (const int at : {0, last})
+        of_ends += static_cast<double>(lines_are_columns ? image.at(line, at) : image.at(at, line));
+    ends += of_ends / (2.0 * lines);
+  }
+  return ends > kLeastShare * all;
+}
+
+/// How wide the plane is over what the detector sees: the beam need not meet the detector where it
+/// is stated to; a truncated object goes on beside it.
+constexpr double kMargin = 1.1;
+constexpr double kTruncatedMargin = 1.6;
+
+AxisPlane axis_plane(const CircularScan& scan, double margin) {
   AxisPlane plane;
   plane.pitch_mm = axis_pixel_mm(scan);
-  // The beam need not meet the detector where it is stated to.
-  constexpr double kMargin = 1.1;
   const AxisView view = view_at_axis(scan);
   const double half_height = std::max(-view.lowest_mm, view.highest_mm);
-  plane.tangents = 2 * static_cast<int>(std::ceil(kMargin * view.wide_mm / plane.pitch_mm)) + 1;
+  plane.tangents = 2 * static_cast<int>(std::ceil(margin * view.wide_mm / plane.pitch_mm)) + 1;
   plane.heights = 2 * static_cast<int>(std::ceil(kMargin * half_height / plane.pitch_mm)) + 1;
   return plane;
 }
@@ -74,6 +130,17 @@ std::vector<float> ramp_kernel(int length, double pitch_mm, double smoothing_px)
   return kernel;
 }
 
+/// Beside the detector an object is taken to go on as at the detector's edge, and to end softly
+/// within a quarter of the detector's width: an end at the edge would be the brightest thing of the
+/// filtered line.
+double beyond_edge_weight(double position_px, int size_px) {
+  constexpr double kShare = 0.25;
+  const double beyond = std::max(-position_px, position_px - (size_px - 1));
+  if (beyond <= 0.0) return 1.0;
+  const double share = beyond / (kShare * size_px);
+  return share >= 1.0 ? 0.0 : std::pow(std::cos(0.5 * std::numbers::pi * share), 2);
+}
+
 /// The cosine-weighted image on the axis plane, one line of tangents after the other.
 std::vector<float> weighted_lines(const CircularScan& scan,
                                   const ScanView& view,
@@ -81,6 +148,8 @@ std::vector<float> weighted_lines(const CircularScan& scan,
   const PointProjector projector(view.camera);
   const Eigen::Vector3d tangent(std::cos(view.angle_rad), std::sin(view.angle_rad), 0.0);
   const double radius = scan.source_to_axis_mm;
+  const DetectorDisplacement displacement(scan);
+  const int across_axis = scan.axis_along == AxisAlong::Columns ? 1 : 0;
   std::vector<float> lines(static_cast<std::size_t>(plane.heights) *
                            static_cast<std::size_t>(plane.tangents));
   float* next = lines.data();
@@ -91,8 +160,10 @@ std::vector<float> weighted_lines(const CircularScan& scan,
       const Eigen::Vector2d pixel =
           projector.project(across * tangent + along * Eigen::Vector3d::UnitZ());
       const double cosine = radius / std::sqrt(radius * radius + across * across + along * along);
+      const double weight = cosine * displacement.weight(across) *
+                            beyond_edge_weight(pixel[across_axis], scan.size_px[across_axis]);
       *next++ =
-          static_cast<float>(cosine * sampled_cubic(*view.line_integrals, pixel.x(), pixel.y()));
+          static_cast<float>(weight * sampled_cubic(*view.line_integrals, pixel.x(), pixel.y()));
     }
   return lines;
 }
@@ -178,7 +249,7 @@ void FdkOptions::describe(Fields& field) {
 CtGrid scan_grid(const CircularScan& scan, double voxel_mm) {
   const double voxel = voxel_mm > 0.0 ? voxel_mm : axis_pixel_mm(scan);
   const AxisView view = view_at_axis(scan);
-  const double radius = seen_radius_mm(scan);
+  const double radius = DetectorDisplacement(scan).seen_radius_mm();
   CtGrid grid;
   const auto voxels = [&](double width_mm) {
     return std::max(2, static_cast<int>(std::floor(width_mm / voxel)));
@@ -201,7 +272,7 @@ MuVolume reconstruct_fdk(const CircularScan& scan,
   std::vector<double> angles;
   for (const ScanView& view : views) angles.push_back(view.angle_rad);
   const std::vector<double> shares = angle_shares_rad(angles);
-  const AxisPlane plane = axis_plane(scan);
+  const AxisPlane plane = axis_plane(scan, is_truncated(scan, views) ? kTruncatedMargin : kMargin);
   const std::vector<float> kernel =
       ramp_kernel(plane.tangents, plane.pitch_mm, options.smoothing_px);
   const double radius = scan.source_to_axis_mm;
@@ -219,7 +290,7 @@ MuVolume reconstruct_fdk(const CircularScan& scan,
   const auto ni = static_cast<std::size_t>(grid.size[0]);
   const auto nj = static_cast<std::size_t>(grid.size[1]);
   const auto nk = static_cast<std::size_t>(grid.size[2]);
-  const double seen_radius = seen_radius_mm(scan);
+  const double seen_radius = DetectorDisplacement(scan).seen_radius_mm();
   pool.for_each(grid.size[1], [&](int j, int /*slot*/) {
     const double y = grid.origin_mm.y() + j * grid.spacing_mm.y();
     std::vector<float> column(nk);

@@ -32,15 +32,17 @@ struct FdkOptions {
   void describe(Fields& field);
 };
 
-/// The grid of the cylinder about the axis that all views see, and what lies around it in the box:
-/// identity direction, centred on the axis and on the heights that the detector sees.
+/// The grid of the cylinder about the axis that the full circle sees, and what lies around it in
+/// the box: identity direction, centred on the axis and on the heights that the detector sees.
 CtGrid scan_grid(const CircularScan& scan, double voxel_mm);
 
 /// Filtered back projection of a full circle (Feldkamp, Davis, Kress, JOSA A 1:612, 1984). Each
 /// image is first resampled to the plane through the axis that is square to its central ray, by its
 /// own camera, so a detector may be shifted, turned and tilted in every view. Views may stand at
-/// uneven angles. Outside the cylinder that all views see the result is 0.
-/// \test Fdk.OfABallGivesItsAttenuation
+/// uneven angles. What a displaced detector (is_displaced()) misses in one view another one sees
+/// half a turn on. An object that reaches beyond the detector is taken to end softly beside it.
+/// Outside the cylinder that the full circle sees the result is 0.
+/// \test FdkAlong.ADisplacedDetectorSeesTwiceAsFar, FdkAlong.OfABallGivesItsAttenuationWhereItIs
 MuVolume reconstruct_fdk(const CircularScan& scan,
                          std::span<const ScanView> views,
                          const CtGrid& grid,

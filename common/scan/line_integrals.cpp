@@ -13,6 +13,9 @@ namespace af {
 
 namespace {
 
+constexpr const char* kGiveFlat =
+    "give flat, an image without the object, or flat_level, the counts of the open beam";
+
 constexpr int kTerms = 10;  // of a cubic polynomial of two variables
 using Terms = Eigen::Matrix<double, kTerms, 1>;
 
@@ -206,6 +209,35 @@ std::vector<unsigned char> steady_pixels(const PixelStatistics& statistics,
   return is_steady;
 }
 
+/// What lies beside one end of a line in all views need not be air: the object reaches beyond the
+/// detector there, or a holder stands in the beam. The beam itself is not that lopsided.
+void refuse_shadow_at_one_side(const LinesAcross& lines,
+                               const std::vector<double>& log_mean,
+                               const std::vector<unsigned char>& ends) {
+  std::vector<float> differences;
+  for (int line = 0; line < lines.count(); ++line) {
+    std::vector<double> first;
+    std::vector<double> last;
+    for (int at = 0; at < lines.length(); ++at)
+      if (const std::size_t pixel = lines.pixel(line, at); ends[pixel] != 0)
+        (2 * at < lines.length() ? first : last).push_back(log_mean[pixel]);
+    if (!first.empty() && !last.empty())
+      differences.push_back(
+          static_cast<float>(std::abs(median(std::move(first)) - median(std::move(last)))));
+  }
+  if (differences.empty()) return;
+  constexpr double kLeastShare = 0.55;
+  constexpr double kOfLines = 0.8;
+  const double share = std::exp(-static_cast<double>(percentile(std::move(differences), kOfLines)));
+  if (share < kLeastShare)
+    throw InputError("air around the object",
+                     "one end of the lines across the rotation axis counts " +
+                         std::to_string(share) + " of the other",
+                     "must be seen at both ends, but the object or a holder shadows one in all "
+                     "views; " +
+                         std::string(kGiveFlat));
+}
+
 std::size_t count_of(const std::vector<unsigned char>& flags) {
   return static_cast<std::size_t>(std::accumulate(flags.begin(), flags.end(), std::size_t{0}));
 }
@@ -243,6 +275,7 @@ AirLevel estimated_air_level(const PixelStatistics& statistics, AxisAlong axis_a
   for (std::size_t i = 0; i < log_mean.size(); ++i)
     log_mean[i] = std::log(std::max(1e-3, static_cast<double>(mean.pixels[i])));
   const std::vector<unsigned char> ends = line_ends(lines, level.is_lit);
+  refuse_shadow_at_one_side(lines, log_mean, ends);
   const std::vector<unsigned char> candidates = steady_pixels(statistics, level.is_lit, ends);
   std::vector<unsigned char> chosen = ends;
   for (std::size_t i = 0; i < chosen.size(); ++i) chosen[i] = chosen[i] & candidates[i];
@@ -251,7 +284,8 @@ AirLevel estimated_air_level(const PixelStatistics& statistics, AxisAlong axis_a
       throw InputError("air around the object",
                        std::to_string(found) + " pixels",
                        "must be seen by at least 200 pixels at the ends of the lines across the "
-                       "rotation axis; give a flat image otherwise");
+                       "rotation axis; " +
+                           std::string(kGiveFlat));
   };
   require_pixels();
   AirModel model(lines);
@@ -283,12 +317,15 @@ AirLevel air_level_of_flat(const Image2d& flat, const PixelStatistics& statistic
     }
     ratios[i] = static_cast<double>(statistics.mean.pixels[i] / flat.pixels[i]);
   }
-  // The tube may have given more or less than for the flat: the brightest ratios are those of air.
+  // The tube may have given somewhat less than for the flat, or more: the brightest ratios are
+  // those of air. Below that no pixel sees air, and the beam is taken to be the flat's.
+  constexpr double kLeastOpen = 0.75;
   std::vector<float> lit;
   for (std::size_t i = 0; i < ratios.size(); ++i)
     if (level.is_lit[i] != 0) lit.push_back(static_cast<float>(ratios[i]));
   if (lit.empty()) throw InputError("flat", "all dark", "must show the open beam");
   const auto open = static_cast<double>(percentile(std::move(lit), 0.98));
+  if (open < kLeastOpen) return level;
   for (std::size_t i = 0; i < ratios.size(); ++i)
     if (level.is_lit[i] != 0 && std::abs(ratios[i] - open) <= kSameAsFlat * open)
       level.is_air[i] = 1;

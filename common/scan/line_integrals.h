@@ -32,12 +32,13 @@ PixelStatistics pixel_statistics(const std::vector<const Image2d*>& images);
 /// factor per line across the rotation axis (stripes of the detector), fitted to the logarithm of
 /// the pixels that no view shadows. The fit begins with the ends of the lines, which see past any
 /// object that a scan can reconstruct, and takes in what agrees with it. Dark areas that touch
-/// those ends are the aperture. InputError when too few pixels show air.
-/// \test AirLevel.IsFoundAroundAnObject
+/// those ends are the aperture. InputError when too few pixels show air, or those at one side
+/// alone. \test AirLevel.IsFoundAroundAnObject
 AirLevel estimated_air_level(const PixelStatistics& statistics, AxisAlong axis_along);
 
 /// The air level of a flat image (counts above dark); which pixels see air is found from the
-/// scan's statistics: those within 5 % of it.
+/// scan's statistics: those within 5 % of the brightest share of it, if that is at least 0.75. An
+/// object that reaches beyond the detector leaves no air, and then the beam counts as the flat's.
 AirLevel air_level_of_flat(const Image2d& flat, const PixelStatistics& statistics);
 
 /// -log(counts / (air * beam)), where `beam` is this view's mean ratio of counts to air over the

@@ -60,13 +60,14 @@ void note_gaps(const std::vector<double>& angles_rad,
                const std::string& which,
                std::vector<std::string>& found) {
   constexpr double kMostUneven = 3.0;
+  constexpr double kAnyGapRad = 30.0 * kRadPerDeg;  // some views are missing, or all are sparse
   const std::vector<double> within_turn = within_one_turn(angles_rad);
   std::vector<double> gaps = gaps_around(within_turn, order_around(within_turn));
   std::sort(gaps.begin(), gaps.end());
   const double even_gap = kTurn / static_cast<double>(gaps.size());
   // Repeated angles leave wider gaps between the others.
   const double typical = std::max(gaps[gaps.size() / 2], even_gap);
-  if (gaps.back() > kMostUneven * typical)
+  if (gaps.back() > std::max(kAnyGapRad, kMostUneven * typical))
     found.push_back(which + " leave " + std::to_string(gaps.back() * kDegPerRad) +
                     " degrees of the circle empty, where neighbours are " +
                     std::to_string(typical * kDegPerRad) + " degrees apart: ");
@@ -123,6 +124,14 @@ CircularScan CircularScan::binned(int factor) const {
   return result;
 }
 
+CircularScan CircularScan::enlarged(double factor) const {
+  CircularScan result = *this;
+  result.source_to_axis_mm *= factor;
+  result.source_to_detector_mm *= factor;
+  result.pixel_spacing_mm *= factor;
+  return result;
+}
+
 Eigen::Vector2d CircularScan::stated_foot_px() const {
   return beam_foot_px.value_or(0.5 * (size_px.cast<double>().array() - 1.0).matrix());
 }
@@ -141,7 +150,22 @@ AxisView view_at_axis(const CircularScan& scan) {
   view.highest_mm = along_columns ? behind.x() : before.y();
   view.narrow_mm = std::min(before[across], behind[across]);
   view.wide_mm = std::max(before[across], behind[across]);
+  view.is_narrow_before = before[across] < behind[across];
   return view;
+}
+
+bool is_displaced(const AxisView& view) {
+  constexpr double kMostShare = 0.7;
+  return view.narrow_mm < kMostShare * view.wide_mm;
+}
+
+int room_for_registration(const CircularScan& scan) {
+  constexpr double kLeastAcrossMm = 60.0;
+  constexpr double kLeastToAxisMm = 200.0;
+  const AxisView view = view_at_axis(scan);
+  const double wanted = std::max(kLeastAcrossMm / (view.narrow_mm + view.wide_mm),
+                                 kLeastToAxisMm / scan.source_to_axis_mm);
+  return std::max(1, static_cast<int>(std::ceil(wanted)));
 }
 
 std::vector<std::string> problems(const CircularScan& scan) {

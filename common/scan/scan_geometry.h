@@ -31,6 +31,8 @@ struct CircularScan {
   /// The scan as seen by pixels `factor` times as wide and high; columns and rows that fill no
   /// coarse pixel are left out. InputError when fewer than 16 pixels remain on a side.
   [[nodiscard]] CircularScan binned(int factor) const;
+  /// The same scan with all lengths multiplied: projections do not change.
+  [[nodiscard]] CircularScan enlarged(double factor) const;
   /// The views `first`, `first` + `stride`, ... below `end`.
   [[nodiscard]] static std::vector<int> every(int first, int stride, int end);
   /// The stated foot of the beam, or the detector's middle.
@@ -39,16 +41,26 @@ struct CircularScan {
 
 /// What the stated detector sees where the axis is, mm: heights are of +z, widths of the tangent.
 struct AxisView {
-  double lowest_mm = 0.0;   ///< along the axis; negative
-  double highest_mm = 0.0;  ///< along the axis
-  double narrow_mm = 0.0;   ///< across, to the side that sees less
-  double wide_mm = 0.0;     ///< across, to the other side
+  double lowest_mm = 0.0;         ///< along the axis; negative
+  double highest_mm = 0.0;        ///< along the axis
+  double narrow_mm = 0.0;         ///< across, to the side that sees less
+  double wide_mm = 0.0;           ///< across, to the other side
+  bool is_narrow_before = false;  ///< the side that sees less is that of the first column (or row)
 };
 AxisView view_at_axis(const CircularScan& scan);
 
+/// Whether the detector stands so far to one side that it is meant to see the other side of the
+/// object half a turn on: the narrow side is less than 0.7 of the wide one.
+bool is_displaced(const AxisView& view);
+
+/// The least whole number by which a scan's lengths are multiplied so that it is as large as a
+/// patient's head at least: 60 mm across seen at the axis, the source 200 mm from it. Registrations
+/// from starts that are tens of mm off need such room.
+int room_for_registration(const CircularScan& scan);
+
 /// "source_to_axis_mm = -3: must be above 0" and so on, among them that the views go all the way
-/// round (the largest gap between neighbouring angles is at most three times the median one), and
-/// so do the even ones and each half of them.
+/// round (the largest gap between neighbouring angles is at most 30 degrees or three times the
+/// median one), and so do the even ones and each half of them.
 std::vector<std::string> problems(const CircularScan& scan);
 
 /// How much of the circle each of these angles stands for, rad: half the gaps to its neighbours.

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <sstream>
 
 #include <Eigen/Dense>
@@ -207,7 +206,7 @@ void refuse_other_direction(const ScanImages& images,
                             double cost) {
   constexpr int kRounds = 3;
   const Rounds other(turned_around(images), used, options, pool);
-  ScanCalibration calibration = stated_calibration(other.images(), used, options);
+  ScanCalibration calibration = stated_calibration(other.images(), used, options, pool);
   const double other_cost = other.improve(calibration, kRounds);
   if (other_cost < cost) {
     std::ostringstream costs;
@@ -240,7 +239,8 @@ void SelfCalibrationOptions::describe(Fields& field) {
       .within(32, 4096);
   field("focal_share",
         focal_share,
-        "The detector's distance is sought within this share of the stated one; 0: kept")
+        "The detector's distance is sought within this share of the stated one; 0: kept. "
+        "Projections hardly tell it, and all lengths of the CT go with it: keep a measured one")
       .within(0.0, 0.3);
   field("tilt_deg", tilt_deg, "The detector's tilt is sought within so many degrees; 0: kept")
       .within(0.0, 10.0);
@@ -270,11 +270,20 @@ double object_radius_mm(const MuVolume& volume) {
 
 ScanCalibration stated_calibration(const ScanImages& images,
                                    const std::vector<int>& used,
-                                   const SelfCalibrationOptions& options) {
-  ScanCalibration calibration = ScanCalibration::nominal(images.scan, options.harmonics);
-  (images.scan.axis_along == AxisAlong::Columns ? calibration.row_px : calibration.column_px)
+                                   const SelfCalibrationOptions& options,
+                                   ThreadPool& pool) {
+  const ScanCalibration stated = ScanCalibration::nominal(images.scan, options.harmonics);
+  ScanCalibration centred = stated;
+  (images.scan.axis_along == AxisAlong::Columns ? centred.row_px : centred.column_px)
       .coefficients[0] = axis_position_px(images, used);
-  return calibration;
+  const int bin = binning_for(images.scan, options.search_px);
+  const Rounds coarse(images.binned(bin), used, options, pool);
+  const auto cost = [&](const ScanCalibration& tried) {
+    constexpr int kRounds = 2;  // the cost after one step
+    ScanCalibration moved = tried.binned(bin);
+    return coarse.improve(moved, kRounds);
+  };
+  return cost(stated) < cost(centred) ? stated : centred;
 }
 
 ScanImages ScanImages::binned(int factor) const {
@@ -381,17 +390,19 @@ ScanCalibration self_calibrate(const ScanImages& images,
   constexpr int kFirstRounds = 4;
   const int search_bin = binning_for(images.scan, options.search_px);
   const Rounds search(images.binned(search_bin), used, options, pool);
-  ScanCalibration calibration = stated_calibration(search.images(), used, options);
+  const ScanCalibration stated = stated_calibration(search.images(), used, options, pool);
+  ScanCalibration calibration = stated;
   double cost = search.improve(calibration, kFirstRounds);
   report(calibration_line("As stated", calibration, cost));
   refuse_other_direction(search.images(), used, options, pool, cost);
-  if (options.focal_share > 0.0)
+  if (options.focal_share > 0.0) {
     seek(search,
          calibration,
          &ScanCalibration::source_to_detector_mm,
          options.focal_share * images.scan.source_to_detector_mm);
-  cost = search.improve(calibration, 2);
-  report(calibration_line("Distance sought", calibration, cost));
+    cost = search.improve(calibration, 2);
+    report(calibration_line("Distance sought", calibration, cost));
+  }
   if (options.tilt_deg > 0.0)
     seek(search, calibration, &ScanCalibration::tilt_rad, options.tilt_deg * kRadPerDeg);
   cost = search.improve(calibration, 2);
@@ -399,10 +410,14 @@ ScanCalibration self_calibrate(const ScanImages& images,
 
   const int bin = binning_for(images.scan, options.working_px);
   const Rounds finer(images.binned(bin), used, options, pool);
-  calibration = calibration.binned(static_cast<double>(bin) / search_bin);
+  const double bin_ratio = static_cast<double>(bin) / search_bin;
+  calibration = calibration.binned(bin_ratio);
   constexpr double kSmallStepPx = 0.005;
-  double lowest = std::numeric_limits<double>::infinity();
-  ScanCalibration best = calibration;
+  // What was found must predict better than what was stated.
+  ScanCalibration best = stated.binned(bin_ratio);
+  ScanCalibration moved = best;
+  double lowest = finer.improve(moved).cost;
+  report(calibration_line("As stated, finer", best, lowest));
   for (int round = 0; round < options.rounds; ++round) {
     const ScanCalibration before = calibration;
     const Rounds::Outcome outcome = finer.improve(calibration);
@@ -416,6 +431,11 @@ ScanCalibration self_calibrate(const ScanImages& images,
     best = before;
     if (outcome.step_px < kSmallStepPx) break;
   }
+  constexpr double kMuchUnexplained = 0.25;
+  if (lowest > kMuchUnexplained)
+    report(
+        "Warning: views predict little of each other's detail (cost " + std::to_string(lowest) +
+        "): the object reaches far beyond the detector or moves, or the stated geometry is wrong");
   return best.binned(1.0 / bin);
 }
 

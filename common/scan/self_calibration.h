@@ -77,11 +77,14 @@ std::vector<unsigned char> fully_seen_pixels(const CircularScan& scan,
 /// The radius about the axis within which nearly all of what attenuates lies, mm.
 double object_radius_mm(const MuVolume& volume);
 
-/// The stated geometry, moved across the axis to where the views' common centre of attenuation
-/// lies: that of a full circle is on the axis. The best that is known without self-calibration.
+/// The stated geometry, or that moved across the axis to where the views' common centre of
+/// attenuation lies, whichever predicts better: the centre of all that a full circle sees is on the
+/// axis, unless the object reaches beyond the detector. The best that is known without
+/// self-calibration.
 ScanCalibration stated_calibration(const ScanImages& images,
                                    const std::vector<int>& used,
-                                   const SelfCalibrationOptions& options);
+                                   const SelfCalibrationOptions& options,
+                                   ThreadPool& pool);
 
 /// Finds the geometry by which the views agree with each other: of the `used` views each half is
 /// predicted from the other's reconstruction, and cameras move to where the images are. Distance

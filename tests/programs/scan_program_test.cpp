@@ -228,7 +228,7 @@ TEST(CbctCylinder, AnExcerptGivesTheNumbersThatWereMeasured) {
   const std::vector<int> odd = CircularScan::every(1, 2, 120);
   const ScanCalibration found = self_calibrate(images, even, options, pool, [](const auto&) {});
   const HeldOutResidual stated = held_out_residual(
-      images, stated_calibration(images, even, options), even, odd, options, pool);
+      images, stated_calibration(images, even, options, pool), even, odd, options, pool);
   const HeldOutResidual after = held_out_residual(images, found, even, odd, options, pool);
   // Measured with this excerpt: 0.0866 mm, 0.0337 mm, 0.01492 rad. The whole scan has less noise.
   EXPECT_NEAR(stated.rms_mm_at_axis, 0.0866, 0.005);

@@ -24,7 +24,8 @@ using tools::ScanOptions;
 
 /// Calibrates on the even views, judges on the odd ones, reconstructs the even ones.
 CalibratedScan calibrated_scan(const ScanOptions& options,
-                               const tools::ScanFile& file,
+                               const std::string& name,
+                               int enlarged,
                                ScanImages images,
                                ThreadPool& pool,
                                const Communicator& world) {
@@ -33,7 +34,8 @@ CalibratedScan calibrated_scan(const ScanOptions& options,
   const std::vector<int> odd = CircularScan::every(1, 2, count);
   const SelfCalibrationOptions& how = options.calibration;
   CalibratedScan scan;
-  scan.name = file.name;
+  scan.name = name;
+  scan.enlarged = enlarged;
   const auto report = [&](const std::string& line) { inform(world, line); };
   scan.calibration = options.is_as_stated ? ScanCalibration::nominal(images.scan, 0)
                                           : self_calibrate(images, even, how, pool, report);
@@ -42,7 +44,8 @@ CalibratedScan calibrated_scan(const ScanOptions& options,
   scan.as_stated =
       options.is_as_stated
           ? scan.calibrated
-          : held_out_residual(images, stated_calibration(images, even, how), even, odd, how, pool);
+          : held_out_residual(
+                images, stated_calibration(images, even, how, pool), even, odd, how, pool);
   inform(world, "Reconstructing the even views");
   FdkOptions fdk = options.fdk;
   constexpr double kVoxelPx = 1.5;
@@ -60,7 +63,9 @@ CalibratedScan calibrated_scan(const ScanOptions& options,
 void run(const ScanOptions& options, const std::string& command_line, const Communicator& world) {
   if (!world.is_root()) return;  // one process does the work, by threads
   throw_if_any(problems(options));
-  const tools::ScanFile file = tools::read_scan_file(options.scan);
+  tools::ScanFile file = tools::read_scan_file(options.scan);
+  const int enlarged = options.enlarges_small ? room_for_registration(file.scan) : 1;
+  file.scan = file.scan.enlarged(enlarged);
   PartialFolder folder(
       options.output,
       options.replaces_output ? PartialFolder::Existing::Replace : PartialFolder::Existing::Refuse);
@@ -71,7 +76,8 @@ void run(const ScanOptions& options, const std::string& command_line, const Comm
   inform(world,
          "Reading " + std::to_string(file.scan.angles_rad.size()) + " views of " + file.name);
   ScanImages images = tools::read_scan_images(file, images_folder, options.most_px, pool);
-  const CalibratedScan scan = calibrated_scan(options, file, std::move(images), pool, world);
+  const CalibratedScan scan =
+      calibrated_scan(options, file.name, enlarged, std::move(images), pool, world);
   const Provenance provenance = {"af-scan",
                                  command_line,
                                  to_toml(options),

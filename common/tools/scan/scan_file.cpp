@@ -151,9 +151,14 @@ void read_image_keys(TomlTableReader& reader, ScanFile& file) {
   file.dark_level = dark_level.value_or(0.0);
   file.dark = reader.get_string("dark", Presence::Optional);
   file.flat = reader.get_string("flat", Presence::Optional);
+  file.flat_level = get_number(reader, "flat_level", Presence::Optional);
+  if (file.flat_level && !(*file.flat_level > file.dark_level))
+    reader.add_problem("flat_level", "must be above dark_level: what the open beam counts");
+  if (file.flat_level && file.flat)
+    reader.add_problem("flat", "must not stand beside flat_level, which says the same");
   if (dark_level && file.dark)
     reader.add_problem("dark", "must not stand beside dark_level, which says the same");
-  for (const char* const key : {"dark_level", "dark", "flat"})
+  for (const char* const key : {"dark_level", "dark", "flat", "flat_level"})
     if (file.xray_domain == XrayDomain::Attenuation && reader.has(key))
       reader.add_problem(key, "is for xray_domain = \"intensity\" alone");
 }

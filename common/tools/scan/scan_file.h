@@ -21,6 +21,7 @@ struct ScanFile {
   double dark_level = 0.0;  ///< counts of every pixel without beam, if there is no dark image
   std::optional<std::string> dark;
   std::optional<std::string> flat;
+  std::optional<double> flat_level;  ///< instead of an image: the same open beam at every pixel
 
   /// Whether one file holds all views, one behind the other.
   [[nodiscard]] bool is_stack() const;

@@ -19,6 +19,13 @@ void ScanOptions::describe(Fields& field) {
   field("force", replaces_output, "Replace the folder if it exists");
   field("most_px", most_px, "Images are binned until their larger side has at most so many pixels")
       .within(64, 4096);
+  field("enlarge_small",
+        enlarges_small,
+        "Multiply all lengths of a small scan by a whole number, until the detector sees 60 mm "
+        "across "
+        "at the axis and the source is 200 mm from it: registrations begin tens of mm away. "
+        "Lengths of "
+        "the study, and errors, are then enlarged ones; calibration.toml has the number");
   field("pairs",
         pairs,
         "Pairs of X-rays about 90 degrees apart, evenly around the circle; the first X-ray of each "

@@ -19,6 +19,7 @@ struct ScanOptions {
   bool replaces_output = false;
   SelfCalibrationOptions calibration;
   int most_px = 512;
+  bool enlarges_small = false;  ///< see room_for_registration()
   FdkOptions fdk;
   int pairs = 5;
   double max_offset_rotation_deg = 3.0;

@@ -96,8 +96,17 @@ AirLevel air_level(const ScanFile& file,
   for (int view = 0; view < count; view += stride)
     sample.push_back(&counts[static_cast<std::size_t>(view)]);
   const PixelStatistics statistics = pixel_statistics(sample);
-  if (!file.flat) return estimated_air_level(statistics, file.scan.axis_along);
-  Image2d flat = read_sized(folder / *file.flat, file.scan, bin);
+  if (!file.flat && !file.flat_level && is_displaced(view_at_axis(file.scan)))
+    throw InputError("flat",
+                     "none, and beam_foot_px is far from the detector's middle",
+                     "must be given, or flat_level, the counts of the open beam: a detector that "
+                     "stands to one side does not see past the object on the other");
+  if (!file.flat && !file.flat_level) return estimated_air_level(statistics, file.scan.axis_along);
+  Image2d flat(statistics.mean.width, statistics.mean.height);
+  if (file.flat)
+    flat = read_sized(folder / *file.flat, file.scan, bin);
+  else
+    std::fill(flat.pixels.begin(), flat.pixels.end(), static_cast<float>(*file.flat_level));
   dark.subtract_from(flat);
   return air_level_of_flat(flat, statistics);
 }

@@ -193,6 +193,8 @@ std::string calibration_text(const CalibratedScan& scan) {
       "reconstruction. Pixels are those of the X-rays here.\n# Series: constant, cos a, sin a, cos "
       "2a, sin 2a, ... of the view angle a.\n";
   text += "scan = " + toml_text(scan.name) + "\n";
+  text +=
+      "enlarged = " + std::to_string(scan.enlarged) + "  # lengths over those of the scan's file\n";
   text += "source_to_axis_mm = " + toml_number(scan.images.scan.source_to_axis_mm) + "\n";
   text += "source_to_detector_mm = " + toml_number(found.source_to_detector_mm) + "\n";
   text += "tilt_rad = " + toml_number(found.tilt_rad) + "\n";
@@ -357,7 +359,10 @@ std::string write_scan_study(const ScanOptions& options,
          " held-out views: " + fixed_text(scan.calibrated.rms_px, 3) + " px, " +
          fixed_text(scan.calibrated.rms_mm_at_axis, 4) +
          " mm at the axis (as stated: " + fixed_text(scan.as_stated.rms_px, 3) + " px, " +
-         fixed_text(scan.as_stated.rms_mm_at_axis, 4) + " mm)";
+         fixed_text(scan.as_stated.rms_mm_at_axis, 4) + " mm)" +
+         (scan.enlarged == 1 ? ""
+                             : "\nAll lengths are " + std::to_string(scan.enlarged) +
+                                   " times those of the scan's file, these, too");
 }
 
 }  // namespace af::tools

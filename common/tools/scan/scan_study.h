@@ -15,6 +15,7 @@ namespace af::tools {
 /// A scan with its geometry found and judged, and what the even views reconstruct.
 struct CalibratedScan {
   std::string name;
+  int enlarged = 1;  ///< all lengths are so many times those of the scan's file
   ScanImages images;
   ScanCalibration calibration;
   HeldOutResidual as_stated;   ///< of the odd views, before

@@ -64,6 +64,40 @@ TEST_P(FdkAlong, ReachesAsFarAsTheDetectorSeesFromAFootAwayFromItsMiddle) {
   EXPECT_NEAR(value_at(volume, center + Eigen::Vector3d(8.0, 0.0, 0.0)), 0.0, 0.001);
 }
 
+TEST_P(FdkAlong, ADisplacedDetectorSeesTwiceAsFar) {
+  for (const double displaced_px : {-16.0, 16.0}) {
+    CircularScan scan = small_scan(GetParam());
+    Eigen::Vector2d foot = scan.stated_foot_px();
+    foot[GetParam() == AxisAlong::Columns ? 1 : 0] += displaced_px;
+    scan.beam_foot_px = foot;
+    const ScanCalibration truth = ScanCalibration::nominal(scan, 0);
+    // The wide side reaches 26 mm or more at the axis, the narrow one 12 mm or less.
+    const Eigen::Vector3d center(15.0, -6.0, 3.0);
+    const ScanImages images =
+        simulated_scan(scan, truth, {Ball{center, 5.0, 0.02}, Ball{{0.0, 0.0, 0.0}, 6.0, 0.01}});
+    ThreadPool pool(2);
+    const MuVolume volume =
+        reconstruct_views(images, truth, CircularScan::every(0, 1, 120), {}, pool);
+    EXPECT_NEAR(value_at(volume, center), 0.02, 0.0006) << displaced_px;
+    EXPECT_NEAR(value_at(volume, {0.0, 0.0, 0.0}), 0.01, 0.0003) << displaced_px;
+    EXPECT_NEAR(value_at(volume, -center), 0.0, 0.001) << displaced_px;
+  }
+}
+
+/// A shadow that is cut off at the detector's edge would leave a rim.
+TEST_P(FdkAlong, AnObjectBeyondTheDetectorHasNoBrightRim) {
+  CircularScan scan = small_scan(GetParam());
+  scan.size_px[GetParam() == AxisAlong::Columns ? 1 : 0] = 30;
+  const ScanCalibration truth = ScanCalibration::nominal(scan, 0);
+  const ScanImages images = simulated_scan(scan, truth, {Ball{{0.0, 0.0, 0.0}, 14.0, 0.02}});
+  ThreadPool pool(2);
+  const MuVolume volume =
+      reconstruct_views(images, truth, CircularScan::every(0, 1, 120), {}, pool);
+  const float middle = value_at(volume, {0.0, 0.0, 0.0});
+  EXPECT_NEAR(middle, 0.02, 0.004);
+  EXPECT_NEAR(value_at(volume, {7.0, 0.0, 0.0}), middle, 0.004);
+}
+
 TEST(Fdk, TakesUnevenAnglesByTheirShares) {
   const CircularScan scan = small_scan();
   const ScanCalibration truth = ScanCalibration::nominal(scan, 0);

@@ -100,6 +100,26 @@ TEST(LineIntegrals, FromAFlatImageAreExact) {
                   0.003);
 }
 
+TEST(LineIntegrals, OfAnObjectBeyondTheDetectorAreThoseOfTheFlat) {
+  Image2d flat(20, 20);
+  std::fill(flat.pixels.begin(), flat.pixels.end(), 1000.0F);
+  Image2d shadowed = flat;
+  for (float& value : shadowed.pixels) value *= std::exp(-0.7F);
+  const AirLevel level = air_level_of_flat(flat, pixel_statistics({&shadowed}));
+  for (const float value : line_integrals_of(shadowed, level, AxisAlong::Rows, 0.5).pixels)
+    EXPECT_NEAR(value, 0.7F, 1e-5F);
+}
+
+TEST(AirLevel, IsRefusedWhereOneSideIsInShadow) {
+  Image2d mean(40, 40);
+  const Image2d deviation(40, 40);
+  for (int row = 0; row < 40; ++row)
+    for (int column = 0; column < 40; ++column)
+      mean.at(column, row) = column < 12 ? 400.0F : 1000.0F;
+  EXPECT_NO_THROW(estimated_air_level({mean, deviation}, AxisAlong::Columns));
+  EXPECT_THROW(estimated_air_level({mean, deviation}, AxisAlong::Rows), InputError);
+}
+
 TEST(AirLevel, IsRefusedWhereNoAirIsSeen) {
   Image2d mean(40, 40);
   Image2d deviation(40, 40);

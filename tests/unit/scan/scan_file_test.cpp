@@ -182,6 +182,8 @@ INSTANTIATE_TEST_SUITE_P(
         BadValue{"\"intensity\"", "\"attenuation\"", "is for xray_domain = \"intensity\" alone"},
         BadValue{"flat = ", "dark = \"d.png\"\nflat = ", "must not stand beside dark_level"},
         BadValue{"flat = ", "flatt = ", "flatt"},
+        BadValue{"flat = ", "flat_level = 40000\nflat = ", "must not stand beside flat_level"},
+        BadValue{"flat = \"flat.png\"", "flat_level = 900", "must be above dark_level"},
         BadValue{"\"small\"", "\"../small\"", "must be usable in a file name"}));
 
 TEST_P(BadScanFile, IsRefusedByName) {

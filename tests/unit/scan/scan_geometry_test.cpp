@@ -62,11 +62,32 @@ TEST(CircularScan, MustGoAllTheWayRoundByItsEvenViewsAlone) {
   EXPECT_THAT(problems(scan), ElementsAre(HasSubstr("the even views leave")));
 }
 
+TEST(CircularScan, MayMissSomeViews) {
+  CircularScan scan = small_scan();
+  scan.angles_rad.erase(scan.angles_rad.begin() + 20, scan.angles_rad.begin() + 24);
+  EXPECT_THAT(problems(scan), IsEmpty());
+  scan.angles_rad.erase(scan.angles_rad.begin() + 20, scan.angles_rad.begin() + 30);
+  EXPECT_THAT(problems(scan), ElementsAre(HasSubstr("must go all the way round")));
+}
+
 TEST(CircularScan, KeepsPixelsEnoughWhenBinned) {
   CircularScan scan = small_scan();
   scan.size_px = {64, 1024};
   EXPECT_EQ(scan.binned(4).size_px, Eigen::Vector2i(16, 256));
   EXPECT_THROW((void)scan.binned(5), InputError);
+}
+
+TEST(RoomForRegistration, EnlargesASmallScanAndChangesNoProjection) {
+  const CircularScan scan = small_scan();
+  CircularScan small = scan.enlarged(0.1);
+  const int factor = room_for_registration(small);
+  EXPECT_EQ(factor, 14) << "4.32 mm across, 20 mm to the axis";
+  EXPECT_EQ(room_for_registration(small.enlarged(factor)), 1);
+  const Eigen::Vector3d point(10.0, -7.0, 5.0);
+  const auto pixel_of = [&](const CircularScan& taken, double size) -> Eigen::Vector2d {
+    return scan_camera(taken, ScanCalibration::nominal(taken, 0), 0.7).project(size * point);
+  };
+  EXPECT_LT((pixel_of(small, 0.1) - pixel_of(scan, 1.0)).norm(), kRounding);
 }
 
 TEST(ViewAtAxis, ReachesFromTheFootToTheEdges) {
