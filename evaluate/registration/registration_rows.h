@@ -16,7 +16,7 @@
 #include "evaluate/registration/registration_errors.h"
 #include "evaluate/starts/perturbed_starts.h"
 #include "evaluate/statistics/success_rate.h"
-#include "register/method/correction_report.h"
+#include "register/method/correction.h"
 #include "register/uncertainty/uncertainty_report.h"
 #include "register/verdict/verdict.h"
 #include "text/csv_table.h"

@@ -3,10 +3,26 @@
 // field interpolates and quantises. From there the last stage converges by ray casting.
 #pragma once
 
+#include <limits>
+#include <tuple>
+
 #include "base/described_fields.h"
-#include "register/method/correction_report.h"
 
 namespace af::registration {
+
+/// What a correction did. Distances are NaN when the end was left as it was: nothing was cast, or
+/// the pose that casting found was discarded, because it is not admissible or has no value.
+struct CorrectionReport {
+  static constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+
+  int casts =
+      0;  ///< DRRs per view; 0: the search before had not converged, or no evaluation was left
+  double moved_mm = kNone;   ///< end from the end of look-up, mean over the target box
+  double last_mm = kNone;    ///< likewise, by the last step alone
+  bool stood_still = false;  ///< the last step was within the tolerance, or the search's final step
+
+  auto members() { return std::tie(casts, moved_mm, last_mm, stood_still); }
+};
 
 struct CorrectionOptions {
   bool is_wanted = false;

@@ -4,7 +4,7 @@
 #include <array>
 
 #include "base/named_rows.h"
-#include "register/method/chain_text.h"
+#include "register/method/method_options.h"
 
 namespace af::registration {
 namespace {

@@ -11,9 +11,8 @@
 #include "base/hash_random.h"
 #include "gold_standard/tre.h"
 #include "register/optimizer/newton_search.h"
-#include "register/problem/parameter_scaling.h"
 #include "register/problem/pose_target.h"
-#include "register/problem/silhouette_objective.h"
+#include "register/problem/silhouette.h"
 #include "register/problem/stage_view.h"
 
 namespace af::registration {
@@ -127,10 +126,6 @@ struct PreparedStage {
   MultiViewObjective objective;  ///< of a silhouette: that of the pose it was last narrowed to
   /// What silhouettes are taken from; none where the whole region counts.
   std::shared_ptr<const std::vector<SilhouetteView>> silhouettes;
-
-  [[nodiscard]] PreparedStage copy() const {
-    return {options, optimizer, MultiViewObjective(objective.views()), silhouettes};
-  }
 
   /// Narrows the objective to the silhouettes at a pose, if it is one of silhouettes; false when
   /// too little is seen of them.
@@ -514,21 +509,9 @@ RegistrationRunner::RegistrationRunner(std::shared_ptr<const RegistrationProblem
   impl_->prepare();
 }
 
-RegistrationRunner::RegistrationRunner(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 RegistrationRunner::~RegistrationRunner() = default;
 RegistrationRunner::RegistrationRunner(RegistrationRunner&&) noexcept = default;
 RegistrationRunner& RegistrationRunner::operator=(RegistrationRunner&&) noexcept = default;
-
-RegistrationRunner RegistrationRunner::share_preparation() const {
-  auto impl = std::make_unique<Impl>();
-  impl->problem = impl_->problem;
-  impl->options = impl_->options;
-  impl->views = impl_->views;
-  impl->some_points_ct = impl_->some_points_ct;
-  for (const PreparedStage& stage : impl_->stages) impl->stages.push_back(stage.copy());
-  if (impl_->judge.has_value()) impl->judge = impl_->judge->copy();
-  return RegistrationRunner(std::move(impl));
-}
 
 RegistrationResult RegistrationRunner::run(const RigidTransform& start_room_from_ct,
                                            std::int64_t start_index) {

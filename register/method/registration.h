@@ -11,7 +11,7 @@
 
 #include "base/thread_pool.h"
 #include "drr/drr_renderer.h"
-#include "register/method/correction_report.h"
+#include "register/method/correction.h"
 #include "register/method/presets.h"
 #include "register/method/registration_options.h"
 #include "register/problem/registration_problem.h"
@@ -70,11 +70,11 @@ struct RegistrationResult {
 
 /// Registers one case from any number of starts. Construction does what all starts share (smoothed
 /// and decimated references, histograms' ranges, X-ray bins); runs reuse the buffers. One run at a
-/// time spreads over the threads of a pool: views, and poses that do not depend on each other. For
-/// runs at the same time share_preparation() makes another runner cheaply. A result depends on
-/// problem, options and start alone (its seconds excepted), not on the number of threads. The DRR
-/// range of a case is that of the DRR at the nominal pose over the region of interest grown by half
-/// its size to every side. \test Registration.TwoViewsRecoverAKnownPose
+/// time spreads over the threads of a pool: views, and poses that do not depend on each other. Runs
+/// at the same time need a runner each. A result depends on problem, options and start alone (its
+/// seconds excepted), not on the number of threads. The DRR range of a case is that of the DRR at
+/// the nominal pose over the region of interest grown by half its size to every side. \test
+/// Registration.TwoViewsRecoverAKnownPose
 class RegistrationRunner {
  public:
   /// InputError when options or problem have problems, or when the nominal pose is outside a field.
@@ -85,9 +85,6 @@ class RegistrationRunner {
   ~RegistrationRunner();
   RegistrationRunner(RegistrationRunner&&) noexcept;
   RegistrationRunner& operator=(RegistrationRunner&&) noexcept;
-
-  /// A runner for another thread, on that thread alone; references and bins are shared.
-  [[nodiscard]] RegistrationRunner share_preparation() const;
 
   /// `start_index` is a key of random numbers.
   [[nodiscard]] RegistrationResult run(const RigidTransform& start_room_from_ct,
@@ -107,7 +104,6 @@ class RegistrationRunner {
 
  private:
   struct Impl;
-  explicit RegistrationRunner(std::unique_ptr<Impl> impl);
   std::unique_ptr<Impl> impl_;
 };
 

@@ -2,14 +2,22 @@
 #include "register/optimizer/gauss_newton.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 
-#include "register/optimizer/learned_curvature.h"
 #include "register/optimizer/search_run.h"
 
 namespace af::registration {
 namespace {
+
+/// An update whose divisor is smaller, relative to its vectors, would be mostly rounding.
+constexpr double kLeastCosine = 1e-3;
+
+/// Longer steps were refused too often: from far off the gradients say little about the end.
+constexpr double kLeastShare = 1.0 / 3.0;
+constexpr double kMostShare = 3.0;
 
 constexpr double kFirstDamping = 1e-3;
 constexpr double kLeastDamping = 1e-6;
@@ -33,6 +41,33 @@ ScaledParameters damped_step(const TargetValue& at,
 }
 
 }  // namespace
+
+void LearnedCurvature::clear() {
+  missing_.setZero();
+  is_empty_ = true;
+}
+
+void LearnedCurvature::learn(const ScaledParameters& step,
+                             const TargetValue& before,
+                             const TargetValue& after) {
+  const ScaledParameters unexplained =
+      before.gradient - after.gradient - (after.matrix + missing_) * step;
+  const double along = unexplained.dot(step);
+  if (!(std::abs(along) > kLeastCosine * unexplained.norm() * step.norm())) return;
+  missing_ += unexplained * unexplained.transpose() / along;
+  is_empty_ = false;
+}
+
+ScaledMatrix LearnedCurvature::added_to(const ScaledMatrix& matrix) const {
+  if (is_empty_) return matrix;
+  const Eigen::GeneralizedSelfAdjointEigenSolver<ScaledMatrix> shares(matrix + missing_, matrix);
+  if (shares.info() != Eigen::Success) return matrix;
+  // The eigenvectors V are scaled so that V' matrix V = 1, hence the sum is
+  // (matrix V) diag(shares) (matrix V)'.
+  const ScaledMatrix axes = matrix * shares.eigenvectors();
+  const ScaledParameters limited = shares.eigenvalues().cwiseMax(kLeastShare).cwiseMin(kMostShare);
+  return axes * limited.asDiagonal() * axes.transpose();
+}
 
 void GaussNewton::maximize(OptimizationTarget& target,
                            const OptimizerOptions& options,

@@ -3,12 +3,17 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include "base/thread_pool.h"
 #include "image/image2d.h"
+#include "register/problem/multi_view_objective.h"
+#include "register/problem/registration_problem.h"
 
 namespace af::registration {
 
@@ -23,5 +28,28 @@ std::vector<std::uint8_t> silhouette(const Image2d& drr,
 /// The smallest region that holds all used pixels and `border` pixels around them, cut at the
 /// image's edges; empty when none is used.
 RegionOfInterest region_of(std::span<const std::uint8_t> used, int width, int height, int border);
+
+/// A view of a stage, whose region is not yet narrowed to a silhouette.
+struct SilhouetteView {
+  ObjectiveView whole;            ///< over the stage's region
+  SimilarityReference reference;  ///< over the same
+  SimilarityOptions similarity;
+  std::shared_ptr<const DrrRenderer> sharpest;  ///< of the problem's view: draws the silhouette
+  double margin_px = 0.0;                       ///< stage pixels
+};
+
+/// The objective that compares only what lies within the silhouettes of the CT at a pose, grown by
+/// the views' margins: a measure over the whole region would mostly compare what surrounds a bone
+/// and is not in its CT. Renderers look at no more than the silhouettes' boxes. The silhouettes
+/// stay where they are when poses change. None when a view sees fewer than kLeastSilhouettePixels
+/// of them, or no contrast there. \test SilhouetteObjective.ComparesOnlyWhatIsNearTheBody
+std::optional<MultiViewObjective> silhouette_objective(
+    std::span<const SilhouetteView> views,
+    std::span<const Eigen::Vector3d> cut_points_ct,
+    const RigidTransform& room_from_ct,
+    const std::shared_ptr<ThreadPool>& pool);
+
+/// Fewer stage pixels than this tell nothing of six parameters.
+inline constexpr std::size_t kLeastSilhouettePixels = 64;
 
 }  // namespace af::registration

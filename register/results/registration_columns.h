@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "register/method/correction_report.h"
+#include "register/method/correction.h"
 #include "register/uncertainty/uncertainty_report.h"
 #include "register/verdict/verdict.h"
 

@@ -91,8 +91,4 @@ NormalEquations CrossCorrelation::normal_equations(std::span<const float> drr,
       sums, kRelativeRounding * gram_product(sums, kDrrChannel, kDrrChannel));
 }
 
-std::unique_ptr<SimilarityWorkspace> CrossCorrelation::make_workspace() const {
-  return std::make_unique<SimilarityWorkspace>();
-}
-
 }  // namespace af::registration

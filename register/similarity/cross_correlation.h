@@ -29,7 +29,6 @@ class CrossCorrelation final : public SimilarityMeasure {
   [[nodiscard]] NormalEquations normal_equations(std::span<const float> drr,
                                                  std::span<const float> planes,
                                                  SimilarityWorkspace& workspace) const override;
-  [[nodiscard]] std::unique_ptr<SimilarityWorkspace> make_workspace() const override;
 
  private:
   std::vector<float> weights_;    ///< 1 where used, 0 elsewhere; empty: all are

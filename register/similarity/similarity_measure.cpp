@@ -12,7 +12,6 @@
 #include "register/similarity/gradient_difference.h"
 #include "register/similarity/gradient_orientation.h"
 #include "register/similarity/mutual_information.h"
-#include "register/similarity/normalized_mutual_information.h"
 #include "register/similarity/pattern_intensity.h"
 #include "register/similarity/robust_gradient.h"
 #include "register/similarity/sum_of_squared_differences.h"
@@ -141,6 +140,10 @@ NormalEquations SimilarityMeasure::normal_equations(std::span<const float> /*drr
                                                     SimilarityWorkspace& /*workspace*/) const {
   check(false, "this similarity measure has no normal equations");
   return {};
+}
+
+std::unique_ptr<SimilarityWorkspace> SimilarityMeasure::make_workspace() const {
+  return std::make_unique<SimilarityWorkspace>();
 }
 
 void SimilarityOptions::describe(Fields& field) {

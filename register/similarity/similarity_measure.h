@@ -77,7 +77,8 @@ class SimilarityMeasure {
                                                          std::span<const float> planes,
                                                          SimilarityWorkspace& workspace) const;
 
-  [[nodiscard]] virtual std::unique_ptr<SimilarityWorkspace> make_workspace() const = 0;
+  /// Without memory, for measures that need none.
+  [[nodiscard]] virtual std::unique_ptr<SimilarityWorkspace> make_workspace() const;
 };
 
 struct SimilarityOptions {

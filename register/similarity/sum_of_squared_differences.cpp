@@ -56,8 +56,4 @@ NormalEquations SumOfSquaredDifferences::normal_equations(
   return result;
 }
 
-std::unique_ptr<SimilarityWorkspace> SumOfSquaredDifferences::make_workspace() const {
-  return std::make_unique<SimilarityWorkspace>();
-}
-
 }  // namespace af::registration

@@ -29,7 +29,6 @@ class SumOfSquaredDifferences final : public SimilarityMeasure {
   [[nodiscard]] NormalEquations normal_equations(std::span<const float> drr,
                                                  std::span<const float> planes,
                                                  SimilarityWorkspace& workspace) const override;
-  [[nodiscard]] std::unique_ptr<SimilarityWorkspace> make_workspace() const override;
 
  private:
   std::vector<float> xray_;     ///< 0 where unused

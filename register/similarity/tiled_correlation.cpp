@@ -115,8 +115,4 @@ NormalEquations TiledCorrelation::normal_equations(std::span<const float> drr,
   return result;
 }
 
-std::unique_ptr<SimilarityWorkspace> TiledCorrelation::make_workspace() const {
-  return std::make_unique<SimilarityWorkspace>();
-}
-
 }  // namespace af::registration

@@ -27,7 +27,6 @@ class TiledCorrelation final : public SimilarityMeasure {
   [[nodiscard]] NormalEquations normal_equations(std::span<const float> drr,
                                                  std::span<const float> planes,
                                                  SimilarityWorkspace& workspace) const override;
-  [[nodiscard]] std::unique_ptr<SimilarityWorkspace> make_workspace() const override;
 
  private:
   struct Tile {

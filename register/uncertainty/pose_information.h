@@ -5,7 +5,7 @@
 
 #include "geometry/rigid_transform.h"
 #include "register/problem/multi_view_objective.h"
-#include "register/problem/parameter_scaling.h"
+#include "register/problem/pose_target.h"
 
 namespace af::registration {
 

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "base/error.h"
-#include "register/problem/parameter_scaling.h"
+#include "register/problem/pose_target.h"
 #include "register/uncertainty/calibration.h"
 #include "register/uncertainty/pose_covariance.h"
 #include "register/uncertainty/pose_information.h"

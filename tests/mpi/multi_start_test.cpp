@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "register/multi_start.h"
-
 #include <gtest/gtest.h>
 
 #include "base/error.h"
 #include "base/hash_random.h"
+#include "register/registration_run.h"
 #include "support/shared_folder.h"
 #include "unit/register/method/registration_cases.h"
 

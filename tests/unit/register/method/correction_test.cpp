@@ -271,10 +271,10 @@ TEST(Correction, HasTheSameBitsOnAnyNumberOfThreadsAndInAnotherRunner) {
   const test::SmallCase small = spoilt_case();
   const RegistrationOptions options = corrected(one_stage("rg", "gauss-newton"));
   RegistrationRunner alone(small.problem, options);
-  RegistrationRunner shared = alone.share_preparation();
+  RegistrationRunner other(small.problem, options);
   RegistrationRunner threads(small.problem, options, std::make_shared<ThreadPool>(3));
   const RegistrationResult first = alone.run(start_near_gold(small));
-  for (RegistrationRunner* const runner : {&alone, &shared, &threads}) {
+  for (RegistrationRunner* const runner : {&alone, &other, &threads}) {
     const RegistrationResult again = runner->run(start_near_gold(small));
     EXPECT_EQ(again.room_from_ct.matrix(), first.room_from_ct.matrix());
     EXPECT_EQ(again.correction->casts, first.correction->casts);

@@ -6,7 +6,6 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
-#include "register/method/chain_text.h"
 #include "register/method/presets.h"
 #include "text/options_toml.h"
 

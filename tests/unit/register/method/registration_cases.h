@@ -5,7 +5,7 @@
 
 #include "drr/ray_cast_drr.h"
 #include "register/method/registration.h"
-#include "register/problem/parameter_scaling.h"
+#include "register/problem/pose_target.h"
 #include "support/ct_phantoms.h"
 
 namespace af::test {

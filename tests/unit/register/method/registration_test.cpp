@@ -91,7 +91,7 @@ TEST(Registration, RepeatsAndThreadsGiveTheSameBits) {
   (void)runner.run(small.gold_room_from_ct);
   const RegistrationResult again = runner.run(start_near(small));
   RegistrationResult in_thread;
-  RegistrationRunner other = runner.share_preparation();
+  RegistrationRunner other(small.problem, options);
   std::thread thread([&] { in_thread = other.run(start_near(small)); });
   (void)runner.run(small.gold_room_from_ct);
   thread.join();

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "register/problem/parameter_scaling.h"
-
 #include <gtest/gtest.h>
 
+#include "register/problem/pose_target.h"
 #include "unit/register/method/registration_cases.h"
 
 namespace af::registration {

@@ -6,7 +6,6 @@
 #include <gtest/gtest.h>
 
 #include "register/method/registration.h"
-#include "register/problem/silhouette_objective.h"
 #include "register/verdict/pose_examiner.h"
 #include "unit/register/method/registration_cases.h"
 

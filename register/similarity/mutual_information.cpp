@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "register/similarity/joint_histogram.h"
+#include "register/similarity/mutual_information.h"
 
 #include <algorithm>
 #include <array>

@@ -1,17 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
+// What af-register does between its command line and its output folder.
 #pragma once
 
 #include <span>
+#include <string>
 #include <vector>
 
 #include "parallel/communicator.h"
 #include "register/method/registration.h"
+#include "register/register_options.h"
 #include "register/results/registration_results.h"
 #include "register/uncertainty/uncertainty_estimator.h"
 #include "register/verdict/pose_examiner.h"
 #include "run/resumable_items.h"
 
 namespace af::registration {
+
+/// Collective. Loads the case, registers it from every start and writes the output folder.
+/// NotFoundError, once the results are written, when the best end is none.
+void run_registration(const RegisterOptions& options,
+                      const std::string& command_line,
+                      const Communicator& world);
 
 /// Collective. Registers from every start and examines the end, the starts shared over the ranks as
 /// these become free. Of several starts the finished ones are kept (see ResumableItems): a stopped

@@ -1,0 +1,245 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "register/registration_run.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <numeric>
+#include <optional>
+
+#include "base/error.h"
+#include "base/stored_bytes.h"
+#include "files/output_file.h"
+#include "gold_standard/target_box.h"
+#include "gold_standard/tre.h"
+#include "parallel/work_watch.h"
+#include "register/results/slicer_folder.h"
+#include "register/verdict/view_diagnosis.h"
+#include "run/run_folder.h"
+#include "run/terminal.h"
+#include "study/case_gold_standard.h"
+#include "study/landmark_start.h"
+#include "study/pose_context.h"
+#include "study/shared_inputs.h"
+#include "text/csv_table.h"
+#include "text/options_toml.h"
+
+namespace af::registration {
+namespace {
+
+/// Rank 0: the records of all starts; the best keeps its trace.
+std::vector<RegistrationRecord> records_of(const ResumableItems& items, std::size_t count) {
+  std::vector<RegistrationRecord> records(count);
+  std::optional<RegistrationRecord> best;
+  items.visit([&](std::int64_t index, std::span<const std::byte> bytes) {
+    auto record = value_of<RegistrationRecord>(bytes, "unfinished registrations");
+    if (!best.has_value() || is_better(record, *best)) best = record;
+    record.result.trace.clear();
+    records[static_cast<std::size_t>(index)] = std::move(record);
+  });
+  if (best.has_value()) records[best_record(records)].result.trace = best->result.trace;
+  return records;
+}
+
+/// Collective. The preset with its replacements, refused where the command line contradicts it.
+RegistrationOptions method_of(const RegisterOptions& options, const Communicator& world) {
+  return all_or_none(world, [&] {
+    throw_if_any(problems(options));
+    RegistrationOptions method = resolve(options.method);
+    method.correction = options.correction;
+    if (options.skip_ct_check && method.silhouette_mm() > 0.0)
+      throw InputError(kSilhouettesNeedTheCt);
+    return method;
+  });
+}
+
+/// What the study says of the case; the same on every rank.
+struct CaseToRegister {
+  Study study;
+  StudyCase of;
+  std::optional<LandmarkPose> landmarks;  ///< when they are the start
+  std::vector<RigidTransform> starts;
+  std::optional<GoldStandard> gold;
+};
+
+void warn_of(const std::vector<std::string>& texts, const Communicator& world) {
+  for (const std::string& text : texts) warn(world, text);
+}
+
+/// Collective.
+CaseToRegister read_case(const RegisterOptions& options, const Communicator& world) {
+  CaseToRegister found;
+  std::vector<std::string> notes;
+  found.study = shared_study(options.study, world, &notes);
+  warn_of(notes, world);
+  found.of = all_or_none(world, [&] { return found.study.find_case(options.case_name); });
+  if (starts_from_landmarks(options, found.of))
+    found.landmarks = all_or_none(world, [&] { return landmark_pose(found.study, found.of); });
+  notes.clear();
+  found.starts = shared_poses(world, [&] {
+    if (found.landmarks.has_value()) return std::vector{found.landmarks->room_from_ct};
+    return start_poses(options, pose_context(found.study, found.of, options.ct), notes);
+  });
+  warn_of(notes, world);
+  found.gold = all_or_none(world, [&] { return known_gold(found.study, found.of); });
+  return found;
+}
+
+/// Collective. The problem of the case: X-rays and renderers.
+LoadedCase load_problem(const RegisterOptions& options,
+                        const RegistrationOptions& method,
+                        const CaseToRegister& registered,
+                        const std::shared_ptr<ThreadPool>& pool,
+                        const Communicator& world) {
+  CaseLoadOptions load = case_load_options(options, method.coarsest_level(), method.last_levels());
+  load.judging_level = PoseExaminer::coarsest_level();
+  load.pool = pool;
+  const WorkNote note("loading case " + registered.of.name, WorkNote::Kind::Phase);
+  LoadedCase loaded = load_case(registered.study, registered.of, load, world);
+  warn_of(loaded.warnings, world);
+  for (const auto& [input, text] : loaded.input_notes) inform(world, input + ": " + text);
+  return loaded;
+}
+
+/// Collective. What the results say of the run beside its records.
+RunDescription description_of(const RegisterOptions& in_force,
+                              const CaseToRegister& registered,
+                              const LoadedCase& loaded,
+                              const std::string& command_line,
+                              const Communicator& world) {
+  RunDescription description{registered.of.name, in_force.renderer, {}, {}};
+  if (registered.landmarks.has_value())
+    description.landmarks = to_json(*registered.landmarks, registered.of);
+  description.provenance = {"af-register",
+                            command_line,
+                            to_toml(in_force),
+                            in_force.method.seed,
+                            world.size(),
+                            loaded.input_sha256,
+                            loaded.input_notes};
+  all_or_none(world, [&] {
+    if (world.is_root()) description.provenance.input_sha256.merge(hashes_of_files(in_force));
+  });
+  return description;
+}
+
+void add_target_errors(const CaseToRegister& registered, std::vector<RegistrationRecord>& records) {
+  if (!registered.gold.has_value()) return;
+  const std::vector<Eigen::Vector3d> points = target_points(registered.of.target_box_ct);
+  const auto error_mm = [&](const RigidTransform& pose) {
+    return mean_tre_mm(pose, registered.gold->room_from_ct, points);
+  };
+  for (RegistrationRecord& record : records)
+    record.errors = TargetErrors{registered.gold->source,
+                                 error_mm(record.result.start_room_from_ct),
+                                 error_mm(record.result.room_from_ct)};
+}
+
+/// Rank 0. Writes what was found, the summary last.
+void write_results(const RegisterOptions& options,
+                   const CaseToRegister& registered,
+                   const std::shared_ptr<const RegistrationProblem>& problem,
+                   const RunDescription& description,
+                   const Communicator& world,
+                   std::vector<RegistrationRecord>& records,
+                   RunFolder& folder) {
+  add_target_errors(registered, records);
+  RegistrationRecord& best = records[best_record(records)];
+  if (!best.view_values.empty() && best.result.evaluations > 0)
+    best.diagnosis = diagnose_views(
+        problem, best.result.start_room_from_ct, best.result.room_from_ct, best.view_values);
+  warn_of(best.diagnosis.messages, world);
+  const bool is_found = judgement_of(best).verdict != Verdict::NotFound;
+  const std::filesystem::path slicer = options.output_folder / "slicer";
+  // Before result.json: when that is there, everything is.
+  if (is_found)
+    write_slicer_folder(*problem, best.result.room_from_ct, registered.of, slicer);
+  else
+    remove_slicer_files(*problem, slicer);  // an earlier run's
+  if (registered.landmarks.has_value())
+    std::cout << residuals_text(*registered.landmarks, registered.of);
+  std::cout << write_run(records, *problem, description, options.output_folder);
+  folder.finish();
+  if (!is_found)
+    throw NotFoundError("nothing was found (see the verdict); what was searched is in " +
+                        options.output_folder.string());
+}
+
+}  // namespace
+
+void run_registration(const RegisterOptions& options,
+                      const std::string& command_line,
+                      const Communicator& world) {
+  const RegistrationOptions method = method_of(options, world);
+  RunFolder folder({options.output_folder, result_file_names(), options.resume.restarts}, world);
+  const CaseToRegister registered = read_case(options, world);
+  const auto pool = std::make_shared<ThreadPool>(thread_count(options.method.threads));
+  const LoadedCase loaded = load_problem(options, method, registered, pool, world);
+  const auto& problem = loaded.problem;
+  RegistrationRunner runner =
+      all_or_none(world, [&] { return RegistrationRunner(problem, method, pool); });
+  PoseExaminer examiner =
+      all_or_none(world, [&] { return PoseExaminer(*problem, method.silhouette_mm()); });
+  UncertaintyEstimator estimator = all_or_none(
+      world, [&] { return UncertaintyEstimator(problem, method, options.uncertainty, pool); });
+  all_or_none(world, [&] {
+    if (!world.is_root()) return;
+    announce_outputs(options.output_folder, overlay_file_names(*problem));
+    announce_outputs(options.output_folder / "slicer", slicer_file_names(*problem));
+  });
+  folder.open();
+
+  RegisterOptions in_force = options.in_force();
+  in_force.case_name = registered.of.name;
+  const RunDescription description =
+      description_of(in_force, registered, loaded, command_line, world);
+  std::vector<RegistrationRecord> records = register_starts(
+      runner,
+      examiner,
+      estimator,
+      registered.starts,
+      folder.unfinished(
+          "registrations",
+          deciding_values(deciding_options(in_force), description.provenance.input_sha256)),
+      world);
+  all_or_none(world, [&] {
+    if (world.is_root())
+      write_results(options, registered, problem, description, world, records, folder);
+  });
+}
+
+std::vector<RegistrationRecord> register_starts(RegistrationRunner& runner,
+                                                PoseExaminer& examiner,
+                                                UncertaintyEstimator& estimator,
+                                                std::span<const RigidTransform> starts,
+                                                const UnfinishedWork& unfinished,
+                                                const Communicator& communicator) {
+  const auto run = [&](std::int64_t index) {
+    RegistrationRecord record;
+    record.start_index = index;
+    record.result = runner.run(starts[static_cast<std::size_t>(index)], index);
+    record.view_values = examiner.view_values(record.result.room_from_ct);
+    record.uncertainty = estimator.report(record.result, record.view_values);
+    return record;
+  };
+  std::vector<RegistrationRecord> records;
+  if (starts.empty()) return records;
+  if (starts.size() == 1) {
+    all_or_none(communicator, [&] {
+      if (communicator.is_root()) records.push_back(run(0));
+    });
+    return records;
+  }
+  ResumableItems items(unfinished, communicator);
+  std::vector<std::int64_t> all(starts.size());
+  std::iota(all.begin(), all.end(), 0);
+  items.complete(all, "registrations", [&](std::int64_t index) { return bytes_of(run(index)); });
+  all_or_none(communicator, [&] {
+    if (communicator.is_root()) records = records_of(items, starts.size());
+  });
+  return records;
+}
+
+}  // namespace af::registration
