@@ -78,19 +78,6 @@ const std::map<std::string, const char*>& builtin_rigs() {
 constexpr std::array kGeometryKeys = {
     "source_point", "detector_origin_point", "column_direction", "row_direction"};
 
-/// Axes within the tolerance of problems() are made exactly unit and orthogonal, so that projecting
-/// and casting agree; axes that already are keep their bits.
-void clean_axes(CameraGeometry& camera) {
-  constexpr double kExact = 1e-12;
-  const auto make_unit = [](Eigen::Vector3d& direction) {
-    if (std::abs(direction.norm() - 1.0) > kExact) direction.normalize();
-  };
-  make_unit(camera.column_direction);
-  const double cosine = camera.column_direction.dot(camera.row_direction);
-  if (std::abs(cosine) > kExact) camera.row_direction -= cosine * camera.column_direction;
-  make_unit(camera.row_direction);
-}
-
 /// The camera's constraints that geometry knows, each placed at the line of its key.
 bool note_geometry_problems(const CameraGeometry& camera,
                             const toml::table& table,
@@ -256,6 +243,17 @@ CameraRig rig_from_table(const toml::table& table,
 }
 
 }  // namespace
+
+void clean_axes(CameraGeometry& camera) {
+  constexpr double kExact = 1e-12;
+  const auto make_unit = [](Eigen::Vector3d& direction) {
+    if (std::abs(direction.norm() - 1.0) > kExact) direction.normalize();
+  };
+  make_unit(camera.column_direction);
+  const double cosine = camera.column_direction.dot(camera.row_direction);
+  if (std::abs(cosine) > kExact) camera.row_direction -= cosine * camera.column_direction;
+  make_unit(camera.row_direction);
+}
 
 std::vector<std::string> builtin_rig_names() {
   std::vector<std::string> names;

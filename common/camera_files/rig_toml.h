@@ -24,6 +24,10 @@ CameraRig parse_rig(const std::string& text,
 /// The rig as TOML text that parse_rig() reads back to the last bit.
 std::string rig_to_toml(const CameraRig& rig);
 
+/// Axes within the tolerance of problems() are made exactly unit and orthogonal, so that projecting
+/// and casting agree; axes that already are keep their bits.
+void clean_axes(CameraGeometry& camera);
+
 /// What a camera name must be so that it can be part of options (--field NAME=PATH) and of file
 /// names; empty when it is.
 std::string camera_name_problem(const std::string& name);

@@ -90,6 +90,7 @@ class RigCompletion {
     rig.isocenter_point = *isocenter_;
     for (const StatedCamera& camera : cameras_) rig.cameras.push_back(camera.geometry);
     throw_if_any(problems(rig), files_.empty() ? "" : files_.front());
+    for (CameraGeometry& camera : rig.cameras) clean_axes(camera);
     note_mirrored();
     if (warnings != nullptr) warnings->insert(warnings->end(), notes_.begin(), notes_.end());
     return rig;
