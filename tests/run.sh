@@ -67,4 +67,5 @@ if [[ "$preset" == sanitize-threads ]]; then
   ctest_options+=(--label-exclude 'checks|physics')
 fi
 cd "$af_root/build/$preset"
-exec ctest --output-on-failure --no-tests=error --parallel "$(core_count)" "${ctest_options[@]}"
+# The longest tests start and stop programs, and wait for much of their time: one more than there are processors.
+exec ctest --output-on-failure --no-tests=error --parallel "$(($(core_count) + 1))" "${ctest_options[@]}"

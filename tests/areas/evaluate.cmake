@@ -45,8 +45,7 @@ af_add_program_tests(
   LIBS af_registration_case af_run
   PROGRAMS af-evaluate af-precompute
   LABELS programs mpi
-  TIMEOUT 1800
-  PROCESSORS 2)
+  TIMEOUT 1800)
 
 af_add_mpi_test(shared_measuring_test SOURCES mpi/shared_measuring_test.cpp LIBS af_evaluation_program RANKS 1 2 3 4)
 
@@ -59,4 +58,4 @@ af_add_test(
 
 add_test(NAME population_program COMMAND ${PROJECT_SOURCE_DIR}/tests/checks/population_program.sh
                                          ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR}/bin)
-set_tests_properties(population_program PROPERTIES LABELS mpi TIMEOUT 900 PROCESSORS 2)
+set_tests_properties(population_program PROPERTIES LABELS mpi TIMEOUT 900)

@@ -6,8 +6,7 @@ af_add_program_tests(
   LIBS af_registration_case
   PROGRAMS af-evaluate af-precompute af-inspect
   LABELS programs mpi
-  TIMEOUT 1800
-  PROCESSORS 2)
+  TIMEOUT 1800)
 
 af_add_program_tests(
   fault_tests
@@ -15,8 +14,7 @@ af_add_program_tests(
   LIBS af_registration_case
   PROGRAMS af-precompute af-inspect stopped_rank
   LABELS programs mpi
-  TIMEOUT 1800
-  PROCESSORS 2)
+  TIMEOUT 1800)
 target_compile_definitions(fault_tests PRIVATE AF_STOPPED_RANK_PROGRAM="$<TARGET_FILE:stopped_rank>")
 add_executable(stopped_rank programs/stopped_rank.cpp)
 target_link_libraries(stopped_rank PRIVATE af_compile_options af_cli)

@@ -11,7 +11,7 @@ foreach(page ${af_pages})
   if(af_blocks)
     string(REGEX REPLACE "[/.]" "_" name ${page})
     add_test(NAME Pages.${name} COMMAND ${af_page_commands} --run ${PROJECT_SOURCE_DIR}/${page} ${PROJECT_BINARY_DIR}/bin)
-    set_tests_properties(Pages.${name} PROPERTIES LABELS programs TIMEOUT 300 PROCESSORS 2)
+    set_tests_properties(Pages.${name} PROPERTIES LABELS programs TIMEOUT 300)
   endif()
   # A page may get its first command, or lose its last.
   set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${page})

@@ -31,16 +31,15 @@ af_add_mpi_test(
 
 add_test(NAME precompute_program COMMAND ${PROJECT_SOURCE_DIR}/tests/checks/precompute_program.sh
                                          $<TARGET_FILE:af-precompute> ${MPIEXEC_EXECUTABLE} ${af_sanitized})
-set_tests_properties(precompute_program PROPERTIES LABELS mpi TIMEOUT 1800 PROCESSORS 2)
+set_tests_properties(precompute_program PROPERTIES LABELS mpi TIMEOUT 1800)
 
 add_test(NAME atlas_program COMMAND ${PROJECT_SOURCE_DIR}/tests/checks/atlas_program.sh
                                     ${PROJECT_BINARY_DIR}/bin ${MPIEXEC_EXECUTABLE})
-set_tests_properties(atlas_program PROPERTIES LABELS mpi TIMEOUT 900 PROCESSORS 2)
+set_tests_properties(atlas_program PROPERTIES LABELS mpi TIMEOUT 900)
 
 af_add_program_tests(
   measured_fields_tests
   SOURCES programs/measured_fields_test.cpp
   LIBS af_image_files af_text
   PROGRAMS af-simulate af-scan af-precompute af-evaluate
-  TIMEOUT 600
-  PROCESSORS 2)
+  TIMEOUT 600)
