@@ -8,11 +8,8 @@
 #include <optional>
 #include <tuple>
 
-#include <CLI/CLI.hpp>
-
 #include "base/error.h"
 #include "base/toml_text.h"
-#include "cli/bind_options.h"
 #include "drr/field_renderer.h"
 #include "drr/ray_cast_drr.h"
 #include "evaluate/image_quality/image_quality_tables.h"
@@ -519,15 +516,7 @@ std::vector<std::string> problems(const ImageQualityOptions& options) {
   return found;
 }
 
-CLI::App* bind_image_quality(CLI::App& app, ImageQualityOptions& options) {
-  CLI::App* command = app.add_subcommand(
-      "image-quality",
-      "DRRs of a field against ray casting at random poses of its motion range (the paper's Fig. "
-      "8): PSNR, statistics, box plot, worst pair");
-  cli::bind_options(*command, options);
-  cli::bind_run_limits(*command);
-  return command;
-}
+namespace {
 
 void run_image_quality(const ImageQualityOptions& options,
                        const std::string& command_line,
@@ -550,6 +539,19 @@ void run_image_quality(const ImageQualityOptions& options,
     if (!options.study.empty()) write_together(results, options.output_folder);
     run.finish();
   });
+}
+
+}  // namespace
+
+cli::SubCommand image_quality_command(CLI::App& app) {
+  cli::SubCommand command = cli::sub_command(
+      app,
+      "image-quality",
+      "DRRs of a field against ray casting at random poses of its motion range (the paper's Fig. "
+      "8): PSNR, statistics, box plot, worst pair",
+      run_image_quality);
+  cli::bind_run_limits(*command.app);
+  return command;
 }
 
 }  // namespace af::evaluation

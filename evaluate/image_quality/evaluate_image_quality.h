@@ -6,11 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "cli/app_forward.h"
 #include "cli/run_limits.h"
+#include "cli/sub_command.h"
 #include "drr/xray_beam.h"
 #include "image_files/ct_reader.h"
-#include "parallel/communicator.h"
 #include "volume/ray_caster.h"
 
 namespace af::evaluation {
@@ -39,16 +38,11 @@ struct ImageQualityOptions {
 
 std::vector<std::string> problems(const ImageQualityOptions& options);
 
-/// Adds the subcommand; returns it.
-CLI::App* bind_image_quality(CLI::App& app, ImageQualityOptions& options);
-
 /// Collective. Compares a field's DRRs with ray casting (Fig. 8), for its own camera, the one of
 /// --rig and --camera, or those of the study, and writes image-quality.csv,
 /// figures, the pictures of the worst and the median pair, summary.json and reproduce.sh. Of a
 /// study every view's field gets a folder of its own, CASE-CAMERA, and the run's folder one table,
 /// one box plot and the worst pairs side by side.
-void run_image_quality(const ImageQualityOptions& options,
-                       const std::string& command_line,
-                       const Communicator& world);
+cli::SubCommand image_quality_command(CLI::App& app);
 
 }  // namespace af::evaluation

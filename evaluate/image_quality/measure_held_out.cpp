@@ -6,12 +6,9 @@
 #include <memory>
 #include <optional>
 
-#include <CLI/CLI.hpp>
-
 #include "base/error.h"
 #include "base/sample_summary.h"
 #include "base/thread_pool.h"
-#include "cli/bind_options.h"
 #include "drr/field_renderer.h"
 #include "drr/ray_cast_drr.h"
 #include "evaluate/outputs/table_paths.h"
@@ -237,16 +234,11 @@ std::vector<std::string> problems(const HeldOutOptions& options) {
   return found;
 }
 
-CLI::App* bind_held_out(CLI::App& app, HeldOutOptions& options) {
-  CLI::App* command = app.add_subcommand(
-      "held-out",
-      "How well fields, and ray casting through their CT, predict X-rays whose true pose is known: "
-      "PSNR with the X-ray as the reference, per view and as a table");
-  cli::bind_options(*command, options);
-  return command;
-}
+namespace {
 
-void run_held_out(const HeldOutOptions& options, const Communicator& world) {
+void run_held_out(const HeldOutOptions& options,
+                  const std::string& /*command_line*/,
+                  const Communicator& world) {
   const std::filesystem::path csv = csv_beside(options.output);
   std::vector<std::string> warnings;
   all_or_none(world, [&] {
@@ -285,6 +277,17 @@ void run_held_out(const HeldOutOptions& options, const Communicator& world) {
     write_text_file(options.output, text);
     std::cout << text;
   });
+}
+
+}  // namespace
+
+cli::SubCommand held_out_command(CLI::App& app) {
+  return cli::sub_command(
+      app,
+      "held-out",
+      "How well fields, and ray casting through their CT, predict X-rays whose true pose is known: "
+      "PSNR with the X-ray as the reference, per view and as a table",
+      run_held_out);
 }
 
 }  // namespace af::evaluation

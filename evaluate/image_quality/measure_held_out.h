@@ -5,9 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "cli/app_forward.h"
+#include "cli/sub_command.h"
 #include "image_files/ct_reader.h"
-#include "parallel/communicator.h"
 #include "volume/ray_caster.h"
 
 namespace af::evaluation {
@@ -30,14 +29,11 @@ struct HeldOutOptions {
 
 std::vector<std::string> problems(const HeldOutOptions& options);
 
-/// Adds the subcommand; returns it.
-CLI::App* bind_held_out(CLI::App& app, HeldOutOptions& options);
-
 /// Collective. How well fields and their CT's ray casting predict the X-rays of a study at their
 /// true poses: PSNR of eq. (12) with the X-ray as the reference, over the pixels of each view's
 /// region that no mask hides and whose rays the CT attenuates, as they are and with both images
 /// smoothed. Views of which a field does not hold every ray of the region are left out for all.
 /// Writes a table (Markdown) and a row per view and renderer (CSV beside it). Rank 0 does the work.
-void run_held_out(const HeldOutOptions& options, const Communicator& world);
+cli::SubCommand held_out_command(CLI::App& app);
 
 }  // namespace af::evaluation

@@ -3,10 +3,7 @@
 
 #include <iostream>
 
-#include <CLI/CLI.hpp>
-
 #include "base/error.h"
-#include "cli/bind_options.h"
 #include "text/options_toml.h"
 
 namespace af::evaluation {
@@ -42,18 +39,25 @@ void append_problems(const MethodOptions& options, std::vector<std::string>& fou
     found.emplace_back("--field = set: must not be given with --renderer raycast");
 }
 
-CLI::App* bind_show_method(CLI::App& app, registration::MethodOptions& options) {
-  CLI::App* command = app.add_subcommand(
-      "method", "Prints the chains of a preset, with the options that replace parts of it");
-  cli::bind_options(*command, options);
-  return command;
-}
+namespace {
 
-void show_method(const registration::MethodOptions& options, const Communicator& world) {
+void show_method(const registration::MethodOptions& options,
+                 const std::string& /*command_line*/,
+                 const Communicator& world) {
   all_or_none(world, [&] {
     const std::string text = to_toml(options);
     if (world.is_root()) std::cout << text;
   });
+}
+
+}  // namespace
+
+cli::SubCommand method_command(CLI::App& app) {
+  return cli::sub_command(
+      app,
+      "method",
+      "Prints the chains of a preset, with the options that replace parts of it",
+      show_method);
 }
 
 }  // namespace af::evaluation

@@ -5,10 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "cli/app_forward.h"
+#include "cli/sub_command.h"
 #include "drr/xray_beam.h"
 #include "image_files/ct_reader.h"
-#include "parallel/communicator.h"
 #include "register/field_paths.h"
 #include "register/method/method_options.h"
 #include "study/study_file.h"
@@ -37,10 +36,7 @@ struct MethodOptions {
 /// Problems of the fields' paths.
 void append_problems(const MethodOptions& options, std::vector<std::string>& found);
 
-/// Adds the subcommand `method`; returns it.
-CLI::App* bind_show_method(CLI::App& app, registration::MethodOptions& options);
-
 /// Prints the chains of a preset, with the options that replace parts of it, as TOML.
-void show_method(const registration::MethodOptions& options, const Communicator& world);
+cli::SubCommand method_command(CLI::App& app);
 
 }  // namespace af::evaluation

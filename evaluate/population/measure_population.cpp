@@ -4,9 +4,6 @@
 #include <iostream>
 #include <utility>
 
-#include <CLI/CLI.hpp>
-
-#include "cli/bind_options.h"
 #include "evaluate/population/population_figures.h"
 #include "evaluate/population/population_runs.h"
 #include "evaluate/population/population_tables.h"
@@ -47,17 +44,11 @@ void PopulationOptions::describe(Fields& field) {
   field("output", output, "Folder for tables and figures").as("-o,--output");
 }
 
-CLI::App* bind_population(CLI::App& app, PopulationOptions& options) {
-  CLI::App* command = app.add_subcommand(
-      "population",
-      "Success and capture range of many patients, with intervals over patients (bootstrap and "
-      "Student's), for all, for those of odd and of even numbers, and for every kind. A case "
-      "named PATIENT-pN is a true pose of that patient");
-  cli::bind_options(*command, options);
-  return command;
-}
+namespace {
 
-void run_population(const PopulationOptions& options, const Communicator& world) {
+void run_population(const PopulationOptions& options,
+                    const std::string& /*command_line*/,
+                    const Communicator& world) {
   all_or_none(world, [&] {
     if (!world.is_root()) return;
     require_gnuplot();
@@ -65,6 +56,18 @@ void run_population(const PopulationOptions& options, const Communicator& world)
     for (const std::string& condition : options.conditions) reader.read(condition);
     write_population(options, reader);
   });
+}
+
+}  // namespace
+
+cli::SubCommand population_command(CLI::App& app) {
+  return cli::sub_command(
+      app,
+      "population",
+      "Success and capture range of many patients, with intervals over patients (bootstrap and "
+      "Student's), for all, for those of odd and of even numbers, and for every kind. A case "
+      "named PATIENT-pN is a true pose of that patient",
+      run_population);
 }
 
 }  // namespace af::evaluation

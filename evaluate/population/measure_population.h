@@ -7,8 +7,7 @@
 #include <vector>
 
 #include "base/described_fields.h"
-#include "cli/app_forward.h"
-#include "parallel/communicator.h"
+#include "cli/sub_command.h"
 
 namespace af::evaluation {
 
@@ -21,13 +20,10 @@ struct PopulationOptions {
   void describe(Fields& field);
 };
 
-/// Adds the subcommand; returns it.
-CLI::App* bind_population(CLI::App& app, PopulationOptions& options);
-
 /// Rank 0. Success of finished registration runs of many patients, with intervals over patients:
 /// population.md, population.csv (conditions and groups of patients), patients.csv, intervals.csv
 /// and the figures success.svg and capture-range.svg. InputError when runs of one study differ in
 /// their intervals or threshold, or a condition holds no run.
-void run_population(const PopulationOptions& options, const Communicator& world);
+cli::SubCommand population_command(CLI::App& app);
 
 }  // namespace af::evaluation

@@ -3,10 +3,7 @@
 
 #include <iostream>
 
-#include <CLI/CLI.hpp>
-
 #include "base/error.h"
-#include "cli/bind_options.h"
 #include "evaluate/outputs/table_paths.h"
 #include "evaluate/registration/method_comparison.h"
 #include "evaluate/registration/pose_distances.h"
@@ -34,16 +31,11 @@ void CompareOptions::describe(Fields& field) {
       .finite();
 }
 
-CLI::App* bind_compare(CLI::App& app, CompareOptions& options) {
-  CLI::App* command = app.add_subcommand(
-      "compare",
-      "One table of finished registration runs: success for starts 0-8, 8-16 and 16-30 mm from "
-      "gold, TRE, bias, DRRs and seconds, and field against ray casting, as Markdown and CSV");
-  cli::bind_options(*command, options);
-  return command;
-}
+namespace {
 
-void run_compare(const CompareOptions& options, const Communicator& world) {
+void run_compare(const CompareOptions& options,
+                 const std::string& /*command_line*/,
+                 const Communicator& world) {
   all_or_none(world, [&] {
     if (!world.is_root()) return;
     throw_if_any(table_problems(options.output));
@@ -83,6 +75,17 @@ void run_compare(const CompareOptions& options, const Communicator& world) {
     write_text_file(options.output, text);
     std::cout << text;
   });
+}
+
+}  // namespace
+
+cli::SubCommand compare_command(CLI::App& app) {
+  return cli::sub_command(
+      app,
+      "compare",
+      "One table of finished registration runs: success for starts 0-8, 8-16 and 16-30 mm from "
+      "gold, TRE, bias, DRRs and seconds, and field against ray casting, as Markdown and CSV",
+      run_compare);
 }
 
 }  // namespace af::evaluation

@@ -5,8 +5,7 @@
 #include <vector>
 
 #include "base/described_fields.h"
-#include "cli/app_forward.h"
-#include "parallel/communicator.h"
+#include "cli/sub_command.h"
 
 namespace af::evaluation {
 
@@ -22,11 +21,8 @@ struct CompareOptions {
   void describe(Fields& field);
 };
 
-/// Adds the subcommand; returns it.
-CLI::App* bind_compare(CLI::App& app, CompareOptions& options);
-
 /// Collective. One table of all finished registration runs, as Markdown and, beside it, as CSV; one
 /// of pairs below it when runs have both renderers.
-void run_compare(const CompareOptions& options, const Communicator& world);
+cli::SubCommand compare_command(CLI::App& app);
 
 }  // namespace af::evaluation

@@ -13,7 +13,6 @@
 #include "base/error.h"
 #include "base/toml_text.h"
 #include "cli/app_main.h"
-#include "cli/bind_options.h"
 #include "cli/run_limits.h"
 #include "evaluate/methods/loaded_methods.h"
 #include "evaluate/outputs/failed_start.h"
@@ -461,18 +460,7 @@ RegistrationStudyOptions RegistrationStudyOptions::in_force() const {
   return options;
 }
 
-CLI::App* bind_registration(CLI::App& app, RegistrationStudyOptions& options) {
-  CLI::App* command = app.add_subcommand(
-      "registration",
-      "Registers the cases of a study from starts at stated distances from the gold pose and "
-      "reports TRE and success (the paper's Table II, Figs. 15 and 16)");
-  cli::bind_options(*command, options);
-  cli::bind_run_limits(*command);
-  command->parse_complete_callback([&options, command] {
-    options.shared_by_repeats = cli::given_options(*command, kNotOfRepeats);
-  });
-  return command;
-}
+namespace {
 
 void run_registration(const RegistrationStudyOptions& options,
                       const std::string& command_line,
@@ -548,6 +536,25 @@ void run_registration(const RegistrationStudyOptions& options,
     run.finish(summary, provenance);
     print_outcome(summary, folder, world);
   });
+}
+
+}  // namespace
+
+cli::SubCommand registration_command(CLI::App& app, const std::string& program) {
+  auto options = std::make_shared<RegistrationStudyOptions>();
+  options->program = program;
+  cli::SubCommand command = cli::sub_command(
+      app,
+      "registration",
+      "Registers the cases of a study from starts at stated distances from the gold pose and "
+      "reports TRE and success (the paper's Table II, Figs. 15 and 16)",
+      run_registration,
+      options);
+  cli::bind_run_limits(*command.app);
+  command.app->parse_complete_callback([options, app = command.app] {
+    options->shared_by_repeats = cli::given_options(*app, kNotOfRepeats);
+  });
+  return command;
 }
 
 }  // namespace af::evaluation

@@ -7,12 +7,11 @@
 #include <string>
 #include <vector>
 
-#include "cli/app_forward.h"
 #include "cli/run_limits.h"
+#include "cli/sub_command.h"
 #include "evaluate/methods/evaluated_methods.h"
 #include "evaluate/starts/perturbed_starts.h"
 #include "evaluate/statistics/success_rate.h"
-#include "parallel/communicator.h"
 #include "register/uncertainty/uncertainty_estimator.h"
 
 namespace af::evaluation {
@@ -53,15 +52,10 @@ struct RegistrationStudyOptions : MethodOptions {
 
 std::vector<std::string> problems(const RegistrationStudyOptions& options);
 
-/// Adds the subcommand; returns it.
-CLI::App* bind_registration(CLI::App& app, RegistrationStudyOptions& options);
-
 /// Collective. Registers a study's cases from starts about gold (Sec. IV-B), or takes the poses
 /// that another program found, and writes starts.csv (before anything is registered),
 /// registrations.csv, figures, overlays, summary.json and reproduce.sh. Finished registrations are
 /// kept in OUTPUT.progress/ until all is written; StoppedError when SIGUSR1 asked for a stop.
-void run_registration(const RegistrationStudyOptions& options,
-                      const std::string& command_line,
-                      const Communicator& world);
+cli::SubCommand registration_command(CLI::App& app, const std::string& program);
 
 }  // namespace af::evaluation

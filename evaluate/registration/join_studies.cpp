@@ -4,10 +4,7 @@
 #include <iostream>
 #include <set>
 
-#include <CLI/CLI.hpp>
-
 #include "base/error.h"
-#include "cli/bind_options.h"
 #include "files/output_file.h"
 #include "run/terminal.h"
 #include "study/rig_file.h"
@@ -31,15 +28,6 @@ void JoinStudiesOptions::describe(Fields& field) {
         "Name every view's field: a path, relative to the new study, with {case} and {camera}, "
         "such as fields/{case}-{camera}.af.h5 (default: as the studies do)");
   field("output", output, "The study to write").as("-o,--output");
-}
-
-CLI::App* bind_join_studies(CLI::App& app, JoinStudiesOptions& options) {
-  CLI::App* command = app.add_subcommand(
-      "join-studies",
-      "One study.toml of the cases of several, which must have the same cameras: a study of many "
-      "patients, for `registration`, `image-quality` and `field-parameters`");
-  cli::bind_options(*command, options);
-  return command;
 }
 
 Study joined_study(const std::vector<Study>& studies,
@@ -70,7 +58,11 @@ Study joined_study(const std::vector<Study>& studies,
   return joined;
 }
 
-void run_join_studies(const JoinStudiesOptions& options, const Communicator& world) {
+namespace {
+
+void run_join_studies(const JoinStudiesOptions& options,
+                      const std::string& /*command_line*/,
+                      const Communicator& world) {
   all_or_none(world, [&] {
     if (!world.is_root()) return;
     announce_output(options.output);
@@ -86,6 +78,17 @@ void run_join_studies(const JoinStudiesOptions& options, const Communicator& wor
               << (joined.cases.size() == 1 ? " case: " : " cases: ") << options.output.string()
               << '\n';
   });
+}
+
+}  // namespace
+
+cli::SubCommand join_studies_command(CLI::App& app) {
+  return cli::sub_command(
+      app,
+      "join-studies",
+      "One study.toml of the cases of several, which must have the same cameras: a study of many "
+      "patients, for `registration`, `image-quality` and `field-parameters`",
+      run_join_studies);
 }
 
 }  // namespace af::evaluation

@@ -6,8 +6,7 @@
 #include <vector>
 
 #include "base/described_fields.h"
-#include "cli/app_forward.h"
-#include "parallel/communicator.h"
+#include "cli/sub_command.h"
 #include "study/study_file.h"
 
 namespace af::evaluation {
@@ -21,9 +20,6 @@ struct JoinStudiesOptions {
   void describe(Fields& field);
 };
 
-/// Adds the subcommand; returns it.
-CLI::App* bind_join_studies(CLI::App& app, JoinStudiesOptions& options);
-
 /// One study of all cases, with the first one's rig. InputError when rigs differ or two cases have
 /// one name. \test JoinedStudy.HasAllCasesAndTheirFields
 Study joined_study(const std::vector<Study>& studies,
@@ -31,6 +27,6 @@ Study joined_study(const std::vector<Study>& studies,
                    const std::filesystem::path& path);
 
 /// Reads, joins and writes on rank 0.
-void run_join_studies(const JoinStudiesOptions& options, const Communicator& world);
+cli::SubCommand join_studies_command(CLI::App& app);
 
 }  // namespace af::evaluation

@@ -3,9 +3,6 @@
 
 #include <iostream>
 
-#include <CLI/CLI.hpp>
-
-#include "cli/bind_options.h"
 #include "evaluate/report/report_page.h"
 #include "figures/gnuplot_figure.h"
 #include "files/output_file.h"
@@ -20,18 +17,11 @@ void ReportOptions::describe(Fields& field) {
   field("title", title, "Its title (default: made from the cases' names)");
 }
 
-CLI::App* bind_report(CLI::App& app, ReportOptions& options) {
-  CLI::App* command = app.add_subcommand(
-      "report",
-      "One self-contained HTML page of finished runs, side by side when there are several: "
-      "findings "
-      "in plain words, figures, tables that sort, overlays, failures with their searches and the "
-      "commands that repeat them, provenance; opens offline, prints well");
-  cli::bind_options(*command, options);
-  return command;
-}
+namespace {
 
-void run_report(const ReportOptions& options, const Communicator& world) {
+void run_report(const ReportOptions& options,
+                const std::string& /*command_line*/,
+                const Communicator& world) {
   all_or_none(world, [&] {
     if (!world.is_root()) return;
     require_gnuplot();
@@ -40,6 +30,19 @@ void run_report(const ReportOptions& options, const Communicator& world) {
     write_text_file(options.output, report_page(runs, options.output, options.title));
     std::cout << "report of " << runs.size() << " run(s): " << options.output.string() << '\n';
   });
+}
+
+}  // namespace
+
+cli::SubCommand report_command(CLI::App& app) {
+  return cli::sub_command(
+      app,
+      "report",
+      "One self-contained HTML page of finished runs, side by side when there are several: "
+      "findings "
+      "in plain words, figures, tables that sort, overlays, failures with their searches and the "
+      "commands that repeat them, provenance; opens offline, prints well",
+      run_report);
 }
 
 }  // namespace af::evaluation

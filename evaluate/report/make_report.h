@@ -6,8 +6,7 @@
 #include <vector>
 
 #include "base/described_fields.h"
-#include "cli/app_forward.h"
-#include "parallel/communicator.h"
+#include "cli/sub_command.h"
 
 namespace af::evaluation {
 
@@ -20,10 +19,7 @@ struct ReportOptions {
   void describe(Fields& field);
 };
 
-/// Adds the subcommand; returns it.
-CLI::App* bind_report(CLI::App& app, ReportOptions& options);
-
 /// Collective; rank 0 works. Writes the report of finished runs.
-void run_report(const ReportOptions& options, const Communicator& world);
+cli::SubCommand report_command(CLI::App& app);
 
 }  // namespace af::evaluation

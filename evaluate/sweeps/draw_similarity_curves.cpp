@@ -9,10 +9,7 @@
 #include <optional>
 #include <tuple>
 
-#include <CLI/CLI.hpp>
-
 #include "base/error.h"
-#include "cli/bind_options.h"
 #include "evaluate/methods/loaded_methods.h"
 #include "evaluate/outputs/result_figures.h"
 #include "evaluate/outputs/row_gathering.h"
@@ -263,17 +260,7 @@ SimilarityCurvesOptions SimilarityCurvesOptions::in_force() const {
   return options;
 }
 
-CLI::App* bind_similarity_curves(CLI::App& app, SimilarityCurvesOptions& options) {
-  CLI::App* command = app.add_subcommand(
-      "similarity-curves",
-      "Similarity along each of the six pose parameters about the gold pose, by field and by ray "
-      "casting (the paper's Fig. 14): where the maxima lie and which axis is broadest");
-  options.renderer = "both";
-  options.method.preset = "paper";
-  cli::bind_options(*command, options);
-  cli::bind_run_limits(*command);
-  return command;
-}
+namespace {
 
 void run_similarity_curves(const SimilarityCurvesOptions& options,
                            const std::string& command_line,
@@ -339,6 +326,23 @@ void run_similarity_curves(const SimilarityCurvesOptions& options,
     print_maxima(curves, summary["renderers"]);
     std::cout << "results: " << folder.string() << '\n';
   });
+}
+
+}  // namespace
+
+cli::SubCommand similarity_curves_command(CLI::App& app) {
+  auto options = std::make_shared<SimilarityCurvesOptions>();
+  options->renderer = "both";
+  options->method.preset = "paper";
+  cli::SubCommand command = cli::sub_command(
+      app,
+      "similarity-curves",
+      "Similarity along each of the six pose parameters about the gold pose, by field and by ray "
+      "casting (the paper's Fig. 14): where the maxima lie and which axis is broadest",
+      run_similarity_curves,
+      options);
+  cli::bind_run_limits(*command.app);
+  return command;
 }
 
 }  // namespace af::evaluation

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "cli/run_limits.h"
+#include "cli/sub_command.h"
 #include "evaluate/methods/evaluated_methods.h"
-#include "parallel/communicator.h"
 
 namespace af::evaluation {
 
@@ -28,15 +28,9 @@ struct SimilarityCurvesOptions : MethodOptions {
 
 std::vector<std::string> problems(const SimilarityCurvesOptions& options);
 
-/// Adds the subcommand; returns it. Its defaults are both renderers and the preset paper: a curve
-/// is of one measure.
-CLI::App* bind_similarity_curves(CLI::App& app, SimilarityCurvesOptions& options);
-
 /// Collective. The similarity along each pose parameter about the gold pose (Fig. 14), by the
 /// objective of the preset's last pass; writes similarity-curves.csv, maxima.csv, the figure,
 /// summary.json and reproduce.sh.
-void run_similarity_curves(const SimilarityCurvesOptions& options,
-                           const std::string& command_line,
-                           const Communicator& world);
+cli::SubCommand similarity_curves_command(CLI::App& app);
 
 }  // namespace af::evaluation

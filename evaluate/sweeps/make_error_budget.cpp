@@ -5,10 +5,7 @@
 #include <iostream>
 #include <sstream>
 
-#include <CLI/CLI.hpp>
-
 #include "base/error.h"
-#include "cli/bind_options.h"
 #include "evaluate/outputs/sample_summary_json.h"
 #include "evaluate/report/evaluation_run.h"
 #include "evaluate/statistics/success_rate.h"
@@ -178,16 +175,7 @@ void ErrorBudgetOptions::describe(Fields& field) {
   field("output", output_folder, "Folder for the results").as("-o,--output").required();
 }
 
-CLI::App* bind_error_budget(CLI::App& app, ErrorBudgetOptions& options) {
-  CLI::App* command = app.add_subcommand(
-      "error-budget",
-      "What each part of the chain from CT to pose adds to the error: finished registration runs "
-      "of "
-      "one case from the same starts, each different from the one before in one thing "
-      "(jobs/error-budget.sh makes them)");
-  cli::bind_options(*command, options);
-  return command;
-}
+namespace {
 
 void run_error_budget(const ErrorBudgetOptions& options,
                       const std::string& command_line,
@@ -214,6 +202,19 @@ void run_error_budget(const ErrorBudgetOptions& options,
     write_results_last(options.output_folder / "summary.json", summary, provenance);
     std::cout << text << "results: " << options.output_folder.string() << '\n';
   });
+}
+
+}  // namespace
+
+cli::SubCommand error_budget_command(CLI::App& app) {
+  return cli::sub_command(
+      app,
+      "error-budget",
+      "What each part of the chain from CT to pose adds to the error: finished registration runs "
+      "of "
+      "one case from the same starts, each different from the one before in one thing "
+      "(jobs/error-budget.sh makes them)",
+      run_error_budget);
 }
 
 }  // namespace af::evaluation

@@ -6,8 +6,7 @@
 #include <vector>
 
 #include "base/described_fields.h"
-#include "cli/app_forward.h"
-#include "parallel/communicator.h"
+#include "cli/sub_command.h"
 
 namespace af::evaluation {
 
@@ -19,15 +18,10 @@ struct ErrorBudgetOptions {
   void describe(Fields& field);
 };
 
-/// Adds the subcommand; returns it.
-CLI::App* bind_error_budget(CLI::App& app, ErrorBudgetOptions& options);
-
 /// Collective. How far each change of a chain of finished registration runs of one case moves the
 /// mean end, beside the optimiser's scatter and the gold standard's own uncertainty: prints
 /// error-budget.md and writes it, error-budget.csv, summary.json and reproduce.sh. InputError: runs
 /// of several cases or methods, or from other starts.
-void run_error_budget(const ErrorBudgetOptions& options,
-                      const std::string& command_line,
-                      const Communicator& world);
+cli::SubCommand error_budget_command(CLI::App& app);
 
 }  // namespace af::evaluation

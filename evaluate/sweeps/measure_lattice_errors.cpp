@@ -8,12 +8,9 @@
 #include <map>
 #include <memory>
 
-#include <CLI/CLI.hpp>
-
 #include "base/error.h"
 #include "base/sample_summary.h"
 #include "base/thread_pool.h"
-#include "cli/bind_options.h"
 #include "drr/drr_renderer.h"
 #include "evaluate/methods/loaded_methods.h"
 #include "evaluate/outputs/table_paths.h"
@@ -183,17 +180,11 @@ void LatticeErrorsOptions::describe(Fields& field) {
   field("output", output, "The Markdown file; the CSV takes its name, .csv").as("-o,--output");
 }
 
-CLI::App* bind_lattice_errors(CLI::App& app, LatticeErrorsOptions& options) {
-  CLI::App* command = app.add_subcommand(
-      "lattice-errors",
-      "Whether registrations lean towards the nodes of the fields: X-rays by ray casting at true "
-      "poses that step through a cell, each registered from 1 mm beside it; the error's dependence "
-      "on the fraction of a cell, and with --renderer both the same by ray casting");
-  cli::bind_options(*command, options);
-  return command;
-}
+namespace {
 
-void run_lattice_errors(const LatticeErrorsOptions& options, const Communicator& world) {
+void run_lattice_errors(const LatticeErrorsOptions& options,
+                        const std::string& /*command_line*/,
+                        const Communicator& world) {
   const std::filesystem::path csv = csv_beside(options.output);
   std::vector<std::string> warnings;
   all_or_none(world, [&] {
@@ -226,6 +217,18 @@ void run_lattice_errors(const LatticeErrorsOptions& options, const Communicator&
     write_text_file(options.output, text);
     std::cout << text;
   });
+}
+
+}  // namespace
+
+cli::SubCommand lattice_errors_command(CLI::App& app) {
+  return cli::sub_command(
+      app,
+      "lattice-errors",
+      "Whether registrations lean towards the nodes of the fields: X-rays by ray casting at true "
+      "poses that step through a cell, each registered from 1 mm beside it; the error's dependence "
+      "on the fraction of a cell, and with --renderer both the same by ray casting",
+      run_lattice_errors);
 }
 
 }  // namespace af::evaluation

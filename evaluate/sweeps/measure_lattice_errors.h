@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "cli/sub_command.h"
 #include "evaluate/methods/evaluated_methods.h"
-#include "parallel/communicator.h"
 
 namespace af::evaluation {
 
@@ -21,13 +21,10 @@ struct LatticeErrorsOptions : MethodOptions {
 
 std::vector<std::string> problems(const LatticeErrorsOptions& options);
 
-/// Adds the subcommand; returns it.
-CLI::App* bind_lattice_errors(CLI::App& app, LatticeErrorsOptions& options);
-
 /// Collective. Whether ends of registrations depend on where in the cells of the fields the true
 /// pose lies: makes X-rays by ray casting at poses that step through a cell, so that the fields are
 /// the only error, registers each from the same start beside it, and writes a table of amplitudes
 /// (Markdown) and the errors of all poses (CSV beside it). Rank 0 does the work.
-void run_lattice_errors(const LatticeErrorsOptions& options, const Communicator& world);
+cli::SubCommand lattice_errors_command(CLI::App& app);
 
 }  // namespace af::evaluation

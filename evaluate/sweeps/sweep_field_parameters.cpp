@@ -10,10 +10,7 @@
 #include <optional>
 #include <set>
 
-#include <CLI/CLI.hpp>
-
 #include "base/error.h"
-#include "cli/bind_options.h"
 #include "drr/ray_cast_drr.h"
 #include "drr/two_pass_af_drr.h"
 #include "evaluate/image_quality/image_quality_tables.h"
@@ -322,19 +319,7 @@ FieldParametersOptions FieldParametersOptions::in_force() const {
   return options;
 }
 
-CLI::App* bind_field_parameters(CLI::App& app, FieldParametersOptions& options) {
-  CLI::App* command = app.add_subcommand(
-      "field-parameters",
-      "PSNR of a camera's fields against each of the four field parameters, with memory, creation "
-      "time and compression (the paper's Fig. 10 and Table I); builds the fields that are missing");
-  PrecomputeOptions& base = options.base;
-  base.max_translation_mm = 30.0;
-  base.preset = "paper";
-  base.training_fraction = 0.1;  // the paper's
-  cli::bind_options(*command, options);
-  cli::bind_run_limits(*command);
-  return command;
-}
+namespace {
 
 void run_field_parameters(const FieldParametersOptions& options,
                           const std::string& command_line,
@@ -367,6 +352,25 @@ void run_field_parameters(const FieldParametersOptions& options,
     if (!world.is_root()) return;
     write_results(options, results, difference_images, run, provenance);
   });
+}
+
+}  // namespace
+
+cli::SubCommand field_parameters_command(CLI::App& app) {
+  auto options = std::make_shared<FieldParametersOptions>();
+  PrecomputeOptions& base = options->base;
+  base.max_translation_mm = 30.0;
+  base.preset = "paper";
+  base.training_fraction = 0.1;  // the paper's
+  cli::SubCommand command = cli::sub_command(
+      app,
+      "field-parameters",
+      "PSNR of a camera's fields against each of the four field parameters, with memory, creation "
+      "time and compression (the paper's Fig. 10 and Table I); builds the fields that are missing",
+      run_field_parameters,
+      options);
+  cli::bind_run_limits(*command.app);
+  return command;
 }
 
 }  // namespace af::evaluation

@@ -6,9 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "cli/app_forward.h"
 #include "cli/run_limits.h"
-#include "parallel/communicator.h"
+#include "cli/sub_command.h"
 #include "precompute/plan/precompute_options.h"
 
 namespace af::evaluation {
@@ -34,16 +33,11 @@ struct FieldParametersOptions {
 
 std::vector<std::string> problems(const FieldParametersOptions& options);
 
-/// Adds the subcommand; returns it.
-CLI::App* bind_field_parameters(CLI::App& app, FieldParametersOptions& options);
-
 /// Collective. Image quality of fields against each of the four field parameters, the others as in
 /// the base setting (Fig. 10), with memory, creation time and compression (Table I), and difference
 /// images at three qualities (Fig. 9): of one camera, or of all views of a study together. Fields
 /// are built once and kept in a folder; one that is there with the same options is reused. Writes
 /// what write_sweep() and write_difference_images() write, summary.json and reproduce.sh.
-void run_field_parameters(const FieldParametersOptions& options,
-                          const std::string& command_line,
-                          const Communicator& world);
+cli::SubCommand field_parameters_command(CLI::App& app);
 
 }  // namespace af::evaluation
