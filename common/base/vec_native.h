@@ -139,6 +139,17 @@ AF_NATIVE_INLINE Floats gather(const float* base, Ints offset) {
 #endif
 }
 
+/// True when any lane of a comparison's result is set.
+AF_NATIVE_INLINE bool any(Ints mask) {
+#if AF_VECTOR_BITS == 512
+  return _mm512_movepi32_mask(reinterpret_cast<__m512i>(mask)) != 0;
+#elif AF_VECTOR_BITS == 256
+  return _mm256_movemask_ps(reinterpret_cast<__m256>(mask)) != 0;
+#else
+  return _mm_movemask_ps(reinterpret_cast<__m128>(mask)) != 0;
+#endif
+}
+
 #if AF_VECTOR_BITS >= 256
 /// True when any lane has any of the bits set.
 AF_NATIVE_INLINE bool any_bit(Ints value, int32_t bits) {

@@ -41,16 +41,11 @@ RenderStatus PolychromaticDrr::render(const RigidTransform& room_from_ct,
       all_->render(room_from_ct, view, *scratch.all, total_attenuation, gradients);
   const RenderStatus bone_status =
       bone_->render(room_from_ct, view, *scratch.bone, scratch.bone_values, of_bone);
-  for (std::size_t i = 0; i < pixels; ++i) {
-    const PolychromaticAttenuation::Value value = attenuation_->at(
-        static_cast<double>(total_attenuation[i]), static_cast<double>(scratch.bone_values[i]));
-    total_attenuation[i] = static_cast<float>(value.attenuation);
-    if (!gradients) continue;
-    const auto by_all = static_cast<float>(value.by_all);
-    const auto by_bone = static_cast<float>(value.by_bone);
-    for (std::size_t k = i; k < gradients->planes.size(); k += pixels)
-      gradients->planes[k] = by_all * gradients->planes[k] + by_bone * scratch.bone_planes[k];
-  }
+  if (gradients)
+    attenuation_->apply(
+        total_attenuation, scratch.bone_values, gradients->planes, scratch.bone_planes);
+  else
+    attenuation_->apply(total_attenuation, scratch.bone_values);
   return {std::max(status.rays_outside, bone_status.rays_outside)};
 }
 

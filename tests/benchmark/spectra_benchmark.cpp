@@ -160,7 +160,7 @@ void print_rows(const Options& options, const Communicator& world) {
                   fit.slope(),
                   fit.rms_about_line());
       if (options.timing_drrs > 0)
-        std::printf(" %.1f |", milliseconds(*loaded.problem, gold, options.timing_drrs));
+        std::printf(" %.3f |", milliseconds(*loaded.problem, gold, options.timing_drrs));
       std::printf("\n");
     }
   }
