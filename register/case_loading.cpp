@@ -216,11 +216,10 @@ void use_fields(const StudyCase& study_case,
           return field_of_view(path, study_case, options, ct, communicator);
         });
     const std::string name = "field " + view.view.camera.name;
-    std::shared_ptr<const CompressedAttenuationField> bone;
+    std::optional<OpenedField> bone;
     if (options.beam.needs_bone()) {
-      FieldFileInfo bone_info;
-      bone = opened.bone_field(communicator, &bone_info);
-      loaded.input_sha256["bone " + name] = bone_info.payload_sha256;
+      bone = opened.bone(communicator);
+      loaded.input_sha256["bone " + name] = bone->info().payload_sha256;
     }
     use_field(opened, bone, problem.frame(), options, communicator, view);
     loaded.input_notes[name] = limit_to_rays(opened, problem.frame(), communicator, view);

@@ -154,49 +154,58 @@ XrayBeam beam_of(const FieldIdentity& identity,
   });
 }
 
-/// Collective. An atlas's renderers for a view. Members that poses near the nominal one need are
-/// held once per node; a search that goes farther opens others, each rank for itself. Their levels
-/// carry about the same blur; that of the nominal pose's member is taken.
-void use_atlas(const OpenedField& opened,
-               const PoseFrame& nominal,
-               const CaseLoadOptions& options,
-               const Communicator& communicator,
-               RegistrationView& view) {
-  const auto pool = options.pool ? options.pool : std::make_shared<ThreadPool>();
+/// As many levels as every field of a file has.
+int level_count(const OpenedField& opened, const CaseLoadOptions& options) {
   int levels = std::numeric_limits<int>::max();
   for (const auto& planes : opened.coverage().planes)
     levels = std::min(levels, level_count(*planes, options));
-  std::vector<std::uint64_t> near = members_in_reach(opened, nominal, view.view);
+  return levels;
+}
+
+/// Threads for a view's levels: the session's, or some of their own where it has none.
+struct LevelThreads {
+  std::shared_ptr<ThreadPool> own;  ///< of the level that is looked up most; may be null
+  std::shared_ptr<ThreadPool> coarse;
+};
+
+/// Collective. An atlas's renderers for a view. Members that poses near the nominal one need are
+/// held once per node; a search that goes farther opens others, each rank for itself. Their levels
+/// carry about the same blur; that of the nominal pose's member is taken.
+FieldLevelRenderers renderers_of_atlas(const OpenedField& opened,
+                                       int levels,
+                                       const PoseFrame& nominal,
+                                       const View& view,
+                                       const LevelThreads& threads,
+                                       const Communicator& communicator) {
+  std::vector<std::uint64_t> near = members_in_reach(opened, nominal, view);
   std::vector<std::byte> bytes = bytes_of(near);
   communicator.broadcast(bytes);
   near = value_of<std::vector<std::uint64_t>>(bytes, "the members of rank 0");
-  const auto open = [opened, levels, pool, own_pool = options.pool](std::size_t member) {
+  const auto open = [opened, levels, threads](std::size_t member) {
     return std::make_shared<const MemberLevels>(
-        renderers_of(
-            opened.member(member, Communicator::alone()), levels, own_pool, pool, process_memory())
+        renderers_of(opened.member(member, Communicator::alone()),
+                     levels,
+                     threads.own,
+                     threads.coarse,
+                     process_memory())
             .renderers);
   };
   const auto members =
       std::make_shared<MembersInUse>(open, near.size() + OpenedField::kMembersKept);
-  std::vector<double> blur_sigma_mm;
+  FieldLevelRenderers set;
   for (const std::uint64_t i : near) {
     const FieldLevelRenderers made = renderers_of(opened.member(i, communicator),
                                                   levels,
-                                                  options.pool,
-                                                  pool,
-                                                  node_memory(communicator, *pool));
+                                                  threads.own,
+                                                  threads.coarse,
+                                                  node_memory(communicator, *threads.coarse));
     members->keep(i, std::make_shared<const MemberLevels>(made.renderers));
-    if (blur_sigma_mm.empty()) blur_sigma_mm = made.blur_sigma_mm;
+    if (set.blur_sigma_mm.empty()) set.blur_sigma_mm = made.blur_sigma_mm;
   }
-  const XrayBeam beam = beam_of(opened.identity(), options, communicator);
-  const auto level = [&](std::size_t of) {
-    return beam.renderer(
-        std::make_shared<const FieldSetDrr>(atlas_level(opened.coverage().planes, members, of)),
-        nullptr);
-  };
-  view.renderer = level(0);
-  for (std::size_t i = 0; i < blur_sigma_mm.size(); ++i)
-    view.coarse_levels.push_back({level(i + 1), blur_sigma_mm[i]});
+  for (std::size_t level = 0; level <= set.blur_sigma_mm.size(); ++level)
+    set.renderers.push_back(
+        std::make_shared<const FieldSetDrr>(atlas_level(opened.coverage().planes, members, level)));
+  return set;
 }
 
 }  // namespace
@@ -247,22 +256,28 @@ std::vector<RendererLevel> coarse_ray_casts(const CastVolumes& volumes,
 }
 
 void use_field(const OpenedField& opened,
-               const std::shared_ptr<const CompressedAttenuationField>& bone,
+               const std::optional<OpenedField>& bone,
                const PoseFrame& nominal,
                const CaseLoadOptions& options,
                const Communicator& communicator,
                RegistrationView& view) {
-  if (opened.atlas()) return use_atlas(opened, nominal, options, communicator, view);
-  const auto pool = options.pool ? options.pool : std::make_shared<ThreadPool>();
-  int levels = level_count(opened.field()->light_slab, options);
-  if (bone) levels = std::min(levels, level_count(bone->light_slab, options));
-  const auto renderers = [&](const std::shared_ptr<const CompressedAttenuationField>& field) {
-    return renderers_of(field, levels, options.pool, pool, node_memory(communicator, *pool));
+  const LevelThreads threads{options.pool,
+                             options.pool ? options.pool : std::make_shared<ThreadPool>()};
+  int levels = level_count(opened, options);
+  if (bone) levels = std::min(levels, level_count(*bone, options));
+  const auto renderers = [&](const OpenedField& of) {
+    if (of.atlas())
+      return renderers_of_atlas(of, levels, nominal, view.view, threads, communicator);
+    return renderers_of(of.field(),
+                        levels,
+                        threads.own,
+                        threads.coarse,
+                        node_memory(communicator, *threads.coarse));
   };
-  FieldLevelRenderers all = renderers(opened.field());
+  FieldLevelRenderers all = renderers(opened);
   FieldLevelRenderers of_bone;
   if (bone) {
-    of_bone = renderers(bone);
+    of_bone = renderers(*bone);
     all.renderers.resize(std::min(all.renderers.size(), of_bone.renderers.size()));
     all.blur_sigma_mm.resize(all.renderers.size() - 1);
   }

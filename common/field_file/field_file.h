@@ -135,14 +135,11 @@ std::shared_ptr<const CompressedAttenuationField> read_field(const std::filesyst
                                                              const Communicator& communicator,
                                                              FieldFileInfo* info = nullptr);
 
-/// Collective. The field of bone's part that belongs to a field of all: FileError, beside those of
-/// read_field(), when it is missing, or of all of a CT, of another CT or another attenuation. Its
-/// camera, range and design may be others.
-std::shared_ptr<const CompressedAttenuationField> read_bone_field(
-    const std::filesystem::path& path,
-    const CompressedAttenuationField& of_all,
-    const Communicator& communicator,
-    FieldFileInfo* info = nullptr);
+/// FileError when a field or an atlas, in the file `path`, is not of the bone's part that belongs
+/// to one of all: it must be of the same CT and attenuation.
+void require_bone_of(const FieldIdentity& all,
+                     const FieldIdentity& found,
+                     const std::filesystem::path& path);
 
 /// Collective. As read_field(), of either material.
 std::shared_ptr<const CompressedAttenuationField> read_field_of_any_material(

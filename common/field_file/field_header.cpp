@@ -167,7 +167,7 @@ std::string payload_hash(const FileHeader& header) {
   return payload_hash(datasets, rules, index_sha256);
 }
 
-/// An atlas is of one CT, all of it, and so are its members.
+/// An atlas is of one CT, all of it or its bone, and so are its members.
 void require_same_origin(const AttenuationAtlas& atlas, const std::filesystem::path& path) {
   const FieldIdentity& all = atlas.identity;
   for (std::size_t i = 0; i < atlas.members.size(); ++i) {
@@ -182,11 +182,11 @@ void require_same_origin(const AttenuationAtlas& atlas, const std::filesystem::p
                       member_group(i) + "/identity",
                       "the attenuation of water and of air of the atlas",
                       "others");
-    if (one.material != FieldMaterial::All)
+    if (one.material != all.material)
       throw FileError(path.string(),
                       field_layout::member_group(i) + "/material",
-                      "none: members of an atlas hold all of the CT",
-                      "bone alone");
+                      "that of the atlas's first member",
+                      "another");
   }
 }
 
@@ -235,6 +235,7 @@ AttenuationAtlas FileHeader::atlas(const std::string& path) const {
     CompressedAttenuationField field = header.field(path);
     atlas.members.push_back({std::move(field.identity), std::move(field.light_slab)});
   }
+  if (!atlas.members.empty()) atlas.identity.material = atlas.members.front().identity.material;
   return atlas;
 }
 

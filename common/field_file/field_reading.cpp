@@ -138,37 +138,21 @@ std::shared_ptr<const CompressedAttenuationField> read_field(const std::filesyst
   return field;
 }
 
-std::shared_ptr<const CompressedAttenuationField> read_bone_field(
-    const std::filesystem::path& path,
-    const CompressedAttenuationField& of_all,
-    const Communicator& communicator,
-    FieldFileInfo* info) {
-  all_or_none(communicator, [&] {
-    if (!std::filesystem::exists(path))
-      throw FileError(path.string(),
-                      "does not exist: a tube voltage needs the field of the CT's bone, which "
-                      "af-precompute --material bone makes with the other options of the field "
-                      "beside it");
-  });
-  auto field = read_field_of_any_material(path, communicator, info);
-  const FieldIdentity& wanted = of_all.identity;
-  const FieldIdentity& found = field->identity;
-  all_or_none(communicator, [&] {
-    if (found.material != FieldMaterial::Bone)
-      throw FileError(path.string(), "/material", "a field of the CT's bone alone", "of all of it");
-    if (found.ct_content_sha256 != wanted.ct_content_sha256)
-      throw FileError(path.string(),
-                      "CT of the field (ct_content_sha256)",
-                      wanted.ct_content_sha256 + " (that of the field of all)",
-                      found.ct_content_sha256);
-    if (found.mu_water_per_mm != wanted.mu_water_per_mm ||
-        found.air_below_hu != wanted.air_below_hu)
-      throw FileError(path.string(),
-                      "attenuation",
-                      "mu_water and the HU that count as air as in the field of all",
-                      "others");
-  });
-  return field;
+void require_bone_of(const FieldIdentity& all,
+                     const FieldIdentity& found,
+                     const std::filesystem::path& path) {
+  if (found.material != FieldMaterial::Bone)
+    throw FileError(path.string(), "/material", "a field of the CT's bone alone", "of all of it");
+  if (found.ct_content_sha256 != all.ct_content_sha256)
+    throw FileError(path.string(),
+                    "CT of the field (ct_content_sha256)",
+                    all.ct_content_sha256 + " (that of the field of all)",
+                    found.ct_content_sha256);
+  if (found.mu_water_per_mm != all.mu_water_per_mm || found.air_below_hu != all.air_below_hu)
+    throw FileError(path.string(),
+                    "attenuation",
+                    "mu_water and the HU that count as air as in the field of all",
+                    "others");
 }
 
 std::shared_ptr<const CompressedAttenuationField> read_field_of_any_material(

@@ -129,6 +129,8 @@ FileContents contents_of(const AttenuationAtlas& atlas, IndexPacking packing) {
     append(field_layout::within(group, field_layout::datasets_of(member)), contents.payload);
     append(field_layout::within(group, field_layout::range_datasets(member.identity.range)),
            contents.beside);
+    append(field_layout::within(group, field_layout::material_datasets(member.identity.material)),
+           contents.beside);
   }
   return contents;
 }

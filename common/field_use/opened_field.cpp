@@ -19,6 +19,11 @@ OpenedField::OpenedField(const std::filesystem::path& path,
   communicator.broadcast(kind);
   if (kind == "atlas") {
     atlas_ = read_atlas(path, communicator, &info_);
+    all_or_none(communicator, [&] {
+      if (materials == Materials::All && atlas_->identity.material != FieldMaterial::All)
+        throw FileError(
+            path.string(), "/material", "an atlas of all of the CT", "of its bone alone");
+    });
     coverage_ = FieldCoverage(atlas_);
   } else {
     field_ = materials == Materials::Any ? read_field_of_any_material(path, communicator, &info_)
@@ -31,16 +36,18 @@ std::size_t OpenedField::codewords() const {
   return atlas_ ? atlas_->codebook.size() : field_->codebook.size();
 }
 
-std::shared_ptr<const CompressedAttenuationField> OpenedField::bone_field(
-    const Communicator& communicator, FieldFileInfo* info) const {
+OpenedField OpenedField::bone(const Communicator& communicator) const {
+  const std::filesystem::path path = bone_field_path(path_);
   all_or_none(communicator, [&] {
-    if (atlas_)
-      throw InputError("tube voltage",
-                       "given",
-                       "needs a field of the CT's bone, which an atlas does not have: use fields",
-                       path_.string());
+    if (!std::filesystem::exists(path))
+      throw FileError(path.string(),
+                      "does not exist: a tube voltage needs the field of the CT's bone, which "
+                      "af-precompute --material bone makes with the other options of the field "
+                      "beside it");
   });
-  return read_bone_field(bone_field_path(path_), *field_, communicator, info);
+  OpenedField opened(path, communicator, Materials::Any);
+  all_or_none(communicator, [&] { require_bone_of(identity(), opened.identity(), path); });
+  return opened;
 }
 
 std::shared_ptr<const CompressedAttenuationField> OpenedField::member(

@@ -44,10 +44,9 @@ class OpenedField {
   [[nodiscard]] const FieldCoverage& coverage() const { return coverage_; }
   [[nodiscard]] std::size_t codewords() const;
 
-  /// Collective. The field of the CT's bone beside it, for DRRs of a tube's spectrum. Errors of
-  /// read_bone_field(); InputError for an atlas, which has none.
-  [[nodiscard]] std::shared_ptr<const CompressedAttenuationField> bone_field(
-      const Communicator& communicator, FieldFileInfo* info = nullptr) const;
+  /// Collective. The field or atlas of the CT's bone beside it, for DRRs of a tube's spectrum. The
+  /// two need not be cut alike. FileError where there is none that belongs to it.
+  [[nodiscard]] OpenedField bone(const Communicator& communicator) const;
 
   /// Collective for a communicator of ranks. A member of an atlas.
   [[nodiscard]] std::shared_ptr<const CompressedAttenuationField> member(

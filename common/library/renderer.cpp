@@ -276,8 +276,7 @@ std::shared_ptr<const af::DrrRenderer> renderer_of(const af::OpenedField& opened
   const af::FieldIdentity& identity = opened.identity();
   const af::XrayBeam beam(options, {identity.mu_water_per_mm, identity.air_below_hu});
   std::shared_ptr<const af::DrrRenderer> bone;
-  if (options.needs_bone())
-    bone = af::make_field_renderer(opened.bone_field(af::Communicator::alone()), look_up, pool);
+  if (options.needs_bone()) bone = opened.bone(af::Communicator::alone()).renderer(look_up, pool);
   std::vector<af::FieldSetMember> members = opened.renderers(look_up, pool);
   for (af::FieldSetMember& member : members) member.renderer = beam.renderer(member.renderer, bone);
   if (members.size() == 1) return members.front().renderer;

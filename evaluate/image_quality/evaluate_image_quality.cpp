@@ -68,8 +68,7 @@ struct TargetResult {
 /// Everything a comparison needs, the same on every rank.
 struct Setup {
   std::shared_ptr<const OpenedField> field;
-  std::shared_ptr<const CompressedAttenuationField> bone_field;  ///< none for one energy
-  FieldFileInfo bone_info;
+  std::shared_ptr<const OpenedField> bone;  ///< none for one energy
   NodeCt ct;
   std::vector<RigidTransform> poses;  ///< empty: random ones
   View view;
@@ -116,7 +115,7 @@ Setup load(const ImageQualityOptions& options, const Target& target, const Commu
   Setup setup;
   setup.field = std::make_shared<const OpenedField>(target.field, world);
   if (options.beam.needs_bone())
-    setup.bone_field = setup.field->bone_field(world, &setup.bone_info);
+    setup.bone = std::make_shared<const OpenedField>(setup.field->bone(world));
   const FieldIdentity& identity = setup.field->identity();
   std::vector<std::string> warnings;
   setup.ct = read_ct_per_node(target.ct,
@@ -328,10 +327,10 @@ Renderers renderers_of(const ImageQualityOptions& options,
   const auto beam =
       all_or_none(world, [&] { return XrayBeam(options.beam, setup.ct.volume->model()); });
   const RendererPointer field = setup.field->renderer(options.look_up);
-  if (!setup.bone_field)
+  if (!setup.bone)
     return {beam.renderer(field, nullptr), beam.renderer(cast(setup.ct.volume), nullptr)};
   const auto bone = bone_per_node(*setup.ct.volume, world);
-  const RendererPointer bone_field = make_field_renderer(setup.bone_field, setup.look_up(options));
+  const RendererPointer bone_field = setup.bone->renderer(setup.look_up(options));
   return {beam.renderer(field, bone_field), beam.renderer(cast(setup.ct.volume), cast(bone))};
 }
 
@@ -354,9 +353,9 @@ TargetResult evaluate_target(const ImageQualityOptions& options,
                            world.size(),
                            {{"field " + setup.view.camera.name, setup.field->info().payload_sha256},
                             {"ct", setup.ct.facts.content_sha256}}};
-  if (setup.bone_field)
+  if (setup.bone)
     provenance.input_sha256["bone field " + setup.view.camera.name] =
-        setup.bone_info.payload_sha256;
+        setup.bone->info().payload_sha256;
   all_or_none(world, [&] {
     if (world.is_root() && !options.poses.empty())
       provenance.input_sha256["poses"] = sha256_of_file(options.poses.string());

@@ -354,8 +354,6 @@ std::vector<std::string> problems(const PrecomputeOptions& options) {
   std::vector<std::string> found = problems(options.range());  // UsageError where it is no range
   if (!options.orbit.empty()) (void)orbit_of_text("--orbit", options.orbit);  // likewise
   append(field_problems(options), found);
-  if (options.is_atlas() && options.is_of_bone())
-    found.emplace_back("material = bone: an atlas is of all of a CT; leave --orbit out");
   append(problems(options.codebook_options()), found);
   if (!options.projections.empty() && options.is_of_bone())
     found.push_back(

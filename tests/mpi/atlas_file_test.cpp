@@ -267,6 +267,28 @@ TEST(AtlasFile, RefusesMembersOfAnotherCt) {
   EXPECT_NE(refusal(folder / "a.h5").find("/member_0/identity"), std::string::npos);
 }
 
+TEST(AtlasFile, IsOfBoneAloneWhereAllItsMembersAre) {
+  const test::SharedFolder folder;
+  const Communicator world = Communicator::world();
+  AttenuationAtlas atlas = small_atlas();
+  const std::string of_all = write(atlas, folder / "a.h5").payload_sha256;
+  for (AtlasMember& member : atlas.members) member.identity.material = FieldMaterial::Bone;
+  const std::string of_bone = write(atlas, folder / "a.bone.h5").payload_sha256;
+  EXPECT_EQ(of_bone, of_all);
+  EXPECT_EQ(read_atlas(folder / "a.bone.h5", world)->identity.material, FieldMaterial::Bone);
+  EXPECT_EQ(read_atlas_member(folder / "a.bone.h5", 1, of_bone, world)->identity.material,
+            FieldMaterial::Bone);
+  // FileError where it is thrown, RemoteError on the other ranks.
+  EXPECT_THROW(OpenedField(folder / "a.bone.h5", world), Error);
+  const OpenedField opened(folder / "a.h5", world);
+  EXPECT_EQ(opened.bone(world).info().payload_sha256, of_bone);
+  EXPECT_THROW(opened.bone(world).bone(world), Error);  // a.bone.bone.h5
+  atlas.members[1].identity.material = FieldMaterial::All;
+  write(atlas, folder / "a.h5");
+  EXPECT_NE(refusal(folder / "a.h5").find("/member_1/material"), std::string::npos);
+  world.barrier();  // the folder goes with rank 0
+}
+
 TEST(AtlasFile, RefusesAMemberOfAFileThatHasBecomeAnother) {
   const test::SharedFolder folder;
   const Communicator world = Communicator::world();

@@ -876,18 +876,21 @@ TEST(FieldFile, SaysThatItIsOfBoneAloneBesideThePayload) {
   const auto all = read_field(folder / "a.af.h5", world);
   EXPECT_EQ(all->identity.material, FieldMaterial::All);
   EXPECT_EQ(read_field_header(folder / "a.bone.af.h5").identity.material, FieldMaterial::Bone);
-  const auto bone = read_bone_field(bone_field_path(folder / "a.af.h5"), *all, world);
+  const auto bone = read_field_of_any_material(bone_field_path(folder / "a.af.h5"), world);
   EXPECT_EQ(bone->identity.material, FieldMaterial::Bone);
   // FileError where it is thrown, RemoteError on the other ranks.
   EXPECT_THROW(read_field(folder / "a.bone.af.h5", world), Error);
-  EXPECT_THROW(read_bone_field(folder / "a.af.h5", *all, world), Error);
-  EXPECT_THROW(read_bone_field(folder / "absent.bone.af.h5", *all, world), Error);
-  CompressedAttenuationField other = *all;
-  other.identity.mu_water_per_mm = 0.019;
-  EXPECT_THROW(read_bone_field(folder / "a.bone.af.h5", other, world), Error);
-  other = *all;
-  other.identity.ct_content_sha256 = std::string(64, 'b');
-  EXPECT_THROW(read_bone_field(folder / "a.bone.af.h5", other, world), Error);
+  const auto is_of = [&](const FieldIdentity& wanted, const FieldIdentity& found) {
+    require_bone_of(wanted, found, "a.bone.af.h5");
+  };
+  EXPECT_NO_THROW(is_of(all->identity, bone->identity));
+  EXPECT_THROW(is_of(all->identity, all->identity), FileError);
+  FieldIdentity other = all->identity;
+  other.mu_water_per_mm = 0.019;
+  EXPECT_THROW(is_of(other, bone->identity), FileError);
+  other = all->identity;
+  other.ct_content_sha256 = std::string(64, 'b');
+  EXPECT_THROW(is_of(other, bone->identity), FileError);
 }
 
 TEST(FieldFile, OfBoneStandsBesideTheFieldOfAll) {

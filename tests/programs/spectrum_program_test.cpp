@@ -6,9 +6,14 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
+#include "drr/field_renderer.h"
+#include "drr/field_set_drr.h"
+#include "drr/xray_beam.h"
+#include "field_use/opened_field.h"
 #include "image_files/image_file.h"
 #include "pose_files/pose_file.h"
 #include "programs/small_study.h"
@@ -118,6 +123,38 @@ TEST_F(SpectrumPrograms, RegisterByFieldsAndByRayCasting) {
   EXPECT_LT(result("by-casting").at("tre_mm").get<double>(), 0.5);
   // Study, its case, CT, two fields of all, two of bone, two X-rays.
   EXPECT_EQ(result("by-field").at("provenance").at("input_sha256").size(), 9U);
+}
+
+TEST_F(SpectrumPrograms, AtlasesGiveTheDrrsOfTheirMembersFields) {
+  const std::string orbit =
+      precompute("AP") + "--orbit axis=z,from=-8,to=8,step=8 --codewords 256 ";
+  run(orbit + "-o " + path("turn.af.h5"));
+  run(orbit + "--material bone -o " + path("turn.bone.af.h5"));
+  expect_refused("af-drr --field " + path("turn.bone.af.h5") + " -o " + path("refused.mha"),
+                 4,
+                 "of its bone alone");
+  const Communicator alone = Communicator::alone();
+  const OpenedField all(path("turn.af.h5"), alone);
+  const OpenedField bone = all.bone(alone);
+  const View view = View::whole_detector(all.identity().camera);
+  const RigidTransform nominal = all.identity().frame.nominal_room_from_ct();
+  const std::vector<double> weights = FieldSetDrr(all.renderers("")).weights(nominal, view);
+  const auto middle =
+      static_cast<std::size_t>(std::max_element(weights.begin(), weights.end()) - weights.begin());
+  ASSERT_EQ(weights[middle], 1.0);
+  XrayBeamOptions options;
+  options.spectrum = {70.0, 2.5, options.spectrum.energy_bins};
+  const auto renderer =
+      XrayBeam(options, {all.identity().mu_water_per_mm, all.identity().air_below_hu})
+          .renderer(make_field_renderer(all.member(middle, alone), all.info().look_up),
+                    make_field_renderer(bone.member(middle, alone), all.info().look_up));
+  const std::string by_atlas = "--field " + path("turn.af.h5") + " ";
+  EXPECT_EQ(drr(by_atlas + kTube).pixels, render_image(*renderer, nominal, view).pixels);
+  EXPECT_NE(drr(by_atlas + kTube).pixels, drr(by_atlas).pixels);
+  run("af-register --study " + path("study.toml") + kTube + "--field AP=" + path("turn.af.h5") +
+      " --field LAT=" + path("LAT.af.h5") +
+      " --start-rotation-deg -1,0.5,2.5 --start-translation-mm 0.5,1,4 -o " + path("by-atlas"));
+  EXPECT_LT(result("by-atlas").at("tre_mm").get<double>(), 1.0);
 }
 
 TEST_F(SpectrumPrograms, RefuseWhatDoesNotFit) {

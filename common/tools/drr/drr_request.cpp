@@ -273,7 +273,7 @@ void require_same_subject(const FieldIdentity& wanted,
 }
 
 /// The field, or every member of an atlas, to be looked up in the beam's way; with a tube's
-/// spectrum a field together with that of the bone beside it.
+/// spectrum together with the field or atlas of the bone beside it.
 std::vector<FieldSetMember> renderers_of(const OpenedField& opened,
                                          const DrrOptions& options,
                                          const std::shared_ptr<ThreadPool>& pool,
@@ -281,9 +281,8 @@ std::vector<FieldSetMember> renderers_of(const OpenedField& opened,
   std::vector<FieldSetMember> members = opened.renderers(options.look_up, pool);
   std::shared_ptr<const DrrRenderer> bone;
   if (options.beam.needs_bone())
-    bone = make_field_renderer(opened.bone_field(communicator),
-                               options.look_up.empty() ? opened.info().look_up : options.look_up,
-                               pool);
+    bone = opened.bone(communicator)
+               .renderer(options.look_up.empty() ? opened.info().look_up : options.look_up, pool);
   const FieldIdentity& identity = opened.identity();
   const XrayBeam beam(options.beam, {identity.mu_water_per_mm, identity.air_below_hu});
   for (FieldSetMember& member : members) member.renderer = beam.renderer(member.renderer, bone);
