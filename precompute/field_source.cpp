@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "precompute/field_source.h"
 
+#include <algorithm>
 #include <optional>
 
 #include "base/error.h"
@@ -44,8 +45,13 @@ NamedSource source_of_study(const PrecomputeOptions& options, const Study& study
   source.frame = study_case.frame();
   std::vector<std::string> cameras;
   for (const StudyView& view : study_case.views) cameras.push_back(view.camera);
-  source.camera = options.camera.empty() ? only_camera(cameras, "case '" + study_case.name + "'")
-                                         : options.camera;
+  const std::string where = "case '" + study_case.name + "'";
+  source.camera = options.camera.empty() ? only_camera(cameras, where) : options.camera;
+  if (std::find(cameras.begin(), cameras.end(), source.camera) == cameras.end())
+    throw InputError("--camera",
+                     source.camera,
+                     "must be one that " + where + " has: " + joined(cameras),
+                     options.study);
   return source;
 }
 
