@@ -196,7 +196,7 @@ of_rig 3 'must be above 0' 'DiffDRR with pixels of -3 mm' "$(edited camera-diffd
 of_rig 3 'within 1 and 32768' 'DiffDRR of 2e9 rows' "$(edited camera-diffdrr.txt '0,/^height = .*/s//height = 2000000000/')"
 of_rig 3 'neighbours different' 'DiffDRR with an unknown convention' "$(edited camera-diffdrr.txt '0,/^convention = .*/s//convention = "XXL"/')"
 of_rig 4 'edited-rig.toml' 'not TOML' "$(edited rig.toml '1s/^.*$/= 3/')"
-row 3 "valid/study.toml: --camera = OB: must be one that case 'patient' has: AP, LAT" 'camera that the case does not have' \
+row 3 "valid/study.toml: --camera = OB: must be one that case 'ellipsoids' has: AP, LAT" 'camera that the case does not have' \
   "${precompute[@]}" --study valid/study.toml --camera OB
 of_design() { row "$1" "$2" "$3" "${precompute[@]}" --study valid/study.toml --camera AP "${@:4}"; }
 of_design 3 'max_field_bytes = 0: must be at least 1' 'no size' --max-field-size 0

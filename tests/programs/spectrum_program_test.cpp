@@ -126,8 +126,7 @@ TEST_F(SpectrumPrograms, RegisterByFieldsAndByRayCasting) {
 }
 
 TEST_F(SpectrumPrograms, AtlasesGiveTheDrrsOfTheirMembersFields) {
-  const std::string orbit =
-      precompute("AP") + "--orbit axis=z,from=-8,to=8,step=8 --codewords 256 ";
+  const std::string orbit = precompute("AP") + "--orbit axis=z,from=-8,to=8,step=8 ";
   run(orbit + "-o " + path("turn.af.h5"));
   run(orbit + "--material bone -o " + path("turn.bone.af.h5"));
   expect_refused("af-drr --field " + path("turn.bone.af.h5") + " -o " + path("refused.mha"),
