@@ -42,7 +42,7 @@ done
 if [[ "$skip_packages" == no ]]; then
   "$af_root/jobs/install-packages.sh" || die 1 "packages are missing (see above)"
 fi
-say "Building build/$preset (about 5 minutes from nothing on two cores) ..."
+say "Building build/$preset (about 10 minutes from nothing on two cores) ..."
 mkdir -p "$af_root/build"
 build_start=$SECONDS
 build_preset "$preset" "$af_root/build/$preset.log"

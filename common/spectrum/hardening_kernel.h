@@ -13,7 +13,7 @@ namespace af {
 ///     a = tilt . (w, b)
 ///     U = straight . (w, b) + x sum_j a^j sum_i c_ij (2 x - 1)^i
 ///
-/// HardeningFit finds the numbers.
+/// fitted_hardening() finds the numbers.
 struct HardeningPolynomial {
   static constexpr int kPowers = 4;                       ///< of a: j
   static constexpr int kTerms[kPowers] = {8, 5, 3, 2};    ///< of each: i

@@ -69,7 +69,7 @@ TEST(PolychromaticDrr, OfASlabIsTheSumOverTheSpectrum) {
         static_cast<double>(tissue.bone_part(static_cast<std::uint16_t>(1000 + hu))) / (1000 + hu);
     // By the ray's own path through the box: its chord is that of a DRR at one energy.
     const float chord =
-        render_image(RayCastDrr(volume), {}, view).pixels.front() /
+        render_image(RayCastDrr(volume), RigidTransform::Identity(), view).pixels.front() /
         static_cast<float>(slab_attenuation(hu, 0.0, tissue.effective_energy_kev()));
     double transmission = 0.0;
     for (const SpectrumBin& bin : tube_spectrum(options, tissue.effective_energy_kev()))
@@ -77,7 +77,9 @@ TEST(PolychromaticDrr, OfASlabIsTheSumOverTheSpectrum) {
                                             slab_attenuation(hu, share, bin.energy_kev));
     // The interpolated sum, and 0.5 / 1000 of a unit of bone in 44 mm that rounding voxels leaves.
     const double tolerance = PolychromaticAttenuation::kTolerance + 0.0005 * 0.02 * 44.0;
-    EXPECT_NEAR(render_image(renderer, {}, view).pixels.front(), -std::log(transmission), tolerance)
+    EXPECT_NEAR(render_image(renderer, RigidTransform::Identity(), view).pixels.front(),
+                -std::log(transmission),
+                tolerance)
         << hu << " HU";
   }
 }

@@ -24,8 +24,9 @@ TEST(ScatteredDrr, AddsTheMeanPrimarySignalTimesTheRatio) {
   constexpr double kRatio = 0.7;
   const auto primary = leaning_field();
   const View view{small_camera(), {3, 2, 20, 15}};
-  const Image2d without = render_image(*primary, {}, view);
-  const Image2d with = render_image(ScatteredDrr(primary, kRatio), {}, view);
+  const Image2d without = render_image(*primary, RigidTransform::Identity(), view);
+  const Image2d with =
+      render_image(ScatteredDrr(primary, kRatio), RigidTransform::Identity(), view);
   double mean = 0.0;
   for (const float u : without.pixels)
     mean += std::exp(-static_cast<double>(u)) / static_cast<double>(without.pixels.size());
@@ -39,8 +40,8 @@ TEST(ScatteredDrr, AddsTheMeanPrimarySignalTimesTheRatio) {
 TEST(ScatteredDrr, OfNoScatterIsThePrimary) {
   const auto primary = leaning_field();
   const View view{small_camera(), {3, 2, 20, 15}};
-  const Image2d without = render_image(*primary, {}, view);
-  const Image2d with = render_image(ScatteredDrr(primary, 0.0), {}, view);
+  const Image2d without = render_image(*primary, RigidTransform::Identity(), view);
+  const Image2d with = render_image(ScatteredDrr(primary, 0.0), RigidTransform::Identity(), view);
   for (std::size_t i = 0; i < with.pixels.size(); ++i)
     EXPECT_NEAR(with.pixels[i], without.pixels[i], 1e-6f * (1.0f + without.pixels[i]));
   // An ordinary beam leaves the renderer as it is.
