@@ -21,8 +21,11 @@ MpiEnvironment::MpiEnvironment(int& argc, char**& argv) {
   // Without mpirun, Open MPI would start a daemon beside the program that could launch more
   // processes. We launch none, and programs start a third faster without it.
   setenv("OMPI_MCA_ess_singleton_isolated", "1", 0);
+  const bool names_process_manager = std::getenv("OMPI_MCA_pmix") != nullptr;
   int provided = 0;
   MPI_Init_thread(&argc, &argv, MPI_THREAD_FUNNELED, &provided);
+  // Open MPI notes that there is none: an mpirun that we or our caller start would crash of it.
+  if (!names_process_manager) unsetenv("OMPI_MCA_pmix");
 }
 
 MpiEnvironment::~MpiEnvironment() {

@@ -111,8 +111,8 @@ TEST(LibraryField, LooksUpTheDrrOfTheProgramOfABeam) {
   EXPECT_THAT(message_of<FileError>([] { (void)Field::open(study_file("LAT.af.h5"), {}, kBeam); }),
               HasSubstr("LAT.bone.af.h5"));
   EXPECT_THAT(
-      message_of<InputError>([] { (void)Field::open(study_file("AP.atlas.af.h5"), {}, kBeam); }),
-      HasSubstr("an atlas"));
+      message_of<FileError>([] { (void)Field::open(study_file("AP.atlas.af.h5"), {}, kBeam); }),
+      HasSubstr("AP.atlas.bone.af.h5"));
   EXPECT_THAT(message_of<InputError>(
                   [] { (void)Field::open(study_file("AP.af.h5"), {}, {.tube_kvp = -1.0}); }),
               HasSubstr("tube_kvp"));
