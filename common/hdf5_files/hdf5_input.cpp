@@ -267,6 +267,9 @@ Hdf5Numbers Hdf5Input::numbers(const std::string& path, std::size_t most) const 
       count = extent > most ? most + 1 : count * extent;
     if ((kind != H5T_FLOAT && kind != H5T_INTEGER) || count > most)
       throw FileError(where, "is no list of at most " + std::to_string(most) + " numbers");
+    // HDF5 makes room for a number as large as the file says, up to 4 GB.
+    if (H5Tget_size(type) > sizeof(long double))
+      throw FileError(where, "has numbers of more than 16 bytes each");
     numbers.values = values_of(dataset, count, where);
     return numbers;
   });

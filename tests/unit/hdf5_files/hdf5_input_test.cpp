@@ -103,6 +103,11 @@ class Hdf5Links : public testing::Test {
     H5Dclose(H5Dcreate2(
         file, "/chunked", H5T_IEEE_F64LE, space_of_many, H5P_DEFAULT, chunked, H5P_DEFAULT));
     H5Pclose(chunked);
+    const hid_t large_numbers = H5Tcopy(H5T_STD_I64LE);
+    H5Tset_size(large_numbers, large);
+    H5Dclose(
+        H5Dcreate2(file, "/large", large_numbers, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
+    H5Tclose(large_numbers);
     H5Sclose(space);
     H5Sclose(space_of_many);
     H5Fclose(file);
@@ -126,6 +131,7 @@ TEST_F(Hdf5Links, AreNotFollowed) {
 TEST_F(Hdf5Links, ValuesOfOtherFilesAndLargePiecesAreRefused) {
   EXPECT_THAT(refusal("/stored"), HasSubstr("holds the contents of another file"));
   EXPECT_THAT(refusal("/chunked"), HasSubstr("is stored in large pieces"));
+  EXPECT_THAT(refusal("/large"), HasSubstr("has numbers of more than 16 bytes each"));
 }
 
 // HDF5 1.10 itself would write beyond its memory for such a file.
