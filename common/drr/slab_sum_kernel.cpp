@@ -55,17 +55,27 @@ AF_NATIVE_INLINE void make_rows(const SlabTerm& term, int32_t r) {
 struct Window {
   int32_t base;
   Ints lane;
-  bool fits;  ///< two vectors from `base` on hold all of them
+  bool is_even;  ///< the nodes of neighbouring columns are neighbours
+  bool fits;     ///< two vectors from `base` on hold all of them
 };
 
 AF_NATIVE_INLINE Window window_of(const int32_t* first) {
   // Ascending, so that the last one is furthest.
-  return {
-      first[0], load_ints(first) - first[0], first[kLanes - 1] - first[0] + kSumTaps <= 2 * kLanes};
+  const int32_t span = first[kLanes - 1] - first[0];
+  const Ints lane = load_ints(first) - first[0];
+  return {first[0],
+          lane,
+          span == kLanes - 1 && !native::any(lane != native::lane_numbers()),
+          span + kSumTaps <= 2 * kLanes};
 }
 
 AF_NATIVE_INLINE void take(const Window& window, const float* row, Floats (&values)[kSumTaps]) {
   const float* const from = row + window.base;
+  // Nodes of a slab and of the sum are about as far apart.
+  if (window.is_even) {
+    for (int tap = 0; tap < kSumTaps; ++tap) values[tap] = load(from + tap);
+    return;
+  }
 #if AF_VECTOR_BITS >= 256
   if (window.fits) {
     const Floats low = load(from);

@@ -67,14 +67,18 @@ double RobustGradient::evaluate(std::span<const float> drr, SimilarityWorkspace&
   return 1.0 - sums_at(mine.drr, gain_of(mine.drr)).cost / cost_without_drr_;
 }
 
-void RobustGradient::take_weights(int direction, double gain, GradientWorkspace& workspace) const {
-  pixel_sum_kernels().robust_sums({reference_.xray.of(direction).data(),
-                                   workspace.drr.of(direction).data(),
-                                   reference_.weights.data(),
-                                   static_cast<float>(gain),
-                                   static_cast<float>(squared_scale_),
-                                   workspace.pixel_weights.data()},
-                                  static_cast<std::int32_t>(reference_.weights.size()));
+double RobustGradient::take_weights(int direction,
+                                    double gain,
+                                    GradientWorkspace& workspace) const {
+  return pixel_sum_kernels()
+      .robust_sums({reference_.xray.of(direction).data(),
+                    workspace.drr.of(direction).data(),
+                    reference_.weights.data(),
+                    static_cast<float>(gain),
+                    static_cast<float>(squared_scale_),
+                    workspace.pixel_weights.data()},
+                   static_cast<std::int32_t>(reference_.weights.size()))
+      .cost;
 }
 
 double RobustGradient::evaluate_with_derivative(std::span<const float> drr,
@@ -90,15 +94,16 @@ double RobustGradient::evaluate_with_derivative(std::span<const float> drr,
   // change does not count.
   const auto scale = static_cast<float>(2.0 * gain / (squared_scale_ * cost_without_drr_));
   const auto single_gain = static_cast<float>(gain);
+  double cost = 0.0;
   for (int direction = 0; direction < 2; ++direction) {
-    take_weights(direction, gain, mine);
+    cost += take_weights(direction, gain, mine);
     const std::vector<float>& x = reference_.xray.of(direction);
     const std::vector<float>& d = mine.drr.of(direction);
     for (std::size_t i = 0; i < drr.size(); ++i)
       mine.derivative[i] = scale * mine.pixel_weights[i] * (x[i] - single_gain * d[i]);
     add_adjoint_gradient(reference_, direction, mine.derivative, mine, derivative);
   }
-  return 1.0 - sums_at(mine.drr, gain).cost / cost_without_drr_;
+  return 1.0 - cost / cost_without_drr_;
 }
 
 NormalEquations RobustGradient::normal_equations(std::span<const float> drr,
@@ -108,8 +113,9 @@ NormalEquations RobustGradient::normal_equations(std::span<const float> drr,
   take_gradients(reference_, drr, planes, mine);
   const double gain = gain_of(mine.drr);
   GramSums sums{};
+  double cost = 0.0;
   for (int direction = 0; direction < 2; ++direction) {
-    take_weights(direction, gain, mine);
+    cost += take_weights(direction, gain, mine);
     const GramSums part = gram_sums(mine.planes[static_cast<std::size_t>(direction)],
                                     mine.drr.of(direction),
                                     reference_.xray.of(direction),
@@ -117,7 +123,7 @@ NormalEquations RobustGradient::normal_equations(std::span<const float> drr,
     for (int i = 0; i < kGramProducts; ++i) sums.products[i] += part.products[i];
   }
   NormalEquations result;
-  result.value = 1.0 - sums_at(mine.drr, gain).cost / cost_without_drr_;
+  result.value = 1.0 - cost / cost_without_drr_;
   const double drr_square = gram_product(sums, kDrrChannel, kDrrChannel);
   if (!(drr_square > 0.0)) return result;
   const double scale = 2.0 / (squared_scale_ * cost_without_drr_);

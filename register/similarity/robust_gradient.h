@@ -33,8 +33,9 @@ class RobustGradient final : public SimilarityMeasure {
  private:
   [[nodiscard]] RobustSums sums_at(const GradientPair& drr, double gain) const;
   [[nodiscard]] double gain_of(const GradientPair& drr) const;
-  /// Fills workspace.pixel_weights with the weights of one direction.
-  void take_weights(int direction, double gain, GradientWorkspace& workspace) const;
+  /// Fills workspace.pixel_weights with the weights of one direction, and gives its part of the
+  /// cost.
+  double take_weights(int direction, double gain, GradientWorkspace& workspace) const;
 
   GradientReference reference_;
   double squared_scale_ = 0.0;
