@@ -1,27 +1,30 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "register/similarity/pixel_sums_kernel.h"
 
-#include "base/vec16.h"
+#include "base/vec_native.h"
 
 namespace af::registration::AF_KERNEL_NAMESPACE {
 
-// base/vec16.h puts its vectors into the same variant of namespace af.
-using namespace af::AF_KERNEL_NAMESPACE;
+// base/vec_native.h puts its vectors into the same variant of namespace af.
+using namespace af::AF_KERNEL_NAMESPACE::native;
 
 namespace {
 
-/// Vectors that are summed in single precision before their sum goes on in double.
-constexpr int kVectorsPerFlush = 64;
+/// Lanes of a sum, at every vector width.
+constexpr int kSumLanes = 16;
+/// Groups of so many lanes that are summed in single precision before their sum goes on in double.
+constexpr int kGroupsPerFlush = 64;
+constexpr int kParts = kSumLanes / kLanes;
 
 /// The first `count` elements, the other lanes 0.
-AF_KERNEL_INLINE Floats16 load_some(const float* from, int32_t count) {
-  if (count >= kLanes) return load<Floats16>(from);
+AF_NATIVE_INLINE Floats load_some(const float* from, int32_t count) {
+  if (count >= kLanes) return load(from);
   float values[kLanes] = {};
   for (int32_t i = 0; i < count; ++i) values[i] = from[i];
-  return load<Floats16>(values);
+  return load(values);
 }
 
-AF_KERNEL_INLINE void store_some(float* to, Floats16 vector, int32_t count) {
+AF_NATIVE_INLINE void store_some(float* to, Floats vector, int32_t count) {
   if (count >= kLanes) {
     store(to, vector);
     return;
@@ -29,77 +32,84 @@ AF_KERNEL_INLINE void store_some(float* to, Floats16 vector, int32_t count) {
   for (int32_t i = 0; i < count; ++i) to[i] = vector[i];
 }
 
-/// N running sums per lane: single precision for a while, then double. The order of additions does
-/// not depend on the vector width.
+/// Lanes below `count` are 1.
+AF_NATIVE_INLINE Floats ones(int32_t count) {
+  return to_float(-(lane_numbers() < splat(count)));
+}
+
+AF_NATIVE_INLINE Floats weight_of(const float* weights, int32_t at, int32_t count) {
+  return weights == nullptr ? ones(count) : load_some(weights + at, count);
+}
+
+/// N sums of kSumLanes lanes each, in double precision.
 template <uint32_t N>
 struct LaneSums {
-  Floats16 recent[N];
-  double flushed[N][kLanes];
-  int vectors;
+  double lanes[N][kSumLanes];
 };
 
 template <uint32_t N>
-AF_KERNEL_INLINE void clear(LaneSums<N>& sums) {
-  for (uint32_t i = 0; i < N; ++i) {
-    sums.recent[i] = Floats16{};
-    for (int lane = 0; lane < kLanes; ++lane) sums.flushed[i][lane] = 0.0;
-  }
-  sums.vectors = 0;
+AF_NATIVE_INLINE void clear(LaneSums<N>& sums) {
+  memset(&sums, 0, sizeof(sums));
 }
 
+/// Moves a part of the lanes to double precision.
 template <uint32_t N>
-AF_KERNEL_INLINE void flush(LaneSums<N>& sums) {
+AF_NATIVE_INLINE void flush(Floats (&recent)[N], int part, LaneSums<N>& sums) {
   for (uint32_t i = 0; i < N; ++i) {
     for (int lane = 0; lane < kLanes; ++lane)
-      sums.flushed[i][lane] += static_cast<double>(sums.recent[i][lane]);
-    sums.recent[i] = Floats16{};
+      sums.lanes[i][part * kLanes + lane] += static_cast<double>(recent[i][lane]);
+    recent[i] = splat(0.0f);
   }
-  sums.vectors = 0;
 }
 
 template <uint32_t N>
-AF_KERNEL_INLINE void end_vector(LaneSums<N>& sums) {
-  if (++sums.vectors == kVectorsPerFlush) flush(sums);
-}
-
-template <uint32_t N>
-AF_KERNEL_INLINE double total(const LaneSums<N>& sums, int i) {
+AF_NATIVE_INLINE double total(const LaneSums<N>& sums, int i) {
   double sum = 0.0;
-  for (int lane = 0; lane < kLanes; ++lane) sum += sums.flushed[i][lane];
+  for (int lane = 0; lane < kSumLanes; ++lane) sum += sums.lanes[i][lane];
   return sum;
 }
 
-/// Lanes below `count` are 1.
-AF_KERNEL_INLINE Floats16 ones(int32_t count) {
-  const Ints16 lane = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
-  return to_float(-(lane < splat(count)));
-}
-
-AF_KERNEL_INLINE Floats16 weight_of(const float* weights, int32_t at, int32_t count) {
-  return weights == nullptr ? ones(count) : load_some(weights + at, count);
+/// N sums over pixels; add(at, left, recent) adds those of the kLanes pixels from `at` on, `left`
+/// of which there are, to running sums. The order of additions does not depend on the vector width.
+template <uint32_t N, typename Add>
+AF_NATIVE_INLINE LaneSums<N> sum_pixels(int32_t count, const Add& add) {
+  LaneSums<N> sums;
+  clear(sums);
+  constexpr int32_t kPixelsPerFlush = kGroupsPerFlush * kSumLanes;
+  for (int32_t begin = 0; begin < count; begin += kPixelsPerFlush) {
+    const int32_t left = count - begin;
+    const int32_t end = begin + (left < kPixelsPerFlush ? left : kPixelsPerFlush);
+    for (int part = 0; part < kParts; ++part) {
+      Floats recent[N] = {};
+      int32_t at = begin + part * kLanes;
+      for (; at + kLanes <= end; at += kSumLanes) add(at, kLanes, recent);
+      if (at < end) add(at, end - at, recent);
+      flush(recent, part, sums);
+    }
+  }
+  return sums;
 }
 
 constexpr int kGramSums = kGramProducts + kGramChannels + 1;
 
-AF_KERNEL_INLINE void add_gram_vector(const GramChannels& request,
+AF_NATIVE_INLINE void add_gram_vector(const GramChannels& request,
                                       int32_t at,
                                       int32_t count,
-                                      LaneSums<kGramSums>& sums) {
-  const Floats16 weight = weight_of(request.weights, at, count);
-  Floats16 values[kGramChannels];
+                                      Floats (&recent)[kGramSums]) {
+  const Floats weight = weight_of(request.weights, at, count);
+  Floats values[kGramChannels];
 #pragma GCC unroll 8
   for (int i = 0; i < kGramChannels; ++i)
     values[i] = load_some(request.channels[i] + at, count) - splat(request.offsets[i]);
   int sum = 0;
 #pragma GCC unroll 8
   for (int i = 0; i < kGramChannels; ++i) {
-    const Floats16 weighted = weight * values[i];
-    sums.recent[kGramProducts + i] += weighted;
+    const Floats weighted = weight * values[i];
+    recent[kGramProducts + i] += weighted;
 #pragma GCC unroll 8
-    for (int j = i; j < kGramChannels; ++j) sums.recent[sum++] += weighted * values[j];
+    for (int j = i; j < kGramChannels; ++j) recent[sum++] += weighted * values[j];
   }
-  sums.recent[kGramSums - 1] += weight;
-  end_vector(sums);
+  recent[kGramSums - 1] += weight;
 }
 
 }  // namespace
@@ -107,10 +117,22 @@ AF_KERNEL_INLINE void add_gram_vector(const GramChannels& request,
 void add_gram(const GramChannels& request, const PixelBlock& block, GramSums& result) {
   LaneSums<kGramSums> sums;
   clear(sums);
+  Floats recent[kParts][kGramSums] = {};
+  int groups = 0;
+  const auto flush_all = [&] {
+    for (int part = 0; part < kParts; ++part) flush(recent[part], part, sums);
+    groups = 0;
+  };
   for (int32_t row = 0; row < block.height; ++row)
-    for (int32_t column = 0; column < block.width; column += kLanes)
-      add_gram_vector(request, row * block.stride + column, block.width - column, sums);
-  flush(sums);
+    for (int32_t column = 0; column < block.width; column += kSumLanes) {
+      for (int part = 0; part < kParts; ++part) {
+        const int32_t at = column + part * kLanes;
+        if (at < block.width)
+          add_gram_vector(request, row * block.stride + at, block.width - at, recent[part]);
+      }
+      if (++groups == kGroupsPerFlush) flush_all();
+    }
+  flush_all();
   for (int i = 0; i < kGramProducts; ++i) result.products[i] += total(sums, i);
   for (int i = 0; i < kGramChannels; ++i) result.firsts[i] += total(sums, kGramProducts + i);
   result.weight += total(sums, kGramSums - 1);
@@ -118,60 +140,50 @@ void add_gram(const GramChannels& request, const PixelBlock& block, GramSums& re
 
 CorrelationSums correlation_sums(
     const float* d, const float* x, const float* weights, float offset, int32_t count) {
-  LaneSums<3> sums;
-  clear(sums);
-  for (int32_t i = 0; i < count; i += kLanes) {
-    const Floats16 value = load_some(d + i, count - i) - splat(offset);
-    const Floats16 weighted = weight_of(weights, i, count - i) * value;
-    sums.recent[0] += weighted;
-    sums.recent[1] += weighted * value;
-    sums.recent[2] += weighted * load_some(x + i, count - i);
-    end_vector(sums);
-  }
-  flush(sums);
+  const LaneSums<3> sums = sum_pixels<3>(count, [=](int32_t at, int32_t left, Floats(&recent)[3]) {
+    const Floats value = load_some(d + at, left) - splat(offset);
+    const Floats weighted = weight_of(weights, at, left) * value;
+    recent[0] += weighted;
+    recent[1] += weighted * value;
+    recent[2] += weighted * load_some(x + at, left);
+  });
   return {total(sums, 0), total(sums, 1), total(sums, 2)};
 }
 
-RobustSums robust_sums(const RobustRequest& request, int32_t count) {
-  LaneSums<3> sums;
-  clear(sums);
-  const Floats16 scale = splat(request.squared_scale);
-  for (int32_t i = 0; i < count; i += kLanes) {
-    const Floats16 x = load_some(request.x + i, count - i);
-    const Floats16 d = load_some(request.d + i, count - i);
-    const Floats16 weight = weight_of(request.weights, i, count - i);
-    const Floats16 residual = x - splat(request.gain) * d;
-    const Floats16 square = residual * residual;
-    const Floats16 share = scale / (scale + square);
-    const Floats16 robust = weight * share * share;
-    if (request.robust_weights != nullptr)
-      store_some(request.robust_weights + i, robust, count - i);
-    const Floats16 weighted = robust * d;
-    sums.recent[0] += weighted * x;
-    sums.recent[1] += weighted * d;
-    sums.recent[2] += weight * (splat(1.0f) - share);
-    end_vector(sums);
-  }
-  flush(sums);
+RobustSums robust_sums(const RobustRequest& given, int32_t count) {
+  const RobustRequest request = given;
+  const Floats scale = splat(request.squared_scale);
+  const Floats gain = splat(request.gain);
+  const LaneSums<3> sums = sum_pixels<3>(count, [=](int32_t at, int32_t left, Floats(&recent)[3]) {
+    const Floats x = load_some(request.x + at, left);
+    const Floats d = load_some(request.d + at, left);
+    const Floats weight = weight_of(request.weights, at, left);
+    const Floats residual = x - gain * d;
+    const Floats square = residual * residual;
+    const Floats share = scale / (scale + square);
+    const Floats robust = weight * share * share;
+    if (request.robust_weights != nullptr) store_some(request.robust_weights + at, robust, left);
+    const Floats weighted = robust * d;
+    recent[0] += weighted * x;
+    recent[1] += weighted * d;
+    recent[2] += weight * (splat(1.0f) - share);
+  });
   return {total(sums, 0), total(sums, 1), total(sums, 2)};
 }
 
-PairSums pair_sums(const PairRequest& request, int32_t count) {
-  LaneSums<2> sums;
-  clear(sums);
-  const Floats16 scale = splat(request.squared_scale);
-  for (int32_t i = 0; i + request.shift < count; i += kLanes) {
-    const int32_t left = count - request.shift - i;
-    const int32_t other = i + request.shift;
-    const Floats16 weight =
-        weight_of(request.weights, i, left) * weight_of(request.weights, other, left);
-    const Floats16 step =
-        load_some(request.difference + i, left) - load_some(request.difference + other, left);
-    sums.recent[0] += weight * (scale / (scale + step * step));
-    sums.recent[1] += weight;
-    end_vector(sums);
-  }
-  flush(sums);
+PairSums pair_sums(const PairRequest& given, int32_t count) {
+  const PairRequest request = given;
+  const Floats scale = splat(request.squared_scale);
+  const int32_t pairs = count - request.shift;
+  const LaneSums<2> sums = sum_pixels<2>(pairs, [=](int32_t at, int32_t left, Floats(&recent)[2]) {
+    const int32_t other = at + request.shift;
+    const Floats weight =
+        weight_of(request.weights, at, left) * weight_of(request.weights, other, left);
+    const Floats step =
+        load_some(request.difference + at, left) - load_some(request.difference + other, left);
+    recent[0] += weight * (scale / (scale + step * step));
+    recent[1] += weight;
+  });
   return {total(sums, 0), total(sums, 1)};
 }
 
@@ -179,22 +191,22 @@ void sobel(
     const float* image, int32_t width, int32_t height, float* along_columns, float* along_rows) {
   const int64_t pixels = static_cast<int64_t>(width) * height;
   for (int64_t i = 0; i < pixels; ++i) along_columns[i] = along_rows[i] = 0.0f;
-  const Floats16 two = splat(2.0f);
-  const Floats16 eighth = splat(0.125f);
+  const Floats two = splat(2.0f);
+  const Floats eighth = splat(0.125f);
   for (int32_t row = 1; row + 1 < height; ++row)
     for (int32_t column = 1; column + 1 < width; column += kLanes) {
       const int32_t left = width - 1 - column;
       const int64_t at = static_cast<int64_t>(row) * width + column;
       const float* const above = image + at - width;
       const float* const below = image + at + width;
-      const Floats16 above_left = load_some(above - 1, left);
-      const Floats16 above_right = load_some(above + 1, left);
-      const Floats16 below_left = load_some(below - 1, left);
-      const Floats16 below_right = load_some(below + 1, left);
-      const Floats16 across = load_some(image + at + 1, left) - load_some(image + at - 1, left);
-      const Floats16 down = load_some(below, left) - load_some(above, left);
-      const Floats16 first = below_right - above_left;
-      const Floats16 second = above_right - below_left;
+      const Floats above_left = load_some(above - 1, left);
+      const Floats above_right = load_some(above + 1, left);
+      const Floats below_left = load_some(below - 1, left);
+      const Floats below_right = load_some(below + 1, left);
+      const Floats across = load_some(image + at + 1, left) - load_some(image + at - 1, left);
+      const Floats down = load_some(below, left) - load_some(above, left);
+      const Floats first = below_right - above_left;
+      const Floats second = above_right - below_left;
       store_some(along_columns + at, eighth * (first + second + two * across), left);
       store_some(along_rows + at, eighth * (first - second + two * down), left);
     }
@@ -204,13 +216,14 @@ void count_histogram(const HistogramRequest& request, int32_t count) {
   uint32_t* const counts = request.counts;
   int32_t i = 0;
   for (; i + kLanes <= count; i += kLanes) {
-    const Floats16 position =
-        (load<Floats16>(request.drr + i) - splat(request.low)) * splat(request.bins_per_unit);
+    const Floats position =
+        (load(request.drr + i) - splat(request.low)) * splat(request.bins_per_unit);
     // In this order of arguments a NaN becomes bin 0 instead of an undefined conversion.
-    const Floats16 clamped = minimum(maximum(position, splat(0.0f)), splat(request.last_bin));
-    const Ints16 cells = to_int(clamped) + load<Ints16>(request.row_offsets + i);
+    const Floats clamped = minimum(maximum(position, splat(0.0f)), splat(request.last_bin));
+    Ints row_offsets;
+    memcpy(&row_offsets, request.row_offsets + i, sizeof(row_offsets));
     int32_t cell[kLanes];
-    store(cell, cells);
+    store(cell, to_int(clamped) + row_offsets);
     // Neighbouring pixels tend to fall into the same cell. They are counted into several histograms
     // in turn, so that no increment waits for the one before it.
 #pragma GCC unroll 16
