@@ -162,22 +162,7 @@ std::size_t count_of_projections(const Hdf5Input& file) {
   return static_cast<std::size_t>(number);
 }
 
-}  // namespace
-
-bool is_xreg_hdf5(const CameraFile& file) {
-  if (!is_hdf5_head(file.head)) return false;
-  try {
-    const Hdf5Input hdf5 = Hdf5Input::of_file(file.path);
-    return hdf5.holds(kDeepFluoroGroup) || hdf5.holds(kCountOfProjections) ||
-           hdf5.holds(std::string("/") + kFrameType);
-  } catch (const FileError&) {
-    return false;
-  }
-}
-
-StatedRig read_xreg_hdf5(const CameraFile& file, const CameraFileOptions& /*options*/) {
-  if (!is_hdf5_head(file.head)) throw FileError(file.name(), "is no HDF5 file");
-  const Hdf5Input hdf5 = Hdf5Input::of_file(file.path);
+StatedRig rig_in(const Hdf5Input& hdf5) {
   StatedRig stated;
   if (hdf5.holds(kDeepFluoroGroup)) {
     stated.cameras.push_back(XRegGroup(hdf5, kDeepFluoroGroup, "pixel-").camera());
@@ -190,10 +175,35 @@ StatedRig read_xreg_hdf5(const CameraFile& file, const CameraFileOptions& /*opti
   }
   if (hdf5.holds(kXRegIsocenter)) {
     const Hdf5Numbers point = hdf5.numbers(kXRegIsocenter, 3);
-    if (point.values.size() != 3) throw FileError(file.name(), "isocenter-point has not 3 numbers");
+    if (point.values.size() != 3) throw FileError(hdf5.name(), "isocenter-point has not 3 numbers");
     stated.isocenter_point = Eigen::Map<const Eigen::Vector3d>(point.values.data());
   }
   return stated;
+}
+
+template <typename Read>
+auto read_hdf5(const CameraFile& file, const Read& read) {
+  return read_distrusted(
+      file.name(), [&] { return Hdf5Input::of_file(file.path); }, read);
+}
+
+}  // namespace
+
+bool is_xreg_hdf5(const CameraFile& file) {
+  if (!is_hdf5_head(file.head)) return false;
+  try {
+    return read_hdf5(file, [](const Hdf5Input& hdf5) {
+      return hdf5.holds(kDeepFluoroGroup) || hdf5.holds(kCountOfProjections) ||
+             hdf5.holds(std::string("/") + kFrameType);
+    });
+  } catch (const FileError&) {
+    return false;
+  }
+}
+
+StatedRig read_xreg_hdf5(const CameraFile& file, const CameraFileOptions& /*options*/) {
+  if (!is_hdf5_head(file.head)) throw FileError(file.name(), "is no HDF5 file");
+  return read_hdf5(file, rig_in);
 }
 
 std::string write_xreg_hdf5(const CameraRig& rig) {

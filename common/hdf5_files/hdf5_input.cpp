@@ -7,6 +7,7 @@
 #include <limits>
 #include <utility>
 
+#include "base/contained_work.h"
 #include "base/error.h"
 #include "hdf5_files/hdf5_handles.h"
 
@@ -218,6 +219,19 @@ auto quietly(const std::string& name, Use&& use) {
 }
 
 }  // namespace
+
+void rehearse_reading(const std::string& name, const std::function<void()>& read) {
+  const ContainedWork rehearsal = contained_work(0, [&](std::span<char>) {
+    try {
+      read();
+    } catch (const std::exception&) {
+      // Its like is thrown again when the file is read in earnest.
+    }
+    return true;
+  });
+  if (!rehearsal.is_done)
+    throw FileError(name, "damaged HDF5: a trial of reading it " + rehearsal.trouble);
+}
 
 bool is_hdf5_head(std::string_view bytes) {
   return bytes.starts_with("\x89HDF\r\n\x1a\n");

@@ -34,6 +34,13 @@ ItkTransform transform_in(const Hdf5Input& file) {
           list_in(file, kFixed, kFixedOfItk4)};
 }
 
+template <typename Read>
+auto read_hdf5(const PoseFileBytes& file, const Read& read) {
+  const std::string name = file.path.string();
+  return read_distrusted(
+      name, [&] { return Hdf5Input::of_bytes(file.bytes, name); }, read);
+}
+
 }  // namespace
 
 bool is_hdf5(const PoseFileBytes& file) {
@@ -43,14 +50,14 @@ bool is_hdf5(const PoseFileBytes& file) {
 bool holds_itk_hdf5_transform(const PoseFileBytes& file) {
   if (!is_hdf5(file)) return false;
   try {
-    return Hdf5Input::of_bytes(file.bytes, file.path.string()).holds(kGroup);
+    return read_hdf5(file, [](const Hdf5Input& hdf5) { return hdf5.holds(kGroup); });
   } catch (const FileError&) {
     return false;
   }
 }
 
 PosesInFile read_itk_hdf5(const PoseFileBytes& file, const PoseContext& /*context*/) {
-  const ItkTransform transform = transform_in(Hdf5Input::of_bytes(file.bytes, file.path.string()));
+  const ItkTransform transform = read_hdf5(file, transform_in);
   return {{{1, map_of_itk_transform(transform, file.path.string()).inverse()}}, {}};
 }
 

@@ -2,6 +2,7 @@
 #include "hdf5_files/hdf5_input.h"
 
 #include <cmath>
+#include <csignal>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -76,6 +77,21 @@ TEST(Hdf5Input, RefusesWhatIsNotAskedFor) {
   EXPECT_THAT(refusal("/nan", 1), HasSubstr("not finite"));
   EXPECT_THAT(refusal("/group", 1), HasSubstr("damaged HDF5: H5Dopen2 failed: not a dataset"));
   EXPECT_THAT(message_of<FileError>([&] { (void)file.text("/count"); }), HasSubstr("is no text"));
+}
+
+TEST(Hdf5Input, AFileThatEndsHdf5IsAFileError) {
+  const auto open = [] { return Hdf5Input::of_bytes(some_file(), "some.h5"); };
+  const auto end = [&](int signal) {
+    return message_of<FileError>([&] {
+      read_distrusted("some.h5", open, [&](const Hdf5Input&) { return std::raise(signal); });
+    });
+  };
+  EXPECT_THAT(end(SIGSEGV), HasSubstr("some.h5: damaged HDF5: a trial of reading it ended by"));
+  EXPECT_THAT(end(SIGABRT), HasSubstr("signal 6"));
+  const auto count = [](const Hdf5Input& file) {
+    return file.numbers("/many", 1000).values.size();
+  };
+  EXPECT_EQ(read_distrusted("some.h5", open, count), count(open()));
 }
 
 /// Files that lead to others, made by HDF5 itself.
