@@ -139,6 +139,31 @@ AF_NATIVE_INLINE Floats gather(const float* base, Ints offset) {
 #endif
 }
 
+/// Two neighbouring 16-bit elements, base[offset] in the low and base[offset + 1] in the high half
+/// of each lane.
+AF_NATIVE_INLINE Ints gather_pairs(const uint16_t* base, Ints offset) {
+#if AF_VECTOR_BITS == 512
+  return reinterpret_cast<Ints>(_mm512_i32gather_epi32(reinterpret_cast<__m512i>(offset), base, 2));
+#elif AF_VECTOR_BITS == 256
+  return reinterpret_cast<Ints>(_mm256_i32gather_epi32(
+      reinterpret_cast<const int*>(base), reinterpret_cast<__m256i>(offset), 2));
+#else
+  Ints pairs;
+  for (int lane = 0; lane < kLanes; ++lane) {
+    int32_t pair = 0;
+    memcpy(&pair, base + offset[lane], sizeof(pair));
+    pairs[lane] = pair;
+  }
+  return pairs;
+#endif
+}
+
+/// The upper 16 bits of each lane, without sign.
+AF_NATIVE_INLINE Ints upper_halves(Ints pairs) {
+  using UnsignedInts = uint32_t __attribute__((vector_size(AF_VECTOR_BITS / 8)));
+  return reinterpret_cast<Ints>(reinterpret_cast<UnsignedInts>(pairs) >> 16);
+}
+
 /// True when any lane of a comparison's result is set.
 AF_NATIVE_INLINE bool any(Ints mask) {
 #if AF_VECTOR_BITS == 512
