@@ -2,56 +2,57 @@
 #include "precompute/casting/shear_warp_kernel.h"
 
 #include "base/vec16.h"
+#include "base/vec_native.h"
 
 namespace af::AF_KERNEL_NAMESPACE {
 
 namespace {
 
-AF_KERNEL_INLINE Floats16 mix(Floats16 a, Floats16 b, Floats16 weight) {
+AF_NATIVE_INLINE native::Floats mix(native::Floats a, native::Floats b, native::Floats weight) {
   return a + weight * (b - a);
 }
 
 /// The cell that holds a position along one axis of `size` voxels, and the weight of its upper end.
 /// Positions beyond the border are moved onto it, where voxels are 0 and so is every interpolant.
 struct Cell {
-  Ints16 index;
-  Floats16 weight;
+  native::Ints index;
+  native::Floats weight;
 };
 
-AF_KERNEL_INLINE Cell cell_of(Floats16 position, int32_t size) {
-  const Floats16 inside = minimum(maximum(position, splat(0.0f)), to_float(splat(size - 1)));
-  const Ints16 index = minimum(to_int(inside), splat(size - 2));
-  return {index, inside - to_float(index)};
+AF_NATIVE_INLINE Cell cell_of(native::Floats position, int32_t size) {
+  const native::Floats inside = native::minimum(native::maximum(position, native::splat(0.0f)),
+                                                native::to_float(native::splat(size - 1)));
+  const native::Ints index = native::minimum(native::to_int(inside), native::splat(size - 2));
+  return {index, inside - native::to_float(index)};
 }
 
 struct Pair {
-  Floats16 low;
-  Floats16 high;
+  native::Floats low;
+  native::Floats high;
 };
 
-AF_KERNEL_INLINE Pair unpack(Ints16 pairs) {
-  return {to_float(pairs & 0xFFFF),
-          to_float(reinterpret_cast<Ints16>(reinterpret_cast<UnsignedInts16>(pairs) >> 16))};
+AF_NATIVE_INLINE Pair unpack(native::Ints pairs) {
+  return {native::to_float(pairs & 0xFFFF), native::to_float(native::upper_halves(pairs))};
 }
 
-AF_KERNEL_INLINE Floats16 sample(const VoxelsToResample& volume,
-                                 Floats16 x,
-                                 Floats16 y,
-                                 Floats16 z) {
+AF_NATIVE_INLINE native::Floats sample(const VoxelsToResample& volume,
+                                       native::Floats x,
+                                       native::Floats y,
+                                       native::Floats z) {
   const Cell i = cell_of(x, volume.size[0]);
   const Cell j = cell_of(y, volume.size[1]);
   const Cell k = cell_of(z, volume.size[2]);
   const int32_t row_stride = volume.size[0];
   const int32_t slice_stride = volume.size[0] * volume.size[1];
-  const Ints16 offset = i.index + j.index * row_stride + k.index * slice_stride;
+  const native::Ints offset = i.index + j.index * row_stride + k.index * slice_stride;
   const uint16_t* next_slice = volume.voxels + slice_stride;
-  const Pair row_00 = unpack(gather_pairs(volume.voxels, offset));
-  const Pair row_10 = unpack(gather_pairs(volume.voxels + row_stride, offset));
-  const Pair row_01 = unpack(gather_pairs(next_slice, offset));
-  const Pair row_11 = unpack(gather_pairs(next_slice + row_stride, offset));
-  const Floats16 low =
+  const Pair row_00 = unpack(native::gather_pairs(volume.voxels, offset));
+  const Pair row_10 = unpack(native::gather_pairs(volume.voxels + row_stride, offset));
+  const Pair row_01 = unpack(native::gather_pairs(next_slice, offset));
+  const Pair row_11 = unpack(native::gather_pairs(next_slice + row_stride, offset));
+  const native::Floats low =
       mix(mix(row_00.low, row_10.low, j.weight), mix(row_01.low, row_11.low, j.weight), k.weight);
-  const Floats16 high = mix(
+  const native::Floats high = mix(
       mix(row_00.high, row_10.high, j.weight), mix(row_01.high, row_11.high, j.weight), k.weight);
   return mix(low, high, i.weight);
 }
@@ -66,37 +67,60 @@ AF_KERNEL_INLINE const int16_t* block_of(const int16_t* values, const ShearRow& 
   return is_stored ? values + (row.origin + x) : kZeros;
 }
 
-/// Eight columns from `group` on for kShearColumns places from x on.
+/// 16-bit lanes of one register, and its groups of eight.
+constexpr int kRegisterShorts = kShearColumns / kRegisters;
+constexpr int kRegisterGroups = kRegisterShorts / 8;
+
+/// Eight columns from `group` on for the places of one register, from x + `first` on. Registers one
+/// by one, because GCC keeps vectors of several in memory.
 template <bool kIsStored>
-AF_KERNEL_INLINE void interpolate_block(const ShearColumns& columns,
-                                        int group,
-                                        int32_t x,
-                                        Shorts32 (&block)[8]) {
+AF_KERNEL_INLINE void interpolate_block(
+    const ShearColumns& columns, int group, int32_t x, int first, IntegerRegister (&block)[8]) {
   for (int i = 0; i < 8; ++i) {
     const int j = group + i;
-    const Shorts32 lower = load<Shorts32>(block_of<kIsStored>(columns.values, columns.lower[j], x));
-    const Shorts32 upper = load<Shorts32>(block_of<kIsStored>(columns.values, columns.upper[j], x));
-    block[i] = lower + multiply_fraction(upper - lower, columns.weight[j] - Shorts32{});
+    IntegerRegister lower;
+    IntegerRegister upper;
+    memcpy(&lower, block_of<kIsStored>(columns.values, columns.lower[j], x) + first, sizeof(lower));
+    memcpy(&upper, block_of<kIsStored>(columns.values, columns.upper[j], x) + first, sizeof(upper));
+    block[i] = AF_INTRINSIC(add_epi16)(
+        lower,
+        AF_INTRINSIC(mulhrs_epi16)(AF_INTRINSIC(sub_epi16)(upper, lower),
+                                   AF_INTRINSIC(set1_epi16)(columns.weight[j])));
   }
 }
 
-/// Transposes 8 x 8 lanes within each of the four groups: rows of x become rows of t.
-AF_KERNEL_INLINE void transpose_groups(Shorts32 (&rows)[8]) {
-  Shorts32 pairs[8];
+/// Transposes 8 x 8 lanes within each group: rows of x become rows of t.
+AF_KERNEL_INLINE void transpose_groups(IntegerRegister (&rows)[8]) {
+  IntegerRegister pairs[8];
   for (int i = 0; i < 4; ++i) {
-    pairs[2 * i] = interleave_low(rows[2 * i], rows[2 * i + 1]);
-    pairs[2 * i + 1] = interleave_high(rows[2 * i], rows[2 * i + 1]);
+    pairs[2 * i] = AF_INTRINSIC(unpacklo_epi16)(rows[2 * i], rows[2 * i + 1]);
+    pairs[2 * i + 1] = AF_INTRINSIC(unpackhi_epi16)(rows[2 * i], rows[2 * i + 1]);
   }
-  Shorts32 fours[8];
+  IntegerRegister fours[8];
   for (int half = 0; half < 8; half += 4)
     for (int i = 0; i < 2; ++i) {
-      fours[half + 2 * i] = interleave_pairs_low(pairs[half + i], pairs[half + i + 2]);
-      fours[half + 2 * i + 1] = interleave_pairs_high(pairs[half + i], pairs[half + i + 2]);
+      fours[half + 2 * i] = AF_INTRINSIC(unpacklo_epi32)(pairs[half + i], pairs[half + i + 2]);
+      fours[half + 2 * i + 1] = AF_INTRINSIC(unpackhi_epi32)(pairs[half + i], pairs[half + i + 2]);
     }
   for (int i = 0; i < 4; ++i) {
-    rows[2 * i] = interleave_fours_low(fours[i], fours[i + 4]);
-    rows[2 * i + 1] = interleave_fours_high(fours[i], fours[i + 4]);
+    rows[2 * i] = AF_INTRINSIC(unpacklo_epi64)(fours[i], fours[i + 4]);
+    rows[2 * i + 1] = AF_INTRINSIC(unpackhi_epi64)(fours[i], fours[i + 4]);
   }
+}
+
+/// Stores a register's groups at to, to + stride, ...
+AF_KERNEL_INLINE void store_groups(int16_t* to, int stride, IntegerRegister value) {
+#if AF_VECTOR_BITS == 512
+  const __m128i groups[] = {_mm512_extracti32x4_epi32(value, 0),
+                            _mm512_extracti32x4_epi32(value, 1),
+                            _mm512_extracti32x4_epi32(value, 2),
+                            _mm512_extracti32x4_epi32(value, 3)};
+#elif AF_VECTOR_BITS == 256
+  const __m128i groups[] = {_mm256_castsi256_si128(value), _mm256_extracti128_si256(value, 1)};
+#else
+  const __m128i groups[] = {value};
+#endif
+  for (int i = 0; i < kRegisterGroups; ++i) memcpy(to + i * stride, &groups[i], sizeof(groups[i]));
 }
 
 /// Adds all slices of one node s to the sums of the columns of one register: within each group of
@@ -131,16 +155,18 @@ AF_KERNEL_INLINE void add_slices(const int16_t* columns,
 }  // namespace
 
 void resample_row(const VoxelsToResample& volume, const RowToResample& row, int16_t* out) {
-  Floats16 index = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
-  index += static_cast<float>(row.first);
-  const Floats16 scale = splat(row.scale);
-  for (int32_t i = 0; i < row.count; i += kLanes, index += static_cast<float>(kLanes)) {
-    const Floats16 value = sample(volume,
-                                  row.start[0] + index * row.step[0],
-                                  row.start[1] + index * row.step[1],
-                                  row.start[2] + index * row.step[2]);
-    const Ints16 level = to_int(value * scale + 0.5f);
-    for (int lane = 0; lane < kLanes; ++lane) out[i + lane] = static_cast<int16_t>(level[lane]);
+  using native::Floats;
+  Floats index = native::to_float(native::lane_numbers()) + static_cast<float>(row.first);
+  const auto lanes = static_cast<float>(native::kLanes);
+  for (int32_t i = 0; i < row.count; i += native::kLanes, index += lanes) {
+    const Floats value = sample(volume,
+                                row.start[0] + index * row.step[0],
+                                row.start[1] + index * row.step[1],
+                                row.start[2] + index * row.step[2]);
+    int32_t levels[native::kLanes];
+    native::store(levels, native::to_int(value * row.scale + 0.5f));
+    for (int lane = 0; lane < native::kLanes; ++lane)
+      out[i + lane] = static_cast<int16_t>(levels[lane]);
   }
 }
 
@@ -153,14 +179,18 @@ void interpolate_columns(const ShearColumns& columns,
   for (int group = 0; group < kShearColumns; group += 8)
     for (int32_t row = 0; row < row_count; row += kShearColumns) {
       const int32_t x = first_x + row;
-      Shorts32 block[8];
-      if (x >= columns.whole_begin && x < columns.whole_end)
-        interpolate_block<true>(columns, group, x, block);
-      else
-        interpolate_block<false>(columns, group, x, block);
-      transpose_groups(block);
-      for (int i = 0; i < 8; ++i)
-        store_groups(rows + (row + i) * kShearColumns + group, 8 * kShearColumns, block[i]);
+      const bool is_whole = x >= columns.whole_begin && x < columns.whole_end;
+      for (int first = 0; first < kShearColumns; first += kRegisterShorts) {
+        IntegerRegister block[8];
+        if (is_whole)
+          interpolate_block<true>(columns, group, x, first, block);
+        else
+          interpolate_block<false>(columns, group, x, first, block);
+        transpose_groups(block);
+        for (int i = 0; i < 8; ++i)
+          store_groups(
+              rows + (row + first + i) * kShearColumns + group, 8 * kShearColumns, block[i]);
+      }
     }
 }
 

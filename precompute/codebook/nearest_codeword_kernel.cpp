@@ -5,30 +5,59 @@
 #include <immintrin.h>
 
 #include "base/vec16.h"
+#include "base/vec_native.h"
 
 namespace af::AF_KERNEL_NAMESPACE {
 
 namespace {
 
-/// Bits of the lanes whose comparison result is set.
-AF_KERNEL_INLINE uint32_t lane_bits(Ints16 mask) {
+/// Sixteen lanes in the registers of one width: GCC keeps vectors of several registers in memory.
+struct Lanes {
+  native::Floats part[16 / native::kLanes];
+};
+constexpr int kParts = 16 / native::kLanes;
+
+/// Bits of the lanes of a comparison's result that are set.
+AF_NATIVE_INLINE uint32_t bits_of(native::Ints mask) {
 #if AF_VECTOR_BITS == 512
-  __m512i lanes;
-  memcpy(&lanes, &mask, sizeof(lanes));
-  return _mm512_movepi32_mask(lanes);
+  return _mm512_movepi32_mask(reinterpret_cast<__m512i>(mask));
 #elif AF_VECTOR_BITS == 256
-  __m256 halves[2];
-  memcpy(halves, &mask, sizeof(halves));
-  return static_cast<uint32_t>(_mm256_movemask_ps(halves[0])) |
-         static_cast<uint32_t>(_mm256_movemask_ps(halves[1])) << 8u;
+  return static_cast<uint32_t>(_mm256_movemask_ps(reinterpret_cast<__m256>(mask)));
 #else
-  __m128 quarters[4];
-  memcpy(quarters, &mask, sizeof(quarters));
-  uint32_t bits = 0;
-  for (uint32_t i = 0; i < 4; ++i)
-    bits |= static_cast<uint32_t>(_mm_movemask_ps(quarters[i])) << (4u * i);
-  return bits;
+  return static_cast<uint32_t>(_mm_movemask_ps(reinterpret_cast<__m128>(mask)));
 #endif
+}
+
+/// Bits of the lanes that are no greater than a limit.
+AF_NATIVE_INLINE uint32_t bits_within(const Lanes& lanes, float limit) {
+  uint32_t bits = 0;
+  for (int i = 0; i < kParts; ++i)
+    bits |= bits_of(lanes.part[i] <= native::splat(limit)) << (i * native::kLanes);
+  return bits;
+}
+
+AF_NATIVE_INLINE float smallest(const Lanes& lanes) {
+#if AF_VECTOR_BITS == 512
+  return _mm512_reduce_min_ps(lanes.part[0]);
+#else
+#if AF_VECTOR_BITS == 256
+  const __m256 pairs = _mm256_min_ps(lanes.part[0], lanes.part[1]);
+  const __m128 fours = _mm_min_ps(_mm256_castps256_ps128(pairs), _mm256_extractf128_ps(pairs, 1));
+#else
+  const __m128 fours = _mm_min_ps(_mm_min_ps(lanes.part[0], lanes.part[1]),
+                                  _mm_min_ps(lanes.part[2], lanes.part[3]));
+#endif
+  const __m128 twos = _mm_min_ps(fours, _mm_movehl_ps(fours, fours));
+  return _mm_cvtss_f32(_mm_min_ss(twos, _mm_shuffle_ps(twos, twos, 1)));
+#endif
+}
+
+AF_NATIVE_INLINE void set_lane(Lanes& lanes, uint32_t lane, float value) {
+  for (int i = 0; i < kParts; ++i) {
+    const native::Ints number = native::lane_numbers() + i * native::kLanes;
+    lanes.part[i] =
+        number == native::splat(static_cast<int32_t>(lane)) ? native::splat(value) : lanes.part[i];
+  }
 }
 
 /// Every lane's value from the lane whose number differs in bit `kStride`.
@@ -52,17 +81,6 @@ AF_KERNEL_INLINE Vector exchanged(Vector values) {
                                  13 ^ kStride,
                                  14 ^ kStride,
                                  15 ^ kStride);
-}
-
-template <int kStride>
-AF_KERNEL_INLINE Floats16 smaller_of_pairs(Floats16 lanes) {
-  const Floats16 other = exchanged<kStride>(lanes);
-  return lanes < other ? lanes : other;
-}
-
-AF_KERNEL_INLINE float smallest(Floats16 lanes) {
-  return smaller_of_pairs<1>(
-      smaller_of_pairs<2>(smaller_of_pairs<4>(smaller_of_pairs<8>(lanes))))[0];
 }
 
 /// Exact: 16 squares below 2^32 each.
@@ -146,22 +164,21 @@ AF_KERNEL_INLINE void offer(Best& best, uint64_t error, uint32_t candidate) {
   best = {error, candidate, limit_of(error)};
 }
 
-AF_KERNEL_INLINE Floats16 add_squared_difference(Floats16 sum,
-                                                 float coefficient,
-                                                 const float* lanes) {
-  const Floats16 difference = splat(coefficient) - load<Floats16>(lanes);
-  return sum + difference * difference;
+AF_KERNEL_INLINE void add_squared_difference(Lanes& sum, float coefficient, const float* lanes) {
+  for (int i = 0; i < kParts; ++i) {
+    const native::Floats difference =
+        native::splat(coefficient) - native::load(lanes + i * native::kLanes);
+    sum.part[i] += difference * difference;
+  }
 }
 
 /// Offers the codewords of a block whose sums are within the limit, the nearest first: exact sums
 /// need no other, the rest are decided by integers.
 AF_KERNEL_INLINE void offer_lanes(
-    const CodewordBlocks& blocks, uint32_t block, const uint16_t* tile, Floats16 sums, Best& best) {
-  uint32_t near_bits = lane_bits(sums <= splat(best.limit));
-  while (near_bits != 0) {
+    const CodewordBlocks& blocks, uint32_t block, const uint16_t* tile, Lanes sums, Best& best) {
+  while (bits_within(sums, best.limit) != 0) {
     const float nearest = smallest(sums);
-    const uint32_t lane =
-        static_cast<uint32_t>(__builtin_ctz(lane_bits(sums == splat(nearest)) & near_bits));
+    const auto lane = static_cast<uint32_t>(__builtin_ctz(bits_within(sums, nearest)));
     const uint32_t candidate = blocks.indices[block * 16 + lane];
     const uint64_t error =
         nearest < kExactBelow
@@ -169,8 +186,7 @@ AF_KERNEL_INLINE void offer_lanes(
             : squared_error(tile, blocks.codewords + static_cast<size_t>(candidate) * 16);
     offer(best, error, candidate);
     if (nearest < kExactBelow) return;
-    sums[lane] = kNoLimit;
-    near_bits = lane_bits(sums <= splat(best.limit));
+    set_lane(sums, lane, kNoLimit);
   }
 }
 
@@ -182,10 +198,10 @@ AF_KERNEL_INLINE void search_block(const CodewordBlocks& blocks,
                                    const float* coefficients,
                                    Best& best) {
   const float* lanes = blocks.coefficients + static_cast<size_t>(block) * 256;
-  Floats16 sum = {};
-  for (int i = 0; i < 5; ++i) sum = add_squared_difference(sum, coefficients[i], lanes + 16 * i);
-  if (lane_bits(sum <= splat(best.limit)) == 0) return;
-  for (int i = 5; i < 16; ++i) sum = add_squared_difference(sum, coefficients[i], lanes + 16 * i);
+  Lanes sum = {};
+  for (int i = 0; i < 5; ++i) add_squared_difference(sum, coefficients[i], lanes + 16 * i);
+  if (bits_within(sum, best.limit) == 0) return;
+  for (int i = 5; i < 16; ++i) add_squared_difference(sum, coefficients[i], lanes + 16 * i);
   offer_lanes(blocks, block, tile, sum, best);
 }
 
@@ -218,14 +234,18 @@ AF_KERNEL_INLINE Best search_outwards(const CodewordBlocks& blocks,
 
 /// Squared distances of a tile's coefficients from those of a box's children, as far as their
 /// ranges tell.
-AF_KERNEL_INLINE Floats16 distances(const CodewordBox& box, const float* coefficients) {
-  Floats16 sum = {};
+AF_KERNEL_INLINE Lanes distances(const CodewordBox& box, const float* coefficients) {
+  Lanes sum = {};
   for (int i = 0; i < kBoxCoefficients; ++i) {
-    const Floats16 coefficient = splat(coefficients[i]);
-    const Floats16 gap = maximum(maximum(load<Floats16>(box.low[i]) - coefficient,
-                                         coefficient - load<Floats16>(box.high[i])),
-                                 Floats16{});
-    sum += gap * gap;
+    const native::Floats coefficient = native::splat(coefficients[i]);
+    for (int part = 0; part < kParts; ++part) {
+      const int at = part * native::kLanes;
+      const native::Floats gap =
+          native::maximum(native::maximum(native::load(box.low[i] + at) - coefficient,
+                                          coefficient - native::load(box.high[i] + at)),
+                          native::splat(0.0f));
+      sum.part[part] += gap * gap;
+    }
   }
   return sum;
 }
@@ -238,9 +258,8 @@ constexpr float kVisited = 3e38f;
 AF_KERNEL_INLINE Best search_boxes(const CodewordBlocks& blocks, const uint16_t* tile, Best best) {
   float coefficients[16];
   hadamard<kFoldedCoefficientOrder>(tile, coefficients);
-  const Ints16 lanes = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
   uint32_t numbers[kMostBoxLevels] = {};
-  Floats16 to_children[kMostBoxLevels];
+  Lanes to_children[kMostBoxLevels];
   to_children[0] = distances(blocks.boxes[0][0], coefficients);
   const int32_t last = blocks.box_levels - 1;
   for (int32_t level = 0; level >= 0;) {
@@ -249,9 +268,10 @@ AF_KERNEL_INLINE Best search_boxes(const CodewordBlocks& blocks, const uint16_t*
       --level;
       continue;
     }
-    const int32_t lane = __builtin_ctz(lane_bits(to_children[level] == splat(nearest)));
-    to_children[level] = lanes == splat(lane) ? splat(kVisited) : to_children[level];
-    const uint32_t child = 16 * numbers[level] + static_cast<uint32_t>(lane);
+    const auto lane =
+        static_cast<uint32_t>(__builtin_ctz(bits_within(to_children[level], nearest)));
+    set_lane(to_children[level], lane, kVisited);
+    const uint32_t child = 16 * numbers[level] + lane;
     if (level == last) {
       search_block(blocks, child, tile, coefficients, best);
       continue;
