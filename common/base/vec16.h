@@ -85,19 +85,7 @@ AF_DEFINE_OPERATION(minimum, min_epi32, IntegerRegister, Ints16, Ints16)
 /// a > b ? a : b per lane.
 AF_DEFINE_OPERATION(maximum, max_ps, FloatRegister, Floats16, Floats16)
 AF_DEFINE_OPERATION(maximum, max_epi32, IntegerRegister, Ints16, Ints16)
-/// round(a * b / 2^15) per 16-bit lane; not for a == b == -32768.
-AF_DEFINE_OPERATION(multiply_fraction, mulhrs_epi16, IntegerRegister, Shorts32, Shorts32)
-/// Within each group of 8 lanes: a[0] b[0] a[1] b[1] a[2] b[2] a[3] b[3].
-AF_DEFINE_OPERATION(interleave_low, unpacklo_epi16, IntegerRegister, Shorts32, Shorts32)
-/// Within each group of 8 lanes: a[4] b[4] a[5] b[5] a[6] b[6] a[7] b[7].
-AF_DEFINE_OPERATION(interleave_high, unpackhi_epi16, IntegerRegister, Shorts32, Shorts32)
-/// The same for pairs and for fours of 16-bit lanes.
-AF_DEFINE_OPERATION(interleave_pairs_low, unpacklo_epi32, IntegerRegister, Shorts32, Shorts32)
-AF_DEFINE_OPERATION(interleave_pairs_high, unpackhi_epi32, IntegerRegister, Shorts32, Shorts32)
-AF_DEFINE_OPERATION(interleave_fours_low, unpacklo_epi64, IntegerRegister, Shorts32, Shorts32)
-AF_DEFINE_OPERATION(interleave_fours_high, unpackhi_epi64, IntegerRegister, Shorts32, Shorts32)
-/// Saturated to 0 ... 65535 (as bits); within each group of 8 lanes: a's four, then b's four. The
-/// inverse of the two interleaves.
+/// Saturated to 0 ... 65535 (as bits); within each group of 8 lanes: a's four, then b's four.
 AF_DEFINE_OPERATION(pack_unsigned, packus_epi32, IntegerRegister, Shorts32, Ints16)
 
 #undef AF_DEFINE_OPERATION
@@ -114,26 +102,6 @@ AF_KERNEL_INLINE bool any(Ints16 mask) {
   return (words[0] | words[1] | words[2] | words[3] | words[4] | words[5] | words[6] | words[7]) !=
          0;
 #endif
-}
-
-/// base[offset] per lane.
-AF_KERNEL_INLINE Floats16 gather(const float* base, Ints16 offset) {
-  Floats16 values;
-#if AF_VECTOR_BITS == 512
-  __m512i index;
-  memcpy(&index, &offset, sizeof(index));
-  const __m512 gathered = _mm512_i32gather_ps(index, base, 4);
-  memcpy(&values, &gathered, sizeof(values));
-#elif AF_VECTOR_BITS == 256
-  __m256i index[2];
-  memcpy(index, &offset, sizeof(index));
-  const __m256 gathered[2] = {_mm256_i32gather_ps(base, index[0], 4),
-                              _mm256_i32gather_ps(base, index[1], 4)};
-  memcpy(&values, gathered, sizeof(values));
-#else
-  for (int lane = 0; lane < kLanes; ++lane) values[lane] = base[offset[lane]];
-#endif
-  return values;
 }
 
 /// Two neighbouring 16-bit elements, base[offset] in the low and base[offset + 1] in the high half
@@ -160,16 +128,6 @@ AF_KERNEL_INLINE Ints16 gather_pairs(const uint16_t* base, Ints16 offset) {
   }
 #endif
   return pairs;
-}
-
-/// Stores the four groups of 8 lanes at to, to + stride, to + 2 stride and to + 3 stride.
-AF_KERNEL_INLINE void store_groups(int16_t* to, int stride, Shorts32 value) {
-  using Group = int16_t __attribute__((vector_size(16)));
-  const Group groups[4] = {__builtin_shufflevector(value, value, 0, 1, 2, 3, 4, 5, 6, 7),
-                           __builtin_shufflevector(value, value, 8, 9, 10, 11, 12, 13, 14, 15),
-                           __builtin_shufflevector(value, value, 16, 17, 18, 19, 20, 21, 22, 23),
-                           __builtin_shufflevector(value, value, 24, 25, 26, 27, 28, 29, 30, 31)};
-  for (int i = 0; i < 4; ++i) memcpy(to + i * stride, &groups[i], sizeof(groups[i]));
 }
 
 AF_KERNEL_INLINE Floats16 square_root(Floats16 value) {
