@@ -351,23 +351,6 @@ void write_ct(const CtVolume& ct, const fs::path& path) {
   write_raw_image(raw_image_of(ct), path);
 }
 
-CtGrid ascending_lps_grid(const CtGrid& grid) {
-  const AxisOrder order = ascending_lps_order(grid.direction);
-  CtGrid sorted;
-  Eigen::Vector3d first_index = Eigen::Vector3d::Zero();
-  for (std::size_t world = 0; world < 3; ++world) {
-    const auto to = static_cast<Eigen::Index>(world);
-    const int from = order.axis[world];
-    const int extent = grid.size[static_cast<std::size_t>(from)];
-    sorted.size[world] = extent;
-    sorted.spacing_mm[to] = grid.spacing_mm[from];
-    sorted.direction.col(to) = (order.reversed[world] ? -1.0 : 1.0) * grid.direction.col(from);
-    if (order.reversed[world]) first_index[from] = extent - 1;
-  }
-  sorted.origin_mm = grid.point_mm(first_index);
-  return sorted;
-}
-
 std::string ct_content_sha256(const CtVolume& ct) {
   const AxisOrder order = ascending_lps_order(ct.grid.direction);
   const std::array<std::ptrdiff_t, 3> stride = {

@@ -35,10 +35,6 @@ void require_sound_grid(const CtGrid& grid, const std::string& file);
 /// Writes a CT (int16) by extension (.mha .nii.gz .nrrd), atomically.
 void write_ct(const CtVolume& ct, const std::filesystem::path& path);
 
-/// The same voxels' grid after reordering its axes to ascending left, posterior, superior: what
-/// geometry of one CT from different files is compared in.
-CtGrid ascending_lps_grid(const CtGrid& grid);
-
 /// SHA-256 over size (three little-endian int32) and voxels (little-endian int16, i fastest), after
 /// reordering the axes to ascending LPS (so that the same CT as DICOM and as NIfTI has the same
 /// hash).

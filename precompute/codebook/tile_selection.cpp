@@ -219,16 +219,6 @@ std::uint64_t TrainingTilePicker::hash_of(const NumberedTile& tile) const {
   return hash64(selection_.seed, kTrainingStream, static_cast<std::uint64_t>(tile.global_index));
 }
 
-TrainingShare select_training_tiles(std::span<const UnitTiles> tiles,
-                                    std::span<const WorkUnit> units,
-                                    const FieldLattice& lattice,
-                                    const TrainingSelection& selection,
-                                    const CodebookReduction& reduction) {
-  TrainingTilePicker picker(selection, lattice);
-  for (const UnitTiles& of_unit : tiles) picker.add(of_unit, units[of_unit.unit_id]);
-  return picker.take(reduction);
-}
-
 void level_out(TrainingShare& share, const CodebookReduction& reduction) {
   level_out_tiles(share.training, reduction);
   level_out_tiles(share.held_out, reduction);

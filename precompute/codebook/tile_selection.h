@@ -65,13 +65,6 @@ class TrainingTilePicker {
   TrainingShare candidates_;
 };
 
-/// The same for units that are all there, one after the other.
-TrainingShare select_training_tiles(std::span<const UnitTiles> tiles,
-                                    std::span<const WorkUnit> units,
-                                    const FieldLattice& lattice,
-                                    const TrainingSelection& selection,
-                                    const CodebookReduction& reduction);
-
 /// Collective. Moves tiles from ranks that have more than the mean to ranks that have fewer, so
 /// that all take equally long to train; only the tiles moved travel.
 void level_out(TrainingShare& share, const CodebookReduction& reduction);

@@ -2,6 +2,7 @@
 af_add_test(
   scan_test
   SOURCES unit/scan/simulated_scan.cpp
+          unit/scan/calibration_distance.cpp
           unit/scan/fdk_test.cpp
           unit/scan/line_integrals_test.cpp
           unit/scan/scan_file_test.cpp

@@ -1,106 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
 // af-scan: a registration study of real X-rays, whose true pose is known, from a circular scan.
-#include <iostream>
 #include <string>
 
 #include <CLI/CLI.hpp>
 
-#include "base/error.h"
 #include "cli/app_main.h"
 #include "cli/bind_options.h"
-#include "files/partial_folder.h"
-#include "image_files/ct_reader.h"
-#include "run/terminal.h"
-#include "text/options_toml.h"
-#include "tools/scan/scan_file.h"
-#include "tools/scan/scan_reading.h"
-#include "tools/scan/scan_study.h"
-
-namespace {
-
-using namespace af;
-using tools::CalibratedScan;
-using tools::ScanOptions;
-
-/// Calibrates on the even views, judges on the odd ones, reconstructs the even ones.
-CalibratedScan calibrated_scan(const ScanOptions& options,
-                               const std::string& name,
-                               int enlarged,
-                               ScanImages images,
-                               ThreadPool& pool,
-                               const Communicator& world) {
-  const int count = static_cast<int>(images.scan.angles_rad.size());
-  const std::vector<int> even = CircularScan::every(0, 2, count);
-  const std::vector<int> odd = CircularScan::every(1, 2, count);
-  const SelfCalibrationOptions& how = options.calibration;
-  CalibratedScan scan;
-  scan.name = name;
-  scan.enlarged = enlarged;
-  const auto report = [&](const std::string& line) { inform(world, line); };
-  scan.calibration = options.is_as_stated ? ScanCalibration::nominal(images.scan, 0)
-                                          : self_calibrate(images, even, how, pool, report);
-  inform(world, "Judging by the odd views");
-  scan.calibrated = held_out_residual(images, scan.calibration, even, odd, how, pool);
-  scan.as_stated =
-      options.is_as_stated
-          ? scan.calibrated
-          : held_out_residual(
-                images, stated_calibration(images, even, how, pool), even, odd, how, pool);
-  inform(world, "Reconstructing the even views");
-  FdkOptions fdk = options.fdk;
-  constexpr double kVoxelPx = 1.5;
-  if (fdk.voxel_mm == 0.0)
-    fdk.voxel_mm = kVoxelPx * images.scan.pixel_spacing_mm.minCoeff() *
-                   images.scan.source_to_axis_mm / scan.calibration.source_to_detector_mm;
-  const MuVolume volume = reconstruct_views(images, scan.calibration, even, fdk, pool);
-  scan.water_mu_per_mm = reference_mu_per_mm(volume);
-  scan.object_radius_mm = object_radius_mm(volume);
-  scan.ct = ct_of(volume, scan.water_mu_per_mm);
-  scan.images = std::move(images);
-  return scan;
-}
-
-void run(const ScanOptions& options, const std::string& command_line, const Communicator& world) {
-  if (!world.is_root()) return;  // one process does the work, by threads
-  throw_if_any(problems(options));
-  tools::ScanFile file = tools::read_scan_file(options.scan);
-  const int enlarged = options.enlarges_small ? room_for_registration(file.scan) : 1;
-  file.scan = file.scan.enlarged(enlarged);
-  PartialFolder folder(
-      options.output,
-      options.replaces_output ? PartialFolder::Existing::Replace : PartialFolder::Existing::Refuse);
-  ThreadPool pool(thread_count(options.threads));
-  const std::filesystem::path images_folder =
-      options.folder.empty() ? std::filesystem::absolute(options.scan).parent_path()
-                             : options.folder;
-  inform(world,
-         "Reading " + std::to_string(file.scan.angles_rad.size()) + " views of " + file.name);
-  ScanImages images = tools::read_scan_images(file, images_folder, options.most_px, pool);
-  const CalibratedScan scan =
-      calibrated_scan(options, file.name, enlarged, std::move(images), pool, world);
-  const Provenance provenance = {"af-scan",
-                                 command_line,
-                                 to_toml(options),
-                                 options.seed,
-                                 world.size(),
-                                 {{"ct_content", ct_content_sha256(scan.ct)}}};
-  const std::string found = tools::write_scan_study(options, scan, provenance, folder.path());
-  folder.commit();
-  std::cout << found << "\nStudy: " << (folder.final_path() / "study.toml").string() << '\n';
-}
-
-}  // namespace
+#include "tools/scan/scan_run.h"
 
 // Outside app_main only the declaration of options can throw, which is a defect of this program.
 // NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
-  ScanOptions options;
+  using namespace af;
+  tools::ScanOptions options;
   CLI::App app{
       "Makes a registration study of real X-rays from a circular cone-beam scan: finds the true "
       "geometry from the even views, reconstructs a CT from them, and takes odd views as X-rays. "
       "The true pose of every X-ray is the identity, and how true is measured by the odd views."};
   cli::bind_options(app, options);
   const std::string command_line = cli::command_line(argc, argv);
-  return cli::app_main(
-      app, argc, argv, [&](const Communicator& world) { run(options, command_line, world); });
+  return cli::app_main(app, argc, argv, [&](const Communicator& world) {
+    tools::run_scan(options, command_line, world);
+  });
 }

@@ -8,11 +8,13 @@
 
 #include "base/error.h"
 #include "geometry/rigid_transform.h"
+#include "unit/scan/calibration_distance.h"
 #include "unit/scan/simulated_scan.h"
 
 namespace af {
 namespace {
 
+using test::calibration_distance_px;
 using test::small_scan;
 using testing::ElementsAre;
 using testing::HasSubstr;

@@ -6,12 +6,14 @@
 
 #include "base/error.h"
 #include "scan/image_sampling.h"
+#include "unit/scan/calibration_distance.h"
 #include "unit/scan/simulated_scan.h"
 
 namespace af {
 namespace {
 
 using test::ball_image;
+using test::calibration_distance_px;
 using test::lopsided_balls;
 using test::simulated_scan;
 using test::small_scan;

@@ -14,6 +14,7 @@
 #include "base/vector_width.h"
 #include "precompute/codebook/nearest_codeword.h"
 #include "precompute/units/unit_planner.h"
+#include "unit/precompute/codebook/selected_tiles.h"
 
 namespace af {
 namespace {
@@ -306,8 +307,8 @@ TEST(TileSelection, DependsOnlyOnSeedAndTileNumber) {
   const CastField coarse = cast_field(1000000);
   const CastField fine = cast_field(3000);
   const auto select = [](const CastField& field, std::uint64_t seed) {
-    return select_training_tiles(
-        field.tiles, field.units, field.lattice, {0.2, 1000000, seed}, serial_reduction());
+    return test::select_training_tiles(
+        field.tiles, field.units, field.lattice, {0.2, 1000000, seed});
   };
   const TrainingShare share = select(coarse, 1);
   EXPECT_EQ(indices_of(share.training), indices_of(select(fine, 1).training));
@@ -317,8 +318,8 @@ TEST(TileSelection, DependsOnlyOnSeedAndTileNumber) {
 
 TEST(TileSelection, TakesTheFractionOfOccupiedTilesAndHoldsOutOthers) {
   const CastField field = cast_field(100000);
-  const TrainingShare share = select_training_tiles(
-      field.tiles, field.units, field.lattice, {0.2, 1000000, 1}, serial_reduction());
+  const TrainingShare share =
+      test::select_training_tiles(field.tiles, field.units, field.lattice, {0.2, 1000000, 1});
   const double expected = 0.2 * static_cast<double>(field.occupied);
   // Five binomial standard deviations.
   EXPECT_NEAR(static_cast<double>(share.training.size()), expected, 5 * std::sqrt(0.8 * expected));
@@ -332,8 +333,8 @@ TEST(TileSelection, TakesTheFractionOfOccupiedTilesAndHoldsOutOthers) {
 
 TEST(TileSelection, TakesEveryTileAtFractionOneAndNoneIsHeldOut) {
   const CastField field = cast_field(100000);
-  const TrainingShare share = select_training_tiles(
-      field.tiles, field.units, field.lattice, {1.0, 1000000, 1}, serial_reduction());
+  const TrainingShare share =
+      test::select_training_tiles(field.tiles, field.units, field.lattice, {1.0, 1000000, 1});
   EXPECT_EQ(share.training.size(), field.occupied);
   EXPECT_TRUE(share.held_out.empty());
 }
@@ -341,8 +342,8 @@ TEST(TileSelection, TakesEveryTileAtFractionOneAndNoneIsHeldOut) {
 TEST(TileSelection, StaysWithinTheCap) {
   const CastField field = cast_field(100000);
   for (const std::uint64_t cap : {100u, 1000u, 5000u}) {
-    const TrainingShare share = select_training_tiles(
-        field.tiles, field.units, field.lattice, {1.0, cap, 1}, serial_reduction());
+    const TrainingShare share =
+        test::select_training_tiles(field.tiles, field.units, field.lattice, {1.0, cap, 1});
     EXPECT_LE(share.training.size(), cap);
     // One of 65536 steps short at most: far less than one tile here, but bins are not equally full.
     EXPECT_GE(share.training.size(), cap * 9 / 10);

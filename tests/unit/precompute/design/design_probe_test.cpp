@@ -17,6 +17,7 @@
 #include "support/c_arm_camera.h"
 #include "support/ct_phantoms.h"
 #include "support/cube_grid.h"
+#include "unit/precompute/codebook/selected_tiles.h"
 
 namespace af {
 namespace {
@@ -73,9 +74,8 @@ class DesignProbeTest : public testing::Test {
       CodebookOptions options;
       options.codewords = codewords;
       field->codebook =
-          train_codebook(select_training_tiles(tiles, units, lattice, {}, serial_reduction()),
-                         options,
-                         serial_reduction())
+          train_codebook(
+              test::select_training_tiles(tiles, units, lattice, {}), options, serial_reduction())
               .codebook;
     }
     const NearestCodeword search(field->codebook);
