@@ -8,9 +8,7 @@
 #include <stdint.h>
 #include <string.h>
 
-#define AF_KERNEL_INLINE static inline __attribute__((always_inline))
-/// For members of classes of kernels.
-#define AF_KERNEL_MEMBER inline __attribute__((always_inline))
+#include "base/kernel_inline.h"
 
 namespace af::AF_KERNEL_NAMESPACE {
 

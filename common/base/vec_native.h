@@ -9,30 +9,36 @@
 #include <stdint.h>
 #include <string.h>
 
-namespace af::AF_KERNEL_NAMESPACE::native {
+#include "base/kernel_inline.h"
 
-#define AF_NATIVE_INLINE static inline __attribute__((always_inline))
+namespace af::AF_KERNEL_NAMESPACE::native {
 
 inline constexpr int kLanes = AF_VECTOR_BITS / 32;
 
 using Floats = float __attribute__((vector_size(AF_VECTOR_BITS / 8)));
 using Ints = int32_t __attribute__((vector_size(AF_VECTOR_BITS / 8)));
 
-AF_NATIVE_INLINE Floats splat(float value) {
+AF_KERNEL_INLINE Floats splat(float value) {
   return value - Floats{};
 }
-AF_NATIVE_INLINE Ints splat(int32_t value) {
+AF_KERNEL_INLINE Ints splat(int32_t value) {
   return value - Ints{};
 }
 
-AF_NATIVE_INLINE Floats load(const float* from) {
+AF_KERNEL_INLINE Floats load(const float* from) {
   Floats vector;
   memcpy(&vector, from, sizeof(vector));
   return vector;
 }
 
+AF_KERNEL_INLINE Ints load(const int32_t* from) {
+  Ints vector;
+  memcpy(&vector, from, sizeof(vector));
+  return vector;
+}
+
 /// Unsigned 16-bit elements as floats.
-AF_NATIVE_INLINE Floats load(const uint16_t* from) {
+AF_KERNEL_INLINE Floats load(const uint16_t* from) {
 #if AF_VECTOR_BITS == 512
   const __m512i samples =
       _mm512_cvtepu16_epi32(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(from)));
@@ -48,7 +54,7 @@ AF_NATIVE_INLINE Floats load(const uint16_t* from) {
 
 /// Unsigned 16-bit levels as floats: signed differences from a mean, and the mean, limited to
 /// 0 ... 65535.
-AF_NATIVE_INLINE Floats load_with_mean(const int16_t* differences, uint16_t mean) {
+AF_KERNEL_INLINE Floats load_with_mean(const int16_t* differences, uint16_t mean) {
   // Signed sums saturate at both limits at once when levels count from the middle.
 #if AF_VECTOR_BITS == 512
   const __m256i middle = _mm256_set1_epi16(INT16_MIN);
@@ -72,23 +78,23 @@ AF_NATIVE_INLINE Floats load_with_mean(const int16_t* differences, uint16_t mean
   return __builtin_convertvector(reinterpret_cast<Ints>(levels), Floats);
 }
 
-AF_NATIVE_INLINE void store(float* to, Floats vector) {
+AF_KERNEL_INLINE void store(float* to, Floats vector) {
   memcpy(to, &vector, sizeof(vector));
 }
-AF_NATIVE_INLINE void store(int32_t* to, Ints vector) {
+AF_KERNEL_INLINE void store(int32_t* to, Ints vector) {
   memcpy(to, &vector, sizeof(vector));
 }
 
 /// Truncation towards zero.
-AF_NATIVE_INLINE Ints to_int(Floats value) {
+AF_KERNEL_INLINE Ints to_int(Floats value) {
   return __builtin_convertvector(value, Ints);
 }
-AF_NATIVE_INLINE Floats to_float(Ints value) {
+AF_KERNEL_INLINE Floats to_float(Ints value) {
   return __builtin_convertvector(value, Floats);
 }
 
 /// 0, 1, 2, ...
-AF_NATIVE_INLINE Ints lane_numbers() {
+AF_KERNEL_INLINE Ints lane_numbers() {
   Ints lanes = splat(0);
   for (int i = 0; i < kLanes; ++i) lanes[i] = i;
   return lanes;
@@ -112,24 +118,24 @@ using IntegerRegister = __m128i;
 #endif
 
 /// a < b ? a : b per lane.
-AF_NATIVE_INLINE Floats minimum(Floats a, Floats b) {
+AF_KERNEL_INLINE Floats minimum(Floats a, Floats b) {
   return AF_NATIVE(min_ps)(a, b);
 }
-AF_NATIVE_INLINE Ints minimum(Ints a, Ints b) {
+AF_KERNEL_INLINE Ints minimum(Ints a, Ints b) {
   return reinterpret_cast<Ints>(AF_NATIVE(min_epi32)(reinterpret_cast<IntegerRegister>(a),
                                                      reinterpret_cast<IntegerRegister>(b)));
 }
-AF_NATIVE_INLINE Ints maximum(Ints a, Ints b) {
+AF_KERNEL_INLINE Ints maximum(Ints a, Ints b) {
   return reinterpret_cast<Ints>(AF_NATIVE(max_epi32)(reinterpret_cast<IntegerRegister>(a),
                                                      reinterpret_cast<IntegerRegister>(b)));
 }
 /// a > b ? a : b per lane.
-AF_NATIVE_INLINE Floats maximum(Floats a, Floats b) {
+AF_KERNEL_INLINE Floats maximum(Floats a, Floats b) {
   return AF_NATIVE(max_ps)(a, b);
 }
 
 /// base[offset] per lane.
-AF_NATIVE_INLINE Floats gather(const float* base, Ints offset) {
+AF_KERNEL_INLINE Floats gather(const float* base, Ints offset) {
 #if AF_VECTOR_BITS == 512
   return _mm512_i32gather_ps(reinterpret_cast<__m512i>(offset), base, 4);
 #elif AF_VECTOR_BITS == 256
@@ -141,7 +147,7 @@ AF_NATIVE_INLINE Floats gather(const float* base, Ints offset) {
 
 /// Two neighbouring 16-bit elements, base[offset] in the low and base[offset + 1] in the high half
 /// of each lane.
-AF_NATIVE_INLINE Ints gather_pairs(const uint16_t* base, Ints offset) {
+AF_KERNEL_INLINE Ints gather_pairs(const uint16_t* base, Ints offset) {
 #if AF_VECTOR_BITS == 512
   return reinterpret_cast<Ints>(_mm512_i32gather_epi32(reinterpret_cast<__m512i>(offset), base, 2));
 #elif AF_VECTOR_BITS == 256
@@ -159,13 +165,13 @@ AF_NATIVE_INLINE Ints gather_pairs(const uint16_t* base, Ints offset) {
 }
 
 /// The upper 16 bits of each lane, without sign.
-AF_NATIVE_INLINE Ints upper_halves(Ints pairs) {
+AF_KERNEL_INLINE Ints upper_halves(Ints pairs) {
   using UnsignedInts = uint32_t __attribute__((vector_size(AF_VECTOR_BITS / 8)));
   return reinterpret_cast<Ints>(reinterpret_cast<UnsignedInts>(pairs) >> 16);
 }
 
 /// True when any lane of a comparison's result is set.
-AF_NATIVE_INLINE bool any(Ints mask) {
+AF_KERNEL_INLINE bool any(Ints mask) {
 #if AF_VECTOR_BITS == 512
   return _mm512_movepi32_mask(reinterpret_cast<__m512i>(mask)) != 0;
 #elif AF_VECTOR_BITS == 256
@@ -177,7 +183,7 @@ AF_NATIVE_INLINE bool any(Ints mask) {
 
 #if AF_VECTOR_BITS >= 256
 /// True when any lane has any of the bits set.
-AF_NATIVE_INLINE bool any_bit(Ints value, int32_t bits) {
+AF_KERNEL_INLINE bool any_bit(Ints value, int32_t bits) {
 #if AF_VECTOR_BITS == 512
   return _mm512_test_epi32_mask(reinterpret_cast<__m512i>(value), _mm512_set1_epi32(bits)) != 0;
 #else
@@ -186,14 +192,14 @@ AF_NATIVE_INLINE bool any_bit(Ints value, int32_t bits) {
 }
 
 /// window[index] per lane, index in 0 ... kLanes - 1.
-AF_NATIVE_INLINE Floats pick(Floats window, Ints index) {
+AF_KERNEL_INLINE Floats pick(Floats window, Ints index) {
 #if AF_VECTOR_BITS == 512
   return _mm512_permutexvar_ps(reinterpret_cast<__m512i>(index), window);
 #else
   return _mm256_permutevar8x32_ps(window, reinterpret_cast<__m256i>(index));
 #endif
 }
-AF_NATIVE_INLINE Ints pick(Ints window, Ints index) {
+AF_KERNEL_INLINE Ints pick(Ints window, Ints index) {
 #if AF_VECTOR_BITS == 512
   return reinterpret_cast<Ints>(_mm512_permutexvar_epi32(reinterpret_cast<__m512i>(index),
                                                          reinterpret_cast<__m512i>(window)));
@@ -203,7 +209,7 @@ AF_NATIVE_INLINE Ints pick(Ints window, Ints index) {
 #endif
 }
 /// Of two windows, one after the other: index modulo 2 kLanes.
-AF_NATIVE_INLINE Floats pick(Floats low, Floats high, Ints index) {
+AF_KERNEL_INLINE Floats pick(Floats low, Floats high, Ints index) {
 #if AF_VECTOR_BITS == 512
   return _mm512_permutex2var_ps(low, reinterpret_cast<__m512i>(index), high);
 #else
@@ -212,10 +218,14 @@ AF_NATIVE_INLINE Floats pick(Floats low, Floats high, Ints index) {
       pick(low, index), pick(high, index), reinterpret_cast<__m256>(index << 28));
 #endif
 }
+AF_KERNEL_INLINE Ints pick(Ints low, Ints high, Ints index) {
+  return reinterpret_cast<Ints>(
+      pick(reinterpret_cast<Floats>(low), reinterpret_cast<Floats>(high), index));
+}
 #endif
 
 /// Stores a[0], b[0], a[1], b[1], ...
-AF_NATIVE_INLINE void store_interleaved(float* to, Floats a, Floats b) {
+AF_KERNEL_INLINE void store_interleaved(float* to, Floats a, Floats b) {
 #if AF_VECTOR_BITS == 512
   store(to, __builtin_shufflevector(a, b, 0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23));
   store(

@@ -20,7 +20,7 @@ struct Blend {
 
 /// Elements first ... first + kLanes - 1 of the tile with this index.
 template <bool kHasMeans>
-AF_NATIVE_INLINE Floats elements_of(const TileStrip& strip, const uint16_t* index, int first) {
+AF_KERNEL_INLINE Floats elements_of(const TileStrip& strip, const uint16_t* index, int first) {
   const int64_t at = int64_t{16} * *index + first;
   if constexpr (kHasMeans)
     return native::load_with_mean(strip.shapes + at, index[strip.mean_offset]);
@@ -30,7 +30,7 @@ AF_NATIVE_INLINE Floats elements_of(const TileStrip& strip, const uint16_t* inde
 
 /// Elements first ... first + kLanes - 1 of the tiles at d.
 template <bool kWithSlopes, bool kHasMeans>
-AF_NATIVE_INLINE Blend blend_elements(const TileStrip& strip, int32_t d, int first) {
+AF_KERNEL_INLINE Blend blend_elements(const TileStrip& strip, int32_t d, int first) {
   Blend sum{splat(0.0f), splat(0.0f), splat(0.0f)};
   const TileTap* const v_begin = strip.v_taps + strip.v_begin[d];
   const TileTap* const v_end = strip.v_taps + strip.v_begin[d + 1];
@@ -56,7 +56,7 @@ using F8 = float __attribute__((vector_size(32)));
 using F4 = float __attribute__((vector_size(16)));
 
 /// The four nodes of a tile, [s][t], go to two rows of the image.
-AF_NATIVE_INLINE void store_nodes(F4 nodes, float* image, int64_t stride) {
+AF_KERNEL_INLINE void store_nodes(F4 nodes, float* image, int64_t stride) {
   const F4 rows = __builtin_shufflevector(nodes, nodes, 0, 2, 1, 3);
   float values[4];
   memcpy(values, &rows, sizeof(values));
@@ -66,21 +66,21 @@ AF_NATIVE_INLINE void store_nodes(F4 nodes, float* image, int64_t stride) {
 
 // Sums over the four viewpoints of a tile, always in the order (0 + 2) + (1 + 3).
 #if AF_VECTOR_BITS == 512
-AF_NATIVE_INLINE F4 sum_over_viewpoints(Floats elements) {
+AF_KERNEL_INLINE F4 sum_over_viewpoints(Floats elements) {
   const F8 pairs = __builtin_shufflevector(elements, elements, 0, 1, 2, 3, 4, 5, 6, 7) +
                    __builtin_shufflevector(elements, elements, 8, 9, 10, 11, 12, 13, 14, 15);
   return __builtin_shufflevector(pairs, pairs, 0, 1, 2, 3) +
          __builtin_shufflevector(pairs, pairs, 4, 5, 6, 7);
 }
 #elif AF_VECTOR_BITS == 256
-AF_NATIVE_INLINE F4 sum_over_viewpoints(F8 pairs) {
+AF_KERNEL_INLINE F4 sum_over_viewpoints(F8 pairs) {
   return __builtin_shufflevector(pairs, pairs, 0, 1, 2, 3) +
          __builtin_shufflevector(pairs, pairs, 4, 5, 6, 7);
 }
 #endif
 
 template <bool kWithSlopes, bool kHasMeans>
-AF_NATIVE_INLINE void blend_tile(const TileStrip& strip, int32_t d) {
+AF_KERNEL_INLINE void blend_tile(const TileStrip& strip, int32_t d) {
 #if AF_VECTOR_BITS == 512
   const Blend blend = blend_elements<kWithSlopes, kHasMeans>(strip, d, 0);
   const F4 value = sum_over_viewpoints(blend.value);
@@ -109,7 +109,7 @@ AF_NATIVE_INLINE void blend_tile(const TileStrip& strip, int32_t d) {
 }
 
 template <bool kWithSlopes, bool kHasMeans>
-AF_NATIVE_INLINE void blend_strip(const TileStrip& given) {
+AF_KERNEL_INLINE void blend_strip(const TileStrip& given) {
   // A copy that no store can change.
   const TileStrip strip = given;
   for (int32_t d = strip.tile_begin; d < strip.tile_end; ++d)
@@ -119,7 +119,7 @@ AF_NATIVE_INLINE void blend_strip(const TileStrip& given) {
 /// kLanes columns of a block from column c on, between two viewpoints along each axis, whose slopes
 /// are opposite.
 template <bool kWithSlopes>
-AF_NATIVE_INLINE void blend_columns_between_two(const SampleBlock& block, int32_t c) {
+AF_KERNEL_INLINE void blend_columns_between_two(const SampleBlock& block, int32_t c) {
   const Floats u_weights[2] = {load(block.u_weights[0] + c), load(block.u_weights[1] + c)};
   const Floats u_slope_weight = load(block.u_slopes[1] + c);
   for (int32_t row = 0; row < block.rows; ++row) {
@@ -144,7 +144,7 @@ AF_NATIVE_INLINE void blend_columns_between_two(const SampleBlock& block, int32_
 
 /// kLanes columns of a block from column c on.
 template <bool kWithSlopes, int kTaps>
-AF_NATIVE_INLINE void blend_columns(const SampleBlock& block, int32_t c) {
+AF_KERNEL_INLINE void blend_columns(const SampleBlock& block, int32_t c) {
   Floats u_weights[kMostTaps];
   Floats u_slopes[kMostTaps];
   for (int a = 0; a < kTaps; ++a) {
@@ -179,7 +179,7 @@ AF_NATIVE_INLINE void blend_columns(const SampleBlock& block, int32_t c) {
 }
 
 template <bool kWithSlopes, int kTaps>
-AF_NATIVE_INLINE void blend_block(const SampleBlock& given) {
+AF_KERNEL_INLINE void blend_block(const SampleBlock& given) {
   // A copy that no store can change.
   const SampleBlock block = given;
   for (int32_t c = 0; c < block.columns; c += kLanes)

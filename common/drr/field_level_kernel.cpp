@@ -10,7 +10,7 @@ namespace af::AF_KERNEL_NAMESPACE {
 namespace {
 
 /// The levels of a mean-removed tile: differences stand 32768 higher, and sums are limited.
-AF_NATIVE_INLINE void add_mean(const uint16_t* shape, uint16_t mean, uint16_t* levels) {
+AF_KERNEL_INLINE void add_mean(const uint16_t* shape, uint16_t mean, uint16_t* levels) {
   const __m128i middle = _mm_set1_epi16(INT16_MIN);
   const __m128i from_middle = _mm_xor_si128(_mm_set1_epi16(static_cast<short>(mean)), middle);
   for (int i = 0; i < 2; ++i) {
@@ -21,7 +21,7 @@ AF_NATIVE_INLINE void add_mean(const uint16_t* shape, uint16_t mean, uint16_t* l
 }
 
 template <bool kHasMeans>
-AF_NATIVE_INLINE void decode_plane(const TilePlane& tiles,
+AF_KERNEL_INLINE void decode_plane(const TilePlane& tiles,
                                    int32_t stride,
                                    uint16_t* const planes[4]) {
   const int64_t row_values = kHasMeans ? int64_t{2} * tiles.t_tiles : tiles.t_tiles;

@@ -16,7 +16,7 @@ using native::store;
 /// nodes on either side, then of the next ones.
 constexpr float kWeights[kUpsampleReach] = {150.0f / 256.0f, -25.0f / 256.0f, 3.0f / 256.0f};
 
-AF_NATIVE_INLINE Floats halfway(const float* const rows[2 * kUpsampleReach], int32_t at) {
+AF_KERNEL_INLINE Floats halfway(const float* const rows[2 * kUpsampleReach], int32_t at) {
   Floats sum = native::splat(0.0f);
   for (int i = 0; i < kUpsampleReach; ++i)
     sum += kWeights[i] *
@@ -24,12 +24,12 @@ AF_NATIVE_INLINE Floats halfway(const float* const rows[2 * kUpsampleReach], int
   return sum;
 }
 
-AF_NATIVE_INLINE int32_t within(int32_t index, int32_t count) {
+AF_KERNEL_INLINE int32_t within(int32_t index, int32_t count) {
   return index < 0 ? 0 : (index < count ? index : count - 1);
 }
 
 /// One row, twice as fine.
-AF_NATIVE_INLINE void upsample_row(const float* in, int32_t count, float* padded, float* out) {
+AF_KERNEL_INLINE void upsample_row(const float* in, int32_t count, float* padded, float* out) {
   memcpy(padded + kUpsampleReach, in, sizeof(float) * static_cast<size_t>(count));
   for (int32_t i = 0; i < kUpsampleReach; ++i) {
     padded[i] = in[0];

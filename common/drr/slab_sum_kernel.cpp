@@ -14,14 +14,14 @@ using native::load;
 using native::splat;
 using native::store;
 
-AF_NATIVE_INLINE Ints load_ints(const int32_t* from) {
+AF_KERNEL_INLINE Ints load_ints(const int32_t* from) {
   Ints vector;
   memcpy(&vector, from, sizeof(vector));
   return vector;
 }
 
 /// Sum of an image's rows by the weights of row r, kLanes columns from c on.
-AF_NATIVE_INLINE Floats weighted_rows(const float* image,
+AF_KERNEL_INLINE Floats weighted_rows(const float* image,
                                       int64_t stride,
                                       const float* const (&weights)[kSumTaps],
                                       int32_t r,
@@ -33,7 +33,7 @@ AF_NATIVE_INLINE Floats weighted_rows(const float* image,
 
 /// The slab's images at row r of the sum.
 template <bool kWithSlopes>
-AF_NATIVE_INLINE void make_rows(const SlabTerm& term, int32_t r) {
+AF_KERNEL_INLINE void make_rows(const SlabTerm& term, int32_t r) {
   const float* const weights[kSumTaps] = {
       term.t.weights[0], term.t.weights[1], term.t.weights[2], term.t.weights[3]};
   const float* const slopes[kSumTaps] = {
@@ -59,7 +59,7 @@ struct Window {
   bool fits;     ///< two vectors from `base` on hold all of them
 };
 
-AF_NATIVE_INLINE Window window_of(const int32_t* first) {
+AF_KERNEL_INLINE Window window_of(const int32_t* first) {
   // Ascending, so that the last one is furthest.
   const int32_t span = first[kLanes - 1] - first[0];
   const Ints lane = load_ints(first) - first[0];
@@ -69,7 +69,7 @@ AF_NATIVE_INLINE Window window_of(const int32_t* first) {
           span + kSumTaps <= 2 * kLanes};
 }
 
-AF_NATIVE_INLINE void take(const Window& window, const float* row, Floats (&values)[kSumTaps]) {
+AF_KERNEL_INLINE void take(const Window& window, const float* row, Floats (&values)[kSumTaps]) {
   const float* const from = row + window.base;
   // Nodes of a slab and of the sum are about as far apart.
   if (window.is_even) {
@@ -88,20 +88,20 @@ AF_NATIVE_INLINE void take(const Window& window, const float* row, Floats (&valu
   for (int tap = 0; tap < kSumTaps; ++tap) values[tap] = native::gather(from + tap, window.lane);
 }
 
-AF_NATIVE_INLINE Floats weighted(const Floats (&weights)[kSumTaps],
+AF_KERNEL_INLINE Floats weighted(const Floats (&weights)[kSumTaps],
                                  const Floats (&values)[kSumTaps]) {
   Floats sum = splat(0.0f);
   for (int tap = 0; tap < kSumTaps; ++tap) sum += weights[tap] * values[tap];
   return sum;
 }
 
-AF_NATIVE_INLINE void put(const SlabTerm& term, int image, int64_t at, Floats value) {
+AF_KERNEL_INLINE void put(const SlabTerm& term, int image, int64_t at, Floats value) {
   float* to = term.sum[image] + at;
   store(to, term.adds ? load(to) + value : value);
 }
 
 template <bool kWithSlopes>
-AF_NATIVE_INLINE void add(const SlabTerm& given) {
+AF_KERNEL_INLINE void add(const SlabTerm& given) {
   // A copy that no store can change.
   const SlabTerm term = given;
   for (int32_t r = 0; r < term.sum_rows; ++r) {

@@ -68,7 +68,7 @@ struct Limits {
   float s, t;
 };
 
-AF_NATIVE_INLINE float largest_below(int32_t positive) {
+AF_KERNEL_INLINE float largest_below(int32_t positive) {
   const auto value = static_cast<float>(positive);
   int32_t bits = 0;
   memcpy(&bits, &value, sizeof(bits));
@@ -78,18 +78,18 @@ AF_NATIVE_INLINE float largest_below(int32_t positive) {
   return below;
 }
 
-AF_NATIVE_INLINE Floats clamped(Floats value, float limit) {
+AF_KERNEL_INLINE Floats clamped(Floats value, float limit) {
   return native::minimum(native::maximum(value, splat(0.0f)), splat(limit));
 }
 
 #if AF_VECTOR_BITS >= 256
-AF_NATIVE_INLINE LeastLanes least_lanes(const WarpRow& row) {
+AF_KERNEL_INLINE LeastLanes least_lanes(const WarpRow& row) {
   const bool s_rises = row.s_1 * row.d_0 > row.s_0 * row.d_1;
   const bool t_rises = row.t_1 * row.d_0 > row.t_0 * row.d_1;
   return {splat(s_rises ? 0 : kLanes - 1), splat(t_rises ? 0 : kLanes - 1)};
 }
 
-AF_NATIVE_INLINE Window window_of(const Cells& cells, const LeastLanes& least, int32_t stride) {
+AF_KERNEL_INLINE Window window_of(const Cells& cells, const LeastLanes& least, int32_t stride) {
   const Ints first_s = native::pick(cells.s_node, least.s);
   const Ints first_t = native::pick(cells.t_node, least.t);
   const Ints column = cells.s_node - first_s;
@@ -113,17 +113,17 @@ AF_NATIVE_INLINE Window window_of(const Cells& cells, const LeastLanes& least, i
 }
 #else
 // Without instructions that pick lanes, all values are gathered.
-AF_NATIVE_INLINE LeastLanes least_lanes(const WarpRow& /*row*/) {
+AF_KERNEL_INLINE LeastLanes least_lanes(const WarpRow& /*row*/) {
   return LeastLanes();
 }
-AF_NATIVE_INLINE Window window_of(const Cells& /*cells*/,
+AF_KERNEL_INLINE Window window_of(const Cells& /*cells*/,
                                   const LeastLanes& /*least*/,
                                   int32_t /*stride*/) {
   return Window();
 }
 #endif
 
-AF_NATIVE_INLINE Cells cells_of(const Limits& limits, const WarpRow& row, Floats column) {
+AF_KERNEL_INLINE Cells cells_of(const Limits& limits, const WarpRow& row, Floats column) {
   Cells cells{};
   cells.inverse_depth = splat(1.0f) / (row.d_0 + column * row.d_1);
   cells.s = clamped((row.s_0 + column * row.s_1) * cells.inverse_depth, limits.s);
@@ -147,11 +147,11 @@ struct Column {
 };
 
 #if AF_VECTOR_BITS >= 256
-AF_NATIVE_INLINE Floats pick_wide(const float* nodes, const Window& window) {
+AF_KERNEL_INLINE Floats pick_wide(const float* nodes, const Window& window) {
   return native::pick(load(nodes), load(nodes + kLanes), window.lane);
 }
 
-AF_NATIVE_INLINE Column pick_column(const float* nodes, int64_t stride, const Window& window) {
+AF_KERNEL_INLINE Column pick_column(const float* nodes, int64_t stride, const Window& window) {
   if (window.shape == kWide) {
     const Floats row_1 = pick_wide(nodes + stride, window);
     const Ints is_upper = window.row >= 1;
@@ -176,14 +176,14 @@ struct Corners {
   Column left, right;
 };
 
-AF_NATIVE_INLINE Corners gather_corners(const float* values, int32_t stride, const Cells& cells) {
+AF_KERNEL_INLINE Corners gather_corners(const float* values, int32_t stride, const Cells& cells) {
   const Ints offset = cells.t_node * stride + cells.s_node;
   const float* next = values + stride;
   return {{native::gather(values, offset), native::gather(next, offset)},
           {native::gather(values + 1, offset), native::gather(next + 1, offset)}};
 }
 
-AF_NATIVE_INLINE Corners corners_of(const float* values, int32_t stride, const Cells& cells) {
+AF_KERNEL_INLINE Corners corners_of(const float* values, int32_t stride, const Cells& cells) {
 #if AF_VECTOR_BITS >= 256
   if (cells.window.shape != kNoWindow) {
     const float* first = values + cells.window.first;
@@ -193,7 +193,7 @@ AF_NATIVE_INLINE Corners corners_of(const float* values, int32_t stride, const C
   return gather_corners(values, stride, cells);
 }
 
-AF_NATIVE_INLINE RowPair sample(const float* values, int32_t stride, const Cells& cells) {
+AF_KERNEL_INLINE RowPair sample(const float* values, int32_t stride, const Cells& cells) {
   const Corners corners = corners_of(values, stride, cells);
   const Floats low_slope = corners.right.low - corners.left.low;
   const Floats high_slope = corners.right.high - corners.left.high;
@@ -203,11 +203,11 @@ AF_NATIVE_INLINE RowPair sample(const float* values, int32_t stride, const Cells
           high_slope};
 }
 
-AF_NATIVE_INLINE Floats value_of(const RowPair& pair, const Cells& cells) {
+AF_KERNEL_INLINE Floats value_of(const RowPair& pair, const Cells& cells) {
   return pair.low + cells.t_weight * (pair.high - pair.low);
 }
 
-AF_NATIVE_INLINE Floats product(const float (&factors)[3], const Floats (&vector)[3]) {
+AF_KERNEL_INLINE Floats product(const float (&factors)[3], const Floats (&vector)[3]) {
   return factors[0] * vector[0] + factors[1] * vector[1] + factors[2] * vector[2];
 }
 
@@ -217,7 +217,7 @@ struct PixelRun {
   int32_t count;
 };
 
-AF_NATIVE_INLINE void put(const PixelRun& run, float* values, Floats value) {
+AF_KERNEL_INLINE void put(const PixelRun& run, float* values, Floats value) {
   float* to = values + run.offset;
   if (run.count == kLanes) {
     store(to, value);
@@ -231,7 +231,7 @@ AF_NATIVE_INLINE void put(const PixelRun& run, float* values, Floats value) {
 /// Calls work(row, cells, run) for all pixels. Arguments come as copies: the compiler cannot know
 /// that stores to pixels do not change what references refer to, and would load it again and again.
 template <typename Work>
-AF_NATIVE_INLINE void for_each_run(NodeImage image,
+AF_KERNEL_INLINE void for_each_run(NodeImage image,
                                    Homography homography,
                                    PixelGrid grid,
                                    Work work) {

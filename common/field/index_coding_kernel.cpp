@@ -2,7 +2,6 @@
 // Coding of blocks of indices (see index_coding.h). Compiled once per vector width.
 #include "field/index_coding_kernel.h"
 
-#include "base/vec16.h"
 #include "field/range_coder.h"
 #include "field/tile_prediction.h"
 
@@ -22,8 +21,22 @@ constexpr uint32_t kLeastMean = 32;
 /// Where the models of a coefficient begin: those of its order, that is, how many axes it is a
 /// difference along: 0, 1, more.
 constexpr int32_t kModelsOfOrder = kDistances * kWidths;
-constexpr Ints16 kFirstModels =
-    Ints16{0, 1, 1, 2, 1, 2, 2, 2, 1, 2, 2, 2, 2, 2, 2, 2} * kModelsOfOrder;
+alignas(64) constexpr int32_t kFirstModels[16] = {0,
+                                                  1 * kModelsOfOrder,
+                                                  1 * kModelsOfOrder,
+                                                  2 * kModelsOfOrder,
+                                                  1 * kModelsOfOrder,
+                                                  2 * kModelsOfOrder,
+                                                  2 * kModelsOfOrder,
+                                                  2 * kModelsOfOrder,
+                                                  1 * kModelsOfOrder,
+                                                  2 * kModelsOfOrder,
+                                                  2 * kModelsOfOrder,
+                                                  2 * kModelsOfOrder,
+                                                  2 * kModelsOfOrder,
+                                                  2 * kModelsOfOrder,
+                                                  2 * kModelsOfOrder,
+                                                  2 * kModelsOfOrder};
 
 constexpr int kOctaveShift = 21;        // of a float's bits: two of the mantissa are kept
 constexpr int32_t kOctavesOfOne = 508;  // 127 << 2
@@ -35,62 +48,36 @@ AF_KERNEL_INLINE int32_t quarter_octaves(float magnitude) {
   return (bits >> kOctaveShift) - kOctavesOfOne;
 }
 
-AF_KERNEL_INLINE Ints16 quarter_octaves(Floats16 magnitudes) {
-  const Floats16 above_one = magnitudes + splat(1.0f);
-  Ints16 bits;
-  memcpy(&bits, &above_one, sizeof(bits));
-  return (bits >> kOctaveShift) - kOctavesOfOne;
+AF_KERNEL_INLINE native::Ints quarter_octaves(native::Floats magnitudes) {
+  const native::Floats above_one = magnitudes + 1.0f;
+  return (reinterpret_cast<native::Ints>(above_one) >> kOctaveShift) - kOctavesOfOne;
 }
 
-AF_KERNEL_INLINE Floats16 magnitude(Floats16 values) {
-  Ints16 bits;
-  memcpy(&bits, &values, sizeof(bits));
-  bits &= splat(int32_t{0x7FFFFFFF});
-  Floats16 result;
-  memcpy(&result, &bits, sizeof(result));
-  return result;
+AF_KERNEL_INLINE native::Floats magnitude(native::Floats values) {
+  return reinterpret_cast<native::Floats>(reinterpret_cast<native::Ints>(values) & 0x7FFFFFFF);
 }
 
 /// Within 0 ... 15.
-AF_KERNEL_INLINE Ints16 class_of(Ints16 quarters) {
-  return minimum(maximum(quarters >> 1, Ints16{}), splat(int32_t{15}));
+AF_KERNEL_INLINE native::Ints class_of(native::Ints quarters) {
+  return native::minimum(native::maximum(quarters >> 1, native::Ints{}), native::splat(15));
 }
 
 /// values[index] per lane, of 16.
-template <typename Vector>
-AF_KERNEL_INLINE Vector picked(Vector values, Ints16 index) {
-  Vector result;
+template <typename Vector, typename Value>
+AF_KERNEL_INLINE Vector picked(const Value* values, native::Ints index) {
 #if AF_VECTOR_BITS == 512
-  __m512i from;
-  __m512i at;
-  memcpy(&from, &values, sizeof(from));
-  memcpy(&at, &index, sizeof(at));
-  from = _mm512_permutexvar_epi32(at, from);
-  memcpy(&result, &from, sizeof(result));
+  return native::pick(native::load(values), index);
 #elif AF_VECTOR_BITS == 256
-  __m256i from[2];
-  __m256i at[2];
-  memcpy(from, &values, sizeof(from));
-  memcpy(at, &index, sizeof(at));
-  __m256 found[2];
-  for (int half = 0; half < 2; ++half)
-    found[half] =
-        _mm256_blendv_ps(_mm256_castsi256_ps(_mm256_permutevar8x32_epi32(from[0], at[half])),
-                         _mm256_castsi256_ps(_mm256_permutevar8x32_epi32(from[1], at[half])),
-                         _mm256_castsi256_ps(_mm256_slli_epi32(at[half], 28)));  // bit 3 decides
-  memcpy(&result, found, sizeof(result));
+  return native::pick(native::load(values), native::load(values + kLanes), index);
 #else
-  for (int lane = 0; lane < kLanes; ++lane) result[lane] = values[index[lane]];
+  return Vector{values[index[0]], values[index[1]], values[index[2]], values[index[3]]};
 #endif
-  return result;
 }
 
-/// Sums of every fourth, then of these by pairs.
-AF_KERNEL_INLINE float sum_of(Floats16 values) {
-  float v[16];
-  memcpy(v, &values, sizeof(v));
-  float sums[4];
-  for (int j = 0; j < 4; ++j) sums[j] = ((v[j] + v[j + 4]) + v[j + 8]) + v[j + 12];
+/// Sums of every fourth of 16, then of these by pairs.
+AF_KERNEL_INLINE float sum_of(const float* values) {
+  __m128 sums = _mm_load_ps(values);
+  for (int first = 4; first < 16; first += 4) sums = _mm_add_ps(sums, _mm_load_ps(values + first));
   return (sums[0] + sums[1]) + (sums[2] + sums[3]);
 }
 
@@ -352,43 +339,45 @@ AF_KERNEL_INLINE bool go_to_occupied(Lane<Coder, Index>& lane,
   prefetch_coefficients(tables, lane.before[row + 3].codeword);
   lane.surprise_class = surprise_class_of(around);
   lane.usual = lane.memory.octaves + 16 * lane.surprise_class;
-  Floats16 predicted = predicted_tile(inputs_of(tables, around));
+  predict_tile(inputs_of(tables, around), lane.predicted);
   if constexpr (kHasMeans) {
-    const float expected_sum = predicted[0] + expected_of_means(lane.memory, around);
+    const float expected_sum = lane.predicted[0] + expected_of_means(lane.memory, around);
     const float sum = code_mean(lane, tables, shape, expected_sum);
     lane.memory.sums[lane.here - lane.memory.notes] = sum;
-    predicted[0] = expected_sum - sum;
+    lane.predicted[0] = expected_sum - sum;
   }
-  store(lane.predicted, predicted);
   lane.cluster = 0;
   lane.within_cluster = tables.first_node;
   lane.number = 1;
   return true;
 }
 
-/// Models of the turns at all nodes of a cluster: a way that is told turn by turn must not wait for
-/// more than the last turn.
-AF_KERNEL_INLINE Ints16 turn_models(const NodeCluster& cluster, Floats16 predicted, Ints16 usual) {
-  const Ints16 splits = load<Ints16>(cluster.splits);
-  const Ints16 coefficients = splits & splat(int32_t{15});
-  const Floats16 differences = picked(predicted, coefficients) - load<Floats16>(cluster.thresholds);
-  const Ints16 usual_there = picked(usual, coefficients);
-  const Ints16 distances = class_of(quarter_octaves(magnitude(differences)) - usual_there + 24);
-  const Ints16 widths = class_of((splits >> 4) - usual_there + 20);
-  Ints16 bits;
-  memcpy(&bits, &differences, sizeof(bits));
-  const Ints16 is_above = ~(bits >> 31);
-  const Ints16 sides = (distances ^ is_above) + kDistances / 2;
-  return picked(kFirstModels, coefficients) + sides * kWidths + widths;
+/// Models of the turns at some nodes of a cluster, as many as a vector has lanes.
+AF_KERNEL_INLINE native::Ints turn_models(const NodeCluster& cluster,
+                                          int first,
+                                          const float* predicted,
+                                          const int32_t* usual) {
+  const native::Ints splits = native::load(cluster.splits + first);
+  const native::Ints coefficients = splits & 15;
+  const native::Floats differences =
+      picked<native::Floats>(predicted, coefficients) - native::load(cluster.thresholds + first);
+  const native::Ints usual_there = picked<native::Ints>(usual, coefficients);
+  const native::Ints distances =
+      class_of(quarter_octaves(magnitude(differences)) - usual_there + 24);
+  const native::Ints widths = class_of((splits >> 4) - usual_there + 20);
+  const native::Ints is_above = ~(reinterpret_cast<native::Ints>(differences) >> 31);
+  const native::Ints sides = (distances ^ is_above) + kDistances / 2;
+  return picked<native::Ints>(kFirstModels, coefficients) + sides * kWidths + widths;
 }
 
-/// A way enters a cluster.
+/// A way enters a cluster. The models of all its turns are found at once: a way that is told turn
+/// by turn must not wait for more than the last turn.
 template <typename Coder, typename Index>
 AF_KERNEL_INLINE void enter_cluster(Lane<Coder, Index>& lane, const CodewordTables& tables) {
-  store(
-      lane.models,
-      turn_models(
-          tables.clusters[lane.cluster], load<Floats16>(lane.predicted), load<Ints16>(lane.usual)));
+#pragma GCC unroll 4
+  for (int first = 0; first < kNodesOfCluster; first += kLanes)
+    native::store(lane.models + first,
+                  turn_models(tables.clusters[lane.cluster], first, lane.predicted, lane.usual));
 }
 
 /// One turn of the way from the root to a codeword; `is_upper` is an encoder's.
@@ -413,13 +402,20 @@ AF_KERNEL_INLINE void finish_tile(Lane<Coder, Index>& lane,
                                   const CodewordTables& tables,
                                   const BlockShape& shape,
                                   uint16_t codeword) {
-  const Floats16 found = load<Floats16>(tables.coefficients + 16u * uint32_t{codeword});
-  const Floats16 wrong_by = magnitude(found - load<Floats16>(lane.predicted));
+  const float* const found = tables.coefficients + 16u * uint32_t{codeword};
   float* const errors = lane.memory.errors + 16 * lane.surprise_class;
-  const Floats16 usual = load<Floats16>(errors);
-  const Floats16 learned = usual + (wrong_by - usual) * splat(kForgetting);
-  store(errors, learned);
-  store(lane.memory.octaves + 16 * lane.surprise_class, quarter_octaves(learned));
+  int32_t* const octaves = lane.memory.octaves + 16 * lane.surprise_class;
+  alignas(64) float wrong_by[16];
+#pragma GCC unroll 4
+  for (int i = 0; i < 16; i += kLanes) {
+    const native::Floats wrong =
+        magnitude(native::load(found + i) - native::load(lane.predicted + i));
+    const native::Floats usual = native::load(errors + i);
+    const native::Floats learned = usual + (wrong - usual) * kForgetting;
+    native::store(wrong_by + i, wrong);
+    native::store(errors + i, learned);
+    native::store(octaves + i, quarter_octaves(learned));
+  }
   *lane.here = {sum_of(wrong_by) / 4.0f, codeword, kOccupied};
   set(lane.index, codeword);
   go_on<kHasMeans>(lane, shape);

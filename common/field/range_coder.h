@@ -7,7 +7,7 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "base/vec16.h"
+#include "base/kernel_inline.h"
 #include "field/index_coding_kernel.h"
 
 namespace af::AF_KERNEL_NAMESPACE {

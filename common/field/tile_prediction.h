@@ -2,7 +2,7 @@
 // For kernels only: prediction of a tile from its neighbours.
 #pragma once
 
-#include "base/vec16.h"
+#include "base/vec_native.h"
 
 namespace af::AF_KERNEL_NAMESPACE {
 
@@ -69,45 +69,41 @@ inline constexpr Term kTerms[] = {
 };
 inline constexpr int kTermCount = sizeof(kTerms) / sizeof(kTerms[0]);
 
+/// A vector holds this many of a tile's coefficients, and this many vectors all of them.
+inline constexpr int kLanes = native::kLanes;
+inline constexpr int kParts = 16 / kLanes;
+
+/// Part `part` of the coefficients of a neighbour, each taken from place j ^ turn.
 template <int kTurn>
-AF_KERNEL_INLINE Floats16 turned_by(Floats16 values) {
-  return __builtin_shufflevector(values,
-                                 values,
-                                 0 ^ kTurn,
-                                 1 ^ kTurn,
-                                 2 ^ kTurn,
-                                 3 ^ kTurn,
-                                 4 ^ kTurn,
-                                 5 ^ kTurn,
-                                 6 ^ kTurn,
-                                 7 ^ kTurn,
-                                 8 ^ kTurn,
-                                 9 ^ kTurn,
-                                 10 ^ kTurn,
-                                 11 ^ kTurn,
-                                 12 ^ kTurn,
-                                 13 ^ kTurn,
-                                 14 ^ kTurn,
-                                 15 ^ kTurn);
+AF_KERNEL_INLINE native::Floats turned_part(const float* coefficients, int part) {
+  const native::Floats from = native::load(coefficients + kLanes * (part ^ (kTurn / kLanes)));
+  native::Ints places = native::lane_numbers() ^ (kTurn % kLanes);
+  return kTurn % kLanes == 0 ? from : __builtin_shuffle(from, places);
 }
 
 template <int kTerm>
-AF_KERNEL_INLINE Floats16 add_terms_from(const PredictionInputs& inputs, Floats16 sum) {
+AF_KERNEL_INLINE native::Floats add_terms_from(const PredictionInputs& inputs,
+                                               int part,
+                                               native::Floats sum) {
   if constexpr (kTerm == kTermCount) {
     return sum;
   } else {
     constexpr Term kThis = kTerms[kTerm];
     const float* from =
         kThis.turn == 0 ? inputs.plain[kThis.neighbour] : inputs.turned[kThis.neighbour];
-    Floats16 weights;
-    for (int i = 0; i < kLanes; ++i) weights[i] = static_cast<float>(kThis.weights[i]) / 64.0f;
-    return add_terms_from<kTerm + 1>(inputs,
-                                     sum + weights * turned_by<kThis.turn>(load<Floats16>(from)));
+    native::Floats weights;
+    for (int i = 0; i < kLanes; ++i)
+      weights[i] = static_cast<float>(kThis.weights[kLanes * part + i]) / 64.0f;
+    return add_terms_from<kTerm + 1>(
+        inputs, part, sum + weights * turned_part<kThis.turn>(from, part));
   }
 }
 
-AF_KERNEL_INLINE Floats16 predicted_tile(const PredictionInputs& inputs) {
-  return add_terms_from<0>(inputs, Floats16{});
+/// The 16 coefficients that the neighbours foretell.
+AF_KERNEL_INLINE void predict_tile(const PredictionInputs& inputs, float* predicted) {
+#pragma GCC unroll 4
+  for (int part = 0; part < kParts; ++part)
+    native::store(predicted + kLanes * part, add_terms_from<0>(inputs, part, native::Floats{}));
 }
 
 }  // namespace af::AF_KERNEL_NAMESPACE

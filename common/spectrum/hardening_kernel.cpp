@@ -18,7 +18,7 @@ constexpr float kLog2E = 1.44269504f;
 
 /// log2(y) of y at least 1, but for a few roundings and 5e-8 of the series that is cut off:
 /// y = 2^e m with m around 1, and log(m) = 2 atanh((m - 1) / (m + 1)).
-AF_NATIVE_INLINE Floats log2_of(Floats y) {
+AF_KERNEL_INLINE Floats log2_of(Floats y) {
   constexpr int32_t kRootOfHalf = 0x3f3504f3;
   const Ints bits = reinterpret_cast<Ints>(y);
   const Ints exponent = (bits - kRootOfHalf) >> 23;
@@ -36,7 +36,7 @@ struct Materials {
   Floats water_beyond, bone_beyond;  ///< the reaches
 };
 
-AF_NATIVE_INLINE Materials materials_of(const HardeningPolynomial& of, Floats all, Floats bone) {
+AF_KERNEL_INLINE Materials materials_of(const HardeningPolynomial& of, Floats all, Floats bone) {
   const Floats ray = native::maximum(all, splat(0.0f));
   const Floats ray_bone = native::minimum(native::maximum(bone, splat(0.0f)), ray);
   const Floats ray_water = ray - ray_bone;
@@ -55,7 +55,7 @@ struct Powers {
 
 /// Two to four terms.
 template <int kCount>
-AF_NATIVE_INLINE Floats short_sum(const float* terms, const Powers& of) {
+AF_KERNEL_INLINE Floats short_sum(const float* terms, const Powers& of) {
   const Floats low = terms[0] + terms[1] * of.z;
   if (kCount == 2) return low;
   if (kCount == 3) return low + terms[2] * of.z2;
@@ -64,7 +64,7 @@ AF_NATIVE_INLINE Floats short_sum(const float* terms, const Powers& of) {
 
 /// sum_i terms[i] z^i of at most eight terms.
 template <int kCount>
-AF_NATIVE_INLINE Floats sum_of(const float* terms, const Powers& of) {
+AF_KERNEL_INLINE Floats sum_of(const float* terms, const Powers& of) {
   if constexpr (kCount == 1)
     return splat(terms[0]);
   else if constexpr (kCount <= 4)
@@ -81,7 +81,7 @@ struct Row {
 };
 
 template <int kPower, bool kWithSlopes>
-AF_NATIVE_INLINE Row row_of(const HardeningPolynomial& of, const Powers& powers) {
+AF_KERNEL_INLINE Row row_of(const HardeningPolynomial& of, const Powers& powers) {
   constexpr int kCount = HardeningPolynomial::kTerms[kPower];
   const float* const terms = of.terms + HardeningPolynomial::kFirst[kPower];
   Row row{sum_of<kCount>(terms, powers), splat(0.0f)};
@@ -105,15 +105,15 @@ struct Place {
   Floats straight;
 };
 
-AF_NATIVE_INLINE Floats product(const float (&factors)[2], const Materials& ray) {
+AF_KERNEL_INLINE Floats product(const float (&factors)[2], const Materials& ray) {
   return factors[0] * ray.water + factors[1] * ray.bone;
 }
 
-AF_NATIVE_INLINE Place place_of(const HardeningPolynomial& of, const Materials& ray) {
+AF_KERNEL_INLINE Place place_of(const HardeningPolynomial& of, const Materials& ray) {
   return {1.0f + product(of.hard, ray), product(of.tilt, ray), product(of.straight, ray)};
 }
 
-AF_NATIVE_INLINE Powers powers_of(Floats x) {
+AF_KERNEL_INLINE Powers powers_of(Floats x) {
   const Floats z = 2.0f * x - 1.0f;
   const Floats z2 = z * z;
   return {z, z2, z2 * z2};
@@ -124,7 +124,7 @@ struct Rows {
 };
 
 template <bool kWithSlopes>
-AF_NATIVE_INLINE Rows rows_of(const HardeningPolynomial& of, Floats x) {
+AF_KERNEL_INLINE Rows rows_of(const HardeningPolynomial& of, Floats x) {
   const Powers powers = powers_of(x);
   return {row_of<0, kWithSlopes>(of, powers),
           row_of<1, kWithSlopes>(of, powers),
@@ -132,11 +132,11 @@ AF_NATIVE_INLINE Rows rows_of(const HardeningPolynomial& of, Floats x) {
           row_of<3, kWithSlopes>(of, powers)};
 }
 
-AF_NATIVE_INLINE Floats sum_of_rows(const Rows& rows, Floats a) {
+AF_KERNEL_INLINE Floats sum_of_rows(const Rows& rows, Floats a) {
   return rows.r0.value + a * (rows.r1.value + a * (rows.r2.value + a * rows.r3.value));
 }
 
-AF_NATIVE_INLINE Hardened within_reach(const HardeningPolynomial& of, const Materials& ray) {
+AF_KERNEL_INLINE Hardened within_reach(const HardeningPolynomial& of, const Materials& ray) {
   const Place place = place_of(of, ray);
   const Floats x = of.log_scale * log2_of(place.y);
   const Rows rows = rows_of<true>(of, x);
@@ -150,7 +150,7 @@ AF_NATIVE_INLINE Hardened within_reach(const HardeningPolynomial& of, const Mate
           of.straight[1] + by_y * of.hard[1] + by_a * of.tilt[1]};
 }
 
-AF_NATIVE_INLINE Hardened gone_on(Hardened at_reach, const Materials& ray) {
+AF_KERNEL_INLINE Hardened gone_on(Hardened at_reach, const Materials& ray) {
   at_reach.value += at_reach.by_water * ray.water_beyond + at_reach.by_bone * ray.bone_beyond;
   return at_reach;
 }
@@ -160,7 +160,7 @@ struct WithSlopes {
   Floats value, by_all, by_bone;
 };
 
-AF_NATIVE_INLINE WithSlopes hardened_with_slopes(const HardeningPolynomial& of,
+AF_KERNEL_INLINE WithSlopes hardened_with_slopes(const HardeningPolynomial& of,
                                                  Floats all,
                                                  Floats bone) {
   const Floats zero = splat(0.0f);
@@ -178,14 +178,14 @@ AF_NATIVE_INLINE WithSlopes hardened_with_slopes(const HardeningPolynomial& of,
 }
 
 /// Up to kLanes values; the lanes beyond are 0.
-AF_NATIVE_INLINE Floats load_some(const float* from, int64_t count) {
+AF_KERNEL_INLINE Floats load_some(const float* from, int64_t count) {
   if (count >= kLanes) return load(from);
   float lanes[kLanes] = {};
   for (int64_t i = 0; i < count; ++i) lanes[i] = from[i];
   return load(lanes);
 }
 
-AF_NATIVE_INLINE void store_some(float* to, int64_t count, Floats value) {
+AF_KERNEL_INLINE void store_some(float* to, int64_t count, Floats value) {
   if (count >= kLanes) {
     store(to, value);
     return;
@@ -200,7 +200,7 @@ AF_NATIVE_INLINE void store_some(float* to, int64_t count, Floats value) {
 constexpr int32_t kBlock = 256;
 
 /// `count`: a multiple of kLanes, at most kBlock.
-AF_NATIVE_INLINE void harden_block(const HardeningPolynomial& of,
+AF_KERNEL_INLINE void harden_block(const HardeningPolynomial& of,
                                    int32_t count,
                                    float* all,
                                    const float* bone) {
@@ -241,7 +241,7 @@ AF_NATIVE_INLINE void harden_block(const HardeningPolynomial& of,
 }
 
 /// The same for any count below kLanes.
-AF_NATIVE_INLINE void harden_rest(const HardeningPolynomial& of,
+AF_KERNEL_INLINE void harden_rest(const HardeningPolynomial& of,
                                   int32_t count,
                                   float* all,
                                   const float* bone) {

@@ -21,11 +21,11 @@ struct Row {
   Floats high;
 };
 
-AF_NATIVE_INLINE Row unpack(Ints pairs) {
+AF_KERNEL_INLINE Row unpack(Ints pairs) {
   return {to_float(pairs & 0xFFFF), to_float(native::upper_halves(pairs))};
 }
 
-AF_NATIVE_INLINE Floats mix(Floats a, Floats b, Floats weight) {
+AF_KERNEL_INLINE Floats mix(Floats a, Floats b, Floats weight) {
   return a + weight * (b - a);
 }
 
@@ -36,7 +36,7 @@ struct Face {
   Floats slope_z;
 };
 
-AF_NATIVE_INLINE Face
+AF_KERNEL_INLINE Face
 face_of(Floats at_00, Floats at_10, Floats at_01, Floats at_11, Floats weight_y, Floats weight_z) {
   const Floats edge_0 = at_10 - at_00;
   const Floats edge_1 = at_11 - at_01;
@@ -51,7 +51,7 @@ struct Sample {
   Floats slope[3];
 };
 
-AF_NATIVE_INLINE Sample sample(const VoxelView& volume, Floats x, Floats y, Floats z) {
+AF_KERNEL_INLINE Sample sample(const VoxelView& volume, Floats x, Floats y, Floats z) {
   const Ints i = to_int(x);
   const Ints j = to_int(y);
   const Ints k = to_int(z);
@@ -79,7 +79,7 @@ struct Rays {
   Ints samples;
 };
 
-AF_NATIVE_INLINE Rays rays_of(const RayBundle& bundle, int first) {
+AF_KERNEL_INLINE Rays rays_of(const RayBundle& bundle, int first) {
   Rays rays;
   for (int axis = 0; axis < 3; ++axis) {
     rays.start[axis] = load(bundle.start[axis] + first);
@@ -89,7 +89,7 @@ AF_NATIVE_INLINE Rays rays_of(const RayBundle& bundle, int first) {
   return rays;
 }
 
-AF_NATIVE_INLINE Sample sample(const VoxelView& volume, const Rays& rays, Floats number) {
+AF_KERNEL_INLINE Sample sample(const VoxelView& volume, const Rays& rays, Floats number) {
   return sample(volume,
                 rays.start[0] + number * rays.step[0],
                 rays.start[1] + number * rays.step[1],
@@ -99,7 +99,7 @@ AF_NATIVE_INLINE Sample sample(const VoxelView& volume, const Rays& rays, Floats
 /// Calls add(sample, number, is_inside) for the samples of all rays in turn. Lanes that are done
 /// sample their first position again.
 template <typename Add>
-AF_NATIVE_INLINE void for_each_sample(const VoxelView& volume, const Rays& rays, Add add) {
+AF_KERNEL_INLINE void for_each_sample(const VoxelView& volume, const Rays& rays, Add add) {
   for (int32_t k = 0;; ++k) {
     const Ints is_inside = rays.samples > k;
     if (!native::any(is_inside)) break;
@@ -110,7 +110,7 @@ AF_NATIVE_INLINE void for_each_sample(const VoxelView& volume, const Rays& rays,
 
 /// SlopeSums::stretched_begin or, by a growth of 1 and numbers backwards from the last, the end.
 template <typename NumberOf>
-AF_NATIVE_INLINE Floats
+AF_KERNEL_INLINE Floats
 stretched(const VoxelView& volume, const Rays& rays, float growth, NumberOf number_of) {
   const Ints count = native::minimum(rays.samples, splat(int32_t{SlopeSums::kStretched}));
   const Floats share = splat(1.0f) / to_float(count);

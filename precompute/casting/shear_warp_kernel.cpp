@@ -8,7 +8,7 @@ namespace af::AF_KERNEL_NAMESPACE {
 
 namespace {
 
-AF_NATIVE_INLINE native::Floats mix(native::Floats a, native::Floats b, native::Floats weight) {
+AF_KERNEL_INLINE native::Floats mix(native::Floats a, native::Floats b, native::Floats weight) {
   return a + weight * (b - a);
 }
 
@@ -19,7 +19,7 @@ struct Cell {
   native::Floats weight;
 };
 
-AF_NATIVE_INLINE Cell cell_of(native::Floats position, int32_t size) {
+AF_KERNEL_INLINE Cell cell_of(native::Floats position, int32_t size) {
   const native::Floats inside = native::minimum(native::maximum(position, native::splat(0.0f)),
                                                 native::to_float(native::splat(size - 1)));
   const native::Ints index = native::minimum(native::to_int(inside), native::splat(size - 2));
@@ -31,11 +31,11 @@ struct Pair {
   native::Floats high;
 };
 
-AF_NATIVE_INLINE Pair unpack(native::Ints pairs) {
+AF_KERNEL_INLINE Pair unpack(native::Ints pairs) {
   return {native::to_float(pairs & 0xFFFF), native::to_float(native::upper_halves(pairs))};
 }
 
-AF_NATIVE_INLINE native::Floats sample(const VoxelsToResample& volume,
+AF_KERNEL_INLINE native::Floats sample(const VoxelsToResample& volume,
                                        native::Floats x,
                                        native::Floats y,
                                        native::Floats z) {

@@ -18,7 +18,7 @@ struct Lanes {
 constexpr int kParts = 16 / native::kLanes;
 
 /// Bits of the lanes of a comparison's result that are set.
-AF_NATIVE_INLINE uint32_t bits_of(native::Ints mask) {
+AF_KERNEL_INLINE uint32_t bits_of(native::Ints mask) {
 #if AF_VECTOR_BITS == 512
   return _mm512_movepi32_mask(reinterpret_cast<__m512i>(mask));
 #elif AF_VECTOR_BITS == 256
@@ -29,14 +29,14 @@ AF_NATIVE_INLINE uint32_t bits_of(native::Ints mask) {
 }
 
 /// Bits of the lanes that are no greater than a limit.
-AF_NATIVE_INLINE uint32_t bits_within(const Lanes& lanes, float limit) {
+AF_KERNEL_INLINE uint32_t bits_within(const Lanes& lanes, float limit) {
   uint32_t bits = 0;
   for (int i = 0; i < kParts; ++i)
     bits |= bits_of(lanes.part[i] <= native::splat(limit)) << (i * native::kLanes);
   return bits;
 }
 
-AF_NATIVE_INLINE float smallest(const Lanes& lanes) {
+AF_KERNEL_INLINE float smallest(const Lanes& lanes) {
 #if AF_VECTOR_BITS == 512
   return _mm512_reduce_min_ps(lanes.part[0]);
 #else
@@ -52,7 +52,7 @@ AF_NATIVE_INLINE float smallest(const Lanes& lanes) {
 #endif
 }
 
-AF_NATIVE_INLINE void set_lane(Lanes& lanes, uint32_t lane, float value) {
+AF_KERNEL_INLINE void set_lane(Lanes& lanes, uint32_t lane, float value) {
   for (int i = 0; i < kParts; ++i) {
     const native::Ints number = native::lane_numbers() + i * native::kLanes;
     lanes.part[i] =

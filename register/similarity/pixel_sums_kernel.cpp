@@ -17,14 +17,14 @@ constexpr int kGroupsPerFlush = 64;
 constexpr int kParts = kSumLanes / kLanes;
 
 /// The first `count` elements, the other lanes 0.
-AF_NATIVE_INLINE Floats load_some(const float* from, int32_t count) {
+AF_KERNEL_INLINE Floats load_some(const float* from, int32_t count) {
   if (count >= kLanes) return load(from);
   float values[kLanes] = {};
   for (int32_t i = 0; i < count; ++i) values[i] = from[i];
   return load(values);
 }
 
-AF_NATIVE_INLINE void store_some(float* to, Floats vector, int32_t count) {
+AF_KERNEL_INLINE void store_some(float* to, Floats vector, int32_t count) {
   if (count >= kLanes) {
     store(to, vector);
     return;
@@ -33,11 +33,11 @@ AF_NATIVE_INLINE void store_some(float* to, Floats vector, int32_t count) {
 }
 
 /// Lanes below `count` are 1.
-AF_NATIVE_INLINE Floats ones(int32_t count) {
+AF_KERNEL_INLINE Floats ones(int32_t count) {
   return to_float(-(lane_numbers() < splat(count)));
 }
 
-AF_NATIVE_INLINE Floats weight_of(const float* weights, int32_t at, int32_t count) {
+AF_KERNEL_INLINE Floats weight_of(const float* weights, int32_t at, int32_t count) {
   return weights == nullptr ? ones(count) : load_some(weights + at, count);
 }
 
@@ -48,13 +48,13 @@ struct LaneSums {
 };
 
 template <uint32_t N>
-AF_NATIVE_INLINE void clear(LaneSums<N>& sums) {
+AF_KERNEL_INLINE void clear(LaneSums<N>& sums) {
   memset(&sums, 0, sizeof(sums));
 }
 
 /// Moves a part of the lanes to double precision.
 template <uint32_t N>
-AF_NATIVE_INLINE void flush(Floats (&recent)[N], int part, LaneSums<N>& sums) {
+AF_KERNEL_INLINE void flush(Floats (&recent)[N], int part, LaneSums<N>& sums) {
   for (uint32_t i = 0; i < N; ++i) {
     for (int lane = 0; lane < kLanes; ++lane)
       sums.lanes[i][part * kLanes + lane] += static_cast<double>(recent[i][lane]);
@@ -63,7 +63,7 @@ AF_NATIVE_INLINE void flush(Floats (&recent)[N], int part, LaneSums<N>& sums) {
 }
 
 template <uint32_t N>
-AF_NATIVE_INLINE double total(const LaneSums<N>& sums, int i) {
+AF_KERNEL_INLINE double total(const LaneSums<N>& sums, int i) {
   double sum = 0.0;
   for (int lane = 0; lane < kSumLanes; ++lane) sum += sums.lanes[i][lane];
   return sum;
@@ -72,7 +72,7 @@ AF_NATIVE_INLINE double total(const LaneSums<N>& sums, int i) {
 /// N sums over pixels; add(at, left, recent) adds those of the kLanes pixels from `at` on, `left`
 /// of which there are, to running sums. The order of additions does not depend on the vector width.
 template <uint32_t N, typename Add>
-AF_NATIVE_INLINE LaneSums<N> sum_pixels(int32_t count, const Add& add) {
+AF_KERNEL_INLINE LaneSums<N> sum_pixels(int32_t count, const Add& add) {
   LaneSums<N> sums;
   clear(sums);
   constexpr int32_t kPixelsPerFlush = kGroupsPerFlush * kSumLanes;
@@ -92,7 +92,7 @@ AF_NATIVE_INLINE LaneSums<N> sum_pixels(int32_t count, const Add& add) {
 
 constexpr int kGramSums = kGramProducts + kGramChannels + 1;
 
-AF_NATIVE_INLINE void add_gram_vector(const GramChannels& request,
+AF_KERNEL_INLINE void add_gram_vector(const GramChannels& request,
                                       int32_t at,
                                       int32_t count,
                                       Floats (&recent)[kGramSums]) {
