@@ -109,6 +109,7 @@ std::unique_ptr<const FieldCaster> make_caster(const FieldPart& part,
 
 std::vector<std::size_t> slab_counts(const std::vector<FieldPart>& parts) {
   std::vector<std::size_t> counts;
+  counts.reserve(parts.size());
   for (const FieldPart& part : parts) counts.push_back(part.light_slab.slabs.size());
   return counts;
 }
@@ -141,6 +142,7 @@ std::unique_ptr<const FieldCaster> make_caster(const std::vector<FieldPart>& par
                                                const PrecomputeOptions& options,
                                                const AttenuationQuantizer& quantizer) {
   std::vector<std::unique_ptr<const FieldCaster>> casters;
+  casters.reserve(parts.size());
   for (const FieldPart& part : parts) casters.push_back(make_caster(part, options, quantizer));
   if (casters.size() == 1) return std::move(casters.front());
   return std::make_unique<const JoinedCaster>(std::move(casters), slab_counts(parts));

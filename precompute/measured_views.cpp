@@ -45,6 +45,7 @@ std::vector<CameraGeometry> cameras_of(const Study& study,
                                        const std::vector<StudyView>& views,
                                        const RigidTransform& ct_from_room) {
   std::vector<CameraGeometry> cameras;
+  cameras.reserve(views.size());
   for (const StudyView& view : views)
     cameras.push_back(in_ct_frame(study.rig.camera(view.camera), ct_from_room));
   return cameras;

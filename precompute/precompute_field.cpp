@@ -552,9 +552,9 @@ class PrecomputeRun {
   }
 
   /// Collective. A field, or an atlas.
-  FieldFileInfo write_output(const Codebook& trained,
-                             const NextBlocks& next_blocks,
-                             const MakeProvenance& make_provenance) const {
+  [[nodiscard]] FieldFileInfo write_output(const Codebook& trained,
+                                           const NextBlocks& next_blocks,
+                                           const MakeProvenance& make_provenance) const {
     const IndexPacking packing =
         options_.packs_by_codebook_tree() ? IndexPacking::CodebookTree : IndexPacking::Deflate;
     AttenuationAtlas atlas{identity_of(source_, source_.range),

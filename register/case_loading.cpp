@@ -162,7 +162,7 @@ OpenedField field_of_view(const std::string& path,
 }
 
 /// Collective. Rank 0's box on every rank: processors may differ in its last bits.
-MotionRange shared_box(MotionRange range, const Communicator& communicator) {
+MotionRange shared_box(const MotionRange& range, const Communicator& communicator) {
   std::vector<std::byte> bytes = bytes_of(range.high);
   communicator.broadcast(bytes);
   const auto high = value_of<PoseParameters>(bytes, "the covered box of rank 0");

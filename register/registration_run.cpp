@@ -99,7 +99,8 @@ LoadedCase load_problem(const RegisterOptions& options,
   const WorkNote note("loading case " + registered.of.name, WorkNote::Kind::Phase);
   LoadedCase loaded = load_case(registered.study, registered.of, load, world);
   warn_of(loaded.warnings, world);
-  for (const auto& [input, text] : loaded.input_notes) inform(world, input + ": " + text);
+  for (const auto& [input, text] : loaded.input_notes)
+    inform(world, std::string(input).append(": ").append(text));
   return loaded;
 }
 

@@ -17,13 +17,13 @@ namespace af {
 
 /// One format. `write` is given all cameras of a rig, or one of them when a file holds only one.
 struct CameraFormat {
-  const char* name;
-  const char* help;
-  const char* extension;
-  bool holds_one_camera;
-  bool (*is_this)(const CameraFile& file);
-  StatedRig (*read)(const CameraFile& file, const CameraFileOptions& options);
-  std::string (*write)(const CameraRig& rig);  ///< nullptr: is not written
+  const char* name = nullptr;
+  const char* help = nullptr;
+  const char* extension = nullptr;
+  bool holds_one_camera = false;
+  bool (*is_this)(const CameraFile& file) = nullptr;
+  StatedRig (*read)(const CameraFile& file, const CameraFileOptions& options) = nullptr;
+  std::string (*write)(const CameraRig& rig) = nullptr;  ///< nullptr: is not written
   bool states_distortion = false;
 };
 

@@ -120,7 +120,7 @@ class XRegGroup {
 
   template <int Size>
   [[nodiscard]] Eigen::Matrix<double, Size, Size> matrix(const std::string& dataset) const {
-    const Hdf5Numbers numbers = file_.numbers(group_ + "/" + dataset, Size * Size);
+    const Hdf5Numbers numbers = file_.numbers(group_ + "/" + dataset, std::size_t{Size} * Size);
     if (numbers.extents != std::vector<std::size_t>{Size, Size})
       throw FileError(path(dataset),
                       "is no matrix of " + std::to_string(Size) + " x " + std::to_string(Size));

@@ -107,8 +107,9 @@ void add_zsh_arguments(const CommandHelp& command,
                        std::string& script) {
   script += indent + "_arguments " + (more.empty() ? "" : "-C");
   for (const OptionHelp& option : command.options)
-    script += " \\\n" + indent + "  " + zsh_specification(option);
-  for (const std::string& specification : more) script += " \\\n" + indent + "  " + specification;
+    script.append(" \\\n").append(indent).append("  ").append(zsh_specification(option));
+  for (const std::string& specification : more)
+    script.append(" \\\n").append(indent).append("  ").append(specification);
   script += "\n";
 }
 

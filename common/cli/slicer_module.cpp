@@ -198,7 +198,7 @@ std::string with_dashes(const CLI::App& app, const std::string& argument) {
   std::replace(name.begin(), name.end(), '_', '-');
   if (app.get_option_no_throw(name) != nullptr) return name + argument.substr(end);
   for (const CLI::App* part : app.get_subcommands([](const CLI::App*) { return true; })) {
-    const std::string found = with_dashes(*part, argument);
+    std::string found = with_dashes(*part, argument);
     if (found != argument) return found;
   }
   return argument;

@@ -39,11 +39,11 @@ struct LeastLanes {
 
 /// What a window holds. A pick from two registers tells 2 kLanes nodes apart: kLanes of two rows,
 /// or twice as many of one.
-enum WindowShape : int32_t {
-  kNoWindow,  ///< registers cannot hold the cells: their nodes are gathered one by one
-  kTwoRows,   ///< lower nodes lie in kLanes columns and two rows
-  kFourRows,  ///< in kLanes columns and four rows
-  kWide,      ///< in 2 kLanes columns and two rows
+enum class WindowShape : int32_t {
+  NoWindow,  ///< registers cannot hold the cells: their nodes are gathered one by one
+  TwoRows,   ///< lower nodes lie in kLanes columns and two rows
+  FourRows,  ///< in kLanes columns and four rows
+  Wide,      ///< in 2 kLanes columns and two rows
 };
 
 /// The part of a node image that registers hold for the cells of neighbouring pixels.
@@ -97,16 +97,16 @@ AF_KERNEL_INLINE Window window_of(const Cells& cells, const LeastLanes& least, i
   Window window{static_cast<int64_t>(first_t[0]) * stride + first_s[0],
                 column + row * kLanes,
                 row,
-                kNoWindow};
+                WindowShape::NoWindow};
   // No high bit is set exactly when both are at least 0, column < kLanes and row < 2, or 4, or
   // column < 2 kLanes and row < 2.
   constexpr int32_t kHighBits = ~(kLanes - 1);
   if (!native::any_bit(column | row * (kLanes / 2), kHighBits)) {
-    window.shape = kTwoRows;
+    window.shape = WindowShape::TwoRows;
   } else if (!native::any_bit(column | row * (kLanes / 4), kHighBits)) {
-    window.shape = kFourRows;
+    window.shape = WindowShape::FourRows;
   } else if (!native::any_bit(column | row * kLanes, kHighBits * 2)) {
-    window.shape = kWide;
+    window.shape = WindowShape::Wide;
     window.lane = column;
   }
   return window;
@@ -152,7 +152,7 @@ AF_KERNEL_INLINE Floats pick_wide(const float* nodes, const Window& window) {
 }
 
 AF_KERNEL_INLINE Column pick_column(const float* nodes, int64_t stride, const Window& window) {
-  if (window.shape == kWide) {
+  if (window.shape == WindowShape::Wide) {
     const Floats row_1 = pick_wide(nodes + stride, window);
     const Ints is_upper = window.row >= 1;
     return {is_upper ? row_1 : pick_wide(nodes, window),
@@ -163,7 +163,7 @@ AF_KERNEL_INLINE Column pick_column(const float* nodes, int64_t stride, const Wi
   const Floats row_2 = load(nodes + 2 * stride);
   const Column column{native::pick(row_0, row_1, window.lane),
                       native::pick(row_1, row_2, window.lane)};
-  if (window.shape == kTwoRows) return column;
+  if (window.shape == WindowShape::TwoRows) return column;
   const Floats row_3 = load(nodes + 3 * stride);
   const Floats row_4 = load(nodes + 4 * stride);
   const Ints is_upper = window.row >= 2;
@@ -185,7 +185,7 @@ AF_KERNEL_INLINE Corners gather_corners(const float* values, int32_t stride, con
 
 AF_KERNEL_INLINE Corners corners_of(const float* values, int32_t stride, const Cells& cells) {
 #if AF_VECTOR_BITS >= 256
-  if (cells.window.shape != kNoWindow) {
+  if (cells.window.shape != WindowShape::NoWindow) {
     const float* first = values + cells.window.first;
     return {pick_column(first, stride, cells.window), pick_column(first + 1, stride, cells.window)};
   }

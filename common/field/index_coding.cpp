@@ -57,8 +57,8 @@ class BlockStart {
  private:
   std::vector<AdaptiveBit> turns_;
   std::vector<AdaptiveBit> empties_;
-  std::array<TileCoefficients, kSurpriseClasses> errors_;
-  std::array<std::array<std::int32_t, kTileElements>, kSurpriseClasses> octaves_;
+  std::array<TileCoefficients, kSurpriseClasses> errors_{};
+  std::array<std::array<std::int32_t, kTileElements>, kSurpriseClasses> octaves_{};
   std::vector<TileNote> notes_;
   std::vector<AdaptiveBit> mean_models_;
   std::vector<float> sums_;

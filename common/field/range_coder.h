@@ -132,7 +132,7 @@ class RangeDecoder {
  private:
   [[nodiscard]] AF_KERNEL_MEMBER uint32_t next_word() const {
     if (next_ + 4 <= count_) [[likely]] {
-      uint32_t word;
+      uint32_t word = 0;
       memcpy(&word, bytes_ + next_, sizeof(word));
       return __builtin_bswap32(word);
     }

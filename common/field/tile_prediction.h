@@ -73,12 +73,48 @@ inline constexpr int kTermCount = sizeof(kTerms) / sizeof(kTerms[0]);
 inline constexpr int kLanes = native::kLanes;
 inline constexpr int kParts = 16 / kLanes;
 
+/// Each lane's value from the lane ^ kTurn.
+template <int kTurn>
+AF_KERNEL_INLINE native::Floats turned_by(native::Floats values) {
+#if AF_VECTOR_BITS == 512
+  return __builtin_shufflevector(values,
+                                 values,
+                                 0 ^ kTurn,
+                                 1 ^ kTurn,
+                                 2 ^ kTurn,
+                                 3 ^ kTurn,
+                                 4 ^ kTurn,
+                                 5 ^ kTurn,
+                                 6 ^ kTurn,
+                                 7 ^ kTurn,
+                                 8 ^ kTurn,
+                                 9 ^ kTurn,
+                                 10 ^ kTurn,
+                                 11 ^ kTurn,
+                                 12 ^ kTurn,
+                                 13 ^ kTurn,
+                                 14 ^ kTurn,
+                                 15 ^ kTurn);
+#elif AF_VECTOR_BITS == 256
+  return __builtin_shufflevector(values,
+                                 values,
+                                 0 ^ kTurn,
+                                 1 ^ kTurn,
+                                 2 ^ kTurn,
+                                 3 ^ kTurn,
+                                 4 ^ kTurn,
+                                 5 ^ kTurn,
+                                 6 ^ kTurn,
+                                 7 ^ kTurn);
+#else
+  return __builtin_shufflevector(values, values, 0 ^ kTurn, 1 ^ kTurn, 2 ^ kTurn, 3 ^ kTurn);
+#endif
+}
+
 /// Part `part` of the coefficients of a neighbour, each taken from place j ^ turn.
 template <int kTurn>
 AF_KERNEL_INLINE native::Floats turned_part(const float* coefficients, int part) {
-  const native::Floats from = native::load(coefficients + kLanes * (part ^ (kTurn / kLanes)));
-  native::Ints places = native::lane_numbers() ^ (kTurn % kLanes);
-  return kTurn % kLanes == 0 ? from : __builtin_shuffle(from, places);
+  return turned_by<kTurn % kLanes>(native::load(coefficients + kLanes * (part ^ (kTurn / kLanes))));
 }
 
 template <int kTerm>

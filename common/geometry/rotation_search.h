@@ -30,7 +30,7 @@ struct RotationMaximum {
 struct RotationGrid {
   Eigen::Vector3d low;
   Eigen::Vector3d high;
-  std::array<int, 3> intervals;
+  std::array<int, 3> intervals{};
   Eigen::Vector3d step;
 
   explicit RotationGrid(const MotionRange& range)

@@ -113,22 +113,23 @@ std::optional<NormalEquations> normal_equations(const std::vector<Sighting>& sig
   constexpr double kStepRad = 1e-6;
   constexpr double kStepMm = 1e-4;
   std::array<RigidTransform, 12> neighbours;
-  for (int i = 0; i < 6; ++i)
-    for (int side = 0; side < 2; ++side) {
+  for (std::size_t i = 0; i < 6; ++i)
+    for (std::size_t side = 0; side < 2; ++side) {
       const double size = (i < 3 ? kStepRad : kStepMm) * (side == 0 ? 1.0 : -1.0);
-      neighbours[static_cast<std::size_t>(2 * i + side)] =
-          stepped(pose, middle, size * Vector6d::Unit(i));
+      neighbours[2 * i + side] =
+          stepped(pose, middle, size * Vector6d::Unit(static_cast<Eigen::Index>(i)));
     }
   NormalEquations equations;
   for (const Sighting& sighting : sightings) {
     const auto miss = miss_mm(sighting, pose);
     if (!miss) return std::nullopt;
     Eigen::Matrix<double, 2, 6> slope;
-    for (int i = 0; i < 6; ++i) {
-      const auto ahead = miss_mm(sighting, neighbours[static_cast<std::size_t>(2 * i)]);
-      const auto behind = miss_mm(sighting, neighbours[static_cast<std::size_t>(2 * i + 1)]);
+    for (std::size_t i = 0; i < 6; ++i) {
+      const auto ahead = miss_mm(sighting, neighbours[2 * i]);
+      const auto behind = miss_mm(sighting, neighbours[2 * i + 1]);
       if (!ahead || !behind) return std::nullopt;
-      slope.col(i) = (*ahead - *behind) / (2.0 * (i < 3 ? kStepRad : kStepMm));
+      slope.col(static_cast<Eigen::Index>(i)) =
+          (*ahead - *behind) / (2.0 * (i < 3 ? kStepRad : kStepMm));
     }
     equations.hessian += slope.transpose() * slope;
     equations.gradient += slope.transpose() * *miss;

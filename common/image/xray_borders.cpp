@@ -224,6 +224,7 @@ std::vector<double> ring_medians(const Image2d& smooth,
     }
   }
   std::vector<double> medians;
+  medians.reserve(rings.size());
   for (const std::vector<float>& ring : rings)
     medians.push_back(ring.empty() ? border_level : static_cast<double>(nearest_rank(ring, 0.5)));
   return medians;

@@ -388,7 +388,7 @@ std::optional<Eigen::Vector2d> imager_spacing_mm(const DicomElements& header, in
   const std::string file = header.path().string();
   if (const DicomValues* const pixels = functional_group(header, frame, kPixelProperties);
       pixels != nullptr)
-    if (const auto spacing = dicom_spacing_mm(*pixels, kImagerSpacing, kName, file)) return spacing;
+    if (auto spacing = dicom_spacing_mm(*pixels, kImagerSpacing, kName, file)) return spacing;
   return dicom_spacing_mm(header.values(), kImagerSpacing, kName, file);
 }
 

@@ -116,7 +116,7 @@ std::vector<DicomPart> fragments_of_frame(const DicomPixelLayout& layout) {
   const std::vector<DicomPart>& parts = layout.header.pixel_parts();
   const std::string file = layout.path().string();
   if (parts.empty()) throw FileError(file, "has no compressed pixels");
-  const std::vector<DicomPart> fragments(parts.begin() + 1, parts.end());
+  std::vector<DicomPart> fragments(parts.begin() + 1, parts.end());
   if (layout.frames == 1) return fragments;
   const auto frames = static_cast<std::size_t>(layout.frames);
   const auto at = static_cast<std::size_t>(layout.frame - 1);

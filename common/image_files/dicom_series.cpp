@@ -360,7 +360,7 @@ CtGrid repaired_grid(const fs::path& folder, const PlacedSlices& slices) {
   if (!(slices.largest_gap_mm <= kWidestGap * slices.usual_gap_mm))
     throw InputError(folder.string() + ": " + slices.trouble + "; a gap of " +
                      number(slices.largest_gap_mm) + " mm is too wide to be resampled");
-  const CtGrid grid = upright_grid(stack);
+  CtGrid grid = upright_grid(stack);
   const double stored = static_cast<double>(stack.columns) * static_cast<double>(stack.rows) *
                         static_cast<double>(stack.origins_mm.size());
   const double wanted = static_cast<double>(grid.size[0]) * static_cast<double>(grid.size[1]) *

@@ -160,17 +160,17 @@ std::string foreign_content(const fs::path& path) {
     std::string_view start;
     std::string_view what;
   };
-  constexpr std::array<Content, 8> known = {Content{"\xff\xd8\xff"sv, "a JPEG picture"},
-                                            {"\0\0\0\x0cjP  "sv, "a JPEG 2000 picture"},
-                                            {"\xff\x4f\xff\x51"sv, "a JPEG 2000 code stream"},
-                                            {"GIF8"sv, "a GIF picture"},
-                                            {"BM"sv, "a BMP picture"},
-                                            {"PK\x03\x04"sv, "a ZIP archive"},
-                                            {"%PDF"sv, "a PDF document"},
-                                            {"<"sv, "a page of HTML or XML"}};
+  constexpr std::array<Content, 8> kKnown = {Content{"\xff\xd8\xff"sv, "a JPEG picture"},
+                                             {"\0\0\0\x0cjP  "sv, "a JPEG 2000 picture"},
+                                             {"\xff\x4f\xff\x51"sv, "a JPEG 2000 code stream"},
+                                             {"GIF8"sv, "a GIF picture"},
+                                             {"BM"sv, "a BMP picture"},
+                                             {"PK\x03\x04"sv, "a ZIP archive"},
+                                             {"%PDF"sv, "a PDF document"},
+                                             {"<"sv, "a page of HTML or XML"}};
   const std::string start = read_prefix(path, 16);
   if (start.empty()) return " (it is empty)";
-  for (const Content& content : known)
+  for (const Content& content : kKnown)
     if (start.starts_with(content.start))
       return " (it begins as " + std::string(content.what) + " does)";
   return is_gzip(start) ? " (it is compressed by gzip)" : "";

@@ -104,9 +104,9 @@ AxisPlane axis_plane(const CircularScan& scan, double margin) {
   return plane;
 }
 
-/// The ramp filter as a kernel in space for samples `pitch` apart (Kak and Slaney, 3.3.3),
-/// smoothed by a Gaussian; entry i is the weight at distance i samples.
-std::vector<float> ramp_kernel(int length, double pitch_mm, double smoothing_px) {
+/// The ramp filter as a kernel in space for the plane's samples along a tangent (Kak and Slaney,
+/// 3.3.3), smoothed by a Gaussian; entry i is the weight at distance i samples.
+std::vector<float> ramp_kernel(const AxisPlane& plane, double smoothing_px) {
   const auto ramp = [&](int n) {
     if (n == 0) return 0.25;
     if (n % 2 == 0) return 0.0;
@@ -119,13 +119,13 @@ std::vector<float> ramp_kernel(int length, double pitch_mm, double smoothing_px)
     gauss.push_back(radius == 0 ? 1.0 : std::exp(-0.5 * i * i / (smoothing_px * smoothing_px)));
     sum += gauss.back();
   }
-  std::vector<float> kernel(static_cast<std::size_t>(length));
-  for (int n = 0; n < length; ++n) {
+  std::vector<float> kernel(static_cast<std::size_t>(plane.tangents));
+  for (int n = 0; n < plane.tangents; ++n) {
     double value = 0.0;
-    for (int i = -radius; i <= radius; ++i)
-      value += gauss[static_cast<std::size_t>(i + radius)] * ramp(n - i);
+    int at = n + radius;
+    for (const double weight : gauss) value += weight * ramp(at--);
     // 1 / pitch^2 of the kernel times the pitch of the sum.
-    kernel[static_cast<std::size_t>(n)] = static_cast<float>(value / (sum * pitch_mm));
+    kernel[static_cast<std::size_t>(n)] = static_cast<float>(value / (sum * plane.pitch_mm));
   }
   return kernel;
 }
@@ -273,8 +273,7 @@ MuVolume reconstruct_fdk(const CircularScan& scan,
   for (const ScanView& view : views) angles.push_back(view.angle_rad);
   const std::vector<double> shares = angle_shares_rad(angles);
   const AxisPlane plane = axis_plane(scan, is_truncated(scan, views) ? kTruncatedMargin : kMargin);
-  const std::vector<float> kernel =
-      ramp_kernel(plane.tangents, plane.pitch_mm, options.smoothing_px);
+  const std::vector<float> kernel = ramp_kernel(plane, options.smoothing_px);
   const double radius = scan.source_to_axis_mm;
 
   std::vector<FilteredView> filtered(views.size());

@@ -280,7 +280,7 @@ AirLevel estimated_air_level(const PixelStatistics& statistics, AxisAlong axis_a
   std::vector<unsigned char> chosen = ends;
   for (std::size_t i = 0; i < chosen.size(); ++i) chosen[i] = chosen[i] & candidates[i];
   const auto require_pixels = [&] {
-    if (const std::size_t found = count_of(chosen); found < 20 * kTerms)
+    if (const std::size_t found = count_of(chosen); found < std::size_t{20} * kTerms)
       throw InputError("air around the object",
                        std::to_string(found) + " pixels",
                        "must be seen by at least 200 pixels at the ends of the lines across the "

@@ -211,11 +211,12 @@ std::vector<double> angle_shares_rad(const std::vector<double>& angles_rad) {
 }
 
 Eigen::VectorXd AngleSeries::basis(int harmonics, double angle_rad) {
-  Eigen::VectorXd values(1 + 2 * harmonics);
+  Eigen::VectorXd values(1 + Eigen::Index{2} * harmonics);
   values[0] = 1.0;
-  for (int k = 1; k <= harmonics; ++k) {
-    values[2 * k - 1] = std::cos(k * angle_rad);
-    values[2 * k] = std::sin(k * angle_rad);
+  for (Eigen::Index k = 1; k <= harmonics; ++k) {
+    const double angle = static_cast<double>(k) * angle_rad;
+    values[2 * k - 1] = std::cos(angle);
+    values[2 * k] = std::sin(angle);
   }
   return values;
 }

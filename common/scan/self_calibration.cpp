@@ -81,8 +81,8 @@ class Rounds {
     double step_px = 0.0;  ///< root mean square over views, of column and row
   };
   Outcome improve(ScanCalibration& calibration) const {
-    const int size = 1 + 2 * options_.harmonics;
-    const int all = kViewParameters * size;
+    const Eigen::Index size = 1 + Eigen::Index{2} * options_.harmonics;
+    const Eigen::Index all = kViewParameters * size;
     Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(all, all);
     Eigen::VectorXd right = Eigen::VectorXd::Zero(all);
     Outcome outcome;
@@ -113,7 +113,7 @@ class Rounds {
     outcome.cost /= static_cast<double>(judged_count);
     // Directions that the images do not tell stay where they are.
     constexpr double kRidge = 1e-6;
-    for (int i = 0; i < all; ++i) normal(i, i) *= 1.0 + kRidge;
+    for (Eigen::Index i = 0; i < all; ++i) normal(i, i) *= 1.0 + kRidge;
     const Eigen::VectorXd step = normal.ldlt().solve(right);
     if (!step.allFinite())
       throw NumericError("self-calibration: the normal equations are singular");

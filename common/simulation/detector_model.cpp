@@ -37,6 +37,7 @@ Image2d block_means(const Image2d& image, int factor) {
 Image2d magnify(const Image2d& coarse, int factor, int width, int height) {
   const auto coarse_positions = [factor](int count) {
     std::vector<double> positions;
+    positions.reserve(static_cast<std::size_t>(count));
     for (int i = 0; i < count; ++i) positions.push_back((i + 0.5) / factor - 0.5);
     return positions;
   };

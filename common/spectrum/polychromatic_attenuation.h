@@ -62,7 +62,7 @@ class PolychromaticAttenuation {
   [[nodiscard]] Sum summed(double water, double bone) const;
 
   std::vector<HardeningBin> bins_;
-  HardeningPolynomial polynomial_;
+  HardeningPolynomial polynomial_{};
 };
 
 }  // namespace af

@@ -18,7 +18,7 @@ std::shared_ptr<const AttenuationVolume> bone_per_node(const AttenuationVolume& 
         fill_bone_voxels(volume, {reinterpret_cast<std::uint16_t*>(memory.data()), count});
       });
   const auto* const voxels = reinterpret_cast<const std::uint16_t*>(owner.get());
-  const auto bone = std::make_shared<const AttenuationVolume>(
+  auto bone = std::make_shared<const AttenuationVolume>(
       volume.grid(), volume.model(), SharedArray<std::uint16_t>(owner, {voxels, count}));
   if (!(bone->max_mu_per_mm() > 0.0))
     throw InputError("the CT has no bone: no voxel attenuates more than soft tissue does");

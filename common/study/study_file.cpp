@@ -191,11 +191,15 @@ std::vector<std::optional<Eigen::Vector2d>> get_landmarks(TomlTableReader& reade
                                                           std::size_t expected,
                                                           const CameraGeometry* camera) {
   constexpr const char* kKey = "landmarks_px";
+  constexpr const char* kMust = "must be a list of [column, row], or [] where one is not visible";
   std::vector<std::optional<Eigen::Vector2d>> points;
   if (!reader.has(kKey)) return points;
   const toml::array* const entries = reader.node(kKey).as_array();
-  const std::size_t count = entries == nullptr ? 0 : entries->size();
-  if (count != expected) {
+  if (entries == nullptr) {
+    reader.add_problem(kKey, kMust);
+    return points;
+  }
+  if (const std::size_t count = entries->size(); count != expected) {
     reader.add_problem(kKey,
                        "has " + std::to_string(count) + " entries, but the case has " +
                            std::to_string(expected) +
@@ -206,7 +210,7 @@ std::vector<std::optional<Eigen::Vector2d>> get_landmarks(TomlTableReader& reade
   for (const toml::node& entry : *entries) {
     std::optional<Eigen::Vector2d> point;
     if (!get_landmark(entry, point)) {
-      reader.add_problem(kKey, "must be a list of [column, row], or [] where one is not visible");
+      reader.add_problem(kKey, kMust);
       return {};
     }
     const bool is_off = point && camera != nullptr &&

@@ -79,6 +79,7 @@ Image2d enlarged(const Image2d& image, double factor) {
   const auto positions = [factor](int count) {
     const double middle = 0.5 * (count - 1);
     std::vector<double> places;
+    places.reserve(static_cast<std::size_t>(count));
     for (int i = 0; i < count; ++i) places.push_back(middle + (i - middle) / factor);
     return places;
   };

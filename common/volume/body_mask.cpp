@@ -21,7 +21,7 @@ constexpr double kEdgeMm = 3.5;
 constexpr double kLeastBodyShare = 0.1;  ///< of the largest part
 
 /// Marks of a voxel while the body is looked for.
-enum Mark : std::uint8_t { kNothing = 0, kCore = 1, kCounted = 2, kBody = 3 };
+enum class Mark : std::uint8_t { Nothing, Core, Counted, Body };
 
 /// The volume slice by slice along the axis that lies nearest the patient's.
 struct AxialOrder {
@@ -119,7 +119,7 @@ void mark_core(const AxialOrder& order,
         distance.from([&](std::size_t x, std::size_t y) { return hu[at(x, y)] <= kTissueHu; });
     for (std::size_t y = 0; y < order.height; ++y)
       for (std::size_t x = 0; x < order.width; ++x)
-        if (static_cast<double>(depth[y * order.width + x]) > kEdgeMm) marks[at(x, y)] = kCore;
+        if (static_cast<double>(depth[y * order.width + x]) > kEdgeMm) marks[at(x, y)] = Mark::Core;
   }
 }
 
@@ -160,14 +160,14 @@ std::size_t mark_body(const CtGrid& grid, std::vector<Mark>& marks) {
   std::vector<Part> parts;
   std::size_t most = 0;
   for (std::size_t at = 0; at < marks.size(); ++at)
-    if (marks[at] == kCore) {
-      parts.push_back({at, mark_part(grid, at, kCounted, marks)});
+    if (marks[at] == Mark::Core) {
+      parts.push_back({at, mark_part(grid, at, Mark::Counted, marks)});
       most = std::max(most, parts.back().voxels);
     }
   std::size_t kept = 0;
   for (const Part& part : parts)
     if (static_cast<double>(part.voxels) >= kLeastBodyShare * static_cast<double>(most)) {
-      (void)mark_part(grid, part.seed, kBody, marks);
+      (void)mark_part(grid, part.seed, Mark::Body, marks);
       ++kept;
     }
   return kept;
@@ -185,7 +185,7 @@ class SliceBody {
       return slice * order_.slice_stride + y * order_.y_stride + x * order_.x_stride;
     };
     const std::vector<float>& away =
-        distance_.from([&](std::size_t x, std::size_t y) { return marks[at(x, y)] == kBody; });
+        distance_.from([&](std::size_t x, std::size_t y) { return marks[at(x, y)] == Mark::Body; });
     std::fill(is_outside_.begin(), is_outside_.end(), std::uint8_t{0});
     const auto is_body = [&](std::size_t pixel) {
       // A step more than what was taken off: distances are between pixel centres, and the voxels
@@ -230,7 +230,7 @@ class SliceBody {
 BodyRemoval remove_all_but_body(const CtGrid& grid, std::span<std::int16_t> hu) {
   check(hu.size() == grid.voxel_count(), "a CT has a value per voxel");
   const AxialOrder order = axial_order(grid);
-  std::vector<Mark> marks(hu.size(), kNothing);
+  std::vector<Mark> marks(hu.size(), Mark::Nothing);
   mark_core(order, hu, marks);
   BodyRemoval removal;
   removal.parts_kept = mark_body(grid, marks);

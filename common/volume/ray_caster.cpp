@@ -73,10 +73,10 @@ class BundleMaker {
   }
 
   /// The sums of one lane as the mechanics want them.
-  [[nodiscard]] RaySums ray_sums(const SlopeSums& sums,
-                                 std::size_t lane,
-                                 float weight_mm,
-                                 float mu_per_mm_per_unit) const {
+  [[nodiscard]] RaySums ray_sums(float weight_mm,
+                                 float mu_per_mm_per_unit,
+                                 const SlopeSums& sums,
+                                 std::size_t lane) const {
     const auto mu_per_mm = static_cast<double>(mu_per_mm_per_unit);
     const double scale = static_cast<double>(weight_mm) * mu_per_mm;
     const auto in_mm = [&](const float(&per_voxel)[3][RayBundle::kRays]) {
@@ -197,7 +197,7 @@ class FanCaster {
             values[run.offset + i] = sums.values[i] * (weights_mm[i] * mu_per_mm_per_unit_);
             const RayPath path = maker_.path(run.column + static_cast<int>(i), row);
             const auto slopes = mechanics.slopes_of(
-                path, maker_.ray_sums(sums, i, weights_mm[i], mu_per_mm_per_unit_));
+                path, maker_.ray_sums(weights_mm[i], mu_per_mm_per_unit_, sums, i));
             for (std::size_t k = 0; k < slopes.size(); ++k)
               planes[k * values.size() + run.offset + i] = slopes[k];
           }

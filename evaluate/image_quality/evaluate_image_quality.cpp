@@ -531,6 +531,7 @@ void run_image_quality(const ImageQualityOptions& options,
   run.open();
   const std::vector<Target> targets = all_or_none(world, [&] { return targets_of(options); });
   std::vector<TargetResult> results;
+  results.reserve(targets.size());
   for (const Target& target : targets)
     results.push_back(evaluate_target(options, target, command_line, run, world));
   all_or_none(world, [&] {

@@ -102,6 +102,7 @@ void judge_view(const HeldOutOptions& options,
     }
   const ViewXray xray = read_view_xray(study_view, view.camera);
   std::vector<Image2d> drrs;
+  drrs.reserve(predictors.size());
   for (const Predictor& predictor : predictors)
     drrs.push_back(rendered_region(*predictor.renderer, pose, view));
   const std::vector<std::size_t> pixels = judged_pixels(xray, view.roi, drrs.front());
@@ -250,7 +251,7 @@ void run_held_out(const HeldOutOptions& options,
   const Study study = shared_study(options.study, world, &warnings);
   for (const std::string& text : warnings) warn(world, text);
   const std::vector<const StudyCase*> chosen = all_or_none(world, [&] {
-    const std::vector<const StudyCase*> cases = study.chosen_cases(options.cases);
+    std::vector<const StudyCase*> cases = study.chosen_cases(options.cases);
     for (const StudyCase* study_case : cases)
       if (!study_case->gold_room_from_ct)
         throw InputError("case '" + study_case->name + "': gold_room_from_ct",

@@ -66,7 +66,9 @@ std::vector<LoadedMethod> load_methods(const MethodOptions& options,
     blurs_mm = level_blurs_mm(*loaded.problem);
     for (const std::string& text : loaded.warnings) warn(world, text);
     for (const auto& [name, note] : loaded.input_notes)
-      if (name.starts_with("field ")) inform(world, study_case.name + ": " + name + ": " + note);
+      if (name.starts_with("field "))
+        inform(world,
+               std::string(study_case.name).append(": ").append(name).append(": ").append(note));
     for (const auto& [name, hash] : loaded.input_sha256)
       inputs.sha256[study_case.name + ": " + name] = hash;
     for (const auto& [name, note] : loaded.input_notes)

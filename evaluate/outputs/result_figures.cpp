@@ -321,9 +321,12 @@ void draw_curve_panels(const std::vector<CurvePanel>& panels,
       figure.add_data(name, points);
       figure.add_data(name + "_peak", {{curve.peak_x, curve.peak_y}});
       const std::string key = p == 0 ? "title " + gnuplot_quoted(curve.label) : "notitle";
-      parts.push_back("$" + name + " using 1:2 with lines lw 2 lc " + color_of(c) + " " + key);
-      parts.push_back("$" + name + "_peak using 1:2 with points pt " +
-                      std::to_string(c == 0 ? 7 : 4) + " ps 0.9 lc " + color_of(c) + " notitle");
+      std::string line = "$" + name;
+      line.append(" using 1:2 with lines lw 2 lc ").append(color_of(c)).append(" ").append(key);
+      std::string peak = "$" + name + "_peak using 1:2 with points pt ";
+      peak.append(c == 0 ? "7" : "4").append(" ps 0.9 lc ").append(color_of(c)).append(" notitle");
+      parts.push_back(std::move(line));
+      parts.push_back(std::move(peak));
     }
     figure.add("set xlabel " + gnuplot_quoted(panels[p].x_label) + "\nset ylabel " +
                gnuplot_quoted(p % 3 == 0 ? y_label : "") + "\nplot " + plots(parts));

@@ -122,6 +122,7 @@ OverPatients rate_over(const std::vector<PatientSuccess>& patients,
 OverPatients capture_over(const std::vector<PatientSuccess>& patients,
                           const PopulationCounting& counting) {
   std::vector<double> ranges_mm;
+  ranges_mm.reserve(patients.size());
   for (const PatientSuccess& patient : patients)
     ranges_mm.push_back(patient.capture.initial_tre_mm);
   OverPatients capture_mm;

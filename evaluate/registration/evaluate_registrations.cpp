@@ -59,19 +59,19 @@ json simulation_in(const std::filesystem::path& folder) {
 }
 
 /// Options that the command for one start sets itself, or does not need.
-const std::set<std::string> kNotOfRepeats = {"--case",
-                                             "--renderer",
-                                             "--starts-from",
-                                             "--starts-per-interval",
-                                             "--start-rule",
-                                             "--starts-only",
-                                             "--only-start",
-                                             "--restart",
-                                             "--max-hours",
-                                             "--stall-minutes",
-                                             "--raycast-starts-per-interval",
-                                             "--raycast-intervals",
-                                             "--output"};
+const std::set<std::string> not_of_repeats = {"--case",
+                                              "--renderer",
+                                              "--starts-from",
+                                              "--starts-per-interval",
+                                              "--start-rule",
+                                              "--starts-only",
+                                              "--only-start",
+                                              "--restart",
+                                              "--max-hours",
+                                              "--stall-minutes",
+                                              "--raycast-starts-per-interval",
+                                              "--raycast-intervals",
+                                              "--output"};
 
 /// From what repeat_command() makes the command for one start; null for another program's poses.
 json repeat_json(const RegistrationStudyOptions& options) {
@@ -552,7 +552,7 @@ cli::SubCommand registration_command(CLI::App& app, const std::string& program) 
       options);
   cli::bind_run_limits(*command.app);
   command.app->parse_complete_callback([options, app = command.app] {
-    options->shared_by_repeats = cli::given_options(*app, kNotOfRepeats);
+    options->shared_by_repeats = cli::given_options(*app, not_of_repeats);
   });
   return command;
 }

@@ -34,11 +34,10 @@ using UniformWords = std::array<std::uint64_t, kUniformWords>;
 
 UniformWords words_of(const UniformStart& start) {
   UniformWords words{};
-  for (int i = 0; i < 3; ++i) {
-    words[static_cast<std::size_t>(i)] =
-        std::bit_cast<std::uint64_t>(start.parameters.rotation_rad[i]);
-    words[static_cast<std::size_t>(i + 3)] =
-        std::bit_cast<std::uint64_t>(start.parameters.translation_mm[i]);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto axis = static_cast<Eigen::Index>(i);
+    words[i] = std::bit_cast<std::uint64_t>(start.parameters.rotation_rad[axis]);
+    words[i + 3] = std::bit_cast<std::uint64_t>(start.parameters.translation_mm[axis]);
   }
   words[6] = std::bit_cast<std::uint64_t>(start.initial_tre_mm);
   words[7] = start.refused;
@@ -47,10 +46,10 @@ UniformWords words_of(const UniformStart& start) {
 
 UniformStart uniform_start_of(std::span<const std::uint64_t> words) {
   UniformStart start;
-  for (int i = 0; i < 3; ++i) {
-    start.parameters.rotation_rad[i] = std::bit_cast<double>(words[static_cast<std::size_t>(i)]);
-    start.parameters.translation_mm[i] =
-        std::bit_cast<double>(words[static_cast<std::size_t>(i + 3)]);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto axis = static_cast<Eigen::Index>(i);
+    start.parameters.rotation_rad[axis] = std::bit_cast<double>(words[i]);
+    start.parameters.translation_mm[axis] = std::bit_cast<double>(words[i + 3]);
   }
   start.initial_tre_mm = std::bit_cast<double>(words[6]);
   start.refused = words[7];

@@ -68,7 +68,7 @@ void set_names(std::vector<EvaluationRun>& runs) {
 
 std::filesystem::path EvaluationRun::path_of(const std::string& relative) const {
   std::error_code error;
-  const std::filesystem::path path = std::filesystem::weakly_canonical(folder / relative, error);
+  std::filesystem::path path = std::filesystem::weakly_canonical(folder / relative, error);
   if (error) throw FileError((folder / relative).string(), error.message());
   const std::filesystem::path own = std::filesystem::weakly_canonical(folder, error);
   if (error || !leads_down(relative) || !leads_down(path.lexically_relative(own)))

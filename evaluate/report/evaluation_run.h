@@ -12,6 +12,8 @@
 namespace af::evaluation {
 
 /// One finished run of af-evaluate, as its folder tells.
+// nlohmann::json asserts in its move constructor.
+// NOLINTNEXTLINE(bugprone-exception-escape)
 struct EvaluationRun {
   std::filesystem::path folder;
   std::string kind;  ///< "image-quality" or "registration"

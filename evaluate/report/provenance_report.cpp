@@ -22,7 +22,7 @@ std::map<std::string, std::string> option_lines(const std::string& text) {
   for (std::string line; std::getline(lines, line);) {
     const std::size_t equals = line.find('=');
     if (line.starts_with("#") || equals == std::string::npos) continue;
-    const auto trimmed = [](std::string part) {
+    const auto trimmed = [](const std::string& part) {
       const std::size_t first = part.find_first_not_of(" \"");
       const std::size_t last = part.find_last_not_of(" \"");
       return first == std::string::npos ? std::string() : part.substr(first, last - first + 1);

@@ -32,6 +32,8 @@ bool CaseEquivalence::is_shown() const {
   return is_student_below && bootstrap.high < margin;
 }
 
+// A margin is no whole number, and a seed is given first wherever numbers are drawn.
+// NOLINTNEXTLINE(bugprone-easily-swappable-parameters)
 CaseEquivalence equivalence_over_cases(std::span<const double> case_means,
                                        double margin,
                                        std::uint64_t seed,

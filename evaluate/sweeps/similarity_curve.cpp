@@ -13,11 +13,11 @@ namespace {
 
 /// Where the curve crosses `level` when walking from `peak` by `direction`; NaN when it does not
 /// before its end or a hole.
-double crossing(std::span<const double> offsets,
+double crossing(double level,
+                std::span<const double> offsets,
                 std::span<const double> similarity,
                 std::size_t peak,
-                int direction,
-                double level) {
+                int direction) {
   for (auto i = static_cast<std::ptrdiff_t>(peak);;) {
     const std::ptrdiff_t next = i + direction;
     if (next < 0 || next >= static_cast<std::ptrdiff_t>(offsets.size())) return kNan;
@@ -75,8 +75,8 @@ CurvePeak find_peak(std::span<const double> offsets,
   return {parabola_vertex(offsets, similarity, peak),
           similarity[peak],
           peak == 0 || peak + 1 == offsets.size(),
-          crossing(offsets, similarity, peak, 1, level) -
-              crossing(offsets, similarity, peak, -1, level)};
+          crossing(level, offsets, similarity, peak, 1) -
+              crossing(level, offsets, similarity, peak, -1)};
 }
 
 }  // namespace af::evaluation

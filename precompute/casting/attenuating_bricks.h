@@ -37,7 +37,7 @@ class AttenuatingBricks {
   void mark(const AttenuationVolume& volume);
   void widen(std::size_t axis, int bricks);
 
-  std::array<int, 3> counts_;
+  std::array<int, 3> counts_{};
   std::vector<std::uint8_t> is_near_;
 };
 

@@ -17,19 +17,19 @@ namespace af {
 /// What casters are made of. All of it must outlive the caster.
 struct CasterInputs {
   const AttenuationVolume& volume;
-  const SlabAlignedVolume* resampled;  ///< only for casters that need it
+  const SlabAlignedVolume* resampled = nullptr;  ///< only for casters that need it
   const LightSlab& light_slab;
   AttenuationQuantizer quantizer;
   RayCasterOptions ray_caster;  ///< of the trilinear caster
 };
 
 struct KnownCaster {
-  const char* name;  ///< as in options and files
-  const char* help;
-  bool needs_resampled;  ///< the CT resampled to the light slab's frame
-  PlanOptions plan;      ///< units that suit it
-  PlanOptions sample;    ///< units of which few tell its speed
-  std::unique_ptr<const FieldCaster> (*make)(const CasterInputs& inputs);
+  const char* name = nullptr;  ///< as in options and files
+  const char* help = nullptr;
+  bool needs_resampled = false;  ///< the CT resampled to the light slab's frame
+  PlanOptions plan;              ///< units that suit it
+  PlanOptions sample;            ///< units of which few tell its speed
+  std::unique_ptr<const FieldCaster> (*make)(const CasterInputs& inputs) = nullptr;
 };
 
 /// InputError when there is none of that name.

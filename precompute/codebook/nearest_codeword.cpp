@@ -30,7 +30,7 @@ float hadamard_coefficient(const Tile& tile, std::uint32_t k) {
 }
 
 CodewordBox far_box() {
-  CodewordBox box;
+  CodewordBox box{};
   for (std::size_t k = 0; k < kBoxCoefficients; ++k) {
     std::ranges::fill(box.low[k], kFarAway);
     std::ranges::fill(box.high[k], kFarAway);

@@ -11,7 +11,7 @@ namespace {
 constexpr std::int64_t kMegabyte = 1000000;
 
 /// Every preset there is; a new one joins here.
-const std::array kPresets = {
+const std::array presets = {
     DesignPreset{kPaperPreset,
                  "one slab of 64 x 64 x 256 x 256 nodes, 16384 codewords, linear look-up",
                  {1, 64, 256, 16384, "linear"},
@@ -44,15 +44,15 @@ const std::array kPresets = {
 }  // namespace
 
 const DesignPreset& design_preset_named(const std::string& name) {
-  return required_row(kPresets, "preset", name);
+  return required_row(presets, "preset", name);
 }
 
 std::vector<std::string> design_preset_names() {
-  return names_of(kPresets);
+  return names_of(presets);
 }
 
 std::string design_preset_help() {
-  return help_of(kPresets);
+  return help_of(presets);
 }
 
 }  // namespace af

@@ -10,8 +10,8 @@ namespace af {
 
 /// A design by name: fixed, or chosen by a probe within a budget.
 struct DesignPreset {
-  const char* name;
-  const char* help;
+  const char* name = nullptr;
+  const char* help = nullptr;
   FieldDesign design;   ///< fixed, or where a probe may not be made
   DesignBudget budget;  ///< none stated: the design is fixed
 };

@@ -78,8 +78,9 @@ class PixelRays {
 /// Probability of each patch of the grid, from a coarse DRR with one ray, or four, per patch.
 std::vector<double> patch_probabilities(const std::vector<float>& coarse, int columns, int rows) {
   const auto at = [&](int column, int row) {
-    return static_cast<double>(coarse[static_cast<std::size_t>(
-        std::clamp(row, 0, rows - 1) * columns + std::clamp(column, 0, columns - 1))]);
+    const auto y = static_cast<std::size_t>(std::clamp(row, 0, rows - 1));
+    const auto x = static_cast<std::size_t>(std::clamp(column, 0, columns - 1));
+    return static_cast<double>(coarse[y * static_cast<std::size_t>(columns) + x]);
   };
   std::vector<double> rough;
   std::vector<double> even;
@@ -180,13 +181,13 @@ class PoseSampler {
     std::ranges::copy(values, patch.reference.begin());
     const RigidTransform slab_from_room = slab_from_ct_ * room_from_ct.inverse();
     patch.source_point = slab_from_room * scene_.camera.source_point;
+    auto direction = patch.directions.begin();
     for (int r = 0; r < RayPatch::kSide; ++r)
       for (int c = 0; c < RayPatch::kSide; ++c)
-        patch.directions[static_cast<std::size_t>(r * RayPatch::kSide + c)] =
-            slab_from_room.linear() *
-            (scene_.camera.detector_point(first_column + c * grid_.step_px,
-                                          first_row + r * grid_.step_px) -
-             scene_.camera.source_point);
+        *direction++ = slab_from_room.linear() *
+                       (scene_.camera.detector_point(first_column + c * grid_.step_px,
+                                                     first_row + r * grid_.step_px) -
+                        scene_.camera.source_point);
     return patch;
   }
 

@@ -66,12 +66,12 @@ NamedCells judge_cells(const ViewSummary& coarse, const ViewSummary& fine) {
 
 NamedCells uncertainty_cells(const UncertaintyReport& report, double chain_distance_mm) {
   static const std::array<std::string, UncertaintyReport::kCovarianceSize> names = [] {
-    constexpr std::array short_names{"rx", "ry", "rz", "tx", "ty", "tz"};
+    constexpr std::array kShortNames{"rx", "ry", "rz", "tx", "ty", "tz"};
     std::array<std::string, UncertaintyReport::kCovarianceSize> result;
     std::size_t next = 0;
-    for (std::size_t row = 0; row < short_names.size(); ++row)
-      for (std::size_t column = row; column < short_names.size(); ++column)
-        result[next++] = std::string("cov_") + short_names[row] + "_" + short_names[column];
+    for (std::size_t row = 0; row < kShortNames.size(); ++row)
+      for (std::size_t column = row; column < kShortNames.size(); ++column)
+        result[next++] = std::string("cov_") + kShortNames[row] + "_" + kShortNames[column];
     return result;
   }();
   NamedCells cells = {{"predicted_tre_rms_mm", number_text(report.tre_rms_mm)},
@@ -97,7 +97,7 @@ std::vector<std::string> names_of(const NamedCells& cells) {
 std::vector<std::string> texts_of(NamedCells cells) {
   std::vector<std::string> texts;
   texts.reserve(cells.size());
-  for (auto& [name, text] : cells) texts.push_back(std::move(text));
+  for (auto& cell : cells) texts.push_back(std::move(cell.second));
   return texts;
 }
 

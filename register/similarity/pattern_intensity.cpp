@@ -15,11 +15,11 @@ constexpr double kScaleOverRange = 10.0 / 256.0;
 
 /// Adds up the pairs (i, i + shift) for all shifts of half the disc: each pair once. Rows are
 /// taken singly so that no pair wraps around the image's edge.
-PairSums pairs_of(std::span<const float> difference,
+PairSums pairs_of(float squared_scale,
+                  std::span<const float> difference,
                   std::span<const float> weights,
                   int width,
-                  int height,
-                  float squared_scale) {
+                  int height) {
   const PixelSumKernels kernels = pixel_sum_kernels();
   PairSums sums{};
   for (int row_shift = 0; row_shift <= kRadiusPx; ++row_shift)
@@ -45,7 +45,7 @@ PairSums pairs_of(std::span<const float> difference,
 
 PatternIntensity::PatternIntensity(const SimilarityReference& reference)
     : difference_(reference), width_(reference.xray.width), height_(reference.xray.height) {
-  pairs_ = pairs_of(difference_.weights(), difference_.weights(), width_, height_, 1.0f).pairs;
+  pairs_ = pairs_of(1.0f, difference_.weights(), difference_.weights(), width_, height_).pairs;
   if (!(pairs_ > 0.0))
     throw InputError("mask = no two used pixels within 3 pixels of each other: pi needs some");
 }
@@ -55,11 +55,11 @@ double PatternIntensity::evaluate(std::span<const float> drr,
   auto& mine = dynamic_cast<DifferenceWorkspace&>(workspace);
   if (!difference_.take(drr, mine)) return std::numeric_limits<double>::quiet_NaN();
   const double scale = kScaleOverRange * difference_.xray_range();
-  return pairs_of(mine.difference,
+  return pairs_of(static_cast<float>(scale * scale),
+                  mine.difference,
                   difference_.weights(),
                   width_,
-                  height_,
-                  static_cast<float>(scale * scale))
+                  height_)
              .likeness /
          pairs_;
 }

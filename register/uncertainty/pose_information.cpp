@@ -26,6 +26,7 @@ std::vector<PoseVector> gradients_beside(MultiViewObjective& objective,
                             1,
                             scores);
   std::vector<PoseVector> gradients;
+  gradients.reserve(scores.size());
   for (const TileScores& view : scores) gradients.push_back(sum_of(view));
   return gradients;
 }

@@ -40,6 +40,7 @@ class ATTENUATION_FIELDS_API Renderer {
   /// Threads that share a large DRR, or the DRRs of a batch.
   [[nodiscard]] int threads() const;
 
+  // NOLINTBEGIN(modernize-use-nodiscard): who knows that no ray is outside need not ask how many.
   /// Total attenuation of every pixel's ray (dimensionless), row by row, into pixel_count() values.
   /// Returns the number of rays outside.
   std::int64_t drr(const Pose& pose, std::span<float> total_attenuation) const;
@@ -68,6 +69,7 @@ class ATTENUATION_FIELDS_API Renderer {
   std::int64_t drrs_and_gradients(std::span<const std::array<double, 6>> parameters,
                                   std::span<float> total_attenuation,
                                   std::span<float> planes) const;
+  // NOLINTEND(modernize-use-nodiscard)
 
  protected:
   struct Impl;

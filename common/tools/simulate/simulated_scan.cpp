@@ -107,10 +107,10 @@ void write_circle(const SimulateOptions& options,
 /// reconstructs from, are farthest.
 std::vector<double> angles_between(const ConeBeamOptions& orbit) {
   std::vector<double> angles_rad;
-  for (int i = 0; i < orbit.elevated_views; ++i)
-    angles_rad.push_back(
-        kRadPerDeg *
-        (orbit.first_angle_deg + (2 * (i - orbit.elevated_views / 2) + 1) * orbit.step_deg()));
+  angles_rad.reserve(static_cast<std::size_t>(orbit.elevated_views));
+  const int before = orbit.elevated_views / 2;
+  for (int i = -before; i < orbit.elevated_views - before; ++i)
+    angles_rad.push_back(kRadPerDeg * (orbit.first_angle_deg + (2 * i + 1) * orbit.step_deg()));
   return angles_rad;
 }
 

@@ -402,6 +402,11 @@ TEST_F(StudyFile, LandmarksGiveTheNominalPoseThatIsNotStated) {
               HasSubstr("must give the nominal pose, which is not stated"));
 }
 
+TEST_F(StudyFile, LandmarksThatAreNoListAreRefusedAlsoWhereTheCaseHasNone) {
+  EXPECT_THAT(refusal("field = ", "landmarks_px = 3\nfield = "),
+              AllOf(HasSubstr("landmarks_px"), HasSubstr("must be a list")));
+}
+
 TEST_F(StudyFile, RepeatedCaseNameIsRefused) {
   const std::string body = kGoodStudy;
   const std::string twice = body + body.substr(body.find("[[case]]"));
@@ -615,7 +620,7 @@ TEST_F(StudyFile, LandmarksWithMistakesAreRefusedWithTheirLine) {
   EXPECT_THAT(refused("[10,20.5]", "\"none\""), HasSubstr("[column, row]"));
   EXPECT_THAT(refused("[10,20.5]", "[10,2000]"), HasSubstr("on the detector"));
   EXPECT_THAT(refused("landmarks_px = [[10,20.5], [], [30,40]]", "landmarks_px = 3"),
-              HasSubstr("0 entries"));
+              HasSubstr("must be a list"));
 }
 
 }  // namespace
