@@ -21,7 +21,7 @@ class AttenuationQuantizer {
   }
 
  private:
-  float step_;
+  float step_ = 0.0f;
 };
 
 }  // namespace af

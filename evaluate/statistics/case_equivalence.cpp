@@ -33,11 +33,12 @@ bool CaseEquivalence::is_shown() const {
 }
 
 // A margin is no whole number, and a seed is given first wherever numbers are drawn.
-// NOLINTNEXTLINE(bugprone-easily-swappable-parameters)
+// NOLINTBEGIN(bugprone-easily-swappable-parameters)
 CaseEquivalence equivalence_over_cases(std::span<const double> case_means,
                                        double margin,
                                        std::uint64_t seed,
                                        std::size_t replicates) {
+  // NOLINTEND(bugprone-easily-swappable-parameters)
   if (!(margin > 0.0) || !std::isfinite(margin))
     throw InputError("equivalence margin", std::to_string(margin), "must be > 0 and finite");
   for (const double value : case_means)

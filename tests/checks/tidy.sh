@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# clang-tidy over the first-party sources (tests left out), as .clang-tidy says; any finding fails. Half an hour on two
-# cores, so it is not a CTest entry. Usage: tidy.sh [PATH-PATTERN]
+# clang-tidy over the first-party sources (tests left out), as .clang-tidy says; any finding fails. Forty minutes on
+# two cores, so it is not a CTest entry. Usage: tidy.sh [PATH-PATTERN]
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR
 source "$(dirname "$0")/source_files.sh"
