@@ -20,6 +20,8 @@
 #include "evaluate/sweeps/sweep_field_parameters.h"
 #include "text/shell_words.h"
 
+// Outside app_main only the declaration of options can throw, which is a defect of this program.
+// NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
   using namespace af::evaluation;
   CLI::App app{

@@ -43,7 +43,7 @@ constexpr int32_t kOctavesOfOne = 508;  // 127 << 2
 
 AF_KERNEL_INLINE int32_t quarter_octaves(float magnitude) {
   const float above_one = magnitude + 1.0f;
-  int32_t bits;
+  int32_t bits = 0;
   memcpy(&bits, &above_one, sizeof(bits));
   return (bits >> kOctaveShift) - kOctavesOfOne;
 }
@@ -301,6 +301,8 @@ AF_KERNEL_INLINE float code_mean(Lane<Coder, Index>& lane,
   const auto limited = [&](int32_t steps) { return steps < 0 ? 0 : steps > most ? most : steps; };
   // Beyond either end by some tiles' sums at most.
   const float steps = expected_sum / sum_of_step;
+  // Part of the format: no other rounding will do.
+  // NOLINTNEXTLINE(bugprone-incorrect-roundings)
   const int32_t expected = limited(static_cast<int32_t>(steps + 0.5f));
   const float beyond = steps - static_cast<float>(expected);
   const int32_t side = beyond < 0.0f ? -1 : 1;
@@ -321,7 +323,7 @@ AF_KERNEL_INLINE bool go_to_occupied(Lane<Coder, Index>& lane,
                                      const CodewordTables& tables,
                                      const BlockShape& shape) {
   const int64_t row = row_of(shape);
-  const TileNote* around[kPredictors];
+  const TileNote* around[kPredictors] = {};
   for (; lane.u < shape.u; go_on<kHasMeans>(lane, shape)) {
     find_neighbours(lane.here, lane.before, row, around);
     AdaptiveBit& model = lane.memory.empties[empty_context_of(around)];

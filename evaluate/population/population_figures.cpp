@@ -73,9 +73,16 @@ std::string panel_script(const std::string& panel,
         name, interval_points(drawn_success(*members[k]), 0.25 * (static_cast<double>(k) - 1.0)));
     const std::string style =
         " lc rgb '" + std::string(kPresetColors[k % kPresetColors.size()]) + "'";
-    plot += (plot.empty() ? "plot $" : ", $") + name + " using 1:2 with lines lw 1.5" + style +
-            " notitle, $" + name + " using 1:2:3:4 with yerrorbars lw 1.5 pt 7 ps 0.6" + style +
-            " title " + gnuplot_quoted(preset_of(members[k]->condition));
+    plot.append(plot.empty() ? "plot $" : ", $")
+        .append(name)
+        .append(" using 1:2 with lines lw 1.5")
+        .append(style)
+        .append(" notitle, $")
+        .append(name)
+        .append(" using 1:2:3:4 with yerrorbars lw 1.5 pt 7 ps 0.6")
+        .append(style)
+        .append(" title ")
+        .append(gnuplot_quoted(preset_of(members[k]->condition)));
   }
   const std::string title = panel + (has_one_view(panel)     ? " view, by mRPD"
                                      : panel.ends_with("-2") ? " views"

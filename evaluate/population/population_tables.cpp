@@ -163,6 +163,7 @@ std::vector<PopulationGroup> groups_of(const PopulationCondition& condition,
   for (const PatientOutcomes& patient : condition.patients)
     if (patient.number() > 0) add(patient.kind(), patient);
   std::vector<PopulationGroup> groups;
+  groups.reserve(names.size());
   for (const std::string& name : names)
     groups.push_back(group_of(condition, name, members[name], counting));
   return groups;

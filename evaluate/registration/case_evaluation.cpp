@@ -6,9 +6,9 @@
 #include <chrono>
 #include <cmath>
 #include <cstdint>
-#include <cstring>
 #include <exception>
 #include <map>
+#include <memory>
 #include <optional>
 #include <span>
 #include <tuple>
@@ -125,7 +125,9 @@ SharedArray<PerturbedStart> held_per_node(const SharedArray<PerturbedStart>& sta
   if (count[0] == 0) return {};
   const auto owner = world.allocate_on_nodes_from_root(
       count[0] * sizeof(PerturbedStart), [&](std::span<std::byte> memory) {
-        std::memcpy(memory.data(), starts.data(), memory.size());
+        std::uninitialized_copy(starts.data(),
+                                starts.data() + starts.size(),
+                                reinterpret_cast<PerturbedStart*>(memory.data()));
       });
   return {owner, {reinterpret_cast<const PerturbedStart*>(owner.get()), count[0]}};
 }
@@ -366,6 +368,7 @@ std::vector<ChosenRow> chosen_rows(const MethodRows& method) {
        {"median", by_tre[(by_tre.size() - 1) / 2].second},
        {"worst", by_tre.back().second}}};
   std::vector<ChosenRow> chosen;
+  chosen.reserve(wanted.size());
   for (const auto& [which, index] : wanted) chosen.push_back({which, {}});
   method.visit([&](std::int64_t index, const TracedRow& traced) {
     for (std::size_t i = 0; i < wanted.size(); ++i)

@@ -294,8 +294,10 @@ std::string methods_markdown(const std::vector<MethodRow>& rows) {
     std::string counts;
     std::string shares;
     for (const IntervalSuccess& band : row.bands) {
-      percents += (percents.empty() ? "" : " / ") + percent_text(band) + wilson_text(band);
-      counts += (counts.empty() ? "" : " / ") + std::to_string(band.trials);
+      percents.append(percents.empty() ? "" : " / ")
+          .append(percent_text(band))
+          .append(wilson_text(band));
+      counts.append(counts.empty() ? "" : " / ").append(std::to_string(band.trials));
     }
     for (const double share : row.rotation_shares)
       shares += (shares.empty() ? "" : " / ") + number_or_dash(share, 2);

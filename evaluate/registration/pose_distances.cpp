@@ -106,6 +106,7 @@ std::vector<MethodEnds> ends_of(const EvaluationRun& run) {
     }
   });
   std::vector<MethodEnds> all;
+  all.reserve(methods.size());
   for (auto& [key, method] : methods) all.push_back(std::move(method));
   return all;
 }

@@ -200,7 +200,7 @@ void run_lattice_errors(const LatticeErrorsOptions& options,
   const GoldStandard gold =
       all_or_none(world, [&] { return gold_standard(study, study_case, options.gold); });
   // Ray casting is loaded in any case: it makes the X-rays.
-  MethodOptions loading = options;
+  MethodOptions loading = static_cast<const MethodOptions&>(options);
   loading.renderer = "both";
   LoadedInputs ignored;
   const std::vector<LoadedMethod> methods =

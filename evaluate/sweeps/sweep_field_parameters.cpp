@@ -82,7 +82,7 @@ std::shared_ptr<const CompressedAttenuationField> field_of(const PrecomputeOptio
                                                            FieldFileInfo& info) {
   const bool exists = all_or_none(world, [&] { return std::filesystem::exists(setting.output); });
   if (!exists) run_precompute(setting, command_line, world);
-  const auto field = read_field(setting.output, world, &info);
+  auto field = read_field(setting.output, world, &info);
   all_or_none(world, [&] {
     const std::string expected = to_toml(setting);
     const std::string& found = info.provenance.options_toml;
