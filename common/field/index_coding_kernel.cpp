@@ -18,25 +18,20 @@ constexpr uint32_t kLeastTurn = 32;
 constexpr uint32_t kLeastEmpty = 1024;
 constexpr uint32_t kLeastMean = 32;
 
+constexpr int32_t kModelsOfOrder = kDistances * kWidths;
 /// Where the models of a coefficient begin: those of its order, that is, how many axes it is a
 /// difference along: 0, 1, more.
-constexpr int32_t kModelsOfOrder = kDistances * kWidths;
-alignas(64) constexpr int32_t kFirstModels[16] = {0,
-                                                  1 * kModelsOfOrder,
-                                                  1 * kModelsOfOrder,
-                                                  2 * kModelsOfOrder,
-                                                  1 * kModelsOfOrder,
-                                                  2 * kModelsOfOrder,
-                                                  2 * kModelsOfOrder,
-                                                  2 * kModelsOfOrder,
-                                                  1 * kModelsOfOrder,
-                                                  2 * kModelsOfOrder,
-                                                  2 * kModelsOfOrder,
-                                                  2 * kModelsOfOrder,
-                                                  2 * kModelsOfOrder,
-                                                  2 * kModelsOfOrder,
-                                                  2 * kModelsOfOrder,
-                                                  2 * kModelsOfOrder};
+struct FirstModels {
+  alignas(64) int32_t of[16] = {};
+
+  constexpr FirstModels() {
+    for (int j = 0; j < 16; ++j) {
+      const int axes = __builtin_popcount(static_cast<unsigned>(j));
+      of[j] = (axes < kOrders ? axes : kOrders - 1) * kModelsOfOrder;
+    }
+  }
+};
+constexpr FirstModels kFirstModels;
 
 constexpr int kOctaveShift = 21;        // of a float's bits: two of the mantissa are kept
 constexpr int32_t kOctavesOfOne = 508;  // 127 << 2
@@ -323,7 +318,7 @@ AF_KERNEL_INLINE bool go_to_occupied(Lane<Coder, Index>& lane,
                                      const CodewordTables& tables,
                                      const BlockShape& shape) {
   const int64_t row = row_of(shape);
-  const TileNote* around[kPredictors] = {};
+  const TileNote* around[kPredictors];
   for (; lane.u < shape.u; go_on<kHasMeans>(lane, shape)) {
     find_neighbours(lane.here, lane.before, row, around);
     AdaptiveBit& model = lane.memory.empties[empty_context_of(around)];
@@ -336,7 +331,7 @@ AF_KERNEL_INLINE bool go_to_occupied(Lane<Coder, Index>& lane,
       lane.memory.sums[lane.here - lane.memory.notes] = 0.0f;
     }
   }
-  if (lane.u == shape.u) return false;
+  if (lane.u >= shape.u) return false;
   // For the tiles that come next but two: the plane before is known.
   prefetch_coefficients(tables, lane.before[row + 3].codeword);
   lane.surprise_class = surprise_class_of(around);
@@ -369,7 +364,7 @@ AF_KERNEL_INLINE native::Ints turn_models(const NodeCluster& cluster,
   const native::Ints widths = class_of((splits >> 4) - usual_there + 20);
   const native::Ints is_above = ~(reinterpret_cast<native::Ints>(differences) >> 31);
   const native::Ints sides = (distances ^ is_above) + kDistances / 2;
-  return picked<native::Ints>(kFirstModels, coefficients) + sides * kWidths + widths;
+  return picked<native::Ints>(kFirstModels.of, coefficients) + sides * kWidths + widths;
 }
 
 /// A way enters a cluster. The models of all its turns are found at once: a way that is told turn

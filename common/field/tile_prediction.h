@@ -73,48 +73,27 @@ inline constexpr int kTermCount = sizeof(kTerms) / sizeof(kTerms[0]);
 inline constexpr int kLanes = native::kLanes;
 inline constexpr int kParts = 16 / kLanes;
 
-/// Each lane's value from the lane ^ kTurn.
-template <int kTurn>
-AF_KERNEL_INLINE native::Floats turned_by(native::Floats values) {
+template <int... kLane>
+struct LaneNumbers {};
 #if AF_VECTOR_BITS == 512
-  return __builtin_shufflevector(values,
-                                 values,
-                                 0 ^ kTurn,
-                                 1 ^ kTurn,
-                                 2 ^ kTurn,
-                                 3 ^ kTurn,
-                                 4 ^ kTurn,
-                                 5 ^ kTurn,
-                                 6 ^ kTurn,
-                                 7 ^ kTurn,
-                                 8 ^ kTurn,
-                                 9 ^ kTurn,
-                                 10 ^ kTurn,
-                                 11 ^ kTurn,
-                                 12 ^ kTurn,
-                                 13 ^ kTurn,
-                                 14 ^ kTurn,
-                                 15 ^ kTurn);
+using AllLanes = LaneNumbers<0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15>;
 #elif AF_VECTOR_BITS == 256
-  return __builtin_shufflevector(values,
-                                 values,
-                                 0 ^ kTurn,
-                                 1 ^ kTurn,
-                                 2 ^ kTurn,
-                                 3 ^ kTurn,
-                                 4 ^ kTurn,
-                                 5 ^ kTurn,
-                                 6 ^ kTurn,
-                                 7 ^ kTurn);
+using AllLanes = LaneNumbers<0, 1, 2, 3, 4, 5, 6, 7>;
 #else
-  return __builtin_shufflevector(values, values, 0 ^ kTurn, 1 ^ kTurn, 2 ^ kTurn, 3 ^ kTurn);
+using AllLanes = LaneNumbers<0, 1, 2, 3>;
 #endif
+
+/// Each lane's value from the lane ^ kTurn.
+template <int kTurn, int... kLane>
+AF_KERNEL_INLINE native::Floats turned_by(native::Floats values, LaneNumbers<kLane...>) {
+  return __builtin_shufflevector(values, values, (kLane ^ kTurn)...);
 }
 
 /// Part `part` of the coefficients of a neighbour, each taken from place j ^ turn.
 template <int kTurn>
 AF_KERNEL_INLINE native::Floats turned_part(const float* coefficients, int part) {
-  return turned_by<kTurn % kLanes>(native::load(coefficients + kLanes * (part ^ (kTurn / kLanes))));
+  return turned_by<kTurn % kLanes>(native::load(coefficients + kLanes * (part ^ (kTurn / kLanes))),
+                                   AllLanes{});
 }
 
 template <int kTerm>

@@ -11,6 +11,7 @@
 #include <Eigen/Core>
 
 #include "base/error.h"
+#include "base/joined.h"
 #include "evaluate/outputs/sample_summary_json.h"
 #include "evaluate/registration/registration_statistics.h"
 #include "evaluate/starts/perturbed_starts.h"
@@ -290,25 +291,26 @@ std::string methods_markdown(const std::vector<MethodRow>& rows) {
       "successes, mm: mean, median | Bias, deg and mm | DRRs | Seconds |\n"
       "|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
   for (const MethodRow& row : rows) {
-    std::string percents;
-    std::string counts;
-    std::string shares;
-    for (const IntervalSuccess& band : row.bands) {
-      percents.append(percents.empty() ? "" : " / ")
-          .append(percent_text(band))
-          .append(wilson_text(band));
-      counts.append(counts.empty() ? "" : " / ").append(std::to_string(band.trials));
-    }
-    for (const double share : row.rotation_shares)
-      shares += (shares.empty() ? "" : " / ") + number_or_dash(share, 2);
-    text += "| " + row.run + " | " + row.case_name + " | " + row.method + " | " + row.renderer +
-            " | " + percents + " | " + counts + " | " + shares + " | " + row.capture_range_mm +
-            " | " + std::to_string(row.gross_failures) + " | " +
-            number_or_dash(row.mean_tre_mm, 3) + ", " + number_or_dash(row.median_tre_mm, 3) +
-            " | " + number_or_dash(row.rotation_bias_deg, 3) + ", " +
-            number_or_dash(row.translation_bias_mm, 3) + " | " +
-            number_or_dash(row.median_drr_count, 0) + " | " +
-            number_or_dash(row.median_seconds, 4) + " |\n";
+    const std::vector<std::string> cells = {
+        "| " + row.run,
+        row.case_name,
+        row.method,
+        row.renderer,
+        joined(row.bands,
+               " / ",
+               [](const IntervalSuccess& band) { return percent_text(band) + wilson_text(band); }),
+        joined(row.bands,
+               " / ",
+               [](const IntervalSuccess& band) { return std::to_string(band.trials); }),
+        joined(row.rotation_shares, " / ", [](double share) { return number_or_dash(share, 2); }),
+        row.capture_range_mm,
+        std::to_string(row.gross_failures),
+        number_or_dash(row.mean_tre_mm, 3) + ", " + number_or_dash(row.median_tre_mm, 3),
+        number_or_dash(row.rotation_bias_deg, 3) + ", " +
+            number_or_dash(row.translation_bias_mm, 3),
+        number_or_dash(row.median_drr_count, 0),
+        number_or_dash(row.median_seconds, 4)};
+    text.append(joined(cells, " | ")).append(" |\n");
   }
   return text;
 }
