@@ -3,18 +3,16 @@
 
 #include <cstdint>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "precompute/field_source.h"
+#include "precompute/phase_clock.h"
 #include "precompute/pipeline/field_build.h"
 #include "precompute/plan/memory_plan.h"
 #include "precompute/plan/precompute_options.h"
 #include "precompute/plan/speed_sample.h"
 
 namespace af {
-
-using PhaseSeconds = std::vector<std::pair<std::string, double>>;
 
 /// What a forecast is made from.
 struct DryRun {

@@ -3,12 +3,9 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
-#include <cmath>
 #include <filesystem>
 #include <iostream>
 #include <memory>
-#include <numeric>
 #include <optional>
 #include <sstream>
 
@@ -17,12 +14,15 @@
 #include "field_file/field_file.h"
 #include "files/output_file.h"
 #include "parallel/work_watch.h"
+#include "precompute/build_record.h"
 #include "precompute/casting/casters.h"
+#include "precompute/casting_decides.h"
 #include "precompute/codebook/mean_removal.h"
 #include "precompute/design_choice.h"
 #include "precompute/dry_run.h"
 #include "precompute/field_parts.h"
 #include "precompute/field_planes.h"
+#include "precompute/phase_clock.h"
 #include "precompute/pipeline/field_build.h"
 #include "precompute/pipeline/field_encoder.h"
 #include "precompute/pipeline/shared_resampling.h"
@@ -36,156 +36,6 @@
 namespace af {
 
 namespace {
-
-/// Seconds of each phase, in order.
-class PhaseClock {
- public:
-  void end(const std::string& phase) {
-    const auto now = std::chrono::steady_clock::now();
-    seconds_.emplace_back(phase, std::chrono::duration<double>(now - start_).count());
-    start_ = now;
-  }
-  /// Takes part of what has passed since the last end as a phase of its own.
-  void split(const std::string& phase, double seconds) {
-    seconds_.emplace_back(phase, seconds);
-    start_ += std::chrono::duration_cast<std::chrono::steady_clock::duration>(
-        std::chrono::duration<double>(seconds));
-  }
-  [[nodiscard]] const PhaseSeconds& phases() const { return seconds_; }
-  [[nodiscard]] double seconds_of(const std::string& phase) const {
-    for (const auto& [name, seconds] : seconds_)
-      if (name == phase) return seconds;
-    return 0.0;
-  }
-
- private:
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-  PhaseSeconds seconds_;
-};
-
-std::string numbers_text(const double* values, Eigen::Index count) {
-  std::string text = "[";
-  for (Eigen::Index i = 0; i < count; ++i) text += (i > 0 ? ", " : "") + toml_float(values[i]);
-  return text + "]";
-}
-
-template <typename Derived>
-std::string numbers_text(const Eigen::PlainObjectBase<Derived>& matrix) {
-  return numbers_text(matrix.data(), matrix.size());
-}
-
-/// Everything that decides the cast samples. Options of the codebook may change between a stop and
-/// its resume, for example after "more codewords than training tiles".
-DecidingValues casting_decides(const PrecomputeOptions& options,
-                               const FieldSource& source,
-                               const std::vector<FieldPart>& parts) {
-  DecidingValues decides = deciding_values(deciding_options(options, kCastingStage), {});
-  const auto add_camera = [&](const CameraGeometry& camera, const std::string& what) {
-    decides[what] = camera.name;
-    decides[what + " source_point"] = numbers_text(camera.source_point);
-    decides[what + " detector_origin_point"] = numbers_text(camera.detector_origin_point);
-    decides[what + " column_direction"] = numbers_text(camera.column_direction);
-    decides[what + " row_direction"] = numbers_text(camera.row_direction);
-    decides[what + " pixel_spacing_mm"] = numbers_text(camera.pixel_spacing_mm);
-    decides[what + " size_px"] =
-        std::to_string(camera.size_px.x()) + " x " + std::to_string(camera.size_px.y());
-  };
-  decides["ct_content_sha256"] = source.ct_content_sha256;
-  if (source.projections != nullptr)
-    decides["projections sha256"] = source.projections->content_sha256;
-  add_camera(source.camera, "camera");
-  for (std::size_t i = 0; i < source.more_cameras.size(); ++i)
-    add_camera(source.more_cameras[i], "covered camera " + std::to_string(i + 1));
-  for (std::size_t i = 0; options.is_atlas() && i < parts.size(); ++i) {
-    const FieldSource& part = parts[i].source;
-    const std::string of_member = " of member " + std::to_string(i);
-    add_camera(part.camera, "camera" + of_member);
-    decides["range" + of_member] = numbers_text(part.range.low.deg_and_mm().data(), 6) + " " +
-                                   numbers_text(part.range.high.deg_and_mm().data(), 6);
-    for (const HalfSpace& half_space : part.sources)
-      decides["sources" + of_member] +=
-          numbers_text(half_space.normal) + " " + numbers_text(&half_space.offset_mm, 1) + " ";
-  }
-  decides["nominal rotation"] = numbers_text(source.frame.rotation);
-  decides["center_ct_mm"] = numbers_text(source.frame.center_ct_mm);
-  decides["nominal center_room_mm"] = numbers_text(source.frame.center_room_mm);
-  if (!options.cover.empty()) {
-    decides["covered from"] = numbers_text(source.range.low.deg_and_mm().data(), 6);
-    decides["covered to"] = numbers_text(source.range.high.deg_and_mm().data(), 6);
-  }
-  return decides;
-}
-
-nlohmann::json training_json(const TrainedCodebook& trained) {
-  nlohmann::json iterations = nlohmann::json::array();
-  for (const TrainingIteration& iteration : trained.iterations)
-    iterations.push_back({{"training_squared_error", iteration.training_squared_error},
-                          {"held_out_squared_error", iteration.held_out_squared_error},
-                          {"codewords_repaired", iteration.codewords_repaired}});
-  return {{"training_tiles", trained.training_tiles},
-          {"held_out_tiles", trained.held_out_tiles},
-          {"stop", to_string(trained.stop)},
-          {"iterations", iterations}};
-}
-
-nlohmann::json forecast_json(const DesignForecast& forecast) {
-  return {{"design", to_text(forecast.design)},
-          {"psnr_db", forecast.psnr_db},
-          {"interpolation_db", forecast.interpolation_db},
-          {"quantisation_db", forecast.quantisation_db},
-          {"file_bytes", forecast.file_bytes},
-          {"drr_ms", forecast.drr_ms}};
-}
-
-nlohmann::json design_json(const DesignChoice& choice) {
-  nlohmann::json measured = nlohmann::json::array();
-  for (const DesignForecast& forecast : choice.chosen.measured)
-    measured.push_back(forecast_json(forecast));
-  return {{"asked", choice.asked},
-          {"chosen", forecast_json(choice.chosen.forecast)},
-          {"measured", measured}};
-}
-
-/// Root mean square error of one element, in units of total attenuation.
-double rms_attenuation(std::uint64_t squared_error, std::uint64_t tiles, float step) {
-  if (tiles == 0) return 0.0;
-  const double elements = static_cast<double>(tiles) * static_cast<double>(kTileElements);
-  return static_cast<double>(step) * std::sqrt(static_cast<double>(squared_error) / elements);
-}
-
-std::string training_text(const TrainedCodebook& trained, float step) {
-  std::ostringstream text;
-  text << "codebook: " << trained.codebook.size() << " codewords from " << trained.training_tiles
-       << " tiles, " << trained.iterations.size() << " iterations (" << to_string(trained.stop)
-       << ")\n  rms error of training / unseen tiles per iteration:";
-  text.precision(4);
-  for (const TrainingIteration& iteration : trained.iterations)
-    text << "  " << rms_attenuation(iteration.training_squared_error, trained.training_tiles, step)
-         << " / "
-         << rms_attenuation(iteration.held_out_squared_error, trained.held_out_tiles, step);
-  return text.str();
-}
-
-/// What a build measured, over all ranks.
-struct BuildStatistics {
-  std::uint64_t squared_error = 0;  ///< in squared levels
-  double rms_error = 0.0;           ///< total attenuation
-  std::vector<double> encode_seconds;
-  std::uint64_t units_encoded_before = 0;  ///< by earlier runs
-  std::uint64_t peak_bytes_per_rank = 0;   ///< beside the CT and its grid
-};
-
-double largest_of(const std::vector<double>& seconds) {
-  return *std::max_element(seconds.begin(), seconds.end());
-}
-
-/// Mean over largest: 1 when all ranks were equally long at work.
-double balance_of(const std::vector<double>& seconds) {
-  const double largest = largest_of(seconds);
-  if (!(largest > 0.0)) return 1.0;
-  return std::accumulate(seconds.begin(), seconds.end(), 0.0) /
-         (largest * static_cast<double>(seconds.size()));
-}
 
 /// One run, phase by phase.
 class PrecomputeRun {
@@ -509,21 +359,23 @@ class PrecomputeRun {
                    const OverflowChoice& choice) {
     FieldEncoder encoder(
         build, cast, trained.codebook, options_.design().mean_step, choice.overflow);
-    BuildStatistics statistics;
+    std::optional<BuildRecord> record;
     std::optional<ProgressPrinter> printer;
     printer.emplace("encoding and writing", world_.is_root());
     const FieldFileInfo info = write_output(
         trained.codebook,
         [&] { return encoder.next_blocks(printer->callback(), stop_requested()); },
         [&] {
-          statistics = statistics_of(cast, encoder);
-          clock_.split("encode", largest_of(statistics.encode_seconds));
-          return provenance_of(trained, cast, statistics);
+          record.emplace(record_of(trained, cast, encoder));
+          clock_.split(
+              "encode",
+              *std::max_element(record->encode_seconds.begin(), record->encode_seconds.end()));
+          return provenance_of(*record);
         });
     printer.reset();
     if (build.progress != nullptr) remove_progress(*build.progress);
     clock_.end("write");
-    report(info, cast, trained, statistics);
+    report(info, record.value());
   }
 
   /// Collective. On NFS a folder cannot be removed while a rank has a file of it open.
@@ -571,22 +423,23 @@ class PrecomputeRun {
   }
 
   /// Collective.
-  [[nodiscard]] BuildStatistics statistics_of(const CastPhase& cast,
-                                              const FieldEncoder& encoder) const {
-    BuildStatistics statistics;
-    statistics.squared_error = encoder.squared_error();
-    statistics.rms_error =
-        rms_attenuation(statistics.squared_error, cast.occupied_tiles, quantizer().step());
-    statistics.encode_seconds = encoder.busy_seconds();
-    statistics.units_encoded_before = encoder.units_resumed();
-    statistics.peak_bytes_per_rank =
-        largest_over_ranks(without_volume(process_memory().peak_own_bytes));
-    return statistics;
+  [[nodiscard]] BuildRecord record_of(const TrainedCodebook& trained,
+                                      const CastPhase& cast,
+                                      const FieldEncoder& encoder) const {
+    return {cast,
+            trained,
+            choice_,
+            clock_,
+            quantizer().step(),
+            encoder.squared_error(),
+            encoder.busy_seconds(),
+            encoder.units_resumed(),
+            iterations_resumed_,
+            largest_over_ranks(without_volume(process_memory().peak_own_bytes)),
+            volume_bytes()};
   }
 
-  [[nodiscard]] FieldProvenance provenance_of(const TrainedCodebook& trained,
-                                              const CastPhase& cast,
-                                              const BuildStatistics& statistics) const {
+  [[nodiscard]] FieldProvenance provenance_of(const BuildRecord& record) const {
     PrecomputeOptions recorded = options_;
     recorded.ct_reading = source_.ct_reading;  // in force, where a study states it
     Provenance provenance = {"af-precompute",
@@ -602,42 +455,12 @@ class PrecomputeRun {
       json["projections"] = {{"views", source_.projections->views.size()},
                              {"measured_rms", source_.projections->measured_rms},
                              {"residual_rms", source_.projections->residual_rms}};
-    json["training"] = training_json(trained);
-    if (choice_) json["design"] = design_json(*choice_);
-    json["occupied_tiles"] = cast.occupied_tiles;
-    json["rms_attenuation_error"] = statistics.rms_error;
-    json["rays_cast"] = cast.rays_cast;
-    json["units_resumed"] = cast.units_resumed;
-    json["training_iterations_resumed"] = iterations_resumed_;
-    json["units_encoded_before"] = statistics.units_encoded_before;
-    json["units_kept_in_memory"] = cast.units_kept;
-    json["busy_seconds"] = {{"cast", cast.busy_seconds}, {"encode", statistics.encode_seconds}};
-    json["peak_bytes"] = {{"per_rank", statistics.peak_bytes_per_rank},
-                          {"ct_and_grid_per_node", volume_bytes()}};
-    for (const auto& [phase, seconds] : clock_.phases()) json["seconds"][phase] = seconds;
+    add_record(record, json);
     return {std::string(program_version()), command_line_, provenance.options_toml, json.dump(2)};
   }
 
-  void report(const FieldFileInfo& info,
-              const CastPhase& cast,
-              const TrainedCodebook& trained,
-              const BuildStatistics& statistics) const {
-    const auto rate = static_cast<double>(cast.rays_cast) / clock_.seconds_of("cast") / 1e6;
-    const auto raw_bytes = static_cast<double>(2 * lattice_.stored_node_count());
-    std::ostringstream text;
-    text.precision(3);
-    text << training_text(trained, quantizer().step())
-         << "\nwhole field: " << static_cast<double>(cast.occupied_tiles) / 1e6
-         << " million tiles not empty, rms error " << statistics.rms_error
-         << " (total attenuation)\nseconds: " << seconds_text(clock_.phases()) << "; cast " << rate
-         << " million rays/s on " << world_.size() << " ranks\nbalance (mean / slowest rank): cast "
-         << balance_of(cast.busy_seconds) << ", encode " << balance_of(statistics.encode_seconds)
-         << "; peak memory " << megabytes_text(statistics.peak_bytes_per_rank)
-         << " of one rank beside " << megabytes_text(volume_bytes())
-         << " per node for the CT\nratio of 16-bit samples stored: payload 1 : "
-         << raw_bytes / static_cast<double>(info.payload_bytes)
-         << ", file 1 : " << raw_bytes / static_cast<double>(info.file_bytes);
-    inform(world_, text.str());
+  void report(const FieldFileInfo& info, const BuildRecord& record) const {
+    inform(world_, record_text(record, info, lattice_.stored_node_count()));
     if (world_.is_root())
       std::cout << options_.output << "  " << megabytes_text(info.file_bytes) << "  payload "
                 << megabytes_text(info.payload_bytes) << "  sha256 " << info.payload_sha256

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <chrono>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace af {
+
+/// Phases of a run, in order, with the seconds that each took.
+using PhaseSeconds = std::vector<std::pair<std::string, double>>;
+
+/// Measures them.
+class PhaseClock {
+ public:
+  void end(const std::string& phase) {
+    const auto now = std::chrono::steady_clock::now();
+    seconds_.emplace_back(phase, std::chrono::duration<double>(now - start_).count());
+    start_ = now;
+  }
+  /// Takes part of what has passed since the last end as a phase of its own.
+  void split(const std::string& phase, double seconds) {
+    seconds_.emplace_back(phase, seconds);
+    start_ += std::chrono::duration_cast<std::chrono::steady_clock::duration>(
+        std::chrono::duration<double>(seconds));
+  }
+  [[nodiscard]] const PhaseSeconds& phases() const { return seconds_; }
+  [[nodiscard]] double seconds_of(const std::string& phase) const {
+    for (const auto& [name, seconds] : seconds_)
+      if (name == phase) return seconds;
+    return 0.0;
+  }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  PhaseSeconds seconds_;
+};
+
+}  // namespace af
