@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "parallel/mpi_environment.h"
 
+#include <algorithm>
+#include <array>
 #include <atomic>
 #include <cstdlib>
+#include <optional>
 
 #include <mpi.h>
 
@@ -11,6 +14,32 @@ namespace af {
 namespace {
 
 std::atomic<bool> abort_required = false;
+
+/// Whether mpirun or srun started this process, as one of several.
+bool is_launched() {
+  constexpr std::array kSetByLaunchers = {
+      "OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "PMI_FD", "PMI_ID"};
+  return std::any_of(kSetByLaunchers.begin(), kSetByLaunchers.end(), [](const char* name) {
+    return std::getenv(name) != nullptr;
+  });
+}
+
+/// Sets a variable of the environment while it lives; one that the user has set stays.
+class VariableMeanwhile {
+ public:
+  VariableMeanwhile(const char* name, const char* value)
+      : name_(std::getenv(name) == nullptr ? name : nullptr) {
+    if (name_ != nullptr) setenv(name_, value, 0);
+  }
+  ~VariableMeanwhile() {
+    if (name_ != nullptr) unsetenv(name_);
+  }
+  VariableMeanwhile(const VariableMeanwhile&) = delete;
+  VariableMeanwhile& operator=(const VariableMeanwhile&) = delete;
+
+ private:
+  const char* name_;
+};
 
 }  // namespace
 
@@ -21,6 +50,11 @@ MpiEnvironment::MpiEnvironment(int& argc, char**& argv) {
   // Without mpirun, Open MPI would start a daemon beside the program that could launch more
   // processes. We launch none, and programs start a third faster without it.
   setenv("OMPI_MCA_ess_singleton_isolated", "1", 0);
+  // Nor does it need a folder for them. All programs without mpirun would share one on a machine,
+  // and one that ends removes it while another begins: one start in some hundred then fails. What
+  // this program starts may need a folder.
+  std::optional<VariableMeanwhile> no_folder;
+  if (!is_launched()) no_folder.emplace("OMPI_MCA_orte_create_session_dirs", "0");
   const bool names_process_manager = std::getenv("OMPI_MCA_pmix") != nullptr;
   int provided = 0;
   MPI_Init_thread(&argc, &argv, MPI_THREAD_FUNNELED, &provided);

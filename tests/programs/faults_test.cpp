@@ -46,6 +46,7 @@ class Faults : public testing::Test {
   void SetUp() override { fs::remove(field()); }
 
   static fs::path field() { return *folder_ / "A.af.h5"; }
+  static fs::path study_file() { return *folder_ / "study.toml"; }
   static fs::path progress() { return field().string() + ".progress"; }
 
   static std::vector<std::string> precompute(int ranks,
@@ -178,6 +179,20 @@ TEST_F(Faults, AFullDiskWhileTheFieldIsWrittenEndsTheJobAtOnce) {
     EXPECT_FALSE(fs::exists(field()));
   }
   expect_going_on();
+}
+
+// Open MPI would give all programs without mpirun on a machine one folder: one that ended removed
+// it while another began, which then failed.
+TEST_F(Faults, AProgramWithoutMpirunSharesNoFolderWithOthers) {
+  const fs::path no_folder = study_file() / "temporary";
+  const test::ProgramRun run =
+      test::run_command("TMPDIR=" + no_folder.string() + " " AF_PROGRAM_FOLDER "/af-inspect " +
+                        study_file().string());
+  EXPECT_EQ(run.exit_code, 0) << run.output;
+  const test::ProgramRun launched = test::run_command(
+      "TMPDIR=" + no_folder.string() + " " AF_MPIEXEC " -n 1 " AF_PROGRAM_FOLDER "/af-inspect " +
+      study_file().string());
+  EXPECT_NE(launched.exit_code, 0) << "the folder can be made, and this test shows nothing";
 }
 
 TEST_F(Faults, AProgressFolderDeletedMeanwhileIsSaidOrNotNeeded) {
