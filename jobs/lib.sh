@@ -85,6 +85,14 @@ build_preset() {
   fi
 }
 
+# Jobs of Open MPI 4.1 that run side by side share a folder, named after the machine without its domain. A job that ends
+# removes it when it is empty, even while another one starts.
+keep_folder_of_mpirun() {
+  local host
+  host=$(uname -n)
+  (umask 077 && mkdir -p "${TMPDIR:-/tmp}/ompi.${host%%.*}.$(id -u)/keep")
+}
+
 # Several ranks of a program on this machine: works as root, with more ranks than cores, in containers.
 run_ranks() {
   local ranks=$1
@@ -93,6 +101,7 @@ run_ranks() {
     "$@"
     return
   fi
+  keep_folder_of_mpirun
   OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 \
     mpirun -n "$ranks" --oversubscribe --bind-to none "$@"
 }

@@ -51,10 +51,7 @@ say "        $(duration $((SECONDS - build_start)))"
 export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
 # In a chroot without /sys hwloc complains on standard error of every program, amid what the tests read there.
 export HWLOC_HIDE_ERRORS="${HWLOC_HIDE_ERRORS:-2}"
-# Jobs of Open MPI 4.1 that run side by side share this folder. A job that ends removes it when it is empty, even while
-# another one starts. Its name has the machine's without a domain.
-host=$(hostname)
-(umask 077 && mkdir -p "${TMPDIR:-/tmp}/ompi.${host%%.*}.$(id -u)/keep")
+keep_folder_of_mpirun
 if [[ "$preset" == sanitize ]]; then
   export LSAN_OPTIONS="suppressions=$af_root/tests/support/lsan.supp:print_suppressions=0"
   export ASAN_OPTIONS="fast_unwind_on_malloc=0" UBSAN_OPTIONS="print_stacktrace=1"

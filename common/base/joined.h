@@ -10,8 +10,12 @@ namespace af {
 template <typename Parts, typename Text = std::identity>
 std::string joined(const Parts& parts, const std::string& between = ", ", const Text& text = {}) {
   std::string result;
-  for (const auto& part : parts)
-    result += (result.empty() ? "" : between) + std::string(std::invoke(text, part));
+  bool is_first = true;
+  for (const auto& part : parts) {
+    if (!is_first) result += between;
+    result += std::string(std::invoke(text, part));
+    is_first = false;
+  }
   return result;
 }
 

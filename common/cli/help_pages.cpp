@@ -7,15 +7,11 @@
 #include <utility>
 #include <vector>
 
+#include "base/joined.h"
+
 namespace af::cli {
 
 namespace {
-
-std::string joined(const std::vector<std::string>& words, const std::string& between) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : between) + word;
-  return text;
-}
 
 /// Options by their headings, in the order in which these first appear.
 std::vector<std::pair<std::string, std::vector<const OptionHelp*>>> by_group(
@@ -43,7 +39,7 @@ std::string value_text(const OptionHelp& option) {
 std::string sentences(const OptionHelp& option) {
   std::string text = option.text;
   if (!option.choices.empty())
-    text += ". One of: " + joined(option.choices, ", ");
+    text += ". One of: " + joined(option.choices);
   else if (!option.constraint.empty())
     text += ". Must be " + option.constraint;
   if (option.is_required) text += ". Required";
@@ -75,7 +71,7 @@ void add_markdown(const CommandHelp& command, const std::string& heading, std::s
     for (const OptionHelp* option : options) {
       std::vector<std::string> names;
       for (const std::string& name : option->names) names.push_back(code(name));
-      page += "| " + joined(names, ", ") + " | " + code(value_text(*option)) + " | " +
+      page += "| " + joined(names) + " | " + code(value_text(*option)) + " | " +
               code(option->default_text) + " | " + cell(sentences(*option)) + " |\n";
     }
   }

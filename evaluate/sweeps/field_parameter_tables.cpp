@@ -85,7 +85,8 @@ const std::vector<std::string>& setting_columns() {
   return columns;
 }
 
-std::vector<std::string> joined(std::vector<std::string> a, const std::vector<std::string>& b) {
+std::vector<std::string> followed_by(std::vector<std::string> a,
+                                     const std::vector<std::string>& b) {
   a.insert(a.end(), b.begin(), b.end());
   return a;
 }
@@ -125,28 +126,30 @@ std::vector<std::string> measured_fields(const PooledSetting& pool) {
 }
 
 CsvTable settings_table(const std::vector<PooledSetting>& pools) {
-  CsvTable table(joined(setting_columns(), measured_columns()));
+  CsvTable table(followed_by(setting_columns(), measured_columns()));
   for (const PooledSetting& pool : pools)
-    table.add_row(joined(setting_fields(pool.setting), measured_fields(pool)));
+    table.add_row(followed_by(setting_fields(pool.setting), measured_fields(pool)));
   return table;
 }
 
 CsvTable fields_table(const std::vector<SettingResult>& results) {
-  CsvTable table(joined(joined({"case", "camera"}, setting_columns()), measured_columns()));
+  CsvTable table(
+      followed_by(followed_by({"case", "camera"}, setting_columns()), measured_columns()));
   for (const SettingResult& result : results)
-    table.add_row(joined(
-        joined({result.setting.case_name, result.setting.camera}, setting_fields(result.setting)),
-        measured_fields(pooled({&result}))));
+    table.add_row(followed_by(followed_by({result.setting.case_name, result.setting.camera},
+                                          setting_fields(result.setting)),
+                              measured_fields(pooled({&result}))));
   return table;
 }
 
 CsvTable poses_table(const std::vector<SettingResult>& results) {
-  CsvTable table(joined(joined({"case", "camera"}, setting_columns()), {"pose_index", "psnr_db"}));
+  CsvTable table(
+      followed_by(followed_by({"case", "camera"}, setting_columns()), {"pose_index", "psnr_db"}));
   for (const SettingResult& result : results)
     for (std::size_t i = 0; i < result.comparisons.size(); ++i)
-      table.add_row(joined(
-          joined({result.setting.case_name, result.setting.camera}, setting_fields(result.setting)),
-          {std::to_string(i), number_text(result.comparisons[i].psnr_db)}));
+      table.add_row(followed_by(followed_by({result.setting.case_name, result.setting.camera},
+                                            setting_fields(result.setting)),
+                                {std::to_string(i), number_text(result.comparisons[i].psnr_db)}));
   return table;
 }
 

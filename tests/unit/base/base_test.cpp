@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "base/hash_random.h"
+#include "base/joined.h"
 #include "base/number_text.h"
 #include "base/parsed_number.h"
 #include "base/vector_width.h"
@@ -136,6 +137,15 @@ TEST(ParsedNumber, IsOneWholeNumberWithOneSignAtMost) {
   EXPECT_EQ(parsed_number("-inf"), -std::numeric_limits<double>::infinity());
   EXPECT_FALSE(finite_number("-inf").has_value());
   EXPECT_FALSE(finite_number("nan").has_value());
+}
+
+TEST(Joined, KeepsASeparatorBesideEmptyParts) {
+  using Words = std::vector<std::string>;
+  EXPECT_EQ(joined(Words{}), "");
+  EXPECT_EQ(joined(Words{"a"}), "a");
+  EXPECT_EQ(joined(Words{"", "a", ""}, "|"), "|a|");
+  EXPECT_EQ(joined(std::vector<int>{1, 2}, " x ", [](int i) { return std::to_string(i); }),
+            "1 x 2");
 }
 
 }  // namespace
