@@ -31,9 +31,10 @@ RegistrationOptions fast_preset() {
 /// were clean, wrong vertebrae came to 0.51 and right poses to 0.69 or more.
 constexpr double kConvincingValue = 0.6;
 
-/// The wide chain searches at level 3, where there are fewer wrong optima to end in, and every
-/// chain ends over the region alone at level 1: at level 2 steel and scatter have optima of their
-/// own there, which the judge cannot undo (docs/population.md).
+/// Every chain ends over the region alone at level 1: at level 2 steel and scatter have optima of
+/// their own there, which the judge cannot undo. Wide chains search at level 3, where there are
+/// fewer wrong optima to end in, and at level 2, because some patients have their deepest one at
+/// level 3 (docs/population.md).
 RegistrationOptions robust_preset() {
   RegistrationOptions options;
   options.chains = {chain_from_text("edges",
@@ -46,6 +47,10 @@ RegistrationOptions robust_preset() {
                                     "rg gauss-newton level=1 pixels=4 final=0.1"),
                     chain_from_text("wide",
                                     "rg cma-es level=3 pixels=8 roi=2 step=8 final=1;"
+                                    "rg gauss-newton level=2 pixels=8 roi=2 final=0.2;"
+                                    "rg gauss-newton level=1 pixels=4 final=0.1"),
+                    chain_from_text("wide-finer",
+                                    "rg cma-es level=2 pixels=16 roi=2 step=8 final=1;"
                                     "rg gauss-newton level=2 pixels=8 roi=2 final=0.2;"
                                     "rg gauss-newton level=1 pixels=4 final=0.1")};
   options.finish = chain_from_text("finish", "rg quasi-newton pixels=2 step=2 final=0.02");
