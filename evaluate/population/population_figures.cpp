@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "evaluate/population/population_figures.h"
 
+#include <algorithm>
 #include <array>
 #include <map>
 #include <string>
@@ -90,18 +91,27 @@ std::string panel_script(const std::string& panel,
   return "set title " + gnuplot_quoted(title) + "\n" + plot + "\n";
 }
 
-/// The marks of one condition: patients of equal range side by side and one below the other.
+/// The marks of one condition: patients of equal range in columns of three about it, which stay
+/// within the interval that ended the range, however many there are.
 void add_patient_marks(const PopulationSuccess& success,
                        double place,
                        std::map<std::string, Points>& marks) {
-  std::map<double, int> stacked;
+  constexpr int kRows = 3;
+  constexpr double kWidestMm = 1.6;
+  constexpr double kColumnMm = 0.3;
+  std::map<double, int> equals;
+  for (const PatientSuccess& patient : success.patients) ++equals[patient.capture.initial_tre_mm];
+  std::map<double, int> drawn;
   for (const PatientSuccess& patient : success.patients) {
     const double range_mm = patient.capture.initial_tre_mm;
-    const int before = stacked[range_mm]++;
+    const int last_column = (equals[range_mm] - 1) / kRows;
+    const double column_mm = std::min(kColumnMm, kWidestMm / std::max(1, last_column));
+    const int before = drawn[range_mm]++;
     PatientOutcomes named;
     named.patient = patient.patient;
     marks[half_of(named) == "odd" ? "odd" : "even"].push_back(
-        {range_mm + 0.3 * before, -place + 0.12 * (before % 3)});
+        {range_mm + column_mm * (before / kRows - 0.5 * last_column),
+         -place + 0.12 * (before % kRows)});
   }
 }
 
@@ -171,7 +181,7 @@ void draw_capture_ranges(const std::vector<PopulationGroup>& groups,
           std::string(palette::kVermilion) + "' title 'mean, 95 % over patients'";
   figure.add("set xlabel 'capture range (mm of initial TRE)'\nset ytics (" + tics +
              ")\nset yrange [" + number_text(-place - 0.6) + ":-0.4]\nset xrange [-1:" +
-             number_text(counting.intervals * counting.interval_width_mm + 5.0) +
+             number_text(counting.intervals * counting.interval_width_mm + 1.5) +
              "]\nset key outside bottom center horizontal\nplot " + plot + "\n");
   figure.draw(path);
 }
