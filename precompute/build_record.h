@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cstdint>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -13,6 +12,7 @@
 #include "precompute/design_choice.h"
 #include "precompute/phase_clock.h"
 #include "precompute/pipeline/field_build.h"
+#include "run/provenance.h"
 
 namespace af {
 

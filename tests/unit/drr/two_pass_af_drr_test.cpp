@@ -133,7 +133,7 @@ TEST(TwoPassAfDrr, LevelsOfMeanRemovedTilesAreLimited) {
     const View view = View::whole_detector(small_camera());
     const auto of_field = [&](const DrrRenderer& renderer) {
       std::vector<float> drr(view.pixel_count());
-      renderer.render({}, view, *renderer.make_workspace(), drr);
+      renderer.render(RigidTransform::Identity(), view, *renderer.make_workspace(), drr);
       return drr;
     };
     const auto expected = of_field(AfDrr(field, FieldInterpolation::Quadrilinear));
