@@ -107,11 +107,11 @@ void add_patient_marks(const PopulationSuccess& success,
     const int last_column = (equals[range_mm] - 1) / kRows;
     const double column_mm = std::min(kColumnMm, kWidestMm / std::max(1, last_column));
     const int before = drawn[range_mm]++;
+    const int column = before / kRows;
     PatientOutcomes named;
     named.patient = patient.patient;
     marks[half_of(named) == "odd" ? "odd" : "even"].push_back(
-        {range_mm + column_mm * (before / kRows - 0.5 * last_column),
-         -place + 0.12 * (before % kRows)});
+        {range_mm + column_mm * (column - 0.5 * last_column), -place + 0.12 * (before % kRows)});
   }
 }
 
