@@ -5,7 +5,6 @@
 #include <array>
 #include <atomic>
 #include <cstdlib>
-#include <optional>
 
 #include <mpi.h>
 
@@ -24,23 +23,6 @@ bool is_launched() {
   });
 }
 
-/// Sets a variable of the environment while it lives; one that the user has set stays.
-class VariableMeanwhile {
- public:
-  VariableMeanwhile(const char* name, const char* value)
-      : name_(std::getenv(name) == nullptr ? name : nullptr) {
-    if (name_ != nullptr) setenv(name_, value, 0);
-  }
-  ~VariableMeanwhile() {
-    if (name_ != nullptr) unsetenv(name_);
-  }
-  VariableMeanwhile(const VariableMeanwhile&) = delete;
-  VariableMeanwhile& operator=(const VariableMeanwhile&) = delete;
-
- private:
-  const char* name_;
-};
-
 }  // namespace
 
 MpiEnvironment::MpiEnvironment(int& argc, char**& argv) {
@@ -51,15 +33,17 @@ MpiEnvironment::MpiEnvironment(int& argc, char**& argv) {
   // processes. We launch none, and programs start a third faster without it.
   setenv("OMPI_MCA_ess_singleton_isolated", "1", 0);
   // Nor does it need a folder for them. All programs without mpirun would share one on a machine,
-  // and one that ends removes it while another begins: one start in some hundred then fails. What
-  // this program starts may need a folder.
-  std::optional<VariableMeanwhile> no_folder;
-  if (!is_launched()) no_folder.emplace("OMPI_MCA_orte_create_session_dirs", "0");
+  // and one that ends removes it while another begins: of starts four at a time, 1 of 600 failed.
+  constexpr const char* kMakesFolder = "OMPI_MCA_orte_create_session_dirs";
+  const bool needs_no_folder = !is_launched() && std::getenv(kMakesFolder) == nullptr;
+  if (needs_no_folder) setenv(kMakesFolder, "0", 0);
   const bool names_process_manager = std::getenv("OMPI_MCA_pmix") != nullptr;
   int provided = 0;
   MPI_Init_thread(&argc, &argv, MPI_THREAD_FUNNELED, &provided);
   // Open MPI notes that there is none: an mpirun that we or our caller start would crash of it.
   if (!names_process_manager) unsetenv("OMPI_MCA_pmix");
+  // What this program starts may need its folder.
+  if (needs_no_folder) unsetenv(kMakesFolder);
 }
 
 MpiEnvironment::~MpiEnvironment() {

@@ -5,4 +5,4 @@ target_link_libraries(make_bad_inputs PRIVATE af_compile_options af_test_support
 af_compile_as(quick make_bad_inputs)
 add_test(NAME bad_inputs COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/programs/bad_inputs.sh ${PROJECT_BINARY_DIR}/bin
                                  $<TARGET_FILE:make_bad_inputs>)
-set_tests_properties(bad_inputs PROPERTIES LABELS programs TIMEOUT 900)
+set_tests_properties(bad_inputs PROPERTIES LABELS programs TIMEOUT 300)

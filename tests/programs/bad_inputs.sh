@@ -113,7 +113,7 @@ printf -- '--- no file ---\n'
 mkfifo pipe
 ln -s loop loop
 long_name=$(printf 'x%.0s' {1..303})
-in_time() { timeout 240 "$@"; }
+in_time() { timeout 60 "$@"; }
 drr=(in_time "$bin/af-drr" -o out/drr.mha)
 drr_of_ct=("${drr[@]}" --ct valid/ct.nii.gz --rig valid/rig.toml --camera AP)
 register_one=(in_time "$bin/af-register" --study valid/study.toml --renderer raycast -o out/result)

@@ -283,11 +283,10 @@ class BrokenRegistrations : public EvaluateProgram {
     return "registration --study " + path("study.toml") + fields() +
            "--preset paper --starts-per-interval 25 -o " + path(folder);
   }
-  static std::vector<std::string> on_two_ranks(const std::string& folder,
-                                               const std::string& options = "") {
+  static std::vector<std::string> on_two_ranks(const std::string& folder) {
     std::vector<std::string> words = {
         AF_MPIEXEC, "--oversubscribe", "-n", "2", AF_PROGRAM_FOLDER "/af-evaluate"};
-    std::istringstream rest(arguments(folder) + options);
+    std::istringstream rest(arguments(folder) + " --stall-minutes 0.1");
     for (std::string word; rest >> word;) words.push_back(word);
     return words;
   }
@@ -307,7 +306,7 @@ class BrokenRegistrations : public EvaluateProgram {
 };
 
 TEST_F(BrokenRegistrations, AStoppedRankIsNamedWithItsStartAndTheJobEnded) {
-  test::LaunchedJob job(on_two_ranks("stalled", " --stall-minutes 0.1"), path("said.txt"));
+  test::LaunchedJob job(on_two_ranks("stalled"), path("said.txt"));
   ASSERT_TRUE(job.wait_until([] { return has_rows("stalled"); }));
   ASSERT_FALSE(job.ranks().empty());
   kill(job.ranks().back(), SIGSTOP);
