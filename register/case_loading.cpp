@@ -14,7 +14,6 @@
 #include "register/case_renderers.h"
 #include "register/problem/fiducial_mask.h"
 #include "register/problem/pose_target.h"
-#include "register/problem/stage_view.h"
 #include "study/ct_keys.h"
 #include "study/node_ct.h"
 #include "study/rig_file.h"
@@ -91,7 +90,7 @@ std::vector<RegistrationView> read_views(const Study& study,
         mask_fiducials(view.mask,
                        camera,
                        study_view.fiducials_px,
-                       fiducial_mask_mm * pixels_per_mm(camera, study.rig.isocenter_point));
+                       fiducial_mask_mm * camera.pixels_per_mm(study.rig.isocenter_point));
     views.push_back(std::move(view));
   }
   return views;

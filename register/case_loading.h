@@ -37,7 +37,8 @@ struct CaseLoadOptions {
   /// does not see; 0: it sees them.
   double fiducial_mask_mm = 0.0;
   int coarsest_level = 0;  ///< of the image pyramids: RegistrationOptions::coarsest_level()
-  int judging_level = 0;   ///< as well, as far as a field has nodes: that of PoseExaminer
+  /// Level that the verdict needs: PoseExaminer::coarsest_level(). Fields of few nodes have fewer.
+  int judging_level = 0;
   /// Ray casting: blurs of levels 1, 2, ..., in mm on the isocentre plane; of missing ones, those
   /// of a field with 1 mm between its nodes.
   std::vector<double> level_blur_sigma_mm;

@@ -282,9 +282,11 @@ void use_field(const OpenedField& opened,
     all.blur_sigma_mm.resize(all.renderers.size() - 1);
   }
   of_bone.renderers.resize(all.renderers.size());
-  const XrayBeam beam = beam_of(opened.identity(), options, communicator);
-  for (std::size_t i = 0; i < all.renderers.size(); ++i)
-    all.renderers[i] = beam.renderer(all.renderers[i], of_bone.renderers[i]);
+  if (!options.beam.is_ordinary()) {
+    const XrayBeam beam = beam_of(opened.identity(), options, communicator);
+    for (std::size_t i = 0; i < all.renderers.size(); ++i)
+      all.renderers[i] = beam.renderer(all.renderers[i], of_bone.renderers[i]);
+  }
   view.renderer = all.renderers.front();
   for (std::size_t i = 0; i < all.blur_sigma_mm.size(); ++i)
     view.coarse_levels.push_back({all.renderers[i + 1], all.blur_sigma_mm[i]});

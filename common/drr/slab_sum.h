@@ -36,8 +36,7 @@ struct SlabSumScratch {
 /// Sums images of several slabs on one plane. From one source the nodes of the sum are scaled and
 /// shifted against those of each slab, along s and t separately, so a slab is resampled by two
 /// passes of four taps (Lagrange's cubic): far cheaper than resampling each slab to the detector.
-/// What is seen through the sum's nodes is what is seen through the slabs: depth keeps its
-/// parallax, as the sum is made for this source alone.
+/// Parallax between slabs is kept, because the sum is made for this source alone.
 /// \test SlabSum.OfOneSlabInItsOwnPlaneIsTheSlab
 class SlabSum {
  public:

@@ -82,6 +82,10 @@ double CameraGeometry::depth_mm(const Eigen::Vector3d& room_point) const {
   return (room_point - source_point).dot(beam_direction());
 }
 
+double CameraGeometry::pixels_per_mm(const Eigen::Vector3d& room_point) const {
+  return source_detector_distance_mm() / depth_mm(room_point) / pixel_spacing_mm.mean();
+}
+
 bool CameraGeometry::is_mirrored() const {
   return column_direction.cross(row_direction).dot(detector_origin_point - source_point) < 0.0;
 }

@@ -4,7 +4,6 @@
 #include <array>
 
 #include "base/named_rows.h"
-#include "register/method/method_options.h"
 
 namespace af::registration {
 namespace {
@@ -15,8 +14,17 @@ RegistrationOptions one_chain(ChainOptions chain) {
   return options;
 }
 
+/// The two passes of the paper (Sec. III-B2). The paper lost the value of its sigma;
+/// register/README.md says how we chose ours.
 RegistrationOptions paper_preset() {
-  return one_chain(paper_chain());
+  StageOptions smoothed;
+  smoothed.smoothing_sigma_mm = 1.0;
+  smoothed.search.initial_step_mm = 5.0;
+  smoothed.search.final_step_mm = 0.5;
+  StageOptions sharp;
+  sharp.search.initial_step_mm = 2.0;
+  sharp.search.final_step_mm = 0.1;
+  return one_chain({"paper", {smoothed, sharp}});
 }
 
 RegistrationOptions fast_preset() {
@@ -32,25 +40,20 @@ RegistrationOptions fast_preset() {
 constexpr double kConvincingValue = 0.6;
 
 /// Every chain ends over the region alone at level 1: at level 2 steel and scatter have optima of
-/// their own there, which the judge cannot undo. Wide chains search at level 3, where there are
-/// fewer wrong optima to end in, and at level 2, because some patients have their deepest one at
-/// level 3 (docs/population.md).
+/// their own there, which the judge cannot undo. Two wide chains search with different measures,
+/// because each has its deepest optimum in a wrong place for some patients (docs/population.md).
 RegistrationOptions robust_preset() {
   RegistrationOptions options;
   options.chains = {chain_from_text("edges",
                                     "ncc gauss-newton level=2 pixels=8 roi=2 step=10;"
                                     "gc gauss-newton level=2 pixels=8 roi=2 final=0.2;"
                                     "rg gauss-newton level=1 pixels=4 final=0.1"),
-                    chain_from_text("tiles",
-                                    "ncc gauss-newton level=2 pixels=8 roi=2 step=10;"
-                                    "tncc gauss-newton level=2 pixels=8 roi=2 final=0.2;"
-                                    "rg gauss-newton level=1 pixels=4 final=0.1"),
                     chain_from_text("wide",
-                                    "rg cma-es level=3 pixels=8 roi=2 step=8 final=1;"
+                                    "rg cma-es level=2 pixels=16 roi=2 step=8 final=1;"
                                     "rg gauss-newton level=2 pixels=8 roi=2 final=0.2;"
                                     "rg gauss-newton level=1 pixels=4 final=0.1"),
-                    chain_from_text("wide-finer",
-                                    "rg cma-es level=2 pixels=16 roi=2 step=8 final=1;"
+                    chain_from_text("wide-edges",
+                                    "gc cma-es level=2 pixels=16 roi=2 step=8 final=1;"
                                     "rg gauss-newton level=2 pixels=8 roi=2 final=0.2;"
                                     "rg gauss-newton level=1 pixels=4 final=0.1")};
   options.finish = chain_from_text("finish", "rg quasi-newton pixels=2 step=2 final=0.02");
@@ -79,8 +82,8 @@ constexpr std::array kPresets = {
     Preset{"paper", "mutual information with best neighbour in two passes", paper_preset},
     Preset{"fast", "Gauss-Newton on correlations, coarse to fine", fast_preset},
     Preset{"robust",
-           "a portfolio: Gauss-Newton on correlations or tiles, or CMA-ES, then on robust gradient "
-           "residuals",
+           "a portfolio: Gauss-Newton on correlations, or CMA-ES on robust gradient residuals or on "
+           "correlations of gradients, then Gauss-Newton on robust gradient residuals",
            robust_preset},
     Preset{
         "bone",
@@ -90,17 +93,6 @@ constexpr std::array kPresets = {
 };
 
 }  // namespace
-
-ChainOptions paper_chain() {
-  StageOptions smoothed;
-  smoothed.smoothing_sigma_mm = 1.0;
-  smoothed.search.initial_step_mm = 5.0;
-  smoothed.search.final_step_mm = 0.5;
-  StageOptions sharp;
-  sharp.search.initial_step_mm = 2.0;
-  sharp.search.final_step_mm = 0.1;
-  return {"paper", {smoothed, sharp}};
-}
 
 std::vector<std::string> preset_names() {
   return names_of(kPresets);

@@ -5,10 +5,6 @@
 
 namespace af::registration {
 
-/// The two passes of the paper (Sec. III-B2). The paper lost the value of its sigma;
-/// register/README.md says how we chose ours.
-ChainOptions paper_chain();
-
 std::vector<std::string> preset_names();
 /// One line for --help.
 std::string preset_help();

@@ -52,7 +52,7 @@ StageGrid stage_grid(const RegistrationProblem& problem,
   }
   return {stage.pixel_step,
           stage.roi_scale,
-          std::sqrt(variance_mm2) * pixels_per_mm(view.view.camera, problem.isocenter_point)};
+          std::sqrt(variance_mm2) * view.view.camera.pixels_per_mm(problem.isocenter_point)};
 }
 
 std::shared_ptr<const DrrRenderer> stage_renderer(const RegistrationView& view, int level) {
@@ -75,27 +75,44 @@ SimilarityReference visible_reference(const RegistrationView& view, const StageG
   return pixels >= kLeastPixelsToHideIn && 4 * used >= 3 * pixels ? hidden : plain;
 }
 
-SilhouetteView prepare_view(const RegistrationProblem& problem,
-                            const RegistrationView& view,
-                            const ValueRange& drr_range,
-                            const StageOptions& stage) {
-  const StageGrid grid = stage_grid(problem, view, stage);
+/// The X-ray as a stage compares it with DRRs; InputError when nothing can be compared with it.
+SimilarityReference prepare_reference(const RegistrationView& view,
+                                      const ValueRange& drr_range,
+                                      const StageGrid& grid) {
   SimilarityReference reference = visible_reference(view, grid);
   reference.drr_range = drr_range;
   std::vector<std::string> found = problems(reference);
   for (std::string& text : found) text.insert(0, view_name(view));
   throw_if_any(found);
+  return reference;
+}
+
+SimilarityOptions similarity_of(const StageOptions& stage) {
   SimilarityOptions similarity = stage.similarity;
   similarity.has_smooth_histogram |=
       make_optimizer(stage.optimizer)->needs() == Derivatives::Gradient;
-  ObjectiveView whole{stage_view(view.view, grid),
-                      stage_renderer(view, stage.level),
-                      make_similarity(similarity, reference),
-                      view.limit};
+  return similarity;
+}
+
+ObjectiveView prepare_view(const RegistrationView& view,
+                           const SimilarityReference& reference,
+                           const StageGrid& grid,
+                           const StageOptions& stage) {
+  return {stage_view(view.view, grid),
+          stage_renderer(view, stage.level),
+          make_similarity(similarity_of(stage), reference),
+          view.limit};
+}
+
+SilhouetteView silhouette_view(const RegistrationProblem& problem,
+                               const RegistrationView& view,
+                               const ObjectiveView& whole,
+                               const SimilarityReference& reference,
+                               const StageOptions& stage) {
   const double margin_px = stage.silhouette_mm *
-                           pixels_per_mm(view.view.camera, problem.isocenter_point) /
+                           view.view.camera.pixels_per_mm(problem.isocenter_point) /
                            stage.pixel_step;
-  return {std::move(whole), std::move(reference), similarity, view.renderer, margin_px};
+  return {whole, reference, similarity_of(stage), view.renderer, margin_px};
 }
 
 /// Points enough for the lengths of steps that derivatives choose.
@@ -124,16 +141,15 @@ struct PreparedStage {
   StageOptions options;
   std::shared_ptr<const Optimizer> optimizer;
   MultiViewObjective objective;  ///< of a silhouette: that of the pose it was last narrowed to
-  /// What silhouettes are taken from; none where the whole region counts.
-  std::shared_ptr<const std::vector<SilhouetteView>> silhouettes;
+  std::vector<SilhouetteView> silhouettes;  ///< none where the whole region counts
 
   /// Narrows the objective to the silhouettes at a pose, if it is one of silhouettes; false when
   /// too little is seen of them.
   [[nodiscard]] bool narrow_to(const RegistrationProblem& problem,
                                const RigidTransform& room_from_ct) {
-    if (!silhouettes) return true;
+    if (silhouettes.empty()) return true;
     auto narrowed =
-        silhouette_objective(*silhouettes, problem.cut_points_ct, room_from_ct, objective.pool());
+        silhouette_objective(silhouettes, problem.cut_points_ct, room_from_ct, objective.pool());
     if (!narrowed.has_value()) return false;
     objective = std::move(*narrowed);
     return true;
@@ -209,13 +225,13 @@ struct RegistrationRunner::Impl {
       const PreparedStage& stage, const RigidTransform& room_from_ct) const;
   [[nodiscard]] std::uint64_t random_key(std::int64_t start_index, std::size_t index) const;
   /// Runs the stages of a chain, the first of which is `first`, from `end`; false when one of them
-  /// was the last that makes sense.
+  /// did not converge.
   bool run_chain(const ChainOptions& chain,
                  std::size_t first,
                  std::int64_t start_index,
                  ChainEnd& end,
                  RegistrationResult& result);
-  /// Searches one stage from `end`; false when no further stage makes sense. `index`: in the trace,
+  /// Searches one stage from `end`; false when it did not converge. `index`: in the trace,
   /// and a key of random numbers.
   bool run_stage(PreparedStage& stage,
                  std::size_t index,
@@ -249,18 +265,20 @@ struct RegistrationRunner::Impl {
 
 PreparedStage RegistrationRunner::Impl::prepare(const StageOptions& stage,
                                                 const std::vector<ValueRange>& drr_ranges) const {
-  std::vector<SilhouetteView> prepared;
   std::vector<ObjectiveView> whole;
+  std::vector<SilhouetteView> silhouettes;
   for (std::size_t i = 0; i < problem->views.size(); ++i) {
-    prepared.push_back(prepare_view(*problem, problem->views[i], drr_ranges[i], stage));
-    whole.push_back(prepared.back().whole);
+    const RegistrationView& view = problem->views[i];
+    const StageGrid grid = stage_grid(*problem, view, stage);
+    const SimilarityReference reference = prepare_reference(view, drr_ranges[i], grid);
+    whole.push_back(prepare_view(view, reference, grid, stage));
+    if (stage.silhouette_mm > 0.0)
+      silhouettes.push_back(silhouette_view(*problem, view, whole.back(), reference, stage));
   }
-  const bool has_silhouettes = stage.silhouette_mm > 0.0;
   return {stage,
           make_optimizer(stage.optimizer),
           MultiViewObjective(std::move(whole), pool),
-          has_silhouettes ? std::make_shared<const std::vector<SilhouetteView>>(std::move(prepared))
-                          : nullptr};
+          std::move(silhouettes)};
 }
 
 void RegistrationRunner::Impl::prepare() {
@@ -362,7 +380,7 @@ bool RegistrationRunner::Impl::run_chain(const ChainOptions& chain,
 bool RegistrationRunner::Impl::narrow_at_start(PreparedStage& stage,
                                                ChainEnd& end,
                                                RegistrationResult& result) const {
-  if (!stage.silhouettes) return true;
+  if (stage.silhouettes.empty()) return true;
   result.drr_count += static_cast<std::int64_t>(views.size());
   if (stage.narrow_to(*problem, end.room_from_ct)) return true;
   end.stop_reason = StopReason::CtOutsideRoi;
@@ -371,7 +389,7 @@ bool RegistrationRunner::Impl::narrow_at_start(PreparedStage& stage,
 
 void RegistrationRunner::Impl::take_own_similarity(ChainEnd& end, RegistrationResult& result) {
   PreparedStage& stage = stages[end.stage];
-  if (!stage.silhouettes || !std::isfinite(end.similarity)) return;
+  if (stage.silhouettes.empty() || !std::isfinite(end.similarity)) return;
   result.drr_count += 2 * static_cast<std::int64_t>(views.size());
   if (!stage.narrow_to(*problem, end.room_from_ct)) return;
   const ObjectiveValue value = stage.objective.evaluate(end.room_from_ct);

@@ -37,12 +37,29 @@ struct ChainOptions {
   std::vector<StageOptions> stages;
 };
 
-/// How a portfolio chooses among the ends of its chains: by the value of a measure that is 0 for
-/// what no DRR at all explains (rg).
+/// A chain as one line: stages separated by ';', each a measure and an optimiser followed by
+/// key=value, for example
+///
+///     ncc gauss-newton level=2 pixels=8 roi=2 step=10 final=0.5; gc gauss-newton level=1 pixels=2
+///
+/// Keys are the options that StageOptions describes.
+std::string chain_text(const ChainOptions& chain);
+
+/// The chain of a line. InputError for a line that is not of this form; whether its values fit is
+/// for problems() to say. \test ChainText.ReadsWhatItWrites
+ChainOptions chain_from_text(const std::string& name, const std::string& text);
+
+/// The keys of a chain's line, each with what it means, for --help.
+std::string chain_keys_help();
+
+/// How a portfolio chooses among the ends of its chains: by the value of rg, the share of the
+/// X-rays' gradients that a DRR explains.
 struct JudgeOptions {
   StageOptions stage;         ///< its optimiser is not used
-  double least_value = 0.0;   ///< mean over views; ends at or below are no better than no DRR
+  double least_value = 0.0;   ///< mean over views; at or below it, the registration has failed
   double enough_value = 1.0;  ///< mean over views; an end at or above ends the portfolio
+
+  JudgeOptions();
 };
 
 /// Silhouettes leave out the edges that a CT has where it is cut.
@@ -59,9 +76,6 @@ struct RegistrationOptions {
   int max_evaluations = 5000;  ///< pose evaluations per registration, all chains together
   std::uint64_t seed = 1;      ///< of optimisers that draw random numbers
   CorrectionOptions correction;
-
-  /// The paper's method.
-  RegistrationOptions();
 
   /// Replaces the measure, or the optimiser, of every stage.
   void use_similarity(const std::string& name);

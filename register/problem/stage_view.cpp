@@ -66,11 +66,6 @@ RegionOfInterest scaled_region(const View& view, const StageGrid& grid) {
 
 }  // namespace
 
-double pixels_per_mm(const CameraGeometry& camera, const Eigen::Vector3d& room_point) {
-  const double magnification = camera.source_detector_distance_mm() / camera.depth_mm(room_point);
-  return magnification / camera.pixel_spacing_mm.mean();
-}
-
 View stage_view(const View& view, const StageGrid& grid) {
   check(grid.pixel_step >= 1, "a stage pixel has at least one detector pixel");
   const View scaled{view.camera, scaled_region(view, grid)};

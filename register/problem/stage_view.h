@@ -13,10 +13,6 @@ struct StageGrid {
   double blur_sigma_px = 0.0;  ///< of the X-ray, in detector pixels, the mean's own blur included
 };
 
-/// Detector pixels per millimetre on the plane through `room_point` parallel to the detector (mean
-/// spacing of columns and rows).
-double pixels_per_mm(const CameraGeometry& camera, const Eigen::Vector3d& room_point);
-
 /// The view of a stage: the region, scaled about its centre and cut at the detector's edges, seen
 /// by pixels of pixel_step detector pixels (View::coarser). It never reaches beyond the detector,
 /// so a field made for the detector holds every ray.

@@ -30,7 +30,7 @@ double share_of(double correlation) {
 /// own, and at level 0.
 RegistrationOptions judging_options(const RegistrationView& view, double silhouette_mm) {
   RegistrationOptions options;
-  StageOptions stage = silhouette_mm > 0.0 ? silhouette_stage(silhouette_mm) : options.judge.stage;
+  StageOptions stage = silhouette_mm > 0.0 ? silhouette_stage(silhouette_mm) : JudgeOptions().stage;
   stage.optimizer = "gauss-newton";
   StageOptions fine = stage;
   stage.level = std::min(stage.level, static_cast<int>(view.coarse_levels.size()));
@@ -56,7 +56,7 @@ std::unique_ptr<RegistrationRunner> judge_of(const RegistrationProblem& problem,
 }  // namespace
 
 int PoseExaminer::coarsest_level() {
-  return RegistrationOptions().judge.stage.level;
+  return JudgeOptions().stage.level;
 }
 
 PoseExaminer::PoseExaminer(const RegistrationProblem& problem, double silhouette_mm)

@@ -3,6 +3,7 @@
 
 #include "base/error.h"
 #include "base/hash_random.h"
+#include "register/method/presets.h"
 #include "register/registration_run.h"
 #include "support/shared_folder.h"
 #include "unit/register/method/registration_cases.h"
@@ -23,7 +24,7 @@ std::vector<RigidTransform> some_starts(const test::SmallCase& small, int count)
 }
 
 RegistrationOptions quick_options() {
-  RegistrationOptions options;
+  RegistrationOptions options = preset_options("paper");
   options.max_evaluations = 60;
   for (StageOptions& stage : options.chains.front().stages) stage.similarity.bins = 24;
   return options;

@@ -6,6 +6,7 @@
 
 #include "drr/field_level.h"
 #include "drr/two_pass_af_drr.h"
+#include "register/method/presets.h"
 #include "register/problem/multi_view_objective.h"
 #include "support/counted_allocations.h"
 #include "unit/drr/small_fields.h"
@@ -118,7 +119,7 @@ TEST_P(AllocationOf, AnEvaluationIsZeroAfterTheFirstOnes) {
 
 TEST_P(AllocationOf, ARegistrationDoesNotGrowWithItsEvaluations) {
   const test::SmallCase small = test::small_case();
-  RegistrationOptions options;
+  RegistrationOptions options = preset_options("paper");
   options.use_similarity(GetParam());
   RegistrationRunner runner(small.problem, options);
   const RegistrationResult result = runner.run(small.problem->nominal_room_from_ct);

@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "gold_standard/tre.h"
+#include "register/method/presets.h"
 #include "register/method/registration.h"
 #include "unit/register/method/registration_cases.h"
 
@@ -55,7 +56,7 @@ test::SmallCase spoilt_case() {
 }
 
 RegistrationOptions one_stage(const std::string& similarity, const std::string& optimizer) {
-  RegistrationOptions options;
+  RegistrationOptions options = preset_options("paper");
   StageOptions stage;
   stage.similarity.name = similarity;
   stage.similarity.bins = 24;

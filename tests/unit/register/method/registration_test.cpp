@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "register/method/presets.h"
 #include "register/problem/pose_target.h"
 #include "unit/register/method/registration_cases.h"
 
@@ -44,7 +45,7 @@ void use_bins(int bins, RegistrationOptions& options) {
 TEST(Registration, TwoViewsRecoverAKnownPose) {
   const test::SmallCase small = test::small_case();
   for (const char* similarity : {"mi", "ncc"}) {
-    RegistrationOptions options;
+    RegistrationOptions options = preset_options("paper");
     options.use_similarity(similarity);
     // 1296 pixels per view are few for 64 x 64 bins.
     use_bins(24, options);
@@ -63,7 +64,7 @@ TEST(Registration, TwoViewsRecoverAKnownPose) {
 
 TEST(Registration, TheTraceTellsBothPasses) {
   const test::SmallCase small = test::small_case();
-  RegistrationRunner runner(small.problem, RegistrationOptions());
+  RegistrationRunner runner(small.problem, preset_options("paper"));
   const RegistrationResult result = runner.run(start_near(small));
   ASSERT_FALSE(result.trace.empty());
   EXPECT_EQ(result.trace.front().pass, 0);
@@ -82,7 +83,7 @@ TEST(Registration, TheTraceTellsBothPasses) {
 
 TEST(Registration, RepeatsAndThreadsGiveTheSameBits) {
   const test::SmallCase small = test::small_case();
-  RegistrationOptions options;
+  RegistrationOptions options = preset_options("paper");
   options.max_evaluations = 200;
   RegistrationRunner runner(small.problem, options);
   const RegistrationResult first = runner.run(start_near(small));
@@ -107,7 +108,7 @@ TEST(Registration, AStartOutsideTheMotionRangeIsReported) {
   const test::SmallCase small = test::small_case();
   for (RegistrationView& view : small.problem->views)
     view.limit = MotionLimit{small.problem->frame(), {3.0 * kRadPerDeg, 1.0}};
-  RegistrationRunner runner(small.problem, RegistrationOptions());
+  RegistrationRunner runner(small.problem, preset_options("paper"));
   const RigidTransform start = start_near(small);
   const RegistrationResult result = runner.run(start);
   EXPECT_EQ(result.stop_reason, StopReason::StartInadmissible);
@@ -122,7 +123,7 @@ TEST(Registration, AnEndAtTheLimitIsReportedAndStaysInside) {
   // The gold pose has |t| = 2.5 mm along x; the box ends at 1.5 mm.
   const MotionLimit limit{small.problem->frame(), {5.0 * kRadPerDeg, 1.5}};
   for (RegistrationView& view : small.problem->views) view.limit = limit;
-  RegistrationRunner runner(small.problem, RegistrationOptions());
+  RegistrationRunner runner(small.problem, preset_options("paper"));
   const RegistrationResult result = runner.run(small.problem->nominal_room_from_ct);
   EXPECT_EQ(result.stop_reason, StopReason::PinnedAtLimit);
   EXPECT_GT(result.inadmissible, 0);
@@ -131,7 +132,7 @@ TEST(Registration, AnEndAtTheLimitIsReportedAndStaysInside) {
 
 TEST(Registration, ACtFarFromTheRegionsIsReported) {
   const test::SmallCase small = test::small_case();
-  RegistrationRunner runner(small.problem, RegistrationOptions());
+  RegistrationRunner runner(small.problem, preset_options("paper"));
   RigidTransform far_away = RigidTransform::Identity();
   far_away.translation() = Eigen::Vector3d(0, 0, 400);
   EXPECT_EQ(runner.run(far_away).stop_reason, StopReason::CtOutsideRoi);
@@ -139,7 +140,7 @@ TEST(Registration, ACtFarFromTheRegionsIsReported) {
 
 TEST(Registration, AMaskedSpotDoesNotMoveTheResult) {
   test::SmallCase small = test::small_case();
-  RegistrationOptions options;
+  RegistrationOptions options = preset_options("paper");
   use_bins(24, options);
   for (RegistrationView& view : small.problem->views) {
     view.mask = Image2d(48, 48);
@@ -162,7 +163,7 @@ TEST(RegistrationProblem, NamesEverythingThatIsWrong) {
   small.problem->views[1].mask = Image2d(2, 2);
   small.problem->scaling_points_ct.clear();
   try {
-    const RegistrationRunner runner(small.problem, RegistrationOptions());
+    const RegistrationRunner runner(small.problem, preset_options("paper"));
     FAIL() << "must throw";
   } catch (const InputError& error) {
     const std::string message = error.what();
@@ -175,7 +176,7 @@ TEST(RegistrationProblem, NamesEverythingThatIsWrong) {
 }
 
 TEST(RegistrationOptions, NamesEverythingThatIsWrong) {
-  RegistrationOptions options;
+  RegistrationOptions options = preset_options("paper");
   StageOptions& first = options.chains[0].stages[0];
   StageOptions& second = options.chains[0].stages[1];
   first.similarity.name = "unheard-of";
@@ -199,7 +200,7 @@ TEST(RegistrationOptions, RobustSeesTheRegionAloneNoCoarserThanLevelOne) {
 }
 
 TEST(RegistrationOptions, RefuseAnOptimizerThatItsMeasureCannotServe) {
-  RegistrationOptions options;
+  RegistrationOptions options = preset_options("paper");
   options.use_optimizer("gauss-newton");
   options.use_similarity("mi");
   EXPECT_EQ(problems(options).size(), 2U);
@@ -214,7 +215,7 @@ TEST(RegistrationOptions, RefuseAnOptimizerThatItsMeasureCannotServe) {
 
 /// Two stages of one measure and optimiser that suit the small case.
 RegistrationOptions two_stages(const std::string& similarity, const std::string& optimizer) {
-  RegistrationOptions options;
+  RegistrationOptions options = preset_options("paper");
   options.use_similarity(similarity);
   options.use_optimizer(optimizer);
   use_bins(24, options);

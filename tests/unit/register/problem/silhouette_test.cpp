@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "register/method/presets.h"
 #include "register/method/registration.h"
 #include "register/verdict/pose_examiner.h"
 #include "unit/register/method/registration_cases.h"
@@ -120,7 +121,7 @@ TEST(SilhouetteObjective, IsNoneWhereTooLittleIsSeen) {
 
 TEST(SilhouetteStage, FindsBonesThatTheWholeRegionLoses) {
   const test::SmallCase small = bones_among_others();
-  RegistrationOptions options;
+  RegistrationOptions options = preset_options("paper");
   StageOptions stage;
   stage.similarity.name = "gc";
   stage.optimizer = "gauss-newton";
@@ -143,7 +144,7 @@ TEST(SilhouetteStage, FindsBonesThatTheWholeRegionLoses) {
 
 TEST(SilhouetteStage, EndsWhereTheBodyIsNotSeen) {
   const test::SmallCase small = bones_among_others();
-  RegistrationOptions options;
+  RegistrationOptions options = preset_options("paper");
   StageOptions stage;
   stage.similarity.name = "gc";
   stage.optimizer = "gauss-newton";

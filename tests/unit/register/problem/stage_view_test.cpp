@@ -39,7 +39,7 @@ TEST(StageView, PixelsPerMmAreThoseOfProjectedLengths) {
   const double columns = moved_px(camera.column_direction);
   const double rows = moved_px(camera.row_direction);
   // Of spacings a and b: 2 / (a + b), the harmonic mean of 1 / a and 1 / b.
-  EXPECT_NEAR(pixels_per_mm(camera, point), 2.0 / (1.0 / columns + 1.0 / rows), 1e-9);
+  EXPECT_NEAR(camera.pixels_per_mm(point), 2.0 / (1.0 / columns + 1.0 / rows), 1e-9);
 }
 
 TEST(StageView, ScalesTheRegionAboutItsCentreAndStaysOnTheDetector) {

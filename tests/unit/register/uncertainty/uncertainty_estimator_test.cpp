@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What objectives say about poses, and what registrations of noisy X-rays make of it.
+#include "register/method/presets.h"
 #include "register/uncertainty/uncertainty_estimator.h"
 
 #include <cmath>
@@ -124,7 +125,7 @@ TEST(BentCurvature, KeepsDirectionsThatAreKnown) {
 
 /// Sums of squares from start to end, at one resolution.
 RegistrationOptions squares() {
-  RegistrationOptions options;
+  RegistrationOptions options = preset_options("paper");
   StageOptions stage;
   stage.similarity.name = "ssd";
   stage.optimizer = "gauss-newton";
@@ -183,7 +184,7 @@ TEST(UncertaintyEstimator, SaysNothingWithoutAnEnd) {
 
 TEST(UncertaintyEstimator, TakesRobustGradientsWhereAMeasureHasNoDerivative) {
   const test::SmallCase small = test::small_case();
-  RegistrationOptions options;  // the paper's, with pattern intensity
+  RegistrationOptions options = preset_options("paper");  // the paper's, with pattern intensity
   options.use_similarity("pi");
   RegistrationResult result;
   result.room_from_ct = small.gold_room_from_ct;
@@ -231,7 +232,7 @@ TEST(UncertaintyEstimator, IsSilentWhereTheMeasureThatStandsInRefusesTheXray) {
   const test::SmallCase small = test::small_case();
   for (RegistrationView& view : small.problem->views)
     std::fill(view.xray.pixels.begin(), view.xray.pixels.end(), 1.0f);
-  RegistrationOptions options;
+  RegistrationOptions options = preset_options("paper");
   options.use_similarity("pi");
   RegistrationResult result;
   result.room_from_ct = small.gold_room_from_ct;
