@@ -6,7 +6,7 @@
 #include <numeric>
 #include <sstream>
 
-#include "precompute/dry_run.h"
+#include "precompute/formatted_text.h"
 
 namespace af {
 

@@ -3,22 +3,10 @@
 
 #include <algorithm>
 
-#include "base/joined.h"
 #include "precompute/design/quantisation_probe.h"
 #include "precompute/formatted_text.h"
 
 namespace af {
-
-std::string megabytes_text(std::uint64_t bytes) {
-  const double megabytes = static_cast<double>(bytes) / 1e6;
-  return formatted(megabytes < 10.0 ? "%.2f MB" : "%.1f MB", megabytes);
-}
-
-std::string seconds_text(const PhaseSeconds& seconds) {
-  return joined(seconds, ", ", [](const auto& phase) {
-    return phase.first + formatted(phase.second < 9.95 ? " %.1f" : " %.0f", phase.second);
-  });
-}
 
 double FieldForecast::all_seconds() const {
   double all = 0.0;
@@ -104,6 +92,78 @@ void forecast_seconds(const DryRun& run, const TileCounts& tiles, FieldForecast&
           seconds_at(static_cast<double>(need.file_bytes), run.disk.write_bytes_per_second));
 }
 
+std::string axis_text(const char* name, const GridAxis& first, const GridAxis& second) {
+  return formatted("  %s plane        %.1f x %.1f mm, %d x %d nodes, %.2f x %.2f mm apart\n",
+                   name,
+                   first.last_mm - first.first_mm,
+                   second.last_mm - second.first_mm,
+                   first.nodes,
+                   second.nodes,
+                   first.spacing_mm(),
+                   second.spacing_mm());
+}
+
+std::string planes_text(const LightSlab& planes) {
+  std::string text = axis_text("(u,v)", planes.u, planes.v);
+  for (const SlabGeometry& slab : planes.slabs) {
+    text += axis_text("(s,t)", slab.s, slab.t);
+    text += formatted("  stored part        s nodes %d to %d, t nodes %d to %d (%.0f %%)\n",
+                      slab.stored_s.begin,
+                      slab.stored_s.end() - 1,
+                      slab.stored_t.begin,
+                      slab.stored_t.end() - 1,
+                      100.0 * slab.stored_s.count * slab.stored_t.count /
+                          (static_cast<double>(slab.s.nodes) * slab.t.nodes));
+  }
+  return text;
+}
+
+/// The members of an atlas.
+std::string parts_text(const std::vector<FieldPart>& parts) {
+  std::string names;
+  for (const FieldPart& part : parts)
+    names += (names.empty() ? "" : ", ") + part.source.camera.name;
+  return "  atlas              " + std::to_string(parts.size()) + " fields: " + names +
+         "; each for at least " + parts.front().range.text() + "\n";
+}
+
+/// What other options would give.
+std::string advice_text(const FieldPart& part, const PrecomputeOptions& options) {
+  const FieldSource& source = part.source;
+  const LightSlab& planes = part.light_slab;
+  const SlabGeometry& slab = planes.slabs.front();
+  const FieldLattice lattice = planes.lattice();
+  std::string text = formatted(
+      "Advice\n  Your range uses %.0f %% of the (s,t) plane; the rest holds no shadow of the CT "
+      "and costs nothing.\n",
+      100.0 * static_cast<double>(lattice.stored_node_count()) /
+          static_cast<double>(lattice.node_count()));
+  const MotionRange narrower(source.range.max_rotation_rad(),
+                             0.5 * source.range.max_translation_mm());
+  if (source.range.is_symmetric() && narrower.max_translation_mm() >= 5.0) {
+    // The spacing that half the range would give with the same nodes.
+    const LightSlab alternative =
+        sized_planes(source, options, narrower, {{}, {slab.st_plane_y_mm}});
+    text += formatted(
+        "  With --max-translation-mm %.0f the same nodes would stand %.2f instead of %.2f mm apart "
+        "on the (s,t) plane: sharper DRRs for the same size.\n",
+        narrower.max_translation_mm(),
+        alternative.slabs.front().s.spacing_mm(),
+        slab.s.spacing_mm());
+  }
+  const double pixel_mm = source.camera.pixel_spacing_mm.minCoeff() *
+                          source.camera.depth_mm(source.frame.center_room_mm) /
+                          source.camera.source_detector_distance_mm();
+  if (slab.s.spacing_mm() > 2.0 * pixel_mm)
+    text += formatted(
+        "  A pixel of %s is %.2f mm wide at the centre, the (s,t) nodes are %.2f mm apart: more "
+        "--st-nodes buy more than more --uv-nodes.\n",
+        source.camera.name.c_str(),
+        pixel_mm,
+        slab.s.spacing_mm());
+  return text;
+}
+
 std::string memory_text(const DryRun& run, const FieldForecast& need) {
   std::string text = "  memory             " + megabytes_text(run.volume_bytes) +
                      " per node for the CT and its grid, up to " +
@@ -157,7 +217,8 @@ std::string dry_run_text(const DryRun& run) {
   std::string text =
       "Field of camera " + run.source.camera.name + " for " + run.source.ct_path + "\n";
   text += "  range              " + run.source.range.text() + "\n";
-  text += run.planes;
+  if (run.options.is_atlas()) text += parts_text(run.parts);
+  text += planes_text(run.parts.front().light_slab);
   text += formatted("  rays               %.1f million stored of %.1f million\n",
                     static_cast<double>(run.lattice.stored_node_count()) / 1e6,
                     static_cast<double>(run.lattice.node_count()) / 1e6);
@@ -181,7 +242,7 @@ std::string dry_run_text(const DryRun& run) {
                 need.all_seconds(),
                 seconds_text(need.seconds).c_str(),
                 run.speed.rays_per_second / 1e6);
-  return text + run.advice;
+  return text + advice_text(run.parts.front(), run.options);
 }
 
 }  // namespace af

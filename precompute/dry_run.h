@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "precompute/field_source.h"
+#include "precompute/field_parts.h"
 #include "precompute/phase_clock.h"
 #include "precompute/pipeline/field_build.h"
 #include "precompute/plan/memory_plan.h"
@@ -17,6 +17,7 @@ namespace af {
 /// What a forecast is made from.
 struct DryRun {
   const FieldSource& source;
+  const std::vector<FieldPart>& parts;
   const FieldLattice& lattice;
   const PrecomputeOptions& options;
   std::vector<WorkUnit> units;
@@ -26,8 +27,6 @@ struct DryRun {
   MemoryPlan memory;
   PhaseSeconds past;  ///< phases that a dry run goes through itself: reading and resampling
   int ranks = 1;
-  std::string planes;  ///< planes_text()
-  std::string advice;  ///< advice_text()
 };
 
 /// What the field would need.
@@ -50,11 +49,5 @@ FieldForecast forecast(const DryRun& run);
 
 /// The text of --dry-run: sizes, units, memory, ratios, time, advice.
 std::string dry_run_text(const DryRun& run);
-
-/// "12.3 MB" (10^6 bytes).
-std::string megabytes_text(std::uint64_t bytes);
-
-/// "read 1.2, cast 3.4".
-std::string seconds_text(const PhaseSeconds& seconds);
 
 }  // namespace af

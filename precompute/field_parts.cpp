@@ -7,6 +7,7 @@
 #include "base/error.h"
 #include "base/stored_bytes.h"
 #include "geometry/orbit.h"
+#include "geometry/slab_sizing.h"
 #include "precompute/casting/casters.h"
 #include "precompute/casting/corrected_caster.h"
 #include "precompute/casting/joined_caster.h"
@@ -131,6 +132,23 @@ std::vector<FieldPart> field_parts(const FieldSource& source,
   return parts;
 }
 
+LightSlab sized_planes(const FieldSource& source,
+                       const PrecomputeOptions& options,
+                       const MotionRange& range,
+                       const DepthSlabs& depth_slabs) {
+  const FieldDesign design = options.design();
+  return make_light_slab(source.camera,
+                         source.frame,
+                         range,
+                         source.volume->corner_points(),
+                         {design.uv_nodes,
+                          design.st_nodes,
+                          depth_slabs.boundaries_y_mm,
+                          depth_slabs.st_plane_y_mm,
+                          source.sources},
+                         source.more_cameras);
+}
+
 FieldLattice lattice_of(const std::vector<FieldPart>& parts) {
   FieldLattice all;
   for (const FieldPart& part : parts)
@@ -167,14 +185,6 @@ std::vector<double> unit_costs(const std::vector<WorkUnit>& units,
     costs.insert(costs.end(), its_costs.begin(), its_costs.end());
   }
   return costs;
-}
-
-std::string parts_text(const std::vector<FieldPart>& parts) {
-  std::string names;
-  for (const FieldPart& part : parts)
-    names += (names.empty() ? "" : ", ") + part.source.camera.name;
-  return "  atlas              " + std::to_string(parts.size()) + " fields: " + names +
-         "; each for at least " + parts.front().range.text() + "\n";
 }
 
 }  // namespace af

@@ -3,12 +3,13 @@
 #pragma once
 
 #include <memory>
-#include <string>
 #include <vector>
 
+#include "field/attenuation_quantizer.h"
 #include "geometry/field_lattice.h"
 #include "geometry/light_slab.h"
 #include "parallel/communicator.h"
+#include "precompute/casting/depth_slabs.h"
 #include "precompute/casting/field_caster.h"
 #include "precompute/casting/slab_aligned_volume.h"
 #include "precompute/field_source.h"
@@ -30,6 +31,12 @@ std::vector<FieldPart> field_parts(const FieldSource& source,
                                    const PrecomputeOptions& options,
                                    const Communicator& communicator);
 
+/// The planes of the options' field, for a motion range of `range`. Errors of make_light_slab().
+LightSlab sized_planes(const FieldSource& source,
+                       const PrecomputeOptions& options,
+                       const MotionRange& range,
+                       const DepthSlabs& depth_slabs);
+
 /// The slabs of all parts, those of the first part first.
 FieldLattice lattice_of(const std::vector<FieldPart>& parts);
 
@@ -41,8 +48,5 @@ std::unique_ptr<const FieldCaster> make_caster(const std::vector<FieldPart>& par
 /// The relative costs of casting units of all slabs.
 std::vector<double> unit_costs(const std::vector<WorkUnit>& units,
                                const std::vector<FieldPart>& parts);
-
-/// What a dry run says of the members of an atlas.
-std::string parts_text(const std::vector<FieldPart>& parts);
 
 }  // namespace af

@@ -6,10 +6,20 @@
 #include <utility>
 #include <vector>
 
+#include "base/joined.h"
+#include "precompute/formatted_text.h"
+
 namespace af {
 
 /// Phases of a run, in order, with the seconds that each took.
 using PhaseSeconds = std::vector<std::pair<std::string, double>>;
+
+/// "read 1.2, cast 3.4".
+inline std::string seconds_text(const PhaseSeconds& seconds) {
+  return joined(seconds, ", ", [](const auto& phase) {
+    return phase.first + formatted(phase.second < 9.95 ? " %.1f" : " %.0f", phase.second);
+  });
+}
 
 /// Measures them.
 class PhaseClock {

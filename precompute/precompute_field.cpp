@@ -126,6 +126,18 @@ class PrecomputeRun {
       if (!is_for_casting) part.resampled = nullptr;
     }
     lattice_ = lattice_of(parts_);
+  /// Collective. The CT in a slab frame, held once per node; the ranks of a node share the work.
+  [[nodiscard]] std::shared_ptr<const SlabAlignedVolume> resampled_on_node(
+      const RigidTransform& slab_from_ct) const {
+    const AttenuationVolume& volume = *source_.volume;
+    const SlabAlignedLayout layout =
+        all_or_none(world_, [&] { return slab_aligned_layout(volume, slab_from_ct); });
+    return std::make_shared<const SlabAlignedVolume>(
+        volume, slab_from_ct, layout, [&](std::size_t bytes, const SlabAlignedFill& fill) {
+          return world_.allocate_on_node_together(bytes, fill);
+        });
+  }
+
   }
 
   [[nodiscard]] bool has_one_central_slab() const {
@@ -202,8 +214,8 @@ class PrecomputeRun {
     all_or_none(world_, [&] {
       if (!world_.is_root()) return;
       const SpeedSample speed =
+                                 parts_,
           sample_speed(caster, lattice_, sample_plan(), options_, kSampleSeconds);
-      const FieldPart& first = parts_.front();
       std::cout << dry_run_text({source_,
                                  lattice_,
                                  options_,
@@ -213,9 +225,7 @@ class PrecomputeRun {
                                  sample_disk(output_folder()),
                                  memory,
                                  clock_.phases(),
-                                 world_.size(),
-                                 what_text(),
-                                 advice_text(first.source, first.light_slab, options_)});
+                                 world_.size()});
     });
   }
 
