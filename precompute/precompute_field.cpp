@@ -21,11 +21,10 @@
 #include "precompute/design_choice.h"
 #include "precompute/dry_run.h"
 #include "precompute/field_parts.h"
-#include "precompute/field_planes.h"
+#include "precompute/formatted_text.h"
 #include "precompute/phase_clock.h"
 #include "precompute/pipeline/field_build.h"
 #include "precompute/pipeline/field_encoder.h"
-#include "precompute/pipeline/shared_resampling.h"
 #include "precompute/pipeline/training_checkpoints.h"
 #include "precompute/units/unit_planner.h"
 #include "run/progress_printer.h"
@@ -113,8 +112,7 @@ class PrecomputeRun {
       note.change(parts_.size() == 1 ? "resampling the CT"
                                      : "resampling the CT for " + std::to_string(i + 1) + " of " +
                                            std::to_string(parts_.size()) + " fields");
-      parts_[i].resampled = std::make_shared<const SlabAlignedVolume>(resample_on_node(
-          *source_.volume, parts_[i].light_slab.slab_from_ct, SlabAlignedOptions{}, world_));
+      parts_[i].resampled = resampled_on_node(parts_[i].light_slab.slab_from_ct);
     }
     clock_.end("resample");
     if (options_.needs_probe()) choose(parts_[parts_.size() / 2]);
@@ -126,6 +124,8 @@ class PrecomputeRun {
       if (!is_for_casting) part.resampled = nullptr;
     }
     lattice_ = lattice_of(parts_);
+  }
+
   /// Collective. The CT in a slab frame, held once per node; the ranks of a node share the work.
   [[nodiscard]] std::shared_ptr<const SlabAlignedVolume> resampled_on_node(
       const RigidTransform& slab_from_ct) const {
@@ -136,8 +136,6 @@ class PrecomputeRun {
         volume, slab_from_ct, layout, [&](std::size_t bytes, const SlabAlignedFill& fill) {
           return world_.allocate_on_node_together(bytes, fill);
         });
-  }
-
   }
 
   [[nodiscard]] bool has_one_central_slab() const {
@@ -214,9 +212,9 @@ class PrecomputeRun {
     all_or_none(world_, [&] {
       if (!world_.is_root()) return;
       const SpeedSample speed =
-                                 parts_,
           sample_speed(caster, lattice_, sample_plan(), options_, kSampleSeconds);
       std::cout << dry_run_text({source_,
+                                 parts_,
                                  lattice_,
                                  options_,
                                  std::move(units),
@@ -227,11 +225,6 @@ class PrecomputeRun {
                                  clock_.phases(),
                                  world_.size()});
     });
-  }
-
-  /// Of a dry run: the planes, of an atlas those of its first field.
-  [[nodiscard]] std::string what_text() const {
-    return (options_.is_atlas() ? parts_text(parts_) : "") + planes_text(parts_.front().light_slab);
   }
 
   void build(const FieldCaster& caster) {

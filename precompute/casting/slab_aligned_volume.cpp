@@ -168,16 +168,20 @@ void narrow(GridRow& row, const std::int16_t* values) {
   if (row.begin == row.end) row.begin = row.end = 0;
 }
 
-}  // namespace
-
+/// Resamples a part of the slices. `values` and `rows` are those of the whole layout; rows of the
+/// slices are narrowed to their nodes that are not 0.
 void fill_slices(const AttenuationVolume& volume,
                  const RigidTransform& slab_from_ct,
-                 const SlabAlignedGrid& grid,
+                 const SlabAlignedLayout& layout,
                  int first_slice,
                  int end_slice,
                  std::span<std::int16_t> values,
                  std::span<GridRow> rows) {
-  check(rows.size() == grid.row_count(), "a row of the layout for each row of the grid");
+  const SlabAlignedGrid& grid = layout.grid;
+  const std::size_t first_row = grid.row_index(first_slice, 0);
+  std::copy_n(layout.rows.data() + first_row,
+              grid.row_index(end_slice, 0) - first_row,
+              rows.data() + first_row);
   const std::size_t stride = RowSampler::row_stride(grid);
   RowSampler sampler(volume, slab_from_ct, grid);
   RowSharpener sharpener(grid);
@@ -201,29 +205,50 @@ void fill_slices(const AttenuationVolume& volume,
   }
 }
 
+std::shared_ptr<const std::byte> filled_in_process(std::size_t bytes, const SlabAlignedFill& fill) {
+  const std::shared_ptr<std::byte[]> memory = std::make_unique_for_overwrite<std::byte[]>(bytes);
+  fill({memory.get(), bytes}, 0, 1);
+  return {memory, memory.get()};
+}
+
+}  // namespace
+
 SlabAlignedVolume::SlabAlignedVolume(const AttenuationVolume& volume,
                                      const RigidTransform& slab_from_ct,
                                      const SlabAlignedOptions& options)
-    : mu_per_mm_per_level_(0.0) {
-  SlabAlignedLayout layout = slab_aligned_layout(volume, slab_from_ct, options);
-  grid_ = layout.grid;
-  mu_per_mm_per_level_ =
-      volume.model().mu_per_mm_per_unit() / static_cast<double>(grid_.levels_per_unit);
-  std::vector<std::int16_t> values(layout.value_count);
-  fill_slices(volume, slab_from_ct, grid_, 0, grid_.size[1], values, layout.rows);
-  values_ = SharedArray<std::int16_t>(std::move(values));
-  rows_ = SharedArray<GridRow>(std::move(layout.rows));
-}
+    : SlabAlignedVolume(volume,
+                        slab_from_ct,
+                        slab_aligned_layout(volume, slab_from_ct, options),
+                        filled_in_process) {}
 
-SlabAlignedVolume::SlabAlignedVolume(const SlabAlignedGrid& grid,
-                                     const AttenuationModel& model,
-                                     SharedArray<std::int16_t> values,
-                                     SharedArray<GridRow> rows)
-    : grid_(grid),
-      mu_per_mm_per_level_(model.mu_per_mm_per_unit() / static_cast<double>(grid.levels_per_unit)),
-      values_(std::move(values)),
-      rows_(std::move(rows)) {
-  check(rows_.size() == grid_.row_count(), "one row of the layout per row of the grid");
+SlabAlignedVolume::SlabAlignedVolume(const AttenuationVolume& volume,
+                                     const RigidTransform& slab_from_ct,
+                                     const SlabAlignedLayout& layout,
+                                     const SlabAlignedMemory& memory)
+    : grid_(layout.grid),
+      mu_per_mm_per_level_(volume.model().mu_per_mm_per_unit() /
+                           static_cast<double>(grid_.levels_per_unit)) {
+  check(layout.rows.size() == grid_.row_count(), "a row of the layout for each row of the grid");
+  const auto values_in = [&](std::byte* bytes) {
+    return std::span(reinterpret_cast<std::int16_t*>(bytes), layout.value_count);
+  };
+  const auto rows_in = [&](std::byte* bytes) {
+    std::byte* const behind_values = bytes + layout.value_count * sizeof(std::int16_t);
+    return std::span(reinterpret_cast<GridRow*>(behind_values), layout.rows.size());
+  };
+  const auto fill = [&](std::span<std::byte> bytes, int part, int parts) {
+    fill_slices(volume,
+                slab_from_ct,
+                layout,
+                layout.part_begin(part, parts),
+                layout.part_begin(part + 1, parts),
+                values_in(bytes.data()),
+                rows_in(bytes.data()));
+  };
+  const std::shared_ptr<const std::byte> owner = memory(layout.bytes(), fill);
+  auto* base = const_cast<std::byte*>(owner.get());  // only to form views of const elements
+  values_ = SharedArray<std::int16_t>(owner, values_in(base));
+  rows_ = SharedArray<GridRow>(owner, rows_in(base));
 }
 
 std::vector<std::int64_t> SlabAlignedVolume::slice_sums() const {

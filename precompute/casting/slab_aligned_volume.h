@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -9,30 +12,28 @@
 
 namespace af {
 
-/// Resamples slices [first_slice, end_slice). `values` and `rows` are those of the whole layout;
-/// rows of the slices are narrowed to their nodes that are not 0. Several ranks may fill slices;
-/// the values depend neither on the rank that fills them nor on the vector width.
-void fill_slices(const AttenuationVolume& volume,
-                 const RigidTransform& slab_from_ct,
-                 const SlabAlignedGrid& grid,
-                 int first_slice,
-                 int end_slice,
-                 std::span<std::int16_t> values,
-                 std::span<GridRow> rows);
+/// Fills a part of a resampled volume's memory; parts may be filled at the same time.
+using SlabAlignedFill = std::function<void(std::span<std::byte> memory, int part, int parts)>;
+
+/// Provides memory of `bytes` bytes and has it filled: by one call (memory, 0, 1), or by the ranks
+/// of a node together (Communicator::allocate_on_node_together).
+using SlabAlignedMemory =
+    std::function<std::shared_ptr<const std::byte>(std::size_t bytes, const SlabAlignedFill& fill)>;
 
 /// A volume resampled to the slab frame: what the shear-warp caster reads. 2 bytes per stored node.
 /// \test SlabAlignedVolume.HoldsMeansOfTwoVoxelsWhenAxesAgree
 class SlabAlignedVolume {
  public:
+  /// In memory of this process.
   SlabAlignedVolume(const AttenuationVolume& volume,
                     const RigidTransform& slab_from_ct,
                     const SlabAlignedOptions& options = {});
-  /// Values and rows that already exist (memory shared by the ranks of a node), filled by
-  /// fill_slices.
-  SlabAlignedVolume(const SlabAlignedGrid& grid,
-                    const AttenuationModel& model,
-                    SharedArray<std::int16_t> values,
-                    SharedArray<GridRow> rows);
+  /// As `layout`, of slab_aligned_layout(), says, in memory of `memory`. The values depend neither
+  /// on who fills which part nor on the vector width.
+  SlabAlignedVolume(const AttenuationVolume& volume,
+                    const RigidTransform& slab_from_ct,
+                    const SlabAlignedLayout& layout,
+                    const SlabAlignedMemory& memory);
 
   [[nodiscard]] const SlabAlignedGrid& grid() const { return grid_; }
   /// The stored blocks of all rows.

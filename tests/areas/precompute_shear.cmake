@@ -5,9 +5,3 @@ af_add_test(
           unit/precompute/casting/slab_aligned_volume_test.cpp unit/precompute/casting/shear_warp_caster_test.cpp
           unit/precompute/casting/depth_slabs_test.cpp
   LIBS af_precompute)
-
-af_add_mpi_test(
-  resampling_test
-  SOURCES mpi/resampling_test.cpp
-  LIBS af_precompute_build
-  RANKS 1 2 3 4)

@@ -12,6 +12,7 @@
 #include "base/stored_bytes.h"
 #include "base/vector_width.h"
 #include "parallel/values_of_ranks.h"
+#include "precompute/casting/slab_aligned_volume.h"
 #include "precompute/casting/trilinear_caster.h"
 #include "precompute/casting/unit_costs.h"
 #include "precompute/codebook/mean_removal.h"
@@ -20,6 +21,7 @@
 #include "precompute/units/unit_planner.h"
 #include "support/ct_phantoms.h"
 #include "support/shared_folder.h"
+#include "unit/precompute/casting/shear_warp_cases.h"
 
 namespace af {
 namespace {
@@ -136,6 +138,32 @@ class FieldBuildTest : public testing::Test {
   std::uint64_t units_kept_ = 0;
   std::uint64_t units_damaged_ = 0;
 };
+
+TEST(SlabAlignedVolume, IsTheSameWhenTheRanksOfANodeFillItTogether) {
+  const Communicator world = Communicator::world();
+  const AttenuationVolume volume(test::smooth_ct(), AttenuationModel{});
+  for (const Eigen::Matrix3d& rotation :
+       {test::aligned_rotations()[1], test::oblique_rotations()[0]}) {
+    RigidTransform slab_from_ct = RigidTransform::Identity();
+    slab_from_ct.linear() = rotation;
+    const SlabAlignedVolume alone(volume, slab_from_ct);
+    const SlabAlignedVolume shared(volume,
+                                   slab_from_ct,
+                                   slab_aligned_layout(volume, slab_from_ct),
+                                   [&](std::size_t bytes, const SlabAlignedFill& fill) {
+                                     return world.allocate_on_node_together(bytes, fill);
+                                   });
+    ASSERT_EQ(shared.bytes(), alone.bytes());
+    for (int y = 0; y < alone.grid().size[1]; ++y)
+      for (int z = 0; z < alone.grid().size[2]; ++z) {
+        ASSERT_EQ(shared.row(y, z).begin, alone.row(y, z).begin);
+        ASSERT_EQ(shared.row(y, z).end, alone.row(y, z).end);
+        for (int x = 0; x < alone.grid().size[0]; ++x)
+          ASSERT_EQ(shared.level(x, y, z), alone.level(x, y, z));
+      }
+    world.barrier();
+  }
+}
 
 TEST_F(FieldBuildTest, PayloadIsTheSameOnAnyRankCountPlanAndVectorWidth) {
   EXPECT_EQ(build(folder_ / "whole.h5", 1000000).payload_sha256, kFrozenPayload);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 
 #include <gtest/gtest.h>
 
@@ -148,6 +149,14 @@ TEST(SlabAlignedVolume, HasZerosOnItsFacesAndKnowsWhereRowsBeginAndEnd) {
   }
 }
 
+SlabAlignedMemory filled_in_parts(int parts) {
+  return [parts](std::size_t bytes, const SlabAlignedFill& fill) {
+    const std::shared_ptr<std::byte[]> memory(new std::byte[bytes]);
+    for (int part = 0; part < parts; ++part) fill({memory.get(), bytes}, part, parts);
+    return std::shared_ptr<const std::byte>(memory, memory.get());
+  };
+}
+
 /// Levels when every node of the grid is stored, as if nothing were known of where the volume
 /// attenuates.
 SlabAlignedVolume resampled_with_all_nodes(const AttenuationVolume& volume,
@@ -155,16 +164,15 @@ SlabAlignedVolume resampled_with_all_nodes(const AttenuationVolume& volume,
   SlabAlignedLayout layout = slab_aligned_layout(volume, slab_from_ct);
   const SlabAlignedGrid& grid = layout.grid;
   std::int32_t blocks = 0;
-  for (GridRow& row : layout.rows) {
-    row = {blocks, 0, static_cast<std::int16_t>(grid.size[0])};
-    blocks += row.end_block();
-  }
-  std::vector<std::int16_t> values(static_cast<std::size_t>(blocks) * kRowBlock);
-  fill_slices(volume, slab_from_ct, grid, 1, grid.size[1] - 1, values, layout.rows);
-  return {grid,
-          volume.model(),
-          SharedArray<std::int16_t>(std::move(values)),
-          SharedArray<GridRow>(std::move(layout.rows))};
+  for (int y = 0; y < grid.size[1]; ++y)
+    for (int z = 0; z < grid.size[2]; ++z) {
+      const bool is_face = y == 0 || y == grid.size[1] - 1;
+      GridRow& row = layout.rows[grid.row_index(y, z)];
+      row = {blocks, 0, static_cast<std::int16_t>(is_face ? 0 : grid.size[0])};
+      blocks += row.end_block();
+    }
+  layout.value_count = static_cast<std::size_t>(blocks) * kRowBlock;
+  return {volume, slab_from_ct, layout, filled_in_parts(1)};
 }
 
 TEST(SlabAlignedVolume, StoresAllThatIsNotZero) {
@@ -191,21 +199,8 @@ TEST(SlabAlignedVolume, DoesNotDependOnThePiecesOrTheVectorWidth) {
     const SlabAlignedVolume whole(volume, slab_from_ct);
     for (const VectorWidth width : supported_vector_widths()) {
       force_vector_width(width);
-      SlabAlignedLayout layout = slab_aligned_layout(volume, slab_from_ct);
-      const SlabAlignedGrid& grid = layout.grid;
-      std::vector<std::int16_t> values(layout.value_count);
-      for (int first = 0; first < grid.size[1]; first += 7)
-        fill_slices(volume,
-                    slab_from_ct,
-                    grid,
-                    first,
-                    std::min(first + 7, grid.size[1]),
-                    values,
-                    layout.rows);
-      const SlabAlignedVolume pieced(grid,
-                                     volume.model(),
-                                     SharedArray<std::int16_t>(std::move(values)),
-                                     SharedArray<GridRow>(std::move(layout.rows)));
+      const SlabAlignedVolume pieced(
+          volume, slab_from_ct, slab_aligned_layout(volume, slab_from_ct), filled_in_parts(7));
       EXPECT_EQ(levels_of(pieced), levels_of(whole)) << to_string(width);
       EXPECT_EQ(pieced.slice_sums(), whole.slice_sums());
     }
