@@ -17,7 +17,6 @@
 #include "precompute/build_record.h"
 #include "precompute/casting/casters.h"
 #include "precompute/casting_decides.h"
-#include "precompute/codebook/mean_removal.h"
 #include "precompute/design_choice.h"
 #include "precompute/dry_run.h"
 #include "precompute/field_parts.h"

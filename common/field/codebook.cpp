@@ -2,6 +2,7 @@
 #include "field/codebook.h"
 
 #include <numeric>
+#include <span>
 
 namespace af {
 
@@ -21,6 +22,14 @@ Tile folded_shape(const Tile& shape) {
   for (std::size_t i = 0; i < kTileElements; ++i)
     if ((i & kUpperS) != 0) folded[i] = static_cast<std::uint16_t>(65535 - folded[i]);
   return folded;
+}
+
+Codebook field_codebook(const Codebook& trained, int mean_step) {
+  Codebook codebook = trained;
+  codebook.mean_step = mean_step;
+  if (mean_step > 0)
+    for (Tile& shape : std::span(codebook.codewords).subspan(1)) shape = folded_shape(shape);
+  return codebook;
 }
 
 std::vector<std::string> problems(const Codebook& codebook) {

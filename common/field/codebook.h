@@ -44,6 +44,10 @@ inline std::uint16_t level_of(std::uint16_t element, std::uint16_t mean) {
 /// shapes stay, and the sum becomes the slope along s.
 Tile folded_shape(const Tile& shape);
 
+/// The codebook of a field from one that was trained: on plain tiles, or on folded shapes where
+/// `mean_step` is above 0.
+Codebook field_codebook(const Codebook& trained, int mean_step);
+
 /// Sum of a tile's elements: its DC coefficient before scaling.
 std::uint32_t tile_sum(const Tile& tile);
 

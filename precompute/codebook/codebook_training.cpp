@@ -6,7 +6,6 @@
 #include <set>
 
 #include "base/error.h"
-#include "precompute/codebook/mean_removal.h"
 #include "precompute/codebook/nearest_codeword.h"
 
 namespace af {
@@ -203,7 +202,7 @@ class CodebookIterations {
 
   /// Collective. Replaces the codebook by a better one.
   TrainingIteration improve(Codebook& codebook) {
-    const NearestCodeword search = codeword_search(codebook, mean_step_);
+    const NearestCodeword search(codebook, mean_step_);
     training_.encode(search, hint_);
     held_out_.encode(search, hint_);
     hint_ = SearchHint::PerTile;

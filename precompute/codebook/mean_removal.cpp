@@ -32,17 +32,4 @@ void remove_means(TrainingShare& share, int mean_step) {
   remove_means(std::span(share.held_out), mean_step);
 }
 
-NearestCodeword codeword_search(const Codebook& trained, int mean_step) {
-  return NearestCodeword(trained,
-                         mean_step > 0 ? SearchedTiles::FoldedShapes : SearchedTiles::Plain);
-}
-
-Codebook field_codebook(const Codebook& trained, int mean_step) {
-  Codebook codebook = trained;
-  codebook.mean_step = mean_step;
-  if (mean_step > 0)
-    for (Tile& shape : std::span(codebook.codewords).subspan(1)) shape = folded_shape(shape);
-  return codebook;
-}
-
 }  // namespace af

@@ -47,10 +47,10 @@ struct NearestCodeword::Part {
   std::uint32_t number = 0;  ///< among the parts of as many halvings
 };
 
-NearestCodeword::NearestCodeword(const Codebook& codebook, SearchedTiles tiles)
-    : codewords_(codebook.codewords) {
-  throw_if_any(problems(codebook));
-  if (tiles == SearchedTiles::FoldedShapes)
+NearestCodeword::NearestCodeword(const Codebook& trained, int mean_step)
+    : codewords_(trained.codewords) {
+  throw_if_any(problems(trained));
+  if (mean_step > 0)
     make_boxes();
   else
     sort_by_dc();

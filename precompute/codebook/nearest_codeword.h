@@ -17,12 +17,6 @@ enum class SearchHint {
   PerTile,  ///< the caller's guess, for example the answer of the last training iteration
 };
 
-/// What is searched. Every search is exact for all tiles; it is fast for those that it is for.
-enum class SearchedTiles {
-  Plain,
-  FoldedShapes,  ///< of mean-removed tiles (mean_removal.h)
-};
-
 /// Exact nearest-codeword search (squared Euclidean distance of 16 levels; ties take the lowest
 /// index). Tiles and codewords are compared in the coordinates of the 4-D Hadamard transform, whose
 /// first coefficient (DC) orders the codebook: blocks of 16 codewords are visited outwards from the
@@ -37,7 +31,9 @@ enum class SearchedTiles {
 /// nearest first, while they may hold a nearer one.
 class NearestCodeword {
  public:
-  explicit NearestCodeword(const Codebook& codebook, SearchedTiles tiles = SearchedTiles::Plain);
+  /// For plain tiles, or for folded shapes (mean_removal.h) where `mean_step` is above 0. The
+  /// answers are right for all tiles; the other kind takes longer.
+  explicit NearestCodeword(const Codebook& trained, int mean_step = 0);
 
   /// Index of the nearest codeword and squared error of every tile. With SearchHint::PerTile
   /// `nearest` holds valid indices on entry. Re-entrant.
@@ -45,8 +41,6 @@ class NearestCodeword {
               SearchHint hint,
               std::span<std::uint32_t> nearest,
               std::span<std::uint64_t> squared_errors) const;
-
-  [[nodiscard]] std::size_t codeword_count() const { return codewords_.size(); }
 
  private:
   struct Part;

@@ -187,7 +187,7 @@ std::vector<PoseLoss> DesignProbe::losses(const FieldCaster& caster,
                                           const LightSlab& planes,
                                           const Codebook& trained,
                                           int mean_step) const {
-  const NearestCodeword search = codeword_search(trained, mean_step);
+  const NearestCodeword search(trained, mean_step);
   const Codebook codebook = field_codebook(trained, mean_step);
   std::vector<PoseLoss> losses(rays_.poses);
   for (const RayPatch& patch : rays_.patches) {
@@ -230,7 +230,7 @@ DesignMeasurement DesignProbe::measure(const FieldDesign& design,
     constexpr double kTrainedCodebook = 0.83;
     // Some of the chunks tell.
     constexpr std::size_t kChunks = 8;
-    const NearestCodeword search = codeword_search(codebook, design.mean_step);
+    const NearestCodeword search(codebook, design.mean_step);
     const IndexCoding coding(field_codebook(codebook, design.mean_step));
     const std::size_t stride = 1 + sample.occupied_share.size() / kChunks;
     std::size_t at = 0;

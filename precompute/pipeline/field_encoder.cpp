@@ -13,7 +13,6 @@
 #include "base/error.h"
 #include "parallel/values_of_ranks.h"
 #include "parallel/work_watch.h"
-#include "precompute/codebook/mean_removal.h"
 
 namespace af {
 
@@ -61,7 +60,7 @@ FieldEncoder::FieldEncoder(const FieldBuild& build,
     : build_(build),
       cast_(cast),
       codebook_(field_codebook(trained, mean_step)),
-      search_(codeword_search(trained, mean_step)),
+      search_(trained, mean_step),
       codebook_crc_(crc_of(trained, mean_step)),
       overflow_(overflow) {
   if (build_.progress != nullptr && overflow_ == TileOverflow::ReadBack)

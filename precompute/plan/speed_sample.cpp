@@ -130,7 +130,7 @@ void sample_search(SampledTiles tiles,
   }
   const Codebook codebook = drawn_codebook(tiles.spread, options.design().codewords);
   const Stopwatch preparing;
-  const NearestCodeword search = codeword_search(codebook, mean_step);
+  const NearestCodeword search(codebook, mean_step);
   sample.codebook_seconds = preparing.seconds();
   std::vector<std::uint32_t> nearest(tiles.run.size());
   std::vector<std::uint64_t> errors(tiles.run.size());

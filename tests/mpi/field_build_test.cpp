@@ -15,7 +15,6 @@
 #include "precompute/casting/slab_aligned_volume.h"
 #include "precompute/casting/trilinear_caster.h"
 #include "precompute/casting/unit_costs.h"
-#include "precompute/codebook/mean_removal.h"
 #include "precompute/pipeline/field_encoder.h"
 #include "precompute/pipeline/training_checkpoints.h"
 #include "precompute/units/unit_planner.h"

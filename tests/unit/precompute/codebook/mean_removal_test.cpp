@@ -81,7 +81,7 @@ TEST(MeanRemoval, UnitsHoldRowsOfIndicesAndOfMeans) {
   const Codebook codebook = field_codebook(trained, 64);
   ASSERT_TRUE(problems(codebook).empty()) << problems(codebook).front();
   EXPECT_EQ(codebook.mean_step, 64);
-  const EncodedUnit encoded = encode_unit(codeword_search(trained, 64), 64, small_unit(), tiles);
+  const EncodedUnit encoded = encode_unit(NearestCodeword(trained, 64), 64, small_unit(), tiles);
   ASSERT_EQ(encoded.indices.size(), 12u);
   EXPECT_EQ(encoded.squared_error, 1u) << "of the faint tile";
   const auto decoded = [&](std::size_t s, std::size_t t) {

@@ -14,6 +14,7 @@
 namespace af {
 namespace {
 
+constexpr int kMeanStep = 64;  ///< above 0: the search for folded shapes
 constexpr std::uint64_t kTileSeed = 7;
 
 /// Tiles as a field has them: a level, a slope along each axis, and noise; some faint, some flat.
@@ -85,8 +86,7 @@ void expect_equals_brute_force(const NearestCodeword& search,
 
 void expect_equals_brute_force(const Codebook& codebook, const std::vector<Tile>& tiles) {
   expect_equals_brute_force(NearestCodeword(codebook), codebook, tiles);
-  expect_equals_brute_force(
-      NearestCodeword(codebook, SearchedTiles::FoldedShapes), codebook, tiles);
+  expect_equals_brute_force(NearestCodeword(codebook, kMeanStep), codebook, tiles);
 }
 
 TEST(NearestCodeword, EqualsBruteForceOnEveryWidth) {
@@ -96,7 +96,6 @@ TEST(NearestCodeword, EqualsBruteForceOnEveryWidth) {
 }
 
 TEST(NearestCodeword, OfFoldedShapesEqualsBruteForce) {
-  constexpr int kMeanStep = 64;
   const auto folded_shapes = [](std::size_t count, std::uint64_t stream) {
     std::vector<Tile> tiles = field_like_tiles(count, stream, 20000.0);
     for (Tile& tile : tiles) tile = remove_mean(tile, kMeanStep).shape;
