@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "precompute/codebook/nearest_codeword.h"
+#include "precompute/codebook/tile_drawing.h"
 
 namespace af {
 

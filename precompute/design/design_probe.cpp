@@ -9,6 +9,7 @@
 #include "base/error.h"
 #include "base/hash_random.h"
 #include "precompute/codebook/mean_removal.h"
+#include "precompute/codebook/tile_drawing.h"
 #include "precompute/design/drr_time.h"
 #include "precompute/design/patch_nodes.h"
 

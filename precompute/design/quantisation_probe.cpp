@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "precompute/codebook/codebook_training.h"
+#include "precompute/codebook/tile_drawing.h"
 #include "precompute/codebook/unit_encoding.h"
 
 namespace af {
