@@ -272,7 +272,7 @@ FileHeader shared_header(bool atlas,
   FileHeader header;
   all_or_none(communicator, [&] {
     if (communicator.is_root())
-      header = naming_file(path, [&] { return read_header_of(atlas, path); });
+      header = hdf5::naming_file(path, [&] { return read_header_of(atlas, path); });
   });
   std::vector<std::byte> bytes = bytes_of(header);
   communicator.broadcast(bytes);

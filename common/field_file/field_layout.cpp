@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "base/file_name.h"
+#include "files/sha256.h"
 
 namespace af::field_layout {
 
@@ -325,6 +326,13 @@ int count_within(const Dataset& dataset, int most, const std::string& path) {
   return count;
 }
 
+/// One line per dataset that takes part in the payload hash.
+std::string payload_line(const DatasetRule& rule, const std::string& sha256) {
+  std::string line = rule.name + " " + to_string(rule.type);
+  for (const std::uint64_t extent : rule.extents) line += " " + std::to_string(extent);
+  return line + " " + sha256 + "\n";
+}
+
 }  // namespace
 
 std::size_t element_bytes(ElementType type) {
@@ -598,10 +606,14 @@ int slab_count_of(const Dataset& dataset, const std::string& path) {
   return count_within(dataset, kMaxSlabs, path);
 }
 
-std::string payload_line(const DatasetRule& rule, const std::string& sha256) {
-  std::string line = rule.name + " " + to_string(rule.type);
-  for (const std::uint64_t extent : rule.extents) line += " " + std::to_string(extent);
-  return line + " " + sha256 + "\n";
+std::string payload_hash(std::span<const Dataset> datasets,
+                         const std::vector<DatasetRule>& rules,
+                         const std::vector<std::string>& index_sha256) {
+  std::string lines;
+  for (const Dataset& dataset : datasets)
+    lines += payload_line(dataset.rule, sha256_hex(dataset.bytes));
+  for (std::size_t k = 0; k < rules.size(); ++k) lines += payload_line(rules[k], index_sha256[k]);
+  return sha256_hex(std::as_bytes(std::span(lines)));
 }
 
 std::uint64_t payload_bytes(const Codebook& codebook, const FieldLattice& lattice) {

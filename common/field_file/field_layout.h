@@ -140,8 +140,10 @@ FieldProvenance provenance_of(std::span<const Dataset> datasets);
 std::string look_up_of(const FieldProvenance& provenance, const std::string& path);
 int slab_count_of(const Dataset& dataset, const std::string& path);
 
-/// One line per dataset that takes part in the payload hash.
-std::string payload_line(const DatasetRule& rule, const std::string& sha256);
+/// SHA-256 of a field's content: of its datasets, and of its indices by their own hashes.
+std::string payload_hash(std::span<const Dataset> datasets,
+                         const std::vector<DatasetRule>& rules,
+                         const std::vector<std::string>& index_sha256);
 
 /// Bytes of codebook, indices and means, as stored.
 std::uint64_t payload_bytes(const Codebook& codebook, const FieldLattice& lattice);

@@ -24,12 +24,12 @@ using field_layout::DatasetRule;
 using field_layout::FieldHeader;
 using field_layout::FileHeader;
 using field_layout::info_of;
-using field_layout::naming_file;
 using field_layout::read_header_of;
 using field_layout::read_planes;
 using field_layout::shared_header;
 using field_layout::value_count_of;
 using hdf5::Handle;
+using hdf5::naming_file;
 
 /// Reads and verifies the indices of one slab into memory for all of them.
 void read_indices(const std::filesystem::path& path,

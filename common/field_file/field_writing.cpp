@@ -31,12 +31,12 @@ using field_layout::DatasetRule;
 using field_layout::hash_sum;
 using field_layout::index_rules;
 using field_layout::kSha256Digits;
-using field_layout::naming_file;
 using field_layout::payload_hash;
 using field_layout::read_planes;
 using field_layout::value_count_of;
 using hdf5::checked;
 using hdf5::Handle;
+using hdf5::naming_file;
 
 /// First value and number of values of a block along the axes of its dataset: tiles, but along s
 /// rows.

@@ -3,10 +3,14 @@
 #pragma once
 
 #include <filesystem>
+#include <new>
+#include <stdexcept>
 #include <string>
+#include <vector>
 
 #include <hdf5.h>
 
+#include "base/error.h"
 #include "field_file/field_layout.h"
 #include "hdf5_files/hdf5_handles.h"
 
@@ -23,6 +27,22 @@ using QuietErrors = H5Quiet;
 template <typename Result>
 Result checked(Result result, const char* call) {
   return h5_checked(result, call);
+}
+
+/// Runs `function` and turns whatever HDF5 or a missing attribute makes of it into a FileError.
+template <typename Function>
+auto naming_file(const std::filesystem::path& path, Function&& function) {
+  try {
+    return function();
+  } catch (const Error&) {
+    throw;
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (const std::logic_error&) {
+    throw;
+  } catch (const std::exception& error) {
+    throw FileError(path.string(), error.what());
+  }
 }
 
 /// File access of new files: formats whose metadata carry checksums.

@@ -7,7 +7,6 @@
 
 #include "field_file/hdf5_calls.h"
 #include "field_file/index_filter.h"
-#include "files/sha256.h"
 #include "parallel/work_watch.h"
 
 namespace af::field_layout {
@@ -108,17 +107,6 @@ void read_planes(
     done(u, std::span<const std::uint16_t>(planes));
     note_progress();
   }
-}
-
-std::string payload_hash(std::span<const Dataset> datasets,
-                         const std::vector<DatasetRule>& rules,
-                         const std::vector<std::string>& index_sha256) {
-  std::string lines;
-  for (const Dataset& dataset : datasets)
-    lines += field_layout::payload_line(dataset.rule, sha256_hex(dataset.bytes));
-  for (std::size_t k = 0; k < rules.size(); ++k)
-    lines += field_layout::payload_line(rules[k], index_sha256[k]);
-  return sha256_hex(std::as_bytes(std::span(lines)));
 }
 
 }  // namespace af::field_layout

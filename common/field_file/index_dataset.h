@@ -3,38 +3,16 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <functional>
-#include <new>
 #include <span>
-#include <stdexcept>
-#include <string>
-#include <vector>
 
 #include <hdf5.h>
 
-#include "base/error.h"
 #include "field_file/chunk_index.h"
 #include "field_file/field_file.h"
 #include "field_file/field_layout.h"
 
 namespace af::field_layout {
-
-/// Runs `function` and turns whatever HDF5 or a missing attribute makes of it into a FileError.
-template <typename Function>
-auto naming_file(const std::filesystem::path& path, Function&& function) {
-  try {
-    return function();
-  } catch (const Error&) {
-    throw;
-  } catch (const std::bad_alloc&) {
-    throw;
-  } catch (const std::logic_error&) {
-    throw;
-  } catch (const std::exception& error) {
-    throw FileError(path.string(), error.what());
-  }
-}
 
 /// Values of a dataset of indices, the means among them.
 std::uint64_t value_count_of(const DatasetRule& rule);
@@ -56,10 +34,5 @@ void read_planes(
     const DatasetRule& rule,
     const std::function<std::span<std::uint16_t>(std::uint64_t u, std::uint64_t count)>& planes_of,
     const std::function<void(std::uint64_t u, std::span<const std::uint16_t> planes)>& done);
-
-/// SHA-256 of a field's content: of its datasets, and of its indices by their own hashes.
-std::string payload_hash(std::span<const Dataset> datasets,
-                         const std::vector<DatasetRule>& rules,
-                         const std::vector<std::string>& index_sha256);
 
 }  // namespace af::field_layout

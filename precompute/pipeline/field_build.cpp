@@ -12,6 +12,7 @@
 #include "parallel/work_queue.h"
 #include "parallel/work_watch.h"
 #include "precompute/codebook/mean_removal.h"
+#include "precompute/pipeline/rank_reduction.h"
 #include "precompute/units/unit_tiles.h"
 
 namespace af {
@@ -84,13 +85,6 @@ void add_up(CastPhase& cast, double busy_seconds, const Communicator& communicat
 }
 
 }  // namespace
-
-CodebookReduction reduction_over(const Communicator& communicator) {
-  return {
-      [&communicator](std::span<std::uint64_t> values) { communicator.sum(values); },
-      [&communicator](std::span<const std::byte> mine) { return communicator.all_gather(mine); },
-      static_cast<std::size_t>(communicator.rank())};
-}
 
 CastPhase cast_field(const FieldBuild& build,
                      const CastLimits& limits,
@@ -184,15 +178,6 @@ TrainedCodebook train_field(const FieldBuild& build,
     remove_means(share, options.mean_step);
     return train_codebook(share, options, reduction, on_progress, checkpoints);
   });
-}
-
-std::string name_of(const WorkUnit& unit, std::size_t units) {
-  const auto range = [](const NodeRange& nodes) {
-    return std::to_string(nodes.begin) + " to " + std::to_string(nodes.end() - 1);
-  };
-  return "unit " + std::to_string(unit.id) + " of " + std::to_string(units) + " (slab " +
-         std::to_string(unit.slab) + ", viewpoints u " + range(unit.u) + ", v " + range(unit.v) +
-         ")";
 }
 
 }  // namespace af

@@ -12,14 +12,10 @@
 #include "base/progress.h"
 #include "parallel/communicator.h"
 #include "precompute/casting/field_caster.h"
-#include "precompute/codebook/codebook_reduction.h"
 #include "precompute/codebook/codebook_training.h"
 #include "precompute/pipeline/unit_store.h"
 
 namespace af {
-
-/// How the ranks of a communicator, which must outlive it, combine their results.
-CodebookReduction reduction_over(const Communicator& communicator);
 
 /// Asked between units; true ends casting with progress saved.
 using StopRequested = std::function<bool()>;
@@ -84,8 +80,5 @@ TrainedCodebook train_field(const FieldBuild& build,
                             const CodebookOptions& options,
                             const ProgressCallback& on_progress,
                             const TrainingCheckpoints& checkpoints = {});
-
-/// "unit 3 of 32 (slab 0, viewpoints u 0 to 7, v 2 to 3)".
-std::string name_of(const WorkUnit& unit, std::size_t units);
 
 }  // namespace af

@@ -3,6 +3,15 @@
 
 namespace af {
 
+std::string name_of(const WorkUnit& unit, std::size_t units) {
+  const auto range = [](const NodeRange& nodes) {
+    return std::to_string(nodes.begin) + " to " + std::to_string(nodes.end() - 1);
+  };
+  return "unit " + std::to_string(unit.id) + " of " + std::to_string(units) + " (slab " +
+         std::to_string(unit.slab) + ", viewpoints u " + range(unit.u) + ", v " + range(unit.v) +
+         ")";
+}
+
 TilePlaces::TilePlaces(const FieldLattice& lattice, const WorkUnit& unit)
     : tiles_before_slab_(lattice.tiles_before(unit.slab)),
       counts_of_slab_(lattice.slabs[unit.slab].tile_counts()),

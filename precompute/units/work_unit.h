@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <string>
 
 #include "geometry/field_lattice.h"
 
@@ -37,6 +38,9 @@ struct WorkUnit {
            static_cast<std::size_t>(s.tiles()) * static_cast<std::size_t>(t.tiles());
   }
 };
+
+/// "unit 3 of 32 (slab 0, viewpoints u 0 to 7, v 2 to 3)".
+std::string name_of(const WorkUnit& unit, std::size_t units);
 
 /// Where a unit's tiles stand in the field.
 class TilePlaces {

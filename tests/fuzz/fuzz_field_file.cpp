@@ -292,17 +292,17 @@ void change(hid_t file, const std::vector<std::string>& names, fuzz::InputBytes&
 
 /// The hash over all datasets, as far as their hashes can be found.
 void mend_payload_hash(hid_t file, const SoundFile& sound) {
-  std::string lines;
-  for (const DatasetRule& rule : sound.payload) {
-    const Dataset dataset = hdf5::read_dataset(file, rule, "field");
-    lines += field_layout::payload_line(dataset.rule, sha256_hex(dataset.bytes));
-  }
+  std::vector<Dataset> datasets;
+  for (const DatasetRule& rule : sound.payload)
+    datasets.push_back(hdf5::read_dataset(file, rule, "field"));
+  std::vector<std::string> index_sha256;
   for (const DatasetRule& rule : sound.indices) {
     const Handle dataset(H5Dopen2(file, rule.name.c_str(), H5P_DEFAULT), H5Dclose, "H5Dopen2");
-    lines += field_layout::payload_line(rule, hdf5::read_text_attribute(dataset, "sha256"));
+    index_sha256.push_back(hdf5::read_text_attribute(dataset, "sha256"));
   }
   H5Adelete(file, "payload_sha256");
-  hdf5::write_text_attribute(file, "payload_sha256", sha256_hex(std::as_bytes(std::span(lines))));
+  hdf5::write_text_attribute(
+      file, "payload_sha256", field_layout::payload_hash(datasets, sound.indices, index_sha256));
 }
 
 /// Runs an edit; HDF5 may refuse it.
