@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstring>
 #include <span>
+#include <sstream>
 #include <unistd.h>
 #include <utility>
 
@@ -217,6 +218,21 @@ FileHeader read_header(const std::filesystem::path& path) {
     throw FileError(path.string(), "attribute ct_sha256", identity.ct_content_sha256, ct_sha256);
   if (header.is_atlas) require_same_origin(header.atlas(path.string()), path);
   return header;
+}
+
+/// The look-up that a field's options name, "linear" where they name none. FileError when there is
+/// no such way.
+std::string look_up_of(const FieldProvenance& provenance, const std::string& path) {
+  const std::string key = "look_up = ";
+  std::istringstream lines(provenance.options_toml);
+  for (std::string line; std::getline(lines, line);) {
+    if (!line.starts_with(key)) continue;
+    const std::string value = line.substr(key.size());
+    for (const char* known : {"linear", "cubic"})
+      if (value == '"' + std::string(known) + '"') return known;
+    throw FileError(path, "/provenance/options_toml: look_up", "\"linear\" or \"cubic\"", value);
+  }
+  return "linear";
 }
 
 }  // namespace

@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "field_file/field_layout.h"
 
+#include <array>
 #include <cmath>
 #include <cstring>
-#include <sstream>
-#include <type_traits>
-#include <variant>
 
 #include "base/error.h"
 #include "base/file_name.h"
@@ -34,99 +32,6 @@ DatasetRule codewords_rule() {
 DatasetRule mean_step_rule() {
   return {"/codebook/mean_step", ElementType::Int32, {1}, false, "level", "none"};
 }
-
-/// A text is never stored empty: HDF5 has no string type of length 0.
-std::string stored_text(const std::string& text) {
-  return text.empty() ? std::string(1, '\0') : text;
-}
-
-template <typename T>
-Dataset dataset_of(const DatasetRule& rule, std::span<const T> values) {
-  Dataset dataset{rule, {}};
-  const auto bytes = std::as_bytes(values);
-  dataset.bytes.assign(bytes.begin(), bytes.end());
-  if (rule.is_first_extent_free) {
-    std::uint64_t inner = 1;
-    for (std::size_t i = 1; i < rule.extents.size(); ++i) inner *= rule.extents[i];
-    dataset.rule.extents[0] = values.size() / inner;
-  }
-  return dataset;
-}
-
-template <typename T>
-std::vector<T> values_of(const Dataset& dataset, const std::string& path) {
-  check(dataset.bytes.size() % sizeof(T) == 0, "bytes of whole elements");
-  std::vector<T> values(dataset.bytes.size() / sizeof(T));
-  if (!values.empty()) std::memcpy(values.data(), dataset.bytes.data(), dataset.bytes.size());
-  if constexpr (std::is_floating_point_v<T>)
-    for (const T value : values)
-      if (std::isnan(value)) throw FileError(path, dataset.rule.name, "numbers", "NaN");
-  return values;
-}
-
-std::string text_of(const Dataset& dataset) {
-  std::string text(reinterpret_cast<const char*>(dataset.bytes.data()), dataset.bytes.size());
-  while (!text.empty() && text.back() == '\0') text.pop_back();
-  return text;
-}
-
-/// A dataset and where its numbers, or its text, are in memory.
-struct StoredValue {
-  DatasetRule rule;
-  std::variant<std::vector<double*>, std::vector<std::int32_t*>, std::string*> places;
-  bool may_be_infinite = false;
-};
-
-/// The stored values of a struct, each listed once, in the fixed order of the payload hash. Rules,
-/// datasets to write and values read follow from the list.
-class StoredValues {
- public:
-  explicit StoredValues(std::string group) : group_(std::move(group)) {}
-
-  template <typename T>
-  StoredValue& numbers(const char* name,
-                       std::initializer_list<T*> places,
-                       const char* units,
-                       const char* frame) {
-    return add(name, std::vector(places), {places.size()}, units, frame);
-  }
-  /// Row by row.
-  template <typename Derived>
-  void matrix(const char* name,
-              Eigen::PlainObjectBase<Derived>& matrix,
-              const char* units,
-              const char* frame) {
-    std::vector<typename Derived::Scalar*> places;
-    for (Eigen::Index row = 0; row < matrix.rows(); ++row)
-      for (Eigen::Index column = 0; column < matrix.cols(); ++column)
-        places.push_back(&matrix(row, column));
-    std::vector<std::uint64_t> extents = {static_cast<std::uint64_t>(matrix.rows())};
-    if (matrix.cols() > 1) extents.push_back(static_cast<std::uint64_t>(matrix.cols()));
-    add(name, places, extents, units, frame);
-  }
-  void text(const char* name, std::string& text, std::uint64_t most_bytes) {
-    values_.push_back({{group_ + name, ElementType::Text, {most_bytes}, true, "1", "none"}, &text});
-  }
-  void start_group(std::string group) { group_ = std::move(group); }
-
-  [[nodiscard]] const std::vector<StoredValue>& list() const { return values_; }
-
- private:
-  template <typename T>
-  StoredValue& add(const char* name,
-                   const std::vector<T*>& places,
-                   const std::vector<std::uint64_t>& extents,
-                   const char* units,
-                   const char* frame) {
-    constexpr ElementType kType =
-        std::is_same_v<T, double> ? ElementType::Float64 : ElementType::Int32;
-    values_.push_back({{group_ + name, kType, extents, false, units, frame}, places});
-    return values_.back();
-  }
-
-  std::string group_;
-  std::vector<StoredValue> values_;
-};
 
 /// Of a field's geometry that has as many slabs as the file.
 StoredValues stored_values(LightSlab& planes) {
@@ -200,59 +105,9 @@ StoredValues stored_values(MotionRange& range) {
   return values;
 }
 
-void append_rules(const StoredValues& values, std::vector<DatasetRule>& rules) {
-  for (const StoredValue& value : values.list()) rules.push_back(value.rule);
-}
-
 template <typename Struct>
 void append_datasets(Struct described, std::vector<Dataset>& datasets) {
-  const StoredValues values = stored_values(described);
-  for (const StoredValue& value : values.list())
-    datasets.push_back(std::visit(
-        [&]<typename Places>(const Places& places) {
-          if constexpr (std::is_same_v<Places, std::string*>) {
-            return dataset_of<char>(value.rule, stored_text(*places));
-          } else {
-            std::vector<std::remove_pointer_t<typename Places::value_type>> numbers;
-            numbers.reserve(places.size());
-            for (const auto* place : places) numbers.push_back(*place);
-            return dataset_of<typename decltype(numbers)::value_type>(value.rule, numbers);
-          }
-        },
-        value.places));
-}
-
-template <typename T>
-void set_numbers(const Dataset& dataset,
-                 const StoredValue& value,
-                 const std::vector<T*>& places,
-                 const std::string& path) {
-  const std::vector<T> numbers = values_of<T>(dataset, path);
-  check(numbers.size() == places.size(), "extents of the rule");
-  for (std::size_t i = 0; i < numbers.size(); ++i) {
-    if (!value.may_be_infinite && std::isinf(static_cast<double>(numbers[i])))
-      throw FileError(path, value.rule.name, "finite numbers", "infinity");
-    *places[i] = numbers[i];
-  }
-}
-
-/// From the first datasets; returns the others.
-std::span<const Dataset> set_values(const StoredValues& values,
-                                    std::span<const Dataset> datasets,
-                                    const std::string& path) {
-  const std::vector<StoredValue>& list = values.list();
-  check(datasets.size() >= list.size(), "a dataset per rule");
-  for (std::size_t i = 0; i < list.size(); ++i) {
-    const Dataset& dataset = datasets[i];
-    const StoredValue& value = list[i];
-    if (std::string* const* text = std::get_if<std::string*>(&value.places))
-      **text = text_of(dataset);
-    else if (const auto* doubles = std::get_if<std::vector<double*>>(&value.places))
-      set_numbers(dataset, value, *doubles, path);
-    else
-      set_numbers(dataset, value, std::get<std::vector<std::int32_t*>>(value.places), path);
-  }
-  return datasets.subspan(list.size());
+  append_datasets(stored_values(described), datasets);
 }
 
 /// What must hold before the indices can even be looked for; without planes, when there are none.
@@ -335,37 +190,6 @@ std::string payload_line(const DatasetRule& rule, const std::string& sha256) {
 
 }  // namespace
 
-std::size_t element_bytes(ElementType type) {
-  switch (type) {
-    case ElementType::Float64:
-      return 8;
-    case ElementType::Float32:
-    case ElementType::Int32:
-      return 4;
-    case ElementType::UInt16:
-      return 2;
-    case ElementType::Text:
-      break;
-  }
-  return 1;
-}
-
-const char* to_string(ElementType type) {
-  switch (type) {
-    case ElementType::Float64:
-      return "float64";
-    case ElementType::Float32:
-      return "float32";
-    case ElementType::Int32:
-      return "int32";
-    case ElementType::UInt16:
-      return "uint16";
-    case ElementType::Text:
-      break;
-  }
-  return "text";
-}
-
 DatasetRule slab_count_rule() {
   return {"/geometry/slab_count", ElementType::Int32, {1}, false, "1", "none"};
 }
@@ -426,7 +250,7 @@ DatasetRule material_rule() {
 
 std::vector<Dataset> material_datasets(FieldMaterial material) {
   if (material == FieldMaterial::All) return {};
-  return {dataset_of<char>(material_rule(), stored_text(kBoneText))};
+  return {text_dataset(material_rule(), kBoneText)};
 }
 
 FieldMaterial material_of(const Dataset& dataset, const std::string& path) {
@@ -561,7 +385,7 @@ std::vector<Dataset> datasets_of(const FieldProvenance& provenance) {
                                   &provenance.command_line,
                                   &provenance.options_toml,
                                   &provenance.provenance_json})
-    datasets.push_back(dataset_of<char>(rules[datasets.size()], stored_text(*text)));
+    datasets.push_back(text_dataset(rules[datasets.size()], *text));
   return datasets;
 }
 
@@ -587,19 +411,6 @@ CompressedAttenuationField field_of(std::span<const Dataset> datasets, const std
 FieldProvenance provenance_of(std::span<const Dataset> datasets) {
   check(datasets.size() == 4, "a dataset per rule");
   return {text_of(datasets[0]), text_of(datasets[1]), text_of(datasets[2]), text_of(datasets[3])};
-}
-
-std::string look_up_of(const FieldProvenance& provenance, const std::string& path) {
-  const std::string key = "look_up = ";
-  std::istringstream lines(provenance.options_toml);
-  for (std::string line; std::getline(lines, line);) {
-    if (!line.starts_with(key)) continue;
-    const std::string value = line.substr(key.size());
-    for (const char* known : {"linear", "cubic"})
-      if (value == '"' + std::string(known) + '"') return known;
-    throw FileError(path, "/provenance/options_toml: look_up", "\"linear\" or \"cubic\"", value);
-  }
-  return "linear";
 }
 
 int slab_count_of(const Dataset& dataset, const std::string& path) {

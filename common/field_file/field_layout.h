@@ -2,17 +2,16 @@
 // Internal to field_file: which datasets a field file holds and what they mean. No HDF5 here.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <span>
 #include <string>
-#include <tuple>
 #include <vector>
 
 #include "field/attenuation_atlas.h"
 #include "field/compressed_attenuation_field.h"
 #include "field_file/field_file.h"
+#include "field_file/stored_values.h"
 
 namespace af::field_layout {
 
@@ -44,31 +43,6 @@ inline std::filesystem::path unfinished_path(const std::filesystem::path& path) 
 inline std::filesystem::path io_test_path(const std::filesystem::path& path) {
   return path.string() + ".io-test";
 }
-
-enum class ElementType { Float64, Float32, Int32, UInt16, Text };
-
-std::size_t element_bytes(ElementType type);
-const char* to_string(ElementType type);
-
-/// What a dataset must look like. A text has one extent, its length in bytes.
-struct DatasetRule {
-  std::string name;  ///< path within the file
-  ElementType type = ElementType::Float64;
-  std::vector<std::uint64_t> extents;  ///< for a text and the codebook: the largest first extent
-  bool is_first_extent_free = false;   ///< the first extent may be 1 ... extents[0]
-  std::string units;
-  std::string frame;
-  std::uint64_t rows_per_tile = 1;  ///< of indices: 2 where rows of means follow theirs along s
-};
-
-/// A small dataset, held whole.
-struct Dataset {
-  DatasetRule rule;  ///< with its true extents
-  std::vector<std::byte> bytes;
-
-  /// What other ranks need of it.
-  auto members() { return std::tie(rule.name, rule.type, rule.extents, bytes); }
-};
 
 /// The rules of all small datasets that count as payload, in the fixed order of the payload hash;
 /// the indices of the slabs follow them.
@@ -135,9 +109,6 @@ std::span<const Dataset> set_geometry(std::span<const Dataset> datasets,
 /// no sense: NaN, bad geometry, a codebook out of order, ranges outside the lattice.
 CompressedAttenuationField field_of(std::span<const Dataset> datasets, const std::string& path);
 FieldProvenance provenance_of(std::span<const Dataset> datasets);
-/// The look-up that a field's options name, "linear" where they name none. FileError when there is
-/// no such way.
-std::string look_up_of(const FieldProvenance& provenance, const std::string& path);
 int slab_count_of(const Dataset& dataset, const std::string& path);
 
 /// SHA-256 of a field's content: of its datasets, and of its indices by their own hashes.
