@@ -15,8 +15,8 @@
 #include "files/output_file.h"
 #include "parallel/work_watch.h"
 #include "precompute/build_record.h"
+#include "precompute/cast_dependencies.h"
 #include "precompute/casting/casters.h"
-#include "precompute/casting_decides.h"
 #include "precompute/design_choice.h"
 #include "precompute/dry_run.h"
 #include "precompute/field_parts.h"
@@ -24,7 +24,7 @@
 #include "precompute/phase_clock.h"
 #include "precompute/pipeline/field_build.h"
 #include "precompute/pipeline/field_encoder.h"
-#include "precompute/pipeline/training_checkpoints.h"
+#include "precompute/pipeline/training_journal.h"
 #include "precompute/units/unit_planner.h"
 #include "run/progress_printer.h"
 #include "run/run_folder.h"
@@ -193,7 +193,7 @@ class PrecomputeRun {
   /// Collective.
   [[nodiscard]] MemoryPlan memory_plan(const std::vector<WorkUnit>& units) const {
     // The program's pages are shared by the ranks of a node, but the first rank counts, too.
-    const ProcessMemory now = process_memory();
+    const ProcessMemory now = measured_memory();
     const std::uint64_t fixed =
         largest_over_ranks(without_volume(now.own_bytes) + now.program_bytes);
     return plan_memory(lattice_, units, options_, fixed, world_.size());
@@ -230,9 +230,9 @@ class PrecomputeRun {
     // A limit that is too low is refused before anything is made.
     const MemoryPlan memory = memory_plan(plan_units(lattice_, plan()));
     all_or_none(world_, [&] { (void)memory_limit(options_, memory); });
-    const DecidingValues decides = casting_decides(options_, source_, parts_);
+    const DecidingValues decides = cast_dependencies(options_, source_, parts_);
     UnfinishedWork work = run_.unfinished("units", decides);
-    work.plan = plan().rays_per_unit;
+    work.unit_size = plan().rays_per_unit;
     std::optional<UnitStore> progress;
     if (options_.has_checkpoint) progress.emplace(work, world_);
     if (progress.has_value() && progress->has_replaced_refused())
@@ -240,7 +240,7 @@ class PrecomputeRun {
              "unfinished work in " + progress->path().string() +
                  " is discarded: its options were refused, and they have changed");
     const auto units =
-        plan_units(lattice_, {progress.has_value() ? progress->rays_per_unit() : work.plan});
+        plan_units(lattice_, {progress.has_value() ? progress->rays_per_unit() : work.unit_size});
     const FieldBuild build{caster,
                            lattice_,
                            units,
@@ -437,7 +437,7 @@ class PrecomputeRun {
             encoder.busy_seconds(),
             encoder.units_resumed(),
             iterations_resumed_,
-            largest_over_ranks(without_volume(process_memory().peak_own_bytes)),
+            largest_over_ranks(without_volume(measured_memory().peak_own_bytes)),
             volume_bytes()};
   }
 

@@ -117,7 +117,7 @@ bool is_there(const fs::path& path) {
 }
 
 /// The manifest; FileError that says what to do when it cannot be one.
-UnfinishedWork read_manifest(const fs::path& path, std::int64_t least_plan) {
+UnfinishedWork read_manifest(const fs::path& path, std::int64_t least_unit_size) {
   const auto unusable = [&](const std::string& why) {
     return FileError(path.string(), why + ": start over with --restart");
   };
@@ -132,10 +132,10 @@ UnfinishedWork read_manifest(const fs::path& path, std::int64_t least_plan) {
                      std::to_string(kFormatVersion));
     UnfinishedWork work;
     work.decides = manifest.at("decides").get<DecidingValues>();
-    work.plan = manifest.at("plan").get<std::int64_t>();
-    if (work.plan < least_plan)
-      throw unusable("plan = " + std::to_string(work.plan) + ": must be at least " +
-                     std::to_string(least_plan));
+    work.unit_size = manifest.at("plan").get<std::int64_t>();
+    if (work.unit_size < least_unit_size)
+      throw unusable("plan = " + std::to_string(work.unit_size) + ": must be at least " +
+                     std::to_string(least_unit_size));
     return work;
   } catch (const nlohmann::json::exception& damage) {
     throw unusable(std::string("damaged (") + damage.what() + ")");
@@ -211,7 +211,7 @@ bool holds_progress_journal(const fs::path& folder) {
 }
 
 ProgressJournal::ProgressJournal(const UnfinishedWork& work)
-    : files_{work.folder, work.name}, plan_(work.plan) {
+    : files_{work.folder, work.name}, unit_size_(work.unit_size) {
   if (work.restarts && is_there(files_.folder) && !fs::is_directory(files_.folder))
     fs::remove_all(files_.folder);
   make_output_folder(files_.folder);
@@ -240,7 +240,7 @@ void ProgressJournal::open(const UnfinishedWork& work) {
   const nlohmann::json written = {{"format", kFormat},
                                   {"format_version", kFormatVersion},
                                   {"decides", work.decides},
-                                  {"plan", work.plan}};
+                                  {"plan", work.unit_size}};
   write_text_file(files_.manifest(), written.dump(2) + "\n");
 }
 
@@ -248,7 +248,7 @@ void ProgressJournal::open(const UnfinishedWork& work) {
 bool ProgressJournal::takes_over(const UnfinishedWork& work) {
   UnfinishedWork earlier;
   try {
-    earlier = read_manifest(files_.manifest(), work.plan > 0 ? 1 : 0);
+    earlier = read_manifest(files_.manifest(), work.unit_size > 0 ? 1 : 0);
   } catch (const FileError&) {
     if (!work.gives_way) throw;
     has_replaced_ = true;
@@ -256,7 +256,7 @@ bool ProgressJournal::takes_over(const UnfinishedWork& work) {
   }
   std::vector<std::string> problems = differences(earlier.decides, work.decides);
   if (problems.empty()) {
-    plan_ = earlier.plan;
+    unit_size_ = earlier.unit_size;
     return true;
   }
   if (!work.gives_way && !fs::exists(refused_path(files_))) {

@@ -24,7 +24,7 @@ struct UnfinishedWork {
   std::filesystem::path folder;  ///< "OUTPUT.progress": RunFolder::unfinished()
   std::string name;              ///< of its files; several may share a folder
   DecidingValues decides;        ///< what every result depends on
-  std::int64_t plan = 0;         ///< how it is cut up; later runs take over the first one's
+  std::int64_t unit_size = 0;    ///< of what it is cut into; later runs keep the first one's
   bool gives_way = false;        ///< discarded, not refused, when it cannot be continued
   bool restarts = false;         ///< discard any earlier progress
 };
@@ -85,7 +85,7 @@ class ProgressJournal {
   /// The number of this run, one more than any before.
   [[nodiscard]] std::int64_t run() const { return run_; }
   /// Of the work; of the run that began it, when this one goes on.
-  [[nodiscard]] std::int64_t plan() const { return plan_; }
+  [[nodiscard]] std::int64_t unit_size() const { return unit_size_; }
   /// Whether work of other options was thrown away.
   [[nodiscard]] bool has_replaced() const { return has_replaced_; }
 
@@ -103,7 +103,7 @@ class ProgressJournal {
 
   JournalFiles files_;
   std::int64_t run_ = 0;
-  std::int64_t plan_ = 0;
+  std::int64_t unit_size_ = 0;
   bool has_replaced_ = false;
 };
 

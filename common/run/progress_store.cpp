@@ -11,17 +11,17 @@ namespace af {
 
 ProgressStore::ProgressStore(const UnfinishedWork& work, const Communicator& communicator)
     : files_{work.folder, work.name}, communicator_(communicator) {
-  std::array<std::uint64_t, 2> run_and_plan{};
+  std::array<std::uint64_t, 2> run_and_unit_size{};
   all_or_none(communicator_, [&] {
     if (!communicator_.is_root()) return;
     journal_.emplace(work);
-    run_and_plan = {static_cast<std::uint64_t>(journal_->run()),
-                    static_cast<std::uint64_t>(journal_->plan())};
+    run_and_unit_size = {static_cast<std::uint64_t>(journal_->run()),
+                         static_cast<std::uint64_t>(journal_->unit_size())};
   });
-  communicator_.maximum(run_and_plan);
-  plan_ = static_cast<std::int64_t>(run_and_plan[1]);
-  shard_.emplace(files_,
-                 JournalShard{static_cast<std::int64_t>(run_and_plan[0]), communicator_.rank()});
+  communicator_.maximum(run_and_unit_size);
+  unit_size_ = static_cast<std::int64_t>(run_and_unit_size[1]);
+  shard_.emplace(
+      files_, JournalShard{static_cast<std::int64_t>(run_and_unit_size[0]), communicator_.rank()});
 }
 
 void ProgressStore::visit(const ProgressJournal::Visit& visit) const {

@@ -20,8 +20,8 @@ class ProgressStore {
   ProgressStore(const UnfinishedWork& work, const Communicator& communicator);
 
   [[nodiscard]] const std::filesystem::path& folder() const { return files_.folder; }
-  /// As ProgressJournal::plan(), the same on every rank.
-  [[nodiscard]] std::int64_t plan() const { return plan_; }
+  /// As ProgressJournal::unit_size(), the same on every rank.
+  [[nodiscard]] std::int64_t unit_size() const { return unit_size_; }
   /// Rank 0: as ProgressJournal::has_replaced() and visit().
   [[nodiscard]] bool has_replaced() const { return journal_->has_replaced(); }
   void visit(const ProgressJournal::Visit& visit) const;
@@ -48,7 +48,7 @@ class ProgressStore {
   Communicator communicator_;
   std::optional<ProgressJournal> journal_;  ///< rank 0
   std::optional<ProgressShard> shard_;
-  std::int64_t plan_ = 0;
+  std::int64_t unit_size_ = 0;
 };
 
 }  // namespace af

@@ -19,12 +19,12 @@ namespace af {
 /// indices. What is damaged is done again. \test FieldBuildTest.DamagedAndTornShardsAreCastAgain
 class UnitStore {
  public:
-  /// Collective. `work.plan`: rays per unit. InputError that names the difference when an earlier
-  /// run was about something else.
+  /// Collective. `work.unit_size`: rays per unit. InputError that names the difference when an
+  /// earlier run was about something else.
   UnitStore(const UnfinishedWork& work, const Communicator& communicator);
 
   /// Of the run that began the work.
-  [[nodiscard]] std::int64_t rays_per_unit() const { return store_.plan(); }
+  [[nodiscard]] std::int64_t rays_per_unit() const { return store_.unit_size(); }
   /// Rank 0: whether unfinished work was thrown away because its options had been refused, and
   /// these are others.
   [[nodiscard]] bool has_replaced_refused() const { return store_.has_replaced(); }

@@ -91,7 +91,7 @@ std::uint64_t memory_limit(const PrecomputeOptions& options, const MemoryPlan& p
   return options.memory_limit_bytes;
 }
 
-ProcessMemory process_memory() {
+ProcessMemory measured_memory() {
   std::ifstream status("/proc/self/status");
   ProcessMemory memory;
   std::uint64_t peak = 0;

@@ -41,7 +41,7 @@ struct ProcessMemory {
   std::uint64_t peak_own_bytes = 0;  ///< most that was resident since forget_peak(), less the two
 };
 
-ProcessMemory process_memory();
+ProcessMemory measured_memory();
 
 /// Starts a new peak.
 void forget_peak();

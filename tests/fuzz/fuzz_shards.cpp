@@ -12,7 +12,7 @@
 #include "fuzz/fuzz_input.h"
 #include "parallel/mpi_environment.h"
 #include "precompute/pipeline/field_encoder.h"
-#include "precompute/pipeline/training_checkpoints.h"
+#include "precompute/pipeline/training_journal.h"
 #include "precompute/pipeline/unit_store.h"
 
 namespace {

@@ -16,7 +16,7 @@
 #include "precompute/casting/trilinear_caster.h"
 #include "precompute/casting/unit_costs.h"
 #include "precompute/pipeline/field_encoder.h"
-#include "precompute/pipeline/training_checkpoints.h"
+#include "precompute/pipeline/training_journal.h"
 #include "precompute/units/unit_planner.h"
 #include "support/ct_phantoms.h"
 #include "support/shared_folder.h"

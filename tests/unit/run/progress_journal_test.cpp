@@ -248,12 +248,12 @@ TEST(ProgressJournal, RefusedWorkGivesWayOnceAndGoesOnWithTheSameOptions) {
 TEST(ProgressJournal, TakesOverTheFirstRunsPlan) {
   const test::ScratchFolder folder;
   UnfinishedWork work = work_in(folder / "p");
-  work.plan = 1000;
-  EXPECT_EQ(ProgressJournal(work).plan(), 1000);
-  work.plan = 50;
-  EXPECT_EQ(ProgressJournal(work).plan(), 1000);
+  work.unit_size = 1000;
+  EXPECT_EQ(ProgressJournal(work).unit_size(), 1000);
+  work.unit_size = 50;
+  EXPECT_EQ(ProgressJournal(work).unit_size(), 1000);
   fs::remove_all(folder / "p");
-  EXPECT_EQ(ProgressJournal(work_in(folder / "p")).plan(), 0);  // none is needed
+  EXPECT_EQ(ProgressJournal(work_in(folder / "p")).unit_size(), 0);  // none is needed
   EXPECT_THROW(ProgressJournal{work}, FileError);
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "precompute/pipeline/training_checkpoints.h"
+#include "precompute/pipeline/training_journal.h"
 
 #include <span>
 #include <utility>

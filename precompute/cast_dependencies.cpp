@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "precompute/casting_decides.h"
+#include "precompute/cast_dependencies.h"
 
 #include <string>
 
@@ -22,9 +22,9 @@ std::string numbers_text(const Eigen::PlainObjectBase<Derived>& matrix) {
 
 }  // namespace
 
-DecidingValues casting_decides(const PrecomputeOptions& options,
-                               const FieldSource& source,
-                               const std::vector<FieldPart>& parts) {
+DecidingValues cast_dependencies(const PrecomputeOptions& options,
+                                 const FieldSource& source,
+                                 const std::vector<FieldPart>& parts) {
   DecidingValues decides = deciding_values(deciding_options(options, kCastingStage), {});
   const auto add_camera = [&](const CameraGeometry& camera, const std::string& what) {
     decides[what] = camera.name;
