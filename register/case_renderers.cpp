@@ -16,7 +16,7 @@
 #include "drr/ray_cast_drr.h"
 #include "drr/two_pass_af_drr.h"
 #include "geometry/pose_in_range.h"
-#include "study/bone_per_node.h"
+#include "study/node_volume.h"
 #include "volume/blurred_volume.h"
 
 namespace af::registration {
@@ -31,14 +31,12 @@ std::shared_ptr<const AttenuationVolume> blurred_per_node(const AttenuationVolum
                                                           double sigma_mm,
                                                           const Communicator& communicator) {
   const VolumeBlur blur(volume.grid(), sigma_mm);
-  const std::size_t count = blur.grid().voxel_count();
-  const auto owner = communicator.allocate_on_node(
-      count * sizeof(std::uint16_t), [&](std::span<std::byte> memory) {
-        blur.fill(volume, {reinterpret_cast<std::uint16_t*>(memory.data()), count});
-      });
-  const auto* const voxels = reinterpret_cast<const std::uint16_t*>(owner.get());
-  return std::make_shared<const AttenuationVolume>(
-      blur.grid(), volume.model(), SharedArray<std::uint16_t>(owner, {voxels, count}));
+  return volume_per_node(
+      blur.grid(),
+      volume.model(),
+      VoxelSource::Node,
+      [&](std::span<std::uint16_t> voxels) { blur.fill(volume, voxels); },
+      communicator);
 }
 
 /// Parts of a rank's share of a level, one thread's work each. The same on every rank, however many

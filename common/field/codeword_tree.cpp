@@ -86,16 +86,6 @@ CodewordTables CodewordTree::tables() const {
           mean_step_};
 }
 
-CodewordTree::Node CodewordTree::node(std::uint32_t number) const {
-  if (codewords_at_[number] != 0) return {.codeword = codewords_at_[number]};
-  const Place place = place_of(number);
-  const NodeCluster& cluster = clusters_[place.cluster];
-  const std::int32_t split = cluster.splits[place.within];
-  return {.threshold = cluster.thresholds[place.within],
-          .coefficient = static_cast<std::uint8_t>(split % 16),
-          .quarter_octaves = static_cast<std::int8_t>(split / 16)};
-}
-
 CodewordTree::Place CodewordTree::place_of(std::uint32_t number) const {
   // Levels that there are not, above the root, fill the uppermost cluster.
   const int missing = (kLevelsOfCluster - depth_ % kLevelsOfCluster) % kLevelsOfCluster;

@@ -28,18 +28,6 @@ class CodewordTree {
  public:
   explicit CodewordTree(const Codebook& codebook);
 
-  struct Node {
-    float threshold = 0.0f;           ///< midway between the halves
-    std::uint16_t codeword = 0;       ///< of a leaf; 0 marks a node that splits
-    std::uint8_t coefficient = 0;     ///< that it splits
-    std::int8_t quarter_octaves = 0;  ///< of the standard deviation of that coefficient
-  };
-
-  [[nodiscard]] Node node(std::uint32_t number) const;
-  [[nodiscard]] std::uint32_t leaf_of(std::uint16_t codeword) const { return leaves_[codeword]; }
-  [[nodiscard]] const TileCoefficients& coefficients(std::uint16_t codeword) const {
-    return coefficients_[codeword].values;
-  }
   [[nodiscard]] std::size_t codeword_count() const { return coefficients_.size(); }
   [[nodiscard]] int mean_step() const { return mean_step_; }
   /// For the kernels, while this lives.

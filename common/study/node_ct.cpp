@@ -2,10 +2,12 @@
 #include "study/node_ct.h"
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <tuple>
 
 #include "base/stored_bytes.h"
+#include "study/node_volume.h"
 #include "volume/cut_faces.h"
 
 namespace af {
@@ -56,15 +58,10 @@ NodeCt read_ct_per_node(const std::filesystem::path& path,
                         std::vector<std::string>& warnings) {
   CtVolume ct;
   const FoundInCt found = read_on_root(path, options, model, communicator, ct, warnings);
-  const std::size_t count = found.bordered.voxel_count();
-  const auto owner = communicator.allocate_on_nodes_from_root(
-      count * sizeof(std::uint16_t), [&](std::span<std::byte> memory) {
-        AttenuationVolume::fill_voxels(
-            ct, model, found.bordered, {reinterpret_cast<std::uint16_t*>(memory.data()), count});
-      });
-  const auto* const voxels = reinterpret_cast<const std::uint16_t*>(owner.get());
-  return {std::make_shared<const AttenuationVolume>(
-              found.bordered, model, SharedArray<std::uint16_t>(owner, {voxels, count})),
+  const auto fill = [&](std::span<std::uint16_t> voxels) {
+    AttenuationVolume::fill_voxels(ct, model, found.bordered, voxels);
+  };
+  return {volume_per_node(found.bordered, model, VoxelSource::Root, fill, communicator),
           found.facts};
 }
 

@@ -47,10 +47,6 @@ std::vector<std::string> problems(const AttenuationModel& model) {
   return field_problems(model);
 }
 
-CtGrid AttenuationVolume::bordered_grid_of(const CtVolume& ct, const AttenuationModel& model) {
-  return bordered_grid(ct.grid, attenuating_box(ct, model));
-}
-
 void AttenuationVolume::fill_voxels(const CtVolume& ct,
                                     const AttenuationModel& model,
                                     const CtGrid& bordered_grid,
@@ -72,7 +68,7 @@ void AttenuationVolume::fill_voxels(const CtVolume& ct,
 }
 
 AttenuationVolume::AttenuationVolume(const CtVolume& ct, const AttenuationModel& model)
-    : grid_(bordered_grid_of(ct, model)), model_(model) {
+    : grid_(bordered_grid(ct.grid, attenuating_box(ct, model))), model_(model) {
   std::vector<std::uint16_t> voxels(grid_.voxel_count());
   fill_voxels(ct, model, grid_, voxels);
   max_mu_per_mm_ = *std::max_element(voxels.begin(), voxels.end()) * model.mu_per_mm_per_unit();

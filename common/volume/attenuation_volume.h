@@ -44,9 +44,8 @@ class AttenuationVolume {
                     const AttenuationModel& model,
                     SharedArray<std::uint16_t> voxels);
 
-  /// Grid with border of the volume that is made from a CT. InputError when no voxel attenuates.
-  [[nodiscard]] static CtGrid bordered_grid_of(const CtVolume& ct, const AttenuationModel& model);
-  /// The voxels of that volume, into memory for bordered_grid.voxel_count() of them.
+  /// The voxels of the volume that is made from a CT, into memory for bordered_grid.voxel_count()
+  /// of them.
   static void fill_voxels(const CtVolume& ct,
                           const AttenuationModel& model,
                           const CtGrid& bordered_grid,

@@ -30,6 +30,11 @@ std::array<bool, 3> resampled_axes(const CtGrid& grid, const RigidTransform& sla
   return is_resampled;
 }
 
+/// Whether no slab axis runs along an axis of the CT.
+bool is_tilted(const std::array<bool, 3>& is_resampled) {
+  return is_resampled[0] && is_resampled[1] && is_resampled[2];
+}
+
 Eigen::Vector3d resampled_spacing(const CtGrid& grid,
                                   const RigidTransform& slab_from_ct,
                                   double relative_spacing) {
@@ -43,7 +48,7 @@ Eigen::Vector3d resampled_spacing(const CtGrid& grid,
   // Voxels that are tilted about every axis leave less room between the frequencies that a slice
   // must keep and those that it must suppress (RowSampler in slab_aligned_volume.cpp).
   constexpr double kTiltedSpacing = 0.8;
-  if (is_resampled[0] && is_resampled[1] && is_resampled[2]) spacing_mm.y() *= kTiltedSpacing;
+  if (is_tilted(is_resampled)) spacing_mm.y() *= kTiltedSpacing;
   // From slice to slice a ray moves sideways by up to its slope times their distance; between
   // slices it is taken to change linearly, which needs that move to stay within a voxel.
   constexpr double kLargestRatio = 1.25;
@@ -289,9 +294,8 @@ SlabAlignedLayout slab_aligned_layout(const AttenuationVolume& volume,
   throw_if_any(problems(options));
   const std::size_t largest =
       options.largest_bytes > 0 ? options.largest_bytes : default_largest_bytes(volume);
-  const auto is_resampled = resampled_axes(volume.grid(), slab_from_ct);
-  const bool is_tilted = is_resampled[0] && is_resampled[1] && is_resampled[2];
-  double relative_spacing = is_tilted ? options.tilted_spacing : options.turned_spacing;
+  const bool tilted = is_tilted(resampled_axes(volume.grid(), slab_from_ct));
+  double relative_spacing = tilted ? options.tilted_spacing : options.turned_spacing;
   while (true) {
     SlabAlignedLayout layout = layout_of(
         volume,
@@ -303,7 +307,7 @@ SlabAlignedLayout slab_aligned_layout(const AttenuationVolume& volume,
     if (excess <= 1.0 || !layout.grid.is_oblique() || relative_spacing >= 1.0) return layout;
     // Rows end at whole blocks, so that bytes fall a little less than nodes do.
     constexpr double kLeastCoarsening = 1.02;
-    relative_spacing *= std::max(kLeastCoarsening, is_tilted ? std::sqrt(excess) : excess);
+    relative_spacing *= std::max(kLeastCoarsening, tilted ? std::sqrt(excess) : excess);
     relative_spacing = std::min(relative_spacing, 1.0);
   }
 }

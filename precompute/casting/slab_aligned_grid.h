@@ -36,9 +36,6 @@ struct SlabAlignedGrid {
   [[nodiscard]] bool is_oblique() const {
     return is_resampled[0] || is_resampled[1] || is_resampled[2];
   }
-  [[nodiscard]] bool is_tilted() const {
-    return is_resampled[0] && is_resampled[1] && is_resampled[2];
-  }
   [[nodiscard]] std::size_t row_count() const { return row_index(size[1], 0); }
   [[nodiscard]] std::size_t row_index(int y, int z) const {
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(size[2]) +

@@ -2,6 +2,7 @@
 #include "field/index_coding.h"
 
 #include <algorithm>
+#include <bit>
 
 #include <gtest/gtest.h>
 
@@ -261,17 +262,28 @@ TEST(IndexCoding, ShrinksNothingByMoreThanDeflateCan) {
 TEST(CodewordTree, LeadsToEveryCodewordAndSplitsAtItsThresholds) {
   const Codebook codebook = some_codebook(1000);
   const CodewordTree tree(codebook);
+  const CodewordTables tables = tree.tables();
   for (std::uint16_t i = 1; i < 1000; ++i) {
-    const std::uint32_t leaf = tree.leaf_of(i);
-    ASSERT_EQ(tree.node(leaf).codeword, i);
-    for (std::uint32_t number = leaf; number > 1; number /= 2) {
-      const CodewordTree::Node& above = tree.node(number / 2);
-      ASSERT_EQ(above.codeword, 0);
-      const float value = tree.coefficients(i)[above.coefficient];
-      if (number % 2 == 0)
-        EXPECT_LE(value, above.threshold);
+    const std::uint32_t leaf = tables.leaves[i];
+    ASSERT_EQ(tables.codewords_at[leaf], i);
+    std::uint32_t cluster = 0;
+    std::uint32_t within = tables.first_node;
+    for (int left = static_cast<int>(std::bit_width(leaf)) - 2; left >= 0; --left) {
+      const std::uint32_t number = leaf >> static_cast<unsigned>(left);
+      const std::uint32_t turn = number & 1u;
+      ASSERT_EQ(tables.codewords_at[number / 2], 0);
+      const auto coefficient =
+          static_cast<std::size_t>(tables.clusters[cluster].splits[within] % kNodesOfCluster);
+      const float threshold = tables.clusters[cluster].thresholds[within];
+      const float value = tables.coefficients[i * kTileElements + coefficient];
+      if (turn == 0)
+        EXPECT_LE(value, threshold);
       else
-        EXPECT_GE(value, above.threshold);
+        EXPECT_GE(value, threshold);
+      within = 2 * within + turn;
+      if (within < kNodesOfCluster) continue;
+      cluster = kNodesOfCluster * cluster + 1 + within - kNodesOfCluster;
+      within = 1;
     }
   }
 }
