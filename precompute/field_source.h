@@ -27,7 +27,7 @@ struct FieldSource {
   PoseFrame frame;
   Eigen::Vector3d isocenter_point = Eigen::Vector3d::Zero();  ///< of the rig
   MotionRange range;                         ///< about the nominal pose: of the options
-  std::vector<HalfSpace> sources;            ///< of it, poses to hold: LightSlabSpec::sources
+  std::vector<HalfSpace> sources;            ///< which of its poses to hold: LightSlabSpec::sources
   std::vector<CameraGeometry> more_cameras;  ///< whose rays the field holds, too
   std::shared_ptr<const MeasuredViews> projections;  ///< that correct the field; null: none
   std::vector<std::string> warnings;

@@ -301,7 +301,8 @@ class PrecomputeRun {
     return megabytes_text(cast.occupied_tiles * sizeof(Tile));
   }
 
-  /// Collective. Options that are refused only now must not stand in the way of better ones.
+  /// Collective. When options are refused only now, the unfinished work gives way: a later run with
+  /// other options may discard it without --restart.
   TrainedCodebook train_or_give_way(const FieldBuild& build,
                                     const DecidingValues& decides,
                                     CastPhase& cast) {

@@ -37,9 +37,10 @@ class IndexCoding {
   [[nodiscard]] std::vector<std::uint8_t> encode(std::span<const std::uint16_t> indices,
                                                  const std::array<std::size_t, 4>& tiles) const;
 
-  /// Some blocks of equal extents, a few of them in turns: a turn waits for the one before it, but
-  /// not for another block's. False when the bytes of any cannot be an encoder's for so many tiles;
-  /// `indices` are then of no use, but below the number of codewords.
+  /// Some blocks of equal extents. A few are decoded alternately, turn by turn: a turn depends on
+  /// the one before it in its block, but not on other blocks, so that the processor overlaps them.
+  /// False when the bytes of any cannot be an encoder's for so many tiles; `indices` are then of no
+  /// use, but below the number of codewords.
   [[nodiscard]] bool decode(std::span<const CodedBlock> blocks,
                             const std::array<std::size_t, 4>& tiles) const;
   [[nodiscard]] bool decode(std::span<const std::uint8_t> bytes,

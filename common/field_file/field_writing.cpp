@@ -390,7 +390,8 @@ FieldFileInfo write_file(const FileContents& contents,
   FieldFileInfo info;
   info.payload_bytes = contents.payload_bytes;
   info.packing = contents.packing;
-  // Before the part that removes the partial file when it fails: it may be none of ours.
+  // Outside the block below, which removes the partial file when it fails: what is refused here may
+  // be a file that this program did not make.
   all_or_none(communicator, [&] {
     if (communicator.is_root()) check_output_file(path, partial);
   });

@@ -18,8 +18,8 @@ namespace af::hdf5 {
 inline constexpr H5Z_filter_t kIndexFilter = 411;
 
 /// While alive, datasets with the filter can be read and written: HDF5 hands a filter nothing but a
-/// chunk, so the codebook stands beside it. One may live within another and then takes its place.
-/// Not for several threads.
+/// chunk, so the codebook stands beside it. One that is made while another is alive replaces it
+/// until it is destroyed. Not for several threads.
 class IndexFilter {
  public:
   explicit IndexFilter(const Codebook& codebook);

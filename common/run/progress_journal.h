@@ -51,8 +51,8 @@ struct RecordPlace {
 /// .records each process appends its finished records, so that nothing passes through one process.
 /// A record has a key, its size, and CRC-32Cs of its header and its content. A reader comes to a
 /// record through the headers before it, so a torn or damaged header ends its file, while damaged
-/// content is the loss of one record. Nobody appends to the files of an earlier run; and what a
-/// process of such a run still writes, on a host that was lost and came back, harms nobody.
+/// content is the loss of one record. Nobody appends to the files of an earlier run: a process of
+/// such a run that still writes, on a host that was lost and came back, damages nothing.
 struct JournalFiles {
   std::filesystem::path folder;
   std::string name;
