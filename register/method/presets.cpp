@@ -49,11 +49,11 @@ RegistrationOptions robust_preset() {
                                     "gc gauss-newton level=2 pixels=8 roi=2 final=0.2;"
                                     "rg gauss-newton level=1 pixels=4 final=0.1"),
                     chain_from_text("wide",
-                                    "rg cma-es level=2 pixels=16 roi=2 step=8 final=1;"
+                                    "rg cma-es level=2 pixels=16 roi=2 step=12 final=1;"
                                     "rg gauss-newton level=2 pixels=8 roi=2 final=0.2;"
                                     "rg gauss-newton level=1 pixels=4 final=0.1"),
                     chain_from_text("wide-edges",
-                                    "gc cma-es level=2 pixels=16 roi=2 step=8 final=1;"
+                                    "gc cma-es level=3 pixels=8 roi=2 step=12 final=1;"
                                     "rg gauss-newton level=2 pixels=8 roi=2 final=0.2;"
                                     "rg gauss-newton level=1 pixels=4 final=0.1")};
   options.finish = chain_from_text("finish", "rg quasi-newton pixels=2 step=2 final=0.02");
