@@ -220,9 +220,8 @@ TEST(PrecomputeOptions, AnAtlasHasItsOwnPreset) {
   options.orbit = "axis=z,from=-90,to=90";
   const FieldDesign of_field = design_preset_named(kDefaultPreset).design;
   const FieldDesign of_atlas = options.in_force().design();
-  EXPECT_GT(of_atlas.mean_step, 0);
-  EXPECT_EQ(of_atlas.uv_nodes, of_field.uv_nodes);
-  EXPECT_EQ(of_atlas.st_nodes, of_field.st_nodes);
+  EXPECT_EQ(of_atlas, design_preset_named(kAtlasPreset).design);
+  EXPECT_NE(of_atlas, of_field);
   options.preset = kDefaultPreset;
   EXPECT_EQ(options.in_force().design(), of_field);
   // Parts that are typed make it the paper's, as a field's.
