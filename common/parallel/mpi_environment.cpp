@@ -26,9 +26,6 @@ bool is_launched() {
 }  // namespace
 
 MpiEnvironment::MpiEnvironment(int& argc, char**& argv) {
-  // Open MPI would make a file per rank beside each file that ranks open together, for shared file
-  // pointers, which we never use. A setting by the user stays.
-  setenv("OMPI_MCA_sharedfp", "^lockedfile", 0);
   // Without mpirun, Open MPI would start a daemon beside the program that could launch more
   // processes. We launch none, and programs start a third faster without it.
   setenv("OMPI_MCA_ess_singleton_isolated", "1", 0);
@@ -37,6 +34,10 @@ MpiEnvironment::MpiEnvironment(int& argc, char**& argv) {
   constexpr const char* kMakesFolder = "OMPI_MCA_orte_create_session_dirs";
   const bool needs_no_folder = !is_launched() && std::getenv(kMakesFolder) == nullptr;
   if (needs_no_folder) setenv(kMakesFolder, "0", 0);
+  // For shared file pointers, which we never use, Open MPI would make a file per rank beside each
+  // file that ranks open together, or one in the folder that there is not. A setting by the user
+  // stays.
+  setenv("OMPI_MCA_sharedfp", needs_no_folder ? "^lockedfile,sm" : "^lockedfile", 0);
   const bool names_process_manager = std::getenv("OMPI_MCA_pmix") != nullptr;
   int provided = 0;
   MPI_Init_thread(&argc, &argv, MPI_THREAD_FUNNELED, &provided);

@@ -195,6 +195,14 @@ TEST_F(Faults, AProgramWithoutMpirunSharesNoFolderWithOthers) {
   EXPECT_NE(launched.exit_code, 0) << "the folder can be made, and this test shows nothing";
 }
 
+TEST_F(Faults, AProgramWithoutMpirunSaysNothingOfMpi) {
+  const test::ProgramRun run = test::run_command(
+      AF_PROGRAM_FOLDER "/af-precompute --study " + study_file().string() +
+      " --camera AP --slabs 1 --uv-nodes 4 --st-nodes 16 --codewords 4 -o " + field().string());
+  EXPECT_EQ(run.exit_code, 0) << run.output;
+  EXPECT_THAT(run.output, Not(HasSubstr("mca_")));
+}
+
 TEST_F(Faults, AProgressFolderDeletedMeanwhileIsSaidOrNotNeeded) {
   test::LaunchedJob job(precompute(kRanks), output());
   ASSERT_TRUE(job.wait_until([] { return unit_bytes() > 0; }));
