@@ -105,8 +105,8 @@ class PrecomputeRun {
     for (FieldPart& part : parts_) size_planes(part, DepthSlabs{{}, {0.0}});
     lattice_ = lattice_of(parts_);
     clock_.end("read");
-    const bool is_for_casting = caster_named(options_.caster).needs_resampled;
-    if (!is_for_casting && !options_.needs_probe() && has_one_central_slab()) return;
+    const bool casting_needs_it = caster_named(options_.caster).needs_resampled;
+    if (!casting_needs_it && !options_.needs_probe() && has_one_central_slab()) return;
     for (std::size_t i = 0; i < parts_.size(); ++i) {
       note.change(parts_.size() == 1 ? "resampling the CT"
                                      : "resampling the CT for " + std::to_string(i + 1) + " of " +
@@ -120,7 +120,7 @@ class PrecomputeRun {
                     return choose_depth_slabs(
                         *part.resampled, options_.design().slabs, options_.st_plane_rule());
                   }));
-      if (!is_for_casting) part.resampled = nullptr;
+      if (!casting_needs_it) part.resampled = nullptr;
     }
     lattice_ = lattice_of(parts_);
   }
@@ -164,7 +164,7 @@ class PrecomputeRun {
     return plan_options_for_ranks(lattice_, world_.size(), caster_named(options_.caster).plan);
   }
 
-  /// Units whose casting tells the speed.
+  /// The units that are cast to measure the speed.
   [[nodiscard]] PlanOptions sample_plan() const {
     const PlanOptions sample = caster_named(options_.caster).sample;
     return sample.rays_per_unit < plan().rays_per_unit ? sample : plan();

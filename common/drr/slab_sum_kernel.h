@@ -28,9 +28,9 @@ struct SlabTerm {
   int32_t stride;
   int32_t columns;
   SumTaps s, t;
-  /// Slopes of the value per node along s and t, times these, belong to the slopes along the
-  /// source's x and z: as the source moves and a node of the sum stays, the place in the slab's
-  /// image where it is seen moves.
+  /// Nodes that the place where a node of the sum is seen in the slab's image moves by, along s and
+  /// t, per mm that the source moves along x and z: the slopes of the value along s and t, times
+  /// these, are added to those along the source's x and z.
   float drift[2];
   float* rows[3];  ///< room for the slab's images between two rows, and 48 values more
   float* sum[3];

@@ -213,7 +213,7 @@ constexpr float kSumWeights[kPredictors] = {weight_of_sum(0),
                                             weight_of_sum(6),
                                             weight_of_sum(7)};
 
-/// Of what the neighbours' means add to the sums of their shapes.
+/// The sum of a tile's levels that its neighbours' means predict.
 AF_KERNEL_INLINE float expected_of_means(const BlockMemory& memory,
                                          const TileNote* const around[kPredictors]) {
   const auto sum_of = [&](const TileNote* note) { return memory.sums[note - memory.notes]; };

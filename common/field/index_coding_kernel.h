@@ -19,8 +19,8 @@ inline constexpr int kLevelsOfCluster = 4;
 inline constexpr int kNodesOfCluster = 1 << kLevelsOfCluster;
 
 /// The nodes of four levels of a CodewordTree: the uppermost at 1, children of n at 2n and 2n + 1.
-/// Beyond 15 a way leaves for the cluster `child` + n - 16 of the level below. In two lines of the
-/// cache, and as vectors.
+/// A path that reaches a number n above 15 goes on in the cluster `child` + n - 16 of the next
+/// level. In two lines of the cache, and as vectors.
 struct alignas(64) NodeCluster {
   float thresholds[kNodesOfCluster];  ///< midway between the halves
   /// 16 times the quarters of octaves of the standard deviation of the coefficient that is split,
@@ -73,7 +73,7 @@ inline constexpr int kNotesBeyond = 4;  ///< that are looked at ahead of time
 struct BlockMemory {
   AdaptiveBit* turns;    ///< [order][distance][width]
   AdaptiveBit* empties;  ///< kEmptyContexts
-  /// By what predictions of each coefficient were wrong by of late, [surprise class][16].
+  /// Recent errors of the predictions of each coefficient, [surprise class][16].
   float* errors;
   int32_t* octaves;  ///< of the errors, in quarters
   /// [u % 2][v][1 + s + 1][1 + t + 1]: tiles beyond the borders are missing. kNotesBeyond follow.

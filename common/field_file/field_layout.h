@@ -61,8 +61,8 @@ std::vector<DatasetRule> within(const std::string& group, std::vector<DatasetRul
 std::vector<Dataset> within(const std::string& group, std::vector<Dataset> datasets);
 DatasetRule member_count_rule();
 /// Payload that stands in an atlas's root: the identity, and the last shared_rules() are codebook
-/// and quantiser. Its rules in payload_rules() are the last, too: the datasets of a member, and
-/// these, are those of a field.
+/// and quantiser. These stand last in payload_rules() as well, so that a member's datasets followed
+/// by them are those of a field.
 std::vector<DatasetRule> atlas_rules(bool has_means);
 inline constexpr std::size_t shared_rules(bool has_means) {
   return has_means ? 3 : 2;

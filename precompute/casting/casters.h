@@ -28,7 +28,7 @@ struct KnownCaster {
   const char* help = nullptr;
   bool needs_resampled = false;  ///< the CT resampled to the light slab's frame
   PlanOptions plan;              ///< units that suit it
-  PlanOptions sample;            ///< units of which few tell its speed
+  PlanOptions sample;            ///< units small enough that casting a few measures its speed
   std::unique_ptr<const FieldCaster> (*make)(const CasterInputs& inputs) = nullptr;
 };
 

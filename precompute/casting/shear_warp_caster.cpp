@@ -287,8 +287,8 @@ class UnitCast {
     }
   }
 
-  /// The column whose sum is at `position` of an accumulator: the two interleaves deal out fours of
-  /// each group of eight.
+  /// The column whose sum is at `position` of an accumulator: of each group of eight columns, the
+  /// first four are in the first half of the accumulator, the others in the second.
   static int column_at(int position) {
     const int half = position / 16;
     const int lane = position % 16;

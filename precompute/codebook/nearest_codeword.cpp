@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "base/vector_width.h"
+#include "field/codeword_tree.h"
 
 namespace af {
 
@@ -17,17 +18,6 @@ constexpr std::size_t kBlockCodewords = 16;
 constexpr float kFarAway = 1e18f;
 /// A box has 16 children.
 constexpr int kHalvingsOfBox = 4;
-
-/// Coefficient `k` of the 4-D Hadamard transform: the sum of the elements with the signs
-/// (-1)^popcount(element & k).
-float hadamard_coefficient(const Tile& tile, std::uint32_t k) {
-  std::int32_t sum = 0;
-  for (std::uint32_t i = 0; i < kTileElements; ++i) {
-    const std::int32_t level = tile[i];
-    sum += std::popcount(i & k) % 2 == 0 ? level : -level;
-  }
-  return static_cast<float>(sum);
-}
 
 CodewordBox far_box() {
   CodewordBox box{};
@@ -40,7 +30,7 @@ CodewordBox far_box() {
 
 }  // namespace
 
-/// Some codewords of a tree: the child of a box at a depth.
+/// The codewords below one node of the tree of boxes.
 struct NearestCodeword::Part {
   std::span<std::uint32_t> codewords;
   int halvings = 0;          ///< between it and the root
@@ -69,9 +59,9 @@ void NearestCodeword::sort_by_dc() {
     const std::size_t block = i / kBlockCodewords;
     const std::size_t lane = i % kBlockCodewords;
     float* of_block = &coefficients_[block * kTileElements * kBlockCodewords];
+    const TileCoefficients coefficients = hadamard_coefficients(codewords_[i]);
     for (std::size_t k = 0; k < kTileElements; ++k)
-      of_block[k * kBlockCodewords + lane] =
-          hadamard_coefficient(codewords_[i], kCoefficientOrder[k]);
+      of_block[k * kBlockCodewords + lane] = coefficients[kCoefficientOrder[k]];
     const auto dc = static_cast<float>(tile_sum(codewords_[i]));
     if (lane == 0) low_dc_[block + 1] = dc;
     high_dc_[block + 1] = dc;
@@ -87,8 +77,9 @@ void NearestCodeword::sort_by_dc() {
 void NearestCodeword::make_boxes() {
   for (const Tile& codeword : codewords_) {
     auto& transformed = transformed_.emplace_back();
+    const TileCoefficients coefficients = hadamard_coefficients(codeword);
     for (std::size_t k = 0; k < kTileElements; ++k)
-      transformed[k] = hadamard_coefficient(codeword, kFoldedCoefficientOrder[k]);
+      transformed[k] = coefficients[kFoldedCoefficientOrder[k]];
   }
   const std::size_t blocks =
       std::bit_ceil((codewords_.size() + kBlockCodewords - 1) / kBlockCodewords);

@@ -56,7 +56,7 @@ EncodedUnit encode_mean_removed(const NearestCodeword& search,
   tiles.for_each([&](std::size_t local_tile, const Tile& tile) {
     const std::size_t at = local_tile / row * 2 * row + local_tile % row;
     const std::size_t i = next++;
-    // What is all but empty may be nearer to nothing than to any shape.
+    // A tile of few, low levels may be nearer to the empty tile than to any shape.
     if (means[i] == 0 && squared_levels(tile) <= squared_errors[i]) {
       encoded.squared_error += squared_levels(tile);
       return;

@@ -303,7 +303,7 @@ bool PrecomputeOptions::packs_by_codebook_tree() const {
   if (index_packing) return *index_packing == "codebook-tree";
   // Means cost more than they gain when they are deflated.
   if (design().mean_step > 0) return true;
-  // Whoever types a design compares with the paper.
+  // A design that is typed is for comparisons with the paper, whose files are deflated.
   return limits().is_stated() || design_preset().name != std::string_view(kPaperPreset);
 }
 
@@ -322,7 +322,7 @@ PrecomputeOptions PrecomputeOptions::with_design(const FieldDesign& design) cons
     options.look_up.reset();
   else
     options.look_up = design.look_up;
-  // Nor do fields of plain tiles say that, unless the preset's have means.
+  // Fields record how tiles are coded only where that differs from plain, or from the preset.
   options.tile_coding.reset();
   options.mean_step.reset();
   if (design.mean_step > 0) {

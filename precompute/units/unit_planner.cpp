@@ -50,11 +50,6 @@ UnitExtent unit_extent(const SlabLattice& slab, const PlanOptions& options) {
 
 }  // namespace
 
-std::vector<std::string> problems(const PlanOptions& options) {
-  if (options.rays_per_unit >= 1) return {};
-  return {"rays_per_unit = " + std::to_string(options.rays_per_unit) + ": must be at least 1"};
-}
-
 std::vector<WorkUnit> plan_units(const FieldLattice& lattice, const PlanOptions& options) {
   std::vector<WorkUnit> units;
   for (std::size_t k = 0; k < lattice.slabs.size(); ++k) {

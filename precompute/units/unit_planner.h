@@ -13,8 +13,6 @@ struct PlanOptions {
   std::int64_t rays_per_unit = 262144;  ///< about 0.2 to 0.5 s of the reference caster
 };
 
-std::vector<std::string> problems(const PlanOptions& options);
-
 /// Most nodes of a unit along s and t: the chunks of field files (kIndexChunkTiles), so that a unit
 /// is written as whole chunks.
 inline constexpr int kLargestS = 256;

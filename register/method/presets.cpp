@@ -81,10 +81,11 @@ struct Preset {
 constexpr std::array kPresets = {
     Preset{"paper", "mutual information with best neighbour in two passes", paper_preset},
     Preset{"fast", "Gauss-Newton on correlations, coarse to fine", fast_preset},
-    Preset{"robust",
-           "a portfolio: Gauss-Newton on correlations, or CMA-ES on robust gradient residuals or on "
-           "correlations of gradients, then Gauss-Newton on robust gradient residuals",
-           robust_preset},
+    Preset{
+        "robust",
+        "a portfolio: Gauss-Newton on correlations, or CMA-ES on robust gradient residuals or on "
+        "correlations of gradients, then Gauss-Newton on robust gradient residuals",
+        robust_preset},
     Preset{
         "bone",
         "for a CT of one bone in X-rays that show more: Gauss-Newton on correlations of gradients "

@@ -10,110 +10,14 @@
 #include "base/error.h"
 #include "base/hash_random.h"
 #include "gold_standard/tre.h"
+#include "register/method/prepared_stage.h"
 #include "register/optimizer/newton_search.h"
 #include "register/problem/pose_target.h"
-#include "register/problem/silhouette.h"
-#include "register/problem/stage_view.h"
 
 namespace af::registration {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-/// The region grown by half its size to every side, cut at the detector's edges.
-RegionOfInterest grown(const RegionOfInterest& roi, const Eigen::Vector2i& size_px) {
-  const int left = std::max(0, roi.column - roi.width / 2);
-  const int top = std::max(0, roi.row - roi.height / 2);
-  const int right = std::min(size_px.x(), roi.column + roi.width + roi.width / 2);
-  const int bottom = std::min(size_px.y(), roi.row + roi.height + roi.height / 2);
-  return {left, top, right - left, bottom - top};
-}
-
-ValueRange drr_range_at_nominal(const RegistrationProblem& problem, const RegistrationView& view) {
-  const View wide{view.view.camera, grown(view.view.roi, view.view.camera.size_px)};
-  std::int64_t rays_outside = 0;
-  const Image2d drr =
-      render_image(*view.renderer, problem.nominal_room_from_ct, wide, &rays_outside);
-  if (rays_outside > 0)
-    throw InputError(view_name(view) + "nominal_room_from_ct = a pose outside the field (" +
-                     std::to_string(rays_outside) +
-                     " rays miss its planes): must lie inside the field");
-  const auto [low, high] = std::minmax_element(drr.pixels.begin(), drr.pixels.end());
-  return {static_cast<double>(*low), static_cast<double>(*high)};
-}
-
-StageGrid stage_grid(const RegistrationProblem& problem,
-                     const RegistrationView& view,
-                     const StageOptions& stage) {
-  double variance_mm2 = stage.smoothing_sigma_mm * stage.smoothing_sigma_mm;
-  if (stage.level > 0) {
-    const auto coarse = static_cast<std::size_t>(stage.level) - 1;
-    variance_mm2 += std::pow(view.coarse_levels[coarse].blur_sigma_mm, 2);
-  }
-  return {stage.pixel_step,
-          stage.roi_scale,
-          std::sqrt(variance_mm2) * view.view.camera.pixels_per_mm(problem.isocenter_point)};
-}
-
-std::shared_ptr<const DrrRenderer> stage_renderer(const RegistrationView& view, int level) {
-  return level == 0 ? view.renderer
-                    : view.coarse_levels[static_cast<std::size_t>(level) - 1].renderer;
-}
-
-/// Hiding markers must leave three quarters of so many pixels of a stage: coarse pixels of a small
-/// region may nearly all touch one.
-constexpr std::size_t kLeastPixelsToHideIn = 400;
-
-/// The X-ray of a stage with the markers hidden, if that leaves enough of it.
-SimilarityReference visible_reference(const RegistrationView& view, const StageGrid& grid) {
-  SimilarityReference plain = stage_reference(view.xray, view.mask, view.view, grid);
-  if (view.mask_without_markers.pixels.empty()) return plain;
-  SimilarityReference hidden =
-      stage_reference(view.xray, view.mask_without_markers, view.view, grid);
-  const auto used = static_cast<std::size_t>(std::count(hidden.used.begin(), hidden.used.end(), 1));
-  const std::size_t pixels = hidden.used.size();
-  return pixels >= kLeastPixelsToHideIn && 4 * used >= 3 * pixels ? hidden : plain;
-}
-
-/// The X-ray as a stage compares it with DRRs; InputError when nothing can be compared with it.
-SimilarityReference prepare_reference(const RegistrationView& view,
-                                      const ValueRange& drr_range,
-                                      const StageGrid& grid) {
-  SimilarityReference reference = visible_reference(view, grid);
-  reference.drr_range = drr_range;
-  std::vector<std::string> found = problems(reference);
-  for (std::string& text : found) text.insert(0, view_name(view));
-  throw_if_any(found);
-  return reference;
-}
-
-SimilarityOptions similarity_of(const StageOptions& stage) {
-  SimilarityOptions similarity = stage.similarity;
-  similarity.has_smooth_histogram |=
-      make_optimizer(stage.optimizer)->needs() == Derivatives::Gradient;
-  return similarity;
-}
-
-ObjectiveView prepare_view(const RegistrationView& view,
-                           const SimilarityReference& reference,
-                           const StageGrid& grid,
-                           const StageOptions& stage) {
-  return {stage_view(view.view, grid),
-          stage_renderer(view, stage.level),
-          make_similarity(similarity_of(stage), reference),
-          view.limit};
-}
-
-SilhouetteView silhouette_view(const RegistrationProblem& problem,
-                               const RegistrationView& view,
-                               const ObjectiveView& whole,
-                               const SimilarityReference& reference,
-                               const StageOptions& stage) {
-  const double margin_px = stage.silhouette_mm *
-                           view.view.camera.pixels_per_mm(problem.isocenter_point) /
-                           stage.pixel_step;
-  return {whole, reference, similarity_of(stage), view.renderer, margin_px};
-}
 
 /// Points enough for the lengths of steps that derivatives choose.
 std::vector<Eigen::Vector3d> some_points(const std::vector<Eigen::Vector3d>& points) {
@@ -137,43 +41,10 @@ bool is_converged(StopReason reason) {
   return reason == StopReason::StepBelowFinal || reason == StopReason::PinnedAtLimit;
 }
 
-struct PreparedStage {
-  StageOptions options;
-  std::shared_ptr<const Optimizer> optimizer;
-  MultiViewObjective objective;  ///< of a silhouette: that of the pose it was last narrowed to
-  std::vector<SilhouetteView> silhouettes;  ///< none where the whole region counts
-
-  /// Narrows the objective to the silhouettes at a pose, if it is one of silhouettes; false when
-  /// too little is seen of them.
-  [[nodiscard]] bool narrow_to(const RegistrationProblem& problem,
-                               const RigidTransform& room_from_ct) {
-    if (silhouettes.empty()) return true;
-    auto narrowed =
-        silhouette_objective(silhouettes, problem.cut_points_ct, room_from_ct, objective.pool());
-    if (!narrowed.has_value()) return false;
-    objective = std::move(*narrowed);
-    return true;
-  }
-};
-
-std::shared_ptr<const DrrRenderer> ray_cast_of(const RegistrationView& view, int level) {
-  const auto at = static_cast<std::size_t>(level);
-  return at < view.ray_casts.size() ? view.ray_casts[at] : nullptr;
-}
-
 bool is_cast(const RegistrationProblem& problem, int level) {
   return std::all_of(problem.views.begin(), problem.views.end(), [&](const RegistrationView& view) {
     return ray_cast_of(view, level) != nullptr;
   });
-}
-
-/// A stage with ray casting in place of look-up, inside the fields' ranges all the same.
-MultiViewObjective ray_cast_objective(const RegistrationProblem& problem,
-                                      const PreparedStage& stage) {
-  std::vector<ObjectiveView> views = stage.objective.views();
-  for (std::size_t i = 0; i < views.size(); ++i)
-    views[i].renderer = ray_cast_of(problem.views[i], stage.options.level);
-  return MultiViewObjective(std::move(views), stage.objective.pool());
 }
 
 /// Of a pose at which there is nothing to compare.
@@ -216,8 +87,6 @@ struct RegistrationRunner::Impl {
   std::optional<ParameterScaling> at_start;  ///< by some_points_ct, at the run's start
 
   void prepare();
-  [[nodiscard]] PreparedStage prepare(const StageOptions& stage,
-                                      const std::vector<ValueRange>& drr_ranges) const;
   [[nodiscard]] std::optional<ParameterScaling> scaling_at(
       const RigidTransform& room_from_ct, std::span<const Eigen::Vector3d> points_ct) const;
   /// What a stage that begins at a pose is searched with.
@@ -263,41 +132,24 @@ struct RegistrationRunner::Impl {
   void append_trace(std::size_t index, const PoseTarget& target, RegistrationResult& result) const;
 };
 
-PreparedStage RegistrationRunner::Impl::prepare(const StageOptions& stage,
-                                                const std::vector<ValueRange>& drr_ranges) const {
-  std::vector<ObjectiveView> whole;
-  std::vector<SilhouetteView> silhouettes;
-  for (std::size_t i = 0; i < problem->views.size(); ++i) {
-    const RegistrationView& view = problem->views[i];
-    const StageGrid grid = stage_grid(*problem, view, stage);
-    const SimilarityReference reference = prepare_reference(view, drr_ranges[i], grid);
-    whole.push_back(prepare_view(view, reference, grid, stage));
-    if (stage.silhouette_mm > 0.0)
-      silhouettes.push_back(silhouette_view(*problem, view, whole.back(), reference, stage));
-  }
-  return {stage,
-          make_optimizer(stage.optimizer),
-          MultiViewObjective(std::move(whole), pool),
-          std::move(silhouettes)};
-}
-
 void RegistrationRunner::Impl::prepare() {
   const int coarsest = options.coarsest_level();
-  std::vector<ValueRange> drr_ranges;
   for (const RegistrationView& view : problem->views) {
     if (static_cast<int>(view.coarse_levels.size()) < coarsest)
       throw InputError(view_name(view) +
                        "coarse_levels = " + std::to_string(view.coarse_levels.size()) +
                        ": the stages need " + std::to_string(coarsest));
     views.push_back(view.view);
-    drr_ranges.push_back(drr_range_at_nominal(*problem, view));
   }
+  const std::vector<ValueRange> drr_ranges = drr_ranges_at_nominal(*problem);
+  const auto prepared = [&](const StageOptions& stage) {
+    return prepared_stage(*problem, stage, drr_ranges, pool);
+  };
   some_points_ct = some_points(problem->scaling_points_ct);
   for (const ChainOptions& chain : options.chains)
-    for (const StageOptions& stage : chain.stages) stages.push_back(prepare(stage, drr_ranges));
-  for (const StageOptions& stage : options.finish.stages)
-    stages.push_back(prepare(stage, drr_ranges));
-  if (options.chains.size() > 1) judge = prepare(options.judge.stage, drr_ranges);
+    for (const StageOptions& stage : chain.stages) stages.push_back(prepared(stage));
+  for (const StageOptions& stage : options.finish.stages) stages.push_back(prepared(stage));
+  if (options.chains.size() > 1) judge = prepared(options.judge.stage);
 }
 
 std::optional<ParameterScaling> RegistrationRunner::Impl::scaling_at(
