@@ -141,7 +141,8 @@ void draw_population_success(const std::vector<PopulationGroup>& groups,
       "set multiplot layout " + std::to_string(rows) + "," + std::to_string(kColumns) +
       "\nset xlabel 'initial TRE (mm)'\nset ylabel 'success (%)'\nset yrange [0:102]\n"
       "set xrange [0:" +
-      number_text(counting.intervals * counting.interval_width_mm) + "]\nset key outside bottom center horizontal\n";
+      number_text(counting.intervals * counting.interval_width_mm) +
+      "]\nset key outside bottom center horizontal\n";
   int block = 0;
   for (const std::string& panel : panels)
     script += panel_script(panel, members[panel], figure, block);
