@@ -42,8 +42,8 @@ struct CameraGeometry {
   [[nodiscard]] double source_detector_distance_mm() const;
   /// Distance from the source to the plane through `room_point` parallel to the detector.
   [[nodiscard]] double depth_mm(const Eigen::Vector3d& room_point) const;
-  /// Detector pixels per millimetre on the plane through `room_point` parallel to the detector (mean
-  /// spacing of columns and rows).
+  /// Detector pixels per millimetre on the plane through `room_point` parallel to the detector
+  /// (mean spacing of columns and rows).
   [[nodiscard]] double pixels_per_mm(const Eigen::Vector3d& room_point) const;
   /// True when column x row points against the beam: images then appear mirrored.
   [[nodiscard]] bool is_mirrored() const;

@@ -33,8 +33,8 @@ std::vector<Eigen::Vector3d> ct_lattice_points(const CtBox& box, int points_per_
 /// Mean displacement (to first order, for rotations about the room's axes through `center_ct_mm`)
 /// of those `points_ct` that project into the region of interest of at least one view, on the plane
 /// through `isocenter_point` parallel to each view's detector, averaged over points and views, at
-/// `room_from_ct` (Sec. III-B2; docs/differences-from-the-paper.md says what the paper leaves open).
-/// nullopt when no point projects into a region.
+/// `room_from_ct` (Sec. III-B2; docs/differences-from-the-paper.md says what the paper leaves
+/// open). nullopt when no point projects into a region.
 std::optional<ParameterScaling> projected_motion_scaling(const RigidTransform& room_from_ct,
                                                          const Eigen::Vector3d& center_ct_mm,
                                                          std::span<const Eigen::Vector3d> points_ct,

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // What objectives say about poses, and what registrations of noisy X-rays make of it.
-#include "register/method/presets.h"
 #include "register/uncertainty/uncertainty_estimator.h"
 
 #include <cmath>
@@ -10,6 +9,7 @@
 
 #include <gtest/gtest.h>
 
+#include "register/method/presets.h"
 #include "register/uncertainty/pose_covariance.h"
 #include "register/uncertainty/pose_information.h"
 #include "register/verdict/pose_examiner.h"
