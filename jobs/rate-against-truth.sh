@@ -208,8 +208,9 @@ median_milliseconds() { awk -F, -v run="$2" '$1 == run { printf "%.4g", 1000 * $
 
 # distances_to_raycast CSV DESIGN: starts, median, 95th percentile, maximum.
 distances_to_raycast() {
-  awk -F, -v design="$2" '($2 == design && $4 == "raycast") || ($4 == design && $2 == "raycast") {
-    printf "%d,%.4f,%.4f,%.4f", $6, $7, $8, $9 }' "$1"
+  awk -F, -v design="$2" 'NR == 1 { for (i = 1; i <= NF; ++i) at[$i] = i }
+    ($2 == design && $4 == "raycast") || ($4 == design && $2 == "raycast") {
+      printf "%d,%.4f,%.4f,%.4f", $at["starts"], $at["median_distance_mm"], $at["p95_distance_mm"], $at["max_distance_mm"] }' "$1"
 }
 
 # row RUN: of one design's registrations, RUN being runs/ANATOMY-VARIANT-VIEWS/DESIGN.

@@ -32,12 +32,13 @@ MpiEnvironment::MpiEnvironment(int& argc, char**& argv) {
   // Nor does it need a folder for them. All programs without mpirun would share one on a machine,
   // and one that ends removes it while another begins: of starts four at a time, 1 of 600 failed.
   constexpr const char* kMakesFolder = "OMPI_MCA_orte_create_session_dirs";
-  const bool needs_no_folder = !is_launched() && std::getenv(kMakesFolder) == nullptr;
+  const bool is_alone = !is_launched();
+  const bool needs_no_folder = is_alone && std::getenv(kMakesFolder) == nullptr;
   if (needs_no_folder) setenv(kMakesFolder, "0", 0);
   // For shared file pointers, which we never use, Open MPI would make a file per rank beside each
   // file that ranks open together, or one in the folder that there is not. A setting by the user
   // stays.
-  setenv("OMPI_MCA_sharedfp", needs_no_folder ? "^lockedfile,sm" : "^lockedfile", 0);
+  setenv("OMPI_MCA_sharedfp", is_alone ? "^lockedfile,sm" : "^lockedfile", 0);
   const bool names_process_manager = std::getenv("OMPI_MCA_pmix") != nullptr;
   int provided = 0;
   MPI_Init_thread(&argc, &argv, MPI_THREAD_FUNNELED, &provided);

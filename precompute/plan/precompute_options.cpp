@@ -167,7 +167,10 @@ void describe_casting(Fields& field, PrecomputeOptions& options) {
 }
 
 void describe_codebook(Fields& field, PrecomputeOptions& options) {
-  field("codewords", options.codewords, "Size of the codebook, 2 to 65536 [16384, or as chosen]")
+  field("codewords",
+        options.codewords,
+        "Size of the codebook, 2 to 65536 [that of the preset, or as chosen; 16384 where parts of "
+        "the design are stated]")
       .decides(kCodebookStage);
   field(
       "tile_coding",

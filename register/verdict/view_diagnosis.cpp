@@ -117,10 +117,14 @@ std::vector<Change> changes_of(const RegistrationProblem& problem) {
   return changes;
 }
 
-/// The coarse chains of the default method that need few poses.
+/// Two coarse chains that need few poses: the default method's first, and one on tiles.
 std::optional<RegistrationOptions> coarse_options(const RegistrationProblem& problem) {
   RegistrationOptions options = preset_options("robust");
-  options.chains.resize(2);
+  options.chains.resize(1);
+  options.chains.push_back(chain_from_text("tiles",
+                                           "ncc gauss-newton level=2 pixels=8 roi=2 step=10;"
+                                           "tncc gauss-newton level=2 pixels=8 roi=2 final=0.2;"
+                                           "rg gauss-newton level=1 pixels=4 final=0.1"));
   options.finish.stages.clear();
   for (const RegistrationView& view : problem.views)
     if (static_cast<int>(view.coarse_levels.size()) < options.coarsest_level()) return std::nullopt;
