@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "base/joined.h"
 #include "precompute/design/quantisation_probe.h"
 #include "precompute/formatted_text.h"
 
@@ -120,9 +121,8 @@ std::string planes_text(const LightSlab& planes) {
 
 /// The members of an atlas.
 std::string parts_text(const std::vector<FieldPart>& parts) {
-  std::string names;
-  for (const FieldPart& part : parts)
-    names += (names.empty() ? "" : ", ") + part.source.camera.name;
+  const std::string names =
+      joined(parts, ", ", [](const FieldPart& part) { return part.source.camera.name; });
   return "  atlas              " + std::to_string(parts.size()) + " fields: " + names +
          "; each for at least " + parts.front().range.text() + "\n";
 }

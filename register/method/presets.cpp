@@ -2,6 +2,8 @@
 #include "register/method/presets.h"
 
 #include <array>
+#include <string>
+#include <utility>
 
 #include "base/named_rows.h"
 
@@ -40,22 +42,29 @@ RegistrationOptions fast_preset() {
 constexpr double kConvincingValue = 0.6;
 
 /// Every chain ends over the region alone at level 1: at level 2 steel and scatter have optima of
-/// their own there, which the judge cannot undo. Two wide chains search with different measures,
-/// because each has its deepest optimum in a wrong place for some patients (docs/population.md).
+/// their own there, which the judge cannot undo.
+constexpr const char* kOverTheRegion = "rg gauss-newton level=1 pixels=4 final=0.1";
+
+/// Searches widely, by CMA-ES, refines what it found, and ends as every chain of `robust` does.
+ChainOptions wide_chain(const std::string& name, const std::string& search) {
+  return chain_from_text(name,
+                         search +
+                             " roi=2 step=12 final=1;"
+                             "rg gauss-newton level=2 pixels=8 roi=2 final=0.2;" +
+                             kOverTheRegion);
+}
+
+/// Two chains search with different measures, because each has its deepest optimum in a wrong place
+/// for some patients (docs/population.md).
 RegistrationOptions robust_preset() {
   RegistrationOptions options;
-  options.chains = {chain_from_text("edges",
-                                    "ncc gauss-newton level=2 pixels=8 roi=2 step=10;"
-                                    "gc gauss-newton level=2 pixels=8 roi=2 final=0.2;"
-                                    "rg gauss-newton level=1 pixels=4 final=0.1"),
-                    chain_from_text("wide",
-                                    "rg cma-es level=2 pixels=16 roi=2 step=12 final=1;"
-                                    "rg gauss-newton level=2 pixels=8 roi=2 final=0.2;"
-                                    "rg gauss-newton level=1 pixels=4 final=0.1"),
-                    chain_from_text("wide-edges",
-                                    "gc cma-es level=3 pixels=8 roi=2 step=12 final=1;"
-                                    "rg gauss-newton level=2 pixels=8 roi=2 final=0.2;"
-                                    "rg gauss-newton level=1 pixels=4 final=0.1")};
+  options.chains = {
+      chain_from_text("edges",
+                      std::string("ncc gauss-newton level=2 pixels=8 roi=2 step=10;"
+                                  "gc gauss-newton level=2 pixels=8 roi=2 final=0.2;") +
+                          kOverTheRegion),
+      wide_chain("wide", "rg cma-es level=2 pixels=16"),
+      wide_chain("wide-edges", "gc cma-es level=3 pixels=8")};
   options.finish = chain_from_text("finish", "rg quasi-newton pixels=2 step=2 final=0.02");
   options.judge.enough_value = kConvincingValue;
   return options;

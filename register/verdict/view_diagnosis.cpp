@@ -5,9 +5,11 @@
 #include <cmath>
 #include <functional>
 #include <optional>
+#include <utility>
 
 #include "base/error.h"
 #include "base/joined.h"
+#include "register/method/presets.h"
 #include "register/verdict/pose_examiner.h"
 #include "register/verdict/verdict.h"
 
@@ -117,14 +119,14 @@ std::vector<Change> changes_of(const RegistrationProblem& problem) {
   return changes;
 }
 
-/// Two coarse chains that need few poses: the default method's first, and one on tiles.
+/// Two coarse chains that need few poses: the default method's first, and the same on tiles.
 std::optional<RegistrationOptions> coarse_options(const RegistrationProblem& problem) {
   RegistrationOptions options = preset_options("robust");
   options.chains.resize(1);
-  options.chains.push_back(chain_from_text("tiles",
-                                           "ncc gauss-newton level=2 pixels=8 roi=2 step=10;"
-                                           "tncc gauss-newton level=2 pixels=8 roi=2 final=0.2;"
-                                           "rg gauss-newton level=1 pixels=4 final=0.1"));
+  ChainOptions tiles = options.chains.front();
+  tiles.name = "tiles";
+  tiles.stages[1].similarity.name = "tncc";
+  options.chains.push_back(std::move(tiles));
   options.finish.stages.clear();
   for (const RegistrationView& view : problem.views)
     if (static_cast<int>(view.coarse_levels.size()) < options.coarsest_level()) return std::nullopt;
