@@ -63,6 +63,19 @@ precompute_options=(--max-rotation-deg 10 --max-translation-mm 30 --uv-nodes 40 
 evaluate_options=(--preset paper --starts-per-interval 20)
 TEXT
 
+# Slurm may fail to launch a step, and srun end with 0 all the same: the first evaluation meets that.
+mkdir "$scratch/bin"
+cat >"$scratch/bin/srun" <<TEXT
+#!/usr/bin/env bash
+if [[ "\$*" == *" registration "* ]] && mkdir "$scratch/lost-step" 2>/dev/null; then
+  echo "srun: error: task 0 launch failed: Unspecified error" >&2
+  exit 0
+fi
+exec "$(command -v srun)" "\$@"
+TEXT
+chmod +x "$scratch/bin/srun"
+export PATH=$scratch/bin:$PATH
+
 # submit RUN: submits the chain, output in RUN.
 submit() { "$af_root/jobs/submit.sh" "$scratch/study.toml" --resources "$scratch/resources.sh" --output "$1"; }
 
@@ -76,6 +89,10 @@ undisturbed=$scratch/run-undisturbed disturbed=$scratch/run-disturbed
 submit "$undisturbed"
 wait_until "the undisturbed chain" no_jobs_left
 [[ -s "$undisturbed/report.html" ]] || fail "no report.html after the undisturbed chain"
+if [[ "${LAUNCHER:-srun}" == srun ]]; then
+  grep -q 'had not started the program (attempt 1 of 3)' "$undisturbed"/logs/evaluate-?.log ||
+    fail "a step that was not launched went unseen"
+fi
 
 # stop_job NAME PROGRESS: TERM to the batch script once PROGRESS exists.
 stop_job() {
