@@ -1,14 +1,16 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Fits the constants of register/uncertainty/calibration.cpp to registrations of known truth, on the cases of odd seeds,
-and prints how well they do on the others.
+"""Fits the constants of register/uncertainty/calibration.cpp to registrations of known truth, on the patients of odd
+numbers, and prints how well they do on the others.
 
-    jobs/fit-uncertainty.py MEASURE=registrations.csv ... [--csv OUT.csv] [--commit HASH]
+    jobs/fit-uncertainty.py MEASURE:VARIANT=registrations.csv ... [--csv OUT.csv] [--commit HASH]
 
-MEASURE is that of the last stage: rg, gc, mi. Cases are named KIND-VARIANT-SEED. Needs nothing but Python.
+MEASURE is that of the last stage: rg, gc, mi. VARIANT says what the X-rays are like. Cases are named PATIENT-POSE, a
+drawn patient KIND-NUMBER; others, which have no number, are never fitted. Needs nothing but Python.
 """
 import csv
 import math
+import re
 import sys
 
 REGION_95 = 12.591587243743977  # chi-square, six degrees of freedom
@@ -20,14 +22,15 @@ LEAST_SHARE = 0.05
 class Row:
     """What is needed of one registration."""
 
-    def __init__(self, measure, cells):
+    def __init__(self, measure, variant, cells):
         def number(name):
             return float(cells[name]) if cells[name] not in ("", "nan") else math.nan
 
         self.measure = measure
-        self.case = cells["case"]
-        self.variant = self.case.split("-")[1]
-        self.is_for_fit = int(self.case.split("-")[-1]) % 2 == 1
+        self.variant = variant
+        self.case = f"{cells['case']} {variant}"
+        number_of_patient = re.search(r"-(\d+)-p\d+$", cells["case"])
+        self.is_for_fit = number_of_patient is not None and int(number_of_patient[1]) % 2 == 1
         self.tre = number("tre_mm")
         self.is_success = self.tre < SUCCESS_TRE_MM
         self.fine_lowest = number("judge_fine_lowest_view")
@@ -195,13 +198,13 @@ def main():
         at = words.index("--commit")
         commit = words[at + 1]
         del words[at : at + 2]
-    if not words or any("=" not in word for word in words):
+    if not words or not all(re.match(r"\w+:\w+=.", word) for word in words):
         sys.exit(__doc__)
     rows = []
     for word in words:
-        measure, path = word.split("=", 1)
+        label, path = word.split("=", 1)
         with open(path, newline="", encoding="utf-8") as file:
-            rows += [Row(measure, cells) for cells in csv.DictReader(file)]
+            rows += [Row(*label.split(":"), cells) for cells in csv.DictReader(file)]
     measures = list(dict.fromkeys(row.measure for row in rows))
     for measure in measures:
         mine = [r for r in rows if r.measure == measure]

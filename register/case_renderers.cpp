@@ -12,6 +12,7 @@
 
 #include "base/stored_bytes.h"
 #include "drr/field_level.h"
+#include "drr/field_renderer.h"
 #include "drr/field_set_drr.h"
 #include "drr/ray_cast_drr.h"
 #include "drr/two_pass_af_drr.h"
@@ -89,9 +90,10 @@ struct FieldLevelRenderers {
 
 /// Collective where the memory is. A field's renderers for a view: its own, and those of so many
 /// levels of its pyramid. A method's levels are those of a field of about 256 nodes: a finer field
-/// begins with more halvings, so that a level has about the same blur. Look-up is linear, whatever
-/// a field is meant for: cubic gives better DRRs, but not better poses (register/README.md).
+/// begins with more halvings, so that a level has about the same blur. The field itself is looked
+/// up as it is meant to be, levels above linearly: there blur hides what cubic look-up gains.
 FieldLevelRenderers renderers_of(const std::shared_ptr<const CompressedAttenuationField>& field,
+                                 const std::string& look_up,
                                  int levels,
                                  const std::shared_ptr<ThreadPool>& pool,
                                  const std::shared_ptr<ThreadPool>& coarse_pool,
@@ -102,10 +104,10 @@ FieldLevelRenderers renderers_of(const std::shared_ptr<const CompressedAttenuati
   FieldLevels pyramid;
   if (pays_to_decode(*field)) {
     const auto samples = std::make_shared<const FieldLevel>(decode_field(*field, memory));
-    made.renderers.push_back(std::make_shared<const TwoPassAfDrr>(samples, TwoPassOptions{}, pool));
+    made.renderers.push_back(make_field_renderer(samples, look_up, pool));
     if (halvings > 0) pyramid = make_field_pyramid(*samples, halvings, memory);
   } else {
-    made.renderers.push_back(std::make_shared<const TwoPassAfDrr>(field, TwoPassOptions{}, pool));
+    made.renderers.push_back(make_field_renderer(field, look_up, pool));
     if (halvings > 0) pyramid = make_field_pyramid(*field, halvings, memory);
   }
   for (auto i = static_cast<std::size_t>(more_halvings); i < pyramid.size(); ++i) {
@@ -182,6 +184,7 @@ FieldLevelRenderers renderers_of_atlas(const OpenedField& opened,
   const auto open = [opened, levels, threads](std::size_t member) {
     return std::make_shared<const MemberLevels>(
         renderers_of(opened.member(member, Communicator::alone()),
+                     opened.info().look_up,
                      levels,
                      threads.own,
                      threads.coarse,
@@ -193,6 +196,7 @@ FieldLevelRenderers renderers_of_atlas(const OpenedField& opened,
   FieldLevelRenderers set;
   for (const std::uint64_t i : near) {
     const FieldLevelRenderers made = renderers_of(opened.member(i, communicator),
+                                                  opened.info().look_up,
                                                   levels,
                                                   threads.own,
                                                   threads.coarse,
@@ -267,6 +271,7 @@ void use_field(const OpenedField& opened,
     if (of.atlas())
       return renderers_of_atlas(of, levels, nominal, view.view, threads, communicator);
     return renderers_of(of.field(),
+                        of.info().look_up,
                         levels,
                         threads.own,
                         threads.coarse,

@@ -3,6 +3,7 @@
 
 #include <array>
 
+#include "base/error.h"
 #include "base/named_rows.h"
 #include "drr/af_drr.h"
 #include "drr/two_pass_af_drr.h"
@@ -11,6 +12,7 @@ namespace af {
 namespace {
 
 using FieldPointer = std::shared_ptr<const CompressedAttenuationField>;
+using LevelPointer = std::shared_ptr<const FieldLevel>;
 using RendererPointer = std::shared_ptr<const DrrRenderer>;
 using PoolPointer = std::shared_ptr<ThreadPool>;
 
@@ -18,15 +20,20 @@ struct KnownLookUp {
   const char* name;
   const char* help;
   RendererPointer (*make)(FieldPointer field, const PoolPointer& pool);
+  RendererPointer (*make_decoded)(LevelPointer level_0, const PoolPointer& pool) = nullptr;
 };
 
 template <FieldInterpolation interpolation>
 RendererPointer make_literal(FieldPointer field, const PoolPointer& /*pool*/) {
   return std::make_shared<const AfDrr>(std::move(field), interpolation);
 }
+template <typename Pointer, AxisInterpolation st, AxisInterpolation uv>
+RendererPointer make_two_pass(Pointer samples, const PoolPointer& pool) {
+  return std::make_shared<const TwoPassAfDrr>(std::move(samples), TwoPassOptions{st, uv}, pool);
+}
 template <AxisInterpolation st, AxisInterpolation uv>
-RendererPointer make_two_pass(FieldPointer field, const PoolPointer& pool) {
-  return std::make_shared<const TwoPassAfDrr>(std::move(field), TwoPassOptions{st, uv}, pool);
+constexpr KnownLookUp two_pass(const char* name, const char* help) {
+  return {name, help, make_two_pass<FieldPointer, st, uv>, make_two_pass<LevelPointer, st, uv>};
 }
 
 using enum AxisInterpolation;
@@ -34,9 +41,9 @@ using enum AxisInterpolation;
 /// Every way of looking up there is; a new one joins here.
 constexpr std::array kLookUps = {
     KnownLookUp{"nearest", "nearest node", make_literal<FieldInterpolation::Nearest>},
-    KnownLookUp{"linear", "linear, in two passes", make_two_pass<Linear, Linear>},
-    KnownLookUp{"cubic", "cubic over (s,t)", make_two_pass<Cubic, Linear>},
-    KnownLookUp{"cubic-uv", "cubic over (s,t) and (u,v)", make_two_pass<Cubic, Cubic>},
+    two_pass<Linear, Linear>("linear", "linear, in two passes"),
+    two_pass<Cubic, Linear>("cubic", "cubic over (s,t)"),
+    two_pass<Cubic, Cubic>("cubic-uv", "cubic over (s,t) and (u,v)"),
     KnownLookUp{"quadrilinear",
                 "over each ray's 16 nodes, the definition",
                 make_literal<FieldInterpolation::Quadrilinear>},
@@ -56,6 +63,16 @@ RendererPointer make_field_renderer(FieldPointer field,
                                     const std::string& look_up,
                                     const PoolPointer& pool) {
   return required_row(kLookUps, "look-up", look_up).make(std::move(field), pool);
+}
+
+RendererPointer make_field_renderer(LevelPointer level_0,
+                                    const std::string& look_up,
+                                    const PoolPointer& pool) {
+  const KnownLookUp& known = required_row(kLookUps, "look-up", look_up);
+  if (known.make_decoded == nullptr)
+    throw InputError(
+        "look-up", "'" + look_up + "'", "a decoded field is not looked up in this way");
+  return known.make_decoded(std::move(level_0), pool);
 }
 
 }  // namespace af

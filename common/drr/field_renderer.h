@@ -7,6 +7,7 @@
 
 #include "base/thread_pool.h"
 #include "drr/drr_renderer.h"
+#include "drr/field_level.h"
 #include "field/compressed_attenuation_field.h"
 
 namespace af {
@@ -19,6 +20,12 @@ std::string field_look_up_help();
 /// `pool` share a large DRR, except for "nearest" and "quadrilinear".
 std::shared_ptr<const DrrRenderer> make_field_renderer(
     std::shared_ptr<const CompressedAttenuationField> field,
+    const std::string& look_up,
+    const std::shared_ptr<ThreadPool>& pool = nullptr);
+
+/// The same of a decoded field, whose names have no "nearest" and no "quadrilinear".
+std::shared_ptr<const DrrRenderer> make_field_renderer(
+    std::shared_ptr<const FieldLevel> level_0,
     const std::string& look_up,
     const std::shared_ptr<ThreadPool>& pool = nullptr);
 

@@ -65,7 +65,9 @@ void describe_chains(Fields& field, MethodOptions& options) {
         "Stages in place of the preset's, separated by ';': measure, optimiser, then any of these "
         "keys with a number. " +
             chain_keys_help() +
-            ". Given several times, the chains are a portfolio: a judge chooses among their ends");
+            ". Given several times, the chains are a portfolio: a judge chooses among their ends. "
+            "One that begins with 'below VALUE:' is a last resort, which runs only where the best "
+            "end so far is worth less to the judge");
   field("finish",
         options.finish,
         "Stages, written as for --chain, that follow the chain, or a portfolio's best one "

@@ -332,9 +332,10 @@ void RegistrationRunner::Impl::run_portfolio(std::int64_t start_index, Registrat
   std::optional<ChainEnd> best;
   std::vector<RigidTransform> others;
   for (const ChainOptions& chain : options.chains) {
+    const std::size_t begin = std::exchange(first, first + chain.stages.size());
+    if (best.has_value() && best->similarity >= chain.only_below) continue;
     ChainEnd end{result.start_room_from_ct};
-    run_chain(chain, first, start_index, end, result);
-    first += chain.stages.size();
+    run_chain(chain, begin, start_index, end, result);
     end.similarity = judged(end.room_from_ct, result);
     if (!std::isfinite(end.similarity)) {
       if (!best.has_value()) result.stop_reason = end.stop_reason;

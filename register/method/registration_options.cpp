@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <set>
 #include <sstream>
+#include <string_view>
 #include <variant>
 
 #include "base/error.h"
@@ -15,6 +17,9 @@
 
 namespace af::registration {
 namespace {
+
+/// What the text of a last resort begins with.
+constexpr std::string_view kLastResort = "below ";
 
 void add_once(const std::string& name, std::vector<std::string>& names) {
   if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
@@ -142,12 +147,22 @@ std::vector<std::string> problems(const StageOptions& stage) {
 }
 
 std::string chain_text(const ChainOptions& chain) {
-  return joined(chain.stages, "; ", stage_text);
+  const std::string condition =
+      chain.is_last_resort() ? std::string(kLastResort) + number_text(chain.only_below) + ": " : "";
+  return condition + joined(chain.stages, "; ", stage_text);
 }
 
 ChainOptions chain_from_text(const std::string& name, const std::string& text) {
   ChainOptions chain{name, {}};
-  std::istringstream stages(text);
+  std::size_t begin = 0;
+  if (text.starts_with(kLastResort)) {
+    const std::size_t colon = std::min(text.find(':'), text.size());
+    const std::string value = text.substr(kLastResort.size(), colon - kLastResort.size());
+    if (colon == text.size() || !parse(value, chain.only_below) || !std::isfinite(chain.only_below))
+      throw InputError("chain", "'" + text + "'", "a last resort begins with 'below VALUE:'");
+    begin = colon + 1;
+  }
+  std::istringstream stages(text.substr(begin));
   for (std::string stage; std::getline(stages, stage, ';');)
     chain.stages.push_back(stage_from_text(stage));
   return chain;
@@ -235,6 +250,9 @@ std::vector<std::string> problems(const RegistrationOptions& options) {
       found.push_back("chain '" + chain.name + "': stages = none: there must be at least one");
     append_chain_problems(chain, found);
   }
+  if (!options.chains.empty() && options.chains.front().is_last_resort())
+    found.push_back("chain '" + options.chains.front().name +
+                    "': must not begin with 'below VALUE:': no chain stands before it");
   append_chain_problems(options.finish, found);
   if (options.chains.size() > 1) {
     for (const std::string& text : problems(options.judge.stage)) found.push_back("judge: " + text);

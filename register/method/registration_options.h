@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -35,6 +36,13 @@ std::vector<std::string> problems(const StageOptions& stage);
 struct ChainOptions {
   std::string name;
   std::vector<StageOptions> stages;
+  /// Of a portfolio: a last resort runs only where the best end of the chains before it is worth
+  /// less, mean over views, to the judge. Infinity: it always runs.
+  double only_below = std::numeric_limits<double>::infinity();
+
+  [[nodiscard]] bool is_last_resort() const {
+    return only_below < std::numeric_limits<double>::infinity();
+  }
 };
 
 /// A chain as one line: stages separated by ';', each a measure and an optimiser followed by
@@ -42,7 +50,8 @@ struct ChainOptions {
 ///
 ///     ncc gauss-newton level=2 pixels=8 roi=2 step=10 final=0.5; gc gauss-newton level=1 pixels=2
 ///
-/// Keys are the options that StageOptions describes.
+/// Keys are the options that StageOptions describes. A last resort begins with the value that calls
+/// it: "below 0.2: ncc cma-es ...".
 std::string chain_text(const ChainOptions& chain);
 
 /// The chain of a line. InputError for a line that is not of this form; whether its values fit is

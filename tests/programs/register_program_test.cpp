@@ -102,6 +102,34 @@ TEST_F(RegisterProgram, RegistersByFieldAndByRayCasting) {
   EXPECT_EQ(provenance.at("input_sha256").size(), 7U) << provenance;
 }
 
+TEST_F(RegisterProgram, LooksAFieldUpAsItIsMeantToBe) {
+  std::string cubic_fields;
+  for (const std::string camera : {"AP", "LAT"}) {
+    const std::string field = path(camera + "-cubic.af.h5");
+    const test::ProgramRun run = test::run_command(
+        program("af-precompute") + " --study " + path("study.toml") + " --camera " + camera +
+        " --max-rotation-deg 8 --max-translation-mm 12 --uv-nodes 24 --st-nodes 96"
+        " --codewords 1024 --look-up cubic -o " +
+        field);
+    ASSERT_EQ(run.exit_code, 0) << run.output;
+    cubic_fields += " --field " + camera + "=" + field;
+  }
+  // The fields hold the same samples. Levels above 0 are looked up linearly.
+  for (const int level : {0, 1}) {
+    const std::string chain = " --chain 'gc gauss-newton level=" + std::to_string(level) +
+                              " final=0.01' --start-rotation-deg 1,0,0"
+                              " --start-translation-mm 1,0,0 -o ";
+    const auto end_by = [&](const std::string& by, const std::string& folder) {
+      const test::ProgramRun run = run_register(by + chain + path(folder));
+      EXPECT_EQ(run.exit_code, 0) << run.output;
+      return read_pose(path(folder + "/result.json")).matrix();
+    };
+    const std::string name = std::to_string(level);
+    EXPECT_EQ(end_by(fields(), "linear-" + name) == end_by(cubic_fields, "cubic-" + name),
+              level == 1);
+  }
+}
+
 TEST_F(RegisterProgram, CorrectsALookedUpEndByRayCasting) {
   const std::string start =
       " --preset robust --start-rotation-deg -1,0.5,2.5 --start-translation-mm 0.5,1,4 ";

@@ -9,8 +9,10 @@
 
 #include <gtest/gtest.h>
 
+#include "base/error.h"
 #include "base/vector_width.h"
 #include "drr/af_drr.h"
+#include "drr/field_renderer.h"
 #include "support/central_differences.h"
 #include "unit/drr/small_fields.h"
 
@@ -150,6 +152,24 @@ TEST(TwoPassAfDrr, LevelsOfMeanRemovedTilesAreLimited) {
     }
     force_vector_width(std::nullopt);
   }
+}
+
+TEST(FieldRenderer, ADecodedFieldIsLookedUpAsTheFieldIs) {
+  const auto field = small_field(waves, 2, 6, 24);
+  const auto decoded = std::make_shared<const FieldLevel>(decode_field(*field));
+  const View view = View::whole_detector(small_camera());
+  const RigidTransform pose = pose_from_parameters({}, small_pose(3));
+  std::vector<Image2d> images;
+  for (const char* look_up : {"linear", "cubic", "cubic-uv"}) {
+    images.push_back(render_image(*make_field_renderer(field, look_up), pose, view));
+    const Image2d image = render_image(*make_field_renderer(decoded, look_up), pose, view);
+    constexpr float kRounding = 0.02f;  // of floats around 16384
+    for (std::size_t i = 0; i < image.pixels.size(); ++i)
+      ASSERT_NEAR(image.pixels[i], images.back().pixels[i], kRounding) << look_up;
+  }
+  EXPECT_NE(images[0].pixels, images[1].pixels);
+  for (const char* look_up : {"nearest", "quadrilinear", "psychic"})
+    EXPECT_THROW((void)make_field_renderer(decoded, look_up), InputError) << look_up;
 }
 
 TEST(TwoPassAfDrr, AnyNumberOfThreadsGivesTheSameBits) {

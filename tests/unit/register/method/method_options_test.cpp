@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "register/method/presets.h"
+#include "register/verdict/verdict.h"
 #include "text/options_toml.h"
 
 namespace af::registration {
@@ -123,6 +124,21 @@ TEST(MethodOptions, ChainsTakeThePlaceOfThePresets) {
   EXPECT_EQ(method.chains[1].stages[1].level, 1);
 }
 
+TEST(Presets, AVerdictOfNotFoundCallsTheLastResort) {
+  const RegistrationOptions robust = preset_options("robust");
+  EXPECT_EQ(robust.chains.back().only_below, kLeastCoarseMean);
+  for (std::size_t i = 0; i + 1 < robust.chains.size(); ++i)
+    EXPECT_FALSE(robust.chains[i].is_last_resort());
+}
+
+TEST(MethodOptions, ALastResortNeedsAChainBeforeIt) {
+  MethodOptions options;
+  options.chains = {"below 0.2: mi bobyqa", "ncc gradient"};
+  EXPECT_THROW((void)resolve(options), InputError);
+  options.chains = {"ncc gradient", "below 0.2: mi bobyqa"};
+  EXPECT_EQ(resolve(options).chains.back().only_below, 0.2);
+}
+
 TEST(ChainText, ReadsWhatItWrites) {
   for (const std::string& name : preset_names())
     for (const ChainOptions& chain : preset_options(name).chains) {
@@ -130,12 +146,23 @@ TEST(ChainText, ReadsWhatItWrites) {
       const ChainOptions read = chain_from_text(chain.name, text);
       EXPECT_EQ(chain_text(read), text);
       EXPECT_EQ(read.stages.size(), chain.stages.size());
+      EXPECT_EQ(read.only_below, chain.only_below);
     }
 }
 
 TEST(ChainText, RefusesWhatItDoesNotKnow) {
-  for (const char* text :
-       {"", "mi", "mi bobyqa levle=1", "mi bobyqa level=x", "mi bobyqa level", "mi bobyqa;;"})
+  for (const char* text : {"",
+                           "mi",
+                           "mi bobyqa levle=1",
+                           "mi bobyqa level=x",
+                           "mi bobyqa level",
+                           "mi bobyqa;;",
+                           "below 0.2",
+                           "below 0.2:",
+                           "below 0.2 mi bobyqa",
+                           "below x: mi bobyqa",
+                           "below nan: mi bobyqa",
+                           "below : mi bobyqa"})
     EXPECT_THROW(
         {
           const ChainOptions chain = chain_from_text("c", text);

@@ -323,6 +323,29 @@ TEST(Registration, APortfolioEndsAtTheFirstConvincingChain) {
   }
 }
 
+TEST(Registration, ALastResortRunsOnlyWhereNothingWasFound) {
+  const test::SmallCase small = test::small_case();
+  RegistrationOptions options = two_stages("ncc", "gauss-newton");
+  ChainOptions idle = options.chains[0];
+  idle.name = "idle";
+  // Steps so small that it ends where it began.
+  for (StageOptions& stage : idle.stages) stage.search = {1e-6, 1e-6, 16};
+  options.chains[0].name = "resort";
+  options.chains = {idle, options.chains[0]};
+  options.judge.stage = StageOptions();
+  options.judge.stage.similarity.name = "rg";
+  options.judge.enough_value = 2.0;  // never
+  const auto result_below = [&](double value) {
+    options.chains.back().only_below = value;
+    return RegistrationRunner(small.problem, options).run(start_near(small));
+  };
+  const RegistrationResult idle_alone = result_below(-1.0);
+  EXPECT_EQ(idle_alone.chain, "idle");
+  // Just called, and just not.
+  EXPECT_EQ(result_below(idle_alone.similarity + 1e-9).chain, "resort");
+  EXPECT_EQ(result_below(idle_alone.similarity).chain, "idle");
+}
+
 /// Everything but the seconds.
 void expect_same(const RegistrationResult& a, const RegistrationResult& b) {
   EXPECT_EQ(a.room_from_ct.matrix(), b.room_from_ct.matrix());
