@@ -3,7 +3,9 @@
 """Fits the constants of register/uncertainty/calibration.cpp to registrations of known truth, on the patients of odd
 numbers, and prints how well they do on the others.
 
-    jobs/fit-uncertainty.py MEASURE:VARIANT=registrations.csv ... [--csv OUT.csv] [--commit HASH]
+    jobs/fit-uncertainty.py MEASURE:VARIANT=registrations.csv ... [--judge] [--csv OUT.csv] [--commit HASH]
+
+With --judge nothing is fitted: all patients are judged by what the programs foretold.
 
 MEASURE is that of the last stage: rg, gc, mi. VARIANT says what the X-rays are like. Cases are named PATIENT-POSE, a
 drawn patient KIND-NUMBER; others, which have no number, are never fitted. Needs nothing but Python.
@@ -15,7 +17,7 @@ import sys
 
 REGION_95 = 12.591587243743977  # chi-square, six degrees of freedom
 SUCCESS_TRE_MM = 2.5
-FAR_MM = 20.0
+NEAR_MM, FAR_MM = 0.001, 20.0
 LEAST_SHARE = 0.05
 
 
@@ -39,9 +41,9 @@ class Row:
         self.distance = number("squared_distance") * inflation  # by the sandwich alone
         self.tre_rms = number("predicted_tre_rms_mm") / math.sqrt(inflation) if inflation > 0 else math.nan
         self.tre_95 = number("predicted_tre_95_mm") / math.sqrt(inflation) if inflation > 0 else math.nan
-        chains = number("chain_distance_mm")
-        self.chains = 0.0 if math.isnan(chains) else min(chains, FAR_MM)
         self.has_pose = not math.isnan(self.fine_lowest)
+        self.stated_inflation = inflation
+        self.stated_confidence = number("confidence")
         self.inflation = 1.0
         self.confidence = 0.0
 
@@ -49,9 +51,9 @@ class Row:
         return -math.log(min(max(self.fine_mean, LEAST_SHARE), 1.0))
 
     def features(self):
-        tre = self.tre_rms * math.sqrt(self.inflation)
-        tre = FAR_MM if math.isnan(tre) else min(tre, FAR_MM)
-        return [1.0, self.fine_lowest, math.log1p(tre), math.log1p(self.chains)]
+        """The distance of a portfolio's ends is none of them: where no portfolio fails it would stand for success."""
+        tre = FAR_MM if math.isnan(self.tre_rms) else min(max(self.tre_rms, NEAR_MM), FAR_MM)
+        return [1.0, self.fine_lowest, math.log(tre)]
 
 
 def weighted_quantile(values, weights, share):
@@ -187,8 +189,35 @@ def reliability(rows):
     return lines
 
 
+def fit(rows, measures):
+    """Prints the constants that fit the rows that are for it, and has all rows foretold by them."""
+    for measure in measures:
+        mine = [r for r in rows if r.measure == measure]
+        fitted = [r for r in mine if r.is_for_fit and r.is_success and not math.isnan(r.distance)]
+        at_once, growth, share_from = fit_inflation(fitted)
+        print(f'    InflationRow{{"{measure}", {at_once:.2f}, {growth:.2f}, {share_from:.2f}}},')
+        for row in mine:
+            if row.has_pose:
+                row.inflation = math.exp(at_once + growth * max(0.0, row.misfit() + math.log(share_from)))
+    coefficients = fit_confidence([row for row in rows if row.is_for_fit and row.has_pose])
+    for name, value in zip(["AtOnce", "ByFine", "ByTre"], coefficients):
+        print(f"constexpr double kConfidence{name} = {value:.2f};")
+    for row in rows:
+        if row.has_pose:
+            row.confidence = probability(coefficients, row.features())
+
+
+def take_as_stated(rows):
+    for row in rows:
+        row.is_for_fit = False
+        row.inflation, row.confidence = row.stated_inflation, row.stated_confidence
+
+
 def main():
     words = sys.argv[1:]
+    is_judging = "--judge" in words
+    if is_judging:
+        words.remove("--judge")
     out = commit = None
     if "--csv" in words:
         at = words.index("--csv")
@@ -206,34 +235,26 @@ def main():
         with open(path, newline="", encoding="utf-8") as file:
             rows += [Row(*label.split(":"), cells) for cells in csv.DictReader(file)]
     measures = list(dict.fromkeys(row.measure for row in rows))
-    for measure in measures:
-        mine = [r for r in rows if r.measure == measure]
-        fit = [r for r in mine if r.is_for_fit and r.is_success and not math.isnan(r.distance)]
-        at_once, growth, share_from = fit_inflation(fit)
-        print(f'    InflationRow{{"{measure}", {at_once:.2f}, {growth:.2f}, {share_from:.2f}}},')
-        for row in mine:
-            if row.has_pose:
-                row.inflation = math.exp(at_once + growth * max(0.0, row.misfit() + math.log(share_from)))
-    coefficients = fit_confidence([row for row in rows if row.is_for_fit and row.has_pose])
-    names = ["AtOnce", "ByFine", "ByTre", "ByChains"]
-    for name, value in zip(names, coefficients):
-        print(f"constexpr double kConfidence{name} = {value:.2f};")
-    for row in rows:
-        if row.has_pose:
-            row.confidence = probability(coefficients, row.features())
+    if is_judging:
+        take_as_stated(rows)
+        halves = {"all, as stated": False}
+    else:
+        fit(rows, measures)
+        halves = {"odd, fitted": True, "even, unseen": False}
+    judged = list(halves)[-1]
     table = []
-    for half, is_for_fit in (("odd, fitted", True), ("even, unseen", False)):
+    for half, is_for_fit in halves.items():
         for label in measures + ["all"]:
             mine = [r for r in rows if r.is_for_fit == is_for_fit and label in ("all", r.measure)]
             table.append(summary(label, half, mine))
     for variant in dict.fromkeys(row.variant for row in rows):
         mine = [r for r in rows if not r.is_for_fit and r.variant == variant]
-        table.append(summary("all, " + variant, "even, unseen", mine))
+        table.append(summary("all, " + variant, judged, mine))
     print()
     for entry in table:
         print("  ".join(f"{k} {v:.3f}" if isinstance(v, float) else f"{k} {v}" for k, v in entry.items()))
     for measure in measures + ["all"]:
-        print(f"\nEven, unseen, {measure}:")
+        print(f"\n{judged}: {measure}")
         print("\n".join(reliability([r for r in rows if not r.is_for_fit and measure in ("all", r.measure)])))
     if out:
         with open(out, "w", newline="", encoding="utf-8") as file:

@@ -21,18 +21,20 @@ command again to continue. Needs the programs in build/release/bin (or installed
   --variants LIST  comma separated, as in the population                                                 [clean,all]
   --presets LIST   comma separated                                                               [robust,fast,paper]
   --starts N       of each patient, one in each interval of 2 mm from 0                                         [15]
+  --judge          fit nothing: judge all patients by what the programs foretell
   --ranks N        MPI ranks of registrations                                                            [all cores]
   --help
 TEXT
 }
 
-target="$PWD/uncertainty" variants=clean,all presets=robust,fast,paper starts=15 ranks=$(core_count) populations=()
+target="$PWD/uncertainty" variants=clean,all presets=robust,fast,paper starts=15 ranks=$(core_count) populations=() judge_option=()
 while (($# > 0)); do
   case "$1" in
     --output | -o) need_value "$1" $#; target=$2; shift ;;
     --variants) need_value "$1" $#; variants=$2; shift ;;
     --presets) need_value "$1" $#; presets=$2; shift ;;
     --starts) need_value "$1" $#; need_count "$1" "$2"; starts=$2; shift ;;
+    --judge) judge_option=(--judge) ;;
     --ranks | -n) need_value "$1" $#; need_count "$1" "$2"; ranks=$2; shift ;;
     --help | -h) usage; exit 0 ;;
     -*) die 2 "unknown option '$1' (try --help)" ;;
@@ -72,5 +74,5 @@ for preset in "${preset_list[@]}"; do
     done
   done
 done
-python3 "$af_root/jobs/fit-uncertainty.py" "${tables[@]}" --csv "$output/uncertainty.csv" | tee "$output/constants.txt"
+python3 "$af_root/jobs/fit-uncertainty.py" "${tables[@]}" "${judge_option[@]}" --csv "$output/uncertainty.csv" | tee "$output/constants.txt"
 say "Table: $output/uncertainty.csv"

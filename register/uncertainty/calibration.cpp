@@ -17,24 +17,26 @@ struct InflationRow {
   double share_from;
 };
 
-/// By `jobs/uncertainty.sh`, on its odd cases. The last row is for measures that were not fitted:
-/// the most cautious of them.
+/// By `jobs/uncertainty.sh`, on patients of odd numbers; mi's is an earlier fit to cases of one
+/// phantom (docs/uncertainty.md). The last row is for measures that were not fitted: the most
+/// cautious of them.
 constexpr std::array kInflation = {
-    InflationRow{"rg", 0.0, 5.80, 0.65},
-    InflationRow{"gc", 0.0, 2.65, 0.65},
+    InflationRow{"rg", 0.41, 2.80, 0.65},
+    InflationRow{"gc", 0.25, 1.25, 0.65},
     InflationRow{"mi", 2.50, 8.00, 0.65},
     InflationRow{"", 2.50, 8.00, 0.65},
 };
 
 /// Of success_confidence(), likewise fitted.
-constexpr double kConfidenceAtOnce = 6.47;
-constexpr double kConfidenceByFine = 1.49;
-constexpr double kConfidenceByTre = -3.02;
-constexpr double kConfidenceByChains = -0.22;
+constexpr double kConfidenceAtOnce = -0.83;
+constexpr double kConfidenceByFine = 18.71;
+constexpr double kConfidenceByTre = -1.28;
 
 /// Shares below are as good as none.
 constexpr double kLeastShare = 0.05;
-/// A TRE that is not foretold, and the farthest that tells more than the one before.
+/// The nearest and the farthest TRE that tell more than the ones before; one that is not foretold
+/// is as good as the farthest.
+constexpr double kNearMm = 0.001;
 constexpr double kFarMm = 20.0;
 
 }  // namespace
@@ -52,14 +54,11 @@ double covariance_inflation(const std::string& similarity, std::span<const ViewV
 
 double success_confidence(const ConfidenceFeatures& features) {
   const double share = summary_of(features.view_values, &ViewValue::fine).lowest;
-  const double tre_mm =
-      std::isfinite(features.tre_rms_mm) ? std::min(features.tre_rms_mm, kFarMm) : kFarMm;
-  const double chains_mm = std::isfinite(features.chain_distance_mm)
-                               ? std::min(features.chain_distance_mm, kFarMm)
-                               : 0.0;
-  const double logit = kConfidenceAtOnce + kConfidenceByFine * share +
-                       kConfidenceByTre * std::log1p(tre_mm) +
-                       kConfidenceByChains * std::log1p(chains_mm);
+  const double tre_mm = std::isfinite(features.sandwich_tre_mm)
+                            ? std::clamp(features.sandwich_tre_mm, kNearMm, kFarMm)
+                            : kFarMm;
+  const double logit =
+      kConfidenceAtOnce + kConfidenceByFine * share + kConfidenceByTre * std::log(tre_mm);
   return 1.0 / (1.0 + std::exp(-logit));
 }
 

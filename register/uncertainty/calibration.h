@@ -19,8 +19,7 @@ double covariance_inflation(const std::string& similarity, std::span<const ViewV
 /// What tells a success from a failure.
 struct ConfidenceFeatures {
   std::span<const ViewValue> view_values;
-  double tre_rms_mm = 0.0;         ///< as predicted, calibrated; NaN counts as no prediction
-  double chain_distance_mm = 0.0;  ///< RegistrationResult::chain_distance_mm
+  double sandwich_tre_mm = 0.0;  ///< as predicted, before inflation; NaN counts as no prediction
 };
 
 /// Probability that the TRE is below 2.5 mm, by logistic regression; NaN where no view can be

@@ -110,7 +110,7 @@ UncertaintyReport UncertaintyEstimator::report(const RegistrationResult& result,
   }
   add_covariance(result, view_values, report);
   report.confidence =
-      success_confidence({view_values, report.tre_rms_mm, result.chain_distance_mm});
+      success_confidence({view_values, report.tre_rms_mm / std::sqrt(report.inflation)});
   if (judged_end(result.stop_reason, view_values).verdict == Verdict::NotFound)
     report.confidence = 0.0;
   return report;

@@ -179,13 +179,15 @@ TEST(Calibration, ConfidenceFallsWithEveryDoubt) {
   const std::vector<ViewValue> good = {{0.8, 0.7}, {0.8, 0.7}};
   const std::vector<ViewValue> one_bad_view = {{0.8, 0.7}, {0.2, 0.1}};
   const double none = std::nan("");
-  const double best = success_confidence({good, 0.1, none});
+  const double best = success_confidence({good, 0.1});
   EXPECT_GT(best, 0.9);
   EXPECT_LE(best, 1.0);
-  EXPECT_LT(success_confidence({one_bad_view, 0.1, none}), best);
-  EXPECT_LT(success_confidence({good, 8.0, none}), best);
-  EXPECT_LE(success_confidence({good, 0.1, 15.0}), best);
-  EXPECT_TRUE(std::isnan(success_confidence({{}, 0.1, none})));
+  EXPECT_LT(success_confidence({one_bad_view, 0.1}), best);
+  EXPECT_LT(success_confidence({good, 8.0}), best);
+  EXPECT_LT(success_confidence({good, none}), best);
+  EXPECT_EQ(success_confidence({good, none}), success_confidence({good, 1e6}));
+  EXPECT_GT(success_confidence({good, 0.0}), best);
+  EXPECT_TRUE(std::isnan(success_confidence({{}, 0.1})));
 }
 
 }  // namespace
