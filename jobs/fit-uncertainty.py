@@ -66,8 +66,7 @@ def weighted_quantile(values, weights, share):
     return pairs[-1][0]
 
 
-# What fit_inflation() tries: limits to what so few cases may say. Wider ones fit the odd half better and hold less on the
-# even one (docs/uncertainty.md).
+# What fit_inflation() tries: limits to what so few cases may say.
 SHARES = [0.4, 0.45, 0.5, 0.55, 0.6, 0.65]
 GROWTHS = [0.05 * i for i in range(161)]
 
@@ -227,7 +226,7 @@ def main():
         at = words.index("--commit")
         commit = words[at + 1]
         del words[at : at + 2]
-    if not words or not all(re.match(r"\w+:\w+=.", word) for word in words):
+    if not words or not all(re.match(r"[^:=]+:[^:=]+=.", word) for word in words):
         sys.exit(__doc__)
     rows = []
     for word in words:

@@ -56,6 +56,7 @@ mkdir -p "$output/runs"
 
 # The measures that the presets end with.
 declare -A measure_of=([robust]=rg [fast]=gc [paper]=mi)
+declare -A made=()
 tables=()
 for preset in "${preset_list[@]}"; do
   [[ -v measure_of["$preset"] ]] || die 2 "--presets = '$presets' must name some of robust, fast, paper"
@@ -65,6 +66,8 @@ for preset in "${preset_list[@]}"; do
         [[ -f "$study" ]] || die 4 "$study: no such study: the population has no X-rays '$variant' from two views"
         patient=$(basename "$study" "-$variant-2.toml")
         run="$output/runs/$variant-$preset/$patient"
+        [[ ! -v made["$run"] ]] || die 2 "$study: another of the populations has a patient '$patient', too"
+        made[$run]=yes
         stage_inputs="$(state_of "$study")"
         stage "$variant-$preset-$patient" "$run/summary.json" run_ranks "$ranks" "$bin/af-evaluate" registration \
           --study "$study" --gold study --preset "$preset" --start-rule within-range --intervals "$starts" \

@@ -27,6 +27,14 @@ void replace_in_stages(const MethodOptions& options, RegistrationOptions& result
   replace_in_chain(options, result.finish);
 }
 
+/// Of a finish or a judge, which no chain stands before.
+ChainOptions unconditional_chain(const std::string& name, const std::string& text) {
+  ChainOptions chain = chain_from_text(name, text);
+  if (chain.is_last_resort())
+    throw InputError(name, "'" + text + "'", "only a chain can begin with 'below VALUE:'");
+  return chain;
+}
+
 /// The chains that were typed, in place of the preset's.
 void replace_chains(const MethodOptions& options, RegistrationOptions& result) {
   if (!options.chains.empty()) {
@@ -36,12 +44,12 @@ void replace_chains(const MethodOptions& options, RegistrationOptions& result) {
   for (const std::string& text : options.chains)
     result.chains.push_back(
         chain_from_text("chain-" + std::to_string(result.chains.size() + 1), text));
-  if (options.finish.has_value()) result.finish = chain_from_text("finish", *options.finish);
+  if (options.finish.has_value()) result.finish = unconditional_chain("finish", *options.finish);
   if (options.judge_least_value.has_value()) result.judge.least_value = *options.judge_least_value;
   if (options.judge_enough_value.has_value())
     result.judge.enough_value = *options.judge_enough_value;
   if (!options.judge.has_value()) return;
-  const ChainOptions judge = chain_from_text("judge", *options.judge);
+  const ChainOptions judge = unconditional_chain("judge", *options.judge);
   if (judge.stages.size() != 1)
     throw InputError("judge", "'" + *options.judge + "'", "must be one stage");
   result.judge.stage = judge.stages.front();

@@ -71,33 +71,34 @@ UncertaintyEstimator::UncertaintyEstimator(std::shared_ptr<const RegistrationPro
   }
 }
 
-void UncertaintyEstimator::add_covariance(const RegistrationResult& result,
-                                          std::span<const ViewValue> view_values,
-                                          UncertaintyReport& report) {
+double UncertaintyEstimator::add_covariance(const RegistrationResult& result,
+                                            std::span<const ViewValue> view_values,
+                                            UncertaintyReport& report) {
   const PoseFrame frame = PoseFrame::about(result.room_from_ct, problem_->center_ct_mm);
   const auto scaling = projected_motion_scaling(result.room_from_ct,
                                                 problem_->center_ct_mm,
                                                 problem_->scaling_points_ct,
                                                 views_,
                                                 problem_->isocenter_point);
-  if (!scaling.has_value()) return;
+  if (!scaling.has_value()) return UncertaintyReport::kNone;
   const std::size_t stage = stage_of_chain_.at(result.chain);
   const auto information = information_at(ends_->objective(stage), frame, *scaling, kTiles);
-  if (!information.has_value()) return;
+  if (!information.has_value()) return UncertaintyReport::kNone;
   const auto sandwich = sandwich_covariance(*information);
-  if (!sandwich.has_value()) return;
+  if (!sandwich.has_value()) return UncertaintyReport::kNone;
   const double inflation = covariance_inflation(similarities_[stage], view_values);
-  if (!std::isfinite(inflation)) return;
+  if (!std::isfinite(inflation)) return UncertaintyReport::kNone;
   report.inflation = inflation;
   const PoseMatrix covariance =
       inflation * *sandwich +
       calibration_covariance(
           *information, views_, problem_->isocenter_point, options_.calibration_error_px);
   report.covariance_deg_mm = in_deg_mm(covariance);
-  if (problem_->target_points_ct.empty()) return;
+  if (problem_->target_points_ct.empty()) return UncertaintyReport::kNone;
   const PredictedTre tre = predicted_tre(covariance, frame, problem_->target_points_ct);
   report.tre_rms_mm = tre.rms_mm;
   report.tre_95_mm = tre.upper_95_mm;
+  return predicted_tre(*sandwich, frame, problem_->target_points_ct).rms_mm;
 }
 
 UncertaintyReport UncertaintyEstimator::report(const RegistrationResult& result,
@@ -108,9 +109,8 @@ UncertaintyReport UncertaintyEstimator::report(const RegistrationResult& result,
     report.confidence = 0.0;
     return report;
   }
-  add_covariance(result, view_values, report);
-  report.confidence =
-      success_confidence({view_values, report.tre_rms_mm / std::sqrt(report.inflation)});
+  const double sandwich_tre_mm = add_covariance(result, view_values, report);
+  report.confidence = success_confidence({view_values, sandwich_tre_mm});
   if (judged_end(result.stop_reason, view_values).verdict == Verdict::NotFound)
     report.confidence = 0.0;
   return report;

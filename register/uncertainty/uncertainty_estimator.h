@@ -42,9 +42,10 @@ class UncertaintyEstimator {
                                          std::span<const ViewValue> view_values);
 
  private:
-  void add_covariance(const RegistrationResult& result,
-                      std::span<const ViewValue> view_values,
-                      UncertaintyReport& report);
+  /// Also the TRE that the sandwich alone foretells, rms, mm; NaN where there is none.
+  double add_covariance(const RegistrationResult& result,
+                        std::span<const ViewValue> view_values,
+                        UncertaintyReport& report);
 
   std::shared_ptr<const RegistrationProblem> problem_;
   UncertaintyOptions options_;

@@ -137,6 +137,12 @@ TEST(MethodOptions, ALastResortNeedsAChainBeforeIt) {
   EXPECT_THROW((void)resolve(options), InputError);
   options.chains = {"ncc gradient", "below 0.2: mi bobyqa"};
   EXPECT_EQ(resolve(options).chains.back().only_below, 0.2);
+  MethodOptions finish = options;
+  finish.finish = "below 0.2: rg gauss-newton";
+  EXPECT_THROW((void)resolve(finish), InputError);
+  MethodOptions judge = options;
+  judge.judge = "below 0.2: rg best-neighbor";
+  EXPECT_THROW((void)resolve(judge), InputError);
 }
 
 TEST(ChainText, ReadsWhatItWrites) {
