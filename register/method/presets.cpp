@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "base/named_rows.h"
-#include "base/number_text.h"
 
 namespace af::registration {
 namespace {
@@ -51,12 +50,10 @@ constexpr double kFoundNothing = 0.2;
 constexpr const char* kOverTheRegion = "rg gauss-newton level=1 pixels=4 final=0.1";
 
 /// Searches widely, by CMA-ES, refines what it found, and ends as every chain of `robust` does.
-ChainOptions wide_chain(const std::string& name,
-                        const std::string& search,
-                        double first_step_mm = 12.0) {
+ChainOptions wide_chain(const std::string& name, const std::string& search) {
   return chain_from_text(name,
-                         search + " roi=2 step=" + number_text(first_step_mm) +
-                             " final=1;"
+                         search +
+                             " roi=2 final=1;"
                              "rg gauss-newton level=2 pixels=8 roi=2 final=0.2;" +
                              kOverTheRegion);
 }
@@ -72,9 +69,9 @@ RegistrationOptions robust_preset() {
                       std::string("ncc gauss-newton level=2 pixels=8 roi=2 step=10;"
                                   "gc gauss-newton level=2 pixels=8 roi=2 final=0.2;") +
                           kOverTheRegion),
-      wide_chain("wide", "rg cma-es level=2 pixels=16"),
-      wide_chain("wide-edges", "gc cma-es level=2 pixels=16"),
-      wide_chain("far", "ncc cma-es level=3 pixels=8", 20.0)};
+      wide_chain("wide", "rg cma-es level=2 pixels=16 step=12"),
+      wide_chain("wide-edges", "gc cma-es level=2 pixels=16 step=12"),
+      wide_chain("far", "ncc cma-es level=3 pixels=8 step=20")};
   options.chains.back().only_below = kFoundNothing;
   options.finish = chain_from_text("finish", "rg quasi-newton pixels=2 step=2 final=0.02");
   options.judge.enough_value = kConvincingValue;

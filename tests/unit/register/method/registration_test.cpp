@@ -274,13 +274,17 @@ TEST(Registration, DrawnSearchesDependOnSeedAndStartIndexAlone) {
   EXPECT_NE(other.run(start_near(small), 3).room_from_ct.matrix(), first.room_from_ct.matrix());
 }
 
+/// With steps so small that it ends where it began.
+ChainOptions idle_chain(ChainOptions chain) {
+  chain.name = "idle";
+  for (StageOptions& stage : chain.stages) stage.search = {1e-6, 1e-6, 16};
+  return chain;
+}
+
 TEST(Registration, APortfolioTakesTheChainThatItsJudgePrefers) {
   const test::SmallCase small = test::small_case();
   RegistrationOptions good = two_stages("ncc", "gauss-newton");
-  ChainOptions idle = good.chains[0];
-  idle.name = "idle";
-  // Steps so small that it ends where it began.
-  for (StageOptions& stage : idle.stages) stage.search = {1e-6, 1e-6, 16};
+  const ChainOptions idle = idle_chain(good.chains[0]);
   good.chains[0].name = "good";
   RegistrationOptions options = good;
   options.chains = {idle, good.chains[0], idle};
@@ -326,12 +330,8 @@ TEST(Registration, APortfolioEndsAtTheFirstConvincingChain) {
 TEST(Registration, ALastResortRunsOnlyWhereNothingWasFound) {
   const test::SmallCase small = test::small_case();
   RegistrationOptions options = two_stages("ncc", "gauss-newton");
-  ChainOptions idle = options.chains[0];
-  idle.name = "idle";
-  // Steps so small that it ends where it began.
-  for (StageOptions& stage : idle.stages) stage.search = {1e-6, 1e-6, 16};
   options.chains[0].name = "resort";
-  options.chains = {idle, options.chains[0]};
+  options.chains = {idle_chain(options.chains[0]), options.chains[0]};
   options.judge.stage = StageOptions();
   options.judge.stage.similarity.name = "rg";
   options.judge.enough_value = 2.0;  // never
