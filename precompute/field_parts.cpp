@@ -89,9 +89,9 @@ std::vector<FieldPart> parts_of_orbit(const FieldSource& source,
   return parts;
 }
 
-std::unique_ptr<const FieldCaster> make_caster(const FieldPart& part,
-                                               const PrecomputeOptions& options,
-                                               const AttenuationQuantizer& quantizer) {
+std::unique_ptr<const FieldCaster> caster_of_part(const FieldPart& part,
+                                                  const PrecomputeOptions& options,
+                                                  const AttenuationQuantizer& quantizer) {
   std::unique_ptr<const FieldCaster> of_ct = caster_named(options.caster)
                                                  .make({*part.source.volume,
                                                         part.resampled.get(),
@@ -161,7 +161,7 @@ std::unique_ptr<const FieldCaster> make_caster(const std::vector<FieldPart>& par
                                                const AttenuationQuantizer& quantizer) {
   std::vector<std::unique_ptr<const FieldCaster>> casters;
   casters.reserve(parts.size());
-  for (const FieldPart& part : parts) casters.push_back(make_caster(part, options, quantizer));
+  for (const FieldPart& part : parts) casters.push_back(caster_of_part(part, options, quantizer));
   if (casters.size() == 1) return std::move(casters.front());
   return std::make_unique<const JoinedCaster>(std::move(casters), slab_counts(parts));
 }

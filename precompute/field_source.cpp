@@ -9,7 +9,6 @@
 #include "pose_files/pose_file.h"
 #include "study/ct_keys.h"
 #include "study/node_ct.h"
-#include "study/node_volume.h"
 #include "study/pose_context.h"
 #include "study/rig_file.h"
 #include "study/shared_inputs.h"

@@ -102,6 +102,8 @@ class PrecomputeRun {
     for (const std::string& warning : source_.warnings) warn(world_, warning);
     if (source_.projections != nullptr) inform(world_, source_.projections->text());
     parts_ = field_parts(source_, options_, world_);
+    // As one central slab first: resampling needs the slab frame alone, and to cut the CT into
+    // slabs takes the resampled CT.
     for (FieldPart& part : parts_) size_planes(part, DepthSlabs{{}, {0.0}});
     lattice_ = lattice_of(parts_);
     clock_.end("read");
@@ -334,9 +336,7 @@ class PrecomputeRun {
     WorkNote note(iteration(0));
     if (build.progress != nullptr) {
       decides.merge(deciding_options(options_, kCodebookStage));
-      journal.emplace(run_.unfinished("training", decides),
-                      static_cast<std::size_t>(options_.codebook_options().codewords),
-                      world_);
+      journal.emplace(run_.unfinished("training", decides), options_.codebook_options(), world_);
       checkpoints.begun = journal->begun();
       checkpoints.on_iteration = [&](const TrainedCodebook& so_far) {
         journal->append(so_far);
@@ -360,8 +360,7 @@ class PrecomputeRun {
                    CastPhase& cast,
                    const TrainedCodebook& trained,
                    const OverflowChoice& choice) {
-    FieldEncoder encoder(
-        build, cast, trained.codebook, options_.design().mean_step, choice.overflow);
+    FieldEncoder encoder(build, cast, trained.codebook, choice.overflow);
     std::optional<BuildRecord> record;
     std::optional<ProgressPrinter> printer;
     printer.emplace("encoding and writing", world_.is_root());
@@ -407,15 +406,12 @@ class PrecomputeRun {
   }
 
   /// Collective. A field, or an atlas.
-  [[nodiscard]] FieldFileInfo write_output(const Codebook& trained,
+  [[nodiscard]] FieldFileInfo write_output(const Codebook& codebook,
                                            const NextBlocks& next_blocks,
                                            const MakeProvenance& make_provenance) const {
     const IndexPacking packing =
         options_.packs_by_codebook_tree() ? IndexPacking::CodebookTree : IndexPacking::Deflate;
-    AttenuationAtlas atlas{identity_of(source_, source_.range),
-                           {},
-                           quantizer().step(),
-                           field_codebook(trained, options_.design().mean_step)};
+    AttenuationAtlas atlas{identity_of(source_, source_.range), {}, quantizer().step(), codebook};
     for (const FieldPart& part : parts_)
       atlas.members.push_back({identity_of(part.source, part.range), part.light_slab});
     if (options_.is_atlas())

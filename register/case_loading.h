@@ -29,8 +29,8 @@ struct CaseLoadOptions {
   CtReadOptions ct;
   AttenuationModel attenuation;  ///< of ray casting
   RayCasterOptions ray_caster;
-  /// Of the X-rays that DRRs are of; with fields of a spectrum, bone_field_path() of each is
-  /// read, too.
+  /// The beam whose X-rays DRRs imitate; where it has a spectrum, bone_field_path() of each field
+  /// is read, too.
   XrayBeamOptions beam;
   bool skip_ct_check = false;  ///< with fields: do not read the CT (it may be absent)
   /// Radius, mm on the isocentre plane, of the discs about the study's fiducials that registration

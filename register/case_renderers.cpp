@@ -17,7 +17,7 @@
 #include "drr/ray_cast_drr.h"
 #include "drr/two_pass_af_drr.h"
 #include "geometry/pose_in_range.h"
-#include "study/node_volume.h"
+#include "study/node_ct.h"
 #include "volume/blurred_volume.h"
 
 namespace af::registration {
@@ -162,7 +162,7 @@ int level_count(const OpenedField& opened, const CaseLoadOptions& options) {
   return levels;
 }
 
-/// Threads for a view's levels: the session's, or some of their own where it has none.
+/// Threads for a view's levels: the run's (options.pool), or some of their own where it has none.
 struct LevelThreads {
   std::shared_ptr<ThreadPool> own;  ///< of the level that is looked up most; may be null
   std::shared_ptr<ThreadPool> coarse;

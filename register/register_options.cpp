@@ -5,9 +5,6 @@
 
 #include "base/error.h"
 #include "base/toml_text.h"
-#include "files/sha256.h"
-#include "pose_files/pose_file.h"
-#include "study/landmark_start.h"
 
 namespace af::registration {
 namespace {
@@ -127,36 +124,6 @@ CaseLoadOptions case_load_options(const RegisterOptions& options,
   result.fiducial_mask_mm = options.method.fiducial_mask_mm;
   if (options.correction.is_wanted) result.correction_levels = last_levels;
   return result;
-}
-
-bool starts_from_landmarks(const RegisterOptions& options, const StudyCase& study_case) {
-  const bool has_start = options.start_rotation_deg.has_value() ||
-                         options.start_translation_mm.has_value() || !options.start_pose.empty() ||
-                         !options.starts.empty();
-  if (options.start == "landmarks") return true;
-  return options.start == "auto" && !has_start && has_landmarks(study_case);
-}
-
-std::vector<RigidTransform> start_poses(const RegisterOptions& options,
-                                        const PoseContext& context,
-                                        std::vector<std::string>& notes) {
-  check(context.frame.has_value(), "a start is relative to the case's nominal pose");
-  if (!options.starts.empty()) return read_unbroken_poses(options.starts, context, &notes);
-  if (!options.start_pose.empty()) return {read_pose(options.start_pose, context, &notes)};
-  std::array<double, 6> values{};
-  for (std::size_t i = 0; i < 3; ++i) {
-    if (options.start_rotation_deg.has_value()) values[i] = (*options.start_rotation_deg)[i];
-    if (options.start_translation_mm.has_value())
-      values[i + 3] = (*options.start_translation_mm)[i];
-  }
-  return {
-      pose_of_deg_and_mm(*context.frame, values, "--start-rotation-deg, --start-translation-mm")};
-}
-
-std::map<std::string, std::string> hashes_of_files(const RegisterOptions& options) {
-  std::map<std::string, std::string> hashes = {{"study", sha256_of_file(options.study.string())}};
-  if (!options.starts.empty()) hashes["starts"] = sha256_of_file(options.starts.string());
-  return hashes;
 }
 
 }  // namespace af::registration

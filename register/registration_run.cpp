@@ -2,9 +2,11 @@
 #include "register/registration_run.h"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <filesystem>
 #include <iostream>
+#include <map>
 #include <memory>
 #include <numeric>
 #include <optional>
@@ -12,9 +14,11 @@
 #include "base/error.h"
 #include "base/stored_bytes.h"
 #include "files/output_file.h"
+#include "files/sha256.h"
 #include "gold_standard/target_box.h"
 #include "gold_standard/tre.h"
 #include "parallel/work_watch.h"
+#include "pose_files/pose_file.h"
 #include "register/results/slicer_folder.h"
 #include "register/verdict/view_diagnosis.h"
 #include "run/run_folder.h"
@@ -41,6 +45,23 @@ std::vector<RegistrationRecord> records_of(const ResumableItems& items, std::siz
   });
   if (best.has_value()) records[best_record(records)].result.trace = best->result.trace;
   return records;
+}
+
+/// Whether the case's landmarks give the start: when they are asked for, or when the case has
+/// landmarks and no start is given.
+bool starts_from_landmarks(const RegisterOptions& options, const StudyCase& study_case) {
+  const bool has_start = options.start_rotation_deg.has_value() ||
+                         options.start_translation_mm.has_value() || !options.start_pose.empty() ||
+                         !options.starts.empty();
+  if (options.start == "landmarks") return true;
+  return options.start == "auto" && !has_start && has_landmarks(study_case);
+}
+
+/// SHA-256 of the study and, if given, the file of starts, by name.
+std::map<std::string, std::string> hashes_of_files(const RegisterOptions& options) {
+  std::map<std::string, std::string> hashes = {{"study", sha256_of_file(options.study.string())}};
+  if (!options.starts.empty()) hashes["starts"] = sha256_of_file(options.starts.string());
+  return hashes;
 }
 
 /// Collective. The preset with its replacements, refused where the command line contradicts it.
@@ -169,6 +190,22 @@ void write_results(const RegisterOptions& options,
 }
 
 }  // namespace
+
+std::vector<RigidTransform> start_poses(const RegisterOptions& options,
+                                        const PoseContext& context,
+                                        std::vector<std::string>& notes) {
+  check(context.frame.has_value(), "a start is relative to the case's nominal pose");
+  if (!options.starts.empty()) return read_unbroken_poses(options.starts, context, &notes);
+  if (!options.start_pose.empty()) return {read_pose(options.start_pose, context, &notes)};
+  std::array<double, 6> values{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (options.start_rotation_deg.has_value()) values[i] = (*options.start_rotation_deg)[i];
+    if (options.start_translation_mm.has_value())
+      values[i + 3] = (*options.start_translation_mm)[i];
+  }
+  return {
+      pose_of_deg_and_mm(*context.frame, values, "--start-rotation-deg, --start-translation-mm")};
+}
 
 void run_registration(const RegisterOptions& options,
                       const std::string& command_line,

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "parallel/communicator.h"
+#include "pose_files/pose_format.h"
 #include "register/method/registration.h"
 #include "register/register_options.h"
 #include "register/results/registration_results.h"
@@ -15,6 +16,14 @@
 #include "run/resumable_items.h"
 
 namespace af::registration {
+
+/// The starts of a run: of --starts, or the one of --start-pose, or nominal with
+/// --start-rotation-deg and --start-translation-mm. `context` is the case's, with its frame;
+/// `notes` get what was left out of a file and assumed. InputError when a frame before the last
+/// pose of --starts has none: rows are numbered by frames.
+std::vector<RigidTransform> start_poses(const RegisterOptions& options,
+                                        const PoseContext& context,
+                                        std::vector<std::string>& notes);
 
 /// Collective. Loads the case, registers it from every start and writes the output folder.
 /// NotFoundError, once the results are written, when the best end is none.

@@ -25,7 +25,8 @@ struct TileStrip {
   const int32_t* v_begin;
   int32_t tile_begin;  ///< tiles to blend, along t
   int32_t tile_end;
-  /// Images [t][s] at the nodes of tile 0: value, slopes along u and v (null: not wanted).
+  /// Images [t][s] at the nodes of tile 0: value, slopes along the source's x and z (null: not
+  /// wanted).
   float* images[3];
   int64_t stride;  ///< from image row to image row
 };
@@ -53,8 +54,8 @@ struct SampleBlock {
   const float* u_weights[kMostTaps];  ///< one per column of nodes
   const float* u_slopes[kMostTaps];   ///< their derivatives with respect to the source
   const ViewpointTap* v_taps;         ///< one per row of nodes
-  /// Images: value, slopes along u and v (null: not wanted); written for up to 15 nodes beyond each
-  /// row of the block.
+  /// Images: value, slopes along the source's x and z (null: not wanted); written for up to 15
+  /// nodes beyond each row of the block.
   float* images[3];
   int64_t image_stride;
   int32_t columns;

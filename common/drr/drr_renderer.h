@@ -54,8 +54,8 @@ class RenderWorkspace {
   virtual ~RenderWorkspace() = default;
 };
 
-/// Makes DRRs of one CT for one camera. Every comparison of fields with ray casting is a swap of
-/// this object. render() is const and re-entrant with one workspace per thread; results do not
+/// Makes DRRs of one CT. Every comparison of fields with ray casting is a swap of this object.
+/// render() is const and re-entrant with one workspace per thread; results do not
 /// depend on threads or vector width.
 class DrrRenderer {
  public:
@@ -84,7 +84,7 @@ class DrrRenderer {
   [[nodiscard]] virtual const char* name() const = 0;
 };
 
-/// Convenience for tools: renders into a fresh image. `rays_outside`, when given, receives the
+/// Renders into a fresh image. `rays_outside`, when given, receives the
 /// count.
 Image2d render_image(const DrrRenderer& renderer,
                      const RigidTransform& room_from_ct,

@@ -142,7 +142,8 @@ void decode_slab(const CompressedAttenuationField& field,
   const int v_tiles = lattice.v.stored.tiles();
   const bool has_means = field.codebook.has_means();
   const auto st_values = static_cast<std::size_t>(lattice.s.stored.tiles()) *
-                         static_cast<std::size_t>(lattice.t.stored.tiles()) * (has_means ? 2 : 1);
+                         static_cast<std::size_t>(lattice.t.stored.tiles()) *
+                         field.codebook.values_per_tile();
   for (int a = u_tiles.begin; a < u_tiles.end; ++a)
     for (int b = 0; b < v_tiles; ++b) {
       std::array<std::uint16_t*, 4> targets{};

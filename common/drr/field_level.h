@@ -21,9 +21,9 @@ double node_spacing_mm(const LightSlab& light_slab);
 
 /// How often a field's (s,t) axes are halved before the first level of its pyramid: until the
 /// longest has about 256 nodes, the paper's number, but only as long as nodes stand no farther
-/// apart than the paper's, about 1.1 mm (10 degrees and 30 mm in the treatment room). More nodes
-/// may also be those of a wider range: halved by their number alone, levels of 20 degrees and 40 mm
-/// had twice the blur, at which scatter and steel have optima of their own. \test
+/// apart than the paper's, about 1.1 mm (10 degrees and 30 mm in the treatment room). A field may
+/// also have more nodes because its range is wider: halved by their number alone, levels of 20
+/// degrees and 40 mm had twice the blur, at which scatter and steel have optima of their own. \test
 /// FieldLevel.BeginsWithMoreHalvingsOfFinerNodesNotOfAWiderRange
 int halvings_to_usual_nodes(const LightSlab& light_slab);
 

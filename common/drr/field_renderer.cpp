@@ -5,7 +5,7 @@
 
 #include "base/error.h"
 #include "base/named_rows.h"
-#include "drr/af_drr.h"
+#include "drr/ray_by_ray_af_drr.h"
 #include "drr/two_pass_af_drr.h"
 
 namespace af {
@@ -25,7 +25,7 @@ struct KnownLookUp {
 
 template <FieldInterpolation interpolation>
 RendererPointer make_literal(FieldPointer field, const PoolPointer& /*pool*/) {
-  return std::make_shared<const AfDrr>(std::move(field), interpolation);
+  return std::make_shared<const RayByRayAfDrr>(std::move(field), interpolation);
 }
 template <typename Pointer, AxisInterpolation st, AxisInterpolation uv>
 RendererPointer make_two_pass(Pointer samples, const PoolPointer& pool) {

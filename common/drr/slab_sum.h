@@ -6,24 +6,10 @@
 
 #include <Eigen/Core>
 
+#include "drr/node_images.h"
 #include "drr/slab_sum_kernel.h"
 
 namespace af {
-
-/// Equidistant nodes of an image on a plane y = plane_y_mm of the slab frame.
-struct NodeGrid {
-  double s_first_mm, s_spacing_mm;
-  double t_first_mm, t_spacing_mm;
-  double plane_y_mm;
-  std::int32_t stride, s_count, t_count;
-};
-
-/// Images of the nodes of one grid: the value and, unless null, its slopes along the source's x and
-/// z (per mm).
-struct NodeImages {
-  NodeGrid grid;
-  std::array<const float*, 3> images;
-};
 
 /// Scratch memory of a sum.
 struct SlabSumScratch {

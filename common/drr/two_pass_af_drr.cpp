@@ -7,6 +7,7 @@
 #include "base/error.h"
 #include "base/vector_width.h"
 #include "drr/node_image_kernel.h"
+#include "drr/node_images.h"
 #include "drr/slab_sum.h"
 #include "drr/warp_kernel.h"
 

@@ -22,8 +22,8 @@ struct TwoPassOptions {
 /// of the detector's footprint, then that image is resampled to the detector through one
 /// homography. The blended images of several slabs are summed on one plane in between (SlabSum).
 /// Differs from the paper: (u,v) weights are taken at the (s,t) nodes instead of at the ray itself.
-/// Against ray casting both are equally good; AfDrr is the literal quadrilinear look-up and this
-/// class's oracle. Pose derivatives are analytic, from the slopes of both passes. \test
+/// Against ray casting both are equally good; RayByRayAfDrr is the literal quadrilinear look-up and
+/// this class's oracle. Pose derivatives are analytic, from the slopes of both passes. \test
 /// TwoPassAfDrr.AgreesWithQuadrilinearLookup
 class TwoPassAfDrr final : public DrrRenderer {
  public:

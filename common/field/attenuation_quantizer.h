@@ -15,6 +15,7 @@ class AttenuationQuantizer {
   static AttenuationQuantizer for_maximum(double max_total_attenuation);
 
   [[nodiscard]] float step() const { return step_; }
+  /// To the nearest level, as quantize_node() of shear_warp_kernel does.
   [[nodiscard]] std::uint16_t quantize(float total_attenuation) const;
   [[nodiscard]] float dequantize(std::uint16_t level) const {
     return step_ * static_cast<float>(level);

@@ -3,8 +3,18 @@
 
 #include <numeric>
 #include <span>
+#include <utility>
 
 namespace af {
+
+namespace {
+
+/// Codeword 0 is no shape.
+void fold_shapes(std::span<Tile> codewords) {
+  for (Tile& shape : codewords.subspan(1)) shape = folded_shape(shape);
+}
+
+}  // namespace
 
 std::uint32_t tile_sum(const Tile& tile) {
   return std::accumulate(tile.begin(), tile.end(), std::uint32_t{0});
@@ -24,12 +34,15 @@ Tile folded_shape(const Tile& shape) {
   return folded;
 }
 
-Codebook field_codebook(const Codebook& trained, int mean_step) {
-  Codebook codebook = trained;
-  codebook.mean_step = mean_step;
-  if (mean_step > 0)
-    for (Tile& shape : std::span(codebook.codewords).subspan(1)) shape = folded_shape(shape);
-  return codebook;
+std::vector<Tile> searched_codewords(const Codebook& codebook) {
+  std::vector<Tile> codewords = codebook.codewords;
+  if (codebook.has_means()) fold_shapes(codewords);
+  return codewords;
+}
+
+Codebook codebook_of_searched(std::vector<Tile> codewords, int mean_step) {
+  if (mean_step > 0) fold_shapes(codewords);
+  return {std::move(codewords), mean_step};
 }
 
 std::vector<std::string> problems(const Codebook& codebook) {
@@ -41,11 +54,9 @@ std::vector<std::string> problems(const Codebook& codebook) {
     found.push_back("mean_step = " + std::to_string(codebook.mean_step) +
                     ": must be within 0 and " + std::to_string(kMaxMeanStep));
   if (!is_zero(codewords.front())) found.emplace_back("codeword 0 must be the zero tile");
-  const auto ordered = [&](std::size_t i) {
-    return codebook.has_means() ? folded_shape(codewords[i]) : codewords[i];
-  };
-  for (std::size_t i = codebook.has_means() ? 2 : 1; i < codewords.size(); ++i)
-    if (codeword_less(ordered(i), ordered(i - 1))) {
+  const std::vector<Tile> ordered = searched_codewords(codebook);
+  for (std::size_t i = codebook.has_means() ? 2 : 1; i < ordered.size(); ++i)
+    if (codeword_less(ordered[i], ordered[i - 1])) {
       found.push_back("codeword " + std::to_string(i) + " breaks the codebook's order by sum");
       break;
     }

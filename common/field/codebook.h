@@ -22,12 +22,17 @@ inline constexpr std::size_t kMaxCodewords = 65536;  ///< an index is 16 bits
 /// `mean_step` levels. Elements of shapes stand kShapeZero higher. The shapes from codeword 1 on
 /// are sorted as plain tiles are, but folded (folded_shape()), because their own sums hardly
 /// differ. Codeword 0 goes with mean 0 and says that a tile is empty.
+///
+/// Tiles are stored [u][v][s][t] as indices; with means each row along t is followed by a row of as
+/// many means: [u][v][s][2][t].
 struct Codebook {
   std::vector<Tile> codewords;
   int mean_step = 0;  ///< 0: of plain tiles
 
   [[nodiscard]] std::size_t size() const { return codewords.size(); }
   [[nodiscard]] bool has_means() const { return mean_step > 0; }
+  /// Numbers that are stored of a tile: its index and, where tiles have means, its mean.
+  [[nodiscard]] std::size_t values_per_tile() const { return has_means() ? 2 : 1; }
 };
 
 /// What an element of a shape that equals the mean holds.
@@ -44,9 +49,12 @@ inline std::uint16_t level_of(std::uint16_t element, std::uint16_t mean) {
 /// shapes stay, and the sum becomes the slope along s.
 Tile folded_shape(const Tile& shape);
 
-/// The codebook of a field from one that was trained: on plain tiles, or on folded shapes where
-/// `mean_step` is above 0.
-Codebook field_codebook(const Codebook& trained, int mean_step);
+/// The codewords in the form in which they are searched, trained and kept in order: shapes folded,
+/// plain tiles as they are.
+std::vector<Tile> searched_codewords(const Codebook& codebook);
+
+/// The inverse of searched_codewords(). `mean_step`: 0 where `codewords` are plain tiles.
+Codebook codebook_of_searched(std::vector<Tile> codewords, int mean_step);
 
 /// Sum of a tile's elements: its DC coefficient before scaling.
 std::uint32_t tile_sum(const Tile& tile);

@@ -30,20 +30,6 @@ double variance_of(const ValueOf& value_of, const std::uint32_t* begin, const st
 
 }  // namespace
 
-TileCoefficients hadamard_coefficients(const Tile& tile) {
-  TileCoefficients values{};
-  std::copy(tile.begin(), tile.end(), values.begin());
-  for (std::size_t stride = 1; stride < kTileElements; stride *= 2)
-    for (std::size_t i = 0; i < kTileElements; ++i)
-      if ((i & stride) == 0) {
-        const float a = values[i];
-        const float b = values[i | stride];
-        values[i] = a + b;
-        values[i | stride] = a - b;
-      }
-  return values;
-}
-
 int quarter_octaves(float magnitude) {
   constexpr unsigned kMantissaBits = 23;
   constexpr unsigned kKept = 2;

@@ -1,21 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
 #include "field/codebook.h"
 #include "field/index_coding_kernel.h"
+#include "field/tile_transform.h"
 
 namespace af {
-
-/// A tile in the coordinates of the 4-D Hadamard transform; coefficient j is the sum of the levels,
-/// negative where an element's number shares an odd number of bits with j. Exact.
-using TileCoefficients = std::array<float, kTileElements>;
-
-TileCoefficients hadamard_coefficients(const Tile& tile);
 
 /// In quarters of an octave, for comparing magnitudes: the steps are exact and the same everywhere.
 int quarter_octaves(float magnitude);

@@ -8,7 +8,7 @@ namespace af {
 float CompressedAttenuationField::node_value(std::size_t slab, const NodeIndex& node) const {
   const std::array<LatticeAxis, 4> axes = lattice(slab).axes();
   const std::array<int, 4> nodes = {node.u, node.v, node.s, node.t};
-  const std::size_t rows = codebook.has_means() ? 2 : 1;
+  const std::size_t rows = codebook.values_per_tile();
   std::size_t tile = 0;
   std::array<unsigned, 4> odd{};
   for (std::size_t axis = 0; axis < 4; ++axis) {
@@ -32,7 +32,7 @@ std::vector<std::string> index_problems(std::span<const std::uint16_t> values,
                                         std::size_t row,
                                         const Codebook& codebook,
                                         const std::string& name) {
-  const std::size_t stride = codebook.has_means() ? 2 * row : row;
+  const std::size_t stride = codebook.values_per_tile() * row;
   std::vector<std::string> found;
   for (std::size_t at = 0; at < values.size(); at += stride) {
     const auto indices = values.subspan(at, row);

@@ -29,10 +29,9 @@ struct FieldIdentity {
   FieldMaterial material = FieldMaterial::All;
 };
 
-/// Codeword indices of one slab, [Tu][Tv][Ts][Tt] with Tt fastest; tile (a, b, c, d) holds nodes
-/// 2a.., 2b.., 2c.., 2d.. of what is stored along each axis. Odd ends are padded by edge
-/// replication. Where the codebook has means, [Tu][Tv][Ts][2][Tt]: a row of indices, then the row
-/// of the means of its tiles, in levels.
+/// Codeword indices (and means, in levels) of one slab, stored as Codebook says, t fastest. Tile
+/// (a, b, c, d) holds nodes 2a.., 2b.., 2c.., 2d.. of what is stored along each axis; odd ends are
+/// padded by edge replication.
 struct CompressedSlab {
   SharedArray<std::uint16_t> indices;
 };

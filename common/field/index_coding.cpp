@@ -75,7 +75,8 @@ std::size_t IndexCoding::most_bytes(std::size_t tiles) {
 
 void IndexCoding::check_values(std::span<const std::uint16_t> values,
                                const std::array<std::size_t, 4>& tiles) const {
-  check(values.size() == values_per_tile() * tile_count_of(tiles), "one index per tile");
+  check(values.size() == values_per_tile() * tile_count_of(tiles),
+        "values_per_tile() numbers per tile");
   const std::size_t row = tiles[3];
   for (std::size_t at = 0; at < values.size(); at += values_per_tile() * row) {
     const auto indices = values.subspan(at, row);
@@ -117,7 +118,7 @@ bool IndexCoding::decode(std::span<const CodedBlock> blocks,
     std::array<BlockToDecode, kBlocksAtOnce> in_memory{};
     for (std::size_t i = 0; i < some.size(); ++i) {
       check(some[i].indices.size() == values_per_tile() * tile_count_of(tiles),
-            "one index per tile");
+            "values_per_tile() numbers per tile");
       memories[i] = starts[i].memory();
       in_memory[i] = {some[i].indices.data(),
                       some[i].bytes.data(),

@@ -172,8 +172,8 @@ AF_KERNEL_INLINE void find_neighbours(const TileNote* here,
   around[7] = before - 1;
 }
 
-/// For a neighbour that is missing, the first one that is there stands in, best one that is not
-/// empty.
+/// The first occupied neighbour, or codeword 0 without one, stands in for a neighbour that is
+/// missing.
 AF_KERNEL_INLINE uint32_t substitute_of(const TileNote* const around[kPredictors]) {
   for (int i = 0; i < kPredictors; ++i)
     if (around[i]->state == kOccupied) return around[i]->codeword;

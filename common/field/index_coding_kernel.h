@@ -82,7 +82,7 @@ struct BlockMemory {
   float* sums;               ///< of these, too: 16 times the mean of the tile of each note
 };
 
-/// Indices [u][v][s][t] of one block and their bytes; with means, [u][v][s][2][t].
+/// Indices (and means) of one block, stored as Codebook says, and their bytes.
 struct BlockToDecode {
   uint16_t* indices;
   const uint8_t* bytes;

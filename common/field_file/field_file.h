@@ -41,8 +41,8 @@ struct FieldFileInfo {
   IndexPacking packing = IndexPacking::CodebookTree;
 };
 
-/// A block of tile indices of one slab that one rank has: half-open tile ranges and the indices,
-/// [u][v][s][t]; of tiles with means, [u][v][s][2][t] as in CompressedSlab.
+/// A block of tile indices (and means) of one slab that one rank has: half-open tile ranges and the
+/// indices, stored as Codebook says.
 struct IndexBlock {
   std::size_t slab = 0;
   std::array<int, 4> first_tile = {0, 0, 0, 0};
@@ -51,11 +51,11 @@ struct IndexBlock {
 };
 
 /// Tiles along s and along t that one chunk of an index dataset spans, where the slab has as many;
-/// along u it spans kIndexChunkViewpoints where that does not make planes too large. Blocks that
+/// along u it spans kIndexChunkTilesAlongU where that does not make planes too large. Blocks that
 /// begin and end at multiples of them are written without reading chunks back. Chunks of fields of
 /// more than 16 GiB are larger.
 inline constexpr std::array<int, 2> kIndexChunkTiles = {128, 64};
-inline constexpr int kIndexChunkViewpoints = 8;
+inline constexpr int kIndexChunkTilesAlongU = 8;
 
 /// This rank's next blocks, none when it has no more. Called on every rank equally often, until no
 /// rank has any left; what it throws is thrown on every rank.
@@ -68,12 +68,12 @@ using MakeProvenance = std::function<FieldProvenance()>;
 using MpiIoHints = std::vector<std::pair<std::string, std::string>>;
 
 /// Collective. Writes `field` (its slabs' index arrays are ignored; every rank gives its codebook)
-/// with the blocks of all ranks by
-/// parallel HDF5 to "PATH.partial", closes it, verifies it by reading it back on rank 0, syncs and
-/// renames. Blocks are asked for and written in rounds, one collective write per round and slab, so
-/// that no rank need hold more than one round's; ranks without a block take part. Returns the same
-/// info on every rank. When a write fails, MPI-IO and HDF5 cannot be used or finalised any more:
-/// the ranks that know of it throw, alone, and MpiEnvironment::is_abort_required() is true.
+/// with the blocks of all ranks by parallel HDF5 to "PATH.partial", closes it, verifies it by
+/// reading it back on rank 0, syncs and renames. Blocks are asked for and written in rounds, one
+/// collective write per round and slab, so that no rank need hold more than one round's; ranks
+/// without a block take part. Returns the same info on every rank. When a write fails, MPI-IO and
+/// HDF5 cannot be used or finalised any more: the ranks that know of it throw, alone, and
+/// MpiEnvironment::is_abort_required() is true.
 FieldFileInfo write_field(const CompressedAttenuationField& field,
                           const NextBlocks& next_blocks,
                           const MakeProvenance& make_provenance,

@@ -69,7 +69,7 @@ void check_plausible_size(const DatasetRule& rule,
                           const std::filesystem::path& path) {
   // Empty tiles have no means of their own.
   const std::uint64_t needed =
-      value_count_of(rule) / rule.rows_per_tile * sizeof(std::uint16_t) / kMaxPackingRatio;
+      rule.value_count() / rule.rows_per_tile * sizeof(std::uint16_t) / kMaxPackingRatio;
   if (needed > file_bytes)
     throw FileError(path.string(),
                     rule.name,

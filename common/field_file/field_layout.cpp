@@ -142,7 +142,7 @@ std::span<const Dataset> set_identity(std::span<const Dataset> datasets,
   return datasets;
 }
 
-/// From the datasets of step_rule() and codewords_rule().
+/// From the datasets of shared_rules().
 void set_codebook(std::span<const Dataset> datasets,
                   const std::string& path,
                   float& quantizer_step,
@@ -429,8 +429,7 @@ std::string payload_hash(std::span<const Dataset> datasets,
 
 std::uint64_t payload_bytes(const Codebook& codebook, const FieldLattice& lattice) {
   return codebook.size() * sizeof(Tile) + static_cast<std::uint64_t>(lattice.tile_count()) *
-                                              (codebook.has_means() ? 2 : 1) *
-                                              sizeof(std::uint16_t);
+                                              codebook.values_per_tile() * sizeof(std::uint16_t);
 }
 
 }  // namespace af::field_layout

@@ -27,7 +27,6 @@ using field_layout::info_of;
 using field_layout::read_header_of;
 using field_layout::read_planes;
 using field_layout::shared_header;
-using field_layout::value_count_of;
 using hdf5::Handle;
 using hdf5::naming_file;
 
@@ -65,7 +64,7 @@ CompressedSlab read_slab(const std::filesystem::path& path,
                          const std::string& sha256,
                          const Codebook& codebook,
                          const Communicator& communicator) {
-  const std::size_t tiles = value_count_of(rule);
+  const std::size_t tiles = rule.value_count();
   const auto memory = communicator.allocate_on_nodes_from_root(
       tiles * sizeof(std::uint16_t), [&](std::span<std::byte> bytes) {
         naming_file(path, [&] {

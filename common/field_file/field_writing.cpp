@@ -8,10 +8,10 @@
 #include <utility>
 
 #include "base/error.h"
-#include "field_file/chunk_index.h"
 #include "field_file/field_file.h"
 #include "field_file/field_layout.h"
 #include "field_file/hdf5_calls.h"
+#include "field_file/index_chunks.h"
 #include "field_file/index_dataset.h"
 #include "field_file/index_filter.h"
 #include "files/input_guard.h"
@@ -33,7 +33,6 @@ using field_layout::index_rules;
 using field_layout::kSha256Digits;
 using field_layout::payload_hash;
 using field_layout::read_planes;
-using field_layout::value_count_of;
 using hdf5::checked;
 using hdf5::Handle;
 using hdf5::naming_file;
@@ -81,7 +80,7 @@ void check_blocks(const std::vector<IndexBlock>& blocks, const std::vector<Datas
             "an index block lies within its slab");
       needed *= values.count[axis];
     }
-    check(block.indices.size() == needed, "an index block has one index per tile");
+    check(block.indices.size() == needed, "an index block has values_per_tile() numbers per tile");
   }
 }
 
@@ -298,8 +297,8 @@ std::vector<std::uint64_t> write_rounds(SharedFile& file,
     for (const IndexBlock& block : blocks)
       for_each_run(block,
                    rules[block.slab],
-                   [&](std::uint64_t first_tile, std::span<const std::uint16_t> indices) {
-                     sums[block.slab] += hash_sum(first_tile, indices);
+                   [&](std::uint64_t first, std::span<const std::uint16_t> values) {
+                     sums[block.slab] += hash_sum(first, values);
                    });
     const WorkNote note("writing round " + std::to_string(round) + " of the indices");
     file.write(blocks);
@@ -337,7 +336,7 @@ std::string verify_and_seal(const FileContents& contents,
   std::vector<std::string> index_sha256;
   for (std::size_t k = 0; k < rules.size(); ++k) {
     const Handle dataset(H5Dopen2(file, rules[k].name.c_str(), H5P_DEFAULT), H5Dclose, "H5Dopen2");
-    const std::uint64_t plane_values = value_count_of(rules[k]) / rules[k].extents[0];
+    const std::uint64_t plane_values = rules[k].value_count() / rules[k].extents[0];
     std::vector<std::uint16_t> planes;
     Sha256 sha256;
     std::uint64_t sum = 0;

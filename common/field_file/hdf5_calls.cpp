@@ -6,7 +6,7 @@
 
 #include "base/error.h"
 #include "base/joined.h"
-#include "field_file/chunk_index.h"
+#include "field_file/index_chunks.h"
 #include "field_file/index_filter.h"
 #include "files/sha256.h"
 

@@ -11,7 +11,7 @@
 #include <hdf5.h>
 
 #include "base/error.h"
-#include "field_file/field_layout.h"
+#include "field_file/dataset_rule.h"
 #include "hdf5_files/hdf5_handles.h"
 
 #ifndef H5_HAVE_PARALLEL
@@ -19,15 +19,6 @@
 #endif
 
 namespace af::hdf5 {
-
-using CallFailed = H5CallFailed;
-using Handle = H5Id;
-using QuietErrors = H5Quiet;
-
-template <typename Result>
-Result checked(Result result, const char* call) {
-  return h5_checked(result, call);
-}
 
 /// Runs `function` and turns whatever HDF5 or a missing attribute makes of it into a FileError.
 template <typename Function>

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 #include <array>
-#include <numeric>
 
+#include "field_file/field_layout.h"
 #include "field_file/hdf5_calls.h"
 #include "field_file/index_filter.h"
 #include "parallel/work_watch.h"
@@ -17,9 +17,8 @@ using hdf5::Handle;
 
 constexpr unsigned kDeflateLevel = 4;
 
-/// Adding this over all tiles gives a sum that a lost, doubled, moved or changed index changes.
-std::uint64_t position_hash(std::uint64_t tile, std::uint16_t index) {
-  std::uint64_t x = (tile << 16u | index) + 0x9E3779B97F4A7C15ull;
+std::uint64_t position_hash(std::uint64_t position, std::uint16_t value) {
+  std::uint64_t x = (position << 16u | value) + 0x9E3779B97F4A7C15ull;
   x = (x ^ (x >> 30u)) * 0xBF58476D1CE4E5B9ull;
   x = (x ^ (x >> 27u)) * 0x94D049BB133111EBull;
   return x ^ (x >> 31u);
@@ -48,14 +47,9 @@ std::uint64_t planes_of_chunk(hid_t dataset) {
 
 }  // namespace
 
-std::uint64_t value_count_of(const DatasetRule& rule) {
-  return std::accumulate(
-      rule.extents.begin(), rule.extents.end(), std::uint64_t{1}, std::multiplies<>());
-}
-
-std::uint64_t hash_sum(std::uint64_t first_tile, std::span<const std::uint16_t> indices) {
+std::uint64_t hash_sum(std::uint64_t first, std::span<const std::uint16_t> values) {
   std::uint64_t sum = 0;
-  for (const std::uint16_t index : indices) sum += position_hash(first_tile++, index);
+  for (const std::uint16_t value : values) sum += position_hash(first++, value);
   return sum;
 }
 

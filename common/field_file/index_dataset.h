@@ -8,18 +8,15 @@
 
 #include <hdf5.h>
 
-#include "field_file/chunk_index.h"
 #include "field_file/field_file.h"
-#include "field_file/field_layout.h"
+#include "field_file/index_chunks.h"
 
 namespace af::field_layout {
 
-/// Values of a dataset of indices, the means among them.
-std::uint64_t value_count_of(const DatasetRule& rule);
-
-/// A sum over the indices from `first_tile` on. Over all blocks of a slab, whoever holds them, it
-/// adds up to one that a lost, doubled, moved or changed index changes.
-std::uint64_t hash_sum(std::uint64_t first_tile, std::span<const std::uint16_t> indices);
+/// A sum over the values (indices and means) of a slab from number `first` on. Over all blocks of a
+/// slab, whoever holds them, it adds up to one that a lost, doubled, moved or changed value
+/// changes.
+std::uint64_t hash_sum(std::uint64_t first, std::span<const std::uint16_t> values);
 
 /// Rank 0 alone: an empty dataset of indices, packed chunk by chunk.
 void create_index_dataset(hid_t file,

@@ -76,7 +76,7 @@ std::size_t filter_chunk(unsigned flags,
   }
 }
 
-/// A chunk as the file has it, and its first tile. No bytes where none was written: zeros.
+/// A chunk as the file has it, and its first value. No bytes where none was written: zeros.
 struct StoredChunk {
   ChunkShape first;
   std::vector<std::uint8_t> bytes;

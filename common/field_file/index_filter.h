@@ -10,7 +10,7 @@
 #include <hdf5.h>
 
 #include "field/index_coding.h"
-#include "field_file/chunk_index.h"
+#include "field_file/index_chunks.h"
 
 namespace af::hdf5 {
 

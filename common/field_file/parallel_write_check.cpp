@@ -9,9 +9,9 @@
 #include <mpi.h>
 
 #include "base/error.h"
-#include "field_file/chunk_index.h"
 #include "field_file/field_file.h"
 #include "field_file/field_layout.h"
+#include "field_file/index_chunks.h"
 #include "parallel/work_watch.h"
 
 namespace af {
@@ -133,8 +133,8 @@ void check_writing_many_chunks(const FieldLattice& lattice,
   const std::uint64_t chunks = hdf5::chunk_count(field_layout::index_rules(lattice, false));
   if (chunks <= kFewChunks) return;
   const auto rows = static_cast<int>(std::min(chunks, kMostTestChunks) / kTestChunksOfBlock + 1);
-  write_to_test({rows * kIndexChunkViewpoints, kTestChunksOfBlock, 1, 1},
-                kIndexChunkViewpoints,
+  write_to_test({rows * kIndexChunkTilesAlongU, kTestChunksOfBlock, 1, 1},
+                kIndexChunkTilesAlongU,
                 path,
                 communicator,
                 hints);

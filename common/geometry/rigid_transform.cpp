@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "base/error.h"
 #include "base/plausible.h"
 
 namespace af {
@@ -125,6 +126,18 @@ RigidTransform rigid_from_matrix(const Eigen::Matrix4d& matrix) {
       rotation, Eigen::ComputeFullU | Eigen::ComputeFullV);
   transform.linear() = svd.matrixU() * svd.matrixV().transpose();
   return transform;
+}
+
+RigidTransform rigid_or_throw(const Eigen::Matrix4d& matrix, const std::string& where) {
+  throw_if_any(rigidity_problems(matrix), where);
+  return rigid_from_matrix(matrix);
+}
+
+RigidTransform pose_of_deg_and_mm(const PoseFrame& frame,
+                                  const std::array<double, 6>& values,
+                                  const std::string& where) {
+  const RigidTransform pose = pose_from_parameters(frame, PoseParameters::from_deg_and_mm(values));
+  return rigid_or_throw(pose.matrix(), where);
 }
 
 Eigen::Matrix3d rotation_between(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {

@@ -72,6 +72,15 @@ std::vector<std::string> rigidity_problems(const Eigen::Matrix4d& matrix);
 /// SVD); one that is orthonormal to 1e-14 keeps its bits, so that written poses read back the same.
 RigidTransform rigid_from_matrix(const Eigen::Matrix4d& matrix);
 
+/// The same of any 4x4 matrix; InputError that begins with `where` when it is not rigid.
+RigidTransform rigid_or_throw(const Eigen::Matrix4d& matrix, const std::string& where);
+
+/// The pose of six numbers (rx_deg ... tz_mm) relative to `frame`. InputError, beginning with
+/// `where`, when it is not finite or leads more than a kilometre away (rigidity_problems()).
+RigidTransform pose_of_deg_and_mm(const PoseFrame& frame,
+                                  const std::array<double, 6>& values,
+                                  const std::string& where);
+
 /// The rotation by the smallest angle that takes the direction of `from` to that of `to` (neither
 /// is zero; ones within 1.4e-6 rad of opposite: half a turn about an axis across). Orthonormal to
 /// 1e-11.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "hdf5_files/hdf5_handles.h"
 
-namespace af {
+namespace af::hdf5 {
 
 namespace {
 
@@ -19,7 +19,7 @@ std::string reason_of_last_error() {
 
 }  // namespace
 
-H5CallFailed::H5CallFailed(const char* call)
+CallFailed::CallFailed(const char* call)
     : std::runtime_error(std::string(call) + " failed: " + reason_of_last_error()) {}
 
-}  // namespace af
+}  // namespace af::hdf5

@@ -14,33 +14,34 @@
 namespace af {
 namespace {
 
-H5Id file_access() {
+hdf5::Handle file_access() {
   return {H5Pcreate(H5P_FILE_ACCESS), H5Pclose, "H5Pcreate"};
 }
 
-H5Id opened_file(const std::string& name) {
-  const H5Id access = file_access();
+hdf5::Handle opened_file(const std::string& name) {
+  const hdf5::Handle access = file_access();
   return {H5Fopen(name.c_str(), H5F_ACC_RDONLY, access), H5Fclose, "H5Fopen"};
 }
 
 /// Opens these bytes as if they were a file. HDF5 copies them.
-H5Id opened_bytes(std::string bytes) {
-  const H5Id access = file_access();
-  h5_checked(H5Pset_fapl_core(access, kH5MemoryStep, 0), "H5Pset_fapl_core");
-  h5_checked(H5Pset_file_image(access, bytes.data(), bytes.size()), "H5Pset_file_image");
-  return {H5Fopen(h5_memory_name().c_str(), H5F_ACC_RDONLY, access), H5Fclose, "H5Fopen"};
+hdf5::Handle opened_bytes(std::string bytes) {
+  const hdf5::Handle access = file_access();
+  hdf5::checked(H5Pset_fapl_core(access, hdf5::kMemoryStep, 0), "H5Pset_fapl_core");
+  hdf5::checked(H5Pset_file_image(access, bytes.data(), bytes.size()), "H5Pset_file_image");
+  return {H5Fopen(hdf5::memory_name().c_str(), H5F_ACC_RDONLY, access), H5Fclose, "H5Fopen"};
 }
 
 /// Of this file itself, uncompressed or deflated in small pieces.
 void check_storage(hid_t dataset, const std::string& where) {
-  const H5Id creation(H5Dget_create_plist(dataset), H5Pclose, "H5Dget_create_plist");
+  const hdf5::Handle creation(H5Dget_create_plist(dataset), H5Pclose, "H5Dget_create_plist");
   const H5D_layout_t layout = H5Pget_layout(creation);
   if (layout == H5D_VIRTUAL || (layout == H5D_CONTIGUOUS && H5Pget_external_count(creation) != 0))
     throw FileError(where, "holds the contents of another file");
   if (layout != H5D_CHUNKED) return;
   constexpr hsize_t kMostOfAChunk = 4096;
   std::array<hsize_t, H5S_MAX_RANK> chunk{};
-  const int rank = h5_checked(H5Pget_chunk(creation, H5S_MAX_RANK, chunk.data()), "H5Pget_chunk");
+  const int rank =
+      hdf5::checked(H5Pget_chunk(creation, H5S_MAX_RANK, chunk.data()), "H5Pget_chunk");
   hsize_t elements = 1;
   for (int i = 0; i < rank; ++i) {
     elements = chunk[static_cast<std::size_t>(i)] > kMostOfAChunk
@@ -48,7 +49,7 @@ void check_storage(hid_t dataset, const std::string& where) {
                    : elements * chunk[static_cast<std::size_t>(i)];
     if (elements > kMostOfAChunk) throw FileError(where, "is stored in large pieces");
   }
-  const int filters = h5_checked(H5Pget_nfilters(creation), "H5Pget_nfilters");
+  const int filters = hdf5::checked(H5Pget_nfilters(creation), "H5Pget_nfilters");
   for (int i = 0; i < filters; ++i) {
     unsigned flags = 0;
     std::size_t values = 0;
@@ -60,21 +61,22 @@ void check_storage(hid_t dataset, const std::string& where) {
 }
 
 std::vector<std::size_t> extents_of(hid_t dataset, const std::string& where) {
-  const H5Id space(H5Dget_space(dataset), H5Sclose, "H5Dget_space");
+  const hdf5::Handle space(H5Dget_space(dataset), H5Sclose, "H5Dget_space");
   constexpr int kMostExtents = 2;
   if (H5Sget_simple_extent_type(space) == H5S_NULL) throw FileError(where, "holds no values");
-  const int rank = h5_checked(H5Sget_simple_extent_ndims(space), "H5Sget_simple_extent_ndims");
+  const int rank = hdf5::checked(H5Sget_simple_extent_ndims(space), "H5Sget_simple_extent_ndims");
   if (rank > kMostExtents) throw FileError(where, "has more than two extents");
   std::array<hsize_t, kMostExtents> sizes{};
-  h5_checked(H5Sget_simple_extent_dims(space, sizes.data(), nullptr), "H5Sget_simple_extent_dims");
+  hdf5::checked(H5Sget_simple_extent_dims(space, sizes.data(), nullptr),
+                "H5Sget_simple_extent_dims");
   return {sizes.begin(), sizes.begin() + rank};
 }
 
 std::vector<double> values_of(hid_t dataset, std::size_t count, const std::string& where) {
   std::vector<double> values(count);
   if (count > 0)
-    h5_checked(H5Dread(dataset, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()),
-               "H5Dread");
+    hdf5::checked(H5Dread(dataset, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()),
+                  "H5Dread");
   for (const double value : values)
     if (!std::isfinite(value)) throw FileError(where, "holds a number that is not finite");
   return values;
@@ -136,12 +138,12 @@ class FileBytes {
 };
 
 void check_plain_addresses(hid_t file, const std::string& where) {
-  const H5Id creation(H5Fget_create_plist(file), H5Pclose, "H5Fget_create_plist");
+  const hdf5::Handle creation(H5Fget_create_plist(file), H5Pclose, "H5Fget_create_plist");
   std::size_t address_bytes = 0;
   std::size_t length_bytes = 0;
   hsize_t user_block = 0;
-  h5_checked(H5Pget_sizes(creation, &address_bytes, &length_bytes), "H5Pget_sizes");
-  h5_checked(H5Pget_userblock(creation, &user_block), "H5Pget_userblock");
+  hdf5::checked(H5Pget_sizes(creation, &address_bytes, &length_bytes), "H5Pget_sizes");
+  hdf5::checked(H5Pget_userblock(creation, &user_block), "H5Pget_userblock");
   if (address_bytes != 8 || length_bytes != 8 || user_block != 0)
     throw FileError(where, "is a text of a file with unusual addresses");
 }
@@ -178,9 +180,9 @@ std::string variable_text(hid_t file, hid_t dataset, FileBytes& bytes, const std
 }  // namespace
 
 struct Hdf5Input::State {
-  State(H5Id opened, FileBytes read_bytes)
+  State(hdf5::Handle opened, FileBytes read_bytes)
       : file(std::move(opened)), bytes(std::move(read_bytes)) {}
-  H5Id file;
+  hdf5::Handle file;
   FileBytes bytes;
 
   enum class Link { Absent, Elsewhere, Hard };
@@ -191,13 +193,13 @@ struct Hdf5Input::State {
       const std::string part = path.substr(0, at);
       if (H5Lexists(file, part.c_str(), H5P_DEFAULT) <= 0) return {Link::Absent, part};
       H5L_info_t link;
-      h5_checked(H5Lget_info(file, part.c_str(), &link, H5P_DEFAULT), "H5Lget_info");
+      hdf5::checked(H5Lget_info(file, part.c_str(), &link, H5P_DEFAULT), "H5Lget_info");
       if (link.type != H5L_TYPE_HARD) return {Link::Elsewhere, part};
       if (at == std::string::npos) return {Link::Hard, part};
     }
   }
 
-  [[nodiscard]] H5Id dataset(const std::string& path, const std::string& name) const {
+  [[nodiscard]] hdf5::Handle dataset(const std::string& path, const std::string& name) const {
     const auto [link, part] = link_at(path);
     if (link == Link::Absent) throw FileError(name, "has no " + part);
     if (link == Link::Elsewhere) throw FileError(name, part, "a part of this file", "a link");
@@ -210,10 +212,10 @@ namespace {
 /// Runs `use` without HDF5's own messages; failed calls become an error of the file.
 template <typename Use>
 auto quietly(const std::string& name, Use&& use) {
-  const H5Quiet quiet;
+  const hdf5::QuietErrors quiet;
   try {
     return use();
-  } catch (const H5CallFailed& failure) {
+  } catch (const hdf5::CallFailed& failure) {
     throw FileError(name, std::string("damaged HDF5: ") + failure.what());
   }
 }
@@ -252,17 +254,17 @@ Hdf5Input Hdf5Input::of_file(const std::filesystem::path& path) {
 
 Hdf5Input Hdf5Input::of_bytes(std::string bytes, std::string name) {
   return quietly(name, [&] {
-    H5Id file = opened_bytes(bytes);
+    hdf5::Handle file = opened_bytes(bytes);
     return Hdf5Input(std::make_unique<State>(std::move(file), FileBytes(std::move(bytes))), name);
   });
 }
 
 bool Hdf5Input::holds(const std::string& path) const {
-  const H5Quiet quiet;
+  const hdf5::QuietErrors quiet;
   try {
     const auto [link, part] = state_->link_at(path);
     return link != State::Link::Absent && part.size() == path.size();
-  } catch (const H5CallFailed&) {
+  } catch (const hdf5::CallFailed&) {
     return false;
   }
 }
@@ -270,9 +272,9 @@ bool Hdf5Input::holds(const std::string& path) const {
 Hdf5Numbers Hdf5Input::numbers(const std::string& path, std::size_t most) const {
   return quietly(name_, [&] {
     const std::string where = name_ + ": " + path;
-    const H5Id dataset = state_->dataset(path, name_);
+    const hdf5::Handle dataset = state_->dataset(path, name_);
     check_storage(dataset, where);
-    const H5Id type(H5Dget_type(dataset), H5Tclose, "H5Dget_type");
+    const hdf5::Handle type(H5Dget_type(dataset), H5Tclose, "H5Dget_type");
     const H5T_class_t kind = H5Tget_class(type);
     Hdf5Numbers numbers;
     numbers.extents = extents_of(dataset, where);
@@ -292,19 +294,19 @@ Hdf5Numbers Hdf5Input::numbers(const std::string& path, std::size_t most) const 
 std::string Hdf5Input::text(const std::string& path) const {
   return quietly(name_, [&] {
     const std::string where = name_ + ": " + path;
-    const H5Id dataset = state_->dataset(path, name_);
+    const hdf5::Handle dataset = state_->dataset(path, name_);
     check_storage(dataset, where);
-    const H5Id type(H5Dget_type(dataset), H5Tclose, "H5Dget_type");
+    const hdf5::Handle type(H5Dget_type(dataset), H5Tclose, "H5Dget_type");
     std::size_t count = 1;
     for (const std::size_t extent : extents_of(dataset, where)) count *= extent;
     if (H5Tget_class(type) != H5T_STRING || count != 1) throw FileError(where, "is no text");
-    if (h5_checked(H5Tis_variable_str(type), "H5Tis_variable_str") > 0)
+    if (hdf5::checked(H5Tis_variable_str(type), "H5Tis_variable_str") > 0)
       return variable_text(state_->file, dataset, state_->bytes, where);
     // The file's word, up to 4 GB: asked before memory is.
     const std::size_t bytes = H5Tget_size(type);
     if (bytes > kMostTextBytes) throw FileError(where, "is too long");
     std::string text(bytes, '\0');
-    h5_checked(H5Dread(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, text.data()), "H5Dread");
+    hdf5::checked(H5Dread(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, text.data()), "H5Dread");
     return text.substr(0, text.find('\0'));
   });
 }

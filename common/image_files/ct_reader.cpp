@@ -154,8 +154,8 @@ void add_values(ValueType type, std::span<const std::byte> bytes, HuValues& valu
   visit_values(type, bytes, [&](const auto span) { values.add_all(span); });
 }
 
-/// Voxels are converted piece by piece while the file is read and checked, once. No values in the
-/// image returned.
+/// Converts the voxels piece by piece while the file is read and checked, in one pass. The image
+/// returned holds no values.
 RawImage read_values(const fs::path& path,
                      const ImageHeader& header,
                      HuValues& values,

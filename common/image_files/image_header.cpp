@@ -8,8 +8,8 @@
 
 #include "base/error.h"
 #include "files/input_guard.h"
+#include "image_files/file_bytes.h"
 #include "image_files/image_formats.h"
-#include "image_files/stored_bytes.h"
 
 namespace af {
 
@@ -48,9 +48,6 @@ namespace {
 
 using namespace image_formats;
 
-/// Deflate cannot expand a byte to more than this many.
-constexpr std::uint64_t kMaxDeflateRatio = 1040;
-
 bool looks_like_nifti(std::string_view header) {
   if (header.size() >= kNifti1HeaderBytes) {
     const std::string_view magic = header.substr(344, 3);
@@ -65,58 +62,6 @@ bool looks_like_meta_image(std::string_view header) {
   return start.find("NDims") != std::string_view::npos &&
          (start.starts_with("ObjectType") || start.starts_with("NDims") ||
           start.starts_with("Comment"));
-}
-
-/// Cuts a stream of bytes into pieces of kPieceBytes, without what stands before and after the
-/// voxels.
-class PayloadPieces {
- public:
-  PayloadPieces(std::uint64_t skipped_bytes, std::uint64_t payload_bytes, ByteVisitor visit)
-      : to_skip_(skipped_bytes), to_come_(payload_bytes), visit_(std::move(visit)) {}
-
-  void add(std::span<const std::byte> bytes) {
-    const auto skipped = std::min<std::uint64_t>(to_skip_, bytes.size());
-    to_skip_ -= skipped;
-    bytes = bytes.subspan(skipped);
-    bytes = bytes.first(std::min<std::uint64_t>(to_come_, bytes.size()));
-    to_come_ -= bytes.size();
-    while (!bytes.empty()) {
-      const std::size_t taken = std::min(bytes.size(), kPieceBytes - piece_.size());
-      piece_.insert(
-          piece_.end(), bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(taken));
-      bytes = bytes.subspan(taken);
-      if (piece_.size() == kPieceBytes) flush();
-    }
-    if (to_come_ == 0) flush();
-  }
-
- private:
-  void flush() {
-    if (!piece_.empty()) visit_(piece_);
-    piece_.clear();
-  }
-
-  std::uint64_t to_skip_;
-  std::uint64_t to_come_;
-  ByteVisitor visit_;
-  std::vector<std::byte> piece_;
-};
-
-/// A stream of another length than stated is another stream, or was cut and mended. What stands
-/// behind it is said, not read.
-void check_compressed_bytes(const fs::path& path,
-                            const ImageHeader& header,
-                            std::uint64_t found,
-                            std::uint64_t stored,
-                            std::vector<std::string>* warnings) {
-  if (header.compressed_bytes.value_or(found) != found)
-    throw FileError(path.string(),
-                    "CompressedDataSize",
-                    std::to_string(found) + ", the length of the compressed voxels",
-                    std::to_string(*header.compressed_bytes));
-  if (found < stored && warnings != nullptr)
-    warnings->push_back(header.data_file.string() + ": " + std::to_string(stored - found) +
-                        " bytes behind the compressed voxels are ignored");
 }
 
 }  // namespace
@@ -195,49 +140,6 @@ ImageHeader read_image_header(const fs::path& path, ImageFormat format) {
   }
   (void)checked_payload_bytes(path, header);
   return header;
-}
-
-void check_image_payload(const fs::path& path,
-                         const ImageHeader& header,
-                         std::vector<std::string>* warnings) {
-  read_image_payload(path, header, warnings, nullptr);
-}
-
-void read_image_payload(const fs::path& path,
-                        const ImageHeader& header,
-                        std::vector<std::string>* warnings,
-                        const ByteVisitor& visit) {
-  if (header.format == ImageFormat::Png) check_png(path);
-  if (header.size.empty()) return;
-  const std::uint64_t payload = checked_payload_bytes(path, header);
-  const std::uint64_t expected = payload + header.skip_bytes;
-  const std::uint64_t file_bytes = existing_file_size(path, header.data_file);
-  const std::uint64_t stored =
-      file_bytes > header.payload_offset ? file_bytes - header.payload_offset : 0;
-  if (header.compressed && stored < expected / kMaxDeflateRatio)
-    throw FileError(path.string(),
-                    "truncated: " + std::to_string(stored) + " compressed bytes cannot hold the " +
-                        std::to_string(expected) + " bytes that the header promises");
-  PayloadPieces pieces(header.skip_bytes, payload, visit);
-  const ByteVisitor take = [&](std::span<const std::byte> bytes) {
-    if (visit) pieces.add(bytes);
-  };
-  std::uint64_t found = stored;
-  if (header.compressed) {
-    const InflatedBytes bytes = inflate_file(header.data_file, header.payload_offset, take);
-    check_compressed_bytes(path, header, bytes.compressed, stored, warnings);
-    found = bytes.inflated;
-  } else if (visit && stored >= expected) {
-    found = read_plain_file(header.data_file, header.payload_offset, take);
-  }
-  if (found < expected)
-    throw FileError(header.data_file.string(),
-                    "truncated: voxel data",
-                    std::to_string(expected) + " bytes",
-                    std::to_string(found));
-  if (found > expected && warnings != nullptr)
-    warnings->push_back(header.data_file.string() + ": " + std::to_string(found - expected) +
-                        " bytes more than the header says; they are ignored");
 }
 
 }  // namespace af

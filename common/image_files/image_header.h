@@ -65,19 +65,4 @@ struct ImageHeader {
 /// InputError for wrong units or spacing.
 ImageHeader read_image_header(const std::filesystem::path& path, ImageFormat format);
 
-/// Checks that all voxels which the header promises are there: by file size, or by decompressing to
-/// the end (which also verifies the stream's own checksum). The libraries behind ITK fill missing
-/// voxels with zeros, and that of PNG aborts the process on a damaged header, which is walked
-/// here first. FileError names expected and found bytes; surplus bytes are a warning.
-void check_image_payload(const std::filesystem::path& path,
-                         const ImageHeader& header,
-                         std::vector<std::string>* warnings);
-
-/// The same, and hands the bytes of the voxels to `visit` on the way, in order, in pieces of 1 MiB
-/// (the last may be shorter). What `visit` has seen counts for nothing when this throws.
-void read_image_payload(const std::filesystem::path& path,
-                        const ImageHeader& header,
-                        std::vector<std::string>* warnings,
-                        const std::function<void(std::span<const std::byte>)>& visit);
-
 }  // namespace af

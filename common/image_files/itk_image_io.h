@@ -14,7 +14,7 @@
 
 namespace af {
 
-/// An image as ITK hands it over: axes in file order (the first is fastest), LPS mm, values in
+/// An image as it is stored: axes in file order (the first is fastest), LPS mm, values in
 /// their own type.
 struct RawImage {
   std::vector<std::size_t> size;

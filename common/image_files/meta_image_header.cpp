@@ -7,10 +7,10 @@
 
 #include "base/error.h"
 #include "base/parsed_number.h"
+#include "image_files/file_bytes.h"
 #include "image_files/image_formats.h"
 #include "image_files/image_text_header.h"
 #include "image_files/itk_image_io.h"
-#include "image_files/stored_bytes.h"
 
 namespace af::image_formats {
 

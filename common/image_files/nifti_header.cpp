@@ -10,9 +10,9 @@
 
 #include "base/error.h"
 #include "base/plausible.h"
+#include "image_files/file_bytes.h"
 #include "image_files/image_formats.h"
 #include "image_files/itk_image_io.h"
-#include "image_files/stored_bytes.h"
 #include "text/csv_table.h"
 
 namespace af::image_formats {

@@ -7,11 +7,26 @@
 #include <string>
 #include <vector>
 
+#include "image_files/file_bytes.h"
 #include "image_files/image_header.h"
 #include "image_files/itk_image_io.h"
-#include "image_files/stored_bytes.h"
 
 namespace af {
+
+/// Checks that all voxels which the header promises are there: by file size, or by decompressing to
+/// the end (which also verifies the stream's own checksum). The libraries behind ITK fill missing
+/// voxels with zeros, and that of PNG aborts the process on a damaged header, which is walked
+/// here first. FileError names expected and found bytes; surplus bytes are a warning.
+void check_image_payload(const std::filesystem::path& path,
+                         const ImageHeader& header,
+                         std::vector<std::string>* warnings);
+
+/// The same, and hands the bytes of the voxels to `visit` on the way, in order, in pieces of 1 MiB
+/// (the last may be shorter). What `visit` has seen counts for nothing when this throws.
+void read_image_payload(const std::filesystem::path& path,
+                        const ImageHeader& header,
+                        std::vector<std::string>* warnings,
+                        const ByteVisitor& visit);
 
 /// Throws when the reader does not want the image; sees it without values.
 using AcceptImage = std::function<void(const RawImage&)>;

@@ -77,11 +77,6 @@ std::vector<RigidTransform> poses_of(const PosesInFile& file) {
 
 }  // namespace
 
-RigidTransform rigid_or_throw(const Eigen::Matrix4d& matrix, const std::string& where) {
-  throw_if_any(rigidity_problems(matrix), where);
-  return rigid_from_matrix(matrix);
-}
-
 std::vector<double> numbers_of(std::string_view text, const std::string& where) {
   constexpr std::string_view kSeparators = " \t\r\n,;[]()";
   constexpr std::size_t kMostBytes = 40;  // of a word in the message

@@ -57,12 +57,6 @@ std::string pose_file_bytes(const std::string& format,
 nlohmann::json pose_rows(const RigidTransform& pose);
 RigidTransform pose_of_rows(const nlohmann::json& rows, const std::string& where);
 
-/// The pose of six numbers (rx_deg ... tz_mm) relative to `frame`. InputError, beginning with
-/// `where`, when it is not finite or leads more than a kilometre away (rigidity_problems()).
-RigidTransform pose_of_deg_and_mm(const PoseFrame& frame,
-                                  const std::array<double, 6>& values,
-                                  const std::string& where);
-
 /// TOML text with room_from_ct as 4x4, 17 significant digits.
 std::string pose_to_toml(const RigidTransform& room_from_ct);
 

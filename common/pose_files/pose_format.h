@@ -55,9 +55,6 @@ struct PoseFormat {
   std::string (*write)(std::span<const RigidTransform> room_from_ct, const PoseContext& context);
 };
 
-/// The rigid transform of a 4x4 matrix; InputError that begins with `where` when it is not rigid.
-RigidTransform rigid_or_throw(const Eigen::Matrix4d& matrix, const std::string& where);
-
 /// The finite numbers of a text, separated by blanks, commas, semicolons or brackets. FileError
 /// that begins with `where` for anything else.
 std::vector<double> numbers_of(std::string_view text, const std::string& where);

@@ -85,13 +85,6 @@ void check_parameter_columns(const CsvTable& table, const std::string& file) {
 
 }  // namespace
 
-RigidTransform pose_of_deg_and_mm(const PoseFrame& frame,
-                                  const std::array<double, 6>& values,
-                                  const std::string& where) {
-  const RigidTransform pose = pose_from_parameters(frame, PoseParameters::from_deg_and_mm(values));
-  return rigid_or_throw(pose.matrix(), where);
-}
-
 nlohmann::json pose_rows(const RigidTransform& pose) {
   nlohmann::json rows = nlohmann::json::array();
   for (int row = 0; row < 4; ++row) {

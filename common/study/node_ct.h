@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
+#include <span>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -32,13 +35,30 @@ struct NodeCt {
 };
 
 /// Collective. Rank 0 reads the CT, the other nodes get the voxels; errors as read_ct(), on every
-/// rank. Only rank 0 ever holds anything but the shared voxels: the file's values and the CT as
-/// int16 while it reads, then the CT while it fills the voxels.
+/// rank. Ranks hold the voxels that their node shares, and no more, but for rank 0: it holds the
+/// file's values and the CT as int16 while it reads, then the CT while it fills the voxels.
 NodeCt read_ct_per_node(const std::filesystem::path& path,
                         const CtReadOptions& options,
                         const AttenuationModel& model,
                         const Communicator& communicator,
                         std::vector<std::string>& warnings);
+
+/// Who fills the voxels of a node: its own first rank, or rank 0 of all, from which they are
+/// copied.
+enum class VoxelSource { Node, Root };
+
+/// Collective. A volume held once per node. An exception in `fill` is thrown on every rank.
+std::shared_ptr<const AttenuationVolume> volume_per_node(
+    const CtGrid& bordered_grid,
+    const AttenuationModel& model,
+    VoxelSource source,
+    const std::function<void(std::span<std::uint16_t> voxels)>& fill,
+    const Communicator& communicator);
+
+/// Collective. The part of a CT's attenuation that is bone (bone_volume()), held once per node.
+/// InputError when there is none.
+std::shared_ptr<const AttenuationVolume> bone_per_node(const AttenuationVolume& volume,
+                                                       const Communicator& communicator);
 
 /// Collective. Rank 0 reads the CT for its grid, hash and cuts.
 CtFacts read_ct_facts(const std::filesystem::path& path,

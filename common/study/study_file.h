@@ -19,6 +19,10 @@
 
 namespace af {
 
+/// Where a study names each of its files: key -> "study.toml:12: case[0].view[1].xray". Empty for
+/// studies that were not read.
+using StudyPlaces = std::map<std::string, std::string>;
+
 /// One X-ray of a case. Paths are absolute after reading.
 struct StudyView {
   std::string camera;

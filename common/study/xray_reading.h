@@ -3,7 +3,6 @@
 
 #include <filesystem>
 #include <functional>
-#include <map>
 #include <optional>
 #include <string>
 
@@ -14,10 +13,6 @@ class TomlTableReader;
 /// What an X-ray's pixel values mean: detector intensity (bright = unattenuated; -log is taken on
 /// reading) or attenuation.
 enum class XrayDomain { Intensity, Attenuation };
-
-/// Where a study names each of its files: key -> "study.toml:12: case[0].view[1].xray". Empty for
-/// studies that were not read.
-using StudyPlaces = std::map<std::string, std::string>;
 
 /// What the detector reads in the open beam.
 enum class AirSource {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 
@@ -69,5 +70,17 @@ class AttenuationVolume {
   SharedArray<std::uint16_t> voxels_;
   double max_mu_per_mm_ = 0.0;
 };
+
+/// The voxels of a CT that attenuate lie within these indices, inclusive.
+struct AttenuatingBox {
+  std::array<int, 3> low;
+  std::array<int, 3> high;
+};
+
+/// The smallest such box; one pass over the CT. InputError when no voxel attenuates.
+AttenuatingBox attenuating_box(const CtVolume& ct, const AttenuationModel& model);
+
+/// Grid with border of the AttenuationVolume of a CT with that box.
+CtGrid bordered_grid(const CtGrid& ct_grid, const AttenuatingBox& box);
 
 }  // namespace af

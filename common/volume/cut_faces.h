@@ -5,7 +5,7 @@
 
 #include <Eigen/Core>
 
-#include "volume/attenuating_box.h"
+#include "volume/attenuation_volume.h"
 
 namespace af {
 

@@ -31,7 +31,6 @@
 #include "run/terminal.h"
 #include "study/ct_keys.h"
 #include "study/node_ct.h"
-#include "study/node_volume.h"
 #include "study/pose_context.h"
 #include "study/rig_file.h"
 #include "study/study_file.h"

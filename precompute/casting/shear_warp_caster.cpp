@@ -13,11 +13,11 @@ namespace af {
 
 namespace {
 
-/// Rows of the first pass's buffer: 512 KiB, about half of a second-level cache.
-constexpr int kBufferRows = 8192;
-/// interpolate_columns writes rows in groups of this many: whole blocks of what is stored.
-constexpr int kRowGroup = kRowBlock;
-static_assert(kRowBlock == kShearColumns);
+/// Most x in the first pass's buffer, each with kShearColumns t nodes: 512 KiB, about half of a
+/// second-level cache.
+constexpr int kMostBufferedX = 8192;
+static_assert(kRowBlock == kShearColumns && kRunOfT == kShearColumns,
+              "interpolate_columns writes x in whole blocks of what is stored, for a run of t");
 
 /// A linear map from node numbers of s or t to grid indices of one slice, for viewpoints at p:
 /// index = per_viewpoint_mm * p + at_first_node + per_node * node.
@@ -45,18 +45,18 @@ struct Slice {
   int y = 0;
   NodeMap x_of_s;
   NodeMap z_of_t;
-  /// Columns that the unit's rays can meet; the first pass computes no others.
+  /// Those that the unit's rays can meet; the first pass computes no others.
   int first_x = 0;
   int last_x = 0;
 };
 
-/// A slice that matters for one tile of t nodes, and where its rows are in the buffer.
+/// A slice that matters for one tile of t nodes, and where it is in the buffer.
 struct ActiveSlice {
   const Slice* slice = nullptr;
-  int first_x = 0;  ///< of the rows in the buffer: a multiple of kRowGroup
-  int low_x = 0;    ///< a column of zeros, or one that no ray reaches
+  int first_x = 0;  ///< of what is in the buffer: a multiple of kRowBlock
+  int low_x = 0;    ///< an x of zeros, or one that no ray reaches
   int high_x = 0;   ///< likewise
-  int row_count = 0;
+  int x_count = 0;
   ShearColumns columns{};
 };
 
@@ -101,9 +101,9 @@ class UnitCast {
   }
 
  private:
-  /// Room for kBufferRows, or for one slice that alone needs more.
+  /// Room for kMostBufferedX, or for one slice that alone needs more.
   static std::size_t buffer_values(const SlabAlignedGrid& grid) {
-    return static_cast<std::size_t>(std::max(kBufferRows, grid.size[0] + 3 * kRowGroup)) *
+    return static_cast<std::size_t>(std::max(kMostBufferedX, grid.size[0] + 3 * kRowBlock)) *
            kShearColumns;
   }
 
@@ -136,22 +136,22 @@ class UnitCast {
     bool is_empty = true;
     for (const Slice& slice : slices_) {
       const ActiveSlice active = activate(slice, light_slab_.v.position_mm(v), first_t, t_count);
-      if (active.row_count == 0) continue;
+      if (active.x_count == 0) continue;
       if (active_.size() == kShearSlices ||
-          (!active_.empty() && rows + active.row_count > kBufferRows)) {
+          (!active_.empty() && rows + active.x_count > kMostBufferedX)) {
         add_block();
         active_.clear();
         rows = 0;
       }
       active_.push_back(active);
-      rows += active.row_count;
+      rows += active.x_count;
       is_empty = false;
     }
     if (!active_.empty()) add_block();
     write_samples(v, first_t, t_count, is_empty);
   }
 
-  /// Where the slice's columns are for a tile; no rows when the tile's rays meet only zeros in it.
+  /// What of the slice a tile's rays meet; no x when these are only zeros.
   [[nodiscard]] ActiveSlice activate(const Slice& slice,
                                      double v_mm,
                                      int first_t,
@@ -175,9 +175,9 @@ class UnitCast {
     active.low_x = std::max(begin - 1, slice.first_x);
     active.high_x = std::min(end, slice.last_x);
     if (active.high_x <= active.low_x) return active;
-    active.first_x = active.low_x / kRowGroup * kRowGroup;
+    active.first_x = active.low_x / kRowBlock * kRowBlock;
     // Up to and including the row after high_x, which is read with a weight of 0.
-    active.row_count = (active.high_x + 1 - active.first_x + kRowGroup) / kRowGroup * kRowGroup;
+    active.x_count = (active.high_x + 1 - active.first_x + kRowBlock) / kRowBlock * kRowBlock;
     fill_columns(slice, v_mm, first_t, t_count, active.columns);
     return active;
   }
@@ -226,20 +226,20 @@ class UnitCast {
       const ActiveSlice& active = active_[k];
       kernels_.interpolate_columns(active.columns,
                                    active.first_x,
-                                   active.row_count,
+                                   active.x_count,
                                    buffer_.data() + std::ptrdiff_t{row} * kShearColumns);
       block.origin[k] = (row - active.first_x) * kShearColumns;
       block.step[k] = static_cast<float>(256.0 * active.slice->x_of_s.per_node);
       block.low[k] = static_cast<float>(256 * active.low_x);
       block.high[k] = static_cast<float>(256 * active.high_x);
-      row += active.row_count;
+      row += active.x_count;
     }
     for (int u = 0; u < unit_.u.count; ++u) add_viewpoint(u, block);
   }
 
   void add_viewpoint(int u, ShearBlock& block) {
     const double u_mm = light_slab_.u.position_mm(unit_.u.begin + u);
-    // Nodes whose rays meet a column between the zeros of any slice; one more on either side.
+    // Nodes whose rays meet an x between the zeros of any slice; one more on either side.
     double first = unit_.s.end();
     double last = unit_.s.begin;
     for (std::size_t k = 0; k < active_.size(); ++k) {
@@ -263,7 +263,7 @@ class UnitCast {
   void write_samples(int v, int first_t, int t_count, bool is_empty) {
     const double v_mm = light_slab_.v.position_mm(v);
     ShearScale scale{};
-    scale.attenuation_per_unit =
+    scale.attenuation_per_sum =
         static_cast<float>(volume_.grid().spacing_mm.y() * volume_.mu_per_mm_per_level() / 256.0);
     scale.quantizer_step = quantizer_.step();
     for (int position = 0; position < kShearColumns; ++position)

@@ -234,7 +234,7 @@ void quantize_node(const int32_t* sums,
     const Floats16 slope_squared =
         load<Floats16>(scale.slope_squared_t + half * kLanes) + slope_squared_s;
     const Floats16 total_attenuation = to_float(load<Ints16>(sums + half * kLanes)) *
-                                       scale.attenuation_per_unit *
+                                       scale.attenuation_per_sum *
                                        square_root(slope_squared + 1.0f);
     const Floats16 level = total_attenuation / scale.quantizer_step + 0.5f;
     levels[half] = to_int(minimum(level, splat(65535.0f)));

@@ -17,7 +17,7 @@ struct ShearRow {
   int32_t count;   ///< likewise
 };
 
-/// One slice brought to a tile of t nodes by the first pass: rows [x][kShearColumns].
+/// What the first pass reads of one slice for a tile of t nodes. It writes [x][kShearColumns].
 struct ShearColumns {
   const int16_t* values;
   ShearRow lower[kShearColumns];  ///< the rows that each column lies between
@@ -41,7 +41,7 @@ struct ShearBlock {
 
 /// The values that turn the accumulators of one viewpoint and a tile of t nodes into samples.
 struct ShearScale {
-  float attenuation_per_unit;  ///< of a ray perpendicular to the planes
+  float attenuation_per_sum;  ///< of a ray perpendicular to the planes
   float quantizer_step;
   float slope_squared_t[kShearColumns];  ///< ((t - v) / (uv_plane_y - st_plane_y))^2, as
                                          ///< accumulators are ordered

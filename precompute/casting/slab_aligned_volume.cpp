@@ -12,9 +12,9 @@ namespace af {
 
 namespace {
 
-constexpr int kLanes = 16;
+constexpr int kLanes = 16;  ///< of resample_row: rows are whole vectors of so many
 
-/// Slices before they are sharpened, single-precision positions.
+/// Samples rows of slices, which are not sharpened yet. Positions are of single precision.
 class RowSampler {
  public:
   RowSampler(const AttenuationVolume& volume,

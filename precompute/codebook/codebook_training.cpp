@@ -76,10 +76,10 @@ struct CodedTiles {
 };
 
 /// The zero tile and the first distinct, non-zero tiles in the order of their sampling keys.
-Codebook initial_codebook(const TrainingShare& mine,
-                          std::uint64_t training_tiles,
-                          const CodebookOptions& options,
-                          const CodebookReduction& reduction) {
+std::vector<Tile> initial_codewords(const TrainingShare& mine,
+                                    std::uint64_t training_tiles,
+                                    const CodebookOptions& options,
+                                    const CodebookReduction& reduction) {
   const auto wanted = static_cast<std::uint64_t>(options.codewords) - 1;
   std::vector<std::uint64_t> keys;
   keys.reserve(mine.training.size());
@@ -94,10 +94,10 @@ Codebook initial_codebook(const TrainingShare& mine,
       if (distinct.size() == wanted) break;
     }
     if (distinct.size() == wanted) {
-      Codebook codebook{{Tile{}}};
-      codebook.codewords.insert(codebook.codewords.end(), distinct.begin(), distinct.end());
-      std::sort(codebook.codewords.begin(), codebook.codewords.end(), codeword_less);
-      return codebook;
+      std::vector<Tile> codewords{Tile{}};
+      codewords.insert(codewords.end(), distinct.begin(), distinct.end());
+      std::sort(codewords.begin(), codewords.end(), codeword_less);
+      return codewords;
     }
     if (count >= training_tiles)
       throw InputError("codewords",
@@ -121,17 +121,16 @@ bool tracked_less(const TrackedCodeword& a, const TrackedCodeword& b) {
   return a.old_index < b.old_index;
 }
 
-/// Replaces codewords that are unused or equal to a lower one by the worst-coded training tiles
-/// (Collective); returns how many.
+/// The centroids of an iteration as its new codewords, in order.
 class CodebookUpdate {
  public:
-  CodebookUpdate(const Codebook& old, const CentroidSums& sums) {
+  CodebookUpdate(const std::vector<Tile>& old, const CentroidSums& sums) {
     codewords_.push_back({Tile{}, 0});
     for (std::uint32_t i = 1; i < old.size(); ++i) {
       if (sums.count(i) > 0)
         codewords_.push_back({sums.centroid(i), i});
       else
-        free_.push_back({old.codewords[i], i});
+        free_.push_back({old[i], i});
     }
     std::sort(codewords_.begin(), codewords_.end(), tracked_less);
     const auto is_same = [](const TrackedCodeword& a, const TrackedCodeword& b) {
@@ -147,6 +146,8 @@ class CodebookUpdate {
     codewords_ = std::move(distinct);
   }
 
+  /// Collective. Replaces codewords that are unused or equal to a lower one by the worst-coded
+  /// training tiles; returns how many.
   std::uint64_t repair(const CodedTiles& coded, const CodebookReduction& reduction) {
     if (free_.empty()) return 0;
     std::vector<std::uint64_t> keys;
@@ -175,10 +176,10 @@ class CodebookUpdate {
     return repaired;
   }
 
-  [[nodiscard]] Codebook codebook() const {
-    Codebook sorted;
-    sorted.codewords.reserve(codewords_.size());
-    for (const TrackedCodeword& codeword : codewords_) sorted.codewords.push_back(codeword.tile);
+  [[nodiscard]] std::vector<Tile> codewords() const {
+    std::vector<Tile> sorted;
+    sorted.reserve(codewords_.size());
+    for (const TrackedCodeword& codeword : codewords_) sorted.push_back(codeword.tile);
     return sorted;
   }
   [[nodiscard]] std::vector<std::uint32_t> new_of_old() const {
@@ -195,15 +196,12 @@ class CodebookUpdate {
 /// Iterations on one rank's share of the tiles.
 class CodebookIterations {
  public:
-  CodebookIterations(const TrainingShare& mine, int mean_step, const CodebookReduction& reduction)
-      : training_(mine.training),
-        held_out_(mine.held_out),
-        mean_step_(mean_step),
-        reduction_(reduction) {}
+  CodebookIterations(const TrainingShare& mine, const CodebookReduction& reduction)
+      : training_(mine.training), held_out_(mine.held_out), reduction_(reduction) {}
 
   /// Collective. Replaces the codebook by a better one.
   TrainingIteration improve(Codebook& codebook) {
-    const NearestCodeword search(codebook, mean_step_);
+    const NearestCodeword search(codebook);
     training_.encode(search, hint_);
     held_out_.encode(search, hint_);
     hint_ = SearchHint::PerTile;
@@ -214,9 +212,9 @@ class CodebookIterations {
     sums.held_out_error() = held_out_.squared_error();
     reduction_.sum(sums.values());
 
-    CodebookUpdate update(codebook, sums);
+    CodebookUpdate update(searched_codewords(codebook), sums);
     const std::uint64_t repaired = update.repair(training_, reduction_);
-    codebook = update.codebook();
+    codebook = codebook_of_searched(update.codewords(), codebook.mean_step);
     const auto new_of_old = update.new_of_old();
     training_.renumber(new_of_old);
     held_out_.renumber(new_of_old);
@@ -227,22 +225,21 @@ class CodebookIterations {
   CodedTiles training_;
   CodedTiles held_out_;
   SearchHint hint_ = SearchHint::None;
-  int mean_step_;
   const CodebookReduction& reduction_;
 };
 
-/// Whether to stop: another iteration would not pay, or is not allowed. Says why.
-bool has_ended(TrainedCodebook& training, const CodebookOptions& options) {
+/// Why to stop: another iteration would not pay, or is not allowed. None: go on.
+std::optional<TrainingStop> reason_to_stop(const TrainedCodebook& training,
+                                           const CodebookOptions& options) {
   const std::size_t done = training.iterations.size();
   if (done >= 2) {
     const auto before = static_cast<double>(training.iterations[done - 2].training_squared_error);
     const auto now = static_cast<double>(training.iterations[done - 1].training_squared_error);
-    if (!(before - now > options.min_relative_improvement * before)) {
-      training.stop = TrainingStop::ImprovementBelowLimit;
-      return true;
-    }
+    if (!(before - now > options.min_relative_improvement * before))
+      return TrainingStop::ImprovementBelowLimit;
   }
-  return done >= static_cast<std::size_t>(options.max_iterations);
+  if (done >= static_cast<std::size_t>(options.max_iterations)) return TrainingStop::MaxIterations;
+  return std::nullopt;
 }
 
 }  // namespace
@@ -278,16 +275,19 @@ TrainedCodebook train_codebook(const TrainingShare& mine,
   if (checkpoints.begun)
     result = *checkpoints.begun;
   else
-    result.codebook = initial_codebook(mine, totals[0], options, reduction);
+    result.codebook = codebook_of_searched(initial_codewords(mine, totals[0], options, reduction),
+                                           options.mean_step);
   result.training_tiles = totals[0];
   result.held_out_tiles = totals[1];
-  CodebookIterations iterations(mine, options.mean_step, reduction);
-  while (!has_ended(result, options)) {
+  CodebookIterations iterations(mine, reduction);
+  std::optional<TrainingStop> stop;
+  while (!(stop = reason_to_stop(result, options))) {
     result.iterations.push_back(iterations.improve(result.codebook));
     if (on_progress)
       on_progress(static_cast<double>(result.iterations.size()), options.max_iterations);
     if (checkpoints.on_iteration) checkpoints.on_iteration(result);
   }
+  result.stop = *stop;
   return result;
 }
 

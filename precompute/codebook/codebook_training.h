@@ -46,7 +46,8 @@ struct TrainedCodebook {
   TrainingStop stop = TrainingStop::MaxIterations;
 
   auto members() {
-    return std::tie(training_tiles, held_out_tiles, iterations, codebook.codewords);
+    return std::tie(
+        training_tiles, held_out_tiles, iterations, codebook.codewords, codebook.mean_step);
   }
 };
 
@@ -60,13 +61,14 @@ struct TrainingCheckpoints {
 };
 
 /// Collective. Trains a codebook by the generalised Lloyd algorithm (Sec. II-D) on the shares of
-/// all ranks. Sums, counts and errors are exact integers and centroids are rounded to levels, so
-/// the codebook is the same on any number of ranks and on any vector width. Codeword 0 is and stays
-/// the zero tile. Initial codewords are distinct tiles drawn by weighted_sampling_key(); codewords
-/// that end up unused or equal to another are replaced by the worst-coded training tiles. Only when
-/// there are no such tiles left do equal codewords remain (the higher ones are then never used), so
-/// the size is always the one asked for. InputError when there are fewer distinct training tiles
-/// than codewords to draw. \test CodebookTraining.IsBitIdenticalOnAnyRankCount
+/// all ranks: plain tiles, or folded shapes (remove_means()) where the options have a step. Sums,
+/// counts and errors are exact integers and centroids are rounded to levels, so the codebook is the
+/// same on any number of ranks and on any vector width. Codeword 0 is and stays the zero tile.
+/// Initial codewords are distinct tiles drawn by weighted_sampling_key(); codewords that end up
+/// unused or equal to another are replaced by the worst-coded training tiles. Only when there are
+/// no such tiles left do equal codewords remain (the higher ones are then never used), so the size
+/// is always the one asked for. InputError when there are fewer distinct training tiles than
+/// codewords to draw. \test CodebookTraining.IsBitIdenticalOnAnyRankCount
 TrainedCodebook train_codebook(const TrainingShare& mine,
                                const CodebookOptions& options,
                                const CodebookReduction& reduction,

@@ -7,7 +7,7 @@
 
 #include "base/error.h"
 #include "base/vector_width.h"
-#include "field/codeword_tree.h"
+#include "field/tile_transform.h"
 
 namespace af {
 
@@ -37,10 +37,10 @@ struct NearestCodeword::Part {
   std::uint32_t number = 0;  ///< among the parts of as many halvings
 };
 
-NearestCodeword::NearestCodeword(const Codebook& trained, int mean_step)
-    : codewords_(trained.codewords) {
-  throw_if_any(problems(trained));
-  if (mean_step > 0)
+NearestCodeword::NearestCodeword(const Codebook& codebook) : mean_step_(codebook.mean_step) {
+  throw_if_any(problems(codebook));
+  codewords_ = searched_codewords(codebook);
+  if (codebook.has_means())
     make_boxes();
   else
     sort_by_dc();

@@ -31,9 +31,10 @@ enum class SearchHint {
 /// nearest first, while they may hold a nearer one.
 class NearestCodeword {
  public:
-  /// For plain tiles, or for folded shapes (mean_removal.h) where `mean_step` is above 0. The
-  /// answers are right for all tiles; the other kind takes longer.
-  explicit NearestCodeword(const Codebook& trained, int mean_step = 0);
+  /// Searches for plain tiles or, where the codebook has means, for folded shapes (remove_mean()).
+  explicit NearestCodeword(const Codebook& codebook);
+
+  [[nodiscard]] int mean_step() const { return mean_step_; }  ///< of the codebook
 
   /// Index of the nearest codeword and squared error of every tile. With SearchHint::PerTile
   /// `nearest` holds valid indices on entry. Re-entrant.
@@ -51,6 +52,7 @@ class NearestCodeword {
   void set_block(const Part& part);
   void set_box(const Part& child);
 
+  int mean_step_;
   // As in CodewordBlocks.
   std::vector<Tile> codewords_;
   std::vector<float> coefficients_;

@@ -37,14 +37,15 @@ std::uint64_t capped_last_hash(std::span<const std::uint64_t> histogram,
 }
 
 /// Hashes above this are held out when the last training hash is `last_training`.
-std::uint64_t first_held_out(std::uint64_t last_training) {
+std::uint64_t held_out_above(std::uint64_t last_training) {
   return kEverything - std::min(last_training / 8, (kEverything - last_training) / 2);
 }
 
-/// The lowest of first_held_out(x) for all x up to `last_training`.
+/// The lowest of held_out_above(x) for all x up to `last_training`. The division by 8 lets the
+/// values there fall by no more than 8 between neighbours.
 std::uint64_t lowest_held_out(std::uint64_t last_training) {
   constexpr std::uint64_t kMostHeldOut = kEverything / 10 * 8;  // where the two halves meet
-  return first_held_out(std::min(last_training, kMostHeldOut)) - 8;
+  return held_out_above(std::min(last_training, kMostHeldOut)) - 8;
 }
 
 /// How many of this rank's tiles other ranks take over, and where its own begin among all tiles
@@ -109,16 +110,16 @@ TrainingTilePicker::TrainingTilePicker(const TrainingSelection& selection,
                                        const FieldLattice& lattice)
     : selection_(selection), lattice_(lattice), histogram_(kBins, 0) {
   throw_if_any(problems(selection));
-  lower_threshold(last_hash_of_fraction(selection.fraction));
+  set_threshold(last_hash_of_fraction(selection.fraction));
   // Only the used part becomes memory. An eighth above the cap, so that dropping is rare.
   constexpr std::uint64_t kMostReserved = std::uint64_t{1} << 24;
   const std::uint64_t most = std::min(selection.max_training_tiles, kMostReserved);
   candidates_.training.reserve(most + most / 8 + 1);
 }
 
-void TrainingTilePicker::lower_threshold(std::uint64_t last_training) {
+void TrainingTilePicker::set_threshold(std::uint64_t last_training) {
   last_training_ = last_training;
-  first_held_out_ = lowest_held_out(last_training);
+  held_out_above_ = lowest_held_out(last_training);
 }
 
 void TrainingTilePicker::add(const UnitTiles& tiles, const WorkUnit& unit) {
@@ -130,7 +131,7 @@ void TrainingTilePicker::add(const UnitTiles& tiles, const WorkUnit& unit) {
       ++histogram_[hash >> 48u];
       candidates_.training.push_back(numbered);
       if (candidates_.training.size() == candidates_.training.capacity()) keep_within_cap();
-    } else if (hash > first_held_out_) {
+    } else if (hash > held_out_above_) {
       candidates_.held_out.push_back(numbered);
     }
   });
@@ -138,17 +139,17 @@ void TrainingTilePicker::add(const UnitTiles& tiles, const WorkUnit& unit) {
 
 void TrainingTilePicker::keep_within_cap() {
   // When one rank's tiles alone exceed the cap, those of all ranks do, too.
-  lower_threshold(capped_last_hash(histogram_, last_training_, selection_.max_training_tiles));
+  set_threshold(capped_last_hash(histogram_, last_training_, selection_.max_training_tiles));
   drop_beyond();
 }
 
 void TrainingTilePicker::drop_beyond() {
   std::vector<NumberedTile>& held_out = candidates_.held_out;
   std::erase_if(held_out,
-                [&](const NumberedTile& tile) { return hash_of(tile) <= first_held_out_; });
+                [&](const NumberedTile& tile) { return hash_of(tile) <= held_out_above_; });
   std::erase_if(candidates_.training, [&](const NumberedTile& tile) {
     const std::uint64_t hash = hash_of(tile);
-    if (hash > last_training_ && hash > first_held_out_) held_out.push_back(tile);
+    if (hash > last_training_ && hash > held_out_above_) held_out.push_back(tile);
     return hash > last_training_;
   });
 }
@@ -158,7 +159,7 @@ TrainingShare TrainingTilePicker::take(const CodebookReduction& reduction) {
   reduction.sum(histogram_);
   last_training_ = capped_last_hash(
       histogram_, last_hash_of_fraction(selection_.fraction), selection_.max_training_tiles);
-  first_held_out_ = first_held_out(last_training_);
+  held_out_above_ = held_out_above(last_training_);
   drop_beyond();
   candidates_.training.shrink_to_fit();
   candidates_.held_out.shrink_to_fit();

@@ -52,7 +52,7 @@ class TrainingTilePicker {
   [[nodiscard]] TrainingShare take(const CodebookReduction& reduction);
 
  private:
-  void lower_threshold(std::uint64_t last_training);
+  void set_threshold(std::uint64_t last_training);
   void keep_within_cap();
   void drop_beyond();
   [[nodiscard]] std::uint64_t hash_of(const NumberedTile& tile) const;
@@ -61,7 +61,7 @@ class TrainingTilePicker {
   FieldLattice lattice_;
   std::uint64_t last_training_ =
       0;  ///< no hash above it trains: the fraction's, or this rank's cap's
-  std::uint64_t first_held_out_ = 0;      ///< no hash below it is held out
+  std::uint64_t held_out_above_ = 0;      ///< no hash below it is held out
   std::vector<std::uint64_t> histogram_;  ///< of the hashes at most last_training_, by bin
   TrainingShare candidates_;
 };

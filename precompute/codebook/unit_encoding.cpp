@@ -34,7 +34,6 @@ EncodedUnit encode_plain(const NearestCodeword& search,
 }
 
 EncodedUnit encode_mean_removed(const NearestCodeword& search,
-                                int mean_step,
                                 const WorkUnit& unit,
                                 const UnitTiles& tiles) {
   std::vector<Tile> shapes;
@@ -42,7 +41,7 @@ EncodedUnit encode_mean_removed(const NearestCodeword& search,
   shapes.reserve(tiles.tiles.size());
   means.reserve(tiles.tiles.size());
   for (const Tile& tile : tiles.tiles) {
-    const MeanRemovedTile removed = remove_mean(tile, mean_step);
+    const MeanRemovedTile removed = remove_mean(tile, search.mean_step());
     shapes.push_back(removed.shape);
     means.push_back(removed.mean);
   }
@@ -71,11 +70,10 @@ EncodedUnit encode_mean_removed(const NearestCodeword& search,
 }  // namespace
 
 EncodedUnit encode_unit(const NearestCodeword& search,
-                        int mean_step,
                         const WorkUnit& unit,
                         const UnitTiles& tiles) {
-  return mean_step > 0 ? encode_mean_removed(search, mean_step, unit, tiles)
-                       : encode_plain(search, unit, tiles);
+  return search.mean_step() > 0 ? encode_mean_removed(search, unit, tiles)
+                                : encode_plain(search, unit, tiles);
 }
 
 }  // namespace af

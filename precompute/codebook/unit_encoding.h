@@ -9,18 +9,15 @@
 
 namespace af {
 
-/// Codeword indices of one unit's tiles, [u][v][s][t] (with means [u][v][s][2][t], as in
-/// CompressedSlab), and the exact sum of their squared errors in levels; empty tiles get codeword
-/// 0. With means, levels beyond 0 and 65535, to which decoding limits them, count as errors.
+/// Codeword indices, and means, of one unit's tiles, stored as Codebook says, and the exact sum of
+/// their squared errors in levels; empty tiles get codeword 0. With means, levels beyond 0 and
+/// 65535, to which decoding limits them, count as errors.
 struct EncodedUnit {
   std::vector<std::uint16_t> indices;
   std::uint64_t squared_error = 0;
 };
 
-/// `search` is over plain tiles, or over folded shapes (mean_removal.h) where `mean_step` is above
-/// 0.
 EncodedUnit encode_unit(const NearestCodeword& search,
-                        int mean_step,
                         const WorkUnit& unit,
                         const UnitTiles& tiles);
 

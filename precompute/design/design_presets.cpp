@@ -36,7 +36,8 @@ const std::array presets = {
                  {4, 16, 384, 4096, "cubic", 64},
                  {}},
     DesignPreset{"fine",
-                 "the same within 8 MB: the truest poses, in several times the time",
+                 "what a probe of the CT finds best within 8 MB: the truest poses, in several "
+                 "times the time",
                  {12, 10, 512, 65536, "cubic"},
                  {std::nullopt, 8 * kMegabyte, std::nullopt}},
 };

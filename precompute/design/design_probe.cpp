@@ -168,14 +168,15 @@ std::vector<NumberedTile> DesignProbe::shuffled_tiles(const FieldSample& sample,
   return shuffled;
 }
 
-std::vector<Codebook> DesignProbe::small_codebooks(std::span<const NumberedTile> tiles) const {
+std::vector<Codebook> DesignProbe::small_codebooks(std::span<const NumberedTile> tiles,
+                                                   int mean_step) const {
   // The largest takes longer than the others together.
   std::vector<std::vector<std::vector<Tile>>> trained;
-  std::vector<Codebook> codebooks(kProbeCodewords.size());
+  std::vector<Codebook> codebooks(kProbeCodewords.size(), Codebook{{}, mean_step});
   for (std::size_t i = 0; i < kProbeCodewords.size(); ++i) {
     const std::size_t trainer = (i + 1 == kProbeCodewords.size() ? 0 : 1) % share_.ranks;
     if (trainer == share_.rank)
-      codebooks[i] = small_codebook(tiles, kProbeCodewords[i], options_.seed);
+      codebooks[i] = small_codebook(tiles, kProbeCodewords[i], mean_step, options_.seed);
   }
   for (std::size_t i = 0; i < kProbeCodewords.size(); ++i) {
     const std::size_t trainer = (i + 1 == kProbeCodewords.size() ? 0 : 1) % share_.ranks;
@@ -186,10 +187,8 @@ std::vector<Codebook> DesignProbe::small_codebooks(std::span<const NumberedTile>
 
 std::vector<PoseLoss> DesignProbe::losses(const FieldCaster& caster,
                                           const LightSlab& planes,
-                                          const Codebook& trained,
-                                          int mean_step) const {
-  const NearestCodeword search(trained, mean_step);
-  const Codebook codebook = field_codebook(trained, mean_step);
+                                          const Codebook& codebook) const {
+  const NearestCodeword search(codebook);
   std::vector<PoseLoss> losses(rays_.poses);
   for (const RayPatch& patch : rays_.patches) {
     const PatchNodes nodes(caster, planes, scene_.quantizer.step(), patch);
@@ -216,30 +215,30 @@ DesignMeasurement DesignProbe::measure(const FieldDesign& design,
   std::vector<NumberedTile> tiles =
       shuffled_tiles(sample, lattice, probe_tiles(*std::ranges::max_element(codewords)));
   remove_means(tiles, design.mean_step);
-  const std::vector<Codebook> codebooks = small_codebooks(tiles);
+  const std::vector<Codebook> codebooks = small_codebooks(tiles, design.mean_step);
   const auto unseen = std::span(tiles).last(std::min(tiles.size(), kProbeUnseenTiles));
   for (std::size_t i = 0; i < codebooks.size(); ++i)
     measured.tile_errors[i] = squared_error(unseen, codebooks[i]);
-  measured.poses = losses(*caster, planes, codebooks.back(), design.mean_step);
+  measured.poses = losses(*caster, planes, codebooks.back());
   for (const int count : codewords) {
     const TrainingSelection selection = options_.selection_for(count);
     measured.training_tiles[count] = std::min(static_cast<double>(selection.max_training_tiles),
                                               selection.fraction * measured.occupied_tiles);
-    const Codebook codebook = drawn_codebook(tiles, count, options_.seed);
+    const Codebook codebook = drawn_codebook(tiles, count, design.mean_step, options_.seed);
     std::array<std::uint64_t, 2> sums{};
     // A trained codebook's indices are coded in fewer bytes than a drawn one's.
     constexpr double kTrainedCodebook = 0.83;
     // Some of the chunks tell.
     constexpr std::size_t kChunks = 8;
-    const NearestCodeword search(codebook, design.mean_step);
-    const IndexCoding coding(field_codebook(codebook, design.mean_step));
+    const NearestCodeword search(codebook);
+    const IndexCoding coding(codebook);
     const std::size_t stride = 1 + sample.occupied_share.size() / kChunks;
     std::size_t at = 0;
     for (std::size_t number = 0; number < sample.occupied_share.size(); ++number) {
       if (!share_.has(number)) continue;
       const FieldSample::Chunk& chunk = sample.chunks[at++];
       if (number % stride != 0) continue;
-      const IndexBytes bytes = index_bytes(chunk, search, design.mean_step, coding);
+      const IndexBytes bytes = index_bytes(chunk, search, coding);
       sums[0] += static_cast<std::uint64_t>(bytes.bytes);
       sums[1] += static_cast<std::uint64_t>(bytes.tiles);
     }

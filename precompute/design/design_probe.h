@@ -71,11 +71,11 @@ class DesignProbe {
   [[nodiscard]] std::vector<NumberedTile> shuffled_tiles(const FieldSample& sample,
                                                          const FieldLattice& lattice,
                                                          std::size_t wanted) const;
-  [[nodiscard]] std::vector<Codebook> small_codebooks(std::span<const NumberedTile> tiles) const;
+  [[nodiscard]] std::vector<Codebook> small_codebooks(std::span<const NumberedTile> tiles,
+                                                      int mean_step) const;
   [[nodiscard]] std::vector<PoseLoss> losses(const FieldCaster& caster,
                                              const LightSlab& planes,
-                                             const Codebook& trained,
-                                             int mean_step) const;
+                                             const Codebook& codebook) const;
 
   const ProbeScene& scene_;
   ProbeOptions options_;

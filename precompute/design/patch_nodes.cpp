@@ -171,8 +171,7 @@ PatchValues PatchNodes::values(const NearestCodeword& search, const Codebook& co
   for (std::size_t k = 0; k < units_.size(); ++k) {
     const WorkUnit& unit = units_[k];
     const UnitTiles tiles = make_unit_tiles(unit, samples_[k]);
-    const std::vector<std::uint16_t> indices =
-        encode_unit(search, codebook.mean_step, unit, tiles).indices;
+    const std::vector<std::uint16_t> indices = encode_unit(search, unit, tiles).indices;
     const auto row = static_cast<std::size_t>(unit.tile_counts()[3]);
     const std::array<int, 4> counts = unit.tile_counts();
     const std::array<int, 4> nodes = {unit.u.count, unit.v.count, unit.s.count, unit.t.count};

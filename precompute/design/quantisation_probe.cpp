@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "base/error.h"
 #include "precompute/codebook/codebook_training.h"
@@ -25,7 +26,10 @@ double trained_share_factor(double per_codeword, double trained_share) {
 
 }  // namespace
 
-Codebook small_codebook(std::span<const NumberedTile> shuffled, int codewords, std::uint64_t seed) {
+Codebook small_codebook(std::span<const NumberedTile> shuffled,
+                        int codewords,
+                        int mean_step,
+                        std::uint64_t seed) {
   const std::size_t wanted = kProbeTilesPerCodeword * static_cast<std::size_t>(codewords);
   const auto training = shuffled.first(std::min(shuffled.size(), wanted));
   std::vector<Tile> distinct;
@@ -36,7 +40,8 @@ Codebook small_codebook(std::span<const NumberedTile> shuffled, int codewords, s
   options.codewords = static_cast<int>(std::min<std::ptrdiff_t>(codewords, count));
   options.max_iterations = kIterations;
   options.seed = seed;
-  if (options.codewords < 2) return {{Tile{}}};
+  options.mean_step = mean_step;
+  if (options.codewords < 2) return {{Tile{}}, mean_step};
   return train_codebook({{training.begin(), training.end()}, {}}, options, serial_reduction())
       .codebook;
 }
@@ -52,17 +57,20 @@ double squared_error(std::span<const NumberedTile> tiles, const Codebook& codebo
   return std::max(sum, 1.0);
 }
 
-Codebook drawn_codebook(std::span<const NumberedTile> shuffled, int codewords, std::uint64_t seed) {
+Codebook drawn_codebook(std::span<const NumberedTile> shuffled,
+                        int codewords,
+                        int mean_step,
+                        std::uint64_t seed) {
   std::vector<std::uint64_t> keys;
   keys.reserve(shuffled.size());
   for (const NumberedTile& tile : shuffled) keys.push_back(weighted_sampling_key(seed, tile));
   const std::size_t wanted =
       std::min(static_cast<std::size_t>(codewords), shuffled.size() / 2 + 1) - 1;
   const auto drawn = smallest_keyed_tiles(keys, shuffled, wanted, serial_reduction());
-  Codebook codebook{{Tile{}}};
-  for (const KeyedTile& tile : drawn) codebook.codewords.push_back(tile.numbered.tile);
-  std::sort(codebook.codewords.begin(), codebook.codewords.end(), codeword_less);
-  return codebook;
+  std::vector<Tile> tiles{Tile{}};
+  for (const KeyedTile& tile : drawn) tiles.push_back(tile.numbered.tile);
+  std::sort(tiles.begin(), tiles.end(), codeword_less);
+  return codebook_of_searched(std::move(tiles), mean_step);
 }
 
 double error_ratio(const std::array<double, kProbeCodewords.size()>& errors_of_small,
@@ -83,9 +91,8 @@ double error_ratio(const std::array<double, kProbeCodewords.size()>& errors_of_s
 
 IndexBytes index_bytes(const FieldSample::Chunk& chunk,
                        const NearestCodeword& search,
-                       int mean_step,
                        const IndexCoding& coding) {
-  const EncodedUnit encoded = encode_unit(search, mean_step, chunk.unit, chunk.tiles);
+  const EncodedUnit encoded = encode_unit(search, chunk.unit, chunk.tiles);
   std::array<std::size_t, 4> tiles{};
   std::ranges::transform(chunk.unit.tile_counts(), tiles.begin(), [](int count) {
     return static_cast<std::size_t>(count);

@@ -31,14 +31,21 @@ constexpr std::size_t probe_tiles(int codewords) {
 }
 
 /// A codebook trained as a field's is on the first tiles of `shuffled`, kProbeTilesPerCodeword per
-/// codeword. Of fewer codewords when there are not so many tiles.
-Codebook small_codebook(std::span<const NumberedTile> shuffled, int codewords, std::uint64_t seed);
+/// codeword: on plain tiles, or on folded shapes (remove_means()) where `mean_step` is above 0. Of
+/// fewer codewords when there are not so many tiles.
+Codebook small_codebook(std::span<const NumberedTile> shuffled,
+                        int codewords,
+                        int mean_step,
+                        std::uint64_t seed);
 
 /// A codebook of the size of a field's whose codewords are drawn, not trained: its indices compress
 /// as a field's do. Of fewer codewords when there are not twice as many tiles.
-Codebook drawn_codebook(std::span<const NumberedTile> shuffled, int codewords, std::uint64_t seed);
+Codebook drawn_codebook(std::span<const NumberedTile> shuffled,
+                        int codewords,
+                        int mean_step,
+                        std::uint64_t seed);
 
-/// Sum over tiles of the squared distance to the nearest codeword, in levels.
+/// Sum over tiles, or folded shapes, of the squared distance to the nearest codeword, in levels.
 double squared_error(std::span<const NumberedTile> tiles, const Codebook& codebook);
 
 /// What a field's codebook will be trained on.
@@ -55,14 +62,13 @@ double error_ratio(const std::array<double, kProbeCodewords.size()>& errors_of_s
                    const TrainingTiles& tiles);
 
 /// Bytes of the indices (and means) of chunks, coded as in a field's file, and their tiles that are
-/// not empty. `search` and `mean_step` as for encode_unit().
+/// not empty.
 struct IndexBytes {
   double bytes = 0.0;
   double tiles = 0.0;
 };
 IndexBytes index_bytes(const FieldSample::Chunk& chunk,
                        const NearestCodeword& search,
-                       int mean_step,
                        const IndexCoding& coding);
 
 /// Bytes of a codebook in a file, deflated, per codeword.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Joins the builder's numerics with ranks and files: the phases of af-precompute, one function
-// each.
+// Joins the builder's numerics with ranks and files: casting and training, one function each (for
+// encoding see FieldEncoder).
 #pragma once
 
 #include <cstdint>
@@ -74,7 +74,7 @@ struct OverflowChoice {
 OverflowChoice choose_overflow(const FieldBuild& build, const CastPhase& cast);
 
 /// Collective. The codebook trained on the share that the picker took of all tiles, or on their
-/// shapes, where the options have a step of means: see field_codebook().
+/// shapes, where the options have a step of means.
 TrainedCodebook train_field(const FieldBuild& build,
                             CastPhase& cast,
                             const CodebookOptions& options,

@@ -13,10 +13,14 @@
 #include "base/error.h"
 #include "parallel/values_of_ranks.h"
 #include "parallel/work_watch.h"
+#include "precompute/units/unit_planner.h"
 
 namespace af {
 
 namespace {
+
+static_assert(kLargestS == 2 * kIndexChunkTiles[0] && kLargestT == 2 * kIndexChunkTiles[1],
+              "a unit that is not cut is whole chunks of a field file");
 
 using Clock = std::chrono::steady_clock;
 
@@ -45,23 +49,22 @@ std::vector<std::size_t> balanced_owners(const std::vector<std::uint64_t>& unit_
   return owners;
 }
 
-std::uint32_t crc_of(const Codebook& trained, int mean_step) {
-  const std::uint32_t crc = crc32c(std::as_bytes(std::span(trained.codewords)));
-  return crc ^ static_cast<std::uint32_t>(mean_step);
+std::uint32_t crc_of(const Codebook& codebook) {
+  const std::uint32_t crc = crc32c(std::as_bytes(std::span(codebook.codewords)));
+  return crc ^ static_cast<std::uint32_t>(codebook.mean_step);
 }
 
 }  // namespace
 
 FieldEncoder::FieldEncoder(const FieldBuild& build,
                            CastPhase& cast,
-                           const Codebook& trained,
-                           int mean_step,
+                           const Codebook& codebook,
                            TileOverflow overflow)
     : build_(build),
       cast_(cast),
-      codebook_(field_codebook(trained, mean_step)),
-      search_(trained, mean_step),
-      codebook_crc_(crc_of(trained, mean_step)),
+      codebook_(codebook),
+      search_(codebook),
+      codebook_crc_(crc_of(codebook)),
       overflow_(overflow) {
   if (build_.progress != nullptr && overflow_ == TileOverflow::ReadBack)
     build_.progress->share_places();
@@ -109,7 +112,7 @@ IndexBlock FieldEncoder::next_block() {
   const bool is_kept = !cast_.kept.empty();
   const WorkUnit& unit = build_.units[is_kept ? cast_.kept.back().unit_id : others_.back()];
   const WorkNote note("encoding " + name_of(unit, build_.units.size()));
-  EncodedUnit of_unit = encoded(unit, is_kept);
+  EncodedUnit of_unit = encoded(unit, is_kept ? &cast_.kept.back() : nullptr);
   if (is_kept)
     cast_.kept.pop_back();
   else
@@ -122,17 +125,16 @@ IndexBlock FieldEncoder::next_block() {
           std::move(of_unit.indices)};
 }
 
-EncodedUnit FieldEncoder::encoded(const WorkUnit& unit, bool is_kept) {
+EncodedUnit FieldEncoder::encoded(const WorkUnit& unit, const UnitTiles* kept) {
   if (build_.progress != nullptr)
     if (auto before =
-            build_.progress->read_encoded(unit, codebook_.has_means() ? 2 : 1, codebook_crc_);
+            build_.progress->read_encoded(unit, codebook_.values_per_tile(), codebook_crc_);
         before && is_ours(*before, unit)) {
       ++units_resumed_;
       return std::move(*before);
     }
-  const int mean_step = codebook_.mean_step;
-  EncodedUnit of_unit = is_kept ? encode_unit(search_, mean_step, unit, cast_.kept.back())
-                                : encode_unit(search_, mean_step, unit, tiles_again(unit));
+  const auto encode = [&](const UnitTiles& tiles) { return encode_unit(search_, unit, tiles); };
+  EncodedUnit of_unit = kept != nullptr ? encode(*kept) : encode(tiles_again(unit));
   if (build_.progress != nullptr) build_.progress->append(unit, of_unit, codebook_crc_);
   return of_unit;
 }

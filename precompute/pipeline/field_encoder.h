@@ -11,16 +11,14 @@
 
 namespace af {
 
-/// Encodes units in rounds, for write_field(). Every rank encodes the tiles it has kept; the others
-/// are dealt out such that all ranks have equally many.
+/// Encodes units in rounds, for write_field(). Every rank encodes the units whose tiles it has
+/// kept; the others are dealt out so that all ranks encode about as many tiles.
 class FieldEncoder {
  public:
-  /// Collective. `cast` is emptied while encoding and must outlive the encoder. `trained`: of
-  /// train_field(), on shapes where `mean_step` is above 0.
+  /// Collective. `cast` is emptied while encoding; it and `codebook` must outlive the encoder.
   FieldEncoder(const FieldBuild& build,
                CastPhase& cast,
-               const Codebook& trained,
-               int mean_step,
+               const Codebook& codebook,
                TileOverflow overflow);
 
   /// This rank's next units, about kRoundBytes of indices; none when it has no more. Units that an
@@ -44,14 +42,15 @@ class FieldEncoder {
   void deal_out_others();
   [[nodiscard]] UnitTiles tiles_again(const WorkUnit& unit);
   IndexBlock next_block();
-  EncodedUnit encoded(const WorkUnit& unit, bool is_kept);
+  /// Of the tiles in memory, or of none where they must be made again.
+  EncodedUnit encoded(const WorkUnit& unit, const UnitTiles* kept);
   /// A record's checksum says that it is whole, not that it is ours.
   [[nodiscard]] bool is_ours(const EncodedUnit& before, const WorkUnit& unit) const;
 
   const FieldBuild& build_;
   CastPhase& cast_;
-  Codebook codebook_;       ///< of the field
-  NearestCodeword search_;  ///< of what was trained
+  const Codebook& codebook_;
+  NearestCodeword search_;
   std::uint32_t codebook_crc_;
   TileOverflow overflow_;
   std::vector<std::uint32_t> others_;  ///< this rank's units that are not in memory

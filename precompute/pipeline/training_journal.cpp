@@ -32,7 +32,7 @@ std::optional<TrainedCodebook> training_of(std::span<const std::byte> bytes) {
 }
 
 TrainingJournal::TrainingJournal(UnfinishedWork work,
-                                 std::size_t codewords,
+                                 const CodebookOptions& options,
                                  const Communicator& communicator)
     : communicator_(communicator), store_(giving_way(std::move(work)), communicator) {
   std::vector<std::byte> last;
@@ -44,7 +44,9 @@ TrainingJournal::TrainingJournal(UnfinishedWork work,
   });
   communicator_.broadcast(last);
   begun_ = training_of(last);
-  if (begun_ && begun_->codebook.size() != codewords) begun_.reset();
+  if (begun_ && (begun_->codebook.size() != static_cast<std::size_t>(options.codewords) ||
+                 begun_->codebook.mean_step != options.mean_step))
+    begun_.reset();
 }
 
 void TrainingJournal::append(const TrainedCodebook& so_far) {

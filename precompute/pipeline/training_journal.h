@@ -16,8 +16,10 @@ class TrainingJournal {
  public:
   /// Collective. Opens or creates the journal. Iterations with other options are thrown away: the
   /// codebook may be changed between a stop and going on, the cast units stay. So are those whose
-  /// codebook is not usable, or not of so many codewords.
-  TrainingJournal(UnfinishedWork work, std::size_t codewords, const Communicator& communicator);
+  /// codebook is not usable, or not of the options' size and step of means.
+  TrainingJournal(UnfinishedWork work,
+                  const CodebookOptions& options,
+                  const Communicator& communicator);
 
   /// What the last sound iteration of earlier runs gave, the same on every rank; none without one.
   [[nodiscard]] const std::optional<TrainedCodebook>& begun() const { return begun_; }

@@ -124,13 +124,12 @@ inline constexpr const char* kCodebookStage = "codebook";  ///< what is made of 
 /// Training tiles where no share is stated: enough that unseen tiles come out nearly as training
 /// tiles do (precompute/README.md has what more and fewer give).
 inline constexpr std::uint64_t kTrainingTilesPerCodeword = 64;
+/// Most of them, so that 65536 codewords do not take more than twice the time of 16384.
+inline constexpr std::uint64_t kTrainingTilesUnlessStated = std::uint64_t{1} << 20u;
 /// Where a training ends unless told otherwise. The paper's single slab keeps the stricter limit,
 /// so that its files stay the same to the byte; with several slabs what the last iterations gain is
 /// below what interpolation loses (precompute/README.md).
 double min_improvement_of(const FieldDesign& design);
-/// A limit for every codebook, so that 65536 codewords do not take more than twice the time of
-/// 16384.
-inline constexpr std::uint64_t kTrainingTilesUnlessStated = std::uint64_t{1} << 20u;
 
 /// Every broken constraint of the values themselves (not of files).
 std::vector<std::string> problems(const PrecomputeOptions& options);

@@ -64,17 +64,17 @@ struct SampledTiles {
   }
 };
 
-/// Every n-th of the spread tiles, so that there are as many as asked for, if there are enough.
-Codebook drawn_codebook(std::vector<Tile> tiles, int codewords) {
-  Codebook codebook{{Tile{}}};
+/// Every n-th of the spread tiles, or folded shapes where `mean_step` is above 0, so that there are
+/// as many as asked for, if there are enough.
+Codebook drawn_codebook(std::vector<Tile> tiles, int codewords, int mean_step) {
+  std::vector<Tile> drawn{Tile{}};
   const std::size_t wanted = static_cast<std::size_t>(codewords) - 1;
   std::sort(tiles.begin(), tiles.end());
   tiles.erase(std::unique(tiles.begin(), tiles.end()), tiles.end());
   const std::size_t count = std::min(wanted, tiles.size());
-  for (std::size_t i = 0; i < count; ++i)
-    codebook.codewords.push_back(tiles[i * tiles.size() / count]);
-  std::sort(codebook.codewords.begin(), codebook.codewords.end(), codeword_less);
-  return codebook;
+  for (std::size_t i = 0; i < count; ++i) drawn.push_back(tiles[i * tiles.size() / count]);
+  std::sort(drawn.begin(), drawn.end(), codeword_less);
+  return codebook_of_searched(std::move(drawn), mean_step);
 }
 
 struct PackedSample {
@@ -128,9 +128,9 @@ void sample_search(SampledTiles tiles,
       tile = removed.shape;
     }
   }
-  const Codebook codebook = drawn_codebook(tiles.spread, options.design().codewords);
+  const Codebook codebook = drawn_codebook(tiles.spread, options.design().codewords, mean_step);
   const Stopwatch preparing;
-  const NearestCodeword search(codebook, mean_step);
+  const NearestCodeword search(codebook);
   sample.codebook_seconds = preparing.seconds();
   std::vector<std::uint32_t> nearest(tiles.run.size());
   std::vector<std::uint64_t> errors(tiles.run.size());
@@ -145,8 +145,7 @@ void sample_search(SampledTiles tiles,
   indices.insert(indices.end(), means.begin(), means.end());
   const PackedSample packed =
       options.packs_by_codebook_tree()
-          ? coded_by_tree(
-                indices, nearest.size(), field_codebook(codebook, mean_step), viewpoint_tiles)
+          ? coded_by_tree(indices, nearest.size(), codebook, viewpoint_tiles)
           : deflated(indices);
   const auto bytes = 2.0 * static_cast<double>(indices.size());
   sample.compress_seconds_per_byte = packed.seconds / bytes;

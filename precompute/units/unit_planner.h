@@ -13,8 +13,8 @@ struct PlanOptions {
   std::int64_t rays_per_unit = 262144;  ///< about 0.2 to 0.5 s of the reference caster
 };
 
-/// Most nodes of a unit along s and t: the chunks of field files (kIndexChunkTiles), so that a unit
-/// is written as whole chunks.
+/// Most nodes of a unit along s and t: those of the chunks of field files (kIndexChunkTiles), so
+/// that a unit that is not cut is written as whole chunks.
 inline constexpr int kLargestS = 256;
 inline constexpr int kLargestT = 128;
 

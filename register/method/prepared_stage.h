@@ -18,7 +18,7 @@ namespace af::registration {
 struct PreparedStage {
   StageOptions options;
   std::shared_ptr<const Optimizer> optimizer;
-  MultiViewObjective objective;  ///< of a silhouette: that of the pose it was last narrowed to
+  MultiViewObjective objective;  ///< narrowed to the silhouettes at the last pose, if any
   std::vector<SilhouetteView> silhouettes;  ///< none where the whole region counts
 
   /// Narrows the objective to the silhouettes at a pose, if it is one of silhouettes; false when

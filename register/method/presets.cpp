@@ -41,8 +41,8 @@ RegistrationOptions fast_preset() {
 /// were clean, wrong vertebrae came to 0.51 and right poses to 0.69 or more.
 constexpr double kConvincingValue = 0.6;
 
-/// Ends worth less are not found by the verdict, too: right poses under every stress at once had
-/// 0.34 or more. \test Presets.AVerdictOfNotFoundCallsTheLastResort
+/// The verdict calls ends that are worth less "not found"; right poses under every stress at once
+/// had 0.34 or more. \test Presets.AVerdictOfNotFoundCallsTheLastResort
 constexpr double kFoundNothing = 0.2;
 
 /// Every chain ends over the region alone at level 1: at level 2 steel and scatter have optima of

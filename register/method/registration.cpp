@@ -19,7 +19,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// Points enough for the lengths of steps that derivatives choose.
+/// As many points as tell how long a step is.
 std::vector<Eigen::Vector3d> some_points(const std::vector<Eigen::Vector3d>& points) {
   constexpr std::size_t kPoints = 512;
   // Odd, so that it walks through all rows and layers of an even lattice.
@@ -80,11 +80,11 @@ struct RegistrationRunner::Impl {
   RegistrationOptions options;
   std::shared_ptr<ThreadPool> pool;
   std::vector<View> views;
-  std::vector<Eigen::Vector3d> some_points_ct;
+  std::vector<Eigen::Vector3d> step_points_ct;
   std::vector<PreparedStage> stages;         ///< of all chains and the finish, in this order
   std::optional<PreparedStage> judge;        ///< of a portfolio
   OptimizerResult search;                    ///< reused
-  std::optional<ParameterScaling> at_start;  ///< by some_points_ct, at the run's start
+  std::optional<ParameterScaling> at_start;  ///< by step_points_ct, at the run's start
 
   void prepare();
   [[nodiscard]] std::optional<ParameterScaling> scaling_at(
@@ -145,7 +145,7 @@ void RegistrationRunner::Impl::prepare() {
   const auto prepared = [&](const StageOptions& stage) {
     return prepared_stage(*problem, stage, drr_ranges, pool);
   };
-  some_points_ct = some_points(problem->scaling_points_ct);
+  step_points_ct = some_points(problem->scaling_points_ct);
   for (const ChainOptions& chain : options.chains)
     for (const StageOptions& stage : chain.stages) stages.push_back(prepared(stage));
   for (const StageOptions& stage : options.finish.stages) stages.push_back(prepared(stage));
@@ -392,7 +392,7 @@ RegistrationResult RegistrationRunner::run(const RigidTransform& start_room_from
   result.start_room_from_ct = start_room_from_ct;
   result.room_from_ct = start_room_from_ct;
   result.similarity = std::numeric_limits<double>::quiet_NaN();
-  impl.at_start = impl.scaling_at(start_room_from_ct, impl.some_points_ct);
+  impl.at_start = impl.scaling_at(start_room_from_ct, impl.step_points_ct);
   if (impl.judge.has_value()) {
     impl.run_portfolio(start_index, result);
   } else {

@@ -114,7 +114,8 @@ std::string stage_text(const StageOptions& stage) {
 void StageOptions::describe(Fields& field) {
   field("level",
         level,
-        "of the pyramid: nodes of the field 2^level as far apart, X-rays blurred to match")
+        "of the pyramid: nodes 2^level as far apart as those of a field of about 256 (a finer "
+        "field's level 1 begins there), X-rays blurred to match")
       .within(0, kCoarsestLevel);
   field("pixel_step", pixel_step, "detector pixels per stage pixel, along each axis")
       .as("pixels")

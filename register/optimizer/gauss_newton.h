@@ -39,7 +39,7 @@ class GaussNewton final : public Optimizer {
  public:
   /// Where the curvature of a step comes from.
   enum class Curvature {
-    NormalEquations,
+    OfTarget,
     Learned,  ///< and from the steps so far (LearnedCurvature)
   };
   explicit GaussNewton(Curvature curvature) : curvature_(curvature) {}

@@ -42,7 +42,7 @@ constexpr std::array kOptimizers = {
         "best-neighbor", "the paper's: best of 12 neighbours", make_search<BestNeighborSearch>},
     KnownOptimizer{"gauss-newton",
                    "steps from normal equations",
-                   make_gauss_newton<GaussNewton::Curvature::NormalEquations>},
+                   make_gauss_newton<GaussNewton::Curvature::OfTarget>},
     KnownOptimizer{"quasi-newton",
                    "gauss-newton that learns missing curvature from its steps",
                    make_gauss_newton<GaussNewton::Curvature::Learned>},

@@ -28,7 +28,7 @@ struct RegistrationView {
   /// or more where it leaves three quarters of them.
   Image2d mask_without_markers;
   std::shared_ptr<const DrrRenderer> renderer;
-  std::vector<RendererLevel> coarse_levels;  ///< levels 1, 2, ... as far as stages need them
+  std::vector<RendererLevel> coarse_levels;  ///< 1, 2, ... as far as stages and verdict need them
   /// Motion box of the renderer's field; none for ray casting, and none where the field was made
   /// for another camera: then rays alone decide.
   std::optional<MotionLimit> limit;

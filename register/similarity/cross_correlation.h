@@ -37,25 +37,4 @@ class CrossCorrelation final : public SimilarityMeasure {
   double drr_offset_ = 0.0;  ///< subtracted before squaring, against cancellation
 };
 
-/// Mean, norm and correlation of an image with a centred image of norm 1.
-struct UnitCorrelation {
-  double value = 0.0;  ///< 0 when the image is constant
-  double mean = 0.0;
-  double norm = 0.0;  ///< of the centred image; 0 when it is constant
-};
-
-/// Over the pixels of weight 1 (none given: all).
-UnitCorrelation correlate(std::span<const float> image,
-                          std::span<const float> unit_reference,
-                          std::span<const float> weights,
-                          double used_pixels,
-                          double offset);
-
-/// Derivative of the correlation by every pixel of the image.
-void correlation_derivative(const UnitCorrelation& correlation,
-                            std::span<const float> image,
-                            std::span<const float> unit_reference,
-                            std::span<const float> weights,
-                            std::span<float> derivative);
-
 }  // namespace af::registration

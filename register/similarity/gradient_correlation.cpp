@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "base/error.h"
-#include "register/similarity/cross_correlation.h"
+#include "register/similarity/pixel_sums.h"
 
 namespace af::registration {
 

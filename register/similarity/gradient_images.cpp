@@ -54,7 +54,7 @@ GradientReference::GradientReference(const SimilarityReference& reference)
 std::unique_ptr<GradientWorkspace> make_gradient_workspace(const GradientReference& reference) {
   auto workspace = std::make_unique<GradientWorkspace>();
   workspace->drr.resize(reference.weights.size());
-  workspace->pixel_weights.resize(reference.weights.size());
+  workspace->robust_weights.resize(reference.weights.size());
   return workspace;
 }
 

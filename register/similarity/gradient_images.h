@@ -40,7 +40,7 @@ class GradientWorkspace final : public SimilarityWorkspace {
   GradientPair drr;
   /// Gradients of the six derivative planes, [direction]; grown at the first use.
   std::array<std::vector<float>, 2> planes;
-  std::vector<float> pixel_weights;
+  std::vector<float> robust_weights;
   std::vector<float> derivative;
   std::vector<float> padded;
   GradientPair padded_gradients;

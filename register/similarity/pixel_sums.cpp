@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "register/similarity/pixel_sums.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "base/error.h"
@@ -8,6 +9,10 @@
 
 namespace af::registration {
 namespace {
+
+/// A constant image leaves rounding errors of this order in its variance: products are rounded to
+/// single precision.
+constexpr double kRelativeRounding = 1e-6;
 
 /// Place of the product of channels a <= b in the upper triangle.
 int product_index(int a, int b) {
@@ -91,6 +96,11 @@ NormalEquations correlation_normal_equations(const GramSums& sums, double smalle
   return result;
 }
 
+NormalEquations correlation_normal_equations(const GramSums& sums) {
+  return correlation_normal_equations(
+      sums, kRelativeRounding * gram_product(sums, kDrrChannel, kDrrChannel));
+}
+
 std::vector<float> pixel_weights(const SimilarityReference& reference) {
   std::vector<float> weights;
   for (const std::uint8_t used : reference.used) weights.push_back(used != 0 ? 1.0f : 0.0f);
@@ -119,6 +129,47 @@ std::vector<float> unit_image(std::span<const float> image, std::span<const floa
     if (is_used(i))
       unit[i] = static_cast<float>((static_cast<double>(image[i]) - mean) / std::sqrt(square));
   return unit;
+}
+
+UnitCorrelation correlate(std::span<const float> image,
+                          std::span<const float> unit_reference,
+                          std::span<const float> weights,
+                          double used_pixels,
+                          double offset) {
+  const auto single_offset = static_cast<float>(offset);
+  const CorrelationSums sums =
+      pixel_sum_kernels().correlation_sums(image.data(),
+                                           unit_reference.data(),
+                                           weights.empty() ? nullptr : weights.data(),
+                                           single_offset,
+                                           static_cast<std::int32_t>(image.size()));
+  UnitCorrelation result;
+  const double mean = sums.value / used_pixels;
+  result.mean = mean + static_cast<double>(single_offset);
+  const double variance = sums.square - sums.value * mean;
+  if (std::isnan(variance)) result.value = variance;
+  if (!(variance > kRelativeRounding * sums.square)) return result;
+  result.norm = std::sqrt(variance);
+  result.value = sums.product / result.norm;
+  return result;
+}
+
+void correlation_derivative(const UnitCorrelation& correlation,
+                            std::span<const float> image,
+                            std::span<const float> unit_reference,
+                            std::span<const float> weights,
+                            std::span<float> derivative) {
+  if (!(correlation.norm > 0.0)) {
+    std::fill(derivative.begin(), derivative.end(), 0.0f);
+    return;
+  }
+  const auto mean = static_cast<float>(correlation.mean);
+  const auto by_norm = static_cast<float>(1.0 / correlation.norm);
+  const auto shrink = static_cast<float>(correlation.value / correlation.norm);
+  for (std::size_t i = 0; i < image.size(); ++i) {
+    const float slope = by_norm * (unit_reference[i] - shrink * (image[i] - mean));
+    derivative[i] = weights.empty() ? slope : weights[i] * slope;
+  }
 }
 
 }  // namespace af::registration

@@ -48,8 +48,12 @@ double gram_product(const GramSums& sums, int a, int b);
 double centered_gram_product(const GramSums& sums, int a, int b);
 
 /// Correlation of DRR and X-ray as 1 - |x^ - d^|^2 / 2 of the centred images divided by their
-/// norms; 0, with no gradient, where the DRR's variance is below `smallest_square`.
-NormalEquations correlation_normal_equations(const GramSums& sums, double smallest_square = 0.0);
+/// norms; 0, with no gradient, where the sum of squares of the centred DRR is below
+/// `smallest_square`.
+NormalEquations correlation_normal_equations(const GramSums& sums, double smallest_square);
+
+/// The same with 0 where correlate() has it: where the DRR is constant but for rounding.
+NormalEquations correlation_normal_equations(const GramSums& sums);
 
 /// 1 where a pixel counts, 0 elsewhere; empty when all do.
 std::vector<float> pixel_weights(const SimilarityReference& reference);
@@ -60,5 +64,26 @@ std::vector<float> unit_image(std::span<const float> image, std::span<const floa
 
 /// Sum of the weights, or `pixels` when there are none.
 double weight_sum(std::span<const float> weights, std::size_t pixels);
+
+/// Mean, norm and correlation of an image with a centred image of norm 1.
+struct UnitCorrelation {
+  double value = 0.0;  ///< 0 when the image is constant
+  double mean = 0.0;
+  double norm = 0.0;  ///< of the centred image; 0 when it is constant
+};
+
+/// Over the pixels of weight 1 (none given: all).
+UnitCorrelation correlate(std::span<const float> image,
+                          std::span<const float> unit_reference,
+                          std::span<const float> weights,
+                          double used_pixels,
+                          double offset);
+
+/// Derivative of the correlation by every pixel of the image.
+void correlation_derivative(const UnitCorrelation& correlation,
+                            std::span<const float> image,
+                            std::span<const float> unit_reference,
+                            std::span<const float> weights,
+                            std::span<float> derivative);
 
 }  // namespace af::registration

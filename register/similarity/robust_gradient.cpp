@@ -76,7 +76,7 @@ double RobustGradient::take_weights(int direction,
                     reference_.weights.data(),
                     static_cast<float>(gain),
                     static_cast<float>(squared_scale_),
-                    workspace.pixel_weights.data()},
+                    workspace.robust_weights.data()},
                    static_cast<std::int32_t>(reference_.weights.size()))
       .cost;
 }
@@ -100,7 +100,7 @@ double RobustGradient::evaluate_with_derivative(std::span<const float> drr,
     const std::vector<float>& x = reference_.xray.of(direction);
     const std::vector<float>& d = mine.drr.of(direction);
     for (std::size_t i = 0; i < drr.size(); ++i)
-      mine.derivative[i] = scale * mine.pixel_weights[i] * (x[i] - single_gain * d[i]);
+      mine.derivative[i] = scale * mine.robust_weights[i] * (x[i] - single_gain * d[i]);
     add_adjoint_gradient(reference_, direction, mine.derivative, mine, derivative);
   }
   return 1.0 - cost / cost_without_drr_;
@@ -119,7 +119,7 @@ NormalEquations RobustGradient::normal_equations(std::span<const float> drr,
     const GramSums part = gram_sums(mine.planes[static_cast<std::size_t>(direction)],
                                     mine.drr.of(direction),
                                     reference_.xray.of(direction),
-                                    mine.pixel_weights);
+                                    mine.robust_weights);
     for (int i = 0; i < kGramProducts; ++i) sums.products[i] += part.products[i];
   }
   NormalEquations result;

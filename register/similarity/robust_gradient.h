@@ -33,7 +33,7 @@ class RobustGradient final : public SimilarityMeasure {
  private:
   [[nodiscard]] RobustSums sums_at(const GradientPair& drr, double gain) const;
   [[nodiscard]] double gain_of(const GradientPair& drr) const;
-  /// Fills workspace.pixel_weights with the weights of one direction, and gives its part of the
+  /// Fills workspace.robust_weights with the weights of one direction, and gives its part of the
   /// cost.
   double take_weights(int direction, double gain, GradientWorkspace& workspace) const;
 

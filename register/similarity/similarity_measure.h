@@ -82,7 +82,7 @@ class SimilarityMeasure {
 };
 
 struct SimilarityOptions {
-  std::string name = "mi";  ///< of a stage that states none; MethodOptions chooses the preset
+  std::string name = "mi";  ///< of the stages of `paper`; those of chains state theirs
   int bins = 64;
   /// mi, nmi: DRR values are counted through cubic B-spline windows, which makes the measure
   /// differentiable; optimisers that need derivatives set it.

@@ -10,7 +10,7 @@
 #include "benchmark/benchmark_case.h"
 #include "benchmark/plastimatch_drr.h"
 #include "cli/app_main.h"
-#include "drr/af_drr.h"
+#include "drr/ray_by_ray_af_drr.h"
 #include "drr/ray_cast_drr.h"
 #include "drr/two_pass_af_drr.h"
 #include "field_file/field_file.h"
@@ -134,7 +134,7 @@ void run(const CaseOptions& options,
   const View region = middle_of(view);
   const View fine = finer(view);
   const TwoPassAfDrr on_two_threads(field, {}, std::make_shared<ThreadPool>(2));
-  const AfDrr quadrilinear(field);
+  const RayByRayAfDrr quadrilinear(field);
   const RayCastDrr ray_cast(benchmark_case.volume());
   const Series series{poses, options.is_quick ? 1 : 20};
   const std::string region_name = "TwoPassAfDrr, region of 3/4";
@@ -156,7 +156,7 @@ void run(const CaseOptions& options,
       renderer_contender("TwoPassAfDrr, 16 times the pixels", two_pass, {poses, 2}, fine),
       renderer_contender(
           "TwoPassAfDrr, 16 times the pixels, two threads", on_two_threads, {poses, 2}, fine),
-      renderer_contender("AfDrr, 16 taps", quadrilinear, {poses, 1}, view),
+      renderer_contender("RayByRayAfDrr, 16 taps", quadrilinear, {poses, 1}, view),
       renderer_contender("RayCastDrr", ray_cast, {few_poses, 1}, view),
       renderer_contender(
           "RayCastDrr, six gradients", ray_cast, {few_poses, 1}, view, Derivatives::OfThePose)};

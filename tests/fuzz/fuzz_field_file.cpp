@@ -8,6 +8,7 @@
 #include <memory>
 #include <utility>
 
+#include "field_file/field_layout.h"
 #include "field_file/hdf5_calls.h"
 #include "field_file/index_filter.h"
 #include "files/sha256.h"

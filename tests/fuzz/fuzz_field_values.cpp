@@ -5,7 +5,7 @@
 #include <memory>
 #include <optional>
 
-#include "drr/af_drr.h"
+#include "drr/ray_by_ray_af_drr.h"
 #include "field_file/field_layout.h"
 #include "fuzz/fuzz_input.h"
 #include "fuzz/sample_field.h"
@@ -46,7 +46,7 @@ void look_up(std::shared_ptr<const CompressedAttenuationField> field) {
   view.roi.width = std::min(view.roi.width, 8);
   view.roi.height = std::min(view.roi.height, 8);
   const RigidTransform pose = field->identity.frame.nominal_room_from_ct();
-  (void)render_image(AfDrr(std::move(field)), pose, view);
+  (void)render_image(RayByRayAfDrr(std::move(field)), pose, view);
 }
 
 }  // namespace

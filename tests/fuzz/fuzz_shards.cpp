@@ -196,9 +196,10 @@ void go_on_training(fuzz::InputBytes& input) {
   std::vector<std::byte> bytes = bytes_of(begun);
   if (input.take_below(4) == 0) bytes[input.take_below(bytes.size())] ^= input.take<std::byte>();
   const UnfinishedWork work = {folder(), "training", {{"codewords", std::to_string(kCodewords)}}};
-  { const TrainingJournal journal(work, kCodewords, world()); }
+  const CodebookOptions options = {kCodewords, 3};
+  { const TrainingJournal journal(work, options, world()); }
   ProgressShard({work.folder, work.name}, {}).append(1, {bytes});
-  const TrainingJournal journal(work, kCodewords, world());
+  const TrainingJournal journal(work, options, world());
   TrainingShare share;
   for (std::uint16_t i = 1; i < 12; ++i) {
     NumberedTile tile{i, {}};
@@ -206,7 +207,7 @@ void go_on_training(fuzz::InputBytes& input) {
     share.training.push_back(tile);
   }
   const TrainedCodebook trained =
-      train_codebook(share, {kCodewords, 3}, serial_reduction(), {}, {journal.begun(), {}});
+      train_codebook(share, options, serial_reduction(), {}, {journal.begun(), {}});
   fuzz::require(trained.codebook.size() == kCodewords && problems(trained.codebook).empty(),
                 "a training gives a codebook of the size asked for");
 }

@@ -11,6 +11,7 @@
 #include "base/hash_random.h"
 #include "drr/field_renderer.h"
 #include "field_file/field_file.h"
+#include "field_file/field_layout.h"
 #include "field_file/hdf5_calls.h"
 #include "field_use/field_coverage.h"
 #include "field_use/opened_field.h"

@@ -76,11 +76,10 @@ class FieldBuildTest : public testing::Test {
     field.identity.ct_content_sha256 = std::string(64, 'b');
     field.light_slab = light_slab_;
     field.quantizer_step = quantizer_.step();
-    const Codebook trained =
+    field.codebook =
         train_field(build, cast, {.codewords = 64, .seed = 3, .mean_step = mean_step_}, {})
             .codebook;
-    field.codebook = field_codebook(trained, mean_step_);
-    FieldEncoder encoder(build, cast, trained, mean_step_, overflow_);
+    FieldEncoder encoder(build, cast, field.codebook, overflow_);
     const FieldFileInfo info = write_field(
         field,
         [&] { return encoder.next_blocks(); },
@@ -194,9 +193,9 @@ TEST_F(FieldBuildTest, MeanRemovedTilesComeNearerToTheSamples) {
   const FieldBuild build = build_of(units, nullptr);
   const auto error_of = [&](int mean_step) {
     CastPhase cast = cast_field(build, {kSelection}, [] { return false; }, {});
-    const Codebook trained =
+    const Codebook codebook =
         train_field(build, cast, {.codewords = 64, .seed = 3, .mean_step = mean_step}, {}).codebook;
-    FieldEncoder encoder(build, cast, trained, mean_step, TileOverflow::CastAgain);
+    FieldEncoder encoder(build, cast, codebook, TileOverflow::CastAgain);
     while (sum_over(world_, encoder.next_blocks().size()) > 0) {
     }
     return static_cast<double>(encoder.squared_error());
@@ -229,7 +228,7 @@ TEST_F(FieldBuildTest, TilesThatCannotBeReadBackAreCastAgain) {
   const OverflowChoice choice = choose_overflow(build, cast);
   EXPECT_GT(choice.read_bytes_per_second, 0.0);
   const Codebook codebook = train_field(build, cast, {.codewords = 64, .seed = 3}, {}).codebook;
-  FieldEncoder encoder(build, cast, codebook, 0, TileOverflow::ReadBack);
+  FieldEncoder encoder(build, cast, codebook, TileOverflow::ReadBack);
   world_.barrier();
   if (world_.is_root())
     for (const auto& entry : std::filesystem::directory_iterator(progress.path()))
@@ -381,15 +380,16 @@ TEST_F(FieldBuildTest, TrainingIsKeptForTheSameOptionsOnly) {
   training.training_tiles = 70;
   training.iterations = {{500, 60, 1}, {400, 50, 0}};
   const UnfinishedWork work = {folder_ / "progress", "training", {{"codewords", "2"}}};
-  EXPECT_FALSE(TrainingJournal(work, 2, world_).begun().has_value());
-  TrainingJournal(work, 2, world_).append(training);
-  const auto begun = TrainingJournal(work, 2, world_).begun();
+  EXPECT_FALSE(TrainingJournal(work, {.codewords = 2}, world_).begun().has_value());
+  TrainingJournal(work, {.codewords = 2}, world_).append(training);
+  const auto begun = TrainingJournal(work, {.codewords = 2}, world_).begun();
   ASSERT_TRUE(begun.has_value());
   EXPECT_EQ(begun->codebook.codewords, training.codebook.codewords);
   EXPECT_EQ(begun->training_tiles, 70u);
   ASSERT_EQ(begun->iterations.size(), 2u);
   EXPECT_EQ(begun->iterations[1].training_squared_error, 400u);
-  const TrainingJournal other({work.folder, work.name, {{"codewords", "3"}}}, 3, world_);
+  const TrainingJournal other(
+      {work.folder, work.name, {{"codewords", "3"}}}, {.codewords = 3}, world_);
   EXPECT_FALSE(other.begun().has_value());
 }
 
@@ -398,13 +398,17 @@ TEST_F(FieldBuildTest, ATrainingWithAnotherCodebookThanItSaysIsThrownAway) {
   const auto begun_with = [&](const std::vector<Tile>& codewords) {
     TrainedCodebook training;
     training.codebook.codewords = codewords;
-    TrainingJournal(work, 2, world_).append(training);
-    return TrainingJournal(work, 2, world_).begun().has_value();
+    TrainingJournal(work, {.codewords = 2}, world_).append(training);
+    return TrainingJournal(work, {.codewords = 2}, world_).begun().has_value();
   };
   EXPECT_TRUE(begun_with({Tile{}, Tile{1}}));
   EXPECT_FALSE(begun_with({Tile{}, Tile{1}, Tile{2}}));  // too many
   EXPECT_FALSE(begun_with({Tile{1}, Tile{}}));           // not sorted, zero is not the first
   EXPECT_FALSE(begun_with({}));
+  TrainedCodebook of_shapes;
+  of_shapes.codebook = {{Tile{}, Tile{1}}, 48};
+  TrainingJournal(work, {.codewords = 2}, world_).append(of_shapes);
+  EXPECT_FALSE(TrainingJournal(work, {.codewords = 2}, world_).begun().has_value());
 }
 
 TEST(TrainingFiles, BytesThatAreNotOfATrainingAreNone) {

@@ -11,8 +11,9 @@
 
 #include "base/error.h"
 #include "base/hash_random.h"
-#include "field_file/chunk_index.h"
+#include "field_file/field_layout.h"
 #include "field_file/hdf5_calls.h"
+#include "field_file/index_chunks.h"
 #include "field_file/index_filter.h"
 #include "files/sha256.h"
 #include "support/shared_folder.h"
@@ -287,7 +288,7 @@ CompressedAttenuationField field_of_chunks(int tiles_u, int tiles_v) {
 
 /// HDF5 1.10's own metadata cache holds the index of 65536 chunks; it failed beyond.
 TEST(FieldFile, HoldsMoreChunksThanFitIntoTheCacheOfHdf5) {
-  constexpr int kAlongU = kIndexChunkViewpoints;
+  constexpr int kAlongU = kIndexChunkTilesAlongU;
   constexpr int kTilesU = 288 * kAlongU;
   constexpr int kTilesV = 256;
   const test::SharedFolder folder;
@@ -312,7 +313,7 @@ TEST(FieldFile, TheTestOfManyChunksLeavesNothing) {
   const test::SharedFolder folder;
   const Communicator world = Communicator::world();
   check_writing_many_chunks(
-      field_of_chunks(288 * kIndexChunkViewpoints, 256).lattice(), folder / "a.af.h5", world);
+      field_of_chunks(288 * kIndexChunkTilesAlongU, 256).lattice(), folder / "a.af.h5", world);
   // A small field is not tested once more: it would fail here.
   check_writing_many_chunks(small_field().lattice(), "/nowhere/a.af.h5", world);
   world.barrier();

@@ -11,8 +11,8 @@
 
 #include "base/error.h"
 #include "base/vector_width.h"
-#include "drr/af_drr.h"
 #include "drr/field_renderer.h"
+#include "drr/ray_by_ray_af_drr.h"
 #include "support/central_differences.h"
 #include "unit/drr/small_fields.h"
 
@@ -138,7 +138,7 @@ TEST(TwoPassAfDrr, LevelsOfMeanRemovedTilesAreLimited) {
       renderer.render(RigidTransform::Identity(), view, *renderer.make_workspace(), drr);
       return drr;
     };
-    const auto expected = of_field(AfDrr(field, FieldInterpolation::Quadrilinear));
+    const auto expected = of_field(RayByRayAfDrr(field, FieldInterpolation::Quadrilinear));
     for (const VectorWidth width : supported_vector_widths()) {
       force_vector_width(width);
       const FieldLevel decoded = decode_field(*field);
@@ -245,7 +245,7 @@ TEST(TwoPassAfDrr, LargeMagnificationAndSteepRowsAgreeWithQuadrilinearLookup) {
     const View view = View::whole_detector(camera);
     for (std::uint64_t i = 0; i < 5; ++i) {
       const RigidTransform pose = pose_from_parameters({}, small_pose(i));
-      const Image2d expected = render_image(AfDrr(field), pose, view);
+      const Image2d expected = render_image(RayByRayAfDrr(field), pose, view);
       const Image2d image = render_image(TwoPassAfDrr(field), pose, view);
       // Single-precision node coordinates (150 nodes, 1e-5) times 220 levels a node of 10^4.
       constexpr float kTolerance = 2e-6f;
@@ -300,7 +300,7 @@ TEST(TwoPassAfDrr, GradientsOfAMultilinearFieldEqualThoseOfQuadrilinearLookup) {
   const RigidTransform pose = pose_from_parameters({}, small_pose(6));
   std::vector<float> values(view.pixel_count());
   std::vector<float> expected(6 * view.pixel_count());
-  const AfDrr exact(field);
+  const RayByRayAfDrr exact(field);
   const Eigen::Vector3d pivot(10.0, -20.0, 30.0);
   exact.render(pose, view, *exact.make_workspace(), values, PoseGradients{pivot, expected});
   const TwoPassAfDrr renderer(field);
@@ -371,7 +371,7 @@ TEST(TwoPassAfDrr, CountsTheRaysThatRenderingCounts) {
   const auto field = small_field(waves, 2, 7, 21);
   const View view = View::whole_detector(small_camera());
   const TwoPassAfDrr renderer(field);
-  const AfDrr literal(field);
+  const RayByRayAfDrr literal(field);
   PoseParameters turned;
   turned.rotation_rad = {2.0, 0.0, 0.0};
   for (const RigidTransform& pose : {pose_from_parameters({}, small_pose(3)),

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "register/registration_run.h"
 #include "support/test_paths.h"
 #include "text/options_toml.h"
 

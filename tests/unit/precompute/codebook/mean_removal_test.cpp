@@ -74,14 +74,15 @@ TEST(MeanRemoval, UnitsHoldRowsOfIndicesAndOfMeans) {
   faint[5] = 1;
   tiles.tiles = {
       some_tile(1, 5000.0, 100.0), some_tile(2, 70.0, 5.0), faint, some_tile(3, 65500.0, 50.0)};
-  Codebook trained{{Tile{}}};
+  std::vector<Tile> shapes{Tile{}};
   for (const Tile& tile : tiles.tiles)
-    if (!(tile == faint)) trained.codewords.push_back(remove_mean(tile, 64).shape);
-  std::sort(trained.codewords.begin(), trained.codewords.end(), codeword_less);
-  const Codebook codebook = field_codebook(trained, 64);
+    if (!(tile == faint)) shapes.push_back(remove_mean(tile, 64).shape);
+  std::sort(shapes.begin(), shapes.end(), codeword_less);
+  const Codebook codebook = codebook_of_searched(shapes, 64);
   ASSERT_TRUE(problems(codebook).empty()) << problems(codebook).front();
   EXPECT_EQ(codebook.mean_step, 64);
-  const EncodedUnit encoded = encode_unit(NearestCodeword(trained, 64), 64, small_unit(), tiles);
+  EXPECT_EQ(searched_codewords(codebook), shapes);
+  const EncodedUnit encoded = encode_unit(NearestCodeword(codebook), small_unit(), tiles);
   ASSERT_EQ(encoded.indices.size(), 12u);
   EXPECT_EQ(encoded.squared_error, 1u) << "of the faint tile";
   const auto decoded = [&](std::size_t s, std::size_t t) {
@@ -100,9 +101,9 @@ TEST(MeanRemoval, UnitsHoldRowsOfIndicesAndOfMeans) {
 }
 
 TEST(MeanRemoval, LeavesPlainCodebooksAlone) {
-  Codebook trained{{Tile{}, some_tile(1, 500.0, 100.0)}};
-  EXPECT_EQ(field_codebook(trained, 0).codewords, trained.codewords);
-  EXPECT_FALSE(field_codebook(trained, 0).has_means());
+  const Codebook codebook{{Tile{}, some_tile(1, 500.0, 100.0)}};
+  EXPECT_EQ(searched_codewords(codebook), codebook.codewords);
+  EXPECT_EQ(codebook_of_searched(codebook.codewords, 0).codewords, codebook.codewords);
 }
 
 }  // namespace

@@ -86,7 +86,8 @@ void expect_equals_brute_force(const NearestCodeword& search,
 
 void expect_equals_brute_force(const Codebook& codebook, const std::vector<Tile>& tiles) {
   expect_equals_brute_force(NearestCodeword(codebook), codebook, tiles);
-  expect_equals_brute_force(NearestCodeword(codebook, kMeanStep), codebook, tiles);
+  const Codebook of_shapes = codebook_of_searched(codebook.codewords, kMeanStep);
+  expect_equals_brute_force(NearestCodeword(of_shapes), codebook, tiles);
 }
 
 TEST(NearestCodeword, EqualsBruteForceOnEveryWidth) {

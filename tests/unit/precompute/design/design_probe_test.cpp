@@ -81,7 +81,7 @@ class DesignProbeTest : public testing::Test {
     const NearestCodeword search(field->codebook);
     for (std::size_t k = 0; k < units.size(); ++k)
       field->slabs.push_back(
-          {SharedArray<std::uint16_t>(encode_unit(search, 0, units[k], tiles[k]).indices)});
+          {SharedArray<std::uint16_t>(encode_unit(search, units[k], tiles[k]).indices)});
     return field;
   }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "drr/af_drr.h"
+#include "drr/ray_by_ray_af_drr.h"
 
 #include <cmath>
 #include <vector>
@@ -32,10 +32,10 @@ RayNodes nodes_of_pixel(const CompressedAttenuationField& field,
       field.light_slab.slabs[k]);
 }
 
-TEST(AfDrr, ReproducesMultilinearFieldExactly) {
+TEST(RayByRayAfDrr, ReproducesMultilinearFieldExactly) {
   for (const int slabs : {1, 3}) {
     const auto field = small_field(multilinear, slabs);
-    const AfDrr renderer(field, FieldInterpolation::Quadrilinear);
+    const RayByRayAfDrr renderer(field, FieldInterpolation::Quadrilinear);
     const View view = View::whole_detector(small_camera());
     for (std::uint64_t i = 0; i < 10; ++i) {
       const RigidTransform pose = pose_from_parameters({}, small_pose(i));
@@ -54,9 +54,9 @@ TEST(AfDrr, ReproducesMultilinearFieldExactly) {
   }
 }
 
-TEST(AfDrr, NearestTakesTheClosestNode) {
+TEST(RayByRayAfDrr, NearestTakesTheClosestNode) {
   const auto field = small_field(multilinear, 1);
-  const AfDrr renderer(field, FieldInterpolation::Nearest);
+  const RayByRayAfDrr renderer(field, FieldInterpolation::Nearest);
   const View view = View::whole_detector(small_camera());
   const RigidTransform pose = pose_from_parameters({}, small_pose(3));
   const Image2d image = render_image(renderer, pose, view);
@@ -69,9 +69,9 @@ TEST(AfDrr, NearestTakesTheClosestNode) {
     }
 }
 
-TEST(AfDrr, RegionOfInterestEqualsThatPartOfTheWholeImage) {
+TEST(RayByRayAfDrr, RegionOfInterestEqualsThatPartOfTheWholeImage) {
   const auto field = small_field(multilinear, 1);
-  const AfDrr renderer(field);
+  const RayByRayAfDrr renderer(field);
   const View whole = View::whole_detector(small_camera());
   const View part{small_camera(), {5, 7, 11, 9}};
   const RigidTransform pose = pose_from_parameters({}, small_pose(4));
@@ -79,9 +79,9 @@ TEST(AfDrr, RegionOfInterestEqualsThatPartOfTheWholeImage) {
             crop(render_image(renderer, pose, whole), part.roi).pixels);
 }
 
-TEST(AfDrr, RaysOutsideAreCountedAndNeverExtrapolated) {
+TEST(RayByRayAfDrr, RaysOutsideAreCountedAndNeverExtrapolated) {
   const auto field = small_field(multilinear, 1);
-  const AfDrr renderer(field);
+  const RayByRayAfDrr renderer(field);
   PoseParameters far;
   far.translation_mm = {150.0, 0.0, 0.0};
   std::int64_t outside = 0;
@@ -94,7 +94,7 @@ TEST(AfDrr, RaysOutsideAreCountedAndNeverExtrapolated) {
   EXPECT_EQ(zeros, outside);
 }
 
-TEST(AfDrr, ValuesOutsideTheStoredRangeAreZero) {
+TEST(RayByRayAfDrr, ValuesOutsideTheStoredRangeAreZero) {
   auto field = small_field([](const RayNodes&) { return 8.0; }, 1);
   auto cropped = std::make_shared<CompressedAttenuationField>(*field);
   SlabGeometry& slab = cropped->light_slab.slabs[0];
@@ -108,13 +108,13 @@ TEST(AfDrr, ValuesOutsideTheStoredRangeAreZero) {
   EXPECT_EQ(cropped->node_value(0, {0, 0, 6, 0}), 0.0f);
 }
 
-TEST(AfDrr, GradientsAgreeWithCentralDifferences) {
+TEST(RayByRayAfDrr, GradientsAgreeWithCentralDifferences) {
   // A field that is quadrilinear over the whole lattice is smooth, so that differences converge:
   // truncation error falls with step^2, single-precision noise of 1e-7 * U / step stays below 1e-4
   // of the gradients' scale.
   for (const int slabs : {1, 2}) {
     const auto field = small_field(multilinear, slabs);
-    const AfDrr renderer(field);
+    const RayByRayAfDrr renderer(field);
     const View view{small_camera(), {3, 2, 20, 15}};
     const RigidTransform pose = pose_from_parameters({}, small_pose(6));
     const auto workspace = renderer.make_workspace();
@@ -148,7 +148,7 @@ double without_cross_terms(const RayNodes& n) {
 TEST(TwoPassAfDrr, AgreesWithQuadrilinearLookup) {
   for (const int slabs : {1, 3}) {
     const auto field = small_field(without_cross_terms, slabs, 6, 11);
-    const AfDrr exact(field);
+    const RayByRayAfDrr exact(field);
     const TwoPassAfDrr two_pass(field);
     // A sum of slabs takes two more nodes on each side, and the viewpoints of nodes outside the
     // detector's rays are limited to the (u,v) rectangle.
@@ -177,7 +177,7 @@ TEST(TwoPassAfDrr, CountsAndBlanksTheSameRaysAsQuadrilinearLookup) {
   const RigidTransform pose = pose_partly_outside();
   std::int64_t expected = 0;
   std::int64_t outside = 0;
-  const Image2d exact = render_image(AfDrr(field), pose, view, &expected);
+  const Image2d exact = render_image(RayByRayAfDrr(field), pose, view, &expected);
   const Image2d image = render_image(TwoPassAfDrr(field), pose, view, &outside);
   EXPECT_GT(expected, 0);
   EXPECT_EQ(outside, expected);

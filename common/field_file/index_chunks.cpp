@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "field_file/chunk_index.h"
+#include "field_file/index_chunks.h"
 
 #include <algorithm>
 
@@ -14,19 +14,19 @@ namespace {
 
 constexpr int kMostDoublings = 16;
 
-/// Viewpoints along u that a chunk spans: whoever reads a field holds so many planes of equal u.
-hsize_t viewpoints_of_chunk(const DatasetRule& rule) {
+/// Tiles along u that a chunk spans: whoever reads a field holds so many planes of equal u.
+hsize_t tiles_along_u(const DatasetRule& rule) {
   constexpr std::uint64_t kMostTilesAtOnce = std::uint64_t{16} << 20;
   const std::uint64_t plane =
       rule.extents[1] * rule.extents[2] * rule.extents[3] / rule.rows_per_tile;
-  hsize_t viewpoints = kIndexChunkViewpoints;
-  while (viewpoints > 1 && viewpoints * plane > kMostTilesAtOnce) viewpoints /= 2;
-  return std::min<hsize_t>(viewpoints, rule.extents[0]);
+  hsize_t tiles = kIndexChunkTilesAlongU;
+  while (tiles > 1 && tiles * plane > kMostTilesAtOnce) tiles /= 2;
+  return std::min<hsize_t>(tiles, rule.extents[0]);
 }
 
 /// The shape after some doublings, or after fewer where it can grow no more.
 ChunkShape chunk_shape(const DatasetRule& rule, int doublings) {
-  ChunkShape shape = {viewpoints_of_chunk(rule),
+  ChunkShape shape = {tiles_along_u(rule),
                       1,
                       std::min<hsize_t>(rule.rows_per_tile * kIndexChunkTiles[0], rule.extents[2]),
                       std::min<hsize_t>(kIndexChunkTiles[1], rule.extents[3])};

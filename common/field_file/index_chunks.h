@@ -8,7 +8,7 @@
 
 #include <hdf5.h>
 
-#include "field_file/field_layout.h"
+#include "field_file/dataset_rule.h"
 
 namespace af::hdf5 {
 
@@ -21,7 +21,7 @@ inline constexpr std::uint64_t kMostSmallChunks = 1u << 20;
 using ChunkShape = std::array<hsize_t, 4>;
 
 /// The chunks of every slab's index dataset: kIndexChunkTiles (with their means, where they have
-/// any) of kIndexChunkViewpoints along u, or of fewer where so many planes of equal u are large.
+/// any) of kIndexChunkTilesAlongU along u, or of fewer where so many planes of equal u are large.
 /// Fields of more than kMostSmallChunks take larger ones: doubled along v, so that such planes
 /// still are whole chunks, and only then along s, t and u.
 std::vector<ChunkShape> index_chunks(const std::vector<field_layout::DatasetRule>& rules);

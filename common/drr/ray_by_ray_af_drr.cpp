@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "drr/af_drr.h"
+#include "drr/ray_by_ray_af_drr.h"
 
 #include <algorithm>
 #include <array>
@@ -94,23 +94,24 @@ std::array<Ray, 6> ray_derivatives(const Eigen::Matrix3d& slab_from_room_axes,
 
 }  // namespace
 
-AfDrr::AfDrr(std::shared_ptr<const CompressedAttenuationField> field,
-             FieldInterpolation interpolation)
+RayByRayAfDrr::RayByRayAfDrr(std::shared_ptr<const CompressedAttenuationField> field,
+                             FieldInterpolation interpolation)
     : field_(std::move(field)), interpolation_(interpolation) {}
 
-std::unique_ptr<RenderWorkspace> AfDrr::make_workspace() const {
+std::unique_ptr<RenderWorkspace> RayByRayAfDrr::make_workspace() const {
   return std::make_unique<RenderWorkspace>();
 }
 
-std::int64_t AfDrr::rays_outside(const RigidTransform& room_from_ct, const View& view) const {
+std::int64_t RayByRayAfDrr::rays_outside(const RigidTransform& room_from_ct,
+                                         const View& view) const {
   return SlabRays(field_->light_slab, room_from_ct, view).count_outside();
 }
 
-RenderStatus AfDrr::render(const RigidTransform& room_from_ct,
-                           const View& view,
-                           RenderWorkspace& /*workspace*/,
-                           std::span<float> total_attenuation,
-                           const std::optional<PoseGradients>& gradients) const {
+RenderStatus RayByRayAfDrr::render(const RigidTransform& room_from_ct,
+                                   const View& view,
+                                   RenderWorkspace& /*workspace*/,
+                                   std::span<float> total_attenuation,
+                                   const std::optional<PoseGradients>& gradients) const {
   const std::size_t pixels = view.pixel_count();
   check(total_attenuation.size() == pixels, "one value per pixel of the view");
   check(!gradients || gradients->planes.size() == 6 * pixels,

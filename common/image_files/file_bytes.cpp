@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "image_files/stored_bytes.h"
+#include "image_files/file_bytes.h"
 
 #include <algorithm>
 #include <fstream>

@@ -12,11 +12,11 @@ enum class FieldInterpolation { Nearest, Quadrilinear };
 
 /// DRRs by look-up in a compressed field (Sec. II-B): each ray's (u,v,s,t) per slab, nearest node
 /// or quadrilinear over 16 neighbours, decoded straight from the codebook; slabs' contributions
-/// add. \test AfDrr.ReproducesMultilinearFieldExactly
-class AfDrr final : public DrrRenderer {
+/// add. \test RayByRayAfDrr.ReproducesMultilinearFieldExactly
+class RayByRayAfDrr final : public DrrRenderer {
  public:
-  explicit AfDrr(std::shared_ptr<const CompressedAttenuationField> field,
-                 FieldInterpolation interpolation = FieldInterpolation::Quadrilinear);
+  explicit RayByRayAfDrr(std::shared_ptr<const CompressedAttenuationField> field,
+                         FieldInterpolation interpolation = FieldInterpolation::Quadrilinear);
 
   RenderStatus render(const RigidTransform& room_from_ct,
                       const View& view,
