@@ -102,8 +102,8 @@ class PrecomputeRun {
     for (const std::string& warning : source_.warnings) warn(world_, warning);
     if (source_.projections != nullptr) inform(world_, source_.projections->text());
     parts_ = field_parts(source_, options_, world_);
-    // As one central slab first: resampling needs the slab frame alone, and to cut the CT into
-    // slabs takes the resampled CT.
+    // As one central slab first: resampling needs the slab frame alone, and cutting the CT into
+    // slabs needs the resampled CT.
     for (FieldPart& part : parts_) size_planes(part, DepthSlabs{{}, {0.0}});
     lattice_ = lattice_of(parts_);
     clock_.end("read");

@@ -3,9 +3,6 @@
 
 #include <cmath>
 
-#include "base/error.h"
-#include "base/toml_text.h"
-
 namespace af::registration {
 namespace {
 

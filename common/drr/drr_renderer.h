@@ -55,8 +55,8 @@ class RenderWorkspace {
 };
 
 /// Makes DRRs of one CT. Every comparison of fields with ray casting is a swap of this object.
-/// render() is const and re-entrant with one workspace per thread; results do not
-/// depend on threads or vector width.
+/// render() is const and re-entrant with one workspace per thread; results do not depend on threads
+/// or vector width.
 class DrrRenderer {
  public:
   virtual ~DrrRenderer() = default;
@@ -84,8 +84,7 @@ class DrrRenderer {
   [[nodiscard]] virtual const char* name() const = 0;
 };
 
-/// Renders into a fresh image. `rays_outside`, when given, receives the
-/// count.
+/// Renders into a fresh image. `rays_outside`, when given, receives the count.
 Image2d render_image(const DrrRenderer& renderer,
                      const RigidTransform& room_from_ct,
                      const View& view,

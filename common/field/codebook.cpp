@@ -11,6 +11,7 @@ namespace {
 
 /// Codeword 0 is no shape.
 void fold_shapes(std::span<Tile> codewords) {
+  if (codewords.empty()) return;
   for (Tile& shape : codewords.subspan(1)) shape = folded_shape(shape);
 }
 

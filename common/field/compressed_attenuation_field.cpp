@@ -65,7 +65,7 @@ std::vector<std::string> problems(const CompressedAttenuationField& field) {
     const std::string name = "slab " + std::to_string(k);
     const auto values = field.slabs[k].indices.view();
     const auto tiles = static_cast<std::size_t>(lattice.slabs[k].tile_count());
-    const std::size_t needed = field.codebook.has_means() ? 2 * tiles : tiles;
+    const std::size_t needed = field.codebook.values_per_tile() * tiles;
     const auto row = static_cast<std::size_t>(lattice.slabs[k].t.stored.tiles());
     if (values.size() != needed)
       found.push_back(name + " holds " + std::to_string(values.size()) +

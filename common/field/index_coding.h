@@ -19,11 +19,11 @@ struct CodedBlock {
 
 /// Coding of a block of indices, and means, without loss, in some 40 to 55 % of the bytes that
 /// deflate needs. A tile resembles its neighbours along u, s and t. So it is predicted from those
-/// that come before it, and its codeword is coded as the turns left and right on its path
-/// through the codebook's tree. An adaptive range coder learns how likely each turn is, given how
-/// far the prediction lies from the node's threshold, relative to recent prediction errors.
-/// A mean is coded first, by its difference to the prediction. Blocks do not need each other. The
-/// bytes are the same on every vector width. Re-entrant. \test IndexCoding.*
+/// that come before it, and its codeword is coded as the turns left and right on its path through
+/// the codebook's tree. An adaptive range coder learns how likely each turn is, given how far the
+/// prediction lies from the node's threshold, relative to recent prediction errors. A mean is coded
+/// first, by its difference to the prediction. Blocks do not need each other. The bytes are the
+/// same on every vector width. Re-entrant. \test IndexCoding.*
 class IndexCoding {
  public:
   /// So many blocks are best decoded together.

@@ -8,6 +8,7 @@
 
 #include <hdf5.h>
 
+#include "field_file/dataset_rule.h"
 #include "field_file/field_file.h"
 #include "field_file/index_chunks.h"
 

@@ -9,7 +9,6 @@
 #include <initializer_list>
 #include <span>
 #include <string>
-#include <tuple>
 #include <type_traits>
 #include <utility>
 #include <variant>

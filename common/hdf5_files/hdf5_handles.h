@@ -74,6 +74,6 @@ inline std::string memory_name() {
 }
 
 /// By how much a file in memory grows.
-constexpr std::size_t kMemoryStep = 1U << 16;
+inline constexpr std::size_t kMemoryStep = 1U << 16;
 
 }  // namespace af::hdf5

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The parts of image_header.cpp, one per kind of file. For that file alone.
+// The parts of image_header.cpp, one per kind of file. For that file and stored_image.cpp alone.
 #pragma once
 
 #include <cstdint>

@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "image_files/image_header.h"
 
-#include <algorithm>
 #include <array>
 #include <string_view>
-#include <utility>
 
 #include "base/error.h"
 #include "files/input_guard.h"

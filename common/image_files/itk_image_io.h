@@ -14,8 +14,8 @@
 
 namespace af {
 
-/// An image as it is stored: axes in file order (the first is fastest), LPS mm, values in
-/// their own type.
+/// An image as it is stored: axes in file order (the first is fastest), LPS mm, values in their
+/// own type.
 struct RawImage {
   std::vector<std::size_t> size;
   std::vector<double> spacing_mm;

@@ -11,8 +11,6 @@
 #include <string_view>
 #include <vector>
 
-#include <Eigen/Core>
-
 #include "geometry/camera_geometry.h"
 #include "geometry/rigid_transform.h"
 #include "volume/ct_volume.h"

@@ -45,7 +45,7 @@ struct Slice {
   int y = 0;
   NodeMap x_of_s;
   NodeMap z_of_t;
-  /// Those that the unit's rays can meet; the first pass computes no others.
+  /// The x that the unit's rays can meet; the first pass computes no others.
   int first_x = 0;
   int last_x = 0;
 };
@@ -132,19 +132,19 @@ class UnitCast {
   void cast_tile(int v, int first_t, int t_count) {
     std::fill(sums_.begin(), sums_.end(), 0);
     active_.clear();
-    int rows = 0;
+    int buffered = 0;
     bool is_empty = true;
     for (const Slice& slice : slices_) {
       const ActiveSlice active = activate(slice, light_slab_.v.position_mm(v), first_t, t_count);
       if (active.x_count == 0) continue;
       if (active_.size() == kShearSlices ||
-          (!active_.empty() && rows + active.x_count > kMostBufferedX)) {
+          (!active_.empty() && buffered + active.x_count > kMostBufferedX)) {
         add_block();
         active_.clear();
-        rows = 0;
+        buffered = 0;
       }
       active_.push_back(active);
-      rows += active.x_count;
+      buffered += active.x_count;
       is_empty = false;
     }
     if (!active_.empty()) add_block();
@@ -176,7 +176,7 @@ class UnitCast {
     active.high_x = std::min(end, slice.last_x);
     if (active.high_x <= active.low_x) return active;
     active.first_x = active.low_x / kRowBlock * kRowBlock;
-    // Up to and including the row after high_x, which is read with a weight of 0.
+    // Up to and including the x after high_x, which is read with a weight of 0.
     active.x_count = (active.high_x + 1 - active.first_x + kRowBlock) / kRowBlock * kRowBlock;
     fill_columns(slice, v_mm, first_t, t_count, active.columns);
     return active;
@@ -221,18 +221,18 @@ class UnitCast {
   void add_block() {
     ShearBlock block;
     block.slices = static_cast<std::int32_t>(active_.size());
-    std::int32_t row = 0;
+    std::int32_t at = 0;
     for (std::size_t k = 0; k < active_.size(); ++k) {
       const ActiveSlice& active = active_[k];
       kernels_.interpolate_columns(active.columns,
                                    active.first_x,
                                    active.x_count,
-                                   buffer_.data() + std::ptrdiff_t{row} * kShearColumns);
-      block.origin[k] = (row - active.first_x) * kShearColumns;
+                                   buffer_.data() + std::ptrdiff_t{at} * kShearColumns);
+      block.origin[k] = (at - active.first_x) * kShearColumns;
       block.step[k] = static_cast<float>(256.0 * active.slice->x_of_s.per_node);
       block.low[k] = static_cast<float>(256 * active.low_x);
       block.high[k] = static_cast<float>(256 * active.high_x);
-      row += active.x_count;
+      at += active.x_count;
     }
     for (int u = 0; u < unit_.u.count; ++u) add_viewpoint(u, block);
   }

@@ -172,13 +172,13 @@ void resample_row(const VoxelsToResample& volume, const RowToResample& row, int1
 
 void interpolate_columns(const ShearColumns& columns,
                          int32_t first_x,
-                         int32_t row_count,
-                         int16_t* rows) {
+                         int32_t x_count,
+                         int16_t* buffer) {
   // Groups of columns are the outer loop: then few rows at a time are read, each to its end, which
   // suits memory prefetchers.
   for (int group = 0; group < kShearColumns; group += 8)
-    for (int32_t row = 0; row < row_count; row += kShearColumns) {
-      const int32_t x = first_x + row;
+    for (int32_t done = 0; done < x_count; done += kShearColumns) {
+      const int32_t x = first_x + done;
       const bool is_whole = x >= columns.whole_begin && x < columns.whole_end;
       for (int first = 0; first < kShearColumns; first += kRegisterShorts) {
         IntegerRegister block[8];
@@ -189,12 +189,12 @@ void interpolate_columns(const ShearColumns& columns,
         transpose_groups(block);
         for (int i = 0; i < 8; ++i)
           store_groups(
-              rows + (row + first + i) * kShearColumns + group, 8 * kShearColumns, block[i]);
+              buffer + (done + first + i) * kShearColumns + group, 8 * kShearColumns, block[i]);
       }
     }
 }
 
-void accumulate_nodes(const int16_t* rows,
+void accumulate_nodes(const int16_t* buffer,
                       const ShearBlock& block,
                       int32_t first_node,
                       int32_t end_node,
@@ -215,7 +215,7 @@ void accumulate_nodes(const int16_t* rows,
     asm volatile("" : : : "memory");
     for (int i = 0; i < kRegisters; ++i) {
       int32_t* low_sums = sums + i * kLanes / kRegisters;
-      add_slices(rows + i * kShearColumns / kRegisters,
+      add_slices(buffer + i * kShearColumns / kRegisters,
                  offsets,
                  weights,
                  block.slices,

@@ -28,15 +28,15 @@ struct ShearColumns {
 };
 
 /// The slices of one block as one viewpoint sees them. Node i of s lies at x = (start + step * i) /
-/// 256 of slice k, in grid units; x outside [low, high] / 256 means 0, and rows low / 256 and high
-/// / 256 hold zeros.
+/// 256 of slice k, in grid units; x outside [low, high] / 256 means 0, and the buffer holds
+/// zeros at low / 256 and high / 256.
 struct ShearBlock {
   int32_t slices = 0;              ///< 1 ... kShearSlices
   float start[kShearSlices] = {};  ///< in 1/256 of the grid's spacing, plus one half to round
   float step[kShearSlices] = {};
   float low[kShearSlices] = {};
   float high[kShearSlices] = {};
-  int32_t origin[kShearSlices] = {};  ///< elements from `rows` to (the possibly absent) row x = 0
+  int32_t origin[kShearSlices] = {};  ///< elements from `buffer` to (the possibly absent) x = 0
 };
 
 /// The values that turn the accumulators of one viewpoint and a tile of t nodes into samples.
@@ -70,17 +70,17 @@ using ResampleRow = void (*)(const VoxelsToResample& volume,
                              const RowToResample& row,
                              int16_t* out);
 
-/// First pass: rows[x - first_x][j] = slice interpolated in z, for x in [first_x, first_x +
-/// row_count); both are multiples of kShearColumns.
+/// First pass: buffer[x - first_x][j] = slice interpolated in z, for x in [first_x, first_x +
+/// x_count); both are multiples of kShearColumns.
 using InterpolateColumns = void (*)(const ShearColumns& columns,
                                     int32_t first_x,
-                                    int32_t row_count,
-                                    int16_t* rows);
+                                    int32_t x_count,
+                                    int16_t* buffer);
 
 /// Second pass: adds 256 times the sum over the block's slices, interpolated in x, to the
 /// accumulators of nodes [first_node, end_node), of which `sums_of_first_node` is the first's:
 /// kShearColumns sums per node.
-using AccumulateNodes = void (*)(const int16_t* rows,
+using AccumulateNodes = void (*)(const int16_t* buffer,
                                  const ShearBlock& block,
                                  int32_t first_node,
                                  int32_t end_node,
@@ -99,9 +99,9 @@ using QuantizeNode = void (*)(const int32_t* sums,
   void resample_row(const VoxelsToResample& volume, const RowToResample& row, int16_t* out); \
   void interpolate_columns(const ShearColumns& columns,                                      \
                            int32_t first_x,                                                  \
-                           int32_t row_count,                                                \
-                           int16_t* rows);                                                   \
-  void accumulate_nodes(const int16_t* rows,                                                 \
+                           int32_t x_count,                                                  \
+                           int16_t* buffer);                                                 \
+  void accumulate_nodes(const int16_t* buffer,                                               \
                         const ShearBlock& block,                                             \
                         int32_t first_node,                                                  \
                         int32_t end_node,                                                    \

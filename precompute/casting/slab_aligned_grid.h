@@ -114,11 +114,11 @@ struct SlabAlignedLayout {
 /// what lies between the first and the last attenuation is stored. A slab axis that runs along one
 /// of the CT keeps the distance of the CT's nodes, so that nothing is interpolated twice along it:
 /// all three for a camera that looks along an axis, z for one that is turned about the patient's
-/// axis. (Along y, slices stand a fifth of their distance beside the CT's.) Along the
-/// others the grid is finer than the CT as the options say and slices are sharpened
-/// against the second interpolation. Slices are never much farther apart than voxels. Levels are
-/// scaled such that no level exceeds 32767 and no sum of 256 times one level per slice exceeds
-/// 2^31 - 1: casters add in 32-bit integers.
+/// axis. (Along y, slices stand a fifth of their distance beside the CT's.) Along the others the
+/// grid is finer than the CT as the options say and slices are sharpened against the second
+/// interpolation. Slices are never much farther apart than voxels. Levels are scaled such that no
+/// level exceeds 32767 and no sum of 256 times one level per slice exceeds 2^31 - 1: casters add in
+/// 32-bit integers.
 SlabAlignedLayout slab_aligned_layout(const AttenuationVolume& volume,
                                       const RigidTransform& slab_from_ct,
                                       const SlabAlignedOptions& options = {});

@@ -272,11 +272,13 @@ TrainedCodebook train_codebook(const TrainingShare& mine,
   std::array<std::uint64_t, 2> totals{mine.training.size(), mine.held_out.size()};
   reduction.sum(totals);
   TrainedCodebook result;
-  if (checkpoints.begun)
+  if (checkpoints.begun) {
     result = *checkpoints.begun;
-  else
+    check(result.codebook.mean_step == options.mean_step, "a training goes on with its options");
+  } else {
     result.codebook = codebook_of_searched(initial_codewords(mine, totals[0], options, reduction),
                                            options.mean_step);
+  }
   result.training_tiles = totals[0];
   result.held_out_tiles = totals[1];
   CodebookIterations iterations(mine, reduction);

@@ -41,8 +41,8 @@ std::uint64_t held_out_above(std::uint64_t last_training) {
   return kEverything - std::min(last_training / 8, (kEverything - last_training) / 2);
 }
 
-/// The lowest of held_out_above(x) for all x up to `last_training`. The division by 8 lets the
-/// values there fall by no more than 8 between neighbours.
+/// Not above held_out_above(x) for any x up to `last_training`, with a margin for the rounding of
+/// its divisions.
 std::uint64_t lowest_held_out(std::uint64_t last_training) {
   constexpr std::uint64_t kMostHeldOut = kEverything / 10 * 8;  // where the two halves meet
   return held_out_above(std::min(last_training, kMostHeldOut)) - 8;

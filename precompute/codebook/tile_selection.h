@@ -61,7 +61,7 @@ class TrainingTilePicker {
   FieldLattice lattice_;
   std::uint64_t last_training_ =
       0;  ///< no hash above it trains: the fraction's, or this rank's cap's
-  std::uint64_t held_out_above_ = 0;      ///< no hash below it is held out
+  std::uint64_t held_out_above_ = 0;      ///< no hash up to it is held out
   std::vector<std::uint64_t> histogram_;  ///< of the hashes at most last_training_, by bin
   TrainingShare candidates_;
 };

@@ -171,7 +171,6 @@ std::vector<NumberedTile> DesignProbe::shuffled_tiles(const FieldSample& sample,
 std::vector<Codebook> DesignProbe::small_codebooks(std::span<const NumberedTile> tiles,
                                                    int mean_step) const {
   // The largest takes longer than the others together.
-  std::vector<std::vector<std::vector<Tile>>> trained;
   std::vector<Codebook> codebooks(kProbeCodewords.size(), Codebook{{}, mean_step});
   for (std::size_t i = 0; i < kProbeCodewords.size(); ++i) {
     const std::size_t trainer = (i + 1 == kProbeCodewords.size() ? 0 : 1) % share_.ranks;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Joins the builder's numerics with ranks and files: casting and training, one function each (for
-// encoding see FieldEncoder).
+// Joins the builder's numerics with ranks and files: casting and training, and how tiles that
+// were not kept come back (for encoding see FieldEncoder).
 #pragma once
 
 #include <cstdint>

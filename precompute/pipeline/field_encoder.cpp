@@ -49,8 +49,10 @@ std::vector<std::size_t> balanced_owners(const std::vector<std::uint64_t>& unit_
   return owners;
 }
 
+/// Over the codewords as they are searched, as progress of earlier versions has it.
 std::uint32_t crc_of(const Codebook& codebook) {
-  const std::uint32_t crc = crc32c(std::as_bytes(std::span(codebook.codewords)));
+  const std::vector<Tile> codewords = searched_codewords(codebook);
+  const std::uint32_t crc = crc32c(std::as_bytes(std::span(codewords)));
   return crc ^ static_cast<std::uint32_t>(codebook.mean_step);
 }
 

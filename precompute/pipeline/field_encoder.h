@@ -20,6 +20,10 @@ class FieldEncoder {
                CastPhase& cast,
                const Codebook& codebook,
                TileOverflow overflow);
+  FieldEncoder(const FieldBuild& build,
+               CastPhase& cast,
+               Codebook&& codebook,
+               TileOverflow overflow) = delete;
 
   /// This rank's next units, about kRoundBytes of indices; none when it has no more. Units that an
   /// earlier run encoded with the same codebook are read. StoppedError, with what is encoded saved,

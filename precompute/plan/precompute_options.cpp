@@ -178,14 +178,13 @@ void describe_codebook(Fields& field, PrecomputeOptions& options) {
       "What a codeword is: plain (the tile), or mean-removed (what differs from the tile's mean, "
       "which the field holds beside the index: with 4096 codewords 1 to 2 dB more than with 16384 "
       "plain ones, in an eighth to a third more bytes). Files with means are read from format "
-      "version 3 on [the "
-      "preset's; plain where parts of the design are stated]")
+      "version 3 on [the preset's; plain where a probe chooses the design, or parts of it are "
+      "stated]")
       .one_of({"plain", "mean-removed"})
       .decides(kCodebookStage);
-  field(
-      "mean_step",
-      options.mean_step,
-      "Means of mean-removed tiles are multiples of so many levels of 65535 [the preset's, or 64]")
+  field("mean_step",
+        options.mean_step,
+        "Means of mean-removed tiles are multiples of so many levels of 65535 [64]")
       .within(1, kMaxMeanStep)
       .needs({"--tile-coding"})
       .decides(kCodebookStage);

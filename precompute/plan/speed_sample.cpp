@@ -8,6 +8,7 @@
 #include <numeric>
 #include <string>
 #include <unistd.h>
+#include <utility>
 #include <vector>
 #include <zlib.h>
 

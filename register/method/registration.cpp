@@ -19,7 +19,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// As many points as tell how long a step is.
+/// About 512 of the points: enough to scale steps.
 std::vector<Eigen::Vector3d> some_points(const std::vector<Eigen::Vector3d>& points) {
   constexpr std::size_t kPoints = 512;
   // Odd, so that it walks through all rows and layers of an even lattice.

@@ -114,8 +114,8 @@ std::string stage_text(const StageOptions& stage) {
 void StageOptions::describe(Fields& field) {
   field("level",
         level,
-        "of the pyramid: nodes 2^level as far apart as those of a field of about 256 (a finer "
-        "field's level 1 begins there), X-rays blurred to match")
+        "of the pyramid. 0: the field itself; above, nodes 2^level as far apart as in a field of "
+        "about 256, X-rays blurred to match")
       .within(0, kCoarsestLevel);
   field("pixel_step", pixel_step, "detector pixels per stage pixel, along each axis")
       .as("pixels")

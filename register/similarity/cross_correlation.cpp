@@ -5,6 +5,7 @@
 #include "register/similarity/pixel_sums.h"
 
 namespace af::registration {
+
 CrossCorrelation::CrossCorrelation(const SimilarityReference& reference)
     : drr_offset_((reference.drr_range.low + reference.drr_range.high) / 2.0) {
   throw_if_any(problems(reference));

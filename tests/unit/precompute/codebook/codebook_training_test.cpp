@@ -12,6 +12,8 @@
 #include "base/error.h"
 #include "base/hash_random.h"
 #include "base/vector_width.h"
+#include "precompute/codebook/mean_removal.h"
+#include "precompute/codebook/mean_removal.h"
 #include "precompute/codebook/nearest_codeword.h"
 #include "precompute/codebook/tile_drawing.h"
 #include "precompute/units/unit_planner.h"
@@ -115,10 +117,11 @@ TEST(CodebookTraining, IsBitIdenticalOnAnyRankCount) {
   }
 }
 
-TEST(CodebookTraining, GoesOnFromAnyIterationToTheSameCodebook) {
-  const auto tiles = training_tiles(3000);
-  const TrainingShare share = dealt(tiles, 1).front();
-  const CodebookOptions options{.codewords = 100, .max_iterations = 20, .seed = kSeed};
+void expect_goes_on_from_any_iteration(int mean_step) {
+  TrainingShare share = dealt(training_tiles(3000), 1).front();
+  remove_means(share, mean_step);
+  const CodebookOptions options{
+      .codewords = 100, .max_iterations = 20, .seed = kSeed, .mean_step = mean_step};
   std::vector<TrainedCodebook> after_iterations;
   TrainingCheckpoints remember;
   remember.on_iteration = [&](const TrainedCodebook& so_far) {
@@ -134,9 +137,18 @@ TEST(CodebookTraining, GoesOnFromAnyIterationToTheSameCodebook) {
     go_on.on_iteration = [&](const TrainedCodebook&) { ++iterations_done; };
     const TrainedCodebook trained = train_codebook(share, options, serial_reduction(), {}, go_on);
     EXPECT_EQ(trained.codebook.codewords, whole.codebook.codewords);
+    EXPECT_EQ(trained.codebook.mean_step, mean_step);
     EXPECT_EQ(trained.stop, whole.stop);
     EXPECT_EQ(iterations_done, whole.iterations.size() - begun.iterations.size());
   }
+}
+
+TEST(CodebookTraining, GoesOnFromAnyIterationToTheSameCodebook) {
+  expect_goes_on_from_any_iteration(0);
+}
+
+TEST(CodebookTraining, OfShapesGoesOnFromAnyIterationToTheSameCodebook) {
+  expect_goes_on_from_any_iteration(64);
 }
 
 TEST(CodebookTraining, IsBitIdenticalOnEveryVectorWidth) {

@@ -215,6 +215,26 @@ TEST(SimilarityMeasures, NothingToCompareIsWorthNothing) {
   EXPECT_NEAR(similarity("nmi", reference, flat), 1.0, kSimilarityRounding);
 }
 
+/// Gradients of a ramp are constant but for rounding, which must not be taken for structure.
+TEST(GradientCorrelation, OfARampIsNothingByBothWays) {
+  const auto measure = make_similarity(options_of("gc"), reference_of(blobs()));
+  const auto workspace = measure->make_workspace();
+  Image2d ramp(kWidth, kHeight);
+  for (int row = 0; row < kHeight; ++row)
+    for (int column = 0; column < kWidth; ++column)
+      ramp.at(column, row) =
+          0.1f * static_cast<float>(column) + 0.07f * static_cast<float>(row) + 3.3f;
+  std::vector<float> planes;
+  for (int k = 0; k < 6; ++k) {
+    const Image2d plane = blobs(0.5 * k, 0.3 * k);
+    planes.insert(planes.end(), plane.pixels.begin(), plane.pixels.end());
+  }
+  EXPECT_EQ(measure->evaluate(ramp.pixels, *workspace), 0.0);
+  const NormalEquations equations = measure->normal_equations(ramp.pixels, planes, *workspace);
+  EXPECT_EQ(equations.value, 0.0);
+  EXPECT_EQ(equations.gradient.norm(), 0.0);
+}
+
 TEST(NormalizedMutualInformation, IsTwoForAnImageWithItself) {
   // The same bins for both: the DRR's range is the X-ray's.
   SimilarityReference reference = reference_of(blobs());
