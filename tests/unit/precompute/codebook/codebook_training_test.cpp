@@ -13,7 +13,6 @@
 #include "base/hash_random.h"
 #include "base/vector_width.h"
 #include "precompute/codebook/mean_removal.h"
-#include "precompute/codebook/mean_removal.h"
 #include "precompute/codebook/nearest_codeword.h"
 #include "precompute/codebook/tile_drawing.h"
 #include "precompute/units/unit_planner.h"
