@@ -24,9 +24,9 @@ const std::array presets = {
     // same PSNR ended twice as far from ray casting's pose.
     DesignPreset{
         "standard",
-        "for registration: six slabs of 12 x 12 x 384 x 384 nodes, mean-removed tiles, 4096 "
+        "for registration: eight slabs of 10 x 10 x 384 x 384 nodes, mean-removed tiles, 4096 "
         "codewords, cubic look-up",
-        {6, 12, 384, 4096, "cubic", 64},
+        {8, 10, 384, 4096, "cubic", 64},
         {}},
     // One codebook serves every angle: with 16384 plain tiles DRRs lost 1.3 dB against those of
     // an angle's own field (docs/other-cameras.md).
