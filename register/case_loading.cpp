@@ -12,6 +12,7 @@
 #include "files/sha256.h"
 #include "geometry/camera_distance.h"
 #include "register/case_renderers.h"
+#include "register/kept_fields.h"
 #include "register/problem/fiducial_mask.h"
 #include "register/problem/pose_target.h"
 #include "study/ct_keys.h"
@@ -139,25 +140,21 @@ std::string how(const CtReadOptions& reading) {
   return text.empty() ? "as HU" : "with " + text;
 }
 
-/// Collective. A field or an atlas, checked against the CT.
-OpenedField field_of_view(const std::string& path,
-                          const StudyCase& study_case,
-                          const CaseLoadOptions& options,
-                          const std::optional<CtFacts>& ct,
-                          const Communicator& communicator) {
-  OpenedField opened(path, communicator);
-  all_or_none(communicator, [&] {
-    const FieldIdentity& identity = opened.identity();
-    require_same_attenuation(identity, options, path);
-    if (ct.has_value() && ct->content_sha256 != identity.ct_content_sha256)
-      throw FileError(path,
-                      "CT of the field (ct_content_sha256)",
-                      ct->content_sha256 + " (" + study_case.ct.string() + ", read " +
-                          how(ct_reading_in_force(options.ct, study_case.ct_reading)) + ")",
-                      identity.ct_content_sha256 + " (read " +
-                          how(ct_reading_of(opened.info().provenance.options_toml)) + ")");
-  });
-  return opened;
+/// The field must be of the case's CT, and of the attenuation that rays are cast through.
+void require_field_of_case(const OpenedField& opened,
+                           const StudyCase& study_case,
+                           const CaseLoadOptions& options,
+                           const std::optional<CtFacts>& ct) {
+  const FieldIdentity& identity = opened.identity();
+  const std::string path = opened.path().string();
+  require_same_attenuation(identity, options, path);
+  if (ct.has_value() && ct->content_sha256 != identity.ct_content_sha256)
+    throw FileError(path,
+                    "CT of the field (ct_content_sha256)",
+                    ct->content_sha256 + " (" + study_case.ct.string() + ", read " +
+                        how(ct_reading_in_force(options.ct, study_case.ct_reading)) + ")",
+                    identity.ct_content_sha256 + " (read " +
+                        how(ct_reading_of(opened.info().provenance.options_toml)) + ")");
 }
 
 /// Collective. Rank 0's box on every rank: processors may differ in its last bits.
@@ -197,6 +194,38 @@ std::string limit_to_rays(const OpenedField& opened,
   return reach.distance + "; " + reach.text(camera.name);
 }
 
+/// Collective. The field of a view with its renderers, kept from the case before or opened, and
+/// checked against the case.
+std::shared_ptr<const FieldInUse> field_of_view(const std::string& path,
+                                                const StudyCase& study_case,
+                                                const CaseLoadOptions& options,
+                                                const std::optional<CtFacts>& ct,
+                                                const RegistrationProblem& problem,
+                                                const View& view,
+                                                const Communicator& communicator) {
+  const auto require_of_case = [&](const OpenedField& opened) {
+    all_or_none(communicator, [&] { require_field_of_case(opened, study_case, options, ct); });
+  };
+  std::shared_ptr<const FieldInUse> field =
+      options.kept_fields ? options.kept_fields->find(path) : nullptr;
+  if (field) {
+    require_of_case(field->opened);
+  } else {
+    OpenedField opened(path, communicator);
+    require_of_case(opened);
+    std::optional<OpenedField> bone;
+    if (options.beam.needs_bone()) bone = opened.bone(communicator);
+    FieldRenderers renderers =
+        field_renderers(opened, bone, problem.frame(), view, options, communicator);
+    std::optional<std::string> bone_sha256;
+    if (bone) bone_sha256 = bone->info().payload_sha256;
+    field = std::make_shared<const FieldInUse>(
+        FieldInUse{std::move(opened), std::move(bone_sha256), std::move(renderers)});
+  }
+  if (options.kept_fields && !field->opened.atlas()) options.kept_fields->add(path, field);
+  return field;
+}
+
 /// Collective. The fields of all views; hashes and notes go to `loaded`.
 void use_fields(const StudyCase& study_case,
                 const CaseLoadOptions& options,
@@ -210,19 +239,18 @@ void use_fields(const StudyCase& study_case,
       return field_path_of(study_case, study_case.views[i], options).string();
     });
     const bool is_of_study = options.field_paths.count(view.view.camera.name) == 0;
-    const OpenedField opened =
+    const std::shared_ptr<const FieldInUse> field =
         naming_study_line(is_of_study ? study_case.views[i].places : StudyPlaces(), "field", [&] {
-          return field_of_view(path, study_case, options, ct, communicator);
+          return field_of_view(path, study_case, options, ct, problem, view.view, communicator);
         });
     const std::string name = "field " + view.view.camera.name;
-    std::optional<OpenedField> bone;
-    if (options.beam.needs_bone()) {
-      bone = opened.bone(communicator);
-      loaded.input_sha256["bone " + name] = bone->info().payload_sha256;
-    }
-    use_field(opened, bone, problem.frame(), options, communicator, view);
-    loaded.input_notes[name] = limit_to_rays(opened, problem.frame(), communicator, view);
-    loaded.input_sha256[name] = opened.info().payload_sha256;
+    if (field->bone_sha256) loaded.input_sha256["bone " + name] = *field->bone_sha256;
+    const FieldRenderers& renderers = field->renderers;
+    view.renderer = renderers.levels.front();
+    for (std::size_t level = 0; level < renderers.blur_sigma_mm.size(); ++level)
+      view.coarse_levels.push_back({renderers.levels[level + 1], renderers.blur_sigma_mm[level]});
+    loaded.input_notes[name] = limit_to_rays(field->opened, problem.frame(), communicator, view);
+    loaded.input_sha256[name] = field->opened.info().payload_sha256;
   }
 }
 
@@ -276,6 +304,7 @@ LoadedCase load_case(const Study& study,
                      const CaseLoadOptions& options,
                      const Communicator& communicator) {
   LoadedCase loaded;
+  if (options.kept_fields) options.kept_fields->begin_case(study_case);
   auto problem = std::make_shared<RegistrationProblem>();
   problem->case_name = study_case.name;
   problem->nominal_room_from_ct = study_case.nominal_room_from_ct;

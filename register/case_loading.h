@@ -18,6 +18,8 @@
 
 namespace af::registration {
 
+class KeptFields;
+
 enum class RendererKind { Field, RayCast };
 
 /// "field" or "raycast".
@@ -46,6 +48,8 @@ struct CaseLoadOptions {
   std::vector<int> correction_levels;
   /// Threads that make the levels together; none: only the calling thread.
   std::shared_ptr<ThreadPool> pool = nullptr;
+  /// Fields that the case before left open; none: every case opens its own.
+  std::shared_ptr<KeptFields> kept_fields = nullptr;
 };
 
 struct LoadedCase {

@@ -82,36 +82,30 @@ bool pays_to_decode(const CompressedAttenuationField& field) {
   return field.slabs.size() > 1 && decoded_bytes(field) <= kMostDecodedBytes;
 }
 
-/// Renderers of one field, and the blurs of its levels 1, 2, ...
-struct FieldLevelRenderers {
-  MemberLevels renderers;  ///< its own first
-  std::vector<double> blur_sigma_mm;
-};
-
 /// Collective where the memory is. A field's renderers for a view: its own, and those of so many
 /// levels of its pyramid. A method's levels are those of a field of about 256 nodes: a finer field
 /// begins with more halvings, so that a level has about the same blur. The field itself is looked
 /// up as it is meant to be, levels above linearly: there blur hides what cubic look-up gains.
-FieldLevelRenderers renderers_of(const std::shared_ptr<const CompressedAttenuationField>& field,
-                                 const std::string& look_up,
-                                 int levels,
-                                 const std::shared_ptr<ThreadPool>& pool,
-                                 const std::shared_ptr<ThreadPool>& coarse_pool,
-                                 const FieldLevelMemory& memory) {
+FieldRenderers renderers_of(const std::shared_ptr<const CompressedAttenuationField>& field,
+                            const std::string& look_up,
+                            int levels,
+                            const std::shared_ptr<ThreadPool>& pool,
+                            const std::shared_ptr<ThreadPool>& coarse_pool,
+                            const FieldLevelMemory& memory) {
   const int more_halvings = halvings_to_usual_nodes(field->light_slab);
   const int halvings = levels > 0 ? levels + more_halvings : 0;
-  FieldLevelRenderers made;
+  FieldRenderers made;
   FieldLevels pyramid;
   if (pays_to_decode(*field)) {
     const auto samples = std::make_shared<const FieldLevel>(decode_field(*field, memory));
-    made.renderers.push_back(make_field_renderer(samples, look_up, pool));
+    made.levels.push_back(make_field_renderer(samples, look_up, pool));
     if (halvings > 0) pyramid = make_field_pyramid(*samples, halvings, memory);
   } else {
-    made.renderers.push_back(make_field_renderer(field, look_up, pool));
+    made.levels.push_back(make_field_renderer(field, look_up, pool));
     if (halvings > 0) pyramid = make_field_pyramid(*field, halvings, memory);
   }
   for (auto i = static_cast<std::size_t>(more_halvings); i < pyramid.size(); ++i) {
-    made.renderers.push_back(
+    made.levels.push_back(
         std::make_shared<const TwoPassAfDrr>(pyramid[i], TwoPassOptions{}, coarse_pool));
     made.blur_sigma_mm.push_back(pyramid[i]->blur_sigma_mm(true));
   }
@@ -171,12 +165,12 @@ struct LevelThreads {
 /// Collective. An atlas's renderers for a view. Members that poses near the nominal one need are
 /// held once per node; a search that goes farther opens others, each rank for itself. Their levels
 /// carry about the same blur; that of the nominal pose's member is taken.
-FieldLevelRenderers renderers_of_atlas(const OpenedField& opened,
-                                       int levels,
-                                       const PoseFrame& nominal,
-                                       const View& view,
-                                       const LevelThreads& threads,
-                                       const Communicator& communicator) {
+FieldRenderers renderers_of_atlas(const OpenedField& opened,
+                                  int levels,
+                                  const PoseFrame& nominal,
+                                  const View& view,
+                                  const LevelThreads& threads,
+                                  const Communicator& communicator) {
   std::vector<std::uint64_t> near = members_in_reach(opened, nominal, view);
   std::vector<std::byte> bytes = bytes_of(near);
   communicator.broadcast(bytes);
@@ -189,23 +183,23 @@ FieldLevelRenderers renderers_of_atlas(const OpenedField& opened,
                      threads.own,
                      threads.coarse,
                      process_memory())
-            .renderers);
+            .levels);
   };
   const auto members =
       std::make_shared<MembersInUse>(open, near.size() + OpenedField::kMembersKept);
-  FieldLevelRenderers set;
+  FieldRenderers set;
   for (const std::uint64_t i : near) {
-    const FieldLevelRenderers made = renderers_of(opened.member(i, communicator),
-                                                  opened.info().look_up,
-                                                  levels,
-                                                  threads.own,
-                                                  threads.coarse,
-                                                  node_memory(communicator, *threads.coarse));
-    members->keep(i, std::make_shared<const MemberLevels>(made.renderers));
+    const FieldRenderers made = renderers_of(opened.member(i, communicator),
+                                             opened.info().look_up,
+                                             levels,
+                                             threads.own,
+                                             threads.coarse,
+                                             node_memory(communicator, *threads.coarse));
+    members->keep(i, std::make_shared<const MemberLevels>(made.levels));
     if (set.blur_sigma_mm.empty()) set.blur_sigma_mm = made.blur_sigma_mm;
   }
   for (std::size_t level = 0; level <= set.blur_sigma_mm.size(); ++level)
-    set.renderers.push_back(
+    set.levels.push_back(
         std::make_shared<const FieldSetDrr>(atlas_level(opened.coverage().planes, members, level)));
   return set;
 }
@@ -257,19 +251,18 @@ std::vector<RendererLevel> coarse_ray_casts(const CastVolumes& volumes,
   return levels;
 }
 
-void use_field(const OpenedField& opened,
-               const std::optional<OpenedField>& bone,
-               const PoseFrame& nominal,
-               const CaseLoadOptions& options,
-               const Communicator& communicator,
-               RegistrationView& view) {
+FieldRenderers field_renderers(const OpenedField& opened,
+                               const std::optional<OpenedField>& bone,
+                               const PoseFrame& nominal,
+                               const View& view,
+                               const CaseLoadOptions& options,
+                               const Communicator& communicator) {
   const LevelThreads threads{options.pool,
                              options.pool ? options.pool : std::make_shared<ThreadPool>()};
   int levels = level_count(opened, options);
   if (bone) levels = std::min(levels, level_count(*bone, options));
   const auto renderers = [&](const OpenedField& of) {
-    if (of.atlas())
-      return renderers_of_atlas(of, levels, nominal, view.view, threads, communicator);
+    if (of.atlas()) return renderers_of_atlas(of, levels, nominal, view, threads, communicator);
     return renderers_of(of.field(),
                         of.info().look_up,
                         levels,
@@ -277,22 +270,20 @@ void use_field(const OpenedField& opened,
                         threads.coarse,
                         node_memory(communicator, *threads.coarse));
   };
-  FieldLevelRenderers all = renderers(opened);
-  FieldLevelRenderers of_bone;
+  FieldRenderers all = renderers(opened);
+  FieldRenderers of_bone;
   if (bone) {
     of_bone = renderers(*bone);
-    all.renderers.resize(std::min(all.renderers.size(), of_bone.renderers.size()));
-    all.blur_sigma_mm.resize(all.renderers.size() - 1);
+    all.levels.resize(std::min(all.levels.size(), of_bone.levels.size()));
+    all.blur_sigma_mm.resize(all.levels.size() - 1);
   }
-  of_bone.renderers.resize(all.renderers.size());
+  of_bone.levels.resize(all.levels.size());
   if (!options.beam.is_ordinary()) {
     const XrayBeam beam = beam_of(opened.identity(), options, communicator);
-    for (std::size_t i = 0; i < all.renderers.size(); ++i)
-      all.renderers[i] = beam.renderer(all.renderers[i], of_bone.renderers[i]);
+    for (std::size_t i = 0; i < all.levels.size(); ++i)
+      all.levels[i] = beam.renderer(all.levels[i], of_bone.levels[i]);
   }
-  view.renderer = all.renderers.front();
-  for (std::size_t i = 0; i < all.blur_sigma_mm.size(); ++i)
-    view.coarse_levels.push_back({all.renderers[i + 1], all.blur_sigma_mm[i]});
+  return all;
 }
 
 }  // namespace af::registration

@@ -43,16 +43,22 @@ std::vector<RendererLevel> coarse_ray_casts(const CastVolumes& volumes,
                                             const CaseLoadOptions& options,
                                             const Communicator& communicator);
 
+/// Renderers of a field or an atlas, and the blurs of its levels 1, 2, ...
+struct FieldRenderers {
+  std::vector<std::shared_ptr<const DrrRenderer>> levels;  ///< its own first
+  std::vector<double> blur_sigma_mm;
+};
+
 /// Collective. Renderers for a view and its coarser levels, looked up in a field or an atlas and
 /// held once per node; with `bone` those of the tube's spectrum, whose levels are as many as both
 /// have, and blurred as those of the field of all. An atlas holds the members that poses
 /// near the nominal one need once per node; a search that goes farther opens others, each rank for
-/// itself.
-void use_field(const OpenedField& opened,
-               const std::optional<OpenedField>& bone,
-               const PoseFrame& nominal,
-               const CaseLoadOptions& options,
-               const Communicator& communicator,
-               RegistrationView& view);
+/// itself. Those of a field depend on neither the pose nor the view.
+FieldRenderers field_renderers(const OpenedField& opened,
+                               const std::optional<OpenedField>& bone,
+                               const PoseFrame& nominal,
+                               const View& view,
+                               const CaseLoadOptions& options,
+                               const Communicator& communicator);
 
 }  // namespace af::registration

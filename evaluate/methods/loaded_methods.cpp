@@ -45,7 +45,8 @@ std::vector<LoadedMethod> load_methods(const MethodOptions& options,
                                        const StudyCase& study_case,
                                        const Communicator& world,
                                        LoadedInputs& inputs,
-                                       int judging_level) {
+                                       int judging_level,
+                                       std::shared_ptr<registration::KeptFields> kept_fields) {
   std::vector<LoadedMethod> methods;
   const registration::RegistrationOptions method =
       all_or_none(world, [&] { return registration::resolve(options.method); });
@@ -61,6 +62,7 @@ std::vector<LoadedMethod> load_methods(const MethodOptions& options,
     if (its_method.correction.is_wanted) loading.correction_levels = method.last_levels();
     loading.judging_level = judging_level;
     loading.pool = pool;
+    if (renderer == "field") loading.kept_fields = kept_fields;
     const registration::LoadedCase loaded =
         registration::load_case(study, study_case, loading, world);
     blurs_mm = level_blurs_mm(*loaded.problem);

@@ -528,6 +528,7 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
                              const Study& study,
                              const StudyCase& study_case,
                              const RunFolder& run,
+                             const std::shared_ptr<registration::KeptFields>& kept_fields,
                              const Communicator& world,
                              const std::function<void(const CaseEvaluation&)>& on_starts,
                              FileBackedArray<RegistrationRow>& all_rows) {
@@ -545,7 +546,8 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
                     study_case,
                     world,
                     evaluation.inputs,
-                    uncertainty.is_left_out ? 0 : PoseExaminer::coarsest_level())) {
+                    uncertainty.is_left_out ? 0 : PoseExaminer::coarsest_level(),
+                    kept_fields)) {
     methods.push_back(
         {method.renderer, std::move(method.runner), {}, options.success_tre_mm, {}, {}});
     all_or_none(world, [&] { examine_ends(method.problem, uncertainty, methods.back()); });
@@ -579,7 +581,8 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
     if (world.is_root())
       draw_pictures(options, study_case, methods.front(), rows.front(), yardstick, evaluation);
   });
-  // Fields and CT go before the rows come: memory has room for only one of the two.
+  // Fields and CT go before the rows come: memory has room for only one of the two. Fields of the
+  // next case stay; a study of so many rows that this matters has one case.
   methods.clear();
   all_or_none(world, [&] {
     if (!world.is_root()) return;

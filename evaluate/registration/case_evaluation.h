@@ -77,6 +77,7 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
                              const Study& study,
                              const StudyCase& study_case,
                              const RunFolder& run,
+                             const std::shared_ptr<registration::KeptFields>& kept_fields,
                              const Communicator& world,
                              const std::function<void(const CaseEvaluation&)>& on_starts,
                              FileBackedArray<RegistrationRow>& rows);

@@ -492,6 +492,7 @@ void run_registration(const RegistrationStudyOptions& options,
 
   FileBackedArray<RegistrationRow> rows(folder);
   std::vector<CaseEvaluation> evaluations;
+  const auto kept_fields = std::make_shared<registration::KeptFields>(cases);
   for (const StudyCase& study_case : cases) {
     const auto on_starts = [&](const CaseEvaluation& so_far) {
       if (!world.is_root()) return;
@@ -501,7 +502,7 @@ void run_registration(const RegistrationStudyOptions& options,
     };
     evaluations.push_back(
         options.poses_from.empty()
-            ? evaluate_case(options, study, study_case, run, world, on_starts, rows)
+            ? evaluate_case(options, study, study_case, run, kept_fields, world, on_starts, rows)
             : all_or_none(world, [&] {
                 return world.is_root()
                            ? evaluate_found_poses(options, study, study_case, on_starts, rows)

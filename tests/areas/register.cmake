@@ -20,7 +20,7 @@ af_add_test(
   LIBS af_registration af_gold_standard af_text)
 af_add_test(
   register_program_unit_tests
-  SOURCES unit/register/register_options_test.cpp unit/register/results/registration_results_test.cpp
+  SOURCES unit/register/register_options_test.cpp unit/register/kept_fields_test.cpp unit/register/results/registration_results_test.cpp
           unit/register/results/slicer_folder_test.cpp
   LIBS af_registration_program af_image_itk)
 af_add_mpi_test(register_mpi_tests SOURCES mpi/multi_start_test.cpp LIBS af_registration_program RANKS 1 2 3 4)

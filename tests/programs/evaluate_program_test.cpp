@@ -225,6 +225,28 @@ constexpr const char* kCutScript = R"sh(
   exit $status
 )sh";
 
+TEST_F(EvaluateProgram, RegistersCasesThatShareFieldsAsItDoesEachAlone) {
+  Study study = read_study(path("study.toml"));
+  for (StudyView& view : study.cases.front().views) view.field = path(view.camera + ".af.h5");
+  study.cases.push_back(study.cases.front());
+  study.cases.back().name = "turned";
+  study.cases.back().nominal_room_from_ct =
+      study.cases.back().nominal_room_from_ct * Eigen::AngleAxisd(0.02, Eigen::Vector3d::UnitY());
+  write_text_file(path("two-cases.toml"), study_to_toml(study, path("")));
+  const std::string run = "registration --study " + path("two-cases.toml") +
+                          " --intervals 2 --starts-per-interval 2 --preset robust ";
+  std::string alone;
+  for (const StudyCase& of : study.cases) {
+    const std::string folder = "case-" + of.name;
+    const test::ProgramRun one = evaluate(run + "--case " + of.name + " -o " + path(folder));
+    ASSERT_EQ(one.exit_code, 0) << one.output;
+    alone += rows_without_seconds(folder);
+  }
+  const test::ProgramRun both = evaluate(run + "-o " + path("two-cases"), 2);
+  ASSERT_EQ(both.exit_code, 0) << both.output;
+  EXPECT_EQ(rows_without_seconds("two-cases"), alone);
+}
+
 TEST_F(EvaluateProgram, GoesOnAfterAStopOrAKillOnAnotherRankCount) {
   const std::string arguments = "registration --study " + path("study.toml") + fields() +
                                 "--preset paper --starts-per-interval 25 -o ";

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <span>
+#include <string>
+
+#include "field_use/opened_field.h"
+#include "register/case_renderers.h"
+#include "study/study_file.h"
+
+namespace af::registration {
+
+/// A field that is open, with its renderers.
+struct FieldInUse {
+  OpenedField opened;
+  std::optional<std::string> bone_sha256;  ///< payload of the bone's part, where that is used
+  FieldRenderers renderers;
+};
+
+/// Fields that stay open from one case of a study to the next: cases of one patient at several
+/// poses share them, and opening one takes longer than dozens of registrations. Kept are those that
+/// the case at hand uses and a later one will. All cases must be loaded with the same options.
+/// \test KeptFields.AreThoseOfTheCaseAtHandThatALaterOneUses
+class KeptFields {
+ public:
+  /// `cases`: all that will be loaded.
+  explicit KeptFields(std::span<const StudyCase> cases);
+
+  /// The case at hand changes: lets go of fields that it does not use.
+  void begin_case(const StudyCase& study_case);
+  /// Null when it must be opened.
+  [[nodiscard]] std::shared_ptr<const FieldInUse> find(const std::string& path) const;
+  /// A field that the case at hand uses, found or opened; not an atlas, whose renderers depend on
+  /// the case's nominal pose.
+  void add(const std::string& path, const std::shared_ptr<const FieldInUse>& field);
+
+ private:
+  std::map<std::string, int> cases_left_;  ///< that use a path and have not begun
+  std::map<std::string, std::shared_ptr<const FieldInUse>> fields_;
+};
+
+}  // namespace af::registration
