@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What af-precompute makes, as a list: one field, or the members of an atlas.
+// What af-precompute makes, as a list: one field, or the members of an atlas; with the planes of
+// each and the caster of all.
 #pragma once
 
 #include <memory>

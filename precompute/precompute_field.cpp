@@ -53,7 +53,7 @@ class PrecomputeRun {
         throw UsageError("-o FIELD.h5 is needed (or --dry-run)");
     });
     if (!options_.is_dry_run) open_output();
-    load();
+    prepare();
     run_.stop_if_requested("before the first unit");
     const std::unique_ptr<const FieldCaster> caster = make_caster(parts_, options_, quantizer());
     if (options_.is_dry_run) {
@@ -96,7 +96,7 @@ class PrecomputeRun {
     check_parallel_writing(options_.output, world_, hints());
   }
 
-  void load() {
+  void prepare() {
     WorkNote note("reading the CT", WorkNote::Kind::Phase);
     source_ = load_source(options_, world_);
     for (const std::string& warning : source_.warnings) warn(world_, warning);

@@ -50,7 +50,7 @@ struct Slice {
   int last_x = 0;
 };
 
-/// A slice that matters for one tile of t nodes, and where it is in the buffer.
+/// A slice that matters for one run of t nodes, and where it is in the buffer.
 struct ActiveSlice {
   const Slice* slice = nullptr;
   int first_x = 0;  ///< of what is in the buffer: a multiple of kRowBlock
@@ -97,7 +97,7 @@ class UnitCast {
   void run() {
     for (int v = unit_.v.begin; v < unit_.v.end(); ++v)
       for (int t = unit_.t.begin; t < unit_.t.end(); t += kShearColumns)
-        cast_tile(v, t, std::min(kShearColumns, unit_.t.end() - t));
+        cast_run(v, t, std::min(kShearColumns, unit_.t.end() - t));
   }
 
  private:
@@ -129,7 +129,7 @@ class UnitCast {
     slices_.push_back(slice);
   }
 
-  void cast_tile(int v, int first_t, int t_count) {
+  void cast_run(int v, int first_t, int t_count) {
     std::fill(sums_.begin(), sums_.end(), 0);
     active_.clear();
     int buffered = 0;
@@ -151,7 +151,7 @@ class UnitCast {
     write_samples(v, first_t, t_count, is_empty);
   }
 
-  /// What of the slice a tile's rays meet; no x when these are only zeros.
+  /// What of the slice a run's rays meet; no x when these are only zeros.
   [[nodiscard]] ActiveSlice activate(const Slice& slice,
                                      double v_mm,
                                      int first_t,

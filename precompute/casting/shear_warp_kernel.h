@@ -17,7 +17,7 @@ struct ShearRow {
   int32_t count;   ///< likewise
 };
 
-/// What the first pass reads of one slice for a tile of t nodes. It writes [x][kShearColumns].
+/// What the first pass reads of one slice for a run of t nodes. It writes [x][kShearColumns].
 struct ShearColumns {
   const int16_t* values;
   ShearRow lower[kShearColumns];  ///< the rows that each column lies between
@@ -39,7 +39,7 @@ struct ShearBlock {
   int32_t origin[kShearSlices] = {};  ///< elements from `buffer` to (the possibly absent) x = 0
 };
 
-/// The values that turn the accumulators of one viewpoint and a tile of t nodes into samples.
+/// The values that turn the accumulators of one viewpoint and a run of t nodes into samples.
 struct ShearScale {
   float attenuation_per_sum;  ///< of a ray perpendicular to the planes
   float quantizer_step;
@@ -86,7 +86,7 @@ using AccumulateNodes = void (*)(const int16_t* buffer,
                                  int32_t end_node,
                                  int32_t* sums_of_first_node);
 
-/// Samples of one node s and a tile of t nodes from their accumulators.
+/// Samples of one node s and a run of t nodes from their accumulators.
 using QuantizeNode = void (*)(const int32_t* sums,
                               const ShearScale& scale,
                               float slope_squared_s,

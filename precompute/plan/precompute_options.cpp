@@ -102,7 +102,8 @@ void describe_casting(Fields& field, PrecomputeOptions& options) {
   field("slabs",
         options.slabs,
         "Depth slabs K, each with its own (s,t) plane: with 8, some 8 --uv-nodes suffice; 1 is the "
-        "paper's field [1, or as chosen]")
+        "paper's field [that of the preset, or as chosen; 1 where parts of the design are "
+        "stated]")
       .within(1, 64)
       .decides(kCastingStage);
   field("st_plane",
@@ -111,15 +112,17 @@ void describe_casting(Fields& field, PrecomputeOptions& options) {
         "where its slab's attenuation is) [centre for one slab, else centroid]")
       .one_of({"centre", "centroid"})
       .decides(kCastingStage);
-  field("uv_nodes",
-        options.uv_nodes,
-        "Viewpoints along each side of the (u,v) plane, both edges included [64, or as chosen]")
+  field(
+      "uv_nodes",
+      options.uv_nodes,
+      "Viewpoints along each side of the (u,v) plane, both edges included [that of the preset, or "
+      "as chosen; 64 where parts of the design are stated]")
       .within(2, 4096)
       .decides(kCastingStage);
   field("st_nodes",
         options.st_nodes,
-        "Nodes along each side of the uncropped (s,t) plane, both edges included [256, or as "
-        "chosen]")
+        "Nodes along each side of the uncropped (s,t) plane, both edges included [that of the "
+        "preset, or as chosen; 256 where parts of the design are stated]")
       .within(2, 4096)
       .decides(kCastingStage);
   field("look_up",

@@ -89,7 +89,7 @@ struct PrecomputeOptions {
   [[nodiscard]] bool is_atlas() const { return !orbit.empty() || !orbit_cameras.empty(); }
   /// The parts of the design that are stated.
   [[nodiscard]] DesignParts stated_parts() const;
-  /// The preset that is asked for: where parts alone are stated, the paper's.
+  /// The preset that is asked for; without one the default, or where parts are stated the paper's.
   [[nodiscard]] const DesignPreset& design_preset() const;
   /// Whether a probe of the CT has to choose what is not stated.
   [[nodiscard]] bool needs_probe() const;

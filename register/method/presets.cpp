@@ -58,10 +58,10 @@ ChainOptions wide_chain(const std::string& name, const std::string& search) {
                              kOverTheRegion);
 }
 
-/// Two chains search with different measures, because each has its deepest optimum in a wrong place
-/// for some patients (docs/population.md). Where none found anything, a third searches once more,
-/// wider and by plain correlation: starts far along a long object led the others to its end, out of
-/// sight (docs/real-xrays.md).
+/// Three chains search with different measures, because each has its deepest optimum in a wrong
+/// place for some patients (docs/population.md). Where none found anything, a fourth searches once
+/// more, wider and by plain correlation: starts far along a long object led the others to its end,
+/// out of sight (docs/real-xrays.md).
 RegistrationOptions robust_preset() {
   RegistrationOptions options;
   options.chains = {
