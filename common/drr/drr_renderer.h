@@ -52,6 +52,12 @@ struct RenderStatus {
 class RenderWorkspace {
  public:
   virtual ~RenderWorkspace() = default;
+
+  /// Whether a DRR may be made from what one before it, with gradients and from a source nearby,
+  /// has left here (KeptImages): nearly the same in half the time, but no longer a function of the
+  /// pose alone. At first it may not. Either way, what is left here is forgotten. Renderers that
+  /// leave nothing do as they always do.
+  virtual void reuse_images(bool /*is_allowed*/) {}
 };
 
 /// Makes DRRs of one CT. Every comparison of fields with ray casting is a swap of this object.

@@ -15,6 +15,11 @@ class TwoMaterialWorkspace final : public RenderWorkspace {
   std::unique_ptr<RenderWorkspace> bone;
   std::vector<float> bone_values;
   std::vector<float> bone_planes;
+
+  void reuse_images(bool is_allowed) override {
+    all->reuse_images(is_allowed);
+    bone->reuse_images(is_allowed);
+  }
 };
 
 }  // namespace

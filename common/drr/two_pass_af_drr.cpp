@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "base/vector_width.h"
+#include "drr/kept_images.h"
 #include "drr/node_image_kernel.h"
 #include "drr/node_images.h"
 #include "drr/slab_sum.h"
@@ -51,6 +52,13 @@ class Workspace final : public RenderWorkspace {
   ImageBuffers summed;
   ImageBuffers fine;
   std::vector<float> row;
+  bool reuses = false;
+  KeptImages kept;
+
+  void reuse_images(bool is_allowed) override {
+    reuses = is_allowed;
+    kept.forget();
+  }
 };
 
 NodeImage image_of(const NodeImages& nodes, std::size_t i) {
@@ -97,10 +105,12 @@ Homography nodes_from_pixels(const NodeGrid& grid, const SlabRays& rays) {
 }
 
 /// The values of a slab's images that the gradients of a pose need (PoseSlopes has the mechanics).
+/// `source_move`: since the images were made.
 PoseSlopes pose_slopes(const NodeImages& slab,
                        const SlabRays& rays,
-                       const Eigen::Matrix3d& slab_from_room,
+                       const Eigen::Vector3d& source_move,
                        const Eigen::Vector3d& source_from_pivot) {
+  const Eigen::Matrix3d slab_from_room = rays.slab_from_room.linear();
   const NodeGrid& grid = slab.grid;
   const double reach = grid.plane_y_mm - rays.source.y();
   PoseSlopes slopes{};
@@ -112,6 +122,7 @@ PoseSlopes pose_slopes(const NodeImages& slab,
   slopes.m_scale[1] = static_cast<float>(grid.t_spacing_mm / reach);
   slopes.m_offset[0] = static_cast<float>((grid.s_first_mm - rays.source.x()) / reach);
   slopes.m_offset[1] = static_cast<float>((grid.t_first_mm - rays.source.z()) / reach);
+  for (int i = 0; i < 3; ++i) slopes.source_move[i] = static_cast<float>(source_move[i]);
   // A CT moved by t + omega x (x - p) meets rays moved the other way.
   for (int axis = 0; axis < 3; ++axis) {
     const Eigen::Vector3d direction = slab_from_room.col(axis);
@@ -157,6 +168,7 @@ NodeImages summed_images(const ViewpointBlender& blender,
                          const SlabRays& rays,
                          const BlendNeeds& needs,
                          Workspace& workspace) {
+  workspace.kept.forget();  // its memory is used again
   if (blender.slab_count() == 1) return blended_images(blender, 0, rays, needs, workspace);
   const Footprint footprint(sum_slab, rays, {needs.margin, false});
   const std::ptrdiff_t stride = rounded_up(footprint.s().count, 16);
@@ -192,6 +204,30 @@ NodeImages upsampled(const NodeImages& slab, Workspace& workspace) {
     fine.images[i] = to;
   }
   return fine;
+}
+
+/// The node images of a DRR, and how far its source is from the one that they were made for.
+struct LookedUpNodes {
+  NodeImages images;
+  Eigen::Vector3d source_move;
+};
+
+/// Both passes before the warp, or the images that an earlier DRR left.
+LookedUpNodes looked_up_nodes(const ViewpointBlender& blender,
+                              const SlabGeometry& sum_slab,
+                              AxisInterpolation st,
+                              const SlabRays& rays,
+                              bool wants_slopes,
+                              Workspace& workspace) {
+  if (const auto move = workspace.kept.source_move(blender, rays))
+    return {workspace.kept.images(), *move};
+  const bool is_cubic = st == AxisInterpolation::Cubic;
+  const bool keeps = workspace.reuses && wants_slopes;
+  const int margin = (is_cubic ? kUpsampleReach - 1 : 0) + (keeps ? KeptImages::kMargin : 0);
+  NodeImages nodes = summed_images(blender, sum_slab, rays, {margin, wants_slopes}, workspace);
+  if (is_cubic) nodes = upsampled(nodes, workspace);
+  if (keeps) workspace.kept.keep(nodes, is_cubic ? 2 : 1, rays);
+  return {nodes, Eigen::Vector3d::Zero()};
 }
 
 /// Sobel's slopes of the value image along s and t, stored where the slopes along the source would
@@ -283,34 +319,33 @@ RenderStatus TwoPassAfDrr::render(const RigidTransform& room_from_ct,
   if (!rays.all_descend()) return {blank_outside()};
   const auto warp_image = select_kernel<WarpImage>(
       kernels_128::warp_image, kernels_256::warp_image, kernels_512::warp_image);
+  const auto warp_moved_image = select_kernel<WarpMovedImage>(
+      kernels_128::warp_moved_image, kernels_256::warp_moved_image, kernels_512::warp_moved_image);
   const auto warp_with_pose_slopes =
       select_kernel<WarpWithPoseSlopes>(kernels_128::warp_with_pose_slopes,
                                         kernels_256::warp_with_pose_slopes,
                                         kernels_512::warp_with_pose_slopes);
-  const bool is_cubic = options_.st == AxisInterpolation::Cubic;
-  const BlendNeeds needs{is_cubic ? kUpsampleReach - 1 : 0, gradients.has_value()};
-  NodeImages nodes = summed_images(*blender_, sum_slab_, rays, needs, scratch);
-  if (is_cubic) nodes = upsampled(nodes, scratch);
+  const auto [nodes, source_move] =
+      looked_up_nodes(*blender_, sum_slab_, options_.st, rays, gradients.has_value(), scratch);
   const Homography homography = nodes_from_pixels(nodes.grid, rays);
-  if (gradients) {
-    const PoseSlopes slopes = pose_slopes(nodes,
-                                          rays,
-                                          rays.slab_from_room.linear(),
-                                          view.camera.source_point - gradients->pivot_room_point);
-    for_each_band(view, *pool_, [&](const PixelGrid& band) {
-      warp_with_pose_slopes(image_of(nodes, 0),
+  const NodeImage values = image_of(nodes, 0);
+  const Eigen::Vector3d pivot = gradients ? gradients->pivot_room_point : view.camera.source_point;
+  const PoseSlopes slopes = pose_slopes(nodes, rays, source_move, view.camera.source_point - pivot);
+  for_each_band(view, *pool_, [&](const PixelGrid& band) {
+    float* const to = total_attenuation.data();
+    if (gradients)
+      warp_with_pose_slopes(values,
                             slopes,
                             homography,
                             band,
-                            total_attenuation.data(),
+                            to,
                             gradients->planes.data(),
                             static_cast<std::int64_t>(pixels));
-    });
-  } else {
-    for_each_band(view, *pool_, [&](const PixelGrid& band) {
-      warp_image(image_of(nodes, 0), homography, band, total_attenuation.data());
-    });
-  }
+    else if (source_move.isZero(0.0))
+      warp_image(values, homography, band, to);
+    else
+      warp_moved_image(values, slopes, homography, band, to);
+  });
   if (rays.all_inside()) return {};
   return {blank_outside()};
 }

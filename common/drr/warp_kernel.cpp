@@ -211,6 +211,24 @@ AF_KERNEL_INLINE Floats product(const float (&factors)[3], const Floats (&vector
   return factors[0] * vector[0] + factors[1] * vector[1] + factors[2] * vector[2];
 }
 
+/// The direction (m_x, 1, m_z) of each cell's ray.
+struct RayDirections {
+  Floats m_x, m_z;
+};
+
+AF_KERNEL_INLINE RayDirections directions_of(const PoseSlopes& of, const Cells& cells) {
+  return {cells.s * of.m_scale[0] + of.m_offset[0], cells.t * of.m_scale[1] + of.m_offset[1]};
+}
+
+/// What the source's motion adds to a value whose slopes along the source are g_x and g_z.
+AF_KERNEL_INLINE Floats added_by_motion(const PoseSlopes& of,
+                                        const RayDirections& m,
+                                        Floats g_x,
+                                        Floats g_z) {
+  const float(&move)[3] = of.source_move;
+  return g_x * (move[0] - m.m_x * move[1]) + g_z * (move[2] - m.m_z * move[1]);
+}
+
 /// Neighbouring pixels of a row, one per lane; the last ones of a row may be fewer.
 struct PixelRun {
   int64_t offset;
@@ -265,6 +283,22 @@ void warp_image(const NodeImage& image,
       });
 }
 
+void warp_moved_image(const NodeImage& image,
+                      const PoseSlopes& slopes,
+                      const Homography& homography,
+                      const PixelGrid& grid,
+                      float* values) {
+  const NodeImage from = image;
+  const PoseSlopes of = slopes;
+  for_each_run(
+      from, homography, grid, [=](const WarpRow& /*row*/, const Cells& cells, const PixelRun& run) {
+        const Floats value = value_of(sample(from.values, from.stride, cells), cells);
+        const Floats g_x = value_of(sample(of.source_x, from.stride, cells), cells);
+        const Floats g_z = value_of(sample(of.source_z, from.stride, cells), cells);
+        put(run, values, value + added_by_motion(of, directions_of(of, cells), g_x, g_z));
+      });
+}
+
 void warp_with_pose_slopes(const NodeImage& image,
                            const PoseSlopes& slopes,
                            const Homography& homography,
@@ -277,14 +311,15 @@ void warp_with_pose_slopes(const NodeImage& image,
   for_each_run(
       from, homography, grid, [=](const WarpRow& /*row*/, const Cells& cells, const PixelRun& run) {
         const RowPair pair = sample(from.values, from.stride, cells);
-        put(run, values, value_of(pair, cells));
         const Floats f_x = of.nodes_per_mm[0] *
                            (pair.low_slope + cells.t_weight * (pair.high_slope - pair.low_slope));
         const Floats f_z = of.nodes_per_mm[1] * (pair.high - pair.low);
         const Floats g_x = value_of(sample(of.source_x, from.stride, cells), cells);
         const Floats g_z = value_of(sample(of.source_z, from.stride, cells), cells);
-        const Floats m_x = cells.s * of.m_scale[0] + of.m_offset[0];
-        const Floats m_z = cells.t * of.m_scale[1] + of.m_offset[1];
+        const RayDirections m = directions_of(of, cells);
+        const Floats m_x = m.m_x;
+        const Floats m_z = m.m_z;
+        put(run, values, value_of(pair, cells) + added_by_motion(of, m, g_x, g_z));
         // Forces are perpendicular to the ray.
         const Floats f_y = -(m_x * f_x + m_z * f_z);
         const Floats force[3] = {f_x + g_x, f_y - (m_x * g_x + m_z * g_z), f_z + g_z};

@@ -45,6 +45,7 @@ struct PoseSlopes {
   float nodes_per_mm[2];  ///< along s, t
   float m_scale[2];       ///< m_x = m_scale[0] s + m_offset[0], m_z likewise of t
   float m_offset[2];
+  float source_move[3];  ///< mm, by which the source has moved since the images were made
   /// One row per room axis: the share that F + G, and (m_x, 1, m_z) x F and F + G, have in the
   /// derivatives.
   float translation_of_force[3][3];
@@ -52,8 +53,16 @@ struct PoseSlopes {
   float rotation_of_force[3][3];
 };
 
-/// The same with six planes of rows x columns derivatives, `plane_stride` values apart, in the
-/// order of PoseGradients.
+/// The same of images that were made for another source: PoseSlopes::source_move moves the values
+/// along the slopes.
+using WarpMovedImage = void (*)(const NodeImage& image,
+                                const PoseSlopes& slopes,
+                                const Homography& homography,
+                                const PixelGrid& grid,
+                                float* values);
+
+/// The same, moved likewise, with six planes of rows x columns derivatives, `plane_stride` values
+/// apart, in the order of PoseGradients.
 using WarpWithPoseSlopes = void (*)(const NodeImage& image,
                                     const PoseSlopes& slopes,
                                     const Homography& homography,
@@ -77,6 +86,11 @@ using WarpSlopes = void (*)(const NodeImage& s_slopes,
                   const Homography& homography,            \
                   const PixelGrid& grid,                   \
                   float* values);                          \
+  void warp_moved_image(const NodeImage& image,            \
+                        const PoseSlopes& slopes,          \
+                        const Homography& homography,      \
+                        const PixelGrid& grid,             \
+                        float* values);                    \
   void warp_with_pose_slopes(const NodeImage& image,       \
                              const PoseSlopes& slopes,     \
                              const Homography& homography, \

@@ -198,7 +198,10 @@ bool RegistrationRunner::Impl::run_stage(PreparedStage& stage,
       stage.objective, PoseFrame::about(end.room_from_ct, problem->center_ct_mm), *scaling);
   const SearchBudget budget{options.max_evaluations - result.evaluations,
                             random_key(start_index, index)};
+  // Searches along derivatives take short steps; others try poses all around.
+  stage.objective.reuse_images(stage.optimizer->needs() != Derivatives::None);
   stage.optimizer->maximize(target, stage.options.search, budget, search);
+  stage.objective.reuse_images(false);
   append_trace(index, target, result);
   result.evaluations += search.evaluations;
   result.inadmissible += search.inadmissible;

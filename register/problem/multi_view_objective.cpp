@@ -78,12 +78,14 @@ void MultiViewObjective::prepare(std::span<const RigidTransform> room_from_ct) {
 
 MultiViewObjective::Scratch& MultiViewObjective::scratch_of(int slot, std::size_t view) {
   Scratch& scratch = scratch_[static_cast<std::size_t>(slot) * views_.size() + view];
-  if (!scratch.render)
+  const bool is_new = !scratch.render;
+  if (is_new)
     scratch = {views_[view].renderer->make_workspace(),
                views_[view].measure->make_workspace(),
                std::vector<float>(views_[view].view.pixel_count()),
                {},
                {}};
+  if (is_new) scratch.render->reuse_images(reuses_images_);
   return scratch;
 }
 
@@ -131,6 +133,12 @@ ObjectiveValue MultiViewObjective::sum_of(std::size_t i, NormalEquations& equati
   return value;
 }
 
+void MultiViewObjective::reuse_images(bool is_allowed) {
+  reuses_images_ = is_allowed;
+  for (const Scratch& scratch : scratch_)
+    if (scratch.render) scratch.render->reuse_images(is_allowed);
+}
+
 ObjectiveValue MultiViewObjective::evaluate(const RigidTransform& room_from_ct) {
   ObjectiveValue value;
   evaluate_all({&room_from_ct, 1}, {&value, 1});
@@ -140,6 +148,8 @@ ObjectiveValue MultiViewObjective::evaluate(const RigidTransform& room_from_ct) 
 void MultiViewObjective::evaluate_all(std::span<const RigidTransform> room_from_ct,
                                       std::span<ObjectiveValue> values) {
   check(room_from_ct.size() == values.size(), "one value per pose");
+  // Which thread takes which pose must not matter.
+  if (reuses_images_ && room_from_ct.size() > 1) reuse_images(false);
   prepare(room_from_ct);
   const auto view_count = static_cast<int>(views_.size());
   const auto pose_count = static_cast<int>(room_from_ct.size());

@@ -70,6 +70,11 @@ class MultiViewObjective {
                                  int tiles,
                                  std::vector<TileScores>& scores);
 
+  /// Whether a search begins whose evaluations may make DRRs of the node images of earlier ones
+  /// (RenderWorkspace::reuse_images()): its values then depend on the poses before, until this is
+  /// called again or several poses are evaluated at once.
+  void reuse_images(bool is_allowed);
+
   [[nodiscard]] const std::vector<ObjectiveView>& views() const { return views_; }
   [[nodiscard]] const std::shared_ptr<ThreadPool>& pool() const { return pool_; }
 
@@ -111,6 +116,7 @@ class MultiViewObjective {
   std::vector<ObjectiveView> views_;
   std::shared_ptr<ThreadPool> pool_;
   std::vector<Scratch> scratch_;  ///< [thread][view], made when first used
+  bool reuses_images_ = false;
   std::vector<PoseState> poses_;  ///< reused
   std::vector<Part> parts_;       ///< [pose][view], reused
 };

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include <Eigen/Core>
+
+#include "drr/node_images.h"
+#include "drr/slab_rays.h"
+#include "drr/viewpoint_blender.h"
+
+namespace af {
+
+/// The node images of a look-up, with their slopes along the source, kept for DRRs whose source is
+/// near: the image of a node n for a source that moved by d is, to first order,
+///
+///     value(n) + source_x(n) (d_x - m_x d_y) + source_z(n) (d_z - m_z d_y),
+///
+/// (m_x, 1, m_z) being the ray's direction: a source that moves along a ray does not change it.
+/// What this leaves out is of second order: slabs shift against the plane of their sum (nothing for
+/// one slab), and viewpoints come to lie in other cells. Both are kept small. \test
+/// KeptImages.AreNearTheLookUpWhileTheSourceIsNear
+class KeptImages {
+ public:
+  /// Nodes that images need beyond those of a DRR, so that they hold those of its neighbours.
+  static constexpr int kMargin = 4;
+
+  void forget() { is_kept_ = false; }
+  /// `images`: with slopes, and of all nodes within kMargin of those that the rays need;
+  /// `nodes_per_node`: nodes of `images` along an axis per node that kMargin counts.
+  void keep(const NodeImages& images, int nodes_per_node, const SlabRays& rays);
+  /// The motion of the source since the images were made, in the slab frame, mm; nullopt when they
+  /// cannot serve these rays.
+  [[nodiscard]] std::optional<Eigen::Vector3d> source_move(const ViewpointBlender& blender,
+                                                           const SlabRays& rays) const;
+  [[nodiscard]] const NodeImages& images() const { return images_; }
+
+ private:
+  /// Where the rays of a view's corners meet the images' plane, in nodes.
+  using Corners = std::array<Eigen::Vector2d, 4>;
+
+  [[nodiscard]] Corners corners_of(const SlabRays& rays) const;
+
+  bool is_kept_ = false;
+  NodeImages images_{};
+  int nodes_per_node_ = 1;
+  Eigen::Vector3d source_ = Eigen::Vector3d::Zero();
+  Corners corners_{};
+};
+
+}  // namespace af

@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "drr/kept_images.h"
+
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "base/vector_width.h"
+#include "drr/two_pass_af_drr.h"
+#include "unit/drr/small_fields.h"
+
+namespace af {
+namespace {
+
+constexpr TwoPassOptions kLinear{AxisInterpolation::Linear, AxisInterpolation::Linear};
+constexpr TwoPassOptions kCubicInSt{AxisInterpolation::Cubic, AxisInterpolation::Linear};
+
+/// Smooth on the scale of the nodes, and different in each slab's depth.
+double waves(const RayNodes& n) {
+  return std::round(30000 + 8000 * std::sin(0.35 * n.s + 0.2 * n.u) * std::cos(0.3 * n.t) +
+                    4000 * std::cos(0.5 * n.v + 0.25 * n.t));
+}
+
+struct Drr {
+  std::vector<float> values, planes;
+
+  bool operator==(const Drr&) const = default;
+};
+
+/// A DRR of a small field, with or without gradients.
+Drr rendered(const TwoPassAfDrr& renderer,
+             const RigidTransform& pose,
+             RenderWorkspace& workspace,
+             bool has_gradients) {
+  const View view = View::whole_detector(small_camera());
+  Drr drr{std::vector<float>(view.pixel_count()), {}};
+  std::optional<PoseGradients> gradients;
+  if (has_gradients) {
+    drr.planes.resize(6 * view.pixel_count());
+    gradients = PoseGradients{Eigen::Vector3d(10.0, -20.0, 30.0), drr.planes};
+  }
+  renderer.render(pose, view, workspace, drr.values, gradients);
+  return drr;
+}
+
+/// A pose beside one of the small fields' by `share` of a small motion along all six parameters.
+RigidTransform beside(double share) {
+  PoseParameters parameters = small_pose(8);
+  parameters.rotation_rad += share * Eigen::Vector3d(0.002, -0.0015, 0.001);
+  parameters.translation_mm += share * Eigen::Vector3d(0.5, 0.8, -0.4);
+  return pose_from_parameters({}, parameters);
+}
+
+double distance(const std::vector<float>& a, const std::vector<float>& b) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < a.size(); ++i)
+    sum += std::pow(static_cast<double>(a[i]) - static_cast<double>(b[i]), 2);
+  return std::sqrt(sum);
+}
+
+double length(const std::vector<float>& values) {
+  return distance(values, std::vector<float>(values.size()));
+}
+
+TEST(KeptImages, AreNearTheLookUpWhileTheSourceIsNear) {
+  for (const TwoPassOptions& options : {kLinear, kCubicInSt})
+    for (const bool has_gradients : {false, true}) {
+      const TwoPassAfDrr renderer(small_field(waves, 2, 7, 51), options);
+      const auto exact = renderer.make_workspace();
+      const Drr at_first = rendered(renderer, beside(0.0), *exact, true);
+      // Of the second order: half the way leaves a quarter of the error, or less than a third where
+      // rounding and the kinks of the nodes' interpolation add to it.
+      std::array<double, 2> errors{};
+      for (std::size_t i = 0; i < errors.size(); ++i) {
+        const RigidTransform pose = beside(i == 0 ? 1.0 : 0.5);
+        const auto workspace = renderer.make_workspace();
+        workspace->reuse_images(true);
+        // A larger image counts its nodes from elsewhere: rounding.
+        const Drr first = rendered(renderer, beside(0.0), *workspace, true);
+        EXPECT_LT(distance(first.values, at_first.values), 1e-5 * length(at_first.values));
+        EXPECT_LT(distance(first.planes, at_first.planes), 1e-4 * length(at_first.planes));
+        const Drr there = rendered(renderer, pose, *exact, has_gradients);
+        const Drr reused = rendered(renderer, pose, *workspace, has_gradients);
+        errors[i] = distance(reused.values, there.values);
+        EXPECT_GT(errors[i], 0.0) << "made anew";
+        EXPECT_LT(errors[i], 0.02 * distance(at_first.values, there.values));
+      }
+      EXPECT_LT(errors[1], errors[0] / 3.0);
+    }
+}
+
+TEST(KeptImages, DoNotServeFarPosesNorAfterTheyAreForgotten) {
+  const TwoPassAfDrr renderer(small_field(waves, 2, 7, 51), kCubicInSt);
+  const auto exact = renderer.make_workspace();
+  const auto workspace = renderer.make_workspace();
+  const auto begin = [&] {
+    workspace->reuse_images(true);
+    rendered(renderer, beside(0.0), *workspace, true);
+  };
+  begin();
+  const RigidTransform far = beside(20.0);
+  EXPECT_EQ(rendered(renderer, far, *workspace, false), rendered(renderer, far, *exact, false));
+  // The far DRR had no gradients: nothing is kept of it, and its images took the kept ones' place.
+  const RigidTransform near = beside(1.0);
+  const Drr there = rendered(renderer, near, *exact, false);
+  EXPECT_EQ(rendered(renderer, near, *workspace, false), there);
+  begin();
+  EXPECT_NE(rendered(renderer, near, *workspace, false), there);
+  workspace->reuse_images(false);
+  EXPECT_EQ(rendered(renderer, near, *workspace, false), there);
+  begin();
+  std::vector<float> columns(there.values.size());
+  std::vector<float> rows(there.values.size());
+  renderer.render_gradient_images(
+      near, View::whole_detector(small_camera()), *workspace, columns, rows);
+  EXPECT_EQ(rendered(renderer, near, *workspace, false), there);
+}
+
+TEST(KeptImages, GiveTheSameBitsByEveryVectorWidth) {
+  const TwoPassAfDrr renderer(small_field(waves, 2, 7, 51), kCubicInSt);
+  std::vector<Drr> found;
+  for (const VectorWidth width : supported_vector_widths()) {
+    force_vector_width(width);
+    const auto workspace = renderer.make_workspace();
+    workspace->reuse_images(true);
+    rendered(renderer, beside(0.0), *workspace, true);
+    for (const bool has_gradients : {false, true})
+      found.push_back(rendered(renderer, beside(1.0), *workspace, has_gradients));
+  }
+  force_vector_width(std::nullopt);
+  for (std::size_t i = 2; i < found.size(); ++i) EXPECT_EQ(found[i], found[i % 2]);
+  // Values do not depend on whether gradients come with them.
+  EXPECT_EQ(found[0].values, found[1].values);
+}
+
+}  // namespace
+}  // namespace af
