@@ -116,6 +116,7 @@ CaseLoadOptions case_load_options(const RegisterOptions& options,
   result.ct = options.ct;
   result.attenuation = options.attenuation;
   result.ray_caster = options.ray_caster;
+  result.ray_caster.step_mm = options.correction.cast_step_mm(options.ray_caster.step_mm);
   result.beam = options.beam;
   result.skip_ct_check = options.skip_ct_check;
   result.fiducial_mask_mm = options.method.fiducial_mask_mm;

@@ -383,6 +383,7 @@ FieldFileInfo write_file(const FileContents& contents,
                          const Communicator& communicator,
                          const MpiIoHints& hints) {
   const hdf5::QuietErrors quiet;
+  // HDF5 calls it, wherever chunks are written and read back below.
   std::optional<hdf5::IndexFilter> filter;
   all_or_none(communicator, [&] { filter.emplace(codebook); });
   const std::filesystem::path partial = field_layout::unfinished_path(path);

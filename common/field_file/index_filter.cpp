@@ -20,6 +20,7 @@ namespace {
 constexpr std::size_t kParameters = 5;
 constexpr unsigned kVersion = 1;
 
+/// Set by the IndexFilter that lives: HDF5 gives its filters no object to work with.
 const IndexCoding* coding_in_use = nullptr;
 
 /// The tiles of a chunk of values along its axes, by the coding in use; false when there are none.

@@ -60,6 +60,7 @@ std::vector<LoadedMethod> load_methods(const MethodOptions& options,
     registration::CaseLoadOptions loading =
         load_options(options, renderer, method.coarsest_level(), blurs_mm);
     if (its_method.correction.is_wanted) loading.correction_levels = method.last_levels();
+    loading.ray_caster.step_mm = its_method.correction.cast_step_mm(options.ray_caster.step_mm);
     loading.judging_level = judging_level;
     loading.pool = pool;
     if (renderer == "field") loading.kept_fields = kept_fields;

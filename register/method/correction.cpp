@@ -19,6 +19,12 @@ void CorrectionOptions::describe(Fields& field) {
       .above(0.0)
       .finite();
   field("correct_max_casts", max_casts, "With --correct: most casts per view").within(1, 1000);
+  field("correct_step_mm",
+        step_mm,
+        "With --correct: its rays are sampled at least so often, mm, also where --step-mm is "
+        "longer: of a single view the place along the beam depends on it")
+      .above(0.0)
+      .finite();
   field.start_group("");
 }
 

@@ -3,6 +3,7 @@
 // field interpolates and quantises. From there the last stage converges by ray casting.
 #pragma once
 
+#include <algorithm>
 #include <limits>
 #include <tuple>
 
@@ -28,8 +29,13 @@ struct CorrectionOptions {
   bool is_wanted = false;
   /// A step that is no longer, mean over the target box, is the last one.
   double tolerance_mm = 0.005;
-  int max_casts = 50;  ///< ray-cast DRRs per view
+  int max_casts = 50;    ///< ray-cast DRRs per view
+  double step_mm = 0.5;  ///< longest step of its ray casting
 
+  /// The step of ray casting where `wanted_mm` is asked for: shorter where a correction needs it.
+  [[nodiscard]] double cast_step_mm(double wanted_mm) const {
+    return is_wanted ? std::min(wanted_mm, step_mm) : wanted_mm;
+  }
   void describe(Fields& field);
 };
 

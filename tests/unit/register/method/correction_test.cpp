@@ -312,5 +312,13 @@ TEST(RegistrationOptions, KnowsTheLevelsThatItCanEndWith) {
   EXPECT_EQ(robust.last_levels(), (std::vector<int>{1, 2}));
 }
 
+TEST(CorrectionOptions, ShortenALongStepOfRayCastingWhereACorrectionIsWanted) {
+  CorrectionOptions options;
+  EXPECT_EQ(options.cast_step_mm(1.0), 1.0);
+  options.is_wanted = true;
+  EXPECT_EQ(options.cast_step_mm(1.0), options.step_mm);
+  EXPECT_EQ(options.cast_step_mm(0.25), 0.25);
+}
+
 }  // namespace
 }  // namespace af::registration
