@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "register/kept_fields.h"
 
+#include <utility>
+
 namespace af::registration {
 namespace {
 
@@ -13,7 +15,8 @@ std::set<std::string> field_paths(const StudyCase& study_case) {
 
 }  // namespace
 
-KeptFields::KeptFields(std::span<const StudyCase> cases) {
+KeptFields::KeptFields(std::span<const StudyCase> cases, std::shared_ptr<ThreadPool> pool)
+    : pool_(std::move(pool)) {
   for (const StudyCase& study_case : cases)
     for (const std::string& path : field_paths(study_case)) ++cases_left_[path];
 }

@@ -8,6 +8,7 @@
 #include <span>
 #include <string>
 
+#include "base/thread_pool.h"
 #include "field_use/opened_field.h"
 #include "register/case_renderers.h"
 #include "study/study_file.h"
@@ -23,12 +24,15 @@ struct FieldInUse {
 
 /// Fields that stay open from one case of a study to the next: cases of one patient at several
 /// poses share them, and opening one takes longer than dozens of registrations. Kept are those that
-/// the case at hand uses and a later one will. All cases must be loaded with the same options.
+/// the case at hand uses and a later one will, by the study's `field` keys: indices and decoded
+/// samples. All cases must be loaded with the same options, and with this object's threads.
 /// \test KeptFields.AreThoseOfTheCaseAtHandThatALaterOneUses
 class KeptFields {
  public:
-  /// `cases`: all that will be loaded.
-  explicit KeptFields(std::span<const StudyCase> cases);
+  /// `cases`: all that will be loaded; `pool`: threads of the renderers, which outlive a case.
+  KeptFields(std::span<const StudyCase> cases, std::shared_ptr<ThreadPool> pool);
+
+  [[nodiscard]] const std::shared_ptr<ThreadPool>& pool() const { return pool_; }
 
   /// The case at hand changes: lets go of fields that it does not use.
   void begin_case(const StudyCase& study_case);
@@ -39,6 +43,7 @@ class KeptFields {
   void add(const std::string& path, const std::shared_ptr<const FieldInUse>& field);
 
  private:
+  std::shared_ptr<ThreadPool> pool_;
   std::map<std::string, int> cases_left_;  ///< that use a path and have not begun
   std::map<std::string, std::shared_ptr<const FieldInUse>> fields_;
 };

@@ -7,8 +7,8 @@
 namespace af {
 namespace {
 
-/// Parallax that kept images may leave out, in nodes of a slab. Over five anatomies ends of
-/// `robust` then move by 0.006 mm at most, a fifth of their distance from ray casting's.
+/// Parallax that kept images may follow to first order, in nodes of a slab: ends of `robust` then
+/// lie as far from the truth as without (docs/rate-against-truth.md).
 constexpr double kMostParallaxNodes = 0.5;
 
 /// Share of a (u,v) cell by which viewpoints may move.

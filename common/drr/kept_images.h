@@ -18,8 +18,8 @@ namespace af {
 ///     value(n) + source_x(n) (d_x - m_x d_y) + source_z(n) (d_z - m_z d_y),
 ///
 /// (m_x, 1, m_z) being the ray's direction: a source that moves along a ray does not change it.
-/// What this leaves out is of second order: slabs shift against the plane of their sum (nothing for
-/// one slab), and viewpoints come to lie in other cells. Both are kept small. \test
+/// What this leaves out is kept small: the second order of how slabs shift against the plane of
+/// their sum (nothing for one slab), and that viewpoints come to lie in other cells. \test
 /// KeptImages.AreNearTheLookUpWhileTheSourceIsNear
 class KeptImages {
  public:

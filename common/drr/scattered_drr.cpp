@@ -12,9 +12,9 @@ namespace {
 class PrimaryWorkspace final : public RenderWorkspace {
  public:
   std::unique_ptr<RenderWorkspace> of_primary;
+  std::vector<double> primary;
 
   void reuse_images(bool is_allowed) override { of_primary->reuse_images(is_allowed); }
-  std::vector<double> primary;
 };
 
 }  // namespace

@@ -176,7 +176,8 @@ NodeImages summed_images(const ViewpointBlender& blender,
   for (std::size_t i = 0; i < (needs.slopes ? 3u : 1u); ++i)
     images[i] = workspace.summed[i].reserve(stride, footprint.t().count);
   SlabSum sum(grid_of(sum_slab, footprint, stride), rays.source, images, workspace.sum_scratch);
-  const BlendNeeds more{needs.margin + kSumMargin, needs.slopes};
+  // A node of the sum is up to 1.25 of a slab's nodes wide.
+  const BlendNeeds more{needs.margin + needs.margin / 4 + kSumMargin, needs.slopes};
   for (std::size_t k = 0; k < blender.slab_count(); ++k)
     sum.add(blended_images(blender, k, rays, more, workspace));
   return sum.images();
@@ -325,12 +326,14 @@ RenderStatus TwoPassAfDrr::render(const RigidTransform& room_from_ct,
       select_kernel<WarpWithPoseSlopes>(kernels_128::warp_with_pose_slopes,
                                         kernels_256::warp_with_pose_slopes,
                                         kernels_512::warp_with_pose_slopes);
-  const auto [nodes, source_move] =
+  const LookedUpNodes nodes =
       looked_up_nodes(*blender_, sum_slab_, options_.st, rays, gradients.has_value(), scratch);
-  const Homography homography = nodes_from_pixels(nodes.grid, rays);
-  const NodeImage values = image_of(nodes, 0);
+  const NodeImage values = image_of(nodes.images, 0);
+  const Homography homography = nodes_from_pixels(nodes.images.grid, rays);
   const Eigen::Vector3d pivot = gradients ? gradients->pivot_room_point : view.camera.source_point;
-  const PoseSlopes slopes = pose_slopes(nodes, rays, source_move, view.camera.source_point - pivot);
+  const PoseSlopes slopes =
+      pose_slopes(nodes.images, rays, nodes.source_move, view.camera.source_point - pivot);
+  const bool has_moved = !nodes.source_move.isZero(0.0);
   for_each_band(view, *pool_, [&](const PixelGrid& band) {
     float* const to = total_attenuation.data();
     if (gradients)
@@ -341,10 +344,10 @@ RenderStatus TwoPassAfDrr::render(const RigidTransform& room_from_ct,
                             to,
                             gradients->planes.data(),
                             static_cast<std::int64_t>(pixels));
-    else if (source_move.isZero(0.0))
-      warp_image(values, homography, band, to);
-    else
+    else if (has_moved)
       warp_moved_image(values, slopes, homography, band, to);
+    else
+      warp_image(values, homography, band, to);
   });
   if (rays.all_inside()) return {};
   return {blank_outside()};

@@ -220,13 +220,25 @@ AF_KERNEL_INLINE RayDirections directions_of(const PoseSlopes& of, const Cells& 
   return {cells.s * of.m_scale[0] + of.m_offset[0], cells.t * of.m_scale[1] + of.m_offset[1]};
 }
 
-/// What the source's motion adds to a value whose slopes along the source are g_x and g_z.
-AF_KERNEL_INLINE Floats added_by_motion(const PoseSlopes& of,
-                                        const RayDirections& m,
-                                        Floats g_x,
-                                        Floats g_z) {
+/// The source's motion parallel to the planes that does to each cell's ray what its whole motion
+/// does: along the ray nothing changes.
+struct ParallelMotion {
+  Floats x, z;
+};
+
+AF_KERNEL_INLINE ParallelMotion parallel_motion(const PoseSlopes& of, const RayDirections& m) {
   const float(&move)[3] = of.source_move;
-  return g_x * (move[0] - m.m_x * move[1]) + g_z * (move[2] - m.m_z * move[1]);
+  return {move[0] - m.m_x * move[1], move[2] - m.m_z * move[1]};
+}
+
+/// Slopes per node along s and t.
+struct NodeSlopes {
+  Floats s, t;
+};
+
+AF_KERNEL_INLINE NodeSlopes slopes_of(const RowPair& pair, const Cells& cells) {
+  return {pair.low_slope + cells.t_weight * (pair.high_slope - pair.low_slope),
+          pair.high - pair.low};
 }
 
 /// Neighbouring pixels of a row, one per lane; the last ones of a row may be fewer.
@@ -295,7 +307,8 @@ void warp_moved_image(const NodeImage& image,
         const Floats value = value_of(sample(from.values, from.stride, cells), cells);
         const Floats g_x = value_of(sample(of.source_x, from.stride, cells), cells);
         const Floats g_z = value_of(sample(of.source_z, from.stride, cells), cells);
-        put(run, values, value + added_by_motion(of, directions_of(of, cells), g_x, g_z));
+        const ParallelMotion move = parallel_motion(of, directions_of(of, cells));
+        put(run, values, value + (g_x * move.x + g_z * move.z));
       });
 }
 
@@ -311,15 +324,25 @@ void warp_with_pose_slopes(const NodeImage& image,
   for_each_run(
       from, homography, grid, [=](const WarpRow& /*row*/, const Cells& cells, const PixelRun& run) {
         const RowPair pair = sample(from.values, from.stride, cells);
-        const Floats f_x = of.nodes_per_mm[0] *
-                           (pair.low_slope + cells.t_weight * (pair.high_slope - pair.low_slope));
-        const Floats f_z = of.nodes_per_mm[1] * (pair.high - pair.low);
-        const Floats g_x = value_of(sample(of.source_x, from.stride, cells), cells);
-        const Floats g_z = value_of(sample(of.source_z, from.stride, cells), cells);
+        const RowPair pair_x = sample(of.source_x, from.stride, cells);
+        const RowPair pair_z = sample(of.source_z, from.stride, cells);
+        const Floats g_x = value_of(pair_x, cells);
+        const Floats g_z = value_of(pair_z, cells);
         const RayDirections m = directions_of(of, cells);
         const Floats m_x = m.m_x;
         const Floats m_z = m.m_z;
-        put(run, values, value_of(pair, cells) + added_by_motion(of, m, g_x, g_z));
+        const ParallelMotion move = parallel_motion(of, m);
+        put(run, values, value_of(pair, cells) + (g_x * move.x + g_z * move.z));
+        // The slopes of that sum; m changes along s and t, too.
+        const NodeSlopes of_value = slopes_of(pair, cells);
+        const NodeSlopes of_x = slopes_of(pair_x, cells);
+        const NodeSlopes of_z = slopes_of(pair_z, cells);
+        const float along_s = of.m_scale[0] * of.source_move[1];
+        const float along_t = of.m_scale[1] * of.source_move[1];
+        const Floats f_x = of.nodes_per_mm[0] *
+                           (of_value.s + (of_x.s * move.x + of_z.s * move.z - along_s * g_x));
+        const Floats f_z = of.nodes_per_mm[1] *
+                           (of_value.t + (of_x.t * move.x + of_z.t * move.z - along_t * g_z));
         // Forces are perpendicular to the ray.
         const Floats f_y = -(m_x * f_x + m_z * f_z);
         const Floats force[3] = {f_x + g_x, f_y - (m_x * g_x + m_z * g_z), f_z + g_z};

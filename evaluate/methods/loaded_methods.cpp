@@ -46,11 +46,13 @@ std::vector<LoadedMethod> load_methods(const MethodOptions& options,
                                        const Communicator& world,
                                        LoadedInputs& inputs,
                                        int judging_level,
-                                       std::shared_ptr<registration::KeptFields> kept_fields) {
+                                       const std::shared_ptr<registration::KeptFields>& kept_fields) {
   std::vector<LoadedMethod> methods;
   const registration::RegistrationOptions method =
       all_or_none(world, [&] { return registration::resolve(options.method); });
-  const auto pool = std::make_shared<ThreadPool>(thread_count(options.method.threads));
+  const auto pool = kept_fields
+                        ? kept_fields->pool()
+                        : std::make_shared<ThreadPool>(thread_count(options.method.threads));
   // Ray casting after a field takes the blurs of the field's levels, so that both run the same
   // method.
   std::vector<double> blurs_mm;
@@ -60,7 +62,8 @@ std::vector<LoadedMethod> load_methods(const MethodOptions& options,
     registration::CaseLoadOptions loading =
         load_options(options, renderer, method.coarsest_level(), blurs_mm);
     if (its_method.correction.is_wanted) loading.correction_levels = method.last_levels();
-    loading.ray_caster.step_mm = its_method.correction.cast_step_mm(options.ray_caster.step_mm);
+    // Both renderers, so that ends compare.
+    loading.ray_caster.step_mm = correction.cast_step_mm(options.ray_caster.step_mm);
     loading.judging_level = judging_level;
     loading.pool = pool;
     if (renderer == "field") loading.kept_fields = kept_fields;

@@ -36,6 +36,6 @@ std::vector<LoadedMethod> load_methods(const MethodOptions& options,
                                        const Communicator& world,
                                        LoadedInputs& inputs,
                                        int judging_level = 0,
-                                       std::shared_ptr<registration::KeptFields> kept_fields = {});
+                                       const std::shared_ptr<registration::KeptFields>& kept_fields = {});
 
 }  // namespace af::evaluation

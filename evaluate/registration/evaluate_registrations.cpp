@@ -492,7 +492,8 @@ void run_registration(const RegistrationStudyOptions& options,
 
   FileBackedArray<RegistrationRow> rows(folder);
   std::vector<CaseEvaluation> evaluations;
-  const auto kept_fields = std::make_shared<registration::KeptFields>(cases);
+  const auto kept_fields = std::make_shared<registration::KeptFields>(
+      cases, std::make_shared<ThreadPool>(thread_count(options.method.threads)));
   for (const StudyCase& study_case : cases) {
     const auto on_starts = [&](const CaseEvaluation& so_far) {
       if (!world.is_root()) return;

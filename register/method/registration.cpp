@@ -47,6 +47,20 @@ bool is_cast(const RegistrationProblem& problem, int level) {
   });
 }
 
+/// Lets a search reuse node images, and nothing after it.
+class ReusedImages {
+ public:
+  ReusedImages(MultiViewObjective& objective, bool is_allowed) : objective_(objective) {
+    objective_.reuse_images(is_allowed);
+  }
+  ~ReusedImages() { objective_.reuse_images(false); }
+  ReusedImages(const ReusedImages&) = delete;
+  ReusedImages& operator=(const ReusedImages&) = delete;
+
+ private:
+  MultiViewObjective& objective_;
+};
+
 /// Of a pose at which there is nothing to compare.
 ObjectiveValue inadmissible_value() {
   ObjectiveValue value;
@@ -111,7 +125,8 @@ struct RegistrationRunner::Impl {
   [[nodiscard]] bool narrow_at_start(PreparedStage& stage,
                                      ChainEnd& end,
                                      RegistrationResult& result) const;
-  /// The similarity of an end within its own silhouettes, so that ends of several starts compare.
+  /// The similarity of an end by itself, so that ends of several starts compare: within its own
+  /// silhouettes, and by images of its own.
   void take_own_similarity(ChainEnd& end, RegistrationResult& result);
   void run_portfolio(std::int64_t start_index, RegistrationResult& result);
   /// The finish, from `end`.
@@ -198,10 +213,11 @@ bool RegistrationRunner::Impl::run_stage(PreparedStage& stage,
       stage.objective, PoseFrame::about(end.room_from_ct, problem->center_ct_mm), *scaling);
   const SearchBudget budget{options.max_evaluations - result.evaluations,
                             random_key(start_index, index)};
-  // Searches along derivatives take short steps; others try poses all around.
-  stage.objective.reuse_images(stage.optimizer->needs() != Derivatives::None);
-  stage.optimizer->maximize(target, stage.options.search, budget, search);
-  stage.objective.reuse_images(false);
+  {
+    // Searches along derivatives take short steps; others try poses all around.
+    const ReusedImages reused(stage.objective, stage.optimizer->needs() != Derivatives::None);
+    stage.optimizer->maximize(target, stage.options.search, budget, search);
+  }
   append_trace(index, target, result);
   result.evaluations += search.evaluations;
   result.inadmissible += search.inadmissible;
@@ -244,8 +260,10 @@ bool RegistrationRunner::Impl::narrow_at_start(PreparedStage& stage,
 
 void RegistrationRunner::Impl::take_own_similarity(ChainEnd& end, RegistrationResult& result) {
   PreparedStage& stage = stages[end.stage];
-  if (stage.silhouettes.empty() || !std::isfinite(end.similarity)) return;
-  result.drr_count += 2 * static_cast<std::int64_t>(views.size());
+  const bool has_silhouettes = !stage.silhouettes.empty();
+  const bool reused_images = stage.optimizer->needs() != Derivatives::None;
+  if (!(has_silhouettes || reused_images) || !std::isfinite(end.similarity)) return;
+  result.drr_count += (has_silhouettes ? 2 : 1) * static_cast<std::int64_t>(views.size());
   if (!stage.narrow_to(*problem, end.room_from_ct)) return;
   const ObjectiveValue value = stage.objective.evaluate(end.room_from_ct);
   if (value.is_admissible) end.similarity = value.similarity;

@@ -139,6 +139,11 @@ void MultiViewObjective::reuse_images(bool is_allowed) {
     if (scratch.render) scratch.render->reuse_images(is_allowed);
 }
 
+void MultiViewObjective::forget_images_of_refused(std::size_t i) {
+  if (reuses_images_ && poses_[i].first_outside < static_cast<int>(views_.size()))
+    reuse_images(true);
+}
+
 ObjectiveValue MultiViewObjective::evaluate(const RigidTransform& room_from_ct) {
   ObjectiveValue value;
   evaluate_all({&room_from_ct, 1}, {&value, 1});
@@ -164,7 +169,10 @@ void MultiViewObjective::evaluate_all(std::span<const RigidTransform> room_from_
     });
   });
   NormalEquations equations;
-  for (std::size_t i = 0; i < values.size(); ++i) values[i] = sum_of(i, equations);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    forget_images_of_refused(i);
+    values[i] = sum_of(i, equations);
+  }
 }
 
 ObjectiveValue MultiViewObjective::evaluate_with(const RigidTransform& room_from_ct,
@@ -189,6 +197,7 @@ ObjectiveValue MultiViewObjective::evaluate_with(const RigidTransform& room_from
             measure, scratch.drr, scratch.planes, scratch.by_pixel, *scratch.similarity);
       });
     });
+  forget_images_of_refused(0);
   return sum_of(0, result);
 }
 

@@ -110,6 +110,9 @@ class MultiViewObjective {
                      Scratch& scratch,
                      const std::optional<PoseGradients>& gradients,
                      const Compare& compare);
+  /// Of a pose with rays outside some views are rendered or not, as the threads come to it: what
+  /// they left must not tell. For pose `i`.
+  void forget_images_of_refused(std::size_t i);
   /// The sum over the views of pose `i`, in their order.
   [[nodiscard]] ObjectiveValue sum_of(std::size_t i, NormalEquations& equations) const;
 

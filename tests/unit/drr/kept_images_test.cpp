@@ -87,6 +87,9 @@ TEST(KeptImages, AreNearTheLookUpWhileTheSourceIsNear) {
         errors[i] = distance(reused.values, there.values);
         EXPECT_GT(errors[i], 0.0) << "made anew";
         EXPECT_LT(errors[i], 0.02 * distance(at_first.values, there.values));
+        if (has_gradients) {
+          EXPECT_LT(distance(reused.planes, there.planes), 0.02 * length(there.planes));
+        }
       }
       EXPECT_LT(errors[1], errors[0] / 3.0);
     }

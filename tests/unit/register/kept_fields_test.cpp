@@ -27,7 +27,7 @@ std::shared_ptr<const FieldInUse> some_field() {
 TEST(KeptFields, AreThoseOfTheCaseAtHandThatALaterOneUses) {
   const std::vector<StudyCase> cases = {
       case_of({"a", "b"}), case_of({"a", "c"}), case_of({"c", "c"}), case_of({"a"})};
-  KeptFields kept(cases);
+  KeptFields kept(cases, nullptr);
   kept.begin_case(cases[0]);
   EXPECT_EQ(kept.find("a"), nullptr);
   const std::shared_ptr<const FieldInUse> a = some_field();

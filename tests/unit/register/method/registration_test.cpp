@@ -242,7 +242,9 @@ TEST(Registration, EveryOptimizerRecoversAKnownPose) {
     EXPECT_EQ(result.stop_reason, StopReason::StepBelowFinal) << optimizer << ' ' << similarity;
     EXPECT_LT(mean_distance_mm(result.room_from_ct, small.gold_room_from_ct), kFinalStepErrorMm)
         << optimizer << ' ' << similarity;
-    EXPECT_EQ(result.similarity, result.trace.back().similarity);
+    EXPECT_EQ(result.similarity, runner.similarity_at(result.room_from_ct).similarity);
+    // Sums that come with derivatives are rounded otherwise.
+    EXPECT_NEAR(result.similarity, result.trace.back().similarity, 1e-5);
   }
 }
 

@@ -2,7 +2,9 @@
 #include "register/problem/multi_view_objective.h"
 
 #include <atomic>
+#include <chrono>
 #include <cmath>
+#include <thread>
 
 #include <gtest/gtest.h>
 
@@ -119,6 +121,90 @@ TEST(MultiViewObjective, PosesTogetherHaveTheValuesThatTheyHaveAlone) {
       EXPECT_EQ(values[i].drr_count, expected.drr_count);
       EXPECT_EQ(values[i].rays_outside, expected.rays_outside);
     }
+  }
+}
+
+/// Gives the tx of the pose that it remembers, which a pose 2 mm off replaces; rays are outside
+/// beyond 3 mm.
+class RememberingRenderer final : public DrrRenderer {
+ public:
+  explicit RememberingRenderer(std::chrono::milliseconds delay) : delay_(delay) {}
+  RenderStatus render(const RigidTransform& room_from_ct,
+                      const View& /*view*/,
+                      RenderWorkspace& workspace,
+                      std::span<float> total_attenuation,
+                      const std::optional<PoseGradients>& /*gradients*/) const override {
+    std::this_thread::sleep_for(delay_);
+    auto& memory = dynamic_cast<Memory&>(workspace);
+    const double tx_mm = room_from_ct.translation().x();
+    if (!memory.tx_mm || std::abs(*memory.tx_mm - tx_mm) > 2.0) memory.tx_mm = tx_mm;
+    for (float& value : total_attenuation) value = static_cast<float>(*memory.tx_mm);
+    if (!memory.is_allowed) memory.tx_mm.reset();
+    return {tx_mm > 3.0 ? 7 : 0};
+  }
+  [[nodiscard]] std::unique_ptr<RenderWorkspace> make_workspace() const override {
+    return std::make_unique<Memory>();
+  }
+  [[nodiscard]] const char* name() const override { return "remembering"; }
+
+ private:
+  struct Memory final : RenderWorkspace {
+    bool is_allowed = false;
+    std::optional<double> tx_mm;
+
+    void reuse_images(bool allowed) override {
+      is_allowed = allowed;
+      tx_mm.reset();
+    }
+  };
+
+  std::chrono::milliseconds delay_;
+};
+
+class FirstPixel final : public SimilarityMeasure {
+ public:
+  [[nodiscard]] double evaluate(std::span<const float> drr,
+                                SimilarityWorkspace& /*workspace*/) const override {
+    return static_cast<double>(drr.front());
+  }
+  [[nodiscard]] std::unique_ptr<SimilarityWorkspace> make_workspace() const override {
+    return std::make_unique<SimilarityWorkspace>();
+  }
+};
+
+/// The first view's DRR comes last where threads share the views.
+MultiViewObjective remembering_objective(int threads) {
+  std::vector<ObjectiveView> views;
+  for (int i = 0; i < 3; ++i) {
+    ObjectiveView view;
+    view.view.camera = test::small_camera(false);
+    view.view.roi = {0, 0, 4, 4};
+    view.renderer =
+        std::make_shared<RememberingRenderer>(std::chrono::milliseconds(i == 0 ? 20 : 0));
+    view.measure = std::make_shared<FirstPixel>();
+    views.push_back(view);
+  }
+  return MultiViewObjective(std::move(views), std::make_shared<ThreadPool>(threads));
+}
+
+TEST(MultiViewObjective, ReusesImagesAlikeOnAnyNumberOfThreads) {
+  for (const int threads : {1, 2, 5}) {
+    MultiViewObjective objective = remembering_objective(threads);
+    EXPECT_EQ(objective.evaluate(shifted(0.5)).similarity, 3 * 0.5);
+    EXPECT_EQ(objective.evaluate(shifted(1.0)).similarity, 3 * 1.0);  // nothing is reused yet
+    objective.reuse_images(true);
+    EXPECT_EQ(objective.evaluate(shifted(0.5)).similarity, 3 * 0.5);
+    EXPECT_EQ(objective.evaluate(shifted(1.0)).similarity, 3 * 0.5);
+    // With threads the later views are rendered, too, before the first one refuses the pose.
+    EXPECT_FALSE(objective.evaluate(shifted(3.25)).is_admissible);
+    EXPECT_EQ(objective.evaluate(shifted(1.5)).similarity, 3 * 1.5);
+    EXPECT_EQ(objective.evaluate(shifted(2.0)).similarity, 3 * 1.5);
+    const std::vector<RigidTransform> poses = {shifted(2.0), shifted(2.25)};
+    std::vector<ObjectiveValue> values(poses.size());
+    objective.evaluate_all(poses, values);  // ends it
+    EXPECT_EQ(values[0].similarity, 3 * 2.0);
+    EXPECT_EQ(values[1].similarity, 3 * 2.25);
+    EXPECT_EQ(objective.evaluate(shifted(1.0)).similarity, 3 * 1.0);
   }
 }
 
