@@ -339,10 +339,10 @@ void warp_with_pose_slopes(const NodeImage& image,
         const NodeSlopes of_z = slopes_of(pair_z, cells);
         const float along_s = of.m_scale[0] * of.source_move[1];
         const float along_t = of.m_scale[1] * of.source_move[1];
-        const Floats f_x = of.nodes_per_mm[0] *
-                           (of_value.s + (of_x.s * move.x + of_z.s * move.z - along_s * g_x));
-        const Floats f_z = of.nodes_per_mm[1] *
-                           (of_value.t + (of_x.t * move.x + of_z.t * move.z - along_t * g_z));
+        const Floats f_x =
+            of.nodes_per_mm[0] * (of_value.s + (of_x.s * move.x + of_z.s * move.z - along_s * g_x));
+        const Floats f_z =
+            of.nodes_per_mm[1] * (of_value.t + (of_x.t * move.x + of_z.t * move.z - along_t * g_z));
         // Forces are perpendicular to the ray.
         const Floats f_y = -(m_x * f_x + m_z * f_z);
         const Floats force[3] = {f_x + g_x, f_y - (m_x * g_x + m_z * g_z), f_z + g_z};

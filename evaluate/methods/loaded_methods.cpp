@@ -39,14 +39,15 @@ std::vector<double> level_blurs_mm(const registration::RegistrationProblem& prob
 
 }  // namespace
 
-std::vector<LoadedMethod> load_methods(const MethodOptions& options,
-                                       const registration::CorrectionOptions& correction,
-                                       const Study& study,
-                                       const StudyCase& study_case,
-                                       const Communicator& world,
-                                       LoadedInputs& inputs,
-                                       int judging_level,
-                                       const std::shared_ptr<registration::KeptFields>& kept_fields) {
+std::vector<LoadedMethod> load_methods(
+    const MethodOptions& options,
+    const registration::CorrectionOptions& correction,
+    const Study& study,
+    const StudyCase& study_case,
+    const Communicator& world,
+    LoadedInputs& inputs,
+    int judging_level,
+    const std::shared_ptr<registration::KeptFields>& kept_fields) {
   std::vector<LoadedMethod> methods;
   const registration::RegistrationOptions method =
       all_or_none(world, [&] { return registration::resolve(options.method); });

@@ -581,8 +581,8 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
     if (world.is_root())
       draw_pictures(options, study_case, methods.front(), rows.front(), yardstick, evaluation);
   });
-  // Fields and CT go before the rows come: memory has room for only one of the two. Only fields that
-  // the next case uses, too, stay (KeptFields).
+  // Fields and CT go before the rows come: memory has room for only one of the two. Only fields
+  // that the next case uses, too, stay (KeptFields).
   methods.clear();
   all_or_none(world, [&] {
     if (!world.is_root()) return;
