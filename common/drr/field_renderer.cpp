@@ -17,9 +17,9 @@ using RendererPointer = std::shared_ptr<const DrrRenderer>;
 using PoolPointer = std::shared_ptr<ThreadPool>;
 
 struct KnownLookUp {
-  const char* name;
-  const char* help;
-  RendererPointer (*make)(FieldPointer field, const PoolPointer& pool);
+  const char* name = nullptr;
+  const char* help = nullptr;
+  RendererPointer (*make)(FieldPointer field, const PoolPointer& pool) = nullptr;
   RendererPointer (*make_decoded)(LevelPointer level_0, const PoolPointer& pool) = nullptr;
 };
 

@@ -34,10 +34,9 @@ KeptImages::Corners KeptImages::corners_of(const SlabRays& rays) const {
   const auto directions = rays.corner_directions();
   Corners corners;
   for (std::size_t i = 0; i < corners.size(); ++i) {
-    const double reach = (grid.plane_y_mm - rays.source.y()) / directions[i].y();
-    corners[i] = {
-        (rays.source.x() + reach * directions[i].x() - grid.s_first_mm) / grid.s_spacing_mm,
-        (rays.source.z() + reach * directions[i].z() - grid.t_first_mm) / grid.t_spacing_mm};
+    const Eigen::Vector3d hit = rays.hit(grid.plane_y_mm, directions[i]);
+    corners[i] = {(hit.x() - grid.s_first_mm) / grid.s_spacing_mm,
+                  (hit.z() - grid.t_first_mm) / grid.t_spacing_mm};
   }
   return corners;
 }

@@ -51,9 +51,6 @@ std::array<double, 4> SlabRays::shares_to_edges() const {
     const double distance_mm = std::min(position_mm - axis.first_mm, axis.last_mm - position_mm);
     least[of] = std::min(least[of], distance_mm / (axis.last_mm - axis.first_mm));
   };
-  const auto hit = [&](double plane_y_mm, const Eigen::Vector3d& ray) -> Eigen::Vector3d {
-    return source + (plane_y_mm - source.y()) / ray.y() * ray;
-  };
   for (const Eigen::Vector3d& direction : corner_directions()) {
     const Eigen::Vector3d on_uv = hit(light_slab_.uv_plane_y_mm, direction);
     keep(0, light_slab_.u, on_uv.x());
@@ -115,9 +112,8 @@ Footprint::Footprint(const SlabGeometry& slab, const SlabRays& rays, const Needs
   std::array<double, 2> high{-1e300, -1e300};
   for (std::size_t i = 0; i < 4; ++i) {
     const Eigen::Vector3d& direction = directions[i == 2 ? 3 : (i == 3 ? 2 : i)];
-    const double scale = (slab.st_plane_y_mm - rays.source.y()) / direction.y();
-    corners_[i] = {slab.s.node_coordinate(rays.source.x() + scale * direction.x()),
-                   slab.t.node_coordinate(rays.source.z() + scale * direction.z())};
+    const Eigen::Vector3d hit = rays.hit(slab.st_plane_y_mm, direction);
+    corners_[i] = {slab.s.node_coordinate(hit.x()), slab.t.node_coordinate(hit.z())};
     for (std::size_t axis = 0; axis < 2; ++axis) {
       low[axis] = std::min(low[axis], corners_[i][axis]);
       high[axis] = std::max(high[axis], corners_[i][axis]);

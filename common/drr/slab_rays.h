@@ -22,6 +22,10 @@ struct SlabRays {
   SlabRays(const LightSlab& light_slab, const RigidTransform& room_from_ct, const View& view);
 
   [[nodiscard]] std::array<Eigen::Vector3d, 4> corner_directions() const;
+  /// Where a ray of a direction meets the plane y = plane_y_mm.
+  [[nodiscard]] Eigen::Vector3d hit(double plane_y_mm, const Eigen::Vector3d& direction) const {
+    return source + (plane_y_mm - source.y()) / direction.y() * direction;
+  }
   /// Whether all rays descend: none is parallel to the planes or rises from them.
   [[nodiscard]] bool all_descend() const;
   /// The hit points of a view's rays form a convex quadrilateral on each plane, so its corner rays

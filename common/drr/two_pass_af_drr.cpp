@@ -330,9 +330,9 @@ RenderStatus TwoPassAfDrr::render(const RigidTransform& room_from_ct,
       looked_up_nodes(*blender_, sum_slab_, options_.st, rays, gradients.has_value(), scratch);
   const NodeImage values = image_of(nodes.images, 0);
   const Homography homography = nodes_from_pixels(nodes.images.grid, rays);
-  const Eigen::Vector3d pivot = gradients ? gradients->pivot_room_point : view.camera.source_point;
-  const PoseSlopes slopes =
-      pose_slopes(nodes.images, rays, nodes.source_move, view.camera.source_point - pivot);
+  Eigen::Vector3d source_from_pivot = Eigen::Vector3d::Zero();
+  if (gradients) source_from_pivot = view.camera.source_point - gradients->pivot_room_point;
+  const PoseSlopes slopes = pose_slopes(nodes.images, rays, nodes.source_move, source_from_pivot);
   const bool has_moved = !nodes.source_move.isZero(0.0);
   for_each_band(view, *pool_, [&](const PixelGrid& band) {
     float* const to = total_attenuation.data();

@@ -78,14 +78,14 @@ void MultiViewObjective::prepare(std::span<const RigidTransform> room_from_ct) {
 
 MultiViewObjective::Scratch& MultiViewObjective::scratch_of(int slot, std::size_t view) {
   Scratch& scratch = scratch_[static_cast<std::size_t>(slot) * views_.size() + view];
-  const bool is_new = !scratch.render;
-  if (is_new)
+  if (!scratch.render) {
     scratch = {views_[view].renderer->make_workspace(),
                views_[view].measure->make_workspace(),
                std::vector<float>(views_[view].view.pixel_count()),
                {},
                {}};
-  if (is_new) scratch.render->reuse_images(reuses_images_);
+    scratch.render->reuse_images(reuses_images_);
+  }
   return scratch;
 }
 

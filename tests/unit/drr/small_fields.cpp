@@ -13,6 +13,11 @@ CameraGeometry small_camera() {
   return test::c_arm_camera(31, 24, 6.0);
 }
 
+double waves(const RayNodes& n) {
+  return std::round(30000 + 8000 * std::sin(0.35 * n.s + 0.2 * n.u) * std::cos(0.3 * n.t) +
+                    4000 * std::cos(0.5 * n.v + 0.25 * n.t));
+}
+
 std::shared_ptr<CompressedAttenuationField> small_field(const FieldFunction& function,
                                                         int slab_count,
                                                         int uv_nodes,

@@ -13,6 +13,10 @@ using FieldFunction = std::function<double(const RayNodes&)>;
 /// 31 x 24 pixels of 6 mm on a C-arm.
 CameraGeometry small_camera();
 
+/// Smooth on the scale of the nodes, so that interpolations differ little from it; scaled up, since
+/// small fields hold integers.
+double waves(const RayNodes& n);
+
 /// An uncompressed field in compressed form: one codeword per tile of a function of (u, v, s, t) in
 /// node units, times a quantiser step of 0.25. The function must be integer at the nodes, so that
 /// nothing is lost.

@@ -19,16 +19,9 @@
 namespace af {
 namespace {
 
-constexpr TwoPassOptions kLinear{AxisInterpolation::Linear, AxisInterpolation::Linear};
+constexpr TwoPassOptions kLinear;
 constexpr TwoPassOptions kCubicInSt{AxisInterpolation::Cubic, AxisInterpolation::Linear};
 constexpr TwoPassOptions kCubic{AxisInterpolation::Cubic, AxisInterpolation::Cubic};
-
-/// Smooth on the scale of the nodes, so that interpolations differ little from it; scaled up, since
-/// small fields hold integers.
-double waves(const RayNodes& n) {
-  return std::round(30000 + 8000 * std::sin(0.35 * n.s + 0.2 * n.u) * std::cos(0.3 * n.t) +
-                    4000 * std::cos(0.5 * n.v + 0.25 * n.t));
-}
 
 /// Everything a renderer can make of one view.
 struct Outputs {
