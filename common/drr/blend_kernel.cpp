@@ -116,28 +116,28 @@ AF_KERNEL_INLINE void blend_strip(const TileStrip& given) {
     blend_tile<kWithSlopes, kHasMeans>(strip, d);
 }
 
-/// kLanes columns of a block from column c on, between two viewpoints along each axis, whose slopes
-/// are opposite.
+/// A row of a block between two viewpoints along each axis, whose slopes are opposite. Rows, not
+/// columns, one after another: the samples of far-apart poses come from memory, which streams.
 template <bool kWithSlopes>
-AF_KERNEL_INLINE void blend_columns_between_two(const SampleBlock& block, int32_t c) {
-  const Floats u_weights[2] = {load(block.u_weights[0] + c), load(block.u_weights[1] + c)};
-  const Floats u_slope_weight = load(block.u_slopes[1] + c);
-  for (int32_t row = 0; row < block.rows; ++row) {
-    const uint16_t* const samples = block.samples + row * block.t_stride + c;
-    const ViewpointTap& v = block.v_taps[row];
+AF_KERNEL_INLINE void blend_row_between_two(const SampleBlock& block, int32_t row) {
+  const ViewpointTap& v = block.v_taps[row];
+  const uint16_t* const samples = block.samples + row * block.t_stride;
+  const int64_t at = row * block.image_stride;
+  for (int32_t c = 0; c < block.columns; c += kLanes) {
+    const Floats u_weights[2] = {load(block.u_weights[0] + c), load(block.u_weights[1] + c)};
     Floats over_v[2];
     Floats step_over_v[2];
     for (int a = 0; a < 2; ++a) {
-      const Floats first = load(samples + a * block.u_stride);
-      const Floats second = load(samples + a * block.u_stride + block.v_stride);
+      const uint16_t* const of_u = samples + a * block.u_stride + c;
+      const Floats first = load(of_u);
+      const Floats second = load(of_u + block.v_stride);
       over_v[a] = first * v.weights[0] + second * v.weights[1];
       step_over_v[a] = second - first;
     }
-    const int64_t at = row * block.image_stride + c;
-    store(block.images[0] + at, over_v[0] * u_weights[0] + over_v[1] * u_weights[1]);
+    store(block.images[0] + at + c, over_v[0] * u_weights[0] + over_v[1] * u_weights[1]);
     if (!kWithSlopes) continue;
-    store(block.images[1] + at, (over_v[1] - over_v[0]) * u_slope_weight);
-    store(block.images[2] + at,
+    store(block.images[1] + at + c, (over_v[1] - over_v[0]) * load(block.u_slopes[1] + c));
+    store(block.images[2] + at + c,
           (step_over_v[0] * u_weights[0] + step_over_v[1] * u_weights[1]) * v.slopes[1]);
   }
 }
@@ -182,11 +182,10 @@ template <bool kWithSlopes, int kTaps>
 AF_KERNEL_INLINE void blend_block(const SampleBlock& given) {
   // A copy that no store can change.
   const SampleBlock block = given;
-  for (int32_t c = 0; c < block.columns; c += kLanes)
-    if constexpr (kTaps == 2)
-      blend_columns_between_two<kWithSlopes>(block, c);
-    else
-      blend_columns<kWithSlopes, kTaps>(block, c);
+  if constexpr (kTaps == 2)
+    for (int32_t row = 0; row < block.rows; ++row) blend_row_between_two<kWithSlopes>(block, row);
+  else
+    for (int32_t c = 0; c < block.columns; c += kLanes) blend_columns<kWithSlopes, kTaps>(block, c);
 }
 
 }  // namespace

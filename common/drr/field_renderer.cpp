@@ -27,26 +27,29 @@ template <FieldInterpolation interpolation>
 RendererPointer make_literal(FieldPointer field, const PoolPointer& /*pool*/) {
   return std::make_shared<const RayByRayAfDrr>(std::move(field), interpolation);
 }
-template <typename Pointer, AxisInterpolation st, AxisInterpolation uv>
+template <typename Pointer, TwoPassOptions options>
 RendererPointer make_two_pass(Pointer samples, const PoolPointer& pool) {
-  return std::make_shared<const TwoPassAfDrr>(std::move(samples), TwoPassOptions{st, uv}, pool);
+  return std::make_shared<const TwoPassAfDrr>(std::move(samples), options, pool);
 }
-template <AxisInterpolation st, AxisInterpolation uv>
+template <TwoPassOptions options>
 constexpr KnownLookUp two_pass(const char* name, const char* help) {
-  return {name, help, make_two_pass<FieldPointer, st, uv>, make_two_pass<LevelPointer, st, uv>};
+  return {name, help, make_two_pass<FieldPointer, options>, make_two_pass<LevelPointer, options>};
 }
 
 using enum AxisInterpolation;
 
 /// Every way of looking up there is; a new one joins here.
 constexpr std::array kLookUps = {
-    KnownLookUp{"nearest", "nearest node", make_literal<FieldInterpolation::Nearest>},
-    two_pass<Linear, Linear>("linear", "linear, in two passes"),
-    two_pass<Cubic, Linear>("cubic", "cubic over (s,t)"),
-    two_pass<Cubic, Cubic>("cubic-uv", "cubic over (s,t) and (u,v)"),
+    KnownLookUp{"nearest", "nearest node", make_literal<FieldInterpolation::Nearest>, nullptr},
+    two_pass<{Linear, Linear}>("linear", "linear, in two passes"),
+    two_pass<{Linear, Linear, true}>(
+        "cubic-sum", "linear, but cubic from each of several slabs to a finer sum of all"),
+    two_pass<{Cubic, Linear}>("cubic", "cubic over (s,t)"),
+    two_pass<{Cubic, Cubic}>("cubic-uv", "cubic over (s,t) and (u,v)"),
     KnownLookUp{"quadrilinear",
                 "over each ray's 16 nodes, the definition",
-                make_literal<FieldInterpolation::Quadrilinear>},
+                make_literal<FieldInterpolation::Quadrilinear>,
+                nullptr},
 };
 
 }  // namespace

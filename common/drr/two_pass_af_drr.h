@@ -15,6 +15,9 @@ struct TwoPassOptions {
   /// exact for cubics (Lagrange's through six nodes), before it is resampled bilinearly.
   AxisInterpolation st = AxisInterpolation::Linear;
   AxisInterpolation uv = AxisInterpolation::Linear;
+  /// Several slabs are summed on a quarter more nodes along each axis, to which cubic look-up (st)
+  /// always sums: their images are resampled cubically once, and linearly from there to pixels.
+  bool sums_on_more_nodes = false;
 };
 
 /// DRRs by look-up in two cheap passes. All rays of a DRR meet in the source, so a ray's (u,v) is

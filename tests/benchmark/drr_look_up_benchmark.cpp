@@ -128,7 +128,9 @@ void run(const CaseOptions& options,
   const TwoPassAfDrr cubic(field, {AxisInterpolation::Cubic, AxisInterpolation::Linear});
   const TwoPassAfDrr cubic_uv(field, {AxisInterpolation::Cubic, AxisInterpolation::Cubic});
   const auto pyramid = make_field_pyramid(*field, 2);
-  const TwoPassAfDrr decoded(std::make_shared<const FieldLevel>(decode_field(*field)));
+  const auto samples = std::make_shared<const FieldLevel>(decode_field(*field));
+  const TwoPassAfDrr decoded(samples);
+  const TwoPassAfDrr cubic_sum(samples, {.sums_on_more_nodes = true});
   const TwoPassAfDrr half(pyramid[0]);
   const TwoPassAfDrr quarter(pyramid[1]);
   const View region = middle_of(view);
@@ -150,6 +152,12 @@ void run(const CaseOptions& options,
       renderer_contender("TwoPassAfDrr, decoded", decoded, series, view),
       renderer_contender(
           "TwoPassAfDrr, decoded, six gradients", decoded, series, view, Derivatives::OfThePose),
+      renderer_contender("TwoPassAfDrr, decoded, cubic-sum", cubic_sum, series, view),
+      renderer_contender("TwoPassAfDrr, decoded, cubic-sum, six gradients",
+                         cubic_sum,
+                         series,
+                         view,
+                         Derivatives::OfThePose),
       renderer_contender(region_name, two_pass, series, region),
       renderer_contender(region_name + ", level 1", half, series, region.coarser(2)),
       renderer_contender(region_name + ", level 2", quarter, series, region.coarser(4)),
