@@ -82,35 +82,28 @@ bool pays_to_decode(const CompressedAttenuationField& field) {
   return field.slabs.size() > 1 && decoded_bytes(field) <= kMostDecodedBytes;
 }
 
-/// A registration needs derivatives, images of their own, which `cubic` upsamples, too. With a sum
-/// of slabs on more nodes it ends as near to ray casting without, a seventh sooner
-/// (docs/look-up.md#ways-of-interpolation).
-std::string look_up_of_registrations(const CompressedAttenuationField& field,
-                                     const std::string& own) {
-  return field.slabs.size() > 1 && own == "cubic" ? "cubic-sum" : own;
-}
-
 /// Collective where the memory is. A field's renderers for a view: its own, and those of so many
 /// levels of its pyramid. A method's levels are those of a field of about 256 nodes: a finer field
 /// begins with more halvings, so that a level has about the same blur. The field itself is looked
-/// up as it is meant to be, levels above linearly: there blur hides what cubic look-up gains.
+/// up as searches do (look_up_of_searches()), levels above linearly: there blur hides what cubic
+/// look-up gains.
 FieldRenderers renderers_of(const std::shared_ptr<const CompressedAttenuationField>& field,
                             const std::string& look_up,
                             int levels,
                             const std::shared_ptr<ThreadPool>& pool,
                             const std::shared_ptr<ThreadPool>& coarse_pool,
                             const FieldLevelMemory& memory) {
-  const std::string of_level_0 = look_up_of_registrations(*field, look_up);
   const int more_halvings = halvings_to_usual_nodes(field->light_slab);
   const int halvings = levels > 0 ? levels + more_halvings : 0;
   FieldRenderers made;
+  made.look_up = look_up_of_searches(look_up, field->slabs.size());
   FieldLevels pyramid;
   if (pays_to_decode(*field)) {
     const auto samples = std::make_shared<const FieldLevel>(decode_field(*field, memory));
-    made.levels.push_back(make_field_renderer(samples, of_level_0, pool));
+    made.levels.push_back(make_field_renderer(samples, made.look_up, pool));
     if (halvings > 0) pyramid = make_field_pyramid(*samples, halvings, memory);
   } else {
-    made.levels.push_back(make_field_renderer(field, of_level_0, pool));
+    made.levels.push_back(make_field_renderer(field, made.look_up, pool));
     if (halvings > 0) pyramid = make_field_pyramid(*field, halvings, memory);
   }
   for (auto i = static_cast<std::size_t>(more_halvings); i < pyramid.size(); ++i) {
@@ -206,6 +199,7 @@ FieldRenderers renderers_of_atlas(const OpenedField& opened,
                                              node_memory(communicator, *threads.coarse));
     members->keep(i, std::make_shared<const MemberLevels>(made.levels));
     if (set.blur_sigma_mm.empty()) set.blur_sigma_mm = made.blur_sigma_mm;
+    set.look_up = made.look_up;
   }
   for (std::size_t level = 0; level <= set.blur_sigma_mm.size(); ++level)
     set.levels.push_back(

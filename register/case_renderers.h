@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "drr/xray_beam.h"
@@ -47,6 +48,7 @@ std::vector<RendererLevel> coarse_ray_casts(const CastVolumes& volumes,
 struct FieldRenderers {
   std::vector<std::shared_ptr<const DrrRenderer>> levels;  ///< its own first
   std::vector<double> blur_sigma_mm;
+  std::string look_up;  ///< of the first
 };
 
 /// Collective. Renderers for a view and its coarser levels, looked up in a field or an atlas and

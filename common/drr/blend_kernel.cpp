@@ -116,8 +116,9 @@ AF_KERNEL_INLINE void blend_strip(const TileStrip& given) {
     blend_tile<kWithSlopes, kHasMeans>(strip, d);
 }
 
-/// A row of a block between two viewpoints along each axis, whose slopes are opposite. Rows, not
-/// columns, one after another: the samples of far-apart poses come from memory, which streams.
+/// A row of a block between two viewpoints along each axis, whose slopes are opposite. Rows are
+/// blended one after another: samples of far-apart poses are not in a cache, and memory is read
+/// fastest in the order of its addresses.
 template <bool kWithSlopes>
 AF_KERNEL_INLINE void blend_row_between_two(const SampleBlock& block, int32_t row) {
   const ViewpointTap& v = block.v_taps[row];

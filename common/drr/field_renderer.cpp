@@ -41,11 +41,11 @@ using enum AxisInterpolation;
 /// Every way of looking up there is; a new one joins here.
 constexpr std::array kLookUps = {
     KnownLookUp{"nearest", "nearest node", make_literal<FieldInterpolation::Nearest>, nullptr},
-    two_pass<{Linear, Linear}>("linear", "linear, in two passes"),
-    two_pass<{Linear, Linear, true}>(
-        "cubic-sum", "linear, but cubic from each of several slabs to a finer sum of all"),
-    two_pass<{Cubic, Linear}>("cubic", "cubic over (s,t)"),
-    two_pass<{Cubic, Cubic}>("cubic-uv", "cubic over (s,t) and (u,v)"),
+    two_pass<TwoPassOptions{Linear, Linear}>("linear", "linear, in two passes"),
+    two_pass<TwoPassOptions{Linear, Linear, true}>(
+        "cubic-sum", "linear, but several slabs are summed on a quarter more nodes"),
+    two_pass<TwoPassOptions{Cubic, Linear}>("cubic", "cubic over (s,t)"),
+    two_pass<TwoPassOptions{Cubic, Cubic}>("cubic-uv", "cubic over (s,t) and (u,v)"),
     KnownLookUp{"quadrilinear",
                 "over each ray's 16 nodes, the definition",
                 make_literal<FieldInterpolation::Quadrilinear>,
@@ -60,6 +60,10 @@ std::vector<std::string> field_look_up_names() {
 
 std::string field_look_up_help() {
   return help_of(kLookUps);
+}
+
+std::string look_up_of_searches(const std::string& own, std::size_t slab_count) {
+  return slab_count > 1 && own == "cubic" ? "cubic-sum" : own;
 }
 
 RendererPointer make_field_renderer(FieldPointer field,

@@ -15,8 +15,8 @@ struct TwoPassOptions {
   /// exact for cubics (Lagrange's through six nodes), before it is resampled bilinearly.
   AxisInterpolation st = AxisInterpolation::Linear;
   AxisInterpolation uv = AxisInterpolation::Linear;
-  /// Several slabs are summed on a quarter more nodes along each axis, to which cubic look-up (st)
-  /// always sums: their images are resampled cubically once, and linearly from there to pixels.
+  /// Several slabs are summed on a quarter more nodes along each axis, so that the bilinear step
+  /// from their sum to pixels loses less. With st = Cubic they always are.
   bool sums_on_more_nodes = false;
 };
 

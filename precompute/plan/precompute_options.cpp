@@ -127,7 +127,8 @@ void describe_casting(Fields& field, PrecomputeOptions& options) {
       .decides(kCastingStage);
   field("look_up",
         options.look_up,
-        "How DRRs are to be looked up in the field, unless a program is told otherwise [linear for "
+        "How DRRs are to be looked up in the field, unless a program is told otherwise; "
+        "registrations look several slabs up by cubic-sum instead of cubic [linear for "
         "the paper's design, else cubic]")
       .one_of({"linear", "cubic"})
       .not_deciding("samples and indices are the same");

@@ -207,8 +207,8 @@ void bind_field(py::module_& module) {
       "tube_kvp"_a = Beam{}.tube_kvp,
       "aluminium_mm"_a = Beam{}.aluminium_mm,
       "scatter_to_primary"_a = Beam{}.scatter_to_primary,
-      "Reads and verifies a file of a field or of an atlas. look_up: 'nearest', 'linear', 'cubic' "
-      "(default: the "
+      "Reads and verifies a file of a field or of an atlas. look_up: a name of `af-drr "
+      "--look-up` (default: the "
       "field's own); threads: 0 is every processor; outside: 'raise' or 'zero' where rays miss the "
       "field; tube_kvp: DRRs of a tube's spectrum, with the field of the CT's bone beside it.");
   field.def_property_readonly("members", &Field::members, "Fields of an atlas; 1 for a field.");

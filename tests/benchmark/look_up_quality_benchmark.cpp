@@ -130,6 +130,7 @@ std::vector<Way> all_ways(const std::shared_ptr<const CompressedAttenuationField
   std::vector<Way> ways;
   for (const auto& [name, options] :
        {std::pair<const char*, TwoPassOptions>{"linear", {Linear, Linear}},
+        {"cubic-sum", {Linear, Linear, true}},
         {"cubic", {Cubic, Linear}},
         {"cubic-uv", {Cubic, Cubic}}}) {
     ways.push_back({name, std::make_shared<const TwoPassAfDrr>(field, options)});

@@ -130,6 +130,23 @@ TEST_F(RegisterProgram, LooksAFieldUpAsItIsMeantToBe) {
   }
 }
 
+TEST_F(RegisterProgram, LooksSlabsThatAreMeantForCubicLookUpUpByTheirSum) {
+  std::string of_slabs;
+  for (const std::string camera : {"AP", "LAT"}) {
+    const std::string field = path(camera + "-slabs.af.h5");
+    const test::ProgramRun run = test::run_command(
+        program("af-precompute") + " --study " + path("study.toml") + " --camera " + camera +
+        " --max-rotation-deg 8 --max-translation-mm 12 --slabs 2 --uv-nodes 12 --st-nodes 96"
+        " --codewords 1024 --look-up cubic -o " +
+        field);
+    ASSERT_EQ(run.exit_code, 0) << run.output;
+    of_slabs += " --field " + camera + "=" + field;
+  }
+  const test::ProgramRun run = run_register(of_slabs + " --preset fast -o " + path("by-sum"));
+  EXPECT_EQ(run.exit_code, 0) << run.output;
+  EXPECT_NE(run.output.find("looked up by cubic-sum"), std::string::npos) << run.output;
+}
+
 TEST_F(RegisterProgram, CorrectsALookedUpEndByRayCasting) {
   const std::string start =
       " --preset robust --start-rotation-deg -1,0.5,2.5 --start-translation-mm 0.5,1,4 ";

@@ -15,6 +15,7 @@ namespace af {
 namespace {
 
 constexpr TwoPassOptions kCubicInSt{.st = AxisInterpolation::Cubic};
+constexpr TwoPassOptions kCubicSum{.sums_on_more_nodes = true};
 
 struct Drr {
   std::vector<float> values, planes;
@@ -58,7 +59,7 @@ double length(const std::vector<float>& values) {
 }
 
 TEST(KeptImages, AreNearTheLookUpWhileTheSourceIsNear) {
-  for (const TwoPassOptions& options : {TwoPassOptions{}, kCubicInSt})
+  for (const TwoPassOptions& options : {TwoPassOptions{}, kCubicSum, kCubicInSt})
     for (const bool has_gradients : {false, true}) {
       const TwoPassAfDrr renderer(small_field(waves, 2, 7, 51), options);
       const auto exact = renderer.make_workspace();

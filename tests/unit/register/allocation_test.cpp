@@ -57,6 +57,7 @@ TEST(Allocation, NoneIsMadeByALookUpOnceItsWorkspaceIsWarm) {
   const auto pool = std::make_shared<ThreadPool>(3);
   for (const TwoPassOptions& options :
        {TwoPassOptions{},
+        TwoPassOptions{.sums_on_more_nodes = true},
         TwoPassOptions{AxisInterpolation::Cubic},
         TwoPassOptions{AxisInterpolation::Cubic, AxisInterpolation::Cubic}}) {
     const TwoPassAfDrr compressed(field, options, pool);
