@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "base/joined.h"
 #include "evaluate/outputs/sample_summary_json.h"
 #include "evaluate/report/html_text.h"
 #include "evaluate/report/number_html.h"
@@ -171,6 +172,25 @@ std::string registration_tiles(const EvaluationRun& run) {
   return tiles;
 }
 
+/// Which X-rays are simulated; empty when none is.
+std::string simulated_xrays_text(const std::vector<const EvaluationRun*>& registrations) {
+  std::vector<std::string> simulated;
+  for (const EvaluationRun* run : registrations)
+    if (run->summary.at("simulation").is_object()) simulated.push_back(escaped(run->name));
+  if (simulated.empty()) return "";
+  const std::string which = simulated.size() == registrations.size()
+                                ? "The X-rays are simulated"
+                                : "The X-rays of " + std::to_string(simulated.size()) + " of " +
+                                      std::to_string(registrations.size()) + " runs are simulated";
+  const std::string names =
+      simulated.size() == registrations.size() ? "" : ": " + joined(simulated, ", ");
+  return element("p",
+                 "<strong>" + which + "</strong>" + names +
+                     ", with effects that neither fields nor ray casting model (<a "
+                     "href=\"#xrays\">how</a>). Real X-rays hold more: motion, devices, "
+                     "calibration errors.");
+}
+
 }  // namespace
 
 std::string summary_section(const std::vector<EvaluationRun>& runs) {
@@ -178,7 +198,6 @@ std::string summary_section(const std::vector<EvaluationRun>& runs) {
   const auto qualities = runs_of(runs, "image-quality");
   std::string sentences;
   std::string tiles;
-  bool is_simulated = false;
   for (const EvaluationRun* run : registrations) {
     if (registrations.size() == 1) {
       sentences += registration_sentences(*run);
@@ -186,7 +205,6 @@ std::string summary_section(const std::vector<EvaluationRun>& runs) {
     } else if (registrations.size() <= kMostSentences) {
       sentences += run_sentences(*run);
     }
-    is_simulated = is_simulated || run->summary.at("simulation").is_object();
   }
   sentences += quality_sentence(qualities);
   for (const EvaluationRun* run : at_most(qualities, kMostTiles))
@@ -194,14 +212,8 @@ std::string summary_section(const std::vector<EvaluationRun>& runs) {
                   "dB",
                   "median PSNR of the field",
                   escaped(field_name(*run)) + ", against ray casting");
-  std::string caution;
-  if (is_simulated)
-    caution += element(
-        "p",
-        "<strong>The X-rays are simulated</strong>, with effects that neither fields nor ray "
-        "casting model (<a href=\"#xrays\">how</a>). Real X-rays hold more: motion, devices, "
-        "calibration errors.");
-  caution += element("p", "Research software, not a medical device.");
+  const std::string caution = simulated_xrays_text(registrations) +
+                              element("p", "Research software, not a medical device.");
   return element("section",
                  element("ul", sentences) + (tiles.empty() ? "" : element("div", tiles, "tiles")) +
                      element("div", caution, "caution"),

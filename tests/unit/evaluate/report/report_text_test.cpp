@@ -53,6 +53,19 @@ TEST(HtmlText, UrlsKeepPathsAndEscapeTheRest) {
   EXPECT_EQ(url_of("\xc3\xa4"), "%C3%A4");
 }
 
+TEST(SummarySection, SaysWhichRunsHaveSimulatedXrays) {
+  std::vector<EvaluationRun> runs;
+  for (const char* name : {"one", "two", "three", "four", "five"})
+    runs.push_back({"", "registration", {{"simulation", nullptr}}, name});
+  EXPECT_THAT(summary_section(runs), Not(HasSubstr("simulated")));
+  runs[1].summary["simulation"] = runs[3].summary["simulation"] = json::object();
+  EXPECT_THAT(
+      summary_section(runs),
+      HasSubstr("<strong>The X-rays of 2 of 5 runs are simulated</strong>: two, four, with"));
+  for (EvaluationRun& run : runs) run.summary["simulation"] = json::object();
+  EXPECT_THAT(summary_section(runs), HasSubstr("<strong>The X-rays are simulated</strong>, with"));
+}
+
 TEST(RepeatCommand, NamesTheStartAndKeepsBothRenderersWhereRayCastingDependsOnFields) {
   const json both = {{"repeat",
                       {{"command", "cd /w && af-evaluate registration --study s.toml"},
