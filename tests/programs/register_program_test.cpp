@@ -35,20 +35,25 @@ class ProgramTest : public testing::Test {
   static void SetUpTestSuite() {
     study_folder = new test::ScratchFolder();
     test::write_small_study(study_folder->path());
-    for (const char* camera : {"AP", "LAT"}) {
-      const test::ProgramRun run = test::run_command(
-          program("af-precompute") + " --study " + path("study.toml") + " --camera " + camera +
-          " --max-rotation-deg 8 --max-translation-mm 12 --uv-nodes 24 --st-nodes 96"
-          " --codewords 1024 -o " +
-          path(std::string(camera) + ".af.h5"));
-      ASSERT_EQ(run.exit_code, 0) << run.output;
-    }
+    make_fields("", "--uv-nodes 24");
   }
   static void TearDownTestSuite() { delete study_folder; }
 
   static std::string path(const std::string& name) { return (*study_folder / name).string(); }
-  static std::string fields() {
-    return " --field AP=" + path("AP.af.h5") + " --field LAT=" + path("LAT.af.h5");
+  /// Both cameras' fields of a design, and the options that name them.
+  static std::string make_fields(const std::string& name, const std::string& design) {
+    for (const std::string camera : {"AP", "LAT"}) {
+      const test::ProgramRun run = test::run_command(
+          program("af-precompute") + " --study " + path("study.toml") + " --camera " + camera +
+          " --max-rotation-deg 8 --max-translation-mm 12 --st-nodes 96 --codewords 1024 " + design +
+          " -o " + path(camera + name + ".af.h5"));
+      EXPECT_EQ(run.exit_code, 0) << run.output;
+    }
+    return fields(name);
+  }
+  static std::string fields(const std::string& name = "") {
+    return " --field AP=" + path("AP" + name + ".af.h5") +
+           " --field LAT=" + path("LAT" + name + ".af.h5");
   }
   static test::ProgramRun run_register(const std::string& arguments) {
     return test::run_command(program("af-register") + " --study " + path("study.toml") + " " +
@@ -103,17 +108,7 @@ TEST_F(RegisterProgram, RegistersByFieldAndByRayCasting) {
 }
 
 TEST_F(RegisterProgram, LooksAFieldUpAsItIsMeantToBe) {
-  std::string cubic_fields;
-  for (const std::string camera : {"AP", "LAT"}) {
-    const std::string field = path(camera + "-cubic.af.h5");
-    const test::ProgramRun run = test::run_command(
-        program("af-precompute") + " --study " + path("study.toml") + " --camera " + camera +
-        " --max-rotation-deg 8 --max-translation-mm 12 --uv-nodes 24 --st-nodes 96"
-        " --codewords 1024 --look-up cubic -o " +
-        field);
-    ASSERT_EQ(run.exit_code, 0) << run.output;
-    cubic_fields += " --field " + camera + "=" + field;
-  }
+  const std::string cubic_fields = make_fields("-cubic", "--uv-nodes 24 --look-up cubic");
   // The fields hold the same samples. Levels above 0 are looked up linearly.
   for (const int level : {0, 1}) {
     const std::string chain = " --chain 'gc gauss-newton level=" + std::to_string(level) +
@@ -131,17 +126,7 @@ TEST_F(RegisterProgram, LooksAFieldUpAsItIsMeantToBe) {
 }
 
 TEST_F(RegisterProgram, LooksSlabsThatAreMeantForCubicLookUpUpByTheirSum) {
-  std::string of_slabs;
-  for (const std::string camera : {"AP", "LAT"}) {
-    const std::string field = path(camera + "-slabs.af.h5");
-    const test::ProgramRun run = test::run_command(
-        program("af-precompute") + " --study " + path("study.toml") + " --camera " + camera +
-        " --max-rotation-deg 8 --max-translation-mm 12 --slabs 2 --uv-nodes 12 --st-nodes 96"
-        " --codewords 1024 --look-up cubic -o " +
-        field);
-    ASSERT_EQ(run.exit_code, 0) << run.output;
-    of_slabs += " --field " + camera + "=" + field;
-  }
+  const std::string of_slabs = make_fields("-slabs", "--slabs 2 --uv-nodes 12 --look-up cubic");
   const test::ProgramRun run = run_register(of_slabs + " --preset fast -o " + path("by-sum"));
   EXPECT_EQ(run.exit_code, 0) << run.output;
   EXPECT_NE(run.output.find("looked up by cubic-sum"), std::string::npos) << run.output;
