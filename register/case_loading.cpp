@@ -250,7 +250,7 @@ void use_fields(const StudyCase& study_case,
     for (std::size_t level = 0; level < renderers.blur_sigma_mm.size(); ++level)
       view.coarse_levels.push_back({renderers.levels[level + 1], renderers.blur_sigma_mm[level]});
     loaded.input_notes[name] = limit_to_rays(field->opened, problem.frame(), communicator, view) +
-                               ", looked up by " + renderers.look_up;
+                               "; level 0 is looked up by " + renderers.look_up;
     loaded.input_sha256[name] = field->opened.info().payload_sha256;
   }
 }

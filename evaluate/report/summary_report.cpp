@@ -181,9 +181,11 @@ std::string simulated_xrays_text(const std::vector<const EvaluationRun*>& regist
   const std::string which = simulated.size() == registrations.size()
                                 ? "The X-rays are simulated"
                                 : "The X-rays of " + std::to_string(simulated.size()) + " of " +
-                                      std::to_string(registrations.size()) + " runs are simulated";
-  const std::string names =
-      simulated.size() == registrations.size() ? "" : ": " + joined(simulated, ", ");
+                                      std::to_string(registrations.size()) +
+                                      " runs of registrations are simulated";
+  const bool are_named =
+      simulated.size() < registrations.size() && simulated.size() <= kMostSentences;
+  const std::string names = are_named ? " (" + joined(simulated, ", ") + ")" : "";
   return element("p",
                  "<strong>" + which + "</strong>" + names +
                      ", with effects that neither fields nor ray casting model (<a "

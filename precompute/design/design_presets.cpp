@@ -28,8 +28,8 @@ const std::array presets = {
         "codewords, cubic look-up",
         {8, 10, 384, 4096, "cubic", 64},
         {}},
-    // One codebook serves every angle: with 4096 codewords DRRs lost up to 1.6 dB against those of
-    // an angle's own field (docs/other-cameras.md#what-an-atlas-costs).
+    // One codebook serves every angle: with 4096 codewords the worst DRRs lost 1.7 dB
+    // against those of an angle's own field (docs/other-cameras.md#what-an-atlas-costs).
     DesignPreset{
         kAtlasPreset,
         "eight slabs of 12 x 12 x 384 x 384 nodes, mean-removed tiles, 16384 codewords for "

@@ -129,7 +129,17 @@ TEST_F(RegisterProgram, LooksSlabsThatAreMeantForCubicLookUpUpByTheirSum) {
   const std::string of_slabs = make_fields("-slabs", "--slabs 2 --uv-nodes 12 --look-up cubic");
   const test::ProgramRun run = run_register(of_slabs + " --preset fast -o " + path("by-sum"));
   EXPECT_EQ(run.exit_code, 0) << run.output;
-  EXPECT_NE(run.output.find("looked up by cubic-sum"), std::string::npos) << run.output;
+  const test::ProgramRun of_one = run_register(fields() + " --preset fast -o " + path("by-one"));
+  EXPECT_EQ(of_one.exit_code, 0) << of_one.output;
+  const auto look_up_of = [&](const std::string& folder, const std::string& camera) {
+    const std::string note =
+        result(folder).at("provenance").at("input_notes").at("field " + camera).get<std::string>();
+    return note.substr(note.find(';'));
+  };
+  for (const char* camera : {"AP", "LAT"}) {
+    EXPECT_EQ(look_up_of("by-sum", camera), "; level 0 is looked up by cubic-sum");
+    EXPECT_EQ(look_up_of("by-one", camera), "; level 0 is looked up by linear");
+  }
 }
 
 TEST_F(RegisterProgram, CorrectsALookedUpEndByRayCasting) {

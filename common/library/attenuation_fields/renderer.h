@@ -95,7 +95,7 @@ class ATTENUATION_FIELDS_API Field : public Renderer {
   /// Reads and verifies a file of a field or of an atlas (.af.h5). FileError, InputError.
   static Field open(const std::filesystem::path& path, const FieldOptions& options = {});
   /// The same for DRRs of a beam. With a tube voltage the field of the CT's bone, A.bone.af.h5
-  /// beside A.af.h5, is read, too: FileError without it, InputError for an atlas.
+  /// beside A.af.h5, is read, too: FileError without it.
   static Field open(const std::filesystem::path& path,
                     const FieldOptions& options,
                     const Beam& beam);

@@ -61,7 +61,8 @@ TEST(SummarySection, SaysWhichRunsHaveSimulatedXrays) {
   runs[1].summary["simulation"] = runs[3].summary["simulation"] = json::object();
   EXPECT_THAT(
       summary_section(runs),
-      HasSubstr("<strong>The X-rays of 2 of 5 runs are simulated</strong>: two, four, with"));
+      HasSubstr("<strong>The X-rays of 2 of 5 runs of registrations are simulated</strong> (two, "
+                "four), with"));
   for (EvaluationRun& run : runs) run.summary["simulation"] = json::object();
   EXPECT_THAT(summary_section(runs), HasSubstr("<strong>The X-rays are simulated</strong>, with"));
 }

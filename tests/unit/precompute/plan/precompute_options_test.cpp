@@ -221,6 +221,7 @@ TEST(PrecomputeOptions, AnAtlasHasItsOwnPreset) {
   const FieldDesign of_field = design_preset_named(kDefaultPreset).design;
   const FieldDesign of_atlas = options.in_force().design();
   EXPECT_EQ(of_atlas, design_preset_named(kAtlasPreset).design);
+  EXPECT_EQ(of_atlas, (FieldDesign{8, 12, 384, 16384, "cubic", 64}));
   EXPECT_NE(of_atlas, of_field);
   options.preset = kDefaultPreset;
   EXPECT_EQ(options.in_force().design(), of_field);
