@@ -175,7 +175,7 @@ std::vector<Codebook> DesignProbe::small_codebooks(std::span<const NumberedTile>
   for (std::size_t i = 0; i < kProbeCodewords.size(); ++i) {
     const std::size_t trainer = (i + 1 == kProbeCodewords.size() ? 0 : 1) % share_.ranks;
     if (trainer == share_.rank)
-      codebooks[i] = small_codebook(tiles, kProbeCodewords[i], mean_step, options_.seed);
+      codebooks[i] = small_codebook(tiles, {kProbeCodewords[i], mean_step, options_.seed});
   }
   for (std::size_t i = 0; i < kProbeCodewords.size(); ++i) {
     const std::size_t trainer = (i + 1 == kProbeCodewords.size() ? 0 : 1) % share_.ranks;
@@ -223,7 +223,7 @@ DesignMeasurement DesignProbe::measure(const FieldDesign& design,
     const TrainingSelection selection = options_.selection_for(count);
     measured.training_tiles[count] = std::min(static_cast<double>(selection.max_training_tiles),
                                               selection.fraction * measured.occupied_tiles);
-    const Codebook codebook = drawn_codebook(tiles, count, design.mean_step, options_.seed);
+    const Codebook codebook = drawn_codebook(tiles, {count, design.mean_step, options_.seed});
     std::array<std::uint64_t, 2> sums{};
     // A trained codebook's indices are coded in fewer bytes than a drawn one's.
     constexpr double kTrainedCodebook = 0.83;

@@ -26,22 +26,20 @@ double trained_share_factor(double per_codeword, double trained_share) {
 
 }  // namespace
 
-Codebook small_codebook(std::span<const NumberedTile> shuffled,
-                        int codewords,
-                        int mean_step,
-                        std::uint64_t seed) {
-  const std::size_t wanted = kProbeTilesPerCodeword * static_cast<std::size_t>(codewords);
-  const auto training = shuffled.first(std::min(shuffled.size(), wanted));
+Codebook small_codebook(std::span<const NumberedTile> shuffled, const ProbedCodebook& wanted) {
+  const std::size_t tile_count =
+      kProbeTilesPerCodeword * static_cast<std::size_t>(wanted.codewords);
+  const auto training = shuffled.first(std::min(shuffled.size(), tile_count));
   std::vector<Tile> distinct;
   for (const NumberedTile& tile : training) distinct.push_back(tile.tile);
   std::sort(distinct.begin(), distinct.end());
   const auto count = std::unique(distinct.begin(), distinct.end()) - distinct.begin();
   CodebookOptions options;
-  options.codewords = static_cast<int>(std::min<std::ptrdiff_t>(codewords, count));
+  options.codewords = static_cast<int>(std::min<std::ptrdiff_t>(wanted.codewords, count));
   options.max_iterations = kIterations;
-  options.seed = seed;
-  options.mean_step = mean_step;
-  if (options.codewords < 2) return {{Tile{}}, mean_step};
+  options.seed = wanted.seed;
+  options.mean_step = wanted.mean_step;
+  if (options.codewords < 2) return {{Tile{}}, wanted.mean_step};
   return train_codebook({{training.begin(), training.end()}, {}}, options, serial_reduction())
       .codebook;
 }
@@ -57,20 +55,18 @@ double squared_error(std::span<const NumberedTile> tiles, const Codebook& codebo
   return std::max(sum, 1.0);
 }
 
-Codebook drawn_codebook(std::span<const NumberedTile> shuffled,
-                        int codewords,
-                        int mean_step,
-                        std::uint64_t seed) {
+Codebook drawn_codebook(std::span<const NumberedTile> shuffled, const ProbedCodebook& wanted) {
   std::vector<std::uint64_t> keys;
   keys.reserve(shuffled.size());
-  for (const NumberedTile& tile : shuffled) keys.push_back(weighted_sampling_key(seed, tile));
-  const std::size_t wanted =
-      std::min(static_cast<std::size_t>(codewords), shuffled.size() / 2 + 1) - 1;
-  const auto drawn = smallest_keyed_tiles(keys, shuffled, wanted, serial_reduction());
+  for (const NumberedTile& tile : shuffled)
+    keys.push_back(weighted_sampling_key(wanted.seed, tile));
+  const std::size_t drawn_count =
+      std::min(static_cast<std::size_t>(wanted.codewords), shuffled.size() / 2 + 1) - 1;
+  const auto drawn = smallest_keyed_tiles(keys, shuffled, drawn_count, serial_reduction());
   std::vector<Tile> tiles{Tile{}};
   for (const KeyedTile& tile : drawn) tiles.push_back(tile.numbered.tile);
   std::sort(tiles.begin(), tiles.end(), codeword_less);
-  return codebook_of_searched(std::move(tiles), mean_step);
+  return codebook_of_searched(std::move(tiles), wanted.mean_step);
 }
 
 double error_ratio(const std::array<double, kProbeCodewords.size()>& errors_of_small,

@@ -30,20 +30,21 @@ constexpr std::size_t probe_tiles(int codewords) {
       2 * static_cast<std::size_t>(codewords));
 }
 
+/// What a codebook of a probe is to be.
+struct ProbedCodebook {
+  int codewords;
+  int mean_step;  ///< of mean-removed tiles; 0: plain ones
+  std::uint64_t seed;
+};
+
 /// A codebook trained as a field's is on the first tiles of `shuffled`, kProbeTilesPerCodeword per
-/// codeword: on plain tiles, or on folded shapes (remove_means()) where `mean_step` is above 0. Of
-/// fewer codewords when there are not so many tiles.
-Codebook small_codebook(std::span<const NumberedTile> shuffled,
-                        int codewords,
-                        int mean_step,
-                        std::uint64_t seed);
+/// codeword: on plain tiles, or on folded shapes (remove_means()) where `wanted.mean_step` is above
+/// 0. Of fewer codewords when there are not so many tiles.
+Codebook small_codebook(std::span<const NumberedTile> shuffled, const ProbedCodebook& wanted);
 
 /// A codebook of the size of a field's whose codewords are drawn, not trained: its indices compress
 /// as a field's do. Of fewer codewords when there are not twice as many tiles.
-Codebook drawn_codebook(std::span<const NumberedTile> shuffled,
-                        int codewords,
-                        int mean_step,
-                        std::uint64_t seed);
+Codebook drawn_codebook(std::span<const NumberedTile> shuffled, const ProbedCodebook& wanted);
 
 /// Sum over tiles, or folded shapes, of the squared distance to the nearest codeword, in levels.
 double squared_error(std::span<const NumberedTile> tiles, const Codebook& codebook);
