@@ -5,7 +5,7 @@
 
 #include "precompute/design/design_probe.h"
 #include "precompute/formatted_text.h"
-#include "precompute/pipeline/rank_reduction.h"
+#include "precompute/pipeline/field_build.h"
 
 namespace af {
 

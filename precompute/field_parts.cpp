@@ -166,8 +166,8 @@ std::unique_ptr<const FieldCaster> make_caster(const std::vector<FieldPart>& par
   return std::make_unique<const JoinedCaster>(std::move(casters), slab_counts(parts));
 }
 
-std::vector<double> unit_costs(const std::vector<WorkUnit>& units,
-                               const std::vector<FieldPart>& parts) {
+std::vector<double> costs_over_parts(const std::vector<WorkUnit>& units,
+                                     const std::vector<FieldPart>& parts) {
   const std::vector<SlabPlace> places = slab_places(slab_counts(parts));
   std::vector<double> costs;
   costs.reserve(units.size());

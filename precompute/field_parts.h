@@ -46,8 +46,8 @@ std::unique_ptr<const FieldCaster> make_caster(const std::vector<FieldPart>& par
                                                const PrecomputeOptions& options,
                                                const AttenuationQuantizer& quantizer);
 
-/// The relative costs of casting units of all slabs.
-std::vector<double> unit_costs(const std::vector<WorkUnit>& units,
-                               const std::vector<FieldPart>& parts);
+/// unit_costs() of units of all slabs.
+std::vector<double> costs_over_parts(const std::vector<WorkUnit>& units,
+                                     const std::vector<FieldPart>& parts);
 
 }  // namespace af

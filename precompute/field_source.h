@@ -8,6 +8,7 @@
 
 #include "geometry/camera_geometry.h"
 #include "geometry/rigid_transform.h"
+#include "geometry/slab_sizing.h"
 #include "parallel/communicator.h"
 #include "precompute/measured_views.h"
 #include "precompute/plan/precompute_options.h"

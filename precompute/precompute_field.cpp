@@ -11,7 +11,9 @@
 
 #include "base/build_info.h"
 #include "base/error.h"
-#include "field_file/field_file.h"
+#include "field_file/field_reading.h"
+#include "field_file/field_writing.h"
+#include "field_file/parallel_write_check.h"
 #include "files/output_file.h"
 #include "parallel/work_watch.h"
 #include "precompute/build_record.h"
@@ -246,7 +248,7 @@ class PrecomputeRun {
     const FieldBuild build{caster,
                            lattice_,
                            units,
-                           unit_costs(units, parts_),
+                           costs_over_parts(units, parts_),
                            progress.has_value() ? &*progress : nullptr,
                            world_};
     CastPhase cast = cast_phase(build);

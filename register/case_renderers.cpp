@@ -16,7 +16,7 @@
 #include "drr/field_set_drr.h"
 #include "drr/ray_cast_drr.h"
 #include "drr/two_pass_af_drr.h"
-#include "geometry/pose_in_range.h"
+#include "geometry/motion_range.h"
 #include "study/node_ct.h"
 #include "volume/blurred_volume.h"
 

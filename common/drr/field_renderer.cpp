@@ -19,6 +19,8 @@ using PoolPointer = std::shared_ptr<ThreadPool>;
 struct KnownLookUp {
   const char* name = nullptr;
   const char* help = nullptr;
+  /// What searches take of several slabs instead; null: this one.
+  const char* of_searches = nullptr;
   RendererPointer (*make)(FieldPointer field, const PoolPointer& pool) = nullptr;
   RendererPointer (*make_decoded)(LevelPointer level_0, const PoolPointer& pool) = nullptr;
 };
@@ -32,22 +34,30 @@ RendererPointer make_two_pass(Pointer samples, const PoolPointer& pool) {
   return std::make_shared<const TwoPassAfDrr>(std::move(samples), options, pool);
 }
 template <TwoPassOptions options>
-constexpr KnownLookUp two_pass(const char* name, const char* help) {
-  return {name, help, make_two_pass<FieldPointer, options>, make_two_pass<LevelPointer, options>};
+constexpr KnownLookUp two_pass(const char* name,
+                               const char* help,
+                               const char* of_searches = nullptr) {
+  return {name,
+          help,
+          of_searches,
+          make_two_pass<FieldPointer, options>,
+          make_two_pass<LevelPointer, options>};
 }
 
 using enum AxisInterpolation;
 
 /// Every way of looking up there is; a new one joins here.
 constexpr std::array kLookUps = {
-    KnownLookUp{"nearest", "nearest node", make_literal<FieldInterpolation::Nearest>, nullptr},
+    KnownLookUp{
+        "nearest", "nearest node", nullptr, make_literal<FieldInterpolation::Nearest>, nullptr},
     two_pass<TwoPassOptions{Linear, Linear}>("linear", "linear, in two passes"),
     two_pass<TwoPassOptions{Linear, Linear, true}>(
         "cubic-sum", "linear, but several slabs are summed on a quarter more nodes"),
-    two_pass<TwoPassOptions{Cubic, Linear}>("cubic", "cubic over (s,t)"),
+    two_pass<TwoPassOptions{Cubic, Linear}>("cubic", "cubic over (s,t)", "cubic-sum"),
     two_pass<TwoPassOptions{Cubic, Cubic}>("cubic-uv", "cubic over (s,t) and (u,v)"),
     KnownLookUp{"quadrilinear",
                 "over each ray's 16 nodes, the definition",
+                nullptr,
                 make_literal<FieldInterpolation::Quadrilinear>,
                 nullptr},
 };
@@ -63,7 +73,8 @@ std::string field_look_up_help() {
 }
 
 std::string look_up_of_searches(const std::string& own, std::size_t slab_count) {
-  return slab_count > 1 && own == "cubic" ? "cubic-sum" : own;
+  const char* of_several = required_row(kLookUps, "look-up", own).of_searches;
+  return slab_count > 1 && of_several != nullptr ? of_several : own;
 }
 
 RendererPointer make_field_renderer(FieldPointer field,

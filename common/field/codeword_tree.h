@@ -7,7 +7,7 @@
 
 #include "field/codebook.h"
 #include "field/index_coding_kernel.h"
-#include "field/tile_transform.h"
+#include "field/tile.h"
 
 namespace af {
 

@@ -10,7 +10,7 @@
 #include "field/attenuation_quantizer.h"
 #include "field/codebook.h"
 #include "geometry/light_slab.h"
-#include "geometry/slab_sizing.h"
+#include "geometry/motion_range.h"
 
 namespace af {
 

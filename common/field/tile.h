@@ -24,4 +24,10 @@ inline bool is_zero(const Tile& tile) {
   return any == 0;
 }
 
+/// A tile in the coordinates of the 4-D Hadamard transform; coefficient j is the sum of the levels,
+/// negative where an element's number shares an odd number of bits with j. Exact.
+using TileCoefficients = std::array<float, kTileElements>;
+
+TileCoefficients hadamard_coefficients(const Tile& tile);
+
 }  // namespace af

@@ -12,6 +12,7 @@
 
 #include "field_file/field_file.h"
 #include "field_file/field_layout.h"
+#include "parallel/communicator.h"
 
 namespace af::field_layout {
 

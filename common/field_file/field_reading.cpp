@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads fields and atlases: what field_file.h promises of its readers.
+#include "field_file/field_reading.h"
+
 #include <algorithm>
 #include <optional>
 #include <span>
 
 #include "base/error.h"
 #include "base/stored_bytes.h"
-#include "field_file/field_file.h"
 #include "field_file/field_header.h"
 #include "field_file/field_layout.h"
 #include "field_file/hdf5_calls.h"
@@ -25,10 +25,10 @@ using field_layout::FieldHeader;
 using field_layout::FileHeader;
 using field_layout::info_of;
 using field_layout::read_header_of;
-using field_layout::read_planes;
 using field_layout::shared_header;
 using hdf5::Handle;
 using hdf5::naming_file;
+using hdf5::read_planes;
 
 /// Reads and verifies the indices of one slab into memory for all of them.
 void read_indices(const std::filesystem::path& path,

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes fields and atlases: what field_file.h promises of write_field() and write_atlas().
+#include "field_file/field_writing.h"
+
 #include <algorithm>
 #include <array>
 #include <iterator>
@@ -8,7 +9,6 @@
 #include <utility>
 
 #include "base/error.h"
-#include "field_file/field_file.h"
 #include "field_file/field_layout.h"
 #include "field_file/hdf5_calls.h"
 #include "field_file/index_chunks.h"
@@ -25,17 +25,17 @@ namespace af {
 
 namespace {
 
-using field_layout::create_index_dataset;
 using field_layout::Dataset;
 using field_layout::DatasetRule;
-using field_layout::hash_sum;
 using field_layout::index_rules;
 using field_layout::kSha256Digits;
 using field_layout::payload_hash;
-using field_layout::read_planes;
 using hdf5::checked;
+using hdf5::create_index_dataset;
 using hdf5::Handle;
+using hdf5::hash_sum;
 using hdf5::naming_file;
+using hdf5::read_planes;
 
 /// First value and number of values of a block along the axes of its dataset: tiles, but along s
 /// rows.

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "field_file/field_file.h"
+#include "field_file/field_writing.h"
 #include "field_file/hdf5_calls.h"
 
 namespace af::hdf5 {

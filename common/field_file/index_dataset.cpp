@@ -9,11 +9,8 @@
 #include "field_file/index_filter.h"
 #include "parallel/work_watch.h"
 
-namespace af::field_layout {
+namespace af::hdf5 {
 namespace {
-
-using hdf5::checked;
-using hdf5::Handle;
 
 constexpr unsigned kDeflateLevel = 4;
 
@@ -24,11 +21,11 @@ std::uint64_t position_hash(std::uint64_t position, std::uint16_t value) {
   return x ^ (x >> 31u);
 }
 
-Handle index_creation(const hdf5::ChunkShape& chunk, IndexPacking packing) {
+Handle index_creation(const ChunkShape& chunk, IndexPacking packing) {
   Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose, "H5Pcreate");
   checked(H5Pset_chunk(creation, 4, chunk.data()), "H5Pset_chunk");
   if (packing == IndexPacking::CodebookTree) {
-    hdf5::add_index_filter(creation, chunk);
+    add_index_filter(creation, chunk);
     return creation;
   }
   checked(H5Pset_shuffle(creation), "H5Pset_shuffle");
@@ -54,36 +51,36 @@ std::uint64_t hash_sum(std::uint64_t first, std::span<const std::uint16_t> value
 }
 
 void create_index_dataset(hid_t file,
-                          const DatasetRule& rule,
-                          const hdf5::ChunkShape& chunk,
+                          const field_layout::DatasetRule& rule,
+                          const ChunkShape& chunk,
                           IndexPacking packing) {
   const std::vector<hsize_t> extents(rule.extents.begin(), rule.extents.end());
   const Handle space(H5Screate_simple(4, extents.data(), nullptr), H5Sclose, "H5Screate_simple");
   const Handle links(H5Pcreate(H5P_LINK_CREATE), H5Pclose, "H5Pcreate");
   checked(H5Pset_create_intermediate_group(links, 1), "H5Pset_create_intermediate_group");
   const Handle creation = index_creation(chunk, packing);
-  const Handle type = hdf5::file_type(rule);
+  const Handle type = file_type(rule);
   const Handle dataset(
       H5Dcreate2(file, rule.name.c_str(), type, space, links, creation, H5P_DEFAULT),
       H5Dclose,
       "H5Dcreate2");
-  hdf5::write_text_attribute(dataset, "units", rule.units);
-  hdf5::write_text_attribute(dataset, "frame", rule.frame);
+  write_text_attribute(dataset, "units", rule.units);
+  write_text_attribute(dataset, "frame", rule.frame);
   // The true hash replaces this once the data are there.
-  hdf5::write_text_attribute(dataset, "sha256", std::string(kSha256Digits, '0'));
+  write_text_attribute(dataset, "sha256", std::string(field_layout::kSha256Digits, '0'));
 }
 
 void read_planes(
     hid_t dataset,
-    const DatasetRule& rule,
+    const field_layout::DatasetRule& rule,
     const std::function<std::span<std::uint16_t>(std::uint64_t u, std::uint64_t count)>& planes_of,
     const std::function<void(std::uint64_t u, std::span<const std::uint16_t> planes)>& done) {
   const Handle in_file(H5Dget_space(dataset), H5Sclose, "H5Dget_space");
   std::array<hsize_t, 4> start{};
   std::array<hsize_t, 4> count = {1, rule.extents[1], rule.extents[2], rule.extents[3]};
   const std::uint64_t at_once = planes_of_chunk(dataset);
-  hdf5::ChunkShape chunk{};
-  const bool is_coded = hdf5::is_coded(dataset, chunk);
+  ChunkShape chunk{};
+  const bool coded = is_coded(dataset, chunk);
   for (std::uint64_t u = 0; u < rule.extents[0]; u += count[0]) {
     start[0] = u;
     count[0] = std::min(at_once, rule.extents[0] - u);
@@ -93,8 +90,8 @@ void read_planes(
         H5Sselect_hyperslab(in_file, H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr),
         "H5Sselect_hyperslab");
     const std::span<std::uint16_t> planes = planes_of(u, count[0]);
-    if (is_coded)
-      hdf5::read_coded_planes(dataset, rule, chunk, u, count[0], planes);
+    if (coded)
+      read_coded_planes(dataset, rule, chunk, u, count[0], planes);
     else
       checked(H5Dread(dataset, H5T_NATIVE_UINT16, in_memory, in_file, H5P_DEFAULT, planes.data()),
               "H5Dread");
@@ -103,4 +100,4 @@ void read_planes(
   }
 }
 
-}  // namespace af::field_layout
+}  // namespace af::hdf5

@@ -12,7 +12,7 @@
 #include "field_file/field_file.h"
 #include "field_file/index_chunks.h"
 
-namespace af::field_layout {
+namespace af::hdf5 {
 
 /// A sum over the values (indices and means) of a slab from number `first` on. Over all blocks of a
 /// slab, whoever holds them, it adds up to one that a lost, doubled, moved or changed value
@@ -21,16 +21,16 @@ std::uint64_t hash_sum(std::uint64_t first, std::span<const std::uint16_t> value
 
 /// Rank 0 alone: an empty dataset of indices, packed chunk by chunk.
 void create_index_dataset(hid_t file,
-                          const DatasetRule& rule,
-                          const hdf5::ChunkShape& chunk,
+                          const field_layout::DatasetRule& rule,
+                          const ChunkShape& chunk,
                           IndexPacking packing);
 
 /// Reads the planes [u] of an index dataset one after the other, as many at once as its chunks
 /// span, into `planes_of(u, count)`, which returns memory for them, and calls `done(u, planes)`.
 void read_planes(
     hid_t dataset,
-    const DatasetRule& rule,
+    const field_layout::DatasetRule& rule,
     const std::function<std::span<std::uint16_t>(std::uint64_t u, std::uint64_t count)>& planes_of,
     const std::function<void(std::uint64_t u, std::span<const std::uint16_t> planes)>& done);
 
-}  // namespace af::field_layout
+}  // namespace af::hdf5

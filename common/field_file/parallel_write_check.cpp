@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "field_file/parallel_write_check.h"
+
 #include <algorithm>
 #include <array>
 #include <cstdlib>
@@ -9,8 +11,8 @@
 #include <mpi.h>
 
 #include "base/error.h"
-#include "field_file/field_file.h"
 #include "field_file/field_layout.h"
+#include "field_file/field_writing.h"
 #include "field_file/index_chunks.h"
 #include "parallel/work_watch.h"
 

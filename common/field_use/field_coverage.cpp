@@ -7,9 +7,9 @@
 
 #include "base/hash_random.h"
 #include "drr/slab_rays.h"
-#include "field_file/field_file.h"
+#include "field_file/field_reading.h"
 #include "geometry/camera_distance.h"
-#include "geometry/pose_in_range.h"
+#include "geometry/motion_range.h"
 #include "geometry/ray_coverage.h"
 
 namespace af {

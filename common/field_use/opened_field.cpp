@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "drr/field_renderer.h"
+#include "field_file/field_reading.h"
 
 namespace af {
 

@@ -8,7 +8,7 @@
 #include <sstream>
 
 #include "base/error.h"
-#include "geometry/pose_in_range.h"
+#include "geometry/motion_range.h"
 #include "geometry/rotation_search.h"
 
 namespace af {

@@ -9,7 +9,7 @@
 
 #include "base/error.h"
 #include "geometry/hit_extents.h"
-#include "geometry/pose_in_range.h"
+#include "geometry/motion_range.h"
 
 namespace af {
 

@@ -5,7 +5,8 @@
 #include <cstdint>
 #include <string>
 
-#include "geometry/slab_sizing.h"
+#include "geometry/light_slab.h"
+#include "geometry/motion_range.h"
 
 namespace af {
 

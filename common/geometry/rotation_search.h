@@ -8,7 +8,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "geometry/slab_sizing.h"
+#include "geometry/motion_range.h"
 
 namespace af {
 

@@ -7,38 +7,9 @@
 #include <vector>
 
 #include "geometry/light_slab.h"
+#include "geometry/motion_range.h"
 
 namespace af {
-
-/// The motion box of a field: bounds of each angle and of each translation relative to its
-/// PoseFrame. The box need not hold zero, the nominal pose.
-struct MotionRange {
-  PoseParameters low;
-  PoseParameters high;
-
-  MotionRange() : MotionRange(10.0 * kRadPerDeg, 100.0) {}
-  /// The same to both sides of zero about and along every axis.
-  MotionRange(double max_rotation_rad, double max_translation_mm);
-  MotionRange(const PoseParameters& lowest, const PoseParameters& highest)
-      : low(lowest), high(highest) {}
-
-  [[nodiscard]] bool contains(const PoseParameters& parameters) const;
-  /// Whether two numbers say all: max_rotation_rad() and max_translation_mm().
-  [[nodiscard]] bool is_symmetric() const;
-  /// Farthest from zero of any bound.
-  [[nodiscard]] double max_rotation_rad() const;
-  [[nodiscard]] double max_translation_mm() const;
-  /// The largest box of two numbers within this one; of the size 0 where this one misses zero.
-  [[nodiscard]] MotionRange symmetric_part() const;
-  [[nodiscard]] MotionRange scaled(double factor) const;
-  /// The parameters, each brought into the middle `share` of its bounds.
-  [[nodiscard]] PoseParameters clamped(const PoseParameters& parameters, double share = 1.0) const;
-  /// "+-10 deg, +-30 mm" or the bounds of each axis.
-  [[nodiscard]] std::string text() const;
-};
-
-/// Why a field cannot be sized for it; empty when it can.
-std::vector<std::string> problems(const MotionRange& range);
 
 /// Extent of ray hits on one plane y = const (mm).
 struct PlaneExtent {

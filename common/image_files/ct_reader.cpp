@@ -52,28 +52,6 @@ std::string triple(const auto& values) {
   return "(" + text(values[0]) + ", " + text(values[1]) + ", " + text(values[2]) + ")";
 }
 
-void check_grid(const CtGrid& grid, const std::string& file) {
-  std::vector<std::string> problems;
-  for (const int extent : grid.size)
-    if (extent < 2) {
-      problems.push_back("size = " + triple(grid.size) +
-                         ": must be at least 2 voxels on each axis");
-      break;
-    }
-  if (!std::all_of(grid.spacing_mm.begin(), grid.spacing_mm.end(), is_plausible_spacing_mm))
-    problems.push_back("spacing = " + triple(grid.spacing_mm) + " mm: " + kPlausibleSpacing);
-  if (!(grid.origin_mm.cwiseAbs().maxCoeff() <= kMaxCtOriginMm))
-    problems.push_back("origin = " + triple(grid.origin_mm) +
-                       " mm: must be finite and within 1e4 mm (10 m)");
-  const Eigen::Matrix3d gram = grid.direction.transpose() * grid.direction;
-  if (!((gram - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() <= kMaxDirectionError))
-    problems.push_back("direction columns " + triple(grid.direction.col(0)) + ", " +
-                       triple(grid.direction.col(1)) + ", " + triple(grid.direction.col(2)) +
-                       ": must be orthonormal (a sheared or scaled grid is not supported; resample "
-                       "the CT)");
-  throw_if_any(problems, file);
-}
-
 /// Refuses what is no scalar volume; runs before voxels are allocated.
 void check_is_scalar_volume(const RawImage& image, const fs::path& path) {
   if (image.channels != 1)
@@ -147,7 +125,7 @@ void check_nifti_orientation(const CtGrid& grid,
 
 void check_is_ct(const RawImage& image, const fs::path& path) {
   check_is_scalar_volume(image, path);
-  check_grid(grid_of(image), path.string());
+  require_sound_grid(grid_of(image), path.string());
 }
 
 void add_values(ValueType type, std::span<const std::byte> bytes, HuValues& values) {
@@ -321,7 +299,7 @@ CtVolume read_ct(const fs::path& path,
     DicomCt series = read_dicom_series(path, options, &found);
     ct.grid = series.grid;
     values = std::move(series.values);
-    check_grid(ct.grid, path.string());
+    require_sound_grid(ct.grid, path.string());
   } else {
     ct = read_ct_image(path, values, found);
   }
@@ -341,7 +319,25 @@ std::string ct_frame_of_reference(const fs::path& path, const CtReadOptions& opt
 }
 
 void require_sound_grid(const CtGrid& grid, const std::string& file) {
-  check_grid(grid, file);
+  std::vector<std::string> problems;
+  for (const int extent : grid.size)
+    if (extent < 2) {
+      problems.push_back("size = " + triple(grid.size) +
+                         ": must be at least 2 voxels on each axis");
+      break;
+    }
+  if (!std::all_of(grid.spacing_mm.begin(), grid.spacing_mm.end(), is_plausible_spacing_mm))
+    problems.push_back("spacing = " + triple(grid.spacing_mm) + " mm: " + kPlausibleSpacing);
+  if (!(grid.origin_mm.cwiseAbs().maxCoeff() <= kMaxCtOriginMm))
+    problems.push_back("origin = " + triple(grid.origin_mm) +
+                       " mm: must be finite and within 1e4 mm (10 m)");
+  const Eigen::Matrix3d gram = grid.direction.transpose() * grid.direction;
+  if (!((gram - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() <= kMaxDirectionError))
+    problems.push_back("direction columns " + triple(grid.direction.col(0)) + ", " +
+                       triple(grid.direction.col(1)) + ", " + triple(grid.direction.col(2)) +
+                       ": must be orthonormal (a sheared or scaled grid is not supported; resample "
+                       "the CT)");
+  throw_if_any(problems, file);
 }
 
 void write_ct(const CtVolume& ct, const fs::path& path) {

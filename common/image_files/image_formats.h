@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The parts of image_header.cpp, one per kind of file. For that file and stored_image.cpp alone.
+// Internal to image_files: how the header of each format is read and checked (NAME_header.cpp).
 #pragma once
 
 #include <cstdint>

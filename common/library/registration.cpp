@@ -13,6 +13,7 @@
 #include "library/translation.h"
 #include "register/case_loading.h"
 #include "register/method/method_options.h"
+#include "register/method/presets.h"
 #include "register/method/registration.h"
 #include "register/uncertainty/uncertainty_estimator.h"
 #include "register/verdict/pose_examiner.h"

@@ -6,7 +6,6 @@
 #include <span>
 
 #include "base/described_fields.h"
-#include "geometry/slab_sizing.h"
 #include "volume/ct_volume.h"
 
 namespace af {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "drr/drr_renderer.h"
-#include "geometry/slab_sizing.h"
+#include "geometry/motion_range.h"
 #include "image/psnr.h"
 
 namespace af::evaluation {

@@ -10,7 +10,7 @@
 
 #include "drr/ray_cast_drr.h"
 #include "drr/two_pass_af_drr.h"
-#include "field_file/field_file.h"
+#include "field_file/field_reading.h"
 #include "figures/picture.h"
 #include "files/output_file.h"
 #include "study/node_ct.h"

@@ -15,7 +15,7 @@
 #include "evaluate/methods/loaded_methods.h"
 #include "evaluate/outputs/table_paths.h"
 #include "evaluate/sweeps/lattice_errors.h"
-#include "field_file/field_file.h"
+#include "field_file/field_reading.h"
 #include "files/output_file.h"
 #include "gold_standard/target_box.h"
 #include "gold_standard/tre.h"

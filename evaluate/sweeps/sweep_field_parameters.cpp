@@ -17,7 +17,7 @@
 #include "evaluate/outputs/row_gathering.h"
 #include "evaluate/sweeps/difference_images.h"
 #include "evaluate/sweeps/field_parameter_tables.h"
-#include "field_file/field_file.h"
+#include "field_file/field_reading.h"
 #include "figures/gnuplot_figure.h"
 #include "files/output_file.h"
 #include "files/resource_check.h"

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "geometry/rigid_transform.h"
 #include "volume/attenuation_volume.h"
 
 namespace af {

@@ -7,7 +7,7 @@
 
 #include "base/error.h"
 #include "base/vector_width.h"
-#include "field/tile_transform.h"
+#include "field/tile.h"
 
 namespace af {
 

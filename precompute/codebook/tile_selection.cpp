@@ -69,7 +69,9 @@ Move move_of_rank(std::span<const std::uint64_t> counts, std::size_t rank) {
   return move;
 }
 
-void level_out_tiles(std::vector<NumberedTile>& tiles, const CodebookReduction& reduction) {
+/// Collective. Moves tiles from ranks that have more than the mean to ranks that have fewer, so
+/// that all take equally long to train; only the tiles moved travel.
+void level_out(std::vector<NumberedTile>& tiles, const CodebookReduction& reduction) {
   const std::uint64_t mine = tiles.size();
   std::vector<std::uint64_t> counts;
   for (const auto& bytes : reduction.all_gather(std::as_bytes(std::span(&mine, 1)))) {
@@ -161,18 +163,15 @@ TrainingShare TrainingTilePicker::take(const CodebookReduction& reduction) {
       histogram_, last_hash_of_fraction(selection_.fraction), selection_.max_training_tiles);
   held_out_above_ = held_out_above(last_training_);
   drop_beyond();
-  candidates_.training.shrink_to_fit();
-  candidates_.held_out.shrink_to_fit();
+  for (std::vector<NumberedTile>* tiles : {&candidates_.training, &candidates_.held_out}) {
+    tiles->shrink_to_fit();
+    level_out(*tiles, reduction);
+  }
   return std::move(candidates_);
 }
 
 std::uint64_t TrainingTilePicker::hash_of(const NumberedTile& tile) const {
   return hash64(selection_.seed, kTrainingStream, static_cast<std::uint64_t>(tile.global_index));
-}
-
-void level_out(TrainingShare& share, const CodebookReduction& reduction) {
-  level_out_tiles(share.training, reduction);
-  level_out_tiles(share.held_out, reduction);
 }
 
 }  // namespace af

@@ -48,7 +48,8 @@ class TrainingTilePicker {
 
   void add(const UnitTiles& tiles, const WorkUnit& unit);
 
-  /// Collective. This rank's share of all units added on any rank, leaving the picker empty.
+  /// Collective. An equal share of what the units added on all ranks gave, leaving the picker
+  /// empty.
   [[nodiscard]] TrainingShare take(const CodebookReduction& reduction);
 
  private:
@@ -65,9 +66,5 @@ class TrainingTilePicker {
   std::vector<std::uint64_t> histogram_;  ///< of the hashes at most last_training_, by bin
   TrainingShare candidates_;
 };
-
-/// Collective. Moves tiles from ranks that have more than the mean to ranks that have fewer, so
-/// that all take equally long to train; only the tiles moved travel.
-void level_out(TrainingShare& share, const CodebookReduction& reduction);
 
 }  // namespace af

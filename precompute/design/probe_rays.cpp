@@ -7,7 +7,7 @@
 
 #include "base/error.h"
 #include "base/hash_random.h"
-#include "geometry/pose_in_range.h"
+#include "geometry/motion_range.h"
 #include "volume/ray_caster.h"
 
 namespace af {

@@ -12,7 +12,6 @@
 #include "parallel/work_queue.h"
 #include "parallel/work_watch.h"
 #include "precompute/codebook/mean_removal.h"
-#include "precompute/pipeline/rank_reduction.h"
 #include "precompute/units/unit_tiles.h"
 
 namespace af {
@@ -174,7 +173,6 @@ TrainedCodebook train_field(const FieldBuild& build,
   // Every rank comes to the same conclusion; this makes it one error of the whole job.
   return all_or_none(build.communicator, [&] {
     TrainingShare share = cast.picker.take(reduction);
-    level_out(share, reduction);
     remove_means(share, options.mean_step);
     return train_codebook(share, options, reduction, on_progress, checkpoints);
   });

@@ -17,6 +17,14 @@
 
 namespace af {
 
+/// How the ranks of a communicator, which must outlive it, combine their results.
+inline CodebookReduction reduction_over(const Communicator& communicator) {
+  return {
+      [&communicator](std::span<std::uint64_t> values) { communicator.sum(values); },
+      [&communicator](std::span<const std::byte> mine) { return communicator.all_gather(mine); },
+      static_cast<std::size_t>(communicator.rank())};
+}
+
 /// Asked between units; true ends casting with progress saved.
 using StopRequested = std::function<bool()>;
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "field_file/field_file.h"
+#include "field_file/field_writing.h"
 #include "precompute/codebook/nearest_codeword.h"
 #include "precompute/codebook/unit_encoding.h"
 #include "precompute/pipeline/field_build.h"

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "base/described_fields.h"
-#include "geometry/slab_sizing.h"
+#include "geometry/motion_range.h"
 #include "precompute/casting/depth_slabs.h"
 #include "precompute/codebook/codebook_training.h"
 #include "precompute/codebook/tile_selection.h"

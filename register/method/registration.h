@@ -12,7 +12,6 @@
 #include "base/thread_pool.h"
 #include "drr/drr_renderer.h"
 #include "register/method/correction.h"
-#include "register/method/presets.h"
 #include "register/method/registration_options.h"
 #include "register/problem/registration_problem.h"
 

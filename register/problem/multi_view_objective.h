@@ -9,7 +9,7 @@
 
 #include "base/thread_pool.h"
 #include "drr/drr_renderer.h"
-#include "geometry/slab_sizing.h"
+#include "geometry/motion_range.h"
 #include "register/optimizer/optimizer.h"
 #include "register/similarity/similarity_measure.h"
 

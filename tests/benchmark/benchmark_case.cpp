@@ -10,6 +10,7 @@
 #include "base/build_info.h"
 #include "base/error.h"
 #include "base/vector_width.h"
+#include "geometry/slab_sizing.h"
 #include "image_files/ct_reader.h"
 #include "precompute/casting/shear_warp_caster.h"
 #include "study/rig_file.h"

@@ -10,7 +10,7 @@
 #include "cli/app_forward.h"
 #include "drr/drr_renderer.h"
 #include "field/attenuation_quantizer.h"
-#include "geometry/slab_sizing.h"
+#include "geometry/light_slab.h"
 #include "precompute/casting/slab_aligned_volume.h"
 #include "precompute/units/unit_tiles.h"
 #include "precompute/units/work_unit.h"

@@ -14,7 +14,7 @@
 #include "cli/app_main.h"
 #include "drr/ray_cast_drr.h"
 #include "drr/two_pass_af_drr.h"
-#include "field_file/field_file.h"
+#include "field_file/field_reading.h"
 #include "image/psnr.h"
 #include "precompute/casting/shear_warp_caster.h"
 #include "support/central_differences.h"

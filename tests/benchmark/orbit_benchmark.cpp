@@ -14,7 +14,7 @@
 #include "benchmark/benchmark_case.h"
 #include "benchmark/viewpoint_cylinder.h"
 #include "cli/app_main.h"
-#include "geometry/pose_in_range.h"
+#include "geometry/motion_range.h"
 #include "image/psnr.h"
 #include "image_files/ct_reader.h"
 #include "study/rig_file.h"

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "base/error.h"
-#include "geometry/pose_in_range.h"
+#include "geometry/motion_range.h"
 #include "geometry/rotation_search.h"
 
 namespace af::benchmark {

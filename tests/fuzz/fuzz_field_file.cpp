@@ -9,6 +9,8 @@
 #include <utility>
 
 #include "field_file/field_layout.h"
+#include "field_file/field_reading.h"
+#include "field_file/field_writing.h"
 #include "field_file/hdf5_calls.h"
 #include "field_file/index_filter.h"
 #include "files/sha256.h"

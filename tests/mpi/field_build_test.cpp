@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "base/stored_bytes.h"
 #include "base/vector_width.h"
+#include "field_file/field_reading.h"
 #include "parallel/values_of_ranks.h"
 #include "precompute/casting/slab_aligned_volume.h"
 #include "precompute/casting/trilinear_caster.h"

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "field_file/field_file.h"
-
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -12,9 +10,12 @@
 #include "base/error.h"
 #include "base/hash_random.h"
 #include "field_file/field_layout.h"
+#include "field_file/field_reading.h"
+#include "field_file/field_writing.h"
 #include "field_file/hdf5_calls.h"
 #include "field_file/index_chunks.h"
 #include "field_file/index_filter.h"
+#include "field_file/parallel_write_check.h"
 #include "files/sha256.h"
 #include "support/shared_folder.h"
 

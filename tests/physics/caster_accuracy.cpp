@@ -6,6 +6,7 @@
 #include <random>
 #include <vector>
 
+#include "geometry/slab_sizing.h"
 #include "precompute/casting/shear_warp_caster.h"
 #include "volume/ray_caster.h"
 

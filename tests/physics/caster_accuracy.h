@@ -2,7 +2,7 @@
 #pragma once
 
 #include "geometry/camera_geometry.h"
-#include "geometry/slab_sizing.h"
+#include "geometry/motion_range.h"
 #include "volume/attenuation_volume.h"
 
 namespace af::test {

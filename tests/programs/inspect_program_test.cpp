@@ -11,7 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "base/build_info.h"
-#include "field_file/field_file.h"
+#include "field_file/field_reading.h"
 #include "geometry/ray_coverage.h"
 #include "pose_files/pose_file.h"
 #include "programs/small_study.h"

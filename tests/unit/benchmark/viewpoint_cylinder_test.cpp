@@ -41,7 +41,7 @@ OrbitScene random_scene(HashRandom& random) {
 }
 
 /// A pose of the range: every other one with some parameters at their bounds.
-PoseParameters random_pose(const MotionRange& range, HashRandom& random) {
+PoseParameters pose_or_bounds(const MotionRange& range, HashRandom& random) {
   const double at_bounds = random.uniform() < 0.5 ? 0.6 : 0.0;
   const auto between = [&](double low, double high) {
     const double share = random.uniform();
@@ -87,7 +87,7 @@ TEST(ViewpointCylinder, HoldsEveryRayOfTheOrbit) {
       const CameraGeometry camera =
           turned_camera(scene.camera, scene.isocenter_point, scene.orbit.direction(), angle);
       const RigidTransform ct_from_room =
-          pose_from_parameters(scene.frame, random_pose(scene.range, random)).inverse();
+          pose_from_parameters(scene.frame, pose_or_bounds(scene.range, random)).inverse();
       const Eigen::Vector3d source = ct_from_room * camera.source_point;
       for (const Eigen::Vector3d& corner : camera.detector_corner_points())
         ASSERT_TRUE(holds(cylinder, {source, ct_from_room * corner - source}))

@@ -9,6 +9,7 @@
 #include "drr/field_level.h"
 #include "drr/ray_cast_drr.h"
 #include "drr/two_pass_af_drr.h"
+#include "geometry/slab_sizing.h"
 #include "support/ct_phantoms.h"
 #include "support/cube_grid.h"
 #include "support/plane_products.h"

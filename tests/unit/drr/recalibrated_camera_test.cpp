@@ -12,6 +12,7 @@
 #include "drr/two_pass_af_drr.h"
 #include "geometry/camera_distance.h"
 #include "geometry/ray_coverage.h"
+#include "geometry/slab_sizing.h"
 #include "image/psnr.h"
 #include "support/c_arm_camera.h"
 #include "support/ct_phantoms.h"

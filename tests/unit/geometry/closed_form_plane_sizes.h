@@ -6,8 +6,8 @@
 #include <string>
 
 #include "base/error.h"
+#include "geometry/motion_range.h"
 #include "geometry/rigid_transform.h"
-#include "geometry/slab_sizing.h"
 
 namespace af::test {
 

@@ -11,8 +11,8 @@
 #include "base/hash_random.h"
 #include "geometry/camera_distance.h"
 #include "geometry/hit_extents.h"
+#include "geometry/motion_range.h"
 #include "geometry/orbit.h"
-#include "geometry/pose_in_range.h"
 #include "support/c_arm_camera.h"
 
 namespace af {

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "base/vector_width.h"
+#include "geometry/slab_sizing.h"
 #include "precompute/casting/trilinear_caster.h"
 #include "precompute/casting/unit_costs.h"
 #include "precompute/units/unit_planner.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "field/tile_transform.h"
+#include "field/tile.h"
 
 #include <algorithm>
 
