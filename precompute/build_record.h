@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a build has measured, as a person and as the field's provenance read it.
+// What a build has measured, for people and for the field's provenance.
 #pragma once
 
 #include <cstdint>

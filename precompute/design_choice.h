@@ -26,7 +26,7 @@ DesignChoice choose_design(const FieldSource& source,
                            const AttenuationQuantizer& quantizer,
                            const Communicator& communicator);
 
-/// What is printed of it.
+/// The text printed about a choice.
 std::string choice_text(const DesignChoice& choice);
 
 }  // namespace af

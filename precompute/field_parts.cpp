@@ -43,7 +43,7 @@ struct PartKey {
 
 std::vector<PartKey> keys_of_orbit(const FieldSource& source, const PrecomputeOptions& options) {
   Orbit orbit = orbit_of_text("--orbit", options.orbit);
-  // Where the rays of cameras that stay where they are count, too, sources are all over the place.
+  // If the rays of stationary cameras count, too, sources are scattered widely.
   if (!source.more_cameras.empty()) orbit.members_by = Orbit::MembersBy::Pose;
   std::vector<PartKey> keys;
   for (OrbitMember& member :

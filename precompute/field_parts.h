@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What af-precompute makes, as a list: one field, or the members of an atlas; with the planes of
-// each and the caster of all.
+// The fields that af-precompute makes: one field or the members of an atlas, each with its planes,
+// and one caster for all.
 #pragma once
 
 #include <memory>
@@ -21,7 +21,7 @@ namespace af {
 /// One field to make.
 struct FieldPart {
   FieldSource source;  ///< with its own camera, and the range and sources that it is sized for
-  MotionRange range;   ///< about the nominal pose: all of it is held
+  MotionRange range;   ///< about the nominal pose; the field holds all of it
   LightSlab light_slab;
   std::shared_ptr<const SlabAlignedVolume> resampled;  ///< for casters that need it
 };

@@ -17,7 +17,7 @@ namespace af {
 
 namespace {
 
-/// Of what was measured: more left by the CT is a mistake.
+/// Largest plausible residual as a share of the measurement.
 constexpr double kMostLeft = 0.7;
 
 /// The camera as the CT sees it.

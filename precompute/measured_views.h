@@ -28,13 +28,12 @@ struct MeasuredViews {
 };
 
 /// Collective. Reads the X-rays of the case that `options.projections` names, which must state its
-/// true pose, and subtracts what `volume` casts. For a field, only views are read that look along
-/// `beam_ct` (from source to CT, ct frame), not against it; for an atlas all. Errors as of
-/// read_study() and read_view_xray(). InputError when the case states no gold pose, when a value is
-/// not finite, when the sources are on no circle, or when the CT leaves more than 0.7 of what was
-/// measured (of an unrelated object it would leave 1.4 times as much): then the X-rays are of
-/// another object or geometry, or of another scale of attenuation. Views of several sizes have no
-/// common part to remove: InputError.
+/// true pose, and subtracts what `volume` casts. For a field, reads only views that look along
+/// `beam_ct` (from source to CT, ct frame), not against it; for an atlas, reads all. Errors as of
+/// read_study() and read_view_xray(). InputError when the case states no gold pose, a value is not
+/// finite, the sources are not on a circle, a common part is to be removed from views of several
+/// sizes, or the CT leaves more than 0.7 of what was measured (an unrelated object leaves about
+/// 1.4): then the X-rays are of another object, geometry or scale of attenuation.
 std::shared_ptr<const MeasuredViews> load_measured_views(const PrecomputeOptions& options,
                                                          const AttenuationVolume& volume,
                                                          const Eigen::Vector3d& beam_ct,

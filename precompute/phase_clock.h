@@ -21,7 +21,7 @@ inline std::string seconds_text(const PhaseSeconds& seconds) {
   });
 }
 
-/// Measures them.
+/// Measures phases.
 class PhaseClock {
  public:
   void end(const std::string& phase) {
@@ -29,7 +29,7 @@ class PhaseClock {
     seconds_.emplace_back(phase, std::chrono::duration<double>(now - start_).count());
     start_ = now;
   }
-  /// Takes part of what has passed since the last end as a phase of its own.
+  /// Records part of the time since the last end() as a separate phase.
   void split(const std::string& phase, double seconds) {
     seconds_.emplace_back(phase, seconds);
     start_ += std::chrono::duration_cast<std::chrono::steady_clock::duration>(

@@ -67,7 +67,7 @@ class PrecomputeRun {
   }
 
  private:
-  /// Without progress there is nothing to stop for.
+  /// Whether a stop saves the finished work.
   static bool keeps_progress(const PrecomputeOptions& options) {
     return options.has_checkpoint && !options.is_dry_run;
   }
@@ -85,7 +85,7 @@ class PrecomputeRun {
     return pairs;
   }
 
-  /// Collective. Before the work, not after it.
+  /// Collective. Checks the output before the work, not after it.
   void open_output() {
     all_or_none(world_, [&] {
       if (world_.is_root() && std::filesystem::is_directory(options_.output))
@@ -145,7 +145,8 @@ class PrecomputeRun {
     return options_.design().slabs == 1 && options_.st_plane_rule() == StPlane::Centre;
   }
 
-  /// Collective. The design within the budget; of an atlas, one for all, by what a member needs.
+  /// Collective. Chooses the design within the budget; an atlas gets one for all members, by what
+  /// one needs.
   void choose(const FieldPart& part) {
     WorkNote note("probing designs", WorkNote::Kind::Phase);
     choice_ = all_or_none(world_, [&] {
@@ -240,9 +241,10 @@ class PrecomputeRun {
     std::optional<UnitStore> progress;
     if (options_.has_checkpoint) progress.emplace(work, world_);
     if (progress.has_value() && progress->has_replaced_refused())
-      inform(world_,
-             "unfinished work in " + progress->path().string() +
-                 " is discarded: its options were refused, and they have changed");
+      inform(
+          world_,
+          "unfinished work in " + progress->path().string() +
+              " is discarded: the options that it was made with were refused; this run has others");
     const auto units =
         plan_units(lattice_, {progress.has_value() ? progress->rays_per_unit() : work.unit_size});
     const FieldBuild build{caster,
@@ -305,8 +307,8 @@ class PrecomputeRun {
     return megabytes_text(cast.occupied_tiles * sizeof(Tile));
   }
 
-  /// Collective. When options are refused only now, the unfinished work gives way: a later run with
-  /// other options may discard it without --restart.
+  /// Collective. If options are refused only now, marks the unfinished work so that a later run
+  /// with other options may discard it without --restart.
   TrainedCodebook train_or_give_way(const FieldBuild& build,
                                     const DecidingValues& decides,
                                     CastPhase& cast) {

@@ -116,7 +116,7 @@ std::string case_sha256(const Study& study, const StudyCase& study_case) {
   return sha256_hex(std::as_bytes(std::span(text)));
 }
 
-/// Rays are cast through the attenuation that the field was made with.
+/// InputError unless rays are cast through the attenuation that the field was made with.
 void require_same_attenuation(const FieldIdentity& field,
                               const CaseLoadOptions& options,
                               const std::string& path) {
@@ -165,9 +165,9 @@ MotionRange shared_box(const MotionRange& range, const Communicator& communicato
   return {high.rotation_rad.x(), high.translation_mm.x()};
 }
 
-/// Collective. Which poses a field answers for, for the view's camera; says so in a note. The
-/// field's motion range speaks of its own camera; of another one, and of an atlas's, its rays
-/// decide.
+/// Collective. Sets the poses that a field covers for the view's camera and returns a note about
+/// them. The field's motion range holds for its own camera only; for another camera, or an atlas,
+/// its rays decide.
 std::string limit_to_rays(const OpenedField& opened,
                           const PoseFrame& nominal,
                           const Communicator& communicator,

@@ -44,7 +44,7 @@ struct CaseLoadOptions {
   /// Ray casting: blurs of levels 1, 2, ..., in mm on the isocentre plane; of missing ones, those
   /// of a field with 1 mm between its nodes.
   std::vector<double> level_blur_sigma_mm;
-  /// With fields: levels that are cast, too, for a correction: RegistrationOptions::last_levels().
+  /// With fields: levels at which a correction casts rays: RegistrationOptions::last_levels().
   std::vector<int> correction_levels;
   /// Threads that make the levels together; none: only the calling thread.
   std::shared_ptr<ThreadPool> pool = nullptr;
@@ -62,13 +62,13 @@ struct LoadedCase {
 /// Collective. Everything a registration of one case needs, with the same content on every rank:
 /// X-rays and masks (on every rank), fields or the CT's attenuation, and their coarser levels, held
 /// once per node. The levels of ray casting are the CT, blurred as the levels of fields blur DRRs.
-/// With fields the CT is read by rank 0 alone, for its hash and grid (skip_ct_check: not at all;
-/// steps are then scaled as if it filled 200 mm about the ROI centre), unless a correction casts
-/// rays through it: its attenuation must then be the fields' (InputError). FileError (exit 4) when
-/// a field was made from another CT (both hashes are named) or misses rays of a view's widest
-/// region at the nominal pose; InputError when a view has no field. A field for another camera is
-/// taken: its rays decide on every pose, and a note says how far the camera is from the field's and
-/// what is covered.
+/// With fields, only rank 0 reads the CT, for its hash and grid (skip_ct_check: nobody does; steps
+/// are then scaled as if it filled 200 mm about the ROI centre), unless a correction casts rays
+/// through it: its attenuation must then equal the fields' (InputError). FileError (exit 4) when a
+/// field was made from another CT (both hashes are named) or misses rays of a view's widest region
+/// at the nominal pose; InputError when a view has no field. A field for another camera is
+/// accepted: at every pose its rays decide, and a note says how far the camera is from the field's
+/// and what is covered.
 LoadedCase load_case(const Study& study,
                      const StudyCase& study_case,
                      const CaseLoadOptions& options,

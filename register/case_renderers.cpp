@@ -61,8 +61,8 @@ FieldLevelMemory node_memory(const Communicator& communicator, ThreadPool& pool)
   };
 }
 
-/// The levels of a method to make of a field: those of its stages, and for judging as many as there
-/// are nodes.
+/// How many levels to make of a field: those of the stages, and for judging as many as its nodes
+/// allow.
 int level_count(const LightSlab& light_slab, const CaseLoadOptions& options) {
   int nodes = std::numeric_limits<int>::max();
   for (const SlabLattice& slab : light_slab.lattice().slabs)
@@ -114,8 +114,8 @@ FieldRenderers renderers_of(const std::shared_ptr<const CompressedAttenuationFie
   return made;
 }
 
-/// Members of an atlas that poses in the middle of its range about the nominal one are looked up
-/// in, the nominal one's first: most registrations need no others.
+/// Members of an atlas that serve poses in the inner half of its range about the nominal pose, that
+/// pose's first: most registrations need no others.
 std::vector<std::uint64_t> members_in_reach(const OpenedField& opened,
                                             const PoseFrame& nominal,
                                             const View& view) {
@@ -165,8 +165,8 @@ struct LevelThreads {
 };
 
 /// Collective. An atlas's renderers for a view. Members that poses near the nominal one need are
-/// held once per node; a search that goes farther opens others, each rank for itself. Their levels
-/// carry about the same blur; that of the nominal pose's member is taken.
+/// held once per node; each rank opens others itself when a search goes farther. All members'
+/// levels have about the same blur, so the nominal pose's member states it.
 FieldRenderers renderers_of_atlas(const OpenedField& opened,
                                   int levels,
                                   const PoseFrame& nominal,

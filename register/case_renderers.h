@@ -52,10 +52,10 @@ struct FieldRenderers {
 };
 
 /// Collective. Renderers for a view and its coarser levels, looked up in a field or an atlas and
-/// held once per node; with `bone` those of the tube's spectrum, whose levels are as many as both
-/// have, and blurred as those of the field of all. An atlas holds the members that poses
-/// near the nominal one need once per node; a search that goes farther opens others, each rank for
-/// itself. Those of a field depend on neither the pose nor the view.
+/// held once per node. With `bone` they render the tube's spectrum, at the levels that both fields
+/// have, with the blurs of the field of all. Atlas members that poses near the nominal one need are
+/// held once per node; each rank opens others itself when a search goes farther. A field's
+/// renderers depend on neither the pose nor the view.
 FieldRenderers field_renderers(const OpenedField& opened,
                                const std::optional<OpenedField>& bone,
                                const PoseFrame& nominal,

@@ -23,9 +23,9 @@ struct FieldInUse {
 };
 
 /// Fields that stay open from one case of a study to the next: cases of one patient at several
-/// poses share them, and opening one takes longer than dozens of registrations. Kept are those that
-/// the case at hand uses and a later one will, by the study's `field` keys: indices and decoded
-/// samples. All cases must be loaded with the same options, and with this object's threads.
+/// poses share them, and opening one takes longer than dozens of registrations. Keeps the indices
+/// and decoded samples of fields that both the current case and a later one use, by the study's
+/// `field` keys. All cases must be loaded with the same options, and with this object's threads.
 /// \test KeptFields.AreThoseOfTheCaseAtHandThatALaterOneUses
 class KeptFields {
  public:
@@ -34,9 +34,9 @@ class KeptFields {
 
   [[nodiscard]] const std::shared_ptr<ThreadPool>& pool() const { return pool_; }
 
-  /// The case at hand changes: lets go of fields that it does not use.
+  /// Makes a case the current one and releases fields that it does not use.
   void begin_case(const StudyCase& study_case);
-  /// Null when it must be opened.
+  /// Null when the field must be opened.
   [[nodiscard]] std::shared_ptr<const FieldInUse> find(const std::string& path) const;
   /// A field that the case at hand uses, found or opened; not an atlas, whose renderers depend on
   /// the case's nominal pose.

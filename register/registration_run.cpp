@@ -185,7 +185,7 @@ void write_results(const RegisterOptions& options,
   std::cout << write_run(records, *problem, description, options.output_folder);
   folder.finish();
   if (!is_found)
-    throw NotFoundError("nothing was found (see the verdict); what was searched is in " +
+    throw NotFoundError("no pose was found (see the verdict); the results of the search are in " +
                         options.output_folder.string());
 }
 

@@ -17,23 +17,23 @@
 
 namespace af::registration {
 
-/// The starts of a run: of --starts, or the one of --start-pose, or nominal with
+/// The starts of a run: those of --starts, the one of --start-pose, or the nominal pose moved by
 /// --start-rotation-deg and --start-translation-mm. `context` is the case's, with its frame;
-/// `notes` get what was left out of a file and assumed. InputError when a frame before the last
-/// pose of --starts has none: rows are numbered by frames.
+/// `notes` get what a file's reader left out or assumed. InputError when a frame of --starts before
+/// the last pose has no pose: frames number the rows.
 std::vector<RigidTransform> start_poses(const RegisterOptions& options,
                                         const PoseContext& context,
                                         std::vector<std::string>& notes);
 
 /// Collective. Loads the case, registers it from every start and writes the output folder.
-/// NotFoundError, once the results are written, when the best end is none.
+/// NotFoundError, after writing the results, when no pose was found.
 void run_registration(const RegisterOptions& options,
                       const std::string& command_line,
                       const Communicator& world);
 
-/// Collective. Registers from every start and examines the end, the starts shared over the ranks as
-/// these become free. Of several starts the finished ones are kept (see ResumableItems): a stopped
-/// or killed run goes on. Rank 0 returns one record per start, in the order of starts; the others
+/// Collective. Registers from every start and examines the ends. Ranks take starts as they become
+/// free. With several starts, finished ones are saved (see ResumableItems), so that a stopped or
+/// killed run can resume. Rank 0 returns one record per start, in the order of starts; the others
 /// return none. Only the record of the highest similarity (ties: the lowest start index) keeps its
 /// trace, so that memory does not grow with the number of starts.
 std::vector<RegistrationRecord> register_starts(RegistrationRunner& runner,

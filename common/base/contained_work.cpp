@@ -36,8 +36,8 @@ class SharedBytes {
   void* start_;
 };
 
-/// How the work ended, as the copy leaves it behind; the status of a process may be taken by others
-/// of a program that we are a library of.
+/// How the work ended, as the copy records it; other code of a program that uses us as a library
+/// may take the copy's exit status first.
 enum class Verdict : char { None = 0, Done, Refused };
 
 void set_limit(decltype(RLIMIT_CPU) resource, rlim_t most) {

@@ -71,7 +71,7 @@ Field& Field::at_most(double high) {
 }
 
 Field& Field::within(double low, double high) {
-  such_that("within " + number_text(low) + " and " + number_text(high),
+  such_that("between " + number_text(low) + " and " + number_text(high),
             [low, high](double v) { return v >= low && v <= high; });
   constraints.back().low = low;
   constraints.back().high = high;

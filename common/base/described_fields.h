@@ -29,8 +29,7 @@
 
 namespace af {
 
-/// Where a field's value is. An empty text or list, or an optional one that is not set, was not
-/// given.
+/// Pointer to a field's value. An empty text or list, or an unset optional, was not given.
 using FieldValue = std::variant<bool*,
                                 int*,
                                 std::int64_t*,
@@ -50,7 +49,7 @@ using FieldValue = std::variant<bool*,
                                 std::optional<std::string>*,
                                 std::optional<std::array<double, 3>>*>;
 
-/// What every number, or every text, of a field must be.
+/// A rule for every number, or every text, of a field.
 struct Constraint {
   std::string words;               ///< "within 2 and 4096"
   std::optional<double> low;       ///< smallest number that is accepted, when words say one
@@ -60,8 +59,7 @@ struct Constraint {
   std::function<bool(const std::string&)> accepts_text = [](const std::string&) { return true; };
 };
 
-/// What the path or paths of a field stand for. Graphical front ends and completion by a shell ask
-/// for it.
+/// What the paths of a field refer to, for graphical front ends and shell completion.
 enum class PathRole {
   Unsaid,
   InputFile,
@@ -98,8 +96,8 @@ struct Field {
   std::string file_endings;  ///< ".toml", ".mha,.nii.gz"; the first is the usual one
 
   bool is_recorded = true;
-  bool is_deciding = true;      ///< of results: unfinished work made with another value is refused
-  std::string stage;            ///< that it decides; empty: all
+  bool is_deciding = true;      ///< decides results; unfinished work of another value is refused
+  std::string stage;            ///< the stage whose results it decides; empty: all
   std::string name_when_unset;  ///< recorded instead ...
   std::string text_when_unset;  ///< ... with this value
 
@@ -116,7 +114,7 @@ struct Field {
   // The command line.
   Field& as(std::string option_names);
   Field& as(std::string option_names, std::string help_text);
-  /// It has no option; the reason is for who reads the code.
+  /// The field has no option; `why` is for readers of the code.
   Field& no_option(const char* why);
   Field& choice(std::vector<std::string> names);
   Field& one_of_group(std::string name);
@@ -132,12 +130,12 @@ struct Field {
   Field& default_in_help();
   Field& stands_for(PathRole role, std::string endings = "");
 
-  // Records. Reasons are for who reads the code.
+  // Records; `why` is for readers of the code.
   /// Neither recorded nor deciding.
   Field& not_recorded(const char* why);
-  /// Recorded, but work goes on with another value.
+  /// Recorded, but unfinished work may continue with another value.
   Field& not_deciding(const char* why);
-  /// Names an input: its content decides, by its checksum, not its name.
+  /// Names an input file: the checksum of its content decides results, not its name.
   Field& input();
   Field& decides(std::string stage_name);
   /// When it is not given, `other_name = text` is recorded.
@@ -172,7 +170,7 @@ class Fields {
 
   /// Group of the options listed from now on; "" for none.
   void start_group(std::string name) { group_ = std::move(name); }
-  /// A field that is listed already, to change what a part says of it.
+  /// A field that is already listed, so that a struct can change what its part says of it.
   Field& at(const std::string& name);
   Field& last() { return fields_.back(); }
   /// None of the fields listed so far has an option.
@@ -193,8 +191,8 @@ class Fields {
   int own_count_ = 0;
 };
 
-/// What `options` describes, pointing into it. A member that the description forgets is found here,
-/// so by the first use of the struct.
+/// The fields that `options` describes, pointing into it. Fails when the description forgets a
+/// member, so the first use of a struct reveals the omission.
 template <Described T>
 Fields fields_of(T& options) {
   Fields fields;

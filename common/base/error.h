@@ -19,8 +19,8 @@ enum class ExitCode : int {
   Stopped = 75,  ///< stopped on request, progress saved: run the same command again
 };
 
-/// A message of which no line is longer than some thousand bytes: from the middle of longer ones it
-/// leaves out what a file or the command line put there, and says how much that is.
+/// The message with every long line shortened to some thousand bytes: the middle, where text from a
+/// file or the command line stands, is replaced by a note of how many bytes were left out.
 std::string shortened(const std::string& message);
 
 /// Base of all errors the project throws on purpose; carries the exit code that app_main returns.
@@ -72,7 +72,7 @@ class NumericError : public Error {
   explicit NumericError(const std::string& message) : Error(ExitCode::Numeric, message) {}
 };
 
-/// A search that has come to its end without finding what it sought; its results say so.
+/// A search finished without finding what it sought; its results say so.
 class NotFoundError : public Error {
  public:
   explicit NotFoundError(const std::string& message) : Error(ExitCode::NotFound, message) {}
@@ -90,9 +90,9 @@ class RemoteError : public Error {
   RemoteError(ExitCode exit_code, const std::string& message) : Error(exit_code, message) {}
 };
 
-/// A broken promise of the caller (a defect, not bad input); becomes exit code 6. The place is
-/// stated by builtins that GCC and Clang share, not by std::source_location: Clang 14, whose tools
-/// check this code, does not have that.
+/// A broken promise of the caller (a defect, not bad input); becomes exit code 6. The location
+/// comes from builtins that GCC and Clang share: Clang 14, whose tools check this code, lacks
+/// std::source_location.
 void check(bool condition,
            const char* message,
            const char* file = __builtin_FILE(),

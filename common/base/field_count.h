@@ -12,8 +12,8 @@ namespace af {
 struct AnyMember {
   template <typename T>
   operator T() const;  // NOLINT(google-explicit-constructor)
-  // std::optional<T> can be made from whatever converts to T, too. Conversions that are no
-  // templates win against that.
+  // std::optional<T> can also be made from anything that converts to T. These conversions win over
+  // that one because they are not templates.
   operator std::optional<int>() const;                    // NOLINT(google-explicit-constructor)
   operator std::optional<std::int64_t>() const;           // NOLINT(google-explicit-constructor)
   operator std::optional<double>() const;                 // NOLINT(google-explicit-constructor)

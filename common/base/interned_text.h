@@ -7,9 +7,9 @@
 
 namespace af {
 
-/// A text in eight bytes, for few texts that are repeated millions of times: equal texts are kept
-/// once, until the program ends. Trivially copyable, and empty when all its bytes are zero.
-/// \test InternedText.KeepsEqualTextsOnce
+/// A text in eight bytes, for a few distinct texts that are repeated millions of times. Each
+/// distinct text is kept once, until the program ends. Trivially copyable, and empty when all bytes
+/// are zero. \test InternedText.KeepsEqualTextsOnce
 class InternedText {
  public:
   InternedText() = default;

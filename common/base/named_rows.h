@@ -14,7 +14,7 @@
 
 namespace af {
 
-/// Also of cameras, cases and the like.
+/// The names of rows; also of cameras, cases and the like.
 template <typename Rows>
 std::vector<std::string> names_of(const Rows& rows) {
   std::vector<std::string> names;

@@ -6,8 +6,9 @@
 
 namespace af {
 
-/// The number that a text is, all of it: decimal, "inf" or "nan", with one sign at most and no
-/// blanks. None for anything else, and for what no double can hold. The reverse of number_text().
+/// Parses the whole text as one number: decimal, "inf" or "nan", with at most one sign and no
+/// blanks. nullopt for anything else and for numbers that no double can hold. The reverse of
+/// number_text().
 std::optional<double> parsed_number(std::string_view text);
 
 /// As parsed_number(), of finite numbers alone.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What numbers of real scanners, rooms and patients can be. Beyond it a number is a mistake of
+// Limits on the numbers of real scanners, rooms and patients. A number beyond them means wrong
 // units or a damaged file, and products of such numbers overflow.
 #pragma once
 

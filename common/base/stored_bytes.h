@@ -164,7 +164,8 @@ class ByteReader {
       list.resize(static_cast<std::size_t>(count));
       take_raw(list.data(), list.size() * sizeof(*list.data()));
     } else {
-      // One by one: an element in memory may be far larger than the byte that it takes at least.
+      // One by one: an element may be far larger in memory than its minimum of one byte in the
+      // record.
       for (std::uint64_t i = 0; i < count; ++i) take(list.emplace_back());
     }
   }

@@ -78,8 +78,8 @@ class ThreadPool {
 
   std::mutex mutex_;
   std::vector<Loop*> open_;          ///< under mutex_, oldest first
-  std::atomic<int> news_ = 0;        ///< counts loops: what helpers without work watch
-  std::atomic<int> departures_ = 0;  ///< counts last helpers that left: what loops' callers watch
+  std::atomic<int> news_ = 0;        ///< loops opened so far; idle helpers watch it
+  std::atomic<int> departures_ = 0;  ///< loops whose last helper has left; their callers watch it
   std::atomic<bool> is_ending_ = false;
   std::vector<std::jthread> helpers_;
 };

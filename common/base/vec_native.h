@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // For kernels only (see af_add_kernel): vectors of one register, 4, 8 or 16 lanes, for code whose
-// lanes do not meet each other. Operations are per lane and never fused, so every width gives
-// identical bits. The vectors of vec16.h have 16 lanes at every width; GCC keeps in memory those
-// that take several registers, so this file stands beside it.
+// lanes are independent. Operations are per lane and never fused, so every width gives identical
+// bits. vec16.h has 16 lanes at every width, but GCC keeps vectors of several registers in memory;
+// hence this second file.
 #pragma once
 
 #include <immintrin.h>
@@ -52,10 +52,9 @@ AF_KERNEL_INLINE Floats load(const uint16_t* from) {
   return __builtin_convertvector(reinterpret_cast<Ints>(samples), Floats);
 }
 
-/// Unsigned 16-bit levels as floats: signed differences from a mean, and the mean, limited to
-/// 0 ... 65535.
+/// Unsigned 16-bit levels as floats: the mean plus signed differences, limited to 0 ... 65535.
 AF_KERNEL_INLINE Floats load_with_mean(const int16_t* differences, uint16_t mean) {
-  // Signed sums saturate at both limits at once when levels count from the middle.
+  // With levels offset by half their range, one signed saturating sum limits them at both ends.
 #if AF_VECTOR_BITS == 512
   const __m256i middle = _mm256_set1_epi16(INT16_MIN);
   const __m256i from_middle = _mm256_xor_si256(_mm256_set1_epi16(static_cast<short>(mean)), middle);

@@ -95,8 +95,9 @@ Eigen::Vector2i size_of(const Eigen::Vector2d& numbers, const std::string& place
   constexpr double kMaxSide = 32768.0;
   for (const double number : numbers)
     if (!(number >= 1.0 && number <= kMaxSide) || number != std::floor(number))
-      throw InputError(
-          place, number_text(number), "the image's size must be whole and within 1 and 32768");
+      throw InputError(place,
+                       number_text(number),
+                       "the image's size must be a whole number between 1 and 32768");
   return numbers.cast<int>();
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A file that may state cameras, as the formats look at it, and the numbers of its text.
+// A file that may state cameras, as the format readers see it, and parsing of its numbers.
 #pragma once
 
 #include <cstddef>

@@ -33,12 +33,12 @@ std::span<const CameraFormat> camera_formats();
 std::vector<std::string> readable_camera_formats();
 std::vector<std::string> writable_camera_formats();
 
-/// The format that a file's content tells, or nullptr.
+/// The format recognised from a file's content, or nullptr.
 const CameraFormat* recognised_camera_format(const CameraFile& file);
 
-/// One rig of the cameras of several files, each of any format. FileError when a file is of none or
-/// broken; InputError for unacceptable values and for what is missing. `warnings` receives what was
-/// taken by default.
+/// Joins the cameras of several files, each of any format, into one rig. FileError when a file is
+/// broken or of no known format; InputError for unacceptable or missing values. `warnings` receives
+/// the defaults that were assumed.
 CameraRig read_camera_files(const std::vector<std::filesystem::path>& files,
                             const CameraFileOptions& options,
                             std::vector<std::string>* warnings);
@@ -49,8 +49,8 @@ struct WrittenCameraFile {
   std::string bytes;
 };
 
-/// The rig in the format of that name: one file `path`, or, when the format holds one camera per
-/// file and the rig has several, one per camera whose name goes before the extension.
+/// The rig in the named format: one file `path`, or, when the format holds one camera per file and
+/// the rig has several, one file per camera, with the camera's name before the extension.
 std::vector<WrittenCameraFile> camera_files_of(const CameraRig& rig,
                                                const std::string& format,
                                                const std::filesystem::path& path);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Numbers of matrices as the writers of text formats put them down: read back to the same bits.
+// Matrices as text for the writers of text formats; the numbers read back to the same bits.
 #pragma once
 
 #include <string>

@@ -109,8 +109,8 @@ class DicomCamera {
       return *found;
     }
     if (given) return *given;
-    throw InputError(file_ + ": " + name + " is missing: af-inspect --rig-from with " + option +
-                     " states it");
+    throw InputError(file_ + ": " + name + " is missing: state it with af-inspect --rig-from and " +
+                     option);
   }
 
   void read_size() {
@@ -147,9 +147,10 @@ class DicomCamera {
     else
       throw InputError(
           file_ +
-          ": ImagerPixelSpacing (0018,1164) is missing: af-inspect --rig-from with "
-          "--rig-pixel-spacing-mm COLUMN,ROW states it; PixelSpacing (0028,0030) may be "
-          "that at the patient and is not taken");
+          ": ImagerPixelSpacing (0018,1164) is missing: state it with af-inspect --rig-from and "
+          "--rig-pixel-spacing-mm COLUMN,ROW; PixelSpacing (0028,0030) is not used, because it may "
+          "be "
+          "the spacing at the patient");
   }
 
   /// Of an enhanced file: one camera per frame, or one when no frame moves.
@@ -187,7 +188,7 @@ class DicomCamera {
     if (!(frames >= 1.0 && frames <= kMostFrames) || frames != std::floor(frames))
       throw InputError("NumberOfFrames (0028,0008)",
                        number_text(frames),
-                       "must be whole and within 1 and 100000",
+                       "must be a whole number between 1 and 100000",
                        file_);
     return static_cast<std::size_t>(frames);
   }
@@ -201,14 +202,15 @@ class DicomCamera {
     const std::vector<double>& given = options_.positioner_deg;
     constexpr double kToleranceDeg = 1e-3;
     if ((!primary || !secondary) && given.empty())
-      throw InputError(file_ +
-                       ": PositionerPrimaryAngle (0018,1510) or PositionerSecondaryAngle "
-                       "(0018,1511) is missing: af-inspect --rig-from with --rig-positioner-deg "
-                       "PRIMARY,SECONDARY states them" +
-                       (functional_group(elements_, frame, kIsocenterMacro) == nullptr
-                            ? ""
-                            : "; the file's PositionerIsocenter angles are of the equipment, not "
-                              "of the patient"));
+      throw InputError(
+          file_ +
+          ": PositionerPrimaryAngle (0018,1510) or PositionerSecondaryAngle "
+          "(0018,1511) is missing: state both with af-inspect --rig-from and --rig-positioner-deg "
+          "PRIMARY,SECONDARY" +
+          (functional_group(elements_, frame, kIsocenterMacro) == nullptr
+               ? ""
+               : "; the file's PositionerIsocenter angles are of the equipment, not "
+                 "of the patient"));
     if (!given.empty() && ((primary && std::abs(*primary - given[0]) > kToleranceDeg) ||
                            (secondary && std::abs(*secondary - given[1]) > kToleranceDeg)))
       throw InputError("--rig-positioner-deg",
@@ -220,7 +222,7 @@ class DicomCamera {
     if (!(std::abs(first.primary_deg) <= 360.0) || !(std::abs(first.secondary_deg) <= 180.0))
       throw InputError("positioner angles",
                        number_text(first.primary_deg) + ", " + number_text(first.secondary_deg),
-                       "must be within 360 and 180 degrees",
+                       "the first must be within +-360 degrees, the second within +-180",
                        file_);
     return first;
   }

@@ -42,7 +42,7 @@ int pixels(TomlTableReader& reader, const char* key, int otherwise) {
   constexpr int kMaxSide = 32768;
   const int value = reader.get_integer(key, otherwise > 0 ? Presence::Optional : Presence::Required)
                         .value_or(otherwise > 0 ? otherwise : 1);
-  if (value < 1 || value > kMaxSide) reader.add_problem(key, "must be within 1 and 32768");
+  if (value < 1 || value > kMaxSide) reader.add_problem(key, "must be between 1 and 32768");
   return value;
 }
 

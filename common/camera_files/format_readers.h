@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// What kCameraFormats (camera_formats.cpp) is made of. Each format's convention is described in
-// docs/cameras.md and above its reader. Readers throw FileError for files that cannot be parsed and
-// InputError for values that cannot be a camera's; what a file leaves open they mark in the
-// StatedCamera. Writers return the bytes of a file that the reader reads back.
+// The readers and writers in kCameraFormats (camera_formats.cpp). docs/cameras.md and the comment
+// above each reader describe its convention. Readers throw FileError for files that cannot be
+// parsed and InputError for values that cannot be a camera's; they mark in the StatedCamera what a
+// file leaves open. Writers return the bytes of a file that the reader reads back.
 #pragma once
 
 #include <string>

@@ -101,7 +101,8 @@ std::optional<CameraGeometry> camera_from_matrix(TomlTableReader& reader,
                                                  TomlProblems& problems) {
   for (const char* key : kGeometryKeys)
     if (reader.has(key))
-      reader.add_problem(key, "must not stand beside projection_matrix, which already fixes it");
+      reader.add_problem(
+          key, "must not be given together with projection_matrix, which already fixes it");
   const auto matrix =
       reader.get_matrix("projection_matrix", 3, 4, Presence::Required, kMaxProjection);
   if (!matrix || !(stated.pixel_spacing_mm.minCoeff() > 0.0)) return std::nullopt;

@@ -136,9 +136,10 @@ class RigCompletion {
       Eigen::Vector2i& size_px = cameras_[i].geometry.size_px;
       if (options_.size_px.empty() && cameras_[i].has_size) continue;
       if (options_.size_px.empty())
-        throw InputError(place(i) +
-                         ": the size of its images is not in the file: af-inspect --rig-from with "
-                         "--rig-size-px COLUMNS,ROWS states it");
+        throw InputError(
+            place(i) +
+            ": the size of its images is not in the file: state it with af-inspect --rig-from and "
+            "--rig-size-px COLUMNS,ROWS");
       const Eigen::Vector2i given(options_.size_px[0], options_.size_px[1]);
       if (cameras_[i].has_size && size_px != given)
         refuse_contradiction("--rig-size-px",
@@ -155,9 +156,10 @@ class RigCompletion {
     for (std::size_t i = 0; i < cameras_.size(); ++i) {
       if (cameras_[i].has_pixel_grid) continue;
       if (options_.pixel_spacing_mm.empty())
-        throw InputError(place(i) +
-                         ": the pixel spacing is not in the file: af-inspect --rig-from with "
-                         "--rig-pixel-spacing-mm COLUMN,ROW states it");
+        throw InputError(
+            place(i) +
+            ": the pixel spacing is not in the file: state it with af-inspect --rig-from and "
+            "--rig-pixel-spacing-mm COLUMN,ROW");
       CameraGeometry& camera = cameras_[i].geometry;
       camera.pixel_spacing_mm = {options_.pixel_spacing_mm[0], options_.pixel_spacing_mm[1]};
       Eigen::Vector2d first_mm = -0.5 * (camera.size_px.cast<double>() - Eigen::Vector2d::Ones())
@@ -214,8 +216,8 @@ class RigCompletion {
         !(along > kLeastMm || (!cameras_.front().knows_front && along < -kLeastMm)))
       throw InputError(place(0) +
                        ": the isocentre is not in the file, and its only central ray does not pass "
-                       "the room's origin: af-inspect --rig-from with --rig-isocenter-point X,Y,Z "
-                       "states it");
+                       "the room's origin: state it with af-inspect --rig-from and "
+                       "--rig-isocenter-point X,Y,Z");
     isocenter_ = ray.origin_point + along * ray.direction;
     notes_.push_back(
         "the isocentre is not in the file; taken as the point of the central ray nearest to the "

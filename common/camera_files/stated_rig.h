@@ -28,7 +28,7 @@ struct StatedRig {
   std::string file;
   std::optional<Eigen::Vector3d> isocenter_point;
   std::vector<StatedCamera> cameras;
-  std::vector<std::string> notes;  ///< what a user should know of how the file was understood
+  std::vector<std::string> notes;  ///< how the file was interpreted, for the user
 };
 
 /// One rig of the cameras of all files: names, sizes, spacings and the isocentre that the files do

@@ -157,7 +157,7 @@ std::size_t count_of_projections(const Hdf5Input& file) {
   if (!(number >= 1.0 && number <= kMost) || number != std::floor(number))
     throw InputError(kCountOfProjections,
                      number_text(number),
-                     "must be a whole number within 1 and 10000",
+                     "must be a whole number between 1 and 10000",
                      file.name());
   return static_cast<std::size_t>(number);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// CLI11's classes for headers that bind options to it: to compile all of CLI11 takes seconds, so
-// only what calls it includes it.
+// Forward declarations of CLI11's classes, for headers that bind options. Compiling CLI11 takes
+// seconds, so only sources that call it include it.
 #pragma once
 
 namespace CLI {

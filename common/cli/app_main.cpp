@@ -59,7 +59,7 @@ void add_help_formats(CLI::App& app) {
       ->trigger_on_parse();
 }
 
-/// CLI11 takes them from the back.
+/// The arguments in reverse order, as CLI11 takes them.
 std::vector<std::string> arguments_for(const CLI::App& app, int argc, char** argv) {
   std::vector<std::string> arguments;
   for (int i = argc - 1; i > 0; --i) arguments.push_back(with_dashes(app, argv[i]));
@@ -96,7 +96,7 @@ std::string reason_text(const RankFailure& failure) {
   return is_stop && !stop_reason().empty() ? " (" + stop_reason() + ")" : "";
 }
 
-/// Whoever has not reported leaves the ending to who has, for a while.
+/// Ends the job. A rank that has not reported first leaves it for a while to the one that has.
 [[noreturn]] void end_after_report(int exit_code, bool has_reported) {
   constexpr std::chrono::seconds kPatience{5};
   if (!has_reported) std::this_thread::sleep_for(kPatience);
@@ -112,8 +112,8 @@ void end_job(const CLI::App& app, const std::string& stall) {
   MpiEnvironment::abort(static_cast<int>(ExitCode::Stopped));
 }
 
-/// Without MPI, which waits for the other ranks itself. Whatever a program has made is complete by
-/// then, or kept.
+/// Ends this process without MPI, which would itself wait for the other ranks. By then, whatever a
+/// program has made is complete or kept.
 void end_alone(const CLI::App& app, const std::string& when) {
   std::ostringstream text;
   text << app.get_name() << ": other ranks of the job hang or are stopped while " << when

@@ -32,7 +32,7 @@ int app_main(CLI::App& app,
 /// The command line as typed, quoted for a shell; goes into every output and reproduce.sh.
 std::string command_line(int argc, char** argv);
 
-/// The options given to a parsed (sub)command but those named, as words for a shell: " --seed 3
+/// The options given to a parsed (sub)command, except `left_out`, as words for a shell: " --seed 3
 /// --field A=a.h5". \test GivenOptions.AreThoseTypedButTheOnesLeftOut
 std::string given_options(const CLI::App& command, const std::set<std::string>& left_out);
 

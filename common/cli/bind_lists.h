@@ -8,8 +8,8 @@
 
 namespace af::cli {
 
-/// --list NAME prints the list of that name, made for scripts, and ends the program; options that
-/// are required otherwise need not be given beside it.
+/// --list NAME prints the list of that name, for scripts, and ends the program; it works without
+/// options that are otherwise required.
 void bind_lists(CLI::App& app, const std::map<std::string, std::string>& lists);
 
 }  // namespace af::cli

@@ -9,7 +9,7 @@ namespace af::cli {
 /// Adds an option for every field that has one.
 void bind_fields(CLI::App& app, const Fields& fields);
 
-/// The description that an option was made of; null for one that was not made of a description.
+/// The description from which an option was made; null when it was made without one.
 const Field* bound_field(const CLI::Option& option);
 
 /// The options of a struct that describes itself; `options` must outlive the parsing.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a program's options are, as data: every page and every front end that shows them is made
-// from it (help_pages.h, shell_completion.h, slicer_module.h).
+// A program's options as data, from which every help page and front end is made (help_pages.h,
+// shell_completion.h, slicer_module.h).
 #pragma once
 
 #include <optional>
@@ -48,7 +48,7 @@ struct CommandHelp {
   std::vector<CommandHelp> commands;
 };
 
-/// Of a program whose options are bound and which is named.
+/// The help of a program that has its name and all its options.
 CommandHelp command_help(const CLI::App& app);
 
 }  // namespace af::cli

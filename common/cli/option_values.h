@@ -7,10 +7,10 @@
 
 namespace af::cli {
 
-/// Checks every value given to a parsed command and its subcommands by the type of its option, more
-/// strictly than CLI11 converts it: that takes -5 for 2^64 - 5 where a number has no sign, 010 for
-/// 8, 99999999999999999999 for the largest number, and nan and inf for numbers. Texts must not be
-/// empty. CLI::ValidationError, which names the option, for the first that is not sound.
+/// Checks every value given to a parsed command and its subcommands against the type of its option,
+/// more strictly than CLI11, which reads -5 as 2^64 - 5 for an unsigned number, 010 as 8 and
+/// 99999999999999999999 as the largest number, and accepts nan and inf. Texts must not be empty.
+/// Throws CLI::ValidationError, which names the option, for the first bad value.
 void check_option_values(const CLI::App& app);
 
 /// "3.5MB" -> "3500000", rounded down to whole bytes; a size without a decimal point stays as it

@@ -13,8 +13,9 @@ void bind_run_limits(CLI::App& app) {
 }
 
 void ResumeOptions::describe(Fields& field) {
-  field(
-      "restart", restarts, "Throw away what a stopped or killed run has finished (OUTPUT.progress)")
+  field("restart",
+        restarts,
+        "Discard what a stopped or killed run has finished (OUTPUT.progress), and start over")
       .not_recorded("results are the same");
 }
 

@@ -10,7 +10,7 @@ namespace af::cli {
 /// stop.
 void bind_run_limits(CLI::App& app);
 
-/// Of a program, or a sub-command, whose unfinished work lies in OUTPUT.progress.
+/// Options of a program, or a sub-command, that keeps unfinished work in OUTPUT.progress.
 struct ResumeOptions {
   bool restarts = false;  ///< throw unfinished work away
 

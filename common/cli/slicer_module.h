@@ -20,8 +20,8 @@ std::string slicer_xml(const CommandHelp& program,
 /// Adds --xml, which prints it and ends the program. After all other options.
 void bind_slicer_module(CLI::App& app, const std::string& title);
 
-/// A typed option with underscores in its name, such as --start_pose, as --start-pose when the
-/// program, or one of its commands, has that one; else the argument as it is.
+/// Turns a typed option with underscores, such as --start_pose, into --start-pose when the program
+/// or one of its commands has that option; returns any other argument unchanged.
 std::string with_dashes(const CLI::App& app, const std::string& argument);
 
 }  // namespace af::cli

@@ -49,7 +49,7 @@ std::string unknown_command(const CommandHelp& command, const std::string& argum
   }
   const std::string meant = meant_name(argument, names);
   return "unknown sub-command '" + argument + "'" +
-         (meant.empty() ? ": there are " + list : ": did you mean '" + meant + "'?");
+         (meant.empty() ? ": choose one of " + list : ": did you mean '" + meant + "'?");
 }
 
 /// Of an option whose value cannot be converted, or which has too many or too few: what it takes.
@@ -87,7 +87,8 @@ std::string usage_message(const CLI::App& app, const CLI::ParseError& error) {
     return shortened(form + ", not '" + message.substr(message.find(" = ") + 3) + "'");
   }
   if (!unknown.empty())
-    return shortened("'" + unknown.front() + "' was not expected: it stands behind no option");
+    return shortened("'" + unknown.front() +
+                     "' was not expected: no option before it takes this value");
   return shortened(message);
 }
 

@@ -11,10 +11,9 @@ class ParseError;
 
 namespace af::cli {
 
-/// What is wrong with a command line that CLI11 refused. An argument that nobody knows comes before
-/// whatever follows from it (a typing error of a required option makes CLI11 say that the option is
-/// missing), with the name that was probably meant; a value that does not fit comes with the form
-/// that --help shows.
+/// Explains why CLI11 refused a command line. An unknown argument is reported first, with the name
+/// that was probably meant, before errors that follow from it (after a typo in a required option,
+/// CLI11 says that the option is missing). A bad value is reported with the form that --help shows.
 std::string usage_message(const CLI::App& app, const CLI::ParseError& error);
 
 }  // namespace af::cli

@@ -12,8 +12,8 @@
 
 namespace af {
 
-/// Sides of the widest region that registrations look at, over those of a study's: what a field
-/// must hold the rays of.
+/// Side lengths of the widest region that registrations look at, relative to the study's region. A
+/// field must hold the rays of that widest region.
 inline constexpr double kWidestRegionScale = 2.0;
 
 /// What is rendered: a region of one camera's detector.
@@ -53,16 +53,16 @@ class RenderWorkspace {
  public:
   virtual ~RenderWorkspace() = default;
 
-  /// Whether a DRR may be made from what one before it, with gradients and from a source nearby,
-  /// has left here (KeptImages): nearly the same in half the time, but no longer a function of the
-  /// pose alone. At first it may not. Either way, what is left here is forgotten. Renderers that
-  /// leave nothing do as they always do.
+  /// Allows or forbids a DRR to reuse what an earlier one, with gradients and from a nearby source,
+  /// left here (KeptImages): nearly the same values in half the time, but no longer a function of
+  /// the pose alone. Initially forbidden. Every call also discards what was left. Renderers that
+  /// leave nothing ignore it.
   virtual void reuse_images(bool /*is_allowed*/) {}
 };
 
-/// Makes DRRs of one CT. Every comparison of fields with ray casting is a swap of this object.
-/// render() is const and re-entrant with one workspace per thread; results do not depend on threads
-/// or vector width.
+/// Makes DRRs of one CT. Fields and ray casting are compared by swapping this object. render() is
+/// const and re-entrant with one workspace per thread; results do not depend on threads or vector
+/// width.
 class DrrRenderer {
  public:
   virtual ~DrrRenderer() = default;
@@ -77,8 +77,8 @@ class DrrRenderer {
       std::span<float> total_attenuation,
       const std::optional<PoseGradients>& gradients = std::nullopt) const = 0;
 
-  /// RenderStatus::rays_outside of render(), without a DRR. None where nothing limits the rays.
-  /// \test TwoPassAfDrr.CountsTheRaysThatRenderingCounts
+  /// The rays_outside that render() would report, without making a DRR; 0 where nothing limits the
+  /// rays. \test TwoPassAfDrr.CountsTheRaysThatRenderingCounts
   [[nodiscard]] virtual std::int64_t rays_outside(const RigidTransform& /*room_from_ct*/,
                                                   const View& /*view*/) const {
     return 0;

@@ -12,19 +12,19 @@
 
 namespace af {
 
-/// Samples beyond the last one, 0, so that kernels may load whole vectors.
+/// Zero samples after the last one, so that kernels may load whole vectors.
 inline constexpr std::size_t kFieldLevelPadding = 16;
 
-/// Mean distance of a field's (s,t) nodes, mm, of s and t and of the slabs, at the plane through
-/// the field's centre (y = 0 of the slab frame).
+/// Mean distance (mm) between a field's (s,t) nodes at the plane through the field's centre (y = 0
+/// of the slab frame), averaged over s, t and the slabs.
 double node_spacing_mm(const LightSlab& light_slab);
 
 /// How often a field's (s,t) axes are halved before the first level of its pyramid: until the
-/// longest has about 256 nodes, the paper's number, but only as long as nodes stand no farther
-/// apart than the paper's, about 1.1 mm (10 degrees and 30 mm in the treatment room). A field may
-/// also have more nodes because its range is wider: halved by their number alone, levels of 20
-/// degrees and 40 mm had twice the blur, at which scatter and steel have optima of their own. \test
-/// FieldLevel.BeginsWithMoreHalvingsOfFinerNodesNotOfAWiderRange
+/// longest has about 256 nodes, the paper's number, but only while nodes stand no farther apart
+/// than the paper's, about 1.1 mm (10 degrees and 30 mm in the treatment room). The second
+/// condition is for fields that have more nodes because their range is wider: halved by node count
+/// alone, levels of 20 degrees and 40 mm had twice the blur, at which scatter and steel create
+/// optima of their own. \test FieldLevel.BeginsWithMoreHalvingsOfFinerNodesNotOfAWiderRange
 int halvings_to_usual_nodes(const LightSlab& light_slab);
 
 /// One slab of a field that is held as plain 16-bit samples, [u][v][t][s] with s fastest (s runs
@@ -39,10 +39,10 @@ struct FieldLevelSlab {
   }
 };
 
-/// Standard deviation, in nodes of level 0, of the blur that a DRR of a level carries along s and t
-/// against one of level 0: the variances 3/4 4^i of the halvings i = 0 ... level - 1. The bilinear
-/// resampling of the coarser nodes blurs a little more, by a variance of (4^level - 1) / 6 nodes of
-/// level 0 on average; `with_resampling` includes it.
+/// Standard deviation, in nodes of level 0, of the blur along s and t that a DRR of a level has
+/// compared with one of level 0; the halvings i = 0 ... level - 1 add variances of 3/4 4^i.
+/// Bilinear resampling of the coarser nodes blurs a little more, by a variance of (4^level - 1) / 6
+/// nodes of level 0 on average; `with_resampling` includes it.
 double level_blur_sigma_in_nodes(int level, bool with_resampling = false);
 
 /// A decoded attenuation field, blurred and decimated in (s,t) for one level of an image pyramid.

@@ -12,14 +12,14 @@
 
 namespace af {
 
-/// The ways of looking DRRs up that programs offer, and one line that explains them.
+/// Names of the look-ups that programs offer, and one line that explains them.
 std::vector<std::string> field_look_up_names();
 std::string field_look_up_help();
 
-/// How a search looks a field up that is meant for `own`: by `cubic-sum` where several slabs are
-/// meant for `cubic`. A search needs the slopes, too, and `cubic` puts nodes between those of all
-/// three images. Over 64 poses of five anatomies ends by `cubic-sum` are as near to the truth
-/// (docs/rate-against-truth.md#the-default-design).
+/// The look-up that a search uses in a field meant for `own`: `cubic-sum` instead of `cubic` where
+/// there are several slabs, otherwise `own`. A search also needs the slopes, and `cubic` inserts
+/// nodes into all three images. Over 64 poses of five anatomies, searches by `cubic-sum` end as
+/// near to the truth (docs/rate-against-truth.md#the-default-design).
 std::string look_up_of_searches(const std::string& own, std::size_t slab_count);
 
 /// The renderer for a name of field_look_up_names(); InputError for any other name. The threads of
@@ -29,7 +29,7 @@ std::shared_ptr<const DrrRenderer> make_field_renderer(
     const std::string& look_up,
     const std::shared_ptr<ThreadPool>& pool = nullptr);
 
-/// The same of a decoded field, whose names have no "nearest" and no "quadrilinear".
+/// The same for a decoded field, which has neither "nearest" nor "quadrilinear".
 std::shared_ptr<const DrrRenderer> make_field_renderer(
     std::shared_ptr<const FieldLevel> level_0,
     const std::string& look_up,

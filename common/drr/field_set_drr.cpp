@@ -56,8 +56,8 @@ std::vector<double> FieldSetDrr::weights(const RigidTransform& room_from_ct,
   double sum = 0.0;
   for (std::size_t i = 0; i < held.size(); ++i) {
     if (!held[i]) continue;
-    // Falls to 0 where a member is no longer nearly the best, as it is not where it loses a ray
-    // that another holds.
+    // The weight falls to 0 as a member ceases to be nearly the best, so before it loses a ray that
+    // another holds.
     const double behind = std::max(0.0, 1.0 - (*best - *held[i]) / kSeam);
     weights[i] = behind * behind;
     sum += weights[i];

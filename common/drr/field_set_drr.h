@@ -15,14 +15,14 @@ struct FieldSetMember {
   std::shared_ptr<const DrrRenderer> renderer;
 };
 
-/// DRRs of several fields of one CT, such as those of a C-arm's angles. A pose is looked up in the
-/// field that holds its rays best: whose planes' edges they keep farthest from, as shares of the
-/// planes' sizes, along all axes together (their product). Where two are nearly as good, both are
-/// looked up, and their DRRs are averaged with weights that are continuous in the pose, so that a
-/// registration can cross a seam. What is rendered depends on the pose alone, not on the poses
-/// before it: results are the same on any number of threads. A pose that no field holds whole is
-/// rendered by the one that misses fewest rays. Gradients leave out how the weights change, which
-/// multiplies the difference of two fields' errors. \test FieldSetDrrTest.HasNoJumpAtASeam
+/// DRRs from several fields of one CT, such as those of a C-arm's angles. A pose is looked up in
+/// the field that holds its rays best: where they stay farthest from the planes' edges, in shares
+/// of the planes' sizes, multiplied over all axes. Where two fields are nearly as good, both are
+/// looked up and their DRRs averaged with weights that are continuous in the pose, so that a
+/// registration can cross a seam. A DRR depends on its pose alone, not on earlier poses: results
+/// are the same on any number of threads. A pose that no field holds completely is rendered by the
+/// field that misses fewest rays. Gradients leave out the change of the weights, which multiplies
+/// the difference of two fields' errors. \test FieldSetDrrTest.HasNoJumpAtASeam
 class FieldSetDrr final : public DrrRenderer {
  public:
   /// At least one member.
@@ -38,7 +38,8 @@ class FieldSetDrr final : public DrrRenderer {
   [[nodiscard]] std::unique_ptr<RenderWorkspace> make_workspace() const override;
   [[nodiscard]] const char* name() const override { return "field"; }
 
-  /// Of each member at a pose; they add up to 1, or are all 0 where none holds all rays.
+  /// The weight of each member at a pose. They add up to 1, or are all 0 where no member holds all
+  /// rays.
   [[nodiscard]] std::vector<double> weights(const RigidTransform& room_from_ct,
                                             const View& view) const;
 

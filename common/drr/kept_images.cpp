@@ -7,8 +7,8 @@
 namespace af {
 namespace {
 
-/// Parallax that kept images may follow to first order, in nodes of a slab: ends of `robust` then
-/// lie as far from the truth as without (docs/rate-against-truth.md).
+/// Most parallax, in nodes of a slab, that kept images follow to first order: with it, ends of
+/// `robust` lie as far from the truth as without kept images (docs/rate-against-truth.md).
 constexpr double kMostParallaxNodes = 0.5;
 
 /// Share of a (u,v) cell by which viewpoints may move.

@@ -23,15 +23,16 @@ namespace af {
 /// KeptImages.AreNearTheLookUpWhileTheSourceIsNear
 class KeptImages {
  public:
-  /// Nodes that images need beyond those of a DRR, so that they hold those of its neighbours.
+  /// Extra nodes around those that a DRR needs, so that the images also serve DRRs of nearby
+  /// sources.
   static constexpr int kMargin = 4;
 
   void forget() { is_kept_ = false; }
-  /// `images`: with slopes, and of all nodes within kMargin of those that the rays need;
+  /// `images` must have slopes and hold all nodes within kMargin of those that the rays need.
   /// `nodes_per_node`: nodes of `images` along an axis per node that kMargin counts.
   void keep(const NodeImages& images, int nodes_per_node, const SlabRays& rays);
-  /// The motion of the source since the images were made, in the slab frame, mm; nullopt when they
-  /// cannot serve these rays.
+  /// The motion of the source since the images were made, in the slab frame, mm; nullopt when the
+  /// images cannot serve these rays.
   [[nodiscard]] std::optional<Eigen::Vector3d> source_move(const ViewpointBlender& blender,
                                                            const SlabRays& rays) const;
   [[nodiscard]] const NodeImages& images() const { return images_; }

@@ -9,8 +9,8 @@
 namespace af {
 
 /// DRRs of polychromatic X-rays. One renderer gives the ordinary DRR, another the bone's part of
-/// it; PolychromaticAttenuation makes of the two, pixel by pixel, what the whole spectrum leaves.
-/// The renderers may look fields up or cast rays. Derivatives follow by the chain rule.
+/// it; PolychromaticAttenuation turns the two, pixel by pixel, into the attenuation of the whole
+/// spectrum. The renderers may look fields up or cast rays. Derivatives follow by the chain rule.
 /// \test PolychromaticDrr.OfASlabIsTheSumOverTheSpectrum
 class PolychromaticDrr final : public DrrRenderer {
  public:
@@ -18,8 +18,8 @@ class PolychromaticDrr final : public DrrRenderer {
                    std::shared_ptr<const DrrRenderer> bone,
                    std::shared_ptr<const PolychromaticAttenuation> attenuation);
 
-  /// Rays outside are those of the renderer that misses more. Where the ordinary DRR is 0, so is
-  /// this one; where only the bone's ray is outside, all is taken for water.
+  /// Reports the larger rays_outside of the two renderers. Where the ordinary DRR is 0, so is this
+  /// one; where only the bone's ray is outside, the whole ray counts as water.
   RenderStatus render(const RigidTransform& room_from_ct,
                       const View& view,
                       RenderWorkspace& workspace,

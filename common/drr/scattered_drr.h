@@ -7,14 +7,14 @@
 
 namespace af {
 
-/// DRRs with even scatter: with P = exp(-U) of another renderer's DRR, the primary share of the
-/// open beam, and s = scatter_to_primary * mean P over the view,
+/// DRRs with even scatter. With P = exp(-U), the primary share of the open beam in another
+/// renderer's DRR, and s = scatter_to_primary * mean P over the view,
 ///
 ///     U' = -ln(P + s).
 ///
-/// Scatter spreads over some hundred millimetres on a detector, so within a region of interest its
-/// mean is most of it; where it is uneven, or its ratio is another, U' errs. Derivatives hold that
-/// of s, too. \test ScatteredDrr.AddsTheMeanPrimarySignalTimesTheRatio
+/// Scatter spreads over some hundred millimetres on a detector, so within a region of interest it
+/// is nearly even; U' is wrong where it is not, or where the ratio differs. Derivatives include
+/// that of s. \test ScatteredDrr.AddsTheMeanPrimarySignalTimesTheRatio
 class ScatteredDrr final : public DrrRenderer {
  public:
   ScatteredDrr(std::shared_ptr<const DrrRenderer> primary, double scatter_to_primary);

@@ -28,8 +28,8 @@ struct SlabRays {
   }
   /// Whether all rays descend: none is parallel to the planes or rises from them.
   [[nodiscard]] bool all_descend() const;
-  /// The hit points of a view's rays form a convex quadrilateral on each plane, so its corner rays
-  /// decide.
+  /// Whether all rays meet every plane within its rectangle. Their hits form a convex quadrilateral
+  /// on each plane, so the corner rays decide.
   [[nodiscard]] bool all_inside() const;
   /// How far the rays keep from the edges of the planes: the least distance of a hit from an edge,
   /// as a share of the plane's side, at most 0.5. Below 0 when a ray is outside.

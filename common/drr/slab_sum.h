@@ -26,8 +26,8 @@ struct SlabSumScratch {
 /// \test SlabSum.OfOneSlabInItsOwnPlaneIsTheSlab
 class SlabSum {
  public:
-  /// Sums to `images` (the slopes null: not wanted), of grid.t_count rows, writable for 16 values
-  /// beyond each. `source`: in the slab frame.
+  /// Sums into `images` (slopes that are null are not wanted) of grid.t_count rows, each writable
+  /// for 16 values beyond its end. `source` is in the slab frame.
   SlabSum(const NodeGrid& grid,
           const Eigen::Vector3d& source,
           const std::array<float*, 3>& images,

@@ -28,16 +28,16 @@ struct SlabTerm {
   int32_t stride;
   int32_t columns;
   SumTaps s, t;
-  /// Nodes that the place where a node of the sum is seen in the slab's image moves by, along s and
-  /// t, per mm that the source moves along x and z: the slopes of the value along s and t, times
-  /// these, are added to those along the source's x and z.
+  /// How far, in nodes along s and t, a node of the sum moves in the slab's image per mm that the
+  /// source moves along x and z. The value's slopes along s and t, times these, are added to its
+  /// slopes along the source's x and z.
   float drift[2];
   float* rows[3];  ///< room for the slab's images between two rows, and 48 values more
   float* sum[3];
   int32_t sum_stride;
   int32_t sum_columns;
   int32_t sum_rows;
-  bool adds;  ///< to the sum, instead of replacing it
+  bool adds;  ///< the slab is added to the sum, instead of replacing it
 };
 
 using AddSlab = void (*)(const SlabTerm& term);

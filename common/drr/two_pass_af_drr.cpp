@@ -24,8 +24,8 @@ std::ptrdiff_t rounded_up(std::ptrdiff_t count, std::ptrdiff_t multiple) {
   return (count + multiple - 1) / multiple * multiple;
 }
 
-/// Nodes of a slab that its sum with others takes around those that the rays hit: a node of the sum
-/// lies up to one of its own nodes outside, and takes two more on that side.
+/// Extra nodes of a slab, around those that the rays hit, for its sum with others: a node of the
+/// sum lies up to one of its own nodes outside and needs two more on that side.
 constexpr int kSumMargin = 3;
 
 /// A node image's memory, grown when a larger one is needed and never shrunk.

@@ -10,8 +10,8 @@
 
 namespace af {
 
-/// Interpolation along axes of the field: between two nodes, or cubic: Catmull-Rom's through four
-/// in (u,v), where the field continues linearly beyond its first and last node.
+/// Interpolation along the field's axes: linear between two nodes, or cubic. In (u,v), cubic is
+/// Catmull-Rom through four nodes, and the field continues linearly beyond its first and last node.
 enum class AxisInterpolation { Linear, Cubic };
 
 /// Scratch memory of the first pass; one per thread.
@@ -23,8 +23,8 @@ struct BlendScratch {
   std::vector<float> u_weights;
 };
 
-/// Images of the nodes of a footprint, [t][s] with `stride` values from row to row: at least 15
-/// more than nodes, which are written, too.
+/// Images of the nodes of a footprint, [t][s]. `stride` values from row to row are at least 15 more
+/// than there are nodes; the extra values are written, too.
 struct BlendedImages {
   float* value = nullptr;
   /// Derivatives with respect to the source's x and z, per mm, as the source moves parallel to the

@@ -35,10 +35,11 @@ using WarpImage = void (*)(const NodeImage& image,
                            const PixelGrid& grid,
                            float* values);
 
-/// What turns slopes of node images into derivatives for the motions of the CT. In the slab frame a
-/// ray through `source` meets the node plane at source + reach (m_x, 1, m_z). Moving the ray acts
-/// on a pixel like velocities on forces: F = (I_x, ., I_z) at the node plane (the image's slopes
-/// per mm) and G at the source (the blended viewpoints'), both perpendicular to the ray.
+/// Turns slopes of node images into derivatives by motions of the CT. In the slab frame a ray
+/// through `source` meets the node plane at source + reach (m_x, 1, m_z). The ray's motion changes
+/// a pixel as forces do work along a motion: F = (I_x, ., I_z) at the node plane (the image's
+/// slopes per mm) and G at the source (the blended viewpoints' slopes), both perpendicular to the
+/// ray.
 struct PoseSlopes {
   const float* source_x;  ///< G_x, per mm, a node image like the value's
   const float* source_z;  ///< G_z
@@ -46,15 +47,15 @@ struct PoseSlopes {
   float m_scale[2];       ///< m_x = m_scale[0] s + m_offset[0], m_z likewise of t
   float m_offset[2];
   float source_move[3];  ///< mm, by which the source has moved since the images were made
-  /// One row per room axis: the share that F + G, and (m_x, 1, m_z) x F and F + G, have in the
-  /// derivatives.
+  /// One row per room axis: the coefficients of F + G, of (m_x, 1, m_z) x F and of F + G again in
+  /// the derivatives.
   float translation_of_force[3][3];
   float rotation_of_moment[3][3];
   float rotation_of_force[3][3];
 };
 
-/// The same of images that were made for another source: PoseSlopes::source_move moves the values
-/// along the slopes.
+/// The same for images that were made for another source: the values are corrected along the slopes
+/// by PoseSlopes::source_move.
 using WarpMovedImage = void (*)(const NodeImage& image,
                                 const PoseSlopes& slopes,
                                 const Homography& homography,

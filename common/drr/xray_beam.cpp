@@ -12,13 +12,14 @@ namespace af {
 void XrayBeamOptions::describe(Fields& field) {
   field.part(spectrum);
   field.at("tube_kvp").help =
-      "DRRs of the X-rays of a tube of this voltage, kV, through water and bone "
-      "(docs/spectra.md); fields need their bone's part, FIELD.bone.af.h5. 0: of one energy, the "
+      "Make DRRs for the spectrum of a tube of this voltage, kV, through water and bone "
+      "(docs/spectra.md); fields then need FIELD.bone.af.h5, the field of the bone. 0: one energy, "
+      "the "
       "HU scale's effective one";
   field("scatter_to_primary",
         scatter_to_primary,
-        "DRRs with even scatter: this many times the mean primary signal of the region that is "
-        "rendered is added to every pixel's (docs/spectra.md)")
+        "Make DRRs with even scatter: this many times the mean primary signal of the rendered "
+        "region is added to every pixel (docs/spectra.md)")
       .within(0.0, 100.0);
 }
 

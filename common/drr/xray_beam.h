@@ -11,14 +11,14 @@
 
 namespace af {
 
-/// The X-rays that DRRs are of. Unless told otherwise, they are of one energy and without scatter.
+/// The X-rays that DRRs simulate; by default of one energy and without scatter.
 struct XrayBeamOptions {
   SpectrumOptions spectrum = SpectrumOptions::one_energy();
   double scatter_to_primary = 0.0;
 
   /// Whether a renderer of the bone's part is needed beside the ordinary one.
   [[nodiscard]] bool needs_bone() const { return !spectrum.is_one_energy(); }
-  /// Whether DRRs are the renderer's own.
+  /// Whether DRRs are those of the ordinary renderer, unchanged.
   [[nodiscard]] bool is_ordinary() const { return !needs_bone() && scatter_to_primary == 0.0; }
   void describe(Fields& field);
 };
@@ -29,8 +29,8 @@ class XrayBeam {
   /// `model`: of the ordinary DRRs. InputError when its mu_water fits no energy of a spectrum.
   XrayBeam(const XrayBeamOptions& options, const AttenuationModel& model);
 
-  /// `bone`: where needs_bone(). The ordinary renderer itself, when the beam is of one energy and
-  /// without scatter.
+  /// Returns the ordinary renderer itself when the beam is of one energy and without scatter.
+  /// `bone` is required where needs_bone().
   [[nodiscard]] std::shared_ptr<const DrrRenderer> renderer(
       std::shared_ptr<const DrrRenderer> all, std::shared_ptr<const DrrRenderer> bone) const;
 

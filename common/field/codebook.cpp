@@ -50,10 +50,10 @@ std::vector<std::string> problems(const Codebook& codebook) {
   std::vector<std::string> found;
   const auto& codewords = codebook.codewords;
   if (codewords.empty() || codewords.size() > kMaxCodewords)
-    return {"codewords = " + std::to_string(codewords.size()) + ": must be within 1 and 65536"};
+    return {"codewords = " + std::to_string(codewords.size()) + ": must be between 1 and 65536"};
   if (codebook.mean_step < 0 || codebook.mean_step > kMaxMeanStep)
     found.push_back("mean_step = " + std::to_string(codebook.mean_step) +
-                    ": must be within 0 and " + std::to_string(kMaxMeanStep));
+                    ": must be between 0 and " + std::to_string(kMaxMeanStep));
   if (!is_zero(codewords.front())) found.emplace_back("codeword 0 must be the zero tile");
   const std::vector<Tile> ordered = searched_codewords(codebook);
   for (std::size_t i = codebook.has_means() ? 2 : 1; i < ordered.size(); ++i)

@@ -14,17 +14,17 @@ inline constexpr std::size_t kMaxCodewords = 65536;  ///< an index is 16 bits
 
 /// Codewords of the vector quantiser. Codeword 0 is the zero tile.
 ///
-/// Of plain tiles, a codeword is the tile: codewords are sorted by the sum of their elements (ties:
+/// With plain tiles, a codeword is a tile. Codewords are sorted by the sum of their elements (ties:
 /// lexicographically), so that a search can bound distances by the sum alone.
 ///
-/// Of mean-removed tiles (mean-removed VQ: Baker and Gray 1983), a codeword is a tile's shape, the
-/// differences from its mean, and the field holds the mean beside the index, as a multiple of
-/// `mean_step` levels. Elements of shapes stand kShapeZero higher. The shapes from codeword 1 on
-/// are sorted as plain tiles are, but folded (folded_shape()), because their own sums hardly
-/// differ. Codeword 0 goes with mean 0 and says that a tile is empty.
+/// With mean-removed tiles (mean-removed VQ: Baker and Gray 1983), a codeword is a tile's shape,
+/// the differences from its mean. The field holds the mean beside the index, as a multiple of
+/// `mean_step` levels. Shapes are stored with kShapeZero added to every element. Shapes from
+/// codeword 1 on are sorted like plain tiles, but folded (folded_shape()), because their unfolded
+/// sums hardly differ. Codeword 0 goes with mean 0 and marks an empty tile.
 ///
-/// Tiles are stored [u][v][s][t] as indices; with means each row along t is followed by a row of as
-/// many means: [u][v][s][2][t].
+/// Tiles are stored [u][v][s][t] as indices; with means, each row along t is followed by a row of
+/// as many means: [u][v][s][2][t].
 struct Codebook {
   std::vector<Tile> codewords;
   int mean_step = 0;  ///< 0: of plain tiles
@@ -35,9 +35,9 @@ struct Codebook {
   [[nodiscard]] std::size_t values_per_tile() const { return has_means() ? 2 : 1; }
 };
 
-/// What an element of a shape that equals the mean holds.
+/// The stored value of a shape's element that equals the mean.
 inline constexpr int kShapeZero = 32768;
-/// A larger step leaves nothing to the means.
+/// The largest step; with a larger one the means would be of no use.
 inline constexpr int kMaxMeanStep = 4096;
 
 /// The level that an element of a mean-removed tile stands for: within 0 and 65535.
@@ -45,8 +45,8 @@ inline std::uint16_t level_of(std::uint16_t element, std::uint16_t mean) {
   return static_cast<std::uint16_t>(std::clamp(int{mean} + int{element} - kShapeZero, 0, 65535));
 }
 
-/// A shape whose elements at the upper node along s are complemented, or back: distances between
-/// shapes stay, and the sum becomes the slope along s.
+/// Complements a shape's elements at the upper node along s; a second call undoes the first.
+/// Distances between shapes stay the same, and the sum becomes the slope along s.
 Tile folded_shape(const Tile& shape);
 
 /// The codewords in the form in which they are searched, trained and kept in order: shapes folded,

@@ -11,12 +11,13 @@
 
 namespace af {
 
-/// In quarters of an octave, for comparing magnitudes: the steps are exact and the same everywhere.
+/// A magnitude in quarters of an octave, for comparisons: the steps are exact and the same
+/// everywhere.
 int quarter_octaves(float magnitude);
 
-/// A balanced tree over the codewords but codeword 0. Each node splits its codewords into halves at
-/// the median of the coefficient that varies most among them. Node 1 is the root, node n has the
-/// children 2n and 2n + 1. Follows from the codebook alone, so it is part of the format of files,
+/// A balanced tree over all codewords except codeword 0. Each node splits its codewords into halves
+/// at the median of the coefficient that varies most among them. Node 1 is the root, node n has the
+/// children 2n and 2n + 1. The tree follows from the codebook alone: it is part of the file format
 /// but need not be stored.
 class CodewordTree {
  public:
@@ -32,7 +33,7 @@ class CodewordTree {
   struct alignas(64) Coefficients {
     TileCoefficients values;
   };
-  /// Where a node stands that splits.
+  /// Where a node that splits is stored.
   struct Place {
     std::size_t cluster;
     std::size_t within;

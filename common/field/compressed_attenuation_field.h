@@ -14,8 +14,8 @@
 
 namespace af {
 
-/// Which part of a CT's attenuation a field holds: all of it, or bone's alone (TissueModel), which
-/// goes with a field of all for DRRs of polychromatic X-rays.
+/// Which part of a CT's attenuation a field holds: all of it, or that of bone alone (TissueModel).
+/// A bone field accompanies a field of all attenuation, for DRRs of polychromatic X-rays.
 enum class FieldMaterial { All, Bone };
 
 /// What a field was made from and for; travels with it.
@@ -47,7 +47,7 @@ struct NodeIndex {
 /// A vector-quantised attenuation field: sum over slabs of decoded tiles times the quantiser step.
 struct CompressedAttenuationField {
   FieldIdentity identity;
-  LightSlab light_slab;         ///< for what asks where nodes lie; all else takes lattice()
+  LightSlab light_slab;         ///< for code that asks where nodes lie; other code: lattice()
   float quantizer_step = 0.0f;  ///< one for all slabs
   Codebook codebook;
   std::vector<CompressedSlab> slabs;  ///< in the order of light_slab.slabs
@@ -59,8 +59,8 @@ struct CompressedAttenuationField {
   [[nodiscard]] float node_value(std::size_t slab, const NodeIndex& node) const;
 };
 
-/// Why rows of indices, each followed by its row of means where the codebook has them, cannot be of
-/// a field with this codebook; empty when they can. `row`: tiles of a row.
+/// Why rows of indices (each followed by its row of means where the codebook has them) cannot
+/// belong to a field with this codebook; empty when they can. `row`: tiles per row.
 std::vector<std::string> index_problems(std::span<const std::uint16_t> values,
                                         std::size_t row,
                                         const Codebook& codebook,

@@ -108,7 +108,7 @@ AF_KERNEL_INLINE int64_t values_of_row(const BlockShape& shape) {
   return kHasMeans ? int64_t{2} * shape.t : shape.t;
 }
 
-/// Indices that are given stay.
+/// An encoder's indices stay as they are.
 AF_KERNEL_INLINE void set(const uint16_t* /*index*/, uint16_t /*codeword*/) {}
 AF_KERNEL_INLINE void set(uint16_t* index, uint16_t codeword) {
   *index = codeword;
@@ -305,7 +305,7 @@ AF_KERNEL_INLINE float code_mean(Lane<Coder, Index>& lane,
   const int32_t given = lane.index[shape.t] / tables.mean_step - expected;
   const int32_t coded = code_difference(
       lane.coder, models, offset < kMeanOffsets ? offset : kMeanOffsets - 1, side * given);
-  // Bytes that no encoder wrote may lead anywhere.
+  // Bytes that no encoder wrote may give any difference.
   const int32_t level = limited(expected + side * coded) * tables.mean_step;
   set_mean(lane.index, shape, static_cast<uint16_t>(level));
   return 16.0f * static_cast<float>(level);
@@ -367,8 +367,8 @@ AF_KERNEL_INLINE native::Ints turn_models(const NodeCluster& cluster,
   return picked<native::Ints>(kFirstModels.of, coefficients) + sides * kWidths + widths;
 }
 
-/// A way enters a cluster. The models of all its turns are found at once: a way that is told turn
-/// by turn must not wait for more than the last turn.
+/// Enters a cluster on the way to a codeword. Finds the models of all its turns at once, so that
+/// each turn waits only for the one before it.
 template <typename Coder, typename Index>
 AF_KERNEL_INLINE void enter_cluster(Lane<Coder, Index>& lane, const CodewordTables& tables) {
 #pragma GCC unroll 4

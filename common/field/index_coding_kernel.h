@@ -11,10 +11,10 @@ namespace af {
 /// How likely a bit is one, learned from those before it.
 struct AdaptiveBit {
   uint16_t one = 1u << 15u;  ///< of 65536
-  uint16_t seen = 0;         ///< bits, up to the number after which it learns no slower
+  uint16_t seen = 0;         ///< bits so far, up to where learning slows no further
 };
 
-/// Levels of a CodewordTree that stand together.
+/// Levels of a CodewordTree that are stored together.
 inline constexpr int kLevelsOfCluster = 4;
 inline constexpr int kNodesOfCluster = 1 << kLevelsOfCluster;
 
@@ -23,8 +23,8 @@ inline constexpr int kNodesOfCluster = 1 << kLevelsOfCluster;
 /// level. In two lines of the cache, and as vectors.
 struct alignas(64) NodeCluster {
   float thresholds[kNodesOfCluster];  ///< midway between the halves
-  /// 16 times the quarters of octaves of the standard deviation of the coefficient that is split,
-  /// and the coefficient.
+  /// 16 q + c: c is the number of the coefficient that is split, q its standard deviation in
+  /// quarters of an octave.
   int32_t splits[kNodesOfCluster];
 };
 
@@ -32,7 +32,7 @@ struct alignas(64) NodeCluster {
 struct CodewordTables {
   /// As a tree in which cluster c has the children 16c + 1 ... 16c + 16.
   const NodeCluster* clusters;
-  uint32_t first_node;           ///< of cluster 0: all clusters but this end where levels do
+  uint32_t first_node;           ///< of cluster 0, the only one that may lack levels
   const uint16_t* codewords_at;  ///< of the leaves; 0 for nodes that split: 1, then 2n and 2n + 1
   int32_t depth;                 ///< levels of nodes; all leaves lie below the last two
   const float* coefficients;     ///< 16 per codeword; of codeword 0 zeros
@@ -43,7 +43,7 @@ struct CodewordTables {
 
 /// What is kept of a tile until those that it helps to predict are done.
 struct TileNote {
-  float surprise;  ///< by what its prediction was wrong; 0 when it is empty
+  float surprise;  ///< error of its prediction; 0 when the tile is empty
   uint16_t codeword;
   uint16_t state;  ///< kMissing, kEmpty, kOccupied
 };
@@ -51,25 +51,25 @@ inline constexpr uint16_t kMissing = 0;
 inline constexpr uint16_t kEmpty = 1;
 inline constexpr uint16_t kOccupied = 2;
 
-/// Everything here is part of the format of files: other numbers are another coding.
+/// These numbers are part of the file format: other numbers make another coding.
 inline constexpr int kSurpriseClasses = 24;
 inline constexpr int kDistances = 32;  ///< of a prediction from a threshold, with their sign
 inline constexpr int kWidths = 16;     ///< of a node against the usual error
 inline constexpr int kOrders = 3;      ///< mean, slopes, the rest
 inline constexpr int kEmptyContexts = 3 * 3 * 3 * 3 * 3;
 
-/// Models of the difference of a mean to its prediction, by the usual difference: whether there is
-/// any, and its sign, by how far the prediction is from its nearest step; how many bits it has, and
-/// these bits from the highest on.
+/// Models of the difference between a mean and its prediction, one set per size of the usual
+/// difference: whether it is zero, and its sign, by the prediction's distance from its nearest
+/// step; how many bits it has; and these bits from the highest on.
 inline constexpr int kMeanSpreads = 32;
 inline constexpr int kMeanBits = 16;
 inline constexpr int kMeanOffsets = 4;
 inline constexpr int kModelsOfSpread = 2 * kMeanOffsets + kMeanBits + 3 * kMeanBits;
 inline constexpr int kMeanModels = kMeanSpreads * kModelsOfSpread;
 
-inline constexpr int kNotesBeyond = 4;  ///< that are looked at ahead of time
+inline constexpr int kNotesBeyond = 4;  ///< that prefetching may read
 
-/// What a coder learns within a block, and its notes. Zeros, and models as they begin, at first.
+/// What a coder learns within a block, and its notes. Starts as zeros and initial models.
 struct BlockMemory {
   AdaptiveBit* turns;    ///< [order][distance][width]
   AdaptiveBit* empties;  ///< kEmptyContexts

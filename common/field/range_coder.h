@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // For kernels only: a binary adaptive range coder (Martin 1979; the carry is handled as LZMA does
-// it). No library that we build with has one. Without branches that depend on a bit: bits are hard
-// to foresee, or they would not be stored.
+// it). None of our libraries has one. No branch depends on a bit, because bits are hard to predict;
+// otherwise they would not be stored.
 #pragma once
 
 #include <stdint.h>
@@ -70,7 +70,7 @@ class RangeEncoder {
     return bit;
   }
 
-  /// How many bytes there are in all.
+  /// Writes the last bytes; returns how many there are in all.
   AF_KERNEL_MEMBER int64_t finish() {
     for (int i = 0; i < 5; ++i) shift_low();
     return bytes_ - begin_;
@@ -110,7 +110,7 @@ class RangeDecoder {
     next_ = 5;
   }
 
-  /// The second argument is an encoder's; it does not count here.
+  /// The second argument matters to the encoder only.
   template <uint32_t least>
   AF_KERNEL_MEMBER bool code(AdaptiveBit& model, bool /*bit*/) {
     const uint32_t bound = (range_ >> 12u) * likelihood_of_one(model);

@@ -24,8 +24,8 @@ inline bool is_zero(const Tile& tile) {
   return any == 0;
 }
 
-/// A tile in the coordinates of the 4-D Hadamard transform; coefficient j is the sum of the levels,
-/// negative where an element's number shares an odd number of bits with j. Exact.
+/// A tile in the coordinates of the 4-D Hadamard transform, exact. Coefficient j is the sum of the
+/// levels, each negated if its element number shares an odd number of bits with j.
 using TileCoefficients = std::array<float, kTileElements>;
 
 TileCoefficients hadamard_coefficients(const Tile& tile);

@@ -11,8 +11,8 @@ namespace af::AF_KERNEL_NAMESPACE {
 inline constexpr int kPredictors = 8;
 
 /// Hadamard coefficients of the neighbours. `plain` serves the terms that keep a coefficient's
-/// place, `turned` those that take it from another place: zeros, where another tile stands in for a
-/// neighbour that is missing.
+/// place, `turned` those that take it from another place. `turned` is zero where another tile
+/// replaces a missing neighbour.
 struct PredictionInputs {
   const float* plain[kPredictors];
   const float* turned[kPredictors];

@@ -16,7 +16,7 @@ struct FieldProvenance {
   std::string provenance_json;
 };
 
-/// How the indices are packed in the file. Without loss: the payload is the same.
+/// Lossless packing of the indices in the file; it does not change the payload.
 enum class IndexPacking {
   CodebookTree,  ///< by IndexCoding; needs these programs to be read
   Deflate,       ///< by HDF5's shuffle and deflate; any reader of HDF5 can, and older programs
@@ -27,7 +27,7 @@ struct FieldFileInfo {
   std::string payload_sha256;  ///< over the named datasets in fixed order
   std::uint64_t file_bytes = 0;
   std::uint64_t payload_bytes = 0;  ///< indices, means and codebook, by the bits stored
-  /// How DRRs are meant to be looked up, by its options: "linear", also where they do not say, or
+  /// The look-up for DRRs that the field's options name: "linear", also when they name none, or
   /// "cubic".
   std::string look_up = "linear";
   IndexPacking packing = IndexPacking::CodebookTree;

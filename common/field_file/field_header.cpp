@@ -77,7 +77,7 @@ void check_plausible_size(const DatasetRule& rule,
                     "a file of " + std::to_string(file_bytes));
 }
 
-/// A file's version and its indices say the same of how they are packed.
+/// Checks that a file's version and its indices agree on how they are packed.
 void check_packing(hid_t dataset,
                    const DatasetRule& rule,
                    IndexPacking packing,

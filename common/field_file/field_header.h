@@ -62,7 +62,8 @@ void check_is_hdf5(const std::filesystem::path& path);
 /// Whether an open file says that it is an atlas. FileError when it is neither atlas nor field.
 bool is_atlas_format(hid_t file, const std::filesystem::path& path);
 
-/// Rank 0 alone. Of one kind: FileError when the file is of the other, or does not verify.
+/// Rank 0 alone. Reads the header of an atlas or of a field; FileError when the file is of the
+/// other kind or does not verify.
 FileHeader read_header_of(bool atlas, const std::filesystem::path& path);
 
 /// Collective. Rank 0's header on every rank.

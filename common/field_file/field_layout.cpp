@@ -57,9 +57,9 @@ StoredValues stored_values(LightSlab& planes) {
   return values;
 }
 
-/// An identity as files hold it. Two numbers are the motion range of files that older programs
-/// read, too; of a range that needs more (range_rules()) they are the largest part that two numbers
-/// can state.
+/// An identity as files hold it. Two numbers state the motion range, which older programs read,
+/// too. Of a range that two numbers cannot state (range_rules()), they hold the largest part that
+/// they can.
 struct StoredIdentity {
   FieldIdentity identity;
   double max_rotation_rad = 0.0;

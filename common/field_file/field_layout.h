@@ -54,15 +54,15 @@ std::vector<DatasetRule> index_rules(const FieldLattice& lattice, bool has_means
 std::vector<DatasetRule> index_rules(const CompressedAttenuationField& field);
 std::vector<DatasetRule> provenance_rules();
 
-/// Where the datasets of an atlas's member stand, as a field's own root has them: "/member_3".
+/// The group that holds an atlas member's datasets, laid out as in a field's root: "/member_3".
 std::string member_group(std::size_t member);
-/// The same with names that begin with the group.
+/// The same rules, or datasets, with the group in front of their names.
 std::vector<DatasetRule> within(const std::string& group, std::vector<DatasetRule> rules);
 std::vector<Dataset> within(const std::string& group, std::vector<Dataset> datasets);
 DatasetRule member_count_rule();
-/// Payload that stands in an atlas's root: the identity, and the last shared_rules() are codebook
-/// and quantiser. These stand last in payload_rules() as well, so that a member's datasets followed
-/// by them are those of a field.
+/// Rules of the payload in an atlas's root: the identity and, as the last shared_rules() of them,
+/// codebook and quantiser. payload_rules() ends with the same ones, so that a member's datasets
+/// followed by the shared ones are those of a field.
 std::vector<DatasetRule> atlas_rules(bool has_means);
 inline constexpr std::size_t shared_rules(bool has_means) {
   return has_means ? 3 : 2;
@@ -70,7 +70,7 @@ inline constexpr std::size_t shared_rules(bool has_means) {
 std::vector<Dataset> datasets_of(const AttenuationAtlas& atlas);
 /// One per slab of every member, in the order of the atlas's lattice.
 std::vector<DatasetRule> index_rules(const AttenuationAtlas& atlas);
-/// payload_rules() without the shared ones, and the datasets of a member that they stand for.
+/// payload_rules() without the shared ones, and a member's datasets by these rules.
 std::vector<DatasetRule> member_rules(int slab_count);
 std::vector<Dataset> datasets_of(const AtlasMember& member);
 int member_count_of(const Dataset& dataset, const std::string& path);
@@ -83,9 +83,9 @@ std::vector<Dataset> datasets_of(const FieldProvenance& provenance);
 /// Of its geometry alone, the number of slabs first.
 std::vector<Dataset> geometry_datasets(const LightSlab& light_slab);
 
-/// A motion range that two numbers do not state, as datasets beside the payload; none for others.
-/// Older programs do not see them: to these the file states symmetric_part() of the range, all of
-/// which it covers.
+/// Datasets beside the payload for a motion range that two numbers cannot state; none for other
+/// ranges. Older programs ignore them and read symmetric_part() of the range, all of which the
+/// field covers.
 std::vector<Dataset> range_datasets(const MotionRange& range);
 std::vector<DatasetRule> range_rules();
 /// The range of such datasets. FileError when it is no range or contradicts the two numbers that
@@ -94,8 +94,8 @@ MotionRange range_of(std::span<const Dataset> datasets,
                      const MotionRange& stated,
                      const std::string& path);
 
-/// Says in a field of bone's part alone that it is one, beside the payload; none for others. Older
-/// programs do not see it.
+/// The dataset beside the payload that marks a field of bone alone; none for other fields. Older
+/// programs ignore it.
 std::vector<Dataset> material_datasets(FieldMaterial material);
 DatasetRule material_rule();
 /// FileError when it names no material that a field has.

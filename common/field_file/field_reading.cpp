@@ -132,7 +132,8 @@ std::shared_ptr<const CompressedAttenuationField> read_field(const std::filesyst
   auto field = read_field_of_any_material(path, communicator, info);
   all_or_none(communicator, [&] {
     if (field->identity.material != FieldMaterial::All)
-      throw FileError(path.string(), "/material", "a field of all of the CT", "of its bone alone");
+      throw FileError(
+          path.string(), "/material", "a field of all of the CT", "one of its bone alone");
   });
   return field;
 }
@@ -141,17 +142,18 @@ void require_bone_of(const FieldIdentity& all,
                      const FieldIdentity& found,
                      const std::filesystem::path& path) {
   if (found.material != FieldMaterial::Bone)
-    throw FileError(path.string(), "/material", "a field of the CT's bone alone", "of all of it");
+    throw FileError(
+        path.string(), "/material", "a field of the CT's bone alone", "one of all of it");
   if (found.ct_content_sha256 != all.ct_content_sha256)
     throw FileError(path.string(),
                     "CT of the field (ct_content_sha256)",
-                    all.ct_content_sha256 + " (that of the field of all)",
+                    all.ct_content_sha256 + " (the CT of the field beside it)",
                     found.ct_content_sha256);
   if (found.mu_water_per_mm != all.mu_water_per_mm || found.air_below_hu != all.air_below_hu)
     throw FileError(path.string(),
                     "attenuation",
-                    "mu_water and the HU that count as air as in the field of all",
-                    "others");
+                    "mu_water and air_below_hu of the field beside it",
+                    "other values");
 }
 
 std::shared_ptr<const CompressedAttenuationField> read_field_of_any_material(

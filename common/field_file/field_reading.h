@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Fields and atlases out of files, and what one file must share with another.
+// Reads fields and atlases from files, and checks what files that belong together must share.
 #pragma once
 
 #include <cstddef>
@@ -30,8 +30,8 @@ std::shared_ptr<const CompressedAttenuationField> read_field(const std::filesyst
                                                              const Communicator& communicator,
                                                              FieldFileInfo* info = nullptr);
 
-/// FileError when a field or an atlas, in the file `path`, is not of the bone's part that belongs
-/// to one of all: it must be of the same CT and attenuation.
+/// FileError unless the field or atlas in the file `path` holds the bone that belongs to `all`: it
+/// must be of the same CT and attenuation.
 void require_bone_of(const FieldIdentity& all,
                      const FieldIdentity& found,
                      const std::filesystem::path& path);
@@ -49,8 +49,8 @@ std::filesystem::path bone_field_path(const std::filesystem::path& path);
 /// atlas nor field.
 bool is_atlas_file(const std::filesystem::path& path);
 
-/// One rank alone, and quick: an atlas, verified as read_field() verifies but for the indices.
-/// FileError.
+/// One rank alone, and quick: reads an atlas without its indices; all else is verified as by
+/// read_field(). FileError.
 AttenuationAtlas read_atlas_header(const std::filesystem::path& path);
 
 /// Collective. The same on every rank; no indices are read.
@@ -59,8 +59,8 @@ std::shared_ptr<const AttenuationAtlas> read_atlas(const std::filesystem::path& 
                                                    FieldFileInfo* info = nullptr);
 
 /// Collective. One member of an atlas, read and verified as a field; indices are held once per
-/// node. `payload_sha256`: of the atlas as it was read before; FileError when the file has become
-/// another. With Communicator::alone() threads may call it.
+/// node. `payload_sha256` is that of the atlas when it was read before; FileError when the file has
+/// changed since. Threads may call this with Communicator::alone().
 std::shared_ptr<const CompressedAttenuationField> read_atlas_member(
     const std::filesystem::path& path,
     std::size_t member,

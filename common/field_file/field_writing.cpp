@@ -84,7 +84,7 @@ void check_blocks(const std::vector<IndexBlock>& blocks, const std::vector<Datas
   }
 }
 
-/// What a file is to hold but for the provenance: of a field, or of an atlas.
+/// What a file is to hold except the provenance: a field or an atlas.
 struct FileContents {
   const char* format = field_layout::kFormat;
   IndexPacking packing = IndexPacking::CodebookTree;
@@ -208,8 +208,8 @@ class MpiInfo {
   MPI_Info info_ = MPI_INFO_NULL;
 };
 
-/// Rank 0 alone. Hints of how a file is laid out (stripes) count when it is made: MPI-IO makes it
-/// where there are hints, and HDF5 writes into it.
+/// Rank 0 alone. Hints on a file's layout (stripes) count only when it is created: if there are
+/// hints, MPI-IO creates the file, and HDF5 writes into it.
 void lay_out(const std::filesystem::path& path, const MpiIoHints& hints) {
   if (hints.empty()) return;
   std::error_code ignored;
@@ -390,8 +390,8 @@ FieldFileInfo write_file(const FileContents& contents,
   FieldFileInfo info;
   info.payload_bytes = contents.payload_bytes;
   info.packing = contents.packing;
-  // Outside the block below, which removes the partial file when it fails: what is refused here may
-  // be a file that this program did not make.
+  // Not in the block below, which removes the partial file on failure: this check may refuse a file
+  // that this program did not make.
   all_or_none(communicator, [&] {
     if (communicator.is_root()) check_output_file(path, partial);
   });
@@ -413,7 +413,7 @@ FieldFileInfo write_file(const FileContents& contents,
       info.file_bytes = std::filesystem::file_size(path);
     });
   } catch (const Error& error) {
-    // HDF5 would try again to write what could not be written, when MPI is finalised.
+    // When MPI is finalised, HDF5 would retry the failed write.
     if (error.exit_code() != ExitCode::Stopped) MpiEnvironment::require_abort();
     std::error_code ignored;
     if (communicator.is_root()) std::filesystem::remove(partial, ignored);

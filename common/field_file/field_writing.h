@@ -33,14 +33,13 @@ struct IndexBlock {
 inline constexpr std::array<int, 2> kIndexChunkTiles = {128, 64};
 inline constexpr int kIndexChunkTilesAlongU = 8;
 
-/// This rank's next blocks, none when it has no more. Called on every rank equally often, until no
-/// rank has any left; what it throws is thrown on every rank.
+/// Returns this rank's next blocks, or none when it has no more. Every rank calls it equally often,
+/// until no rank has any left; an exception is thrown on every rank.
 using NextBlocks = std::function<std::vector<IndexBlock>()>;
 /// Called on every rank after the last block.
 using MakeProvenance = std::function<FieldProvenance()>;
 
-/// How MPI-IO is to write: names and values of its hints ("cb_nodes", "8"). Those that it does not
-/// know it ignores.
+/// Hints to MPI-IO on how to write: names and values ("cb_nodes", "8"). It ignores unknown ones.
 using MpiIoHints = std::vector<std::pair<std::string, std::string>>;
 
 /// Collective. Writes `field` (its slabs' index arrays are ignored; every rank gives its codebook)
@@ -66,8 +65,8 @@ FieldFileInfo write_field(const CompressedAttenuationField& field,
                           const MpiIoHints& hints = {},
                           IndexPacking packing = IndexPacking::CodebookTree);
 
-/// Collective. As write_field(), of an atlas: a block's slab counts over the slabs of all members.
-/// The identity of every member names the atlas's CT and attenuation.
+/// Collective. write_field() for an atlas: a block's slab counts over the slabs of all members. The
+/// identity of every member must name the atlas's CT and attenuation.
 FieldFileInfo write_atlas(const AttenuationAtlas& atlas,
                           const NextBlocks& next_blocks,
                           const MakeProvenance& make_provenance,

@@ -20,10 +20,10 @@ inline constexpr std::uint64_t kMostSmallChunks = 1u << 20;
 
 using ChunkShape = std::array<hsize_t, 4>;
 
-/// The chunks of every slab's index dataset: kIndexChunkTiles (with their means, where they have
-/// any) of kIndexChunkTilesAlongU along u, or of fewer where so many planes of equal u are large.
-/// Fields of more than kMostSmallChunks take larger ones: doubled along v, so that such planes
-/// still are whole chunks, and only then along s, t and u.
+/// The chunks of every slab's index dataset: kIndexChunkTiles (with means, if any), and along u
+/// kIndexChunkTilesAlongU, or fewer where so many planes of equal u are large. Fields of more than
+/// kMostSmallChunks chunks take larger ones: doubled first along v, so that such planes still are
+/// whole chunks, and only then along s, t and u.
 std::vector<ChunkShape> index_chunks(const std::vector<field_layout::DatasetRule>& rules);
 
 /// Chunks of all index datasets together.

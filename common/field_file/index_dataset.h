@@ -14,9 +14,9 @@
 
 namespace af::hdf5 {
 
-/// A sum over the values (indices and means) of a slab from number `first` on. Over all blocks of a
-/// slab, whoever holds them, it adds up to one that a lost, doubled, moved or changed value
-/// changes.
+/// A hash sum over values (indices and means) of a slab, starting at value number `first`. The sums
+/// of all blocks of a slab, whichever ranks hold them, add up to a total that changes when a value
+/// is lost, doubled, moved or altered.
 std::uint64_t hash_sum(std::uint64_t first, std::span<const std::uint16_t> values);
 
 /// Rank 0 alone: an empty dataset of indices, packed chunk by chunk.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Internal to field_file: IndexCoding as a filter of HDF5, so that chunks of indices are coded
-// where HDF5 deflates others, on any number of ranks.
+// Internal to field_file: IndexCoding as an HDF5 filter, so that chunks of indices are coded where
+// HDF5 would deflate them, on any number of ranks.
 #pragma once
 
 #include <cstdint>
@@ -17,9 +17,9 @@ namespace af::hdf5 {
 /// Of the range that The HDF Group leaves for use within a program.
 inline constexpr H5Z_filter_t kIndexFilter = 411;
 
-/// While alive, datasets with the filter can be read and written: HDF5 hands a filter nothing but a
-/// chunk, so the codebook stands beside it. One that is made while another is alive replaces it
-/// until it is destroyed. Not for several threads.
+/// While this object lives, datasets with the filter can be read and written: HDF5 passes a filter
+/// nothing but a chunk, so the codebook comes from here. A second object replaces the first until
+/// it is destroyed. Not for several threads.
 class IndexFilter {
  public:
   explicit IndexFilter(const Codebook& codebook);
@@ -49,8 +49,8 @@ void add_index_filter(hid_t creation, const ChunkShape& chunk);
 /// Whether a dataset has the filter; `chunk` is then its chunks' shape.
 bool is_coded(hid_t dataset, ChunkShape& chunk);
 
-/// Why the only filter of these properties cannot be one that add_index_filter() put there: a
-/// version that is not known, a shape other than the chunks'; empty when it can.
+/// Why the only filter of these properties cannot come from add_index_filter(): its version is
+/// unknown, or its shape is not the chunks'. Empty when it can.
 std::string index_filter_problem(hid_t creation);
 
 }  // namespace af::hdf5

@@ -19,17 +19,18 @@ namespace af {
 /// The renderers of one member: its own, then those of the levels of its image pyramid.
 using MemberLevels = std::vector<std::shared_ptr<const DrrRenderer>>;
 
-/// The members of an atlas that are in memory: at most so many, those that were used last. For any
-/// number of threads. \test MembersInUse.KeepsThoseThatWereUsedLast
+/// The members of an atlas that are in memory: at most `most`, those used last. Safe for any number
+/// of threads. \test MembersInUse.KeepsThoseThatWereUsedLast
 class MembersInUse {
  public:
   using Open = std::function<std::shared_ptr<const MemberLevels>(std::size_t member)>;
 
-  /// `open` is called by one thread at a time; what it throws, get() throws. At least two members
-  /// are kept: a seam needs as many.
+  /// `open` is called by one thread at a time; get() throws what it throws. At least two members
+  /// are kept, because a seam needs two.
   MembersInUse(Open open, std::size_t most);
 
-  /// Opened, if need be. What the caller holds stays usable when the member is let go.
+  /// Returns the member, opened if need be. It stays usable for the caller after it is dropped
+  /// here.
   std::shared_ptr<const MemberLevels> get(std::size_t member);
   /// Keeps a member that was opened elsewhere, for good.
   void keep(std::size_t member, std::shared_ptr<const MemberLevels> levels);

@@ -23,7 +23,7 @@ struct ViewReach {
   [[nodiscard]] std::string text(const std::string& camera) const;
 };
 
-/// The fields of a file, without what they hold.
+/// The cameras and planes of a file's fields, without samples.
 struct FieldCoverage {
   std::vector<CameraGeometry> cameras;  ///< that each was made for
   std::vector<std::shared_ptr<const LightSlab>> planes;
@@ -41,9 +41,10 @@ struct FieldCoverage {
   [[nodiscard]] ViewReach reach(const View& view,
                                 const PoseFrame& nominal,
                                 const MotionRange& proportion) const;
-  /// The largest box about the nominal pose of `frame`, in the proportion of `proportion`, each of
-  /// whose poses one of the fields holds: covered_box() of a field. Of several it is judged by
-  /// kBoxPoses poses, the box's corners first: between them a ray may be missed.
+  /// The largest box about the nominal pose of `frame`, in the proportion of `proportion`, whose
+  /// poses are all held by one of the fields or another. For one field it is covered_box(); for
+  /// several, kBoxPoses poses are tested, the box's corners first, so a ray between them may be
+  /// missed.
   [[nodiscard]] MotionRange box(const View& view,
                                 const PoseFrame& frame,
                                 const MotionRange& proportion) const;
@@ -52,8 +53,8 @@ struct FieldCoverage {
   [[nodiscard]] std::string distance_text(const CameraGeometry& camera) const;
 };
 
-/// One rank alone, and quick: of a field's or an atlas's file, and what it was made from.
-/// FileError.
+/// What a file's field or atlas was made from, and which rays it holds. Read by one rank alone, and
+/// quickly. FileError.
 struct HeldRays {
   FieldIdentity identity;
   FieldCoverage coverage;

@@ -23,7 +23,7 @@ OpenedField::OpenedField(const std::filesystem::path& path,
     all_or_none(communicator, [&] {
       if (materials == Materials::All && atlas_->identity.material != FieldMaterial::All)
         throw FileError(
-            path.string(), "/material", "an atlas of all of the CT", "of its bone alone");
+            path.string(), "/material", "an atlas of all of the CT", "one of its bone alone");
     });
     coverage_ = FieldCoverage(atlas_);
   } else {
@@ -42,8 +42,8 @@ OpenedField OpenedField::bone(const Communicator& communicator) const {
   all_or_none(communicator, [&] {
     if (!std::filesystem::exists(path))
       throw FileError(path.string(),
-                      "does not exist: a tube voltage needs the field of the CT's bone, which "
-                      "af-precompute --material bone makes with the other options of the field "
+                      "does not exist: --tube-kvp needs a field of the CT's bone; make it with "
+                      "af-precompute --material bone and otherwise the same options as the field "
                       "beside it");
   });
   OpenedField opened(path, communicator, Materials::Any);

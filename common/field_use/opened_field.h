@@ -22,8 +22,8 @@ class OpenedField {
  public:
   enum class Materials { All, Any };
 
-  /// Collective. Errors of read_field() and read_atlas(); a field of bone alone is refused, too,
-  /// unless any will do.
+  /// Collective. Throws as read_field() and read_atlas(); also refuses a field of bone alone unless
+  /// `materials` is Any.
   OpenedField(const std::filesystem::path& path,
               const Communicator& communicator,
               Materials materials = Materials::All);

@@ -9,9 +9,8 @@
 
 namespace af {
 
-/// Memory backed by a file, to which the system writes what does not fit. So there can be more of
-/// it than the machine, or its batch job, has. The file has no name and disappears with the
-/// program.
+/// Memory backed by a file, to which the system writes what does not fit, so it can exceed the
+/// memory of the machine or its batch job. The file has no name and disappears with the program.
 class FileBackedMemory {
  public:
   /// `folder` must exist when resize() is called.

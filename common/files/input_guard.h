@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a program reads it does not overwrite. Readers note the files they open; whatever gives a
-// file its name or removes one asks here. Files are told apart by device and inode, so that links
-// and other spellings of a path are seen through. A file that this process has written itself is
-// no input: it may be read back and written again.
+// Keeps a program from overwriting what it reads. Readers note the files they open; code that
+// renames or removes a file asks here first. Files are identified by device and inode, which sees
+// through links and other spellings of a path. A file that this process has written itself is no
+// input: it may be read back and written again.
 #pragma once
 
 #include <filesystem>
@@ -10,7 +10,7 @@
 namespace af {
 
 /// Notes a file or folder that is read as input; InputError when it is, or lies in, an announced
-/// output. Nothing when there is no such file: its reader will say so.
+/// output. Does nothing when there is no such file: its reader will report that.
 void note_input(const std::filesystem::path& path);
 
 /// InputError when `path` is a file noted as input.
@@ -26,7 +26,7 @@ void announce_output_file(const std::filesystem::path& path);
 /// From now on note_input() refuses this folder and whatever lies within.
 void announce_replaced_folder(const std::filesystem::path& folder);
 
-/// The file of this name has been written by this process.
+/// Notes that this process has written the file of this name.
 void note_written(const std::filesystem::path& path);
 
 }  // namespace af

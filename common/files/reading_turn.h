@@ -5,8 +5,8 @@
 
 namespace af {
 
-/// Held while a thread reads files by HDF5, ITK or GDCM where other threads may do so, too: these
-/// libraries are made for one. Whoever holds it must not wait for a thread that may want it.
+/// A lock to hold while a thread reads files by HDF5, ITK or GDCM and other threads may do so, too:
+/// these libraries are single-threaded. Its holder must not wait for a thread that may want it.
 class ReadingTurn {
  public:
   ReadingTurn() : guard_(mutex()) {}

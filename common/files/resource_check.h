@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Work of which it is known beforehand that it cannot end well.
+// Checks before the work whether disk and memory suffice for it.
 #pragma once
 
 #include <cstdint>

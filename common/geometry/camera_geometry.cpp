@@ -187,7 +187,7 @@ std::vector<std::string> problems(const CameraGeometry& camera) {
   constexpr double kMaxPixels = 1 << 28;  // 1 GB as float
   if (camera.size_px.minCoeff() < 1 || camera.size_px.maxCoeff() > kMaxSide ||
       camera.size_px.cast<double>().prod() > kMaxPixels)
-    add("size_px", text_of(camera.size_px), "must be within 1 and 32768, at most 2^28 pixels");
+    add("size_px", text_of(camera.size_px), "must be between 1 and 32768, at most 2^28 pixels");
   if (!camera.distortion.is_none() && found.empty())
     if (const std::string problem = distortion_problem(camera); !problem.empty())
       add("distortion",

@@ -17,7 +17,7 @@ void append_axis_problems(const std::string& name,
                           std::vector<std::string>& found) {
   const NodeRange& range = axis.stored;
   if (axis.nodes < 2 || axis.nodes > kMaxNodes)
-    found.push_back(name + " nodes = " + std::to_string(axis.nodes) + ": must be within 2 and " +
+    found.push_back(name + " nodes = " + std::to_string(axis.nodes) + ": must be between 2 and " +
                     std::to_string(kMaxNodes));
   else if (range.begin < 0 || range.begin % 2 != 0 || range.begin > axis.nodes || range.count < 1 ||
            range.count > axis.nodes - range.begin ||

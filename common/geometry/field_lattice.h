@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The nodes of a field as integers: all that training, encoding, planning, progress and the layout
-// of files need. Where nodes lie, and which rays they are, the field's geometry knows.
+// of files need. The field's geometry knows where nodes lie and which rays they are.
 #pragma once
 
 #include <array>
@@ -23,8 +23,8 @@ struct NodeRange {
 /// One axis of a slab's lattice.
 struct LatticeAxis {
   int nodes = 0;  ///< of the whole lattice
-  /// Of them; the others are exactly 0. It begins at an even node, and its count is odd only where
-  /// it ends at the last node.
+  /// The stored nodes; all others are exactly 0. The range begins at an even node, and its count is
+  /// odd only where it ends at the last node.
   NodeRange stored;
 };
 
@@ -36,7 +36,7 @@ struct SlabLattice {
   LatticeAxis t;
 
   [[nodiscard]] std::array<LatticeAxis, 4> axes() const { return {u, v, s, t}; }
-  /// Of what is stored, along each axis.
+  /// Number of tiles of the stored nodes along each axis.
   [[nodiscard]] std::array<int, 4> tile_counts() const {
     return {u.stored.tiles(), v.stored.tiles(), s.stored.tiles(), t.stored.tiles()};
   }

@@ -11,9 +11,9 @@ namespace af {
 
 struct CameraGeometry;
 
-/// OpenCV's model of a distorting lens (or image intensifier). Of a point at (x, y) = (X / Z, Y /
-/// Z) in the camera's frame, with r2 = x^2 + y^2 and f = (1 + k1 r2 + k2 r2^2 + k3 r2^3) / (1 + k4
-/// r2 + k5 r2^2 + k6 r2^3), the image shows
+/// OpenCV's model of a distorting lens (or image intensifier). A point at (x, y) = (X / Z, Y / Z)
+/// in the camera's frame, with r2 = x^2 + y^2 and f = (1 + k1 r2 + k2 r2^2 + k3 r2^3) / (1 + k4 r2
+/// + k5 r2^2 + k6 r2^3), appears at
 ///   (x f + 2 p1 x y + p2 (r2 + 2 x^2), y f + p1 (r2 + 2 y^2) + 2 p2 x y).
 struct LensDistortion {
   std::array<double, 8> coefficients{};  ///< k1, k2, p1, p2, k3, k4, k5, k6
@@ -22,7 +22,7 @@ struct LensDistortion {
   /// As many as are written: 0, 5 or 8.
   [[nodiscard]] std::size_t count() const;
   [[nodiscard]] Eigen::Vector2d distorted(const Eigen::Vector2d& at) const;
-  /// Of distorted() by `at`; not finite where the denominator of f is 0.
+  /// Derivative of distorted() by `at`; not finite where the denominator of f is 0.
   [[nodiscard]] Eigen::Matrix2d jacobian(const Eigen::Vector2d& at) const;
   /// The same lens for images whose rows run the other way: PinholeCamera then turns x and y round.
   [[nodiscard]] LensDistortion with_rows_flipped() const;
@@ -30,8 +30,8 @@ struct LensDistortion {
   bool operator==(const LensDistortion&) const = default;
 };
 
-/// Between the pixels of a camera without distortion, which everything but the files of X-rays has,
-/// and those of its stored, distorted images. K is that of pinhole_of(camera).
+/// Maps between ideal pixels, those of a camera without distortion, and pixels of its stored,
+/// distorted images. Only X-ray files have the latter. K is that of pinhole_of(camera).
 class PixelDistortion {
  public:
   explicit PixelDistortion(const CameraGeometry& camera);

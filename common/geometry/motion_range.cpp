@@ -98,10 +98,10 @@ std::vector<std::string> problems(const MotionRange& range) {
     if (!(range.max_rotation_rad() >= 0.0 && range.max_rotation_rad() <= 60.0 * kRadPerDeg))
       found.push_back(
           "max_rotation_deg = " + std::to_string(range.max_rotation_rad() * kDegPerRad) +
-          ": must be within 0 and 60");
+          ": must be between 0 and 60");
     if (!(range.max_translation_mm() >= 0.0 && range.max_translation_mm() <= kMostShiftMm))
       found.push_back("max_translation_mm = " + std::to_string(range.max_translation_mm()) +
-                      ": must be within 0 and 1000");
+                      ": must be between 0 and 1000");
     return found;
   }
   const std::array<double, 6> from = range.low.deg_and_mm();
@@ -111,7 +111,7 @@ std::vector<std::string> problems(const MotionRange& range) {
     if (from[i] >= -most && to[i] <= most && from[i] <= to[i]) continue;
     found.push_back("range of " + std::string(kParameterNames[i]) + " = " +
                     std::to_string(from[i]) + " to " + std::to_string(to[i]) +
-                    ": must ascend within -" + std::to_string(static_cast<int>(most)) + " and " +
+                    ": must ascend, between -" + std::to_string(static_cast<int>(most)) + " and " +
                     std::to_string(static_cast<int>(most)));
   }
   return found;

@@ -28,7 +28,8 @@ struct MotionRange {
   /// Farthest from zero of any bound.
   [[nodiscard]] double max_rotation_rad() const;
   [[nodiscard]] double max_translation_mm() const;
-  /// The largest box of two numbers within this one; of the size 0 where this one misses zero.
+  /// The largest box within this one that two numbers can state; of size 0 where this one misses
+  /// zero.
   [[nodiscard]] MotionRange symmetric_part() const;
   [[nodiscard]] MotionRange scaled(double factor) const;
   /// The parameters, each brought into the middle `share` of its bounds.

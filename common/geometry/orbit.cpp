@@ -47,7 +47,7 @@ struct PointBox {
   }
 };
 
-/// Translations of the poses of `range` that cameras see which stand `off` from a member: the box
+/// Translations of the poses of `range` as seen by cameras that stand `off` from a member: the box
 /// turned back about the isocentre.
 PointBox translations_seen(const Orbit& orbit,
                            const Eigen::Vector3d& from_isocenter_mm,
@@ -73,9 +73,9 @@ PointBox translations_seen(const Orbit& orbit,
   return box;
 }
 
-/// Angles of the poses of `range` that cameras see which stand `off` from a member, about an axis
-/// whose turns change all three. Searched on a grid; what an extreme between its nodes can exceed
-/// it by is far less than the margin.
+/// Angles of the poses of `range` as seen by cameras that stand `off` from a member, about an axis
+/// whose turns change all three. Searched on a grid; an extreme between its nodes exceeds the
+/// grid's by far less than the margin.
 PointBox rotations_seen(const Orbit& orbit, const MotionRange& range, const Angles& off) {
   constexpr int kParts = 8;
   constexpr double kMargin = 0.01;  // of the box
@@ -162,7 +162,8 @@ class SourceAngle {
         .front();
   }
 
-  /// Sources less than `angle_rad` on, of a half turn; `sign` -1: more than that. Ct frame.
+  /// Half-space (ct frame) of sources at less than `angle_rad`, over half a turn; `sign` -1: at
+  /// more.
   [[nodiscard]] HalfSpace half_space(double angle_rad, double sign, const PoseFrame& frame) const {
     const Eigen::Vector3d normal =
         sign * (std::cos(angle_rad) * aside_ - std::sin(angle_rad) * ahead_);
@@ -175,7 +176,7 @@ class SourceAngle {
   }
 
  private:
-  /// Of a source seen from the frame's centre.
+  /// The angle of a source seen from the frame's centre.
   [[nodiscard]] double of_source(const Eigen::Vector3d& from_center) const {
     const Eigen::Vector3d from_axis = from_center + axis_;
     return std::atan2(aside_.dot(from_axis), ahead_.dot(from_axis));
@@ -227,7 +228,7 @@ MotionRange box_within(const TiledOrbit& of, double below_rad, double above_rad)
   return box;
 }
 
-/// Poses that cameras see which stand `off` from a member about an axis whose turns change all
+/// Poses as seen by cameras that stand `off` from a member, about an axis whose turns change all
 /// angles.
 MotionRange box_seen(const TiledOrbit& of, const Angles& off) {
   const PointBox shifts =

@@ -16,9 +16,9 @@ struct Orbit {
   int axis = 2;  ///< 0, 1, 2: the room's x, y, z
   double from_rad = 0.0;
   double to_rad = 0.0;
-  std::optional<double> step_rad;  ///< most between two members; none: default_step_rad()
-  /// What tells members apart: where the source stands as the CT sees it, or the pose's angle, with
-  /// all shifts in every member. About x and y it is the pose.
+  std::optional<double> step_rad;  ///< largest between two members; none: default_step_rad()
+  /// How poses are divided among members: by where the source stands as the CT sees it, or by the
+  /// pose's angle, with all shifts in every member. About x and y it is always by the pose.
   enum class MembersBy { Source, Pose } members_by = MembersBy::Source;
 
   [[nodiscard]] Eigen::Vector3d direction() const { return Eigen::Vector3d::Unit(axis); }
@@ -35,32 +35,32 @@ struct OrbitMember {
   CameraGeometry camera;  ///< the nominal one, turned by angle_rad; its name says so
   double angle_rad = 0.0;
   MotionRange range;  ///< about the nominal pose: all of it is held
-  /// Of these poses those are held whose source lies in all of `sources` (ct frame).
+  /// The planes hold those of these poses whose source lies in all of `sources` (ct frame).
   MotionRange sized_for;
   std::vector<HalfSpace> sources;
 };
 
-/// Angle about the axis between the seam of two members and where either still holds what it sees,
-/// so that DRRs pass from one to the other gradually.
+/// How far beyond the seam of two members, as an angle about the axis, either still holds what it
+/// sees, so that DRRs pass from one to the other gradually.
 inline constexpr double kSeamOverlapRad = 0.75 * kRadPerDeg;
 
-/// How far members stand apart unless an orbit says it: as wide as the range is about its axis, at
-/// least 5 degrees.
+/// The default angle between members: the width of the range about the orbit's axis, at least 5
+/// degrees.
 double default_step_rad(const Orbit& orbit, const MotionRange& range);
 
 /// Most members of an orbit.
 inline constexpr int kMaxOrbitMembers = 64;
 
-/// Fields at equal distances, one about the nominal camera where the orbit holds it, such that
-/// every pose of `range` about the nominal pose of `frame`, seen by the camera at any angle of the
-/// orbit, is held by one of them. A turn about z, the outermost rotation of a pose, adds to its
-/// rz and changes no other angle: members then tile the sum of both. By source, a member has those
-/// poses whose source is between two half-planes through the axis, or kSeamOverlapRad beyond,
-/// wherever turns and shifts have put it: what shifts need is not held by two. About x and y a
-/// member holds the whole range at every angle that is nearest to it. Shifts are those of
-/// the room: a member holds the box turned. InputError when there would be more than
-/// kMaxOrbitMembers, or angles are not finite and ascending. \test
-/// Orbit.EveryPoseAtEveryAngleIsAMembers
+/// Members at equal distances, one at the nominal camera if the orbit contains it, such that one of
+/// them holds every pose of `range` about the nominal pose of `frame`, seen by the camera at any
+/// angle of the orbit. A turn about z, the outermost rotation of a pose, adds to its rz and changes
+/// no other angle, so members about z tile the sum of both. Divided by source, a member holds the
+/// poses whose source lies between two half-planes through the axis, or up to kSeamOverlapRad
+/// beyond, wherever turns and shifts have put it; so what shifts need is held only once. About x
+/// and y a member holds the whole range at every angle that is nearest to it. Shifts are along the
+/// room's axes: a member holds the turned box. InputError when there would be more than
+/// kMaxOrbitMembers, or angles are not finite and ascending.
+/// \test Orbit.EveryPoseAtEveryAngleIsAMembers
 std::vector<OrbitMember> orbit_members(const CameraGeometry& nominal,
                                        const Eigen::Vector3d& isocenter_point,
                                        const PoseFrame& frame,
@@ -68,8 +68,8 @@ std::vector<OrbitMember> orbit_members(const CameraGeometry& nominal,
                                        const Orbit& orbit);
 
 /// The member that holds every pose of `range` at any angle of an orbit about z whose source stands
-/// within `reach_rad` of the camera turned by `angle_rad`, as the CT sees it. With all poses of its
-/// range, without regard to sources, where these move too far for that.
+/// within `reach_rad` of the camera turned by `angle_rad`, as the CT sees it. Where sources move
+/// too far for that, it holds all poses of its range, whatever their sources.
 /// \test Orbit.AMemberHoldsItsRangeOnPlanesAsNarrowAsItsSources
 OrbitMember member_of_sources(const CameraGeometry& nominal,
                               const Eigen::Vector3d& isocenter_point,

@@ -11,18 +11,17 @@
 namespace af {
 
 /// Whether all rays of the whole detector meet every plane of the light slab within its rectangle,
-/// wherever the CT is within `range` about the nominal pose of `frame`. Found as planes are sized
-/// (hit_extents), so the answer is no sample of poses. \test
-/// RayCoverage.SaysWhatSampledRaysSay
+/// wherever the CT is within `range` about the nominal pose of `frame`. Computed as planes are
+/// sized (hit_extents), not from sampled poses. \test RayCoverage.SaysWhatSampledRaysSay
 bool covers_range(const LightSlab& light_slab,
                   const CameraGeometry& camera,
                   const PoseFrame& frame,
                   const MotionRange& range);
 
 /// The largest box about the nominal pose of `frame` (angles and translations to both sides in the
-/// proportion of `proportion`, at most 60 degrees) whose poses are all covered. Its bounds are at
-/// most `kCoveredBoxTolerance` of themselves too small, never too large. Of the size 0 when the
-/// nominal pose itself is covered no farther, or not at all: covers_range() tells which.
+/// proportion of `proportion`, at most 60 degrees) whose poses are all covered. Its bounds may be
+/// too small by at most the share `kCoveredBoxTolerance`, but never too large. It has size 0 when
+/// no more than the nominal pose is covered, or not even that; covers_range() tells which.
 MotionRange covered_box(const LightSlab& light_slab,
                         const CameraGeometry& camera,
                         const PoseFrame& frame,

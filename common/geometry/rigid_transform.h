@@ -81,8 +81,8 @@ RigidTransform pose_of_deg_and_mm(const PoseFrame& frame,
                                   const std::array<double, 6>& values,
                                   const std::string& where);
 
-/// The rotation by the smallest angle that takes the direction of `from` to that of `to` (neither
-/// is zero; ones within 1.4e-6 rad of opposite: half a turn about an axis across). Orthonormal to
+/// The smallest rotation that takes the direction of `from` to that of `to`; neither is zero. For
+/// directions within 1.4e-6 rad of opposite, half a turn about a perpendicular axis. Orthonormal to
 /// 1e-11.
 Eigen::Matrix3d rotation_between(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
 

@@ -77,8 +77,8 @@ double refined(RotationMaximum best, const RotationGrid& grid, const Objective& 
 }
 
 /// Maximises smooth functions over the rotation box, each from its best node of one grid. At large
-/// angles extremes lie inside the box, so corners alone would not do. `turned(angles)` is what the
-/// functions share of a rotation, `value(that, i)` the function i of `count`.
+/// angles extremes lie inside the box, so corners alone would not do. `turned(angles)` computes
+/// what the functions share at a rotation; `value(shared, i)` is function i of `count`.
 template <typename Turned, typename Value>
 std::vector<double> maxima_over_rotations(const MotionRange& range,
                                           std::size_t count,

@@ -95,8 +95,8 @@ class MovingCamera {
     return at;
   }
 
-  /// What lies beyond a half-space is paid for: `price` per mm of normal . source - offset, gained
-  /// within it.
+  /// Charges a source beyond a half-space `price` per mm of normal . source - offset, and credits
+  /// one within it.
   struct PricedRegion {
     HalfSpace sources;  ///< slab frame
     double price = 0.0;
@@ -312,7 +312,7 @@ std::vector<PlaneExtent> extents_from(const CameraGeometry& camera,
     for (std::size_t i = 0; i < extents.size(); ++i)
       extents[i] = common_part(extents[i], reached[i]);
   }
-  // Where no source of the range is within, bounds may have passed each other: a point is left.
+  // Where no source of the range is within, the bounds may have crossed; a point is left then.
   for (PlaneExtent& extent : extents) {
     extent.x_high_mm = std::max(extent.x_low_mm, extent.x_high_mm);
     extent.z_high_mm = std::max(extent.z_low_mm, extent.z_high_mm);

@@ -17,8 +17,8 @@ struct PlaneExtent {
   double z_low_mm = 0.0, z_high_mm = 0.0;  ///< along v or t
 };
 
-/// Share of a plane's larger side (of 1 mm, where it is smaller) that extents_on_planes() adds to
-/// all four.
+/// The margin that extents_on_planes() adds on all four sides, as a share of the plane's larger
+/// side or of 1 mm, whichever is larger.
 inline constexpr double kExtentMargin = 1e-6;
 
 /// Where all rays of a camera can meet the planes y = `plane_y_mm` of the slab frame while the CT
@@ -71,9 +71,9 @@ struct LightSlabSpec {
   int st_nodes = 256;
   std::vector<double> slab_boundaries_y_mm;  ///< K - 1 inner boundaries, ascending; empty for K = 1
   std::vector<double> st_plane_y_mm = {0.0};  ///< one per slab, in the order of ascending y
-  /// Of the range's poses, the field holds those whose source lies in all of these (ct frame); none
-  /// means all poses. Of further cameras it holds all. Where they leave less than the whole (u,v)
-  /// plane, its shorter side has fewer nodes: they stand no farther apart than along the other.
+  /// The field holds only those of the range's poses whose source lies in all of these (ct frame);
+  /// none means all poses. For further cameras it holds all poses. Where these leave less than the
+  /// whole (u,v) plane, its shorter side gets fewer nodes, no farther apart than along the other.
   std::vector<HalfSpace> sources;
 };
 

@@ -71,8 +71,8 @@ struct FiducialGold {
   std::vector<std::size_t> used;
   std::vector<BackProjection> back_projections;
   RigidFit fit;
-  /// Its distance (mm) from where the pose fitted to all others puts it. Empty when
-  /// the others are fewer than three or, for any of the fiducials, lie on one line.
+  /// Distance (mm) of each from where the pose fitted to all others puts it. Empty when, for any of
+  /// the fiducials, the others are fewer than three or lie on one line.
   std::vector<double> leave_one_out_mm;
 };
 

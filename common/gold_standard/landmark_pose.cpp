@@ -303,7 +303,9 @@ LandmarkPose pose_from_landmarks(std::span<const LandmarkView> views,
         sightings, nearest_to_rays(sightings, rotation * nominal_room_from_ct.linear()), middle));
   const std::vector<Candidate> different = different_candidates(std::move(all));
   if (different.empty())
-    throw InputError("landmarks", "no pose", "must lie before the cameras that saw them");
+    throw InputError("landmarks",
+                     "behind a camera at every pose",
+                     "must lie in front of the cameras that saw them");
   std::vector<Candidate> good = about_as_good(different, sightings.size());
   const auto turn_deg = [&](const Candidate& candidate) {
     return rotation_angle_between_rad(nominal_room_from_ct, candidate.room_from_ct) * kDegPerRad;

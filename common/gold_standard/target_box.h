@@ -10,8 +10,8 @@ namespace af {
 
 inline constexpr double kTargetPointSpacingMm = 2.0;
 
-/// What a target box must be and this one is not, in words: low below high, no side longer than a
-/// CT can be, no more points than memory has room for. Empty: nothing.
+/// The rule that this target box breaks, in words: low below high, no side longer than a CT can be,
+/// no more points than memory has room for. Empty when it breaks none.
 std::string target_box_problem(const CtBox& box, double max_spacing_mm = kTargetPointSpacingMm);
 
 /// The points that stand for a target box (ct frame, mm): the centres of equal cells whose sides

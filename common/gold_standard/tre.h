@@ -21,10 +21,10 @@ struct TreBounds {
   double high_mm = 0.0;
 };
 
-/// Bounds mean_tre_mm() without a pass over all points: of each of some cells of points, the
-/// distance at its mean below (Jensen), the root mean square distance above. With four cells along
-/// each axis they lie within a few percent; with more they are closer and take longer. They are one
-/// for a pure translation. \test MeanTre.LiesWithinItsBounds
+/// Bounds mean_tre_mm() without a pass over all points, from cells of points: below by the distance
+/// at each cell's mean (Jensen), above by its root mean square distance. With four cells along each
+/// axis the bounds lie within a few percent; with more they are closer and take longer. For a pure
+/// translation they coincide. \test MeanTre.LiesWithinItsBounds
 class TreBounder {
  public:
   /// Throws InputError without points.

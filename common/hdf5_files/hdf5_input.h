@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Few numbers and texts of an HDF5 file that somebody else wrote: poses, cameras. Links that are
-// not hard ones are refused, and so are datasets whose values another file holds: HDF5 opens no
-// other file than the one it is given. (Fields, which are large, are read by field_file.)
+// Reads a few numbers and texts (poses, cameras) from an HDF5 file that somebody else wrote. Links
+// other than hard ones are refused, and so are datasets whose values lie in another file: HDF5
+// opens only the file it is given. (Fields, which are large, are read by field_file.)
 #pragma once
 
 #include <cstddef>
@@ -53,8 +53,8 @@ class Hdf5Input {
   std::string name_;
 };
 
-/// Reads in a copy of the process and throws away what it found. FileError, which begins with the
-/// file's name, where HDF5 ends the copy.
+/// Runs `read` in a copy of the process and discards what it found. FileError, which begins with
+/// the file's name, when HDF5 ends the copy.
 void rehearse_reading(const std::string& name, const std::function<void()>& read);
 
 /// read(open()), rehearsed first: HDF5 1.10 ends the process (signal 11) on some damaged files.

@@ -31,11 +31,11 @@ enum class Background { Bright, Dark, Undecided };
 /// beyond 75 % of that range, dark below 25 %.
 Background background_of(const Image2d& image, const Image2d& mask);
 
-/// How much finer detail the brightest quarter of the field has than the darkest: the logarithm to
-/// the base 2 of the ratio of their means of detail, which is the smaller of the second differences
-/// along rows and along columns. Values at either end of the scale are clipped and left out.
-/// Photons and what attenuates them make more detail where there are more of them, so it is above 0
-/// of intensities and below of a negative; 0 where there is none to compare.
+/// How much finer detail the brightest quarter of the field has than the darkest: the base-2
+/// logarithm of the ratio of their mean details. A pixel's detail is the smaller of its second
+/// differences along rows and along columns. Clipped values, at either end of the scale, are left
+/// out. Photons, and what attenuates them, make more detail where there are more photons, so the
+/// result is above 0 for intensities and below 0 for a negative; 0 where there is none to compare.
 double bright_detail(const Image2d& image, const Image2d& mask);
 
 /// (image - dark) / (flat - dark) for pixels with flat > dark; others get 0. Images of one size; an

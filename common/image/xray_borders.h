@@ -39,11 +39,11 @@ struct XrayBorders {
 /// Finds the irradiated field of an X-ray whose values are intensities, on any scale, with a
 /// detector's offset of at most half the open beam. Dead borders are rows and columns of one value.
 /// Beyond a collimator or an aperture the picture is as dark as its darkest parts; the field itself
-/// is convex, whatever made it (blades, a circle, an iris). So what is dark and reaches the edge
-/// counts as border only outside the convex hull of the rest: anatomy that leaves the picture bites
-/// into the field and stays in, unless it takes a whole corner. Within the hull only small bodies
-/// at the edge are masked that are as dark as the border. When more than `kMostMasked` would go,
-/// nothing goes and `doubt` says so.
+/// is convex, whatever made it (blades, a circle, an iris). So a dark part that reaches the edge
+/// counts as border only outside the convex hull of the rest: anatomy that leaves the picture dents
+/// the field and stays in, unless it takes a whole corner. Within the hull, only small bodies at
+/// the edge that are as dark as the border are masked. When this would mask more than
+/// `kMostMasked`, nothing is masked and `doubt` says so.
 XrayBorders find_xray_borders(const Image2d& intensity);
 
 /// Values of the pixels that lie in the field within `width_px` of its masked edge, or of the

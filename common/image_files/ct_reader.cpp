@@ -230,7 +230,7 @@ void keep_body(const CtGrid& grid,
                      "would remove " +
                          std::to_string(std::lround(100.0 * removal.dense_share_removed)) +
                          " % of what is 300 HU or more: walls of a hollow body (a dry skull?) are "
-                         "too thin to be told from a table",
+                         "too thin to be told from a table; leave this option out",
                      file);
   warnings.push_back(file + ": " + std::to_string(std::lround(removal.removed_ml)) +
                      " ml outside the body were made air (--body-only); " +

@@ -403,7 +403,7 @@ DicomCt read_dicom_series(const fs::path& folder,
                      "; resample it to an upright, even grid with --resample (ct_resample = true "
                      "in a study)");
   if (places.trouble.empty() && !tag.empty())
-    warn(warnings, tag + ", but the slices' positions do not lean; these are believed");
+    warn(warnings, tag + ", but the slices' positions show no tilt; the positions are trusted");
   const bool is_repaired = !places.trouble.empty();
   DicomCt ct;
   ct.values = HuValues{HuConversion(options)};

@@ -29,7 +29,7 @@ DicomCt read_dicom_series(const std::filesystem::path& folder,
                           std::vector<std::string>* warnings);
 
 /// Frame of Reference UID of the series that read_dicom_series() reads, from headers alone; empty
-/// when it states none. Errors as that one's of the choice of a series.
+/// when it states none. Throws as read_dicom_series() does when it chooses the series.
 std::string dicom_frame_of_reference(const std::filesystem::path& folder,
                                      const std::string& series_uid);
 

@@ -72,8 +72,8 @@ decltype(auto) visit_values(const RawImage& image, Function&& function) {
 /// What read_raw_image() reads, without values.
 RawImage read_raw_image_header(const std::filesystem::path& path, ImageFormat format);
 
-/// Reads an image file (not DICOM) by ITK. `accept` sees it without values and throws when it does
-/// not want them: nothing is allocated by the header's word before that. FileError when ITK fails.
+/// Reads an image file (not DICOM) by ITK. `accept` sees it without values and throws to refuse it,
+/// before anything is allocated by the header's sizes. FileError when ITK fails.
 RawImage read_raw_image(const std::filesystem::path& path,
                         ImageFormat format,
                         const std::function<void(const RawImage&)>& accept);

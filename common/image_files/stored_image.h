@@ -37,9 +37,9 @@ RawImage read_image_description(const std::filesystem::path& path,
                                 const ImageHeader& header,
                                 const AcceptImage& accept);
 
-/// The values of a described MetaImage, NRRD or NIfTI, in pieces of whole values, in their order,
-/// in the description's type: byte order and NIfTI's slope and intercept are seen to. We do this
-/// and not ITK, whose libraries take zeros for voxels that they do not find, and for NaN.
+/// The values of a described MetaImage, NRRD or NIfTI, in order and in the description's type, in
+/// pieces of whole values; byte order and NIfTI's slope and intercept are applied. ITK does not
+/// read them, because its libraries return zeros for missing voxels and for NaN.
 void read_described_values(const std::filesystem::path& path,
                            const ImageHeader& header,
                            const RawImage& description,

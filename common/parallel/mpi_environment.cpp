@@ -42,7 +42,8 @@ MpiEnvironment::MpiEnvironment(int& argc, char**& argv) {
   const bool names_process_manager = std::getenv("OMPI_MCA_pmix") != nullptr;
   int provided = 0;
   MPI_Init_thread(&argc, &argv, MPI_THREAD_FUNNELED, &provided);
-  // Open MPI notes that there is none: an mpirun that we or our caller start would crash of it.
+  // Open MPI notes that there is no process manager, which would crash an mpirun that we or our
+  // caller start.
   if (!names_process_manager) unsetenv("OMPI_MCA_pmix");
   // What this program starts may need its folder.
   if (needs_no_folder) unsetenv(kMakesFolder);

@@ -39,8 +39,8 @@ std::string first_of(const std::vector<std::int64_t>& frames) {
 
 CtGrid grid_of(const PoseContext& context, const std::string& file) {
   if (!context.ct_grid)
-    throw InputError(file +
-                     ": an Autoscoper pose is of the CT's voxels; name the CT (--ct, or --study)");
+    throw InputError(
+        file + ": an Autoscoper pose is in the CT's voxel frame; give the CT (--ct, or --study)");
   return context.ct_grid();
 }
 

@@ -15,15 +15,16 @@ constexpr const char* kMarkKey = "diffdrr_parameterization";
 
 CameraRig rig_of(const PoseContext& context, const std::string& file) {
   if (!context.rig)
-    throw InputError(file + ": DiffDRR's pose is of a camera; name its rig (--rig, or --study)");
+    throw InputError(file +
+                     ": a DiffDRR pose is relative to a camera; give its rig (--rig, or --study)");
   return context.rig();
 }
 
 Vector3d middle_of(const PoseContext& context, const std::string& file) {
   if (!context.ct_grid)
     throw InputError(file +
-                     ": DiffDRR's pose is about the middle of the CT; state volume_middle_ct_mm, "
-                     "or name the CT (--ct, or --study)");
+                     ": a DiffDRR pose is about the middle of the CT; state volume_middle_ct_mm, "
+                     "or give the CT (--ct, or --study)");
   return context.ct_grid().center_mm();
 }
 
@@ -31,7 +32,7 @@ Vector3d middle_of(const PoseContext& context, const std::string& file) {
 CameraGeometry camera_of(const CameraRig& rig, const std::string& name, const std::string& file) {
   if (!name.empty()) return rig.camera(name);
   if (rig.cameras.size() != 1)
-    throw InputError(file + ": which camera is not said, and the rig has several (--camera)");
+    throw InputError(file + ": names no camera, and the rig has several; choose one with --camera");
   return rig.cameras.front();
 }
 

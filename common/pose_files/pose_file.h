@@ -35,8 +35,8 @@ std::vector<RigidTransform> read_poses(const std::filesystem::path& path,
                                        const PoseContext& context,
                                        std::vector<std::string>* notes = nullptr);
 
-/// As read_poses(), where the place in the list is the number of the row or frame: InputError that
-/// names the first one which has no pose, though a later one has. Starts are numbered so.
+/// read_poses() for lists, such as starts, whose places must be the numbers of rows or frames.
+/// InputError names the first row or frame without a pose, if a later one has a pose.
 std::vector<RigidTransform> read_unbroken_poses(const std::filesystem::path& path,
                                                 const PoseContext& context,
                                                 std::vector<std::string>* notes = nullptr);

@@ -17,8 +17,8 @@
 
 namespace af {
 
-/// What some formats leave to the CT and the cameras that the pose is of. Each is asked only by a
-/// format that needs it; an empty function: not known, and such a format is refused.
+/// What some formats need of the CT and the cameras that the pose is of. Each function is called
+/// only by a format that needs it; an empty one means not known, and such a format is refused.
 struct PoseContext {
   /// What six numbers (rx_deg ... tz_mm) of a table are relative to.
   std::optional<PoseFrame> frame;

@@ -180,7 +180,7 @@ PosesInFile read_csv_of_poses(const PoseFileBytes& file, const PoseContext& cont
     if (!context.frame)
       throw InputError(name +
                        ": rx_deg ... tz_mm are relative to a nominal pose, which is not known "
-                       "here; m00 ... m23 are not");
+                       "here; give m00 ... m23 (room_from_ct) instead");
   }
   PosesInFile found;
   found.poses.reserve(table.row_count());

@@ -196,15 +196,16 @@ std::string readable_holder(const fs::path& path) {
                          const fs::path& lock,
                          const std::optional<LockHolder>& holder,
                          bool is_held) {
-  const std::string who = holder ? words_of(*holder) : "a job that has not said its name yet";
+  const std::string who = holder ? words_of(*holder) : "a job that has not identified itself yet";
   throw InputError(
       "output",
       output.string(),
-      is_held ? "another job writes it: " + who +
-                    "; wait for its end, stop it, or choose another output"
-              : "another job has begun it and not ended it properly: " + who +
-                    "; whether it still runs cannot be told from here: when it does not, remove " +
-                    lock.string() + " and run the same command again");
+      is_held
+          ? "another job is writing it: " + who +
+                "; wait until it ends, stop it, or choose another output"
+          : "another job started writing it and did not end properly: " + who +
+                "; whether it is still running cannot be told from here: if it is not, remove " +
+                lock.string() + " and run the same command again");
 }
 
 }  // namespace
@@ -330,7 +331,7 @@ bool OutputLock::open_file() {
 
 OutputLock::~OutputLock() {
   if (descriptor_ < 0) return;
-  // Whoever removed the file meanwhile may have let another job make it anew.
+  // If somebody removed the file meanwhile, another job may have made it anew.
   if (is_current(descriptor_, path_)) ::unlink(path_.c_str());
   ::close(descriptor_);
 }

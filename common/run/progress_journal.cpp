@@ -111,7 +111,7 @@ std::string padded(std::int64_t number, std::size_t width) {
   return std::string(width - std::min(width, digits.size()), '0') + digits;
 }
 
-/// Be it a link to nowhere or to itself.
+/// Whether anything has this name, even a link to nowhere or to itself.
 bool is_there(const fs::path& path) {
   return fs::symlink_status(path).type() != fs::file_type::not_found;
 }
@@ -142,7 +142,7 @@ UnfinishedWork read_manifest(const fs::path& path, std::int64_t least_unit_size)
   }
 }
 
-/// Programs before this format kept a field's units so.
+/// The files in which programs before this format kept a field's units.
 std::vector<fs::path> files_of_older_programs(const fs::path& folder) {
   std::vector<fs::path> found;
   for (const auto& entry : fs::directory_iterator(folder))

@@ -84,7 +84,7 @@ class ProgressJournal {
   [[nodiscard]] const JournalFiles& files() const { return files_; }
   /// The number of this run, one more than any before.
   [[nodiscard]] std::int64_t run() const { return run_; }
-  /// Of the work; of the run that began it, when this one goes on.
+  /// The unit size of the work, as set by the run that began it.
   [[nodiscard]] std::int64_t unit_size() const { return unit_size_; }
   /// Whether work of other options was thrown away.
   [[nodiscard]] bool has_replaced() const { return has_replaced_; }
@@ -94,7 +94,8 @@ class ProgressJournal {
   /// another host has just made.
   void visit(int rank_count, const Visit& visit) const;
 
-  /// The options of this work have been refused: it gives way to a later run with others.
+  /// Notes that the options of this work were refused, so that a later run with others may discard
+  /// it.
   void give_way() const;
 
  private:

@@ -40,7 +40,7 @@ class ProgressStore {
   [[nodiscard]] ProgressShard& shard() { return *shard_; }
   [[nodiscard]] const ProgressShard& shard() const { return *shard_; }
 
-  /// Rank 0 notes it, see ProgressJournal; when it cannot, --restart helps.
+  /// Rank 0 calls ProgressJournal::give_way(). Its failure is ignored: --restart helps.
   void give_way() const;
 
  private:

@@ -31,9 +31,9 @@ class RunFolder {
   /// Collective. From now on the output files are refused as inputs, and a stop may be asked for.
   RunFolder(RunOutput output, const Communicator& world);
 
-  /// Collective. Makes the folder, and keeps other jobs out from now on. Once the inputs are known
-  /// to be good, which then leave nothing behind when they are not; and before the work, so that an
-  /// unwritable folder does not cost it. FileError or InputError as make_output_folder() and
+  /// Collective. Makes the folder, and keeps other jobs out from now on. Call it once the inputs
+  /// are known to be good, so that bad ones leave nothing behind, and before the work, so that an
+  /// unwritable folder does not waste it. FileError or InputError as make_output_folder() and
   /// OutputLock.
   void open();
 

@@ -14,7 +14,7 @@ namespace af {
 namespace {
 
 constexpr const char* kGiveFlat =
-    "give flat, an image without the object, or flat_level, the counts of the open beam";
+    "state flat (an image without the object) or flat_level (the counts of the open beam)";
 
 constexpr int kTerms = 10;  // of a cubic polynomial of two variables
 using Terms = Eigen::Matrix<double, kTerms, 1>;
@@ -231,8 +231,8 @@ void refuse_shadow_at_one_side(const LinesAcross& lines,
   const double share = std::exp(-static_cast<double>(percentile(std::move(differences), kOfLines)));
   if (share < kLeastShare)
     throw InputError("air around the object",
-                     "one end of the lines across the rotation axis counts " +
-                         std::to_string(share) + " of the other",
+                     "at one end of the lines across the rotation axis, counts are " +
+                         std::to_string(share) + " times those at the other",
                      "must be seen at both ends, but the object or a holder shadows one in all "
                      "views; " +
                          std::string(kGiveFlat));

@@ -36,9 +36,10 @@ PixelStatistics pixel_statistics(const std::vector<const Image2d*>& images);
 /// alone. \test AirLevel.IsFoundAroundAnObject
 AirLevel estimated_air_level(const PixelStatistics& statistics, AxisAlong axis_along);
 
-/// The air level of a flat image (counts above dark); which pixels see air is found from the
-/// scan's statistics: those within 5 % of the brightest share of it, if that is at least 0.75. An
-/// object that reaches beyond the detector leaves no air, and then the beam counts as the flat's.
+/// The air level of a flat image (counts above dark). Pixels that see air are found from the scan's
+/// statistics: those whose share of the flat is within 5 % of the brightest, if that is at least
+/// 0.75. An object that reaches beyond the detector leaves no air; then the beam is taken to be the
+/// flat's.
 AirLevel air_level_of_flat(const Image2d& flat, const PixelStatistics& statistics);
 
 /// -log(counts / (air * beam)), where `beam` is this view's mean ratio of counts to air over the

@@ -185,7 +185,7 @@ std::vector<std::string> problems(const CircularScan& scan) {
   constexpr int kMostPixels = 16384;
   for (const int size : scan.size_px)
     if (size < kFewestPixels || size > kMostPixels)
-      found.push_back("size_px = " + std::to_string(size) + ": must be within 16 and 16384");
+      found.push_back("size_px = " + std::to_string(size) + ": must be between 16 and 16384");
   for (int axis = 0; axis < 2; ++axis) {
     const double foot = scan.stated_foot_px()[axis];
     // The whole object must be seen on both sides of the axis.

@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "geometry/point_projector.h"
+#include "geometry/rigid_transform.h"
 #include "scan/image_sampling.h"
 #include "volume/ray_caster.h"
 
@@ -229,7 +230,7 @@ void SelfCalibrationOptions::describe(Fields& field) {
   field("rounds", rounds, "Rounds of reconstructing, predicting and moving cameras").within(1, 100);
   field("fine_px", fine_px, "Smoothing of compared images, pixels of the working resolution")
       .within(0.3, 10.0);
-  field("coarse_px", coarse_px, "What varies over more than this is left out, pixels")
+  field("coarse_px", coarse_px, "Image variation on scales above this is left out, pixels")
       .within(2.0, 100.0);
   field("working_px",
         working_px,
@@ -240,7 +241,8 @@ void SelfCalibrationOptions::describe(Fields& field) {
   field("focal_share",
         focal_share,
         "The detector's distance is sought within this share of the stated one; 0: kept. "
-        "Projections hardly tell it, and all lengths of the CT go with it: keep a measured one")
+        "Projections hardly determine it, and all lengths of the CT scale with it: give 0 if it "
+        "was measured")
       .within(0.0, 0.3);
   field("tilt_deg", tilt_deg, "The detector's tilt is sought within so many degrees; 0: kept")
       .within(0.0, 10.0);

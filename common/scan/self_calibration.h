@@ -77,20 +77,20 @@ std::vector<unsigned char> fully_seen_pixels(const CircularScan& scan,
 /// The radius about the axis within which nearly all of what attenuates lies, mm.
 double object_radius_mm(const MuVolume& volume);
 
-/// The stated geometry, or that moved across the axis to where the views' common centre of
-/// attenuation lies, whichever predicts better: the centre of all that a full circle sees is on the
-/// axis, unless the object reaches beyond the detector. The best that is known without
+/// The stated geometry, or the same moved across the axis to the views' common centre of
+/// attenuation, whichever predicts better: the centre of all that a full circle sees is on the
+/// axis, unless the object reaches beyond the detector. This is the best estimate without
 /// self-calibration.
 ScanCalibration stated_calibration(const ScanImages& images,
                                    const std::vector<int>& used,
                                    const SelfCalibrationOptions& options,
                                    ThreadPool& pool);
 
-/// Finds the geometry by which the views agree with each other: of the `used` views each half is
-/// predicted from the other's reconstruction, and cameras move to where the images are. Distance
-/// of the detector and its tilt, which projections hardly tell, are sought by the same residual.
-/// Throws InputError when a scan turning the other way would agree better: then step or handedness
-/// of the images is wrong. `report` receives a line per step.
+/// Finds the geometry by which the views agree with each other: each half of the `used` views is
+/// predicted from the other's reconstruction, and cameras move to where the images are. The
+/// detector's distance and tilt, which projections hardly determine, are sought by the same
+/// residual. Throws InputError when a scan turning the other way would agree better: then step or
+/// handedness of the images is wrong. `report` receives a line per step.
 ScanCalibration self_calibrate(const ScanImages& images,
                                const std::vector<int>& used,
                                const SelfCalibrationOptions& options,

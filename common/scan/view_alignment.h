@@ -10,8 +10,8 @@
 
 namespace af {
 
-/// What of a view's camera a prediction can be wrong in: column and row of the beam's foot (px) and
-/// the detector's rotation in its plane (rad).
+/// The parameters of a view's camera that alignment corrects: column and row of the beam's foot
+/// (px) and the detector's rotation in its plane (rad).
 inline constexpr int kViewParameters = 3;
 using ViewVector = Eigen::Matrix<double, kViewParameters, 1>;
 using ViewMatrix = Eigen::Matrix<double, kViewParameters, kViewParameters>;

@@ -42,9 +42,9 @@ class Anatomy {
   std::uint64_t key_ = 0;
 };
 
-/// A smooth map of the ct frame that makes a patient's size and proportions of the typical adult's:
-/// stretches, long waves (no side mirrors the other), and, where `bends`, scoliosis with the turn
-/// of the vertebrae that goes with it, and more or less kyphosis.
+/// A smooth map of the ct frame that turns the typical adult's size and proportions into a
+/// patient's: stretches, long waves (no side mirrors the other), and, where `bends`, scoliosis with
+/// the turn of the vertebrae that goes with it, and more or less kyphosis.
 class Habitus {
  public:
   /// `wave_mm`: amplitude of the waves.

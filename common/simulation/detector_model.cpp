@@ -69,16 +69,16 @@ void DetectorOptions::describe(Fields& field) {
   field("photons_per_pixel",
         photons_per_pixel,
         "Photons per pixel in the open beam, for Poisson noise")
-      .such_that("within 1 and 1e12, or 0 for no noise", [](double photons) {
+      .such_that("between 1 and 1e12, or 0 for no noise", [](double photons) {
         return photons == 0.0 || (photons >= 1.0 && photons <= 1e12);
       });
   field("blur_sigma_px", blur_sigma_px, "Gaussian detector blur, px").within(0.0, 50.0);
   field("bits", bits, "Grey level bits, 8 to 16; 0: float pixels")
-      .such_that("within 8 and 16, or 0 for no quantisation",
+      .such_that("between 8 and 16, or 0 for no quantisation",
                  [](double count) { return count == 0.0 || (count >= 8.0 && count <= 16.0); });
   field("open_beam_level",
         open_beam_level,
-        "Grey level of the open beam; beyond the bits it saturates")
+        "Grey level of the open beam; levels that --bits cannot hold saturate")
       .within(1.0, 1e6);
 }
 

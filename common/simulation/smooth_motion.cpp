@@ -65,8 +65,8 @@ std::vector<std::string> problems(const SmoothMotionOptions& options) {
   const double slope_per_mm =
       std::sqrt(3.0) * (kTwoPi / options.wavelength_mm + kRampSlope / options.ramp_mm);
   if (!(options.amplitude_mm >= 0.0 && options.amplitude_mm <= 1.0 / slope_per_mm))
-    found.push_back("motion_mm = " + number_text(options.amplitude_mm) + ": must be within 0 and " +
-                    number_text(1.0 / slope_per_mm));
+    found.push_back("motion_mm = " + number_text(options.amplitude_mm) +
+                    ": must be between 0 and " + number_text(1.0 / slope_per_mm));
   return found;
 }
 

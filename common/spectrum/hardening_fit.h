@@ -16,12 +16,12 @@ struct HardeningBin {
   double bone;
 };
 
-/// The polynomial that comes nearest to U of a spectrum: least squares over nodes that are dense
-/// where the beam is soft, relative ones where U exceeds 8. `attenuation`: U of water and bone;
+/// The polynomial that comes nearest to U of a spectrum, by least squares (relative ones where U
+/// exceeds 8) over nodes that are dense where the beam is soft. `attenuation`: U of water and bone;
 /// `slope_of_air`: dU / d water at 0.
 ///
-/// The coefficients of both materials at all energies lie nearly on a line, for both are mostly
-/// photoelectric absorption beside a part that hardly knows the energy. Along that line the beam
+/// The coefficients of both materials at all energies lie nearly on a line, because both are mostly
+/// photoelectric absorption plus a part that hardly depends on the energy. Along that line the beam
 /// hardens, fast at first; across it U is nearly straight.
 HardeningPolynomial fitted_hardening(
     const std::vector<HardeningBin>& spectrum,

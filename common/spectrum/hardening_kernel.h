@@ -5,9 +5,10 @@
 
 namespace af {
 
-/// What a tube's spectrum leaves of a ray, as a polynomial of two coordinates: how much it hardens
-/// the beam and, for the little that this leaves open, of which of the two materials. With water w
-/// and bone b of a ray, both as line integrals at the effective energy,
+/// Total attenuation U of a ray for a tube's spectrum, as a polynomial of two coordinates: x says
+/// how much the ray hardens the beam and a, for the little that x leaves open, which of the two
+/// materials does. With water w and bone b of a ray, both as line integrals at the effective
+/// energy,
 ///
 ///     x = log2(1 + hard . (w, b)) log_scale,    0 at w = b = 0 and 1 at the reaches
 ///     a = tilt . (w, b)

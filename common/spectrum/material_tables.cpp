@@ -79,7 +79,7 @@ double effective_energy_kev(double mu_water_per_mm) {
     throw InputError(
         "water_mu_per_mm",
         std::to_string(mu_water_per_mm),
-        "must be water's attenuation at some energy of 10 to 200 keV, that is within " +
+        "must be water's attenuation at some energy of 10 to 200 keV, that is between " +
             std::to_string(smallest) + " and " + std::to_string(largest));
   constexpr int kBisections = 60;  // 190 keV / 2^60 is below one unit in the last place
   for (int i = 0; i < kBisections; ++i) {

@@ -38,9 +38,9 @@ class PolychromaticAttenuation {
   PolychromaticAttenuation(const SpectrumOptions& options, const TissueModel& tissue);
 
   /// `all`: line integrals at the effective energy, bone included (an ordinary DRR); `bone`: bone's
-  /// part of them. Turns `all` into U. Noise beyond what can be is cut off: bone below 0 counts as
-  /// 0, and above all as all; all below 0 is continued by its slope at 0. Bits do not depend on the
-  /// vector width.
+  /// part of them. Turns `all` into U. Impossible values, from noise, are limited: bone below 0
+  /// counts as 0, and bone above `all` as `all`; below `all` = 0, U continues with its slope at 0.
+  /// Bits do not depend on the vector width.
   void apply(std::span<float> all, std::span<const float> bone) const;
   /// The same, and planes of derivatives of both, one after the other, by the chain rule.
   void apply(std::span<float> all,

@@ -15,7 +15,7 @@ SpectrumOptions SpectrumOptions::one_energy() {
 
 void SpectrumOptions::describe(Fields& field) {
   field("tube_kvp", tube_kvp, "Tube voltage, kV; 0: only the HU scale's effective energy")
-      .such_that("within 30 and 200, or 0 for a single energy", [](double kvp) {
+      .such_that("between 30 and 200, or 0 for a single energy", [](double kvp) {
         return kvp == 0.0 || (kvp >= 30.0 && kvp <= kHighestTableEnergyKev);
       });
   field("aluminium_mm", aluminium_mm, "Filtration, mm of aluminium").within(0.0, 50.0);

@@ -35,8 +35,8 @@ GoldStandard gold_standard(const Study& study,
 /// the one the study states); nullopt when the study knows none.
 std::optional<GoldStandard> known_gold(const Study& study, const StudyCase& study_case);
 
-/// What stands beside every TRE that is measured against this pose: the mean TRE (mm) that the gold
-/// standard has by itself. NaN for a stated pose, whose uncertainty nothing tells.
+/// The mean TRE (mm) of the gold standard itself, stated beside every TRE that is measured against
+/// this pose. NaN for a stated pose, whose uncertainty is not known.
 double own_tre_mm(const GoldStandard& gold);
 
 /// Source, fiducial registration error, ray gaps, residuals, leave-one-out errors, uncertainty at

@@ -293,7 +293,7 @@ void read_views(TomlTableReader& reader,
                            std::string(view_prefix)
                                .append("camera = '")
                                .append(camera)
-                               .append("': has another view of this case at ")
+                               .append("': already has a view in this case, at ")
                                .append(earlier->second));
   }
 }
@@ -354,7 +354,7 @@ void read_cases(TomlTableReader& reader, Study& study, const StudyContext& conte
                            std::string(prefix)
                                .append("name = '")
                                .append(name)
-                               .append("': is the name of the case at ")
+                               .append("': is already the name of the case at ")
                                .append(earlier->second));
   }
 }
@@ -446,7 +446,8 @@ const StudyCase& Study::find_case(const std::string& name) const {
   if (const StudyCase* const found = find_row(cases, name); found != nullptr) return *found;
   if (name.empty() && cases.size() == 1) return cases.front();
   const std::string known = joined(names_of(cases));
-  if (name.empty()) throw InputError(path.string() + ": name one of its cases: " + known);
+  if (name.empty())
+    throw InputError(path.string() + ": has several cases; choose one of them: " + known);
   throw InputError("case", name, "the study has only: " + known, path.string());
 }
 

@@ -84,9 +84,9 @@ void check_spacing(const LoadedImage& loaded,
       return;
     throw InputError(loaded.dicom ? "ImagerPixelSpacing" : "pixel spacing",
                      spacing_text(*loaded.spacing_mm),
-                     "must be pixel_spacing_mm of camera '" + camera.name +
+                     "must equal pixel_spacing_mm of camera '" + camera.name +
                          "': " + spacing_text(camera.pixel_spacing_mm) +
-                         " (column, row); mend the rig or the file, or set xray_spacing = "
+                         " (column, row); correct the rig or the file, or set xray_spacing = "
                          "\"ignore\"",
                      view.xray.string());
   }
@@ -216,11 +216,12 @@ Image2d load_companion(const std::filesystem::path& path,
       loaded.dicom ? loaded.dicom->inversion_sum : sum_of_xray.value_or(inversion_sum(loaded));
   const float most = *std::max_element(loaded.image.pixels.begin(), loaded.image.pixels.end());
   if (static_cast<double>(most) > sum)
-    throw InputError("largest value",
-                     number_text(static_cast<double>(most)),
-                     "must not exceed " + number_text(sum) +
-                         ", the full scale by which the X-ray's values were turned round",
-                     path.string());
+    throw InputError(
+        "largest value",
+        number_text(static_cast<double>(most)),
+        "must not exceed " + number_text(sum) +
+            ", the full scale from which the X-ray's values were subtracted to invert them",
+        path.string());
   turn_round(loaded.image, sum);
   return std::move(loaded.image);
 }
@@ -319,11 +320,12 @@ double air_level(const Image2d& image,
     case AirSource::OpenBeam: {
       const auto air = open_beam_peak(values_in(image, field));
       if (!air)
-        throw InputError("air_level",
-                         "\"open-beam\"",
-                         "no level is shared by 3 % of the pixels: is air in view? State a "
-                         "number or a flat field",
-                         view.xray.string());
+        throw InputError(
+            "air_level",
+            "\"open-beam\"",
+            "no grey level is common to 3 % of the pixels: is there air in view? If not, state a "
+            "number or a flat field",
+            view.xray.string());
       return told(air->level, "open beam: " + percent(air->share) + " of the field within 10 %");
     }
     case AirSource::CollimatedBorders: {
@@ -402,8 +404,8 @@ void note_background(const Image2d& image,
                      (is_bright ? "bright" : "dark") + ", but xray_domain = \"" + domain +
                      "\" means " + (is_bright ? "dark" : "bright") + " air; " +
                      (may_be_border ? "a collimator or aperture (mask = \"auto\")? " : "") +
-                     "if its greys are turned round, set xray_polarity = \"inverted\"; anatomy "
-                     "that fills the picture looks so, too");
+                     "if its greys are inverted, set xray_polarity = \"inverted\"; anatomy "
+                     "that fills the picture can look like this, too");
 }
 
 double hidden_share(const Image2d& mask, const RegionOfInterest& roi) {
@@ -472,7 +474,7 @@ Image2d load_oriented(const StudyView& view,
   if (is_turned(loaded, view)) {
     inversion = inversion_sum(loaded);
     turn_round(loaded.image, *inversion);
-    note.add("values turned round: " + number_text(*inversion) + " - stored");
+    note.add("values inverted: " + number_text(*inversion) + " - stored");
   }
   return std::move(loaded.image);
 }

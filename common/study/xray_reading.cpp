@@ -58,9 +58,10 @@ void read_spacing(TomlTableReader& reader, XrayReading& reading) {
 
 void refuse_contradictions(TomlTableReader& reader, XrayDomain domain, const XrayReading& reading) {
   if (reading.flat && reading.air != AirSource::NotAsked)
-    reader.add_problem("air_level", "must not stand beside `flat`, which gives it for every pixel");
+    reader.add_problem("air_level",
+                       "must not be given together with `flat`, which gives it for every pixel");
   if (reading.dark && reading.dark_level != 0.0)
-    reader.add_problem("dark_level", "must not stand beside `dark`");
+    reader.add_problem("dark_level", "must not be given together with `dark`");
   if (domain == XrayDomain::Intensity) return;
   for (const char* key : {"air_level", "flat", "dark", "dark_level"})
     if (reader.has(key)) reader.add_problem(key, "is for xray_domain = \"intensity\" only");

@@ -22,7 +22,7 @@ std::string toml_of_fields(const Fields& fields);
 /// The fields that decide results, or one stage of them.
 OptionTexts deciding_fields(const Fields& fields, const std::string& stage);
 
-/// The options with what follows from those that were not given, where the struct knows that.
+/// The options with the values that follow from others filled in, if the struct has in_force().
 template <Described T>
 T options_in_force(const T& options) {
   if constexpr (requires { options.in_force(); })

@@ -103,7 +103,7 @@ bool is_absent_row(const toml::node& node, int columns) {
 }
 
 std::string wanted_numbers(double most) {
-  return " finite numbers, none beyond " + number_text(most);
+  return " finite numbers, each within +-" + number_text(most);
 }
 
 }  // namespace
@@ -181,10 +181,10 @@ std::optional<std::string> TomlTableReader::get_string(const char* key, Presence
   if (found == nullptr) return std::nullopt;
   if (auto text = found->value_exact<std::string>(); text && !text->empty()) {
     if (text->find('\0') == std::string::npos) return text;
-    add_problem(key, "must not hold a zero character");
+    add_problem(key, "must not contain a NUL character");
     return std::nullopt;
   }
-  add_problem(key, "must be a text in quotes that is not empty");
+  add_problem(key, "must be text in quotes, and not empty");
   return std::nullopt;
 }
 

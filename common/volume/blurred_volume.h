@@ -14,11 +14,11 @@ namespace af {
 /// Blurs and thins out a CT's attenuation, so that DRRs of it are those of the CT blurred by a
 /// given variance along each axis: ray casting's levels of an image pyramid.
 ///
-/// Along each axis every f-th voxel remains, f being the most whose spacing does not exceed half of
+/// Along each axis every f-th voxel remains, f being the largest whose spacing is at most half of
 /// sigma, so that interpolation leaves no trace of where the voxels lie. The weights are (a, 1 -
 /// 2a, a), 0 < a <= 1/4, applied n times: their variance 2 a n is exact. Trilinear interpolation of
-/// voxels h apart blurs by h^2 / 6 itself; the weights leave out by how much it does more of that
-/// than in the CT. \test VolumeBlur.SpreadsAVoxelByTheVariance
+/// voxels h apart itself blurs by h^2 / 6; the weights blur less by what this adds beyond that of
+/// the CT. \test VolumeBlur.SpreadsAVoxelByTheVariance
 class VolumeBlur {
  public:
   /// `fine`: grid with border of an AttenuationVolume. sigma_mm is positive. InputError when the

@@ -47,16 +47,17 @@ void CtReadOptions::describe(Fields& field) {
       .finite();
   field("values_water_mu_per_mm",
         values_water_mu_per_mm,
-        "With --values mu or raw: the attenuation that is kept as 0 HU, 1/mm; with the same "
-        "--water-mu-per-mm line integrals are those of the file's attenuation")
+        "With --values mu or raw: the attenuation that becomes 0 HU, 1/mm; with the same value of "
+        "--water-mu-per-mm, line integrals are those of the file's attenuation")
       .above(0.0)
       .at_most(1.0);
   field("label_hu",
         label_hu,
-        "With --values labels: HU of a label, as 3=700; repeated; labels without one are air")
+        "With --values labels: HU of a label, such as 3=700; may be repeated; other labels are air")
       .one_at_a_time();
-  field(
-      "body_only", keeps_body_only, "Make air of what is not the body: table, head holder, cables");
+  field("body_only",
+        keeps_body_only,
+        "Replace everything but the body (table, head holder, cables) with air");
 }
 
 std::vector<std::string> problems(const CtReadOptions& options) {
@@ -69,7 +70,7 @@ std::vector<std::string> problems(const CtReadOptions& options) {
                     ": is for values = raw");
   if ((options.values == "labels") == options.label_hu.empty())
     found.push_back("label_hu = " + (options.label_hu.empty() ? "none" : joined(options.label_hu)) +
-                    ": must be given with values = labels, and with nothing else");
+                    ": must be given with values = labels, and must not be given otherwise");
   for (const std::string& text : options.label_hu)
     if (!label_of(text))
       found.push_back("label_hu = " + text + ": must be LABEL=HU, such as 3=700");

@@ -9,8 +9,8 @@
 
 namespace af {
 
-/// How a CT's file becomes HU. What is read differently has other voxels, so another content hash:
-/// fields and unfinished work of the one are refused with the other.
+/// How a CT's file becomes HU. A CT read in another way has other voxels, so another content hash:
+/// fields and unfinished work of one reading are refused with another.
 struct CtReadOptions {
   std::string series_uid;  ///< chooses one of several DICOM series in a folder; empty: there must
                            ///< be only one

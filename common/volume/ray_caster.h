@@ -58,11 +58,10 @@ class RayCaster {
 
   /// The same values, bit for bit, with derivatives, for about a third more time. Derivatives are
   /// those of the line integrals of the interpolant, summed over the same samples: each moves with
-  /// the ray, across it. How samples slide along a ray when the points move where it enters and
-  /// leaves the volume, which shifts values by the errors of sampling, is left out: that makes the
-  /// derivatives more precise than central differences of values. Only at the volume's faces
-  /// samples slide, because a face may cut a body.
-  /// \test RayCasterSlopes.ConvergeToThoseOfTheLineIntegral
+  /// the ray, across it. When the entry and exit points of a ray move, samples also slide along it,
+  /// which shifts values by the errors of sampling. This is left out, except at the volume's faces,
+  /// because a face may cut a body; that makes the derivatives more precise than central
+  /// differences of values. \test RayCasterSlopes.ConvergeToThoseOfTheLineIntegral
   void cast_with_slopes(const RayFan& fan,
                         std::span<float> total_attenuation,
                         const MotionSlopes& slopes,

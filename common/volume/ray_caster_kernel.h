@@ -29,9 +29,9 @@ struct SlopeSums {
   float values[RayBundle::kRays];
   float slopes[3][RayBundle::kRays];           ///< of the interpolant, per voxel along i, j, k
   float numbered_slopes[3][RayBundle::kRays];  ///< each times the sample's number k
-  /// What moving an end along the ray by one step gives: its first (last) kStretched samples, or
-  /// all when there are fewer, move along with it, less and less, and their weights make up for it.
-  /// About 0 at air, and the attenuation there where the volume's face cuts a body.
+  /// Change of the sum when an end moves along the ray by one step: its first (last) kStretched
+  /// samples, or all when there are fewer, move along with it, less and less, and their weights
+  /// change to match. About 0 in air; the attenuation there where the volume's face cuts a body.
   static constexpr int kStretched = 16;
   float stretched_begin[RayBundle::kRays];
   float stretched_end[RayBundle::kRays];

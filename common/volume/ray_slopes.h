@@ -30,10 +30,10 @@ struct RaySums {
   double stretched_end;
 };
 
-/// dU by the motions of MotionSlopes. Moving the volume moves the ray the other way, and samples
-/// with it, across the ray: so they act like forces on the two ends of the path. Motion along the
-/// ray changes nothing within the volume. The ends slide along the faces that they lie on, which
-/// matters where a face cuts a body.
+/// dU by the motions of MotionSlopes. Moving the volume moves the ray and its samples the other
+/// way, across the ray, so that the samples act like forces on the two ends of the path. Motion
+/// along the ray changes nothing within the volume. The ends slide along the faces that they lie
+/// on, which matters where a face cuts a body.
 class RayMechanics {
  public:
   RayMechanics(const CtGrid& grid, const MotionSlopes& motions);

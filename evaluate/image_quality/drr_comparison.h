@@ -22,10 +22,10 @@ PoseParameters random_pose_in_range(const MotionRange& range,
                                     std::uint64_t index,
                                     std::uint64_t attempt = 0);
 
-/// How well a DRR equals its reference at one pose.
+/// How closely a DRR matches its reference at one pose.
 struct DrrComparison {
   PoseParameters parameters;
-  int redrawn = 0;                ///< random poses given up for want of foreground
+  int redrawn = 0;                ///< random poses discarded for too little foreground
   std::int64_t rays_outside = 0;  ///< > 0: the field does not cover this pose; the rest is NaN
   double psnr_db = std::numeric_limits<double>::quiet_NaN();  ///< infinity: equal images
   double rms_difference = std::numeric_limits<double>::quiet_NaN();

@@ -82,8 +82,8 @@ struct Setup {
   }
 };
 
-/// The camera that is looked through, and from where random poses are drawn. An atlas's range is
-/// held at each of its angles; a field's is that of its own camera.
+/// Sets the camera to look through and the range of random poses. An atlas holds its range at each
+/// of its angles; a field's range is that of its own camera.
 void choose_camera(const Target& target, Setup& setup) {
   const FieldIdentity& identity = setup.field->identity();
   setup.view = View::whole_detector(identity.camera);
@@ -493,7 +493,7 @@ void ImageQualityOptions::describe(Fields& field_list) {
   field_list.part(ray_caster);
   field_list.part(beam);
   field_list.part(ct_reading);
-  field_list("seed", seed, "Of the random poses");
+  field_list("seed", seed, "Seed of the random poses");
   field_list.part(resume);
   field_list("output", output_folder, "Folder for the results")
       .as("-o,--output")

@@ -39,10 +39,10 @@ struct ImageQualityOptions {
 std::vector<std::string> problems(const ImageQualityOptions& options);
 
 /// Collective. Compares a field's DRRs with ray casting (Fig. 8), for its own camera, the one of
-/// --rig and --camera, or those of the study, and writes image-quality.csv,
-/// figures, the pictures of the worst and the median pair, summary.json and reproduce.sh. Of a
-/// study every view's field gets a folder of its own, CASE-CAMERA, and the run's folder one table,
-/// one box plot and the worst pairs side by side.
+/// --rig and --camera, or those of the study, and writes image-quality.csv, figures, the pictures
+/// of the worst and the median pair, summary.json and reproduce.sh. For a study, every view's field
+/// gets its own folder, CASE-CAMERA, and the run's folder gets one table, one box plot and the
+/// worst pairs side by side.
 cli::SubCommand image_quality_command(CLI::App& app);
 
 }  // namespace af::evaluation

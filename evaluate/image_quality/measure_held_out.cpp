@@ -226,7 +226,9 @@ void HeldOutOptions::describe(Fields& field_list) {
              "deviation in pixels")
       .within(0.0, 100.0);
   field_list("threads", threads, "Threads; 0: every processor").within(0, 1024);
-  field_list("output", output, "The Markdown file; the CSV takes its name, .csv").as("-o,--output");
+  field_list(
+      "output", output, "Markdown file to write; a CSV of the same name is written beside it")
+      .as("-o,--output");
 }
 
 std::vector<std::string> problems(const HeldOutOptions& options) {

@@ -32,8 +32,8 @@ std::vector<std::string> problems(const HeldOutOptions& options);
 /// Collective. How well fields and their CT's ray casting predict the X-rays of a study at their
 /// true poses: PSNR of eq. (12) with the X-ray as the reference, over the pixels of each view's
 /// region that no mask hides and whose rays the CT attenuates, as they are and with both images
-/// smoothed. Views of which a field does not hold every ray of the region are left out for all.
-/// Writes a table (Markdown) and a row per view and renderer (CSV beside it). Rank 0 does the work.
+/// smoothed. A view is left out for all predictors if some field lacks a ray of its region. Writes
+/// a table (Markdown) and a row per view and renderer (CSV beside it). Rank 0 does the work.
 cli::SubCommand held_out_command(CLI::App& app);
 
 }  // namespace af::evaluation

@@ -28,7 +28,7 @@ struct LoadedInputs {
 
 /// Collective. The methods of a case, in the order of chosen_renderers(); hashes and notes of the
 /// inputs go to `inputs`. Look-up is corrected where `correction` says so. `judging_level`: as
-/// CaseLoadOptions has it. `kept_fields`: of a loop over cases. Throws as load_case() does.
+/// CaseLoadOptions has it. `kept_fields`: shared by a loop over cases. Throws as load_case() does.
 std::vector<LoadedMethod> load_methods(
     const MethodOptions& options,
     const registration::CorrectionOptions& correction,

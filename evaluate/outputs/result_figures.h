@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The figures of the paper's evaluation, as SVG and PNG; those without a table of their own beside
-// them also as CSV of what is drawn.
+// The figures of the paper's evaluation, as SVG and PNG; figures without a table of their own also
+// get a CSV of the plotted data.
 #pragma once
 
 #include <filesystem>
@@ -17,7 +17,7 @@ struct PsnrGroup {
   std::vector<double> psnr_db;
 };
 
-/// Whether the paper's PSNR may stand beside a figure: its levels hold for its motion range and its
+/// Whether a figure may show the paper's PSNR levels, which hold for the paper's motion range and
 /// camera alone (see paper_setting.h).
 enum class PaperLevels { Hidden, Shown };
 
@@ -47,8 +47,8 @@ void draw_tre_histogram(const std::vector<OutcomeGroup>& groups,
                         const std::filesystem::path& path_without_extension,
                         double success_tre_mm = kSuccessTreMm);
 
-/// Initial against final TRE, one dot per registration, logarithmic final TRE. Of more than 4000
-/// every second, third, ... is drawn, which the title says.
+/// Initial against final TRE, one dot per registration, logarithmic final TRE. Above 4000 dots,
+/// only every second, third, ... is drawn, and the title says so.
 /// \test Figures.DrawAPartOfVeryManyStartsAndSaySo
 void draw_tre_scatter(const std::vector<OutcomeGroup>& groups,
                       double largest_initial_mm,

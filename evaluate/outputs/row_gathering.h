@@ -15,9 +15,9 @@
 
 namespace af::evaluation {
 
-/// Collective. The rows of items 0 ... count - 1: those that no earlier run has finished are shared
-/// over the ranks and kept (see ResumableItems). Rank 0 gets all, the other ranks as many empty
-/// ones. Rank 0 prints the progress of `what`, unless that is empty.
+/// Collective. The rows of items 0 ... count - 1. The ranks share the items that no earlier run has
+/// finished, and save their rows (see ResumableItems). Rank 0 gets all rows, other ranks as many
+/// empty ones. Rank 0 prints the progress of `what`, unless that is empty.
 template <typename Row, typename RowOfItem>
 std::vector<Row> collected_rows(const Communicator& world,
                                 const UnfinishedWork& unfinished,

@@ -12,7 +12,7 @@ std::filesystem::path csv_beside(const std::filesystem::path& markdown) {
 std::vector<std::string> table_problems(const std::filesystem::path& output) {
   if (output.extension() != ".csv") return {};
   return {"--output = " + output.string() +
-          ": must name the table in Markdown; the CSV stands beside it under that name"};
+          ": must name the Markdown file, such as NAME.md; the CSV is written beside it"};
 }
 
 }  // namespace af::evaluation

@@ -30,7 +30,7 @@ class PopulationReader {
   void read(const std::string& condition);
 
   [[nodiscard]] const std::vector<PopulationCondition>& conditions() const { return conditions_; }
-  /// How all runs count. Only after read().
+  /// The counting that all runs share; valid after read().
   [[nodiscard]] const PopulationCounting& counting() const { return *counting_; }
 
  private:

@@ -51,9 +51,9 @@ class PlausibleRates {
   std::map<std::pair<std::int64_t, std::int64_t>, std::vector<double>> rates_;
 };
 
-/// What else the patient's capture range might have come out as: the number of starts of an
-/// interval stays, its true rate is one that its successes leave plausible, and the starts that
-/// succeed are drawn by it. Two successes of two starts say little about an interval.
+/// Interval of plausible capture ranges of the patient: each interval keeps its number of starts,
+/// gets a true rate that is plausible given its successes, and successes are drawn with that rate.
+/// Two successes of two starts say little about an interval.
 MeanInterval capture_interval(const std::vector<IntervalSuccess>& intervals,
                               std::uint64_t seed,
                               PlausibleRates& rates) {

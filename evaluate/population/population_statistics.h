@@ -42,7 +42,7 @@ std::string half_of(const PatientOutcomes& patient);
 /// A mean over patients with both kinds of 95 % intervals.
 struct OverPatients {
   double value = 0.0;
-  /// Of the mean of the patients' own values, each of the same weight; NaN where these are equal.
+  /// Interval of the mean of the patients' own values, equally weighted; NaN where they are equal.
   MeanInterval student;
   CaseBootstrap bootstrap;  ///< by resampling of patients
 };
@@ -54,8 +54,8 @@ struct PatientSuccess {
   std::int64_t successes = 0;
   ProportionInterval wilson;
   CaptureRange capture;
-  /// 95 % of what the capture range might have come out as, by what the patient's starts leave
-  /// plausible: each interval's rate is drawn from Jeffreys' posterior, its successes by that rate.
+  /// 95 % interval of capture ranges that are plausible given the patient's starts: each interval's
+  /// rate is drawn from Jeffreys' posterior, and its successes are drawn with that rate.
   MeanInterval capture_interval_mm;
 };
 

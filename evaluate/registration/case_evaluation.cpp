@@ -59,7 +59,7 @@ struct Method {
   std::unique_ptr<registration::UncertaintyEstimator> estimator;
 };
 
-/// Prepares what says how far ends are from the truth, unless that is left out.
+/// Prepares the estimate of how far ends are from the truth, unless it is left out.
 void examine_ends(const std::shared_ptr<const registration::RegistrationProblem>& problem,
                   const registration::UncertaintyOptions& options,
                   Method& method) {
@@ -269,7 +269,7 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-/// How many poses a method tries, about: the medians of preset paper, and of robust, whose steps
+/// Typical number of poses that a method tries: medians of preset paper, and of robust, whose steps
 /// come from normal equations.
 double usual_poses(const registration::RegistrationOptions& options) {
   return options.optimizer_list().find("newton") == std::string::npos ? 400.0 : 15.0;
@@ -347,7 +347,7 @@ void draw_xrays(const registration::RegistrationProblem& problem,
       {{"file", name}, {"case", evaluation.case_name}, {"which", "xrays"}});
 }
 
-/// A row worth a look.
+/// A registration to show in pictures.
 struct ChosenRow {
   const char* which;
   RegistrationRow row;

@@ -12,16 +12,17 @@
 namespace af::evaluation {
 
 void CompareOptions::describe(Fields& field) {
-  field("runs", runs, "Folders of finished runs, searched with all below them")
+  field("runs", runs, "Folders of finished runs; all their subfolders are searched, too")
       .as("RUN")
       .required();
-  field("output", output, "The Markdown file; the CSV takes its name, .csv").as("-o,--output");
+  field("output", output, "Markdown file to write; a CSV of the same name is written beside it")
+      .as("-o,--output");
   field("screen", is_screen, "In Markdown, measures against optimisers instead of a row per run");
   field("pose_distances",
         with_pose_distances,
         "Also the distance between the end poses of every two methods from the same starts (mean "
         "over the target box: median, 95th percentile, maximum) for every patient, and their mean "
-        "over patients with intervals, as tables below and in CSVs beside, ...-pose-distances.csv "
+        "over patients with intervals, as further tables and as CSVs, ...-pose-distances.csv "
         "and ...-pose-distances-over-patients.csv");
   field("equivalence_margin_mm",
         equivalence_margin_mm,

@@ -152,10 +152,11 @@ std::vector<std::string> warnings_about_starts(const RegistrationStudyOptions& o
                  ")";
   }
   if (intervals.empty()) return {};
-  return {evaluation.case_name +
-          ": the fields' range refused most draws of some starts, which are therefore not of every "
-          "kind (where nothing is refused the share of rotation is 0.5): " +
-          intervals};
+  return {
+      evaluation.case_name +
+      ": most draws of some starts lay outside the fields' range and were refused, so that these "
+      "starts cover directions unevenly (without refusals the share of rotation is 0.5): " +
+      intervals};
 }
 
 /// How far the end poses of two rows lie apart, over the target points of their case.
@@ -439,7 +440,7 @@ void RegistrationStudyOptions::describe(Fields& field) {
   field.part(uncertainty);
   describe_starts(field, *this);
   describe_methods(field, *this);
-  field.at("seed").as("--seed", "Of the starts, and of what cma-es draws");
+  field.at("seed").as("--seed", "Seed of the starts, and of what cma-es draws");
   field.part(resume);
   field("output", output_folder, "Folder for the results")
       .as("-o,--output")

@@ -45,8 +45,8 @@ struct RegistrationStudyOptions : MethodOptions {
     return {intervals, interval_width_mm, starts_per_interval, method.seed};
   }
   void describe(Fields& field);
-  /// With the preset resolved, and what counts for ray casting or another program's poses only
-  /// where there is that.
+  /// These options with the preset resolved; options for ray casting beside fields, or for another
+  /// program's poses, are set only where they apply.
   [[nodiscard]] RegistrationStudyOptions in_force() const;
 };
 

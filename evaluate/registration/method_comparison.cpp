@@ -39,7 +39,7 @@ struct Sums {
   std::vector<double> seconds;
 };
 
-/// What of a run's summary its rows are read with.
+/// Facts from a run's summary that are needed to read its rows.
 struct RunFacts {
   double success_tre_mm = kSuccessTreMm;
   std::map<std::string, double> radius_mm;  ///< of the cases' target boxes, about their centres

@@ -55,10 +55,11 @@ CaseTarget target_of(const json& of_case) {
 
 std::map<std::string, CaseTarget> targets_of(const EvaluationRun& run) {
   const auto unusable = [&] {
-    return FileError((run.folder / "summary.json").string(),
-                     "cases",
-                     "gold_room_from_ct, center_ct_mm and target_box_ct_mm of every case",
-                     "a run of an earlier version, or damage: --pose-distances needs them");
+    return FileError(
+        (run.folder / "summary.json").string(),
+        "cases",
+        "gold_room_from_ct, center_ct_mm and target_box_ct_mm of every case",
+        "a run without them (of an earlier version, or damaged); --pose-distances needs them");
   };
   std::map<std::string, CaseTarget> targets;
   try {

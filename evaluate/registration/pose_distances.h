@@ -22,9 +22,9 @@ struct PoseDistanceRow {
   SampleSummary distance_mm;  ///< mean over the target box, of starts where both have an end pose
 };
 
-/// Every two methods of the runs that began at the same starts: rows of one case whose start index
-/// is equal, and whose start is up to rounding. FileError when a run does not state its cases' gold
-/// pose and target box.
+/// Every pair of methods of the runs that began at the same starts: rows of one case with equal
+/// start index and, up to rounding, equal start. FileError when a run does not state its cases'
+/// gold pose and target box.
 std::vector<PoseDistanceRow> pose_distances(const std::vector<EvaluationRun>& runs);
 
 CsvTable pose_distances_table(const std::vector<PoseDistanceRow>& rows);

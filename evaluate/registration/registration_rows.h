@@ -119,7 +119,7 @@ void write_registrations(const std::filesystem::path& path,
                          std::span<const RegistrationRow> rows,
                          double success_tre_mm = kSuccessTreMm);
 
-/// starts.csv: the starts of all cases, in order, of any number. It has its name once finished.
+/// starts.csv: the starts of any number of cases, in order. The file gets its name once finished.
 class StartsFile {
  public:
   explicit StartsFile(std::filesystem::path path);

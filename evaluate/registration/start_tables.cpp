@@ -80,7 +80,8 @@ PoseOfRow pose_reader(const CsvTable& table, const PoseTableFrames& frames) {
 FoundPoses read_table(const std::filesystem::path& path, const PoseTableFrames& frames) {
   const CsvTable table = CsvTable::read(path);
   if (!table.find_column("start_index").has_value())
-    throw FileError(path.string(), "column start_index", "absent", "the start of each pose");
+    throw FileError(
+        path.string(), "column start_index", "the start of each pose", "no such column");
   const PoseOfRow pose_of = pose_reader(table, frames);
   const bool has_seconds = table.find_column("seconds").has_value();
   FoundPoses found;
@@ -136,14 +137,14 @@ bool is_table(const std::filesystem::path& path) {
   return is_csv_of_poses(file) || first_line.find("start_index") != std::string::npos;
 }
 
-/// A file of poses that is no table of ours names no case.
+/// A file of poses that is not one of our tables does not name a case.
 void require_only_case(const std::filesystem::path& path, const PoseTableFrames& frames) {
   if (!frames.is_only_case)
     throw InputError(path.string() +
                      ": does not say of which case its poses are; choose one with --case");
 }
 
-/// Of such a file: frame 1 is start 0.
+/// Reads such a file: frame 1 is start 0.
 FoundPoses read_frames(const std::filesystem::path& path, const PoseTableFrames& frames) {
   require_only_case(path, frames);
   const PosesInFile file = read_pose_file(path, frames.context);

@@ -26,10 +26,10 @@ struct PoseTableFrames {
 /// The starts of one case from a CSV file, in its order: rows whose `case` is the case's; the pose
 /// is m00 ... m23 of room_from_ct, or start_rx_deg ... start_tz_mm relative to gold. FileError:
 /// unreadable, or a value that is not a number; InputError: no row of the case, a pose that is not
-/// rigid, or a start_index (where there is that column) that is not the row's place among the
-/// case's: a start that is missing, repeated or out of order would give all others another number.
-/// A file of another format of poses (docs/poses.md) holds the starts of the only case; InputError
-/// when a frame before its last pose has none. `notes` get what its reader left out and assumed.
+/// rigid, or a start_index (if there is that column) that differs from the row's place among the
+/// case's rows: a start that is missing, repeated or out of order would renumber the others. A file
+/// of another format of poses (docs/poses.md) holds the starts of the only case; InputError when a
+/// frame before its last pose has none. `notes` get what its reader left out and assumed.
 std::vector<RigidTransform> read_starts(const std::filesystem::path& path,
                                         const PoseTableFrames& frames,
                                         std::vector<std::string>& notes);
@@ -46,14 +46,13 @@ struct FoundPoses {
 /// rx_deg ... tz_mm relative to the nominal pose, about the ROI centre. Or a folder of files of one
 /// pose each (docs/poses.md), named [CASE-]INDEX.tfm, .h5, .dcm, .json, .toml, .tra or .txt. Or one
 /// file of several poses that is no table: its first frame or row is start 0 of the only case, and
-/// frames without a pose leave their start without one. A pose with
-/// a value that is not finite is no pose; of a start that occurs twice the first counts, also when
-/// it is no pose; a start_index that is not a whole number is no start: all are reported as
-/// problems.
+/// frames without a pose leave their start without one. Reported as problems: a pose with a value
+/// that is not finite (no pose), a start that occurs twice (the first counts, even if it is no
+/// pose) and a start_index that is not a whole number (no start).
 FoundPoses read_found_poses(const std::filesystem::path& path, const PoseTableFrames& frames);
 
-/// The cases in a table or folder of poses that are not among `known`, in words: otherwise nobody
-/// would notice that they are left out. Empty when there are none, and for a table without cases.
+/// Says which cases in a table or folder of poses are not among `known`, so that their omission is
+/// noticed. Empty when there are none, and for a table without cases.
 std::vector<std::string> unknown_case_problems(const std::filesystem::path& path,
                                                const std::set<std::string>& known);
 

@@ -16,9 +16,9 @@ namespace af::evaluation {
 /// range of van de Kraats, by TRE and by mRPD, and the cumulative one. docs/errors.md defines each.
 nlohmann::json success_statistics(const RowPointers& rows, const StatisticsOptions& options);
 
-/// Adds to `over_cases`: `capture_range_mm`, of the cases' own capture ranges the mean, the ends,
-/// how many are at least so large, and intervals over cases; `pooled_capture_range_mm`, the
-/// bootstrap interval over cases of the range of all starts together.
+/// Adds to `over_cases`: `capture_range_mm`, the mean, smallest and largest of the cases' own
+/// capture ranges, how many are lower bounds, and intervals over cases; `pooled_capture_range_mm`,
+/// the bootstrap interval over cases of the range of all starts together.
 void add_capture_over_cases(const std::map<std::string, RowPointers>& by_case,
                             const StatisticsOptions& options,
                             nlohmann::json& over_cases);

@@ -25,7 +25,7 @@ struct Yardstick {
 
 Yardstick yardstick_of(const Study& study, const StudyCase& study_case, const GoldStandard& gold);
 
-/// Final parameters and all errors of a pose into its row.
+/// Writes the final parameters and all errors of a pose into its row.
 void measure_pose(const RigidTransform& room_from_ct,
                   const Yardstick& yardstick,
                   RegistrationRow& row);

@@ -35,7 +35,7 @@ void collect(const std::filesystem::path& folder, std::set<std::filesystem::path
   }
 }
 
-/// Whether a path stays below where it begins.
+/// Whether a relative path stays below its base folder.
 bool leads_down(const std::filesystem::path& relative) {
   const std::filesystem::path path = relative.lexically_normal();
   return !path.empty() && !path.is_absolute() && *path.begin() != ".." &&
@@ -43,7 +43,7 @@ bool leads_down(const std::filesystem::path& relative) {
 }
 
 /// The paths below the deepest folder that all runs share. Where several registration runs end
-/// alike ("skull/registration", "thorax/registration"), the end tells nothing and is left out.
+/// alike ("skull/registration", "thorax/registration"), the common end is left out.
 void set_names(std::vector<EvaluationRun>& runs) {
   std::filesystem::path shared = runs.front().folder.parent_path();
   for (const EvaluationRun& run : runs)

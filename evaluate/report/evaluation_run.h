@@ -31,7 +31,7 @@ struct EvaluationRun {
   [[nodiscard]] std::string file(const std::string& file_name) const;
   /// A table of the run, named by its path below the folder. FileError as of file(), or no CSV.
   [[nodiscard]] CsvTable table(const std::string& relative) const;
-  /// The same of a table of any length, in parts; table() is refused one of 256 MB.
+  /// Reads a table of any length in parts; table() refuses one of 256 MB.
   void read_in_parts(const std::string& relative,
                      const std::function<void(const CsvTable& part)>& receive) const;
   /// A link from the page to a file or folder of the run, named by its path below the folder.

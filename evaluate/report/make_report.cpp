@@ -10,7 +10,7 @@
 namespace af::evaluation {
 
 void ReportOptions::describe(Fields& field) {
-  field("runs", runs, "Folders of finished runs, searched with all below them")
+  field("runs", runs, "Folders of finished runs; all their subfolders are searched, too")
       .as("RUN")
       .required();
   field("output", output, "The page to write").as("-o,--output");

@@ -67,8 +67,8 @@ std::string success_table(const json& summary) {
   columns.push_back({"Share of rotation", true});
   HtmlTable table(columns,
                   "Success per interval of initial error, with Wilson intervals. Draws outside the "
-                  "fields' motion range were refused and drawn again; where many were, the starts "
-                  "are less rotation than the half that directions of every kind have");
+                  "fields' motion range were refused and drawn again; where many were, rotation "
+                  "makes up less of the starts than the half that it does without refusals");
   const std::size_t intervals = renderers.at(0).at("intervals").size();
   for (std::size_t i = 0; i < intervals; ++i) {
     const json& first = renderers.at(0).at("intervals").at(i);

@@ -86,7 +86,7 @@ void pick(StartMeasures& measures,
   });
 }
 
-/// Sets what the starts of every interval are made of.
+/// Sets the mean share of rotation of the starts of every interval.
 void add_rotation_shares(const StartMeasures& measures, StratifiedStarts& result) {
   const StartFrame& frame = measures.frame();
   const double radius_mm = rms_radius_mm(frame.target_box_ct, frame.center_ct_mm);
@@ -262,9 +262,9 @@ double StartMeasures::tre_mm(const RigidTransform& room_from_ct) const {
 /// A pose so far from gold along a direction, brought back into the motion range.
 RigidTransform StartMeasures::pose_within_range(const PoseParameters& direction,
                                                 double size_mm) const {
-  // A search that starts at the wall itself could not step beyond it on any side.
+  // A search that starts at the wall could not try poses on both sides of its start.
   constexpr double kShareOfRange = 0.98;
-  // Farther turns have other angles about the axes than those that were meant.
+  // Beyond this, a rotation no longer has the intended angles about the axes.
   constexpr double kFarthestTurnRad = 1.4;
   const double radius_mm = rms_radius_mm(frame_.target_box_ct, frame_.center_ct_mm);
   PoseParameters wanted;
@@ -301,7 +301,7 @@ UniformStart StartMeasures::draw_within_range(std::uint64_t index) const {
     }
     const RigidTransform pose = pose_within_range(direction, below);
     const double found_mm = tre_mm(pose);
-    // A gold pose beside the wall has no such way near it.
+    // There is no continuous way near a gold pose beside the wall.
     constexpr double kToleranceMm = 1e-6;
     if (std::abs(found_mm - wanted_mm) > kToleranceMm || !is_admissible_(pose)) continue;
     start.parameters = parameters_from_pose(frame_.pose_frame(), pose);

@@ -178,10 +178,10 @@ StratifiedStarts uniform_starts(StartMeasures& measures);
 
 /// As many starts in each interval as stratified_starts() gives, inside the measures' limit by
 /// design: a direction uniform in the six parameters as there, and a TRE uniform in the interval.
-/// The start goes along the direction; each of the limit's six parameters stops at 98 % of its
-/// range, and the others go on until the TRE is as wanted. So a start keeps as much rotation as the
-/// range holds, and translation makes up for the rest. A direction in which the range does not
-/// reach the TRE is drawn again and counts as refused, as does one that the predicate refuses
+/// The start moves along the direction; each of the limit's six parameters stops at 98 % of its
+/// range, and the others continue until the TRE is reached. So a start keeps as much rotation as
+/// the range allows, and translation provides the rest. A direction that cannot reach the TRE
+/// within the range is drawn again and counts as refused, as does one that the predicate refuses
 /// (another field's range). InputError without a limit, for a gold pose outside, and after 1000
 /// refusals of one start. \test PerturbedStarts.WithinRangeLieInsideByDesign
 StratifiedStarts starts_within_range(StartMeasures& measures);

@@ -8,8 +8,8 @@
 
 namespace af::evaluation {
 
-/// With fewer cases the percentile interval is too narrow: docs/errors.md has how often it holds
-/// the truth of simulated studies. \test IntervalCoverage.OfTheBootstrapGrowsWithTheCases
+/// With fewer cases the percentile interval is too narrow: docs/errors.md says how often it
+/// contains the truth of simulated studies. \test IntervalCoverage.OfTheBootstrapGrowsWithTheCases
 inline constexpr std::size_t kEnoughCases = 30;
 
 /// Percentile interval of a statistic under resampling of cases.

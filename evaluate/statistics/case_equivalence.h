@@ -10,8 +10,8 @@
 
 namespace af::evaluation {
 
-/// With fewer patients nothing is said about equivalence: docs/errors.md has how often studies of
-/// so many claim it wrongly. \test CaseEquivalence.IsRarelyClaimedWrongly
+/// With fewer patients, equivalence is neither claimed nor denied: docs/errors.md says how often
+/// studies of this size claim it wrongly. \test CaseEquivalence.IsRarelyClaimedWrongly
 inline constexpr std::size_t kEnoughCasesForEquivalence = 10;
 
 /// Whether the mean over patients of a distance (never negative: opposite errors do not cancel) is

@@ -20,15 +20,15 @@ struct ProportionInterval {
   double high = 1.0;
 };
 
-/// Score interval of a proportion (Wilson 1927), the two-sided `confidence` of which stays close to
-/// nominal even for few trials and rates near 0 or 1. Without trials [0, 1].
+/// Score interval of a proportion (Wilson 1927). Its two-sided coverage stays close to `confidence`
+/// even for few trials and rates near 0 or 1. Without trials [0, 1].
 /// \test WilsonInterval.EqualsPublishedValues
 ProportionInterval wilson_interval(std::int64_t successes,
                                    std::int64_t trials,
                                    double confidence = 0.95);
 
-/// Quantile `p` in (0, 1) of what successes leave plausible of a rate: of Jeffreys' posterior,
-/// Beta( successes + 1/2, failures + 1/2).
+/// Quantile `p` in (0, 1) of the rates that are plausible given the successes: of Jeffreys'
+/// posterior, Beta( successes + 1/2, failures + 1/2).
 double plausible_rate(std::int64_t successes, std::int64_t trials, double p);
 
 /// Success among the starts of one interval of initial TRE.
@@ -53,7 +53,7 @@ struct TreOutcome {
 /// Number of outcomes with TRE below `threshold_mm`; NaN never is.
 std::int64_t count_successes(std::span<const TreOutcome> outcomes, double threshold_mm);
 
-/// Up to which initial TRE enough of all starts together succeed.
+/// The initial TRE up to which enough of all starts together succeed.
 struct CumulativeCaptureRange {
   double initial_tre_mm = 0.0;  ///< the largest initial TRE with enough success up to it
   std::int64_t starts = 0;      ///< that began at or below it
@@ -77,7 +77,7 @@ std::vector<IntervalSuccess> success_per_interval(std::span<const TreOutcome> ou
                                                   double width_mm,
                                                   double threshold_mm = kSuccessTreMm);
 
-/// Interval by interval, the starts of the cases that `drawn` names together, as often as it names
+/// Sums, interval by interval, the starts of the cases that `drawn` names, as often as it names
 /// them. All cases have the same intervals; Wilson's interval is left as it was.
 std::vector<IntervalSuccess> pooled_intervals(std::span<const std::vector<IntervalSuccess>> cases,
                                               std::span<const std::size_t> drawn);

@@ -16,16 +16,16 @@ struct SweepDrr {
   std::size_t pose = 0;
 };
 
-/// For each PSNR level the setting nearest to it. All settings are of one target and pose, namely
-/// those for which the three come nearest to the levels together. Empty when nothing could be
-/// compared.
+/// For each PSNR level, the setting nearest to it. All are of one target and pose: those with the
+/// least sum of distances from the levels. Empty when nothing could be compared.
 /// \test DifferenceImages.AreThoseNearestToTheLevelsAtOnePose
 std::vector<SweepDrr> drrs_at_levels(const std::vector<SettingResult>& results,
                                      const std::vector<double>& levels_db);
 
 /// Collective. The paper's Fig. 9: difference images, field - ray casting, of DRRs of about 36, 40
-/// and 44 dB at one pose, by fields of different settings, all in one window: difference-images.png
-/// and .csv. Returns the entry of summary.json; null when nothing could be compared.
+/// and 44 dB at one pose, from fields of different settings, with one common window:
+/// difference-images.png and .csv. Returns the entry of summary.json; null when nothing could be
+/// compared.
 nlohmann::json write_difference_images(const std::vector<SettingResult>& results,
                                        double drr_step_mm,
                                        const std::filesystem::path& folder,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Do registrations lean towards the nodes of a field? True poses that differ by fractions of a
-// field's cells tell: an end's error that depends on the fraction is the lattice's.
+// Whether registrations are biased towards the nodes of a field, from true poses that differ by
+// fractions of its cells: the lattice causes the part of the error that depends on the fraction.
 #pragma once
 
 #include <array>
@@ -22,9 +22,9 @@ struct CellView {
   std::array<double, kCellAxes> spacing_mm = {};
 };
 
-/// The smallest motions of the patient, relative to a pose about `center_room_mm`, that move all
-/// cameras by one cell of their fields each, as well as one motion can: along u and v rotations,
-/// which move the sources about the CT, along s and t translations. To first order.
+/// The smallest motions of the patient, relative to a pose about `center_room_mm`, that move each
+/// camera by one cell of its field, as closely as one motion can: rotations along u and v, which
+/// move the sources about the CT; translations along s and t. To first order.
 /// \test LatticeErrors.StepsMoveEveryCameraByOneCell
 std::array<PoseParameters, kCellAxes> cell_steps(std::span<const CellView> views,
                                                  const Eigen::Vector3d& center_room_mm);
@@ -35,15 +35,15 @@ struct LatticePose {
   PoseParameters parameters;                 ///< relative to the cell's centre
 };
 
-/// fractions^3 poses about a cell's centre. Along each axis every fraction is equally often there,
-/// and so is every combination of fractions along two or three axes.
+/// fractions^3 poses about a cell's centre. Every fraction occurs equally often along each axis, as
+/// does every combination of fractions along two or three axes.
 /// \test LatticeErrors.PosesAreBalanced
 std::vector<LatticePose> lattice_poses(const std::array<PoseParameters, kCellAxes>& steps,
                                        int fractions);
 
-/// Half of the largest less the smallest of the mean errors at each fraction along an axis, for
-/// each parameter (deg, mm). `errors` are those of lattice_poses(), in the same order; poses whose
-/// error is NaN are left out.
+/// Half the difference between the largest and the smallest mean error over the fractions along an
+/// axis, for each parameter (deg, mm). `errors` are those of lattice_poses(), in the same order;
+/// poses whose error is NaN are left out.
 /// \test LatticeErrors.AmplitudeIsThatOfAPatternAlongOneAxis
 std::array<double, 6> amplitude_along(int axis,
                                       std::span<const LatticePose> poses,

@@ -177,7 +177,8 @@ void LatticeErrorsOptions::describe(Fields& field) {
         fractions,
         "Fractions of a cell along each of u, v, s and t; their cube is the number of true poses")
       .within(2, 10);
-  field("output", output, "The Markdown file; the CSV takes its name, .csv").as("-o,--output");
+  field("output", output, "Markdown file to write; a CSV of the same name is written beside it")
+      .as("-o,--output");
 }
 
 namespace {

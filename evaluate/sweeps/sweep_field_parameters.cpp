@@ -303,7 +303,7 @@ void FieldParametersOptions::describe(Fields& field) {
       .as("--step-mm", "Longest step of the reference DRRs, mm")
       .decides(kComparisonStage)
       .name = "drr_step_mm";
-  field("pose_seed", seed, "Of the random poses").as("--seed").decides(kComparisonStage);
+  field("pose_seed", seed, "Seed of the random poses").as("--seed").decides(kComparisonStage);
   field("fields", fields_folder, "Where fields are kept and looked for (default: OUTPUT/fields)")
       .not_deciding("a field that is there is the one to make");
   field.part(resume);

@@ -10,9 +10,9 @@
 
 namespace af {
 
-/// Where a volume attenuates, in bricks of 2 x 2 x 2 voxels, widened by a reach: tells for any
-/// point whether all voxels around it are 0. A byte per brick. \test
-/// AttenuatingBricks.NeverMissesAVoxelWithinReach
+/// Marks where a volume attenuates, in bricks of 2 x 2 x 2 voxels widened by a reach, and tells
+/// whether all voxels around a point are 0. One byte per brick.
+/// \test AttenuatingBricks.NeverMissesAVoxelWithinReach
 class AttenuatingBricks {
  public:
   /// `reach_voxels`: along i, j, k, at least 0.

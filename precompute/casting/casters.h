@@ -14,7 +14,7 @@
 
 namespace af {
 
-/// What casters are made of. All of it must outlive the caster.
+/// Inputs of a caster; they must outlive it.
 struct CasterInputs {
   const AttenuationVolume& volume;
   const SlabAlignedVolume* resampled = nullptr;  ///< only for casters that need it
@@ -32,7 +32,7 @@ struct KnownCaster {
   std::unique_ptr<const FieldCaster> (*make)(const CasterInputs& inputs) = nullptr;
 };
 
-/// InputError when there is none of that name.
+/// InputError for an unknown name.
 const KnownCaster& caster_named(const std::string& name);
 
 /// Names that caster_named() knows, and one line that explains them.

@@ -10,8 +10,8 @@
 
 namespace af {
 
-/// Another caster's line integrals plus what measured X-rays hold beyond the CT. Each depth slab
-/// gets the part that lies in it. Nodes where the CT has nothing stay 0, and no sum is below 0.
+/// Adds to another caster's line integrals what measured X-rays show beyond the CT. Each depth slab
+/// gets the part that lies in it. Nodes that are 0 stay 0, and sums are at least 0.
 /// \test CorrectedCaster.*
 class CorrectedFieldCaster final : public FieldCaster {
  public:

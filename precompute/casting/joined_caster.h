@@ -9,16 +9,16 @@
 
 namespace af {
 
-/// Which of several fields, whose slabs are counted through, a slab belongs to.
+/// The field that a slab belongs to, when the slabs of several fields are numbered consecutively.
 struct SlabPlace {
   std::size_t field = 0;
   std::size_t slab = 0;  ///< of that field
 };
 
-/// Of every slab, in order. `slab_counts`: of each field.
+/// The place of every slab, in order. `slab_counts`: number of slabs of each field.
 std::vector<SlabPlace> slab_places(const std::vector<std::size_t>& slab_counts);
 
-/// Casts units of several fields as of one that has the slabs of all, those of the first first.
+/// Casts units of several fields as if one field had all their slabs, in the order of the fields.
 class JoinedCaster final : public FieldCaster {
  public:
   /// One caster per field.

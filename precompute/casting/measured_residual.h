@@ -18,23 +18,23 @@ struct ResidualView {
                                     ///< where nothing was measured
 };
 
-/// Why views cannot be those of one orbit of a source about the CT; empty when they can.
+/// Why the views cannot come from one orbit of a source about the CT; empty when they can.
 std::vector<std::string> orbit_problems(std::span<const ResidualView> views);
 
-/// What measured X-rays, taken along a circle about the CT, say of any ray beyond the CT's own line
-/// integral.
+/// Predicts, for any ray, what X-rays measured along a circle about the CT show beyond the CT's own
+/// line integral.
 ///
-/// In the plane of a ray and the circle's axis lies one point of the circle between two
-/// neighbouring sources: both views are asked, with weights linear in the distance along their
-/// chord. A view tells of a ray what it would if its residual were spread along its own rays as the
-/// CT's attenuation is: the mean of the residual at the projections of the ray's points, weighted
-/// by the attenuation there. A ray that was measured projects to one pixel, whose residual is the
-/// answer; the farther a ray leaves the circle, the longer the track of its points on the detector,
-/// and the more of the residual's detail averages out. That is the whole fall-off: there is no
-/// width to choose.
+/// The plane through a ray and parallel to the circle's axis meets the circle between two
+/// neighbouring sources. Both views contribute, with weights linear in the distance along their
+/// chord. Each view assumes that its residual is spread along its own rays as the CT's attenuation
+/// is: it contributes the mean of the residual at the projections of the ray's points, weighted by
+/// the attenuation there. A measured ray projects to one pixel and gets that pixel's residual. The
+/// farther a ray is from the circle, the longer the track of its points on the detector, and the
+/// more of the residual's detail averages out. Nothing else limits the reach: there is no width to
+/// choose.
 ///
-/// Rays that no two views stand to both sides of, and points that a view does not see, have
-/// residual 0. No function of the mathematics library decides a value. \test MeasuredResidual.*
+/// Rays without a view on either side, and points that a view does not see, have residual 0. No
+/// value depends on a mathematics library function. \test MeasuredResidual.*
 class MeasuredResidual {
  public:
   /// `toward_source`: from the CT to where the field's viewpoints are (ct frame); views on that
@@ -55,7 +55,7 @@ class MeasuredResidual {
   [[nodiscard]] std::size_t view_count() const { return views_.size(); }
 
  private:
-  /// A view as a map of ct points (mm) to homogeneous pixels.
+  /// Maps ct points (mm) to homogeneous pixels of a view.
   struct Projection {
     Eigen::Vector3d source_point;
     Eigen::Matrix3d pixels_from_ct;

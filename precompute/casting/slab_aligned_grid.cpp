@@ -49,15 +49,15 @@ Eigen::Vector3d resampled_spacing(const CtGrid& grid,
   // must keep and those that it must suppress (RowSampler in slab_aligned_volume.cpp).
   constexpr double kTiltedSpacing = 0.8;
   if (is_tilted(is_resampled)) spacing_mm.y() *= kTiltedSpacing;
-  // From slice to slice a ray moves sideways by up to its slope times their distance; between
-  // slices it is taken to change linearly, which needs that move to stay within a voxel.
+  // From slice to slice a ray moves sideways by up to its slope times their distance. Attenuation
+  // is taken to change linearly along that step, so the step must stay within about a voxel.
   constexpr double kLargestRatio = 1.25;
   spacing_mm.y() /= std::ceil(spacing_mm.y() / (kLargestRatio * voxel_mm));
   return spacing_mm;
 }
 
-/// What the filters' taps add up to in magnitude: of slices (RowSampler), of nodes along x and z
-/// (RowSharpener).
+/// Sums of the filters' absolute taps, multiplied: over slices (RowSampler), over nodes along x and
+/// z (RowSharpener).
 double filter_gain(const SlabAlignedGrid& grid) {
   constexpr double kSliceGain = 36.0 / 32.0;
   constexpr double kNodeGain = 272.0 / 180.0;
@@ -90,9 +90,9 @@ SlabAlignedGrid grid_of_spacing(const AttenuationVolume& volume,
     last_mm = last_mm.cwiseMax(slab_from_ct * corner);
   }
   if (!grid.is_resampled[1]) {
-    // Between the CT's planes attenuation changes linearly, so a slanted ray smears each plane by a
-    // hat over its sideways way to the next ones, of variance 1/6 in units of that way. One slice
-    // per plane and on it smears nothing; slices beside it by d smear by d (1 - d): 1/6 for this d.
+    // Attenuation is linear between the CT's planes, so a slanted ray smears each plane by a hat as
+    // wide as its sideways step to the next planes: variance 1/6 in units of that step. A slice on
+    // each plane smears nothing; slices offset by d smear by d (1 - d): 1/6 for this d.
     constexpr double kSliceShift = 0.21132486540518713;
     grid.origin_mm.y() -= kSliceShift * grid.spacing_mm.y();
   }
@@ -263,7 +263,7 @@ std::vector<std::string> problems(const SlabAlignedOptions& options) {
   const auto check_spacing = [&](const char* name, double spacing) {
     if (!(spacing >= 0.1 && spacing <= 1.0))
       found.push_back(std::string(name) + " = " + std::to_string(spacing) +
-                      ": must be within 0.1 and 1");
+                      ": must be between 0.1 and 1");
   };
   check_spacing("turned_spacing", options.turned_spacing);
   check_spacing("tilted_spacing", options.tilted_spacing);

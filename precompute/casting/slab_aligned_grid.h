@@ -11,13 +11,13 @@
 
 namespace af {
 
-/// How finely a volume is resampled along x and z where these are not axes of the CT: as parts of
-/// the CT's own spacing in that direction.
+/// Resampling spacing along x and z where these are not axes of the CT, as a fraction of the CT's
+/// own spacing in that direction.
 struct SlabAlignedOptions {
   double turned_spacing = 0.5;   ///< when one slab axis runs along an axis of the CT
   double tilted_spacing = 0.35;  ///< when none does
-  /// Where the grid would need more memory than this, the spacing is coarser, at most the CT's own;
-  /// 0 means 6 bytes per voxel of the CT, or 96 MiB if that is more.
+  /// If the grid would need more memory than this, its spacing is coarsened, at most to the CT's
+  /// own; 0 means 6 bytes per voxel of the CT, or 96 MiB if that is more.
   std::size_t largest_bytes = 0;
 };
 
@@ -45,9 +45,9 @@ struct SlabAlignedGrid {
   [[nodiscard]] double slice_y_mm(int slice) const {
     return origin_mm.y() + spacing_mm.y() * slice;
   }
-  /// Node (0, y, 0) of slice y. Along resampled x and z slices are shifted against each other by
-  /// parts of a cell, so that rays that run along y meet every slice at another place between its
-  /// nodes and errors of interpolation cancel.
+  /// Node (0, y, 0) of slice y. Along resampled x and z, slices are shifted against each other by
+  /// fractions of a cell: a ray along y then meets each slice at a different place between nodes,
+  /// and interpolation errors cancel.
   [[nodiscard]] Eigen::Vector3d slice_origin_mm(int slice) const;
   /// Slices with y in [y_low, y_high).
   [[nodiscard]] std::array<int, 2> slice_range(double y_low_mm, double y_high_mm) const;
@@ -58,8 +58,8 @@ struct NodeLine {
   Eigen::Vector3d start;
   Eigen::Vector3d step;
 
-  /// First and last place (in nodes) inside the box of `size` voxels widened by `margin`, of a line
-  /// of `nodes`; first > last when there is none.
+  /// First and last position (in nodes) where a line of `nodes` is inside the box of `size` voxels
+  /// widened by `margin`; first > last when it misses the box.
   [[nodiscard]] std::array<double, 2> nodes_inside(const std::array<int, 3>& size,
                                                    const std::array<int, 3>& margin,
                                                    int nodes) const;
@@ -112,14 +112,14 @@ struct SlabAlignedLayout {
 };
 
 /// The grid that holds all attenuation of `volume` and has zeros on its faces; of each row only
-/// what lies between the first and the last attenuation is stored. A slab axis that runs along one
-/// of the CT keeps the distance of the CT's nodes, so that nothing is interpolated twice along it:
-/// all three for a camera that looks along an axis, z for one that is turned about the patient's
-/// axis. (Along y, slices stand a fifth of their distance beside the CT's.) Along the others the
-/// grid is finer than the CT as the options say and slices are sharpened against the second
-/// interpolation. Slices are never much farther apart than voxels. Levels are scaled such that no
-/// level exceeds 32767 and no sum of 256 times one level per slice exceeds 2^31 - 1: casters add in
-/// 32-bit integers.
+/// what lies between the first and the last attenuation is stored. A slab axis parallel to a CT
+/// axis keeps the CT's spacing, so that nothing is interpolated twice along it: all three axes for
+/// a camera that looks along a CT axis, z for a camera turned about the patient's axis. (Along y,
+/// slices are offset from the CT's by a fifth of their spacing.) Along other axes the grid is finer
+/// than the CT, as the options say, and slices are sharpened to undo the second interpolation.
+/// Slices are never much farther apart than voxels. Levels are scaled such that no level exceeds
+/// 32767 and no sum of 256 times one level per slice exceeds 2^31 - 1: casters add in 32-bit
+/// integers.
 SlabAlignedLayout slab_aligned_layout(const AttenuationVolume& volume,
                                       const RigidTransform& slab_from_ct,
                                       const SlabAlignedOptions& options = {});

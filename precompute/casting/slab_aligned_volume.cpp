@@ -55,11 +55,11 @@ class RowSampler {
     std::int32_t weight;  ///< in 1/32
   };
 
-  /// A sum over slices is their integral but for what oscillates once (or more often) from slice to
-  /// slice. Voxels that lie oblique to the slices do: an interpolant's cells keep some per cent of
+  /// A sum over slices equals their integral except for content that oscillates once or more per
+  /// slice. Voxels oblique to the slices have such content: interpolation keeps a few per cent of
   /// the texture at that frequency. The half-band filter [-1 0 9 16 9 0 -1] / 32 at steps of half a
-  /// slice is 0 there in fourth order, and 1 for the slow changes along y that slanted rays see, in
-  /// fourth order too.
+  /// slice is 0 there to fourth order, and 1 to fourth order for the slow changes along y that
+  /// slanted rays see.
   void sample_mean(int y, int z, const GridRow& row, std::int16_t* levels) {
     constexpr std::array<Tap, 5> kTaps = {
         {{0.0, 16}, {-0.5, 9}, {0.5, 9}, {-kSliceFilterReach, -1}, {kSliceFilterReach, -1}}};

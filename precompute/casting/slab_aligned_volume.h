@@ -28,8 +28,8 @@ class SlabAlignedVolume {
   SlabAlignedVolume(const AttenuationVolume& volume,
                     const RigidTransform& slab_from_ct,
                     const SlabAlignedOptions& options = {});
-  /// As `layout`, of slab_aligned_layout(), says, in memory of `memory`. The values depend neither
-  /// on who fills which part nor on the vector width.
+  /// Laid out by `layout`, from slab_aligned_layout(), in memory from `memory`. The values depend
+  /// neither on who fills which part nor on the vector width.
   SlabAlignedVolume(const AttenuationVolume& volume,
                     const RigidTransform& slab_from_ct,
                     const SlabAlignedLayout& layout,
@@ -38,7 +38,7 @@ class SlabAlignedVolume {
   [[nodiscard]] const SlabAlignedGrid& grid() const { return grid_; }
   /// The stored blocks of all rows.
   [[nodiscard]] const std::int16_t* values() const { return values_.data(); }
-  /// A row; its begin and end are those of what is not 0.
+  /// A row; its begin and end bound the values that are not 0.
   [[nodiscard]] const GridRow& row(int y, int z) const { return rows_[grid_.row_index(y, z)]; }
   [[nodiscard]] std::int16_t level(int x, int y, int z) const {
     const GridRow& of = row(y, z);

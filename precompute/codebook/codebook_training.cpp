@@ -248,13 +248,13 @@ std::vector<std::string> problems(const CodebookOptions& options) {
   std::vector<std::string> found;
   if (options.codewords < 2 || options.codewords > static_cast<int>(kMaxCodewords))
     found.push_back("codewords = " + std::to_string(options.codewords) +
-                    ": must be within 2 and 65536");
+                    ": must be between 2 and 65536");
   if (options.max_iterations < 1)
     found.push_back("max_iterations = " + std::to_string(options.max_iterations) +
                     ": must be at least 1");
   if (!(options.min_relative_improvement >= 0.0 && options.min_relative_improvement < 1.0))
     found.push_back("min_relative_improvement = " +
-                    std::to_string(options.min_relative_improvement) + ": must be within 0 and 1");
+                    std::to_string(options.min_relative_improvement) + ": must be between 0 and 1");
   return found;
 }
 

@@ -11,24 +11,24 @@
 
 namespace af {
 
-/// Where the search for a tile takes its first guess from. It affects only speed.
+/// Where the search for a tile gets its first guess. Affects only speed.
 enum class SearchHint {
-  None,     ///< the codewords that are compared first serve: nearer than a neighbour's answer
+  None,     ///< none: the first codewords compared are nearer than a neighbour's answer
   PerTile,  ///< the caller's guess, for example the answer of the last training iteration
 };
 
 /// Exact nearest-codeword search (squared Euclidean distance of 16 levels; ties take the lowest
 /// index). Tiles and codewords are compared in the coordinates of the 4-D Hadamard transform, whose
 /// first coefficient (DC) orders the codebook: blocks of 16 codewords are visited outwards from the
-/// tile's DC until the DC alone is farther than the best, and left after five coefficients when all
-/// 16 are. Floats decide where they are exact (sums below 2^24); above, they discard with a margin
-/// above their rounding and integers decide. So the answer equals brute force on every vector
-/// width. \test NearestCodeword.EqualsBruteForceOnEveryWidth
+/// tile's DC until the DC alone is farther than the best; a block is left after five coefficients
+/// if all 16 are farther. Sums below 2^24 are exact as floats and decide; larger ones only discard,
+/// with a margin above their rounding, and integers decide. So the answer equals brute force on
+/// every vector width. \test NearestCodeword.EqualsBruteForceOnEveryWidth
 ///
-/// Shapes have no coefficient that tells as much as the DC of plain tiles. A balanced tree halves
-/// them at the median of the coefficient that varies most, down to blocks of 16; the ranges of
-/// eight coefficients within each part bound how near its codewords can be, and parts are visited
-/// nearest first, while they may hold a nearer one.
+/// Shapes have no coefficient as informative as the DC of plain tiles. A balanced tree halves them
+/// at the median of the coefficient that varies most, down to blocks of 16. The ranges of eight
+/// coefficients in each part bound the distance of its codewords; parts are visited nearest first,
+/// until none can hold a nearer codeword.
 class NearestCodeword {
  public:
   /// Searches for plain tiles or, where the codebook has means, for folded shapes (remove_mean()).

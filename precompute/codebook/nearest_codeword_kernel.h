@@ -11,8 +11,8 @@ namespace af {
 /// Coefficients whose ranges a CodewordBox states, the first in the order of the search.
 inline constexpr int kBoxCoefficients = 8;
 
-/// Ranges of coefficients of the codewords of up to 16 boxes or blocks; beyond all tiles where
-/// there are fewer.
+/// Coefficient ranges of the codewords in up to 16 boxes or blocks; unused ranges lie beyond all
+/// tiles.
 struct CodewordBox {
   float low[kBoxCoefficients][16];
   float high[kBoxCoefficients][16];
@@ -44,8 +44,8 @@ inline constexpr uint32_t kStartEntries = (16u * 65535u >> kStartShift) + 1;
 /// those sorted by DC: DC, the four linear ones, then by falling energy in practice.
 inline constexpr uint32_t kCoefficientOrder[16] = {
     0, 1, 2, 4, 8, 3, 5, 6, 9, 10, 12, 7, 11, 13, 14, 15};
-/// That of folded shapes, under boxes: the four linear ones, what rounding left of the mean, then
-/// by falling energy in practice. Folding along s turns coefficient k into k ^ 2.
+/// The order for folded shapes, under boxes: the four linear ones, the remainder of the rounded
+/// mean, then by falling energy in practice. Folding along s turns coefficient k into k ^ 2.
 inline constexpr uint32_t kFoldedCoefficientOrder[16] = {
     0, 3, 6, 10, 2, 7, 8, 1, 4, 11, 14, 5, 9, 15, 12, 13};
 

@@ -24,7 +24,7 @@ struct TrainingShare {
   std::vector<NumberedTile> held_out;
 };
 
-/// The largest share of the tiles that may train: an eighth as many again are held out.
+/// Largest share of tiles used for training; an eighth of that number is held out in addition.
 inline constexpr double kLargestTrainingFraction = 8.0 / 9.0;
 
 struct TrainingSelection {
@@ -37,10 +37,10 @@ std::vector<std::string> problems(const TrainingSelection& selection);
 
 /// Picks a rank's training tiles while units are cast, so that it need not keep the others. Tile i
 /// trains when hash(seed, i) lies below a threshold, so the choice depends on neither ranks nor
-/// plan. The threshold is that of the fraction, or the highest of 65536 steps that keeps the number
-/// of training tiles of all ranks within the cap. An eighth as many again are held out. Empty tiles
-/// take no part: they are codeword 0. The picker never holds many more candidates than five
-/// quarters of the cap.
+/// plan. The threshold follows from the fraction, or is the highest of 65536 steps that keeps the
+/// training tiles of all ranks within the cap. An eighth of their number is held out in addition.
+/// Empty tiles are ignored: they are codeword 0. The picker never holds many more candidates than
+/// five quarters of the cap.
 /// \test TileSelection.*
 class TrainingTilePicker {
  public:
@@ -48,8 +48,8 @@ class TrainingTilePicker {
 
   void add(const UnitTiles& tiles, const WorkUnit& unit);
 
-  /// Collective. An equal share of what the units added on all ranks gave, leaving the picker
-  /// empty.
+  /// Collective. Returns this rank's equal share of the tiles picked on all ranks and empties the
+  /// picker.
   [[nodiscard]] TrainingShare take(const CodebookReduction& reduction);
 
  private:
@@ -61,7 +61,7 @@ class TrainingTilePicker {
   TrainingSelection selection_;
   FieldLattice lattice_;
   std::uint64_t last_training_ =
-      0;  ///< no hash above it trains: the fraction's, or this rank's cap's
+      0;  ///< largest hash that trains, by the fraction or this rank's cap
   std::uint64_t held_out_above_ = 0;      ///< no hash up to it is held out
   std::vector<std::uint64_t> histogram_;  ///< of the hashes at most last_training_, by bin
   TrainingShare candidates_;

@@ -11,9 +11,9 @@
 
 namespace af {
 
-/// What a field may cost and what it must give. Any of them chooses the design by a probe.
+/// Limits on a field's cost and quality. If any is set, a probe chooses the design.
 struct DesignBudget {
-  std::optional<double> target_psnr_db;  ///< the least; the smallest file that gives it is chosen
+  std::optional<double> target_psnr_db;  ///< minimum; the smallest file that reaches it is chosen
   std::optional<std::int64_t> max_field_bytes;  ///< of the file
   std::optional<double> max_drr_ms;             ///< estimated, the whole detector on one core
 

@@ -16,9 +16,9 @@ namespace {
 constexpr double kUvExponent = 3.0;
 constexpr double kStExponent = 2.1;
 constexpr double kQuantisationUvExponent = 1.0;
-/// The squared error falls so with the codewords.
+/// Exponent of the fall of the squared error with the codewords.
 constexpr double kCodewordExponent = 0.4;
-/// Bits that an index takes more, per doubling of the codewords.
+/// Extra bits per index for each doubling of the codewords.
 constexpr double kBitsPerDoubling = 1.5;
 
 double from_db(double decibels) {
@@ -80,7 +80,7 @@ void DesignModel::fit() {
         sum += residual;
         sum_of_squares += residual * residual;
       }
-      // Two or three points prove little: an extreme has to explain some decibels.
+      // Two or three points prove little, so extreme values cost some squared decibels.
       constexpr double kCaution = 12.0;
       const double excess = (value - middle) / (high - low);
       const double cost = sum_of_squares - sum * sum / static_cast<double>(points_.size()) +

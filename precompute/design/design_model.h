@@ -7,8 +7,8 @@
 
 namespace af {
 
-/// What a measurement says of one design with one look-up and one size of the codebook, and what a
-/// model needs to tell its neighbours' by.
+/// Measured forecast of one design, look-up and codebook size, and what the model needs to
+/// extrapolate from it.
 struct DesignPoint {
   DesignForecast forecast;
   double occupied_tiles = 0.0;
@@ -16,9 +16,9 @@ struct DesignPoint {
   double footprint_nodes = 0.0;
 };
 
-/// Tells forecasts of designs from those of measured ones by laws of growth: over (u,v), losses
-/// fall with the number of viewpoints times slabs; over (s,t), with the nodes; how much each
-/// matters is fitted to the points. At a point itself it gives that point's forecast.
+/// Extrapolates forecasts from measured designs by power laws: losses fall over (u,v) with the
+/// number of viewpoints times slabs, over (s,t) with the nodes. The weight of each law is fitted to
+/// the points. At a measured point it returns that point's forecast.
 class DesignModel {
  public:
   void add(const std::vector<DesignPoint>& points) {
@@ -29,7 +29,7 @@ class DesignModel {
   /// Fits the shares; call after add().
   void fit();
 
-  /// From the nearest point. At least one point of that look-up must be there.
+  /// Extrapolates from the nearest point with that look-up, of which there must be one.
   [[nodiscard]] DesignForecast forecast(const FieldDesign& design) const;
 
  private:

@@ -20,8 +20,8 @@ const std::array presets = {
                  "what a probe of the CT finds best within 2 MB",
                  {12, 8, 256, 16384, "cubic"},
                  {std::nullopt, 2 * kMegabyte, std::nullopt}},
-    // For registration depth slabs count for more than PSNR: a probe's choice of one slab at the
-    // same PSNR ended twice as far from ray casting's pose.
+    // For registration, depth slabs matter more than PSNR: with the one slab that a probe chose at
+    // the same PSNR, registrations ended twice as far from ray casting's pose.
     DesignPreset{
         "standard",
         "for registration: eight slabs of 10 x 10 x 384 x 384 nodes, mean-removed tiles, 4096 "

@@ -23,7 +23,7 @@ inline constexpr const char* kAtlasPreset = "atlas";
 /// The paper's own design, for comparisons.
 inline constexpr const char* kPaperPreset = "paper";
 
-/// InputError when there is none of that name.
+/// InputError for an unknown name.
 const DesignPreset& design_preset_named(const std::string& name);
 
 /// Names that design_preset_named() knows, and one line that explains them.

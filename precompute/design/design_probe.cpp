@@ -227,7 +227,7 @@ DesignMeasurement DesignProbe::measure(const FieldDesign& design,
     std::array<std::uint64_t, 2> sums{};
     // A trained codebook's indices are coded in fewer bytes than a drawn one's.
     constexpr double kTrainedCodebook = 0.83;
-    // Some of the chunks tell.
+    // A few chunks suffice for the estimate.
     constexpr std::size_t kChunks = 8;
     const NearestCodeword search(codebook);
     const IndexCoding coding(codebook);
@@ -242,7 +242,7 @@ DesignMeasurement DesignProbe::measure(const FieldDesign& design,
       sums[1] += static_cast<std::uint64_t>(bytes.tiles);
     }
     reduction_.sum(sums);
-    // A smaller codebook stands for the one wanted.
+    // Extrapolates from a smaller codebook to the one wanted.
     const double missing_bits = std::log2(1.0 * count / static_cast<double>(codebook.size()));
     measured.bytes_per_tile[count] =
         kTrainedCodebook * sharing_along_u(lattice.slabs[0].u.stored.tiles()) *

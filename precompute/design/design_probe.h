@@ -21,7 +21,7 @@ namespace af {
 struct PoseLoss {
   std::array<double, 2> interpolation{};
   std::array<double, 2> quantisation{};  ///< with the largest small codebook
-  /// What both together lose beyond the sum of the two: both blur.
+  /// Loss of both together beyond the sum of the two, because both blur.
   std::array<double, 2> common{};
 };
 
@@ -38,7 +38,7 @@ struct DesignMeasurement {
   /// Largest number of codewords that the tiles suffice for.
   int most_codewords = 0;
 
-  /// For a number of codewords that was measured.
+  /// Forecast for a number of codewords that was measured.
   [[nodiscard]] DesignForecast forecast(int codewords, const std::string& look_up) const;
   [[nodiscard]] DesignPoint point(int codewords, const std::string& look_up) const;
 };

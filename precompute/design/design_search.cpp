@@ -14,10 +14,10 @@ namespace af {
 
 namespace {
 
-/// Of the size asked for, left to the error of the forecast.
+/// Share of the requested size to aim for; the rest allows for forecast errors.
 constexpr double kSizeMargin = 0.97;
 constexpr int kMostMeasured = 5;
-/// After so many, one of them is taken also when another looks better by more than a little.
+/// After this many measurements, a measured design may be worse by more than kLittle.
 constexpr int kEnoughMeasured = 3;
 
 /// A number with so many digits after the point.
@@ -63,7 +63,7 @@ class Family {
     for (const std::string& look_up : look_ups_)
       for (const int slabs : slabs_)
         for (const int uv : uv_nodes_) {
-          // Fewer viewpoints blur whatever else is done; more only cost.
+          // Fewer viewpoints always blur; more add cost without benefit.
           constexpr int kFewest = 40;
           constexpr int kMost = 128;
           if (is_uv_free_ && (slabs * uv < kFewest || slabs * uv > kMost)) continue;
@@ -133,7 +133,7 @@ bool is_measured(const FieldDesign& design, const DesignModel& model) {
 
 struct Choice {
   std::optional<DesignForecast> best;
-  std::optional<DesignForecast> best_measured;  ///< of those that are all but measured
+  std::optional<DesignForecast> best_measured;  ///< of designs that count as measured
   std::optional<DesignForecast> other_slabs;    ///< the best of another number of slabs
   DesignForecast highest_psnr;                  ///< of those that fit size and time
   DesignForecast smallest;                      ///< of those with the PSNR
@@ -183,7 +183,7 @@ Choice choice_of(const Family& family,
 }
 
 [[noreturn]] void refuse(const DesignBudget& budget, const Choice& choice) {
-  std::string text = "no field keeps " + to_text(budget);
+  std::string text = "no field meets the limits: " + to_text(budget);
   if (choice.has_highest)
     text += "; the highest PSNR within size and time: " + summary(choice.highest_psnr);
   if (choice.has_smallest)
@@ -221,7 +221,7 @@ ChosenDesign search_design(const DesignBudget& budget,
     model.fit();
     chosen.measured.push_back(model.forecast(next));
     choice = choice_of(family, judge, model, budget);
-    // What is measured is known better than what is only told to be a little better.
+    // Prefer a measured design to one that the model only forecasts to be slightly better.
     constexpr double kLittle = 0.06;
     const double allowed = measured + 1 < kEnoughMeasured ? kLittle : 3.0 * kLittle;
     if (choice.best_measured &&
@@ -230,7 +230,7 @@ ChosenDesign search_design(const DesignBudget& budget,
       choice.best = choice.best_measured;
       break;
     }
-    // A budget that looks impossible may only look so: measure at its edge.
+    // The model may be wrong that nothing fits: measure at the edge of the budget.
     if (choice.best)
       next = choice.best->design;
     else if (choice.has_highest)

@@ -9,7 +9,7 @@
 
 namespace af {
 
-/// Where a search may go.
+/// Limits of a search.
 struct SearchSpace {
   DesignParts fixed;    ///< parts that are stated
   int most_slabs = 12;  ///< slices of the CT that attenuate
@@ -22,15 +22,14 @@ struct ChosenDesign {
   DesignForecast forecast;
   std::vector<DesignForecast>
       measured;  ///< the designs that the probe measured, in order, by the choice's look-up
-  DesignForecast
-      runner_up;  ///< the best of another number of slabs, by the model; slabs 0: there is none
+  DesignForecast runner_up;  ///< the best with another number of slabs, by the model; slabs 0: none
 };
 
-/// The best design within a budget. With a PSNR to reach, the smallest file, and of files within a
-/// few percent of it the fastest DRR; else the highest PSNR, and of designs within a fifth of a
-/// decibel the fastest DRR. It measures a first guess, tells all others by the model, measures the
-/// best of them, and so on until the best is one that is (almost) measured. InputError, naming the
-/// best that can be had, when nothing fits. \test DesignSearch.*
+/// Finds the best design within a budget: with a PSNR to reach, the smallest file, or the fastest
+/// DRR among files within a few percent of it; otherwise the highest PSNR, or the fastest DRR among
+/// designs within a fifth of a decibel. It measures a first guess, forecasts all other designs by
+/// the model, measures the best of them, and repeats until the best is (almost) measured.
+/// InputError, naming the best possible design, when none fits. \test DesignSearch.*
 ChosenDesign search_design(const DesignBudget& budget,
                            const SearchSpace& space,
                            const MeasureDesign& measure);

@@ -18,9 +18,9 @@ struct PatchValues {
   std::array<double, RayPatch::kRays> cubic{};
 };
 
-/// The nodes of one field around one patch of rays, in every slab, cast: whole tiles. Looks the
-/// patch up as TwoPassAfDrr does, before and after quantisation; several slabs one by one, where
-/// TwoPassAfDrr sums them on one plane first, which is about as good.
+/// The cast nodes (whole tiles) of one field around one patch of rays, in every slab. Looks the
+/// patch up as TwoPassAfDrr does, before and after quantisation, but slab by slab; TwoPassAfDrr
+/// first sums slabs on one plane, which is about as good.
 /// \test DesignProbeTest.LooksPatchesOfOneSlabUpAsTwoPassAfDrrDoes
 class PatchNodes {
  public:

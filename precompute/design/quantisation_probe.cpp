@@ -15,7 +15,7 @@ namespace af {
 namespace {
 
 constexpr int kIterations = 5;
-/// Excess of the squared error of unseen tiles over that of a boundless training, times tiles per
+/// Excess of unseen tiles' squared error over that after unlimited training, times tiles per
 /// codeword: 1.16 at 14 and 1.05 at 64 (precompute/README.md). Tiles trained on fall short by about
 /// as much.
 constexpr double kUnseenExcess = 2.5;
@@ -72,7 +72,7 @@ Codebook drawn_codebook(std::span<const NumberedTile> shuffled, const ProbedCode
 double error_ratio(const std::array<double, kProbeCodewords.size()>& errors_of_small,
                    int codewords,
                    const TrainingTiles& tiles) {
-  // Some -0.45 in practice; a field of few tiles has hardly any errors to tell it from.
+  // About -0.45 in practice; a field of few tiles has too few errors to estimate it.
   const double falls = std::clamp(std::log(errors_of_small[1] / errors_of_small[0]) /
                                       std::log(1.0 * kProbeCodewords[1] / kProbeCodewords[0]),
                                   -0.8,

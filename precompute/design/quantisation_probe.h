@@ -19,7 +19,7 @@ namespace af {
 inline constexpr std::array<int, 2> kProbeCodewords = {512, 2048};
 /// Training tiles per codeword of each.
 inline constexpr std::size_t kProbeTilesPerCodeword = 32;
-/// Tiles on which none of them is trained, where there are so many.
+/// Tiles that train none of them, if there are that many.
 inline constexpr std::size_t kProbeUnseenTiles = 8192;
 
 /// Tiles that a probe needs for a field of so many codewords: for the largest small codebook, and
@@ -30,20 +30,20 @@ constexpr std::size_t probe_tiles(int codewords) {
       2 * static_cast<std::size_t>(codewords));
 }
 
-/// What a codebook of a probe is to be.
+/// Specification of a probe's codebook.
 struct ProbedCodebook {
   int codewords;
   int mean_step;  ///< of mean-removed tiles; 0: plain ones
   std::uint64_t seed;
 };
 
-/// A codebook trained as a field's is on the first tiles of `shuffled`, kProbeTilesPerCodeword per
+/// Trains a codebook, as for a field, on the first tiles of `shuffled`, kProbeTilesPerCodeword per
 /// codeword: on plain tiles, or on folded shapes (remove_means()) where `wanted.mean_step` is above
-/// 0. Of fewer codewords when there are not so many tiles.
+/// 0. Has fewer codewords when there are too few tiles.
 Codebook small_codebook(std::span<const NumberedTile> shuffled, const ProbedCodebook& wanted);
 
-/// A codebook of the size of a field's whose codewords are drawn, not trained: its indices compress
-/// as a field's do. Of fewer codewords when there are not twice as many tiles.
+/// A full-size codebook whose codewords are drawn, not trained: its indices compress like a
+/// field's. Has fewer codewords when there are less than twice as many tiles.
 Codebook drawn_codebook(std::span<const NumberedTile> shuffled, const ProbedCodebook& wanted);
 
 /// Sum over tiles, or folded shapes, of the squared distance to the nearest codeword, in levels.
@@ -55,9 +55,9 @@ struct TrainingTiles {
   double occupied = 0.0;  ///< of the whole field: not empty
 };
 
-/// The squared error of a field with `codewords` over that with the largest small codebook, from
-/// the errors with the small ones: a straight line in the logarithms. Tiles that were
-/// trained on are coded better than unseen ones, the more the fewer there are per codeword.
+/// A field's squared error with `codewords` relative to that with the largest small codebook,
+/// extrapolated from the small codebooks' errors by a straight line in the logarithms. Training
+/// tiles are coded better than unseen ones, especially with few tiles per codeword.
 double error_ratio(const std::array<double, kProbeCodewords.size()>& errors_of_small,
                    int codewords,
                    const TrainingTiles& tiles);
@@ -75,8 +75,8 @@ IndexBytes index_bytes(const FieldSample::Chunk& chunk,
 /// Bytes of a codebook in a file, deflated, per codeword.
 inline constexpr double kFileBytesPerCodeword = 17.0;
 
-/// The chunks of a file span several viewpoint tiles along u, which resemble each other: their
-/// bytes over those of chunks of one.
+/// Bytes of chunks that span several viewpoint tiles along u, which resemble each other, relative
+/// to chunks of one tile.
 double sharing_along_u(int viewpoint_tiles);
 
 }  // namespace af

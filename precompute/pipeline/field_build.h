@@ -38,7 +38,7 @@ struct FieldBuild {
   const Communicator& communicator;
 };
 
-/// Where the tiles are found, once the codebook is trained, that no rank has kept in memory.
+/// Source, after training, of the tiles that no rank kept in memory.
 enum class TileOverflow { ReadBack, CastAgain };
 
 struct CastLimits {
@@ -81,8 +81,8 @@ struct OverflowChoice {
 /// again.
 OverflowChoice choose_overflow(const FieldBuild& build, const CastPhase& cast);
 
-/// Collective. The codebook trained on the share that the picker took of all tiles, or on their
-/// shapes, where the options have a step of means.
+/// Collective. Trains the codebook on the picker's share of all tiles, or on their shapes if the
+/// options have a mean step.
 TrainedCodebook train_field(const FieldBuild& build,
                             CastPhase& cast,
                             const CodebookOptions& options,

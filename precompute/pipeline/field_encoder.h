@@ -31,11 +31,11 @@ class FieldEncoder {
   std::vector<IndexBlock> next_blocks(const ProgressCallback& on_progress = {},
                                       const StopRequested& stop_requested = {});
 
-  /// Collective. Over all ranks, in squared levels; once all blocks are made.
+  /// Collective. Sum over all ranks, in squared levels; valid once all blocks are made.
   [[nodiscard]] std::uint64_t squared_error() const;
   /// Collective. Seconds of every rank spent in next_blocks().
   [[nodiscard]] std::vector<double> busy_seconds() const;
-  /// Units that were to be read back but were damaged, and cast again; this rank's.
+  /// This rank's units that were damaged when read back, and cast again.
   [[nodiscard]] std::uint64_t units_damaged() const { return units_damaged_; }
   /// Collective. Units that an earlier run had encoded, over all ranks.
   [[nodiscard]] std::uint64_t units_resumed() const;
@@ -46,9 +46,9 @@ class FieldEncoder {
   void deal_out_others();
   [[nodiscard]] UnitTiles tiles_again(const WorkUnit& unit);
   IndexBlock next_block();
-  /// Of the tiles in memory, or of none where they must be made again.
+  /// Encodes the tiles in memory; `kept` null: makes the tiles again.
   EncodedUnit encoded(const WorkUnit& unit, const UnitTiles* kept);
-  /// A record's checksum says that it is whole, not that it is ours.
+  /// Whether the indices fit our codebook: a checksum proves only that a record is whole.
   [[nodiscard]] bool is_ours(const EncodedUnit& before, const WorkUnit& unit) const;
 
   const FieldBuild& build_;

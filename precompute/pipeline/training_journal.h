@@ -14,14 +14,14 @@ namespace af {
 /// The iterations of an unfinished training, in a journal that rank 0 keeps in the progress folder.
 class TrainingJournal {
  public:
-  /// Collective. Opens or creates the journal. Iterations with other options are thrown away: the
-  /// codebook may be changed between a stop and going on, the cast units stay. So are those whose
-  /// codebook is not usable, or not of the options' size and step of means.
+  /// Collective. Opens or creates the journal. Discards iterations made with other options: a
+  /// resumed run may change the codebook and keeps the cast units. Also discards those whose
+  /// codebook is unusable or has another size or mean step than the options.
   TrainingJournal(UnfinishedWork work,
                   const CodebookOptions& options,
                   const Communicator& communicator);
 
-  /// What the last sound iteration of earlier runs gave, the same on every rank; none without one.
+  /// Result of the last valid iteration of earlier runs, the same on every rank; none without one.
   [[nodiscard]] const std::optional<TrainedCodebook>& begun() const { return begun_; }
 
   /// Collective. Keeps the training after an iteration.
@@ -33,7 +33,7 @@ class TrainingJournal {
   std::optional<TrainedCodebook> begun_;
 };
 
-/// The training of bytes_of(); nothing when they are not of one with a usable codebook.
+/// Restores a training from bytes_of(); nothing when it has no usable codebook.
 std::optional<TrainedCodebook> training_of(std::span<const std::byte> bytes);
 
 }  // namespace af

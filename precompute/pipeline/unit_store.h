@@ -19,14 +19,14 @@ namespace af {
 /// indices. What is damaged is done again. \test FieldBuildTest.DamagedAndTornShardsAreCastAgain
 class UnitStore {
  public:
-  /// Collective. `work.unit_size`: rays per unit. InputError that names the difference when an
-  /// earlier run was about something else.
+  /// Collective. `work.unit_size`: rays per unit. InputError, naming the difference, when an
+  /// earlier run did other work.
   UnitStore(const UnfinishedWork& work, const Communicator& communicator);
 
   /// Of the run that began the work.
   [[nodiscard]] std::int64_t rays_per_unit() const { return store_.unit_size(); }
-  /// Rank 0: whether unfinished work was thrown away because its options had been refused, and
-  /// these are others.
+  /// Rank 0: whether unfinished work was discarded because its options, other than these, were
+  /// refused.
   [[nodiscard]] bool has_replaced_refused() const { return store_.has_replaced(); }
 
   using Visit = std::function<void(UnitTiles)>;
@@ -37,7 +37,7 @@ class UnitStore {
   /// Appends a finished unit to this rank's shard. FileError when it cannot be written.
   void append(const UnitTiles& tiles);
 
-  /// Appends the indices of a unit, by the codebook of this CRC-32C. FileError as above.
+  /// Appends the indices of a unit, encoded with the codebook of this CRC-32C. FileError as above.
   void append(const WorkUnit& unit, const EncodedUnit& encoded, std::uint32_t codebook_crc);
 
   /// The indices of a unit that an earlier run encoded with the codebook of this CRC-32C; nothing
@@ -49,8 +49,8 @@ class UnitStore {
   /// Collective. Tells every rank where each unit lies, so that any can read it.
   void share_places();
 
-  /// A unit that this rank has appended or visited, or any after share_places(); nothing when it is
-  /// not there or is damaged.
+  /// Reads a unit that this rank appended or visited, or any after share_places(); nothing when it
+  /// is missing or damaged.
   [[nodiscard]] std::optional<UnitTiles> read(const WorkUnit& unit) const;
 
   /// See ProgressShard and ProgressStore.

@@ -14,9 +14,9 @@ struct AxisRanges {
 };
 
 /// The bounds of "rx=-15:15,ry=5,rz=-30:30" for the letter 'r': LOW:HIGH, or one number for both
-/// sides of zero. An axis that is not named is within `otherwise` to both sides. UsageError, which
-/// names `option`, for an axis that is unknown or named twice, for what is no number, and for
-/// bounds that descend.
+/// sides of zero. Axes that are not named get -`otherwise` to `otherwise`. UsageError, naming
+/// `option`, for an axis that is unknown or named twice, for text that is no number, and for
+/// descending bounds.
 AxisRanges axis_ranges(const std::string& option,
                        const std::string& text,
                        char letter,

@@ -29,8 +29,8 @@ MemoryPlan plan_memory(const FieldLattice& lattice,
                        std::uint64_t fixed_bytes,
                        int ranks);
 
-/// The limit that applies: the option's, or the default, or more where a rank would need it even
-/// without keeping any tiles. InputError when the option's own limit is less than that.
+/// The limit that applies: the option's, or else the default, raised to what a rank needs without
+/// keeping any tiles. InputError when the option's limit is below that need.
 std::uint64_t memory_limit(const PrecomputeOptions& options, const MemoryPlan& plan);
 
 /// Memory of this process, from the system (0 where it does not tell).
@@ -38,7 +38,7 @@ struct ProcessMemory {
   std::uint64_t own_bytes = 0;       ///< resident, private
   std::uint64_t program_bytes = 0;   ///< resident, files: the program and its libraries
   std::uint64_t shared_bytes = 0;    ///< resident, shared with other ranks of the node
-  std::uint64_t peak_own_bytes = 0;  ///< most that was resident since forget_peak(), less the two
+  std::uint64_t peak_own_bytes = 0;  ///< peak resident since forget_peak(), less program and shared
 };
 
 ProcessMemory measured_memory();

@@ -25,7 +25,7 @@ void describe_source(Fields& field, PrecomputeOptions& options) {
       .input();
   field("camera",
         options.camera,
-        "Which camera of the rig, in letters of any case (a field belongs to one)")
+        "Camera of the rig, in upper or lower case (a field belongs to one camera)")
       .input();
   field("center_ct_mm",
         options.center_ct_mm,
@@ -79,9 +79,9 @@ void describe_casting(Fields& field, PrecomputeOptions& options) {
       "Make an atlas, one file of many fields, for the camera on an orbit: axis=z,from=-90,to=90 "
       "turns it about the room's z through the isocentre, degrees, right-handed. Every pose of "
       "the range at every angle is in one of its fields; they stand as far apart as the range "
-      "about the axis is wide, or step=10 degrees. About z each field has the poses whose source "
-      "is nearest to it; with members=by-pose those whose angle is, with all shifts, in 1.4 times "
-      "the bytes. A budget of the design is that of each field")
+      "about the axis is wide, or step=10 degrees. About z, each field has the poses whose source "
+      "is nearest to its own; with members=by-pose, those whose angle is nearest, with all shifts, "
+      "in 1.4 times the bytes. A limit on size, PSNR or time applies to each field")
       .decides(kCastingStage);
   field("orbit_cameras",
         options.orbit_cameras,
@@ -157,15 +157,16 @@ void describe_casting(Fields& field, PrecomputeOptions& options) {
       .input();
   field("projections_smoothing_px",
         options.projections_smoothing_px,
-        "Gaussian by which what the projections hold beyond the CT is smoothed, standard "
-        "deviation in pixels: for noisy ones; 0: not at all")
+        "Gaussian that smooths the projections' difference from the CT, standard "
+        "deviation in pixels: for noisy projections; 0: no smoothing")
       .within(0.0, 100.0)
       .not_deciding("the hash of the projections says it");
-  field("projections_common",
-        options.projections_common,
-        "What becomes of that part of what the projections hold beyond the CT that is the same at "
-        "a pixel in the mean of all views: keep, or remove, because the detector's errors are such "
-        "and the object's seldom")
+  field(
+      "projections_common",
+      options.projections_common,
+      "What to do with the part of the projections' difference from the CT that is the same, at "
+      "a pixel, in all views: keep it, or remove it, because errors of the detector are like this "
+      "and differences of the object seldom are")
       .one_of({"keep", "remove"})
       .not_deciding("the hash of the projections says it");
 }
@@ -233,8 +234,8 @@ void describe_run(Fields& field, PrecomputeOptions& options) {
       .not_deciding(why);
   field("overflow",
         options.overflow,
-        "What is done once the codebook is trained about tiles that did not fit: read-back (from "
-        "FIELD.h5.progress), cast-again, or auto (what is faster, measured)")
+        "What to do, after the training, about tiles that did not fit into memory: read-back (from "
+        "FIELD.h5.progress), cast-again, or auto (whichever is measured to be faster)")
       .one_of({"auto", "read-back", "cast-again"})
       .not_deciding(why);
   field("index_packing",
@@ -257,7 +258,8 @@ void describe_run(Fields& field, PrecomputeOptions& options) {
         options.is_dry_run,
         "Print sizes, memory, compression, expected time and advice; write nothing")
       .not_recorded("it writes nothing");
-  field("restart", options.is_restart, "Throw unfinished work in FIELD.h5.progress away")
+  field(
+      "restart", options.is_restart, "Discard unfinished work in FIELD.h5.progress and start over")
       .not_recorded(why);
   field("checkpoint",
         options.has_checkpoint,
@@ -324,7 +326,7 @@ PrecomputeOptions PrecomputeOptions::with_design(const FieldDesign& design) cons
   options.uv_nodes = design.uv_nodes;
   options.st_nodes = design.st_nodes;
   options.codewords = design.codewords;
-  // Fields that do not say it are for linear look-up.
+  // Fields without this option are for linear look-up.
   if (design.look_up == "linear")
     options.look_up.reset();
   else
@@ -364,14 +366,14 @@ std::vector<std::string> problems(const PrecomputeOptions& options) {
   append(problems(options.codebook_options()), found);
   if (!options.projections.empty() && options.is_of_bone())
     found.push_back(
-        "projections: show all that attenuates, and correct no field of material = bone");
+        "projections: must not be given with material = bone: X-rays show all that attenuates");
   append(problems(options.training_selection()), found);
   if (options.mean_step && options.tile_coding == "plain")
     found.emplace_back("mean_step: plain tiles have no means; leave it out");
   if (options.limits().max_field_bytes && !options.packs_by_codebook_tree())
     found.emplace_back(
-        "index_packing = deflate: the size that --max-field-size or the preset allows is that of a "
-        "file with codebook-tree; leave one out");
+        "index_packing = deflate: the size limit of --max-field-size or the preset assumes "
+        "codebook-tree; leave out --index-packing or the limit");
   if (!options.center_ct_mm.empty() && options.center_ct_mm.size() != 3)
     found.push_back("center_ct_mm has " + std::to_string(options.center_ct_mm.size()) +
                     " numbers: must be x,y,z");

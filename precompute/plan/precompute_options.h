@@ -19,8 +19,7 @@
 
 namespace af {
 
-/// The memory that a rank may take beside what every node holds once, unless an option says
-/// otherwise.
+/// Default memory limit of a rank, not counting what every node holds once.
 inline constexpr std::uint64_t kDefaultMemoryLimitBytes = std::uint64_t{300} << 20;
 
 /// Options of af-precompute: what is cast, how it is compressed, where it goes. Angles in degrees,
@@ -89,13 +88,13 @@ struct PrecomputeOptions {
   [[nodiscard]] bool is_atlas() const { return !orbit.empty() || !orbit_cameras.empty(); }
   /// The parts of the design that are stated.
   [[nodiscard]] DesignParts stated_parts() const;
-  /// The preset that is asked for; without one the default, or where parts are stated the paper's.
+  /// The requested preset; without one the default, or the paper's if parts are stated.
   [[nodiscard]] const DesignPreset& design_preset() const;
   /// Whether a probe of the CT has to choose what is not stated.
   [[nodiscard]] bool needs_probe() const;
-  /// Of the design: those stated, or the preset's.
+  /// The design's budget: the stated one, or the preset's.
   [[nodiscard]] const DesignBudget& limits() const;
-  /// Else the indices are deflated.
+  /// Whether the codebook tree packs the indices; otherwise they are deflated.
   [[nodiscard]] bool packs_by_codebook_tree() const;
   /// The design: of the preset, with the parts that are stated.
   [[nodiscard]] FieldDesign design() const { return stated_parts().over(design_preset().design); }
@@ -110,11 +109,11 @@ struct PrecomputeOptions {
   [[nodiscard]] bool is_of_bone() const { return material == "bone"; }
 
   void describe(Fields& field);
-  /// With the design, unless a probe has to choose it, and the rule that places the (s,t) planes.
+  /// Fills in the design, unless a probe has to choose it, and the rule that places (s,t) planes.
   [[nodiscard]] PrecomputeOptions in_force() const;
 };
 
-/// Of the means of mean-removed tiles, unless a design says otherwise: levels of 65535.
+/// Default step of the means of mean-removed tiles, in levels of 65535.
 inline constexpr int kDefaultMeanStep = 64;
 
 /// Stages that options decide.
@@ -124,11 +123,11 @@ inline constexpr const char* kCodebookStage = "codebook";  ///< what is made of 
 /// Training tiles where no share is stated: enough that unseen tiles come out nearly as training
 /// tiles do (precompute/README.md has what more and fewer give).
 inline constexpr std::uint64_t kTrainingTilesPerCodeword = 64;
-/// Most of them, so that 65536 codewords do not take more than twice the time of 16384.
+/// Upper limit of that default, so that 65536 codewords take at most twice the time of 16384.
 inline constexpr std::uint64_t kTrainingTilesUnlessStated = std::uint64_t{1} << 20u;
-/// Where a training ends unless told otherwise. The paper's single slab keeps the stricter limit,
-/// so that its files stay the same to the byte; with several slabs what the last iterations gain is
-/// below what interpolation loses (precompute/README.md).
+/// Default improvement below which training ends. The paper's single slab keeps the stricter limit,
+/// so that its files stay byte-identical; with several slabs the last iterations gain less than
+/// interpolation loses (precompute/README.md).
 double min_improvement_of(const FieldDesign& design);
 
 /// Every broken constraint of the values themselves (not of files).

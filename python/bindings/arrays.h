@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// NumPy arrays and what the library takes and gives. No array is copied that is what is asked for.
+// Conversion between NumPy arrays and the library's types. Arrays of the required kind are not
+// copied.
 #pragma once
 
 #include <array>
@@ -19,13 +20,13 @@ namespace py = pybind11;
 /// float64, C order; another kind of sequence is converted.
 using Numbers = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
-/// "(3,)", "(n, 6)": how shapes are told in errors.
+/// "(3,)", "(n, 6)": a shape as errors state it.
 std::string shape_text(const py::array& array);
 
 /// InputError naming `name` unless the array has this shape; -1 is any extent.
 void require_shape(const py::array& array, const char* name, const std::vector<py::ssize_t>& shape);
 
-/// InputError naming `name` unless numbers stand in memory where the processor wants them.
+/// InputError naming `name` unless the numbers are aligned in memory.
 void require_aligned(const py::array& array, const char* name);
 
 /// A new float32 array, or `out` itself: InputError unless that is float32, C-contiguous, aligned,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Texts of the library as Python's. They may hold bytes that are not UTF-8: names of files, cells.
+// The library's texts as Python strings. File names and cells may hold bytes that are not UTF-8.
 #pragma once
 
 #include <pybind11/pybind11.h>

@@ -27,7 +27,7 @@ struct CorrectionReport {
 
 struct CorrectionOptions {
   bool is_wanted = false;
-  /// A step that is no longer, mean over the target box, is the last one.
+  /// The correction stops after a step no longer than this, mean over the target box.
   double tolerance_mm = 0.005;
   int max_casts = 50;    ///< ray-cast DRRs per view
   double step_mm = 0.5;  ///< longest step of its ray casting
@@ -39,7 +39,7 @@ struct CorrectionOptions {
   void describe(Fields& field);
 };
 
-/// Of options that ask for one where rays are cast anyway.
+/// The problem with a correction where rays are cast anyway.
 inline constexpr const char* kCorrectsRayCasting =
     "--correct = set: must not be given with --renderer raycast, whose DRRs are ray-cast already";
 

@@ -27,7 +27,7 @@ void replace_in_stages(const MethodOptions& options, RegistrationOptions& result
   replace_in_chain(options, result.finish);
 }
 
-/// Of a finish or a judge, which no chain stands before.
+/// The chain of a finish or a judge, which cannot be a last resort.
 ChainOptions unconditional_chain(const std::string& name, const std::string& text) {
   ChainOptions chain = chain_from_text(name, text);
   if (chain.is_last_resort())
@@ -82,8 +82,8 @@ void describe_chains(Fields& field, MethodOptions& options) {
         "(default: the preset's; none with --chain)");
   field("judge",
         options.judge,
-        "Of a portfolio: what ends are compared by, one stage written as for --chain; its measure "
-        "is rg, its optimiser does not count (default: the preset's)");
+        "For a portfolio: the stage, written as for --chain, by which end poses are compared; its "
+        "measure must be rg, its optimiser is ignored (default: the preset's)");
   field("judge_least_value", options.judge_least_value, "Ends below it are failures")
       .no_option("the preset's");
   field("judge_enough_value", options.judge_enough_value, "An end above it is taken")
@@ -96,8 +96,8 @@ void describe_chains(Fields& field, MethodOptions& options) {
   field("coarse_roi_scale",
         options.coarse_roi_scale,
         "Coarse stages look at this many times the region's sides (fast, robust: 2), cut at the "
-        "detector's edges. A field holds every ray of its camera's whole detector, so none is made "
-        "for it")
+        "detector's edges. Fields need not be made for it: they hold every ray of the whole "
+        "detector")
       .not_recorded(why);
 }
 
@@ -120,7 +120,7 @@ void MethodOptions::describe(Fields& field) {
         "processors for the rank. Many starts are better shared by ranks")
       .not_deciding("results do not depend on it");
   field.start_group("");
-  field("seed", seed, "Of the random numbers that cma-es draws").no_option("programs add it");
+  field("seed", seed, "Seed of the random numbers that cma-es draws").no_option("programs add it");
 }
 
 std::string MethodOptions::preset_name() const {

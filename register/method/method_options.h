@@ -26,7 +26,7 @@ struct MethodOptions {
   /// Radius, mm on the isocentre plane, of the discs about fiducials that registration does not
   /// see.
   double fiducial_mask_mm = 4.0;
-  // Of a portfolio's judge: ends below the one are failures, an end above the other is taken.
+  // A portfolio's judge rejects ends below the first value and accepts an end above the second.
   std::optional<double> judge_least_value;
   std::optional<double> judge_enough_value;
   std::uint64_t seed = 1;
@@ -37,8 +37,8 @@ struct MethodOptions {
   [[nodiscard]] std::string preset_name() const;
 
   void describe(Fields& field);
-  /// With preset and budget, and every chain, finish and judge as text: they hold what else
-  /// replaces parts of the preset. Throws as resolve().
+  /// These options with preset and budget set and with all chains, finish and judge as text, which
+  /// include the other replacements. Throws as resolve().
   [[nodiscard]] MethodOptions in_force() const;
 };
 

@@ -52,8 +52,8 @@ std::shared_ptr<const DrrRenderer> stage_renderer(const RegistrationView& view, 
                     : view.coarse_levels[static_cast<std::size_t>(level) - 1].renderer;
 }
 
-/// Hiding markers must leave three quarters of so many pixels of a stage: coarse pixels of a small
-/// region may nearly all touch one.
+/// Markers are hidden only in stages of at least this many pixels, and if three quarters stay
+/// visible: in a small region nearly all coarse pixels may touch a marker.
 constexpr std::size_t kLeastPixelsToHideIn = 400;
 
 /// The X-ray of a stage with the markers hidden, if that leaves enough of it.

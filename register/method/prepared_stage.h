@@ -21,8 +21,8 @@ struct PreparedStage {
   MultiViewObjective objective;  ///< narrowed to the silhouettes at the last pose, if any
   std::vector<SilhouetteView> silhouettes;  ///< none where the whole region counts
 
-  /// Narrows the objective to the silhouettes at a pose, if it is one of silhouettes; false when
-  /// too little is seen of them.
+  /// Narrows the objective to the silhouettes at a pose, if the stage uses silhouettes; false when
+  /// too little of them is visible.
   [[nodiscard]] bool narrow_to(const RegistrationProblem& problem,
                                const RigidTransform& room_from_ct);
 };

@@ -59,8 +59,8 @@ ChainOptions wide_chain(const std::string& name, const std::string& search) {
 }
 
 /// Three chains search with different measures, because each has its deepest optimum in a wrong
-/// place for some patients (docs/population.md). Where none found anything, a fourth searches once
-/// more, wider and by plain correlation: starts far along a long object led the others to its end,
+/// place for some patients (docs/population.md). If none finds anything, a fourth searches more
+/// widely, by plain correlation: from starts far along a long object, the others went to its end,
 /// out of sight (docs/real-xrays.md).
 RegistrationOptions robust_preset() {
   RegistrationOptions options;
@@ -78,8 +78,8 @@ RegistrationOptions robust_preset() {
   return options;
 }
 
-/// The last stage sees every pixel: where pixels are as large as a CT's voxels, two of them to a
-/// stage pixel put simulated bones 0.3 mm and 1 degree off, one 0.04 mm and 0.1 degrees
+/// The last stage sees every pixel: where pixels are as large as CT voxels, simulated bones ended
+/// 0.3 mm and 1 degree off with pixels=2, and 0.04 mm and 0.1 degrees off with pixels=1
 /// (docs/howto/bones.md).
 RegistrationOptions bone_preset() {
   return one_chain(

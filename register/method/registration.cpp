@@ -47,7 +47,7 @@ bool is_cast(const RegistrationProblem& problem, int level) {
   });
 }
 
-/// Lets a search reuse node images, and nothing after it.
+/// Lets a search reuse node images until this object is destroyed.
 class ReusedImages {
  public:
   ReusedImages(MultiViewObjective& objective, bool is_allowed) : objective_(objective) {
@@ -61,7 +61,7 @@ class ReusedImages {
   MultiViewObjective& objective_;
 };
 
-/// Of a pose at which there is nothing to compare.
+/// The value at a pose where there is nothing to compare.
 ObjectiveValue inadmissible_value() {
   ObjectiveValue value;
   value.similarity = std::numeric_limits<double>::quiet_NaN();
@@ -103,7 +103,7 @@ struct RegistrationRunner::Impl {
   void prepare();
   [[nodiscard]] std::optional<ParameterScaling> scaling_at(
       const RigidTransform& room_from_ct, std::span<const Eigen::Vector3d> points_ct) const;
-  /// What a stage that begins at a pose is searched with.
+  /// The scaling with which a stage searches from a pose.
   [[nodiscard]] std::optional<ParameterScaling> scaling_of(
       const PreparedStage& stage, const RigidTransform& room_from_ct) const;
   [[nodiscard]] std::uint64_t random_key(std::int64_t start_index, std::size_t index) const;
@@ -125,8 +125,8 @@ struct RegistrationRunner::Impl {
   [[nodiscard]] bool narrow_at_start(PreparedStage& stage,
                                      ChainEnd& end,
                                      RegistrationResult& result) const;
-  /// The similarity of an end by itself, so that ends of several starts compare: within its own
-  /// silhouettes, and by images of its own.
+  /// Makes the similarities of ends of several starts comparable: evaluates an end within its own
+  /// silhouettes and without reused images.
   void take_own_similarity(ChainEnd& end, RegistrationResult& result);
   void run_portfolio(std::int64_t start_index, RegistrationResult& result);
   /// The finish, from `end`.
@@ -240,7 +240,7 @@ bool RegistrationRunner::Impl::run_chain(const ChainOptions& chain,
   for (std::size_t i = 0; i < chain.stages.size(); ++i) {
     end.stage = first + i;
     if (run_stage(stages[end.stage], end.stage, start_index, end, result)) continue;
-    // The stage before ended on the very limit, and rounding put its end beyond.
+    // The previous stage ended at the limit, and rounding put its end beyond.
     if (i > 0 && end.stop_reason == StopReason::StartInadmissible)
       end.stop_reason = StopReason::PinnedAtLimit;
     return false;
@@ -318,7 +318,7 @@ void RegistrationRunner::Impl::correct(std::int64_t start_index,
   if (budget.max_evaluations <= 0) return;
   const RigidTransform found = search_by_casting(*scaling, budget, end, result);
   report.casts = search.evaluations;
-  // The value is look-up's, as that of ends that are not corrected; and the fields hold the pose.
+  // By look-up, as for ends that are not corrected; this also checks that the fields hold the pose.
   const ObjectiveValue value = stages[end.stage].objective.evaluate(found);
   result.drr_count += value.drr_count;
   if (!std::isfinite(search.value) || !value.is_admissible) return;

@@ -45,7 +45,7 @@ struct RegistrationResult {
   std::optional<CorrectionReport> correction;  ///< when one was wanted
   double seconds = 0.0;                        ///< wall time
 
-  /// Whether it ended with a pose that means anything.
+  /// Whether the registration ended with a meaningful pose.
   [[nodiscard]] bool has_pose() const {
     return std::isfinite(similarity) && room_from_ct.matrix().allFinite();
   }
@@ -89,13 +89,13 @@ class RegistrationRunner {
   [[nodiscard]] RegistrationResult run(const RigidTransform& start_room_from_ct,
                                        std::int64_t start_index = 0);
 
-  /// What RegistrationResult::similarity is at a pose.
+  /// The value of RegistrationResult::similarity at a pose.
   [[nodiscard]] ObjectiveValue similarity_at(const RigidTransform& room_from_ct);
   /// The objective of one stage, counted over the chains, at a pose.
   [[nodiscard]] ObjectiveValue similarity_at(const RigidTransform& room_from_ct, std::size_t stage);
 
-  /// What a stage, counted over the chains, maximises; lives as long as the runner, and is used by
-  /// no run meanwhile.
+  /// The objective of a stage, counted over the chains. It lives as long as the runner; no run may
+  /// use it at the same time.
   [[nodiscard]] MultiViewObjective& objective(std::size_t stage);
 
   [[nodiscard]] const RegistrationProblem& problem() const;

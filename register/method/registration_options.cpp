@@ -120,7 +120,7 @@ void StageOptions::describe(Fields& field) {
   field("pixel_step", pixel_step, "detector pixels per stage pixel, along each axis")
       .as("pixels")
       .within(1, 64);
-  field("roi_scale", roi_scale, "sides of the region over those of the study's")
+  field("roi_scale", roi_scale, "sides of the region, as a multiple of those of the study's")
       .as("roi")
       .within(0.1, 4.0);
   field("smoothing_sigma_mm",
@@ -131,8 +131,8 @@ void StageOptions::describe(Fields& field) {
       .finite();
   field("silhouette_mm",
         silhouette_mm,
-        "mm on the isocentre plane: of the region only what lies within so many mm of the CT's "
-        "silhouette, as it is where the stage starts, counts; 0: all of the region")
+        "mm on the isocentre plane: only the part of the region within this distance of the CT's "
+        "silhouette at the start of the stage counts; 0: all of the region")
       .as("silhouette")
       .within(0.0, 100.0);
   field.part(similarity);

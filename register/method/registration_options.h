@@ -36,8 +36,8 @@ std::vector<std::string> problems(const StageOptions& stage);
 struct ChainOptions {
   std::string name;
   std::vector<StageOptions> stages;
-  /// Of a portfolio: a last resort runs only where the best end of the chains before it is worth
-  /// less, mean over views, to the judge. Infinity: it always runs.
+  /// In a portfolio, a last resort: the chain runs only if the judge scores the best end of the
+  /// chains before it below this (mean over views). Infinity: it always runs.
   double only_below = std::numeric_limits<double>::infinity();
 
   [[nodiscard]] bool is_last_resort() const {
@@ -54,8 +54,8 @@ struct ChainOptions {
 /// it: "below 0.2: ncc cma-es ...".
 std::string chain_text(const ChainOptions& chain);
 
-/// The chain of a line. InputError for a line that is not of this form; whether its values fit is
-/// for problems() to say. \test ChainText.ReadsWhatItWrites
+/// Parses the line of a chain. InputError for a line of another form; problems() checks the values.
+/// \test ChainText.ReadsWhatItWrites
 ChainOptions chain_from_text(const std::string& name, const std::string& text);
 
 /// The keys of a chain's line, each with what it means, for --help.
@@ -79,7 +79,7 @@ inline constexpr const char* kSilhouettesNeedTheCt =
 /// How to register: one chain, or a portfolio of several from the same start.
 struct RegistrationOptions {
   std::vector<ChainOptions> chains;
-  /// Stages that follow the chain, of a portfolio from its best end only; may have none.
+  /// Stages that follow the chain, or a portfolio's best end; may be empty.
   ChainOptions finish;
   JudgeOptions judge;          ///< of a portfolio; not used with one chain
   int max_evaluations = 5000;  ///< pose evaluations per registration, all chains together
@@ -92,7 +92,7 @@ struct RegistrationOptions {
   /// Names of the measures, or of the optimisers, in the order of stages, each once: "ncc, gc".
   [[nodiscard]] std::string similarity_list() const;
   [[nodiscard]] std::string optimizer_list() const;
-  /// The measure that results' similarities are values of.
+  /// The measure whose values are the similarities of results.
   [[nodiscard]] std::string final_similarity() const;
   /// Margin of the last stage's silhouettes; 0: it compares the whole region.
   [[nodiscard]] double silhouette_mm() const;

@@ -15,7 +15,7 @@ namespace {
 /// An update whose divisor is smaller, relative to its vectors, would be mostly rounding.
 constexpr double kLeastCosine = 1e-3;
 
-/// Longer steps were refused too often: from far off the gradients say little about the end.
+/// Longer steps were rejected too often: far away, gradients say little about the optimum.
 constexpr double kLeastShare = 1.0 / 3.0;
 constexpr double kMostShare = 3.0;
 

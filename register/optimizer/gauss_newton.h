@@ -7,8 +7,8 @@ namespace af::registration {
 
 /// The curvature that normal equations leave out, learned from accepted steps.
 ///
-/// Measures whose residuals are weighted anew at every point (rg) curve less than their normal
-/// equations say, so that steps by these alone converge linearly: each is half or more of the one
+/// Measures that reweight their residuals at every point (rg) curve less than their normal
+/// equations say, so steps by these alone converge only linearly: each is at least half of the one
 /// before. The difference follows from the gradients on either side of a step, by symmetric
 /// rank-one updates: a structured quasi-Newton method (Dennis, Gay and Welsch, An Adaptive
 /// Nonlinear Least-Squares Algorithm, ACM TOMS 7(3), 1981; Nocedal and Wright, Numerical
@@ -18,7 +18,7 @@ class LearnedCurvature {
   [[nodiscard]] bool is_empty() const { return is_empty_; }
   void clear();
 
-  /// From a step between two points with gradients and normal equations.
+  /// Learns from a step between two points with gradients and normal equations.
   void learn(const ScaledParameters& step, const TargetValue& before, const TargetValue& after);
 
   /// The normal equations `matrix` (positive definite) with what was learned. Along every direction

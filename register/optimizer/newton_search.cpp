@@ -11,16 +11,16 @@
 namespace af::registration {
 namespace {
 
-/// What Gauss and Newton's curvature overestimates where residuals are large: by up to a factor of
-/// twenty along some directions, measured on X-rays under stress. A measured curvature beyond that
-/// is taken for an error of the differences, and so is one that is larger than theirs.
+/// Least curvature as a share of Gauss and Newton's, which is up to twenty times too large along
+/// some directions where residuals are large (measured on X-rays under stress). Measured curvatures
+/// below this share, or above Gauss and Newton's, are taken for errors of the differences.
 constexpr double kLeastShareOfGaussNewton = 0.03;
 
 /// Least curvature over the largest one, where Gauss and Newton's is not known.
 constexpr double kLeastCurvatureOverLargest = 1e-6;
 
-/// A value that is less by this share of it is not worse: near an optimum the errors with which
-/// rays are sampled change values more than the pose does, and the derivatives know better.
+/// A value lower by this share does not count as worse: near an optimum, ray sampling errors change
+/// values more than the pose does, and the derivatives are more reliable.
 constexpr double kValueNoise = 1e-4;
 
 /// `curvature` with its sizes along the directions that it shares with `scale` kept between
@@ -54,7 +54,8 @@ ScaledParameters newton_step(const ScaledMatrix& curvature,
   return length > longest_mm ? ScaledParameters(step * (longest_mm / length)) : step;
 }
 
-/// The gradient fell by `fall` along `step`. What would no longer bend downwards is not learnt.
+/// The gradient fell by `fall` along `step`. Skips a correction after which the target would no
+/// longer bend downwards.
 void correct_curvature(const ScaledParameters& step,
                        const ScaledParameters& fall,
                        ScaledMatrix& curvature) {

@@ -8,10 +8,10 @@
 namespace af::registration {
 
 /// The curvature (negative Hessian) of a target at the origin, by central differences of its
-/// derivatives over `step_mm` to both sides, or as far as the target's limits admit. Where it bends
-/// upwards or hardly at all, or more than Gauss and Newton's stand-in for it (of
-/// Derivatives::NormalEquations), it is made to bend a little, or as much as that: Newton's steps
-/// then lead up. Evaluates the target thirteen times.
+/// derivatives over `step_mm` to both sides, or as far as the target's limits admit. Directions
+/// that bend upwards or hardly at all get a small curvature, and curvatures above Gauss and
+/// Newton's (of Derivatives::NormalEquations) are reduced to it, so that Newton's steps lead up.
+/// Evaluates the target thirteen times.
 ScaledMatrix measured_curvature(OptimizationTarget& target,
                                 Derivatives derivatives,
                                 double step_mm);
@@ -19,7 +19,7 @@ ScaledMatrix measured_curvature(OptimizationTarget& target,
 struct NewtonOptions {
   Derivatives derivatives = Derivatives::Gradient;
   double longest_step_mm = 2.0;
-  /// A step no longer than this, by `length_mm`, is the last one.
+  /// The search stops after a step no longer than this, by `length_mm`.
   double tolerance_mm = 0.005;
   std::function<double(const ScaledParameters& from, const ScaledParameters& to)> length_mm;
 };
@@ -27,9 +27,9 @@ struct NewtonOptions {
 /// Newton's steps for a target that costs much to evaluate, from near its optimum and from its
 /// `curvature` there, which may be that of a cheaper target much like it. Each evaluation corrects
 /// the curvature along the step before (symmetric rank one: Nocedal and Wright, Numerical
-/// Optimization, 2006, Sec. 6.2). The last step is taken without an evaluation, and so is the one
-/// for which no budget is left: the result's value is the one before. \test
-/// NewtonSearch.TakesFewEvaluationsWithACurvatureThatIsNearlyRight
+/// Optimization, 2006, Sec. 6.2). The last step is not evaluated, nor is a step for which no budget
+/// is left: the result then has the value of the point before.
+/// \test NewtonSearch.TakesFewEvaluationsWithACurvatureThatIsNearlyRight
 void newton_search(OptimizationTarget& target,
                    ScaledMatrix curvature,
                    const NewtonOptions& options,

@@ -22,7 +22,7 @@ enum class StopReason {
   StartInadmissible,      ///< the start lies outside the field or its motion range
   CtOutsideRoi,           ///< no CT point projects into a region of interest: steps undefined
   NonFiniteSimilarity,    ///< the similarity is NaN or infinite
-  NoBetterThanNoDrr,      ///< every chain of a portfolio explains the X-rays no better than no DRR
+  NoBetterThanNoDrr,      ///< no chain of a portfolio explains the X-rays better than no DRR
 };
 
 /// "step-below-final", "evaluation-budget-spent", "pinned-at-limit", "start-inadmissible",
@@ -38,7 +38,7 @@ using ScaledMatrix = Eigen::Matrix<double, 6, 6>;
 enum class Derivatives {
   None,
   Gradient,         ///< first derivatives
-  NormalEquations,  ///< and a positive semi-definite stand-in for the negative Hessian
+  NormalEquations,  ///< and a positive semi-definite approximation of the negative Hessian
 };
 
 /// A target at a point, with the derivatives that were asked for.

@@ -25,8 +25,8 @@ class SearchRun {
     Outcome outcome = Outcome::Ended;
     TargetValue target;
   };
-  /// One evaluation; Ended when the budget is spent or the value is not finite, which the result
-  /// then says.
+  /// Evaluates one point; Ended, with the reason in the result, when the budget is spent or the
+  /// value is not finite.
   Evaluation evaluate(const ScaledParameters& point, Derivatives derivatives = Derivatives::None);
   /// The same, without derivatives, for points that do not depend on each other. They are counted
   /// in their order: after a point that ends the search, all others are Ended.
@@ -51,7 +51,7 @@ class SearchRun {
  private:
   /// Whether the budget allows one more evaluation; if not, the result says so.
   bool has_budget();
-  /// Counts an evaluation, and says what it means.
+  /// Counts an evaluation and returns its outcome.
   Evaluation counted(const std::optional<TargetValue>& found);
 
   OptimizationTarget& target_;

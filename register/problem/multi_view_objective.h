@@ -36,8 +36,9 @@ struct ObjectiveValue {
   int drr_count = 0;              ///< DRRs rendered for this value
 };
 
-/// The gradient of one view's similarity, tile by tile of its region, row by row; they sum to the
-/// view's. By small motions of the CT in the room, as PoseGradients (per rad, per mm).
+/// The gradient of one view's similarity, split over the tiles of its region, row by row; the parts
+/// sum to the view's gradient. By small motions of the CT in the room, as PoseGradients (per rad,
+/// per mm).
 using TileScores = std::vector<PoseVector>;
 
 /// Eq. (13): sum of the views' similarities at a pose. Owns the scratch memory: one objective at a
@@ -63,16 +64,15 @@ class MultiViewObjective {
 
   /// The views one by one, the gradient of each split over `tiles` x `tiles` parts of its region:
   /// sums of (derivative by a DRR pixel) x (derivative of that pixel by the pose). The measures
-  /// must have derivatives. `scores`: one per view; it keeps what it was when the pose is
-  /// inadmissible.
+  /// must have derivatives. `scores`: one per view; unchanged when the pose is inadmissible.
   ObjectiveValue evaluate_scores(const RigidTransform& room_from_ct,
                                  const Eigen::Vector3d& pivot_room_point,
                                  int tiles,
                                  std::vector<TileScores>& scores);
 
-  /// Whether a search begins whose evaluations may make DRRs of the node images of earlier ones
-  /// (RenderWorkspace::reuse_images()): its values then depend on the poses before, until this is
-  /// called again or several poses are evaluated at once.
+  /// Call before a search: says whether evaluations may make DRRs from node images of earlier ones
+  /// (RenderWorkspace::reuse_images()). If so, values depend on earlier poses until this is called
+  /// again or several poses are evaluated at once.
   void reuse_images(bool is_allowed);
 
   [[nodiscard]] const std::vector<ObjectiveView>& views() const { return views_; }
@@ -110,8 +110,8 @@ class MultiViewObjective {
                      Scratch& scratch,
                      const std::optional<PoseGradients>& gradients,
                      const Compare& compare);
-  /// Of a pose with rays outside some views are rendered or not, as the threads come to it: what
-  /// they left must not tell. For pose `i`.
+  /// Forgets node images if pose `i` has rays outside: which of its views were rendered depends on
+  /// the threads and must not affect later values.
   void forget_images_of_refused(std::size_t i);
   /// The sum over the views of pose `i`, in their order.
   [[nodiscard]] ObjectiveValue sum_of(std::size_t i, NormalEquations& equations) const;

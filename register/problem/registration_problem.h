@@ -24,8 +24,8 @@ struct RegistrationView {
   View view;     ///< camera and region of interest
   Image2d xray;  ///< whole detector, attenuation domain (bright = attenuated)
   Image2d mask;  ///< whole detector, non-zero = used; empty: every pixel of the region
-  /// `mask` without the gold standard's markers; empty: the same. It counts in stages of 400 pixels
-  /// or more where it leaves three quarters of them.
+  /// `mask` that also hides the gold standard's markers; empty: the same. Used in stages of 400
+  /// pixels or more if it leaves three quarters of them.
   Image2d mask_without_markers;
   std::shared_ptr<const DrrRenderer> renderer;
   std::vector<RendererLevel> coarse_levels;  ///< 1, 2, ... as far as stages and verdict need them
@@ -43,7 +43,7 @@ struct RegistrationView {
   [[nodiscard]] View widest_view() const;
 };
 
-/// "view 'AP': ", before what is wrong with it.
+/// Prefix of messages about a view: "view 'AP': ".
 std::string view_name(const RegistrationView& view);
 
 /// Everything that does not change between the starts of one case.

@@ -37,8 +37,8 @@ struct RegistrationCells {
 /// Name of a column, which must last, and the text in it.
 using NamedCells = std::vector<std::pair<std::string_view, std::string>>;
 
-/// A row in the order of the columns: the contract's, and what a program adds to them behind the
-/// stop reason and before the time.
+/// A row in the order of the columns: the contract's, with a program's own columns after the stop
+/// reason and before the time.
 NamedCells registration_row(const RegistrationCells& row,
                             const NamedCells& behind_stop_reason,
                             const NamedCells& before_seconds);
@@ -49,7 +49,7 @@ NamedCells correction_cells(const std::optional<CorrectionReport>& correction);
 /// What the judge says of an end: means and lowest values over the views.
 NamedCells judge_cells(const ViewSummary& coarse, const ViewSummary& fine);
 
-/// Uncertainty: TREs foretold, confidence, inflation, distance of the chains, and the covariance's
+/// Uncertainty: predicted TREs, confidence, inflation, distance of the chains, and the covariance's
 /// upper triangle as `cov_rx_rx` (deg^2), `cov_rx_tx` (deg mm) ... `cov_tz_tz` (mm^2).
 NamedCells uncertainty_cells(const UncertaintyReport& report, double chain_distance_mm);
 

@@ -83,14 +83,14 @@ std::string parameters_line(const PoseParameters& parameters) {
 /// "by 2 ray-cast DRRs per view, which moved the end 0.041 mm; it stands still"
 std::string correction_text(const CorrectionReport& correction) {
   if (correction.casts == 0)
-    return "no: the search before had not converged, or no evaluation was left";
+    return "no: the search before it did not converge, or --max-evaluations was used up";
   const std::string casts = std::to_string(correction.casts) + " ray-cast DRR" +
                             (correction.casts == 1 ? "" : "s") + " per view";
   if (std::isnan(correction.moved_mm))
     return "no: " + casts + " led to a pose that is not admissible or has no value";
   return "by " + casts + ", which moved the end " + fixed_text(correction.moved_mm, 3) + " mm; " +
-         (correction.stood_still ? "it stands still"
-                                 : "it does not stand still, the last moved it " +
+         (correction.stood_still ? "it has settled"
+                                 : "it has not settled: the last one moved it " +
                                        fixed_text(correction.last_mm, 3) + " mm");
 }
 
@@ -383,7 +383,8 @@ void write_overlay(const RegistrationView& view,
 
 namespace {
 
-/// The pose's files under names that say whether it is one; those of an earlier run are gone.
+/// Removes an earlier run's pose files and writes the pose under names that say whether it was
+/// found.
 void write_pose_files(const RegistrationRecord& record, const std::filesystem::path& folder) {
   for (const char* name : {"pose.toml", "result.tfm", "rejected-pose.toml"})
     remove_output(folder / name);
@@ -421,7 +422,7 @@ std::string write_run(const std::vector<RegistrationRecord>& records,
                       const RunDescription& run,
                       const std::filesystem::path& folder) {
   const RegistrationRecord& best = records[best_record(records)];
-  // What an earlier run left here is whole no more.
+  // From here on, results of an earlier run are incomplete.
   remove_output(folder / "result.json");
   std::ostringstream summary;
   const Judgement judgement = judgement_of(best);
@@ -465,7 +466,7 @@ std::string summary_text(const RegistrationRecord& record, const RegistrationPro
       << "similarity  " << fixed_text(result.similarity, 4) << '\n';
   if (std::isfinite(record.uncertainty.tre_95_mm) && std::isfinite(record.uncertainty.confidence))
     out << "uncertain   TRE below " << fixed_text(record.uncertainty.tre_95_mm, 2)
-        << " mm with 95 % if the pose is the right one, which it is with "
+        << " mm with 95 % probability if the pose is the right one; it is, with a probability of "
         << fixed_text(std::min(99.9, 100.0 * record.uncertainty.confidence), 1)
         << " % (docs/uncertainty.md)\n";
   if (record.errors.has_value())
@@ -476,7 +477,8 @@ std::string summary_text(const RegistrationRecord& record, const RegistrationPro
     out << "corrected   " << correction_text(*result.correction) << '\n';
   out << "stopped     " << to_string(result.stop_reason);
   if (result.stop_reason == StopReason::StartInadmissible)
-    out << " (" << result.rays_outside << " rays outside the field; 0: beyond its motion range)";
+    out << " (" << result.rays_outside
+        << " rays outside the field; 0 means that the start is beyond its motion range)";
   out << " after " << result.evaluations << " poses (" << result.inadmissible << " inadmissible), "
       << result.drr_count << " DRRs, " << fixed_text(result.seconds, 2) << " s\n";
   return out.str();

@@ -32,7 +32,7 @@ struct RegistrationRecord {
   ViewDiagnosis diagnosis;             ///< of a run's best record
   std::optional<TargetErrors> errors;  ///< when the gold pose is known
 
-  /// What the registration itself found; the rest follows from it once all are there.
+  /// What the registration itself found; the rest is derived once all records exist.
   auto members() { return std::tie(start_index, result, view_values, uncertainty); }
 };
 
@@ -56,8 +56,8 @@ struct RunDescription {
 
 /// result.json: verdict, poses as 4x4 (`room_from_ct`, which read_pose() reads) and as six
 /// parameters relative to the nominal pose about the ROI centre, uncertainty, similarity, counts,
-/// stop reason, trace, seconds, TRE, provenance. Numbers that do not exist are null. What is not
-/// found is no pose for read_pose(): its key is `rejected_room_from_ct`.
+/// stop reason, trace, seconds, TRE, provenance. Numbers that do not exist are null. A pose that is
+/// "not found" has the key `rejected_room_from_ct`, so that read_pose() does not take it.
 nlohmann::json result_json(const RegistrationRecord& record,
                            const RegistrationProblem& problem,
                            const RunDescription& run);
@@ -76,7 +76,7 @@ void write_overlay(const RegistrationView& view,
                    const std::filesystem::path& path);
 
 /// result.json, pose.toml, result.tfm, VIEW-overlay.png and reproduce.sh in `folder`, result.json
-/// last: when it is there, all are. Of what is not found there is no result.tfm, and
+/// last: when it is there, all are. A result that is "not found" gets no result.tfm, and
 /// rejected-pose.toml instead of pose.toml, so that no script takes its pose for a result.
 void write_result_files(const RegistrationRecord& record,
                         const RegistrationProblem& problem,
@@ -90,7 +90,7 @@ std::string write_run(const std::vector<RegistrationRecord>& records,
                       const RunDescription& run,
                       const std::filesystem::path& folder);
 
-/// Those that a run replaces in its folder, whatever the cameras' names.
+/// Names of files that a run replaces in its folder, whatever the cameras' names.
 std::vector<std::string> result_file_names();
 /// The pictures that it replaces, one per view.
 std::vector<std::string> overlay_file_names(const RegistrationProblem& problem);

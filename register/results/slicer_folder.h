@@ -11,8 +11,8 @@
 
 namespace af::registration {
 
-/// Writes into `folder`: ct-to-room.tfm (ITK transform, ct_from_room: applied to the CT it shows it
-/// in the room), fiducials.mrk.json (when the case has any) and target-box.mrk.json (Slicer
+/// Writes into `folder`: ct-to-room.tfm (ITK transform, ct_from_room: applied to the CT, it shows
+/// the CT in the room), fiducials.mrk.json (when the case has any) and target-box.mrk.json (Slicer
 /// markups, ct frame, LPS mm), per view xray-CAMERA.nrrd and drr-CAMERA.nrrd (whole detector, as
 /// attenuation, placed on the detector in the room, LPS mm), and README.md, which says where the CT
 /// is and how to load all. \test SlicerFiles.AreWhatItkAndJsonReadBack

@@ -11,8 +11,8 @@ namespace af::registration {
 ///
 /// over the N pixels where the gradients (Sobel) of both images are longer than the medians of
 /// their lengths; angle_i in rad between the two gradients, N_low half of the used pixels. At most
-/// 1. It knows directions only: no gain, no offset, no rising change of the contrast's strength
-/// enters. \test SimilarityMeasures.GainAndOffsetDoNotCountWhereTheyAreEliminated
+/// 1. Only directions count: gain, offset and rising changes of contrast have no effect.
+/// \test SimilarityMeasures.GainAndOffsetDoNotCountWhereTheyAreEliminated
 class GradientOrientation final : public SimilarityMeasure {
  public:
   /// InputError as GradientReference.

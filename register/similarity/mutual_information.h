@@ -19,7 +19,7 @@ struct JointEntropies {
   double joint = 0.0;
 };
 
-/// What a similarity makes of the entropies, and its derivatives by those of DRR and pair.
+/// A similarity computed from the entropies, and its derivatives by the DRR's and the joint one.
 struct EntropyScore {
   double value = 0.0;
   double by_drr = 0.0;
@@ -88,8 +88,8 @@ class MutualInformation final : public JointHistogramMeasure {
 ///
 ///     NMI = (H(x) + H(d)) / H(x, d)   in [1, 2],
 ///
-/// 1 when the images know nothing of each other (and when both are constant), 2 when each is a
-/// function of the other. Less than MI it rewards the mere overlap of varied regions.
+/// 1 when the images are independent (and when both are constant), 2 when each is a function of the
+/// other. It rewards the mere overlap of varied regions less than MI does.
 /// \test NormalizedMutualInformation.IsTwoForAnImageWithItself
 class NormalizedMutualInformation final : public JointHistogramMeasure {
  public:

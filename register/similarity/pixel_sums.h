@@ -52,7 +52,7 @@ double centered_gram_product(const GramSums& sums, int a, int b);
 /// `smallest_square`.
 NormalEquations correlation_normal_equations(const GramSums& sums, double smallest_square);
 
-/// The same with 0 where correlate() has it: where the DRR is constant but for rounding.
+/// The same, but 0 where correlate() gives 0: where the DRR is constant up to rounding.
 NormalEquations correlation_normal_equations(const GramSums& sums);
 
 /// 1 where a pixel counts, 0 elsewhere; empty when all do.

@@ -11,9 +11,9 @@ namespace af::registration {
 ///     RG = 1 - sum rho(x_i - a d_i) / sum rho(x_i),   rho(r) = r^2 / (s^2 + r^2),
 ///
 /// over Sobel's derivatives along columns and rows at the used pixels. The gain a >= 0 of the view
-/// is eliminated: from least squares, refined by a fixed number of reweighted steps. 1 is a
-/// perfect DRR, 0 what no DRR at all explains (a = 0), and what occluders, which a DRR cannot know,
-/// contribute is bounded. s = `residual_scale` times the median length of the X-ray's gradients.
+/// is eliminated: from least squares, refined by a fixed number of reweighted steps. A perfect DRR
+/// has 1, no DRR at all (a = 0) has 0, and the contribution of occluders, which a DRR cannot show,
+/// is bounded. s = `residual_scale` times the median length of the X-ray's gradients.
 /// \test RobustGradient.OccludersCostABoundedPrice
 class RobustGradient final : public SimilarityMeasure {
  public:

@@ -14,7 +14,7 @@ namespace af::registration {
 ///
 ///     SSD = -1/n sum (x - d)^2.
 ///
-/// It asks for equal scales: only for X-rays that are line integrals of the same attenuation.
+/// It needs equal scales: X-rays must be line integrals of the same attenuation.
 /// \test SumOfSquaredDifferences.OfAShiftedImageIsMinusTheSquaredShift
 class SumOfSquaredDifferences final : public SimilarityMeasure {
  public:

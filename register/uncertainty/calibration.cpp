@@ -32,10 +32,9 @@ constexpr double kConfidenceAtOnce = -0.83;
 constexpr double kConfidenceByFine = 18.71;
 constexpr double kConfidenceByTre = -1.28;
 
-/// Shares below are as good as none.
+/// Smaller shares are treated as this one.
 constexpr double kLeastShare = 0.05;
-/// The nearest and the farthest TRE that tell more than the ones before; one that is not foretold
-/// is as good as the farthest.
+/// Predicted TREs are clamped to this range; a missing one counts as the farthest.
 constexpr double kNearMm = 0.001;
 constexpr double kFarMm = 20.0;
 

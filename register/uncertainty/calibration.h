@@ -10,9 +10,9 @@
 
 namespace af::registration {
 
-/// What a covariance is multiplied by, for ends of a measure whose judge says that the pose
-/// explains these shares of the X-rays' gradients: what no rigid pose explains, as moved anatomy,
-/// pulls the optimum aside more than its scatter tells. NaN where nothing can be judged.
+/// Factor by which to multiply a covariance, given the measure and the shares of the X-rays'
+/// gradients that the pose explains: content that no rigid pose explains, such as moved anatomy,
+/// shifts the optimum more than its scatter shows. NaN where nothing can be judged.
 /// \test Calibration.WidensWhatThePoseDoesNotExplain
 double covariance_inflation(const std::string& similarity, std::span<const ViewValue> view_values);
 

@@ -30,7 +30,7 @@ PoseMatrix calibration_covariance(const PoseInformation& information,
                                   const Eigen::Vector3d& isocenter_point,
                                   double shift_px);
 
-/// TRE that a covariance foretells.
+/// TRE that a covariance predicts.
 struct PredictedTre {
   /// Root of the expected squared distance, mean over the points. NaN for a covariance that is not
   /// finite.
@@ -48,7 +48,7 @@ PredictedTre predicted_tre(const PoseMatrix& covariance,
 
 /// Upper triangle, row by row, in deg and mm.
 std::array<double, 21> in_deg_mm(const PoseMatrix& covariance);
-/// The matrix (rad and mm) again.
+/// The inverse of in_deg_mm(): the matrix in rad and mm.
 PoseMatrix from_deg_mm(const std::array<double, 21>& upper_triangle);
 
 /// Squared Mahalanobis distance of an error (rad and mm); below kPoseRegion95 inside the 95 %

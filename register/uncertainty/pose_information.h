@@ -31,8 +31,8 @@ std::optional<PoseInformation> information_at(MultiViewObjective& objective,
 /// Long enough to average over a field's nodes, short beside the way over which curvatures change.
 inline constexpr double kInformationStepMm = 0.2;
 
-/// Where the objective bends less than this share of its strongest bend, in scaled parameters, it
-/// is taken to bend so: differences cannot tell it from a straight line, or one that bends upwards.
+/// Curvatures below this share of the largest, in scaled parameters, are raised to it: differences
+/// cannot tell them from zero or from an upward bend.
 inline constexpr double kLeastRelativeCurvature = 1e-2;
 
 /// The matrix, in scaled parameters, with its eigenvalues no less than kLeastRelativeCurvature of

@@ -35,8 +35,8 @@ void UncertaintyOptions::describe(Fields& field) {
         "some 13 DRRs with derivatives per registration");
   field("calibration_error_px",
         calibration_error_px,
-        "Error of the cameras' calibration that covariances are to contain: the standard deviation "
-        "of every view's shift along its columns and rows, px of the detector. X-rays do not tell "
+        "Error of the cameras' calibration to include in covariances: the standard deviation "
+        "of every view's shift along its columns and rows, px of the detector. X-rays cannot show "
         "it")
       .at_least(0.0)
       .finite();
@@ -66,8 +66,8 @@ UncertaintyEstimator::UncertaintyEstimator(std::shared_ptr<const RegistrationPro
   try {
     ends_ = std::make_unique<RegistrationRunner>(problem_, stages, std::move(pool));
   } catch (const InputError&) {
-    // The measure that stands for one without derivative refuses X-rays without gradients over most
-    // of the region, which the registration's own measure may take.
+    // rg, which replaces measures without derivative, rejects X-rays without gradients over most of
+    // the region; the registration's own measure may accept them.
   }
 }
 

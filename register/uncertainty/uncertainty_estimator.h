@@ -21,28 +21,29 @@ struct UncertaintyOptions {
   void describe(Fields& field);
 };
 
-/// Says how far the end of a registration may be from the truth (docs/uncertainty.md): the
-/// sandwich covariance of the stage that it ended with, what the cameras' calibration adds, widened
-/// as measured registrations ask for, the TRE that follows, and the confidence that it succeeded.
-/// Where the stage's measure has no derivative (tncc, gd, pi, entropy, go), rg stands for it. For
-/// one thread at a time. \test UncertaintyEstimator.ForetellsTheSpreadOfNoisyXrays
+/// Says how far the end of a registration may be from the truth (docs/uncertainty.md): the sandwich
+/// covariance of the stage that it ended with, what the cameras' calibration adds, widened by a
+/// factor calibrated on measured registrations, the resulting TRE, and the confidence that it
+/// succeeded. Where the stage's measure has no derivative (tncc, gd, pi, entropy, go), rg stands
+/// for it. For one thread at a time. \test UncertaintyEstimator.ForetellsTheSpreadOfNoisyXrays
 class UncertaintyEstimator {
  public:
   /// `problem` and `method`: as for the RegistrationRunner of the results. Reports stay empty when
   /// uncertainty is left out, when the method looks within silhouettes, and when X-rays have no
-  /// gradients that the curvature could be of.
+  /// gradients to measure the curvature.
   UncertaintyEstimator(std::shared_ptr<const RegistrationProblem> problem,
                        const RegistrationOptions& method,
                        const UncertaintyOptions& options,
                        std::shared_ptr<ThreadPool> pool = nullptr);
 
-  /// `view_values`: of PoseExaminer, at the result's end. Only NaN where there is no end, or no
-  /// motion to both sides of it is admissible; the confidence is 0 where nothing was found.
+  /// `view_values`: of PoseExaminer, at the result's end. Covariance and TREs are NaN when there is
+  /// no end, or when some motion from it is admissible to neither side; the confidence is 0 when
+  /// nothing was found.
   [[nodiscard]] UncertaintyReport report(const RegistrationResult& result,
                                          std::span<const ViewValue> view_values);
 
  private:
-  /// Also the TRE that the sandwich alone foretells, rms, mm; NaN where there is none.
+  /// Returns the rms TRE (mm) that the sandwich alone predicts; NaN where there is none.
   double add_covariance(const RegistrationResult& result,
                         std::span<const ViewValue> view_values,
                         UncertaintyReport& report);

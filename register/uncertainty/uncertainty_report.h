@@ -15,11 +15,11 @@ struct UncertaintyReport {
   static constexpr std::size_t kCovarianceSize = 21;
 
   /// Upper triangle, row by row, of the covariance of (rx, ry, rz, tx, ty, tz) in deg and mm: the
-  /// true pose is x_room -> p + t + Rz Ry Rx (x_room - p) after the pose that was found, p being
-  /// where that puts the ROI centre, axes the room's.
+  /// true pose is the found pose followed by x_room -> p + t + Rz Ry Rx (x_room - p), about the
+  /// room's axes, where p is the ROI centre at the found pose.
   std::array<double, kCovarianceSize> covariance_deg_mm = filled_with_nan();
   double tre_rms_mm = kNone;  ///< the root of the expected mean squared TRE over the target box
-  double tre_95_mm = kNone;   ///< the TRE stays below with a probability of 0.95
+  double tre_95_mm = kNone;   ///< the TRE is below this with probability 0.95
   double inflation = kNone;   ///< what calibration multiplied the covariance by
   double confidence = kNone;  ///< probability that the registration succeeded (TRE below 2.5 mm)
 

@@ -9,10 +9,10 @@
 
 namespace af::registration {
 
-/// Judges poses view by view, whatever the method that found them: by the judge of portfolios
-/// (RobustGradient), at its own level, or the coarsest that the problem's views have, and at level
-/// 0. Within silhouettes, see ViewValue. For one thread at a time. \test
-/// PoseExaminer.TellsARightPoseFromAWrongOneInEveryView
+/// Judges poses view by view, independently of the method that found them, with the judge of
+/// portfolios (RobustGradient) at level 0 and at the judge's own level, or the coarsest that the
+/// views have. For silhouettes see ViewValue. For one thread at a time.
+/// \test PoseExaminer.TellsARightPoseFromAWrongOneInEveryView
 class PoseExaminer {
  public:
   /// The level of the image pyramids that it looks at where views have it.

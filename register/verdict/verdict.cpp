@@ -19,7 +19,7 @@ std::string share_text(double value, double limit) {
   return value_text(value) + " of 1 (right poses have " + value_text(limit) + " or more)";
 }
 
-/// What stop reasons say of an end that no view speaks against.
+/// Why the stop reason makes an end doubtful, even if no view does.
 std::optional<std::string> doubt_of(StopReason stop_reason) {
   switch (stop_reason) {
     case StopReason::PinnedAtLimit:
@@ -41,7 +41,7 @@ std::optional<std::string> failure_of(StopReason stop_reason) {
     case StopReason::NonFiniteSimilarity:
       return "the similarity is not a finite number";
     case StopReason::NoBetterThanNoDrr:
-      return "no pose explains the X-rays' gradients better than no DRR at all";
+      return "no DRR, at any pose tried, explains any of the X-rays' gradients";
     default:
       return std::nullopt;
   }
@@ -64,8 +64,9 @@ Judgement judged_values(const ViewSummary& coarse,
             little + value_text(fine.lowest) + " of 1 in detail (" +
                 value_text(limits.fine_of_found) + " or more leaves no doubt)"};
   return {Verdict::Found,
-          "of every X-ray's gradients the pose explains " + value_text(coarse.lowest) +
-              " of 1 or more, " + value_text(fine.lowest) + " in detail"};
+          "the pose explains at least " + value_text(coarse.lowest) +
+              " (of 1) of each X-ray's gradients, and at least " + value_text(fine.lowest) +
+              " in detail"};
 }
 
 /// "X-ray 2 of 2 cannot be judged: ..."; nothing where every view has both values.

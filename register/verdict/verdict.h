@@ -21,9 +21,9 @@ struct Judgement {
   std::string reason;
 };
 
-/// The shares of an X-ray's gradients over twice the region that the DRR at a pose explains, at the
-/// judge's coarse level and at the renderer's own: 0 is what no DRR explains, 1 is all, NaN where
-/// it cannot be judged.
+/// How much of an X-ray's gradients, over twice the region, the DRR at a pose explains, at the
+/// judge's coarse level and at the renderer's own: 0 as without a DRR, 1 all, NaN where it cannot
+/// be judged.
 struct ViewValue {
   double coarse = 0.0;
   double fine = 0.0;
@@ -40,7 +40,7 @@ struct ViewValue {
 inline constexpr double kLeastCoarseMean = 0.2;
 inline constexpr double kLeastFineMean = 0.08;
 
-/// Every view of a found pose has these values or more: of wrong poses one view or both have less.
+/// Every view of a found pose reaches these values; for wrong poses, at least one view does not.
 inline constexpr double kLeastCoarseOfFound = 0.3;
 inline constexpr double kLeastFineOfFound = 0.3;
 
@@ -62,11 +62,11 @@ inline constexpr VerdictLimits kSilhouetteLimits = {0.2, 0.12, 0.3, 0.23};
 /// By which limits values are judged.
 const VerdictLimits& limits_of(std::span<const ViewValue> values);
 
-/// A view disagrees with the others when its coarse or its fine value is less than this share of
-/// their highest, and less than that of a found pose, which the highest is not.
+/// A view disagrees when its coarse or fine value is below both the limit of a found pose and this
+/// share of the other views' highest value, provided that this highest value reaches the limit.
 inline constexpr double kLeastShareOfOthers = 0.5;
 
-/// The verdict by why the search stopped and by what the views are worth at its end.
+/// The verdict from the search's stop reason and the views' values at its end.
 Judgement judged_end(StopReason stop_reason, std::span<const ViewValue> values);
 
 /// Whether the other views agree with the pose much better than this one.

@@ -16,8 +16,8 @@
 namespace af::registration {
 namespace {
 
-/// So much more of the gradients must be explained, on average over the views, for a change to be
-/// named: a wrong change gains next to nothing.
+/// A change is reported if it explains this much more of the gradients, on average over the views;
+/// a wrong change gains next to nothing.
 constexpr double kLeastGain = 0.15;
 
 std::string percent_text(double share) {

@@ -18,9 +18,9 @@ struct ViewDiagnosis {
 /// Looks at the values that PoseExaminer gave the views at `room_from_ct`. Where one of them is
 /// low, the X-rays are tried inverted, mirrored left-right and up-down, turned by 180 degrees and
 /// exchanged, one change at a time, each with a coarse registration from the start and from the
-/// end. What would explain far more is said; values within silhouettes are not compared. Views with
-/// the same X-ray are always told. Nothing of `problem` changes. \test
-/// ViewDiagnosis.NamesTheViewAndWhatWouldMendIt
+/// end. Reports a change that would explain far more; values within silhouettes are not compared.
+/// Always reports views with the same X-ray. Nothing of `problem` changes.
+/// \test ViewDiagnosis.NamesTheViewAndWhatWouldMendIt
 ViewDiagnosis diagnose_views(const std::shared_ptr<const RegistrationProblem>& problem,
                              const RigidTransform& start_room_from_ct,
                              const RigidTransform& room_from_ct,

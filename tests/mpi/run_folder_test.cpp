@@ -113,7 +113,7 @@ TEST(RunFolder, ASecondRunIsRefusedOnEveryRankAndLeavesTheFirstItsProgress) {
     ADD_FAILURE() << "opened on rank " << world.rank();
   } catch (const Error& error) {
     EXPECT_EQ(error.exit_code(), ExitCode::Input);
-    EXPECT_THAT(error.what(), testing::HasSubstr("another job writes it"));
+    EXPECT_THAT(error.what(), testing::HasSubstr("another job is writing it"));
   }
   EXPECT_EQ(done_in(first), 0u);
 }

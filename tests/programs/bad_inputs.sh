@@ -193,7 +193,7 @@ of_rig 4 'TPosition has four lines' '.rad cut short' cut.rad
 printf '%s0 1 0 -72\n0 0 0 1\n' "${rad/-650/-1e300}" >far.rad
 of_rig 3 'source_point' '.rad with the source at 1e300 mm' far.rad
 of_rig 3 'must be above 0' 'DiffDRR with pixels of -3 mm' "$(edited camera-diffdrr.txt '0,/^delx = .*/s//delx = -3/')"
-of_rig 3 'within 1 and 32768' 'DiffDRR of 2e9 rows' "$(edited camera-diffdrr.txt '0,/^height = .*/s//height = 2000000000/')"
+of_rig 3 'between 1 and 32768' 'DiffDRR of 2e9 rows' "$(edited camera-diffdrr.txt '0,/^height = .*/s//height = 2000000000/')"
 of_rig 3 'neighbours different' 'DiffDRR with an unknown convention' "$(edited camera-diffdrr.txt '0,/^convention = .*/s//convention = "XXL"/')"
 of_rig 4 'edited-rig.toml' 'not TOML' "$(edited rig.toml '1s/^.*$/= 3/')"
 row 3 "valid/study.toml: --camera = OB: must be one that case 'ellipsoids' has: AP, LAT" 'camera that the case does not have' \
@@ -205,11 +205,11 @@ of_design 2 '--max-field-size' 'size that is no number' --max-field-size much
 of_design 2 '--max-field-size' 'size of an unknown unit' --max-field-size 8XB
 of_design 2 '--max-field-size' 'size beyond all numbers' --max-field-size 99999999999GB
 of_design 2 '--max-field-size' 'empty size' --max-field-size ''
-of_design 3 'target_psnr_db = 1000: must be within 10 and 90' 'PSNR beyond 16 bits' --target-psnr-db 1000
+of_design 3 'target_psnr_db = 1000: must be between 10 and 90' 'PSNR beyond 16 bits' --target-psnr-db 1000
 of_design 2 'must be a finite number' 'PSNR that is no number' --target-psnr-db nan
 of_design 3 'max_drr_ms = -1: must be above 0' 'DRR in less than no time' --max-drr-ms -1
-of_design 3 'no field keeps at least 89 dB' 'PSNR that no design gives' --target-psnr-db 89
-of_design 3 'no field keeps at most 0.001 MB; the smallest file' 'size that no field has' --max-field-size 1kB
+of_design 3 'no field meets the limits: at least 89 dB' 'PSNR that no design gives' --target-psnr-db 89
+of_design 3 'no field meets the limits: at most 0.001 MB; the smallest file' 'size that no field has' --max-field-size 1kB
 of_design 3 '; the fastest DRR: ' 'time that no DRR keeps' --max-drr-ms 0.000001
 of_design 3 "preset = 'nonsense': must be one of paper" 'unknown preset' --preset nonsense
 of_design 2 '--preset excludes' 'preset and budget' --preset paper --max-field-size 8MB
@@ -217,7 +217,7 @@ of_design 3 'look_up = nearest: must be linear or cubic' 'look-up that no field 
 of_projections() { row "$1" "$2" "$3" "${precompute[@]}" --study valid/study.toml --camera AP --projections "${@:4}"; }
 of_projections 4 'nowhere.toml' 'projections that are not there' nowhere.toml
 of_projections 3 'must be at least 3' 'projections of two views' valid/study.toml
-of_projections 3 'projections: show all' 'projections for a field of bone' valid/study.toml --material bone
+of_projections 3 'projections: must not be given with material' 'projections for a field of bone' valid/study.toml --material bone
 row 2 '--projections' 'case of no projections' "${precompute[@]}" --study valid/study.toml --camera AP --projections-case x
 row 3 "XY" 'unknown camera' "${precompute[@]}" --study valid/study.toml --camera XY
 
@@ -225,7 +225,7 @@ printf -- '--- study ---\n'
 of_study 3 'nominal_room_from_ct' 'pose not rigid' "$(edited study.toml 's/^nominal_room_from_ct = .*/nominal_room_from_ct = [[1,0,0,0],[0,2,0,0],[0,0,1,0],[0,0,0,1]]/')"
 of_study 3 'roi_px' 'ROI off the detector' "$(edited study.toml '0,/^roi_px = .*/s//roi_px = [40, 40, 20, 20]/')"
 of_study 3 'target_box_ct_mm' 'target box to 1e308' "$(edited study.toml 's/^target_box_ct_mm = .*/target_box_ct_mm = [[-1e308,0,0],[1,1,1]]/')"
-of_study 3 'none beyond 1e+06' 'pose 1e300 mm away' "$(edited study.toml 's/^nominal_room_from_ct = .*/nominal_room_from_ct = [[1,0,0,1e300],[0,1,0,0],[0,0,1,0],[0,0,0,1]]/')"
+of_study 3 'each within +-1e+06' 'pose 1e300 mm away' "$(edited study.toml 's/^nominal_room_from_ct = .*/nominal_room_from_ct = [[1,0,0,1e300],[0,1,0,0],[0,0,1,0],[0,0,0,1]]/')"
 of_study 3 'must vary' 'ROI of one pixel at the corner' "$(edited study.toml 's/^roi_px = .*/roi_px = [47, 47, 1, 1]/')"
 of_study 3 'roi_px' 'ROI of huge numbers' "$(edited study.toml '0,/^roi_px = .*/s//roi_px = [2147483647, 0, 2147483647, 1]/')"
 of_study 3 'collinear' 'collinear fiducials' "$(edited study.toml 's/^name = .*/&\nfiducials_ct_mm = [[0,0,0],[1,1,1],[2,2,2],[3,3,3]]/; s/^roi_px = .*/&\nfiducials_px = [[10,10],[20,20],[30,30],[40,41]]/')"
@@ -365,7 +365,7 @@ of_scan 4 'p35.png' 'a scan without images' valid/scan.toml
 of_scan 3 'size_px is missing' 'a scan without its size' "$(edited scan.toml '/^size_px/d')"
 of_scan 3 'must go all the way round' 'a scan of half a circle' "$(edited scan.toml 's/^step_deg.*/step_deg = 5.0/')"
 of_scan 3 'source_to_axis_mm' 'a source at 1e300 mm' "$(edited scan.toml 's/^source_to_axis_mm.*/source_to_axis_mm = 1e300/')"
-of_scan 3 'must hold {} once' 'a file pattern with half an index' "$(edited scan.toml 's/p[{][}]/p{/')"
+of_scan 3 'must contain {} once' 'a file pattern with half an index' "$(edited scan.toml 's/p[{][}]/p{/')"
 of_scan 4 'valid/p.png' 'a stack of views that is not there' "$(edited scan.toml 's/p[{][}]/p/')"
 of_scan 4 'edited-scan.toml' 'a scan that is not TOML' "$(edited scan.toml '1s/^.*$/= 3/')"
 

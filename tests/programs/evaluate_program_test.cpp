@@ -295,7 +295,7 @@ TEST_F(EvaluateProgram, ASecondRunInAFolderIsRefused) {
        {"registration --study " + path("study.toml") + fields(),
         "similarity-curves --study " + path("study.toml") + fields(),
         "image-quality --field " + path("LAT.af.h5") + " --ct " + path("ct.nii.gz")})
-    expect_refused(evaluate(arguments + " -o " + path("taken")), 3, "another job writes it");
+    expect_refused(evaluate(arguments + " -o " + path("taken")), 3, "another job is writing it");
 }
 
 /// Registrations that last some seconds, under mpirun; what it says goes to said.txt.
@@ -507,7 +507,7 @@ TEST_F(EvaluateProgram, MeasuresErrorsAgainstFractionsOfACell) {
                  3,
                  "must be field or both");
   expect_refused(
-      evaluate(arguments + " -o " + path("cells.csv")), 3, "must name the table in Markdown");
+      evaluate(arguments + " -o " + path("cells.csv")), 3, "must name the Markdown file");
 }
 
 TEST_F(EvaluateProgram, BuildsTheFieldsOfASweepOnceAndReusesThem) {
@@ -619,7 +619,7 @@ TEST_F(EvaluateProgram, ComparesRunsInOneTable) {
   expect_refused(evaluate("compare " + path("nowhere")), 4, "nowhere");
   expect_refused(evaluate("compare " + path("methods") + " -o " + path("methods/table.csv")),
                  3,
-                 "must name the table in Markdown");
+                 "must name the Markdown file");
 }
 
 TEST_F(EvaluateProgram, CorrectsLookedUpEndsAndMeasuresHowFarMethodsEndApart) {

@@ -123,7 +123,7 @@ TEST_F(Faults, ASecondJobIsRefusedAndToldOfTheFirst) {
   for (const pid_t rank : first.ranks()) kill(rank, SIGCONT);
   EXPECT_EQ(second.exit_code, 3) << second.output;
   EXPECT_THAT(second.output,
-              AllOf(HasSubstr("another job writes it: process "), HasSubstr(", since 20")));
+              AllOf(HasSubstr("another job is writing it: process "), HasSubstr(", since 20")));
   EXPECT_EQ(first.wait(kEndsWithin), 0) << said();
   EXPECT_FALSE(fs::exists(field().string() + ".lock"));
 }

@@ -171,7 +171,7 @@ TEST_F(SpectrumPrograms, RefuseWhatDoesNotFit) {
   const std::string lonely = "af-drr --field " + path("lonely.af.h5");
   expect_refused(lonely + kTube + out, 4, "lonely.bone.af.h5");
   fs::copy_file(path("AP.af.h5"), path("lonely.bone.af.h5"));
-  expect_refused(lonely + kTube + out, 4, "of all of it");
+  expect_refused(lonely + kTube + out, 4, "one of all of it");
   write_ct(box_phantom(test::five_ellipsoids().grid, {8, 8, 8}, {24, 24, 24}, 40),
            path("water.nii.gz"));
   expect_refused("af-precompute --ct " + path("water.nii.gz") + " --rig " + path("rig.toml") +
@@ -195,7 +195,7 @@ TEST_F(SpectrumPrograms, RefuseBoneOfAnotherCt) {
       path("mixed.bone.af.h5"));
   expect_refused("af-drr --field " + path("mixed.af.h5") + kTube + " -o " + path("refused.mha"),
                  4,
-                 "that of the field of all");
+                 "the CT of the field beside it");
 }
 
 TEST_F(SpectrumPrograms, EvaluationTakesTheTubeToo) {

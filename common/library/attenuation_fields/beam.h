@@ -3,8 +3,8 @@
 
 namespace attenuation_fields {
 
-/// The X-rays that DRRs are of. Unless told otherwise they are of one energy, the effective one of
-/// the CT's HU scale, and without scatter.
+/// The X-rays that DRRs simulate; by default of one energy, the effective one of the CT's HU scale,
+/// and without scatter.
 struct Beam {
   double tube_kvp = 0.0;            ///< tube voltage, kV; 0: one energy
   double aluminium_mm = 3.0;        ///< total filtration, with a tube voltage

@@ -31,8 +31,8 @@ class ATTENUATION_FIELDS_API Ct {
   /// A DICOM folder, NIfTI, MetaImage or NRRD file. `series_uid` chooses one of several DICOM
   /// series. InputError, FileError, as the programs.
   static Ct read(const std::filesystem::path& path, const std::string& series_uid = "");
-  /// Voxels that exist already, i fastest; `owner` keeps them, and nobody changes them. InputError
-  /// when the grid has not as many or is no grid.
+  /// Uses voxels that exist already, i fastest; `owner` keeps them, and nobody may change them.
+  /// InputError when their number does not fit the grid, or the grid is invalid.
   static Ct from_voxels(const CtGrid& grid,
                         std::shared_ptr<const void> owner,
                         std::span<const std::int16_t> hu);

@@ -39,8 +39,8 @@ struct RegistrationOptions {
   std::string ct_series_uid = {};
   std::uint64_t seed = 1;
   bool no_uncertainty = false;  ///< no covariance and no confidence: all of Uncertainty is NaN
-  double calibration_error_px = 0.0;  ///< of every view's shift, that covariances are to contain
-  int threads = 1;                    ///< that one registration spreads over; 0: every processor
+  double calibration_error_px = 0.0;  ///< of every view's shift; covariances include it
+  int threads = 1;                    ///< for one registration; 0: every processor
 };
 
 /// Shares of an X-ray's gradients that the DRR at a pose explains, 0 to 1; NaN: not judged.
@@ -114,8 +114,8 @@ class ATTENUATION_FIELDS_API RegistrationCase {
   /// Mean distance (mm) over the target box between where a pose and the gold pose put its points.
   [[nodiscard]] std::optional<double> tre_mm(const Pose& pose) const;
 
-  /// The pose that the landmarks give which the study states in CT and X-rays. nullopt when it
-  /// states none; InputError when no pose fits them.
+  /// The pose from the landmarks that the study states in CT and X-rays. nullopt when it states
+  /// none; InputError when no pose fits them.
   [[nodiscard]] std::optional<Pose> landmark_start() const;
   /// Where af-register starts when it is given no start: at landmark_start(), else at the nominal
   /// pose. InputError as landmark_start().
@@ -124,9 +124,9 @@ class ATTENUATION_FIELDS_API RegistrationCase {
   /// Registers from a start. `start_index` is a key of random numbers. What af-register writes into
   /// result.json, to the bit (its seconds excepted).
   [[nodiscard]] Registration run(const Pose& start, std::int64_t start_index = 0) const;
-  /// From many starts, by their positions; verdicts as in registrations.csv, without what
-  /// af-register finds out about the X-rays of the best one: that may turn its verdict from found
-  /// to doubtful. run() finds it out.
+  /// Registers from many starts; the start_index of each is its position. Verdicts are as in
+  /// registrations.csv, but X-rays are not examined, as af-register does for the best result and
+  /// run() for its own: that may turn the verdict from found to doubtful.
   [[nodiscard]] std::vector<Registration> run_all(std::span<const Pose> starts) const;
   /// The similarity that results are compared by, at a pose; nullopt where it is inadmissible.
   [[nodiscard]] std::optional<double> similarity(const Pose& pose) const;

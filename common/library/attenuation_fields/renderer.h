@@ -40,7 +40,7 @@ class ATTENUATION_FIELDS_API Renderer {
   /// Threads that share a large DRR, or the DRRs of a batch.
   [[nodiscard]] int threads() const;
 
-  // NOLINTBEGIN(modernize-use-nodiscard): who knows that no ray is outside need not ask how many.
+  // NOLINTBEGIN(modernize-use-nodiscard): callers who know no ray is outside may ignore the count.
   /// Total attenuation of every pixel's ray (dimensionless), row by row, into pixel_count() values.
   /// Returns the number of rays outside.
   std::int64_t drr(const Pose& pose, std::span<float> total_attenuation) const;

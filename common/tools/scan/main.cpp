@@ -16,7 +16,7 @@ int main(int argc, char** argv) {
   CLI::App app{
       "Makes a registration study of real X-rays from a circular cone-beam scan: finds the true "
       "geometry from the even views, reconstructs a CT from them, and takes odd views as X-rays. "
-      "The true pose of every X-ray is the identity, and how true is measured by the odd views."};
+      "The true pose of every X-ray is the identity; the odd views show how accurate that is."};
   cli::bind_options(app, options);
   const std::string command_line = cli::command_line(argc, argv);
   return cli::app_main(app, argc, argv, [&](const Communicator& world) {

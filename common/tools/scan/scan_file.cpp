@@ -60,7 +60,7 @@ std::optional<int> get_index(TomlTableReader& reader,
   constexpr int kMost = 100000;
   if (*value != std::floor(*value) || *value < least || *value > kMost) {
     reader.add_problem(key,
-                       "must be a whole number within " + std::to_string(least) + " and 100000");
+                       "must be a whole number between " + std::to_string(least) + " and 100000");
     return std::nullopt;
   }
   return static_cast<int>(*value);
@@ -107,9 +107,11 @@ std::vector<double> read_angles_file(const std::filesystem::path& path) {
 std::vector<double> read_listed_angles(TomlTableReader& reader,
                                        const std::filesystem::path& folder) {
   for (const char* const key : {"view_count", "step_deg", "first_angle_deg"})
-    if (reader.has(key)) reader.add_problem(key, "must not stand beside a list of angles");
+    if (reader.has(key))
+      reader.add_problem(key, "must not be given together with a list of angles");
   if (reader.has("angles_deg") && reader.has("angles_file"))
-    reader.add_problem("angles_file", "must not stand beside angles_deg, which says the same");
+    reader.add_problem("angles_file",
+                       "must not be given together with angles_deg, which says the same");
   if (const auto listed = reader.get_number_list("angles_deg", Presence::Optional)) return *listed;
   const auto file = reader.get_string("angles_file", Presence::Optional);
   return file ? read_angles_file(folder / *file) : std::vector<double>{};
@@ -125,7 +127,7 @@ void read_angles(TomlTableReader& reader, const std::filesystem::path& folder, C
   const auto step_deg = get_number(reader, "step_deg", Presence::Required);
   const auto first_deg = get_number(reader, "first_angle_deg", Presence::Optional);
   if (step_deg && (*step_deg == 0.0 || std::abs(*step_deg) > 90.0))
-    reader.add_problem("step_deg", "must be within -90 and 90 degrees, and not 0");
+    reader.add_problem("step_deg", "must be between -90 and 90 degrees, and not 0");
   for (int view = 0; view < count.value_or(0); ++view)
     scan.angles_rad.push_back((first_deg.value_or(0.0) + view * step_deg.value_or(1.0)) *
                               kRadPerDeg);
@@ -135,9 +137,10 @@ void read_image_keys(TomlTableReader& reader, ScanFile& file) {
   file.files = reader.get_string("files", Presence::Required).value_or("{}");
   const bool has_braces = file.files.find_first_of("{}") != std::string::npos;
   if (has_braces && !index_place(file.files))
-    reader.add_problem("files",
-                       "must hold {} once, where the view's index stands; {:04} for four digits; a "
-                       "stack of all views has none");
+    reader.add_problem(
+        "files",
+        "must contain {} once in place of the view's index ({:04} for four digits), or, for a "
+        "stack of all views, no braces at all");
   if (file.is_stack() && reader.has("first_index"))
     reader.add_problem("first_index",
                        "is for files with an index; a stack's first image is the "
@@ -155,9 +158,9 @@ void read_image_keys(TomlTableReader& reader, ScanFile& file) {
   if (file.flat_level && !(*file.flat_level > file.dark_level))
     reader.add_problem("flat_level", "must be above dark_level: what the open beam counts");
   if (file.flat_level && file.flat)
-    reader.add_problem("flat", "must not stand beside flat_level, which says the same");
+    reader.add_problem("flat", "must not be given together with flat_level, which says the same");
   if (dark_level && file.dark)
-    reader.add_problem("dark", "must not stand beside dark_level, which says the same");
+    reader.add_problem("dark", "must not be given together with dark_level, which says the same");
   for (const char* const key : {"dark_level", "dark", "flat", "flat_level"})
     if (file.xray_domain == XrayDomain::Attenuation && reader.has(key))
       reader.add_problem(key, "is for xray_domain = \"intensity\" alone");

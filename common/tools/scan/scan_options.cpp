@@ -6,7 +6,9 @@
 namespace af::tools {
 
 void ScanOptions::describe(Fields& field) {
-  field("scan", scan, "scan.toml: geometry of a circular cone-beam scan, and which files it is in")
+  field("scan",
+        scan,
+        "scan.toml: geometry of a circular cone-beam scan, and the names of its image files")
       .input()
       .required();
   field("folder", folder, "Where the scan's images are; default: beside the scan's file");
@@ -57,7 +59,7 @@ void ScanOptions::describe(Fields& field) {
   field.start_group("Self-calibration");
   field("as_stated",
         is_as_stated,
-        "None: the stated geometry is exact, of a calibrated or simulated scanner");
+        "No self-calibration: the stated geometry is exact (a calibrated or simulated scanner)");
   field.part(calibration);
   field.start_group("Reconstruction");
   field.part(fdk);

@@ -100,19 +100,20 @@ void append_scan_problems(const SimulateOptions& options, std::vector<std::strin
   const ConeBeamOptions& scan = options.cone_beam;
   if (scan.views == 0) {
     if (!scan.elevations_deg.empty())
-      found.push_back("elevations_deg: are of a scan: they need --cone-beam");
+      found.push_back("elevations_deg: apply to scans only; give --cone-beam, too");
     return;
   }
   if (scan.orbit_deg == 0.0)
-    found.push_back("orbit_deg = 0: must not be 0, because the source goes round");
+    found.push_back("orbit_deg = 0: must not be 0, because the source must go round the CT");
   if (!options.stress.names.empty())
-    found.push_back("stress: is of studies; a scan's X-rays have the effects of Imaging alone");
+    found.push_back(
+        "stress: applies to studies only; a scan's X-rays have the Imaging effects alone");
   if (options.xray_format != "mha")
     found.push_back("xray_format = " + options.xray_format + ": a scan's X-rays are mha");
   for (const double elevation : scan.elevations_deg)
     if (!(std::abs(elevation) <= 80.0))
       found.push_back("elevations_deg = " + number_text(elevation) +
-                      ": must be within -80 and 80 degrees");
+                      ": must be between -80 and 80 degrees");
 }
 
 /// Studies are refused whose target box breaks the rule of target_box_problem().
@@ -156,9 +157,9 @@ std::vector<std::string> problems(const SimulateOptions& options) {
   std::vector<std::string> found = field_problems(options);
   if (found.empty()) found = problems(options.stress);
   if (options.phantom_options.has_metal && options.phantom.empty())
-    found.push_back("metal: needs a phantom; a CT has its own");
+    found.push_back("metal: applies to --phantom only; a CT has its own metal or none");
   if (options.phantom_options.anatomy_seed && options.phantom.empty())
-    found.push_back("anatomy-seed: needs a phantom; a CT is one patient");
+    found.push_back("anatomy-seed: applies to --phantom only; a CT is of one patient");
   append_target_problems(options, found);
   append_scan_problems(options, found);
   const int bits = options.xray_in_force().detector.bits;
@@ -176,11 +177,12 @@ Phantom phantom_of(const SimulateOptions& options) {
 }
 
 void ConeBeamOptions::describe(Fields& field) {
-  field("cone_beam",
-        views,
-        "Take so many X-rays on a circle about the CT's centre and write a scan for af-scan: "
-        "scan.toml, an X-ray per view, and ct.nii.gz; those of a phantom are of its bodies, not of "
-        "voxels. 0: a study")
+  field(
+      "cone_beam",
+      views,
+      "Take this many X-rays on a circle about the CT's centre and write a scan for af-scan: "
+      "scan.toml, an X-ray per view, and ct.nii.gz; X-rays of a phantom show its exact shapes, not "
+      "voxels. 0: a study")
       .within(0, 100000);
   field("scan_camera",
         camera,
@@ -191,14 +193,15 @@ void ConeBeamOptions::describe(Fields& field) {
         "360")
       .within(-360.0, 360.0);
   field("first_angle_deg", first_angle_deg, "Angle of the first view").within(-360.0, 360.0);
-  field("elevations_deg",
-        elevations_deg,
-        "Also write elevated.toml: X-rays without noise from so many degrees above the circle, "
-        "e.g. 0,2,8, to judge predictions by")
+  field(
+      "elevations_deg",
+      elevations_deg,
+      "Also write elevated.toml: X-rays without noise from these angles above the circle, degrees, "
+      "e.g. 0,2,8, to judge predictions by")
       .comma_separated();
   field("elevated_views",
         elevated_views,
-        "Of each elevation, at the angles of odd views around the first")
+        "X-rays per elevation, at the angles of odd views around the first")
       .within(1, 1000);
 }
 

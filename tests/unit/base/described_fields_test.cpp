@@ -77,7 +77,7 @@ TEST(FieldProblems, NameFieldValueAndConstraint) {
   whole.names = {"b", "d", ""};
   whole.part.step_mm = -0.5;
   EXPECT_THAT(field_problems(whole),
-              ElementsAre("nodes = 1: must be within 2 and 4096",
+              ElementsAre("nodes = 1: must be between 2 and 4096",
                           "share = nan: must be finite and at least 0",
                           "names = d: must be a, b or c",
                           "names = '': must be a, b or c",

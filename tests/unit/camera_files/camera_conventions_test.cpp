@@ -677,7 +677,7 @@ TEST_F(CameraConventions, XRegRefusals) {
   EXPECT_THAT(file_refusal(flat.bytes()), HasSubstr("is no matrix of 3 x 3"));
   Hdf5Output many;
   many.add_scalar("/num-projs", 1e300);
-  EXPECT_THAT(input_refusal(many.bytes()), HasSubstr("within 1 and 10000"));
+  EXPECT_THAT(input_refusal(many.bytes()), HasSubstr("between 1 and 10000"));
 }
 
 constexpr const char* kRad =
@@ -773,7 +773,7 @@ TEST_F(CameraConventions, DiffDrrRefusals) {
   EXPECT_THAT(input_refusal(test::replaced(good, "delx = 2.0", "delx = -2.0")),
               HasSubstr("must be above 0"));
   EXPECT_THAT(input_refusal(test::replaced(good, "height = 200", "height = 0")),
-              HasSubstr("within 1 and 32768"));
+              HasSubstr("between 1 and 32768"));
   EXPECT_THAT(input_refusal(good + "convention = \"ZZX\"\n"), HasSubstr("neighbours different"));
   EXPECT_THAT(input_refusal(good + "parameterization = \"quaternion\"\n"), HasSubstr("rotation"));
   EXPECT_THAT(input_refusal(good + "sid = 3\n"), HasSubstr("sid"));

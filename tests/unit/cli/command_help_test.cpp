@@ -63,7 +63,7 @@ TEST(MarkdownPage, HasARowForEveryOption) {
   EXPECT_THAT(page, HasSubstr("| `--study` | `PATH` |  | A study \\| of \\<one> case |\n"));
   EXPECT_THAT(page, HasSubstr("| `-o`, `--output` | `PATH` |  | Results. Required |\n"));
   EXPECT_THAT(page, HasSubstr("| `--way` | `TEXT` | `quick` | How. One of: quick, exact |\n"));
-  EXPECT_THAT(page, HasSubstr("| `--nodes` | `INT` | `64` | Nodes. Must be within 2 and 128 |\n"));
+  EXPECT_THAT(page, HasSubstr("| `--nodes` | `INT` | `64` | Nodes. Must be between 2 and 128 |\n"));
   EXPECT_THAT(page, HasSubstr("| `--exact` |  |  | A flag |\n"));
 }
 

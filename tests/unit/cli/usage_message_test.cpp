@@ -56,7 +56,7 @@ TEST(UsageMessage, NamesTheSubCommandThatWasMeant) {
   EXPECT_EQ(message_for("regstration -o x", true),
             "unknown sub-command 'regstration': did you mean 'registration'?");
   EXPECT_EQ(message_for("pictures", true),
-            "unknown sub-command 'pictures': there are registration, report");
+            "unknown sub-command 'pictures': choose one of registration, report");
   EXPECT_EQ(message_for("registration --rotaton-deg 1,2,3", true),
             "unknown option '--rotaton-deg': did you mean '--rotation-deg'?");
 }
@@ -70,7 +70,7 @@ TEST(UsageMessage, SaysWhatAnOptionTakes) {
 
 TEST(UsageMessage, SaysThatAWordStandsBehindNoOption) {
   EXPECT_EQ(message_for("-o x study.toml"),
-            "'study.toml' was not expected: it stands behind no option");
+            "'study.toml' was not expected: no option before it takes this value");
 }
 
 }  // namespace

@@ -215,7 +215,7 @@ TEST(CameraGeometry, ProblemsNameKeyValueAndConstraint) {
   EXPECT_THAT(found,
               Contains(HasSubstr("camera 'AP': column_direction = [2, 0, 0]: must have length 1")));
   EXPECT_THAT(found, Contains(HasSubstr("pixel_spacing_mm = [0, 1]: must be 0.01 to 100 mm")));
-  EXPECT_THAT(found, Contains(HasSubstr("size_px = [0, 40000]: must be within 1 and 32768")));
+  EXPECT_THAT(found, Contains(HasSubstr("size_px = [0, 40000]: must be between 1 and 32768")));
 }
 
 TEST(CameraGeometry, ProblemsNameAxesThatAreNotOrthogonalAndASourceOnTheDetector) {

@@ -40,7 +40,7 @@ TEST(FieldLattice, NamesWhatIsNoLattice) {
     const auto found = problems(slab, "slab 3");
     return found.size() == 1 ? found.front() : std::to_string(found.size()) + " problems";
   };
-  EXPECT_EQ(problem_with({1, {0, 1}}), "slab 3 s nodes = 1: must be within 2 and 65536");
+  EXPECT_EQ(problem_with({1, {0, 1}}), "slab 3 s nodes = 1: must be between 2 and 65536");
   EXPECT_THAT(problem_with({65537, {0, 2}}), HasSubstr("nodes = 65537"));
   EXPECT_EQ(problem_with({20, {3, 4}}),
             "slab 3 s stored range [3, +4) is not an even-aligned part of 20 nodes");

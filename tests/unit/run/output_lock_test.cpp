@@ -90,7 +90,7 @@ TEST(OutputLock, IsHeldByOneAndNamesIt) {
   {
     const OutputLock lock(folder / "a.h5");
     const std::string said = refusal(folder / "a.h5");
-    EXPECT_THAT(said, HasSubstr("another job writes it: process " + std::to_string(getpid())));
+    EXPECT_THAT(said, HasSubstr("another job is writing it: process " + std::to_string(getpid())));
     EXPECT_THAT(said, HasSubstr("since 20"));
     EXPECT_EQ(refusal(folder / "b.h5"), "");
   }

@@ -171,18 +171,21 @@ INSTANTIATE_TEST_SUITE_P(
         BadValue{"= -3.0", "= 0", "step_deg"},
         BadValue{"= -3.0", "= inf", "step_deg"},
         BadValue{"p{:04}.png", "p.mha", "first_index = 7: is for files with an index"},
-        BadValue{"p{:04}.png", "p{}{}.png", "must hold {} once"},
-        BadValue{"p{:04}.png", "p{:4}.png", "must hold {} once"},
-        BadValue{"p{:04}.png", "p}{.png", "must hold {} once"},
+        BadValue{"p{:04}.png", "p{}{}.png", "must contain {} once"},
+        BadValue{"p{:04}.png", "p{:4}.png", "must contain {} once"},
+        BadValue{"p{:04}.png", "p}{.png", "must contain {} once"},
         BadValue{"= 7", "= -1", "first_index"},
         BadValue{"[72, 60]", "[72, 60]\nbeam_foot_px = [72, 30]", "beam_foot_px"},
         BadValue{"[72, 60]", "[72, 60]\nbeam_foot_px = 36", "beam_foot_px"},
-        BadValue{"[72, 60]", "[72, 60]\nangles_deg = [0, 3]", "must not stand beside a list"},
+        BadValue{
+            "[72, 60]", "[72, 60]\nangles_deg = [0, 3]", "must not be given together with a list"},
         BadValue{"\"intensity\"", "\"counts\"", "xray_domain"},
         BadValue{"\"intensity\"", "\"attenuation\"", "is for xray_domain = \"intensity\" alone"},
-        BadValue{"flat = ", "dark = \"d.png\"\nflat = ", "must not stand beside dark_level"},
+        BadValue{
+            "flat = ", "dark = \"d.png\"\nflat = ", "must not be given together with dark_level"},
         BadValue{"flat = ", "flatt = ", "flatt"},
-        BadValue{"flat = ", "flat_level = 40000\nflat = ", "must not stand beside flat_level"},
+        BadValue{
+            "flat = ", "flat_level = 40000\nflat = ", "must not be given together with flat_level"},
         BadValue{"flat = \"flat.png\"", "flat_level = 900", "must be above dark_level"},
         BadValue{"\"small\"", "\"../small\"", "must be usable in a file name"}));
 

@@ -277,7 +277,7 @@ TEST(SmoothMotion, NeverFoldsSpace) {
               kStepMm);
   }
   options.amplitude_mm = 7.0;
-  EXPECT_THAT(problems(options), ElementsAre(HasSubstr("motion_mm = 7: must be within 0 and")));
+  EXPECT_THAT(problems(options), ElementsAre(HasSubstr("motion_mm = 7: must be between 0 and")));
 }
 
 TEST(SmoothMotion, MovesVoxelsOutsideTheBoxAndKeepsThoseWithin) {

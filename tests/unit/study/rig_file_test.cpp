@@ -197,8 +197,9 @@ projection_matrix = [[2000, 128, 0, 89600], [0, 64, -2000, 44800], [0, 1, 0, 700
 pixel_spacing_mm = [0.5, 0.5]
 size_px = [256, 128]
 )");
-  EXPECT_THAT(message,
-              HasSubstr(":4: camera[0].source_point = [0, -700, 0]: must not stand beside"));
+  EXPECT_THAT(
+      message,
+      HasSubstr(":4: camera[0].source_point = [0, -700, 0]: must not be given together with"));
 }
 
 TEST_F(RigFile, SingularProjectionMatrixIsRefusedAtItsLine) {
@@ -229,7 +230,7 @@ TEST_F(RigFile, BadValuesAreRefusedWithLineKeyValueAndConstraint) {
   EXPECT_THAT(input_refusal(replaced(good_, "[256, 256]", "[256, 99999999999999]")),
               HasSubstr("whole numbers"));
   EXPECT_THAT(input_refusal(replaced(good_, "[256, 256]", "[256, 1000000]")),
-              HasSubstr("must be within 1 and 32768"));
+              HasSubstr("must be between 1 and 32768"));
   EXPECT_THAT(input_refusal(replaced(good_, "[1.190625, 1.190625]", "[0, -1]")),
               HasSubstr("pixel_spacing_mm = [0, -1]: must be 0.01 to 100 mm"));
   EXPECT_THAT(input_refusal(replaced(good_, "[1.190625, 1.190625]", "[nan, inf]")),
@@ -239,7 +240,7 @@ TEST_F(RigFile, BadValuesAreRefusedWithLineKeyValueAndConstraint) {
   EXPECT_THAT(input_refusal(replaced(good_, "\"AP\"", "\"\"")), HasSubstr("name = \"\""));
   EXPECT_THAT(input_refusal(replaced(good_, "\"AP\"", "\"a/b\"")),
               HasSubstr("usable in a file name"));
-  EXPECT_THAT(input_refusal(replaced(good_, "\"AP\"", "7")), HasSubstr("name = 7: must be a text"));
+  EXPECT_THAT(input_refusal(replaced(good_, "\"AP\"", "7")), HasSubstr("name = 7: must be text"));
 }
 
 TEST_F(RigFile, DistortionIsOpenCvsFourFiveOrEightNumbers) {

@@ -272,7 +272,7 @@ TEST_F(StudyFile, BadValuesAreRefusedWithLineKeyValueAndConstraint) {
       refusal("camera = \"A\"", "camera = \"C\""),
       HasSubstr(
           ":10: case[0].view[0].camera = \"C\": must be a camera of the rig, which has A, B"));
-  EXPECT_THAT(refusal("camera = \"B\"", "camera = \"A\""), HasSubstr("another view"));
+  EXPECT_THAT(refusal("camera = \"B\"", "camera = \"A\""), HasSubstr("already has a view"));
 }
 
 TEST_F(StudyFile, FiducialsMustBeEnoughNotCollinearAndEquallyMany) {
@@ -520,8 +520,8 @@ TEST_F(StudyFile, RefusesContradictionsInHowAnXrayIsRead) {
   EXPECT_THAT(refused("xray_frame = 1.5"), HasSubstr("must be a whole number"));
   EXPECT_THAT(refused("air_level = -1.0"), HasSubstr("must be positive"));
   EXPECT_THAT(refused("air_level = \"sky\""), HasSubstr("percentile, open-beam"));
-  EXPECT_THAT(refused("air_level = 3.0\nflat = \"f.mha\""), HasSubstr("beside `flat`"));
-  EXPECT_THAT(refused("dark_level = 3.0\ndark = \"d.mha\""), HasSubstr("beside `dark`"));
+  EXPECT_THAT(refused("air_level = 3.0\nflat = \"f.mha\""), HasSubstr("together with `flat`"));
+  EXPECT_THAT(refused("dark_level = 3.0\ndark = \"d.mha\""), HasSubstr("together with `dark`"));
   EXPECT_THAT(refused("dark_level = nan"), HasSubstr("must be a finite number"));
   EXPECT_THAT(refused("xray_polarity = \"upside down\""), HasSubstr("\"as-stored\""));
   EXPECT_THAT(refused("xray_spacing = \"no\""), HasSubstr("\"check\" or \"ignore\""));

@@ -203,7 +203,7 @@ TEST_F(DicomXrayView, Monochrome1IsTurnedRoundByItsStoredBits) {
     file.set_pixels(pixels);
   });
   expect_lines_of_levels(xray);
-  EXPECT_THAT(xray.note, HasSubstr("values turned round: 4095 - stored"));
+  EXPECT_THAT(xray.note, HasSubstr("values inverted: 4095 - stored"));
 }
 
 TEST_F(DicomXrayView, TheSignOfTheRelationshipDecidesOverThePhotometricInterpretation) {
@@ -403,7 +403,7 @@ TEST(XrayReader, InvertedGreysAreToldAndTurnedRoundOnRequest) {
   view.reading.polarity = XrayPolarity::Inverted;
   const ViewXray found = read_view_xray(view, camera(60, 60));
   EXPECT_TRUE(found.warnings.empty());
-  EXPECT_THAT(found.note, HasSubstr("values turned round: 255 - stored"));
+  EXPECT_THAT(found.note, HasSubstr("values inverted: 255 - stored"));
   EXPECT_NEAR(found.attenuation.at(30, 30), std::log(2.5f), kLogRounding);
 }
 

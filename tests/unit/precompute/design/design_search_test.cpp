@@ -141,7 +141,8 @@ TEST(DesignSearch, NamesTheBestWhereNothingFits) {
     FAIL() << "it must refuse";
   } catch (const InputError& error) {
     const std::string text = error.what();
-    EXPECT_NE(text.find("no field keeps at least 58 dB, at most 0.5 MB"), std::string::npos)
+    EXPECT_NE(text.find("no field meets the limits: at least 58 dB, at most 0.5 MB"),
+              std::string::npos)
         << text;
     EXPECT_NE(text.find("the highest PSNR within size and time: "), std::string::npos) << text;
     EXPECT_NE(text.find("the smallest file with that PSNR: "), std::string::npos) << text;

@@ -206,7 +206,7 @@ TEST(SimilarityOptions, AnUnknownMeasureIsRefusedWithTheKnownOnes) {
   const std::vector<std::string> found = problems(options);
   ASSERT_EQ(found.size(), 2U);
   EXPECT_EQ(found[0], "similarity = 'psnr': must be one of " + joined(similarity_names()));
-  EXPECT_EQ(found[1], "bins = 1: must be within 2 and 256");
+  EXPECT_EQ(found[1], "bins = 1: must be between 2 and 256");
   EXPECT_THROW(make_similarity(options, {}), InputError);
 }
 
