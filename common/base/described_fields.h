@@ -51,7 +51,7 @@ using FieldValue = std::variant<bool*,
 
 /// A rule for every number, or every text, of a field.
 struct Constraint {
-  std::string words;               ///< "within 2 and 4096"
+  std::string words;               ///< "between 2 and 4096"
   std::optional<double> low;       ///< smallest number that is accepted, when words say one
   std::optional<double> high;      ///< largest
   std::vector<std::string> names;  ///< all texts that are accepted, when they can be listed

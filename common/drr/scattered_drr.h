@@ -12,9 +12,9 @@ namespace af {
 ///
 ///     U' = -ln(P + s).
 ///
-/// Scatter spreads over some hundred millimetres on a detector, so within a region of interest it
-/// is nearly even; U' is wrong where it is not, or where the ratio differs. Derivatives include
-/// that of s. \test ScatteredDrr.AddsTheMeanPrimarySignalTimesTheRatio
+/// Scatter spreads over some hundred millimetres on a detector, so within a region of interest most
+/// of it is its mean; U' is wrong where scatter is uneven, or where the ratio differs. Derivatives
+/// include that of s. \test ScatteredDrr.AddsTheMeanPrimarySignalTimesTheRatio
 class ScatteredDrr final : public DrrRenderer {
  public:
   ScatteredDrr(std::shared_ptr<const DrrRenderer> primary, double scatter_to_primary);

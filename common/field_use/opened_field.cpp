@@ -42,7 +42,7 @@ OpenedField OpenedField::bone(const Communicator& communicator) const {
   all_or_none(communicator, [&] {
     if (!std::filesystem::exists(path))
       throw FileError(path.string(),
-                      "does not exist: --tube-kvp needs a field of the CT's bone; make it with "
+                      "does not exist: a tube voltage needs a field of the CT's bone; make it with "
                       "af-precompute --material bone and otherwise the same options as the field "
                       "beside it");
   });

@@ -51,16 +51,16 @@ double default_step_rad(const Orbit& orbit, const MotionRange& range);
 /// Most members of an orbit.
 inline constexpr int kMaxOrbitMembers = 64;
 
-/// Members at equal distances, one at the nominal camera if the orbit contains it, such that one of
-/// them holds every pose of `range` about the nominal pose of `frame`, seen by the camera at any
-/// angle of the orbit. A turn about z, the outermost rotation of a pose, adds to its rz and changes
-/// no other angle, so members about z tile the sum of both. Divided by source, a member holds the
-/// poses whose source lies between two half-planes through the axis, or up to kSeamOverlapRad
-/// beyond, wherever turns and shifts have put it; so what shifts need is held only once. About x
-/// and y a member holds the whole range at every angle that is nearest to it. Shifts are along the
-/// room's axes: a member holds the turned box. InputError when there would be more than
-/// kMaxOrbitMembers, or angles are not finite and ascending.
-/// \test Orbit.EveryPoseAtEveryAngleIsAMembers
+/// Members at equal distances, one at the nominal camera if the orbit contains it, such that every
+/// pose of `range` about the nominal pose of `frame`, seen by the camera at any angle of the orbit,
+/// is held by one of them. A turn about z, the outermost rotation of a pose, adds to its rz and
+/// changes no other angle, so members about z tile the sum of both. Divided by source, a member
+/// holds the poses whose source lies between two half-planes through the axis, or up to
+/// kSeamOverlapRad beyond, wherever turns and shifts have put it; so what shifts need is held only
+/// once. About x and y a member holds the whole range at every angle that is nearest to it. Shifts
+/// are along the room's axes: a member holds the turned box. InputError when there would be more
+/// than kMaxOrbitMembers, or angles are not finite and ascending. \test
+/// Orbit.EveryPoseAtEveryAngleIsAMembers
 std::vector<OrbitMember> orbit_members(const CameraGeometry& nominal,
                                        const Eigen::Vector3d& isocenter_point,
                                        const PoseFrame& frame,

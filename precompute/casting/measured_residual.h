@@ -33,8 +33,8 @@ std::vector<std::string> orbit_problems(std::span<const ResidualView> views);
 /// more of the residual's detail averages out. Nothing else limits the reach: there is no width to
 /// choose.
 ///
-/// Rays without a view on either side, and points that a view does not see, have residual 0. No
-/// value depends on a mathematics library function. \test MeasuredResidual.*
+/// Rays that do not have a view on each side, and points that a view does not see, have residual 0.
+/// No value depends on a mathematics library function. \test MeasuredResidual.*
 class MeasuredResidual {
  public:
   /// `toward_source`: from the CT to where the field's viewpoints are (ct frame); views on that

@@ -80,7 +80,7 @@ std::string parameters_line(const PoseParameters& parameters) {
   return line + " mm";
 }
 
-/// "by 2 ray-cast DRRs per view, which moved the end 0.041 mm; it stands still"
+/// "by 2 ray-cast DRRs per view, which moved the end 0.041 mm; it has settled"
 std::string correction_text(const CorrectionReport& correction) {
   if (correction.casts == 0)
     return "no: the search before it did not converge, or --max-evaluations was used up";

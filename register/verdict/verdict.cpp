@@ -41,7 +41,8 @@ std::optional<std::string> failure_of(StopReason stop_reason) {
     case StopReason::NonFiniteSimilarity:
       return "the similarity is not a finite number";
     case StopReason::NoBetterThanNoDrr:
-      return "no DRR, at any pose tried, explains any of the X-rays' gradients";
+      return "no chain ended at a pose that explains the X-rays' gradients better than no DRR at "
+             "all";
     default:
       return std::nullopt;
   }

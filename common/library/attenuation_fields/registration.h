@@ -125,8 +125,8 @@ class ATTENUATION_FIELDS_API RegistrationCase {
   /// result.json, to the bit (its seconds excepted).
   [[nodiscard]] Registration run(const Pose& start, std::int64_t start_index = 0) const;
   /// Registers from many starts; the start_index of each is its position. Verdicts are as in
-  /// registrations.csv, but X-rays are not examined, as af-register does for the best result and
-  /// run() for its own: that may turn the verdict from found to doubtful.
+  /// registrations.csv: the X-rays are not examined, which may turn a verdict from found to
+  /// doubtful. af-register examines those of the best result, run() those of its own.
   [[nodiscard]] std::vector<Registration> run_all(std::span<const Pose> starts) const;
   /// The similarity that results are compared by, at a pose; nullopt where it is inadmissible.
   [[nodiscard]] std::optional<double> similarity(const Pose& pose) const;
