@@ -475,15 +475,16 @@ StartFrame start_frame(const StudyCase& study_case, const Yardstick& yardstick) 
           study_case.target_box_ct};
 }
 
-PoseTableFrames pose_table_frames(const Study& study,
+PoseTableFrames pose_table_frames(const RegistrationStudyOptions& options,
+                                  const Study& study,
                                   const StudyCase& study_case,
-                                  const RigidTransform& gold_room_from_ct,
-                                  const CtReadOptions& ct_reading) {
+                                  const RigidTransform& gold_room_from_ct) {
+  const std::size_t cases = options.cases.empty() ? study.cases.size() : options.cases.size();
   return {study_case.name,
-          study.cases.size() == 1,
+          cases == 1,
           PoseFrame::about(gold_room_from_ct, study_case.center_ct_mm),
           PoseFrame::about(study_case.nominal_room_from_ct, study_case.center_ct_mm),
-          pose_context(study, study_case, ct_reading)};
+          pose_context(study, study_case, options.ct)};
 }
 
 StratifiedStarts given_starts(const RegistrationStudyOptions& options,
@@ -495,7 +496,7 @@ StratifiedStarts given_starts(const RegistrationStudyOptions& options,
   return starts_at(
       measures,
       read_starts(options.starts_from,
-                  pose_table_frames(study, study_case, yardstick.gold_room_from_ct, options.ct),
+                  pose_table_frames(options, study, study_case, yardstick.gold_room_from_ct),
                   notes));
 }
 

@@ -37,11 +37,11 @@ struct CaseEvaluation {
   nlohmann::json pictures = nlohmann::json::array();  ///< rank 0: files and what they show
 };
 
-/// What poses in files of one case are relative to. `ct_reading`: as the command line says.
-PoseTableFrames pose_table_frames(const Study& study,
+/// What poses in files of one case are relative to.
+PoseTableFrames pose_table_frames(const RegistrationStudyOptions& options,
+                                  const Study& study,
                                   const StudyCase& study_case,
-                                  const RigidTransform& gold_room_from_ct,
-                                  const CtReadOptions& ct_reading);
+                                  const RigidTransform& gold_room_from_ct);
 
 /// What the starts of a case are relative to.
 StartFrame start_frame(const StudyCase& study_case, const Yardstick& yardstick);

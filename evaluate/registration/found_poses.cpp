@@ -57,9 +57,9 @@ CaseEvaluation evaluate_found_poses(const RegistrationStudyOptions& options,
   evaluation.starts =
       given_starts(options, study, study_case, yardstick, measures, evaluation.pose_problems);
   on_starts(evaluation);
-  const FoundPoses found = read_found_poses(
-      options.poses_from,
-      pose_table_frames(study, study_case, yardstick.gold_room_from_ct, options.ct));
+  const FoundPoses found =
+      read_found_poses(options.poses_from,
+                       pose_table_frames(options, study, study_case, yardstick.gold_room_from_ct));
   evaluation.pose_problems.insert(
       evaluation.pose_problems.end(), found.problems.begin(), found.problems.end());
   evaluation.start_count = evaluation.starts.starts.size();

@@ -27,11 +27,12 @@ void replace_in_stages(const MethodOptions& options, RegistrationOptions& result
   replace_in_chain(options, result.finish);
 }
 
-/// The chain of a finish or a judge, which cannot be a last resort.
+/// The chain of a finish or a judge, which cannot depend on other chains.
 ChainOptions unconditional_chain(const std::string& name, const std::string& text) {
   ChainOptions chain = chain_from_text(name, text);
-  if (chain.is_last_resort())
-    throw InputError(name, "'" + text + "'", "only a chain can begin with 'below VALUE:'");
+  if (chain.is_last_resort() || chain.from_best_end)
+    throw InputError(
+        name, "'" + text + "'", "only a chain can begin with 'below VALUE:' or 'again:'");
   return chain;
 }
 
@@ -75,11 +76,14 @@ void describe_chains(Fields& field, MethodOptions& options) {
             chain_keys_help() +
             ". Given several times, the chains are a portfolio: a judge chooses among their ends. "
             "One that begins with 'below VALUE:' is a last resort, which runs only where the best "
-            "end so far is worth less to the judge");
-  field("finish",
-        options.finish,
-        "Stages, written as for --chain, that follow the chain, or a portfolio's best one "
-        "(default: the preset's; none with --chain)");
+            "end so far is worth less to the judge; one that begins with 'again:' starts from that "
+            "end");
+  field(
+      "finish",
+      options.finish,
+      "Stages, written as for --chain, that follow the chain, or a portfolio's best one and those "
+      "that the judge can hardly tell from it: the value of the last stage chooses among these "
+      "(default: the preset's; none with --chain)");
   field("judge",
         options.judge,
         "For a portfolio: the stage, written as for --chain, by which end poses are compared; its "

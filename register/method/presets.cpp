@@ -61,7 +61,8 @@ ChainOptions wide_chain(const std::string& name, const std::string& search) {
 /// Three chains search with different measures, because each has its deepest optimum in a wrong
 /// place for some patients (docs/population.md). If none finds anything, a fourth searches more
 /// widely, by plain correlation: from starts far along a long object, the others went to its end,
-/// out of sight (docs/real-xrays.md).
+/// out of sight (docs/real-xrays.md). If none convinces, the last one searches about the best end,
+/// finer than the others: where anatomy moved about the target, they ended some mm beside it.
 RegistrationOptions robust_preset() {
   RegistrationOptions options;
   options.chains = {
@@ -71,8 +72,11 @@ RegistrationOptions robust_preset() {
                           kOverTheRegion),
       wide_chain("wide", "rg cma-es level=2 pixels=16 step=12"),
       wide_chain("wide-edges", "gc cma-es level=2 pixels=16 step=12"),
-      wide_chain("far", "ncc cma-es level=3 pixels=8 step=20")};
-  options.chains.back().only_below = kFoundNothing;
+      wide_chain("far", "ncc cma-es level=3 pixels=8 step=20"),
+      chain_from_text(
+          "again",
+          std::string("again: gc cma-es level=2 pixels=8 roi=2 step=4 final=1;") + kOverTheRegion)};
+  options.chains[3].only_below = kFoundNothing;
   options.finish = chain_from_text("finish", "rg quasi-newton pixels=2 step=2 final=0.02");
   options.judge.enough_value = kConvincingValue;
   return options;

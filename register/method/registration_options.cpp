@@ -21,6 +21,9 @@ namespace {
 /// What the text of a last resort begins with.
 constexpr std::string_view kLastResort = "below ";
 
+/// What the text of a chain that starts from the best end so far begins with, behind that.
+constexpr std::string_view kAgain = "again:";
+
 void add_once(const std::string& name, std::vector<std::string>& names) {
   if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
 }
@@ -150,7 +153,8 @@ std::vector<std::string> problems(const StageOptions& stage) {
 std::string chain_text(const ChainOptions& chain) {
   const std::string condition =
       chain.is_last_resort() ? std::string(kLastResort) + number_text(chain.only_below) + ": " : "";
-  return condition + joined(chain.stages, "; ", stage_text);
+  const std::string from = chain.from_best_end ? std::string(kAgain) + " " : "";
+  return condition + from + joined(chain.stages, "; ", stage_text);
 }
 
 ChainOptions chain_from_text(const std::string& name, const std::string& text) {
@@ -161,7 +165,11 @@ ChainOptions chain_from_text(const std::string& name, const std::string& text) {
     const std::string value = text.substr(kLastResort.size(), colon - kLastResort.size());
     if (colon == text.size() || !parse(value, chain.only_below) || !std::isfinite(chain.only_below))
       throw InputError("chain", "'" + text + "'", "a last resort begins with 'below VALUE:'");
-    begin = colon + 1;
+    begin = std::min(text.find_first_not_of(' ', colon + 1), text.size());
+  }
+  if (text.substr(begin).starts_with(kAgain)) {
+    chain.from_best_end = true;
+    begin += kAgain.size();
   }
   std::istringstream stages(text.substr(begin));
   for (std::string stage; std::getline(stages, stage, ';');)
@@ -251,9 +259,10 @@ std::vector<std::string> problems(const RegistrationOptions& options) {
       found.push_back("chain '" + chain.name + "': stages = none: there must be at least one");
     append_chain_problems(chain, found);
   }
-  if (!options.chains.empty() && options.chains.front().is_last_resort())
+  if (!options.chains.empty() &&
+      (options.chains.front().is_last_resort() || options.chains.front().from_best_end))
     found.push_back("chain '" + options.chains.front().name +
-                    "': must not begin with 'below VALUE:': no chain stands before it");
+                    "': must not begin with 'below VALUE:' or 'again:': no chain stands before it");
   append_chain_problems(options.finish, found);
   if (options.chains.size() > 1) {
     for (const std::string& text : problems(options.judge.stage)) found.push_back("judge: " + text);

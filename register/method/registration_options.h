@@ -39,6 +39,9 @@ struct ChainOptions {
   /// In a portfolio, a last resort: the chain runs only if the judge scores the best end of the
   /// chains before it below this (mean over views). Infinity: it always runs.
   double only_below = std::numeric_limits<double>::infinity();
+  /// In a portfolio: starts from the best end of the chains before it, not from the registration's
+  /// start.
+  bool from_best_end = false;
 
   [[nodiscard]] bool is_last_resort() const {
     return only_below < std::numeric_limits<double>::infinity();
@@ -51,7 +54,7 @@ struct ChainOptions {
 ///     ncc gauss-newton level=2 pixels=8 roi=2 step=10 final=0.5; gc gauss-newton level=1 pixels=2
 ///
 /// Keys are the options that StageOptions describes. A last resort begins with the value that calls
-/// it: "below 0.2: ncc cma-es ...".
+/// it: "below 0.2: ncc cma-es ...". Then "again: " may follow: the chain starts from the best end.
 std::string chain_text(const ChainOptions& chain);
 
 /// Parses the line of a chain. InputError for a line of another form; problems() checks the values.

@@ -247,6 +247,22 @@ TEST_F(EvaluateProgram, RegistersCasesThatShareFieldsAsItDoesEachAlone) {
   EXPECT_EQ(rows_without_seconds("two-cases"), alone);
 }
 
+TEST_F(EvaluateProgram, TakesStartsWithoutACaseWhereOneCaseIsChosen) {
+  Study study = read_study(path("study.toml"));
+  study.cases.push_back(study.cases.front());
+  study.cases.back().name = "twin";
+  write_text_file(path("twins.toml"), study_to_toml(study, path("")));
+  write_text_file(path("no-case.csv"),
+                  "start_rx_deg,start_ry_deg,start_rz_deg,start_tx_mm,start_ty_mm,start_tz_mm\n"
+                  "0,0,0,1,0,0\n");
+  const std::string run = "registration --study " + path("twins.toml") + fields() +
+                          " --preset fast --starts-from " + path("no-case.csv") + " -o ";
+  const test::ProgramRun one = evaluate(run + path("twin-only") + " --case twin");
+  ASSERT_EQ(one.exit_code, 0) << one.output;
+  EXPECT_EQ(CsvTable::read(path("twin-only/registrations.csv")).text(0, "case"), "twin");
+  expect_refused(evaluate(run + path("both-twins")), 3, "needed with several cases");
+}
+
 TEST_F(EvaluateProgram, GoesOnAfterAStopOrAKillOnAnotherRankCount) {
   const std::string arguments = "registration --study " + path("study.toml") + fields() +
                                 "--preset paper --starts-per-interval 25 -o ";

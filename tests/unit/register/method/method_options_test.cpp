@@ -126,9 +126,10 @@ TEST(MethodOptions, ChainsTakeThePlaceOfThePresets) {
 
 TEST(Presets, AVerdictOfNotFoundCallsTheLastResort) {
   const RegistrationOptions robust = preset_options("robust");
-  EXPECT_EQ(robust.chains.back().only_below, kLeastCoarseMean);
-  for (std::size_t i = 0; i + 1 < robust.chains.size(); ++i)
-    EXPECT_FALSE(robust.chains[i].is_last_resort());
+  for (const ChainOptions& chain : robust.chains) {
+    EXPECT_EQ(chain.is_last_resort(), chain.name == "far");
+    if (chain.is_last_resort()) EXPECT_EQ(chain.only_below, kLeastCoarseMean);
+  }
 }
 
 TEST(MethodOptions, ALastResortNeedsAChainBeforeIt) {
@@ -145,6 +146,22 @@ TEST(MethodOptions, ALastResortNeedsAChainBeforeIt) {
   EXPECT_THROW((void)resolve(judge), InputError);
 }
 
+TEST(MethodOptions, AChainFromTheBestEndNeedsAChainBeforeIt) {
+  MethodOptions options;
+  options.chains = {"again: mi bobyqa", "ncc gradient"};
+  EXPECT_THROW((void)resolve(options), InputError);
+  options.chains = {"ncc gradient", "below 0.3: again: mi bobyqa", "again:mi bobyqa"};
+  const std::vector<ChainOptions> chains = resolve(options).chains;
+  EXPECT_FALSE(chains[0].from_best_end);
+  EXPECT_TRUE(chains[1].from_best_end);
+  EXPECT_EQ(chains[1].only_below, 0.3);
+  EXPECT_TRUE(chains[2].from_best_end);
+  EXPECT_FALSE(chains[2].is_last_resort());
+  MethodOptions finish = options;
+  finish.finish = "again: rg gauss-newton";
+  EXPECT_THROW((void)resolve(finish), InputError);
+}
+
 TEST(ChainText, ReadsWhatItWrites) {
   for (const std::string& name : preset_names())
     for (const ChainOptions& chain : preset_options(name).chains) {
@@ -153,6 +170,7 @@ TEST(ChainText, ReadsWhatItWrites) {
       EXPECT_EQ(chain_text(read), text);
       EXPECT_EQ(read.stages.size(), chain.stages.size());
       EXPECT_EQ(read.only_below, chain.only_below);
+      EXPECT_EQ(read.from_best_end, chain.from_best_end);
     }
 }
 
@@ -168,7 +186,10 @@ TEST(ChainText, RefusesWhatItDoesNotKnow) {
                            "below 0.2 mi bobyqa",
                            "below x: mi bobyqa",
                            "below nan: mi bobyqa",
-                           "below : mi bobyqa"})
+                           "below : mi bobyqa",
+                           "again:",
+                           "again mi bobyqa",
+                           "again: below 0.2: mi bobyqa"})
     EXPECT_THROW(
         {
           const ChainOptions chain = chain_from_text("c", text);

@@ -348,6 +348,71 @@ TEST(Registration, ALastResortRunsOnlyWhereNothingWasFound) {
   EXPECT_EQ(result_below(idle_alone.similarity).chain, "idle");
 }
 
+std::vector<Eigen::Vector3d> target_points() {
+  return ct_lattice_points(CtBox{{-20, -20, -20}, {20, 20, 20}}, 4);
+}
+
+TEST(Registration, AChainCanStartFromTheBestEndSoFar) {
+  const test::SmallCase small = test::small_case();
+  small.problem->target_points_ct = target_points();
+  RegistrationOptions options = two_stages("ncc", "gauss-newton");
+  options.chains.push_back(idle_chain(options.chains[0]));
+  options.judge.stage = StageOptions();
+  options.judge.stage.similarity.name = "rg";
+  options.judge.enough_value = 2.0;  // never
+  // The idle chain ends where it starts.
+  const double apart_mm =
+      RegistrationRunner(small.problem, options).run(start_near(small)).chain_distance_mm;
+  EXPECT_GT(apart_mm, 4.0);
+  options.chains.back().from_best_end = true;
+  const RegistrationResult again =
+      RegistrationRunner(small.problem, options).run(start_near(small));
+  EXPECT_LT(again.chain_distance_mm, 1e-3);
+}
+
+/// X-rays whose middle shows the CT at gold, and whose border shows it elsewhere.
+test::SmallCase case_with_moved_border(const RigidTransform& border_room_from_ct) {
+  test::SmallCase small = test::small_case();
+  small.problem->target_points_ct = target_points();
+  for (RegistrationView& view : small.problem->views) {
+    view.view.roi = {12, 12, 24, 24};
+    const Image2d elsewhere =
+        render_image(*view.renderer, border_room_from_ct, View::whole_detector(view.view.camera));
+    for (int row = 0; row < view.xray.height; ++row)
+      for (int column = 0; column < view.xray.width; ++column)
+        if (std::min(row, column) < 12 || std::max(row, column) >= 36)
+          view.xray.at(column, row) = elsewhere.at(column, row);
+  }
+  return small;
+}
+
+TEST(Registration, TheFinishChoosesAmongEndsThatTheJudgeHardlyTellsApart) {
+  const RigidTransform gold = test::small_case().gold_room_from_ct;
+  // The judge looks at three times the region's area, so it prefers the border's pose: by little
+  // when that is near, by much when it is far.
+  for (const bool is_near : {true, false}) {
+    const RigidTransform elsewhere = Eigen::Translation3d(0, 0, is_near ? 2.0 : 6.0) * gold;
+    const test::SmallCase small = case_with_moved_border(elsewhere);
+    RegistrationOptions options = two_stages("ncc", "gauss-newton");
+    options.chains[0].name = "middle";
+    options.chains.push_back(idle_chain(options.chains[0]));
+    options.finish = idle_chain(two_stages("rg", "gauss-newton").chains[0]);
+    options.judge.stage = StageOptions();
+    options.judge.stage.similarity.name = "rg";
+    options.judge.stage.roi_scale = 2.0;
+    options.judge.enough_value = 2.0;  // never
+    RegistrationRunner runner(small.problem, options);
+    const RegistrationResult result = runner.run(elsewhere);
+    const double share =
+        runner.similarity_at(gold).similarity / runner.similarity_at(elsewhere).similarity;
+    EXPECT_LT(share, is_near ? 1.0 : 0.7);
+    if (is_near) EXPECT_GT(share, 0.83);
+    EXPECT_EQ(result.chain, is_near ? "middle" : "idle");
+    EXPECT_LT(mean_distance_mm(result.room_from_ct, is_near ? gold : elsewhere), 1.0);
+    EXPECT_EQ(result.similarity, runner.similarity_at(result.room_from_ct).similarity);
+  }
+}
+
 /// Everything but the seconds.
 void expect_same(const RegistrationResult& a, const RegistrationResult& b) {
   EXPECT_EQ(a.room_from_ct.matrix(), b.room_from_ct.matrix());
