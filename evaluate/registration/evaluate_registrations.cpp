@@ -385,7 +385,8 @@ void describe_starts(Fields& field, RegistrationStudyOptions& options) {
   field("starts_from",
         options.starts_from,
         "starts.csv of another run instead of drawn starts: [case,] and m00 ... m23 of "
-        "room_from_ct, or start_rx_deg ... start_tz_mm relative to gold")
+        "room_from_ct, or start_rx_deg ... start_tz_mm relative to gold. The column case may be "
+        "missing where one case is registered")
       .input();
   field("starts_only",
         options.is_starts_only,

@@ -64,6 +64,8 @@ ChainOptions wide_chain(const std::string& name, const std::string& search) {
 /// out of sight (docs/real-xrays.md). If none convinces, the last one searches about the best end,
 /// finer than the others: where anatomy moved about the target, they ended some mm beside it.
 RegistrationOptions robust_preset() {
+  ChainOptions far = wide_chain("far", "ncc cma-es level=3 pixels=8 step=20");
+  far.only_below = kFoundNothing;
   RegistrationOptions options;
   options.chains = {
       chain_from_text("edges",
@@ -72,11 +74,10 @@ RegistrationOptions robust_preset() {
                           kOverTheRegion),
       wide_chain("wide", "rg cma-es level=2 pixels=16 step=12"),
       wide_chain("wide-edges", "gc cma-es level=2 pixels=16 step=12"),
-      wide_chain("far", "ncc cma-es level=3 pixels=8 step=20"),
+      far,
       chain_from_text(
           "again",
           std::string("again: gc cma-es level=2 pixels=8 roi=2 step=4 final=1;") + kOverTheRegion)};
-  options.chains[3].only_below = kFoundNothing;
   options.finish = chain_from_text("finish", "rg quasi-newton pixels=2 step=2 final=0.02");
   options.judge.enough_value = kConvincingValue;
   return options;

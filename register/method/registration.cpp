@@ -39,12 +39,13 @@ struct ChainEnd {
 
 /// An end that the judge has valued.
 struct PortfolioEnd : ChainEnd {
-  std::string chain;
+  const ChainOptions* chain = nullptr;
+  double chain_distance_mm = std::numeric_limits<double>::quiet_NaN();
 };
 
 /// Ends that are worth at least this share of the best one to the judge, and lie farther than this
-/// from every better one, are finished, too. The judge looks coarsely: wrong ends came within 5 %
-/// of right ones, whose values after the finish were a fifth to a half higher
+/// from every better one, are finished, too. The judge looks coarsely: it preferred wrong ends by
+/// up to 5 % where the finish gave right ones values that were a third higher
 /// (docs/population.md). \test Registration.TheFinishChoosesAmongEndsThatTheJudgeHardlyTellsApart
 constexpr double kRivalShare = 0.8;
 constexpr double kRivalDistanceMm = 1.0;
@@ -142,10 +143,22 @@ struct RegistrationRunner::Impl {
   void take_own_similarity(ChainEnd& end, RegistrationResult& result);
   /// Runs the chains and judges their ends: those that have a value, the best one first.
   std::vector<PortfolioEnd> portfolio_ends(std::int64_t start_index, RegistrationResult& result);
-  /// From an end to the nearest one of another chain, mean over the target box; NaN without any.
-  [[nodiscard]] double distance_mm(const PortfolioEnd& end,
-                                   std::span<const PortfolioEnd> others) const;
-  /// The finish from the best end and from its rivals; the finish's own value chooses among them.
+  /// Whether the best of these ends, which is the first, ends the portfolio.
+  [[nodiscard]] bool is_convincing(std::span<const PortfolioEnd> ends) const {
+    return ends.front().similarity >= options.judge.enough_value;
+  }
+  /// From an end to the nearest one of another chain that `counts`, mean over the target box; NaN
+  /// without any.
+  template <typename Counts>
+  [[nodiscard]] double nearest_mm(const PortfolioEnd& end,
+                                  std::span<const PortfolioEnd> others,
+                                  const Counts& counts) const;
+  /// Whether end `i`, behind the better ones, is to be finished, too.
+  [[nodiscard]] bool is_rival(std::span<const PortfolioEnd> ends, std::size_t i) const;
+  /// The finish from an end; its similarity is NaN when nothing was searched.
+  PortfolioEnd finished(PortfolioEnd end, std::int64_t start_index, RegistrationResult& result);
+  /// The finish from the best end and, unless that convinces, from its rivals; the finish's own
+  /// value chooses among those that converged.
   PortfolioEnd finished_best(std::span<const PortfolioEnd> ends,
                              std::int64_t start_index,
                              RegistrationResult& result);
@@ -378,7 +391,7 @@ std::vector<PortfolioEnd> RegistrationRunner::Impl::portfolio_ends(std::int64_t 
     if (ends.empty() ? chain.from_best_end : ends.front().similarity >= chain.only_below) continue;
     PortfolioEnd end;
     end.room_from_ct = chain.from_best_end ? ends.front().room_from_ct : result.start_room_from_ct;
-    end.chain = chain.name;
+    end.chain = &chain;
     run_chain(chain, begin, start_index, end, result);
     end.similarity = judged(end.room_from_ct, result);
     if (std::isfinite(end.similarity)) {
@@ -386,44 +399,71 @@ std::vector<PortfolioEnd> RegistrationRunner::Impl::portfolio_ends(std::int64_t 
         return other.similarity < end.similarity;
       });
       ends.insert(worse, end);
-      if (ends.front().similarity >= options.judge.enough_value) break;
+      if (is_convincing(ends)) break;
     } else if (ends.empty()) {
       result.stop_reason = end.stop_reason;
     }
   }
+  for (PortfolioEnd& end : ends)
+    end.chain_distance_mm = nearest_mm(
+        end, ends, [](const PortfolioEnd& other) { return !other.chain->from_best_end; });
   return ends;
 }
 
-double RegistrationRunner::Impl::distance_mm(const PortfolioEnd& end,
-                                             std::span<const PortfolioEnd> others) const {
-  double nearest_mm = std::numeric_limits<double>::quiet_NaN();
-  if (problem->target_points_ct.empty()) return nearest_mm;
+template <typename Counts>
+double RegistrationRunner::Impl::nearest_mm(const PortfolioEnd& end,
+                                            std::span<const PortfolioEnd> others,
+                                            const Counts& counts) const {
+  double nearest = std::numeric_limits<double>::quiet_NaN();
+  if (problem->target_points_ct.empty()) return nearest;
   for (const PortfolioEnd& other : others)
-    if (other.stage != end.stage)
-      nearest_mm = std::fmin(
-          nearest_mm, mean_tre_mm(end.room_from_ct, other.room_from_ct, problem->target_points_ct));
-  return nearest_mm;
+    if (other.chain != end.chain && counts(other))
+      nearest = std::fmin(
+          nearest, mean_tre_mm(end.room_from_ct, other.room_from_ct, problem->target_points_ct));
+  return nearest;
+}
+
+bool RegistrationRunner::Impl::is_rival(std::span<const PortfolioEnd> ends, std::size_t i) const {
+  return ends[i].similarity >= kRivalShare * ends.front().similarity &&
+         nearest_mm(ends[i], ends.first(i), [](const PortfolioEnd&) { return true; }) >
+             kRivalDistanceMm;
+}
+
+PortfolioEnd RegistrationRunner::Impl::finished(PortfolioEnd end,
+                                                std::int64_t start_index,
+                                                RegistrationResult& result) {
+  end.similarity = std::numeric_limits<double>::quiet_NaN();
+  run_finish(start_index, end, result);
+  return end;
 }
 
 PortfolioEnd RegistrationRunner::Impl::finished_best(std::span<const PortfolioEnd> ends,
                                                      std::int64_t start_index,
                                                      RegistrationResult& result) {
-  PortfolioEnd best = ends.front();
-  run_finish(start_index, best, result);
-  bool has_own_similarity = false;
+  const auto own_value = [&](PortfolioEnd& end) {
+    if (!is_converged(end.stop_reason) || end.stage + 1 != stages.size())
+      return -std::numeric_limits<double>::infinity();
+    take_own_similarity(end, result);
+    return end.similarity;
+  };
+  PortfolioEnd best = finished(ends.front(), start_index, result);
+  if (is_convincing(ends)) return best;
+  std::optional<double> best_value;
   for (std::size_t i = 1; i < ends.size(); ++i) {
-    if (!(ends[i].similarity >= kRivalShare * ends.front().similarity)) break;
-    if (!(distance_mm(ends[i], ends.first(i)) > kRivalDistanceMm)) continue;
-    if (!std::exchange(has_own_similarity, true)) take_own_similarity(best, result);
-    PortfolioEnd rival = ends[i];
+    if (!is_rival(ends, i)) continue;
+    if (!best_value.has_value()) best_value = own_value(best);
     const std::size_t trace_size = result.trace.size();
-    run_finish(start_index, rival, result);
-    take_own_similarity(rival, result);
-    if (std::isfinite(rival.similarity) && !(best.similarity >= rival.similarity))
+    PortfolioEnd rival = finished(ends[i], start_index, result);
+    const double value = own_value(rival);
+    if (std::isfinite(value) && !(*best_value >= value)) {
       best = rival;
-    else
+      best_value = value;
+    } else {
       result.trace.resize(trace_size);
+    }
   }
+  // A correction looks where the finish did.
+  if (best_value.has_value()) (void)stages[best.stage].narrow_to(*problem, best.room_from_ct);
   return best;
 }
 
@@ -432,10 +472,8 @@ void RegistrationRunner::Impl::run_portfolio(std::int64_t start_index, Registrat
   if (ends.empty()) return;
   const bool has_finish = !options.finish.stages.empty();
   PortfolioEnd best = has_finish ? finished_best(ends, start_index, result) : ends.front();
-  result.chain = best.chain;
-  const auto chosen = std::find_if(
-      ends.begin(), ends.end(), [&](const PortfolioEnd& end) { return end.chain == best.chain; });
-  result.chain_distance_mm = distance_mm(*chosen, ends);
+  result.chain = best.chain->name;
+  result.chain_distance_mm = best.chain_distance_mm;
   correct(start_index, best, result);
   if (has_finish || options.correction.is_wanted)
     best.similarity = judged(best.room_from_ct, result);

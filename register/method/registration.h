@@ -33,14 +33,16 @@ struct RegistrationResult {
   double similarity = 0.0;  ///< at the end: of the chain's last stage, of a portfolio by its
                             ///< judge (mean over views); NaN if it has none
   std::string chain;        ///< the one that the result is from
-  /// Of a portfolio: from its choice to the nearest end of another chain, mean over the target box;
-  /// NaN when only one chain was run, or none of the others has a value.
+  /// Of a portfolio: from its choice, before the finish, to the nearest end of another chain that
+  /// began at the start, mean over the target box; NaN when there is none with a value.
   double chain_distance_mm = std::numeric_limits<double>::quiet_NaN();
   int evaluations = 0;            ///< poses tried
   int inadmissible = 0;           ///< of these, outside the field or its motion range
   std::int64_t drr_count = 0;     ///< DRRs rendered, those of a correction included
   std::int64_t rays_outside = 0;  ///< at the start, when that is why it is inadmissible
   StopReason stop_reason = StopReason::StepBelowFinal;
+  /// Finishes of ends that were not chosen are left out, but for one that a later one replaced;
+  /// their evaluations count.
   std::vector<TraceRow> trace;
   std::optional<CorrectionReport> correction;  ///< when one was wanted
   double seconds = 0.0;                        ///< wall time

@@ -21,7 +21,8 @@ namespace {
 /// What the text of a last resort begins with.
 constexpr std::string_view kLastResort = "below ";
 
-/// What the text of a chain that starts from the best end so far begins with, behind that.
+/// What the text of a chain that starts from the best end so far begins with, after any
+/// 'below VALUE:'.
 constexpr std::string_view kAgain = "again:";
 
 void add_once(const std::string& name, std::vector<std::string>& names) {

@@ -79,10 +79,11 @@ inline constexpr const char* kSilhouettesNeedTheCt =
     "skip_ct_check = set: must be left out where a stage looks within the CT's silhouette, because "
     "the CT says where it is cut";
 
-/// How to register: one chain, or a portfolio of several from the same start.
+/// How to register: one chain, or a portfolio of several.
 struct RegistrationOptions {
   std::vector<ChainOptions> chains;
-  /// Stages that follow the chain, or a portfolio's best end; may be empty.
+  /// Stages that follow the chain, or a portfolio's best end and those that the judge can hardly
+  /// tell from it; may be empty.
   ChainOptions finish;
   JudgeOptions judge;          ///< of a portfolio; not used with one chain
   int max_evaluations = 5000;  ///< pose evaluations per registration, all chains together

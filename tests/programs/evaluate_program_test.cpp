@@ -249,13 +249,14 @@ TEST_F(EvaluateProgram, RegistersCasesThatShareFieldsAsItDoesEachAlone) {
 
 TEST_F(EvaluateProgram, TakesStartsWithoutACaseWhereOneCaseIsChosen) {
   Study study = read_study(path("study.toml"));
+  for (StudyView& view : study.cases.front().views) view.field = path(view.camera + ".af.h5");
   study.cases.push_back(study.cases.front());
   study.cases.back().name = "twin";
   write_text_file(path("twins.toml"), study_to_toml(study, path("")));
   write_text_file(path("no-case.csv"),
                   "start_rx_deg,start_ry_deg,start_rz_deg,start_tx_mm,start_ty_mm,start_tz_mm\n"
                   "0,0,0,1,0,0\n");
-  const std::string run = "registration --study " + path("twins.toml") + fields() +
+  const std::string run = "registration --study " + path("twins.toml") +
                           " --preset fast --starts-from " + path("no-case.csv") + " -o ";
   const test::ProgramRun one = evaluate(run + path("twin-only") + " --case twin");
   ASSERT_EQ(one.exit_code, 0) << one.output;

@@ -356,18 +356,39 @@ TEST(Registration, AChainCanStartFromTheBestEndSoFar) {
   const test::SmallCase small = test::small_case();
   small.problem->target_points_ct = target_points();
   RegistrationOptions options = two_stages("ncc", "gauss-newton");
-  options.chains.push_back(idle_chain(options.chains[0]));
+  // The idle chains end where they start.
+  const ChainOptions idle = idle_chain(options.chains[0]);
+  options.chains = {options.chains[0], idle, idle};
   options.judge.stage = StageOptions();
   options.judge.stage.similarity.name = "rg";
   options.judge.enough_value = 2.0;  // never
-  // The idle chain ends where it starts.
-  const double apart_mm =
-      RegistrationRunner(small.problem, options).run(start_near(small)).chain_distance_mm;
-  EXPECT_GT(apart_mm, 4.0);
+  const auto run = [&] {
+    return RegistrationRunner(small.problem, options).run(start_near(small));
+  };
+  const auto last_pose_to_gold_mm = [&] {
+    const PoseParameters last = run().trace.back().parameters;
+    return mean_distance_mm(pose_from_parameters(small.problem->frame(), last),
+                            small.gold_room_from_ct);
+  };
+  EXPECT_GT(last_pose_to_gold_mm(), 4.0);
+  EXPECT_GT(run().chain_distance_mm, 4.0);
   options.chains.back().from_best_end = true;
-  const RegistrationResult again =
+  EXPECT_LT(last_pose_to_gold_mm(), kFinalStepErrorMm);
+}
+
+TEST(Registration, AChainFromTheBestEndIsLeftOutWhereThereIsNone) {
+  const test::SmallCase small = test::small_case();
+  for (RegistrationView& view : small.problem->views)
+    view.limit = MotionLimit{small.problem->frame(), {3.0 * kRadPerDeg, 1.0}};
+  RegistrationOptions options = two_stages("ncc", "gauss-newton");
+  options.chains.push_back(options.chains[0]);
+  options.chains.back().from_best_end = true;
+  options.judge.stage = StageOptions();
+  options.judge.stage.similarity.name = "rg";
+  const RegistrationResult result =
       RegistrationRunner(small.problem, options).run(start_near(small));
-  EXPECT_LT(again.chain_distance_mm, 1e-3);
+  EXPECT_EQ(result.stop_reason, StopReason::StartInadmissible);
+  EXPECT_FALSE(result.has_pose());
 }
 
 /// X-rays whose middle shows the CT at gold, and whose border shows it elsewhere.
@@ -388,8 +409,8 @@ test::SmallCase case_with_moved_border(const RigidTransform& border_room_from_ct
 
 TEST(Registration, TheFinishChoosesAmongEndsThatTheJudgeHardlyTellsApart) {
   const RigidTransform gold = test::small_case().gold_room_from_ct;
-  // The judge looks at three times the region's area, so it prefers the border's pose: by little
-  // when that is near, by much when it is far.
+  // Three quarters of what the judge looks at are border, so it prefers the border's pose: by
+  // little when that is near, by much when it is far.
   for (const bool is_near : {true, false}) {
     const RigidTransform elsewhere = Eigen::Translation3d(0, 0, is_near ? 2.0 : 6.0) * gold;
     const test::SmallCase small = case_with_moved_border(elsewhere);
@@ -401,12 +422,17 @@ TEST(Registration, TheFinishChoosesAmongEndsThatTheJudgeHardlyTellsApart) {
     options.judge.stage.similarity.name = "rg";
     options.judge.stage.roi_scale = 2.0;
     options.judge.enough_value = 2.0;  // never
+    RegistrationOptions alone = options;
+    alone.chains.pop_back();
+    EXPECT_LT(mean_distance_mm(RegistrationRunner(small.problem, alone).run(elsewhere).room_from_ct,
+                               gold),
+              1.0);
     RegistrationRunner runner(small.problem, options);
     const RegistrationResult result = runner.run(elsewhere);
     const double share =
         runner.similarity_at(gold).similarity / runner.similarity_at(elsewhere).similarity;
     EXPECT_LT(share, is_near ? 1.0 : 0.7);
-    if (is_near) EXPECT_GT(share, 0.83);
+    EXPECT_GT(share, is_near ? 0.83 : 0.0);
     EXPECT_EQ(result.chain, is_near ? "middle" : "idle");
     EXPECT_LT(mean_distance_mm(result.room_from_ct, is_near ? gold : elsewhere), 1.0);
     EXPECT_EQ(result.similarity, runner.similarity_at(result.room_from_ct).similarity);
