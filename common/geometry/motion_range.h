@@ -34,7 +34,7 @@ struct MotionRange {
   [[nodiscard]] MotionRange scaled(double factor) const;
   /// The parameters, each brought into the middle `share` of its bounds.
   [[nodiscard]] PoseParameters clamped(const PoseParameters& parameters, double share = 1.0) const;
-  /// "+-10 deg, +-30 mm" or the bounds of each axis.
+  /// "+-10 degrees, +-30 mm", or the bounds of each axis.
   [[nodiscard]] std::string text() const;
 };
 
