@@ -40,7 +40,6 @@ struct ChainEnd {
 /// An end that the judge has valued.
 struct PortfolioEnd : ChainEnd {
   const ChainOptions* chain = nullptr;
-  double chain_distance_mm = std::numeric_limits<double>::quiet_NaN();
 };
 
 /// Ends that are worth at least this share of the best one to the judge, and lie farther than this
@@ -404,9 +403,6 @@ std::vector<PortfolioEnd> RegistrationRunner::Impl::portfolio_ends(std::int64_t 
       result.stop_reason = end.stop_reason;
     }
   }
-  for (PortfolioEnd& end : ends)
-    end.chain_distance_mm = nearest_mm(
-        end, ends, [](const PortfolioEnd& other) { return !other.chain->from_best_end; });
   return ends;
 }
 
@@ -473,7 +469,10 @@ void RegistrationRunner::Impl::run_portfolio(std::int64_t start_index, Registrat
   const bool has_finish = !options.finish.stages.empty();
   PortfolioEnd best = has_finish ? finished_best(ends, start_index, result) : ends.front();
   result.chain = best.chain->name;
-  result.chain_distance_mm = best.chain_distance_mm;
+  const auto chosen = std::find_if(
+      ends.begin(), ends.end(), [&](const PortfolioEnd& end) { return end.chain == best.chain; });
+  result.chain_distance_mm = nearest_mm(
+      *chosen, ends, [](const PortfolioEnd& other) { return !other.chain->from_best_end; });
   correct(start_index, best, result);
   if (has_finish || options.correction.is_wanted)
     best.similarity = judged(best.room_from_ct, result);
