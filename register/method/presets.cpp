@@ -58,10 +58,15 @@ ChainOptions wide_chain(const std::string& name, const std::string& search) {
                              kOverTheRegion);
 }
 
+/// Searches about the best end so far, and ends as every chain of `robust` does.
+ChainOptions again_chain(const std::string& name, const std::string& search) {
+  return chain_from_text(name, "again: " + search + ";" + kOverTheRegion);
+}
+
 /// Three chains search with different measures, because each has its deepest optimum in a wrong
 /// place for some patients (docs/population.md). If none finds anything, a fourth searches more
 /// widely, by plain correlation: from starts far along a long object, the others went to its end,
-/// out of sight (docs/real-xrays.md). If none convinces, the last one searches about the best end,
+/// out of sight (docs/real-xrays.md). If none convinces, the last two search about the best end,
 /// finer than the others: where anatomy moved about the target, they ended some mm beside it.
 RegistrationOptions robust_preset() {
   ChainOptions far = wide_chain("far", "ncc cma-es level=3 pixels=8 step=20");
@@ -75,9 +80,8 @@ RegistrationOptions robust_preset() {
       wide_chain("wide", "rg cma-es level=2 pixels=16 step=12"),
       wide_chain("wide-edges", "gc cma-es level=2 pixels=16 step=12"),
       far,
-      chain_from_text(
-          "again",
-          std::string("again: gc cma-es level=2 pixels=8 roi=2 step=4 final=1;") + kOverTheRegion)};
+      again_chain("again-edges", "gc cma-es level=2 pixels=8 roi=2 step=4 final=1"),
+      again_chain("again", "rg nelder-mead level=1 pixels=8 roi=2 step=10 final=1")};
   options.finish = chain_from_text("finish", "rg quasi-newton pixels=2 step=2 final=0.02");
   options.judge.enough_value = kConvincingValue;
   return options;
