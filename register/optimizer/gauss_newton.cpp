@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 
+#include "register/optimizer/curvature_bounds.h"
 #include "register/optimizer/search_run.h"
 
 namespace af::registration {
@@ -60,13 +60,7 @@ void LearnedCurvature::learn(const ScaledParameters& step,
 
 ScaledMatrix LearnedCurvature::added_to(const ScaledMatrix& matrix) const {
   if (is_empty_) return matrix;
-  const Eigen::GeneralizedSelfAdjointEigenSolver<ScaledMatrix> shares(matrix + missing_, matrix);
-  if (shares.info() != Eigen::Success) return matrix;
-  // The eigenvectors V are scaled so that V' matrix V = 1, hence the sum is
-  // (matrix V) diag(shares) (matrix V)'.
-  const ScaledMatrix axes = matrix * shares.eigenvectors();
-  const ScaledParameters limited = shares.eigenvalues().cwiseMax(kLeastShare).cwiseMin(kMostShare);
-  return axes * limited.asDiagonal() * axes.transpose();
+  return kept_between(matrix + missing_, matrix, kLeastShare, kMostShare);
 }
 
 void GaussNewton::maximize(OptimizationTarget& target,

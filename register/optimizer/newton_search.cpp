@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 
+#include "register/optimizer/curvature_bounds.h"
 #include "register/optimizer/search_run.h"
 
 namespace af::registration {
@@ -22,18 +22,6 @@ constexpr double kLeastCurvatureOverLargest = 1e-6;
 /// A value lower by this share does not count as worse: near an optimum, ray sampling errors change
 /// values more than the pose does, and the derivatives are more reliable.
 constexpr double kValueNoise = 1e-4;
-
-/// `curvature` with its sizes along the directions that it shares with `scale` kept between
-/// `least` and `most` of the scale's.
-ScaledMatrix kept_between(const ScaledMatrix& curvature,
-                          const ScaledMatrix& scale,
-                          double least,
-                          double most) {
-  const Eigen::GeneralizedSelfAdjointEigenSolver<ScaledMatrix> solver(curvature, scale);
-  const ScaledMatrix directions = scale * solver.eigenvectors();
-  return directions * solver.eigenvalues().cwiseMax(least).cwiseMin(most).asDiagonal() *
-         directions.transpose();
-}
 
 ScaledMatrix bent_downwards(const ScaledMatrix& curvature, const ScaledMatrix& gauss_newton) {
   if (gauss_newton.llt().info() == Eigen::Success)

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "geometry/point_projector.h"
+#include "register/optimizer/curvature_bounds.h"
 
 namespace af::registration {
 namespace {
@@ -11,6 +12,10 @@ namespace {
 /// A parameter that moves projections by less than this (for example a translation along the only
 /// view's beam) is scaled as if it moved them by this much, which keeps its steps finite.
 constexpr double kSmallestDisplacementMm = 1e-3;
+
+/// Where measures that reweight their residuals curve less than this share of what their normal
+/// equations say, searches take them to curve by this share.
+constexpr double kLeastCurvatureShare = 0.03;
 
 bool projects_into(const PointProjector& projector,
                    const RegionOfInterest& roi,
@@ -177,9 +182,16 @@ std::optional<TargetValue> PoseTarget::evaluate_with(const ScaledParameters& poi
   if (!value.is_admissible) return std::nullopt;
   PoseMatrix motions = motions_from_parameters(parameters);
   for (int k = 0; k < 6; ++k) motions.col(k) /= scaling_.displacement_mm[k];
-  return TargetValue{equations.value,
+  TargetValue target{equations.value,
                      motions.transpose() * equations.gradient,
                      motions.transpose() * equations.matrix * motions};
+  if (!equations.reweighting.isZero(0.0))
+    target.matrix =
+        kept_between(target.matrix - motions.transpose() * equations.reweighting * motions,
+                     target.matrix,
+                     kLeastCurvatureShare,
+                     1.0);
+  return target;
 }
 
 }  // namespace af::registration

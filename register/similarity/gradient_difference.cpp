@@ -36,6 +36,7 @@ double GradientDifference::evaluate(std::span<const float> drr,
                                  reference_.weights.data(),
                                  static_cast<float>(gain),
                                  static_cast<float>(variance_[static_cast<std::size_t>(direction)]),
+                                 nullptr,
                                  nullptr},
                                 static_cast<std::int32_t>(drr.size()))
                    .cost /

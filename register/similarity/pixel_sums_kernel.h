@@ -52,6 +52,8 @@ struct RobustRequest {
   float gain;
   float squared_scale;
   float* robust_weights;  ///< receives q; nullptr: not wanted
+  /// Receives 4 q r r / (s + r r), by which the cost curves less than q says; nullptr: not wanted
+  float* lost_weights;
 };
 
 /// Bins of the joint histogram: cell = row offset of the pixel + bin of the DRR value.

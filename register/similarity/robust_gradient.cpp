@@ -23,6 +23,19 @@ double median_gradient(const GradientReference& reference) {
   return *middle;
 }
 
+/// Products of the six derivatives after the gain has followed them: without their parts along the
+/// DRR.
+PoseMatrix without_gain(const GramSums& sums) {
+  const double square = gram_product(sums, kDrrChannel, kDrrChannel);
+  PoseMatrix products;
+  for (int k = 0; k < 6; ++k)
+    for (int l = 0; l < 6; ++l) products(k, l) = gram_product(sums, k, l);
+  if (!(square > 0.0)) return products;
+  PoseVector along;
+  for (int k = 0; k < 6; ++k) along[k] = gram_product(sums, k, kDrrChannel);
+  return products - along * along.transpose() / square;
+}
+
 }  // namespace
 
 RobustGradient::RobustGradient(const SimilarityReference& reference, double residual_scale)
@@ -42,6 +55,7 @@ RobustSums RobustGradient::sums_at(const GradientPair& drr, double gain) const {
                                          reference_.weights.data(),
                                          static_cast<float>(gain),
                                          static_cast<float>(squared_scale_),
+                                         nullptr,
                                          nullptr},
                                         static_cast<std::int32_t>(reference_.weights.size()));
     sums.product += part.product;
@@ -69,6 +83,7 @@ double RobustGradient::evaluate(std::span<const float> drr, SimilarityWorkspace&
 
 double RobustGradient::take_weights(int direction,
                                     double gain,
+                                    bool wants_lost_weights,
                                     GradientWorkspace& workspace) const {
   return pixel_sum_kernels()
       .robust_sums({reference_.xray.of(direction).data(),
@@ -76,7 +91,8 @@ double RobustGradient::take_weights(int direction,
                     reference_.weights.data(),
                     static_cast<float>(gain),
                     static_cast<float>(squared_scale_),
-                    workspace.robust_weights.data()},
+                    workspace.robust_weights.data(),
+                    wants_lost_weights ? workspace.lost_weights.data() : nullptr},
                    static_cast<std::int32_t>(reference_.weights.size()))
       .cost;
 }
@@ -96,7 +112,7 @@ double RobustGradient::evaluate_with_derivative(std::span<const float> drr,
   const auto single_gain = static_cast<float>(gain);
   double cost = 0.0;
   for (int direction = 0; direction < 2; ++direction) {
-    cost += take_weights(direction, gain, mine);
+    cost += take_weights(direction, gain, false, mine);
     const std::vector<float>& x = reference_.xray.of(direction);
     const std::vector<float>& d = mine.drr.of(direction);
     for (std::size_t i = 0; i < drr.size(); ++i)
@@ -113,28 +129,32 @@ NormalEquations RobustGradient::normal_equations(std::span<const float> drr,
   take_gradients(reference_, drr, planes, mine);
   const double gain = gain_of(mine.drr);
   GramSums sums{};
+  GramSums lost{};
   double cost = 0.0;
   for (int direction = 0; direction < 2; ++direction) {
-    cost += take_weights(direction, gain, mine);
-    const GramSums part = gram_sums(mine.planes[static_cast<std::size_t>(direction)],
-                                    mine.drr.of(direction),
-                                    reference_.xray.of(direction),
-                                    mine.robust_weights);
-    for (int i = 0; i < kGramProducts; ++i) sums.products[i] += part.products[i];
+    cost += take_weights(direction, gain, true, mine);
+    const auto add_sums = [&](std::span<const float> weights, GramSums& to) {
+      const GramSums part = gram_sums(mine.planes[static_cast<std::size_t>(direction)],
+                                      mine.drr.of(direction),
+                                      reference_.xray.of(direction),
+                                      weights);
+      for (int i = 0; i < kGramProducts; ++i) to.products[i] += part.products[i];
+    };
+    add_sums(mine.robust_weights, sums);
+    add_sums(mine.lost_weights, lost);
   }
   NormalEquations result;
   result.value = 1.0 - cost / cost_without_drr_;
   const double drr_square = gram_product(sums, kDrrChannel, kDrrChannel);
   if (!(drr_square > 0.0)) return result;
   const double scale = 2.0 / (squared_scale_ * cost_without_drr_);
-  for (int k = 0; k < 6; ++k) {
-    const double with_drr = gram_product(sums, k, kDrrChannel);
-    result.gradient[k] = scale * gain * (gram_product(sums, k, kXrayChannel) - gain * with_drr);
-    for (int l = 0; l < 6; ++l)
-      result.matrix(k, l) =
-          scale * gain * gain *
-          (gram_product(sums, k, l) - with_drr * gram_product(sums, l, kDrrChannel) / drr_square);
-  }
+  for (int k = 0; k < 6; ++k)
+    result.gradient[k] =
+        scale * gain *
+        (gram_product(sums, k, kXrayChannel) - gain * gram_product(sums, k, kDrrChannel));
+  result.matrix = scale * gain * gain * without_gain(sums);
+  for (int i = 0; i < kGramProducts; ++i) lost.products[i] = sums.products[i] - lost.products[i];
+  result.reweighting = result.matrix - scale * gain * gain * without_gain(lost);
   return result;
 }
 

@@ -33,9 +33,12 @@ class RobustGradient final : public SimilarityMeasure {
  private:
   [[nodiscard]] RobustSums sums_at(const GradientPair& drr, double gain) const;
   [[nodiscard]] double gain_of(const GradientPair& drr) const;
-  /// Fills workspace.robust_weights with the weights of one direction, and gives its part of the
-  /// cost.
-  double take_weights(int direction, double gain, GradientWorkspace& workspace) const;
+  /// Fills workspace.robust_weights, and .lost_weights if wanted, with the weights of one
+  /// direction, and gives its part of the cost.
+  double take_weights(int direction,
+                      double gain,
+                      bool wants_lost_weights,
+                      GradientWorkspace& workspace) const;
 
   GradientReference reference_;
   double squared_scale_ = 0.0;

@@ -125,6 +125,7 @@ NormalEquations& NormalEquations::operator+=(const NormalEquations& other) {
   value += other.value;
   gradient += other.gradient;
   matrix += other.matrix;
+  reweighting += other.reweighting;
   return *this;
 }
 

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "register/optimizer/curvature_bounds.h"
 #include "register/optimizer/newton_search.h"
 #include "register/optimizer/optimizer.h"
 #include "unit/register/optimizer/function_target.h"
@@ -178,6 +179,27 @@ TEST(QuasiNewton, ForgetsWhatMadeAStepTooLong) {
   const OptimizerResult result = search("quasi-newton", target);
   EXPECT_EQ(result.stop_reason, StopReason::StepBelowFinal);
   EXPECT_NEAR(result.point[0], 2.0, 0.1);
+}
+
+TEST(CurvatureBounds, KeepWhatIsWithin) {
+  // In directions that a shear makes oblique.
+  ScaledMatrix shear = ScaledMatrix::Identity();
+  shear(0, 1) = 0.7;
+  shear(4, 2) = -0.4;
+  const auto sheared = [&](const ScaledParameters& sizes) -> ScaledMatrix {
+    return shear.transpose() * sizes.asDiagonal() * shear;
+  };
+  ScaledParameters scale;
+  scale << 1.0, 2.0, 3.0, 4.0, 5.0, 6.0;
+  ScaledParameters shares;
+  shares << -1.0, 0.01, 0.1, 0.5, 1.0, 2.0;
+  ScaledParameters kept;
+  kept << 0.1, 0.1, 0.1, 0.5, 1.0, 1.0;
+  const ScaledMatrix found =
+      kept_between(sheared(scale.cwiseProduct(shares)), sheared(scale), 0.1, 1.0);
+  EXPECT_LT((found - sheared(scale.cwiseProduct(kept))).norm(), 1e-12 * found.norm());
+  const ScaledMatrix flat = sheared(ScaledParameters::Unit(0));
+  EXPECT_EQ(kept_between(found, -flat, 0.1, 1.0), -flat);
 }
 
 TEST(GradientAscent, FindsAnIllConditionedMaximum) {

@@ -215,6 +215,45 @@ TEST(SimilarityMeasures, NothingToCompareIsWorthNothing) {
   EXPECT_NEAR(similarity("nmi", reference, flat), 1.0, kSimilarityRounding);
 }
 
+/// Where no derivative leads up, the second derivatives are those of the value, with the gain
+/// eliminated, along planes that change the DRR linearly.
+TEST(RobustGradient, CurvesLessThanItsNormalEquationsByTheReweighting) {
+  Image2d xray = blobs();
+  HashRandom random(8);
+  for (float& pixel : xray.pixels) pixel += static_cast<float>(random.uniform(-0.1, 0.1));
+  const auto measure = make_similarity(options_of("rg"), reference_of(xray));
+  const auto workspace = measure->make_workspace();
+  const std::vector<float> drr = blobs().pixels;
+  const std::size_t pixels = drr.size();
+  std::vector<float> planes;
+  for (int k = 0; k < 6; ++k) {
+    const Image2d plane = blobs(random.uniform(-3.0, 3.0), random.uniform(-3.0, 3.0));
+    planes.insert(planes.end(), plane.pixels.begin(), plane.pixels.end());
+  }
+  const PoseVector slopes = measure->normal_equations(drr, planes, *workspace).gradient;
+  for (std::size_t k = 1; k < 6; ++k) {
+    const auto share = static_cast<float>(slopes[static_cast<int>(k)] / slopes[0]);
+    for (std::size_t i = 0; i < pixels; ++i) planes[k * pixels + i] -= share * planes[i];
+  }
+  const NormalEquations equations = measure->normal_equations(drr, planes, *workspace);
+  const auto slopes_at = [&](std::size_t k, float step) {
+    std::vector<float> moved = drr;
+    for (std::size_t i = 0; i < pixels; ++i) moved[i] += step * planes[k * pixels + i];
+    return measure->normal_equations(moved, planes, *workspace).gradient;
+  };
+  constexpr float kStep = 2e-3f;
+  for (std::size_t k = 1; k < 6; ++k) {
+    const auto column = static_cast<int>(k);
+    const PoseVector fall =
+        (slopes_at(k, -kStep) - slopes_at(k, kStep)) / (2.0 * static_cast<double>(kStep));
+    const PoseVector plain = equations.matrix.col(column);
+    const PoseVector expected = plain - equations.reweighting.col(column);
+    // The gain's few steps do not quite converge, as above.
+    EXPECT_LT((fall - expected).tail<5>().norm(), 0.01 * plain.tail<5>().norm()) << k;
+    EXPECT_GT((fall - plain).tail<5>().norm(), 0.1 * plain.tail<5>().norm()) << k;
+  }
+}
+
 /// Gradients of a ramp are constant but for rounding, which must not be taken for structure.
 TEST(GradientCorrelation, OfARampIsNothingByBothWays) {
   const auto measure = make_similarity(options_of("gc"), reference_of(blobs()));
