@@ -14,9 +14,9 @@ Usage: jobs/real-xrays.sh FOLDER [OPTIONS]
 
 FOLDER holds the images of a circular cone-beam scan. Finds the scan's true geometry from its even views, reconstructs a
 CT from them, takes odd views as X-rays, in pairs about 90 degrees apart and alone, builds a field for each X-ray,
-registers from starts up to 30 mm from the true pose with every preset, by fields, by fields with a finish by ray casting
-(but paper, which has none), and by ray casting, and writes methods.md and report.html. After a stop, run the same command again to continue. Needs the
-programs in build/release/bin (or installed).
+registers from starts up to 30 mm from the true pose with every preset, by fields and by ray casting, both again with a
+finish by ray casting (--correct; paper has none), and writes methods.md, distances.md and report.html. After a
+stop, run the same command again to continue. Needs the programs in build/release/bin (or installed).
 
   --scan FILE               geometry of the scan (af-scan --help)        [FOLDER/scan.toml, else docs/data/cbct-cylinder.toml]
   --output DIR              where everything goes                                                      [./real-xrays]
@@ -135,7 +135,7 @@ for case_name in "${case_names[@]}"; do
     run_folders+=("$output/runs/$case_name-$preset")
     if ((raycast_starts > 0)) && [[ "$preset" != paper ]]; then
       register "finishes/$case_name-$preset-corrected" summary.json "$case_name" "${of_case[@]}" "${from[@]}" \
-        --preset "$preset" --correct --renderer field
+        --preset "$preset" --correct "${both[@]}"
       finish_folders+=("$output/finishes/$case_name-$preset-corrected")
     fi
   done

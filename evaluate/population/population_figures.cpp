@@ -142,7 +142,7 @@ void draw_population_success(const std::vector<PopulationGroup>& groups,
       "\nset xlabel 'initial TRE (mm)'\nset ylabel 'success (%)'\nset yrange [0:102]\n"
       "set xrange [0:" +
       number_text(counting.intervals * counting.interval_width_mm) +
-      "]\nset key outside bottom center horizontal\n";
+      "]\nset key outside bottom center horizontal height 1\n";
   int block = 0;
   for (const std::string& panel : panels)
     script += panel_script(panel, members[panel], figure, block);
@@ -183,7 +183,7 @@ void draw_capture_ranges(const std::vector<PopulationGroup>& groups,
   figure.add("set xlabel 'capture range (mm of initial TRE)'\nset ytics (" + tics +
              ")\nset yrange [" + number_text(-place - 0.6) + ":-0.4]\nset xrange [-1:" +
              number_text(counting.intervals * counting.interval_width_mm + 1.5) +
-             "]\nset key outside bottom center horizontal\nplot " + plot + "\n");
+             "]\nset key outside bottom center horizontal height 1\nplot " + plot + "\n");
   figure.draw(path);
 }
 
