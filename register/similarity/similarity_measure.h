@@ -45,8 +45,8 @@ using PoseMatrix = Eigen::Matrix<double, 6, 6>;
 
 /// A similarity near a pose, as Gauss and Newton see it: S(p + h) ~ value + gradient h - h' matrix
 /// h / 2 with the residuals taken as linear in h and their weights as constant, so that `matrix` is
-/// positive semi-definite. Where residuals count the less the larger they are, S curves less: by
-/// `matrix` - `reweighting`, which may bend upwards.
+/// positive semi-definite. Where residuals count the less the larger they are, S curves less, as
+/// `matrix` - `reweighting` says, which may bend upwards.
 struct NormalEquations {
   double value = 0.0;
   PoseVector gradient = PoseVector::Zero();
