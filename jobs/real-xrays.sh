@@ -14,10 +14,10 @@ Usage: jobs/real-xrays.sh FOLDER [OPTIONS]
 
 FOLDER holds the images of a circular cone-beam scan. Finds the scan's true geometry from its even views, reconstructs a
 CT from them, takes odd views as X-rays, in pairs about 90 degrees apart and alone, builds a field for each X-ray,
-registers from starts up to 30 mm from the true pose with every preset, by fields and by ray casting, and but for paper
-also by fields with a finish by ray casting (--correct) beside ray casting with the finish's steps (0.5 mm instead of
-1), and writes methods.md, distances.md and report.html. After a stop, run the same command again to continue. Needs the
-programs in build/release/bin (or installed).
+registers from starts up to 30 mm from the true pose with every preset, by fields and by ray casting. All but paper
+register again by fields with a finish by ray casting (--correct), beside ray casting with the finish's steps (0.5 mm
+instead of 1). Writes methods.md, finishes.md, distances.md and report.html. After a
+stop, run the same command again to continue. Needs the programs in build/release/bin (or installed).
 
   --scan FILE               geometry of the scan (af-scan --help)        [FOLDER/scan.toml, else docs/data/cbct-cylinder.toml]
   --output DIR              where everything goes                                                      [./real-xrays]
@@ -25,7 +25,8 @@ programs in build/release/bin (or installed).
   --presets LIST            comma separated                                                       [robust,fast,paper]
   --starts-per-interval N   starts in each interval of 2 mm                                                       [8]
   --intervals N             intervals of 2 mm, from 0                                                            [15]
-  --raycast-starts N        of each interval's starts, so many also by ray casting and with a finish by it; 0: none  [1]
+  --raycast-starts N        of each interval's starts, so many also by ray casting, with both steps; 0: no ray casting, and
+                            no finish                                                                            [1]
   --calibration OPTIONS     options of af-scan, in one word, e.g. "--focal-share 0" for a distance that was measured
   --field OPTIONS           options of af-precompute, in one word                                 [--preset standard]
   --max-rotation-deg X      range of the fields, degrees                                                         [16]

@@ -7,12 +7,11 @@ namespace af::registration {
 
 /// The curvature that normal equations leave out, learned from accepted steps.
 ///
-/// Measures that reweight their residuals at every point (rg) curve less than their normal
-/// equations say, so steps by these alone converge only linearly: each is at least half of the one
-/// before. The difference follows from the gradients on either side of a step, by symmetric
-/// rank-one updates: a structured quasi-Newton method (Dennis, Gay and Welsch, An Adaptive
-/// Nonlinear Least-Squares Algorithm, ACM TOMS 7(3), 1981; Nocedal and Wright, Numerical
-/// Optimization, 2006, eq. (6.24)).
+/// DRRs are not linear in the pose, so that where residuals are large the target curves otherwise
+/// than its matrix says, and steps by this alone converge only linearly. The difference follows
+/// from the gradients on either side of a step, by symmetric rank-one updates: a structured
+/// quasi-Newton method (Dennis, Gay and Welsch, An Adaptive Nonlinear Least-Squares Algorithm, ACM
+/// TOMS 7(3), 1981; Nocedal and Wright, Numerical Optimization, 2006, eq. (6.24)).
 class LearnedCurvature {
  public:
   [[nodiscard]] bool is_empty() const { return is_empty_; }

@@ -11,9 +11,9 @@
 namespace af::registration {
 namespace {
 
-/// Least curvature as a share of Gauss and Newton's, which is up to twenty times too large along
-/// some directions where residuals are large (measured on X-rays under stress). Measured curvatures
-/// below this share, or above Gauss and Newton's, are taken for errors of the differences.
+/// Least curvature as a share of the target's own matrix: that of Gauss and Newton, or less where
+/// the measure reweights its residuals (PoseTarget). Measured curvatures below this share, or above
+/// the matrix, are taken for errors of the differences.
 constexpr double kLeastShareOfGaussNewton = 0.03;
 
 /// Least curvature over the largest one, where Gauss and Newton's is not known.

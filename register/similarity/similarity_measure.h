@@ -46,7 +46,8 @@ using PoseMatrix = Eigen::Matrix<double, 6, 6>;
 /// A similarity near a pose, as Gauss and Newton see it: S(p + h) ~ value + gradient h - h' matrix
 /// h / 2 with the residuals taken as linear in h and their weights as constant, so that `matrix` is
 /// positive semi-definite. Where residuals count the less the larger they are, S curves less, as
-/// `matrix` - `reweighting` says, which may bend upwards.
+/// `matrix` - `reweighting` says, which may bend upwards. Left out are second derivatives of the
+/// DRR, and a term of the eliminated gain that vanishes with the gradient.
 struct NormalEquations {
   double value = 0.0;
   PoseVector gradient = PoseVector::Zero();
