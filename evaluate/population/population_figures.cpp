@@ -16,6 +16,9 @@ namespace {
 
 using Points = std::vector<std::vector<double>>;
 
+/// Clear of the x label.
+constexpr const char* kLegendBelow = "set key outside bottom center horizontal height 1\n";
+
 constexpr std::array kPresetColors{palette::kBlue,
                                    palette::kVermilion,
                                    palette::kGreen,
@@ -141,8 +144,7 @@ void draw_population_success(const std::vector<PopulationGroup>& groups,
       "set multiplot layout " + std::to_string(rows) + "," + std::to_string(kColumns) +
       "\nset xlabel 'initial TRE (mm)'\nset ylabel 'success (%)'\nset yrange [0:102]\n"
       "set xrange [0:" +
-      number_text(counting.intervals * counting.interval_width_mm) +
-      "]\nset key outside bottom center horizontal height 1\n";
+      number_text(counting.intervals * counting.interval_width_mm) + "]\n" + kLegendBelow;
   int block = 0;
   for (const std::string& panel : panels)
     script += panel_script(panel, members[panel], figure, block);
@@ -182,8 +184,8 @@ void draw_capture_ranges(const std::vector<PopulationGroup>& groups,
           std::string(palette::kVermilion) + "' title 'mean, 95 % over patients'";
   figure.add("set xlabel 'capture range (mm of initial TRE)'\nset ytics (" + tics +
              ")\nset yrange [" + number_text(-place - 0.6) + ":-0.4]\nset xrange [-1:" +
-             number_text(counting.intervals * counting.interval_width_mm + 1.5) +
-             "]\nset key outside bottom center horizontal height 1\nplot " + plot + "\n");
+             number_text(counting.intervals * counting.interval_width_mm + 1.5) + "]\n" +
+             kLegendBelow + "plot " + plot + "\n");
   figure.draw(path);
 }
 

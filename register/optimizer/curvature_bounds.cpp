@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "register/optimizer/curvature_bounds.h"
 
+#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
 namespace af::registration {
@@ -9,6 +10,8 @@ ScaledMatrix kept_between(const ScaledMatrix& curvature,
                           const ScaledMatrix& scale,
                           double least,
                           double most) {
+  // The solver takes any scale for positive definite.
+  if (scale.llt().info() != Eigen::Success) return scale;
   const Eigen::GeneralizedSelfAdjointEigenSolver<ScaledMatrix> solver(curvature, scale);
   if (solver.info() != Eigen::Success) return scale;
   // The eigenvectors V are scaled so that V' scale V = 1, hence the curvature is

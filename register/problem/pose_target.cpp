@@ -15,7 +15,7 @@ constexpr double kSmallestDisplacementMm = 1e-3;
 
 /// Where measures that reweight their residuals curve less than this share of what their normal
 /// equations say, searches take them to curve by this share.
-constexpr double kLeastCurvatureShare = 0.03;
+constexpr double kLeastShareOfNormalEquations = 0.03;
 
 bool projects_into(const PointProjector& projector,
                    const RegionOfInterest& roi,
@@ -189,7 +189,7 @@ std::optional<TargetValue> PoseTarget::evaluate_with(const ScaledParameters& poi
     target.matrix =
         kept_between(target.matrix - motions.transpose() * equations.reweighting * motions,
                      target.matrix,
-                     kLeastCurvatureShare,
+                     kLeastShareOfNormalEquations,
                      1.0);
   return target;
 }

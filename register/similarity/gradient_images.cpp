@@ -55,7 +55,7 @@ std::unique_ptr<GradientWorkspace> make_gradient_workspace(const GradientReferen
   auto workspace = std::make_unique<GradientWorkspace>();
   workspace->drr.resize(reference.weights.size());
   workspace->robust_weights.resize(reference.weights.size());
-  workspace->lost_weights.resize(reference.weights.size());
+  workspace->curvature_weights.resize(reference.weights.size());
   return workspace;
 }
 

@@ -41,7 +41,7 @@ class GradientWorkspace final : public SimilarityWorkspace {
   /// Gradients of the six derivative planes, [direction]; grown at the first use.
   std::array<std::vector<float>, 2> planes;
   std::vector<float> robust_weights;
-  std::vector<float> lost_weights;
+  std::vector<float> curvature_weights;
   std::vector<float> derivative;
   std::vector<float> padded;
   GradientPair padded_gradients;

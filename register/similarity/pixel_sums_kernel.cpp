@@ -163,8 +163,9 @@ RobustSums robust_sums(const RobustRequest& given, int32_t count) {
     const Floats share = scale / (scale + square);
     const Floats robust = weight * share * share;
     if (request.robust_weights != nullptr) store_some(request.robust_weights + at, robust, left);
-    if (request.lost_weights != nullptr)
-      store_some(request.lost_weights + at, splat(4.0f) * robust * (splat(1.0f) - share), left);
+    if (request.curvature_weights != nullptr)
+      store_some(
+          request.curvature_weights + at, robust * (splat(4.0f) * share - splat(3.0f)), left);
     const Floats weighted = robust * d;
     recent[0] += weighted * x;
     recent[1] += weighted * d;

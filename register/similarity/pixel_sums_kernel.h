@@ -51,9 +51,8 @@ struct RobustRequest {
   const float* weights;
   float gain;
   float squared_scale;
-  float* robust_weights;  ///< receives q; nullptr: not wanted
-  /// Receives 4 q r r / (s + r r), by which the cost curves less than q says; nullptr: not wanted
-  float* lost_weights;
+  float* robust_weights;     ///< receives q; nullptr: not wanted
+  float* curvature_weights;  ///< likewise q (s - 3 r r) / (s + r r), with which the cost curves
 };
 
 /// Bins of the joint histogram: cell = row offset of the pixel + bin of the DRR value.

@@ -83,7 +83,6 @@ double RobustGradient::evaluate(std::span<const float> drr, SimilarityWorkspace&
 
 double RobustGradient::take_weights(int direction,
                                     double gain,
-                                    bool wants_lost_weights,
                                     GradientWorkspace& workspace) const {
   return pixel_sum_kernels()
       .robust_sums({reference_.xray.of(direction).data(),
@@ -92,7 +91,7 @@ double RobustGradient::take_weights(int direction,
                     static_cast<float>(gain),
                     static_cast<float>(squared_scale_),
                     workspace.robust_weights.data(),
-                    wants_lost_weights ? workspace.lost_weights.data() : nullptr},
+                    workspace.curvature_weights.data()},
                    static_cast<std::int32_t>(reference_.weights.size()))
       .cost;
 }
@@ -112,7 +111,7 @@ double RobustGradient::evaluate_with_derivative(std::span<const float> drr,
   const auto single_gain = static_cast<float>(gain);
   double cost = 0.0;
   for (int direction = 0; direction < 2; ++direction) {
-    cost += take_weights(direction, gain, false, mine);
+    cost += take_weights(direction, gain, mine);
     const std::vector<float>& x = reference_.xray.of(direction);
     const std::vector<float>& d = mine.drr.of(direction);
     for (std::size_t i = 0; i < drr.size(); ++i)
@@ -129,10 +128,10 @@ NormalEquations RobustGradient::normal_equations(std::span<const float> drr,
   take_gradients(reference_, drr, planes, mine);
   const double gain = gain_of(mine.drr);
   GramSums sums{};
-  GramSums lost{};
+  GramSums curving{};
   double cost = 0.0;
   for (int direction = 0; direction < 2; ++direction) {
-    cost += take_weights(direction, gain, true, mine);
+    cost += take_weights(direction, gain, mine);
     const auto add_sums = [&](std::span<const float> weights, GramSums& to) {
       const GramSums part = gram_sums(mine.planes[static_cast<std::size_t>(direction)],
                                       mine.drr.of(direction),
@@ -141,7 +140,7 @@ NormalEquations RobustGradient::normal_equations(std::span<const float> drr,
       for (int i = 0; i < kGramProducts; ++i) to.products[i] += part.products[i];
     };
     add_sums(mine.robust_weights, sums);
-    add_sums(mine.lost_weights, lost);
+    add_sums(mine.curvature_weights, curving);
   }
   NormalEquations result;
   result.value = 1.0 - cost / cost_without_drr_;
@@ -153,8 +152,7 @@ NormalEquations RobustGradient::normal_equations(std::span<const float> drr,
         scale * gain *
         (gram_product(sums, k, kXrayChannel) - gain * gram_product(sums, k, kDrrChannel));
   result.matrix = scale * gain * gain * without_gain(sums);
-  for (int i = 0; i < kGramProducts; ++i) lost.products[i] = sums.products[i] - lost.products[i];
-  result.reweighting = result.matrix - scale * gain * gain * without_gain(lost);
+  result.reweighting = result.matrix - scale * gain * gain * without_gain(curving);
   return result;
 }
 

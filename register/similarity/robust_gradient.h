@@ -14,7 +14,11 @@ namespace af::registration {
 /// is eliminated: from least squares, refined by a fixed number of reweighted steps. A perfect DRR
 /// has 1, no DRR at all (a = 0) has 0, and the contribution of occluders, which a DRR cannot show,
 /// is bounded. s = `residual_scale` times the median length of the X-ray's gradients.
-/// \test RobustGradient.OccludersCostABoundedPrice
+///
+/// Its normal equations take the weights as constant. With rho'' in place of rho' / r they become
+/// the curvature (after the gain has followed, but for a term that vanishes with the gradient).
+/// \test RobustGradient.OccludersCostABoundedPrice,
+/// RobustGradient.CurvesLessThanItsNormalEquationsByTheReweighting
 class RobustGradient final : public SimilarityMeasure {
  public:
   /// InputError as GradientReference, or when most of the X-ray has no gradient.
@@ -33,12 +37,9 @@ class RobustGradient final : public SimilarityMeasure {
  private:
   [[nodiscard]] RobustSums sums_at(const GradientPair& drr, double gain) const;
   [[nodiscard]] double gain_of(const GradientPair& drr) const;
-  /// Fills workspace.robust_weights, and .lost_weights if wanted, with the weights of one
-  /// direction, and gives its part of the cost.
-  double take_weights(int direction,
-                      double gain,
-                      bool wants_lost_weights,
-                      GradientWorkspace& workspace) const;
+  /// Fills workspace.robust_weights and .curvature_weights with the weights of one direction, and
+  /// gives its part of the cost.
+  double take_weights(int direction, double gain, GradientWorkspace& workspace) const;
 
   GradientReference reference_;
   double squared_scale_ = 0.0;

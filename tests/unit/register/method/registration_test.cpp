@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "register/method/presets.h"
+#include "register/optimizer/curvature_bounds.h"
 #include "register/problem/pose_target.h"
 #include "unit/register/method/registration_cases.h"
 
@@ -530,24 +531,31 @@ TEST(Registration, GaussNewtonStaysInsideTheMotionRange) {
   EXPECT_NEAR(end.translation_mm.x(), 1.5, 1e-3);
 }
 
+MultiViewObjective objective_of(const RegistrationProblem& problem, const std::string& similarity) {
+  std::vector<ObjectiveView> views;
+  for (const RegistrationView& view : problem.views) {
+    SimilarityReference reference{crop(view.xray, view.view.roi), {}, {0.0, 5.0}};
+    SimilarityOptions options;
+    options.name = similarity;
+    views.push_back({view.view, view.renderer, make_similarity(options, reference), std::nullopt});
+  }
+  return MultiViewObjective(std::move(views));
+}
+
+ParameterScaling some_scaling() {
+  ParameterScaling scaling;
+  scaling.displacement_mm << 40.0, 30.0, 20.0, 1.0, 0.8, 1.2;
+  return scaling;
+}
+
 TEST(PoseTarget, DerivativesAreThoseOfItsValue) {
   const test::SmallCase small = test::small_case();
   for (const char* similarity : {"ncc", "gc", "rg", "ssd", "tncc"}) {
     RegistrationRunner runner(small.problem, two_stages(similarity, "gauss-newton"));
     const RegistrationProblem& problem = runner.problem();
-    std::vector<ObjectiveView> views;
-    for (const RegistrationView& view : problem.views) {
-      SimilarityReference reference{crop(view.xray, view.view.roi), {}, {0.0, 5.0}};
-      SimilarityOptions options;
-      options.name = similarity;
-      views.push_back(
-          {view.view, view.renderer, make_similarity(options, reference), std::nullopt});
-    }
-    MultiViewObjective objective(views);
-    ParameterScaling scaling;
-    scaling.displacement_mm << 40.0, 30.0, 20.0, 1.0, 0.8, 1.2;
+    MultiViewObjective objective = objective_of(problem, similarity);
     PoseTarget target(
-        objective, PoseFrame::about(start_near(small), problem.center_ct_mm), scaling);
+        objective, PoseFrame::about(start_near(small), problem.center_ct_mm), some_scaling());
     ScaledParameters point;
     point << 1.0, -0.7, 0.5, 0.3, -0.2, 0.4;
     const auto with = target.evaluate_with(point, Derivatives::NormalEquations);
@@ -566,6 +574,26 @@ TEST(PoseTarget, DerivativesAreThoseOfItsValue) {
           << similarity << ' ' << k;
     }
   }
+}
+
+TEST(PoseTarget, BoundsTheCurvatureOfReweightedResidualsByTheirNormalEquations) {
+  const test::SmallCase small = test::small_case();
+  MultiViewObjective objective = objective_of(*small.problem, "rg");
+  const ParameterScaling scaling = some_scaling();
+  const PoseFrame frame = PoseFrame::about(start_near(small), small.problem->center_ct_mm);
+  PoseTarget target(objective, frame, scaling);
+  const auto with = target.evaluate_with(ScaledParameters::Zero(), Derivatives::NormalEquations);
+  ASSERT_TRUE(with.has_value());
+  NormalEquations equations;
+  objective.evaluate_with(
+      start_near(small), frame.center_room_mm, Derivatives::NormalEquations, equations);
+  const ScaledMatrix per_mm = scaling.displacement_mm.cwiseInverse().asDiagonal();
+  const ScaledMatrix plain = per_mm * equations.matrix * per_mm;
+  const ScaledMatrix curving = plain - per_mm * equations.reweighting * per_mm;
+  constexpr double kRounding = 1e-9;
+  EXPECT_LT((with->matrix - kept_between(curving, plain, 0.03, 1.0)).norm(),
+            kRounding * plain.norm());
+  EXPECT_GT((with->matrix - plain).norm(), 0.1 * plain.norm());
 }
 
 }  // namespace

@@ -198,8 +198,12 @@ TEST(CurvatureBounds, KeepWhatIsWithin) {
   const ScaledMatrix found =
       kept_between(sheared(scale.cwiseProduct(shares)), sheared(scale), 0.1, 1.0);
   EXPECT_LT((found - sheared(scale.cwiseProduct(kept))).norm(), 1e-12 * found.norm());
-  const ScaledMatrix flat = sheared(ScaledParameters::Unit(0));
-  EXPECT_EQ(kept_between(found, -flat, 0.1, 1.0), -flat);
+  const ScaledMatrix upwards = -ScaledMatrix::Identity();
+  EXPECT_EQ(kept_between(found, upwards, 0.1, 1.0), upwards);
+  // Of rank five, without a zero on its diagonal.
+  ScaledMatrix flat = ScaledMatrix::Identity();
+  flat(0, 1) = flat(1, 0) = 1.0;
+  EXPECT_EQ(kept_between(found, flat, 0.1, 1.0), flat);
 }
 
 TEST(GradientAscent, FindsAnIllConditionedMaximum) {
