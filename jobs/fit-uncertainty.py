@@ -35,13 +35,13 @@ class Row:
         self.is_for_fit = number_of_patient is not None and int(number_of_patient[1]) % 2 == 1
         self.tre = number("tre_mm")
         self.is_success = self.tre < SUCCESS_TRE_MM
-        self.fine_lowest = number("judge_fine_lowest_view")
         self.fine_mean = number("judge_fine_mean")
+        self.background = number("judge_fine_background")
         inflation = number("covariance_inflation")
         self.distance = number("squared_distance") * inflation  # by the sandwich alone
         self.tre_rms = number("predicted_tre_rms_mm") / math.sqrt(inflation) if inflation > 0 else math.nan
         self.tre_95 = number("predicted_tre_95_mm") / math.sqrt(inflation) if inflation > 0 else math.nan
-        self.has_pose = not math.isnan(self.fine_lowest)
+        self.has_pose = not math.isnan(self.fine_mean - self.background)
         self.stated_inflation = inflation
         self.stated_confidence = number("confidence")
         self.inflation = 1.0
@@ -53,7 +53,7 @@ class Row:
     def features(self):
         """The distance of a portfolio's ends is none of them: where no portfolio fails it would stand for success."""
         tre = FAR_MM if math.isnan(self.tre_rms) else min(max(self.tre_rms, NEAR_MM), FAR_MM)
-        return [1.0, self.fine_lowest, math.log(tre)]
+        return [1.0, self.fine_mean - self.background, math.log(tre)]
 
 
 def weighted_quantile(values, weights, share):
@@ -199,7 +199,7 @@ def fit(rows, measures):
             if row.has_pose:
                 row.inflation = math.exp(at_once + growth * max(0.0, row.misfit() + math.log(share_from)))
     coefficients = fit_confidence([row for row in rows if row.is_for_fit and row.has_pose])
-    for name, value in zip(["AtOnce", "ByFine", "ByTre"], coefficients):
+    for name, value in zip(["AtOnce", "ByExcess", "ByTre"], coefficients):
         print(f"constexpr double kConfidence{name} = {value:.2f};")
     for row in rows:
         if row.has_pose:

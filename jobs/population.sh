@@ -30,13 +30,13 @@ command again, also with more patients. Needs the programs in build/release/bin 
   --presets LIST          comma separated                                                       [robust,fast,paper]
   --views LIST            2, 1 or both                                                                         [2,1]
   --intervals N           intervals of initial TRE of 2 mm, from 0                                              [15]
-  --starts N              starts in each of them per true pose                                                   [2]
-  --raycast-patients N    of the first N patients, on clean X-rays, also by ray casting with robust:            [12]
+  --starts N              starts in each of them per true pose                                                   [1]
+  --raycast-patients N    of the first N patients, on clean X-rays, also by ray casting with robust:             [6]
   --raycast-intervals N   ... one start in each of the first N intervals                                         [4]
   --field OPTIONS         options of af-precompute, in one word                                  [--preset standard]
   --max-rotation-deg X    range of the fields, degrees                                                          [20]
   --max-translation-mm X  range of the fields, mm                                                               [40]
-  --quick                 6 patients, 2 poses, 1 start in each interval, ray casting of 1 patient
+  --quick                 6 patients, 2 poses, ray casting of 1 patient
   --slurm                 make the studies here, then submit fields and registrations of every condition to Slurm by
                           jobs/submit.sh; run with --tables when all have ended
   --resources FILE        with --slurm: ranks, memory, time limits                       [jobs/slurm/resources.sh]
@@ -51,7 +51,7 @@ TEXT
 # --- options -----------------------------------------------------------------------------------------------------
 
 target="$PWD/population" patients=60 first=1 kinds=spine,pelvis,head poses=3 variants=clean,all presets=robust,fast,paper
-views=2,1 intervals=15 starts=2 raycast_patients=12 raycast_intervals=4 field_words="--preset standard"
+views=2,1 intervals=15 starts=1 raycast_patients=6 raycast_intervals=4 field_words="--preset standard"
 max_rotation_deg=20 max_translation_mm=40 ranks=$(core_count) seed=1 mode=local resources="$af_root/jobs/slurm/resources.sh"
 cts=() dry_run_option=()
 while (($# > 0)); do
@@ -72,7 +72,7 @@ while (($# > 0)); do
     --field) need_value "$1" $#; field_words=$2; shift ;;
     --max-rotation-deg) need_value "$1" $#; max_rotation_deg=$2; shift ;;
     --max-translation-mm) need_value "$1" $#; max_translation_mm=$2; shift ;;
-    --quick) patients=6 poses=2 starts=1 raycast_patients=1 raycast_intervals=2 ;;
+    --quick) patients=6 poses=2 raycast_patients=1 raycast_intervals=2 ;;
     --slurm) mode=slurm ;;
     --resources) need_value "$1" $#; resources=$(realpath "$2"); shift ;;
     --dry-run) dry_run_option=(--dry-run) ;;
@@ -141,7 +141,7 @@ register() {
   shift 2
   stage "$folder" "$output/runs/$folder/summary.json" run_ranks "$ranks" "$bin/af-evaluate" registration \
     --study "$study" --gold study --intervals "$intervals" --starts-per-interval "$starts" --seed "$seed" \
-    --start-rule within-range --no-uncertainty "$@" -o "$output/runs/$folder"
+    --start-rule within-range --no-uncertainty --no-pictures "$@" -o "$output/runs/$folder"
 }
 
 # study_patient NAME SOURCE: every condition of one patient.

@@ -71,7 +71,7 @@ for preset in "${preset_list[@]}"; do
         stage_inputs="$(state_of "$study")"
         stage "$variant-$preset-$patient" "$run/summary.json" run_ranks "$ranks" "$bin/af-evaluate" registration \
           --study "$study" --gold study --preset "$preset" --start-rule within-range --intervals "$starts" \
-          --starts-per-interval 1 -o "$run"
+          --starts-per-interval 1 --no-pictures -o "$run"
         tables+=("${measure_of[$preset]}:$variant=$run/registrations.csv")
       done
     done

@@ -179,9 +179,13 @@ void add_uncertainty(Method& method, const RegistrationResult& result, Registrat
   if (method.estimator == nullptr) return;
   row.chain_distance_mm = result.chain_distance_mm;
   std::vector<registration::ViewValue> values;
-  if (result.has_pose()) values = method.examiner->view_values(result.room_from_ct);
+  if (result.has_pose()) {
+    values = method.examiner->view_values(result.room_from_ct);
+    if (method.estimator->is_on()) method.examiner->add_backgrounds(result.room_from_ct, values);
+  }
   row.judge = summary_of(values, &registration::ViewValue::coarse);
   row.judge_fine = summary_of(values, &registration::ViewValue::fine);
+  row.judge_background = summary_of(values, &registration::ViewValue::background).mean;
   row.uncertainty = method.estimator->report(result, values);
   if (!std::isfinite(row.uncertainty.covariance_deg_mm[0])) return;
   const PoseParameters error = PoseParameters::from_deg_and_mm(row.final_deg_mm);
@@ -579,7 +583,7 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
   // The starts go before the rows come: memory has room for only one of the two.
   evaluation.starts.starts = {};
   all_or_none(world, [&] {
-    if (world.is_root())
+    if (world.is_root() && !options.has_no_pictures)
       draw_pictures(options, study_case, methods.front(), rows.front(), yardstick, evaluation);
   });
   // Fields and CT go before the rows come: memory has room for only one of the two. Only fields
@@ -587,7 +591,7 @@ CaseEvaluation evaluate_case(const RegistrationStudyOptions& options,
   methods.clear();
   all_or_none(world, [&] {
     if (!world.is_root()) return;
-    draw_setting(options, study, study_case, evaluation);
+    if (!options.has_no_pictures) draw_setting(options, study, study_case, evaluation);
     const WorkNote note("reading the rows of case " + study_case.name, WorkNote::Kind::Phase);
     for (const MethodRows& method : rows)
       evaluation.traces[method.renderer] = add_rows(method, all_rows);

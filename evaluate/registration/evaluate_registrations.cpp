@@ -392,6 +392,11 @@ void describe_starts(Fields& field, RegistrationStudyOptions& options) {
         options.is_starts_only,
         "Write starts.csv, for other programs, and register nothing")
       .not_recorded("without registrations nothing records options");
+  field(
+      "no_pictures",
+      options.has_no_pictures,
+      "Neither overlays nor settings nor folders for 3D Slicer, some 15 MB and a second per case: "
+      "for batches of many runs");
   field("only_start",
         options.only_start,
         "Register from this start alone, its start_index in starts.csv, by every renderer: repeats "

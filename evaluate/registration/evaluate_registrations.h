@@ -29,6 +29,7 @@ struct RegistrationStudyOptions : MethodOptions {
   std::string start_rule = "stratified";           ///< or "uniform", "within-range"
   std::filesystem::path starts_from;               ///< starts.csv instead of drawn ones
   bool is_starts_only = false;                     ///< write starts.csv and register nothing
+  bool has_no_pictures = false;                    ///< neither overlays nor folders for Slicer
   std::optional<std::int64_t> only_start;          ///< of the table of starts, by every renderer
   std::filesystem::path poses_from;                ///< poses that another program found
   std::string method_name = "poses";               ///< what these are called

@@ -61,6 +61,7 @@ struct RegistrationRow {
   // What the registration says of itself, without the gold pose; NaN where it was not asked.
   registration::ViewSummary judge = {kMissing, kMissing};
   registration::ViewSummary judge_fine = {kMissing, kMissing};
+  double judge_background = kMissing;  ///< mean over the views
   registration::UncertaintyReport uncertainty;
   double chain_distance_mm = kMissing;
   double squared_distance = kMissing;  ///< Mahalanobis, of the error by the covariance
@@ -91,6 +92,7 @@ struct RegistrationRow {
                     correction,
                     judge,
                     judge_fine,
+                    judge_background,
                     uncertainty,
                     chain_distance_mm,
                     squared_distance,

@@ -47,7 +47,7 @@ NamedCells registration_row(const RegistrationCells& row,
 NamedCells correction_cells(const std::optional<CorrectionReport>& correction);
 
 /// What the judge says of an end: means and lowest values over the views.
-NamedCells judge_cells(const ViewSummary& coarse, const ViewSummary& fine);
+NamedCells judge_cells(const ViewSummary& coarse, const ViewSummary& fine, double background);
 
 /// Uncertainty: predicted TREs, confidence, inflation, distance of the chains, and the covariance's
 /// upper triangle as `cov_rx_rx` (deg^2), `cov_rx_tx` (deg mm) ... `cov_tz_tz` (mm^2).

@@ -147,6 +147,7 @@ json views_json(const RegistrationRecord& record, const RegistrationProblem& pro
     views.push_back({{"camera", problem.views[i].view.camera.name},
                      {"judge_value", number_or_null(values[i].coarse)},
                      {"judge_value_fine", number_or_null(values[i].fine)},
+                     {"judge_value_beside", number_or_null(values[i].background)},
                      {"agrees", is_judged ? json(agrees) : json()}});
   }
   return {{"verdict", agree ? "nothing found" : "suspicious"},
@@ -255,7 +256,8 @@ NamedCells cells_of(const RegistrationRecord& record,
   NamedCells before_seconds = {{"relative_to", "nominal"},
                                {"verdict", to_string(judgement_of(record).verdict)}};
   append(judge_cells(summary_of(record.view_values, &ViewValue::coarse),
-                     summary_of(record.view_values, &ViewValue::fine)),
+                     summary_of(record.view_values, &ViewValue::fine),
+                     summary_of(record.view_values, &ViewValue::background).mean),
          before_seconds);
   append(uncertainty_cells(record.uncertainty, result.chain_distance_mm), before_seconds);
   if (result.correction.has_value()) append(correction_cells(result.correction), before_seconds);

@@ -28,9 +28,9 @@ constexpr std::array kInflation = {
 };
 
 /// Of success_confidence(), likewise fitted.
-constexpr double kConfidenceAtOnce = -0.83;
-constexpr double kConfidenceByFine = 18.71;
-constexpr double kConfidenceByTre = -1.28;
+constexpr double kConfidenceAtOnce = -2.8;
+constexpr double kConfidenceByExcess = 43.93;
+constexpr double kConfidenceByTre = -1.17;
 
 /// Smaller shares are treated as this one.
 constexpr double kLeastShare = 0.05;
@@ -52,12 +52,13 @@ double covariance_inflation(const std::string& similarity, std::span<const ViewV
 }
 
 double success_confidence(const ConfidenceFeatures& features) {
-  const double share = summary_of(features.view_values, &ViewValue::fine).lowest;
+  const double excess = summary_of(features.view_values, &ViewValue::fine).mean -
+                        summary_of(features.view_values, &ViewValue::background).mean;
   const double tre_mm = std::isfinite(features.sandwich_tre_mm)
                             ? std::clamp(features.sandwich_tre_mm, kNearMm, kFarMm)
                             : kFarMm;
   const double logit =
-      kConfidenceAtOnce + kConfidenceByFine * share + kConfidenceByTre * std::log(tre_mm);
+      kConfidenceAtOnce + kConfidenceByExcess * excess + kConfidenceByTre * std::log(tre_mm);
   return 1.0 / (1.0 + std::exp(-logit));
 }
 

@@ -18,12 +18,14 @@ double covariance_inflation(const std::string& similarity, std::span<const ViewV
 
 /// What tells a success from a failure.
 struct ConfidenceFeatures {
-  std::span<const ViewValue> view_values;
+  std::span<const ViewValue> view_values;  ///< with backgrounds
   double sandwich_tre_mm = 0.0;  ///< as predicted, before inflation; NaN counts as no prediction
 };
 
-/// Probability that the TRE is below 2.5 mm, by logistic regression; NaN where no view can be
-/// judged. \test Calibration.ConfidenceFallsWithEveryDoubt
+/// Probability that the TRE is below 2.5 mm, by logistic regression on how much more of the X-rays'
+/// gradients the pose explains than poses beside it, and on the logarithm of the predicted TRE. NaN
+/// where no view can be judged, or no pose beside it. \test
+/// Calibration.ConfidenceFallsWithEveryDoubt
 double success_confidence(const ConfidenceFeatures& features);
 
 }  // namespace af::registration

@@ -36,9 +36,12 @@ class UncertaintyEstimator {
                        const UncertaintyOptions& options,
                        std::shared_ptr<ThreadPool> pool = nullptr);
 
-  /// `view_values`: of PoseExaminer, at the result's end. Covariance and TREs are NaN when there is
-  /// no end, or when some motion from it is admissible to neither side; the confidence is 0 when
-  /// nothing was found.
+  /// Whether reports say anything.
+  [[nodiscard]] bool is_on() const { return ends_ != nullptr; }
+
+  /// `view_values`: of PoseExaminer, with backgrounds, at the result's end. Covariance and TREs are
+  /// NaN when there is no end, or when some motion from it is admissible to neither side; the
+  /// confidence is 0 when nothing was found.
   [[nodiscard]] UncertaintyReport report(const RegistrationResult& result,
                                          std::span<const ViewValue> view_values);
 

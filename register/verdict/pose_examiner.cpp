@@ -60,24 +60,49 @@ int PoseExaminer::coarsest_level() {
 }
 
 PoseExaminer::PoseExaminer(const RegistrationProblem& problem, double silhouette_mm)
-    : in_silhouette_(silhouette_mm > 0.0) {
-  for (std::size_t i = 0; i < problem.views.size(); ++i)
+    : in_silhouette_(silhouette_mm > 0.0), center_ct_mm_(problem.center_ct_mm) {
+  for (std::size_t i = 0; i < problem.views.size(); ++i) {
+    cameras_.push_back(problem.views[i].view.camera);
     views_.push_back(judge_of(problem, i, silhouette_mm));
+  }
+}
+
+double PoseExaminer::fine_value(std::size_t view, const RigidTransform& room_from_ct) {
+  const double value = views_[view]->similarity_at(room_from_ct, 1).similarity;
+  return in_silhouette_ ? share_of(value) : value;
 }
 
 std::vector<ViewValue> PoseExaminer::view_values(const RigidTransform& room_from_ct) {
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   std::vector<ViewValue> values;
-  for (const auto& view : views_) {
+  for (std::size_t i = 0; i < views_.size(); ++i) {
     values.push_back({kNone, kNone, in_silhouette_});
-    if (!view) continue;
-    values.back().coarse = view->similarity_at(room_from_ct, 0).similarity;
-    values.back().fine = view->similarity_at(room_from_ct, 1).similarity;
-    if (!in_silhouette_) continue;
-    values.back().coarse = share_of(values.back().coarse);
-    values.back().fine = share_of(values.back().fine);
+    if (!views_[i]) continue;
+    const double coarse = views_[i]->similarity_at(room_from_ct, 0).similarity;
+    values.back().coarse = in_silhouette_ ? share_of(coarse) : coarse;
+    values.back().fine = fine_value(i, room_from_ct);
   }
   return values;
+}
+
+void PoseExaminer::add_backgrounds(const RigidTransform& room_from_ct,
+                                   std::vector<ViewValue>& values) {
+  const PoseFrame frame = PoseFrame::about(room_from_ct, center_ct_mm_);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (!views_[i]) continue;
+    double sum = 0.0;
+    int count = 0;
+    for (double mm = kBackgroundDistanceMm; count == 0 && mm >= kBackgroundDistanceMm / 4; mm /= 2)
+      for (const Eigen::Vector3d& axis : {cameras_[i].column_direction, cameras_[i].row_direction})
+        for (const double way : {-mm, mm}) {
+          const double value =
+              fine_value(i, pose_from_parameters(frame, {.translation_mm = way * axis}));
+          if (!std::isfinite(value)) continue;
+          sum += value;
+          ++count;
+        }
+    if (count > 0) values[i].background = sum / count;
+  }
 }
 
 }  // namespace af::registration

@@ -26,9 +26,23 @@ class PoseExaminer {
   /// One per view; NaN where the pose is outside a field, or the X-ray has no gradients to explain.
   [[nodiscard]] std::vector<ViewValue> view_values(const RigidTransform& room_from_ct);
 
+  /// Adds what the views' X-rays have in common with the CT wherever it is: means of `fine` over
+  /// four poses, the CT moved by kBackgroundDistanceMm to both sides along the view's columns and
+  /// its rows, or, where a field holds none of these, by half or a quarter of that. `values`: of
+  /// view_values() at the pose. \test PoseExaminer.BackgroundIsFarBelowARightPose
+  void add_backgrounds(const RigidTransform& room_from_ct, std::vector<ViewValue>& values);
+
  private:
+  /// Share in detail that the view's DRR explains at a pose.
+  double fine_value(std::size_t view, const RigidTransform& room_from_ct);
+
   bool in_silhouette_ = false;
+  Eigen::Vector3d center_ct_mm_;
+  std::vector<CameraGeometry> cameras_;
   std::vector<std::unique_ptr<RegistrationRunner>> views_;  ///< none where nothing can be judged
 };
+
+/// Farther than X-rays and DRRs of bodies correlate, and well within the default fields' range.
+inline constexpr double kBackgroundDistanceMm = 20.0;
 
 }  // namespace af::registration

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <limits>
 #include <span>
 #include <string>
 #include <tuple>
@@ -31,8 +32,11 @@ struct ViewValue {
   /// gradients there (0 where it is negative), which is the share that a gain times the DRR
   /// explains.
   bool in_silhouette = false;
+  /// The share in detail that poses beside this one explain on average
+  /// (PoseExaminer::add_backgrounds); NaN where that was not asked for, or none can be judged.
+  double background = std::numeric_limits<double>::quiet_NaN();
 
-  auto members() { return std::tie(coarse, fine, in_silhouette); }
+  auto members() { return std::tie(coarse, fine, in_silhouette, background); }
 };
 
 /// Limits by what was measured (docs/registration-study.md, Verdicts). An end whose means over the

@@ -702,6 +702,25 @@ TEST_F(EvaluateProgram, WritesOneSelfContainedReport) {
   EXPECT_TRUE(has("camera AP: left edge R, right L, top H, bottom F"));
 }
 
+TEST_F(EvaluateProgram, DrawsNoPicturesWhereNoneAreWanted) {
+  const std::string study = "registration --study " + path("study.toml") + fields() +
+                            "--intervals 1 --starts-per-interval 2 ";
+  ASSERT_EQ(evaluate(study + "-o " + path("drawn/run"), 1).exit_code, 0);
+  ASSERT_EQ(evaluate(study + "--no-pictures -o " + path("plain/run"), 1).exit_code, 0);
+  EXPECT_TRUE(std::filesystem::exists(path("drawn/run/slicer")));
+  EXPECT_FALSE(std::filesystem::exists(path("plain/run/slicer")));
+  for (const auto& entry : std::filesystem::directory_iterator(path("plain/run")))
+    EXPECT_FALSE(entry.path().filename().string().starts_with("ellipsoids-")) << entry.path();
+  // All else is the same, and a report leaves out what is not there.
+  EXPECT_EQ(CsvTable::read(path("plain/run/registrations.csv")).row_count(), 2u);
+  ASSERT_EQ(evaluate("report " + path("plain/run") + " -o " + path("plain/report.html")).exit_code,
+            0);
+  const std::string page = text("plain/report.html");
+  EXPECT_EQ(page.find("What it looks like"), std::string::npos);
+  EXPECT_EQ(page.find("Whether the study fits together"), std::string::npos);
+  EXPECT_NE(page.find("Capture range"), std::string::npos);
+}
+
 TEST_F(EvaluateProgram, LeavesWhatTheReportLinksToBesideIt) {
   make_runs_of_every_kind();
   const std::string page = text("runs/report.html");

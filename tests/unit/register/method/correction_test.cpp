@@ -10,6 +10,7 @@
 #include "gold_standard/tre.h"
 #include "register/method/presets.h"
 #include "register/method/registration.h"
+#include "unit/register/method/narrow_drr.h"
 #include "unit/register/method/registration_cases.h"
 
 namespace af::registration {
@@ -196,37 +197,11 @@ TEST(Correction, OfAPortfolioCorrectsTheChosenEndAndJudgesIt) {
   EXPECT_EQ(result.trace.back().pass, 2);
 }
 
-/// Look-up that ends where rays leave a field: at poses too far from one.
-class NarrowDrr final : public DrrRenderer {
- public:
-  NarrowDrr(std::shared_ptr<const DrrRenderer> renderer, const RigidTransform& middle)
-      : renderer_(std::move(renderer)), middle_(middle) {}
-
-  RenderStatus render(const RigidTransform& room_from_ct,
-                      const View& view,
-                      RenderWorkspace& workspace,
-                      std::span<float> total_attenuation,
-                      const std::optional<PoseGradients>& gradients) const override {
-    const double far_mm = (room_from_ct.translation() - middle_.translation()).norm();
-    if (far_mm > kReachMm) return {1};
-    return renderer_->render(room_from_ct, view, workspace, total_attenuation, gradients);
-  }
-  [[nodiscard]] std::unique_ptr<RenderWorkspace> make_workspace() const override {
-    return renderer_->make_workspace();
-  }
-  [[nodiscard]] const char* name() const override { return "field"; }
-
- private:
-  static constexpr double kReachMm = 1e-3;
-  std::shared_ptr<const DrrRenderer> renderer_;
-  RigidTransform middle_;
-};
-
 TEST(Correction, LeavesAnEndWhoseCorrectedPoseNoFieldHolds) {
   test::SmallCase small = spoilt_case();
   const RigidTransform start = start_near_gold(small);
   for (RegistrationView& view : small.problem->views)
-    view.renderer = std::make_shared<const NarrowDrr>(view.renderer, start);
+    view.renderer = std::make_shared<const test::NarrowDrr>(view.renderer, start, 1e-3);
   small.problem->nominal_room_from_ct = start;
   const RegistrationOptions options = corrected(one_stage("ncc", "gauss-newton"));
   const RegistrationResult result = RegistrationRunner(small.problem, options).run(start);

@@ -176,17 +176,21 @@ TEST(Calibration, WidensWhatThePoseDoesNotExplain) {
 }
 
 TEST(Calibration, ConfidenceFallsWithEveryDoubt) {
-  const std::vector<ViewValue> good = {{0.8, 0.7}, {0.8, 0.7}};
-  const std::vector<ViewValue> one_bad_view = {{0.8, 0.7}, {0.2, 0.1}};
+  const auto confidence = [](double fine, double background, double tre_mm) {
+    const ViewValue value = {0.8, fine, false, background};
+    return success_confidence({std::vector<ViewValue>{value, value}, tre_mm});
+  };
   const double none = std::nan("");
-  const double best = success_confidence({good, 0.1});
+  const double best = confidence(0.5, 0.3, 0.1);
   EXPECT_GT(best, 0.9);
   EXPECT_LE(best, 1.0);
-  EXPECT_LT(success_confidence({one_bad_view, 0.1}), best);
-  EXPECT_LT(success_confidence({good, 8.0}), best);
-  EXPECT_LT(success_confidence({good, none}), best);
-  EXPECT_EQ(success_confidence({good, none}), success_confidence({good, 1e6}));
-  EXPECT_GT(success_confidence({good, 0.0}), best);
+  EXPECT_LT(confidence(0.4, 0.3, 0.1), best);
+  EXPECT_LT(confidence(0.5, 0.4, 0.1), best);
+  EXPECT_LT(confidence(0.5, 0.3, 8.0), best);
+  EXPECT_LT(confidence(0.5, 0.3, none), best);
+  EXPECT_EQ(confidence(0.5, 0.3, none), confidence(0.5, 0.3, 1e6));
+  EXPECT_GT(confidence(0.5, 0.3, 0.0), best);
+  EXPECT_TRUE(std::isnan(confidence(0.5, none, 0.1)));
   EXPECT_TRUE(std::isnan(success_confidence({{}, 0.1})));
 }
 

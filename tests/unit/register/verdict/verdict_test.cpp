@@ -11,6 +11,7 @@
 #include "base/hash_random.h"
 #include "register/verdict/pose_examiner.h"
 #include "register/verdict/view_diagnosis.h"
+#include "unit/register/method/narrow_drr.h"
 #include "unit/register/method/registration_cases.h"
 
 namespace af::registration {
@@ -107,6 +108,32 @@ TEST(PoseExaminer, TellsARightPoseFromAWrongOneInEveryView) {
     EXPECT_GT(right[i].fine, kLeastFineOfFound);
     EXPECT_LT(wrong[i].coarse, 0.5 * right[i].coarse);
   }
+}
+
+TEST(PoseExaminer, BackgroundIsFarBelowARightPose) {
+  const test::SmallCase small = case_with_levels();
+  PoseExaminer examiner(*small.problem, 0.0);
+  auto values = examiner.view_values(small.gold_room_from_ct);
+  EXPECT_TRUE(std::isnan(values[0].background));
+  examiner.add_backgrounds(small.gold_room_from_ct, values);
+  for (const ViewValue& value : values) EXPECT_LT(value.background, 0.3 * value.fine);
+}
+
+TEST(PoseExaminer, BackgroundIsTakenNearerWhereAFieldEnds) {
+  const auto background_within = [](double reach_mm) {
+    test::SmallCase small = case_with_levels();
+    for (RegistrationView& view : small.problem->views)
+      view.renderer =
+          std::make_shared<const test::NarrowDrr>(view.renderer, small.gold_room_from_ct, reach_mm);
+    PoseExaminer examiner(*small.problem, 0.0);
+    auto values = examiner.view_values(small.gold_room_from_ct);
+    examiner.add_backgrounds(small.gold_room_from_ct, values);
+    return values[0].background;
+  };
+  const double far = background_within(1.01 * kBackgroundDistanceMm);
+  const double near = background_within(0.26 * kBackgroundDistanceMm);
+  EXPECT_LT(far, near);
+  EXPECT_TRUE(std::isnan(background_within(0.24 * kBackgroundDistanceMm)));
 }
 
 TEST(PoseExaminer, DoesNotJudgeAnXrayWithoutGradients) {
