@@ -12,6 +12,7 @@ drawn patient KIND-NUMBER; others, which have no number, are never fitted. Needs
 """
 import csv
 import math
+import random
 import re
 import sys
 
@@ -31,6 +32,7 @@ class Row:
         self.measure = measure
         self.variant = variant
         self.case = f"{cells['case']} {variant}"
+        self.patient = re.sub(r"-p\d+$", "", cells["case"])
         number_of_patient = re.search(r"-(\d+)-p\d+$", cells["case"])
         self.is_for_fit = number_of_patient is not None and int(number_of_patient[1]) % 2 == 1
         self.tre = number("tre_mm")
@@ -41,7 +43,8 @@ class Row:
         self.distance = number("squared_distance") * inflation  # by the sandwich alone
         self.tre_rms = number("predicted_tre_rms_mm") / math.sqrt(inflation) if inflation > 0 else math.nan
         self.tre_95 = number("predicted_tre_95_mm") / math.sqrt(inflation) if inflation > 0 else math.nan
-        self.has_pose = not math.isnan(self.fine_mean - self.background)
+        self.has_pose = not math.isnan(self.fine_mean)
+        self.has_confidence = self.has_pose and not math.isnan(self.background)
         self.stated_inflation = inflation
         self.stated_confidence = number("confidence")
         self.inflation = 1.0
@@ -155,11 +158,30 @@ def coverage(rows, holds):
     return sum(w for row, w in zip(rows, weights) if holds(row)) / sum(weights) if rows else math.nan
 
 
+def coverage_interval(rows, holds, draws=2000):
+    """Percentile bootstrap over patients, 95 %, of coverage()."""
+    patients = {}
+    for row, weight in zip(rows, case_weights(rows)):
+        inside, total = patients.get(row.patient, (0.0, 0.0))
+        patients[row.patient] = (inside + weight * holds(row), total + weight)
+    sums = list(patients.values())
+    if len(sums) < 2:
+        return math.nan, math.nan
+    generator = random.Random(1)
+    shares = []
+    for _ in range(draws):
+        drawn = generator.choices(sums, k=len(sums))
+        shares.append(sum(inside for inside, _ in drawn) / sum(total for _, total in drawn))
+    shares.sort()
+    return shares[round(0.025 * (draws - 1))], shares[round(0.975 * (draws - 1))]
+
+
 def summary(label, half, rows):
     known = [row for row in rows if row.is_success and not math.isnan(row.distance)]
-    posed = [row for row in rows if row.has_pose]
+    posed = [row for row in rows if row.has_confidence]
     successes = [row.confidence for row in posed if row.is_success]
     failures = [row.confidence for row in posed if not row.is_success]
+    region_low, region_high = coverage_interval(known, lambda r: r.distance <= REGION_95 * r.inflation)
     return {
         "measure": label,
         "half": half,
@@ -167,6 +189,8 @@ def summary(label, half, rows):
         "successes": len(successes),
         "failures": len(failures),
         "pose_region": coverage(known, lambda r: r.distance <= REGION_95 * r.inflation),
+        "pose_region_low": region_low,
+        "pose_region_high": region_high,
         "tre_region": coverage(known, lambda r: r.tre <= r.tre_95 * math.sqrt(r.inflation)),
         "sandwich_alone": coverage(known, lambda r: r.distance <= REGION_95),
         "roc_area": roc_area(successes, failures),
@@ -180,7 +204,7 @@ def reliability(rows):
     bounds = [0.0, 0.1, 0.5, 0.9, 0.99, 1.0]
     lines = []
     for low, high in zip(bounds, bounds[1:]):
-        within = [r for r in rows if r.has_pose and low <= r.confidence < high + (high == 1.0)]
+        within = [r for r in rows if r.has_confidence and low <= r.confidence < high + (high == 1.0)]
         if within:
             mean = share(r.confidence for r in within)
             succeeded = share(float(r.is_success) for r in within)
@@ -198,11 +222,12 @@ def fit(rows, measures):
         for row in mine:
             if row.has_pose:
                 row.inflation = math.exp(at_once + growth * max(0.0, row.misfit() + math.log(share_from)))
-    coefficients = fit_confidence([row for row in rows if row.is_for_fit and row.has_pose])
+    coefficients = fit_confidence([row for row in rows if row.is_for_fit and row.has_confidence])
     for name, value in zip(["AtOnce", "ByExcess", "ByTre"], coefficients):
         print(f"constexpr double kConfidence{name} = {value:.2f};")
     for row in rows:
-        if row.has_pose:
+        # Ends that the verdict calls not found have none, whatever the constants.
+        if row.has_confidence and row.stated_confidence != 0.0:
             row.confidence = probability(coefficients, row.features())
 
 

@@ -31,7 +31,9 @@ RowParts parts_of(std::span<const RegistrationRow> rows) {
   RowParts parts;
   for (const RegistrationRow& row : rows) {
     parts.correction = parts.correction || row.is_corrected;
-    parts.uncertainty = parts.uncertainty || std::isfinite(row.uncertainty.confidence);
+    // Either may be missing alone.
+    parts.uncertainty = parts.uncertainty || std::isfinite(row.uncertainty.confidence) ||
+                        std::isfinite(row.uncertainty.covariance_deg_mm[0]);
   }
   return parts;
 }

@@ -79,13 +79,13 @@ json uncertainty_statistics(const std::map<std::string, RowPointers>& by_case,
   std::vector<double> squared_distances;
   for (const auto& [name, rows] : by_case)
     for (const RegistrationRow* row : rows) {
-      if (!std::isfinite(row->uncertainty.confidence)) continue;
       const bool is_success = row->is_success(options.success_tre_mm);
-      (is_success ? successes : failures).push_back(row->uncertainty.confidence);
+      if (std::isfinite(row->uncertainty.confidence))
+        (is_success ? successes : failures).push_back(row->uncertainty.confidence);
       if (is_success && std::isfinite(row->squared_distance))
         squared_distances.push_back(row->squared_distance);
     }
-  if (successes.empty() && failures.empty()) return nullptr;
+  if (successes.empty() && failures.empty() && squared_distances.empty()) return nullptr;
   const Region pose = {
       [](const RegistrationRow& row) { return std::isfinite(row.squared_distance); },
       [](const RegistrationRow& row) {

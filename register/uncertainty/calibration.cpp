@@ -21,16 +21,16 @@ struct InflationRow {
 /// phantom (docs/uncertainty.md). The last row is for measures that were not fitted: the most
 /// cautious of them.
 constexpr std::array kInflation = {
-    InflationRow{"rg", 0.41, 2.80, 0.65},
-    InflationRow{"gc", 0.25, 1.25, 0.65},
+    InflationRow{"rg", 0.09, 2.95, 0.65},
+    InflationRow{"gc", 0.00, 1.90, 0.65},
     InflationRow{"mi", 2.50, 8.00, 0.65},
     InflationRow{"", 2.50, 8.00, 0.65},
 };
 
 /// Of success_confidence(), likewise fitted.
-constexpr double kConfidenceAtOnce = -2.8;
-constexpr double kConfidenceByExcess = 43.93;
-constexpr double kConfidenceByTre = -1.17;
+constexpr double kConfidenceAtOnce = -3.64;
+constexpr double kConfidenceByExcess = 50.09;
+constexpr double kConfidenceByTre = -0.82;
 
 /// Smaller shares are treated as this one.
 constexpr double kLeastShare = 0.05;
@@ -53,7 +53,7 @@ double covariance_inflation(const std::string& similarity, std::span<const ViewV
 
 double success_confidence(const ConfidenceFeatures& features) {
   const double excess = summary_of(features.view_values, &ViewValue::fine).mean -
-                        summary_of(features.view_values, &ViewValue::background).mean;
+                        mean_background(features.view_values);
   const double tre_mm = std::isfinite(features.sandwich_tre_mm)
                             ? std::clamp(features.sandwich_tre_mm, kNearMm, kFarMm)
                             : kFarMm;

@@ -32,7 +32,7 @@ void UncertaintyOptions::describe(Fields& field) {
   field("no_uncertainty",
         is_left_out,
         "Do not say how far the pose may be from the truth: no covariance, no confidence. Saves "
-        "some 13 DRRs with derivatives per registration");
+        "some 13 DRRs with derivatives and 4 without per view");
   field("calibration_error_px",
         calibration_error_px,
         "Error of the cameras' calibration to include in covariances: the standard deviation "

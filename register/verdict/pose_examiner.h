@@ -26,10 +26,11 @@ class PoseExaminer {
   /// One per view; NaN where the pose is outside a field, or the X-ray has no gradients to explain.
   [[nodiscard]] std::vector<ViewValue> view_values(const RigidTransform& room_from_ct);
 
-  /// Adds what the views' X-rays have in common with the CT wherever it is: means of `fine` over
-  /// four poses, the CT moved by kBackgroundDistanceMm to both sides along the view's columns and
-  /// its rows, or, where a field holds none of these, by half or a quarter of that. `values`: of
-  /// view_values() at the pose. \test PoseExaminer.BackgroundIsFarBelowARightPose
+  /// Adds what a view's X-ray has in common with the CT wherever that is: the mean of `fine` over
+  /// the poses beside this one that the view's field holds, of four with the CT moved by
+  /// kBackgroundDistanceMm to both sides along the view's columns and its rows; where it holds none
+  /// of them, by half or a quarter of that. `values`: of view_values() at the pose.
+  /// \test PoseExaminer.BackgroundIsFarBelowARightPose
   void add_backgrounds(const RigidTransform& room_from_ct, std::vector<ViewValue>& values);
 
  private:
@@ -42,7 +43,8 @@ class PoseExaminer {
   std::vector<std::unique_ptr<RegistrationRunner>> views_;  ///< none where nothing can be judged
 };
 
-/// Farther than X-rays and DRRs of bodies correlate, and well within the default fields' range.
+/// The farther, the better failures were told from successes (docs/uncertainty.md, on 2 to 16 mm);
+/// within the default fields' range.
 inline constexpr double kBackgroundDistanceMm = 20.0;
 
 }  // namespace af::registration

@@ -130,6 +130,17 @@ bool disagrees(std::size_t view, std::span<const ViewValue> values) {
          is_far_below_others(view, values, &ViewValue::fine, limits.fine_of_found);
 }
 
+double mean_background(std::span<const ViewValue> values) {
+  double sum = 0.0;
+  int count = 0;
+  for (const ViewValue& value : values) {
+    if (!std::isfinite(value.fine)) continue;
+    sum += value.background;
+    ++count;
+  }
+  return count > 0 ? sum / count : std::nan("");
+}
+
 ViewSummary summary_of(std::span<const ViewValue> values, double ViewValue::*value) {
   ViewSummary summary = {0.0, std::nan("")};
   int count = 0;

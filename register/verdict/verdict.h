@@ -85,4 +85,9 @@ struct ViewSummary {
 };
 ViewSummary summary_of(std::span<const ViewValue> values, double ViewValue::*value);
 
+/// Mean background of the views that can be judged; NaN when one of them has none, so that it is
+/// of the same views as summary_of() of `fine`.
+/// \test PoseExaminer.MeanBackgroundIsOfTheViewsThatAreJudged
+double mean_background(std::span<const ViewValue> values);
+
 }  // namespace af::registration

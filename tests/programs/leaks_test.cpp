@@ -174,7 +174,7 @@ TEST_F(Leaks, AMirroredXrayIsFoundAtAnotherPoseOrNotAtAll) {
   }
 }
 
-TEST_F(Leaks, PatientsAndSeedsShareNoNoise) {
+TEST_F(Leaks, SeedsShareNoNoise) {
   // Two X-rays of one patient at one pose whose seeds differ: their noise is independent. Of n
   // pixels the correlation is within 5 / sqrt(n).
   simulate("noise-1", "--anatomy-seed 1 --seed 1", 3.0, 0.0);
@@ -198,7 +198,7 @@ TEST_F(Leaks, PatientsAndSeedsShareNoNoise) {
             5.0 / std::sqrt(static_cast<double>(mean.pixels.size())));
 }
 
-TEST_F(Leaks, StartsDependOnTheirSeedAndNotOnThePatient) {
+TEST_F(Leaks, StartsDependOnTheirSeedAndNotOnThePose) {
   // Starts relative to gold say nothing about where gold is: a study at another true pose has the
   // same draws, another seed has others.
   const auto starts = [&](const std::string& study, int seed) {

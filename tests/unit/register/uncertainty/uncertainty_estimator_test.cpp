@@ -191,11 +191,14 @@ TEST(UncertaintyEstimator, TakesRobustGradientsWhereAMeasureHasNoDerivative) {
   result.similarity = 1.0;
   result.chain = options.chains.front().name;
   UncertaintyEstimator estimator(small.problem, options, {});
-  const UncertaintyReport report = estimator.report(result, std::vector<ViewValue>{{0.9, 0.9}});
+  const UncertaintyReport report =
+      estimator.report(result, std::vector<ViewValue>{{0.9, 0.9, false, 0.15}});
   EXPECT_TRUE(std::isfinite(report.covariance_deg_mm[0]));
   // What the X-rays explain moves the confidence, whatever the calibration makes of this small
   // case.
-  const UncertaintyReport worse = estimator.report(result, std::vector<ViewValue>{{0.1, 0.1}});
+  const UncertaintyReport worse =
+      estimator.report(result, std::vector<ViewValue>{{0.3, 0.15, false, 0.15}});
+  EXPECT_GT(worse.confidence, 0.0);
   EXPECT_GT(report.confidence, 2.0 * worse.confidence);
 }
 

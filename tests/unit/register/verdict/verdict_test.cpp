@@ -119,6 +119,16 @@ TEST(PoseExaminer, BackgroundIsFarBelowARightPose) {
   for (const ViewValue& value : values) EXPECT_LT(value.background, 0.3 * value.fine);
 }
 
+TEST(PoseExaminer, MeanBackgroundIsOfTheViewsThatAreJudged) {
+  const double none = std::nan("");
+  EXPECT_DOUBLE_EQ(mean_background(std::vector<ViewValue>{
+                       {0.5, 0.4, false, 0.1}, {0.5, 0.4, false, 0.3}, {none, none}}),
+                   0.2);
+  EXPECT_TRUE(std::isnan(
+      mean_background(std::vector<ViewValue>{{0.5, 0.4, false, 0.1}, {0.5, 0.4, false, none}})));
+  EXPECT_TRUE(std::isnan(mean_background({})));
+}
+
 TEST(PoseExaminer, BackgroundIsTakenNearerWhereAFieldEnds) {
   const auto background_within = [](double reach_mm) {
     test::SmallCase small = case_with_levels();
