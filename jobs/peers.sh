@@ -90,6 +90,9 @@ peer() {
   stage "$case_name-$name-poses" "$poses" "$python" "$af_root/evaluate/peers/$script" \
     --study "$output/studies/$case_name/study.toml" --case "$kind" --starts "$output/starts/$case_name/starts.csv" \
     --most "$most" -o "$poses"
+  local stage_inputs
+  # shellcheck disable=SC2034  # for stage()
+  stage_inputs="$(state_of "$poses")"
   evaluate "$case_name-$name" "$case_name" --poses-from "$poses" --method-name "$name"
 }
 
