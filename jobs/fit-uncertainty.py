@@ -172,15 +172,14 @@ def coverage_interval(rows, holds, draws=2000):
     for _ in range(draws):
         drawn = generator.choices(sums, k=len(sums))
         shares.append(sum(inside for inside, _ in drawn) / sum(total for _, total in drawn))
-    shares.sort()
-    return shares[round(0.025 * (draws - 1))], shares[round(0.975 * (draws - 1))]
+    alike = [1.0] * draws
+    return weighted_quantile(shares, alike, 0.025), weighted_quantile(shares, alike, 0.975)
 
 
 def summary(label, half, rows):
     known = [row for row in rows if row.is_success and not math.isnan(row.distance)]
-    posed = [row for row in rows if row.has_confidence]
-    successes = [row.confidence for row in posed if row.is_success]
-    failures = [row.confidence for row in posed if not row.is_success]
+    successes = [row.confidence for row in rows if row.has_confidence and row.is_success]
+    failures = [row.confidence for row in rows if row.has_confidence and not row.is_success]
     region_low, region_high = coverage_interval(known, lambda r: r.distance <= REGION_95 * r.inflation)
     return {
         "measure": label,

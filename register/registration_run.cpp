@@ -258,8 +258,7 @@ std::vector<RegistrationRecord> register_starts(RegistrationRunner& runner,
     RegistrationRecord record;
     record.start_index = index;
     record.result = runner.run(starts[static_cast<std::size_t>(index)], index);
-    record.view_values = examiner.view_values(record.result.room_from_ct);
-    if (estimator.is_on()) examiner.add_backgrounds(record.result.room_from_ct, record.view_values);
+    record.view_values = examiner.view_values(record.result.room_from_ct, estimator.is_on());
     record.uncertainty = estimator.report(record.result, record.view_values);
     return record;
   };

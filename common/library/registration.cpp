@@ -132,8 +132,7 @@ struct RegistrationCase::Impl {
   /// `is_diagnosed`: X-rays that do not fit are looked into, as af-register does for its best end.
   Registration run(const af::RigidTransform& start, std::int64_t start_index, bool is_diagnosed) {
     const registration::RegistrationResult result = runner->run(start, start_index);
-    auto view_values = examiner->view_values(result.room_from_ct);
-    if (estimator->is_on()) examiner->add_backgrounds(result.room_from_ct, view_values);
+    const auto view_values = examiner->view_values(result.room_from_ct, estimator->is_on());
     registration::Judgement judgement = registration::judged_end(result.stop_reason, view_values);
     if (is_diagnosed && !view_values.empty() && result.evaluations > 0)
       judgement = registration::judgement_with(

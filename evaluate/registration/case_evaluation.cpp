@@ -179,10 +179,8 @@ void add_uncertainty(Method& method, const RegistrationResult& result, Registrat
   if (method.estimator == nullptr) return;
   row.chain_distance_mm = result.chain_distance_mm;
   std::vector<registration::ViewValue> values;
-  if (result.has_pose()) {
-    values = method.examiner->view_values(result.room_from_ct);
-    if (method.estimator->is_on()) method.examiner->add_backgrounds(result.room_from_ct, values);
-  }
+  if (result.has_pose())
+    values = method.examiner->view_values(result.room_from_ct, method.estimator->is_on());
   row.judge = summary_of(values, &registration::ViewValue::coarse);
   row.judge_fine = summary_of(values, &registration::ViewValue::fine);
   row.judge_background = registration::mean_background(values);

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "base/error.h"
+#include "base/sample_summary.h"
 
 namespace af::registration {
 namespace {
@@ -25,6 +26,10 @@ StageOptions silhouette_stage(double silhouette_mm) {
 double share_of(double correlation) {
   return std::isfinite(correlation) ? std::pow(std::max(0.0, correlation), 2) : correlation;
 }
+
+/// Places in judging_options().
+constexpr std::size_t kCoarse = 0;
+constexpr std::size_t kFine = 1;
 
 /// Two stages, to be evaluated only: the judge's at the coarsest level that the view has up to its
 /// own, and at level 0.
@@ -53,6 +58,33 @@ std::unique_ptr<RegistrationRunner> judge_of(const RegistrationProblem& problem,
   }
 }
 
+double share_at(RegistrationRunner& view,
+                std::size_t stage,
+                const RigidTransform& room_from_ct,
+                bool in_silhouette) {
+  const double value = view.similarity_at(room_from_ct, stage).similarity;
+  return in_silhouette ? share_of(value) : value;
+}
+
+/// Mean share in detail over the poses that the field holds of four `mm` beside one; NaN for none.
+double share_beside(RegistrationRunner& view,
+                    const RigidTransform& room_from_ct,
+                    double mm,
+                    bool in_silhouette) {
+  const RegistrationProblem& problem = view.problem();
+  const CameraGeometry& camera = problem.views.front().view.camera;
+  const PoseFrame frame = PoseFrame::about(room_from_ct, problem.center_ct_mm);
+  std::vector<double> shares;
+  for (const Eigen::Vector3d& direction : {camera.column_direction, camera.row_direction})
+    for (const double way_mm : {-mm, mm}) {
+      const RigidTransform beside =
+          pose_from_parameters(frame, {.translation_mm = way_mm * direction});
+      const double share = share_at(view, kFine, beside, in_silhouette);
+      if (std::isfinite(share)) shares.push_back(share);
+    }
+  return mean_of(shares);
+}
+
 }  // namespace
 
 int PoseExaminer::coarsest_level() {
@@ -60,49 +92,28 @@ int PoseExaminer::coarsest_level() {
 }
 
 PoseExaminer::PoseExaminer(const RegistrationProblem& problem, double silhouette_mm)
-    : in_silhouette_(silhouette_mm > 0.0), center_ct_mm_(problem.center_ct_mm) {
-  for (std::size_t i = 0; i < problem.views.size(); ++i) {
-    cameras_.push_back(problem.views[i].view.camera);
+    : in_silhouette_(silhouette_mm > 0.0) {
+  for (std::size_t i = 0; i < problem.views.size(); ++i)
     views_.push_back(judge_of(problem, i, silhouette_mm));
-  }
 }
 
-double PoseExaminer::fine_value(std::size_t view, const RigidTransform& room_from_ct) {
-  const double value = views_[view]->similarity_at(room_from_ct, 1).similarity;
-  return in_silhouette_ ? share_of(value) : value;
-}
-
-std::vector<ViewValue> PoseExaminer::view_values(const RigidTransform& room_from_ct) {
+std::vector<ViewValue> PoseExaminer::view_values(const RigidTransform& room_from_ct,
+                                                 bool with_backgrounds) {
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   std::vector<ViewValue> values;
-  for (std::size_t i = 0; i < views_.size(); ++i) {
-    values.push_back({kNone, kNone, in_silhouette_});
-    if (!views_[i]) continue;
-    const double coarse = views_[i]->similarity_at(room_from_ct, 0).similarity;
-    values.back().coarse = in_silhouette_ ? share_of(coarse) : coarse;
-    values.back().fine = fine_value(i, room_from_ct);
+  for (const auto& view : views_) {
+    ViewValue& value = values.emplace_back(ViewValue{kNone, kNone, in_silhouette_});
+    if (!view) continue;
+    value.coarse = share_at(*view, kCoarse, room_from_ct, in_silhouette_);
+    value.fine = share_at(*view, kFine, room_from_ct, in_silhouette_);
+    if (!with_backgrounds) continue;
+    for (const double part : {1.0, 0.5, 0.25}) {
+      value.background =
+          share_beside(*view, room_from_ct, part * kBackgroundDistanceMm, in_silhouette_);
+      if (std::isfinite(value.background)) break;
+    }
   }
   return values;
-}
-
-void PoseExaminer::add_backgrounds(const RigidTransform& room_from_ct,
-                                   std::vector<ViewValue>& values) {
-  const PoseFrame frame = PoseFrame::about(room_from_ct, center_ct_mm_);
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    if (!views_[i]) continue;
-    double sum = 0.0;
-    int count = 0;
-    for (double mm = kBackgroundDistanceMm; count == 0 && mm >= kBackgroundDistanceMm / 4; mm /= 2)
-      for (const Eigen::Vector3d& axis : {cameras_[i].column_direction, cameras_[i].row_direction})
-        for (const double way : {-mm, mm}) {
-          const double value =
-              fine_value(i, pose_from_parameters(frame, {.translation_mm = way * axis}));
-          if (!std::isfinite(value)) continue;
-          sum += value;
-          ++count;
-        }
-    if (count > 0) values[i].background = sum / count;
-  }
 }
 
 }  // namespace af::registration

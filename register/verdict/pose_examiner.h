@@ -24,22 +24,16 @@ class PoseExaminer {
   PoseExaminer(const RegistrationProblem& problem, double silhouette_mm);
 
   /// One per view; NaN where the pose is outside a field, or the X-ray has no gradients to explain.
-  [[nodiscard]] std::vector<ViewValue> view_values(const RigidTransform& room_from_ct);
-
-  /// Adds what a view's X-ray has in common with the CT wherever that is: the mean of `fine` over
-  /// the poses beside this one that the view's field holds, of four with the CT moved by
-  /// kBackgroundDistanceMm to both sides along the view's columns and its rows; where it holds none
-  /// of them, by half or a quarter of that. `values`: of view_values() at the pose.
-  /// \test PoseExaminer.BackgroundIsFarBelowARightPose
-  void add_backgrounds(const RigidTransform& room_from_ct, std::vector<ViewValue>& values);
+  /// `with_backgrounds`: also what the X-ray has in common with the CT wherever that is, the mean
+  /// of `fine` over the poses beside this one that the view's field holds: of four with the CT
+  /// moved by kBackgroundDistanceMm to both sides along the view's columns and its rows; where it
+  /// holds none of them, by half or a quarter of that. \test
+  /// PoseExaminer.BackgroundIsFarBelowARightPose
+  [[nodiscard]] std::vector<ViewValue> view_values(const RigidTransform& room_from_ct,
+                                                   bool with_backgrounds = false);
 
  private:
-  /// Share in detail that the view's DRR explains at a pose.
-  double fine_value(std::size_t view, const RigidTransform& room_from_ct);
-
   bool in_silhouette_ = false;
-  Eigen::Vector3d center_ct_mm_;
-  std::vector<CameraGeometry> cameras_;
   std::vector<std::unique_ptr<RegistrationRunner>> views_;  ///< none where nothing can be judged
 };
 

@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <vector>
+
+#include "base/sample_summary.h"
 
 namespace af::registration {
 namespace {
@@ -131,14 +134,10 @@ bool disagrees(std::size_t view, std::span<const ViewValue> values) {
 }
 
 double mean_background(std::span<const ViewValue> values) {
-  double sum = 0.0;
-  int count = 0;
-  for (const ViewValue& value : values) {
-    if (!std::isfinite(value.fine)) continue;
-    sum += value.background;
-    ++count;
-  }
-  return count > 0 ? sum / count : std::nan("");
+  std::vector<double> backgrounds;
+  for (const ViewValue& value : values)
+    if (std::isfinite(value.fine)) backgrounds.push_back(value.background);
+  return mean_of(backgrounds);
 }
 
 ViewSummary summary_of(std::span<const ViewValue> values, double ViewValue::*value) {

@@ -33,7 +33,7 @@ struct ViewValue {
   /// explains.
   bool in_silhouette = false;
   /// The share in detail that poses beside this one explain on average
-  /// (PoseExaminer::add_backgrounds); NaN where that was not asked for, or none can be judged.
+  /// (PoseExaminer::view_values); NaN where that was not asked for, or none can be judged.
   double background = std::numeric_limits<double>::quiet_NaN();
 
   auto members() { return std::tie(coarse, fine, in_silhouette, background); }

@@ -113,10 +113,9 @@ TEST(PoseExaminer, TellsARightPoseFromAWrongOneInEveryView) {
 TEST(PoseExaminer, BackgroundIsFarBelowARightPose) {
   const test::SmallCase small = case_with_levels();
   PoseExaminer examiner(*small.problem, 0.0);
-  auto values = examiner.view_values(small.gold_room_from_ct);
-  EXPECT_TRUE(std::isnan(values[0].background));
-  examiner.add_backgrounds(small.gold_room_from_ct, values);
-  for (const ViewValue& value : values) EXPECT_LT(value.background, 0.3 * value.fine);
+  EXPECT_TRUE(std::isnan(examiner.view_values(small.gold_room_from_ct)[0].background));
+  for (const ViewValue& value : examiner.view_values(small.gold_room_from_ct, true))
+    EXPECT_LT(value.background, 0.3 * value.fine);
 }
 
 TEST(PoseExaminer, MeanBackgroundIsOfTheViewsThatAreJudged) {
@@ -135,10 +134,9 @@ TEST(PoseExaminer, BackgroundIsTakenNearerWhereAFieldEnds) {
     for (RegistrationView& view : small.problem->views)
       view.renderer =
           std::make_shared<const test::NarrowDrr>(view.renderer, small.gold_room_from_ct, reach_mm);
-    PoseExaminer examiner(*small.problem, 0.0);
-    auto values = examiner.view_values(small.gold_room_from_ct);
-    examiner.add_backgrounds(small.gold_room_from_ct, values);
-    return values[0].background;
+    return PoseExaminer(*small.problem, 0.0)
+        .view_values(small.gold_room_from_ct, true)[0]
+        .background;
   };
   const double far = background_within(1.01 * kBackgroundDistanceMm);
   const double near = background_within(0.26 * kBackgroundDistanceMm);
