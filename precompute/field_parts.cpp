@@ -11,6 +11,7 @@
 #include "precompute/casting/casters.h"
 #include "precompute/casting/corrected_caster.h"
 #include "precompute/casting/joined_caster.h"
+#include "precompute/casting/least_squares_caster.h"
 #include "precompute/casting/unit_costs.h"
 #include "precompute/plan/orbit_text.h"
 #include "study/rig_file.h"
@@ -89,23 +90,33 @@ std::vector<FieldPart> parts_of_orbit(const FieldSource& source,
   return parts;
 }
 
-std::unique_ptr<const FieldCaster> caster_of_part(const FieldPart& part,
-                                                  const PrecomputeOptions& options,
-                                                  const AttenuationQuantizer& quantizer) {
-  std::unique_ptr<const FieldCaster> of_ct = caster_named(options.caster)
-                                                 .make({*part.source.volume,
-                                                        part.resampled.get(),
-                                                        part.light_slab,
-                                                        quantizer,
-                                                        options.ray_caster});
+/// Of line integrals of the part's CT, with what measured X-rays show beyond it.
+std::unique_ptr<const FieldCaster> line_integral_caster(const FieldPart& part,
+                                                        const LightSlab& planes,
+                                                        const PrecomputeOptions& options,
+                                                        const AttenuationQuantizer& quantizer) {
+  std::unique_ptr<const FieldCaster> of_ct =
+      caster_named(options.caster)
+          .make({*part.source.volume, part.resampled.get(), planes, quantizer, options.ray_caster});
   if (part.source.projections == nullptr) return of_ct;
   const Eigen::Vector3d toward_source =
-      part.light_slab.slab_from_ct.linear().transpose() * Eigen::Vector3d::UnitY();
+      planes.slab_from_ct.linear().transpose() * Eigen::Vector3d::UnitY();
   return std::make_unique<const CorrectedFieldCaster>(
       std::move(of_ct),
       MeasuredResidual(part.source.projections->views, *part.source.volume, toward_source),
-      part.light_slab,
+      planes,
       quantizer);
+}
+
+std::unique_ptr<const FieldCaster> caster_of_part(const FieldPart& part,
+                                                  const PrecomputeOptions& options,
+                                                  const AttenuationQuantizer& quantizer) {
+  const auto of_planes = [&](const LightSlab& planes) {
+    return line_integral_caster(part, planes, options, quantizer);
+  };
+  if (options.design().fits_uv)
+    return std::make_unique<const LeastSquaresFieldCaster>(part.light_slab, of_planes);
+  return of_planes(part.light_slab);
 }
 
 std::vector<std::size_t> slab_counts(const std::vector<FieldPart>& parts) {

@@ -77,6 +77,11 @@ struct Setup {
   [[nodiscard]] std::string look_up(const ImageQualityOptions& options) const {
     return options.look_up.empty() ? field->info().look_up : options.look_up;
   }
+  [[nodiscard]] bool has_fitted_viewpoints() const {
+    const OptionTexts made_with = option_texts(field->info().provenance.options_toml);
+    const auto samples = made_with.find("uv_samples");
+    return samples != made_with.end() && samples->second == "\"least-squares\"";
+  }
   [[nodiscard]] std::int64_t pose_count(const ImageQualityOptions& options) const {
     return poses.empty() ? options.pose_count : static_cast<std::int64_t>(poses.size());
   }
@@ -143,6 +148,11 @@ Setup load(const ImageQualityOptions& options, const Target& target, const Commu
                        std::to_string(options.split_loss_poses),
                        "is for linear look-up; the field's own is " + setup.look_up(options) +
                            ": give --look-up linear",
+                       target.field.string());
+    if (options.split_loss_poses > 0 && setup.has_fitted_viewpoints())
+      throw InputError("--split-loss-poses",
+                       std::to_string(options.split_loss_poses),
+                       "is for point samples; this field has least-squares viewpoints",
                        target.field.string());
     choose_camera(target, setup);
     if (options.poses.empty()) return;
@@ -238,7 +248,7 @@ void write_results(const ImageQualityOptions& options,
   json field = field_description(
       setup.field->identity(), *setup.field->coverage().planes.front(), setup.field->codewords());
   if (setup.field->atlas()) field["members"] = setup.field->coverage().planes.size();
-  result.is_papers_setting = is_papers_setting(field);
+  result.is_papers_setting = is_papers_setting(field) && !setup.has_fitted_viewpoints();
   draw_psnr_boxes({group}, levels_for(result.is_papers_setting), folder / "psnr");
   json summary = {{"format", "attenuation-fields evaluation"},
                   {"format_version", 1},

@@ -48,6 +48,7 @@ FieldDesign DesignParts::over(FieldDesign design) const {
   design.codewords = codewords.value_or(design.codewords);
   design.look_up = look_up.value_or(design.look_up);
   design.mean_step = mean_step.value_or(design.mean_step);
+  design.fits_uv = fits_uv.value_or(design.fits_uv);
   return design;
 }
 

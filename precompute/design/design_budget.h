@@ -34,6 +34,7 @@ struct DesignParts {
   std::optional<int> codewords;
   std::optional<std::string> look_up;
   std::optional<int> mean_step;  ///< 0: plain tiles
+  std::optional<bool> fits_uv;
 
   /// `design` with these parts replaced.
   [[nodiscard]] FieldDesign over(FieldDesign design) const;

@@ -8,8 +8,9 @@ std::string to_text(const FieldDesign& design) {
     return std::to_string(nodes) + " x " + std::to_string(nodes);
   };
   return std::to_string(design.slabs) + (design.slabs == 1 ? " slab, " : " slabs, ") +
-         square(design.uv_nodes) + " (u,v) nodes, " + square(design.st_nodes) + " (s,t) nodes, " +
-         std::to_string(design.codewords) + " codewords" +
+         square(design.uv_nodes) + (design.fits_uv ? " fitted" : "") + " (u,v) nodes, " +
+         square(design.st_nodes) + " (s,t) nodes, " + std::to_string(design.codewords) +
+         " codewords" +
          (design.mean_step > 0
               ? " of mean-removed tiles (step " + std::to_string(design.mean_step) + "), "
               : ", ") +

@@ -13,6 +13,7 @@ struct FieldDesign {
   int codewords = 16384;
   std::string look_up = "linear";  ///< "linear" or "cubic": how DRRs are meant to be looked up
   int mean_step = 0;               ///< levels, of mean-removed tiles; 0: plain ones
+  bool fits_uv = false;  ///< samples fit linear interpolation over (u,v): LeastSquaresFieldCaster
 
   bool operator==(const FieldDesign&) const = default;
 };

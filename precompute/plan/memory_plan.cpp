@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "base/error.h"
+#include "precompute/casting/least_squares_caster.h"
 
 namespace af {
 
@@ -28,12 +29,16 @@ std::string mebibytes(std::uint64_t bytes) {
 }
 
 /// Samples, tiles, and the casters' working arrays of the largest unit.
-double unit_bytes(const std::vector<WorkUnit>& units) {
+double unit_bytes(const std::vector<WorkUnit>& units, bool fits_uv) {
   double most = 0.0;
   for (const WorkUnit& unit : units) {
     const double samples = 2.0 * static_cast<double>(unit.sample_count());
-    const double sums = 4.0 * kRunOfT * unit.u.count * unit.s.count;
-    most = std::max(most, 2.0 * samples + sums);
+    const double fitted =
+        fits_uv ? 2.0 * static_cast<double>(LeastSquaresFieldCaster::held_samples(unit)) : 0.0;
+    const int u_count = unit.u.count + (fits_uv ? 2 : 0);
+    const double sums = 4.0 * kRunOfT * u_count * unit.s.count;
+    // Tiles are made once the line integrals that samples are fitted to are gone.
+    most = std::max(most, samples + std::max(samples, fitted) + sums);
   }
   constexpr double kBuffers = 4.0 * 0x1.0p20;
   return most + kBuffers;
@@ -54,7 +59,7 @@ MemoryPlan plan_memory(const FieldLattice& lattice,
                        const PrecomputeOptions& options,
                        std::uint64_t fixed_bytes,
                        int ranks) {
-  const double unit = unit_bytes(units);
+  const double unit = unit_bytes(units, options.design().fits_uv);
   const TrainingSelection training = options.training_selection();
   const double fraction_tiles = training.fraction * static_cast<double>(lattice.tile_count());
   const auto cap = static_cast<double>(training.max_training_tiles);

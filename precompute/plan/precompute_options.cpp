@@ -7,6 +7,7 @@
 #include "base/plausible.h"
 #include "base/toml_text.h"
 #include "precompute/casting/casters.h"
+#include "precompute/casting/least_squares_caster.h"
 #include "precompute/plan/axis_ranges.h"
 #include "precompute/plan/orbit_text.h"
 
@@ -125,6 +126,15 @@ void describe_casting(Fields& field, PrecomputeOptions& options) {
         "preset, or as chosen; 256 where parts of the design are stated]")
       .within(2, 4096)
       .decides(kCastingStage);
+  field("uv_samples",
+        options.uv_samples,
+        "What the field holds of a viewpoint: point (line integrals of its rays), or least-squares "
+        "(what makes linear interpolation between viewpoints come nearest to the line integrals of "
+        "all rays: 1 to 2 dB for 3 to 4 times the rays cast; not with a probe) [that of the "
+        "preset; point where a probe chooses the design, or parts of it are stated without "
+        "--preset]")
+      .one_of({"point", "least-squares"})
+      .decides(kCastingStage);
   field("look_up",
         options.look_up,
         "How DRRs are to be looked up in the field, unless a program is told otherwise; "
@@ -171,6 +181,10 @@ void describe_casting(Fields& field, PrecomputeOptions& options) {
       .not_deciding("the hash of the projections says it");
 }
 
+std::uint64_t training_tiles_per_codeword(bool fits_uv) {
+  return fits_uv ? kFewerTrainingTilesPerCodeword : kTrainingTilesPerCodeword;
+}
+
 void describe_codebook(Fields& field, PrecomputeOptions& options) {
   field("codewords",
         options.codewords,
@@ -206,8 +220,12 @@ void describe_codebook(Fields& field, PrecomputeOptions& options) {
   field("training_fraction",
         options.training_fraction,
         "Share of the tiles that are not empty on which the codebook is trained; the paper's was "
-        "0.1 [64 tiles per codeword, at most a million, at most 8 of 9 tiles]")
-      .recorded_when_unset("training_tiles_per_codeword", std::to_string(kTrainingTilesPerCodeword))
+        "0.1 [64 tiles per codeword, 32 with least-squares viewpoints, at most a million, at most "
+        "8 of 9 "
+        "tiles]")
+      .recorded_when_unset(
+          "training_tiles_per_codeword",
+          std::to_string(training_tiles_per_codeword(options.uv_samples == "least-squares")))
       .decides(kCodebookStage);
   field("max_training_tiles", options.max_training_tiles, "Most training tiles, whatever the share")
       .decides(kCodebookStage);
@@ -287,14 +305,16 @@ PrecomputeOptions PrecomputeOptions::in_force() const {
 }
 
 DesignParts PrecomputeOptions::stated_parts() const {
-  DesignParts parts{slabs, uv_nodes, st_nodes, codewords, look_up, std::nullopt};
+  DesignParts parts{slabs, uv_nodes, st_nodes, codewords, look_up, std::nullopt, std::nullopt};
+  if (uv_samples) parts.fits_uv = *uv_samples == "least-squares";
   if (tile_coding)
     parts.mean_step = *tile_coding == "plain" ? 0 : mean_step.value_or(kDefaultMeanStep);
   return parts;
 }
 
 const DesignPreset& PrecomputeOptions::design_preset() const {
-  const bool has_parts = slabs || uv_nodes || st_nodes || codewords || look_up || tile_coding;
+  const bool has_parts =
+      slabs || uv_nodes || st_nodes || codewords || uv_samples || look_up || tile_coding;
   const char* const whole = is_atlas() ? kAtlasPreset : kDefaultPreset;
   return design_preset_named(preset.value_or(has_parts ? kPaperPreset : whole));
 }
@@ -340,6 +360,11 @@ PrecomputeOptions PrecomputeOptions::with_design(const FieldDesign& design) cons
   } else if (options.design().mean_step > 0) {
     options.tile_coding = "plain";
   }
+  options.uv_samples.reset();
+  if (design.fits_uv)
+    options.uv_samples = "least-squares";
+  else if (options.design().fits_uv)
+    options.uv_samples = "point";
   options.min_improvement = min_improvement.value_or(min_improvement_of(design));
   return options;
 }
@@ -368,6 +393,14 @@ std::vector<std::string> problems(const PrecomputeOptions& options) {
     found.push_back(
         "projections: must not be given with material = bone: X-rays show all that attenuates");
   append(problems(options.training_selection()), found);
+  if (options.needs_probe() && options.uv_samples == "least-squares")
+    found.emplace_back(
+        "uv_samples = least-squares: a probe forecasts point samples alone; leave it out, or state "
+        "slabs, uv_nodes, st_nodes and codewords instead of a limit");
+  const FieldDesign design = options.design();
+  if (!options.needs_probe() && design.fits_uv && design.uv_nodes < kFewestFittedViewpoints)
+    found.push_back("uv_nodes = " + std::to_string(design.uv_nodes) + ": must be at least " +
+                    std::to_string(kFewestFittedViewpoints) + " with uv_samples = least-squares");
   if (options.mean_step && options.tile_coding == "plain")
     found.emplace_back("mean_step: plain tiles have no means; leave it out");
   if (options.limits().max_field_bytes && !options.packs_by_codebook_tree())
@@ -406,9 +439,10 @@ MotionRange PrecomputeOptions::range() const {
 
 TrainingSelection PrecomputeOptions::training_selection(int for_codewords) const {
   if (training_fraction) return {*training_fraction, max_training_tiles, seed};
-  const auto per_codeword = kTrainingTilesPerCodeword * static_cast<std::uint64_t>(for_codewords);
+  const std::uint64_t tiles =
+      training_tiles_per_codeword(design().fits_uv) * static_cast<std::uint64_t>(for_codewords);
   return {kLargestTrainingFraction,
-          std::min({max_training_tiles, per_codeword, kTrainingTilesUnlessStated}),
+          std::min({max_training_tiles, tiles, kTrainingTilesUnlessStated}),
           seed};
 }
 

@@ -52,6 +52,7 @@ struct PrecomputeOptions {
   std::optional<std::string> st_plane;
   std::optional<int> uv_nodes;
   std::optional<int> st_nodes;
+  std::optional<std::string> uv_samples;  ///< "point" or "least-squares"
   std::optional<std::string> look_up;
   std::optional<std::string> tile_coding;  ///< "plain" or "mean-removed"
   std::optional<int> mean_step;            ///< of mean-removed tiles, levels
@@ -123,6 +124,8 @@ inline constexpr const char* kCodebookStage = "codebook";  ///< what is made of 
 /// Training tiles where no share is stated: enough that unseen tiles come out nearly as training
 /// tiles do (precompute/README.md has what more and fewer give).
 inline constexpr std::uint64_t kTrainingTilesPerCodeword = 64;
+/// The same for least-squares viewpoints, whose casting takes the time that this saves.
+inline constexpr std::uint64_t kFewerTrainingTilesPerCodeword = 32;
 /// Upper limit of that default, so that 65536 codewords take at most twice the time of 16384.
 inline constexpr std::uint64_t kTrainingTilesUnlessStated = std::uint64_t{1} << 20u;
 /// Default improvement below which training ends. The paper's single slab keeps the stricter limit,

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "precompute/casting/field_caster.h"
 
-#include <map>
-
 #include <gtest/gtest.h>
 
 #include "base/vector_width.h"
@@ -10,6 +8,7 @@
 #include "precompute/casting/trilinear_caster.h"
 #include "precompute/casting/unit_costs.h"
 #include "precompute/units/unit_planner.h"
+#include "support/cast_plan.h"
 #include "support/ct_phantoms.h"
 
 namespace af {
@@ -42,22 +41,6 @@ LightSlab small_light_slab() {
   slab.stored_t = {4, 7};
   light_slab.slabs.push_back(slab);
   return light_slab;
-}
-
-using NodeSamples = std::map<std::array<int, 4>, std::uint16_t>;
-
-NodeSamples cast_plan(const FieldCaster& caster, const LightSlab& light_slab, PlanOptions plan) {
-  NodeSamples by_node;
-  for (const WorkUnit& unit : plan_units(light_slab.lattice(), plan)) {
-    std::vector<std::uint16_t> samples(unit.sample_count());
-    caster.cast(unit, samples);
-    auto sample = samples.begin();
-    for (int u = unit.u.begin; u < unit.u.end(); ++u)
-      for (int v = unit.v.begin; v < unit.v.end(); ++v)
-        for (int s = unit.s.begin; s < unit.s.end(); ++s)
-          for (int t = unit.t.begin; t < unit.t.end(); ++t) by_node[{u, v, s, t}] = *sample++;
-  }
-  return by_node;
 }
 
 class TrilinearFieldCasterTest : public testing::Test {

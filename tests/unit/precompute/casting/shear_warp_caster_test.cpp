@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "precompute/casting/shear_warp_caster.h"
 
-#include <map>
-
 #include <gtest/gtest.h>
 
 #include "base/vector_width.h"
 #include "precompute/casting/trilinear_caster.h"
+#include "support/cast_plan.h"
 #include "support/ct_phantoms.h"
 #include "unit/precompute/casting/shear_warp_cases.h"
 
@@ -16,28 +15,6 @@ namespace {
 /// One of each kind, for tests that cast many plans.
 std::vector<Eigen::Matrix3d> two_rotations() {
   return {test::aligned_rotations()[1], test::oblique_rotations()[0]};
-}
-
-using Node = std::array<int, 4>;
-using NodeSamples = std::map<Node, std::uint16_t>;
-
-/// Samples of one slab by (u, v, s, t), cast in the units of a plan.
-NodeSamples cast_plan(const FieldCaster& caster,
-                      const LightSlab& light_slab,
-                      const PlanOptions& plan = kShearWarpPlan,
-                      std::size_t slab = 0) {
-  NodeSamples by_node;
-  for (const WorkUnit& unit : plan_units(light_slab.lattice(), plan)) {
-    if (unit.slab != slab) continue;
-    std::vector<std::uint16_t> samples(unit.sample_count());
-    caster.cast(unit, samples);
-    auto sample = samples.begin();
-    for (int u = unit.u.begin; u < unit.u.end(); ++u)
-      for (int v = unit.v.begin; v < unit.v.end(); ++v)
-        for (int s = unit.s.begin; s < unit.s.end(); ++s)
-          for (int t = unit.t.begin; t < unit.t.end(); ++t) by_node[{u, v, s, t}] = *sample++;
-  }
-  return by_node;
 }
 
 /// A caster with all that it refers to.

@@ -31,6 +31,8 @@ TEST(PrecomputeOptions, TrainOnNoMoreTilesThanTheCap) {
 
 TEST(PrecomputeOptions, FieldsRecordWhichRuleChoseTheTrainingTiles) {
   PrecomputeOptions options;
+  EXPECT_NE(to_toml(options).find("training_tiles_per_codeword = 32"), std::string::npos);
+  options.preset = "paper";
   EXPECT_NE(to_toml(options).find("training_tiles_per_codeword = 64"), std::string::npos);
   options.training_fraction = 0.25;
   EXPECT_NE(to_toml(options).find("training_fraction = 0.25"), std::string::npos);
@@ -213,6 +215,41 @@ TEST(PrecomputeOptions, TakeAnOrbitAsText) {
     EXPECT_THROW(problems(options), UsageError) << text;
     EXPECT_TRUE(options.is_atlas());
   }
+}
+
+TEST(FieldDesignOfOptions, FitsTheViewpointsOfTheDefaultAlone) {
+  PrecomputeOptions options;
+  EXPECT_TRUE(options.design().fits_uv);
+  EXPECT_EQ(options.in_force().uv_samples, "least-squares");
+  EXPECT_EQ(options.in_force().in_force().uv_samples, "least-squares");
+  EXPECT_EQ(deciding_options(options, kCastingStage).at("uv_samples"), "\"least-squares\"");
+  EXPECT_EQ(options.training_selection().max_training_tiles, 32u * 8192u);
+  options.preset = kDefaultPreset;
+  options.uv_samples = "point";
+  EXPECT_FALSE(options.design().fits_uv);
+  EXPECT_EQ(options.design().slabs, design_preset_named(kDefaultPreset).design.slabs);
+  EXPECT_EQ(option_texts(to_toml(options)).at("uv_samples"), "\"point\"");
+  EXPECT_EQ(options.training_selection().max_training_tiles, 64u * 8192u);
+  options.preset = kPaperPreset;
+  options.uv_samples.reset();
+  EXPECT_FALSE(options.in_force().uv_samples.has_value());
+}
+
+TEST(FieldDesignOfOptions, RefusesToFitTooFewViewpointsAndWhatAProbeCannotForecast) {
+  PrecomputeOptions options;
+  options.preset = kDefaultPreset;
+  options.uv_nodes = 2;
+  ASSERT_EQ(problems(options).size(), 1u);
+  EXPECT_NE(problems(options)[0].find("uv_nodes = 2"), std::string::npos);
+  options.uv_nodes = 3;
+  EXPECT_TRUE(problems(options).empty());
+  options = {};
+  options.preset = "fine";
+  options.uv_samples = "least-squares";
+  ASSERT_EQ(problems(options).size(), 1u);
+  EXPECT_NE(problems(options)[0].find("probe"), std::string::npos);
+  options.uv_samples = "point";
+  EXPECT_TRUE(problems(options).empty());
 }
 
 TEST(PrecomputeOptions, AnAtlasHasItsOwnPreset) {
