@@ -130,7 +130,7 @@ void describe_casting(Fields& field, PrecomputeOptions& options) {
         options.uv_samples,
         "What the field holds of a viewpoint: point (line integrals of its rays), or least-squares "
         "(what makes linear interpolation between viewpoints come nearest to the line integrals of "
-        "all rays: 1 to 2 dB for 3 to 4 times the rays cast; not with a probe) [that of the "
+        "all rays: some 1 dB for 3 to 4.5 times the rays cast; not with a probe) [that of the "
         "preset; point where a probe chooses the design, or parts of it are stated without "
         "--preset]")
       .one_of({"point", "least-squares"})
