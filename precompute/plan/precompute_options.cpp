@@ -221,8 +221,7 @@ void describe_codebook(Fields& field, PrecomputeOptions& options) {
         options.training_fraction,
         "Share of the tiles that are not empty on which the codebook is trained; the paper's was "
         "0.1 [64 tiles per codeword, 32 with least-squares viewpoints, at most a million, at most "
-        "8 of 9 "
-        "tiles]")
+        "8 of 9 tiles]")
       .recorded_when_unset(
           "training_tiles_per_codeword",
           std::to_string(training_tiles_per_codeword(options.uv_samples == "least-squares")))

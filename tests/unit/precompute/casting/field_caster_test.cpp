@@ -104,21 +104,12 @@ TEST_F(TrilinearFieldCasterTest, SlabsSumToTheWhole) {
   cut.slabs[0].y_high_mm = cut.slabs[1].y_low_mm = -8.0;
   cut.slabs[1].y_high_mm = cut.slabs[2].y_low_mm = 5.5;
   const TrilinearFieldCaster caster(volume_, cut, quantizer_, options_);
-  std::map<std::array<int, 4>, double> sums;
+  std::map<Node, double> sums;
   int in_all_slabs = 0;
   for (std::size_t k = 0; k < 3; ++k)
-    for (WorkUnit unit : plan_units(light_slab_.lattice(), {1000000})) {
-      unit.slab = k;
-      std::vector<std::uint16_t> samples(unit.sample_count());
-      caster.cast(unit, samples);
-      auto sample = samples.begin();
-      for (int u = unit.u.begin; u < unit.u.end(); ++u)
-        for (int v = unit.v.begin; v < unit.v.end(); ++v)
-          for (int s = unit.s.begin; s < unit.s.end(); ++s)
-            for (int t = unit.t.begin; t < unit.t.end(); ++t, ++sample) {
-              sums[{u, v, s, t}] += static_cast<double>(quantizer_.dequantize(*sample));
-              in_all_slabs += *sample > 0 ? 1 : 0;
-            }
+    for (const auto& [node, sample] : cast_plan(caster, cut, {1000000}, k)) {
+      sums[node] += static_cast<double>(quantizer_.dequantize(sample));
+      in_all_slabs += sample > 0 ? 1 : 0;
     }
   // Steps of up to 2 mm meet the faces of the box (mu = 0.026) at other places in each slab.
   constexpr double kStepping = 4.0 * 2.0 * 0.026 / 2.0;
