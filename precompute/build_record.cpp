@@ -15,10 +15,10 @@ namespace {
 using nlohmann::json;
 
 /// Root mean square error of one element, total attenuation.
-double rms_attenuation(std::uint64_t squared_error, std::uint64_t tiles, float step) {
+double rms_attenuation(double squared_error, std::uint64_t tiles, float step) {
   if (tiles == 0) return 0.0;
   const double elements = static_cast<double>(tiles) * static_cast<double>(kTileElements);
-  return static_cast<double>(step) * std::sqrt(static_cast<double>(squared_error) / elements);
+  return static_cast<double>(step) * std::sqrt(squared_error / elements);
 }
 
 json training_json(const TrainedCodebook& trained) {
@@ -58,9 +58,30 @@ std::string training_text(const TrainedCodebook& trained, float step) {
        << ")\n  rms error of training / unseen tiles per iteration:";
   text.precision(4);
   for (const TrainingIteration& iteration : trained.iterations)
-    text << "  " << rms_attenuation(iteration.training_squared_error, trained.training_tiles, step)
+    text << "  "
+         << rms_attenuation(
+                static_cast<double>(iteration.training_squared_error), trained.training_tiles, step)
          << " / "
-         << rms_attenuation(iteration.held_out_squared_error, trained.held_out_tiles, step);
+         << rms_attenuation(static_cast<double>(iteration.held_out_squared_error),
+                            trained.held_out_tiles,
+                            step);
+  return text.str();
+}
+
+json filter_json(const FittedFilter& fitted, float step) {
+  return {{"tiles", fitted.tiles},
+          {"rms_attenuation_error", rms_attenuation(fitted.squared_error, fitted.tiles, step)},
+          {"rms_attenuation_error_filtered",
+           rms_attenuation(fitted.squared_error_left, fitted.tiles, step)}};
+}
+
+std::string filter_text(const FittedFilter& fitted, float step) {
+  if (!fitted.filter) return "";
+  std::ostringstream text;
+  text.precision(3);
+  text << "\ntile filter: rms error " << rms_attenuation(fitted.squared_error, fitted.tiles, step)
+       << " becomes " << rms_attenuation(fitted.squared_error_left, fitted.tiles, step)
+       << ", as fitted to " << fitted.tiles << " tiles";
   return text.str();
 }
 
@@ -75,11 +96,12 @@ double balance_of(const std::vector<double>& seconds) {
 }  // namespace
 
 double BuildRecord::rms_error() const {
-  return rms_attenuation(squared_error, cast.occupied_tiles, step);
+  return rms_attenuation(static_cast<double>(squared_error), cast.occupied_tiles, step);
 }
 
 void add_record(const BuildRecord& record, json& provenance) {
   provenance["training"] = training_json(record.trained);
+  if (record.fitted.filter) provenance["tile_filter"] = filter_json(record.fitted, record.step);
   if (record.design) provenance["design"] = design_json(*record.design);
   provenance["occupied_tiles"] = record.cast.occupied_tiles;
   provenance["rms_attenuation_error"] = record.rms_error();
@@ -103,11 +125,12 @@ std::string record_text(const BuildRecord& record,
   const auto raw_bytes = static_cast<double>(2 * stored_nodes);
   std::ostringstream text;
   text.precision(3);
-  text << training_text(record.trained, record.step)
+  text << training_text(record.trained, record.step) << filter_text(record.fitted, record.step)
        << "\nwhole field: " << static_cast<double>(record.cast.occupied_tiles) / 1e6
-       << " million tiles not empty, rms error " << record.rms_error()
-       << " (total attenuation)\nseconds: " << seconds_text(record.clock.phases()) << "; cast "
-       << rate << " million rays/s on " << record.encode_seconds.size()
+       << " million tiles not empty, rms error " << record.rms_error() << " (total attenuation"
+       << (record.fitted.filter ? ", before the filter" : "")
+       << ")\nseconds: " << seconds_text(record.clock.phases()) << "; cast " << rate
+       << " million rays/s on " << record.encode_seconds.size()
        << " ranks\nbalance (mean / slowest rank): cast " << balance_of(record.cast.busy_seconds)
        << ", encode " << balance_of(record.encode_seconds) << "; peak memory "
        << megabytes_text(record.peak_bytes_per_rank) << " of one rank beside "

@@ -9,6 +9,7 @@
 
 #include "field_file/field_file.h"
 #include "precompute/codebook/codebook_training.h"
+#include "precompute/codebook/filter_fitting.h"
 #include "precompute/design_choice.h"
 #include "precompute/phase_clock.h"
 #include "precompute/pipeline/field_build.h"
@@ -19,6 +20,7 @@ namespace af {
 struct BuildRecord {
   const CastPhase& cast;
   const TrainedCodebook& trained;
+  const FittedFilter& fitted;
   const std::optional<DesignChoice>& design;
   const PhaseClock& clock;
   float step = 0.0F;                       ///< total attenuation of one level

@@ -255,8 +255,10 @@ class PrecomputeRun {
                            world_};
     CastPhase cast = cast_phase(build);
     const OverflowChoice choice = overflow_choice(build, cast);
-    const TrainedCodebook trained = train_or_give_way(build, decides, cast);
-    write_phase(build, cast, trained, choice);
+    TrainedCodebook trained = train_or_give_way(build, decides, cast);
+    const FittedFilter fitted = fit_phase(build, trained.codebook);
+    trained.codebook.filter = fitted.filter;
+    write_phase(build, cast, trained, fitted, choice);
   }
 
   CastPhase cast_phase(const FieldBuild& build) {
@@ -359,10 +361,24 @@ class PrecomputeRun {
     return trained;
   }
 
+  /// Collective. Without a filter where the design has none.
+  [[nodiscard]] FittedFilter fit_phase(const FieldBuild& build, const Codebook& codebook) {
+    if (!options_.design().filters_tiles) return {};
+    const WorkNote note("fitting the tile filter");
+    FittedFilter fitted = fit_filter(build, codebook, options_.seed);
+    if (!fitted.filter)
+      inform(
+          world_,
+          "tile filter: none, " + std::to_string(fitted.tiles) + " tiles are too few to fit one");
+    clock_.end("fit filter");
+    return fitted;
+  }
+
   /// Encoding and writing take turns, so that no rank holds more than a round of indices.
   void write_phase(const FieldBuild& build,
                    CastPhase& cast,
                    const TrainedCodebook& trained,
+                   const FittedFilter& fitted,
                    const OverflowChoice& choice) {
     FieldEncoder encoder(build, cast, trained.codebook, choice.overflow);
     std::optional<BuildRecord> record;
@@ -372,7 +388,7 @@ class PrecomputeRun {
         trained.codebook,
         [&] { return encoder.next_blocks(printer->callback(), stop_requested()); },
         [&] {
-          record.emplace(record_of(trained, cast, encoder));
+          record.emplace(record_of(trained, fitted, cast, encoder));
           clock_.split(
               "encode",
               *std::max_element(record->encode_seconds.begin(), record->encode_seconds.end()));
@@ -427,10 +443,12 @@ class PrecomputeRun {
 
   /// Collective.
   [[nodiscard]] BuildRecord record_of(const TrainedCodebook& trained,
+                                      const FittedFilter& fitted,
                                       const CastPhase& cast,
                                       const FieldEncoder& encoder) const {
     return {cast,
             trained,
+            fitted,
             choice_,
             clock_,
             quantizer().step(),

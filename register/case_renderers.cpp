@@ -75,11 +75,12 @@ int level_count(const LightSlab& light_slab, const CaseLoadOptions& options) {
 
 /// The samples of several slabs are decoded when they take no more than this: they have few
 /// viewpoints, so they are small, and many nodes, which are blended faster from samples than from
-/// codewords.
+/// codewords. Those of a field with a tile filter always are: look-up by codewords knows no filter.
 constexpr std::size_t kMostDecodedBytes = std::size_t{512} << 20;
 
 bool pays_to_decode(const CompressedAttenuationField& field) {
-  return field.slabs.size() > 1 && decoded_bytes(field) <= kMostDecodedBytes;
+  return field.codebook.filter.has_value() ||
+         (field.slabs.size() > 1 && decoded_bytes(field) <= kMostDecodedBytes);
 }
 
 /// Collective where the memory is. A field's renderers for a view: its own, and those of so many

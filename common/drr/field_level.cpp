@@ -10,6 +10,7 @@
 #include "base/thread_pool.h"
 #include "base/vector_width.h"
 #include "drr/field_level_kernel.h"
+#include "drr/filtered_decoding.h"
 #include "drr/slab_merging.h"
 
 namespace af {
@@ -213,6 +214,7 @@ SharedArray<std::uint16_t> padded_samples(const FieldLevel& level,
 FieldLevel decoded_level(const CompressedAttenuationField& field,
                          int level,
                          const FieldLevelMemory& memory) {
+  check(!field.codebook.filter, "tiles without a filter");
   FieldLevel result{level, field.light_slab, field.quantizer_step, {}};
   for (std::size_t k = 0; k < field.slabs.size(); ++k) {
     const SlabGeometry& fine = field.light_slab.slabs[k];
@@ -220,6 +222,22 @@ FieldLevel decoded_level(const CompressedAttenuationField& field,
     slab.samples = padded_samples(result, slab, memory, [&](auto samples, int part, int parts) {
       const int u_tiles = field.lattice(k).u.stored.tiles();
       decode_slab(field, k, slab, level, share_of(u_tiles, part, parts), samples);
+    });
+    result.slabs.push_back(std::move(slab));
+  }
+  return result;
+}
+
+/// Level 0 of a field whose codebook has a filter.
+FieldLevel filtered_level(const CompressedAttenuationField& field, const FieldLevelMemory& memory) {
+  const std::vector<TileCoefficients> codewords = decoded_coefficients(field.codebook);
+  FieldLevel result{0, field.light_slab, field.quantizer_step, {}};
+  for (std::size_t k = 0; k < field.slabs.size(); ++k) {
+    const FilteredDecoding decoding(field, codewords, k);
+    FieldLevelSlab slab{field.light_slab.slabs[k], {}};
+    slab.samples = padded_samples(result, slab, memory, [&](auto samples, int part, int parts) {
+      const Share rows = share_of(decoding.row_count(), part, parts);
+      decoding.decode(rows.begin, rows.end, samples);
     });
     result.slabs.push_back(std::move(slab));
   }
@@ -293,6 +311,20 @@ int halvings_to_usual_nodes(const LightSlab& light_slab) {
   return std::max(0, static_cast<int>(std::lround(halvings)));
 }
 
+float FieldLevel::node_value(std::size_t slab, const NodeIndex& node) const {
+  const FieldLevelSlab& of_slab = slabs[slab];
+  const NodeRange& s = of_slab.geometry.stored_s;
+  const NodeRange& t = of_slab.geometry.stored_t;
+  if (node.s < s.begin || node.s >= s.end() || node.t < t.begin || node.t >= t.end()) return 0.0f;
+  const auto viewpoint = static_cast<std::size_t>(node.u * field_geometry.v.nodes + node.v);
+  const auto of_viewpoint =
+      static_cast<std::size_t>(node.t - t.begin) * static_cast<std::size_t>(s.count) +
+      static_cast<std::size_t>(node.s - s.begin);
+  return quantizer_step *
+         static_cast<float>(
+             of_slab.samples[viewpoint * of_slab.samples_per_viewpoint() + of_viewpoint]);
+}
+
 double FieldLevel::blur_sigma_mm(bool with_resampling) const {
   return level_blur_sigma_in_nodes(level, with_resampling) * node_spacing_mm(field_geometry);
 }
@@ -314,12 +346,13 @@ std::size_t decoded_bytes(const CompressedAttenuationField& field) {
 }
 
 FieldLevel decode_field(const CompressedAttenuationField& field, const FieldLevelMemory& memory) {
-  return decoded_level(field, 0, memory);
+  return field.codebook.filter ? filtered_level(field, memory) : decoded_level(field, 0, memory);
 }
 
 FieldLevel decode_halved_field(const CompressedAttenuationField& field,
                                const FieldLevelMemory& memory) {
   check(field.slabs.size() == 1, "several slabs are merged from their decoded samples");
+  if (field.codebook.filter) return next_field_level(decode_field(field, memory), memory);
   return decoded_level(field, 1, memory);
 }
 

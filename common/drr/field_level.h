@@ -68,6 +68,9 @@ struct FieldLevel {
            static_cast<std::size_t>(field_geometry.v.nodes);
   }
 
+  /// Total attenuation at a node of one of this level's slabs; 0 where nothing is stored.
+  [[nodiscard]] float node_value(std::size_t slab, const NodeIndex& node) const;
+
   /// level_blur_sigma_in_nodes() in mm at the plane through the field's centre (y = 0 of the slab
   /// frame), the mean of s and t and of the slabs. Blur a reference image by this sigma (times the
   /// magnification there) to match.
@@ -94,7 +97,8 @@ std::size_t decoded_bytes(const CompressedAttenuationField& field);
 FieldLevel decode_field(const CompressedAttenuationField& field,
                         const FieldLevelMemory& memory = process_memory());
 
-/// Level 1 of a compressed field of one slab, without the memory of its level 0. InputError when an
+/// Level 1 of a compressed field of one slab, without the memory of its level 0 unless its codebook
+/// has a filter. InputError when an
 /// axis has too few nodes to halve.
 FieldLevel decode_halved_field(const CompressedAttenuationField& field,
                                const FieldLevelMemory& memory = process_memory());

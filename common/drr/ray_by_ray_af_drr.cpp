@@ -33,23 +33,29 @@ struct FieldSample {
   std::array<double, 4> slope = {0.0, 0.0, 0.0, 0.0};
 };
 
-FieldSample nearest_sample(const CompressedAttenuationField& field,
-                           std::size_t k,
-                           const RayNodes& nodes) {
-  const SlabLattice lattice = field.lattice(k);
+/// Values at nodes, by definition or from what has been decoded.
+struct NodeValues {
+  const CompressedAttenuationField& field;
+  const FieldLevel* decoded;
+
+  [[nodiscard]] float at(std::size_t k, const NodeIndex& node) const {
+    return decoded != nullptr ? decoded->node_value(k, node) : field.node_value(k, node);
+  }
+};
+
+FieldSample nearest_sample(const NodeValues& values, std::size_t k, const RayNodes& nodes) {
+  const SlabLattice lattice = values.field.lattice(k);
   FieldSample sample;
-  sample.value = static_cast<double>(field.node_value(k,
-                                                      {nearest_node(nodes.u, lattice.u.nodes),
-                                                       nearest_node(nodes.v, lattice.v.nodes),
-                                                       nearest_node(nodes.s, lattice.s.nodes),
-                                                       nearest_node(nodes.t, lattice.t.nodes)}));
+  sample.value = static_cast<double>(values.at(k,
+                                               {nearest_node(nodes.u, lattice.u.nodes),
+                                                nearest_node(nodes.v, lattice.v.nodes),
+                                                nearest_node(nodes.s, lattice.s.nodes),
+                                                nearest_node(nodes.t, lattice.t.nodes)}));
   return sample;
 }
 
-FieldSample quadrilinear_sample(const CompressedAttenuationField& field,
-                                std::size_t k,
-                                const RayNodes& nodes) {
-  const SlabLattice lattice = field.lattice(k);
+FieldSample quadrilinear_sample(const NodeValues& values, std::size_t k, const RayNodes& nodes) {
+  const SlabLattice lattice = values.field.lattice(k);
   const std::array<AxisTap, 4> taps = {axis_tap(nodes.u, lattice.u.nodes),
                                        axis_tap(nodes.v, lattice.v.nodes),
                                        axis_tap(nodes.s, lattice.s.nodes),
@@ -63,8 +69,7 @@ FieldSample quadrilinear_sample(const CompressedAttenuationField& field,
       node[axis] = taps[axis].node + (is_upper ? 1 : 0);
       weight[axis] = is_upper ? taps[axis].weight : 1.0 - taps[axis].weight;
     }
-    const auto value =
-        static_cast<double>(field.node_value(k, {node[0], node[1], node[2], node[3]}));
+    const auto value = static_cast<double>(values.at(k, {node[0], node[1], node[2], node[3]}));
     sample.value += weight[0] * weight[1] * weight[2] * weight[3] * value;
     for (unsigned axis = 0; axis < 4; ++axis) {
       double others = (corner >> axis & 1u) != 0 ? value : -value;
@@ -96,7 +101,9 @@ std::array<Ray, 6> ray_derivatives(const Eigen::Matrix3d& slab_from_room_axes,
 
 RayByRayAfDrr::RayByRayAfDrr(std::shared_ptr<const CompressedAttenuationField> field,
                              FieldInterpolation interpolation)
-    : field_(std::move(field)), interpolation_(interpolation) {}
+    : field_(std::move(field)), interpolation_(interpolation) {
+  if (field_->codebook.filter) decoded_ = decode_field(*field_);
+}
 
 std::unique_ptr<RenderWorkspace> RayByRayAfDrr::make_workspace() const {
   return std::make_unique<RenderWorkspace>();
@@ -117,6 +124,7 @@ RenderStatus RayByRayAfDrr::render(const RigidTransform& room_from_ct,
   check(!gradients || gradients->planes.size() == 6 * pixels,
         "six gradient planes of the view's size");
   const auto& geometry = field_->light_slab;
+  const NodeValues values{*field_, decoded_ ? &*decoded_ : nullptr};
   const RigidTransform slab_from_room = geometry.slab_from_ct * room_from_ct.inverse();
   const Eigen::Vector3d source = slab_from_room * view.camera.source_point;
   RenderStatus status;
@@ -137,8 +145,8 @@ RenderStatus RayByRayAfDrr::render(const RigidTransform& room_from_ct,
           break;
         }
         const FieldSample sample = interpolation_ == FieldInterpolation::Nearest
-                                       ? nearest_sample(*field_, k, *nodes)
-                                       : quadrilinear_sample(*field_, k, *nodes);
+                                       ? nearest_sample(values, k, *nodes)
+                                       : quadrilinear_sample(values, k, *nodes);
         value += sample.value;
         if (!gradients) continue;
         const std::array<Ray, 6> changes =

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
 #include "drr/drr_renderer.h"
+#include "drr/field_level.h"
 #include "field/compressed_attenuation_field.h"
 
 namespace af {
@@ -11,8 +13,8 @@ namespace af {
 enum class FieldInterpolation { Nearest, Quadrilinear };
 
 /// DRRs by look-up in a compressed field (Sec. II-B): each ray's (u,v,s,t) per slab, nearest node
-/// or quadrilinear over 16 neighbours, decoded straight from the codebook; slabs' contributions
-/// add. \test RayByRayAfDrr.ReproducesMultilinearFieldExactly
+/// or quadrilinear over 16 neighbours, decoded straight from the codebook, or once for all where it
+/// has a filter; slabs' contributions add. \test RayByRayAfDrr.ReproducesMultilinearFieldExactly
 class RayByRayAfDrr final : public DrrRenderer {
  public:
   explicit RayByRayAfDrr(std::shared_ptr<const CompressedAttenuationField> field,
@@ -31,6 +33,7 @@ class RayByRayAfDrr final : public DrrRenderer {
 
  private:
   std::shared_ptr<const CompressedAttenuationField> field_;
+  std::optional<FieldLevel> decoded_;  ///< where the codebook has a filter
   FieldInterpolation interpolation_;
 };
 

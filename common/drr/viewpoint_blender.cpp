@@ -191,6 +191,7 @@ class CompressedBlender final : public AnyBlender {
   CompressedBlender(std::shared_ptr<const CompressedAttenuationField> field, AxisInterpolation uv)
       : AnyBlender(uv), field_(std::move(field)) {
     const Codebook& codebook = field_->codebook;
+    check(!codebook.filter, "tiles without a filter");
     if (codebook.has_means()) {
       shapes_.reserve(codebook.size());
       for (const Tile& tile : codebook.codewords) shapes_.push_back(aligned_shape(tile));
@@ -435,7 +436,10 @@ class LevelBlender final : public AnyBlender {
 }  // namespace
 
 std::unique_ptr<const ViewpointBlender> make_viewpoint_blender(
-    std::shared_ptr<const CompressedAttenuationField> field, AxisInterpolation uv) {
+    std::shared_ptr<const CompressedAttenuationField> field, AxisInterpolation uv, int threads) {
+  if (field->codebook.filter)
+    return std::make_unique<LevelBlender>(
+        std::make_shared<const FieldLevel>(decode_field(*field, process_memory(threads))), uv);
   return std::make_unique<CompressedBlender>(std::move(field), uv);
 }
 

@@ -59,9 +59,10 @@ class ViewpointBlender {
                      const BlendedImages& images) const = 0;
 };
 
-/// From the codebook's tiles.
+/// From the codebook's tiles, or, where it has a filter, from samples that `threads` threads decode
+/// first.
 std::unique_ptr<const ViewpointBlender> make_viewpoint_blender(
-    std::shared_ptr<const CompressedAttenuationField> field, AxisInterpolation uv);
+    std::shared_ptr<const CompressedAttenuationField> field, AxisInterpolation uv, int threads = 1);
 /// From decoded samples.
 std::unique_ptr<const ViewpointBlender> make_viewpoint_blender(
     std::shared_ptr<const FieldLevel> level, AxisInterpolation uv);

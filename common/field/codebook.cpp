@@ -43,7 +43,18 @@ std::vector<Tile> searched_codewords(const Codebook& codebook) {
 
 Codebook codebook_of_searched(std::vector<Tile> codewords, int mean_step) {
   if (mean_step > 0) fold_shapes(codewords);
-  return {std::move(codewords), mean_step};
+  return {std::move(codewords), mean_step, {}};
+}
+
+std::vector<TileCoefficients> decoded_coefficients(const Codebook& codebook) {
+  std::vector<TileCoefficients> coefficients;
+  coefficients.reserve(codebook.size());
+  for (const Tile& codeword : codebook.codewords)
+    coefficients.push_back(hadamard_coefficients(codeword));
+  constexpr auto kOffset = static_cast<float>(kTileElements * kShapeZero);
+  if (codebook.has_means())
+    for (std::size_t i = 1; i < coefficients.size(); ++i) coefficients[i][0] -= kOffset;
+  return coefficients;
 }
 
 std::vector<std::string> problems(const Codebook& codebook) {
@@ -54,6 +65,8 @@ std::vector<std::string> problems(const Codebook& codebook) {
   if (codebook.mean_step < 0 || codebook.mean_step > kMaxMeanStep)
     found.push_back("mean_step = " + std::to_string(codebook.mean_step) +
                     ": must be between 0 and " + std::to_string(kMaxMeanStep));
+  if (codebook.filter)
+    for (std::string& problem : problems(*codebook.filter)) found.push_back(std::move(problem));
   if (!is_zero(codewords.front())) found.emplace_back("codeword 0 must be the zero tile");
   const std::vector<Tile> ordered = searched_codewords(codebook);
   for (std::size_t i = codebook.has_means() ? 2 : 1; i < ordered.size(); ++i)

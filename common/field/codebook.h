@@ -3,10 +3,12 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "field/tile.h"
+#include "field/tile_filter.h"
 
 namespace af {
 
@@ -28,6 +30,8 @@ inline constexpr std::size_t kMaxCodewords = 65536;  ///< an index is 16 bits
 struct Codebook {
   std::vector<Tile> codewords;
   int mean_step = 0;  ///< 0: of plain tiles
+  /// By which decoded tiles are corrected; none: they are taken as they are.
+  std::optional<TileFilter> filter = {};
 
   [[nodiscard]] std::size_t size() const { return codewords.size(); }
   [[nodiscard]] bool has_means() const { return mean_step > 0; }
@@ -44,6 +48,10 @@ inline constexpr int kMaxMeanStep = 4096;
 inline std::uint16_t level_of(std::uint16_t element, std::uint16_t mean) {
   return static_cast<std::uint16_t>(std::clamp(int{mean} + int{element} - kShapeZero, 0, 65535));
 }
+
+/// Hadamard coefficients of every codeword as it is decoded with mean 0, before levels are limited
+/// to 0 ... 65535; a mean adds kTileElements times itself to coefficient 0. Exact.
+std::vector<TileCoefficients> decoded_coefficients(const Codebook& codebook);
 
 /// Complements a shape's elements at the upper node along s; a second call undoes the first.
 /// Distances between shapes stay the same, and the sum becomes the slope along s.

@@ -2,14 +2,83 @@
 #include "field/compressed_attenuation_field.h"
 
 #include <algorithm>
+#include <cmath>
+#include <map>
 
 namespace af {
+
+namespace {
+
+/// The tiles of one slab by their numbers along the axes.
+class SlabTiles {
+ public:
+  SlabTiles(const CompressedAttenuationField& field, std::size_t slab)
+      : codebook_(field.codebook),
+        values_(field.slabs[slab].indices.view()),
+        counts_(field.lattice(slab).tile_counts()) {}
+
+  /// Of a neighbour as decoded, before levels are limited.
+  [[nodiscard]] TileCoefficients coefficients(const std::array<int, 4>& tile,
+                                              const TileOffset& offset) const {
+    const auto at = neighbouring_tile(tile, offset, counts_);
+    if (!at) return {};
+    const auto row = static_cast<std::size_t>(counts_[3]);
+    std::size_t rows = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      rows = rows * static_cast<std::size_t>(counts_[axis]) + static_cast<std::size_t>((*at)[axis]);
+    const std::size_t i =
+        rows * codebook_.values_per_tile() * row + static_cast<std::size_t>((*at)[3]);
+    const std::uint16_t index = values_[i];
+    if (index == 0) return {};
+    Codebook of_one{{{}, codebook_.codewords[index]}, codebook_.mean_step, {}};
+    TileCoefficients coefficients = decoded_coefficients(of_one)[1];
+    if (codebook_.has_means())
+      coefficients[0] += static_cast<float>(kTileElements) * static_cast<float>(values_[i + row]);
+    return coefficients;
+  }
+
+ private:
+  const Codebook& codebook_;
+  std::span<const std::uint16_t> values_;
+  std::array<int, 4> counts_;
+};
+
+/// A level of a tile by a codebook's filter: the definition, slow. FieldLevel has all levels.
+double filtered_level(const SlabTiles& tiles,
+                      const TileFilter& filter,
+                      const std::array<int, 4>& tile,
+                      std::size_t element) {
+  std::map<TileOffset, TileCoefficients> decoded;
+  const auto coefficient = [&](const TileOffset& offset, std::size_t k) {
+    auto [at, is_new] = decoded.try_emplace(offset);
+    if (is_new) at->second = tiles.coefficients(tile, offset);
+    return static_cast<double>(at->second[k]);
+  };
+  double level = 0.0;
+  bool is_empty = true;
+  for (std::size_t j = 0; j < kTileElements; ++j) {
+    double estimate = coefficient({}, j);
+    is_empty = is_empty && estimate == 0.0;
+    const auto inputs = filter_inputs<double>(j, coefficient);
+    for (std::size_t i = 0; i < kFilterInputs; ++i)
+      estimate += static_cast<double>(filter.weights[j][i]) * inputs[i];
+    const bool is_negated = __builtin_parityll(j & element) != 0;
+    level += is_negated ? -estimate : estimate;
+  }
+  if (is_empty) return 0.0;
+  constexpr double kLargestLevel = 65535.0;
+  return std::clamp(
+      std::floor(level / static_cast<double>(kTileElements) + 0.5), 0.0, kLargestLevel);
+}
+
+}  // namespace
 
 float CompressedAttenuationField::node_value(std::size_t slab, const NodeIndex& node) const {
   const std::array<LatticeAxis, 4> axes = lattice(slab).axes();
   const std::array<int, 4> nodes = {node.u, node.v, node.s, node.t};
   const std::size_t rows = codebook.values_per_tile();
   std::size_t tile = 0;
+  std::array<int, 4> of_axes{};
   std::array<unsigned, 4> odd{};
   for (std::size_t axis = 0; axis < 4; ++axis) {
     const NodeRange& stored = axes[axis].stored;
@@ -18,11 +87,15 @@ float CompressedAttenuationField::node_value(std::size_t slab, const NodeIndex& 
     const std::size_t rows_before = axis == 3 ? rows : 1;
     tile = tile * static_cast<std::size_t>(stored.tiles()) * rows_before +
            static_cast<std::size_t>(local / 2);
+    of_axes[axis] = local / 2;
     odd[axis] = static_cast<unsigned>(local) & 1u;
   }
+  const std::size_t number = tile_element(odd[0], odd[1], odd[2], odd[3]);
+  if (codebook.filter)
+    return quantizer_step * static_cast<float>(filtered_level(
+                                SlabTiles(*this, slab), *codebook.filter, of_axes, number));
   const SharedArray<std::uint16_t>& values = slabs[slab].indices;
-  const std::uint16_t element =
-      codebook.codewords[values[tile]][tile_element(odd[0], odd[1], odd[2], odd[3])];
+  const std::uint16_t element = codebook.codewords[values[tile]][number];
   const auto row = static_cast<std::size_t>(axes[3].stored.tiles());
   const std::uint16_t level = rows == 1 ? element : level_of(element, values[tile + row]);
   return quantizer_step * static_cast<float>(level);

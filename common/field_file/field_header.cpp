@@ -29,7 +29,7 @@ constexpr std::uint64_t kMaxPackingRatio = 1032;
 /// What a file's version and attributes say of its indices.
 struct StoredCoding {
   IndexPacking packing = IndexPacking::CodebookTree;
-  bool has_means = false;
+  CodebookParts codebook;
 };
 
 /// A text attribute that a version asks for, one of `known`.
@@ -52,15 +52,20 @@ StoredCoding checked_coding(hid_t file, const std::filesystem::path& path) {
                     "attribute format_version",
                     "1 to " + std::to_string(kFormatVersion),
                     std::to_string(version));
-  if (version != kFormatVersionWithMeans)
-    return {version == format_version_of(IndexPacking::Deflate, false) ? IndexPacking::Deflate
-                                                                       : IndexPacking::CodebookTree,
-            false};
-  required_attribute(file, kTileCodingAttribute, {kMeanRemoved}, path);
+  if (version < kFormatVersionWithMeans)
+    return {version == format_version_of(IndexPacking::Deflate, {}) ? IndexPacking::Deflate
+                                                                    : IndexPacking::CodebookTree,
+            {}};
+  const bool has_filter = version >= kFormatVersionWithFilter;
+  std::vector<std::string> codings = {kMeanRemoved};
+  if (has_filter) codings.emplace_back(kPlainTiles);
+  const bool has_means =
+      required_attribute(file, kTileCodingAttribute, codings, path) == kMeanRemoved;
   const char* const deflate = to_string(IndexPacking::Deflate);
   const std::string packing = required_attribute(
       file, kPackingAttribute, {to_string(IndexPacking::CodebookTree), deflate}, path);
-  return {packing == deflate ? IndexPacking::Deflate : IndexPacking::CodebookTree, true};
+  return {packing == deflate ? IndexPacking::Deflate : IndexPacking::CodebookTree,
+          {has_means, has_filter}};
 }
 
 /// Whether a file of this size can hold so many indices at all; refuses before memory is asked for.
@@ -81,11 +86,12 @@ void check_plausible_size(const DatasetRule& rule,
 void check_packing(hid_t dataset,
                    const DatasetRule& rule,
                    IndexPacking packing,
+                   const CodebookParts& parts,
                    const std::filesystem::path& path) {
   hdf5::ChunkShape chunk{};
   const auto text = [&](IndexPacking of) {
-    if (rule.rows_per_tile > 1) return std::string(to_string(of));
-    return "indices packed as in version " + std::to_string(format_version_of(of, false));
+    if (parts.has_means || parts.has_filter) return std::string(to_string(of));
+    return "indices packed as in version " + std::to_string(format_version_of(of, parts));
   };
   const IndexPacking found =
       hdf5::is_coded(dataset, chunk) ? IndexPacking::CodebookTree : IndexPacking::Deflate;
@@ -123,7 +129,7 @@ FieldHeader read_field_of(hid_t file,
       slab_count_of(hdf5::read_dataset(file, slab_count, path.string()), path.string());
   header.payload = read_datasets(
       file,
-      of_group(shared.empty() ? payload_rules(slabs, of_file.has_means) : member_rules(slabs)),
+      of_group(shared.empty() ? payload_rules(slabs, of_file.codebook) : member_rules(slabs)),
       path.string());
   header.payload.insert(header.payload.end(), shared.begin(), shared.end());
   header.range = read_range(file, group, path.string());
@@ -135,7 +141,7 @@ FieldHeader read_field_of(hid_t file,
     check_plausible_size(rule, of_file.file_bytes, path);
     std::vector<std::uint64_t> extents;
     const Handle dataset = hdf5::open_dataset(file, rule, path.string(), extents);
-    check_packing(dataset, rule, of_file.packing, path);
+    check_packing(dataset, rule, of_file.packing, of_file.codebook, path);
     header.index_sha256.push_back(hdf5::read_text_attribute(dataset, "sha256"));
   }
   return header;
@@ -143,9 +149,9 @@ FieldHeader read_field_of(hid_t file,
 
 /// The root of an atlas, and its members.
 void read_members(hid_t file, const std::filesystem::path& path, FileHeader& header) {
-  header.root = read_datasets(file, atlas_rules(header.has_means), path.string());
+  header.root = read_datasets(file, atlas_rules(header.codebook), path.string());
   header.root_range = read_range(file, "", path.string());
-  const auto shared = std::span<const Dataset>(header.root).last(shared_rules(header.has_means));
+  const auto shared = std::span<const Dataset>(header.root).last(shared_rules(header.codebook));
   const int members = member_count_of(header.root.front(), path.string());
   for (int i = 0; i < members; ++i)
     header.fields.push_back(
@@ -157,7 +163,7 @@ std::string payload_hash(const FileHeader& header) {
   std::vector<Dataset> datasets = header.root;
   std::vector<DatasetRule> rules;
   std::vector<std::string> index_sha256;
-  const std::size_t shared = header.is_atlas ? shared_rules(header.has_means) : 0;
+  const std::size_t shared = header.is_atlas ? shared_rules(header.codebook) : 0;
   for (const FieldHeader& field : header.fields) {
     datasets.insert(datasets.end(),
                     field.payload.begin(),
@@ -200,7 +206,7 @@ FileHeader read_header(const std::filesystem::path& path) {
   header.is_atlas = is_atlas_format(file, path);
   const StoredCoding coding = checked_coding(file, path);
   header.packing = coding.packing;
-  header.has_means = coding.has_means;
+  header.codebook = coding.codebook;
   header.file_bytes = std::filesystem::file_size(path);
   if (header.is_atlas)
     read_members(file, path, header);

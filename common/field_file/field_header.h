@@ -39,7 +39,7 @@ struct FileHeader {
   std::string payload_sha256;
   std::uint64_t file_bytes = 0;
   IndexPacking packing = IndexPacking::CodebookTree;
-  bool has_means = false;
+  CodebookParts codebook;
 
   auto members() {
     return std::tie(is_atlas,
@@ -50,7 +50,7 @@ struct FileHeader {
                     payload_sha256,
                     file_bytes,
                     packing,
-                    has_means);
+                    codebook);
   }
   /// Of an atlas. FileError.
   [[nodiscard]] AttenuationAtlas atlas(const std::string& path) const;

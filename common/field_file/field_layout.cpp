@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <utility>
 
 #include "base/error.h"
 #include "base/file_name.h"
@@ -31,6 +32,23 @@ DatasetRule codewords_rule() {
 
 DatasetRule mean_step_rule() {
   return {"/codebook/mean_step", ElementType::Int32, {1}, false, "level", "none"};
+}
+
+DatasetRule tile_filter_rule() {
+  return {"/codebook/tile_filter",
+          ElementType::Float32,
+          {kTileElements, kFilterInputs},
+          false,
+          "1",
+          "Hadamard coefficient of a tile, input"};
+}
+
+/// Of the codebook, in the order of the payload hash.
+std::vector<DatasetRule> codebook_rules(const CodebookParts& parts) {
+  std::vector<DatasetRule> rules = {step_rule(), codewords_rule()};
+  if (parts.has_means) rules.push_back(mean_step_rule());
+  if (parts.has_filter) rules.push_back(tile_filter_rule());
+  return rules;
 }
 
 /// Of a field's geometry that has as many slabs as the file.
@@ -147,13 +165,19 @@ void set_codebook(std::span<const Dataset> datasets,
                   const std::string& path,
                   float& quantizer_step,
                   Codebook& codebook) {
-  const bool has_means = datasets.size() == shared_rules(true);
-  check(has_means || datasets.size() == shared_rules(false), "a dataset per rule");
-  if (has_means) {
-    codebook.mean_step = values_of<std::int32_t>(datasets[2], path).at(0);
-    if (!codebook.has_means())
-      throw FileError(
-          path, datasets[2].rule.name, "at least 1", std::to_string(codebook.mean_step));
+  check(datasets.size() >= shared_rules({}), "a dataset per rule");
+  for (const Dataset& more : datasets.subspan(shared_rules({}))) {
+    if (more.rule.name == mean_step_rule().name) {
+      codebook.mean_step = values_of<std::int32_t>(more, path).at(0);
+      if (!codebook.has_means())
+        throw FileError(path, more.rule.name, "at least 1", std::to_string(codebook.mean_step));
+    } else {
+      check(more.rule.name == tile_filter_rule().name, "a rule of a codebook");
+      const auto weights = values_of<float>(more, path);
+      check(weights.size() == kTileElements * kFilterInputs, "a weight of every input");
+      codebook.filter.emplace();
+      std::memcpy(&codebook.filter->weights, weights.data(), weights.size() * sizeof(float));
+    }
   }
   quantizer_step = values_of<float>(datasets[0], path)[0];
   const auto levels = values_of<std::uint16_t>(datasets[1], path);
@@ -171,6 +195,10 @@ void append_codebook(float quantizer_step,
   const std::int32_t mean_step = codebook.mean_step;
   if (codebook.has_means())
     datasets.push_back(dataset_of<std::int32_t>(mean_step_rule(), std::span(&mean_step, 1)));
+  if (codebook.filter)
+    datasets.push_back(dataset_of<float>(
+        tile_filter_rule(),
+        std::span(codebook.filter->weights.front().data(), kTileElements * kFilterInputs)));
 }
 
 int count_within(const Dataset& dataset, int most, const std::string& path) {
@@ -190,6 +218,10 @@ std::string payload_line(const DatasetRule& rule, const std::string& sha256) {
 
 }  // namespace
 
+CodebookParts parts_of(const Codebook& codebook) {
+  return {codebook.has_means(), codebook.filter.has_value()};
+}
+
 DatasetRule slab_count_rule() {
   return {"/geometry/slab_count", ElementType::Int32, {1}, false, "1", "none"};
 }
@@ -204,11 +236,9 @@ std::vector<DatasetRule> member_rules(int slab_count) {
   return rules;
 }
 
-std::vector<DatasetRule> payload_rules(int slab_count, bool has_means) {
+std::vector<DatasetRule> payload_rules(int slab_count, const CodebookParts& parts) {
   std::vector<DatasetRule> rules = member_rules(slab_count);
-  rules.push_back(step_rule());
-  rules.push_back(codewords_rule());
-  if (has_means) rules.push_back(mean_step_rule());
+  for (DatasetRule& rule : codebook_rules(parts)) rules.push_back(std::move(rule));
   return rules;
 }
 
@@ -289,13 +319,11 @@ DatasetRule member_count_rule() {
   return {"/member_count", ElementType::Int32, {1}, false, "1", "none"};
 }
 
-std::vector<DatasetRule> atlas_rules(bool has_means) {
+std::vector<DatasetRule> atlas_rules(const CodebookParts& parts) {
   StoredIdentity identity;
   std::vector<DatasetRule> rules = {member_count_rule()};
   append_rules(stored_values(identity), rules);
-  rules.push_back(step_rule());
-  rules.push_back(codewords_rule());
-  if (has_means) rules.push_back(mean_step_rule());
+  for (DatasetRule& rule : codebook_rules(parts)) rules.push_back(std::move(rule));
   return rules;
 }
 

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <span>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "field/attenuation_atlas.h"
@@ -17,16 +18,31 @@ namespace af::field_layout {
 
 inline constexpr const char* kFormat = "attenuation-field";
 /// Version 2 has indices that IndexPacking::CodebookTree coded; else it is as version 1. Version 3
-/// has mean-removed tiles, packed either way, and says so in its attribute tile_coding.
-inline constexpr int kFormatVersion = 3;
+/// has mean-removed tiles, packed either way, and says so in its attribute tile_coding. Version 4
+/// has a tile filter, and tiles of either kind.
+inline constexpr int kFormatVersion = 4;
 inline constexpr int kFormatVersionWithMeans = 3;
-inline constexpr int format_version_of(IndexPacking packing, bool has_means) {
-  if (has_means) return kFormatVersionWithMeans;
+inline constexpr int kFormatVersionWithFilter = 4;
+
+/// What a codebook has beside its codewords.
+struct CodebookParts {
+  bool has_means = false;
+  bool has_filter = false;
+
+  auto members() { return std::tie(has_means, has_filter); }
+};
+CodebookParts parts_of(const Codebook& codebook);
+
+inline constexpr int format_version_of(IndexPacking packing, const CodebookParts& parts) {
+  if (parts.has_filter) return kFormatVersionWithFilter;
+  if (parts.has_means) return kFormatVersionWithMeans;
   return packing == IndexPacking::CodebookTree ? 2 : 1;
 }
-/// Attributes of files of version 3: "mean-removed", and "codebook-tree" or "deflate".
+/// Attributes of files from version 3 on: "mean-removed" or, from version 4 on, "plain"; and
+/// "codebook-tree" or "deflate".
 inline constexpr const char* kTileCodingAttribute = "tile_coding";
 inline constexpr const char* kMeanRemoved = "mean-removed";
+inline constexpr const char* kPlainTiles = "plain";
 inline constexpr const char* kPackingAttribute = "index_packing";
 const char* to_string(IndexPacking packing);
 inline constexpr const char* kAtlasFormat = "attenuation-atlas";
@@ -46,7 +62,7 @@ inline std::filesystem::path io_test_path(const std::filesystem::path& path) {
 
 /// The rules of all small datasets that count as payload, in the fixed order of the payload hash;
 /// the indices of the slabs follow them.
-std::vector<DatasetRule> payload_rules(int slab_count, bool has_means);
+std::vector<DatasetRule> payload_rules(int slab_count, const CodebookParts& parts);
 DatasetRule slab_count_rule();
 DatasetRule index_rule(const FieldLattice& lattice, std::size_t slab, bool has_means);
 /// One per slab.
@@ -63,9 +79,9 @@ DatasetRule member_count_rule();
 /// Rules of the payload in an atlas's root: the identity and, as the last shared_rules() of them,
 /// codebook and quantiser. payload_rules() ends with the same ones, so that a member's datasets
 /// followed by the shared ones are those of a field.
-std::vector<DatasetRule> atlas_rules(bool has_means);
-inline constexpr std::size_t shared_rules(bool has_means) {
-  return has_means ? 3 : 2;
+std::vector<DatasetRule> atlas_rules(const CodebookParts& parts);
+inline constexpr std::size_t shared_rules(const CodebookParts& parts) {
+  return std::size_t{2} + (parts.has_means ? 1u : 0u) + (parts.has_filter ? 1u : 0u);
 }
 std::vector<Dataset> datasets_of(const AttenuationAtlas& atlas);
 /// One per slab of every member, in the order of the atlas's lattice.

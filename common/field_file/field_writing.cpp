@@ -88,7 +88,7 @@ void check_blocks(const std::vector<IndexBlock>& blocks, const std::vector<Datas
 struct FileContents {
   const char* format = field_layout::kFormat;
   IndexPacking packing = IndexPacking::CodebookTree;
-  bool has_means = false;
+  field_layout::CodebookParts codebook;
   std::string ct_sha256;
   std::vector<Dataset> payload;
   std::vector<Dataset> beside;  ///< not of the payload: ranges that two numbers do not state, bone
@@ -99,7 +99,7 @@ struct FileContents {
 FileContents contents_of(const CompressedAttenuationField& field, IndexPacking packing) {
   FileContents contents = {field_layout::kFormat,
                            packing,
-                           field.codebook.has_means(),
+                           field_layout::parts_of(field.codebook),
                            field.identity.ct_content_sha256,
                            field_layout::datasets_of(field),
                            field_layout::range_datasets(field.identity.range),
@@ -113,7 +113,7 @@ FileContents contents_of(const CompressedAttenuationField& field, IndexPacking p
 FileContents contents_of(const AttenuationAtlas& atlas, IndexPacking packing) {
   FileContents contents = {field_layout::kAtlasFormat,
                            packing,
-                           atlas.codebook.has_means(),
+                           field_layout::parts_of(atlas.codebook),
                            atlas.identity.ct_content_sha256,
                            field_layout::datasets_of(atlas),
                            field_layout::range_datasets(atlas.identity.range),
@@ -138,12 +138,13 @@ FileContents contents_of(const AttenuationAtlas& atlas, IndexPacking packing) {
 void create_file_without_indices(const FileContents& contents, const std::filesystem::path& path) {
   Handle file = hdf5::create_file(path);
   hdf5::write_text_attribute(file, "format", contents.format);
-  hdf5::write_int_attribute(file,
-                            "format_version",
-                            field_layout::format_version_of(contents.packing, contents.has_means));
-  if (contents.has_means) {
+  hdf5::write_int_attribute(
+      file, "format_version", field_layout::format_version_of(contents.packing, contents.codebook));
+  if (contents.codebook.has_means || contents.codebook.has_filter) {
     hdf5::write_text_attribute(
-        file, field_layout::kTileCodingAttribute, field_layout::kMeanRemoved);
+        file,
+        field_layout::kTileCodingAttribute,
+        contents.codebook.has_means ? field_layout::kMeanRemoved : field_layout::kPlainTiles);
     hdf5::write_text_attribute(
         file, field_layout::kPackingAttribute, field_layout::to_string(contents.packing));
   }

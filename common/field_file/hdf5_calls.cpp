@@ -78,6 +78,8 @@ bool is_type_of(hid_t type, const DatasetRule& rule) {
 void check_is_of_this_file(hid_t file, const DatasetRule& rule, const std::string& path) {
   for (std::size_t end = rule.name.find('/', 1);; end = rule.name.find('/', end + 1)) {
     const std::string part = rule.name.substr(0, end);
+    if (checked(H5Lexists(file, part.c_str(), H5P_DEFAULT), "H5Lexists") == 0)
+      throw FileError(path, "has no " + part);
     H5L_info_t link;
     checked(H5Lget_info(file, part.c_str(), &link, H5P_DEFAULT), "H5Lget_info");
     if (link.type != H5L_TYPE_HARD) throw FileError(path, part, "an object of this file", "a link");

@@ -49,6 +49,7 @@ FieldDesign DesignParts::over(FieldDesign design) const {
   design.look_up = look_up.value_or(design.look_up);
   design.mean_step = mean_step.value_or(design.mean_step);
   design.fits_uv = fits_uv.value_or(design.fits_uv);
+  design.filters_tiles = filters_tiles.value_or(design.filters_tiles);
   return design;
 }
 

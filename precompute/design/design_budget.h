@@ -35,6 +35,7 @@ struct DesignParts {
   std::optional<std::string> look_up;
   std::optional<int> mean_step;  ///< 0: plain tiles
   std::optional<bool> fits_uv;
+  std::optional<bool> filters_tiles;
 
   /// `design` with these parts replaced.
   [[nodiscard]] FieldDesign over(FieldDesign design) const;

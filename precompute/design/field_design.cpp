@@ -14,7 +14,7 @@ std::string to_text(const FieldDesign& design) {
          (design.mean_step > 0
               ? " of mean-removed tiles (step " + std::to_string(design.mean_step) + "), "
               : ", ") +
-         design.look_up + " look-up";
+         (design.filters_tiles ? "a tile filter, " : "") + design.look_up + " look-up";
 }
 
 }  // namespace af

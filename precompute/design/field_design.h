@@ -14,6 +14,7 @@ struct FieldDesign {
   std::string look_up = "linear";  ///< "linear" or "cubic": how DRRs are meant to be looked up
   int mean_step = 0;               ///< levels, of mean-removed tiles; 0: plain ones
   bool fits_uv = false;  ///< samples fit linear interpolation over (u,v): LeastSquaresFieldCaster
+  bool filters_tiles = false;  ///< decoded tiles are corrected by their neighbours: TileFilter
 
   bool operator==(const FieldDesign&) const = default;
 };

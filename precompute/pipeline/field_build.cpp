@@ -178,4 +178,23 @@ TrainedCodebook train_field(const FieldBuild& build,
   });
 }
 
+FittedFilter fit_filter(const FieldBuild& build, const Codebook& codebook, std::uint64_t seed) {
+  FilterSums sums = all_or_none(build.communicator, [&] {
+    FilterSums mine(codebook);
+    const std::vector<WorkUnit> patches = filter_patches(build.lattice, seed);
+    const auto ranks = static_cast<std::size_t>(build.communicator.size());
+    std::vector<std::uint16_t> samples;
+    for (auto i = static_cast<std::size_t>(build.communicator.rank()); i < patches.size();
+         i += ranks) {
+      const WorkUnit& patch = patches[i];
+      samples.resize(patch.sample_count());
+      build.caster.cast(patch, samples);
+      mine.add(patch, build.lattice.slabs[patch.slab], make_unit_tiles(patch, samples));
+    }
+    return mine;
+  });
+  build.communicator.sum(sums.values());
+  return sums.fit();
+}
+
 }  // namespace af

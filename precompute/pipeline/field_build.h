@@ -13,6 +13,7 @@
 #include "parallel/communicator.h"
 #include "precompute/casting/field_caster.h"
 #include "precompute/codebook/codebook_training.h"
+#include "precompute/codebook/filter_fitting.h"
 #include "precompute/pipeline/unit_store.h"
 
 namespace af {
@@ -88,5 +89,9 @@ TrainedCodebook train_field(const FieldBuild& build,
                             const CodebookOptions& options,
                             const ProgressCallback& on_progress,
                             const TrainingCheckpoints& checkpoints = {});
+
+/// Collective. Casts the patches of filter_patches(), shared over the ranks, and fits the filter of
+/// the codebook's tiles to them. The same on any number of ranks.
+FittedFilter fit_filter(const FieldBuild& build, const Codebook& codebook, std::uint64_t seed);
 
 }  // namespace af

@@ -207,6 +207,15 @@ void describe_codebook(Fields& field, PrecomputeOptions& options) {
       .within(1, kMaxMeanStep)
       .needs({"--tile-coding"})
       .decides(kCodebookStage);
+  field("tile_filter",
+        options.tile_filter,
+        "Whether decoded tiles are corrected by what their neighbours say of them: none, or "
+        "neighbours (1 to 2 dB for two kilobytes; programs then hold all samples, 2 bytes each, "
+        "where they would look tiles up; read from format version 4 on; not with a probe) [that of "
+        "the preset; none where a probe chooses the design, or parts of it are stated without "
+        "--preset]")
+      .one_of({"none", "neighbours"})
+      .not_deciding("samples and indices are the same");
   field("max_iterations",
         options.max_iterations,
         "Most iterations of the training, see --min-improvement")
@@ -304,16 +313,18 @@ PrecomputeOptions PrecomputeOptions::in_force() const {
 }
 
 DesignParts PrecomputeOptions::stated_parts() const {
-  DesignParts parts{slabs, uv_nodes, st_nodes, codewords, look_up, std::nullopt, std::nullopt};
+  DesignParts parts{
+      slabs, uv_nodes, st_nodes, codewords, look_up, std::nullopt, std::nullopt, std::nullopt};
   if (uv_samples) parts.fits_uv = *uv_samples == "least-squares";
+  if (tile_filter) parts.filters_tiles = *tile_filter == "neighbours";
   if (tile_coding)
     parts.mean_step = *tile_coding == "plain" ? 0 : mean_step.value_or(kDefaultMeanStep);
   return parts;
 }
 
 const DesignPreset& PrecomputeOptions::design_preset() const {
-  const bool has_parts =
-      slabs || uv_nodes || st_nodes || codewords || uv_samples || look_up || tile_coding;
+  const bool has_parts = slabs || uv_nodes || st_nodes || codewords || uv_samples || look_up ||
+                         tile_coding || tile_filter;
   const char* const whole = is_atlas() ? kAtlasPreset : kDefaultPreset;
   return design_preset_named(preset.value_or(has_parts ? kPaperPreset : whole));
 }
@@ -364,6 +375,11 @@ PrecomputeOptions PrecomputeOptions::with_design(const FieldDesign& design) cons
     options.uv_samples = "least-squares";
   else if (options.design().fits_uv)
     options.uv_samples = "point";
+  options.tile_filter.reset();
+  if (design.filters_tiles)
+    options.tile_filter = "neighbours";
+  else if (options.design().filters_tiles)
+    options.tile_filter = "none";
   options.min_improvement = min_improvement.value_or(min_improvement_of(design));
   return options;
 }
@@ -395,6 +411,10 @@ std::vector<std::string> problems(const PrecomputeOptions& options) {
   if (options.needs_probe() && options.uv_samples == "least-squares")
     found.emplace_back(
         "uv_samples = least-squares: a probe forecasts point samples alone; leave it out, or state "
+        "slabs, uv_nodes, st_nodes and codewords instead of a limit");
+  if (options.needs_probe() && options.tile_filter == "neighbours")
+    found.emplace_back(
+        "tile_filter = neighbours: a probe forecasts fields without one; leave it out, or state "
         "slabs, uv_nodes, st_nodes and codewords instead of a limit");
   const FieldDesign design = options.design();
   if (!options.needs_probe() && design.fits_uv && design.uv_nodes < kFewestFittedViewpoints)

@@ -52,7 +52,8 @@ struct PrecomputeOptions {
   std::optional<std::string> st_plane;
   std::optional<int> uv_nodes;
   std::optional<int> st_nodes;
-  std::optional<std::string> uv_samples;  ///< "point" or "least-squares"
+  std::optional<std::string> uv_samples;   ///< "point" or "least-squares"
+  std::optional<std::string> tile_filter;  ///< "none" or "neighbours"
   std::optional<std::string> look_up;
   std::optional<std::string> tile_coding;  ///< "plain" or "mean-removed"
   std::optional<int> mean_step;            ///< of mean-removed tiles, levels

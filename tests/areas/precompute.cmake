@@ -2,9 +2,9 @@
 af_add_test(
   precompute_test
   SOURCES unit/precompute/units/unit_planner_test.cpp unit/precompute/units/unit_tiles_test.cpp unit/precompute/codebook/nearest_codeword_test.cpp
-          unit/precompute/codebook/mean_removal_test.cpp
+          unit/precompute/codebook/filter_fitting_test.cpp unit/precompute/codebook/mean_removal_test.cpp
           unit/precompute/plan/precompute_options_test.cpp unit/precompute/casting/field_caster_test.cpp unit/precompute/casting/least_squares_caster_test.cpp unit/precompute/casting/measured_residual_test.cpp unit/precompute/codebook/codebook_training_test.cpp
-  LIBS af_precompute af_text)
+  LIBS af_precompute af_drr_core af_text)
 
 af_add_test(
   field_design_test

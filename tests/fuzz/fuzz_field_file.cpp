@@ -80,7 +80,7 @@ SoundFile sound_field(const CompressedAttenuationField& field, IndexPacking pack
     beside.push_back(std::move(dataset));
   return written_file({{},
                        field.codebook,
-                       field_layout::payload_rules(2, has_means),
+                       field_layout::payload_rules(2, field_layout::parts_of(field.codebook)),
                        field_layout::index_rules(field),
                        {},
                        false},
@@ -101,7 +101,7 @@ SoundFile sound_atlas(const AttenuationAtlas& atlas) {
   SoundFile sound;
   sound.is_atlas = true;
   sound.codebook = atlas.codebook;
-  sound.payload = field_layout::atlas_rules(has_means);
+  sound.payload = field_layout::atlas_rules(field_layout::parts_of(atlas.codebook));
   for (std::size_t i = 0; i < atlas.members.size(); ++i)
     for (DatasetRule& rule :
          field_layout::within(field_layout::member_group(i), field_layout::member_rules(2)))
@@ -115,6 +115,10 @@ std::vector<SoundFile> sound_files() {
   start_mpi();
   const CompressedAttenuationField plain = fuzz::sample_field();
   const CompressedAttenuationField mean_removed = fuzz::sample_field_with_means();
+  CompressedAttenuationField filtered = mean_removed;
+  filtered.codebook.filter.emplace();
+  CompressedAttenuationField filtered_plain = plain;
+  filtered_plain.codebook.filter.emplace();
   CompressedAttenuationField one_sided = plain;
   one_sided.identity.range.high.rotation_rad.y() *= 2.0;
   CompressedAttenuationField bone = plain;
@@ -123,10 +127,13 @@ std::vector<SoundFile> sound_files() {
           sound_field(mean_removed, IndexPacking::CodebookTree),
           sound_field(plain, IndexPacking::Deflate),
           sound_field(mean_removed, IndexPacking::Deflate),
+          sound_field(filtered, IndexPacking::CodebookTree),
+          sound_field(filtered_plain, IndexPacking::Deflate),
           sound_field(one_sided, IndexPacking::CodebookTree),
           sound_field(bone, IndexPacking::CodebookTree),
           sound_atlas(fuzz::sample_atlas(plain)),
-          sound_atlas(fuzz::sample_atlas(mean_removed))};
+          sound_atlas(fuzz::sample_atlas(mean_removed)),
+          sound_atlas(fuzz::sample_atlas(filtered))};
 }
 
 /// Any of the types that a file may hold.

@@ -204,6 +204,29 @@ TEST_F(FieldBuildTest, MeanRemovedTilesComeNearerToTheSamples) {
   EXPECT_LT(error_of(48), 0.75 * error_of(0));
 }
 
+/// The weights in the payload depend on neither.
+TEST_F(FieldBuildTest, FilterIsTheSameOnAnyRankCountAndVectorWidth) {
+  light_slab_.slabs[0].s.nodes = 65;
+  light_slab_.slabs[0].stored_s = {2, 63};
+  const auto units = plan_units(light_slab_.lattice(), {kUnitRays});
+  const FieldBuild build = build_of(units, nullptr);
+  CastPhase cast = cast_field(build, {kSelection}, [] { return false; }, {});
+  const Codebook codebook =
+      train_field(build, cast, {.codewords = 64, .seed = 3, .mean_step = 48}, {}).codebook;
+  const Communicator alone = Communicator::alone();
+  const FieldBuild build_alone{caster_, light_slab_.lattice(), units, {}, nullptr, alone};
+  const FittedFilter expected = fit_filter(build_alone, codebook, 3);
+  ASSERT_TRUE(expected.filter.has_value());
+  EXPECT_LT(expected.squared_error_left, 0.8 * expected.squared_error);
+  for (const VectorWidth width : supported_vector_widths()) {
+    force_vector_width(width);
+    const FittedFilter fitted = fit_filter(build, codebook, 3);
+    EXPECT_EQ(fitted.filter, expected.filter);
+    EXPECT_EQ(fitted.tiles, expected.tiles);
+  }
+  force_vector_width(std::nullopt);
+}
+
 TEST_F(FieldBuildTest, PayloadIsTheSameWhereverTheTilesAreKept) {
   constexpr std::uint64_t kRoomForSome = 2000;
   for (const std::uint64_t room : {std::uint64_t{0}, kRoomForSome}) {

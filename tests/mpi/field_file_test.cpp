@@ -493,10 +493,10 @@ TEST(FieldFile, RefusesAnUnknownVersion) {
   write(small_field(), folder / "a.af.h5");
   edit_file(folder / "a.af.h5", [](hid_t file) {
     H5Adelete(file, "format_version");
-    hdf5::write_int_attribute(file, "format_version", 4);
+    hdf5::write_int_attribute(file, "format_version", field_layout::kFormatVersion + 1);
   });
   const std::string message = refusal(folder / "a.af.h5");
-  EXPECT_NE(message.find("format_version: expected 1 to 3, found 4"), std::string::npos) << message;
+  EXPECT_NE(message.find("format_version: expected 1 to 4, found 5"), std::string::npos) << message;
 }
 
 TEST(FieldFile, RefusesIndicesPackedOtherwiseThanItsVersionSays) {
@@ -798,6 +798,74 @@ TEST(FieldFile, HoldsMeansBesideTheIndices) {
   EXPECT_NE(message.find("attribute tile_coding: expected mean-removed, found two stages"),
             std::string::npos)
       << message;
+}
+
+TileFilter some_filter() {
+  TileFilter filter;
+  for (std::size_t j = 0; j < kTileElements; ++j)
+    for (std::size_t i = 0; i < kFilterInputs; ++i)
+      filter.weights[j][i] = 0.01f * static_cast<float>(j) - 0.003f * static_cast<float>(i);
+  return filter;
+}
+
+TEST(FieldFile, HoldsAFilterBesideTheCodebook) {
+  const test::SharedFolder folder;
+  const Communicator world = Communicator::world();
+  for (const bool has_means : {false, true}) {
+    CompressedAttenuationField field = has_means ? field_with_means() : small_field();
+    field.codebook.filter = some_filter();
+    const auto blocks = has_means ? blocks_with_means(field) : all_blocks(field);
+    std::array<std::string, 2> payload;
+    for (const IndexPacking packing : {IndexPacking::CodebookTree, IndexPacking::Deflate}) {
+      const auto path = folder / (std::string(field_layout::to_string(packing)) + ".af.h5");
+      write_field(field, dealt(blocks, world), some_provenance(), path, world, {}, packing);
+      FieldFileInfo info;
+      const auto read = read_field(path, world, &info);
+      payload[packing == IndexPacking::Deflate ? 1 : 0] = info.payload_sha256;
+      EXPECT_EQ(info.packing, packing);
+      EXPECT_EQ(read->codebook.mean_step, field.codebook.mean_step);
+      EXPECT_EQ(read->codebook.codewords, field.codebook.codewords);
+      EXPECT_EQ(read->codebook.filter, field.codebook.filter);
+      EXPECT_EQ(read_field_header(path).codebook.filter, field.codebook.filter);
+    }
+    EXPECT_EQ(payload[0], payload[1]);
+  }
+}
+
+TEST(FieldFile, RefusesAFilterThatIsNoneOrNotStated) {
+  const test::SharedFolder folder;
+  const Communicator world = Communicator::world();
+  CompressedAttenuationField field = small_field();
+  const auto write = [&](const TileFilter& filter) {
+    field.codebook.filter = filter;
+    std::error_code ignored;
+    if (world.is_root()) std::filesystem::remove(folder / "a.af.h5", ignored);
+    world.barrier();
+    write_field(
+        field, dealt(all_blocks(field), world), some_provenance(), folder / "a.af.h5", world);
+  };
+  const auto expect_refused = [&](const std::string& text) {
+    const std::string message = refusal(folder / "a.af.h5");
+    EXPECT_NE(message.find(text), std::string::npos) << message;
+  };
+  TileFilter filter = some_filter();
+  filter.weights[3][4] = std::numeric_limits<float>::quiet_NaN();
+  write(filter);
+  expect_refused("tile_filter");
+  filter.weights[3][4] = std::numeric_limits<float>::infinity();
+  write(filter);
+  expect_refused("tile_filter: weights must be within 1e6 of 0");
+  // Versions say whether there is one: without it tiles would be taken as they are.
+  write(some_filter());
+  edit_file(folder / "a.af.h5", [](hid_t file) {
+    H5Adelete(file, "format_version");
+    hdf5::write_int_attribute(file, "format_version", 2);
+  });
+  expect_refused("payload_sha256");
+  write(some_filter());
+  edit_file(folder / "a.af.h5",
+            [](hid_t file) { H5Ldelete(file, "/codebook/tile_filter", H5P_DEFAULT); });
+  expect_refused("has no /codebook/tile_filter");
 }
 
 TEST(FieldFile, RefusesMeansThatMakeNoSense) {

@@ -31,7 +31,7 @@ void expect_page(const std::string& name, const std::string& text) {
 std::string dataset_table() {
   std::ostringstream out;
   out << "| Dataset | Type | Extents | Unit | Frame |\n|---|---|---|---|---|\n";
-  std::vector<field_layout::DatasetRule> rules = field_layout::payload_rules(1, true);
+  std::vector<field_layout::DatasetRule> rules = field_layout::payload_rules(1, {true, true});
   for (const field_layout::DatasetRule& rule : field_layout::provenance_rules())
     rules.push_back(rule);
   for (const field_layout::DatasetRule& rule : rules) {
@@ -66,7 +66,10 @@ std::string file_page() {
       << "`/field/slab_0` a row of codewords along t and the row of their tiles' means, in levels, "
       << "take turns along s. Codeword 0 is an empty tile; the level of any other tile's element "
       << "is its mean + the codeword's element - 32768, within 0 and 65535. Versions 1 and 2 are "
-      << "fields of plain tiles, deflated and packed by the codebook's tree. "
+      << "fields of plain tiles, deflated and packed by the codebook's tree. Version 4 has "
+      << "`/codebook/tile_filter`, the weights by which decoded tiles are corrected "
+      << "([how](../../precompute/README.md#tile-filter)), and states `tile_coding` "
+      << "for plain tiles, too. "
       << "[Frames](../../common/geometry/README.md), "
       << "[coding](../coding.md).\n\n"
       << dataset_table() << "\nAn atlas (`af-precompute --orbit`, [page](../other-cameras.md)) has "

@@ -166,10 +166,11 @@ void inspect_field(const std::filesystem::path& path,
     describe_planes(opened.field()->light_slab, facts);
   }
   facts["codewords"] = opened.codewords();
-  const int mean_step =
-      atlas != nullptr ? atlas->codebook.mean_step : opened.field()->codebook.mean_step;
+  const Codebook& codebook = atlas != nullptr ? atlas->codebook : opened.field()->codebook;
+  const int mean_step = codebook.mean_step;
   facts["tile_coding"] = mean_step > 0 ? "mean-removed" : "plain";
   if (mean_step > 0) facts["mean_step_levels"] = mean_step;
+  facts["tile_filter"] = codebook.filter ? "neighbours" : "none";
   facts["quantizer_step"] =
       atlas != nullptr ? atlas->quantizer_step : opened.field()->quantizer_step;
   facts["look_up"] = info.look_up;

@@ -223,13 +223,13 @@ TEST(FieldDesignOfOptions, FitsTheViewpointsOfTheDefaultAlone) {
   EXPECT_EQ(options.in_force().uv_samples, "least-squares");
   EXPECT_EQ(options.in_force().in_force().uv_samples, "least-squares");
   EXPECT_EQ(deciding_options(options, kCastingStage).at("uv_samples"), "\"least-squares\"");
-  EXPECT_EQ(options.training_selection().max_training_tiles, 32u * 8192u);
+  EXPECT_EQ(options.training_selection().max_training_tiles, 32u * 4096u);
   options.preset = kDefaultPreset;
   options.uv_samples = "point";
   EXPECT_FALSE(options.design().fits_uv);
   EXPECT_EQ(options.design().slabs, design_preset_named(kDefaultPreset).design.slabs);
   EXPECT_EQ(option_texts(to_toml(options)).at("uv_samples"), "\"point\"");
-  EXPECT_EQ(options.training_selection().max_training_tiles, 64u * 8192u);
+  EXPECT_EQ(options.training_selection().max_training_tiles, 64u * 4096u);
   options.preset = kPaperPreset;
   options.uv_samples.reset();
   EXPECT_FALSE(options.in_force().uv_samples.has_value());
@@ -250,6 +250,29 @@ TEST(FieldDesignOfOptions, RefusesToFitTooFewViewpointsAndWhatAProbeCannotForeca
   EXPECT_NE(problems(options)[0].find("probe"), std::string::npos);
   options.uv_samples = "point";
   EXPECT_TRUE(problems(options).empty());
+}
+
+TEST(FieldDesignOfOptions, FiltersTheTilesOfTheDefaultAlone) {
+  PrecomputeOptions options;
+  EXPECT_TRUE(options.design().filters_tiles);
+  EXPECT_EQ(options.in_force().in_force().tile_filter, "neighbours");
+  EXPECT_EQ(option_texts(to_toml(options)).at("tile_filter"), "\"neighbours\"");
+  options.preset = kDefaultPreset;
+  options.tile_filter = "none";
+  EXPECT_FALSE(options.design().filters_tiles);
+  EXPECT_EQ(options.in_force().tile_filter, "none");
+  options.preset = kPaperPreset;
+  options.tile_filter.reset();
+  EXPECT_FALSE(options.in_force().tile_filter.has_value());
+  options.tile_filter = "neighbours";
+  EXPECT_TRUE(problems(options).empty());
+  EXPECT_TRUE(options.design().filters_tiles);
+  options = {};
+  options.preset = "fine";
+  EXPECT_FALSE(options.in_force().tile_filter.has_value());
+  options.tile_filter = "neighbours";
+  ASSERT_EQ(problems(options).size(), 1u);
+  EXPECT_NE(problems(options)[0].find("probe"), std::string::npos);
 }
 
 TEST(PrecomputeOptions, AnAtlasHasItsOwnPreset) {
