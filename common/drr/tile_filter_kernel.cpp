@@ -100,15 +100,11 @@ void filter_tile_row(const FilterRow& row, Weights weights, uint16_t* const rows
   for (int32_t s = 0; s < row.s_tiles; s += kLanes) {
     const Block block{&row, s};
     const float* own = neighbour(block, 0, 0);
-    // Next to air tiles stay as they are (kDecidingTiles).
-    const Floats zero = splat(0.0f);
-    const Ints stays = (load(own) == zero) | (load(neighbour(block, 2, 1)) == zero) |
-                       (load(neighbour(block, 2, -1)) == zero) |
-                       (load(neighbour(block, 3, 1)) == zero) |
-                       (load(neighbour(block, 3, -1)) == zero);
     Floats estimates[kElements];
+    Ints is_empty = splat(-1);
     for (int k = 0; k < kElements; ++k) {
       const Floats coefficient = load(own + k * row.coefficient_stride);
+      is_empty &= coefficient == splat(0.0f);
       estimates[k] = coefficient + splat(weights[k][0]) * coefficient;
     }
 #pragma GCC unroll 4
@@ -118,15 +114,13 @@ void filter_tile_row(const FilterRow& row, Weights weights, uint16_t* const rows
     for (int a = 0; a < 4; ++a)
 #pragma GCC unroll 4
       for (int b = a + 1; b < 4; ++b, input += 4) add_pair(block, a, b, input, weights, estimates);
-    for (int k = 0; k < kElements; ++k)
-      estimates[k] = stays ? load(own + k * row.coefficient_stride) : estimates[k];
     to_levels(estimates);
     for (int i = 0; i < 8; ++i) {
       // Elements of lower and upper nodes along s: 8 du + 4 dv + 2 ds + dt.
       const int lower = 4 * (i / 2) + i % 2;
       const Ints levels =
           native::to_int(estimates[lower]) | (native::to_int(estimates[lower + 2]) << 16);
-      native::store(reinterpret_cast<int32_t*>(rows[i] + 2 * s), levels);
+      native::store(reinterpret_cast<int32_t*>(rows[i] + 2 * s), levels & ~is_empty);
     }
   }
 }

@@ -54,17 +54,18 @@ double filtered_level(const SlabTiles& tiles,
     if (is_new) at->second = tiles.coefficients(tile, offset);
     return static_cast<double>(at->second[k]);
   };
-  const bool is_corrected = std::ranges::all_of(
-      kDecidingTiles, [&](const TileOffset& offset) { return coefficient(offset, 0) != 0.0; });
   double level = 0.0;
+  bool is_empty = true;
   for (std::size_t j = 0; j < kTileElements; ++j) {
     double estimate = coefficient({}, j);
+    is_empty = is_empty && estimate == 0.0;
     const auto inputs = filter_inputs<double>(j, coefficient);
-    for (std::size_t i = 0; is_corrected && i < kFilterInputs; ++i)
+    for (std::size_t i = 0; i < kFilterInputs; ++i)
       estimate += static_cast<double>(filter.weights[j][i]) * inputs[i];
     const bool is_negated = __builtin_parityll(j & element) != 0;
     level += is_negated ? -estimate : estimate;
   }
+  if (is_empty) return 0.0;
   constexpr double kLargestLevel = 65535.0;
   return std::clamp(
       std::floor(level / static_cast<double>(kTileElements) + 0.5), 0.0, kLargestLevel);

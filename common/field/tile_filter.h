@@ -27,11 +27,7 @@ inline constexpr std::size_t kFilterInputs = 1 + 4 * 2 + 6 * 4;
 /// It works on Hadamard coefficients, which are even or odd along each axis. Mirror symmetry leaves
 /// kFilterInputs of the 528 numbers of the neighbourhood to each coefficient: along every axis that
 /// a neighbour lies on, sums of coefficients of the same parity, or differences of those of the
-/// other.
-///
-/// Next to air a field is not smooth, least of all where the CT is cut off: a tile stays as decoded
-/// when its coefficient 0, or that of one of its four neighbours along s and t, is 0. Corrected,
-/// such tiles had seven to eleven times the error (in dB), and DRRs a line along the cut.
+/// other. Tiles without a coefficient other than 0 are empty, and stay so.
 struct TileFilter {
   /// Added to coefficient j of a tile: the sum over i of weights[j][i] filter_inputs(j)[i].
   std::array<std::array<float, kFilterInputs>, kTileElements> weights{};
@@ -58,10 +54,6 @@ inline std::optional<std::array<int, 4>> neighbouring_tile(const std::array<int,
   }
   return at;
 }
-
-/// Neighbours by whose coefficients 0 (0 for air) a tile is corrected or stays as it is.
-inline constexpr std::array<TileOffset, 5> kDecidingTiles = {
-    {{0, 0, 0, 0}, {0, 0, 1, 0}, {0, 0, -1, 0}, {0, 0, 0, 1}, {0, 0, 0, -1}}};
 
 /// The bit by which the numbers of a tile's elements and coefficients tell along an axis (0 ... 3:
 /// u, v, s, t).

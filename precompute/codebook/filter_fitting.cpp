@@ -51,8 +51,13 @@ class Patch {
       : counts_(unit.tile_counts()),
         decoded_(unit.tile_count()),
         errors_(unit.tile_count()),
-        begins_{unit.u.begin == slab.u.stored.begin, unit.v.begin == slab.v.stored.begin},
-        ends_{unit.u.end() == slab.u.stored.end(), unit.v.end() == slab.v.stored.end()} {
+        is_empty_(unit.tile_count(), true) {
+    const std::array<LatticeAxis, 4> axes = slab.axes();
+    const std::array<NodeRange, 4> parts = {unit.u, unit.v, unit.s, unit.t};
+    for (std::size_t axis = 0; axis < 4; ++axis) {
+      begins_[axis] = parts[axis].begin == axes[axis].stored.begin;
+      ends_[axis] = parts[axis].end() == axes[axis].stored.end();
+    }
     const auto row = static_cast<std::size_t>(counts_[3]);
     tiles.for_each([&](std::size_t i, const Tile& tile) {
       const std::size_t at = i / row * values_per_tile * row + i % row;
@@ -61,18 +66,19 @@ class Patch {
       decoded_[i] = exact(codewords[index]);
       if (values_per_tile > 1)
         decoded_[i][0] += static_cast<std::int32_t>(kTileElements) * encoded.indices[at + row];
+      is_empty_[i] = decoded_[i] == IntegerCoefficients{};
       const IntegerCoefficients original = exact(hadamard_coefficients(tile));
       for (std::size_t k = 0; k < kTileElements; ++k) errors_[i][k] = original[k] - decoded_[i][k];
     });
   }
 
-  /// Calls visit(tile along each axis, its number) for those that a filter corrects and whose
+  /// Calls visit(tile along each axis, its number) for those that are not empty and whose
   /// neighbours are known.
   template <typename Visit>
-  void for_each_corrected(Visit&& visit) const {
+  void for_each_inner(Visit&& visit) const {
     std::array<int, 4> tile{};
     for (std::size_t i = 0; i < decoded_.size(); ++i) {
-      if (knows_viewpoints(tile) && is_corrected(tile)) visit(tile, i);
+      if (!is_empty_[i] && knows_neighbours(tile)) visit(tile, i);
       for (std::size_t axis = 4; axis-- > 0;) {
         if (++tile[axis] < counts_[axis]) break;
         tile[axis] = 0;
@@ -93,23 +99,19 @@ class Patch {
   }
 
  private:
-  [[nodiscard]] bool knows_viewpoints(const std::array<int, 4>& tile) const {
-    for (std::size_t axis = 0; axis < 2; ++axis)
+  [[nodiscard]] bool knows_neighbours(const std::array<int, 4>& tile) const {
+    for (std::size_t axis = 0; axis < 4; ++axis)
       if ((tile[axis] == 0 && !begins_[axis]) || (tile[axis] == counts_[axis] - 1 && !ends_[axis]))
         return false;
     return true;
   }
-  /// Not at the patch's ends along s and t: beyond them tiles are unknown or not stored.
-  [[nodiscard]] bool is_corrected(const std::array<int, 4>& tile) const {
-    return std::ranges::all_of(
-        kDecidingTiles, [&](const TileOffset& offset) { return neighbour(tile, offset)[0] != 0; });
-  }
 
   std::array<int, 4> counts_;
+  std::array<bool, 4> begins_{};  ///< with the first stored node
+  std::array<bool, 4> ends_{};    ///< with the last
   std::vector<IntegerCoefficients> decoded_;
   std::vector<IntegerCoefficients> errors_;
-  std::array<bool, 2> begins_;  ///< with the first viewpoint along u and v
-  std::array<bool, 2> ends_;    ///< with the last
+  std::vector<bool> is_empty_;
 };
 
 /// A tile and its neighbours, each found once.
@@ -236,7 +238,7 @@ FilterSums::FilterSums(const Codebook& codebook)
 void FilterSums::add(const WorkUnit& patch, const SlabLattice& slab, const UnitTiles& tiles) {
   const Patch of_patch(
       patch, slab, tiles, encode_unit(search_, patch, tiles), codewords_, values_per_tile_);
-  of_patch.for_each_corrected([&](const std::array<int, 4>& tile, std::size_t i) {
+  of_patch.for_each_inner([&](const std::array<int, 4>& tile, std::size_t i) {
     ++values_[0];
     const Neighbourhood around(of_patch, tile);
     for (std::size_t j = 0; j < kTileElements; ++j)

@@ -22,9 +22,9 @@ std::vector<WorkUnit> filter_patches(const FieldLattice& lattice, std::uint64_t 
 /// What a fit found, over the tiles of all patches.
 struct FittedFilter {
   std::optional<TileFilter> filter;  ///< none: the tiles are too few to say
-  std::uint64_t tiles = 0;           ///< that the filter corrects and whose neighbours are known
-  double squared_error = 0.0;        ///< of these, in squared levels, not yet rounded and limited
-  double squared_error_left = 0.0;   ///< by the filter
+  std::uint64_t tiles = 0;     ///< that are not empty and have their neighbours within the patch
+  double squared_error = 0.0;  ///< of these, in squared levels, not yet rounded and limited
+  double squared_error_left = 0.0;  ///< by the filter
 };
 
 /// Sums for the normal equations of a TileFilter. They are exact integers, so that the order of

@@ -31,7 +31,7 @@ TileFilter any_filter() {
 /// Integer noise, alike everywhere; some tiles are empty.
 double holed_noise(const RayNodes& n) {
   const auto tile_number = [](double node) { return static_cast<int>(node) / 2; };
-  if ((tile_number(n.s) + 2 * tile_number(n.t) + tile_number(n.u)) % 11 == 0) return 0.0;
+  if ((tile_number(n.s) + 2 * tile_number(n.t) + tile_number(n.u)) % 5 == 0) return 0.0;
   const auto index = static_cast<std::uint64_t>(((n.u * 100 + n.v) * 100 + n.s) * 100 + n.t);
   return std::floor(HashRandom(9, index).uniform(20000, 40000));
 }
@@ -87,15 +87,10 @@ TEST(FilteredDecoding, EqualsTheDefinition) {
       if (sample != static_cast<int>(defined)) ++rounded_otherwise;
       const double before = static_cast<double>(unfiltered.node_value(k, node)) / 0.25;
       if (before == 0.0 && sample == 0) ++empty;
-      const bool is_at_the_end =
-          node.s < 2 || node.t < 2;  // beyond which nothing is stored, so that it is air
-      if (is_at_the_end) {
-        ASSERT_EQ(sample, before);
-      }
       if (std::abs(before - sample) > 1.0) ++changed;
     });
-    EXPECT_GT(empty, all / 40);
-    EXPECT_GT(changed, all / 20);
+    EXPECT_GT(empty, all / 10);
+    EXPECT_GT(changed, all / 2);
     EXPECT_LT(rounded_otherwise, all / 100);
   }
 }
