@@ -43,13 +43,16 @@ class PrecomputeRun {
   PrecomputeRun(const PrecomputeOptions& options,
                 std::string command_line,
                 const Communicator& communicator)
-      : options_(options.in_force()),
+      : options_(options),
         command_line_(std::move(command_line)),
         world_(communicator),
         run_({options.output, {}, options.is_restart, keeps_progress(options)}, communicator) {}
 
   void run() {
     all_or_none(world_, [&] {
+      // As stated first: what is in force has known names alone.
+      throw_if_any(problems(options_));
+      options_ = options_.in_force();
       throw_if_any(problems(options_));
       if (!options_.is_dry_run && options_.output.empty())
         throw UsageError("-o FIELD.h5 is needed (or --dry-run)");

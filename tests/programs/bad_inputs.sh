@@ -214,6 +214,9 @@ of_design 3 '; the fastest DRR: ' 'time that no DRR keeps' --max-drr-ms 0.000001
 of_design 3 "preset = 'nonsense': must be one of paper" 'unknown preset' --preset nonsense
 of_design 2 '--preset excludes' 'preset and budget' --preset paper --max-field-size 8MB
 of_design 3 'look_up = nearest: must be linear or cubic' 'look-up that no field is for' --look-up nearest
+of_design 3 'tile_filter = neighbors: must be none or neighbours' 'tile filter of another spelling' --tile-filter neighbors
+of_design 3 'uv_samples = pont: must be point or least-squares' 'samples that no caster makes' --uv-samples pont
+of_design 3 'tile_coding = mean: must be plain or mean-removed' 'tile coding that there is not' --tile-coding mean
 of_projections() { row "$1" "$2" "$3" "${precompute[@]}" --study valid/study.toml --camera AP --projections "${@:4}"; }
 of_projections 4 'nowhere.toml' 'projections that are not there' nowhere.toml
 of_projections 3 'must be at least 3' 'projections of two views' valid/study.toml
