@@ -210,38 +210,50 @@ SharedArray<std::uint16_t> padded_samples(const FieldLevel& level,
                 });
 }
 
-/// Level 0 or 1 of a field, slab by slab.
-FieldLevel decoded_level(const CompressedAttenuationField& field,
+/// Level 0 or 1 of a field, slab by slab: decode(k, slab, samples, part, parts).
+template <typename Decode>
+FieldLevel decoded_slabs(const CompressedAttenuationField& field,
                          int level,
-                         const FieldLevelMemory& memory) {
-  check(!field.codebook.filter, "tiles without a filter");
+                         const FieldLevelMemory& memory,
+                         const Decode& decode) {
   FieldLevel result{level, field.light_slab, field.quantizer_step, {}};
   for (std::size_t k = 0; k < field.slabs.size(); ++k) {
     const SlabGeometry& fine = field.light_slab.slabs[k];
     FieldLevelSlab slab{level == 0 ? fine : halved_geometry(fine), {}};
     slab.samples = padded_samples(result, slab, memory, [&](auto samples, int part, int parts) {
-      const int u_tiles = field.lattice(k).u.stored.tiles();
-      decode_slab(field, k, slab, level, share_of(u_tiles, part, parts), samples);
+      decode(k, slab, samples, part, parts);
     });
     result.slabs.push_back(std::move(slab));
   }
   return result;
 }
 
+FieldLevel decoded_level(const CompressedAttenuationField& field,
+                         int level,
+                         const FieldLevelMemory& memory) {
+  check(!field.codebook.filter, "tiles without a filter");
+  return decoded_slabs(
+      field,
+      level,
+      memory,
+      [&](std::size_t k, const FieldLevelSlab& slab, auto samples, int part, int parts) {
+        const int u_tiles = field.lattice(k).u.stored.tiles();
+        decode_slab(field, k, slab, level, share_of(u_tiles, part, parts), samples);
+      });
+}
+
 /// Level 0 of a field whose codebook has a filter.
-FieldLevel filtered_level(const CompressedAttenuationField& field, const FieldLevelMemory& memory) {
-  const std::vector<TileCoefficients> codewords = decoded_coefficients(field.codebook);
-  FieldLevel result{0, field.light_slab, field.quantizer_step, {}};
-  for (std::size_t k = 0; k < field.slabs.size(); ++k) {
-    const FilteredDecoding decoding(field, codewords, k);
-    FieldLevelSlab slab{field.light_slab.slabs[k], {}};
-    slab.samples = padded_samples(result, slab, memory, [&](auto samples, int part, int parts) {
-      const Share rows = share_of(decoding.row_count(), part, parts);
-      decoding.decode(rows.begin, rows.end, samples);
-    });
-    result.slabs.push_back(std::move(slab));
-  }
-  return result;
+FieldLevel filtered_level_0(const CompressedAttenuationField& field,
+                            const FieldLevelMemory& memory) {
+  const FilteredDecoding decoding(field);
+  return decoded_slabs(
+      field,
+      0,
+      memory,
+      [&](std::size_t k, const FieldLevelSlab& /*slab*/, auto samples, int part, int parts) {
+        const Share rows = share_of(field.lattice(k).t.stored.tiles(), part, parts);
+        decoding.decode(k, rows.begin, rows.end, samples);
+      });
 }
 
 FieldLevelSlab halved_slab(const FieldLevelSlab& from,
@@ -346,7 +358,7 @@ std::size_t decoded_bytes(const CompressedAttenuationField& field) {
 }
 
 FieldLevel decode_field(const CompressedAttenuationField& field, const FieldLevelMemory& memory) {
-  return field.codebook.filter ? filtered_level(field, memory) : decoded_level(field, 0, memory);
+  return field.codebook.filter ? filtered_level_0(field, memory) : decoded_level(field, 0, memory);
 }
 
 FieldLevel decode_halved_field(const CompressedAttenuationField& field,

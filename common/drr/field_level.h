@@ -98,8 +98,7 @@ FieldLevel decode_field(const CompressedAttenuationField& field,
                         const FieldLevelMemory& memory = process_memory());
 
 /// Level 1 of a compressed field of one slab, without the memory of its level 0 unless its codebook
-/// has a filter. InputError when an
-/// axis has too few nodes to halve.
+/// has a filter. InputError when an axis has too few nodes to halve.
 FieldLevel decode_halved_field(const CompressedAttenuationField& field,
                                const FieldLevelMemory& memory = process_memory());
 

@@ -16,11 +16,13 @@ namespace {
 constexpr int kRowsTogether = 4;
 constexpr int kRowsHeld = kRowsTogether + 2;
 
-}  // namespace
+struct TileCounts {
+  int u, v, s, t;
+};
 
 /// Coefficients of the rows in work, of three rows of viewpoint tiles along u and all along v:
 /// [u modulo 3][v][row][coefficient][s], and the levels of one row of tiles.
-class FilteredDecoding::Window {
+class Window {
  public:
   explicit Window(const TileCounts& tiles)
       : v_tiles_(static_cast<std::size_t>(tiles.v)),
@@ -49,36 +51,49 @@ class FilteredDecoding::Window {
   std::array<std::uint16_t*, 8> rows_{};
 };
 
-FilteredDecoding::FilteredDecoding(const CompressedAttenuationField& field,
-                                   const std::vector<TileCoefficients>& codewords,
-                                   std::size_t slab)
-    : field_(field),
-      codewords_(codewords),
-      values_(field.slabs[slab].indices.view()),
-      lattice_(field.lattice(slab)) {
-  check(field.codebook.filter.has_value(), "a codebook with a filter");
-  const std::array<int, 4> counts = lattice_.tile_counts();
-  tiles_ = {counts[0], counts[1], counts[2], counts[3]};
-}
+/// One slab, and the window that moves over it.
+class SlabDecoding {
+ public:
+  SlabDecoding(const CompressedAttenuationField& field,
+               const std::vector<TileCoefficients>& codewords,
+               std::size_t slab,
+               std::span<std::uint16_t> samples)
+      : codebook_(field.codebook),
+        codewords_(codewords),
+        values_(field.slabs[slab].indices.view()),
+        lattice_(field.lattice(slab)),
+        tiles_{lattice_.u.stored.tiles(),
+               lattice_.v.stored.tiles(),
+               lattice_.s.stored.tiles(),
+               lattice_.t.stored.tiles()},
+        samples_(samples),
+        window_(tiles_) {}
 
-void FilteredDecoding::decode(int begin, int end, std::span<std::uint16_t> samples) const {
-  Window window(tiles_);
-  for (int row = begin; row < end; row += kRowsTogether)
-    decode_rows(row, std::min(row + kRowsTogether, end), window, samples);
-}
+  /// At most kRowsTogether.
+  void decode_rows(int begin, int end);
 
-void FilteredDecoding::decode_rows(int begin,
-                                   int end,
-                                   Window& window,
-                                   std::span<std::uint16_t> samples) const {
+ private:
+  void fill(int u, int v, int first_row, int rows);
+  void store(int u, int v, int row) const;
+
+  const Codebook& codebook_;
+  const std::vector<TileCoefficients>& codewords_;
+  std::span<const std::uint16_t> values_;
+  SlabLattice lattice_;
+  TileCounts tiles_;
+  std::span<std::uint16_t> samples_;
+  Window window_;
+};
+
+void SlabDecoding::decode_rows(int begin, int end) {
   const auto filter_tile_row = select_kernel<FilterTileRow>(
       kernels_128::filter_tile_row, kernels_256::filter_tile_row, kernels_512::filter_tile_row);
   static_assert(kTileElements == 16 && kFilterInputs == 33 && axis_input(4) == 9,
                 "the kernel's numbers");
   const auto* weights =
-      reinterpret_cast<const float(*)[kFilterInputs]>(field_.codebook.filter->weights.data());
+      reinterpret_cast<const float(*)[kFilterInputs]>(codebook_.filter->weights.data());
   const auto fill_all = [&](int u) {
-    for (int v = 0; v < tiles_.v; ++v) fill(u, v, begin - 1, end - begin + 2, window);
+    for (int v = 0; v < tiles_.v; ++v) fill(u, v, begin - 1, end - begin + 2);
   };
   fill_all(0);
   for (int u = 0; u < tiles_.u; ++u) {
@@ -86,46 +101,44 @@ void FilteredDecoding::decode_rows(int begin,
     for (int v = 0; v < tiles_.v; ++v)
       for (int row = begin; row < end; ++row) {
         FilterRow tiles{{},
-                        static_cast<std::int64_t>(window.row_stride()),
-                        static_cast<std::int64_t>(window.coefficient_stride()),
+                        static_cast<std::int64_t>(window_.row_stride()),
+                        static_cast<std::int64_t>(window_.coefficient_stride()),
                         tiles_.s};
         for (int i = 0; i < 9; ++i)
-          tiles.tiles[i] = window.tiles(std::clamp(u + i / 3 - 1, 0, tiles_.u - 1),
-                                        std::clamp(v + i % 3 - 1, 0, tiles_.v - 1)) +
+          tiles.tiles[i] = window_.tiles(std::clamp(u + i / 3 - 1, 0, tiles_.u - 1),
+                                         std::clamp(v + i % 3 - 1, 0, tiles_.v - 1)) +
                            (row - begin + 1) * tiles.row_stride;
-        filter_tile_row(tiles, weights, window.rows());
-        store(u, v, row, window, samples);
+        filter_tile_row(tiles, weights, window_.rows());
+        store(u, v, row);
       }
   }
 }
 
-void FilteredDecoding::fill(int u, int v, int first_row, int rows, Window& window) const {
-  const std::size_t stride = window.coefficient_stride();
-  const Codebook& codebook = field_.codebook;
+void SlabDecoding::fill(int u, int v, int first_row, int rows) {
+  const std::size_t stride = window_.coefficient_stride();
   const std::size_t values_per_row =
-      codebook.values_per_tile() * static_cast<std::size_t>(tiles_.t);
+      codebook_.values_per_tile() * static_cast<std::size_t>(tiles_.t);
   const std::size_t first_value =
       (static_cast<std::size_t>(u) * static_cast<std::size_t>(tiles_.v) +
        static_cast<std::size_t>(v)) *
       static_cast<std::size_t>(tiles_.s) * values_per_row;
   for (int s = 0; s < tiles_.s; ++s)
     for (int r = 0; r < rows; ++r) {
-      float* tile = window.tiles(u, v) + static_cast<std::size_t>(r) * window.row_stride() + s;
+      float* tile = window_.tiles(u, v) + static_cast<std::size_t>(r) * window_.row_stride() + s;
       const int t = first_row + r;
+      // Codeword 0, an empty tile, stands for tiles that are not stored, too.
       const std::uint16_t* value = nullptr;
       if (t >= 0 && t < tiles_.t)
         value = values_.data() + first_value + static_cast<std::size_t>(s) * values_per_row + t;
-      const bool is_empty = value == nullptr || *value == 0;
-      const TileCoefficients& codeword = codewords_[is_empty ? 0 : *value];
-      for (std::size_t k = 0; k < kTileElements; ++k)
-        tile[k * stride] = is_empty ? 0.0f : codeword[k];
-      if (!is_empty && codebook.has_means())
+      const std::uint16_t index = value != nullptr ? *value : std::uint16_t{0};
+      const TileCoefficients& codeword = codewords_[index];
+      for (std::size_t k = 0; k < kTileElements; ++k) tile[k * stride] = codeword[k];
+      if (index != 0 && codebook_.has_means())
         tile[0] += static_cast<float>(kTileElements) * static_cast<float>(value[tiles_.t]);
     }
 }
 
-void FilteredDecoding::store(
-    int u, int v, int row, const Window& window, std::span<std::uint16_t> samples) const {
+void SlabDecoding::store(int u, int v, int row) const {
   const auto columns = static_cast<std::size_t>(lattice_.s.stored.count);
   const auto nodes_t = static_cast<std::size_t>(lattice_.t.stored.count);
   for (int i = 0; i < 8; ++i) {
@@ -139,10 +152,29 @@ void FilteredDecoding::store(
         static_cast<std::size_t>(node_u) * static_cast<std::size_t>(lattice_.v.nodes) +
         static_cast<std::size_t>(node_v);
     std::copy_n(
-        window.rows()[i],
+        window_.rows()[i],
         columns,
-        samples.data() + (viewpoint * nodes_t + static_cast<std::size_t>(node_t)) * columns);
+        samples_.data() + (viewpoint * nodes_t + static_cast<std::size_t>(node_t)) * columns);
   }
+}
+
+}  // namespace
+
+FilteredDecoding::FilteredDecoding(const CompressedAttenuationField& field) : field_(field) {
+  const Codebook& codebook = field.codebook;
+  check(codebook.filter.has_value(), "a codebook with a filter");
+  codewords_.reserve(codebook.size());
+  for (std::size_t i = 0; i < codebook.size(); ++i)
+    codewords_.push_back(decoded_coefficients(codebook, static_cast<std::uint16_t>(i), 0));
+}
+
+void FilteredDecoding::decode(std::size_t slab,
+                              int begin,
+                              int end,
+                              std::span<std::uint16_t> samples) const {
+  SlabDecoding decoding(field_, codewords_, slab, samples);
+  for (int row = begin; row < end; row += kRowsTogether)
+    decoding.decode_rows(row, std::min(row + kRowsTogether, end));
 }
 
 }  // namespace af

@@ -46,14 +46,13 @@ Codebook codebook_of_searched(std::vector<Tile> codewords, int mean_step) {
   return {std::move(codewords), mean_step, {}};
 }
 
-std::vector<TileCoefficients> decoded_coefficients(const Codebook& codebook) {
-  std::vector<TileCoefficients> coefficients;
-  coefficients.reserve(codebook.size());
-  for (const Tile& codeword : codebook.codewords)
-    coefficients.push_back(hadamard_coefficients(codeword));
-  constexpr auto kOffset = static_cast<float>(kTileElements * kShapeZero);
-  if (codebook.has_means())
-    for (std::size_t i = 1; i < coefficients.size(); ++i) coefficients[i][0] -= kOffset;
+TileCoefficients decoded_coefficients(const Codebook& codebook,
+                                      std::uint16_t index,
+                                      std::uint16_t mean) {
+  TileCoefficients coefficients = hadamard_coefficients(codebook.codewords[index]);
+  if (codebook.has_means() && index > 0)
+    coefficients[0] +=
+        static_cast<float>(kTileElements) * static_cast<float>(int{mean} - kShapeZero);
   return coefficients;
 }
 

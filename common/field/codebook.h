@@ -49,9 +49,12 @@ inline std::uint16_t level_of(std::uint16_t element, std::uint16_t mean) {
   return static_cast<std::uint16_t>(std::clamp(int{mean} + int{element} - kShapeZero, 0, 65535));
 }
 
-/// Hadamard coefficients of every codeword as it is decoded with mean 0, before levels are limited
-/// to 0 ... 65535; a mean adds kTileElements times itself to coefficient 0. Exact.
-std::vector<TileCoefficients> decoded_coefficients(const Codebook& codebook);
+/// Hadamard coefficients of a tile as decoded, before levels are limited to 0 ... 65535. Exact.
+/// `mean`, 0 where tiles have none, adds kTileElements times itself to coefficient 0; codeword 0
+/// has none.
+TileCoefficients decoded_coefficients(const Codebook& codebook,
+                                      std::uint16_t index,
+                                      std::uint16_t mean);
 
 /// Complements a shape's elements at the upper node along s; a second call undoes the first.
 /// Distances between shapes stay the same, and the sum becomes the slope along s.

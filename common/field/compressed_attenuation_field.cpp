@@ -17,27 +17,29 @@ class SlabTiles {
         values_(field.slabs[slab].indices.view()),
         counts_(field.lattice(slab).tile_counts()) {}
 
+  [[nodiscard]] std::uint16_t index(const std::array<int, 4>& tile) const {
+    return values_[position(tile)];
+  }
+  /// 0 where tiles have none.
+  [[nodiscard]] std::uint16_t mean(const std::array<int, 4>& tile) const {
+    return codebook_.has_means() ? values_[position(tile) + row()] : std::uint16_t{0};
+  }
   /// Of a neighbour as decoded, before levels are limited.
   [[nodiscard]] TileCoefficients coefficients(const std::array<int, 4>& tile,
                                               const TileOffset& offset) const {
     const auto at = neighbouring_tile(tile, offset, counts_);
-    if (!at) return {};
-    const auto row = static_cast<std::size_t>(counts_[3]);
-    std::size_t rows = 0;
-    for (std::size_t axis = 0; axis < 3; ++axis)
-      rows = rows * static_cast<std::size_t>(counts_[axis]) + static_cast<std::size_t>((*at)[axis]);
-    const std::size_t i =
-        rows * codebook_.values_per_tile() * row + static_cast<std::size_t>((*at)[3]);
-    const std::uint16_t index = values_[i];
-    if (index == 0) return {};
-    Codebook of_one{{{}, codebook_.codewords[index]}, codebook_.mean_step, {}};
-    TileCoefficients coefficients = decoded_coefficients(of_one)[1];
-    if (codebook_.has_means())
-      coefficients[0] += static_cast<float>(kTileElements) * static_cast<float>(values_[i + row]);
-    return coefficients;
+    return at ? decoded_coefficients(codebook_, index(*at), mean(*at)) : TileCoefficients{};
   }
 
  private:
+  [[nodiscard]] std::size_t row() const { return static_cast<std::size_t>(counts_[3]); }
+  [[nodiscard]] std::size_t position(const std::array<int, 4>& tile) const {
+    std::size_t rows = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      rows = rows * static_cast<std::size_t>(counts_[axis]) + static_cast<std::size_t>(tile[axis]);
+    return rows * codebook_.values_per_tile() * row() + static_cast<std::size_t>(tile[3]);
+  }
+
   const Codebook& codebook_;
   std::span<const std::uint16_t> values_;
   std::array<int, 4> counts_;
@@ -76,28 +78,22 @@ double filtered_level(const SlabTiles& tiles,
 float CompressedAttenuationField::node_value(std::size_t slab, const NodeIndex& node) const {
   const std::array<LatticeAxis, 4> axes = lattice(slab).axes();
   const std::array<int, 4> nodes = {node.u, node.v, node.s, node.t};
-  const std::size_t rows = codebook.values_per_tile();
-  std::size_t tile = 0;
-  std::array<int, 4> of_axes{};
+  std::array<int, 4> tile{};
   std::array<unsigned, 4> odd{};
   for (std::size_t axis = 0; axis < 4; ++axis) {
     const NodeRange& stored = axes[axis].stored;
     const int local = nodes[axis] - stored.begin;
     if (local < 0 || local >= stored.count) return 0.0f;
-    const std::size_t rows_before = axis == 3 ? rows : 1;
-    tile = tile * static_cast<std::size_t>(stored.tiles()) * rows_before +
-           static_cast<std::size_t>(local / 2);
-    of_axes[axis] = local / 2;
+    tile[axis] = local / 2;
     odd[axis] = static_cast<unsigned>(local) & 1u;
   }
   const std::size_t number = tile_element(odd[0], odd[1], odd[2], odd[3]);
+  const SlabTiles tiles(*this, slab);
   if (codebook.filter)
-    return quantizer_step * static_cast<float>(filtered_level(
-                                SlabTiles(*this, slab), *codebook.filter, of_axes, number));
-  const SharedArray<std::uint16_t>& values = slabs[slab].indices;
-  const std::uint16_t element = codebook.codewords[values[tile]][number];
-  const auto row = static_cast<std::size_t>(axes[3].stored.tiles());
-  const std::uint16_t level = rows == 1 ? element : level_of(element, values[tile + row]);
+    return quantizer_step *
+           static_cast<float>(filtered_level(tiles, *codebook.filter, tile, number));
+  const std::uint16_t element = codebook.codewords[tiles.index(tile)][number];
+  const std::uint16_t level = codebook.has_means() ? level_of(element, tiles.mean(tile)) : element;
   return quantizer_step * static_cast<float>(level);
 }
 

@@ -46,8 +46,7 @@ class Patch {
         const SlabLattice& slab,
         const UnitTiles& tiles,
         const EncodedUnit& encoded,
-        const std::vector<TileCoefficients>& codewords,
-        std::size_t values_per_tile)
+        const Codebook& codebook)
       : counts_(unit.tile_counts()),
         decoded_(unit.tile_count()),
         errors_(unit.tile_count()),
@@ -60,12 +59,12 @@ class Patch {
     }
     const auto row = static_cast<std::size_t>(counts_[3]);
     tiles.for_each([&](std::size_t i, const Tile& tile) {
-      const std::size_t at = i / row * values_per_tile * row + i % row;
+      const std::size_t at = i / row * codebook.values_per_tile() * row + i % row;
       const std::uint16_t index = encoded.indices[at];
       if (index == 0) return;
-      decoded_[i] = exact(codewords[index]);
-      if (values_per_tile > 1)
-        decoded_[i][0] += static_cast<std::int32_t>(kTileElements) * encoded.indices[at + row];
+      const std::uint16_t mean =
+          codebook.has_means() ? encoded.indices[at + row] : std::uint16_t{0};
+      decoded_[i] = exact(decoded_coefficients(codebook, index, mean));
       is_empty_[i] = decoded_[i] == IntegerCoefficients{};
       const IntegerCoefficients original = exact(hadamard_coefficients(tile));
       for (std::size_t k = 0; k < kTileElements; ++k) errors_[i][k] = original[k] - decoded_[i][k];
@@ -230,14 +229,10 @@ std::vector<WorkUnit> filter_patches(const FieldLattice& lattice, std::uint64_t 
 }
 
 FilterSums::FilterSums(const Codebook& codebook)
-    : search_(codebook),
-      codewords_(decoded_coefficients(codebook)),
-      values_per_tile_(codebook.values_per_tile()),
-      values_(1 + kTileElements * kSumsPerCoefficient, 0) {}
+    : codebook_(codebook), search_(codebook), values_(1 + kTileElements * kSumsPerCoefficient, 0) {}
 
 void FilterSums::add(const WorkUnit& patch, const SlabLattice& slab, const UnitTiles& tiles) {
-  const Patch of_patch(
-      patch, slab, tiles, encode_unit(search_, patch, tiles), codewords_, values_per_tile_);
+  const Patch of_patch(patch, slab, tiles, encode_unit(search_, patch, tiles), codebook_);
   of_patch.for_each_inner([&](const std::array<int, 4>& tile, std::size_t i) {
     ++values_[0];
     const Neighbourhood around(of_patch, tile);

@@ -32,7 +32,9 @@ struct FittedFilter {
 /// 2^23, and products of 2^17 tiles, which the patches do not have, below 2^63.
 class FilterSums {
  public:
+  /// `codebook` must outlive it.
   explicit FilterSums(const Codebook& codebook);
+  explicit FilterSums(Codebook&& codebook) = delete;
 
   /// Adds the tiles of a patch as cast, and as they will be decoded. `slab`: the patch's, to tell
   /// the end of the lattice from that of the patch.
@@ -46,9 +48,8 @@ class FilterSums {
  private:
   [[nodiscard]] std::span<const std::uint64_t> of_coefficient(std::size_t j) const;
 
+  const Codebook& codebook_;
   NearestCodeword search_;
-  std::vector<TileCoefficients> codewords_;
-  std::size_t values_per_tile_;
   /// Tiles; then, for each coefficient, the products of its inputs and of the decoded tile's error
   /// with one another, on and above the diagonal, row by row.
   std::vector<std::uint64_t> values_;
