@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 
 #include <Eigen/Cholesky>
 
@@ -15,7 +16,11 @@ namespace af {
 
 namespace {
 
-constexpr std::size_t kPatches = 24;
+/// Many, and of each only a share of its tiles: neighbouring tiles say much the same, and few
+/// patches leave it to chance which edges of the body they see. From 24 whole ones to these, the
+/// seed moved the worst DRR of a skull by 1.3 instead of 4.5 dB, in the same time.
+constexpr std::size_t kPatches = 72;
+constexpr int kTilesPerFittedTile = 3;
 constexpr int kPatchViewpoints = 12;
 constexpr int kPatchNodesAlongS = 16;
 /// Fewer tiles for each weight of a coefficient would fit their own noise.
@@ -54,6 +59,7 @@ class Patch {
     const std::array<LatticeAxis, 4> axes = slab.axes();
     const std::array<NodeRange, 4> parts = {unit.u, unit.v, unit.s, unit.t};
     for (std::size_t axis = 0; axis < 4; ++axis) {
+      first_tile_[axis] = (parts[axis].begin - axes[axis].stored.begin) / 2;
       begins_[axis] = parts[axis].begin == axes[axis].stored.begin;
       ends_[axis] = parts[axis].end() == axes[axis].stored.end();
     }
@@ -71,13 +77,13 @@ class Patch {
     });
   }
 
-  /// Calls visit(tile along each axis, its number) for those that are not empty and whose
+  /// Calls visit(tile along each axis, its number) for those to fit that are not empty and whose
   /// neighbours are known.
   template <typename Visit>
-  void for_each_inner(Visit&& visit) const {
+  void for_each_fitted(Visit&& visit) const {
     std::array<int, 4> tile{};
     for (std::size_t i = 0; i < decoded_.size(); ++i) {
-      if (!is_empty_[i] && knows_neighbours(tile)) visit(tile, i);
+      if (!is_empty_[i] && is_fitted(tile) && knows_neighbours(tile)) visit(tile, i);
       for (std::size_t axis = 4; axis-- > 0;) {
         if (++tile[axis] < counts_[axis]) break;
         tile[axis] = 0;
@@ -98,6 +104,12 @@ class Patch {
   }
 
  private:
+  /// Spread evenly along every axis, wherever the patch was taken from.
+  [[nodiscard]] bool is_fitted(const std::array<int, 4>& tile) const {
+    const int steps = std::accumulate(tile.begin(), tile.end(), 0) +
+                      std::accumulate(first_tile_.begin(), first_tile_.end(), 0);
+    return steps % kTilesPerFittedTile == 0;
+  }
   [[nodiscard]] bool knows_neighbours(const std::array<int, 4>& tile) const {
     for (std::size_t axis = 0; axis < 4; ++axis)
       if ((tile[axis] == 0 && !begins_[axis]) || (tile[axis] == counts_[axis] - 1 && !ends_[axis]))
@@ -106,8 +118,9 @@ class Patch {
   }
 
   std::array<int, 4> counts_;
-  std::array<bool, 4> begins_{};  ///< with the first stored node
-  std::array<bool, 4> ends_{};    ///< with the last
+  std::array<int, 4> first_tile_{};  ///< of the patch, among those stored
+  std::array<bool, 4> begins_{};     ///< with the first stored node
+  std::array<bool, 4> ends_{};       ///< with the last
   std::vector<IntegerCoefficients> decoded_;
   std::vector<IntegerCoefficients> errors_;
   std::vector<bool> is_empty_;
@@ -233,7 +246,7 @@ FilterSums::FilterSums(const Codebook& codebook)
 
 void FilterSums::add(const WorkUnit& patch, const SlabLattice& slab, const UnitTiles& tiles) {
   const Patch of_patch(patch, slab, tiles, encode_unit(search_, patch, tiles), codebook_);
-  of_patch.for_each_inner([&](const std::array<int, 4>& tile, std::size_t i) {
+  of_patch.for_each_fitted([&](const std::array<int, 4>& tile, std::size_t i) {
     ++values_[0];
     const Neighbourhood around(of_patch, tile);
     for (std::size_t j = 0; j < kTileElements; ++j)

@@ -14,7 +14,7 @@
 
 namespace af {
 
-/// Where a field is cast for its filter: units of at most 12 viewpoints along u and v, 16 nodes
+/// Where a field is cast for its filter: 72 units of at most 12 viewpoints along u and v, 16 nodes
 /// along s and kRunOfT along t, at random places of slabs spread over the field. The same for any
 /// plan and number of ranks.
 std::vector<WorkUnit> filter_patches(const FieldLattice& lattice, std::uint64_t seed);
@@ -22,7 +22,8 @@ std::vector<WorkUnit> filter_patches(const FieldLattice& lattice, std::uint64_t 
 /// What a fit found, over the tiles of all patches.
 struct FittedFilter {
   std::optional<TileFilter> filter;  ///< none: the tiles are too few to say
-  std::uint64_t tiles = 0;     ///< that are not empty and have their neighbours within the patch
+  std::uint64_t tiles = 0;     ///< a third of those that are not empty and have their neighbours
+                               ///< within the patch
   double squared_error = 0.0;  ///< of these, in squared levels, not yet rounded and limited
   double squared_error_left = 0.0;  ///< by the filter
 };
