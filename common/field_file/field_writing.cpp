@@ -326,37 +326,71 @@ std::vector<std::uint64_t> write_indices(const std::filesystem::path& path,
   }
 }
 
-/// Rank 0 alone: reads every index back, compares with what the ranks wrote, and stores the hashes
-/// and the provenance.
-std::string verify_and_seal(const FileContents& contents,
-                            const FieldProvenance& provenance,
-                            const std::vector<std::uint64_t>& written_sums,
+/// Reads every index of a slab back and compares with what the ranks wrote; its hash.
+std::string verified_sha256(hid_t file,
+                            const DatasetRule& rule,
+                            std::uint64_t written_sum,
                             const std::filesystem::path& path) {
+  const Handle dataset(H5Dopen2(file, rule.name.c_str(), H5P_DEFAULT), H5Dclose, "H5Dopen2");
+  const std::uint64_t plane_values = rule.value_count() / rule.extents[0];
+  std::vector<std::uint16_t> planes;
+  Sha256 sha256;
+  std::uint64_t sum = 0;
+  read_planes(
+      dataset,
+      rule,
+      [&](std::uint64_t, std::uint64_t count) {
+        planes.resize(count * plane_values);
+        return std::span(planes);
+      },
+      [&](std::uint64_t u, std::span<const std::uint16_t> indices) {
+        sha256.update(std::as_bytes(indices));
+        sum += hash_sum(u * plane_values, indices);
+      });
+  if (sum != written_sum)
+    throw FileError(
+        path.string(), rule.name, "the indices written", "different indices on reading back");
+  return sha256.hex_digest();
+}
+
+/// Collective. The hash of every slab's indices, read back; ranks take the slabs in turn, as
+/// decoding them takes longer than anything else here.
+std::vector<std::string> verify_indices(const std::vector<DatasetRule>& rules,
+                                        const std::vector<std::uint64_t>& written_sums,
+                                        const std::filesystem::path& path,
+                                        const Communicator& communicator) {
+  const auto ranks = static_cast<std::size_t>(communicator.size());
+  const auto mine = all_or_none(communicator, [&] {
+    std::vector<std::string> digests;
+    const auto rank = static_cast<std::size_t>(communicator.rank());
+    if (rank >= rules.size()) return digests;
+    const WorkNote note("reading " + path.string() + " back to verify it");
+    naming_file(path, [&] {
+      const Handle file = hdf5::open_file(path, H5F_ACC_RDONLY);
+      for (std::size_t k = rank; k < rules.size(); k += ranks)
+        digests.push_back(verified_sha256(file, rules[k], written_sums[k], path));
+    });
+    return digests;
+  });
+  const auto of_ranks = communicator.all_gather(bytes_of(mine));
+  std::vector<std::string> all(rules.size());
+  for (std::size_t rank = 0; rank < ranks; ++rank) {
+    auto digests = value_of<std::vector<std::string>>(of_ranks[rank], "hashes of a rank");
+    for (std::size_t i = 0; i < digests.size(); ++i) all[rank + i * ranks] = std::move(digests[i]);
+  }
+  return all;
+}
+
+/// Rank 0 alone: stores the hashes and the provenance.
+std::string seal(const FileContents& contents,
+                 const FieldProvenance& provenance,
+                 const std::vector<std::string>& index_sha256,
+                 const std::filesystem::path& path) {
   Handle file = hdf5::open_file(path, H5F_ACC_RDWR);
   const std::vector<DatasetRule>& rules = contents.indices;
-  std::vector<std::string> index_sha256;
   for (std::size_t k = 0; k < rules.size(); ++k) {
     const Handle dataset(H5Dopen2(file, rules[k].name.c_str(), H5P_DEFAULT), H5Dclose, "H5Dopen2");
-    const std::uint64_t plane_values = rules[k].value_count() / rules[k].extents[0];
-    std::vector<std::uint16_t> planes;
-    Sha256 sha256;
-    std::uint64_t sum = 0;
-    read_planes(
-        dataset,
-        rules[k],
-        [&](std::uint64_t, std::uint64_t count) {
-          planes.resize(count * plane_values);
-          return std::span(planes);
-        },
-        [&](std::uint64_t u, std::span<const std::uint16_t> indices) {
-          sha256.update(std::as_bytes(indices));
-          sum += hash_sum(u * plane_values, indices);
-        });
-    if (sum != written_sums[k])
-      throw FileError(
-          path.string(), rules[k].name, "the indices written", "different indices on reading back");
-    index_sha256.push_back(sha256.hex_digest());
-    hdf5::replace_text_attribute(dataset, "sha256", index_sha256.back());
+    hdf5::replace_text_attribute(dataset, "sha256", index_sha256[k]);
   }
   std::string payload = payload_hash(contents.payload, rules, index_sha256);
   hdf5::replace_text_attribute(file, "payload_sha256", payload);
@@ -405,11 +439,11 @@ FieldFileInfo write_file(const FileContents& contents,
     });
     const auto sums = write_indices(partial, contents.indices, next_blocks, communicator, hints);
     info.provenance = make_provenance();
+    const auto hashes = verify_indices(contents.indices, sums, partial, communicator);
     all_or_none(communicator, [&] {
       if (!communicator.is_root()) return;
-      const WorkNote note("reading " + partial.string() + " back to verify it");
-      info.payload_sha256 = naming_file(
-          partial, [&] { return verify_and_seal(contents, info.provenance, sums, partial); });
+      info.payload_sha256 =
+          naming_file(partial, [&] { return seal(contents, info.provenance, hashes, partial); });
       move_into_place(partial, path);
       info.file_bytes = std::filesystem::file_size(path);
     });
