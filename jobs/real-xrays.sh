@@ -14,7 +14,8 @@ Usage: jobs/real-xrays.sh FOLDER [OPTIONS]
 
 FOLDER holds the images of a circular cone-beam scan. Finds the scan's true geometry from its even views, reconstructs a
 CT from them, takes odd views as X-rays, in pairs about 90 degrees apart and alone, builds a field for each X-ray,
-registers from starts up to 30 mm from the true pose with every preset, by fields and by ray casting. All but paper
+registers from starts up to 30 mm from the true pose, drawn within the range of the fields, with every preset, by fields
+and by ray casting. All but paper
 register again by fields with a finish by ray casting (--correct), beside ray casting with the finish's steps (0.5 mm
 instead of 1). Writes methods.md, finishes.md, distances.md and report.html. After a
 stop, run the same command again to continue. Needs the programs in build/release/bin (or installed).
@@ -126,7 +127,7 @@ for case_name in "${case_names[@]}"; do
   for camera in ${cameras_of[$case_name]}; do
     of_case+=(--field "$camera=$output/fields/pair-${case_name#*-}-$camera.af.h5")
   done
-  register "starts/$case_name" starts.csv "$case_name" "${of_case[@]}" --starts-per-interval "$starts" --starts-only
+  register "starts/$case_name" starts.csv "$case_name" "${of_case[@]}" --starts-per-interval "$starts" --start-rule within-range --starts-only
   from=(--starts-from "$output/starts/$case_name/starts.csv" --starts-per-interval "$starts")
   for preset in "${preset_list[@]}"; do
     both=(--renderer field)
