@@ -43,15 +43,22 @@ std::shared_ptr<CompressedAttenuationField> filtered(
 }
 
 /// Fields whose rows of tiles are shorter and longer than a vector, cropped and whole, of odd and
-/// even numbers of nodes, plain and with means.
+/// even numbers of nodes, of other numbers along u than along v and one tile along either, plain
+/// and with means.
 std::vector<std::shared_ptr<CompressedAttenuationField>> fields() {
   auto cropped = small_field(holed_noise, 1, 4, 13);
   crop_stored(*cropped, {2, 8}, {4, 9});
   const auto wide = small_field(holed_noise, 1, 3, 37);
+  const auto low = small_field(holed_noise, 1, 8, 11);
+  crop_viewpoints(*low, 8, 2);
+  const auto narrow = small_field(holed_noise, 1, 7, 11);
+  crop_viewpoints(*narrow, 2, 7);
   return {filtered(small_field(holed_noise, 2), any_filter()),
           filtered(cropped, any_filter()),
           filtered(mean_removed(*wide, 64), any_filter()),
           filtered(wide, any_filter()),
+          filtered(low, any_filter()),
+          filtered(narrow, any_filter()),
           // Five rows of viewpoint tiles, and one.
           filtered(small_field(holed_noise, 1, 10, 7), any_filter()),
           filtered(small_field(holed_noise, 1, 2, 15), any_filter())};

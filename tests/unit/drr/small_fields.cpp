@@ -121,6 +121,25 @@ void crop_stored(CompressedAttenuationField& field, const NodeRange& s, const No
   field.slabs[0].indices = SharedArray<std::uint16_t>(std::move(indices));
 }
 
+void crop_viewpoints(CompressedAttenuationField& field, int u_nodes, int v_nodes) {
+  const SlabLattice lattice = field.lattice(0);
+  const int of_viewpoint = lattice.s.stored.tiles() * lattice.t.stored.tiles();
+  const auto crop = [](GridAxis& axis, int nodes) {
+    axis.last_mm = axis.position_mm(nodes - 1);
+    axis.nodes = nodes;
+  };
+  crop(field.light_slab.u, u_nodes);
+  crop(field.light_slab.v, v_nodes);
+  std::vector<std::uint16_t> indices;
+  for (int u = 0; u < field.lattice(0).u.stored.tiles(); ++u)
+    for (int v = 0; v < field.lattice(0).v.stored.tiles(); ++v) {
+      const int first = (u * lattice.v.stored.tiles() + v) * of_viewpoint;
+      for (int i = 0; i < of_viewpoint; ++i)
+        indices.push_back(field.slabs[0].indices[static_cast<std::size_t>(first + i)]);
+    }
+  field.slabs[0].indices = SharedArray<std::uint16_t>(std::move(indices));
+}
+
 PoseParameters small_pose(std::uint64_t index) {
   HashRandom random(17, index);
   PoseParameters parameters;

@@ -33,6 +33,10 @@ std::shared_ptr<CompressedAttenuationField> mean_removed(const CompressedAttenua
 /// Leaves of a one-slab field that stores its whole lattice the even-aligned nodes s x t.
 void crop_stored(CompressedAttenuationField& field, const NodeRange& s, const NodeRange& t);
 
+/// Leaves of a one-slab field of plain tiles its first viewpoints along u and v, even numbers or
+/// all.
+void crop_viewpoints(CompressedAttenuationField& field, int u_nodes, int v_nodes);
+
 /// Pose `index` of a fixed random series within the small fields' range.
 PoseParameters small_pose(std::uint64_t index);
 

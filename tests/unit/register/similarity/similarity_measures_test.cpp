@@ -97,6 +97,40 @@ TEST_P(EveryMeasure, GivesTheSameBitsOnEveryVectorWidth) {
   force_vector_width(std::nullopt);
 }
 
+/// Images by which a DRR might change with six parameters.
+std::vector<float> planes_of_six() {
+  std::vector<float> planes;
+  HashRandom random(12);
+  for (int k = 0; k < 6; ++k) {
+    const Image2d plane = blobs(random.uniform(-3.0, 3.0), random.uniform(-3.0, 3.0));
+    planes.insert(planes.end(), plane.pixels.begin(), plane.pixels.end());
+  }
+  return planes;
+}
+
+TEST(SimilarityMeasures, NormalEquationsHaveTheSameBitsOnEveryVectorWidth) {
+  const std::vector<float> drr = blobs(0.7, 0.4).pixels;
+  const std::vector<float> planes = planes_of_six();
+  int measures = 0;
+  for (const std::string& name : similarity_names()) {
+    if (!similarity_has_normal_equations(name)) continue;
+    ++measures;
+    const auto measure = make_similarity(options_of(name), reference_of(blobs()));
+    const auto workspace = measure->make_workspace();
+    const NormalEquations expected = measure->normal_equations(drr, planes, *workspace);
+    for (const VectorWidth width : supported_vector_widths()) {
+      force_vector_width(width);
+      const NormalEquations found = measure->normal_equations(drr, planes, *workspace);
+      EXPECT_EQ(found.value, expected.value) << name << ' ' << to_string(width);
+      EXPECT_EQ(found.gradient, expected.gradient) << name << ' ' << to_string(width);
+      EXPECT_EQ(found.matrix, expected.matrix) << name << ' ' << to_string(width);
+      EXPECT_EQ(found.reweighting, expected.reweighting) << name << ' ' << to_string(width);
+    }
+    force_vector_width(std::nullopt);
+  }
+  EXPECT_GT(measures, 1);
+}
+
 TEST_P(EveryMeasure, HasTheDerivativeOfItsValueByEveryPixel) {
   const auto measure = make_similarity(options_of(GetParam(), true), reference_of(blobs()));
   const auto workspace = measure->make_workspace();
@@ -144,12 +178,7 @@ TEST_P(EveryMeasure, NormalEquationsAgreeWithValueAndDerivative) {
   const auto measure = make_similarity(options_of(GetParam()), reference_of(blobs()));
   const auto workspace = measure->make_workspace();
   const std::vector<float> drr = mapped(blobs(0.7, 0.4), 0.8f, 0.1f);
-  std::vector<float> planes;
-  HashRandom random(12);
-  for (int k = 0; k < 6; ++k) {
-    const Image2d plane = blobs(random.uniform(-3.0, 3.0), random.uniform(-3.0, 3.0));
-    planes.insert(planes.end(), plane.pixels.begin(), plane.pixels.end());
-  }
+  const std::vector<float> planes = planes_of_six();
   if (!similarity_has_normal_equations(GetParam())) {
     EXPECT_THROW(static_cast<void>(measure->normal_equations(drr, planes, *workspace)),
                  std::logic_error);
