@@ -15,9 +15,8 @@ Usage: jobs/real-xrays.sh FOLDER [OPTIONS]
 FOLDER holds the images of a circular cone-beam scan. Finds the scan's true geometry from its even views, reconstructs a
 CT from them, takes odd views as X-rays, in pairs about 90 degrees apart and alone, builds a field for each X-ray,
 registers from starts up to 30 mm from the true pose, drawn within the range of the fields, with every preset, by fields
-and by ray casting. All but paper
-register again by fields with a finish by ray casting (--correct), beside ray casting with the finish's steps (0.5 mm
-instead of 1). Writes methods.md, finishes.md, distances.md and report.html. After a
+and by ray casting. All but paper register again by fields with a finish by ray casting (--correct), beside ray casting
+with the finish's steps (0.5 mm instead of 1). Writes methods.md, finishes.md, distances.md and report.html. After a
 stop, run the same command again to continue. Needs the programs in build/release/bin (or installed).
 
   --scan FILE               geometry of the scan (af-scan --help)        [FOLDER/scan.toml, else docs/data/cbct-cylinder.toml]

@@ -78,8 +78,10 @@ void forecast_seconds(const DryRun& run, const TileCounts& tiles, FieldForecast&
           : overflow_fraction * cast_seconds;
   const double index_bytes = bytes_per_tile(run.options) * tiles.occupied;
   const double compress_seconds = index_bytes * speed.compress_seconds_per_byte;
-  // Rank 0 reads the file back: decoding takes as long as coding, SHA-256 some 2 ns a byte.
+  // The file is read back: decoding takes as long as coding, SHA-256 some 2 ns a byte.
   const double verify_seconds = compress_seconds + 2e-9 * bytes_per_tile(run.options) * tiles.all;
+  const double verifying_ranks =
+      std::min(static_cast<double>(run.ranks), static_cast<double>(run.lattice.slabs.size()));
   need.seconds = run.past;
   need.seconds.emplace_back("cast", cast_seconds + checkpoint_seconds);
   need.seconds.emplace_back("train",
@@ -89,7 +91,7 @@ void forecast_seconds(const DryRun& run, const TileCounts& tiles, FieldForecast&
       "encode", speed.encode_seconds_per_tile * tiles.occupied / run.ranks + overflow_seconds);
   need.seconds.emplace_back(
       "write",
-      compress_seconds / run.ranks + verify_seconds +
+      compress_seconds / run.ranks + verify_seconds / verifying_ranks +
           seconds_at(static_cast<double>(need.file_bytes), run.disk.write_bytes_per_second));
 }
 

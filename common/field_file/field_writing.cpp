@@ -353,12 +353,18 @@ std::string verified_sha256(hid_t file,
   return sha256.hex_digest();
 }
 
-/// Collective. The hash of every slab's indices, read back; ranks take the slabs in turn, as
-/// decoding them takes longer than anything else here.
+/// How many ranks of this one's node verify at the same time.
+int verifying_ranks(const std::vector<DatasetRule>& rules, const Communicator& communicator) {
+  return std::min(communicator.node().size(), static_cast<int>(rules.size()));
+}
+
+/// Collective. The hash of every slab's indices, read back; ranks take the slabs in turn.
 std::vector<std::string> verify_indices(const std::vector<DatasetRule>& rules,
                                         const std::vector<std::uint64_t>& written_sums,
                                         const std::filesystem::path& path,
                                         const Communicator& communicator) {
+  // On network file systems ranks see what others wrote once these have closed the file.
+  communicator.barrier();
   const auto ranks = static_cast<std::size_t>(communicator.size());
   const auto mine = all_or_none(communicator, [&] {
     std::vector<std::string> digests;
@@ -420,7 +426,9 @@ FieldFileInfo write_file(const FileContents& contents,
   const hdf5::QuietErrors quiet;
   // HDF5 calls it, wherever chunks are written and read back below.
   std::optional<hdf5::IndexFilter> filter;
-  all_or_none(communicator, [&] { filter.emplace(codebook); });
+  const int ranks_at_once = verifying_ranks(contents.indices, communicator);
+  all_or_none(communicator,
+              [&] { filter.emplace(codebook, std::max(1, usable_processors() / ranks_at_once)); });
   const std::filesystem::path partial = field_layout::unfinished_path(path);
   FieldFileInfo info;
   info.payload_bytes = contents.payload_bytes;
@@ -442,6 +450,7 @@ FieldFileInfo write_file(const FileContents& contents,
     const auto hashes = verify_indices(contents.indices, sums, partial, communicator);
     all_or_none(communicator, [&] {
       if (!communicator.is_root()) return;
+      const WorkNote note("sealing " + partial.string());
       info.payload_sha256 =
           naming_file(partial, [&] { return seal(contents, info.provenance, hashes, partial); });
       move_into_place(partial, path);

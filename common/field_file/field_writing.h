@@ -44,11 +44,11 @@ using MpiIoHints = std::vector<std::pair<std::string, std::string>>;
 
 /// Collective. Writes `field` (its slabs' index arrays are ignored; every rank gives its codebook)
 /// with the blocks of all ranks by parallel HDF5 to "PATH.partial", closes it, verifies it by
-/// reading it back on rank 0, syncs and renames. Blocks are asked for and written in rounds, one
-/// collective write per round and slab, so that no rank need hold more than one round's; ranks
-/// without a block take part. Returns the same info on every rank. When a write fails, MPI-IO and
-/// HDF5 cannot be used or finalised any more: the ranks that know of it throw, alone, and
-/// MpiEnvironment::is_abort_required() is true.
+/// reading it back, its slabs shared among the ranks, syncs and renames. Blocks are asked for and
+/// written in rounds, one collective write per round and slab, so that no rank need hold more than
+/// one round's; ranks without a block take part. Returns the same info on every rank. When a write
+/// fails, MPI-IO and HDF5 cannot be used or finalised any more: the ranks that know of it throw,
+/// alone, and MpiEnvironment::is_abort_required() is true.
 FieldFileInfo write_field(const CompressedAttenuationField& field,
                           const NextBlocks& next_blocks,
                           const MakeProvenance& make_provenance,

@@ -7,7 +7,6 @@
 #include <stdexcept>
 #include <vector>
 
-#include "base/thread_pool.h"
 #include "field_file/hdf5_calls.h"
 
 namespace af::hdf5 {
@@ -21,11 +20,11 @@ constexpr std::size_t kParameters = 5;
 constexpr unsigned kVersion = 1;
 
 /// Set by the IndexFilter that lives: HDF5 gives its filters no object to work with.
-const IndexCoding* coding_in_use = nullptr;
+IndexFilter* filter_in_use = nullptr;
 
 /// The tiles of a chunk of values along its axes, by the coding in use; false when there are none.
 bool tiles_of_chunk(const std::array<std::size_t, 4>& values, std::array<std::size_t, 4>& tiles) {
-  const std::size_t rows = coding_in_use->values_per_tile();
+  const std::size_t rows = filter_in_use->coding().values_per_tile();
   tiles = {values[0], values[1], values[2] / rows, values[3]};
   return values[2] % rows == 0;
 }
@@ -50,13 +49,14 @@ std::size_t code_chunk(bool reads,
   if (!tiles_of_chunk(values, tiles)) return 0;
   std::vector<std::uint16_t> indices(values[0] * values[1] * values[2] * values[3]);
   if (reads) {
-    if (!coding_in_use->decode({static_cast<const std::uint8_t*>(*buffer), bytes}, tiles, indices))
+    if (!filter_in_use->coding().decode(
+            {static_cast<const std::uint8_t*>(*buffer), bytes}, tiles, indices))
       return 0;
     return give(std::as_bytes(std::span(indices)), buffer_size, buffer);
   }
   if (bytes != indices.size() * sizeof(std::uint16_t)) return 0;
   std::memcpy(indices.data(), *buffer, bytes);
-  const std::vector<std::uint8_t> coded = coding_in_use->encode(indices, tiles);
+  const std::vector<std::uint8_t> coded = filter_in_use->coding().encode(indices, tiles);
   return give(std::as_bytes(std::span(coded)), buffer_size, buffer);
 }
 
@@ -67,7 +67,7 @@ std::size_t filter_chunk(unsigned flags,
                          std::size_t bytes,
                          std::size_t* buffer_size,
                          void** buffer) {
-  if (coding_in_use == nullptr || parameter_count != kParameters) return 0;
+  if (filter_in_use == nullptr || parameter_count != kParameters) return 0;
   std::array<std::size_t, 4> values{};
   std::copy(parameters + 1, parameters + kParameters, values.begin());
   try {
@@ -135,7 +135,7 @@ void decode_into(std::span<const StoredChunk> stored,
   for (std::size_t i = 0; i < stored.size(); ++i)
     if (!stored[i].bytes.empty())
       coded.push_back({stored[i].bytes, std::span(indices).subspan(i * size, size)});
-  if (!coding_in_use->decode(coded, tiles))
+  if (!filter_in_use->coding().decode(coded, tiles))
     throw std::runtime_error("a chunk of indices cannot be decoded");
   for (std::size_t i = 0; i < stored.size(); ++i)
     copy_into(
@@ -156,13 +156,19 @@ void register_filter() {
 
 }  // namespace
 
-IndexFilter::IndexFilter(const Codebook& codebook) : coding_(codebook), outer_(coding_in_use) {
+IndexFilter::IndexFilter(const Codebook& codebook, int threads)
+    : coding_(codebook), threads_(threads), outer_(filter_in_use) {
   register_filter();
-  coding_in_use = &coding_;
+  filter_in_use = this;
 }
 
 IndexFilter::~IndexFilter() {
-  coding_in_use = outer_;
+  filter_in_use = outer_;
+}
+
+ThreadPool& IndexFilter::pool() {
+  if (!pool_.has_value()) pool_.emplace(threads_);
+  return *pool_;
 }
 
 bool is_coded(hid_t dataset, ChunkShape& chunk) {
@@ -181,13 +187,12 @@ void read_coded_planes(hid_t dataset,
                        std::uint64_t u,
                        std::uint64_t count,
                        std::span<std::uint16_t> planes) {
-  static ThreadPool pool(usable_processors());
   std::vector<StoredChunk> stored;
   for (hsize_t v = 0; v < rule.extents[1]; v += chunk[1])
     for (hsize_t s = 0; s < rule.extents[2]; s += chunk[2])
       for (hsize_t t = 0; t < rule.extents[3]; t += chunk[3])
         stored.push_back(stored_chunk(dataset, chunk, {u, v, s, t}));
-  pool.for_each_block(
+  filter_in_use->pool().for_each_block(
       static_cast<int>(stored.size()), IndexCoding::kBlocksTogether, [&](int begin, int end) {
         decode_into(std::span(stored).subspan(static_cast<std::size_t>(begin),
                                               static_cast<std::size_t>(end - begin)),

@@ -4,11 +4,13 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 
 #include <hdf5.h>
 
+#include "base/thread_pool.h"
 #include "field/index_coding.h"
 #include "field_file/index_chunks.h"
 
@@ -22,20 +24,27 @@ inline constexpr H5Z_filter_t kIndexFilter = 411;
 /// it is destroyed. Not for several threads.
 class IndexFilter {
  public:
-  explicit IndexFilter(const Codebook& codebook);
+  /// `threads`: for read_coded_planes().
+  explicit IndexFilter(const Codebook& codebook, int threads = usable_processors());
   ~IndexFilter();
   IndexFilter(const IndexFilter&) = delete;
   IndexFilter& operator=(const IndexFilter&) = delete;
 
+  [[nodiscard]] const IndexCoding& coding() const { return coding_; }
+  /// Its threads start with the first call.
+  [[nodiscard]] ThreadPool& pool();
+
  private:
   IndexCoding coding_;
-  const IndexCoding* outer_;
+  int threads_;
+  std::optional<ThreadPool> pool_;
+  IndexFilter* outer_;
 };
 
-/// Reads the chunks of a coded dataset that begin at plane u, and decodes them on all processors
-/// that this process may use: HDF5 would do so one after the other. `planes` has room for `count`
-/// planes of equal u, as many as a chunk spans or as are left. Throws std::runtime_error when
-/// chunks cannot be decoded.
+/// Reads the chunks of a coded dataset that begin at plane u, and decodes them on the threads of
+/// the IndexFilter: HDF5 would do so one after the other. `planes` has room for `count` planes of
+/// equal u, as many as a chunk spans or as are left. Throws std::runtime_error when chunks cannot
+/// be decoded.
 void read_coded_planes(hid_t dataset,
                        const field_layout::DatasetRule& rule,
                        const ChunkShape& chunk,

@@ -15,8 +15,8 @@
 namespace af {
 
 /// Where a field is cast for its filter: 72 units of at most 12 viewpoints along u and v, 16 nodes
-/// along s and kRunOfT along t, at random places of slabs spread over the field. The same for any
-/// plan and number of ranks.
+/// along s and kRunOfT along t, at random places of slabs spread over the field, each place once.
+/// The same for any plan and number of ranks.
 std::vector<WorkUnit> filter_patches(const FieldLattice& lattice, std::uint64_t seed);
 
 /// What a fit found, over the tiles of all patches.
@@ -30,7 +30,7 @@ struct FittedFilter {
 
 /// Sums for the normal equations of a TileFilter. They are exact integers, so that the order of
 /// tiles and the number of ranks do not matter: levels have 16 bits, so that inputs stay below
-/// 2^23, and products of 2^17 tiles, which the patches do not have, below 2^63.
+/// 2^23, and products of 2^17 fitted tiles, more than the patches have, below 2^63.
 class FilterSums {
  public:
   /// `codebook` must outlive it.

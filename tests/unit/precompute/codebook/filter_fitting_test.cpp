@@ -211,5 +211,15 @@ TEST(FilterFitting, TakesPatchesFromWhatIsStored) {
   EXPECT_NE(nodes_of(filter_patches(lattice, 1)), nodes_of(filter_patches(lattice, 2)));
 }
 
+/// Else the tiles of small fields would count as many.
+TEST(FilterFitting, TakesEveryPlaceOnce) {
+  FieldLattice lattice;
+  lattice.slabs = {{{12, {0, 12}}, {14, {0, 14}}, {16, {0, 16}}, {32, {0, 32}}}};
+  const std::vector<WorkUnit> patches = filter_patches(lattice, 1);
+  ASSERT_EQ(patches.size(), 2u);  // along v
+  EXPECT_NE(patches[0].v.begin, patches[1].v.begin);
+  EXPECT_EQ(patches[1].id, 1u);
+}
+
 }  // namespace
 }  // namespace af
