@@ -41,13 +41,17 @@ class Row:
         self.background = number("judge_fine_background")
         inflation = number("covariance_inflation")
         self.distance = number("squared_distance") * inflation  # by the sandwich alone
-        self.tre_rms = number("predicted_tre_rms_mm") / math.sqrt(inflation) if inflation > 0 else math.nan
-        self.tre_95 = number("predicted_tre_95_mm") / math.sqrt(inflation) if inflation > 0 else math.nan
+        # Tables of programs before TREs had a factor of their own.
+        tre_inflation = number("tre_inflation") if "tre_inflation" in cells else inflation
+        scale = 1.0 / math.sqrt(tre_inflation) if tre_inflation > 0 else math.nan
+        self.tre_rms = number("predicted_tre_rms_mm") * scale
+        self.tre_95 = number("predicted_tre_95_mm") * scale
         self.has_pose = not math.isnan(self.fine_mean)
         self.has_confidence = self.has_pose and not math.isnan(self.background)
         self.stated_inflation = inflation
+        self.stated_tre_inflation = tre_inflation
         self.stated_confidence = number("confidence")
-        self.inflation = 1.0
+        self.inflation = self.tre_inflation = 1.0
         self.confidence = 0.0
 
     def misfit(self):
@@ -82,22 +86,30 @@ def case_weights(rows):
     return [1.0 / counts[row.case] for row in rows]
 
 
-def fit_inflation(rows):
-    """Quantile regression (Koenker and Bassett 1978) of log squared distance on the misfit beyond what all X-rays have,
-    so that 95 % lie inside."""
-    y = [math.log(max(row.distance, 1e-6) / REGION_95) for row in rows]
+def fit_inflation(rows, squares, least):
+    """Quantile regression (Koenker and Bassett 1978) of log squares, over those that 95 % should not exceed by the sandwich
+    alone, on the misfit beyond what all X-rays have, so that 95 % lie inside."""
+    y = [math.log(max(square, 1e-6)) for square in squares]
     weights = case_weights(rows)
     best = None
     for share in SHARES:
         x = [max(0.0, row.misfit() + math.log(share)) for row in rows]
         for growth in GROWTHS:
             rest = [b - growth * a for a, b in zip(x, y)]
-            # Never less than the sandwich itself, which holds where the pose explains the X-rays.
-            at_once = max(0.0, weighted_quantile(rest, weights, 0.95))
+            at_once = max(least, weighted_quantile(rest, weights, 0.95))
             loss = sum(w * ((0.95 if r > at_once else -0.05) * (r - at_once)) for r, w in zip(rest, weights))
             if best is None or loss < best[0]:
                 best = (loss, at_once, growth, share)
     return best[1:]
+
+
+def inflation_of(row, constants):
+    at_once, growth, share_from = constants
+    return math.exp(at_once + growth * max(0.0, row.misfit() + math.log(share_from)))
+
+
+def inflation_text(constants):
+    return "{" + ", ".join(f"{number:.2f}" for number in constants) + "}"
 
 
 def solve(matrix, right):
@@ -180,17 +192,27 @@ def summary(label, half, rows):
     known = [row for row in rows if row.is_success and not math.isnan(row.distance)]
     successes = [row.confidence for row in rows if row.has_confidence and row.is_success]
     failures = [row.confidence for row in rows if row.has_confidence and not row.is_success]
-    region_low, region_high = coverage_interval(known, lambda r: r.distance <= REGION_95 * r.inflation)
+
+    def in_region(row):
+        return row.distance <= REGION_95 * row.inflation
+
+    def in_tre(row):
+        return row.tre <= row.tre_95 * math.sqrt(row.tre_inflation)
+
+    region_low, region_high = coverage_interval(known, in_region)
+    tre_low, tre_high = coverage_interval(known, in_tre)
     return {
         "measure": label,
         "half": half,
         "cases": len({row.case for row in known}),
         "successes": len(successes),
         "failures": len(failures),
-        "pose_region": coverage(known, lambda r: r.distance <= REGION_95 * r.inflation),
+        "pose_region": coverage(known, in_region),
         "pose_region_low": region_low,
         "pose_region_high": region_high,
-        "tre_region": coverage(known, lambda r: r.tre <= r.tre_95 * math.sqrt(r.inflation)),
+        "tre_region": coverage(known, in_tre),
+        "tre_region_low": tre_low,
+        "tre_region_high": tre_high,
         "sandwich_alone": coverage(known, lambda r: r.distance <= REGION_95),
         "roc_area": roc_area(successes, failures),
         "sure_failures": share(v >= 0.9 for v in failures),
@@ -216,11 +238,15 @@ def fit(rows, measures):
     for measure in measures:
         mine = [r for r in rows if r.measure == measure]
         fitted = [r for r in mine if r.is_for_fit and r.is_success and not math.isnan(r.distance)]
-        at_once, growth, share_from = fit_inflation(fitted)
-        print(f'    InflationRow{{"{measure}", {at_once:.2f}, {growth:.2f}, {share_from:.2f}}},')
+        # Never less than the sandwich itself, which holds where the pose explains the X-rays. A TRE adds up what all six
+        # directions do, and may be foretold too large.
+        pose = fit_inflation(fitted, [row.distance / REGION_95 for row in fitted], 0.0)
+        tre = fit_inflation(fitted, [(row.tre / row.tre_95) ** 2 for row in fitted], -math.inf)
+        print(f'    InflationRow{{"{measure}", {inflation_text(pose)}, {inflation_text(tre)}}},')
         for row in mine:
             if row.has_pose:
-                row.inflation = math.exp(at_once + growth * max(0.0, row.misfit() + math.log(share_from)))
+                row.inflation = inflation_of(row, pose)
+                row.tre_inflation = inflation_of(row, tre)
     coefficients = fit_confidence([row for row in rows if row.is_for_fit and row.has_confidence])
     for name, value in zip(["AtOnce", "ByExcess", "ByTre"], coefficients):
         print(f"constexpr double kConfidence{name} = {value:.2f};")
@@ -233,7 +259,8 @@ def fit(rows, measures):
 def take_as_stated(rows):
     for row in rows:
         row.is_for_fit = False
-        row.inflation, row.confidence = row.stated_inflation, row.stated_confidence
+        row.inflation, row.tre_inflation = row.stated_inflation, row.stated_tre_inflation
+        row.confidence = row.stated_confidence
 
 
 def main():

@@ -33,7 +33,10 @@ void bind_result(py::module_& module) {
       },
       "Of (rx, ry, rz, tx, ty, tz) (6x6), degrees and mm: motions after the end, about the centre "
       "of the region of interest, along the room's axes.");
-  uncertainty.def_readonly("tre_rms_mm", &Uncertainty::tre_rms_mm, "Expected over the target box.");
+  uncertainty.def_readonly("tre_rms_mm",
+                           &Uncertainty::tre_rms_mm,
+                           "Expected over the target box. TREs are calibrated by themselves: by "
+                           "the covariance they would be larger.");
   uncertainty.def_readonly(
       "tre_95_mm", &Uncertainty::tre_95_mm, "The TRE stays below with a probability of 0.95.");
   uncertainty.def_readonly(

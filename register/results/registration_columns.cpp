@@ -79,6 +79,7 @@ NamedCells uncertainty_cells(const UncertaintyReport& report, double chain_dista
                       {"predicted_tre_95_mm", number_text(report.tre_95_mm)},
                       {"confidence", number_text(report.confidence)},
                       {"covariance_inflation", number_text(report.inflation)},
+                      {"tre_inflation", number_text(report.tre_inflation)},
                       {"chain_distance_mm", number_text(chain_distance_mm)}};
   for (std::size_t i = 0; i < names.size(); ++i)
     cells.emplace_back(names[i], number_text(report.covariance_deg_mm[i]));

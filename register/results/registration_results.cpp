@@ -170,6 +170,7 @@ json uncertainty_json(const RegistrationRecord& record) {
           {"parameters", kParameterNames},
           {"frame", "motions after the pose found, about the ROI centre, along the room's axes"},
           {"inflation", number_or_null(report.inflation)},
+          {"tre_inflation", number_or_null(report.tre_inflation)},
           {"tre_rms_mm", number_or_null(report.tre_rms_mm)},
           {"tre_95_mm", number_or_null(report.tre_95_mm)},
           {"chain_distance_mm", number_or_null(record.result.chain_distance_mm)},

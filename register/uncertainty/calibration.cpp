@@ -10,21 +10,26 @@ namespace {
 
 /// exp(at_once + growth x): x is by how much the logarithm of the share of the X-rays' gradients
 /// that the pose explains in detail (mean over the views) falls short of that of `share_from`.
-struct InflationRow {
-  const char* similarity;
+struct Inflation {
   double at_once;
   double growth;
   double share_from;
+};
+
+struct InflationRow {
+  const char* similarity;
+  Inflation pose;
+  Inflation tre;
 };
 
 /// By `jobs/uncertainty.sh`, on patients of odd numbers; mi's is an earlier fit to cases of one
 /// phantom (docs/uncertainty.md). The last row is for measures that were not fitted: the most
 /// cautious of them.
 constexpr std::array kInflation = {
-    InflationRow{"rg", 0.09, 2.95, 0.65},
-    InflationRow{"gc", 0.00, 1.90, 0.65},
-    InflationRow{"mi", 2.50, 8.00, 0.65},
-    InflationRow{"", 2.50, 8.00, 0.65},
+    InflationRow{"rg", {0.09, 2.95, 0.65}, {-0.54, 1.65, 0.65}},
+    InflationRow{"gc", {0.00, 1.90, 0.65}, {-0.57, 0.75, 0.65}},
+    InflationRow{"mi", {2.50, 8.00, 0.65}, {2.50, 8.00, 0.65}},
+    InflationRow{"", {2.50, 8.00, 0.65}, {2.50, 8.00, 0.65}},
 };
 
 /// Of success_confidence(), likewise fitted.
@@ -38,17 +43,22 @@ constexpr double kLeastShare = 0.05;
 constexpr double kNearMm = 0.001;
 constexpr double kFarMm = 20.0;
 
+double factor_of(const Inflation& inflation, double share) {
+  if (!std::isfinite(share)) return share;
+  const double shortfall = std::log(inflation.share_from / std::clamp(share, kLeastShare, 1.0));
+  return std::exp(inflation.at_once + inflation.growth * std::max(0.0, shortfall));
+}
+
 }  // namespace
 
-double covariance_inflation(const std::string& similarity, std::span<const ViewValue> view_values) {
+CovarianceInflation covariance_inflation(const std::string& similarity,
+                                         std::span<const ViewValue> view_values) {
   const double share = summary_of(view_values, &ViewValue::fine).mean;
-  if (!std::isfinite(share)) return share;
   const auto* const row =
       std::find_if(kInflation.begin(), kInflation.end() - 1, [&](const InflationRow& candidate) {
         return similarity == candidate.similarity;
       });
-  const double shortfall = std::log(row->share_from / std::clamp(share, kLeastShare, 1.0));
-  return std::exp(row->at_once + row->growth * std::max(0.0, shortfall));
+  return {factor_of(row->pose, share), factor_of(row->tre, share)};
 }
 
 double success_confidence(const ConfidenceFeatures& features) {

@@ -10,11 +10,18 @@
 
 namespace af::registration {
 
-/// Factor by which to multiply a covariance, given the measure and the shares of the X-rays'
-/// gradients that the pose explains: content that no rigid pose explains, such as moved anatomy,
-/// shifts the optimum more than its scatter shows. NaN where nothing can be judged.
-/// \test Calibration.WidensWhatThePoseDoesNotExplain
-double covariance_inflation(const std::string& similarity, std::span<const ViewValue> view_values);
+/// Factors by which to multiply a sandwich covariance, so that 95 % of the cases fitted lie inside
+/// what it then foretells.
+struct CovarianceInflation {
+  double pose;  ///< for the region of the pose, whose worst of six directions decides; at least 1
+  double tre;   ///< for TREs, which add up what all directions do
+};
+
+/// Given the measure and the shares of the X-rays' gradients that the pose explains: content that
+/// no rigid pose explains, such as moved anatomy, shifts the optimum more than its scatter shows.
+/// NaN where nothing can be judged. \test Calibration.WidensWhatThePoseDoesNotExplain
+CovarianceInflation covariance_inflation(const std::string& similarity,
+                                         std::span<const ViewValue> view_values);
 
 /// What tells a success from a failure.
 struct ConfidenceFeatures {

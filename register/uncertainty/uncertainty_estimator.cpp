@@ -86,16 +86,16 @@ double UncertaintyEstimator::add_covariance(const RegistrationResult& result,
   if (!information.has_value()) return UncertaintyReport::kNone;
   const auto sandwich = sandwich_covariance(*information);
   if (!sandwich.has_value()) return UncertaintyReport::kNone;
-  const double inflation = covariance_inflation(similarities_[stage], view_values);
-  if (!std::isfinite(inflation)) return UncertaintyReport::kNone;
-  report.inflation = inflation;
-  const PoseMatrix covariance =
-      inflation * *sandwich +
-      calibration_covariance(
-          *information, views_, problem_->isocenter_point, options_.calibration_error_px);
-  report.covariance_deg_mm = in_deg_mm(covariance);
+  const CovarianceInflation inflation = covariance_inflation(similarities_[stage], view_values);
+  if (!std::isfinite(inflation.pose)) return UncertaintyReport::kNone;
+  report.inflation = inflation.pose;
+  report.tre_inflation = inflation.tre;
+  const PoseMatrix by_cameras = calibration_covariance(
+      *information, views_, problem_->isocenter_point, options_.calibration_error_px);
+  report.covariance_deg_mm = in_deg_mm(inflation.pose * *sandwich + by_cameras);
   if (problem_->target_points_ct.empty()) return UncertaintyReport::kNone;
-  const PredictedTre tre = predicted_tre(covariance, frame, problem_->target_points_ct);
+  const PredictedTre tre =
+      predicted_tre(inflation.tre * *sandwich + by_cameras, frame, problem_->target_points_ct);
   report.tre_rms_mm = tre.rms_mm;
   report.tre_95_mm = tre.upper_95_mm;
   return predicted_tre(*sandwich, frame, problem_->target_points_ct).rms_mm;

@@ -63,7 +63,9 @@ struct Uncertainty {
   /// Of (rx, ry, rz, tx, ty, tz), deg and mm: the true pose is a motion after the pose that was
   /// found, about the centre of the region of interest, along the room's axes.
   std::array<std::array<double, 6>, 6> covariance{};
-  double tre_rms_mm = 0.0;  ///< expected over the target box
+  /// Expected over the target box. TREs are calibrated by themselves: by the covariance, which is
+  /// to hold the truth in all six directions, they would be larger.
+  double tre_rms_mm = 0.0;
   double tre_95_mm = 0.0;   ///< stays below with a probability of 0.95
   double confidence = 0.0;  ///< probability of a TRE below 2.5 mm
 };

@@ -164,15 +164,19 @@ TEST(PredictedTre, IsThatOfDrawnPoses) {
 
 TEST(Calibration, WidensWhatThePoseDoesNotExplain) {
   for (const char* similarity : {"rg", "gc", "mi"}) {
-    double last = 0.0;
+    CovarianceInflation last = {0.0, 0.0};
     for (const double share : {0.9, 0.5, 0.3}) {
-      const double inflation =
+      const CovarianceInflation inflation =
           covariance_inflation(similarity, std::vector<ViewValue>{{0.8, share}, {0.8, share}});
-      EXPECT_GT(inflation, last) << similarity << ' ' << share;
+      EXPECT_GT(inflation.pose, last.pose) << similarity << ' ' << share;
+      EXPECT_GT(inflation.tre, last.tre) << similarity << ' ' << share;
+      EXPECT_GE(inflation.pose, 1.0);
+      EXPECT_GE(inflation.pose, inflation.tre);
       last = inflation;
     }
   }
-  EXPECT_TRUE(std::isnan(covariance_inflation("rg", {})));
+  EXPECT_TRUE(std::isnan(covariance_inflation("rg", {}).pose));
+  EXPECT_TRUE(std::isnan(covariance_inflation("rg", {}).tre));
 }
 
 TEST(Calibration, ConfidenceFallsWithEveryDoubt) {

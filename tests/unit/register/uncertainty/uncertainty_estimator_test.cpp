@@ -202,6 +202,33 @@ TEST(UncertaintyEstimator, TakesRobustGradientsWhereAMeasureHasNoDerivative) {
   EXPECT_GT(report.confidence, 2.0 * worse.confidence);
 }
 
+TEST(UncertaintyEstimator, CalibratesTresByThemselves) {
+  const test::SmallCase small = test::small_case();
+  const auto problem = std::make_shared<RegistrationProblem>(*small.problem);
+  const Eigen::Vector3d& center = problem->center_ct_mm;
+  problem->target_points_ct = {center, center + Eigen::Vector3d(20, 5, -10)};
+  std::mt19937_64 random(13);
+  std::normal_distribution<float> noise(0.0f, 0.02f);
+  for (RegistrationView& view : problem->views)
+    for (float& value : view.xray.pixels) value += noise(random);
+  RegistrationOptions options = squares();
+  options.chains[0].stages[0].similarity.name = "rg";
+  RegistrationResult result;
+  result.room_from_ct = small.gold_room_from_ct;
+  result.similarity = 1.0;
+  result.chain = options.chains[0].name;
+  const UncertaintyReport report =
+      UncertaintyEstimator(problem, options, {}).report(result, std::vector<ViewValue>{{0.9, 0.9}});
+  EXPECT_LT(report.tre_inflation, report.inflation);
+  const PredictedTre tre =
+      predicted_tre(from_deg_mm(report.covariance_deg_mm) * report.tre_inflation / report.inflation,
+                    PoseFrame::about(result.room_from_ct, center),
+                    problem->target_points_ct);
+  ASSERT_GT(tre.rms_mm, 0.0);
+  EXPECT_NEAR(report.tre_rms_mm, tre.rms_mm, 1e-9 * tre.rms_mm);
+  EXPECT_NEAR(report.tre_95_mm, tre.upper_95_mm, 1e-9 * tre.upper_95_mm);
+}
+
 TEST(UncertaintyEstimator, SaysNothingWhereNoViewCanBeJudged) {
   const test::SmallCase small = test::small_case();
   RegistrationResult result;
@@ -213,6 +240,7 @@ TEST(UncertaintyEstimator, SaysNothingWhereNoViewCanBeJudged) {
       UncertaintyEstimator(small.problem, squares(), {}).report(result, unjudged);
   EXPECT_TRUE(std::isnan(report.covariance_deg_mm[0]));
   EXPECT_TRUE(std::isnan(report.inflation));
+  EXPECT_TRUE(std::isnan(report.tre_inflation));
   EXPECT_TRUE(std::isnan(report.tre_rms_mm));
   EXPECT_TRUE(std::isnan(report.tre_95_mm));
 }
