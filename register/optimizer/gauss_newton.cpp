@@ -21,6 +21,7 @@ constexpr double kMostShare = 3.0;
 
 constexpr double kFirstDamping = 1e-3;
 constexpr double kLeastDamping = 1e-6;
+constexpr double kMostDamping = 1e12;
 constexpr double kDampingFactor = 10.0;
 
 /// A parameter that hardly changes the residuals (a translation along the only view's beam) is
@@ -38,6 +39,15 @@ ScaledParameters damped_step(const TargetValue& at,
   if (!step.allFinite()) step = at.gradient;
   const double length = step.norm();
   return length > longest_mm ? ScaledParameters(step * (longest_mm / length)) : step;
+}
+
+/// Damping after a rejected step, without what was learned: raised until a step is at most half as
+/// long. Small dampings hardly change a step, so that it would be evaluated and rejected again.
+double raised_damping(const TargetValue& at, double damping, double rejected_mm) {
+  do damping *= kDampingFactor;
+  while (damping < kMostDamping &&
+         damped_step(at, LearnedCurvature(), damping, rejected_mm).norm() > rejected_mm / 2.0);
+  return damping;
 }
 
 }  // namespace
@@ -74,8 +84,8 @@ void GaussNewton::maximize(OptimizationTarget& target,
   double damping = kFirstDamping;
   bool met_limit = false;
   for (;;) {
-    const ScaledParameters point =
-        run.stepped(damped_step(*at, learned, damping, options.initial_step_mm));
+    const ScaledParameters wanted = damped_step(*at, learned, damping, options.initial_step_mm);
+    const ScaledParameters point = run.stepped(wanted);
     const ScaledParameters step = point - result.point;
     // No step follows the last one: it needs no derivatives.
     const bool is_last = step.norm() < options.final_step_mm;
@@ -93,7 +103,7 @@ void GaussNewton::maximize(OptimizationTarget& target,
       met_limit = false;
     } else {
       // First without what was learned: it may have made the step too long.
-      if (learned.is_empty()) damping *= kDampingFactor;
+      if (learned.is_empty()) damping = raised_damping(*at, damping, wanted.norm());
       learned.clear();
       met_limit = is_inadmissible;
     }

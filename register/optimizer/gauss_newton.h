@@ -32,8 +32,9 @@ class LearnedCurvature {
 /// Levenberg and Marquardt on the normal equations of a sum of squares (Madsen, Nielsen, Tingleff,
 /// Methods for Non-Linear Least Squares Problems, 2004, Sec. 3.2): the step solves (H + lambda
 /// diag H) h = g and is no longer than initial_step_mm; a better point lowers lambda, a worse or
-/// inadmissible one raises it, which shortens and turns the step, until it falls below
-/// final_step_mm. \test GaussNewton.EndsAQuadraticInAFewSteps, QuasiNewton.LearnsMissingCurvature
+/// inadmissible one raises it until the step is at most half as long, which also turns it, until it
+/// falls below final_step_mm. \test GaussNewton.EndsAQuadraticInAFewSteps,
+/// QuasiNewton.LearnsMissingCurvature
 class GaussNewton final : public Optimizer {
  public:
   /// Where the curvature of a step comes from.

@@ -136,6 +136,21 @@ TEST(GaussNewton, EndsAQuadraticInAFewSteps) {
   EXPECT_LT((result.point - quadratic_optimum()).norm(), kFinalStepMm);
 }
 
+/// Where the value does not rise as the derivatives promise, every next try is at most half as far,
+/// however small the damping was.
+TEST(GaussNewton, HalvesRejectedStepsAtLeast) {
+  test::FunctionTarget target(
+      [](const ScaledParameters& p) -> std::optional<double> { return -p.norm(); },
+      [](const ScaledParameters&) {
+        return TargetValue{0.0, ScaledParameters::Constant(0.5), curvature(4.0)};
+      });
+  const OptimizerResult result = search("gauss-newton", target);
+  EXPECT_EQ(result.point, ScaledParameters::Zero());
+  ASSERT_GT(target.points.size(), 3u);
+  for (std::size_t i = 2; i < target.points.size(); ++i)
+    EXPECT_LE(target.points[i].norm(), 0.5 * target.points[i - 1].norm()) << i;
+}
+
 TEST(QuasiNewton, LearnsMissingCurvature) {
   // Normal equations that overstate the curvature twofold: every plain step goes half of the way,
   // so that 6.6 mm take seven of them after the three that are limited to 2 mm.
