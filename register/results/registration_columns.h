@@ -49,8 +49,8 @@ NamedCells correction_cells(const std::optional<CorrectionReport>& correction);
 /// What the judge says of an end: means and lowest values over the views.
 NamedCells judge_cells(const ViewSummary& coarse, const ViewSummary& fine, double background);
 
-/// Uncertainty: predicted TREs, confidence, inflations, distance of the chains, and the covariance's
-/// upper triangle as `cov_rx_rx` (deg^2), `cov_rx_tx` (deg mm) ... `cov_tz_tz` (mm^2).
+/// Uncertainty: predicted TREs, confidence, inflations, distance of the chains, and the
+/// covariance's upper triangle as `cov_rx_rx` (deg^2), `cov_rx_tx` (deg mm) ... `cov_tz_tz` (mm^2).
 NamedCells uncertainty_cells(const UncertaintyReport& report, double chain_distance_mm);
 
 void append(const NamedCells& more, NamedCells& cells);
