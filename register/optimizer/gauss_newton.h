@@ -31,10 +31,11 @@ class LearnedCurvature {
 
 /// Levenberg and Marquardt on the normal equations of a sum of squares (Madsen, Nielsen, Tingleff,
 /// Methods for Non-Linear Least Squares Problems, 2004, Sec. 3.2): the step solves (H + lambda
-/// diag H) h = g and is no longer than initial_step_mm; a better point lowers lambda, a worse or
-/// inadmissible one raises it until the step is at most half as long, which also turns it, until it
-/// falls below final_step_mm. \test GaussNewton.EndsAQuadraticInAFewSteps,
-/// QuasiNewton.LearnsMissingCurvature
+/// diag H) h = g and is no longer than initial_step_mm; a better point lowers lambda; after a worse
+/// or inadmissible one, and another try without what was learned, lambda rises until the step,
+/// before limits trim it, is at most half as long, which also turns it; until a step falls below
+/// final_step_mm. \test GaussNewton.EndsAQuadraticInAFewSteps,
+/// GaussNewton.HalvesRejectedStepsAtLeast, QuasiNewton.LearnsMissingCurvature
 class GaussNewton final : public Optimizer {
  public:
   /// Where the curvature of a step comes from.
