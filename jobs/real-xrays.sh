@@ -126,7 +126,8 @@ for case_name in "${case_names[@]}"; do
   for camera in ${cameras_of[$case_name]}; do
     of_case+=(--field "$camera=$output/fields/pair-${case_name#*-}-$camera.af.h5")
   done
-  register "starts/$case_name" starts.csv "$case_name" "${of_case[@]}" --starts-per-interval "$starts" --start-rule within-range --starts-only
+  register "starts/$case_name" starts.csv "$case_name" "${of_case[@]}" --starts-per-interval "$starts" \
+    --start-rule within-range --starts-only
   from=(--starts-from "$output/starts/$case_name/starts.csv" --starts-per-interval "$starts")
   for preset in "${preset_list[@]}"; do
     both=(--renderer field)

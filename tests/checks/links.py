@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Every relative link of every Markdown page below ROOT leads to a file that is there, and to a heading that is there.
+"""Every relative link of every Markdown page below ROOT leads to a file that is there, and to a heading that is there,
+and docs/data/README.md names every table in its folder.
 
 Usage: links.py ROOT
        links.py --self-test
@@ -83,6 +84,14 @@ def dead_links(root):
     return found
 
 
+def unlisted_tables(root):
+    folder = root / "docs" / "data"
+    index = folder / "README.md"
+    listed = index.read_text(encoding="utf-8") if index.exists() else ""
+    return [f"{table.relative_to(root)}: {index.relative_to(root)} does not name it"
+            for table in sorted(folder.glob("*.csv")) if f"`{table.name}`" not in listed]
+
+
 def self_test():
     with tempfile.TemporaryDirectory() as folder:
         root = Path(folder)
@@ -97,6 +106,14 @@ def self_test():
         found = dead_links(root)
         if found != expected:
             sys.exit(f"links.py: the self-test found {found}")
+        data = root / "docs" / "data"
+        data.mkdir(parents=True)
+        for name in ("listed.csv", "forgotten.csv"):
+            (data / name).write_text("a\n")
+        (data / "README.md").write_text("`listed.csv`\n")
+        found = unlisted_tables(root)
+        if found != ["docs/data/forgotten.csv: docs/data/README.md does not name it"]:
+            sys.exit(f"links.py: the self-test found {found}")
     print("links: the self-test passes")
 
 
@@ -106,11 +123,11 @@ def main():
     if len(sys.argv) != 2 or not Path(sys.argv[1]).is_dir():
         sys.exit(__doc__)
     root = Path(sys.argv[1])
-    found = dead_links(root)
-    for line in found:
+    dead, unlisted = dead_links(root), unlisted_tables(root)
+    for line in dead + unlisted:
         print(line, file=sys.stderr)
-    if found:
-        sys.exit(f"links: {len(found)} dead links")
+    if dead or unlisted:
+        sys.exit(f"links: {len(dead)} dead links, {len(unlisted)} tables that are not listed")
     print(f"links: all links of {len(pages_below(root))} pages lead somewhere")
     return None
 
