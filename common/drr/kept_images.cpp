@@ -7,9 +7,10 @@
 namespace af {
 namespace {
 
-/// Most parallax, in nodes of a slab, that kept images follow to first order: with it, ends of
-/// `robust` lie as far from the truth as without kept images (docs/rate-against-truth.md).
-constexpr double kMostParallaxNodes = 0.5;
+/// Most parallax, in nodes of a slab, that kept images follow to first order. With half a node,
+/// values were so much higher than those of new images that searches refused the steps after which
+/// images were made anew (docs/look-up.md).
+constexpr double kMostParallaxNodes = 0.125;
 
 /// Share of a (u,v) cell by which viewpoints may move.
 constexpr double kMostViewpointShare = 0.25;

@@ -112,6 +112,14 @@ AF_KERNEL_INLINE void add_gram_vector(const GramChannels& request,
   recent[kGramSums - 1] += weight;
 }
 
+void clear_border(float* image, int32_t width, int32_t height) {
+  const int64_t last_row = static_cast<int64_t>(height - 1) * width;
+  for (int32_t column = 0; column < width; ++column)
+    image[column] = image[last_row + column] = 0.0f;
+  for (int64_t first = 0; first <= last_row; first += width)
+    image[first] = image[first + width - 1] = 0.0f;
+}
+
 }  // namespace
 
 void add_gram(const GramChannels& request, const PixelBlock& block, GramSums& result) {
@@ -192,8 +200,8 @@ PairSums pair_sums(const PairRequest& given, int32_t count) {
 
 void sobel(
     const float* image, int32_t width, int32_t height, float* along_columns, float* along_rows) {
-  const int64_t pixels = static_cast<int64_t>(width) * height;
-  for (int64_t i = 0; i < pixels; ++i) along_columns[i] = along_rows[i] = 0.0f;
+  clear_border(along_columns, width, height);
+  clear_border(along_rows, width, height);
   const Floats two = splat(2.0f);
   const Floats eighth = splat(0.125f);
   for (int32_t row = 1; row + 1 < height; ++row)

@@ -7,6 +7,7 @@
 
 #include "base/hash_random.h"
 #include "base/vector_width.h"
+#include "register/similarity/pixel_sums.h"
 #include "register/similarity/similarity_measure.h"
 
 namespace af::registration {
@@ -284,6 +285,29 @@ TEST(RobustGradient, CurvesLessThanItsNormalEquationsByTheReweighting) {
 }
 
 /// Gradients of a ramp are constant but for rounding, which must not be taken for structure.
+TEST(Sobel, WritesEveryPixelWithABorderOfZeros) {
+  Image2d ramp(kWidth, kHeight);
+  for (int row = 0; row < kHeight; ++row)
+    for (int column = 0; column < kWidth; ++column)
+      ramp.at(column, row) = static_cast<float>(3 * column - 2 * row);
+  for (const VectorWidth width : supported_vector_widths()) {
+    force_vector_width(width);
+    std::vector<float> along_columns(ramp.pixels.size(), 1e9f);
+    std::vector<float> along_rows = along_columns;
+    pixel_sum_kernels().sobel(
+        ramp.pixels.data(), kWidth, kHeight, along_columns.data(), along_rows.data());
+    for (int row = 0; row < kHeight; ++row)
+      for (int column = 0; column < kWidth; ++column) {
+        const bool is_inside = row > 0 && column > 0 && row + 1 < kHeight && column + 1 < kWidth;
+        const auto i = static_cast<std::size_t>(row * kWidth + column);
+        // The weights' sum over a step of two pixels, divided by 8.
+        EXPECT_EQ(along_columns[i], is_inside ? 3.0f : 0.0f);
+        EXPECT_EQ(along_rows[i], is_inside ? -2.0f : 0.0f);
+      }
+  }
+  force_vector_width(std::nullopt);
+}
+
 TEST(GradientCorrelation, OfARampIsNothingByBothWays) {
   const auto measure = make_similarity(options_of("gc"), reference_of(blobs()));
   const auto workspace = measure->make_workspace();
