@@ -114,13 +114,18 @@ View finer(const View& whole) {
   return View::whole_detector(camera);
 }
 
-void run(const CaseOptions& options,
-         const std::string& field_path,
-         const std::string& work,
-         const Communicator& world) {
+struct LookUpOptions {
+  CaseOptions of_case;
+  std::string field;
+  std::string work;
+  std::string section = "drr-look-up";
+};
+
+void run(const LookUpOptions& of_look_up, const Communicator& world) {
+  const CaseOptions& options = of_look_up.of_case;
   const BenchmarkCase benchmark_case(options);
   FieldFileInfo info;
-  const auto field = read_field(field_path, world, &info);
+  const auto field = read_field(of_look_up.field, world, &info);
   const View view = View::whole_detector(field->identity.camera);
   const std::vector<RigidTransform> poses = random_poses(*field, options.is_quick ? 2 : 20);
   const std::vector<RigidTransform> few_poses = evenly_spread(poses, 2);
@@ -168,7 +173,8 @@ void run(const CaseOptions& options,
       renderer_contender("RayCastDrr", ray_cast, {few_poses, 1}, view),
       renderer_contender(
           "RayCastDrr, six gradients", ray_cast, {few_poses, 1}, view, Derivatives::OfThePose)};
-  const auto plastimatch = PlastimatchDrr::prepare(benchmark_case, work, options.is_quick ? 1 : 3);
+  const auto plastimatch =
+      PlastimatchDrr::prepare(benchmark_case, of_look_up.work, options.is_quick ? 1 : 3);
   if (plastimatch)
     contenders.push_back({"plastimatch drr exact", 1.0 * plastimatch->drrs_per_call(), "DRRs", [&] {
                             return plastimatch->run();
@@ -178,7 +184,7 @@ void run(const CaseOptions& options,
   for (std::size_t i = 1; i < timings.size(); ++i)
     ratios.push_back(speed_ratio(timings.front(), timings[i]));
   write_section(options.output,
-                "drr-look-up",
+                of_look_up.section,
                 {{"case", benchmark_case.description()},
                  {"field_payload_sha256", info.payload_sha256},
                  {"slabs", field->light_slab.slabs.size()},
@@ -194,14 +200,12 @@ void run(const CaseOptions& options,
 // Only what CLI11 throws while the options are bound: a defect.
 // NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
-  af::benchmark::CaseOptions options;
-  std::string field_path;
-  std::string work;
+  af::benchmark::LookUpOptions options;
   CLI::App app{"Seconds of one DRR looked up in a field, one core."};
-  af::benchmark::bind_case(app, options);
-  app.add_option("--field", field_path, "The field of --ct and --camera")->required();
-  app.add_option("--work", work, "Folder for plastimatch's files")->required();
-  return af::cli::app_main(app, argc, argv, [&](const af::Communicator& world) {
-    af::benchmark::run(options, field_path, work, world);
-  });
+  af::benchmark::bind_case(app, options.of_case);
+  app.add_option("--field", options.field, "The field of --ct and --camera")->required();
+  app.add_option("--work", options.work, "Folder for plastimatch's files")->required();
+  app.add_option("--section", options.section, "The section's name")->capture_default_str();
+  return af::cli::app_main(
+      app, argc, argv, [&](const af::Communicator& world) { af::benchmark::run(options, world); });
 }

@@ -32,25 +32,39 @@ struct FieldOptions {
 struct Job {
   std::string name;
   int ranks = 2;
-  std::vector<std::string> arguments;
+  std::vector<std::string> arguments;  ///< besides those of the case
 };
 
+Job design(const std::string& name,
+           const std::string& preset,
+           const std::vector<std::string>& options = {}) {
+  Job job{name, 2, {"--preset", preset}};
+  job.arguments.insert(job.arguments.end(), options.begin(), options.end());
+  return job;
+}
+
+const std::vector<std::string> kLittleTraining{"--codewords", "64", "--training-fraction", "0.5"};
+
+Job paper_job(bool is_quick) {
+  return design("paper", "paper", is_quick ? kLittleTraining : std::vector<std::string>{});
+}
+
+/// The default design, the paper's, and what single choices change of the paper's.
 std::vector<Job> field_jobs(bool is_quick) {
-  if (is_quick)
-    return {{"paper", 2, {"--codewords", "64", "--training-fraction", "0.5"}},
-            {"slabs-8", 2, {"--slabs", "2", "--codewords", "64", "--training-fraction", "0.5"}}};
-  return {{"paper", 2, {}},
-          {"st-512", 2, {"--st-nodes", "512"}},
-          {"codewords-65536", 2, {"--codewords", "65536"}},
-          {"slabs-8",
-           2,
-           {"--slabs", "8", "--uv-nodes", "8", "--st-nodes", "512", "--codewords", "65536"}}};
+  if (is_quick) return {design("standard", "standard", kLittleTraining), paper_job(true)};
+  return {design("standard", "standard"),
+          paper_job(false),
+          design("st-512", "paper", {"--st-nodes", "512"}),
+          design("codewords-65536", "paper", {"--codewords", "65536"}),
+          design("slabs-8",
+                 "paper",
+                 {"--slabs", "8", "--uv-nodes", "8", "--st-nodes", "512", "--codewords", "65536"})};
 }
 
 std::vector<Job> rank_jobs(bool is_quick) {
   std::vector<Job> jobs;
   for (const int ranks : {1, 2, 4}) {
-    Job job = field_jobs(is_quick).front();
+    Job job = paper_job(is_quick);
     job.name = "ranks-" + std::to_string(ranks);
     job.ranks = ranks;
     jobs.push_back(job);
@@ -80,10 +94,9 @@ std::vector<std::string> precompute_command(const FieldOptions& options, const J
                   options.of_case.rig,
                   "--camera",
                   options.of_case.camera});
-  command.insert(command.end(), {"--preset", "paper"});
+  command.insert(command.end(), job.arguments.begin(), job.arguments.end());
   if (options.of_case.is_quick)
     command.insert(command.end(), {"--uv-nodes", "8", "--st-nodes", "64"});
-  command.insert(command.end(), job.arguments.begin(), job.arguments.end());
   command.insert(command.end(), {"-o", field_path(options, job).string()});
   return command;
 }

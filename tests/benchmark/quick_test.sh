@@ -10,7 +10,7 @@ trap 'rm -rf "$scratch"' EXIT
   cat "$scratch/log" >&2
   exit 1
 }
-for section in machine casting encoding fields efficiency memory quality drr-look-up ranks-2 ranks-4; do
+for section in machine casting encoding fields efficiency memory quality drr-look-up drr-standard ranks-2 ranks-4; do
   grep -q "^    \"$section\": {" "$scratch/out/benchmark.json" || { echo "benchmark.json lacks section $section" >&2; exit 1; }
 done
 if [[ -x "$programs/benchmark/bench-python" ]]; then
@@ -19,4 +19,5 @@ fi
 for table in 'Casting' 'Encoding' 'One DRR' 'Whole fields' 'Seconds per phase' 'Machine'; do
   grep -q "^## $table" "$scratch/out/benchmark.md" || { echo "benchmark.md lacks the table $table" >&2; exit 1; }
 done
+grep -q '^drr-standard,"TwoPassAfDrr, decoded, cubic-sum",median us per DRR,' "$scratch/out/benchmark.csv" || { echo "benchmark.csv lacks the default field's DRR" >&2; exit 1; }
 echo "all sections and tables are there"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Joins the sections' JSON files into one, with what a model of scaling needs, and writes the
-// tables.
+// tables and the list of their numbers.
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -170,7 +170,8 @@ std::string fields_table(const json& sections) {
 }
 
 std::string phases_table(const json& jobs, const std::string& title) {
-  const std::vector<std::string> phases{"read", "resample", "cast", "train", "encode", "write"};
+  const std::vector<std::string> phases{
+      "read", "resample", "cast", "train", "fit filter", "encode", "write"};
   std::string text = "## " + title + "\n\n" +
                      header({"field",
                              "ranks",
@@ -180,6 +181,7 @@ std::string phases_table(const json& jobs, const std::string& title) {
                              "resample",
                              "cast",
                              "train",
+                             "fit filter",
                              "encode",
                              "write"});
   for (const json& job : jobs) {
@@ -259,6 +261,81 @@ json model_inputs(const json& sections) {
   return inputs;
 }
 
+/// One measured number per line, for docs/data.
+class NumberList {
+ public:
+  NumberList(std::string ct_sha256, std::string commit)
+      : ct_sha256_(std::move(ct_sha256)), commit_(std::move(commit)) {}
+
+  void add(const std::string& section,
+           const std::string& name,
+           const std::string& quantity,
+           double value) {
+    text_ += section + ",\"" + name + "\"," + quantity + "," + number(value, "%.4g") + "," +
+             ct_sha256_ + "," + commit_ + "\n";
+  }
+  /// Medians and minima of what alternated.
+  void add_timings(const std::string& section, const json& results, const std::string& suffix) {
+    for (const auto& [name, result] : results.items()) {
+      std::string unit = result.at("unit");
+      if (unit.ends_with('s')) unit.pop_back();
+      for (const char* which : {"median", "min"})
+        add(section,
+            name + suffix,
+            std::string(which) + " us per " + unit,
+            result.at("seconds").at(which).get<double>() * 1e6 / result.at("work").get<double>());
+    }
+  }
+  /// What jobs report: seconds, sizes, decibels.
+  void add_jobs(const std::string& section, const json& jobs) {
+    for (const json& job : jobs) {
+      const std::string name = job.at("name");
+      if (job.contains("seconds"))
+        add(section, name, "median s", job.at("seconds").at("median").get<double>());
+      for (const char* size : {"file_mb", "payload_mb", "peak_node_mb"})
+        if (job.contains(size)) add(section, name, size, job.at(size).get<double>());
+      if (job.contains("phase_seconds"))
+        for (const auto& [phase, seconds] : job.at("phase_seconds").items())
+          add(section, name, "median s of " + phase, seconds.get<double>());
+      if (job.contains("psnr_db"))
+        for (const char* which : {"median", "p5", "min"})
+          add(section,
+              name,
+              std::string(which) + " PSNR dB",
+              job.at("psnr_db").at(which).get<double>());
+    }
+  }
+  [[nodiscard]] const std::string& text() const { return text_; }
+
+ private:
+  std::string ct_sha256_;
+  std::string commit_;
+  std::string text_ = "section,name,quantity,value,ct_content_sha256,commit\n";
+};
+
+/// The first digits of the CT's hash, from the sections that say it.
+std::string ct_sha256_of(const json& sections) {
+  for (const json& of_section : sections)
+    if (of_section.contains("case"))
+      return of_section.at("case").at("ct_content_sha256").get<std::string>().substr(0, 16);
+  return {};
+}
+
+std::string numbers(const json& result) {
+  const json& sections = result.at("sections");
+  NumberList list(ct_sha256_of(sections), result.at("commit"));
+  for (const auto& [name, of_section] : sections.items()) {
+    if (of_section.contains("jobs")) list.add_jobs(name, of_section.at("jobs"));
+    if (of_section.contains("results")) list.add_timings(name, of_section.at("results"), "");
+    if (of_section.contains("codebooks"))
+      for (const json& codebook : of_section.at("codebooks"))
+        list.add_timings(name,
+                         codebook.at("results"),
+                         ", " + std::to_string(codebook.at("codewords").get<int>()) + " codewords");
+  }
+  return list.text();
+}
+
 std::string tables(const json& result) {
   const json& sections = result.at("sections");
   std::string text;
@@ -267,7 +344,10 @@ std::string tables(const json& result) {
   };
   add("casting", casting_table);
   add("encoding", encoding_table);
-  add("drr-look-up", [](const json& drrs) { return drr_table("One DRR, one core", drrs); });
+  add("drr-look-up",
+      [](const json& drrs) { return drr_table("One DRR of the paper's field, one core", drrs); });
+  add("drr-standard",
+      [](const json& drrs) { return drr_table("One DRR of the default field, one core", drrs); });
   add("python", [](const json& drrs) { return drr_table("One DRR from Python, one core", drrs); });
   add("fields", [&](const json& fields) {
     return fields_table(sections) + "\n" +
@@ -295,8 +375,11 @@ void run(const ReportOptions& options) {
   const fs::path json_path = fs::path(options.folder) / "benchmark.json";
   const fs::path table_path = fs::path(options.folder) / "benchmark.md";
   std::ofstream(json_path) << result.dump(2) << '\n';
+  const fs::path number_path = fs::path(options.folder) / "benchmark.csv";
   std::ofstream(table_path) << text;
-  std::cout << text << "Wrote " << json_path.string() << " and " << table_path.string() << '\n';
+  std::ofstream(number_path) << numbers(result);
+  std::cout << text << "Wrote " << json_path.string() << ", " << table_path.string() << " and "
+            << number_path.string() << '\n';
 }
 
 }  // namespace
@@ -309,7 +392,7 @@ int main(int argc, char** argv) {
   af::benchmark::ReportOptions options;
   CLI::App app{"Joins the sections of a benchmark into one JSON file and one page of tables."};
   app.add_option(
-         "--folder", options.folder, "Holds sections/*.json; receives benchmark.json, benchmark.md")
+         "--folder", options.folder, "Holds sections/*.json; receives benchmark.json, .md and .csv")
       ->required();
   app.add_option("--commit", options.commit, "What was measured")->capture_default_str();
   app.add_option("--command", options.command, "How it was measured");

@@ -5,7 +5,7 @@ set -euo pipefail
 # shellcheck source-path=SCRIPTDIR
 source "$(dirname "${BASH_SOURCE[0]}")/../../jobs/lib.sh"
 
-all_sections=(machine casting encoding fields drr-look-up efficiency memory quality ranks python)
+all_sections=(machine casting encoding fields drr-look-up drr-standard efficiency memory quality ranks python)
 
 usage() {
   cat <<TEXT
@@ -13,7 +13,7 @@ Usage: tests/benchmark/run.sh [--ct FILE] [--rig RIG] [--camera NAME] [--out DIR
                               [--skip-build]
 
 Measures casting, encoding, look-up and whole fields on this machine, which should do nothing else meanwhile, and writes
-DIR/benchmark.json and DIR/benchmark.md. What is compared alternates within one run of one program; medians of several
+DIR/benchmark.json, DIR/benchmark.md (tables) and DIR/benchmark.csv (their numbers). What is compared alternates within one run of one program; medians of several
 rounds are shown. Takes about ten minutes on two cores.
 
   --ct FILE       the CT [the default study's skull]
@@ -94,9 +94,11 @@ run_section() {
     casting) "$bench/bench-casting" "${of_case[@]}" "${small_field[@]}" --work "$out/work" -o "$json" ;;
     encoding) "$bench/bench-encoding" "${of_case[@]}" "${small_field[@]}" -o "$json" ;;
     fields | efficiency | memory | quality) "${field_program[@]}" --part "$section" -o "$json" ;;
-    drr-look-up)
-      [[ -f "$out/work/paper.af.h5" ]] || die 1 "drr-look-up needs the field that section 'fields' makes: run that first"
-      "$bench/bench-drr-look-up" "${of_case[@]}" --field "$out/work/paper.af.h5" --work "$out/work" -o "$json"
+    drr-look-up | drr-standard)
+      local field="$out/work/paper.af.h5"
+      [[ "$section" == drr-look-up ]] || field="$out/work/standard.af.h5"
+      [[ -f "$field" ]] || die 1 "$section needs the field that section 'fields' makes: run that first"
+      "$bench/bench-drr-look-up" "${of_case[@]}" --field "$field" --work "$out/work" --section "$section" -o "$json"
       ;;
     python)
       [[ -f "$out/work/paper.af.h5" ]] || die 1 "python needs the field that section 'fields' makes: run that first"
