@@ -8,8 +8,9 @@ namespace af {
 namespace {
 
 /// Most parallax, in nodes of a slab, that kept images follow to first order. With half a node,
-/// values were so much higher than those of new images that searches refused the steps after which
-/// images were made anew (docs/look-up.md).
+/// values were so much higher than those of new images that searches refused later steps, whose
+/// images were made anew (docs/look-up.md). \test
+/// KeptImages.ServeNoPoseThatShiftsASlabByMoreThanAnEighthOfANode
 constexpr double kMostParallaxNodes = 0.125;
 
 /// Share of a (u,v) cell by which viewpoints may move.

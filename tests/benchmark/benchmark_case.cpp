@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "benchmark/benchmark_case.h"
 
+#include <cstdlib>
 #include <fstream>
 #include <sys/utsname.h>
 #include <unistd.h>
@@ -77,11 +78,21 @@ nlohmann::json BenchmarkCase::description() const {
           {"attenuating_voxels", volume_->grid().size},
           {"rig", options_.rig},
           {"camera", options_.camera},
-          {"detector_px", {view_.roi.width, view_.roi.height}},
-          {"uv_nodes", options_.uv_nodes},
-          {"st_nodes", options_.st_nodes},
-          {"stored_rays", light_slab_.lattice().stored_node_count()},
-          {"stored_tiles", light_slab_.lattice().tile_count()}};
+          {"detector_px", {view_.roi.width, view_.roi.height}}};
+}
+
+nlohmann::json BenchmarkCase::description_with_field() const {
+  nlohmann::json json = description();
+  json["field"] = lattice_description(light_slab_);
+  return json;
+}
+
+nlohmann::json lattice_description(const LightSlab& light_slab) {
+  return {{"slabs", light_slab.slabs.size()},
+          {"uv_nodes", {light_slab.u.nodes, light_slab.v.nodes}},
+          {"st_nodes", {light_slab.slabs.front().s.nodes, light_slab.slabs.front().t.nodes}},
+          {"stored_rays", light_slab.lattice().stored_node_count()},
+          {"stored_tiles", light_slab.lattice().tile_count()}};
 }
 
 nlohmann::json machine_description() {
@@ -103,6 +114,8 @@ nlohmann::json machine_description() {
 void write_section(const std::string& output, const std::string& name, nlohmann::json body) {
   body["section"] = name;
   body["machine"] = machine_description();
+  const char* const commit = std::getenv("AF_BENCHMARK_COMMIT");
+  body["commit"] = commit != nullptr ? commit : "unknown";
   std::ofstream file(output);
   file << body.dump(2) << '\n';
   if (!file.flush()) throw FileError(output, "cannot be written");

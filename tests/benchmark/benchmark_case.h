@@ -44,7 +44,10 @@ class BenchmarkCase {
   [[nodiscard]] const LightSlab& light_slab() const { return light_slab_; }
   [[nodiscard]] AttenuationQuantizer quantizer() const;
   [[nodiscard]] std::vector<WorkUnit> units() const;  ///< as one rank would cast them
+  /// The CT and the camera.
   [[nodiscard]] nlohmann::json description() const;
+  /// These, and the field geometry.
+  [[nodiscard]] nlohmann::json description_with_field() const;
 
  private:
   CaseOptions options_;
@@ -65,10 +68,13 @@ std::vector<Value> evenly_spread(const std::vector<Value>& values, std::size_t c
   return spread;
 }
 
+/// Nodes of a field.
+nlohmann::json lattice_description(const LightSlab& light_slab);
+
 /// Processor, its caches, memory, kernel, vector width, compiler and commit.
 nlohmann::json machine_description();
 
-/// Writes {"section": name, "machine": ..., ...body} to options.output.
+/// Writes {"section": name, "machine": ..., "commit": that of AF_BENCHMARK_COMMIT, ...body}.
 void write_section(const std::string& output, const std::string& name, nlohmann::json body);
 
 nlohmann::json read_json(const std::filesystem::path& path);

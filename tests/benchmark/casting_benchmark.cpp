@@ -159,7 +159,7 @@ void run(const CaseOptions& options, const std::string& work_folder) {
                           }});
   const std::vector<Timing> timings = alternate(contenders, options.rounds);
 
-  nlohmann::json body{{"case", benchmark_case.description()},
+  nlohmann::json body{{"case", benchmark_case.description_with_field()},
                       {"results", to_json(timings)},
                       {"ratios", ratios_of(timings)},
                       {"resample_seconds", resample_seconds},

@@ -129,6 +129,8 @@ void run(const LookUpOptions& of_look_up, const Communicator& world) {
   const View view = View::whole_detector(field->identity.camera);
   const std::vector<RigidTransform> poses = random_poses(*field, options.is_quick ? 2 : 20);
   const std::vector<RigidTransform> few_poses = evenly_spread(poses, 2);
+  // With a filter, every look-up is in decoded samples.
+  const bool has_filter = field->codebook.filter.has_value();
   const TwoPassAfDrr two_pass(field);
   const TwoPassAfDrr cubic(field, {AxisInterpolation::Cubic, AxisInterpolation::Linear});
   const TwoPassAfDrr cubic_uv(field, {AxisInterpolation::Cubic, AxisInterpolation::Cubic});
@@ -154,9 +156,6 @@ void run(const LookUpOptions& of_look_up, const Communicator& world) {
       renderer_contender(
           "TwoPassAfDrr, cubic, six gradients", cubic, series, view, Derivatives::OfThePose),
       gradient_image_contender("TwoPassAfDrr, gradient images", two_pass, series, view),
-      renderer_contender("TwoPassAfDrr, decoded", decoded, series, view),
-      renderer_contender(
-          "TwoPassAfDrr, decoded, six gradients", decoded, series, view, Derivatives::OfThePose),
       renderer_contender("TwoPassAfDrr, decoded, cubic-sum", cubic_sum, series, view),
       renderer_contender("TwoPassAfDrr, decoded, cubic-sum, six gradients",
                          cubic_sum,
@@ -173,6 +172,11 @@ void run(const LookUpOptions& of_look_up, const Communicator& world) {
       renderer_contender("RayCastDrr", ray_cast, {few_poses, 1}, view),
       renderer_contender(
           "RayCastDrr, six gradients", ray_cast, {few_poses, 1}, view, Derivatives::OfThePose)};
+  if (!has_filter) {
+    contenders.push_back(renderer_contender("TwoPassAfDrr, decoded", decoded, series, view));
+    contenders.push_back(renderer_contender(
+        "TwoPassAfDrr, decoded, six gradients", decoded, series, view, Derivatives::OfThePose));
+  }
   const auto plastimatch =
       PlastimatchDrr::prepare(benchmark_case, of_look_up.work, options.is_quick ? 1 : 3);
   if (plastimatch)
@@ -187,7 +191,7 @@ void run(const LookUpOptions& of_look_up, const Communicator& world) {
                 of_look_up.section,
                 {{"case", benchmark_case.description()},
                  {"field_payload_sha256", info.payload_sha256},
-                 {"slabs", field->light_slab.slabs.size()},
+                 {"field", lattice_description(field->light_slab)},
                  {"codewords", field->codebook.size()},
                  {"results", to_json(timings)},
                  {"ratios", ratios}});

@@ -161,7 +161,7 @@ void run(const CaseOptions& options) {
     sizes.push_back(measure(tiles, codewords, options));
   write_section(options.output,
                 "encoding",
-                {{"case", benchmark_case.description()},
+                {{"case", benchmark_case.description_with_field()},
                  {"tiles_not_empty", tiles.size()},
                  {"blas", blas_description()},
                  {"codebooks", sizes}});

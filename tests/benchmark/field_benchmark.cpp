@@ -243,7 +243,7 @@ nlohmann::json measure_quality(const FieldOptions& options) {
 void run(const FieldOptions& options) {
   fs::create_directories(options.work);
   const bool is_quick = options.of_case.is_quick;
-  nlohmann::json body;
+  nlohmann::json body{{"case", BenchmarkCase(options.of_case).description()}};
   if (options.part == "fields")
     body["jobs"] = measure_jobs(options, field_jobs(is_quick));
   else if (options.part == "efficiency")

@@ -217,7 +217,7 @@ void run(const CaseOptions& options, const std::string& field_path, const Commun
   }
   write_section(options.output,
                 "look-up-quality",
-                {{"case", benchmark_case.description()}, {"results", results}});
+                {{"case", benchmark_case.description_with_field()}, {"results", results}});
 }
 
 }  // namespace

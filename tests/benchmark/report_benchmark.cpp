@@ -264,73 +264,64 @@ json model_inputs(const json& sections) {
 /// One measured number per line, for docs/data.
 class NumberList {
  public:
-  NumberList(std::string ct_sha256, std::string commit)
-      : ct_sha256_(std::move(ct_sha256)), commit_(std::move(commit)) {}
-
-  void add(const std::string& section,
-           const std::string& name,
-           const std::string& quantity,
-           double value) {
-    text_ += section + ",\"" + name + "\"," + quantity + "," + number(value, "%.4g") + "," +
-             ct_sha256_ + "," + commit_ + "\n";
+  /// Numbers that follow are of this section.
+  void begin(const std::string& name, const json& of_section) {
+    section_ = name;
+    const json of_case = of_section.value("case", json::object());
+    origin_ = of_case.value("ct_content_sha256", std::string()).substr(0, 16) + "," +
+              of_section.value("commit", std::string("unknown"));
+  }
+  void add(const std::string& name, const std::string& quantity, double value) {
+    text_ += section_ + ",\"" + name + "\"," + quantity + "," + number(value, "%.4g") + "," +
+             origin_ + "\n";
   }
   /// Medians and minima of what alternated.
-  void add_timings(const std::string& section, const json& results, const std::string& suffix) {
+  void add_timings(const json& results, const std::string& suffix = {}) {
     for (const auto& [name, result] : results.items()) {
       std::string unit = result.at("unit");
       if (unit.ends_with('s')) unit.pop_back();
       for (const char* which : {"median", "min"})
-        add(section,
-            name + suffix,
+        add(name + suffix,
             std::string(which) + " us per " + unit,
             result.at("seconds").at(which).get<double>() * 1e6 / result.at("work").get<double>());
     }
   }
   /// What jobs report: seconds, sizes, decibels.
-  void add_jobs(const std::string& section, const json& jobs) {
+  void add_jobs(const json& jobs) {
     for (const json& job : jobs) {
       const std::string name = job.at("name");
       if (job.contains("seconds"))
-        add(section, name, "median s", job.at("seconds").at("median").get<double>());
+        add(name, "median s", job.at("seconds").at("median").get<double>());
       for (const char* size : {"file_mb", "payload_mb", "peak_node_mb"})
-        if (job.contains(size)) add(section, name, size, job.at(size).get<double>());
+        if (job.contains(size)) add(name, size, job.at(size).get<double>());
       if (job.contains("phase_seconds"))
         for (const auto& [phase, seconds] : job.at("phase_seconds").items())
-          add(section, name, "median s of " + phase, seconds.get<double>());
+          add(name, "median s of " + phase, seconds.get<double>());
       if (job.contains("psnr_db"))
         for (const char* which : {"median", "p5", "min"})
-          add(section,
-              name,
-              std::string(which) + " PSNR dB",
-              job.at("psnr_db").at(which).get<double>());
+          add(name, std::string(which) + " PSNR dB", job.at("psnr_db").at(which).get<double>());
     }
   }
   [[nodiscard]] const std::string& text() const { return text_; }
 
  private:
-  std::string ct_sha256_;
-  std::string commit_;
+  std::string section_;
+  std::string origin_;  ///< hash of the CT and commit
   std::string text_ = "section,name,quantity,value,ct_content_sha256,commit\n";
 };
 
-/// The first digits of the CT's hash, from the sections that say it.
-std::string ct_sha256_of(const json& sections) {
-  for (const json& of_section : sections)
-    if (of_section.contains("case"))
-      return of_section.at("case").at("ct_content_sha256").get<std::string>().substr(0, 16);
-  return {};
-}
-
-std::string numbers(const json& result) {
-  const json& sections = result.at("sections");
-  NumberList list(ct_sha256_of(sections), result.at("commit"));
+std::string numbers(const json& sections) {
+  NumberList list;
   for (const auto& [name, of_section] : sections.items()) {
-    if (of_section.contains("jobs")) list.add_jobs(name, of_section.at("jobs"));
-    if (of_section.contains("results")) list.add_timings(name, of_section.at("results"), "");
+    list.begin(name, of_section);
+    if (of_section.contains("jobs")) list.add_jobs(of_section.at("jobs"));
+    if (of_section.contains("results")) list.add_timings(of_section.at("results"));
+    if (of_section.contains("agreement_with_reference"))
+      for (const auto& [caster, agreement] : of_section.at("agreement_with_reference").items())
+        list.add(caster, "PSNR dB against RayCaster", agreement.at("psnr_db").get<double>());
     if (of_section.contains("codebooks"))
       for (const json& codebook : of_section.at("codebooks"))
-        list.add_timings(name,
-                         codebook.at("results"),
+        list.add_timings(codebook.at("results"),
                          ", " + std::to_string(codebook.at("codewords").get<int>()) + " codewords");
   }
   return list.text();
@@ -377,7 +368,7 @@ void run(const ReportOptions& options) {
   std::ofstream(json_path) << result.dump(2) << '\n';
   const fs::path number_path = fs::path(options.folder) / "benchmark.csv";
   std::ofstream(table_path) << text;
-  std::ofstream(number_path) << numbers(result);
+  std::ofstream(number_path) << numbers(result.at("sections"));
   std::cout << text << "Wrote " << json_path.string() << ", " << table_path.string() << " and "
             << number_path.string() << '\n';
 }

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Builds the benchmarks and runs them on one CT: one JSON file and one page of tables.
+# Builds the benchmarks and runs them on one CT: one JSON file, one page of tables and one list of numbers.
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR
 source "$(dirname "${BASH_SOURCE[0]}")/../../jobs/lib.sh"
@@ -14,7 +14,7 @@ Usage: tests/benchmark/run.sh [--ct FILE] [--rig RIG] [--camera NAME] [--out DIR
 
 Measures casting, encoding, look-up and whole fields on this machine, which should do nothing else meanwhile, and writes
 DIR/benchmark.json, DIR/benchmark.md (tables) and DIR/benchmark.csv (their numbers). What is compared alternates within one run of one program; medians of several
-rounds are shown. Takes about ten minutes on two cores.
+rounds are shown. Takes about ten minutes on two cores, half as long again for a CT of 512x512x275 voxels.
 
   --ct FILE       the CT [the default study's skull]
   --rig, --camera the cameras and which of them [c-arm-12in, AP]
@@ -117,6 +117,8 @@ run_section() {
   esac
 }
 
+AF_BENCHMARK_COMMIT=$(git -C "$af_root" describe --always --dirty 2>/dev/null || echo unknown)
+export AF_BENCHMARK_COMMIT
 small_field=()
 ((${#quick[@]} == 0)) || small_field=(--uv-nodes 8 --st-nodes 64 --rounds 1)
 for section in "${sections[@]}"; do
@@ -125,5 +127,4 @@ for section in "${sections[@]}"; do
   run_section "$section"
   say "        $(duration $((SECONDS - start)))"
 done
-commit=$(git -C "$af_root" describe --always --dirty 2>/dev/null || echo unknown)
-"$bench/bench-report" --folder "$out" --commit "$commit" --command "tests/benchmark/run.sh $arguments"
+"$bench/bench-report" --folder "$out" --commit "$AF_BENCHMARK_COMMIT" --command "tests/benchmark/run.sh $arguments"

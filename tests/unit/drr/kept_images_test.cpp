@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "drr/kept_images.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <vector>
@@ -113,6 +114,49 @@ TEST(KeptImages, DoNotServeFarPosesNorAfterTheyAreForgotten) {
   renderer.render_gradient_images(
       near, View::whole_detector(small_camera()), *workspace, columns, rows);
   EXPECT_EQ(rendered(renderer, near, *workspace, false), there);
+}
+
+/// How many nodes a slab shifts by, at most, against the plane of the slabs' sum, midway between
+/// the outermost, when the source moves from one pose's place to another's.
+double parallax_nodes(const LightSlab& field,
+                      const RigidTransform& from,
+                      const RigidTransform& to) {
+  const View view = View::whole_detector(small_camera());
+  const Eigen::Vector3d source = SlabRays(field, from, view).source;
+  const double way_mm = (SlabRays(field, to, view).source - source).norm();
+  const double sum_y_mm =
+      0.5 * (field.slabs.front().st_plane_y_mm + field.slabs.back().st_plane_y_mm);
+  double nodes = 0.0;
+  for (const SlabGeometry& slab : field.slabs)
+    nodes = std::max(nodes,
+                     way_mm * std::abs((slab.st_plane_y_mm - sum_y_mm) / (source.y() - sum_y_mm)) /
+                         std::min(slab.s.spacing_mm(), slab.t.spacing_mm()));
+  return nodes;
+}
+
+TEST(KeptImages, ServeNoPoseThatShiftsASlabByMoreThanAnEighthOfANode) {
+  const auto field = small_field(waves, 2, 3, 61);
+  const TwoPassAfDrr renderer(field, kCubicSum);
+  const auto exact = renderer.make_workspace();
+  const auto is_reused = [&](const RigidTransform& pose) {
+    const auto workspace = renderer.make_workspace();
+    workspace->reuse_images(true);
+    rendered(renderer, RigidTransform::Identity(), *workspace, true);
+    return rendered(renderer, pose, *workspace, false) != rendered(renderer, pose, *exact, false);
+  };
+  // About the middle of the plane, so that corners hardly move on it.
+  const auto turned = [](double degrees) {
+    PoseParameters parameters;
+    parameters.rotation_rad = {0.0, 0.0, degrees * kRadPerDeg};
+    return pose_from_parameters({}, parameters);
+  };
+  double degrees = 0.05;
+  while (degrees < 8.0 && is_reused(turned(degrees))) degrees += 0.05;
+  const auto nodes = [&](double of_degrees) {
+    return parallax_nodes(field->light_slab, RigidTransform::Identity(), turned(of_degrees));
+  };
+  EXPECT_LE(nodes(degrees - 0.05), 0.125);
+  EXPECT_GT(nodes(degrees), 0.125);
 }
 
 TEST(KeptImages, GiveTheSameBitsByEveryVectorWidth) {

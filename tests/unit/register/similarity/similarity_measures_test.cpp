@@ -284,7 +284,7 @@ TEST(RobustGradient, CurvesLessThanItsNormalEquationsByTheReweighting) {
   }
 }
 
-/// Gradients of a ramp are constant but for rounding, which must not be taken for structure.
+/// Outputs come uninitialised, or with an earlier DRR's values.
 TEST(Sobel, WritesEveryPixelWithABorderOfZeros) {
   Image2d ramp(kWidth, kHeight);
   for (int row = 0; row < kHeight; ++row)
@@ -301,13 +301,14 @@ TEST(Sobel, WritesEveryPixelWithABorderOfZeros) {
         const bool is_inside = row > 0 && column > 0 && row + 1 < kHeight && column + 1 < kWidth;
         const auto i = static_cast<std::size_t>(row * kWidth + column);
         // The weights' sum over a step of two pixels, divided by 8.
-        EXPECT_EQ(along_columns[i], is_inside ? 3.0f : 0.0f);
-        EXPECT_EQ(along_rows[i], is_inside ? -2.0f : 0.0f);
+        EXPECT_EQ(along_columns[i], is_inside ? 3.0f : 0.0f) << column << ", " << row;
+        EXPECT_EQ(along_rows[i], is_inside ? -2.0f : 0.0f) << column << ", " << row;
       }
   }
   force_vector_width(std::nullopt);
 }
 
+/// Gradients of a ramp are constant but for rounding, which must not be taken for structure.
 TEST(GradientCorrelation, OfARampIsNothingByBothWays) {
   const auto measure = make_similarity(options_of("gc"), reference_of(blobs()));
   const auto workspace = measure->make_workspace();
