@@ -296,10 +296,10 @@ TEST(Sobel, WritesEveryPixelWithABorderOfZeros) {
     std::vector<float> along_rows = along_columns;
     pixel_sum_kernels().sobel(
         ramp.pixels.data(), kWidth, kHeight, along_columns.data(), along_rows.data());
+    std::size_t i = 0;
     for (int row = 0; row < kHeight; ++row)
-      for (int column = 0; column < kWidth; ++column) {
+      for (int column = 0; column < kWidth; ++column, ++i) {
         const bool is_inside = row > 0 && column > 0 && row + 1 < kHeight && column + 1 < kWidth;
-        const auto i = static_cast<std::size_t>(row * kWidth + column);
         // The weights' sum over a step of two pixels, divided by 8.
         EXPECT_EQ(along_columns[i], is_inside ? 3.0f : 0.0f) << column << ", " << row;
         EXPECT_EQ(along_rows[i], is_inside ? -2.0f : 0.0f) << column << ", " << row;
