@@ -13,8 +13,9 @@ Usage: tests/benchmark/run.sh [--ct FILE] [--rig RIG] [--camera NAME] [--out DIR
                               [--skip-build]
 
 Measures casting, encoding, look-up and whole fields on this machine, which should do nothing else meanwhile, and writes
-DIR/benchmark.json, DIR/benchmark.md (tables) and DIR/benchmark.csv (their numbers). What is compared alternates within one run of one program; medians of several
-rounds are shown. Takes about ten minutes on two cores, half as long again for a CT of 512x512x275 voxels.
+DIR/benchmark.json, DIR/benchmark.md (tables) and DIR/benchmark.csv (their numbers). What is compared alternates within
+one run of one program; medians of several rounds are shown. Takes about ten minutes on two cores, half as long again
+for a CT of 512x512x275 voxels.
 
   --ct FILE       the CT [the default study's skull]
   --rig, --camera the cameras and which of them [c-arm-12in, AP]
