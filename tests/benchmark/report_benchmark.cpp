@@ -172,18 +172,9 @@ std::string fields_table(const json& sections) {
 std::string phases_table(const json& jobs, const std::string& title) {
   const std::vector<std::string> phases{
       "read", "resample", "cast", "train", "fit filter", "encode", "write"};
-  std::string text = "## " + title + "\n\n" +
-                     header({"field",
-                             "ranks",
-                             "total",
-                             "start and end",
-                             "read",
-                             "resample",
-                             "cast",
-                             "train",
-                             "fit filter",
-                             "encode",
-                             "write"});
+  std::vector<std::string> titles{"field", "ranks", "total", "start and end"};
+  titles.insert(titles.end(), phases.begin(), phases.end());
+  std::string text = "## " + title + "\n\n" + header(titles);
   for (const json& job : jobs) {
     const json& seconds = job.at("phase_seconds");
     const double total = job.at("seconds").at("median");
