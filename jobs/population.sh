@@ -141,7 +141,7 @@ register() {
   shift 2
   stage "$folder" "$output/runs/$folder/summary.json" run_ranks "$ranks" "$bin/af-evaluate" registration \
     --study "$study" --gold study --intervals "$intervals" --starts-per-interval "$starts" --seed "$seed" \
-    --start-rule within-range --no-uncertainty --no-pictures "$@" -o "$output/runs/$folder"
+    --start-rule within-range --no-pictures "$@" -o "$output/runs/$folder"
 }
 
 # study_patient NAME SOURCE: every condition of one patient.
@@ -164,7 +164,7 @@ study_patient() {
   done
   if ((done_patients < raycast_patients)) && [[ ",$variants," == *,clean,* ]]; then
     register "clean-2-robust-by-both/$patient" "$output/studies/$patient-clean-2.toml" --preset robust --renderer both \
-      --raycast-intervals "$raycast_intervals" --raycast-starts-per-interval 1
+      --raycast-intervals "$raycast_intervals" --raycast-starts-per-interval 1 --step-mm 0.5 --no-uncertainty
   fi
   done_patients=$((done_patients + 1))
 }
@@ -211,7 +211,7 @@ submit_conditions() {
           printf '%q ' "${field_options[@]}" --max-rotation-deg "$max_rotation_deg" --max-translation-mm "$max_translation_mm"
           printf ')\nevaluate_options=('
           printf '%q ' --preset "$preset" --gold study --intervals "$intervals" --starts-per-interval "$starts" \
-            --seed "$seed" --start-rule within-range --no-uncertainty --no-pictures
+            --seed "$seed" --start-rule within-range --no-pictures
           printf ')\n'
         } >"$output/$condition-resources.sh"
         "$af_root/jobs/submit.sh" "$output/$variant-$count.toml" --resources "$output/$condition-resources.sh" \

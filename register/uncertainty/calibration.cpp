@@ -22,7 +22,7 @@ struct InflationRow {
   Inflation tre;
 };
 
-/// By `jobs/uncertainty.sh`, on patients of odd numbers; mi's is an earlier fit to cases of one
+/// By `jobs/uncertainty.py`, on patients of odd numbers; mi's is an earlier fit to cases of one
 /// phantom (docs/uncertainty.md). The last row is for measures that were not fitted: the most
 /// cautious of them.
 constexpr std::array kInflation = {

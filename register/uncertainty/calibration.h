@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the measured registrations of jobs/uncertainty.sh say of predictions: constants that are
+// What the measured registrations of jobs/uncertainty.py say of predictions: constants that are
 // fitted on one half of the cases and judged on the other (docs/uncertainty.md).
 #pragma once
 

@@ -1,21 +1,18 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Fits the constants of register/uncertainty/calibration.cpp to registrations of known truth, on the patients of odd
-numbers, and prints how well they do on the others.
-
-    jobs/fit-uncertainty.py MEASURE:VARIANT=registrations.csv ... [--judge] [--csv OUT.csv] [--commit HASH]
-
-With --judge nothing is fitted: all patients are judged by what the programs foretold.
-
-MEASURE is that of the last stage: rg, gc, mi. VARIANT says what the X-rays are like. Cases are named PATIENT-POSE, a
-drawn patient KIND-NUMBER; others, which have no number, are never fitted. Needs nothing but Python.
-"""
+"""Whether registrations know their own errors: fits the constants of register/uncertainty/calibration.cpp to the
+registrations of a population study (jobs/population.sh), whose truth is known, on the patients of odd numbers, and
+prints how well they do on the others. Needs nothing but Python."""
+import argparse
 import csv
 import math
+import pathlib
 import random
 import re
 import sys
 
+# The measures that the presets end with.
+MEASURE_OF = {"robust": "rg", "fast": "gc", "paper": "mi"}
 REGION_95 = 12.591587243743977  # chi-square, six degrees of freedom
 SUCCESS_TRE_MM = 2.5
 NEAR_MM, FAR_MM = 0.001, 20.0
@@ -41,8 +38,7 @@ class Row:
         self.background = number("judge_fine_background")
         inflation = number("covariance_inflation")
         self.distance = number("squared_distance") * inflation  # by the sandwich alone
-        # Tables of programs before TREs had a factor of their own.
-        tre_inflation = number("tre_inflation") if "tre_inflation" in cells else inflation
+        tre_inflation = number("tre_inflation")
         scale = 1.0 / math.sqrt(tre_inflation) if tre_inflation > 0 else math.nan
         self.tre_rms = number("predicted_tre_rms_mm") * scale
         self.tre_95 = number("predicted_tre_95_mm") * scale
@@ -263,56 +259,99 @@ def take_as_stated(rows):
         row.confidence = row.stated_confidence
 
 
+def options():
+    parser = argparse.ArgumentParser(
+        description=__doc__, epilog="Exit codes: 0 done, 2 wrong options, 4 no registrations, or none with predictions."
+    )
+    parser.add_argument("population", nargs="+", type=pathlib.Path, help="output folders of jobs/population.sh")
+    parser.add_argument("--presets", default="robust,fast", help="comma separated [%(default)s]")
+    parser.add_argument("--variants", default="clean,all", help="comma separated, as in the population [%(default)s]")
+    parser.add_argument("--views", type=int, choices=(1, 2), default=2, help="registrations from so many [%(default)s]")
+    parser.add_argument("--judge", action="store_true", help="fit nothing: judge all patients by what the programs foretold")
+    parser.add_argument("--csv", metavar="FILE", help="the table, as CSV")
+    parser.add_argument("--commit", metavar="HASH", help="a last column of it: the commit of the programs")
+    chosen = parser.parse_args()
+    chosen.presets = chosen.presets.split(",")
+    chosen.variants = chosen.variants.split(",")
+    for preset in chosen.presets:
+        if preset not in MEASURE_OF:
+            parser.error(f"--presets names '{preset}': must be some of {', '.join(MEASURE_OF)}")
+    return chosen
+
+
+def refuse(path, why):
+    print(f"error: {path}: {why}", file=sys.stderr)
+    sys.exit(4)
+
+
+def rows_of(path, measure, variant):
+    with open(path, newline="", encoding="utf-8") as file:
+        table = csv.DictReader(file)
+        if "squared_distance" not in (table.fieldnames or []):
+            refuse(path, "has no column 'squared_distance': made with --no-uncertainty, or not a table of registrations")
+        return [Row(measure, variant, cells) for cells in table]
+
+
+def rows_of_populations(chosen):
+    """All registrations of the runs CONDITION/PATIENT of all folders; a patient may be in one of them alone."""
+    rows, seen = [], {}
+    for preset in chosen.presets:
+        for variant in chosen.variants:
+            condition = f"{variant}-{chosen.views}-{preset}"
+            for folder in chosen.population:
+                tables = sorted(folder.glob(f"runs/{condition}/*/registrations.csv"))
+                if not tables:
+                    refuse(folder, f"holds no runs/{condition}/PATIENT/registrations.csv of jobs/population.sh")
+                for path in tables:
+                    run = f"{condition}/{path.parent.name}"
+                    if run in seen:
+                        refuse(path, f"{seen[run]} has the same patient, too")
+                    seen[run] = path
+                    rows += rows_of(path, MEASURE_OF[preset], variant)
+    return rows
+
+
+def tables_of(rows, measures, halves):
+    """How well predictions hold: of every half, measure and kind of X-rays."""
+    table = [
+        summary(label, half, [r for r in rows if r.is_for_fit == is_for_fit and label in ("all", r.measure)])
+        for half, is_for_fit in halves.items()
+        for label in measures + ["all"]
+    ]
+    judged = [row for row in rows if not row.is_for_fit]
+    for variant in dict.fromkeys(row.variant for row in rows):
+        table.append(summary("all, " + variant, list(halves)[-1], [r for r in judged if r.variant == variant]))
+    return table
+
+
+def write_csv(path, table, commit):
+    with open(path, "w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, list(table[0]) + (["commit"] if commit else []), lineterminator="\n")
+        writer.writeheader()
+        for entry in table:
+            cells = {k: f"{v:.4f}" if isinstance(v, float) else v for k, v in entry.items()}
+            writer.writerow({**cells, "commit": commit} if commit else cells)
+
+
 def main():
-    words = sys.argv[1:]
-    is_judging = "--judge" in words
-    if is_judging:
-        words.remove("--judge")
-    out = commit = None
-    if "--csv" in words:
-        at = words.index("--csv")
-        out = words[at + 1]
-        del words[at : at + 2]
-    if "--commit" in words:
-        at = words.index("--commit")
-        commit = words[at + 1]
-        del words[at : at + 2]
-    if not words or not all(re.match(r"[^:=]+:[^:=]+=.", word) for word in words):
-        sys.exit(__doc__)
-    rows = []
-    for word in words:
-        label, path = word.split("=", 1)
-        with open(path, newline="", encoding="utf-8") as file:
-            rows += [Row(*label.split(":"), cells) for cells in csv.DictReader(file)]
+    chosen = options()
+    rows = rows_of_populations(chosen)
     measures = list(dict.fromkeys(row.measure for row in rows))
-    if is_judging:
+    if chosen.judge:
         take_as_stated(rows)
         halves = {"all, as stated": False}
     else:
         fit(rows, measures)
         halves = {"odd, fitted": True, "even, unseen": False}
-    judged = list(halves)[-1]
-    table = []
-    for half, is_for_fit in halves.items():
-        for label in measures + ["all"]:
-            mine = [r for r in rows if r.is_for_fit == is_for_fit and label in ("all", r.measure)]
-            table.append(summary(label, half, mine))
-    for variant in dict.fromkeys(row.variant for row in rows):
-        mine = [r for r in rows if not r.is_for_fit and r.variant == variant]
-        table.append(summary("all, " + variant, judged, mine))
+    table = tables_of(rows, measures, halves)
     print()
     for entry in table:
         print("  ".join(f"{k} {v:.3f}" if isinstance(v, float) else f"{k} {v}" for k, v in entry.items()))
     for measure in measures + ["all"]:
-        print(f"\n{judged}: {measure}")
+        print(f"\n{list(halves)[-1]}: {measure}")
         print("\n".join(reliability([r for r in rows if not r.is_for_fit and measure in ("all", r.measure)])))
-    if out:
-        with open(out, "w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, list(table[0]) + (["commit"] if commit else []), lineterminator="\n")
-            writer.writeheader()
-            for entry in table:
-                cells = {k: f"{v:.4f}" if isinstance(v, float) else v for k, v in entry.items()}
-                writer.writerow({**cells, "commit": commit} if commit else cells)
+    if chosen.csv:
+        write_csv(chosen.csv, table, chosen.commit)
 
 
 if __name__ == "__main__":
